@@ -1,0 +1,167 @@
+//! The arm: a serial chain of revolute joints, each with a link, a drive and limits.
+
+use nalgebra::{Matrix3, Rotation3, Vector3};
+
+use super::inertia::LinkInertia;
+
+/// A serial arm. Joint `i` (0-based) connects body `i − 1` (the base for `i = 0`) to body `i`.
+///
+/// Frame `i` is fixed in body `i`, has its origin on joint axis `i` and its z axis along it, so
+/// that `R_i(q) = placement.rotation · Rot_z(q)` maps coordinates of frame `i` into its parent's.
+/// Immutable once built: algorithms take `&Arm` and a workspace.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Arm {
+    /// Name as given to `--robot`.
+    pub name: String,
+    /// Gravity in the base frame, m/s².
+    pub gravity_m_s2: Vector3<f64>,
+    /// ε of the regularised sign tanh(q̇/ε) of the paper's (3), rad/s.
+    pub friction_epsilon_rad_s: f64,
+    /// Joints from base to flange.
+    pub joints: Vec<Joint>,
+    /// Where the arm must not touch itself or the floor.
+    pub clearance: Clearance,
+}
+
+/// One revolute joint with the body it carries and the drive that moves it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Joint {
+    /// Name of the joint.
+    pub name: String,
+    /// Pose of the joint frame at q = 0 in the parent's joint frame.
+    pub placement: Placement,
+    /// Inertial parameters of the moved body about the joint frame.
+    pub link: LinkInertia,
+    /// Motor, gear and friction.
+    pub drive: Drive,
+    /// What the joint may do.
+    pub limits: Limits,
+}
+
+/// A rigid transform: `p_parent = rotation · p_child + translation_m`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Placement {
+    /// Child axes in parent coordinates.
+    pub rotation: Matrix3<f64>,
+    /// Child origin in parent coordinates, m.
+    pub translation_m: Vector3<f64>,
+}
+
+impl Placement {
+    /// From URDF-style fixed-axis roll, pitch, yaw (rad) and a translation (m).
+    pub fn from_xyz_rpy(xyz_m: [f64; 3], rpy_rad: [f64; 3]) -> Self {
+        let [r, p, y] = rpy_rad;
+        Self {
+            rotation: Rotation3::from_euler_angles(r, p, y).into_inner().map(snap),
+            translation_m: Vector3::from(xyz_m),
+        }
+    }
+
+    /// No rotation, no translation.
+    pub fn identity() -> Self {
+        Self { rotation: Matrix3::identity(), translation_m: Vector3::zeros() }
+    }
+
+    /// `self ∘ inner`: first `inner`, then `self`.
+    pub fn compose(&self, inner: &Self) -> Self {
+        Self {
+            rotation: self.rotation * inner.rotation,
+            translation_m: self.rotation * inner.translation_m + self.translation_m,
+        }
+    }
+
+    /// The transform that undoes this one.
+    pub fn inverse(&self) -> Self {
+        let rotation = self.rotation.transpose();
+        Self { rotation, translation_m: -(rotation * self.translation_m) }
+    }
+}
+
+/// Rotations by multiples of π/2 carry round-off of 6e-17 where a 0 or ±1 is meant. A structural
+/// zero that is not exactly zero would blur the rank of the regressor, so such entries are snapped.
+fn snap(x: f64) -> f64 {
+    if (x - x.round()).abs() < 4.0 * f64::EPSILON { x.round() } else { x }
+}
+
+/// Motor, gear and friction of one joint, all seen from the joint side.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drive {
+    /// Reflected rotor inertia i_G² C_M of the paper's (4), kg m².
+    pub rotor_inertia_kg_m2: f64,
+    /// Viscous friction rv of the paper's (2), Nm s/rad.
+    pub viscous_nm_s_rad: f64,
+    /// Coulomb friction rc of the paper's (2), Nm.
+    pub coulomb_nm: f64,
+    /// Gear ratio i_G.
+    pub gear_ratio: f64,
+    /// Motor torque constant k, Nm/A at the motor shaft.
+    pub torque_constant_nm_a: f64,
+}
+
+impl Drive {
+    /// i_G·k: joint torque per ampere, Nm/A.
+    pub fn gain_nm_a(&self) -> f64 {
+        self.gear_ratio * self.torque_constant_nm_a
+    }
+}
+
+/// What one joint may do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Lowest and highest angle, rad.
+    pub position_rad: [f64; 2],
+    /// Largest speed, rad/s.
+    pub velocity_rad_s: f64,
+    /// Largest acceleration, rad/s².
+    pub acceleration_rad_s2: f64,
+    /// Largest drive torque at the joint, Nm.
+    pub torque_nm: f64,
+}
+
+/// Collision geometry: capsules on the bodies, the pairs to keep apart, and the floor.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Clearance {
+    /// Capsules fixed in bodies.
+    pub capsules: Vec<Capsule>,
+    /// Pairs of indices into `capsules` whose distance is watched.
+    pub pairs: Vec<[usize; 2]>,
+    /// Height of the floor in the base frame, m; `None`: no floor.
+    pub floor_z_m: Option<f64>,
+}
+
+/// A segment with a radius, fixed in a body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Capsule {
+    /// 0 = base, i = body of joint i (1-based), so that 1…N are the moving bodies.
+    pub body: usize,
+    /// Segment ends in the body's joint frame (base frame for body 0), m.
+    pub from_m: Vector3<f64>,
+    /// Other end, m.
+    pub to_m: Vector3<f64>,
+    /// Radius, m.
+    pub radius_m: f64,
+}
+
+impl Arm {
+    /// Number of joints N.
+    pub fn dof(&self) -> usize {
+        self.joints.len()
+    }
+
+    /// Pose of every joint frame in the base frame at configuration `q_rad` (length N).
+    pub fn frames(&self, q_rad: &[f64]) -> Vec<Placement> {
+        let mut pose = Placement::identity();
+        self.joints
+            .iter()
+            .zip(q_rad)
+            .map(|(joint, &q)| {
+                let turn = Placement {
+                    rotation: Rotation3::from_axis_angle(&Vector3::z_axis(), q).into_inner(),
+                    translation_m: Vector3::zeros(),
+                };
+                pose = pose.compose(&joint.placement).compose(&turn);
+                pose
+            })
+            .collect()
+    }
+}

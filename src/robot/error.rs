@@ -1,0 +1,49 @@
+//! What can be wrong with a description of an arm.
+
+use thiserror::Error;
+
+/// A description of an arm that cannot be used, with the place and the value.
+#[derive(Debug, Error)]
+pub enum RobotError {
+    /// `--robot` is neither built in nor a file.
+    #[error(
+        "unknown robot \"{name}\": built in are {}; or give a .urdf or .toml file",
+        super::file::built_in_names().collect::<Vec<_>>().join(", ")
+    )]
+    UnknownName {
+        /// What was asked for.
+        name: String,
+    },
+    /// The file could not be read.
+    #[error("{file}: {source}")]
+    Read {
+        /// The file.
+        file: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Not valid TOML, or a key that robot files do not have.
+    #[error("{file}: {message}")]
+    Toml {
+        /// The file.
+        file: String,
+        /// The parser's message with line and key.
+        message: String,
+    },
+    /// Not valid URDF.
+    #[error("{file}: not readable as URDF: {message}")]
+    Urdf {
+        /// The file.
+        file: String,
+        /// The parser's message.
+        message: String,
+    },
+    /// Read, but not an arm this program can work with.
+    #[error("{file}: {what}")]
+    Invalid {
+        /// The file.
+        file: String,
+        /// What is wrong, where, and what to do.
+        what: String,
+    },
+}

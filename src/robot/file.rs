@@ -1,0 +1,277 @@
+//! Robot files: one TOML per arm, and the arms built into the program.
+
+use nalgebra::{Matrix3, Vector3};
+use serde::Deserialize;
+
+use super::arm::{Arm, Capsule, Clearance, Drive, Joint, Limits, Placement};
+use super::error::RobotError;
+use super::inertia::LinkInertia;
+
+/// Arms built in, by the name given to `--robot`.
+const BUILT_IN: [(&str, &str); 4] = [
+    ("ur5", include_str!("../../robots/ur5.toml")),
+    ("ur10e", include_str!("../../robots/ur10e.toml")),
+    ("ur3e", include_str!("../../robots/ur3e.toml")),
+    ("ur5e", include_str!("../../robots/ur5e.toml")),
+];
+
+/// Names of the arms built in.
+pub fn built_in_names() -> impl Iterator<Item = &'static str> {
+    BUILT_IN.iter().map(|(name, _)| *name)
+}
+
+impl Arm {
+    /// One of the arms built in.
+    pub fn built_in(name: &str) -> Result<Self, RobotError> {
+        let (_, text) = BUILT_IN
+            .iter()
+            .find(|(known, _)| *known == name)
+            .ok_or_else(|| RobotError::UnknownName { name: name.to_owned() })?;
+        Self::from_toml(text, name)
+    }
+
+    /// What `--robot` accepts: a built-in name, a `.urdf` file or a `.toml` robot file.
+    pub fn load(name_or_path: &str) -> Result<Self, RobotError> {
+        let path = std::path::Path::new(name_or_path);
+        let read = || {
+            std::fs::read_to_string(path)
+                .map_err(|source| RobotError::Read { file: name_or_path.to_owned(), source })
+        };
+        match path.extension().and_then(|e| e.to_str()) {
+            Some("urdf") => super::urdf::arm_from_urdf(&read()?, name_or_path),
+            Some("toml") => Self::from_toml(&read()?, name_or_path),
+            _ => Self::built_in(name_or_path),
+        }
+    }
+
+    /// From the text of a robot file; `source` names it in messages.
+    pub fn from_toml(text: &str, source: &str) -> Result<Self, RobotError> {
+        let file: RobotFile = toml::from_str(text)
+            .map_err(|e| RobotError::Toml { file: source.to_owned(), message: e.to_string() })?;
+        file.into_arm(source)
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RobotFile {
+    name: String,
+    #[serde(default = "standard_gravity")]
+    gravity_m_s2: [f64; 3],
+    #[serde(default = "default_epsilon")]
+    friction_epsilon_rad_s: f64,
+    floor_z_m: Option<f64>,
+    #[serde(default)]
+    collision_pairs: Vec<[String; 2]>,
+    #[serde(rename = "joint")]
+    joints: Vec<JointEntry>,
+    #[serde(default, rename = "capsule")]
+    capsules: Vec<CapsuleEntry>,
+}
+
+fn standard_gravity() -> [f64; 3] {
+    [0.0, 0.0, -9.81]
+}
+
+pub(super) fn default_epsilon() -> f64 {
+    0.02
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct JointEntry {
+    name: String,
+    xyz_m: [f64; 3],
+    rpy_rad: [f64; 3],
+    mass_kg: f64,
+    com_m: [f64; 3],
+    inertia_com_kg_m2: Tensor,
+    rotor_inertia_kg_m2: f64,
+    viscous_nm_s_rad: f64,
+    coulomb_nm: f64,
+    gear_ratio: f64,
+    torque_constant_nm_a: f64,
+    position_rad: [f64; 2],
+    velocity_rad_s: f64,
+    acceleration_rad_s2: f64,
+    torque_nm: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Tensor {
+    xx: f64,
+    xy: f64,
+    xz: f64,
+    yy: f64,
+    yz: f64,
+    zz: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CapsuleEntry {
+    name: String,
+    body: usize,
+    from_m: [f64; 3],
+    to_m: [f64; 3],
+    radius_m: f64,
+}
+
+impl RobotFile {
+    fn into_arm(self, source: &str) -> Result<Arm, RobotError> {
+        let fault = |what: String| RobotError::Invalid { file: source.to_owned(), what };
+        if self.joints.is_empty() {
+            return Err(fault("it has no [[joint]]".into()));
+        }
+        if !(self.friction_epsilon_rad_s > 0.0 && self.friction_epsilon_rad_s.is_finite()) {
+            return Err(fault(format!(
+                "friction_epsilon_rad_s = {} must be positive",
+                self.friction_epsilon_rad_s
+            )));
+        }
+        let dof = self.joints.len();
+        let find = |name: &str| {
+            self.capsules.iter().position(|c| c.name == name).ok_or_else(|| {
+                fault(format!("collision_pairs names the capsule \"{name}\", which is not there"))
+            })
+        };
+        let pairs = self
+            .collision_pairs
+            .iter()
+            .map(|[a, b]| Ok([find(a)?, find(b)?]))
+            .collect::<Result<Vec<_>, RobotError>>()?;
+        for c in &self.capsules {
+            if c.body > dof || c.radius_m <= 0.0 {
+                return Err(fault(format!(
+                    "capsule \"{}\": body {} of 0…{dof}, radius {} m",
+                    c.name, c.body, c.radius_m
+                )));
+            }
+        }
+        let clearance = Clearance {
+            capsules: self
+                .capsules
+                .iter()
+                .map(|c| Capsule {
+                    body: c.body,
+                    from_m: Vector3::from(c.from_m),
+                    to_m: Vector3::from(c.to_m),
+                    radius_m: c.radius_m,
+                })
+                .collect(),
+            pairs,
+            floor_z_m: self.floor_z_m,
+        };
+        let joints = self
+            .joints
+            .into_iter()
+            .map(|entry| entry.into_joint(source))
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(Arm {
+            name: self.name,
+            gravity_m_s2: Vector3::from(self.gravity_m_s2),
+            friction_epsilon_rad_s: self.friction_epsilon_rad_s,
+            joints,
+            clearance,
+        })
+    }
+}
+
+impl JointEntry {
+    fn into_joint(self, source: &str) -> Result<Joint, RobotError> {
+        let t = &self.inertia_com_kg_m2;
+        let inertia = Matrix3::new(t.xx, t.xy, t.xz, t.xy, t.yy, t.yz, t.xz, t.yz, t.zz);
+        let link = LinkInertia::from_com(self.mass_kg, Vector3::from(self.com_m), inertia);
+        let fault = |what: String| RobotError::Invalid {
+            file: source.to_owned(),
+            what: format!("joint \"{}\": {what}", self.name),
+        };
+        let margin = link.consistency_margin();
+        if margin.is_nan() || margin <= 0.0 {
+            return Err(fault(format!(
+                "no body has this mass, centre of mass and inertia tensor (smallest eigenvalue of \
+                 the pseudo-inertia {margin:.3e}, must be positive)"
+            )));
+        }
+        for (name, value) in [
+            ("rotor_inertia_kg_m2", self.rotor_inertia_kg_m2),
+            ("viscous_nm_s_rad", self.viscous_nm_s_rad),
+            ("coulomb_nm", self.coulomb_nm),
+        ] {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(fault(format!("{name} = {value} must not be negative")));
+            }
+        }
+        for (name, value) in [
+            ("gear_ratio", self.gear_ratio),
+            ("torque_constant_nm_a", self.torque_constant_nm_a),
+            ("velocity_rad_s", self.velocity_rad_s),
+            ("acceleration_rad_s2", self.acceleration_rad_s2),
+            ("torque_nm", self.torque_nm),
+        ] {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(fault(format!("{name} = {value} must be positive")));
+            }
+        }
+        let [low, high] = self.position_rad;
+        if low.is_nan() || high.is_nan() || low >= high {
+            return Err(fault(format!("position_rad = [{low}, {high}] must be [low, high]")));
+        }
+        Ok(Joint {
+            placement: Placement::from_xyz_rpy(self.xyz_m, self.rpy_rad),
+            link,
+            drive: Drive {
+                rotor_inertia_kg_m2: self.rotor_inertia_kg_m2,
+                viscous_nm_s_rad: self.viscous_nm_s_rad,
+                coulomb_nm: self.coulomb_nm,
+                gear_ratio: self.gear_ratio,
+                torque_constant_nm_a: self.torque_constant_nm_a,
+            },
+            limits: Limits {
+                position_rad: self.position_rad,
+                velocity_rad_s: self.velocity_rad_s,
+                acceleration_rad_s2: self.acceleration_rad_s2,
+                torque_nm: self.torque_nm,
+            },
+            name: self.name,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_built_in_arm_is_physically_consistent() {
+        for name in built_in_names() {
+            let arm = Arm::built_in(name).unwrap();
+            assert_eq!(arm.dof(), 6, "{name}");
+            assert_eq!(arm.name, name);
+            for joint in &arm.joints {
+                assert!(joint.link.consistency_margin() > 0.0, "{name} {}", joint.name);
+                let r = joint.placement.rotation;
+                assert!((r.transpose() * r - Matrix3::identity()).norm() < 1e-12, "{name}");
+                assert!((r.determinant() - 1.0).abs() < 1e-12, "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_unknown_key_is_an_error_that_names_it() {
+        let text = include_str!("../../robots/ur5.toml").replace("gear_ratio", "gear_ration");
+        let message = Arm::from_toml(&text, "x.toml").unwrap_err().to_string();
+        assert!(message.contains("gear_ration"), "{message}");
+    }
+
+    #[test]
+    fn a_tensor_no_body_can_have_is_refused() {
+        let text = include_str!("../../robots/ur5.toml").replacen("xx = ", "xx = 9", 1);
+        let message = Arm::from_toml(&text, "x.toml").unwrap_err().to_string();
+        assert!(
+            message.contains("shoulder_pan") && message.contains("pseudo-inertia"),
+            "{message}"
+        );
+    }
+}

@@ -1,0 +1,17 @@
+//! What an arm is: joints, frames, links, drives, limits and clearance.
+//!
+//! Enters: a built-in name, a robot file (TOML) or a URDF. Leaves: an immutable [`Arm`], and
+//! [`JointSignals`], the shape in which every later chapter holds one number per joint and sample.
+
+mod arm;
+mod error;
+mod file;
+mod inertia;
+mod signals;
+mod urdf;
+
+pub use arm::{Arm, Capsule, Clearance, Drive, Joint, Limits, Placement};
+pub use error::RobotError;
+pub use file::built_in_names;
+pub use inertia::LinkInertia;
+pub use signals::JointSignals;

@@ -1,0 +1,82 @@
+//! One number per joint and sample, stored joint by joint.
+
+/// Samples of all joints of one quantity (angle, velocity, torque …), unit stated by whoever owns it.
+///
+/// Storage is joint-major: `joint(j)` is one contiguous time series, which is what filters,
+/// spectra and the batched regressor read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointSignals {
+    joints: usize,
+    samples: usize,
+    data: Vec<f64>,
+}
+
+impl JointSignals {
+    /// All zeros, `joints` × `samples`.
+    pub fn zeros(joints: usize, samples: usize) -> Self {
+        Self { joints, samples, data: vec![0.0; joints * samples] }
+    }
+
+    /// Value of `f(joint, sample)` everywhere.
+    pub fn from_fn(joints: usize, samples: usize, mut f: impl FnMut(usize, usize) -> f64) -> Self {
+        let mut out = Self::zeros(joints, samples);
+        for j in 0..joints {
+            for (k, value) in out.joint_mut(j).iter_mut().enumerate() {
+                *value = f(j, k);
+            }
+        }
+        out
+    }
+
+    /// Number of joints.
+    pub fn joints(&self) -> usize {
+        self.joints
+    }
+
+    /// Number of samples of every joint.
+    pub fn samples(&self) -> usize {
+        self.samples
+    }
+
+    /// Time series of joint `j` (0-based).
+    pub fn joint(&self, j: usize) -> &[f64] {
+        &self.data[j * self.samples..(j + 1) * self.samples]
+    }
+
+    /// Mutable time series of joint `j` (0-based).
+    pub fn joint_mut(&mut self, j: usize) -> &mut [f64] {
+        &mut self.data[j * self.samples..(j + 1) * self.samples]
+    }
+
+    /// All joints at sample `k`, copied into `out` (length = joints).
+    pub fn sample_into(&self, k: usize, out: &mut [f64]) {
+        for (j, value) in out.iter_mut().enumerate() {
+            *value = self.data[j * self.samples + k];
+        }
+    }
+
+    /// Overwrites sample `k` of all joints.
+    pub fn set_sample(&mut self, k: usize, values: &[f64]) {
+        for (j, value) in values.iter().enumerate() {
+            self.data[j * self.samples + k] = *value;
+        }
+    }
+
+    /// The samples `range`, as a new set of signals.
+    pub fn slice(&self, range: std::ops::Range<usize>) -> Self {
+        Self::from_fn(self.joints, range.len(), |j, k| self.joint(j)[range.start + k])
+    }
+
+    /// Each joint's series replaced by `f(series)`; all results must have one length.
+    pub fn map_joints(&self, mut f: impl FnMut(usize, &[f64]) -> Vec<f64>) -> Self {
+        let mut data = Vec::new();
+        let mut samples = 0;
+        for j in 0..self.joints {
+            let series = f(j, self.joint(j));
+            assert!(j == 0 || series.len() == samples, "joints must keep one common length");
+            samples = series.len();
+            data.extend(series);
+        }
+        Self { joints: self.joints, samples, data }
+    }
+}
