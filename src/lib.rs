@@ -2,4 +2,5 @@
 //! checked against a simulated truth, and a diagnosis of what the model gets wrong.
 #![warn(missing_docs)]
 
+pub mod dynamics;
 pub mod robot;

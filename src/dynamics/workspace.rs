@@ -1,0 +1,27 @@
+//! Scratch memory of the algorithms, made once and used for every sample.
+
+use super::model::Model;
+use super::newton_euler::BodyMotion;
+use super::real::Real;
+use super::vector::Vec3;
+
+/// Scratch for one arm and one scalar type. Contents between calls mean nothing.
+#[derive(Debug, Clone)]
+pub struct Workspace<T> {
+    pub(super) motion: Vec<BodyMotion<T>>,
+    /// Force and moment about the frame's origin, in the body's frame.
+    pub(super) wrench: Vec<(Vec3<T>, Vec3<T>)>,
+    /// Jacobian of one body: per ancestor joint (angular, linear) velocity per unit joint speed.
+    pub(super) jacobian: Vec<(Vec3<T>, Vec3<T>)>,
+}
+
+impl<T: Real> Workspace<T> {
+    /// Scratch for `model`.
+    pub fn new(model: &Model) -> Self {
+        let zero = T::constant(0.0);
+        let v = Vec3::zero();
+        let rest = BodyMotion { sin_cos: (zero, zero), omega: v, alpha: v, accel: v };
+        let n = model.dof();
+        Self { motion: vec![rest; n], wrench: vec![(v, v); n], jacobian: vec![(v, v); n] }
+    }
+}
