@@ -3,4 +3,5 @@
 #![warn(missing_docs)]
 
 pub mod dynamics;
+pub mod excitation;
 pub mod robot;
