@@ -2,6 +2,7 @@
 //! checked against a simulated truth, and a diagnosis of what the model gets wrong.
 #![warn(missing_docs)]
 
+pub mod base;
 pub mod dynamics;
 pub mod excitation;
 pub mod robot;

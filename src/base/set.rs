@@ -1,0 +1,206 @@
+//! The base parameters: which combinations can be known at all.
+
+use nalgebra::{DMatrix, DVector};
+use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
+use thiserror::Error;
+
+use super::parameterisation::{Parameterisation, Terms, evaluate};
+use crate::dynamics::{Model, Workspace, regressor};
+use crate::robot::Arm;
+
+/// Columns of a parameterisation that are independent for almost every motion, and the
+/// combinations of parameters that go with them: the paper's (15).
+#[derive(Debug, Clone, PartialEq)]
+pub struct BaseSet {
+    /// The model's parameters.
+    pub parameterisation: Parameterisation,
+    /// Independent columns, left to right: indices into the parameterisation.
+    pub independent: Vec<usize>,
+    /// One base parameter per independent column; the kept parameter is the first term
+    /// (coefficient 1), the others are indices into the parameterisation.
+    pub combinations: Vec<Terms>,
+    /// How clearly the rank was told.
+    pub gap: RankGap,
+}
+
+/// Distance of a column from the span of those before it, relative to its length: smallest among
+/// the independent columns, largest among the dependent ones.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RankGap {
+    /// Smallest ratio that counted as independent.
+    pub smallest_independent: f64,
+    /// Largest ratio that counted as dependent; 0 if every column is independent.
+    pub largest_dependent: f64,
+}
+
+/// The rank of the regressor cannot be told from rounding errors.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[error(
+    "the rank is not clear: column {column} stands {ratio:.2e} of its length off the columns before \
+     it, between rounding ({DEPENDENT_BELOW:.0e}) and independence ({INDEPENDENT_ABOVE:.0e}); look \
+     for nearly parallel or nearly intersecting axes in the kinematics"
+)]
+pub struct AmbiguousRank {
+    /// Name of the column.
+    pub column: String,
+    /// Its relative distance.
+    pub ratio: f64,
+}
+
+/// Below this a column is dependent: rounding of 1200 rows at double precision stays under 1e-13.
+const DEPENDENT_BELOW: f64 = 1e-10;
+/// Above this a column is independent. Between the two the answer would be a guess.
+const INDEPENDENT_ABOVE: f64 = 1e-7;
+/// Random states stacked: 6 rows each, far more rows than columns.
+const STATES: usize = 200;
+/// Coefficients below this are rounding and are left out.
+const NEGLIGIBLE: f64 = 1e-9;
+
+impl BaseSet {
+    /// Finds the independent columns of `parameterisation` from left to right.
+    ///
+    /// The regressor is stacked over random states (fixed seed: the answer is the same every
+    /// time). Column by column, the part outside the span of the columns kept so far is computed
+    /// by Gram–Schmidt with reorthogonalisation: a column is kept when that part is not rounding,
+    /// otherwise its coefficients β on the kept columns say where its parameter goes:
+    /// p_B,k = p_k + Σ_d β_kd p_d.
+    pub fn find(arm: &Arm, parameterisation: Parameterisation) -> Result<Self, AmbiguousRank> {
+        let stacked = random_regressor(arm, &parameterisation);
+        let mut directions: Vec<DVector<f64>> = Vec::new();
+        let mut triangle: Vec<Vec<f64>> = Vec::new();
+        let mut independent: Vec<usize> = Vec::new();
+        let mut combinations: Vec<Terms> = Vec::new();
+        let mut gap = RankGap { smallest_independent: f64::INFINITY, largest_dependent: 0.0 };
+        let longest = stacked.column_iter().map(|c| c.norm()).fold(0.0, f64::max);
+        for (c, column) in stacked.column_iter().enumerate() {
+            let length = column.norm();
+            // A column of rounding errors (a structural zero) is no direction at all.
+            if length < DEPENDENT_BELOW * longest {
+                continue;
+            }
+            let mut rest = column.into_owned();
+            let mut coordinates = vec![0.0; directions.len()];
+            for _ in 0..2 {
+                for (direction, coordinate) in directions.iter().zip(&mut coordinates) {
+                    let along = direction.dot(&rest);
+                    rest.axpy(-along, direction, 1.0);
+                    *coordinate += along;
+                }
+            }
+            let outside = rest.norm();
+            let ratio = outside / length;
+            if ratio > INDEPENDENT_ABOVE {
+                gap.smallest_independent = gap.smallest_independent.min(ratio);
+                coordinates.push(outside);
+                triangle.push(coordinates);
+                directions.push(rest / outside);
+                independent.push(c);
+                combinations.push(vec![(c, 1.0)]);
+            } else if ratio < DEPENDENT_BELOW {
+                gap.largest_dependent = gap.largest_dependent.max(ratio);
+                let beta = back_substitute(&triangle, coordinates);
+                for (combination, beta) in combinations.iter_mut().zip(beta) {
+                    if beta.abs() > NEGLIGIBLE {
+                        combination.push((c, beta));
+                    }
+                }
+            } else {
+                return Err(AmbiguousRank { column: parameterisation.names[c].clone(), ratio });
+            }
+        }
+        Ok(Self { parameterisation, independent, combinations, gap })
+    }
+
+    /// Number of base parameters.
+    pub fn rank(&self) -> usize {
+        self.independent.len()
+    }
+
+    /// Name of base parameter `k`: that of its kept column.
+    pub fn name(&self, k: usize) -> &str {
+        &self.parameterisation.names[self.independent[k]]
+    }
+
+    /// SI unit of base parameter `k`.
+    pub fn unit(&self, k: usize) -> &'static str {
+        self.parameterisation.units[self.independent[k]]
+    }
+
+    /// The whole combination in words, such as `A3 - C3 + 0.1539 m4`.
+    pub fn formula(&self, k: usize) -> String {
+        let mut text = String::new();
+        for (position, &(index, coefficient)) in self.combinations[k].iter().enumerate() {
+            let sign = match (position, coefficient < 0.0) {
+                (0, _) => "",
+                (_, true) => " - ",
+                (_, false) => " + ",
+            };
+            text.push_str(sign);
+            if (coefficient.abs() - 1.0).abs() > NEGLIGIBLE {
+                text.push_str(&format!("{} ", significant(coefficient.abs(), 4)));
+            }
+            text.push_str(&self.parameterisation.names[index]);
+        }
+        text
+    }
+
+    /// Values of the base parameters for an arm with the given standard parameters.
+    pub fn values(&self, standard: &[f64]) -> Vec<f64> {
+        let parameters = self.parameterisation.values(standard);
+        self.combinations.iter().map(|terms| evaluate(terms, &parameters)).collect()
+    }
+
+    /// Column `k` of the base regressor as terms over the standard regressor's columns.
+    pub fn column(&self, k: usize) -> &Terms {
+        &self.parameterisation.to_standard[self.independent[k]]
+    }
+}
+
+/// `value` with `digits` significant digits, without exponent or trailing zeros.
+fn significant(value: f64, digits: i32) -> String {
+    let decimals = (digits - 1 - value.abs().log10().floor() as i32).max(0) as usize;
+    let text = format!("{value:.decimals$}");
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
+}
+
+/// Θ L over random states: |q| ≤ π rad, |q̇| ≤ π rad/s, |q̈| ≤ 10 rad/s².
+fn random_regressor(arm: &Arm, parameterisation: &Parameterisation) -> DMatrix<f64> {
+    let model = Model::new(arm);
+    let n = model.dof();
+    let mut ws = Workspace::new(&model);
+    let mut rng = ChaCha8Rng::seed_from_u64(0x00ba_5e5e);
+    let mut uniform = |bound: f64| -> Vec<f64> {
+        (0..n).map(|_| bound * (2.0 * rng.random::<f64>() - 1.0)).collect()
+    };
+    let mut stacked = DMatrix::zeros(STATES * n, parameterisation.count());
+    for state in 0..STATES {
+        let pi = std::f64::consts::PI;
+        let (q, qd, qdd) = (uniform(pi), uniform(pi), uniform(10.0));
+        let theta = regressor(&model, &mut ws, &q, &qd, &qdd);
+        for (c, terms) in parameterisation.to_standard.iter().enumerate() {
+            let mut column = stacked.column_mut(c);
+            let mut rows = column.rows_mut(state * n, n);
+            for &(standard, coefficient) in terms {
+                rows.axpy(coefficient, &theta.column(standard), 1.0);
+            }
+        }
+    }
+    stacked
+}
+
+/// β of R β = c, R given by its columns.
+fn back_substitute(columns: &[Vec<f64>], mut c: Vec<f64>) -> Vec<f64> {
+    for k in (0..c.len()).rev() {
+        c[k] /= columns[k][k];
+        let beta = c[k];
+        for (row, value) in c[..k].iter_mut().enumerate() {
+            *value -= columns[k][row] * beta;
+        }
+    }
+    c
+}
