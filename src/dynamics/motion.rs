@@ -14,6 +14,12 @@ pub struct Motion {
 }
 
 impl Motion {
+    /// All joints at zero, not moving.
+    pub fn at_rest(joints: usize, samples: usize) -> Self {
+        let zeros = JointSignals::zeros(joints, samples);
+        Self { q_rad: zeros.clone(), qd_rad_s: zeros.clone(), qdd_rad_s2: zeros }
+    }
+
     /// Number of samples.
     pub fn samples(&self) -> usize {
         self.q_rad.samples()

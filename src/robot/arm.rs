@@ -17,6 +17,9 @@ pub struct Arm {
     pub gravity_m_s2: Vector3<f64>,
     /// ε of the regularised sign tanh(q̇/ε) of the paper's (3), rad/s.
     pub friction_epsilon_rad_s: f64,
+    /// Whether identification fits a constant torque per joint (current sensor offset and unequal
+    /// friction in the two directions): yes for real arms, no for the simulated null model.
+    pub torque_offsets: bool,
     /// Joints from base to flange.
     pub joints: Vec<Joint>,
     /// Where the arm must not touch itself or the floor.

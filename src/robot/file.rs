@@ -60,6 +60,8 @@ struct RobotFile {
     gravity_m_s2: [f64; 3],
     #[serde(default = "default_epsilon")]
     friction_epsilon_rad_s: f64,
+    #[serde(default = "fits_offsets")]
+    torque_offsets: bool,
     floor_z_m: Option<f64>,
     #[serde(default)]
     collision_pairs: Vec<[String; 2]>,
@@ -67,6 +69,10 @@ struct RobotFile {
     joints: Vec<JointEntry>,
     #[serde(default, rename = "capsule")]
     capsules: Vec<CapsuleEntry>,
+}
+
+fn fits_offsets() -> bool {
+    true
 }
 
 fn standard_gravity() -> [f64; 3] {
@@ -172,6 +178,7 @@ impl RobotFile {
             name: self.name,
             gravity_m_s2: Vector3::from(self.gravity_m_s2),
             friction_epsilon_rad_s: self.friction_epsilon_rad_s,
+            torque_offsets: self.torque_offsets,
             joints,
             clearance,
         })

@@ -1,0 +1,83 @@
+//! Which base columns each joint's equation contains.
+
+use crate::base::{BaseSet, Terms};
+use crate::dynamics::{Model, Parameter, ParameterLayout, RegressorBlock, Workspace};
+
+/// For every joint, the base columns that are structurally non-zero in its row of Θ_B.
+///
+/// Joint j's torque does not depend on bodies before it, so that the wrist's equations have few
+/// columns: storing and eliminating only these saves three quarters of the work.
+#[derive(Debug, Clone)]
+pub struct ColumnPlan {
+    joints: Vec<Vec<PlannedColumn>>,
+    base_count: usize,
+}
+
+#[derive(Debug, Clone)]
+struct PlannedColumn {
+    /// Index of the base parameter.
+    base: usize,
+    /// Terms over the standard regressor's columns, non-zero for this joint only.
+    terms: Vec<(Parameter, f64)>,
+}
+
+impl ColumnPlan {
+    /// The plan of a base set for an arm of `model`'s shape.
+    pub fn new(model: &Model, set: &BaseSet) -> Self {
+        let layout = ParameterLayout::new(model.dof());
+        let mut block = RegressorBlock::new(model, 1);
+        let at_rest = crate::dynamics::Motion::at_rest(model.dof(), 1);
+        block.fill(model, &mut Workspace::new(model), &at_rest, 0..1);
+        let present = |joint: usize, terms: &Terms| -> Vec<(Parameter, f64)> {
+            terms
+                .iter()
+                .map(|&(index, coefficient)| (layout.parameter(index), coefficient))
+                .filter(|&(parameter, _)| block.column(joint, parameter).is_some())
+                .collect()
+        };
+        let joints = (0..model.dof())
+            .map(|joint| {
+                (0..set.rank())
+                    .map(|base| PlannedColumn { base, terms: present(joint, set.column(base)) })
+                    .filter(|column| !column.terms.is_empty())
+                    .collect()
+            })
+            .collect();
+        Self { joints, base_count: set.rank() }
+    }
+
+    /// Number of joints.
+    pub fn joints(&self) -> usize {
+        self.joints.len()
+    }
+
+    /// Number of base parameters.
+    pub fn base_count(&self) -> usize {
+        self.base_count
+    }
+
+    /// Base parameters in joint `joint`'s equation, ascending.
+    pub fn base_indices(&self, joint: usize) -> impl ExactSizeIterator<Item = usize> {
+        self.joints[joint].iter().map(|column| column.base)
+    }
+
+    /// Writes joint `joint`'s columns of the block, one after the other, into `out`
+    /// (columns × samples values).
+    pub fn copy_columns(&self, block: &RegressorBlock, joint: usize, out: &mut [f64]) {
+        let samples = block.samples();
+        for (column, out) in self.joints[joint].iter().zip(out.chunks_exact_mut(samples)) {
+            let mut first = true;
+            for &(parameter, coefficient) in &column.terms {
+                let Some(source) = block.column(joint, parameter) else { continue };
+                if first && coefficient == 1.0 {
+                    out.copy_from_slice(source);
+                } else {
+                    for (o, s) in out.iter_mut().zip(source) {
+                        *o = coefficient * s + if first { 0.0 } else { *o };
+                    }
+                }
+                first = false;
+            }
+        }
+    }
+}
