@@ -1,7 +1,20 @@
-//! How an arm is moved so that its parameters show.
+//! How to move so that the parameters can be known.
 //!
-//! Enters: limits and clearance of an arm. Leaves: a [`Reference`] that a controller can follow.
+//! Enters: an [`Arm`](crate::robot::Arm) with its limits and clearance model. Leaves: a
+//! [`Reference`], the motion asked of the arm as a function of time; in particular an
+//! [`Excitation`], the paper's periodic series (24) with a smooth run-in from rest, and the
+//! [`Margins`] it keeps from every limit.
 
+mod clearance;
+mod error;
+mod fourier;
+mod limits;
 mod reference;
+mod run_in;
 
+pub use clearance::{ClearanceModel, ClearanceWorkspace};
+pub use error::ExcitationError;
+pub use fourier::{FourierSeries, TRAJECTORY_SCHEMA, built_in_names};
+pub use limits::{LimitKind, Margin, Margins, Requirements, check};
 pub use reference::Reference;
+pub use run_in::Excitation;

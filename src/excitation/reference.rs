@@ -13,6 +13,7 @@ pub trait Reference: Sync {
     fn duration_s(&self) -> f64;
 
     /// Position (rad), velocity (rad/s) and acceleration (rad/s²) at `t_s` (s), each of length N.
-    /// Before 0 and after the end the motion is at its first and last point.
+    /// Before 0 and after the end the motion is continued without a jump: at rest where it begins or
+    /// ends at rest, periodically where it is periodic.
     fn sample(&self, t_s: f64, q_rad: &mut [f64], qd_rad_s: &mut [f64], qdd_rad_s2: &mut [f64]);
 }

@@ -133,8 +133,10 @@ pub struct Clearance {
 }
 
 /// A segment with a radius, fixed in a body.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Capsule {
+    /// Name in messages and reports.
+    pub name: String,
     /// 0 = base, i = body of joint i (1-based), so that 1…N are the moving bodies.
     pub body: usize,
     /// Segment ends in the body's joint frame (base frame for body 0), m.

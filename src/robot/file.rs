@@ -160,6 +160,7 @@ impl RobotFile {
                 .capsules
                 .iter()
                 .map(|c| Capsule {
+                    name: c.name.clone(),
                     body: c.body,
                     from_m: Vector3::from(c.from_m),
                     to_m: Vector3::from(c.to_m),

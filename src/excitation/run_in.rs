@@ -1,0 +1,259 @@
+//! Periods of a series, joined from rest and left to rest without a jump.
+
+use super::error::ExcitationError;
+use super::fourier::FourierSeries;
+use super::limits::{Requirements, check};
+use super::reference::Reference;
+use crate::robot::Arm;
+
+/// Durations tried for a run-in, s.
+const RUN_INS_S: [f64; 8] = [0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0];
+
+/// Whole periods of a series, after a smooth start from rest: `run_in_s` of blend, then `periods`
+/// periods from the phase 0 of the series, then `run_out_s` of blend to rest (0: the motion goes
+/// on past the last period).
+///
+/// The blend of duration T leads from rest to the state (v, a) of the series at its phase 0. Its
+/// velocity is the cubic with q̇ = q̈ = 0 at the start and q̇ = v, q̈ = a at the end, with s = t/T:
+///
+/// ```text
+/// q̇(s) = v (3s² − 2s³) + a T (s³ − s²)
+/// q(s)  = q_start + T [ v (s³ − s⁴/2) + a T (s⁴/4 − s³/3) ]
+/// ```
+///
+/// so the arm starts from q_start = q(0) − v T/2 + a T²/12: the pose from which nothing but the
+/// speed has to be built up. The run-out is the same thing backwards.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Excitation {
+    series: FourierSeries,
+    run_in_s: f64,
+    periods: usize,
+    run_out_s: f64,
+    join: State,
+}
+
+/// State of all joints at the phase 0 of the series.
+#[derive(Debug, Clone, PartialEq)]
+struct State {
+    q_rad: Vec<f64>,
+    qd_rad_s: Vec<f64>,
+    qdd_rad_s2: Vec<f64>,
+}
+
+impl Excitation {
+    /// `periods` ≥ 1 periods of `series` after `run_in_s` > 0 seconds of run-in, no run-out.
+    ///
+    /// Limits are not checked here: see [`check`] and [`Excitation::fitted`].
+    pub fn new(
+        series: FourierSeries,
+        run_in_s: f64,
+        periods: usize,
+    ) -> Result<Self, ExcitationError> {
+        positive("run_in_s", run_in_s)?;
+        positive("periods", periods as f64)?;
+        let n = series.joints();
+        let (mut q_rad, mut qd_rad_s, mut qdd_rad_s2) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        series.sample(0.0, &mut q_rad, &mut qd_rad_s, &mut qdd_rad_s2);
+        let join = State { q_rad, qd_rad_s, qdd_rad_s2 };
+        Ok(Self { series, run_in_s, periods, run_out_s: 0.0, join })
+    }
+
+    /// With the run-in (and, where `run_out`, a run-out of the same duration) that keeps the
+    /// largest share of the arm's limits free, among durations of 0.5 … 4 s.
+    ///
+    /// # Errors
+    /// [`ExcitationError::NoRunIn`] if every one of them passes a limit of the arm.
+    pub fn fitted(
+        arm: &Arm,
+        requirements: &Requirements,
+        series: FourierSeries,
+        periods: usize,
+        run_out: bool,
+    ) -> Result<Self, ExcitationError> {
+        let mut best: Option<(f64, Self)> = None;
+        for run_in_s in RUN_INS_S {
+            let mut candidate = Self::new(series.clone(), run_in_s, 1)?;
+            if run_out {
+                candidate = candidate.with_run_out(run_in_s)?;
+            }
+            let worst = check(arm, requirements, &candidate)?.worst().share;
+            if best.as_ref().is_none_or(|(share, _)| worst > *share) {
+                best = Some((worst, candidate));
+            }
+        }
+        // The list of durations is not empty, so there is a best one.
+        let [shortest_s, .., longest_s] = RUN_INS_S;
+        let Some((share, mut chosen)) = best else {
+            return Self::new(series, longest_s, periods);
+        };
+        if share < 0.0 {
+            let margins = check(arm, requirements, &chosen)?;
+            let worst = margins.worst();
+            return Err(ExcitationError::NoRunIn {
+                shortest_s,
+                longest_s,
+                limit: worst.limit.to_string(),
+                margin: worst.in_words(),
+                time_s: worst.time_s,
+            });
+        }
+        positive("periods", periods as f64)?;
+        chosen.periods = periods;
+        Ok(chosen)
+    }
+
+    /// The same, brought to rest within `run_out_s` > 0 seconds after the last period.
+    pub fn with_run_out(self, run_out_s: f64) -> Result<Self, ExcitationError> {
+        positive("run_out_s", run_out_s)?;
+        Ok(Self { run_out_s, ..self })
+    }
+
+    /// The periodic motion.
+    pub fn series(&self) -> &FourierSeries {
+        &self.series
+    }
+
+    /// Duration of the run-in, s.
+    pub fn run_in_s(&self) -> f64 {
+        self.run_in_s
+    }
+
+    /// Number of whole periods.
+    pub fn periods(&self) -> usize {
+        self.periods
+    }
+
+    /// Begin and end of the whole periods, s.
+    pub fn periodic_window_s(&self) -> [f64; 2] {
+        [self.run_in_s, self.run_in_s + self.periods as f64 * self.series.period_s]
+    }
+
+    /// The pose at rest from which the motion starts, rad.
+    pub fn start_rad(&self) -> Vec<f64> {
+        let mut state = self.join.clone();
+        self.sample(0.0, &mut state.q_rad, &mut state.qd_rad_s, &mut state.qdd_rad_s2);
+        state.q_rad
+    }
+
+    /// The blend of `duration_s` at the time `left_s` before its moving end. Backwards in time
+    /// (`direction` = −1) the velocity changes sign and the acceleration does not.
+    fn blend(&self, duration_s: f64, left_s: f64, direction: f64, out: [&mut [f64]; 3]) {
+        let [q, qd, qdd] = out;
+        let s = (1.0 - left_s / duration_s).max(0.0);
+        let (s2, s3, s4) = (s * s, s * s * s, s * s * s * s);
+        for j in 0..q.len() {
+            let v = direction * self.join.qd_rad_s[j];
+            let at = self.join.qdd_rad_s2[j] * duration_s;
+            // Both brackets of q are taken relative to s = 1, where q is that of the series.
+            q[j] = self.join.q_rad[j]
+                + duration_s
+                    * (v * (s3 - s4 / 2.0 - 0.5) + at * (s4 / 4.0 - s3 / 3.0 + 1.0 / 12.0));
+            qd[j] = direction * (v * (3.0 * s2 - 2.0 * s3) + at * (s3 - s2));
+            qdd[j] = (v * 6.0 * (s - s2) + at * (3.0 * s2 - 2.0 * s)) / duration_s;
+        }
+    }
+}
+
+fn positive(what: &str, value: f64) -> Result<(), ExcitationError> {
+    if value > 0.0 && value.is_finite() {
+        return Ok(());
+    }
+    Err(ExcitationError::Value { what: what.to_owned(), value, must: "positive" })
+}
+
+impl Reference for Excitation {
+    fn joints(&self) -> usize {
+        self.series.joints()
+    }
+
+    fn duration_s(&self) -> f64 {
+        self.periodic_window_s()[1] + self.run_out_s
+    }
+
+    fn sample(&self, t_s: f64, q_rad: &mut [f64], qd_rad_s: &mut [f64], qdd_rad_s2: &mut [f64]) {
+        let [begin_s, end_s] = self.periodic_window_s();
+        let out = [&mut *q_rad, &mut *qd_rad_s, &mut *qdd_rad_s2];
+        if t_s < begin_s {
+            self.blend(self.run_in_s, begin_s - t_s, 1.0, out);
+        } else if t_s > end_s && self.run_out_s > 0.0 {
+            self.blend(self.run_out_s, t_s - end_s, -1.0, out);
+        } else {
+            self.series.sample(t_s - begin_s, q_rad, qd_rad_s, qdd_rad_s2);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn excitation() -> Excitation {
+        let series = FourierSeries::built_in("ur5_identification").unwrap();
+        Excitation::new(series, 1.5, 2).unwrap().with_run_out(1.0).unwrap()
+    }
+
+    fn at(r: &impl Reference, t: f64) -> [Vec<f64>; 3] {
+        let [mut q, mut qd, mut qdd] = std::array::from_fn(|_| vec![0.0; r.joints()]);
+        r.sample(t, &mut q, &mut qd, &mut qdd);
+        [q, qd, qdd]
+    }
+
+    #[test]
+    fn starts_and_ends_at_rest() {
+        let e = excitation();
+        for t in [0.0, e.duration_s(), e.duration_s() + 3.0] {
+            let [_, qd, qdd] = at(&e, t);
+            assert!(qd.iter().chain(&qdd).all(|x| x.abs() < 1e-12), "t = {t}");
+        }
+        assert_eq!(e.start_rad(), at(&e, 0.0)[0]);
+    }
+
+    /// Across the joins q, q̇ and q̈ change by no more than the next derivative allows: with
+    /// |q⃛| < 100 rad/s³ a step of 2e-9 s changes nothing by more than 2e-7.
+    #[test]
+    fn joins_without_a_jump() {
+        let e = excitation();
+        for t in e.periodic_window_s() {
+            for (before, after) in at(&e, t - 1e-9).iter().zip(&at(&e, t + 1e-9)) {
+                for (x, y) in before.iter().zip(after) {
+                    assert!((x - y).abs() < 2e-7, "t = {t}: {x} {y}");
+                }
+            }
+        }
+    }
+
+    /// Central differences with h = 1e-5 s, |q⃛| and |q⃜| below 1e3: truncation below 2e-8.
+    #[test]
+    fn velocity_and_acceleration_are_derivatives_in_the_blends() {
+        let e = excitation();
+        let h = 1e-5;
+        let end = e.periodic_window_s()[1];
+        for t in [0.2, 0.75, 1.3, end + 0.1, end + 0.5, end + 0.9] {
+            let (before, now, after) = (at(&e, t - h), at(&e, t), at(&e, t + h));
+            for j in 0..6 {
+                for d in 0..2 {
+                    let slope = (after[d][j] - before[d][j]) / (2.0 * h);
+                    assert!((slope - now[d + 1][j]).abs() < 1e-7, "t = {t}, derivative {d}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_period_is_the_same() {
+        let e = excitation();
+        let (first, second) = (at(&e, 1.5 + 3.3), at(&e, 1.5 + 3.3 + e.series().period_s));
+        for (x, y) in first.iter().flatten().zip(second.iter().flatten()) {
+            assert!((x - y).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn impossible_durations_are_refused() {
+        let series = FourierSeries::built_in("ur5_identification").unwrap();
+        for (run_in_s, periods) in [(0.0, 1), (-1.0, 1), (f64::NAN, 1), (1.0, 0)] {
+            assert!(Excitation::new(series.clone(), run_in_s, periods).is_err());
+        }
+        assert!(excitation().with_run_out(0.0).is_err());
+    }
+}
