@@ -5,4 +5,5 @@
 pub mod base;
 pub mod dynamics;
 pub mod excitation;
+pub mod identify;
 pub mod robot;

@@ -172,7 +172,8 @@ mod tests {
     use faer::prelude::*;
 
     fn wobble(i: usize, k: usize) -> f64 {
-        ((i * 37 + k * 101 + i * i % 13) as f64 * 0.61803).sin() + if i % 7 == k { 2.0 } else { 0.0 }
+        ((i * 37 + k * 101 + i * i % 13) as f64 * 0.61803).sin()
+            + if i % 7 == k { 2.0 } else { 0.0 }
     }
 
     /// Least squares of the same data by faer's QR: an implementation that shares nothing with ours.

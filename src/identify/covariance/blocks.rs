@@ -1,0 +1,68 @@
+//! Scatter between blocks of time.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::{Covariance, CovarianceError, CovarianceKind, CovarianceMethod, sandwich};
+use crate::identify::fit::Fit;
+use crate::identify::problem::Problem;
+
+/// V = A⁻¹ Ω A⁻¹ with the scores G_b = Σ_{t in block b} X_tᵀW²e_t of B blocks of time,
+/// Ω = B/(B − 1) Σ G_b G_bᵀ, and Student's t of B − 1 degrees of freedom.
+///
+/// Holds for noise of any colour and any correlation between joints whose memory is short against
+/// a block; made for a single run without repetitions. Unlike the scatter between periods it sees
+/// a model error as noise.
+pub struct BlockCluster;
+
+/// Longer than the memory of motor-current noise (about 1 s), short enough for many blocks.
+const BLOCK_S: f64 = 5.0;
+/// Fewer blocks would leave the variance to chance.
+const LEAST_BLOCKS: usize = 6;
+
+impl CovarianceMethod for BlockCluster {
+    fn covariance(&self, problem: &Problem, fit: &Fit) -> Result<Covariance, CovarianceError> {
+        let n = problem.samples;
+        let seconds = (n * problem.periods) as f64 / problem.rate_hz;
+        // Short records get shorter blocks rather than none.
+        let length_s = BLOCK_S.min(seconds / LEAST_BLOCKS as f64);
+        let length = ((length_s * problem.rate_hz) as usize).max(1);
+        let blocks = (n / length) * problem.periods;
+        if blocks < LEAST_BLOCKS || length_s < 0.2 * BLOCK_S {
+            let needed = LEAST_BLOCKS;
+            return Err(CovarianceError::TooFewBlocks { seconds, blocks, needed });
+        }
+        let residuals = problem.residuals(&fit.theta);
+        // The last block of a period takes what is left over.
+        let per_period = n / length;
+        let mut scores = vec![DVector::zeros(problem.parameters()); blocks];
+        for (j, panel) in problem.panels.iter().enumerate() {
+            let weight = fit.weights[j] * fit.weights[j];
+            for (base, column) in problem.plan.base_indices(j).zip(panel.x.chunks_exact(n)) {
+                for (p, period) in residuals.joint(j).chunks_exact(n).enumerate() {
+                    for k in 0..per_period {
+                        let end = if k + 1 == per_period { n } else { (k + 1) * length };
+                        let part = k * length..end;
+                        let score: f64 = column[part.clone()]
+                            .iter()
+                            .zip(&period[part])
+                            .map(|(x, e)| x * e)
+                            .sum();
+                        scores[p * per_period + k][base] += weight * score;
+                    }
+                }
+            }
+        }
+        let mut omega = DMatrix::zeros(problem.parameters(), problem.parameters());
+        for score in &scores {
+            omega.ger(1.0, score, score, 1.0);
+        }
+        let count = blocks as f64;
+        omega *= count / (count - 1.0);
+        let repeats = problem.periods as f64;
+        Ok(Covariance {
+            kind: CovarianceKind::Blocks,
+            matrix: sandwich(fit, &omega) / (repeats * repeats),
+            degrees_of_freedom: count - 1.0,
+        })
+    }
+}

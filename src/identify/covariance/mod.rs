@@ -1,0 +1,122 @@
+//! Covariances of the estimate: one method per file, one trait.
+//!
+//! A σ is a claim about how θ̂ would scatter over repetitions of the experiment. Each method rests
+//! on other assumptions about the noise; the Monte Carlo measures how often each one's intervals
+//! hold the truth.
+
+mod blocks;
+mod ols;
+mod paper;
+mod periods;
+mod wls;
+
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{ContinuousCDF, StudentsT};
+use thiserror::Error;
+
+pub use blocks::BlockCluster;
+pub use ols::OrdinaryLeastSquares;
+pub use paper::Paper;
+pub use periods::PeriodReplicates;
+pub use wls::WeightedLeastSquares;
+
+use super::fit::Fit;
+use super::problem::Problem;
+
+/// A method's covariance of θ̂.
+#[derive(Debug, Clone)]
+pub struct Covariance {
+    /// Which method made it.
+    pub kind: CovarianceKind,
+    /// b × b, products of the parameters' units.
+    pub matrix: DMatrix<f64>,
+    /// Degrees of freedom of the noise variance behind it; infinite for many.
+    pub degrees_of_freedom: f64,
+}
+
+impl Covariance {
+    /// σ of every parameter.
+    pub fn sigma(&self) -> Vec<f64> {
+        self.matrix.diagonal().iter().map(|v| v.sqrt()).collect()
+    }
+
+    /// Half-width of the 95 % interval in units of σ: Student's t with the degrees of freedom.
+    pub fn quantile_95(&self) -> f64 {
+        quantile_95(self.degrees_of_freedom)
+    }
+}
+
+/// 97.5 % quantile of Student's t; 1.96 for infinitely many degrees of freedom.
+pub fn quantile_95(degrees_of_freedom: f64) -> f64 {
+    // Beyond 1e6 the quantile differs from the normal one by less than 3e-6.
+    match StudentsT::new(0.0, 1.0, degrees_of_freedom.clamp(1.0, 1e6)) {
+        Ok(t) => t.inverse_cdf(0.975),
+        Err(_) => f64::NAN,
+    }
+}
+
+/// The methods by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CovarianceKind {
+    /// The paper's (20), noise variance left out.
+    Paper,
+    /// s² (XᵀX)⁻¹.
+    Ols,
+    /// (XᵀW²X)⁻¹ with s_j per joint.
+    Wls,
+    /// Scatter of the estimates of single periods.
+    Periods,
+    /// Scatter of the score over blocks of time.
+    Blocks,
+}
+
+/// The method asks for something the data do not have.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum CovarianceError {
+    /// Needs replicates.
+    #[error("the scatter between periods needs at least 2 whole periods; the log has {periods}")]
+    TooFewPeriods {
+        /// Whole periods found.
+        periods: usize,
+    },
+    /// Needs a longer record.
+    #[error(
+        "{seconds:.1} s of data make {blocks} blocks of time; at least {needed} are needed for a \
+         σ from blocks"
+    )]
+    TooFewBlocks {
+        /// Length of the record, s.
+        seconds: f64,
+        /// Blocks it makes.
+        blocks: usize,
+        /// Blocks needed.
+        needed: usize,
+    },
+}
+
+/// A method to compute the covariance of θ̂.
+pub trait CovarianceMethod {
+    /// V of `fit`, which solved `problem`.
+    fn covariance(&self, problem: &Problem, fit: &Fit) -> Result<Covariance, CovarianceError>;
+}
+
+impl CovarianceKind {
+    /// The method itself.
+    pub fn method(self) -> &'static dyn CovarianceMethod {
+        match self {
+            Self::Paper => &Paper,
+            Self::Ols => &OrdinaryLeastSquares,
+            Self::Wls => &WeightedLeastSquares,
+            Self::Periods => &PeriodReplicates,
+            Self::Blocks => &BlockCluster,
+        }
+    }
+}
+
+/// A⁻¹ Ω A⁻¹ with A = XᵀW²X of one period, A⁻¹ = R⁻¹ R⁻ᵀ.
+fn sandwich(fit: &Fit, omega: &DMatrix<f64>) -> DMatrix<f64> {
+    let bread = &fit.inverse * fit.inverse.transpose();
+    &bread * omega * &bread
+}

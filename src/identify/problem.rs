@@ -1,0 +1,126 @@
+//! The linear problem: base regressor and torque, joint by joint.
+
+use super::columns::ColumnPlan;
+use crate::dynamics::{Lanes, Model, Motion, RegressorBlock, Workspace};
+use crate::robot::JointSignals;
+
+/// y = X θ + e for every joint, sampled at `rate_hz`: the paper's (16), row-sorted by joint.
+///
+/// A motion that repeats P times has one X for all periods and P columns of torque; a single run
+/// has P = 1. Memory is that of X: joints × their columns × samples.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    /// Which base parameters each joint's equation contains.
+    pub plan: ColumnPlan,
+    /// Samples of X per joint, n.
+    pub samples: usize,
+    /// Repetitions P.
+    pub periods: usize,
+    /// Samples per second.
+    pub rate_hz: f64,
+    /// One per joint.
+    pub panels: Vec<Panel>,
+}
+
+/// One joint's equation.
+#[derive(Debug, Clone, Default)]
+pub struct Panel {
+    /// Columns of X one after the other: (columns of the joint) × n.
+    pub x: Vec<f64>,
+    /// Torque of period 1, 2, …, P, Nm: P × n.
+    pub y: Vec<f64>,
+}
+
+/// Samples per regressor block: 128 × 228 columns × 8 B = 0.2 MB, well inside a level-2 cache.
+const BLOCK: usize = 128;
+
+/// Scratch for assembling problems of one model.
+pub struct Assembler {
+    block: RegressorBlock,
+    workspace: Workspace<Lanes>,
+    columns: Vec<f64>,
+}
+
+impl Assembler {
+    /// Scratch for `model`.
+    pub fn new(model: &Model) -> Self {
+        Self {
+            block: RegressorBlock::new(model, BLOCK),
+            workspace: Workspace::new(model),
+            columns: Vec::new(),
+        }
+    }
+
+    /// Fills `problem` with Θ_B of `motion` (n samples) and `torque_nm` (P·n samples).
+    pub fn assemble(
+        &mut self,
+        problem: &mut Problem,
+        model: &Model,
+        motion: &Motion,
+        torque_nm: &JointSignals,
+    ) {
+        let n = motion.samples();
+        problem.samples = n;
+        problem.periods = torque_nm.samples() / n;
+        for (joint, panel) in problem.panels.iter_mut().enumerate() {
+            panel.x.resize(problem.plan.base_indices(joint).len() * n, 0.0);
+            panel.y.clear();
+            panel.y.extend_from_slice(torque_nm.joint(joint));
+        }
+        for start in (0..n).step_by(BLOCK) {
+            let rows = BLOCK.min(n - start);
+            self.block.fill(model, &mut self.workspace, motion, start..start + rows);
+            for (joint, panel) in problem.panels.iter_mut().enumerate() {
+                self.columns.resize(problem.plan.base_indices(joint).len() * rows, 0.0);
+                problem.plan.copy_columns(&self.block, joint, &mut self.columns);
+                let targets = panel.x.chunks_exact_mut(n);
+                for (target, source) in targets.zip(self.columns.chunks_exact(rows)) {
+                    target[start..start + rows].copy_from_slice(source);
+                }
+            }
+        }
+    }
+}
+
+impl Problem {
+    /// An empty problem over `plan`'s columns.
+    pub fn new(plan: ColumnPlan, rate_hz: f64) -> Self {
+        let panels = vec![Panel::default(); plan.joints()];
+        Self { plan, samples: 0, periods: 0, rate_hz, panels }
+    }
+
+    /// Number of joints.
+    pub fn joints(&self) -> usize {
+        self.panels.len()
+    }
+
+    /// Number of base parameters.
+    pub fn parameters(&self) -> usize {
+        self.plan.base_count()
+    }
+
+    /// X θ of joint `joint`, Nm, written into `out` (n values).
+    pub fn predict(&self, joint: usize, theta: &[f64], out: &mut [f64]) {
+        out.fill(0.0);
+        let columns = self.panels[joint].x.chunks_exact(self.samples);
+        for (base, column) in self.plan.base_indices(joint).zip(columns) {
+            let value = theta[base];
+            out.iter_mut().zip(column).for_each(|(o, x)| *o += value * x);
+        }
+    }
+
+    /// y − X θ of all joints and periods, Nm: joints × P·n.
+    pub fn residuals(&self, theta: &[f64]) -> JointSignals {
+        let mut residual = JointSignals::zeros(self.joints(), self.samples * self.periods);
+        let mut predicted = vec![0.0; self.samples];
+        for joint in 0..self.joints() {
+            self.predict(joint, theta, &mut predicted);
+            let out = residual.joint_mut(joint);
+            out.copy_from_slice(&self.panels[joint].y);
+            for period in out.chunks_exact_mut(self.samples) {
+                period.iter_mut().zip(&predicted).for_each(|(r, p)| *r -= p);
+            }
+        }
+        residual
+    }
+}
