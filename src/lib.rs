@@ -7,3 +7,4 @@ pub mod dynamics;
 pub mod excitation;
 pub mod identify;
 pub mod robot;
+pub mod signal;

@@ -1,0 +1,36 @@
+//! What happens to a record before anything is identified from it: filters without phase,
+//! derivatives, fewer samples, a uniform time grid, periods averaged and differentiated, spectra.
+//!
+//! Enters: time stamps and [`JointSignals`](crate::robot::JointSignals) of one log. Leaves: the
+//! same quantities, smoother, on a uniform grid or averaged over periods, and how noisy they were.
+//!
+//! | question | answer |
+//! |---|---|
+//! | remove what is faster than the motion, keep its place in time | [`ZeroPhase`], [`Decimator`] |
+//! | accelerations as the paper makes them | [`PaperDifferentiator`] |
+//! | accelerations of a noise-free log | [`hermite_acceleration`], [`central_4`] |
+//! | time stamps jitter, samples are missing | [`Resampler`] |
+//! | the best estimate of a repeated motion and its derivatives | [`PeriodicFit`] |
+//! | how noisy is a signal, without any model of it? | [`replicate_noise`] |
+//! | at which frequencies is there energy? | [`welch`] |
+
+mod biquad;
+mod butterworth;
+mod decimate;
+mod differentiate;
+mod error;
+mod fourier;
+mod paper_filter;
+mod replicates;
+mod resample;
+mod spectrum;
+
+pub use butterworth::{Scratch, ZeroPhase};
+pub use decimate::Decimator;
+pub use differentiate::{central_2, central_4, hermite_acceleration};
+pub use error::SignalError;
+pub use fourier::{AveragedMotion, FitScratch, PeriodicFit};
+pub use paper_filter::{PaperDifferentiator, PaperReading};
+pub use replicates::{Replicates, replicate_noise};
+pub use resample::{Gap, Resampler, gaps, natural_rate_hz};
+pub use spectrum::{PowerSpectrum, welch};

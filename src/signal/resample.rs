@@ -1,0 +1,337 @@
+//! From jittered time stamps with gaps to a uniform grid.
+//!
+//! The grid is t₀ + k/f_s from the first time stamp on. Between two time stamps that are close
+//! enough a value is interpolated; across a longer gap nothing is invented: its grid points are
+//! left out and the gap is reported. Samples on either side of a gap belong to different
+//! [`Resampler::segments`], and filters must not run across.
+
+use std::ops::Range;
+
+use super::error::{SignalError, checked_rate_hz, enough, same};
+use crate::robot::JointSignals;
+
+/// A stretch of time without samples, longer than the caller lets be interpolated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gap {
+    /// Last time stamp before it, s.
+    pub start_s: f64,
+    /// First time stamp after it, s.
+    pub end_s: f64,
+}
+
+/// Where each grid point lies between the time stamps; applies to any number of signals.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Resampler {
+    source_s: Vec<f64>,
+    rate_hz: f64,
+    points: Vec<Point>,
+    segments: Vec<Range<usize>>,
+    gaps: Vec<Gap>,
+}
+
+/// A grid point at the fraction `u` of the interval from time stamp `left` to the next.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Point {
+    /// Number of the point on the grid, gaps counted.
+    tick: usize,
+    left: usize,
+    u: f64,
+}
+
+/// The natural rate of a log: one over the median distance of its time stamps, Hz.
+///
+/// Errors: fewer than two time stamps, time that does not increase.
+pub fn natural_rate_hz(time_s: &[f64]) -> Result<f64, SignalError> {
+    check_time(time_s)?;
+    let mut steps: Vec<f64> = time_s.windows(2).map(|t| t[1] - t[0]).collect();
+    let middle = steps.len() / 2;
+    let (_, median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
+    Ok(1.0 / *median)
+}
+
+/// Stretches between neighbouring time stamps that are longer than `limit_s`.
+pub fn gaps(time_s: &[f64], limit_s: f64) -> Vec<Gap> {
+    time_s
+        .windows(2)
+        .filter(|t| t[1] - t[0] > limit_s)
+        .map(|t| Gap { start_s: t[0], end_s: t[1] })
+        .collect()
+}
+
+fn check_time(time_s: &[f64]) -> Result<(), SignalError> {
+    enough("a time grid", time_s.len(), 2)?;
+    let fails = |t: &[f64]| !(t[1] - t[0] > 0.0 && (t[1] - t[0]).is_finite());
+    match time_s.windows(2).position(fails) {
+        Some(k) => {
+            Err(SignalError::Time { index: k + 1, before_s: time_s[k], after_s: time_s[k + 1] })
+        }
+        None => Ok(()),
+    }
+}
+
+impl Resampler {
+    /// Grid at `rate_hz` over strictly increasing `time_s`; nothing is interpolated between time
+    /// stamps further apart than `longest_gap_s`.
+    pub fn new(time_s: &[f64], rate_hz: f64, longest_gap_s: f64) -> Result<Self, SignalError> {
+        check_time(time_s)?;
+        checked_rate_hz(rate_hz)?;
+        if longest_gap_s.is_nan() || longest_gap_s <= 0.0 {
+            return Err(SignalError::GapLimit { limit_s: longest_gap_s });
+        }
+        let start_s = time_s[0];
+        let mut points = Vec::new();
+        let mut segments = Vec::new();
+        let mut segment_start = 0;
+        for (left, t) in time_s.windows(2).enumerate() {
+            let step_s = t[1] - t[0];
+            if step_s > longest_gap_s {
+                // A grid point exactly on the time stamp before the gap needs no interpolation.
+                push_on_stamp(&mut points, left, t[0] - start_s, rate_hz);
+                close_segment(&mut segments, &mut segment_start, points.len());
+                continue;
+            }
+            let first = points.last().map_or(0, |p: &Point| p.tick + 1);
+            let first = first.max(((t[0] - start_s) * rate_hz - ROUNDING_TICKS).ceil() as usize);
+            let offset_s = t[0] - start_s;
+            points.extend(
+                (first..)
+                    .map(|tick| (tick, tick as f64 / rate_hz - offset_s))
+                    .take_while(|(_, dt)| *dt * rate_hz < step_s * rate_hz - ROUNDING_TICKS)
+                    .map(|(tick, dt)| Point { tick, left, u: (dt / step_s).max(0.0) }),
+            );
+        }
+        let last = time_s.len() - 1;
+        push_on_stamp(&mut points, last, time_s[last] - start_s, rate_hz);
+        close_segment(&mut segments, &mut segment_start, points.len());
+        let gaps = gaps(time_s, longest_gap_s);
+        Ok(Self { source_s: time_s.to_vec(), rate_hz, points, segments, gaps })
+    }
+
+    /// Number of samples on the grid, those in gaps not counted.
+    pub fn samples(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Rate of the grid, Hz.
+    pub fn rate_hz(&self) -> f64 {
+        self.rate_hz
+    }
+
+    /// Times of the samples, s, on the clock of the time stamps.
+    pub fn time_s(&self) -> Vec<f64> {
+        self.points.iter().map(|p| self.source_s[0] + p.tick as f64 / self.rate_hz).collect()
+    }
+
+    /// Ranges of samples without a gap inside; one range if there is no gap.
+    pub fn segments(&self) -> &[Range<usize>] {
+        &self.segments
+    }
+
+    /// Gaps that were not bridged.
+    pub fn gaps(&self) -> &[Gap] {
+        &self.gaps
+    }
+
+    /// Straight lines between the time stamps: for signals that jump, such as currents.
+    pub fn linear(&self, y: &[f64]) -> Result<Vec<f64>, SignalError> {
+        self.check(y)?;
+        Ok(self.points.iter().map(|p| lerp(y, p)).collect())
+    }
+
+    /// Piecewise cubic with the known slope at every time stamp: for angles with their velocity.
+    ///
+    /// Error for a smooth y: at most step⁴/384 · max|y⁗|.
+    pub fn hermite(&self, y: &[f64], slope_per_s: &[f64]) -> Result<Vec<f64>, SignalError> {
+        self.check(y)?;
+        self.check(slope_per_s)?;
+        Ok(self.points.iter().map(|p| self.cubic(y, slope_per_s, p)).collect())
+    }
+
+    /// Piecewise cubic that never overshoots its samples: for smooth signals without known slope.
+    ///
+    /// Slopes are the weighted harmonic mean of the neighbouring differences, zero at extrema
+    /// (F. Fritsch and J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300–304).
+    pub fn monotone(&self, y: &[f64]) -> Result<Vec<f64>, SignalError> {
+        self.check(y)?;
+        let slopes = monotone_slopes(&self.source_s, y);
+        Ok(self.points.iter().map(|p| self.cubic(y, &slopes, p)).collect())
+    }
+
+    /// Angles by [`Self::hermite`] with their velocities as slopes.
+    pub fn angles(
+        &self,
+        q_rad: &JointSignals,
+        qd_rad_s: &JointSignals,
+    ) -> Result<JointSignals, SignalError> {
+        same("joints of angle and velocity", q_rad.joints(), qd_rad_s.joints())?;
+        self.all_joints(q_rad, |j, q| self.hermite(q, qd_rad_s.joint(j)))
+    }
+
+    /// Every joint by [`Self::monotone`].
+    pub fn smooth(&self, y: &JointSignals) -> Result<JointSignals, SignalError> {
+        self.all_joints(y, |_, series| self.monotone(series))
+    }
+
+    /// Every joint by [`Self::linear`].
+    pub fn straight(&self, y: &JointSignals) -> Result<JointSignals, SignalError> {
+        self.all_joints(y, |_, series| self.linear(series))
+    }
+
+    fn all_joints(
+        &self,
+        y: &JointSignals,
+        f: impl Fn(usize, &[f64]) -> Result<Vec<f64>, SignalError>,
+    ) -> Result<JointSignals, SignalError> {
+        let mut out = JointSignals::zeros(y.joints(), self.samples());
+        for j in 0..y.joints() {
+            out.joint_mut(j).copy_from_slice(&f(j, y.joint(j))?);
+        }
+        Ok(out)
+    }
+
+    fn check(&self, y: &[f64]) -> Result<(), SignalError> {
+        same("values for the time stamps", self.source_s.len(), y.len())
+    }
+
+    fn cubic(&self, y: &[f64], slope: &[f64], p: &Point) -> f64 {
+        if p.u == 0.0 {
+            return y[p.left];
+        }
+        let (i, u) = (p.left, p.u);
+        let h = self.source_s[i + 1] - self.source_s[i];
+        let rise = y[i + 1] - y[i];
+        let (bend_0, bend_1) = (h * slope[i] - rise, h * slope[i + 1] - rise);
+        lerp(y, p) + u * (1.0 - u) * ((1.0 - u) * bend_0 - u * bend_1)
+    }
+}
+
+/// A grid point this close to a time stamp, in grid steps, is on it: rounding of t · f_s.
+const ROUNDING_TICKS: f64 = 1e-6;
+
+/// Adds the grid point that coincides with time stamp `index`, if there is one and it is new.
+fn push_on_stamp(points: &mut Vec<Point>, index: usize, offset_s: f64, rate_hz: f64) {
+    let ticks = offset_s * rate_hz;
+    let tick = ticks.round() as usize;
+    let is_new = points.last().is_none_or(|p| p.tick < tick);
+    if (ticks - ticks.round()).abs() <= ROUNDING_TICKS && is_new {
+        points.push(Point { tick, left: index, u: 0.0 });
+    }
+}
+
+fn close_segment(segments: &mut Vec<Range<usize>>, start: &mut usize, end: usize) {
+    if end > *start {
+        segments.push(*start..end);
+    }
+    *start = end;
+}
+
+fn lerp(y: &[f64], p: &Point) -> f64 {
+    if p.u == 0.0 { y[p.left] } else { y[p.left] + p.u * (y[p.left + 1] - y[p.left]) }
+}
+
+fn monotone_slopes(t: &[f64], y: &[f64]) -> Vec<f64> {
+    let n = y.len();
+    let step = |i: usize| t[i + 1] - t[i];
+    let secant = |i: usize| (y[i + 1] - y[i]) / step(i);
+    if n == 2 {
+        return vec![secant(0); 2];
+    }
+    let inner = |i: usize| {
+        let (left, right) = (secant(i - 1), secant(i));
+        if left * right <= 0.0 {
+            return 0.0;
+        }
+        let (w1, w2) = (2.0 * step(i) + step(i - 1), step(i) + 2.0 * step(i - 1));
+        (w1 + w2) / (w1 / left + w2 / right)
+    };
+    // Three-point formula at the ends, limited so that the curve keeps to the samples' side.
+    let end = |h0: f64, h1: f64, d0: f64, d1: f64| {
+        let slope = ((2.0 * h0 + h1) * d0 - h0 * d1) / (h0 + h1);
+        if slope * d0 <= 0.0 {
+            0.0
+        } else if d0 * d1 <= 0.0 && slope.abs() > 3.0 * d0.abs() {
+            3.0 * d0
+        } else {
+            slope
+        }
+    };
+    let mut slopes = Vec::with_capacity(n);
+    slopes.push(end(step(0), step(1), secant(0), secant(1)));
+    slopes.extend((1..n - 1).map(inner));
+    slopes.push(end(step(n - 2), step(n - 3), secant(n - 2), secant(n - 3)));
+    slopes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_uniform_log_comes_back_bit_for_bit() {
+        let time_s: Vec<f64> = (0..1000).map(|k| 838.465 + k as f64 * 0.008).collect();
+        let rate = natural_rate_hz(&time_s).unwrap();
+        assert!((rate - 125.0).abs() < 1e-8);
+        let y: Vec<f64> = (0..1000).map(|k| (k as f64 * 0.37).sin()).collect();
+        let grid = Resampler::new(&time_s, 125.0, 0.1).unwrap();
+        assert_eq!(grid.samples(), 1000);
+        assert_eq!(grid.segments(), std::slice::from_ref(&(0..1000)));
+        for (k, v) in grid.linear(&y).unwrap().iter().enumerate() {
+            // Time stamps at 838 s are rounded to 1e-13 s.
+            assert!((v - y[k]).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn cubic_resampling_is_exact_for_cubics_and_fourth_order_for_the_rest() {
+        let worst = |step_s: f64, q: fn(f64) -> f64, qd: fn(f64) -> f64| {
+            let n = (4.0 / step_s) as usize;
+            let t: Vec<f64> = (0..n)
+                .map(|k| step_s * (k as f64 + 0.3 * ((k * 7919) % 11) as f64 / 11.0))
+                .collect();
+            let values: Vec<f64> = t.iter().map(|t| q(*t)).collect();
+            let slopes: Vec<f64> = t.iter().map(|t| qd(*t)).collect();
+            let grid = Resampler::new(&t, 1000.0, 1.0).unwrap();
+            let y = grid.hermite(&values, &slopes).unwrap();
+            y.iter().zip(grid.time_s()).map(|(y, t)| (y - q(t)).abs()).fold(0.0, f64::max)
+        };
+        assert!(worst(0.04, |t| t * t * t - t, |t| 3.0 * t * t - 1.0) < 1e-12);
+        let coarse = worst(0.04, |t| (3.0 * t).sin(), |t| 3.0 * (3.0 * t).cos());
+        // The longest step is 0.04 (1 + 0.3·10/11).
+        assert!(coarse < (0.04_f64 * 1.273).powi(4) / 384.0 * 81.0 * 1.01);
+        let fine = worst(0.02, |t| (3.0 * t).sin(), |t| 3.0 * (3.0 * t).cos());
+        assert!((coarse / fine).log2() > 3.7);
+    }
+
+    #[test]
+    fn gaps_are_reported_and_not_bridged() {
+        let time_s: Vec<f64> =
+            (0..100).filter(|k| !(40..60).contains(k)).map(|k| 5.0 + k as f64 * 0.01).collect();
+        let y: Vec<f64> = time_s.iter().map(|t| 2.0 * t).collect();
+        let grid = Resampler::new(&time_s, 100.0, 0.05).unwrap();
+        assert_eq!(grid.gaps().len(), 1);
+        assert!((grid.gaps()[0].start_s - 5.39).abs() < 1e-12);
+        assert!((grid.gaps()[0].end_s - 5.60).abs() < 1e-12);
+        assert_eq!(grid.segments(), [0..40, 40..80]);
+        for (t, v) in grid.time_s().iter().zip(grid.linear(&y).unwrap()) {
+            assert!((v - 2.0 * t).abs() < 1e-12);
+            assert!(*t < 5.391 || *t > 5.599, "a sample was invented at {t} s");
+        }
+        // A limit above the gap bridges it, and says nothing.
+        let bridged = Resampler::new(&time_s, 100.0, 0.3).unwrap();
+        assert_eq!((bridged.samples(), bridged.gaps().len()), (100, 0));
+    }
+
+    #[test]
+    fn time_that_stands_or_runs_backwards_is_refused_with_its_place() {
+        let refused = |t: &[f64]| Resampler::new(t, 100.0, 1.0).unwrap_err();
+        assert_eq!(
+            refused(&[0.0, 0.01, 0.01]),
+            SignalError::Time { index: 2, before_s: 0.01, after_s: 0.01 }
+        );
+        assert!(matches!(refused(&[0.0, -0.01]), SignalError::Time { index: 1, .. }));
+        assert!(matches!(refused(&[0.0, f64::NAN]), SignalError::Time { index: 1, .. }));
+        assert!(matches!(refused(&[0.0]), SignalError::TooFewSamples { .. }));
+        let limit = Resampler::new(&[0.0, 1.0], 100.0, 0.0).unwrap_err();
+        assert!(matches!(limit, SignalError::GapLimit { .. }));
+    }
+}
