@@ -1,0 +1,90 @@
+//! What stands between the torque a drive makes and the torque that reaches the link.
+
+use super::rapier_arm::RapierArm;
+use crate::robot::Arm;
+
+/// One evaluation of the equations of motion: everything held fixed during it.
+#[derive(Debug, Clone, Copy)]
+pub struct Stage<'a> {
+    /// Time, s.
+    pub time_s: f64,
+    /// Joint angles, rad.
+    pub q_rad: &'a [f64],
+    /// Joint velocities, rad/s.
+    pub qd_rad_s: &'a [f64],
+    /// The drivetrain's own states.
+    pub states: &'a [f64],
+    /// Torque of the drives i_G k I at the joints, before friction, Nm.
+    pub drive_torque_nm: &'a [f64],
+}
+
+/// Joint mechanics: turns drive torque into joint acceleration by way of the links' dynamics.
+///
+/// It owns the call to [`RapierArm::forward_dynamics`], so that a law that needs the load the gear
+/// really carries can find it (the arm may be asked more than once in a stage), and it may add states
+/// of its own, which are integrated with the joints': bristle deflections, motor angles behind an
+/// elastic gear, temperatures.
+pub trait Drivetrain: Send {
+    /// Number of states of its own.
+    fn states(&self) -> usize {
+        0
+    }
+
+    /// Prepares the arm and the own states for a run that starts at (`q_rad`, `qd_rad_s`).
+    fn start(&mut self, arm: &mut RapierArm, q_rad: &[f64], qd_rad_s: &[f64], states: &mut [f64]);
+
+    /// Joint accelerations `qdd_rad_s2` (rad/s²) and the own states' time derivatives.
+    fn rates(
+        &mut self,
+        arm: &mut RapierArm,
+        stage: &Stage<'_>,
+        qdd_rad_s2: &mut [f64],
+        states_rate: &mut [f64],
+    );
+}
+
+/// A stiff gear with the regularised friction of the paper's (2) and (3):
+/// τ_link = τ_drive − rv q̇ − rc tanh(q̇/ε).
+#[derive(Debug, Clone)]
+pub struct RigidDrivetrain {
+    epsilon_rad_s: f64,
+    /// Per joint: rv (Nm s/rad), rc (Nm), Ia (kg m²).
+    joints: Vec<[f64; 3]>,
+    link_torque_nm: Vec<f64>,
+}
+
+impl RigidDrivetrain {
+    /// Friction and rotors of `arm`.
+    pub fn new(arm: &Arm) -> Self {
+        let joints = arm
+            .joints
+            .iter()
+            .map(|j| [j.drive.viscous_nm_s_rad, j.drive.coulomb_nm, j.drive.rotor_inertia_kg_m2])
+            .collect();
+        let epsilon_rad_s = arm.friction_epsilon_rad_s;
+        Self { epsilon_rad_s, joints, link_torque_nm: vec![0.0; arm.dof()] }
+    }
+}
+
+impl Drivetrain for RigidDrivetrain {
+    fn start(&mut self, arm: &mut RapierArm, _: &[f64], _: &[f64], _: &mut [f64]) {
+        for (j, [_, _, rotor]) in self.joints.iter().enumerate() {
+            arm.set_rotor_inertia(j, *rotor);
+        }
+    }
+
+    fn rates(
+        &mut self,
+        arm: &mut RapierArm,
+        stage: &Stage<'_>,
+        qdd_rad_s2: &mut [f64],
+        _: &mut [f64],
+    ) {
+        for (j, [viscous, coulomb, _]) in self.joints.iter().enumerate() {
+            let speed = stage.qd_rad_s[j];
+            let friction = viscous * speed + coulomb * (speed / self.epsilon_rad_s).tanh();
+            self.link_torque_nm[j] = stage.drive_torque_nm[j] - friction;
+        }
+        arm.forward_dynamics(stage.q_rad, stage.qd_rad_s, &self.link_torque_nm, qdd_rad_s2);
+    }
+}

@@ -1,0 +1,68 @@
+//! What can stop a simulation.
+
+use thiserror::Error;
+
+/// A plant that cannot be built, a configuration that cannot be run, or a run that broke down.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum PlantError {
+    /// A link that no mass distribution has. The engine would clamp it silently.
+    #[error(
+        "joint {joint}: no body has mass {mass_kg} kg and principal moments {principal_kg_m2:?} \
+         kg m2 (smallest eigenvalue of the pseudo-inertia {margin:.3e}, must be positive)"
+    )]
+    Inertia {
+        /// Joint, from 1.
+        joint: usize,
+        /// Mass of the link, kg.
+        mass_kg: f64,
+        /// Principal moments about the centre of mass, kg m², ascending.
+        principal_kg_m2: [f64; 3],
+        /// Smallest eigenvalue of the pseudo-inertia.
+        margin: f64,
+    },
+    /// The engine holds another inertia tensor than the one it was given.
+    #[error(
+        "joint {joint}: the engine changed the inertia tensor by {difference_kg_m2:.3e} kg m2 \
+         (largest entry), more than round-off"
+    )]
+    InertiaNotKept {
+        /// Joint, from 1.
+        joint: usize,
+        /// Largest difference of an entry, kg m².
+        difference_kg_m2: f64,
+    },
+    /// A setting outside its range.
+    #[error("{key} = {value}: {requirement}")]
+    Setting {
+        /// The key in the scenario.
+        key: &'static str,
+        /// The value found.
+        value: f64,
+        /// What it must be.
+        requirement: &'static str,
+    },
+    /// A list with one entry per joint has another length.
+    #[error("{what} has {found} joints, the arm has {expected}")]
+    Joints {
+        /// What has the wrong length.
+        what: &'static str,
+        /// Its length.
+        found: usize,
+        /// Joints of the arm.
+        expected: usize,
+    },
+    /// The state left the finite numbers.
+    #[error(
+        "the simulation broke down at t = {time_s} s: joint {joint} at {q_rad} rad, {qd_rad_s} rad/s"
+    )]
+    Diverged {
+        /// Time, s.
+        time_s: f64,
+        /// Joint, from 1.
+        joint: usize,
+        /// Its angle, rad.
+        q_rad: f64,
+        /// Its speed, rad/s.
+        qd_rad_s: f64,
+    },
+}

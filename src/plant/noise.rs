@@ -1,0 +1,226 @@
+//! Colours of noise: what a torque reading is off by, in time and across the joints.
+
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
+
+use super::error::PlantError;
+use crate::random::{Channel, TrialStreams};
+use crate::robot::JointSignals;
+
+/// How one component of a noise runs on in time. All are stationary with unit variance.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Colour {
+    /// Independent from sample to sample.
+    White,
+    /// First-order autoregression: autocorrelation exp(−|t|/T).
+    Ar1 {
+        /// Time constant T, s.
+        time_constant_s: f64,
+    },
+    /// White noise behind a causal second-order Butterworth low-pass.
+    LowPass {
+        /// Cut-off frequency (−3 dB), Hz.
+        cutoff_hz: f64,
+    },
+}
+
+/// One part of a noise: its share of the variance and its colour.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Component {
+    /// Share of the variance, 0…1.
+    pub share: f64,
+    /// How it runs on in time.
+    pub colour: Colour,
+}
+
+/// Noise of the torque channels: e_j = s_j Σ_c √share_c (√(1−ρ) own_jc + √ρ shared_c), where own and
+/// shared are independent unit-variance processes of colour c. Its standard deviation is s_j and its
+/// correlation between any two joints at one instant is ρ.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NoiseModel {
+    /// Parts; the shares sum to 1.
+    pub components: Vec<Component>,
+    /// Correlation ρ between the joints, 0 ≤ ρ < 1.
+    #[serde(default)]
+    pub cross_joint_correlation: f64,
+}
+
+impl Default for NoiseModel {
+    fn default() -> Self {
+        Self::white()
+    }
+}
+
+impl NoiseModel {
+    /// Independent in time and across joints.
+    pub fn white() -> Self {
+        let components = vec![Component { share: 1.0, colour: Colour::White }];
+        Self { components, cross_joint_correlation: 0.0 }
+    }
+
+    /// The colour of the residuals of a real arm of the same family: half of the variance white,
+    /// 30 % with a time constant of 20 ms, 20 % with 1 s, and a correlation of 0.3 between joints
+    /// (seen in the residuals of the public UR10e logs).
+    pub fn real_arm() -> Self {
+        let part = |share, colour| Component { share, colour };
+        Self {
+            components: vec![
+                part(0.5, Colour::White),
+                part(0.3, Colour::Ar1 { time_constant_s: 0.02 }),
+                part(0.2, Colour::Ar1 { time_constant_s: 1.0 }),
+            ],
+            cross_joint_correlation: 0.3,
+        }
+    }
+
+    /// Checks shares, time constants, cut-off frequencies (below half of `rate_hz`) and ρ.
+    pub fn validate(&self, rate_hz: f64) -> Result<(), PlantError> {
+        let check = |ok: bool, key, value, requirement| {
+            if ok { Ok(()) } else { Err(PlantError::Setting { key, value, requirement }) }
+        };
+        for Component { share, colour } in &self.components {
+            check(*share >= 0.0, "torque_noise share", *share, "must not be negative")?;
+            match *colour {
+                Colour::White => {}
+                Colour::Ar1 { time_constant_s: t } => {
+                    let ok = t > 0.0 && t.is_finite();
+                    check(ok, "torque_noise time_constant_s", t, "must be positive")?;
+                }
+                Colour::LowPass { cutoff_hz: f } => {
+                    let ok = f > 0.0 && f < 0.5 * rate_hz;
+                    check(ok, "torque_noise cutoff_hz", f, "must be below half of the log's rate")?;
+                }
+            }
+        }
+        let sum: f64 = self.components.iter().map(|c| c.share).sum();
+        let count_fits = self.components.len() <= usize::from(u8::MAX);
+        check(count_fits && (sum - 1.0).abs() < 1e-9, "torque_noise shares", sum, "must sum to 1")?;
+        let rho = self.cross_joint_correlation;
+        let ok = (0.0..1.0).contains(&rho);
+        check(ok, "torque_noise cross_joint_correlation", rho, "must be 0 or more and below 1")
+    }
+
+    /// Adds the noise of one trial to `signals`, sampled at `rate_hz`, with standard deviation `sd[j]`
+    /// at joint j. `shared` is scratch.
+    pub(super) fn add_to(
+        &self,
+        streams: &TrialStreams,
+        rate_hz: f64,
+        sd: &[f64],
+        shared: &mut Vec<f64>,
+        signals: &mut JointSignals,
+    ) {
+        let rho = self.cross_joint_correlation;
+        for (component, part) in (0..=u8::MAX).zip(&self.components) {
+            shared.clear();
+            if rho > 0.0 {
+                let mut rng = streams.stream(Channel::TorqueShared { component }, 0);
+                let mut process = Process::new(part.colour, rate_hz, &mut rng);
+                shared.extend((0..signals.samples()).map(|_| process.next(&mut rng)));
+            }
+            for (j, &sd) in sd.iter().enumerate() {
+                let mut rng = streams.stream(Channel::Torque { component }, j);
+                let mut process = Process::new(part.colour, rate_hz, &mut rng);
+                let scale = sd * part.share.sqrt();
+                let (own, common) = (scale * (1.0 - rho).sqrt(), scale * rho.sqrt());
+                let series = signals.joint_mut(j);
+                for value in series.iter_mut() {
+                    *value += own * process.next(&mut rng);
+                }
+                for (value, shared) in series.iter_mut().zip(&*shared) {
+                    *value += common * shared;
+                }
+            }
+        }
+    }
+}
+
+/// A unit-variance stationary process, sample by sample.
+#[derive(Debug, Clone)]
+enum Process {
+    White,
+    Ar1 { phi: f64, innovation: f64, value: f64 },
+    LowPass(Butterworth2),
+}
+
+impl Process {
+    /// The process in its stationary state: its first sample is distributed as all others.
+    fn new(colour: Colour, rate_hz: f64, rng: &mut impl Rng) -> Self {
+        match colour {
+            Colour::White => Self::White,
+            Colour::Ar1 { time_constant_s } => {
+                let phi = (-1.0 / (rate_hz * time_constant_s)).exp();
+                Self::Ar1 { phi, innovation: (1.0 - phi * phi).sqrt(), value: normal(rng) }
+            }
+            Colour::LowPass { cutoff_hz } => {
+                // The poles decay as exp(−√2 π f_c t): to e⁻²⁰ within 4.5 / f_c.
+                let settled = (4.5 * rate_hz / cutoff_hz).ceil() as usize;
+                let mut filter = Butterworth2::new(cutoff_hz / rate_hz);
+                filter.gain /= filter.clone().energy(settled).sqrt();
+                for _ in 0..settled {
+                    filter.next(normal(rng));
+                }
+                Self::LowPass(filter)
+            }
+        }
+    }
+
+    #[inline]
+    fn next(&mut self, rng: &mut impl Rng) -> f64 {
+        let white = normal(rng);
+        match self {
+            Self::White => white,
+            Self::Ar1 { phi, innovation, value } => {
+                *value = *phi * *value + *innovation * white;
+                *value
+            }
+            Self::LowPass(filter) => filter.next(white),
+        }
+    }
+}
+
+/// A standard normal number.
+#[inline]
+pub(super) fn normal(rng: &mut impl Rng) -> f64 {
+    StandardNormal.sample(rng)
+}
+
+/// Second-order Butterworth low-pass by the bilinear transform:
+/// H(z) = g (1 + z⁻¹)² / (1 + a₁ z⁻¹ + a₂ z⁻²).
+#[derive(Debug, Clone)]
+struct Butterworth2 {
+    gain: f64,
+    a1: f64,
+    a2: f64,
+    memory: [f64; 2],
+}
+
+impl Butterworth2 {
+    /// `cutoff` as a fraction of the sampling rate, below 0.5.
+    fn new(cutoff: f64) -> Self {
+        let k = (std::f64::consts::PI * cutoff).tan();
+        let norm = 1.0 / (1.0 + std::f64::consts::SQRT_2 * k + k * k);
+        Self {
+            gain: k * k * norm,
+            a1: 2.0 * (k * k - 1.0) * norm,
+            a2: (1.0 - std::f64::consts::SQRT_2 * k + k * k) * norm,
+            memory: [0.0; 2],
+        }
+    }
+
+    fn next(&mut self, input: f64) -> f64 {
+        let [m1, m2] = self.memory;
+        let m0 = input - self.a1 * m1 - self.a2 * m2;
+        self.memory = [m0, m1];
+        self.gain * (m0 + 2.0 * m1 + m2)
+    }
+
+    /// Sum of squares of the first `samples` of the impulse response: variance for white input.
+    fn energy(mut self, samples: usize) -> f64 {
+        (0..samples).map(|k| self.next(if k == 0 { 1.0 } else { 0.0 }).powi(2)).sum()
+    }
+}

@@ -1,0 +1,54 @@
+//! What a simulated run leaves: the truth at the instants of the log.
+
+use crate::robot::JointSignals;
+
+/// The noise-free course of a run, sampled at the log's rate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    /// Time from the start of the reference, s.
+    pub time_s: Vec<f64>,
+    /// Joint angles, rad.
+    pub q_rad: JointSignals,
+    /// Joint velocities, rad/s.
+    pub qd_rad_s: JointSignals,
+    /// Drive torque i_G k I at the joint, before friction, Nm: at the instants at which the
+    /// controller decides, the mean of what was held before and what is held after.
+    pub torque_nm: JointSignals,
+    /// Reference angles, rad.
+    pub target_q_rad: JointSignals,
+    /// Reference velocities, rad/s.
+    pub target_qd_rad_s: JointSignals,
+    /// Reference accelerations, rad/s².
+    pub target_qdd_rad_s2: JointSignals,
+    /// What the controller read at these instants, where it did not read the truth.
+    pub readings: Option<Readings>,
+    /// Decisions of the controller at which at least one drive was at its limit.
+    pub saturated_decisions: usize,
+}
+
+/// Positions and velocities as the controller read them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Readings {
+    /// Joint angles, rad.
+    pub q_rad: JointSignals,
+    /// Joint velocities, rad/s.
+    pub qd_rad_s: JointSignals,
+}
+
+impl Recording {
+    /// Zeros for `joints` × `samples`, and room for readings if there are any.
+    pub(super) fn zeros(joints: usize, samples: usize, with_readings: bool) -> Self {
+        let zeros = || JointSignals::zeros(joints, samples);
+        Self {
+            time_s: vec![0.0; samples],
+            q_rad: zeros(),
+            qd_rad_s: zeros(),
+            torque_nm: zeros(),
+            target_q_rad: zeros(),
+            target_qd_rad_s: zeros(),
+            target_qdd_rad_s2: zeros(),
+            readings: with_readings.then(|| Readings { q_rad: zeros(), qd_rad_s: zeros() }),
+            saturated_decisions: 0,
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! One run of the arm under its controller.
+
+use super::config::PlantConfig;
+use super::controller::Controller;
+use super::drivetrain::{Drivetrain, RigidDrivetrain};
+use super::error::PlantError;
+use super::integrate::{RungeKutta4, State};
+use super::rapier_arm::RapierArm;
+use super::recording::Recording;
+use super::sensors::Encoders;
+use crate::excitation::Reference;
+use crate::robot::Arm;
+
+/// The arm, what moves it, and what it believes: everything of a run but the motion.
+pub struct Plant {
+    arm: RapierArm,
+    drivetrain: Box<dyn Drivetrain>,
+    controller: Controller,
+    config: PlantConfig,
+}
+
+impl Plant {
+    /// `arm` as it is, behind a stiff gear, with a controller that knows it.
+    pub fn new(arm: &Arm, config: &PlantConfig) -> Result<Self, PlantError> {
+        Self::with_drivetrain(arm, arm, Box::new(RigidDrivetrain::new(arm)), config)
+    }
+
+    /// `arm` as it is, behind `drivetrain`, with a controller that takes it for `nominal`.
+    pub fn with_drivetrain(
+        arm: &Arm,
+        nominal: &Arm,
+        drivetrain: Box<dyn Drivetrain>,
+        config: &PlantConfig,
+    ) -> Result<Self, PlantError> {
+        config.validate()?;
+        expect_joints("the controller's arm", nominal.dof(), arm.dof())?;
+        Ok(Self {
+            arm: RapierArm::new(arm)?,
+            drivetrain,
+            controller: Controller::new(nominal, config),
+            config: config.clone(),
+        })
+    }
+
+    /// Follows `reference` from its start to its end. The controller reads the true angles and
+    /// speeds, or, where they are given, what `encoders` make of them.
+    pub fn run(
+        &mut self,
+        reference: &dyn Reference,
+        mut encoders: Option<Encoders>,
+    ) -> Result<Recording, PlantError> {
+        let n = self.arm.dof();
+        expect_joints("the reference", reference.joints(), n)?;
+        let h = self.config.step_s;
+        let per_control = self.config.steps_per_control()?;
+        let per_log = self.config.steps_per_log()?;
+        if encoders.is_some() && !per_log.is_multiple_of(per_control) {
+            return Err(PlantError::Setting {
+                key: "log_rate_hz",
+                value: self.config.log_rate_hz,
+                requirement: "must divide control_rate_hz where the controller reads the encoders, \
+                              so that the log holds what it read",
+            });
+        }
+        // A duration that is a whole number of samples up to round-off keeps its last sample.
+        let logged = (reference.duration_s() * self.config.log_rate_hz + 1e-6).floor() as usize;
+        let mut recording = Recording::zeros(n, logged + 1, encoders.is_some());
+
+        let mut state = State::zeros(n, self.drivetrain.states());
+        let (q, qd, own) = state.parts_mut();
+        reference.sample(0.0, q, qd, &mut vec![0.0; n]);
+        let (q, qd) = (&*q, &*qd);
+        self.drivetrain.start(&mut self.arm, q, qd, own);
+        let mut integrator = RungeKutta4::new(&state);
+
+        let (mut q_read, mut qd_read) = (vec![0.0; n], vec![0.0; n]);
+        let (mut held_before, mut held) = (vec![0.0; n], vec![0.0; n]);
+        let last = logged * per_log;
+        for step in 0..=last {
+            let time_s = step as f64 * h;
+            held_before.copy_from_slice(&held);
+            if step % per_control == 0 {
+                q_read.copy_from_slice(state.q_rad());
+                qd_read.copy_from_slice(state.qd_rad_s());
+                if let Some(encoders) = &mut encoders {
+                    encoders.read(&mut q_read, &mut qd_read);
+                }
+                let (q, qd, qdd) = self.controller.target_mut();
+                reference.sample(time_s, q, qd, qdd);
+                let saturated = self.controller.torque(&q_read, &qd_read, &mut held);
+                recording.saturated_decisions += usize::from(saturated);
+                if step == 0 {
+                    held_before.copy_from_slice(&held);
+                }
+            }
+            if step % per_log == 0 {
+                let k = step / per_log;
+                recording.time_s[k] = k as f64 / self.config.log_rate_hz;
+                recording.q_rad.set_sample(k, state.q_rad());
+                recording.qd_rad_s.set_sample(k, state.qd_rad_s());
+                if let Some(readings) = &mut recording.readings {
+                    readings.q_rad.set_sample(k, &q_read);
+                    readings.qd_rad_s.set_sample(k, &qd_read);
+                }
+                for (before, after) in held_before.iter_mut().zip(&held) {
+                    *before = 0.5 * (*before + after);
+                }
+                recording.torque_nm.set_sample(k, &held_before);
+            }
+            if step == last {
+                break;
+            }
+            integrator.step(&mut self.arm, &mut *self.drivetrain, &mut state, time_s, h, &held);
+            if let Some(j) = state.first_not_finite() {
+                let (q_rad, qd_rad_s) = (state.q_rad()[j], state.qd_rad_s()[j]);
+                return Err(PlantError::Diverged { time_s, joint: j + 1, q_rad, qd_rad_s });
+            }
+        }
+        write_targets(reference, &mut recording);
+        Ok(recording)
+    }
+}
+
+/// One run of `arm` as it is, behind a stiff gear, with a controller that knows it.
+pub fn simulate(
+    arm: &Arm,
+    reference: &dyn Reference,
+    config: &PlantConfig,
+    encoders: Option<Encoders>,
+) -> Result<Recording, PlantError> {
+    Plant::new(arm, config)?.run(reference, encoders)
+}
+
+fn write_targets(reference: &dyn Reference, recording: &mut Recording) {
+    let n = reference.joints();
+    let (mut q, mut qd, mut qdd) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    for (k, &time_s) in recording.time_s.iter().enumerate() {
+        reference.sample(time_s, &mut q, &mut qd, &mut qdd);
+        recording.target_q_rad.set_sample(k, &q);
+        recording.target_qd_rad_s.set_sample(k, &qd);
+        recording.target_qdd_rad_s2.set_sample(k, &qdd);
+    }
+}
+
+fn expect_joints(what: &'static str, found: usize, expected: usize) -> Result<(), PlantError> {
+    if found == expected { Ok(()) } else { Err(PlantError::Joints { what, found, expected }) }
+}
