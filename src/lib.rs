@@ -6,6 +6,7 @@ pub mod base;
 pub mod dynamics;
 pub mod excitation;
 pub mod identify;
+pub mod montecarlo;
 pub mod plant;
 pub mod random;
 pub mod robot;

@@ -1,0 +1,274 @@
+//! Is the σ true? The verdict over a tally.
+
+use serde::{Serialize, Serializer};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+
+use super::tally::Tally;
+
+/// Chance that all checks together fail an identifier that is exactly at its claim.
+pub const FALSE_FAILURE_RATE: f64 = 1e-3;
+
+/// What is claimed, as intervals that the true value of a statistic must lie in.
+pub mod claims {
+    /// Coverage of nominal 95 % intervals, mean over the parameters.
+    pub const MEAN_COVERAGE: [f64; 2] = [0.935, 0.965];
+    /// Coverage of each single parameter.
+    pub const EACH_COVERAGE: [f64; 2] = [0.90, 0.985];
+    /// |mean error| of each parameter in units of its σ.
+    pub const BIAS: [f64; 2] = [-0.2, 0.2];
+    /// Empirical over predicted σ, pooled over the parameters.
+    pub const POOLED_RATIO: [f64; 2] = [0.95, 1.05];
+    /// Empirical over predicted σ of each parameter.
+    pub const EACH_RATIO: [f64; 2] = [0.85, 1.15];
+}
+
+/// Answer of one check, or of all.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// The claim holds as far as these trials can tell.
+    Pass,
+    /// The claim is wrong beyond what chance explains.
+    Fail,
+    /// Too few trials: chance alone could hide or fake a violation.
+    NotEvaluated,
+}
+
+impl std::fmt::Display for Verdict {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(match self {
+            Self::Pass => "pass",
+            Self::Fail => "fail",
+            Self::NotEvaluated => "not_evaluated",
+        })
+    }
+}
+
+impl Serialize for Verdict {
+    fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
+        s.collect_str(self)
+    }
+}
+
+/// One check: a statistic, what chance leaves open about it, and the claim.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Check {
+    /// In words.
+    pub what: &'static str,
+    /// Parameter that decided (the worst), `None` for statistics over all.
+    pub parameter: Option<usize>,
+    /// Measured value.
+    pub value: f64,
+    /// Where the true value lies at the check's confidence.
+    pub interval: [f64; 2],
+    /// Where the claim says that it lies.
+    pub claim: [f64; 2],
+    /// The answer.
+    pub verdict: Verdict,
+}
+
+/// All checks of one experiment.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Calibration {
+    /// One per claim.
+    pub checks: Vec<Check>,
+    /// Fail if any fails; not evaluated if any could not be; else pass.
+    pub verdict: Verdict,
+}
+
+/// Number of claims that share [`FALSE_FAILURE_RATE`].
+const CHECKS: f64 = 5.0;
+
+impl Calibration {
+    /// Checks every claim against `tally`.
+    ///
+    /// Each statistic gets an interval at confidence 1 − α/(number of claims × number of
+    /// statistics in the claim) (Bonferroni), from the binomial, normal or χ² distribution at the
+    /// tally's number of trials. A claim **fails** when an interval lies wholly outside it, is
+    /// **not evaluated** when an interval is wider than the claim, and passes otherwise. A trial
+    /// that failed counts as an interval that misses the truth.
+    pub fn of(tally: &Tally) -> Self {
+        let b = tally.parameters();
+        let n = tally.succeeded as f64;
+        if tally.succeeded < 2 || b == 0 {
+            return Self { checks: Vec::new(), verdict: Verdict::NotEvaluated };
+        }
+        let statistics: Vec<_> = (0..b).map(|k| tally.statistics(k)).collect();
+        let single = FALSE_FAILURE_RATE / CHECKS;
+        let each = single / b as f64;
+        let (z_single, z_each) = (normal_quantile(single), normal_quantile(each));
+        let lost = tally.failures.len() as f64;
+        let held = n / (n + lost);
+
+        let (mean, error) = tally.mean_coverage();
+        // A handful of trials may show no scatter at all; the binomial error of one parameter, over
+        // √b for independent ones, is the least there can be.
+        let least = (0.95 * 0.05 / (n * b as f64)).sqrt();
+        let half = z_single * error.max(least);
+        let mean = mean * held;
+        let ratios: Vec<f64> =
+            statistics.iter().map(|s| s.sigma_empirical / s.sigma_predicted).collect();
+        let (pooled, pooled_error) = tally.pooled_ratio();
+        // Again no less than for independent parameters: σ of s/σ is 1/√(2n) each.
+        let pooled_half = z_single * pooled_error.max((0.5 / (n * b as f64)).sqrt());
+        let ratio_interval = |ratio: f64, alpha: f64| {
+            // (n − 1) s²/σ² ~ χ²(n − 1).
+            match ChiSquared::new(n - 1.0) {
+                Ok(chi) => {
+                    let root = |p: f64| (chi.inverse_cdf(p) / (n - 1.0)).sqrt();
+                    [ratio / root(1.0 - 0.5 * alpha), ratio / root(0.5 * alpha)]
+                }
+                Err(_) => [0.0, f64::INFINITY],
+            }
+        };
+        let checks = vec![
+            Check::new(
+                "coverage of 95 % intervals, mean over parameters",
+                claims::MEAN_COVERAGE,
+                [(None, mean, [mean - half, mean + half])],
+            ),
+            Check::new(
+                "coverage of 95 % intervals, worst parameter",
+                claims::EACH_COVERAGE,
+                statistics.iter().enumerate().map(|(k, s)| {
+                    let coverage = s.coverage * held;
+                    (Some(k), coverage, wilson(coverage, n + lost, z_each))
+                }),
+            ),
+            Check::new(
+                "bias over σ, worst parameter",
+                claims::BIAS,
+                statistics.iter().enumerate().map(|(k, s)| {
+                    let bias = s.bias / s.sigma_empirical;
+                    let half = z_each / n.sqrt();
+                    (Some(k), bias, [bias - half, bias + half])
+                }),
+            ),
+            Check::new(
+                "empirical over predicted σ, pooled over parameters",
+                claims::POOLED_RATIO,
+                [(None, pooled, [pooled - pooled_half, pooled + pooled_half])],
+            ),
+            Check::new(
+                "empirical over predicted σ, worst parameter",
+                claims::EACH_RATIO,
+                ratios.iter().enumerate().map(|(k, &r)| (Some(k), r, ratio_interval(r, each))),
+            ),
+        ];
+        let any = |wanted| checks.iter().any(|check: &Check| check.verdict == wanted);
+        let verdict = if any(Verdict::Fail) {
+            Verdict::Fail
+        } else if any(Verdict::NotEvaluated) {
+            Verdict::NotEvaluated
+        } else {
+            Verdict::Pass
+        };
+        Self { checks, verdict }
+    }
+}
+
+impl Check {
+    /// The statistic furthest out decides.
+    fn new(
+        what: &'static str,
+        claim: [f64; 2],
+        statistics: impl IntoIterator<Item = (Option<usize>, f64, [f64; 2])>,
+    ) -> Self {
+        let middle = 0.5 * (claim[0] + claim[1]);
+        let half = 0.5 * (claim[1] - claim[0]);
+        let mut worst: Option<Self> = None;
+        for (parameter, value, interval) in statistics {
+            let outside = interval[0] > claim[1] || interval[1] < claim[0];
+            let verdict = if outside {
+                Verdict::Fail
+            } else if interval[1] - interval[0] > claim[1] - claim[0] {
+                Verdict::NotEvaluated
+            } else {
+                Verdict::Pass
+            };
+            let severity = |check: &Self| {
+                let rank = match check.verdict {
+                    Verdict::Fail => 2,
+                    Verdict::NotEvaluated => 1,
+                    Verdict::Pass => 0,
+                };
+                (rank, ((check.value - middle).abs() / half * 1e9) as u64)
+            };
+            let check = Self { what, parameter, value, interval, claim, verdict };
+            if worst.as_ref().is_none_or(|known| severity(&check) > severity(known)) {
+                worst = Some(check);
+            }
+        }
+        worst.unwrap_or(Self {
+            what,
+            parameter: None,
+            value: f64::NAN,
+            interval: [f64::NEG_INFINITY, f64::INFINITY],
+            claim,
+            verdict: Verdict::NotEvaluated,
+        })
+    }
+}
+
+/// Two-sided normal quantile for a total tail probability `alpha`.
+fn normal_quantile(alpha: f64) -> f64 {
+    Normal::standard().inverse_cdf(1.0 - 0.5 * alpha)
+}
+
+/// Wilson's interval for a binomial share (E. B. Wilson 1927).
+pub fn wilson(share: f64, trials: f64, z: f64) -> [f64; 2] {
+    let z2 = z * z / trials;
+    let centre = (share + 0.5 * z2) / (1.0 + z2);
+    let half = z / (1.0 + z2) * (share * (1.0 - share) / trials + 0.25 * z2 / trials).sqrt();
+    [centre - half, centre + half]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::montecarlo::tally::Outcome;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    /// Trials of 20 independent parameters whose true σ is `true_sigma` where 1 is claimed.
+    fn experiment(trials: usize, true_sigma: f64, bias: f64) -> Verdict {
+        let mut rng = rand::rngs::ChaCha8Rng::seed_from_u64(11);
+        let mut tally = Tally::new(20);
+        for _ in 0..trials {
+            let outcomes: Vec<Outcome> = (0..20)
+                .map(|_| {
+                    let z: f64 = StandardNormal.sample(&mut rng);
+                    Outcome { z: bias + true_sigma * z, sigma: 1.0, quantile_95: 1.96 }
+                })
+                .collect();
+            tally.add(&outcomes);
+        }
+        Calibration::of(&tally).verdict
+    }
+
+    #[test]
+    fn a_true_sigma_passes_and_a_false_one_fails() {
+        assert_eq!(experiment(2000, 1.0, 0.0), Verdict::Pass);
+        assert_eq!(experiment(2000, 1.3, 0.0), Verdict::Fail);
+        assert_eq!(experiment(2000, 0.7, 0.0), Verdict::Fail);
+        assert_eq!(experiment(2000, 1.0, 0.4), Verdict::Fail);
+    }
+
+    #[test]
+    fn a_handful_of_trials_cannot_tell() {
+        assert_eq!(experiment(1, 1.0, 0.0), Verdict::NotEvaluated);
+        assert_eq!(experiment(20, 1.0, 0.0), Verdict::NotEvaluated);
+    }
+
+    #[test]
+    fn failed_trials_count_against_coverage() {
+        let mut tally = Tally::new(1);
+        for k in 0..2000 {
+            let z = if k % 20 == 0 { 2.5 } else { 0.9 * f64::from(k % 3 - 1) };
+            tally.add(&[Outcome { z, sigma: 1.0, quantile_95: 1.96 }]);
+        }
+        for trial in 2000..4000 {
+            tally.add_failure(crate::montecarlo::tally::Failure { trial, reason: "x".into() });
+        }
+        assert_eq!(Calibration::of(&tally).verdict, Verdict::Fail);
+    }
+}

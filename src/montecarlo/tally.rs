@@ -1,0 +1,291 @@
+//! Sums over trials that come out the same in any order.
+
+use serde::{Deserialize, Serialize};
+
+/// Fixed-point unit of the sums: 2⁻⁴⁰ of a parameter's scale, 1e-12 of a σ.
+///
+/// Integer addition is exact and associative, so a tally does not depend on the number of threads,
+/// on the split into shards or on the order of merging, and its size not on the number of trials.
+/// 2¹²⁷ units hold 1e9 trials of |z| ≤ 1e6 with their squares.
+const UNITS_PER_ONE: f64 = (1u64 << 40) as f64;
+
+/// Largest |z| a tally takes; a trial beyond it has failed.
+pub const LARGEST_Z: f64 = 1e6;
+
+/// Histogram of (θ̂ − θ)/σ̂ pooled over the parameters: bins of [`BIN_WIDTH`] from −[`BIN_RANGE`] to
+/// it, one bin beyond each end.
+pub const BIN_WIDTH: f64 = 0.25;
+/// See [`BIN_WIDTH`].
+pub const BIN_RANGE: f64 = 5.0;
+const BINS: usize = (2.0 * BIN_RANGE / BIN_WIDTH) as usize + 2;
+
+fn to_units(x: f64) -> i128 {
+    (x * UNITS_PER_ONE).round() as i128
+}
+
+fn from_units(units: i128) -> f64 {
+    units as f64 / UNITS_PER_ONE
+}
+
+/// What one trial says of one parameter, in units of the parameter's scale.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outcome {
+    /// (θ̂ − θ)/scale.
+    pub z: f64,
+    /// σ̂/scale.
+    pub sigma: f64,
+    /// Half-width of the 95 % interval over σ̂.
+    pub quantile_95: f64,
+}
+
+impl Outcome {
+    fn covered(&self) -> bool {
+        self.z.abs() <= self.quantile_95 * self.sigma
+    }
+
+    /// Whether the tally can hold it.
+    pub fn is_sound(&self) -> bool {
+        self.z.abs() <= LARGEST_Z && self.sigma > 0.0 && self.sigma <= LARGEST_Z
+    }
+}
+
+/// A trial that gave no estimate.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Failure {
+    /// Which trial (from 0).
+    pub trial: u64,
+    /// Why.
+    pub reason: String,
+}
+
+/// Exact sums over trials.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tally {
+    /// Trials that gave an estimate.
+    pub succeeded: u64,
+    /// Trials that did not, by number.
+    pub failures: Vec<Failure>,
+    parameters: Vec<ParameterSums>,
+    /// Σ over trials of the number of covered parameters, and of its square.
+    covered: u64,
+    covered_squared: u64,
+    /// Σ over trials of the mean over parameters of z², and of its square.
+    #[serde(with = "decimal")]
+    spread: i128,
+    #[serde(with = "decimal")]
+    spread_squared: i128,
+    histogram: Vec<u64>,
+}
+
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ParameterSums {
+    #[serde(with = "decimal")]
+    z: i128,
+    #[serde(with = "decimal")]
+    z_squared: i128,
+    #[serde(with = "decimal")]
+    sigma_squared: i128,
+    covered: u64,
+}
+
+/// 128-bit integers as decimal strings: JSON numbers would lose their low digits.
+mod decimal {
+    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+    pub fn serialize<S: Serializer>(value: &i128, s: S) -> Result<S::Ok, S::Error> {
+        s.collect_str(value)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(d: D) -> Result<i128, D::Error> {
+        String::deserialize(d)?.parse().map_err(D::Error::custom)
+    }
+}
+
+/// Statistics of one parameter over the trials, in units of its scale.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ParameterStatistics {
+    /// Mean of (θ̂ − θ)/scale.
+    pub bias: f64,
+    /// Standard deviation of θ̂/scale; NaN for fewer than two trials.
+    pub sigma_empirical: f64,
+    /// Root mean square of σ̂/scale.
+    pub sigma_predicted: f64,
+    /// Share of trials whose 95 % interval holds the truth.
+    pub coverage: f64,
+}
+
+impl Tally {
+    /// No trials yet.
+    pub fn new(parameters: usize) -> Self {
+        Self {
+            succeeded: 0,
+            failures: Vec::new(),
+            parameters: vec![ParameterSums::default(); parameters],
+            covered: 0,
+            covered_squared: 0,
+            spread: 0,
+            spread_squared: 0,
+            histogram: vec![0; BINS],
+        }
+    }
+
+    /// Number of parameters.
+    pub fn parameters(&self) -> usize {
+        self.parameters.len()
+    }
+
+    /// Trials run.
+    pub fn trials(&self) -> u64 {
+        self.succeeded + self.failures.len() as u64
+    }
+
+    /// Adds a trial's estimates.
+    pub fn add(&mut self, outcomes: &[Outcome]) {
+        self.succeeded += 1;
+        let mut covered = 0;
+        for (sums, outcome) in self.parameters.iter_mut().zip(outcomes) {
+            sums.z += to_units(outcome.z);
+            sums.z_squared += to_units(outcome.z * outcome.z);
+            sums.sigma_squared += to_units(outcome.sigma * outcome.sigma);
+            sums.covered += u64::from(outcome.covered());
+            covered += u64::from(outcome.covered());
+            let bin = ((outcome.z / outcome.sigma + BIN_RANGE) / BIN_WIDTH).floor() + 1.0;
+            self.histogram[bin.clamp(0.0, (BINS - 1) as f64) as usize] += 1;
+        }
+        self.covered += covered;
+        self.covered_squared += covered * covered;
+        let spread = outcomes.iter().map(|o| o.z * o.z).sum::<f64>() / outcomes.len() as f64;
+        self.spread += to_units(spread);
+        self.spread_squared += to_units(spread * spread);
+    }
+
+    /// Adds a trial that failed.
+    pub fn add_failure(&mut self, failure: Failure) {
+        let at = self.failures.partition_point(|known| known < &failure);
+        self.failures.insert(at, failure);
+    }
+
+    /// Adds another tally over other trials of the same experiment.
+    pub fn merge(&mut self, other: &Self) {
+        self.succeeded += other.succeeded;
+        other.failures.iter().for_each(|failure| self.add_failure(failure.clone()));
+        for (sums, more) in self.parameters.iter_mut().zip(&other.parameters) {
+            sums.z += more.z;
+            sums.z_squared += more.z_squared;
+            sums.sigma_squared += more.sigma_squared;
+            sums.covered += more.covered;
+        }
+        self.covered += other.covered;
+        self.covered_squared += other.covered_squared;
+        self.spread += other.spread;
+        self.spread_squared += other.spread_squared;
+        self.histogram.iter_mut().zip(&other.histogram).for_each(|(a, b)| *a += b);
+    }
+
+    /// Statistics of parameter `k`.
+    pub fn statistics(&self, k: usize) -> ParameterStatistics {
+        let n = self.succeeded as f64;
+        let sums = &self.parameters[k];
+        let bias = from_units(sums.z) / n;
+        let variance = (from_units(sums.z_squared) - n * bias * bias) / (n - 1.0);
+        ParameterStatistics {
+            bias,
+            sigma_empirical: if self.succeeded < 2 { f64::NAN } else { variance.max(0.0).sqrt() },
+            sigma_predicted: (from_units(sums.sigma_squared) / n).sqrt(),
+            coverage: sums.covered as f64 / n,
+        }
+    }
+
+    /// Coverage averaged over the parameters, and the standard error of that average. The error
+    /// comes from the scatter between trials, so that correlated parameters are not counted as
+    /// independent evidence.
+    pub fn mean_coverage(&self) -> (f64, f64) {
+        let n = self.succeeded as f64;
+        let b = self.parameters.len() as f64;
+        let mean = self.covered as f64 / n;
+        let variance = (self.covered_squared as f64 - n * mean * mean) / (n - 1.0);
+        (mean / b, (variance.max(0.0) / n).sqrt() / b)
+    }
+
+    /// Empirical over predicted σ pooled over the parameters, √(Σ z² / Σ σ̂²), and its standard
+    /// error, again from the scatter between trials.
+    pub fn pooled_ratio(&self) -> (f64, f64) {
+        let n = self.succeeded as f64;
+        let spread = from_units(self.spread) / n;
+        let variance = (from_units(self.spread_squared) / n - spread * spread) * n / (n - 1.0);
+        let predicted: i128 = self.parameters.iter().map(|sums| sums.sigma_squared).sum();
+        let predicted = from_units(predicted) / n / self.parameters.len() as f64;
+        let ratio = (spread / predicted).sqrt();
+        (ratio, 0.5 * ratio * (variance.max(0.0) / n).sqrt() / spread)
+    }
+
+    /// `(bin centre, share of all)` of (θ̂ − θ)/σ̂ pooled over parameters and trials; the first and
+    /// last bin collect what lies beyond.
+    pub fn histogram(&self) -> Vec<(f64, f64)> {
+        let all: u64 = self.histogram.iter().sum();
+        let centre = |bin: usize| (bin as f64 - 0.5) * BIN_WIDTH - BIN_RANGE;
+        let share = |count: u64| count as f64 / all.max(1) as f64;
+        self.histogram.iter().enumerate().map(|(bin, &c)| (centre(bin), share(c))).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outcome(k: u64, parameter: u64) -> Outcome {
+        let z = ((k * 7 + parameter * 13) as f64 * 0.37).sin() * 2.2;
+        Outcome { z, sigma: 1.0 + 0.01 * (k % 5) as f64, quantile_95: 1.96 }
+    }
+
+    fn tally(trials: impl Iterator<Item = u64>) -> Tally {
+        let mut tally = Tally::new(3);
+        for k in trials {
+            if k % 10 == 9 {
+                tally.add_failure(Failure { trial: k, reason: "did not converge".into() });
+            } else {
+                tally.add(&[outcome(k, 0), outcome(k, 1), outcome(k, 2)]);
+            }
+        }
+        tally
+    }
+
+    #[test]
+    fn any_split_and_any_order_give_the_same_tally() {
+        let whole = tally(0..100);
+        let mut parts = tally(60..100);
+        parts.merge(&tally(0..13));
+        parts.merge(&tally((13..60).rev()));
+        assert_eq!(whole, parts);
+        assert_eq!(whole.trials(), 100);
+        assert_eq!(whole.failures.len(), 10);
+    }
+
+    #[test]
+    fn statistics_are_those_of_the_textbook() {
+        let whole = tally(0..100);
+        let z: Vec<f64> = (0..100).filter(|k| k % 10 != 9).map(|k| outcome(k, 1).z).collect();
+        let n = z.len() as f64;
+        let mean = z.iter().sum::<f64>() / n;
+        let sd = (z.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+        let statistics = whole.statistics(1);
+        // Every term is rounded to 1e-12.
+        assert!((statistics.bias - mean).abs() < 1e-11);
+        assert!((statistics.sigma_empirical - sd).abs() < 1e-11);
+        let covered = (0..100).filter(|k| k % 10 != 9).filter(|&k| outcome(k, 1).covered()).count();
+        assert_eq!(statistics.coverage, covered as f64 / n);
+        assert!(
+            (whole.histogram().iter().map(|(_, share)| share).sum::<f64>() - 1.0).abs() < 1e-12
+        );
+    }
+
+    #[test]
+    fn a_tally_survives_json() {
+        let whole = tally(0..50);
+        let text = serde_json::to_string(&whole).unwrap();
+        assert_eq!(serde_json::from_str::<Tally>(&text).unwrap(), whole);
+    }
+}
