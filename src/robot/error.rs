@@ -38,6 +38,14 @@ pub enum RobotError {
         /// The parser's message.
         message: String,
     },
+    /// A URDF, but not of an arm this program can work with.
+    #[error("{file}: {fault}")]
+    UrdfArm {
+        /// The file.
+        file: String,
+        /// What is wrong, where, and what to do.
+        fault: super::urdf::UrdfFault,
+    },
     /// Read, but not an arm this program can work with.
     #[error("{file}: {what}")]
     Invalid {

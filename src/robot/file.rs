@@ -6,6 +6,7 @@ use serde::Deserialize;
 use super::arm::{Arm, Capsule, Clearance, Drive, Joint, Limits, Placement};
 use super::error::RobotError;
 use super::inertia::LinkInertia;
+use super::urdf::{UrdfArm, UrdfNotice, read_urdf};
 
 /// Arms built in, by the name given to `--robot`.
 const BUILT_IN: [(&str, &str); 4] = [
@@ -32,15 +33,23 @@ impl Arm {
 
     /// What `--robot` accepts: a built-in name, a `.urdf` file or a `.toml` robot file.
     pub fn load(name_or_path: &str) -> Result<Self, RobotError> {
+        Self::load_with_notices(name_or_path).map(|(arm, _)| arm)
+    }
+
+    /// As [`Arm::load`], with what had to be assumed; only a URDF leaves anything open.
+    pub fn load_with_notices(name_or_path: &str) -> Result<(Self, Vec<UrdfNotice>), RobotError> {
         let path = std::path::Path::new(name_or_path);
         let read = || {
             std::fs::read_to_string(path)
                 .map_err(|source| RobotError::Read { file: name_or_path.to_owned(), source })
         };
         match path.extension().and_then(|e| e.to_str()) {
-            Some("urdf") => super::urdf::arm_from_urdf(&read()?, name_or_path),
-            Some("toml") => Self::from_toml(&read()?, name_or_path),
-            _ => Self::built_in(name_or_path),
+            Some("urdf") => {
+                let UrdfArm { arm, notices, .. } = read_urdf(&read()?, name_or_path)?;
+                Ok((arm, notices))
+            }
+            Some("toml") => Ok((Self::from_toml(&read()?, name_or_path)?, Vec::new())),
+            _ => Ok((Self::built_in(name_or_path)?, Vec::new())),
         }
     }
 

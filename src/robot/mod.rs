@@ -15,3 +15,4 @@ pub use error::RobotError;
 pub use file::built_in_names;
 pub use inertia::LinkInertia;
 pub use signals::JointSignals;
+pub use urdf::{FixedFrame, UrdfArm, UrdfFault, UrdfNotice, read_urdf};

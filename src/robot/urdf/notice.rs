@@ -1,0 +1,137 @@
+//! What was assumed or left out in reading a URDF.
+
+use std::fmt;
+
+/// Something a URDF does not say, or says in a way that had to be interpreted.
+#[derive(Debug, Clone, PartialEq)]
+pub enum UrdfNotice {
+    /// URDF has no gravity: 9.81 m/s² along −z of the root link.
+    Gravity {
+        /// The root link: the base frame.
+        root: String,
+    },
+    /// URDF has no drives: rotor inertia 0, gear ratio 1, torque constant 1 Nm/A.
+    Drives,
+    /// Neither damping nor friction is given.
+    NoFriction {
+        /// The joints without.
+        joints: Vec<String>,
+    },
+    /// Collision shapes are not read.
+    NoClearance,
+    /// A continuous (or unlimited) joint was given ±2π rad.
+    Continuous {
+        /// The joint.
+        joint: String,
+    },
+    /// No speed limit in the file.
+    AssumedVelocity {
+        /// The joint.
+        joint: String,
+        /// What it was given.
+        velocity_rad_s: f64,
+    },
+    /// No acceleration limit in the file.
+    AssumedAcceleration {
+        /// The joints without.
+        joints: Vec<String>,
+        /// What they were given.
+        acceleration_rad_s2: f64,
+    },
+    /// No torque limit in the file: unlimited.
+    NoTorqueLimit {
+        /// The joint.
+        joint: String,
+    },
+    /// A link fixed to a moving body was added to it.
+    Merged {
+        /// The link.
+        link: String,
+        /// The joint that moves it.
+        joint: String,
+        /// What it added.
+        mass_kg: f64,
+    },
+    /// A link ahead of the first moving joint never moves: its inertia is left out.
+    StandingMass {
+        /// The link.
+        link: String,
+        /// Its mass.
+        mass_kg: f64,
+    },
+    /// The joint's frame is not the link's: z was turned onto the axis.
+    Reoriented {
+        /// The joint.
+        joint: String,
+        /// The axis in the link's frame: z of the joint frame.
+        axis: [f64; 3],
+    },
+    /// An axis was a unit vector only to the digits printed.
+    AxisNormalised {
+        /// The joint.
+        joint: String,
+        /// Its length as written.
+        length: f64,
+    },
+    /// An angle printed to a few digits was taken as the multiple of π/2 it stands for.
+    RightAngle {
+        /// The joint or link.
+        place: String,
+        /// As written.
+        written_rad: f64,
+        /// As used.
+        used_rad: f64,
+    },
+}
+
+impl fmt::Display for UrdfNotice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Gravity { root } => {
+                write!(f, "gravity is taken as 9.81 m/s2 along -z of the root link \"{root}\"")
+            }
+            Self::Drives => write!(
+                f,
+                "URDF has no drives: rotor inertia 0, gear ratio 1, torque constant 1 Nm/A (a current column reads as joint torque)"
+            ),
+            Self::NoFriction { joints } => {
+                write!(f, "no damping and no friction given, taken as 0: {}", joints.join(", "))
+            }
+            Self::NoClearance => write!(
+                f,
+                "collision shapes are not read: self-collision and the floor are not watched"
+            ),
+            Self::Continuous { joint } => {
+                write!(f, "joint \"{joint}\" has no end stops: taken as -2 pi to 2 pi")
+            }
+            Self::AssumedVelocity { joint, velocity_rad_s } => {
+                write!(f, "joint \"{joint}\": no speed limit, taken as {velocity_rad_s:.4} rad/s")
+            }
+            Self::AssumedAcceleration { joints, acceleration_rad_s2 } => write!(
+                f,
+                "no acceleration limit, taken as {acceleration_rad_s2} rad/s2: {}",
+                joints.join(", ")
+            ),
+            Self::NoTorqueLimit { joint } => {
+                write!(f, "joint \"{joint}\": no effort limit, torque taken as unlimited")
+            }
+            Self::Merged { link, joint, mass_kg } => write!(
+                f,
+                "link \"{link}\" ({mass_kg} kg) is fixed to the body of joint \"{joint}\" and counted in it"
+            ),
+            Self::StandingMass { link, mass_kg } => {
+                write!(f, "link \"{link}\" ({mass_kg} kg) stands still: its inertia is left out")
+            }
+            Self::Reoriented { joint, axis: [x, y, z] } => write!(
+                f,
+                "joint \"{joint}\": its frame has z along the axis ({x}, {y}, {z}) of the link, parameters are about that frame"
+            ),
+            Self::AxisNormalised { joint, length } => {
+                write!(f, "joint \"{joint}\": an axis of length {length} was made a unit vector")
+            }
+            Self::RightAngle { place, written_rad, used_rad } => {
+                write!(f, "{place}: angle {written_rad} is taken as {used_rad} rad")
+            }
+        }
+    }
+}
