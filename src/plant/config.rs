@@ -48,7 +48,8 @@ impl PlantConfig {
             ("friction_feedforward", self.friction_feedforward, true),
         ] {
             if !(value > 0.0 && value.is_finite() || zero_allowed && value == 0.0) {
-                let requirement = "must be a positive number";
+                let requirement =
+                    if zero_allowed { "must not be negative" } else { "must be positive" };
                 return Err(PlantError::Setting { key, value, requirement });
             }
         }

@@ -224,3 +224,116 @@ impl Butterworth2 {
         (0..samples).map(|k| self.next(if k == 0 { 1.0 } else { 0.0 }).powi(2)).sum()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RATE_HZ: f64 = 125.0;
+    const SAMPLES: usize = 200_000;
+    /// Bounds are 5 standard deviations of the estimate: each check fails by chance once in 2 million
+    /// seeds, and the seed is fixed.
+    const SIGMAS: f64 = 5.0;
+
+    fn draw(model: &NoiseModel, sd: &[f64]) -> JointSignals {
+        let mut signals = JointSignals::zeros(sd.len(), SAMPLES);
+        let streams = TrialStreams::new(11, b"noise", 0);
+        model.add_to(&streams, RATE_HZ, sd, &mut Vec::new(), &mut signals);
+        signals
+    }
+
+    fn mean_product(a: &[f64], b: &[f64]) -> f64 {
+        a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / a.len().min(b.len()) as f64
+    }
+
+    fn single(colour: Colour) -> NoiseModel {
+        let components = vec![Component { share: 1.0, colour }];
+        NoiseModel { components, cross_joint_correlation: 0.0 }
+    }
+
+    /// The variance of a sample variance is 2/n Σ ρ²; Σ ρ² is (1+φ²)/(1−φ²) for AR(1) and
+    /// 0.338 f_s/f_c for a second-order Butterworth spectrum 1/(1 + (f/f_c)⁴).
+    #[test]
+    fn every_colour_has_the_variance_asked_for() {
+        let ar1 = |t: f64| {
+            let p2 = (-2.0 / (RATE_HZ * t)).exp();
+            (Colour::Ar1 { time_constant_s: t }, (1.0 + p2) / (1.0 - p2))
+        };
+        let low_pass = |f: f64| (Colour::LowPass { cutoff_hz: f }, 0.338 * RATE_HZ / f);
+        for (colour, sum_rho2) in [(Colour::White, 1.0), ar1(0.02), ar1(1.0), low_pass(10.0)] {
+            let sd = [1.0, 0.15];
+            let signals = draw(&single(colour), &sd);
+            for (j, sd) in sd.iter().enumerate() {
+                let variance = mean_product(signals.joint(j), signals.joint(j)) / (sd * sd);
+                let bound = SIGMAS * (2.0 * sum_rho2 / SAMPLES as f64).sqrt();
+                assert!((variance - 1.0).abs() < bound, "{colour:?} {j}: {variance}, ±{bound}");
+            }
+        }
+    }
+
+    /// Bartlett's variance of the sample autocorrelation of an AR(1) process at lag k:
+    /// ((1+φ²)(1−φ²ᵏ)/(1−φ²) − 2kφ²ᵏ)/n.
+    #[test]
+    fn autoregression_forgets_at_its_time_constant() {
+        let time_constant_s = 0.076;
+        let signals = draw(&single(Colour::Ar1 { time_constant_s }), &[1.0]);
+        let x = signals.joint(0);
+        let phi = (-1.0 / (RATE_HZ * time_constant_s)).exp();
+        for lag in [1_usize, 5, 20, 100] {
+            let k = lag as f64;
+            let (p2, p2k) = (phi * phi, phi.powf(2.0 * k));
+            let variance = (1.0 + p2) * (1.0 - p2k) / (1.0 - p2) - 2.0 * k * p2k;
+            let bound = SIGMAS * (variance / SAMPLES as f64).sqrt();
+            let seen = mean_product(&x[lag..], &x[..SAMPLES - lag]) / mean_product(x, x);
+            assert!((seen - phi.powf(k)).abs() < bound, "lag {lag}: {seen}, {}", phi.powf(k));
+        }
+    }
+
+    #[test]
+    fn the_low_pass_halves_the_power_at_its_cutoff() {
+        let cutoff = 0.08;
+        let mut filter = Butterworth2::new(cutoff);
+        let (mut dc, mut re, mut im) = (0.0, 0.0, 0.0);
+        for k in 0..500 {
+            let h = filter.next(if k == 0 { 1.0 } else { 0.0 });
+            let (sin, cos) = (std::f64::consts::TAU * cutoff * f64::from(k)).sin_cos();
+            (dc, re, im) = (dc + h, re + h * cos, im + h * sin);
+        }
+        assert!((dc - 1.0).abs() < 1e-12, "{dc}");
+        assert!((re * re + im * im - 0.5).abs() < 1e-12, "{}", re * re + im * im);
+    }
+
+    /// The correlation of two series with autocorrelation ρ_k varies by (1−ρ²)²/n · Σ ρ_k², with the
+    /// shares' sum of squares dominated by the slow 20 %: 0.2² · 125.
+    #[test]
+    fn joints_are_correlated_as_asked() {
+        let model = NoiseModel::real_arm();
+        let signals = draw(&model, &[1.0, 1.0, 0.15]);
+        let bound = SIGMAS * (8.0 / SAMPLES as f64).sqrt();
+        for (a, b) in [(0, 1), (0, 2), (1, 2)] {
+            let [aa, bb, ab] = [(a, a), (b, b), (a, b)]
+                .map(|(a, b)| mean_product(signals.joint(a), signals.joint(b)));
+            let seen = ab / (aa * bb).sqrt();
+            assert!((seen - model.cross_joint_correlation).abs() < bound, "{a} {b}: {seen}");
+        }
+    }
+
+    #[test]
+    fn impossible_noise_is_refused() {
+        let of = |share, colour, rho| NoiseModel {
+            components: vec![Component { share, colour }],
+            cross_joint_correlation: rho,
+        };
+        for model in [
+            of(0.9, Colour::White, 0.0),
+            of(f64::NAN, Colour::White, 0.0),
+            of(1.0, Colour::White, 1.0),
+            of(1.0, Colour::White, -0.1),
+            of(1.0, Colour::Ar1 { time_constant_s: 0.0 }, 0.0),
+            of(1.0, Colour::LowPass { cutoff_hz: 62.5 }, 0.0),
+        ] {
+            assert!(model.validate(RATE_HZ).is_err(), "{model:?}");
+        }
+        assert_eq!(NoiseModel::real_arm().validate(RATE_HZ), Ok(()));
+    }
+}

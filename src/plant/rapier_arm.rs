@@ -102,8 +102,9 @@ impl RapierArm {
     /// q̈ = (M(q) + diag(Ia))⁻¹ (τ − c(q, q̇) − g(q)), rad/s², with τ the torque that reaches the
     /// link side (drive torque minus friction), Nm. All slices have length N.
     ///
-    /// The result depends on the arguments alone, bit for bit, whatever was asked before. For a
-    /// state that is not finite the result is not meaningful: the caller checks its state.
+    /// The result depends on the arguments alone, bit for bit, whatever was asked before. A state that
+    /// is not finite gives a result that is not finite, and makes the engine set the links aside: the
+    /// arm is of no use afterwards.
     pub fn forward_dynamics(
         &mut self,
         q_rad: &[f64],

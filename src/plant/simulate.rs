@@ -12,8 +12,10 @@ use crate::excitation::Reference;
 use crate::robot::Arm;
 
 /// The arm, what moves it, and what it believes: everything of a run but the motion.
+///
+/// Every run starts from a newly built engine, so that runs do not know of each other.
 pub struct Plant {
-    arm: RapierArm,
+    arm: Arm,
     drivetrain: Box<dyn Drivetrain>,
     controller: Controller,
     config: PlantConfig,
@@ -35,7 +37,7 @@ impl Plant {
         config.validate()?;
         expect_joints("the controller's arm", nominal.dof(), arm.dof())?;
         Ok(Self {
-            arm: RapierArm::new(arm)?,
+            arm: arm.clone(),
             drivetrain,
             controller: Controller::new(nominal, config),
             config: config.clone(),
@@ -51,6 +53,7 @@ impl Plant {
     ) -> Result<Recording, PlantError> {
         let n = self.arm.dof();
         expect_joints("the reference", reference.joints(), n)?;
+        let mut arm = RapierArm::new(&self.arm)?;
         let h = self.config.step_s;
         let per_control = self.config.steps_per_control()?;
         let per_log = self.config.steps_per_log()?;
@@ -70,7 +73,7 @@ impl Plant {
         let (q, qd, own) = state.parts_mut();
         reference.sample(0.0, q, qd, &mut vec![0.0; n]);
         let (q, qd) = (&*q, &*qd);
-        self.drivetrain.start(&mut self.arm, q, qd, own);
+        self.drivetrain.start(&mut arm, q, qd, own);
         let mut integrator = RungeKutta4::new(&state);
 
         let (mut q_read, mut qd_read) = (vec![0.0; n], vec![0.0; n]);
@@ -110,7 +113,7 @@ impl Plant {
             if step == last {
                 break;
             }
-            integrator.step(&mut self.arm, &mut *self.drivetrain, &mut state, time_s, h, &held);
+            integrator.step(&mut arm, &mut *self.drivetrain, &mut state, time_s, h, &held);
             if let Some(j) = state.first_not_finite() {
                 let (q_rad, qd_rad_s) = (state.q_rad()[j], state.qd_rad_s()[j]);
                 return Err(PlantError::Diverged { time_s, joint: j + 1, q_rad, qd_rad_s });

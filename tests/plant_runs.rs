@@ -1,0 +1,127 @@
+//! Runs of the plant: tracking, saturation, and what is refused.
+
+use armid::excitation::{FourierSeries, Reference};
+use armid::plant::{PlantConfig, PlantError, RapierArm, simulate};
+use armid::robot::{Arm, LinkInertia};
+use nalgebra::{Matrix3, Vector3};
+
+fn ur5() -> Arm {
+    Arm::built_in("ur5").unwrap()
+}
+
+fn motion() -> FourierSeries {
+    FourierSeries::built_in("ur5_identification").unwrap()
+}
+
+/// What the controller does not know is a tenth of the friction. Against the stiffness ω² times an
+/// inertia of at least the rotor's, a joint gives way by 0.1 (rc + rv q̇)/(ω² Ia); twice that leaves
+/// room for what the other joints' errors bring in through the mass matrix.
+#[test]
+fn the_arm_follows_its_reference() {
+    let arm = ur5();
+    let config = PlantConfig::default();
+    let run = simulate(&arm, &motion(), &config, None).unwrap();
+    assert_eq!(run.saturated_decisions, 0);
+    assert!(run.readings.is_none());
+    let (first, last) = (run.time_s[0], run.time_s[run.time_s.len() - 1]);
+    assert_eq!((first, last), (0.0, motion().duration_s()));
+    for (j, joint) in arm.joints.iter().enumerate() {
+        let errors = run.q_rad.joint(j).iter().zip(run.target_q_rad.joint(j));
+        let worst = errors.map(|(q, target)| (q - target).abs()).fold(0.0, f64::max);
+        let speed = run.qd_rad_s.joint(j).iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        let unknown_nm = (1.0 - config.friction_feedforward)
+            * (joint.drive.coulomb_nm + joint.drive.viscous_nm_s_rad * speed);
+        let stiffness_nm_rad = config.bandwidth_rad_s.powi(2) * joint.drive.rotor_inertia_kg_m2;
+        let bound = 2.0 * unknown_nm / stiffness_nm_rad;
+        println!("joint {}: largest tracking error {worst:.1e} of {bound:.1e} rad", j + 1);
+        assert!(worst < bound, "joint {}: {worst:e} rad", j + 1);
+        assert!(worst > 0.01 * bound, "joint {}: {worst:e} rad with friction unknown", j + 1);
+    }
+}
+
+/// 125 Hz is every fourth sample of 500 Hz: the log's rate does not touch the motion.
+#[test]
+fn the_log_rate_does_not_change_the_run() {
+    let slow = simulate(&ur5(), &motion(), &PlantConfig::default(), None).unwrap();
+    let config = PlantConfig { log_rate_hz: 500.0, ..PlantConfig::default() };
+    let fast = simulate(&ur5(), &motion(), &config, None).unwrap();
+    for j in 0..6 {
+        let thinned: Vec<f64> = fast.q_rad.joint(j).iter().step_by(4).copied().collect();
+        assert_eq!(thinned, slow.q_rad.joint(j));
+        let thinned: Vec<f64> = fast.torque_nm.joint(j).iter().step_by(4).copied().collect();
+        assert_eq!(thinned, slow.torque_nm.joint(j));
+    }
+}
+
+#[test]
+fn a_weak_drive_saturates_and_is_counted() {
+    let mut arm = ur5();
+    arm.joints[1].limits.torque_nm = 40.0;
+    let run = simulate(&arm, &motion(), &PlantConfig::default(), None).unwrap();
+    assert!(run.saturated_decisions > 0);
+    assert!(run.torque_nm.joint(1).iter().all(|t| t.abs() <= 40.0));
+}
+
+#[test]
+fn a_body_that_cannot_exist_is_refused_with_its_numbers() {
+    let mut arm = ur5();
+    // Principal moments of a body obey the triangle inequality: 0.05 > 0.01 + 0.02.
+    let tensor = Matrix3::from_diagonal(&Vector3::new(0.01, 0.02, 0.05));
+    arm.joints[2].link = LinkInertia::from_com(2.0, Vector3::new(0.1, 0.0, 0.0), tensor);
+    let error = RapierArm::new(&arm).unwrap_err();
+    assert!(matches!(error, PlantError::Inertia { joint: 3, mass_kg: 2.0, .. }), "{error}");
+    assert!(error.to_string().contains("0.05"), "{error}");
+    arm.joints[2].link = LinkInertia::zero();
+    assert!(matches!(RapierArm::new(&arm), Err(PlantError::Inertia { joint: 3, .. })));
+}
+
+#[test]
+fn impossible_settings_are_refused() {
+    let default = PlantConfig::default;
+    for (key, config) in [
+        ("step_s", PlantConfig { step_s: 0.0, ..default() }),
+        ("step_s", PlantConfig { step_s: f64::NAN, ..default() }),
+        ("control_rate_hz", PlantConfig { control_rate_hz: 300.0, ..default() }),
+        ("log_rate_hz", PlantConfig { log_rate_hz: 1000.0, ..default() }),
+        ("damping", PlantConfig { damping: -1.0, ..default() }),
+    ] {
+        match simulate(&ur5(), &motion(), &config, None) {
+            Err(PlantError::Setting { key: named, .. }) => assert_eq!(named, key),
+            other => panic!("{key}: {other:?}"),
+        }
+    }
+    assert!(toml::from_str::<PlantConfig>("step = 0.001").is_err());
+}
+
+/// A reference for `joints` joints that is lost after half a second.
+struct Lost {
+    joints: usize,
+}
+
+impl Reference for Lost {
+    fn joints(&self) -> usize {
+        self.joints
+    }
+
+    fn duration_s(&self) -> f64 {
+        1.0
+    }
+
+    fn sample(&self, t_s: f64, q_rad: &mut [f64], qd_rad_s: &mut [f64], qdd_rad_s2: &mut [f64]) {
+        q_rad.fill(if t_s < 0.5 { 0.3 } else { f64::NAN });
+        qd_rad_s.fill(0.0);
+        qdd_rad_s2.fill(0.0);
+    }
+}
+
+#[test]
+fn a_run_that_breaks_down_says_when_and_where() {
+    match simulate(&ur5(), &Lost { joints: 6 }, &PlantConfig::default(), None) {
+        Err(PlantError::Diverged { time_s, joint: 1, .. }) => {
+            assert!((time_s - 0.5).abs() < 1e-9, "{time_s}");
+        }
+        other => panic!("{other:?}"),
+    }
+    let error = simulate(&ur5(), &Lost { joints: 7 }, &PlantConfig::default(), None).unwrap_err();
+    assert_eq!(error, PlantError::Joints { what: "the reference", found: 7, expected: 6 });
+}
