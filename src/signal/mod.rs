@@ -1,5 +1,6 @@
 //! What happens to a record before anything is identified from it: filters without phase,
-//! derivatives, fewer samples, a uniform time grid, periods averaged and differentiated, spectra.
+//! derivatives, fewer samples, a uniform time grid, rest and motion told apart, periods found,
+//! averaged and differentiated, spectra.
 //!
 //! Enters: time stamps and [`JointSignals`](crate::robot::JointSignals) of one log. Leaves: the
 //! same quantities, smoother, on a uniform grid or averaged over periods, and how noisy they were.
@@ -10,27 +11,34 @@
 //! | accelerations as the paper makes them | [`PaperDifferentiator`] |
 //! | accelerations of a noise-free log | [`hermite_acceleration`], [`central_4`] |
 //! | time stamps jitter, samples are missing | [`Resampler`] |
+//! | when does the arm move? | [`Activity`] |
+//! | does the motion repeat, and from where to where? | [`find_period`] |
 //! | the best estimate of a repeated motion and its derivatives | [`PeriodicFit`] |
 //! | how noisy is a signal, without any model of it? | [`replicate_noise`] |
 //! | at which frequencies is there energy? | [`welch`] |
 
+mod activity;
 mod biquad;
 mod butterworth;
 mod decimate;
 mod differentiate;
 mod error;
 mod fourier;
+mod noise;
 mod paper_filter;
+mod period;
 mod replicates;
 mod resample;
 mod spectrum;
 
+pub use activity::Activity;
 pub use butterworth::{Scratch, ZeroPhase};
 pub use decimate::Decimator;
 pub use differentiate::{central_2, central_4, hermite_acceleration};
 pub use error::SignalError;
 pub use fourier::{AveragedMotion, FitScratch, PeriodicFit};
 pub use paper_filter::{PaperDifferentiator, PaperReading};
+pub use period::{Period, find_period};
 pub use replicates::{Replicates, replicate_noise};
 pub use resample::{Gap, Resampler, gaps, natural_rate_hz};
 pub use spectrum::{PowerSpectrum, welch};

@@ -1,0 +1,438 @@
+//! Finds by itself whether a motion repeats, how long its period is, and which part of the log
+//! consists of whole periods.
+//!
+//! 1. Candidates: lags L at which the mean square difference d(L) = ⟨|q(k + L) − q(k)|²⟩, summed
+//!    over joints and computed by FFT, has a local minimum below a quarter of what unrelated
+//!    positions would give (2 × variance).
+//! 2. At each candidate the difference is judged block by block. A block repeats if its mean
+//!    square is below what noise, half a sample of slip and one percent of the motion's amplitude
+//!    allow. The longest stretch of such blocks is the repeated part: run-in and rest fall away.
+//! 3. The stretch is cut again where a block differs by more than four times the upper quartile
+//!    of the stretch's own blocks: what noise allows is what this log shows.
+//! 4. Of the candidates that cover two or more periods, the one covering most wins, the shortest
+//!    among equals, so that a period is preferred to its multiples.
+//! 5. The lag of the first period against the last, interpolated, refines the period.
+
+use std::ops::Range;
+
+use realfft::RealFftPlanner;
+
+use super::error::{SignalError, enough};
+use super::noise::{block_noise, quantile};
+use crate::robot::JointSignals;
+
+/// Samples to which the search for candidates thins a longer log.
+const SEARCH_SAMPLES: usize = 16384;
+/// Shortest period looked for, in samples of the (thinned) log.
+const SHORTEST_PERIOD: usize = 16;
+/// A candidate's mean square difference, relative to unrelated positions.
+const CANDIDATE_SHARE: f64 = 0.25;
+/// Imperfect repetition that is still called one, relative to the motion's rms amplitude.
+const REPEATS_WITHIN: f64 = 0.01;
+/// Ratio of mean squares that tells a block that repeats from one that does not.
+const BLOCK_RATIO: f64 = 4.0;
+/// Blocks per period.
+const BLOCKS: usize = 64;
+/// Samples by which the ends of the repeated part are judged.
+const EDGE_SAMPLES: usize = 4;
+/// Slip over the whole log that is always taken for none, in samples.
+const NO_SLIP: f64 = 0.01;
+
+/// A repeated motion inside a log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Period {
+    /// Length of the period, in whole samples (nearest).
+    pub samples: usize,
+    /// Length of the period in samples, interpolated.
+    pub refined_samples: f64,
+    /// Whether the period is a whole number of samples: the slip between `samples` and
+    /// `refined_samples`, added up over the log, is hidden in the scatter between periods (or
+    /// below a hundredth of a sample). Only then may periods be folded.
+    pub is_whole: bool,
+    /// Number of whole periods in `window`.
+    pub periods: usize,
+    /// Samples of the log that hold the whole periods; `periods` × `samples` long.
+    pub window: Range<usize>,
+    /// Rms over joints and samples of the difference between neighbouring periods, over √2, rad.
+    pub scatter_rad: f64,
+}
+
+/// The period of the motion `q_rad` (joints × samples), or `None` if no stretch of two periods or
+/// more repeats. The log may have run-in, run-out and standstill around it.
+///
+/// Errors: fewer than 64 samples, a value that is not finite.
+pub fn find_period(q_rad: &JointSignals) -> Result<Option<Period>, SignalError> {
+    enough("the search for a period", q_rad.samples(), 4 * SHORTEST_PERIOD)?;
+    for joint in 0..q_rad.joints() {
+        if let Some(sample) = q_rad.joint(joint).iter().position(|v| !v.is_finite()) {
+            let value = q_rad.joint(joint)[sample];
+            return Err(SignalError::NotFinite { what: "angle", joint, sample, value });
+        }
+    }
+    let record = Record::new(q_rad);
+    if record.variance <= 0.0 {
+        return Ok(None);
+    }
+    let mut best: Option<Period> = None;
+    for lag in candidates(q_rad) {
+        let Some(found) = record.repeats_at(record.sharpen(lag)) else { continue };
+        // Longer than the best by more than the new period cannot be had by a multiple of it.
+        if best.as_ref().is_none_or(|b| found.window.len() > b.window.len() + found.samples) {
+            best = Some(found);
+        }
+    }
+    Ok(best)
+}
+
+/// A lag and how far it may be off, in samples.
+#[derive(Debug, Clone, Copy)]
+struct Candidate {
+    samples: usize,
+    uncertainty: usize,
+}
+
+/// Step 1, on a log thinned by averaging neighbours.
+fn candidates(q_rad: &JointSignals) -> Vec<Candidate> {
+    let thin = q_rad.samples().div_ceil(SEARCH_SAMPLES);
+    let n = q_rad.samples() / thin;
+    let padded = (2 * n).next_power_of_two();
+    let mut planner = RealFftPlanner::new();
+    let (forward, inverse) = (planner.plan_fft_forward(padded), planner.plan_fft_inverse(padded));
+    let mut time = forward.make_input_vec();
+    let mut spectrum = forward.make_output_vec();
+    let mut power = forward.make_output_vec();
+    let mut energy = vec![0.0; n + 1];
+    for j in 0..q_rad.joints() {
+        let series = q_rad.joint(j);
+        let mean = series.iter().sum::<f64>() / series.len() as f64;
+        time.fill(0.0);
+        for (t, part) in time.iter_mut().zip(series.chunks_exact(thin)).take(n) {
+            *t = part.iter().sum::<f64>() / thin as f64 - mean;
+        }
+        for k in 0..n {
+            energy[k + 1] += time[k] * time[k];
+        }
+        forward.process(&mut time, &mut spectrum).expect("buffers were made by the plan");
+        for (p, c) in power.iter_mut().zip(&spectrum) {
+            p.re += c.norm_sqr();
+        }
+    }
+    for k in 1..=n {
+        energy[k] += energy[k - 1];
+    }
+    inverse.process(&mut power, &mut time).expect("buffers fit and the ends are real");
+    let correlation = |lag: usize| time[lag] / padded as f64;
+    let difference = |lag: usize| {
+        let both = energy[n - lag] + energy[n] - energy[lag];
+        (both - 2.0 * correlation(lag)) / (n - lag) as f64
+    };
+    let unrelated = 2.0 * energy[n] / n as f64;
+    let longest = n / 2;
+    (SHORTEST_PERIOD..=longest)
+        .filter(|&lag| {
+            let d = difference(lag);
+            d < CANDIDATE_SHARE * unrelated && d <= difference(lag - 1) && d <= difference(lag + 1)
+        })
+        .map(|lag| Candidate { samples: lag * thin, uncertainty: thin })
+        .collect()
+}
+
+/// The log and what it says about itself.
+struct Record<'a> {
+    q_rad: &'a JointSignals,
+    /// Variance of q, summed over joints, rad².
+    variance: f64,
+    /// Mean square of the step from one sample to the next, summed over joints, rad².
+    step_square: f64,
+    /// Mean square difference up to which positions count as repeated, rad².
+    tolerance: f64,
+}
+
+impl<'a> Record<'a> {
+    fn new(q_rad: &'a JointSignals) -> Self {
+        let n = q_rad.samples() as f64;
+        let (mut variance, mut step_square, mut noise) = (0.0, 0.0, 0.0);
+        for j in 0..q_rad.joints() {
+            let q = q_rad.joint(j);
+            variance += variance_of(q);
+            step_square += q.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum::<f64>() / (n - 1.0);
+            noise += quantile(&block_noise(q, 32), 0.5).powi(2);
+        }
+        let amplitude = REPEATS_WITHIN.powi(2) * variance;
+        let tolerance = BLOCK_RATIO * (2.0 * noise + 0.25 * step_square + amplitude);
+        Self { q_rad, variance, step_square, tolerance }
+    }
+
+    /// |q(k + lag) − q(k)|², summed over joints.
+    fn difference(&self, k: usize, lag: usize) -> f64 {
+        (0..self.q_rad.joints())
+            .map(|j| {
+                let q = self.q_rad.joint(j);
+                (q[k + lag] - q[k]).powi(2)
+            })
+            .sum()
+    }
+
+    /// The lag near `candidate` at which most of the log repeats best: least median of block means.
+    fn sharpen(&self, candidate: Candidate) -> usize {
+        let Candidate { samples, uncertainty } = candidate;
+        let cost = |lag: usize| {
+            let mut means: Vec<f64> = blocks(self.q_rad.samples() - lag, lag / BLOCKS)
+                .map(|block| {
+                    let inside = block.clone().step_by(uncertainty);
+                    let count = inside.len() as f64;
+                    inside.map(|k| self.difference(k, lag)).sum::<f64>() / count
+                })
+                .collect();
+            let middle = means.len() / 2;
+            *means.select_nth_unstable_by(middle, f64::total_cmp).1
+        };
+        let longest = self.q_rad.samples() / 2;
+        let mut best = (samples, cost(samples));
+        // Run-in and rest pull the candidate aside: go on while the range's end is the best.
+        loop {
+            let lowest = best.0.saturating_sub(uncertainty).max(SHORTEST_PERIOD);
+            let highest = (best.0 + uncertainty).min(longest);
+            let Some(next) = (lowest..=highest)
+                .map(|lag| (lag, cost(lag)))
+                .min_by(|a, b| a.1.total_cmp(&b.1))
+                .filter(|next| next.1 < best.1)
+            else {
+                return best.0;
+            };
+            best = next;
+        }
+    }
+
+    /// Steps 2, 3 and 5 for one lag.
+    fn repeats_at(&self, lag: usize) -> Option<Period> {
+        let pairs = self.q_rad.samples() - lag;
+        // Sums of |q(k + lag) − q(k)|² over all k before.
+        let mut sums = Vec::with_capacity(pairs + 1);
+        sums.push(0.0);
+        let mut total = 0.0;
+        for k in 0..pairs {
+            total += self.difference(k, lag);
+            sums.push(total);
+        }
+        let mean = |r: &Range<usize>| (sums[r.end] - sums[r.start]) / r.len() as f64;
+        let blocks: Vec<(Range<usize>, f64)> = blocks(pairs, lag / BLOCKS)
+            .map(|b| {
+                let m = mean(&b);
+                (b, m)
+            })
+            .collect();
+
+        let rough = self.longest_run(&blocks, self.tolerance, lag)?;
+        let within: Vec<(Range<usize>, f64)> = blocks
+            .into_iter()
+            .filter(|(b, _)| b.start >= rough.start && b.end <= rough.end)
+            .collect();
+        let mut levels: Vec<f64> = within.iter().map(|(_, m)| *m).collect();
+        levels.sort_by(f64::total_cmp);
+        let rounding = 1e-10 * self.variance;
+        let own = (BLOCK_RATIO * quantile(&levels, 0.75)).max(rounding);
+        let run = widened(self.longest_run(&within, own, lag)?, own, &sums);
+
+        let periods = (run.len() + lag) / lag;
+        let slack = run.len() + lag - periods * lag;
+        let pairs_used = (periods - 1) * lag;
+        let start = (run.start..=run.start + slack).min_by(|a, b| {
+            let cost = |s: usize| sums[s + pairs_used] - sums[s];
+            cost(*a).total_cmp(&cost(*b))
+        })?;
+        let window = start..start + periods * lag;
+        let (refined_samples, scatter_square) = self.refine(&window, lag, periods);
+        let slip = (refined_samples - lag as f64).abs() * (periods - 1) as f64;
+        let hidden = (scatter_square / self.step_square).sqrt().max(NO_SLIP);
+        let neighbours = mean(&(start..start + pairs_used));
+        Some(Period {
+            samples: lag,
+            refined_samples,
+            is_whole: slip <= hidden,
+            periods,
+            window,
+            scatter_rad: (0.5 * neighbours / self.q_rad.joints() as f64).sqrt(),
+        })
+    }
+
+    /// Longest run of neighbouring blocks below `limit` that spans a period of difference (hence
+    /// two periods of log) in which the arm really moves.
+    fn longest_run(
+        &self,
+        blocks: &[(Range<usize>, f64)],
+        limit: f64,
+        lag: usize,
+    ) -> Option<Range<usize>> {
+        blocks
+            .chunk_by(|a, b| (a.1 <= limit) == (b.1 <= limit))
+            .filter(|run| run[0].1 <= limit)
+            .filter_map(|run| Some(run.first()?.0.start..run.last()?.0.end))
+            .filter(|run| run.len() >= lag && self.moves(run.start..run.end + lag))
+            .max_by_key(|run| run.len())
+    }
+
+    /// Whether a stretch holds a good part of the log's motion; rest repeats at any lag.
+    fn moves(&self, stretch: Range<usize>) -> bool {
+        let variance: f64 = (0..self.q_rad.joints())
+            .map(|j| variance_of(&self.q_rad.joint(j)[stretch.clone()]))
+            .sum();
+        variance > CANDIDATE_SHARE * self.variance
+    }
+
+    /// The period from the shift that carries the first period of `window` onto its last, and the
+    /// mean square that no shift removes. Parabola through the three best whole shifts.
+    fn refine(&self, window: &Range<usize>, lag: usize, periods: usize) -> (f64, f64) {
+        let far = (periods - 1) * lag;
+        let reach = periods.div_ceil(2) + 1;
+        let (from, to) = (far.saturating_sub(reach), far + reach);
+        let last = (window.start + lag).min(self.q_rad.samples() - to.min(self.q_rad.samples()));
+        if last < window.start + lag / 2 {
+            // No room behind the window: compare what is left of the first period.
+            return (lag as f64, 0.0);
+        }
+        let mean = |shift: usize| {
+            (window.start..last).map(|k| self.difference(k, shift)).sum::<f64>()
+                / (last - window.start) as f64
+        };
+        let costs: Vec<f64> = (from..=to).map(mean).collect();
+        let inner = 1..costs.len() - 1;
+        let Some(i) = inner.min_by(|a, b| costs[*a].total_cmp(&costs[*b])) else {
+            return (lag as f64, costs[0]);
+        };
+        let (left, middle, right) = (costs[i - 1], costs[i], costs[i + 1]);
+        let bend = left - 2.0 * middle + right;
+        let shift = if bend > 0.0 { (0.5 * (left - right) / bend).clamp(-1.0, 1.0) } else { 0.0 };
+        let residue = (middle - 0.5 * bend * shift * shift).max(0.0);
+        (((from + i) as f64 + shift) / (periods - 1) as f64, residue)
+    }
+}
+
+/// The run continued sample by sample at both ends, as far as the mean over the next
+/// [`EDGE_SAMPLES`] stays below `limit`: blocks end where they happen to, periods do not.
+fn widened(run: Range<usize>, limit: f64, sums: &[f64]) -> Range<usize> {
+    let pairs = sums.len() - 1;
+    let below = |from: usize| sums[from + EDGE_SAMPLES] - sums[from] <= limit * EDGE_SAMPLES as f64;
+    let Range { mut start, mut end } = run;
+    while start > 0 && below(start - 1) {
+        start -= 1;
+    }
+    while end < pairs && below(end + 1 - EDGE_SAMPLES) {
+        end += 1;
+    }
+    start..end
+}
+
+/// 0..count in blocks of `length` (at least 8); the last takes the remainder.
+fn blocks(count: usize, length: usize) -> impl Iterator<Item = Range<usize>> {
+    let length = length.max(8).min(count.max(1));
+    let full = count / length;
+    (0..full).map(move |b| {
+        let end = if b + 1 == full { count } else { (b + 1) * length };
+        b * length..end
+    })
+}
+
+fn variance_of(y: &[f64]) -> f64 {
+    let n = y.len() as f64;
+    let mean = y.iter().sum::<f64>() / n;
+    y.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{SeedableRng, rngs::ChaCha8Rng};
+    use rand_distr::{Distribution, StandardNormal};
+    use std::f64::consts::PI;
+
+    /// Six joints, five harmonics of the period, in samples; a smooth run-in over `run_in`
+    /// samples from rest, `rest` samples of standstill before and after.
+    fn log(
+        period: f64,
+        periods: f64,
+        run_in: usize,
+        rest: usize,
+        sigma: f64,
+        seed: u64,
+    ) -> JointSignals {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let n = 2 * rest + run_in + (period * periods).round() as usize;
+        JointSignals::from_fn(6, n, |j, k| {
+            let k = k.clamp(rest, n - 1 - rest) - rest;
+            let ramp =
+                if k >= run_in { 1.0 } else { 0.5 - 0.5 * (PI * k as f64 / run_in as f64).cos() };
+            let phase = 2.0 * PI * (k as f64 - run_in as f64) / period;
+            let q: f64 = (1..=5)
+                .map(|h| (h as f64 * phase + (j * j + 3 * h * j) as f64).sin() / h as f64)
+                .sum();
+            let noise: f64 = StandardNormal.sample(&mut rng);
+            ramp * q + sigma * noise
+        })
+    }
+
+    #[test]
+    fn whole_periods_are_found_behind_a_run_in_and_between_rests() {
+        for (sigma, run_in, rest, seed) in [
+            (2e-5, 0, 0, 1),
+            (2e-5, 600, 0, 2),
+            (2e-5, 300, 250, 3),
+            (0.0, 600, 100, 4),
+            (1e-3, 50, 0, 5),
+        ] {
+            let q = log(1250.0, 8.0, run_in, rest, sigma, seed);
+            let found = find_period(&q).unwrap().expect("eight periods are there");
+            assert_eq!((found.samples, found.is_whole), (1250, true), "{found:?}");
+            assert_eq!(found.window.len(), found.samples * found.periods);
+            assert!(found.periods >= 7, "{found:?}");
+            // Where the run-in still differs, no period may start.
+            assert!(found.window.start + 20 >= rest + run_in, "{found:?}");
+            assert!(found.window.end <= rest + run_in + 10020, "{found:?}");
+            if sigma > 0.0 && rest == 0 {
+                assert_eq!(found.periods, 8);
+                assert!((found.scatter_rad / sigma - 1.0).abs() < 0.1, "{found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn two_periods_are_enough_and_one_is_not() {
+        let two = find_period(&log(2500.0, 2.3, 500, 0, 2e-5, 7)).unwrap().expect("two periods");
+        assert_eq!((two.samples, two.periods, two.is_whole), (2500, 2, true));
+        assert_eq!(find_period(&log(2500.0, 1.6, 500, 200, 2e-5, 8)).unwrap(), None);
+        assert_eq!(find_period(&log(5000.0, 1.0, 300, 300, 2e-5, 9)).unwrap(), None);
+    }
+
+    #[test]
+    fn a_period_between_samples_is_reported_as_such() {
+        let found = find_period(&log(1000.3, 6.0, 200, 0, 2e-5, 10)).unwrap().expect("periodic");
+        assert_eq!((found.samples, found.is_whole), (1000, false), "{found:?}");
+        assert!((found.refined_samples - 1000.3).abs() < 0.01, "{found:?}");
+    }
+
+    #[test]
+    fn rest_and_noise_are_not_periodic() {
+        let still = JointSignals::from_fn(6, 4000, |j, _| j as f64);
+        assert_eq!(find_period(&still).unwrap(), None);
+        let mut rng = ChaCha8Rng::seed_from_u64(11);
+        let noise = JointSignals::from_fn(6, 4000, |_, _| StandardNormal.sample(&mut rng));
+        assert_eq!(find_period(&noise).unwrap(), None);
+        let mut wandering = JointSignals::zeros(6, 6000);
+        for j in 0..6 {
+            let mut q = 0.0;
+            for value in wandering.joint_mut(j) {
+                let step: f64 = StandardNormal.sample(&mut rng);
+                q += 0.01 * step;
+                *value = q;
+            }
+        }
+        assert_eq!(find_period(&wandering).unwrap(), None);
+    }
+
+    #[test]
+    fn a_long_log_is_searched_thinned_and_found_to_the_sample() {
+        let q = log(5003.0, 12.0, 1000, 0, 2e-5, 12);
+        let found = find_period(&q).unwrap().expect("twelve periods");
+        assert_eq!((found.samples, found.periods, found.is_whole), (5003, 12, true), "{found:?}");
+    }
+}
