@@ -1,4 +1,4 @@
-//! When the arm moves and when it stands still, judged by the log's own noise.
+//! When the arm moves and when it stands still, judged by the log's own noise and speed.
 
 use std::ops::Range;
 
@@ -10,6 +10,9 @@ use crate::robot::JointSignals;
 const NOISE_BLOCK_S: f64 = 0.25;
 /// Share of blocks taken to be the quiet ones: a log with less rest than that has none.
 const QUIET_SHARE: f64 = 0.1;
+/// Share of the fastest joint's rms speed that is no motion worth the name: brakes, settling and
+/// sensor flicker at rest are not noise of any fixed size.
+const CREEP_SHARE: f64 = 0.005;
 /// A rest is at least this long, s: shorter ones are reversals.
 const SHORTEST_REST_S: f64 = 0.5;
 /// Samples in a row above the threshold that make a motion; fewer are outliers.
@@ -21,7 +24,8 @@ pub struct Activity {
     /// Velocity noise per joint in the quietest tenth of the log, rad/s.
     pub noise_rad_s: Vec<f64>,
     /// Velocity beyond which a joint counts as moving, rad/s: σ√(2 ln N), which the largest of N
-    /// noise values hardly exceeds, plus one quantum of the recorded numbers.
+    /// noise values hardly exceeds, plus one quantum of the recorded numbers; but at least half a
+    /// percent of the fastest joint's rms speed.
     pub threshold_rad_s: Vec<f64>,
     /// Stretches of samples in which no joint moves for half a second or longer.
     pub rests: Vec<Range<usize>>,
@@ -32,13 +36,15 @@ pub struct Activity {
 impl Activity {
     /// Judges the velocities `qd_rad_s` (joints × samples) recorded at `rate_hz`.
     ///
-    /// Nothing needs to be set: the noise comes from sixth differences, in which motion drops
+    /// The caller sets nothing: the noise comes from sixth differences, in which motion drops
     /// out, the quantum is the smallest distance between recorded values that occurs in the log.
     pub fn of(qd_rad_s: &JointSignals, rate_hz: f64) -> Result<Self, SignalError> {
         checked_rate_hz(rate_hz)?;
         let samples = qd_rad_s.samples();
         let block = (NOISE_BLOCK_S * rate_hz).ceil() as usize;
         enough("telling rest from motion", samples, 2 * block.max(16))?;
+        let creep_rad_s = CREEP_SHARE
+            * (0..qd_rad_s.joints()).map(|j| rms(qd_rad_s.joint(j))).fold(0.0, f64::max);
         let peak = (2.0 * ((samples * qd_rad_s.joints()) as f64).ln()).sqrt();
 
         let mut noise_rad_s = Vec::with_capacity(qd_rad_s.joints());
@@ -51,7 +57,7 @@ impl Activity {
                 return Err(SignalError::NotFinite { what: "velocity", joint: j, sample, value });
             }
             let noise = quantile(&block_noise(series, block.max(16)), QUIET_SHARE);
-            let threshold = peak * noise + quantum(series);
+            let threshold = (peak * noise + quantum(series)).max(creep_rad_s);
             for (moves, v) in moves.iter_mut().zip(series) {
                 *moves |= v.abs() > threshold;
             }
@@ -78,6 +84,10 @@ impl Activity {
         let moving = self.moving.as_ref()?;
         Some(moving.start.saturating_sub(margin)..(moving.end + margin).min(self.samples))
     }
+}
+
+fn rms(y: &[f64]) -> f64 {
+    (y.iter().map(|v| v * v).sum::<f64>() / y.len() as f64).sqrt()
 }
 
 /// Runs of consecutive `true`.
