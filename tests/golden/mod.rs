@@ -1,4 +1,5 @@
 //! Reader of the goldens written by `dynamics.py`; the formats are described there.
+#![allow(dead_code, reason = "each test program uses its part")]
 
 use armid::robot::Arm;
 
@@ -6,7 +7,6 @@ use armid::robot::Arm;
 const OWN_JOINT_ZEROS: [usize; 2] = [0, 3];
 
 /// One random state and what Pinocchio makes of it.
-#[allow(dead_code, reason = "each test program uses its part")]
 pub struct State {
     pub q_rad: Vec<f64>,
     pub qd_rad_s: Vec<f64>,
@@ -24,7 +24,6 @@ pub struct State {
     pub regressor: Vec<f64>,
 }
 
-#[allow(dead_code, reason = "each test program uses its part")]
 impl State {
     /// The torque that the golden acceleration answers to: 5 kg m² · q̈.
     pub fn applied_nm(&self) -> Vec<f64> {
