@@ -1,0 +1,216 @@
+//! Which rows of a log belong together.
+
+use std::f64::consts::TAU;
+
+use super::account::{LogWarning, Reason};
+
+/// Largest angle of a joint, rad: 159 turns. More is not a position.
+pub(super) const ANGLE_BOUND_RAD: f64 = 1e3;
+/// Largest velocity of a joint, rad/s; the fastest arms reach about 15.
+pub(super) const VELOCITY_BOUND_RAD_S: f64 = 100.0;
+
+/// Difference of angle that is always accepted between rows, rad. It is above encoder noise, quantisation
+/// and the lag of a filtered velocity (1 rad/s late by 20 ms is 0.02 rad), and far below the steps of
+/// uninitialised or shifted rows.
+const STEP_TOLERANCE_RAD: f64 = 0.05;
+/// Acceleration up to which a motion is believed over a step, rad/s²; arms stay below about 20.
+const ACCELERATION_RAD_S2: f64 = 20.0;
+/// Change of velocity that is always accepted between rows, rad/s: a collision or an emergency stop.
+const VELOCITY_TOLERANCE_RAD_S: f64 = 1.0;
+/// A row continues a stretch over at most this many lines of the file.
+const BRIDGED_LINES: usize = 8;
+/// Stretches shorter than this that nothing connects to the rest are garbage.
+const SHORT_STRETCH: usize = 10;
+/// Stretches that are open for continuation at one time.
+const OPEN_STRETCHES: usize = 16;
+/// A step of time this many times the median is far ahead.
+const FAR_AHEAD_STEPS: f64 = 20.0;
+
+/// The columns of motion of a log, one entry per row.
+pub(super) struct Motion<'a> {
+    pub(super) time_s: &'a [f64],
+    /// Angle of each joint.
+    pub(super) q: &'a [Vec<f64>],
+    /// Velocity of each joint.
+    pub(super) qd: &'a [Vec<f64>],
+    /// Number of the row in the file.
+    pub(super) row: &'a [usize],
+}
+
+impl Motion<'_> {
+    pub(super) fn rows(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// q_j(k) − q_j(i) − ½ (q̇_j(i) + q̇_j(k)) (t_k − t_i): zero for a motion of constant acceleration.
+    pub(super) fn defect(&self, joint: usize, i: usize, k: usize) -> f64 {
+        let (q, qd) = (&self.q[joint], &self.qd[joint]);
+        q[k] - q[i] - 0.5 * (qd[i] + qd[k]) * (self.time_s[k] - self.time_s[i])
+    }
+
+    /// Largest defect or change of velocity of any joint over what is tolerated; at most 1 if row `k` can follow row `i`. One whole
+    /// turn does not count: a wrapped angle is a matter of notation.
+    fn strain(&self, i: usize, k: usize) -> f64 {
+        let step_s = self.time_s[k] - self.time_s[i];
+        let tolerance_rad_s = VELOCITY_TOLERANCE_RAD_S + ACCELERATION_RAD_S2 * step_s;
+        (0..self.q.len())
+            .map(|joint| {
+                let defect = self.defect(joint, i, k).abs();
+                let change = (self.qd[joint][k] - self.qd[joint][i]).abs();
+                let angle = defect.min((defect - TAU).abs()) / angle_tolerance_rad(step_s);
+                angle.max(change / tolerance_rad_s)
+            })
+            .fold(0.0, f64::max)
+    }
+
+    fn is_plausible(&self, k: usize) -> bool {
+        self.q.iter().all(|q| q[k].abs() <= ANGLE_BOUND_RAD)
+            && self.qd.iter().all(|qd| qd[k].abs() <= VELOCITY_BOUND_RAD_S)
+    }
+}
+
+/// Defect of angle tolerated over a step of time: the trapezoidal rule errs by at most a Δt²/4 if the
+/// acceleration stays within ±a.
+fn angle_tolerance_rad(step_s: f64) -> f64 {
+    STEP_TOLERANCE_RAD + ACCELERATION_RAD_S2 * step_s * step_s / 4.0
+}
+
+/// Median step of time among the steps forward, s; `None` without any.
+pub(super) fn median_step(time_s: &[f64]) -> Option<f64> {
+    let mut steps: Vec<f64> =
+        time_s.windows(2).map(|pair| pair[1] - pair[0]).filter(|&step| step > 0.0).collect();
+    median(&mut steps)
+}
+
+/// Upper median of finite values.
+pub(super) fn median(values: &mut [f64]) -> Option<f64> {
+    let middle = values.len() / 2;
+    if values.is_empty() {
+        return None;
+    }
+    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// For every row why its time cannot stay, so that the times that stay increase strictly.
+///
+/// A time not after the one before it is set aside, unless the one before is a lone value far ahead of
+/// the rows on both its sides; then that one is.
+pub(super) fn order_of_time(time_s: &[f64]) -> Vec<Option<Reason>> {
+    let mut verdicts = vec![None; time_s.len()];
+    let far = FAR_AHEAD_STEPS * median_step(time_s).unwrap_or(0.0);
+    let mut last: Option<usize> = None;
+    let mut before: Option<usize> = None;
+    for k in 0..time_s.len() {
+        let Some(previous) = last.filter(|&i| time_s[k] <= time_s[i]) else {
+            before = last;
+            last = Some(k);
+            continue;
+        };
+        let follows = |i: usize| time_s[k] > time_s[i] && time_s[previous] - time_s[i] > far;
+        let lone = before.is_none_or(follows)
+            && time_s[previous] - time_s[k] > far
+            && time_s.get(k + 1).is_some_and(|&t| t > time_s[k] && t < time_s[previous]);
+        if lone {
+            verdicts[previous] = Some(Reason::TimeAhead);
+            last = Some(k);
+        } else {
+            verdicts[k] = Some(if time_s[k] == time_s[previous] {
+                Reason::TimeRepeated
+            } else {
+                Reason::TimeBackwards
+            });
+        }
+    }
+    verdicts
+}
+
+/// For every row why its motion cannot stay.
+///
+/// Rows are strung into stretches, each row onto the one whose last row it follows best. Short
+/// stretches beside longer ones are garbage: rows of uninitialised memory, shifted fields, zeros.
+pub(super) fn consistency(motion: &Motion) -> Vec<Option<Reason>> {
+    let mut verdicts = vec![None; motion.rows()];
+    let mut stretch_of = vec![0_usize; motion.rows()];
+    let mut lengths: Vec<usize> = Vec::new();
+    // (stretch, its last row), the longest unused first.
+    let mut open: Vec<(usize, usize)> = Vec::with_capacity(OPEN_STRETCHES + 1);
+    for k in 0..motion.rows() {
+        if !motion.is_plausible(k) {
+            verdicts[k] = Some(Reason::Implausible);
+            continue;
+        }
+        let best = open
+            .iter()
+            .enumerate()
+            .filter(|&(_, &(_, last))| motion.row[k] - motion.row[last] <= BRIDGED_LINES)
+            .map(|(place, &(_, last))| (place, motion.strain(last, k)))
+            .filter(|&(_, strain)| strain <= 1.0)
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        let stretch = match best {
+            Some((place, _)) => open.remove(place).0,
+            None => {
+                lengths.push(0);
+                lengths.len() - 1
+            }
+        };
+        if open.len() == OPEN_STRETCHES {
+            open.remove(0);
+        }
+        open.push((stretch, k));
+        stretch_of[k] = stretch;
+        lengths[stretch] += 1;
+    }
+    let longest = lengths.iter().copied().max().unwrap_or(0);
+    for (verdict, &stretch) in verdicts.iter_mut().zip(&stretch_of) {
+        if verdict.is_none() && lengths[stretch] < SHORT_STRETCH.min(longest) {
+            *verdict = Some(Reason::Inconsistent);
+        }
+    }
+    verdicts
+}
+
+/// Whether the angles jump between the rows that are left.
+pub(super) fn jumps(motion: &Motion) -> Option<LogWarning> {
+    let mut first = None;
+    let mut count = 0;
+    for k in 1..motion.rows() {
+        let step_s = motion.time_s[k] - motion.time_s[k - 1];
+        let (joint, jump_rad) = (0..motion.q.len())
+            .map(|joint| (joint, motion.defect(joint, k - 1, k)))
+            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+        if jump_rad.abs() > angle_tolerance_rad(step_s) {
+            count += 1;
+            first = first.or(Some((motion.row[k - 1], joint + 1, jump_rad)));
+        }
+    }
+    first.map(|(after_row, joint, jump_rad)| LogWarning::PositionJumps {
+        count,
+        after_row,
+        joint,
+        jump_rad,
+    })
+}
+
+/// How many rows the recorder left out: the time between two rows in median steps, less the rows between
+/// them that were set aside.
+pub(super) fn missed_samples(motion: &Motion) -> Option<(usize, LogWarning)> {
+    let typical_s = median_step(motion.time_s)?;
+    let (mut missed, mut gaps, mut longest_s, mut after_row) = (0_usize, 0, 0.0, 0);
+    for k in 1..motion.rows() {
+        let step_s = motion.time_s[k] - motion.time_s[k - 1];
+        let steps = (step_s / typical_s).round();
+        let in_file = motion.row[k] - motion.row[k - 1];
+        // A float beyond the range becomes the largest integer, so a clock that leaps cannot overflow.
+        let here = (steps as usize).saturating_sub(in_file);
+        if here > 0 {
+            missed = missed.saturating_add(here);
+            gaps += 1;
+            if step_s > longest_s {
+                longest_s = step_s;
+                after_row = motion.row[k - 1];
+            }
+        }
+    }
+    (missed > 0)
+        .then_some((missed, LogWarning::MissedSamples { missed, gaps, longest_s, after_row }))
+}

@@ -1,0 +1,563 @@
+//! Layouts: which column of a file is which quantity, and in which unit.
+
+use std::f64::consts::PI;
+
+use serde::Deserialize;
+
+use super::error::{LayoutFault, LogError};
+
+/// Layouts built in, by the name given to `--layout`.
+const BUILT_IN: [(&str, &str); 3] = [
+    ("armid", include_str!("../../layouts/armid.toml")),
+    ("ur10e_innopolis", include_str!("../../layouts/ur10e_innopolis.toml")),
+    ("ur10e_innopolis_author", include_str!("../../layouts/ur10e_innopolis_author.toml")),
+];
+
+/// Names of the layouts built in; the first is the default.
+pub fn built_in_layout_names() -> impl Iterator<Item = &'static str> {
+    BUILT_IN.iter().map(|(name, _)| *name)
+}
+
+/// How the files of one recorder are to be read: a small TOML file.
+///
+/// ```toml
+/// name = "my_robot"
+/// delimiter = "semicolon"      # auto (default), comma, semicolon, tab, blank
+/// header = true                # the first row holds column names
+/// decimal_comma = true         # 0,25 for 0.25; default false
+/// drive_gain_nm_a = [12.0, 12.0, 9.8, 10.7, 10.7, 10.7]   # default: the arm's own i_G·k
+///
+/// [units]                      # defaults: s, rad, rad/s, rad/s2, A
+/// time = "ms"                  # s, ms, us, ns
+/// q = "deg"                    # rad, deg; qd = "deg/s", qdd = "deg/s2" likewise
+/// current = "mA"               # A, mA
+///
+/// [columns]                    # {0}: joints counted from 0 in the names, {1}: from 1
+/// time = "clock"
+/// q = "angle {1}"
+/// qd = ["w1", "w2", "w3", "w4", "w5", "w6"]
+/// current = { first = 14, last = 19 }   # column numbers count from 1
+/// ```
+///
+/// Blocks: `time q qd`, `current` or `torque` (Nm; taken where both are there), and optionally
+/// `target_q target_qd target_qdd target_current target_moment temperature`. The unit of `q` holds for
+/// `target_q` and so on. Files without header need the list of their possible widths:
+///
+/// ```toml
+/// [[width]]
+/// fields = 19
+/// blocks = ["time", "q", "qd", "current"]
+/// ```
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Layout {
+    /// Name, for messages.
+    pub name: String,
+    #[serde(default)]
+    pub(super) delimiter: DelimiterChoice,
+    pub(super) header: bool,
+    #[serde(default)]
+    pub(super) decimal_comma: bool,
+    pub(super) drive_gain_nm_a: Option<Vec<f64>>,
+    #[serde(default)]
+    pub(super) units: Units,
+    columns: Blocks,
+    #[serde(default, rename = "width")]
+    pub(super) widths: Vec<Width>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum DelimiterChoice {
+    #[default]
+    Auto,
+    Comma,
+    Semicolon,
+    Tab,
+    Blank,
+}
+
+/// A group of columns with one meaning.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Block {
+    Time,
+    Q,
+    Qd,
+    Current,
+    Torque,
+    TargetQ,
+    TargetQd,
+    TargetQdd,
+    TargetCurrent,
+    TargetMoment,
+    Temperature,
+}
+
+impl Block {
+    pub(super) const ALL: [Self; 11] = [
+        Self::Time,
+        Self::Q,
+        Self::Qd,
+        Self::Current,
+        Self::Torque,
+        Self::TargetQ,
+        Self::TargetQd,
+        Self::TargetQdd,
+        Self::TargetCurrent,
+        Self::TargetMoment,
+        Self::Temperature,
+    ];
+
+    /// Its key in a layout file.
+    pub(super) fn key(self) -> &'static str {
+        match self {
+            Self::Time => "time",
+            Self::Q => "q",
+            Self::Qd => "qd",
+            Self::Current => "current",
+            Self::Torque => "torque",
+            Self::TargetQ => "target_q",
+            Self::TargetQd => "target_qd",
+            Self::TargetQdd => "target_qdd",
+            Self::TargetCurrent => "target_current",
+            Self::TargetMoment => "target_moment",
+            Self::Temperature => "temperature",
+        }
+    }
+
+    /// Largest magnitude that can be a measurement, in the SI unit (°C for temperatures). What lies beyond
+    /// is an uninitialised number. Angles and velocities are held to a tighter bound once their unit is sure.
+    pub(super) fn bound(self) -> f64 {
+        match self {
+            // Nanoseconds since 1970 stay below this until the year 2286.
+            Self::Time => 1e19,
+            // A thousand turns read in degrees without the layout saying so.
+            Self::Q | Self::Qd | Self::TargetQ | Self::TargetQd => 3.6e5,
+            // 30 000 rad/s² is 3000 times what arms do; in degrees 60 times.
+            Self::TargetQdd => 3e4,
+            // The drives of the largest arms take about 100 A and give about 10 kNm.
+            Self::Current | Self::TargetCurrent => 500.0,
+            Self::Torque | Self::TargetMoment => 5e4,
+            Self::Temperature => 1e3,
+        }
+    }
+}
+
+/// Where each block is.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Blocks {
+    time: Option<Columns>,
+    q: Option<Columns>,
+    qd: Option<Columns>,
+    current: Option<Columns>,
+    torque: Option<Columns>,
+    target_q: Option<Columns>,
+    target_qd: Option<Columns>,
+    target_qdd: Option<Columns>,
+    target_current: Option<Columns>,
+    target_moment: Option<Columns>,
+    temperature: Option<Columns>,
+}
+
+/// The columns of one block.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "columns are a name (with {0} or {1} for the joint), a list of names, a column number, \
+                 or { first = 2, last = 7 }"
+)]
+pub(super) enum Columns {
+    Name(String),
+    Names(Vec<String>),
+    Number(usize),
+    Range(ColumnRange),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ColumnRange {
+    first: usize,
+    last: usize,
+}
+
+impl Columns {
+    /// Names by joint; a pattern goes on for as many joints as asked. `None` for column numbers.
+    pub(super) fn name(&self, joint: usize) -> Option<String> {
+        match self {
+            Self::Name(pattern) => Some(
+                pattern.replace("{0}", &joint.to_string()).replace("{1}", &(joint + 1).to_string()),
+            ),
+            Self::Names(names) => names.get(joint).cloned(),
+            Self::Number(_) | Self::Range(_) => None,
+        }
+    }
+
+    /// Column numbers from 0, in the order of the joints. `None` for names.
+    pub(super) fn numbers(&self) -> Option<std::ops::Range<usize>> {
+        match *self {
+            Self::Number(n) => Some(n - 1..n),
+            Self::Range(ColumnRange { first, last }) => Some(first - 1..last),
+            Self::Name(_) | Self::Names(_) => None,
+        }
+    }
+
+    /// How many there are; `None` for a pattern.
+    pub(super) fn len(&self) -> Option<usize> {
+        match self {
+            Self::Name(_) => None,
+            Self::Names(names) => Some(names.len()),
+            Self::Number(_) | Self::Range(_) => self.numbers().map(|r| r.len()),
+        }
+    }
+
+    fn check(&self, block: Block, header: bool) -> Result<(), LayoutFault> {
+        let fault = |expected| {
+            Err(LayoutFault::BadColumns {
+                block: block.key(),
+                value: format!("{self:?}"),
+                expected,
+            })
+        };
+        let is_pattern = |name: &str| name.contains("{0}") || name.contains("{1}");
+        match self {
+            Self::Name(_) | Self::Names(_) if !header => {
+                fault("files without header have no names; give column numbers")
+            }
+            Self::Name(name) if block == Block::Time && is_pattern(name) => {
+                fault("the time is one column, without {0} or {1}")
+            }
+            Self::Name(name) if block != Block::Time && !is_pattern(name) => {
+                fault("a name for all joints needs {0} or {1} where the joint's number stands")
+            }
+            Self::Names(_) | Self::Range(_) if block == Block::Time => {
+                fault("the time is one column")
+            }
+            Self::Names(names) if names.is_empty() => fault("name at least one column"),
+            Self::Number(0) => fault("column numbers count from 1"),
+            Self::Range(r) if r.first == 0 || r.last < r.first => {
+                fault("column numbers count from 1, and last is not before first")
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// One width that files without header may have.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Width {
+    pub(super) fields: usize,
+    pub(super) blocks: Vec<Block>,
+}
+
+/// Units of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct Units {
+    pub(super) time: TimeUnit,
+    pub(super) q: Angle,
+    pub(super) qd: AngularVelocity,
+    qdd: AngularAcceleration,
+    current: Current,
+}
+
+impl Units {
+    /// Factor from the file's unit to the SI unit; `None` where nothing changes, so that numbers stay
+    /// the same to the last bit.
+    pub(super) fn factor(&self, block: Block) -> Option<f64> {
+        let degrees = |yes: bool| yes.then_some(PI / 180.0);
+        match block {
+            Block::Time => Some(self.time.seconds()).filter(|&s| s != 1.0),
+            Block::Q | Block::TargetQ => degrees(self.q == Angle::Deg),
+            Block::Qd | Block::TargetQd => degrees(self.qd == AngularVelocity::DegS),
+            Block::TargetQdd => degrees(self.qdd == AngularAcceleration::DegS2),
+            Block::Current | Block::TargetCurrent => (self.current == Current::Ma).then_some(1e-3),
+            Block::Torque | Block::TargetMoment | Block::Temperature => None,
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum TimeUnit {
+    #[default]
+    S,
+    Ms,
+    Us,
+    Ns,
+}
+
+impl TimeUnit {
+    pub(super) const ALL: [Self; 4] = [Self::S, Self::Ms, Self::Us, Self::Ns];
+
+    pub(super) fn seconds(self) -> f64 {
+        match self {
+            Self::S => 1.0,
+            Self::Ms => 1e-3,
+            Self::Us => 1e-6,
+            Self::Ns => 1e-9,
+        }
+    }
+
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::S => "s",
+            Self::Ms => "ms",
+            Self::Us => "us",
+            Self::Ns => "ns",
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Angle {
+    #[default]
+    Rad,
+    Deg,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+pub(super) enum AngularVelocity {
+    #[default]
+    #[serde(rename = "rad/s")]
+    RadS,
+    #[serde(rename = "deg/s")]
+    DegS,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+enum AngularAcceleration {
+    #[default]
+    #[serde(rename = "rad/s2")]
+    RadS2,
+    #[serde(rename = "deg/s2")]
+    DegS2,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+enum Current {
+    #[default]
+    A,
+    #[serde(rename = "mA")]
+    Ma,
+}
+
+impl Default for Layout {
+    /// The project's own log, which is also what RTDE recorders write.
+    fn default() -> Self {
+        Self::from_toml(BUILT_IN[0].1, BUILT_IN[0].0).expect("a built-in layout is valid: tested")
+    }
+}
+
+impl Layout {
+    /// What `--layout` accepts: a built-in name or a `.toml` file.
+    ///
+    /// # Errors
+    /// [`LogError::UnknownLayout`], or [`LogError::Layout`] with what is wrong in the file.
+    pub fn load(name_or_path: &str) -> Result<Self, LogError> {
+        if let Some((name, text)) = BUILT_IN.iter().find(|(name, _)| *name == name_or_path) {
+            return Self::from_toml(text, name);
+        }
+        let path = std::path::Path::new(name_or_path);
+        if path.extension().is_none_or(|extension| extension != "toml") {
+            return Err(LogError::UnknownLayout { name: name_or_path.to_owned() });
+        }
+        let text = std::fs::read_to_string(path).map_err(|e| LogError::Layout {
+            file: name_or_path.to_owned(),
+            fault: LayoutFault::Read(e),
+        })?;
+        Self::from_toml(&text, name_or_path)
+    }
+
+    /// From the text of a layout file; `source` names it in messages.
+    ///
+    /// # Errors
+    /// [`LogError::Layout`] with what is wrong.
+    pub fn from_toml(text: &str, source: &str) -> Result<Self, LogError> {
+        let fault = |fault| LogError::Layout { file: source.to_owned(), fault };
+        let layout: Self =
+            toml::from_str(text).map_err(|e| fault(LayoutFault::Toml(e.to_string())))?;
+        layout.check().map_err(fault)?;
+        Ok(layout)
+    }
+
+    pub(super) fn columns(&self, block: Block) -> Option<&Columns> {
+        let c = &self.columns;
+        match block {
+            Block::Time => &c.time,
+            Block::Q => &c.q,
+            Block::Qd => &c.qd,
+            Block::Current => &c.current,
+            Block::Torque => &c.torque,
+            Block::TargetQ => &c.target_q,
+            Block::TargetQd => &c.target_qd,
+            Block::TargetQdd => &c.target_qdd,
+            Block::TargetCurrent => &c.target_current,
+            Block::TargetMoment => &c.target_moment,
+            Block::Temperature => &c.temperature,
+        }
+        .as_ref()
+    }
+
+    fn check(&self) -> Result<(), LayoutFault> {
+        for (j, &value) in self.drive_gain_nm_a.iter().flatten().enumerate() {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(LayoutFault::Gain { joint: j + 1, value });
+            }
+        }
+        if self.decimal_comma && self.delimiter == DelimiterChoice::Comma {
+            return Err(LayoutFault::CommaTwice);
+        }
+        let has = |block| self.columns(block).is_some();
+        check_blocks(has, "[columns]")?;
+        for block in Block::ALL {
+            if let Some(columns) = self.columns(block) {
+                columns.check(block, self.header)?;
+            }
+        }
+        if self.header != self.widths.is_empty() {
+            return Err(LayoutFault::Widths { header: self.header, widths: self.widths.len() });
+        }
+        for (i, width) in self.widths.iter().enumerate() {
+            self.check_width(width)?;
+            if self.widths[..i].iter().any(|w| w.fields == width.fields) {
+                return Err(LayoutFault::SameWidth { fields: width.fields });
+            }
+        }
+        Ok(())
+    }
+
+    fn check_width(&self, width: &Width) -> Result<(), LayoutFault> {
+        let place = format!("the [[width]] of {} fields", width.fields);
+        check_blocks(|block| width.blocks.contains(&block), &place)?;
+        let mut owners: Vec<(usize, Block)> = Vec::new();
+        for &block in &width.blocks {
+            let numbers = self.columns(block).and_then(Columns::numbers).ok_or_else(|| {
+                LayoutFault::MissingBlock { block: block.key(), place: "[columns]".to_owned() }
+            })?;
+            if numbers.end > width.fields {
+                return Err(LayoutFault::BeyondWidth {
+                    block: block.key(),
+                    column: numbers.end,
+                    fields: width.fields,
+                });
+            }
+            for column in numbers {
+                if let Some((_, first)) = owners.iter().find(|(c, _)| *c == column) {
+                    return Err(LayoutFault::Overlap {
+                        column: column + 1,
+                        first: first.key(),
+                        second: block.key(),
+                    });
+                }
+                owners.push((column, block));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Every log needs time, angles, velocities and an effort.
+fn check_blocks(has: impl Fn(Block) -> bool, place: &str) -> Result<(), LayoutFault> {
+    let missing = [Block::Time, Block::Q, Block::Qd]
+        .into_iter()
+        .find(|&block| !has(block))
+        .or_else(|| (!has(Block::Current) && !has(Block::Torque)).then_some(Block::Current));
+    match missing {
+        Some(block) => {
+            Err(LayoutFault::MissingBlock { block: block.key(), place: place.to_owned() })
+        }
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const VALID: &str = r#"
+        name = "mine"
+        header = false
+        [columns]
+        time = 1
+        q = { first = 2, last = 3 }
+        qd = { first = 4, last = 5 }
+        torque = { first = 6, last = 7 }
+        [[width]]
+        fields = 7
+        blocks = ["time", "q", "qd", "torque"]
+    "#;
+
+    fn fault_of(from: &str, to: &str) -> String {
+        assert!(VALID.contains(from));
+        Layout::from_toml(&VALID.replacen(from, to, 1), "mine.toml").unwrap_err().to_string()
+    }
+
+    #[test]
+    fn every_built_in_layout_is_valid_and_has_its_own_name() {
+        for name in built_in_layout_names() {
+            assert_eq!(Layout::load(name).unwrap().name, name);
+        }
+        assert_eq!(Layout::default().name, "armid");
+        Layout::from_toml(VALID, "mine.toml").unwrap();
+    }
+
+    #[test]
+    fn the_documented_example_is_valid() {
+        let text = "name = \"my_robot\"\ndelimiter = \"semicolon\"\nheader = true\ndecimal_comma = true\n\
+            drive_gain_nm_a = [12.0, 12.0, 9.8, 10.7, 10.7, 10.7]\n[units]\ntime = \"ms\"\nq = \"deg\"\n\
+            current = \"mA\"\n[columns]\ntime = \"clock\"\nq = \"angle {1}\"\n\
+            qd = [\"w1\", \"w2\", \"w3\", \"w4\", \"w5\", \"w6\"]\ncurrent = { first = 14, last = 19 }\n";
+        let layout = Layout::from_toml(text, "doc").unwrap();
+        assert_eq!(layout.columns(Block::Q).unwrap().name(0).unwrap(), "angle 1");
+        assert_eq!(layout.columns(Block::Current).unwrap().numbers().unwrap(), 13..19);
+        assert_eq!(layout.units.factor(Block::Time), Some(1e-3));
+    }
+
+    #[test]
+    fn each_fault_is_named_with_its_value() {
+        for (from, to, parts) in [
+            ("header = false", "header = false\nheadr = 1", vec!["headr"]),
+            ("header = false", "header = true", vec!["header = true", "1 [[width]]"]),
+            ("header = false", "header = false\ndelimiter = \"pipe\"", vec!["pipe"]),
+            ("last = 5", "last = 3", vec!["qd", "3"]),
+            ("time = 1\n", "time = 0\n", vec!["time", "count from 1"]),
+            ("time = 1\n", "time = \"t\"\n", vec!["time", "column numbers"]),
+            ("time = 1\n", "time = 1.5\n", vec!["columns are a name"]),
+            ("first = 4", "first = 3", vec!["column 3", "\"q\"", "\"qd\""]),
+            ("fields = 7", "fields = 6", vec!["torque", "column 7", "6 fields"]),
+            (", \"torque\"]", "]", vec!["current", "[[width]] of 7"]),
+            ("\"torque\"]", "\"current\"]", vec!["current", "[columns]"]),
+            ("torque = { first = 6, last = 7 }", "", vec!["current", "[columns]"]),
+            (
+                "header = false",
+                "header = false\ndrive_gain_nm_a = [1.0, -2.0]",
+                vec!["joint 2", "-2"],
+            ),
+            (
+                "header = false",
+                "header = false\ndecimal_comma = true\ndelimiter = \"comma\"",
+                vec!["decimal_comma"],
+            ),
+        ] {
+            let message = fault_of(from, to);
+            for part in parts {
+                assert!(message.contains(part), "{to}: {message}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_unknown_layout_lists_those_built_in() {
+        let message = Layout::load("ur10").unwrap_err().to_string();
+        assert!(
+            message.contains("\"ur10\"") && message.contains("ur10e_innopolis_author"),
+            "{message}"
+        );
+        let message = Layout::load("missing.toml").unwrap_err().to_string();
+        assert!(message.contains("missing.toml"), "{message}");
+    }
+}

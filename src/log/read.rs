@@ -1,0 +1,395 @@
+//! From a file to a log.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use super::account::{LogWarning, Reason, RowAccount};
+use super::clean;
+use super::error::LogError;
+use super::layout::{Block, Layout};
+use super::lines::{Line, Lines};
+use super::plan::{Delimiter, Plan};
+use super::record::{Effort, Log};
+use super::units;
+use crate::robot::JointSignals;
+
+/// Rows without header that are looked at to find the width of a file: one cut row does not decide.
+const WIDTH_ROWS: usize = 50;
+
+/// Reads a log of an arm with `joints` joints.
+///
+/// Only the columns of the layout are read, row by row; memory is that of the numbers kept, 8 bytes each.
+/// Numbers are converted to SI units. Then, in this order:
+///
+/// 1. Rows are set aside that have another number of fields than the file, an empty field, text, NaN,
+///    an infinity, or a magnitude beyond: angle and velocity 3.6·10⁵, acceleration 3·10⁴ rad/s²,
+///    current 500 A, torque 5·10⁴ Nm, temperature 1000 °C, time 10¹⁹ s.
+/// 2. Times must increase: repeated, backward and lone far-ahead times are set aside.
+/// 3. Units: Δq is compared with ∫q̇ dt, and the clock with what recorders do. Numbers that say degrees,
+///    milli-, micro- or nanoseconds are an error that names the layout's remedy.
+/// 4. Angles beyond 1000 rad and velocities beyond 100 rad/s are set aside, and so are rows whose angles
+///    do not follow from their neighbours' angles and velocities (short stretches of fewer than 10 rows
+///    that no acceleration below 20 rad/s² connects to the rest).
+///
+/// # Errors
+/// Any [`LogError`] about files, layouts, units and joints; [`LogError::NoUsableRows`] if fewer than two
+/// rows are left.
+pub fn read_log(path: &Path, layout: &Layout, joints: usize) -> Result<Log, LogError> {
+    let file = path.display().to_string();
+    if path.is_dir() {
+        return Err(LogError::IsFolder { file });
+    }
+    match File::open(path) {
+        Ok(source) => read_log_from(source, &file, layout, joints),
+        Err(source) => Err(LogError::Read { file, source }),
+    }
+}
+
+/// As [`read_log`], from any source of bytes; `name` stands for the file in messages.
+///
+/// # Errors
+/// As [`read_log`].
+pub fn read_log_from(
+    source: impl Read,
+    name: &str,
+    layout: &Layout,
+    joints: usize,
+) -> Result<Log, LogError> {
+    let mut lines = Lines::new(source, name)?;
+    let mut first = Line::default();
+    if !lines.next_into(&mut first)? {
+        return Err(LogError::Empty { file: name.to_owned(), lines: lines.row() });
+    }
+    let delimiter = Delimiter::choose(layout, &first.bytes);
+    let (plan, ahead) = if layout.header {
+        (Plan::from_header(layout, joints, delimiter, &first, name)?, Vec::new())
+    } else {
+        plan_by_width(&mut lines, first.clone(), layout, joints, delimiter, name)?
+    };
+    let mut table = Table::new(&plan);
+    let mut account = RowAccount::default();
+    for line in &ahead {
+        table.push(&plan, line, &mut account, name)?;
+    }
+    let mut line = Line::default();
+    while lines.next_into(&mut line)? {
+        table.push(&plan, &line, &mut account, name)?;
+    }
+    if account.read == 0 {
+        return Err(LogError::HeaderOnly { file: name.to_owned(), row: first.row });
+    }
+    let warnings = table.clean(&plan, layout, &mut account, name)?;
+    account.warnings.extend(warnings);
+    Ok(table.into_log(&plan, layout, account, name, lines.sha256()))
+}
+
+/// The plan of a file without header, from the width that most of its first rows have, and those rows.
+fn plan_by_width(
+    lines: &mut Lines<impl Read>,
+    first: Line,
+    layout: &Layout,
+    joints: usize,
+    delimiter: Delimiter,
+    file: &str,
+) -> Result<(Plan, Vec<Line>), LogError> {
+    let leading = delimiter.split(&first.bytes).next().unwrap_or_default();
+    let leading = String::from_utf8_lossy(leading);
+    let begins_like_a_name = leading.starts_with(|c: char| c.is_alphabetic() || c == '_');
+    if begins_like_a_name && leading.parse::<f64>().is_err() {
+        return Err(LogError::UnexpectedHeader {
+            file: file.to_owned(),
+            row: first.row,
+            value: abridged(&leading),
+            layout: layout.name.clone(),
+        });
+    }
+    let (first_row, first_width) = (first.row, delimiter.split(&first.bytes).count());
+    let mut ahead = vec![first];
+    let mut line = Line::default();
+    while ahead.len() < WIDTH_ROWS && lines.next_into(&mut line)? {
+        ahead.push(line.clone());
+    }
+    let rows_of = |fields: usize| {
+        ahead.iter().filter(|line| delimiter.split(&line.bytes).count() == fields).count()
+    };
+    let common = layout.widths.iter().map(|w| w.fields).max_by_key(|&fields| rows_of(fields));
+    let plan = match common.filter(|&fields| rows_of(fields) > 0) {
+        Some(fields) => Plan::from_width(layout, joints, delimiter, fields, file)?,
+        None => None,
+    };
+    match plan {
+        Some(plan) => Ok((plan, ahead)),
+        None => Err(LogError::Width {
+            file: file.to_owned(),
+            row: first_row,
+            found: first_width,
+            expected: layout.widths.iter().map(|w| w.fields).collect(),
+            layout: layout.name.clone(),
+        }),
+    }
+}
+
+/// The numbers read so far, column by column, and where each row stood in the file.
+struct Table {
+    columns: Vec<Vec<f64>>,
+    rows: Vec<usize>,
+    current: Vec<f64>,
+}
+
+/// What is wrong with a row: in which column (from 0), or with how many fields.
+struct Defect {
+    reason: Reason,
+    at: usize,
+}
+
+impl Table {
+    fn new(plan: &Plan) -> Self {
+        Self {
+            columns: vec![Vec::new(); plan.fields.len()],
+            rows: Vec::new(),
+            current: vec![0.0; plan.fields.len()],
+        }
+    }
+
+    /// Takes a row in, or counts why not.
+    fn push(
+        &mut self,
+        plan: &Plan,
+        line: &Line,
+        account: &mut RowAccount,
+        file: &str,
+    ) -> Result<(), LogError> {
+        account.read += 1;
+        match parse(plan, line, &mut self.current) {
+            Ok(()) => {
+                for (column, &value) in self.columns.iter_mut().zip(&self.current) {
+                    column.push(value);
+                }
+                self.rows.push(line.row);
+            }
+            Err(defect) => {
+                let text = plan.delimiter.split(&line.bytes).nth(defect.at).unwrap_or_default();
+                let text = String::from_utf8_lossy(text);
+                if defect.reason == Reason::NotANumber && is_decimal_comma(&text) {
+                    return Err(LogError::DecimalComma {
+                        file: file.to_owned(),
+                        row: line.row,
+                        column: defect.at + 1,
+                        value: abridged(&text),
+                    });
+                }
+                account.add(defect.reason, line.row, || match defect.reason {
+                    Reason::TooFewFields | Reason::TooManyFields | Reason::CutShort => {
+                        format!("{} fields of {}", defect.at, plan.width)
+                    }
+                    _ => {
+                        let place = plan.place[defect.at].map(|i| plan.fields[i].place());
+                        format!("{} = \"{}\"", place.unwrap_or_default(), abridged(&text))
+                    }
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Steps 2 to 4 of [`read_log`].
+    fn clean(
+        &mut self,
+        plan: &Plan,
+        layout: &Layout,
+        account: &mut RowAccount,
+        file: &str,
+    ) -> Result<Vec<LogWarning>, LogError> {
+        let (time, q, qd) = motion_ranges(plan);
+        let order = clean::order_of_time(&self.columns[time]);
+        self.retain(&order, account, |table, k, _| format!("time {} s", table.columns[time][k]));
+        self.require_two(account, file)?;
+        let motion = clean::Motion {
+            time_s: &self.columns[time],
+            q: &self.columns[q.clone()],
+            qd: &self.columns[qd.clone()],
+            row: &self.rows,
+        };
+        let mut warnings = units::check(&motion, &layout.units)
+            .map_err(|suspicion| LogError::Units { file: file.to_owned(), suspicion })?;
+        let verdicts = clean::consistency(&motion);
+        self.retain(&verdicts, account, |table, k, reason| {
+            let beyond = |columns: std::ops::Range<usize>, bound: f64| {
+                columns.into_iter().find(|&c| table.columns[c][k].abs() > bound)
+            };
+            let worst = beyond(q.clone(), clean::ANGLE_BOUND_RAD)
+                .or_else(|| beyond(qd.clone(), clean::VELOCITY_BOUND_RAD_S))
+                .filter(|_| reason == Reason::Implausible);
+            let c = worst.unwrap_or(q.start);
+            format!("{} = {}", plan.fields[c].place(), table.columns[c][k])
+        });
+        self.require_two(account, file)?;
+        let motion = clean::Motion {
+            time_s: &self.columns[time],
+            q: &self.columns[q.clone()],
+            qd: &self.columns[qd],
+            row: &self.rows,
+        };
+        warnings.extend(clean::jumps(&motion));
+        if let Some((missed, warning)) = clean::missed_samples(&motion) {
+            account.missed_samples = missed;
+            warnings.push(warning);
+        }
+        let set_aside = account.total_set_aside();
+        if set_aside * 10 > account.read {
+            warnings.push(LogWarning::ManySetAside { set_aside, read: account.read });
+        }
+        Ok(warnings)
+    }
+
+    /// Keeps the rows without a reason against them and counts the others.
+    fn retain(
+        &mut self,
+        verdicts: &[Option<Reason>],
+        account: &mut RowAccount,
+        example: impl Fn(&Self, usize, Reason) -> String,
+    ) {
+        for (k, verdict) in verdicts.iter().enumerate() {
+            if let Some(reason) = *verdict {
+                account.add(reason, self.rows[k], || example(self, k, reason));
+            }
+        }
+        if verdicts.iter().all(Option::is_none) {
+            return;
+        }
+        for column in &mut self.columns {
+            let mut verdict = verdicts.iter();
+            column.retain(|_| verdict.next().is_some_and(Option::is_none));
+        }
+        let mut verdict = verdicts.iter();
+        self.rows.retain(|_| verdict.next().is_some_and(Option::is_none));
+    }
+
+    fn require_two(&self, account: &mut RowAccount, file: &str) -> Result<(), LogError> {
+        account.used = self.rows.len();
+        if account.used < 2 {
+            return Err(LogError::NoUsableRows {
+                file: file.to_owned(),
+                account: std::mem::take(account),
+            });
+        }
+        Ok(())
+    }
+
+    fn into_log(
+        mut self,
+        plan: &Plan,
+        layout: &Layout,
+        rows: RowAccount,
+        source: &str,
+        sha256: String,
+    ) -> Log {
+        let mut signals = |block| plan.range(block).map(|range| self.signals(range));
+        let gain = || layout.drive_gain_nm_a.clone();
+        let current = |ampere| Effort::Current { ampere, gain_nm_a: gain() };
+        let effort = signals(Block::Torque)
+            .map(Effort::Torque)
+            .or_else(|| signals(Block::Current).map(current))
+            .unwrap_or_else(|| unreachable!("a plan always has an effort"));
+        let target_effort = signals(Block::TargetCurrent)
+            .map(current)
+            .or_else(|| signals(Block::TargetMoment).map(Effort::Torque));
+        let (time, q, qd) = motion_ranges(plan);
+        Log {
+            source: source.to_owned(),
+            target_q_rad: signals(Block::TargetQ),
+            target_qd_rad_s: signals(Block::TargetQd),
+            target_qdd_rad_s2: signals(Block::TargetQdd),
+            temperature_c: signals(Block::Temperature),
+            effort,
+            target_effort,
+            q_rad: self.signals(q),
+            qd_rad_s: self.signals(qd),
+            time_s: std::mem::take(&mut self.columns[time]),
+            rows,
+            sha256,
+        }
+    }
+
+    /// The columns as signals; they are given up one block at a time, so that no second copy of the whole
+    /// log is ever held.
+    fn signals(&mut self, range: std::ops::Range<usize>) -> JointSignals {
+        let columns: Vec<Vec<f64>> = self.columns[range].iter_mut().map(std::mem::take).collect();
+        JointSignals::from_fn(columns.len(), self.rows.len(), |j, k| columns[j][k])
+    }
+}
+
+/// Places of time, angles and velocities among a plan's fields: every plan begins with these three.
+fn motion_ranges(plan: &Plan) -> (usize, std::ops::Range<usize>, std::ops::Range<usize>) {
+    let range = |block| plan.range(block).unwrap_or_default();
+    (range(Block::Time).start, range(Block::Q), range(Block::Qd))
+}
+
+/// One row's numbers in SI units into `values`.
+fn parse(plan: &Plan, line: &Line, values: &mut [f64]) -> Result<(), Defect> {
+    let mut defect = None;
+    let mut count = 0;
+    let mut last_is_empty = false;
+    for (at, text) in plan.delimiter.split(&line.bytes).enumerate() {
+        count += 1;
+        last_is_empty = text.is_empty();
+        let Some(&Some(place)) = plan.place.get(at) else { continue };
+        match number(text, plan.decimal_comma) {
+            Ok(raw) => {
+                let field = &plan.fields[place];
+                let value = field.factor.map_or(raw, |factor| raw * factor);
+                values[place] = value;
+                if value.abs() > field.block.bound() && defect.is_none() {
+                    defect = Some(Defect { reason: Reason::Implausible, at });
+                }
+            }
+            Err(reason) => defect = defect.or(Some(Defect { reason, at })),
+        }
+    }
+    // A delimiter at the end of a row separates nothing.
+    let surplus = usize::from(last_is_empty && count == plan.width + 1);
+    let fields = count - surplus;
+    let last_is_used = plan.place.last().is_some_and(Option::is_some);
+    let reason = if !line.ended && surplus == 0 && (fields < plan.width || last_is_used) {
+        Some(Reason::CutShort)
+    } else {
+        match fields.cmp(&plan.width) {
+            std::cmp::Ordering::Less => Some(Reason::TooFewFields),
+            std::cmp::Ordering::Greater => Some(Reason::TooManyFields),
+            std::cmp::Ordering::Equal => None,
+        }
+    };
+    match reason.map(|reason| Defect { reason, at: fields }).or(defect) {
+        Some(defect) => Err(defect),
+        None => Ok(()),
+    }
+}
+
+fn number(text: &[u8], decimal_comma: bool) -> Result<f64, Reason> {
+    if text.is_empty() {
+        return Err(Reason::EmptyField);
+    }
+    let text = std::str::from_utf8(text).map_err(|_| Reason::NotANumber)?;
+    let value: Result<f64, _> =
+        if decimal_comma { text.replace(',', ".").parse() } else { text.parse() };
+    match value {
+        Ok(value) if value.is_finite() => Ok(value),
+        Ok(_) => Err(Reason::NotFinite),
+        Err(_) => Err(Reason::NotANumber),
+    }
+}
+
+/// "0,25", "-1,5e3": a number once its only comma is a point.
+fn is_decimal_comma(text: &str) -> bool {
+    text.matches(',').count() == 1 && text.replace(',', ".").parse::<f64>().is_ok()
+}
+
+/// A value as shown in messages; uninitialised doubles are printed with 300 digits.
+fn abridged(text: &str) -> String {
+    const SHOWN: usize = 24;
+    match text.char_indices().nth(SHOWN) {
+        Some((end, _)) => format!("{}… ({} characters)", &text[..end], text.chars().count()),
+        None => text.to_owned(),
+    }
+}

@@ -1,0 +1,174 @@
+//! The record of one run.
+
+use super::account::RowAccount;
+use super::error::LogError;
+use crate::robot::{Arm, JointSignals};
+
+/// One run of an arm: what was measured, at which times, and what became of the file's rows.
+///
+/// All signals have one length; times increase strictly. Angles follow the joint convention of the arm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Log {
+    /// File or scenario it comes from.
+    pub source: String,
+    /// Time of every sample, s.
+    pub time_s: Vec<f64>,
+    /// Measured joint angles, rad.
+    pub q_rad: JointSignals,
+    /// Measured joint velocities, rad/s.
+    pub qd_rad_s: JointSignals,
+    /// Measured effort of the motors.
+    pub effort: Effort,
+    /// Angles the controller asked for, rad.
+    pub target_q_rad: Option<JointSignals>,
+    /// Velocities the controller asked for, rad/s.
+    pub target_qd_rad_s: Option<JointSignals>,
+    /// Accelerations the controller asked for, rad/s².
+    pub target_qdd_rad_s2: Option<JointSignals>,
+    /// The manufacturer's feed-forward: desired currents where logged, otherwise desired moments.
+    pub target_effort: Option<Effort>,
+    /// Joint temperatures, °C.
+    pub temperature_c: Option<JointSignals>,
+    /// What became of the file's rows.
+    pub rows: RowAccount,
+    /// SHA-256 of the file's bytes in hexadecimal; empty for a log that was not read from a file.
+    pub sha256: String,
+}
+
+/// What the motors gave, in the quantity that was logged.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Effort {
+    /// Motor currents.
+    Current {
+        /// Current of every joint's motor, A.
+        ampere: JointSignals,
+        /// Joint torque per ampere stated by the layout, Nm/A; `None`: the arm's own i_G·k.
+        gain_nm_a: Option<Vec<f64>>,
+    },
+    /// Motor torques at the joints, Nm.
+    Torque(JointSignals),
+}
+
+impl Effort {
+    /// The values in the unit that was logged (A or Nm).
+    pub fn signals(&self) -> &JointSignals {
+        match self {
+            Self::Current { ampere, .. } => ampere,
+            Self::Torque(nm) => nm,
+        }
+    }
+
+    /// Motor torque at the joint, Nm: τ = gain · I with the layout's gain where it states one, otherwise
+    /// with the arm's i_G·k; torques as they are.
+    ///
+    /// # Errors
+    /// [`LogError::JointCount`] where signals, gains and arm differ in joints; `file` names the log in it.
+    fn torque_nm(&self, arm: &Arm, file: &str) -> Result<JointSignals, LogError> {
+        let count = |what, found| {
+            if found == arm.dof() {
+                return Ok(());
+            }
+            Err(LogError::JointCount { file: file.to_owned(), what, found, expected: arm.dof() })
+        };
+        count("the log", self.signals().joints())?;
+        match self {
+            Self::Torque(nm) => Ok(nm.clone()),
+            Self::Current { ampere, gain_nm_a } => {
+                let gain = match gain_nm_a {
+                    Some(gain) => gain.clone(),
+                    None => arm.joints.iter().map(|joint| joint.drive.gain_nm_a()).collect(),
+                };
+                count("the layout's drive_gain_nm_a", gain.len())?;
+                Ok(JointSignals::from_fn(ampere.joints(), ampere.samples(), |j, k| {
+                    gain[j] * ampere.joint(j)[k]
+                }))
+            }
+        }
+    }
+}
+
+impl Log {
+    /// A log that was made rather than read (a simulation's, or a test's); targets and temperatures may be
+    /// set afterwards.
+    ///
+    /// # Errors
+    /// [`LogError::Shape`] where the signals differ in joints or samples.
+    pub fn new(
+        source: impl Into<String>,
+        time_s: Vec<f64>,
+        q_rad: JointSignals,
+        qd_rad_s: JointSignals,
+        effort: Effort,
+    ) -> Result<Self, LogError> {
+        let log = Self {
+            source: source.into(),
+            rows: RowAccount::complete(time_s.len()),
+            time_s,
+            q_rad,
+            qd_rad_s,
+            effort,
+            target_q_rad: None,
+            target_qd_rad_s: None,
+            target_qdd_rad_s2: None,
+            target_effort: None,
+            temperature_c: None,
+            sha256: String::new(),
+        };
+        log.check_shape()?;
+        Ok(log)
+    }
+
+    /// Number of joints.
+    pub fn joints(&self) -> usize {
+        self.q_rad.joints()
+    }
+
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// Measured motor torque at the joints, Nm: gain · current, or the torque that was logged.
+    ///
+    /// # Errors
+    /// [`LogError::JointCount`] if the log or the layout's gains are not of this arm's number of joints.
+    pub fn torque_nm(&self, arm: &Arm) -> Result<JointSignals, LogError> {
+        self.effort.torque_nm(arm, &self.source)
+    }
+
+    /// The manufacturer's feed-forward as torque at the joints, Nm; `None` where it was not logged.
+    ///
+    /// # Errors
+    /// As [`Log::torque_nm`].
+    pub fn target_torque_nm(&self, arm: &Arm) -> Result<Option<JointSignals>, LogError> {
+        self.target_effort.as_ref().map(|effort| effort.torque_nm(arm, &self.source)).transpose()
+    }
+
+    pub(super) fn check_shape(&self) -> Result<(), LogError> {
+        let (joints, samples) = (self.joints(), self.samples());
+        let signals = [
+            ("q", Some(&self.q_rad)),
+            ("qd", Some(&self.qd_rad_s)),
+            ("effort", Some(self.effort.signals())),
+            ("target q", self.target_q_rad.as_ref()),
+            ("target qd", self.target_qd_rad_s.as_ref()),
+            ("target qdd", self.target_qdd_rad_s2.as_ref()),
+            ("target effort", self.target_effort.as_ref().map(Effort::signals)),
+            ("temperature", self.temperature_c.as_ref()),
+        ];
+        for (signal, values) in signals {
+            let Some(values) = values else { continue };
+            if values.joints() != joints || values.samples() != samples {
+                return Err(LogError::Shape {
+                    file: self.source.clone(),
+                    signal,
+                    found_joints: values.joints(),
+                    found_samples: values.samples(),
+                    joints,
+                    samples,
+                });
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,180 @@
+//! Whether the numbers are in the units the layout says.
+//!
+//! An angle is the integral of its velocity over time. If Δq / ∫q̇ dt, which is 1 in the right units, is
+//! 180/π, 10⁻³ or another factor between units, one of the three is in another unit than stated.
+
+use std::f64::consts::{PI, TAU};
+
+use super::account::LogWarning;
+use super::clean::{Motion, median, median_step};
+use super::error::UnitSuspicion;
+use super::layout::{Angle, AngularVelocity, TimeUnit, Units};
+
+/// Motion within one span below which its ratio says nothing, rad: 200 steps of a 10⁻⁴ rad encoder.
+const MOVES_RAD: f64 = 0.02;
+/// Ratios this near to 1 (or, relatively, to a factor between units) are taken for it.
+const RATIO_TOLERANCE: f64 = 0.2;
+/// Steps of time a recorder of motion has, s.
+const CLOCK_STEP_S: std::ops::Range<f64> = 1e-5..0.9;
+
+/// Δq / ∫q̇ dt of one joint.
+struct Ratio {
+    joint: usize,
+    ratio: f64,
+    /// Rows (indices) of the span with the largest motion.
+    span: (usize, usize),
+}
+
+/// Compares angles, velocities and clock.
+///
+/// # Errors
+/// What the numbers contradict, with the remedy.
+pub(super) fn check(motion: &Motion, units: &Units) -> Result<Vec<LogWarning>, UnitSuspicion> {
+    let ratios: Vec<Ratio> = (0..motion.q.len()).filter_map(|j| ratio_of(motion, j)).collect();
+    let mut values: Vec<f64> = ratios.iter().map(|r| r.ratio).collect();
+    let typical = median(&mut values);
+    match typical {
+        Some(ratio) if is_near(ratio, 1.0) => {}
+        Some(ratio) => return Err(contradiction(motion, units, &ratios, ratio)),
+        None => check_clock(motion, units)?,
+    }
+    check_degrees(motion, units)?;
+    Ok(ratios
+        .iter()
+        .filter(|r| !is_near(r.ratio, 1.0))
+        .map(|r| LogWarning::VelocityDisagrees { joint: r.joint + 1, ratio: r.ratio })
+        .collect())
+}
+
+fn is_near(ratio: f64, expected: f64) -> bool {
+    (ratio / expected - 1.0).abs() <= RATIO_TOLERANCE
+}
+
+/// The median over the spans of a log in which the joint moves; `None` if it hardly moves.
+fn ratio_of(motion: &Motion, joint: usize) -> Option<Ratio> {
+    let rows = motion.rows();
+    let length = (rows / 200).clamp(10, 100);
+    let (q, qd) = (&motion.q[joint], &motion.qd[joint]);
+    let mut ratios = Vec::new();
+    let mut widest = (0.0, (0, 0));
+    let spans = rows.saturating_sub(1) / length;
+    for first in (0..spans).map(|s| s * length) {
+        let last = first + length;
+        let moved = q[last] - q[first];
+        let integral: f64 = (first..last)
+            .map(|k| 0.5 * (qd[k] + qd[k + 1]) * (motion.time_s[k + 1] - motion.time_s[k]))
+            .sum();
+        if moved.abs().max(integral.abs()) < MOVES_RAD {
+            continue;
+        }
+        ratios.push(moved / integral);
+        if moved.abs() > widest.0 {
+            widest = (moved.abs(), (first, last));
+        }
+    }
+    // A few spans of garbage in a log at rest are no motion.
+    if ratios.len() < 3.max(spans / 20) {
+        return None;
+    }
+    Some(Ratio { joint, ratio: median(&mut ratios)?, span: widest.1 })
+}
+
+/// The fewest changes of unit that explain the ratio, the first of them named.
+fn contradiction(motion: &Motion, units: &Units, ratios: &[Ratio], ratio: f64) -> UnitSuspicion {
+    let seen =
+        ratios.iter().min_by(|a, b| (a.ratio - ratio).abs().total_cmp(&(b.ratio - ratio).abs()));
+    let (joint, (first, last)) = seen.map_or((0, (0, 0)), |r| (r.joint, r.span));
+    let (first_row, last_row) = (motion.row[first], motion.row[last]);
+    let best =
+        alternatives(units).filter(|a| is_near(ratio, a.ratio)).min_by_key(|a| a.changes.len());
+    match best.and_then(|a| a.changes.first().copied()) {
+        Some((quantity, unit)) => UnitSuspicion::Ratio {
+            quantity,
+            unit,
+            joint: joint + 1,
+            ratio,
+            first_row,
+            last_row,
+            q_from: motion.q[joint][first],
+            q_to: motion.q[joint][last],
+        },
+        None => UnitSuspicion::Unrelated { joint: joint + 1, ratio, first_row, last_row },
+    }
+}
+
+/// Other units the file might be in, with the Δq / ∫q̇ dt this would show as read.
+struct Alternative {
+    ratio: f64,
+    changes: Vec<(&'static str, &'static str)>,
+}
+
+fn alternatives(units: &Units) -> impl Iterator<Item = Alternative> {
+    let degree = |yes: bool| if yes { PI / 180.0 } else { 1.0 };
+    let stated = *units;
+    TimeUnit::ALL.into_iter().flat_map(move |time| {
+        [(false, false), (true, false), (false, true), (true, true)].into_iter().map(
+            move |(q_deg, qd_deg)| {
+                let (q_stated, qd_stated) =
+                    (stated.q == Angle::Deg, stated.qd == AngularVelocity::DegS);
+                let mut changes = Vec::new();
+                if time != stated.time {
+                    changes.push(("time", time.name()));
+                }
+                if q_deg != q_stated {
+                    changes.push(("q", if q_deg { "deg" } else { "rad" }));
+                }
+                if qd_deg != qd_stated {
+                    changes.push(("qd", if qd_deg { "deg/s" } else { "rad/s" }));
+                }
+                let q = degree(q_stated) / degree(q_deg);
+                let qd = degree(qd_stated) / degree(qd_deg);
+                let t = stated.time.seconds() / time.seconds();
+                Alternative { ratio: q / (qd * t), changes }
+            },
+        )
+    })
+}
+
+/// For logs at rest: no recorder of motion has steps of seconds.
+fn check_clock(motion: &Motion, units: &Units) -> Result<(), UnitSuspicion> {
+    let Some(step_s) = median_step(motion.time_s).filter(|s| !CLOCK_STEP_S.contains(s)) else {
+        return Ok(());
+    };
+    let better = TimeUnit::ALL
+        .into_iter()
+        .find(|unit| CLOCK_STEP_S.contains(&(step_s / units.time.seconds() * unit.seconds())));
+    match better {
+        Some(unit) => Err(UnitSuspicion::Clock {
+            unit: unit.name(),
+            step_s,
+            row: motion.row[0],
+            time_s: motion.time_s[0],
+        }),
+        None => Ok(()),
+    }
+}
+
+/// Angles and velocities both in degrees agree with each other. But no arm keeps two joints beyond a
+/// whole turn for half of a log, and in degrees nearly every posture looks like that.
+fn check_degrees(motion: &Motion, units: &Units) -> Result<(), UnitSuspicion> {
+    if units.q == Angle::Deg {
+        return Ok(());
+    }
+    let beyond: Vec<usize> = (0..motion.q.len())
+        .filter(|&j| motion.q[j].iter().filter(|q| q.abs() > TAU).count() * 2 > motion.rows())
+        .collect();
+    if beyond.len() < 2 {
+        return Ok(());
+    }
+    let (joint, k) = beyond
+        .iter()
+        .filter_map(|&j| motion.q[j].iter().position(|q| q.abs() > TAU).map(|k| (j, k)))
+        .min_by_key(|&(_, k)| k)
+        .unwrap_or((beyond[0], 0));
+    Err(UnitSuspicion::Degrees {
+        row: motion.row[k],
+        joint: joint + 1,
+        q: motion.q[joint][k],
+        joints: beyond.len(),
+    })
+}

@@ -1,0 +1,252 @@
+//! Files the program writes: checked before the work starts, complete or not there at all.
+
+use std::ffi::OsString;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufWriter, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use thiserror::Error;
+
+/// An output file that cannot be written, and what to do about it.
+#[derive(Debug, Error)]
+pub enum OutputError {
+    /// The path names a folder.
+    #[error("{}: this is a folder; name a file to write", path.display())]
+    IsFolder {
+        /// The output asked for.
+        path: PathBuf,
+    },
+    /// The folder to write into does not exist.
+    #[error("{}: the folder {} does not exist; create it first", path.display(), folder.display())]
+    NoFolder {
+        /// The output asked for.
+        path: PathBuf,
+        /// The folder that is missing.
+        folder: PathBuf,
+    },
+    /// The file or its folder does not accept writing.
+    #[error("{}: cannot be written: {source}", path.display())]
+    NotWritable {
+        /// The output asked for.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// No space is left.
+    #[error("{}: the disk is full; nothing was written, free some space and run again", path.display())]
+    DiskFull {
+        /// The output asked for.
+        path: PathBuf,
+    },
+}
+
+impl OutputError {
+    fn new(path: &Path, source: io::Error) -> Self {
+        let path = path.to_owned();
+        match source.kind() {
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Self::DiskFull { path },
+            _ => Self::NotWritable { path, source },
+        }
+    }
+}
+
+/// Whether `path` could be written now: its folder exists and takes a file, it is no folder itself
+/// and not read-only. Call it before long work, so that the work is not lost at its end.
+pub fn check_writable(path: &Path) -> Result<(), OutputError> {
+    match Target::find(path)? {
+        Target::Device => {
+            OpenOptions::new().write(true).open(path).map_err(|e| OutputError::new(path, e))?;
+        }
+        Target::File { path: file, .. } => {
+            Partial::create(&file).map_err(|e| OutputError::new(path, e))?;
+        }
+    }
+    Ok(())
+}
+
+/// Writes `path` as a whole: into a temporary file beside it, forced to the disk, then renamed. On any
+/// error, the writer's own included, an earlier file of that name stays as it was and the temporary
+/// one is removed. A device (such as `/dev/stdout`) is written directly.
+pub fn write_atomically(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), OutputError> {
+    let fault = |e| OutputError::new(path, e);
+    match Target::find(path)? {
+        Target::Device => {
+            let file = OpenOptions::new().write(true).open(path).map_err(fault)?;
+            fill(&file, write).map_err(fault)
+        }
+        Target::File { path: file, permissions } => {
+            let partial = Partial::create(&file).map_err(fault)?;
+            fill(&partial.file, write).map_err(fault)?;
+            if let Some(permissions) = permissions {
+                fs::set_permissions(&partial.path, permissions).map_err(fault)?;
+            }
+            partial.file.sync_all().map_err(fault)?;
+            partial.rename_to(&file).map_err(fault)
+        }
+    }
+}
+
+fn fill(file: &File, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    let mut buffer = BufWriter::with_capacity(1 << 16, file);
+    write(&mut buffer)?;
+    buffer.flush()
+}
+
+/// What a path leads to.
+enum Target {
+    /// A regular file, there already or not; links are followed, so that a link stays a link.
+    File { path: PathBuf, permissions: Option<fs::Permissions> },
+    /// A terminal, pipe or device: it cannot be replaced by renaming.
+    Device,
+}
+
+impl Target {
+    fn find(path: &Path) -> Result<Self, OutputError> {
+        let fault = |e| OutputError::new(path, e);
+        match fs::metadata(path) {
+            Ok(data) if data.is_dir() => Err(OutputError::IsFolder { path: path.to_owned() }),
+            Ok(data) if !data.is_file() => Ok(Self::Device),
+            Ok(data) if data.permissions().readonly() => {
+                Err(fault(io::Error::new(ErrorKind::PermissionDenied, "the file is read-only")))
+            }
+            Ok(data) => Ok(Self::File {
+                path: fs::canonicalize(path).map_err(fault)?,
+                permissions: Some(data.permissions()),
+            }),
+            Err(e) if e.kind() == ErrorKind::NotFound => {
+                let folder = folder_of(path);
+                match fs::metadata(folder) {
+                    Ok(data) if data.is_dir() && path.file_name().is_some() => {
+                        Ok(Self::File { path: path.to_owned(), permissions: None })
+                    }
+                    _ => Err(OutputError::NoFolder {
+                        path: path.to_owned(),
+                        folder: folder.to_owned(),
+                    }),
+                }
+            }
+            Err(e) => Err(fault(e)),
+        }
+    }
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+/// A temporary file in the folder of the file it is to become; removed when dropped.
+struct Partial {
+    path: PathBuf,
+    file: File,
+}
+
+impl Partial {
+    fn create(target: &Path) -> io::Result<Self> {
+        static NUMBER: AtomicU64 = AtomicU64::new(0);
+        let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+        let mut name = OsString::from(".");
+        name.push(target.file_name().unwrap_or_default());
+        name.push(format!(".{}-{number}.part", std::process::id()));
+        let path = folder_of(target).join(name);
+        let file = OpenOptions::new().write(true).create_new(true).open(&path)?;
+        Ok(Self { path, file })
+    }
+
+    fn rename_to(self, target: &Path) -> io::Result<()> {
+        fs::rename(&self.path, target)?;
+        // The rename itself reaches the disk with the folder. Not every file system allows this,
+        // and the file is whole either way, so a refusal is no failure.
+        if let Ok(folder) = File::open(folder_of(target)) {
+            let _ = folder.sync_all();
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Partial {
+    fn drop(&mut self) {
+        // After a rename there is nothing left to remove.
+        let _ = fs::remove_file(&self.path);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<OsString> {
+        fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name()).collect()
+    }
+
+    #[test]
+    fn a_written_file_is_whole_and_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.json");
+        check_writable(&path).unwrap();
+        assert!(names(folder.path()).is_empty(), "the check leaves nothing behind");
+        for text in ["first", "second"] {
+            write_atomically(&path, |w| w.write_all(text.as_bytes())).unwrap();
+            assert_eq!(fs::read_to_string(&path).unwrap(), text);
+        }
+        assert_eq!(names(folder.path()), ["a.json"]);
+    }
+
+    #[test]
+    fn a_failure_half_way_leaves_the_earlier_file_untouched() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.json");
+        fs::write(&path, "earlier").unwrap();
+        let error = write_atomically(&path, |w| {
+            w.write_all(b"half")?;
+            Err(ErrorKind::StorageFull.into())
+        })
+        .unwrap_err();
+        assert!(error.to_string().contains("disk is full"), "{error}");
+        assert_eq!(fs::read_to_string(&path).unwrap(), "earlier");
+        assert_eq!(names(folder.path()), ["a.json"]);
+    }
+
+    #[test]
+    fn unwritable_places_are_named_before_the_work() {
+        let folder = tempfile::tempdir().unwrap();
+        let error = check_writable(folder.path()).unwrap_err();
+        assert!(matches!(error, OutputError::IsFolder { .. }), "{error}");
+        let error = check_writable(&folder.path().join("missing/a.json")).unwrap_err();
+        assert!(error.to_string().contains("missing does not exist"), "{error}");
+        let locked = folder.path().join("locked.json");
+        fs::write(&locked, "kept").unwrap();
+        let mut permissions = fs::metadata(&locked).unwrap().permissions();
+        permissions.set_readonly(true);
+        fs::set_permissions(&locked, permissions).unwrap();
+        let error = check_writable(&locked).unwrap_err();
+        assert!(error.to_string().contains("read-only"), "{error}");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_full_device_is_reported_and_not_replaced() {
+        let full = Path::new("/dev/full");
+        let error = write_atomically(full, |w| w.write_all(b"x")).unwrap_err();
+        assert!(matches!(error, OutputError::DiskFull { .. }), "{error}");
+        assert!(!fs::metadata(full).unwrap().is_file());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_stays_a_link() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("file"), folder.path().join("link"));
+        fs::write(&file, "earlier").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        write_atomically(&link, |w| w.write_all(b"new")).unwrap();
+        assert_eq!(fs::read_to_string(&file).unwrap(), "new");
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+    }
+}
