@@ -1,7 +1,10 @@
 //! Runs of the plant: tracking, saturation, and what is refused.
 
 use armid::excitation::{FourierSeries, Reference};
-use armid::plant::{PlantConfig, PlantError, RapierArm, simulate};
+use armid::plant::{
+    Drivetrain, Plant, PlantConfig, PlantError, RapierArm, RigidDrivetrain, RungeKutta4, Stage,
+    State, simulate,
+};
 use armid::robot::{Arm, LinkInertia};
 use nalgebra::{Matrix3, Vector3};
 
@@ -124,4 +127,61 @@ fn a_run_that_breaks_down_says_when_and_where() {
     }
     let error = simulate(&ur5(), &Lost { joints: 7 }, &PlantConfig::default(), None).unwrap_err();
     assert_eq!(error, PlantError::Joints { what: "the reference", found: 7, expected: 6 });
+}
+
+/// A stiff gear with one more state per joint: the distance travelled, ż = q̇.
+struct Odometer {
+    gear: RigidDrivetrain,
+}
+
+impl Drivetrain for Odometer {
+    fn states(&self) -> usize {
+        6
+    }
+
+    fn start(&mut self, arm: &mut RapierArm, q: &[f64], qd: &[f64], states: &mut [f64]) {
+        self.gear.start(arm, q, qd, &mut []);
+        states.fill(0.0);
+    }
+
+    fn rates(
+        &mut self,
+        arm: &mut RapierArm,
+        stage: &Stage<'_>,
+        qdd_rad_s2: &mut [f64],
+        states_rate: &mut [f64],
+    ) {
+        self.gear.rates(arm, stage, qdd_rad_s2, &mut []);
+        states_rate.copy_from_slice(stage.qd_rad_s);
+    }
+}
+
+/// A drivetrain's states are integrated with the joints', and change nothing they do not touch.
+#[test]
+fn a_drivetrain_may_have_states_of_its_own() {
+    let arm = ur5();
+    let odometer = || Odometer { gear: RigidDrivetrain::new(&arm) };
+    let mut engine = RapierArm::new(&arm).unwrap();
+    let mut drivetrain = odometer();
+    let mut state = State::zeros(6, drivetrain.states());
+    state.parts_mut().0.copy_from_slice(&[0.1, -1.0, 0.5, 0.3, 0.2, 0.7]);
+    let start = state.q_rad().to_vec();
+    drivetrain.start(&mut engine, &start, &[0.0; 6], &mut [0.0; 6]);
+    let mut rk4 = RungeKutta4::new(&state);
+    for k in 0..200 {
+        let time_s = f64::from(k) * 2e-3;
+        rk4.step(&mut engine, &mut drivetrain, &mut state, time_s, 2e-3, &[5.0; 6]);
+    }
+    let (q, _, distance) = state.parts_mut();
+    for ((q, start), distance) in q.iter().zip(&start).zip(distance) {
+        assert!((q - start - *distance).abs() < 1e-13, "{q} − {start} is not {distance}");
+    }
+    let config = PlantConfig::default();
+    let run = |drivetrain: Box<dyn Drivetrain>| {
+        Plant::with_drivetrain(&arm, &arm, drivetrain, &config)
+            .unwrap()
+            .run(&motion(), None)
+            .unwrap()
+    };
+    assert_eq!(run(Box::new(odometer())), run(Box::new(RigidDrivetrain::new(&arm))));
 }

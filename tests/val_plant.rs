@@ -1,4 +1,7 @@
-//! The plant against this crate's own dynamics, which shares no code with the engine.
+//! The plant against Pinocchio and against this crate's own dynamics; neither shares code with the
+//! engine.
+
+mod golden;
 
 use armid::dynamics::{
     Model, Workspace, forward_dynamics, inverse_dynamics, kinetic_energy, potential_energy,
@@ -55,6 +58,26 @@ impl Reference for Sines {
             }
             (q_rad[j], qd_rad_s[j], qdd_rad_s2[j]) = (q, qd, qdd);
         }
+    }
+}
+
+/// Pinocchio's articulated-body algorithm, without friction, on 200 random states of each of three
+/// arms, one of them with tilted axes. Round-off of 1e-16 times the condition number of M (below 1e3)
+/// and a thousand operations is 1e-10.
+#[test]
+fn forward_dynamics_agrees_with_pinocchio() {
+    for (arm, states) in golden::all() {
+        let mut plant = RapierArm::new(&arm).unwrap();
+        let mut worst: f64 = 0.0;
+        for s in &states {
+            let mut qdd = vec![0.0; arm.dof()];
+            plant.forward_dynamics(&s.q_rad, &s.qd_rad_s, &s.applied_nm(), &mut qdd);
+            let norm = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>().sqrt();
+            let error = norm(&mut qdd.iter().zip(&s.acceleration_rad_s2).map(|(a, b)| a - b));
+            worst = worst.max(error / norm(&mut s.acceleration_rad_s2.iter().copied()));
+        }
+        println!("{}: worst relative difference to Pinocchio {worst:.1e}", arm.name);
+        assert!(worst < 1e-9, "{}: {worst:e}", arm.name);
     }
 }
 

@@ -35,6 +35,12 @@ const TENSOR_TOLERANCE: f64 = 1e-13;
 /// Friction does not enter: it belongs to the [drivetrain](super::Drivetrain), and the torque given
 /// here is what is left of the drive torque behind it. The engine's integrator, which is of first
 /// order and dissipates energy, is not used.
+///
+/// The engine computes an acceleration only within a full step, which costs about 10 µs for six joints:
+/// two fifths for the mass matrix and the Coriolis matrix of its implicit integrator (not used here,
+/// and not to be switched off), a fifth for kinematics and Jacobians before and after the step, a
+/// quarter for islands, solver stages and collision detection that find nothing to do. There are no
+/// colliders, contacts or constraints to remove.
 pub struct RapierArm {
     world: PhysicsWorld,
     multibody: MultibodyIndex,
