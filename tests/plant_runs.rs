@@ -96,9 +96,28 @@ fn impossible_settings_are_refused() {
     assert!(toml::from_str::<PlantConfig>("step = 0.001").is_err());
 }
 
-/// A reference for `joints` joints that is lost after half a second.
+/// ε = 1 mrad/s makes the wrists' friction decay at about (1.4/0.001 + 2)/0.3 = 5000 /s.
+#[test]
+fn a_step_too_long_for_the_friction_is_refused() {
+    let mut arm = ur5();
+    arm.friction_epsilon_rad_s = 0.001;
+    match simulate(&arm, &motion(), &PlantConfig::default(), None) {
+        Err(PlantError::StepTooLong { decay_per_s, longest_s, .. }) => {
+            assert!((2e3..1e4).contains(&decay_per_s), "{decay_per_s}");
+            let step_s = 0.0001;
+            assert!(step_s < longest_s);
+            let config = PlantConfig { step_s, ..PlantConfig::default() };
+            let short = Lost { joints: 6, until_s: f64::INFINITY };
+            simulate(&arm, &short, &config, None).unwrap();
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+/// A reference for `joints` joints that stands still, and is lost at `until_s`.
 struct Lost {
     joints: usize,
+    until_s: f64,
 }
 
 impl Reference for Lost {
@@ -111,7 +130,7 @@ impl Reference for Lost {
     }
 
     fn sample(&self, t_s: f64, q_rad: &mut [f64], qd_rad_s: &mut [f64], qdd_rad_s2: &mut [f64]) {
-        q_rad.fill(if t_s < 0.5 { 0.3 } else { f64::NAN });
+        q_rad.fill(if t_s < self.until_s { 0.3 } else { f64::NAN });
         qd_rad_s.fill(0.0);
         qdd_rad_s2.fill(0.0);
     }
@@ -119,13 +138,14 @@ impl Reference for Lost {
 
 #[test]
 fn a_run_that_breaks_down_says_when_and_where() {
-    match simulate(&ur5(), &Lost { joints: 6 }, &PlantConfig::default(), None) {
+    match simulate(&ur5(), &Lost { joints: 6, until_s: 0.5 }, &PlantConfig::default(), None) {
         Err(PlantError::Diverged { time_s, joint: 1, .. }) => {
             assert!((time_s - 0.5).abs() < 1e-9, "{time_s}");
         }
         other => panic!("{other:?}"),
     }
-    let error = simulate(&ur5(), &Lost { joints: 7 }, &PlantConfig::default(), None).unwrap_err();
+    let error = simulate(&ur5(), &Lost { joints: 7, until_s: 0.5 }, &PlantConfig::default(), None)
+        .unwrap_err();
     assert_eq!(error, PlantError::Joints { what: "the reference", found: 7, expected: 6 });
 }
 
@@ -142,6 +162,10 @@ impl Drivetrain for Odometer {
     fn start(&mut self, arm: &mut RapierArm, q: &[f64], qd: &[f64], states: &mut [f64]) {
         self.gear.start(arm, q, qd, &mut []);
         states.fill(0.0);
+    }
+
+    fn fastest_decay_per_s(&self, inverse_inertia: &[f64]) -> f64 {
+        self.gear.fastest_decay_per_s(inverse_inertia)
     }
 
     fn rates(

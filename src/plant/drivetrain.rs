@@ -33,6 +33,10 @@ pub trait Drivetrain: Send {
     /// Prepares the arm and the own states for a run that starts at (`q_rad`, `qd_rad_s`).
     fn start(&mut self, arm: &mut RapierArm, q_rad: &[f64], qd_rad_s: &[f64], states: &mut [f64]);
 
+    /// Fastest rate (1/s) at which it makes a disturbance of a joint's speed decay, given the arm's
+    /// diag(M⁻¹) in kg⁻¹ m⁻²: what limits the step of an explicit integrator.
+    fn fastest_decay_per_s(&self, inverse_inertia_per_kg_m2: &[f64]) -> f64;
+
     /// Joint accelerations `qdd_rad_s2` (rad/s²) and the own states' time derivatives.
     fn rates(
         &mut self,
@@ -71,6 +75,15 @@ impl Drivetrain for RigidDrivetrain {
         for (j, [_, _, rotor]) in self.joints.iter().enumerate() {
             arm.set_rotor_inertia(j, *rotor);
         }
+    }
+
+    /// The friction curve is steepest at rest: (rv + rc/ε) (M⁻¹)_jj.
+    fn fastest_decay_per_s(&self, inverse_inertia_per_kg_m2: &[f64]) -> f64 {
+        let slopes = self.joints.iter().map(|[rv, rc, _]| rv + rc / self.epsilon_rad_s);
+        slopes
+            .zip(inverse_inertia_per_kg_m2)
+            .map(|(slope, inverse)| slope * inverse)
+            .fold(0.0, f64::max)
     }
 
     fn rates(

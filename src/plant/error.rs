@@ -41,6 +41,19 @@ pub enum PlantError {
         /// What it must be.
         requirement: &'static str,
     },
+    /// Friction is too steep for the step: the integration would chatter around standstill.
+    #[error(
+        "step_s = {step_s}: friction at standstill decays at {decay_per_s:.0} /s, which needs a step \
+         of at most {longest_s:.2e} s (or a larger friction_epsilon_rad_s)"
+    )]
+    StepTooLong {
+        /// The step asked for, s.
+        step_s: f64,
+        /// Fastest decay, 1/s.
+        decay_per_s: f64,
+        /// The longest step accepted, s.
+        longest_s: f64,
+    },
     /// A list with one entry per joint has another length.
     #[error("{what} has {found} joints, the arm has {expected}")]
     Joints {

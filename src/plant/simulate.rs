@@ -74,6 +74,11 @@ impl Plant {
         reference.sample(0.0, q, qd, &mut vec![0.0; n]);
         let (q, qd) = (&*q, &*qd);
         self.drivetrain.start(&mut arm, q, qd, own);
+        let decay_per_s = self.drivetrain.fastest_decay_per_s(&inverse_inertia(&mut arm, q));
+        let longest_s = RungeKutta4::LARGEST_STEP_DECAY / decay_per_s;
+        if h > longest_s {
+            return Err(PlantError::StepTooLong { step_s: h, decay_per_s, longest_s });
+        }
         let mut integrator = RungeKutta4::new(&state);
 
         let (mut q_read, mut qd_read) = (vec![0.0; n], vec![0.0; n]);
@@ -122,6 +127,20 @@ impl Plant {
         write_targets(reference, &mut recording);
         Ok(recording)
     }
+}
+
+/// diag(M⁻¹) at `q_rad`, kg⁻¹ m⁻²: what a unit torque on each joint adds to its acceleration.
+fn inverse_inertia(arm: &mut RapierArm, q_rad: &[f64]) -> Vec<f64> {
+    let n = q_rad.len();
+    let rest = vec![0.0; n];
+    let mut accelerations = |torque_nm: &[f64]| {
+        let mut qdd = vec![0.0; n];
+        arm.forward_dynamics(q_rad, &rest, torque_nm, &mut qdd);
+        qdd
+    };
+    let idle = accelerations(&rest);
+    let pushed = |j: usize| -> Vec<f64> { (0..n).map(|i| f64::from(u8::from(i == j))).collect() };
+    (0..n).map(|j| accelerations(&pushed(j))[j] - idle[j]).collect()
 }
 
 /// One run of `arm` as it is, behind a stiff gear, with a controller that knows it.
