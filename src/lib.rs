@@ -11,5 +11,6 @@ pub mod montecarlo;
 pub mod output;
 pub mod plant;
 pub mod random;
+pub mod report;
 pub mod robot;
 pub mod signal;

@@ -1,0 +1,32 @@
+//! Why a report or JSON document could not be made.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// A report that could not be made.
+#[derive(Debug, Error)]
+pub enum ReportError {
+    /// A figure could not be drawn.
+    #[error(transparent)]
+    Plot(#[from] super::plot::PlotError),
+    /// The page template refused its data.
+    #[error("the report page could not be assembled: {0}")]
+    Template(#[from] minijinja::Error),
+    /// The document could not be written as JSON.
+    #[error("the {schema} document could not be written as JSON: {source}")]
+    Json {
+        /// Schema of the document.
+        schema: String,
+        /// Why.
+        source: serde_json::Error,
+    },
+    /// An input could not be read for its checksum.
+    #[error("{}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+}

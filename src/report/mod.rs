@@ -1,0 +1,17 @@
+//! What is shown: numbers with their uncertainty, tables, figures, one self-contained page, and JSON.
+//!
+//! Enters: results of the chapters before. Leaves: text for the terminal, Markdown, a [`Page`] as one HTML file
+//! without network or scripts, and [`json`] documents that name program, command, seed and inputs.
+
+mod error;
+pub mod json;
+pub mod number;
+mod page;
+pub mod plot;
+mod status;
+mod table;
+
+pub use error::ReportError;
+pub use page::{Page, Section, Verdict};
+pub use status::Status;
+pub use table::{Align, Column, Row, Table};

@@ -1,0 +1,215 @@
+//! One self-contained HTML page: verdict first, then the evidence, then where it comes from.
+
+use minijinja::syntax::SyntaxConfig;
+use minijinja::value::Serde;
+use minijinja::{AutoEscape, Environment, context};
+use serde::Serialize;
+
+use super::error::ReportError;
+use super::json::Program;
+use super::status::Status;
+use super::table::Table;
+
+/// What the reader takes away if they read nothing else.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Verdict {
+    /// Colour of the banner.
+    pub status: Status,
+    /// One plain sentence.
+    pub sentence: String,
+    /// A few facts that carry the sentence.
+    pub facts: Vec<String>,
+}
+
+/// A page under construction.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Page {
+    /// Title.
+    pub title: String,
+    /// A line under the title: robot, log, scenario; may be empty.
+    pub subtitle: String,
+    /// The banner.
+    pub verdict: Verdict,
+    /// The sections, in reading order.
+    pub sections: Vec<Section>,
+    /// The footer.
+    pub program: Program,
+}
+
+/// A part of the page with a heading.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Section {
+    title: String,
+    blocks: Vec<Block>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "lowercase")]
+enum Block {
+    Paragraph { text: String },
+    Note { status: Status, text: String },
+    List { items: Vec<String> },
+    Code { text: String },
+    Table { table: Table, caption: String },
+    Figure { svg: String, caption: String },
+    Details { summary: String, blocks: Vec<Block> },
+}
+
+impl Section {
+    /// A section without contents.
+    pub fn new(title: impl Into<String>) -> Self {
+        Self { title: title.into(), blocks: Vec::new() }
+    }
+
+    /// With a paragraph.
+    pub fn paragraph(self, text: impl Into<String>) -> Self {
+        self.with(Block::Paragraph { text: text.into() })
+    }
+
+    /// With a remark that stands out.
+    pub fn note(self, status: Status, text: impl Into<String>) -> Self {
+        self.with(Block::Note { status, text: text.into() })
+    }
+
+    /// With a bulleted list.
+    pub fn list(self, items: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        self.with(Block::List { items: items.into_iter().map(Into::into).collect() })
+    }
+
+    /// With text in a fixed-width font: a command, a file.
+    pub fn code(self, text: impl Into<String>) -> Self {
+        self.with(Block::Code { text: text.into() })
+    }
+
+    /// With a table and a caption above it; the caption may be empty.
+    pub fn table(self, table: Table, caption: impl Into<String>) -> Self {
+        self.with(Block::Table { table, caption: caption.into() })
+    }
+
+    /// With a figure and a caption below it; the caption may be empty.
+    ///
+    /// `svg` is set into the page as it is: it must come from [`super::plot`], where all text is escaped.
+    pub fn figure(self, svg: impl Into<String>, caption: impl Into<String>) -> Self {
+        self.with(Block::Figure { svg: svg.into(), caption: caption.into() })
+    }
+
+    /// With everything in `contents` folded away behind its title. On paper it is shown.
+    pub fn details(self, contents: Section) -> Self {
+        self.with(Block::Details { summary: contents.title, blocks: contents.blocks })
+    }
+
+    fn with(mut self, block: Block) -> Self {
+        self.blocks.push(block);
+        self
+    }
+}
+
+impl Page {
+    /// A page with a verdict and no sections.
+    pub fn new(
+        title: impl Into<String>,
+        subtitle: impl Into<String>,
+        verdict: Verdict,
+        program: Program,
+    ) -> Self {
+        Self {
+            title: title.into(),
+            subtitle: subtitle.into(),
+            verdict,
+            sections: Vec::new(),
+            program,
+        }
+    }
+
+    /// Adds a section.
+    pub fn push(&mut self, section: Section) {
+        self.sections.push(section);
+    }
+
+    /// The page as an HTML document, the same bytes for the same contents.
+    pub fn to_html(&self) -> Result<String, ReportError> {
+        Ok(environment()?.get_template("page.html")?.render(context! { page => Serde(self) })?)
+    }
+}
+
+/// One table as an HTML element.
+pub(super) fn render_table(table: &Table) -> Result<String, ReportError> {
+    Ok(environment()?
+        .get_template("table.html")?
+        .render(context! { table => Serde(table), caption => "" })?)
+}
+
+fn environment() -> Result<Environment<'static>, minijinja::Error> {
+    let mut environment = Environment::new();
+    environment.set_syntax(SyntaxConfig::builder().trim_blocks(true).lstrip_blocks(true).build()?);
+    environment.set_auto_escape_callback(|_| AutoEscape::Html);
+    environment.add_template("page.html", include_str!("page.html"))?;
+    environment.add_template("table.html", include_str!("table.html"))?;
+    environment.add_template("page.css", include_str!("page.css"))?;
+    Ok(environment)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::plot::{Axis, Colour, Mark, XyPlot};
+    use crate::report::{Column, json::Input};
+
+    const HOSTILE: &str = "<script>alert('1')</script> & \"q\"";
+
+    fn page() -> Page {
+        let verdict =
+            Verdict { status: Status::Warn, sentence: HOSTILE.into(), facts: vec![HOSTILE.into()] };
+        let input = Input { path: HOSTILE.into(), sha256: "0".repeat(64) };
+        let mut page =
+            Page::new(HOSTILE, HOSTILE, verdict, Program::new([HOSTILE], Some(1), vec![input]));
+        let mut table = Table::new([Column::text(HOSTILE), Column::number(HOSTILE, HOSTILE)]);
+        table.push([HOSTILE, HOSTILE]);
+        let svg =
+            XyPlot::new(HOSTILE, Axis::linear(HOSTILE, HOSTILE), Axis::linear(HOSTILE, HOSTILE))
+                .with(HOSTILE, &[0.0, 1.0], &[0.0, 1.0], Colour::MODEL, Mark::Line)
+                .to_svg()
+                .unwrap();
+        let hidden = Section::new(HOSTILE).code(HOSTILE).list([HOSTILE]);
+        let section = Section::new(HOSTILE)
+            .paragraph(HOSTILE)
+            .note(Status::Bad, HOSTILE)
+            .table(table, HOSTILE);
+        page.push(section.figure(svg, HOSTILE).details(hidden));
+        page.push(Section::new("Empty"));
+        page
+    }
+
+    #[test]
+    fn text_from_outside_is_escaped_everywhere() {
+        let html = page().to_html().unwrap();
+        assert!(!html.contains("<script"), "unescaped text in the page");
+        assert!(html.matches("&lt;script&gt;").count() >= 20);
+    }
+
+    #[test]
+    fn the_page_needs_nothing_from_elsewhere() {
+        let html = page().to_html().unwrap();
+        for loads in ["src=", "<link", "@import", "url(", "href=\"http"] {
+            assert!(!html.contains(loads), "{loads}");
+        }
+    }
+
+    #[test]
+    fn the_same_contents_give_the_same_bytes() {
+        assert_eq!(page().to_html().unwrap(), page().to_html().unwrap());
+    }
+
+    #[test]
+    fn the_verdict_comes_before_every_section_and_anchors_resolve() {
+        let html = page().to_html().unwrap();
+        let verdict = html.find("class=\"verdict warn\"").unwrap();
+        assert!(verdict < html.find("<section").unwrap());
+        for target in ["s1", "s2"] {
+            assert!(
+                html.contains(&format!("href=\"#{target}\""))
+                    && html.contains(&format!("id=\"{target}\""))
+            );
+        }
+    }
+}

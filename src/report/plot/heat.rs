@@ -1,0 +1,171 @@
+//! A matrix of numbers in shades: confusion of causes, correlation of parameters.
+
+use super::canvas::{Anchor, Canvas, FONT_PX, Font, Rect, Size, render, text_width_px};
+use super::error::PlotError;
+use super::palette::Colour;
+use super::panel::ROW_PX;
+use super::ticks::typographic;
+
+const DARKEST: Colour = Colour { red: 0x08, green: 0x45, blue: 0x7e };
+const DARKEST_NEGATIVE: Colour = Colour { red: 0x9c, green: 0x3a, blue: 0x10 };
+
+/// A matrix with a label for every row and column and the number in every cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeatMap {
+    /// What is seen.
+    pub title: String,
+    /// What the rows are, such as `hidden`.
+    pub row_axis: String,
+    /// What the columns are, such as `named`.
+    pub column_axis: String,
+    /// Label of every row.
+    pub row_labels: Vec<String>,
+    /// Label of every column.
+    pub column_labels: Vec<String>,
+    /// Values, row by row; what is not finite leaves its cell empty.
+    pub values: Vec<Vec<f64>>,
+    /// Value of the darkest shade; `None` takes the largest magnitude. Negative values have a colour of their own.
+    pub full_scale: Option<f64>,
+    /// Decimals of the numbers in the cells.
+    pub decimals: usize,
+    /// Height of a cell in pixels.
+    pub cell_height_px: f64,
+    /// Largest width of a cell in pixels.
+    pub cell_width_px: f64,
+}
+
+impl HeatMap {
+    /// The figure as an SVG document; its size follows from the labels and cells.
+    pub fn to_svg(&self) -> Result<String, PlotError> {
+        self.check()?;
+        let widest = |labels: &[String]| {
+            labels.iter().map(|l| text_width_px(l, FONT_PX)).fold(0.0, f64::max)
+        };
+        let left =
+            widest(&self.row_labels) + 14.0 + if self.row_axis.is_empty() { 0.0 } else { ROW_PX };
+        let columns = self.column_labels.len().max(1) as f64;
+        let cell_px =
+            ((Size::FULL_WIDTH_PX - left - 2.0) / columns).min(self.cell_width_px).max(4.0);
+        let upwards = widest(&self.column_labels) + 6.0 > cell_px;
+        let labels_px = if upwards { widest(&self.column_labels) + 10.0 } else { ROW_PX };
+        let heading_px = if self.title.is_empty() { 0.0 } else { ROW_PX + 2.0 };
+        let axis_px = if self.column_axis.is_empty() { 0.0 } else { ROW_PX };
+        let top = heading_px + axis_px + labels_px;
+        let cells = Rect {
+            left,
+            top,
+            right: left + columns * cell_px,
+            bottom: top + self.row_labels.len().max(1) as f64 * self.cell_height_px,
+        };
+        let title_px = text_width_px(&self.title, super::canvas::TITLE_PX) * 1.1;
+        let size = Size {
+            width_px: (cells.right + 2.0).max(title_px).max(80.0),
+            height_px: (cells.bottom + 2.0).max(80.0),
+        };
+        render(size, &self.title, |canvas| {
+            canvas.text(&self.title, (0.0, 0.5 * ROW_PX), Anchor::Left, Font::TITLE)?;
+            let above = (0.5 * (cells.left + cells.right), heading_px + 0.5 * axis_px);
+            canvas.text(&self.column_axis, above, Anchor::Centre, Font::LABEL)?;
+            let beside = (0.5 * ROW_PX, 0.5 * (cells.top + cells.bottom));
+            canvas.text(
+                &self.row_axis,
+                beside,
+                Anchor::Centre,
+                Font { upwards: true, ..Font::LABEL },
+            )?;
+            self.draw_labels(canvas, &cells, cell_px, upwards)?;
+            self.draw_cells(canvas, &cells, cell_px)
+        })
+    }
+
+    fn draw_labels(
+        &self,
+        canvas: &Canvas,
+        cells: &Rect,
+        cell_px: f64,
+        upwards: bool,
+    ) -> Result<(), PlotError> {
+        let font = Font { upwards, ..Font::LABEL.colour(Colour::INK) };
+        for (k, label) in self.column_labels.iter().enumerate() {
+            let x = cells.left + (k as f64 + 0.5) * cell_px;
+            let (y, anchor) = if upwards {
+                (cells.top - 6.0, Anchor::Left)
+            } else {
+                (cells.top - 0.5 * ROW_PX, Anchor::Centre)
+            };
+            canvas.text(label, (x, y), anchor, font)?;
+        }
+        for (k, label) in self.row_labels.iter().enumerate() {
+            let y = cells.top + (k as f64 + 0.5) * self.cell_height_px;
+            canvas.text(
+                label,
+                (cells.left - 8.0, y),
+                Anchor::Right,
+                Font { upwards: false, ..font },
+            )?;
+        }
+        Ok(())
+    }
+
+    fn draw_cells(&self, canvas: &Canvas, cells: &Rect, cell_px: f64) -> Result<(), PlotError> {
+        let magnitudes = self.values.iter().flatten().map(|v| v.abs()).filter(|v| v.is_finite());
+        let full = self.full_scale.unwrap_or_else(|| magnitudes.fold(0.0, f64::max));
+        for (i, row) in self.values.iter().enumerate() {
+            for (j, &value) in row.iter().enumerate() {
+                let left = cells.left + j as f64 * cell_px;
+                let top = cells.top + i as f64 * self.cell_height_px;
+                let cell = Rect {
+                    left: left + 0.5,
+                    top: top + 0.5,
+                    right: left + cell_px - 0.5,
+                    bottom: top + self.cell_height_px - 0.5,
+                };
+                let share = if full > 0.0 { (value.abs() / full).min(1.0) } else { 0.0 };
+                let share = if share.is_finite() { share } else { 0.0 };
+                let dark = if value < 0.0 { DARKEST_NEGATIVE } else { DARKEST };
+                // The square root spreads the small values, which are what one looks for off the diagonal.
+                let shade = Colour::STRIPE.towards(dark, share.sqrt());
+                canvas.rect(cell, shade, 1.0)?;
+                let ink = match share {
+                    0.0 => Colour::AXIS,
+                    share if share > 0.35 => Colour::PAPER,
+                    _ => Colour::INK,
+                };
+                let text = self.cell_text(value);
+                if text_width_px(&text, FONT_PX) < cell_px {
+                    let middle = (0.5 * (cell.left + cell.right), 0.5 * (cell.top + cell.bottom));
+                    canvas.text(&text, middle, Anchor::Centre, Font::LABEL.colour(ink))?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// A dot where nothing is, so that what is there stands out.
+    fn cell_text(&self, value: f64) -> String {
+        if !value.is_finite() {
+            String::new()
+        } else if value == 0.0 {
+            "·".into()
+        } else {
+            typographic(&format!("{value:.0$}", self.decimals))
+        }
+    }
+
+    fn check(&self) -> Result<(), PlotError> {
+        let ragged = |row, found, expected| PlotError::RaggedRow {
+            figure: self.title.clone(),
+            row,
+            found,
+            expected,
+        };
+        if self.values.len() != self.row_labels.len() {
+            return Err(ragged(self.row_labels.len(), self.values.len(), self.row_labels.len()));
+        }
+        let columns = self.column_labels.len();
+        match self.values.iter().enumerate().find(|(_, row)| row.len() != columns) {
+            Some((k, row)) => Err(ragged(k, row.len(), columns)),
+            None => Ok(()),
+        }
+    }
+}
