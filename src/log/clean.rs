@@ -1,5 +1,6 @@
 //! Which rows of a log belong together.
 
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use super::account::{LogWarning, Reason};
@@ -124,16 +125,24 @@ pub(super) fn order_of_time(time_s: &[f64]) -> Vec<Option<Reason>> {
     verdicts
 }
 
+/// Rows that follow from one another.
+struct Stretch {
+    first: usize,
+    last: usize,
+    rows: usize,
+}
+
 /// For every row why its motion cannot stay.
 ///
-/// Rows are strung into stretches, each row onto the one whose last row it follows best. Short
-/// stretches beside longer ones are garbage: rows of uninitialised memory, shifted fields, zeros.
+/// Rows are strung into stretches, each row onto the one whose last row it follows best. A log is one
+/// motion: what is short beside a longer stretch, or interleaved with one, is garbage (rows of
+/// uninitialised memory, shifted fields, zeros).
 pub(super) fn consistency(motion: &Motion) -> Vec<Option<Reason>> {
     let mut verdicts = vec![None; motion.rows()];
     let mut stretch_of = vec![0_usize; motion.rows()];
-    let mut lengths: Vec<usize> = Vec::new();
-    // (stretch, its last row), the longest unused first.
-    let mut open: Vec<(usize, usize)> = Vec::with_capacity(OPEN_STRETCHES + 1);
+    let mut stretches: Vec<Stretch> = Vec::new();
+    // Those that may go on, the longest unused first.
+    let mut open: Vec<usize> = Vec::with_capacity(OPEN_STRETCHES);
     for k in 0..motion.rows() {
         if !motion.is_plausible(k) {
             verdicts[k] = Some(Reason::Implausible);
@@ -142,31 +151,55 @@ pub(super) fn consistency(motion: &Motion) -> Vec<Option<Reason>> {
         let best = open
             .iter()
             .enumerate()
-            .filter(|&(_, &(_, last))| motion.row[k] - motion.row[last] <= BRIDGED_LINES)
-            .map(|(place, &(_, last))| (place, motion.strain(last, k)))
+            .map(|(place, &stretch)| (place, stretches[stretch].last))
+            .filter(|&(_, last)| motion.row[k] - motion.row[last] <= BRIDGED_LINES)
+            .map(|(place, last)| (place, motion.strain(last, k)))
             .filter(|&(_, strain)| strain <= 1.0)
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let stretch = match best {
-            Some((place, _)) => open.remove(place).0,
+            Some((place, _)) => open.remove(place),
             None => {
-                lengths.push(0);
-                lengths.len() - 1
+                stretches.push(Stretch { first: k, last: k, rows: 0 });
+                stretches.len() - 1
             }
         };
         if open.len() == OPEN_STRETCHES {
             open.remove(0);
         }
-        open.push((stretch, k));
+        open.push(stretch);
         stretch_of[k] = stretch;
-        lengths[stretch] += 1;
+        stretches[stretch].last = k;
+        stretches[stretch].rows += 1;
     }
-    let longest = lengths.iter().copied().max().unwrap_or(0);
+    let believed = believed(&stretches);
     for (verdict, &stretch) in verdicts.iter_mut().zip(&stretch_of) {
-        if verdict.is_none() && lengths[stretch] < SHORT_STRETCH.min(longest) {
+        if verdict.is_none() && !believed[stretch] {
             *verdict = Some(Reason::Inconsistent);
         }
     }
     verdicts
+}
+
+/// The stretches that make up the motion: the longest, and every other that is not short and does not
+/// overlap a longer one.
+fn believed(stretches: &[Stretch]) -> Vec<bool> {
+    let mut believed = vec![false; stretches.len()];
+    let mut order: Vec<usize> = (0..stretches.len()).collect();
+    order.sort_by_key(|&s| std::cmp::Reverse(stretches[s].rows));
+    // First row to last row of those taken; they are disjoint.
+    let mut taken: BTreeMap<usize, usize> = BTreeMap::new();
+    for (rank, s) in order.into_iter().enumerate() {
+        let Stretch { first, last, rows } = stretches[s];
+        if rank > 0 && rows < SHORT_STRETCH {
+            break;
+        }
+        let overlaps = taken.range(..=last).next_back().is_some_and(|(_, &end)| end >= first);
+        if !overlaps {
+            taken.insert(first, last);
+            believed[s] = true;
+        }
+    }
+    believed
 }
 
 /// Whether the angles jump between the rows that are left.

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::account::{LogWarning, Reason, RowAccount};
 use super::clean;
-use super::error::LogError;
+use super::error::{LogError, UnitSuspicion};
 use super::layout::{Block, Layout};
 use super::lines::{Line, Lines};
 use super::plan::{Delimiter, Plan};
@@ -29,8 +29,8 @@ const WIDTH_ROWS: usize = 50;
 /// 3. Units: Δq is compared with ∫q̇ dt, and the clock with what recorders do. Numbers that say degrees,
 ///    milli-, micro- or nanoseconds are an error that names the layout's remedy.
 /// 4. Angles beyond 1000 rad and velocities beyond 100 rad/s are set aside, and so are rows whose angles
-///    do not follow from their neighbours' angles and velocities (short stretches of fewer than 10 rows
-///    that no acceleration below 20 rad/s² connects to the rest).
+///    and velocities do not follow from their neighbours': stretches of fewer than 10 rows, or
+///    interleaved with a longer one, that no acceleration below 20 rad/s² connects to the rest.
 ///
 /// # Errors
 /// Any [`LogError`] about files, layouts, units and joints; [`LogError::NoUsableRows`] if fewer than two
@@ -201,6 +201,7 @@ impl Table {
         account: &mut RowAccount,
         file: &str,
     ) -> Result<Vec<LogWarning>, LogError> {
+        let fault = |suspicion| LogError::Units { file: file.to_owned(), suspicion };
         let (time, q, qd) = motion_ranges(plan);
         let order = clean::order_of_time(&self.columns[time]);
         self.retain(&order, account, |table, k, _| format!("time {} s", table.columns[time][k]));
@@ -211,8 +212,13 @@ impl Table {
             qd: &self.columns[qd.clone()],
             row: &self.rows,
         };
-        let mut warnings = units::check(&motion, &layout.units)
-            .map_err(|suspicion| LogError::Units { file: file.to_owned(), suspicion })?;
+        // Many garbage rows can hide how angles and velocities are related: then they go first.
+        let mut related = units::check(&motion, &layout.units);
+        if let Err(suspicion) = &related
+            && !matches!(suspicion, UnitSuspicion::Unrelated { .. })
+        {
+            return Err(fault(suspicion.clone()));
+        }
         let verdicts = clean::consistency(&motion);
         self.retain(&verdicts, account, |table, k, reason| {
             let beyond = |columns: std::ops::Range<usize>, bound: f64| {
@@ -231,6 +237,10 @@ impl Table {
             qd: &self.columns[qd],
             row: &self.rows,
         };
+        if related.is_err() {
+            related = units::check(&motion, &layout.units);
+        }
+        let mut warnings = related.map_err(fault)?;
         warnings.extend(clean::jumps(&motion));
         if let Some((missed, warning)) = clean::missed_samples(&motion) {
             account.missed_samples = missed;
@@ -288,10 +298,11 @@ impl Table {
         let mut signals = |block| plan.range(block).map(|range| self.signals(range));
         let gain = || layout.drive_gain_nm_a.clone();
         let current = |ampere| Effort::Current { ampere, gain_nm_a: gain() };
-        let effort = signals(Block::Torque)
-            .map(Effort::Torque)
-            .or_else(|| signals(Block::Current).map(current))
-            .unwrap_or_else(|| unreachable!("a plan always has an effort"));
+        // A plan has torques or currents: without either there is no plan.
+        let effort = match signals(Block::Torque) {
+            Some(nm) => Effort::Torque(nm),
+            None => current(signals(Block::Current).unwrap_or(JointSignals::zeros(0, 0))),
+        };
         let target_effort = signals(Block::TargetCurrent)
             .map(current)
             .or_else(|| signals(Block::TargetMoment).map(Effort::Torque));

@@ -1,0 +1,536 @@
+//! One valid log, then one test per single defect: every message names file, row and value.
+
+use std::f64::consts::PI;
+use std::fmt::Write as _;
+use std::path::Path;
+
+use armid::log::{
+    Effort, Layout, Log, LogError, LogWarning, Reason, UnitSuspicion, read_log, read_log_from,
+    write_log,
+};
+use armid::robot::{Arm, JointSignals};
+
+const JOINTS: usize = 6;
+const SAMPLES: usize = 400;
+const STEP_S: f64 = 0.008;
+/// Row of the file that holds sample `k`: the header is row 1.
+fn row(k: usize) -> usize {
+    k + 2
+}
+
+fn angle_rad(j: usize, t: f64) -> f64 {
+    (0.4 + 0.1 * j as f64) * (2.0 * t + j as f64).sin() - 1.0
+}
+
+fn velocity_rad_s(j: usize, t: f64) -> f64 {
+    2.0 * (0.4 + 0.1 * j as f64) * (2.0 * t + j as f64).cos()
+}
+
+/// Header and rows of a log without defects, as fields.
+fn valid() -> Vec<Vec<String>> {
+    let mut header = vec!["timestamp".to_owned()];
+    for name in ["actual_q", "actual_qd", "actual_current"] {
+        header.extend((0..JOINTS).map(|j| format!("{name}_{j}")));
+    }
+    let mut rows = vec![header];
+    for k in 0..SAMPLES {
+        let t = 100.0 + STEP_S * k as f64;
+        let mut fields = vec![t];
+        fields.extend((0..JOINTS).map(|j| angle_rad(j, t)));
+        fields.extend((0..JOINTS).map(|j| velocity_rad_s(j, t)));
+        fields.extend((0..JOINTS).map(|j| 1.5 * (t + j as f64).sin()));
+        rows.push(fields.iter().map(f64::to_string).collect());
+    }
+    rows
+}
+
+fn text(rows: &[Vec<String>], delimiter: &str, end: &str) -> String {
+    rows.iter().fold(String::new(), |mut text, row| {
+        let _ = write!(text, "{}{end}", row.join(delimiter));
+        text
+    })
+}
+
+fn read(bytes: impl AsRef<[u8]>) -> Result<Log, LogError> {
+    read_log_from(bytes.as_ref(), "run.csv", &Layout::default(), JOINTS)
+}
+
+/// The log after `edit` was done to the fields of the valid one.
+fn edited(edit: impl FnOnce(&mut Vec<Vec<String>>)) -> Result<Log, LogError> {
+    let mut rows = valid();
+    edit(&mut rows);
+    read(text(&rows, ",", "\n"))
+}
+
+/// Multiplies column `c` of every row of data.
+fn scale(rows: &mut [Vec<String>], columns: std::ops::Range<usize>, factor: f64) {
+    for row in &mut rows[1..] {
+        for field in &mut row[columns.clone()] {
+            *field = (field.parse::<f64>().unwrap() * factor).to_string();
+        }
+    }
+}
+
+fn assert_says(result: Result<Log, LogError>, parts: &[&str]) {
+    let message = result.expect_err("this log must be refused").to_string();
+    for part in parts {
+        assert!(message.contains(part), "\"{part}\" is not in: {message}");
+    }
+}
+
+/// One row is set aside for `reason`, at `row`, and the example shows `value`.
+fn assert_one_row_aside(result: Result<Log, LogError>, reason: Reason, row: usize, value: &str) {
+    let log = result.unwrap();
+    let entry = &log.rows.set_aside[0];
+    assert_eq!((entry.reason, entry.count, entry.first_row), (reason, 1, row), "{}", log.rows);
+    assert!(entry.example.contains(value), "\"{value}\" is not in: {}", entry.example);
+    assert_eq!(log.rows.set_aside.len(), 1);
+    assert_eq!(log.rows.read, log.rows.used + 1);
+    assert_eq!(log.samples(), log.rows.used);
+    let table = log.rows.to_string();
+    assert!(table.contains(&row.to_string()) && table.contains(value), "{table}");
+}
+
+#[test]
+fn the_valid_log_is_read_as_it_is() {
+    let log = edited(|_| {}).unwrap();
+    assert_eq!((log.rows.read, log.rows.used), (SAMPLES, SAMPLES));
+    assert!(log.rows.set_aside.is_empty() && log.rows.warnings.is_empty(), "{}", log.rows);
+    let t = log.time_s[7];
+    assert_eq!(log.q_rad.joint(3)[7], angle_rad(3, t));
+    assert_eq!(log.qd_rad_s.joint(3)[7], velocity_rad_s(3, t));
+    assert_eq!(log.effort.signals().joint(3)[7], 1.5 * (t + 3.0).sin());
+}
+
+#[test]
+fn byte_order_mark_line_ends_blank_lines_and_delimiters_change_nothing() {
+    let rows = valid();
+    let expected = read(text(&rows, ",", "\n")).unwrap();
+    let quoted = text(&rows, ",", "\n").replacen("timestamp", "\"timestamp\"", 1);
+    for variant in [
+        format!("\u{feff}{}", text(&rows, ",", "\n")),
+        text(&rows, ",", "\r\n"),
+        text(&rows, " ", "\r\r\n"),
+        text(&rows, ",", "\r"),
+        text(&rows, ";", "\n"),
+        text(&rows, "\t", "\n"),
+        text(&rows, "  ", " \n"),
+        text(&rows, ", ", "\n"),
+        text(&rows, ",", ",\n"),
+        text(&rows, ",", "\n") + "\n\n  \n",
+        text(&rows, ",", "\n\n"),
+        quoted,
+    ] {
+        let mut log = read(&variant).unwrap_or_else(|e| panic!("{e}: {:?}", &variant[..60]));
+        log.sha256.clone_from(&expected.sha256);
+        // Only the numbers of the rows differ with blank lines between them.
+        assert_eq!(log, expected, "{:?}", &variant[..60]);
+    }
+}
+
+#[test]
+fn rows_are_numbered_as_in_the_file() {
+    let mut lines = text(&valid(), ",", "\n");
+    lines = format!("\n\n{lines}").replacen("\n100.016,", "\n\n100.016,NaN", 1);
+    let log = read(lines).unwrap();
+    // Two blank lines, the header, two samples, a blank line: the third sample is row 7.
+    assert_eq!(log.rows.set_aside[0].first_row, 7, "{}", log.rows);
+}
+
+#[test]
+fn a_missing_column() {
+    let result = edited(|rows| rows[0][9] = "speed_2".into());
+    assert_says(result, &["run.csv", "row 1", "actual_qd_2", "armid"]);
+    let result = edited(|rows| rows[0][0] = "time".into());
+    assert_says(result, &["run.csv", "row 1", "\"timestamp\"", "\"time\""]);
+}
+
+#[test]
+fn a_duplicate_column() {
+    let result = edited(|rows| rows[0][9] = "actual_qd_1".into());
+    assert_says(result, &["run.csv", "row 1", "\"actual_qd_1\" twice", "9 and 10"]);
+}
+
+#[test]
+fn neither_currents_nor_torques() {
+    let result = edited(|rows| rows.iter_mut().for_each(|row| row.truncate(13)));
+    assert_says(result, &["run.csv", "row 1", "actual_current_0", "actual_torque_0"]);
+}
+
+#[test]
+fn a_log_of_another_arm() {
+    let three = edited(|rows| {
+        for row in rows {
+            let fields: Vec<String> =
+                [0, 1, 2, 3, 7, 8, 9, 13, 14, 15].iter().map(|&c| row[c].clone()).collect();
+            *row = fields;
+        }
+    });
+    assert_says(three, &["run.csv", "3 joints", "arm has 6"]);
+    let result =
+        read_log_from(text(&valid(), ",", "\n").as_bytes(), "run.csv", &Layout::default(), 3);
+    assert_says(result, &["run.csv", "4 joints", "arm has 3"]);
+    let layout = Layout::load("ur10e_innopolis").unwrap();
+    let rows = text(&valid()[1..], ",", "\n");
+    let result = read_log_from(rows.as_bytes(), "run.csv", &layout, 3);
+    assert_says(result, &["run.csv", "layout has 6 joints", "arm has 3"]);
+}
+
+#[test]
+fn a_wrong_layout() {
+    assert_says(read(text(&valid()[1..], ",", "\n")), &["run.csv", "row 1", "100", "--layout"]);
+    let layout = Layout::load("ur10e_innopolis").unwrap();
+    let with_header = text(&valid(), ",", "\n");
+    let result = read_log_from(with_header.as_bytes(), "run.csv", &layout, 6);
+    assert_says(result, &["run.csv", "row 1", "\"timestamp\"", "header"]);
+    let narrow: Vec<Vec<String>> = valid()[1..].iter().map(|row| row[..18].to_vec()).collect();
+    let result = read_log_from(text(&narrow, ",", "\n").as_bytes(), "run.csv", &layout, 6);
+    assert_says(result, &["run.csv", "row 1", "18 fields", "19, 25, 31"]);
+}
+
+#[test]
+fn one_cut_row_at_the_top_does_not_decide_the_width() {
+    let mut rows = valid()[1..].to_vec();
+    rows[0].truncate(12);
+    let layout = Layout::load("ur10e_innopolis").unwrap();
+    let result = read_log_from(text(&rows, ",", "\n").as_bytes(), "run.csv", &layout, 6);
+    assert_one_row_aside(result, Reason::TooFewFields, 1, "12 fields of 19");
+}
+
+#[test]
+fn numbers_that_are_none() {
+    for (value, reason) in [
+        ("NaN", Reason::NotFinite),
+        ("inf", Reason::NotFinite),
+        ("-Infinity", Reason::NotFinite),
+        ("1e999", Reason::NotFinite),
+        ("", Reason::EmptyField),
+        ("n/a", Reason::NotANumber),
+        ("1e293", Reason::Implausible),
+        ("-5.9e293", Reason::Implausible),
+    ] {
+        for column in [0, 3, 10, 18] {
+            let result = edited(|rows| rows[51][column] = value.into());
+            assert_one_row_aside(result, reason, 52, value);
+        }
+    }
+}
+
+#[test]
+fn implausible_values_of_each_quantity() {
+    for (column, value) in [(3, "1001"), (10, "-101"), (18, "501")] {
+        let result = edited(|rows| rows[51][column] = value.into());
+        assert_one_row_aside(result, Reason::Implausible, 52, value);
+    }
+}
+
+#[test]
+fn rows_of_another_width() {
+    let result = edited(|rows| rows[51].truncate(12));
+    assert_one_row_aside(result, Reason::TooFewFields, 52, "12 fields of 19");
+    let result = edited(|rows| rows[51].push("1".into()));
+    assert_one_row_aside(result, Reason::TooManyFields, 52, "20 fields of 19");
+}
+
+#[test]
+fn a_file_cut_anywhere_in_its_last_row() {
+    let whole = text(&valid(), ",", "\n");
+    let last = whole.trim_end().rfind('\n').unwrap() + 1;
+    for cut in last + 1..whole.len() {
+        let log = read(&whole[..cut]).unwrap();
+        assert_eq!(log.rows.count(Reason::CutShort), 1, "{}", log.rows);
+        assert_eq!(log.rows.set_aside[0].first_row, row(SAMPLES - 1));
+        assert_eq!(log.samples(), SAMPLES - 1);
+    }
+}
+
+#[test]
+fn repeated_and_backward_times() {
+    let result = edited(|rows| rows[51][0] = rows[50][0].clone());
+    assert_one_row_aside(result, Reason::TimeRepeated, 52, "100.392");
+    let result = edited(|rows| rows[51][0] = "3.25".into());
+    assert_one_row_aside(result, Reason::TimeBackwards, 52, "3.25");
+    let result = edited(|rows| {
+        let copy = rows[51].clone();
+        rows.insert(51, copy);
+    });
+    assert_one_row_aside(result, Reason::TimeRepeated, 53, "100.4");
+    let result = edited(|rows| rows.swap(51, 52));
+    assert_one_row_aside(result, Reason::TimeBackwards, 53, "100.4");
+}
+
+#[test]
+fn one_time_far_ahead_costs_one_row_and_not_all_that_follow() {
+    for k in [1, 51, SAMPLES - 2] {
+        let result = edited(|rows| rows[k][0] = "5000".into());
+        assert_one_row_aside(result, Reason::TimeAhead, k + 1, "5000");
+    }
+}
+
+#[test]
+fn a_row_shifted_by_a_column() {
+    let result = edited(|rows| rows[51][1..].rotate_right(1));
+    let log = result.unwrap();
+    assert_eq!(log.rows.count(Reason::Inconsistent), 1, "{}", log.rows);
+    assert_eq!(log.rows.set_aside[0].first_row, 52);
+}
+
+#[test]
+fn every_fifth_row_uninitialised() {
+    let log = edited(|rows| {
+        for row in rows[1..].iter_mut().step_by(5) {
+            row[1..].fill("0".into());
+        }
+    })
+    .unwrap();
+    assert_eq!(log.rows.count(Reason::Inconsistent), SAMPLES / 5, "{}", log.rows);
+    assert_eq!(log.rows.missed_samples, 0, "rows set aside are not rows the recorder left out");
+    assert!(log.rows.warnings.iter().any(|w| matches!(w, LogWarning::ManySetAside { .. })));
+}
+
+#[test]
+fn missed_samples_are_counted() {
+    let log = edited(|rows| drop(rows.drain(51..54))).unwrap();
+    assert_eq!(log.rows.missed_samples, 3);
+    let warning = log.rows.warnings[0].to_string();
+    assert!(warning.contains("3 samples") && warning.contains("row 51"), "{warning}");
+}
+
+#[test]
+fn a_wrapped_angle_is_a_warning() {
+    let log = edited(|rows| {
+        for row in &mut rows[200..] {
+            row[2] = (row[2].parse::<f64>().unwrap() + 2.0 * PI).to_string();
+        }
+    })
+    .unwrap();
+    assert_eq!(log.samples(), SAMPLES);
+    let warning = log.rows.warnings[0].to_string();
+    assert!(warning.contains("row 200") && warning.contains("joint 2"), "{warning}");
+    assert!(warning.contains("wrapped"), "{warning}");
+}
+
+#[test]
+fn decimal_commas() {
+    let commas = |delimiter: &str| text(&valid(), delimiter, "\n").replace('.', ",");
+    for delimiter in [";", "\t"] {
+        let result = read(commas(delimiter));
+        assert_says(result, &["run.csv", "row 2", "column 2", "decimal_comma = true"]);
+    }
+    assert_says(
+        read(text(&valid(), ",", "\n").replace('.', ",")),
+        &["run.csv", "row 2", "delimiter"],
+    );
+    let layout = include_str!("../layouts/armid.toml").replacen(
+        "header = true",
+        "header = true\ndecimal_comma = true",
+        1,
+    );
+    let layout = Layout::from_toml(&layout, "comma.toml").unwrap();
+    let expected = edited(|_| {}).unwrap();
+    for delimiter in [";", "\t", " "] {
+        let log = read_log_from(commas(delimiter).as_bytes(), "run.csv", &layout, JOINTS).unwrap();
+        assert_eq!(log.q_rad, expected.q_rad);
+    }
+}
+
+/// The unit that the error names.
+fn suspected(result: Result<Log, LogError>) -> (&'static str, &'static str) {
+    match result {
+        Err(LogError::Units { file, suspicion }) => {
+            assert_eq!(file, "run.csv");
+            let message = suspicion.to_string();
+            let remedy = match suspicion {
+                UnitSuspicion::Unrelated { .. } => "columns",
+                _ => "[units]",
+            };
+            assert!(message.contains("row") && message.contains(remedy), "{message}");
+            match suspicion {
+                UnitSuspicion::Ratio { quantity, unit, .. } => (quantity, unit),
+                UnitSuspicion::Clock { unit, .. } => ("clock", unit),
+                UnitSuspicion::Degrees { .. } => ("both", "deg"),
+                UnitSuspicion::Unrelated { .. } => ("none", ""),
+            }
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn other_units_are_recognised_and_named() {
+    let degrees = 180.0 / PI;
+    for (factors, expected) in [
+        ([1e3, 1.0, 1.0], ("time", "ms")),
+        ([1e6, 1.0, 1.0], ("time", "us")),
+        ([1e9, 1.0, 1.0], ("time", "ns")),
+        ([1.0, degrees, 1.0], ("q", "deg")),
+        ([1.0, 1.0, degrees], ("qd", "deg/s")),
+        ([1.0, degrees, degrees], ("both", "deg")),
+        ([1e3, degrees, degrees], ("time", "ms")),
+        ([1e3, degrees, 1.0], ("time", "ms")),
+    ] {
+        let result = edited(|rows| {
+            scale(rows, 0..1, factors[0]);
+            scale(rows, 1..7, factors[1]);
+            scale(rows, 7..13, factors[2]);
+        });
+        assert_eq!(suspected(result), expected, "{factors:?}");
+    }
+}
+
+#[test]
+fn a_clock_in_milliseconds_is_recognised_at_rest() {
+    let result = edited(|rows| {
+        scale(rows, 0..1, 1e3);
+        for row in &mut rows[1..] {
+            row[1..13].fill("0".into());
+        }
+    });
+    assert_eq!(suspected(result), ("clock", "ms"));
+}
+
+#[test]
+fn the_remedy_that_is_named_works() {
+    let layout = include_str!("../layouts/armid.toml").replacen(
+        "[columns]",
+        "[units]\ntime = \"ms\"\nq = \"deg\"\nqd = \"deg/s\"\ncurrent = \"mA\"\n[columns]",
+        1,
+    );
+    let layout = Layout::from_toml(&layout, "units.toml").unwrap();
+    let mut rows = valid();
+    scale(&mut rows, 0..1, 1e3);
+    scale(&mut rows, 1..13, 180.0 / PI);
+    scale(&mut rows, 13..19, 1e3);
+    let log = read_log_from(text(&rows, ",", "\n").as_bytes(), "run.csv", &layout, JOINTS).unwrap();
+    let expected = edited(|_| {}).unwrap();
+    let worst = (0..JOINTS)
+        .flat_map(|j| log.q_rad.joint(j).iter().zip(expected.q_rad.joint(j)))
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max);
+    assert!(worst < 1e-14, "{worst}: two roundings of numbers below 2");
+    // The same layout for numbers that are in SI units is recognised as well.
+    let result = read_log_from(text(&valid(), ",", "\n").as_bytes(), "run.csv", &layout, JOINTS);
+    assert_eq!(suspected(result), ("clock", "s"));
+}
+
+#[test]
+fn velocities_that_belong_to_other_joints() {
+    let swapped = edited(|rows| scale(rows, 7..13, -1.0));
+    assert_eq!(suspected(swapped), ("none", ""));
+    let one = edited(|rows| scale(rows, 9..10, -1.0)).unwrap();
+    let warning = one.rows.warnings[0].to_string();
+    assert!(warning.contains("joint 3") && warning.contains("-1.000"), "{warning}");
+}
+
+#[test]
+fn files_without_data() {
+    assert_says(read(""), &["run.csv", "empty"]);
+    assert_says(read("\n\r\n  \n"), &["run.csv", "empty", "3 blank lines"]);
+    assert_says(edited(|rows| rows.truncate(1)), &["run.csv", "row 1", "header"]);
+    assert_says(edited(|rows| rows.truncate(2)), &["run.csv", "1 can be used"]);
+    let result = edited(|rows| rows.iter_mut().skip(1).for_each(|row| row[4] = "NaN".into()));
+    assert_says(result, &["run.csv", "400 rows read", "row 2", "actual_q_3", "NaN"]);
+}
+
+#[test]
+fn files_that_are_no_text() {
+    assert_says(read(b"\x7fELF\x02\x01\x01\x00\x00"), &["run.csv", "byte 8", "0x00"]);
+    assert_says(read(b"\xff\xfet\x00i\x00"), &["run.csv", "UTF-16", "UTF-8"]);
+    let endless = vec![b'x'; 1 << 20];
+    assert_says(read(endless), &["run.csv", "row 1", "65536 bytes"]);
+    let folder = tempfile::tempdir().unwrap();
+    let read_path = |path: &Path| read_log(path, &Layout::default(), JOINTS);
+    assert_says(read_path(folder.path()), &["folder"]);
+    assert_says(read_path(&folder.path().join("none.csv")), &["none.csv", "cannot be read"]);
+}
+
+/// A log with every optional signal and numbers that are hard to print.
+fn full_log() -> Log {
+    let hard = [0.1, -0.0, 5e-324, 1.0 / 3.0, 123_456.789e-12, f64::EPSILON, -1e-5, 2.5e-7];
+    let time_s: Vec<f64> = (0..50).map(|k| 1e9 + STEP_S * k as f64).collect();
+    let of =
+        |scale: f64| JointSignals::from_fn(JOINTS, 50, |j, k| hard[(j + k) % hard.len()] * scale);
+    // At rest, so that the hard numbers are no jumps.
+    let current = |scale| Effort::Current { ampere: of(scale), gain_nm_a: None };
+    let still = JointSignals::from_fn(JOINTS, 50, |j, _| hard[j] / 10.0);
+    let mut log = Log::new("made", time_s, still.clone(), of(1e-3), current(1.0)).unwrap();
+    log.target_q_rad = Some(still);
+    log.target_qd_rad_s = Some(of(1e-4));
+    log.target_qdd_rad_s2 = Some(of(1.7));
+    log.target_effort = Some(current(0.9));
+    log.temperature_c = Some(of(30.0));
+    log
+}
+
+fn bits(signals: &JointSignals) -> Vec<u64> {
+    (0..signals.joints()).flat_map(|j| signals.joint(j).iter().map(|v| v.to_bits())).collect()
+}
+
+#[test]
+fn a_written_log_reads_back_to_the_same_bits() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    let log = full_log();
+    let sha256 = write_log(&path, &log).unwrap();
+    let back = read_log(&path, &Layout::default(), JOINTS).unwrap();
+    assert_eq!(back.sha256, sha256);
+    assert_eq!(back.rows, log.rows);
+    assert_eq!(back.time_s, log.time_s);
+    for (a, b) in [
+        (Some(&back.q_rad), Some(&log.q_rad)),
+        (Some(&back.qd_rad_s), Some(&log.qd_rad_s)),
+        (Some(back.effort.signals()), Some(log.effort.signals())),
+        (back.target_q_rad.as_ref(), log.target_q_rad.as_ref()),
+        (back.target_qd_rad_s.as_ref(), log.target_qd_rad_s.as_ref()),
+        (back.target_qdd_rad_s2.as_ref(), log.target_qdd_rad_s2.as_ref()),
+        (back.temperature_c.as_ref(), log.temperature_c.as_ref()),
+    ] {
+        assert_eq!(a.map(bits), b.map(bits));
+    }
+    assert_eq!(back.target_effort, log.target_effort);
+}
+
+#[test]
+fn torques_and_moments_have_their_own_columns() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    let mut log = full_log();
+    log.effort = Effort::Torque(log.effort.signals().clone());
+    log.target_effort = Some(Effort::Torque(log.effort.signals().clone()));
+    write_log(&path, &log).unwrap();
+    let back = read_log(&path, &Layout::default(), JOINTS).unwrap();
+    assert_eq!((&back.effort, &back.target_effort), (&log.effort, &log.target_effort));
+    let arm = Arm::built_in("ur5").unwrap();
+    assert_eq!(&back.torque_nm(&arm).unwrap(), log.effort.signals());
+}
+
+#[test]
+fn a_log_that_could_not_be_read_back_is_not_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    let mut log = full_log();
+    log.q_rad.joint_mut(2)[5] = f64::NAN;
+    let message = write_log(&path, &log).unwrap_err().to_string();
+    for part in ["log.csv", "row 7", "actual_q_2", "NaN"] {
+        assert!(message.contains(part), "{message}");
+    }
+    let mut log = full_log();
+    log.temperature_c = Some(JointSignals::zeros(JOINTS, 49));
+    let message = write_log(&path, &log).unwrap_err().to_string();
+    assert!(message.contains("temperature") && message.contains("49 samples"), "{message}");
+    assert!(!path.exists());
+}
+
+#[test]
+fn currents_become_torques_by_the_arms_gains_or_the_layouts() {
+    let arm = Arm::built_in("ur5").unwrap();
+    let log = full_log();
+    let torque_nm = log.torque_nm(&arm).unwrap();
+    let gain = arm.joints[4].drive.gain_nm_a();
+    assert_eq!(torque_nm.joint(4)[9], gain * log.effort.signals().joint(4)[9]);
+    let mut wrong = full_log();
+    let ampere = wrong.effort.signals().clone();
+    wrong.effort = Effort::Current { ampere, gain_nm_a: Some(vec![1.0; 3]) };
+    let message = wrong.torque_nm(&arm).unwrap_err().to_string();
+    assert!(message.contains("drive_gain_nm_a has 3 joints"), "{message}");
+}
