@@ -144,12 +144,15 @@ fn mutation() -> impl Strategy<Value = Mutation> {
     ]
 }
 
+/// The fields of every row.
+type Fields = Vec<Vec<Vec<u8>>>;
+
 fn apply(bytes: &mut Vec<u8>, mutation: &Mutation) {
     if bytes.is_empty() {
         return;
     }
-    let in_rows = |bytes: &mut Vec<u8>, edit: &dyn Fn(&mut Vec<Vec<Vec<u8>>>)| {
-        let mut rows: Vec<Vec<Vec<u8>>> = bytes
+    let in_rows = |bytes: &mut Vec<u8>, edit: &dyn Fn(&mut Fields)| {
+        let mut rows: Fields = bytes
             .split(|&b| b == b'\n')
             .map(|row| row.split(|&b| b == b',').map(<[u8]>::to_vec).collect())
             .collect();
