@@ -5,4 +5,4 @@ set -eu
 cd "$(dirname "$0")/.."
 target="${CARGO_TARGET_DIR:-target}"
 cargo bench --quiet --bench dynamics >&2
-OMP_NUM_THREADS=1 python3 benches/pinocchio.py "$target"
+OMP_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE=1 python3 benches/pinocchio_times.py "$target"
