@@ -21,7 +21,7 @@ const SEED: u64 = 20;
 fn main() -> Result<(), Box<dyn Error>> {
     let path =
         std::env::args_os().nth(1).map_or_else(|| PathBuf::from("gallery.html"), PathBuf::from);
-    std::fs::write(&path, page()?.to_html()?)?;
+    page()?.write(&path)?;
     println!("wrote {}", path.display());
     Ok(())
 }

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use crate::output::OutputError;
+
 /// A report that could not be made.
 #[derive(Debug, Error)]
 pub enum ReportError {
@@ -21,6 +23,9 @@ pub enum ReportError {
         /// Why.
         source: serde_json::Error,
     },
+    /// The document could not be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
     /// An input could not be read for its checksum.
     #[error("{}: {source}", path.display())]
     Read {

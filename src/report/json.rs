@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::error::ReportError;
+use crate::output::write_atomically;
 
 /// A file that was read.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -78,6 +79,12 @@ impl<T: Serialize> Document<'_, T> {
         let text = serde_json::to_string_pretty(self)
             .map_err(|source| ReportError::Json { schema: self.schema.to_owned(), source })?;
         Ok(text + "\n")
+    }
+
+    /// Writes the document as a whole or not at all.
+    pub fn write(&self, path: &Path) -> Result<(), ReportError> {
+        let text = self.to_json()?;
+        Ok(write_atomically(path, |file| file.write_all(text.as_bytes()))?)
     }
 }
 

@@ -1,5 +1,7 @@
 //! One self-contained HTML page: verdict first, then the evidence, then where it comes from.
 
+use std::path::Path;
+
 use minijinja::syntax::SyntaxConfig;
 use minijinja::value::Serde;
 use minijinja::{AutoEscape, Environment, context};
@@ -9,6 +11,7 @@ use super::error::ReportError;
 use super::json::Program;
 use super::status::Status;
 use super::table::Table;
+use crate::output::write_atomically;
 
 /// What the reader takes away if they read nothing else.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -129,6 +132,12 @@ impl Page {
     /// The page as an HTML document, the same bytes for the same contents.
     pub fn to_html(&self) -> Result<String, ReportError> {
         Ok(environment()?.get_template("page.html")?.render(context! { page => Serde(self) })?)
+    }
+
+    /// Writes the page as a whole or not at all.
+    pub fn write(&self, path: &Path) -> Result<(), ReportError> {
+        let html = self.to_html()?;
+        Ok(write_atomically(path, |file| file.write_all(html.as_bytes()))?)
     }
 }
 

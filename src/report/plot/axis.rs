@@ -102,12 +102,15 @@ impl Axis {
 
 /// Values beyond this are drawn as gaps: their differences would overflow.
 const HUGE: f64 = 1e150;
+/// Values below this are drawn as zero (on a log axis, as gaps): steps between them would underflow.
+const TINY: f64 = 1e-150;
 
 impl Scale {
     fn to_axis(self, value: f64) -> f64 {
         match self {
+            Scale::Linear if value.abs() < TINY => 0.0,
             Scale::Linear => value,
-            Scale::Log if value > 0.0 => value.log10(),
+            Scale::Log if (TINY..HUGE).contains(&value) => value.log10(),
             Scale::Log => f64::NAN,
         }
     }
@@ -127,6 +130,8 @@ impl Extent {
     }
 
     pub fn ticks(self, length_px: f64, along: Along) -> ticks::Ticks {
+        // A figure can be too low for its heading and labels.
+        let length_px = length_px.max(1.0);
         match self.scale {
             Scale::Linear => ticks::linear(self.low, self.high, length_px, along),
             Scale::Log => ticks::logarithmic(self.low, self.high, length_px, along),

@@ -20,6 +20,9 @@ use super::palette::Colour;
 const UNITS_PER_PX: f64 = 10.0;
 /// The backend divides the size it is given by this number.
 const BACKEND_FONT_DIVISOR: f64 = 1.24;
+/// Sizes between which a figure can be drawn.
+pub(super) const LEAST_SIZE_PX: f64 = 40.0;
+pub(super) const MOST_SIZE_PX: f64 = 10_000.0;
 const DASH_PX: i32 = 5;
 const GAP_PX: i32 = 4;
 
@@ -50,7 +53,7 @@ impl Size {
     }
 
     fn check(self) -> Result<(), PlotError> {
-        let usable = 80.0..=10_000.0;
+        let usable = LEAST_SIZE_PX..=MOST_SIZE_PX;
         if usable.contains(&self.width_px) && usable.contains(&self.height_px) {
             Ok(())
         } else {

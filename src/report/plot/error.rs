@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use super::canvas::{LEAST_SIZE_PX, MOST_SIZE_PX};
+
 /// A figure that cannot be drawn because what was given does not fit together.
 ///
 /// Empty, constant and non-finite data are no errors: they give an empty figure, a widened axis
@@ -47,7 +49,11 @@ pub enum PlotError {
         high: f64,
     },
     /// A figure without room for its contents.
-    #[error("a figure of {width_px} x {height_px} pixels is outside 80 to 10000")]
+    #[error(
+        "a figure of {width_px} x {height_px} pixels is outside {} to {}",
+        LEAST_SIZE_PX,
+        MOST_SIZE_PX
+    )]
     Size {
         /// Width in pixels.
         width_px: f64,

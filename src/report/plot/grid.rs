@@ -3,7 +3,8 @@
 use super::axis::{Axis, Extent};
 use super::canvas::{Anchor, Canvas, Font, Rect, Size, TITLE_PX, render};
 use super::error::PlotError;
-use super::panel::{self, Heading, Layout, RIGHT_PX, X_NAME_PX, X_TICKS_PX};
+use super::heading::{self, Heading};
+use super::panel::{self, Layout, RIGHT_PX, X_NAME_PX, X_TICKS_PX};
 use super::xy::XyPlot;
 
 const PANEL_TITLE_PX: f64 = 19.0;
@@ -62,7 +63,7 @@ impl Grid {
         let rows = self.panels.len().div_ceil(columns).max(1);
         let labels_px = X_TICKS_PX + X_NAME_PX;
         let labelled_rows = if self.share_x { 1 } else { rows };
-        let entries = panel::legend_entries(&self.panels);
+        let entries = heading::legend_entries(&self.panels);
         // Panels of different ranges carry their own powers of ten, and the common name carries none.
         let unscaled = Extent { scale: self.y.scale, low: 0.0, high: 1.0 };
         let shared_y =

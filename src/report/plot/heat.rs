@@ -1,9 +1,12 @@
 //! A matrix of numbers in shades: confusion of causes, correlation of parameters.
 
-use super::canvas::{Anchor, Canvas, FONT_PX, Font, Rect, Size, render, text_width_px};
+use super::canvas::{
+    Anchor, Canvas, FONT_PX, Font, LEAST_SIZE_PX, Rect, Size, TITLE_PX, render, text_width_px,
+};
 use super::error::PlotError;
+use super::heading::ROW_PX;
 use super::palette::Colour;
-use super::panel::ROW_PX;
+
 use super::ticks::typographic;
 
 const DARKEST: Colour = Colour { red: 0x08, green: 0x45, blue: 0x7e };
@@ -57,10 +60,10 @@ impl HeatMap {
             right: left + columns * cell_px,
             bottom: top + self.row_labels.len().max(1) as f64 * self.cell_height_px,
         };
-        let title_px = text_width_px(&self.title, super::canvas::TITLE_PX) * 1.1;
+        let title_px = text_width_px(&self.title, TITLE_PX) * 1.1;
         let size = Size {
-            width_px: (cells.right + 2.0).max(title_px).max(80.0),
-            height_px: (cells.bottom + 2.0).max(80.0),
+            width_px: (cells.right + 2.0).max(title_px).max(LEAST_SIZE_PX),
+            height_px: (cells.bottom + 2.0).max(LEAST_SIZE_PX),
         };
         render(size, &self.title, |canvas| {
             canvas.text(&self.title, (0.0, 0.5 * ROW_PX), Anchor::Left, Font::TITLE)?;

@@ -3,8 +3,9 @@
 use super::axis::{Axis, Extent, Frame};
 use super::canvas::{Anchor, Canvas, FONT_PX, Font, Rect, Size, Stroke, render, text_width_px};
 use super::error::PlotError;
+use super::heading::{Entry, Heading, Swatch};
 use super::palette::Colour;
-use super::panel::{self, Entry, Heading, RIGHT_PX, Swatch, X_NAME_PX, X_TICKS_PX};
+use super::panel::{self, RIGHT_PX, X_NAME_PX, X_TICKS_PX};
 use super::ticks::Along;
 use super::xy::{Mark, Span};
 use crate::report::Status;

@@ -3,8 +3,9 @@
 use super::axis::{Axis, Extent, Frame};
 use super::canvas::{Anchor, Canvas, Font, Point, Rect, Size, Stroke, render};
 use super::error::PlotError;
+use super::heading::{Entry, Heading, ROW_PX, Swatch};
 use super::palette::Colour;
-use super::panel::{self, Entry, Heading, RIGHT_PX, ROW_PX, Swatch, X_NAME_PX, X_TICKS_PX};
+use super::panel::{self, RIGHT_PX, X_NAME_PX, X_TICKS_PX};
 use super::ticks::Along;
 use super::trace;
 use super::xy::Mark;

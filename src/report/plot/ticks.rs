@@ -36,11 +36,11 @@ impl Along {
         }
     }
 
-    /// Smallest distance of two lines at which a grid does not look crowded.
-    fn least_px(self) -> f64 {
+    /// Smallest distance of two lines at which a grid of this length does not look crowded.
+    fn least_px(self, length_px: f64) -> f64 {
         match self {
-            Along::Horizontal => 55.0,
-            Along::Vertical => 26.0,
+            Along::Horizontal => (length_px / 12.0).max(42.0),
+            Along::Vertical => (length_px / 9.0).max(22.0),
         }
     }
 }
@@ -48,7 +48,7 @@ impl Along {
 /// Multiples of 1, 2 or 5 × 10ᵏ between `low` and `high`, as many as `length_px` holds without crowding.
 pub(super) fn linear(low: f64, high: f64, length_px: f64, along: Along) -> Ticks {
     let px = length_px / (high - low);
-    let least = (along.least_px() / px).min(high - low);
+    let least = (along.least_px(length_px) / px).min(high - low);
     let mut decade = 10f64.powf(least.log10().floor());
     loop {
         for step in

@@ -3,8 +3,9 @@
 use super::axis::{Axis, Extent, Scale};
 use super::canvas::{Rect, Size, render};
 use super::error::PlotError;
+use super::heading::{self, Heading};
 use super::palette::Colour;
-use super::panel::{self, Heading, Layout};
+use super::panel::{self, Layout};
 
 /// How a series is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -158,7 +159,7 @@ impl XyPlot {
         let (x, y) = self.extents()?;
         render(self.size, &self.title, |canvas| {
             let sheet = Rect::of(self.size);
-            let entries = panel::legend_entries([self]);
+            let entries = heading::legend_entries([self]);
             let heading = Heading { title: &self.title, y: Some((&self.y, y)), entries: &entries };
             let area = heading.draw(canvas, sheet)?;
             let layout = Layout {
