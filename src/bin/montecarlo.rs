@@ -1,1 +1,10 @@
-fn main() {}
+//! The main job: `cargo run --release --bin montecarlo`.
+
+use std::process::ExitCode;
+
+use armid::cli;
+use clap::Parser;
+
+fn main() -> ExitCode {
+    cli::exit_code(cli::montecarlo::run(cli::montecarlo::Command::parse()))
+}

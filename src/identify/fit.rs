@@ -6,16 +6,27 @@ use thiserror::Error;
 
 use super::problem::Problem;
 use super::triangle::Triangle;
+use crate::base::BaseSet;
 
 /// How the joints' equations are weighted against each other.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
+#[value(rename_all = "snake_case")]
 pub enum Estimator {
     /// The paper's (18), (19): every equation counts the same.
     Ols,
     /// Each joint's equation divided by the standard deviation of its own residual, s_j, iterated
     /// (Gautier 1997).
     Wls,
+}
+
+impl std::fmt::Display for Estimator {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(match self {
+            Self::Ols => "ols",
+            Self::Wls => "wls",
+        })
+    }
 }
 
 /// The data cannot give the parameters at all.
@@ -35,7 +46,7 @@ pub enum FitError {
          within rounding", parameters.join(", ")
     )]
     NotExcited {
-        /// Names or numbers of the base parameters.
+        /// Names of the base parameters.
         parameters: Vec<String>,
     },
 }
@@ -88,7 +99,12 @@ impl Fitter {
     ///
     /// Each joint's equations are reduced to a triangle once; weights only scale triangles, so the
     /// iterations cost nothing in the number of samples.
-    pub fn fit(&mut self, problem: &Problem, estimator: Estimator) -> Result<Fit, FitError> {
+    pub fn fit(
+        &mut self,
+        problem: &Problem,
+        set: &BaseSet,
+        estimator: Estimator,
+    ) -> Result<Fit, FitError> {
         let b = problem.parameters();
         let rows = problem.joints() * problem.samples;
         if rows < b {
@@ -96,7 +112,7 @@ impl Fitter {
         }
         self.reduce(problem);
         let mut weights = vec![1.0; problem.joints()];
-        let mut triangle = self.combine(problem, &weights)?;
+        let mut triangle = self.combine(problem, set, &weights)?;
         let mut theta = mean_solution(&triangle);
         let mut joint_sigma_nm = self.joint_sigma(problem, &theta, &triangle, &weights);
         if estimator == Estimator::Wls {
@@ -104,7 +120,7 @@ impl Fitter {
                 // A joint without any residual (noise-free data) must not weigh infinitely.
                 let floor = 1e-9 * joint_sigma_nm.iter().fold(f64::MIN_POSITIVE, |a, s| a.max(*s));
                 weights = joint_sigma_nm.iter().map(|s| 1.0 / s.max(floor)).collect();
-                triangle = self.combine(problem, &weights)?;
+                triangle = self.combine(problem, set, &weights)?;
                 theta = mean_solution(&triangle);
                 joint_sigma_nm = self.joint_sigma(problem, &theta, &triangle, &weights);
             }
@@ -149,7 +165,12 @@ impl Fitter {
     }
 
     /// The weighted joints' triangles, stacked and reduced to one.
-    fn combine(&mut self, problem: &Problem, weights: &[f64]) -> Result<Triangle, FitError> {
+    fn combine(
+        &mut self,
+        problem: &Problem,
+        set: &BaseSet,
+        weights: &[f64],
+    ) -> Result<Triangle, FitError> {
         let b = problem.parameters();
         let periods = problem.periods;
         let mut all = Triangle::new(b, periods);
@@ -171,7 +192,7 @@ impl Fitter {
         }
         let dependent: Vec<String> = (0..b)
             .filter(|&k| all.r(k, k).abs() <= PIVOT_FLOOR * all.column_length(k))
-            .map(|k| k.to_string())
+            .map(|k| set.name(k).to_owned())
             .collect();
         if !dependent.is_empty() {
             return Err(FitError::NotExcited { parameters: dependent });

@@ -3,11 +3,19 @@
 pub mod covariance;
 
 mod columns;
+mod error;
 mod fit;
+mod identifier;
+mod options;
+mod prepare;
 mod problem;
 mod triangle;
 
 pub use columns::ColumnPlan;
+pub use error::IdentifyError;
 pub use fit::{Estimator, Fit, FitError, Fitter};
+pub use identifier::{Identification, Identifier, Regression, Residual};
+pub use options::Options;
+pub use prepare::{Measurement, Prepared, Preparer, Processing};
 pub use problem::{Assembler, Panel, Problem};
 pub use triangle::Triangle;

@@ -5,6 +5,7 @@
 
 mod error;
 pub mod json;
+pub mod montecarlo;
 pub mod number;
 mod page;
 pub mod plot;

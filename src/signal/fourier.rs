@@ -118,6 +118,11 @@ impl PeriodicFit {
         self.samples_per_period
     }
 
+    /// Samples per second.
+    pub fn rate_hz(&self) -> f64 {
+        self.rate_hz
+    }
+
     /// Number of periods a record must have.
     pub fn periods(&self) -> usize {
         self.periods

@@ -57,8 +57,9 @@ pub fn quantile_95(degrees_of_freedom: f64) -> f64 {
 }
 
 /// The methods by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
+#[value(rename_all = "snake_case")]
 pub enum CovarianceKind {
     /// The paper's (20), noise variance left out.
     Paper,
@@ -70,6 +71,18 @@ pub enum CovarianceKind {
     Periods,
     /// Scatter of the score over blocks of time.
     Blocks,
+}
+
+impl std::fmt::Display for CovarianceKind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(match self {
+            Self::Paper => "paper",
+            Self::Ols => "ols",
+            Self::Wls => "wls",
+            Self::Periods => "periods",
+            Self::Blocks => "blocks",
+        })
+    }
 }
 
 /// The method asks for something the data do not have.

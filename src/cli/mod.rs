@@ -1,0 +1,92 @@
+//! The command line: one file per subcommand, shared by the two binaries.
+//!
+//! Enters: arguments. Leaves: files, text on the terminal and an exit code.
+
+pub mod montecarlo;
+
+use std::io::IsTerminal;
+use std::process::ExitCode;
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// How a command ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// It did what was asked: exit code 0.
+    Done,
+    /// It ran, outputs are written, and the answer is no: exit code 3.
+    Negative,
+}
+
+/// Whatever went wrong, already in words for the user.
+pub type CommandResult = Result<Outcome, Box<dyn std::error::Error>>;
+
+/// Prints an error as one message and turns the result into the exit code.
+pub fn exit_code(result: CommandResult) -> ExitCode {
+    match result {
+        Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::Negative) => ExitCode::from(3),
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Progress of long work: a bar on a terminal, a plain line now and then elsewhere.
+pub struct Progress {
+    bar: ProgressBar,
+    what: &'static str,
+    total: u64,
+    printed: std::sync::Mutex<std::time::Instant>,
+}
+
+/// Time between plain lines.
+const PLAIN_LINE_EVERY: std::time::Duration = std::time::Duration::from_secs(10);
+
+impl Progress {
+    /// For `total` steps of `what`, such as "trials".
+    pub fn new(what: &'static str, total: u64) -> Self {
+        let bar = if std::io::stderr().is_terminal() {
+            let style = "{bar:40} {pos}/{len} {msg}, {per_sec}, {eta} left";
+            let style = ProgressStyle::with_template(style).unwrap_or(ProgressStyle::default_bar());
+            ProgressBar::new(total).with_style(style).with_message(what)
+        } else {
+            ProgressBar::hidden()
+        };
+        Self { bar, what, total, printed: std::sync::Mutex::new(std::time::Instant::now()) }
+    }
+
+    /// Tells how far the work has come.
+    pub fn reached(&self, done: u64) {
+        self.bar.set_position(done);
+        if !self.bar.is_hidden() {
+            return;
+        }
+        let mut printed = self.printed.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        if printed.elapsed() > PLAIN_LINE_EVERY {
+            *printed = std::time::Instant::now();
+            eprintln!("{done}/{} {}", self.total, self.what);
+        }
+    }
+
+    /// Removes the bar.
+    pub fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+/// A flag that Ctrl-C sets, so that work can stop between two steps and keep what it has.
+pub fn interrupt_flag() -> &'static std::sync::atomic::AtomicBool {
+    static FLAG: std::sync::atomic::AtomicBool = std::sync::atomic::AtomicBool::new(false);
+    static ONCE: std::sync::Once = std::sync::Once::new();
+    ONCE.call_once(|| {
+        // Without a handler Ctrl-C simply ends the program, which is no harm.
+        let _ = ctrlc::set_handler(|| {
+            if FLAG.swap(true, std::sync::atomic::Ordering::Relaxed) {
+                std::process::exit(130);
+            }
+        });
+    });
+    &FLAG
+}

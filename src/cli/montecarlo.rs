@@ -1,0 +1,248 @@
+//! `montecarlo`: the main job, and `montecarlo merge`.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use std::time::Instant;
+
+use clap::{Args, Parser, Subcommand};
+
+use super::{CommandResult, Outcome, Progress, interrupt_flag};
+use crate::montecarlo::calibration::Verdict;
+use crate::montecarlo::shard::{
+    Merged, Shard, load_folders, merge, same_run, shard_path, shard_range,
+};
+use crate::montecarlo::{Experiment, SUMMARY_SCHEMA, Scenario, Summary};
+use crate::output::{check_writable, write_atomically};
+use crate::report::json::{Document, Input, Program};
+use crate::report::montecarlo::{check_table, page, parameter_table};
+
+/// Simulate an arm with a known truth, identify it from noisy logs thousands of times, and check
+/// that the predicted uncertainty is true.
+#[derive(Debug, Parser)]
+#[command(name = "montecarlo", version, args_conflicts_with_subcommands = true)]
+pub struct Command {
+    #[command(subcommand)]
+    merge: Option<MergeCommand>,
+    #[command(flatten)]
+    run: RunArgs,
+}
+
+#[derive(Debug, Subcommand)]
+enum MergeCommand {
+    /// Put the shards of one run together; refuses shards of different runs, lists missing trials.
+    Merge {
+        /// Folders with shard files.
+        #[arg(required = true)]
+        folders: Vec<PathBuf>,
+        #[command(flatten)]
+        output: OutputArgs,
+    },
+}
+
+#[derive(Debug, Args)]
+struct RunArgs {
+    /// Scenario file; sims/default.toml (built in) where left out.
+    #[arg(long)]
+    scenario: Option<PathBuf>,
+    /// Number of trials instead of the scenario's.
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
+    trials: Option<u64>,
+    /// Run this one trial alone (from 0) and print its estimates.
+    #[arg(long, conflicts_with_all = ["shard", "out", "resume"])]
+    trial: Option<u64>,
+    /// Seed instead of the scenario's.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Threads; all cores where left out. Results do not depend on it.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    /// Run only part I of N (I from 0) of the trials; needs --out.
+    #[arg(long, value_name = "I/N", requires = "out")]
+    shard: Option<ShardOf>,
+    /// Folder for the shard file, written every few seconds.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Go on with the shard file in --out.
+    #[arg(long, requires = "out")]
+    resume: bool,
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+#[derive(Debug, Args)]
+struct OutputArgs {
+    /// Write the result as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
+    /// Write the report as one HTML page.
+    #[arg(long)]
+    report: Option<PathBuf>,
+}
+
+/// `I/N` with I < N.
+#[derive(Debug, Clone, Copy)]
+struct ShardOf {
+    index: u64,
+    count: u64,
+}
+
+impl FromStr for ShardOf {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts =
+            text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+        match parts {
+            Some((index, count)) if index < count => Ok(Self { index, count }),
+            Some((index, count)) => {
+                Err(format!("shard {index} of {count} does not exist: they count from 0"))
+            }
+            None => Err("expected I/N, such as 0/8".into()),
+        }
+    }
+}
+
+/// Runs the command.
+pub fn run(command: Command) -> CommandResult {
+    match command.merge {
+        Some(MergeCommand::Merge { folders, output }) => run_merge(&folders, &output),
+        None => run_trials(&command.run),
+    }
+}
+
+fn run_merge(folders: &[PathBuf], output: &OutputArgs) -> CommandResult {
+    output.check()?;
+    let shards = load_folders(folders)?;
+    let mut inputs = Vec::new();
+    for (file, _) in &shards {
+        inputs.push(Input::of(file)?);
+    }
+    let merged = merge(shards)?;
+    let wall_s = merged.seconds;
+    conclude(&merged, wall_s, inputs, output)
+}
+
+fn run_trials(args: &RunArgs) -> CommandResult {
+    args.output.check()?;
+    let mut scenario = Scenario::load(args.scenario.as_deref())?;
+    scenario.seed = args.seed.unwrap_or(scenario.seed);
+    let trials = args.trials.unwrap_or(scenario.trials);
+    let range = args.shard.map_or(0..trials, |s| shard_range(trials, s.index, s.count));
+    if let Some(folder) = &args.out {
+        std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+        check_writable(&shard_path(folder, &range))?;
+    }
+    eprintln!("{}: {}", scenario.name, scenario.description);
+    eprintln!(
+        "simulating {:.0} s of {} in rapier …",
+        crate::excitation::Reference::duration_s(&scenario.excitation),
+        scenario.arm.name
+    );
+    let experiment = Experiment::prepare(scenario)?;
+    if let Some(trial) = args.trial {
+        return replay(&experiment, trial);
+    }
+    let (shard, wall_s) = run_shard(&experiment, args, trials, range)?;
+    let complete = shard.is_complete();
+    if !complete {
+        eprintln!("interrupted after {} trials", shard.tally.trials());
+    }
+    let mut inputs = Vec::new();
+    if let Some(file) = &args.scenario {
+        inputs.push(Input::of(file)?);
+    }
+    let range = shard.range;
+    let mut merged = merge(vec![(PathBuf::new(), shard)])?;
+    // One shard of many is judged by its own trials; what others run is not missing.
+    merged.missing.retain(|gap| gap.start >= range[0] && gap.end <= range[1]);
+    conclude(&merged, wall_s, inputs, &args.output)
+}
+
+fn run_shard(
+    experiment: &Experiment,
+    args: &RunArgs,
+    trials: u64,
+    range: Range<u64>,
+) -> Result<(Shard, f64), Box<dyn std::error::Error>> {
+    let threads = match args.threads {
+        Some(threads) => usize::from(threads),
+        None => std::thread::available_parallelism().map_or(1, usize::from),
+    };
+    let file = args.out.as_ref().map(|folder| shard_path(folder, &range));
+    let mut shard = Shard::new(experiment, trials, range);
+    if let Some(file) = file.as_deref().filter(|file| file.exists()) {
+        if !args.resume {
+            let file = file.display();
+            return Err(format!("{file} exists: give --resume to go on, or another --out").into());
+        }
+        let saved = Shard::load(file)?;
+        same_run(file, &saved.header, &shard.header)?;
+        shard = saved;
+        eprintln!("going on after {} trials", shard.tally.trials());
+    }
+    let progress = Progress::new("trials", shard.range[1] - shard.range[0]);
+    let begun = Instant::now();
+    let before = shard.seconds;
+    shard.run(experiment, threads, file.as_deref(), interrupt_flag(), &|n| progress.reached(n))?;
+    progress.finish();
+    Ok((shard, before + begun.elapsed().as_secs_f64()))
+}
+
+/// One trial alone: its estimates against the truth.
+fn replay(experiment: &Experiment, trial: u64) -> CommandResult {
+    let set = &experiment.scenario.set;
+    let identification = experiment.worker().identify(trial)?;
+    let sigma = identification.sigma();
+    println!("trial {trial}, {} with {}", identification.fit.estimator, experiment.covariance);
+    println!("{:<6} {:>24} {:>24} {:>24} {:>8}", "", "truth", "estimate", "sigma", "z");
+    for (k, sigma) in sigma.iter().enumerate() {
+        let (truth, estimate) = (experiment.truth[k], identification.fit.theta[k]);
+        let z = (estimate - truth) / sigma;
+        println!("{:<6} {truth:>24} {estimate:>24} {sigma:>24} {z:>8.3}", set.name(k));
+    }
+    Ok(Outcome::Done)
+}
+
+/// Prints, writes and judges.
+fn conclude(
+    merged: &Merged,
+    wall_s: f64,
+    inputs: Vec<Input>,
+    output: &OutputArgs,
+) -> CommandResult {
+    let summary = Summary::of(merged, wall_s);
+    println!("{}", parameter_table(&summary).to_text());
+    println!("{}", check_table(&summary).to_text());
+    println!(
+        "{} trials ({} failed) in {wall_s:.1} s: {:.1} trials/s",
+        summary.trials, summary.failed, summary.trials_per_second
+    );
+    for failure in summary.failures.iter().take(5) {
+        println!("  trial {} failed: {}", failure.trial, failure.reason);
+    }
+    for [start, end] in &summary.missing {
+        println!("  trials {start}…{} have not been run", end - 1);
+    }
+    println!("\n{}: {}", summary.verdict.to_string().to_uppercase(), summary.sentence());
+    let program = Program::new(std::env::args(), Some(merged.header.seed), inputs);
+    if let Some(path) = &output.json {
+        let document = Document { schema: SUMMARY_SCHEMA, program: &program, body: &summary };
+        write_text(path, &document.to_json()?)?;
+    }
+    if let Some(path) = &output.report {
+        write_text(path, &page(&summary, merged, program)?.to_html()?)?;
+        println!("report: {}", path.display());
+    }
+    Ok(if summary.verdict == Verdict::Fail { Outcome::Negative } else { Outcome::Done })
+}
+
+fn write_text(path: &Path, text: &str) -> Result<(), crate::output::OutputError> {
+    write_atomically(path, |out| out.write_all(text.as_bytes()))
+}
+
+impl OutputArgs {
+    fn check(&self) -> Result<(), crate::output::OutputError> {
+        [&self.json, &self.report].into_iter().flatten().try_for_each(|path| check_writable(path))
+    }
+}

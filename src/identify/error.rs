@@ -1,0 +1,60 @@
+//! Why a log cannot be identified from.
+
+use thiserror::Error;
+
+use super::covariance::CovarianceError;
+use super::fit::FitError;
+use crate::signal::SignalError;
+
+/// A log that gives no estimate, with the numbers that say why.
+#[derive(Debug, Error)]
+pub enum IdentifyError {
+    /// Not enough samples, or not enough of them in motion.
+    #[error("{log}: {samples} samples of motion; at least {needed} are needed")]
+    TooShort {
+        /// The log.
+        log: String,
+        /// Samples there are.
+        samples: usize,
+        /// Samples needed.
+        needed: usize,
+    },
+    /// The arm stands still throughout.
+    #[error("{log}: the arm never moves")]
+    NoMotion {
+        /// The log.
+        log: String,
+    },
+    /// Another number of joints than the arm's.
+    #[error("{log}: {found} joints, but the arm has {expected}")]
+    Joints {
+        /// The log.
+        log: String,
+        /// Joints in the log.
+        found: usize,
+        /// Joints of the arm.
+        expected: usize,
+    },
+    /// `--period` names a period that the motion does not have.
+    #[error(
+        "{log}: the motion does not repeat every {wanted_s} s{}",
+        found_s.map_or_else(String::new, |s| format!(" (it does every {s:.3} s)"))
+    )]
+    NoSuchPeriod {
+        /// The log.
+        log: String,
+        /// Period asked for, s.
+        wanted_s: f64,
+        /// Period found, s.
+        found_s: Option<f64>,
+    },
+    /// A filter or spectrum could not be computed.
+    #[error(transparent)]
+    Signal(#[from] SignalError),
+    /// The equations have no unique solution.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    /// The covariance asked for does not exist for these data.
+    #[error(transparent)]
+    Covariance(#[from] CovarianceError),
+}

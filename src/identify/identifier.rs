@@ -1,0 +1,270 @@
+//! From a raw log to θ̂ and σ: the one function that real logs and simulated trials go through.
+
+use super::columns::ColumnPlan;
+use super::covariance::{Covariance, CovarianceKind};
+use super::error::IdentifyError;
+use super::fit::{Fit, Fitter};
+use super::options::Options;
+use super::prepare::{Measurement, Prepared, Preparer, Processing};
+use super::problem::{Assembler, Problem};
+use crate::base::BaseSet;
+use crate::dynamics::Model;
+use crate::robot::JointSignals;
+use crate::signal::{Replicates, Scratch, ZeroPhase};
+
+/// Everything that stays the same from log to log, and the memory that is used again.
+pub struct Identifier<'a> {
+    model: &'a Model,
+    set: &'a BaseSet,
+    options: Options,
+    preparer: Preparer,
+    assembler: Assembler,
+    problem: Problem,
+    fitter: Fitter,
+    filter: Scratch,
+}
+
+/// What a log says about the arm.
+#[derive(Debug, Clone)]
+pub struct Identification {
+    /// The least-squares solution.
+    pub fit: Fit,
+    /// Its covariance.
+    pub covariance: Covariance,
+    /// Why this covariance was chosen.
+    pub covariance_reason: &'static str,
+    /// What was done to the log.
+    pub processing: Processing,
+    /// Samples of torque per joint that were used.
+    pub samples: usize,
+    /// Scatter of the torque between periods; `None` for a single run.
+    pub replicates: Option<Replicates>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// How far a prediction is off.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Residual {
+    /// Root mean square per joint, Nm.
+    pub rms_nm: Vec<f64>,
+    /// 100 ‖e_j‖/‖τ_j‖ per joint, percent.
+    pub relative_percent: Vec<f64>,
+    /// The paper's (21): √(eᵀe)/m, e over all joints, m time samples. Not an rms: it shrinks with
+    /// the length of the record.
+    pub e_n: f64,
+}
+
+impl Residual {
+    /// From ‖e_j‖² and ‖τ_j‖² over `samples` time samples.
+    pub fn from_squares(residual: &[f64], torque: &[f64], samples: usize) -> Self {
+        let m = samples as f64;
+        let pairs = residual.iter().zip(torque);
+        Self {
+            rms_nm: residual.iter().map(|e| (e / m).sqrt()).collect(),
+            relative_percent: pairs.map(|(e, t)| 100.0 * (e / t).sqrt()).collect(),
+            e_n: residual.iter().sum::<f64>().sqrt() / m,
+        }
+    }
+
+    /// Of the samples of `error` and `torque_nm` (same shape) for which `counts(joint, sample)`.
+    pub fn of(
+        error_nm: &JointSignals,
+        torque_nm: &JointSignals,
+        counts: impl Fn(usize, usize) -> bool,
+    ) -> Self {
+        let (n, samples) = (error_nm.joints(), error_nm.samples());
+        let mut rms_nm = Vec::with_capacity(n);
+        let mut relative_percent = Vec::with_capacity(n);
+        let mut all = 0.0;
+        for j in 0..n {
+            let mut squares = [0.0; 2];
+            let mut counted = 0usize;
+            for k in (0..samples).filter(|&k| counts(j, k)) {
+                squares[0] += error_nm.joint(j)[k].powi(2);
+                squares[1] += torque_nm.joint(j)[k].powi(2);
+                counted += 1;
+            }
+            rms_nm.push((squares[0] / counted as f64).sqrt());
+            relative_percent.push(100.0 * (squares[0] / squares[1]).sqrt());
+            all += squares[0];
+        }
+        Self { rms_nm, relative_percent, e_n: all.sqrt() / samples as f64 }
+    }
+}
+
+/// A log laid out for regression.
+pub struct Regression {
+    /// X and y of every joint.
+    pub problem: Problem,
+    /// The motion and torque behind them; for a single run unfiltered and as long as the window.
+    pub prepared: Prepared,
+    /// First sample of `prepared` that is in `problem` (edges of the filter are cut off).
+    pub first_sample: usize,
+    /// Samples of `prepared` per sample of `problem` (long logs are thinned behind the filter).
+    pub every: usize,
+}
+
+/// Single runs are processed in pieces of this many samples, so that memory stays bounded.
+const PIECE: usize = 1 << 16;
+/// Longest single run that keeps all its samples.
+const LONG_RUN: usize = 100_000;
+/// Rate kept behind the low-pass of a longer run, in multiples of the cutoff.
+const KEPT_RATE: f64 = 4.0;
+
+impl<'a> Identifier<'a> {
+    /// For logs of one arm.
+    pub fn new(model: &'a Model, set: &'a BaseSet, options: Options) -> Self {
+        let problem = Problem::new(ColumnPlan::new(model, set), 0.0);
+        Self {
+            model,
+            set,
+            options,
+            preparer: Preparer::default(),
+            assembler: Assembler::new(model),
+            fitter: Fitter::new(&problem),
+            problem,
+            filter: Scratch::default(),
+        }
+    }
+
+    /// The base set that is identified.
+    pub fn base_set(&self) -> &'a BaseSet {
+        self.set
+    }
+
+    /// Identifies from one log.
+    pub fn identify(&mut self, m: &Measurement) -> Result<Identification, IdentifyError> {
+        let prepared = self.fill(m)?;
+        self.solve(prepared)
+    }
+
+    /// Lays a log out for regression without solving: for validation and diagnosis.
+    pub fn regression(&mut self, m: &Measurement) -> Result<Regression, IdentifyError> {
+        let (prepared, first_sample, every) = self.fill_from(m)?;
+        let empty = Problem::new(self.problem.plan.clone(), 0.0);
+        let problem = std::mem::replace(&mut self.problem, empty);
+        Ok(Regression { problem, prepared, first_sample, every })
+    }
+
+    /// Solves a log laid out before.
+    pub fn identify_regression(
+        &mut self,
+        regression: &Regression,
+    ) -> Result<Identification, IdentifyError> {
+        self.problem.clone_from(&regression.problem);
+        self.solve(regression.prepared.clone())
+    }
+
+    fn fill(&mut self, m: &Measurement) -> Result<Prepared, IdentifyError> {
+        Ok(self.fill_from(m)?.0)
+    }
+
+    fn fill_from(&mut self, m: &Measurement) -> Result<(Prepared, usize, usize), IdentifyError> {
+        if m.q_rad.joints() != self.model.dof() {
+            let (found, expected) = (m.q_rad.joints(), self.model.dof());
+            return Err(IdentifyError::Joints { log: m.source.to_owned(), found, expected });
+        }
+        let prepared = self.preparer.prepare(m, &self.options)?;
+        self.problem.rate_hz = prepared.processing.rate_hz;
+        if prepared.replicates.is_some() {
+            let Prepared { motion, torque_nm, .. } = &prepared;
+            self.assembler.assemble(&mut self.problem, self.model, motion, torque_nm);
+            return Ok((prepared, 0, 1));
+        }
+        let (first, every) = self.fill_filtered(&prepared)?;
+        Ok((prepared, first, every))
+    }
+
+    /// A single run: the same low-pass on torque and every regressor column (Gautier 1997), in
+    /// pieces that overlap by the filter's memory; the filter's edges are cut off.
+    fn fill_filtered(&mut self, prepared: &Prepared) -> Result<(usize, usize), IdentifyError> {
+        let rate_hz = prepared.processing.rate_hz;
+        let Options { cutoff_hz, order, .. } = self.options;
+        let filter = ZeroPhase::new(cutoff_hz, order, rate_hz)?;
+        let samples = prepared.motion.samples();
+        let edge = filter.edge_samples().min(samples / 8);
+        let every = if samples > LONG_RUN {
+            ((rate_hz / (KEPT_RATE * cutoff_hz)).floor() as usize).max(1)
+        } else {
+            1
+        };
+        let mut whole = Problem::new(self.problem.plan.clone(), rate_hz / every as f64);
+        whole.periods = 1;
+        let kept = edge..samples - edge;
+        let mut start = kept.start;
+        let mut columns: Vec<Vec<Vec<f64>>> = Vec::new();
+        while start < kept.end {
+            let end = (start + PIECE.next_multiple_of(every)).min(kept.end);
+            let from = start - edge;
+            let part = from..(end + edge).min(samples);
+            let motion = prepared.motion.slice(part.clone());
+            let torque = prepared.torque_nm.slice(part.clone());
+            self.assembler.assemble(&mut self.problem, self.model, &motion, &torque);
+            let inside = start - from..end - from;
+            for (j, panel) in self.problem.panels.iter_mut().enumerate() {
+                let length = part.len();
+                let all = panel.x.chunks_exact_mut(length).chain(panel.y.chunks_exact_mut(length));
+                for (c, column) in all.enumerate() {
+                    filter.filter_in_place(column, &mut self.filter)?;
+                    if columns.len() <= j {
+                        columns.push(Vec::new());
+                    }
+                    if columns[j].len() <= c {
+                        columns[j].push(Vec::new());
+                    }
+                    columns[j][c].extend(column[inside.clone()].iter().step_by(every));
+                }
+            }
+            start = end;
+        }
+        for (panel, mut columns) in whole.panels.iter_mut().zip(columns) {
+            panel.y = columns.pop().unwrap_or_default();
+            whole.samples = panel.y.len();
+            panel.x = columns.concat();
+        }
+        self.problem = whole;
+        Ok((kept.start, every))
+    }
+
+    fn solve(&mut self, prepared: Prepared) -> Result<Identification, IdentifyError> {
+        let fit = self.fitter.fit(&self.problem, self.set, self.options.estimator)?;
+        let (kind, covariance_reason) = match self.options.covariance {
+            Some(kind) => (kind, "asked for"),
+            None if prepared.processing.periods >= MANY_PERIODS => (
+                CovarianceKind::Periods,
+                "the motion repeats: the scatter between periods holds for noise of any colour",
+            ),
+            None => (
+                CovarianceKind::Blocks,
+                "a single run: the scatter between blocks of time holds for noise with a memory \
+                 short against a block",
+            ),
+        };
+        let covariance = kind.method().covariance(&self.problem, &fit)?;
+        Ok(Identification {
+            samples: self.problem.samples * self.problem.periods,
+            covariance,
+            covariance_reason,
+            processing: prepared.processing,
+            replicates: prepared.replicates,
+            warnings: prepared.warnings,
+            fit,
+        })
+    }
+}
+
+/// With fewer periods their scatter has so few degrees of freedom that blocks tell more.
+const MANY_PERIODS: usize = 4;
+
+impl Identification {
+    /// Residual of the fit over all samples used.
+    pub fn residual(&self) -> Residual {
+        Residual::from_squares(&self.fit.residual_squares, &self.fit.torque_squares, self.samples)
+    }
+
+    /// σ of every base parameter.
+    pub fn sigma(&self) -> Vec<f64> {
+        self.covariance.sigma()
+    }
+}

@@ -1,0 +1,42 @@
+//! How a log is processed, the `[processing]` table of a scenario.
+
+use serde::{Deserialize, Serialize};
+
+use super::covariance::CovarianceKind;
+use super::fit::Estimator;
+
+/// Everything about the processing that a user may choose; the default chooses from the data.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Options {
+    /// Least squares with or without weights per joint.
+    pub estimator: Estimator,
+    /// How σ is computed; `None`: by what the log offers.
+    pub covariance: Option<CovarianceKind>,
+    /// Low-pass applied to torque and regressor columns of a motion that does not repeat, Hz.
+    pub cutoff_hz: f64,
+    /// Order of that low-pass (each of its two passes).
+    pub order: usize,
+    /// Rate that logs are resampled to, Hz; `None`: the log's own, at most [`Self::HIGHEST_RATE_HZ`].
+    pub rate_hz: Option<f64>,
+    /// Period of the motion, s; `None`: found in the log. Zero: treat the log as a single run.
+    pub period_s: Option<f64>,
+}
+
+impl Options {
+    /// Faster logs are decimated to at most this rate: an arm moves at a few hertz.
+    pub const HIGHEST_RATE_HZ: f64 = 150.0;
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            estimator: Estimator::Wls,
+            covariance: None,
+            cutoff_hz: 10.0,
+            order: 4,
+            rate_hz: None,
+            period_s: None,
+        }
+    }
+}

@@ -1,0 +1,304 @@
+//! From the channels of a log to motion and torque on one clock.
+
+use std::ops::Range;
+
+use serde::Serialize;
+
+use super::error::IdentifyError;
+use super::options::Options;
+use crate::dynamics::Motion;
+use crate::robot::JointSignals;
+use crate::signal::{
+    Activity, Decimator, FitScratch, PeriodicFit, Replicates, Resampler, Scratch, ZeroPhase,
+    central_4, find_period, natural_rate_hz, replicate_noise,
+};
+
+/// The channels identification needs of a log, borrowed.
+#[derive(Debug, Clone, Copy)]
+pub struct Measurement<'a> {
+    /// Where it comes from, for messages.
+    pub source: &'a str,
+    /// Increasing time stamps, s.
+    pub time_s: &'a [f64],
+    /// Joint angles, rad.
+    pub q_rad: &'a JointSignals,
+    /// Joint velocities, rad/s.
+    pub qd_rad_s: &'a JointSignals,
+    /// Drive torque at the joint i_G k I, Nm.
+    pub torque_nm: &'a JointSignals,
+}
+
+/// What was done to a log before the regression.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Processing {
+    /// Low-pass on torque and regressor columns, Hz; null where nothing was filtered.
+    pub cutoff_hz: Option<f64>,
+    /// Order of each of its two passes.
+    pub order: Option<usize>,
+    /// Rate of the samples used, Hz.
+    pub rate_hz: f64,
+    /// First and last instant used, s, on the log's clock.
+    pub window_s: [f64; 2],
+    /// Whether the torque went through the low-pass.
+    pub torque_filtered: bool,
+    /// Period of the motion, s; null for a single run.
+    pub period_s: Option<f64>,
+    /// Whole periods used; 1 for a single run.
+    pub periods: usize,
+    /// Whether time stamps were uneven and the log was resampled.
+    pub resampled: bool,
+    /// Highest harmonic of the averaged motion, per joint; null for a single run.
+    pub harmonics: Option<Vec<usize>>,
+}
+
+/// Motion and torque ready for the regressor.
+#[derive(Debug, Clone)]
+pub struct Prepared {
+    /// One period of the averaged motion, or the whole single run.
+    pub motion: Motion,
+    /// Torque of all periods one after the other, or of the single run, Nm.
+    pub torque_nm: JointSignals,
+    /// Scatter of the torque between periods; `None` for a single run.
+    pub replicates: Option<Replicates>,
+    /// What was done.
+    pub processing: Processing,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// Fewer samples than this are no experiment.
+const FEWEST_SAMPLES: usize = 64;
+/// Time stamps further off the median step than this share of it make a log uneven.
+const EVEN_WITHIN: f64 = 0.02;
+/// Gaps up to this many natural steps are interpolated, longer ones end the record.
+const LONGEST_GAP_STEPS: f64 = 10.0;
+/// Velocity is low-passed at this multiple of the regression's cutoff before it is differentiated.
+const DERIVATIVE_CUTOFF: f64 = 2.5;
+
+/// Filters and plans kept from log to log.
+#[derive(Default)]
+pub struct Preparer {
+    periodic: Option<PeriodicFit>,
+    fit: FitScratch,
+    filter: Scratch,
+}
+
+/// The channels on an even clock.
+struct Even<'a> {
+    start_s: f64,
+    rate_hz: f64,
+    resampled: bool,
+    q_rad: std::borrow::Cow<'a, JointSignals>,
+    qd_rad_s: std::borrow::Cow<'a, JointSignals>,
+    torque_nm: std::borrow::Cow<'a, JointSignals>,
+}
+
+impl Preparer {
+    /// Brings `m` into the shape of a regression problem.
+    ///
+    /// A motion that repeats is averaged over its whole periods and differentiated as a Fourier
+    /// series; the torque of every period is kept and nothing is filtered. A single run keeps its
+    /// samples; the low-pass comes later, on torque and regressor alike.
+    pub fn prepare(
+        &mut self,
+        m: &Measurement,
+        options: &Options,
+    ) -> Result<Prepared, IdentifyError> {
+        let samples = m.time_s.len();
+        if samples < FEWEST_SAMPLES {
+            let log = m.source.to_owned();
+            return Err(IdentifyError::TooShort { log, samples, needed: FEWEST_SAMPLES });
+        }
+        let mut warnings = Vec::new();
+        let even = self.even(m, options, &mut warnings)?;
+        let single_run = options.period_s == Some(0.0);
+        let period = if single_run { None } else { find_period(&even.q_rad)? };
+        if let (Some(wanted), false) = (options.period_s, single_run) {
+            let found = period.as_ref().map(|p| p.samples as f64 / even.rate_hz);
+            if found.is_none_or(|found| (found - wanted).abs() > 1.5 / even.rate_hz) {
+                let log = m.source.to_owned();
+                return Err(IdentifyError::NoSuchPeriod { log, wanted_s: wanted, found_s: found });
+            }
+        }
+        match period {
+            Some(period) if period.is_whole => {
+                self.periodic(&even, period.window, period.samples, warnings)
+            }
+            Some(period) => {
+                warnings.push(format!(
+                    "the motion repeats every {:.3} samples, which is not a whole number: periods \
+                     are not averaged",
+                    period.refined_samples
+                ));
+                self.single_run(m, &even, options, warnings)
+            }
+            None => self.single_run(m, &even, options, warnings),
+        }
+    }
+
+    /// Resamples an uneven log, decimates a fast one.
+    fn even<'a>(
+        &mut self,
+        m: &Measurement<'a>,
+        options: &Options,
+        warnings: &mut Vec<String>,
+    ) -> Result<Even<'a>, IdentifyError> {
+        use std::borrow::Cow;
+        let natural_hz = natural_rate_hz(m.time_s)?;
+        let step = 1.0 / natural_hz;
+        let is_even = m.time_s.windows(2).all(|w| ((w[1] - w[0]) / step - 1.0).abs() < EVEN_WITHIN);
+        let rate_hz = options.rate_hz.unwrap_or(natural_hz);
+        let mut even = Even {
+            start_s: m.time_s[0],
+            rate_hz: natural_hz,
+            resampled: false,
+            q_rad: Cow::Borrowed(m.q_rad),
+            qd_rad_s: Cow::Borrowed(m.qd_rad_s),
+            torque_nm: Cow::Borrowed(m.torque_nm),
+        };
+        if is_even {
+            // The median step carries the rounding of the time stamps; their mean does not.
+            even.rate_hz =
+                (m.time_s.len() - 1) as f64 / (m.time_s[m.time_s.len() - 1] - m.time_s[0]);
+        }
+        if !is_even || rate_hz < 0.999 * natural_hz || rate_hz > 1.001 * natural_hz {
+            let grid_hz = if rate_hz < natural_hz { natural_hz } else { rate_hz };
+            let grid = Resampler::new(m.time_s, grid_hz, LONGEST_GAP_STEPS * step)?;
+            let longest = longest(grid.segments());
+            for gap in grid.gaps() {
+                warnings.push(format!(
+                    "no samples for {:.2} s from {:.2} s on: only the longest stretch without such \
+                     a gap is used",
+                    gap.end_s - gap.start_s,
+                    gap.start_s
+                ));
+            }
+            let cut = |signals: JointSignals| Cow::Owned(signals.slice(longest.clone()));
+            even.start_s = grid.time_s()[longest.start];
+            even.q_rad = cut(grid.angles(m.q_rad, m.qd_rad_s)?);
+            even.qd_rad_s = cut(grid.smooth(m.qd_rad_s)?);
+            even.torque_nm = cut(grid.straight(m.torque_nm)?);
+            even.rate_hz = grid_hz;
+            even.resampled = true;
+        }
+        let highest = options.rate_hz.unwrap_or(Options::HIGHEST_RATE_HZ);
+        let every = (even.rate_hz / highest * 0.999).ceil().max(1.0) as usize;
+        if every > 1 {
+            let decimator = Decimator::new(every, even.rate_hz)?;
+            for signals in [&mut even.q_rad, &mut even.qd_rad_s, &mut even.torque_nm] {
+                let mut error = None;
+                let decimated = signals.map_joints(|_, y| {
+                    decimator.decimate(y, &mut self.filter).unwrap_or_else(|e| {
+                        error = Some(e);
+                        Vec::new()
+                    })
+                });
+                if let Some(error) = error {
+                    return Err(error.into());
+                }
+                *signals = Cow::Owned(decimated);
+            }
+            even.rate_hz = decimator.rate_hz();
+        }
+        Ok(even)
+    }
+
+    fn periodic(
+        &mut self,
+        even: &Even,
+        window: Range<usize>,
+        samples_per_period: usize,
+        warnings: Vec<String>,
+    ) -> Result<Prepared, IdentifyError> {
+        let periods = window.len() / samples_per_period;
+        let fits = |fit: &PeriodicFit| {
+            fit.samples_per_period() == samples_per_period
+                && fit.periods() == periods
+                && fit.rate_hz() == even.rate_hz
+        };
+        let fit = match self.periodic.take().filter(fits) {
+            Some(fit) => fit,
+            None => PeriodicFit::new(samples_per_period, periods, even.rate_hz)?,
+        };
+        let q_rad = even.q_rad.slice(window.clone());
+        let qd_rad_s = even.qd_rad_s.slice(window.clone());
+        let torque_nm = even.torque_nm.slice(window.clone());
+        let averaged = fit.fit(&q_rad, &qd_rad_s, &mut self.fit);
+        self.periodic = Some(fit);
+        let averaged = averaged?;
+        let at = |k: usize| even.start_s + k as f64 / even.rate_hz;
+        Ok(Prepared {
+            motion: Motion {
+                q_rad: averaged.q_rad,
+                qd_rad_s: averaged.qd_rad_s,
+                qdd_rad_s2: averaged.qdd_rad_s2,
+            },
+            replicates: Some(replicate_noise(&torque_nm, samples_per_period)?),
+            torque_nm,
+            processing: Processing {
+                cutoff_hz: None,
+                order: None,
+                rate_hz: even.rate_hz,
+                window_s: [at(window.start), at(window.end)],
+                torque_filtered: false,
+                period_s: Some(samples_per_period as f64 / even.rate_hz),
+                periods,
+                resampled: even.resampled,
+                harmonics: Some(averaged.harmonics),
+            },
+            warnings,
+        })
+    }
+
+    fn single_run(
+        &mut self,
+        m: &Measurement,
+        even: &Even,
+        options: &Options,
+        warnings: Vec<String>,
+    ) -> Result<Prepared, IdentifyError> {
+        let rate_hz = even.rate_hz;
+        let activity = Activity::of(&even.qd_rad_s, rate_hz)?;
+        let window = activity
+            .moving_window(0)
+            .ok_or_else(|| IdentifyError::NoMotion { log: m.source.to_owned() })?;
+        if window.len() < FEWEST_SAMPLES {
+            let (samples, needed) = (window.len(), FEWEST_SAMPLES);
+            return Err(IdentifyError::TooShort { log: m.source.to_owned(), samples, needed });
+        }
+        let cutoff_hz = (DERIVATIVE_CUTOFF * options.cutoff_hz).min(0.4 * rate_hz);
+        let smooth = ZeroPhase::new(cutoff_hz, options.order, rate_hz)?;
+        let mut qdd_rad_s2 = JointSignals::zeros(even.q_rad.joints(), even.q_rad.samples());
+        for j in 0..qdd_rad_s2.joints() {
+            let mut qd = even.qd_rad_s.joint(j).to_vec();
+            smooth.filter_in_place(&mut qd, &mut self.filter)?;
+            central_4(&qd, rate_hz, qdd_rad_s2.joint_mut(j))?;
+        }
+        let at = |k: usize| even.start_s + k as f64 / rate_hz;
+        Ok(Prepared {
+            motion: Motion {
+                q_rad: even.q_rad.slice(window.clone()),
+                qd_rad_s: even.qd_rad_s.slice(window.clone()),
+                qdd_rad_s2: qdd_rad_s2.slice(window.clone()),
+            },
+            torque_nm: even.torque_nm.slice(window.clone()),
+            replicates: None,
+            processing: Processing {
+                cutoff_hz: Some(options.cutoff_hz),
+                order: Some(options.order),
+                rate_hz,
+                window_s: [at(window.start), at(window.end)],
+                torque_filtered: true,
+                period_s: None,
+                periods: 1,
+                resampled: even.resampled,
+                harmonics: None,
+            },
+            warnings,
+        })
+    }
+}
+
+fn longest(segments: &[Range<usize>]) -> Range<usize> {
+    segments.iter().max_by_key(|s| s.len()).cloned().unwrap_or(0..0)
+}

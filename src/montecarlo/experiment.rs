@@ -1,0 +1,173 @@
+//! One scenario made ready, and its trials.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use thiserror::Error;
+
+use super::scenario::Scenario;
+use super::tally::Outcome;
+use crate::dynamics::Model;
+use crate::excitation::Reference;
+use crate::identify::covariance::CovarianceKind;
+use crate::identify::{Identification, Identifier, IdentifyError, Measurement};
+use crate::plant::{Encoders, Measured, Plant, PlantError, Recording, Sensors};
+use crate::random::TrialStreams;
+
+/// A scenario whose plant has run: what all trials share.
+pub struct Experiment {
+    /// The scenario.
+    pub scenario: Scenario,
+    /// The arm's equations of motion.
+    pub model: Model,
+    /// True base parameters.
+    pub truth: Vec<f64>,
+    /// σ of the pilot trial per parameter: the unit of the tally.
+    pub scale: Vec<f64>,
+    /// The covariance that the pilot's log calls for, and all trials' with it.
+    pub covariance: CovarianceKind,
+    /// The noise-free run.
+    pub recording: Recording,
+    sensors: Sensors,
+}
+
+/// Number of the pilot trial: its noise is its own and it is never counted.
+const PILOT: u64 = u64::MAX;
+
+/// A trial that gave no estimate.
+#[derive(Debug, Error)]
+pub enum TrialError {
+    /// The plant did not run.
+    #[error("the plant: {0}")]
+    Plant(#[from] PlantError),
+    /// The log was not identified.
+    #[error("{0}")]
+    Identify(#[from] IdentifyError),
+    /// An estimate so far off that it is no estimate.
+    #[error("{parameter}: estimate {z:.3e} pilot σ off the truth, σ {sigma:.3e} pilot σ")]
+    Unsound {
+        /// Name of the base parameter.
+        parameter: String,
+        /// (θ̂ − θ)/scale.
+        z: f64,
+        /// σ̂/scale.
+        sigma: f64,
+    },
+    /// The code of the trial panicked.
+    #[error("panicked: {message}")]
+    Panicked {
+        /// The panic's message.
+        message: String,
+    },
+}
+
+impl Experiment {
+    /// Runs the plant once without noise, and a pilot trial that sets the scales.
+    pub fn prepare(scenario: Scenario) -> Result<Self, TrialError> {
+        let model = Model::new(&scenario.arm);
+        let truth = scenario.set.values(&model.standard_parameters());
+        let recording = run_plant(&scenario, None)?;
+        let sensors = Sensors::new(&scenario.sensors, &scenario.arm, scenario.plant.log_rate_hz)?;
+        let scale = vec![1.0; truth.len()];
+        let covariance = CovarianceKind::Wls;
+        let mut experiment = Self { scenario, model, truth, scale, covariance, recording, sensors };
+        let pilot = experiment.worker().identify(PILOT)?;
+        experiment.scale = pilot.sigma();
+        experiment.covariance = pilot.covariance.kind;
+        Ok(experiment)
+    }
+
+    /// What one thread needs to run trials.
+    pub fn worker(&self) -> Worker<'_> {
+        Worker {
+            experiment: self,
+            identifier: Identifier::new(
+                &self.model,
+                &self.scenario.set,
+                self.scenario.processing.clone(),
+            ),
+            measured: Measured::like(&self.recording),
+        }
+    }
+
+    /// The random numbers of a trial.
+    pub fn streams(&self, trial: u64) -> TrialStreams {
+        TrialStreams::new(self.scenario.seed, self.scenario.name.as_bytes(), trial)
+    }
+
+    /// The noise-free run of a trial: the shared one, or its own where the controller reads the
+    /// sensors.
+    pub fn recording(&self, trial: u64) -> Result<std::borrow::Cow<'_, Recording>, PlantError> {
+        if !self.scenario.controller_reads_sensors {
+            return Ok(std::borrow::Cow::Borrowed(&self.recording));
+        }
+        let encoders = self.sensors.encoders(&self.streams(trial));
+        Ok(std::borrow::Cow::Owned(run_plant(&self.scenario, Some(encoders))?))
+    }
+
+    /// The log of a trial: the noise-free run as its sensors read it.
+    pub fn log(&self, trial: u64) -> Result<(Measured, Vec<f64>), PlantError> {
+        let recording = self.recording(trial)?;
+        let mut measured = Measured::like(&recording);
+        self.sensors.measure(&recording, &self.streams(trial), &mut measured);
+        Ok((measured, recording.time_s.clone()))
+    }
+}
+
+fn run_plant(scenario: &Scenario, encoders: Option<Encoders>) -> Result<Recording, PlantError> {
+    let reference: &dyn Reference = &scenario.excitation;
+    Plant::new(&scenario.arm, &scenario.plant)?.run(reference, encoders)
+}
+
+/// One thread's memory for trials of an [`Experiment`].
+pub struct Worker<'a> {
+    experiment: &'a Experiment,
+    identifier: Identifier<'a>,
+    measured: Measured,
+}
+
+impl Worker<'_> {
+    /// Identifies trial `trial` from its log.
+    pub fn identify(&mut self, trial: u64) -> Result<Identification, TrialError> {
+        let experiment = self.experiment;
+        let recording = experiment.recording(trial)?;
+        experiment.sensors.measure(&recording, &experiment.streams(trial), &mut self.measured);
+        Ok(self.identifier.identify(&Measurement {
+            source: "simulated log",
+            time_s: &recording.time_s,
+            q_rad: &self.measured.q_rad,
+            qd_rad_s: &self.measured.qd_rad_s,
+            torque_nm: &self.measured.torque_nm,
+        })?)
+    }
+
+    /// Runs trial `trial` and compares with the truth. A panic inside is a failed trial.
+    pub fn trial(&mut self, trial: u64) -> Result<Vec<Outcome>, TrialError> {
+        // After a panic the scratch memory may be half written; every use overwrites it.
+        catch_unwind(AssertUnwindSafe(|| self.outcomes(trial))).unwrap_or_else(|panic| {
+            let text = panic.downcast_ref::<String>().map(String::as_str);
+            let message = text.or_else(|| panic.downcast_ref::<&str>().copied());
+            Err(TrialError::Panicked { message: message.unwrap_or("no message").to_owned() })
+        })
+    }
+
+    fn outcomes(&mut self, trial: u64) -> Result<Vec<Outcome>, TrialError> {
+        let identification = self.identify(trial)?;
+        let Experiment { truth, scale, scenario, .. } = self.experiment;
+        let quantile_95 = identification.covariance.quantile_95();
+        let sigma = identification.sigma();
+        let estimates = identification.fit.theta.iter().zip(&sigma);
+        estimates
+            .zip(truth.iter().zip(scale))
+            .enumerate()
+            .map(|(k, ((theta, sigma), (truth, scale)))| {
+                let outcome =
+                    Outcome { z: (theta - truth) / scale, sigma: sigma / scale, quantile_95 };
+                if outcome.is_sound() {
+                    return Ok(outcome);
+                }
+                let parameter = scenario.set.name(k).to_owned();
+                Err(TrialError::Unsound { parameter, z: outcome.z, sigma: outcome.sigma })
+            })
+            .collect()
+    }
+}

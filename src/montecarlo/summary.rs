@@ -1,0 +1,172 @@
+//! What a run says, as the JSON that others read.
+
+use serde::Serialize;
+
+use super::calibration::{Calibration, Verdict};
+use super::shard::Merged;
+use super::tally::Failure;
+
+/// Format of the JSON output.
+pub const SUMMARY_SCHEMA: &str = "armid.montecarlo/1";
+
+/// Result of a Monte Carlo run. Fractions are 0…1; σ in the parameter's unit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Trials run, failed ones included.
+    pub trials: u64,
+    /// Trials that gave no estimate.
+    pub failed: u64,
+    /// Which and why.
+    pub failures: Vec<Failure>,
+    /// Stretches of trials that have not been run: `[first, one behind the last]`.
+    pub missing: Vec<[u64; 2]>,
+    /// Estimator.
+    pub estimator: String,
+    /// Method of the covariance.
+    pub covariance: String,
+    /// One entry per base parameter.
+    pub parameters: Vec<ParameterSummary>,
+    /// Coverage of nominal 95 % intervals, mean over parameters.
+    pub coverage_mean: f64,
+    /// The parameter covered worst (furthest from 95 %).
+    pub coverage_worst: NamedValue,
+    /// Empirical over predicted σ, pooled over parameters.
+    pub sigma_ratio_pooled: f64,
+    /// The checks behind the verdict.
+    pub checks: Vec<CheckSummary>,
+    /// Trials per second of wall time.
+    pub trials_per_second: f64,
+    /// Whether the claimed σ is true.
+    pub verdict: Verdict,
+}
+
+/// Statistics of one base parameter.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ParameterSummary {
+    /// Name of the kept column.
+    pub name: String,
+    /// The whole combination.
+    pub formula: String,
+    /// SI unit.
+    pub unit: String,
+    /// True value.
+    pub truth: f64,
+    /// Mean estimate.
+    pub mean: f64,
+    /// Standard deviation of the estimates.
+    pub sigma_empirical: f64,
+    /// Root mean square of the claimed σ.
+    pub sigma_predicted: f64,
+    /// Share of 95 % intervals that hold the truth.
+    pub coverage: f64,
+}
+
+/// A value with the parameter it belongs to.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NamedValue {
+    /// Name of the parameter.
+    pub name: String,
+    /// The value.
+    pub value: f64,
+}
+
+/// One check with its bounds.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CheckSummary {
+    /// In words.
+    pub what: &'static str,
+    /// The parameter that decided; null for statistics over all.
+    pub parameter: Option<String>,
+    /// Measured value.
+    pub value: f64,
+    /// Where the true value lies, given the number of trials.
+    pub interval: [f64; 2],
+    /// Where the claim says that it lies.
+    pub claim: [f64; 2],
+    /// The answer.
+    pub verdict: Verdict,
+}
+
+impl Summary {
+    /// Of merged shards; `wall_s` is the wall time that the trials took.
+    pub fn of(merged: &Merged, wall_s: f64) -> Self {
+        let Merged { header, tally, missing, .. } = merged;
+        let calibration = Calibration::of(tally);
+        let parameters: Vec<ParameterSummary> = header
+            .parameters
+            .iter()
+            .enumerate()
+            .map(|(k, p)| {
+                let s = tally.statistics(k);
+                ParameterSummary {
+                    name: p.name.clone(),
+                    formula: p.formula.clone(),
+                    unit: p.unit.clone(),
+                    truth: p.truth,
+                    mean: p.truth + s.bias * p.scale,
+                    sigma_empirical: s.sigma_empirical * p.scale,
+                    sigma_predicted: s.sigma_predicted * p.scale,
+                    coverage: s.coverage,
+                }
+            })
+            .collect();
+        let worst = parameters
+            .iter()
+            .max_by(|a, b| (a.coverage - 0.95).abs().total_cmp(&(b.coverage - 0.95).abs()));
+        let checks = calibration.checks.iter().map(|check| CheckSummary {
+            what: check.what,
+            parameter: check.parameter.map(|k| header.parameters[k].name.clone()),
+            value: check.value,
+            interval: check.interval,
+            claim: check.claim,
+            verdict: check.verdict,
+        });
+        Self {
+            scenario: header.scenario.clone(),
+            trials: tally.trials(),
+            failed: tally.failures.len() as u64,
+            failures: tally.failures.clone(),
+            missing: missing.iter().map(|range| [range.start, range.end]).collect(),
+            estimator: header.estimator.clone(),
+            covariance: header.covariance.clone(),
+            coverage_mean: tally.mean_coverage().0,
+            coverage_worst: worst.map_or_else(
+                || NamedValue { name: String::new(), value: f64::NAN },
+                |p| NamedValue { name: p.name.clone(), value: p.coverage },
+            ),
+            sigma_ratio_pooled: tally.pooled_ratio().0,
+            checks: checks.collect(),
+            trials_per_second: tally.trials() as f64 / wall_s,
+            verdict: calibration.verdict,
+            parameters,
+        }
+    }
+
+    /// The verdict in a sentence.
+    pub fn sentence(&self) -> String {
+        let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+        match self.verdict {
+            Verdict::Pass => format!(
+                "The predicted σ is true: {} of the 95 % intervals hold the true value, and the \
+                 estimates scatter {:.3} times as far as predicted.",
+                percent(self.coverage_mean),
+                self.sigma_ratio_pooled
+            ),
+            Verdict::Fail => {
+                let failed = self.checks.iter().find(|c| c.verdict == Verdict::Fail);
+                let reason = failed.map_or_else(String::new, |c| {
+                    let of = c.parameter.as_ref().map_or(String::new(), |p| format!(" ({p})"));
+                    let [low, high] = c.claim;
+                    format!(": {}{of} is {:.3}, claimed {low} to {high}", c.what, c.value)
+                });
+                format!("The claim does not hold{reason}.")
+            }
+            Verdict::NotEvaluated => format!(
+                "{} trials are too few to tell whether the predicted σ is true.",
+                self.trials
+            ),
+        }
+    }
+}

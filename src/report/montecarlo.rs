@@ -1,0 +1,209 @@
+//! The Monte Carlo's page and its table for the terminal.
+
+use super::json::Program;
+use super::number::{percent, significant};
+use super::plot::{Axis, Bars, Colour, IntervalPlot, IntervalRow, Mark, Span, XyPlot};
+use super::{Column, Page, ReportError, Section, Status, Table, Verdict};
+use crate::montecarlo::calibration::{self, claims, wilson};
+use crate::montecarlo::tally::BIN_WIDTH;
+use crate::montecarlo::{Summary, shard::Merged};
+
+/// Every base parameter: truth, mean, bias, σ found and claimed, coverage.
+pub fn parameter_table(summary: &Summary) -> Table {
+    let mut table = Table::new([
+        Column::text("parameter"),
+        Column::text("unit"),
+        Column::number("truth", ""),
+        Column::number("mean", ""),
+        Column::number("bias/σ", ""),
+        Column::number("σ empirical", ""),
+        Column::number("σ predicted", ""),
+        Column::number("ratio", ""),
+        Column::number("coverage", ""),
+    ]);
+    for p in &summary.parameters {
+        let ratio = p.sigma_empirical / p.sigma_predicted;
+        let [low, high] = claims::EACH_COVERAGE;
+        let status = (p.coverage < low || p.coverage > high).then_some(Status::Warn);
+        table.push_judged(
+            status,
+            [
+                p.name.clone(),
+                p.unit.clone(),
+                significant(p.truth, 5),
+                significant(p.mean, 5),
+                format!("{:+.3}", (p.mean - p.truth) / p.sigma_empirical),
+                significant(p.sigma_empirical, 3),
+                significant(p.sigma_predicted, 3),
+                format!("{ratio:.3}"),
+                percent(p.coverage, 3),
+            ],
+        );
+    }
+    table
+}
+
+/// The checks with what chance leaves open and what is claimed.
+pub fn check_table(summary: &Summary) -> Table {
+    let mut table = Table::new([
+        Column::text("check"),
+        Column::text("decided by"),
+        Column::number("measured", ""),
+        Column::number("true value within", ""),
+        Column::number("claim", ""),
+        Column::text("verdict"),
+    ]);
+    for check in &summary.checks {
+        let range = |[low, high]: [f64; 2]| format!("{low:.3} … {high:.3}");
+        table.push_judged(
+            Some(status(check.verdict)),
+            [
+                check.what.to_owned(),
+                check.parameter.clone().unwrap_or_else(|| "all".into()),
+                format!("{:.3}", check.value),
+                range(check.interval),
+                range(check.claim),
+                check.verdict.to_string(),
+            ],
+        );
+    }
+    table
+}
+
+fn status(verdict: calibration::Verdict) -> Status {
+    match verdict {
+        calibration::Verdict::Pass => Status::Good,
+        calibration::Verdict::Fail => Status::Bad,
+        calibration::Verdict::NotEvaluated => Status::Warn,
+    }
+}
+
+/// The page: verdict, coverage and ratio per parameter, distribution of the errors, tables.
+pub fn page(summary: &Summary, merged: &Merged, program: Program) -> Result<Page, ReportError> {
+    let facts = vec![
+        format!(
+            "{} trials, {} failed; estimator {}, covariance {}",
+            summary.trials, summary.failed, summary.estimator, summary.covariance
+        ),
+        format!(
+            "coverage of 95 % intervals: mean {}, worst {} ({})",
+            percent(summary.coverage_mean, 3),
+            percent(summary.coverage_worst.value, 3),
+            summary.coverage_worst.name
+        ),
+        format!("empirical over predicted σ, pooled: {:.3}", summary.sigma_ratio_pooled),
+        format!("{:.0} trials per second", summary.trials_per_second),
+    ];
+    let verdict = Verdict { status: status(summary.verdict), sentence: summary.sentence(), facts };
+    let subtitle = format!("Scenario {}", summary.scenario);
+    let mut page = Page::new("Is the σ true?", subtitle, verdict, program);
+    page.push(
+        Section::new("What was checked")
+            .paragraph(
+                "Each trial draws fresh sensor noise, identifies the arm from the noisy log with \
+                 the same code that real logs go through, and compares the estimate with the \
+                 known truth. A check fails only when chance cannot explain the deviation (all \
+                 checks together fail a true claim once in a thousand runs).",
+            )
+            .table(check_table(summary), ""),
+    );
+    page.push(
+        Section::new("Coverage")
+            .figure(
+                coverage_plot(summary)?,
+                "Share of trials whose 95 % interval holds the true value, with what chance \
+                 leaves open at 95 % confidence.",
+            )
+            .figure(
+                ratio_plot(summary)?,
+                "Scatter of the estimates over the σ that was predicted from a single log.",
+            ),
+    );
+    page.push(Section::new("Distribution of the errors").figure(
+        histogram(merged)?,
+        "Errors in units of the σ predicted in the same trial, all parameters pooled.",
+    ));
+    let combinations = summary.parameters.iter().map(|p| format!("{}: {}", p.name, p.formula));
+    page.push(
+        Section::new("Parameters")
+            .table(parameter_table(summary), "Base parameters, named by the column that is kept")
+            .details(Section::new("The combinations behind the names").list(combinations)),
+    );
+    if summary.failed > 0 {
+        let failures = summary.failures.iter().map(|f| format!("trial {}: {}", f.trial, f.reason));
+        page.push(Section::new("Failed trials").list(failures));
+    }
+    Ok(page)
+}
+
+fn coverage_plot(summary: &Summary) -> Result<String, ReportError> {
+    let n = (summary.trials - summary.failed) as f64;
+    let mut plot =
+        IntervalPlot::new("Coverage of nominal 95 % intervals", Axis::linear("coverage", "%"));
+    plot.columns = 2;
+    plot.reference = Some(95.0);
+    let [low, high] = claims::EACH_COVERAGE;
+    plot.expected =
+        Some(Span { from: 100.0 * low, to: 100.0 * high, label: "claimed for each".into() });
+    plot.value_name = "coverage ± chance".into();
+    plot.rows = summary
+        .parameters
+        .iter()
+        .map(|p| {
+            let [low, high] = wilson(p.coverage, n, 1.96);
+            interval_row(&p.name, 100.0 * p.coverage, [100.0 * low, 100.0 * high])
+        })
+        .collect();
+    Ok(plot.to_svg()?)
+}
+
+fn ratio_plot(summary: &Summary) -> Result<String, ReportError> {
+    let n = (summary.trials - summary.failed) as f64;
+    let mut plot = IntervalPlot::new(
+        "Empirical over predicted σ",
+        Axis::linear("σ empirical / σ predicted", ""),
+    );
+    plot.columns = 2;
+    plot.reference = Some(1.0);
+    let [low, high] = claims::EACH_RATIO;
+    plot.expected = Some(Span { from: low, to: high, label: "claimed for each".into() });
+    plot.value_name = "ratio ± chance".into();
+    plot.rows = summary
+        .parameters
+        .iter()
+        .map(|p| {
+            let ratio = p.sigma_empirical / p.sigma_predicted;
+            let half = 1.96 * ratio / (2.0 * n).sqrt();
+            interval_row(&p.name, ratio, [ratio - half, ratio + half])
+        })
+        .collect();
+    Ok(plot.to_svg()?)
+}
+
+fn interval_row(name: &str, value: f64, [low, high]: [f64; 2]) -> IntervalRow {
+    IntervalRow { name: name.to_owned(), value, low, high, expected: f64::NAN, status: None }
+}
+
+fn histogram(merged: &Merged) -> Result<String, ReportError> {
+    let bins = merged.tally.histogram();
+    let inner = &bins[1..bins.len() - 1];
+    let density: Vec<f64> = inner.iter().map(|(_, share)| share / BIN_WIDTH).collect();
+    let mut edges: Vec<f64> = inner.iter().map(|(centre, _)| centre - 0.5 * BIN_WIDTH).collect();
+    edges.push(inner[inner.len() - 1].0 + 0.5 * BIN_WIDTH);
+    let x: Vec<f64> = (-200..=200).map(|k| k as f64 * 0.025).collect();
+    let normal: Vec<f64> =
+        x.iter().map(|z| (-0.5 * z * z).exp() / (2.0 * std::f64::consts::PI).sqrt()).collect();
+    let mut plot = XyPlot::new(
+        "Errors in units of the predicted σ",
+        Axis::linear("(estimate − truth) / predicted σ", ""),
+        Axis::linear("density", ""),
+    );
+    plot.bars.push(Bars {
+        name: "trials".into(),
+        edges,
+        heights: density,
+        colour: Colour::REFERENCE,
+    });
+    let plot = plot.with("standard normal", &x, &normal, Colour::MODEL, Mark::Line);
+    Ok(plot.to_svg()?)
+}
