@@ -2,7 +2,9 @@
 //!
 //! Enters: arguments. Leaves: files, text on the terminal and an exit code.
 
+pub mod excite;
 pub mod montecarlo;
+mod prior;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;

@@ -11,6 +11,7 @@ mod newton_euler;
 mod parameters;
 mod real;
 mod regressor;
+mod regressor_adjoint;
 mod vector;
 mod workspace;
 
@@ -23,5 +24,6 @@ pub use newton_euler::{inverse_dynamics, rigid_torque};
 pub use parameters::{BODY_PARAMETERS, Parameter, ParameterLayout};
 pub use real::{LANES, Lanes, Real};
 pub use regressor::{RegressorBlock, regressor};
+pub use regressor_adjoint::AdjointWorkspace;
 pub use vector::Vec3;
 pub use workspace::Workspace;

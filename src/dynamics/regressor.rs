@@ -98,12 +98,12 @@ pub fn regressor(
 /// of samples; a block of a few hundred samples stays in cache while it is consumed.
 #[derive(Debug, Clone)]
 pub struct RegressorBlock {
-    dof: usize,
-    capacity: usize,
-    samples: usize,
+    pub(super) dof: usize,
+    pub(super) capacity: usize,
+    pub(super) samples: usize,
     /// First column of each joint's row block, in units of columns.
-    first: Vec<usize>,
-    columns: Vec<f64>,
+    pub(super) first: Vec<usize>,
+    pub(super) columns: Vec<f64>,
 }
 
 /// Columns of one joint's drive behind its body columns: Ia, rv, rc, off.
@@ -134,6 +134,27 @@ impl RegressorBlock {
     /// Joint `joint`'s column of the standard parameter `parameter`, one value per sample; `None`
     /// where the structure makes it zero.
     pub fn column(&self, joint: usize, parameter: Parameter) -> Option<&[f64]> {
+        let start = self.start(joint, parameter)?;
+        Some(&self.columns[start..start + self.samples])
+    }
+
+    /// The same column, to be written: for blocks that hold weights on a regressor.
+    pub fn column_mut(&mut self, joint: usize, parameter: Parameter) -> Option<&mut [f64]> {
+        let start = self.start(joint, parameter)?;
+        Some(&mut self.columns[start..start + self.samples])
+    }
+
+    /// Makes this a block of `samples` zeros, to be written column by column.
+    ///
+    /// # Panics
+    /// If `samples` exceeds the capacity.
+    pub fn set_samples(&mut self, samples: usize) {
+        assert!(samples <= self.capacity);
+        self.samples = samples;
+        self.columns.fill(0.0);
+    }
+
+    fn start(&self, joint: usize, parameter: Parameter) -> Option<usize> {
         let drive = 10 * (self.dof - joint);
         let within = match parameter {
             Parameter::Body(body, k) if body >= joint => 10 * (body - joint) + k,
@@ -143,8 +164,7 @@ impl RegressorBlock {
             Parameter::Offset(j) if j == joint => drive + 3,
             _ => return None,
         };
-        let start = (self.first[joint] + within) * self.capacity;
-        Some(&self.columns[start..start + self.samples])
+        Some((self.first[joint] + within) * self.capacity)
     }
 
     /// Fills the block with the regressor of `motion` at the samples `range`.

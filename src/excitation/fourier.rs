@@ -53,6 +53,11 @@ struct TrajectoryFile {
     q0_rad: Vec<f64>,
     a_rad_s: Vec<Vec<f64>>,
     b_rad_s: Vec<Vec<f64>>,
+    /// Program that wrote the file, and how the series was designed: for the reader of the file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    program: Option<serde_json::Value>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    design: Option<serde_json::Value>,
 }
 
 impl FourierSeries {
@@ -133,6 +138,8 @@ impl FourierSeries {
             q0_rad: self.q0_rad.clone(),
             a_rad_s: self.a_rad_s.clone(),
             b_rad_s: self.b_rad_s.clone(),
+            program: None,
+            design: None,
         };
         // Numbers and strings only: there is nothing in it that JSON could refuse.
         serde_json::to_string_pretty(&file).unwrap_or_default() + "\n"

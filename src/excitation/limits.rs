@@ -5,6 +5,7 @@ use std::fmt;
 use super::clearance::ClearanceModel;
 use super::error::ExcitationError;
 use super::reference::Reference;
+use crate::dynamics::{Model, Workspace, inverse_dynamics};
 use crate::robot::Arm;
 
 /// What is asked of a motion beyond the limits of the arm itself.
@@ -12,14 +13,16 @@ use crate::robot::Arm;
 pub struct Requirements {
     /// Smallest distance of the arm from itself and from the floor, m.
     pub clearance_m: f64,
+    /// Share of the largest torque of a joint that the nominal model may need.
+    pub torque_share: f64,
     /// Rate at which a motion is checked, Hz.
     pub check_rate_hz: f64,
 }
 
 impl Default for Requirements {
-    /// 2 cm, 1 kHz.
+    /// 2 cm, 90 % of the torque, 1 kHz.
     fn default() -> Self {
-        Self { clearance_m: 0.02, check_rate_hz: 1000.0 }
+        Self { clearance_m: 0.02, torque_share: 0.9, check_rate_hz: 1000.0 }
     }
 }
 
@@ -38,6 +41,11 @@ pub enum LimitKind {
     },
     /// Joint acceleration, rad/s².
     Acceleration {
+        /// The joint.
+        joint: usize,
+    },
+    /// Torque of the nominal model, Nm.
+    Torque {
         /// The joint.
         joint: usize,
     },
@@ -62,6 +70,7 @@ impl LimitKind {
             Self::Position { .. } => "rad",
             Self::Velocity { .. } => "rad/s",
             Self::Acceleration { .. } => "rad/s²",
+            Self::Torque { .. } => "Nm",
             Self::Clearance { .. } | Self::Floor { .. } => "m",
         }
     }
@@ -73,6 +82,7 @@ impl fmt::Display for LimitKind {
             Self::Position { joint } => write!(f, "position of joint {}", joint + 1),
             Self::Velocity { joint } => write!(f, "velocity of joint {}", joint + 1),
             Self::Acceleration { joint } => write!(f, "acceleration of joint {}", joint + 1),
+            Self::Torque { joint } => write!(f, "torque of joint {}", joint + 1),
             Self::Clearance { one, other } => write!(f, "clearance of {one} and {other}"),
             Self::Floor { capsule } => write!(f, "clearance of {capsule} and floor"),
         }
@@ -86,8 +96,8 @@ pub struct Margin {
     pub limit: LimitKind,
     /// What is left in the limit's unit; negative where it is passed.
     pub free: f64,
-    /// `free` as a fraction of the bound: of half the range of a position, of the largest velocity or
-    /// acceleration, of 0.1 m for a distance.
+    /// `free` as a fraction of the bound: of half the range of a position, of the largest velocity,
+    /// acceleration or torque, of 0.1 m for a distance.
     pub share: f64,
     /// When it is least, s.
     pub time_s: f64,
@@ -110,7 +120,7 @@ pub struct Margins {
 }
 
 impl Margins {
-    /// Position, velocity and acceleration joint by joint, then the distances.
+    /// Position, velocity, acceleration and torque joint by joint, then the distances.
     pub fn all(&self) -> &[Margin] {
         &self.all
     }
@@ -122,7 +132,7 @@ impl Margins {
 
     /// The limit with the smallest share left.
     pub fn worst(&self) -> &Margin {
-        // An arm has at least one joint, so there are at least three margins.
+        // An arm has at least one joint, so there are at least four margins.
         self.all.iter().min_by(|a, b| a.share.total_cmp(&b.share)).unwrap_or(&self.all[0])
     }
 }
@@ -143,20 +153,27 @@ pub fn check(
         return Err(ExcitationError::WrongArm { trajectory, arm, dof });
     }
     for (what, value) in
-        [("clearance", requirements.clearance_m), ("check rate", requirements.check_rate_hz)]
+        [("clearance", requirements.clearance_m), ("torque share", requirements.torque_share)]
     {
         if !(value >= 0.0 && value.is_finite()) {
             let what = what.to_owned();
             return Err(ExcitationError::Value { what, value, must: "finite and not negative" });
         }
     }
+    if !(requirements.check_rate_hz > 0.0 && requirements.check_rate_hz.is_finite()) {
+        let (what, value) = ("check rate".to_owned(), requirements.check_rate_hz);
+        return Err(ExcitationError::Value { what, value, must: "positive" });
+    }
+    let model = Model::new(arm);
+    let mut dynamics = Workspace::new(&model);
     let clearance = ClearanceModel::new(arm);
     let mut ws = clearance.workspace();
     let mut distances_m = vec![0.0; clearance.len()];
-    let joint_limits: [fn(usize) -> LimitKind; 3] = [
+    let joint_limits: [fn(usize) -> LimitKind; 4] = [
         |joint| LimitKind::Position { joint },
         |joint| LimitKind::Velocity { joint },
         |joint| LimitKind::Acceleration { joint },
+        |joint| LimitKind::Torque { joint },
     ];
     let unseen = |limit| Margin { limit, free: f64::INFINITY, share: f64::INFINITY, time_s: 0.0 };
     let mut all: Vec<Margin> = joint_limits
@@ -166,11 +183,13 @@ pub fn check(
         .collect();
 
     let (mut q, mut qd, mut qdd) = (vec![0.0; dof], vec![0.0; dof], vec![0.0; dof]);
+    let mut torque_nm = vec![0.0; dof];
     let steps = (motion.duration_s() * requirements.check_rate_hz).ceil().max(1.0) as usize;
     for k in 0..=steps {
         let t_s = motion.duration_s() * k as f64 / steps as f64;
         motion.sample(t_s, &mut q, &mut qd, &mut qdd);
         clearance.distances(&mut ws, &q, &mut distances_m);
+        inverse_dynamics(&model, &mut dynamics, &q, &qd, &qdd, &mut torque_nm);
         let mut note = |index: usize, free: f64, full: f64| {
             let margin = &mut all[index];
             if free < margin.free {
@@ -185,9 +204,11 @@ pub fn check(
             note(dof + j, v - qd[j].abs(), v);
             let a = limits.acceleration_rad_s2;
             note(2 * dof + j, a - qdd[j].abs(), a);
+            let free = requirements.torque_share * limits.torque_nm - torque_nm[j].abs();
+            note(3 * dof + j, free, limits.torque_nm);
         }
         for (c, d) in distances_m.iter().enumerate() {
-            note(3 * dof + c, d - requirements.clearance_m, CLEARANCE_SCALE_M);
+            note(4 * dof + c, d - requirements.clearance_m, CLEARANCE_SCALE_M);
         }
     }
     Ok(Margins { all })

@@ -6,7 +6,9 @@
 //! [`Margins`] it keeps from every limit.
 
 mod clearance;
+pub mod design;
 mod error;
+pub mod export;
 mod fourier;
 mod limits;
 mod reference;

@@ -4,6 +4,7 @@
 //! without network or scripts, and [`json`] documents that name program, command, seed and inputs.
 
 mod error;
+pub mod excitation;
 pub mod json;
 pub mod montecarlo;
 pub mod number;

@@ -1,0 +1,413 @@
+//! `armid excite`: design an excitation and write it for people, programs and the robot.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use serde::Serialize;
+use thiserror::Error as ThisError;
+
+use super::{CommandResult, Outcome, Progress, interrupt_flag, prior};
+use crate::base::{BaseSet, Parameterisation};
+use crate::excitation::design::{
+    self, Budget, Criterion, Design, DesignError, Experiment, Specification, Variables,
+};
+use crate::excitation::export::{Playback, urscript, write_csv};
+use crate::excitation::{Requirements, TRAJECTORY_SCHEMA};
+use crate::output::{check_writable, write_atomically};
+use crate::report::excitation::page;
+use crate::report::json::{Document, Input, Program};
+use crate::robot::{Arm, Joint};
+
+/// Design the motion that tells most about the parameters, inside all limits.
+#[derive(Debug, Args)]
+pub struct ExciteArgs {
+    /// Robot: a built-in name, a .urdf or a .toml file.
+    #[arg(long)]
+    robot: String,
+    /// d: volume of the confidence ellipsoid; a: mean relative variance; e: worst combination;
+    /// cond: condition of the information matrix (the paper's); scaled: the same, columns of unit length.
+    #[arg(long, value_enum, default_value = "d")]
+    criterion: CriterionName,
+    /// Order of the Fourier series.
+    #[arg(long, default_value_t = 5)]
+    order: usize,
+    /// Period, s.
+    #[arg(long = "period", value_name = "S", default_value_t = 10.0)]
+    period_s: f64,
+    /// Let the base frequency be free, with periods between these, s: LOW,HIGH.
+    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 1)]
+    period_range: Option<Vec<f64>>,
+    /// Fix offsets, rad, joint by joint: `free` or a number, such as 0,-1.5708,0,0,0,free.
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    offsets: Option<String>,
+    /// Start and end every period at rest.
+    #[arg(long)]
+    rest_start: bool,
+    /// Smallest distance of the arm from itself and the floor, m.
+    #[arg(long = "clearance", value_name = "M", default_value_t = 0.02)]
+    clearance_m: f64,
+    /// Share of the torque limits the nominal model may need.
+    #[arg(long, value_name = "0…1", default_value_t = 0.9)]
+    torque_share: f64,
+    /// Torque noise per joint, Nm; without it 0.6 % of the torque limits.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', num_args = 1)]
+    noise_nm: Option<Vec<f64>>,
+    /// Length of the data that will be recorded, s.
+    #[arg(long = "data", value_name = "S", default_value_t = 80.0)]
+    data_s: f64,
+    /// Rate of the data and of the CSV, Hz.
+    #[arg(long = "rate", value_name = "HZ", default_value_t = 125.0)]
+    rate_hz: f64,
+    /// Result of an earlier identification: design for what is still poorly known.
+    #[arg(long, value_name = "RESULT.json")]
+    prior: Option<PathBuf>,
+    /// Random starts.
+    #[arg(long, default_value_t = 48)]
+    starts: usize,
+    /// Starts taken to the end.
+    #[arg(long, default_value_t = 4)]
+    finalists: usize,
+    /// Seed of the starts.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Stop after this time and keep the best design so far, s.
+    #[arg(long = "seconds", value_name = "S", default_value_t = 120.0)]
+    seconds: f64,
+    /// Threads; 0: all cores. The result does not depend on it.
+    #[arg(long, default_value_t = 0)]
+    threads: u16,
+    /// Trajectory file, for `simulate` and `montecarlo`.
+    #[arg(long, value_name = "FILE.json")]
+    out: PathBuf,
+    /// Samples of the whole motion.
+    #[arg(long, value_name = "FILE.csv")]
+    csv: Option<PathBuf>,
+    /// Program for a Universal Robots controller.
+    #[arg(long, value_name = "FILE.script")]
+    urscript: Option<PathBuf>,
+    /// Playback speed of the URScript program as a fraction of the designed one.
+    #[arg(long, value_name = "0…1", default_value_t = 1.0)]
+    speed: f64,
+    /// Report page.
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+}
+
+/// Criteria by their names on the command line.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum CriterionName {
+    D,
+    A,
+    E,
+    Cond,
+    Scaled,
+}
+
+impl From<CriterionName> for Criterion {
+    fn from(name: CriterionName) -> Self {
+        match name {
+            CriterionName::D => Self::D,
+            CriterionName::A => Self::A,
+            CriterionName::E => Self::E,
+            CriterionName::Cond => Self::Cond,
+            CriterionName::Scaled => Self::Scaled,
+        }
+    }
+}
+
+/// An option that makes no sense.
+#[derive(Debug, ThisError)]
+#[error("--{option} {value}: {message}")]
+struct BadOption {
+    option: &'static str,
+    value: String,
+    message: String,
+}
+
+/// The design block of a trajectory file.
+#[derive(Serialize)]
+struct Record<'a> {
+    period_s: f64,
+    q0_rad: &'a [f64],
+    a_rad_s: &'a [Vec<f64>],
+    b_rad_s: &'a [Vec<f64>],
+    design: DesignRecord,
+}
+
+#[derive(Serialize)]
+struct DesignRecord {
+    robot: String,
+    criterion: Criterion,
+    value: f64,
+    condition: f64,
+    scaled_condition: f64,
+    geometric_mean_sigma: f64,
+    relative_sigma_median: f64,
+    relative_sigma_90: f64,
+    run_in_s: f64,
+    periods: usize,
+    start_rad: Vec<f64>,
+    margins: Vec<MarginRecord>,
+    starts: usize,
+    feasible_starts: usize,
+    finalists: Vec<FinalistRecord>,
+    evaluations: usize,
+    cut_short: bool,
+    seconds: f64,
+}
+
+#[derive(Serialize)]
+struct MarginRecord {
+    limit: String,
+    free: f64,
+    unit: &'static str,
+    time_s: f64,
+}
+
+#[derive(Serialize)]
+struct FinalistRecord {
+    start: usize,
+    value: f64,
+}
+
+/// Designs, prints what was found, and writes it.
+pub fn run(args: &ExciteArgs) -> CommandResult {
+    let arm = Arm::load(&args.robot)?;
+    let base = BaseSet::find(&arm, Parameterisation::full(arm.dof(), false))?;
+    let spec = specification(args, &arm, &base)?;
+    let outputs =
+        [Some(&args.out), args.csv.as_ref(), args.urscript.as_ref(), args.report.as_ref()];
+    for path in outputs.into_iter().flatten() {
+        check_writable(path)?;
+    }
+    let robot_file = Path::new(&args.robot);
+    let read = args.prior.as_deref().into_iter().chain(robot_file.extension().map(|_| robot_file));
+    let inputs = read.map(Input::of).collect::<Result<Vec<_>, _>>()?;
+    let program = Program::new(std::env::args(), Some(args.seed), inputs);
+
+    let begun = Instant::now();
+    let budget = Budget {
+        deadline: begun.checked_add(Duration::from_secs_f64(args.seconds)),
+        stop: interrupt_flag(),
+    };
+    let rounds = Rounds { criterion: spec.criterion, current: Mutex::new(None) };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.into()).build()?;
+    let found = pool.install(|| design::design(&arm, &base, &spec, &budget, &|p| rounds.report(p)));
+    let found = match found {
+        Err(e @ (DesignError::Infeasible { .. } | DesignError::CheckFailed { .. })) => {
+            eprintln!("no design: {e}; nothing was written");
+            return Ok(Outcome::Negative);
+        }
+        other => other?,
+    };
+    let seconds = begun.elapsed().as_secs_f64();
+    print_summary(&base, &spec, &found, seconds);
+    write_outputs(args, (&arm, &base, &spec), &found, &program, seconds)?;
+    Ok(Outcome::Done)
+}
+
+fn specification(
+    args: &ExciteArgs,
+    arm: &Arm,
+    base: &BaseSet,
+) -> Result<Specification, Box<dyn Error>> {
+    if !(args.seconds > 0.0 && args.seconds.is_finite()) {
+        return Err(BadOption {
+            option: "seconds",
+            value: args.seconds.to_string(),
+            message: "must be positive".into(),
+        }
+        .into());
+    }
+    if !(args.speed > 0.0 && args.speed <= 1.0) {
+        return Err(BadOption {
+            option: "speed",
+            value: args.speed.to_string(),
+            message: "must be in (0, 1]".into(),
+        }
+        .into());
+    }
+    let period_range_s = match args.period_range.as_deref() {
+        None => None,
+        Some([low, high]) => Some([*low, *high]),
+        Some(other) => {
+            return Err(BadOption {
+                option: "period-range",
+                value: format!("{other:?}"),
+                message: "two numbers LOW,HIGH are expected".into(),
+            }
+            .into());
+        }
+    };
+    let noise_of_limit = |j: &Joint| 0.006 * j.limits.torque_nm;
+    let spec = Specification {
+        criterion: args.criterion.into(),
+        variables: Variables {
+            order: args.order,
+            period_s: args.period_s,
+            period_range_s,
+            fixed_offsets_rad: offsets(args.offsets.as_deref(), arm.dof())?,
+            rest_start: args.rest_start,
+        },
+        requirements: Requirements {
+            clearance_m: args.clearance_m,
+            torque_share: args.torque_share,
+            ..Requirements::default()
+        },
+        experiment: Experiment {
+            data_s: args.data_s,
+            rate_hz: args.rate_hz,
+            torque_noise_nm: match &args.noise_nm {
+                Some(list) => list.clone(),
+                None => arm.joints.iter().map(noise_of_limit).collect(),
+            },
+        },
+        prior_sigma: match &args.prior {
+            Some(path) => Some(prior::sigmas(path, arm, base)?),
+            None => None,
+        },
+        starts: args.starts,
+        finalists: args.finalists,
+        seed: args.seed,
+    };
+    spec.check(arm)?;
+    Ok(spec)
+}
+
+/// `free` or a number per joint; nothing given: all free.
+fn offsets(list: Option<&str>, dof: usize) -> Result<Vec<Option<f64>>, BadOption> {
+    let Some(list) = list else { return Ok(vec![None; dof]) };
+    list.split(',')
+        .map(|word| match word.trim() {
+            "free" => Ok(None),
+            number => number.parse().map(Some).map_err(|_| BadOption {
+                option: "offsets",
+                value: list.to_owned(),
+                message: format!("\"{number}\" is neither a number nor `free`"),
+            }),
+        })
+        .collect()
+}
+
+/// One bar per round, and a line with the best design when a round ends.
+struct Rounds {
+    criterion: Criterion,
+    current: Mutex<Option<(usize, Progress)>>,
+}
+
+impl Rounds {
+    fn report(&self, p: design::Progress) {
+        let mut current = self.current.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        if current.as_ref().is_none_or(|(round, _)| *round != p.round) {
+            *current = Some((p.round, Progress::new("designs", p.of as u64)));
+        }
+        let Some((round, bar)) = current.as_ref() else { return };
+        bar.reached(p.done as u64);
+        if p.done == p.of {
+            bar.finish();
+            eprintln!("round {round}: best {}", self.criterion.in_words(p.best));
+        }
+    }
+}
+
+fn print_summary(base: &BaseSet, spec: &Specification, found: &Design, seconds: f64) {
+    let p = &found.prediction;
+    println!(
+        "cond(ΘᵀΘ) {:.1}, columns scaled {:.2}; predicted over {} s: geometric mean σ {:.6}, relative σ \
+         median {:.2} %, 90th percentile {:.2} %",
+        p.condition,
+        p.scaled_condition,
+        spec.experiment.data_s,
+        p.geometric_mean_sigma(),
+        100.0 * p.relative_quantile(0.5),
+        100.0 * p.relative_quantile(0.9),
+    );
+    println!("{} base parameters; margins left (least first):", base.rank());
+    let mut margins: Vec<_> = found.margins.all().iter().collect();
+    margins.sort_by(|a, b| a.share.total_cmp(&b.share));
+    for margin in margins {
+        println!(
+            "  {:<38} {:>16}  at {:8.3} s",
+            margin.limit.to_string(),
+            margin.in_words(),
+            margin.time_s
+        );
+    }
+    println!(
+        "{} of {} starts feasible, {} evaluations, {seconds:.1} s{}",
+        found.feasible_starts,
+        found.starts,
+        found.evaluations,
+        if found.cut_short { ", cut short: another run may end elsewhere" } else { "" }
+    );
+}
+
+fn write_outputs(
+    args: &ExciteArgs,
+    (arm, base, spec): (&Arm, &BaseSet, &Specification),
+    found: &Design,
+    program: &Program,
+    seconds: f64,
+) -> Result<(), Box<dyn Error>> {
+    let p = &found.prediction;
+    let series = found.excitation.series();
+    let record = Record {
+        period_s: series.period_s,
+        q0_rad: &series.q0_rad,
+        a_rad_s: &series.a_rad_s,
+        b_rad_s: &series.b_rad_s,
+        design: DesignRecord {
+            robot: arm.name.clone(),
+            criterion: spec.criterion,
+            value: found.value,
+            condition: p.condition,
+            scaled_condition: p.scaled_condition,
+            geometric_mean_sigma: p.geometric_mean_sigma(),
+            relative_sigma_median: p.relative_quantile(0.5),
+            relative_sigma_90: p.relative_quantile(0.9),
+            run_in_s: found.excitation.run_in_s(),
+            periods: found.excitation.periods(),
+            start_rad: found.excitation.start_rad(),
+            margins: found
+                .margins
+                .all()
+                .iter()
+                .map(|m| MarginRecord {
+                    limit: m.limit.to_string(),
+                    free: m.free,
+                    unit: m.limit.unit(),
+                    time_s: m.time_s,
+                })
+                .collect(),
+            starts: found.starts,
+            feasible_starts: found.feasible_starts,
+            finalists: found
+                .finalists
+                .iter()
+                .map(|f| FinalistRecord { start: f.start, value: f.value })
+                .collect(),
+            evaluations: found.evaluations,
+            cut_short: found.cut_short,
+            seconds,
+        },
+    };
+    let text = Document { schema: TRAJECTORY_SCHEMA, program, body: &record }.to_json()?;
+    write_atomically(&args.out, |out| out.write_all(text.as_bytes()))?;
+    if let Some(path) = &args.csv {
+        write_atomically(path, |out| write_csv(out, &found.excitation, args.rate_hz))?;
+    }
+    if let Some(path) = &args.urscript {
+        let playback =
+            Playback { cycle_s: 1.0 / args.rate_hz, speed: args.speed, approach_rad_s: 0.3 };
+        let script = urscript(&found.excitation, &playback);
+        write_atomically(path, |out| out.write_all(script.as_bytes()))?;
+    }
+    if let Some(path) = &args.report {
+        let html = page(arm, base, spec, found, program.clone())?.to_html()?;
+        write_atomically(path, |out| out.write_all(html.as_bytes()))?;
+    }
+    Ok(())
+}

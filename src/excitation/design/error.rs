@@ -1,0 +1,79 @@
+//! Why there is no design.
+
+use thiserror::Error;
+
+use crate::base::{AmbiguousRank, ParameterisationError};
+use crate::excitation::ExcitationError;
+
+/// A specification that cannot be met or makes no sense.
+#[derive(Debug, Error)]
+pub enum DesignError {
+    /// A number outside what is possible.
+    #[error("{what} = {value} must be {must}")]
+    Value {
+        /// Which quantity.
+        what: String,
+        /// Its value.
+        value: f64,
+        /// What is allowed.
+        must: String,
+    },
+    /// One number per joint is needed.
+    #[error("{what}: {found} values, but \"{arm}\" has {dof} joints")]
+    Length {
+        /// Which list.
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+        /// Name of the arm.
+        arm: String,
+        /// How many there must be.
+        dof: usize,
+    },
+    /// Fixed offsets at which the arm may not even stand.
+    #[error("the fixed offsets are no pose the arm may take: {limit} is short by {short}")]
+    FixedPose {
+        /// The limit that is passed.
+        limit: String,
+        /// By how much, with its unit.
+        short: String,
+    },
+    /// What is known already belongs to another model.
+    #[error("{file}: {message}")]
+    Prior {
+        /// The file.
+        file: String,
+        /// What does not fit.
+        message: String,
+    },
+    /// None of the starts became a motion inside the limits.
+    #[error(
+        "no motion inside the limits was found from {starts} starts: ask for less clearance ({clearance_m} m), \
+         free the offsets, or look at the limits of \"{arm}\""
+    )]
+    Infeasible {
+        /// How many were tried.
+        starts: usize,
+        /// Clearance asked for.
+        clearance_m: f64,
+        /// Name of the arm.
+        arm: String,
+    },
+    /// Designs were found, but none passed the check on the fine grid together with a run-in.
+    #[error("{candidates} designs were found, none of which passes the final check: {last}")]
+    CheckFailed {
+        /// How many.
+        candidates: usize,
+        /// Why the last one failed.
+        last: String,
+    },
+    /// From the trajectory.
+    #[error(transparent)]
+    Excitation(#[from] ExcitationError),
+    /// From the base parameters.
+    #[error(transparent)]
+    Rank(#[from] AmbiguousRank),
+    /// From the parameterisation.
+    #[error(transparent)]
+    Parameterisation(#[from] ParameterisationError),
+}

@@ -1,0 +1,122 @@
+//! What an experiment will tell, before it is run.
+
+use faer::linalg::solvers::DenseSolveCore;
+use faer::{Mat, Side};
+
+use super::criterion::{condition, congruent, equilibration};
+use super::information::Information;
+use crate::base::BaseSet;
+use crate::dynamics::{Model, Motion};
+use crate::excitation::{FourierSeries, Reference};
+
+/// The data an experiment gives: its length, rate and torque noise.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Experiment {
+    /// Length of the periodic motion that is recorded, s.
+    pub data_s: f64,
+    /// Sampling rate, Hz.
+    pub rate_hz: f64,
+    /// Standard deviation of the white torque noise, joint by joint, Nm.
+    pub torque_noise_nm: Vec<f64>,
+}
+
+impl Experiment {
+    /// Number of samples.
+    pub fn samples(&self) -> f64 {
+        self.data_s * self.rate_hz
+    }
+
+    /// 1/σ_j².
+    pub(super) fn weights(&self) -> Vec<f64> {
+        self.torque_noise_nm.iter().map(|sigma| 1.0 / (sigma * sigma)).collect()
+    }
+}
+
+/// Predicted standard deviations of the base parameters and the condition numbers of one motion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prediction {
+    /// Standard deviation of every base parameter by weighted least squares, in its unit:
+    /// σ_i = sqrt([(Θ_BᵀWΘ_B)⁻¹]_ii), the paper's (20) with the noise in it.
+    pub sigma: Vec<f64>,
+    /// σ_i / |θ_i| with the arm's own parameters θ; infinite where θ_i is zero (symmetric bodies have
+    /// moments that vanish).
+    pub relative_sigma: Vec<f64>,
+    /// cond(Θ_BᵀΘ_B), the paper's (22).
+    pub condition: f64,
+    /// The same with columns of unit length.
+    pub scaled_condition: f64,
+}
+
+impl Prediction {
+    /// Of `series` played over and over, sampled over one period at the experiment's rate; `None` if
+    /// it leaves some base parameter undetermined.
+    pub fn of(
+        model: &Model,
+        base: &BaseSet,
+        experiment: &Experiment,
+        series: &FourierSeries,
+        prior: Option<&Mat<f64>>,
+    ) -> Option<Self> {
+        let samples = (series.period_s * experiment.rate_hz).round().max(1.0) as usize;
+        let motion = sampled(series, samples);
+        let mut torque_nm = vec![0.0; model.dof() * samples];
+        let mut per_sample = |weights: Vec<f64>| {
+            let information = Information::new(model, base, weights);
+            information.evaluate(&mut information.workspace(samples), &motion, &mut torque_nm)
+        };
+        let raw = per_sample(vec![1.0; model.dof()]);
+        let whitened = per_sample(experiment.weights());
+        let total = Mat::from_fn(base.rank(), base.rank(), |i, k| {
+            whitened[(i, k)] * experiment.samples() + prior.map_or(0.0, |p| p[(i, k)])
+        });
+        // Columns of very different size are brought to one before the inverse is formed.
+        let scales = equilibration(&total)?;
+        let inverse = congruent(&total, &scales).llt(Side::Lower).ok()?.inverse();
+        let sigma: Vec<f64> =
+            (0..base.rank()).map(|i| scales[i] * inverse[(i, i)].sqrt()).collect();
+        let theta = base.values(&model.standard_parameters());
+        let largest = theta.iter().fold(0.0, |m: f64, t| m.max(t.abs()));
+        let zero = |t: f64| t.abs() <= 1e-12 * largest;
+        Some(Self {
+            relative_sigma: (0..base.rank())
+                .map(|i| if zero(theta[i]) { f64::INFINITY } else { sigma[i] / theta[i].abs() })
+                .collect(),
+            sigma,
+            condition: condition(&raw)?,
+            scaled_condition: condition(&congruent(&raw, &equilibration(&raw)?))?,
+        })
+    }
+
+    /// Geometric mean of the σ. It mixes units, so it only compares designs for one arm.
+    pub fn geometric_mean_sigma(&self) -> f64 {
+        (self.sigma.iter().map(|s| s.ln()).sum::<f64>() / self.sigma.len() as f64).exp()
+    }
+
+    /// The `fraction` quantile of the relative σ (linear between order statistics) of the parameters
+    /// that are not zero.
+    pub fn relative_quantile(&self, fraction: f64) -> f64 {
+        let mut sorted = self.relative_sigma.clone();
+        sorted.retain(|r| r.is_finite());
+        sorted.sort_by(f64::total_cmp);
+        if sorted.is_empty() {
+            return f64::NAN;
+        }
+        let at = fraction * (sorted.len() - 1) as f64;
+        let low = sorted[at.floor() as usize];
+        low + (sorted[at.ceil() as usize] - low) * at.fract()
+    }
+}
+
+/// `samples` equidistant samples of one period.
+pub(super) fn sampled(series: &FourierSeries, samples: usize) -> Motion {
+    let n = series.joints();
+    let mut motion = Motion::at_rest(n, samples);
+    let (mut q, mut qd, mut qdd) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    for k in 0..samples {
+        series.sample(series.period_s * k as f64 / samples as f64, &mut q, &mut qd, &mut qdd);
+        motion.q_rad.set_sample(k, &q);
+        motion.qd_rad_s.set_sample(k, &qd);
+        motion.qdd_rad_s2.set_sample(k, &qdd);
+    }
+    motion
+}

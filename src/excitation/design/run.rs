@@ -1,0 +1,273 @@
+//! From a specification to a design that passed its check.
+
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use faer::Mat;
+
+use super::barrier::LimitBarrier;
+use super::error::DesignError;
+use super::information::Information;
+use super::interior_point::Stage;
+use super::prediction::Prediction;
+use super::problem::Problem;
+use super::search::{Candidate, Effort, Progress, Round, search};
+use super::space::DesignSpace;
+use super::specification::Specification;
+use crate::base::BaseSet;
+use crate::dynamics::{Model, Workspace, inverse_dynamics};
+use crate::excitation::{
+    ClearanceModel, Excitation, ExcitationError, FourierSeries, Margins, Reference, check,
+};
+use crate::robot::Arm;
+
+/// A design that passed its check on the fine grid, run-in and run-out included.
+#[derive(Debug, Clone)]
+pub struct Design {
+    /// The motion: run-in, periods to cover the experiment's data, run-out.
+    pub excitation: Excitation,
+    /// Value of the criterion (a logarithm, see [`super::Criterion`]) on the optimiser's grid.
+    pub value: f64,
+    /// What the experiment will tell.
+    pub prediction: Prediction,
+    /// What the motion leaves free.
+    pub margins: Margins,
+    /// Finalists, best first.
+    pub finalists: Vec<Finalist>,
+    /// Starts tried.
+    pub starts: usize,
+    /// Starts that became a motion inside the limits.
+    pub feasible_starts: usize,
+    /// Points evaluated (criterion, limits and their derivatives).
+    pub evaluations: usize,
+    /// Whether time or the user ended the search; if not, the result depends on the seed alone.
+    pub cut_short: bool,
+}
+
+/// One design that was taken to the end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Finalist {
+    /// The start it came from.
+    pub start: usize,
+    /// Value of the criterion.
+    pub value: f64,
+}
+
+/// When a search ends before its work is done.
+#[derive(Debug)]
+pub struct Budget<'a> {
+    /// At this time.
+    pub deadline: Option<Instant>,
+    /// Once this is set.
+    pub stop: &'a AtomicBool,
+}
+
+/// Samples per period of the fastest harmonic: first, middle and last round.
+const GRIDS: [usize; 3] = [20, 24, 48];
+
+fn rounds(spec: &Specification) -> Vec<Round> {
+    let stage = |mu: f64, sharpness: f64, steps: usize| Stage { mu, sharpness, steps };
+    let samples = |grid: usize| (spec.variables.order * grid).max(48);
+    let halfway = spec.finalists.max(spec.starts.div_ceil(4));
+    vec![
+        Round {
+            survivors: spec.starts,
+            samples: samples(GRIDS[0]),
+            stages: vec![stage(1.0, 4.0, 15), stage(0.3, 6.0, 25), stage(0.1, 8.0, 40)],
+        },
+        Round {
+            survivors: halfway,
+            samples: samples(GRIDS[1]),
+            stages: vec![stage(0.03, 12.0, 80), stage(0.01, 20.0, 80)],
+        },
+        Round {
+            survivors: spec.finalists,
+            samples: samples(GRIDS[2]),
+            stages: vec![stage(0.01, 20.0, 60), stage(0.003, 40.0, 120), stage(0.001, 80.0, 200)],
+        },
+    ]
+}
+
+/// Scale of every base parameter for the relative criteria: its own size, but at least a thousandth
+/// of the largest of the same unit, so that what is nearly zero does not rule the design.
+pub fn parameter_scales(base: &BaseSet, theta: &[f64]) -> Vec<f64> {
+    const FLOOR: f64 = 1e-3;
+    (0..base.rank())
+        .map(|i| {
+            let same = (0..base.rank()).filter(|&k| base.unit(k) == base.unit(i));
+            let largest = same.map(|k| theta[k].abs()).fold(0.0, f64::max);
+            theta[i].abs().max(FLOOR * largest).max(f64::MIN_POSITIVE)
+        })
+        .collect()
+}
+
+/// Designs a motion for `arm` that tells most about the parameters of `base`.
+///
+/// # Errors
+/// A specification that makes no sense, or no feasible motion: then there is no design to return.
+pub fn design(
+    arm: &Arm,
+    base: &BaseSet,
+    spec: &Specification,
+    budget: &Budget,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Design, DesignError> {
+    spec.check(arm)?;
+    let model = Model::new(arm);
+    let scales = parameter_scales(base, &base.values(&model.standard_parameters()));
+    let weights =
+        if spec.criterion.whitened() { spec.experiment.weights() } else { vec![1.0; arm.dof()] };
+    let prior = spec.prior_sigma.as_ref().map(|sigma| prior_information(base, sigma));
+    let per_sample = prior.as_ref().map(|p| {
+        let samples = spec.experiment.samples();
+        Mat::from_fn(p.nrows(), p.ncols(), |i, k| p[(i, k)] / samples)
+    });
+    let information = Information::new(&model, base, weights);
+    let barrier = LimitBarrier::new(arm, &spec.requirements, ClearanceModel::new(arm));
+    let torque_nm =
+        arm.joints.iter().map(|j| spec.requirements.torque_share * j.limits.torque_nm).collect();
+    let problem = Problem {
+        space: DesignSpace::new(spec.variables.clone(), 8),
+        information,
+        criterion: spec.criterion,
+        scales,
+        prior: per_sample.filter(|_| spec.criterion.whitened()),
+        barrier,
+        torque_nm,
+    };
+    let at = |samples: usize| Problem {
+        space: DesignSpace::new(spec.variables.clone(), samples),
+        ..problem.clone()
+    };
+    let effort = Effort {
+        starts: spec.starts,
+        seed: spec.seed,
+        deadline: budget.deadline,
+        stop: budget.stop,
+    };
+    let found = search(arm, at, &effort, &rounds(spec), progress);
+    if found.candidates.is_empty() {
+        return Err(DesignError::Infeasible {
+            starts: spec.starts,
+            clearance_m: spec.requirements.clearance_m,
+            arm: arm.name.clone(),
+        });
+    }
+    let mut last = String::new();
+    for candidate in &found.candidates {
+        match finish(arm, spec, &problem.space, candidate) {
+            Err(DesignError::Excitation(e)) => last = e.to_string(),
+            Err(e) => return Err(e),
+            Ok((excitation, margins)) => {
+                let series = excitation.series();
+                let prediction =
+                    Prediction::of(&model, base, &spec.experiment, series, prior.as_ref());
+                let Some(prediction) = prediction else {
+                    last = "it leaves a parameter undetermined".into();
+                    continue;
+                };
+                let finalists = found.candidates.iter().take(spec.finalists);
+                return Ok(Design {
+                    excitation,
+                    value: candidate.value,
+                    prediction,
+                    margins,
+                    finalists: finalists
+                        .map(|c| Finalist { start: c.start, value: c.value })
+                        .collect(),
+                    starts: spec.starts,
+                    feasible_starts: found.feasible_starts,
+                    evaluations: found.evaluations,
+                    cut_short: found.cut_short,
+                });
+            }
+        }
+    }
+    Err(DesignError::CheckFailed { candidates: found.candidates.len(), last })
+}
+
+/// diag(1/σ²). A result file states no correlations, so the prior has none.
+fn prior_information(base: &BaseSet, sigma: &[f64]) -> Mat<f64> {
+    Mat::from_fn(
+        base.rank(),
+        base.rank(),
+        |i, k| if i == k { 1.0 / (sigma[i] * sigma[i]) } else { 0.0 },
+    )
+}
+
+/// The candidate made ready to run: shrunk by a trifle if the fine grid finds it outside, started at
+/// its calmest moment, with run-in and run-out; and checked as a whole.
+fn finish(
+    arm: &Arm,
+    spec: &Specification,
+    space: &DesignSpace,
+    candidate: &Candidate,
+) -> Result<(Excitation, Margins), DesignError> {
+    const SHRINK: f64 = 0.998;
+    const ATTEMPTS: usize = 15;
+    let mut x = candidate.x.as_slice().to_vec();
+    for _ in 0..ATTEMPTS {
+        if check(arm, &spec.requirements, &space.series(&x))?.feasible() {
+            break;
+        }
+        x = space.scaled(&x, SHRINK);
+    }
+    let series = space.series(&x);
+    let periods = (spec.experiment.data_s / series.period_s).round().max(1.0) as usize;
+    let mut failure = None;
+    for shift_s in calm_moments(arm, spec, &series) {
+        let begun = series.shifted(shift_s);
+        match Excitation::fitted(arm, &spec.requirements, begun, periods, true) {
+            Ok(excitation) => {
+                let margins = check(arm, &spec.requirements, &excitation)?;
+                return Ok((excitation, margins));
+            }
+            Err(e @ ExcitationError::NoRunIn { .. }) => failure = Some(e),
+            Err(e) => return Err(e.into()),
+        }
+    }
+    let shortfall = DesignError::CheckFailed { candidates: 1, last: String::new() };
+    Err(failure.map_or(shortfall, DesignError::from))
+}
+
+/// Times of the period at which the motion may start: only 0 for a motion through rest, otherwise
+/// the moments of least speed and acceleration first, some way apart.
+fn calm_moments(arm: &Arm, spec: &Specification, series: &FourierSeries) -> Vec<f64> {
+    const MOMENTS: usize = 200;
+    const TRIED: usize = 8;
+    if spec.variables.rest_start {
+        return vec![0.0];
+    }
+    let n = arm.dof();
+    let model = Model::new(arm);
+    let mut ws = Workspace::new(&model);
+    let (mut q, mut qd, mut qdd) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    let mut torque_nm = vec![0.0; n];
+    let mut moments: Vec<(f64, usize)> = (0..MOMENTS)
+        .map(|k| {
+            let t_s = series.period_s * k as f64 / MOMENTS as f64;
+            series.sample(t_s, &mut q, &mut qd, &mut qdd);
+            inverse_dynamics(&model, &mut ws, &q, &qd, &qdd, &mut torque_nm);
+            let stress = arm.joints.iter().enumerate().map(|(j, joint)| {
+                let limits = &joint.limits;
+                (qd[j] / limits.velocity_rad_s)
+                    .abs()
+                    .max((qdd[j] / limits.acceleration_rad_s2).abs())
+                    .max((torque_nm[j] / limits.torque_nm).abs())
+            });
+            (stress.fold(0.0, f64::max), k)
+        })
+        .collect();
+    moments.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut chosen: Vec<usize> = Vec::new();
+    for (_, k) in moments {
+        let far = |&c: &usize| {
+            let apart = k.abs_diff(c);
+            apart.min(MOMENTS - apart) >= MOMENTS / 20
+        };
+        if chosen.len() < TRIED && chosen.iter().all(far) {
+            chosen.push(k);
+        }
+    }
+    chosen.into_iter().map(|k| series.period_s * k as f64 / MOMENTS as f64).collect()
+}

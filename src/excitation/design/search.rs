@@ -1,0 +1,224 @@
+//! Many starts, fewer and fewer survivors.
+
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Instant;
+
+use nalgebra::DVector;
+use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
+use rayon::prelude::*;
+
+use super::interior_point::{Descent, Ending, Stage, descend};
+use super::problem::{Problem, ProblemWorkspace};
+use crate::robot::Arm;
+
+/// How much work a search does, and what may end it early.
+#[derive(Debug)]
+pub struct Effort<'a> {
+    /// Random starts.
+    pub starts: usize,
+    /// Seed of the starts; start k is the same whatever the number of starts or threads.
+    pub seed: u64,
+    /// No new work after this.
+    pub deadline: Option<Instant>,
+    /// No new work once set.
+    pub stop: &'a AtomicBool,
+}
+
+impl Effort<'_> {
+    fn over(&self) -> bool {
+        self.stop.load(Ordering::Relaxed) || self.deadline.is_some_and(|d| Instant::now() >= d)
+    }
+}
+
+/// One round of the search: the best `survivors` of the round before are taken further.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Round {
+    /// How many designs take part (of the first round: all starts).
+    pub survivors: usize,
+    /// Samples per period the limits are kept on and the information is summed over.
+    pub samples: usize,
+    /// What each of them goes through.
+    pub stages: Vec<Stage>,
+}
+
+/// How far a search is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Progress {
+    /// Round, from 1.
+    pub round: usize,
+    /// Designs of this round finished.
+    pub done: usize,
+    /// Designs of this round.
+    pub of: usize,
+    /// Best value of the criterion so far in this round (not smoothed).
+    pub best: f64,
+}
+
+/// A design that came out of a search, best first.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// Number of the start it came from.
+    pub start: usize,
+    /// The variables, in the space of the last round reached.
+    pub x: DVector<f64>,
+    /// Value of the criterion on the grid of that round, not smoothed.
+    pub value: f64,
+}
+
+/// What a search found.
+#[derive(Debug, Clone)]
+pub struct Found {
+    /// Survivors, best first.
+    pub candidates: Vec<Candidate>,
+    /// Starts for which a feasible motion was found.
+    pub feasible_starts: usize,
+    /// Points evaluated.
+    pub evaluations: usize,
+    /// Whether it was cut short by the deadline or the stop signal: then the result depends on how
+    /// fast the machine is, otherwise only on the seed.
+    pub cut_short: bool,
+}
+
+/// Runs the rounds. `problem_at(samples)` is the problem on a grid of `samples` times.
+///
+/// Every start is a function of (seed, start) alone, every descent is sequential, and survivors are
+/// chosen by value with ties by number, so the result does not depend on the number of threads.
+pub fn search(
+    arm: &Arm,
+    problem_at: impl Fn(usize) -> Problem,
+    effort: &Effort,
+    rounds: &[Round],
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Found {
+    let mut candidates: Vec<Candidate> = Vec::new();
+    let (mut feasible_starts, mut evaluations, mut cut_short) = (0, 0, false);
+    for (index, round) in rounds.iter().enumerate() {
+        let problem = problem_at(round.samples);
+        let entrants: Vec<(usize, Option<DVector<f64>>)> = if index == 0 {
+            (0..effort.starts).map(|start| (start, None)).collect()
+        } else {
+            let survivors = candidates.iter().take(round.survivors);
+            survivors.map(|c| (c.start, Some(c.x.clone()))).collect()
+        };
+        if index > 0 && entrants.is_empty() {
+            break;
+        }
+        let done = AtomicUsize::new(0);
+        let best = std::sync::Mutex::new(f64::INFINITY);
+        let of = entrants.len();
+        let results: Vec<Option<(Candidate, usize, bool)>> = entrants
+            .into_par_iter()
+            .map_init(
+                || problem.workspace(),
+                |ws, (start, x)| {
+                    // Even when time is over, the first entrants get their look at the grid, so that
+                    // there is something feasible to return.
+                    if effort.over() && index == 0 && start > 0 {
+                        return None;
+                    }
+                    let from = match x {
+                        Some(x) => x,
+                        None => random_start(arm, &problem, start as u64, effort.seed, ws)?,
+                    };
+                    let first = round.stages.first()?;
+                    let from = inside(&problem, ws, from, first)?;
+                    let descent = descend(&problem, ws, from, &round.stages, &|| effort.over())?;
+                    let Descent { x, evaluations, ending, .. } = descent;
+                    let value = problem.exact(ws, &x)?;
+                    let finished = done.fetch_add(1, Ordering::Relaxed) + 1;
+                    if let Ok(mut best) = best.lock() {
+                        *best = best.min(value);
+                        progress(Progress { round: index + 1, done: finished, of, best: *best });
+                    }
+                    let interrupted = ending == Ending::Interrupted;
+                    Some((Candidate { start, x, value }, evaluations, interrupted))
+                },
+            )
+            .collect();
+        let mut next: Vec<Candidate> = Vec::new();
+        for (candidate, used, interrupted) in results.into_iter().flatten() {
+            evaluations += used;
+            cut_short |= interrupted;
+            next.push(candidate);
+        }
+        if index == 0 {
+            feasible_starts = next.len();
+        }
+        next.sort_by(|a, b| a.value.total_cmp(&b.value).then(a.start.cmp(&b.start)));
+        if !next.is_empty() {
+            candidates = next;
+        }
+        if effort.over() {
+            cut_short = true;
+            break;
+        }
+    }
+    Found { candidates, feasible_starts, evaluations, cut_short }
+}
+
+/// `x` if it is strictly feasible in `problem`, or the largest of a few smaller motions about the
+/// same offsets that is.
+fn inside(
+    problem: &Problem,
+    ws: &mut ProblemWorkspace,
+    x: DVector<f64>,
+    stage: &Stage,
+) -> Option<DVector<f64>> {
+    let mut factor = 1.0;
+    for _ in 0..40 {
+        let candidate = DVector::from_vec(problem.space.scaled(x.as_slice(), factor));
+        if problem.point(ws, candidate.clone(), stage.mu, stage.sharpness).is_some() {
+            return Some(candidate);
+        }
+        factor *= if factor > 0.9 { 0.985 } else { 0.8 };
+    }
+    None
+}
+
+/// Poses tried for the offsets of one start.
+const POSES: usize = 200;
+
+/// A random feasible motion: a pose that keeps its distance, and random coefficients shrunk until
+/// the motion stays inside.
+fn random_start(
+    arm: &Arm,
+    problem: &Problem,
+    start: u64,
+    seed: u64,
+    ws: &mut ProblemWorkspace,
+) -> Option<DVector<f64>> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(start);
+    let space = &problem.space;
+    let stage = Stage { mu: 1.0, sharpness: 4.0, steps: 0 };
+    for _ in 0..POSES {
+        let mut series = space.series(&vec![0.0; space.count()]);
+        series.period_s = space.variables().period_s;
+        for (j, joint) in arm.joints.iter().enumerate() {
+            let limits = &joint.limits;
+            let [low, high] = limits.position_rad;
+            // Half a turn either way covers every pose; more of the range only shifts it.
+            let reach = (0.5 * (high - low)).min(std::f64::consts::PI);
+            let centre = 0.5 * (high + low);
+            series.q0_rad[j] = centre + reach * rng.random_range(-1.0..1.0);
+            let order = space.variables().order;
+            let size = limits.velocity_rad_s / (order as f64).sqrt();
+            for l in 0..order {
+                series.a_rad_s[j][l] = size * rng.random_range(-1.0..1.0);
+                series.b_rad_s[j][l] = size * rng.random_range(-1.0..1.0);
+            }
+        }
+        let x = DVector::from_vec(space.project(&series));
+        let mut factor = 1.0;
+        // Below a tenth of its size a motion is hardly a start: another pose is better.
+        while factor > 0.1 {
+            let candidate = DVector::from_vec(space.scaled(x.as_slice(), factor));
+            if problem.point(ws, candidate.clone(), stage.mu, stage.sharpness).is_some() {
+                return Some(candidate);
+            }
+            factor *= 0.75;
+        }
+    }
+    None
+}

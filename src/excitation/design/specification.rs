@@ -1,0 +1,114 @@
+//! What a design is asked for, checked before anything runs.
+
+use super::criterion::Criterion;
+use super::error::DesignError;
+use super::prediction::Experiment;
+use super::space::Variables;
+use crate::excitation::{FourierSeries, Requirements, check};
+use crate::robot::Arm;
+
+/// What a design is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Specification {
+    /// What is minimised.
+    pub criterion: Criterion,
+    /// Over which variables.
+    pub variables: Variables,
+    /// Inside which limits, beyond those of the arm.
+    pub requirements: Requirements,
+    /// For which experiment.
+    pub experiment: Experiment,
+    /// Standard deviations with which the base parameters are known already, in the order of the base
+    /// set; ∞ for what is not known.
+    pub prior_sigma: Option<Vec<f64>>,
+    /// Number of random starts.
+    pub starts: usize,
+    /// How many of them are taken to the end.
+    pub finalists: usize,
+    /// Seed of the starts.
+    pub seed: u64,
+}
+
+impl Specification {
+    /// Whether this can be asked of `arm`.
+    pub fn check(&self, arm: &Arm) -> Result<(), DesignError> {
+        let v = &self.variables;
+        positive("the period", v.period_s)?;
+        positive("the length of the data", self.experiment.data_s)?;
+        positive("the sampling rate", self.experiment.rate_hz)?;
+        at_least("the order", v.order, if v.rest_start { 2 } else { 1 })?;
+        at_least("the number of starts", self.starts, 1)?;
+        at_least("the number of finalists", self.finalists, 1)?;
+        if let Some([low, high]) = v.period_range_s {
+            positive("the shortest period", low)?;
+            if !(low..=high).contains(&v.period_s) || low >= high {
+                return Err(DesignError::Value {
+                    what: "the period".into(),
+                    value: v.period_s,
+                    must: format!("inside its range of {low} … {high} s"),
+                });
+            }
+        }
+        let share = self.requirements.torque_share;
+        if !(share > 0.0 && share <= 1.0) {
+            let what = "the share of the torque".to_owned();
+            return Err(DesignError::Value { what, value: share, must: "in (0, 1]".into() });
+        }
+        per_joint(arm, "torque noise", self.experiment.torque_noise_nm.len())?;
+        for (j, &sigma) in self.experiment.torque_noise_nm.iter().enumerate() {
+            positive(&format!("the torque noise of joint {}", j + 1), sigma)?;
+        }
+        per_joint(arm, "offsets", v.fixed_offsets_rad.len())?;
+        for (j, (offset, joint)) in v.fixed_offsets_rad.iter().zip(&arm.joints).enumerate() {
+            let [low, high] = joint.limits.position_rad;
+            if let Some(value) = *offset
+                && !(low..=high).contains(&value)
+            {
+                return Err(DesignError::Value {
+                    what: format!("the offset of joint {}", j + 1),
+                    value,
+                    must: format!("inside the joint's limits of {low:.4} … {high:.4} rad"),
+                });
+            }
+        }
+        self.check_fixed_pose(arm)
+    }
+
+    /// With every offset fixed, the motion goes through the neighbourhood of that pose: if the arm
+    /// may not stand there, no amplitude is small enough.
+    fn check_fixed_pose(&self, arm: &Arm) -> Result<(), DesignError> {
+        let fixed: Option<Vec<f64>> = self.variables.fixed_offsets_rad.iter().copied().collect();
+        let Some(q0_rad) = fixed else { return Ok(()) };
+        let still = vec![vec![]; arm.dof()];
+        let pose = FourierSeries::new(1.0, q0_rad, still.clone(), still)?;
+        let margins = check(arm, &self.requirements, &pose)?;
+        if margins.feasible() {
+            return Ok(());
+        }
+        let worst = margins.worst();
+        let short = format!("{:.4} {}", -worst.free, worst.limit.unit());
+        Err(DesignError::FixedPose { limit: worst.limit.to_string(), short })
+    }
+}
+
+fn positive(what: &str, value: f64) -> Result<(), DesignError> {
+    if value > 0.0 && value.is_finite() {
+        return Ok(());
+    }
+    Err(DesignError::Value { what: what.to_owned(), value, must: "positive".into() })
+}
+
+fn at_least(what: &str, value: usize, least: usize) -> Result<(), DesignError> {
+    if value >= least {
+        return Ok(());
+    }
+    let must = format!("at least {least}");
+    Err(DesignError::Value { what: what.to_owned(), value: value as f64, must })
+}
+
+fn per_joint(arm: &Arm, what: &'static str, found: usize) -> Result<(), DesignError> {
+    if found == arm.dof() {
+        return Ok(());
+    }
+    Err(DesignError::Length { what, found, arm: arm.name.clone(), dof: arm.dof() })
+}

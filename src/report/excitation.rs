@@ -1,0 +1,318 @@
+//! The page of `armid excite`: the motion against its limits, what it will tell, the swept arm.
+
+use crate::base::BaseSet;
+use crate::excitation::design::{Design, Specification};
+use crate::excitation::{ClearanceModel, LimitKind, Reference};
+use crate::robot::Arm;
+
+use super::json::Program;
+use super::plot::{
+    Across, Axis, Colour, Grid, Mark, PlotError, Size, Stick, StickFigure, StickStyle, XyPlot,
+};
+use super::{Column, Page, ReportError, Section, Status, Table, Verdict, number};
+
+/// Samples of one period in the figures.
+const SAMPLES: usize = 600;
+
+/// The report page of a design.
+pub fn page(
+    arm: &Arm,
+    base: &BaseSet,
+    spec: &Specification,
+    found: &Design,
+    program: Program,
+) -> Result<Page, ReportError> {
+    let p = &found.prediction;
+    let worst = found.margins.worst();
+    let verdict = Verdict {
+        status: if found.cut_short { Status::Warn } else { Status::Good },
+        sentence: format!(
+            "A motion inside every limit, checked at {} Hz: {}.",
+            spec.requirements.check_rate_hz,
+            spec.criterion.in_words(found.value)
+        ),
+        facts: vec![
+            format!(
+                "Predicted from {} s of data: half of the parameters to {} or better, nine tenths to {}.",
+                spec.experiment.data_s,
+                number::percent(p.relative_quantile(0.5), 2),
+                number::percent(p.relative_quantile(0.9), 2)
+            ),
+            format!(
+                "cond(ΘᵀΘ) {}; with columns of unit length {}.",
+                number::significant(p.condition, 4),
+                number::significant(p.scaled_condition, 3)
+            ),
+            format!(
+                "Closest limit: {}, {} left at {:.2} s.",
+                worst.limit,
+                worst.in_words(),
+                worst.time_s
+            ),
+            search_fact(found),
+        ],
+    };
+    let series = found.excitation.series();
+    let subtitle = format!(
+        "{}, order {}, period {} s, run-in {} s",
+        arm.name,
+        series.order(),
+        number::significant(series.period_s, 4),
+        found.excitation.run_in_s()
+    );
+    let motion = Samples::of(arm, found);
+    let mut page = Page::new("Excitation", subtitle, verdict, program);
+    page.push(
+        Section::new("The motion")
+            .figure(motion.against_limits(arm, 0)?, "Angles; dashed: limits.")
+            .figure(motion.against_limits(arm, 1)?, "Velocities; dashed: limits.")
+            .figure(motion.against_limits(arm, 2)?, "Accelerations; dashed: limits.")
+            .figure(motion.clearance(arm, spec)?, "Smallest distances over one period; dashed: what is required.")
+            .figure(swept(arm, &motion)?, "Postures over one period (pale), where it is closest to itself, and the way of the flange."),
+    );
+    page.push(
+        Section::new("What it will tell")
+            .paragraph(
+                "Standard deviations by weighted least squares from white torque noise, before any experiment is run. \
+                 Parameters that are zero for this arm have no relative σ.",
+            )
+            .table(parameters(arm, base, found), ""),
+    );
+    page.push(
+        Section::new("Margins").table(
+            margins(found),
+            "What the whole motion, run-in and run-out included, leaves free.",
+        ),
+    );
+    page.push(
+        Section::new("Clearance model")
+            .paragraph("Capsules fixed in the bodies; ends in the joint frame of the body, body 0 is the base.")
+            .table(capsules(arm), "")
+            .figure(drawn_capsules(arm, &motion)?, "Axes of the capsules at the start of the period."),
+    );
+    Ok(page)
+}
+
+fn search_fact(found: &Design) -> String {
+    let end = if found.cut_short { "; cut short, so another run may end elsewhere" } else { "" };
+    format!(
+        "{} of {} random starts were feasible, {} evaluations{end}.",
+        found.feasible_starts,
+        found.starts,
+        number::count(found.evaluations)
+    )
+}
+
+/// One period at [`SAMPLES`] times.
+struct Samples {
+    time_s: Vec<f64>,
+    /// q, q̇, q̈ by joint.
+    states: [Vec<Vec<f64>>; 3],
+    /// Distances by index.
+    distances_m: Vec<Vec<f64>>,
+}
+
+impl Samples {
+    fn of(arm: &Arm, found: &Design) -> Self {
+        let series = found.excitation.series();
+        let n = arm.dof();
+        let clearance = ClearanceModel::new(arm);
+        let mut ws = clearance.workspace();
+        let mut out = Self {
+            time_s: Vec::new(),
+            states: std::array::from_fn(|_| vec![Vec::new(); n]),
+            distances_m: vec![Vec::new(); clearance.len()],
+        };
+        let [mut q, mut qd, mut qdd]: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; n]);
+        let mut d = vec![0.0; clearance.len()];
+        for k in 0..=SAMPLES {
+            let t_s = series.period_s * k as f64 / SAMPLES as f64;
+            series.sample(t_s, &mut q, &mut qd, &mut qdd);
+            clearance.distances(&mut ws, &q, &mut d);
+            out.time_s.push(t_s);
+            for (rows, values) in out.states.iter_mut().zip([&q, &qd, &qdd]) {
+                for (row, value) in rows.iter_mut().zip(values) {
+                    row.push(*value);
+                }
+            }
+            for (row, value) in out.distances_m.iter_mut().zip(&d) {
+                row.push(*value);
+            }
+        }
+        out
+    }
+
+    fn against_limits(&self, arm: &Arm, which: usize) -> Result<String, PlotError> {
+        let (label, unit) = [("q", "rad"), ("q̇", "rad/s"), ("q̈", "rad/s²")][which];
+        let panels =
+            arm.joints.iter().zip(&self.states[which]).enumerate().map(|(j, (joint, y))| {
+                let limits = &joint.limits;
+                let [low, high] = match which {
+                    0 => limits.position_rad,
+                    1 => [-limits.velocity_rad_s, limits.velocity_rad_s],
+                    _ => [-limits.acceleration_rad_s2, limits.acceleration_rad_s2],
+                };
+                XyPlot::new(
+                    format!("joint {}", j + 1),
+                    Axis::linear("t", "s"),
+                    Axis::linear(label, unit),
+                )
+                .with_marker(Across::Y, low, "")
+                .with_marker(Across::Y, high, "")
+                .with("", &self.time_s, y, Colour::MEASURED, Mark::Line)
+            });
+        let (x, y) = (Axis::linear("t", "s"), Axis::linear(label, unit));
+        Grid { panels: panels.collect(), ..Grid::new("", x, y) }.to_svg()
+    }
+
+    fn clearance(&self, arm: &Arm, spec: &Specification) -> Result<String, PlotError> {
+        const SHOWN: usize = 5;
+        let model = ClearanceModel::new(arm);
+        let mut plot =
+            XyPlot::new("Clearance", Axis::linear("t", "s"), Axis::linear("distance", "m"))
+                .with_marker(Across::Y, spec.requirements.clearance_m, "required");
+        let mut order: Vec<usize> = (0..self.distances_m.len()).collect();
+        let least = |k: usize| self.distances_m[k].iter().copied().fold(f64::INFINITY, f64::min);
+        order.sort_by(|&a, &b| least(a).total_cmp(&least(b)));
+        for (shown, &k) in order.iter().take(SHOWN).enumerate() {
+            let name = match model.limit(k) {
+                LimitKind::Clearance { one, other } => format!("{one} – {other}"),
+                LimitKind::Floor { capsule } => format!("{capsule} – floor"),
+                joint_limit => joint_limit.to_string(),
+            };
+            plot = plot.with(
+                name,
+                &self.time_s,
+                &self.distances_m[k],
+                Colour::series(shown),
+                Mark::Line,
+            );
+        }
+        plot.to_svg()
+    }
+
+    /// The sample with the smallest distance.
+    fn closest(&self) -> usize {
+        let least = |k: usize| self.distances_m.iter().map(|d| d[k]).fold(f64::INFINITY, f64::min);
+        (0..self.time_s.len()).min_by(|&a, &b| least(a).total_cmp(&least(b))).unwrap_or(0)
+    }
+
+    fn pose(&self, k: usize) -> Vec<f64> {
+        self.states[0].iter().map(|row| row[k]).collect()
+    }
+}
+
+/// Points of the arm's axis line at one pose: the ends of its capsules, body by body.
+fn skeleton(arm: &Arm, q_rad: &[f64]) -> Vec<[f64; 3]> {
+    std::iter::once([0.0; 3])
+        .chain(arm.frames(q_rad).iter().map(|f| f.translation_m.into()))
+        .collect()
+}
+
+fn swept(arm: &Arm, motion: &Samples) -> Result<String, PlotError> {
+    const POSTURES: usize = 24;
+    let mut sticks: Vec<Stick> = (0..POSTURES)
+        .map(|k| Stick {
+            name: String::new(),
+            points_m: skeleton(arm, &motion.pose(k * SAMPLES / POSTURES)),
+            colour: Colour::REFERENCE,
+            style: StickStyle::Trail,
+        })
+        .collect();
+    let flange =
+        (0..=SAMPLES).filter_map(|k| skeleton(arm, &motion.pose(k)).last().copied()).collect();
+    sticks.push(Stick {
+        name: "flange".into(),
+        points_m: flange,
+        colour: Colour::MODEL,
+        style: StickStyle::Path,
+    });
+    sticks.push(Stick {
+        name: "closest".into(),
+        points_m: skeleton(arm, &motion.pose(motion.closest())),
+        colour: Colour::MEASURED,
+        style: StickStyle::Posture,
+    });
+    StickFigure { title: "The swept arm".into(), sticks, size: Size::wide(420.0) }.to_svg()
+}
+
+fn drawn_capsules(arm: &Arm, motion: &Samples) -> Result<String, PlotError> {
+    let model = ClearanceModel::new(arm);
+    let placed = model.capsules_at(&motion.pose(0));
+    let sticks =
+        arm.clearance.capsules.iter().zip(placed).enumerate().map(|(k, (capsule, (ends, _)))| {
+            Stick {
+                name: capsule.name.clone(),
+                points_m: ends.iter().map(|&end| end.into()).collect(),
+                colour: Colour::series(k),
+                style: StickStyle::Posture,
+            }
+        });
+    StickFigure { title: "Capsule axes".into(), sticks: sticks.collect(), size: Size::wide(420.0) }
+        .to_svg()
+}
+
+fn parameters(arm: &Arm, base: &BaseSet, found: &Design) -> Table {
+    let model = crate::dynamics::Model::new(arm);
+    let theta = base.values(&model.standard_parameters());
+    let mut table = Table::new([
+        Column::text("parameter"),
+        Column::number("nominal", ""),
+        Column::number("σ", ""),
+        Column::text("unit"),
+        Column::number("relative σ", ""),
+    ]);
+    let p = &found.prediction;
+    for (k, value) in theta.iter().enumerate() {
+        let relative = p.relative_sigma[k];
+        let share =
+            if relative.is_finite() { number::percent(relative, 2) } else { "—".to_owned() };
+        table.push([
+            base.formula(k),
+            number::significant(*value, 4),
+            number::significant(p.sigma[k], 2),
+            base.unit(k).to_owned(),
+            share,
+        ]);
+    }
+    table
+}
+
+fn margins(found: &Design) -> Table {
+    let mut table = Table::new([
+        Column::text("limit"),
+        Column::number("left", ""),
+        Column::text("unit"),
+        Column::number("at", "s"),
+    ]);
+    for margin in found.margins.all() {
+        table.push([
+            margin.limit.to_string(),
+            number::significant(margin.free, 3),
+            margin.limit.unit().to_owned(),
+            format!("{:.3}", margin.time_s),
+        ]);
+    }
+    table
+}
+
+fn capsules(arm: &Arm) -> Table {
+    let mut table = Table::new([
+        Column::text("capsule"),
+        Column::number("body", ""),
+        Column::number("radius", "m"),
+        Column::text("from (m)"),
+        Column::text("to (m)"),
+    ]);
+    for c in &arm.clearance.capsules {
+        let point = |v: &nalgebra::Vector3<f64>| format!("{:.4}, {:.4}, {:.4}", v.x, v.y, v.z);
+        table.push([
+            c.name.clone(),
+            c.body.to_string(),
+            format!("{:.3}", c.radius_m),
+            point(&c.from_m),
+            point(&c.to_m),
+        ]);
+    }
+    table
+}
