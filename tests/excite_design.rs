@@ -137,6 +137,11 @@ fn specifications_that_make_no_sense_are_refused_with_the_number() {
     assert!(message(|s| s.experiment.torque_noise_nm[4] = 0.0).contains("joint 5"));
     assert!(message(|s| s.requirements.torque_share = 1.5).contains("1.5"));
     assert!(message(|s| s.starts = 0).contains("starts"));
+    let unused = |s: &mut Specification| {
+        s.criterion = Criterion::Cond;
+        s.prior_sigma = Some(vec![1.0; 52]);
+    };
+    assert!(message(unused).contains("prior"));
     // Lying on the floor is no pose to move about.
     let flat = |s: &mut Specification| {
         s.variables.fixed_offsets_rad = [0.0, 0.5, 0.0, 0.0, 0.0, 0.0].map(Some).to_vec();

@@ -156,7 +156,6 @@ struct DesignRecord {
     finalists: Vec<FinalistRecord>,
     evaluations: usize,
     cut_short: bool,
-    seconds: f64,
 }
 
 #[derive(Serialize)]
@@ -205,7 +204,7 @@ pub fn run(args: &ExciteArgs) -> CommandResult {
     };
     let seconds = begun.elapsed().as_secs_f64();
     print_summary(&base, &spec, &found, seconds);
-    write_outputs(args, (&arm, &base, &spec), &found, &program, seconds)?;
+    write_outputs(args, (&arm, &base, &spec), &found, &program)?;
     Ok(Outcome::Done)
 }
 
@@ -350,7 +349,6 @@ fn write_outputs(
     (arm, base, spec): (&Arm, &BaseSet, &Specification),
     found: &Design,
     program: &Program,
-    seconds: f64,
 ) -> Result<(), Box<dyn Error>> {
     let p = &found.prediction;
     let series = found.excitation.series();
@@ -391,7 +389,6 @@ fn write_outputs(
                 .collect(),
             evaluations: found.evaluations,
             cut_short: found.cut_short,
-            seconds,
         },
     };
     let text = Document { schema: TRAJECTORY_SCHEMA, program, body: &record }.to_json()?;

@@ -38,6 +38,11 @@ pub enum DesignError {
         /// By how much, with its unit.
         short: String,
     },
+    /// A condition number is about one motion alone.
+    #[error(
+        "the condition number of Θ does not know what was known before: use a prior with d, a or e"
+    )]
+    PriorUnused,
     /// What is known already belongs to another model.
     #[error("{file}: {message}")]
     Prior {

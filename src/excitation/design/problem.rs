@@ -18,13 +18,13 @@ use crate::dynamics::Motion;
 pub struct Problem {
     /// The variables.
     pub space: DesignSpace,
-    /// Λ per sample.
+    /// Λ of the experiment (of one sample for unweighted criteria).
     pub information: Information,
     /// What is minimised.
     pub criterion: Criterion,
     /// Scale of every base parameter (for the relative criteria).
     pub scales: Vec<f64>,
-    /// What is known already, per sample of the new data.
+    /// What is known already.
     pub prior: Option<Mat<f64>>,
     /// Joint limits and distances.
     pub barrier: LimitBarrier,
@@ -126,7 +126,7 @@ impl Problem {
         Some(Point { x, motion, smooth, torque_barrier, gradient, terms, barrier_gradient })
     }
 
-    /// Λ + Λ_prior per sample, feasible or not.
+    /// Λ + Λ_prior, feasible or not.
     pub fn total_information(&self, ws: &mut ProblemWorkspace, x: &DVector<f64>) -> Mat<f64> {
         self.space.motion(x.as_slice(), &mut ws.bar);
         let mut information =

@@ -115,13 +115,14 @@ pub fn design(
     spec.check(arm)?;
     let model = Model::new(arm);
     let scales = parameter_scales(base, &base.values(&model.standard_parameters()));
-    let weights =
-        if spec.criterion.whitened() { spec.experiment.weights() } else { vec![1.0; arm.dof()] };
+    // Λ is averaged over the samples of one period; the experiment has so many of them.
+    let samples = spec.experiment.samples();
+    let weights = if spec.criterion.whitened() {
+        spec.experiment.weights().iter().map(|w| w * samples).collect()
+    } else {
+        vec![1.0; arm.dof()]
+    };
     let prior = spec.prior_sigma.as_ref().map(|sigma| prior_information(base, sigma));
-    let per_sample = prior.as_ref().map(|p| {
-        let samples = spec.experiment.samples();
-        Mat::from_fn(p.nrows(), p.ncols(), |i, k| p[(i, k)] / samples)
-    });
     let information = Information::new(&model, base, weights);
     let barrier = LimitBarrier::new(arm, &spec.requirements, ClearanceModel::new(arm));
     let torque_nm =
@@ -131,7 +132,7 @@ pub fn design(
         information,
         criterion: spec.criterion,
         scales,
-        prior: per_sample.filter(|_| spec.criterion.whitened()),
+        prior: prior.clone(),
         barrier,
         torque_nm,
     };

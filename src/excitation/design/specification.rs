@@ -49,6 +49,9 @@ impl Specification {
                 });
             }
         }
+        if self.prior_sigma.is_some() && !self.criterion.whitened() {
+            return Err(DesignError::PriorUnused);
+        }
         let share = self.requirements.torque_share;
         if !(share > 0.0 && share <= 1.0) {
             let what = "the share of the torque".to_owned();
