@@ -15,11 +15,17 @@ struct Command {
 
 #[derive(Debug, Subcommand)]
 enum Task {
+    Base(cli::base::BaseArgs),
     Excite(cli::excite::ExciteArgs),
+    Identify(cli::identify::IdentifyArgs),
+    Simulate(cli::simulate::SimulateArgs),
 }
 
 fn main() -> ExitCode {
     cli::exit_code(match Command::parse().task {
+        Task::Base(args) => cli::base::run(&args),
         Task::Excite(args) => cli::excite::run(&args),
+        Task::Identify(args) => cli::identify::run(&args),
+        Task::Simulate(args) => cli::simulate::run(&args),
     })
 }

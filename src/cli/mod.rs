@@ -2,9 +2,12 @@
 //!
 //! Enters: arguments. Leaves: files, text on the terminal and an exit code.
 
+pub mod base;
 pub mod excite;
+pub mod identify;
 pub mod montecarlo;
 mod prior;
+pub mod simulate;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;

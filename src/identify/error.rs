@@ -35,6 +35,20 @@ pub enum IdentifyError {
         /// Joints of the arm.
         expected: usize,
     },
+    /// Nothing to identify from.
+    #[error("no logs")]
+    NoLogs,
+    /// Logs of different sampling rates.
+    #[error(
+        "logs sampled at {expected_hz:.2} and {found_hz:.2} Hz cannot be used together: give one \
+         --rate for all"
+    )]
+    Rates {
+        /// Rate of this log, Hz.
+        found_hz: f64,
+        /// Rate of the first log, Hz.
+        expected_hz: f64,
+    },
     /// `--period` names a period that the motion does not have.
     #[error(
         "{log}: the motion does not repeat every {wanted_s} s{}",

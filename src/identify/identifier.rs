@@ -105,6 +105,35 @@ pub struct Regression {
     pub every: usize,
 }
 
+impl Regression {
+    /// Several logs as one: rows stand below each other. A repeated motion then counts as that many
+    /// runs, and the processing reported is that of the first log.
+    pub fn joined(regressions: Vec<Self>) -> Result<Self, IdentifyError> {
+        let logs = regressions.len();
+        let mut rest = regressions.into_iter();
+        let Some(mut first) = rest.next() else {
+            return Err(IdentifyError::NoLogs);
+        };
+        if logs == 1 {
+            return Ok(first);
+        }
+        first.problem.unfold();
+        first.prepared.replicates = None;
+        first.prepared.processing.periods = 1;
+        for other in rest {
+            let mut problem = other.problem;
+            problem.unfold();
+            let (found_hz, expected_hz) = (problem.rate_hz, first.problem.rate_hz);
+            if (found_hz / expected_hz - 1.0).abs() > 0.02 {
+                return Err(IdentifyError::Rates { found_hz, expected_hz });
+            }
+            first.problem.append(&problem);
+            first.prepared.warnings.extend(other.prepared.warnings);
+        }
+        Ok(first)
+    }
+}
+
 /// Single runs are processed in pieces of this many samples, so that memory stays bounded.
 const PIECE: usize = 1 << 16;
 /// Longest single run that keeps all its samples.

@@ -258,9 +258,7 @@ impl Preparer {
         warnings: Vec<String>,
     ) -> Result<Prepared, IdentifyError> {
         let rate_hz = even.rate_hz;
-        let activity = Activity::of(&even.qd_rad_s, rate_hz)?;
-        let window = activity
-            .moving_window(0)
+        let window = experiment_window(&Activity::of(&even.qd_rad_s, rate_hz)?)
             .ok_or_else(|| IdentifyError::NoMotion { log: m.source.to_owned() })?;
         if window.len() < FEWEST_SAMPLES {
             let (samples, needed) = (window.len(), FEWEST_SAMPLES);
@@ -297,6 +295,23 @@ impl Preparer {
             warnings,
         })
     }
+}
+
+/// The samples of the experiment proper: the motion without standstill at its ends, and without
+/// what a pause separates from it (the arm driving to its start), if one uninterrupted stretch is
+/// most of the motion. Where many moves and pauses alternate, all of them are the experiment.
+fn experiment_window(activity: &Activity) -> Option<Range<usize>> {
+    let whole = activity.moving_window(0)?;
+    let inside = activity.rests.iter().filter(|r| r.start > whole.start && r.end < whole.end);
+    let mut start = whole.start;
+    let mut longest = 0..0;
+    for rest in inside.cloned().chain([whole.end..whole.end]) {
+        if rest.start - start > longest.len() {
+            longest = start..rest.start;
+        }
+        start = rest.end;
+    }
+    Some(if longest.len() > whole.len() / 2 { longest } else { whole })
 }
 
 fn longest(segments: &[Range<usize>]) -> Range<usize> {

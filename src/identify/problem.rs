@@ -99,6 +99,27 @@ impl Problem {
         self.plan.base_count()
     }
 
+    /// Turns P periods with one X into one run with X repeated P times.
+    pub fn unfold(&mut self) {
+        let (n, periods) = (self.samples, self.periods);
+        for panel in &mut self.panels {
+            panel.x = panel.x.chunks_exact(n).flat_map(|column| column.repeat(periods)).collect();
+        }
+        self.samples = n * periods;
+        self.periods = 1;
+    }
+
+    /// Puts the rows of `other` below this problem's; both single runs over the same columns.
+    pub fn append(&mut self, other: &Self) {
+        let (n, m) = (self.samples, other.samples);
+        for (panel, more) in self.panels.iter_mut().zip(&other.panels) {
+            let pairs = panel.x.chunks_exact(n).zip(more.x.chunks_exact(m));
+            panel.x = pairs.flat_map(|(above, below)| [above, below].concat()).collect();
+            panel.y.extend_from_slice(&more.y);
+        }
+        self.samples = n + m;
+    }
+
     /// X θ of joint `joint`, Nm, written into `out` (n values).
     pub fn predict(&self, joint: usize, theta: &[f64], out: &mut [f64]) {
         out.fill(0.0);

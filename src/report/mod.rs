@@ -5,6 +5,7 @@
 
 mod error;
 pub mod excitation;
+pub mod identify;
 pub mod json;
 pub mod montecarlo;
 pub mod number;

@@ -1,0 +1,97 @@
+//! `armid base`: which combinations of parameters can be known.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::{CommandResult, Outcome};
+use crate::base::{BaseSet, Parameterisation};
+use crate::output::check_writable;
+use crate::report::json::{Document, Program};
+use crate::report::{Column, Table};
+use crate::robot::Arm;
+
+/// Print the base parameters of an arm: the combinations that torque can reveal.
+#[derive(Debug, Args)]
+pub struct BaseArgs {
+    /// Robot: a built-in name, a .urdf or a .toml file.
+    #[arg(long)]
+    robot: String,
+    /// Reduced parameter set instead of the full one: paper.
+    #[arg(long)]
+    reduced: Option<String>,
+    /// Write the result as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
+}
+
+#[derive(Serialize)]
+struct BaseResult<'a> {
+    robot: &'a str,
+    rank: usize,
+    columns: usize,
+    combinations: Vec<Combination<'a>>,
+}
+
+#[derive(Serialize)]
+struct Combination<'a> {
+    name: &'a str,
+    terms: Vec<Term<'a>>,
+}
+
+#[derive(Serialize)]
+struct Term<'a> {
+    parameter: &'a str,
+    coefficient: f64,
+}
+
+/// Runs the command.
+pub fn run(args: &BaseArgs) -> CommandResult {
+    if let Some(path) = &args.json {
+        check_writable(path)?;
+    }
+    let (arm, notices) = Arm::load_with_notices(&args.robot)?;
+    for notice in notices {
+        eprintln!("note: {}: {notice}", args.robot);
+    }
+    let parameterisation = match &args.reduced {
+        Some(name) => Parameterisation::reduced(name, &arm)?,
+        None => Parameterisation::full(arm.dof(), arm.torque_offsets),
+    };
+    let set = BaseSet::find(&arm, parameterisation)?;
+    let mut table =
+        Table::new([Column::number("", ""), Column::text("combination"), Column::text("unit")]);
+    for k in 0..set.rank() {
+        table.push([(k + 1).to_string(), set.formula(k), set.unit(k).to_owned()]);
+    }
+    println!("{}", table.to_text());
+    println!(
+        "{}: {} base parameters from {} columns; independent columns stand at least {:.1e} of \
+         their length off the others, dependent ones at most {:.1e}",
+        arm.name,
+        set.rank(),
+        set.parameterisation.count(),
+        set.gap.smallest_independent,
+        set.gap.largest_dependent
+    );
+    if let Some(path) = &args.json {
+        let names = &set.parameterisation.names;
+        let term =
+            |&(index, coefficient): &(usize, f64)| Term { parameter: &names[index], coefficient };
+        let result = BaseResult {
+            robot: &arm.name,
+            rank: set.rank(),
+            columns: set.parameterisation.count(),
+            combinations: (0..set.rank())
+                .map(|k| Combination {
+                    name: set.name(k),
+                    terms: set.combinations[k].iter().map(term).collect(),
+                })
+                .collect(),
+        };
+        let program = Program::new(std::env::args(), None, Vec::new());
+        Document { schema: "armid.base/1", program: &program, body: &result }.write(path)?;
+    }
+    Ok(Outcome::Done)
+}

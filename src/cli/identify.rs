@@ -1,0 +1,230 @@
+//! `armid identify`: parameters with their uncertainty from the logs of a real or simulated arm.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::{CommandResult, Outcome};
+use crate::base::{BaseSet, Parameterisation};
+use crate::dynamics::Model;
+use crate::identify::covariance::CovarianceKind;
+use crate::identify::{Estimator, Identifier, Measurement, Options, Regression};
+use crate::log::{Layout, Log, read_log};
+use crate::output::check_writable;
+use crate::report::identify::{
+    IDENTIFY_SCHEMA, Result as IdentifyResult, Training, Validation, page, parameter_table,
+    residual_table,
+};
+use crate::report::json::{Document, Input, Program};
+use crate::robot::{Arm, JointSignals};
+
+/// Identify the base parameters of an arm from logs of its motion.
+#[derive(Debug, Args)]
+pub struct IdentifyArgs {
+    /// Logs to identify from.
+    #[arg(required = true)]
+    logs: Vec<PathBuf>,
+    #[command(flatten)]
+    source: SourceArgs,
+    /// Reduced parameter set instead of the full one: paper.
+    #[arg(long)]
+    reduced: Option<String>,
+    #[command(flatten)]
+    processing: ProcessingArgs,
+    /// Logs to validate on: nothing is fitted to them.
+    #[arg(long, num_args = 1..)]
+    validate: Vec<PathBuf>,
+    /// Write the result as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
+    /// Write the report as one HTML page.
+    #[arg(long)]
+    report: Option<PathBuf>,
+}
+
+/// Which arm and which kind of log.
+#[derive(Debug, Args)]
+pub struct SourceArgs {
+    /// Robot: a built-in name, a .urdf or a .toml file.
+    #[arg(long)]
+    pub robot: String,
+    /// Layout of the logs: a built-in name or a .toml file.
+    #[arg(long, default_value = "armid")]
+    pub layout: String,
+}
+
+/// How logs are processed.
+#[derive(Debug, Args)]
+pub struct ProcessingArgs {
+    /// Low-pass on torque and regressor of a single run, Hz.
+    #[arg(long = "cutoff", value_name = "HZ")]
+    cutoff_hz: Option<f64>,
+    /// Rate the log is resampled to, Hz; its own where left out.
+    #[arg(long = "rate", value_name = "HZ")]
+    rate_hz: Option<f64>,
+    /// Period of the motion, s; found where left out, 0 to treat it as a single run.
+    #[arg(long = "period", value_name = "S")]
+    period_s: Option<f64>,
+    /// Estimator.
+    #[arg(long, value_enum)]
+    estimator: Option<Estimator>,
+    /// Method of the covariance; chosen by what the log offers where left out.
+    #[arg(long, value_enum)]
+    covariance: Option<CovarianceKind>,
+}
+
+impl ProcessingArgs {
+    /// The library's options, checked.
+    pub fn options(&self) -> Result<Options, String> {
+        let default = Options::default();
+        let positive = |name: &str, value: Option<f64>, zero_allowed: bool| match value {
+            Some(v) if !(v > 0.0 && v.is_finite() || zero_allowed && v == 0.0) => {
+                Err(format!("--{name} {v}: must be a positive number"))
+            }
+            _ => Ok(()),
+        };
+        positive("cutoff", self.cutoff_hz, false)?;
+        positive("rate", self.rate_hz, false)?;
+        positive("period", self.period_s, true)?;
+        Ok(Options {
+            estimator: self.estimator.unwrap_or(default.estimator),
+            covariance: self.covariance,
+            cutoff_hz: self.cutoff_hz.unwrap_or(default.cutoff_hz),
+            rate_hz: self.rate_hz,
+            period_s: self.period_s,
+            ..default
+        })
+    }
+}
+
+/// A log with its torque in Nm.
+pub struct LoadedLog {
+    /// The log.
+    pub log: Log,
+    /// Drive torque at the joint, Nm.
+    pub torque_nm: JointSignals,
+    /// Where it was read from.
+    pub input: Input,
+}
+
+impl LoadedLog {
+    /// The channels identification needs.
+    pub fn measurement(&self) -> Measurement<'_> {
+        Measurement {
+            source: &self.log.source,
+            time_s: &self.log.time_s,
+            q_rad: &self.log.q_rad,
+            qd_rad_s: &self.log.qd_rad_s,
+            torque_nm: &self.torque_nm,
+        }
+    }
+}
+
+impl SourceArgs {
+    /// The arm; what was assumed about it goes to the terminal.
+    pub fn arm(&self) -> Result<Arm, crate::robot::RobotError> {
+        let (arm, notices) = Arm::load_with_notices(&self.robot)?;
+        for notice in notices {
+            eprintln!("note: {}: {notice}", self.robot);
+        }
+        Ok(arm)
+    }
+
+    /// Reads logs and prints what became of their rows.
+    pub fn read(
+        &self,
+        arm: &Arm,
+        files: &[PathBuf],
+    ) -> Result<Vec<LoadedLog>, Box<dyn std::error::Error>> {
+        let layout = Layout::load(&self.layout)?;
+        let read = |file: &PathBuf| {
+            let log = read_log(file, &layout, arm.dof())?;
+            eprintln!("{}:\n{}", file.display(), log.rows);
+            let torque_nm = log.torque_nm(arm)?;
+            let input = Input { path: file.clone(), sha256: log.sha256.clone() };
+            Ok(LoadedLog { log, torque_nm, input })
+        };
+        files.iter().map(read).collect()
+    }
+}
+
+/// Runs the command.
+pub fn run(args: &IdentifyArgs) -> CommandResult {
+    for path in [&args.json, &args.report].into_iter().flatten() {
+        check_writable(path)?;
+    }
+    let options = args.processing.options()?;
+    let arm = args.source.arm()?;
+    let parameterisation = match &args.reduced {
+        Some(name) => Parameterisation::reduced(name, &arm)?,
+        None => Parameterisation::full(arm.dof(), arm.torque_offsets),
+    };
+    let set = BaseSet::find(&arm, parameterisation)?;
+    let model = Model::new(&arm);
+    let logs = args.source.read(&arm, &args.logs)?;
+    let validation_logs = args.source.read(&arm, &args.validate)?;
+    for validation in &validation_logs {
+        if let Some(same) = logs.iter().find(|l| l.input.sha256 == validation.input.sha256) {
+            return Err(format!(
+                "{} is validated on, but it is the training log {}: a fit always describes its \
+                 own data",
+                validation.input.path.display(),
+                same.input.path.display()
+            )
+            .into());
+        }
+    }
+    let mut identifier = Identifier::new(&model, &set, options);
+    let regressions = logs
+        .iter()
+        .map(|log| identifier.regression(&log.measurement()))
+        .collect::<Result<_, _>>()?;
+    let regression = Regression::joined(regressions)?;
+    let identification = identifier.identify_regression(&regression)?;
+    let training = Training {
+        arm: &arm,
+        set: &set,
+        logs: &logs.iter().map(|l| &l.log).collect::<Vec<_>>(),
+        regression: &regression,
+        identification: &identification,
+    };
+    let mut validations = Vec::new();
+    for log in &validation_logs {
+        validations.push(validate(&arm, &mut identifier, log, &identification.fit.theta)?);
+    }
+    let result = IdentifyResult::of(&training, &validations)?;
+    println!("{}", parameter_table(&result).to_text());
+    println!("{}", residual_table(&result).to_text());
+    for warning in &result.warnings {
+        println!("note: {warning}");
+    }
+    println!("\n{}", result.sentence());
+    let inputs = logs.iter().chain(&validation_logs).map(|l| l.input.clone()).collect();
+    let program = Program::new(std::env::args(), None, inputs);
+    if let Some(path) = &args.json {
+        Document { schema: IDENTIFY_SCHEMA, program: &program, body: &result }.write(path)?;
+    }
+    if let Some(path) = &args.report {
+        page(&result, &training, &validations, program)?.write(path)?;
+        println!("report: {}", path.display());
+    }
+    Ok(if result.is_declined() { Outcome::Negative } else { Outcome::Done })
+}
+
+/// Predicts a log that was not used for the fit, with the same processing.
+fn validate(
+    arm: &Arm,
+    identifier: &mut Identifier,
+    log: &LoadedLog,
+    theta: &[f64],
+) -> Result<Validation, Box<dyn std::error::Error>> {
+    let regression = identifier.regression(&log.measurement())?;
+    let manufacturer = match log.log.target_torque_nm(arm)? {
+        Some(torque_nm) => {
+            let measurement = Measurement { torque_nm: &torque_nm, ..log.measurement() };
+            Some(identifier.regression(&measurement)?)
+        }
+        None => None,
+    };
+    Ok(Validation::new(Path::new(&log.log.source), &regression, manufacturer.as_ref(), theta))
+}

@@ -1,0 +1,87 @@
+//! `armid simulate`: one log of the simulated arm, and the truth behind it.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::{CommandResult, Outcome};
+use crate::dynamics::ParameterLayout;
+use crate::log::{Effort, Log, write_log};
+use crate::montecarlo::{Experiment, Scenario};
+use crate::output::check_writable;
+use crate::plant::SensorConfig;
+use crate::report::json::{Document, Input, Program};
+
+/// Simulate one trial of a scenario and write its log.
+#[derive(Debug, Args)]
+pub struct SimulateArgs {
+    /// Scenario file; sims/default.toml (built in) where left out.
+    #[arg(long)]
+    scenario: Option<PathBuf>,
+    /// The log.
+    #[arg(long)]
+    out: PathBuf,
+    /// Which trial's noise (from 0).
+    #[arg(long, default_value_t = 0)]
+    trial: u64,
+    /// Write the truth as JSON.
+    #[arg(long)]
+    truth: Option<PathBuf>,
+}
+
+#[derive(Serialize)]
+struct Truth<'a> {
+    robot: &'a str,
+    standard_parameters: Vec<StandardParameter>,
+    noise: &'a SensorConfig,
+}
+
+#[derive(Serialize)]
+struct StandardParameter {
+    name: String,
+    value: f64,
+    unit: &'static str,
+}
+
+/// Runs the command.
+pub fn run(args: &SimulateArgs) -> CommandResult {
+    for path in [Some(&args.out), args.truth.as_ref()].into_iter().flatten() {
+        check_writable(path)?;
+    }
+    let experiment = Experiment::prepare(Scenario::load(args.scenario.as_deref())?)?;
+    let (measured, time_s) = experiment.log(args.trial)?;
+    let scenario = &experiment.scenario;
+    let samples = time_s.len();
+    let source = format!("{} trial {}", scenario.name, args.trial);
+    let effort = match scenario.sensors.effort {
+        crate::plant::Effort::Torque => Effort::Torque(measured.torque_nm),
+        crate::plant::Effort::Current => {
+            let gain = |j: usize| scenario.arm.joints[j].drive.gain_nm_a();
+            let ampere =
+                measured.torque_nm.map_joints(|j, t| t.iter().map(|t| t / gain(j)).collect());
+            Effort::Current { ampere, gain_nm_a: None }
+        }
+    };
+    let log = Log::new(source, time_s, measured.q_rad, measured.qd_rad_s, effort)?;
+    let sha256 = write_log(&args.out, &log)?;
+    println!("{}: {samples} samples, sha256 {sha256}", args.out.display());
+    if let Some(path) = &args.truth {
+        let layout = ParameterLayout::new(scenario.arm.dof());
+        let values = experiment.model.standard_parameters();
+        let named = values.iter().enumerate().map(|(k, &value)| StandardParameter {
+            name: layout.name(k),
+            value,
+            unit: layout.unit(k),
+        });
+        let truth = Truth {
+            robot: &scenario.arm.name,
+            standard_parameters: named.collect(),
+            noise: &scenario.sensors,
+        };
+        let inputs = args.scenario.iter().map(|file| Input::of(file)).collect::<Result<_, _>>()?;
+        let program = Program::new(std::env::args(), Some(scenario.seed), inputs);
+        Document { schema: "armid.truth/1", program: &program, body: &truth }.write(path)?;
+    }
+    Ok(Outcome::Done)
+}

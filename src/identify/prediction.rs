@@ -1,0 +1,71 @@
+//! Torque as measured and as a set of parameters predicts it, sample by sample.
+
+use super::identifier::{Regression, Residual};
+use crate::robot::JointSignals;
+
+/// Measured and predicted torque along one log, with the processing of the regression.
+#[derive(Debug, Clone)]
+pub struct Prediction {
+    /// Time on the log's clock, s.
+    pub time_s: Vec<f64>,
+    /// Joint velocity, rad/s: to tell motion from standstill.
+    pub qd_rad_s: JointSignals,
+    /// Measured torque, Nm.
+    pub measured_nm: JointSignals,
+    /// X θ, Nm.
+    pub predicted_nm: JointSignals,
+}
+
+/// Speed beyond which a joint counts as moving, rad/s.
+pub const MOVING_RAD_S: f64 = 0.02;
+
+impl Prediction {
+    /// Of the parameters `theta` along the log behind `regression`.
+    pub fn of(regression: &Regression, theta: &[f64]) -> Self {
+        let problem = &regression.problem;
+        let (n, periods, joints) = (problem.samples, problem.periods, problem.joints());
+        let residual = problem.residuals(theta);
+        let measured_nm = JointSignals::from_fn(joints, n * periods, |j, k| problem.panels[j].y[k]);
+        let predicted_nm = JointSignals::from_fn(joints, n * periods, |j, k| {
+            measured_nm.joint(j)[k] - residual.joint(j)[k]
+        });
+        let processing = &regression.prepared.processing;
+        let source = |k: usize| regression.first_sample + (k % n) * regression.every;
+        let rate_hz = processing.rate_hz;
+        let start_s = processing.window_s[0] + regression.first_sample as f64 / rate_hz;
+        let step_s = regression.every as f64 / rate_hz;
+        let motion = &regression.prepared.motion;
+        Self {
+            time_s: (0..n * periods).map(|k| start_s + k as f64 * step_s).collect(),
+            qd_rad_s: JointSignals::from_fn(joints, n * periods, |j, k| {
+                motion.qd_rad_s.joint(j)[source(k)]
+            }),
+            measured_nm,
+            predicted_nm,
+        }
+    }
+
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// Measured minus predicted, Nm.
+    pub fn error_nm(&self) -> JointSignals {
+        JointSignals::from_fn(self.measured_nm.joints(), self.samples(), |j, k| {
+            self.measured_nm.joint(j)[k] - self.predicted_nm.joint(j)[k]
+        })
+    }
+
+    /// Residual over all samples.
+    pub fn residual(&self) -> Residual {
+        Residual::of(&self.error_nm(), &self.measured_nm, |_, _| true)
+    }
+
+    /// Residual over the samples in which the joint itself moves faster than [`MOVING_RAD_S`].
+    pub fn moving_residual(&self) -> Residual {
+        Residual::of(&self.error_nm(), &self.measured_nm, |j, k| {
+            self.qd_rad_s.joint(j)[k].abs() > MOVING_RAD_S
+        })
+    }
+}

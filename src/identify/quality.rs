@@ -1,0 +1,93 @@
+//! How well a log determines the parameters: condition numbers, and what it leaves open.
+
+use nalgebra::DMatrix;
+use serde::Serialize;
+
+use super::fit::{Estimator, FitError, Fitter};
+use super::problem::Problem;
+use super::triangle::Triangle;
+use crate::base::BaseSet;
+use crate::dynamics::{Parameter, ParameterLayout};
+use crate::robot::Arm;
+
+/// Condition numbers of the base regressor along a motion.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Condition {
+    /// cond(Θ_B), unweighted, parameters in SI units.
+    pub regressor: f64,
+    /// cond(Θ_BᵀΘ_B), the paper's (22): the square of the above.
+    pub information: f64,
+    /// cond(Θ_B) with every column scaled to unit length: free of units.
+    pub scaled: f64,
+}
+
+impl Condition {
+    /// Of the regressor in `problem`.
+    pub fn of(problem: &Problem, set: &BaseSet) -> Result<Self, FitError> {
+        let triangle = Fitter::new(problem).fit(problem, set, Estimator::Ols)?.triangle;
+        let regressor = condition_number(&triangle, |_| 1.0);
+        Ok(Self {
+            regressor,
+            information: regressor * regressor,
+            scaled: condition_number(&triangle, |k| 1.0 / triangle.column_length(k)),
+        })
+    }
+}
+
+fn condition_number(triangle: &Triangle, scale: impl Fn(usize) -> f64) -> f64 {
+    let b = triangle.columns();
+    let r = DMatrix::from_fn(b, b, |i, k| triangle.r(i, k) * scale(k));
+    let singular = r.singular_values();
+    singular.max() / singular.min()
+}
+
+/// The largest a base parameter could plausibly be on this arm: beyond it, an interval says
+/// nothing.
+///
+/// With M the mass and ℓ the reach of everything from the parameter's body outward: M for masses,
+/// M ℓ for first moments, M ℓ² for moments of inertia; the drive's torque limit over its speed
+/// limit for viscous friction, the torque limit for Coulomb friction and offsets, and that limit
+/// over the acceleration limit for rotor inertias.
+pub fn plausible_size(arm: &Arm, set: &BaseSet, k: usize) -> f64 {
+    let layout = ParameterLayout::new(arm.dof());
+    let (standard, _) = set.column(k)[0];
+    let outward = |body: usize| {
+        let mass: f64 = arm.joints[body..].iter().map(|j| j.link.mass_kg()).sum();
+        let later = arm.joints[body + 1..].iter().map(|j| j.placement.translation_m.norm());
+        // The last link has no joint behind it to tell its length; its centre of mass does.
+        let last = arm.joints.last().and_then(|j| j.link.com_m()).map_or(0.0, |c| c.norm());
+        (mass, later.sum::<f64>() + last + HAND_M)
+    };
+    match layout.parameter(standard) {
+        Parameter::Body(body, 0) => outward(body).0,
+        Parameter::Body(body, 1..=3) => outward(body).0 * outward(body).1,
+        Parameter::Body(body, _) => outward(body).0 * outward(body).1.powi(2),
+        Parameter::RotorInertia(j) => {
+            arm.joints[j].limits.torque_nm / arm.joints[j].limits.acceleration_rad_s2
+        }
+        Parameter::Viscous(j) => {
+            arm.joints[j].limits.torque_nm / arm.joints[j].limits.velocity_rad_s
+        }
+        Parameter::Coulomb(j) | Parameter::Offset(j) => arm.joints[j].limits.torque_nm,
+    }
+}
+
+/// Least reach of a body, m: a wrist is not a point.
+const HAND_M: f64 = 0.05;
+
+/// Whether a log that leaves the parameters `open` still identifies the arm: the moments of inertia
+/// of a light wrist may stay open, because no torque depends on them; gravity, friction, rotors and
+/// the bulk of the parameters may not.
+pub fn identifies_the_arm(arm: &Arm, set: &BaseSet, open: &[usize]) -> bool {
+    let layout = ParameterLayout::new(arm.dof());
+    let is_moment_of_inertia =
+        |&k: &usize| matches!(layout.parameter(set.column(k)[0].0), Parameter::Body(_, 4..));
+    open.iter().all(is_moment_of_inertia) && 4 * open.len() <= set.rank()
+}
+
+/// Base parameters whose 95 % interval (half-width `half_width[k]`) is wider than
+/// [`plausible_size`]: the log does not identify them.
+pub fn not_identified(arm: &Arm, set: &BaseSet, half_width: &[f64]) -> Vec<usize> {
+    let open = |&k: &usize| half_width[k].is_nan() || half_width[k] > plausible_size(arm, set, k);
+    (0..set.rank()).filter(open).collect()
+}
