@@ -305,7 +305,7 @@ fn experiment_window(activity: &Activity) -> Option<Range<usize>> {
     let inside = activity.rests.iter().filter(|r| r.start > whole.start && r.end < whole.end);
     let mut start = whole.start;
     let mut longest = 0..0;
-    for rest in inside.cloned().chain([whole.end..whole.end]) {
+    for rest in inside.cloned().chain(std::iter::once(whole.end..whole.end)) {
         if rest.start - start > longest.len() {
             longest = start..rest.start;
         }
