@@ -87,7 +87,7 @@ impl ProcessingArgs {
         positive("rate", self.rate_hz, false)?;
         positive("period", self.period_s, true)?;
         Ok(Options {
-            estimator: self.estimator.unwrap_or(default.estimator),
+            estimator: self.estimator,
             covariance: self.covariance,
             cutoff_hz: self.cutoff_hz.unwrap_or(default.cutoff_hz),
             rate_hz: self.rate_hz,

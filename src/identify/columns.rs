@@ -46,6 +46,20 @@ impl ColumnPlan {
         Self { joints, base_count: set.rank() }
     }
 
+    /// The plan of equations in which joint j's has those of all joints behind it mixed in.
+    pub fn cumulative(&self) -> Self {
+        let joints = (0..self.joints())
+            .map(|j| {
+                let mut bases: Vec<usize> =
+                    (j..self.joints()).flat_map(|i| self.base_indices(i)).collect();
+                bases.sort_unstable();
+                bases.dedup();
+                bases.into_iter().map(|base| PlannedColumn { base, terms: Vec::new() }).collect()
+            })
+            .collect();
+        Self { joints, base_count: self.base_count }
+    }
+
     /// Number of joints.
     pub fn joints(&self) -> usize {
         self.joints.len()

@@ -1,4 +1,4 @@
-//! Ordinary and joint-weighted least squares.
+//! Least squares with and without weights.
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,7 @@ use super::problem::Problem;
 use super::triangle::Triangle;
 use crate::base::BaseSet;
 
-/// How the joints' equations are weighted against each other.
+/// How the equations are weighted against each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
 #[value(rename_all = "snake_case")]
@@ -18,6 +18,9 @@ pub enum Estimator {
     /// Each joint's equation divided by the standard deviation of its own residual, s_j, iterated
     /// (Gautier 1997).
     Wls,
+    /// Each harmonic of a motion that repeats, and each joint, weighted by the noise that the
+    /// periods show there, correlation between joints included.
+    Spectral,
 }
 
 impl std::fmt::Display for Estimator {
@@ -25,6 +28,7 @@ impl std::fmt::Display for Estimator {
         f.pad(match self {
             Self::Ols => "ols",
             Self::Wls => "wls",
+            Self::Spectral => "spectral",
         })
     }
 }
@@ -39,6 +43,17 @@ pub enum FitError {
         rows: usize,
         /// Base parameters.
         parameters: usize,
+    },
+    /// Noise cannot be told from motion in a single run.
+    #[error(
+        "weights frequency by frequency need at least {needed} whole periods of a motion that \
+         repeats; the log has {periods}"
+    )]
+    TooFewPeriods {
+        /// Whole periods found.
+        periods: usize,
+        /// Periods needed.
+        needed: usize,
     },
     /// Columns of the regressor vanish or coincide along this motion.
     #[error(
@@ -62,9 +77,9 @@ pub struct Fit {
     pub theta_periods: Vec<Vec<f64>>,
     /// s_j: standard deviation of one torque sample's residual per joint, Nm.
     pub joint_sigma_nm: Vec<f64>,
-    /// Weight of each joint's equations: 1/s_j, or 1 for OLS.
+    /// Weight of each joint's equations: 1/s_j, or 1 where they are not weighted as a whole.
     pub weights: Vec<f64>,
-    /// QR of the weighted W X of one period, and of W y of every period.
+    /// QR of the weighted (whitened) W X of one period, and of W y of every period.
     pub triangle: Triangle,
     /// R⁻¹ of that triangle, b × b: (XᵀW²X)⁻¹ = R⁻¹R⁻ᵀ of one period.
     pub inverse: DMatrix<f64>,
@@ -72,6 +87,19 @@ pub struct Fit {
     pub residual_squares: Vec<f64>,
     /// ‖y_j‖² over all samples and periods, Nm².
     pub torque_squares: Vec<f64>,
+}
+
+impl Fit {
+    /// Restates residuals and torques as those of `problem`, whose whitened rows were solved.
+    pub(super) fn state_residuals_of(&mut self, problem: &Problem) {
+        self.residual_squares = problem.residual_squares(&self.theta);
+        self.torque_squares =
+            problem.panels.iter().map(|p| p.y.iter().map(|v| v * v).sum()).collect();
+        let equations = (problem.samples * problem.periods) as f64;
+        let share = self.theta.len() as f64 / problem.joints() as f64;
+        let sigma = |squares: &f64| (squares / (equations - share).max(1.0)).sqrt();
+        self.joint_sigma_nm = self.residual_squares.iter().map(sigma).collect();
+    }
 }
 
 /// Iterations of the weights: the first uses the residuals of OLS, the second those of the first.

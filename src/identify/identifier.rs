@@ -3,7 +3,8 @@
 use super::columns::ColumnPlan;
 use super::covariance::{Covariance, CovarianceKind};
 use super::error::IdentifyError;
-use super::fit::{Fit, Fitter};
+use super::estimation::Estimation;
+use super::fit::{Estimator, Fit};
 use super::options::Options;
 use super::prepare::{Measurement, Prepared, Preparer, Processing};
 use super::problem::{Assembler, Problem};
@@ -20,7 +21,7 @@ pub struct Identifier<'a> {
     preparer: Preparer,
     assembler: Assembler,
     problem: Problem,
-    fitter: Fitter,
+    estimation: Estimation,
     filter: Scratch,
 }
 
@@ -31,6 +32,8 @@ pub struct Identification {
     pub fit: Fit,
     /// Its covariance.
     pub covariance: Covariance,
+    /// Why this estimator was chosen.
+    pub estimator_reason: &'static str,
     /// Why this covariance was chosen.
     pub covariance_reason: &'static str,
     /// What was done to the log.
@@ -151,7 +154,7 @@ impl<'a> Identifier<'a> {
             options,
             preparer: Preparer::default(),
             assembler: Assembler::new(model),
-            fitter: Fitter::new(&problem),
+            estimation: Estimation::new(&problem),
             problem,
             filter: Scratch::default(),
         }
@@ -257,11 +260,19 @@ impl<'a> Identifier<'a> {
     }
 
     fn solve(&mut self, prepared: Prepared) -> Result<Identification, IdentifyError> {
-        let fit = self.fitter.fit(&self.problem, self.set, self.options.estimator)?;
+        let repeats = prepared.processing.periods >= MANY_PERIODS;
+        let (estimator, estimator_reason) = match self.options.estimator {
+            Some(estimator) => (estimator, "asked for"),
+            None if repeats => (
+                Estimator::Spectral,
+                "the motion repeats: the periods show the noise at every frequency and joint",
+            ),
+            None => (Estimator::Wls, "a single run: the residuals show the noise of every joint"),
+        };
         let (kind, covariance_reason) = match self.options.covariance {
             Some(kind) => (kind, "asked for"),
-            None if prepared.processing.periods >= MANY_PERIODS => (
-                CovarianceKind::Periods,
+            None if repeats => (
+                CovarianceKind::Spectral,
                 "the motion repeats: the scatter between periods holds for noise of any colour",
             ),
             None => (
@@ -270,10 +281,13 @@ impl<'a> Identifier<'a> {
                  short against a block",
             ),
         };
-        let covariance = kind.method().covariance(&self.problem, &fit)?;
+        let harmonics = prepared.processing.harmonics.as_deref();
+        let (fit, covariance) =
+            self.estimation.estimate(&self.problem, self.set, estimator, kind, harmonics)?;
         Ok(Identification {
             samples: self.problem.samples * self.problem.periods,
             covariance,
+            estimator_reason,
             covariance_reason,
             processing: prepared.processing,
             replicates: prepared.replicates,

@@ -4,6 +4,7 @@ pub mod covariance;
 
 mod columns;
 mod error;
+mod estimation;
 mod fit;
 mod identifier;
 mod options;
@@ -12,6 +13,7 @@ mod prepare;
 mod problem;
 mod quality;
 mod triangle;
+mod whiten;
 
 pub use columns::ColumnPlan;
 pub use error::IdentifyError;
@@ -20,6 +22,6 @@ pub use identifier::{Identification, Identifier, Regression, Residual};
 pub use options::Options;
 pub use prediction::{MOVING_RAD_S, Prediction};
 pub use prepare::{Measurement, Prepared, Preparer, Processing};
-pub use problem::{Assembler, Panel, Problem};
+pub use problem::{Assembler, Domain, Panel, Problem};
 pub use quality::{Condition, identifies_the_arm, not_identified, plausible_size};
 pub use triangle::Triangle;

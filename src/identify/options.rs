@@ -9,8 +9,8 @@ use super::fit::Estimator;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Options {
-    /// Least squares with or without weights per joint.
-    pub estimator: Estimator,
+    /// How equations are weighted; `None`: by what the log offers.
+    pub estimator: Option<Estimator>,
     /// How σ is computed; `None`: by what the log offers.
     pub covariance: Option<CovarianceKind>,
     /// Low-pass applied to torque and regressor columns of a motion that does not repeat, Hz.
@@ -31,7 +31,7 @@ impl Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            estimator: Estimator::Wls,
+            estimator: None,
             covariance: None,
             cutoff_hz: 10.0,
             order: 4,

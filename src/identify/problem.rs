@@ -4,6 +4,16 @@ use super::columns::ColumnPlan;
 use crate::dynamics::{Lanes, Model, Motion, RegressorBlock, Workspace};
 use crate::robot::JointSignals;
 
+/// What the rows of a [`Problem`] follow each other in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Domain {
+    /// One row per sample.
+    Time,
+    /// Row 0 is the mean of a period, rows 2k − 1 and 2k are √2 times real and imaginary part of its
+    /// k-th Fourier coefficient (unitary: white noise keeps its variance).
+    Frequency,
+}
+
 /// y = X θ + e for every joint, sampled at `rate_hz`: the paper's (16), row-sorted by joint.
 ///
 /// A motion that repeats P times has one X for all periods and P columns of torque; a single run
@@ -12,12 +22,14 @@ use crate::robot::JointSignals;
 pub struct Problem {
     /// Which base parameters each joint's equation contains.
     pub plan: ColumnPlan,
-    /// Samples of X per joint, n.
+    /// Rows of X per joint, n: samples of one period, or two per harmonic.
     pub samples: usize,
     /// Repetitions P.
     pub periods: usize,
     /// Samples per second.
     pub rate_hz: f64,
+    /// What rows follow each other in.
+    pub domain: Domain,
     /// One per joint.
     pub panels: Vec<Panel>,
 }
@@ -86,7 +98,7 @@ impl Problem {
     /// An empty problem over `plan`'s columns.
     pub fn new(plan: ColumnPlan, rate_hz: f64) -> Self {
         let panels = vec![Panel::default(); plan.joints()];
-        Self { plan, samples: 0, periods: 0, rate_hz, panels }
+        Self { plan, samples: 0, periods: 0, rate_hz, domain: Domain::Time, panels }
     }
 
     /// Number of joints.
@@ -128,6 +140,18 @@ impl Problem {
             let value = theta[base];
             out.iter_mut().zip(column).for_each(|(o, x)| *o += value * x);
         }
+    }
+
+    /// ‖y − X θ‖² of every joint over all periods, Nm².
+    pub fn residual_squares(&self, theta: &[f64]) -> Vec<f64> {
+        let mut predicted = vec![0.0; self.samples];
+        (0..self.joints())
+            .map(|joint| {
+                self.predict(joint, theta, &mut predicted);
+                let periods = self.panels[joint].y.chunks_exact(self.samples);
+                periods.flat_map(|y| y.iter().zip(&predicted)).map(|(y, p)| (y - p).powi(2)).sum()
+            })
+            .collect()
     }
 
     /// y − X θ of all joints and periods, Nm: joints × P·n.

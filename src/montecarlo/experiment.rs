@@ -9,7 +9,7 @@ use super::tally::Outcome;
 use crate::dynamics::Model;
 use crate::excitation::Reference;
 use crate::identify::covariance::CovarianceKind;
-use crate::identify::{Identification, Identifier, IdentifyError, Measurement};
+use crate::identify::{Estimator, Identification, Identifier, IdentifyError, Measurement, Options};
 use crate::plant::{Encoders, Measured, Plant, PlantError, Recording, Sensors};
 use crate::random::TrialStreams;
 
@@ -23,6 +23,8 @@ pub struct Experiment {
     pub truth: Vec<f64>,
     /// σ of the pilot trial per parameter: the unit of the tally.
     pub scale: Vec<f64>,
+    /// The estimator that the pilot's log calls for, and all trials' with it.
+    pub estimator: Estimator,
     /// The covariance that the pilot's log calls for, and all trials' with it.
     pub covariance: CovarianceKind,
     /// The noise-free run.
@@ -68,23 +70,37 @@ impl Experiment {
         let recording = run_plant(&scenario, None)?;
         let sensors = Sensors::new(&scenario.sensors, &scenario.arm, scenario.plant.log_rate_hz)?;
         let scale = vec![1.0; truth.len()];
-        let covariance = CovarianceKind::Wls;
-        let mut experiment = Self { scenario, model, truth, scale, covariance, recording, sensors };
-        let pilot = experiment.worker().identify(PILOT)?;
+        let pilot_options = scenario.processing.clone();
+        let mut experiment = Self {
+            scenario,
+            model,
+            truth,
+            scale,
+            estimator: Estimator::Wls,
+            covariance: CovarianceKind::Wls,
+            recording,
+            sensors,
+        };
+        let pilot = experiment.worker_with(pilot_options).identify(PILOT)?;
         experiment.scale = pilot.sigma();
+        experiment.estimator = pilot.fit.estimator;
         experiment.covariance = pilot.covariance.kind;
         Ok(experiment)
     }
 
     /// What one thread needs to run trials.
     pub fn worker(&self) -> Worker<'_> {
+        self.worker_with(Options {
+            estimator: Some(self.estimator),
+            covariance: Some(self.covariance),
+            ..self.scenario.processing.clone()
+        })
+    }
+
+    fn worker_with(&self, options: Options) -> Worker<'_> {
         Worker {
             experiment: self,
-            identifier: Identifier::new(
-                &self.model,
-                &self.scenario.set,
-                self.scenario.processing.clone(),
-            ),
+            identifier: Identifier::new(&self.model, &self.scenario.set, options),
             measured: Measured::like(&self.recording),
         }
     }

@@ -170,7 +170,7 @@ impl Shard {
                 scenario_sha256: scenario.sha256.clone(),
                 seed: scenario.seed,
                 trials,
-                estimator: scenario.processing.estimator.to_string(),
+                estimator: experiment.estimator.to_string(),
                 covariance: experiment.covariance.to_string(),
                 parameters,
             },

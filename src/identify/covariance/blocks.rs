@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{Covariance, CovarianceError, CovarianceKind, CovarianceMethod, sandwich};
 use crate::identify::fit::Fit;
-use crate::identify::problem::Problem;
+use crate::identify::problem::{Domain, Problem};
 
 /// V = A⁻¹ Ω A⁻¹ with the scores G_b = Σ_{t in block b} X_tᵀW²e_t of B blocks of time,
 /// Ω = B/(B − 1) Σ G_b G_bᵀ, and Student's t of B − 1 degrees of freedom.
@@ -21,6 +21,9 @@ const LEAST_BLOCKS: usize = 6;
 
 impl CovarianceMethod for BlockCluster {
     fn covariance(&self, problem: &Problem, fit: &Fit) -> Result<Covariance, CovarianceError> {
+        if problem.domain == Domain::Frequency {
+            return Err(CovarianceError::NotInTime { what: "blocks of time" });
+        }
         let n = problem.samples;
         let seconds = (n * problem.periods) as f64 / problem.rate_hz;
         // Short records get shorter blocks rather than none.

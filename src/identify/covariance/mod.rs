@@ -8,6 +8,7 @@ mod blocks;
 mod ols;
 mod paper;
 mod periods;
+mod spectral;
 mod wls;
 
 use nalgebra::DMatrix;
@@ -19,6 +20,7 @@ pub use blocks::BlockCluster;
 pub use ols::OrdinaryLeastSquares;
 pub use paper::Paper;
 pub use periods::PeriodReplicates;
+pub use spectral::SpectralSandwich;
 pub use wls::WeightedLeastSquares;
 
 use super::fit::Fit;
@@ -69,6 +71,8 @@ pub enum CovarianceKind {
     Wls,
     /// Scatter of the estimates of single periods.
     Periods,
+    /// Scatter between periods, frequency by frequency.
+    Spectral,
     /// Scatter of the score over blocks of time.
     Blocks,
 }
@@ -80,6 +84,7 @@ impl std::fmt::Display for CovarianceKind {
             Self::Ols => "ols",
             Self::Wls => "wls",
             Self::Periods => "periods",
+            Self::Spectral => "spectral",
             Self::Blocks => "blocks",
         })
     }
@@ -93,6 +98,15 @@ pub enum CovarianceError {
     TooFewPeriods {
         /// Whole periods found.
         periods: usize,
+    },
+    /// Needs samples in the order of time.
+    #[error(
+        "a covariance from {what} needs an estimator that works in the time domain (ols, wls), not \
+         one that works frequency by frequency"
+    )]
+    NotInTime {
+        /// What it is made from.
+        what: &'static str,
     },
     /// Needs a longer record.
     #[error(
@@ -123,6 +137,7 @@ impl CovarianceKind {
             Self::Ols => &OrdinaryLeastSquares,
             Self::Wls => &WeightedLeastSquares,
             Self::Periods => &PeriodReplicates,
+            Self::Spectral => &SpectralSandwich,
             Self::Blocks => &BlockCluster,
         }
     }

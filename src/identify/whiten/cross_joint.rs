@@ -1,0 +1,91 @@
+//! Noise that the joints share.
+
+use nalgebra::DMatrix;
+
+use crate::identify::problem::Problem;
+
+/// U, upper triangular, with U C Uᵀ = 1 for a correlation matrix C: row j mixes joint j with those
+/// behind it only, so that wrist equations keep their few columns. The identity where C is not
+/// positive definite to within rounding.
+pub fn decorrelation(correlation: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = correlation.nrows();
+    let reversed = DMatrix::from_fn(n, n, |i, k| correlation[(n - 1 - i, n - 1 - k)]);
+    let inverse = nalgebra::Cholesky::new(reversed)
+        .filter(|factor| factor.l_dirty().diagonal().min() > 1e-4)
+        .and_then(|factor| factor.l().try_inverse());
+    match inverse {
+        Some(inverse) => DMatrix::from_fn(n, n, |i, k| inverse[(n - 1 - i, n - 1 - k)]),
+        None => DMatrix::identity(n, n),
+    }
+}
+
+/// Correlation of the joints from sums of products of their deviations; a joint without any is
+/// uncorrelated.
+pub fn correlation(products: &DMatrix<f64>) -> DMatrix<f64> {
+    DMatrix::from_fn(products.nrows(), products.nrows(), |i, k| {
+        let scale = (products[(i, i)] * products[(k, k)]).sqrt();
+        if i == k {
+            1.0
+        } else if scale > 0.0 {
+            products[(i, k)] / scale
+        } else {
+            0.0
+        }
+    })
+}
+
+/// Equation j of `out` = Σ_{i ≥ j} U_ji · weight_i · equation i of `problem`, row by row;
+/// `weights[i]` has one entry per row. `out` has the cumulative plan of `problem`.
+pub fn mix(problem: &Problem, weights: &[Vec<f64>], u: &DMatrix<f64>, out: &mut Problem) {
+    let n = problem.samples;
+    out.samples = n;
+    out.periods = problem.periods;
+    out.rate_hz = problem.rate_hz;
+    out.domain = problem.domain;
+    for (j, target) in out.panels.iter_mut().enumerate() {
+        let bases: Vec<usize> = out.plan.base_indices(j).collect();
+        target.x.clear();
+        target.x.resize(bases.len() * n, 0.0);
+        target.y.clear();
+        target.y.resize(problem.periods * n, 0.0);
+        for i in j..problem.joints() {
+            let factor = u[(j, i)];
+            if factor == 0.0 {
+                continue;
+            }
+            let source = &problem.panels[i];
+            for (base, column) in problem.plan.base_indices(i).zip(source.x.chunks_exact(n)) {
+                let at = bases.partition_point(|b| *b < base);
+                add(factor, &weights[i], column, &mut target.x[at * n..(at + 1) * n]);
+            }
+            for (y, out) in source.y.chunks_exact(n).zip(target.y.chunks_exact_mut(n)) {
+                add(factor, &weights[i], y, out);
+            }
+        }
+    }
+}
+
+fn add(factor: f64, weights: &[f64], values: &[f64], out: &mut [f64]) {
+    for ((out, value), weight) in out.iter_mut().zip(values).zip(weights) {
+        *out += factor * weight * value;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mixed_joints_are_uncorrelated() {
+        let c = DMatrix::from_fn(6, 6, |i, k| if i == k { 1.0 } else { 0.3 / (1 + i + k) as f64 });
+        let u = decorrelation(&c);
+        let one = &u * &c * u.transpose();
+        assert!((one - DMatrix::identity(6, 6)).amax() < 1e-14);
+        assert_eq!(u, u.upper_triangle());
+    }
+
+    #[test]
+    fn a_copy_of_another_joint_is_left_as_it_is() {
+        assert_eq!(decorrelation(&DMatrix::from_element(2, 2, 1.0)), DMatrix::identity(2, 2));
+    }
+}

@@ -1,0 +1,12 @@
+//! Problems with the same parameters and whiter noise.
+//!
+//! Enters: a [`Problem`](super::problem::Problem). Leaves: another one, whose rows are combinations
+//! of its rows chosen so that noise is alike and independent from row to row: plain least squares on
+//! it is the weighted least squares of the one that entered.
+
+mod cross_joint;
+mod replicates;
+mod spectrum;
+
+pub(super) use replicates::ReplicateWhitening;
+pub(super) use spectrum::Spectrum;

@@ -1,0 +1,122 @@
+//! Every frequency and joint weighted by the noise that the periods show there.
+
+use nalgebra::DMatrix;
+
+use super::cross_joint::{correlation, decorrelation, mix};
+use super::spectrum::Spectrum;
+use crate::identify::problem::Problem;
+
+/// Whitening by the scatter between periods.
+///
+/// With the Fourier coefficients Y_pk of period p and their mean Ȳ_k, the noise of joint j at
+/// harmonic k has the variance s²_jk = Σ_p |Y_jpk − Ȳ_jk|²/(P − 1), averaged over the neighbouring
+/// harmonics (k ± max(3, k/4), k itself left out), and the joints have the correlation C of the
+/// deviations over s, pooled over all harmonics. Rows become U diag(1/s_k) · row with U C Uᵀ = 1.
+///
+/// For Gaussian noise Ȳ and the scatter are independent, so that least squares on the whitened rows
+/// is unbiased whatever the scatter is; leaving k out of its own weight keeps the scatter of the
+/// whitened rows an honest measure of their noise.
+#[derive(Default)]
+pub struct ReplicateWhitening {
+    spectrum: Spectrum,
+    rows: Option<Problem>,
+    weights: Vec<Vec<f64>>,
+}
+
+/// Neighbours on either side that a weight is averaged over: at least these …
+const LEAST_NEIGHBOURS: usize = 3;
+/// … and this part of the harmonic's own number.
+const NEIGHBOUR_SHARE: usize = 4;
+/// Weights of rows almost without noise are bounded by this much of the noisiest row's noise.
+const LEAST_NOISE: f64 = 1e-9;
+
+impl ReplicateWhitening {
+    /// Writes the whitened mean and harmonics 1 … `harmonics` of `problem` into `out`, which has the
+    /// cumulative plan of `problem`. Needs two periods or more.
+    pub fn whiten(&mut self, problem: &Problem, harmonics: usize, out: &mut Problem) {
+        let rows = self.rows.get_or_insert_with(|| Problem::new(problem.plan.clone(), 0.0));
+        self.spectrum.transform(problem, harmonics, rows);
+        let (n, periods) = (rows.samples, rows.periods);
+        let mut deviations: Vec<Vec<f64>> = rows.panels.iter().map(|p| p.y.clone()).collect();
+        self.weights.resize(rows.joints(), Vec::new());
+        let mut noisiest: f64 = 0.0;
+        for (deviations, weights) in deviations.iter_mut().zip(&mut self.weights) {
+            subtract_mean(deviations, n);
+            *weights = vec![0.0; n];
+            for period in deviations.chunks_exact(n) {
+                weights.iter_mut().zip(period).for_each(|(w, d)| *w += d * d);
+            }
+            weights.iter_mut().for_each(|w| *w /= (periods - 1) as f64);
+            smooth(weights);
+            noisiest = weights.iter().fold(noisiest, |a, w| a.max(*w));
+        }
+        let floor = (LEAST_NOISE.powi(2) * noisiest).max(f64::MIN_POSITIVE);
+        for weight in self.weights.iter_mut().flatten() {
+            *weight = if noisiest > 0.0 { 1.0 / weight.max(floor).sqrt() } else { 1.0 };
+        }
+        let products = DMatrix::from_fn(rows.joints(), rows.joints(), |i, k| {
+            let weights = self.weights[i].iter().zip(&self.weights[k]).cycle();
+            let products = deviations[i].iter().zip(&deviations[k]).zip(weights);
+            products.map(|((a, b), (wa, wb))| a * wa * b * wb).sum()
+        });
+        mix(rows, &self.weights, &decorrelation(&correlation(&products)), out);
+    }
+}
+
+/// y − ȳ, with the mean over the chunks of `n`.
+fn subtract_mean(y: &mut [f64], n: usize) {
+    let periods = (y.len() / n) as f64;
+    for k in 0..n {
+        let mean = y[k..].iter().step_by(n).sum::<f64>() / periods;
+        y[k..].iter_mut().step_by(n).for_each(|v| *v -= mean);
+    }
+}
+
+/// Variances per row replaced by the mean over neighbouring harmonics without their own.
+fn smooth(variances: &mut [f64]) {
+    let last = variances.len() / 2;
+    let first_row = |h: usize| if h == 0 { 0 } else { 2 * h - 1 };
+    let mut sums = Vec::with_capacity(variances.len() + 1);
+    let mut sum = 0.0;
+    sums.push(sum);
+    for v in variances.iter() {
+        sum += v;
+        sums.push(sum);
+    }
+    for h in 0..=last {
+        let reach = (h / NEIGHBOUR_SHARE).max(LEAST_NEIGHBOURS);
+        let window = first_row(h.saturating_sub(reach))..2 * (h + reach).min(last) + 1;
+        let own = first_row(h)..2 * h + 1;
+        let others = (window.len() - own.len()).max(1) as f64;
+        let over = |r: &std::ops::Range<usize>| sums[r.end] - sums[r.start];
+        let mean = (over(&window) - over(&own)).max(0.0) / others;
+        variances[own].fill(mean);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_weight_knows_its_neighbours_but_not_itself() {
+        let mut variances = vec![1.0; 41];
+        variances[19] = 8.0;
+        variances[20] = 8.0;
+        smooth(&mut variances);
+        // Harmonic 10 itself, then 8 … 12 with windows of ± 3.
+        assert!((variances[19] - 1.0).abs() < 1e-12 && (variances[20] - 1.0).abs() < 1e-12);
+        assert!((variances[21] - (10.0 + 16.0) / 12.0).abs() < 1e-12);
+        // The mean (row 0) sees harmonics 1 to 3.
+        assert!((variances[0] - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn deviations_sum_to_zero() {
+        let mut y: Vec<f64> = (0..12).map(|k| (k * k) as f64).collect();
+        subtract_mean(&mut y, 4);
+        for k in 0..4 {
+            assert!((y[k] + y[k + 4] + y[k + 8]).abs() < 1e-12);
+        }
+    }
+}
