@@ -9,7 +9,7 @@ use std::error::Error;
 use armid::base::{BaseSet, Parameterisation};
 use armid::dynamics::Model;
 use armid::excitation::design::{Experiment, Prediction};
-use armid::excitation::{FourierSeries, LimitKind, Requirements, check};
+use armid::excitation::{FourierSeries, Requirements, check};
 use armid::report::{Column, Table};
 use armid::robot::Arm;
 use serde::Deserialize;
@@ -60,9 +60,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             // Without any clearance asked for, the margin of a distance is the distance.
             let requirements = Requirements { clearance_m: 0.0, ..Requirements::default() };
             let margins = check(&arm, &requirements, &series)?;
-            let distances = margins.all().iter().filter(|m| {
-                matches!(m.limit, LimitKind::Clearance { .. } | LimitKind::Floor { .. })
-            });
+            let distances = margins.all().iter().filter(|m| m.limit.unit() == "m");
             let least = distances.map(|m| m.free).fold(f64::INFINITY, f64::min);
             let worst = check(&arm, &Requirements::default(), &series)?;
             let worst = worst.worst();

@@ -6,6 +6,7 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use nalgebra::Vector3;
 use serde::Serialize;
 use thiserror::Error as ThisError;
 
@@ -19,7 +20,7 @@ use crate::excitation::{Requirements, TRAJECTORY_SCHEMA};
 use crate::output::{check_writable, write_atomically};
 use crate::report::excitation::page;
 use crate::report::json::{Document, Input, Program};
-use crate::robot::{Arm, Joint};
+use crate::robot::{Arm, CellBox, Joint};
 
 /// Design the motion that tells most about the parameters, inside all limits.
 #[derive(Debug, Args)]
@@ -49,6 +50,9 @@ pub struct ExciteArgs {
     /// Smallest distance of the arm from itself and the floor, m.
     #[arg(long = "clearance", value_name = "M", default_value_t = 0.02)]
     clearance_m: f64,
+    /// A box in the cell to stay clear of, two corners in the base frame, m; may be given again.
+    #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1", allow_hyphen_values = true)]
+    boxes: Vec<String>,
     /// Share of the torque limits the nominal model may need.
     #[arg(long, value_name = "0…1", default_value_t = 0.9)]
     torque_share: f64,
@@ -174,7 +178,11 @@ struct FinalistRecord {
 
 /// Designs, prints what was found, and writes it.
 pub fn run(args: &ExciteArgs) -> CommandResult {
-    let arm = Arm::load(&args.robot)?;
+    let mut arm = Arm::load(&args.robot)?;
+    for corners in &args.boxes {
+        arm.clearance.boxes.push(cell_box(corners)?);
+    }
+    let arm = arm;
     let base = BaseSet::find(&arm, Parameterisation::full(arm.dof(), false))?;
     let spec = specification(args, &arm, &base)?;
     let outputs =
@@ -274,6 +282,25 @@ fn specification(
     };
     spec.check(arm)?;
     Ok(spec)
+}
+
+/// A box from its two corners, in any order.
+fn cell_box(corners: &str) -> Result<CellBox, BadOption> {
+    let numbers: Option<Vec<f64>> = corners
+        .split(',')
+        .map(|word| word.trim().parse().ok().filter(|x: &f64| x.is_finite()))
+        .collect();
+    match numbers.as_deref() {
+        Some(&[x0, y0, z0, x1, y1, z1]) => {
+            let (a, b) = (Vector3::new(x0, y0, z0), Vector3::new(x1, y1, z1));
+            Ok(CellBox { low_m: a.inf(&b), high_m: a.sup(&b) })
+        }
+        _ => Err(BadOption {
+            option: "box",
+            value: corners.to_owned(),
+            message: "six numbers X0,Y0,Z0,X1,Y1,Z1 are expected".into(),
+        }),
+    }
 }
 
 /// `free` or a number per joint; nothing given: all free.

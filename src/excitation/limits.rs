@@ -61,6 +61,13 @@ pub enum LimitKind {
         /// The capsule.
         capsule: String,
     },
+    /// Distance of a capsule from a box of the cell, m.
+    Box {
+        /// The capsule.
+        capsule: String,
+        /// Position of the box in the robot's list, from 0.
+        which: usize,
+    },
 }
 
 impl LimitKind {
@@ -71,7 +78,7 @@ impl LimitKind {
             Self::Velocity { .. } => "rad/s",
             Self::Acceleration { .. } => "rad/s²",
             Self::Torque { .. } => "Nm",
-            Self::Clearance { .. } | Self::Floor { .. } => "m",
+            Self::Clearance { .. } | Self::Floor { .. } | Self::Box { .. } => "m",
         }
     }
 }
@@ -85,6 +92,9 @@ impl fmt::Display for LimitKind {
             Self::Torque { joint } => write!(f, "torque of joint {}", joint + 1),
             Self::Clearance { one, other } => write!(f, "clearance of {one} and {other}"),
             Self::Floor { capsule } => write!(f, "clearance of {capsule} and floor"),
+            Self::Box { capsule, which } => {
+                write!(f, "clearance of {capsule} and box {}", which + 1)
+            }
         }
     }
 }

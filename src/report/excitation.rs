@@ -178,6 +178,7 @@ impl Samples {
             let name = match model.limit(k) {
                 LimitKind::Clearance { one, other } => format!("{one} – {other}"),
                 LimitKind::Floor { capsule } => format!("{capsule} – floor"),
+                LimitKind::Box { capsule, which } => format!("{capsule} – box {}", which + 1),
                 joint_limit => joint_limit.to_string(),
             };
             plot = plot.with(

@@ -130,6 +130,17 @@ pub struct Clearance {
     pub pairs: Vec<[usize; 2]>,
     /// Height of the floor in the base frame, m; `None`: no floor.
     pub floor_z_m: Option<f64>,
+    /// What else stands in the cell.
+    pub boxes: Vec<CellBox>,
+}
+
+/// A box in the cell, its edges along the axes of the base frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CellBox {
+    /// Corner with the smallest coordinates, m.
+    pub low_m: Vector3<f64>,
+    /// Corner with the largest coordinates, m.
+    pub high_m: Vector3<f64>,
 }
 
 /// A segment with a radius, fixed in a body.

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 
-use super::arm::{Arm, Capsule, Clearance, Drive, Joint, Limits, Placement};
+use super::arm::{Arm, Capsule, CellBox, Clearance, Drive, Joint, Limits, Placement};
 use super::error::RobotError;
 use super::inertia::LinkInertia;
 use super::urdf::{UrdfArm, UrdfNotice, read_urdf};
@@ -78,6 +78,8 @@ struct RobotFile {
     joints: Vec<JointEntry>,
     #[serde(default, rename = "capsule")]
     capsules: Vec<CapsuleEntry>,
+    #[serde(default, rename = "box")]
+    boxes: Vec<BoxEntry>,
 }
 
 fn fits_offsets() -> bool {
@@ -133,6 +135,13 @@ struct CapsuleEntry {
     radius_m: f64,
 }
 
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BoxEntry {
+    low_m: [f64; 3],
+    high_m: [f64; 3],
+}
+
 impl RobotFile {
     fn into_arm(self, source: &str) -> Result<Arm, RobotError> {
         let fault = |what: String| RobotError::Invalid { file: source.to_owned(), what };
@@ -164,6 +173,19 @@ impl RobotFile {
                 )));
             }
         }
+        let boxes = self
+            .boxes
+            .iter()
+            .map(|b| {
+                if (0..3).all(|k| b.low_m[k] < b.high_m[k]) {
+                    return Ok(CellBox { low_m: b.low_m.into(), high_m: b.high_m.into() });
+                }
+                Err(fault(format!(
+                    "box: low_m = {:?} must be below high_m = {:?} in every coordinate",
+                    b.low_m, b.high_m
+                )))
+            })
+            .collect::<Result<Vec<_>, RobotError>>()?;
         let clearance = Clearance {
             capsules: self
                 .capsules
@@ -178,6 +200,7 @@ impl RobotFile {
                 .collect(),
             pairs,
             floor_z_m: self.floor_z_m,
+            boxes,
         };
         let joints = self
             .joints

@@ -52,6 +52,11 @@ impl Specification {
         if self.prior_sigma.is_some() && !self.criterion.whitened() {
             return Err(DesignError::PriorUnused);
         }
+        let clearance_m = self.requirements.clearance_m;
+        if !(clearance_m >= 0.0 && clearance_m.is_finite()) {
+            let (what, must) = ("the clearance".to_owned(), "finite and not negative".to_owned());
+            return Err(DesignError::Value { what, value: clearance_m, must });
+        }
         let share = self.requirements.torque_share;
         if !(share > 0.0 && share <= 1.0) {
             let what = "the share of the torque".to_owned();

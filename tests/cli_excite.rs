@@ -1,0 +1,73 @@
+//! `armid excite` from the outside: exit codes, messages, and outputs that are whole or not there.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn excite(folder: &Path, words: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_armid"))
+        .current_dir(folder)
+        .arg("excite")
+        .args(words)
+        .output()
+        .unwrap()
+}
+
+fn message(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn a_small_design_writes_every_output() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = "--robot ur5 --order 3 --starts 2 --finalists 1 --out t.json --csv t.csv \
+                 --urscript t.script --report t.html --box 0.4,-0.5,0,0.9,0.5,0.3";
+    let output = excite(folder.path(), &words.split_whitespace().collect::<Vec<_>>());
+    assert_eq!(output.status.code(), Some(0), "{}", message(&output));
+    let series =
+        armid::excitation::FourierSeries::load(folder.path().join("t.json").to_str().unwrap());
+    assert_eq!(series.unwrap().order(), 3);
+    let text = std::fs::read_to_string(folder.path().join("t.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(json["design"]["cut_short"], false);
+    assert_eq!(json["program"]["seed"], 1);
+    let margins = json["design"]["margins"].as_array().unwrap();
+    assert!(margins.len() > 24 && margins.iter().all(|m| m["free"].as_f64().unwrap() >= 0.0));
+    let page = std::fs::read_to_string(folder.path().join("t.html")).unwrap();
+    assert!(page.contains("forearm and wrist 3") && page.contains("The swept arm"));
+    assert!(folder.path().join("t.csv").exists() && folder.path().join("t.script").exists());
+}
+
+/// Exit code 3, a reason, and no file: a run without a design must not look like one with.
+#[test]
+fn an_infeasible_task_writes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = "--robot ur5 --order 2 --starts 2 --clearance 0.9 --out t.json --csv t.csv";
+    let output = excite(folder.path(), &words.split_whitespace().collect::<Vec<_>>());
+    assert_eq!(output.status.code(), Some(3));
+    assert!(message(&output).contains("nothing was written"), "{}", message(&output));
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn bad_input_is_named_before_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let fails = |words: &str, expected: &str| {
+        let output = excite(folder.path(), &words.split_whitespace().collect::<Vec<_>>());
+        assert_eq!(output.status.code(), Some(1), "{words}: {}", message(&output));
+        assert!(message(&output).contains(expected), "{words}: {}", message(&output));
+    };
+    fails("--robot ur6 --out t.json", "ur6");
+    fails("--robot ur5 --out no/such/folder/t.json", "no/such/folder");
+    fails("--robot ur5 --out t.json --offsets 0,0", "6 joints");
+    fails("--robot ur5 --out t.json --offsets 0,x,0,0,0,0", "\"x\"");
+    fails("--robot ur5 --out t.json --offsets 0,0.5,0,0,0,0", "floor");
+    fails("--robot ur5 --out t.json --noise-nm 1,1", "6 joints");
+    fails("--robot ur5 --out t.json --period nan", "NaN");
+    fails("--robot ur5 --out t.json --seconds 0", "seconds");
+    fails("--robot ur5 --out t.json --speed 2", "speed");
+    fails("--robot ur5 --out t.json --clearance=-1", "-1");
+    fails("--robot ur5 --out t.json --prior no.json", "no.json");
+    fails("--robot ur5 --out t.json --box 0,1,2", "six numbers");
+    fails("--robot ur5 --out t.json --period-range 1,2,3", "LOW,HIGH");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
