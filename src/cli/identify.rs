@@ -8,12 +8,14 @@ use super::{CommandResult, Outcome};
 use crate::base::{BaseSet, Parameterisation};
 use crate::dynamics::Model;
 use crate::identify::covariance::CovarianceKind;
-use crate::identify::{Estimator, Identifier, Measurement, Options, Regression};
+use crate::identify::{
+    Estimator, FitError, Identifier, IdentifyError, Measurement, Options, Regression,
+};
 use crate::log::{Layout, Log, read_log};
 use crate::output::check_writable;
 use crate::report::identify::{
-    IDENTIFY_SCHEMA, Result as IdentifyResult, Training, Validation, page, parameter_table,
-    residual_table,
+    Declined, IDENTIFY_SCHEMA, Result as IdentifyResult, Training, Validation, page,
+    parameter_table, residual_table,
 };
 use crate::report::json::{Document, Input, Program};
 use crate::robot::{Arm, JointSignals};
@@ -180,11 +182,20 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         .map(|log| identifier.regression(&log.measurement()))
         .collect::<Result<_, _>>()?;
     let regression = Regression::joined(regressions)?;
-    let identification = identifier.identify_regression(&regression)?;
+    let inputs = logs.iter().chain(&validation_logs).map(|l| l.input.clone()).collect();
+    let program = Program::new(std::env::args(), None, inputs);
+    let logs: Vec<&Log> = logs.iter().map(|l| &l.log).collect();
+    let identification = match identifier.identify_regression(&regression) {
+        Err(IdentifyError::Fit(FitError::NotExcited { parameters })) => {
+            return decline(args, &Declined::new(&arm, &logs, &regression, parameters), program);
+        }
+        other => other?,
+    };
     let training = Training {
         arm: &arm,
         set: &set,
-        logs: &logs.iter().map(|l| &l.log).collect::<Vec<_>>(),
+        logs: &logs,
+        nominal: &set.values(&model.standard_parameters()),
         regression: &regression,
         identification: &identification,
     };
@@ -199,8 +210,6 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         println!("note: {warning}");
     }
     println!("\n{}", result.sentence());
-    let inputs = logs.iter().chain(&validation_logs).map(|l| l.input.clone()).collect();
-    let program = Program::new(std::env::args(), None, inputs);
     if let Some(path) = &args.json {
         Document { schema: IDENTIFY_SCHEMA, program: &program, body: &result }.write(path)?;
     }
@@ -209,6 +218,19 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         println!("report: {}", path.display());
     }
     Ok(if result.is_declined() { Outcome::Negative } else { Outcome::Done })
+}
+
+/// Writes what can be said of a log whose motion leaves parameters without any trace in the torque.
+fn decline(args: &IdentifyArgs, declined: &Declined, program: Program) -> CommandResult {
+    println!("\n{}", declined.sentence());
+    if let Some(path) = &args.json {
+        Document { schema: IDENTIFY_SCHEMA, program: &program, body: declined }.write(path)?;
+    }
+    if let Some(path) = &args.report {
+        declined.page(program).write(path)?;
+        println!("report: {}", path.display());
+    }
+    Ok(Outcome::Negative)
 }
 
 /// Predicts a log that was not used for the fit, with the same processing.

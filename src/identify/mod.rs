@@ -23,5 +23,5 @@ pub use options::Options;
 pub use prediction::{MOVING_RAD_S, Prediction};
 pub use prepare::{Measurement, Prepared, Preparer, Processing};
 pub use problem::{Assembler, Domain, Panel, Problem};
-pub use quality::{Condition, identifies_the_arm, not_identified, plausible_size};
+pub use quality::{Condition, gravity_ratio, identifies_the_arm, not_identified, plausible_size};
 pub use triangle::Triangle;

@@ -12,7 +12,7 @@ use crate::base::BaseSet;
 use crate::identify::covariance::CovarianceKind;
 use crate::identify::{
     Condition, Estimator, FitError, Identification, Prediction, Processing, Regression, Residual,
-    identifies_the_arm, not_identified,
+    gravity_ratio, identifies_the_arm, not_identified,
 };
 use crate::log::Log;
 use crate::robot::{Arm, JointSignals};
@@ -35,6 +35,58 @@ pub struct Training<'a> {
     pub regression: &'a Regression,
     /// The solution.
     pub identification: &'a Identification,
+    /// Base parameters by the robot's description.
+    pub nominal: &'a [f64],
+}
+
+/// The JSON of a log that leaves parameters without any trace in the torque: same schema, nothing
+/// estimated.
+#[derive(Debug, Clone, Serialize)]
+pub struct Declined {
+    robot: String,
+    log: Vec<String>,
+    processing: Processing,
+    base_parameters: Vec<BaseParameter>,
+    standard_parameters: Option<Vec<()>>,
+    not_identified: Vec<String>,
+    warnings: Vec<String>,
+    rows: Rows,
+    verdict: &'static str,
+}
+
+impl Declined {
+    /// `parameters`: names of the base parameters whose columns vanish or coincide.
+    pub fn new(arm: &Arm, logs: &[&Log], regression: &Regression, parameters: Vec<String>) -> Self {
+        Self {
+            robot: arm.name.clone(),
+            log: logs.iter().map(|log| log.source.clone()).collect(),
+            processing: regression.prepared.processing.clone(),
+            base_parameters: Vec::new(),
+            standard_parameters: None,
+            not_identified: parameters,
+            warnings: regression.prepared.warnings.clone(),
+            rows: Rows::of(logs),
+            verdict: NOT_IDENTIFIED,
+        }
+    }
+
+    /// The verdict in a sentence.
+    pub fn sentence(&self) -> String {
+        format!(
+            "Declined: this motion does not identify the arm. Along it the columns of {} vanish or \
+             depend on the others to within rounding. Record a motion that excites them (armid \
+             excite).",
+            self.not_identified.join(", ")
+        )
+    }
+
+    /// A page with the verdict alone.
+    pub fn page(&self, program: Program) -> Page {
+        let facts = vec![format!("{} rows read, {} used", self.rows.read, self.rows.used)];
+        let verdict = Verdict { status: Status::Bad, sentence: self.sentence(), facts };
+        let subtitle = format!("{} from {}", self.robot, self.log.join(", "));
+        Page::new("Identified parameters", subtitle, verdict, program)
+    }
 }
 
 /// A prediction of a log that was not used for the fit.
@@ -136,6 +188,28 @@ struct SetAside {
     count: usize,
 }
 
+impl Rows {
+    fn of(logs: &[&Log]) -> Self {
+        let mut rows = Self { read: 0, used: 0, set_aside: Vec::new() };
+        for log in logs {
+            rows.read += log.rows.read;
+            rows.used += log.rows.used;
+            for part in &log.rows.set_aside {
+                let (reason, count) = (part.reason.text(), part.count);
+                match rows.set_aside.iter_mut().find(|known| known.reason == reason) {
+                    Some(known) => known.count += count,
+                    None => rows.set_aside.push(SetAside { reason, count }),
+                }
+            }
+        }
+        rows
+    }
+}
+
+/// Factor between gravity found and described beyond which it is remarked on: payloads and
+/// tolerances of drive gains stay below.
+const GRAVITY_OFF: f64 = 1.5;
+
 impl Result {
     /// Collects everything that is said.
     pub fn of(
@@ -160,17 +234,14 @@ impl Result {
                 }
             })
             .collect();
-        let mut rows = Rows { read: 0, used: 0, set_aside: Vec::new() };
-        for log in training.logs {
-            rows.read += log.rows.read;
-            rows.used += log.rows.used;
-            for part in &log.rows.set_aside {
-                let (reason, count) = (part.reason.text(), part.count);
-                match rows.set_aside.iter_mut().find(|known| known.reason == reason) {
-                    Some(known) => known.count += count,
-                    None => rows.set_aside.push(SetAside { reason, count }),
-                }
-            }
+        let mut warnings = identification.warnings.clone();
+        let ratio = gravity_ratio(arm, set, training.nominal, &identification.fit.theta);
+        if let Some(ratio) = ratio.filter(|r| !(1.0 / GRAVITY_OFF..GRAVITY_OFF).contains(r)) {
+            warnings.push(format!(
+                "gravity torque is {ratio:.2} times what the description of {} says: another robot, \
+                 a payload, or drive gains that are off?",
+                arm.name
+            ));
         }
         Ok(Self {
             robot: arm.name.clone(),
@@ -189,8 +260,8 @@ impl Result {
             verdict: if identifies_the_arm(arm, set, &open) { IDENTIFIED } else { NOT_IDENTIFIED },
             not_identified: open.iter().map(|&k| set.name(k).to_owned()).collect(),
             validation: validations.iter().map(ValidationJson::of).collect(),
-            warnings: identification.warnings.clone(),
-            rows,
+            warnings,
+            rows: Rows::of(training.logs),
         })
     }
 

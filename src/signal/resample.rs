@@ -46,7 +46,10 @@ pub fn natural_rate_hz(time_s: &[f64]) -> Result<f64, SignalError> {
     let mut steps: Vec<f64> = time_s.windows(2).map(|t| t[1] - t[0]).collect();
     let middle = steps.len() / 2;
     let (_, median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
-    Ok(1.0 / *median)
+    // Differences of large time stamps carry rounding; no clock is known to more than nine digits.
+    let rate_hz = 1.0 / *median;
+    let unit = 10f64.powi(rate_hz.log10().floor() as i32 - 8);
+    Ok((rate_hz / unit).round() * unit)
 }
 
 /// Stretches between neighbouring time stamps that are longer than `limit_s`.
