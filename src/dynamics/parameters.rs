@@ -1,5 +1,7 @@
 //! Names, order and units of the standard parameters: the columns of the full regressor.
 
+use crate::robot::{Arm, LinkInertia};
+
 /// The ten inertial parameters of a body in the paper's order (7).
 pub const BODY_PARAMETERS: [&str; 10] = ["m", "mx", "my", "mz", "A", "B", "C", "D", "E", "F"];
 
@@ -77,6 +79,21 @@ impl ParameterLayout {
         }
     }
 
+    /// `arm` with other standard parameters (at least 13 N of them). Constant torques have no place in
+    /// an [`Arm`] and are not taken over.
+    pub fn apply(&self, standard: &[f64], arm: &Arm) -> Arm {
+        let value = |parameter| standard[self.index(parameter)];
+        let mut arm = arm.clone();
+        for (j, joint) in arm.joints.iter_mut().enumerate() {
+            let parameters = std::array::from_fn(|k| value(Parameter::Body(j, k)));
+            joint.link = LinkInertia { parameters };
+            joint.drive.rotor_inertia_kg_m2 = value(Parameter::RotorInertia(j));
+            joint.drive.viscous_nm_s_rad = value(Parameter::Viscous(j));
+            joint.drive.coulomb_nm = value(Parameter::Coulomb(j));
+        }
+        arm
+    }
+
     /// SI unit.
     pub fn unit(&self, index: usize) -> &'static str {
         match self.parameter(index) {
@@ -104,5 +121,12 @@ mod tests {
         assert_eq!(layout.name(60), "Ia1");
         assert_eq!(layout.name(77), "rc6");
         assert_eq!(layout.name(83), "off6");
+    }
+
+    #[test]
+    fn an_arm_takes_its_own_parameters_without_change() {
+        let arm = Arm::built_in("ur10e").unwrap();
+        let standard = crate::dynamics::Model::new(&arm).standard_parameters();
+        assert_eq!(ParameterLayout::new(6).apply(&standard, &arm), arm);
     }
 }

@@ -1,6 +1,7 @@
 //! From a log to parameters with an uncertainty: sections III-D and IV-B of the paper.
 
 pub mod covariance;
+pub mod physical;
 
 mod columns;
 mod error;

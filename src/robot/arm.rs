@@ -39,6 +39,17 @@ pub struct Joint {
     pub drive: Drive,
     /// What the joint may do.
     pub limits: Limits,
+    /// What is known of the moved body beforehand.
+    pub bounds: LinkBounds,
+}
+
+/// What a physically consistent estimate of a body must respect, where it is known.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LinkBounds {
+    /// Least and greatest mass, kg.
+    pub mass_kg: Option<[f64; 2]>,
+    /// Box that holds the centre of mass, in the joint frame: [low, high] of x, y, z, m.
+    pub com_m: Option<[[f64; 2]; 3]>,
 }
 
 /// A rigid transform: `p_parent = rotation · p_child + translation_m`.

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 
-use super::arm::{Arm, Capsule, CellBox, Clearance, Drive, Joint, Limits, Placement};
+use super::arm::{Arm, Capsule, CellBox, Clearance, Drive, Joint, Limits, LinkBounds, Placement};
 use super::error::RobotError;
 use super::inertia::LinkInertia;
 use super::urdf::{UrdfArm, UrdfNotice, read_urdf};
@@ -112,6 +112,10 @@ struct JointEntry {
     velocity_rad_s: f64,
     acceleration_rad_s2: f64,
     torque_nm: f64,
+    /// Known bounds of the mass, [low, high].
+    mass_bounds_kg: Option<[f64; 2]>,
+    /// Known box around the centre of mass: [low, high] of x, y and z.
+    com_bounds_m: Option<[[f64; 2]; 3]>,
 }
 
 #[derive(Deserialize)]
@@ -258,6 +262,13 @@ impl JointEntry {
         if low.is_nan() || high.is_nan() || low >= high {
             return Err(fault(format!("position_rad = [{low}, {high}] must be [low, high]")));
         }
+        let ranges = self.mass_bounds_kg.iter().map(|range| ("mass_bounds_kg", range));
+        let boxes = self.com_bounds_m.iter().flatten().map(|range| ("com_bounds_m", range));
+        for (name, [low, high]) in ranges.chain(boxes) {
+            if !(low < high && low.is_finite() && high.is_finite()) {
+                return Err(fault(format!("{name}: [{low}, {high}] must be [low, high]")));
+            }
+        }
         Ok(Joint {
             placement: Placement::from_xyz_rpy(self.xyz_m, self.rpy_rad),
             link,
@@ -274,6 +285,7 @@ impl JointEntry {
                 acceleration_rad_s2: self.acceleration_rad_s2,
                 torque_nm: self.torque_nm,
             },
+            bounds: LinkBounds { mass_kg: self.mass_bounds_kg, com_m: self.com_bounds_m },
             name: self.name,
         })
     }

@@ -10,7 +10,7 @@ mod inertia;
 mod signals;
 mod urdf;
 
-pub use arm::{Arm, Capsule, CellBox, Clearance, Drive, Joint, Limits, Placement};
+pub use arm::{Arm, Capsule, CellBox, Clearance, Drive, Joint, Limits, LinkBounds, Placement};
 pub use error::RobotError;
 pub use file::built_in_names;
 pub use inertia::LinkInertia;

@@ -8,7 +8,7 @@ use urdf_rs::{Inertial, JointType, Link, Pose};
 use super::chain::{Body, bodies};
 use super::fault::UrdfFault;
 use super::notice::UrdfNotice;
-use crate::robot::arm::{Arm, Clearance, Drive, Joint, Limits, Placement};
+use crate::robot::arm::{Arm, Clearance, Drive, Joint, Limits, LinkBounds, Placement};
 use crate::robot::error::RobotError;
 use crate::robot::file::default_epsilon;
 use crate::robot::inertia::LinkInertia;
@@ -120,6 +120,7 @@ impl Reader {
                         link: LinkInertia::zero(),
                         drive: drive(joint)?,
                         limits: self.limits(joint)?,
+                        bounds: LinkBounds::default(),
                     });
                     turn
                 }

@@ -1,0 +1,255 @@
+//! The constrained estimate and everything that is said about it.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::error::PhysicalError;
+use super::evidence::{Evidence, bootstrap, noise_root};
+use super::information::Information;
+use super::program::{ConeProgram, ConeSolution};
+use super::realisable::realisability;
+use super::structure::{Structure, Subject};
+use super::weight::{CrossValidation, PriorWeight, cross_validate};
+use crate::base::BaseSet;
+use crate::identify::covariance::Covariance;
+use crate::identify::fit::Fit;
+use crate::robot::Arm;
+
+/// How the constrained estimate is made.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PhysicalOptions {
+    /// γ, the weight of the prior.
+    pub prior_weight: PriorWeight,
+    /// ε: every pseudo-inertia is at least this share of the prior's.
+    pub margin: f64,
+    /// Draws of the parametric bootstrap behind the p-value; 0 for none.
+    pub bootstrap: usize,
+    /// Seed of those draws.
+    pub seed: u64,
+}
+
+impl Default for PhysicalOptions {
+    fn default() -> Self {
+        Self { prior_weight: PriorWeight::default(), margin: 1e-4, bootstrap: 199, seed: 1 }
+    }
+}
+
+/// A physically consistent arm close to the data.
+#[derive(Debug, Clone)]
+pub struct PhysicalEstimate {
+    /// Standard parameters in the order of [`ParameterLayout`](crate::dynamics::ParameterLayout):
+    /// 14 N, offsets zero where they are not fitted.
+    pub standard: Vec<f64>,
+    /// σ of the standard parameters, as far as the data decide them: what only the prior decides
+    /// has none of the data's noise.
+    pub standard_sigma: Vec<f64>,
+    /// Base parameters of these standard parameters.
+    pub base: Vec<f64>,
+    /// σ of the base parameters: delta method through the optimality conditions. Where a bound
+    /// holds a direction the estimate does not move in it, and its σ says just that; the error of
+    /// such a parameter is bounded by [`Self::unconstrained_sigma`].
+    pub base_sigma: Vec<f64>,
+    /// σ of the unconstrained base parameters.
+    pub unconstrained_sigma: Vec<f64>,
+    /// Bounds that the estimate lies on.
+    pub active: Vec<Subject>,
+    /// How far the solver's answer is from optimal.
+    pub certificate: Certificate,
+    /// Whether the unconstrained estimate could have been an arm, and what the repair cost.
+    pub evidence: Evidence,
+    /// The weight γ that was used.
+    pub prior_weight: f64,
+    /// How it was chosen, where the data chose it.
+    pub cross_validation: Option<CrossValidation>,
+}
+
+/// Proof of optimality.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Certificate {
+    /// Objective ½T + ½γ(…), in units of the noise's χ².
+    pub objective: f64,
+    /// It is at most this much above the minimum.
+    pub duality_gap: f64,
+    /// ‖∇objective − Aᵀz‖∞ over ‖c‖∞: the stationarity that is left.
+    pub kkt_residual: f64,
+    /// Newton steps.
+    pub iterations: usize,
+}
+
+/// Estimates standard parameters from `fit`, which identified `set` on `arm`; the arm's own values
+/// (the robot file's) are the prior.
+pub fn solve(
+    arm: &Arm,
+    set: &BaseSet,
+    fit: &Fit,
+    covariance: &Covariance,
+    options: &PhysicalOptions,
+) -> Result<PhysicalEstimate, PhysicalError> {
+    let solver = Solver::new(Structure::new(arm, set, arm, options.margin)?);
+    solver.estimate(fit, covariance, options)
+}
+
+/// Solves the same arm for one data set after the other.
+#[derive(Debug, Clone)]
+pub struct Solver {
+    structure: Structure,
+}
+
+/// One solved program.
+#[derive(Debug, Clone)]
+pub struct Constrained {
+    /// The unknowns of the [`Structure`].
+    pub y: DVector<f64>,
+    /// T = ‖R (K y − θ̂)‖².
+    pub distance: f64,
+    /// Proof of optimality.
+    pub certificate: Certificate,
+    solution: ConeSolution,
+}
+
+/// Relative duality gap at which a solution counts: far below what an estimate's σ could show.
+const GAP: f64 = 1e-8;
+
+impl Solver {
+    /// For data about the arm of `structure`.
+    pub fn new(structure: Structure) -> Self {
+        Self { structure }
+    }
+
+    /// Unknowns, base map, cones and prior.
+    pub fn structure(&self) -> &Structure {
+        &self.structure
+    }
+
+    /// The estimate with its certificate, evidence and σ.
+    pub fn estimate(
+        &self,
+        fit: &Fit,
+        covariance: &Covariance,
+        options: &PhysicalOptions,
+    ) -> Result<PhysicalEstimate, PhysicalError> {
+        options.check()?;
+        let information = Information::of(fit, covariance);
+        let (weight, cross_validation) = match options.prior_weight {
+            PriorWeight::Fixed(weight) => (weight, None),
+            PriorWeight::CrossValidated => {
+                let chosen = cross_validate(self, &information, &fit.theta_periods)?;
+                (chosen.weight, Some(chosen))
+            }
+        };
+        let data = self.data(&information, weight);
+        let constrained = self.solve(&data, &(&information.root * &information.theta))?;
+        let noise = information.whitened(covariance);
+        let realisable = realisability(&self.structure, &information.theta)?;
+        let exceeded = bootstrap(
+            self,
+            &data,
+            &constrained,
+            &noise_root(&noise, covariance.degrees_of_freedom),
+            options,
+        )?;
+        let sensitivity = constrained.solution.stiffness.solve(&data.map.transpose());
+        let scatter = |map: &DMatrix<f64>| -> Vec<f64> {
+            let linear = map * &sensitivity;
+            let spread = &linear * &noise;
+            linear.row_iter().zip(spread.row_iter()).map(|(a, b)| a.dot(&b).sqrt()).collect()
+        };
+        Ok(PhysicalEstimate {
+            standard: self.structure.standard(&constrained.y),
+            standard_sigma: scatter(&self.structure.standard_map()),
+            base: (&self.structure.base_map * &constrained.y).as_slice().to_vec(),
+            base_sigma: scatter(&self.structure.base_map),
+            unconstrained_sigma: covariance.sigma(),
+            active: constrained.active(&self.structure),
+            certificate: constrained.certificate,
+            evidence: Evidence { realisable, distance: constrained.distance, exceeded },
+            prior_weight: weight,
+            cross_validation,
+        })
+    }
+
+    /// The estimate alone.
+    pub fn constrained(
+        &self,
+        information: &Information,
+        weight: f64,
+    ) -> Result<Constrained, PhysicalError> {
+        let data = self.data(information, weight);
+        self.solve(&data, &(&information.root * &information.theta))
+    }
+
+    /// The program of data with this information and prior weight.
+    pub(super) fn data(&self, information: &Information, weight: f64) -> Data {
+        let n = self.structure.unknowns();
+        let map = &information.root * &self.structure.base_map;
+        let mut hessian = map.tr_mul(&map);
+        let mut pull = DVector::zeros(n);
+        let pull_constant = self.structure.add_pulls(weight, &mut hessian, &mut pull);
+        let program = ConeProgram {
+            hessian,
+            linear: DVector::zeros(n),
+            constraints: self.structure.constraints.clone(),
+        };
+        Data { map, pull, pull_constant, program }
+    }
+
+    /// Solves for a whitened right-hand side ρ = R θ̂.
+    pub(super) fn solve(
+        &self,
+        data: &Data,
+        rho: &DVector<f64>,
+    ) -> Result<Constrained, PhysicalError> {
+        let mut program = data.program.clone();
+        program.linear = data.map.tr_mul(rho) + &data.pull;
+        let constant = 0.5 * rho.norm_squared() + data.pull_constant;
+        let solution = program.solve(self.structure.start.clone(), constant, GAP)?;
+        Ok(Constrained {
+            distance: (&data.map * &solution.y - rho).norm_squared(),
+            certificate: Certificate {
+                objective: solution.objective + constant,
+                duality_gap: solution.gap,
+                kkt_residual: solution.dual_residual,
+                iterations: solution.iterations,
+            },
+            y: solution.y.clone(),
+            solution,
+        })
+    }
+}
+
+/// Data ready for solving with any right-hand side.
+#[derive(Debug, Clone)]
+pub(super) struct Data {
+    /// R K, b × n.
+    pub map: DMatrix<f64>,
+    pull: DVector<f64>,
+    pull_constant: f64,
+    program: ConeProgram,
+}
+
+impl Constrained {
+    /// Constraints that the solution lies on: those whose multiplier exceeds their margin (their
+    /// product is the same tiny number for all of them).
+    fn active(&self, structure: &Structure) -> Vec<Subject> {
+        let ConeSolution { multipliers, margins, .. } = &self.solution;
+        let found = structure.subjects.iter().zip(multipliers.iter().zip(margins));
+        found
+            .filter(|(_, (z, margin))| z.iter().map(|z| z * z).sum::<f64>().sqrt() > **margin)
+            .map(|(subject, _)| *subject)
+            .collect()
+    }
+}
+
+impl PhysicalOptions {
+    fn check(&self) -> Result<(), PhysicalError> {
+        let fault = |name, value, requirement| PhysicalError::Setting { name, value, requirement };
+        if !(self.margin > 0.0 && self.margin < 1.0) {
+            return Err(fault("margin", self.margin, "must lie between 0 and 1"));
+        }
+        match self.prior_weight {
+            PriorWeight::Fixed(w) if !(w > 0.0 && w.is_finite()) => {
+                Err(fault("prior weight", w, "must be positive"))
+            }
+            _ => Ok(()),
+        }
+    }
+}

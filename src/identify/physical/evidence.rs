@@ -1,0 +1,104 @@
+//! Is it only noise that made the estimate impossible?
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+use rand::SeedableRng;
+use rand::rngs::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::error::PhysicalError;
+use super::estimate::{Constrained, Data, PhysicalOptions, Solver};
+
+/// Whether the unconstrained estimate belongs to any set of links, and what making it so cost.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Evidence {
+    /// The largest t for which links with exactly the unconstrained base parameters exist whose
+    /// pseudo-inertias (and friction, rotor inertias) are all at least t times the prior's.
+    /// Negative: no links have these base parameters; −1 is wrong by the size of the prior.
+    pub realisable: f64,
+    /// T = ‖R (K x − θ̂)‖²: how much the weighted squares grew by the repair, in units of the noise.
+    pub distance: f64,
+    /// Draws of the bootstrap whose T was at least as large, and draws in all.
+    pub exceeded: Option<(usize, usize)>,
+}
+
+/// Below this p-value noise is no explanation.
+const SIGNIFICANT: f64 = 0.01;
+
+impl Evidence {
+    /// (1 + draws at least as large)/(1 + draws).
+    pub fn p_value(&self) -> Option<f64> {
+        self.exceeded.map(|(larger, draws)| (1 + larger) as f64 / (1 + draws) as f64)
+    }
+
+    /// Whether some links have the unconstrained base parameters.
+    pub fn is_realisable(&self) -> bool {
+        self.realisable >= 0.0
+    }
+
+    /// Whether the repair cost more fit than noise explains (p < 1 %).
+    pub fn model_is_wrong(&self) -> bool {
+        !self.is_realisable() && self.p_value().is_some_and(|p| p < SIGNIFICANT)
+    }
+
+    /// The finding in words.
+    pub fn sentence(&self) -> String {
+        let Self { realisable, distance, .. } = self;
+        if self.is_realisable() {
+            return format!(
+                "the unconstrained estimate is an arm that can exist: its bodies keep at least \
+                 {realisable:.2e} of the robot file's pseudo-inertias"
+            );
+        }
+        let found = format!(
+            "no links have the unconstrained base parameters (short by {:.2e} of the robot file's \
+             values); the repair cost {distance:.1} units of noise",
+            -realisable
+        );
+        match self.p_value() {
+            Some(p) if p < SIGNIFICANT => format!(
+                "{found}, more than noise explains (p = {p:.3}): the model is wrong, not only \
+                 noisy. Run armid diagnose"
+            ),
+            Some(p) => format!("{found}, which noise explains (p = {p:.2})"),
+            None => found,
+        }
+    }
+}
+
+/// A factor L, L Lᵀ = w Ω + (1 − w) diag Ω with w = f/(f + b): f degrees of freedom know the b
+/// variances well, but not the b² covariances.
+pub(super) fn noise_root(omega: &DMatrix<f64>, degrees_of_freedom: f64) -> DMatrix<f64> {
+    let b = omega.nrows() as f64;
+    let share = if degrees_of_freedom.is_finite() {
+        degrees_of_freedom / (degrees_of_freedom + b)
+    } else {
+        1.0
+    };
+    let diagonal = DMatrix::from_diagonal(&omega.diagonal());
+    let mixed = omega * share + &diagonal * (1.0 - share);
+    // A covariance that is singular for other reasons keeps its variances.
+    Cholesky::new(mixed).map_or_else(|| diagonal.map(f64::sqrt), Cholesky::unpack)
+}
+
+/// How many draws of noise about the constrained estimate cost at least as much fit. The estimate
+/// is on the boundary where T was positive: the least favourable of all arms that can exist.
+pub(super) fn bootstrap(
+    solver: &Solver,
+    data: &Data,
+    constrained: &Constrained,
+    noise_root: &DMatrix<f64>,
+    options: &PhysicalOptions,
+) -> Result<Option<(usize, usize)>, PhysicalError> {
+    if options.bootstrap == 0 {
+        return Ok(None);
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
+    let expected = &data.map * &constrained.y;
+    let mut larger = 0;
+    for _ in 0..options.bootstrap {
+        let noise = DVector::from_fn(expected.len(), |_, _| StandardNormal.sample(&mut rng));
+        let drawn = solver.solve(data, &(&expected + noise_root * noise))?;
+        larger += usize::from(drawn.distance >= constrained.distance);
+    }
+    Ok(Some((larger, options.bootstrap)))
+}

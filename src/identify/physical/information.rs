@@ -1,0 +1,48 @@
+//! What the data say, in units of their noise.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::identify::covariance::Covariance;
+use crate::identify::fit::Fit;
+
+/// The weighted least-squares problem of a fit, reduced to its triangle: for any base parameters
+/// the weighted squares exceed their minimum by ‖R (θ − θ̂)‖², all periods together, in units of
+/// the noise.
+#[derive(Debug, Clone)]
+pub struct Information {
+    /// R, b × b.
+    pub root: DMatrix<f64>,
+    /// θ̂.
+    pub theta: DVector<f64>,
+}
+
+/// The noise counts as at least this share of the torque: data without noise must not make the
+/// whole problem infinite.
+const LEAST_NOISE: f64 = 1e-6;
+
+impl Information {
+    /// Of a fit and the covariance V of its estimate. The unit is chosen so that θ̂ scatters with
+    /// tr(R V Rᵀ) = b about what it estimates: weights that were wrong by a factor, or none, as in
+    /// ordinary least squares, then make no difference to the size of a distance.
+    pub fn of(fit: &Fit, covariance: &Covariance) -> Self {
+        let b = fit.theta.len();
+        let root = DMatrix::from_fn(b, b, |i, k| fit.triangle.r(i, k));
+        let theta = DVector::from_column_slice(&fit.theta);
+        let relative = Self { root, theta };
+        let variance = relative.whitened(covariance).trace() / b as f64;
+        let sum = |values: &[f64]| values.iter().sum::<f64>();
+        let share = (sum(&fit.residual_squares) / sum(&fit.torque_squares)).sqrt();
+        let noise = variance.sqrt() * (LEAST_NOISE / share).max(1.0);
+        Self { root: relative.root / noise.max(f64::MIN_POSITIVE), ..relative }
+    }
+
+    /// ‖R (θ − θ̂)‖².
+    pub fn distance(&self, theta: &DVector<f64>) -> f64 {
+        (&self.root * (theta - &self.theta)).norm_squared()
+    }
+
+    /// R V Rᵀ: the covariance of the noise; its mean diagonal entry is 1.
+    pub fn whitened(&self, covariance: &Covariance) -> DMatrix<f64> {
+        &self.root * &covariance.matrix * self.root.transpose()
+    }
+}

@@ -1,0 +1,38 @@
+//! Parameters that a body can have: the estimate a simulator accepts.
+//!
+//! Least squares gives base parameters that need not belong to any set of links: with noise or
+//! a wrong model, negative rotor inertias and indefinite mass matrices come out. Here all standard
+//! parameters x are estimated at once,
+//!
+//! minimise ½ ‖R (K x − θ̂)‖² + ½ γ Σ_i tr(P₀⁻¹ΔP P₀⁻¹ΔP) + ½ γ Σ_k (Δx_k/x₀_k)²
+//! subject to P_i ⪰ ε P₀_i, Ia, rv, rc ≥ 0, and the robot file's bounds where it has some,
+//!
+//! with the whitened triangle R of the data, the base map K, each body's pseudo-inertia P_i and the
+//! robot file's P₀_i (P. M. Wensing, S. Kim, J.-J. Slotine, "Linear matrix inequalities for
+//! physically consistent inertial parameter identification", 2018; the pull to the prior is the
+//! constant pull-back metric of T. Lee, P. M. Wensing, F. C. Park, "Geometric robot dynamic
+//! identification", 2020). x has 78 or 84 entries, the data know 52 or 58 combinations of them: the
+//! others are where the prior puts them, and the default γ is so small that it decides nothing else.
+//!
+//! Enters: a [`Fit`](super::Fit) with its covariance. Leaves: a [`PhysicalEstimate`]: standard
+//! parameters, how far they are from optimal, whether the unconstrained estimate was realisable,
+//! and whether the repair cost more fit than noise explains.
+
+mod cone;
+mod error;
+mod estimate;
+mod evidence;
+mod information;
+mod program;
+mod realisable;
+mod structure;
+mod weight;
+
+pub use cone::{Cone, Svec, smat, svec};
+pub use error::PhysicalError;
+pub use estimate::{Certificate, Constrained, PhysicalEstimate, PhysicalOptions, Solver, solve};
+pub use evidence::Evidence;
+pub use information::Information;
+pub use program::{ConeProgram, ConeSolution, Constraint, ProgramError};
+pub use structure::{Structure, Subject};
+pub use weight::{CrossValidation, PriorWeight};

@@ -1,0 +1,358 @@
+//! A convex quadratic program over a product of cones, and its primal–dual solution.
+
+use nalgebra::{Cholesky, DMatrix, DVector, DVectorView};
+use thiserror::Error;
+
+use super::cone::{Cone, Scaling};
+
+/// minimise ½ yᵀH y − cᵀy subject to s_i = A_i y + b_i ∈ K_i for every constraint i.
+///
+/// H is positive definite. Each constraint reads a few entries of y only, so that its share of
+/// a Newton step is small dense blocks.
+#[derive(Debug, Clone)]
+pub struct ConeProgram {
+    /// H.
+    pub hessian: DMatrix<f64>,
+    /// c.
+    pub linear: DVector<f64>,
+    /// The constraints.
+    pub constraints: Vec<Constraint>,
+}
+
+/// A_i y + b_i ∈ K_i.
+#[derive(Debug, Clone)]
+pub struct Constraint {
+    /// K_i.
+    pub cone: Cone,
+    /// Entries of y that it reads.
+    pub columns: Vec<usize>,
+    /// A_i: dimension of the cone × number of columns.
+    pub map: DMatrix<f64>,
+    /// b_i.
+    pub offset: DVector<f64>,
+}
+
+/// A solution with the proof of how good it is.
+#[derive(Debug, Clone)]
+pub struct ConeSolution {
+    /// y.
+    pub y: DVector<f64>,
+    /// ½ yᵀH y − cᵀy.
+    pub objective: f64,
+    /// The objective is at most this much above the least possible one. It is the difference to
+    /// the value of a dual point, so that it holds whatever happened on the way.
+    pub gap: f64,
+    /// ‖H y − c − Aᵀz‖∞ over ‖c‖∞.
+    pub dual_residual: f64,
+    /// Newton steps taken.
+    pub iterations: usize,
+    /// Multiplier z_i of every constraint.
+    pub multipliers: Vec<Vec<f64>>,
+    /// Smallest eigenvalue of s_i of every constraint.
+    pub margins: Vec<f64>,
+    /// H + Σ A_iᵀ W_i⁻¹W_i⁻ᵀ A_i at the solution, factorised: what a shift of c does to y.
+    pub stiffness: Cholesky<f64, nalgebra::Dyn>,
+}
+
+/// No solution was found.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum ProgramError {
+    /// The starting point must be inside all cones.
+    #[error("the starting point is outside cone {constraint} by {margin:.3e}")]
+    StartOutside {
+        /// Number of the constraint.
+        constraint: usize,
+        /// Smallest eigenvalue there.
+        margin: f64,
+    },
+    /// H has a direction without curvature.
+    #[error("the quadratic form is not positive definite")]
+    NotConvex,
+    /// The gap stopped shrinking before it was small enough.
+    #[error("after {iterations} steps the duality gap is {gap:.3e}, wanted {wanted:.3e}")]
+    NotConverged {
+        /// Steps taken.
+        iterations: usize,
+        /// Gap reached.
+        gap: f64,
+        /// Gap wanted.
+        wanted: f64,
+    },
+}
+
+/// Steps that are far more than any problem has needed (10 to 25).
+const MOST_STEPS: usize = 100;
+/// Share of the way to the boundary that a step goes.
+const SHORT_OF_BOUNDARY: f64 = 0.99;
+
+impl ConeProgram {
+    /// Solves from `start`, which is inside all cones, until the duality gap is below `tolerance`
+    /// times 1 + |objective + `constant`| (a constant added to the objective, so that "relative"
+    /// has a meaning).
+    ///
+    /// Mehrotra's predictor–corrector with Nesterov and Todd's scaling (L. Vandenberghe, "The
+    /// CVXOPT linear and quadratic cone program solvers", 2010). s = A y + b holds throughout, so
+    /// only the dual equation and complementarity are left to Newton's method.
+    ///
+    /// # Certificate
+    /// For z in the cones and r = H y − c − Aᵀz the dual value is
+    /// objective(y) − sᵀz − ½ rᵀH⁻¹r, whence gap = sᵀz + ½ rᵀH⁻¹r.
+    pub fn solve(
+        &self,
+        start: DVector<f64>,
+        constant: f64,
+        tolerance: f64,
+    ) -> Result<ConeSolution, ProgramError> {
+        let n = self.linear.len();
+        let hessian = Cholesky::new(self.hessian.clone()).ok_or(ProgramError::NotConvex)?;
+        let mut point = Point::new(self, start)?;
+        let mut step = Step::new(self);
+        let mut stiffness = DMatrix::zeros(n, n);
+        let scale = self.linear.amax().max(f64::MIN_POSITIVE);
+        let mut iterations = 0;
+        loop {
+            let objective = self.objective(&point.y);
+            let residual = self.dual_residual(&point);
+            let slack = point.complementarity();
+            let gap = slack + 0.5 * residual.dot(&hessian.solve(&residual));
+            let wanted = tolerance * (1.0 + (objective + constant).abs());
+            let stuck = || ProgramError::NotConverged { iterations, gap, wanted };
+            let scalings = point.scalings(self).ok_or_else(stuck)?;
+            stiffness.copy_from(&self.hessian);
+            step.scale_maps(self, &scalings);
+            step.add_curvature(self, &mut stiffness);
+            let factor = Cholesky::new(stiffness).ok_or_else(stuck)?;
+            if gap <= wanted {
+                return Ok(ConeSolution {
+                    objective,
+                    gap,
+                    dual_residual: residual.amax() / scale,
+                    iterations,
+                    margins: point.margins(self),
+                    multipliers: point.z,
+                    y: point.y,
+                    stiffness: factor,
+                });
+            }
+            if iterations == MOST_STEPS || !gap.is_finite() {
+                return Err(stuck());
+            }
+            let mu = slack / self.degree() as f64;
+            step.towards(self, &scalings, &factor, &residual, 0.0, Correction::None);
+            let affine = step.longest(&scalings).min(1.0);
+            let centring = (1.0 - affine).powi(3) * mu;
+            step.towards(self, &scalings, &factor, &residual, centring, Correction::SecondOrder);
+            let length = (SHORT_OF_BOUNDARY * step.longest(&scalings)).min(1.0);
+            point.advance(self, &scalings, &step, length);
+            stiffness = factor.unpack_dirty();
+            iterations += 1;
+        }
+    }
+
+    /// ½ yᵀH y − cᵀy.
+    pub fn objective(&self, y: &DVector<f64>) -> f64 {
+        0.5 * y.dot(&(&self.hessian * y)) - self.linear.dot(y)
+    }
+
+    /// Σ of the cones' degrees.
+    fn degree(&self) -> usize {
+        self.constraints.iter().map(|c| c.cone.degree()).sum()
+    }
+
+    /// r = H y − c − Aᵀz.
+    fn dual_residual(&self, point: &Point) -> DVector<f64> {
+        let mut residual = &self.hessian * &point.y - &self.linear;
+        for (constraint, z) in self.constraints.iter().zip(&point.z) {
+            constraint.add_transposed(-1.0, z, &mut residual);
+        }
+        residual
+    }
+}
+
+impl Constraint {
+    /// A_i y, written into `out`.
+    fn apply(&self, y: &DVector<f64>, out: &mut [f64]) {
+        out.fill(0.0);
+        for (&column, entries) in self.columns.iter().zip(self.map.column_iter()) {
+            for (o, a) in out.iter_mut().zip(entries.iter()) {
+                *o += a * y[column];
+            }
+        }
+    }
+
+    /// Smallest eigenvalue of A_i y + b_i.
+    pub fn margin(&self, y: &DVector<f64>) -> f64 {
+        let mut point = vec![0.0; self.cone.dimension()];
+        self.apply(y, &mut point);
+        point.iter_mut().zip(self.offset.iter()).for_each(|(s, b)| *s += b);
+        self.cone.margin(&point)
+    }
+
+    /// target += factor·A_iᵀ z.
+    fn add_transposed(&self, factor: f64, z: &[f64], target: &mut DVector<f64>) {
+        let z = DVectorView::from_slice(z, z.len());
+        for (&column, entries) in self.columns.iter().zip(self.map.column_iter()) {
+            target[column] += factor * entries.dot(&z);
+        }
+    }
+}
+
+/// Where the iteration stands: y, s = A y + b and z.
+struct Point {
+    y: DVector<f64>,
+    s: Vec<Vec<f64>>,
+    z: Vec<Vec<f64>>,
+}
+
+impl Point {
+    /// s from `y`, and z = μ s⁻¹ on the central path's dual side with a μ of the size of the
+    /// objective, so that primal and dual start equally far from the solution.
+    fn new(program: &ConeProgram, y: DVector<f64>) -> Result<Self, ProgramError> {
+        let zeros: Vec<Vec<f64>> =
+            program.constraints.iter().map(|c| vec![0.0; c.cone.dimension()]).collect();
+        let mut point = Self { y, s: zeros.clone(), z: zeros };
+        point.update_s(program);
+        let gradient = &program.hessian * &point.y - &program.linear;
+        let mu = (gradient.dot(&point.y).abs() / program.degree() as f64).max(1.0);
+        for (k, constraint) in program.constraints.iter().enumerate() {
+            let margin = constraint.cone.margin(&point.s[k]);
+            if margin.is_nan() || margin <= 0.0 {
+                return Err(ProgramError::StartOutside { constraint: k, margin });
+            }
+            constraint.cone.invert(&point.s[k], &mut point.z[k]);
+            point.z[k].iter_mut().for_each(|z| *z *= mu);
+        }
+        Ok(point)
+    }
+
+    fn update_s(&mut self, program: &ConeProgram) {
+        for (constraint, s) in program.constraints.iter().zip(&mut self.s) {
+            constraint.apply(&self.y, s);
+            s.iter_mut().zip(constraint.offset.iter()).for_each(|(s, b)| *s += b);
+        }
+    }
+
+    /// sᵀz.
+    fn complementarity(&self) -> f64 {
+        self.s.iter().flatten().zip(self.z.iter().flatten()).map(|(s, z)| s * z).sum()
+    }
+
+    fn scalings(&self, program: &ConeProgram) -> Option<Vec<Scaling>> {
+        let points = self.s.iter().zip(&self.z);
+        program.constraints.iter().zip(points).map(|(c, (s, z))| c.cone.scaling(s, z)).collect()
+    }
+
+    fn margins(&self, program: &ConeProgram) -> Vec<f64> {
+        program.constraints.iter().zip(&self.s).map(|(c, s)| c.cone.margin(s)).collect()
+    }
+
+    fn advance(&mut self, program: &ConeProgram, scalings: &[Scaling], step: &Step, length: f64) {
+        self.y.axpy(length, &step.y, 1.0);
+        self.update_s(program);
+        let mut unscaled = [0.0; 10];
+        for ((z, direction), scaling) in self.z.iter_mut().zip(&step.z).zip(scalings) {
+            scaling.dual(direction, &mut unscaled[..z.len()]);
+            z.iter_mut().zip(&unscaled).for_each(|(z, d)| *z += length * d);
+        }
+    }
+}
+
+/// What the right-hand side of a step takes from the one before.
+#[derive(Clone, Copy, PartialEq)]
+enum Correction {
+    /// Nothing: the affine step.
+    None,
+    /// The product of the affine step's parts, which the linearisation left out.
+    SecondOrder,
+}
+
+/// A Newton step, primal and dual directions scaled, and the memory to compute it.
+struct Step {
+    y: DVector<f64>,
+    s: Vec<Vec<f64>>,
+    z: Vec<Vec<f64>>,
+    /// B_i = W_i⁻ᵀ A_i.
+    maps: Vec<DMatrix<f64>>,
+}
+
+impl Step {
+    fn new(program: &ConeProgram) -> Self {
+        let zeros: Vec<Vec<f64>> =
+            program.constraints.iter().map(|c| vec![0.0; c.cone.dimension()]).collect();
+        Self {
+            y: DVector::zeros(program.linear.len()),
+            s: zeros.clone(),
+            z: zeros,
+            maps: program.constraints.iter().map(|c| c.map.clone()).collect(),
+        }
+    }
+
+    fn scale_maps(&mut self, program: &ConeProgram, scalings: &[Scaling]) {
+        for ((constraint, scaling), map) in
+            program.constraints.iter().zip(scalings).zip(&mut self.maps)
+        {
+            for (source, mut target) in constraint.map.column_iter().zip(map.column_iter_mut()) {
+                scaling.primal(source.as_slice(), target.as_mut_slice());
+            }
+        }
+    }
+
+    /// matrix += Σ B_iᵀB_i.
+    fn add_curvature(&self, program: &ConeProgram, matrix: &mut DMatrix<f64>) {
+        for (constraint, map) in program.constraints.iter().zip(&self.maps) {
+            for (a, &row) in constraint.columns.iter().enumerate() {
+                for (b, &column) in constraint.columns.iter().enumerate() {
+                    matrix[(row, column)] += map.column(a).dot(&map.column(b));
+                }
+            }
+        }
+    }
+
+    /// Solves H Δy − AᵀΔz = −r, λ∘(Δz̃ + Δs̃) = σμ e − λ∘λ − (correction), Δs̃ = B Δy:
+    /// with d = λ\(…), (H + BᵀB) Δy = −r + Bᵀd and Δz̃ = d − B Δy.
+    fn towards(
+        &mut self,
+        program: &ConeProgram,
+        scalings: &[Scaling],
+        factor: &Cholesky<f64, nalgebra::Dyn>,
+        residual: &DVector<f64>,
+        target: f64,
+        correction: Correction,
+    ) {
+        const NOTHING: [f64; 10] = [0.0; 10];
+        self.y.copy_from(residual);
+        self.y.neg_mut();
+        let mut d = [0.0; 10];
+        for (k, (constraint, scaling)) in program.constraints.iter().zip(scalings).enumerate() {
+            let length = constraint.cone.dimension();
+            let (a, b) = match correction {
+                Correction::None => (&NOTHING[..length], &NOTHING[..length]),
+                Correction::SecondOrder => (&self.s[k][..], &self.z[k][..]),
+            };
+            scaling.complementarity(target, a, b, &mut d[..length]);
+            self.z[k].copy_from_slice(&d[..length]);
+            let d = DVectorView::from_slice(&d, length);
+            for (&column, map) in constraint.columns.iter().zip(self.maps[k].column_iter()) {
+                self.y[column] += map.dot(&d);
+            }
+        }
+        factor.solve_mut(&mut self.y);
+        for (k, constraint) in program.constraints.iter().enumerate() {
+            self.s[k].fill(0.0);
+            for (&column, map) in constraint.columns.iter().zip(self.maps[k].column_iter()) {
+                for (s, b) in self.s[k].iter_mut().zip(map.iter()) {
+                    *s += b * self.y[column];
+                }
+            }
+            self.z[k].iter_mut().zip(&self.s[k]).for_each(|(z, s)| *z -= s);
+        }
+    }
+
+    /// Longest step that keeps s and z in the cones.
+    fn longest(&self, scalings: &[Scaling]) -> f64 {
+        let directions = self.s.iter().zip(&self.z);
+        scalings.iter().zip(directions).fold(f64::INFINITY, |longest, (scaling, (s, z))| {
+            longest.min(scaling.longest_step(s)).min(scaling.longest_step(z))
+        })
+    }
+}

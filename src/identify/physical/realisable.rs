@@ -1,0 +1,99 @@
+//! Could the unconstrained estimate be an arm?
+
+use nalgebra::{DMatrix, DVector};
+
+use super::cone::{Cone, svec};
+use super::error::PhysicalError;
+use super::program::{ConeProgram, Constraint};
+use super::structure::{Structure, Subject};
+
+/// Curvature that makes the linear program a strictly convex one, relative to the prior.
+const CURVATURE: f64 = 1e-9;
+/// The answer is wanted to this accuracy, relative to the prior.
+const ACCURACY: f64 = 1e-6;
+
+/// The largest t such that links with base parameters exactly `theta` exist, every pseudo-inertia
+/// at least t times the prior's and every drive parameter at least t times its prior's size.
+///
+/// maximise t over y = y₀ + N w, K y₀ = θ, K N = 0.
+pub(super) fn realisability(
+    structure: &Structure,
+    theta: &DVector<f64>,
+) -> Result<f64, PhysicalError> {
+    let (particular, null_space) = solutions(structure, theta);
+    let dimension = null_space.ncols();
+    let mut pull = DMatrix::zeros(structure.unknowns(), structure.unknowns());
+    structure.add_pulls(CURVATURE, &mut pull, &mut DVector::zeros(structure.unknowns()));
+    let mut hessian = DMatrix::zeros(dimension + 1, dimension + 1);
+    let curved = null_space.tr_mul(&(pull * &null_space));
+    hessian.view_mut((0, 0), (dimension, dimension)).copy_from(&curved);
+    hessian[(dimension, dimension)] = CURVATURE;
+    let mut linear = DVector::zeros(dimension + 1);
+    linear[dimension] = 1.0;
+    let constraints = structure.constraints.iter().zip(&structure.subjects);
+    let constraints: Vec<Constraint> = constraints
+        .map(|(constraint, subject)| {
+            let unit = match constraint.cone {
+                Cone::NonNegative => DVector::from_element(1, 1.0),
+                Cone::Semidefinite => {
+                    DVector::from_column_slice(svec(&nalgebra::Matrix4::identity()).as_slice())
+                }
+            };
+            along(constraint, &particular, &null_space, &unit, matches!(subject, Subject::Link(_)))
+        })
+        .collect();
+    let mut start = DVector::zeros(dimension + 1);
+    let worst = constraints.iter().map(|c| c.margin(&start)).fold(f64::INFINITY, f64::min);
+    start[dimension] = worst - 1.0;
+    let solution = ConeProgram { hessian, linear, constraints }.solve(start, 0.0, ACCURACY)?;
+    Ok(solution.y[dimension])
+}
+
+/// One solution of K y = θ, as near to the prior as changing the kept parameters alone makes it, and
+/// a basis of the null space of K.
+fn solutions(structure: &Structure, theta: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
+    let map = &structure.base_map;
+    let kept: Vec<usize> =
+        map.row_iter().map(|row| row.iter().position(|&a| a != 0.0).unwrap_or_default()).collect();
+    let mut particular = structure.start.clone();
+    let missing = theta - map * &particular;
+    kept.iter().zip(missing.iter()).for_each(|(&k, m)| particular[k] += m);
+    let free: Vec<usize> = (0..structure.unknowns()).filter(|k| !kept.contains(k)).collect();
+    let mut null_space = DMatrix::zeros(structure.unknowns(), free.len());
+    for (column, &d) in free.iter().enumerate() {
+        null_space[(d, column)] = 1.0;
+        for (row, &k) in kept.iter().enumerate() {
+            null_space[(k, column)] = -map[(row, d)];
+        }
+    }
+    (particular, null_space)
+}
+
+/// The constraint in terms of (w, t): A (y₀ + N w) + b − t·unit ∈ K. The margin ε of a link is left
+/// out: t takes its place.
+fn along(
+    constraint: &Constraint,
+    particular: &DVector<f64>,
+    null_space: &DMatrix<f64>,
+    unit: &DVector<f64>,
+    is_link: bool,
+) -> Constraint {
+    let rows = |matrix: &DMatrix<f64>| matrix.select_rows(&constraint.columns);
+    let inside = &constraint.map * rows(null_space);
+    let columns: Vec<usize> =
+        (0..null_space.ncols()).filter(|&c| inside.column(c).iter().any(|&a| a != 0.0)).collect();
+    let mut map = inside.select_columns(&columns);
+    let last = map.ncols();
+    map = map.insert_column(last, 0.0);
+    map.set_column(last, &-unit);
+    let values = DVector::from_iterator(
+        constraint.columns.len(),
+        constraint.columns.iter().map(|&k| particular[k]),
+    );
+    let mut offset = &constraint.map * values;
+    if !is_link {
+        offset += &constraint.offset;
+    }
+    let columns = columns.into_iter().chain([null_space.ncols()]).collect();
+    Constraint { cone: constraint.cone, columns, map, offset }
+}

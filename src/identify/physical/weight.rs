@@ -1,0 +1,84 @@
+//! The weight of the prior: given, or chosen by cross-validation.
+
+use std::str::FromStr;
+
+use nalgebra::DVector;
+
+use super::error::PhysicalError;
+use super::estimate::Solver;
+use super::information::Information;
+
+/// γ: a relative deviation of s from the prior costs as much as one σ of noise when γ = 1/s².
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PriorWeight {
+    /// This weight.
+    Fixed(f64),
+    /// The one that predicts left-out periods best.
+    CrossValidated,
+}
+
+/// A deviation of 10 000 % from the prior is one σ: it decides only what the data do not.
+const WEAK: f64 = 1e-4;
+
+impl Default for PriorWeight {
+    fn default() -> Self {
+        Self::Fixed(WEAK)
+    }
+}
+
+impl FromStr for PriorWeight {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match (text, text.parse()) {
+            ("auto", _) => Ok(Self::CrossValidated),
+            (_, Ok(weight)) if weight > 0.0 && f64::is_finite(weight) => Ok(Self::Fixed(weight)),
+            _ => Err("expected a positive number or auto".into()),
+        }
+    }
+}
+
+/// Weights tried and how they predicted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CrossValidation {
+    /// The best of them.
+    pub weight: f64,
+    /// (γ, mean squared prediction error of a left-out period per base parameter, in units of that
+    /// period's noise; 1 + 1/(P − 1) is what noise alone leaves).
+    pub tried: Vec<(f64, f64)>,
+}
+
+/// From "decides nothing" to "10 % deviation is one σ".
+const CANDIDATES: [f64; 7] = [1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2];
+
+/// Leaves out one period after the other.
+pub(super) fn cross_validate(
+    solver: &Solver,
+    information: &Information,
+    periods: &[Vec<f64>],
+) -> Result<CrossValidation, PhysicalError> {
+    let count = periods.len();
+    if count < 3 {
+        return Err(PhysicalError::TooFewPeriods { periods: count });
+    }
+    let p = count as f64;
+    // R counts all periods; P − 1 of them know less, one of them less still.
+    let kept_root = &information.root * ((p - 1.0) / p).sqrt();
+    let single_root = &information.root / p.sqrt();
+    let kept_information = Information { root: kept_root, theta: information.theta.clone() };
+    let mut tried = Vec::with_capacity(CANDIDATES.len());
+    for weight in CANDIDATES {
+        let data = solver.data(&kept_information, weight);
+        let mut error = 0.0;
+        for left_out in periods {
+            let left_out = DVector::from_column_slice(left_out);
+            let kept = (&information.theta * p - &left_out) / (p - 1.0);
+            let constrained = solver.solve(&data, &(&kept_information.root * kept))?;
+            let predicted = &solver.structure().base_map * &constrained.y;
+            error += (&single_root * (predicted - left_out)).norm_squared();
+        }
+        tried.push((weight, error / (p * information.theta.len() as f64)));
+    }
+    let best = tried.iter().fold(tried[0], |best, next| if next.1 < best.1 { *next } else { best });
+    Ok(CrossValidation { weight: best.0, tried })
+}
