@@ -3,6 +3,7 @@
 //! convexity on simulated logs.
 
 use std::f64::consts::PI;
+use std::sync::OnceLock;
 use std::time::Instant;
 
 use armid::base::{BaseSet, Parameterisation};
@@ -89,6 +90,12 @@ fn a_solve_takes_milliseconds() {
     }
 }
 
+/// The default scenario, its plant run once for all tests.
+fn experiment() -> &'static Experiment {
+    static EXPERIMENT: OnceLock<Experiment> = OnceLock::new();
+    EXPERIMENT.get_or_init(|| Experiment::prepare(Scenario::load(None).unwrap()).unwrap())
+}
+
 /// The default scenario's log of trial `trial`, its torque late by `delay` samples, identified.
 fn identified(experiment: &Experiment, trial: u64, delay: usize) -> Identification {
     let (measured, time_s) = experiment.log(trial).unwrap();
@@ -116,10 +123,10 @@ fn estimate(experiment: &Experiment, found: &Identification) -> PhysicalEstimate
 /// estimate is the nearest, and the truth is one of those it was chosen from.
 #[test]
 fn noise_is_repaired_and_called_noise() {
-    let experiment = Experiment::prepare(Scenario::load(None).unwrap()).unwrap();
+    let experiment = experiment();
     for trial in 0..2 {
-        let found = identified(&experiment, trial, 0);
-        let physical = estimate(&experiment, &found);
+        let found = identified(experiment, trial, 0);
+        let physical = estimate(experiment, &found);
         println!("{}", physical.evidence.sentence());
         let truth = DVector::from_column_slice(&experiment.truth);
         let information = Information::of(&found.fit, &found.covariance);
@@ -133,14 +140,14 @@ fn noise_is_repaired_and_called_noise() {
 /// The repair must not pass for noise, and what comes out must still run.
 #[test]
 fn late_torque_is_repaired_and_called_a_wrong_model() {
-    let experiment = Experiment::prepare(Scenario::load(None).unwrap()).unwrap();
+    let experiment = experiment();
     let rate_hz = experiment.scenario.plant.log_rate_hz;
-    let found = identified(&experiment, 0, (0.16 * rate_hz).round() as usize);
+    let found = identified(experiment, 0, (0.16 * rate_hz).round() as usize);
     let position = |name: &str| {
         (0..found.fit.theta.len()).find(|&k| experiment.scenario.set.name(k) == name).unwrap()
     };
     assert!(found.fit.theta[position("Ia6")] < 0.0);
-    let physical = estimate(&experiment, &found);
+    let physical = estimate(experiment, &found);
     println!("{}", physical.evidence.sentence());
     assert!(physical.evidence.model_is_wrong());
     assert!(physical.evidence.sentence().contains("armid diagnose"));
@@ -174,8 +181,8 @@ fn assert_runs(arm: &Arm, physical: &PhysicalEstimate, states: usize) {
 /// The truth's own base parameters are realised by the truth, that is with t = 1 and more.
 #[test]
 fn the_true_base_parameters_are_realisable() {
-    let experiment = Experiment::prepare(Scenario::load(None).unwrap()).unwrap();
-    let mut found = identified(&experiment, 0, 0);
+    let experiment = experiment();
+    let mut found = identified(experiment, 0, 0);
     let truth = experiment.truth.clone();
     let triangle = &found.fit.triangle;
     let information = Information {
@@ -186,7 +193,7 @@ fn the_true_base_parameters_are_realisable() {
     let solver = Solver::new(Structure::new(arm, set, arm, 1e-4).unwrap());
     assert!(solver.constrained(&information, 1e-4).unwrap().distance < 1e-6);
     found.fit.theta = truth;
-    let physical = estimate(&experiment, &found);
+    let physical = estimate(experiment, &found);
     assert!(physical.evidence.realisable > 1.0 - 1e-5, "{:?}", physical.evidence);
 }
 

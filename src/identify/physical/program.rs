@@ -1,6 +1,6 @@
 //! A convex quadratic program over a product of cones, and its primal–dual solution.
 
-use nalgebra::{Cholesky, DMatrix, DVector, DVectorView};
+use nalgebra::{Cholesky, DMatrix, DVector, DVectorView, Dyn};
 use thiserror::Error;
 
 use super::cone::{Cone, Scaling};
@@ -50,8 +50,9 @@ pub struct ConeSolution {
     pub multipliers: Vec<Vec<f64>>,
     /// Smallest eigenvalue of s_i of every constraint.
     pub margins: Vec<f64>,
-    /// H + Σ A_iᵀ W_i⁻¹W_i⁻ᵀ A_i at the solution, factorised: what a shift of c does to y.
-    pub stiffness: Cholesky<f64, nalgebra::Dyn>,
+    /// H + Σ A_iᵀ W_i⁻¹W_i⁻ᵀ A_i one step before the solution, factorised: what a shift of c does to
+    /// y. At the solution itself it is infinite in the directions that an active constraint holds.
+    pub stiffness: Cholesky<f64, Dyn>,
 }
 
 /// No solution was found.
@@ -107,8 +108,8 @@ impl ConeProgram {
         let hessian = Cholesky::new(self.hessian.clone()).ok_or(ProgramError::NotConvex)?;
         let mut point = Point::new(self, start)?;
         let mut step = Step::new(self);
-        let mut stiffness = DMatrix::zeros(n, n);
         let scale = self.linear.amax().max(f64::MIN_POSITIVE);
+        let mut last_factor: Option<Cholesky<f64, Dyn>> = None;
         let mut iterations = 0;
         loop {
             let objective = self.objective(&point.y);
@@ -116,27 +117,31 @@ impl ConeProgram {
             let slack = point.complementarity();
             let gap = slack + 0.5 * residual.dot(&hessian.solve(&residual));
             let wanted = tolerance * (1.0 + (objective + constant).abs());
+            let mut stiffness = match last_factor.take() {
+                Some(stiffness) if gap <= wanted => {
+                    return Ok(ConeSolution {
+                        objective,
+                        gap,
+                        dual_residual: residual.amax() / scale,
+                        iterations,
+                        margins: point.margins(self),
+                        multipliers: point.z,
+                        y: point.y,
+                        stiffness,
+                    });
+                }
+                Some(used) => used.unpack_dirty(),
+                None => DMatrix::zeros(n, n),
+            };
             let stuck = || ProgramError::NotConverged { iterations, gap, wanted };
+            if iterations == MOST_STEPS || !gap.is_finite() {
+                return Err(stuck());
+            }
             let scalings = point.scalings(self).ok_or_else(stuck)?;
             stiffness.copy_from(&self.hessian);
             step.scale_maps(self, &scalings);
             step.add_curvature(self, &mut stiffness);
             let factor = Cholesky::new(stiffness).ok_or_else(stuck)?;
-            if gap <= wanted {
-                return Ok(ConeSolution {
-                    objective,
-                    gap,
-                    dual_residual: residual.amax() / scale,
-                    iterations,
-                    margins: point.margins(self),
-                    multipliers: point.z,
-                    y: point.y,
-                    stiffness: factor,
-                });
-            }
-            if iterations == MOST_STEPS || !gap.is_finite() {
-                return Err(stuck());
-            }
             let mu = slack / self.degree() as f64;
             step.towards(self, &scalings, &factor, &residual, 0.0, Correction::None);
             let affine = step.longest(&scalings).min(1.0);
@@ -144,7 +149,7 @@ impl ConeProgram {
             step.towards(self, &scalings, &factor, &residual, centring, Correction::SecondOrder);
             let length = (SHORT_OF_BOUNDARY * step.longest(&scalings)).min(1.0);
             point.advance(self, &scalings, &step, length);
-            stiffness = factor.unpack_dirty();
+            last_factor = Some(factor);
             iterations += 1;
         }
     }
@@ -314,7 +319,7 @@ impl Step {
         &mut self,
         program: &ConeProgram,
         scalings: &[Scaling],
-        factor: &Cholesky<f64, nalgebra::Dyn>,
+        factor: &Cholesky<f64, Dyn>,
         residual: &DVector<f64>,
         target: f64,
         correction: Correction,
