@@ -1,0 +1,141 @@
+//! `armid` and `montecarlo` as a user runs them: exit codes, messages, and nothing written half.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn armid(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_armid")).args(arguments).output().unwrap()
+}
+
+fn montecarlo(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_montecarlo")).args(arguments).output().unwrap()
+}
+
+/// Asserts the exit code and that the message on stderr (or, for verdicts, stdout) says `words`.
+fn assert_says(output: &Output, code: i32, words: &[&str]) {
+    let text = format!(
+        "{}{}",
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    );
+    assert_eq!(output.status.code(), Some(code), "{text}");
+    for word in words {
+        assert!(text.contains(word), "\"{word}\" is not in: {text}");
+    }
+}
+
+/// A log in the default layout: joint `j` moves as `amplitude[j]` rad × a sum of sines.
+fn write_log(file: &Path, amplitude: [f64; 6], samples: usize) {
+    let names = |what: &str| (0..6).map(|j| format!("{what}_{j}")).collect::<Vec<_>>().join(",");
+    let (q, qd, torque) = (names("actual_q"), names("actual_qd"), names("actual_torque"));
+    let mut text = format!("timestamp,{q},{qd},{torque}\n");
+    for k in 0..samples {
+        let t = k as f64 * 0.008;
+        let wave = |j: usize| {
+            let (w, v) = (0.9 + 0.23 * j as f64, 2.1 + 0.31 * j as f64);
+            let q = amplitude[j] * ((w * t).sin() + 0.5 * (v * t).sin());
+            let qd = amplitude[j] * (w * (w * t).cos() + 0.5 * v * (v * t).cos());
+            (q, qd)
+        };
+        let values: Vec<String> = [t]
+            .into_iter()
+            .chain((0..6).map(|j| wave(j).0))
+            .chain((0..6).map(|j| wave(j).1))
+            .chain((0..6).map(|j| 3.0 * wave(j).1 + 0.1 * ((k * (j + 3)) as f64).sin()))
+            .map(|v| v.to_string())
+            .collect();
+        text.push_str(&values.join(","));
+        text.push('\n');
+    }
+    std::fs::write(file, text).unwrap();
+}
+
+#[test]
+fn bad_input_ends_in_a_message_that_names_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("log.csv");
+    write_log(&log, [0.5; 6], 1000);
+    let log = log.to_str().unwrap();
+    assert_says(&armid(&["base", "--robot", "ur9"]), 1, &["ur9", "ur10e"]);
+    assert_says(&armid(&["base", "--robot", "ur10e", "--reduced", "paper"]), 1, &["UR5", "ur10e"]);
+    assert_says(&armid(&["identify", "no.csv", "--robot", "ur5"]), 1, &["no.csv"]);
+    let twice = armid(&["identify", log, "--robot", "ur5", "--validate", log]);
+    assert_says(&twice, 1, &["training log"]);
+    let period = armid(&["identify", log, "--robot", "ur5", "--period", "3"]);
+    assert_says(&period, 1, &["does not repeat every 3 s"]);
+    let unwritable =
+        armid(&["identify", log, "--robot", "ur5", "--json", "/no/such/folder/x.json"]);
+    assert_says(&unwritable, 1, &["/no/such/folder"]);
+    assert_says(&armid(&["identify", log]), 2, &["--robot"]);
+}
+
+#[test]
+fn a_motion_that_does_not_excite_the_arm_is_a_negative_result_not_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let (log, json) = (folder.path().join("log.csv"), folder.path().join("result.json"));
+    write_log(&log, [0.8, 0.0, 0.0, 0.0, 0.0, 0.0], 4000);
+    let arguments =
+        ["identify", log.to_str().unwrap(), "--robot", "ur5", "--json", json.to_str().unwrap()];
+    assert_says(&armid(&arguments), 3, &["Declined", "rc6"]);
+    let result: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
+    assert_eq!(result["schema"], "armid.identify/1");
+    assert_eq!(result["verdict"], "not_identified");
+    assert!(result["not_identified"].as_array().unwrap().iter().any(|name| name == "rv4"));
+}
+
+#[test]
+fn usage_errors_of_the_main_job_exit_with_2() {
+    assert_says(&montecarlo(&["--trials", "0"]), 2, &["--trials"]);
+    assert_says(&montecarlo(&["--threads", "0"]), 2, &["--threads"]);
+    assert_says(&montecarlo(&["--shard", "3/3", "--out", "x"]), 2, &["count from 0"]);
+    assert_says(&montecarlo(&["--shard", "0/3"]), 2, &["--out"]);
+    assert_says(&montecarlo(&["--scenario", "no.toml"]), 1, &["no.toml"]);
+    assert_says(&montecarlo(&["merge", "no-folder"]), 1, &["no-folder"]);
+}
+
+#[test]
+fn unknown_keys_of_a_scenario_are_errors_that_name_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenario = folder.path().join("x.toml");
+    let default = include_str!("../sims/default.toml");
+    std::fs::write(&scenario, default.replace("trials =", "trails =")).unwrap();
+    let output = montecarlo(&["--scenario", scenario.to_str().unwrap()]);
+    assert_says(&output, 1, &["x.toml", "trails"]);
+}
+
+#[test]
+fn a_simulated_log_goes_through_identify_and_the_base_set_is_printed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let scenario = include_str!("../sims/default.toml").replace("periods = 8", "periods = 4");
+    std::fs::write(path("s.toml"), scenario).unwrap();
+    let (toml, log, truth, json) =
+        (path("s.toml"), path("log.csv"), path("t.json"), path("r.json"));
+    let simulate = armid(&["simulate", "--scenario", &toml, "--out", &log, "--truth", &truth]);
+    assert_says(&simulate, 0, &["samples"]);
+    let report = path("r.html");
+    let arguments = ["identify", &log, "--robot", "ur5", "--json", &json, "--report", &report];
+    assert_says(&armid(&arguments), 0, &["Identified 52 base parameters"]);
+    let read = |file: &str| -> serde_json::Value {
+        serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap()
+    };
+    let (result, truth) = (read(&json), read(&truth));
+    // Viscous friction of joint 1 is a base parameter by itself: no combination to compute.
+    let of = |list: &serde_json::Value, name: &str| {
+        list.as_array().unwrap().iter().find(|p| p["name"] == name).unwrap().clone()
+    };
+    let estimate = of(&result["base_parameters"], "rv1");
+    let true_value = of(&truth["standard_parameters"], "rv1")["value"].as_f64().unwrap();
+    let z =
+        (estimate["value"].as_f64().unwrap() - true_value) / estimate["sigma"].as_f64().unwrap();
+    // Fixed seed; a correct σ exceeds 8 of Student's t with few degrees of freedom once in 1e3.
+    assert!(z.abs() < 8.0, "z = {z}");
+    assert_eq!(result["processing"]["periods"], 4);
+    assert!(std::fs::read_to_string(&report).unwrap().contains("Identified parameters"));
+    assert_says(
+        &armid(&["base", "--robot", "ur5", "--reduced", "paper"]),
+        0,
+        &["33 base parameters"],
+    );
+}

@@ -1,0 +1,101 @@
+//! The whole chain pinned: scenario, simulated log, estimate, σ, verdict. A change of the chain's
+//! path is seen here even where the answer is still right.
+//!
+//! After an intended change run `ARMID_PIN=1 cargo test --test regress_chain -- --nocapture` and
+//! carry the printed numbers over. The log's hash covers every bit of the plant and the sensors; it
+//! rests on the platform's sine and logarithm, so another C library may call for another hash (the
+//! estimates, compared to 1e-9, must not change with it).
+
+use armid::identify::Options;
+use armid::montecarlo::calibration::Calibration;
+use armid::montecarlo::shard::Shard;
+use armid::montecarlo::{Experiment, Scenario};
+use sha2::{Digest, Sha256};
+
+/// Four periods instead of eight: half the plant's time.
+const SCENARIO: &str = r#"
+name = "regress"
+robot = "ur5"
+seed = 7
+trials = 24
+
+[motion]
+trajectory = "ur5_identification"
+periods = 4
+
+[sensors]
+torque_sd_nm = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15]
+q_sd_rad = 2e-5
+qd_sd_rad_s = 1e-3
+"#;
+
+const LOG_SHA256: &str = "05842d9cde4bf7c4d8c360021d8d4bef17af724b5374b7f2dbb1a1a438e49a66";
+/// `(name, estimate, σ)` of trial 0.
+const ESTIMATES: [(&str, f64, f64); 4] = [
+    ("mx2", -3.8897599642510126, 0.003507830410206881),
+    ("Ia4", 0.24751227104772844, 0.0007721802876459878),
+    ("rv1", 11.990311561682557, 0.01810500491284455),
+    ("rc6", 1.405470058548807, 0.00556635967550702),
+];
+const VERDICT: &str = "not_evaluated";
+
+fn experiment() -> Experiment {
+    let folder = std::path::Path::new("");
+    Experiment::prepare(Scenario::from_toml(SCENARIO, "regress", folder).unwrap()).unwrap()
+}
+
+#[test]
+fn the_chain_takes_the_path_it_took() {
+    let experiment = experiment();
+    assert_eq!(experiment.scenario.processing, Options::default());
+    let (measured, time_s) = experiment.log(0).unwrap();
+    let mut hash = Sha256::new();
+    time_s.iter().for_each(|t| hash.update(t.to_le_bytes()));
+    for signals in [&measured.q_rad, &measured.qd_rad_s, &measured.torque_nm] {
+        for j in 0..signals.joints() {
+            signals.joint(j).iter().for_each(|v| hash.update(v.to_le_bytes()));
+        }
+    }
+    let log_sha256: String = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+    let identification = experiment.worker().identify(0).unwrap();
+    let sigma = identification.sigma();
+    let set = &experiment.scenario.set;
+    let find = |name: &str| (0..set.rank()).find(|&k| set.name(k) == name).unwrap();
+    if std::env::var_os("ARMID_PIN").is_some() {
+        println!("LOG_SHA256 = {log_sha256}");
+        for (name, ..) in ESTIMATES {
+            let k = find(name);
+            println!("(\"{name}\", {:?}, {:?}),", identification.fit.theta[k], sigma[k]);
+        }
+        return;
+    }
+    assert_eq!(log_sha256, LOG_SHA256);
+    for (name, estimate, sigma_pinned) in ESTIMATES {
+        let k = find(name);
+        let theta = identification.fit.theta[k];
+        assert!((theta - estimate).abs() <= 1e-9 * estimate.abs(), "{name}: {theta:?}");
+        assert!(
+            (sigma[k] - sigma_pinned).abs() <= 1e-9 * sigma_pinned,
+            "σ of {name}: {:?}",
+            sigma[k]
+        );
+    }
+}
+
+#[test]
+fn threads_and_shards_give_the_same_bits_and_few_trials_no_verdict() {
+    let experiment = experiment();
+    let stop = std::sync::atomic::AtomicBool::new(false);
+    let run = |range: std::ops::Range<u64>, threads: usize| {
+        let mut shard = Shard::new(&experiment, 24, range);
+        shard.run(&experiment, threads, None, &stop, &|_| ()).unwrap();
+        shard.tally
+    };
+    let whole = run(0..24, 1);
+    assert_eq!(whole, run(0..24, 2));
+    let mut parts = run(16..24, 2);
+    parts.merge(&run(0..5, 1));
+    parts.merge(&run(5..16, 2));
+    assert_eq!(whole, parts);
+    assert_eq!(Calibration::of(&whole).verdict.to_string(), VERDICT);
+}
