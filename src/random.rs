@@ -30,6 +30,16 @@ pub enum Channel {
         /// Which component of the noise model.
         component: u8,
     },
+    /// Readings that a fault replaces by nonsense.
+    Outlier {
+        /// Which of the scenario's effects, from 0.
+        effect: u8,
+    },
+    /// Rows that a fault loses or repeats.
+    Dropped {
+        /// Which of the scenario's effects, from 0.
+        effect: u8,
+    },
 }
 
 impl Channel {
@@ -40,6 +50,8 @@ impl Channel {
             Self::Velocity => (2, 0),
             Self::Torque { component } => (3, component),
             Self::TorqueShared { component } => (4, component),
+            Self::Outlier { effect } => (5, effect),
+            Self::Dropped { effect } => (6, effect),
         };
         kind << 8 | u64::from(component)
     }
@@ -90,6 +102,8 @@ mod tests {
                         Channel::Torque { component: 0 },
                         Channel::Torque { component: 1 },
                         Channel::TorqueShared { component: 0 },
+                        Channel::Outlier { effect: 0 },
+                        Channel::Dropped { effect: 0 },
                     ] {
                         for joint in 0..7 {
                             first_words.insert(streams.stream(channel, joint).next_u64());
@@ -98,7 +112,7 @@ mod tests {
                 }
             }
         }
-        assert_eq!(first_words.len(), 3 * 3 * 3 * 5 * 7);
+        assert_eq!(first_words.len(), 3 * 3 * 3 * 7 * 7);
     }
 
     /// The scheme is part of every published result: a change must be seen.

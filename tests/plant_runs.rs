@@ -159,7 +159,7 @@ impl Drivetrain for Odometer {
         6
     }
 
-    fn start(&mut self, arm: &mut RapierArm, q: &[f64], qd: &[f64], states: &mut [f64]) {
+    fn start(&mut self, arm: &mut RapierArm, q: &mut [f64], qd: &mut [f64], states: &mut [f64]) {
         self.gear.start(arm, q, qd, &mut []);
         states.fill(0.0);
     }
@@ -190,7 +190,7 @@ fn a_drivetrain_may_have_states_of_its_own() {
     let mut state = State::zeros(6, drivetrain.states());
     state.parts_mut().0.copy_from_slice(&[0.1, -1.0, 0.5, 0.3, 0.2, 0.7]);
     let start = state.q_rad().to_vec();
-    drivetrain.start(&mut engine, &start, &[0.0; 6], &mut [0.0; 6]);
+    drivetrain.start(&mut engine, &mut start.clone(), &mut [0.0; 6], &mut [0.0; 6]);
     let mut rk4 = RungeKutta4::new(&state);
     for k in 0..200 {
         let time_s = f64::from(k) * 2e-3;

@@ -11,6 +11,7 @@ use crate::log::{Effort, Log, write_log};
 use crate::montecarlo::{Experiment, Scenario};
 use crate::output::check_writable;
 use crate::plant::SensorConfig;
+use crate::plant::faults::Effect;
 use crate::report::json::{Document, Input, Program};
 
 /// Simulate one trial of a scenario and write its log.
@@ -34,7 +35,15 @@ pub struct SimulateArgs {
 struct Truth<'a> {
     robot: &'a str,
     standard_parameters: Vec<StandardParameter>,
+    effects: Vec<HiddenEffect<'a>>,
     noise: &'a SensorConfig,
+}
+
+#[derive(Serialize)]
+struct HiddenEffect<'a> {
+    kind: &'a str,
+    joint: Option<usize>,
+    parameters: serde_json::Map<String, serde_json::Value>,
 }
 
 #[derive(Serialize)]
@@ -44,15 +53,21 @@ struct StandardParameter {
     unit: &'static str,
 }
 
+impl<'a> HiddenEffect<'a> {
+    fn of(effect: &'a Effect) -> Self {
+        Self { kind: effect.kind(), joint: effect.joint(), parameters: effect.parameters() }
+    }
+}
+
 /// Runs the command.
 pub fn run(args: &SimulateArgs) -> CommandResult {
     for path in [Some(&args.out), args.truth.as_ref()].into_iter().flatten() {
         check_writable(path)?;
     }
     let experiment = Experiment::prepare(Scenario::load(args.scenario.as_deref())?)?;
-    let (measured, time_s) = experiment.log(args.trial)?;
+    let measured = experiment.log(args.trial)?;
     let scenario = &experiment.scenario;
-    let samples = time_s.len();
+    let samples = measured.time_s.len();
     let source = format!("{} trial {}", scenario.name, args.trial);
     let effort = match scenario.sensors.effort {
         crate::plant::Effort::Torque => Effort::Torque(measured.torque_nm),
@@ -63,7 +78,7 @@ pub fn run(args: &SimulateArgs) -> CommandResult {
             Effort::Current { ampere, gain_nm_a: None }
         }
     };
-    let log = Log::new(source, time_s, measured.q_rad, measured.qd_rad_s, effort)?;
+    let log = Log::new(source, measured.time_s, measured.q_rad, measured.qd_rad_s, effort)?;
     let sha256 = write_log(&args.out, &log)?;
     println!("{}: {samples} samples, sha256 {sha256}", args.out.display());
     if let Some(path) = &args.truth {
@@ -77,6 +92,7 @@ pub fn run(args: &SimulateArgs) -> CommandResult {
         let truth = Truth {
             robot: &scenario.arm.name,
             standard_parameters: named.collect(),
+            effects: scenario.effects.iter().map(HiddenEffect::of).collect(),
             noise: &scenario.sensors,
         };
         let inputs = args.scenario.iter().map(|file| Input::of(file)).collect::<Result<_, _>>()?;

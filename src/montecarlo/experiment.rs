@@ -7,10 +7,10 @@ use thiserror::Error;
 use super::scenario::Scenario;
 use super::tally::Outcome;
 use crate::dynamics::Model;
-use crate::excitation::Reference;
 use crate::identify::covariance::CovarianceKind;
 use crate::identify::{Estimator, Identification, Identifier, IdentifyError, Measurement, Options};
-use crate::plant::{Encoders, Measured, Plant, PlantError, Recording, Sensors};
+use crate::plant::faults::FaultyPlant;
+use crate::plant::{Measured, PlantError, Recording, Sensors};
 use crate::random::TrialStreams;
 
 /// A scenario whose plant has run: what all trials share.
@@ -29,6 +29,7 @@ pub struct Experiment {
     pub covariance: CovarianceKind,
     /// The noise-free run.
     pub recording: Recording,
+    plant: FaultyPlant,
     sensors: Sensors,
 }
 
@@ -67,7 +68,8 @@ impl Experiment {
     pub fn prepare(scenario: Scenario) -> Result<Self, TrialError> {
         let model = Model::new(&scenario.arm);
         let truth = scenario.set.values(&model.standard_parameters());
-        let recording = run_plant(&scenario, None)?;
+        let plant = FaultyPlant::new(&scenario.arm, &scenario.effects, &scenario.plant)?;
+        let recording = plant.run(&scenario.excitation, None)?;
         let sensors = Sensors::new(&scenario.sensors, &scenario.arm, scenario.plant.log_rate_hz)?;
         let scale = vec![1.0; truth.len()];
         let pilot_options = scenario.processing.clone();
@@ -79,6 +81,7 @@ impl Experiment {
             estimator: Estimator::Wls,
             covariance: CovarianceKind::Wls,
             recording,
+            plant,
             sensors,
         };
         let pilot = experiment.worker_with(pilot_options).identify(PILOT)?;
@@ -117,21 +120,23 @@ impl Experiment {
             return Ok(std::borrow::Cow::Borrowed(&self.recording));
         }
         let encoders = self.sensors.encoders(&self.streams(trial));
-        Ok(std::borrow::Cow::Owned(run_plant(&self.scenario, Some(encoders))?))
+        Ok(std::borrow::Cow::Owned(self.plant.run(&self.scenario.excitation, Some(encoders))?))
     }
 
-    /// The log of a trial: the noise-free run as its sensors read it.
-    pub fn log(&self, trial: u64) -> Result<(Measured, Vec<f64>), PlantError> {
+    /// The log of a trial: the noise-free run as its sensors read it, with the readings that go
+    /// wrong.
+    pub fn log(&self, trial: u64) -> Result<Measured, PlantError> {
         let recording = self.recording(trial)?;
         let mut measured = Measured::like(&recording);
-        self.sensors.measure(&recording, &self.streams(trial), &mut measured);
-        Ok((measured, recording.time_s.clone()))
+        self.read(&recording, trial, &mut measured);
+        Ok(measured)
     }
-}
 
-fn run_plant(scenario: &Scenario, encoders: Option<Encoders>) -> Result<Recording, PlantError> {
-    let reference: &dyn Reference = &scenario.excitation;
-    Plant::new(&scenario.arm, &scenario.plant)?.run(reference, encoders)
+    fn read(&self, recording: &Recording, trial: u64, log: &mut Measured) {
+        let streams = self.streams(trial);
+        self.sensors.measure(recording, &streams, log);
+        self.plant.spoil(&streams, log);
+    }
 }
 
 /// One thread's memory for trials of an [`Experiment`].
@@ -146,10 +151,10 @@ impl Worker<'_> {
     pub fn identify(&mut self, trial: u64) -> Result<Identification, TrialError> {
         let experiment = self.experiment;
         let recording = experiment.recording(trial)?;
-        experiment.sensors.measure(&recording, &experiment.streams(trial), &mut self.measured);
+        experiment.read(&recording, trial, &mut self.measured);
         Ok(self.identifier.identify(&Measurement {
             source: "simulated log",
-            time_s: &recording.time_s,
+            time_s: &self.measured.time_s,
             q_rad: &self.measured.q_rad,
             qd_rad_s: &self.measured.qd_rad_s,
             torque_nm: &self.measured.torque_nm,

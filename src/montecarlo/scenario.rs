@@ -9,6 +9,7 @@ use thiserror::Error;
 use crate::base::{BaseSet, Parameterisation, ParameterisationError};
 use crate::excitation::{Excitation, ExcitationError, FourierSeries, Requirements};
 use crate::identify::Options;
+use crate::plant::faults::{Effect, FaultyPlant};
 use crate::plant::{PlantConfig, PlantError, SensorConfig, Sensors};
 use crate::robot::{Arm, RobotError};
 
@@ -34,6 +35,8 @@ pub struct Scenario {
     pub plant: PlantConfig,
     /// What the sensors add.
     pub sensors: SensorConfig,
+    /// What is hidden in the arm: the null model knows nothing of it.
+    pub effects: Vec<Effect>,
     /// Whether the controller reads the noisy sensors (the plant then runs anew for every trial).
     pub controller_reads_sensors: bool,
     /// How logs are processed.
@@ -62,6 +65,8 @@ struct ScenarioFile {
     plant: PlantConfig,
     #[serde(default)]
     sensors: SensorConfig,
+    #[serde(default, rename = "effect")]
+    effects: Vec<Effect>,
     #[serde(default)]
     processing: Options,
 }
@@ -163,7 +168,7 @@ impl Scenario {
                 Excitation::fitted(&arm, &requirements, series, file.motion.periods, false)?
             }
         };
-        file.plant.validate()?;
+        FaultyPlant::new(&arm, &file.effects, &file.plant)?;
         Sensors::new(&file.sensors, &arm, file.plant.log_rate_hz)?;
         Ok(Self {
             set: BaseSet::find(&arm, parameterisation)?,
@@ -174,6 +179,7 @@ impl Scenario {
             excitation,
             plant: file.plant,
             sensors: file.sensors,
+            effects: file.effects,
             controller_reads_sensors: file.controller_reads_sensors,
             processing: file.processing,
             seed: file.seed,

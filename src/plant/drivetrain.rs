@@ -30,8 +30,25 @@ pub trait Drivetrain: Send {
         0
     }
 
-    /// Prepares the arm and the own states for a run that starts at (`q_rad`, `qd_rad_s`).
-    fn start(&mut self, arm: &mut RapierArm, q_rad: &[f64], qd_rad_s: &[f64], states: &mut [f64]);
+    /// Prepares the arm and the own states for a run whose encoders read (`q_rad`, `qd_rad_s`) at its
+    /// start, and leaves there where the links are (the same where nothing gives way).
+    fn start(
+        &mut self,
+        arm: &mut RapierArm,
+        q_rad: &mut [f64],
+        qd_rad_s: &mut [f64],
+        states: &mut [f64],
+    );
+
+    /// Replaces the links' angles and speeds by those of what the encoders sit on, their errors of
+    /// mounting included. By default they sit on the joints themselves.
+    fn encoder_side(&self, _states: &[f64], _q_rad: &mut [f64], _qd_rad_s: &mut [f64]) {}
+
+    /// Into how many parts a step may be divided where [`Self::fastest_decay_per_s`] asks for it.
+    /// By default a step that is too long is refused.
+    fn most_substeps(&self) -> usize {
+        1
+    }
 
     /// Fastest rate (1/s) at which it makes a disturbance of a joint's speed decay, given the arm's
     /// diag(M⁻¹) in kg⁻¹ m⁻²: what limits the step of an explicit integrator.
@@ -71,7 +88,7 @@ impl RigidDrivetrain {
 }
 
 impl Drivetrain for RigidDrivetrain {
-    fn start(&mut self, arm: &mut RapierArm, _: &[f64], _: &[f64], _: &mut [f64]) {
+    fn start(&mut self, arm: &mut RapierArm, _: &mut [f64], _: &mut [f64], _: &mut [f64]) {
         for (j, [_, _, rotor]) in self.joints.iter().enumerate() {
             arm.set_rotor_inertia(j, *rotor);
         }

@@ -41,10 +41,11 @@ pub enum PlantError {
         /// What it must be.
         requirement: &'static str,
     },
-    /// Friction is too steep for the step: the integration would chatter around standstill.
+    /// Friction is too steep, or a gear too stiff, for the step: the integration would chatter.
     #[error(
-        "step_s = {step_s}: friction at standstill decays at {decay_per_s:.0} /s, which needs a step \
-         of at most {longest_s:.2e} s (or a larger friction_epsilon_rad_s)"
+        "step_s = {step_s}: the joint mechanics (friction at standstill, bristles, gears) are as fast \
+         as {decay_per_s:.0} /s, which needs a step of at most {longest_s:.2e} s, a larger \
+         friction_epsilon_rad_s or less stiffness"
     )]
     StepTooLong {
         /// The step asked for, s.
@@ -53,6 +54,33 @@ pub enum PlantError {
         decay_per_s: f64,
         /// The longest step accepted, s.
         longest_s: f64,
+    },
+    /// A hidden effect whose numbers make no sense.
+    #[error("effect {number} ({kind}): {key} = {value}: {requirement}")]
+    Effect {
+        /// Its place among the scenario's effects, from 1.
+        number: usize,
+        /// Its kind.
+        kind: &'static str,
+        /// The key.
+        key: &'static str,
+        /// The value found.
+        value: f64,
+        /// What it must be.
+        requirement: &'static str,
+    },
+    /// Effects that together turn friction of a joint into a drive.
+    #[error(
+        "joint {joint}: the effects leave {torque_nm:.3} Nm of friction at {qd_rad_s:.3} rad/s, which \
+         would drive the joint instead of slowing it"
+    )]
+    FrictionDrives {
+        /// Joint, from 1.
+        joint: usize,
+        /// Speed at which it does, rad/s.
+        qd_rad_s: f64,
+        /// Friction there, Nm.
+        torque_nm: f64,
     },
     /// A list with one entry per joint has another length.
     #[error("{what} has {found} joints, the arm has {expected}")]

@@ -26,6 +26,11 @@ impl State {
         &self.values[self.dof..2 * self.dof]
     }
 
+    /// The drivetrain's own states.
+    pub fn own(&self) -> &[f64] {
+        &self.values[2 * self.dof..]
+    }
+
     /// Angles (rad), velocities (rad/s) and the drivetrain's own states, to be set.
     pub fn parts_mut(&mut self) -> (&mut [f64], &mut [f64], &mut [f64]) {
         let (q, rest) = self.values.split_at_mut(self.dof);
@@ -86,7 +91,7 @@ impl RungeKutta4 {
                 time_s: time_s + reach,
                 q_rad: self.trial.q_rad(),
                 qd_rad_s: self.trial.qd_rad_s(),
-                states: &self.trial.values[2 * n..],
+                states: self.trial.own(),
                 drive_torque_nm,
             };
             let (qd, rest) = from_here[0].split_at_mut(n);

@@ -14,6 +14,7 @@ mod controller;
 mod drivetrain;
 mod engine_math;
 mod error;
+pub mod faults;
 mod integrate;
 mod noise;
 mod rapier_arm;

@@ -1,6 +1,6 @@
 //! The arm as a multibody of the physics engine: exact forward dynamics, no integration.
 
-use nalgebra::Matrix3;
+use nalgebra::{DMatrix, DVector, Matrix3};
 use rapier3d::dynamics::{
     GenericJointBuilder, JointAxesMask, MassProperties, Multibody, MultibodyIndex, RigidBodyBuilder,
 };
@@ -130,6 +130,32 @@ impl RapierArm {
         self.world.step();
         let multibody = multibody_mut(&mut self.world, self.multibody);
         qdd_rad_s2.copy_from_slice(multibody.generalized_acceleration().as_slice());
+    }
+
+    /// Accelerations at rest without any torque (rad/s²), and what a unit torque on each joint adds to
+    /// them, column by column: M⁻¹, kg⁻¹ m⁻².
+    pub(super) fn response(&mut self, q_rad: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
+        let n = self.dof();
+        let rest = vec![0.0; n];
+        let mut idle = DVector::zeros(n);
+        self.forward_dynamics(q_rad, &rest, &rest, idle.as_mut_slice());
+        let mut inverse = DMatrix::zeros(n, n);
+        for j in 0..n {
+            let mut push = rest.clone();
+            push[j] = 1.0;
+            let mut pushed = DVector::zeros(n);
+            self.forward_dynamics(q_rad, &rest, &push, pushed.as_mut_slice());
+            inverse.set_column(j, &(pushed - &idle));
+        }
+        (idle, inverse)
+    }
+
+    /// Torques that hold the links still against gravity, Nm: M⁻¹ τ = −q̈(τ = 0). In a pose that is
+    /// not finite there are none, and what is returned is not finite either.
+    pub(super) fn holding_torque(&mut self, q_rad: &[f64]) -> DVector<f64> {
+        let (idle, inverse) = self.response(q_rad);
+        let none = DVector::repeat(self.dof(), f64::NAN);
+        inverse.lu().solve(&-idle).unwrap_or(none)
     }
 
     /// Replaces the rotor inertia that the multibody carries at joint `j` (from 0), kg m². A

@@ -7,9 +7,9 @@ use crate::robot::JointSignals;
 pub struct Recording {
     /// Time from the start of the reference, s.
     pub time_s: Vec<f64>,
-    /// Joint angles, rad.
+    /// Angles of what the encoders sit on (the joints, unless a gear gives way), rad.
     pub q_rad: JointSignals,
-    /// Joint velocities, rad/s.
+    /// Velocities of the same, rad/s.
     pub qd_rad_s: JointSignals,
     /// Drive torque i_G k I at the joint, before friction, Nm: at the instants at which the
     /// controller decides, the mean of what was held before and what is held after.

@@ -108,6 +108,8 @@ pub struct Sensors {
 /// The channels of a log as the sensors report them; same samples as the recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
+    /// Time stamps, s.
+    pub time_s: Vec<f64>,
     /// Joint angles, rad.
     pub q_rad: JointSignals,
     /// Joint velocities, rad/s.
@@ -122,6 +124,7 @@ impl Measured {
     /// Room for what is measured of `recording`.
     pub fn like(recording: &Recording) -> Self {
         Self {
+            time_s: recording.time_s.clone(),
             q_rad: recording.q_rad.clone(),
             qd_rad_s: recording.qd_rad_s.clone(),
             torque_nm: recording.torque_nm.clone(),
@@ -162,6 +165,7 @@ impl Sensors {
     ///
     /// Positions and velocities that the controller has read already are logged as it read them.
     pub fn measure(&self, recording: &Recording, streams: &TrialStreams, out: &mut Measured) {
+        out.time_s.clone_from(&recording.time_s);
         match &recording.readings {
             Some(readings) => {
                 out.q_rad.clone_from(&readings.q_rad);
@@ -242,6 +246,6 @@ impl Encoders {
 }
 
 /// The nearest multiple of `step`.
-fn quantised(value: f64, step: f64) -> f64 {
+pub(super) fn quantised(value: f64, step: f64) -> f64 {
     (value / step).round() * step
 }

@@ -72,24 +72,28 @@ impl Plant {
         let mut state = State::zeros(n, self.drivetrain.states());
         let (q, qd, own) = state.parts_mut();
         reference.sample(0.0, q, qd, &mut vec![0.0; n]);
-        let (q, qd) = (&*q, &*qd);
         self.drivetrain.start(&mut arm, q, qd, own);
-        let decay_per_s = self.drivetrain.fastest_decay_per_s(&inverse_inertia(&mut arm, q));
-        let longest_s = RungeKutta4::LARGEST_STEP_DECAY / decay_per_s;
-        if h > longest_s {
+        let (_, inverse) = arm.response(q);
+        let decay_per_s = self.drivetrain.fastest_decay_per_s(inverse.diagonal().as_slice());
+        let parts = (h * decay_per_s / RungeKutta4::LARGEST_STEP_DECAY).ceil().max(1.0);
+        let most = self.drivetrain.most_substeps();
+        // Also where the decay is no number: the cast below must not hide it.
+        if parts.is_nan() || parts > most as f64 {
+            let longest_s = most as f64 * RungeKutta4::LARGEST_STEP_DECAY / decay_per_s;
             return Err(PlantError::StepTooLong { step_s: h, decay_per_s, longest_s });
         }
+        let (substeps, substep_s) = (parts as usize, h / parts);
         let mut integrator = RungeKutta4::new(&state);
 
         let (mut q_read, mut qd_read) = (vec![0.0; n], vec![0.0; n]);
+        let (mut q_seen, mut qd_seen) = (vec![0.0; n], vec![0.0; n]);
         let (mut held_before, mut held) = (vec![0.0; n], vec![0.0; n]);
         let last = logged * per_log;
         for step in 0..=last {
             let time_s = step as f64 * h;
             held_before.copy_from_slice(&held);
             if step % per_control == 0 {
-                q_read.copy_from_slice(state.q_rad());
-                qd_read.copy_from_slice(state.qd_rad_s());
+                self.seen(&state, &mut q_read, &mut qd_read);
                 if let Some(encoders) = &mut encoders {
                     encoders.read(&mut q_read, &mut qd_read);
                 }
@@ -104,8 +108,9 @@ impl Plant {
             if step % per_log == 0 {
                 let k = step / per_log;
                 recording.time_s[k] = k as f64 / self.config.log_rate_hz;
-                recording.q_rad.set_sample(k, state.q_rad());
-                recording.qd_rad_s.set_sample(k, state.qd_rad_s());
+                self.seen(&state, &mut q_seen, &mut qd_seen);
+                recording.q_rad.set_sample(k, &q_seen);
+                recording.qd_rad_s.set_sample(k, &qd_seen);
                 if let Some(readings) = &mut recording.readings {
                     readings.q_rad.set_sample(k, &q_read);
                     readings.qd_rad_s.set_sample(k, &qd_read);
@@ -118,7 +123,11 @@ impl Plant {
             if step == last {
                 break;
             }
-            integrator.step(&mut arm, &mut *self.drivetrain, &mut state, time_s, h, &held);
+            for part in 0..substeps {
+                let time_s = time_s + part as f64 * substep_s;
+                let drivetrain = &mut *self.drivetrain;
+                integrator.step(&mut arm, drivetrain, &mut state, time_s, substep_s, &held);
+            }
             if let Some(j) = state.first_not_finite() {
                 let (q_rad, qd_rad_s) = (state.q_rad()[j], state.qd_rad_s()[j]);
                 return Err(PlantError::Diverged { time_s, joint: j + 1, q_rad, qd_rad_s });
@@ -127,20 +136,13 @@ impl Plant {
         write_targets(reference, &mut recording);
         Ok(recording)
     }
-}
 
-/// diag(M⁻¹) at `q_rad`, kg⁻¹ m⁻²: what a unit torque on each joint adds to its acceleration.
-fn inverse_inertia(arm: &mut RapierArm, q_rad: &[f64]) -> Vec<f64> {
-    let n = q_rad.len();
-    let rest = vec![0.0; n];
-    let mut accelerations = |torque_nm: &[f64]| {
-        let mut qdd = vec![0.0; n];
-        arm.forward_dynamics(q_rad, &rest, torque_nm, &mut qdd);
-        qdd
-    };
-    let idle = accelerations(&rest);
-    let pushed = |j: usize| -> Vec<f64> { (0..n).map(|i| f64::from(u8::from(i == j))).collect() };
-    (0..n).map(|j| accelerations(&pushed(j))[j] - idle[j]).collect()
+    /// What ideal encoders would read in `state`.
+    fn seen(&self, state: &State, q_rad: &mut [f64], qd_rad_s: &mut [f64]) {
+        q_rad.copy_from_slice(state.q_rad());
+        qd_rad_s.copy_from_slice(state.qd_rad_s());
+        self.drivetrain.encoder_side(state.own(), q_rad, qd_rad_s);
+    }
 }
 
 /// One run of `arm` as it is, behind a stiff gear, with a controller that knows it.

@@ -1,0 +1,88 @@
+//! Drives whose current is not what it is taken for.
+
+use serde::{Deserialize, Serialize};
+
+use super::assembly::Assembly;
+use super::effect::{Complaint, Fault, finite, positive, require};
+
+/// A torque constant off its nominal value: the torque that controller and log compute from the
+/// current with the nominal i_G k is (1 + e) times the true one (the true constant is k/(1 + e)).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TorqueGain {
+    /// Joint, from 1.
+    pub joint: usize,
+    /// e, between −0.5 and 1.
+    pub error_fraction: f64,
+}
+
+impl Fault for TorqueGain {
+    fn joint(&self) -> Option<usize> {
+        Some(self.joint)
+    }
+
+    fn check(&self) -> Result<(), Complaint> {
+        let ok = (-0.5..=1.0).contains(&self.error_fraction);
+        require(ok, "error_fraction", self.error_fraction, "must be between -0.5 and 1")
+    }
+
+    fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
+        let joint = assembly.joint(self.joint);
+        joint.gain_error = (1.0 + joint.gain_error) * (1.0 + self.error_fraction) - 1.0;
+        Ok(())
+    }
+}
+
+/// A current sensor off zero. The current loop holds the *reading* at what the controller asks for, so
+/// the log shows the command and the drive gives o less.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CurrentOffset {
+    /// Joint, from 1.
+    pub joint: usize,
+    /// o: reading minus truth, as torque at the joint, Nm.
+    pub offset_nm: f64,
+}
+
+impl Fault for CurrentOffset {
+    fn joint(&self) -> Option<usize> {
+        Some(self.joint)
+    }
+
+    fn check(&self) -> Result<(), Complaint> {
+        finite("offset_nm", self.offset_nm)
+    }
+
+    fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
+        assembly.joint(self.joint).offset_nm += self.offset_nm;
+        Ok(())
+    }
+}
+
+/// A current reading that ends at a limit which the current itself passes: the log shows
+/// clamp(τ, ±limit). (A drive that cannot give more than it is asked for is a limit of the arm,
+/// `torque_nm`; its log is true.)
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Saturation {
+    /// Joint, from 1.
+    pub joint: usize,
+    /// Largest torque that can be read, Nm.
+    pub limit_nm: f64,
+}
+
+impl Fault for Saturation {
+    fn joint(&self) -> Option<usize> {
+        Some(self.joint)
+    }
+
+    fn check(&self) -> Result<(), Complaint> {
+        positive("limit_nm", self.limit_nm)
+    }
+
+    fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
+        let limit = &mut assembly.joint(self.joint).reading_limit_nm;
+        *limit = limit.min(self.limit_nm);
+        Ok(())
+    }
+}

@@ -1,0 +1,377 @@
+//! Friction of a joint, and everything that can be wrong with a model of it.
+
+use serde::{Deserialize, Serialize};
+
+use super::assembly::Assembly;
+use super::effect::{Complaint, Fault, finite, not_negative, positive, require};
+use crate::robot::Drive;
+
+/// Friction torque of one joint on the motor's side of its gear:
+///
+/// ```text
+/// τ_f = (1 + φ Θ) · [ rv q̇ + c(q, q̇, L) z + Σ A |q̇|ᵖ s + a z² + b |q̇| ]
+/// c   = rc + Σ d exp(−(q̇/v_s)²) + Σ P cos(q + ψ) + μ |L|
+/// s   = tanh(q̇/ε);   z = s, or the bristle's state with presliding
+/// ```
+#[derive(Debug, Clone)]
+pub(super) struct Friction {
+    epsilon_rad_s: f64,
+    viscous_nm_s_rad: f64,
+    coulomb_nm: f64,
+    stribeck: Vec<Stribeck>,
+    powers: Vec<NonlinearViscous>,
+    asymmetric_nm: f64,
+    asymmetric_nm_s_rad: f64,
+    positions: Vec<PositionFriction>,
+    /// μ of the load-dependent part.
+    pub(super) mu: f64,
+    /// Bristles, if any.
+    pub(super) presliding: Option<Presliding>,
+    /// Warming, if any.
+    pub(super) thermal: Option<ThermalDrift>,
+}
+
+impl Friction {
+    /// The paper's (2) and (3), with the drive's own rv and rc.
+    pub(super) fn nominal(drive: &Drive, epsilon_rad_s: f64) -> Self {
+        Self {
+            epsilon_rad_s,
+            viscous_nm_s_rad: drive.viscous_nm_s_rad,
+            coulomb_nm: drive.coulomb_nm,
+            stribeck: Vec::new(),
+            powers: Vec::new(),
+            asymmetric_nm: 0.0,
+            asymmetric_nm_s_rad: 0.0,
+            positions: Vec::new(),
+            mu: 0.0,
+            presliding: None,
+            thermal: None,
+        }
+    }
+
+    /// τ_f, Nm, at angle and speed of the motor, the bristle's state where there is one, the warmth Θ
+    /// and the torque L that the gear's output carries.
+    #[inline]
+    pub(super) fn torque_nm(
+        &self,
+        q_rad: f64,
+        qd_rad_s: f64,
+        bristle: Option<f64>,
+        warmth: f64,
+        load_nm: f64,
+    ) -> f64 {
+        let sign = (qd_rad_s / self.epsilon_rad_s).tanh();
+        let direction = bristle.unwrap_or(sign);
+        let level = self.level_nm(q_rad, qd_rad_s, load_nm);
+        let speed = qd_rad_s.abs();
+        let mut torque = self.viscous_nm_s_rad * qd_rad_s + level * direction;
+        torque += self.asymmetric_nm * direction * direction + self.asymmetric_nm_s_rad * speed;
+        for power in &self.powers {
+            torque += power.amplitude_nm * speed.powf(power.exponent) * sign;
+        }
+        match &self.thermal {
+            Some(thermal) => torque * (1.0 + thermal.fraction * warmth),
+            None => torque,
+        }
+    }
+
+    /// The level c of dry friction, Nm.
+    #[inline]
+    fn level_nm(&self, q_rad: f64, qd_rad_s: f64, load_nm: f64) -> f64 {
+        let mut level = self.coulomb_nm + self.mu * load_nm.abs();
+        for part in &self.stribeck {
+            level += part.extra_nm * (-(qd_rad_s / part.vs_rad_s).powi(2)).exp();
+        }
+        for part in &self.positions {
+            level += part.amplitude_nm * (q_rad + part.phase_rad).cos();
+        }
+        level
+    }
+
+    /// ż = k (q̇ − |q̇| z), 1/s.
+    #[inline]
+    pub(super) fn bristle_rate(presliding: &Presliding, qd_rad_s: f64, bristle: f64) -> f64 {
+        presliding.stiffness_per_rad * (qd_rad_s - qd_rad_s.abs() * bristle)
+    }
+
+    /// Power lost at `qd_rad_s` under the nominal law, W.
+    pub(super) fn nominal_power_w(&self, qd_rad_s: f64) -> f64 {
+        let sign = (qd_rad_s / self.epsilon_rad_s).tanh();
+        (self.viscous_nm_s_rad * qd_rad_s + self.coulomb_nm * sign) * qd_rad_s
+    }
+
+    /// First speed up to `largest_rad_s` (and its torque, Nm) at which friction would drive the joint
+    /// instead of slowing it.
+    pub(super) fn first_driving(&self, largest_rad_s: f64) -> Option<(f64, f64)> {
+        const SPEEDS: i32 = 48;
+        let wave: f64 = self.positions.iter().map(|p| p.amplitude_nm.abs()).sum();
+        let unphased = Self { positions: Vec::new(), ..self.clone() };
+        (0..SPEEDS)
+            .map(|k| largest_rad_s * 0.8_f64.powi(k))
+            .flat_map(|speed| [speed, -speed])
+            .find_map(|v| {
+                let sign = (v / self.epsilon_rad_s).tanh();
+                let torque = unphased.torque_nm(0.0, v, None, 1.0, 0.0) - wave * sign;
+                (torque * v < 0.0).then_some((v, torque))
+            })
+    }
+
+    /// Steepest slope dτ_f/dq̇ at speeds up to `largest_rad_s` with gear loads up to `load_nm`, and
+    /// steepest slope dτ_f/dq of the bristles: Nm s/rad and Nm/rad. Upper bounds.
+    pub(super) fn slopes(&self, largest_rad_s: f64, load_nm: f64) -> (f64, f64) {
+        let level = self.coulomb_nm
+            + self.mu * load_nm
+            + self.stribeck.iter().map(|p| p.extra_nm.abs()).sum::<f64>()
+            + self.positions.iter().map(|p| p.amplitude_nm.abs()).sum::<f64>();
+        let power = |p: &NonlinearViscous| {
+            // |v|ᵖ tanh(v/ε): at most p vᵖ⁻¹ for p ≥ 1, and about εᵖ⁻¹ near standstill for p < 1.
+            let at = if p.exponent < 1.0 { self.epsilon_rad_s } else { largest_rad_s };
+            p.amplitude_nm.abs() * p.exponent.max(1.0) * at.powf(p.exponent - 1.0)
+        };
+        let mut smooth = self.viscous_nm_s_rad
+            + self.asymmetric_nm_s_rad.abs()
+            + self.powers.iter().map(power).sum::<f64>();
+        let mut bristles = 0.0;
+        match &self.presliding {
+            Some(presliding) => bristles = level * presliding.stiffness_per_rad,
+            None => smooth += (level + self.asymmetric_nm.abs()) / self.epsilon_rad_s,
+        }
+        let warm = 1.0 + self.thermal.as_ref().map_or(0.0, |t| t.fraction.max(0.0) * 2.0);
+        (smooth * warm, bristles * warm)
+    }
+}
+
+/// Extra dry friction near standstill: c = rc + d exp(−(q̇/v_s)²) (Bo and Pavelescu 1982 with
+/// exponent 2, as in Armstrong-Hélouvry, Dupont, Canudas de Wit 1994).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stribeck {
+    /// Joint, from 1.
+    pub joint: usize,
+    /// d: static minus Coulomb friction, Nm.
+    pub extra_nm: f64,
+    /// v_s, rad/s.
+    pub vs_rad_s: f64,
+}
+
+impl Fault for Stribeck {
+    fn joint(&self) -> Option<usize> {
+        Some(self.joint)
+    }
+
+    fn check(&self) -> Result<(), Complaint> {
+        finite("extra_nm", self.extra_nm)?;
+        positive("vs_rad_s", self.vs_rad_s)
+    }
+
+    fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
+        assembly.joint(self.joint).friction.stribeck.push(*self);
+        Ok(())
+    }
+}
+
+/// Viscous friction off proportionality: + A |q̇/(1 rad/s)|ᵖ sign q̇. Concave for p < 1 (thinning
+/// grease) or A < 0 with p > 1, convex otherwise.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NonlinearViscous {
+    /// Joint, from 1.
+    pub joint: usize,
+    /// A: deviation from the linear law at 1 rad/s, Nm.
+    pub amplitude_nm: f64,
+    /// p, above 0 and up to 4.
+    pub exponent: f64,
+}
+
+impl Fault for NonlinearViscous {
+    fn joint(&self) -> Option<usize> {
+        Some(self.joint)
+    }
+
+    fn check(&self) -> Result<(), Complaint> {
+        finite("amplitude_nm", self.amplitude_nm)?;
+        let ok = self.exponent > 0.0 && self.exponent <= 4.0;
+        require(ok, "exponent", self.exponent, "must be above 0 and at most 4")
+    }
+
+    fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
+        assembly.joint(self.joint).friction.powers.push(*self);
+        Ok(())
+    }
+}
+
+/// Friction of unequal size in the two directions: rc ± a and rv ± b for positive (negative) speed.
+/// At standstill, where dry friction has no direction, the unequal part vanishes too.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AsymmetricFriction {
+    /// Joint, from 1.
+    pub joint: usize,
+    /// a: half the difference of Coulomb friction, Nm.
+    pub coulomb_nm: f64,
+    /// b: half the difference of viscous friction, Nm s/rad.
+    pub viscous_nm_s_rad: f64,
+}
+
+impl Fault for AsymmetricFriction {
+    fn joint(&self) -> Option<usize> {
+        Some(self.joint)
+    }
+
+    fn check(&self) -> Result<(), Complaint> {
+        finite("coulomb_nm", self.coulomb_nm)?;
+        finite("viscous_nm_s_rad", self.viscous_nm_s_rad)
+    }
+
+    fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
+        let friction = &mut assembly.joint(self.joint).friction;
+        friction.asymmetric_nm += self.coulomb_nm;
+        friction.asymmetric_nm_s_rad += self.viscous_nm_s_rad;
+        Ok(())
+    }
+}
+
+/// Dry friction that grows with the load: c = rc + μ |L|, with L the torque that the gear's output
+/// hands to the link (the rotor's own inertia is upstream of it and not in it). In a stiff gear L
+/// depends on the acceleration and the acceleration on friction: both are solved for in every stage.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LoadFriction {
+    /// Joint, from 1.
+    pub joint: usize,
+    /// μ: friction per gear torque, 0 up to 0.5.
+    pub mu: f64,
+}
+
+impl Fault for LoadFriction {
+    fn joint(&self) -> Option<usize> {
+        Some(self.joint)
+    }
+
+    fn check(&self) -> Result<(), Complaint> {
+        require((0.0..=0.5).contains(&self.mu), "mu", self.mu, "must be between 0 and 0.5")
+    }
+
+    fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
+        let friction = &mut assembly.joint(self.joint).friction;
+        friction.mu += self.mu;
+        require(friction.mu <= 0.5, "mu", friction.mu, "must not sum to more than 0.5 on a joint")
+    }
+}
+
+/// Dry friction that builds up over an angle instead of at once: Dahl's model (1968),
+/// τ = c z with ż = k (q̇ − |q̇| z), in place of c tanh(q̇/ε). The stiffness of the bristles is c k.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Presliding {
+    /// Joint, from 1.
+    pub joint: usize,
+    /// k: inverse of the angle over which friction turns round, 1/rad.
+    pub stiffness_per_rad: f64,
+}
+
+impl Fault for Presliding {
+    fn joint(&self) -> Option<usize> {
+        Some(self.joint)
+    }
+
+    fn check(&self) -> Result<(), Complaint> {
+        positive("stiffness_per_rad", self.stiffness_per_rad)
+    }
+
+    fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
+        let present = assembly.joint(self.joint).friction.presliding.replace(*self).is_some();
+        require(!present, "joint", self.joint as f64, "has presliding already")
+    }
+}
+
+/// Dry friction that varies over a turn: c = rc + P cos(q + ψ), from a gear or seal out of round.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PositionFriction {
+    /// Joint, from 1.
+    pub joint: usize,
+    /// P, Nm.
+    pub amplitude_nm: f64,
+    /// ψ, rad.
+    pub phase_rad: f64,
+}
+
+impl Fault for PositionFriction {
+    fn joint(&self) -> Option<usize> {
+        Some(self.joint)
+    }
+
+    fn check(&self) -> Result<(), Complaint> {
+        finite("amplitude_nm", self.amplitude_nm)?;
+        finite("phase_rad", self.phase_rad)
+    }
+
+    fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
+        assembly.joint(self.joint).friction.positions.push(*self);
+        Ok(())
+    }
+}
+
+/// All friction of a joint times 1 + φ Θ, where Θ is the joint's warmth: 0 when the run starts, and
+/// heated by the friction itself, T Θ̇ = p/p̄ − Θ, with p its present power and p̄ the mean power of
+/// nominal friction along the motion, so that Θ settles around 1. Grease thins: φ < 0 as a rule.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ThermalDrift {
+    /// Joint, from 1.
+    pub joint: usize,
+    /// φ: relative change of friction once warm, above −0.5 and up to 1.
+    pub fraction: f64,
+    /// T, s.
+    pub time_constant_s: f64,
+}
+
+impl Fault for ThermalDrift {
+    fn joint(&self) -> Option<usize> {
+        Some(self.joint)
+    }
+
+    fn check(&self) -> Result<(), Complaint> {
+        positive("time_constant_s", self.time_constant_s)?;
+        let ok = self.fraction > -0.5 && self.fraction <= 1.0;
+        require(ok, "fraction", self.fraction, "must be above -0.5 and at most 1")
+    }
+
+    fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
+        let present = assembly.joint(self.joint).friction.thermal.replace(*self).is_some();
+        require(!present, "joint", self.joint as f64, "has a thermal drift already")
+    }
+}
+
+/// Friction of the nominal form but of another size than the controller and the simulation it came
+/// from assume: rc + a, rv + b.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrictionChange {
+    /// Joint, from 1.
+    pub joint: usize,
+    /// a, Nm.
+    pub coulomb_nm: f64,
+    /// b, Nm s/rad.
+    pub viscous_nm_s_rad: f64,
+}
+
+impl Fault for FrictionChange {
+    fn joint(&self) -> Option<usize> {
+        Some(self.joint)
+    }
+
+    fn check(&self) -> Result<(), Complaint> {
+        finite("coulomb_nm", self.coulomb_nm)?;
+        finite("viscous_nm_s_rad", self.viscous_nm_s_rad)
+    }
+
+    fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
+        let friction = &mut assembly.joint(self.joint).friction;
+        friction.coulomb_nm += self.coulomb_nm;
+        friction.viscous_nm_s_rad += self.viscous_nm_s_rad;
+        not_negative("coulomb_nm", friction.coulomb_nm)?;
+        not_negative("viscous_nm_s_rad", friction.viscous_nm_s_rad)
+    }
+}

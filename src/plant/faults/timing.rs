@@ -1,0 +1,247 @@
+//! Channels that are not read when the log says.
+
+use serde::{Deserialize, Serialize};
+
+use super::assembly::Assembly;
+use super::effect::{Complaint, Fault, finite, not_negative, require};
+use crate::plant::Recording;
+use crate::robot::JointSignals;
+
+/// Torque that is read late: the log at t shows the torque of t − δ beside the angles of t.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TimeSkew {
+    /// Joint, from 1; left out: all.
+    pub joint: Option<usize>,
+    /// δ, s; negative where the angles are late.
+    pub delay_s: f64,
+}
+
+/// Longest delay, s: beyond it there is no log to speak of.
+const LONGEST_DELAY_S: f64 = 0.5;
+
+impl Fault for TimeSkew {
+    fn joint(&self) -> Option<usize> {
+        self.joint
+    }
+
+    fn check(&self) -> Result<(), Complaint> {
+        let ok = self.delay_s.abs() <= LONGEST_DELAY_S;
+        require(ok, "delay_s", self.delay_s, "must be between -0.5 s and 0.5 s")
+    }
+
+    fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
+        for j in assembly.indices(self.joint) {
+            assembly.timing.torque_delay_s[j] += self.delay_s;
+        }
+        Ok(())
+    }
+}
+
+/// Velocity behind a first-order low-pass of time constant δ in the path of the log:
+/// δ ẏ = q̇ − y, which at the slow frequencies of a motion is a delay by δ.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VelocityLag {
+    /// Joint, from 1; left out: all.
+    pub joint: Option<usize>,
+    /// δ, s.
+    pub delay_s: f64,
+}
+
+impl Fault for VelocityLag {
+    fn joint(&self) -> Option<usize> {
+        self.joint
+    }
+
+    fn check(&self) -> Result<(), Complaint> {
+        let ok = (0.0..=LONGEST_DELAY_S).contains(&self.delay_s);
+        require(ok, "delay_s", self.delay_s, "must be between 0 and 0.5 s")
+    }
+
+    fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
+        for j in assembly.indices(self.joint) {
+            assembly.timing.velocity_lag_s[j] += self.delay_s;
+        }
+        Ok(())
+    }
+}
+
+/// A logger that stalls and does not say so: after every n rows it misses `lost_s` of the motion,
+/// while the time column goes on evenly.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClockFault {
+    /// Time missed at each stall, s.
+    pub lost_s: f64,
+    /// n: rows from one stall to the next.
+    pub every_rows: usize,
+}
+
+impl Fault for ClockFault {
+    fn joint(&self) -> Option<usize> {
+        None
+    }
+
+    fn check(&self) -> Result<(), Complaint> {
+        not_negative("lost_s", self.lost_s)?;
+        let rows = self.every_rows as f64;
+        require(self.every_rows > 0, "every_rows", rows, "must be at least 1")
+    }
+
+    fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
+        finite("lost_s", self.lost_s)?;
+        assembly.timing.stalls.push(*self);
+        Ok(())
+    }
+}
+
+/// When each channel is really read.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Timing {
+    pub(super) torque_delay_s: Vec<f64>,
+    pub(super) velocity_lag_s: Vec<f64>,
+    pub(super) stalls: Vec<ClockFault>,
+}
+
+impl Timing {
+    /// Every channel when the log says.
+    pub(super) fn exact(joints: usize) -> Self {
+        let zeros = vec![0.0; joints];
+        Self { torque_delay_s: zeros.clone(), velocity_lag_s: zeros, stalls: Vec::new() }
+    }
+
+    /// Whether it does nothing.
+    pub(super) fn is_exact(&self) -> bool {
+        let delays = self.torque_delay_s.iter().chain(&self.velocity_lag_s);
+        delays.chain(self.stalls.iter().map(|s| &s.lost_s)).all(|d| *d == 0.0)
+    }
+
+    /// The true instant of row `k` of a log with `step_s` between its time stamps, s.
+    fn instant_s(&self, k: usize, step_s: f64) -> f64 {
+        let lost = self.stalls.iter().map(|s| (k / s.every_rows) as f64 * s.lost_s).sum::<f64>();
+        k as f64 * step_s + lost
+    }
+
+    /// The log at every `every`-th sample of the run `dense`, read when this timing has it read.
+    /// Between samples of `dense` angles are interpolated by Hermite's cubic, speeds by Lagrange's,
+    /// torques (means over the hold) linearly. What the controller read keeps its errors.
+    pub(super) fn sample(&self, dense: &Recording, rate_hz: f64, every: usize) -> Recording {
+        let n = dense.q_rad.joints();
+        let step_s = every as f64 / rate_hz;
+        let last = dense.time_s.len() - 1;
+        let rows = (0..=last / every)
+            .take_while(|&k| self.instant_s(k, step_s) * rate_hz <= last as f64 + 1e-6)
+            .count();
+        // Position on the grid of `dense` at which a row is read, `delay_s` earlier.
+        let at = |k: usize, delay_s: f64| {
+            Place::new((self.instant_s(k, step_s) - delay_s) * rate_hz, last)
+        };
+        let lagged = dense.qd_rad_s.map_joints(|j, y| lag(y, self.velocity_lag_s[j] * rate_hz));
+        let signals = |f: &dyn Fn(usize, usize) -> f64| JointSignals::from_fn(n, rows, f);
+        let hermite = |q: &JointSignals, qd: &JointSignals| {
+            signals(&|j, k| at(k, 0.0).hermite(q.joint(j), qd.joint(j), rate_hz))
+        };
+        let mut log = Recording {
+            time_s: (0..rows).map(|k| dense.time_s[k * every]).collect(),
+            q_rad: hermite(&dense.q_rad, &dense.qd_rad_s),
+            qd_rad_s: signals(&|j, k| at(k, 0.0).lagrange(lagged.joint(j))),
+            torque_nm: signals(&|j, k| {
+                at(k, self.torque_delay_s[j]).linear(dense.torque_nm.joint(j))
+            }),
+            target_q_rad: hermite(&dense.target_q_rad, &dense.target_qd_rad_s),
+            target_qd_rad_s: signals(&|j, k| at(k, 0.0).lagrange(dense.target_qd_rad_s.joint(j))),
+            target_qdd_rad_s2: signals(&|j, k| {
+                at(k, 0.0).lagrange(dense.target_qdd_rad_s2.joint(j))
+            }),
+            readings: None,
+            saturated_decisions: dense.saturated_decisions,
+        };
+        log.readings = dense.readings.as_ref().map(|read| {
+            let with_errors =
+                |true_log: &JointSignals, truth: &JointSignals, read: &JointSignals| {
+                    JointSignals::from_fn(n, rows, |j, k| {
+                        let error = read.joint(j)[k * every] - truth.joint(j)[k * every];
+                        true_log.joint(j)[k] + error
+                    })
+                };
+            crate::plant::Readings {
+                q_rad: with_errors(&log.q_rad, &dense.q_rad, &read.q_rad),
+                qd_rad_s: with_errors(&log.qd_rad_s, &dense.qd_rad_s, &read.qd_rad_s),
+            }
+        });
+        log
+    }
+}
+
+/// A first-order low-pass of time constant `constant` samples over a signal that is linear between
+/// its samples, exact, starting settled: y' = e y + …, e = exp(−1/c).
+fn lag(u: &[f64], constant: f64) -> Vec<f64> {
+    if constant == 0.0 {
+        return u.to_vec();
+    }
+    let decay = (-1.0 / constant).exp();
+    let mut y = u.first().copied().unwrap_or(0.0);
+    let mut out = Vec::with_capacity(u.len());
+    out.push(y);
+    for pair in u.windows(2) {
+        // A ramp of slope m ends m c behind its input.
+        let slope = pair[1] - pair[0];
+        let ahead = y - (pair[0] - slope * constant);
+        y = pair[1] - slope * constant + ahead * decay;
+        out.push(y);
+    }
+    out
+}
+
+/// A place between two samples of an even grid.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    index: usize,
+    fraction: f64,
+    last: usize,
+}
+
+impl Place {
+    /// Off whole samples by less than this is round-off of the time, in samples.
+    const ROUND_OFF: f64 = 1e-7;
+
+    /// `position` samples behind the first; outside the grid its ends hold.
+    fn new(position: f64, last: usize) -> Self {
+        let position = position.clamp(0.0, last as f64);
+        let nearest = position.round();
+        if (position - nearest).abs() < Self::ROUND_OFF {
+            return Self { index: nearest as usize, fraction: 0.0, last };
+        }
+        Self { index: position.floor() as usize, fraction: position.fract(), last }
+    }
+
+    fn linear(self, y: &[f64]) -> f64 {
+        if self.fraction == 0.0 {
+            return y[self.index];
+        }
+        y[self.index] + self.fraction * (y[self.index + 1] - y[self.index])
+    }
+
+    fn hermite(self, y: &[f64], slope_per_s: &[f64], rate_hz: f64) -> f64 {
+        let (i, x) = (self.index, self.fraction);
+        if x == 0.0 {
+            return y[i];
+        }
+        let (m0, m1) = (slope_per_s[i] / rate_hz, slope_per_s[i + 1] / rate_hz);
+        let step = y[i + 1] - y[i];
+        y[i] + x * (m0 + x * (3.0 * step - 2.0 * m0 - m1 + x * (m0 + m1 - 2.0 * step)))
+    }
+
+    fn lagrange(self, y: &[f64]) -> f64 {
+        let (i, x) = (self.index, self.fraction);
+        if x == 0.0 {
+            return y[i];
+        }
+        let (before, behind) = (i.saturating_sub(1), (i + 2).min(self.last));
+        let [a, b, c, d] = [y[before], y[i], y[i + 1], y[behind]];
+        -a * x * (x - 1.0) * (x - 2.0) / 6.0 + b * (x + 1.0) * (x - 1.0) * (x - 2.0) / 2.0
+            - c * (x + 1.0) * x * (x - 2.0) / 2.0
+            + d * (x + 1.0) * x * (x - 1.0) / 6.0
+    }
+}
