@@ -13,10 +13,10 @@ use faer::prelude::SolveLstsq;
 
 fn trial(criterion: &mut Criterion) {
     let experiment = Experiment::prepare(Scenario::load(None).unwrap()).unwrap();
-    let (measured, time_s) = experiment.log(0).unwrap();
+    let measured = experiment.log(0).unwrap();
     let measurement = Measurement {
         source: "bench",
-        time_s: &time_s,
+        time_s: &measured.time_s,
         q_rad: &measured.q_rad,
         qd_rad_s: &measured.qd_rad_s,
         torque_nm: &measured.torque_nm,
@@ -94,9 +94,9 @@ fn qr(criterion: &mut Criterion) {
 /// Reading a log: rows per second.
 fn log(criterion: &mut Criterion) {
     let experiment = Experiment::prepare(Scenario::load(None).unwrap()).unwrap();
-    let (m, time_s) = experiment.log(0).unwrap();
+    let m = experiment.log(0).unwrap();
     let effort = armid::log::Effort::Torque(m.torque_nm);
-    let log = armid::log::Log::new("bench", time_s, m.q_rad, m.qd_rad_s, effort).unwrap();
+    let log = armid::log::Log::new("bench", m.time_s, m.q_rad, m.qd_rad_s, effort).unwrap();
     let file = std::env::temp_dir().join(format!("armid-bench-{}.csv", std::process::id()));
     armid::log::write_log(&file, &log).unwrap();
     let layout = armid::log::Layout::default();

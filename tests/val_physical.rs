@@ -98,15 +98,15 @@ fn experiment() -> &'static Experiment {
 
 /// The default scenario's log of trial `trial`, its torque late by `delay` samples, identified.
 fn identified(experiment: &Experiment, trial: u64, delay: usize) -> Identification {
-    let (measured, time_s) = experiment.log(trial).unwrap();
-    let torque_nm = JointSignals::from_fn(6, time_s.len(), |j, k| {
+    let measured = experiment.log(trial).unwrap();
+    let torque_nm = JointSignals::from_fn(6, measured.time_s.len(), |j, k| {
         measured.torque_nm.joint(j)[k.saturating_sub(delay)]
     });
     let Scenario { set, processing, .. } = &experiment.scenario;
     let mut identifier = Identifier::new(&experiment.model, set, processing.clone());
     let measurement = Measurement {
         source: "log",
-        time_s: &time_s,
+        time_s: &measured.time_s,
         q_rad: &measured.q_rad,
         qd_rad_s: &measured.qd_rad_s,
         torque_nm: &torque_nm,
