@@ -44,7 +44,7 @@ pub struct Training<'a> {
 #[derive(Debug, Clone, Serialize)]
 pub struct Declined {
     robot: String,
-    log: Vec<String>,
+    log: String,
     processing: Processing,
     base_parameters: Vec<BaseParameter>,
     standard_parameters: Option<Vec<()>>,
@@ -59,7 +59,7 @@ impl Declined {
     pub fn new(arm: &Arm, logs: &[&Log], regression: &Regression, parameters: Vec<String>) -> Self {
         Self {
             robot: arm.name.clone(),
-            log: logs.iter().map(|log| log.source.clone()).collect(),
+            log: names(logs),
             processing: regression.prepared.processing.clone(),
             base_parameters: Vec::new(),
             standard_parameters: None,
@@ -84,7 +84,7 @@ impl Declined {
     pub fn page(&self, program: Program) -> Page {
         let facts = vec![format!("{} rows read, {} used", self.rows.read, self.rows.used)];
         let verdict = Verdict { status: Status::Bad, sentence: self.sentence(), facts };
-        let subtitle = format!("{} from {}", self.robot, self.log.join(", "));
+        let subtitle = format!("{} from {}", self.robot, self.log);
         Page::new("Identified parameters", subtitle, verdict, program)
     }
 }
@@ -121,7 +121,7 @@ impl Validation {
 #[derive(Debug, Clone, Serialize)]
 pub struct Result {
     robot: String,
-    log: Vec<String>,
+    log: String,
     samples: usize,
     rate_hz: f64,
     processing: Processing,
@@ -188,6 +188,11 @@ struct SetAside {
     count: usize,
 }
 
+/// The logs by name, separated by commas.
+fn names(logs: &[&Log]) -> String {
+    logs.iter().map(|log| log.source.as_str()).collect::<Vec<_>>().join(", ")
+}
+
 impl Rows {
     fn of(logs: &[&Log]) -> Self {
         let mut rows = Self { read: 0, used: 0, set_aside: Vec::new() };
@@ -245,7 +250,7 @@ impl Result {
         }
         Ok(Self {
             robot: arm.name.clone(),
-            log: training.logs.iter().map(|log| log.source.clone()).collect(),
+            log: names(training.logs),
             samples: identification.samples,
             rate_hz: regression.problem.rate_hz,
             processing: identification.processing.clone(),
@@ -399,7 +404,7 @@ pub fn page(
     ];
     let status = if result.is_declined() { Status::Bad } else { Status::Good };
     let verdict = Verdict { status, sentence: result.sentence(), facts };
-    let subtitle = format!("{} from {}", result.robot, result.log.join(", "));
+    let subtitle = format!("{} from {}", result.robot, result.log);
     let mut page = Page::new("Identified parameters", subtitle, verdict, program);
     let fit = Prediction::of(training.regression, &training.identification.fit.theta);
     let mut section = Section::new("Torque: measured and predicted")
