@@ -13,7 +13,7 @@ use faer::prelude::SolveLstsq;
 
 fn trial(criterion: &mut Criterion) {
     let experiment = Experiment::prepare(Scenario::load(None).unwrap()).unwrap();
-    let measured = experiment.log(0).unwrap();
+    let measured = experiment.simulation.log(0).unwrap();
     let measurement = Measurement {
         source: "bench",
         time_s: &measured.time_s,
@@ -21,7 +21,7 @@ fn trial(criterion: &mut Criterion) {
         qd_rad_s: &measured.qd_rad_s,
         torque_nm: &measured.torque_nm,
     };
-    let set = &experiment.scenario.set;
+    let set = &experiment.simulation.scenario.set;
     let mut group = criterion.benchmark_group("trial");
     group.sample_size(20);
     let mut worker = experiment.worker();
@@ -94,7 +94,7 @@ fn qr(criterion: &mut Criterion) {
 /// Reading a log: rows per second.
 fn log(criterion: &mut Criterion) {
     let experiment = Experiment::prepare(Scenario::load(None).unwrap()).unwrap();
-    let m = experiment.log(0).unwrap();
+    let m = experiment.simulation.log(0).unwrap();
     let effort = armid::log::Effort::Torque(m.torque_nm);
     let log = armid::log::Log::new("bench", m.time_s, m.q_rad, m.qd_rad_s, effort).unwrap();
     let file = std::env::temp_dir().join(format!("armid-bench-{}.csv", std::process::id()));

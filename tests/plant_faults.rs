@@ -174,3 +174,155 @@ fn every_effect_shows_in_the_log_and_gives_the_same_bits_again() {
         assert!(log(&[effect]) == spoilt, "{effect}");
     }
 }
+
+/// Torque that is late by one sample is the torque of the row before; the angles are untouched.
+#[test]
+fn skewed_torque_is_that_of_an_earlier_instant() {
+    let clean = run(&[], &lively());
+    let late = run(&["kind='time_skew'\ndelay_s=0.008"], &lively());
+    assert_eq!(late.q_rad, clean.q_rad);
+    for j in 0..6 {
+        let rows = clean.torque_nm.samples();
+        assert_eq!(late.torque_nm.joint(j)[1..], clean.torque_nm.joint(j)[..rows - 1]);
+    }
+    // Half a sample of the log is two decisions of the controller: between the rows, exactly.
+    let half = run(&["kind='time_skew'\njoint=2\ndelay_s=0.004"], &lively());
+    let config = PlantConfig { log_rate_hz: 250.0, ..PlantConfig::default() };
+    let dense = Plant::new(&ur5(), &config).unwrap().run(&lively(), None).unwrap();
+    for k in 1..half.torque_nm.samples() {
+        assert_eq!(half.torque_nm.joint(1)[k], dense.torque_nm.joint(1)[2 * k - 1]);
+    }
+    assert_eq!(half.torque_nm.joint(0), clean.torque_nm.joint(0));
+}
+
+/// A low-pass δ ẏ = q̇ − y, integrated: δ (y(T) − y(0)) + ∫ y dt = q(T) − q(0).
+#[test]
+fn a_lagging_velocity_loses_no_distance() {
+    let delay_s = 0.01;
+    let config = PlantConfig { log_rate_hz: 500.0, ..PlantConfig::default() };
+    let effect = effects(&["kind='velocity_lag'\njoint=1\ndelay_s=0.01"]);
+    let log = FaultyPlant::new(&ur5(), &effect, &config).unwrap().run(&lively(), None).unwrap();
+    let (q, y) = (log.q_rad.joint(0), log.qd_rad_s.joint(0));
+    let last = y.len() - 1;
+    let area: f64 = y.windows(2).map(|w| 0.5 * (w[0] + w[1]) / 500.0).sum();
+    let error = delay_s * (y[last] - y[0]) + area - (q[last] - q[0]);
+    // The trapezoid's error of q̇ and of y, h²/12 · change of acceleration (up to 2 · 20 rad/s²) each.
+    assert!(error.abs() < 3e-5, "{error} rad over {} rad", q[last] - q[0]);
+}
+
+/// A stall of three samples after every 50 rows: the rows behind it are those of later instants.
+#[test]
+fn a_stalling_clock_hides_rows_and_keeps_counting() {
+    let clean = run(&[], &lively());
+    let log = run(&["kind='clock_fault'\nlost_s=0.024\nevery_rows=50"], &lively());
+    let rows = log.time_s.len();
+    assert_eq!(log.time_s, clean.time_s[..rows]);
+    for k in 0..rows {
+        let read = k + 3 * (k / 50);
+        assert_eq!(log.q_rad.joint(1)[k], clean.q_rad.joint(1)[read]);
+        assert_eq!(log.torque_nm.joint(1)[k], clean.torque_nm.joint(1)[read]);
+    }
+    assert!(rows < clean.time_s.len());
+}
+
+/// Shares of Bernoulli draws: 6 × 126 readings, 5 standard deviations (once in 2 million seeds).
+#[test]
+fn readings_go_wrong_as_often_as_asked() {
+    let clean = log(&[]);
+    let limits: Vec<f64> = ur5().joints.iter().map(|j| j.limits.torque_nm).collect();
+    let spoilt = log(&["kind='outliers'\nfraction=0.1"]);
+    let mut hit = 0;
+    for j in 0..6 {
+        for (a, b) in spoilt.torque_nm.joint(j).iter().zip(clean.torque_nm.joint(j)) {
+            hit += usize::from(a != b);
+            assert!(a == b || a.abs() <= limits[j]);
+        }
+    }
+    let count = 6.0 * clean.time_s.len() as f64;
+    assert!((hit as f64 - 0.1 * count).abs() < 5.0 * (0.09 * count).sqrt(), "{hit} of {count}");
+
+    let lossy = log(&["kind='dropped_samples'\nfraction=0.2"]);
+    let lost = clean.time_s.len() - lossy.time_s.len();
+    let rows = clean.time_s.len() as f64;
+    assert!((lost as f64 - 0.2 * rows).abs() < 5.0 * (0.16 * rows).sqrt(), "{lost} of {rows}");
+    for (k, t) in lossy.time_s.iter().enumerate() {
+        let row = clean.time_s.iter().position(|s| s == t).unwrap();
+        assert_eq!(lossy.torque_nm.joint(3)[k], clean.torque_nm.joint(3)[row]);
+    }
+
+    let stale = log(&["kind='dropped_samples'\njoint=2\nfraction=0.2\nrepeat=true"]);
+    assert_eq!(stale.time_s, clean.time_s);
+    assert_eq!(stale.q_rad.joint(0), clean.q_rad.joint(0));
+    let repeated = stale.q_rad.joint(1).windows(2).filter(|w| w[0] == w[1]).count();
+    assert!((repeated as f64 - 0.2 * rows).abs() < 5.0 * (0.16 * rows).sqrt(), "{repeated}");
+}
+
+#[test]
+fn a_coarse_reading_has_whole_steps() {
+    let coarse = log(&["kind='quantisation'\njoint=3\nstep=0.001\nchannel='position'"]);
+    let clean = log(&[]);
+    for (a, b) in coarse.q_rad.joint(2).iter().zip(clean.q_rad.joint(2)) {
+        assert!((a / 0.001 - (a / 0.001).round()).abs() < 1e-9 && (a - b).abs() <= 0.5001e-3);
+    }
+    assert_eq!(coarse.q_rad.joint(1), clean.q_rad.joint(1));
+}
+
+/// Any two effects run together, on short runs; the result is a log of finite numbers.
+#[test]
+fn any_two_effects_combine() {
+    let short = Start { motion: lively().motion, duration_s: 0.04 };
+    for (i, (first, _)) in KINDS.iter().enumerate() {
+        for (second, _) in &KINDS[..i] {
+            let plant = plant(&[first, second]).unwrap_or_else(|e| panic!("{first} {second}: {e}"));
+            let log = plant.run(&short, None).unwrap_or_else(|e| panic!("{first} {second}: {e}"));
+            let finite = (0..6).all(|j| log.torque_nm.joint(j).iter().all(|t| t.is_finite()));
+            assert!(finite, "{first} {second}");
+        }
+    }
+}
+
+/// With noise in the control loop the log keeps its errors, whatever the timing makes of the rest.
+#[test]
+fn effects_live_with_a_controller_that_reads_the_sensors() {
+    let streams = TrialStreams::new(1, b"faults", 0);
+    let read = |tables: &[&str]| {
+        plant(tables).unwrap().run(&lively(), Some(sensors().encoders(&streams))).unwrap()
+    };
+    let (clean, skewed) = (read(&[]), read(&["kind='time_skew'\ndelay_s=0.004"]));
+    let elastic = read(&["kind='elasticity'\njoint=2\nstiffness_nm_rad=10000"]);
+    assert_eq!(skewed.readings, clean.readings);
+    assert!(skewed.torque_nm != clean.torque_nm && elastic.readings != clean.readings);
+}
+
+#[test]
+fn nonsense_is_refused_with_its_place_and_key() {
+    for (table, bad_key) in [
+        ("kind='stribeck'\njoint=7\nextra_nm=0.5\nvs_rad_s=0.1", "joint"),
+        ("kind='stribeck'\njoint=0\nextra_nm=0.5\nvs_rad_s=0.1", "joint"),
+        ("kind='stribeck'\njoint=1\nextra_nm=0.5\nvs_rad_s=0", "vs_rad_s"),
+        ("kind='load_friction'\njoint=1\nmu=0.9", "mu"),
+        ("kind='contact'\nstart_s=2\nend_s=1\npeak_nm=3", "end_s"),
+        ("kind='link_length'\njoint=2\nerror_m=0.001", "joint"),
+        ("kind='dropped_samples'\njoint=2\nfraction=0.1", "joint"),
+        ("kind='clock_fault'\nlost_s=0.1\nevery_rows=0", "every_rows"),
+        ("kind='payload'\nmass_kg=nan\ncom_x_m=0\ncom_y_m=0\ncom_z_m=0", "mass_kg"),
+    ] {
+        match plant(&["kind='gravity'\ng_m_s2=9.8", table]) {
+            Err(PlantError::Effect { number: 2, key, .. }) => assert_eq!(key, bad_key, "{table}"),
+            other => panic!("{table}: {:?}", other.err()),
+        }
+    }
+    let driving = plant(&["kind='stribeck'\njoint=1\nextra_nm=-20\nvs_rad_s=1"]);
+    assert!(matches!(driving, Err(PlantError::FrictionDrives { joint: 1, .. })));
+    let stiff = plant(&["kind='elasticity'\njoint=6\nstiffness_nm_rad=1e9"]).unwrap();
+    assert!(matches!(stiff.run(&lively(), None), Err(PlantError::StepTooLong { .. })));
+    for unknown in ["kind='stribek'\njoint=1", "kind='gravity'\ng_m_s2=9.8\njoint=1"] {
+        let text = format!("effect = [{{ {} }}]", unknown.replace('\n', ", "));
+        #[derive(Debug, serde::Deserialize)]
+        struct File {
+            #[allow(dead_code)]
+            effect: Vec<Effect>,
+        }
+        assert!(toml::from_str::<File>(&text).is_err(), "{unknown}");
+    }
+}

@@ -47,8 +47,8 @@ fn experiment() -> Experiment {
 #[test]
 fn the_chain_takes_the_path_it_took() {
     let experiment = experiment();
-    assert_eq!(experiment.scenario.processing, Options::default());
-    let measured = experiment.log(0).unwrap();
+    assert_eq!(experiment.simulation.scenario.processing, Options::default());
+    let measured = experiment.simulation.log(0).unwrap();
     let mut hash = Sha256::new();
     measured.time_s.iter().for_each(|t| hash.update(t.to_le_bytes()));
     for signals in [&measured.q_rad, &measured.qd_rad_s, &measured.torque_nm] {
@@ -59,7 +59,7 @@ fn the_chain_takes_the_path_it_took() {
     let log_sha256: String = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
     let identification = experiment.worker().identify(0).unwrap();
     let sigma = identification.sigma();
-    let set = &experiment.scenario.set;
+    let set = &experiment.simulation.scenario.set;
     let find = |name: &str| (0..set.rank()).find(|&k| set.name(k) == name).unwrap();
     if std::env::var_os("ARMID_PIN").is_some() {
         println!("LOG_SHA256 = {log_sha256}");

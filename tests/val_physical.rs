@@ -98,11 +98,11 @@ fn experiment() -> &'static Experiment {
 
 /// The default scenario's log of trial `trial`, its torque late by `delay` samples, identified.
 fn identified(experiment: &Experiment, trial: u64, delay: usize) -> Identification {
-    let measured = experiment.log(trial).unwrap();
+    let measured = experiment.simulation.log(trial).unwrap();
     let torque_nm = JointSignals::from_fn(6, measured.time_s.len(), |j, k| {
         measured.torque_nm.joint(j)[k.saturating_sub(delay)]
     });
-    let Scenario { set, processing, .. } = &experiment.scenario;
+    let Scenario { set, processing, .. } = &experiment.simulation.scenario;
     let mut identifier = Identifier::new(&experiment.model, set, processing.clone());
     let measurement = Measurement {
         source: "log",
@@ -115,7 +115,7 @@ fn identified(experiment: &Experiment, trial: u64, delay: usize) -> Identificati
 }
 
 fn estimate(experiment: &Experiment, found: &Identification) -> PhysicalEstimate {
-    let Scenario { arm, set, .. } = &experiment.scenario;
+    let Scenario { arm, set, .. } = &experiment.simulation.scenario;
     solve(arm, set, &found.fit, &found.covariance, &PhysicalOptions::default()).unwrap()
 }
 
@@ -132,7 +132,7 @@ fn noise_is_repaired_and_called_noise() {
         let information = Information::of(&found.fit, &found.covariance);
         assert!(physical.evidence.distance <= information.distance(&truth));
         assert!(!physical.evidence.model_is_wrong(), "{}", physical.evidence.sentence());
-        assert_runs(&experiment.scenario.arm, &physical, 100_000);
+        assert_runs(&experiment.simulation.scenario.arm, &physical, 100_000);
     }
 }
 
@@ -141,10 +141,12 @@ fn noise_is_repaired_and_called_noise() {
 #[test]
 fn late_torque_is_repaired_and_called_a_wrong_model() {
     let experiment = experiment();
-    let rate_hz = experiment.scenario.plant.log_rate_hz;
+    let rate_hz = experiment.simulation.scenario.plant.log_rate_hz;
     let found = identified(experiment, 0, (0.16 * rate_hz).round() as usize);
     let position = |name: &str| {
-        (0..found.fit.theta.len()).find(|&k| experiment.scenario.set.name(k) == name).unwrap()
+        (0..found.fit.theta.len())
+            .find(|&k| experiment.simulation.scenario.set.name(k) == name)
+            .unwrap()
     };
     assert!(found.fit.theta[position("Ia6")] < 0.0);
     let physical = estimate(experiment, &found);
@@ -154,7 +156,7 @@ fn late_torque_is_repaired_and_called_a_wrong_model() {
     assert!(
         physical.active.iter().any(|s| matches!(s, Subject::Drive(Parameter::RotorInertia(_))))
     );
-    assert_runs(&experiment.scenario.arm, &physical, 10_000);
+    assert_runs(&experiment.simulation.scenario.arm, &physical, 10_000);
 }
 
 /// Every body keeps the margin, no drive parameter is negative (to the 1e-12 that the interior point
@@ -189,7 +191,7 @@ fn the_true_base_parameters_are_realisable() {
         root: DMatrix::from_fn(truth.len(), truth.len(), |i, k| triangle.r(i, k)),
         theta: DVector::from_column_slice(&truth),
     };
-    let Scenario { arm, set, .. } = &experiment.scenario;
+    let Scenario { arm, set, .. } = &experiment.simulation.scenario;
     let solver = Solver::new(Structure::new(arm, set, arm, 1e-4).unwrap());
     assert!(solver.constrained(&information, 1e-4).unwrap().distance < 1e-6);
     found.fit.theta = truth;

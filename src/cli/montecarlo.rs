@@ -191,7 +191,7 @@ fn run_shard(
 
 /// One trial alone: its estimates against the truth.
 fn replay(experiment: &Experiment, trial: u64) -> CommandResult {
-    let set = &experiment.scenario.set;
+    let set = &experiment.simulation.scenario.set;
     let identification = experiment.worker().identify(trial)?;
     let sigma = identification.sigma();
     println!("trial {trial}, {} with {}", identification.fit.estimator, experiment.covariance);

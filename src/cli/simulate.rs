@@ -6,9 +6,10 @@ use clap::Args;
 use serde::Serialize;
 
 use super::{CommandResult, Outcome};
+use crate::dynamics::Model;
 use crate::dynamics::ParameterLayout;
 use crate::log::{Effort, Log, write_log};
-use crate::montecarlo::{Experiment, Scenario};
+use crate::montecarlo::{EffectSize, Scenario, Simulation};
 use crate::output::check_writable;
 use crate::plant::SensorConfig;
 use crate::plant::faults::Effect;
@@ -37,6 +38,10 @@ struct Truth<'a> {
     standard_parameters: Vec<StandardParameter>,
     effects: Vec<HiddenEffect<'a>>,
     noise: &'a SensorConfig,
+    /// Size of all effects together in units of the noise; null where the torque is read without.
+    lambda: Option<f64>,
+    /// What of it moves the parameters.
+    lambda_sim: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -59,14 +64,21 @@ impl<'a> HiddenEffect<'a> {
     }
 }
 
+/// λ of the scenario's effects, where there is noise to compare them with.
+fn size(simulation: &Simulation) -> Result<Option<EffectSize>, crate::plant::PlantError> {
+    let sensors = &simulation.scenario.sensors;
+    let sd = sensors.torque_sd_per_joint_nm(simulation.scenario.arm.dof())?;
+    if sd.contains(&0.0) { Ok(None) } else { simulation.effect_size().map(Some) }
+}
+
 /// Runs the command.
 pub fn run(args: &SimulateArgs) -> CommandResult {
     for path in [Some(&args.out), args.truth.as_ref()].into_iter().flatten() {
         check_writable(path)?;
     }
-    let experiment = Experiment::prepare(Scenario::load(args.scenario.as_deref())?)?;
-    let measured = experiment.log(args.trial)?;
-    let scenario = &experiment.scenario;
+    let simulation = Simulation::run(Scenario::load(args.scenario.as_deref())?)?;
+    let measured = simulation.log(args.trial)?;
+    let scenario = &simulation.scenario;
     let samples = measured.time_s.len();
     let source = format!("{} trial {}", scenario.name, args.trial);
     let effort = match scenario.sensors.effort {
@@ -83,17 +95,20 @@ pub fn run(args: &SimulateArgs) -> CommandResult {
     println!("{}: {samples} samples, sha256 {sha256}", args.out.display());
     if let Some(path) = &args.truth {
         let layout = ParameterLayout::new(scenario.arm.dof());
-        let values = experiment.model.standard_parameters();
+        let values = Model::new(&scenario.arm).standard_parameters();
         let named = values.iter().enumerate().map(|(k, &value)| StandardParameter {
             name: layout.name(k),
             value,
             unit: layout.unit(k),
         });
+        let size = size(&simulation)?;
         let truth = Truth {
             robot: &scenario.arm.name,
             standard_parameters: named.collect(),
             effects: scenario.effects.iter().map(HiddenEffect::of).collect(),
             noise: &scenario.sensors,
+            lambda: size.map(|s| s.lambda),
+            lambda_sim: size.map(|s| s.lambda_sim),
         };
         let inputs = args.scenario.iter().map(|file| Input::of(file)).collect::<Result<_, _>>()?;
         let program = Program::new(std::env::args(), Some(scenario.seed), inputs);

@@ -5,18 +5,17 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use thiserror::Error;
 
 use super::scenario::Scenario;
+use super::simulation::Simulation;
 use super::tally::Outcome;
 use crate::dynamics::Model;
 use crate::identify::covariance::CovarianceKind;
 use crate::identify::{Estimator, Identification, Identifier, IdentifyError, Measurement, Options};
-use crate::plant::faults::FaultyPlant;
-use crate::plant::{Measured, PlantError, Recording, Sensors};
-use crate::random::TrialStreams;
+use crate::plant::{Measured, PlantError};
 
 /// A scenario whose plant has run: what all trials share.
 pub struct Experiment {
-    /// The scenario.
-    pub scenario: Scenario,
+    /// The scenario, its run and its sensors.
+    pub simulation: Simulation,
     /// The arm's equations of motion.
     pub model: Model,
     /// True base parameters.
@@ -27,10 +26,6 @@ pub struct Experiment {
     pub estimator: Estimator,
     /// The covariance that the pilot's log calls for, and all trials' with it.
     pub covariance: CovarianceKind,
-    /// The noise-free run.
-    pub recording: Recording,
-    plant: FaultyPlant,
-    sensors: Sensors,
 }
 
 /// Number of the pilot trial: its noise is its own and it is never counted.
@@ -68,21 +63,15 @@ impl Experiment {
     pub fn prepare(scenario: Scenario) -> Result<Self, TrialError> {
         let model = Model::new(&scenario.arm);
         let truth = scenario.set.values(&model.standard_parameters());
-        let plant = FaultyPlant::new(&scenario.arm, &scenario.effects, &scenario.plant)?;
-        let recording = plant.run(&scenario.excitation, None)?;
-        let sensors = Sensors::new(&scenario.sensors, &scenario.arm, scenario.plant.log_rate_hz)?;
         let scale = vec![1.0; truth.len()];
         let pilot_options = scenario.processing.clone();
         let mut experiment = Self {
-            scenario,
+            simulation: Simulation::run(scenario)?,
             model,
             truth,
             scale,
             estimator: Estimator::Wls,
             covariance: CovarianceKind::Wls,
-            recording,
-            plant,
-            sensors,
         };
         let pilot = experiment.worker_with(pilot_options).identify(PILOT)?;
         experiment.scale = pilot.sigma();
@@ -96,46 +85,16 @@ impl Experiment {
         self.worker_with(Options {
             estimator: Some(self.estimator),
             covariance: Some(self.covariance),
-            ..self.scenario.processing.clone()
+            ..self.simulation.scenario.processing.clone()
         })
     }
 
     fn worker_with(&self, options: Options) -> Worker<'_> {
         Worker {
             experiment: self,
-            identifier: Identifier::new(&self.model, &self.scenario.set, options),
-            measured: Measured::like(&self.recording),
+            identifier: Identifier::new(&self.model, &self.simulation.scenario.set, options),
+            measured: Measured::like(&self.simulation.recording),
         }
-    }
-
-    /// The random numbers of a trial.
-    pub fn streams(&self, trial: u64) -> TrialStreams {
-        TrialStreams::new(self.scenario.seed, self.scenario.name.as_bytes(), trial)
-    }
-
-    /// The noise-free run of a trial: the shared one, or its own where the controller reads the
-    /// sensors.
-    pub fn recording(&self, trial: u64) -> Result<std::borrow::Cow<'_, Recording>, PlantError> {
-        if !self.scenario.controller_reads_sensors {
-            return Ok(std::borrow::Cow::Borrowed(&self.recording));
-        }
-        let encoders = self.sensors.encoders(&self.streams(trial));
-        Ok(std::borrow::Cow::Owned(self.plant.run(&self.scenario.excitation, Some(encoders))?))
-    }
-
-    /// The log of a trial: the noise-free run as its sensors read it, with the readings that go
-    /// wrong.
-    pub fn log(&self, trial: u64) -> Result<Measured, PlantError> {
-        let recording = self.recording(trial)?;
-        let mut measured = Measured::like(&recording);
-        self.read(&recording, trial, &mut measured);
-        Ok(measured)
-    }
-
-    fn read(&self, recording: &Recording, trial: u64, log: &mut Measured) {
-        let streams = self.streams(trial);
-        self.sensors.measure(recording, &streams, log);
-        self.plant.spoil(&streams, log);
     }
 }
 
@@ -150,8 +109,7 @@ impl Worker<'_> {
     /// Identifies trial `trial` from its log.
     pub fn identify(&mut self, trial: u64) -> Result<Identification, TrialError> {
         let experiment = self.experiment;
-        let recording = experiment.recording(trial)?;
-        experiment.read(&recording, trial, &mut self.measured);
+        experiment.simulation.log_into(trial, &mut self.measured)?;
         Ok(self.identifier.identify(&Measurement {
             source: "simulated log",
             time_s: &self.measured.time_s,
@@ -173,7 +131,7 @@ impl Worker<'_> {
 
     fn outcomes(&mut self, trial: u64) -> Result<Vec<Outcome>, TrialError> {
         let identification = self.identify(trial)?;
-        let Experiment { truth, scale, scenario, .. } = self.experiment;
+        let Experiment { truth, scale, simulation, .. } = self.experiment;
         let quantile_95 = identification.covariance.quantile_95();
         let sigma = identification.sigma();
         let estimates = identification.fit.theta.iter().zip(&sigma);
@@ -186,7 +144,7 @@ impl Worker<'_> {
                 if outcome.is_sound() {
                     return Ok(outcome);
                 }
-                let parameter = scenario.set.name(k).to_owned();
+                let parameter = simulation.scenario.set.name(k).to_owned();
                 Err(TrialError::Unsound { parameter, z: outcome.z, sigma: outcome.sigma })
             })
             .collect()

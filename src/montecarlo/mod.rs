@@ -5,12 +5,16 @@
 //! the σ that the identifier claims is true.
 
 pub mod calibration;
+mod effect_size;
 mod experiment;
 mod scenario;
 pub mod shard;
+mod simulation;
 mod summary;
 pub mod tally;
 
+pub use effect_size::EffectSize;
 pub use experiment::{Experiment, TrialError, Worker};
 pub use scenario::{Scenario, ScenarioError};
+pub use simulation::Simulation;
 pub use summary::{ParameterSummary, SUMMARY_SCHEMA, Summary};

@@ -151,7 +151,7 @@ const SAVE_EVERY: Duration = Duration::from_secs(5);
 impl Shard {
     /// No trials run yet.
     pub fn new(experiment: &Experiment, trials: u64, range: Range<u64>) -> Self {
-        let scenario = &experiment.scenario;
+        let scenario = &experiment.simulation.scenario;
         let set = &scenario.set;
         let parameters = (0..set.rank())
             .map(|k| ParameterHeader {

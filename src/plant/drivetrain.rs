@@ -44,6 +44,10 @@ pub trait Drivetrain: Send {
     /// mounting included. By default they sit on the joints themselves.
     fn encoder_side(&self, _states: &[f64], _q_rad: &mut [f64], _qd_rad_s: &mut [f64]) {}
 
+    /// Replaces the links' accelerations by those of what the encoders sit on, from the own states'
+    /// time derivatives. By default they are the same.
+    fn encoder_acceleration(&self, _states_rate: &[f64], _qdd_rad_s2: &mut [f64]) {}
+
     /// Into how many parts a step may be divided where [`Self::fastest_decay_per_s`] asks for it.
     /// By default a step that is too long is refused.
     fn most_substeps(&self) -> usize {

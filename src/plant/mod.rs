@@ -21,6 +21,7 @@ mod rapier_arm;
 mod recording;
 mod sensors;
 mod simulate;
+mod whitening;
 
 pub use config::PlantConfig;
 pub use controller::Controller;
@@ -32,3 +33,4 @@ pub use rapier_arm::RapierArm;
 pub use recording::{Readings, Recording};
 pub use sensors::{Effort, Encoders, Measured, PerJoint, SensorConfig, Sensors};
 pub use simulate::{Plant, simulate};
+pub use whitening::Whitening;

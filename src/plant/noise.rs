@@ -104,6 +104,32 @@ impl NoiseModel {
         check(ok, "torque_noise cross_joint_correlation", rho, "must be 0 or more and below 1")
     }
 
+    /// Autocorrelation at lags 0, 1, …, `lags` − 1 samples of `1/rate_hz`.
+    pub(super) fn autocorrelation(&self, rate_hz: f64, lags: usize) -> Vec<f64> {
+        let mut sum = vec![0.0; lags];
+        for Component { share, colour } in &self.components {
+            for (k, sum) in sum.iter_mut().enumerate() {
+                *sum += share
+                    * match *colour {
+                        Colour::White => f64::from(u8::from(k == 0)),
+                        Colour::Ar1 { time_constant_s } => {
+                            (-(k as f64) / (rate_hz * time_constant_s)).exp()
+                        }
+                        Colour::LowPass { .. } => 0.0,
+                    };
+            }
+            if let Colour::LowPass { cutoff_hz } = *colour {
+                let filter = Butterworth2::new(cutoff_hz / rate_hz);
+                for (sum, r) in
+                    sum.iter_mut().zip(filter.autocorrelation(settled(cutoff_hz, rate_hz)))
+                {
+                    *sum += share * r;
+                }
+            }
+        }
+        sum
+    }
+
     /// Adds the noise of one trial to `signals`, sampled at `rate_hz`, with standard deviation `sd[j]`
     /// at joint j. `shared` is scratch.
     pub(super) fn add_to(
@@ -157,8 +183,7 @@ impl Process {
                 Self::Ar1 { phi, innovation: (1.0 - phi * phi).sqrt(), value: normal(rng) }
             }
             Colour::LowPass { cutoff_hz } => {
-                // The poles decay as exp(−√2 π f_c t): to e⁻²⁰ within 4.5 / f_c.
-                let settled = (4.5 * rate_hz / cutoff_hz).ceil() as usize;
+                let settled = settled(cutoff_hz, rate_hz);
                 let mut filter = Butterworth2::new(cutoff_hz / rate_hz);
                 filter.gain /= filter.clone().energy(settled).sqrt();
                 for _ in 0..settled {
@@ -181,6 +206,12 @@ impl Process {
             Self::LowPass(filter) => filter.next(white),
         }
     }
+}
+
+/// Samples after which a low-pass has forgotten: its poles decay as exp(−√2 π f_c t), to e⁻²⁰ within
+/// 4.5 / f_c.
+fn settled(cutoff_hz: f64, rate_hz: f64) -> usize {
+    (4.5 * rate_hz / cutoff_hz).ceil() as usize
 }
 
 /// A standard normal number.
@@ -217,6 +248,14 @@ impl Butterworth2 {
         let m0 = input - self.a1 * m1 - self.a2 * m2;
         self.memory = [m0, m1];
         self.gain * (m0 + 2.0 * m1 + m2)
+    }
+
+    /// Autocorrelation of its output for white input at all lags at which it is not forgotten, from
+    /// the first `samples` of its impulse response h: r_k = Σ h_i h_{i+k} / Σ h_i².
+    fn autocorrelation(mut self, samples: usize) -> Vec<f64> {
+        let h: Vec<f64> = (0..samples).map(|k| self.next(if k == 0 { 1.0 } else { 0.0 })).collect();
+        let product = |k: usize| h[k..].iter().zip(&h).map(|(a, b)| a * b).sum::<f64>();
+        (0..samples).map(|k| product(k) / product(0)).collect()
     }
 
     /// Sum of squares of the first `samples` of the impulse response: variance for white input.

@@ -91,6 +91,13 @@ impl Default for SensorConfig {
     }
 }
 
+impl SensorConfig {
+    /// Standard deviation of the torque reading of each of `joints`, Nm.
+    pub fn torque_sd_per_joint_nm(&self, joints: usize) -> Result<Vec<f64>, PlantError> {
+        self.torque_sd_nm.resolve("torque_sd_nm", joints)
+    }
+}
+
 /// The sensors of one arm.
 #[derive(Debug, Clone)]
 pub struct Sensors {
@@ -152,7 +159,7 @@ impl Sensors {
         Ok(Self {
             q_sd_rad: config.q_sd_rad.resolve("q_sd_rad", n)?,
             qd_sd_rad_s: config.qd_sd_rad_s.resolve("qd_sd_rad_s", n)?,
-            torque_sd_nm: config.torque_sd_nm.resolve("torque_sd_nm", n)?,
+            torque_sd_nm: config.torque_sd_per_joint_nm(n)?,
             torque_noise: config.torque_noise.clone(),
             q_step_rad: config.q_step_rad,
             qd_step_rad_s: config.qd_step_rad_s,

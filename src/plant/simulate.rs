@@ -2,14 +2,14 @@
 
 use super::config::PlantConfig;
 use super::controller::Controller;
-use super::drivetrain::{Drivetrain, RigidDrivetrain};
+use super::drivetrain::{Drivetrain, RigidDrivetrain, Stage};
 use super::error::PlantError;
 use super::integrate::{RungeKutta4, State};
 use super::rapier_arm::RapierArm;
 use super::recording::Recording;
 use super::sensors::Encoders;
 use crate::excitation::Reference;
-use crate::robot::Arm;
+use crate::robot::{Arm, JointSignals};
 
 /// The arm, what moves it, and what it believes: everything of a run but the motion.
 ///
@@ -49,7 +49,32 @@ impl Plant {
     pub fn run(
         &mut self,
         reference: &dyn Reference,
+        encoders: Option<Encoders>,
+    ) -> Result<Recording, PlantError> {
+        self.follow(reference, encoders, None)
+    }
+
+    /// As [`Self::run`] with true readings, with the accelerations (rad/s²) of what the encoders sit on:
+    /// at the instants at which the controller decides the mean of those before and after, as the
+    /// recorded torque is.
+    pub fn run_with_acceleration(
+        &mut self,
+        reference: &dyn Reference,
+    ) -> Result<(Recording, JointSignals), PlantError> {
+        let mut series = Vec::new();
+        let recording = self.follow(reference, None, Some(&mut series))?;
+        let n = self.arm.dof();
+        let at = |j: usize, k: usize| series[k * n + j];
+        let samples = recording.time_s.len();
+        Ok((recording, JointSignals::from_fn(n, samples, at)))
+    }
+
+    /// The run; accelerations, where they are asked for, sample by sample.
+    fn follow(
+        &mut self,
+        reference: &dyn Reference,
         mut encoders: Option<Encoders>,
+        mut accelerations: Option<&mut Vec<f64>>,
     ) -> Result<Recording, PlantError> {
         let n = self.arm.dof();
         expect_joints("the reference", reference.joints(), n)?;
@@ -114,6 +139,20 @@ impl Plant {
                 if let Some(readings) = &mut recording.readings {
                     readings.q_rad.set_sample(k, &q_read);
                     readings.qd_rad_s.set_sample(k, &qd_read);
+                }
+                if let Some(series) = &mut accelerations {
+                    let mut mean = vec![0.0; n];
+                    let mut rate = vec![0.0; n + state.own().len()];
+                    for drive_torque_nm in [&held_before, &held] {
+                        let (q_rad, qd_rad_s, states) =
+                            (state.q_rad(), state.qd_rad_s(), state.own());
+                        let stage = Stage { time_s, q_rad, qd_rad_s, states, drive_torque_nm };
+                        let (qdd, own) = rate.split_at_mut(n);
+                        self.drivetrain.rates(&mut arm, &stage, qdd, own);
+                        self.drivetrain.encoder_acceleration(own, qdd);
+                        mean.iter_mut().zip(&*qdd).for_each(|(m, a)| *m += 0.5 * a);
+                    }
+                    series.extend(mean);
                 }
                 for (before, after) in held_before.iter_mut().zip(&held) {
                     *before = 0.5 * (*before + after);

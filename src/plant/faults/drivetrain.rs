@@ -227,6 +227,14 @@ impl Drivetrain for HiddenDrivetrain {
         }
     }
 
+    fn encoder_acceleration(&self, states_rate: &[f64], qdd_rad_s2: &mut [f64]) {
+        for (j, joint) in self.joints.iter().enumerate() {
+            if let (Some(rotor), EncoderSide::Motor) = (self.slots[j].rotor, joint.encoder) {
+                qdd_rad_s2[j] = states_rate[rotor + 1];
+            }
+        }
+    }
+
     /// The fastest of: friction against what it acts on, the swing of bristles and gears, bristles
     /// passing by at the largest speed of the motion, ripple passing by. A swing of frequency ω counts
     /// as 2 ω: a step ω h = 1 resolves it.
@@ -293,7 +301,7 @@ impl Drivetrain for HiddenDrivetrain {
             }
             if let (Some(thermal), Some(s)) = (&joint.friction.thermal, self.slots[j].warmth) {
                 let mean_w = self.course.mean_friction_power_w[j];
-                let power_w = self.friction_nm(j, stage.states) * speed;
+                let power_w = joint.friction.nominal_power_w(speed);
                 let heat = if mean_w > 0.0 { power_w / mean_w } else { 0.0 };
                 states_rate[s] = (heat - stage.states[s]) / thermal.time_constant_s;
             }

@@ -313,9 +313,9 @@ impl Fault for PositionFriction {
     }
 }
 
-/// All friction of a joint times 1 + φ Θ, where Θ is the joint's warmth: 0 when the run starts, and
-/// heated by the friction itself, T Θ̇ = p/p̄ − Θ, with p its present power and p̄ the mean power of
-/// nominal friction along the motion, so that Θ settles around 1. Grease thins: φ < 0 as a rule.
+/// All friction of a joint times 1 + φ Θ, where Θ is the joint's warmth: 0 when the run starts, then
+/// heated by friction, T Θ̇ = p/p̄ − Θ, with p the present and p̄ the mean power of nominal friction
+/// along the motion, so that Θ settles around 1. Grease thins: φ < 0 as a rule.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ThermalDrift {

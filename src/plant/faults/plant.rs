@@ -6,7 +6,7 @@ use super::effect::{Complaint, Effect, require};
 use crate::excitation::Reference;
 use crate::plant::{Encoders, Measured, Plant, PlantConfig, PlantError, Recording};
 use crate::random::TrialStreams;
-use crate::robot::Arm;
+use crate::robot::{Arm, JointSignals};
 
 /// An arm with hidden effects under the controller of the nominal arm.
 #[derive(Debug, Clone)]
@@ -77,14 +77,31 @@ impl FaultyPlant {
         encoders: Option<Encoders>,
     ) -> Result<Recording, PlantError> {
         let mut recording = if self.assembly.timing.is_exact() {
-            self.record(reference, encoders, &self.config)?
+            self.plant(reference, &self.config)?.run(reference, encoders)?
         } else {
             let (config, every) = self.dense_config()?;
-            let dense = self.record(reference, encoders, &config)?;
+            let dense = self.plant(reference, &config)?.run(reference, encoders)?;
             self.assembly.timing.sample(&dense, config.log_rate_hz, every)
         };
         self.end_at_limits(&mut recording.torque_nm);
         Ok(recording)
+    }
+
+    /// As [`Self::run`] without encoders' errors, with the accelerations (rad/s²) of what the encoders
+    /// sit on at the instants at which the log's rows are read.
+    pub fn run_with_acceleration(
+        &self,
+        reference: &dyn Reference,
+    ) -> Result<(Recording, JointSignals), PlantError> {
+        let (config, every) = self.dense_config()?;
+        let rate_hz = config.log_rate_hz;
+        let (dense, accelerations) =
+            self.plant(reference, &config)?.run_with_acceleration(reference)?;
+        let timing = &self.assembly.timing;
+        let mut recording = timing.sample(&dense, rate_hz, every);
+        let at_rows = timing.sample_one(&accelerations, &recording, rate_hz, every);
+        self.end_at_limits(&mut recording.torque_nm);
+        Ok((recording, at_rows))
     }
 
     /// Applies to `log`, fresh from the sensors, what goes wrong with single readings in this trial.
@@ -95,20 +112,14 @@ impl FaultyPlant {
         }
     }
 
-    /// The run at every sample of a log as `config` wants it, every channel read in time.
-    fn record(
-        &self,
-        reference: &dyn Reference,
-        encoders: Option<Encoders>,
-        config: &PlantConfig,
-    ) -> Result<Recording, PlantError> {
+    /// The plant for a run along `reference`, with every channel read in time.
+    fn plant(&self, reference: &dyn Reference, config: &PlantConfig) -> Result<Plant, PlantError> {
         if reference.joints() != self.nominal.dof() {
             let (found, expected) = (reference.joints(), self.nominal.dof());
             return Err(PlantError::Joints { what: "the reference", found, expected });
         }
         let drivetrain = Box::new(HiddenDrivetrain::new(&self.assembly, reference));
-        let arm = &self.assembly.arm;
-        Plant::with_drivetrain(arm, &self.nominal, drivetrain, config)?.run(reference, encoders)
+        Plant::with_drivetrain(&self.assembly.arm, &self.nominal, drivetrain, config)
     }
 
     /// A configuration that logs at every decision of the controller (or at every step, where the
@@ -121,7 +132,7 @@ impl FaultyPlant {
         Ok((PlantConfig { log_rate_hz, ..self.config.clone() }, every))
     }
 
-    fn end_at_limits(&self, torque_nm: &mut crate::robot::JointSignals) {
+    fn end_at_limits(&self, torque_nm: &mut JointSignals) {
         for (j, joint) in self.assembly.joints.iter().enumerate() {
             let limit = joint.reading_limit_nm;
             if limit.is_finite() {

@@ -172,6 +172,21 @@ impl Timing {
         });
         log
     }
+
+    /// One more channel of the run behind [`Self::sample`], at the instants of the rows of `log`.
+    pub(super) fn sample_one(
+        &self,
+        dense: &JointSignals,
+        log: &Recording,
+        rate_hz: f64,
+        every: usize,
+    ) -> JointSignals {
+        let step_s = every as f64 / rate_hz;
+        let last = dense.samples() - 1;
+        JointSignals::from_fn(dense.joints(), log.time_s.len(), |j, k| {
+            Place::new(self.instant_s(k, step_s) * rate_hz, last).lagrange(dense.joint(j))
+        })
+    }
 }
 
 /// A first-order low-pass of time constant `constant` samples over a signal that is linear between

@@ -1,0 +1,59 @@
+//! A scenario's arm, run and read: everything of a scenario but the identification.
+
+use std::borrow::Cow;
+
+use super::scenario::Scenario;
+use crate::plant::faults::FaultyPlant;
+use crate::plant::{Measured, PlantError, Recording, Sensors};
+use crate::random::TrialStreams;
+
+/// A scenario whose plant has run: what the logs of all its trials share.
+pub struct Simulation {
+    /// The scenario.
+    pub scenario: Scenario,
+    /// The noise-free run.
+    pub recording: Recording,
+    pub(super) plant: FaultyPlant,
+    sensors: Sensors,
+}
+
+impl Simulation {
+    /// Runs the plant once without noise.
+    pub fn run(scenario: Scenario) -> Result<Self, PlantError> {
+        let plant = FaultyPlant::new(&scenario.arm, &scenario.effects, &scenario.plant)?;
+        let recording = plant.run(&scenario.excitation, None)?;
+        let sensors = Sensors::new(&scenario.sensors, &scenario.arm, scenario.plant.log_rate_hz)?;
+        Ok(Self { scenario, recording, plant, sensors })
+    }
+
+    /// The random numbers of a trial.
+    pub fn streams(&self, trial: u64) -> TrialStreams {
+        TrialStreams::new(self.scenario.seed, self.scenario.name.as_bytes(), trial)
+    }
+
+    /// The noise-free run of a trial: the shared one, or its own where the controller reads the
+    /// sensors.
+    pub fn recording(&self, trial: u64) -> Result<Cow<'_, Recording>, PlantError> {
+        if !self.scenario.controller_reads_sensors {
+            return Ok(Cow::Borrowed(&self.recording));
+        }
+        let encoders = self.sensors.encoders(&self.streams(trial));
+        Ok(Cow::Owned(self.plant.run(&self.scenario.excitation, Some(encoders))?))
+    }
+
+    /// The log of a trial: the noise-free run as its sensors read it, with the readings that go wrong.
+    pub fn log(&self, trial: u64) -> Result<Measured, PlantError> {
+        let mut log = Measured::like(&self.recording);
+        self.log_into(trial, &mut log)?;
+        Ok(log)
+    }
+
+    /// As [`Self::log`], into memory that is used again and again.
+    pub fn log_into(&self, trial: u64, log: &mut Measured) -> Result<(), PlantError> {
+        let recording = self.recording(trial)?;
+        let streams = self.streams(trial);
+        self.sensors.measure(&recording, &streams, log);
+        self.plant.spoil(&streams, log);
+        Ok(())
+    }
+}

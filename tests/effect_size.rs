@@ -1,0 +1,54 @@
+//! The size of a hidden effect in units of the noise.
+
+use std::path::Path;
+
+use armid::montecarlo::{EffectSize, Scenario, Simulation};
+
+/// One period of the default scenario's motion, with its own noise.
+fn size_of(effects: &str, noise: &str) -> EffectSize {
+    let text = format!(
+        "name = 'size'\nrobot = 'ur5'\nseed = 1\ntrials = 1\n\
+         [motion]\ntrajectory = 'ur5_identification'\nperiods = 1\n\
+         [sensors]\ntorque_sd_nm = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15]\n{noise}\n{effects}"
+    );
+    let scenario = Scenario::from_toml(&text, "test", Path::new("")).unwrap();
+    Simulation::run(scenario).unwrap().effect_size().unwrap()
+}
+
+const COLOURED: &str = "[sensors.torque_noise]\ncross_joint_correlation = 0.3\n\
+    components = [{ share = 0.6, colour = 'white' }, \
+    { share = 0.4, colour = { ar1 = { time_constant_s = 0.1 } } }]";
+
+/// Nothing hidden: what is left is how well the equations of motion hold along a log, 1e-4 Nm and
+/// less: 7500 rows · (1e-4 / 0.15)² is 3e-3.
+#[test]
+fn without_effects_there_is_nothing_to_see() {
+    for noise in ["", COLOURED] {
+        let size = size_of("", noise);
+        println!("{size:?}");
+        assert!(size.lambda < 0.02 && size.lambda_sim < 0.02, "{size:?}");
+    }
+}
+
+/// A change of two parameters of the null model: all of it moves parameters.
+#[test]
+fn what_the_null_model_absorbs_has_only_a_size_against_a_simulation() {
+    let payload = "[[effect]]\nkind='payload'\nmass_kg=0.5\ncom_x_m=0\ncom_y_m=0\ncom_z_m=0.05";
+    for noise in ["", COLOURED] {
+        let size = size_of(payload, noise);
+        println!("{size:?}");
+        assert!(size.lambda_sim > 1e3 && size.lambda < 0.02, "{size:?}");
+    }
+}
+
+/// λ is a square: twice the effect, four times λ. Stribeck friction is linear in its size up to what it
+/// does to the motion, a few percent here.
+#[test]
+fn the_size_of_an_effect_is_quadratic() {
+    let stribeck = |nm: f64| {
+        size_of(&format!("[[effect]]\nkind='stribeck'\njoint=4\nextra_nm={nm}\nvs_rad_s=0.1"), "")
+    };
+    let (one, two) = (stribeck(0.25), stribeck(0.5));
+    println!("{one:?} {two:?}");
+    assert!((two.lambda / one.lambda - 4.0).abs() < 0.2, "{one:?} {two:?}");
+}
