@@ -232,10 +232,10 @@ fn readings_go_wrong_as_often_as_asked() {
     let limits: Vec<f64> = ur5().joints.iter().map(|j| j.limits.torque_nm).collect();
     let spoilt = log(&["kind='outliers'\nfraction=0.1"]);
     let mut hit = 0;
-    for j in 0..6 {
+    for (j, &limit) in limits.iter().enumerate() {
         for (a, b) in spoilt.torque_nm.joint(j).iter().zip(clean.torque_nm.joint(j)) {
             hit += usize::from(a != b);
-            assert!(a == b || a.abs() <= limits[j]);
+            assert!(a == b || a.abs() <= limit);
         }
     }
     let count = 6.0 * clean.time_s.len() as f64;
