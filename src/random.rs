@@ -40,6 +40,8 @@ pub enum Channel {
         /// Which of the scenario's effects, from 0.
         effect: u8,
     },
+    /// Which blocks of a record are drawn again.
+    Resampling,
 }
 
 impl Channel {
@@ -52,6 +54,7 @@ impl Channel {
             Self::TorqueShared { component } => (4, component),
             Self::Outlier { effect } => (5, effect),
             Self::Dropped { effect } => (6, effect),
+            Self::Resampling => (7, 0),
         };
         kind << 8 | u64::from(component)
     }
@@ -104,6 +107,7 @@ mod tests {
                         Channel::TorqueShared { component: 0 },
                         Channel::Outlier { effect: 0 },
                         Channel::Dropped { effect: 0 },
+                        Channel::Resampling,
                     ] {
                         for joint in 0..7 {
                             first_words.insert(streams.stream(channel, joint).next_u64());
@@ -112,7 +116,7 @@ mod tests {
                 }
             }
         }
-        assert_eq!(first_words.len(), 3 * 3 * 3 * 7 * 7);
+        assert_eq!(first_words.len(), 3 * 3 * 3 * 8 * 7);
     }
 
     /// The scheme is part of every published result: a change must be seen.

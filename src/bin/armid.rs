@@ -19,6 +19,7 @@ enum Task {
     Excite(cli::excite::ExciteArgs),
     Identify(cli::identify::IdentifyArgs),
     Simulate(cli::simulate::SimulateArgs),
+    Study(cli::study::StudyArgs),
 }
 
 fn main() -> ExitCode {
@@ -27,5 +28,6 @@ fn main() -> ExitCode {
         Task::Excite(args) => cli::excite::run(&args),
         Task::Identify(args) => cli::identify::run(&args),
         Task::Simulate(args) => cli::simulate::run(&args),
+        Task::Study(args) => cli::study::run(&args),
     })
 }

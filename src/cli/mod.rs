@@ -8,6 +8,7 @@ pub mod identify;
 pub mod montecarlo;
 mod prior;
 pub mod simulate;
+pub mod study;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;

@@ -194,7 +194,7 @@ fn replay(experiment: &Experiment, trial: u64) -> CommandResult {
     let set = &experiment.simulation.scenario.set;
     let identification = experiment.worker().identify(trial)?;
     let sigma = identification.sigma();
-    println!("trial {trial}, {} with {}", identification.fit.estimator, experiment.covariance);
+    println!("trial {trial}, {} with {}", identification.estimator, experiment.covariance);
     println!("{:<6} {:>24} {:>24} {:>24} {:>8}", "", "truth", "estimate", "sigma", "z");
     for (k, sigma) in sigma.iter().enumerate() {
         let (truth, estimate) = (experiment.truth[k], identification.fit.theta[k]);

@@ -46,18 +46,26 @@ impl ColumnPlan {
         Self { joints, base_count: set.rank() }
     }
 
+    /// The plan of a problem whose columns come from elsewhere: the base indices of every joint,
+    /// ascending, out of `base_count`.
+    pub fn explicit(joints: &[Vec<usize>], base_count: usize) -> Self {
+        let column = |&base: &usize| PlannedColumn { base, terms: Vec::new() };
+        let joints = joints.iter().map(|bases| bases.iter().map(column).collect()).collect();
+        Self { joints, base_count }
+    }
+
     /// The plan of equations in which joint j's has those of all joints behind it mixed in.
     pub fn cumulative(&self) -> Self {
-        let joints = (0..self.joints())
+        let joints: Vec<Vec<usize>> = (0..self.joints())
             .map(|j| {
                 let mut bases: Vec<usize> =
                     (j..self.joints()).flat_map(|i| self.base_indices(i)).collect();
                 bases.sort_unstable();
                 bases.dedup();
-                bases.into_iter().map(|base| PlannedColumn { base, terms: Vec::new() }).collect()
+                bases
             })
             .collect();
-        Self { joints, base_count: self.base_count }
+        Self::explicit(&joints, self.base_count)
     }
 
     /// Number of joints.

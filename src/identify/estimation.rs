@@ -1,73 +1,138 @@
-//! Estimator and covariance applied to one problem.
+//! Estimators and covariances applied to one problem.
 
 use super::columns::ColumnPlan;
-use super::covariance::{Covariance, CovarianceKind};
+use super::covariance::{Covariance, CovarianceError, CovarianceKind};
 use super::error::IdentifyError;
-use super::fit::{Estimator, Fit, FitError, Fitter};
+use super::fit::{Estimator, Fit, FitError, Fitter, Weighting};
+use super::lack_of_fit::LackOfFit;
+use super::options::Options;
 use super::problem::Problem;
-use super::whiten::ReplicateWhitening;
+use super::whiten::{ReplicateWhitening, decimate, decorrelate, prewhiten};
 use crate::base::BaseSet;
+use crate::signal::{HarmonicPower, Scratch};
 
 /// Memory for estimates of problems of one shape.
 pub struct Estimation {
     plan: ColumnPlan,
     fitter: Fitter,
-    whitened: Option<Whitened>,
+    whitening: ReplicateWhitening,
+    filter: Scratch,
+    /// Whitened joint by joint.
+    own: Option<Whitened>,
+    /// Whitened across joints.
+    mixed: Option<Whitened>,
 }
 
-/// Memory of the estimators that whiten first.
+/// What one estimator says of a problem.
+#[derive(Debug, Clone)]
+pub struct Estimate {
+    /// The solution.
+    pub fit: Fit,
+    /// The covariances asked for, in their order.
+    pub covariances: Vec<Result<Covariance, CovarianceError>>,
+    /// Whether what repeats in the torque is explained; known for the spectral estimator.
+    pub lack_of_fit: Option<LackOfFit>,
+}
+
 struct Whitened {
-    whitening: ReplicateWhitening,
     problem: Problem,
     fitter: Fitter,
 }
 
-/// Share of the motion's harmonics whose equations are used: those near its end lack the products
-/// of what was cut off the motion with the mass matrix.
-const USED_HARMONICS: f64 = 0.8;
-/// Always used, so that a motion of few harmonics still gives equations for all parameters.
-const LEAST_HARMONICS: usize = 24;
-
-impl Estimation {
-    /// For problems shaped like `problem`, whatever its number of samples.
-    pub fn new(problem: &Problem) -> Self {
-        Self { plan: problem.plan.clone(), fitter: Fitter::new(problem), whitened: None }
-    }
-
-    /// θ̂ and its covariance. `harmonics` of a motion that repeats: the highest of each joint, 0 for
-    /// one that stands still.
-    pub fn estimate(
-        &mut self,
-        problem: &Problem,
-        set: &BaseSet,
-        estimator: Estimator,
-        kind: CovarianceKind,
-        harmonics: Option<&[usize]>,
-    ) -> Result<(Fit, Covariance), IdentifyError> {
-        if estimator != Estimator::Spectral {
-            let fit = self.fitter.fit(problem, set, estimator)?;
-            let covariance = kind.method().covariance(problem, &fit)?;
-            return Ok((fit, covariance));
-        }
-        let moving = harmonics.unwrap_or_default().iter().filter(|h| **h > 0).min();
-        let (Some(&highest), true) = (moving, problem.periods >= LEAST_PERIODS) else {
-            let (periods, needed) = (problem.periods, LEAST_PERIODS);
-            return Err(FitError::TooFewPeriods { periods, needed }.into());
-        };
-        let used = ((USED_HARMONICS * highest as f64) as usize).max(LEAST_HARMONICS);
-        let whitened = self.whitened.get_or_insert_with(|| {
-            let whitened = Problem::new(self.plan.cumulative(), 0.0);
-            let fitter = Fitter::new(&whitened);
-            Whitened { whitening: ReplicateWhitening::default(), problem: whitened, fitter }
-        });
-        whitened.whitening.whiten(problem, used, &mut whitened.problem);
-        let mut fit = whitened.fitter.fit(&whitened.problem, set, Estimator::Ols)?;
-        let covariance = kind.method().covariance(&whitened.problem, &fit)?;
-        fit.estimator = estimator;
-        fit.state_residuals_of(problem);
-        Ok((fit, covariance))
+impl Whitened {
+    fn new(plan: ColumnPlan) -> Self {
+        let problem = Problem::new(plan, 0.0);
+        Self { fitter: Fitter::new(&problem), problem }
     }
 }
 
 /// Periods whose scatter gives weights: below, the noise of the weights outdoes their use.
 const LEAST_PERIODS: usize = 3;
+
+impl Estimation {
+    /// For problems shaped like `problem`, whatever its number of samples.
+    pub fn new(problem: &Problem) -> Self {
+        Self {
+            plan: problem.plan.clone(),
+            fitter: Fitter::new(problem),
+            whitening: ReplicateWhitening::default(),
+            filter: Scratch::default(),
+            own: None,
+            mixed: None,
+        }
+    }
+
+    /// θ̂ by `estimator` and its covariances `kinds`. `acceleration` of a motion that repeats says to
+    /// which harmonic [`Estimator::Spectral`] may trust it; `options` is for the filter of
+    /// [`Estimator::Decimated`].
+    pub fn estimate(
+        &mut self,
+        problem: &Problem,
+        set: &BaseSet,
+        estimator: Estimator,
+        kinds: &[CovarianceKind],
+        acceleration: Option<&[HarmonicPower]>,
+        options: &Options,
+    ) -> Result<Estimate, IdentifyError> {
+        let plan = &self.plan;
+        let own = || Whitened::new(plan.clone());
+        let mixed = || Whitened::new(plan.cumulative());
+        let weighting = match estimator {
+            Estimator::Ols | Estimator::Sur | Estimator::Spectral => Weighting::Equal,
+            Estimator::Wls | Estimator::Gls | Estimator::Decimated => Weighting::PerJoint,
+        };
+        let whitened = match estimator {
+            Estimator::Ols | Estimator::Wls => {
+                let fit = self.fitter.fit(problem, set, weighting)?;
+                return Ok(Estimate {
+                    covariances: covariances(problem, &fit, kinds),
+                    fit,
+                    lack_of_fit: None,
+                });
+            }
+            Estimator::Sur => {
+                let whitened = self.mixed.get_or_insert_with(mixed);
+                let first = self.fitter.fit(problem, set, Weighting::PerJoint)?;
+                decorrelate(problem, &first, &mut whitened.problem);
+                whitened
+            }
+            Estimator::Gls => {
+                let whitened = self.own.get_or_insert_with(own);
+                let first = self.fitter.fit(problem, set, Weighting::PerJoint)?;
+                prewhiten(problem, &first, &mut whitened.problem);
+                whitened
+            }
+            Estimator::Decimated => {
+                let whitened = self.own.get_or_insert_with(own);
+                let Options { cutoff_hz, order, .. } = *options;
+                decimate(problem, cutoff_hz, order, &mut self.filter, &mut whitened.problem)?;
+                whitened
+            }
+            Estimator::Spectral => {
+                let acceleration = acceleration.unwrap_or_default();
+                let moving = acceleration.iter().any(|power| !power.noise.is_empty());
+                if !moving || problem.periods < LEAST_PERIODS {
+                    let (periods, needed) = (problem.periods, LEAST_PERIODS);
+                    return Err(FitError::TooFewPeriods { periods, needed }.into());
+                }
+                let whitened = self.mixed.get_or_insert_with(mixed);
+                self.whitening.whiten(problem, acceleration, &mut whitened.problem);
+                whitened
+            }
+        };
+        let mut fit = whitened.fitter.fit(&whitened.problem, set, weighting)?;
+        let covariances = covariances(&whitened.problem, &fit, kinds);
+        let lack_of_fit = (estimator == Estimator::Spectral)
+            .then(|| LackOfFit::of(&whitened.problem, &fit.theta));
+        fit.state_residuals_of(problem);
+        Ok(Estimate { fit, covariances, lack_of_fit })
+    }
+}
+
+fn covariances(
+    problem: &Problem,
+    fit: &Fit,
+    kinds: &[CovarianceKind],
+) -> Vec<Result<Covariance, CovarianceError>> {
+    kinds.iter().map(|kind| kind.method().covariance(problem, fit)).collect()
+}

@@ -18,6 +18,14 @@ pub enum Estimator {
     /// Each joint's equation divided by the standard deviation of its own residual, s_j, iterated
     /// (Gautier 1997).
     Wls,
+    /// Seemingly unrelated regressions: the joints' equations weighted by the 6 × 6 covariance of
+    /// their residuals (Zellner 1962).
+    Sur,
+    /// Each joint's equations behind the filter that makes its residuals white (autoregression),
+    /// then weighted per joint.
+    Gls,
+    /// Torque and regressor behind a low-pass and thinned, then weighted per joint (Gautier 1997).
+    Decimated,
     /// Each harmonic of a motion that repeats, and each joint, weighted by the noise that the
     /// periods show there, correlation between joints included.
     Spectral,
@@ -28,9 +36,21 @@ impl std::fmt::Display for Estimator {
         f.pad(match self {
             Self::Ols => "ols",
             Self::Wls => "wls",
+            Self::Sur => "sur",
+            Self::Gls => "gls",
+            Self::Decimated => "decimated",
             Self::Spectral => "spectral",
         })
     }
+}
+
+/// How least squares weighs the equations of a problem.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Weighting {
+    /// All alike.
+    Equal,
+    /// Each joint's divided by the standard deviation of its residual, iterated.
+    PerJoint,
 }
 
 /// The data cannot give the parameters at all.
@@ -69,8 +89,6 @@ pub enum FitError {
 /// A least-squares solution with the triangle that stands for all its equations.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// Which estimator made it.
-    pub estimator: Estimator,
     /// θ̂, base parameters in their SI units.
     pub theta: Vec<f64>,
     /// θ̂ of each period alone (P of them).
@@ -131,7 +149,7 @@ impl Fitter {
         &mut self,
         problem: &Problem,
         set: &BaseSet,
-        estimator: Estimator,
+        weighting: Weighting,
     ) -> Result<Fit, FitError> {
         let b = problem.parameters();
         let rows = problem.joints() * problem.samples;
@@ -143,7 +161,7 @@ impl Fitter {
         let mut triangle = self.combine(problem, set, &weights)?;
         let mut theta = mean_solution(&triangle);
         let mut joint_sigma_nm = self.joint_sigma(problem, &theta, &triangle, &weights);
-        if estimator == Estimator::Wls {
+        if weighting == Weighting::PerJoint {
             for _ in 0..WEIGHT_ITERATIONS {
                 // A joint without any residual (noise-free data) must not weigh infinitely.
                 let floor = 1e-9 * joint_sigma_nm.iter().fold(f64::MIN_POSITIVE, |a, s| a.max(*s));
@@ -162,7 +180,6 @@ impl Fitter {
             .collect();
         let square = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
         Ok(Fit {
-            estimator,
             theta_periods,
             weights,
             inverse: DMatrix::from_vec(b, b, triangle.inverse()),

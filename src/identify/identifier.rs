@@ -3,8 +3,9 @@
 use super::columns::ColumnPlan;
 use super::covariance::{Covariance, CovarianceKind};
 use super::error::IdentifyError;
-use super::estimation::Estimation;
+use super::estimation::{Estimate, Estimation};
 use super::fit::{Estimator, Fit};
+use super::lack_of_fit::LackOfFit;
 use super::options::Options;
 use super::prepare::{Measurement, Prepared, Preparer, Processing};
 use super::problem::{Assembler, Problem};
@@ -28,6 +29,8 @@ pub struct Identifier<'a> {
 /// What a log says about the arm.
 #[derive(Debug, Clone)]
 pub struct Identification {
+    /// Which estimator made the solution.
+    pub estimator: Estimator,
     /// The least-squares solution.
     pub fit: Fit,
     /// Its covariance.
@@ -42,6 +45,10 @@ pub struct Identification {
     pub samples: usize,
     /// Scatter of the torque between periods; `None` for a single run.
     pub replicates: Option<Replicates>,
+    /// Rms per joint of what repeats and is not explained, Nm; `None` for a single run.
+    pub explainable_nm: Option<Vec<f64>>,
+    /// Test of the model against the scatter between periods; known for the spectral estimator.
+    pub lack_of_fit: Option<LackOfFit>,
     /// What the user should know.
     pub warnings: Vec<String>,
 }
@@ -122,6 +129,7 @@ impl Regression {
         }
         first.problem.unfold();
         first.prepared.replicates = None;
+        first.prepared.acceleration = None;
         first.prepared.processing.periods = 1;
         for other in rest {
             let mut problem = other.problem;
@@ -281,20 +289,71 @@ impl<'a> Identifier<'a> {
                  short against a block",
             ),
         };
-        let harmonics = prepared.processing.harmonics.as_deref();
-        let (fit, covariance) =
-            self.estimation.estimate(&self.problem, self.set, estimator, kind, harmonics)?;
+        let acceleration = prepared.acceleration.as_deref();
+        let estimate = self.estimation.estimate(
+            &self.problem,
+            self.set,
+            estimator,
+            &[kind],
+            acceleration,
+            &self.options,
+        )?;
+        let Estimate { fit, mut covariances, lack_of_fit } = estimate;
+        let covariance = covariances.swap_remove(0)?;
+        let mut warnings = prepared.warnings;
+        if let Some(lack) = lack_of_fit.filter(|lack| !lack.fits()) {
+            warnings.push(format!(
+                "the model does not explain all that repeats in the torque (lack of fit {:.2}, \
+                 p = {:.1e}): σ covers the noise, not the error of the model",
+                lack.statistic, lack.p_value
+            ));
+        }
         Ok(Identification {
+            estimator,
             samples: self.problem.samples * self.problem.periods,
+            explainable_nm: prepared.replicates.as_ref().map(|r| explainable(&fit, r)),
             covariance,
             estimator_reason,
             covariance_reason,
             processing: prepared.processing,
             replicates: prepared.replicates,
-            warnings: prepared.warnings,
+            lack_of_fit,
+            warnings,
             fit,
         })
     }
+
+    /// Estimates from one log by several methods: estimators, each with its covariances.
+    pub fn compare(
+        &mut self,
+        m: &Measurement,
+        methods: &[(Estimator, Vec<CovarianceKind>)],
+    ) -> Result<Vec<Result<Estimate, IdentifyError>>, IdentifyError> {
+        let prepared = self.fill(m)?;
+        let acceleration = prepared.acceleration.as_deref();
+        let estimates = methods.iter().map(|(estimator, kinds)| {
+            let Self { estimation, problem, set, options, .. } = self;
+            estimation.estimate(problem, set, *estimator, kinds, acceleration, options)
+        });
+        Ok(estimates.collect())
+    }
+}
+
+/// Rms per joint of what repeats in the torque and is not explained, Nm: the residual of the mean
+/// period less the share that its noise, σ²/P, has in it.
+fn explainable(fit: &Fit, replicates: &Replicates) -> Vec<f64> {
+    let n = replicates.mean.samples() as f64;
+    let periods = replicates.periods as f64;
+    let joints = replicates.sigma.len() as f64;
+    let fitted = fit.theta.len() as f64 / (joints * n);
+    let pairs = fit.residual_squares.iter().zip(&replicates.sigma);
+    pairs
+        .map(|(squares, sigma)| {
+            let variance = sigma * sigma;
+            let of_mean = (squares - variance * n * (periods - 1.0)) / (n * periods);
+            (of_mean - variance / periods * (1.0 - fitted)).max(0.0).sqrt()
+        })
+        .collect()
 }
 
 /// With fewer periods their scatter has so few degrees of freedom that blocks tell more.

@@ -3,11 +3,13 @@
 pub mod covariance;
 pub mod physical;
 
+mod bound;
 mod columns;
 mod error;
 mod estimation;
 mod fit;
 mod identifier;
+mod lack_of_fit;
 mod options;
 mod prediction;
 mod prepare;
@@ -16,10 +18,13 @@ mod quality;
 mod triangle;
 mod whiten;
 
+pub use bound::{KnownNoise, cramer_rao};
 pub use columns::ColumnPlan;
 pub use error::IdentifyError;
-pub use fit::{Estimator, Fit, FitError, Fitter};
+pub use estimation::{Estimate, Estimation};
+pub use fit::{Estimator, Fit, FitError, Fitter, Weighting};
 pub use identifier::{Identification, Identifier, Regression, Residual};
+pub use lack_of_fit::LackOfFit;
 pub use options::Options;
 pub use prediction::{MOVING_RAD_S, Prediction};
 pub use prepare::{Measurement, Prepared, Preparer, Processing};

@@ -9,8 +9,8 @@ use super::options::Options;
 use crate::dynamics::Motion;
 use crate::robot::JointSignals;
 use crate::signal::{
-    Activity, Decimator, FitScratch, PeriodicFit, Replicates, Resampler, Scratch, ZeroPhase,
-    central_4, find_period, natural_rate_hz, replicate_noise,
+    Activity, Decimator, FitScratch, HarmonicPower, PeriodicFit, Replicates, Resampler, Scratch,
+    ZeroPhase, central_4, find_period, natural_rate_hz, replicate_noise,
 };
 
 /// The channels identification needs of a log, borrowed.
@@ -47,7 +47,7 @@ pub struct Processing {
     pub periods: usize,
     /// Whether time stamps were uneven and the log was resampled.
     pub resampled: bool,
-    /// Highest harmonic of the averaged motion, per joint; null for a single run.
+    /// Highest harmonic of the averaged acceleration, per joint; null for a single run.
     pub harmonics: Option<Vec<usize>>,
 }
 
@@ -60,6 +60,8 @@ pub struct Prepared {
     pub torque_nm: JointSignals,
     /// Scatter of the torque between periods; `None` for a single run.
     pub replicates: Option<Replicates>,
+    /// How well the averaged acceleration is known, per joint; `None` for a single run.
+    pub acceleration: Option<Vec<HarmonicPower>>,
     /// What was done.
     pub processing: Processing,
     /// What the user should know.
@@ -234,6 +236,7 @@ impl Preparer {
                 qdd_rad_s2: averaged.qdd_rad_s2,
             },
             replicates: Some(replicate_noise(&torque_nm, samples_per_period)?),
+            acceleration: Some(averaged.acceleration),
             torque_nm,
             processing: Processing {
                 cutoff_hz: None,
@@ -281,6 +284,7 @@ impl Preparer {
             },
             torque_nm: even.torque_nm.slice(window.clone()),
             replicates: None,
+            acceleration: None,
             processing: Processing {
                 cutoff_hz: Some(options.cutoff_hz),
                 order: Some(options.order),

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use serde::Serialize;
 
-use super::fit::{Estimator, FitError, Fitter};
+use super::fit::{FitError, Fitter, Weighting};
 use super::problem::Problem;
 use super::triangle::Triangle;
 use crate::base::BaseSet;
@@ -24,7 +24,7 @@ pub struct Condition {
 impl Condition {
     /// Of the regressor in `problem`.
     pub fn of(problem: &Problem, set: &BaseSet) -> Result<Self, FitError> {
-        let triangle = Fitter::new(problem).fit(problem, set, Estimator::Ols)?.triangle;
+        let triangle = Fitter::new(problem).fit(problem, set, Weighting::Equal)?.triangle;
         let regressor = condition_number(&triangle, |_| 1.0);
         Ok(Self {
             regressor,

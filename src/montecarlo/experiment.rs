@@ -75,7 +75,7 @@ impl Experiment {
         };
         let pilot = experiment.worker_with(pilot_options).identify(PILOT)?;
         experiment.scale = pilot.sigma();
-        experiment.estimator = pilot.fit.estimator;
+        experiment.estimator = pilot.estimator;
         experiment.covariance = pilot.covariance.kind;
         Ok(experiment)
     }
@@ -95,6 +95,28 @@ impl Experiment {
             identifier: Identifier::new(&self.model, &self.simulation.scenario.set, options),
             measured: Measured::like(&self.simulation.recording),
         }
+    }
+
+    /// Estimates `theta` with their `sigma` against the truth, in units of the tally.
+    pub fn outcomes(
+        &self,
+        theta: &[f64],
+        sigma: &[f64],
+        quantile_95: f64,
+    ) -> Result<Vec<Outcome>, TrialError> {
+        let Self { truth, scale, simulation, .. } = self;
+        let estimates = theta.iter().zip(sigma).zip(truth.iter().zip(scale)).enumerate();
+        estimates
+            .map(|(k, ((theta, sigma), (truth, scale)))| {
+                let outcome =
+                    Outcome { z: (theta - truth) / scale, sigma: sigma / scale, quantile_95 };
+                if outcome.is_sound() {
+                    return Ok(outcome);
+                }
+                let parameter = simulation.scenario.set.name(k).to_owned();
+                Err(TrialError::Unsound { parameter, z: outcome.z, sigma: outcome.sigma })
+            })
+            .collect()
     }
 }
 
@@ -131,22 +153,10 @@ impl Worker<'_> {
 
     fn outcomes(&mut self, trial: u64) -> Result<Vec<Outcome>, TrialError> {
         let identification = self.identify(trial)?;
-        let Experiment { truth, scale, simulation, .. } = self.experiment;
-        let quantile_95 = identification.covariance.quantile_95();
-        let sigma = identification.sigma();
-        let estimates = identification.fit.theta.iter().zip(&sigma);
-        estimates
-            .zip(truth.iter().zip(scale))
-            .enumerate()
-            .map(|(k, ((theta, sigma), (truth, scale)))| {
-                let outcome =
-                    Outcome { z: (theta - truth) / scale, sigma: sigma / scale, quantile_95 };
-                if outcome.is_sound() {
-                    return Ok(outcome);
-                }
-                let parameter = simulation.scenario.set.name(k).to_owned();
-                Err(TrialError::Unsound { parameter, z: outcome.z, sigma: outcome.sigma })
-            })
-            .collect()
+        self.experiment.outcomes(
+            &identification.fit.theta,
+            &identification.sigma(),
+            identification.covariance.quantile_95(),
+        )
     }
 }

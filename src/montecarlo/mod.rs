@@ -10,6 +10,7 @@ mod experiment;
 mod scenario;
 pub mod shard;
 mod simulation;
+pub mod study;
 mod summary;
 pub mod tally;
 

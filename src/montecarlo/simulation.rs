@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::scenario::Scenario;
 use crate::plant::faults::FaultyPlant;
-use crate::plant::{Measured, PlantError, Recording, Sensors};
+use crate::plant::{Measured, PlantError, Recording, Sensors, TorqueNoise};
 use crate::random::TrialStreams;
 
 /// A scenario whose plant has run: what the logs of all its trials share.
@@ -39,6 +39,11 @@ impl Simulation {
         }
         let encoders = self.sensors.encoders(&self.streams(trial));
         Ok(Cow::Owned(self.plant.run(&self.scenario.excitation, Some(encoders))?))
+    }
+
+    /// The law of the torque noise, where rounding adds nothing to it.
+    pub fn known_torque_noise(&self) -> Option<TorqueNoise<'_>> {
+        self.sensors.torque_noise()
     }
 
     /// The log of a trial: the noise-free run as its sensors read it, with the readings that go wrong.

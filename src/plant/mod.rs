@@ -31,6 +31,6 @@ pub use integrate::{RungeKutta4, State};
 pub use noise::{Colour, Component, NoiseModel};
 pub use rapier_arm::RapierArm;
 pub use recording::{Readings, Recording};
-pub use sensors::{Effort, Encoders, Measured, PerJoint, SensorConfig, Sensors};
+pub use sensors::{Effort, Encoders, Measured, PerJoint, SensorConfig, Sensors, TorqueNoise};
 pub use simulate::{Plant, simulate};
 pub use whitening::Whitening;

@@ -130,6 +130,27 @@ impl NoiseModel {
         sum
     }
 
+    /// Power at `frequency_hz` of noise sampled at `rate_hz`, relative to white noise of the same
+    /// variance: |H(e^{iω})|² of the filter that makes the colour, its mean over all frequencies 1.
+    pub fn power(&self, frequency_hz: f64, rate_hz: f64) -> f64 {
+        let omega = std::f64::consts::TAU * frequency_hz / rate_hz;
+        let power = |colour: Colour| match colour {
+            Colour::White => 1.0,
+            Colour::Ar1 { time_constant_s } => {
+                let phi = (-1.0 / (rate_hz * time_constant_s)).exp();
+                (1.0 - phi * phi) / (1.0 - 2.0 * phi * omega.cos() + phi * phi)
+            }
+            Colour::LowPass { cutoff_hz } => {
+                let ratio =
+                    (0.5 * omega).tan() / (std::f64::consts::PI * cutoff_hz / rate_hz).tan();
+                let settled = (4.5 * rate_hz / cutoff_hz).ceil() as usize;
+                let energy = Butterworth2::new(cutoff_hz / rate_hz).energy(settled);
+                1.0 / (1.0 + ratio.powi(4)) / energy
+            }
+        };
+        self.components.iter().map(|c| c.share * power(c.colour)).sum()
+    }
+
     /// Adds the noise of one trial to `signals`, sampled at `rate_hz`, with standard deviation `sd[j]`
     /// at joint j. `shared` is scratch.
     pub(super) fn add_to(
@@ -325,6 +346,24 @@ mod tests {
             let bound = SIGMAS * (variance / SAMPLES as f64).sqrt();
             let seen = mean_product(&x[lag..], &x[..SAMPLES - lag]) / mean_product(x, x);
             assert!((seen - phi.powf(k)).abs() < bound, "lag {lag}: {seen}, {}", phi.powf(k));
+        }
+    }
+
+    #[test]
+    fn power_over_all_frequencies_is_the_variance() {
+        let colours = [
+            Colour::White,
+            Colour::Ar1 { time_constant_s: 0.02 },
+            Colour::LowPass { cutoff_hz: 10.0 },
+        ];
+        for colour in colours {
+            let model = single(colour);
+            let bins = 20_000;
+            let frequency = |k: usize| (k as f64 + 0.5) / bins as f64 * 0.5 * RATE_HZ;
+            let mean =
+                (0..bins).map(|k| model.power(frequency(k), RATE_HZ)).sum::<f64>() / bins as f64;
+            // The mid-point rule on a smooth spectrum.
+            assert!((mean - 1.0).abs() < 1e-5, "{colour:?}: {mean}");
         }
     }
 

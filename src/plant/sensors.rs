@@ -202,6 +202,13 @@ impl Sensors {
         }
     }
 
+    /// The law of the torque noise; `None` where the torque is rounded too.
+    pub fn torque_noise(&self) -> Option<TorqueNoise<'_>> {
+        let rounded = self.torque_step_nm.iter().any(|step| *step > 0.0);
+        let noise = TorqueNoise { sd_nm: &self.torque_sd_nm, model: &self.torque_noise };
+        (!rounded).then_some(noise)
+    }
+
     /// The encoders of one trial, to be read in the loop.
     pub fn encoders(&self, streams: &TrialStreams) -> Encoders {
         let channel = |channel, j, sd, step| Reader { rng: streams.stream(channel, j), sd, step };
@@ -213,6 +220,15 @@ impl Sensors {
             .collect();
         Encoders { joints }
     }
+}
+
+/// Size and colour of the torque noise.
+#[derive(Debug, Clone, Copy)]
+pub struct TorqueNoise<'a> {
+    /// Standard deviation per joint, Nm.
+    pub sd_nm: &'a [f64],
+    /// Colour and correlation.
+    pub model: &'a NoiseModel,
 }
 
 /// The encoders of all joints during one trial; every reading draws the next errors.

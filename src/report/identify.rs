@@ -254,7 +254,7 @@ impl Result {
             samples: identification.samples,
             rate_hz: regression.problem.rate_hz,
             processing: identification.processing.clone(),
-            estimator: identification.fit.estimator,
+            estimator: identification.estimator,
             covariance: identification.covariance.kind,
             covariance_reason: identification.covariance_reason,
             base_parameters,

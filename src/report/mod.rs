@@ -8,6 +8,7 @@ pub mod excitation;
 pub mod identify;
 pub mod json;
 pub mod montecarlo;
+pub mod noise_study;
 pub mod number;
 mod page;
 pub mod plot;

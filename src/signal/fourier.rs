@@ -12,9 +12,10 @@
 //! 3. The series ends with the last band in which energy stands above the noise. In a band of B
 //!    harmonics without motion, P Σ|Ȳ_h|²/B over ΣS_h/B follows F(2B, 2B(P − 1)) for Gaussian
 //!    noise of any smooth spectrum; angle and velocity are tested each, at a level that lets one
-//!    joint in a hundred keep a band too many. It goes on as long as all noise in q̈ is less than
-//!    [`FREE_NOISE`] of q̈: what is too weak to be seen band by band (the kink that friction leaves
-//!    at a reversal fades as 1/h² in q̇) is not too weak to bias the friction parameters.
+//!    joint in a hundred keep a band too many. It goes on as long as all its noise is less than
+//!    a share of it that costs nothing ([`FREE_NOISE`], for q̈ and, much later, for q̇): what is too
+//!    weak to be seen band by band (the kink that friction leaves at a reversal fades as 1/h² in
+//!    q̇) is not too weak to bias the friction parameters.
 //! 4. q, q̇ = Σ ihω Q̂_h e^{ihωt}, q̈ = −Σ (hω)² Q̂_h e^{ihωt} on the period's grid.
 //!
 //! The mean angle is the angle's own; a mean velocity (an offset of its sensor) is not used.
@@ -36,7 +37,9 @@ const BAND_HARMONICS: usize = 8;
 const FALSE_BAND: f64 = 0.01;
 /// Noise in q̈, as a share of its mean square, that costs nothing: it attenuates an inertia by about
 /// as much, a small part of the σ that any practical record reaches.
-const FREE_NOISE: f64 = 1e-4;
+pub const FREE_NOISE: f64 = 1e-4;
+/// The same for q̇, where friction looks closer: a few mrad/s against the tens over which it turns.
+const FREE_NOISE_QD: f64 = 1e-5;
 
 /// Plans and thresholds for motions of one length; made once, used for every record of it.
 pub struct PeriodicFit {
@@ -53,6 +56,11 @@ struct Band {
     harmonics: RangeInclusive<usize>,
     threshold: f64,
 }
+
+/// Highest frequency of the series over the sampling rate. Where friction reverses, q̇ has a kink,
+/// whose spectrum falls only as 1/f²: sampled at f_s, q̇ at f holds (f/(f_s − f))² of what belongs to
+/// f_s − f, a sixteenth at 0.2 f_s, and its derivative is worth no more.
+const ALIAS_FREE: f64 = 0.2;
 
 /// Working memory of [`PeriodicFit::fit`], one per thread.
 #[derive(Default)]
@@ -84,14 +92,25 @@ pub struct AveragedMotion {
     pub qd_rad_s: JointSignals,
     /// Joint accelerations over one period, rad/s².
     pub qdd_rad_s2: JointSignals,
-    /// Highest harmonic kept, per joint; 0 for a joint that stands still.
+    /// Highest harmonic kept in the acceleration, per joint; 0 for a joint that stands still.
     pub harmonics: Vec<usize>,
+    /// How well the acceleration is known, harmonic by harmonic, per joint.
+    pub acceleration: Vec<HarmonicPower>,
     /// Noise of one raw sample of q, per joint, rad: rms scatter between periods.
     pub sigma_q_rad: Vec<f64>,
     /// Noise of one raw sample of q̇, per joint, rad/s.
     pub sigma_qd_rad_s: Vec<f64>,
     /// Noise left in `qdd_rad_s2`, per joint, rad/s²: √(Σ 2(hω)⁴ v_h).
     pub sigma_qdd_rad_s2: Vec<f64>,
+}
+
+/// Mean squares of harmonics 1, 2, … of a joint's averaged acceleration, rad²/s⁴.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct HarmonicPower {
+    /// Of the estimate.
+    pub estimate: Vec<f64>,
+    /// Of the noise in it.
+    pub noise: Vec<f64>,
 }
 
 impl PeriodicFit {
@@ -152,6 +171,7 @@ impl PeriodicFit {
             qd_rad_s: JointSignals::zeros(joints, n),
             qdd_rad_s2: JointSignals::zeros(joints, n),
             harmonics: Vec::with_capacity(joints),
+            acceleration: Vec::with_capacity(joints),
             sigma_q_rad: Vec::with_capacity(joints),
             sigma_qd_rad_s: Vec::with_capacity(joints),
             sigma_qdd_rad_s2: Vec::with_capacity(joints),
@@ -163,11 +183,14 @@ impl PeriodicFit {
             motion.sigma_q_rad.push(checked_sigma("angle", q_rad, j, q.sigma(n))?);
             motion.sigma_qd_rad_s.push(checked_sigma("velocity", qd_rad_s, j, qd.sigma(n))?);
 
-            let (highest, variance) = self.combine(scratch);
+            let power = self.combine(scratch);
+            let highest = power.noise.len();
             motion.harmonics.push(highest);
-            motion.sigma_qdd_rad_s2.push(variance.sqrt());
+            motion.sigma_qdd_rad_s2.push(power.noise.iter().sum::<f64>().sqrt());
+            motion.acceleration.push(power);
             self.synthesise(scratch, |_| Complex64::ONE, motion.q_rad.joint_mut(j));
             self.synthesise(scratch, |w| Complex64::new(0.0, w), motion.qd_rad_s.joint_mut(j));
+            scratch.series[highest + 1..].fill(Complex64::ZERO);
             self.synthesise(
                 scratch,
                 |w| Complex64::new(-w * w, 0.0),
@@ -219,43 +242,54 @@ impl PeriodicFit {
         out.floor = ((8.0 * f64::EPSILON).powi(2) * power * scale).max(f64::MIN_POSITIVE.sqrt());
     }
 
-    /// Steps 2 and 3: Q̂ into `scratch.series`; the highest harmonic kept and the variance of q̈.
-    fn combine(&self, scratch: &mut FitScratch) -> (usize, f64) {
+    /// Steps 2 and 3: Q̂ into `scratch.series`; power of the harmonics kept in q̈.
+    fn combine(&self, scratch: &mut FitScratch) -> HarmonicPower {
         let FitScratch { q, qd, series, .. } = scratch;
         let periods = self.periods as f64;
         series.clear();
         series.resize(q.mean.len(), Complex64::ZERO);
         series[0] = q.mean[0];
+        let mut power = HarmonicPower::default();
         let Some(last) = self
             .bands
             .iter()
             .rposition(|band| q.stands_out(band, periods) || qd.stands_out(band, periods))
         else {
-            return (0, 0.0);
+            return power;
         };
-        let (mut square_qdd, mut variance_qdd) = (0.0, 0.0);
-        let mut highest = 0;
+        // Mean square and noise so far: of q̇, of q̈.
+        let (mut square, mut noise) = ([0.0; 2], [0.0; 2]);
+        let mut in_qdd = true;
         for (b, band) in self.bands.iter().enumerate() {
             let (noise_q, noise_qd) = (q.noise(band), qd.noise(band));
             let noise_from_qd = |w: f64| noise_qd / (w * w);
             let weight = |w: f64| noise_q / (noise_q + noise_from_qd(w));
             let frequencies = band.harmonics.clone().map(|h| (h, self.angular_frequency(h)));
-            let added: f64 = frequencies
-                .clone()
-                .map(|(_, w)| 2.0 * w.powi(4) * weight(w) * noise_from_qd(w) / periods)
-                .sum();
-            if b > last && variance_qdd + added > FREE_NOISE * square_qdd {
-                break;
+            // Mean square of the noise of a harmonic in q̇.
+            let in_qd = |w: f64| 2.0 * w * w * weight(w) * noise_from_qd(w) / periods;
+            let added = frequencies.clone().fold([0.0; 2], |[v, a], (_, w)| {
+                let noise = in_qd(w);
+                [v + noise, a + w * w * noise]
+            });
+            if b > last {
+                if noise[0] + added[0] > FREE_NOISE_QD * square[0] {
+                    break;
+                }
+                in_qdd &= noise[1] + added[1] <= FREE_NOISE * square[1];
             }
-            variance_qdd += added;
-            highest = *band.harmonics.end();
+            noise = [noise[0] + added[0], noise[1] + added[1]];
             for (h, w) in frequencies {
                 let from_qd = qd.mean[h] / Complex64::new(0.0, w);
                 series[h] = q.mean[h] + (from_qd - q.mean[h]) * weight(w);
-                square_qdd += 2.0 * w.powi(4) * series[h].norm_sqr();
+                let of_qd = 2.0 * w * w * series[h].norm_sqr();
+                square = [square[0] + of_qd, square[1] + w * w * of_qd];
+                if in_qdd {
+                    power.estimate.push(w * w * of_qd);
+                    power.noise.push(w * w * in_qd(w));
+                }
             }
         }
-        (highest, variance_qdd)
+        power
     }
 
     /// Step 4: Σ_h factor(hω) Q̂_h e^{ihωt} on the period's grid.
@@ -298,9 +332,9 @@ impl Spectra {
     }
 }
 
-/// Harmonics 1 … ⌈n/2⌉ − 1 in bands of [`BAND_HARMONICS`]; the last takes the remainder.
+/// Harmonics 1 … n·[`ALIAS_FREE`] in bands of [`BAND_HARMONICS`]; the last takes the remainder.
 fn bands(samples_per_period: usize, periods: usize) -> Vec<Band> {
-    let highest = (samples_per_period - 1) / 2;
+    let highest = ((ALIAS_FREE * samples_per_period as f64) as usize).max(1);
     let count = (highest / BAND_HARMONICS).max(1);
     let level = FALSE_BAND / (2 * count) as f64;
     let threshold = |width: usize| {
@@ -383,8 +417,8 @@ mod tests {
             let m = fit.fit(&q, &qd, &mut FitScratch::default()).unwrap();
             for j in 0..6 {
                 assert!(m.harmonics[j] >= 5);
-                // Rounding of a coefficient, 1e-16, grows by ω and ω² of the highest harmonic kept.
-                let w = fit.angular_frequency(m.harmonics[j]);
+                // Rounding of a coefficient, 1e-16, grows by ω and ω² of the highest harmonic.
+                let w = fit.angular_frequency(n / 2);
                 assert!(rms_error(&m.q_rad, j, 0) < 1e-14);
                 assert!(rms_error(&m.qd_rad_s, j, 1) < 1e-15 * (10.0 + w));
                 assert!(rms_error(&m.qdd_rad_s2, j, 2) < 1e-15 * (100.0 + w * w));

@@ -36,7 +36,7 @@ pub use butterworth::{Scratch, ZeroPhase};
 pub use decimate::Decimator;
 pub use differentiate::{central_2, central_4, hermite_acceleration};
 pub use error::SignalError;
-pub use fourier::{AveragedMotion, FitScratch, PeriodicFit};
+pub use fourier::{AveragedMotion, FREE_NOISE, FitScratch, HarmonicPower, PeriodicFit};
 pub use paper_filter::{PaperDifferentiator, PaperReading};
 pub use period::{Period, find_period};
 pub use replicates::{Replicates, replicate_noise};

@@ -5,9 +5,12 @@
 //! hold the truth.
 
 mod blocks;
+mod bootstrap;
+mod newey_west;
 mod ols;
 mod paper;
 mod periods;
+mod scores;
 mod spectral;
 mod wls;
 
@@ -17,6 +20,8 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use thiserror::Error;
 
 pub use blocks::BlockCluster;
+pub use bootstrap::BlockBootstrap;
+pub use newey_west::NeweyWest;
 pub use ols::OrdinaryLeastSquares;
 pub use paper::Paper;
 pub use periods::PeriodReplicates;
@@ -75,6 +80,10 @@ pub enum CovarianceKind {
     Spectral,
     /// Scatter of the score over blocks of time.
     Blocks,
+    /// Autocorrelation of the score (Newey–West).
+    Hac,
+    /// Residuals resampled in blocks of time.
+    Bootstrap,
 }
 
 impl std::fmt::Display for CovarianceKind {
@@ -86,6 +95,8 @@ impl std::fmt::Display for CovarianceKind {
             Self::Periods => "periods",
             Self::Spectral => "spectral",
             Self::Blocks => "blocks",
+            Self::Hac => "hac",
+            Self::Bootstrap => "bootstrap",
         })
     }
 }
@@ -139,6 +150,8 @@ impl CovarianceKind {
             Self::Periods => &PeriodReplicates,
             Self::Spectral => &SpectralSandwich,
             Self::Blocks => &BlockCluster,
+            Self::Hac => &NeweyWest { lags: None },
+            Self::Bootstrap => &BlockBootstrap,
         }
     }
 }

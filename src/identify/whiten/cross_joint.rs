@@ -2,7 +2,21 @@
 
 use nalgebra::DMatrix;
 
+use crate::identify::fit::Fit;
 use crate::identify::problem::Problem;
+
+/// Equations of the joints weighted and mixed so that the residuals of `fit` are uncorrelated
+/// between joints at one instant (Zellner 1962, seemingly unrelated regressions), written into `out`
+/// with the cumulative plan.
+pub fn decorrelate(problem: &Problem, fit: &Fit, out: &mut Problem) {
+    let residuals = problem.residuals(&fit.theta);
+    let joints = problem.joints();
+    let products = DMatrix::from_fn(joints, joints, |i, k| {
+        residuals.joint(i).iter().zip(residuals.joint(k)).map(|(a, b)| a * b).sum()
+    });
+    let weights: Vec<Vec<f64>> = fit.weights.iter().map(|w| vec![*w; problem.samples]).collect();
+    mix(problem, &weights, &decorrelation(&correlation(&products)), out);
+}
 
 /// U, upper triangular, with U C Uᵀ = 1 for a correlation matrix C: row j mixes joint j with those
 /// behind it only, so that wrist equations keep their few columns. The identity where C is not

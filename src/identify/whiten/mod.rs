@@ -4,9 +4,14 @@
 //! of its rows chosen so that noise is alike and independent from row to row: plain least squares on
 //! it is the weighted least squares of the one that entered.
 
+mod autoregression;
 mod cross_joint;
+mod decimate;
 mod replicates;
 mod spectrum;
 
+pub(super) use autoregression::prewhiten;
+pub(super) use cross_joint::{decorrelate, decorrelation, mix};
+pub(super) use decimate::decimate;
 pub(super) use replicates::ReplicateWhitening;
 pub(super) use spectrum::Spectrum;

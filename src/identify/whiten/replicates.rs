@@ -5,6 +5,7 @@ use nalgebra::DMatrix;
 use super::cross_joint::{correlation, decorrelation, mix};
 use super::spectrum::Spectrum;
 use crate::identify::problem::Problem;
+use crate::signal::{FREE_NOISE, HarmonicPower};
 
 /// Whitening by the scatter between periods.
 ///
@@ -12,6 +13,12 @@ use crate::identify::problem::Problem;
 /// harmonic k has the variance s²_jk = Σ_p |Y_jpk − Ȳ_jk|²/(P − 1), averaged over the neighbouring
 /// harmonics (k ± max(3, k/4), k itself left out), and the joints have the correlation C of the
 /// deviations over s, pooled over all harmonics. Rows become U diag(1/s_k) · row with U C Uᵀ = 1.
+///
+/// Rows end at 0.8 of the harmonics kept in the acceleration, because what was cut off it comes down
+/// by the harmonics of the mass matrix. Those of joint j end earlier where quiet torque at high
+/// frequency would lift an acceleration that is mostly noise there: as soon as the noise left in the
+/// averaged acceleration, weighted like the rows, is a larger share of it than it is unweighted
+/// (and more than [`FREE_NOISE`]).
 ///
 /// For Gaussian noise Ȳ and the scatter are independent, so that least squares on the whitened rows
 /// is unbiased whatever the scatter is; leaving k out of its own weight keeps the scatter of the
@@ -23,6 +30,10 @@ pub struct ReplicateWhitening {
     weights: Vec<Vec<f64>>,
 }
 
+/// Share of the harmonics of the acceleration whose equations are used.
+const USED_HARMONICS: f64 = 0.8;
+/// Always used, so that a motion of few harmonics still gives equations for all parameters.
+const LEAST_HARMONICS: usize = 16;
 /// Neighbours on either side that a weight is averaged over: at least these …
 const LEAST_NEIGHBOURS: usize = 3;
 /// … and this part of the harmonic's own number.
@@ -31,9 +42,12 @@ const NEIGHBOUR_SHARE: usize = 4;
 const LEAST_NOISE: f64 = 1e-9;
 
 impl ReplicateWhitening {
-    /// Writes the whitened mean and harmonics 1 … `harmonics` of `problem` into `out`, which has the
-    /// cumulative plan of `problem`. Needs two periods or more.
-    pub fn whiten(&mut self, problem: &Problem, harmonics: usize, out: &mut Problem) {
+    /// Writes the whitened mean and harmonics of `problem` into `out`, which has the cumulative plan
+    /// of `problem`. Needs two periods or more and the power of the averaged acceleration per joint.
+    pub fn whiten(&mut self, problem: &Problem, acceleration: &[HarmonicPower], out: &mut Problem) {
+        let moving = acceleration.iter().map(|power| power.noise.len()).filter(|h| *h > 0);
+        let highest = moving.min().unwrap_or(0) as f64;
+        let harmonics = ((USED_HARMONICS * highest) as usize).max(LEAST_HARMONICS);
         let rows = self.rows.get_or_insert_with(|| Problem::new(problem.plan.clone(), 0.0));
         self.spectrum.transform(problem, harmonics, rows);
         let (n, periods) = (rows.samples, rows.periods);
@@ -54,12 +68,33 @@ impl ReplicateWhitening {
         for weight in self.weights.iter_mut().flatten() {
             *weight = if noisiest > 0.0 { 1.0 / weight.max(floor).sqrt() } else { 1.0 };
         }
+        for (weights, power) in self.weights.iter_mut().zip(acceleration) {
+            cut(weights, power);
+        }
         let products = DMatrix::from_fn(rows.joints(), rows.joints(), |i, k| {
             let weights = self.weights[i].iter().zip(&self.weights[k]).cycle();
             let products = deviations[i].iter().zip(&deviations[k]).zip(weights);
             products.map(|((a, b), (wa, wb))| a * wa * b * wb).sum()
         });
         mix(rows, &self.weights, &decorrelation(&correlation(&products)), out);
+    }
+}
+
+/// Weights of the harmonics behind the last one whose acceleration can be trusted set to zero.
+fn cut(weights: &mut [f64], acceleration: &HarmonicPower) {
+    let used = (weights.len() / 2).min(acceleration.noise.len());
+    let all = |powers: &[f64]| powers[..used].iter().sum::<f64>();
+    let unweighted = all(&acceleration.noise) / all(&acceleration.estimate);
+    let limit = unweighted.max(FREE_NOISE);
+    let (mut estimate, mut noise) = (0.0, 0.0);
+    for h in 1..=used {
+        let weight = weights[2 * h] * weights[2 * h];
+        estimate += weight * acceleration.estimate[h - 1];
+        noise += weight * acceleration.noise[h - 1];
+        if h > LEAST_HARMONICS && noise > limit * estimate {
+            weights[2 * h - 1..].fill(0.0);
+            return;
+        }
     }
 }
 

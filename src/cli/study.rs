@@ -1,0 +1,88 @@
+//! `armid study`: what is true in general, found by simulation.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+
+use super::{CommandResult, Outcome, Progress};
+use crate::montecarlo::Scenario;
+use crate::montecarlo::study::{NoiseStudy, study};
+use crate::output::{check_writable, write_atomically};
+use crate::report::json::{Document, Input, Program};
+use crate::report::noise_study::{markdown, page};
+
+/// Studies over many scenarios.
+#[derive(Debug, Args)]
+pub struct StudyArgs {
+    #[command(subcommand)]
+    topic: Topic,
+}
+
+#[derive(Debug, Subcommand)]
+enum Topic {
+    /// Which σ is true under which noise: every estimator and covariance on the same logs.
+    Noise(NoiseArgs),
+}
+
+#[derive(Debug, Args)]
+struct NoiseArgs {
+    /// Scenario files.
+    #[arg(required = true)]
+    scenarios: Vec<PathBuf>,
+    /// Trials per scenario instead of each scenario's own.
+    #[arg(long, value_parser = clap::value_parser!(u64).range(2..))]
+    trials: Option<u64>,
+    /// Threads; all cores where left out.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    /// Write the tables as Markdown.
+    #[arg(long)]
+    markdown: Option<PathBuf>,
+    /// Write a page with plots.
+    #[arg(long)]
+    report: Option<PathBuf>,
+    /// Write the numbers as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
+}
+
+/// Runs the command.
+pub fn run(args: &StudyArgs) -> CommandResult {
+    match &args.topic {
+        Topic::Noise(args) => noise(args),
+    }
+}
+
+fn noise(args: &NoiseArgs) -> CommandResult {
+    for path in [&args.markdown, &args.report, &args.json].into_iter().flatten() {
+        check_writable(path)?;
+    }
+    let threads = match args.threads {
+        Some(threads) => usize::from(threads),
+        None => std::thread::available_parallelism().map_or(1, usize::from),
+    };
+    let mut results = NoiseStudy { scenarios: Vec::new() };
+    let mut inputs = Vec::new();
+    for path in &args.scenarios {
+        inputs.push(Input::of(path)?);
+        let scenario = Scenario::load(Some(path))?;
+        eprintln!("{}: {}", scenario.name, scenario.description);
+        let progress = Progress::new("trials", args.trials.unwrap_or(scenario.trials));
+        results.scenarios.push(study(scenario, args.trials, threads, &|n| progress.reached(n))?);
+        progress.finish();
+    }
+    let program = Program::new(std::env::args(), None, inputs);
+    let text = markdown(&results, &program.command);
+    println!("{text}");
+    if let Some(path) = &args.markdown {
+        write_atomically(path, |out| out.write_all(text.as_bytes()))?;
+    }
+    if let Some(path) = &args.json {
+        Document { schema: "armid.study-noise/1", program: &program, body: &results }
+            .write(path)?;
+    }
+    if let Some(path) = &args.report {
+        page(&results, program)?.write(path)?;
+    }
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,62 @@
+//! Does the model explain all that repeats?
+
+use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use super::problem::Problem;
+
+/// Test of the model against the scatter between periods, which no model can go below.
+///
+/// On whitened rows (noise of unit variance) the mean period leaves
+/// LoF = P‖ȳ − Xθ̂‖²/ν₁ with ν₁ = rows − b, and the periods scatter by
+/// PE = Σ_p‖y_p − ȳ‖²/ν₂ with ν₂ = rows (P − 1). Where the model holds, LoF/PE follows F(ν₁, ν₂)
+/// (Draper and Smith, Applied Regression Analysis; per Fourier coefficient because these are
+/// independent for noise of any colour). Used is the lower half of the harmonics, where the noise
+/// left in the averaged acceleration does not count.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct LackOfFit {
+    /// LoF/PE: 1 where the model explains everything but noise.
+    pub statistic: f64,
+    /// ν₁ and ν₂.
+    pub degrees_of_freedom: [f64; 2],
+    /// Chance of a larger statistic where the model holds.
+    pub p_value: f64,
+}
+
+impl LackOfFit {
+    /// Below this chance the model does not fit, and a σ that covers noise alone is no claim about
+    /// the truth.
+    pub const REJECT_BELOW: f64 = 1e-3;
+
+    /// Of the whitened rows `problem` in the frequency domain, with two periods or more.
+    pub(super) fn of(problem: &Problem, theta: &[f64]) -> Self {
+        let n = problem.samples;
+        let periods = problem.periods as f64;
+        let used = n / 4 * 2 + 1;
+        let mut predicted = vec![0.0; n];
+        let (mut lack, mut scatter, mut rows) = (0.0, 0.0, 0.0);
+        for (j, panel) in problem.panels.iter().enumerate() {
+            problem.predict(j, theta, &mut predicted);
+            for (k, predicted) in predicted[..used].iter().enumerate() {
+                let values = panel.y[k..].iter().step_by(n);
+                let mean = values.clone().sum::<f64>() / periods;
+                lack += periods * (mean - predicted).powi(2);
+                let own = values.map(|y| (y - mean).powi(2)).sum::<f64>();
+                scatter += own;
+                // Rows that are not used are zero.
+                rows += f64::from(u8::from(own > 0.0));
+            }
+        }
+        // The parameters are fitted to all rows; these take the larger part of them.
+        let first = (rows - theta.len() as f64).max(1.0);
+        let second = rows * (periods - 1.0);
+        let statistic = lack / first / (scatter / second);
+        let p_value = FisherSnedecor::new(first, second).map_or(f64::NAN, |f| f.sf(statistic));
+        Self { statistic, degrees_of_freedom: [first, second], p_value }
+    }
+
+    /// Whether the model explains what repeats.
+    pub fn fits(&self) -> bool {
+        self.p_value >= Self::REJECT_BELOW
+    }
+}
