@@ -46,7 +46,7 @@ fn status(method: &MethodResult) -> Status {
     let [low, high] = claims::MEAN_COVERAGE;
     match method.coverage_mean {
         c if c >= low && c <= high => Status::Good,
-        c if c >= 0.9 && c <= 0.99 => Status::Warn,
+        c if (0.9..=0.99).contains(&c) => Status::Warn,
         _ => Status::Bad,
     }
 }
