@@ -4,6 +4,7 @@
 
 pub mod base;
 pub mod cli;
+pub mod diagnose;
 pub mod dynamics;
 pub mod excitation;
 pub mod identify;

@@ -16,6 +16,7 @@ struct Command {
 #[derive(Debug, Subcommand)]
 enum Task {
     Base(cli::base::BaseArgs),
+    Diagnose(cli::diagnose::DiagnoseArgs),
     Excite(cli::excite::ExciteArgs),
     Identify(cli::identify::IdentifyArgs),
     Simulate(cli::simulate::SimulateArgs),
@@ -25,6 +26,7 @@ enum Task {
 fn main() -> ExitCode {
     cli::exit_code(match Command::parse().task {
         Task::Base(args) => cli::base::run(&args),
+        Task::Diagnose(args) => cli::diagnose::run(&args),
         Task::Excite(args) => cli::excite::run(&args),
         Task::Identify(args) => cli::identify::run(&args),
         Task::Simulate(args) => cli::simulate::run(&args),

@@ -3,6 +3,7 @@
 //! Enters: arguments. Leaves: files, text on the terminal and an exit code.
 
 pub mod base;
+pub mod diagnose;
 pub mod excite;
 pub mod identify;
 pub mod montecarlo;

@@ -1,0 +1,165 @@
+//! `armid diagnose`: what the model of an arm gets wrong, from its log.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde::{Deserialize, Serialize};
+
+use super::identify::{LoadedLog, ProcessingArgs, SourceArgs};
+use super::{CommandResult, Outcome};
+use crate::base::{BaseSet, Parameterisation};
+use crate::diagnose::{DIAGNOSE_SCHEMA, Diagnoser, Diagnosis, Validation};
+use crate::dynamics::Model;
+use crate::log::RowAccount;
+use crate::montecarlo::Scenario;
+use crate::output::check_writable;
+use crate::report::diagnose::{cause_table, held_out_table, limit_table, page};
+use crate::report::json::{Document, Program};
+
+/// Say what the rigid model with linear friction gets wrong along a log, and what explains it.
+#[derive(Debug, Args)]
+pub struct DiagnoseArgs {
+    /// The log.
+    log: PathBuf,
+    #[command(flatten)]
+    source: SourceArgs,
+    #[command(flatten)]
+    processing: ProcessingArgs,
+    /// Logs on which the gain is measured: nothing is fitted to them or chosen by them.
+    #[arg(long, num_args = 1..)]
+    held_out: Vec<PathBuf>,
+    /// A simulation to compare with: a scenario (.toml) or a result of `armid identify` (.json).
+    #[arg(long, value_name = "SCENARIO|RESULT")]
+    sim: Option<PathBuf>,
+    /// Write the result as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
+    /// Write the report as one HTML page.
+    #[arg(long)]
+    report: Option<PathBuf>,
+}
+
+/// Runs the command.
+pub fn run(args: &DiagnoseArgs) -> CommandResult {
+    for path in [&args.json, &args.report].into_iter().flatten() {
+        check_writable(path)?;
+    }
+    let options = args.processing.options()?;
+    let arm = args.source.arm()?;
+    let set = BaseSet::find(&arm, Parameterisation::full(arm.dof(), arm.torque_offsets))?;
+    let model = Model::new(&arm);
+    let logs = args.source.read(&arm, std::slice::from_ref(&args.log))?;
+    let held_out = args.source.read(&arm, &args.held_out)?;
+    if let Some(same) =
+        held_out.iter().find(|h| logs.iter().any(|l| l.input.sha256 == h.input.sha256))
+    {
+        let file = same.input.path.display();
+        return Err(format!("{file} is held out, but it is also the log that is diagnosed").into());
+    }
+    let manufacturer =
+        held_out.iter().map(|log| log.log.target_torque_nm(&arm)).collect::<Result<Vec<_>, _>>()?;
+    let validations: Vec<Validation> = held_out
+        .iter()
+        .zip(&manufacturer)
+        .map(|(log, manufacturer_nm)| Validation {
+            measurement: log.measurement(),
+            manufacturer_nm: manufacturer_nm.as_ref(),
+        })
+        .collect();
+    let simulation =
+        args.sim.as_deref().map(|file| simulated_parameters(file, &set)).transpose()?;
+    let mut diagnoser = Diagnoser::new(&arm, &model, &set, options);
+    let Some(log) = logs.first() else { return Ok(Outcome::Done) };
+    let finding = diagnoser.diagnose(&log.measurement(), &validations, simulation.as_deref())?;
+    let diagnosis = &finding.diagnosis;
+    for sentence in &diagnosis.sentences {
+        println!("{sentence}");
+    }
+    println!();
+    if !diagnosis.causes.is_empty() {
+        println!("{}", cause_table(diagnosis).to_text());
+    }
+    if !diagnosis.held_out.is_empty() {
+        println!("{}", held_out_table(diagnosis).to_text());
+    }
+    if !diagnosis.detection_limits.is_empty() {
+        println!("{}", limit_table(diagnosis).to_text());
+    }
+    for warning in &diagnosis.warnings {
+        println!("note: {warning}");
+    }
+    let inputs = logs.iter().chain(&held_out).map(|l: &LoadedLog| l.input.clone()).collect();
+    let program = Program::new(std::env::args(), None, inputs);
+    if let Some(path) = &args.json {
+        let body = WithRows { diagnosis, rows: Rows::of(&log.log.rows) };
+        Document { schema: DIAGNOSE_SCHEMA, program: &program, body: &body }.write(path)?;
+    }
+    if let Some(path) = &args.report {
+        page(&finding, &arm, program)?.write(path)?;
+        println!("report: {}", path.display());
+    }
+    Ok(Outcome::Done)
+}
+
+/// Base parameters of the simulation that `file` describes, in the order of `set`.
+fn simulated_parameters(
+    file: &Path,
+    set: &BaseSet,
+) -> Result<Vec<f64>, Box<dyn std::error::Error>> {
+    if file.extension().is_some_and(|e| e == "toml") {
+        let scenario = Scenario::load(Some(file))?;
+        return Ok(set.values(&Model::new(&scenario.arm).standard_parameters()));
+    }
+    let text = std::fs::read_to_string(file).map_err(|e| format!("{}: {e}", file.display()))?;
+    let result: IdentifiedParameters =
+        serde_json::from_str(&text).map_err(|e| format!("{}: {e}", file.display()))?;
+    (0..set.rank())
+        .map(|k| {
+            let name = set.name(k);
+            let found = result.base_parameters.iter().find(|p| p.name == name);
+            let missing = || format!("{}: no base parameter {name}", file.display()).into();
+            found.map(|p| p.value).ok_or_else(missing)
+        })
+        .collect()
+}
+
+/// What is needed of an identification's JSON.
+#[derive(Deserialize)]
+struct IdentifiedParameters {
+    base_parameters: Vec<IdentifiedParameter>,
+}
+
+#[derive(Deserialize)]
+struct IdentifiedParameter {
+    name: String,
+    value: f64,
+}
+
+/// The diagnosis with what became of the log's rows.
+#[derive(Serialize)]
+struct WithRows<'a> {
+    #[serde(flatten)]
+    diagnosis: &'a Diagnosis,
+    rows: Rows,
+}
+
+#[derive(Serialize)]
+struct Rows {
+    read: usize,
+    used: usize,
+    set_aside: Vec<SetAside>,
+}
+
+#[derive(Serialize)]
+struct SetAside {
+    reason: &'static str,
+    count: usize,
+}
+
+impl Rows {
+    fn of(account: &RowAccount) -> Self {
+        let part = |p: &crate::log::SetAside| SetAside { reason: p.reason.text(), count: p.count };
+        let set_aside = account.set_aside.iter().map(part).collect();
+        Self { read: account.read, used: account.used, set_aside }
+    }
+}

@@ -1,0 +1,37 @@
+//! Friction of different size in the two directions: half the differences of Coulomb and viscous
+//! friction, τ = c + v |q̇|.
+
+use super::*;
+
+/// See the module.
+pub struct AsymmetricFriction;
+
+impl Candidate for AsymmetricFriction {
+    fn kind(&self) -> Kind {
+        Kind::AsymmetricFriction
+    }
+
+    fn columns(&self, scene: &Scene, site: Option<usize>, _: Shape) -> Vec<Column> {
+        let j = joint(site);
+        let qd = scene.motion.qd_rad_s.joint(j);
+        let constant = Column::on(j, vec![1.0; scene.samples()]);
+        vec![Column::on(j, samples(scene, |k| qd[k].abs())), constant]
+    }
+
+    fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
+        // The constant is the estimate's own where it fits offsets.
+        let coulomb_nm = b.get(1).copied().unwrap_or(0.0);
+        vec![
+            quantity("coulomb_nm", coulomb_nm, "Nm"),
+            quantity("viscous_nm_s_rad", b[0], "Nm s/rad"),
+        ]
+    }
+
+    fn separating_experiment(&self) -> &'static str {
+        "the current with brakes closed: what is left there is an offset, not friction"
+    }
+
+    fn in_words(&self) -> &'static str {
+        "friction of different size in the two directions"
+    }
+}

@@ -1,0 +1,47 @@
+//! A base that does not stand level: gravity turned by small angles about the base's x and y axes.
+
+use nalgebra::{Rotation3, Vector3};
+
+use super::*;
+
+/// See the module.
+pub struct BaseTilt;
+
+/// Tilt at which the torque change is taken, rad: small, so that it is linear.
+const SMALL_RAD: f64 = 1e-5;
+
+impl Candidate for BaseTilt {
+    fn kind(&self) -> Kind {
+        Kind::BaseTilt
+    }
+
+    fn sites(&self, _: usize) -> Vec<Option<usize>> {
+        vec![None]
+    }
+
+    fn columns(&self, scene: &Scene, _: Option<usize>, _: Shape) -> Vec<Column> {
+        [Vector3::x_axis(), Vector3::y_axis()]
+            .iter()
+            .map(|axis| {
+                // The base turns by +angle, so that gravity turns by −angle in its frame.
+                let turn = Rotation3::from_axis_angle(axis, -SMALL_RAD);
+                let mut arm = scene.arm.clone();
+                arm.gravity_m_s2 = turn * arm.gravity_m_s2;
+                Column::everywhere(&scene.torque_change(&arm, &scene.motion))
+                    .scaled(1.0 / SMALL_RAD)
+            })
+            .collect()
+    }
+
+    fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
+        vec![quantity("tilt_x_rad", b[0], "rad"), quantity("tilt_y_rad", b[1], "rad")]
+    }
+
+    fn separating_experiment(&self) -> &'static str {
+        "the same motion with joint 1 turned by 180°, or a spirit level on the base"
+    }
+
+    fn in_words(&self) -> &'static str {
+        "a base that does not stand level"
+    }
+}

@@ -1,0 +1,32 @@
+//! An angle with a constant error: the torques are those of q − δ.
+
+use super::elasticity::give_way;
+use super::*;
+
+/// See the module.
+pub struct EncoderOffset;
+
+/// Offset at which the torque change is taken, rad: small, so that it is linear.
+const SMALL_RAD: f64 = 1e-5;
+
+impl Candidate for EncoderOffset {
+    fn kind(&self) -> Kind {
+        Kind::EncoderOffset
+    }
+
+    fn columns(&self, scene: &Scene, site: Option<usize>, _: Shape) -> Vec<Column> {
+        vec![give_way(scene, joint(site), &vec![SMALL_RAD; scene.samples()], SMALL_RAD)]
+    }
+
+    fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
+        vec![quantity("offset_rad", b[0], "rad")]
+    }
+
+    fn separating_experiment(&self) -> &'static str {
+        "the flange against a level or a laser tracker"
+    }
+
+    fn in_words(&self) -> &'static str {
+        "an angle with a constant error"
+    }
+}

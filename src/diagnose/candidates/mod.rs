@@ -1,0 +1,162 @@
+//! What can be wrong, one family per file.
+//!
+//! A family turns the processed motion of a log into the torque it would add to it, per unit of its
+//! coefficients. Adding a family is one file and one line in [`all`]. Nothing here is shared with the
+//! plant, which makes the same effects by physics.
+
+mod asymmetric_friction;
+mod backlash;
+mod base_tilt;
+mod current_offset;
+mod elasticity;
+mod encoder_offset;
+mod load_friction;
+mod nonlinear_viscous;
+mod position_friction;
+mod presliding;
+pub(super) mod ripple;
+mod saturation;
+mod spring;
+mod stribeck;
+mod thermal_drift;
+mod time_skew;
+mod torque_gain;
+
+use super::image::Column;
+use super::kind::Kind;
+use super::scene::Scene;
+
+/// A point in the nonlinear parameters of a family.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shape {
+    /// Form of the law, where there are several.
+    pub variant: usize,
+    /// The nonlinear parameter in SI units; 0 where there is none.
+    pub value: f64,
+}
+
+/// How the nonlinear parameter is searched.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Search {
+    /// There is none.
+    None,
+    /// Between neighbours on a logarithmic scale.
+    Logarithmic,
+    /// Between neighbours on a straight scale.
+    Straight,
+}
+
+/// A physical parameter of an effect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quantity {
+    /// Name with its unit, as in scenarios.
+    pub name: &'static str,
+    /// SI value.
+    pub value: f64,
+    /// SI unit.
+    pub unit: &'static str,
+}
+
+/// Shorthand for a [`Quantity`].
+fn quantity(name: &'static str, value: f64, unit: &'static str) -> Quantity {
+    Quantity { name, value, unit }
+}
+
+/// One family of effects.
+pub trait Candidate: Sync {
+    /// Its name.
+    fn kind(&self) -> Kind;
+
+    /// Where it may sit: a joint (0-based), or `None` for the arm as a whole.
+    fn sites(&self, joints: usize) -> Vec<Option<usize>> {
+        (0..joints).map(Some).collect()
+    }
+
+    /// Shapes to begin with: fine enough that between two neighbours there is only one optimum.
+    fn shapes(&self, _scene: &Scene, _site: Option<usize>) -> Vec<Shape> {
+        vec![Shape { variant: 0, value: 0.0 }]
+    }
+
+    /// How the shape is refined.
+    fn search(&self) -> Search {
+        Search::None
+    }
+
+    /// Half the width of the bracket around a shape in which the optimum lies, where starting shapes
+    /// are no grid; `None`: neighbours on the grid are the bracket.
+    fn half_width(&self, _scene: &Scene, _site: Option<usize>) -> Option<f64> {
+        None
+    }
+
+    /// Whether one joint may have several of it, with different shapes.
+    fn is_repeatable(&self) -> bool {
+        false
+    }
+
+    /// Torque per unit of each coefficient.
+    fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column>;
+
+    /// Physical parameters of the coefficients.
+    fn quantities(
+        &self,
+        scene: &Scene,
+        site: Option<usize>,
+        shape: Shape,
+        b: &[f64],
+    ) -> Vec<Quantity>;
+
+    /// The quantity that says how large the effect is, for detection limits.
+    fn size(&self, quantities: &[Quantity]) -> Option<Quantity> {
+        quantities.first().copied()
+    }
+
+    /// The experiment that tells it from what it resembles.
+    fn separating_experiment(&self) -> &'static str;
+
+    /// Whether coefficients `b` can belong to it at all.
+    fn is_possible(&self, _b: &[f64]) -> bool {
+        true
+    }
+
+    /// The effect in words, its parameters behind: "friction that grows with load".
+    fn in_words(&self) -> &'static str;
+}
+
+/// Every family.
+pub fn all() -> Vec<Box<dyn Candidate>> {
+    vec![
+        Box::new(stribeck::Stribeck),
+        Box::new(nonlinear_viscous::NonlinearViscous),
+        Box::new(load_friction::LoadFriction),
+        Box::new(presliding::Presliding),
+        Box::new(position_friction::PositionFriction),
+        Box::new(asymmetric_friction::AsymmetricFriction),
+        Box::new(current_offset::CurrentOffset),
+        Box::new(thermal_drift::ThermalDrift),
+        Box::new(ripple::Ripple),
+        Box::new(elasticity::Elasticity),
+        Box::new(backlash::Backlash),
+        Box::new(torque_gain::TorqueGain),
+        Box::new(saturation::Saturation),
+        Box::new(time_skew::TimeSkew),
+        Box::new(encoder_offset::EncoderOffset),
+        Box::new(base_tilt::BaseTilt),
+        Box::new(spring::Spring),
+    ]
+}
+
+/// Samples of joint `j` made from angle, speed and load by `f(k)`.
+fn samples(scene: &Scene, f: impl Fn(usize) -> f64) -> Vec<f64> {
+    (0..scene.samples()).map(f).collect()
+}
+
+/// The joint of a family that always sits on one.
+fn joint(site: Option<usize>) -> usize {
+    site.unwrap_or_default()
+}
+
+/// `count` values from `low` to `high` in equal ratios.
+fn geometric(low: f64, high: f64, count: usize) -> impl Iterator<Item = f64> {
+    let ratio = (high / low).powf(1.0 / (count - 1) as f64);
+    (0..count).map(move |k| low * ratio.powi(k as i32))
+}

@@ -1,0 +1,34 @@
+//! Coulomb friction that depends on the angle: τ = (a cos q + b sin q) sign q̇ = A cos(q + φ) sign q̇.
+
+use super::*;
+
+/// See the module.
+pub struct PositionFriction;
+
+impl Candidate for PositionFriction {
+    fn kind(&self) -> Kind {
+        Kind::PositionFriction
+    }
+
+    fn columns(&self, scene: &Scene, site: Option<usize>, _: Shape) -> Vec<Column> {
+        let j = joint(site);
+        let (q, sign) = (scene.motion.q_rad.joint(j), scene.sign.joint(j));
+        let column = |f: fn(f64) -> f64| Column::on(j, samples(scene, |k| f(q[k]) * sign[k]));
+        vec![column(f64::cos), column(f64::sin)]
+    }
+
+    fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
+        vec![
+            quantity("amplitude_nm", b[0].hypot(b[1]), "Nm"),
+            quantity("phase_rad", (-b[1]).atan2(b[0]), "rad"),
+        ]
+    }
+
+    fn separating_experiment(&self) -> &'static str {
+        "the same motion with another payload or on a tilted base: this friction stays where it was"
+    }
+
+    fn in_words(&self) -> &'static str {
+        "friction that depends on the angle"
+    }
+}

@@ -1,0 +1,73 @@
+//! Friction that builds up behind a reversal: τ = F (z − sign q̇), dz/dq = k (1 − z sign q̇) (Dahl 1968).
+//!
+//! z is propagated exactly along the motion: over a stretch of one direction of length Δ,
+//! z ← s + (z − s) e^{−kΔ}. Over a motion that repeats it is carried round until it repeats as well.
+
+use super::*;
+
+/// See the module.
+pub struct Presliding;
+
+/// z along joint `j`, for a stiffness `k` in 1/rad.
+fn deflection(scene: &Scene, j: usize, stiffness_per_rad: f64) -> Vec<f64> {
+    let q = scene.motion.q_rad.joint(j);
+    let mut z = vec![0.0; q.len()];
+    let mut state = scene.sign.joint(j)[0];
+    // One lap forgets where the state began if the joint travels a few times 1/k; two are plenty.
+    let laps = if scene.periodic { 2 } else { 1 };
+    for _ in 0..laps {
+        let mut previous = if scene.periodic { q[q.len() - 1] } else { q[0] };
+        for (z, &angle) in z.iter_mut().zip(q) {
+            let step = angle - previous;
+            let direction = if step >= 0.0 { 1.0 } else { -1.0 };
+            state = direction + (state - direction) * (-stiffness_per_rad * step.abs()).exp();
+            *z = state;
+            previous = angle;
+        }
+    }
+    z
+}
+
+impl Candidate for Presliding {
+    fn kind(&self) -> Kind {
+        Kind::Presliding
+    }
+
+    fn shapes(&self, _: &Scene, _: Option<usize>) -> Vec<Shape> {
+        geometric(20.0, 10_000.0, 10).map(|value| Shape { variant: 0, value }).collect()
+    }
+
+    fn search(&self) -> Search {
+        Search::Logarithmic
+    }
+
+    fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
+        let j = joint(site);
+        let z = deflection(scene, j, shape.value);
+        let sign = scene.sign.joint(j);
+        vec![Column::on(j, samples(scene, |k| z[k] - sign[k]))]
+    }
+
+    fn quantities(&self, _: &Scene, _: Option<usize>, shape: Shape, b: &[f64]) -> Vec<Quantity> {
+        vec![
+            quantity("stiffness_per_rad", shape.value, "1/rad"),
+            quantity("coulomb_nm", b[0], "Nm"),
+        ]
+    }
+
+    fn size(&self, quantities: &[Quantity]) -> Option<Quantity> {
+        quantities.get(1).copied()
+    }
+
+    fn separating_experiment(&self) -> &'static str {
+        "triangular motion of ±2 mrad: the torque follows the angle on a hysteresis loop"
+    }
+
+    fn is_possible(&self, b: &[f64]) -> bool {
+        b[0] > 0.0
+    }
+
+    fn in_words(&self) -> &'static str {
+        "friction that builds up over a small angle behind every reversal (presliding)"
+    }
+}

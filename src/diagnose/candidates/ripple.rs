@@ -1,0 +1,108 @@
+//! Torque that repeats many times per turn: τ = A cos(N q + φ), of the gear's teeth (even multiples of the
+//! ratio) or the motor's poles.
+
+use super::*;
+
+/// See the module.
+pub struct Ripple;
+
+/// Orders that a strain-wave gear of ratio 100 makes, per turn of the joint, and their neighbours.
+const HIGHEST_ORDER: f64 = 450.0;
+const LOWEST_ORDER: f64 = 20.0;
+/// Peaks of the order spectrum that are looked at closely.
+const PEAKS: usize = 3;
+
+impl Candidate for Ripple {
+    fn kind(&self) -> Kind {
+        Kind::Ripple
+    }
+
+    fn shapes(&self, scene: &Scene, site: Option<usize>) -> Vec<Shape> {
+        let spacing = order_spacing(scene, joint(site));
+        let ratio = scene.arm.joints[joint(site)].drive.gear_ratio;
+        // Half the resolution on both sides brackets a peak of the order spectrum.
+        let about = |order: f64| [-0.5, 0.0, 0.5].map(|u| order + u * spacing);
+        [1.0, 2.0, 4.0]
+            .iter()
+            .flat_map(|m| about(m * ratio))
+            .map(|value| Shape { variant: 0, value })
+            .collect()
+    }
+
+    fn search(&self) -> Search {
+        Search::Straight
+    }
+
+    fn half_width(&self, scene: &Scene, site: Option<usize>) -> Option<f64> {
+        Some(0.5 * order_spacing(scene, joint(site)))
+    }
+
+    fn is_repeatable(&self) -> bool {
+        true
+    }
+
+    fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
+        let j = joint(site);
+        let q = scene.motion.q_rad.joint(j);
+        let column = |f: fn(f64) -> f64| Column::on(j, samples(scene, |k| f(shape.value * q[k])));
+        vec![column(f64::cos), column(f64::sin)]
+    }
+
+    fn quantities(&self, _: &Scene, _: Option<usize>, shape: Shape, b: &[f64]) -> Vec<Quantity> {
+        vec![
+            quantity("amplitude_nm", b[0].hypot(b[1]), "Nm"),
+            quantity("order_per_turn", shape.value, "1/turn"),
+            quantity("phase_rad", (-b[1]).atan2(b[0]), "rad"),
+        ]
+    }
+
+    fn separating_experiment(&self) -> &'static str {
+        "constant speed over a whole turn at two speeds: the order per turn stays"
+    }
+
+    fn in_words(&self) -> &'static str {
+        "torque ripple that repeats many times per turn"
+    }
+}
+
+/// Resolution in orders per turn: one cycle more over the joint's range.
+fn order_spacing(scene: &Scene, j: usize) -> f64 {
+    let q = scene.motion.q_rad.joint(j);
+    let (low, high) =
+        q.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &q| (l.min(q), h.max(q)));
+    std::f64::consts::TAU / (high - low).max(1e-2)
+}
+
+/// Orders at which `residual_nm` of joint `j` has most power: shapes to begin with.
+pub(in crate::diagnose) fn strongest_orders(
+    scene: &Scene,
+    j: usize,
+    residual_nm: &[f64],
+) -> Vec<Shape> {
+    let q = scene.motion.q_rad.joint(j);
+    let step = 0.5 * order_spacing(scene, j).min(2.0);
+    let count = ((HIGHEST_ORDER - LOWEST_ORDER) / step) as usize;
+    let mut power = vec![0.0; count];
+    let mut phasors: Vec<(f64, f64)> = q.iter().map(|q| (LOWEST_ORDER * q).sin_cos()).collect();
+    let turns: Vec<(f64, f64)> = q.iter().map(|q| (step * q).sin_cos()).collect();
+    for power in &mut power {
+        let (mut re, mut im) = (0.0, 0.0);
+        for ((phasor, turn), r) in phasors.iter_mut().zip(&turns).zip(residual_nm) {
+            re += r * phasor.1;
+            im += r * phasor.0;
+            *phasor =
+                (phasor.0 * turn.1 + phasor.1 * turn.0, phasor.1 * turn.1 - phasor.0 * turn.0);
+        }
+        *power = re * re + im * im;
+    }
+    let mut peaks: Vec<usize> = (1..count.saturating_sub(1))
+        .filter(|&k| power[k] >= power[k - 1] && power[k] >= power[k + 1])
+        .collect();
+    peaks.sort_by(|&a, &b| power[b].total_cmp(&power[a]));
+    peaks
+        .into_iter()
+        .take(PEAKS)
+        .flat_map(|k| [-1.0, 0.0, 1.0].map(|u| LOWEST_ORDER + step * (k as f64 + u)))
+        .map(|value| Shape { variant: 0, value })
+        .collect()
+}

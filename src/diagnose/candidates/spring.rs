@@ -1,0 +1,32 @@
+//! A cable or hose that pulls like a spring: the drive has to give τ = k (q − q₀).
+
+use super::*;
+
+/// See the module.
+pub struct Spring;
+
+impl Candidate for Spring {
+    fn kind(&self) -> Kind {
+        Kind::Spring
+    }
+
+    fn columns(&self, scene: &Scene, site: Option<usize>, _: Shape) -> Vec<Column> {
+        let j = joint(site);
+        let q = scene.motion.q_rad.joint(j).to_vec();
+        vec![Column::on(j, q), Column::on(j, vec![1.0; scene.samples()])]
+    }
+
+    fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
+        // The constant is the estimate's own where it fits offsets.
+        let rest_rad = b.get(1).map_or(f64::NAN, |constant| -constant / b[0]);
+        vec![quantity("stiffness_nm_rad", b[0], "Nm/rad"), quantity("rest_rad", rest_rad, "rad")]
+    }
+
+    fn separating_experiment(&self) -> &'static str {
+        "slow motion over the joint's whole range with the cable on and off"
+    }
+
+    fn in_words(&self) -> &'static str {
+        "a cable or hose that pulls like a spring"
+    }
+}

@@ -1,0 +1,47 @@
+//! Friction that changes while the arm warms up: τ = f (F_c sign q̇ + F_v q̇)(1 − e^{−t/T}), t from the
+//! start of the record. It does not repeat, so that the differences between periods show it.
+
+use super::*;
+
+/// See the module.
+pub struct ThermalDrift;
+
+impl Candidate for ThermalDrift {
+    fn kind(&self) -> Kind {
+        Kind::ThermalDrift
+    }
+
+    fn shapes(&self, scene: &Scene, _: Option<usize>) -> Vec<Shape> {
+        // Slower than ten records the drift is a straight line in time.
+        let record = scene.duration_s();
+        geometric(record / 20.0, 5.0 * record, 5).map(|value| Shape { variant: 0, value }).collect()
+    }
+
+    fn search(&self) -> Search {
+        Search::Logarithmic
+    }
+
+    fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
+        let j = joint(site);
+        let drive = &scene.arm.joints[j].drive;
+        let (qd, sign) = (scene.motion.qd_rad_s.joint(j), scene.sign.joint(j));
+        let n = scene.samples();
+        let friction = (0..n * scene.periods).map(|k| {
+            let warm = 1.0 - (-(k as f64) / scene.rate_hz / shape.value).exp();
+            warm * (drive.coulomb_nm * sign[k % n] + drive.viscous_nm_s_rad * qd[k % n])
+        });
+        vec![Column::on(j, friction.collect())]
+    }
+
+    fn quantities(&self, _: &Scene, _: Option<usize>, shape: Shape, b: &[f64]) -> Vec<Quantity> {
+        vec![quantity("fraction", b[0], ""), quantity("time_constant_s", shape.value, "s")]
+    }
+
+    fn separating_experiment(&self) -> &'static str {
+        "the same motion again after half an hour of work, joint temperatures recorded"
+    }
+
+    fn in_words(&self) -> &'static str {
+        "friction that changes while the arm warms up"
+    }
+}

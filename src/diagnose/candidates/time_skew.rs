@@ -1,0 +1,52 @@
+//! Torque recorded later than the motion by a delay d: τ(t − d) − τ(t), of one joint or of all.
+
+use super::*;
+
+/// See the module.
+pub struct TimeSkew;
+
+impl Candidate for TimeSkew {
+    fn kind(&self) -> Kind {
+        Kind::TimeSkew
+    }
+
+    fn sites(&self, joints: usize) -> Vec<Option<usize>> {
+        std::iter::once(None).chain((0..joints).map(Some)).collect()
+    }
+
+    fn shapes(&self, scene: &Scene, _: Option<usize>) -> Vec<Shape> {
+        let sample_s = 1.0 / scene.rate_hz;
+        [-3.0, -1.0, -0.2, 0.2, 1.0, 3.0]
+            .map(|d| Shape { variant: 0, value: d * sample_s })
+            .to_vec()
+    }
+
+    fn search(&self) -> Search {
+        Search::Straight
+    }
+
+    fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
+        let change = |j: usize| {
+            let torque = scene.torque_nm.joint(j);
+            let late = scene.delayed(torque, shape.value);
+            late.iter().zip(torque).map(|(late, now)| (late - now) / shape.value).collect()
+        };
+        let joints = match site {
+            Some(j) => j..j + 1,
+            None => 0..scene.joints(),
+        };
+        vec![Column { parts: joints.map(|j| (j, change(j))).collect() }]
+    }
+
+    fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
+        vec![quantity("delay_s", b[0], "s")]
+    }
+
+    fn separating_experiment(&self) -> &'static str {
+        "a sharp tap on the standing arm: both channels must show it in the same sample"
+    }
+
+    fn in_words(&self) -> &'static str {
+        "torque that is recorded later than the motion"
+    }
+}

@@ -1,0 +1,29 @@
+//! A wrong torque constant: the log says (1 + e) times the torque.
+
+use super::*;
+
+/// See the module.
+pub struct TorqueGain;
+
+impl Candidate for TorqueGain {
+    fn kind(&self) -> Kind {
+        Kind::TorqueGain
+    }
+
+    fn columns(&self, scene: &Scene, site: Option<usize>, _: Shape) -> Vec<Column> {
+        let j = joint(site);
+        vec![Column::on(j, scene.torque_nm.joint(j).to_vec())]
+    }
+
+    fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
+        vec![quantity("error_fraction", b[0], "")]
+    }
+
+    fn separating_experiment(&self) -> &'static str {
+        "the same motion with a payload of known mass"
+    }
+
+    fn in_words(&self) -> &'static str {
+        "a wrong torque constant"
+    }
+}

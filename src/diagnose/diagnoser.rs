@@ -1,0 +1,496 @@
+//! From a log to a diagnosis: the procedure as a whole.
+
+use std::collections::BTreeMap;
+
+use super::against;
+use super::candidates::{self, Candidate, Quantity, Search, Shape};
+use super::data_faults;
+use super::error::DiagnoseError;
+use super::extension::{Effect, Extension, mean_period};
+use super::image::{Column, Image, Span};
+use super::misfit;
+use super::scene::Scene;
+use super::selection::{Kept, Selected, select};
+use super::study::{Entry, Study};
+use super::verdict::{Cause, DetectionLimit, Diagnosis, Estimate, HeldOut, Rival, Rms, Verdict};
+use super::whitening::{RunWhitening, Whitening};
+use crate::base::BaseSet;
+use crate::dynamics::Model;
+use crate::identify::{Identification, Identifier, Measurement, Options};
+use crate::robot::{Arm, JointSignals};
+
+/// Everything that stays the same from log to log.
+pub struct Diagnoser<'a> {
+    arm: &'a Arm,
+    set: &'a BaseSet,
+    options: Options,
+    identifier: Identifier<'a>,
+    families: Vec<Box<dyn Candidate>>,
+}
+
+/// A diagnosis with what it was made from, for pictures.
+pub struct Finding {
+    /// What is said.
+    pub diagnosis: Diagnosis,
+    /// The null model's identification.
+    pub identification: Identification,
+    /// Motion and predictions along the log.
+    pub scene: Scene,
+    /// Residual of the null model, one period or the run, Nm.
+    pub before_nm: JointSignals,
+    /// Residual of the extended model, Nm.
+    pub after_nm: JointSignals,
+    /// Sample of the scene behind each residual.
+    pub samples: Vec<usize>,
+}
+
+/// √λ at which a family is found with 90 % probability: z of its threshold plus 1.28.
+const POWER: f64 = 0.9;
+const POWER_Z: f64 = 1.281_551_565_544_6;
+
+impl<'a> Diagnoser<'a> {
+    /// For logs of `arm`, with all families.
+    pub fn new(arm: &'a Arm, model: &'a Model, set: &'a BaseSet, options: Options) -> Self {
+        Self::with_families(arm, model, set, options, candidates::all())
+    }
+
+    /// With these families only.
+    pub fn with_families(
+        arm: &'a Arm,
+        model: &'a Model,
+        set: &'a BaseSet,
+        options: Options,
+        families: Vec<Box<dyn Candidate>>,
+    ) -> Self {
+        let identifier = Identifier::new(model, set, options.clone());
+        Self { arm, set, options, identifier, families }
+    }
+
+    /// Says what the model gets wrong along `m`; `held_out` logs measure the gain;
+    /// `simulation`, base parameters of a simulation of the arm, is compared with what the log says.
+    pub fn diagnose(
+        &mut self,
+        m: &Measurement,
+        held_out: &[Validation],
+        simulation: Option<&[f64]>,
+    ) -> Result<Finding, DiagnoseError> {
+        let faults = data_faults::find(m);
+        let qd_rad_s = data_faults::without_lag(m, &faults);
+        let m = &Measurement { qd_rad_s: &qd_rad_s, ..*m };
+        let regression = self.identifier.regression(m)?;
+        let identification = self.identifier.identify_regression(&regression)?;
+        let fit = &identification.fit;
+        let sources = (self.arm, self.set, &self.options);
+        let estimate = (&fit.theta[..], &fit.joint_sigma_nm[..]);
+        let first = Study::new(&self.families, sources, &regression, estimate, m.source)?;
+        let null = Extension::fit(&first, &[], &first.torque);
+        let found = select(&first);
+        // The load on the gear is better known once friction is.
+        let entries: Vec<&Entry> = found.iter().map(|c| &c.entry).collect();
+        let refined = Extension::fit(&first, &entries, &first.torque);
+        let study = first.with_estimate(self.arm, self.set, &refined.theta);
+        let kept = Kept::taken_over(&study, found);
+        let selected = kept.selected();
+        let entries: Vec<&Entry> = selected.iter().map(|s| &s.contender.entry).collect();
+        let extension = Extension::fit(&study, &entries, &study.torque);
+
+        let before_nm = residual(&study, &null);
+        let after_nm = residual(&study, &extension);
+        let (accepted, rest) = kept.without(None);
+        let fitted = study.null.len() + accepted.len();
+        let lack = misfit::lack_of_fit(&study, &rest, fitted);
+        let unexplained = misfit::unexplained(&study, &accepted, &rest, lack);
+        let gains = CrossFit::new(&study, &entries);
+        let physics = selected
+            .iter()
+            .enumerate()
+            .map(|(c, selected)| self.cause(&study, &kept, selected, c, &gains, &extension));
+        let mut causes: Vec<Cause> = faults.into_iter().chain(physics).collect();
+        let mut moved_parameters = Vec::new();
+        if let Some(simulation) = simulation {
+            moved_parameters = against::moved(self.set, simulation, &identification);
+            causes.extend(against::explain(&study, self.set, simulation));
+        }
+        let held_out = held_out
+            .iter()
+            .map(|log| {
+                let models = (&null, &extension);
+                held_out_gain(&mut self.identifier, sources, &self.families, log, models)
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let rms = |e: &JointSignals| Rms {
+            rms_nm: (0..e.joints())
+                .map(|j| rms_where(e.joint(j), |k| study.whitening.counts(j, k)))
+                .collect(),
+        };
+        let verdict = match (&unexplained, causes.is_empty()) {
+            (Some(_), _) => Verdict::Unexplained,
+            (None, true) => Verdict::NothingFound,
+            (None, false) => Verdict::CauseNamed,
+        };
+        let mut diagnosis = Diagnosis {
+            log: m.source.to_owned(),
+            noise_floor_nm: identification.replicates.as_ref().map(|r| r.sigma.clone()),
+            before: rms(&before_nm),
+            causes,
+            unexplained,
+            after: rms(&after_nm),
+            held_out,
+            moved_parameters,
+            detection_limits: self.detection_limits(&study, &accepted),
+            lack_of_fit_probability: lack,
+            verdict,
+            sentences: Vec::new(),
+            warnings: identification.warnings.clone(),
+        };
+        diagnosis.sentences = diagnosis.in_sentences();
+        let samples = (0..study.regression.problem.samples)
+            .map(|k| regression.first_sample + k * regression.every)
+            .collect();
+        let scene = study.scene;
+        Ok(Finding { diagnosis, identification, scene, before_nm, after_nm, samples })
+    }
+
+    fn cause(
+        &self,
+        study: &Study,
+        kept: &Kept,
+        selected: &Selected,
+        index: usize,
+        gains: &CrossFit,
+        extension: &Extension,
+    ) -> Cause {
+        let entry = &selected.contender.entry;
+        let family = &self.families[entry.family];
+        let name = |&(f, site): &(usize, Option<usize>)| {
+            let kind = self.families[f].kind();
+            match site.filter(|_| site != entry.site) {
+                Some(j) => format!("{kind}@{}", j + 1),
+                None => kind.to_string(),
+            }
+        };
+        let class: Vec<String> = selected.class.iter().map(name).collect();
+        let rivals = selected.rivals.iter().map(|rival| Rival {
+            kind: self.families[rival.entry.family].kind(),
+            joint: rival.entry.site.map(|j| j + 1),
+            evidence_behind: selected.contender.evidence - rival.evidence,
+        });
+        Cause {
+            kind: family.kind(),
+            joint: entry.site.map(|j| j + 1),
+            confidence: selected.confidence,
+            parameters: estimates(study, kept, &extension.effects[index], index),
+            gain_fraction: gains.gain(study, index),
+            separating_experiment: (!class.is_empty()).then(|| family.separating_experiment()),
+            class,
+            strength: selected.contender.statistic.sqrt(),
+            in_words: family.in_words().to_owned(),
+            rivals: rivals.collect(),
+        }
+    }
+
+    /// Per family and site the size that would be found with 90 % probability.
+    fn detection_limits(&self, study: &Study, accepted: &Span) -> Vec<DetectionLimit> {
+        if !study.scene.periodic {
+            return Vec::new();
+        }
+        let mut out = Vec::new();
+        for (family, candidate) in self.families.iter().enumerate() {
+            for site in candidate.sites(study.scene.joints()) {
+                let entries: Vec<&Entry> =
+                    study.entries.iter().filter(|e| (e.family, e.site) == (family, site)).collect();
+                let threshold = |k: usize| {
+                    let price = k as f64 * (study.residual.mean.len() as f64).ln()
+                        + 2.0 * (entries.len().max(1) as f64).ln()
+                        + 2.0 * (study.hypotheses() as f64).ln();
+                    price.sqrt() + POWER_Z
+                };
+                let Some(entry) = entries.get(entries.len() / 2) else { continue };
+                let span = study.span(entry, accepted);
+                if span.is_empty() {
+                    continue;
+                }
+                // √λ of a coefficient b on column 1 alone is b ‖d⊥‖.
+                let length = span.first_length();
+                let mut b = vec![0.0; entry.images.len()];
+                b[0] = threshold(b.len()) / length;
+                let q = candidate.quantities(&study.scene, site, entry.shape, &b);
+                let Some(quantity) = candidate.size(&q) else { continue };
+                out.push(DetectionLimit {
+                    kind: candidate.kind(),
+                    joint: site.map(|j| j + 1),
+                    parameter: quantity.name,
+                    value: Some(quantity.value),
+                    unit: quantity.unit,
+                    power: POWER,
+                });
+            }
+        }
+        out
+    }
+}
+
+/// Residuals of both models on a log that neither has seen.
+fn held_out_gain(
+    identifier: &mut Identifier,
+    (arm, set, options): (&Arm, &BaseSet, &Options),
+    families: &[Box<dyn Candidate>],
+    log: &Validation,
+    (null, extension): (&Extension, &Extension),
+) -> Result<HeldOut, DiagnoseError> {
+    let regression = identifier.regression(&log.measurement)?;
+    let prepared = &regression.prepared;
+    let moving = RunWhitening::moving_rows(&regression);
+    let whitening = if prepared.replicates.is_some() {
+        None
+    } else {
+        let weights = vec![1.0; arm.dof()];
+        Some(Whitening::Run(RunWhitening::new(&regression, options, &weights)?))
+    };
+    let scene = Scene::new(arm, set, &extension.theta, prepared);
+    let problem = &regression.problem;
+    let error = |model: &Extension| {
+        let predicted = model.torque_nm(families, &scene, problem, whitening.as_ref());
+        JointSignals::from_fn(problem.joints(), problem.samples, |j, k| {
+            let y = mean_period(&problem.panels[j].y, problem.samples);
+            y[k] - predicted.joint(j)[k]
+        })
+    };
+    let (before, after) = (error(null), error(extension));
+    let all = |e: &JointSignals| (0..e.joints()).map(|j| rms_where(e.joint(j), |_| true)).collect();
+    let moves = |e: &JointSignals| {
+        (0..e.joints()).map(|j| rms_where(e.joint(j), |k| moving[j][k])).collect()
+    };
+    let manufacturer_rms_nm = match log.manufacturer_nm {
+        Some(torque_nm) => {
+            let feed_forward =
+                identifier.regression(&Measurement { torque_nm, ..log.measurement })?;
+            let given = JointSignals::from_fn(problem.joints(), problem.samples, |j, k| {
+                let n = problem.samples;
+                mean_period(&problem.panels[j].y, n)[k]
+                    - mean_period(&feed_forward.problem.panels[j].y, n)[k]
+            });
+            Some(all(&given))
+        }
+        None => None,
+    };
+    Ok(HeldOut {
+        log: log.measurement.source.to_owned(),
+        before_rms_nm: all(&before),
+        after_rms_nm: all(&after),
+        before_moving_rms_nm: moves(&before),
+        after_moving_rms_nm: moves(&after),
+        manufacturer_rms_nm,
+    })
+}
+
+/// A log that no model has seen, to measure gains on.
+pub struct Validation<'a> {
+    /// Its channels.
+    pub measurement: Measurement<'a>,
+    /// The manufacturer's feed-forward, Nm.
+    pub manufacturer_nm: Option<&'a JointSignals>,
+}
+
+/// Residual of `model` in time, Nm: of the mean period, or of the run.
+fn residual(study: &Study, model: &Extension) -> JointSignals {
+    let problem = &study.regression.problem;
+    let predicted = model.torque_nm(study.families, &study.scene, problem, Some(&study.whitening));
+    let mut out = JointSignals::zeros(problem.joints(), problem.samples);
+    for (j, panel) in problem.panels.iter().enumerate() {
+        let y = mean_period(&panel.y, problem.samples);
+        let pairs = y.iter().zip(predicted.joint(j));
+        out.joint_mut(j).iter_mut().zip(pairs).for_each(|(o, (y, p))| *o = y - p);
+    }
+    out
+}
+
+fn rms_where(e: &[f64], counts: impl Fn(usize) -> bool) -> f64 {
+    let (mut square, mut count) = (0.0, 0usize);
+    for (_, e) in e.iter().enumerate().filter(|(k, _)| counts(*k)) {
+        square += e * e;
+        count += 1;
+    }
+    (square / count.max(1) as f64).sqrt()
+}
+
+/// Physical parameters of a cause with 95 % intervals by the delta method: coefficients and shape are
+/// linearised together, the other causes' coefficients free.
+fn estimates(
+    study: &Study,
+    kept: &Kept,
+    effect: &Effect,
+    index: usize,
+) -> BTreeMap<&'static str, Estimate> {
+    let (others, residual) = kept.without(Some(index));
+    let family = &study.families[effect.family];
+    let entry = &kept.causes()[index].entry;
+    let mut span = Span::default();
+    let project = |image: &Image| {
+        let mut image = image.clone();
+        others.residualise(&mut image);
+        image
+    };
+    for image in &entry.images {
+        span.push(&project(image));
+    }
+    let step = 1e-3 * effect.shape.value.abs();
+    if family.search() != Search::None && step > 0.0 {
+        let signal = |value: f64| {
+            let shape = Shape { value, ..effect.shape };
+            let columns = family.columns(&study.scene, effect.site, shape);
+            let mut sum = Image::default();
+            for (column, b) in columns.iter().zip(&effect.coefficients) {
+                let image: Image = study.whitening.image(column);
+                if sum.mean.is_empty() {
+                    sum = image;
+                    sum.scale(*b);
+                } else {
+                    sum.add(*b, &image);
+                }
+            }
+            sum
+        };
+        let mut slope = signal(effect.shape.value + step);
+        slope.add(-1.0, &signal(effect.shape.value - step));
+        slope.scale(0.5 / step);
+        study.null.residualise(&mut slope);
+        span.push(&project(&slope));
+    }
+    let covariance = study.statistic.covariance(&span, &residual);
+    let half = study.statistic.quantile_95();
+    let at = |b: &[f64], value: f64| -> Vec<Quantity> {
+        family.quantities(&study.scene, effect.site, Shape { value, ..effect.shape }, b)
+    };
+    let centre = at(&effect.coefficients, effect.shape.value);
+    let k = effect.coefficients.len();
+    let mut gradients = vec![vec![0.0; span.len()]; centre.len()];
+    for parameter in 0..span.len() {
+        let sigma = covariance[(parameter, parameter)].max(0.0).sqrt();
+        let h = 1e-3 * sigma.max(f64::MIN_POSITIVE);
+        let moved = |sign: f64| {
+            let mut b = effect.coefficients.clone();
+            let mut value = effect.shape.value;
+            if parameter < k {
+                b[parameter] += sign * h;
+            } else {
+                value += sign * h;
+            }
+            at(&b, value)
+        };
+        for (g, (up, down)) in gradients.iter_mut().zip(moved(1.0).iter().zip(moved(-1.0))) {
+            let mut difference = up.value - down.value;
+            if up.unit == "rad" && difference.abs() > std::f64::consts::PI {
+                difference -= difference.signum() * std::f64::consts::TAU;
+            }
+            g[parameter] = difference / (2.0 * h);
+        }
+    }
+    centre
+        .iter()
+        .zip(&gradients)
+        .map(|(quantity, gradient)| {
+            let g = nalgebra::DVector::from_column_slice(gradient);
+            let variance = (g.transpose() * &covariance * &g)[(0, 0)].max(0.0);
+            let reach = half * variance.sqrt();
+            let ci95 = [quantity.value - reach, quantity.value + reach];
+            (quantity.name, Estimate { value: quantity.value, unit: quantity.unit, ci95 })
+        })
+        .collect()
+}
+
+/// Models fitted to one half of the periods and judged on the other half.
+struct CrossFit {
+    /// Per half: mean square residual per joint without any cause, without cause c, with all.
+    halves: Vec<HalfFit>,
+    sites: Vec<Option<usize>>,
+}
+
+struct HalfFit {
+    null: Vec<f64>,
+    without: Vec<Vec<f64>>,
+    all: Vec<f64>,
+    floor: Vec<f64>,
+}
+
+impl CrossFit {
+    fn new(study: &Study, entries: &[&Entry]) -> Self {
+        let sites = entries.iter().map(|e| e.site).collect();
+        let replicates = study.regression.prepared.replicates.as_ref();
+        let Some(replicates) =
+            replicates.filter(|_| study.scene.periods >= 4 && !entries.is_empty())
+        else {
+            return Self { halves: Vec::new(), sites };
+        };
+        let halves = [0, 1].map(|half| {
+            let (train, test) = (half_mean(study, half), half_mean(study, 1 - half));
+            let image = study.whitening.image(&train);
+            let square = |entries: &[&Entry]| -> Vec<f64> {
+                let model = Extension::fit(study, entries, &image);
+                let problem = &study.regression.problem;
+                let predicted =
+                    model.torque_nm(study.families, &study.scene, problem, Some(&study.whitening));
+                test.parts
+                    .iter()
+                    .map(|(j, y)| {
+                        let errors =
+                            y.iter().zip(predicted.joint(*j)).map(|(y, p)| (y - p).powi(2));
+                        errors.sum::<f64>() / y.len() as f64
+                    })
+                    .collect()
+            };
+            let without = (0..entries.len())
+                .map(|c| {
+                    let rest: Vec<&Entry> = entries
+                        .iter()
+                        .enumerate()
+                        .filter(|(i, _)| *i != c)
+                        .map(|(_, e)| *e)
+                        .collect();
+                    square(&rest)
+                })
+                .collect();
+            let tested = (study.scene.periods + half) / 2;
+            let floor = replicates.sigma.iter().map(|s| s * s / tested as f64).collect();
+            HalfFit { null: square(&[]), without, all: square(entries), floor }
+        });
+        Self { halves: halves.into(), sites }
+    }
+
+    /// Share of the explainable mean square that cause `c` removes on its joint (or on all, each in
+    /// units of its noise).
+    fn gain(&self, study: &Study, c: usize) -> Option<f64> {
+        if self.halves.is_empty() {
+            return None;
+        }
+        let joints = match self.sites[c] {
+            Some(j) => j..j + 1,
+            None => 0..study.scene.joints(),
+        };
+        let (mut removed, mut explainable) = (0.0, 0.0);
+        for half in &self.halves {
+            for j in joints.clone() {
+                removed += (half.without[c][j] - half.all[j]) / half.floor[j];
+                explainable += (half.null[j] - half.floor[j]).max(0.0) / half.floor[j];
+            }
+        }
+        (explainable > 0.0).then(|| removed / explainable)
+    }
+}
+
+/// Mean torque of the even (0) or odd (1) periods.
+fn half_mean(study: &Study, half: usize) -> Column {
+    let problem = &study.regression.problem;
+    let n = problem.samples;
+    let parts = problem.panels.iter().enumerate().map(|(j, panel)| {
+        let mut sum = vec![0.0; n];
+        let mut count = 0.0;
+        for period in panel.y.chunks_exact(n).skip(half).step_by(2) {
+            sum.iter_mut().zip(period).for_each(|(s, y)| *s += y);
+            count += 1.0;
+        }
+        sum.iter_mut().for_each(|s| *s /= count);
+        (j, sum)
+    });
+    Column { parts: parts.collect() }
+}

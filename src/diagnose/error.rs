@@ -1,0 +1,36 @@
+//! Why a log cannot be diagnosed.
+
+use thiserror::Error;
+
+use crate::identify::IdentifyError;
+use crate::signal::SignalError;
+
+/// A log without a diagnosis, with the numbers that say why.
+#[derive(Debug, Error)]
+pub enum DiagnoseError {
+    /// There is no model to diagnose.
+    #[error(transparent)]
+    Identify(#[from] IdentifyError),
+    /// A filter or spectrum could not be computed.
+    #[error(transparent)]
+    Signal(#[from] SignalError),
+    /// The scatter between periods gives no covariance.
+    #[error(
+        "{log}: the scatter between periods at {frequency_hz:.3} Hz is singular: a channel of \
+         torque is constant or a copy of another"
+    )]
+    NoNoise {
+        /// The log.
+        log: String,
+        /// Frequency, Hz.
+        frequency_hz: f64,
+    },
+    /// A parameter's column vanishes in the whitened equations.
+    #[error("{log}: the motion does not excite {parameter} beyond its noise")]
+    NotExcited {
+        /// The log.
+        log: String,
+        /// Name of the base parameter.
+        parameter: String,
+    },
+}

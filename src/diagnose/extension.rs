@@ -1,0 +1,102 @@
+//! The extended model: base parameters and effects together.
+
+use super::candidates::{Candidate, Shape};
+use super::image::{Column, Image, Span};
+use super::scene::Scene;
+use super::study::{Entry, Study};
+use super::whitening::Whitening;
+use crate::identify::Problem;
+use crate::robot::JointSignals;
+
+/// An effect with its numbers.
+#[derive(Debug, Clone)]
+pub struct Effect {
+    /// Index into the families.
+    pub family: usize,
+    /// Joint, or the arm as a whole.
+    pub site: Option<usize>,
+    /// Nonlinear parameters.
+    pub shape: Shape,
+    /// Coefficients of its columns.
+    pub coefficients: Vec<f64>,
+}
+
+/// Base parameters and effects fitted together.
+#[derive(Debug, Clone)]
+pub struct Extension {
+    /// Base parameters.
+    pub theta: Vec<f64>,
+    /// Effects.
+    pub effects: Vec<Effect>,
+}
+
+impl Extension {
+    /// Least squares of `torque` (the study's own, or that of other periods of the same motion) on
+    /// the null model and `entries`, in the whitened equations.
+    pub fn fit(study: &Study, entries: &[&Entry], torque: &Image) -> Self {
+        let mut residual = torque.clone();
+        study.null.residualise(&mut residual);
+        let mut span = Span::default();
+        let mut counts = Vec::with_capacity(entries.len());
+        for entry in entries {
+            counts.push(entry.images.iter().filter(|image| span.push(image)).count());
+        }
+        let mut coefficients = span.solve(&residual).into_iter();
+        let effects: Vec<Effect> = entries
+            .iter()
+            .zip(counts)
+            .map(|(entry, count)| Effect {
+                family: entry.family,
+                site: entry.site,
+                shape: entry.shape,
+                coefficients: coefficients.by_ref().take(count).collect(),
+            })
+            .collect();
+        let mut rest = torque.clone();
+        for effect in &effects {
+            for (column, b) in effect.columns(study.families, &study.scene) {
+                rest.add(-b, &study.whitening.image(&column));
+            }
+        }
+        Self { theta: study.null.solve(&rest), effects }
+    }
+
+    /// Torque of one period (or of the run), Nm, as the regression sees it: joints × samples of `problem`.
+    pub fn torque_nm(
+        &self,
+        families: &[Box<dyn Candidate>],
+        scene: &Scene,
+        problem: &Problem,
+        whitening: Option<&Whitening>,
+    ) -> JointSignals {
+        let mut out = JointSignals::zeros(problem.joints(), problem.samples);
+        for j in 0..problem.joints() {
+            problem.predict(j, &self.theta, out.joint_mut(j));
+        }
+        for effect in &self.effects {
+            for (column, b) in effect.columns(families, scene) {
+                for (j, y) in column.parts {
+                    // What does not repeat is averaged over the periods.
+                    let mean = mean_period(&y, scene.samples());
+                    let y = whitening.map_or(mean.clone(), |w| w.as_regressed(&mean));
+                    out.joint_mut(j).iter_mut().zip(&y).for_each(|(o, y)| *o += b * y);
+                }
+            }
+        }
+        out
+    }
+}
+
+impl Effect {
+    /// The effect's columns with their coefficients.
+    fn columns(&self, families: &[Box<dyn Candidate>], scene: &Scene) -> Vec<(Column, f64)> {
+        let columns = families[self.family].columns(scene, self.site, self.shape);
+        columns.into_iter().zip(self.coefficients.iter().copied()).collect()
+    }
+}
+
+/// Mean over the periods of n samples.
+pub fn mean_period(y: &[f64], n: usize) -> Vec<f64> {
+    let periods = y.len() / n;
+    (0..n).map(|k| y.iter().skip(k).step_by(n).sum::<f64>() / periods as f64).collect()
+}

@@ -1,0 +1,223 @@
+//! Signals in the whitened equations, and the space that known columns span there.
+
+use nalgebra::DMatrix;
+
+/// A torque signal on some joints, in Nm (or Nm per unit of its coefficient).
+///
+/// Each part is a joint and either n samples, which repeat in every period, or P·n samples.
+#[derive(Debug, Clone, Default)]
+pub struct Column {
+    /// Joint (0-based) and samples.
+    pub parts: Vec<(usize, Vec<f64>)>,
+}
+
+impl Column {
+    /// On one joint.
+    pub fn on(joint: usize, samples: Vec<f64>) -> Self {
+        Self { parts: vec![(joint, samples)] }
+    }
+
+    /// On all joints of `signals`.
+    pub fn everywhere(signals: &crate::robot::JointSignals) -> Self {
+        Self { parts: (0..signals.joints()).map(|j| (j, signals.joint(j).to_vec())).collect() }
+    }
+
+    /// Every sample times `factor`.
+    pub fn scaled(mut self, factor: f64) -> Self {
+        self.parts.iter_mut().flat_map(|(_, y)| y).for_each(|v| *v *= factor);
+        self
+    }
+}
+
+/// A column in the whitened equations: noise there has variance one in every row.
+///
+/// `mean` belongs to the mean of the periods, `contrast` to their differences; what repeats has no
+/// contrast (empty).
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Image {
+    /// Rows of the mean period.
+    pub mean: Vec<f64>,
+    /// Rows of the differences between periods; empty for what repeats.
+    pub contrast: Vec<f64>,
+}
+
+impl Image {
+    /// ⟨self, other⟩.
+    pub fn dot(&self, other: &Self) -> f64 {
+        let mut sum = dot(&self.mean, &other.mean);
+        if !self.contrast.is_empty() && !other.contrast.is_empty() {
+            sum += dot(&self.contrast, &other.contrast);
+        }
+        sum
+    }
+
+    /// ⟨self, self⟩.
+    pub fn square(&self) -> f64 {
+        self.dot(self)
+    }
+
+    /// self += factor · other.
+    pub fn add(&mut self, factor: f64, other: &Self) {
+        axpy(&mut self.mean, factor, &other.mean);
+        if !other.contrast.is_empty() {
+            self.contrast.resize(other.contrast.len(), 0.0);
+            axpy(&mut self.contrast, factor, &other.contrast);
+        }
+    }
+
+    /// self *= factor.
+    pub fn scale(&mut self, factor: f64) {
+        self.mean.iter_mut().chain(&mut self.contrast).for_each(|v| *v *= factor);
+    }
+}
+
+/// Sum of products in eight interleaved partial sums: fast, and a fixed order.
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let (a8, a_rest) = a.as_chunks::<8>();
+    let (b8, b_rest) = b.as_chunks::<8>();
+    let mut partial = [0.0; 8];
+    for (x, y) in a8.iter().zip(b8) {
+        for k in 0..8 {
+            partial[k] += x[k] * y[k];
+        }
+    }
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum();
+    partial.iter().sum::<f64>() + rest
+}
+
+fn axpy(y: &mut [f64], factor: f64, x: &[f64]) {
+    y.iter_mut().zip(x).for_each(|(y, x)| *y += factor * x);
+}
+
+/// An orthonormal basis of the span of columns, with the triangle that made it.
+#[derive(Debug, Clone, Default)]
+pub struct Span {
+    directions: Vec<Image>,
+    /// Column k of R: coefficients of column k on directions 0…k.
+    triangle: Vec<Vec<f64>>,
+}
+
+/// A column that keeps less than this share of its length is a combination of those before it.
+const DEPENDENT: f64 = 1e-6;
+
+impl Span {
+    /// Dimensions.
+    pub fn len(&self) -> usize {
+        self.directions.len()
+    }
+
+    /// Whether nothing is spanned.
+    pub fn is_empty(&self) -> bool {
+        self.directions.is_empty()
+    }
+
+    /// Takes `column` in; `false`, and nothing changes, if it is already spanned.
+    pub fn push(&mut self, column: &Image) -> bool {
+        let length = column.square().sqrt();
+        let mut rest = column.clone();
+        let mut coefficients = vec![0.0; self.len()];
+        for _ in 0..2 {
+            for (direction, coefficient) in self.directions.iter().zip(&mut coefficients) {
+                let along = direction.dot(&rest);
+                *coefficient += along;
+                rest.add(-along, direction);
+            }
+        }
+        let outside = rest.square().sqrt();
+        if outside.is_nan() || outside <= DEPENDENT * length {
+            return false;
+        }
+        rest.scale(1.0 / outside);
+        coefficients.push(outside);
+        self.directions.push(rest);
+        self.triangle.push(coefficients);
+        true
+    }
+
+    /// Removes from `column` what is spanned.
+    pub fn residualise(&self, column: &mut Image) {
+        for direction in &self.directions {
+            let along = direction.dot(column);
+            column.add(-along, direction);
+        }
+    }
+
+    /// ⟨direction, y⟩ for every direction.
+    pub fn coordinates(&self, y: &Image) -> Vec<f64> {
+        self.directions.iter().map(|d| d.dot(y)).collect()
+    }
+
+    /// Length² of the part of `y` inside the span.
+    pub fn explained(&self, y: &Image) -> f64 {
+        self.directions.iter().map(|d| d.dot(y).powi(2)).sum()
+    }
+
+    /// Least-squares coefficients of `y` on the columns that were pushed.
+    pub fn solve(&self, y: &Image) -> Vec<f64> {
+        let mut x = self.coordinates(y);
+        for k in (0..x.len()).rev() {
+            x[k] /= self.triangle[k][k];
+            let value = x[k];
+            for (x, r) in x[..k].iter_mut().zip(&self.triangle[k]) {
+                *x -= r * value;
+            }
+        }
+        x
+    }
+
+    /// Length of the first column.
+    pub fn first_length(&self) -> f64 {
+        self.triangle.first().map_or(0.0, |column| column[0])
+    }
+
+    /// The orthonormal directions.
+    pub fn directions(&self) -> &[Image] {
+        &self.directions
+    }
+
+    /// R⁻¹, with columns = directions · R.
+    pub fn inverse_triangle(&self) -> DMatrix<f64> {
+        let k = self.len();
+        let r = DMatrix::from_fn(k, k, |i, c| self.triangle[c].get(i).copied().unwrap_or(0.0));
+        // Every pivot is positive, or its column would not have been taken in.
+        r.solve_upper_triangular(&DMatrix::identity(k, k)).unwrap_or_else(|| DMatrix::zeros(k, k))
+    }
+
+    /// (columnsᵀ columns)⁻¹ = R⁻¹R⁻ᵀ.
+    pub fn inverse_gram(&self) -> DMatrix<f64> {
+        let inverse = self.inverse_triangle();
+        &inverse * inverse.transpose()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(values: &[f64]) -> Image {
+        Image { mean: values.to_vec(), contrast: Vec::new() }
+    }
+
+    #[test]
+    fn solves_least_squares_and_knows_its_covariance() {
+        let columns = [image(&[1.0, 1.0, 1.0, 1.0]), image(&[0.0, 1.0, 2.0, 3.0])];
+        let mut span = Span::default();
+        assert!(columns.iter().all(|c| span.push(c)));
+        // The straight line through (k, 1 + 2k) and its Gram inverse by hand: [[14, −6], [−6, 4]]/20.
+        let solution = span.solve(&image(&[1.0, 3.0, 5.0, 7.0]));
+        assert!((solution[0] - 1.0).abs() < 1e-14 && (solution[1] - 2.0).abs() < 1e-14);
+        let inverse = span.inverse_gram();
+        for (entry, expected) in inverse.iter().zip([0.7, -0.3, -0.3, 0.2]) {
+            assert!((entry - expected).abs() < 1e-14);
+        }
+        assert!(!span.push(&image(&[1.0, 2.0, 3.0, 4.0])), "a combination of both");
+    }
+
+    #[test]
+    fn what_repeats_is_orthogonal_to_what_does_not() {
+        let repeating = image(&[1.0, 2.0]);
+        let drifting = Image { mean: vec![0.0, 0.0], contrast: vec![3.0, 4.0] };
+        assert_eq!(repeating.dot(&drifting), 0.0);
+        assert_eq!(drifting.square(), 25.0);
+    }
+}

@@ -1,0 +1,118 @@
+//! Names of what can be wrong: shared with the scenarios of the plant and with the JSON.
+
+use serde::{Deserialize, Serialize};
+
+/// One family of effects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// Friction that falls with speed near rest.
+    Stribeck,
+    /// Friction that is not a straight line in speed.
+    NonlinearViscous,
+    /// Friction of different size in the two directions.
+    AsymmetricFriction,
+    /// Friction that grows with the torque on the gear.
+    LoadFriction,
+    /// Friction that builds up over a small angle behind a reversal.
+    Presliding,
+    /// Friction that depends on the angle.
+    PositionFriction,
+    /// Friction that changes while the arm warms up.
+    ThermalDrift,
+    /// Torque that repeats many times per turn.
+    Ripple,
+    /// A gear that gives way under torque.
+    Elasticity,
+    /// A gear with play.
+    Backlash,
+    /// A wrong torque constant.
+    TorqueGain,
+    /// A constant error of the current sensor.
+    CurrentOffset,
+    /// A drive at its limit.
+    Saturation,
+    /// Torque and motion recorded at different times.
+    TimeSkew,
+    /// A velocity that lags behind the angle.
+    VelocityLag,
+    /// An angle with a constant error.
+    EncoderOffset,
+    /// A base that does not stand level.
+    BaseTilt,
+    /// A wrong constant of gravity.
+    Gravity,
+    /// A body on the flange.
+    Payload,
+    /// A link that is longer or shorter than drawn.
+    LinkLength,
+    /// A cable or hose that pulls like a spring.
+    Spring,
+    /// Something touched the arm.
+    Contact,
+    /// A clock that stops without the time stamps showing it.
+    ClockFault,
+    /// Samples missing or repeated.
+    DroppedSamples,
+    /// A coarse quantity.
+    Quantisation,
+    /// Single values far off.
+    Outliers,
+    /// Friction that is not what the simulation assumes.
+    FrictionChange,
+}
+
+impl Kind {
+    /// The name in scenarios and JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Stribeck => "stribeck",
+            Self::NonlinearViscous => "nonlinear_viscous",
+            Self::AsymmetricFriction => "asymmetric_friction",
+            Self::LoadFriction => "load_friction",
+            Self::Presliding => "presliding",
+            Self::PositionFriction => "position_friction",
+            Self::ThermalDrift => "thermal_drift",
+            Self::Ripple => "ripple",
+            Self::Elasticity => "elasticity",
+            Self::Backlash => "backlash",
+            Self::TorqueGain => "torque_gain",
+            Self::CurrentOffset => "current_offset",
+            Self::Saturation => "saturation",
+            Self::TimeSkew => "time_skew",
+            Self::VelocityLag => "velocity_lag",
+            Self::EncoderOffset => "encoder_offset",
+            Self::BaseTilt => "base_tilt",
+            Self::Gravity => "gravity",
+            Self::Payload => "payload",
+            Self::LinkLength => "link_length",
+            Self::Spring => "spring",
+            Self::Contact => "contact",
+            Self::ClockFault => "clock_fault",
+            Self::DroppedSamples => "dropped_samples",
+            Self::Quantisation => "quantisation",
+            Self::Outliers => "outliers",
+            Self::FrictionChange => "friction_change",
+        }
+    }
+}
+
+impl Kind {
+    /// Whether it is a fault of the recording, not of the arm.
+    pub fn is_of_the_record(self) -> bool {
+        matches!(
+            self,
+            Self::VelocityLag
+                | Self::ClockFault
+                | Self::DroppedSamples
+                | Self::Outliers
+                | Self::Quantisation
+        )
+    }
+}
+
+impl std::fmt::Display for Kind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.name())
+    }
+}

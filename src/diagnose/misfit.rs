@@ -1,0 +1,123 @@
+//! What is left behind the last cause: is it noise, and if not, on what does it depend?
+
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use super::image::{Column, Image, Span};
+use super::study::Study;
+use super::verdict::Unexplained;
+
+/// Model errors live where the motion does: below this frequency.
+const BAND_HZ: f64 = 5.0;
+/// Chance that a log without faults is called unexplained, per test.
+const FALSE_ALARM: f64 = 0.0005;
+/// A part of the curve that keeps less than this share of its length belongs to the model.
+const ABSORBED: f64 = 0.1;
+/// Knots of the curve along an axis.
+const KNOTS: usize = 10;
+
+/// Probability that noise alone leaves as much, below 5 Hz or in all; `None` for a single run.
+pub fn lack_of_fit(study: &Study, residual: &Image, fitted: usize) -> Option<f64> {
+    if !study.scene.periodic {
+        return None;
+    }
+    let joints = study.scene.joints();
+    let n = study.scene.samples();
+    let harmonics = (BAND_HZ * n as f64 / study.scene.rate_hz) as usize;
+    let slow = (joints * (1 + 2 * harmonics)).min(residual.mean.len());
+    let band = |rows: &[f64]| {
+        // Nearly all of the model's columns are slow: their degrees of freedom are taken from there.
+        let freedom = (rows.len().saturating_sub(fitted)).max(1) as f64;
+        let noise_freedom = rows.len() as f64 * (study.scene.periods - 1) as f64;
+        let mean_square = rows.iter().map(|r| r * r).sum::<f64>() / freedom;
+        FisherSnedecor::new(freedom, noise_freedom).map_or(1.0, |f| f.sf(mean_square))
+    };
+    Some((2.0 * band(&residual.mean[..slow]).min(band(&residual.mean))).min(1.0))
+}
+
+/// The axis along which the residual is largest: a curve of 10 knots in each quantity of each joint.
+///
+/// `Some` if that curve, or the lack of fit as a whole, cannot be noise.
+pub fn unexplained(
+    study: &Study,
+    accepted: &Span,
+    residual: &Image,
+    lack_of_fit: Option<f64>,
+) -> Option<Unexplained> {
+    if !study.scene.periodic {
+        return None;
+    }
+    let scene = &study.scene;
+    let mut best: Option<(f64, f64, Unexplained)> = None;
+    let mut tests = 0.0;
+    for j in 0..scene.joints() {
+        let torque_rate = scene.derivative(scene.torque_nm.joint(j));
+        let time: Vec<f64> = (0..scene.samples()).map(|k| k as f64 / scene.rate_hz).collect();
+        let axes: [(&'static str, &[f64]); 6] = [
+            ("angle", scene.motion.q_rad.joint(j)),
+            ("speed", scene.motion.qd_rad_s.joint(j)),
+            ("acceleration", scene.motion.qdd_rad_s2.joint(j)),
+            ("torque", scene.torque_nm.joint(j)),
+            ("rate of the torque", &torque_rate),
+            ("time within the period", &time),
+        ];
+        for (axis, values) in axes {
+            tests += 1.0;
+            let (knots, hats) = hats(values);
+            let mut span = Span::default();
+            let mut used = Vec::new();
+            for (knot, hat) in hats.iter().enumerate() {
+                let mut image = study.whitening.image(&Column::on(j, hat.clone()));
+                let length = image.square();
+                study.null.residualise(&mut image);
+                accepted.residualise(&mut image);
+                if image.square() > ABSORBED * ABSORBED * length && span.push(&image) {
+                    used.push(knot);
+                }
+            }
+            let explained = span.explained(residual);
+            let probability = study.statistic.probability(&span, residual);
+            let evidence = explained - span.len() as f64 * (residual.mean.len() as f64).ln();
+            if best.as_ref().is_some_and(|b| b.0 >= evidence) {
+                continue;
+            }
+            let mut heights = vec![0.0; KNOTS];
+            for (knot, b) in used.iter().zip(span.solve(residual)) {
+                heights[*knot] = b;
+            }
+            // The level belongs to the model; the curve is what varies.
+            let mean = heights.iter().sum::<f64>() / KNOTS as f64;
+            heights.iter_mut().for_each(|h| *h -= mean);
+            let curve_at =
+                |k: usize| -> f64 { hats.iter().zip(&heights).map(|(h, b)| h[k] * b).sum() };
+            let n = scene.samples();
+            let square: f64 = (0..n).map(|k| curve_at(k).powi(2)).sum();
+            let found = Unexplained {
+                axis,
+                joint: j + 1,
+                rms_nm: (square / n as f64).sqrt(),
+                curve: knots.iter().zip(&heights).map(|(x, y)| [*x, *y]).collect(),
+            };
+            best = Some((evidence, probability, found));
+        }
+    }
+    let (_, probability, found) = best?;
+    let fires = probability * tests < FALSE_ALARM || lack_of_fit.is_some_and(|p| p < FALSE_ALARM);
+    fires.then_some(found)
+}
+
+/// Knots at equal shares of the samples, and the piecewise linear hat of each.
+fn hats(values: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let last = sorted.len() - 1;
+    let knots: Vec<f64> = (0..KNOTS).map(|k| sorted[k * last / (KNOTS - 1)]).collect();
+    let mut hats = vec![vec![0.0; values.len()]; KNOTS];
+    for (k, &x) in values.iter().enumerate() {
+        let right = knots.partition_point(|knot| *knot < x).clamp(1, KNOTS - 1);
+        let width = knots[right] - knots[right - 1];
+        let u = if width > 0.0 { ((x - knots[right - 1]) / width).clamp(0.0, 1.0) } else { 1.0 };
+        hats[right - 1][k] = 1.0 - u;
+        hats[right][k] = u;
+    }
+    (knots, hats)
+}

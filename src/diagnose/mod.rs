@@ -1,0 +1,42 @@
+//! What the model gets wrong: candidates, tests, verdict, extended model, gain.
+//!
+//! Enters: a log, the arm and its base set. Leaves: a [`Diagnosis`]: causes with names, sizes and
+//! intervals, what cannot be told apart, what is left unexplained, what would not have been seen, and
+//! how much the extended model gains on data it was not fitted to.
+//!
+//! 1. The log is processed as for identification, and its equations are whitened ([`Whitening`]): with
+//!    periods by the scatter between them, without by the residual itself.
+//! 2. Every family's columns lose what the null model spans; the squared length of the residual along
+//!    them, T = ‖P r‖² ~ χ²_k(λ), is the score test of adding the family.
+//! 3. Nonlinear parameters are refined continuously, the best family is added if chance does not explain
+//!    it, all causes are refined together, exchanged and removed where another set is better, and again.
+//! 4. What is left is tested against noise; if it is none and no family fits, the answer says so.
+
+pub mod candidates;
+
+mod against;
+mod data_faults;
+mod diagnoser;
+mod error;
+mod extension;
+mod image;
+mod kind;
+mod misfit;
+mod scene;
+mod selection;
+mod statistic;
+mod study;
+mod verdict;
+mod whitening;
+
+pub use diagnoser::{Diagnoser, Finding, Validation};
+pub use error::DiagnoseError;
+pub use extension::{Effect, Extension};
+pub use image::Column;
+pub use kind::Kind;
+pub use scene::{Scene, equivalent_arm};
+pub use verdict::{
+    Cause, DIAGNOSE_SCHEMA, DetectionLimit, Diagnosis, Estimate, HeldOut, Moved, Rival, Rms,
+    Unexplained, Verdict,
+};
+pub use whitening::Whitening;

@@ -1,0 +1,238 @@
+//! What every candidate sees of a log: the motion, and what the current estimate makes of it.
+
+use std::sync::Arc;
+
+use realfft::num_complex::Complex64;
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+
+use crate::base::BaseSet;
+use crate::dynamics::{
+    LANES, Lanes, Model, Motion, Parameter, ParameterLayout, Workspace, rigid_torque,
+};
+use crate::identify::Prepared;
+use crate::robot::{Arm, JointSignals};
+use crate::signal::central_4;
+
+/// The processed motion of one log and the torques that the estimate predicts along it.
+///
+/// A motion that repeats is one period of n samples, `periods` of which follow each other in the
+/// log; a single run is n samples, once.
+pub struct Scene {
+    /// The arm with parameters that are equivalent to the estimate.
+    pub arm: Arm,
+    /// The motion.
+    pub motion: Motion,
+    /// Samples per second.
+    pub rate_hz: f64,
+    /// Repetitions P.
+    pub periods: usize,
+    /// Whether the motion closes on itself.
+    pub periodic: bool,
+    /// Torque that moves the links, Nm.
+    pub link_nm: JointSignals,
+    /// Torque on the gear: links and rotors, Nm.
+    pub load_nm: JointSignals,
+    /// Predicted drive torque: load, friction and offset, Nm.
+    pub torque_nm: JointSignals,
+    /// tanh(q̇/ε).
+    pub sign: JointSignals,
+    /// Estimated Coulomb friction, Nm.
+    pub coulomb_nm: Vec<f64>,
+    derivative: Derivative,
+}
+
+/// How signals along this motion are differentiated and shifted in time.
+enum Derivative {
+    Fourier { forward: Arc<dyn RealToComplex<f64>>, inverse: Arc<dyn ComplexToReal<f64>> },
+    Differences,
+}
+
+impl Scene {
+    /// Along `prepared`, for the arm whose base parameters are `theta`.
+    pub fn new(nominal: &Arm, set: &BaseSet, theta: &[f64], prepared: &Prepared) -> Self {
+        let periodic = prepared.replicates.is_some();
+        let motion = prepared.motion.clone();
+        let (arm, offset_nm) = equivalent_arm(nominal, set, theta);
+        let (joints, n) = (motion.joints(), motion.samples());
+        let link_nm = rigid_torque_along(&Model::new(&arm), &motion);
+        let drive = |j: usize| &arm.joints[j].drive;
+        let load_nm = JointSignals::from_fn(joints, n, |j, k| {
+            link_nm.joint(j)[k] + drive(j).rotor_inertia_kg_m2 * motion.qdd_rad_s2.joint(j)[k]
+        });
+        let epsilon = arm.friction_epsilon_rad_s;
+        let sign =
+            motion.qd_rad_s.map_joints(|_, v| v.iter().map(|v| (v / epsilon).tanh()).collect());
+        let torque_nm = JointSignals::from_fn(joints, n, |j, k| {
+            load_nm.joint(j)[k]
+                + drive(j).viscous_nm_s_rad * motion.qd_rad_s.joint(j)[k]
+                + drive(j).coulomb_nm * sign.joint(j)[k]
+                + offset_nm[j]
+        });
+        let derivative = if periodic {
+            let mut planner = RealFftPlanner::new();
+            let (forward, inverse) = (planner.plan_fft_forward(n), planner.plan_fft_inverse(n));
+            Derivative::Fourier { forward, inverse }
+        } else {
+            Derivative::Differences
+        };
+        Self {
+            coulomb_nm: (0..joints).map(|j| drive(j).coulomb_nm).collect(),
+            rate_hz: prepared.processing.rate_hz,
+            periods: prepared.processing.periods,
+            arm,
+            motion,
+            periodic,
+            link_nm,
+            load_nm,
+            torque_nm,
+            sign,
+            derivative,
+        }
+    }
+
+    /// Number of joints.
+    pub fn joints(&self) -> usize {
+        self.motion.joints()
+    }
+
+    /// Samples n of the motion.
+    pub fn samples(&self) -> usize {
+        self.motion.samples()
+    }
+
+    /// Duration of the whole record, s.
+    pub fn duration_s(&self) -> f64 {
+        (self.samples() * self.periods) as f64 / self.rate_hz
+    }
+
+    /// Time derivative of a signal of n samples.
+    pub fn derivative(&self, y: &[f64]) -> Vec<f64> {
+        match &self.derivative {
+            Derivative::Fourier { forward, inverse } => {
+                let omega = std::f64::consts::TAU * self.rate_hz / y.len() as f64;
+                transform(forward.as_ref(), inverse.as_ref(), y, |h, n| {
+                    // The Nyquist harmonic of a real signal has no derivative on the grid.
+                    let keep = if 2 * h == n { 0.0 } else { 1.0 };
+                    Complex64::new(0.0, keep * h as f64 * omega)
+                })
+            }
+            Derivative::Differences => {
+                let mut out = vec![0.0; y.len()];
+                // Fewer than five samples never reach this point; a derivative of zero is harmless.
+                let _ = central_4(y, self.rate_hz, &mut out);
+                out
+            }
+        }
+    }
+
+    /// y(t − delay) on the grid of y.
+    pub fn delayed(&self, y: &[f64], delay_s: f64) -> Vec<f64> {
+        match &self.derivative {
+            Derivative::Fourier { forward, inverse } => {
+                let turn = -std::f64::consts::TAU * self.rate_hz * delay_s / y.len() as f64;
+                transform(forward.as_ref(), inverse.as_ref(), y, |h, n| {
+                    let shift = Complex64::from_polar(1.0, turn * h as f64);
+                    if 2 * h == n { Complex64::new(shift.re, 0.0) } else { shift }
+                })
+            }
+            Derivative::Differences => (0..y.len())
+                .map(|k| {
+                    let at = (k as f64 - delay_s * self.rate_hz).clamp(0.0, (y.len() - 1) as f64);
+                    let left = (at.floor() as usize).min(y.len() - 2);
+                    let u = at - left as f64;
+                    y[left] * (1.0 - u) + y[left + 1] * u
+                })
+                .collect(),
+        }
+    }
+
+    /// Change of the link torques, Nm, when `arm` moves as `motion` instead of what was recorded.
+    pub fn torque_change(&self, arm: &Arm, motion: &Motion) -> JointSignals {
+        let mut changed = rigid_torque_along(&Model::new(arm), motion);
+        for j in 0..self.joints() {
+            changed.joint_mut(j).iter_mut().zip(self.link_nm.joint(j)).for_each(|(c, l)| *c -= l);
+        }
+        changed
+    }
+}
+
+/// Multiplies the spectrum of `y` by `factor(harmonic, n)`.
+fn transform(
+    forward: &dyn RealToComplex<f64>,
+    inverse: &dyn ComplexToReal<f64>,
+    y: &[f64],
+    factor: impl Fn(usize, usize) -> Complex64,
+) -> Vec<f64> {
+    let n = y.len();
+    let mut time = y.to_vec();
+    let mut spectrum = forward.make_output_vec();
+    let mut out = inverse.make_output_vec();
+    // Lengths are the plans' own, so that both transforms succeed.
+    let _ = forward.process(&mut time, &mut spectrum);
+    for (h, value) in spectrum.iter_mut().enumerate() {
+        *value *= factor(h, n) / n as f64;
+    }
+    spectrum[0].im = 0.0;
+    if n.is_multiple_of(2) {
+        spectrum[n / 2].im = 0.0;
+    }
+    let _ = inverse.process(&mut spectrum, &mut out);
+    out
+}
+
+/// An arm with the base parameters `theta`, and the constant torques that go with it, Nm.
+///
+/// Base parameters are combinations; of the many arms with the same combinations this is the one
+/// that differs from `nominal` in the kept parameters only. Every torque along every motion is that
+/// of the estimate, though a single body may come out unphysical.
+pub fn equivalent_arm(nominal: &Arm, set: &BaseSet, theta: &[f64]) -> (Arm, Vec<f64>) {
+    let layout = ParameterLayout::new(nominal.dof());
+    let full = set.parameterisation.count() >= layout.count_without_offsets();
+    let mut standard = vec![0.0; layout.count()];
+    if full {
+        standard = Model::new(nominal).standard_parameters();
+    }
+    let start = set.values(&standard);
+    for (k, (theta, start)) in theta.iter().zip(&start).enumerate() {
+        for &(index, coefficient) in set.column(k) {
+            standard[index] += coefficient * (theta - start);
+        }
+    }
+    let mut arm = nominal.clone();
+    let mut offset_nm = vec![0.0; nominal.dof()];
+    for (index, &value) in standard.iter().enumerate() {
+        match layout.parameter(index) {
+            Parameter::Body(body, k) => arm.joints[body].link.parameters[k] = value,
+            Parameter::RotorInertia(j) => arm.joints[j].drive.rotor_inertia_kg_m2 = value,
+            Parameter::Viscous(j) => arm.joints[j].drive.viscous_nm_s_rad = value,
+            Parameter::Coulomb(j) => arm.joints[j].drive.coulomb_nm = value,
+            Parameter::Offset(j) => offset_nm[j] = value,
+        }
+    }
+    (arm, offset_nm)
+}
+
+/// M_links q̈ + c + g of every sample, eight samples at a time.
+fn rigid_torque_along(model: &Model, motion: &Motion) -> JointSignals {
+    let (joints, n) = (motion.joints(), motion.samples());
+    let mut workspace = Workspace::<Lanes>::new(model);
+    let mut out = JointSignals::zeros(joints, n);
+    let zero = <Lanes as crate::dynamics::Real>::constant(0.0);
+    let (mut q, mut qd, mut qdd) = (vec![zero; joints], vec![zero; joints], vec![zero; joints]);
+    let mut torque = vec![zero; joints];
+    for start in (0..n).step_by(LANES) {
+        let count = LANES.min(n - start);
+        for j in 0..joints {
+            for lane in 0..count {
+                q[j].0[lane] = motion.q_rad.joint(j)[start + lane];
+                qd[j].0[lane] = motion.qd_rad_s.joint(j)[start + lane];
+                qdd[j].0[lane] = motion.qdd_rad_s2.joint(j)[start + lane];
+            }
+        }
+        rigid_torque(model, &mut workspace, &q, &qd, &qdd, &mut torque);
+        for (j, torque) in torque.iter().enumerate() {
+            out.joint_mut(j)[start..start + count].copy_from_slice(&torque.0[..count]);
+        }
+    }
+    out
+}

@@ -1,0 +1,294 @@
+//! Which families explain the residual: forward selection with refinement, exchange and removal.
+
+use rayon::prelude::*;
+
+use super::candidates::ripple::strongest_orders;
+use super::image::{Image, Span};
+use super::kind::Kind;
+use super::study::{Entry, Study};
+
+/// Chance that a log without faults is given a cause.
+pub const FALSE_ALARM: f64 = 0.002;
+/// Causes at most: a log that needs more has another kind of problem.
+const MOST_CAUSES: usize = 12;
+/// Families whose shapes are refined before one is chosen.
+const FINALISTS: usize = 10;
+/// Two effects are told apart with 99.9 % confidence and 90 % power where λ(1 − cos²) exceeds
+/// (z₀.₉₉₉ + z₀.₉)² = (3.09 + 1.28)².
+pub const TELLS_APART: f64 = 19.0;
+
+/// A family that was considered, at its best shape.
+#[derive(Debug, Clone)]
+pub struct Contender {
+    /// Family, site, shape and columns.
+    pub entry: Entry,
+    /// Twice the gain in log-likelihood.
+    pub statistic: f64,
+    /// Twice the log-evidence against no effect.
+    pub evidence: f64,
+}
+
+/// A cause that was kept, and what else it might be.
+#[derive(Debug, Clone)]
+pub struct Selected {
+    /// The cause.
+    pub contender: Contender,
+    /// Posterior probability of its class.
+    pub confidence: f64,
+    /// Others that the data cannot tell from it: family and site.
+    pub class: Vec<(usize, Option<usize>)>,
+    /// The others, best first.
+    pub rivals: Vec<Contender>,
+}
+
+/// The causes kept so far.
+pub struct Kept<'s, 'a> {
+    study: &'s Study<'a>,
+    causes: Vec<Contender>,
+}
+
+/// Adds families one by one while the data ask for it.
+pub fn select(study: &Study) -> Vec<Contender> {
+    let mut kept = Kept { study, causes: Vec::new() };
+    while kept.causes.len() < MOST_CAUSES {
+        let (others, residual) = kept.without(None);
+        let Some(best) = kept.contenders(None, &others, &residual).into_iter().next() else {
+            break;
+        };
+        if !kept.is_significant(&best, &others, &residual) {
+            break;
+        }
+        kept.causes.push(best);
+        if !kept.settle() {
+            break;
+        }
+    }
+    kept.causes
+}
+
+impl<'s, 'a> Kept<'s, 'a> {
+    /// `causes` found in another study of the same log (its load estimated with another model),
+    /// taken over into `study`, refined and judged.
+    pub fn taken_over(study: &'s Study<'a>, causes: Vec<Contender>) -> Self {
+        let again = causes.into_iter().filter_map(|cause| {
+            let Entry { family, site, shape, .. } = cause.entry;
+            Some(Contender { entry: study.entry(family, site, shape)?, ..cause })
+        });
+        let mut kept = Self { study, causes: again.collect() };
+        for c in 0..kept.causes.len() {
+            kept.refine(c);
+        }
+        kept
+    }
+
+    /// The causes.
+    pub fn causes(&self) -> &[Contender] {
+        &self.causes
+    }
+
+    /// The causes, judged.
+    pub fn selected(&self) -> Vec<Selected> {
+        (0..self.causes.len()).map(|c| self.judged(c)).collect()
+    }
+
+    /// The best shape of cause `c`, the others given.
+    fn refine(&mut self, c: usize) {
+        let (others, residual) = self.without(Some(c));
+        let current = &self.causes[c].entry;
+        if let Some((entry, statistic)) = self.study.refined(current, &others, &residual) {
+            let evidence = self.evidence(&entry, statistic);
+            self.causes[c] = Contender { entry, statistic, evidence };
+        }
+    }
+
+    /// Span of all causes but `left_out`, and the residual outside it.
+    pub fn without(&self, left_out: Option<usize>) -> (Span, Image) {
+        let mut span = Span::default();
+        for (_, cause) in self.causes.iter().enumerate().filter(|(c, _)| Some(*c) != left_out) {
+            for image in &cause.entry.images {
+                span.push(image);
+            }
+        }
+        let mut residual = self.study.residual.clone();
+        span.residualise(&mut residual);
+        (span, residual)
+    }
+
+    /// 2 ln of the evidence (Schwarz 1978) for adding `entry`: T − k ln n, less the price of having
+    /// looked at so many shapes and families.
+    fn evidence(&self, entry: &Entry, statistic: f64) -> f64 {
+        let study = self.study;
+        let n = study.statistic.sample_count(entry.site, study.residual.mean.len());
+        let grid = study.grid_size(entry.family, entry.site) as f64;
+        statistic
+            - entry.images.len() as f64 * n.ln()
+            - 2.0 * grid.ln()
+            - 2.0 * (study.hypotheses() as f64).ln()
+    }
+
+    /// The best shape of every family at every site that is free (`open` is the cause to be replaced,
+    /// if any), best first.
+    fn contenders(&self, open: Option<usize>, others: &Span, residual: &Image) -> Vec<Contender> {
+        let study = self.study;
+        let orders = self.ripple_orders(residual);
+        let taken = |entry: &Entry| {
+            let place = (entry.family, entry.site);
+            let is_taken = |c: &Contender| (c.entry.family, c.entry.site) == place;
+            !study.families[entry.family].is_repeatable()
+                && self
+                    .causes
+                    .iter()
+                    .enumerate()
+                    .any(|(c, cause)| Some(c) != open && is_taken(cause))
+        };
+        let mut best: Vec<Contender> = Vec::new();
+        let scores: Vec<Option<f64>> = study
+            .entries
+            .par_iter()
+            .chain(orders.par_iter())
+            .map(|entry| if taken(entry) { None } else { study.score(entry, others, residual) })
+            .collect();
+        for (entry, score) in study.entries.iter().chain(&orders).zip(scores) {
+            let Some(statistic) = score else { continue };
+            let evidence = self.evidence(entry, statistic);
+            let same =
+                |c: &&mut Contender| (c.entry.family, c.entry.site) == (entry.family, entry.site);
+            match best.iter_mut().find(same) {
+                Some(old) if old.statistic >= statistic => {}
+                Some(old) => *old = Contender { entry: entry.clone(), statistic, evidence },
+                None => best.push(Contender { entry: entry.clone(), statistic, evidence }),
+            }
+        }
+        best.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+        let (head, tail) = best.split_at(FINALISTS.min(best.len()));
+        let mut all: Vec<Contender> = head
+            .par_iter()
+            .map(|contender| match study.refined(&contender.entry, others, residual) {
+                Some((entry, statistic)) => {
+                    let evidence = self.evidence(&entry, statistic);
+                    Contender { entry, statistic, evidence }
+                }
+                None => contender.clone(),
+            })
+            .collect();
+        all.extend_from_slice(tail);
+        all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+        all
+    }
+
+    /// Ripple at the orders in which the residual has most power.
+    fn ripple_orders(&self, residual: &Image) -> Vec<Entry> {
+        let study = self.study;
+        let Some(family) = study.families.iter().position(|f| f.kind() == Kind::Ripple) else {
+            return Vec::new();
+        };
+        let Some(torque) = study.whitening.in_time(residual) else { return Vec::new() };
+        (0..study.scene.joints())
+            .into_par_iter()
+            .flat_map(|j| {
+                let shapes = strongest_orders(&study.scene, j, torque.joint(j));
+                shapes
+                    .into_iter()
+                    .filter_map(|s| study.entry(family, Some(j), s))
+                    .collect::<Vec<_>>()
+            })
+            .collect()
+    }
+
+    /// Whether chance explains `contender` in fewer than one log without faults in 500, all
+    /// families, sites and shapes counted, and the evidence is for it.
+    fn is_significant(&self, contender: &Contender, others: &Span, residual: &Image) -> bool {
+        let study = self.study;
+        let span = study.span(&contender.entry, others);
+        let single = study.statistic.probability(&span, residual);
+        let tests = study.entries.len() as f64;
+        contender.evidence > 0.0 && single * tests < FALSE_ALARM
+    }
+
+    /// Refines all causes jointly, exchanges those that another family now replaces, and drops those
+    /// that are not needed any more. `false` if the newest cause was dropped.
+    fn settle(&mut self) -> bool {
+        let newest = self.causes.len() - 1;
+        let new_site = self.causes[newest].entry.site;
+        for _ in 0..2 {
+            for c in 0..self.causes.len() {
+                self.refine(c);
+            }
+            let mut exchanged = false;
+            for c in 0..self.causes.len().saturating_sub(1) {
+                // Only what shares a joint with the newest can have stood in for it.
+                let site = self.causes[c].entry.site;
+                if site.is_some() && new_site.is_some() && site != new_site {
+                    continue;
+                }
+                let (others, residual) = self.without(Some(c));
+                let Some(best) = self.contenders(Some(c), &others, &residual).into_iter().next()
+                else {
+                    continue;
+                };
+                let current = &self.causes[c];
+                if best.evidence > current.evidence + 1.0
+                    && (best.entry.family, best.entry.site)
+                        != (current.entry.family, current.entry.site)
+                {
+                    self.causes[c] = best;
+                    exchanged = true;
+                }
+            }
+            if !exchanged {
+                break;
+            }
+        }
+        let mut newest_stays = true;
+        let mut c = 0;
+        let mut index = 0;
+        while c < self.causes.len() {
+            let (others, residual) = self.without(Some(c));
+            let needed = self.is_significant(&self.causes[c].clone(), &others, &residual);
+            if needed {
+                c += 1;
+            } else {
+                self.causes.remove(c);
+                newest_stays &= index != newest;
+            }
+            index += 1;
+        }
+        newest_stays
+    }
+
+    /// Confidence, class and rivals of cause `c`, the others given.
+    fn judged(&self, c: usize) -> Selected {
+        let study = self.study;
+        let (others, residual) = self.without(Some(c));
+        let contender = self.causes[c].clone();
+        let own = study.span(&contender.entry, &others);
+        // The signal of the cause as the data show it.
+        let mut signal = residual.clone();
+        own.residualise(&mut signal);
+        signal.scale(-1.0);
+        signal.add(1.0, &residual);
+        let size = signal.square();
+        let identity = (contender.entry.family, contender.entry.site);
+        let mut rivals = self.contenders(Some(c), &others, &residual);
+        rivals.retain(|r| (r.entry.family, r.entry.site) != identity);
+        let scale = contender.statistic / size.max(f64::MIN_POSITIVE);
+        let class: Vec<(usize, Option<usize>)> = rivals
+            .iter()
+            .filter(|rival| {
+                let explained = study.span(&rival.entry, &others).explained(&signal);
+                scale * (size - explained) < TELLS_APART
+            })
+            .map(|rival| (rival.entry.family, rival.entry.site))
+            .collect();
+        let top = rivals.iter().map(|r| r.evidence).fold(contender.evidence, f64::max).max(0.0);
+        let weight = |evidence: f64| (0.5 * (evidence - top)).exp();
+        let in_class = |r: &&Contender| class.contains(&(r.entry.family, r.entry.site));
+        let own_weight = weight(contender.evidence)
+            + rivals.iter().filter(in_class).map(|r| weight(r.evidence)).sum::<f64>();
+        let all = weight(0.0)
+            + weight(contender.evidence)
+            + rivals.iter().map(|r| weight(r.evidence)).sum::<f64>();
+        rivals.truncate(FINALISTS);
+        Selected { contender, confidence: own_weight / all, class, rivals }
+    }
+}

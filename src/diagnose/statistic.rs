@@ -1,0 +1,168 @@
+//! From the part of a residual that a family explains to a statistic and a probability.
+
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
+
+use super::image::{Image, Span};
+use super::whitening::Whitening;
+
+/// How evidence is counted.
+pub enum Statistic {
+    /// Rows are independent with variance one: the explained square is χ².
+    Exact,
+    /// A single run: residuals have a memory and hold what the model gets wrong.
+    Blocks {
+        /// Block of time of every row.
+        block_of: Vec<usize>,
+        /// Number of blocks B.
+        blocks: usize,
+        /// Rows per joint.
+        rows: usize,
+        /// Independent rows per joint: rows over the correlation time of the null residual.
+        effective: Vec<f64>,
+    },
+}
+
+impl Statistic {
+    /// For the rows of `whitening`, with the null model's `residual`.
+    pub fn new(whitening: &Whitening, residual: &Image, joints: usize) -> Self {
+        match whitening.blocks() {
+            None => Self::Exact,
+            Some(block_of) => {
+                let rows = block_of.len() / joints;
+                let effective = residual
+                    .mean
+                    .chunks_exact(rows)
+                    .map(|r| rows as f64 / correlation_rows(r))
+                    .collect();
+                Self::Blocks { blocks: block_of[rows - 1] + 1, block_of, rows, effective }
+            }
+        }
+    }
+
+    /// Twice the gain in log-likelihood when the residual loses what `span` explains.
+    ///
+    /// Exact: T = ‖P r‖². Blocks: T = n_e ln(S/(S − ‖P r‖²)) with S the square of the residual of the
+    /// joint (or all) and n_e the independent rows in it.
+    pub fn gain(&self, span: &Span, site: Option<usize>, residual: &Image) -> f64 {
+        let explained = span.explained(residual);
+        match self {
+            Self::Exact => explained,
+            Self::Blocks { rows, effective, .. } => {
+                let (square, effective) = match site {
+                    Some(j) => {
+                        let own = &residual.mean[j * rows..(j + 1) * rows];
+                        (own.iter().map(|r| r * r).sum::<f64>(), effective[j])
+                    }
+                    None => (residual.square(), effective.iter().sum()),
+                };
+                let left = (1.0 - explained / square).max(1e-6);
+                -effective * left.ln()
+            }
+        }
+    }
+
+    /// Samples that count in the penalty for a coefficient.
+    pub fn sample_count(&self, site: Option<usize>, all_rows: usize) -> f64 {
+        match (self, site) {
+            (Self::Exact, _) => all_rows as f64,
+            (Self::Blocks { effective, .. }, Some(j)) => effective[j],
+            (Self::Blocks { effective, .. }, None) => effective.iter().sum(),
+        }
+    }
+
+    /// Probability of at least this much by chance alone, one test.
+    ///
+    /// Exact: χ². Blocks: the Wald statistic bᵀV⁻¹b with V from the scatter of block sums, as
+    /// F(k, B − k).
+    pub fn probability(&self, span: &Span, residual: &Image) -> f64 {
+        let k = span.len();
+        match self {
+            Self::Exact => upper_chi_squared(span.explained(residual), k),
+            Self::Blocks { .. } => {
+                let coordinates = DVector::from_vec(span.coordinates(residual));
+                let Some((scatter, blocks)) = self.scatter(span, residual, &coordinates) else {
+                    return 1.0;
+                };
+                let Some(inverse) = scatter.try_inverse() else { return 1.0 };
+                if blocks <= k {
+                    return 1.0;
+                }
+                let wald = (coordinates.transpose() * inverse * &coordinates)[(0, 0)];
+                let f = wald * (blocks - k) as f64 / (k * (blocks - 1)) as f64;
+                FisherSnedecor::new(k as f64, (blocks - k) as f64).map_or(1.0, |d| d.sf(f))
+            }
+        }
+    }
+
+    /// Covariance of the coordinates on `span` from the scatter of block sums of what is left.
+    fn scatter(
+        &self,
+        span: &Span,
+        residual: &Image,
+        coordinates: &DVector<f64>,
+    ) -> Option<(DMatrix<f64>, usize)> {
+        let Self::Blocks { block_of, blocks, .. } = self else { return None };
+        let mut left = residual.clone();
+        span.residualise(&mut left);
+        let k = coordinates.len();
+        let mut sums = vec![DVector::<f64>::zeros(k); *blocks];
+        for (i, direction) in span.directions().iter().enumerate() {
+            for ((d, r), &block) in direction.mean.iter().zip(&left.mean).zip(block_of) {
+                sums[block][i] += d * r;
+            }
+        }
+        let mut scatter = DMatrix::zeros(k, k);
+        for sum in &sums {
+            scatter += sum * sum.transpose();
+        }
+        Some((scatter * (*blocks as f64 / (*blocks - 1).max(1) as f64), *blocks))
+    }
+
+    /// Covariance of the least-squares coefficients of `residual` on the columns of `span`.
+    pub fn covariance(&self, span: &Span, residual: &Image) -> DMatrix<f64> {
+        let coordinates = DVector::from_vec(span.coordinates(residual));
+        match self.scatter(span, residual, &coordinates) {
+            None => span.inverse_gram(),
+            Some((scatter, _)) => {
+                let inverse = span.inverse_triangle();
+                &inverse * scatter * inverse.transpose()
+            }
+        }
+    }
+
+    /// Half width of a 95 % interval in σ.
+    pub fn quantile_95(&self) -> f64 {
+        match self {
+            Self::Exact => 1.96,
+            Self::Blocks { blocks, .. } => {
+                let freedom = (*blocks - 1).max(1) as f64;
+                statrs::distribution::StudentsT::new(0.0, 1.0, freedom)
+                    .map_or(1.96, |t| t.inverse_cdf(0.975))
+            }
+        }
+    }
+}
+
+/// P(χ²_k > x).
+pub fn upper_chi_squared(x: f64, k: usize) -> f64 {
+    ChiSquared::new(k as f64).map_or(1.0, |d| d.sf(x.max(0.0)))
+}
+
+/// Integrated correlation time of a series, in samples: 1 + 2 Σ ρ up to the first ρ ≤ 0.
+fn correlation_rows(r: &[f64]) -> f64 {
+    let n = r.len();
+    let square: f64 = r.iter().map(|v| v * v).sum();
+    if square == 0.0 {
+        return 1.0;
+    }
+    let mut sum = 1.0;
+    for lag in 1..n / 4 {
+        let rho = r[lag..].iter().zip(r).map(|(a, b)| a * b).sum::<f64>() / square;
+        if rho <= 0.0 {
+            break;
+        }
+        sum += 2.0 * rho;
+    }
+    sum
+}

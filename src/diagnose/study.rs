@@ -1,0 +1,274 @@
+//! One log made ready for tests: whitened, the null model projected out, and every family's columns.
+
+use rayon::prelude::*;
+
+use super::candidates::{Candidate, Search, Shape};
+use super::error::DiagnoseError;
+use super::image::{Column, Image, Span};
+use super::scene::Scene;
+use super::statistic::Statistic;
+use super::whitening::{PeriodWhitening, RunWhitening, Whitening};
+use crate::base::BaseSet;
+use crate::identify::{Options, Regression};
+use crate::robot::Arm;
+
+/// A family at one site with one shape.
+#[derive(Debug, Clone)]
+pub struct Entry {
+    /// Index into the families.
+    pub family: usize,
+    /// Joint, or the arm as a whole.
+    pub site: Option<usize>,
+    /// Nonlinear parameters.
+    pub shape: Shape,
+    /// Whitened columns, the null model projected out.
+    pub images: Vec<Image>,
+}
+
+/// A log, its null model, and what may be added to it.
+pub struct Study<'a> {
+    /// The families.
+    pub families: &'a [Box<dyn Candidate>],
+    /// What the candidates see.
+    pub scene: Scene,
+    /// The regression of the null model.
+    pub regression: &'a Regression,
+    /// Where tests are made.
+    pub whitening: Whitening,
+    /// The null model's columns there.
+    pub null_columns: Vec<Image>,
+    /// Their span.
+    pub null: Span,
+    /// Torque minus null model there.
+    pub residual: Image,
+    /// How scores become statistics.
+    pub statistic: Statistic,
+    /// Every family at every site with every starting shape.
+    pub entries: Vec<Entry>,
+    /// Measured torque there.
+    pub torque: Image,
+}
+
+/// A column that keeps less than this share of its length outside the null model is not seen.
+const ABSORBED: f64 = 0.02;
+/// Steps of a golden-section search: the bracket shrinks to 1 %.
+const GOLDEN_STEPS: usize = 10;
+
+impl<'a> Study<'a> {
+    /// Prepares the log laid out in `regression`; `theta` and `sigma_nm` are the null model's fit.
+    pub fn new(
+        families: &'a [Box<dyn Candidate>],
+        (arm, set, options): (&Arm, &BaseSet, &Options),
+        regression: &'a Regression,
+        (theta, sigma_nm): (&[f64], &[f64]),
+        log: &str,
+    ) -> Result<Self, DiagnoseError> {
+        let scene = Scene::new(arm, set, theta, &regression.prepared);
+        let whitening = if scene.periodic {
+            Whitening::Periods(PeriodWhitening::new(regression, log)?)
+        } else {
+            Whitening::Run(RunWhitening::new(regression, options, sigma_nm)?)
+        };
+        let problem = &regression.problem;
+        let n = problem.samples;
+        let columns: Vec<Column> = (0..problem.parameters())
+            .map(|base| {
+                let part = |j: usize| {
+                    let at = problem.plan.base_indices(j).position(|b| b == base)?;
+                    Some((j, problem.panels[j].x[at * n..(at + 1) * n].to_vec()))
+                };
+                Column { parts: (0..problem.joints()).filter_map(part).collect() }
+            })
+            .collect();
+        let images: Vec<Image> =
+            columns.par_iter().map(|c| whitening.regression_image(c)).collect();
+        let mut null = Span::default();
+        for (k, image) in images.iter().enumerate() {
+            if !null.push(image) {
+                let parameter = set.name(k).to_owned();
+                return Err(DiagnoseError::NotExcited { log: log.to_owned(), parameter });
+            }
+        }
+        let torque = whitening.regression_image(&Column {
+            parts: problem.panels.iter().enumerate().map(|(j, p)| (j, p.y.clone())).collect(),
+        });
+        let mut residual = torque.clone();
+        null.residualise(&mut residual);
+        let statistic = Statistic::new(&whitening, &residual, problem.joints());
+        let mut study = Self {
+            families,
+            scene,
+            regression,
+            whitening,
+            null_columns: images,
+            null,
+            residual,
+            statistic,
+            entries: Vec::new(),
+            torque,
+        };
+        study.fill_entries();
+        Ok(study)
+    }
+
+    /// The same study with torques predicted by other base parameters.
+    pub fn with_estimate(mut self, arm: &Arm, set: &BaseSet, theta: &[f64]) -> Self {
+        self.scene = Scene::new(arm, set, theta, &self.regression.prepared);
+        self.fill_entries();
+        self
+    }
+
+    fn fill_entries(&mut self) {
+        let study = &*self;
+        let wanted: Vec<(usize, Option<usize>, Shape)> = study
+            .families
+            .iter()
+            .enumerate()
+            .flat_map(|(family, candidate)| {
+                let scene = &study.scene;
+                candidate.sites(scene.joints()).into_iter().flat_map(move |site| {
+                    let shapes = candidate.shapes(scene, site);
+                    shapes.into_iter().map(move |shape| (family, site, shape))
+                })
+            })
+            .collect();
+        let entries = wanted.par_iter().filter_map(|&(f, site, shape)| study.entry(f, site, shape));
+        self.entries = entries.collect();
+    }
+
+    /// A family's columns, the null model projected out; `None` if it absorbs them.
+    pub fn entry(&self, family: usize, site: Option<usize>, shape: Shape) -> Option<Entry> {
+        let columns = self.families[family].columns(&self.scene, site, shape);
+        let mut images = Vec::with_capacity(columns.len());
+        for column in &columns {
+            let mut image = self.whitening.image(column);
+            let length = image.square();
+            self.null.residualise(&mut image);
+            // Columns behind an absorbed one are parameters that go with it.
+            let left = image.square();
+            if left.is_nan() || left <= ABSORBED * ABSORBED * length {
+                break;
+            }
+            images.push(image);
+        }
+        (!images.is_empty()).then_some(Entry { family, site, shape, images })
+    }
+
+    /// Span of an entry outside the null model and outside `others`.
+    pub fn span(&self, entry: &Entry, others: &Span) -> Span {
+        let mut span = Span::default();
+        for image in &entry.images {
+            let mut image = image.clone();
+            others.residualise(&mut image);
+            span.push(&image);
+        }
+        span
+    }
+
+    /// Statistic of adding `entry` to `others`, given the residual of both null model and `others`;
+    /// `None` if its coefficients are physically impossible.
+    pub fn score(&self, entry: &Entry, others: &Span, residual: &Image) -> Option<f64> {
+        let span = self.span(entry, others);
+        if span.len() != entry.images.len() {
+            return None;
+        }
+        let possible = self.families[entry.family].is_possible(&span.solve(residual));
+        possible.then(|| self.statistic.gain(&span, entry.site, residual))
+    }
+
+    /// The best shape near `entry`, and its statistic.
+    pub fn refined(&self, entry: &Entry, others: &Span, residual: &Image) -> Option<(Entry, f64)> {
+        let start = (entry.clone(), self.score(entry, others, residual)?);
+        let search = self.families[entry.family].search();
+        if search == Search::None {
+            return Some(start);
+        }
+        let logarithmic = search == Search::Logarithmic;
+        let to = |value: f64| if logarithmic { value.ln() } else { value };
+        let from = |scaled: f64| if logarithmic { scaled.exp() } else { scaled };
+        let [low, high] = match self.bracket(entry) {
+            Some(bracket) => bracket,
+            None => return Some(start),
+        };
+        let (mut low, mut high) = (to(low), to(high));
+        const RATIO: f64 = 0.618_033_988_749_895;
+        let evaluate = |at: f64| -> Option<(Entry, f64)> {
+            let shape = Shape { value: from(at), ..entry.shape };
+            let entry = self.entry(entry.family, entry.site, shape)?;
+            let score = self.score(&entry, others, residual)?;
+            Some((entry, score))
+        };
+        let value =
+            |found: &Option<(Entry, f64)>| found.as_ref().map_or(f64::NEG_INFINITY, |f| f.1);
+        let mut inner = [high - RATIO * (high - low), low + RATIO * (high - low)];
+        let mut found = inner.map(evaluate);
+        let mut best = start;
+        for _ in 0..GOLDEN_STEPS {
+            for f in &found {
+                if let Some(f) = f.as_ref().filter(|f| f.1 > best.1) {
+                    best = f.clone();
+                }
+            }
+            if value(&found[0]) >= value(&found[1]) {
+                high = inner[1];
+                inner = [high - RATIO * (high - low), inner[0]];
+                found[1] = found[0].take();
+                found[0] = evaluate(inner[0]);
+            } else {
+                low = inner[0];
+                inner = [inner[1], low + RATIO * (high - low)];
+                found[0] = found[1].take();
+                found[1] = evaluate(inner[1]);
+            }
+        }
+        Some(best)
+    }
+
+    /// Where the nonlinear parameter of `entry` is searched: from the starting shape before it to the
+    /// one behind it, never beyond the smallest and largest.
+    fn bracket(&self, entry: &Entry) -> Option<[f64; 2]> {
+        let value = entry.shape.value;
+        if let Some(half_width) = self.families[entry.family].half_width(&self.scene, entry.site) {
+            return Some([value - half_width, value + half_width]);
+        }
+        let same = self.entries.iter().filter(|e| {
+            (e.family, e.site, e.shape.variant) == (entry.family, entry.site, entry.shape.variant)
+        });
+        let near = 1e-9 * value.abs();
+        let (mut low, mut high) = (value, value);
+        let mut below = f64::NEG_INFINITY;
+        let mut above = f64::INFINITY;
+        for other in same.map(|e| e.shape.value) {
+            if other < value - near {
+                below = below.max(other);
+            } else if other > value + near {
+                above = above.min(other);
+            }
+        }
+        if below.is_finite() {
+            low = below;
+        }
+        if above.is_finite() {
+            high = above;
+        }
+        (low < high).then_some([low, high])
+    }
+
+    /// Torque of the null model with base parameters `theta` on joint `j` alone.
+    pub fn torque_on(&self, j: usize, theta: &[f64]) -> Image {
+        let problem = &self.regression.problem;
+        let mut torque = vec![0.0; problem.samples];
+        problem.predict(j, theta, &mut torque);
+        self.whitening.regression_image(&Column::on(j, torque))
+    }
+
+    /// Number of sites of all families.
+    pub fn hypotheses(&self) -> usize {
+        self.families.iter().map(|f| f.sites(self.scene.joints()).len()).sum()
+    }
+
+    /// Starting shapes of a family at a site.
+    pub fn grid_size(&self, family: usize, site: Option<usize>) -> usize {
+        self.entries.iter().filter(|e| (e.family, e.site) == (family, site)).count().max(1)
+    }
+}

@@ -1,0 +1,242 @@
+//! What a diagnosis says, in numbers and in words.
+
+use serde::Serialize;
+
+use super::kind::Kind;
+
+/// Schema of the diagnosis JSON.
+pub const DIAGNOSE_SCHEMA: &str = "armid.diagnose/1";
+
+/// A physical parameter with its interval.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Estimate {
+    /// SI value.
+    pub value: f64,
+    /// SI unit.
+    pub unit: &'static str,
+    /// 95 % interval.
+    pub ci95: [f64; 2],
+}
+
+/// A named cause.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Cause {
+    /// Family.
+    pub kind: Kind,
+    /// Joint (1-based); null for the arm as a whole.
+    pub joint: Option<usize>,
+    /// What these data cannot tell from it, itself left out: kind, with `@joint` where the joint differs.
+    pub class: Vec<String>,
+    /// Posterior probability of the class.
+    pub confidence: f64,
+    /// Physical parameters.
+    pub parameters: std::collections::BTreeMap<&'static str, Estimate>,
+    /// Share of the explainable mean square that it removes, on data not used for the fit; null where no
+    /// data were left for that.
+    pub gain_fraction: Option<f64>,
+    /// What would separate it from its class; null where nothing has to be separated.
+    pub separating_experiment: Option<&'static str>,
+    /// √λ̂: size in standard deviations of the noise.
+    pub strength: f64,
+    /// The effect in words.
+    pub in_words: String,
+    /// The families that came next, and by how much evidence (2 ln) they lost.
+    pub rivals: Vec<Rival>,
+}
+
+/// A family that lost.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Rival {
+    /// Family.
+    pub kind: Kind,
+    /// Joint (1-based).
+    pub joint: Option<usize>,
+    /// 2 ln of the odds against it.
+    pub evidence_behind: f64,
+}
+
+/// Something is there and no family explains it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Unexplained {
+    /// Quantity on which it depends most clearly.
+    pub axis: &'static str,
+    /// Joint (1-based).
+    pub joint: usize,
+    /// Size of that dependence, Nm.
+    pub rms_nm: f64,
+    /// Axis value and torque, Nm, of the curve.
+    pub curve: Vec<[f64; 2]>,
+}
+
+/// Smallest effect of a family that this log would show.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DetectionLimit {
+    /// Family.
+    pub kind: Kind,
+    /// Joint (1-based).
+    pub joint: Option<usize>,
+    /// Name of the parameter.
+    pub parameter: &'static str,
+    /// Value that is found with probability `power`; null where the null model absorbs the effect.
+    pub value: Option<f64>,
+    /// SI unit.
+    pub unit: &'static str,
+    /// Probability of detection at that value.
+    pub power: f64,
+}
+
+/// Rms of residuals per joint, Nm.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Rms {
+    /// Per joint, Nm.
+    pub rms_nm: Vec<f64>,
+}
+
+/// How much is gained on a log that was not used.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct HeldOut {
+    /// The log.
+    pub log: String,
+    /// Without the causes, all samples.
+    pub before_rms_nm: Vec<f64>,
+    /// With the causes, all samples.
+    pub after_rms_nm: Vec<f64>,
+    /// Without the causes, samples in which the joint moves.
+    pub before_moving_rms_nm: Vec<f64>,
+    /// With the causes, samples in which the joint moves.
+    pub after_moving_rms_nm: Vec<f64>,
+    /// The manufacturer's feed-forward, all samples; null where it is not logged.
+    pub manufacturer_rms_nm: Option<Vec<f64>>,
+}
+
+/// A parameter of the simulation against the data.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Moved {
+    /// Base parameter.
+    pub name: String,
+    /// In the simulation.
+    pub simulation: f64,
+    /// In the data.
+    pub data: f64,
+    /// Of the difference.
+    pub sigma: f64,
+    /// Difference over σ.
+    pub z: f64,
+}
+
+/// The result of a diagnosis: the body of the JSON.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Diagnosis {
+    /// The log.
+    pub log: String,
+    /// Rms noise of one sample per joint from the scatter between periods, Nm; null for a single run.
+    pub noise_floor_nm: Option<Vec<f64>>,
+    /// Residual of the model without causes.
+    pub before: Rms,
+    /// What was found.
+    pub causes: Vec<Cause>,
+    /// What is there but not explained.
+    pub unexplained: Option<Unexplained>,
+    /// Residual of the extended model.
+    pub after: Rms,
+    /// Gains on other logs.
+    pub held_out: Vec<HeldOut>,
+    /// Parameters against the simulation.
+    pub moved_parameters: Vec<Moved>,
+    /// What would not be seen.
+    pub detection_limits: Vec<DetectionLimit>,
+    /// Probability that noise alone leaves this much behind the last cause; null for a single run.
+    pub lack_of_fit_probability: Option<f64>,
+    /// In one word.
+    pub verdict: Verdict,
+    /// In sentences.
+    pub sentences: Vec<String>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// In one word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Nothing that the log could show.
+    NothingFound,
+    /// Causes named, nothing left over.
+    CauseNamed,
+    /// Something is left that no family explains.
+    Unexplained,
+}
+
+impl Diagnosis {
+    /// The first screen.
+    pub(super) fn in_sentences(&self) -> Vec<String> {
+        let mut out: Vec<String> = self.causes.iter().map(Cause::sentence).collect();
+        if let Some(unexplained) = &self.unexplained {
+            out.push(format!(
+                "Joint {} shows {:.2} Nm (rms) that no known effect explains; it depends most clearly on the {}.",
+                unexplained.joint, unexplained.rms_nm, unexplained.axis
+            ));
+        }
+        if out.is_empty() {
+            out.push(match self.noise_floor_nm {
+                Some(_) => "Nothing found: what the model leaves is noise, as the scatter between periods shows; \
+                            the detection limits say what would have been seen."
+                    .into(),
+                None => "Nothing found above what a single run can show; the motion does not repeat, so that \
+                         the noise is judged from the residual itself."
+                    .into(),
+            });
+        }
+        out
+    }
+}
+
+impl Cause {
+    fn sentence(&self) -> String {
+        let place = self.joint.map_or("The model".to_owned(), |j| format!("Joint {j}'s model"));
+        let numbers: Vec<String> = self
+            .parameters
+            .iter()
+            .map(|(name, e)| {
+                let half = 0.5 * (e.ci95[1] - e.ci95[0]);
+                let name = name.trim_end_matches(&unit_suffix(e.unit)).replace('_', " ");
+                format!("{name} {}", pair(e.value, half, e.unit))
+            })
+            .collect();
+        let numbers = numbers.join(", ");
+        let mut text = match (self.kind.is_of_the_record(), self.joint) {
+            (true, None) => format!("The record has {} ({numbers}).", self.in_words),
+            (true, Some(j)) => format!("Joint {j}'s record has {} ({numbers}).", self.in_words),
+            (false, _) => format!("{place} misses {} ({numbers}).", self.in_words),
+        };
+        if let Some(gain) = self.gain_fraction {
+            text += &format!(
+                " Adding it removes {:.0} % of what the noise floor leaves to explain, on data not used for the fit.",
+                100.0 * gain.clamp(0.0, 1.0)
+            );
+        }
+        if !self.class.is_empty() {
+            let class = self.class.join(", ");
+            text += &format!(" These data cannot tell it from {class}");
+            if let Some(experiment) = self.separating_experiment {
+                text += &format!("; this would: {experiment}");
+            }
+            text.push('.');
+        }
+        text
+    }
+}
+
+/// The unit as parameter names carry it, such as `_nm`.
+fn unit_suffix(unit: &str) -> String {
+    format!("_{}", unit.to_lowercase().replace(['/', ' '], "_").replace("1_", "per_"))
+}
+
+/// `value ± half unit`, digits by the uncertainty.
+fn pair(value: f64, half: f64, unit: &str) -> String {
+    if !value.is_finite() || !half.is_finite() || half <= 0.0 {
+        return format!("{value:.3} {unit}").trim_end().to_owned();
+    }
+    let decimals = (1.0 - half.log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{value:.decimals$} ± {half:.decimals$} {unit}").trim_end().to_owned()
+}

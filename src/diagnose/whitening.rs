@@ -1,0 +1,413 @@
+//! The equations of a log in which noise is white: where every test is made.
+
+use std::sync::Arc;
+
+use nalgebra::{Complex, DMatrix};
+use realfft::{RealFftPlanner, RealToComplex};
+
+use super::error::DiagnoseError;
+use super::image::{Column, Image};
+use crate::identify::{Options, Regression};
+use crate::robot::JointSignals;
+use crate::signal::{Scratch, ZeroPhase};
+
+/// From torques in time to whitened rows.
+pub enum Whitening {
+    /// A motion that repeats: noise known from the scatter between periods.
+    Periods(PeriodWhitening),
+    /// A single run: rows of moving samples, divided by the scatter of the fit's residual.
+    Run(RunWhitening),
+}
+
+/// Per harmonic, with S the 6 × 6 noise covariance of one period's Fourier coefficients:
+/// rows √P L⁻¹ Ȳ_k of the mean period and L⁻¹ C_k of P − 1 orthonormal contrasts, S = L Lᴴ.
+///
+/// S is the scatter between periods, averaged over neighbouring harmonics, scaled by M/(M − N)
+/// (M complex degrees of freedom, N joints) so that ⟨Yᴴ S⁻¹ Y⟩ is that of the true covariance. Only
+/// harmonics in which the whole motion is known, and clearly, are used: beyond them the torque still
+/// holds what friction's corners do to the acceleration while the motion does not; and where the
+/// acceleration is noisy, what the null model leaves is correlated with its own columns, which shows up
+/// as any effect that it nearly absorbs.
+pub struct PeriodWhitening {
+    samples: usize,
+    periods: usize,
+    joints: usize,
+    forward: Arc<dyn RealToComplex<f64>>,
+    /// L⁻¹ per harmonic that is used, row-major N × N.
+    factors: Vec<Vec<Complex<f64>>>,
+}
+
+/// Rows of a single run: the regression's low-pass, then a weight per joint, and only samples in
+/// which the joint moves: at rest dry friction may be anything between ±Fc.
+pub struct RunWhitening {
+    filter: ZeroPhase,
+    first_sample: usize,
+    every: usize,
+    rows: usize,
+    /// Every so many rows are tested: behind a low-pass neighbours say the same.
+    thin: usize,
+    weights: Vec<f64>,
+    /// Per joint and row.
+    counts: Vec<Vec<bool>>,
+    /// Rows per block of time, for tests that allow noise with a memory.
+    block_rows: usize,
+}
+
+/// Harmonics averaged on each side for one covariance: at least so many, and a quarter of the
+/// harmonic's number.
+const NEIGHBOURS: usize = 12;
+/// Noise below this share of a joint's rms torque is not told from the rounding of a model.
+const FLOOR: f64 = 1e-4;
+/// Share of the harmonics of the motion that are used: at its end the products with the mass matrix
+/// lack what was cut off.
+const USED_HARMONICS: f64 = 0.8;
+/// Always used.
+const LEAST_HARMONICS: usize = 24;
+/// Rows kept of a single run, per second and hertz of its low-pass.
+const KEPT_RATE: f64 = 4.0;
+/// Blocks of a single run.
+const BLOCK_S: f64 = 2.0;
+/// A joint slower than this, rad/s, for as long as [`REST_S`] stands still.
+const REST_RAD_S: f64 = 0.02;
+const REST_S: f64 = 0.25;
+
+impl PeriodWhitening {
+    /// From the periods of a log.
+    pub fn new(regression: &Regression, log: &str) -> Result<Self, DiagnoseError> {
+        let problem = &regression.problem;
+        let (n, periods, joints) = (problem.samples, problem.periods, problem.joints());
+        let forward = RealFftPlanner::new().plan_fft_forward(n);
+        let mut whitening = Self { samples: n, periods, joints, forward, factors: Vec::new() };
+        let harmonics = n / 2 + 1;
+        let known = regression.prepared.processing.harmonics.iter().flatten();
+        let known = known.filter(|h| **h > 0).min().map_or(n / 2, |h| *h);
+        let complete = (USED_HARMONICS * known as f64) as usize;
+        let clear = clear_harmonics(&regression.prepared.motion.qdd_rad_s2, &*whitening.forward);
+        let used = complete.min(clear).max(LEAST_HARMONICS).min(n / 2);
+        // Running sums over harmonics of Σ_p D Dᴴ/(P − 1), D the deviation from the mean period.
+        let mut scatter = vec![DMatrix::<Complex<f64>>::zeros(joints, joints); harmonics];
+        let spectra: Vec<Vec<Complex<f64>>> = problem
+            .panels
+            .iter()
+            .flat_map(|panel| panel.y.chunks_exact(n))
+            .map(|period| whitening.spectrum(period))
+            .collect();
+        let mut power = vec![0.0; joints];
+        for (j, panel) in problem.panels.iter().enumerate() {
+            power[j] = panel.y.iter().map(|y| y * y).sum::<f64>() / panel.y.len() as f64;
+        }
+        for (k, scatter) in scatter.iter_mut().enumerate() {
+            for p in 0..periods {
+                let deviation = nalgebra::DVector::from_fn(joints, |j, _| {
+                    let of = |p: usize| spectra[j * periods + p][k];
+                    of(p) - (0..periods).map(of).sum::<Complex<f64>>() / periods as f64
+                });
+                *scatter += &deviation * deviation.adjoint() / Complex::from((periods - 1) as f64);
+            }
+        }
+        for k in 0..=used {
+            let reach = NEIGHBOURS.max(k / 4);
+            // The mean torque drifts more than its neighbours: it is left out of their average.
+            let range = k.saturating_sub(reach).max(1)..(k + reach + 1).min(harmonics);
+            let count = range.len();
+            let mut s = DMatrix::<Complex<f64>>::zeros(joints, joints);
+            for scatter in &scatter[range] {
+                s += scatter;
+            }
+            let freedom = (count * (periods - 1)) as f64;
+            s *= Complex::from(1.0 / count as f64 * freedom / (freedom - joints as f64).max(1.0));
+            if k == 0 || 2 * k == n {
+                s.iter_mut().for_each(|v| v.im = 0.0);
+            }
+            for j in 0..joints {
+                s[(j, j)] += FLOOR * FLOOR * power[j];
+            }
+            if k == 0 {
+                let inflation: Vec<f64> = (0..joints)
+                    .map(|j| (scatter[0][(j, j)].re / s[(j, j)].re).max(1.0).sqrt())
+                    .collect();
+                for i in 0..joints {
+                    for j in 0..joints {
+                        s[(i, j)] *= inflation[i] * inflation[j];
+                    }
+                }
+            }
+            let inverse = s.cholesky().and_then(|c| c.l().try_inverse());
+            let Some(inverse) = inverse else {
+                let frequency_hz = k as f64 * problem.rate_hz / n as f64;
+                return Err(DiagnoseError::NoNoise { log: log.to_owned(), frequency_hz });
+            };
+            whitening.factors.push(inverse.transpose().iter().copied().collect());
+        }
+        Ok(whitening)
+    }
+
+    /// Unitary Fourier coefficients of one period.
+    fn spectrum(&self, period: &[f64]) -> Vec<Complex<f64>> {
+        let mut time = period.to_vec();
+        let mut out = self.forward.make_output_vec();
+        // The lengths are the plan's own, so that the transform succeeds.
+        let _ = self.forward.process(&mut time, &mut out);
+        let scale = 1.0 / (self.samples as f64).sqrt();
+        out.iter_mut().for_each(|c| *c *= scale);
+        out
+    }
+
+    /// Whitened rows of one period's spectra (joint, coefficients), times `scale`.
+    fn rows(&self, spectra: &[(usize, Vec<Complex<f64>>)], scale: f64) -> Vec<f64> {
+        let rows = self.samples.min(2 * self.factors.len() - 1);
+        let mut out = vec![0.0; self.joints * rows];
+        let mut row = 0;
+        for (k, factor) in self.factors.iter().enumerate() {
+            let real = k == 0 || 2 * k == self.samples;
+            for i in 0..self.joints {
+                let mut sum = Complex::new(0.0, 0.0);
+                for (j, spectrum) in spectra.iter().filter(|(j, _)| *j <= i) {
+                    sum += factor[i * self.joints + j] * spectrum[k];
+                }
+                if real {
+                    out[row] = scale * sum.re;
+                    row += 1;
+                } else {
+                    out[row] = scale * std::f64::consts::SQRT_2 * sum.re;
+                    out[row + 1] = scale * std::f64::consts::SQRT_2 * sum.im;
+                    row += 2;
+                }
+            }
+        }
+        out
+    }
+
+    /// The adjoint of [`Self::rows`], per joint over one period.
+    fn in_time(&self, rows: &[f64]) -> JointSignals {
+        let n = self.samples;
+        let inverse = RealFftPlanner::new().plan_fft_inverse(n);
+        let mut spectra = vec![inverse.make_input_vec(); self.joints];
+        let mut row = 0;
+        for (k, factor) in self.factors.iter().enumerate() {
+            let real = k == 0 || 2 * k == n;
+            for i in 0..self.joints {
+                let value = if real {
+                    Complex::new(rows[row], 0.0)
+                } else {
+                    Complex::new(rows[row], rows[row + 1]) / std::f64::consts::SQRT_2
+                };
+                row += if real { 1 } else { 2 };
+                for (j, spectrum) in spectra.iter_mut().enumerate().take(i + 1) {
+                    spectrum[k] += factor[i * self.joints + j].conj() * value;
+                }
+            }
+        }
+        let mut out = JointSignals::zeros(self.joints, n);
+        let scale = 1.0 / (n as f64).sqrt();
+        for (j, spectrum) in spectra.iter_mut().enumerate() {
+            spectrum[0].im = 0.0;
+            if n.is_multiple_of(2) {
+                spectrum[n / 2].im = 0.0;
+            }
+            // The lengths are the plan's own, so that the transform succeeds.
+            let _ = inverse.process(spectrum, out.joint_mut(j));
+            out.joint_mut(j).iter_mut().for_each(|v| *v *= scale);
+        }
+        out
+    }
+
+    fn image(&self, column: &Column) -> Image {
+        let n = self.samples;
+        let repeats = column.parts.iter().all(|(_, y)| y.len() == n);
+        let weight = (self.periods as f64).sqrt();
+        if repeats {
+            let spectra: Vec<_> =
+                column.parts.iter().map(|(j, y)| (*j, self.spectrum(y))).collect();
+            return Image { mean: self.rows(&spectra, weight), contrast: Vec::new() };
+        }
+        let periods: Vec<Vec<(usize, Vec<Complex<f64>>)>> = (0..self.periods)
+            .map(|p| {
+                let part = |y: &'_ [f64]| {
+                    self.spectrum(if y.len() == n { y } else { &y[p * n..(p + 1) * n] })
+                };
+                column.parts.iter().map(|(j, y)| (*j, part(y))).collect()
+            })
+            .collect();
+        // Helmert's contrasts: period c against the mean of the periods before it.
+        let combine = |weights: &[f64]| -> Vec<(usize, Vec<Complex<f64>>)> {
+            let mut sum = periods[0].clone();
+            for (part, (_, spectrum)) in sum.iter_mut().enumerate() {
+                for (k, value) in spectrum.iter_mut().enumerate() {
+                    *value = weights.iter().zip(&periods).map(|(w, p)| p[part].1[k] * *w).sum();
+                }
+            }
+            sum
+        };
+        let mean = self.rows(&combine(&vec![1.0 / self.periods as f64; self.periods]), weight);
+        let mut contrast = Vec::with_capacity((self.periods - 1) * mean.len());
+        for c in 1..self.periods {
+            let scale = 1.0 / ((c * (c + 1)) as f64).sqrt();
+            let mut weights = vec![scale; c];
+            weights.push(-(c as f64) * scale);
+            contrast.extend(self.rows(&combine(&weights), 1.0));
+        }
+        Image { mean, contrast }
+    }
+}
+
+/// Harmonics over which the spectrum of an acceleration is averaged.
+const BAND: usize = 8;
+
+/// The harmonic, of the first joint to reach it, at which the spectrum of the acceleration is lowest: the
+/// motion's own falls with frequency, that of white noise in the velocity grows as its square.
+fn clear_harmonics(qdd_rad_s2: &JointSignals, forward: &dyn RealToComplex<f64>) -> usize {
+    let of_joint = |j: usize| {
+        let mut time = qdd_rad_s2.joint(j).to_vec();
+        let mut spectrum = forward.make_output_vec();
+        // The length is the plan's own, so that the transform succeeds.
+        let _ = forward.process(&mut time, &mut spectrum);
+        let power = |band: &[Complex<f64>]| band.iter().map(|c| c.norm_sqr()).sum::<f64>();
+        let bands: Vec<f64> = spectrum[1..].chunks_exact(BAND).map(power).collect();
+        // Bands that were cut off are empty.
+        let end = bands.iter().position(|b| *b < 1e-20 * bands[0]).unwrap_or(bands.len());
+        let lowest = (0..end).min_by(|&a, &b| bands[a].total_cmp(&bands[b])).unwrap_or(0);
+        BAND * (lowest + 1)
+    };
+    (0..qdd_rad_s2.joints()).map(of_joint).min().unwrap_or(usize::MAX)
+}
+
+impl RunWhitening {
+    /// From a single run and the standard deviation of its residual per joint, Nm.
+    pub fn new(
+        regression: &Regression,
+        options: &Options,
+        sigma_nm: &[f64],
+    ) -> Result<Self, DiagnoseError> {
+        let rate_hz = regression.prepared.processing.rate_hz;
+        let filter = ZeroPhase::new(options.cutoff_hz, options.order, rate_hz)?;
+        let rows = regression.problem.samples;
+        Ok(Self {
+            filter,
+            first_sample: regression.first_sample,
+            every: regression.every,
+            rows,
+            thin: ((rate_hz / regression.every as f64 / (KEPT_RATE * options.cutoff_hz)) as usize)
+                .max(1),
+            weights: sigma_nm.iter().map(|s| 1.0 / s).collect(),
+            counts: Self::moving_rows(regression),
+            block_rows: ((BLOCK_S * rate_hz / regression.every as f64) as usize).max(1),
+        })
+    }
+
+    /// Per joint and row of the regression, whether the joint moves.
+    pub fn moving_rows(regression: &Regression) -> Vec<Vec<bool>> {
+        let motion = &regression.prepared.motion;
+        let rest = (REST_S * regression.prepared.processing.rate_hz).ceil() as usize;
+        let rows = 0..regression.problem.samples;
+        (0..motion.joints())
+            .map(|j| {
+                let moves = moving(motion.qd_rad_s.joint(j), rest, rest / 4);
+                let at = |r: usize| moves[regression.first_sample + r * regression.every];
+                rows.clone().map(at).collect()
+            })
+            .collect()
+    }
+
+    fn filtered(&self, y: &[f64]) -> Vec<f64> {
+        let mut filtered = y.to_vec();
+        // The run is longer than the filter's memory, or there would be no regression of it.
+        let _ = self.filter.filter_in_place(&mut filtered, &mut Scratch::default());
+        filtered
+            .iter()
+            .skip(self.first_sample)
+            .step_by(self.every)
+            .take(self.rows)
+            .copied()
+            .collect()
+    }
+
+    fn image(&self, column: &Column, is_filtered: bool) -> Image {
+        let rows = self.rows.div_ceil(self.thin);
+        let mut mean = vec![0.0; rows * self.weights.len()];
+        for (j, y) in &column.parts {
+            let filtered = if is_filtered { y.clone() } else { self.filtered(y) };
+            let out = &mut mean[j * rows..(j + 1) * rows];
+            for (k, (out, value)) in
+                out.iter_mut().zip(filtered.iter().step_by(self.thin)).enumerate()
+            {
+                if self.counts[*j][k * self.thin] {
+                    *out += self.weights[*j] * value;
+                }
+            }
+        }
+        Image { mean, contrast: Vec::new() }
+    }
+}
+
+/// Samples in which a joint moves: not within a rest of `rest` samples or longer, nor `margin`
+/// samples beside one.
+fn moving(qd_rad_s: &[f64], rest: usize, margin: usize) -> Vec<bool> {
+    let n = qd_rad_s.len();
+    let mut moves = vec![true; n];
+    let mut start = 0;
+    for k in 0..=n {
+        if k < n && qd_rad_s[k].abs() < REST_RAD_S {
+            continue;
+        }
+        if k - start >= rest {
+            moves[start.saturating_sub(margin)..(k + margin).min(n)].fill(false);
+        }
+        start = k + 1;
+    }
+    moves
+}
+
+impl Whitening {
+    /// Rows of a torque signal given in time.
+    pub fn image(&self, column: &Column) -> Image {
+        match self {
+            Self::Periods(periods) => periods.image(column),
+            Self::Run(run) => run.image(column, false),
+        }
+    }
+
+    /// Rows of a column of the regression, which has been through its filter.
+    pub fn regression_image(&self, column: &Column) -> Image {
+        match self {
+            Self::Periods(periods) => periods.image(column),
+            Self::Run(run) => run.image(column, true),
+        }
+    }
+
+    /// Block of time of every row of [`Image::mean`]; `None` where rows are independent.
+    pub fn blocks(&self) -> Option<Vec<usize>> {
+        match self {
+            Self::Periods(_) => None,
+            Self::Run(run) => {
+                let rows = (0..run.rows).step_by(run.thin);
+                let one_joint: Vec<usize> = rows.map(|r| r / run.block_rows).collect();
+                Some(one_joint.repeat(run.weights.len()))
+            }
+        }
+    }
+
+    /// Wᵀr in time: its correlation with a torque signal is that signal's score. `None` for a single run.
+    pub fn in_time(&self, rows: &Image) -> Option<JointSignals> {
+        match self {
+            Self::Periods(periods) => Some(periods.in_time(&rows.mean)),
+            Self::Run(_) => None,
+        }
+    }
+
+    /// Torque in time (n samples) as the regression sees it: filtered and cut for a single run.
+    pub fn as_regressed(&self, y: &[f64]) -> Vec<f64> {
+        match self {
+            Self::Periods(_) => y.to_vec(),
+            Self::Run(run) => run.filtered(y),
+        }
+    }
+
+    /// Whether row `row` of joint `joint` in the regression's time counts (the joint moves).
+    pub fn counts(&self, joint: usize, row: usize) -> bool {
+        match self {
+            Self::Periods(_) => true,
+            Self::Run(run) => run.counts[joint][row],
+        }
+    }
+}

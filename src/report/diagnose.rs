@@ -1,0 +1,224 @@
+//! What `armid diagnose` shows: the verdict in words, the picture that convinces, the alternatives.
+
+use super::json::Program;
+use super::number::{percent, significant};
+use super::plot::{Axis, Colour, Grid, Mark};
+use super::{Column, Page, ReportError, Section, Status, Table, Verdict};
+use crate::diagnose::{self, Cause, Diagnosis, Finding, Kind};
+use crate::robot::Arm;
+
+/// The causes with their numbers.
+pub fn cause_table(diagnosis: &Diagnosis) -> Table {
+    let mut table = Table::new([
+        Column::text("cause"),
+        Column::number("joint", ""),
+        Column::text("parameter"),
+        Column::number("value", ""),
+        Column::text("95 % interval"),
+        Column::text("unit"),
+        Column::number("confidence", ""),
+        Column::number("strength/σ", ""),
+        Column::number("gain", ""),
+    ]);
+    for cause in &diagnosis.causes {
+        for (k, (name, estimate)) in cause.parameters.iter().enumerate() {
+            let once = |text: String| if k == 0 { text } else { String::new() };
+            let [low, high] = estimate.ci95.map(|v| significant(v, 4));
+            table.push([
+                once(cause.kind.to_string()),
+                once(joint(cause.joint)),
+                (*name).to_owned(),
+                significant(estimate.value, 4),
+                format!("{low} … {high}"),
+                estimate.unit.to_owned(),
+                once(percent(cause.confidence, 3)),
+                once(significant(cause.strength, 3)),
+                once(cause.gain_fraction.map_or("–".to_owned(), |g| percent(g, 3))),
+            ]);
+        }
+    }
+    table
+}
+
+/// Gains on logs that were not used.
+pub fn held_out_table(diagnosis: &Diagnosis) -> Table {
+    let mut table = Table::new([
+        Column::text("held-out log"),
+        Column::text("rms, Nm"),
+        Column::text("joints 1, 2, …"),
+    ]);
+    for log in &diagnosis.held_out {
+        let list = |values: &[f64]| {
+            values.iter().map(|v| significant(*v, 3)).collect::<Vec<_>>().join("  ")
+        };
+        let gain = |before: &[f64], after: &[f64]| {
+            let pairs = before.iter().zip(after);
+            pairs
+                .map(|(b, a)| format!("{:+.0} %", 100.0 * (a / b - 1.0)))
+                .collect::<Vec<_>>()
+                .join("  ")
+        };
+        let mut push = |what: &str, text: String| {
+            table.push([log.log.clone(), what.to_owned(), text]);
+        };
+        push("moving, before", list(&log.before_moving_rms_nm));
+        push("moving, after", list(&log.after_moving_rms_nm));
+        push("moving, change", gain(&log.before_moving_rms_nm, &log.after_moving_rms_nm));
+        push("all, before", list(&log.before_rms_nm));
+        push("all, after", list(&log.after_rms_nm));
+        push("all, change", gain(&log.before_rms_nm, &log.after_rms_nm));
+        if let Some(manufacturer) = &log.manufacturer_rms_nm {
+            push("all, manufacturer", list(manufacturer));
+        }
+    }
+    table
+}
+
+/// What would not have been seen.
+pub fn limit_table(diagnosis: &Diagnosis) -> Table {
+    let mut table = Table::new([
+        Column::text("found with 90 % probability from"),
+        Column::number("joint", ""),
+        Column::text("parameter"),
+        Column::number("value", ""),
+        Column::text("unit"),
+    ]);
+    for limit in &diagnosis.detection_limits {
+        table.push([
+            limit.kind.to_string(),
+            joint(limit.joint),
+            limit.parameter.to_owned(),
+            limit.value.map_or("absorbed".to_owned(), |v| significant(v, 3)),
+            limit.unit.to_owned(),
+        ]);
+    }
+    table
+}
+
+fn joint(joint: Option<usize>) -> String {
+    joint.map_or("all".to_owned(), |j| j.to_string())
+}
+
+/// The page.
+pub fn page(finding: &Finding, arm: &Arm, program: Program) -> Result<Page, ReportError> {
+    let diagnosis = &finding.diagnosis;
+    let status = match diagnosis.verdict {
+        diagnose::Verdict::NothingFound => Status::Good,
+        diagnose::Verdict::CauseNamed => Status::Warn,
+        diagnose::Verdict::Unexplained => Status::Bad,
+    };
+    let mut sentences = diagnosis.sentences.iter().cloned();
+    let list =
+        |values: &[f64]| values.iter().map(|v| significant(*v, 3)).collect::<Vec<_>>().join(", ");
+    let mut facts: Vec<String> = Vec::new();
+    let sentence = sentences.next().unwrap_or_default();
+    facts.extend(sentences);
+    facts.push(format!(
+        "Residual rms per joint: {} Nm before, {} Nm with the causes in the model.",
+        list(&diagnosis.before.rms_nm),
+        list(&diagnosis.after.rms_nm)
+    ));
+    if let Some(floor) = &diagnosis.noise_floor_nm {
+        facts.push(format!("Noise of one sample per joint: {} Nm.", list(floor)));
+    }
+    let verdict = Verdict { status, sentence, facts };
+    let subtitle = format!("{}, {}", arm.name, diagnosis.log);
+    let mut page = Page::new("What the model gets wrong", subtitle, verdict, program);
+    for cause in &diagnosis.causes {
+        page.push(cause_section(finding, cause)?);
+    }
+    if let Some(unexplained) = &diagnosis.unexplained {
+        let [x, y]: [Vec<f64>; 2] =
+            [0, 1].map(|k| unexplained.curve.iter().map(|point| point[k]).collect());
+        let mut grid =
+            Grid::new("", Axis::linear(unexplained.axis, ""), Axis::linear("torque", "Nm"));
+        let panel = grid.panel(format!("Joint {}", unexplained.joint));
+        grid.panels.push(panel.with("unexplained", &x, &y, Colour::MEASURED, Mark::DotsAndLine));
+        page.push(
+            Section::new("Not explained")
+                .paragraph("No known effect explains this part; the curve says on what it depends.")
+                .figure(
+                    grid.to_svg()?,
+                    "Mean of the unexplained torque along the axis on which it depends most.",
+                ),
+        );
+    }
+    if !diagnosis.causes.is_empty() {
+        page.push(Section::new("Causes in numbers").table(cause_table(diagnosis), ""));
+    }
+    if !diagnosis.held_out.is_empty() {
+        page.push(
+            Section::new("On logs that were not used")
+                .paragraph("The same processing for every model; nothing was fitted to these logs.")
+                .table(held_out_table(diagnosis), ""),
+        );
+    }
+    if !diagnosis.detection_limits.is_empty() {
+        page.push(
+            Section::new("What would not have been seen")
+                .details(Section::new("Detection limits").table(limit_table(diagnosis), "")),
+        );
+    }
+    Ok(page)
+}
+
+/// One cause: residual against the axis that matters before and after, and who lost.
+fn cause_section(finding: &Finding, cause: &Cause) -> Result<Section, ReportError> {
+    let title = match cause.joint {
+        Some(j) => format!("Joint {j}: {}", cause.in_words),
+        None => format!("All joints: {}", cause.in_words),
+    };
+    let j = cause.joint.map_or(0, |j| j - 1);
+    let (label, unit, axis) = axis(finding, cause.kind, j);
+    let mut grid = Grid::new("", Axis::linear(label, unit), Axis::linear("residual", "Nm"));
+    grid.columns = 2;
+    for (name, residual, colour) in [
+        ("before", &finding.before_nm, Colour::BEFORE),
+        ("after", &finding.after_nm, Colour::AFTER),
+    ] {
+        let panel = grid.panel(format!("Joint {}, {name}", j + 1));
+        grid.panels.push(panel.with("", &axis, residual.joint(j), colour, Mark::Dots));
+    }
+    let mut table = Table::new([
+        Column::text("alternative"),
+        Column::number("joint", ""),
+        Column::number("evidence behind, 2 ln", ""),
+        Column::text("told apart"),
+    ]);
+    for rival in &cause.rivals {
+        let in_class = cause.class.iter().any(|c| c.split('@').next() == Some(rival.kind.name()));
+        table.push([
+            rival.kind.to_string(),
+            joint(rival.joint),
+            significant(rival.evidence_behind, 3),
+            if in_class { "no" } else { "yes" }.to_owned(),
+        ]);
+    }
+    Ok(Section::new(title)
+        .figure(grid.to_svg()?, "Residual of the model without and with the causes.")
+        .table(table, "What else was tried in its place, best first"))
+}
+
+/// The quantity against which a family's residual is drawn.
+fn axis(finding: &Finding, kind: Kind, j: usize) -> (&'static str, &'static str, Vec<f64>) {
+    let scene = &finding.scene;
+    let pick = |y: &[f64]| finding.samples.iter().map(|&k| y[k]).collect::<Vec<f64>>();
+    match kind {
+        Kind::Stribeck | Kind::NonlinearViscous | Kind::AsymmetricFriction | Kind::Presliding => {
+            ("speed", "rad/s", pick(scene.motion.qd_rad_s.joint(j)))
+        }
+        Kind::LoadFriction => {
+            let signed = scene.link_nm.joint(j).iter().zip(scene.sign.joint(j));
+            (
+                "gear torque in the direction of motion",
+                "Nm",
+                pick(&signed.map(|(l, s)| l.abs() * s).collect::<Vec<_>>()),
+            )
+        }
+        Kind::TimeSkew => {
+            ("rate of the torque", "Nm/s", pick(&scene.derivative(scene.torque_nm.joint(j))))
+        }
+        Kind::TorqueGain | Kind::Saturation => ("torque", "Nm", pick(scene.torque_nm.joint(j))),
+        _ => ("angle", "rad", pick(scene.motion.q_rad.joint(j))),
+    }
+}

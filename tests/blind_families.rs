@@ -1,0 +1,99 @@
+//! Hide and find: one effect per family, made by the plant at a joint drawn by chance, and named from
+//! the log alone.
+
+use armid::diagnose::{Diagnoser, Diagnosis, Verdict};
+use armid::dynamics::Model;
+use armid::identify::Measurement;
+use armid::montecarlo::{Experiment, Scenario};
+use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+
+/// A scenario with white noise and the effects of `toml`.
+fn diagnose(seed: u64, toml: &str) -> Diagnosis {
+    let text = format!(
+        r#"
+        name = "blind"
+        robot = "ur5"
+        seed = {seed}
+        trials = 1
+        [motion]
+        trajectory = "ur5_identification"
+        periods = 6
+        [sensors]
+        torque_sd_nm = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15]
+        q_sd_rad = 2e-5
+        qd_sd_rad_s = 1e-3
+        {toml}
+        "#
+    );
+    let scenario = Scenario::from_toml(&text, "blind", std::path::Path::new(".")).unwrap();
+    let (arm, set) = (scenario.arm.clone(), scenario.set.clone());
+    let options = scenario.processing.clone();
+    let log = Experiment::prepare(scenario).unwrap().simulation.log(0).unwrap();
+    let model = Model::new(&arm);
+    let measurement = Measurement {
+        source: "blind",
+        time_s: &log.time_s,
+        q_rad: &log.q_rad,
+        qd_rad_s: &log.qd_rad_s,
+        torque_nm: &log.torque_nm,
+    };
+    let finding = Diagnoser::new(&arm, &model, &set, options).diagnose(&measurement, &[], None);
+    finding.unwrap().diagnosis
+}
+
+/// One effect of `kind` at a joint drawn from `joints`, with `parameters`.
+fn hide(seed: u64, kind: &str, joints: &[usize], parameters: &str) -> (usize, Diagnosis) {
+    let joint = joints[ChaCha8Rng::seed_from_u64(seed).random_range(0..joints.len())];
+    let toml = format!("[[effect]]\nkind = \"{kind}\"\njoint = {joint}\n{parameters}\n");
+    (joint, diagnose(seed, &toml))
+}
+
+/// Whether the strongest cause is `kind` (or its class) at `joint`.
+fn is_named(d: &Diagnosis, kind: &str, joint: Option<usize>) -> bool {
+    println!("{kind} at {joint:?}: {:?} {:#?}", d.verdict, d.sentences);
+    let strongest = d.causes.iter().max_by(|a, b| a.strength.total_cmp(&b.strength));
+    strongest.is_some_and(|c| {
+        c.joint == joint && (c.kind.name() == kind || c.class.iter().any(|k| k == kind))
+    })
+}
+
+#[test]
+fn one_hidden_effect_of_each_family_is_named_at_its_joint() {
+    let cases: [(u64, &str, &[usize], &str); 11] = [
+        (100, "stribeck", &[2, 3, 4, 5], "extra_nm = 1.2\nvs_rad_s = 0.1"),
+        (102, "load_friction", &[2, 3], "mu = 0.05"),
+        (103, "presliding", &[4, 5, 6], "stiffness_per_rad = 300.0"),
+        (104, "position_friction", &[1, 2, 3, 5], "amplitude_nm = 1.0\nphase_rad = 0.4"),
+        (105, "ripple", &[3, 4, 5], "amplitude_nm = 0.4\norder_per_turn = 202.0\nphase_rad = 0.3"),
+        (106, "elasticity", &[2, 3], "stiffness_nm_rad = 8000.0"),
+        (107, "torque_gain", &[2], "error_fraction = 0.05"),
+        (108, "current_offset", &[1, 4, 5], "offset_nm = 0.5"),
+        (109, "time_skew", &[2, 3], "delay_s = 0.004"),
+        (110, "velocity_lag", &[1, 2, 3, 4], "delay_s = 0.004"),
+        (111, "thermal_drift", &[1, 2, 3], "fraction = -0.3\ntime_constant_s = 60.0"),
+    ];
+    let mut missed = Vec::new();
+    for (seed, kind, joints, parameters) in cases {
+        let (joint, d) = hide(seed, kind, joints, parameters);
+        if !is_named(&d, kind, Some(joint)) {
+            missed.push(kind);
+        }
+    }
+    assert!(missed.is_empty(), "not named: {missed:?}");
+}
+
+#[test]
+fn a_tilted_base_and_late_torque_belong_to_the_whole_arm() {
+    let tilt = "[[effect]]\nkind = \"base_tilt\"\ntilt_x_rad = 0.01\ntilt_y_rad = -0.006\n";
+    assert!(is_named(&diagnose(1, tilt), "base_tilt", None));
+    let skew = "[[effect]]\nkind = \"time_skew\"\ndelay_s = 0.002\n";
+    assert!(is_named(&diagnose(2, skew), "time_skew", None));
+}
+
+#[test]
+fn clean_logs_have_no_cause() {
+    for seed in 0..10 {
+        let d = diagnose(seed, "");
+        assert_eq!(d.verdict, Verdict::NothingFound, "{:?}", d.sentences);
+    }
+}

@@ -1,0 +1,55 @@
+//! Effects made by physics in a drivetrain of this test, found in periodic logs.
+
+mod hidden;
+
+use armid::diagnose::{Finding, Kind, Verdict};
+use hidden::{Hidden, Law};
+
+fn only(finding: &Finding, kind: Kind, joint: Option<usize>) -> &armid::diagnose::Cause {
+    let d = &finding.diagnosis;
+    println!("{:#?}", d.sentences);
+    assert_eq!(
+        d.causes.len(),
+        1,
+        "{:?}",
+        d.causes.iter().map(|c| (c.kind, c.joint)).collect::<Vec<_>>()
+    );
+    let cause = &d.causes[0];
+    let in_class = cause.class.iter().any(|c| c == kind.name());
+    assert!(cause.kind == kind || in_class, "{} is not {kind}", cause.kind);
+    assert_eq!(cause.joint, joint);
+    assert_eq!(d.verdict, Verdict::CauseNamed);
+    cause
+}
+
+fn contains(cause: &armid::diagnose::Cause, parameter: &str, truth: f64) {
+    let e = &cause.parameters[parameter];
+    println!("{parameter}: {} in {:?}, truth {truth}", e.value, e.ci95);
+    // Twice the half width: an interval of 95 % would fail one seed in twenty by chance.
+    let half = e.ci95[1] - e.ci95[0];
+    assert!((e.value - truth).abs() < half, "{parameter} {} {:?}", e.value, e.ci95);
+}
+
+#[test]
+fn load_friction() {
+    let found = Hidden::on(1, Law::Load { mu: 0.03 }).diagnose(2);
+    contains(only(&found, Kind::LoadFriction, Some(2)), "mu", 0.03);
+}
+
+#[test]
+fn presliding() {
+    let found = Hidden::on(3, Law::Dahl { stiffness_per_rad: 300.0 }).diagnose(4);
+    contains(only(&found, Kind::Presliding, Some(4)), "stiffness_per_rad", 300.0);
+}
+
+#[test]
+fn elastic_gear() {
+    let found = Hidden::on(1, Law::Spring { stiffness_nm_rad: 25_000.0 }).diagnose(6);
+    contains(only(&found, Kind::Elasticity, Some(2)), "stiffness_nm_rad", 25_000.0);
+}
+
+#[test]
+fn torque_recorded_late() {
+    let found = Hidden::none().late(0.002).diagnose(7);
+    contains(only(&found, Kind::TimeSkew, None), "delay_s", 0.002);
+}

@@ -1,0 +1,194 @@
+//! A drivetrain with one hidden effect, and the log of the arm behind it.
+
+use armid::base::{BaseSet, Parameterisation};
+use armid::diagnose::{Diagnoser, Finding};
+use armid::dynamics::Model;
+use armid::excitation::{Excitation, FourierSeries};
+use armid::identify::{Measurement, Options};
+use armid::plant::{
+    Drivetrain, Measured, PerJoint, Plant, PlantConfig, RapierArm, SensorConfig, Sensors, Stage,
+};
+use armid::random::TrialStreams;
+use armid::robot::{Arm, JointSignals};
+
+/// What is hidden.
+#[derive(Debug, Clone, Copy)]
+pub enum Law {
+    Nothing,
+    Load { mu: f64 },
+    Dahl { stiffness_per_rad: f64 },
+    Spring { stiffness_nm_rad: f64 },
+}
+
+/// A hidden effect and where it sits.
+pub struct Hidden {
+    joint: usize,
+    law: Law,
+    late_s: f64,
+    periods: usize,
+}
+
+impl Hidden {
+    pub fn none() -> Self {
+        Self::on(0, Law::Nothing)
+    }
+
+    pub fn on(joint: usize, law: Law) -> Self {
+        Self { joint, law, late_s: 0.0, periods: 8 }
+    }
+
+    pub fn late(self, late_s: f64) -> Self {
+        Self { late_s, ..self }
+    }
+
+    /// Simulates a log with noise of `seed` and diagnoses it.
+    pub fn diagnose(&self, seed: u64) -> Finding {
+        let arm = Arm::built_in("ur5").unwrap();
+        let series = FourierSeries::built_in("ur5_identification").unwrap();
+        let excitation = Excitation::new(series, 2.0, self.periods).unwrap();
+        let config = PlantConfig::default();
+        let law = HiddenLaw::new(&arm, self.joint, self.law);
+        let mut plant = Plant::with_drivetrain(&arm, &arm, Box::new(law), &config).unwrap();
+        let mut recording = plant.run(&excitation, None).unwrap();
+        if self.late_s != 0.0 {
+            let samples = self.late_s * config.log_rate_hz;
+            recording.torque_nm = delayed(&recording.torque_nm, samples);
+        }
+        let sensors = SensorConfig {
+            torque_sd_nm: PerJoint::Each(vec![1.0, 1.0, 0.7, 0.15, 0.15, 0.15]),
+            q_sd_rad: PerJoint::All(2e-5),
+            qd_sd_rad_s: PerJoint::All(1e-3),
+            ..SensorConfig::default()
+        };
+        let sensors = Sensors::new(&sensors, &arm, config.log_rate_hz).unwrap();
+        let mut measured = Measured::like(&recording);
+        sensors.measure(&recording, &TrialStreams::new(seed, b"hidden", 0), &mut measured);
+        let model = Model::new(&arm);
+        let full = Parameterisation::full(arm.dof(), arm.torque_offsets);
+        let set = BaseSet::find(&arm, full).unwrap();
+        let mut diagnoser = Diagnoser::new(&arm, &model, &set, Options::default());
+        let measurement = Measurement {
+            source: "hidden",
+            time_s: &recording.time_s,
+            q_rad: &measured.q_rad,
+            qd_rad_s: &measured.qd_rad_s,
+            torque_nm: &measured.torque_nm,
+        };
+        diagnoser.diagnose(&measurement, &[], None).unwrap()
+    }
+}
+
+/// y(t − d) by Catmull–Rom interpolation, `samples` = d f_s.
+fn delayed(y: &JointSignals, samples: f64) -> JointSignals {
+    let n = y.samples();
+    let at = |s: &[f64], k: isize| s[k.clamp(0, n as isize - 1) as usize];
+    JointSignals::from_fn(y.joints(), n, |j, k| {
+        let s = y.joint(j);
+        let t = k as f64 - samples;
+        let (i, u) = (t.floor() as isize, t - t.floor());
+        let p: [f64; 4] = std::array::from_fn(|m| at(s, i + m as isize - 1));
+        p[1] + 0.5
+            * u
+            * (p[2] - p[0]
+                + u * (2.0 * p[0] - 5.0 * p[1] + 4.0 * p[2] - p[3]
+                    + u * (3.0 * (p[1] - p[2]) + p[3] - p[0])))
+    })
+}
+
+struct HiddenLaw {
+    arm: Arm,
+    joint: usize,
+    law: Law,
+    link_nm: Vec<f64>,
+}
+
+impl HiddenLaw {
+    fn new(arm: &Arm, joint: usize, law: Law) -> Self {
+        Self { arm: arm.clone(), joint, law, link_nm: vec![0.0; arm.dof()] }
+    }
+}
+
+impl Drivetrain for HiddenLaw {
+    fn states(&self) -> usize {
+        match self.law {
+            Law::Dahl { .. } => 1,
+            Law::Spring { .. } => 2,
+            _ => 0,
+        }
+    }
+
+    fn start(&mut self, arm: &mut RapierArm, q: &mut [f64], _: &mut [f64], states: &mut [f64]) {
+        for (j, joint) in self.arm.joints.iter().enumerate() {
+            let split = matches!(self.law, Law::Spring { .. }) && j == self.joint;
+            let rotor = if split { 0.0 } else { joint.drive.rotor_inertia_kg_m2 };
+            arm.set_rotor_inertia(j, rotor);
+        }
+        if let Law::Spring { .. } = self.law {
+            states[0] = q[self.joint];
+        }
+    }
+
+    fn fastest_decay_per_s(&self, inverse: &[f64]) -> f64 {
+        let slope = |d: &armid::robot::Drive| {
+            d.viscous_nm_s_rad + d.coulomb_nm / self.arm.friction_epsilon_rad_s
+        };
+        self.arm
+            .joints
+            .iter()
+            .enumerate()
+            .filter(|(j, _)| !(matches!(self.law, Law::Spring { .. }) && *j == self.joint))
+            .map(|(j, joint)| slope(&joint.drive) * inverse[j])
+            .fold(0.0, f64::max)
+    }
+
+    fn rates(
+        &mut self,
+        arm: &mut RapierArm,
+        stage: &Stage<'_>,
+        qdd: &mut [f64],
+        states_rate: &mut [f64],
+    ) {
+        let h = self.joint;
+        for (j, joint) in self.arm.joints.iter().enumerate() {
+            let v = stage.qd_rad_s[j];
+            let sign = (v / self.arm.friction_epsilon_rad_s).tanh();
+            let friction = joint.drive.viscous_nm_s_rad * v + joint.drive.coulomb_nm * sign;
+            self.link_nm[j] = stage.drive_torque_nm[j] - friction;
+        }
+        let drive = self.arm.joints[h].drive;
+        let v = stage.qd_rad_s[h];
+        let sign = (v / self.arm.friction_epsilon_rad_s).tanh();
+        match self.law {
+            Law::Nothing => {}
+            Law::Load { mu } => {
+                // The torque behind the gear: what is left of the drive's behind rotor and friction,
+                // where the rotor's share follows from the acceleration. A few rounds converge as μ^k.
+                let before = self.link_nm[h];
+                for _ in 0..4 {
+                    arm.forward_dynamics(stage.q_rad, stage.qd_rad_s, &self.link_nm, qdd);
+                    let transmitted = self.link_nm[h] - drive.rotor_inertia_kg_m2 * qdd[h];
+                    self.link_nm[h] = before - mu * transmitted.abs() * sign;
+                }
+            }
+            Law::Dahl { stiffness_per_rad } => {
+                let z = stage.states[0];
+                states_rate[0] = stiffness_per_rad * (v - v.abs() * z);
+                self.link_nm[h] += drive.coulomb_nm * (sign - z);
+            }
+            Law::Spring { stiffness_nm_rad } => {
+                // The arm's joint is the link; the motor's angle and speed are states. The drive and
+                // its controller see the link here.
+                let (angle, speed) = (stage.states[0], stage.states[1]);
+                let torque = stiffness_nm_rad * (angle - stage.q_rad[h])
+                    + 2.0 * (speed - v) * (0.1 * stiffness_nm_rad).sqrt();
+                let motor_sign = (speed / self.arm.friction_epsilon_rad_s).tanh();
+                let friction = drive.viscous_nm_s_rad * speed + drive.coulomb_nm * motor_sign;
+                let net = stage.drive_torque_nm[h] - friction - torque;
+                states_rate[0] = speed;
+                states_rate[1] = net / drive.rotor_inertia_kg_m2;
+                self.link_nm[h] = torque;
+            }
+        }
+        arm.forward_dynamics(stage.q_rad, stage.qd_rad_s, &self.link_nm, qdd);
+    }
+}
