@@ -375,7 +375,7 @@ impl Whitening {
         }
     }
 
-    /// Block of time of every row of [`Image::mean`]; `None` where rows are independent.
+    /// Block of time of every row of an image; `None` where rows are independent.
     pub fn blocks(&self) -> Option<Vec<usize>> {
         match self {
             Self::Periods(_) => None,
