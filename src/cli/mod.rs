@@ -2,9 +2,11 @@
 //!
 //! Enters: arguments. Leaves: files, text on the terminal and an exit code.
 
+mod arm_result;
 pub mod base;
 pub mod diagnose;
 pub mod excite;
+pub mod export;
 pub mod identify;
 pub mod montecarlo;
 mod prior;

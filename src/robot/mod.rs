@@ -3,6 +3,8 @@
 //! Enters: a built-in name, a robot file (TOML) or a URDF. Leaves: an immutable [`Arm`], and
 //! [`JointSignals`], the shape in which every later chapter holds one number per joint and sample.
 
+pub mod export;
+
 mod arm;
 mod error;
 mod file;

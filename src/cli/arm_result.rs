@@ -1,0 +1,144 @@
+//! The arm in a result of `armid identify --physical`.
+
+use std::path::Path;
+
+use serde::Deserialize;
+use thiserror::Error;
+
+use crate::dynamics::{Model, Parameter, ParameterLayout};
+use crate::report::identify::IDENTIFY_SCHEMA;
+use crate::robot::{Arm, RobotError};
+
+/// An identified arm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ArmResult {
+    /// The robot with the identified parameters.
+    pub arm: Arm,
+    /// Constant torque per joint, Nm; an [`Arm`] has no place for it.
+    pub offsets_nm: Vec<f64>,
+}
+
+/// A result file that holds no arm.
+#[derive(Debug, Error)]
+pub enum ResultError {
+    /// The file could not be read.
+    #[error("{file}: {source}")]
+    Read {
+        /// The file.
+        file: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Not a result of `armid identify`.
+    #[error("{file}: not a result of armid identify: {message}")]
+    Format {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        message: String,
+    },
+    /// Only combinations were identified.
+    #[error(
+        "{file}: it has no standard parameters, only combinations of them: run identify --physical"
+    )]
+    BaseOnly {
+        /// The file.
+        file: String,
+    },
+    /// The result is about another robot than the one given.
+    #[error("{file}: it is about \"{found}\", not \"{expected}\"")]
+    OtherRobot {
+        /// The file.
+        file: String,
+        /// Robot of the result.
+        found: String,
+        /// Robot given.
+        expected: String,
+    },
+    /// A parameter is unknown, missing, twice there or not a number.
+    #[error("{file}: standard parameter \"{name}\" {fault}")]
+    Parameter {
+        /// The file.
+        file: String,
+        /// Its name.
+        name: String,
+        /// What is wrong with it.
+        fault: &'static str,
+    },
+    /// The robot itself.
+    #[error(transparent)]
+    Robot(#[from] RobotError),
+}
+
+#[derive(Deserialize)]
+struct ResultFile {
+    schema: String,
+    robot: String,
+    standard_parameters: Option<Vec<Value>>,
+}
+
+#[derive(Deserialize)]
+struct Value {
+    name: String,
+    value: Option<f64>,
+}
+
+impl ArmResult {
+    /// Reads the result in `path`; it is about `robot`, or the built-in arm it names.
+    pub fn load(path: &Path, robot: Option<&str>) -> Result<Self, ResultError> {
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| ResultError::Read { file: file.clone(), source })?;
+        let format = |message: String| ResultError::Format { file: file.clone(), message };
+        let result: ResultFile =
+            serde_json::from_str(&text).map_err(|error| format(error.to_string()))?;
+        if result.schema != IDENTIFY_SCHEMA {
+            return Err(format(format!("its schema is \"{}\"", result.schema)));
+        }
+        let values = result.standard_parameters.filter(|values| !values.is_empty());
+        let values = values.ok_or_else(|| ResultError::BaseOnly { file: file.clone() })?;
+        let arm = Arm::load(robot.unwrap_or(&result.robot))?;
+        if arm.name != result.robot {
+            let (found, expected) = (result.robot, arm.name);
+            return Err(ResultError::OtherRobot { file, found, expected });
+        }
+        let standard = standard(&arm, &values).map_err(|(name, fault)| ResultError::Parameter {
+            file,
+            name,
+            fault,
+        })?;
+        let layout = ParameterLayout::new(arm.dof());
+        let offset = |j| standard[layout.index(Parameter::Offset(j))];
+        Ok(Self {
+            offsets_nm: (0..arm.dof()).map(offset).collect(),
+            arm: layout.apply(&standard, &arm),
+        })
+    }
+}
+
+/// The values in the order of the layout; offsets may be left out. The error is a name and what is
+/// wrong with it.
+fn standard(arm: &Arm, values: &[Value]) -> Result<Vec<f64>, (String, &'static str)> {
+    let layout = ParameterLayout::new(arm.dof());
+    let mut standard: Vec<Option<f64>> = vec![None; layout.count()];
+    for Value { name, value } in values {
+        let index = (0..layout.count())
+            .find(|&k| layout.name(k) == *name)
+            .ok_or_else(|| (name.clone(), "is not one of this arm"))?;
+        let value = value.filter(|v| v.is_finite());
+        let value = value.ok_or_else(|| (name.clone(), "is not a finite number"))?;
+        if standard[index].replace(value).is_some() {
+            return Err((name.clone(), "is there twice"));
+        }
+    }
+    let nothing = Model::new(arm).standard_parameters();
+    standard
+        .into_iter()
+        .enumerate()
+        .map(|(k, value)| match (value, layout.parameter(k)) {
+            (Some(value), _) => Ok(value),
+            (None, Parameter::Offset(_)) => Ok(nothing[k]),
+            (None, _) => Err((layout.name(k), "is missing")),
+        })
+        .collect()
+}

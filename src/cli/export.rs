@@ -1,0 +1,62 @@
+//! `armid export`: an identified arm for simulators.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::arm_result::ArmResult;
+use super::{CommandResult, Outcome};
+use crate::output::{check_writable, write_atomically};
+use crate::robot::export::{drive_file, mjcf, urdf};
+use crate::robot::{FixedFrame, UrdfArm, read_urdf};
+
+/// Write an identified arm as URDF or MJCF.
+#[derive(Debug, Args)]
+pub struct ExportArgs {
+    /// Result of `armid identify --physical --json`.
+    result: PathBuf,
+    /// Robot that the result is about, where it is not a built-in one: a .urdf or .toml file.
+    #[arg(long)]
+    robot: Option<String>,
+    /// Write a URDF, and beside it <name>.drives.toml with what a URDF has no place for.
+    #[arg(long, value_name = "FILE", required_unless_present = "mjcf")]
+    urdf: Option<PathBuf>,
+    /// Write an MJCF.
+    #[arg(long, value_name = "FILE")]
+    mjcf: Option<PathBuf>,
+}
+
+/// Runs the command.
+pub fn run(args: &ExportArgs) -> CommandResult {
+    let drives = args.urdf.as_ref().map(|path| path.with_extension("drives.toml"));
+    for path in [&args.urdf, &drives, &args.mjcf].into_iter().flatten() {
+        check_writable(path)?;
+    }
+    let ArmResult { arm, offsets_nm } = ArmResult::load(&args.result, args.robot.as_deref())?;
+    let frames = frames(args.robot.as_deref())?;
+    let write = |path: &Path, text: &str| -> Result<(), crate::output::OutputError> {
+        write_atomically(path, |file| file.write_all(text.as_bytes()))?;
+        println!("{}", path.display());
+        Ok(())
+    };
+    if let Some(path) = &args.urdf {
+        write(path, &urdf(&arm, &frames)?)?;
+    }
+    if let Some(path) = &drives {
+        write(path, &drive_file(&arm, &offsets_nm))?;
+    }
+    if let Some(path) = &args.mjcf {
+        write(path, &mjcf(&arm, &frames)?)?;
+        if offsets_nm.iter().any(|offset| *offset != 0.0) {
+            println!("note: torque offsets {offsets_nm:?} Nm have no place in an MJCF");
+        }
+    }
+    Ok(Outcome::Done)
+}
+
+/// Named frames of a robot that came as a URDF.
+fn frames(robot: Option<&str>) -> Result<Vec<FixedFrame>, Box<dyn std::error::Error>> {
+    let Some(file) = robot.filter(|name| name.ends_with(".urdf")) else { return Ok(Vec::new()) };
+    let UrdfArm { frames, .. } = read_urdf(&std::fs::read_to_string(file)?, file)?;
+    Ok(frames)
+}

@@ -1,0 +1,90 @@
+//! MJCF, MuJoCo's own format.
+
+use std::fmt::Write;
+
+use nalgebra::{Rotation3, UnitQuaternion};
+
+use super::xml::{about_com, escaped, frames_of, numbers};
+use super::{ExportError, UNKNOWN_TORQUE_NM, check, link_name};
+use crate::robot::{Arm, FixedFrame, Joint, Placement};
+
+/// The arm as MJCF, with `frames` as sites and one motor per joint.
+///
+/// `armature` is the rotor inertia, `damping` rv, `frictionloss` rc: MuJoCo's dry friction is
+/// a constraint that holds at standstill, not our tanh(q̇/ε), so the two differ below a few ε. Position
+/// limits and the motors' torque limits are written; speed and acceleration limits, ε, offsets and
+/// clearance capsules have no place.
+pub fn mjcf(arm: &Arm, frames: &[FixedFrame]) -> Result<String, ExportError> {
+    check(arm, frames.iter().map(|frame| frame.name.as_str()))?;
+    let mut out = String::new();
+    // Writing to a String cannot fail, so the results carry no information.
+    let _ = write!(
+        out,
+        "<mujoco model=\"{}\">\n  <compiler angle=\"radian\" autolimits=\"true\"/>\n  \
+         <option gravity=\"{}\" integrator=\"implicitfast\"/>\n  <worldbody>\n",
+        escaped(&arm.name),
+        numbers(arm.gravity_m_s2.iter()),
+    );
+    write_sites(&mut out, frames, 0);
+    for (body, joint) in arm.joints.iter().enumerate() {
+        write_body(&mut out, joint, body + 1);
+        write_sites(&mut out, frames, body + 1);
+    }
+    for depth in (1..=arm.dof()).rev() {
+        let _ = writeln!(out, "{}</body>", indent(depth));
+    }
+    out.push_str("  </worldbody>\n  <actuator>\n");
+    for joint in &arm.joints {
+        let limit = joint.limits.torque_nm.min(UNKNOWN_TORQUE_NM);
+        let name = escaped(&joint.name);
+        let _ = writeln!(
+            out,
+            "    <motor name=\"{name}\" joint=\"{name}\" ctrlrange=\"{}\"/>",
+            numbers([&-limit, &limit])
+        );
+    }
+    out.push_str("  </actuator>\n</mujoco>\n");
+    Ok(out)
+}
+
+/// Opens the body of a joint, `depth` bodies deep.
+fn write_body(out: &mut String, joint: &Joint, depth: usize) {
+    let (mass_kg, com, i) = about_com(&joint.link);
+    let margin = indent(depth);
+    let inertia = [i[(0, 0)], i[(1, 1)], i[(2, 2)], i[(0, 1)], i[(0, 2)], i[(1, 2)]];
+    let _ = write!(
+        out,
+        "{margin}<body name=\"{}\" {}>\n{margin}  <inertial pos=\"{}\" mass=\"{mass_kg}\" \
+         fullinertia=\"{}\"/>\n{margin}  <joint name=\"{}\" axis=\"0 0 1\" range=\"{}\" \
+         armature=\"{}\" damping=\"{}\" frictionloss=\"{}\"/>\n",
+        escaped(&link_name(&joint.name)),
+        pose(&joint.placement),
+        numbers(com.iter()),
+        numbers(&inertia),
+        escaped(&joint.name),
+        numbers(&joint.limits.position_rad),
+        joint.drive.rotor_inertia_kg_m2,
+        joint.drive.viscous_nm_s_rad,
+        joint.drive.coulomb_nm,
+    );
+}
+
+fn write_sites(out: &mut String, frames: &[FixedFrame], body: usize) {
+    for frame in frames_of(frames, body) {
+        let margin = indent(body + 1);
+        let name = escaped(&frame.name);
+        let _ = writeln!(out, "{margin}<site name=\"{name}\" {}/>", pose(&frame.placement));
+    }
+}
+
+fn indent(depth: usize) -> String {
+    "  ".repeat(depth + 1)
+}
+
+/// Position and quaternion (scalar first).
+fn pose(placement: &Placement) -> String {
+    let rotation = Rotation3::from_matrix_unchecked(placement.rotation);
+    let q = UnitQuaternion::from_rotation_matrix(&rotation);
+    let pos = numbers(placement.translation_m.iter());
+    format!("pos=\"{pos}\" quat=\"{}\"", numbers([&q.w, &q.i, &q.j, &q.k]))
+}

@@ -1,0 +1,194 @@
+//! Arms for other programs.
+//!
+//! Enters: an [`Arm`](super::Arm) whose bodies can exist, and named frames on them. Leaves: a URDF,
+//! the drive file with what a URDF has no place for, or an MJCF. All numbers are written so that
+//! they read back as the same bits.
+
+mod drives;
+mod mjcf;
+mod urdf;
+mod xml;
+
+use thiserror::Error;
+
+use super::arm::Arm;
+
+pub use drives::drive_file;
+pub use mjcf::mjcf;
+pub use urdf::urdf;
+
+/// The arm is not one that a simulator accepts.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum ExportError {
+    /// No mass distribution has these ten parameters.
+    #[error(
+        "the body of joint \"{joint}\" cannot exist (smallest eigenvalue of its pseudo-inertia \
+         {smallest:.3e}, must be positive): no simulator runs it; identify with --physical"
+    )]
+    Impossible {
+        /// Name of the joint that moves it.
+        joint: String,
+        /// Smallest eigenvalue.
+        smallest: f64,
+    },
+    /// A drive that gives energy.
+    #[error("joint \"{joint}\": {quantity} = {value} is negative; identify with --physical")]
+    Negative {
+        /// Name of the joint.
+        joint: String,
+        /// Which quantity.
+        quantity: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// A number that no file format has.
+    #[error("joint \"{joint}\": {quantity} = {value} is not a finite number")]
+    NotFinite {
+        /// Name of the joint.
+        joint: String,
+        /// Which quantity.
+        quantity: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// Two links or frames of one name.
+    #[error("the name \"{name}\" is used twice; rename the joint or the frame")]
+    DuplicateName {
+        /// The name.
+        name: String,
+    },
+}
+
+/// Written for a torque limit that is not known: simulators want a number, and take 0 literally.
+const UNKNOWN_TORQUE_NM: f64 = 1e9;
+
+/// Refuses an arm that could not run, and names that would collide.
+fn check<'a>(arm: &'a Arm, frames: impl Iterator<Item = &'a str>) -> Result<(), ExportError> {
+    for joint in &arm.joints {
+        let drive = [
+            ("rotor inertia", joint.drive.rotor_inertia_kg_m2),
+            ("viscous friction", joint.drive.viscous_nm_s_rad),
+            ("Coulomb friction", joint.drive.coulomb_nm),
+        ];
+        let name = || joint.name.clone();
+        for (quantity, value) in drive {
+            if !value.is_finite() {
+                return Err(ExportError::NotFinite { joint: name(), quantity, value });
+            }
+            if value < 0.0 {
+                return Err(ExportError::Negative { joint: name(), quantity, value });
+            }
+        }
+        if let Some(&value) = joint.link.parameters.iter().find(|p| !p.is_finite()) {
+            let quantity = "an inertial parameter";
+            return Err(ExportError::NotFinite { joint: name(), quantity, value });
+        }
+        let smallest = joint.link.consistency_margin();
+        if smallest <= 0.0 {
+            return Err(ExportError::Impossible { joint: name(), smallest });
+        }
+    }
+    let mut seen = std::collections::HashSet::from([BASE_LINK.to_owned()]);
+    let links = arm.joints.iter().map(|joint| link_name(&joint.name));
+    for name in links.chain(frames.map(str::to_owned)) {
+        if !seen.insert(name.clone()) {
+            return Err(ExportError::DuplicateName { name });
+        }
+    }
+    Ok(())
+}
+
+const BASE_LINK: &str = "base_link";
+
+/// Name of the link that a joint moves.
+fn link_name(joint: &str) -> String {
+    format!("{joint}_link")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::{FixedFrame, Placement, UrdfArm, read_urdf};
+
+    fn frames() -> Vec<FixedFrame> {
+        let frame = |name: &str, body, xyz, rpy| FixedFrame {
+            name: name.into(),
+            body,
+            placement: Placement::from_xyz_rpy(xyz, rpy),
+        };
+        vec![
+            frame("stand", 0, [0.1, 0.0, -0.3], [0.0, 0.0, 0.3]),
+            frame("tool & <tip>", 6, [0.0, 0.01, 0.1], [0.4, -1.2, 2.0]),
+        ]
+    }
+
+    /// Rotations go through three angles and back (a few roundings), moments through the centre of
+    /// mass; everything else comes back as written.
+    #[test]
+    fn an_arm_written_as_urdf_reads_back_as_the_same_arm() {
+        for name in crate::robot::built_in_names() {
+            let arm = Arm::built_in(name).unwrap();
+            let text = urdf(&arm, &frames()).unwrap();
+            let UrdfArm { arm: read, frames: read_frames, notices } =
+                read_urdf(&text, "x.urdf").unwrap();
+            assert_eq!((read.name.as_str(), read.dof()), (name, 6));
+            for (a, b) in arm.joints.iter().zip(&read.joints) {
+                assert_eq!(a.name, b.name);
+                assert_eq!(a.limits, b.limits);
+                assert_eq!(a.drive.viscous_nm_s_rad, b.drive.viscous_nm_s_rad);
+                assert_eq!(a.drive.coulomb_nm, b.drive.coulomb_nm);
+                assert_eq!(a.placement.translation_m, b.placement.translation_m);
+                assert!((a.placement.rotation - b.placement.rotation).norm() < 1e-14);
+                for (x, y) in a.link.parameters.iter().zip(&b.link.parameters) {
+                    assert!((x - y).abs() < 1e-14, "{name} {}: {x} {y}", a.name);
+                }
+            }
+            for (a, b) in frames().iter().zip(&read_frames) {
+                assert_eq!((&a.name, a.body), (&b.name, b.body));
+                assert!((a.placement.rotation - b.placement.rotation).norm() < 1e-14);
+                assert!((a.placement.translation_m - b.placement.translation_m).norm() < 1e-15);
+            }
+            for notice in notices {
+                let harmless = ["gravity", "rotor", "collision", "clear", "acceleration"];
+                let text = notice.to_string();
+                assert!(harmless.iter().any(|word| text.contains(word)), "{text}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_no_simulator_runs_is_not_written() {
+        let mut arm = Arm::built_in("ur5").unwrap();
+        arm.joints[3].drive.rotor_inertia_kg_m2 = -0.1;
+        let message = urdf(&arm, &[]).unwrap_err().to_string();
+        assert!(message.contains("wrist_1") && message.contains("--physical"), "{message}");
+        let mut arm = Arm::built_in("ur5").unwrap();
+        arm.joints[5].link.parameters[4] = 1.0;
+        let message = mjcf(&arm, &[]).unwrap_err().to_string();
+        assert!(message.contains("wrist_3") && message.contains("cannot exist"), "{message}");
+        let mut arm = Arm::built_in("ur5").unwrap();
+        arm.joints[1].link.parameters[0] = f64::NAN;
+        assert!(matches!(mjcf(&arm, &[]), Err(ExportError::NotFinite { .. })));
+        let mut arm = Arm::built_in("ur5").unwrap();
+        arm.joints[1].name = arm.joints[0].name.clone();
+        assert!(matches!(urdf(&arm, &[]), Err(ExportError::DuplicateName { .. })));
+    }
+
+    #[test]
+    fn an_unknown_torque_limit_is_a_large_number() {
+        let mut arm = Arm::built_in("ur5").unwrap();
+        arm.joints[0].limits.torque_nm = f64::INFINITY;
+        assert!(urdf(&arm, &[]).unwrap().contains("effort=\"1000000000\""));
+        assert!(mjcf(&arm, &[]).unwrap().contains("-1000000000 1000000000"));
+    }
+
+    #[test]
+    fn the_drive_file_has_what_a_urdf_has_not() {
+        let arm = Arm::built_in("ur5").unwrap();
+        let file: toml::Table = toml::from_str(&drive_file(&arm, &[0.5; 6])).unwrap();
+        let joints = file["joint"].as_array().unwrap();
+        assert_eq!(joints[2]["rotor_inertia_kg_m2"].as_float(), Some(1.6));
+        assert_eq!(joints[5]["torque_offset_nm"].as_float(), Some(0.5));
+        assert_eq!(file["friction_epsilon_rad_s"].as_float(), Some(0.02));
+    }
+}

@@ -1,0 +1,94 @@
+//! URDF: kinematics, inertias, limits and friction.
+
+use std::fmt::Write;
+
+use nalgebra::Rotation3;
+
+use super::xml::{about_com, escaped, frames_of, numbers};
+use super::{BASE_LINK, ExportError, UNKNOWN_TORQUE_NM, check, link_name};
+use crate::robot::{Arm, FixedFrame, Joint, Placement};
+
+/// The arm as URDF, with `frames` as links without mass.
+///
+/// - One link per body, named `<joint>_link` behind `base_link`; its frame is our joint frame, so
+///   every axis is `0 0 1`; inertia about the centre of mass, in the link's axes.
+/// - `damping` is rv in Nm s/rad, `friction` rc in Nm (tanh(q̇/ε) in our model, a sign or
+///   a constraint in others).
+/// - Rotor inertia, acceleration limit, gear ratio, torque constant, ε, torque offsets and gravity have no place: they
+///   are in the [`drive_file`](super::drive_file). Clearance capsules are left out.
+pub fn urdf(arm: &Arm, frames: &[FixedFrame]) -> Result<String, ExportError> {
+    check(arm, frames.iter().map(|frame| frame.name.as_str()))?;
+    let mut out = String::from("<?xml version=\"1.0\"?>\n");
+    // Writing to a String cannot fail, so the results carry no information.
+    let _ = writeln!(out, "<robot name=\"{}\">", escaped(&arm.name));
+    let _ = writeln!(out, "  <link name=\"{BASE_LINK}\"/>");
+    write_frames(&mut out, frames, 0, BASE_LINK);
+    let mut parent = BASE_LINK.to_owned();
+    for (body, joint) in arm.joints.iter().enumerate() {
+        let child = link_name(&joint.name);
+        write_link(&mut out, joint, &child);
+        write_joint(&mut out, joint, &parent, &child);
+        write_frames(&mut out, frames, body + 1, &child);
+        parent = child;
+    }
+    out.push_str("</robot>\n");
+    Ok(out)
+}
+
+fn write_link(out: &mut String, joint: &Joint, name: &str) {
+    let (mass_kg, com, i) = about_com(&joint.link);
+    let _ = write!(
+        out,
+        "  <link name=\"{name}\">\n    <inertial>\n      <origin xyz=\"{com}\" rpy=\"0 0 0\"/>\n      \
+         <mass value=\"{mass_kg}\"/>\n      <inertia ixx=\"{}\" ixy=\"{}\" ixz=\"{}\" iyy=\"{}\" \
+         iyz=\"{}\" izz=\"{}\"/>\n    </inertial>\n  </link>\n",
+        numbers([&i[(0, 0)]]),
+        numbers([&i[(0, 1)]]),
+        numbers([&i[(0, 2)]]),
+        numbers([&i[(1, 1)]]),
+        numbers([&i[(1, 2)]]),
+        numbers([&i[(2, 2)]]),
+        name = escaped(name),
+        com = numbers(com.iter()),
+    );
+}
+
+fn write_joint(out: &mut String, joint: &Joint, parent: &str, child: &str) {
+    let [lower, upper] = joint.limits.position_rad;
+    let _ = write!(
+        out,
+        "  <joint name=\"{name}\" type=\"revolute\">\n    {origin}\n    <parent link=\"{parent}\"/>\n    \
+         <child link=\"{child}\"/>\n    <axis xyz=\"0 0 1\"/>\n    <limit lower=\"{lower}\" \
+         upper=\"{upper}\" effort=\"{effort}\" velocity=\"{velocity}\"/>\n    <dynamics damping=\"{damping}\" \
+         friction=\"{friction}\"/>\n  </joint>\n",
+        name = escaped(&joint.name),
+        origin = origin(&joint.placement),
+        parent = escaped(parent),
+        child = escaped(child),
+        effort = joint.limits.torque_nm.min(UNKNOWN_TORQUE_NM),
+        velocity = joint.limits.velocity_rad_s,
+        damping = joint.drive.viscous_nm_s_rad,
+        friction = joint.drive.coulomb_nm,
+    );
+}
+
+fn write_frames(out: &mut String, frames: &[FixedFrame], body: usize, parent: &str) {
+    for frame in frames_of(frames, body) {
+        let name = escaped(&frame.name);
+        let _ = write!(
+            out,
+            "  <link name=\"{name}\"/>\n  <joint name=\"{name}_fixed\" type=\"fixed\">\n    {}\n    \
+             <parent link=\"{}\"/>\n    <child link=\"{name}\"/>\n  </joint>\n",
+            origin(&frame.placement),
+            escaped(parent),
+        );
+    }
+}
+
+/// Translation and fixed-axis roll, pitch, yaw.
+fn origin(placement: &Placement) -> String {
+    let rotation = Rotation3::from_matrix_unchecked(placement.rotation);
+    let (roll, pitch, yaw) = rotation.euler_angles();
+    let xyz = numbers(placement.translation_m.iter());
+    format!("<origin xyz=\"{xyz}\" rpy=\"{}\"/>", numbers([&roll, &pitch, &yaw]))
+}
