@@ -141,6 +141,7 @@ fn a_urdf_that_is_read_again_is_the_same_arm() {
         let mut back = read.arm;
         // What a URDF has no place for.
         back.gravity_m_s2 = arm.gravity_m_s2;
+        back.friction_epsilon_rad_s = arm.friction_epsilon_rad_s;
         for (written, read) in arm.joints.iter_mut().zip(&back.joints) {
             assert_eq!(read.drive.viscous_nm_s_rad, written.drive.viscous_nm_s_rad);
             written.drive.rotor_inertia_kg_m2 = 0.0;

@@ -8,8 +8,10 @@ use super::{CommandResult, Outcome};
 use crate::base::{BaseSet, Parameterisation};
 use crate::dynamics::Model;
 use crate::identify::covariance::CovarianceKind;
+use crate::identify::physical::{self, PhysicalOptions, PriorWeight};
 use crate::identify::{
-    Estimator, FitError, Identifier, IdentifyError, Measurement, Options, Regression,
+    Estimator, FitError, Identification, Identifier, IdentifyError, Measurement, Options,
+    Regression,
 };
 use crate::log::{Layout, Log, read_log};
 use crate::output::check_writable;
@@ -36,6 +38,13 @@ pub struct IdentifyArgs {
     /// Logs to validate on: nothing is fitted to them.
     #[arg(long, num_args = 1..)]
     validate: Vec<PathBuf>,
+    /// Also estimate standard parameters that an arm can have, for simulators.
+    #[arg(long)]
+    physical: bool,
+    /// Weight of the robot file's values in them, or auto for cross-validation: 1/s² makes a relative
+    /// deviation of s as unlikely as one σ of noise.
+    #[arg(long, requires = "physical", default_value = "1e-4")]
+    prior_weight: PriorWeight,
     /// Write the result as JSON.
     #[arg(long)]
     json: Option<PathBuf>,
@@ -203,13 +212,23 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
     for log in &validation_logs {
         validations.push(validate(&arm, &mut identifier, log, &identification.fit.theta)?);
     }
-    let result = IdentifyResult::of(&training, &validations)?;
+    let mut result = IdentifyResult::of(&training, &validations)?;
+    if args.physical {
+        let options =
+            PhysicalOptions { prior_weight: args.prior_weight, ..PhysicalOptions::default() };
+        let Identification { fit, covariance, .. } = &identification;
+        let estimate = physical::solve(&arm, &set, fit, covariance, &options)?;
+        result.set_physical(&estimate, &training);
+    }
     println!("{}", parameter_table(&result).to_text());
     println!("{}", residual_table(&result).to_text());
     for warning in &result.warnings {
         println!("note: {warning}");
     }
     println!("\n{}", result.sentence());
+    for fact in result.physical().map_or_else(Vec::new, |physical| physical.facts()) {
+        println!("{fact}");
+    }
     if let Some(path) = &args.json {
         Document { schema: IDENTIFY_SCHEMA, program: &program, body: &result }.write(path)?;
     }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
+use super::arm_result::ArmResult;
 use super::{CommandResult, Outcome};
 use crate::dynamics::Model;
 use crate::dynamics::ParameterLayout;
@@ -21,6 +22,12 @@ pub struct SimulateArgs {
     /// Scenario file; sims/default.toml (built in) where left out.
     #[arg(long)]
     scenario: Option<PathBuf>,
+    /// Simulate the arm of this result of `armid identify --physical` instead of the scenario's.
+    #[arg(long, value_name = "RESULT.json")]
+    arm: Option<PathBuf>,
+    /// Robot that the result is about, where it is not a built-in one.
+    #[arg(long, requires = "arm")]
+    robot: Option<String>,
     /// The log.
     #[arg(long)]
     out: PathBuf,
@@ -76,7 +83,20 @@ pub fn run(args: &SimulateArgs) -> CommandResult {
     for path in [Some(&args.out), args.truth.as_ref()].into_iter().flatten() {
         check_writable(path)?;
     }
-    let simulation = Simulation::run(Scenario::load(args.scenario.as_deref())?)?;
+    let mut scenario = Scenario::load(args.scenario.as_deref())?;
+    if let Some(path) = &args.arm {
+        let ArmResult { arm, offsets_nm } = ArmResult::load(path, args.robot.as_deref())?;
+        if arm.dof() != scenario.arm.dof() {
+            let (found, expected) = (arm.dof(), scenario.arm.dof());
+            let file = path.display();
+            return Err(format!("{file}: {found} joints, the scenario's arm has {expected}").into());
+        }
+        if offsets_nm.iter().any(|offset| *offset != 0.0) {
+            eprintln!("note: the plant has no torque offsets; left out: {offsets_nm:?} Nm");
+        }
+        scenario.arm = arm;
+    }
+    let simulation = Simulation::run(scenario)?;
     let measured = simulation.log(args.trial)?;
     let scenario = &simulation.scenario;
     let samples = measured.time_s.len();
@@ -110,7 +130,8 @@ pub fn run(args: &SimulateArgs) -> CommandResult {
             lambda: size.map(|s| s.lambda),
             lambda_sim: size.map(|s| s.lambda_sim),
         };
-        let inputs = args.scenario.iter().map(|file| Input::of(file)).collect::<Result<_, _>>()?;
+        let files = args.scenario.iter().chain(&args.arm);
+        let inputs = files.map(|file| Input::of(file)).collect::<Result<_, _>>()?;
         let program = Program::new(std::env::args(), Some(scenario.seed), inputs);
         Document { schema: "armid.truth/1", program: &program, body: &truth }.write(path)?;
     }

@@ -6,10 +6,12 @@ use serde::Serialize;
 
 use super::json::Program;
 use super::number::{significant, with_sigma};
+use super::physical::{Physical, StandardParameter, standard_parameters};
 use super::plot::{Axis, Colour, Grid, IntervalPlot, IntervalRow, Mark};
 use super::{Column, Page, ReportError, Section, Status, Table, Verdict};
 use crate::base::BaseSet;
 use crate::identify::covariance::CovarianceKind;
+use crate::identify::physical::PhysicalEstimate;
 use crate::identify::{
     Condition, Estimator, FitError, Identification, Prediction, Processing, Regression, Residual,
     gravity_ratio, identifies_the_arm, not_identified,
@@ -130,7 +132,9 @@ pub struct Result {
     covariance_reason: &'static str,
     base_parameters: Vec<BaseParameter>,
     /// Null: only combinations are known.
-    standard_parameters: Option<Vec<()>>,
+    standard_parameters: Option<Vec<StandardParameter>>,
+    /// How the standard parameters were found; null without `--physical`.
+    physical: Option<Physical>,
     residual: ResidualJson,
     noise_floor_nm: Option<Vec<f64>>,
     condition: Condition,
@@ -259,6 +263,7 @@ impl Result {
             covariance_reason: identification.covariance_reason,
             base_parameters,
             standard_parameters: None,
+            physical: None,
             residual: identification.residual().into(),
             noise_floor_nm: identification.replicates.as_ref().map(|r| r.sigma.clone()),
             condition: Condition::of(&regression.problem, set)?,
@@ -268,6 +273,21 @@ impl Result {
             warnings,
             rows: Rows::of(training.logs),
         })
+    }
+
+    /// Adds standard parameters that an arm can have.
+    pub fn set_physical(&mut self, estimate: &PhysicalEstimate, training: &Training) {
+        let problem = &training.regression.problem;
+        self.standard_parameters = Some(standard_parameters(estimate, training.arm));
+        self.physical = Some(Physical::of(estimate, problem));
+        if estimate.evidence.model_is_wrong() {
+            self.warnings.push(estimate.evidence.sentence());
+        }
+    }
+
+    /// How the standard parameters were found.
+    pub fn physical(&self) -> Option<&Physical> {
+        self.physical.as_ref()
     }
 
     /// Whether the data do not identify the model.
@@ -437,6 +457,9 @@ pub fn page(
             )
             .table(parameter_table(result), "Base parameters, named by the column that is kept"),
     );
+    if let (Some(physical), Some(standard)) = (&result.physical, &result.standard_parameters) {
+        page.push(physical.section(standard));
+    }
     Ok(page)
 }
 

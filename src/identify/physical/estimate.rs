@@ -48,7 +48,9 @@ pub struct PhysicalEstimate {
     /// holds a direction the estimate does not move in it, and its σ says just that; the error of
     /// such a parameter is bounded by [`Self::unconstrained_sigma`].
     pub base_sigma: Vec<f64>,
-    /// σ of the unconstrained base parameters.
+    /// The unconstrained base parameters θ̂.
+    pub unconstrained: Vec<f64>,
+    /// Their σ.
     pub unconstrained_sigma: Vec<f64>,
     /// Bounds that the estimate lies on.
     pub active: Vec<Subject>,
@@ -158,6 +160,7 @@ impl Solver {
             standard_sigma: scatter(&self.structure.standard_map()),
             base: (&self.structure.base_map * &constrained.y).as_slice().to_vec(),
             base_sigma: scatter(&self.structure.base_map),
+            unconstrained: fit.theta.clone(),
             unconstrained_sigma: covariance.sigma(),
             active: constrained.active(&self.structure),
             certificate: constrained.certificate,

@@ -1,0 +1,162 @@
+//! Standard parameters that an arm can have: JSON and section of the page.
+
+use serde::Serialize;
+
+use super::number::{significant, with_sigma};
+use super::{Column, Section, Status, Table};
+use crate::dynamics::ParameterLayout;
+use crate::identify::Problem;
+use crate::identify::physical::{Certificate, CrossValidation, PhysicalEstimate};
+use crate::robot::Arm;
+
+/// One standard parameter.
+#[derive(Debug, Clone, Serialize)]
+pub struct StandardParameter {
+    name: String,
+    value: f64,
+    unit: &'static str,
+    /// As far as the data decide the value; what the prior decides scatters with no log.
+    sigma: f64,
+}
+
+/// All of them; torque offsets are zero where they were not fitted.
+pub fn standard_parameters(estimate: &PhysicalEstimate, arm: &Arm) -> Vec<StandardParameter> {
+    let layout = ParameterLayout::new(arm.dof());
+    let values = estimate.standard.iter().zip(&estimate.standard_sigma).enumerate();
+    values
+        .map(|(k, (&value, &sigma))| StandardParameter {
+            name: layout.name(k),
+            value,
+            unit: layout.unit(k),
+            sigma,
+        })
+        .collect()
+}
+
+/// How they were found.
+#[derive(Debug, Clone, Serialize)]
+pub struct Physical {
+    sentence: String,
+    realisable_share: f64,
+    distance: f64,
+    p_value: Option<f64>,
+    model_is_wrong: bool,
+    prior_weight: f64,
+    cross_validation: Option<Vec<TriedWeight>>,
+    active: Vec<String>,
+    objective: f64,
+    duality_gap: f64,
+    kkt_residual: f64,
+    iterations: usize,
+    residual_rms_nm: Vec<f64>,
+    unconstrained_rms_nm: Vec<f64>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct TriedWeight {
+    weight: f64,
+    prediction_error: f64,
+}
+
+impl Physical {
+    /// Of an estimate from `problem`.
+    pub fn of(estimate: &PhysicalEstimate, problem: &Problem) -> Self {
+        let PhysicalEstimate { evidence, certificate, .. } = estimate;
+        let Certificate { objective, duality_gap, kkt_residual, iterations } = *certificate;
+        let samples = (problem.samples * problem.periods) as f64;
+        let rms = |theta: &[f64]| -> Vec<f64> {
+            problem.residual_squares(theta).iter().map(|e| (e / samples).sqrt()).collect()
+        };
+        let tried = |cv: &CrossValidation| -> Vec<TriedWeight> {
+            let pairs = cv.tried.iter();
+            pairs
+                .map(|&(weight, prediction_error)| TriedWeight { weight, prediction_error })
+                .collect()
+        };
+        Self {
+            sentence: evidence.sentence(),
+            realisable_share: evidence.realisable,
+            distance: evidence.distance,
+            p_value: evidence.p_value(),
+            model_is_wrong: evidence.model_is_wrong(),
+            prior_weight: estimate.prior_weight,
+            cross_validation: estimate.cross_validation.as_ref().map(tried),
+            active: estimate.active.iter().map(ToString::to_string).collect(),
+            objective,
+            duality_gap,
+            kkt_residual,
+            iterations,
+            residual_rms_nm: rms(&estimate.base),
+            unconstrained_rms_nm: rms(&estimate.unconstrained),
+        }
+    }
+
+    /// What is to be said, line by line.
+    pub fn facts(&self) -> Vec<String> {
+        let list = |values: &[f64]| -> String {
+            let cells: Vec<String> = values.iter().map(|v| significant(*v, 4)).collect();
+            cells.join(", ")
+        };
+        let mut facts = vec![
+            format!("Physical consistency: {}.", self.sentence),
+            format!(
+                "Optimal to {:.1e} of an objective of {} (duality gap; KKT residual {:.1e}, {} Newton \
+                 steps).",
+                self.duality_gap,
+                significant(self.objective, 5),
+                self.kkt_residual,
+                self.iterations
+            ),
+            format!(
+                "Residual per joint {} Nm; unconstrained {} Nm.",
+                list(&self.residual_rms_nm),
+                list(&self.unconstrained_rms_nm)
+            ),
+            format!(
+                "The robot file's values are the prior, weight {:.0e}{}: combinations that no torque \
+                 depends on are where it puts them.",
+                self.prior_weight,
+                if self.cross_validation.is_some() { " by cross-validation" } else { "" }
+            ),
+        ];
+        if !self.active.is_empty() {
+            facts.push(format!(
+                "On the boundary of what can exist: {}. Their σ leaves out the directions that the \
+                 boundary holds.",
+                self.active.join(", ")
+            ));
+        }
+        facts
+    }
+
+    /// The section of the page.
+    pub fn section(&self, standard: &[StandardParameter]) -> Section {
+        let mut section = Section::new("Standard parameters that an arm can have");
+        let status = if self.model_is_wrong { Status::Bad } else { Status::Good };
+        let facts = self.facts();
+        section = section.note(status, facts[0].as_str()).list(facts[1..].iter().cloned());
+        if let Some(tried) = &self.cross_validation {
+            let mut table = Table::new([
+                Column::number("weight of the prior", ""),
+                Column::number("error of predicted left-out periods", ""),
+            ]);
+            for TriedWeight { weight, prediction_error } in tried {
+                let best = (*weight == self.prior_weight).then_some(Status::Good);
+                table.push_judged(
+                    best,
+                    [format!("{weight:.0e}"), significant(*prediction_error, 6)],
+                );
+            }
+            section = section.table(table, "Squared error per parameter in units of the noise");
+        }
+        let mut table = Table::new([
+            Column::text("parameter"),
+            Column::text("unit"),
+            Column::number("estimate ± σ", ""),
+        ]);
+        for p in standard {
+            table.push([p.name.clone(), p.unit.to_owned(), with_sigma(p.value, p.sigma)]);
+        }
+        section.details(Section::new("All standard parameters").table(table, ""))
+    }
+}
