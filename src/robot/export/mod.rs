@@ -1,6 +1,6 @@
 //! Arms for other programs.
 //!
-//! Enters: an [`Arm`](super::super::Arm) whose bodies can exist, and named frames on them. Leaves: a URDF,
+//! Enters: an [`Arm`] whose bodies can exist, and named frames on them. Leaves: a URDF,
 //! the drive file with what a URDF has no place for, or an MJCF. All numbers are written so that
 //! they read back as the same bits.
 
