@@ -12,6 +12,7 @@ pub mod montecarlo;
 mod prior;
 pub mod simulate;
 pub mod study;
+mod study_paper;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
+use super::study_paper::{self, PaperArgs};
 use super::{CommandResult, Outcome, Progress};
 use crate::montecarlo::Scenario;
 use crate::montecarlo::study::{NoiseStudy, study};
@@ -22,6 +23,8 @@ pub struct StudyArgs {
 enum Topic {
     /// Which σ is true under which noise: every estimator and covariance on the same logs.
     Noise(NoiseArgs),
+    /// The paper's section IV on the simulated arm, and where negative rotor inertias come from.
+    Paper(PaperArgs),
 }
 
 #[derive(Debug, Args)]
@@ -50,6 +53,7 @@ struct NoiseArgs {
 pub fn run(args: &StudyArgs) -> CommandResult {
     match &args.topic {
         Topic::Noise(args) => noise(args),
+        Topic::Paper(args) => study_paper::run(args),
     }
 }
 

@@ -12,6 +12,7 @@ pub mod montecarlo;
 pub mod noise_study;
 pub mod number;
 mod page;
+pub mod paper_study;
 pub mod physical;
 pub mod plot;
 mod status;

@@ -2,6 +2,17 @@
 //!
 //! Enters: scenarios. Leaves: tables of what each method claims and what is true.
 
+mod error;
+mod mass_matrix;
 mod noise;
+mod paper;
+mod paper_equations;
 
+pub use error::StudyError;
+pub use mass_matrix::indefinite_share;
 pub use noise::{Bound, MethodResult, NoiseStudy, ScenarioResult, study};
+pub use paper::{
+    ErrorResult, Mechanism, MechanismResult, PaperStudy, ParameterResult, StartResult, Trace,
+    paper_study, paper_study_runs,
+};
+pub use paper_equations::{Acceleration, PaperEquations};

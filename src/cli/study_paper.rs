@@ -1,0 +1,61 @@
+//! `armid study paper`: the paper's section IV on the simulated arm.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{CommandResult, Outcome, Progress};
+use crate::excitation::FourierSeries;
+use crate::montecarlo::Scenario;
+use crate::montecarlo::study::{paper_study, paper_study_runs};
+use crate::output::{check_writable, write_atomically};
+use crate::report::json::{Document, Input, Program};
+use crate::report::paper_study::{markdown, page};
+
+#[derive(Debug, Args)]
+pub(super) struct PaperArgs {
+    /// Scenario of the identification trajectory.
+    #[arg(default_value = "sims/paper.toml")]
+    scenario: PathBuf,
+    /// Second trajectory, for validation: a built-in name or a .json file.
+    #[arg(long, default_value = "trajectories/ur5_paper_validation.json")]
+    validation: String,
+    /// Repetitions with fresh noise instead of the scenario's own.
+    #[arg(long, value_parser = clap::value_parser!(u64).range(2..))]
+    trials: Option<u64>,
+    /// Write the tables as Markdown.
+    #[arg(long)]
+    markdown: Option<PathBuf>,
+    /// Write a page with plots.
+    #[arg(long)]
+    report: Option<PathBuf>,
+    /// Write the numbers as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
+}
+
+pub(super) fn run(args: &PaperArgs) -> CommandResult {
+    for path in [&args.markdown, &args.report, &args.json].into_iter().flatten() {
+        check_writable(path)?;
+    }
+    let inputs = vec![Input::of(&args.scenario)?];
+    let scenario = Scenario::load(Some(&args.scenario))?;
+    let validation = FourierSeries::load(&args.validation)?;
+    let trials = args.trials.unwrap_or(scenario.trials).max(2);
+    let progress = Progress::new("runs of the arm", paper_study_runs());
+    let result = paper_study(&scenario, validation, trials, &|n| progress.reached(n))?;
+    progress.finish();
+    let program = Program::new(std::env::args(), Some(scenario.seed), inputs);
+    let text = markdown(&result, &program.command);
+    println!("{text}");
+    if let Some(path) = &args.markdown {
+        write_atomically(path, |out| out.write_all(text.as_bytes()))?;
+    }
+    if let Some(path) = &args.json {
+        Document { schema: "armid.study-paper/1", program: &program, body: &result }.write(path)?;
+    }
+    if let Some(path) = &args.report {
+        page(&result, program)?.write(path)?;
+    }
+    Ok(Outcome::Done)
+}
