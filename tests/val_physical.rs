@@ -9,7 +9,7 @@ use std::time::Instant;
 use armid::base::{BaseSet, Parameterisation};
 use armid::dynamics::{Model, Parameter, ParameterLayout, Workspace, mass_matrix};
 use armid::identify::physical::{
-    Information, PhysicalEstimate, PhysicalOptions, Solver, Structure, Subject, solve,
+    Information, PhysicalEstimate, PhysicalOptions, PriorMetric, Pulling, Solver, Structure, Subject, solve,
 };
 use armid::identify::{Identification, Identifier, Measurement};
 use armid::montecarlo::{Experiment, Scenario};
@@ -24,6 +24,7 @@ struct Case {
     name: String,
     weight: f64,
     margin: f64,
+    entropic: bool,
     triangle: Vec<Vec<f64>>,
     theta: Vec<f64>,
     standard: Vec<f64>,
@@ -33,6 +34,11 @@ struct Case {
 impl Case {
     fn all() -> Vec<Self> {
         serde_json::from_str(include_str!("golden/physical.json")).unwrap()
+    }
+
+    fn prior(&self) -> Pulling {
+        let metric = if self.entropic { PriorMetric::Entropic } else { PriorMetric::PullBack };
+        Pulling { metric, weight: self.weight }
     }
 
     fn information(&self) -> Information {
@@ -58,7 +64,7 @@ fn the_optimum_is_clarabels() {
     for case in Case::all() {
         let solver = Solver::new(Structure::new(&arm, &set, &arm, case.margin).unwrap());
         let information = case.information();
-        let ours = solver.constrained(&information, case.weight).unwrap();
+        let ours = solver.constrained(&information, case.prior()).unwrap();
         let certificate = ours.certificate;
         println!("{}: {certificate:?}, Clarabel {}", case.name, case.objective);
         let tolerance = 1e-7 * (1.0 + case.objective);
@@ -82,7 +88,7 @@ fn a_solve_takes_milliseconds() {
         let start = Instant::now();
         let runs = 10;
         for _ in 0..runs {
-            solver.constrained(&information, case.weight).unwrap();
+            solver.constrained(&information, case.prior()).unwrap();
         }
         let each = start.elapsed() / runs;
         println!("{}: {:.2} ms", case.name, 1e3 * each.as_secs_f64());
@@ -193,7 +199,7 @@ fn the_true_base_parameters_are_realisable() {
     };
     let Scenario { arm, set, .. } = &experiment.simulation.scenario;
     let solver = Solver::new(Structure::new(arm, set, arm, 1e-4).unwrap());
-    assert!(solver.constrained(&information, 1e-4).unwrap().distance < 1e-6);
+    assert!(solver.constrained(&information, Pulling::squared(1e-4)).unwrap().distance < 1e-6);
     found.fit.theta = truth;
     let physical = estimate(experiment, &found);
     assert!(physical.evidence.realisable > 1.0 - 1e-5, "{:?}", physical.evidence);
@@ -207,7 +213,7 @@ fn bounds_of_the_robot_file_hold_and_must_hold_for_the_file_itself() {
     arm.joints[2].bounds.mass_kg = Some([2.3, 2.36]);
     arm.joints[3].bounds.com_m = Some([[-0.01, 0.01], [-0.02, 0.0], [-0.01, 0.01]]);
     let solver = Solver::new(Structure::new(&arm, &set, &arm, case.margin).unwrap());
-    let found = solver.constrained(&information, case.weight).unwrap();
+    let found = solver.constrained(&information, case.prior()).unwrap();
     let standard = solver.structure().standard(&found.y);
     let bounded = ParameterLayout::new(6).apply(&standard, &arm);
     let mass_kg = bounded.joints[2].link.mass_kg();
@@ -231,7 +237,7 @@ fn the_papers_reduced_set_gives_an_arm_as_well() {
     let theta = DVector::from_vec(set.values(&Model::new(&arm).standard_parameters()));
     let root = DMatrix::from_diagonal_element(theta.len(), theta.len(), 100.0);
     let solver = Solver::new(structure);
-    let found = solver.constrained(&Information { root, theta: theta.clone() }, 1e-4).unwrap();
+    let found = solver.constrained(&Information { root, theta: theta.clone() }, Pulling::squared(1e-4)).unwrap();
     let standard = solver.structure().standard(&found.y);
     let error = DVector::from_vec(set.values(&standard)) - theta;
     assert!(error.amax() < 1e-4, "{error}");

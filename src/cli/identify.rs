@@ -8,7 +8,7 @@ use super::{CommandResult, Outcome};
 use crate::base::{BaseSet, Parameterisation};
 use crate::dynamics::Model;
 use crate::identify::covariance::CovarianceKind;
-use crate::identify::physical::{self, PhysicalOptions, PriorWeight};
+use crate::identify::physical::{self, PhysicalOptions, PriorMetric, PriorWeight};
 use crate::identify::{
     Estimator, FitError, Identification, Identifier, IdentifyError, Measurement, Options,
     Regression,
@@ -41,6 +41,9 @@ pub struct IdentifyArgs {
     /// Also estimate standard parameters that an arm can have, for simulators.
     #[arg(long)]
     physical: bool,
+    /// How deviations from the robot file's values are measured.
+    #[arg(long, requires = "physical", value_enum, default_value = "pull_back")]
+    prior: PriorMetric,
     /// Weight of the robot file's values in them, or auto for cross-validation: 1/s² makes a relative
     /// deviation of s as unlikely as one σ of noise.
     #[arg(long, requires = "physical", default_value = "1e-4")]
@@ -215,7 +218,11 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
     let mut result = IdentifyResult::of(&training, &validations)?;
     if args.physical {
         let options =
-            PhysicalOptions { prior_weight: args.prior_weight, ..PhysicalOptions::default() };
+            PhysicalOptions {
+            metric: args.prior,
+            prior_weight: args.prior_weight,
+            ..PhysicalOptions::default()
+        };
         let Identification { fit, covariance, .. } = &identification;
         let estimate = physical::solve(&arm, &set, fit, covariance, &options)?;
         result.set_physical(&estimate, &training);

@@ -13,6 +13,7 @@ mod prior;
 pub mod simulate;
 pub mod study;
 mod study_paper;
+mod study_physical;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;

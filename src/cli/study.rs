@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::study_paper::{self, PaperArgs};
+use super::study_physical::{self, PhysicalArgs};
 use super::{CommandResult, Outcome, Progress};
 use crate::montecarlo::Scenario;
 use crate::montecarlo::study::{NoiseStudy, study};
@@ -25,6 +26,8 @@ enum Topic {
     Noise(NoiseArgs),
     /// The paper's section IV on the simulated arm, and where negative rotor inertias come from.
     Paper(PaperArgs),
+    /// What physical consistency repairs, and what not: scatter, model error and σ.
+    Physical(PhysicalArgs),
 }
 
 #[derive(Debug, Args)]
@@ -54,6 +57,7 @@ pub fn run(args: &StudyArgs) -> CommandResult {
     match &args.topic {
         Topic::Noise(args) => noise(args),
         Topic::Paper(args) => study_paper::run(args),
+        Topic::Physical(args) => study_physical::run(args),
     }
 }
 

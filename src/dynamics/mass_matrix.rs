@@ -1,6 +1,6 @@
 //! Mass matrix, forward dynamics and energies.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVectorViewMut};
 use thiserror::Error;
 
 use super::model::Model;
@@ -57,20 +57,35 @@ pub fn forward_dynamics(
     torque_nm: &[f64],
     qdd_rad_s2: &mut [f64],
 ) -> Result<(), NotPositiveDefinite> {
-    let n = model.dof();
-    let mut bias = DVector::zeros(n);
-    let rest = vec![0.0; n];
-    inverse_dynamics(model, ws, q_rad, qd_rad_s, &rest, bias.as_mut_slice());
-    let mut m = DMatrix::zeros(n, n);
-    mass_matrix(model, ws, q_rad, &mut m);
-    let factor = Cholesky::new(m.clone()).ok_or_else(|| NotPositiveDefinite {
-        q_rad: q_rad.to_vec(),
-        smallest_kg_m2: m.symmetric_eigenvalues().min(),
-    })?;
-    let mut rhs = DVector::from_column_slice(torque_nm) - bias;
-    factor.solve_mut(&mut rhs);
-    qdd_rad_s2.copy_from_slice(rhs.as_slice());
-    Ok(())
+    // The workspace's memory is on loan while the functions below use the rest of it.
+    let mut bias_nm = std::mem::take(&mut ws.bias_nm);
+    let rest = std::mem::take(&mut ws.no_acceleration);
+    let mut mass = std::mem::take(&mut ws.mass_matrix);
+    inverse_dynamics(model, ws, q_rad, qd_rad_s, &rest, bias_nm.as_mut_slice());
+    mass_matrix(model, ws, q_rad, &mut mass);
+    let factor = Cholesky::new(mass);
+    if let Some(factor) = &factor {
+        let torques = torque_nm.iter().zip(&bias_nm);
+        qdd_rad_s2.iter_mut().zip(torques).for_each(|(qdd, (torque, bias))| *qdd = torque - bias);
+        let n = model.dof();
+        factor.solve_mut(&mut DVectorViewMut::from_slice(qdd_rad_s2, n));
+    }
+    let solved = factor.is_some();
+    ws.mass_matrix = match factor {
+        Some(factor) => factor.unpack_dirty(),
+        None => DMatrix::zeros(model.dof(), model.dof()),
+    };
+    ws.bias_nm = bias_nm;
+    ws.no_acceleration = rest;
+    if solved { Ok(()) } else { Err(NotPositiveDefinite::at(model, ws, q_rad)) }
+}
+
+impl NotPositiveDefinite {
+    fn at(model: &Model, ws: &mut Workspace<f64>, q_rad: &[f64]) -> Self {
+        let mut mass = DMatrix::zeros(model.dof(), model.dof());
+        mass_matrix(model, ws, q_rad, &mut mass);
+        Self { q_rad: q_rad.to_vec(), smallest_kg_m2: mass.symmetric_eigenvalues().min() }
+    }
 }
 
 /// Kinetic energy ½ q̇ᵀ M(q) q̇ of links and rotors, J.
@@ -80,11 +95,14 @@ pub fn kinetic_energy(
     q_rad: &[f64],
     qd_rad_s: &[f64],
 ) -> f64 {
-    let n = model.dof();
-    let mut m = DMatrix::zeros(n, n);
-    mass_matrix(model, ws, q_rad, &mut m);
-    let qd = DVector::from_column_slice(qd_rad_s);
-    0.5 * qd.dot(&(m * &qd))
+    let mut mass = std::mem::take(&mut ws.mass_matrix);
+    mass_matrix(model, ws, q_rad, &mut mass);
+    let momentum = |j: usize| -> f64 {
+        mass.column(j).iter().zip(qd_rad_s).map(|(m, qd)| m * qd).sum()
+    };
+    let twice: f64 = qd_rad_s.iter().enumerate().map(|(j, qd)| qd * momentum(j)).sum();
+    ws.mass_matrix = mass;
+    0.5 * twice
 }
 
 /// Potential energy −Σ_i gᵀ(m p_i + R_i h_i) of the links, J; zero with all mass at the base origin.

@@ -1,5 +1,7 @@
 //! Scratch memory of the algorithms, made once and used for every sample.
 
+use nalgebra::{DMatrix, DVector};
+
 use super::model::Model;
 use super::newton_euler::BodyMotion;
 use super::real::Real;
@@ -13,6 +15,10 @@ pub struct Workspace<T> {
     pub(super) wrench: Vec<(Vec3<T>, Vec3<T>)>,
     /// Jacobian of one body: per ancestor joint (angular, linear) velocity per unit joint speed.
     pub(super) jacobian: Vec<(Vec3<T>, Vec3<T>)>,
+    pub(super) mass_matrix: DMatrix<f64>,
+    pub(super) bias_nm: DVector<f64>,
+    /// Zeros.
+    pub(super) no_acceleration: Vec<T>,
 }
 
 impl<T: Real> Workspace<T> {
@@ -22,6 +28,13 @@ impl<T: Real> Workspace<T> {
         let v = Vec3::zero();
         let rest = BodyMotion { sin_cos: (zero, zero), omega: v, alpha: v, accel: v };
         let n = model.dof();
-        Self { motion: vec![rest; n], wrench: vec![(v, v); n], jacobian: vec![(v, v); n] }
+        Self {
+            motion: vec![rest; n],
+            wrench: vec![(v, v); n],
+            jacobian: vec![(v, v); n],
+            mass_matrix: DMatrix::zeros(n, n),
+            bias_nm: DVector::zeros(n),
+            no_acceleration: vec![zero; n],
+        }
     }
 }

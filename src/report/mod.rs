@@ -14,6 +14,7 @@ pub mod number;
 mod page;
 pub mod paper_study;
 pub mod physical;
+pub mod physical_study;
 pub mod plot;
 mod status;
 mod table;

@@ -6,7 +6,7 @@ use super::number::{significant, with_sigma};
 use super::{Column, Section, Status, Table};
 use crate::dynamics::ParameterLayout;
 use crate::identify::Problem;
-use crate::identify::physical::{Certificate, CrossValidation, PhysicalEstimate};
+use crate::identify::physical::{Certificate, CrossValidation, PhysicalEstimate, PriorMetric};
 use crate::robot::Arm;
 
 /// One standard parameter.
@@ -22,7 +22,7 @@ pub struct StandardParameter {
 /// All of them; torque offsets are zero where they were not fitted.
 pub fn standard_parameters(estimate: &PhysicalEstimate, arm: &Arm) -> Vec<StandardParameter> {
     let layout = ParameterLayout::new(arm.dof());
-    let values = estimate.standard.iter().zip(&estimate.standard_sigma).enumerate();
+    let values = estimate.standard.iter().zip(&estimate.scatter.released.standard).enumerate();
     values
         .map(|(k, (&value, &sigma))| StandardParameter {
             name: layout.name(k),
@@ -41,6 +41,7 @@ pub struct Physical {
     distance: f64,
     p_value: Option<f64>,
     model_is_wrong: bool,
+    prior_metric: PriorMetric,
     prior_weight: f64,
     cross_validation: Option<Vec<TriedWeight>>,
     active: Vec<String>,
@@ -79,7 +80,8 @@ impl Physical {
             distance: evidence.distance,
             p_value: evidence.p_value(),
             model_is_wrong: evidence.model_is_wrong(),
-            prior_weight: estimate.prior_weight,
+            prior_metric: estimate.prior.metric,
+            prior_weight: estimate.prior.weight,
             cross_validation: estimate.cross_validation.as_ref().map(tried),
             active: estimate.active.iter().map(ToString::to_string).collect(),
             objective,
@@ -113,16 +115,17 @@ impl Physical {
                 list(&self.unconstrained_rms_nm)
             ),
             format!(
-                "The robot file's values are the prior, weight {:.0e}{}: combinations that no torque \
-                 depends on are where it puts them.",
+                "The robot file's values are the prior ({} pull, weight {:.0e}{}): combinations that no \
+                 torque depends on are where it puts them.",
+                self.prior_metric,
                 self.prior_weight,
-                if self.cross_validation.is_some() { " by cross-validation" } else { "" }
+                if self.cross_validation.is_some() { " chosen by cross-validation" } else { "" }
             ),
         ];
         if !self.active.is_empty() {
             facts.push(format!(
-                "On the boundary of what can exist: {}. Their σ leaves out the directions that the \
-                 boundary holds.",
+                "On the boundary of what can exist: {}. σ is stated as if no bound were there: the \
+                 estimate scatters less, but it may be as far from the truth.",
                 self.active.join(", ")
             ));
         }

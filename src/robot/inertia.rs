@@ -89,6 +89,13 @@ impl LinkInertia {
         p
     }
 
+    /// The body with this pseudo-inertia, whose upper left block is Σ: J = tr(Σ) 1 − Σ.
+    pub fn from_pseudo_inertia(p: &Matrix4<f64>) -> Self {
+        let sigma = p.fixed_view::<3, 3>(0, 0).into_owned();
+        let h = p.fixed_view::<3, 1>(0, 3).into_owned();
+        Self::from_moments(p[(3, 3)], h, sigma.trace() * Matrix3::identity() - sigma)
+    }
+
     /// Smallest eigenvalue of the pseudo-inertia: > 0 for a body that can exist.
     pub fn consistency_margin(&self) -> f64 {
         self.pseudo_inertia().symmetric_eigenvalues().min()

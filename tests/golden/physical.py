@@ -17,6 +17,8 @@ time of Clarabel alone and with CVXPY's modelling. The cases:
     very noisy  60 states, five times as much
     wrong       the first with a torque of -3 kg m^2 qdd on every joint: rotor inertias come out negative
     prior       the second with a prior that counts
+    entropic    the second with the entropic prior: weight (tr U_i - ln det U_i - 4) and weight (u_k - ln u_k - 1) with
+                U_i = L_i^-1 P_i L_i^-T and u_k = x_k / x0_k, and 1e-4 of the squares above
 """
 
 import json
@@ -61,7 +63,7 @@ def data(arm, rng, noise, wrong):
     return np.vstack(rows), np.concatenate(torques), x
 
 
-def solve(y, tau, prior, weight):
+def solve(y, tau, prior, weight, entropic):
     """Clarabel's x, objective above the unconstrained minimum, and times."""
     n = 6
     start = time.perf_counter()
@@ -70,16 +72,21 @@ def solve(y, tau, prior, weight):
     r = np.linalg.qr(np.column_stack([y, tau]), mode="r")
     cost = 0.5 * cp.sum_squares(r[:-1, :-1] @ x - r[:-1, -1])
     constraints = []
+    square = 0.5 * weight * (1e-4 if entropic else 1.0)
     for i in range(n):
         p0 = np.array(pseudo_inertia(prior[10 * i : 10 * i + 10]))
         inverse = np.linalg.inv(np.linalg.cholesky(p0))
         scaled = inverse @ cp.bmat(pseudo_inertia([x[10 * i + k] for k in range(10)])) @ inverse.T
         u = cp.Variable((4, 4), symmetric=True)
         constraints += [u == scaled, u >> MARGIN * np.eye(4)]
-        cost += 0.5 * weight * cp.sum_squares(u - np.eye(4))
+        cost += square * cp.sum_squares(u - np.eye(4))
+        if entropic:
+            cost += weight * (cp.trace(u) - cp.log_det(u) - 4.0)
     drives = x[10 * n :] / prior[10 * n :]
     constraints.append(drives >= 0)
-    cost += 0.5 * weight * cp.sum_squares(drives - 1.0)
+    cost += square * cp.sum_squares(drives - 1.0)
+    if entropic:
+        cost += weight * cp.sum(drives - cp.log(drives) - 1.0)
     problem = cp.Problem(cp.Minimize(cost), constraints)
     problem.solve(solver=cp.CLARABEL, tol_gap_abs=1e-9, tol_gap_rel=1e-10, tol_feas=1e-10)
     total = time.perf_counter() - start
@@ -87,17 +94,18 @@ def solve(y, tau, prior, weight):
     return x.value, problem.value - unconstrained, problem.status, problem.solver_stats.solve_time, total
 
 
-def case(name, arm, kept, noise, wrong, weight):
+def case(name, arm, kept, noise, wrong, weight, entropic=False):
     y, tau, prior = data(arm, np.random.default_rng(5), noise, wrong)
     base = y[:, kept]
     theta = np.linalg.lstsq(base, tau, rcond=None)[0]
     triangle = np.linalg.qr(base, mode="r")
-    x, objective, status, seconds, total = solve(y, tau, prior, weight)
+    x, objective, status, seconds, total = solve(y, tau, prior, weight, entropic)
     print(f"{name}: {status}, objective {objective:.9f}, Clarabel {1e3 * seconds:.1f} ms, with CVXPY {1e3 * total:.0f} ms")
     return {
         "name": name,
         "weight": weight,
         "margin": MARGIN,
+        "entropic": entropic,
         "triangle": [triangle[i, i:].tolist() for i in range(len(kept))],
         "theta": theta.tolist(),
         "standard": x.tolist(),
@@ -117,6 +125,7 @@ if __name__ == "__main__":
         case("very noisy", arm, kept, 5.0, 0.0, 1e-4),
         case("wrong", arm, kept, 1.0, 3.0, 1e-4),
         case("prior", arm, kept, 5.0, 0.0, 1.0),
+        case("entropic", arm, kept, 5.0, 0.0, 1.0, True),
     ]
     text = json.dumps(cases)
     if "--print" not in sys.argv:

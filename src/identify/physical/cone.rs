@@ -67,6 +67,15 @@ impl Cone {
         }
     }
 
+    /// Logarithm of the number or of the determinant; NaN outside the cone.
+    pub fn log_det(self, point: &[f64]) -> f64 {
+        match self {
+            Self::NonNegative => point[0].ln(),
+            Self::Semidefinite => Cholesky::new(smat(point))
+                .map_or(f64::NAN, |factor| 2.0 * factor.l().diagonal().map(f64::ln).sum()),
+        }
+    }
+
     /// z = s⁻¹ for a point inside, written into `z`.
     pub fn invert(self, s: &[f64], z: &mut [f64]) {
         match self {
@@ -147,7 +156,7 @@ impl Scaling {
         }
     }
 
-    /// λ \ (target − λ∘λ − a∘b), with σμ on the diagonal of the target: the right-hand side of
+    /// λ \ (target − λ∘λ − a∘b), with γ + σμ on the diagonal of the target: the right-hand side of
     /// the complementarity equation after division by λ.
     pub fn complementarity(&self, target: f64, a: &[f64], b: &[f64], out: &mut [f64]) {
         match self {

@@ -1,14 +1,15 @@
 //! The constrained estimate and everything that is said about it.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::error::PhysicalError;
 use super::evidence::{Evidence, bootstrap, noise_root};
 use super::information::Information;
-use super::program::{ConeProgram, ConeSolution};
+use super::program::{ConeProgram, ConeSolution, ProgramError};
 use super::realisable::realisability;
+use super::scatter::{Scatter, Sigma};
 use super::structure::{Structure, Subject};
-use super::weight::{CrossValidation, PriorWeight, cross_validate};
+use super::weight::{CrossValidation, PriorMetric, PriorWeight, Pulling, cross_validate};
 use crate::base::BaseSet;
 use crate::identify::covariance::Covariance;
 use crate::identify::fit::Fit;
@@ -17,6 +18,8 @@ use crate::robot::Arm;
 /// How the constrained estimate is made.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhysicalOptions {
+    /// How deviations from the prior are measured.
+    pub metric: PriorMetric,
     /// γ, the weight of the prior.
     pub prior_weight: PriorWeight,
     /// ε: every pseudo-inertia is at least this share of the prior's.
@@ -29,7 +32,13 @@ pub struct PhysicalOptions {
 
 impl Default for PhysicalOptions {
     fn default() -> Self {
-        Self { prior_weight: PriorWeight::default(), margin: 1e-4, bootstrap: 199, seed: 1 }
+        Self {
+            metric: PriorMetric::default(),
+            prior_weight: PriorWeight::default(),
+            margin: 1e-4,
+            bootstrap: 199,
+            seed: 1,
+        }
     }
 }
 
@@ -39,15 +48,10 @@ pub struct PhysicalEstimate {
     /// Standard parameters in the order of [`ParameterLayout`](crate::dynamics::ParameterLayout):
     /// 14 N, offsets zero where they are not fitted.
     pub standard: Vec<f64>,
-    /// σ of the standard parameters, as far as the data decide them: what only the prior decides
-    /// has none of the data's noise.
-    pub standard_sigma: Vec<f64>,
     /// Base parameters of these standard parameters.
     pub base: Vec<f64>,
-    /// σ of the base parameters: delta method through the optimality conditions. Where a bound
-    /// holds a direction the estimate does not move in it, and its σ says just that; the error of
-    /// such a parameter is bounded by [`Self::unconstrained_sigma`].
-    pub base_sigma: Vec<f64>,
+    /// How both scatter.
+    pub scatter: Scatter,
     /// The unconstrained base parameters θ̂.
     pub unconstrained: Vec<f64>,
     /// Their σ.
@@ -58,8 +62,8 @@ pub struct PhysicalEstimate {
     pub certificate: Certificate,
     /// Whether the unconstrained estimate could have been an arm, and what the repair cost.
     pub evidence: Evidence,
-    /// The weight γ that was used.
-    pub prior_weight: f64,
+    /// The pull to the prior that was used.
+    pub prior: Pulling,
     /// How it was chosen, where the data chose it.
     pub cross_validation: Option<CrossValidation>,
 }
@@ -131,41 +135,46 @@ impl Solver {
     ) -> Result<PhysicalEstimate, PhysicalError> {
         options.check()?;
         let information = Information::of(fit, covariance);
+        let metric = options.metric;
         let (weight, cross_validation) = match options.prior_weight {
             PriorWeight::Fixed(weight) => (weight, None),
             PriorWeight::CrossValidated => {
-                let chosen = cross_validate(self, &information, &fit.theta_periods)?;
+                let chosen = cross_validate(self, &information, &fit.theta_periods, metric)?;
                 (chosen.weight, Some(chosen))
             }
         };
-        let data = self.data(&information, weight);
+        let prior = Pulling { metric, weight };
+        let data = self.data(&information, prior);
         let constrained = self.solve(&data, &(&information.root * &information.theta))?;
         let noise = information.whitened(covariance);
         let realisable = realisability(&self.structure, &information.theta)?;
-        let exceeded = bootstrap(
+        let draws = bootstrap(
             self,
             &data,
             &constrained,
             &noise_root(&noise, covariance.degrees_of_freedom),
             options,
         )?;
-        let sensitivity = constrained.solution.stiffness.solve(&data.map.transpose());
-        let scatter = |map: &DMatrix<f64>| -> Vec<f64> {
-            let linear = map * &sensitivity;
-            let spread = &linear * &noise;
-            linear.row_iter().zip(spread.row_iter()).map(|(a, b)| a.dot(&b).sqrt()).collect()
+        let by_delta = |curvature: &Cholesky<f64, Dyn>| {
+            Sigma::by_delta_method(&self.structure, curvature, &data.map, &noise)
+        };
+        let free = Cholesky::new(data.program.hessian.clone()).ok_or(ProgramError::NotConvex)?;
+        let exceeded = draws.as_ref().map(|draws| draws.exceeded);
+        let scatter = Scatter {
+            held: by_delta(&constrained.solution.stiffness),
+            released: by_delta(&free),
+            drawn: draws.map(|draws| draws.sigma),
         };
         Ok(PhysicalEstimate {
             standard: self.structure.standard(&constrained.y),
-            standard_sigma: scatter(&self.structure.standard_map()),
             base: (&self.structure.base_map * &constrained.y).as_slice().to_vec(),
-            base_sigma: scatter(&self.structure.base_map),
+            scatter,
             unconstrained: fit.theta.clone(),
             unconstrained_sigma: covariance.sigma(),
             active: constrained.active(&self.structure),
             certificate: constrained.certificate,
             evidence: Evidence { realisable, distance: constrained.distance, exceeded },
-            prior_weight: weight,
+            prior,
             cross_validation,
         })
     }
@@ -174,24 +183,28 @@ impl Solver {
     pub fn constrained(
         &self,
         information: &Information,
-        weight: f64,
+        prior: Pulling,
     ) -> Result<Constrained, PhysicalError> {
-        let data = self.data(information, weight);
+        let data = self.data(information, prior);
         self.solve(&data, &(&information.root * &information.theta))
     }
 
-    /// The program of data with this information and prior weight.
-    pub(super) fn data(&self, information: &Information, weight: f64) -> Data {
-        let n = self.structure.unknowns();
-        let map = &information.root * &self.structure.base_map;
+    /// The program of data with this information and pull to the prior.
+    pub(super) fn data(&self, information: &Information, prior: Pulling) -> Data {
+        let Self { structure } = self;
+        let Pulling { metric, weight } = prior;
+        let n = structure.unknowns();
+        let map = &information.root * &structure.base_map;
         let mut hessian = map.tr_mul(&map);
         let mut pull = DVector::zeros(n);
-        let pull_constant = self.structure.add_pulls(weight, &mut hessian, &mut pull);
-        let program = ConeProgram {
-            hessian,
-            linear: DVector::zeros(n),
-            constraints: self.structure.constraints.clone(),
+        let mut constraints = structure.constraints.clone();
+        let pull_constant = match metric {
+            PriorMetric::PullBack => structure.add_pulls(weight, &mut hessian, &mut pull),
+            PriorMetric::Entropic => {
+                structure.add_divergences(weight, &mut hessian, &mut pull, &mut constraints)
+            }
         };
+        let program = ConeProgram { hessian, linear: DVector::zeros(n), constraints };
         Data { map, pull, pull_constant, program }
     }
 

@@ -7,6 +7,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::error::PhysicalError;
 use super::estimate::{Constrained, Data, PhysicalOptions, Solver};
+use super::scatter::{Deviations, Sigma};
 
 /// Whether the unconstrained estimate belongs to any set of links, and what making it so cost.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,18 +81,28 @@ pub(super) fn noise_root(omega: &DMatrix<f64>, degrees_of_freedom: f64) -> DMatr
     Cholesky::new(mixed).map_or_else(|| diagonal.map(f64::sqrt), Cholesky::unpack)
 }
 
-/// How many draws of noise about the constrained estimate cost at least as much fit. The estimate
-/// is on the boundary where T was positive: the least favourable of all arms that can exist.
+/// What the bootstrap says.
+pub(super) struct Draws {
+    /// Draws whose T was at least as large, and draws in all.
+    pub exceeded: (usize, usize),
+    /// How far their estimates are off.
+    pub sigma: Sigma,
+}
+
+/// How many draws of noise about the constrained estimate cost at least as much fit, and how far
+/// their estimates are from it. The estimate is on the boundary where T was positive: the least
+/// favourable of all arms that can exist.
 pub(super) fn bootstrap(
     solver: &Solver,
     data: &Data,
     constrained: &Constrained,
     noise_root: &DMatrix<f64>,
     options: &PhysicalOptions,
-) -> Result<Option<(usize, usize)>, PhysicalError> {
+) -> Result<Option<Draws>, PhysicalError> {
     if options.bootstrap == 0 {
         return Ok(None);
     }
+    let mut deviations = Deviations::new(solver.structure());
     let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
     let expected = &data.map * &constrained.y;
     let mut larger = 0;
@@ -99,6 +110,7 @@ pub(super) fn bootstrap(
         let noise = DVector::from_fn(expected.len(), |_, _| StandardNormal.sample(&mut rng));
         let drawn = solver.solve(data, &(&expected + noise_root * noise))?;
         larger += usize::from(drawn.distance >= constrained.distance);
+        deviations.add(solver.structure(), &(drawn.y - &constrained.y));
     }
-    Ok(Some((larger, options.bootstrap)))
+    Ok(Some(Draws { exceeded: (larger, options.bootstrap), sigma: deviations.sigma() }))
 }

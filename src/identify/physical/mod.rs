@@ -25,6 +25,7 @@ mod evidence;
 mod information;
 mod program;
 mod realisable;
+mod scatter;
 mod structure;
 mod weight;
 
@@ -34,5 +35,6 @@ pub use estimate::{Certificate, Constrained, PhysicalEstimate, PhysicalOptions, 
 pub use evidence::Evidence;
 pub use information::Information;
 pub use program::{ConeProgram, ConeSolution, Constraint, ProgramError};
+pub use scatter::{Scatter, Sigma};
 pub use structure::{Structure, Subject};
-pub use weight::{CrossValidation, PriorWeight};
+pub use weight::{CrossValidation, PriorMetric, PriorWeight, Pulling};

@@ -5,7 +5,8 @@ use thiserror::Error;
 
 use super::cone::{Cone, Scaling};
 
-/// minimise ½ yᵀH y − cᵀy subject to s_i = A_i y + b_i ∈ K_i for every constraint i.
+/// minimise ½ yᵀH y − cᵀy − Σ γ_i ln det s_i subject to s_i = A_i y + b_i ∈ K_i for every
+/// constraint i.
 ///
 /// H is positive definite. Each constraint reads a few entries of y only, so that its share of
 /// a Newton step is small dense blocks.
@@ -30,6 +31,8 @@ pub struct Constraint {
     pub map: DMatrix<f64>,
     /// b_i.
     pub offset: DVector<f64>,
+    /// γ_i ≥ 0: zero for a plain constraint.
+    pub barrier: f64,
 }
 
 /// A solution with the proof of how good it is.
@@ -37,7 +40,7 @@ pub struct Constraint {
 pub struct ConeSolution {
     /// y.
     pub y: DVector<f64>,
-    /// ½ yᵀH y − cᵀy.
+    /// ½ yᵀH y − cᵀy − Σ γ_i ln det s_i.
     pub objective: f64,
     /// The objective is at most this much above the least possible one. It is the difference to
     /// the value of a dual point, so that it holds whatever happened on the way.
@@ -85,6 +88,8 @@ pub enum ProgramError {
 const MOST_STEPS: usize = 100;
 /// Share of the way to the boundary that a step goes.
 const SHORT_OF_BOUNDARY: f64 = 0.99;
+/// A shorter step means that the second-order correction led astray: one back to the centre is taken.
+const TOO_SHORT: f64 = 0.1;
 
 impl ConeProgram {
     /// Solves from `start`, which is inside all cones, until the duality gap is below `tolerance`
@@ -93,11 +98,14 @@ impl ConeProgram {
     ///
     /// Mehrotra's predictor–corrector with Nesterov and Todd's scaling (L. Vandenberghe, "The
     /// CVXOPT linear and quadratic cone program solvers", 2010). s = A y + b holds throughout, so
-    /// only the dual equation and complementarity are left to Newton's method.
+    /// only the dual equation and complementarity are left to Newton's method: s_i z_i = γ_i, which
+    /// for a plain constraint is the end of the central path and for a barrier a point on it.
     ///
     /// # Certificate
     /// For z in the cones and r = H y − c − Aᵀz the dual value is
-    /// objective(y) − sᵀz − ½ rᵀH⁻¹r, whence gap = sᵀz + ½ rᵀH⁻¹r.
+    /// objective(y) − Σ g_i − ½ rᵀH⁻¹r, whence gap = Σ g_i + ½ rᵀH⁻¹r with g_i = s_iᵀz_i for a plain
+    /// constraint and g_i = s_iᵀz_i − γ_i (d_i + ln det(s_i z_i / γ_i)) for a barrier of degree d_i: both
+    /// are ≥ 0, and 0 only where complementarity holds.
     pub fn solve(
         &self,
         start: DVector<f64>,
@@ -112,10 +120,9 @@ impl ConeProgram {
         let mut last_factor: Option<Cholesky<f64, Dyn>> = None;
         let mut iterations = 0;
         loop {
-            let objective = self.objective(&point.y);
+            let objective = self.objective(&point.y) + point.barriers(self);
             let residual = self.dual_residual(&point);
-            let slack = point.complementarity();
-            let gap = slack + 0.5 * residual.dot(&hessian.solve(&residual));
+            let gap = point.gap(self) + 0.5 * residual.dot(&hessian.solve(&residual));
             let wanted = tolerance * (1.0 + (objective + constant).abs());
             let mut stiffness = match last_factor.take() {
                 Some(stiffness) if gap <= wanted => {
@@ -142,19 +149,23 @@ impl ConeProgram {
             step.scale_maps(self, &scalings);
             step.add_curvature(self, &mut stiffness);
             let factor = Cholesky::new(stiffness).ok_or_else(stuck)?;
-            let mu = slack / self.degree() as f64;
+            let mu = point.excess(self) / self.degree() as f64;
             step.towards(self, &scalings, &factor, &residual, 0.0, Correction::None);
             let affine = step.longest(&scalings).min(1.0);
             let centring = (1.0 - affine).powi(3) * mu;
             step.towards(self, &scalings, &factor, &residual, centring, Correction::SecondOrder);
-            let length = (SHORT_OF_BOUNDARY * step.longest(&scalings)).min(1.0);
+            let mut length = (SHORT_OF_BOUNDARY * step.longest(&scalings)).min(1.0);
+            if length < TOO_SHORT {
+                step.towards(self, &scalings, &factor, &residual, mu, Correction::None);
+                length = (SHORT_OF_BOUNDARY * step.longest(&scalings)).min(1.0);
+            }
             point.advance(self, &scalings, &step, length);
             last_factor = Some(factor);
             iterations += 1;
         }
     }
 
-    /// ½ yᵀH y − cᵀy.
+    /// ½ yᵀH y − cᵀy: the objective without its barriers.
     pub fn objective(&self, y: &DVector<f64>) -> f64 {
         0.5 * y.dot(&(&self.hessian * y)) - self.linear.dot(y)
     }
@@ -202,6 +213,10 @@ impl Constraint {
     }
 }
 
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
 /// Where the iteration stands: y, s = A y + b and z.
 struct Point {
     y: DVector<f64>,
@@ -218,7 +233,8 @@ impl Point {
         let mut point = Self { y, s: zeros.clone(), z: zeros };
         point.update_s(program);
         let gradient = &program.hessian * &point.y - &program.linear;
-        let mu = (gradient.dot(&point.y).abs() / program.degree() as f64).max(1.0);
+        let most = program.constraints.iter().map(|c| c.barrier).fold(1.0, f64::max);
+        let mu = (gradient.dot(&point.y).abs() / program.degree() as f64).max(most);
         for (k, constraint) in program.constraints.iter().enumerate() {
             let margin = constraint.cone.margin(&point.s[k]);
             if margin.is_nan() || margin <= 0.0 {
@@ -237,9 +253,41 @@ impl Point {
         }
     }
 
-    /// sᵀz.
-    fn complementarity(&self) -> f64 {
-        self.s.iter().flatten().zip(self.z.iter().flatten()).map(|(s, z)| s * z).sum()
+    /// Every constraint with its s and z.
+    fn pairs<'a>(
+        &'a self,
+        program: &'a ConeProgram,
+    ) -> impl Iterator<Item = (&'a Constraint, &'a [f64], &'a [f64])> {
+        let points = self.s.iter().zip(&self.z);
+        program.constraints.iter().zip(points).map(|(c, (s, z))| (c, &s[..], &z[..]))
+    }
+
+    /// Σ g_i, the certificate's part that complementarity leaves.
+    fn gap(&self, program: &ConeProgram) -> f64 {
+        self.pairs(program)
+            .map(|(Constraint { cone, barrier, .. }, s, z)| match *barrier {
+                0.0 => dot(s, z),
+                weight => {
+                    let degree = cone.degree() as f64;
+                    let logarithm = cone.log_det(s) + cone.log_det(z) - degree * weight.ln();
+                    dot(s, z) - weight * (degree + logarithm)
+                }
+            })
+            .sum()
+    }
+
+    /// How far the s_iᵀz_i are from their ends γ_i d_i.
+    fn excess(&self, program: &ConeProgram) -> f64 {
+        let off = |(c, s, z): (&Constraint, &[f64], &[f64])| {
+            (dot(s, z) - c.barrier * c.cone.degree() as f64).abs()
+        };
+        self.pairs(program).map(off).sum()
+    }
+
+    /// −Σ γ_i ln det s_i.
+    fn barriers(&self, program: &ConeProgram) -> f64 {
+        let weighted = self.pairs(program).filter(|(c, ..)| c.barrier > 0.0);
+        -weighted.map(|(c, s, _)| c.barrier * c.cone.log_det(s)).sum::<f64>()
     }
 
     fn scalings(&self, program: &ConeProgram) -> Option<Vec<Scaling>> {
@@ -313,7 +361,7 @@ impl Step {
         }
     }
 
-    /// Solves H Δy − AᵀΔz = −r, λ∘(Δz̃ + Δs̃) = σμ e − λ∘λ − (correction), Δs̃ = B Δy:
+    /// Solves H Δy − AᵀΔz = −r, λ∘(Δz̃ + Δs̃) = (γ + σμ) e − λ∘λ − (correction), Δs̃ = B Δy:
     /// with d = λ\(…), (H + BᵀB) Δy = −r + Bᵀd and Δz̃ = d − B Δy.
     fn towards(
         &mut self,
@@ -321,7 +369,7 @@ impl Step {
         scalings: &[Scaling],
         factor: &Cholesky<f64, Dyn>,
         residual: &DVector<f64>,
-        target: f64,
+        centring: f64,
         correction: Correction,
     ) {
         const NOTHING: [f64; 10] = [0.0; 10];
@@ -334,7 +382,7 @@ impl Step {
                 Correction::None => (&NOTHING[..length], &NOTHING[..length]),
                 Correction::SecondOrder => (&self.s[k][..], &self.z[k][..]),
             };
-            scaling.complementarity(target, a, b, &mut d[..length]);
+            scaling.complementarity(constraint.barrier + centring, a, b, &mut d[..length]);
             self.z[k].copy_from_slice(&d[..length]);
             let d = DVectorView::from_slice(&d, length);
             for (&column, map) in constraint.columns.iter().zip(self.maps[k].column_iter()) {

@@ -95,5 +95,5 @@ fn along(
         offset += &constraint.offset;
     }
     let columns = columns.into_iter().chain([null_space.ncols()]).collect();
-    Constraint { cone: constraint.cone, columns, map, offset }
+    Constraint { cone: constraint.cone, columns, map, offset, barrier: 0.0 }
 }

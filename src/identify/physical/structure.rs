@@ -25,7 +25,7 @@ pub struct Structure {
     pub constraints: Vec<Constraint>,
     /// What each constraint is about.
     pub subjects: Vec<Subject>,
-    /// Squares ‖A y − a‖² that pull to the prior.
+    /// What pulls to the prior.
     pub pulls: Vec<Pull>,
     /// The prior, moved inside the cones where it lies on their boundary.
     pub start: DVector<f64>,
@@ -60,14 +60,32 @@ impl std::fmt::Display for Subject {
     }
 }
 
-/// ‖A y − a‖² over a few entries of y.
+/// What pulls a few entries of y to the prior: A y is to be near a.
 #[derive(Debug, Clone)]
 pub struct Pull {
     columns: Vec<usize>,
     map: DMatrix<f64>,
     target: DVector<f64>,
+    /// The cone whose unit a is; `None` where the prior is zero.
+    cone: Option<Cone>,
 }
 
+impl Pull {
+    /// weight·½‖A y − a‖² as a part of ½ yᵀH y − cᵀy; returns weight·½‖a‖².
+    fn add_square(&self, weight: f64, h: &mut DMatrix<f64>, c: &mut DVector<f64>) -> f64 {
+        let Self { columns, map, target, .. } = self;
+        for (a, &row) in columns.iter().enumerate() {
+            c[row] += weight * map.column(a).dot(target);
+            for (b, &column) in columns.iter().enumerate() {
+                h[(row, column)] += weight * map.column(a).dot(&map.column(b));
+            }
+        }
+        0.5 * weight * target.norm_squared()
+    }
+}
+
+/// Share of the squared pull that is added to the entropic one.
+pub const ENTROPIC_CURVATURE: f64 = 1e-4;
 /// Size of a drive parameter whose prior is zero (a URDF has no rotor inertia): what counts as
 /// a deviation of 100 %. In kg m², Nm s/rad and Nm.
 const UNKNOWN_ROTOR_INERTIA: f64 = 0.1;
@@ -150,15 +168,38 @@ impl Structure {
 
     /// Adds weight·½‖A y − a‖² of every pull to ½ yᵀH y − cᵀy; returns weight·½‖a‖².
     pub fn add_pulls(&self, weight: f64, h: &mut DMatrix<f64>, c: &mut DVector<f64>) -> f64 {
+        self.pulls.iter().map(|pull| pull.add_square(weight, h, c)).sum()
+    }
+
+    /// Adds weight·D of every pull, D = tr(A y) − ln det(A y) − d: the logarithm as a barrier among
+    /// `constraints`, the trace to −cᵀy; returns −Σ weight·d. Where the prior is zero there is no
+    /// logarithm, and the pull is the square. H is given [`ENTROPIC_CURVATURE`] of the square as well,
+    /// because data alone leave it singular.
+    pub fn add_divergences(
+        &self,
+        weight: f64,
+        h: &mut DMatrix<f64>,
+        c: &mut DVector<f64>,
+        constraints: &mut Vec<Constraint>,
+    ) -> f64 {
         let mut constant = 0.0;
-        for Pull { columns, map, target } in &self.pulls {
-            constant += 0.5 * weight * target.norm_squared();
-            for (a, &row) in columns.iter().enumerate() {
-                c[row] += weight * map.column(a).dot(target);
-                for (b, &column) in columns.iter().enumerate() {
-                    h[(row, column)] += weight * map.column(a).dot(&map.column(b));
-                }
+        for pull in &self.pulls {
+            let Some(cone) = pull.cone else {
+                constant += pull.add_square(weight, h, c);
+                continue;
+            };
+            constant += pull.add_square(ENTROPIC_CURVATURE * weight, h, c);
+            constant -= weight * cone.degree() as f64;
+            for (&row, column) in pull.columns.iter().zip(pull.map.column_iter()) {
+                c[row] -= weight * column.dot(&pull.target);
             }
+            constraints.push(Constraint {
+                cone,
+                columns: pull.columns.clone(),
+                map: pull.map.clone(),
+                offset: DVector::zeros(cone.dimension()),
+                barrier: weight,
+            });
         }
         constant
     }
@@ -203,7 +244,12 @@ impl Structure {
         let (columns, block) = self.block(10 * body..10 * body + 10);
         let map = coordinates * block;
         let unit = DVector::from_column_slice(svec(&Matrix4::identity()).as_slice());
-        self.pulls.push(Pull { columns: columns.clone(), map: map.clone(), target: unit.clone() });
+        self.pulls.push(Pull {
+            columns: columns.clone(),
+            map: map.clone(),
+            target: unit.clone(),
+            cone: Some(Cone::Semidefinite),
+        });
         self.push(Subject::Link(body), Cone::Semidefinite, columns, map, -margin * unit);
         Ok(())
     }
@@ -222,7 +268,8 @@ impl Structure {
             self.start[*only] = size;
         }
         let target = DVector::from_element(1, prior / size);
-        self.pulls.push(Pull { columns: columns.clone(), map: map.clone(), target });
+        let cone = (prior > 0.0).then_some(Cone::NonNegative);
+        self.pulls.push(Pull { columns: columns.clone(), map: map.clone(), target, cone });
         self.push(Subject::Drive(parameter), Cone::NonNegative, columns, map, DVector::zeros(1));
     }
 
@@ -231,7 +278,8 @@ impl Structure {
         let (columns, map) = self.block(index..index + 1);
         if !columns.is_empty() {
             let map = map / USUAL_OFFSET_NM;
-            self.pulls.push(Pull { columns, map, target: DVector::zeros(1) });
+            let target = DVector::zeros(1);
+            self.pulls.push(Pull { columns, map, target, cone: None });
         }
     }
 
@@ -265,7 +313,7 @@ impl Structure {
         offset: DVector<f64>,
     ) {
         self.subjects.push(subject);
-        self.constraints.push(Constraint { cone, columns, map, offset });
+        self.constraints.push(Constraint { cone, columns, map, offset, barrier: 0.0 });
     }
 
     /// The prior itself must satisfy every bound.

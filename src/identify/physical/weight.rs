@@ -1,12 +1,58 @@
-//! The weight of the prior: given, or chosen by cross-validation.
+//! The pull to the prior: how it measures deviations, and its weight, given or chosen by
+//! cross-validation.
 
 use std::str::FromStr;
 
 use nalgebra::DVector;
+use serde::{Deserialize, Serialize};
 
 use super::error::PhysicalError;
 use super::estimate::Solver;
 use super::information::Information;
+
+/// How a deviation from the prior is measured. Both are ½ tr(P₀⁻¹ΔP P₀⁻¹ΔP) for small deviations and
+/// do not depend on the choice of frames and units.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "snake_case")]
+#[value(rename_all = "snake_case")]
+pub enum PriorMetric {
+    /// ½ tr(P₀⁻¹ΔP P₀⁻¹ΔP): the square of the distance in the tangent space at the prior.
+    #[default]
+    PullBack,
+    /// tr(P₀⁻¹P) − ln det(P₀⁻¹P) − 4: the relative entropy of Gaussian densities of mass, infinite
+    /// where a body ceases to exist.
+    Entropic,
+}
+
+impl std::fmt::Display for PriorMetric {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(match self {
+            Self::PullBack => "constant pull-back",
+            Self::Entropic => "entropic",
+        })
+    }
+}
+
+/// A pull to the prior.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pulling {
+    /// How deviations are measured.
+    pub metric: PriorMetric,
+    /// γ.
+    pub weight: f64,
+}
+
+impl Pulling {
+    /// The constant pull-back with weight γ.
+    pub fn squared(weight: f64) -> Self {
+        Self { metric: PriorMetric::PullBack, weight }
+    }
+
+    /// The relative entropy with weight γ.
+    pub fn entropic(weight: f64) -> Self {
+        Self { metric: PriorMetric::Entropic, weight }
+    }
+}
 
 /// γ: a relative deviation of s from the prior costs as much as one σ of noise when γ = 1/s².
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,6 +102,7 @@ pub(super) fn cross_validate(
     solver: &Solver,
     information: &Information,
     periods: &[Vec<f64>],
+    metric: PriorMetric,
 ) -> Result<CrossValidation, PhysicalError> {
     let count = periods.len();
     if count < 3 {
@@ -68,7 +115,7 @@ pub(super) fn cross_validate(
     let kept_information = Information { root: kept_root, theta: information.theta.clone() };
     let mut tried = Vec::with_capacity(CANDIDATES.len());
     for weight in CANDIDATES {
-        let data = solver.data(&kept_information, weight);
+        let data = solver.data(&kept_information, Pulling { metric, weight });
         let mut error = 0.0;
         for left_out in periods {
             let left_out = DVector::from_column_slice(left_out);

@@ -7,6 +7,7 @@ mod mass_matrix;
 mod noise;
 mod paper;
 mod paper_equations;
+pub mod physical;
 
 pub use error::StudyError;
 pub use mass_matrix::indefinite_share;

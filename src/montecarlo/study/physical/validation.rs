@@ -1,0 +1,86 @@
+//! How well base parameters predict a motion that they were not identified from.
+
+use nalgebra::DVector;
+
+use crate::excitation::{Excitation, FourierSeries, Requirements};
+use crate::identify::{Identifier, Measurement, Options, Problem, Triangle};
+use crate::montecarlo::experiment::TrialError;
+use crate::montecarlo::scenario::{Scenario, ScenarioError};
+use crate::montecarlo::simulation::Simulation;
+use crate::plant::SensorConfig;
+
+/// Error of a prediction on another motion of the same arm, noise-free, reduced to a triangle:
+/// mean over the joints of ‖e_j‖²/‖τ_j‖² = ‖R θ − ρ‖² + (what no θ explains)².
+#[derive(Debug, Clone)]
+pub struct Validation {
+    triangle: Triangle,
+}
+
+impl Validation {
+    /// Runs the arm of `scenario`, with all that is hidden in it, along `trajectory`.
+    pub fn run(scenario: &Scenario, trajectory: &str) -> Result<Self, CaseError> {
+        let series = FourierSeries::built_in(trajectory).map_err(ScenarioError::from)?;
+        let arm = &scenario.arm;
+        let excitation = Excitation::fitted(arm, &Requirements::default(), series, 1, false)
+            .map_err(ScenarioError::from)?;
+        let quiet = Scenario { excitation, sensors: SensorConfig::default(), ..scenario.clone() };
+        let simulation = Simulation::run(quiet).map_err(TrialError::from)?;
+        let log = simulation.log(0).map_err(TrialError::from)?;
+        let options = Options { period_s: Some(0.0), ..scenario.processing.clone() };
+        let model = crate::dynamics::Model::new(arm);
+        let measurement = Measurement {
+            source: trajectory,
+            time_s: &log.time_s,
+            q_rad: &log.q_rad,
+            qd_rad_s: &log.qd_rad_s,
+            torque_nm: &log.torque_nm,
+        };
+        let mut identifier = Identifier::new(&model, &scenario.set, options);
+        let regression = identifier.regression(&measurement).map_err(TrialError::from)?;
+        Ok(Self { triangle: reduced(&regression.problem) })
+    }
+
+    /// R θ − ρ.
+    pub fn error(&self, theta: &[f64]) -> DVector<f64> {
+        let b = theta.len();
+        let row = |i: usize| (i..b).map(|k| self.triangle.r(i, k) * theta[k]).sum::<f64>();
+        DVector::from_iterator(b, self.triangle.rhs(0).iter().enumerate().map(|(i, z)| row(i) - z))
+    }
+
+    /// (What no θ explains)².
+    pub fn unexplained(&self) -> f64 {
+        self.triangle.outside(0)
+    }
+}
+
+/// All joints' equations, each joint's divided by its torque and by √joints.
+fn reduced(problem: &Problem) -> Triangle {
+    let (b, n) = (problem.parameters(), problem.samples);
+    let mut triangle = Triangle::new(b, 1);
+    for (joint, panel) in problem.panels.iter().enumerate() {
+        let size = panel.y.iter().map(|y| y * y).sum::<f64>().sqrt();
+        let weight = 1.0 / (size * (problem.joints() as f64).sqrt());
+        let mut block = vec![0.0; (b + 1) * n];
+        for (base, column) in problem.plan.base_indices(joint).zip(panel.x.chunks_exact(n)) {
+            block[base * n..][..n].copy_from_slice(column);
+        }
+        block[b * n..].copy_from_slice(&panel.y);
+        block.iter_mut().for_each(|x| *x *= weight);
+        triangle.append(&mut block, n);
+    }
+    triangle
+}
+
+/// A case that could not be run.
+#[derive(Debug, thiserror::Error)]
+pub enum CaseError {
+    /// The scenario or the motion to validate on.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// The plant, or the log that all trials are modelled on.
+    #[error(transparent)]
+    Trial(#[from] TrialError),
+    /// The constraints of the arm.
+    #[error(transparent)]
+    Physical(#[from] crate::identify::physical::PhysicalError),
+}
