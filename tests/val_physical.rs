@@ -3,15 +3,18 @@
 //! convexity on simulated logs.
 
 use std::f64::consts::PI;
+use std::path::Path;
 use std::sync::OnceLock;
 use std::time::Instant;
 
 use armid::base::{BaseSet, Parameterisation};
 use armid::dynamics::{Model, Parameter, ParameterLayout, Workspace, mass_matrix};
 use armid::identify::physical::{
-    Information, PhysicalEstimate, PhysicalOptions, PriorMetric, Pulling, Solver, Structure, Subject, solve,
+    Information, PhysicalEstimate, PhysicalOptions, PriorMetric, Pulling, Solver, Structure,
+    Subject, solve,
 };
 use armid::identify::{Identification, Identifier, Measurement};
+use armid::montecarlo::study::physical::{SIGMAS, physical_case};
 use armid::montecarlo::{Experiment, Scenario};
 use armid::robot::{Arm, JointSignals};
 use nalgebra::{DMatrix, DVector};
@@ -237,7 +240,9 @@ fn the_papers_reduced_set_gives_an_arm_as_well() {
     let theta = DVector::from_vec(set.values(&Model::new(&arm).standard_parameters()));
     let root = DMatrix::from_diagonal_element(theta.len(), theta.len(), 100.0);
     let solver = Solver::new(structure);
-    let found = solver.constrained(&Information { root, theta: theta.clone() }, Pulling::squared(1e-4)).unwrap();
+    let found = solver
+        .constrained(&Information { root, theta: theta.clone() }, Pulling::squared(1e-4))
+        .unwrap();
     let standard = solver.structure().standard(&found.y);
     let error = DVector::from_vec(set.values(&standard)) - theta;
     assert!(error.amax() < 1e-4, "{error}");
@@ -252,4 +257,26 @@ fn a_body_that_cannot_exist_is_no_prior() {
     arm.joints[4].link.parameters[6] = 1.0;
     let message = Structure::new(&arm, &set, &arm, 1e-4).unwrap_err().to_string();
     assert!(message.contains("body 5") && message.contains("cannot exist"), "{message}");
+}
+
+/// A small version of `armid study physical`: another arm than the robot file's, five times the usual
+/// noise, 4 periods, so that bounds are active in nearly every trial.
+///
+/// The stated σ (as if no bound were there) holds the truth in 95 % of cases; the mean over 52
+/// parameters of 80 trials has a standard error of 0.6 % (parameters of one trial are correlated), and
+/// σ from 4 periods may be low by a few percent: 92 to 99 %. Scatter of predictions: the projection
+/// onto a convex set never adds to it.
+#[test]
+fn intervals_of_the_constrained_estimate_hold_the_truth() {
+    let text = include_str!("../sims/physical_noise_5.toml").replace("periods = 8", "periods = 4");
+    let scenario = Scenario::from_toml(&text, "small", Path::new("")).unwrap();
+    let case = physical_case(scenario, Some(80), 80, 2, &|_| {}).unwrap();
+    assert!(case.failures.is_empty(), "{:?}", case.failures);
+    println!("{case:#?}");
+    assert!(case.not_realisable > 0.5 && case.indefinite[1] == 0.0);
+    let released = SIGMAS.iter().position(|name| *name == "released").unwrap();
+    let coverage = case.coverage[released].unwrap();
+    assert!((0.92..0.99).contains(&coverage.mean), "{coverage:?}");
+    let [unconstrained, constrained] = [0, 1].map(|method| case.predictions[method].unwrap());
+    assert!(constrained.scatter_percent < 1.01 * unconstrained.scatter_percent);
 }

@@ -30,7 +30,7 @@ pub enum ResultError {
         source: std::io::Error,
     },
     /// Not a result of `armid identify`.
-    #[error("{file}: not a result of armid identify: {message}")]
+    #[error("{file}: not a result of armid identify --physical --json: {message}")]
     Format {
         /// The file.
         file: String,

@@ -217,8 +217,7 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
     }
     let mut result = IdentifyResult::of(&training, &validations)?;
     if args.physical {
-        let options =
-            PhysicalOptions {
+        let options = PhysicalOptions {
             metric: args.prior,
             prior_weight: args.prior_weight,
             ..PhysicalOptions::default()

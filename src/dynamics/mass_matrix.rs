@@ -97,9 +97,8 @@ pub fn kinetic_energy(
 ) -> f64 {
     let mut mass = std::mem::take(&mut ws.mass_matrix);
     mass_matrix(model, ws, q_rad, &mut mass);
-    let momentum = |j: usize| -> f64 {
-        mass.column(j).iter().zip(qd_rad_s).map(|(m, qd)| m * qd).sum()
-    };
+    let momentum =
+        |j: usize| -> f64 { mass.column(j).iter().zip(qd_rad_s).map(|(m, qd)| m * qd).sum() };
     let twice: f64 = qd_rad_s.iter().enumerate().map(|(j, qd)| qd * momentum(j)).sum();
     ws.mass_matrix = mass;
     0.5 * twice

@@ -115,7 +115,7 @@ impl Physical {
                 list(&self.unconstrained_rms_nm)
             ),
             format!(
-                "The robot file's values are the prior ({} pull, weight {:.0e}{}): combinations that no \
+                "The robot file's values are the prior ({}, weight {:.0e}{}): combinations that no \
                  torque depends on are where it puts them.",
                 self.prior_metric,
                 self.prior_weight,

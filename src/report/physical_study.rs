@@ -153,8 +153,7 @@ fn short(case: &CaseResult) -> &str {
 
 /// The page.
 pub fn page(study: &PhysicalStudy, program: Program) -> Result<Page, ReportError> {
-    let verdict =
-        Verdict { status: Status::Good, sentence: sentence(study), facts: facts(study) };
+    let verdict = Verdict { status: Status::Good, sentence: sentence(study), facts: facts(study) };
     let title = "What does physical consistency repair, and what not?";
     let mut page = Page::new(title, "", verdict, program);
     let cases = study.cases.iter().map(|case| format!("{}: {}.", short(case), case.description));
@@ -170,13 +169,17 @@ pub fn page(study: &PhysicalStudy, program: Program) -> Result<Page, ReportError
             )),
     );
     page.push(
-        Section::new("Could the unconstrained estimate be an arm?").table(realisable_table(study), ""),
+        Section::new("Could the unconstrained estimate be an arm?")
+            .table(realisable_table(study), ""),
     );
     page.push(
         Section::new("Is the σ of the constrained estimate true?")
             .paragraph(SIGMA)
             .figure(coverage_plot(study)?, "Mean coverage; bars are ±1.96 standard errors.")
-            .table(coverage_table(study), "Mean over the base parameters, and the one covered least"),
+            .table(
+                coverage_table(study),
+                "Mean over the base parameters, and the one covered least",
+            ),
     );
     Ok(page)
 }

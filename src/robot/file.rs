@@ -5,6 +5,7 @@ use serde::Deserialize;
 
 use super::arm::{Arm, Capsule, CellBox, Clearance, Drive, Joint, Limits, LinkBounds, Placement};
 use super::error::RobotError;
+use super::export::apply_drive_file;
 use super::inertia::LinkInertia;
 use super::urdf::{UrdfArm, UrdfNotice, read_urdf};
 
@@ -31,7 +32,8 @@ impl Arm {
         Self::from_toml(text, name)
     }
 
-    /// What `--robot` accepts: a built-in name, a `.urdf` file or a `.toml` robot file.
+    /// What `--robot` accepts: a built-in name, a `.urdf` file (with its drive file, where
+    /// `NAME.drives.toml` lies beside it) or a `.toml` robot file.
     pub fn load(name_or_path: &str) -> Result<Self, RobotError> {
         Self::load_with_notices(name_or_path).map(|(arm, _)| arm)
     }
@@ -39,13 +41,21 @@ impl Arm {
     /// As [`Arm::load`], with what had to be assumed; only a URDF leaves anything open.
     pub fn load_with_notices(name_or_path: &str) -> Result<(Self, Vec<UrdfNotice>), RobotError> {
         let path = std::path::Path::new(name_or_path);
-        let read = || {
+        let read_from = |path: &std::path::Path| {
             std::fs::read_to_string(path)
-                .map_err(|source| RobotError::Read { file: name_or_path.to_owned(), source })
+                .map_err(|source| RobotError::Read { file: path.display().to_string(), source })
         };
+        let read = || read_from(path);
         match path.extension().and_then(|e| e.to_str()) {
             Some("urdf") => {
-                let UrdfArm { arm, notices, .. } = read_urdf(&read()?, name_or_path)?;
+                let UrdfArm { mut arm, mut notices, .. } = read_urdf(&read()?, name_or_path)?;
+                let drives = path.with_extension("drives.toml");
+                if drives.exists() {
+                    let file = drives.display().to_string();
+                    apply_drive_file(&mut arm, &read_from(&drives)?, &file)?;
+                    notices.retain(|notice| !notice.is_settled_by_drive_file());
+                    notices.push(UrdfNotice::DriveFile { file });
+                }
                 Ok((arm, notices))
             }
             Some("toml") => Ok((Self::from_toml(&read()?, name_or_path)?, Vec::new())),

@@ -43,7 +43,7 @@ pub enum PhysicalError {
     /// Cross-validation leaves periods out in turn.
     #[error(
         "the weight of the prior can be cross-validated on a motion that repeats at least 3 times; \
-         this one has {periods} whole periods: give the weight as a number"
+         whole periods in this one: {periods}; give the weight as a number"
     )]
     TooFewPeriods {
         /// Periods there are.

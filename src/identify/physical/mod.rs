@@ -4,15 +4,17 @@
 //! a wrong model, negative rotor inertias and indefinite mass matrices come out. Here all standard
 //! parameters x are estimated at once,
 //!
-//! minimise ½ ‖R (K x − θ̂)‖² + ½ γ Σ_i tr(P₀⁻¹ΔP P₀⁻¹ΔP) + ½ γ Σ_k (Δx_k/x₀_k)²
+//! minimise ½ ‖R (K x − θ̂)‖² + γ D(x ‖ x₀)
 //! subject to P_i ⪰ ε P₀_i, Ia, rv, rc ≥ 0, and the robot file's bounds where it has some,
 //!
 //! with the whitened triangle R of the data, the base map K, each body's pseudo-inertia P_i and the
 //! robot file's P₀_i (P. M. Wensing, S. Kim, J.-J. Slotine, "Linear matrix inequalities for
-//! physically consistent inertial parameter identification", 2018; the pull to the prior is the
-//! constant pull-back metric of T. Lee, P. M. Wensing, F. C. Park, "Geometric robot dynamic
-//! identification", 2020). x has 78 or 84 entries, the data know 52 or 58 combinations of them: the
-//! others are where the prior puts them, and the default γ is so small that it decides nothing else.
+//! physically consistent inertial parameter identification", 2018). D pulls to the robot file: the
+//! constant pull-back metric ½ Σ tr(P₀⁻¹ΔP P₀⁻¹ΔP), or the entropic divergence
+//! Σ tr(P₀⁻¹P) − ln det(P₀⁻¹P) − 4 (T. Lee, P. M. Wensing, F. C. Park, "Geometric robot dynamic
+//! identification", 2020); drives likewise with x/x₀. x has 78 or 84 entries, the data know 52 or 58
+//! combinations of them: the others are where the prior puts them, and the default γ is so small that
+//! it decides nothing else.
 //!
 //! Enters: a [`Fit`](super::Fit) with its covariance. Leaves: a [`PhysicalEstimate`]: standard
 //! parameters, how far they are from optimal, whether the unconstrained estimate was realisable,

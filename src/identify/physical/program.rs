@@ -86,6 +86,9 @@ pub enum ProgramError {
 
 /// Steps that are far more than any problem has needed (10 to 25).
 const MOST_STEPS: usize = 100;
+/// Where rounding ends the iteration early, this relative gap is still far below what noise could
+/// show (half a unit of the objective is one σ).
+const ACCEPTABLE: f64 = 1e-6;
 /// Share of the way to the boundary that a step goes.
 const SHORT_OF_BOUNDARY: f64 = 0.99;
 /// A shorter step means that the second-order correction led astray: one back to the centre is taken.
@@ -112,7 +115,6 @@ impl ConeProgram {
         constant: f64,
         tolerance: f64,
     ) -> Result<ConeSolution, ProgramError> {
-        let n = self.linear.len();
         let hessian = Cholesky::new(self.hessian.clone()).ok_or(ProgramError::NotConvex)?;
         let mut point = Point::new(self, start)?;
         let mut step = Step::new(self);
@@ -123,10 +125,14 @@ impl ConeProgram {
             let objective = self.objective(&point.y) + point.barriers(self);
             let residual = self.dual_residual(&point);
             let gap = point.gap(self) + 0.5 * residual.dot(&hessian.solve(&residual));
-            let wanted = tolerance * (1.0 + (objective + constant).abs());
-            let mut stiffness = match last_factor.take() {
-                Some(stiffness) if gap <= wanted => {
-                    return Ok(ConeSolution {
+            let size = 1.0 + (objective + constant).abs();
+            let wanted = tolerance * size;
+            let done = gap <= wanted && last_factor.is_some();
+            let exhausted = iterations == MOST_STEPS || !gap.is_finite();
+            let next = if done || exhausted { None } else { step.prepare(self, &point) };
+            let Some((scalings, factor)) = next else {
+                return match last_factor {
+                    Some(stiffness) if gap <= ACCEPTABLE * size => Ok(ConeSolution {
                         objective,
                         gap,
                         dual_residual: residual.amax() / scale,
@@ -135,20 +141,10 @@ impl ConeProgram {
                         multipliers: point.z,
                         y: point.y,
                         stiffness,
-                    });
-                }
-                Some(used) => used.unpack_dirty(),
-                None => DMatrix::zeros(n, n),
+                    }),
+                    _ => Err(ProgramError::NotConverged { iterations, gap, wanted }),
+                };
             };
-            let stuck = || ProgramError::NotConverged { iterations, gap, wanted };
-            if iterations == MOST_STEPS || !gap.is_finite() {
-                return Err(stuck());
-            }
-            let scalings = point.scalings(self).ok_or_else(stuck)?;
-            stiffness.copy_from(&self.hessian);
-            step.scale_maps(self, &scalings);
-            step.add_curvature(self, &mut stiffness);
-            let factor = Cholesky::new(stiffness).ok_or_else(stuck)?;
             let mu = point.excess(self) / self.degree() as f64;
             step.towards(self, &scalings, &factor, &residual, 0.0, Correction::None);
             let affine = step.longest(&scalings).min(1.0);
@@ -338,6 +334,20 @@ impl Step {
             z: zeros,
             maps: program.constraints.iter().map(|c| c.map.clone()).collect(),
         }
+    }
+
+    /// The scalings at `point` and the factor of H + Σ B_iᵀB_i; `None` where rounding has taken the
+    /// point out of a cone.
+    fn prepare(
+        &mut self,
+        program: &ConeProgram,
+        point: &Point,
+    ) -> Option<(Vec<Scaling>, Cholesky<f64, Dyn>)> {
+        let scalings = point.scalings(program)?;
+        self.scale_maps(program, &scalings);
+        let mut matrix = program.hessian.clone();
+        self.add_curvature(program, &mut matrix);
+        Some((scalings, Cholesky::new(matrix)?))
     }
 
     fn scale_maps(&mut self, program: &ConeProgram, scalings: &[Scaling]) {

@@ -1,20 +1,23 @@
 //! What a URDF has no place for.
 
-use serde::Serialize;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
-use crate::robot::Arm;
+use crate::robot::{Arm, RobotError};
 
-#[derive(Serialize)]
-struct DriveFile<'a> {
-    robot: &'a str,
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DriveFile {
+    robot: String,
     gravity_m_s2: [f64; 3],
     friction_epsilon_rad_s: f64,
-    joint: Vec<DriveEntry<'a>>,
+    joint: Vec<DriveEntry>,
 }
 
-#[derive(Serialize)]
-struct DriveEntry<'a> {
-    name: &'a str,
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DriveEntry {
+    name: String,
     rotor_inertia_kg_m2: f64,
     viscous_nm_s_rad: f64,
     coulomb_nm: f64,
@@ -30,12 +33,12 @@ struct DriveEntry<'a> {
 pub fn drive_file(arm: &Arm, offsets_nm: &[f64]) -> String {
     let joints = arm.joints.iter().zip(offsets_nm);
     let file = DriveFile {
-        robot: &arm.name,
+        robot: arm.name.clone(),
         gravity_m_s2: arm.gravity_m_s2.into(),
         friction_epsilon_rad_s: arm.friction_epsilon_rad_s,
         joint: joints
             .map(|(joint, &torque_offset_nm)| DriveEntry {
-                name: &joint.name,
+                name: joint.name.clone(),
                 rotor_inertia_kg_m2: joint.drive.rotor_inertia_kg_m2,
                 viscous_nm_s_rad: joint.drive.viscous_nm_s_rad,
                 coulomb_nm: joint.drive.coulomb_nm,
@@ -48,4 +51,52 @@ pub fn drive_file(arm: &Arm, offsets_nm: &[f64]) -> String {
     };
     // Strings and finite numbers in a table always serialise.
     toml::to_string(&file).unwrap_or_default()
+}
+
+/// Gives `arm`, which was read from a URDF, the drives in the text of its drive file; `source` names
+/// it in messages. An [`Arm`] has no place for torque offsets.
+pub fn apply_drive_file(arm: &mut Arm, text: &str, source: &str) -> Result<(), RobotError> {
+    let file: DriveFile = toml::from_str(text)
+        .map_err(|e| RobotError::Toml { file: source.to_owned(), message: e.to_string() })?;
+    let fault = |what: String| RobotError::Invalid { file: source.to_owned(), what };
+    if file.robot != arm.name {
+        return Err(fault(format!(
+            "it is about \"{}\", not \"{}\": move it away or give the URDF that it belongs to",
+            file.robot, arm.name
+        )));
+    }
+    let names = |list: &[String]| list.join(", ");
+    let given: Vec<String> = file.joint.iter().map(|entry| entry.name.clone()).collect();
+    let wanted: Vec<String> = arm.joints.iter().map(|joint| joint.name.clone()).collect();
+    if given != wanted {
+        return Err(fault(format!(
+            "its joints are {}, the URDF\'s are {}: export both again",
+            names(&given),
+            names(&wanted)
+        )));
+    }
+    let positive = |place: &str, name: &str, value: f64| match value > 0.0 && value.is_finite() {
+        true => Ok(value),
+        false => Err(fault(format!("{place}{name} = {value} must be positive"))),
+    };
+    arm.friction_epsilon_rad_s =
+        positive("", "friction_epsilon_rad_s", file.friction_epsilon_rad_s)?;
+    arm.gravity_m_s2 = Vector3::from(file.gravity_m_s2);
+    for (joint, entry) in arm.joints.iter_mut().zip(file.joint) {
+        let place = format!("joint \"{}\": ", entry.name);
+        let not_negative = |name: &str, value: f64| match value >= 0.0 && value.is_finite() {
+            true => Ok(value),
+            false => Err(fault(format!("{place}{name} = {value} must not be negative"))),
+        };
+        let drive = &mut joint.drive;
+        drive.rotor_inertia_kg_m2 = not_negative("rotor_inertia_kg_m2", entry.rotor_inertia_kg_m2)?;
+        drive.viscous_nm_s_rad = not_negative("viscous_nm_s_rad", entry.viscous_nm_s_rad)?;
+        drive.coulomb_nm = not_negative("coulomb_nm", entry.coulomb_nm)?;
+        drive.gear_ratio = positive(&place, "gear_ratio", entry.gear_ratio)?;
+        drive.torque_constant_nm_a =
+            positive(&place, "torque_constant_nm_a", entry.torque_constant_nm_a)?;
+        joint.limits.acceleration_rad_s2 =
+            positive(&place, "acceleration_rad_s2", entry.acceleration_rad_s2)?;
+    }
+    Ok(())
 }

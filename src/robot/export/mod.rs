@@ -13,7 +13,7 @@ use thiserror::Error;
 
 use super::arm::Arm;
 
-pub use drives::drive_file;
+pub use drives::{apply_drive_file, drive_file};
 pub use mjcf::mjcf;
 pub use urdf::urdf;
 
@@ -190,5 +190,35 @@ mod tests {
         assert_eq!(joints[2]["rotor_inertia_kg_m2"].as_float(), Some(1.6));
         assert_eq!(joints[5]["torque_offset_nm"].as_float(), Some(0.5));
         assert_eq!(file["friction_epsilon_rad_s"].as_float(), Some(0.02));
+    }
+
+    /// URDF and drive file together are the whole arm but for its clearance.
+    #[test]
+    fn the_drive_file_gives_a_urdf_its_drives_back() {
+        let arm = Arm::built_in("ur5").unwrap();
+        let mut read = read_urdf(&urdf(&arm, &[]).unwrap(), "x.urdf").unwrap().arm;
+        apply_drive_file(&mut read, &drive_file(&arm, &[0.0; 6]), "x.drives.toml").unwrap();
+        assert_eq!(read.gravity_m_s2, arm.gravity_m_s2);
+        assert_eq!(read.friction_epsilon_rad_s, arm.friction_epsilon_rad_s);
+        for (a, b) in arm.joints.iter().zip(&read.joints) {
+            assert_eq!((a.drive, a.limits), (b.drive, b.limits));
+        }
+    }
+
+    #[test]
+    fn a_drive_file_that_does_not_belong_to_the_urdf_is_refused() {
+        let arm = Arm::built_in("ur5").unwrap();
+        let text = drive_file(&arm, &[0.0; 6]);
+        let message = |text: &str| {
+            apply_drive_file(&mut arm.clone(), text, "x.drives.toml").unwrap_err().to_string()
+        };
+        let other = message(&text.replacen("ur5", "ur9", 1));
+        assert!(other.contains("x.drives.toml") && other.contains("ur9"), "{other}");
+        let joint = message(&text.replace("wrist_1", "wrist_9"));
+        assert!(joint.contains("wrist_9") && joint.contains("export both again"), "{joint}");
+        let negative = message(&text.replace("rotor_inertia_kg_m2 = ", "rotor_inertia_kg_m2 = -"));
+        assert!(negative.contains("rotor_inertia_kg_m2 = -"), "{negative}");
+        let unknown = message(&text.replace("coulomb_nm", "coulombs"));
+        assert!(unknown.contains("coulombs"), "{unknown}");
     }
 }

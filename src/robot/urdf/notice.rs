@@ -19,6 +19,16 @@ pub enum UrdfNotice {
     },
     /// Collision shapes are not read.
     NoClearance,
+    /// Mesh files that could not be found (also those of a package, whose folder is not known).
+    MissingMeshes {
+        /// As written.
+        files: Vec<String>,
+    },
+    /// The drive file beside the URDF was read: rotor inertias, friction, gears, gravity.
+    DriveFile {
+        /// The file.
+        file: String,
+    },
     /// A continuous (or unlimited) joint was given ±2π rad.
     Continuous {
         /// The joint.
@@ -84,6 +94,19 @@ pub enum UrdfNotice {
     },
 }
 
+impl UrdfNotice {
+    /// Whether a drive file says what the URDF left open.
+    pub fn is_settled_by_drive_file(&self) -> bool {
+        matches!(
+            self,
+            Self::Gravity { .. }
+                | Self::Drives
+                | Self::NoFriction { .. }
+                | Self::AssumedAcceleration { .. }
+        )
+    }
+}
+
 impl fmt::Display for UrdfNotice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -100,6 +123,16 @@ impl fmt::Display for UrdfNotice {
             Self::NoClearance => write!(
                 f,
                 "collision shapes are not read: self-collision and the floor are not watched"
+            ),
+            Self::MissingMeshes { files } => write!(
+                f,
+                "{} mesh files are not there, such as {}: nothing is lost, shapes are not read and not exported",
+                files.len(),
+                files.first().map_or("", String::as_str)
+            ),
+            Self::DriveFile { file } => write!(
+                f,
+                "rotor inertia, friction, gears, acceleration limits and gravity are those of {file}; torque offsets in it are left out"
             ),
             Self::Continuous { joint } => {
                 write!(f, "joint \"{joint}\" has no end stops: taken as -2 pi to 2 pi")

@@ -1,9 +1,10 @@
 //! From the chain of a URDF to an [`Arm`].
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::path::Path;
 
 use nalgebra::{Matrix3, Vector3};
-use urdf_rs::{Inertial, JointType, Link, Pose};
+use urdf_rs::{Geometry, Inertial, JointType, Link, Pose};
 
 use super::chain::{Body, bodies};
 use super::fault::UrdfFault;
@@ -60,9 +61,10 @@ pub struct FixedFrame {
 ///   otherwise π about x followed by the smallest rotation from −ẑ to a. Axis z gives S = 1.
 /// - **Friction**: `damping` is rv, `friction` is rc. **Limits**: `effort` is the torque limit,
 ///   `velocity` the speed limit.
+/// - **Shapes** are not read; mesh files that are not there are named in the notices.
 /// - **What URDF does not have**: rotor inertia is 0, gear ratio 1 and torque constant 1 (a current
 ///   column then reads as joint torque), gravity 9.81 m/s² along −z of the root link, acceleration
-///   limit 10 rad/s² unless the file has one. Transmissions, meshes and collision shapes are not read.
+///   limit 10 rad/s² unless the file has one. Transmissions are not read.
 /// - **Angles** within 5e-6 rad of a multiple of π/2 are that multiple: files print 1.5708 for π/2,
 ///   and parallel axes that are nearly parallel blur which parameters can be known.
 ///
@@ -76,6 +78,10 @@ pub fn read_urdf(text: &str, source: &str) -> Result<UrdfArm, RobotError> {
     let joints = bodies(&robot)
         .and_then(|chain| reader.joints(&chain))
         .map_err(|fault| RobotError::UrdfArm { file: source.to_owned(), fault })?;
+    let files = missing_meshes(&robot, source);
+    if !files.is_empty() {
+        reader.notices.push(UrdfNotice::MissingMeshes { files });
+    }
     Ok(UrdfArm {
         arm: Arm {
             name: if robot.name.is_empty() { source.to_owned() } else { robot.name },
@@ -88,6 +94,25 @@ pub fn read_urdf(text: &str, source: &str) -> Result<UrdfArm, RobotError> {
         frames: reader.frames,
         notices: reader.notices,
     })
+}
+
+/// Mesh files that cannot be found from the folder of `source`, each once.
+fn missing_meshes(robot: &urdf_rs::Robot, source: &str) -> Vec<String> {
+    let folder = Path::new(source).parent().unwrap_or(Path::new(""));
+    let shapes = robot.links.iter().flat_map(|link| {
+        let visual = link.visual.iter().map(|visual| &visual.geometry);
+        visual.chain(link.collision.iter().map(|collision| &collision.geometry))
+    });
+    let mut missing: Vec<String> = shapes
+        .filter_map(|shape| match shape {
+            Geometry::Mesh { filename, .. } => Some(filename.clone()),
+            _ => None,
+        })
+        .filter(|file| !folder.join(file.trim_start_matches("file://")).exists())
+        .collect();
+    missing.sort();
+    missing.dedup();
+    missing
 }
 
 /// What accumulates beside the joints.

@@ -214,12 +214,18 @@ fn a_right_angle_printed_short_is_a_right_angle_and_is_said() {
 }
 
 #[test]
-fn meshes_that_are_not_there_do_not_matter() {
+fn meshes_that_are_not_there_are_named_and_do_not_matter() {
     let mesh =
         r#"<visual><geometry><mesh filename="package://nowhere/a.stl"/></geometry></visual>"#;
     let mut parts = two_joints();
     parts[1] = link("a", &format!("{BODY}{mesh}{}", mesh.replace("visual", "collision")));
-    assert_eq!(read(&robot(&parts)).arm, read(&robot(&two_joints())).arm);
+    let UrdfArm { arm, notices, .. } = read(&robot(&parts));
+    assert_eq!(arm, read(&robot(&two_joints())).arm);
+    let files = vec!["package://nowhere/a.stl".to_owned()];
+    let notice = UrdfNotice::MissingMeshes { files };
+    assert!(notices.contains(&notice), "{notices:?}");
+    let message = notice.to_string();
+    assert!(message.contains("nowhere/a.stl") && message.contains("nothing is lost"), "{message}");
 }
 
 #[test]
@@ -242,7 +248,7 @@ fn a_moving_link_of_mass_zero_is_refused() {
     parts[2] = link("b", empty);
     says(&robot(&parts), &["\"b\"", "mass 0"]);
     parts[2] = link("b", &BODY.replace(r#"mass value="2""#, r#"mass value="0""#));
-    assert_eq!(fault(&robot(&parts)), UrdfFault::InertiaWithoutMass { link: "b".into() });
+    says(&robot(&parts), &["\"b\"", "mass 0", "give its mass"]);
     parts[2] = link("b", &BODY.replace(r#"mass value="2""#, r#"mass value="-2""#));
     says(&robot(&parts), &["\"b\"", "mass = -2", "negative"]);
 }
@@ -253,12 +259,7 @@ fn an_axis_that_is_no_unit_vector_is_refused() {
         let mut parts = two_joints();
         let inside = format!(r#"{LIMIT}<axis xyz="{axis}"/>"#);
         parts[4] = joint("j2", "revolute", "a", "b", &inside);
-        match fault(&robot(&parts)) {
-            UrdfFault::Axis { joint, length: actual, .. } => {
-                assert_eq!((joint.as_str(), actual), ("j2", length));
-            }
-            other => panic!("{other}"),
-        }
+        says(&robot(&parts), &["\"j2\"", &format!("length {length};"), "must be a unit vector"]);
     }
 }
 

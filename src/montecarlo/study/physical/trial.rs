@@ -43,11 +43,7 @@ pub struct Bench<'a> {
 }
 
 impl<'a> Bench<'a> {
-    pub fn new(
-        experiment: &'a Experiment,
-        solver: &'a Solver,
-        validation: &'a Validation,
-    ) -> Self {
+    pub fn new(experiment: &'a Experiment, solver: &'a Solver, validation: &'a Validation) -> Self {
         Self { experiment, worker: experiment.worker(), solver, validation }
     }
 
@@ -60,7 +56,8 @@ impl<'a> Bench<'a> {
         let mut outcome = self.outcome(&found, &estimate);
         // A single run has no periods to leave out.
         if thorough && found.fit.theta_periods.len() > 2 {
-            for (k, metric) in [PriorMetric::PullBack, PriorMetric::Entropic].into_iter().enumerate()
+            for (k, metric) in
+                [PriorMetric::PullBack, PriorMetric::Entropic].into_iter().enumerate()
             {
                 let prior_weight = PriorWeight::CrossValidated;
                 let options = PhysicalOptions { metric, prior_weight, bootstrap: 0, ..plain };
