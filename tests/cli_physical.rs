@@ -100,7 +100,7 @@ fn the_weight_of_the_prior_is_cross_validated_and_shown() {
     }
     let words = "identify log.csv --robot ur5 --period 0 --physical --prior-weight auto";
     says(&armid(folder, words), 1, &["repeats at least 3 times", "give the weight as a number"]);
-    let words = "identify log.csv --robot ur5 --physical --prior-weight -1";
+    let words = "identify log.csv --robot ur5 --physical --prior-weight 0";
     says(&armid(folder, words), 2, &["positive number or auto"]);
     says(&armid(folder, "identify log.csv --robot ur5 --prior entropic"), 2, &["--physical"]);
 }
