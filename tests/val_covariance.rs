@@ -1,11 +1,14 @@
 //! Covariances against statsmodels (`golden/covariance.py`): ordinary and weighted least squares,
-//! clusters of time and Newey–West with the joints of one instant added up.
+//! clusters of time, Newey–West with the joints of one instant added up, and generalised least squares
+//! with autoregressive noise (GLSAR), instrumental variables (IV2SLS).
 
 use armid::base::{BaseSet, Parameterisation};
 use armid::identify::covariance::{
-    BlockCluster, Covariance, CovarianceMethod, NeweyWest, OrdinaryLeastSquares,
+    BlockCluster, Covariance, CovarianceKind, CovarianceMethod, NeweyWest, OrdinaryLeastSquares,
 };
-use armid::identify::{ColumnPlan, Fit, Fitter, Problem, Weighting};
+use armid::identify::{
+    ColumnPlan, Estimation, Estimator, Fit, Fitter, MotionAids, Options, Problem, Weighting,
+};
 use armid::robot::Arm;
 use serde::Deserialize;
 
@@ -25,6 +28,10 @@ struct Golden {
     wls_theta: Vec<f64>,
     hac: Vec<Vec<f64>>,
     cluster: Vec<Vec<f64>>,
+    glsar_theta: Vec<f64>,
+    glsar: Vec<Vec<f64>>,
+    iv_theta: Vec<f64>,
+    iv: Vec<Vec<f64>>,
 }
 
 fn golden() -> Golden {
@@ -56,10 +63,12 @@ fn problem(weights: [f64; 2]) -> Problem {
     problem
 }
 
+fn base_set() -> BaseSet {
+    BaseSet::find(&Arm::built_in("ur5").unwrap(), Parameterisation::full(6, false)).unwrap()
+}
+
 fn fit(problem: &Problem) -> Fit {
-    let arm = Arm::built_in("ur5").unwrap();
-    let set = BaseSet::find(&arm, Parameterisation::full(6, false)).unwrap();
-    Fitter::new(problem).fit(problem, &set, Weighting::Equal).unwrap()
+    Fitter::new(problem).fit(problem, &base_set(), Weighting::Equal).unwrap()
 }
 
 fn assert_close(found: &Covariance, factor: f64, expected: &[Vec<f64>]) {
@@ -95,4 +104,53 @@ fn scores_in_lags_and_in_blocks_of_time() {
     assert_close(&hac, lost, &golden.hac);
     let blocks = BlockCluster.covariance(&problem, &fit).unwrap();
     assert_close(&blocks, BLOCKS / (BLOCKS - 1.0), &golden.cluster);
+}
+
+/// The first joint alone by `estimator`.
+fn first_joint(
+    estimator: Estimator,
+    kind: CovarianceKind,
+    instruments: Option<&Problem>,
+) -> (Vec<f64>, Covariance) {
+    let problem = without_second_joint(problem([1.0, 1.0]));
+    let aids = MotionAids { instruments, ..MotionAids::default() };
+    let options = Options::default();
+    let mut estimate = Estimation::new(&problem)
+        .estimate(&problem, &base_set(), estimator, &[kind], aids, &options)
+        .unwrap();
+    (estimate.fit.theta, estimate.covariances.swap_remove(0).unwrap())
+}
+
+fn without_second_joint(mut problem: Problem) -> Problem {
+    problem.plan = ColumnPlan::explicit(&[(0..COLUMNS).collect()], COLUMNS);
+    problem.panels.truncate(1);
+    problem
+}
+
+fn assert_estimate(found: &[f64], expected: &[f64]) {
+    for (found, expected) in found.iter().zip(expected) {
+        assert!((found - expected).abs() < TOLERANCE, "{found} {expected}");
+    }
+}
+
+#[test]
+fn autoregressive_noise() {
+    let golden = golden();
+    let (theta, covariance) = first_joint(Estimator::Gls, CovarianceKind::Wls, None);
+    assert_estimate(&theta, &golden.glsar_theta);
+    assert_close(&covariance, 1.0, &golden.glsar);
+}
+
+#[test]
+fn instrumental_variables() {
+    let golden = golden();
+    let mut instruments = without_second_joint(problem([1.0, 1.0]));
+    for (c, column) in instruments.panels[0].x.chunks_exact_mut(SAMPLES).enumerate() {
+        for (t, z) in column.iter_mut().enumerate() {
+            *z += 0.2 * (0.11 * t as f64 + c as f64).sin();
+        }
+    }
+    let (theta, covariance) = first_joint(Estimator::Iv, CovarianceKind::Ols, Some(&instruments));
+    assert_estimate(&theta, &golden.iv_theta);
+    assert_close(&covariance, 1.0, &golden.iv);
 }

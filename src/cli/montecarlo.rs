@@ -15,7 +15,7 @@ use crate::montecarlo::shard::{
 use crate::montecarlo::{Experiment, SUMMARY_SCHEMA, Scenario, Summary};
 use crate::output::{check_writable, write_atomically};
 use crate::report::json::{Document, Input, Program};
-use crate::report::montecarlo::{check_table, page, parameter_table};
+use crate::report::montecarlo::{check_table, efficiency_sentence, page, parameter_table};
 
 /// Simulate an arm with a known truth, identify it from noisy logs thousands of times, and check
 /// that the predicted uncertainty is true.
@@ -120,7 +120,8 @@ fn run_merge(folders: &[PathBuf], output: &OutputArgs) -> CommandResult {
     }
     let merged = merge(shards)?;
     let wall_s = merged.seconds;
-    conclude(&merged, wall_s, inputs, output)
+    // Shards hold sums only; what bounds σ is known where the scenario is.
+    conclude(&merged, wall_s, None, inputs, output)
 }
 
 fn run_trials(args: &RunArgs) -> CommandResult {
@@ -156,7 +157,8 @@ fn run_trials(args: &RunArgs) -> CommandResult {
     let mut merged = merge(vec![(PathBuf::new(), shard)])?;
     // One shard of many is judged by its own trials; what others run is not missing.
     merged.missing.retain(|gap| gap.start >= range[0] && gap.end <= range[1]);
-    conclude(&merged, wall_s, inputs, &args.output)
+    let least_sigma = experiment.least_sigma()?;
+    conclude(&merged, wall_s, least_sigma.as_deref(), inputs, &args.output)
 }
 
 fn run_shard(
@@ -208,10 +210,11 @@ fn replay(experiment: &Experiment, trial: u64) -> CommandResult {
 fn conclude(
     merged: &Merged,
     wall_s: f64,
+    least_sigma: Option<&[f64]>,
     inputs: Vec<Input>,
     output: &OutputArgs,
 ) -> CommandResult {
-    let summary = Summary::of(merged, wall_s);
+    let summary = Summary::of(merged, wall_s, least_sigma);
     println!("{}", parameter_table(&summary).to_text());
     println!("{}", check_table(&summary).to_text());
     println!(
@@ -223,6 +226,9 @@ fn conclude(
     }
     for [start, end] in &summary.missing {
         println!("  trials {start}…{} have not been run", end - 1);
+    }
+    if let Some(efficiency) = &summary.efficiency {
+        println!("{}", efficiency_sentence(efficiency));
     }
     println!("\n{}: {}", summary.verdict.to_string().to_uppercase(), summary.sentence());
     let program = Program::new(std::env::args(), Some(merged.header.seed), inputs);

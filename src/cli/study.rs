@@ -35,7 +35,7 @@ struct NoiseArgs {
     /// Scenario files.
     #[arg(required = true)]
     scenarios: Vec<PathBuf>,
-    /// Trials per scenario instead of each scenario's own.
+    /// At most this many trials per scenario; each scenario's own number where left out.
     #[arg(long, value_parser = clap::value_parser!(u64).range(2..))]
     trials: Option<u64>,
     /// Threads; all cores where left out.
@@ -75,7 +75,10 @@ fn noise(args: &NoiseArgs) -> CommandResult {
         inputs.push(Input::of(path)?);
         let scenario = Scenario::load(Some(path))?;
         eprintln!("{}: {}", scenario.name, scenario.description);
-        let progress = Progress::new("trials", args.trials.unwrap_or(scenario.trials));
+        let progress = Progress::new(
+            "trials",
+            args.trials.map_or(scenario.trials, |most| most.min(scenario.trials)),
+        );
         results.scenarios.push(study(scenario, args.trials, threads, &|n| progress.reached(n))?);
         progress.finish();
     }

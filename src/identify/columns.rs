@@ -68,6 +68,12 @@ impl ColumnPlan {
         Self::explicit(&joints, self.base_count)
     }
 
+    /// The plan of equations with all columns at every joint.
+    pub fn full(&self) -> Self {
+        let all: Vec<usize> = (0..self.base_count).collect();
+        Self::explicit(&vec![all; self.joints()], self.base_count)
+    }
+
     /// Number of joints.
     pub fn joints(&self) -> usize {
         self.joints.len()

@@ -7,7 +7,7 @@ use super::fit::{Estimator, Fit, FitError, Fitter, Weighting};
 use super::lack_of_fit::LackOfFit;
 use super::options::Options;
 use super::problem::Problem;
-use super::whiten::{ReplicateWhitening, decimate, decorrelate, prewhiten};
+use super::whiten::{ReplicateWhitening, decimate, decorrelate, instrument, prewhiten};
 use crate::base::BaseSet;
 use crate::signal::{HarmonicPower, Scratch};
 
@@ -21,6 +21,18 @@ pub struct Estimation {
     own: Option<Whitened>,
     /// Whitened across joints.
     mixed: Option<Whitened>,
+    /// Every joint with all columns.
+    full: Option<Whitened>,
+}
+
+/// What is known of the motion besides the regressor along it.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct MotionAids<'a> {
+    /// How well the averaged acceleration of a motion that repeats is known, per joint: up to which
+    /// harmonic [`Estimator::Spectral`] may trust it.
+    pub acceleration: Option<&'a [HarmonicPower]>,
+    /// The regressor along a smoother motion (same rows), for [`Estimator::Iv`].
+    pub instruments: Option<&'a Problem>,
 }
 
 /// What one estimator says of a problem.
@@ -59,11 +71,11 @@ impl Estimation {
             filter: Scratch::default(),
             own: None,
             mixed: None,
+            full: None,
         }
     }
 
-    /// θ̂ by `estimator` and its covariances `kinds`. `acceleration` of a motion that repeats says to
-    /// which harmonic [`Estimator::Spectral`] may trust it; `options` is for the filter of
+    /// θ̂ by `estimator` and its covariances `kinds`; `options` is for the filter of
     /// [`Estimator::Decimated`].
     pub fn estimate(
         &mut self,
@@ -71,14 +83,17 @@ impl Estimation {
         set: &BaseSet,
         estimator: Estimator,
         kinds: &[CovarianceKind],
-        acceleration: Option<&[HarmonicPower]>,
+        aids: MotionAids,
         options: &Options,
     ) -> Result<Estimate, IdentifyError> {
         let plan = &self.plan;
         let own = || Whitened::new(plan.clone());
         let mixed = || Whitened::new(plan.cumulative());
+        let full = || Whitened::new(plan.full());
         let weighting = match estimator {
-            Estimator::Ols | Estimator::Sur | Estimator::Spectral => Weighting::Equal,
+            Estimator::Ols | Estimator::Sur | Estimator::Iv | Estimator::Spectral => {
+                Weighting::Equal
+            }
             Estimator::Wls | Estimator::Gls | Estimator::Decimated => Weighting::PerJoint,
         };
         let whitened = match estimator {
@@ -108,8 +123,15 @@ impl Estimation {
                 decimate(problem, cutoff_hz, order, &mut self.filter, &mut whitened.problem)?;
                 whitened
             }
+            Estimator::Iv => {
+                let instruments = aids.instruments.ok_or(FitError::WeakInstruments)?;
+                let whitened = self.full.get_or_insert_with(full);
+                let first = self.fitter.fit(problem, set, Weighting::PerJoint)?;
+                instrument(problem, instruments, &first.weights, &mut whitened.problem)?;
+                whitened
+            }
             Estimator::Spectral => {
-                let acceleration = acceleration.unwrap_or_default();
+                let acceleration = aids.acceleration.unwrap_or_default();
                 let moving = acceleration.iter().any(|power| !power.noise.is_empty());
                 if !moving || problem.periods < LEAST_PERIODS {
                     let (periods, needed) = (problem.periods, LEAST_PERIODS);

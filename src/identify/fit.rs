@@ -26,6 +26,9 @@ pub enum Estimator {
     Gls,
     /// Torque and regressor behind a low-pass and thinned, then weighted per joint (Gautier 1997).
     Decimated,
+    /// Instrumental variables, the regressor along a smoother motion, against the noise in the measured
+    /// one; weighted per joint (after Janot, Vandanjon and Gautier 2014).
+    Iv,
     /// Each harmonic of a motion that repeats, and each joint, weighted by the noise that the
     /// periods show there, correlation between joints included.
     Spectral,
@@ -39,6 +42,7 @@ impl std::fmt::Display for Estimator {
             Self::Sur => "sur",
             Self::Gls => "gls",
             Self::Decimated => "decimated",
+            Self::Iv => "iv",
             Self::Spectral => "spectral",
         })
     }
@@ -75,6 +79,12 @@ pub enum FitError {
         /// Periods needed.
         needed: usize,
     },
+    /// The smoother motion says nothing of some parameters.
+    #[error(
+        "the motion below the cutoff of the instruments does not excite all parameters: choose a \
+         higher cutoff, or another estimator than iv"
+    )]
+    WeakInstruments,
     /// Columns of the regressor vanish or coincide along this motion.
     #[error(
         "the motion does not excite {}: along it their columns are dependent on the others to \

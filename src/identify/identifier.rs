@@ -3,12 +3,13 @@
 use super::columns::ColumnPlan;
 use super::covariance::{Covariance, CovarianceKind};
 use super::error::IdentifyError;
-use super::estimation::{Estimate, Estimation};
+use super::estimation::{Estimate, Estimation, MotionAids};
 use super::fit::{Estimator, Fit};
 use super::lack_of_fit::LackOfFit;
 use super::options::Options;
 use super::prepare::{Measurement, Prepared, Preparer, Processing};
 use super::problem::{Assembler, Problem};
+use super::whiten::smoothed;
 use crate::base::BaseSet;
 use crate::dynamics::Model;
 use crate::robot::JointSignals;
@@ -107,6 +108,8 @@ impl Residual {
 pub struct Regression {
     /// X and y of every joint.
     pub problem: Problem,
+    /// The regressor along a smoother motion; only where the estimator asks for it.
+    pub instruments: Option<Problem>,
     /// The motion and torque behind them; for a single run unfiltered and as long as the window.
     pub prepared: Prepared,
     /// First sample of `prepared` that is in `problem` (edges of the filter are cut off).
@@ -128,6 +131,7 @@ impl Regression {
             return Ok(first);
         }
         first.problem.unfold();
+        first.instruments.iter_mut().for_each(Problem::unfold);
         first.prepared.replicates = None;
         first.prepared.acceleration = None;
         first.prepared.processing.periods = 1;
@@ -139,6 +143,13 @@ impl Regression {
                 return Err(IdentifyError::Rates { found_hz, expected_hz });
             }
             first.problem.append(&problem);
+            match (&mut first.instruments, other.instruments) {
+                (Some(instruments), Some(mut more)) => {
+                    more.unfold();
+                    instruments.append(&more);
+                }
+                (instruments, _) => *instruments = None,
+            }
             first.prepared.warnings.extend(other.prepared.warnings);
         }
         Ok(first)
@@ -175,16 +186,18 @@ impl<'a> Identifier<'a> {
 
     /// Identifies from one log.
     pub fn identify(&mut self, m: &Measurement) -> Result<Identification, IdentifyError> {
-        let prepared = self.fill(m)?;
-        self.solve(prepared)
+        let (prepared, ..) = self.fill_from(m)?;
+        let instruments = self.instruments_for(self.options.estimator, &prepared)?;
+        self.solve(prepared, instruments.as_ref())
     }
 
     /// Lays a log out for regression without solving: for validation and diagnosis.
     pub fn regression(&mut self, m: &Measurement) -> Result<Regression, IdentifyError> {
         let (prepared, first_sample, every) = self.fill_from(m)?;
+        let instruments = self.instruments_for(self.options.estimator, &prepared)?;
         let empty = Problem::new(self.problem.plan.clone(), 0.0);
         let problem = std::mem::replace(&mut self.problem, empty);
-        Ok(Regression { problem, prepared, first_sample, every })
+        Ok(Regression { problem, instruments, prepared, first_sample, every })
     }
 
     /// Solves a log laid out before.
@@ -193,11 +206,7 @@ impl<'a> Identifier<'a> {
         regression: &Regression,
     ) -> Result<Identification, IdentifyError> {
         self.problem.clone_from(&regression.problem);
-        self.solve(regression.prepared.clone())
-    }
-
-    fn fill(&mut self, m: &Measurement) -> Result<Prepared, IdentifyError> {
-        Ok(self.fill_from(m)?.0)
+        self.solve(regression.prepared.clone(), regression.instruments.as_ref())
     }
 
     fn fill_from(&mut self, m: &Measurement) -> Result<(Prepared, usize, usize), IdentifyError> {
@@ -206,14 +215,40 @@ impl<'a> Identifier<'a> {
             return Err(IdentifyError::Joints { log: m.source.to_owned(), found, expected });
         }
         let prepared = self.preparer.prepare(m, &self.options)?;
+        let (first, every) = self.lay_out(&prepared)?;
+        Ok((prepared, first, every))
+    }
+
+    /// The rows of `prepared`; which of its samples they start with, and how many are between them.
+    fn lay_out(&mut self, prepared: &Prepared) -> Result<(usize, usize), IdentifyError> {
         self.problem.rate_hz = prepared.processing.rate_hz;
         if prepared.replicates.is_some() {
-            let Prepared { motion, torque_nm, .. } = &prepared;
+            let Prepared { motion, torque_nm, .. } = prepared;
             self.assembler.assemble(&mut self.problem, self.model, motion, torque_nm);
-            return Ok((prepared, 0, 1));
+            return Ok((0, 1));
         }
-        let (first, every) = self.fill_filtered(&prepared)?;
-        Ok((prepared, first, every))
+        self.fill_filtered(prepared)
+    }
+
+    /// The rows of `prepared` along its smoothed motion, where `estimator` asks for them.
+    fn instruments_for(
+        &mut self,
+        estimator: Option<Estimator>,
+        prepared: &Prepared,
+    ) -> Result<Option<Problem>, IdentifyError> {
+        if estimator != Some(Estimator::Iv) {
+            return Ok(None);
+        }
+        let Options { cutoff_hz, order, .. } = self.options;
+        let (repeats, rate_hz) = (prepared.replicates.is_some(), prepared.processing.rate_hz);
+        let motion =
+            smoothed(&prepared.motion, repeats, rate_hz, cutoff_hz, order, &mut self.filter)?;
+        let along = Prepared { motion, ..prepared.clone() };
+        let problem = self.problem.clone();
+        let laid_out = self.lay_out(&along);
+        let instruments = std::mem::replace(&mut self.problem, problem);
+        laid_out?;
+        Ok(Some(instruments))
     }
 
     /// A single run: the same low-pass on torque and every regressor column (Gautier 1997), in
@@ -267,7 +302,11 @@ impl<'a> Identifier<'a> {
         Ok((kept.start, every))
     }
 
-    fn solve(&mut self, prepared: Prepared) -> Result<Identification, IdentifyError> {
+    fn solve(
+        &mut self,
+        prepared: Prepared,
+        instruments: Option<&Problem>,
+    ) -> Result<Identification, IdentifyError> {
         let repeats = prepared.processing.periods >= MANY_PERIODS;
         let (estimator, estimator_reason) = match self.options.estimator {
             Some(estimator) => (estimator, "asked for"),
@@ -289,13 +328,13 @@ impl<'a> Identifier<'a> {
                  short against a block",
             ),
         };
-        let acceleration = prepared.acceleration.as_deref();
+        let aids = MotionAids { acceleration: prepared.acceleration.as_deref(), instruments };
         let estimate = self.estimation.estimate(
             &self.problem,
             self.set,
             estimator,
             &[kind],
-            acceleration,
+            aids,
             &self.options,
         )?;
         let Estimate { fit, mut covariances, lack_of_fit } = estimate;
@@ -329,11 +368,16 @@ impl<'a> Identifier<'a> {
         m: &Measurement,
         methods: &[(Estimator, Vec<CovarianceKind>)],
     ) -> Result<Vec<Result<Estimate, IdentifyError>>, IdentifyError> {
-        let prepared = self.fill(m)?;
-        let acceleration = prepared.acceleration.as_deref();
+        let (prepared, ..) = self.fill_from(m)?;
+        let by_instruments = methods.iter().map(|(e, _)| *e).find(|e| *e == Estimator::Iv);
+        let instruments = self.instruments_for(by_instruments, &prepared)?;
+        let aids = MotionAids {
+            acceleration: prepared.acceleration.as_deref(),
+            instruments: instruments.as_ref(),
+        };
         let estimates = methods.iter().map(|(estimator, kinds)| {
             let Self { estimation, problem, set, options, .. } = self;
-            estimation.estimate(problem, set, *estimator, kinds, acceleration, options)
+            estimation.estimate(problem, set, *estimator, kinds, aids, options)
         });
         Ok(estimates.collect())
     }

@@ -11,8 +11,7 @@ use super::problem::Problem;
 /// LoF = P‖ȳ − Xθ̂‖²/ν₁ with ν₁ = rows − b, and the periods scatter by
 /// PE = Σ_p‖y_p − ȳ‖²/ν₂ with ν₂ = rows (P − 1). Where the model holds, LoF/PE follows F(ν₁, ν₂)
 /// (Draper and Smith, Applied Regression Analysis; per Fourier coefficient because these are
-/// independent for noise of any colour). Used is the lower half of the harmonics, where the noise
-/// left in the averaged acceleration does not count.
+/// independent for noise of any colour).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LackOfFit {
     /// LoF/PE: 1 where the model explains everything but noise.
@@ -32,12 +31,11 @@ impl LackOfFit {
     pub(super) fn of(problem: &Problem, theta: &[f64]) -> Self {
         let n = problem.samples;
         let periods = problem.periods as f64;
-        let used = n / 4 * 2 + 1;
         let mut predicted = vec![0.0; n];
         let (mut lack, mut scatter, mut rows) = (0.0, 0.0, 0.0);
         for (j, panel) in problem.panels.iter().enumerate() {
             problem.predict(j, theta, &mut predicted);
-            for (k, predicted) in predicted[..used].iter().enumerate() {
+            for (k, predicted) in predicted.iter().enumerate() {
                 let values = panel.y[k..].iter().step_by(n);
                 let mean = values.clone().sum::<f64>() / periods;
                 lack += periods * (mean - predicted).powi(2);
@@ -47,7 +45,6 @@ impl LackOfFit {
                 rows += f64::from(u8::from(own > 0.0));
             }
         }
-        // The parameters are fitted to all rows; these take the larger part of them.
         let first = (rows - theta.len() as f64).max(1.0);
         let second = rows * (periods - 1.0);
         let statistic = lack / first / (scatter / second);

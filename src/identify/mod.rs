@@ -21,7 +21,7 @@ mod whiten;
 pub use bound::{KnownNoise, cramer_rao};
 pub use columns::ColumnPlan;
 pub use error::IdentifyError;
-pub use estimation::{Estimate, Estimation};
+pub use estimation::{Estimate, Estimation, MotionAids};
 pub use fit::{Estimator, Fit, FitError, Fitter, Weighting};
 pub use identifier::{Identification, Identifier, Regression, Residual};
 pub use lack_of_fit::LackOfFit;

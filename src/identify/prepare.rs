@@ -76,6 +76,9 @@ const EVEN_WITHIN: f64 = 0.02;
 const LONGEST_GAP_STEPS: f64 = 10.0;
 /// Velocity is low-passed at this multiple of the regression's cutoff before it is differentiated.
 const DERIVATIVE_CUTOFF: f64 = 2.5;
+/// Friction sees the velocity low-passed at this share of the sampling rate, where the series of a
+/// motion that repeats ends too.
+const VELOCITY_END: f64 = 0.32;
 
 /// Filters and plans kept from log to log.
 #[derive(Default)]
@@ -269,17 +272,20 @@ impl Preparer {
         }
         let cutoff_hz = (DERIVATIVE_CUTOFF * options.cutoff_hz).min(0.4 * rate_hz);
         let smooth = ZeroPhase::new(cutoff_hz, options.order, rate_hz)?;
+        let light = ZeroPhase::new(VELOCITY_END * rate_hz, options.order, rate_hz)?;
+        let mut qd_rad_s = even.qd_rad_s.clone().into_owned();
         let mut qdd_rad_s2 = JointSignals::zeros(even.q_rad.joints(), even.q_rad.samples());
         for j in 0..qdd_rad_s2.joints() {
             let mut qd = even.qd_rad_s.joint(j).to_vec();
             smooth.filter_in_place(&mut qd, &mut self.filter)?;
             central_4(&qd, rate_hz, qdd_rad_s2.joint_mut(j))?;
+            light.filter_in_place(qd_rad_s.joint_mut(j), &mut self.filter)?;
         }
         let at = |k: usize| even.start_s + k as f64 / rate_hz;
         Ok(Prepared {
             motion: Motion {
                 q_rad: even.q_rad.slice(window.clone()),
-                qd_rad_s: even.qd_rad_s.slice(window.clone()),
+                qd_rad_s: qd_rad_s.slice(window.clone()),
                 qdd_rad_s2: qdd_rad_s2.slice(window.clone()),
             },
             torque_nm: even.torque_nm.slice(window.clone()),

@@ -6,6 +6,7 @@
 
 pub mod calibration;
 mod effect_size;
+mod efficiency;
 mod experiment;
 mod scenario;
 pub mod shard;
@@ -15,6 +16,7 @@ mod summary;
 pub mod tally;
 
 pub use effect_size::EffectSize;
+pub use efficiency::Efficiency;
 pub use experiment::{Experiment, TrialError, Worker};
 pub use scenario::{Scenario, ScenarioError};
 pub use simulation::Simulation;

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::calibration::{Calibration, Verdict};
+use super::efficiency::Efficiency;
 use super::shard::Merged;
 use super::tally::Failure;
 
@@ -34,6 +35,8 @@ pub struct Summary {
     pub coverage_worst: NamedValue,
     /// Empirical over predicted σ, pooled over parameters.
     pub sigma_ratio_pooled: f64,
+    /// Empirical σ over the Cramér–Rao bound; null where the noise has no known law.
+    pub efficiency: Option<Efficiency>,
     /// The checks behind the verdict.
     pub checks: Vec<CheckSummary>,
     /// Trials per second of wall time.
@@ -59,6 +62,8 @@ pub struct ParameterSummary {
     pub sigma_empirical: f64,
     /// Root mean square of the claimed σ.
     pub sigma_predicted: f64,
+    /// The Cramér–Rao bound; null where the noise has no known law.
+    pub sigma_least: Option<f64>,
     /// Share of 95 % intervals that hold the truth.
     pub coverage: f64,
 }
@@ -90,8 +95,9 @@ pub struct CheckSummary {
 }
 
 impl Summary {
-    /// Of merged shards; `wall_s` is the wall time that the trials took.
-    pub fn of(merged: &Merged, wall_s: f64) -> Self {
+    /// Of merged shards; `wall_s` is the wall time that the trials took, `least_sigma` the Cramér–Rao
+    /// bound of every parameter where it is known.
+    pub fn of(merged: &Merged, wall_s: f64, least_sigma: Option<&[f64]>) -> Self {
         let Merged { header, tally, missing, .. } = merged;
         let calibration = Calibration::of(tally);
         let parameters: Vec<ParameterSummary> = header
@@ -108,6 +114,7 @@ impl Summary {
                     mean: p.truth + s.bias * p.scale,
                     sigma_empirical: s.sigma_empirical * p.scale,
                     sigma_predicted: s.sigma_predicted * p.scale,
+                    sigma_least: least_sigma.map(|least| least[k]),
                     coverage: s.coverage,
                 }
             })
@@ -123,6 +130,11 @@ impl Summary {
             claim: check.claim,
             verdict: check.verdict,
         });
+        let sigma: Vec<f64> = parameters.iter().map(|p| p.sigma_empirical).collect();
+        let name = |k: usize| parameters[k].name.clone();
+        let efficiency = least_sigma
+            .filter(|_| tally.succeeded > 1)
+            .map(|least| Efficiency::of(&sigma, least, name));
         Self {
             scenario: header.scenario.clone(),
             trials: tally.trials(),
@@ -137,6 +149,7 @@ impl Summary {
                 |p| NamedValue { name: p.name.clone(), value: p.coverage },
             ),
             sigma_ratio_pooled: tally.pooled_ratio().0,
+            efficiency,
             checks: checks.collect(),
             trials_per_second: tally.trials() as f64 / wall_s,
             verdict: calibration.verdict,

@@ -6,7 +6,7 @@ use super::plot::{Axis, Bars, Colour, IntervalPlot, IntervalRow, Mark, Span, XyP
 use super::{Column, Page, ReportError, Section, Status, Table, Verdict};
 use crate::montecarlo::calibration::{self, claims, wilson};
 use crate::montecarlo::tally::BIN_WIDTH;
-use crate::montecarlo::{Summary, shard::Merged};
+use crate::montecarlo::{Efficiency, Summary, shard::Merged};
 
 /// Every base parameter: truth, mean, bias, σ found and claimed, coverage.
 pub fn parameter_table(summary: &Summary) -> Table {
@@ -19,6 +19,7 @@ pub fn parameter_table(summary: &Summary) -> Table {
         Column::number("σ empirical", ""),
         Column::number("σ predicted", ""),
         Column::number("ratio", ""),
+        Column::number("σ/least", ""),
         Column::number("coverage", ""),
     ]);
     for p in &summary.parameters {
@@ -36,11 +37,24 @@ pub fn parameter_table(summary: &Summary) -> Table {
                 significant(p.sigma_empirical, 3),
                 significant(p.sigma_predicted, 3),
                 format!("{ratio:.3}"),
+                p.sigma_least.map_or_else(
+                    || "–".into(),
+                    |least| format!("{:.2}", p.sigma_empirical / least),
+                ),
                 percent(p.coverage, 3),
             ],
         );
     }
     table
+}
+
+/// Empirical σ against the Cramér–Rao bound.
+pub fn efficiency_sentence(efficiency: &Efficiency) -> String {
+    format!(
+        "the estimates scatter {:.2} times as far as the best unbiased estimator's could (Cramér–Rao; rms over \
+         parameters, worst {:.2} for {})",
+        efficiency.rms, efficiency.worst, efficiency.worst_of
+    )
 }
 
 /// The checks with what chance leaves open and what is claimed.
@@ -94,6 +108,8 @@ pub fn page(summary: &Summary, merged: &Merged, program: Program) -> Result<Page
         format!("empirical over predicted σ, pooled: {:.3}", summary.sigma_ratio_pooled),
         format!("{:.0} trials per second", summary.trials_per_second),
     ];
+    let efficiency = summary.efficiency.as_ref().map(efficiency_sentence);
+    let facts = facts.into_iter().chain(efficiency).collect();
     let verdict = Verdict { status: status(summary.verdict), sentence: summary.sentence(), facts };
     let subtitle = format!("Scenario {}", summary.scenario);
     let mut page = Page::new("Is the σ true?", subtitle, verdict, program);

@@ -57,10 +57,13 @@ struct Band {
     threshold: f64,
 }
 
-/// Highest frequency of the series over the sampling rate. Where friction reverses, q̇ has a kink,
-/// whose spectrum falls only as 1/f²: sampled at f_s, q̇ at f holds (f/(f_s − f))² of what belongs to
+/// Highest frequency of q̈ over the sampling rate. Where friction reverses, q̇ has a kink, whose
+/// spectrum falls only as 1/f²: sampled at f_s, q̇ at f holds (f/(f_s − f))² of what belongs to
 /// f_s − f, a sixteenth at 0.2 f_s, and its derivative is worth no more.
 const ALIAS_FREE: f64 = 0.2;
+/// The same for q and q̇. Friction looks at q̇ sample by sample: there what is folded belongs to the
+/// sample, and a series that ends at 0.2 f_s rounds the kink off by several mrad/s.
+const SERIES_END: f64 = 0.32;
 
 /// Working memory of [`PeriodicFit::fit`], one per thread.
 #[derive(Default)]
@@ -260,6 +263,7 @@ impl PeriodicFit {
         // Mean square and noise so far: of q̇, of q̈.
         let (mut square, mut noise) = ([0.0; 2], [0.0; 2]);
         let mut in_qdd = true;
+        let last_of_qdd = harmonics_below(ALIAS_FREE, self.samples_per_period);
         for (b, band) in self.bands.iter().enumerate() {
             let (noise_q, noise_qd) = (q.noise(band), qd.noise(band));
             let noise_from_qd = |w: f64| noise_qd / (w * w);
@@ -283,7 +287,7 @@ impl PeriodicFit {
                 series[h] = q.mean[h] + (from_qd - q.mean[h]) * weight(w);
                 let of_qd = 2.0 * w * w * series[h].norm_sqr();
                 square = [square[0] + of_qd, square[1] + w * w * of_qd];
-                if in_qdd {
+                if in_qdd && h <= last_of_qdd {
                     power.estimate.push(w * w * of_qd);
                     power.noise.push(w * w * in_qd(w));
                 }
@@ -332,9 +336,14 @@ impl Spectra {
     }
 }
 
-/// Harmonics 1 … n·[`ALIAS_FREE`] in bands of [`BAND_HARMONICS`]; the last takes the remainder.
+/// Harmonics of a period of n samples up to `share` of the sampling rate.
+fn harmonics_below(share: f64, samples_per_period: usize) -> usize {
+    ((share * samples_per_period as f64) as usize).max(1)
+}
+
+/// Harmonics 1 … n·[`SERIES_END`] in bands of [`BAND_HARMONICS`]; the last takes the remainder.
 fn bands(samples_per_period: usize, periods: usize) -> Vec<Band> {
-    let highest = ((ALIAS_FREE * samples_per_period as f64) as usize).max(1);
+    let highest = harmonics_below(SERIES_END, samples_per_period);
     let count = (highest / BAND_HARMONICS).max(1);
     let level = FALSE_BAND / (2 * count) as f64;
     let threshold = |width: usize| {

@@ -1,4 +1,4 @@
-"""Covariances of a small two-joint regression by statsmodels, for tests/val_covariance.rs.
+"""Covariances of a small two-joint regression, and one with autoregressive noise, by statsmodels, for tests/val_covariance.rs.
 
     python3 tests/golden/covariance.py > tests/golden/covariance.json
 
@@ -10,6 +10,7 @@ import json
 import numpy as np
 import statsmodels.api as sm
 from statsmodels.regression.linear_model import yule_walker
+from statsmodels.sandbox.regression.gmm import IV2SLS
 
 N, COLUMNS, JOINTS, BLOCK, LAGS = 240, 3, 2, 40, 9
 t = np.arange(N)
@@ -41,12 +42,32 @@ hac = wls.get_robustcov_results(
 cluster = wls.get_robustcov_results(
     "cluster", groups=time // BLOCK, use_correction=False, df_correction=False
 )
-rho, _ = yule_walker(noise(0), order=2, method="mle", demean=True)
+# The first joint alone, its noise an autoregression of the order of least BIC (0 … n/10).
+residual = sm.OLS(y[0], X[0]).fit().resid
+
+
+def bic(order):
+    if order == 0:
+        return N * np.log(np.var(residual))
+    _, sigma = yule_walker(residual, order, method="mle", demean=True, result_object=False)
+    return N * np.log(sigma**2) + order * np.log(N)
+
+
+order = min(range(N // 10 + 1), key=bic)
+rho, _ = yule_walker(residual, order, method="mle", demean=True, result_object=False)
+glsar = sm.GLSAR(y[0], X[0], rho=rho).fit()
+# The same with instruments that resemble the columns.
+Z = X[0] + 0.2 * np.column_stack([np.sin(0.11 * t + c) for c in range(COLUMNS)])
+iv = IV2SLS(y[0], X[0], instrument=Z).fit()
 print(json.dumps({
     "ols_theta": ols.params.tolist(),
     "ols": ols.cov_params().tolist(),
     "wls_theta": wls.params.tolist(),
     "hac": np.asarray(hac.cov_params()).tolist(),
     "cluster": np.asarray(cluster.cov_params()).tolist(),
-    "yule_walker": rho.tolist(),
+    "glsar_rho": rho.tolist(),
+    "glsar_theta": glsar.params.tolist(),
+    "glsar": np.asarray(glsar.cov_params()).tolist(),
+    "iv_theta": iv.params.tolist(),
+    "iv": np.asarray(iv.cov_params()).tolist(),
 }, indent=1))

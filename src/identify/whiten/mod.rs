@@ -7,11 +7,13 @@
 mod autoregression;
 mod cross_joint;
 mod decimate;
+mod instruments;
 mod replicates;
 mod spectrum;
 
 pub(super) use autoregression::prewhiten;
 pub(super) use cross_joint::{decorrelate, decorrelation, mix};
 pub(super) use decimate::decimate;
+pub(super) use instruments::{instrument, smoothed};
 pub(super) use replicates::ReplicateWhitening;
 pub(super) use spectrum::Spectrum;

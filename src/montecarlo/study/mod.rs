@@ -11,7 +11,7 @@ pub mod physical;
 
 pub use error::StudyError;
 pub use mass_matrix::indefinite_share;
-pub use noise::{Bound, MethodResult, NoiseStudy, ScenarioResult, study};
+pub use noise::{MethodResult, NoiseStudy, SLOW_EVERY, ScenarioResult, study};
 pub use paper::{
     ErrorResult, Mechanism, MechanismResult, PaperStudy, ParameterResult, StartResult, Trace,
     paper_study, paper_study_runs,

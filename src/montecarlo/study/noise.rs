@@ -1,40 +1,43 @@
 //! Which σ is true under which noise? Every method on the same logs.
 
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::identify::covariance::CovarianceKind as C;
-use crate::identify::{
-    Estimate, Estimator as E, Identifier, KnownNoise, LackOfFit, Measurement, Options, cramer_rao,
-};
+use crate::identify::{Estimate, Estimator as E, Identifier, LackOfFit, Measurement};
+use crate::montecarlo::calibration::wilson;
+use crate::montecarlo::efficiency::Efficiency;
 use crate::montecarlo::experiment::{Experiment, TrialError};
 use crate::montecarlo::scenario::Scenario;
-use crate::montecarlo::simulation::Simulation;
 use crate::montecarlo::tally::{Failure, Tally};
 use crate::plant::Measured;
 
-/// Estimators with their covariances, cheap enough for every trial.
-fn quick_methods() -> Vec<(E, Vec<C>)> {
-    vec![
-        (E::Ols, vec![C::Paper, C::Ols]),
-        (E::Wls, vec![C::Wls, C::Blocks, C::Periods]),
-        (E::Spectral, vec![C::Spectral, C::Periods]),
-    ]
-}
+/// The methods that are compared, in the order of the tables: estimator, covariance, and whether it is
+/// fast enough for every trial (others run every [`SLOW_EVERY`]-th).
+const METHODS: [(E, C, bool); 17] = [
+    (E::Ols, C::Paper, true),
+    (E::Ols, C::Ols, true),
+    (E::Wls, C::Wls, true),
+    (E::Wls, C::Blocks, true),
+    (E::Wls, C::Periods, true),
+    (E::Wls, C::Spectral, false),
+    (E::Wls, C::Hac, false),
+    (E::Wls, C::Bootstrap, false),
+    (E::Sur, C::Wls, false),
+    (E::Sur, C::Periods, false),
+    (E::Gls, C::Wls, false),
+    (E::Gls, C::Hac, false),
+    (E::Decimated, C::Wls, false),
+    (E::Iv, C::Blocks, false),
+    (E::Iv, C::Periods, false),
+    (E::Spectral, C::Spectral, true),
+    (E::Spectral, C::Periods, true),
+];
 
-/// Those that take longer: every [`SLOW_EVERY`]-th trial.
-fn slow_methods() -> Vec<(E, Vec<C>)> {
-    vec![
-        (E::Wls, vec![C::Hac, C::Bootstrap, C::Spectral]),
-        (E::Sur, vec![C::Wls, C::Periods]),
-        (E::Gls, vec![C::Wls, C::Hac]),
-        (E::Decimated, vec![C::Wls]),
-    ]
-}
-
-/// See [`slow_methods`].
+/// See [`METHODS`].
 pub const SLOW_EVERY: u64 = 5;
 
 /// All scenarios of a study.
@@ -55,6 +58,8 @@ pub struct ScenarioResult {
     pub trials: u64,
     /// Time for them, s.
     pub seconds: f64,
+    /// Whether an effect is hidden that the model does not know.
+    pub model_is_wrong: bool,
     /// Estimator and covariance that the log calls for.
     pub chosen: [String; 2],
     /// The methods that exist for such logs.
@@ -78,8 +83,12 @@ pub struct MethodResult {
     pub failed: u64,
     /// Coverage of 95 % intervals, mean over the parameters.
     pub coverage_mean: f64,
+    /// Its standard error, from the scatter between trials.
+    pub coverage_error: f64,
     /// Coverage of the parameter furthest from 95 %.
     pub coverage_worst: f64,
+    /// Where its true value lies with 95 % confidence (Wilson's binomial interval).
+    pub coverage_worst_within: [f64; 2],
     /// Its name.
     pub coverage_worst_of: String,
     /// Empirical over predicted σ: least, pooled, greatest over the parameters.
@@ -89,76 +98,63 @@ pub struct MethodResult {
     /// Its name.
     pub bias_worst_of: String,
     /// Empirical σ over the Cramér–Rao bound, where the law of the noise is known.
-    pub efficiency: Option<Bound>,
+    pub efficiency: Option<Efficiency>,
 }
 
-/// σ over the least possible σ: root mean square over the parameters, and the worst.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub struct Bound {
-    /// Root mean square over the parameters.
-    pub rms: f64,
-    /// Largest of any parameter.
-    pub worst: f64,
-}
-
-/// Tallies of the methods of one list.
-struct Part {
-    tallies: Vec<Vec<Tally>>,
+/// Tallies of all methods, in their order.
+struct Tallies {
+    methods: Vec<Tally>,
     tested: u64,
     rejected: u64,
 }
 
-/// Runs `trials` of `scenario` (its own number where `None`) with every method on `threads` threads.
+/// Runs the scenario's trials, at most `most`, with every method on `threads` threads; `progress` is
+/// told the number of trials done.
+///
+/// A trial's log is simulated and laid out once; every estimator solves it once for all its covariances.
 pub fn study(
     scenario: Scenario,
-    trials: Option<u64>,
+    most: Option<u64>,
     threads: usize,
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<ScenarioResult, TrialError> {
     let experiment = Experiment::prepare(scenario)?;
-    let trials = trials.unwrap_or(experiment.simulation.scenario.trials);
+    let scenario = &experiment.simulation.scenario;
+    let trials = most.map_or(scenario.trials, |most| most.min(scenario.trials));
     let begun = Instant::now();
-    let done = std::sync::atomic::AtomicU64::new(0);
-    let lists = [quick_methods(), slow_methods()];
-    let empty = || lists.each_ref().map(|list| Part::new(list, experiment.truth.len()));
+    let done = AtomicU64::new(0);
     let share = |t: usize| {
-        let mut parts = empty();
+        let mut tallies = Tallies::new(experiment.truth.len());
         let mut bench = Bench::new(&experiment);
         for trial in (t as u64..trials).step_by(threads) {
-            for (k, (part, list)) in parts.iter_mut().zip(&lists).enumerate() {
-                if k == 0 || trial % SLOW_EVERY == 0 {
-                    part.add(&experiment, trial, list, bench.estimate(trial, list));
-                }
-            }
-            progress(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1);
+            tallies.add(&experiment, trial, &mut bench);
+            progress(done.fetch_add(1, Ordering::Relaxed) + 1);
         }
-        parts
+        tallies
     };
-    let merge = |mut a: [Part; 2], b: [Part; 2]| {
-        a.iter_mut().zip(&b).for_each(|(a, b)| a.merge(b));
-        a
-    };
-    let parts = (0..threads).into_par_iter().map(share).reduce(empty, merge);
-    let bound = bound(&experiment)?;
-    let mut methods = Vec::new();
-    for (part, list) in parts.iter().zip(&lists) {
-        for ((estimator, kinds), tallies) in list.iter().zip(&part.tallies) {
-            for (kind, tally) in kinds.iter().zip(tallies).filter(|(_, tally)| tally.succeeded > 1)
-            {
-                let names = [estimator.to_string(), kind.to_string()];
-                methods.push(MethodResult::of(&experiment, names, tally, bound.as_deref()));
-            }
-        }
-    }
+    let tallies = (0..threads)
+        .into_par_iter()
+        .map(share)
+        .reduce(|| Tallies::new(experiment.truth.len()), Tallies::merged);
+    let least = experiment.least_sigma()?;
+    let results = METHODS.iter().zip(&tallies.methods);
+    let methods = results
+        .filter(|(_, tally)| tally.succeeded > 1)
+        .map(|((estimator, kind, _), tally)| {
+            let names = [estimator.to_string(), kind.to_string()];
+            MethodResult::of(&experiment, names, tally, least.as_deref())
+        })
+        .collect();
     Ok(ScenarioResult {
-        name: experiment.simulation.scenario.name.clone(),
-        description: experiment.simulation.scenario.description.clone(),
+        name: scenario.name.clone(),
+        description: scenario.description.clone(),
         trials,
         seconds: begun.elapsed().as_secs_f64(),
+        model_is_wrong: !scenario.effects.is_empty(),
         chosen: [experiment.estimator.to_string(), experiment.covariance.to_string()],
         methods,
-        tested_for_fit: parts[0].tested,
-        rejected_fits: parts[0].rejected,
+        tested_for_fit: tallies.tested,
+        rejected_fits: tallies.rejected,
     })
 }
 
@@ -174,16 +170,15 @@ type Estimates = Vec<Result<Estimate, TrialError>>;
 impl<'a> Bench<'a> {
     fn new(experiment: &'a Experiment) -> Self {
         let Experiment { simulation, model, .. } = experiment;
-        let Simulation { scenario, recording, .. } = simulation;
-        let options: Options = scenario.processing.clone();
+        let options = simulation.scenario.processing.clone();
         Self {
             experiment,
-            identifier: Identifier::new(model, &scenario.set, options),
-            measured: Measured::like(recording),
+            identifier: Identifier::new(model, &simulation.scenario.set, options),
+            measured: Measured::like(&simulation.recording),
         }
     }
 
-    fn estimate(&mut self, trial: u64, methods: &[(E, Vec<C>)]) -> Result<Estimates, TrialError> {
+    fn estimate(&mut self, trial: u64, requests: &[(E, Vec<C>)]) -> Result<Estimates, TrialError> {
         self.experiment.simulation.log_into(trial, &mut self.measured)?;
         let measurement = Measurement {
             source: "simulated log",
@@ -192,67 +187,88 @@ impl<'a> Bench<'a> {
             qd_rad_s: &self.measured.qd_rad_s,
             torque_nm: &self.measured.torque_nm,
         };
-        let estimates = self.identifier.compare(&measurement, methods)?;
+        let estimates = self.identifier.compare(&measurement, requests)?;
         Ok(estimates.into_iter().map(|e| e.map_err(TrialError::from)).collect())
     }
 }
 
-impl Part {
-    fn new(list: &[(E, Vec<C>)], parameters: usize) -> Self {
-        let tallies = list.iter().map(|(_, kinds)| vec![Tally::new(parameters); kinds.len()]);
-        Self { tallies: tallies.collect(), tested: 0, rejected: 0 }
+/// The methods that trial `trial` runs, as their indices per estimator.
+fn due(trial: u64) -> Vec<(E, Vec<usize>)> {
+    let mut due: Vec<(E, Vec<usize>)> = Vec::new();
+    for (index, (estimator, _, always)) in METHODS.iter().enumerate() {
+        if !always && !trial.is_multiple_of(SLOW_EVERY) {
+            continue;
+        }
+        match due.last_mut().filter(|(known, _)| known == estimator) {
+            Some((_, indices)) => indices.push(index),
+            None => due.push((*estimator, vec![index])),
+        }
+    }
+    due
+}
+
+impl Tallies {
+    fn new(parameters: usize) -> Self {
+        Self { methods: vec![Tally::new(parameters); METHODS.len()], tested: 0, rejected: 0 }
     }
 
-    fn merge(&mut self, other: &Self) {
-        let pairs = self.tallies.iter_mut().flatten().zip(other.tallies.iter().flatten());
-        pairs.for_each(|(a, b)| a.merge(b));
+    fn merged(mut self, other: Self) -> Self {
+        self.methods.iter_mut().zip(&other.methods).for_each(|(a, b)| a.merge(b));
         self.tested += other.tested;
         self.rejected += other.rejected;
+        self
     }
 
-    fn add(
+    fn add(&mut self, experiment: &Experiment, trial: u64, bench: &mut Bench) {
+        let due = due(trial);
+        let kinds = |indices: &[usize]| indices.iter().map(|&k| METHODS[k].1).collect();
+        let requests: Vec<(E, Vec<C>)> = due.iter().map(|(e, k)| (*e, kinds(k))).collect();
+        match bench.estimate(trial, &requests) {
+            Ok(estimates) => {
+                for (estimate, (_, indices)) in estimates.into_iter().zip(&due) {
+                    self.add_estimate(experiment, trial, estimate, indices);
+                }
+            }
+            Err(error) => {
+                let indices = due.iter().flat_map(|(_, indices)| indices);
+                indices.for_each(|&k| self.lose(k, trial, error.to_string()));
+            }
+        }
+    }
+
+    fn add_estimate(
         &mut self,
         experiment: &Experiment,
         trial: u64,
-        list: &[(E, Vec<C>)],
-        estimates: Result<Estimates, TrialError>,
+        estimate: Result<Estimate, TrialError>,
+        indices: &[usize],
     ) {
-        let lost = |tally: &mut Tally, reason: String| tally.add_failure(Failure { trial, reason });
-        let estimates = match estimates {
-            Ok(estimates) => estimates,
+        let estimate = match estimate {
+            Ok(estimate) => estimate,
             Err(error) => {
-                let reason = error.to_string();
-                self.tallies.iter_mut().flatten().for_each(|t| lost(t, reason.clone()));
+                indices.iter().for_each(|&k| self.lose(k, trial, error.to_string()));
                 return;
             }
         };
-        for ((estimate, tallies), (_, kinds)) in estimates.iter().zip(&mut self.tallies).zip(list) {
-            let estimate = match estimate {
-                Ok(estimate) => estimate,
-                Err(error) => {
-                    tallies.iter_mut().for_each(|t| lost(t, error.to_string()));
-                    continue;
+        self.tested += u64::from(estimate.lack_of_fit.is_some());
+        self.rejected += u64::from(estimate.lack_of_fit.is_some_and(|lack| !lack.fits()));
+        for (covariance, &k) in estimate.covariances.iter().zip(indices) {
+            let outcomes = match covariance {
+                Ok(covariance) => {
+                    let (sigma, quantile) = (covariance.sigma(), covariance.quantile_95());
+                    experiment.outcomes(&estimate.fit.theta, &sigma, quantile)
                 }
+                Err(error) => Err(TrialError::Identify(error.clone().into())),
             };
-            self.tested += u64::from(estimate.lack_of_fit.is_some());
-            self.rejected += u64::from(estimate.lack_of_fit.is_some_and(|lack| !lack.fits()));
-            for ((covariance, tally), kind) in estimate.covariances.iter().zip(tallies).zip(kinds) {
-                match covariance {
-                    Ok(covariance) => {
-                        let quantile_95 = covariance.quantile_95();
-                        match experiment.outcomes(
-                            &estimate.fit.theta,
-                            &covariance.sigma(),
-                            quantile_95,
-                        ) {
-                            Ok(outcomes) => tally.add(&outcomes),
-                            Err(error) => lost(tally, error.to_string()),
-                        }
-                    }
-                    Err(error) => lost(tally, format!("{kind}: {error}")),
-                }
+            match outcomes {
+                Ok(outcomes) => self.methods[k].add(&outcomes),
+                Err(error) => self.lose(k, trial, error.to_string()),
             }
         }
+    }
+
+    fn lose(&mut self, method: usize, trial: u64, reason: String) {
+        self.methods[method].add_failure(Failure { trial, reason });
     }
 }
 
@@ -261,7 +277,7 @@ impl MethodResult {
         experiment: &Experiment,
         [estimator, covariance]: [String; 2],
         tally: &Tally,
-        bound: Option<&[f64]>,
+        least_sigma: Option<&[f64]>,
     ) -> Self {
         let set = &experiment.simulation.scenario.set;
         let statistics: Vec<_> = (0..tally.parameters()).map(|k| tally.statistics(k)).collect();
@@ -274,69 +290,38 @@ impl MethodResult {
         let coverage = furthest(&|k| (statistics[k].coverage - 0.95).abs());
         let biased = furthest(&bias);
         // The pooled ratio of the empirical σ alone; bias is stated by itself.
-        let square = |f: &dyn Fn(usize) -> f64| {
-            (0..statistics.len()).map(|k| f(k).powi(2)).sum::<f64>() / statistics.len() as f64
-        };
-        let efficiency = bound.map(|bound| {
-            let ratio = |k: usize| statistics[k].sigma_empirical * experiment.scale[k] / bound[k];
-            Bound {
-                rms: square(&ratio).sqrt(),
-                worst: (0..statistics.len()).map(ratio).fold(0.0, f64::max),
-            }
-        });
+        let pooled = ratios().map(|r| r * r).sum::<f64>() / statistics.len() as f64;
+        let sigma: Vec<f64> = statistics
+            .iter()
+            .zip(&experiment.scale)
+            .map(|(s, scale)| s.sigma_empirical * scale)
+            .collect();
+        let (coverage_mean, coverage_error) = tally.mean_coverage();
+        let coverage_worst = statistics[coverage].coverage;
         Self {
             estimator,
             covariance,
             trials: tally.trials(),
             failed: tally.failures.len() as u64,
-            coverage_mean: tally.mean_coverage().0,
-            coverage_worst: statistics[coverage].coverage,
+            coverage_mean,
+            coverage_error,
+            coverage_worst,
+            coverage_worst_within: wilson(coverage_worst, tally.succeeded as f64, 1.96),
             coverage_worst_of: set.name(coverage).to_owned(),
             ratio: [
                 ratios().fold(f64::INFINITY, f64::min),
-                square(&ratio).sqrt(),
+                pooled.sqrt(),
                 ratios().fold(0.0, f64::max),
             ],
             bias_worst: bias(biased),
             bias_worst_of: set.name(biased).to_owned(),
-            efficiency,
+            efficiency: least_sigma
+                .map(|least| Efficiency::of(&sigma, least, |k| set.name(k).to_owned())),
         }
     }
 }
 
-/// The least σ along the noise-free motion, where the torque noise has a known law.
-fn bound(experiment: &Experiment) -> Result<Option<Vec<f64>>, TrialError> {
-    let Some(torque) = experiment.simulation.known_torque_noise() else { return Ok(None) };
-    let Simulation { scenario, recording, .. } = &experiment.simulation;
-    let options = Options { period_s: None, ..scenario.processing.clone() };
-    let regression =
-        Identifier::new(&experiment.model, &scenario.set, options).regression(&Measurement {
-            source: "noise-free log",
-            time_s: &recording.time_s,
-            q_rad: &recording.q_rad,
-            qd_rad_s: &recording.qd_rad_s,
-            torque_nm: &recording.torque_nm,
-        })?;
-    let rate_hz = regression.problem.rate_hz;
-    let noise = KnownNoise {
-        torque_sd_nm: torque.sd_nm,
-        correlation: torque.model.cross_joint_correlation,
-        power: &|frequency_hz| torque.model.power(frequency_hz, rate_hz),
-    };
-    let harmonics = regression.problem.samples;
-    let bound = cramer_rao(&regression.problem, &scenario.set, &noise, harmonics)
-        .map_err(|e| TrialError::Identify(e.into()))?;
-    Ok(Some(bound))
-}
-
 impl NoiseStudy {
-    /// Share of the trials of all scenarios that the lack-of-fit test rejected.
-    pub fn rejected_share(&self) -> f64 {
-        let tested: u64 = self.scenarios.iter().map(|s| s.tested_for_fit).sum();
-        let rejected: u64 = self.scenarios.iter().map(|s| s.rejected_fits).sum();
-        rejected as f64 / tested.max(1) as f64
-    }
-
     /// Level of the lack-of-fit test.
     pub fn rejection_level() -> f64 {
         LackOfFit::REJECT_BELOW

@@ -1,0 +1,72 @@
+//! How far the estimates are from the best that there can be.
+
+use serde::Serialize;
+
+use super::experiment::{Experiment, TrialError};
+use super::simulation::Simulation;
+use crate::identify::{Identifier, KnownNoise, Measurement, Options, cramer_rao};
+
+/// Empirical σ over the Cramér–Rao bound.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Efficiency {
+    /// Root mean square over the parameters; 1 cannot be beaten without bias.
+    pub rms: f64,
+    /// Largest of any parameter.
+    pub worst: f64,
+    /// Its name.
+    pub worst_of: String,
+}
+
+impl Efficiency {
+    /// Of the empirical `sigma` over the least possible `bound`, for parameters called `name(k)`.
+    pub fn of(sigma: &[f64], bound: &[f64], name: impl Fn(usize) -> String) -> Self {
+        let ratios: Vec<f64> = sigma.iter().zip(bound).map(|(s, b)| s / b).collect();
+        let worst = (0..ratios.len()).max_by(|a, b| ratios[*a].total_cmp(&ratios[*b])).unwrap_or(0);
+        let squares: f64 = ratios.iter().map(|r| r * r).sum();
+        Self {
+            rms: (squares / ratios.len() as f64).sqrt(),
+            worst: ratios.get(worst).copied().unwrap_or(f64::NAN),
+            worst_of: name(worst),
+        }
+    }
+}
+
+impl Experiment {
+    /// The least σ of every parameter that an unbiased estimator can have: the Cramér–Rao bound of the
+    /// whole periods of the noise-free motion, known exactly, under the scenario's torque noise at all
+    /// frequencies. `None` where that noise has no known law (rounded readings), where the motion does
+    /// not repeat, or where every trial has a motion of its own (sensors in the loop).
+    pub fn least_sigma(&self) -> Result<Option<Vec<f64>>, TrialError> {
+        let Simulation { scenario, recording, .. } = &self.simulation;
+        let Some(torque) = self.simulation.known_torque_noise() else { return Ok(None) };
+        if scenario.controller_reads_sensors || torque.sd_nm.iter().any(|sd| *sd <= 0.0) {
+            return Ok(None);
+        }
+        let options = Options { period_s: None, ..scenario.processing.clone() };
+        let regression =
+            Identifier::new(&self.model, &scenario.set, options).regression(&Measurement {
+                source: "noise-free log",
+                time_s: &recording.time_s,
+                q_rad: &recording.q_rad,
+                qd_rad_s: &recording.qd_rad_s,
+                torque_nm: &recording.torque_nm,
+            })?;
+        if regression.prepared.replicates.is_none() {
+            return Ok(None);
+        }
+        let rate_hz = regression.problem.rate_hz;
+        let noise = KnownNoise {
+            torque_sd_nm: torque.sd_nm,
+            correlation: torque.model.cross_joint_correlation,
+            power: &|frequency_hz| torque.model.power(frequency_hz, rate_hz),
+        };
+        let harmonics = regression.problem.samples;
+        let bound = cramer_rao(&regression.problem, &scenario.set, &noise, harmonics)
+            .map_err(|e| TrialError::Identify(e.into()))?;
+        // Without noise not even the last trace of the run-in is a period like the others; the logs of the
+        // trials have them all.
+        let found = regression.problem.periods as f64;
+        let more = (found / scenario.excitation.periods() as f64).sqrt();
+        Ok(Some(bound.into_iter().map(|sigma| sigma * more).collect()))
+    }
+}

@@ -1,0 +1,61 @@
+//! Whether the intervals can be trusted: noise and misfit apart.
+
+use serde::Serialize;
+
+use crate::identify::{Identification, LackOfFit};
+
+/// Whether the 95 % intervals may claim to hold the truth.
+#[derive(Debug, Clone, Serialize)]
+pub struct Intervals {
+    /// False where the model leaves more than noise; null where that could not be tested.
+    pub trusted: Option<bool>,
+    /// Why, in a sentence.
+    pub reason: String,
+    /// The test behind it.
+    pub lack_of_fit: Option<TestResult>,
+}
+
+/// The lack-of-fit test and its answer.
+#[derive(Debug, Clone, Serialize)]
+pub struct TestResult {
+    /// Statistic, degrees of freedom, chance.
+    #[serde(flatten)]
+    pub test: LackOfFit,
+    /// Chance below which the model is rejected.
+    pub level: f64,
+}
+
+impl Intervals {
+    /// Of what a log said.
+    pub fn of(identification: &Identification) -> Self {
+        let Some(test) = identification.lack_of_fit else {
+            let reason = if identification.replicates.is_some() {
+                format!(
+                    "Whether the intervals hold was not tested: lack of fit is measured with the weights of the \
+                     spectral estimator, and {} was asked for.",
+                    identification.estimator
+                )
+            } else {
+                "Whether the intervals hold cannot be tested: a single run does not tell noise from what the model \
+                 lacks. Repeat the motion four times or more."
+                    .to_owned()
+            };
+            return Self { trusted: None, reason, lack_of_fit: None };
+        };
+        let LackOfFit { statistic, p_value, .. } = test;
+        let reason = if test.fits() {
+            format!(
+                "The model explains what repeats in the torque: what it leaves is {statistic:.2} times what the \
+                 scatter between periods leads to expect (chance {p_value:.2})."
+            )
+        } else {
+            format!(
+                "The 95 % intervals are not to be trusted: what repeats in the torque and is not explained is \
+                 {statistic:.2} times what noise would leave (chance {p_value:.1e}). They cover the noise, not the \
+                 error of the model; armid diagnose looks for its cause."
+            )
+        };
+        let level = LackOfFit::REJECT_BELOW;
+        Self { trusted: Some(test.fits()), reason, lack_of_fit: Some(TestResult { test, level }) }
+    }
+}

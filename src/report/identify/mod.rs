@@ -1,0 +1,269 @@
+//! What `armid identify` says: JSON, tables and page.
+
+mod declined;
+mod intervals;
+mod page;
+mod rows;
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+pub use declined::Declined;
+pub use intervals::{Intervals, TestResult};
+pub use page::{page, parameter_table, residual_table};
+
+use super::physical::{Physical, StandardParameter, standard_parameters};
+use crate::base::BaseSet;
+use crate::identify::covariance::CovarianceKind;
+use crate::identify::physical::PhysicalEstimate;
+use crate::identify::{
+    Condition, Estimator, FitError, Identification, Prediction, Processing, Regression, Residual,
+    gravity_ratio, identifies_the_arm, not_identified,
+};
+use crate::log::Log;
+use crate::robot::Arm;
+use rows::{Rows, names};
+
+/// Format of the JSON output.
+pub const IDENTIFY_SCHEMA: &str = "armid.identify/1";
+
+const IDENTIFIED: &str = "identified";
+const NOT_IDENTIFIED: &str = "not_identified";
+
+/// What was identified, from what.
+pub struct Training<'a> {
+    /// The arm.
+    pub arm: &'a Arm,
+    /// Base parameters.
+    pub set: &'a BaseSet,
+    /// The logs.
+    pub logs: &'a [&'a Log],
+    /// The logs laid out for regression.
+    pub regression: &'a Regression,
+    /// The solution.
+    pub identification: &'a Identification,
+    /// Base parameters by the robot's description.
+    pub nominal: &'a [f64],
+}
+
+/// A prediction of a log that was not used for the fit.
+pub struct Validation {
+    /// The log.
+    pub log: PathBuf,
+    /// Measured and predicted torque.
+    pub prediction: Prediction,
+    /// The manufacturer's feed-forward torque with the same processing, Nm.
+    pub manufacturer: Option<Prediction>,
+}
+
+impl Validation {
+    /// Of `theta` along `regression`; `manufacturer` is the same log laid out with the
+    /// manufacturer's torque in place of the measured one.
+    pub fn new(
+        log: &Path,
+        regression: &Regression,
+        manufacturer: Option<&Regression>,
+        theta: &[f64],
+    ) -> Self {
+        let prediction = Prediction::of(regression, theta);
+        let manufacturer = manufacturer.map(|m| Prediction {
+            predicted_nm: Prediction::of(m, theta).measured_nm,
+            ..prediction.clone()
+        });
+        Self { log: log.to_owned(), prediction, manufacturer }
+    }
+}
+
+/// The JSON of `armid identify`.
+#[derive(Debug, Clone, Serialize)]
+pub struct Result {
+    robot: String,
+    log: String,
+    samples: usize,
+    rate_hz: f64,
+    processing: Processing,
+    estimator: Estimator,
+    covariance: CovarianceKind,
+    covariance_reason: &'static str,
+    base_parameters: Vec<BaseParameter>,
+    /// Null: only combinations are known.
+    standard_parameters: Option<Vec<StandardParameter>>,
+    /// How the standard parameters were found; null without `--physical`.
+    physical: Option<Physical>,
+    residual: ResidualJson,
+    noise_floor_nm: Option<Vec<f64>>,
+    /// Of what repeats in the torque, the part that is neither explained nor noise; null for a single run.
+    explainable_nm: Option<Vec<f64>>,
+    intervals: Intervals,
+    condition: Condition,
+    not_identified: Vec<String>,
+    validation: Vec<ValidationJson>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+    rows: Rows,
+    verdict: &'static str,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct BaseParameter {
+    name: String,
+    formula: String,
+    value: f64,
+    unit: &'static str,
+    sigma: f64,
+    ci95: [f64; 2],
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct ResidualJson {
+    rms_nm: Vec<f64>,
+    relative_percent: Vec<f64>,
+    e_n: f64,
+}
+
+impl From<Residual> for ResidualJson {
+    fn from(r: Residual) -> Self {
+        Self { rms_nm: r.rms_nm, relative_percent: r.relative_percent, e_n: r.e_n }
+    }
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct ValidationJson {
+    log: String,
+    #[serde(flatten)]
+    residual: ResidualJson,
+    moving_rms_nm: Vec<f64>,
+    manufacturer_rms_nm: Option<Vec<f64>>,
+    manufacturer_moving_rms_nm: Option<Vec<f64>>,
+}
+
+/// Factor between gravity found and described beyond which it is remarked on: payloads and
+/// tolerances of drive gains stay below.
+const GRAVITY_OFF: f64 = 1.5;
+
+impl Result {
+    /// Collects everything that is said.
+    pub fn of(
+        training: &Training,
+        validations: &[Validation],
+    ) -> std::result::Result<Self, FitError> {
+        let Training { arm, set, identification, regression, .. } = training;
+        let sigma = identification.sigma();
+        let quantile = identification.covariance.quantile_95();
+        let half_width: Vec<f64> = sigma.iter().map(|s| quantile * s).collect();
+        let open = not_identified(arm, set, &half_width);
+        let base_parameters = (0..set.rank())
+            .map(|k| {
+                let value = identification.fit.theta[k];
+                BaseParameter {
+                    name: set.name(k).to_owned(),
+                    formula: set.formula(k),
+                    value,
+                    unit: set.unit(k),
+                    sigma: sigma[k],
+                    ci95: [value - half_width[k], value + half_width[k]],
+                }
+            })
+            .collect();
+        let mut warnings = identification.warnings.clone();
+        let ratio = gravity_ratio(arm, set, training.nominal, &identification.fit.theta);
+        if let Some(ratio) = ratio.filter(|r| !(1.0 / GRAVITY_OFF..GRAVITY_OFF).contains(r)) {
+            warnings.push(format!(
+                "gravity torque is {ratio:.2} times what the description of {} says: another robot, \
+                 a payload, or drive gains that are off?",
+                arm.name
+            ));
+        }
+        Ok(Self {
+            robot: arm.name.clone(),
+            log: names(training.logs),
+            samples: identification.samples,
+            rate_hz: regression.problem.rate_hz,
+            processing: identification.processing.clone(),
+            estimator: identification.estimator,
+            covariance: identification.covariance.kind,
+            covariance_reason: identification.covariance_reason,
+            base_parameters,
+            standard_parameters: None,
+            physical: None,
+            residual: identification.residual().into(),
+            noise_floor_nm: identification.replicates.as_ref().map(|r| r.sigma.clone()),
+            explainable_nm: identification.explainable_nm.clone(),
+            intervals: Intervals::of(identification),
+            condition: Condition::of(&regression.problem, set)?,
+            verdict: if identifies_the_arm(arm, set, &open) { IDENTIFIED } else { NOT_IDENTIFIED },
+            not_identified: open.iter().map(|&k| set.name(k).to_owned()).collect(),
+            validation: validations.iter().map(ValidationJson::of).collect(),
+            warnings,
+            rows: Rows::of(training.logs),
+        })
+    }
+
+    /// Adds standard parameters that an arm can have.
+    pub fn set_physical(&mut self, estimate: &PhysicalEstimate, training: &Training) {
+        let problem = &training.regression.problem;
+        self.standard_parameters = Some(standard_parameters(estimate, training.arm));
+        self.physical = Some(Physical::of(estimate, problem));
+        if estimate.evidence.model_is_wrong() {
+            self.warnings.push(estimate.evidence.sentence());
+        }
+    }
+
+    /// How the standard parameters were found.
+    pub fn physical(&self) -> Option<&Physical> {
+        self.physical.as_ref()
+    }
+
+    /// Whether the data do not identify the model.
+    pub fn is_declined(&self) -> bool {
+        self.verdict == NOT_IDENTIFIED
+    }
+
+    /// The verdict in a sentence.
+    pub fn sentence(&self) -> String {
+        let b = self.base_parameters.len();
+        if self.is_declined() {
+            let names = &self.not_identified;
+            return format!(
+                "Declined: this motion does not identify the arm. For {} of {b} base parameters the \
+                 95 % interval is wider than anything an arm of this size could have: {}. Record a \
+                 motion that excites them (armid excite).",
+                names.len(),
+                names.join(", ")
+            );
+        }
+        let percent = self.residual.relative_percent.iter();
+        let (low, high) = percent.fold((f64::INFINITY, 0f64), |(l, h), &p| (l.min(p), h.max(p)));
+        let open = match self.not_identified.len() {
+            0 => String::new(),
+            n => format!(
+                " {n} moments of inertia of light bodies stay open ({}): no torque in this motion \
+                 depends on them.",
+                self.not_identified.join(", ")
+            ),
+        };
+        let distrust = match self.intervals.trusted {
+            Some(false) => format!(" {}", self.intervals.reason),
+            _ => String::new(),
+        };
+        format!(
+            "Identified {b} base parameters of {} from {} samples: what the model leaves of the \
+             torque is {low:.1} to {high:.1} % per joint.{open}{distrust}",
+            self.robot, self.samples
+        )
+    }
+}
+
+impl ValidationJson {
+    fn of(v: &Validation) -> Self {
+        let rms = |f: fn(&Prediction) -> Residual| v.manufacturer.as_ref().map(|m| f(m).rms_nm);
+        Self {
+            log: v.log.display().to_string(),
+            residual: v.prediction.residual().into(),
+            moving_rms_nm: v.prediction.moving_residual().rms_nm,
+            manufacturer_rms_nm: rms(Prediction::residual),
+            manufacturer_moving_rms_nm: rms(Prediction::moving_residual),
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! Tables and page of an identification.
+
+use std::path::Path;
+
+use super::{Result, Training, Validation};
+use crate::identify::Prediction;
+use crate::report::json::Program;
+use crate::report::number::{significant, with_sigma};
+use crate::report::plot::{Axis, Colour, Grid, IntervalPlot, IntervalRow, Mark};
+use crate::report::{Column, Page, ReportError, Section, Status, Table, Verdict};
+use crate::robot::JointSignals;
+
+/// Every base parameter with its σ and interval.
+pub fn parameter_table(result: &Result) -> Table {
+    let distrusted = result.intervals.trusted == Some(false);
+    let mut table = Table::new([
+        Column::text("parameter"),
+        Column::text("unit"),
+        Column::number("estimate ± σ", ""),
+        Column::number(
+            if distrusted { "95 % interval, of the noise alone" } else { "95 % interval" },
+            "",
+        ),
+        Column::text("combination"),
+    ]);
+    for p in &result.base_parameters {
+        let open = result.not_identified.contains(&p.name);
+        table.push_judged(
+            open.then_some(Status::Bad),
+            [
+                p.name.clone(),
+                p.unit.to_owned(),
+                with_sigma(p.value, p.sigma),
+                format!("{} … {}", significant(p.ci95[0], 4), significant(p.ci95[1], 4)),
+                p.formula.clone(),
+            ],
+        );
+    }
+    table
+}
+
+/// Residual per joint: of the fit, and of every validation log with all and with moving samples.
+pub fn residual_table(result: &Result) -> Table {
+    let joints = result.residual.rms_nm.len();
+    let columns = (1..=joints).map(|j| Column::number(format!("joint {j}"), ""));
+    let mut table =
+        Table::new([Column::text("rms"), Column::text("unit")].into_iter().chain(columns));
+    let mut row = |name: String, unit: &str, values: &[f64]| {
+        let cells = values.iter().map(|v| significant(*v, 3));
+        table.push([name, unit.to_owned()].into_iter().chain(cells));
+    };
+    row("residual of the fit".into(), "Nm", &result.residual.rms_nm);
+    row("… of the torque".into(), "%", &result.residual.relative_percent);
+    if let Some(floor) = &result.noise_floor_nm {
+        row("noise floor (scatter between periods)".into(), "Nm", floor);
+    }
+    if let Some(explainable) = &result.explainable_nm {
+        row("repeats and is not explained".into(), "Nm", explainable);
+    }
+    for v in &result.validation {
+        let name = Path::new(&v.log)
+            .file_stem()
+            .map_or_else(|| v.log.clone(), |stem| stem.to_string_lossy().into_owned());
+        row(format!("{name}: prediction"), "Nm", &v.residual.rms_nm);
+        row(format!("{name}: … moving samples"), "Nm", &v.moving_rms_nm);
+        if let (Some(all), Some(moving)) = (&v.manufacturer_rms_nm, &v.manufacturer_moving_rms_nm) {
+            row(format!("{name}: manufacturer's feed-forward"), "Nm", all);
+            row(format!("{name}: … moving samples"), "Nm", moving);
+        }
+    }
+    table
+}
+
+/// The page: verdict, torque measured and predicted, residuals, parameters.
+pub fn page(
+    result: &Result,
+    training: &Training,
+    validations: &[Validation],
+    program: Program,
+) -> std::result::Result<Page, ReportError> {
+    let processing = &result.processing;
+    let periods = match processing.period_s {
+        Some(period) => format!(
+            "{} periods of {period:.3} s averaged and differentiated as a Fourier series",
+            processing.periods
+        ),
+        None => format!(
+            "a single run, torque and regressor low-passed at {:.0} Hz",
+            processing.cutoff_hz.unwrap_or(f64::NAN)
+        ),
+    };
+    let facts = vec![
+        format!("{} rows read, {} used; {periods}", result.rows.read, result.rows.used),
+        format!(
+            "estimator {}, σ from {}: {}",
+            result.estimator, result.covariance, result.covariance_reason
+        ),
+        format!(
+            "condition of the regressor {:.0}, with columns of unit length {:.1}; e_N = {:.4}",
+            result.condition.regressor, result.condition.scaled, result.residual.e_n
+        ),
+    ];
+    let status = match result.intervals.trusted {
+        _ if result.is_declined() => Status::Bad,
+        Some(false) => Status::Warn,
+        _ => Status::Good,
+    };
+    let verdict = Verdict { status, sentence: result.sentence(), facts };
+    let subtitle = format!("{} from {}", result.robot, result.log);
+    let mut page = Page::new("Identified parameters", subtitle, verdict, program);
+    let fit = Prediction::of(training.regression, &training.identification.fit.theta);
+    let mut section = Section::new("Torque: measured and predicted")
+        .figure(torque_figure("Torque along the training log", &fit)?, "")
+        .figure(
+            error_figure("What the model leaves", &fit)?,
+            "Measured minus predicted torque. Structure that returns at every reversal or with \
+             every period is not noise: the model lacks something.",
+        )
+        .table(residual_table(result), "Root mean square over all samples used")
+        .paragraph(&result.intervals.reason);
+    for warning in &result.warnings {
+        section = section.note(Status::Warn, warning);
+    }
+    page.push(section);
+    for v in validations {
+        let name = v.log.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+        page.push(
+            Section::new(format!("Validation on {name}"))
+                .paragraph("Nothing is fitted to this log; same processing.")
+                .figure(torque_figure("Torque along the validation log", &v.prediction)?, "")
+                .figure(error_figure("What the model leaves", &v.prediction)?, ""),
+        );
+    }
+    page.push(
+        Section::new("Parameters")
+            .figure(
+                relative_sigma_figure(result)?,
+                "σ relative to the estimate; parameters near zero are far right without being \
+                 badly known.",
+            )
+            .table(parameter_table(result), "Base parameters, named by the column that is kept"),
+    );
+    if let (Some(physical), Some(standard)) = (&result.physical, &result.standard_parameters) {
+        page.push(physical.section(standard));
+    }
+    Ok(page)
+}
+
+/// Measured and predicted torque, one panel per joint.
+fn torque_figure(title: &str, p: &Prediction) -> std::result::Result<String, ReportError> {
+    joints_figure(
+        title,
+        "Nm",
+        p,
+        &[
+            ("measured", &p.measured_nm, Colour::MEASURED, Mark::ThinLine),
+            ("predicted", &p.predicted_nm, Colour::MODEL, Mark::ThinLine),
+        ],
+    )
+}
+
+/// Measured minus predicted, one panel per joint.
+fn error_figure(title: &str, p: &Prediction) -> std::result::Result<String, ReportError> {
+    let error = p.error_nm();
+    joints_figure(title, "Nm", p, &[("residual", &error, Colour::AFTER, Mark::ThinLine)])
+}
+
+type JointLine<'a> = (&'a str, &'a JointSignals, Colour, Mark);
+
+/// One panel per joint over time.
+fn joints_figure(
+    title: &str,
+    unit: &str,
+    p: &Prediction,
+    lines: &[JointLine],
+) -> std::result::Result<String, ReportError> {
+    let mut grid = Grid::new(title, Axis::linear("time", "s"), Axis::linear("torque", unit));
+    grid.columns = 2;
+    grid.share_x = true;
+    for j in 0..p.measured_nm.joints() {
+        let mut panel = grid.panel(format!("joint {}", j + 1));
+        for (name, signals, colour, mark) in lines {
+            panel = panel.with(*name, &p.time_s, signals.joint(j), *colour, *mark);
+        }
+        grid.panels.push(panel);
+    }
+    Ok(grid.to_svg()?)
+}
+
+/// σ over the estimate, parameter by parameter.
+fn relative_sigma_figure(result: &Result) -> std::result::Result<String, ReportError> {
+    let mut plot = IntervalPlot::new("σ of each parameter", Axis::log("σ / |estimate|", "%"));
+    plot.columns = 2;
+    plot.value_name = "relative σ".into();
+    plot.rows = result
+        .base_parameters
+        .iter()
+        .map(|p| IntervalRow {
+            name: p.name.clone(),
+            value: 100.0 * p.sigma / p.value.abs(),
+            low: f64::NAN,
+            high: f64::NAN,
+            expected: f64::NAN,
+            status: result.not_identified.contains(&p.name).then_some(Status::Bad),
+        })
+        .collect();
+    Ok(plot.to_svg()?)
+}
