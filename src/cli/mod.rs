@@ -12,6 +12,7 @@ pub mod montecarlo;
 mod prior;
 pub mod simulate;
 pub mod study;
+mod study_cutoff;
 mod study_paper;
 mod study_physical;
 

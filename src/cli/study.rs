@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
+use super::study_cutoff::{self, CutoffArgs};
 use super::study_paper::{self, PaperArgs};
 use super::study_physical::{self, PhysicalArgs};
 use super::{CommandResult, Outcome, Progress};
@@ -28,6 +29,8 @@ enum Topic {
     Paper(PaperArgs),
     /// What physical consistency repairs, and what not: scatter, model error and σ.
     Physical(PhysicalArgs),
+    /// Where the low-pass should sit: bias and scatter against its cutoff, by formula and measured.
+    Cutoff(CutoffArgs),
 }
 
 #[derive(Debug, Args)]
@@ -58,6 +61,7 @@ pub fn run(args: &StudyArgs) -> CommandResult {
         Topic::Noise(args) => noise(args),
         Topic::Paper(args) => study_paper::run(args),
         Topic::Physical(args) => study_physical::run(args),
+        Topic::Cutoff(args) => study_cutoff::run(args),
     }
 }
 

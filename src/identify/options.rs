@@ -26,7 +26,16 @@ pub struct Options {
 impl Options {
     /// Faster logs are decimated to at most this rate: an arm moves at a few hertz.
     pub const HIGHEST_RATE_HZ: f64 = 150.0;
+
+    /// Cutoff (Hz) of the low-pass on the velocity of a single run before it is differentiated: wide
+    /// enough above [`Self::cutoff_hz`] to leave the acceleration to the low-pass on the equations.
+    pub fn derivative_cutoff_hz(&self, rate_hz: f64) -> f64 {
+        (DERIVATIVE_CUTOFF * self.cutoff_hz).min(0.4 * rate_hz)
+    }
 }
+
+/// Velocity is low-passed at this multiple of the regression's cutoff before it is differentiated.
+const DERIVATIVE_CUTOFF: f64 = 2.5;
 
 impl Default for Options {
     fn default() -> Self {

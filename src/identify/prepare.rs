@@ -74,8 +74,6 @@ const FEWEST_SAMPLES: usize = 64;
 const EVEN_WITHIN: f64 = 0.02;
 /// Gaps up to this many natural steps are interpolated, longer ones end the record.
 const LONGEST_GAP_STEPS: f64 = 10.0;
-/// Velocity is low-passed at this multiple of the regression's cutoff before it is differentiated.
-const DERIVATIVE_CUTOFF: f64 = 2.5;
 /// Friction sees the velocity low-passed at this share of the sampling rate, where the series of a
 /// motion that repeats ends too.
 const VELOCITY_END: f64 = 0.32;
@@ -270,7 +268,7 @@ impl Preparer {
             let (samples, needed) = (window.len(), FEWEST_SAMPLES);
             return Err(IdentifyError::TooShort { log: m.source.to_owned(), samples, needed });
         }
-        let cutoff_hz = (DERIVATIVE_CUTOFF * options.cutoff_hz).min(0.4 * rate_hz);
+        let cutoff_hz = options.derivative_cutoff_hz(rate_hz);
         let smooth = ZeroPhase::new(cutoff_hz, options.order, rate_hz)?;
         let light = ZeroPhase::new(VELOCITY_END * rate_hz, options.order, rate_hz)?;
         let mut qd_rad_s = even.qd_rad_s.clone().into_owned();

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::scenario::Scenario;
 use crate::plant::faults::FaultyPlant;
-use crate::plant::{Measured, PlantError, Recording, Sensors, TorqueNoise};
+use crate::plant::{Measured, PlantError, Recording, SensorConfig, Sensors, TorqueNoise};
 use crate::random::TrialStreams;
 
 /// A scenario whose plant has run: what the logs of all its trials share.
@@ -24,6 +24,26 @@ impl Simulation {
         let recording = plant.run(&scenario.excitation, None)?;
         let sensors = Sensors::new(&scenario.sensors, &scenario.arm, scenario.plant.log_rate_hz)?;
         Ok(Self { scenario, recording, plant, sensors })
+    }
+
+    /// The same run read by other sensors.
+    ///
+    /// # Errors
+    /// [`PlantError`] where a setting makes no sense, or where the controller reads the sensors: the
+    /// run would be another one.
+    pub fn read_by(&self, sensors: SensorConfig) -> Result<Self, PlantError> {
+        if self.scenario.controller_reads_sensors {
+            let requirement = "must be false where one run is read by several sensors";
+            let key = "controller_reads_sensors";
+            return Err(PlantError::Setting { key, value: 1.0, requirement });
+        }
+        let scenario = Scenario { sensors, ..self.scenario.clone() };
+        Ok(Self {
+            recording: self.recording.clone(),
+            plant: self.plant.clone(),
+            sensors: Sensors::new(&scenario.sensors, &scenario.arm, scenario.plant.log_rate_hz)?,
+            scenario,
+        })
     }
 
     /// The random numbers of a trial.

@@ -2,13 +2,19 @@
 //!
 //! Enters: scenarios. Leaves: tables of what each method claims and what is true.
 
+mod cutoff;
 mod error;
 mod mass_matrix;
 mod noise;
+mod noisy_regressor;
 mod paper;
 mod paper_equations;
 pub mod physical;
+mod paper_sigma;
+mod periodic;
+mod record_length;
 
+pub use cutoff::{Curve, CutoffStudy, Method, Point, cutoff_study, cutoff_study_trials};
 pub use error::StudyError;
 pub use mass_matrix::indefinite_share;
 pub use noise::{MethodResult, NoiseStudy, SLOW_EVERY, ScenarioResult, study};
@@ -17,3 +23,5 @@ pub use paper::{
     paper_study, paper_study_runs,
 };
 pub use paper_equations::{Acceleration, PaperEquations};
+pub use paper_sigma::SigmaCase;
+pub use record_length::RecordLength;

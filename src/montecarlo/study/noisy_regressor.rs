@@ -1,0 +1,517 @@
+//! What least squares makes of a regressor that is filtered and noisy: by formula, not by trial.
+//!
+//! The true equations are y = Xθ. A processing solves others: the torque behind G_y, the regressor
+//! behind G_x, in it the acceleration that a differentiator jA(ω) makes of the velocity, and in that
+//! the encoder's white noise v of variance σ_v². With X̄ the mean of the regressor that is used, E what
+//! is random in it, and W the weights of the joints,
+//!
+//! ```text
+//! θ̂ → (X̄ᵀW²X̄ + N)⁻¹ X̄ᵀW² G_y y,   N = E[EᵀW²E]                                  (a)
+//! V  = (X̄ᵀW²X̄ + N)⁻¹ Ω (X̄ᵀW²X̄ + N)⁻¹                                             (b)
+//! ```
+//!
+//! **Filter branch** (N = 0): the acceleration lacks (1 − A/ω) q̈, torque that the parameters make up for.
+//! For (33), A/ω = 1/(1 + (f/f_c)²): a rotor inertia comes out too large by about (f/f_c)², f the
+//! frequency of the motion. It falls as 1/f_c².
+//!
+//! **Noise branch** (errors in variables): a = A v has the variance
+//!
+//! ```text
+//! σ_a² = σ_v² · mean over all frequencies of (A G_x)²  →  σ_v² ω_c³/(4 f_s) for (33)
+//! N    = σ_a² Σ_i Σ_t D_iᵀW²D_i + N_friction,   D_i = ∂X/∂q̈_i
+//! ```
+//!
+//! which attenuates inertias by σ_a²/var(q̈ | other columns): it grows as f_c³. N_friction is the
+//! covariance of q̇ + v and tanh((q̇ + v)/ε), by quadrature over v; it does not depend on the cutoff. Noise
+//! of velocity and acceleration at one instant are uncorrelated (A is odd).
+//!
+//! **Scatter**: Ω has a part of the torque noise (variance s_j², spectrum S, correlation C between joints)
+//! and one of the encoder's noise that passes into the equations' error, first order in v:
+//!
+//! ```text
+//! Ω = Σ_jj' C_jj' s_j s_j' w_j² w_j'² Y_jᵀY_j' + σ_v² Σ_i g_iᵀg_i,   Y = √S G_y X̄
+//! g_i = jA* [Σ_j w_j² (G_x X̄)_j (D_iθ)_j] + w_i² (G_x X̄)_i (rv_i + rc_i E[1 − tanh²]/ε)
+//! ```
+
+use nalgebra::{DMatrix, DVector};
+use realfft::num_complex::Complex64;
+
+use super::periodic::Periodic;
+use crate::base::BaseSet;
+use crate::dynamics::{Model, Motion};
+use crate::identify::{Assembler, ColumnPlan, Problem};
+use crate::robot::JointSignals;
+
+/// A real response over the frequency in Hz.
+pub(super) type Response<'a> = &'a dyn Fn(f64) -> f64;
+
+/// How a processing treats one log.
+pub(super) struct Treatment<'a> {
+    /// A(f), rad/s: the acceleration is made of the velocity by jA.
+    pub differentiator: Response<'a>,
+    /// G_x.
+    pub regressor: Response<'a>,
+    /// G_y.
+    pub torque: Response<'a>,
+    /// w_j.
+    pub weights: &'a [f64],
+}
+
+/// The noise of a log.
+pub(super) struct LogNoise<'a> {
+    /// σ_v, rad/s.
+    pub velocity_sd_rad_s: f64,
+    /// s_j, Nm.
+    pub torque_sd_nm: &'a [f64],
+    /// S(f), its mean over all frequencies 1.
+    pub torque_power: Response<'a>,
+    /// Correlation between any two joints.
+    pub torque_correlation: f64,
+}
+
+/// Where the estimates end up.
+#[derive(Debug, Clone)]
+pub(super) struct Outcome {
+    /// Limit of θ̂ minus θ.
+    pub bias: Vec<f64>,
+    /// Variance of θ̂.
+    pub variance: Vec<f64>,
+}
+
+/// One period of an arm's exact motion with all that the formulas need of it.
+pub(super) struct NoisyRegressor<'a> {
+    model: &'a Model,
+    set: &'a BaseSet,
+    theta: Vec<f64>,
+    epsilon_rad_s: f64,
+    motion: Motion,
+    periodic: Periodic,
+    rate_hz: f64,
+    exact: Columns,
+    torque_nm: Vec<Vec<f64>>,
+    /// D_i.
+    slopes: Vec<Columns>,
+}
+
+/// The columns of every joint's equation, each with its base index.
+type Columns = Vec<Vec<(usize, Vec<f64>)>>;
+
+fn columns(problem: &Problem) -> Columns {
+    let panels = problem.panels.iter().enumerate();
+    panels
+        .map(|(j, panel)| {
+            let series = panel.x.chunks_exact(problem.samples).map(<[f64]>::to_vec);
+            problem.plan.base_indices(j).zip(series).collect()
+        })
+        .collect()
+}
+
+/// Quadrature over a normal number: nodes and weights.
+fn normal_nodes() -> impl Iterator<Item = (f64, f64)> {
+    const STEP: f64 = 0.25;
+    let density = |x: f64| STEP * (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt();
+    // The trapezoidal rule converges faster than any power of the step; beyond 6 there is 1e-9 left.
+    (-24..=24).map(move |k| (STEP * f64::from(k), density(STEP * f64::from(k))))
+}
+
+impl<'a> NoisyRegressor<'a> {
+    /// For one period `motion` of an arm with the base parameters `theta`.
+    pub(super) fn new(
+        model: &'a Model,
+        set: &'a BaseSet,
+        theta: Vec<f64>,
+        epsilon_rad_s: f64,
+        motion: Motion,
+        rate_hz: f64,
+    ) -> Self {
+        let exact = assembled(model, set, &motion, rate_hz);
+        let torque_nm =
+            exact.iter().map(|joint| product(joint, &theta, motion.samples())).collect();
+        let slopes = (0..motion.joints())
+            .map(|i| {
+                let mut faster = motion.clone();
+                faster.qdd_rad_s2.joint_mut(i).iter_mut().for_each(|a| *a += 1.0);
+                let mut slope = assembled(model, set, &faster, rate_hz);
+                for (slope, exact) in slope.iter_mut().flatten().zip(exact.iter().flatten()) {
+                    slope.1.iter_mut().zip(&exact.1).for_each(|(s, x)| *s -= x);
+                }
+                slope
+            })
+            .collect();
+        Self {
+            periodic: Periodic::new(motion.samples(), rate_hz),
+            model,
+            set,
+            theta,
+            epsilon_rad_s,
+            motion,
+            rate_hz,
+            exact,
+            torque_nm,
+            slopes,
+        }
+    }
+
+    /// √diag (XᵀWX)⁻¹ over `periods` periods, white torque noise of known size and an exact regressor.
+    pub(super) fn least_sigma(&self, torque_sd_nm: &[f64], periods: f64) -> Vec<f64> {
+        let weights: Vec<f64> = torque_sd_nm.iter().map(|s| 1.0 / s).collect();
+        let inverse = inverse(self.gram(&self.exact, &weights));
+        inverse.diagonal().iter().map(|v| (v / periods).sqrt()).collect()
+    }
+
+    /// √diag (XᵀX)⁻¹ over `periods` periods: the paper's (20) for an exact regressor.
+    pub(super) fn paper_sigma(&self, periods: f64) -> Vec<f64> {
+        self.least_sigma(&vec![1.0; self.exact.len()], periods)
+    }
+
+    /// (a) and (b) for `periods` periods of data.
+    pub(super) fn outcome(&self, how: &Treatment, noise: &LogNoise, periods: f64) -> Outcome {
+        let b = self.set.rank();
+        let n = self.motion.samples();
+        let joints = self.exact.len();
+        let differentiated = |f: f64| Complex64::new(0.0, (how.differentiator)(f));
+        let real = |response: Response, x: &[f64]| {
+            self.periodic.filtered(x, |f| Complex64::new(response(f), 0.0))
+        };
+
+        let mut motion = self.motion.clone();
+        for j in 0..joints {
+            let qdd = self.periodic.filtered(motion.qd_rad_s.joint(j), differentiated);
+            motion.qdd_rad_s2.joint_mut(j).copy_from_slice(&qdd);
+        }
+        let mut mean = assembled(self.model, self.set, &motion, self.rate_hz);
+        let friction: Vec<Friction> =
+            (0..joints).map(|j| self.friction(j, noise.velocity_sd_rad_s)).collect();
+        for (joint, friction) in mean.iter_mut().zip(&friction) {
+            for (base, column) in joint.iter_mut() {
+                if Some(*base) == friction.coulomb {
+                    column.copy_from_slice(&friction.mean_sign);
+                }
+                *column = real(how.regressor, column);
+            }
+        }
+
+        let mut information = self.gram(&mean, how.weights);
+        let acceleration_variance = noise.velocity_sd_rad_s.powi(2)
+            * self.periodic.noise_gain(|f| (how.differentiator)(f) * (how.regressor)(f));
+        for slope in &self.slopes {
+            information += self.gram(slope, how.weights) * acceleration_variance;
+        }
+        let passed = self.periodic.noise_gain(how.regressor);
+        for (friction, weight) in friction.iter().zip(how.weights) {
+            friction.add_covariance(&mut information, passed * weight * weight);
+        }
+
+        let mut right = DVector::zeros(b);
+        for ((joint, torque), weight) in mean.iter().zip(&self.torque_nm).zip(how.weights) {
+            let torque = real(how.torque, torque);
+            for (base, column) in joint {
+                right[*base] += weight * weight * dot(column, &torque);
+            }
+        }
+
+        let inverse = inverse(information);
+        let limit = &inverse * right;
+        let mut omega = self.torque_part(&mean, how, noise);
+        if noise.velocity_sd_rad_s > 0.0 {
+            let seen: Columns = mean
+                .iter()
+                .map(|joint| {
+                    joint.iter().map(|(base, x)| (*base, real(how.regressor, x))).collect()
+                })
+                .collect();
+            let mut score = DMatrix::zeros(n, b);
+            for i in 0..joints {
+                score.fill(0.0);
+                self.encoder_score(&seen, how, &friction, i, &mut score);
+                omega += score.tr_mul(&score) * noise.velocity_sd_rad_s.powi(2);
+            }
+        }
+        let variance = &inverse * omega * &inverse;
+        Outcome {
+            bias: limit.iter().zip(&self.theta).map(|(limit, theta)| limit - theta).collect(),
+            variance: variance.diagonal().iter().map(|v| v / periods).collect(),
+        }
+    }
+
+    /// Ω of the torque noise.
+    fn torque_part(&self, mean: &Columns, how: &Treatment, noise: &LogNoise) -> DMatrix<f64> {
+        let b = self.set.rank();
+        let shape = |f: f64| Complex64::new((noise.torque_power)(f).sqrt() * (how.torque)(f), 0.0);
+        let seen: Columns = mean
+            .iter()
+            .zip(how.weights.iter().zip(noise.torque_sd_nm))
+            .map(|(joint, (weight, sd))| {
+                let scale = weight * weight * sd;
+                let scaled = |column: &[f64]| {
+                    self.periodic.filtered(column, shape).iter().map(|y| scale * y).collect()
+                };
+                joint.iter().map(|(base, column)| (*base, scaled(column))).collect()
+            })
+            .collect();
+        let own = 1.0 - noise.torque_correlation;
+        let mut omega = self.gram(&seen, &vec![1.0; seen.len()]) * own;
+        if noise.torque_correlation > 0.0 {
+            let mut sum = DMatrix::zeros(self.motion.samples(), b);
+            for (base, column) in seen.iter().flatten() {
+                let mut target = sum.column_mut(*base);
+                target.iter_mut().zip(column).for_each(|(t, c)| *t += c);
+            }
+            omega += sum.tr_mul(&sum) * noise.torque_correlation;
+        }
+        omega
+    }
+
+    /// g_i: how the score of every parameter answers to v_i; `seen` is G_x X̄.
+    fn encoder_score(
+        &self,
+        seen: &Columns,
+        how: &Treatment,
+        friction: &[Friction],
+        i: usize,
+        score: &mut DMatrix<f64>,
+    ) {
+        let n = self.motion.samples();
+        // The adjoint of jA.
+        let adjoint = |f: f64| Complex64::new(0.0, -(how.differentiator)(f));
+        for (j, joint) in seen.iter().enumerate() {
+            let slope = product(&self.slopes[i][j], &self.theta, n);
+            let weight = how.weights[j].powi(2);
+            for (base, seen) in joint {
+                let mut target = score.column_mut(*base);
+                let answers: Vec<f64> =
+                    seen.iter().zip(&slope).map(|(x, d)| x * d * weight).collect();
+                let passed = self.periodic.filtered(&answers, adjoint);
+                target.iter_mut().zip(&passed).for_each(|(t, p)| *t += p);
+                if i == j {
+                    let direct = seen.iter().zip(&friction[i].slope_nm_s_rad);
+                    target.iter_mut().zip(direct).for_each(|(t, (x, d))| *t += x * d * weight);
+                }
+            }
+        }
+    }
+
+    /// Σ_j w_j² X_jᵀX_j.
+    fn gram(&self, columns: &Columns, weights: &[f64]) -> DMatrix<f64> {
+        let b = self.set.rank();
+        let mut gram = DMatrix::zeros(b, b);
+        for (joint, weight) in columns.iter().zip(weights) {
+            for (k, (row, x)) in joint.iter().enumerate() {
+                for (column, y) in &joint[..=k] {
+                    let value = weight * weight * dot(x, y);
+                    gram[(*row, *column)] += value;
+                    if row != column {
+                        gram[(*column, *row)] += value;
+                    }
+                }
+            }
+        }
+        gram
+    }
+
+    fn friction(&self, joint: usize, velocity_sd_rad_s: f64) -> Friction {
+        let find = |name: String| (0..self.set.rank()).find(|&k| self.set.name(k) == name);
+        let viscous = find(format!("rv{}", joint + 1));
+        let coulomb = find(format!("rc{}", joint + 1));
+        let value = |k: Option<usize>| k.map_or(0.0, |k| self.theta[k]);
+        let (rv, rc) = (value(viscous), value(coulomb));
+        let mut out = Friction {
+            viscous,
+            coulomb,
+            mean_sign: Vec::new(),
+            slope_nm_s_rad: Vec::new(),
+            covariance: [0.0; 3],
+        };
+        for qd in self.motion.qd_rad_s.joint(joint) {
+            let [mut mean, mut square, mut cross, mut steep] = [0.0; 4];
+            for (node, weight) in normal_nodes() {
+                let v = velocity_sd_rad_s * node;
+                let sign = ((qd + v) / self.epsilon_rad_s).tanh();
+                mean += weight * sign;
+                square += weight * sign * sign;
+                cross += weight * v * sign;
+                steep += weight * (1.0 - sign * sign);
+            }
+            out.mean_sign.push(mean);
+            out.slope_nm_s_rad.push(rv + rc * steep / self.epsilon_rad_s);
+            let [vv, vs, ss] = &mut out.covariance;
+            *vv += velocity_sd_rad_s.powi(2);
+            *vs += cross;
+            *ss += square - mean * mean;
+        }
+        out
+    }
+}
+
+/// A joint's friction columns under velocity noise.
+struct Friction {
+    /// Base index of rv.
+    viscous: Option<usize>,
+    /// Base index of rc.
+    coulomb: Option<usize>,
+    /// E tanh((q̇ + v)/ε).
+    mean_sign: Vec<f64>,
+    /// rv + rc E[1 − tanh²]/ε.
+    slope_nm_s_rad: Vec<f64>,
+    /// Sums over the period of var(q̇ + v), their covariance, var(tanh).
+    covariance: [f64; 3],
+}
+
+impl Friction {
+    fn add_covariance(&self, information: &mut DMatrix<f64>, scale: f64) {
+        let (Some(v), Some(s)) = (self.viscous, self.coulomb) else { return };
+        let [vv, vs, ss] = self.covariance.map(|c| c * scale);
+        information[(v, v)] += vv;
+        information[(v, s)] += vs;
+        information[(s, v)] += vs;
+        information[(s, s)] += ss;
+    }
+}
+
+fn assembled(model: &Model, set: &BaseSet, motion: &Motion, rate_hz: f64) -> Columns {
+    let mut problem = Problem::new(ColumnPlan::new(model, set), rate_hz);
+    let torque = JointSignals::zeros(motion.joints(), motion.samples());
+    Assembler::new(model).assemble(&mut problem, model, motion, &torque);
+    columns(&problem)
+}
+
+/// X_j θ.
+fn product(joint: &[(usize, Vec<f64>)], theta: &[f64], samples: usize) -> Vec<f64> {
+    let mut sum = vec![0.0; samples];
+    for (base, column) in joint {
+        sum.iter_mut().zip(column).for_each(|(s, x)| *s += theta[*base] * x);
+    }
+    sum
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Inverse of a symmetric positive definite matrix, scaled to a unit diagonal first; NaN where it is none.
+fn inverse(mut matrix: DMatrix<f64>) -> DMatrix<f64> {
+    let b = matrix.nrows();
+    let scale = DVector::from_fn(b, |k, _| 1.0 / matrix[(k, k)].sqrt());
+    matrix = DMatrix::from_fn(b, b, |i, k| matrix[(i, k)] * scale[i] * scale[k]);
+    match matrix.cholesky() {
+        Some(factor) => {
+            let inverse = factor.inverse();
+            DMatrix::from_fn(b, b, |i, k| inverse[(i, k)] * scale[i] * scale[k])
+        }
+        None => DMatrix::from_element(b, b, f64::NAN),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::Parameterisation;
+    use crate::excitation::{FourierSeries, Reference};
+    use crate::montecarlo::study::cutoff::central_difference;
+    use crate::robot::Arm;
+    use crate::signal::{PaperDifferentiator, PaperReading, ZeroPhase};
+
+    const RATE_HZ: f64 = 125.0;
+
+    /// One period of the identification trajectory, exactly.
+    fn motion() -> Motion {
+        let series = FourierSeries::built_in("ur5_identification").unwrap();
+        let samples = (series.period_s * RATE_HZ).round() as usize;
+        let mut motion = Motion::at_rest(6, samples);
+        let [mut q, mut qd, mut qdd] = [[0.0; 6]; 3];
+        for k in 0..samples {
+            series.sample(k as f64 / RATE_HZ, &mut q, &mut qd, &mut qdd);
+            motion.q_rad.set_sample(k, &q);
+            motion.qd_rad_s.set_sample(k, &qd);
+            motion.qdd_rad_s2.set_sample(k, &qdd);
+        }
+        motion
+    }
+
+    fn with_formulas(check: impl Fn(&NoisyRegressor)) {
+        let arm = Arm::load("ur5").unwrap();
+        let model = Model::new(&arm);
+        let set = BaseSet::find(&arm, Parameterisation::full(6, false)).unwrap();
+        let theta = set.values(&model.standard_parameters());
+        let epsilon = arm.friction_epsilon_rad_s;
+        check(&NoisyRegressor::new(&model, &set, theta, epsilon, motion(), RATE_HZ));
+    }
+
+    fn outcome(formulas: &NoisyRegressor, cutoff_hz: f64, velocity_sd_rad_s: f64) -> Outcome {
+        let filter = ZeroPhase::with_single_pass_cutoff(cutoff_hz, 1, RATE_HZ).unwrap();
+        let differentiator = |f: f64| central_difference(f, RATE_HZ) * filter.response(f);
+        let one = |_: f64| 1.0;
+        let treatment = Treatment {
+            differentiator: &differentiator,
+            regressor: &one,
+            torque: &one,
+            weights: &[1.0; 6],
+        };
+        let noise = LogNoise {
+            velocity_sd_rad_s,
+            torque_sd_nm: &[1.0; 6],
+            torque_power: &one,
+            torque_correlation: 0.0,
+        };
+        formulas.outcome(&treatment, &noise, 1.0)
+    }
+
+    fn norm(values: &[f64]) -> f64 {
+        values.iter().map(|v| v * v).sum::<f64>().sqrt()
+    }
+
+    /// The acceleration lacks tan²(πf/f_s)/tan²(πf_c/f_s) of itself, and less by that share again:
+    /// at most (0.5/20)² = 6e-4. The central difference adds (2πf/f_s)⁴/30 < 1e-8.
+    #[test]
+    fn the_filter_branch_falls_with_the_square_of_the_cutoff() {
+        with_formulas(|formulas| {
+            let [low, high] = [20.0, 40.0].map(|hz| norm(&outcome(formulas, hz, 0.0).bias));
+            let warped = |hz: f64| (std::f64::consts::PI * hz / RATE_HZ).tan();
+            let expected = (warped(40.0) / warped(20.0)).powi(2);
+            assert!((low / high / expected - 1.0).abs() < 2e-3, "{low} {high} {expected}");
+        });
+    }
+
+    /// With white noise of 1 Nm everywhere and an exact regressor the scatter is the paper's (20): at
+    /// 40 Hz the filter takes (0.5/40)² = 1.6e-4 of the acceleration.
+    #[test]
+    fn without_encoder_noise_and_for_unit_noise_the_scatter_is_the_papers_sigma() {
+        with_formulas(|formulas| {
+            let scatter = outcome(formulas, 40.0, 0.0).variance;
+            for (variance, sigma) in scatter.iter().zip(formulas.paper_sigma(1.0)) {
+                assert!((variance.sqrt() / sigma - 1.0).abs() < 2e-3);
+            }
+        });
+    }
+
+    /// σ_a as stated for fast sampling, and a noise branch that grows with its square.
+    #[test]
+    fn the_noise_branch_grows_with_the_variance_of_the_acceleration() {
+        let gain = |cutoff_hz: f64| {
+            let filter = ZeroPhase::with_single_pass_cutoff(cutoff_hz, 1, RATE_HZ).unwrap();
+            let periodic = Periodic::new(12_500, RATE_HZ);
+            periodic.noise_gain(|f| central_difference(f, RATE_HZ) * filter.response(f))
+        };
+        let differentiator =
+            PaperDifferentiator::new(PaperReading::Intended, 0.25, RATE_HZ).unwrap();
+        // Beyond 10 Hz, where a difference of samples falls behind the derivative, lie 4 f_c/(π · 10 Hz) =
+        // 3 % of σ_a² at f_c = 0.25 Hz, 1.6 % of σ_a.
+        let sigma = gain(0.25).sqrt();
+        assert!((sigma / differentiator.acceleration_sigma(1.0) - 1.0).abs() < 0.016, "{sigma}");
+        with_formulas(|formulas| {
+            // At 2e-5 rad/s the attenuation is linear in σ_a²; the friction columns' share, which does
+            // not depend on the cutoff, is taken off by a third cutoff.
+            let bias = |hz: f64| {
+                let [with, without] = [2e-5, 0.0].map(|sd| outcome(formulas, hz, sd).bias);
+                with.iter().zip(without).map(|(a, b)| a - b).collect::<Vec<f64>>()
+            };
+            let [five, ten, twenty] = [5.0, 10.0, 20.0].map(bias);
+            let less = |a: &[f64], b: &[f64]| -> Vec<f64> {
+                a.iter().zip(b).map(|(a, b)| a - b).collect()
+            };
+            let ratio = norm(&less(&twenty, &five)) / norm(&less(&ten, &five));
+            let expected = (gain(20.0) - gain(5.0)) / (gain(10.0) - gain(5.0));
+            assert!((ratio / expected - 1.0).abs() < 0.02, "{ratio} {expected}");
+        });
+    }
+}

@@ -1,0 +1,78 @@
+//! Series of one period behind a filter of known response.
+
+use std::sync::Arc;
+
+use realfft::num_complex::Complex64;
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+
+/// Transforms of series with one number of samples.
+pub(super) struct Periodic {
+    samples: usize,
+    rate_hz: f64,
+    forward: Arc<dyn RealToComplex<f64>>,
+    inverse: Arc<dyn ComplexToReal<f64>>,
+}
+
+impl Periodic {
+    pub(super) fn new(samples: usize, rate_hz: f64) -> Self {
+        let mut planner = RealFftPlanner::new();
+        let forward = planner.plan_fft_forward(samples);
+        let inverse = planner.plan_fft_inverse(samples);
+        Self { samples, rate_hz, forward, inverse }
+    }
+
+    fn frequency_hz(&self, bin: usize) -> f64 {
+        bin as f64 * self.rate_hz / self.samples as f64
+    }
+
+    /// One period of a series as it is in the steady state behind a filter with `response`, a
+    /// function of the frequency in Hz.
+    pub(super) fn filtered(&self, x: &[f64], response: impl Fn(f64) -> Complex64) -> Vec<f64> {
+        const LENGTHS: &str = "all buffers have the plan's own lengths";
+        let mut input = x.to_vec();
+        let mut spectrum = self.forward.make_output_vec();
+        self.forward.process(&mut input, &mut spectrum).expect(LENGTHS);
+        let scale = 1.0 / self.samples as f64;
+        for (bin, value) in spectrum.iter_mut().enumerate() {
+            *value *= response(self.frequency_hz(bin)) * scale;
+        }
+        // A real series has no imaginary part at frequency zero and at half the sampling rate.
+        spectrum[0].im = 0.0;
+        if self.samples.is_multiple_of(2) {
+            spectrum[self.samples / 2].im = 0.0;
+        }
+        let mut out = self.inverse.make_output_vec();
+        self.inverse.process(&mut spectrum, &mut out).expect(LENGTHS);
+        out
+    }
+
+    /// Variance of unit white noise behind a filter whose gain is `gain`: the mean of its square over
+    /// all frequencies.
+    pub(super) fn noise_gain(&self, gain: impl Fn(f64) -> f64) -> f64 {
+        let half = self.samples / 2;
+        let sum: f64 = (0..=half)
+            .map(|bin| {
+                let once = bin == 0 || (self.samples.is_multiple_of(2) && bin == half);
+                gain(self.frequency_hz(bin)).powi(2) * if once { 1.0 } else { 2.0 }
+            })
+            .sum();
+        sum / self.samples as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sine_is_scaled_and_turned_and_noise_keeps_its_share() {
+        let (n, rate_hz) = (200, 50.0);
+        let periodic = Periodic::new(n, rate_hz);
+        let wave = |k: usize| std::f64::consts::TAU * 3.0 * k as f64 / n as f64;
+        let x: Vec<f64> = (0..n).map(|k| wave(k).cos()).collect();
+        // 3 periods in 4 s: 0.75 Hz.
+        let y = periodic.filtered(&x, |f| Complex64::new(0.0, 2.0 * f));
+        assert!((0..n).all(|k| (y[k] + 1.5 * wave(k).sin()).abs() < 1e-12));
+        assert!((periodic.noise_gain(|_| 1.0) - 1.0).abs() < 1e-12);
+    }
+}
