@@ -27,6 +27,10 @@ impl Options {
     /// Faster logs are decimated to at most this rate: an arm moves at a few hertz.
     pub const HIGHEST_RATE_HZ: f64 = 150.0;
 
+    /// Friction of a single run sees the velocity low-passed at this share of the sampling rate, where
+    /// the series of a motion that repeats ends too.
+    pub const VELOCITY_END: f64 = 0.32;
+
     /// Cutoff (Hz) of the low-pass on the velocity of a single run before it is differentiated: wide
     /// enough above [`Self::cutoff_hz`] to leave the acceleration to the low-pass on the equations.
     pub fn derivative_cutoff_hz(&self, rate_hz: f64) -> f64 {

@@ -74,9 +74,6 @@ const FEWEST_SAMPLES: usize = 64;
 const EVEN_WITHIN: f64 = 0.02;
 /// Gaps up to this many natural steps are interpolated, longer ones end the record.
 const LONGEST_GAP_STEPS: f64 = 10.0;
-/// Friction sees the velocity low-passed at this share of the sampling rate, where the series of a
-/// motion that repeats ends too.
-const VELOCITY_END: f64 = 0.32;
 
 /// Filters and plans kept from log to log.
 #[derive(Default)]
@@ -270,7 +267,7 @@ impl Preparer {
         }
         let cutoff_hz = options.derivative_cutoff_hz(rate_hz);
         let smooth = ZeroPhase::new(cutoff_hz, options.order, rate_hz)?;
-        let light = ZeroPhase::new(VELOCITY_END * rate_hz, options.order, rate_hz)?;
+        let light = ZeroPhase::new(Options::VELOCITY_END * rate_hz, options.order, rate_hz)?;
         let mut qd_rad_s = even.qd_rad_s.clone().into_owned();
         let mut qdd_rad_s2 = JointSignals::zeros(even.q_rad.joints(), even.q_rad.samples());
         for j in 0..qdd_rad_s2.joints() {

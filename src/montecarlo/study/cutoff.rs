@@ -364,12 +364,14 @@ fn point(
             let smooth_hz = options.derivative_cutoff_hz(rate_hz);
             let derivative = ZeroPhase::new(smooth_hz, options.order, rate_hz)?;
             let both = ZeroPhase::new(cutoff_hz, options.order, rate_hz)?;
-            (derivative, Some(both), &own)
+            let velocity = ZeroPhase::new(Options::VELOCITY_END * rate_hz, options.order, rate_hz)?;
+            (derivative, Some((velocity, both)), &own)
         }
     };
     let differentiator = |f: f64| central_difference(f, rate_hz) * derivative.response(f);
     let ideal = |f: f64| central_difference(f, rate_hz);
-    let equations = |f: f64| both.as_ref().map_or(1.0, |both| both.response(f));
+    let equations = |f: f64| both.as_ref().map_or(1.0, |(_, both)| both.response(f));
+    let velocity = |f: f64| both.as_ref().map_or(1.0, |(velocity, _)| velocity.response(f));
     let white = |_: f64| 1.0;
     let noise = |velocity_sd_rad_s| LogNoise {
         velocity_sd_rad_s,
@@ -379,6 +381,7 @@ fn point(
     };
     let treatment = Treatment {
         differentiator: &differentiator,
+        velocity: &velocity,
         regressor: &equations,
         torque: &equations,
         weights,
@@ -434,6 +437,7 @@ mod tests {
             let one = |_: f64| 1.0;
             let treatment = Treatment {
                 differentiator: &differentiator,
+                velocity: &one,
                 regressor: &one,
                 torque: &one,
                 weights: &[1.0; 6],

@@ -9,9 +9,9 @@ mod noise;
 mod noisy_regressor;
 mod paper;
 mod paper_equations;
-pub mod physical;
 mod paper_sigma;
 mod periodic;
+pub mod physical;
 mod record_length;
 
 pub use cutoff::{Curve, CutoffStudy, Method, Point, cutoff_study, cutoff_study_trials};

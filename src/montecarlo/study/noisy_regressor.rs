@@ -3,7 +3,7 @@
 //! The true equations are y = Xθ. A processing solves others: the torque behind G_y, the regressor
 //! behind G_x, in it the acceleration that a differentiator jA(ω) makes of the velocity, and in that
 //! the encoder's white noise v of variance σ_v². With X̄ the mean of the regressor that is used, E what
-//! is random in it, and W the weights of the joints,
+//! is random in it, and W the weights of the joints (the velocity itself behind L, 1 in the paper),
 //!
 //! ```text
 //! θ̂ → (X̄ᵀW²X̄ + N)⁻¹ X̄ᵀW² G_y y,   N = E[EᵀW²E]                                  (a)
@@ -22,7 +22,7 @@
 //! ```
 //!
 //! which attenuates inertias by σ_a²/var(q̈ | other columns): it grows as f_c³. N_friction is the
-//! covariance of q̇ + v and tanh((q̇ + v)/ε), by quadrature over v; it does not depend on the cutoff. Noise
+//! covariance of q̇ + Lv and tanh((q̇ + Lv)/ε), by quadrature; it hardly depends on the cutoff. Noise
 //! of velocity and acceleration at one instant are uncorrelated (A is odd).
 //!
 //! **Scatter**: Ω has a part of the torque noise (variance s_j², spectrum S, correlation C between joints)
@@ -30,7 +30,7 @@
 //!
 //! ```text
 //! Ω = Σ_jj' C_jj' s_j s_j' w_j² w_j'² Y_jᵀY_j' + σ_v² Σ_i g_iᵀg_i,   Y = √S G_y X̄
-//! g_i = jA* [Σ_j w_j² (G_x X̄)_j (D_iθ)_j] + w_i² (G_x X̄)_i (rv_i + rc_i E[1 − tanh²]/ε)
+//! g_i = jA* [Σ_j w_j² (G_x X̄)_j (D_iθ)_j] + L [w_i² (G_x X̄)_i (rv_i + rc_i E[1 − tanh²]/ε)]
 //! ```
 
 use nalgebra::{DMatrix, DVector};
@@ -49,6 +49,8 @@ pub(super) type Response<'a> = &'a dyn Fn(f64) -> f64;
 pub(super) struct Treatment<'a> {
     /// A(f), rad/s: the acceleration is made of the velocity by jA.
     pub differentiator: Response<'a>,
+    /// L: the velocity of the regressor is behind this.
+    pub velocity: Response<'a>,
     /// G_x.
     pub regressor: Response<'a>,
     /// G_y.
@@ -178,10 +180,14 @@ impl<'a> NoisyRegressor<'a> {
         for j in 0..joints {
             let qdd = self.periodic.filtered(motion.qd_rad_s.joint(j), differentiated);
             motion.qdd_rad_s2.joint_mut(j).copy_from_slice(&qdd);
+            let qd = real(how.velocity, motion.qd_rad_s.joint(j));
+            motion.qd_rad_s.joint_mut(j).copy_from_slice(&qd);
         }
+        let velocity_gain = self.periodic.noise_gain(how.velocity);
+        let velocity_sd_rad_s = noise.velocity_sd_rad_s * velocity_gain.sqrt();
         let mut mean = assembled(self.model, self.set, &motion, self.rate_hz);
         let friction: Vec<Friction> =
-            (0..joints).map(|j| self.friction(j, noise.velocity_sd_rad_s)).collect();
+            (0..joints).map(|j| self.friction(j, &motion, velocity_sd_rad_s)).collect();
         for (joint, friction) in mean.iter_mut().zip(&friction) {
             for (base, column) in joint.iter_mut() {
                 if Some(*base) == friction.coulomb {
@@ -197,7 +203,8 @@ impl<'a> NoisyRegressor<'a> {
         for slope in &self.slopes {
             information += self.gram(slope, how.weights) * acceleration_variance;
         }
-        let passed = self.periodic.noise_gain(how.regressor);
+        let both = self.periodic.noise_gain(|f| (how.regressor)(f) * (how.velocity)(f));
+        let passed = both / velocity_gain;
         for (friction, weight) in friction.iter().zip(how.weights) {
             friction.add_covariance(&mut information, passed * weight * weight);
         }
@@ -284,8 +291,12 @@ impl<'a> NoisyRegressor<'a> {
                 let passed = self.periodic.filtered(&answers, adjoint);
                 target.iter_mut().zip(&passed).for_each(|(t, p)| *t += p);
                 if i == j {
-                    let direct = seen.iter().zip(&friction[i].slope_nm_s_rad);
-                    target.iter_mut().zip(direct).for_each(|(t, (x, d))| *t += x * d * weight);
+                    let slope = &friction[i].slope_nm_s_rad;
+                    let direct: Vec<f64> =
+                        seen.iter().zip(slope).map(|(x, d)| x * d * weight).collect();
+                    let velocity = |f: f64| Complex64::new((how.velocity)(f), 0.0);
+                    let passed = self.periodic.filtered(&direct, velocity);
+                    target.iter_mut().zip(&passed).for_each(|(t, p)| *t += p);
                 }
             }
         }
@@ -309,7 +320,7 @@ impl<'a> NoisyRegressor<'a> {
         gram
     }
 
-    fn friction(&self, joint: usize, velocity_sd_rad_s: f64) -> Friction {
+    fn friction(&self, joint: usize, motion: &Motion, velocity_sd_rad_s: f64) -> Friction {
         let find = |name: String| (0..self.set.rank()).find(|&k| self.set.name(k) == name);
         let viscous = find(format!("rv{}", joint + 1));
         let coulomb = find(format!("rc{}", joint + 1));
@@ -322,7 +333,7 @@ impl<'a> NoisyRegressor<'a> {
             slope_nm_s_rad: Vec::new(),
             covariance: [0.0; 3],
         };
-        for qd in self.motion.qd_rad_s.joint(joint) {
+        for qd in motion.qd_rad_s.joint(joint) {
             let [mut mean, mut square, mut cross, mut steep] = [0.0; 4];
             for (node, weight) in normal_nodes() {
                 let v = velocity_sd_rad_s * node;
@@ -443,6 +454,7 @@ mod tests {
         let one = |_: f64| 1.0;
         let treatment = Treatment {
             differentiator: &differentiator,
+            velocity: &one,
             regressor: &one,
             torque: &one,
             weights: &[1.0; 6],

@@ -90,6 +90,7 @@ pub(super) fn paper_sigma(
         let predicted = formulas.outcome(
             &Treatment {
                 differentiator: &differentiator,
+                velocity: &|_| 1.0,
                 regressor: &|_| 1.0,
                 torque: &|f| if case.torque_filtered { smooth.response(f) } else { 1.0 },
                 weights: &vec![1.0; torque_sd_nm.len()],
