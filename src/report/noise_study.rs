@@ -141,7 +141,7 @@ fn paper_table(study: &NoiseStudy) -> Table {
     table
 }
 
-/// Scenarios against methods, with `cell` of each pair that exists.
+/// Methods against scenarios, with `cell` of each pair that exists.
 fn matrix(study: &NoiseStudy, cell: impl Fn(&MethodResult) -> String) -> Table {
     let mut names: Vec<(&str, &str)> = Vec::new();
     for m in study.scenarios.iter().flat_map(|s| &s.methods) {
@@ -150,14 +150,17 @@ fn matrix(study: &NoiseStudy, cell: impl Fn(&MethodResult) -> String) -> Table {
             names.push(name);
         }
     }
-    let columns = names.iter().map(|(e, c)| Column::number(format!("{e} {c}"), ""));
-    let mut table = Table::new([Column::text("scenario")].into_iter().chain(columns));
-    for s in &study.scenarios {
-        let cells = names.iter().map(|(e, c)| {
-            let method = s.methods.iter().find(|m| m.estimator == *e && m.covariance == *c);
-            method.map_or_else(|| "–".into(), &cell)
+    // Names break between words where columns are narrow.
+    let heading = |s: &ScenarioResult| Column::number(s.short_name().replace('_', " "), "");
+    let columns = study.scenarios.iter().map(heading);
+    let labels = ["estimator", "σ from"].map(Column::text);
+    let mut table = Table::new(labels.into_iter().chain(columns));
+    for (estimator, covariance) in names {
+        let cells = study.scenarios.iter().map(|s| {
+            let is_it = |m: &&MethodResult| m.estimator == estimator && m.covariance == covariance;
+            s.methods.iter().find(is_it).map_or_else(|| "–".into(), &cell)
         });
-        table.push([s.short_name().to_owned()].into_iter().chain(cells));
+        table.push([estimator.to_owned(), covariance.to_owned()].into_iter().chain(cells));
     }
     table
 }

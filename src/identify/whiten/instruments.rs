@@ -30,7 +30,8 @@ pub fn smoothed(
 ) -> Result<Motion, SignalError> {
     let filter = ZeroPhase::new(SMOOTHER * cutoff_hz, order, rate_hz)?;
     let n = motion.samples();
-    let around = if repeats { filter.edge_samples().min(n) } else { 0 };
+    // One edge is where the guess about what lies beyond fades to 1 %: three leave 1e-6.
+    let around = if repeats { (3 * filter.edge_samples()).min(n) } else { 0 };
     let mut longer = Vec::with_capacity(n + 2 * around);
     let mut slope = Vec::new();
     let mut low_pass = |series: &[f64], out: &mut [f64], derivative: Option<&mut [f64]>| {
