@@ -207,21 +207,15 @@ fn repeated_or_missing(m: &Measurement) -> Option<Cause> {
     })
 }
 
-/// Single torque values far off both neighbours.
+/// Single torque values far off both neighbours, on the same side of both: a step is off one of them.
 fn outliers(m: &Measurement) -> Vec<Cause> {
     (0..m.torque_nm.joints())
         .filter_map(|j| {
             let y = m.torque_nm.joint(j);
-            let off: Vec<f64> = y.windows(3).map(|w| w[1] - 0.5 * (w[0] + w[2])).collect();
-            let sigma = robust_sigma(&off);
-            // A value between two far ones is as far off: its neighbour must be further.
-            let is_peak = |k: &usize| {
-                let here = off[*k].abs();
-                here > FAR * sigma
-                    && (*k == 0 || off[k - 1].abs() < 0.75 * here)
-                    && off.get(k + 1).is_none_or(|next| next.abs() < 0.75 * here)
-            };
-            let count = (0..off.len()).filter(is_peak).count();
+            let steps: Vec<f64> = y.windows(2).map(|w| w[1] - w[0]).collect();
+            let limit = FAR * robust_sigma(&steps);
+            let is_peak = |w: &&[f64]| w[0] * w[1] < 0.0 && w[0].abs().min(w[1].abs()) > limit;
+            let count = steps.windows(2).filter(is_peak).count();
             (count >= 3).then(|| {
                 let parameters = [("fraction", exact(count as f64 / y.len() as f64, ""))];
                 cause(

@@ -4,10 +4,12 @@ use std::collections::BTreeMap;
 
 use super::against;
 use super::candidates::{self, Candidate, Quantity, Search, Shape};
+use super::common_motion::move_to_common_motion;
 use super::data_faults;
 use super::error::DiagnoseError;
 use super::extension::{Effect, Extension, mean_period};
-use super::image::{Column, Image, Span};
+use super::gain;
+use super::image::{Image, Span};
 use super::misfit;
 use super::scene::Scene;
 use super::selection::{Kept, Selected, select};
@@ -77,9 +79,10 @@ impl<'a> Diagnoser<'a> {
         let faults = data_faults::find(m);
         let qd_rad_s = data_faults::without_lag(m, &faults);
         let m = &Measurement { qd_rad_s: &qd_rad_s, ..*m };
-        let regression = self.identifier.regression(m)?;
+        let mut regression = self.identifier.regression(m)?;
         let identification = self.identifier.identify_regression(&regression)?;
         let fit = &identification.fit;
+        move_to_common_motion(&mut regression, self.arm, self.set, &fit.theta);
         let sources = (self.arm, self.set, &self.options);
         let estimate = (&fit.theta[..], &fit.joint_sigma_nm[..]);
         let first = Study::new(&self.families, sources, &regression, estimate, m.source)?;
@@ -100,11 +103,11 @@ impl<'a> Diagnoser<'a> {
         let fitted = study.null.len() + accepted.len();
         let lack = misfit::lack_of_fit(&study, &rest, fitted);
         let unexplained = misfit::unexplained(&study, &accepted, &rest, lack);
-        let gains = CrossFit::new(&study, &entries);
+        let gains = gain::on_other_periods(&study, &entries);
         let physics = selected
             .iter()
             .enumerate()
-            .map(|(c, selected)| self.cause(&study, &kept, selected, c, &gains, &extension));
+            .map(|(c, selected)| self.cause(&study, &kept, selected, c, gains[c], &extension));
         let mut causes: Vec<Cause> = faults.into_iter().chain(physics).collect();
         let mut moved_parameters = Vec::new();
         if let Some(simulation) = simulation {
@@ -157,7 +160,7 @@ impl<'a> Diagnoser<'a> {
         kept: &Kept,
         selected: &Selected,
         index: usize,
-        gains: &CrossFit,
+        gain_fraction: Option<f64>,
         extension: &Extension,
     ) -> Cause {
         let entry = &selected.contender.entry;
@@ -180,7 +183,7 @@ impl<'a> Diagnoser<'a> {
             joint: entry.site.map(|j| j + 1),
             confidence: selected.confidence,
             parameters: estimates(study, kept, &extension.effects[index], index),
-            gain_fraction: gains.gain(study, index),
+            gain_fraction,
             separating_experiment: (!class.is_empty()).then(|| family.separating_experiment()),
             class,
             strength: selected.contender.statistic.sqrt(),
@@ -397,100 +400,4 @@ fn estimates(
             (quantity.name, Estimate { value: quantity.value, unit: quantity.unit, ci95 })
         })
         .collect()
-}
-
-/// Models fitted to one half of the periods and judged on the other half.
-struct CrossFit {
-    /// Per half: mean square residual per joint without any cause, without cause c, with all.
-    halves: Vec<HalfFit>,
-    sites: Vec<Option<usize>>,
-}
-
-struct HalfFit {
-    null: Vec<f64>,
-    without: Vec<Vec<f64>>,
-    all: Vec<f64>,
-    floor: Vec<f64>,
-}
-
-impl CrossFit {
-    fn new(study: &Study, entries: &[&Entry]) -> Self {
-        let sites = entries.iter().map(|e| e.site).collect();
-        let replicates = study.regression.prepared.replicates.as_ref();
-        let Some(replicates) =
-            replicates.filter(|_| study.scene.periods >= 4 && !entries.is_empty())
-        else {
-            return Self { halves: Vec::new(), sites };
-        };
-        let halves = [0, 1].map(|half| {
-            let (train, test) = (half_mean(study, half), half_mean(study, 1 - half));
-            let image = study.whitening.image(&train);
-            let square = |entries: &[&Entry]| -> Vec<f64> {
-                let model = Extension::fit(study, entries, &image);
-                let problem = &study.regression.problem;
-                let predicted =
-                    model.torque_nm(study.families, &study.scene, problem, Some(&study.whitening));
-                test.parts
-                    .iter()
-                    .map(|(j, y)| {
-                        let errors =
-                            y.iter().zip(predicted.joint(*j)).map(|(y, p)| (y - p).powi(2));
-                        errors.sum::<f64>() / y.len() as f64
-                    })
-                    .collect()
-            };
-            let without = (0..entries.len())
-                .map(|c| {
-                    let rest: Vec<&Entry> = entries
-                        .iter()
-                        .enumerate()
-                        .filter(|(i, _)| *i != c)
-                        .map(|(_, e)| *e)
-                        .collect();
-                    square(&rest)
-                })
-                .collect();
-            let tested = (study.scene.periods + half) / 2;
-            let floor = replicates.sigma.iter().map(|s| s * s / tested as f64).collect();
-            HalfFit { null: square(&[]), without, all: square(entries), floor }
-        });
-        Self { halves: halves.into(), sites }
-    }
-
-    /// Share of the explainable mean square that cause `c` removes on its joint (or on all, each in
-    /// units of its noise).
-    fn gain(&self, study: &Study, c: usize) -> Option<f64> {
-        if self.halves.is_empty() {
-            return None;
-        }
-        let joints = match self.sites[c] {
-            Some(j) => j..j + 1,
-            None => 0..study.scene.joints(),
-        };
-        let (mut removed, mut explainable) = (0.0, 0.0);
-        for half in &self.halves {
-            for j in joints.clone() {
-                removed += (half.without[c][j] - half.all[j]) / half.floor[j];
-                explainable += (half.null[j] - half.floor[j]).max(0.0) / half.floor[j];
-            }
-        }
-        (explainable > 0.0).then(|| removed / explainable)
-    }
-}
-
-/// Mean torque of the even (0) or odd (1) periods.
-fn half_mean(study: &Study, half: usize) -> Column {
-    let problem = &study.regression.problem;
-    let n = problem.samples;
-    let parts = problem.panels.iter().enumerate().map(|(j, panel)| {
-        let mut sum = vec![0.0; n];
-        let mut count = 0.0;
-        for period in panel.y.chunks_exact(n).skip(half).step_by(2) {
-            sum.iter_mut().zip(period).for_each(|(s, y)| *s += y);
-            count += 1.0;
-        }
-        sum.iter_mut().for_each(|s| *s /= count);
-        (j, sum)
-    });
-    Column { parts: parts.collect() }
 }

@@ -15,10 +15,12 @@
 pub mod candidates;
 
 mod against;
+mod common_motion;
 mod data_faults;
 mod diagnoser;
 mod error;
 mod extension;
+mod gain;
 mod image;
 mod kind;
 mod misfit;

@@ -7,7 +7,8 @@ use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
 use crate::base::BaseSet;
 use crate::dynamics::{
-    LANES, Lanes, Model, Motion, Parameter, ParameterLayout, Workspace, rigid_torque,
+    LANES, Lanes, Model, Motion, Parameter, ParameterLayout, Workspace, inverse_dynamics,
+    rigid_torque,
 };
 use crate::identify::Prepared;
 use crate::robot::{Arm, JointSignals};
@@ -28,7 +29,10 @@ pub struct Scene {
     pub periods: usize,
     /// Whether the motion closes on itself.
     pub periodic: bool,
-    /// Torque that moves the links, Nm.
+    /// Torque that moves the links along the motion as it was recorded, Nm.
+    recorded_nm: JointSignals,
+    /// Torque that moves the links, Nm. In a motion that repeats it, and the load, have only the
+    /// harmonics that are known well: see [`TrustedHarmonics`].
     pub link_nm: JointSignals,
     /// Torque on the gear: links and rotors, Nm.
     pub load_nm: JointSignals,
@@ -54,11 +58,25 @@ impl Scene {
         let motion = prepared.motion.clone();
         let (arm, offset_nm) = equivalent_arm(nominal, set, theta);
         let (joints, n) = (motion.joints(), motion.samples());
-        let link_nm = rigid_torque_along(&Model::new(&arm), &motion);
+        let model = Model::new(&arm);
         let drive = |j: usize| &arm.joints[j].drive;
-        let load_nm = JointSignals::from_fn(joints, n, |j, k| {
-            link_nm.joint(j)[k] + drive(j).rotor_inertia_kg_m2 * motion.qdd_rad_s2.joint(j)[k]
-        });
+        let rotor = |j: usize, motion: &Motion| -> Vec<f64> {
+            let inertia = drive(j).rotor_inertia_kg_m2;
+            motion.qdd_rad_s2.joint(j).iter().map(|qdd| inertia * qdd).collect()
+        };
+        let recorded_nm = rigid_torque_along(&model, &motion);
+        let mut link_nm = recorded_nm.clone();
+        let mut rotor_nm = motion.qdd_rad_s2.map_joints(|j, _| rotor(j, &motion));
+        if let Some(each) = &prepared.each_period {
+            let harmonics = TrustedHarmonics::new(n);
+            let links = rigid_torque_along(&model, each);
+            for j in 0..joints {
+                harmonics.keep(link_nm.joint_mut(j), links.joint(j));
+                harmonics.keep(rotor_nm.joint_mut(j), &rotor(j, each));
+            }
+        }
+        let load_nm =
+            JointSignals::from_fn(joints, n, |j, k| link_nm.joint(j)[k] + rotor_nm.joint(j)[k]);
         let epsilon = arm.friction_epsilon_rad_s;
         let sign =
             motion.qd_rad_s.map_joints(|_, v| v.iter().map(|v| (v / epsilon).tanh()).collect());
@@ -82,6 +100,7 @@ impl Scene {
             arm,
             motion,
             periodic,
+            recorded_nm,
             link_nm,
             load_nm,
             torque_nm,
@@ -150,9 +169,65 @@ impl Scene {
     pub fn torque_change(&self, arm: &Arm, motion: &Motion) -> JointSignals {
         let mut changed = rigid_torque_along(&Model::new(arm), motion);
         for j in 0..self.joints() {
-            changed.joint_mut(j).iter_mut().zip(self.link_nm.joint(j)).for_each(|(c, l)| *c -= l);
+            changed
+                .joint_mut(j)
+                .iter_mut()
+                .zip(self.recorded_nm.joint(j))
+                .for_each(|(c, l)| *c -= l);
         }
         changed
+    }
+}
+
+/// Removes from a predicted torque the harmonics that are known badly.
+///
+/// The acceleration's noise is in what the null model leaves and in what a family makes of the load; where
+/// the load is differentiated the two would be correlated for no physical reason. A band of harmonics of
+/// the mean load is kept if its power is a hundred times what the periods' scatter makes of it.
+struct TrustedHarmonics {
+    forward: Arc<dyn RealToComplex<f64>>,
+    inverse: Arc<dyn ComplexToReal<f64>>,
+}
+
+/// Power over noise of a band that is kept.
+const TRUSTED: f64 = 100.0;
+/// Harmonics that are judged together.
+const BAND: usize = 8;
+
+impl TrustedHarmonics {
+    fn new(n: usize) -> Self {
+        let mut planner = RealFftPlanner::new();
+        Self { forward: planner.plan_fft_forward(n), inverse: planner.plan_fft_inverse(n) }
+    }
+
+    fn spectrum(&self, y: &[f64]) -> Vec<Complex64> {
+        let mut out = self.forward.make_output_vec();
+        // The length is the plan's own, so that the transform succeeds.
+        let _ = self.forward.process(&mut y.to_vec(), &mut out);
+        out
+    }
+
+    /// `mean` loses the bands that the torque of all periods, one after the other, leaves uncertain.
+    fn keep(&self, mean: &mut [f64], periods: &[f64]) {
+        let spectra: Vec<Vec<Complex64>> =
+            periods.chunks_exact(mean.len()).map(|y| self.spectrum(y)).collect();
+        let count = spectra.len() as f64;
+        let kept: Vec<bool> = (0..spectra[0].len())
+            .step_by(BAND)
+            .map(|first| {
+                let (mut power, mut scatter) = (0.0, 0.0);
+                for h in first..(first + BAND).min(spectra[0].len()) {
+                    let average = spectra.iter().map(|s| s[h]).sum::<Complex64>() / count;
+                    power += count * average.norm_sqr();
+                    scatter += spectra.iter().map(|s| (s[h] - average).norm_sqr()).sum::<f64>();
+                }
+                power > (1.0 + TRUSTED) * scatter / (count - 1.0)
+            })
+            .collect();
+        let out = transform(&*self.forward, &*self.inverse, mean, |h, _| {
+            if kept[h / BAND] { Complex64::ONE } else { Complex64::ZERO }
+        });
+        mean.copy_from_slice(&out);
     }
 }
 
@@ -212,8 +287,20 @@ pub fn equivalent_arm(nominal: &Arm, set: &BaseSet, theta: &[f64]) -> (Arm, Vec<
     (arm, offset_nm)
 }
 
-/// M_links q̈ + c + g of every sample, eight samples at a time.
+/// A law of torque at one instant, eight instants at a time.
+type Law = fn(&Model, &mut Workspace<Lanes>, &[Lanes], &[Lanes], &[Lanes], &mut [Lanes]);
+
+/// M_links q̈ + c + g of every sample, Nm.
 fn rigid_torque_along(model: &Model, motion: &Motion) -> JointSignals {
+    along(model, motion, rigid_torque)
+}
+
+/// M q̈ + c + g + friction of every sample, Nm.
+pub fn drive_torque_along(model: &Model, motion: &Motion) -> JointSignals {
+    along(model, motion, inverse_dynamics)
+}
+
+fn along(model: &Model, motion: &Motion, law: Law) -> JointSignals {
     let (joints, n) = (motion.joints(), motion.samples());
     let mut workspace = Workspace::<Lanes>::new(model);
     let mut out = JointSignals::zeros(joints, n);
@@ -229,7 +316,7 @@ fn rigid_torque_along(model: &Model, motion: &Motion) -> JointSignals {
                 qdd[j].0[lane] = motion.qdd_rad_s2.joint(j)[start + lane];
             }
         }
-        rigid_torque(model, &mut workspace, &q, &qd, &qdd, &mut torque);
+        law(model, &mut workspace, &q, &qd, &qdd, &mut torque);
         for (j, torque) in torque.iter().enumerate() {
             out.joint_mut(j)[start..start + count].copy_from_slice(&torque.0[..count]);
         }

@@ -58,11 +58,8 @@ pub struct RunWhitening {
 const NEIGHBOURS: usize = 12;
 /// Noise below this share of a joint's rms torque is not told from the rounding of a model.
 const FLOOR: f64 = 1e-4;
-/// Share of the harmonics of the motion that are used: at its end the products with the mass matrix
-/// lack what was cut off.
-const USED_HARMONICS: f64 = 0.8;
-/// Always used.
-const LEAST_HARMONICS: usize = 24;
+/// Highest frequency that is used, over the rate: below the end of the periods' own motion.
+const USED: f64 = 0.35;
 /// Rows kept of a single run, per second and hertz of its low-pass.
 const KEPT_RATE: f64 = 4.0;
 /// Blocks of a single run.
@@ -79,11 +76,7 @@ impl PeriodWhitening {
         let forward = RealFftPlanner::new().plan_fft_forward(n);
         let mut whitening = Self { samples: n, periods, joints, forward, factors: Vec::new() };
         let harmonics = n / 2 + 1;
-        let known = regression.prepared.processing.harmonics.iter().flatten();
-        let known = known.filter(|h| **h > 0).min().map_or(n / 2, |h| *h);
-        let complete = (USED_HARMONICS * known as f64) as usize;
-        let clear = clear_harmonics(&regression.prepared.motion.qdd_rad_s2, &*whitening.forward);
-        let used = complete.min(clear).max(LEAST_HARMONICS).min(n / 2);
+        let used = (USED * n as f64) as usize;
         // Running sums over harmonics of Σ_p D Dᴴ/(P − 1), D the deviation from the mean period.
         let mut scatter = vec![DMatrix::<Complex<f64>>::zeros(joints, joints); harmonics];
         let spectra: Vec<Vec<Complex<f64>>> = problem
@@ -249,27 +242,6 @@ impl PeriodWhitening {
         }
         Image { mean, contrast }
     }
-}
-
-/// Harmonics over which the spectrum of an acceleration is averaged.
-const BAND: usize = 8;
-
-/// The harmonic, of the first joint to reach it, at which the spectrum of the acceleration is lowest: the
-/// motion's own falls with frequency, that of white noise in the velocity grows as its square.
-fn clear_harmonics(qdd_rad_s2: &JointSignals, forward: &dyn RealToComplex<f64>) -> usize {
-    let of_joint = |j: usize| {
-        let mut time = qdd_rad_s2.joint(j).to_vec();
-        let mut spectrum = forward.make_output_vec();
-        // The length is the plan's own, so that the transform succeeds.
-        let _ = forward.process(&mut time, &mut spectrum);
-        let power = |band: &[Complex<f64>]| band.iter().map(|c| c.norm_sqr()).sum::<f64>();
-        let bands: Vec<f64> = spectrum[1..].chunks_exact(BAND).map(power).collect();
-        // Bands that were cut off are empty.
-        let end = bands.iter().position(|b| *b < 1e-20 * bands[0]).unwrap_or(bands.len());
-        let lowest = (0..end).min_by(|&a, &b| bands[a].total_cmp(&bands[b])).unwrap_or(0);
-        BAND * (lowest + 1)
-    };
-    (0..qdd_rad_s2.joints()).map(of_joint).min().unwrap_or(usize::MAX)
 }
 
 impl RunWhitening {

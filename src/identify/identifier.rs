@@ -186,14 +186,14 @@ impl<'a> Identifier<'a> {
 
     /// Identifies from one log.
     pub fn identify(&mut self, m: &Measurement) -> Result<Identification, IdentifyError> {
-        let (prepared, ..) = self.fill_from(m)?;
+        let (prepared, ..) = self.fill_from(m, false)?;
         let instruments = self.instruments_for(self.options.estimator, &prepared)?;
         self.solve(prepared, instruments.as_ref())
     }
 
     /// Lays a log out for regression without solving: for validation and diagnosis.
     pub fn regression(&mut self, m: &Measurement) -> Result<Regression, IdentifyError> {
-        let (prepared, first_sample, every) = self.fill_from(m)?;
+        let (prepared, first_sample, every) = self.fill_from(m, true)?;
         let instruments = self.instruments_for(self.options.estimator, &prepared)?;
         let empty = Problem::new(self.problem.plan.clone(), 0.0);
         let problem = std::mem::replace(&mut self.problem, empty);
@@ -209,12 +209,20 @@ impl<'a> Identifier<'a> {
         self.solve(regression.prepared.clone(), regression.instruments.as_ref())
     }
 
-    fn fill_from(&mut self, m: &Measurement) -> Result<(Prepared, usize, usize), IdentifyError> {
+    fn fill_from(
+        &mut self,
+        m: &Measurement,
+        with_periods: bool,
+    ) -> Result<(Prepared, usize, usize), IdentifyError> {
         if m.q_rad.joints() != self.model.dof() {
             let (found, expected) = (m.q_rad.joints(), self.model.dof());
             return Err(IdentifyError::Joints { log: m.source.to_owned(), found, expected });
         }
-        let prepared = self.preparer.prepare(m, &self.options)?;
+        let prepared = if with_periods {
+            self.preparer.prepare_with_periods(m, &self.options)?
+        } else {
+            self.preparer.prepare(m, &self.options)?
+        };
         let (first, every) = self.lay_out(&prepared)?;
         Ok((prepared, first, every))
     }
@@ -368,7 +376,7 @@ impl<'a> Identifier<'a> {
         m: &Measurement,
         methods: &[(Estimator, Vec<CovarianceKind>)],
     ) -> Result<Vec<Result<Estimate, IdentifyError>>, IdentifyError> {
-        let (prepared, ..) = self.fill_from(m)?;
+        let (prepared, ..) = self.fill_from(m, false)?;
         let by_instruments = methods.iter().map(|(e, _)| *e).find(|e| *e == Estimator::Iv);
         let instruments = self.instruments_for(by_instruments, &prepared)?;
         let aids = MotionAids {

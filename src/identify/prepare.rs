@@ -60,6 +60,9 @@ pub struct Prepared {
     pub torque_nm: JointSignals,
     /// Scatter of the torque between periods; `None` for a single run.
     pub replicates: Option<Replicates>,
+    /// The motion of every period for itself, with all harmonics up to [`Preparer::WIDE`]; only where
+    /// it was asked for and the motion repeats.
+    pub each_period: Option<Motion>,
     /// How well the averaged acceleration is known, per joint; `None` for a single run.
     pub acceleration: Option<Vec<HarmonicPower>>,
     /// What was done.
@@ -81,6 +84,7 @@ pub struct Preparer {
     periodic: Option<PeriodicFit>,
     fit: FitScratch,
     filter: Scratch,
+    keeps_periods: bool,
 }
 
 /// The channels on an even clock.
@@ -94,6 +98,21 @@ struct Even<'a> {
 }
 
 impl Preparer {
+    /// Highest frequency of a period's own motion over the rate.
+    pub const WIDE: f64 = 0.4;
+
+    /// [`Self::prepare`], and the motion of every period for itself.
+    pub fn prepare_with_periods(
+        &mut self,
+        m: &Measurement,
+        options: &Options,
+    ) -> Result<Prepared, IdentifyError> {
+        self.keeps_periods = true;
+        let prepared = self.prepare(m, options);
+        self.keeps_periods = false;
+        prepared
+    }
+
     /// Brings `m` into the shape of a regression problem.
     ///
     /// A motion that repeats is averaged over its whole periods and differentiated as a Fourier
@@ -224,8 +243,17 @@ impl Preparer {
         let qd_rad_s = even.qd_rad_s.slice(window.clone());
         let torque_nm = even.torque_nm.slice(window.clone());
         let averaged = fit.fit(&q_rad, &qd_rad_s, &mut self.fit);
+        let each_period = self
+            .keeps_periods
+            .then(|| fit.each_period(&q_rad, &qd_rad_s, Self::WIDE, &mut self.fit))
+            .transpose();
         self.periodic = Some(fit);
         let averaged = averaged?;
+        let each_period = each_period?.map(|[q_rad, qd_rad_s, qdd_rad_s2]| Motion {
+            q_rad,
+            qd_rad_s,
+            qdd_rad_s2,
+        });
         let at = |k: usize| even.start_s + k as f64 / even.rate_hz;
         Ok(Prepared {
             motion: Motion {
@@ -233,6 +261,7 @@ impl Preparer {
                 qd_rad_s: averaged.qd_rad_s,
                 qdd_rad_s2: averaged.qdd_rad_s2,
             },
+            each_period,
             replicates: Some(replicate_noise(&torque_nm, samples_per_period)?),
             acceleration: Some(averaged.acceleration),
             torque_nm,
@@ -284,6 +313,7 @@ impl Preparer {
                 qdd_rad_s2: qdd_rad_s2.slice(window.clone()),
             },
             torque_nm: even.torque_nm.slice(window.clone()),
+            each_period: None,
             replicates: None,
             acceleration: None,
             processing: Processing {

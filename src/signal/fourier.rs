@@ -166,9 +166,7 @@ impl PeriodicFit {
         scratch: &mut FitScratch,
     ) -> Result<AveragedMotion, SignalError> {
         let (n, joints) = (self.samples_per_period, q_rad.joints());
-        same("samples in whole periods", n * self.periods, q_rad.samples())?;
-        same("samples of angle and velocity", q_rad.samples(), qd_rad_s.samples())?;
-        same("joints of angle and velocity", joints, qd_rad_s.joints())?;
+        self.check_sizes(q_rad, qd_rad_s)?;
         let mut motion = AveragedMotion {
             q_rad: JointSignals::zeros(joints, n),
             qd_rad_s: JointSignals::zeros(joints, n),
@@ -201,6 +199,69 @@ impl PeriodicFit {
             );
         }
         Ok(motion)
+    }
+
+    /// Every period for itself: angle, velocity and acceleration (joints × P·n samples), angle and
+    /// velocity combined as in step 2, all harmonics up to `share` of the rate and nothing averaged.
+    ///
+    /// What differs between the periods is noise of the encoders as the acceleration shows it, and
+    /// motion that does not repeat.
+    ///
+    /// Errors: as for [`Self::fit`].
+    pub fn each_period(
+        &self,
+        q_rad: &JointSignals,
+        qd_rad_s: &JointSignals,
+        share: f64,
+        scratch: &mut FitScratch,
+    ) -> Result<[JointSignals; 3], SignalError> {
+        let (n, joints) = (self.samples_per_period, q_rad.joints());
+        self.check_sizes(q_rad, qd_rad_s)?;
+        let bins = n / 2 + 1;
+        let highest = ((share * n as f64) as usize).clamp(1, n / 2);
+        let mut out = [(); 3].map(|()| JointSignals::zeros(joints, n * self.periods));
+        for j in 0..joints {
+            let FitScratch { time, fft, q, qd, .. } = &mut *scratch;
+            self.analyse(q_rad.joint(j), time, fft, q);
+            self.analyse(qd_rad_s.joint(j), time, fft, qd);
+            checked_sigma("angle", q_rad, j, q.sigma(n))?;
+            checked_sigma("velocity", qd_rad_s, j, qd.sigma(n))?;
+            for p in 0..self.periods {
+                let FitScratch { q, qd, series, .. } = &mut *scratch;
+                let (of_q, of_qd) = (&q.periods[p * bins..], &qd.periods[p * bins..]);
+                series.clear();
+                series.resize(bins, Complex64::ZERO);
+                series[0] = of_q[0];
+                for first in (1..=highest).step_by(BAND_HARMONICS) {
+                    let band = first..=(first + BAND_HARMONICS - 1).min(highest);
+                    let (noise_q, noise_qd) = (q.noise(&band), qd.noise(&band));
+                    for h in band {
+                        let w = self.angular_frequency(h);
+                        let from_qd = of_qd[h] / Complex64::new(0.0, w);
+                        series[h] = of_q[h] + (from_qd - of_q[h]) * weight(noise_q, noise_qd, w);
+                    }
+                }
+                let derivatives: [fn(f64) -> Complex64; 3] = [
+                    |_| Complex64::ONE,
+                    |w| Complex64::new(0.0, w),
+                    |w| Complex64::new(-w * w, 0.0),
+                ];
+                for (out, factor) in out.iter_mut().zip(derivatives) {
+                    self.synthesise(scratch, factor, &mut out.joint_mut(j)[p * n..(p + 1) * n]);
+                }
+            }
+        }
+        Ok(out)
+    }
+
+    fn check_sizes(
+        &self,
+        q_rad: &JointSignals,
+        qd_rad_s: &JointSignals,
+    ) -> Result<(), SignalError> {
+        same("samples in whole periods", self.samples_per_period * self.periods, q_rad.samples())?;
+        same("samples of angle and velocity", q_rad.samples(), qd_rad_s.samples())?;
+        same("joints of angle and velocity", q_rad.joints(), qd_rad_s.joints())
     }
 
     /// ω of harmonic `h`, rad/s.
@@ -265,12 +326,11 @@ impl PeriodicFit {
         let mut in_qdd = true;
         let last_of_qdd = harmonics_below(ALIAS_FREE, self.samples_per_period);
         for (b, band) in self.bands.iter().enumerate() {
-            let (noise_q, noise_qd) = (q.noise(band), qd.noise(band));
-            let noise_from_qd = |w: f64| noise_qd / (w * w);
-            let weight = |w: f64| noise_q / (noise_q + noise_from_qd(w));
+            let (noise_q, noise_qd) = (q.noise(&band.harmonics), qd.noise(&band.harmonics));
+            let weight = |w: f64| weight(noise_q, noise_qd, w);
             let frequencies = band.harmonics.clone().map(|h| (h, self.angular_frequency(h)));
             // Mean square of the noise of a harmonic in q̇.
-            let in_qd = |w: f64| 2.0 * w * w * weight(w) * noise_from_qd(w) / periods;
+            let in_qd = |w: f64| 2.0 * weight(w) * noise_qd / periods;
             let added = frequencies.clone().fold([0.0; 2], |[v, a], (_, w)| {
                 let noise = in_qd(w);
                 [v + noise, a + w * w * noise]
@@ -314,10 +374,15 @@ impl PeriodicFit {
     }
 }
 
+/// Weight of the velocity at ω beside the angle, by the noise powers of both.
+fn weight(noise_q: f64, noise_qd: f64, w: f64) -> f64 {
+    noise_q / (noise_q + noise_qd / (w * w))
+}
+
 impl Spectra {
     /// Noise power of one coefficient of one period, pooled over the band.
-    fn noise(&self, band: &Band) -> f64 {
-        let scatter = &self.scatter[band.harmonics.clone()];
+    fn noise(&self, band: &RangeInclusive<usize>) -> f64 {
+        let scatter = &self.scatter[band.clone()];
         (scatter.iter().sum::<f64>() / scatter.len() as f64).max(self.floor)
     }
 
@@ -325,7 +390,7 @@ impl Spectra {
     fn stands_out(&self, band: &Band, periods: f64) -> bool {
         let mean = &self.mean[band.harmonics.clone()];
         let energy = periods * mean.iter().map(|c| c.norm_sqr()).sum::<f64>() / mean.len() as f64;
-        energy > band.threshold * self.noise(band)
+        energy > band.threshold * self.noise(&band.harmonics)
     }
 
     /// Rms noise of one sample of a period of `n`: Parseval's sum over all ±h.

@@ -44,7 +44,14 @@ impl Candidate for Ripple {
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let j = joint(site);
         let q = scene.motion.q_rad.joint(j);
-        let column = |f: fn(f64) -> f64| Column::on(j, samples(scene, |k| f(shape.value * q[k])));
+        let qd = scene.motion.qd_rad_s.joint(j);
+        let column = |f: fn(f64) -> f64| {
+            let ripple = |k: usize| {
+                let frequency_hz = shape.value * qd[k] / std::f64::consts::TAU;
+                seen_share(frequency_hz, scene.rate_hz) * f(shape.value * q[k])
+            };
+            Column::on(j, samples(scene, ripple))
+        };
         vec![column(f64::cos), column(f64::sin)]
     }
 
@@ -63,6 +70,16 @@ impl Candidate for Ripple {
     fn in_words(&self) -> &'static str {
         "torque ripple that repeats many times per turn"
     }
+}
+
+/// Share of a ripple of this frequency that is left between torque and inertia times acceleration.
+///
+/// Fast ripple goes into the acceleration of the links, not into the torque. Above half the rate it has
+/// its alias there: the velocity it makes, 1/f as large as the acceleration, is differentiated at the
+/// frequency f − f_s round(f/f_s) at which it appears.
+fn seen_share(frequency_hz: f64, rate_hz: f64) -> f64 {
+    let turns = frequency_hz / rate_hz;
+    if turns.abs() <= 0.5 { 1.0 } else { (turns - turns.round()) / turns }
 }
 
 /// Resolution in orders per turn: one cycle more over the joint's range.

@@ -1,0 +1,132 @@
+//! How much of what can be explained a cause removes, on periods that were not used for the fit.
+//!
+//! All in whitened rows, where the mean of all P periods has noise of variance one, that of P_h periods
+//! v_h = P/P_h. With P_S the projection on the span of null model and causes, and P_R that without cause c,
+//! models are fitted to one half of the periods (y₁) and judged on the other (y₂), both ways round:
+//!
+//! explainable = ‖y₂ − P_R y₁‖² − m v₂ − v₁ tr P_R,
+//! removed = explainable − (‖y₂ − P_S y₁‖² − m v₂ − v₁ tr P_S),
+//!
+//! both over the m rows in which the cause has 95 % of its square, by the half it was fitted to: noise
+//! elsewhere says nothing of it. m v₂ is the noise of y₂ there, v₁ tr the noise of the fit to y₁.
+
+use super::image::{Column, Image, Span};
+use super::study::{Entry, Study};
+
+/// Share of a cause's square in the rows it is judged by.
+const WHERE_IT_ACTS: f64 = 0.95;
+/// Fewer periods have no halves worth fitting.
+const LEAST_PERIODS: usize = 4;
+
+/// removed/explainable of every entry, at most 1; `None` for a single run, for what does not repeat, and where
+/// noise leaves nothing to be explained.
+pub fn on_other_periods(study: &Study, entries: &[&Entry]) -> Vec<Option<f64>> {
+    if !study.scene.periodic || study.scene.periods < LEAST_PERIODS {
+        return vec![None; entries.len()];
+    }
+    let halves = [0, 1].map(|half| half_mean(study, half));
+    let all = Model::new(study, entries);
+    (0..entries.len())
+        .map(|c| {
+            let mut others = entries.to_vec();
+            let cause = others.remove(c);
+            if cause.images.iter().any(|image| !image.contrast.is_empty()) {
+                return None;
+            }
+            let without = Model::new(study, &others);
+            let (mut removed, mut explainable) = (0.0, 0.0);
+            for (fitted, judged) in [(0, 1), (1, 0)] {
+                let with = all.prediction(&halves[fitted].mean);
+                let less = without.prediction(&halves[fitted].mean);
+                let signal: Vec<f64> =
+                    with.mean.iter().zip(&less.mean).map(|(a, b)| a - b).collect();
+                let rows = strongest(&signal);
+                let left = |prediction: &Image, model: &Model| -> f64 {
+                    let y = &halves[judged].mean.mean;
+                    let square: f64 =
+                        rows.iter().map(|&r| (y[r] - prediction.mean[r]).powi(2)).sum();
+                    square
+                        - rows.len() as f64 * halves[judged].variance
+                        - model.trace(&rows) * halves[fitted].variance
+                };
+                let before = left(&less, &without);
+                explainable += before;
+                removed += before - left(&with, &all);
+            }
+            (explainable > 0.0).then(|| (removed / explainable).min(1.0))
+        })
+        .collect()
+}
+
+/// An orthonormal basis of a model's columns.
+struct Model<'a> {
+    null: &'a [Image],
+    causes: Span,
+}
+
+impl<'a> Model<'a> {
+    fn new(study: &'a Study, entries: &[&Entry]) -> Self {
+        let mut causes = Span::default();
+        for image in entries.iter().flat_map(|entry| &entry.images) {
+            causes.push(image);
+        }
+        Self { null: study.null.directions(), causes }
+    }
+
+    fn directions(&self) -> impl Iterator<Item = &Image> {
+        self.null.iter().chain(self.causes.directions())
+    }
+
+    /// P y.
+    fn prediction(&self, y: &Image) -> Image {
+        let mut out = Image { mean: vec![0.0; y.mean.len()], contrast: Vec::new() };
+        for direction in self.directions() {
+            out.add(direction.dot(y), direction);
+        }
+        out
+    }
+
+    /// Trace of P over `rows`.
+    fn trace(&self, rows: &[usize]) -> f64 {
+        let of = |d: &Image| rows.iter().map(|&r| d.mean[r] * d.mean[r]).sum::<f64>();
+        self.directions().map(of).sum()
+    }
+}
+
+/// The rows that hold [`WHERE_IT_ACTS`] of the square of `signal`.
+fn strongest(signal: &[f64]) -> Vec<usize> {
+    let mut rows: Vec<usize> = (0..signal.len()).collect();
+    rows.sort_by(|&a, &b| signal[b].abs().total_cmp(&signal[a].abs()));
+    let all: f64 = signal.iter().map(|s| s * s).sum();
+    let mut sum = 0.0;
+    let enough = rows.iter().position(|&r| {
+        sum += signal[r] * signal[r];
+        sum >= WHERE_IT_ACTS * all
+    });
+    rows.truncate(enough.map_or(signal.len(), |last| last + 1));
+    rows
+}
+
+/// Mean torque of half of the periods.
+struct Half {
+    /// Whitened.
+    mean: Image,
+    /// Variance of its noise in every row.
+    variance: f64,
+}
+
+/// The mean of the even (0) or odd (1) periods.
+fn half_mean(study: &Study, half: usize) -> Half {
+    let problem = &study.regression.problem;
+    let (n, periods) = (problem.samples, problem.periods);
+    let count = ((periods + 1 - half) / 2) as f64;
+    let parts = problem.panels.iter().enumerate().map(|(j, panel)| {
+        let mut mean = vec![0.0; n];
+        for period in panel.y.chunks_exact(n).skip(half).step_by(2) {
+            mean.iter_mut().zip(period).for_each(|(m, y)| *m += y / count);
+        }
+        (j, mean)
+    });
+    let mean = study.whitening.image(&Column { parts: parts.collect() });
+    Half { mean, variance: periods as f64 / count }
+}
