@@ -18,7 +18,10 @@ use crate::robot::JointSignals;
 /// logs has such a value.
 const FAR: f64 = 8.0;
 /// A lag that a reader of a log need not care about, in samples.
-const SMALL_LAG_SAMPLES: f64 = 0.1;
+const SMALL_LAG_SAMPLES: f64 = 0.01;
+/// A step of this part of the rms change from sample to sample adds a tenth to the variance of the noise:
+/// white noise changes by √2 σ, a step s adds s²/12.
+const COARSE: f64 = 0.77;
 /// Blocks for the scatter of the lag.
 const BLOCKS: usize = 20;
 /// Student's t₁₉ for a chance of 10⁻⁵ in two tails, six joints.
@@ -30,6 +33,7 @@ pub fn find(m: &Measurement) -> Vec<Cause> {
     out.extend(clock_fault(m));
     out.extend(repeated_or_missing(m));
     out.extend(outliers(m));
+    out.extend(quantisation(m));
     out
 }
 
@@ -230,6 +234,36 @@ fn outliers(m: &Measurement) -> Vec<Cause> {
         .collect()
 }
 
+/// Torques that are whole multiples of a step that is coarse against what changes between samples.
+fn quantisation(m: &Measurement) -> Vec<Cause> {
+    (0..m.torque_nm.joints())
+        .filter_map(|j| {
+            let y = m.torque_nm.joint(j);
+            let mut values = y.to_vec();
+            values.sort_by(f64::total_cmp);
+            values.dedup();
+            let gap = |w: &[f64]| w[1] - w[0];
+            let step = values.windows(2).map(gap).filter(|g| *g > 0.0).fold(f64::NAN, f64::min);
+            let scale = values.last()?.abs().max(values.first()?.abs());
+            // Rounding of a decimal fraction may stand in the last digits of every value.
+            let off_grid = |v: &f64| {
+                let steps = (v - values[0]) / step;
+                (steps - steps.round()).abs() * step > 1e-9 * scale
+            };
+            if values.len() < 3 || step.is_nan() || values.iter().any(off_grid) {
+                return None;
+            }
+            let changes: Vec<f64> = y.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+            let rms = (changes.iter().map(|c| c * c).sum::<f64>() / changes.len() as f64).sqrt();
+            (step > COARSE * rms).then(|| {
+                let parameters = [("step", exact(step, "Nm"))];
+                let words = "torque in coarse steps";
+                cause(Kind::Quantisation, Some(j), words, step / rms, &parameters)
+            })
+        })
+        .collect()
+}
+
 fn median_step(time_s: &[f64]) -> f64 {
     median(&mut time_s.windows(2).map(|t| t[1] - t[0]).collect::<Vec<f64>>())
 }
@@ -285,6 +319,29 @@ mod tests {
     #[test]
     fn a_good_record_has_no_fault() {
         assert_eq!(found(0.0, None), []);
+    }
+
+    #[test]
+    fn coarse_torque_is_found_with_its_step_and_fine_torque_is_not() {
+        let (time_s, [q_rad, qd_rad_s, torque_nm]) = record(0.0, None);
+        let rounded = |step: f64| {
+            let torque_nm =
+                torque_nm.map_joints(|_, y| y.iter().map(|v| (v / step).round() * step).collect());
+            find(&Measurement {
+                source: "test",
+                time_s: &time_s,
+                q_rad: &q_rad,
+                qd_rad_s: &qd_rad_s,
+                torque_nm: &torque_nm,
+            })
+        };
+        let coarse = rounded(0.8);
+        assert_eq!(coarse.len(), 2, "both joints");
+        for cause in coarse {
+            assert_eq!(cause.kind, Kind::Quantisation);
+            assert!((cause.parameters["step"].value - 0.8).abs() < 1e-9);
+        }
+        assert_eq!(rounded(0.01), []);
     }
 
     #[test]

@@ -241,7 +241,8 @@ fn held_out_gain(
     log: &Validation,
     (null, extension): (&Extension, &Extension),
 ) -> Result<HeldOut, DiagnoseError> {
-    let regression = identifier.regression(&log.measurement)?;
+    let mut regression = identifier.regression(&log.measurement)?;
+    move_to_common_motion(&mut regression, arm, set, &null.theta);
     let prepared = &regression.prepared;
     let moving = RunWhitening::moving_rows(&regression);
     let whitening = if prepared.replicates.is_some() {

@@ -7,8 +7,7 @@ use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
 use crate::base::BaseSet;
 use crate::dynamics::{
-    LANES, Lanes, Model, Motion, Parameter, ParameterLayout, Workspace, inverse_dynamics,
-    rigid_torque,
+    LANES, Lanes, Model, Motion, Parameter, ParameterLayout, Workspace, rigid_torque,
 };
 use crate::identify::Prepared;
 use crate::robot::{Arm, JointSignals};
@@ -287,20 +286,19 @@ pub fn equivalent_arm(nominal: &Arm, set: &BaseSet, theta: &[f64]) -> (Arm, Vec<
     (arm, offset_nm)
 }
 
-/// A law of torque at one instant, eight instants at a time.
-type Law = fn(&Model, &mut Workspace<Lanes>, &[Lanes], &[Lanes], &[Lanes], &mut [Lanes]);
+/// Torque on the gear of every sample, Nm: M q̈ + c + g of links and rotors, without friction.
+pub fn load_along(model: &Model, arm: &Arm, motion: &Motion) -> JointSignals {
+    let mut out = rigid_torque_along(model, motion);
+    for (j, joint) in arm.joints.iter().enumerate() {
+        let inertia = joint.drive.rotor_inertia_kg_m2;
+        let qdd = motion.qdd_rad_s2.joint(j);
+        out.joint_mut(j).iter_mut().zip(qdd).for_each(|(o, qdd)| *o += inertia * qdd);
+    }
+    out
+}
 
-/// M_links q̈ + c + g of every sample, Nm.
+/// M_links q̈ + c + g of every sample, eight samples at a time.
 fn rigid_torque_along(model: &Model, motion: &Motion) -> JointSignals {
-    along(model, motion, rigid_torque)
-}
-
-/// M q̈ + c + g + friction of every sample, Nm.
-pub fn drive_torque_along(model: &Model, motion: &Motion) -> JointSignals {
-    along(model, motion, inverse_dynamics)
-}
-
-fn along(model: &Model, motion: &Motion, law: Law) -> JointSignals {
     let (joints, n) = (motion.joints(), motion.samples());
     let mut workspace = Workspace::<Lanes>::new(model);
     let mut out = JointSignals::zeros(joints, n);
@@ -316,7 +314,7 @@ fn along(model: &Model, motion: &Motion, law: Law) -> JointSignals {
                 qdd[j].0[lane] = motion.qdd_rad_s2.joint(j)[start + lane];
             }
         }
-        law(model, &mut workspace, &q, &qd, &qdd, &mut torque);
+        rigid_torque(model, &mut workspace, &q, &qd, &qdd, &mut torque);
         for (j, torque) in torque.iter().enumerate() {
             out.joint_mut(j)[start..start + count].copy_from_slice(&torque.0[..count]);
         }

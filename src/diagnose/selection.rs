@@ -9,6 +9,9 @@ use super::study::{Entry, Study};
 
 /// Chance that a log without faults is given a cause.
 pub const FALSE_ALARM: f64 = 0.002;
+/// A family's law is right to this share of its own size: what is smaller on the same joint is no second
+/// cause.
+const FORM_ERROR: f64 = 0.05;
 /// Causes at most: a log that needs more has another kind of problem.
 const MOST_CAUSES: usize = 12;
 /// Families whose shapes are refined before one is chosen.
@@ -119,7 +122,7 @@ impl<'s, 'a> Kept<'s, 'a> {
     fn evidence(&self, entry: &Entry, statistic: f64) -> f64 {
         let study = self.study;
         let n = study.statistic.sample_count(entry.site, study.residual.mean.len());
-        let grid = study.grid_size(entry.family, entry.site) as f64;
+        let grid = study.alternatives(entry);
         statistic
             - entry.images.len() as f64 * n.ln()
             - 2.0 * grid.ln()
@@ -196,12 +199,24 @@ impl<'s, 'a> Kept<'s, 'a> {
     }
 
     /// Whether chance explains `contender` in fewer than one log without faults in 500, all
-    /// families, sites and shapes counted, and the evidence is for it.
+    /// families, sites and shapes counted, the evidence is for it, and it is more than what the
+    /// approximate form of the causes found beside it may leave.
     fn is_significant(&self, contender: &Contender, others: &Span, residual: &Image) -> bool {
         let study = self.study;
+        let site = contender.entry.site;
+        let beside = self
+            .causes
+            .iter()
+            .filter(|c| (c.entry.family, c.entry.site) != (contender.entry.family, site))
+            .filter(|c| c.entry.site.is_none() || site.is_none() || c.entry.site == site)
+            .map(|c| c.statistic)
+            .fold(0.0, f64::max);
+        if contender.statistic < FORM_ERROR * FORM_ERROR * beside {
+            return false;
+        }
         let span = study.span(&contender.entry, others);
         let single = study.statistic.probability(&span, residual);
-        let tests = study.entries.len() as f64;
+        let tests = study.entries.len() as f64 + study.alternatives(&contender.entry);
         contender.evidence > 0.0 && single * tests < FALSE_ALARM
     }
 

@@ -267,8 +267,12 @@ impl<'a> Study<'a> {
         self.families.iter().map(|f| f.sites(self.scene.joints()).len()).sum()
     }
 
-    /// Starting shapes of a family at a site.
-    pub fn grid_size(&self, family: usize, site: Option<usize>) -> usize {
-        self.entries.iter().filter(|e| (e.family, e.site) == (family, site)).count().max(1)
+    /// Shapes that were to choose from when `entry` was taken.
+    pub fn alternatives(&self, entry: &Entry) -> f64 {
+        let Entry { family, site, shape, .. } = *entry;
+        self.families[family].alternatives(&self.scene, site, shape).unwrap_or_else(|| {
+            let same = |e: &&Entry| (e.family, e.site) == (family, site);
+            self.entries.iter().filter(same).count().max(1) as f64
+        })
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Where the log has the motor's angle, the links move by δ = τ_L/k less: the torques change by
 //! τ(q − δ, q̇ − δ̇, q̈ − δ̈) − τ(q, q̇, q̈) on every joint (variant 0). Where it has the link's, the rotor
-//! and its friction move more: I_a δ̈ + F_v δ̇ on the joint itself (variant 1).
+//! and its friction move more: I_a δ̈ + (F_v + F_c/(ε cosh²(q̇/ε))) δ̇ on the joint itself (variant 1).
 
 use super::*;
 use crate::dynamics::Motion;
@@ -44,8 +44,11 @@ impl Candidate for Elasticity {
         let drive = &scene.arm.joints[j].drive;
         let rate = scene.derivative(scene.link_nm.joint(j));
         let acceleration = scene.derivative(&rate);
+        let sign = scene.sign.joint(j);
+        let epsilon = scene.arm.friction_epsilon_rad_s;
         let extra = samples(scene, |k| {
-            drive.rotor_inertia_kg_m2 * acceleration[k] + drive.viscous_nm_s_rad * rate[k]
+            let slope = drive.coulomb_nm * (1.0 - sign[k] * sign[k]) / epsilon;
+            drive.rotor_inertia_kg_m2 * acceleration[k] + (drive.viscous_nm_s_rad + slope) * rate[k]
         });
         vec![Column::on(j, extra)]
     }

@@ -88,6 +88,12 @@ pub trait Candidate: Sync {
         None
     }
 
+    /// How many shapes were to choose from when this one was taken, where there were more than the
+    /// starting ones.
+    fn alternatives(&self, _scene: &Scene, _site: Option<usize>, _shape: Shape) -> Option<f64> {
+        None
+    }
+
     /// Whether one joint may have several of it, with different shapes.
     fn is_repeatable(&self) -> bool {
         false

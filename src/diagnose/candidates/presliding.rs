@@ -1,7 +1,7 @@
 //! Friction that builds up behind a reversal: τ = F (z − sign q̇), dz/dq = k (1 − z sign q̇) (Dahl 1968).
 //!
 //! z is propagated exactly along the motion: over a stretch of one direction of length Δ,
-//! z ← s + (z − s) e^{−kΔ}. Over a motion that repeats it is carried round until it repeats as well.
+//! z ← s + (z − s) e^{−kΔ}; a step within which the velocity reverses has two such stretches. Over a motion that repeats it is carried round until it repeats as well.
 
 use super::*;
 
@@ -10,22 +10,35 @@ pub struct Presliding;
 
 /// z along joint `j`, for a stiffness `k` in 1/rad.
 fn deflection(scene: &Scene, j: usize, stiffness_per_rad: f64) -> Vec<f64> {
-    let q = scene.motion.q_rad.joint(j);
+    let (q, qd) = (scene.motion.q_rad.joint(j), scene.motion.qd_rad_s.joint(j));
+    let step_s = 1.0 / scene.rate_hz;
     let mut z = vec![0.0; q.len()];
     let mut state = scene.sign.joint(j)[0];
     // One lap forgets where the state began if the joint travels a few times 1/k; two are plenty.
     let laps = if scene.periodic { 2 } else { 1 };
     for _ in 0..laps {
-        let mut previous = if scene.periodic { q[q.len() - 1] } else { q[0] };
-        for (z, &angle) in z.iter_mut().zip(q) {
-            let step = angle - previous;
-            let direction = if step >= 0.0 { 1.0 } else { -1.0 };
-            state = direction + (state - direction) * (-stiffness_per_rad * step.abs()).exp();
+        let first = if scene.periodic { q.len() - 1 } else { 0 };
+        let mut previous = (q[first], qd[first]);
+        for (z, now) in z.iter_mut().zip(q.iter().copied().zip(qd.iter().copied())) {
+            for leg in legs(previous, now, step_s) {
+                let direction = if leg >= 0.0 { 1.0 } else { -1.0 };
+                state = direction + (state - direction) * (-stiffness_per_rad * leg.abs()).exp();
+            }
             *z = state;
-            previous = angle;
+            previous = now;
         }
     }
     z
+}
+
+/// Signed lengths of the way from one (angle, velocity) to the next: there and back where the velocity,
+/// straight between them, passes through zero.
+fn legs((q0, v0): (f64, f64), (q1, v1): (f64, f64), step_s: f64) -> [f64; 2] {
+    if v0 * v1 >= 0.0 {
+        return [q1 - q0, 0.0];
+    }
+    let turn = q0 + 0.5 * v0 * step_s * v0 / (v0 - v1);
+    [turn - q0, q1 - turn]
 }
 
 impl Candidate for Presliding {

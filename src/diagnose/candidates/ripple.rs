@@ -9,6 +9,8 @@ pub struct Ripple;
 /// Orders that a strain-wave gear of ratio 100 makes, per turn of the joint, and their neighbours.
 const HIGHEST_ORDER: f64 = 450.0;
 const LOWEST_ORDER: f64 = 20.0;
+/// Orders of a strain-wave gear in multiples of its ratio.
+const GEAR_MULTIPLES: [f64; 3] = [1.0, 2.0, 4.0];
 /// Peaks of the order spectrum that are looked at closely.
 const PEAKS: usize = 3;
 
@@ -22,7 +24,7 @@ impl Candidate for Ripple {
         let ratio = scene.arm.joints[joint(site)].drive.gear_ratio;
         // Half the resolution on both sides brackets a peak of the order spectrum.
         let about = |order: f64| [-0.5, 0.0, 0.5].map(|u| order + u * spacing);
-        [1.0, 2.0, 4.0]
+        GEAR_MULTIPLES
             .iter()
             .flat_map(|m| about(m * ratio))
             .map(|value| Shape { variant: 0, value })
@@ -35,6 +37,14 @@ impl Candidate for Ripple {
 
     fn half_width(&self, scene: &Scene, site: Option<usize>) -> Option<f64> {
         Some(0.5 * order_spacing(scene, joint(site)))
+    }
+
+    fn alternatives(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Option<f64> {
+        let spacing = order_spacing(scene, joint(site));
+        let ratio = scene.arm.joints[joint(site)].drive.gear_ratio;
+        let of_the_gear = |m: f64| (shape.value - m * ratio).abs() <= spacing;
+        let any_order = (HIGHEST_ORDER - LOWEST_ORDER) / spacing;
+        (!GEAR_MULTIPLES.into_iter().any(of_the_gear)).then_some(any_order)
     }
 
     fn is_repeatable(&self) -> bool {
