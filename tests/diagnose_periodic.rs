@@ -41,15 +41,3 @@ fn presliding() {
     let found = Hidden::on(3, Law::Dahl { stiffness_per_rad: 300.0 }).diagnose(4);
     contains(only(&found, Kind::Presliding, Some(4)), "stiffness_per_rad", 300.0);
 }
-
-#[test]
-fn elastic_gear() {
-    let found = Hidden::on(1, Law::Spring { stiffness_nm_rad: 25_000.0 }).diagnose(6);
-    contains(only(&found, Kind::Elasticity, Some(2)), "stiffness_nm_rad", 25_000.0);
-}
-
-#[test]
-fn torque_recorded_late() {
-    let found = Hidden::none().late(0.002).diagnose(7);
-    contains(only(&found, Kind::TimeSkew, None), "delay_s", 0.002);
-}

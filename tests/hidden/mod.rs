@@ -9,12 +9,11 @@ use armid::plant::{
     Drivetrain, Measured, PerJoint, Plant, PlantConfig, RapierArm, SensorConfig, Sensors, Stage,
 };
 use armid::random::TrialStreams;
-use armid::robot::{Arm, JointSignals};
+use armid::robot::Arm;
 
 /// What is hidden.
 #[derive(Debug, Clone, Copy)]
 pub enum Law {
-    Nothing,
     Load { mu: f64 },
     Dahl { stiffness_per_rad: f64 },
     Spring { stiffness_nm_rad: f64 },
@@ -24,21 +23,12 @@ pub enum Law {
 pub struct Hidden {
     joint: usize,
     law: Law,
-    late_s: f64,
     periods: usize,
 }
 
 impl Hidden {
-    pub fn none() -> Self {
-        Self::on(0, Law::Nothing)
-    }
-
     pub fn on(joint: usize, law: Law) -> Self {
-        Self { joint, law, late_s: 0.0, periods: 8 }
-    }
-
-    pub fn late(self, late_s: f64) -> Self {
-        Self { late_s, ..self }
+        Self { joint, law, periods: 8 }
     }
 
     /// Simulates a log with noise of `seed` and diagnoses it.
@@ -49,11 +39,7 @@ impl Hidden {
         let config = PlantConfig::default();
         let law = HiddenLaw::new(&arm, self.joint, self.law);
         let mut plant = Plant::with_drivetrain(&arm, &arm, Box::new(law), &config).unwrap();
-        let mut recording = plant.run(&excitation, None).unwrap();
-        if self.late_s != 0.0 {
-            let samples = self.late_s * config.log_rate_hz;
-            recording.torque_nm = delayed(&recording.torque_nm, samples);
-        }
+        let recording = plant.run(&excitation, None).unwrap();
         let sensors = SensorConfig {
             torque_sd_nm: PerJoint::Each(vec![1.0, 1.0, 0.7, 0.15, 0.15, 0.15]),
             q_sd_rad: PerJoint::All(2e-5),
@@ -76,23 +62,6 @@ impl Hidden {
         };
         diagnoser.diagnose(&measurement, &[], None).unwrap()
     }
-}
-
-/// y(t − d) by Catmull–Rom interpolation, `samples` = d f_s.
-fn delayed(y: &JointSignals, samples: f64) -> JointSignals {
-    let n = y.samples();
-    let at = |s: &[f64], k: isize| s[k.clamp(0, n as isize - 1) as usize];
-    JointSignals::from_fn(y.joints(), n, |j, k| {
-        let s = y.joint(j);
-        let t = k as f64 - samples;
-        let (i, u) = (t.floor() as isize, t - t.floor());
-        let p: [f64; 4] = std::array::from_fn(|m| at(s, i + m as isize - 1));
-        p[1] + 0.5
-            * u
-            * (p[2] - p[0]
-                + u * (2.0 * p[0] - 5.0 * p[1] + 4.0 * p[2] - p[3]
-                    + u * (3.0 * (p[1] - p[2]) + p[3] - p[0])))
-    })
 }
 
 struct HiddenLaw {
@@ -159,7 +128,6 @@ impl Drivetrain for HiddenLaw {
         let v = stage.qd_rad_s[h];
         let sign = (v / self.arm.friction_epsilon_rad_s).tanh();
         match self.law {
-            Law::Nothing => {}
             Law::Load { mu } => {
                 // The torque behind the gear: what is left of the drive's behind rotor and friction,
                 // where the rotor's share follows from the acceleration. A few rounds converge as μ^k.

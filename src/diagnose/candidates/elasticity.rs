@@ -2,7 +2,8 @@
 //!
 //! Where the log has the motor's angle, the links move by δ = τ_L/k less: the torques change by
 //! τ(q − δ, q̇ − δ̇, q̈ − δ̈) − τ(q, q̇, q̈) on every joint (variant 0). Where it has the link's, the rotor
-//! and its friction move more: I_a δ̈ + (F_v + F_c/(ε cosh²(q̇/ε))) δ̇ on the joint itself (variant 1).
+//! and its friction move more: I_a δ̈ + F_v δ̇ + F_c [tanh((q̇ + δ̇)/ε) − tanh(q̇/ε)] on the joint itself
+//! (variant 1; the friction reverses where the motor does, so that the stiffness is in the shape as well).
 
 use super::*;
 use crate::dynamics::Motion;
@@ -32,7 +33,13 @@ impl Candidate for Elasticity {
     }
 
     fn shapes(&self, _: &Scene, _: Option<usize>) -> Vec<Shape> {
-        vec![Shape { variant: 0, value: 0.0 }, Shape { variant: 1, value: 0.0 }]
+        let linear = Shape { variant: 0, value: 0.0 };
+        let stiffness = geometric(2e3, 2e5, 5).map(|value| Shape { variant: 1, value });
+        std::iter::once(linear).chain(stiffness).collect()
+    }
+
+    fn search(&self) -> Search {
+        Search::Logarithmic
     }
 
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
@@ -42,13 +49,16 @@ impl Candidate for Elasticity {
             return vec![give_way(scene, j, &delta, SMALL_RAD_NM)];
         }
         let drive = &scene.arm.joints[j].drive;
+        let softness = 1.0 / shape.value;
         let rate = scene.derivative(scene.link_nm.joint(j));
         let acceleration = scene.derivative(&rate);
-        let sign = scene.sign.joint(j);
+        let (qd, sign) = (scene.motion.qd_rad_s.joint(j), scene.sign.joint(j));
         let epsilon = scene.arm.friction_epsilon_rad_s;
         let extra = samples(scene, |k| {
-            let slope = drive.coulomb_nm * (1.0 - sign[k] * sign[k]) / epsilon;
-            drive.rotor_inertia_kg_m2 * acceleration[k] + (drive.viscous_nm_s_rad + slope) * rate[k]
+            let motor_sign = ((qd[k] + softness * rate[k]) / epsilon).tanh();
+            drive.rotor_inertia_kg_m2 * acceleration[k]
+                + drive.viscous_nm_s_rad * rate[k]
+                + drive.coulomb_nm * (motor_sign - sign[k]) / softness
         });
         vec![Column::on(j, extra)]
     }
