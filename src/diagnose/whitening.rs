@@ -8,6 +8,7 @@ use statrs::function::gamma::digamma;
 
 use super::error::DiagnoseError;
 use super::image::{Column, Image};
+use super::scene::Scene;
 use crate::identify::{Options, Regression};
 use crate::robot::JointSignals;
 use crate::signal::{Scratch, ZeroPhase};
@@ -26,7 +27,10 @@ pub enum Whitening {
 /// S is the scatter between periods, divided by the trend of every joint's power over frequency so that
 /// steep noise does not bend it, averaged over neighbouring harmonics, and scaled by M/(M − N) (M complex
 /// degrees of freedom, N joints) so that ⟨Yᴴ S⁻¹ Y⟩ is that of the true covariance. Torques have been
-/// moved to a common motion before, so that S is the noise of torque and acceleration together.
+/// moved to a common motion before, so that S is the noise of torque and acceleration together. To it comes
+/// what sampling does to the acceleration where friction reverses: the velocity has a kink there, whose
+/// spectrum falls as 1/f², and holds at f the share (f/(f_s − f))² of it that belongs to f_s − f. That
+/// share of Coulomb's torque is an error of the equations that no period tells from another.
 pub struct PeriodWhitening {
     samples: usize,
     periods: usize,
@@ -69,13 +73,15 @@ const REST_S: f64 = 0.25;
 
 impl PeriodWhitening {
     /// From the periods of a log.
-    pub fn new(regression: &Regression, log: &str) -> Result<Self, DiagnoseError> {
+    pub fn new(regression: &Regression, scene: &Scene, log: &str) -> Result<Self, DiagnoseError> {
         let problem = &regression.problem;
         let (n, periods, joints) = (problem.samples, problem.periods, problem.joints());
         let forward = RealFftPlanner::new().plan_fft_forward(n);
         let mut whitening = Self { samples: n, periods, joints, forward, factors: Vec::new() };
         let harmonics = n / 2 + 1;
         let used = (USED * n as f64) as usize;
+        let corners: Vec<Vec<Complex<f64>>> =
+            (0..joints).map(|j| whitening.spectrum(scene.sign.joint(j))).collect();
         // Running sums over harmonics of Σ_p D Dᴴ/(P − 1), D the deviation from the mean period.
         let mut scatter = vec![DMatrix::<Complex<f64>>::zeros(joints, joints); harmonics];
         let spectra: Vec<Vec<Complex<f64>>> = problem
@@ -138,8 +144,11 @@ impl PeriodWhitening {
             for (i, j) in pairs(joints) {
                 s[(i, j)] *= sd[i] * sd[j];
             }
+            // f/(f_s − f), squared, of the corners that friction makes in the velocity.
+            let alias = (k as f64 / (n - k) as f64).powi(2);
             for (j, power) in power.iter().enumerate() {
-                s[(j, j)] += FLOOR * FLOOR * power;
+                let corner = alias * scene.coulomb_nm[j] * corners[j][k].norm();
+                s[(j, j)] += FLOOR * FLOOR * power + periods as f64 * corner * corner;
             }
             let inverse = s.cholesky().and_then(|c| c.l().try_inverse());
             let Some(inverse) = inverse else {

@@ -16,7 +16,6 @@ use armid::robot::Arm;
 pub enum Law {
     Load { mu: f64 },
     Dahl { stiffness_per_rad: f64 },
-    Spring { stiffness_nm_rad: f64 },
 }
 
 /// A hidden effect and where it sits.
@@ -81,19 +80,13 @@ impl Drivetrain for HiddenLaw {
     fn states(&self) -> usize {
         match self.law {
             Law::Dahl { .. } => 1,
-            Law::Spring { .. } => 2,
-            _ => 0,
+            Law::Load { .. } => 0,
         }
     }
 
-    fn start(&mut self, arm: &mut RapierArm, q: &mut [f64], _: &mut [f64], states: &mut [f64]) {
+    fn start(&mut self, arm: &mut RapierArm, _: &mut [f64], _: &mut [f64], _: &mut [f64]) {
         for (j, joint) in self.arm.joints.iter().enumerate() {
-            let split = matches!(self.law, Law::Spring { .. }) && j == self.joint;
-            let rotor = if split { 0.0 } else { joint.drive.rotor_inertia_kg_m2 };
-            arm.set_rotor_inertia(j, rotor);
-        }
-        if let Law::Spring { .. } = self.law {
-            states[0] = q[self.joint];
+            arm.set_rotor_inertia(j, joint.drive.rotor_inertia_kg_m2);
         }
     }
 
@@ -105,7 +98,6 @@ impl Drivetrain for HiddenLaw {
             .joints
             .iter()
             .enumerate()
-            .filter(|(j, _)| !(matches!(self.law, Law::Spring { .. }) && *j == self.joint))
             .map(|(j, joint)| slope(&joint.drive) * inverse[j])
             .fold(0.0, f64::max)
     }
@@ -142,19 +134,6 @@ impl Drivetrain for HiddenLaw {
                 let z = stage.states[0];
                 states_rate[0] = stiffness_per_rad * (v - v.abs() * z);
                 self.link_nm[h] += drive.coulomb_nm * (sign - z);
-            }
-            Law::Spring { stiffness_nm_rad } => {
-                // The arm's joint is the link; the motor's angle and speed are states. The drive and
-                // its controller see the link here.
-                let (angle, speed) = (stage.states[0], stage.states[1]);
-                let torque = stiffness_nm_rad * (angle - stage.q_rad[h])
-                    + 2.0 * (speed - v) * (0.1 * stiffness_nm_rad).sqrt();
-                let motor_sign = (speed / self.arm.friction_epsilon_rad_s).tanh();
-                let friction = drive.viscous_nm_s_rad * speed + drive.coulomb_nm * motor_sign;
-                let net = stage.drive_torque_nm[h] - friction - torque;
-                states_rate[0] = speed;
-                states_rate[1] = net / drive.rotor_inertia_kg_m2;
-                self.link_nm[h] = torque;
             }
         }
         arm.forward_dynamics(stage.q_rad, stage.qd_rad_s, &self.link_nm, qdd);
