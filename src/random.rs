@@ -42,6 +42,8 @@ pub enum Channel {
     },
     /// Which blocks of a record are drawn again.
     Resampling,
+    /// What is hidden in a trial of a blind benchmark.
+    Case,
 }
 
 impl Channel {
@@ -55,6 +57,7 @@ impl Channel {
             Self::Outlier { effect } => (5, effect),
             Self::Dropped { effect } => (6, effect),
             Self::Resampling => (7, 0),
+            Self::Case => (8, 0),
         };
         kind << 8 | u64::from(component)
     }
@@ -108,6 +111,7 @@ mod tests {
                         Channel::Outlier { effect: 0 },
                         Channel::Dropped { effect: 0 },
                         Channel::Resampling,
+                        Channel::Case,
                     ] {
                         for joint in 0..7 {
                             first_words.insert(streams.stream(channel, joint).next_u64());
@@ -116,7 +120,7 @@ mod tests {
                 }
             }
         }
-        assert_eq!(first_words.len(), 3 * 3 * 3 * 8 * 7);
+        assert_eq!(first_words.len(), 3 * 3 * 3 * 9 * 7);
     }
 
     /// The scheme is part of every published result: a change must be seen.

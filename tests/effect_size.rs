@@ -52,3 +52,34 @@ fn the_size_of_an_effect_is_quadratic() {
     println!("{one:?} {two:?}");
     assert!((two.lambda / one.lambda - 4.0).abs() < 0.2, "{one:?} {two:?}");
 }
+
+/// What is copied instead of integrated is what the integration gives: the log of three periods, and its
+/// sizes, for effects with a memory (bristles, a spring and an inertia, a channel that is read late).
+#[test]
+fn a_log_that_repeats_need_not_be_integrated() {
+    let effects = "[[effect]]\nkind='presliding'\njoint=4\nstiffness_per_rad=300\n\
+                   [[effect]]\nkind='elasticity'\njoint=2\nstiffness_nm_rad=8000\n\
+                   [[effect]]\nkind='time_skew'\njoint=3\ndelay_s=-0.004";
+    let text = format!(
+        "name = 'size'\nrobot = 'ur5'\nseed = 1\ntrials = 1\n\
+         [motion]\ntrajectory = 'ur5_identification'\nperiods = 2\n\
+         [sensors]\ntorque_sd_nm = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15]\n{effects}"
+    );
+    let scenario = || Scenario::from_toml(&text, "test", Path::new("")).unwrap();
+    let whole = Simulation::run(scenario()).unwrap();
+    let (copied, size) = Simulation::run_sized(scenario()).unwrap();
+    assert_eq!(whole.recording.time_s.len(), copied.recording.time_s.len());
+    let sd = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15];
+    // The last half second of the whole run lacks what a late channel would still read.
+    let settled = whole.recording.time_s.len() - 63;
+    for (j, sd) in sd.iter().enumerate() {
+        let pairs =
+            whole.recording.torque_nm.joint(j).iter().zip(copied.recording.torque_nm.joint(j));
+        let worst = pairs.take(settled).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        println!("joint {}: {:.2e} sd", j + 1, worst / sd);
+        // Ten thousand samples off by a hundredth of the noise are a λ of 1.
+        assert!(worst < 0.01 * sd, "joint {}: {worst} Nm", j + 1);
+    }
+    let lambda = whole.effect_size().unwrap().lambda;
+    assert!((size.lambda / lambda - 1.0).abs() < 0.01, "{} {lambda}", size.lambda);
+}

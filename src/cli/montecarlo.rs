@@ -8,12 +8,15 @@ use std::time::Instant;
 use clap::{Args, Parser, Subcommand};
 
 use super::{CommandResult, Outcome, Progress, interrupt_flag};
+use crate::montecarlo::blind::{Benchmark, BlindContent, SCORES_SCHEMA, Scores};
 use crate::montecarlo::calibration::Verdict;
 use crate::montecarlo::shard::{
-    Merged, Shard, load_folders, merge, same_run, shard_path, shard_range,
+    Merged, Shard, load_all, merge, same_run, schema_of, shard_files, shard_path, shard_range,
 };
-use crate::montecarlo::{Experiment, SUMMARY_SCHEMA, Scenario, Summary};
+use crate::montecarlo::trials::{Content, Trials};
+use crate::montecarlo::{Estimation, Experiment, Job, SUMMARY_SCHEMA, Summary};
 use crate::output::{check_writable, write_atomically};
+use crate::report::blind;
 use crate::report::json::{Document, Input, Program};
 use crate::report::montecarlo::{check_table, efficiency_sentence, page, parameter_table};
 
@@ -78,6 +81,9 @@ struct OutputArgs {
     /// Write the report as one HTML page.
     #[arg(long)]
     report: Option<PathBuf>,
+    /// Write the report of a blind benchmark as Markdown.
+    #[arg(long)]
+    markdown: Option<PathBuf>,
 }
 
 /// `I/N` with I < N.
@@ -113,60 +119,82 @@ pub fn run(command: Command) -> CommandResult {
 
 fn run_merge(folders: &[PathBuf], output: &OutputArgs) -> CommandResult {
     output.check()?;
-    let shards = load_folders(folders)?;
-    let mut inputs = Vec::new();
-    for (file, _) in &shards {
-        inputs.push(Input::of(file)?);
+    let files = shard_files(folders)?;
+    let inputs = files.iter().map(|file| Input::of(file)).collect::<Result<Vec<_>, _>>()?;
+    let schema = files.first().map(|file| schema_of(file)).transpose()?;
+    if schema.as_deref() == Some(BlindContent::SCHEMA) {
+        let merged = merge(load_all::<BlindContent>(&files)?)?;
+        return conclude_blind(&merged, inputs, output);
     }
-    let merged = merge(shards)?;
-    let wall_s = merged.seconds;
+    let merged = merge(load_all::<Estimation>(&files)?)?;
     // Shards hold sums only; what bounds σ is known where the scenario is.
-    conclude(&merged, wall_s, None, inputs, output)
+    conclude(&merged, merged.seconds, None, inputs, output)
 }
 
 fn run_trials(args: &RunArgs) -> CommandResult {
     args.output.check()?;
-    let mut scenario = Scenario::load(args.scenario.as_deref())?;
-    scenario.seed = args.seed.unwrap_or(scenario.seed);
-    let trials = args.trials.unwrap_or(scenario.trials);
-    let range = args.shard.map_or(0..trials, |s| shard_range(trials, s.index, s.count));
-    if let Some(folder) = &args.out {
-        std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-        check_writable(&shard_path(folder, &range))?;
+    let mut inputs = Vec::new();
+    if let Some(file) = &args.scenario {
+        inputs.push(Input::of(file)?);
     }
+    let mut job = Job::load(args.scenario.as_deref())?;
+    let scenario = job.scenario_mut();
+    scenario.seed = args.seed.unwrap_or(scenario.seed);
     eprintln!("{}: {}", scenario.name, scenario.description);
     eprintln!(
         "simulating {:.0} s of {} in rapier …",
         crate::excitation::Reference::duration_s(&scenario.excitation),
         scenario.arm.name
     );
-    let experiment = Experiment::prepare(scenario)?;
-    if let Some(trial) = args.trial {
-        return replay(&experiment, trial);
+    match job {
+        Job::Estimates(scenario) => {
+            let experiment = Experiment::prepare(*scenario)?;
+            if let Some(trial) = args.trial {
+                return replay(&experiment, trial);
+            }
+            let (merged, wall_s) = run_all(&experiment, args)?;
+            let least_sigma = experiment.least_sigma()?;
+            conclude(&merged, wall_s, least_sigma.as_deref(), inputs, &args.output)
+        }
+        Job::Blind(plan) => {
+            let benchmark = Benchmark::prepare(*plan)?;
+            if let Some(trial) = args.trial {
+                return replay_blind(&benchmark, trial);
+            }
+            let (merged, _) = run_all(&benchmark, args)?;
+            conclude_blind(&merged, inputs, &args.output)
+        }
     }
-    let (shard, wall_s) = run_shard(&experiment, args, trials, range)?;
-    let complete = shard.is_complete();
-    if !complete {
-        eprintln!("interrupted after {} trials", shard.tally.trials());
+}
+
+/// Something with the wall time that it took, s.
+type Timed<T> = Result<(T, f64), Box<dyn std::error::Error>>;
+
+/// Runs what the arguments ask for: all trials, or those of one shard.
+fn run_all<T: Trials>(experiment: &T, args: &RunArgs) -> Timed<Merged<T::Content>> {
+    let trials = args.trials.unwrap_or(experiment.scenario().trials);
+    let range = args.shard.map_or(0..trials, |s| shard_range(trials, s.index, s.count));
+    if let Some(folder) = &args.out {
+        std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+        check_writable(&shard_path(folder, &range))?;
     }
-    let mut inputs = Vec::new();
-    if let Some(file) = &args.scenario {
-        inputs.push(Input::of(file)?);
+    let (shard, wall_s) = run_shard(experiment, args, trials, range)?;
+    if !shard.is_complete() {
+        eprintln!("interrupted after {} trials", shard.next - shard.range[0]);
     }
     let range = shard.range;
     let mut merged = merge(vec![(PathBuf::new(), shard)])?;
     // One shard of many is judged by its own trials; what others run is not missing.
     merged.missing.retain(|gap| gap.start >= range[0] && gap.end <= range[1]);
-    let least_sigma = experiment.least_sigma()?;
-    conclude(&merged, wall_s, least_sigma.as_deref(), inputs, &args.output)
+    Ok((merged, wall_s))
 }
 
-fn run_shard(
-    experiment: &Experiment,
+fn run_shard<T: Trials>(
+    experiment: &T,
     args: &RunArgs,
     trials: u64,
     range: Range<u64>,
-) -> Result<(Shard, f64), Box<dyn std::error::Error>> {
+) -> Timed<Shard<T::Content>> {
     let threads = match args.threads {
         Some(threads) => usize::from(threads),
         None => std::thread::available_parallelism().map_or(1, usize::from),
@@ -181,7 +209,7 @@ fn run_shard(
         let saved = Shard::load(file)?;
         same_run(file, &saved.header, &shard.header)?;
         shard = saved;
-        eprintln!("going on after {} trials", shard.tally.trials());
+        eprintln!("going on after {} trials", shard.next - shard.range[0]);
     }
     let progress = Progress::new("trials", shard.range[1] - shard.range[0]);
     let begun = Instant::now();
@@ -208,7 +236,7 @@ fn replay(experiment: &Experiment, trial: u64) -> CommandResult {
 
 /// Prints, writes and judges.
 fn conclude(
-    merged: &Merged,
+    merged: &Merged<Estimation>,
     wall_s: f64,
     least_sigma: Option<&[f64]>,
     inputs: Vec<Input>,
@@ -243,12 +271,49 @@ fn conclude(
     Ok(if summary.verdict == Verdict::Fail { Outcome::Negative } else { Outcome::Done })
 }
 
+/// One hidden case alone: the case, the truth and the answer.
+fn replay_blind(benchmark: &Benchmark, trial: u64) -> CommandResult {
+    let begun = Instant::now();
+    let record = benchmark.worker().trial(trial)?;
+    for line in blind::replay_lines(&record) {
+        println!("{line}");
+    }
+    println!("{:.1} s", begun.elapsed().as_secs_f64());
+    Ok(Outcome::Done)
+}
+
+/// Prints, writes and judges a blind benchmark.
+fn conclude_blind(
+    merged: &Merged<BlindContent>,
+    inputs: Vec<Input>,
+    output: &OutputArgs,
+) -> CommandResult {
+    let scores = Scores::of(merged);
+    let program = Program::new(std::env::args(), Some(merged.header.seed), inputs);
+    println!("{}", blind::markdown(&scores, &program.command));
+    if let Some(path) = &output.json {
+        let document = Document { schema: SCORES_SCHEMA, program: &program, body: &scores };
+        write_text(path, &document.to_json()?)?;
+    }
+    if let Some(path) = &output.markdown {
+        write_text(path, &blind::markdown(&scores, &program.command))?;
+    }
+    if let Some(path) = &output.report {
+        write_text(path, &blind::page(&scores, program)?.to_html()?)?;
+        println!("report: {}", path.display());
+    }
+    Ok(if scores.verdict == Verdict::Fail { Outcome::Negative } else { Outcome::Done })
+}
+
 fn write_text(path: &Path, text: &str) -> Result<(), crate::output::OutputError> {
     write_atomically(path, |out| out.write_all(text.as_bytes()))
 }
 
 impl OutputArgs {
     fn check(&self) -> Result<(), crate::output::OutputError> {
-        [&self.json, &self.report].into_iter().flatten().try_for_each(|path| check_writable(path))
+        [&self.json, &self.report, &self.markdown]
+            .into_iter()
+            .flatten()
+            .try_for_each(|path| check_writable(path))
     }
 }

@@ -108,6 +108,11 @@ impl Excitation {
         Ok(Self { run_out_s, ..self })
     }
 
+    /// The same with `periods` periods, at least one.
+    pub fn with_periods(self, periods: usize) -> Self {
+        Self { periods: periods.max(1), ..self }
+    }
+
     /// The periodic motion.
     pub fn series(&self) -> &FourierSeries {
         &self.series

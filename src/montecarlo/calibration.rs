@@ -267,7 +267,7 @@ mod tests {
             tally.add(&[Outcome { z, sigma: 1.0, quantile_95: 1.96 }]);
         }
         for trial in 2000..4000 {
-            tally.add_failure(crate::montecarlo::tally::Failure { trial, reason: "x".into() });
+            tally.add_failure(crate::montecarlo::trials::Failure { trial, reason: "x".into() });
         }
         assert_eq!(Calibration::of(&tally).verdict, Verdict::Fail);
     }

@@ -1,12 +1,12 @@
 //! One scenario made ready, and its trials.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
-
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::scenario::Scenario;
 use super::simulation::Simulation;
-use super::tally::Outcome;
+use super::tally::{Outcome, Tally};
+use super::trials::{Content, Difference, Trials};
 use crate::dynamics::Model;
 use crate::identify::covariance::CovarianceKind;
 use crate::identify::{Estimator, Identification, Identifier, IdentifyError, Measurement, Options};
@@ -49,12 +49,6 @@ pub enum TrialError {
         z: f64,
         /// σ̂/scale.
         sigma: f64,
-    },
-    /// The code of the trial panicked.
-    #[error("panicked: {message}")]
-    Panicked {
-        /// The panic's message.
-        message: String,
     },
 }
 
@@ -141,22 +135,100 @@ impl Worker<'_> {
         })?)
     }
 
-    /// Runs trial `trial` and compares with the truth. A panic inside is a failed trial.
+    /// Runs trial `trial` and compares with the truth.
     pub fn trial(&mut self, trial: u64) -> Result<Vec<Outcome>, TrialError> {
-        // After a panic the scratch memory may be half written; every use overwrites it.
-        catch_unwind(AssertUnwindSafe(|| self.outcomes(trial))).unwrap_or_else(|panic| {
-            let text = panic.downcast_ref::<String>().map(String::as_str);
-            let message = text.or_else(|| panic.downcast_ref::<&str>().copied());
-            Err(TrialError::Panicked { message: message.unwrap_or("no message").to_owned() })
-        })
-    }
-
-    fn outcomes(&mut self, trial: u64) -> Result<Vec<Outcome>, TrialError> {
         let identification = self.identify(trial)?;
         self.experiment.outcomes(
             &identification.fit.theta,
             &identification.sigma(),
             identification.covariance.quantile_95(),
         )
+    }
+}
+
+/// What the trials of a Monte Carlo over estimates have in common.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Estimation {
+    /// Estimator and covariance, as they appear in the results.
+    pub estimator: String,
+    /// See `estimator`.
+    pub covariance: String,
+    /// The parameters with their truth and scale.
+    pub parameters: Vec<ParameterHeader>,
+}
+
+/// One parameter of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ParameterHeader {
+    /// Name of the kept column.
+    pub name: String,
+    /// The whole combination.
+    pub formula: String,
+    /// SI unit.
+    pub unit: String,
+    /// True value.
+    pub truth: f64,
+    /// Unit of the tally's sums.
+    pub scale: f64,
+}
+
+impl Content for Estimation {
+    type Gathered = Tally;
+    const SCHEMA: &'static str = "armid.shard/2";
+
+    fn nothing(&self) -> Tally {
+        Tally::new(self.parameters.len())
+    }
+
+    fn difference(&self, expected: &Self) -> Option<Difference> {
+        let methods = |e: &Self| format!("{} with {}", e.estimator, e.covariance);
+        if methods(self) != methods(expected) {
+            let (found, expected) = (methods(self), methods(expected));
+            return Some(Difference { what: "estimator", found, expected });
+        }
+        (self.parameters != expected.parameters).then(|| Difference {
+            what: "parameters",
+            found: format!("{} of them or their truth", self.parameters.len()),
+            expected: format!("{} others", expected.parameters.len()),
+        })
+    }
+}
+
+impl Trials for Experiment {
+    type Content = Estimation;
+    type Worker<'a> = Worker<'a>;
+    type Error = TrialError;
+    const BATCH_PER_THREAD: u64 = 16;
+
+    fn scenario(&self) -> &Scenario {
+        &self.simulation.scenario
+    }
+
+    fn content(&self) -> Estimation {
+        let set = &self.simulation.scenario.set;
+        let parameters = (0..set.rank())
+            .map(|k| ParameterHeader {
+                name: set.name(k).to_owned(),
+                formula: set.formula(k),
+                unit: set.unit(k).to_owned(),
+                truth: self.truth[k],
+                scale: self.scale[k],
+            })
+            .collect();
+        Estimation {
+            estimator: self.estimator.to_string(),
+            covariance: self.covariance.to_string(),
+            parameters,
+        }
+    }
+
+    fn worker(&self) -> Worker<'_> {
+        Self::worker(self)
+    }
+
+    fn trial(worker: &mut Worker<'_>, trial: u64) -> Result<Vec<Outcome>, TrialError> {
+        worker.trial(trial)
     }
 }

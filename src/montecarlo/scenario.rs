@@ -6,6 +6,7 @@ use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use thiserror::Error;
 
+use super::blind::BlindEntry;
 use crate::base::{BaseSet, Parameterisation, ParameterisationError};
 use crate::excitation::{Excitation, ExcitationError, FourierSeries, Requirements};
 use crate::identify::Options;
@@ -29,6 +30,8 @@ pub struct Scenario {
     pub arm: Arm,
     /// Base parameters that are identified.
     pub set: BaseSet,
+    /// Name or file of the motion's trajectory.
+    pub trajectory: String,
     /// The motion.
     pub excitation: Excitation,
     /// How the plant runs.
@@ -49,7 +52,7 @@ pub struct Scenario {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct ScenarioFile {
+pub(super) struct ScenarioFile {
     name: String,
     #[serde(default)]
     description: String,
@@ -69,13 +72,15 @@ struct ScenarioFile {
     effects: Vec<Effect>,
     #[serde(default)]
     processing: Options,
+    /// Makes it a blind benchmark.
+    pub(super) blind: Option<BlindEntry>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct MotionEntry {
+pub(super) struct MotionEntry {
     /// Built-in name or JSON file.
-    trajectory: String,
+    pub(super) trajectory: String,
     periods: usize,
     /// Length of the run-in from rest, s; chosen inside the limits where left out.
     run_in_s: Option<f64>,
@@ -99,6 +104,12 @@ pub enum ScenarioError {
         file: String,
         /// The parser's message with line and key.
         message: String,
+    },
+    /// A blind benchmark where one arm is asked for.
+    #[error("{file}: is a blind benchmark ([blind]), which only `montecarlo` can run")]
+    Blind {
+        /// The file.
+        file: String,
     },
     /// A number that makes no experiment.
     #[error("{file}: {key} = {value} {requirement}")]
@@ -132,51 +143,39 @@ pub enum ScenarioError {
 impl Scenario {
     /// The scenario in `path`, or the default one.
     pub fn load(path: Option<&Path>) -> Result<Self, ScenarioError> {
-        let Some(path) = path else {
-            return Self::from_toml(DEFAULT, "sims/default.toml", Path::new(""));
-        };
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| ScenarioError::Read { file: path.to_owned(), source })?;
-        let folder = path.parent().unwrap_or(Path::new(""));
-        Self::from_toml(&text, &path.display().to_string(), folder)
+        let source = Source::load(path)?;
+        Self::from_toml(&source.text, &source.name, &source.folder)
     }
 
     /// From TOML text; `source` names it in messages, files in it are relative to `folder`.
     pub fn from_toml(text: &str, source: &str, folder: &Path) -> Result<Self, ScenarioError> {
-        let file: ScenarioFile = toml::from_str(text)
-            .map_err(|e| ScenarioError::Toml { file: source.to_owned(), message: e.to_string() })?;
-        let check = |ok: bool, key, value, requirement| match ok {
-            true => Ok(()),
-            false => Err(ScenarioError::Setting { file: source.into(), key, value, requirement }),
-        };
-        check(file.trials > 0, "trials", 0.0, "must be at least 1")?;
-        check(file.motion.periods > 0, "motion.periods", 0.0, "must be at least 1")?;
-        let beside = |name: &str| match Path::new(name).extension() {
-            Some(_) => folder.join(name).display().to_string(),
-            None => name.to_owned(),
-        };
-        let arm = Arm::load(&beside(&file.robot))?;
+        let source = Source::new(text, source, folder);
+        let file = source.parse()?;
+        if file.blind.is_some() {
+            return Err(ScenarioError::Blind { file: source.name });
+        }
+        Self::from_file(file, &source)
+    }
+
+    /// From a parsed file.
+    pub(super) fn from_file(file: ScenarioFile, source: &Source) -> Result<Self, ScenarioError> {
+        source.check(file.trials > 0, "trials", 0.0, "must be at least 1")?;
+        let arm = Arm::load(&source.beside(&file.robot))?;
         let parameterisation = match &file.reduced {
             Some(name) => Parameterisation::reduced(name, &arm)?,
             None => Parameterisation::full(arm.dof(), arm.torque_offsets),
         };
-        let series = FourierSeries::load(&beside(&file.motion.trajectory))?;
-        let excitation = match file.motion.run_in_s {
-            Some(run_in_s) => Excitation::new(series, run_in_s, file.motion.periods)?,
-            None => {
-                let requirements = Requirements::default();
-                Excitation::fitted(&arm, &requirements, series, file.motion.periods, false)?
-            }
-        };
+        let excitation = file.motion.excitation(&arm, source)?;
         FaultyPlant::new(&arm, &file.effects, &file.plant)?;
         Sensors::new(&file.sensors, &arm, file.plant.log_rate_hz)?;
         Ok(Self {
             set: BaseSet::find(&arm, parameterisation)?,
             name: file.name,
             description: file.description,
-            sha256: Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect(),
+            sha256: Sha256::digest(&source.text).iter().map(|byte| format!("{byte:02x}")).collect(),
             arm,
             excitation,
+            trajectory: file.motion.trajectory,
             plant: file.plant,
             sensors: file.sensors,
             effects: file.effects,
@@ -185,5 +184,79 @@ impl Scenario {
             seed: file.seed,
             trials: file.trials,
         })
+    }
+}
+
+impl MotionEntry {
+    /// The motion of `arm`.
+    pub(super) fn excitation(
+        &self,
+        arm: &Arm,
+        source: &Source,
+    ) -> Result<Excitation, ScenarioError> {
+        source.check(self.periods > 0, "motion.periods", 0.0, "must be at least 1")?;
+        let series = FourierSeries::load(&source.beside(&self.trajectory))?;
+        Ok(match self.run_in_s {
+            Some(run_in_s) => Excitation::new(series, run_in_s, self.periods)?,
+            None => {
+                let requirements = Requirements::default();
+                Excitation::fitted(arm, &requirements, series, self.periods, false)?
+            }
+        })
+    }
+}
+
+/// Where a scenario's text comes from.
+pub(super) struct Source {
+    pub(super) text: String,
+    /// For messages.
+    pub(super) name: String,
+    /// Files that the text names are relative to it.
+    folder: PathBuf,
+}
+
+impl Source {
+    pub(super) fn new(text: &str, name: &str, folder: &Path) -> Self {
+        Self { text: text.to_owned(), name: name.to_owned(), folder: folder.to_owned() }
+    }
+
+    /// The file `path`, or the default scenario.
+    pub(super) fn load(path: Option<&Path>) -> Result<Self, ScenarioError> {
+        let Some(path) = path else {
+            let name = "sims/default.toml".to_owned();
+            return Ok(Self { text: DEFAULT.to_owned(), name, folder: PathBuf::new() });
+        };
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| ScenarioError::Read { file: path.to_owned(), source })?;
+        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        Ok(Self { text, name: path.display().to_string(), folder })
+    }
+
+    pub(super) fn parse(&self) -> Result<ScenarioFile, ScenarioError> {
+        toml::from_str(&self.text)
+            .map_err(|e| ScenarioError::Toml { file: self.name.clone(), message: e.to_string() })
+    }
+
+    /// A file beside it, or the name of something built in.
+    fn beside(&self, name: &str) -> String {
+        match Path::new(name).extension() {
+            Some(_) => self.folder.join(name).display().to_string(),
+            None => name.to_owned(),
+        }
+    }
+
+    pub(super) fn check(
+        &self,
+        ok: bool,
+        key: &'static str,
+        value: f64,
+        requirement: &'static str,
+    ) -> Result<(), ScenarioError> {
+        let file = || self.name.clone();
+        if ok {
+            Ok(())
+        } else {
+            Err(ScenarioError::Setting { file: file(), key, value, requirement })
+        }
     }
 }

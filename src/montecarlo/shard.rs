@@ -9,18 +9,14 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::experiment::Experiment;
-use super::tally::{Failure, Tally};
+use super::trials::{Content, Difference, Gathered, Trials, run_one};
 use crate::output::{OutputError, write_atomically};
-
-/// Format of shard files.
-pub const SHARD_SCHEMA: &str = "armid.shard/1";
 
 /// What must be equal for two shards to belong together.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Header {
-    /// Always [`SHARD_SCHEMA`].
+#[serde(deny_unknown_fields, bound = "")]
+pub struct Header<C: Content> {
+    /// Always [`Content::SCHEMA`].
     pub schema: String,
     /// Version of the program.
     pub version: String,
@@ -32,44 +28,24 @@ pub struct Header {
     pub seed: u64,
     /// Trials of the whole run.
     pub trials: u64,
-    /// Estimator and covariance, as they appear in the results.
-    pub estimator: String,
-    /// See `estimator`.
-    pub covariance: String,
-    /// The parameters with their truth and scale.
-    pub parameters: Vec<ParameterHeader>,
-}
-
-/// One parameter of a run.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ParameterHeader {
-    /// Name of the kept column.
-    pub name: String,
-    /// The whole combination.
-    pub formula: String,
-    /// SI unit.
-    pub unit: String,
-    /// True value.
-    pub truth: f64,
-    /// Unit of the tally's sums.
-    pub scale: f64,
+    /// What the kind of experiment adds.
+    pub content: C,
 }
 
 /// A shard's file: its header, its range of trials, how far it has come, and the sums so far.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Shard {
+#[serde(deny_unknown_fields, bound = "")]
+pub struct Shard<C: Content> {
     /// What it is part of.
-    pub header: Header,
+    pub header: Header<C>,
     /// First trial and the one behind the last.
     pub range: [u64; 2],
     /// First trial that has not been run.
     pub next: u64,
     /// Time spent on trials, s, summed over resumptions.
     pub seconds: f64,
-    /// Sums over the trials from `range[0]` to `next`.
-    pub tally: Tally,
+    /// What the trials from `range[0]` to `next` add up to.
+    pub tally: C::Gathered,
 }
 
 /// Shards that cannot be saved, read, resumed or merged.
@@ -143,38 +119,25 @@ pub fn shard_path(folder: &Path, range: &Range<u64>) -> PathBuf {
     folder.join(format!("shard-{:012}-{:012}.json", range.start, range.end))
 }
 
-/// Trials between two looks at the clock, per thread.
-const BATCH_PER_THREAD: u64 = 16;
 /// Longest time whose work a kill can lose.
 const SAVE_EVERY: Duration = Duration::from_secs(5);
 
-impl Shard {
+impl<C: Content> Shard<C> {
     /// No trials run yet.
-    pub fn new(experiment: &Experiment, trials: u64, range: Range<u64>) -> Self {
-        let scenario = &experiment.simulation.scenario;
-        let set = &scenario.set;
-        let parameters = (0..set.rank())
-            .map(|k| ParameterHeader {
-                name: set.name(k).to_owned(),
-                formula: set.formula(k),
-                unit: set.unit(k).to_owned(),
-                truth: experiment.truth[k],
-                scale: experiment.scale[k],
-            })
-            .collect();
+    pub fn new<T: Trials<Content = C>>(experiment: &T, trials: u64, range: Range<u64>) -> Self {
+        let scenario = experiment.scenario();
+        let content = experiment.content();
         Self {
+            tally: content.nothing(),
             header: Header {
-                schema: SHARD_SCHEMA.to_owned(),
+                schema: C::SCHEMA.to_owned(),
                 version: env!("CARGO_PKG_VERSION").to_owned(),
                 scenario: scenario.name.clone(),
                 scenario_sha256: scenario.sha256.clone(),
                 seed: scenario.seed,
                 trials,
-                estimator: experiment.estimator.to_string(),
-                covariance: experiment.covariance.to_string(),
-                parameters,
+                content,
             },
-            tally: Tally::new(set.rank()),
             next: range.start,
             range: [range.start, range.end],
             seconds: 0.0,
@@ -187,8 +150,9 @@ impl Shard {
             .map_err(|source| ShardError::Read { file: file.to_owned(), source })?;
         let format = |message: String| ShardError::Format { file: file.to_owned(), message };
         let shard: Self = serde_json::from_str(&text).map_err(|e| format(e.to_string()))?;
-        if shard.header.schema != SHARD_SCHEMA {
-            return Err(format(format!("schema {}, expected {SHARD_SCHEMA}", shard.header.schema)));
+        if shard.header.schema != C::SCHEMA {
+            let (found, expected) = (&shard.header.schema, C::SCHEMA);
+            return Err(format(format!("schema {found}, expected {expected}")));
         }
         let [start, end] = shard.range;
         let run = shard.next.checked_sub(start);
@@ -213,9 +177,9 @@ impl Shard {
     ///
     /// `progress` is told the number of trials run in this shard; `file` is written every few
     /// seconds and at the end, so that a killed run loses little and repeats nothing.
-    pub fn run(
+    pub fn run<T: Trials<Content = C>>(
         &mut self,
-        experiment: &Experiment,
+        experiment: &T,
         threads: usize,
         file: Option<&Path>,
         stop: &AtomicBool,
@@ -229,23 +193,17 @@ impl Shard {
         let mut saved = Instant::now();
         while !self.is_complete() && !stop.load(Ordering::Relaxed) {
             let begun = Instant::now();
-            let end = (self.next + BATCH_PER_THREAD * threads as u64).min(self.range[1]);
+            let end = (self.next + T::BATCH_PER_THREAD * threads as u64).min(self.range[1]);
             let trials = self.next..end;
             // Thread t runs every threads-th trial of the batch; sums do not depend on the order.
-            let parts: Vec<Tally> = pool.install(|| {
+            let parts: Vec<C::Gathered> = pool.install(|| {
                 workers
                     .par_iter_mut()
                     .enumerate()
                     .map(|(t, worker)| {
-                        let mut tally = Tally::new(experiment.truth.len());
+                        let mut tally = experiment.content().nothing();
                         for trial in trials.clone().skip(t).step_by(threads) {
-                            match worker.trial(trial) {
-                                Ok(outcomes) => tally.add(&outcomes),
-                                Err(error) => {
-                                    let reason = error.to_string();
-                                    tally.add_failure(Failure { trial, reason });
-                                }
-                            }
+                            run_one::<T>(worker, trial, &mut tally);
                         }
                         tally
                     })
@@ -266,11 +224,11 @@ impl Shard {
 
 /// Shards put together.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Merged {
+pub struct Merged<C: Content> {
     /// Common header.
-    pub header: Header,
+    pub header: Header<C>,
     /// All trials.
-    pub tally: Tally,
+    pub tally: C::Gathered,
     /// Sum of the time spent on trials, s.
     pub seconds: f64,
     /// Trials that no shard has run.
@@ -278,14 +236,14 @@ pub struct Merged {
 }
 
 /// Merges shards (with the files they come from); any order gives the same bits.
-pub fn merge(mut shards: Vec<(PathBuf, Shard)>) -> Result<Merged, ShardError> {
+pub fn merge<C: Content>(mut shards: Vec<(PathBuf, Shard<C>)>) -> Result<Merged<C>, ShardError> {
     shards.sort_by_key(|(_, shard)| shard.range);
     let Some((_, first)) = shards.first() else {
         return Err(ShardError::Empty { folder: PathBuf::new() });
     };
     let header = first.header.clone();
     let mut merged = Merged {
-        tally: Tally::new(header.parameters.len()),
+        tally: header.content.nothing(),
         header: header.clone(),
         seconds: 0.0,
         missing: Vec::new(),
@@ -314,9 +272,9 @@ pub fn merge(mut shards: Vec<(PathBuf, Shard)>) -> Result<Merged, ShardError> {
     Ok(merged)
 }
 
-/// All shard files below the given folders.
-pub fn load_folders(folders: &[PathBuf]) -> Result<Vec<(PathBuf, Shard)>, ShardError> {
-    let mut shards = Vec::new();
+/// The names of all shard files in the given folders.
+pub fn shard_files(folders: &[PathBuf]) -> Result<Vec<PathBuf>, ShardError> {
+    let mut all = Vec::new();
     for folder in folders {
         let read = |source| ShardError::Read { file: folder.clone(), source };
         let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
@@ -331,39 +289,54 @@ pub fn load_folders(folders: &[PathBuf]) -> Result<Vec<(PathBuf, Shard)>, ShardE
         if files.is_empty() {
             return Err(ShardError::Empty { folder: folder.clone() });
         }
-        for file in files {
-            let shard = Shard::load(&file)?;
-            shards.push((file, shard));
-        }
+        all.append(&mut files);
     }
-    Ok(shards)
+    Ok(all)
+}
+
+/// The shards in `files`, each with its file.
+pub fn load_all<C: Content>(files: &[PathBuf]) -> Result<Vec<(PathBuf, Shard<C>)>, ShardError> {
+    files.iter().map(|file| Ok((file.clone(), Shard::load(file)?))).collect()
+}
+
+/// Format of the shard in `file`: which kind of experiment it is part of.
+pub fn schema_of(file: &Path) -> Result<String, ShardError> {
+    #[derive(Deserialize)]
+    struct AnyShard {
+        header: AnyHeader,
+    }
+    #[derive(Deserialize)]
+    struct AnyHeader {
+        schema: String,
+    }
+    let text = std::fs::read_to_string(file)
+        .map_err(|source| ShardError::Read { file: file.to_owned(), source })?;
+    let shard: AnyShard = serde_json::from_str(&text)
+        .map_err(|e| ShardError::Format { file: file.to_owned(), message: e.to_string() })?;
+    Ok(shard.header.schema)
 }
 
 /// Refuses a header that differs, naming the first part that does.
-pub fn same_run(file: &Path, found: &Header, expected: &Header) -> Result<(), ShardError> {
-    let parts: [(&'static str, String, String); 7] = [
+pub fn same_run<C: Content>(
+    file: &Path,
+    found: &Header<C>,
+    expected: &Header<C>,
+) -> Result<(), ShardError> {
+    let parts: [(&'static str, String, String); 5] = [
         ("program version", found.version.clone(), expected.version.clone()),
         ("scenario", found.scenario.clone(), expected.scenario.clone()),
         ("scenario text", found.scenario_sha256.clone(), expected.scenario_sha256.clone()),
         ("seed", found.seed.to_string(), expected.seed.to_string()),
         ("number of trials", found.trials.to_string(), expected.trials.to_string()),
-        (
-            "estimator",
-            format!("{} with {}", found.estimator, found.covariance),
-            format!("{} with {}", expected.estimator, expected.covariance),
-        ),
-        (
-            "parameters",
-            format!("{} of them or their truth", found.parameters.len()),
-            format!("{} others", expected.parameters.len()),
-        ),
     ];
-    let parameters_differ = found.parameters != expected.parameters;
-    for (what, found, expected) in parts {
-        let differs = if what == "parameters" { parameters_differ } else { found != expected };
-        if differs {
-            return Err(ShardError::Mismatch { file: file.to_owned(), what, found, expected });
+    let outer = parts
+        .into_iter()
+        .find(|(_, found, expected)| found != expected)
+        .map(|(what, found, expected)| Difference { what, found, expected });
+    match outer.or_else(|| found.content.difference(&expected.content)) {
+        Some(Difference { what, found, expected }) => {
+            Err(ShardError::Mismatch { file: file.to_owned(), what, found, expected })
         }
+        None => Ok(()),
     }
-    Ok(())
 }

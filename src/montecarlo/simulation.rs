@@ -22,6 +22,15 @@ impl Simulation {
     pub fn run(scenario: Scenario) -> Result<Self, PlantError> {
         let plant = FaultyPlant::new(&scenario.arm, &scenario.effects, &scenario.plant)?;
         let recording = plant.run(&scenario.excitation, None)?;
+        Self::with_recording(scenario, plant, recording)
+    }
+
+    /// With the run that the plant has made.
+    pub(super) fn with_recording(
+        scenario: Scenario,
+        plant: FaultyPlant,
+        recording: Recording,
+    ) -> Result<Self, PlantError> {
         let sensors = Sensors::new(&scenario.sensors, &scenario.arm, scenario.plant.log_rate_hz)?;
         Ok(Self { scenario, recording, plant, sensors })
     }

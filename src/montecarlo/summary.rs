@@ -4,8 +4,9 @@ use serde::Serialize;
 
 use super::calibration::{Calibration, Verdict};
 use super::efficiency::Efficiency;
+use super::experiment::Estimation;
 use super::shard::Merged;
-use super::tally::Failure;
+use super::trials::Failure;
 
 /// Format of the JSON output.
 pub const SUMMARY_SCHEMA: &str = "armid.montecarlo/1";
@@ -97,10 +98,11 @@ pub struct CheckSummary {
 impl Summary {
     /// Of merged shards; `wall_s` is the wall time that the trials took, `least_sigma` the Cramér–Rao
     /// bound of every parameter where it is known.
-    pub fn of(merged: &Merged, wall_s: f64, least_sigma: Option<&[f64]>) -> Self {
+    pub fn of(merged: &Merged<Estimation>, wall_s: f64, least_sigma: Option<&[f64]>) -> Self {
         let Merged { header, tally, missing, .. } = merged;
+        let content = &header.content;
         let calibration = Calibration::of(tally);
-        let parameters: Vec<ParameterSummary> = header
+        let parameters: Vec<ParameterSummary> = content
             .parameters
             .iter()
             .enumerate()
@@ -124,7 +126,7 @@ impl Summary {
             .max_by(|a, b| (a.coverage - 0.95).abs().total_cmp(&(b.coverage - 0.95).abs()));
         let checks = calibration.checks.iter().map(|check| CheckSummary {
             what: check.what,
-            parameter: check.parameter.map(|k| header.parameters[k].name.clone()),
+            parameter: check.parameter.map(|k| content.parameters[k].name.clone()),
             value: check.value,
             interval: check.interval,
             claim: check.claim,
@@ -141,8 +143,8 @@ impl Summary {
             failed: tally.failures.len() as u64,
             failures: tally.failures.clone(),
             missing: missing.iter().map(|range| [range.start, range.end]).collect(),
-            estimator: header.estimator.clone(),
-            covariance: header.covariance.clone(),
+            estimator: content.estimator.clone(),
+            covariance: content.covariance.clone(),
             coverage_mean: tally.mean_coverage().0,
             coverage_worst: worst.map_or_else(
                 || NamedValue { name: String::new(), value: f64::NAN },

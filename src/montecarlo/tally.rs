@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::trials::{Failure, Gathered};
+
 /// Fixed-point unit of the sums: 2⁻⁴⁰ of a parameter's scale, 1e-12 of a σ.
 ///
 /// Integer addition is exact and associative, so a tally does not depend on the number of threads,
@@ -49,16 +51,6 @@ impl Outcome {
     }
 }
 
-/// A trial that gave no estimate.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Failure {
-    /// Which trial (from 0).
-    pub trial: u64,
-    /// Why.
-    pub reason: String,
-}
-
 /// Exact sums over trials.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -101,6 +93,26 @@ mod decimal {
 
     pub fn deserialize<'de, D: Deserializer<'de>>(d: D) -> Result<i128, D::Error> {
         String::deserialize(d)?.parse().map_err(D::Error::custom)
+    }
+}
+
+impl Gathered for Tally {
+    type Outcome = Vec<Outcome>;
+
+    fn gather(&mut self, _trial: u64, outcomes: Vec<Outcome>) {
+        self.add(&outcomes);
+    }
+
+    fn gather_failure(&mut self, failure: Failure) {
+        self.add_failure(failure);
+    }
+
+    fn merge(&mut self, other: &Self) {
+        Self::merge(self, other);
+    }
+
+    fn trials(&self) -> u64 {
+        Self::trials(self)
     }
 }
 

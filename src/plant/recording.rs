@@ -36,6 +36,29 @@ pub struct Readings {
 }
 
 impl Recording {
+    /// The same run gone on to `samples` rows: each row beyond the first `known` is the row of one
+    /// period (`period` rows) before.
+    pub fn repeated(&self, known: usize, period: usize, samples: usize) -> Self {
+        let signals = |s: &JointSignals| repeated(s, known, period, samples);
+        let step_s = self.time_s[known - 1] / (known - 1) as f64;
+        Self {
+            time_s: (0..samples)
+                .map(|k| if k < known { self.time_s[k] } else { k as f64 * step_s })
+                .collect(),
+            q_rad: signals(&self.q_rad),
+            qd_rad_s: signals(&self.qd_rad_s),
+            torque_nm: signals(&self.torque_nm),
+            target_q_rad: signals(&self.target_q_rad),
+            target_qd_rad_s: signals(&self.target_qd_rad_s),
+            target_qdd_rad_s2: signals(&self.target_qdd_rad_s2),
+            readings: self.readings.as_ref().map(|read| Readings {
+                q_rad: signals(&read.q_rad),
+                qd_rad_s: signals(&read.qd_rad_s),
+            }),
+            saturated_decisions: self.saturated_decisions,
+        }
+    }
+
     /// Zeros for `joints` × `samples`, and room for readings if there are any.
     pub(super) fn zeros(joints: usize, samples: usize, with_readings: bool) -> Self {
         let zeros = || JointSignals::zeros(joints, samples);
@@ -51,4 +74,17 @@ impl Recording {
             saturated_decisions: 0,
         }
     }
+}
+
+/// `signals` gone on to `samples` samples: each beyond the first `known` is that of `period` before.
+pub fn repeated(
+    signals: &JointSignals,
+    known: usize,
+    period: usize,
+    samples: usize,
+) -> JointSignals {
+    signals.map_joints(|_, y| {
+        let back = |k: usize| k - (k + 1 - known).div_ceil(period) * period;
+        (0..samples).map(|k| y[if k < known { k } else { back(k) }]).collect()
+    })
 }

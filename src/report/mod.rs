@@ -4,6 +4,7 @@
 //! without network or scripts, and [`json`] documents that name program, command, seed and inputs.
 
 pub mod cutoff_study;
+pub mod blind;
 pub mod diagnose;
 mod error;
 pub mod excitation;

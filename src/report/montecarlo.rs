@@ -6,7 +6,7 @@ use super::plot::{Axis, Bars, Colour, IntervalPlot, IntervalRow, Mark, Span, XyP
 use super::{Column, Page, ReportError, Section, Status, Table, Verdict};
 use crate::montecarlo::calibration::{self, claims, wilson};
 use crate::montecarlo::tally::BIN_WIDTH;
-use crate::montecarlo::{Efficiency, Summary, shard::Merged};
+use crate::montecarlo::{Efficiency, Estimation, Summary, shard::Merged};
 
 /// Every base parameter: truth, mean, bias, σ found and claimed, coverage.
 pub fn parameter_table(summary: &Summary) -> Table {
@@ -93,7 +93,11 @@ fn status(verdict: calibration::Verdict) -> Status {
 }
 
 /// The page: verdict, coverage and ratio per parameter, distribution of the errors, tables.
-pub fn page(summary: &Summary, merged: &Merged, program: Program) -> Result<Page, ReportError> {
+pub fn page(
+    summary: &Summary,
+    merged: &Merged<Estimation>,
+    program: Program,
+) -> Result<Page, ReportError> {
     let facts = vec![
         format!(
             "{} trials, {} failed; estimator {}, covariance {}",
@@ -200,7 +204,7 @@ fn interval_row(name: &str, value: f64, [low, high]: [f64; 2]) -> IntervalRow {
     IntervalRow { name: name.to_owned(), value, low, high, expected: f64::NAN, status: None }
 }
 
-fn histogram(merged: &Merged) -> Result<String, ReportError> {
+fn histogram(merged: &Merged<Estimation>) -> Result<String, ReportError> {
     let bins = merged.tally.histogram();
     let inner = &bins[1..bins.len() - 1];
     let density: Vec<f64> = inner.iter().map(|(_, share)| share / BIN_WIDTH).collect();

@@ -12,7 +12,8 @@ use crate::montecarlo::calibration::wilson;
 use crate::montecarlo::efficiency::Efficiency;
 use crate::montecarlo::experiment::{Experiment, TrialError};
 use crate::montecarlo::scenario::Scenario;
-use crate::montecarlo::tally::{Failure, Tally};
+use crate::montecarlo::tally::Tally;
+use crate::montecarlo::trials::Failure;
 use crate::plant::Measured;
 
 /// The methods that are compared, in the order of the tables: estimator, covariance, and whether it is

@@ -155,6 +155,12 @@ impl Effect {
         self.as_fault().joint()
     }
 
+    /// Whether the noise-free log of a periodic motion repeats with it, once the start is forgotten.
+    /// (Single readings that go wrong do so later, in each trial's log.)
+    pub fn repeats(&self) -> bool {
+        !matches!(self, Self::ThermalDrift(_) | Self::Contact(_) | Self::ClockFault(_))
+    }
+
     /// Its numbers and choices, by their keys in a scenario.
     pub fn parameters(&self) -> serde_json::Map<String, serde_json::Value> {
         match serde_json::to_value(self) {

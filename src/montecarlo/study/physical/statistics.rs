@@ -7,7 +7,7 @@ use super::METHODS;
 use super::trial::{Lost, Outcome, SIGMAS};
 use super::validation::Validation;
 use crate::montecarlo::experiment::Experiment;
-use crate::montecarlo::tally::Failure;
+use crate::montecarlo::trials::Failure;
 
 /// What all trials of one scenario say.
 #[derive(Debug, Clone, Serialize)]

@@ -1,0 +1,204 @@
+//! A blind benchmark made ready, and its trials.
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::case::{Case, Drawn, Secret, draw};
+use super::family::{Family, Judged};
+use super::plan::BlindPlan;
+use super::record::{Answer, HeldOutGain, Record, Records};
+use crate::diagnose::{DiagnoseError, Diagnoser, Diagnosis, Kind, Validation, candidates};
+use crate::dynamics::Model;
+use crate::excitation::Excitation;
+use crate::identify::Measurement;
+use crate::montecarlo::trials::{Content, Difference, Trials};
+use crate::montecarlo::{Scenario, Simulation};
+use crate::plant::faults::Effect;
+use crate::plant::{Measured, PlantError, Recording, SensorConfig};
+
+/// What all trials share.
+#[derive(Clone)]
+pub struct Benchmark {
+    /// What is drawn from.
+    pub plan: BlindPlan,
+    /// The arm's equations of motion.
+    pub model: Model,
+    /// Base parameters of the nominal arm.
+    pub simulation: Vec<f64>,
+    /// Families of the dictionary.
+    pub known: Vec<Kind>,
+    /// The run of the arm without effects along each motion.
+    pub(super) clean: Vec<Recording>,
+}
+
+/// A trial without an answer.
+#[derive(Debug, Error)]
+pub enum BlindError {
+    /// The plant did not run.
+    #[error("the plant: {0}")]
+    Plant(#[from] PlantError),
+    /// The log was not diagnosed.
+    #[error(transparent)]
+    Diagnose(#[from] DiagnoseError),
+    /// No family fits what was drawn.
+    #[error("no family can be hidden here")]
+    NothingToHide,
+}
+
+/// Periods of the held-out log.
+const HELD_OUT_PERIODS: usize = 2;
+
+impl Benchmark {
+    /// Runs the clean arm along every motion.
+    pub fn prepare(plan: BlindPlan) -> Result<Self, PlantError> {
+        let model = Model::new(&plan.base.arm);
+        let clean = plan
+            .motions
+            .iter()
+            .map(|motion| {
+                let excitation = motion.excitation.clone();
+                let scenario = Scenario { excitation, ..plan.base.clone() };
+                let (simulation, _) = Simulation::run_sized(scenario)?;
+                Ok(simulation.recording)
+            })
+            .collect::<Result<_, PlantError>>()?;
+        let simulation = plan.base.set.values(&model.standard_parameters());
+        let known = candidates::all().iter().map(|f| f.kind()).collect();
+        Ok(Self { plan, model, simulation, known, clean })
+    }
+
+    /// Whether the dictionary has the family, and its effects can be seen in the residual in every
+    /// period.
+    pub(super) fn can_be_withheld(&self, family: &Family) -> bool {
+        family.judged == Judged::Residual && self.known.contains(&family.kind)
+    }
+
+    /// What one thread needs.
+    pub fn worker(&self) -> BlindWorker<'_> {
+        BlindWorker { benchmark: self, log: Measured::like(&self.clean[0]) }
+    }
+}
+
+/// One thread's memory.
+pub struct BlindWorker<'a> {
+    benchmark: &'a Benchmark,
+    log: Measured,
+}
+
+impl BlindWorker<'_> {
+    /// Hides, logs, diagnoses.
+    pub fn trial(&mut self, trial: u64) -> Result<Record, BlindError> {
+        let benchmark = self.benchmark;
+        let drawn = draw(benchmark, trial)?;
+        self.log = Measured::like(&drawn.simulation.recording);
+        drawn.simulation.log_into(trial, &mut self.log)?;
+        let held_out = self.held_out(&drawn)?;
+        let diagnosis = self.diagnose(&drawn.case, held_out.as_ref())?;
+        let sensors = &drawn.simulation.scenario.sensors;
+        let sd_nm = sensors.torque_sd_per_joint_nm(benchmark.plan.base.arm.dof())?;
+        let gain = diagnosis.held_out.first().map(|held_out| HeldOutGain::of(held_out, &sd_nm));
+        Ok(Record { trial, case: drawn.case, answer: Answer::of(&diagnosis, gain) })
+    }
+
+    /// What the diagnosis makes of the log.
+    fn diagnose(&self, case: &Case, held_out: Option<&Recording>) -> Result<Diagnosis, BlindError> {
+        let Benchmark { plan, model, simulation, .. } = self.benchmark;
+        let mut families = candidates::all();
+        if case.secret == Secret::Withheld {
+            families.retain(|f| case.hidden.iter().all(|h| h.kind != f.kind()));
+        }
+        let Scenario { arm, set, processing, .. } = &plan.base;
+        let mut diagnoser = Diagnoser::with_families(arm, model, set, processing.clone(), families);
+        let log = &self.log;
+        let measurement = Measurement {
+            source: "hidden",
+            time_s: &log.time_s,
+            q_rad: &log.q_rad,
+            qd_rad_s: &log.qd_rad_s,
+            torque_nm: &log.torque_nm,
+        };
+        let held_out: Vec<Validation> = held_out
+            .iter()
+            .map(|run| Validation {
+                measurement: Measurement {
+                    source: "held out",
+                    time_s: &run.time_s,
+                    q_rad: &run.q_rad,
+                    qd_rad_s: &run.qd_rad_s,
+                    torque_nm: &run.torque_nm,
+                },
+                manufacturer_nm: None,
+            })
+            .collect();
+        let simulation = case.against_simulation.then_some(&simulation[..]);
+        Ok(diagnoser.diagnose(&measurement, &held_out, simulation)?.diagnosis)
+    }
+
+    /// The noise-free run of the same arm along the next motion, where the case is one of those whose
+    /// gain is measured.
+    fn held_out(&self, drawn: &Drawn) -> Result<Option<Recording>, BlindError> {
+        let plan = &self.benchmark.plan;
+        let scenario = &drawn.simulation.scenario;
+        let measured = drawn.measures_gain
+            && scenario.effects.iter().all(Effect::repeats)
+            && drawn.case.hidden.iter().all(|h| h.judged == Judged::Residual);
+        if !measured {
+            return Ok(None);
+        }
+        let next = &plan.motions[(drawn.motion + 1) % plan.motions.len()];
+        let excitation: Excitation = next.excitation.clone().with_periods(HELD_OUT_PERIODS);
+        let sensors = SensorConfig::default();
+        let simulation = Simulation::run(Scenario { excitation, sensors, ..scenario.clone() })?;
+        Ok(Some(simulation.recording))
+    }
+}
+
+/// What the trials of a blind benchmark have in common.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BlindContent {
+    /// Families of the dictionary.
+    pub known: Vec<Kind>,
+    /// Base parameters of the null model.
+    pub parameters: usize,
+}
+
+impl Content for BlindContent {
+    type Gathered = Records;
+    const SCHEMA: &'static str = "armid.blind-shard/1";
+
+    fn nothing(&self) -> Records {
+        Records::default()
+    }
+
+    fn difference(&self, expected: &Self) -> Option<Difference> {
+        (self != expected).then(|| Difference {
+            what: "dictionary",
+            found: format!("{:?}", self.known),
+            expected: format!("{:?}", expected.known),
+        })
+    }
+}
+
+impl Trials for Benchmark {
+    type Content = BlindContent;
+    type Worker<'a> = BlindWorker<'a>;
+    type Error = BlindError;
+    const BATCH_PER_THREAD: u64 = 2;
+
+    fn scenario(&self) -> &Scenario {
+        &self.plan.base
+    }
+
+    fn content(&self) -> BlindContent {
+        BlindContent { known: self.known.clone(), parameters: self.simulation.len() }
+    }
+
+    fn worker(&self) -> BlindWorker<'_> {
+        Self::worker(self)
+    }
+
+    fn trial(worker: &mut BlindWorker<'_>, trial: u64) -> Result<Record, BlindError> {
+        worker.trial(trial)
+    }
+}

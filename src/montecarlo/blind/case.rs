@@ -1,0 +1,259 @@
+//! What one trial hides, drawn from its own random numbers.
+
+use rand::RngExt;
+use rand::rngs::ChaCha8Rng;
+use rand::seq::IndexedRandom;
+use serde::{Deserialize, Serialize};
+
+use super::benchmark::{Benchmark, BlindError};
+use super::family::{Family, Judged, Recipe, Surroundings, chance, log_uniform};
+use super::plan::Shares;
+use crate::diagnose::Kind;
+use crate::montecarlo::{EffectSize, Scenario, Simulation};
+use crate::plant::NoiseModel;
+use crate::plant::faults::{Effect, FaultyPlant};
+use crate::random::{Channel, TrialStreams};
+
+/// What is hidden.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Secret {
+    /// Nothing.
+    Nothing,
+    /// One effect.
+    One,
+    /// Two effects.
+    Two,
+    /// One effect whose family the diagnosis does not know.
+    Withheld,
+}
+
+impl std::fmt::Display for Secret {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(match self {
+            Self::Nothing => "clean",
+            Self::One => "one effect",
+            Self::Two => "two effects",
+            Self::Withheld => "family withheld",
+        })
+    }
+}
+
+/// One hidden effect.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Hidden {
+    /// Family.
+    pub kind: Kind,
+    /// Joint from 1; `None`: the arm as a whole.
+    pub joint: Option<usize>,
+    /// By what it can be seen.
+    pub judged: Judged,
+    /// √λ or √λ_sim of this effect alone; `None` for faults of the record.
+    pub strength: Option<f64>,
+    /// Its numbers.
+    pub effect: Effect,
+}
+
+/// The truth of one trial.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Case {
+    /// What is hidden.
+    pub secret: Secret,
+    /// Trajectory.
+    pub motion: String,
+    /// Colour of the noise.
+    pub noise: String,
+    /// Whether the diagnosis is given the nominal simulation.
+    pub against_simulation: bool,
+    /// The effects.
+    pub hidden: Vec<Hidden>,
+    /// √λ of all effects together along the log.
+    pub sqrt_lambda: f64,
+    /// √λ_sim of the same.
+    pub sqrt_lambda_sim: f64,
+    /// Of two effects: the cosine of the angle between what the null model leaves of them.
+    pub cosine: Option<f64>,
+}
+
+/// Sizes tried for an effect whose √λ is not proportional to its size.
+const PILOTS: usize = 3;
+/// A pilot this close to the √λ that is wanted is good enough.
+const CLOSE: f64 = 0.1;
+
+/// A case with the arm that makes its log.
+pub(super) struct Drawn {
+    pub case: Case,
+    pub simulation: Simulation,
+    pub motion: usize,
+    /// Whether its gain is measured along another motion.
+    pub measures_gain: bool,
+}
+
+/// Draws trial `trial` of `benchmark`.
+pub(super) fn draw(benchmark: &Benchmark, trial: u64) -> Result<Drawn, BlindError> {
+    let plan = &benchmark.plan;
+    let streams = TrialStreams::new(plan.base.seed, plan.base.name.as_bytes(), trial);
+    let mut rng = streams.stream(Channel::Case, 0);
+    let secret = secret(&mut rng, plan.shares);
+    let motion = rng.random_range(0..plan.motions.len());
+    let sensors = rng.random_range(0..plan.sensors.len());
+    let is_against = chance(&mut rng, plan.against_simulation);
+    let measures_gain = chance(&mut rng, plan.held_out) && secret == Secret::One;
+    let scenario = Scenario {
+        excitation: plan.motions[motion].excitation.clone(),
+        sensors: plan.sensors[sensors].clone(),
+        ..plan.base.clone()
+    };
+    let mut case = Case {
+        secret,
+        motion: plan.motions[motion].name.clone(),
+        noise: colour(&scenario.sensors.torque_noise).to_owned(),
+        against_simulation: is_against && secret == Secret::Nothing,
+        hidden: Vec::new(),
+        sqrt_lambda: 0.0,
+        sqrt_lambda_sim: 0.0,
+        cosine: None,
+    };
+    if secret == Secret::Nothing {
+        let plant = FaultyPlant::new(&scenario.arm, &[], &scenario.plant)?;
+        let recording = benchmark.clean[motion].clone();
+        let simulation = Simulation::with_recording(scenario, plant, recording)?;
+        return Ok(Drawn { case, simulation, motion, measures_gain });
+    }
+    let mut maker = Maker { benchmark, scenario: &scenario, motion, rng: &mut rng };
+    case.hidden = match secret {
+        Secret::Two => maker.two()?,
+        _ => vec![maker.one(secret == Secret::Withheld, plan.sqrt_lambda)?],
+    };
+    case.against_simulation = case.hidden.iter().any(|h| h.judged == Judged::Simulation);
+    let effects = case.hidden.iter().map(|h| h.effect.clone()).collect();
+    let scenario = Scenario { effects, ..scenario };
+    let (simulation, size) = Simulation::run_sized(scenario)?;
+    case.sqrt_lambda = size.lambda.sqrt();
+    case.sqrt_lambda_sim = size.lambda_sim.sqrt();
+    match &mut case.hidden[..] {
+        [only] => only.strength = strength(only.judged, size),
+        [a, b] => {
+            if let (Some(a), Some(b)) = (a.strength, b.strength) {
+                case.cosine = Some((size.lambda - a * a - b * b) / (2.0 * a * b));
+            }
+        }
+        _ => {}
+    }
+    Ok(Drawn { case, simulation, motion, measures_gain })
+}
+
+fn secret(rng: &mut ChaCha8Rng, shares: Shares) -> Secret {
+    let u: f64 = rng.random();
+    match u {
+        u if u < shares.one => Secret::One,
+        u if u < shares.one + shares.two => Secret::Two,
+        u if u < shares.one + shares.two + shares.withheld => Secret::Withheld,
+        _ => Secret::Nothing,
+    }
+}
+
+fn colour(noise: &NoiseModel) -> &'static str {
+    if *noise == NoiseModel::white() { "white" } else { "coloured" }
+}
+
+/// √ of what the effect is judged by.
+fn strength(judged: Judged, size: EffectSize) -> Option<f64> {
+    match judged {
+        Judged::Residual => Some(size.lambda.sqrt()),
+        Judged::Simulation => Some(size.lambda_sim.sqrt()),
+        Judged::Record => None,
+    }
+}
+
+/// Draws effects and finds their sizes.
+struct Maker<'a> {
+    benchmark: &'a Benchmark,
+    scenario: &'a Scenario,
+    motion: usize,
+    rng: &'a mut ChaCha8Rng,
+}
+
+impl Maker<'_> {
+    /// One effect; of a family that can be withheld, if `withheld`.
+    fn one(&mut self, withheld: bool, range: [f64; 2]) -> Result<Hidden, BlindError> {
+        let can_be = |f: &&Family| !withheld || self.benchmark.can_be_withheld(f);
+        let open: Vec<&Family> = self.benchmark.plan.families.iter().filter(can_be).collect();
+        self.hidden(&open, range)
+    }
+
+    /// Two effects of different families or at different joints, both to be seen in the residual.
+    fn two(&mut self) -> Result<Vec<Hidden>, BlindError> {
+        let range = self.benchmark.plan.sqrt_lambda_of_two;
+        let is_open = |f: &&Family| self.benchmark.can_be_withheld(f);
+        let open: Vec<&Family> = self.benchmark.plan.families.iter().filter(is_open).collect();
+        let first = self.hidden(&open, range)?;
+        loop {
+            let second = self.hidden(&open, range)?;
+            if (second.kind, second.joint) != (first.kind, first.joint) {
+                return Ok(vec![first, second]);
+            }
+        }
+    }
+
+    /// An effect of one of `families` whose strength lies in `range`, where its physics allows.
+    fn hidden(&mut self, families: &[&Family], range: [f64; 2]) -> Result<Hidden, BlindError> {
+        let family = **families.choose(self.rng).ok_or(BlindError::NothingToHide)?;
+        let joint = *family.sites.choose(self.rng).ok_or(BlindError::NothingToHide)?;
+        let around = Surroundings {
+            arm: &self.scenario.arm,
+            clean_torque_nm: &self.benchmark.clean[self.motion].torque_nm,
+            window_s: self.scenario.excitation.periodic_window_s(),
+            sensors: &self.scenario.sensors,
+        };
+        let recipe = family.recipe(joint, &around, self.rng);
+        let wanted = log_uniform(self.rng, range);
+        let (effect, strength) = self.sized(&family, &recipe, wanted)?;
+        Ok(Hidden { kind: family.kind, joint, judged: family.judged, strength, effect })
+    }
+
+    /// The recipe at the size whose strength is `wanted`, and about how strong it is.
+    fn sized(
+        &self,
+        family: &Family,
+        recipe: &Recipe,
+        wanted: f64,
+    ) -> Result<(Effect, Option<f64>), BlindError> {
+        let mut size = recipe.start;
+        for _ in 0..PILOTS {
+            let effect = recipe.effect(size);
+            let Some(found) = self.pilot(family.judged, effect)? else { break };
+            let off = wanted / found;
+            if (off - 1.0).abs() < CLOSE {
+                return Ok((recipe.effect(size), Some(found)));
+            }
+            let next = (size * off.powf(1.0 / recipe.power)).clamp(recipe.least, recipe.most);
+            if recipe.linear || next == size {
+                return Ok((recipe.effect(next), Some(found * next / size)));
+            }
+            size = next;
+        }
+        Ok((recipe.effect(size), None))
+    }
+
+    /// Strength of `effect` along the log, from one period of it where it repeats.
+    fn pilot(&self, judged: Judged, effect: Effect) -> Result<Option<f64>, BlindError> {
+        if judged == Judged::Record {
+            return Ok(None);
+        }
+        let excitation = &self.scenario.excitation;
+        let (periods, times) = match effect.repeats() {
+            true => (1, excitation.periods() as f64),
+            false => (excitation.periods(), 1.0),
+        };
+        let scenario = Scenario {
+            excitation: excitation.clone().with_periods(periods),
+            effects: vec![effect],
+            ..self.scenario.clone()
+        };
+        let (_, size) = Simulation::run_sized(scenario)?;
+        Ok(strength(judged, size).map(|s| s * times.sqrt()))
+    }
+}

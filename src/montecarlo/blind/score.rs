@@ -1,0 +1,611 @@
+//! All trials together, against the targets.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use statrs::distribution::{Beta, ContinuousCDF, Normal};
+
+use super::benchmark::BlindContent;
+use super::case::{Case, Secret};
+use super::family::Judged;
+use super::judge::{Outcome, is_at, is_right};
+use super::record::{Named, Record};
+use crate::diagnose::{Kind, candidates};
+use crate::montecarlo::calibration::Verdict;
+use crate::montecarlo::shard::Merged;
+use crate::montecarlo::trials::Failure;
+
+/// Format of the JSON output.
+pub const SCORES_SCHEMA: &str = "armid.blind/1";
+
+/// Fewer trials than this say nothing about a share.
+const FEWEST: u64 = 20;
+/// Edges of the bins of √λ.
+const STRENGTHS: [f64; 12] = [0.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 30.0, 40.0, 60.0];
+/// Edges of the bins of stated confidence.
+const CONFIDENCES: [f64; 8] = [0.0, 0.5, 0.8, 0.9, 0.95, 0.99, 0.999, 1.0];
+/// Chance that a log without faults is given a cause, as it is designed.
+pub const DESIGN_FALSE_ALARM: f64 = 0.003;
+
+/// So many of so many, and what that says about the chance behind it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Share {
+    /// Trials of the wanted kind.
+    pub count: u64,
+    /// Trials.
+    pub of: u64,
+}
+
+impl Share {
+    /// Counts those of `all` that are `wanted`.
+    fn of<T>(all: impl IntoIterator<Item = T>, mut wanted: impl FnMut(&T) -> bool) -> Self {
+        let mut share = Self::default();
+        for one in all {
+            share.of += 1;
+            share.count += u64::from(wanted(&one));
+        }
+        share
+    }
+
+    /// The share; NaN of none.
+    pub fn value(&self) -> f64 {
+        self.count as f64 / self.of as f64
+    }
+
+    /// One-sided bounds of Clopper and Pearson (1934) at confidence 1 − `alpha` each.
+    pub fn bounds(&self, alpha: f64) -> [f64; 2] {
+        let (k, n) = (self.count as f64, self.of as f64);
+        let quantile =
+            |a: f64, b: f64, p: f64| Beta::new(a, b).map(|beta| beta.inverse_cdf(p)).ok();
+        // Without successes the lower bound is 0, without failures the upper one is 1.
+        let low = if self.count == 0 { None } else { quantile(k, n - k + 1.0, alpha) };
+        let high = if self.count == self.of { None } else { quantile(k + 1.0, n - k, 1.0 - alpha) };
+        [low.unwrap_or(0.0), high.unwrap_or(1.0)]
+    }
+}
+
+/// One target.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Target {
+    /// What is counted.
+    pub what: &'static str,
+    /// The count.
+    pub share: Share,
+    /// Measured value: the share, or its bound where the target is about that.
+    pub measured: f64,
+    /// Interval that holds the chance behind the share with 95 %.
+    pub interval: [f64; 2],
+    /// Least and greatest value that meets the target.
+    pub target: [f64; 2],
+    /// Whether the measured value does.
+    pub verdict: Verdict,
+}
+
+impl Target {
+    fn new(what: &'static str, share: Share, target: [f64; 2]) -> Self {
+        let measured = share.value();
+        Self::about(what, share, measured, target)
+    }
+
+    fn about(what: &'static str, share: Share, measured: f64, target: [f64; 2]) -> Self {
+        let verdict = match measured {
+            _ if share.of < FEWEST => Verdict::NotEvaluated,
+            m if m >= target[0] && m <= target[1] => Verdict::Pass,
+            _ => Verdict::Fail,
+        };
+        let interval = share.bounds(0.025);
+        Self { what, share, measured, interval, target, verdict }
+    }
+}
+
+/// Cases of a range of √λ.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StrengthBin {
+    /// Range of √λ.
+    pub range: [f64; 2],
+    /// Mean √λ.
+    pub mean: f64,
+    /// Anything was said.
+    pub detected: Share,
+    /// Named rightly, joint included.
+    pub right: Share,
+    /// At the right joint.
+    pub right_joint: Share,
+    /// A wrong name without doubt.
+    pub wrong: Share,
+    /// Power of the best test there is, mean over the cases.
+    pub power: f64,
+}
+
+/// One family's cases.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FamilyScore {
+    /// Family.
+    pub kind: Kind,
+    /// By what it is seen.
+    pub judged: Judged,
+    /// Mean √λ (or √λ_sim); null for faults of the record.
+    pub mean_strength: Option<f64>,
+    /// Named rightly, joint included, at √λ ≥ 8 (faults of the record: all).
+    pub right: Share,
+    /// At the right joint, as above.
+    pub right_joint: Share,
+    /// Nothing was said, as above.
+    pub silent: Share,
+    /// Mean number of other things that it is not told from, where it is named rightly.
+    pub mean_class: f64,
+    /// Intervals of its parameters that hold the truth.
+    pub covered: Share,
+}
+
+/// How often one family was given the name of another.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Confusion {
+    /// Hidden.
+    pub hidden: Kind,
+    /// What was said first; `nothing` and `unexplained` included.
+    pub said: BTreeMap<String, u64>,
+}
+
+/// Named causes of a range of stated confidence.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ConfidenceBin {
+    /// Range of stated confidence.
+    pub range: [f64; 2],
+    /// Mean stated confidence.
+    pub stated: f64,
+    /// How many are right.
+    pub right: Share,
+}
+
+/// Gains along a motion that was not used.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GainBin {
+    /// Range of √λ.
+    pub range: [f64; 2],
+    /// Cases.
+    pub cases: u64,
+    /// Share of the explainable mean square that is removed, median.
+    pub removed: f64,
+    /// What the parameters' own noise allows, median.
+    pub predicted: f64,
+}
+
+/// What a blind benchmark says.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Scores {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Trials run.
+    pub trials: u64,
+    /// Trials without an answer.
+    pub failures: Vec<Failure>,
+    /// Stretches of trials that have not been run: `[first, one behind the last]`.
+    pub missing: Vec<[u64; 2]>,
+    /// Trials by what is hidden.
+    pub secrets: BTreeMap<Secret, u64>,
+    /// The targets.
+    pub targets: Vec<Target>,
+    /// Single effects seen in the residual, by √λ.
+    pub residual: Vec<StrengthBin>,
+    /// Single effects seen against a simulation, by √λ_sim.
+    pub simulation: Vec<StrengthBin>,
+    /// Effects whose family is withheld, by √λ; `right` counts answers that leave something
+    /// unexplained.
+    pub withheld: Vec<StrengthBin>,
+    /// Right at √λ ≥ 8 by motion and noise.
+    pub conditions: BTreeMap<String, Share>,
+    /// By family.
+    pub families: Vec<FamilyScore>,
+    /// Single effects at √λ ≥ 8.
+    pub confusion: Vec<Confusion>,
+    /// Stated confidence of all causes named where no family was withheld.
+    pub confidence: Vec<ConfidenceBin>,
+    /// Mean distance between stated confidence and share of right causes.
+    pub calibration_error: f64,
+    /// By √λ.
+    pub gains: Vec<GainBin>,
+    /// Answers that are not right: false alarms, single effects with √λ ≥ 8, two effects, and wrong
+    /// names of withheld families.
+    pub misses: Vec<Record>,
+    /// All targets together.
+    pub verdict: Verdict,
+}
+
+impl Case {
+    /// What the effects are judged by together: √λ, or √λ_sim of one that the model absorbs.
+    pub fn strength(&self) -> Option<f64> {
+        match &self.hidden[..] {
+            [only] => only.strength,
+            [] => None,
+            _ => Some(self.sqrt_lambda),
+        }
+    }
+
+    fn is_one(&self, judged: Judged) -> bool {
+        self.secret == Secret::One && self.hidden.iter().all(|h| h.judged == judged)
+    }
+
+    fn is_from(&self, low: f64) -> bool {
+        self.strength().is_some_and(|s| s >= low)
+    }
+}
+
+impl Record {
+    fn is_silent(&self) -> bool {
+        self.answer.named.is_empty() && self.answer.left.is_none()
+    }
+
+    fn first_is(&self, good: impl Fn(&Named, &super::case::Hidden) -> bool) -> bool {
+        match (self.answer.named.first(), self.case.hidden.first()) {
+            (Some(named), Some(hidden)) => good(named, hidden),
+            _ => false,
+        }
+    }
+
+    /// `(covered, all)` of the parameters of what was named by its own name.
+    fn covered(&self) -> Share {
+        let mut share = Share::default();
+        let Some(hidden) = self.case.hidden.first() else { return share };
+        let own = |n: &&Named| n.kind == hidden.kind && n.joint == hidden.joint;
+        let Some(named) = self.answer.named.first().filter(own) else { return share };
+        for (name, truth) in hidden.effect.parameters() {
+            let (Some(truth), Some(p)) = (truth.as_f64(), named.parameters.get(&name)) else {
+                continue;
+            };
+            // An interval without width is no claim about chance.
+            if p.high <= p.low {
+                continue;
+            }
+            let truth = if name.ends_with("phase_rad") { same_turn(truth, p.value) } else { truth };
+            share.of += 1;
+            share.count += u64::from(p.low <= truth && truth <= p.high);
+        }
+        share
+    }
+}
+
+/// The angle `a` plus the turns that bring it closest to `b`.
+fn same_turn(a: f64, b: f64) -> f64 {
+    let turn = std::f64::consts::TAU;
+    a + turn * ((b - a) / turn).round()
+}
+
+impl Scores {
+    /// Of merged shards.
+    pub fn of(merged: &Merged<BlindContent>) -> Self {
+        let all = &merged.tally.records;
+        let secret = |s: Secret| all.iter().filter(move |r| r.case.secret == s);
+        let one = |judged: Judged| all.iter().filter(move |r| r.case.is_one(judged));
+        let mut secrets = BTreeMap::new();
+        all.iter().for_each(|r| *secrets.entry(r.case.secret).or_insert(0) += 1);
+        let targets = targets(merged);
+        let verdict = match &targets {
+            t if t.iter().any(|t| t.verdict == Verdict::Fail) => Verdict::Fail,
+            t if t.iter().any(|t| t.verdict == Verdict::NotEvaluated) => Verdict::NotEvaluated,
+            _ => Verdict::Pass,
+        };
+        let confidence = confidence(all);
+        let stated: u64 = confidence.iter().map(|bin| bin.right.of).sum();
+        let distance =
+            |bin: &ConfidenceBin| (bin.stated - bin.right.value()).abs() * bin.right.of as f64;
+        let is_miss = |r: &&Record| match r.case.secret {
+            Secret::One => {
+                (r.case.is_from(8.0) || r.case.is_one(Judged::Record))
+                    && r.outcome() != Outcome::Right
+            }
+            Secret::Withheld => r.outcome() == Outcome::Wrong,
+            Secret::Nothing | Secret::Two => r.outcome() != Outcome::Right,
+        };
+        Self {
+            scenario: merged.header.scenario.clone(),
+            trials: all.len() as u64 + merged.tally.failures.len() as u64,
+            failures: merged.tally.failures.clone(),
+            missing: merged.missing.iter().map(|range| [range.start, range.end]).collect(),
+            secrets,
+            verdict,
+            residual: bins(one(Judged::Residual), |r| r.outcome() == Outcome::Right),
+            simulation: bins(one(Judged::Simulation), |r| r.outcome() == Outcome::Right),
+            withheld: bins(secret(Secret::Withheld), |r| r.answer.left.is_some()),
+            conditions: conditions(one(Judged::Residual).filter(|r| r.case.is_from(8.0))),
+            families: families(all),
+            confusion: confusion(secret(Secret::One)),
+            calibration_error: confidence
+                .iter()
+                .filter(|b| b.right.of > 0)
+                .map(distance)
+                .sum::<f64>()
+                / stated.max(1) as f64,
+            confidence,
+            gains: gains(all, merged.header.content.parameters),
+            misses: all.iter().filter(is_miss).cloned().collect(),
+            targets,
+        }
+    }
+
+    /// Targets met, and targets that could be judged.
+    pub fn met(&self) -> [usize; 2] {
+        let count = |v: Verdict| self.targets.iter().filter(|t| t.verdict == v).count();
+        [count(Verdict::Pass), count(Verdict::Pass) + count(Verdict::Fail)]
+    }
+}
+
+fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
+    let all = &merged.tally.records;
+    let is_right = |r: &&Record| r.outcome() == Outcome::Right;
+    let one = |judged: Judged, [low, high]: [f64; 2]| {
+        all.iter().filter(move |r| {
+            r.case.is_one(judged) && r.case.strength().is_some_and(|s| s >= low && s < high)
+        })
+    };
+    let above = |low: f64| [low, f64::INFINITY];
+    let alarms = Share::of(all.iter().filter(|r| r.case.secret == Secret::Nothing), |r| {
+        r.outcome() != Outcome::Right
+    });
+    let two = all.iter().filter(|r| {
+        r.case.secret == Secret::Two
+            && r.case.hidden.iter().all(|h| h.strength.is_some_and(|s| s >= 15.0))
+            && r.case.cosine.is_some_and(|c| c.abs() < 0.5)
+    });
+    let withheld = |low: f64| {
+        let of_them =
+            all.iter().filter(move |r| r.case.secret == Secret::Withheld && r.case.is_from(low));
+        Share::of(of_them, |r| r.outcome() == Outcome::Wrong)
+    };
+    let sure = causes(all).filter(|(named, _)| named.confidence >= 0.99);
+    let mut covered = Share::default();
+    for share in all.iter().filter(|r| r.case.secret == Secret::One).map(Record::covered) {
+        covered.count += share.count;
+        covered.of += share.of;
+    }
+    let large = all.iter().filter(|r| r.case.is_from(40.0)).filter_map(|r| r.answer.gain);
+    let residual = Judged::Residual;
+    vec![
+        Target::new("clean: a false alarm", alarms, [0.0, DESIGN_FALSE_ALARM]),
+        Target::about(
+            "clean: one-sided 95 % upper bound of the false alarms",
+            alarms,
+            alarms.bounds(0.05)[1],
+            [0.0, 0.01],
+        ),
+        Target::new(
+            "one effect, √λ ≥ 8: kind (class) and joint right",
+            Share::of(one(residual, above(8.0)), is_right),
+            [0.97, 1.0],
+        ),
+        Target::new(
+            "one effect, √λ 6 … 8: kind (class) and joint right",
+            Share::of(one(residual, [6.0, 8.0]), is_right),
+            [0.90, 1.0],
+        ),
+        Target::new(
+            "one effect, √λ ≥ 8: joint right",
+            Share::of(one(residual, above(8.0)), |r| r.first_is(is_at)),
+            [0.99, 1.0],
+        ),
+        Target::new(
+            "one effect against a simulation, √λ_sim ≥ 8: kind (class) and joint right",
+            Share::of(one(Judged::Simulation, above(8.0)), is_right),
+            [0.97, 1.0],
+        ),
+        Target::new(
+            "causes named with confidence ≥ 0.99: right",
+            Share::of(sure, |(_, right)| *right),
+            [0.99, 1.0],
+        ),
+        Target::new(
+            "two effects, both √λ ≥ 15, |cos| < 0.5: both named",
+            Share::of(two, is_right),
+            [0.90, 1.0],
+        ),
+        Target::new(
+            "family withheld, √λ ≥ 15: a wrong name without doubt",
+            withheld(15.0),
+            [0.0, 0.05],
+        ),
+        Target::new(
+            "family withheld, √λ ≥ 30: a wrong name without doubt",
+            withheld(30.0),
+            [0.0, 0.01],
+        ),
+        Target::new(
+            "95 % intervals of a named effect's parameters that hold the truth",
+            covered,
+            [0.93, 0.97],
+        ),
+        Target::new(
+            "√λ ≥ 40: at least 95 % of the explainable mean square removed on another motion",
+            Share::of(large, |gain| gain.share() >= 0.95),
+            [0.5, 1.0],
+        ),
+    ]
+}
+
+/// All causes named where no family is withheld, and whether each is something that was hidden.
+fn causes(all: &[Record]) -> impl Iterator<Item = (&Named, bool)> {
+    all.iter().filter(|r| r.case.secret != Secret::Withheld).flat_map(|r| {
+        r.answer.named.iter().map(|n| (n, r.case.hidden.iter().any(|h| is_right(n, h))))
+    })
+}
+
+/// Power of the likelihood-ratio test of one coefficient at √λ, among as many tests as the dictionary
+/// has families and sites: Φ(√λ − z₁₋ₐ/₂ₘ).
+pub fn power(sqrt_lambda: f64) -> f64 {
+    let tests: usize = candidates::all().iter().map(|f| f.sites(6).len()).sum();
+    let normal = Normal::standard();
+    let threshold = normal.inverse_cdf(1.0 - 0.5 * DESIGN_FALSE_ALARM / tests as f64);
+    normal.cdf(sqrt_lambda - threshold)
+}
+
+fn bins<'a>(
+    records: impl Iterator<Item = &'a Record>,
+    right: impl Fn(&Record) -> bool,
+) -> Vec<StrengthBin> {
+    let with: Vec<(f64, &Record)> = records.filter_map(|r| Some((r.case.strength()?, r))).collect();
+    STRENGTHS
+        .windows(2)
+        .map(|edges| {
+            let last = edges[1] == STRENGTHS[STRENGTHS.len() - 1];
+            let inside = |s: &f64| *s >= edges[0] && (*s < edges[1] || last);
+            let here: Vec<&(f64, &Record)> = with.iter().filter(|(s, _)| inside(s)).collect();
+            let mean = |f: &dyn Fn(f64) -> f64| {
+                here.iter().map(|(s, _)| f(*s)).sum::<f64>() / here.len() as f64
+            };
+            let share = |wanted: &dyn Fn(&Record) -> bool| Share::of(&here, |(_, r)| wanted(r));
+            StrengthBin {
+                range: [edges[0], if last { f64::INFINITY } else { edges[1] }],
+                mean: mean(&|s| s),
+                detected: share(&|r| !r.is_silent()),
+                right: share(&right),
+                right_joint: share(&|r| r.first_is(is_at)),
+                wrong: share(&|r| r.outcome() == Outcome::Wrong),
+                power: mean(&power),
+            }
+        })
+        .filter(|bin| bin.right.of > 0)
+        .collect()
+}
+
+fn conditions<'a>(records: impl Iterator<Item = &'a Record>) -> BTreeMap<String, Share> {
+    let mut out: BTreeMap<String, Share> = BTreeMap::new();
+    for r in records {
+        let share = out.entry(format!("{}, {} noise", r.case.motion, r.case.noise)).or_default();
+        share.of += 1;
+        share.count += u64::from(r.outcome() == Outcome::Right);
+    }
+    out
+}
+
+fn families(all: &[Record]) -> Vec<FamilyScore> {
+    let mut groups: BTreeMap<(Judged, Kind), Vec<&Record>> = BTreeMap::new();
+    for r in all.iter().filter(|r| r.case.secret == Secret::One) {
+        for h in &r.case.hidden {
+            groups.entry((h.judged, h.kind)).or_default().push(r);
+        }
+    }
+    groups
+        .into_iter()
+        .map(|((judged, kind), records)| {
+            let strengths: Vec<f64> = records.iter().filter_map(|r| r.case.strength()).collect();
+            let seen: Vec<&&Record> = records
+                .iter()
+                .filter(|r| judged == Judged::Record || r.case.is_from(8.0))
+                .collect();
+            let right: Vec<&&&Record> =
+                seen.iter().filter(|r| r.outcome() == Outcome::Right).collect();
+            let class = |r: &&&&Record| r.answer.named.first().map_or(0, |n| n.class.len());
+            let mut covered = Share::default();
+            for share in records.iter().map(|r| r.covered()) {
+                covered.count += share.count;
+                covered.of += share.of;
+            }
+            FamilyScore {
+                kind,
+                judged,
+                mean_strength: (!strengths.is_empty())
+                    .then(|| strengths.iter().sum::<f64>() / strengths.len() as f64),
+                right: Share::of(&seen, |r| r.outcome() == Outcome::Right),
+                right_joint: Share::of(&seen, |r| r.first_is(is_at)),
+                silent: Share::of(&seen, |r| r.is_silent()),
+                mean_class: right.iter().map(class).sum::<usize>() as f64 / right.len() as f64,
+                covered,
+            }
+        })
+        .collect()
+}
+
+/// What was said first where nothing was named.
+pub const SAID_NOTHING: &str = "nothing";
+/// See [`SAID_NOTHING`].
+pub const SAID_UNEXPLAINED: &str = "unexplained";
+
+fn confusion<'a>(records: impl Iterator<Item = &'a Record>) -> Vec<Confusion> {
+    let mut rows: BTreeMap<Kind, BTreeMap<String, u64>> = BTreeMap::new();
+    for r in records.filter(|r| r.case.is_from(8.0) || r.case.is_one(Judged::Record)) {
+        let Some(hidden) = r.case.hidden.first() else { continue };
+        let said = match r.answer.named.first() {
+            // A class that holds the truth is a right answer.
+            Some(named) if is_right(named, hidden) => hidden.kind.name(),
+            Some(named) => named.kind.name(),
+            None if r.answer.left.is_some() => SAID_UNEXPLAINED,
+            None => SAID_NOTHING,
+        };
+        *rows.entry(hidden.kind).or_default().entry(said.to_owned()).or_insert(0) += 1;
+    }
+    rows.into_iter().map(|(hidden, said)| Confusion { hidden, said }).collect()
+}
+
+fn confidence(all: &[Record]) -> Vec<ConfidenceBin> {
+    CONFIDENCES
+        .windows(2)
+        .map(|edges| {
+            let last = edges[1] == 1.0;
+            let inside = |c: f64| c >= edges[0] && (c < edges[1] || last);
+            let here: Vec<(&Named, bool)> =
+                causes(all).filter(|(n, _)| inside(n.confidence)).collect();
+            let stated = here.iter().map(|(n, _)| n.confidence).sum::<f64>() / here.len() as f64;
+            let right = Share::of(here, |(_, right)| *right);
+            ConfidenceBin { range: [edges[0], edges[1]], stated, right }
+        })
+        .filter(|bin| bin.right.of > 0)
+        .collect()
+}
+
+/// Along a motion that excites the arm as the log's did, the p parameters of the null model leave a
+/// mean square of p per log in units of the noise, and with an effect's k coefficients p + k: of
+/// λ + p, at most 1 − (p + k)/(λ + p) can be removed; k is taken as 1.
+fn gains(all: &[Record], parameters: usize) -> Vec<GainBin> {
+    let p = parameters as f64;
+    let with: Vec<(f64, f64)> = all
+        .iter()
+        .filter_map(|r| Some((r.case.sqrt_lambda, r.answer.gain?.share())))
+        .filter(|(_, share)| share.is_finite())
+        .collect();
+    STRENGTHS
+        .windows(2)
+        .map(|edges| {
+            let last = edges[1] == STRENGTHS[STRENGTHS.len() - 1];
+            let inside = |s: f64| s >= edges[0] && (s < edges[1] || last);
+            let here: Vec<&(f64, f64)> = with.iter().filter(|(s, _)| inside(*s)).collect();
+            let bound = |s: f64| 1.0 - (p + 1.0) / (s * s + p);
+            GainBin {
+                range: [edges[0], if last { f64::INFINITY } else { edges[1] }],
+                cases: here.len() as u64,
+                removed: median(here.iter().map(|(_, share)| *share).collect()),
+                predicted: median(here.iter().map(|(s, _)| bound(*s)).collect()),
+            }
+        })
+        .filter(|bin| bin.cases > 0)
+        .collect()
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rule of three: no event in n trials leaves at most 1 − 0.05^(1/n), about 3/n.
+    #[test]
+    fn bounds_are_those_of_clopper_and_pearson() {
+        let none = Share { count: 0, of: 1000 };
+        assert!((none.bounds(0.05)[1] - (1.0 - 0.05f64.powf(1e-3))).abs() < 1e-9);
+        assert_eq!(none.bounds(0.05)[0], 0.0);
+        // Published example: 10 of 100, two-sided 95 %: 4.90 … 17.62 %.
+        let [low, high] = Share { count: 10, of: 100 }.bounds(0.025);
+        assert!((low - 0.0490).abs() < 1e-4 && (high - 0.1762).abs() < 1e-4, "{low} {high}");
+    }
+
+    #[test]
+    fn angles_are_compared_on_the_same_turn() {
+        assert!((same_turn(3.1, -3.1) - (3.1 - std::f64::consts::TAU)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn half_the_effects_at_the_threshold_are_found() {
+        assert!(power(3.0) < 0.2 && power(6.0) > 0.8, "{} {}", power(3.0), power(6.0));
+    }
+}

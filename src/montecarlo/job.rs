@@ -1,0 +1,46 @@
+//! What a scenario file asks for.
+
+use std::path::Path;
+
+use super::blind::BlindPlan;
+use super::scenario::{Scenario, ScenarioError, Source};
+
+/// What `montecarlo` can run.
+#[derive(Debug, Clone)]
+pub enum Job {
+    /// One arm, identified from many noisy logs.
+    Estimates(Box<Scenario>),
+    /// Many arms with something hidden in them, each diagnosed from one log.
+    Blind(Box<BlindPlan>),
+}
+
+impl Job {
+    /// What the file `path` asks for; the default scenario where there is none.
+    pub fn load(path: Option<&Path>) -> Result<Self, ScenarioError> {
+        Self::from_source(&Source::load(path)?)
+    }
+
+    /// From TOML text; `name` stands for it in messages.
+    pub fn from_toml(text: &str, name: &str) -> Result<Self, ScenarioError> {
+        Self::from_source(&Source::new(text, name, Path::new("")))
+    }
+
+    fn from_source(source: &Source) -> Result<Self, ScenarioError> {
+        let mut file = source.parse()?;
+        Ok(match file.blind.take() {
+            Some(entry) => {
+                let base = Scenario::from_file(file, source)?;
+                Self::Blind(Box::new(BlindPlan::new(base, entry, source)?))
+            }
+            None => Self::Estimates(Box::new(Scenario::from_file(file, source)?)),
+        })
+    }
+
+    /// The scenario; of a blind benchmark, the one without its draws.
+    pub fn scenario_mut(&mut self) -> &mut Scenario {
+        match self {
+            Self::Estimates(scenario) => scenario,
+            Self::Blind(plan) => &mut plan.base,
+        }
+    }
+}
