@@ -3,8 +3,8 @@
 //! Enters: results of the chapters before. Leaves: text for the terminal, Markdown, a [`Page`] as one HTML file
 //! without network or scripts, and [`json`] documents that name program, command, seed and inputs.
 
-pub mod cutoff_study;
 pub mod blind;
+pub mod cutoff_study;
 pub mod diagnose;
 mod error;
 pub mod excitation;
