@@ -19,8 +19,9 @@ use crate::report::json::{Document, Program};
 /// Say what the rigid model with linear friction gets wrong along a log, and what explains it.
 #[derive(Debug, Args)]
 pub struct DiagnoseArgs {
-    /// The log.
-    log: PathBuf,
+    /// The log; with a second one: what that has on its flange that the first has not.
+    #[arg(required = true, num_args = 1..=2)]
+    logs: Vec<PathBuf>,
     #[command(flatten)]
     source: SourceArgs,
     #[command(flatten)]
@@ -31,6 +32,9 @@ pub struct DiagnoseArgs {
     /// A simulation to compare with: a scenario (.toml) or a result of `armid identify` (.json).
     #[arg(long, value_name = "SCENARIO|RESULT")]
     sim: Option<PathBuf>,
+    /// Mass of the body that the second log was recorded with, kg: tells the scale of the drive gains.
+    #[arg(long = "known-payload", value_name = "KG", value_parser = mass)]
+    known_payload_kg: Option<f64>,
     /// Write the result as JSON.
     #[arg(long)]
     json: Option<PathBuf>,
@@ -44,11 +48,14 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
     for path in [&args.json, &args.report].into_iter().flatten() {
         check_writable(path)?;
     }
+    if args.known_payload_kg.is_some() && args.logs.len() < 2 {
+        return Err("--known-payload needs two logs: without the body, and with it".into());
+    }
     let options = args.processing.options()?;
     let arm = args.source.arm()?;
     let set = BaseSet::find(&arm, Parameterisation::full(arm.dof(), arm.torque_offsets))?;
     let model = Model::new(&arm);
-    let logs = args.source.read(&arm, std::slice::from_ref(&args.log))?;
+    let logs = args.source.read(&arm, &args.logs)?;
     let held_out = args.source.read(&arm, &args.held_out)?;
     if let Some(same) =
         held_out.iter().find(|h| logs.iter().any(|l| l.input.sha256 == h.input.sha256))
@@ -70,7 +77,14 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
         args.sim.as_deref().map(|file| simulated_parameters(file, &set)).transpose()?;
     let mut diagnoser = Diagnoser::new(&arm, &model, &set, options);
     let Some(log) = logs.first() else { return Ok(Outcome::Done) };
-    let finding = diagnoser.diagnose(&log.measurement(), &validations, simulation.as_deref())?;
+    let mut finding =
+        diagnoser.diagnose(&log.measurement(), &validations, simulation.as_deref())?;
+    if let Some(loaded) = logs.get(1) {
+        let measurements = (&log.measurement(), &loaded.measurement());
+        let payload =
+            diagnoser.payload(&finding, measurements.0, measurements.1, args.known_payload_kg)?;
+        finding.diagnosis.add_payload(payload);
+    }
     let diagnosis = &finding.diagnosis;
     for sentence in &diagnosis.sentences {
         println!("{sentence}");
@@ -99,6 +113,13 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
         println!("report: {}", path.display());
     }
     Ok(Outcome::Done)
+}
+
+/// A mass in kg.
+fn mass(text: &str) -> Result<f64, String> {
+    let mass: f64 = text.parse().map_err(|e| format!("{e}"))?;
+    let is_mass = mass > 0.0 && mass.is_finite();
+    if is_mass { Ok(mass) } else { Err("must be a positive number".into()) }
 }
 
 /// Base parameters of the simulation that `file` describes, in the order of `set`.

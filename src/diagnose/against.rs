@@ -1,31 +1,44 @@
-//! A log against a given simulation: which of its parameters moved, and which single physical change
-//! moved them.
+//! A log against a given simulation: which of its parameters moved, and which physical changes moved them.
 //!
-//! Nothing is fitted first: the residual is y − X θ_sim, and a change of standard parameters δ explains
-//! X K δ of it, K the map to base parameters. Effects that any fit would absorb — a body on the flange,
-//! other friction, a wrong torque constant — stand out here.
+//! Nothing is fitted first: the residual is y − X θ_sim, and a change explains its own torque of it. A body
+//! on the flange adds X K δ, δ its ten inertial parameters and K the map to base parameters; other friction
+//! adds multiples of its columns; a wrong torque constant a share of the joint's torque; gravity, tilt and
+//! length add what the inverse dynamics of the changed arm add. Effects that any fit would absorb stand out
+//! here.
 
 use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::image::{Image, Span};
+use super::candidates::{Candidate, Quantity, Shape};
+use super::image::{Column, Image, Span};
 use super::kind::Kind;
-use super::selection::FALSE_ALARM;
-use super::study::Study;
+use super::selection::{FALSE_ALARM, TELLS_APART};
+use super::study::{Entry, Study};
 use super::verdict::{Cause, Estimate, Moved, Rival};
 use crate::base::BaseSet;
 use crate::dynamics::{Parameter, ParameterLayout};
 use crate::identify::Identification;
+use crate::robot::{Arm, JointSignals};
 
 /// Changes at most.
 const MOST_CHANGES: usize = 8;
+/// Alternatives that are reported.
+const RIVALS: usize = 5;
+/// Steps of the numerical derivatives: small against what matters, large against rounding.
+const LENGTH_STEP_M: f64 = 1e-4;
+const GRAVITY_STEP: f64 = 1e-4;
+
+/// Physical parameters of coefficients.
+type Quantities<'a> = Box<dyn Fn(&[f64]) -> Vec<Quantity> + 'a>;
 
 /// A change that may have moved the parameters.
-struct Change {
+struct Change<'a> {
     kind: Kind,
     site: Option<usize>,
     images: Vec<Image>,
+    quantities: Quantities<'a>,
+    in_words: &'static str,
 }
 
 /// Every base parameter in the simulation and in the data.
@@ -43,76 +56,170 @@ pub fn moved(set: &BaseSet, simulation: &[f64], identification: &Identification)
         .collect()
 }
 
-/// The changes that explain how the data differ from the simulation, largest first.
-pub fn explain(study: &Study, set: &BaseSet, simulation: &[f64]) -> Vec<Cause> {
+/// The changes that explain how the data differ from the simulation, the one that explains most first.
+/// `accepted` are effects that no simulation of this kind has.
+pub fn explain(
+    study: &Study,
+    set: &BaseSet,
+    simulation: &[f64],
+    accepted: &[&Entry],
+) -> Vec<Cause> {
     let mut residual = study.torque.clone();
     for (column, theta) in study.null_columns.iter().zip(simulation) {
         residual.add(-theta, column);
     }
     let changes = changes(study, set, simulation);
-    let tests = changes.len() as f64;
-    let mut taken: Vec<usize> = Vec::new();
-    let mut rivals: Vec<Vec<Rival>> = Vec::new();
-    while taken.len() < MOST_CHANGES {
-        let (others, rest) = outside(&changes, &taken, &residual);
-        let mut open: Vec<(usize, f64, f64)> = (0..changes.len())
-            .filter(|c| !taken.contains(c))
-            .map(|c| {
-                let span = own(&changes[c], &others);
-                let gain = study.statistic.gain(&span, changes[c].site, &rest);
-                let n = study.statistic.sample_count(changes[c].site, rest.mean.len());
-                let price = span.len() as f64 * n.ln() + 2.0 * tests.ln();
-                (c, gain - price, study.statistic.probability(&span, &rest))
-            })
-            .collect();
-        open.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let Some(&(best, evidence, probability)) = open.first() else { break };
-        if !(evidence > 0.0 && probability * tests < FALSE_ALARM) {
-            break;
-        }
-        taken.push(best);
-        let behind = open[1..].iter().take(5).map(|&(c, e, _)| Rival {
-            kind: changes[c].kind,
-            joint: changes[c].site.map(|j| j + 1),
-            evidence_behind: evidence - e,
-        });
-        rivals.push(behind.collect());
+    let is_change = |entry: &Entry| {
+        let place = (study.families[entry.family].kind(), entry.site);
+        changes.iter().any(|c| (c.kind, c.site) == place)
+    };
+    let mut nuisance = Span::default();
+    for image in accepted.iter().filter(|e| !is_change(e)).flat_map(|e| &e.images) {
+        nuisance.push(image);
     }
-    taken
-        .iter()
-        .zip(rivals)
-        .map(|(&c, rivals)| {
-            let rest: Vec<usize> = taken.iter().copied().filter(|o| *o != c).collect();
-            let (others, left) = outside(&changes, &rest, &residual);
-            let span = own(&changes[c], &others);
-            let b = span.solve(&left);
-            let covariance = study.statistic.covariance(&span, &left);
-            let half = study.statistic.quantile_95();
-            Cause {
-                kind: changes[c].kind,
-                joint: changes[c].site.map(|j| j + 1),
-                class: Vec::new(),
-                confidence: 1.0,
-                parameters: quantities(changes[c].kind, &b, &covariance, half),
-                gain_fraction: None,
-                separating_experiment: None,
-                strength: study.statistic.gain(&span, changes[c].site, &left).max(0.0).sqrt(),
-                in_words: in_words(changes[c].kind).to_owned(),
-                rivals,
-            }
-        })
-        .collect()
+    let search = Search { study, changes, nuisance, residual };
+    let taken = search.select();
+    (0..taken.len()).map(|index| search.cause(&taken, index)).collect()
 }
 
-/// Span of the changes `taken`, and the residual outside it.
-fn outside(changes: &[Change], taken: &[usize], residual: &Image) -> (Span, Image) {
-    let mut span = Span::default();
-    for image in taken.iter().flat_map(|&c| &changes[c].images) {
-        span.push(image);
+struct Search<'a> {
+    study: &'a Study<'a>,
+    changes: Vec<Change<'a>>,
+    nuisance: Span,
+    residual: Image,
+}
+
+/// A change with 2 ln of the evidence for it and the probability of as much by chance.
+struct Scored {
+    change: usize,
+    evidence: f64,
+    probability: f64,
+}
+
+impl Search<'_> {
+    /// Forward selection, with removal of what a later change makes needless.
+    fn select(&self) -> Vec<usize> {
+        let tests = self.changes.len() as f64;
+        let significant = |s: &Scored| s.evidence > 0.0 && s.probability * tests < FALSE_ALARM;
+        let mut taken: Vec<usize> = Vec::new();
+        while taken.len() < MOST_CHANGES {
+            let Some(best) = self.scored(&taken).into_iter().next().filter(significant) else {
+                break;
+            };
+            taken.push(best.change);
+            let mut c = 0;
+            while c + 1 < taken.len() {
+                let rest = without(&taken, c);
+                let again = self.scored(&rest);
+                let own = again.iter().find(|s| s.change == taken[c]);
+                if own.is_some_and(significant) {
+                    c += 1;
+                } else {
+                    taken.remove(c);
+                }
+            }
+        }
+        taken
     }
-    let mut rest = residual.clone();
-    span.residualise(&mut rest);
-    (span, rest)
+
+    /// All changes that are not `taken`, best first.
+    fn scored(&self, taken: &[usize]) -> Vec<Scored> {
+        let study = self.study;
+        let (others, rest) = self.outside(taken);
+        let tests = self.changes.len() as f64;
+        let mut out: Vec<Scored> = (0..self.changes.len())
+            .filter(|c| !taken.contains(c))
+            .map(|c| {
+                let site = self.changes[c].site;
+                let span = own(&self.changes[c], &others);
+                let n = study.statistic.sample_count(site, rest.mean.len());
+                let price = span.len() as f64 * n.ln() + 2.0 * tests.ln();
+                Scored {
+                    change: c,
+                    evidence: study.statistic.gain(&span, site, &rest) - price,
+                    probability: study.statistic.probability(&span, &rest),
+                }
+            })
+            .collect();
+        out.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+        out
+    }
+
+    /// Span of the changes `taken` and of what no simulation has, and the residual outside it.
+    fn outside(&self, taken: &[usize]) -> (Span, Image) {
+        let mut span = self.nuisance.clone();
+        for image in taken.iter().flat_map(|&c| &self.changes[c].images) {
+            span.push(image);
+        }
+        let mut rest = self.residual.clone();
+        span.residualise(&mut rest);
+        (span, rest)
+    }
+
+    /// Change `taken[index]` with its numbers, the others given.
+    fn cause(&self, taken: &[usize], index: usize) -> Cause {
+        let study = self.study;
+        let change = &self.changes[taken[index]];
+        let rest = without(taken, index);
+        let (others, left) = self.outside(&rest);
+        let span = own(change, &others);
+        let b = span.solve(&left);
+        let covariance = study.statistic.covariance(&span, &left);
+        let scored = self.scored(&rest);
+        let evidence = scored.iter().find(|s| s.change == taken[index]).map_or(0.0, |s| s.evidence);
+        // The part of the residual that the change explains.
+        let mut signal = left.clone();
+        span.residualise(&mut signal);
+        signal.scale(-1.0);
+        signal.add(1.0, &left);
+        let size = signal.square();
+        let gain = study.statistic.gain(&span, change.site, &left);
+        let scale = gain / size.max(f64::MIN_POSITIVE);
+        let rivals: Vec<&Scored> = scored.iter().filter(|s| s.change != taken[index]).collect();
+        let in_class: Vec<&Scored> = rivals
+            .iter()
+            .filter(|s| {
+                let explained = own(&self.changes[s.change], &others).explained(&signal);
+                scale * (size - explained) < TELLS_APART
+            })
+            .copied()
+            .collect();
+        let name = |s: &&Scored| {
+            let Change { kind, site, .. } = &self.changes[s.change];
+            match site.filter(|_| *site != change.site) {
+                Some(j) => format!("{kind}@{}", j + 1),
+                None => kind.to_string(),
+            }
+        };
+        let top = rivals.iter().map(|s| s.evidence).fold(evidence, f64::max).max(0.0);
+        let weight = |evidence: f64| (0.5 * (evidence - top)).exp();
+        let own_weight =
+            weight(evidence) + in_class.iter().map(|s| weight(s.evidence)).sum::<f64>();
+        let all =
+            weight(0.0) + weight(evidence) + rivals.iter().map(|s| weight(s.evidence)).sum::<f64>();
+        let class: Vec<String> = in_class.iter().map(name).collect();
+        let behind = rivals.iter().take(RIVALS).map(|s| Rival {
+            kind: self.changes[s.change].kind,
+            joint: self.changes[s.change].site.map(|j| j + 1),
+            evidence_behind: evidence - s.evidence,
+        });
+        Cause {
+            kind: change.kind,
+            joint: change.site.map(|j| j + 1),
+            separating_experiment: (!class.is_empty()).then(|| separating_experiment(change.kind)),
+            class,
+            confidence: own_weight / all,
+            parameters: estimates(change, &b, &covariance, study.statistic.quantile_95()),
+            gain_fraction: None,
+            strength: gain.max(0.0).sqrt(),
+            in_words: change.in_words.to_owned(),
+            rivals: behind.collect(),
+        }
+    }
+}
+
+fn without(taken: &[usize], index: usize) -> Vec<usize> {
+    taken.iter().enumerate().filter(|(i, _)| *i != index).map(|(_, c)| *c).collect()
 }
 
 fn own(change: &Change, others: &Span) -> Span {
@@ -125,8 +232,10 @@ fn own(change: &Change, others: &Span) -> Span {
     span
 }
 
-fn changes(study: &Study, set: &BaseSet, simulation: &[f64]) -> Vec<Change> {
-    let joints = study.scene.joints();
+/// Everything that is looked for.
+fn changes<'a>(study: &'a Study<'a>, set: &BaseSet, simulation: &[f64]) -> Vec<Change<'a>> {
+    let scene = &study.scene;
+    let joints = scene.joints();
     let layout = ParameterLayout::new(joints);
     let image = |parameter: Parameter| {
         let mut standard = vec![0.0; layout.count()];
@@ -138,15 +247,97 @@ fn changes(study: &Study, set: &BaseSet, simulation: &[f64]) -> Vec<Change> {
         kind: Kind::Payload,
         site: None,
         images: (0..10).filter_map(|k| image(Parameter::Body(last, k))).collect(),
+        quantities: Box::new(payload),
+        in_words: "a body on the flange",
     }];
     for j in 0..joints {
         let images = [Parameter::Coulomb(j), Parameter::Viscous(j)].map(image);
-        let images: Vec<Image> = images.into_iter().flatten().collect();
-        out.push(Change { kind: Kind::FrictionChange, site: Some(j), images });
-        let torque = study.torque_on(j, simulation);
-        out.push(Change { kind: Kind::TorqueGain, site: Some(j), images: vec![torque] });
+        out.push(Change {
+            kind: Kind::FrictionChange,
+            site: Some(j),
+            images: images.into_iter().flatten().collect(),
+            quantities: Box::new(friction),
+            in_words: "friction that is not what the simulation assumes",
+        });
+        out.push(Change {
+            kind: Kind::TorqueGain,
+            site: Some(j),
+            images: vec![study.torque_on(j, simulation)],
+            quantities: Box::new(|b| vec![quantity("error_fraction", b[0], "")]),
+            in_words: "a wrong torque constant",
+        });
+        let length_m = scene.arm.joints[j].placement.translation_m.norm();
+        if j > 0 && length_m > 0.0 {
+            out.push(Change {
+                kind: Kind::LinkLength,
+                site: Some(j),
+                images: vec![study.whitening.image(&longer(study, j))],
+                quantities: Box::new(|b| vec![quantity("error_m", b[0], "m")]),
+                in_words: "a link that is longer or shorter than drawn",
+            });
+        }
     }
+    let gravity_m_s2 = scene.arm.gravity_m_s2.norm();
+    if gravity_m_s2 > 0.0 {
+        let heavier = with_arm(study, GRAVITY_STEP, |arm| arm.gravity_m_s2 *= 1.0 + GRAVITY_STEP);
+        out.push(Change {
+            kind: Kind::Gravity,
+            site: None,
+            images: vec![study.whitening.image(&heavier)],
+            quantities: Box::new(move |b| {
+                vec![quantity("g_m_s2", gravity_m_s2 * (1.0 + b[0]), "m/s²")]
+            }),
+            in_words: "another gravity than the simulation's",
+        });
+    }
+    for family in study.families {
+        let wanted = [Kind::BaseTilt, Kind::EncoderOffset, Kind::CurrentOffset, Kind::Spring];
+        if wanted.contains(&family.kind()) {
+            out.extend(
+                family
+                    .sites(joints)
+                    .into_iter()
+                    .map(|site| of_family(study, family.as_ref(), site)),
+            );
+        }
+    }
+    out.retain(|change| change.images.iter().any(|i| i.square() > 0.0));
     out
+}
+
+/// A family of the catalogue, whose columns the null model may absorb here.
+fn of_family<'a>(
+    study: &'a Study<'a>,
+    family: &'a dyn Candidate,
+    site: Option<usize>,
+) -> Change<'a> {
+    let scene = &study.scene;
+    let shapes = family.shapes(scene, site);
+    let shape = shapes.first().copied().unwrap_or(Shape { variant: 0, value: 0.0 });
+    let columns = family.columns(scene, site, shape);
+    Change {
+        kind: family.kind(),
+        site,
+        images: columns.iter().map(|c| study.whitening.image(c)).collect(),
+        quantities: Box::new(move |b| family.quantities(scene, site, shape, b)),
+        in_words: family.in_words(),
+    }
+}
+
+/// Torque per metre by which the way to joint `j`'s frame is longer, Nm/m.
+fn longer(study: &Study, j: usize) -> Column {
+    with_arm(study, LENGTH_STEP_M, |arm| {
+        let way_m = &mut arm.joints[j].placement.translation_m;
+        *way_m += way_m.normalize() * LENGTH_STEP_M;
+    })
+}
+
+/// Torque per unit of a small `change` of the arm of size `step`.
+fn with_arm(study: &Study, step: f64, change: impl Fn(&mut Arm)) -> Column {
+    let mut arm = study.scene.arm.clone();
+    change(&mut arm);
+    let torque_nm: JointSignals = study.scene.torque_change(&arm, &study.scene.motion);
+    Column::everywhere(&torque_nm).scaled(1.0 / step)
 }
 
 /// Σ b_k column_k; `None` if every b_k is zero.
@@ -165,48 +356,64 @@ fn combined(columns: &[Image], b: &[f64]) -> Option<Image> {
     sum
 }
 
-fn in_words(kind: Kind) -> &'static str {
+fn separating_experiment(kind: Kind) -> &'static str {
     match kind {
-        Kind::Payload => "a body on the flange",
-        Kind::FrictionChange => "friction that is not what the simulation assumes",
-        _ => "a wrong torque constant",
+        Kind::Payload => "the same motion with the flange bare",
+        Kind::FrictionChange => "the same motion after half an hour of work",
+        Kind::TorqueGain => "a known payload: it scales every torque constant",
+        Kind::LinkLength => "a measurement of the kinematics",
+        Kind::Gravity => "a known payload, weighed at the same place",
+        _ => "a level on the base, and the same motion with joint 1 turned by 180°",
     }
 }
 
-fn quantities(
-    kind: Kind,
+fn quantity(name: &'static str, value: f64, unit: &'static str) -> Quantity {
+    Quantity { name, value, unit }
+}
+
+fn payload(b: &[f64]) -> Vec<Quantity> {
+    let m = b[0];
+    let com = |axis: usize| b.get(axis).copied().unwrap_or(0.0) / m;
+    vec![
+        quantity("mass_kg", m, "kg"),
+        quantity("com_x_m", com(1), "m"),
+        quantity("com_y_m", com(2), "m"),
+        quantity("com_z_m", com(3), "m"),
+    ]
+}
+
+fn friction(b: &[f64]) -> Vec<Quantity> {
+    let viscous = b.get(1).copied().unwrap_or(0.0);
+    vec![quantity("coulomb_nm", b[0], "Nm"), quantity("viscous_nm_s_rad", viscous, "Nm s/rad")]
+}
+
+/// Quantities of coefficients `b` with 95 % intervals by the delta method.
+fn estimates(
+    change: &Change,
     b: &[f64],
     covariance: &DMatrix<f64>,
     half: f64,
 ) -> BTreeMap<&'static str, Estimate> {
-    let estimate = |value: f64, gradient: &[f64], unit: &'static str| {
-        let g = DVector::from_fn(b.len(), |k, _| gradient.get(k).copied().unwrap_or(0.0));
-        let reach = half * (g.transpose() * covariance * &g)[(0, 0)].max(0.0).sqrt();
-        Estimate { value, unit, ci95: [value - reach, value + reach] }
-    };
-    let unit_vector = |k: usize| {
-        let mut g = vec![0.0; b.len()];
-        g[k] = 1.0;
-        g
-    };
-    match (kind, b.len()) {
-        (Kind::Payload, 4..) => {
-            let m = b[0];
-            let names = ["com_x_m", "com_y_m", "com_z_m"];
-            let com = names.iter().enumerate().map(|(axis, name)| {
-                let mut g = unit_vector(axis + 1);
-                g[axis + 1] = 1.0 / m;
-                g[0] = -b[axis + 1] / (m * m);
-                (*name, estimate(b[axis + 1] / m, &g, "m"))
-            });
-            std::iter::once(("mass_kg", estimate(m, &unit_vector(0), "kg"))).chain(com).collect()
+    let centre = (change.quantities)(b);
+    let mut gradients = vec![DVector::<f64>::zeros(b.len()); centre.len()];
+    for k in 0..b.len() {
+        let h = 1e-3 * covariance[(k, k)].max(0.0).sqrt().max(f64::MIN_POSITIVE);
+        let at = |sign: f64| {
+            let mut moved = b.to_vec();
+            moved[k] += sign * h;
+            (change.quantities)(&moved)
+        };
+        for (g, (up, down)) in gradients.iter_mut().zip(at(1.0).iter().zip(at(-1.0))) {
+            g[k] = (up.value - down.value) / (2.0 * h);
         }
-        (Kind::FrictionChange, 2) => [
-            ("coulomb_nm", estimate(b[0], &unit_vector(0), "Nm")),
-            ("viscous_nm_s_rad", estimate(b[1], &unit_vector(1), "Nm s/rad")),
-        ]
-        .into(),
-        (Kind::TorqueGain, 1) => [("error_fraction", estimate(b[0], &unit_vector(0), ""))].into(),
-        _ => BTreeMap::new(),
     }
+    centre
+        .iter()
+        .zip(&gradients)
+        .map(|(q, g)| {
+            let reach = half * (g.transpose() * covariance * g)[(0, 0)].max(0.0).sqrt();
+            let ci95 = [q.value - reach, q.value + reach];
+            (q.name, Estimate { value: q.value, unit: q.unit, ci95 })
+        })
+        .collect()
 }

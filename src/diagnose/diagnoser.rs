@@ -5,20 +5,22 @@ use std::collections::BTreeMap;
 use super::against;
 use super::candidates::{self, Candidate, Quantity, Search, Shape};
 use super::common_motion::move_to_common_motion;
+use super::contact;
 use super::data_faults;
 use super::error::DiagnoseError;
 use super::extension::{Effect, Extension, mean_period};
 use super::gain;
+use super::held_out::{Models, Validation, held_out_gain};
 use super::image::{Image, Span};
 use super::misfit;
+use super::payload::{self, PayloadFinding};
 use super::scene::Scene;
 use super::selection::{Kept, Selected, select};
 use super::study::{Entry, Study};
-use super::verdict::{Cause, DetectionLimit, Diagnosis, Estimate, HeldOut, Rival, Rms, Verdict};
-use super::whitening::{RunWhitening, Whitening};
+use super::verdict::{Cause, DetectionLimit, Diagnosis, Estimate, Rival, Rms, Verdict};
 use crate::base::BaseSet;
 use crate::dynamics::Model;
-use crate::identify::{Identification, Identifier, Measurement, Options};
+use crate::identify::{Identification, Identifier, Measurement, Options, Regression};
 use crate::robot::{Arm, JointSignals};
 
 /// Everything that stays the same from log to log.
@@ -38,6 +40,8 @@ pub struct Finding {
     pub identification: Identification,
     /// Motion and predictions along the log.
     pub scene: Scene,
+    /// The extended model.
+    pub extension: Extension,
     /// Residual of the null model, one period or the run, Nm.
     pub before_nm: JointSignals,
     /// Residual of the extended model, Nm.
@@ -76,9 +80,12 @@ impl<'a> Diagnoser<'a> {
         held_out: &[Validation],
         simulation: Option<&[f64]>,
     ) -> Result<Finding, DiagnoseError> {
-        let faults = data_faults::find(m);
+        let mut faults = data_faults::find(m);
         let qd_rad_s = data_faults::without_lag(m, &faults);
         let m = &Measurement { qd_rad_s: &qd_rad_s, ..*m };
+        let touched = contact::between_periods(m)?;
+        let torque_nm = touched.as_ref().map_or(m.torque_nm, |t| &t.torque_nm);
+        let m = &Measurement { torque_nm, ..*m };
         let mut regression = self.identifier.regression(m)?;
         let identification = self.identifier.identify_regression(&regression)?;
         let fit = &identification.fit;
@@ -91,8 +98,15 @@ impl<'a> Diagnoser<'a> {
         // The load on the gear is better known once friction is.
         let entries: Vec<&Entry> = found.iter().map(|c| &c.entry).collect();
         let refined = Extension::fit(&first, &entries, &first.torque);
-        let study = first.with_estimate(self.arm, self.set, &refined.theta);
-        let kept = Kept::taken_over(&study, found);
+        let mut study = first.with_estimate(self.arm, self.set, &refined.theta);
+        let mut kept = Kept::taken_over(&study, found.clone());
+        if !study.scene.periodic {
+            // A single run is judged by its own residual, which is known only now.
+            let (_, rest) = kept.without(None);
+            study.judge_by(&rest);
+            kept = Kept::taken_over(&study, found);
+            kept.grow();
+        }
         let selected = kept.selected();
         let entries: Vec<&Entry> = selected.iter().map(|s| &s.contender.entry).collect();
         let extension = Extension::fit(&study, &entries, &study.torque);
@@ -108,17 +122,25 @@ impl<'a> Diagnoser<'a> {
             .iter()
             .enumerate()
             .map(|(c, selected)| self.cause(&study, &kept, selected, c, gains[c], &extension));
+        let touches = match &touched {
+            Some(touched) => touched.causes.clone(),
+            None if study.scene.periodic => Vec::new(),
+            None => beside_model(&study, &after_nm),
+        };
+        faults.extend(touches);
         let mut causes: Vec<Cause> = faults.into_iter().chain(physics).collect();
         let mut moved_parameters = Vec::new();
         if let Some(simulation) = simulation {
             moved_parameters = against::moved(self.set, simulation, &identification);
-            causes.extend(against::explain(&study, self.set, simulation));
+            let changes = against::explain(&study, self.set, simulation, &entries);
+            causes.retain(|c| changes.iter().all(|n| (n.kind, n.joint) != (c.kind, c.joint)));
+            causes.extend(changes);
         }
         let held_out = held_out
             .iter()
             .map(|log| {
-                let models = (&null, &extension);
-                held_out_gain(&mut self.identifier, sources, &self.families, log, models)
+                let models = Models { null: &null, extension: &extension };
+                held_out_gain(&mut self.identifier, sources, &self.families, log, &models)
             })
             .collect::<Result<Vec<_>, _>>()?;
         let rms = |e: &JointSignals| Rms {
@@ -140,6 +162,7 @@ impl<'a> Diagnoser<'a> {
             after: rms(&after_nm),
             held_out,
             moved_parameters,
+            payload: None,
             detection_limits: self.detection_limits(&study, &accepted),
             lack_of_fit_probability: lack,
             verdict,
@@ -151,7 +174,29 @@ impl<'a> Diagnoser<'a> {
             .map(|k| regression.first_sample + k * regression.every)
             .collect();
         let scene = study.scene;
-        Ok(Finding { diagnosis, identification, scene, before_nm, after_nm, samples })
+        Ok(Finding { diagnosis, identification, scene, extension, before_nm, after_nm, samples })
+    }
+
+    /// Says whether `loaded` was recorded with a body on the flange that `reference`, diagnosed as
+    /// `finding`, did not have; a known mass also tells the drives' gains.
+    pub fn payload(
+        &mut self,
+        finding: &Finding,
+        reference: &Measurement,
+        loaded: &Measurement,
+        known_mass_kg: Option<f64>,
+    ) -> Result<PayloadFinding, DiagnoseError> {
+        let regressions =
+            [self.identifier.regression(reference)?, self.identifier.regression(loaded)?];
+        let shared = payload::Shared {
+            arm: self.arm,
+            set: self.set,
+            options: &self.options,
+            families: &self.families,
+            extension: &finding.extension,
+        };
+        let names = [reference.source, loaded.source];
+        payload::between(&shared, &regressions[0], &regressions[1], names, known_mass_kg)
     }
 
     fn cause(
@@ -233,67 +278,16 @@ impl<'a> Diagnoser<'a> {
     }
 }
 
-/// Residuals of both models on a log that neither has seen.
-fn held_out_gain(
-    identifier: &mut Identifier,
-    (arm, set, options): (&Arm, &BaseSet, &Options),
-    families: &[Box<dyn Candidate>],
-    log: &Validation,
-    (null, extension): (&Extension, &Extension),
-) -> Result<HeldOut, DiagnoseError> {
-    let mut regression = identifier.regression(&log.measurement)?;
-    move_to_common_motion(&mut regression, arm, set, &null.theta);
-    let prepared = &regression.prepared;
-    let moving = RunWhitening::moving_rows(&regression);
-    let whitening = if prepared.replicates.is_some() {
-        None
-    } else {
-        let weights = vec![1.0; arm.dof()];
-        Some(Whitening::Run(RunWhitening::new(&regression, options, &weights)?))
-    };
-    let scene = Scene::new(arm, set, &extension.theta, prepared);
-    let problem = &regression.problem;
-    let error = |model: &Extension| {
-        let predicted = model.torque_nm(families, &scene, problem, whitening.as_ref());
-        JointSignals::from_fn(problem.joints(), problem.samples, |j, k| {
-            let y = mean_period(&problem.panels[j].y, problem.samples);
-            y[k] - predicted.joint(j)[k]
-        })
-    };
-    let (before, after) = (error(null), error(extension));
-    let all = |e: &JointSignals| (0..e.joints()).map(|j| rms_where(e.joint(j), |_| true)).collect();
-    let moves = |e: &JointSignals| {
-        (0..e.joints()).map(|j| rms_where(e.joint(j), |k| moving[j][k])).collect()
-    };
-    let manufacturer_rms_nm = match log.manufacturer_nm {
-        Some(torque_nm) => {
-            let feed_forward =
-                identifier.regression(&Measurement { torque_nm, ..log.measurement })?;
-            let given = JointSignals::from_fn(problem.joints(), problem.samples, |j, k| {
-                let n = problem.samples;
-                mean_period(&problem.panels[j].y, n)[k]
-                    - mean_period(&feed_forward.problem.panels[j].y, n)[k]
-            });
-            Some(all(&given))
-        }
-        None => None,
-    };
-    Ok(HeldOut {
-        log: log.measurement.source.to_owned(),
-        before_rms_nm: all(&before),
-        after_rms_nm: all(&after),
-        before_moving_rms_nm: moves(&before),
-        after_moving_rms_nm: moves(&after),
-        manufacturer_rms_nm,
-    })
-}
-
-/// A log that no model has seen, to measure gains on.
-pub struct Validation<'a> {
-    /// Its channels.
-    pub measurement: Measurement<'a>,
-    /// The manufacturer's feed-forward, Nm.
-    pub manufacturer_nm: Option<&'a JointSignals>,
+/// Contacts in the residual of the extended model along a single run.
+fn beside_model(study: &Study, after_nm: &JointSignals) -> Vec<Cause> {
+    let Regression { prepared, first_sample, every, .. } = study.regression;
+    let at = |row: usize| first_sample + row * every;
+    let qd = &prepared.motion.qd_rad_s;
+    let qd = JointSignals::from_fn(qd.joints(), after_nm.samples(), |j, k| qd.joint(j)[at(k)]);
+    let (start_s, rate_hz) = (prepared.processing.window_s[0], prepared.processing.rate_hz);
+    let time_s: Vec<f64> =
+        (0..after_nm.samples()).map(|k| start_s + at(k) as f64 / rate_hz).collect();
+    contact::beside_model(after_nm, &qd, &time_s)
 }
 
 /// Residual of `model` in time, Nm: of the mean period, or of the run.
@@ -309,7 +303,8 @@ fn residual(study: &Study, model: &Extension) -> JointSignals {
     out
 }
 
-fn rms_where(e: &[f64], counts: impl Fn(usize) -> bool) -> f64 {
+/// Rms of the samples that count, Nm.
+pub(super) fn rms_where(e: &[f64], counts: impl Fn(usize) -> bool) -> f64 {
     let (mut square, mut count) = (0.0, 0usize);
     for (_, e) in e.iter().enumerate().filter(|(k, _)| counts(*k)) {
         square += e * e;

@@ -25,6 +25,14 @@ pub enum DiagnoseError {
         /// Frequency, Hz.
         frequency_hz: f64,
     },
+    /// Several logs together do not determine the unknowns.
+    #[error("{log}: the motions do not determine the {unknowns} unknowns that are asked for")]
+    Singular {
+        /// The log.
+        log: String,
+        /// Unknowns.
+        unknowns: usize,
+    },
     /// A parameter's column vanishes in the whitened equations.
     #[error("{log}: the motion does not excite {parameter} beyond its noise")]
     NotExcited {

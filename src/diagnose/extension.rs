@@ -89,7 +89,11 @@ impl Extension {
 
 impl Effect {
     /// The effect's columns with their coefficients.
-    fn columns(&self, families: &[Box<dyn Candidate>], scene: &Scene) -> Vec<(Column, f64)> {
+    pub(super) fn columns(
+        &self,
+        families: &[Box<dyn Candidate>],
+        scene: &Scene,
+    ) -> Vec<(Column, f64)> {
         let columns = families[self.family].columns(scene, self.site, self.shape);
         columns.into_iter().zip(self.coefficients.iter().copied()).collect()
     }

@@ -98,6 +98,21 @@ impl Kind {
 }
 
 impl Kind {
+    /// Whether it hangs on the direction of motion, so that it is undetermined at standstill.
+    pub fn is_friction(self) -> bool {
+        matches!(
+            self,
+            Self::Stribeck
+                | Self::NonlinearViscous
+                | Self::AsymmetricFriction
+                | Self::LoadFriction
+                | Self::Presliding
+                | Self::PositionFriction
+                | Self::ThermalDrift
+                | Self::FrictionChange
+        )
+    }
+
     /// Whether it is a fault of the recording, not of the arm.
     pub fn is_of_the_record(self) -> bool {
         matches!(

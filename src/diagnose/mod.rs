@@ -15,15 +15,19 @@
 pub mod candidates;
 
 mod against;
+mod clustered;
 mod common_motion;
+mod contact;
 mod data_faults;
 mod diagnoser;
 mod error;
 mod extension;
 mod gain;
+mod held_out;
 mod image;
 mod kind;
 mod misfit;
+mod payload;
 mod scene;
 mod selection;
 mod statistic;
@@ -31,11 +35,13 @@ mod study;
 mod verdict;
 mod whitening;
 
-pub use diagnoser::{Diagnoser, Finding, Validation};
+pub use diagnoser::{Diagnoser, Finding};
 pub use error::DiagnoseError;
 pub use extension::{Effect, Extension};
+pub use held_out::Validation;
 pub use image::Column;
 pub use kind::Kind;
+pub use payload::PayloadFinding;
 pub use scene::{Scene, equivalent_arm};
 pub use verdict::{
     Cause, DIAGNOSE_SCHEMA, DetectionLimit, Diagnosis, Estimate, HeldOut, Moved, Rival, Rms,

@@ -41,6 +41,9 @@ pub struct Scene {
     pub sign: JointSignals,
     /// Estimated Coulomb friction, Nm.
     pub coulomb_nm: Vec<f64>,
+    /// Half-width of the interval around each recorded angle in which the true one lies, rad; zero for
+    /// a motion that repeats, whose angles are averaged.
+    pub angle_doubt_rad: Vec<f64>,
     derivative: Derivative,
 }
 
@@ -92,7 +95,11 @@ impl Scene {
         } else {
             Derivative::Differences
         };
+        // Rounded to a quantum Δ, the true angle lies within ±Δ/2.
+        let doubt = |quantum: &f64| if periodic { 0.0 } else { 0.5 * quantum };
+        let angle_doubt_rad = prepared.angle_quantum_rad.iter().map(doubt).collect();
         Self {
+            angle_doubt_rad,
             coulomb_nm: (0..joints).map(|j| drive(j).coulomb_nm).collect(),
             rate_hz: prepared.processing.rate_hz,
             periods: prepared.processing.periods,

@@ -13,7 +13,7 @@ pub const FALSE_ALARM: f64 = 0.002;
 /// cause.
 const FORM_ERROR: f64 = 0.05;
 /// Causes at most: a log that needs more has another kind of problem.
-const MOST_CAUSES: usize = 12;
+const MOST_CAUSES: usize = 24;
 /// Families whose shapes are refined before one is chosen.
 const FINALISTS: usize = 10;
 /// Two effects are told apart with 99.9 % confidence and 90 % power where λ(1 − cos²) exceeds
@@ -53,19 +53,7 @@ pub struct Kept<'s, 'a> {
 /// Adds families one by one while the data ask for it.
 pub fn select(study: &Study) -> Vec<Contender> {
     let mut kept = Kept { study, causes: Vec::new() };
-    while kept.causes.len() < MOST_CAUSES {
-        let (others, residual) = kept.without(None);
-        let Some(best) = kept.contenders(None, &others, &residual).into_iter().next() else {
-            break;
-        };
-        if !kept.is_significant(&best, &others, &residual) {
-            break;
-        }
-        kept.causes.push(best);
-        if !kept.settle() {
-            break;
-        }
-    }
+    kept.grow();
     kept.causes
 }
 
@@ -82,6 +70,28 @@ impl<'s, 'a> Kept<'s, 'a> {
             kept.refine(c);
         }
         kept
+    }
+
+    /// Adds families one by one while the data ask for it.
+    pub fn grow(&mut self) {
+        let mut dropped: Vec<(usize, Option<usize>)> = Vec::new();
+        while self.causes.len() < MOST_CAUSES {
+            let (others, residual) = self.without(None);
+            // Where noise has a memory, the most evidence and the least chance need not go together.
+            let contenders = self.contenders(None, &others, &residual);
+            let significant = |c: &Contender| {
+                !dropped.contains(&(c.entry.family, c.entry.site))
+                    && self.is_significant(c, &others, &residual)
+            };
+            let Some(best) = contenders.into_iter().take(FINALISTS).find(significant) else {
+                break;
+            };
+            let place = (best.entry.family, best.entry.site);
+            self.causes.push(best);
+            if !self.settle() {
+                dropped.push(place);
+            }
+        }
     }
 
     /// The causes.
@@ -118,7 +128,7 @@ impl<'s, 'a> Kept<'s, 'a> {
     }
 
     /// 2 ln of the evidence (Schwarz 1978) for adding `entry`: T − k ln n, less the price of having
-    /// looked at so many shapes and families.
+    /// looked at so many shapes and families, and of being rare.
     fn evidence(&self, entry: &Entry, statistic: f64) -> f64 {
         let study = self.study;
         let n = study.statistic.sample_count(entry.site, study.residual.mean.len());
@@ -127,6 +137,7 @@ impl<'s, 'a> Kept<'s, 'a> {
             - entry.images.len() as f64 * n.ln()
             - 2.0 * grid.ln()
             - 2.0 * (study.hypotheses() as f64).ln()
+            + 2.0 * study.families[entry.family].prior_odds(entry.site).ln()
     }
 
     /// The best shape of every family at every site that is free (`open` is the cause to be replaced,
@@ -217,7 +228,9 @@ impl<'s, 'a> Kept<'s, 'a> {
         let span = study.span(&contender.entry, others);
         let single = study.statistic.probability(&span, residual);
         let tests = study.entries.len() as f64 + study.alternatives(&contender.entry);
-        contender.evidence > 0.0 && single * tests < FALSE_ALARM
+        contender.evidence > 0.0
+            && single * tests < FALSE_ALARM
+            && study.statistic.generalises(&span, residual)
     }
 
     /// Refines all causes jointly, exchanges those that another family now replaces, and drops those

@@ -23,6 +23,11 @@ pub enum Statistic {
     },
 }
 
+/// Stretches of time of the cross-validation.
+const FOLDS: usize = 10;
+/// Share of the explained square that has to be explained in left-out stretches as well.
+const KEPT_SHARE: f64 = 0.5;
+
 impl Statistic {
     /// For the rows of `whitening`, with the null model's `residual`.
     pub fn new(whitening: &Whitening, residual: &Image, joints: usize) -> Self {
@@ -93,6 +98,37 @@ impl Statistic {
                 FisherSnedecor::new(k as f64, (blocks - k) as f64).map_or(1.0, |d| d.sf(f))
             }
         }
+    }
+
+    /// Whether what `span` explains of `residual` is also explained in parts of the run that were left
+    /// out of the fit: blocked cross-validation in [`FOLDS`] stretches of time. Always true where noise
+    /// is known.
+    ///
+    /// With s_f = Uᵀr and G_f = UᵀU over stretch f, b₋f = (I − G_f)⁻¹ (Uᵀr − s_f), and the gain is
+    /// Σ_f 2 b₋fᵀ s_f − b₋fᵀ G_f b₋f.
+    pub fn generalises(&self, span: &Span, residual: &Image) -> bool {
+        let Self::Blocks { block_of, blocks, .. } = self else { return true };
+        let k = span.len();
+        let whole = DVector::from_vec(span.coordinates(residual));
+        let mut along = vec![DVector::<f64>::zeros(k); FOLDS];
+        let mut gram = vec![DMatrix::<f64>::zeros(k, k); FOLDS];
+        let directions: Vec<&[f64]> = span.directions().iter().map(|d| d.mean.as_slice()).collect();
+        for (row, (r, &block)) in residual.mean.iter().zip(block_of).enumerate() {
+            let fold = block * FOLDS / blocks;
+            for i in 0..k {
+                along[fold][i] += directions[i][row] * r;
+                for j in 0..k {
+                    gram[fold][(i, j)] += directions[i][row] * directions[j][row];
+                }
+            }
+        }
+        let mut gain = 0.0;
+        for (s, g) in along.iter().zip(&gram) {
+            let rest = DMatrix::identity(k, k) - g;
+            let Some(b) = rest.lu().solve(&(&whole - s)) else { return false };
+            gain += 2.0 * b.dot(s) - b.dot(&(g * &b));
+        }
+        gain > KEPT_SHARE * whole.norm_squared()
     }
 
     /// Covariance of the coordinates on `span` from the scatter of block sums of what is left.

@@ -118,6 +118,11 @@ impl<'a> Study<'a> {
         self
     }
 
+    /// Lets `residual` (of a better model than the null model) say how many rows are independent.
+    pub fn judge_by(&mut self, residual: &Image) {
+        self.statistic = Statistic::new(&self.whitening, residual, self.scene.joints());
+    }
+
     fn fill_entries(&mut self) {
         let study = &*self;
         let wanted: Vec<(usize, Option<usize>, Shape)> = study

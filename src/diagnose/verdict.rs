@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::kind::Kind;
+use super::payload::PayloadFinding;
 
 /// Schema of the diagnosis JSON.
 pub const DIAGNOSE_SCHEMA: &str = "armid.diagnose/1";
@@ -105,8 +106,16 @@ pub struct HeldOut {
     pub before_moving_rms_nm: Vec<f64>,
     /// With the causes, samples in which the joint moves.
     pub after_moving_rms_nm: Vec<f64>,
+    /// Without the causes, all samples, friction at standstill anywhere within ± Coulomb friction.
+    pub before_standstill_free_rms_nm: Vec<f64>,
+    /// With the causes, all samples, friction at standstill anywhere within ± Coulomb friction.
+    pub after_standstill_free_rms_nm: Vec<f64>,
     /// The manufacturer's feed-forward, all samples; null where it is not logged.
     pub manufacturer_rms_nm: Option<Vec<f64>>,
+    /// The manufacturer's feed-forward, samples in which the joint moves.
+    pub manufacturer_moving_rms_nm: Option<Vec<f64>>,
+    /// Share of samples in which the joint stands still.
+    pub standstill_fraction: Vec<f64>,
 }
 
 /// A parameter of the simulation against the data.
@@ -143,6 +152,8 @@ pub struct Diagnosis {
     pub held_out: Vec<HeldOut>,
     /// Parameters against the simulation.
     pub moved_parameters: Vec<Moved>,
+    /// A second log against this one.
+    pub payload: Option<PayloadFinding>,
     /// What would not be seen.
     pub detection_limits: Vec<DetectionLimit>,
     /// Probability that noise alone leaves this much behind the last cause; null for a single run.
@@ -168,6 +179,19 @@ pub enum Verdict {
 }
 
 impl Diagnosis {
+    /// Takes in what a second log says about a body on the flange.
+    pub fn add_payload(&mut self, payload: PayloadFinding) {
+        let cause = payload.cause();
+        if let (Verdict::NothingFound, Some(_)) = (self.verdict, &cause) {
+            self.verdict = Verdict::CauseNamed;
+            self.sentences.clear();
+        }
+        self.sentences.extend(cause.iter().map(Cause::sentence));
+        self.sentences.extend(payload.sentences());
+        self.causes.extend(cause);
+        self.payload = Some(payload);
+    }
+
     /// The first screen.
     pub(super) fn in_sentences(&self) -> Vec<String> {
         let mut out: Vec<String> = self.causes.iter().map(Cause::sentence).collect();
@@ -193,6 +217,11 @@ impl Diagnosis {
 
 impl Cause {
     fn sentence(&self) -> String {
+        match self.kind {
+            Kind::Contact => return self.contact_sentence(),
+            Kind::Payload => return self.payload_sentence(),
+            _ => {}
+        }
         let place = self.joint.map_or("The model".to_owned(), |j| format!("Joint {j}'s model"));
         let numbers: Vec<String> = self
             .parameters
@@ -224,6 +253,29 @@ impl Cause {
             text.push('.');
         }
         text
+    }
+}
+
+impl Cause {
+    fn contact_sentence(&self) -> String {
+        let value = |name: &str| self.parameters.get(name).map_or(f64::NAN, |e| e.value);
+        format!("From {:.2} s to {:.2} s {}.", value("start_s"), value("end_s"), self.in_words)
+    }
+
+    fn payload_sentence(&self) -> String {
+        let pair = |name: &str| {
+            let estimate = self.parameters.get(name);
+            let half = estimate.map_or(f64::NAN, |e| 0.25 * (e.ci95[1] - e.ci95[0]));
+            (estimate.map_or(f64::NAN, |e| e.value), half)
+        };
+        let (mass, mass_sigma) = pair("mass_kg");
+        let com = ["com_x_m", "com_y_m", "com_z_m"].map(pair);
+        let place = com.map(|(value, _)| format!("{value:.4}")).join(", ");
+        let sigma = com.map(|(_, sigma)| format!("{sigma:.4}")).join(", ");
+        format!(
+            "A body of {mass:.3} ± {mass_sigma:.3} kg at ({place}) ± ({sigma}) m on the flange (± one σ, last \
+             joint's frame)."
+        )
     }
 }
 

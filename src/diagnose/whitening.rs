@@ -66,7 +66,7 @@ const USED: f64 = 0.35;
 /// Rows kept of a single run, per second and hertz of its low-pass.
 const KEPT_RATE: f64 = 4.0;
 /// Blocks of a single run.
-const BLOCK_S: f64 = 2.0;
+const BLOCK_S: f64 = 1.0;
 /// A joint slower than this, rad/s, for as long as [`REST_S`] stands still.
 const REST_RAD_S: f64 = 0.02;
 const REST_S: f64 = 0.25;

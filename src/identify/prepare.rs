@@ -10,7 +10,7 @@ use crate::dynamics::Motion;
 use crate::robot::JointSignals;
 use crate::signal::{
     Activity, Decimator, FitScratch, HarmonicPower, PeriodicFit, Replicates, Resampler, Scratch,
-    ZeroPhase, central_4, find_period, natural_rate_hz, replicate_noise,
+    ZeroPhase, central_4, find_period, natural_rate_hz, quantum, replicate_noise,
 };
 
 /// The channels identification needs of a log, borrowed.
@@ -63,6 +63,8 @@ pub struct Prepared {
     /// The motion of every period for itself, with all harmonics up to [`Preparer::WIDE`]; only where
     /// it was asked for and the motion repeats.
     pub each_period: Option<Motion>,
+    /// Smallest distance between two recorded angles, per joint, rad.
+    pub angle_quantum_rad: Vec<f64>,
     /// How well the averaged acceleration is known, per joint; `None` for a single run.
     pub acceleration: Option<Vec<HarmonicPower>>,
     /// What was done.
@@ -141,7 +143,7 @@ impl Preparer {
         }
         match period {
             Some(period) if period.is_whole => {
-                self.periodic(&even, period.window, period.samples, warnings)
+                self.periodic(m, &even, (period.window, period.samples), warnings)
             }
             Some(period) => {
                 warnings.push(format!(
@@ -224,9 +226,9 @@ impl Preparer {
 
     fn periodic(
         &mut self,
+        m: &Measurement,
         even: &Even,
-        window: Range<usize>,
-        samples_per_period: usize,
+        (window, samples_per_period): (Range<usize>, usize),
         warnings: Vec<String>,
     ) -> Result<Prepared, IdentifyError> {
         let periods = window.len() / samples_per_period;
@@ -262,6 +264,7 @@ impl Preparer {
                 qdd_rad_s2: averaged.qdd_rad_s2,
             },
             each_period,
+            angle_quantum_rad: angle_quantum_rad(m),
             replicates: Some(replicate_noise(&torque_nm, samples_per_period)?),
             acceleration: Some(averaged.acceleration),
             torque_nm,
@@ -314,6 +317,7 @@ impl Preparer {
             },
             torque_nm: even.torque_nm.slice(window.clone()),
             each_period: None,
+            angle_quantum_rad: angle_quantum_rad(m),
             replicates: None,
             acceleration: None,
             processing: Processing {
@@ -330,6 +334,10 @@ impl Preparer {
             warnings,
         })
     }
+}
+
+fn angle_quantum_rad(m: &Measurement) -> Vec<f64> {
+    (0..m.q_rad.joints()).map(|j| quantum(m.q_rad.joint(j))).collect()
 }
 
 /// The samples of the experiment proper: the motion without standstill at its ends, and without

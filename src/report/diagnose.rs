@@ -67,6 +67,14 @@ pub fn held_out_table(diagnosis: &Diagnosis) -> Table {
         push("all, before", list(&log.before_rms_nm));
         push("all, after", list(&log.after_rms_nm));
         push("all, change", gain(&log.before_rms_nm, &log.after_rms_nm));
+        let (before, after) =
+            (&log.before_standstill_free_rms_nm, &log.after_standstill_free_rms_nm);
+        push("standstill free, before", list(before));
+        push("standstill free, after", list(after));
+        push("standstill free, change", gain(before, after));
+        if let Some(manufacturer) = &log.manufacturer_moving_rms_nm {
+            push("moving, manufacturer", list(manufacturer));
+        }
         if let Some(manufacturer) = &log.manufacturer_rms_nm {
             push("all, manufacturer", list(manufacturer));
         }

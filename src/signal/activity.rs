@@ -102,10 +102,11 @@ fn runs(flags: &[bool]) -> impl Iterator<Item = Range<usize>> {
 
 /// Smallest distance between two different values of the series: its resolution as recorded.
 /// Zero for a constant.
-fn quantum(series: &[f64]) -> f64 {
+pub fn quantum(series: &[f64]) -> f64 {
     let mut values = series.to_vec();
     values.sort_by(f64::total_cmp);
-    let scale = values.last().map_or(0.0, |v| v.abs()).max(values[0].abs());
+    let scale =
+        [values.first(), values.last()].into_iter().flatten().fold(0.0, |s: f64, v| s.max(v.abs()));
     // What differs by rounding alone is the same value.
     let distances = values.windows(2).map(|v| v[1] - v[0]).filter(|d| *d > 1e-12 * scale);
     let smallest = distances.fold(f64::INFINITY, f64::min);

@@ -31,7 +31,7 @@ mod replicates;
 mod resample;
 mod spectrum;
 
-pub use activity::Activity;
+pub use activity::{Activity, quantum};
 pub use butterworth::{Scratch, ZeroPhase};
 pub use decimate::Decimator;
 pub use differentiate::{central_2, central_4, hermite_acceleration};

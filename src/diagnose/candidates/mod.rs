@@ -72,6 +72,11 @@ pub trait Candidate: Sync {
         (0..joints).map(Some).collect()
     }
 
+    /// How common it is there beside the other families, before the log was seen.
+    fn prior_odds(&self, _site: Option<usize>) -> f64 {
+        1.0
+    }
+
     /// Shapes to begin with: fine enough that between two neighbours there is only one optimum.
     fn shapes(&self, _scene: &Scene, _site: Option<usize>) -> Vec<Shape> {
         vec![Shape { variant: 0, value: 0.0 }]

@@ -11,8 +11,10 @@ impl Candidate for NonlinearViscous {
     }
 
     fn shapes(&self, _: &Scene, _: Option<usize>) -> Vec<Shape> {
-        // At p = 0 and p = 1 the law is Coulomb's or linear.
-        [0.3, 0.5, 0.7, 1.4, 1.8, 2.2, 3.0].map(|value| Shape { variant: 0, value }).to_vec()
+        // At p = 0 and p = 1 the law is Coulomb's or linear: concave and convex are searched apart.
+        let concave = [0.3, 0.5, 0.7].map(|value| Shape { variant: 0, value });
+        let convex = [1.4, 1.8, 2.2, 3.0].map(|value| Shape { variant: 1, value });
+        concave.into_iter().chain(convex).collect()
     }
 
     fn search(&self) -> Search {

@@ -1,7 +1,11 @@
 //! Friction that builds up behind a reversal: τ = F (z − sign q̇), dz/dq = k (1 − z sign q̇) (Dahl 1968).
 //!
 //! z is propagated exactly along the motion: over a stretch of one direction of length Δ,
-//! z ← s + (z − s) e^{−kΔ}; a step within which the velocity reverses has two such stretches. Over a motion that repeats it is carried round until it repeats as well.
+//! z ← s + (z − s) e^{−kΔ}; a step within which the velocity reverses has two such stretches. Over a motion
+//! that repeats it is carried round until it repeats as well.
+//!
+//! The angle of a single run is followed with play: it moves only as far as the doubt about the recorded
+//! angles (their rounding) demands. Without, rounding at standstill would shake the friction loose.
 
 use super::*;
 
@@ -10,7 +14,8 @@ pub struct Presliding;
 
 /// z along joint `j`, for a stiffness `k` in 1/rad.
 fn deflection(scene: &Scene, j: usize, stiffness_per_rad: f64) -> Vec<f64> {
-    let (q, qd) = (scene.motion.q_rad.joint(j), scene.motion.qd_rad_s.joint(j));
+    let q = with_play(scene.motion.q_rad.joint(j), scene.angle_doubt_rad[j]);
+    let qd = scene.motion.qd_rad_s.joint(j);
     let step_s = 1.0 / scene.rate_hz;
     let mut z = vec![0.0; q.len()];
     let mut state = scene.sign.joint(j)[0];
@@ -20,7 +25,13 @@ fn deflection(scene: &Scene, j: usize, stiffness_per_rad: f64) -> Vec<f64> {
         let first = if scene.periodic { q.len() - 1 } else { 0 };
         let mut previous = (q[first], qd[first]);
         for (z, now) in z.iter_mut().zip(q.iter().copied().zip(qd.iter().copied())) {
-            for leg in legs(previous, now, step_s) {
+            // An angle that is known to a quantum only says itself where it went.
+            let way = if scene.angle_doubt_rad[j] > 0.0 {
+                [now.0 - previous.0, 0.0]
+            } else {
+                legs(previous, now, step_s)
+            };
+            for leg in way {
                 let direction = if leg >= 0.0 { 1.0 } else { -1.0 };
                 state = direction + (state - direction) * (-stiffness_per_rad * leg.abs()).exp();
             }
@@ -39,6 +50,17 @@ fn legs((q0, v0): (f64, f64), (q1, v1): (f64, f64), step_s: f64) -> [f64; 2] {
     }
     let turn = q0 + 0.5 * v0 * step_s * v0 / (v0 - v1);
     [turn - q0, q1 - turn]
+}
+
+/// The angle that stays within ± `half_width` of `q` and moves only when it must.
+fn with_play(q: &[f64], half_width: f64) -> Vec<f64> {
+    let mut angle = q[0];
+    q.iter()
+        .map(|q| {
+            angle = angle.clamp(q - half_width, q + half_width);
+            angle
+        })
+        .collect()
 }
 
 impl Candidate for Presliding {

@@ -12,9 +12,11 @@ impl Candidate for ThermalDrift {
     }
 
     fn shapes(&self, scene: &Scene, _: Option<usize>) -> Vec<Shape> {
-        // Slower than ten records the drift is a straight line in time.
+        // Slower than ten records the drift is a straight line in time. What ends early in a single run
+        // may be anything that happened once.
         let record = scene.duration_s();
-        geometric(record / 20.0, 5.0 * record, 5).map(|value| Shape { variant: 0, value }).collect()
+        let fastest = if scene.periodic { record / 20.0 } else { record / 2.0 };
+        geometric(fastest, 5.0 * record, 5).map(|value| Shape { variant: 0, value }).collect()
     }
 
     fn search(&self) -> Search {

@@ -1,0 +1,159 @@
+//! Gains on a log that was used neither for the fit nor for a choice.
+//!
+//! Every model goes through the same processing, nothing is fitted again, and three scores are kept
+//! apart: samples in which the joint moves (|q̇| > 0.02 rad/s), all samples with friction at standstill
+//! as the model says it, and all samples with friction at standstill anywhere in [−F, F]. Dry friction
+//! holds a joint that stands still against any torque up to F, so that no function of its speed can
+//! predict it: the third score leaves out what is unpredictable, for every model alike.
+
+use super::candidates::Candidate;
+use super::common_motion::move_to_common_motion;
+use super::diagnoser::rms_where;
+use super::error::DiagnoseError;
+use super::extension::{Extension, mean_period};
+use super::scene::Scene;
+use super::verdict::HeldOut;
+use super::whitening::{RunWhitening, Whitening};
+use crate::base::BaseSet;
+use crate::identify::{Identifier, MOVING_RAD_S, Measurement, Options, Regression};
+use crate::robot::{Arm, JointSignals};
+
+/// A log that no model has seen, to measure gains on.
+pub struct Validation<'a> {
+    /// Its channels.
+    pub measurement: Measurement<'a>,
+    /// The manufacturer's feed-forward, Nm.
+    pub manufacturer_nm: Option<&'a JointSignals>,
+}
+
+/// The models that are compared.
+pub(super) struct Models<'a> {
+    /// Rigid body, Coulomb and viscous friction, offset.
+    pub(super) null: &'a Extension,
+    /// With the causes.
+    pub(super) extension: &'a Extension,
+}
+
+/// Residuals of both models on a log that neither has seen.
+pub(super) fn held_out_gain(
+    identifier: &mut Identifier,
+    (arm, set, options): (&Arm, &BaseSet, &Options),
+    families: &[Box<dyn Candidate>],
+    log: &Validation,
+    models: &Models,
+) -> Result<HeldOut, DiagnoseError> {
+    let mut regression = identifier.regression(&log.measurement)?;
+    move_to_common_motion(&mut regression, arm, set, &models.null.theta);
+    let prepared = &regression.prepared;
+    let whitening = if prepared.replicates.is_some() {
+        None
+    } else {
+        let weights = vec![1.0; arm.dof()];
+        Some(Whitening::Run(RunWhitening::new(&regression, options, &weights)?))
+    };
+    let scene = Scene::new(arm, set, &models.extension.theta, prepared);
+    let problem = &regression.problem;
+    let (joints, samples) = (problem.joints(), problem.samples);
+    let measured: Vec<Vec<f64>> =
+        problem.panels.iter().map(|panel| mean_period(&panel.y, samples)).collect();
+    let error = |model: &Extension| {
+        let predicted = model.torque_nm(families, &scene, problem, whitening.as_ref());
+        JointSignals::from_fn(joints, samples, |j, k| measured[j][k] - predicted.joint(j)[k])
+    };
+    let rows = Rows::of(&regression);
+    let coulomb: Vec<f64> = (0..joints).map(|j| coulomb_nm(set, &models.null.theta, j)).collect();
+    let outside_friction = |model: &Extension| {
+        let bare = without_friction(model, set, families);
+        let mut e = error(model);
+        let free = error(&bare);
+        for (j, coulomb) in coulomb.iter().enumerate() {
+            let free = free.joint(j).iter();
+            for ((e, free), rests) in e.joint_mut(j).iter_mut().zip(free).zip(&rows.rests[j]) {
+                if *rests {
+                    *e = free.signum() * (free.abs() - coulomb).max(0.0);
+                }
+            }
+        }
+        e
+    };
+    let all = |e: &JointSignals| (0..joints).map(|j| rms_where(e.joint(j), |_| true)).collect();
+    let moving = |e: &JointSignals| -> Vec<f64> {
+        (0..joints).map(|j| rms_where(e.joint(j), |k| rows.moves[j][k])).collect()
+    };
+    let manufacturer = match log.manufacturer_nm {
+        Some(torque_nm) => {
+            let given = identifier.regression(&Measurement { torque_nm, ..log.measurement })?;
+            let panels = &given.problem.panels;
+            Some(JointSignals::from_fn(joints, samples, |j, k| {
+                measured[j][k] - mean_period(&panels[j].y, samples)[k]
+            }))
+        }
+        None => None,
+    };
+    let (before, after) = (error(models.null), error(models.extension));
+    Ok(HeldOut {
+        log: log.measurement.source.to_owned(),
+        standstill_fraction: rows.standstill_fractions(),
+        before_rms_nm: all(&before),
+        after_rms_nm: all(&after),
+        before_moving_rms_nm: moving(&before),
+        after_moving_rms_nm: moving(&after),
+        before_standstill_free_rms_nm: all(&outside_friction(models.null)),
+        after_standstill_free_rms_nm: all(&outside_friction(models.extension)),
+        manufacturer_rms_nm: manufacturer.as_ref().map(all),
+        manufacturer_moving_rms_nm: manufacturer.as_ref().map(moving),
+    })
+}
+
+/// Which samples of the regression count as what, per joint.
+struct Rows {
+    /// |q̇| > 0.02 rad/s.
+    moves: Vec<Vec<bool>>,
+    /// Within a rest of a quarter of a second or longer.
+    rests: Vec<Vec<bool>>,
+}
+
+impl Rows {
+    fn of(regression: &Regression) -> Self {
+        let qd = &regression.prepared.motion.qd_rad_s;
+        let at = |row: usize| regression.first_sample + row * regression.every;
+        let samples = regression.problem.samples;
+        let moves = (0..qd.joints())
+            .map(|j| (0..samples).map(|r| qd.joint(j)[at(r)].abs() > MOVING_RAD_S).collect());
+        let runs = RunWhitening::moving_rows(regression);
+        let rests = runs.iter().map(|runs| runs.iter().map(|run| !run).collect());
+        Self { moves: moves.collect(), rests: rests.collect() }
+    }
+
+    fn standstill_fractions(&self) -> Vec<f64> {
+        let share = |rests: &Vec<bool>| {
+            rests.iter().filter(|rests| **rests).count() as f64 / rests.len().max(1) as f64
+        };
+        self.rests.iter().map(share).collect()
+    }
+}
+
+/// Coulomb friction of joint `j` in the base parameters `theta`, Nm.
+fn coulomb_nm(set: &BaseSet, theta: &[f64], j: usize) -> f64 {
+    coulomb_index(set, j).map_or(0.0, |k| theta[k].abs())
+}
+
+/// The base parameter that stands for joint `j`'s Coulomb friction.
+fn coulomb_index(set: &BaseSet, j: usize) -> Option<usize> {
+    let name = format!("rc{}", j + 1);
+    (0..set.rank()).find(|&k| set.name(k) == name)
+}
+
+/// `model` without what depends on the direction of motion.
+fn without_friction(
+    model: &Extension,
+    set: &BaseSet,
+    families: &[Box<dyn Candidate>],
+) -> Extension {
+    let mut bare = model.clone();
+    bare.effects.retain(|effect| !families[effect.family].kind().is_friction());
+    for k in (0..).map_while(|j| coulomb_index(set, j)) {
+        bare.theta[k] = 0.0;
+    }
+    bare
+}

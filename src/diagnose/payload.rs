@@ -1,0 +1,389 @@
+//! What changed between two logs of the same arm: a body on the flange.
+//!
+//! Both logs share the base parameters and the effects that were found in the first; the second may have
+//! a body on the flange (ten inertial parameters, about the last joint's frame) and friction of other
+//! size, as another day makes it. The motions need not be the same.
+//!
+//! A known mass M gives the scale of the drive gains: with gains that are off by a common factor every
+//! identified mass is, so that true gain = M/m̂ × assumed gain. Joint by joint the body's torque enters
+//! with a factor a_j of its own (Gautier and Briot 2014, with the mass as the known quantity); 1/a_j is the
+//! scale of that joint's gain.
+
+use serde::Serialize;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::candidates::Candidate;
+use super::clustered::{Equations, Solution, solve};
+use super::error::DiagnoseError;
+use super::extension::Extension;
+use super::kind::Kind;
+use super::scene::Scene;
+use super::selection::FALSE_ALARM;
+use super::verdict::{Cause, Estimate};
+use super::whitening::{RunWhitening, Whitening};
+use crate::base::BaseSet;
+use crate::dynamics::{Parameter, ParameterLayout};
+use crate::identify::{Options, Regression};
+use crate::robot::Arm;
+
+/// What a second log says about a body on the flange.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PayloadFinding {
+    /// The log without the body.
+    pub reference: String,
+    /// Mass, kg.
+    pub mass_kg: Estimate,
+    /// First moments m·c about the last joint's frame, kg m.
+    pub first_moment_kg_m: [Estimate; 3],
+    /// Centre of mass in the last joint's frame, m; meaningful where the body is named.
+    pub com_m: [Estimate; 3],
+    /// Probability of such a mass and first moment by chance.
+    pub probability: f64,
+    /// Whether a body is named.
+    pub is_named: bool,
+    /// Scale of all drive gains that the known mass implies; null where none was given.
+    pub gain_scale: Option<Estimate>,
+    /// The same joint by joint.
+    pub joint_gain_scales: Option<Vec<Estimate>>,
+    /// Change of Coulomb friction per joint from the first log to the second, Nm.
+    pub coulomb_change_nm: Vec<Estimate>,
+}
+
+/// What stays the same for both logs.
+pub(super) struct Shared<'a> {
+    pub(super) arm: &'a Arm,
+    pub(super) set: &'a BaseSet,
+    pub(super) options: &'a Options,
+    pub(super) families: &'a [Box<dyn Candidate>],
+    /// Base parameters and effects found in the first log.
+    pub(super) extension: &'a Extension,
+}
+
+/// Inertial parameters of a body.
+const BODY: usize = 10;
+/// Mass and first moments: what a body cannot be without.
+const STATIC: usize = 4;
+/// Length of the blocks, s.
+const BLOCK_S: f64 = 2.0;
+/// Rows kept per joint and log.
+const MOST_ROWS: usize = 8000;
+/// The load on the gears, which some effects depend on, is known better with the body.
+const ROUNDS: usize = 2;
+/// Gauss–Newton steps for gains and first moments together.
+const STEPS: usize = 4;
+
+/// Compares the log behind `second` with the one behind `first`, named `names`.
+pub(super) fn between(
+    shared: &Shared,
+    first: &Regression,
+    second: &Regression,
+    names: [&str; 2],
+    known_mass_kg: Option<f64>,
+) -> Result<PayloadFinding, DiagnoseError> {
+    let set = shared.set;
+    let joints = shared.arm.dof();
+    let body = body_in_base(set, joints);
+    let mut loaded_theta = shared.extension.theta.clone();
+    let layout = Layout::new(set, shared.extension, joints);
+    let unloaded = equations(shared, &layout, first, &shared.extension.theta, 0)?;
+    let offset = blocks(&unloaded);
+    let mut fit: Option<(Vec<Equations>, Solution)> = None;
+    for _ in 0..ROUNDS {
+        let mut all = clone_of(&unloaded);
+        let mut loaded = equations(shared, &layout, second, &loaded_theta, offset)?;
+        for e in &mut loaded {
+            layout.add_friction_change(e);
+            for (c, terms) in body.iter().enumerate() {
+                let column = combination(&e.columns, terms);
+                e.columns.set_column(layout.body + c, &column);
+            }
+        }
+        all.extend(loaded);
+        let solution = solve(&all, joints, names[1])?;
+        for (k, theta) in loaded_theta.iter_mut().enumerate() {
+            let change: f64 = (0..BODY).map(|c| body[c][k] * solution.x[layout.body + c]).sum();
+            *theta = solution.x[k] + change;
+        }
+        fit = Some((all, solution));
+    }
+    let Some((all, solution)) = fit else {
+        return Err(DiagnoseError::Singular { log: names[1].to_owned(), unknowns: layout.count });
+    };
+    let x: Vec<f64> = (0..BODY).map(|c| solution.x[layout.body + c]).collect();
+    let mass = x[0];
+    let unit_vector = |at: usize| {
+        let mut g = [0.0; STATIC];
+        g[at] = 1.0;
+        g
+    };
+    let estimate =
+        |value: f64, g: &[f64], unit: &'static str| solution.estimate(value, layout.body, g, unit);
+    let mass_kg = estimate(mass, &unit_vector(0), "kg");
+    let first_moment_kg_m = [1, 2, 3].map(|a| estimate(x[a], &unit_vector(a), "kg m"));
+    let com_m = [1, 2, 3].map(|a| {
+        let mut g = [0.0; STATIC];
+        g[a] = 1.0 / mass;
+        g[0] = -x[a] / (mass * mass);
+        estimate(x[a] / mass, &g, "m")
+    });
+    let probability = solution.probability(layout.body, STATIC);
+    let is_named = probability < FALSE_ALARM && mass_kg.ci95[0] > 0.0;
+    let gain_scale = known_mass_kg
+        .filter(|_| is_named)
+        .map(|known| estimate(known / mass, &[-known / (mass * mass), 0.0, 0.0, 0.0], ""));
+    let joint_gain_scales = match known_mass_kg.filter(|_| is_named) {
+        Some(known) => Some(joint_gains(&all, &layout, joints, &x, known, names[1])?),
+        None => None,
+    };
+    let coulomb_change_nm = (0..joints)
+        .map(|j| {
+            let at = layout.friction + 3 * j;
+            solution.estimate(solution.x[at], at, &[1.0], "Nm")
+        })
+        .collect();
+    Ok(PayloadFinding {
+        reference: names[0].to_owned(),
+        mass_kg,
+        first_moment_kg_m,
+        com_m,
+        probability,
+        is_named,
+        gain_scale,
+        joint_gain_scales,
+        coulomb_change_nm,
+    })
+}
+
+impl PayloadFinding {
+    /// As a cause, if a body is named.
+    pub fn cause(&self) -> Option<Cause> {
+        if !self.is_named {
+            return None;
+        }
+        let sigma = 0.25 * (self.mass_kg.ci95[1] - self.mass_kg.ci95[0]);
+        let [x, y, z] = self.com_m.clone();
+        let parameters =
+            [("mass_kg", self.mass_kg.clone()), ("com_x_m", x), ("com_y_m", y), ("com_z_m", z)];
+        Some(Cause {
+            kind: Kind::Payload,
+            joint: None,
+            class: Vec::new(),
+            confidence: 1.0 - self.probability,
+            parameters: parameters.into(),
+            gain_fraction: None,
+            separating_experiment: None,
+            strength: self.mass_kg.value / sigma,
+            in_words: "a body on the flange".to_owned(),
+            rivals: Vec::new(),
+        })
+    }
+
+    /// What is said where no body is named, and what a known mass says about the drives.
+    pub fn sentences(&self) -> Vec<String> {
+        let pair = |e: &Estimate| format!("{:.3} ± {:.3}", e.value, 0.25 * (e.ci95[1] - e.ci95[0]));
+        let mut out = Vec::new();
+        if !self.is_named {
+            out.push(format!(
+                "No body on the flange beside {}: {} kg, which chance explains (p = {:.2}).",
+                self.reference,
+                pair(&self.mass_kg),
+                self.probability
+            ));
+        }
+        if let Some(scale) = &self.gain_scale {
+            out.push(format!(
+                "With the mass known, all drive gains are to be multiplied by {}.",
+                pair(scale)
+            ));
+        }
+        if let Some(scales) = &self.joint_gain_scales {
+            let told: Vec<String> = scales
+                .iter()
+                .enumerate()
+                .map(|(j, scale)| {
+                    let half = 0.5 * (scale.ci95[1] - scale.ci95[0]);
+                    if half < TOLD_WITHIN * scale.value {
+                        format!("joint {}: {}", j + 1, pair(scale))
+                    } else {
+                        format!("joint {}: not told by these motions", j + 1)
+                    }
+                })
+                .collect();
+            out.push(format!("Joint by joint: {}.", told.join(", ")));
+        }
+        out
+    }
+}
+
+/// A gain is told if its 95 % interval is within this share of it: two sources rarely differ by less.
+const TOLD_WITHIN: f64 = 0.1;
+
+/// Where the unknowns stand.
+struct Layout {
+    base: usize,
+    /// First of the body's parameters.
+    body: usize,
+    /// First of the changes of Coulomb, viscous friction and offset, three per joint.
+    friction: usize,
+    /// Their base parameters, per joint.
+    friction_base: Vec<[Option<usize>; 3]>,
+    count: usize,
+}
+
+impl Layout {
+    fn new(set: &BaseSet, extension: &Extension, joints: usize) -> Self {
+        let base = set.rank();
+        let effects: usize = extension.effects.iter().map(|e| e.coefficients.len()).sum();
+        let body = base + effects;
+        let friction = body + BODY;
+        let named = |name: String| (0..base).find(|&k| set.name(k) == name);
+        let friction_base = (1..=joints)
+            .map(|j| ["rc", "rv", "off"].map(|symbol| named(format!("{symbol}{j}"))))
+            .collect();
+        Self { base, body, friction, friction_base, count: friction + 3 * joints }
+    }
+
+    fn add_friction_change(&self, e: &mut Equations) {
+        for (c, base) in self.friction_base[e.joint].iter().enumerate() {
+            if let Some(base) = base {
+                let column = e.columns.column(*base).into_owned();
+                e.columns.set_column(self.friction + 3 * e.joint + c, &column);
+            }
+        }
+    }
+}
+
+/// The last body's ten parameters in base parameters.
+fn body_in_base(set: &BaseSet, joints: usize) -> Vec<Vec<f64>> {
+    let layout = ParameterLayout::new(joints);
+    let of = |k: usize| {
+        let mut standard = vec![0.0; layout.count()];
+        standard[layout.index(Parameter::Body(joints - 1, k))] = 1.0;
+        set.values(&standard)
+    };
+    (0..BODY).map(of).collect()
+}
+
+/// Σ_k terms_k column_k of the base parameters' columns.
+fn combination(columns: &DMatrix<f64>, terms: &[f64]) -> DVector<f64> {
+    let mut sum = DVector::zeros(columns.nrows());
+    for (k, term) in terms.iter().enumerate().filter(|(_, t)| **t != 0.0) {
+        sum.axpy(*term, &columns.column(k), 1.0);
+    }
+    sum
+}
+
+fn blocks(equations: &[Equations]) -> usize {
+    equations.iter().flat_map(|e| &e.block_of).max().map_or(0, |b| b + 1)
+}
+
+fn clone_of(equations: &[Equations]) -> Vec<Equations> {
+    let copy = |e: &Equations| Equations {
+        joint: e.joint,
+        columns: e.columns.clone(),
+        torque_nm: e.torque_nm.clone(),
+        block_of: e.block_of.clone(),
+    };
+    equations.iter().map(copy).collect()
+}
+
+/// Base parameters and effects along one log, in samples in which the joint moves.
+fn equations(
+    shared: &Shared,
+    layout: &Layout,
+    regression: &Regression,
+    theta: &[f64],
+    first_block: usize,
+) -> Result<Vec<Equations>, DiagnoseError> {
+    let Shared { arm, set, options, families, extension } = shared;
+    let prepared = &regression.prepared;
+    let problem = &regression.problem;
+    let scene = Scene::new(arm, set, theta, prepared);
+    let whitening = if scene.periodic {
+        None
+    } else {
+        let weights = vec![1.0; arm.dof()];
+        Some(Whitening::Run(RunWhitening::new(regression, options, &weights)?))
+    };
+    let moving = RunWhitening::moving_rows(regression);
+    let (n, periods) = (problem.samples, problem.periods);
+    let thin = (n * periods).div_ceil(MOST_ROWS).max(1);
+    let block_rows = ((BLOCK_S * problem.rate_hz) as usize).max(1);
+    let mut out = Vec::with_capacity(problem.joints());
+    for (j, panel) in problem.panels.iter().enumerate() {
+        let rows: Vec<usize> =
+            (0..n * periods).step_by(thin).filter(|row| moving[j][row % n]).collect();
+        let mut columns = DMatrix::zeros(rows.len(), layout.count);
+        for (base, x) in problem.plan.base_indices(j).zip(panel.x.chunks_exact(n)) {
+            for (value, row) in columns.column_mut(base).iter_mut().zip(&rows) {
+                *value = x[row % n];
+            }
+        }
+        let mut at = layout.base;
+        for effect in &extension.effects {
+            for (column, _) in effect.columns(families, &scene) {
+                for (_, y) in column.parts.iter().filter(|(joint, _)| *joint == j) {
+                    let y = whitening.as_ref().map_or_else(|| y.clone(), |w| w.as_regressed(y));
+                    for (value, row) in columns.column_mut(at).iter_mut().zip(&rows) {
+                        *value = y[row % y.len()];
+                    }
+                }
+                at += 1;
+            }
+        }
+        out.push(Equations {
+            joint: j,
+            columns,
+            torque_nm: DVector::from_iterator(rows.len(), rows.iter().map(|row| panel.y[*row])),
+            block_of: rows.iter().map(|row| first_block + row / block_rows).collect(),
+        });
+    }
+    Ok(out)
+}
+
+/// Scale 1/a_j of every joint's drive gain, the body's mass known.
+fn joint_gains(
+    all: &[Equations],
+    layout: &Layout,
+    joints: usize,
+    body: &[f64],
+    known_kg: f64,
+    log: &str,
+) -> Result<Vec<Estimate>, DiagnoseError> {
+    let mut factors = vec![body[0] / known_kg; joints];
+    // The body's other parameters as a gain of one would show them.
+    let mut rest: Vec<f64> = body[1..].iter().map(|p| p * known_kg / body[0]).collect();
+    let mut scales = Vec::new();
+    for _ in 0..STEPS {
+        let mut linear = clone_of(all);
+        for (e, original) in linear.iter_mut().zip(all) {
+            let columns = |c: usize| original.columns.column(layout.body + c);
+            let mut torque = columns(0) * known_kg;
+            for (c, value) in rest.iter().enumerate() {
+                torque.axpy(*value, &columns(c + 1), 1.0);
+                let scaled = columns(c + 1) * factors[e.joint];
+                e.columns.set_column(layout.body + c + 1, &scaled);
+            }
+            e.columns.column_mut(layout.body).fill(0.0);
+            let rows = e.columns.nrows();
+            e.columns = std::mem::replace(&mut e.columns, DMatrix::zeros(0, 0)).resize(
+                rows,
+                layout.count + joints,
+                0.0,
+            );
+            e.columns.set_column(layout.count + e.joint, &torque);
+        }
+        let solution = solve(&linear, joints, log)?;
+        for (c, value) in rest.iter_mut().enumerate() {
+            *value += solution.x[layout.body + c + 1];
+        }
+        scales.clear();
+        for (j, factor) in factors.iter_mut().enumerate() {
+            *factor = solution.x[layout.count + j];
+            let slope = -factor.powi(-2);
+            scales.push(solution.estimate(1.0 / *factor, layout.count + j, &[slope], ""));
+        }
+    }
+    Ok(scales)
+}
