@@ -15,6 +15,7 @@ pub mod study;
 mod study_cutoff;
 mod study_paper;
 mod study_physical;
+mod study_real_arm;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;

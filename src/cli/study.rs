@@ -7,6 +7,7 @@ use clap::{Args, Subcommand};
 use super::study_cutoff::{self, CutoffArgs};
 use super::study_paper::{self, PaperArgs};
 use super::study_physical::{self, PhysicalArgs};
+use super::study_real_arm::{self, RealArmArgs};
 use super::{CommandResult, Outcome, Progress};
 use crate::montecarlo::Scenario;
 use crate::montecarlo::study::{NoiseStudy, study};
@@ -31,6 +32,8 @@ enum Topic {
     Physical(PhysicalArgs),
     /// Where the low-pass should sit: bias and scatter against its cutoff, by formula and measured.
     Cutoff(CutoffArgs),
+    /// What a real UR10e's rigid model gets wrong, from its public logs.
+    RealArm(RealArmArgs),
 }
 
 #[derive(Debug, Args)]
@@ -62,6 +65,7 @@ pub fn run(args: &StudyArgs) -> CommandResult {
         Topic::Paper(args) => study_paper::run(args),
         Topic::Physical(args) => study_physical::run(args),
         Topic::Cutoff(args) => study_cutoff::run(args),
+        Topic::RealArm(args) => study_real_arm::run(args),
     }
 }
 

@@ -72,14 +72,14 @@ pub fn between_periods(m: &Measurement) -> Result<Option<Repeated>, SignalError>
     let mut raw = JointSignals::zeros(joints, n);
     let mut smooth = JointSignals::zeros(joints, n);
     let mut counts = vec![vec![false; n]; joints];
-    for j in 0..joints {
+    for (j, counts) in counts.iter_mut().enumerate() {
         let mut values = torque.joint(j).to_vec();
         filter.filter_in_place(&mut values, &mut Scratch::default())?;
         let refined = period.refined_samples;
         for k in period.window.clone() {
             raw.joint_mut(j)[k] = deviation(torque.joint(j), k, refined, &period.window);
             smooth.joint_mut(j)[k] = deviation(&values, k, refined, &period.window);
-            counts[j][k] = true;
+            counts[k] = true;
         }
     }
     let touches = touches(&smooth, &counts, rate_hz, FAR);

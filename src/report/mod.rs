@@ -18,6 +18,7 @@ pub mod paper_study;
 pub mod physical;
 pub mod physical_study;
 pub mod plot;
+pub mod real_arm;
 mod status;
 mod table;
 

@@ -1,0 +1,168 @@
+//! `armid study real-arm`: the case study of a real UR10e from its public logs.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::identify::{LoadedLog, SourceArgs};
+use super::{CommandResult, Outcome};
+use crate::base::{BaseSet, Parameterisation};
+use crate::diagnose::{Cause, Diagnoser, Finding, Kind, Validation};
+use crate::dynamics::Model;
+use crate::identify::Options;
+use crate::log::Effort;
+use crate::output::{check_writable, write_atomically};
+use crate::report::json::Program;
+use crate::report::real_arm::{Pair, RealArmStudy, Recorded};
+use crate::robot::Arm;
+
+#[derive(Debug, Args)]
+pub(super) struct RealArmArgs {
+    /// Folder with the logs (dataset_ur10e of github.com/shamilmamedov/dynamic_calibration), or one that
+    /// holds it as ur10e/.
+    #[arg(long)]
+    data: PathBuf,
+    /// Write the report as Markdown.
+    #[arg(long)]
+    markdown: Option<PathBuf>,
+    /// Write the report as one HTML page.
+    #[arg(long)]
+    report: Option<PathBuf>,
+}
+
+/// The body that the authors bolted to the flange, kg.
+const KNOWN_KG: f64 = 2.805;
+const TRAINING: &str = "ur-20_02_19_14harm50sec.csv";
+const HELD_OUT: [&str; 3] = [
+    "ur-20_02_10-30sec_12harm.csv",
+    "ur-20_02_12-50sec_12harm.csv",
+    "ur-20_01_17-ptp_10_points.csv",
+];
+const LOADED: &str = "ur-20_02_19_14harm50secLoad.csv";
+const SECOND_PAIR: [&str; 2] = ["ur-20_01_31-unload.csv", "ur-20_01_31-load.csv"];
+const CONTACTS: [&str; 2] = ["collision_2link.csv", "collision_free.csv"];
+const LAYOUTS: [&str; 2] = ["ur10e_innopolis", "ur10e_innopolis_author"];
+
+/// Runs the command.
+pub(super) fn run(args: &RealArmArgs) -> CommandResult {
+    for path in [&args.markdown, &args.report].into_iter().flatten() {
+        check_writable(path)?;
+    }
+    let inside = args.data.join("ur10e");
+    let folder = if inside.is_dir() { inside } else { args.data.clone() };
+    let sources = LAYOUTS.map(|layout| SourceArgs { robot: "ur10e".into(), layout: layout.into() });
+    let arm = sources[0].arm()?;
+    let set = BaseSet::find(&arm, Parameterisation::full(arm.dof(), arm.torque_offsets))?;
+    let model = Model::new(&arm);
+    let read = |source: &SourceArgs, file: &str| -> Result<LoadedLog, Box<dyn std::error::Error>> {
+        let mut logs = source.read(&arm, &[folder.join(file)])?;
+        logs.pop().ok_or_else(|| format!("{file}: not read").into())
+    };
+    let mut diagnoser = Diagnoser::new(&arm, &model, &set, Options::default());
+
+    let training = read(&sources[0], TRAINING)?;
+    let held_out = HELD_OUT.iter().map(|f| read(&sources[0], f)).collect::<Result<Vec<_>, _>>()?;
+    let manufacturer =
+        held_out.iter().map(|l| l.log.target_torque_nm(&arm)).collect::<Result<Vec<_>, _>>()?;
+    let validations: Vec<Validation> = held_out
+        .iter()
+        .zip(&manufacturer)
+        .map(|(log, own)| Validation {
+            measurement: log.measurement(),
+            manufacturer_nm: own.as_ref(),
+        })
+        .collect();
+    let finding = diagnoser.diagnose(&training.measurement(), &validations, None)?;
+
+    let loaded = read(&sources[0], LOADED)?;
+    let [unload, load] = [read(&sources[0], SECOND_PAIR[0])?, read(&sources[0], SECOND_PAIR[1])?];
+    let second = diagnoser.diagnose(&unload.measurement(), &[], None)?;
+    let mut pairs = Vec::new();
+    let mut compare = |diagnoser: &mut Diagnoser,
+                       finding: &Finding,
+                       [first, other]: [&LoadedLog; 2],
+                       truth: &'static str,
+                       gains: &'static str|
+     -> CommandResult {
+        let measurements = (first.measurement(), other.measurement());
+        let finding =
+            diagnoser.payload(finding, &measurements.0, &measurements.1, Some(KNOWN_KG))?;
+        pairs.push(Pair { file: name(other), truth, gains, finding });
+        Ok(Outcome::Done)
+    };
+    let (body, bare) = ("2.805 kg", "nothing");
+    compare(&mut diagnoser, &finding, [&training, &loaded], body, "controller's")?;
+    compare(&mut diagnoser, &second, [&unload, &load], body, "controller's")?;
+    for log in held_out.iter().take(2).chain([&unload]) {
+        compare(&mut diagnoser, &finding, [&training, log], bare, "controller's")?;
+    }
+    let others = [read(&sources[1], TRAINING)?, read(&sources[1], LOADED)?];
+    let other = diagnoser.diagnose(&others[0].measurement(), &[], None)?;
+    compare(&mut diagnoser, &other, [&others[0], &others[1]], body, "authors'")?;
+
+    let touched = CONTACTS.iter().map(|f| read(&sources[0], f)).collect::<Result<Vec<_>, _>>()?;
+    let mut contacts = Vec::new();
+    for log in &touched {
+        let finding = diagnoser.diagnose(&log.measurement(), &[], None)?;
+        let is_contact = |c: &Cause| c.kind == Kind::Contact;
+        let found = finding.diagnosis.causes.into_iter().filter(is_contact).collect();
+        contacts.push((name(log), found));
+    }
+
+    let roles =
+        [(&training, "training: every fit and every choice"), (&loaded, "body on the flange")]
+            .into_iter()
+            .chain(held_out.iter().map(|l| (l, "held out: gains only")))
+            .chain([(&unload, "second pair, bare"), (&load, "second pair, with the body")])
+            .chain(touched.iter().map(|l| (l, "contact")));
+    let recorded: Vec<Recorded> = roles
+        .map(|(log, role)| {
+            let rows = &log.log.rows;
+            let time_s = &log.log.time_s;
+            let seconds = time_s.last().unwrap_or(&0.0) - time_s.first().unwrap_or(&0.0);
+            let rows = [rows.used, rows.read - rows.used];
+            Recorded { file: name(log), role, rows, seconds }
+        })
+        .collect();
+    let inputs = [&training, &loaded, &unload, &load]
+        .into_iter()
+        .chain(&held_out)
+        .chain(&touched)
+        .map(|l| l.input.clone())
+        .collect();
+    let gains_nm_a = [gains_of(&training, &arm), gains_of(&others[0], &arm)];
+    let other_gains = other.diagnosis.causes;
+    let study = RealArmStudy {
+        arm: arm.clone(),
+        recorded,
+        finding,
+        other_gains,
+        gains_nm_a,
+        pairs,
+        contacts,
+    };
+    let program = Program::new(std::env::args(), None, inputs);
+    let text = study.markdown(&program.command)?;
+    println!("{text}");
+    if let Some(path) = &args.markdown {
+        write_atomically(path, |out| out.write_all(text.as_bytes()))?;
+    }
+    if let Some(path) = &args.report {
+        study.page(program)?.write(path)?;
+    }
+    Ok(Outcome::Done)
+}
+
+fn name(log: &LoadedLog) -> String {
+    let path = &log.input.path;
+    path.file_name()
+        .map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned())
+}
+
+/// The drive gains with which the log's currents became torques, Nm/A.
+fn gains_of(log: &LoadedLog, arm: &Arm) -> Vec<f64> {
+    match &log.log.effort {
+        Effort::Current { gain_nm_a: Some(gains), .. } => gains.clone(),
+        _ => arm.joints.iter().map(|joint| joint.drive.gain_nm_a()).collect(),
+    }
+}
