@@ -30,6 +30,10 @@ const TOGETHER_S: f64 = 0.3;
 const MARGIN_S: f64 = 0.2;
 /// The median over fewer periods is moved by one contact.
 const FEWEST_PERIODS: usize = 3;
+/// Joints that differ by less than this share of their rms amplitude, in the median, move alike.
+const SAME_MOTION: f64 = 0.02;
+/// σ over the median of |x| for Gaussian x.
+const ROBUST: f64 = 1.4826;
 /// Gaps up to this many steps are bridged.
 const LONGEST_GAP_STEPS: f64 = 10.0;
 /// A joint slower than this, rad/s, or so shortly before or behind, s, may be held by friction.
@@ -63,7 +67,10 @@ pub fn between_periods(m: &Measurement) -> Result<Option<Repeated>, SignalError>
     }
     let q_rad = grid.angles(m.q_rad, m.qd_rad_s)?;
     let Some(period) = find_period(&q_rad)? else { return Ok(None) };
-    if period.periods < FEWEST_PERIODS {
+    let refined = period.refined_samples;
+    let window = with_disturbed_periods(&q_rad, refined, period.window);
+    let periods = (window.len() as f64 / refined + 0.01) as usize;
+    if periods < FEWEST_PERIODS {
         return Ok(None);
     }
     let torque = grid.straight(m.torque_nm)?;
@@ -72,17 +79,23 @@ pub fn between_periods(m: &Measurement) -> Result<Option<Repeated>, SignalError>
     let mut raw = JointSignals::zeros(joints, n);
     let mut smooth = JointSignals::zeros(joints, n);
     let mut counts = vec![vec![false; n]; joints];
+    let mut sigma = vec![0.0; joints];
     for (j, counts) in counts.iter_mut().enumerate() {
         let mut values = torque.joint(j).to_vec();
         filter.filter_in_place(&mut values, &mut Scratch::default())?;
-        let refined = period.refined_samples;
-        for k in period.window.clone() {
-            raw.joint_mut(j)[k] = deviation(torque.joint(j), k, refined, &period.window);
-            smooth.joint_mut(j)[k] = deviation(&values, k, refined, &period.window);
+        for k in window.clone() {
+            raw.joint_mut(j)[k] = deviation(torque.joint(j), k, refined, &window);
+            smooth.joint_mut(j)[k] = deviation(&values, k, refined, &window);
             counts[k] = true;
         }
+        // Far apart, so that a drift counts as scatter.
+        let lag = ((periods / 2) as f64 * refined) as usize;
+        let pairs = (window.start..window.end - lag).map(|k| (values[k + lag] - values[k]).abs());
+        sigma[j] = ROBUST * median(&mut pairs.collect::<Vec<_>>()) / std::f64::consts::SQRT_2;
     }
-    let touches = touches(&smooth, &counts, rate_hz, FAR);
+    let mut touches = touches(&smooth, &counts, &sigma, rate_hz, FAR);
+    // What lasts for half a period is no contact: friction that drifts, or another motion.
+    touches.retain(|touch| (touch.samples.len() as f64) < 0.5 * refined);
     if touches.is_empty() {
         return Ok(None);
     }
@@ -128,7 +141,44 @@ pub fn beside_model(
             counts
         })
         .collect();
-    touches(error_nm, &counts, rate_hz, FAR_OF_MODEL).iter().map(|t| t.cause(time_s)).collect()
+    let sigma: Vec<f64> = counts
+        .iter()
+        .enumerate()
+        .map(|(j, counts)| {
+            let values = error_nm.joint(j).iter().zip(counts);
+            let mut sizes: Vec<f64> = values.filter(|(_, c)| **c).map(|(e, _)| e.abs()).collect();
+            ROBUST * median(&mut sizes)
+        })
+        .collect();
+    let touches = touches(error_nm, &counts, &sigma, rate_hz, FAR_OF_MODEL);
+    touches.iter().map(|touch| touch.cause(time_s)).collect()
+}
+
+/// `window`, longer by whole periods in which most of the motion repeats: a contact moves the arm for a
+/// moment, and that period is then not among those that repeat throughout.
+fn with_disturbed_periods(q_rad: &JointSignals, period: f64, window: Range<usize>) -> Range<usize> {
+    let step = period.round() as usize;
+    let amplitude = |q: &[f64]| {
+        let mean = q.iter().sum::<f64>() / q.len() as f64;
+        (q.iter().map(|q| (q - mean).powi(2)).sum::<f64>() / q.len() as f64).sqrt()
+    };
+    let limits: Vec<f64> =
+        (0..q_rad.joints()).map(|j| SAME_MOTION * amplitude(q_rad.joint(j)) + 1e-9).collect();
+    let repeats = |from: usize, to: usize| {
+        limits.iter().enumerate().all(|(j, limit)| {
+            let q = q_rad.joint(j);
+            let differences = (0..step).map(|k| (q[from + k] - q[to + k]).abs());
+            median(&mut differences.collect::<Vec<_>>()) < *limit
+        })
+    };
+    let Range { mut start, mut end } = window;
+    while start >= step && repeats(start - step, start) {
+        start -= step;
+    }
+    while end + step <= q_rad.samples() && repeats(end, end - step) {
+        end += step;
+    }
+    start..end
 }
 
 /// y(k) minus the median of y at the same phase in all periods.
@@ -157,17 +207,11 @@ fn median(values: &mut [f64]) -> f64 {
 fn touches(
     deviation_nm: &JointSignals,
     counts: &[Vec<bool>],
+    sigma: &[f64],
     rate_hz: f64,
     far: f64,
 ) -> Vec<Touch> {
     let (joints, n) = (deviation_nm.joints(), deviation_nm.samples());
-    let sigma: Vec<f64> = (0..joints)
-        .map(|j| {
-            let values = deviation_nm.joint(j).iter().zip(&counts[j]);
-            let mut sizes: Vec<f64> = values.filter(|(_, c)| **c).map(|(d, _)| d.abs()).collect();
-            1.4826 * median(&mut sizes)
-        })
-        .collect();
     let gap = (TOGETHER_S * rate_hz) as usize;
     let mut out: Vec<Touch> = Vec::new();
     let score = |j: usize, k: usize| {

@@ -75,7 +75,8 @@ impl<'s, 'a> Kept<'s, 'a> {
     /// Adds families one by one while the data ask for it.
     pub fn grow(&mut self) {
         let mut dropped: Vec<(usize, Option<usize>)> = Vec::new();
-        while self.causes.len() < MOST_CAUSES {
+        // Two causes may replace each other for ever: rounds are counted, not causes.
+        for _ in 0..MOST_CAUSES {
             let (others, residual) = self.without(None);
             // Where noise has a memory, the most evidence and the least chance need not go together.
             let contenders = self.contenders(None, &others, &residual);
