@@ -114,6 +114,8 @@ pub struct Constrained {
 
 /// Relative duality gap at which a solution counts: far below what an estimate's σ could show.
 const GAP: f64 = 1e-8;
+/// The same for solutions of which only sums are used: of draws, and of left-out periods.
+pub(super) const ROUGH_GAP: f64 = 1e-6;
 
 impl Solver {
     /// For data about the arm of `structure`.
@@ -145,7 +147,7 @@ impl Solver {
         };
         let prior = Pulling { metric, weight };
         let data = self.data(&information, prior);
-        let constrained = self.solve(&data, &(&information.root * &information.theta))?;
+        let constrained = self.solve(&data, &(&information.root * &information.theta), GAP)?;
         let noise = information.whitened(covariance);
         let realisable = realisability(&self.structure, &information.theta)?;
         let draws = bootstrap(
@@ -186,7 +188,7 @@ impl Solver {
         prior: Pulling,
     ) -> Result<Constrained, PhysicalError> {
         let data = self.data(information, prior);
-        self.solve(&data, &(&information.root * &information.theta))
+        self.solve(&data, &(&information.root * &information.theta), GAP)
     }
 
     /// The program of data with this information and pull to the prior.
@@ -208,16 +210,17 @@ impl Solver {
         Data { map, pull, pull_constant, program }
     }
 
-    /// Solves for a whitened right-hand side ρ = R θ̂.
+    /// Solves for a whitened right-hand side ρ = R θ̂ to a relative duality gap.
     pub(super) fn solve(
         &self,
         data: &Data,
         rho: &DVector<f64>,
+        gap: f64,
     ) -> Result<Constrained, PhysicalError> {
         let mut program = data.program.clone();
         program.linear = data.map.tr_mul(rho) + &data.pull;
         let constant = 0.5 * rho.norm_squared() + data.pull_constant;
-        let solution = program.solve(self.structure.start.clone(), constant, GAP)?;
+        let solution = program.solve(self.structure.start.clone(), constant, gap)?;
         Ok(Constrained {
             distance: (&data.map * &solution.y - rho).norm_squared(),
             certificate: Certificate {

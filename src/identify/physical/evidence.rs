@@ -6,7 +6,7 @@ use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::error::PhysicalError;
-use super::estimate::{Constrained, Data, PhysicalOptions, Solver};
+use super::estimate::{Constrained, Data, PhysicalOptions, ROUGH_GAP, Solver};
 use super::scatter::{Deviations, Sigma};
 
 /// Whether the unconstrained estimate belongs to any set of links, and what making it so cost.
@@ -108,7 +108,7 @@ pub(super) fn bootstrap(
     let mut larger = 0;
     for _ in 0..options.bootstrap {
         let noise = DVector::from_fn(expected.len(), |_, _| StandardNormal.sample(&mut rng));
-        let drawn = solver.solve(data, &(&expected + noise_root * noise))?;
+        let drawn = solver.solve(data, &(&expected + noise_root * noise), ROUGH_GAP)?;
         larger += usize::from(drawn.distance >= constrained.distance);
         deviations.add(solver.structure(), &(drawn.y - &constrained.y));
     }

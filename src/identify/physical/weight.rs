@@ -7,7 +7,7 @@ use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 use super::error::PhysicalError;
-use super::estimate::Solver;
+use super::estimate::{ROUGH_GAP, Solver};
 use super::information::Information;
 
 /// How a deviation from the prior is measured. Both are ½ tr(P₀⁻¹ΔP P₀⁻¹ΔP) for small deviations and
@@ -120,7 +120,7 @@ pub(super) fn cross_validate(
         for left_out in periods {
             let left_out = DVector::from_column_slice(left_out);
             let kept = (&information.theta * p - &left_out) / (p - 1.0);
-            let constrained = solver.solve(&data, &(&kept_information.root * kept))?;
+            let constrained = solver.solve(&data, &(&kept_information.root * kept), ROUGH_GAP)?;
             let predicted = &solver.structure().base_map * &constrained.y;
             error += (&single_root * (predicted - left_out)).norm_squared();
         }
