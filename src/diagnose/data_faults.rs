@@ -22,6 +22,9 @@ const SMALL_LAG_SAMPLES: f64 = 0.01;
 /// A step of this part of the rms change from sample to sample adds a tenth to the variance of the noise:
 /// white noise changes by √2 σ, a step s adds s²/12.
 const COARSE: f64 = 0.77;
+/// A step as large as the rms change between samples leaves errors that repeat with the motion, as physics
+/// does.
+const TOO_COARSE: f64 = 1.0;
 /// Blocks for the scatter of the lag.
 const BLOCKS: usize = 20;
 /// Student's t₁₉ for a chance of 10⁻⁵ in two tails, six joints.
@@ -211,27 +214,47 @@ fn repeated_or_missing(m: &Measurement) -> Option<Cause> {
     })
 }
 
-/// Single torque values far off both neighbours, on the same side of both: a step is off one of them.
+/// Joints with single torque values far off.
 fn outliers(m: &Measurement) -> Vec<Cause> {
     (0..m.torque_nm.joints())
         .filter_map(|j| {
-            let y = m.torque_nm.joint(j);
-            let steps: Vec<f64> = y.windows(2).map(|w| w[1] - w[0]).collect();
-            let limit = FAR * robust_sigma(&steps);
-            let is_peak = |w: &&[f64]| w[0] * w[1] < 0.0 && w[0].abs().min(w[1].abs()) > limit;
-            let count = steps.windows(2).filter(is_peak).count();
+            let count = far_off(m.torque_nm.joint(j)).len();
             (count >= 3).then(|| {
-                let parameters = [("fraction", exact(count as f64 / y.len() as f64, ""))];
-                cause(
-                    Kind::Outliers,
-                    Some(j),
-                    "single values of torque that are far off",
-                    FAR,
-                    &parameters,
-                )
+                let parameters =
+                    [("fraction", exact(count as f64 / m.torque_nm.samples() as f64, ""))];
+                let words = "single values of torque that are far off";
+                cause(Kind::Outliers, Some(j), words, FAR, &parameters)
             })
         })
         .collect()
+}
+
+/// Samples far off the median of five, which follows a step, and that median.
+fn far_off(y: &[f64]) -> Vec<(usize, f64)> {
+    let steps: Vec<f64> = y.windows(2).map(|w| w[1] - w[0]).collect();
+    let limit = FAR * robust_sigma(&steps);
+    y.windows(5)
+        .enumerate()
+        .map(|(k, window)| (k + 2, median(&mut window.to_vec())))
+        .filter(|&(k, middle)| (y[k] - middle).abs() > limit)
+        .collect()
+}
+
+/// The torques of `m` with the outliers named in `faults` replaced by what is beside them.
+pub fn without_outliers(m: &Measurement, faults: &[Cause]) -> JointSignals {
+    let mut out = m.torque_nm.clone();
+    for j in faults.iter().filter(|f| f.kind == Kind::Outliers).filter_map(|f| f.joint) {
+        for (k, middle) in far_off(m.torque_nm.joint(j - 1)) {
+            out.joint_mut(j - 1)[k] = middle;
+        }
+    }
+    out
+}
+
+/// Joints (0-based) whose torque is too coarse to say more than that.
+pub fn coarse_joints(faults: &[Cause]) -> Vec<usize> {
+    let coarse = |f: &&Cause| f.kind == Kind::Quantisation && f.strength > TOO_COARSE;
+    faults.iter().filter(coarse).filter_map(|f| f.joint).map(|j| j - 1).collect()
 }
 
 /// Torques that are whole multiples of a step that is coarse against what changes between samples.

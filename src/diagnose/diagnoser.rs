@@ -82,7 +82,8 @@ impl<'a> Diagnoser<'a> {
     ) -> Result<Finding, DiagnoseError> {
         let mut faults = data_faults::find(m);
         let qd_rad_s = data_faults::without_lag(m, &faults);
-        let m = &Measurement { qd_rad_s: &qd_rad_s, ..*m };
+        let torque_nm = data_faults::without_outliers(m, &faults);
+        let m = &Measurement { qd_rad_s: &qd_rad_s, torque_nm: &torque_nm, ..*m };
         let touched = contact::between_periods(m)?;
         let torque_nm = touched.as_ref().map_or(m.torque_nm, |t| &t.torque_nm);
         let m = &Measurement { torque_nm, ..*m };
@@ -92,7 +93,8 @@ impl<'a> Diagnoser<'a> {
         move_to_common_motion(&mut regression, self.arm, self.set, &fit.theta);
         let sources = (self.arm, self.set, &self.options);
         let estimate = (&fit.theta[..], &fit.joint_sigma_nm[..]);
-        let first = Study::new(&self.families, sources, &regression, estimate, m.source)?;
+        let mut first = Study::new(&self.families, sources, &regression, estimate, m.source)?;
+        first.leave_out(data_faults::coarse_joints(&faults));
         let null = Extension::fit(&first, &[], &first.torque);
         let found = select(&first);
         // The load on the gear is better known once friction is.

@@ -49,7 +49,7 @@ pub fn unexplained(
     let scene = &study.scene;
     let mut best: Option<(f64, f64, Unexplained)> = None;
     let mut tests = 0.0;
-    for j in 0..scene.joints() {
+    for j in (0..scene.joints()).filter(|j| !study.left_out.contains(j)) {
         let torque_rate = scene.derivative(scene.torque_nm.joint(j));
         let time: Vec<f64> = (0..scene.samples()).map(|k| k as f64 / scene.rate_hz).collect();
         let axes: [(&'static str, &[f64]); 6] = [

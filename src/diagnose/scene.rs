@@ -39,6 +39,8 @@ pub struct Scene {
     pub torque_nm: JointSignals,
     /// tanh(q̇/ε).
     pub sign: JointSignals,
+    /// Noise of one sample of torque, Nm; zero where no period repeats to show it.
+    pub noise_nm: Vec<f64>,
     /// Estimated Coulomb friction, Nm.
     pub coulomb_nm: Vec<f64>,
     /// Half-width of the interval around each recorded angle in which the true one lies, rad; zero for
@@ -98,7 +100,9 @@ impl Scene {
         // Rounded to a quantum Δ, the true angle lies within ±Δ/2.
         let doubt = |quantum: &f64| if periodic { 0.0 } else { 0.5 * quantum };
         let angle_doubt_rad = prepared.angle_quantum_rad.iter().map(doubt).collect();
+        let noise_nm = prepared.replicates.as_ref().map_or(vec![0.0; joints], |r| r.sigma.clone());
         Self {
+            noise_nm,
             angle_doubt_rad,
             coulomb_nm: (0..joints).map(|j| drive(j).coulomb_nm).collect(),
             rate_hz: prepared.processing.rate_hz,

@@ -12,6 +12,8 @@ pub const FALSE_ALARM: f64 = 0.002;
 /// A family's law is right to this share of its own size: what is smaller on the same joint is no second
 /// cause.
 const FORM_ERROR: f64 = 0.05;
+/// 2 ln of the odds for a cause, at least: seven to one.
+const LEAST_EVIDENCE: f64 = 4.0;
 /// Causes at most: a log that needs more has another kind of problem.
 const MOST_CAUSES: usize = 24;
 /// Families whose shapes are refined before one is chosen.
@@ -200,6 +202,7 @@ impl<'s, 'a> Kept<'s, 'a> {
         let Some(torque) = study.whitening.in_time(residual) else { return Vec::new() };
         (0..study.scene.joints())
             .into_par_iter()
+            .filter(|j| !study.left_out.contains(j))
             .flat_map(|j| {
                 let shapes = strongest_orders(&study.scene, j, torque.joint(j));
                 shapes
@@ -229,7 +232,7 @@ impl<'s, 'a> Kept<'s, 'a> {
         let span = study.span(&contender.entry, others);
         let single = study.statistic.probability(&span, residual);
         let tests = study.entries.len() as f64 + study.alternatives(&contender.entry);
-        contender.evidence > 0.0
+        contender.evidence > LEAST_EVIDENCE
             && single * tests < FALSE_ALARM
             && study.statistic.generalises(&span, residual)
     }

@@ -47,6 +47,8 @@ pub struct Study<'a> {
     pub entries: Vec<Entry>,
     /// Measured torque there.
     pub torque: Image,
+    /// Joints (0-based) whose readings are too bad to look for physics in them.
+    pub left_out: Vec<usize>,
 }
 
 /// A column that keeps less than this share of its length outside the null model is not seen.
@@ -106,6 +108,7 @@ impl<'a> Study<'a> {
             statistic,
             entries: Vec::new(),
             torque,
+            left_out: Vec::new(),
         };
         study.fill_entries();
         Ok(study)
@@ -123,6 +126,12 @@ impl<'a> Study<'a> {
         self.statistic = Statistic::new(&self.whitening, residual, self.scene.joints());
     }
 
+    /// Looks for nothing on these joints any more.
+    pub fn leave_out(&mut self, joints: Vec<usize>) {
+        self.entries.retain(|e| e.site.is_none_or(|j| !joints.contains(&j)));
+        self.left_out = joints;
+    }
+
     fn fill_entries(&mut self) {
         let study = &*self;
         let wanted: Vec<(usize, Option<usize>, Shape)> = study
@@ -131,7 +140,10 @@ impl<'a> Study<'a> {
             .enumerate()
             .flat_map(|(family, candidate)| {
                 let scene = &study.scene;
-                candidate.sites(scene.joints()).into_iter().flat_map(move |site| {
+                let sites = candidate.sites(scene.joints()).into_iter();
+                let looked_at =
+                    |site: &Option<usize>| site.is_none_or(|j| !study.left_out.contains(&j));
+                sites.filter(looked_at).flat_map(move |site| {
                     let shapes = candidate.shapes(scene, site);
                     shapes.into_iter().map(move |shape| (family, site, shape))
                 })

@@ -69,7 +69,7 @@ impl Candidate for Presliding {
     }
 
     fn shapes(&self, _: &Scene, _: Option<usize>) -> Vec<Shape> {
-        geometric(20.0, 10_000.0, 10).map(|value| Shape { variant: 0, value }).collect()
+        geometric(20.0, 100_000.0, 13).map(|value| Shape { variant: 0, value }).collect()
     }
 
     fn search(&self) -> Search {

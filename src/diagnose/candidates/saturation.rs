@@ -1,9 +1,22 @@
-//! A drive at its limit: torque beyond ±c is cut off.
+//! A drive at its limit: torque beyond ±c is cut off, and its noise with it. With σ the noise of one sample,
+//! the mean of what is cut above is E max(0, τ + n − c) = x Φ(x/σ) + σ φ(x/σ), x = τ − c.
 
 use super::*;
+use statrs::function::erf::erfc;
 
 /// See the module.
 pub struct Saturation;
+
+/// E max(0, x + n), n normal with standard deviation `sigma`.
+fn beyond(x: f64, sigma: f64) -> f64 {
+    if x.abs() >= 8.0 * sigma {
+        return x.max(0.0);
+    }
+    let u = x / sigma;
+    let below = 0.5 * erfc(-u * std::f64::consts::FRAC_1_SQRT_2);
+    let density = (-0.5 * u * u).exp() / std::f64::consts::TAU.sqrt();
+    x * below + sigma * density
+}
 
 impl Candidate for Saturation {
     fn kind(&self) -> Kind {
@@ -22,7 +35,8 @@ impl Candidate for Saturation {
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let j = joint(site);
         let torque = scene.torque_nm.joint(j);
-        let cut = |t: f64| t.clamp(-shape.value, shape.value) - t;
+        let noise_nm = scene.noise_nm[j];
+        let cut = |t: f64| beyond(-t - shape.value, noise_nm) - beyond(t - shape.value, noise_nm);
         vec![Column::on(j, samples(scene, |k| cut(torque[k])))]
     }
 

@@ -10,13 +10,24 @@ impl Candidate for Spring {
         Kind::Spring
     }
 
-    fn columns(&self, scene: &Scene, site: Option<usize>, _: Shape) -> Vec<Column> {
-        let j = joint(site);
-        let q = scene.motion.q_rad.joint(j).to_vec();
-        vec![Column::on(j, q), Column::on(j, vec![1.0; scene.samples()])]
+    fn shapes(&self, _: &Scene, _: Option<usize>) -> Vec<Shape> {
+        // Where the null model absorbs the angle, the pull at zero is all that is left of a spring.
+        [0, 1].map(|variant| Shape { variant, value: 0.0 }).to_vec()
     }
 
-    fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
+    fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
+        let j = joint(site);
+        let constant = Column::on(j, vec![1.0; scene.samples()]);
+        if shape.variant == 1 {
+            return vec![constant];
+        }
+        vec![Column::on(j, scene.motion.q_rad.joint(j).to_vec()), constant]
+    }
+
+    fn quantities(&self, _: &Scene, _: Option<usize>, shape: Shape, b: &[f64]) -> Vec<Quantity> {
+        if shape.variant == 1 {
+            return vec![quantity("pull_at_zero_nm", b[0], "Nm")];
+        }
         // The constant is the estimate's own where it fits offsets.
         let rest_rad = b.get(1).map_or(f64::NAN, |constant| -constant / b[0]);
         vec![quantity("stiffness_nm_rad", b[0], "Nm/rad"), quantity("rest_rad", rest_rad, "rad")]
