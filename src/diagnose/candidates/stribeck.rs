@@ -1,4 +1,4 @@
-//! Friction that falls, or rises, with speed near rest: τ = F e^{−(|q̇|/v_s)ⁿ} sign q̇, n = 2 or 1 (Stribeck 1902; Armstrong-Hélouvry,
+//! Friction that falls with speed near rest: τ = F e^{−(|q̇|/v_s)ⁿ} sign q̇, n = 2 or 1 (Stribeck 1902; Armstrong-Hélouvry,
 //! Dupont and Canudas de Wit 1994).
 
 use super::*;
@@ -43,7 +43,11 @@ impl Candidate for Stribeck {
         "constant speeds in a slow staircase down to 0.005 rad/s, both directions"
     }
 
+    fn is_possible(&self, b: &[f64]) -> bool {
+        b[0] > 0.0
+    }
+
     fn in_words(&self) -> &'static str {
-        "friction that changes near rest and settles with speed (Stribeck)"
+        "friction that is larger near rest and falls with speed (Stribeck)"
     }
 }

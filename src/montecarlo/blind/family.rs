@@ -175,9 +175,9 @@ impl Family {
         };
         match self.kind {
             Kind::Stribeck => {
-                let (sign, vs_rad_s) = (sign(rng), log_uniform(rng, [0.03, 0.3]));
+                let vs_rad_s = log_uniform(rng, [0.03, 0.3]);
                 Recipe::linear(0.1 * coulomb, 0.8 * coulomb, move |s| {
-                    Effect::Stribeck(Stribeck { joint, extra_nm: sign * s, vs_rad_s })
+                    Effect::Stribeck(Stribeck { joint, extra_nm: s, vs_rad_s })
                 })
             }
             Kind::NonlinearViscous => {
