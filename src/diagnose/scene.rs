@@ -31,7 +31,7 @@ pub struct Scene {
     /// Torque that moves the links along the motion as it was recorded, Nm.
     recorded_nm: JointSignals,
     /// Torque that moves the links, Nm. In a motion that repeats it, and the load, have only the
-    /// harmonics that are known well: see [`TrustedHarmonics`].
+    /// harmonics that are known a hundred times better than their noise.
     pub link_nm: JointSignals,
     /// Torque on the gear: links and rotors, Nm.
     pub load_nm: JointSignals,

@@ -173,7 +173,7 @@ impl Structure {
 
     /// Adds weight·D of every pull, D = tr(A y) − ln det(A y) − d: the logarithm as a barrier among
     /// `constraints`, the trace to −cᵀy; returns −Σ weight·d. Where the prior is zero there is no
-    /// logarithm, and the pull is the square. H is given [`ENTROPIC_CURVATURE`] of the square as well,
+    /// logarithm, and the pull is the square. H is given `ENTROPIC_CURVATURE` of the square as well,
     /// because data alone leave it singular.
     pub fn add_divergences(
         &self,

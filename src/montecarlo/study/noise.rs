@@ -38,7 +38,7 @@ const METHODS: [(E, C, bool); 17] = [
     (E::Spectral, C::Periods, true),
 ];
 
-/// See [`METHODS`].
+/// Of `METHODS`, the slow ones are run on every so many trials.
 pub const SLOW_EVERY: u64 = 5;
 
 /// All scenarios of a study.
