@@ -13,6 +13,7 @@ mod prior;
 pub mod simulate;
 pub mod study;
 mod study_cutoff;
+mod study_output;
 mod study_paper;
 mod study_physical;
 mod study_real_arm;
@@ -43,6 +44,14 @@ pub fn exit_code(result: CommandResult) -> ExitCode {
             eprintln!("error: {error}");
             ExitCode::FAILURE
         }
+    }
+}
+
+/// Threads asked for, or one per core.
+fn threads_or_all(asked: Option<u16>) -> usize {
+    match asked {
+        Some(threads) => usize::from(threads),
+        None => std::thread::available_parallelism().map_or(1, usize::from),
     }
 }
 

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use clap::{Args, Parser, Subcommand};
 
-use super::{CommandResult, Outcome, Progress, interrupt_flag};
+use super::{CommandResult, Outcome, Progress, interrupt_flag, threads_or_all};
 use crate::montecarlo::blind::{Benchmark, BlindContent, SCORES_SCHEMA, Scores};
 use crate::montecarlo::calibration::Verdict;
 use crate::montecarlo::shard::{
@@ -195,10 +195,7 @@ fn run_shard<T: Trials>(
     trials: u64,
     range: Range<u64>,
 ) -> Timed<Shard<T::Content>> {
-    let threads = match args.threads {
-        Some(threads) => usize::from(threads),
-        None => std::thread::available_parallelism().map_or(1, usize::from),
-    };
+    let threads = threads_or_all(args.threads);
     let file = args.out.as_ref().map(|folder| shard_path(folder, &range));
     let mut shard = Shard::new(experiment, trials, range);
     if let Some(file) = file.as_deref().filter(|file| file.exists()) {

@@ -5,14 +5,14 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::study_cutoff::{self, CutoffArgs};
+use super::study_output::StudyOutput;
 use super::study_paper::{self, PaperArgs};
 use super::study_physical::{self, PhysicalArgs};
 use super::study_real_arm::{self, RealArmArgs};
-use super::{CommandResult, Outcome, Progress};
+use super::{CommandResult, Progress, threads_or_all};
 use crate::montecarlo::Scenario;
 use crate::montecarlo::study::{NoiseStudy, study};
-use crate::output::{check_writable, write_atomically};
-use crate::report::json::{Document, Input, Program};
+use crate::report::json::{Input, Program};
 use crate::report::noise_study::{markdown, page};
 
 /// Studies over many scenarios.
@@ -47,15 +47,8 @@ struct NoiseArgs {
     /// Threads; all cores where left out.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
-    /// Write the tables as Markdown.
-    #[arg(long)]
-    markdown: Option<PathBuf>,
-    /// Write a page with plots.
-    #[arg(long)]
-    report: Option<PathBuf>,
-    /// Write the numbers as JSON.
-    #[arg(long)]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    output: StudyOutput,
 }
 
 /// Runs the command.
@@ -70,13 +63,8 @@ pub fn run(args: &StudyArgs) -> CommandResult {
 }
 
 fn noise(args: &NoiseArgs) -> CommandResult {
-    for path in [&args.markdown, &args.report, &args.json].into_iter().flatten() {
-        check_writable(path)?;
-    }
-    let threads = match args.threads {
-        Some(threads) => usize::from(threads),
-        None => std::thread::available_parallelism().map_or(1, usize::from),
-    };
+    args.output.check()?;
+    let threads = threads_or_all(args.threads);
     let mut results = NoiseStudy { scenarios: Vec::new() };
     let mut inputs = Vec::new();
     for path in &args.scenarios {
@@ -91,17 +79,5 @@ fn noise(args: &NoiseArgs) -> CommandResult {
         progress.finish();
     }
     let program = Program::new(std::env::args(), None, inputs);
-    let text = markdown(&results, &program.command);
-    println!("{text}");
-    if let Some(path) = &args.markdown {
-        write_atomically(path, |out| out.write_all(text.as_bytes()))?;
-    }
-    if let Some(path) = &args.json {
-        Document { schema: "armid.study-noise/1", program: &program, body: &results }
-            .write(path)?;
-    }
-    if let Some(path) = &args.report {
-        page(&results, program)?.write(path)?;
-    }
-    Ok(Outcome::Done)
+    args.output.write("armid.study-noise/1", &results, program, markdown, page)
 }

@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{CommandResult, Outcome, Progress};
+use super::study_output::StudyOutput;
+use super::{CommandResult, Progress};
 use crate::excitation::FourierSeries;
 use crate::montecarlo::Scenario;
 use crate::montecarlo::study::{paper_study, paper_study_runs};
-use crate::output::{check_writable, write_atomically};
-use crate::report::json::{Document, Input, Program};
+use crate::report::json::{Input, Program};
 use crate::report::paper_study::{markdown, page};
 
 #[derive(Debug, Args)]
@@ -23,21 +23,12 @@ pub(super) struct PaperArgs {
     /// Repetitions with fresh noise instead of the scenario's own.
     #[arg(long, value_parser = clap::value_parser!(u64).range(2..))]
     trials: Option<u64>,
-    /// Write the tables as Markdown.
-    #[arg(long)]
-    markdown: Option<PathBuf>,
-    /// Write a page with plots.
-    #[arg(long)]
-    report: Option<PathBuf>,
-    /// Write the numbers as JSON.
-    #[arg(long)]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    output: StudyOutput,
 }
 
 pub(super) fn run(args: &PaperArgs) -> CommandResult {
-    for path in [&args.markdown, &args.report, &args.json].into_iter().flatten() {
-        check_writable(path)?;
-    }
+    args.output.check()?;
     let inputs = vec![Input::of(&args.scenario)?];
     let scenario = Scenario::load(Some(&args.scenario))?;
     let validation = FourierSeries::load(&args.validation)?;
@@ -46,16 +37,5 @@ pub(super) fn run(args: &PaperArgs) -> CommandResult {
     let result = paper_study(&scenario, validation, trials, &|n| progress.reached(n))?;
     progress.finish();
     let program = Program::new(std::env::args(), Some(scenario.seed), inputs);
-    let text = markdown(&result, &program.command);
-    println!("{text}");
-    if let Some(path) = &args.markdown {
-        write_atomically(path, |out| out.write_all(text.as_bytes()))?;
-    }
-    if let Some(path) = &args.json {
-        Document { schema: "armid.study-paper/1", program: &program, body: &result }.write(path)?;
-    }
-    if let Some(path) = &args.report {
-        page(&result, program)?.write(path)?;
-    }
-    Ok(Outcome::Done)
+    args.output.write("armid.study-paper/1", &result, program, markdown, page)
 }

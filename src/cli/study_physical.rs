@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{CommandResult, Outcome, Progress};
+use super::study_output::StudyOutput;
+use super::{CommandResult, Progress, threads_or_all};
 use crate::montecarlo::Scenario;
 use crate::montecarlo::study::physical::{PhysicalStudy, THOROUGH_EVERY, physical_case};
-use crate::output::{check_writable, write_atomically};
-use crate::report::json::{Document, Input, Program};
+use crate::report::json::{Input, Program};
 use crate::report::physical_study::{markdown, page};
 
 /// Which scenarios, and where to write.
@@ -23,26 +23,14 @@ pub struct PhysicalArgs {
     /// Threads; all cores where left out.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
-    /// Write the tables as Markdown.
-    #[arg(long)]
-    markdown: Option<PathBuf>,
-    /// Write a page with plots.
-    #[arg(long)]
-    report: Option<PathBuf>,
-    /// Write the numbers as JSON.
-    #[arg(long)]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    output: StudyOutput,
 }
 
 /// Runs the study.
 pub fn run(args: &PhysicalArgs) -> CommandResult {
-    for path in [&args.markdown, &args.report, &args.json].into_iter().flatten() {
-        check_writable(path)?;
-    }
-    let threads = match args.threads {
-        Some(threads) => usize::from(threads),
-        None => std::thread::available_parallelism().map_or(1, usize::from),
-    };
+    args.output.check()?;
+    let threads = threads_or_all(args.threads);
     let mut study = PhysicalStudy { cases: Vec::new() };
     let mut inputs = Vec::new();
     for path in &args.scenarios {
@@ -56,17 +44,5 @@ pub fn run(args: &PhysicalArgs) -> CommandResult {
         progress.finish();
     }
     let program = Program::new(std::env::args(), None, inputs);
-    let text = markdown(&study, &program.command);
-    println!("{text}");
-    if let Some(path) = &args.markdown {
-        write_atomically(path, |out| out.write_all(text.as_bytes()))?;
-    }
-    if let Some(path) = &args.json {
-        Document { schema: "armid.study-physical/1", program: &program, body: &study }
-            .write(path)?;
-    }
-    if let Some(path) = &args.report {
-        page(&study, program)?.write(path)?;
-    }
-    Ok(Outcome::Done)
+    args.output.write("armid.study-physical/1", &study, program, markdown, page)
 }

@@ -1,0 +1,106 @@
+//! `armid study paper` and `armid study cutoff` as a user runs them, with as few trials as there can be.
+
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+
+/// Runs a study and returns its JSON and Markdown; the page must be there too.
+fn study(topic: &str, scenario: &Path, extra: &[&str]) -> (Value, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (json, markdown, page) = (file("a.json"), file("a.md"), file("a.html"));
+    let output = Command::new(env!("CARGO_BIN_EXE_armid"))
+        .args(["study", topic, scenario.to_str().unwrap(), "--trials", "2"])
+        .args(["--json", &json, "--markdown", &markdown, "--report", &page])
+        .args(extra)
+        .output()
+        .unwrap();
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{stderr}");
+    let html = std::fs::read_to_string(page).unwrap();
+    assert!(html.contains("<svg") && !html.contains("NaN"), "a page without figures");
+    let value = serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap();
+    (value, std::fs::read_to_string(markdown).unwrap())
+}
+
+/// `file` of `sims/` with `old` replaced by `new`, in a folder where its relative paths hold.
+fn changed(file: &str, old: &str, new: &str) -> tempfile::NamedTempFile {
+    let sims = Path::new(env!("CARGO_MANIFEST_DIR")).join("sims");
+    let text = std::fs::read_to_string(sims.join(file)).unwrap();
+    assert!(text.contains(old), "{file} without {old}");
+    let copy = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
+    let absolute = format!("{}/", sims.parent().unwrap().display());
+    let text = text.replace(old, new).replace("\"../", &format!("\"{absolute}"));
+    std::fs::write(copy.path(), text).unwrap();
+    copy
+}
+
+#[test]
+fn the_paper_is_repeated_and_its_negative_rotor_inertias_with_it() {
+    let scenario = changed("paper.toml", "periods = 3", "periods = 2");
+    let root = env!("CARGO_MANIFEST_DIR");
+    let validation = format!("{root}/trajectories/ur5_paper_validation.json");
+    let (result, markdown) = study("paper", scenario.path(), &["--validation", &validation]);
+    assert_eq!(result["schema"], "armid.study-paper/1");
+    assert_eq!(result["parameters"].as_array().unwrap().len(), 33);
+    assert!(markdown.contains("iG") || markdown.contains("Ia1"), "{markdown}");
+
+    let noise = result["noise_e_n"].as_f64().unwrap();
+    let errors = result["errors"].as_array().unwrap();
+    for error in errors.iter().filter(|e| e["torque_filtered"] == false) {
+        let fit = error["e_n"][0].as_f64().unwrap();
+        let rigid = error["hidden_effects"] == false;
+        // Of 10 s with a 1 s memory the noise makes some 10 independent samples per joint in its slow
+        // fifth: its size is known to about 0.2/√10 = 6 %; the fit of 33 … 52 parameters takes a little.
+        assert!(fit > 0.75 * noise, "{error}");
+        assert_eq!(rigid, fit < 1.25 * noise, "{error}");
+    }
+
+    let rotors = |kind: &str| -> Vec<f64> {
+        let of = |m: &&Value| m["mechanism"]["kind"] == kind;
+        let rows = result["mechanisms"].as_array().unwrap().iter().filter(of);
+        rows.flat_map(|m| m["rotor_inertia_kg_m2"].as_array().unwrap().clone())
+            .map(|value| value.as_f64().unwrap())
+            .collect()
+    };
+    // Truth: 1.6 and 0.25 kg m²; 33 parameters, no noise.
+    let nothing = rotors("nothing");
+    assert!((nothing[0] / 1.6 - 1.0).abs() < 0.03, "{nothing:?}");
+    assert!(nothing[1..].iter().all(|ia| (ia / 0.25 - 1.0).abs() < 0.05), "{nothing:?}");
+    // A torque 100 ms late, and (33) on the angle, whose sign is turned.
+    assert!(rotors("delay").iter().any(|ia| *ia < 0.0));
+    assert!(rotors("literal_filter")[4..].iter().all(|ia| *ia < 0.0));
+
+    // Static friction holds the arm before it starts, and the rigid arm has nothing of the kind.
+    let at_zero = |k: usize| result["starts"][k]["error_at_zero_nm"][1].as_f64().unwrap().abs();
+    assert!(at_zero(0) > 4.0 && at_zero(1) < 0.5, "{} {}", at_zero(0), at_zero(1));
+}
+
+#[test]
+fn the_cutoff_has_a_best_value_and_e_n_falls_with_the_record() {
+    let sims = Path::new(env!("CARGO_MANIFEST_DIR")).join("sims/cutoff.toml");
+    let (result, _) = study("cutoff", &sims, &[]);
+    assert_eq!(result["schema"], "armid.study-cutoff/1");
+    let curves = result["curves"].as_array().unwrap();
+    assert_eq!(curves.len(), 8);
+    for curve in curves {
+        let error = |k: usize| curve["points"][k]["predicted"].as_f64().unwrap();
+        let last = curve["points"].as_array().unwrap().len() - 1;
+        let least = (0..=last).map(error).fold(f64::INFINITY, f64::min);
+        assert!(least < error(0), "no left branch: {curve}");
+        if curve["velocity_sd_rad_s"] == 1e-2 && curve["method"] == "paper" {
+            assert!(least < 0.7 * error(last), "no right branch: {curve}");
+        }
+    }
+    // eᵀe of white noise has the relative standard deviation √(2 Σs⁴/m)/Σs²: 1.7 % at 1250 samples, half of
+    // it for e_N. Asked for is 5 %, six of these; the encoder's noise and the filter add less than 1 %.
+    for length in result["lengths"].as_array().unwrap() {
+        let [found, formula] = ["e_n", "predicted_e_n"].map(|key| length[key].as_f64().unwrap());
+        assert!((found / formula - 1.0).abs() < 0.05, "{length}");
+    }
+    // (20) is right for white noise of 1 Nm, and off by the size of the noise for 0.3 Nm.
+    let rms = |k: usize| result["sigmas"][k]["predicted"][1].as_f64().unwrap();
+    assert!((rms(0) - 1.0).abs() < 0.03, "{}", rms(0));
+    assert!((rms(1) - 0.3).abs() < 0.03, "{}", rms(1));
+}
