@@ -44,6 +44,9 @@ struct NoiseArgs {
     /// At most this many trials per scenario; each scenario's own number where left out.
     #[arg(long, value_parser = clap::value_parser!(u64).range(2..))]
     trials: Option<u64>,
+    /// Run the costly methods (bootstrap, HAC, instruments, …) on every so many trials only.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..))]
+    slow_every: u64,
     /// Threads; all cores where left out.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
@@ -65,7 +68,7 @@ pub fn run(args: &StudyArgs) -> CommandResult {
 fn noise(args: &NoiseArgs) -> CommandResult {
     args.output.check()?;
     let threads = threads_or_all(args.threads);
-    let mut results = NoiseStudy { scenarios: Vec::new() };
+    let mut results = NoiseStudy { slow_every: args.slow_every, scenarios: Vec::new() };
     let mut inputs = Vec::new();
     for path in &args.scenarios {
         inputs.push(Input::of(path)?);
@@ -75,7 +78,8 @@ fn noise(args: &NoiseArgs) -> CommandResult {
             "trials",
             args.trials.map_or(scenario.trials, |most| most.min(scenario.trials)),
         );
-        results.scenarios.push(study(scenario, args.trials, threads, &|n| progress.reached(n))?);
+        let done = |n| progress.reached(n);
+        results.scenarios.push(study(scenario, args.trials, args.slow_every, threads, &done)?);
         progress.finish();
     }
     let program = Program::new(std::env::args(), None, inputs);

@@ -9,8 +9,8 @@ use super::options::Options;
 use crate::dynamics::Motion;
 use crate::robot::JointSignals;
 use crate::signal::{
-    Activity, Decimator, FitScratch, HarmonicPower, PeriodicFit, Replicates, Resampler, Scratch,
-    ZeroPhase, central_4, find_period, natural_rate_hz, quantum, replicate_noise,
+    Activity, Decimator, FitScratch, HarmonicPower, PeriodSearch, PeriodicFit, Replicates,
+    Resampler, Scratch, ZeroPhase, central_4, natural_rate_hz, quantum, replicate_noise,
 };
 
 /// The channels identification needs of a log, borrowed.
@@ -83,6 +83,7 @@ const LONGEST_GAP_STEPS: f64 = 10.0;
 /// Filters and plans kept from log to log.
 #[derive(Default)]
 pub struct Preparer {
+    search: PeriodSearch,
     periodic: Option<PeriodicFit>,
     fit: FitScratch,
     filter: Scratch,
@@ -133,7 +134,7 @@ impl Preparer {
         let mut warnings = Vec::new();
         let even = self.even(m, options, &mut warnings)?;
         let single_run = options.period_s == Some(0.0);
-        let period = if single_run { None } else { find_period(&even.q_rad)? };
+        let period = if single_run { None } else { self.search.find(&even.q_rad)? };
         if let (Some(wanted), false) = (options.period_s, single_run) {
             let found = period.as_ref().map(|p| p.samples as f64 / even.rate_hz);
             if found.is_none_or(|found| (found - wanted).abs() > 1.5 / even.rate_hz) {

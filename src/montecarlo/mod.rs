@@ -25,4 +25,4 @@ pub use experiment::{Estimation, Experiment, TrialError, Worker};
 pub use job::Job;
 pub use scenario::{Scenario, ScenarioError};
 pub use simulation::Simulation;
-pub use summary::{ParameterSummary, SUMMARY_SCHEMA, Summary};
+pub use summary::{CheckSummary, ParameterSummary, SUMMARY_SCHEMA, Summary};

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::calibration::{Calibration, Verdict};
+use super::calibration::{Calibration, Check, Verdict};
 use super::efficiency::Efficiency;
 use super::experiment::Estimation;
 use super::shard::Merged;
@@ -95,6 +95,20 @@ pub struct CheckSummary {
     pub verdict: Verdict,
 }
 
+impl CheckSummary {
+    /// Of `check`, whose parameter k is called `name(k)`.
+    pub fn of(check: &Check, name: impl Fn(usize) -> String) -> Self {
+        Self {
+            what: check.what,
+            parameter: check.parameter.map(name),
+            value: check.value,
+            interval: check.interval,
+            claim: check.claim,
+            verdict: check.verdict,
+        }
+    }
+}
+
 impl Summary {
     /// Of merged shards; `wall_s` is the wall time that the trials took, `least_sigma` the Cramér–Rao
     /// bound of every parameter where it is known.
@@ -124,14 +138,8 @@ impl Summary {
         let worst = parameters
             .iter()
             .max_by(|a, b| (a.coverage - 0.95).abs().total_cmp(&(b.coverage - 0.95).abs()));
-        let checks = calibration.checks.iter().map(|check| CheckSummary {
-            what: check.what,
-            parameter: check.parameter.map(|k| content.parameters[k].name.clone()),
-            value: check.value,
-            interval: check.interval,
-            claim: check.claim,
-            verdict: check.verdict,
-        });
+        let checks = calibration.checks.iter();
+        let checks = checks.map(|c| CheckSummary::of(c, |k| content.parameters[k].name.clone()));
         let sigma: Vec<f64> = parameters.iter().map(|p| p.sigma_empirical).collect();
         let name = |k: usize| parameters[k].name.clone();
         let efficiency = least_sigma

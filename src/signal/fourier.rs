@@ -13,7 +13,7 @@
 //!    harmonics without motion, P Σ|Ȳ_h|²/B over ΣS_h/B follows F(2B, 2B(P − 1)) for Gaussian
 //!    noise of any smooth spectrum; angle and velocity are tested each, at a level that lets one
 //!    joint in a hundred keep a band too many. It goes on as long as all its noise is less than
-//!    a share of it that costs nothing ([`FREE_NOISE`], for q̈ and, much later, for q̇): what is too
+//!    a share of it that costs nothing (`FREE_NOISE`, for q̈ and, much later, for q̇): what is too
 //!    weak to be seen band by band (the kink that friction leaves at a reversal fades as 1/h² in
 //!    q̇) is not too weak to bias the friction parameters.
 //! 4. q, q̇ = Σ ihω Q̂_h e^{ihωt}, q̈ = −Σ (hω)² Q̂_h e^{ihωt} on the period's grid.
@@ -37,7 +37,7 @@ const BAND_HARMONICS: usize = 8;
 const FALSE_BAND: f64 = 0.01;
 /// Noise in q̈, as a share of its mean square, that costs nothing: it attenuates an inertia by about
 /// as much, a small part of the σ that any practical record reaches.
-pub const FREE_NOISE: f64 = 1e-4;
+const FREE_NOISE: f64 = 1e-4;
 /// The same for q̇, where friction looks closer: a few mrad/s against the tens over which it turns.
 const FREE_NOISE_QD: f64 = 1e-5;
 

@@ -14,8 +14,10 @@
 //! 5. The lag of the first period against the last, interpolated, refines the period.
 
 use std::ops::Range;
+use std::sync::Arc;
 
-use realfft::RealFftPlanner;
+use realfft::num_complex::Complex64;
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
 use super::error::{SignalError, enough};
 use super::noise::{block_noise, quantile};
@@ -57,31 +59,29 @@ pub struct Period {
     pub scatter_rad: f64,
 }
 
-/// The period of the motion `q_rad` (joints × samples), or `None` if no stretch of two periods or
-/// more repeats. The log may have run-in, run-out and standstill around it.
-///
-/// Errors: fewer than 64 samples, a value that is not finite.
+/// Plans and memory of the search, kept from log to log.
+#[derive(Default)]
+pub struct PeriodSearch {
+    plans: Option<Plans>,
+    time: Vec<f64>,
+    spectrum: Vec<Complex64>,
+    power: Vec<Complex64>,
+    /// Σ q² up to each sample of the thinned log, over all joints.
+    energy: Vec<f64>,
+    /// Σ |q(k + L) − q(k)|² up to each k.
+    sums: Vec<f64>,
+}
+
+/// Transforms of one length.
+struct Plans {
+    length: usize,
+    forward: Arc<dyn RealToComplex<f64>>,
+    inverse: Arc<dyn ComplexToReal<f64>>,
+}
+
+/// [`PeriodSearch::find`] for a single log.
 pub fn find_period(q_rad: &JointSignals) -> Result<Option<Period>, SignalError> {
-    enough("the search for a period", q_rad.samples(), 4 * SHORTEST_PERIOD)?;
-    for joint in 0..q_rad.joints() {
-        if let Some(sample) = q_rad.joint(joint).iter().position(|v| !v.is_finite()) {
-            let value = q_rad.joint(joint)[sample];
-            return Err(SignalError::NotFinite { what: "angle", joint, sample, value });
-        }
-    }
-    let record = Record::new(q_rad);
-    if record.variance <= 0.0 {
-        return Ok(None);
-    }
-    let mut best: Option<Period> = None;
-    for lag in candidates(q_rad) {
-        let Some(found) = record.repeats_at(record.sharpen(lag)) else { continue };
-        // Longer than the best by more than the new period cannot be had by a multiple of it.
-        if best.as_ref().is_none_or(|b| found.window.len() > b.window.len() + found.samples) {
-            best = Some(found);
-        }
-    }
-    Ok(best)
+    PeriodSearch::default().find(q_rad)
 }
 
 /// A lag and how far it may be off, in samples.
@@ -91,50 +91,103 @@ struct Candidate {
     uncertainty: usize,
 }
 
-/// Step 1, on a log thinned by averaging neighbours.
-fn candidates(q_rad: &JointSignals) -> Vec<Candidate> {
-    let thin = q_rad.samples().div_ceil(SEARCH_SAMPLES);
-    let n = q_rad.samples() / thin;
-    let padded = (2 * n).next_power_of_two();
-    let mut planner = RealFftPlanner::new();
-    let (forward, inverse) = (planner.plan_fft_forward(padded), planner.plan_fft_inverse(padded));
-    let mut time = forward.make_input_vec();
-    let mut spectrum = forward.make_output_vec();
-    let mut power = forward.make_output_vec();
-    let mut energy = vec![0.0; n + 1];
-    for j in 0..q_rad.joints() {
-        let series = q_rad.joint(j);
-        let mean = series.iter().sum::<f64>() / series.len() as f64;
-        time.fill(0.0);
-        for (t, part) in time.iter_mut().zip(series.chunks_exact(thin)).take(n) {
-            *t = part.iter().sum::<f64>() / thin as f64 - mean;
+impl PeriodSearch {
+    /// The period of the motion `q_rad` (joints × samples), or `None` if no stretch of two periods or
+    /// more repeats. The log may have run-in, run-out and standstill around it.
+    ///
+    /// Errors: fewer than 64 samples, a value that is not finite.
+    pub fn find(&mut self, q_rad: &JointSignals) -> Result<Option<Period>, SignalError> {
+        enough("the search for a period", q_rad.samples(), 4 * SHORTEST_PERIOD)?;
+        for joint in 0..q_rad.joints() {
+            if let Some(sample) = q_rad.joint(joint).iter().position(|v| !v.is_finite()) {
+                let value = q_rad.joint(joint)[sample];
+                return Err(SignalError::NotFinite { what: "angle", joint, sample, value });
+            }
         }
-        for k in 0..n {
-            energy[k + 1] += time[k] * time[k];
+        let record = Record::new(q_rad);
+        if record.variance <= 0.0 {
+            return Ok(None);
         }
-        forward.process(&mut time, &mut spectrum).expect("buffers were made by the plan");
-        for (p, c) in power.iter_mut().zip(&spectrum) {
-            p.re += c.norm_sqr();
+        let mut best: Option<Period> = None;
+        for candidate in self.candidates(q_rad) {
+            // Longer than the best by more than the new period cannot be had by a multiple of it.
+            let needed =
+                |period: usize| best.as_ref().map_or(0, |b: &Period| b.window.len() + period);
+            if needed(candidate.samples - candidate.uncertainty) >= q_rad.samples() {
+                continue;
+            }
+            let lag = record.sharpen(candidate);
+            let Some(found) = record.repeats_at(lag, &mut self.sums) else { continue };
+            if found.window.len() > needed(found.samples) {
+                best = Some(found);
+            }
         }
+        Ok(best)
     }
-    for k in 1..=n {
-        energy[k] += energy[k - 1];
+
+    /// Step 1, on a log thinned by averaging neighbours.
+    fn candidates(&mut self, q_rad: &JointSignals) -> Vec<Candidate> {
+        let thin = q_rad.samples().div_ceil(SEARCH_SAMPLES);
+        let n = q_rad.samples() / thin;
+        let longest = n / 2;
+        // Long enough that no lag in use is reached from the other side of the circle.
+        let length = (n + longest + 1).next_power_of_two();
+        let plans = match self.plans.take().filter(|plans| plans.length == length) {
+            Some(plans) => plans,
+            None => Plans::new(length),
+        };
+        let Self { time, spectrum, power, energy, .. } = self;
+        time.resize(length, 0.0);
+        spectrum.resize(length / 2 + 1, Complex64::ZERO);
+        power.clear();
+        power.resize(length / 2 + 1, Complex64::ZERO);
+        energy.clear();
+        energy.resize(n + 1, 0.0);
+        for j in 0..q_rad.joints() {
+            let series = q_rad.joint(j);
+            let mean = series.iter().sum::<f64>() / series.len() as f64;
+            time.fill(0.0);
+            for (t, part) in time.iter_mut().zip(series.chunks_exact(thin)).take(n) {
+                *t = part.iter().sum::<f64>() / thin as f64 - mean;
+            }
+            for (energy, t) in energy[1..].iter_mut().zip(time.iter()) {
+                *energy += t * t;
+            }
+            plans.forward.process(time, spectrum).expect("buffers have the plan's length");
+            for (p, c) in power.iter_mut().zip(spectrum.iter()) {
+                p.re += c.norm_sqr();
+            }
+        }
+        for k in 1..=n {
+            energy[k] += energy[k - 1];
+        }
+        plans.inverse.process(power, time).expect("buffers fit and the ends are real");
+        self.plans = Some(plans);
+        let correlation = |lag: usize| time[lag] / length as f64;
+        let difference = |lag: usize| {
+            let both = energy[n - lag] + energy[n] - energy[lag];
+            (both - 2.0 * correlation(lag)) / (n - lag) as f64
+        };
+        let unrelated = 2.0 * energy[n] / n as f64;
+        (SHORTEST_PERIOD..=longest)
+            .filter(|&lag| {
+                let d = difference(lag);
+                d < CANDIDATE_SHARE * unrelated
+                    && d <= difference(lag - 1)
+                    && d <= difference(lag + 1)
+            })
+            .map(|lag| Candidate { samples: lag * thin, uncertainty: thin })
+            .collect()
     }
-    inverse.process(&mut power, &mut time).expect("buffers fit and the ends are real");
-    let correlation = |lag: usize| time[lag] / padded as f64;
-    let difference = |lag: usize| {
-        let both = energy[n - lag] + energy[n] - energy[lag];
-        (both - 2.0 * correlation(lag)) / (n - lag) as f64
-    };
-    let unrelated = 2.0 * energy[n] / n as f64;
-    let longest = n / 2;
-    (SHORTEST_PERIOD..=longest)
-        .filter(|&lag| {
-            let d = difference(lag);
-            d < CANDIDATE_SHARE * unrelated && d <= difference(lag - 1) && d <= difference(lag + 1)
-        })
-        .map(|lag| Candidate { samples: lag * thin, uncertainty: thin })
-        .collect()
+}
+
+impl Plans {
+    fn new(length: usize) -> Self {
+        let mut planner = RealFftPlanner::new();
+        let (forward, inverse) =
+            (planner.plan_fft_forward(length), planner.plan_fft_inverse(length));
+        Self { length, forward, inverse }
+    }
 }
 
 /// The log and what it says about itself.
@@ -163,14 +216,33 @@ impl<'a> Record<'a> {
         Self { q_rad, variance, step_square, tolerance }
     }
 
-    /// |q(k + lag) − q(k)|², summed over joints.
-    fn difference(&self, k: usize, lag: usize) -> f64 {
-        (0..self.q_rad.joints())
+    /// Mean over the samples k = from, from + every, … of `range` of |q(k + lag) − q(k)|², summed over
+    /// joints.
+    fn difference(&self, range: &Range<usize>, lag: usize, every: usize) -> f64 {
+        let later = range.start + lag..range.end + lag;
+        let sum: f64 = (0..self.q_rad.joints())
             .map(|j| {
                 let q = self.q_rad.joint(j);
-                (q[k + lag] - q[k]).powi(2)
+                let pairs = q[range.clone()].iter().zip(&q[later.clone()]).step_by(every);
+                pairs.map(|(now, then)| (then - now) * (then - now)).sum::<f64>()
             })
-            .sum()
+            .sum();
+        sum / range.len().div_ceil(every) as f64
+    }
+
+    /// Sums of |q(k + lag) − q(k)|², over joints and all k before the index.
+    fn sum_differences(&self, lag: usize, sums: &mut Vec<f64>) {
+        sums.clear();
+        sums.resize(self.q_rad.samples() - lag + 1, 0.0);
+        for j in 0..self.q_rad.joints() {
+            let q = self.q_rad.joint(j);
+            for (sum, (now, then)) in sums[1..].iter_mut().zip(q.iter().zip(&q[lag..])) {
+                *sum += (then - now) * (then - now);
+            }
+        }
+        for k in 1..sums.len() {
+            sums[k] += sums[k - 1];
+        }
     }
 
     /// The lag near `candidate` at which most of the log repeats best: least median of block means.
@@ -178,11 +250,7 @@ impl<'a> Record<'a> {
         let Candidate { samples, uncertainty } = candidate;
         let cost = |lag: usize| {
             let mut means: Vec<f64> = blocks(self.q_rad.samples() - lag, lag / BLOCKS)
-                .map(|block| {
-                    let inside = block.clone().step_by(uncertainty);
-                    let count = inside.len() as f64;
-                    inside.map(|k| self.difference(k, lag)).sum::<f64>() / count
-                })
+                .map(|block| self.difference(&block, lag, uncertainty))
                 .collect();
             let middle = means.len() / 2;
             *means.select_nth_unstable_by(middle, f64::total_cmp).1
@@ -205,16 +273,9 @@ impl<'a> Record<'a> {
     }
 
     /// Steps 2, 3 and 5 for one lag.
-    fn repeats_at(&self, lag: usize) -> Option<Period> {
+    fn repeats_at(&self, lag: usize, sums: &mut Vec<f64>) -> Option<Period> {
         let pairs = self.q_rad.samples() - lag;
-        // Sums of |q(k + lag) − q(k)|² over all k before.
-        let mut sums = Vec::with_capacity(pairs + 1);
-        sums.push(0.0);
-        let mut total = 0.0;
-        for k in 0..pairs {
-            total += self.difference(k, lag);
-            sums.push(total);
-        }
+        self.sum_differences(lag, sums);
         let mean = |r: &Range<usize>| (sums[r.end] - sums[r.start]) / r.len() as f64;
         let blocks: Vec<(Range<usize>, f64)> = blocks(pairs, lag / BLOCKS)
             .map(|b| {
@@ -232,7 +293,7 @@ impl<'a> Record<'a> {
         levels.sort_by(f64::total_cmp);
         let rounding = 1e-10 * self.variance;
         let own = (BLOCK_RATIO * quantile(&levels, 0.75)).max(rounding);
-        let run = widened(self.longest_run(&within, own, lag)?, own, &sums);
+        let run = widened(self.longest_run(&within, own, lag)?, own, sums);
 
         let periods = (run.len() + lag) / lag;
         let slack = run.len() + lag - periods * lag;
@@ -291,11 +352,8 @@ impl<'a> Record<'a> {
             // No room behind the window: compare what is left of the first period.
             return (lag as f64, 0.0);
         }
-        let mean = |shift: usize| {
-            (window.start..last).map(|k| self.difference(k, shift)).sum::<f64>()
-                / (last - window.start) as f64
-        };
-        let costs: Vec<f64> = (from..=to).map(mean).collect();
+        let costs: Vec<f64> =
+            (from..=to).map(|shift| self.difference(&(window.start..last), shift, 1)).collect();
         let inner = 1..costs.len() - 1;
         let Some(i) = inner.min_by(|a, b| costs[*a].total_cmp(&costs[*b])) else {
             return (lag as f64, costs[0]);

@@ -17,7 +17,7 @@ mod record_length;
 pub use cutoff::{Curve, CutoffStudy, Method, Point, cutoff_study, cutoff_study_trials};
 pub use error::StudyError;
 pub use mass_matrix::indefinite_share;
-pub use noise::{MethodResult, NoiseStudy, SLOW_EVERY, ScenarioResult, study};
+pub use noise::{MethodResult, NoiseStudy, ScenarioResult, study};
 pub use paper::{
     ErrorResult, Mechanism, MechanismResult, PaperStudy, ParameterResult, StartResult, Trace,
     paper_study, paper_study_runs,

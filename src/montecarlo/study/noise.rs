@@ -8,16 +8,17 @@ use serde::Serialize;
 
 use crate::identify::covariance::CovarianceKind as C;
 use crate::identify::{Estimate, Estimator as E, Identifier, LackOfFit, Measurement};
-use crate::montecarlo::calibration::wilson;
+use crate::montecarlo::calibration::{Calibration, wilson};
 use crate::montecarlo::efficiency::Efficiency;
 use crate::montecarlo::experiment::{Experiment, TrialError};
 use crate::montecarlo::scenario::Scenario;
+use crate::montecarlo::summary::CheckSummary;
 use crate::montecarlo::tally::Tally;
 use crate::montecarlo::trials::Failure;
 use crate::plant::Measured;
 
 /// The methods that are compared, in the order of the tables: estimator, covariance, and whether it is
-/// fast enough for every trial (others run every [`SLOW_EVERY`]-th).
+/// fast enough for every trial (how often the others run is the caller's choice).
 const METHODS: [(E, C, bool); 17] = [
     (E::Ols, C::Paper, true),
     (E::Ols, C::Ols, true),
@@ -38,12 +39,11 @@ const METHODS: [(E, C, bool); 17] = [
     (E::Spectral, C::Periods, true),
 ];
 
-/// Of `METHODS`, the slow ones are run on every so many trials.
-pub const SLOW_EVERY: u64 = 5;
-
 /// All scenarios of a study.
 #[derive(Debug, Clone, Serialize)]
 pub struct NoiseStudy {
+    /// The slow methods ran on every so many trials.
+    pub slow_every: u64,
     /// One entry per scenario.
     pub scenarios: Vec<ScenarioResult>,
 }
@@ -61,8 +61,12 @@ pub struct ScenarioResult {
     pub seconds: f64,
     /// Whether an effect is hidden that the model does not know.
     pub model_is_wrong: bool,
+    /// Whether the log is treated as one run that does not repeat.
+    pub single_run: bool,
     /// Estimator and covariance that the log calls for.
     pub chosen: [String; 2],
+    /// What is claimed of them, against the trials.
+    pub checks: Vec<CheckSummary>,
     /// The methods that exist for such logs.
     pub methods: Vec<MethodResult>,
     /// Trials with a lack-of-fit test.
@@ -109,13 +113,14 @@ struct Tallies {
     rejected: u64,
 }
 
-/// Runs the scenario's trials, at most `most`, with every method on `threads` threads; `progress` is
-/// told the number of trials done.
+/// Runs the scenario's trials, at most `most`, with every method (the slow ones on every
+/// `slow_every`-th trial) on `threads` threads; `progress` is told the number of trials done.
 ///
 /// A trial's log is simulated and laid out once; every estimator solves it once for all its covariances.
 pub fn study(
     scenario: Scenario,
     most: Option<u64>,
+    slow_every: u64,
     threads: usize,
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<ScenarioResult, TrialError> {
@@ -128,7 +133,7 @@ pub fn study(
         let mut tallies = Tallies::new(experiment.truth.len());
         let mut bench = Bench::new(&experiment);
         for trial in (t as u64..trials).step_by(threads) {
-            tallies.add(&experiment, trial, &mut bench);
+            tallies.add(trial, &due(trial, slow_every), &mut bench);
             progress(done.fetch_add(1, Ordering::Relaxed) + 1);
         }
         tallies
@@ -138,6 +143,10 @@ pub fn study(
         .map(share)
         .reduce(|| Tallies::new(experiment.truth.len()), Tallies::merged);
     let least = experiment.least_sigma()?;
+    let name = |k: usize| scenario.set.name(k).to_owned();
+    let chosen = (experiment.estimator, experiment.covariance);
+    let by_itself = METHODS.iter().zip(&tallies.methods).find(|((e, c, _), _)| (*e, *c) == chosen);
+    let checks = by_itself.map_or_else(Vec::new, |(_, tally)| Calibration::of(tally).checks);
     let results = METHODS.iter().zip(&tallies.methods);
     let methods = results
         .filter(|(_, tally)| tally.succeeded > 1)
@@ -152,7 +161,9 @@ pub fn study(
         trials,
         seconds: begun.elapsed().as_secs_f64(),
         model_is_wrong: !scenario.effects.is_empty(),
-        chosen: [experiment.estimator.to_string(), experiment.covariance.to_string()],
+        single_run: scenario.processing.period_s == Some(0.0),
+        chosen: [chosen.0.to_string(), chosen.1.to_string()],
+        checks: checks.iter().map(|check| CheckSummary::of(check, name)).collect(),
         methods,
         tested_for_fit: tallies.tested,
         rejected_fits: tallies.rejected,
@@ -194,10 +205,10 @@ impl<'a> Bench<'a> {
 }
 
 /// The methods that trial `trial` runs, as their indices per estimator.
-fn due(trial: u64) -> Vec<(E, Vec<usize>)> {
+fn due(trial: u64, slow_every: u64) -> Vec<(E, Vec<usize>)> {
     let mut due: Vec<(E, Vec<usize>)> = Vec::new();
     for (index, (estimator, _, always)) in METHODS.iter().enumerate() {
-        if !always && !trial.is_multiple_of(SLOW_EVERY) {
+        if !always && !trial.is_multiple_of(slow_every) {
             continue;
         }
         match due.last_mut().filter(|(known, _)| known == estimator) {
@@ -220,14 +231,13 @@ impl Tallies {
         self
     }
 
-    fn add(&mut self, experiment: &Experiment, trial: u64, bench: &mut Bench) {
-        let due = due(trial);
+    fn add(&mut self, trial: u64, due: &[(E, Vec<usize>)], bench: &mut Bench) {
         let kinds = |indices: &[usize]| indices.iter().map(|&k| METHODS[k].1).collect();
         let requests: Vec<(E, Vec<C>)> = due.iter().map(|(e, k)| (*e, kinds(k))).collect();
         match bench.estimate(trial, &requests) {
             Ok(estimates) => {
-                for (estimate, (_, indices)) in estimates.into_iter().zip(&due) {
-                    self.add_estimate(experiment, trial, estimate, indices);
+                for (estimate, (_, indices)) in estimates.into_iter().zip(due) {
+                    self.add_estimate(bench.experiment, trial, estimate, indices);
                 }
             }
             Err(error) => {
