@@ -15,6 +15,7 @@ use crate::montecarlo::Scenario;
 use crate::output::check_writable;
 use crate::report::diagnose::{cause_table, held_out_table, limit_table, page};
 use crate::report::json::{Document, Program};
+use crate::report::replay::table as replay_table;
 
 /// Say what the rigid model with linear friction gets wrong along a log, and what explains it.
 #[derive(Debug, Args)]
@@ -35,6 +36,14 @@ pub struct DiagnoseArgs {
     /// Mass of the body that the second log was recorded with, kg: tells the scale of the drive gains.
     #[arg(long = "known-payload", value_name = "KG", value_parser = mass)]
     known_payload_kg: Option<f64>,
+    /// Put what was found back into the simulation, and let it replay the log and the held-out ones: some
+    /// seconds per log.
+    #[arg(long)]
+    replay: bool,
+    /// Write the simulation with what was found as a scenario for `simulate` and `montecarlo`, with
+    /// its robot file and trajectory beside it.
+    #[arg(long, value_name = "FILE.toml")]
+    extended_scenario: Option<PathBuf>,
     /// Write the result as JSON.
     #[arg(long)]
     json: Option<PathBuf>,
@@ -45,7 +54,7 @@ pub struct DiagnoseArgs {
 
 /// Runs the command.
 pub fn run(args: &DiagnoseArgs) -> CommandResult {
-    for path in [&args.json, &args.report].into_iter().flatten() {
+    for path in [&args.json, &args.report, &args.extended_scenario].into_iter().flatten() {
         check_writable(path)?;
     }
     if args.known_payload_kg.is_some() && args.logs.len() < 2 {
@@ -75,7 +84,7 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
         .collect();
     let simulation =
         args.sim.as_deref().map(|file| simulated_parameters(file, &set)).transpose()?;
-    let mut diagnoser = Diagnoser::new(&arm, &model, &set, options);
+    let mut diagnoser = Diagnoser::new(&arm, &model, &set, options.clone());
     let Some(log) = logs.first() else { return Ok(Outcome::Done) };
     let mut finding =
         diagnoser.diagnose(&log.measurement(), &validations, simulation.as_deref())?;
@@ -84,6 +93,17 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
         let payload =
             diagnoser.payload(&finding, measurements.0, measurements.1, args.known_payload_kg)?;
         finding.diagnosis.add_payload(payload);
+    }
+    if args.replay {
+        let replay = diagnoser.replay(&finding, &validations);
+        finding.diagnosis.add_replay(replay);
+    }
+    if let Some(path) = &args.extended_scenario {
+        let simulation = diagnoser.extended_simulation(&finding)?;
+        let measurement = log.measurement();
+        Scenario::of_diagnosis(&simulation, &finding, &measurement, &set, &options)?.save(path)?;
+        // What was written has to be what a scenario may be.
+        Scenario::load(Some(path))?;
     }
     let diagnosis = &finding.diagnosis;
     for sentence in &diagnosis.sentences {
@@ -96,6 +116,9 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
     if !diagnosis.held_out.is_empty() {
         println!("{}", held_out_table(diagnosis).to_text());
     }
+    if let Some(replay) = &diagnosis.replay {
+        println!("{}", replay_table(replay).to_text());
+    }
     if !diagnosis.detection_limits.is_empty() {
         println!("{}", limit_table(diagnosis).to_text());
     }
@@ -107,6 +130,9 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
     if let Some(path) = &args.json {
         let body = WithRows { diagnosis, rows: Rows::of(&log.log.rows) };
         Document { schema: DIAGNOSE_SCHEMA, program: &program, body: &body }.write(path)?;
+    }
+    if let Some(path) = &args.extended_scenario {
+        println!("scenario: {}", path.display());
     }
     if let Some(path) = &args.report {
         page(&finding, &arm, program)?.write(path)?;

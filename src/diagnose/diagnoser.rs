@@ -14,6 +14,7 @@ use super::held_out::{Models, Validation, held_out_gain};
 use super::image::{Image, Span};
 use super::misfit;
 use super::payload::{self, PayloadFinding};
+use super::replay::measured_nm;
 use super::scene::Scene;
 use super::selection::{Kept, Selected, select};
 use super::study::{Entry, Study};
@@ -25,11 +26,11 @@ use crate::robot::{Arm, JointSignals};
 
 /// Everything that stays the same from log to log.
 pub struct Diagnoser<'a> {
-    arm: &'a Arm,
-    set: &'a BaseSet,
-    options: Options,
-    identifier: Identifier<'a>,
-    families: Vec<Box<dyn Candidate>>,
+    pub(super) arm: &'a Arm,
+    pub(super) set: &'a BaseSet,
+    pub(super) options: Options,
+    pub(super) identifier: Identifier<'a>,
+    pub(super) families: Vec<Box<dyn Candidate>>,
 }
 
 /// A diagnosis with what it was made from, for pictures.
@@ -46,6 +47,8 @@ pub struct Finding {
     pub before_nm: JointSignals,
     /// Residual of the extended model, Nm.
     pub after_nm: JointSignals,
+    /// Logged torque: the mean period, or the run behind its low-pass, Nm.
+    pub measured_nm: JointSignals,
     /// Sample of the scene behind each residual.
     pub samples: Vec<usize>,
 }
@@ -89,6 +92,7 @@ impl<'a> Diagnoser<'a> {
         let m = &Measurement { torque_nm, ..*m };
         let mut regression = self.identifier.regression(m)?;
         let identification = self.identifier.identify_regression(&regression)?;
+        let measured_nm = measured_nm(&regression);
         let fit = &identification.fit;
         move_to_common_motion(&mut regression, self.arm, self.set, &fit.theta);
         let sources = (self.arm, self.set, &self.options);
@@ -165,6 +169,7 @@ impl<'a> Diagnoser<'a> {
             held_out,
             moved_parameters,
             payload: None,
+            replay: None,
             detection_limits: self.detection_limits(&study, &accepted),
             lack_of_fit_probability: lack,
             verdict,
@@ -176,7 +181,16 @@ impl<'a> Diagnoser<'a> {
             .map(|k| regression.first_sample + k * regression.every)
             .collect();
         let scene = study.scene;
-        Ok(Finding { diagnosis, identification, scene, extension, before_nm, after_nm, samples })
+        Ok(Finding {
+            diagnosis,
+            identification,
+            scene,
+            extension,
+            before_nm,
+            after_nm,
+            measured_nm,
+            samples,
+        })
     }
 
     /// Says whether `loaded` was recorded with a body on the flange that `reference`, diagnosed as

@@ -19,6 +19,8 @@ pub struct Effect {
     pub shape: Shape,
     /// Coefficients of its columns.
     pub coefficients: Vec<f64>,
+    /// What the base parameters would take over of it if it were left out.
+    pub absorbed: Vec<f64>,
 }
 
 /// Base parameters and effects fitted together.
@@ -42,7 +44,7 @@ impl Extension {
             counts.push(entry.images.iter().filter(|image| span.push(image)).count());
         }
         let mut coefficients = span.solve(&residual).into_iter();
-        let effects: Vec<Effect> = entries
+        let mut effects: Vec<Effect> = entries
             .iter()
             .zip(counts)
             .map(|(entry, count)| Effect {
@@ -50,13 +52,19 @@ impl Extension {
                 site: entry.site,
                 shape: entry.shape,
                 coefficients: coefficients.by_ref().take(count).collect(),
+                absorbed: Vec::new(),
             })
             .collect();
         let mut rest = torque.clone();
-        for effect in &effects {
+        for effect in &mut effects {
+            let mut own = torque.clone();
+            own.scale(0.0);
             for (column, b) in effect.columns(study.families, &study.scene) {
-                rest.add(-b, &study.whitening.image(&column));
+                let image = study.whitening.image(&column);
+                rest.add(-b, &image);
+                own.add(b, &image);
             }
+            effect.absorbed = study.null.solve(&own);
         }
         Self { theta: study.null.solve(&rest), effects }
     }

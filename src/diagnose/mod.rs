@@ -28,6 +28,7 @@ mod image;
 mod kind;
 mod misfit;
 mod payload;
+pub mod replay;
 mod scene;
 mod selection;
 mod statistic;

@@ -154,6 +154,16 @@ impl Scene {
         }
     }
 
+    /// The harmonics of a signal of n samples up to `highest_hz`, where the motion repeats; of a single run
+    /// the signal itself.
+    pub fn slow_part(&self, y: &[f64], highest_hz: f64) -> Vec<f64> {
+        let Derivative::Fourier { forward, inverse } = &self.derivative else { return y.to_vec() };
+        let last = (highest_hz * y.len() as f64 / self.rate_hz) as usize;
+        transform(forward.as_ref(), inverse.as_ref(), y, |h, _| {
+            if h <= last { Complex64::ONE } else { Complex64::ZERO }
+        })
+    }
+
     /// y(t − delay) on the grid of y.
     pub fn delayed(&self, y: &[f64], delay_s: f64) -> Vec<f64> {
         match &self.derivative {

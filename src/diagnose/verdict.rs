@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::kind::Kind;
 use super::payload::PayloadFinding;
+use super::replay::Replay;
 
 /// Schema of the diagnosis JSON.
 pub const DIAGNOSE_SCHEMA: &str = "armid.diagnose/1";
@@ -154,6 +155,9 @@ pub struct Diagnosis {
     pub moved_parameters: Vec<Moved>,
     /// A second log against this one.
     pub payload: Option<PayloadFinding>,
+    /// The simulation against the logs, without and with the causes; null where it was not asked for or
+    /// does not run.
+    pub replay: Option<Replay>,
     /// What would not be seen.
     pub detection_limits: Vec<DetectionLimit>,
     /// Probability that noise alone leaves this much behind the last cause; null for a single run.
@@ -179,6 +183,17 @@ pub enum Verdict {
 }
 
 impl Diagnosis {
+    /// Takes in what the simulation says, or why it says nothing.
+    pub fn add_replay<E: std::fmt::Display>(&mut self, replay: Result<Replay, E>) {
+        match replay {
+            Ok(replay) => {
+                self.sentences.extend(replay.sentences());
+                self.replay = Some(replay);
+            }
+            Err(error) => self.warnings.push(format!("nothing is replayed: {error}")),
+        }
+    }
+
     /// Takes in what a second log says about a body on the flange.
     pub fn add_payload(&mut self, payload: PayloadFinding) {
         let cause = payload.cause();

@@ -7,9 +7,13 @@ use serde::{Deserialize, Serialize};
 
 use super::error::ExcitationError;
 use super::reference::Reference;
+use crate::robot::JointSignals;
 
 /// Schema of trajectory files.
 pub const TRAJECTORY_SCHEMA: &str = "armid.trajectory/1";
+
+/// Share of the rms velocity that the last harmonics of a fitted series may hold.
+const LEFT_OUT: f64 = 1e-3;
 
 /// Trajectories built in, by the name given instead of a file.
 const BUILT_IN: [(&str, &str); 2] = [
@@ -92,6 +96,43 @@ impl FourierSeries {
             }
         }
         Ok(Self { period_s, q0_rad, a_rad_s, b_rad_s })
+    }
+
+    /// The series through one period of angles (n samples at `rate_hz`), up to `highest_hz`; the last
+    /// harmonics, which together hold less than a thousandth of every joint's rms velocity, are left out.
+    pub fn of_period(
+        q_rad: &JointSignals,
+        rate_hz: f64,
+        highest_hz: f64,
+    ) -> Result<Self, ExcitationError> {
+        let n = q_rad.samples();
+        let period_s = n as f64 / rate_hz;
+        let order = ((highest_hz * period_s) as usize).min(n.saturating_sub(1) / 2);
+        let coefficient = |j: usize, l: usize| {
+            let (mut sine, mut cosine) = (0.0, 0.0);
+            for (k, q) in q_rad.joint(j).iter().enumerate() {
+                let (sin, cos) = (TAU * ((l * k) % n) as f64 / n as f64).sin_cos();
+                sine += q * sin;
+                cosine += q * cos;
+            }
+            let to_velocity = TAU * l as f64 / period_s * 2.0 / n as f64;
+            (to_velocity * sine, -to_velocity * cosine)
+        };
+        let all: Vec<Vec<(f64, f64)>> =
+            (0..q_rad.joints()).map(|j| (1..=order).map(|l| coefficient(j, l)).collect()).collect();
+        let power = |harmonics: &[(f64, f64)]| -> f64 {
+            harmonics.iter().map(|(a, b)| a * a + b * b).sum()
+        };
+        let enough = |joint: &Vec<(f64, f64)>, order: usize| {
+            power(&joint[order..]) <= LEFT_OUT.powi(2) * power(joint)
+        };
+        let order = (0..order).find(|&l| all.iter().all(|joint| enough(joint, l))).unwrap_or(order);
+        let pick = |part: fn(&(f64, f64)) -> f64| -> Vec<Vec<f64>> {
+            all.iter().map(|joint| joint[..order].iter().map(part).collect()).collect()
+        };
+        let mean = |j: usize| q_rad.joint(j).iter().sum::<f64>() / n as f64;
+        let q0_rad = (0..q_rad.joints()).map(mean).collect();
+        Self::new(period_s, q0_rad, pick(|c| c.0), pick(|c| c.1))
     }
 
     /// One of the trajectories built in.
@@ -256,6 +297,22 @@ mod tests {
         assert!((q[0] - (0.25 + s - 2.0 * c)).abs() < 1e-14);
         assert!((qd[0] - (c + 2.0 * s)).abs() < 1e-14);
         assert!((qdd[0] - (2.0 * c - s)).abs() < 1e-14);
+    }
+
+    /// Sums over a whole period are orthogonal to round-off.
+    #[test]
+    fn a_sampled_series_is_found_again() {
+        let series = two_joints();
+        let (rate_hz, n) = (50.0, 200);
+        let q = JointSignals::from_fn(2, n, |j, k| at(&series, k as f64 / rate_hz)[0][j]);
+        let found = FourierSeries::of_period(&q, rate_hz, 10.0).unwrap();
+        assert_eq!((found.order(), found.period_s), (3, 4.0));
+        let both = [(&found.a_rad_s, &series.a_rad_s), (&found.b_rad_s, &series.b_rad_s)];
+        for (found, truth) in both {
+            for (x, y) in found.iter().flatten().zip(truth.iter().flatten()) {
+                assert!((x - y).abs() < 1e-13, "{x} {y}");
+            }
+        }
     }
 
     #[test]

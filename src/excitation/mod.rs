@@ -13,6 +13,7 @@ mod fourier;
 mod limits;
 mod reference;
 mod run_in;
+mod sampled;
 
 pub use clearance::{ClearanceModel, ClearanceWorkspace};
 pub use error::ExcitationError;
@@ -20,3 +21,4 @@ pub use fourier::{FourierSeries, TRAJECTORY_SCHEMA, built_in_names};
 pub use limits::{LimitKind, Margin, Margins, Requirements, check};
 pub use reference::Reference;
 pub use run_in::Excitation;
+pub use sampled::SampledMotion;

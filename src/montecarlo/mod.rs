@@ -10,6 +10,7 @@ pub mod calibration;
 mod effect_size;
 mod efficiency;
 mod experiment;
+mod extended;
 mod job;
 mod scenario;
 pub mod shard;

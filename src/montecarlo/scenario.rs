@@ -123,6 +123,12 @@ pub enum ScenarioError {
         /// What it must be.
         requirement: &'static str,
     },
+    /// A motion that does not repeat is no scenario's.
+    #[error("{log}: its motion does not repeat, and that of a scenario does")]
+    OnePeriod {
+        /// The log.
+        log: String,
+    },
     /// The arm.
     #[error(transparent)]
     Robot(#[from] RobotError),

@@ -3,7 +3,7 @@
 use super::json::Program;
 use super::number::{percent, significant};
 use super::plot::{Axis, Colour, Grid, Mark};
-use super::{Column, Page, ReportError, Section, Status, Table, Verdict};
+use super::{Column, Page, ReportError, Section, Status, Table, Verdict, replay};
 use crate::diagnose::{self, Cause, Diagnosis, Finding, Kind};
 use crate::robot::Arm;
 
@@ -134,6 +134,9 @@ pub fn page(finding: &Finding, arm: &Arm, program: Program) -> Result<Page, Repo
     let mut page = Page::new("What the model gets wrong", subtitle, verdict, program);
     for cause in &diagnosis.causes {
         page.push(cause_section(finding, cause)?);
+    }
+    if let Some(replay) = &diagnosis.replay {
+        page.push(replay::section(replay)?);
     }
     if let Some(unexplained) = &diagnosis.unexplained {
         let [x, y]: [Vec<f64>; 2] =

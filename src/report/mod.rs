@@ -19,6 +19,7 @@ pub mod physical;
 pub mod physical_study;
 pub mod plot;
 pub mod real_arm;
+pub mod replay;
 mod status;
 mod table;
 

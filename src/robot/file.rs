@@ -1,7 +1,9 @@
 //! Robot files: one TOML per arm, and the arms built into the program.
 
+mod write;
+
 use nalgebra::{Matrix3, Vector3};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::arm::{Arm, Capsule, CellBox, Clearance, Drive, Joint, Limits, LinkBounds, Placement};
 use super::error::RobotError;
@@ -71,7 +73,7 @@ impl Arm {
     }
 }
 
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RobotFile {
     name: String,
@@ -104,7 +106,7 @@ pub(super) fn default_epsilon() -> f64 {
     0.02
 }
 
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct JointEntry {
     name: String,
@@ -128,7 +130,7 @@ struct JointEntry {
     com_bounds_m: Option<[[f64; 2]; 3]>,
 }
 
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Tensor {
     xx: f64,
@@ -139,7 +141,7 @@ struct Tensor {
     zz: f64,
 }
 
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CapsuleEntry {
     name: String,
@@ -149,7 +151,7 @@ struct CapsuleEntry {
     radius_m: f64,
 }
 
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct BoxEntry {
     low_m: [f64; 3],

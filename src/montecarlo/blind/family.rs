@@ -177,7 +177,7 @@ impl Family {
             Kind::Stribeck => {
                 let vs_rad_s = log_uniform(rng, [0.03, 0.3]);
                 Recipe::linear(0.1 * coulomb, 0.8 * coulomb, move |s| {
-                    Effect::Stribeck(Stribeck { joint, extra_nm: s, vs_rad_s })
+                    Effect::Stribeck(Stribeck { joint, extra_nm: s, vs_rad_s, exponent: 2 })
                 })
             }
             Kind::NonlinearViscous => {

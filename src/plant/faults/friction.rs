@@ -10,7 +10,7 @@ use crate::robot::Drive;
 ///
 /// ```text
 /// τ_f = (1 + φ Θ) · [ rv q̇ + c(q, q̇, L) z + Σ A |q̇|ᵖ s + a z² + b |q̇| ]
-/// c   = rc + Σ d exp(−(q̇/v_s)²) + Σ P cos(q + ψ) + μ |L|
+/// c   = rc + Σ d exp(−|q̇/v_s|ⁿ) + Σ P cos(q + ψ) + μ |L|
 /// s   = tanh(q̇/ε);   z = s, or the bristle's state with presliding
 /// ```
 #[derive(Debug, Clone)]
@@ -80,7 +80,7 @@ impl Friction {
     fn level_nm(&self, q_rad: f64, qd_rad_s: f64, load_nm: f64) -> f64 {
         let mut level = self.coulomb_nm + self.mu * load_nm.abs();
         for part in &self.stribeck {
-            level += part.extra_nm * (-(qd_rad_s / part.vs_rad_s).powi(2)).exp();
+            level += part.extra_nm * (-(qd_rad_s / part.vs_rad_s).abs().powi(part.exponent)).exp();
         }
         for part in &self.positions {
             level += part.amplitude_nm * (q_rad + part.phase_rad).cos();
@@ -141,8 +141,8 @@ impl Friction {
     }
 }
 
-/// Extra dry friction near standstill: c = rc + d exp(−(q̇/v_s)²) (Bo and Pavelescu 1982 with
-/// exponent 2, as in Armstrong-Hélouvry, Dupont, Canudas de Wit 1994).
+/// Extra dry friction near standstill: c = rc + d exp(−|q̇/v_s|ⁿ) (Bo and Pavelescu 1982; exponent 2
+/// as in Armstrong-Hélouvry, Dupont, Canudas de Wit 1994, 1 as in Tustin 1947).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stribeck {
@@ -152,6 +152,13 @@ pub struct Stribeck {
     pub extra_nm: f64,
     /// v_s, rad/s.
     pub vs_rad_s: f64,
+    /// n: 1 or 2. Default 2.
+    #[serde(default = "gaussian")]
+    pub exponent: i32,
+}
+
+fn gaussian() -> i32 {
+    2
 }
 
 impl Fault for Stribeck {
@@ -161,7 +168,9 @@ impl Fault for Stribeck {
 
     fn check(&self) -> Result<(), Complaint> {
         finite("extra_nm", self.extra_nm)?;
-        positive("vs_rad_s", self.vs_rad_s)
+        positive("vs_rad_s", self.vs_rad_s)?;
+        let ok = (1..=2).contains(&self.exponent);
+        require(ok, "exponent", f64::from(self.exponent), "must be 1 or 2")
     }
 
     fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {

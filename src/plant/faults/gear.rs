@@ -122,6 +122,13 @@ pub struct Elasticity {
     pub encoder: EncoderSide,
 }
 
+impl Elasticity {
+    /// With the usual damping.
+    pub fn new(joint: usize, stiffness_nm_rad: f64, encoder: EncoderSide) -> Self {
+        Self { joint, stiffness_nm_rad, damping_ratio: DAMPING_RATIO, encoder }
+    }
+}
+
 impl Fault for Elasticity {
     fn joint(&self) -> Option<usize> {
         Some(self.joint)
@@ -167,6 +174,17 @@ pub struct Backlash {
 impl Backlash {
     /// Frequency of the rotor against the flanks where no stiffness is given, rad/s.
     const FLANK_RAD_S: f64 = 300.0;
+
+    /// With the usual flanks, the encoder on the motor.
+    pub fn new(joint: usize, gap_rad: f64) -> Self {
+        Self {
+            joint,
+            gap_rad,
+            stiffness_nm_rad: None,
+            damping_ratio: DAMPING_RATIO,
+            encoder: EncoderSide::Motor,
+        }
+    }
 }
 
 impl Fault for Backlash {

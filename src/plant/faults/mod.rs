@@ -17,7 +17,7 @@
 //!
 //! | kind | acts in | keys besides `joint` |
 //! |---|---|---|
-//! | [`stribeck`](Stribeck) | friction | `extra_nm`, `vs_rad_s` |
+//! | [`stribeck`](Stribeck) | friction | `extra_nm`, `vs_rad_s`, (`exponent`) |
 //! | [`nonlinear_viscous`](NonlinearViscous) | friction | `amplitude_nm`, `exponent` |
 //! | [`asymmetric_friction`](AsymmetricFriction) | friction | `coulomb_nm`, `viscous_nm_s_rad` |
 //! | [`load_friction`](LoadFriction) | friction | `mu` |

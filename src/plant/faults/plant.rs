@@ -28,8 +28,18 @@ impl FaultyPlant {
         effects: &[Effect],
         config: &PlantConfig,
     ) -> Result<Self, PlantError> {
+        Self::with_controller(nominal, nominal, effects, config)
+    }
+
+    /// As [`Self::new`] from `arm`, under a controller that takes the result for `nominal`.
+    pub fn with_controller(
+        arm: &Arm,
+        nominal: &Arm,
+        effects: &[Effect],
+        config: &PlantConfig,
+    ) -> Result<Self, PlantError> {
         config.validate()?;
-        let mut assembly = Assembly::new(nominal);
+        let mut assembly = Assembly::new(arm);
         for (i, effect) in effects.iter().enumerate() {
             let install = |assembly: &mut Assembly| {
                 let fault = effect.as_fault();

@@ -1,0 +1,202 @@
+//! What a named cause is in the plant.
+//!
+//! The two speak of the same physical quantities in the same units, and nothing else is shared: a size
+//! that was fitted to a log goes into the equations of motion. Where a family and its effect do not mean
+//! the same, it says so here.
+
+use crate::diagnose::Kind;
+use crate::plant::faults::{self, Effect};
+
+/// What becomes of a cause when the simulation is extended by it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Counterpart {
+    /// It is part of the model that was fitted, and acts in the simulated arm.
+    InTheModel(Effect),
+    /// It acts on the readings: the log was freed of it before the model was fitted, so that a replay
+    /// goes without, while a scenario that is to make such logs has it.
+    OfTheRecord(Effect),
+    /// It does not go back, for this reason.
+    None(&'static str),
+}
+
+/// Why a cause does not go back.
+const IN_THE_PARAMETERS: &str = "the identified parameters hold it already";
+const ONE_EVENT: &str =
+    "it happened once: no property of the arm, taken out of the log before the fit";
+const NO_SUCH_SIZE: &str = "the size that was found is none that the simulated effect can have";
+const INCOMPLETE: &str = "the log does not tell all of its numbers";
+
+/// A cause as the diagnosis has it.
+#[derive(Debug, Clone, Copy)]
+pub struct Found<'a> {
+    /// Its family.
+    pub kind: Kind,
+    /// From 1; `None`: the arm as a whole.
+    pub joint: Option<usize>,
+    /// Which form of the family's law.
+    pub variant: usize,
+    /// Names of its physical parameters, with SI values.
+    pub quantities: &'a [(&'static str, f64)],
+}
+
+impl Found<'_> {
+    fn value(&self, name: &str) -> Option<f64> {
+        let found = self.quantities.iter().find(|(known, _)| *known == name);
+        found.map(|(_, value)| *value).filter(|value| value.is_finite())
+    }
+
+    /// The counterpart in the plant.
+    pub fn counterpart(&self) -> Counterpart {
+        self.effect().unwrap_or(Counterpart::None(INCOMPLETE))
+    }
+
+    /// `None` where a number is missing.
+    fn effect(&self) -> Option<Counterpart> {
+        let value = |name| self.value(name);
+        let in_the_model = |effect| Some(Counterpart::InTheModel(effect));
+        let of_the_record = |effect| Some(Counterpart::OfTheRecord(effect));
+        match self.kind {
+            Kind::Stribeck => in_the_model(Effect::Stribeck(faults::Stribeck {
+                joint: self.joint?,
+                extra_nm: value("extra_nm")?,
+                vs_rad_s: value("vs_rad_s")?,
+                exponent: if self.variant == 0 { 2 } else { 1 },
+            })),
+            Kind::NonlinearViscous => {
+                in_the_model(Effect::NonlinearViscous(faults::NonlinearViscous {
+                    joint: self.joint?,
+                    amplitude_nm: value("amplitude_nm")?,
+                    exponent: value("exponent")?,
+                }))
+            }
+            Kind::AsymmetricFriction => {
+                in_the_model(Effect::AsymmetricFriction(faults::AsymmetricFriction {
+                    joint: self.joint?,
+                    coulomb_nm: value("coulomb_nm")?,
+                    viscous_nm_s_rad: value("viscous_nm_s_rad")?,
+                }))
+            }
+            Kind::LoadFriction => match value("mu")? {
+                mu if (0.0..=0.5).contains(&mu) => {
+                    let joint = self.joint?;
+                    in_the_model(Effect::LoadFriction(faults::LoadFriction { joint, mu }))
+                }
+                _ => Some(Counterpart::None(NO_SUCH_SIZE)),
+            },
+            // The friction that slides is the arm's own; what the family fits to the reversals alone is
+            // the same quantity, known less well.
+            Kind::Presliding => in_the_model(Effect::Presliding(faults::Presliding {
+                joint: self.joint?,
+                stiffness_per_rad: value("stiffness_per_rad")?,
+            })),
+            Kind::PositionFriction => {
+                in_the_model(Effect::PositionFriction(faults::PositionFriction {
+                    joint: self.joint?,
+                    amplitude_nm: value("amplitude_nm")?,
+                    phase_rad: value("phase_rad")?,
+                }))
+            }
+            Kind::ThermalDrift => match value("fraction")? {
+                fraction if fraction > -0.5 && fraction <= 1.0 => {
+                    in_the_model(Effect::ThermalDrift(faults::ThermalDrift {
+                        joint: self.joint?,
+                        fraction,
+                        time_constant_s: value("time_constant_s")?,
+                    }))
+                }
+                _ => Some(Counterpart::None(NO_SUCH_SIZE)),
+            },
+            Kind::Ripple => in_the_model(Effect::Ripple(faults::Ripple {
+                joint: self.joint?,
+                amplitude_nm: value("amplitude_nm")?,
+                order_per_turn: value("order_per_turn")?,
+                phase_rad: value("phase_rad")?,
+            })),
+            Kind::Elasticity => {
+                let stiffness_nm_rad = value("stiffness_nm_rad")?;
+                let side = [faults::EncoderSide::Motor, faults::EncoderSide::Link];
+                let encoder = side[self.variant.min(1)];
+                in_the_model(Effect::Elasticity(faults::Elasticity::new(
+                    self.joint?,
+                    stiffness_nm_rad,
+                    encoder,
+                )))
+            }
+            Kind::Backlash => in_the_model(Effect::Backlash(faults::Backlash::new(
+                self.joint?,
+                value("gap_rad")?,
+            ))),
+            Kind::TorqueGain => match value("error_fraction")? {
+                error_fraction if (-0.5..=1.0).contains(&error_fraction) => {
+                    let joint = self.joint?;
+                    in_the_model(Effect::TorqueGain(faults::TorqueGain { joint, error_fraction }))
+                }
+                _ => Some(Counterpart::None(NO_SUCH_SIZE)),
+            },
+            Kind::CurrentOffset => in_the_model(Effect::CurrentOffset(faults::CurrentOffset {
+                joint: self.joint?,
+                offset_nm: value("offset_nm")?,
+            })),
+            Kind::Saturation => in_the_model(Effect::Saturation(faults::Saturation {
+                joint: self.joint?,
+                limit_nm: value("limit_nm")?,
+            })),
+            Kind::TimeSkew => in_the_model(Effect::TimeSkew(faults::TimeSkew {
+                joint: self.joint,
+                delay_s: value("delay_s")?,
+            })),
+            Kind::EncoderOffset => in_the_model(Effect::EncoderOffset(faults::EncoderOffset {
+                joint: self.joint?,
+                offset_rad: value("offset_rad")?,
+            })),
+            Kind::BaseTilt => in_the_model(Effect::BaseTilt(faults::BaseTilt {
+                tilt_x_rad: value("tilt_x_rad")?,
+                tilt_y_rad: value("tilt_y_rad")?,
+            })),
+            Kind::Spring => self.spring(),
+            Kind::VelocityLag => of_the_record(Effect::VelocityLag(faults::VelocityLag {
+                joint: self.joint,
+                delay_s: value("delay_s")?,
+            })),
+            Kind::ClockFault => of_the_record(Effect::ClockFault(faults::ClockFault {
+                lost_s: value("lost_s")?,
+                every_rows: value("every_rows")? as usize,
+            })),
+            Kind::DroppedSamples => of_the_record(Effect::DroppedSamples(faults::DroppedSamples {
+                joint: self.joint,
+                fraction: value("fraction")?,
+                repeat: true,
+            })),
+            Kind::Quantisation => of_the_record(Effect::Quantisation(faults::Quantisation {
+                joint: self.joint,
+                step: value("step")?,
+                channel: faults::ReadingChannel::Torque,
+            })),
+            Kind::Outliers => of_the_record(Effect::Outliers(faults::Outliers {
+                joint: self.joint,
+                fraction: value("fraction")?,
+            })),
+            Kind::Contact => Some(Counterpart::None(ONE_EVENT)),
+            Kind::Gravity | Kind::Payload | Kind::LinkLength | Kind::FrictionChange => {
+                Some(Counterpart::None(IN_THE_PARAMETERS))
+            }
+        }
+    }
+
+    /// A spring whose angle dependence the null model absorbs leaves its pull at zero; one whose pull at
+    /// zero the offset of the null model absorbs pulls from there.
+    fn spring(&self) -> Option<Counterpart> {
+        let joint = self.joint?;
+        if let Some(offset_nm) = self.value("pull_at_zero_nm") {
+            let offset = faults::CurrentOffset { joint, offset_nm };
+            return Some(Counterpart::InTheModel(Effect::CurrentOffset(offset)));
+        }
+        let stiffness_nm_rad = self.value("stiffness_nm_rad")?;
+        if stiffness_nm_rad < 0.0 {
+            return Some(Counterpart::None(NO_SUCH_SIZE));
+        }
+        let rest_rad = self.value("rest_rad").unwrap_or(0.0);
+        let spring = faults::Spring { joint, stiffness_nm_rad, rest_rad };
+        Some(Counterpart::InTheModel(Effect::Spring(spring)))
+    }
+}

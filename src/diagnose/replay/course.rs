@@ -1,0 +1,194 @@
+//! One log replayed by one arm.
+
+use super::error::ReplayError;
+use super::simulated::SimulatedArm;
+use crate::diagnose::Scene;
+use crate::diagnose::diagnoser::rms_where;
+use crate::diagnose::extension::mean_period;
+use crate::dynamics::Motion;
+use crate::excitation::SampledMotion;
+use crate::identify::{Options, Regression};
+use crate::plant::faults::{Effect, FaultyPlant};
+use crate::plant::{PlantConfig, PlantError, Recording};
+use crate::robot::{Arm, JointSignals};
+use crate::signal::{Scratch, SignalError, ZeroPhase, central_4};
+
+/// A log as it is to be replayed.
+pub(super) struct Course<'a> {
+    /// Its motion.
+    pub(super) scene: &'a Scene,
+    /// Its torque: the mean period, or the run behind its low-pass, Nm.
+    pub(super) measured_nm: &'a JointSignals,
+    /// Sample of the motion behind each sample of the torque.
+    pub(super) samples: &'a [usize],
+    /// How a single run is processed.
+    pub(super) options: &'a Options,
+}
+
+/// What a simulated arm did along the motion of a log.
+pub(super) struct Replayed {
+    /// Drive torque, as processed as the log's, Nm.
+    pub(super) torque_nm: JointSignals,
+    /// Logged minus simulated angle under the controller alone, rms per joint, rad.
+    pub(super) tracking_rms_rad: Vec<f64>,
+    /// Logged minus simulated angle in the run whose torque is compared, rms per joint, rad.
+    pub(super) motion_rms_rad: Vec<f64>,
+}
+
+/// The last of these runs follows the log, the ones before show by how much the arm leaves it.
+const RUNS: usize = 2;
+/// A motion that repeats is entered this long before the period that counts, s: fifty times as long as
+/// the controller takes to forget how it started.
+const LEAD_S: f64 = 1.0;
+/// Longest step of the integrator, s.
+const LONGEST_STEP_S: f64 = 0.001;
+
+/// Torque of a log as it is compared: of one period the mean, of a single run what its low-pass leaves, Nm.
+pub(in crate::diagnose) fn measured_nm(regression: &Regression) -> JointSignals {
+    let Regression { prepared, problem, .. } = regression;
+    if prepared.replicates.is_some() {
+        let n = prepared.motion.samples();
+        return prepared.torque_nm.map_joints(|_, y| mean_period(y, n));
+    }
+    JointSignals::from_fn(problem.joints(), problem.samples, |j, k| problem.panels[j].y[k])
+}
+
+impl Course<'_> {
+    /// The log's motion run by `simulated` with `effects` in it, under the controller of `nominal`.
+    ///
+    /// The controller is given the motion that was logged, and the arm leaves it by what the controller
+    /// does not know: the tracking error. What it lacks is then added to the reference, so that the arm
+    /// moves as the logged one did, and the torque of that run is what the two can be compared by.
+    pub(super) fn replay(
+        &self,
+        simulated: &SimulatedArm,
+        effects: &[Effect],
+        nominal: &Arm,
+    ) -> Result<Replayed, ReplayError> {
+        let effects: Vec<Effect> = simulated.offsets.iter().chain(effects).cloned().collect();
+        let plant = FaultyPlant::with_controller(
+            &simulated.arm,
+            nominal,
+            &effects,
+            &plant_config(self.scene.rate_hz),
+        )?;
+        let repeats = effects.iter().all(Effect::repeats);
+        let logged = &self.scene.motion.q_rad;
+        let mut reference = self.smooth(logged)?;
+        let mut tracking_rms_rad = Vec::new();
+        for run in 0.. {
+            let (q_rad, torque_nm) = self.follow(&plant, reference.clone(), repeats)?;
+            let off_rad = JointSignals::from_fn(logged.joints(), logged.samples(), |j, k| {
+                logged.joint(j)[k] - q_rad.joint(j)[k]
+            });
+            let motion_rms_rad: Vec<f64> =
+                (0..off_rad.joints()).map(|j| rms_where(off_rad.joint(j), |_| true)).collect();
+            if run == 0 {
+                tracking_rms_rad.clone_from(&motion_rms_rad);
+            }
+            if run + 1 == RUNS {
+                let torque_nm = self.as_compared(torque_nm)?;
+                return Ok(Replayed { torque_nm, tracking_rms_rad, motion_rms_rad });
+            }
+            let correction = self.smooth(&off_rad)?;
+            let add = |signals: &mut JointSignals, more: &JointSignals| {
+                for j in 0..signals.joints() {
+                    let pairs = signals.joint_mut(j).iter_mut().zip(more.joint(j));
+                    pairs.for_each(|(signal, more)| *signal += more);
+                }
+            };
+            add(&mut reference.q_rad, &correction.q_rad);
+            add(&mut reference.qd_rad_s, &correction.qd_rad_s);
+            add(&mut reference.qdd_rad_s2, &correction.qdd_rad_s2);
+        }
+        unreachable!("the loop ends in its last run")
+    }
+
+    /// Angles and torque of one run on the samples of the scene: of the mean period, where it repeats.
+    fn follow(
+        &self,
+        plant: &FaultyPlant,
+        reference: Motion,
+        repeats: bool,
+    ) -> Result<(JointSignals, JointSignals), PlantError> {
+        let Scene { rate_hz, periodic, periods, .. } = *self.scene;
+        let n = self.scene.samples();
+        if !periodic {
+            let Recording { q_rad, torque_nm, .. } =
+                plant.run(&SampledMotion::once(reference, rate_hz), None)?;
+            return Ok((q_rad, torque_nm));
+        }
+        // What does not repeat begins with the record.
+        let (lead, count) =
+            if repeats { ((LEAD_S * rate_hz).ceil() as usize, n) } else { (0, n * periods) };
+        let (lead_s, duration_s) = (lead as f64 / rate_hz, (lead + count) as f64 / rate_hz);
+        let reference = SampledMotion::repeating(reference, rate_hz, lead_s, duration_s);
+        let run = plant.run(&reference, None)?;
+        let mean = |signals: &JointSignals| {
+            signals.map_joints(|_, y| mean_period(&y[lead..lead + count], n))
+        };
+        Ok((mean(&run.q_rad), mean(&run.torque_nm)))
+    }
+
+    /// The part of angles below the cutoff of the processing, with its derivatives. Above it, and above
+    /// what the controller can follow, the accelerations of a log are noise rather than motion, and would
+    /// be fed forward as torque.
+    fn smooth(&self, q_rad: &JointSignals) -> Result<Motion, SignalError> {
+        let rate_hz = self.scene.rate_hz;
+        let Options { cutoff_hz, order, .. } = *self.options;
+        let mut motion = Motion::at_rest(q_rad.joints(), q_rad.samples());
+        let mut scratch = Scratch::default();
+        for j in 0..q_rad.joints() {
+            let (q, qd, qdd);
+            if self.scene.periodic {
+                q = self.scene.slow_part(q_rad.joint(j), cutoff_hz);
+                qd = self.scene.derivative(&q);
+                qdd = self.scene.derivative(&qd);
+            } else {
+                let mut low = q_rad.joint(j).to_vec();
+                ZeroPhase::new(cutoff_hz, order, rate_hz)?
+                    .filter_in_place(&mut low, &mut scratch)?;
+                let mut rates = [vec![0.0; low.len()], vec![0.0; low.len()]];
+                central_4(&low, rate_hz, &mut rates[0])?;
+                let [first, second] = &mut rates;
+                central_4(first, rate_hz, second)?;
+                q = low;
+                [qd, qdd] = rates;
+            }
+            motion.q_rad.joint_mut(j).copy_from_slice(&q);
+            motion.qd_rad_s.joint_mut(j).copy_from_slice(&qd);
+            motion.qdd_rad_s2.joint_mut(j).copy_from_slice(&qdd);
+        }
+        Ok(motion)
+    }
+
+    /// Simulated torque, processed and picked as the log's.
+    fn as_compared(&self, mut torque_nm: JointSignals) -> Result<JointSignals, SignalError> {
+        if self.scene.periodic {
+            return Ok(torque_nm);
+        }
+        let Options { cutoff_hz, order, .. } = *self.options;
+        let low_pass = ZeroPhase::new(cutoff_hz, order, self.scene.rate_hz)?;
+        let mut scratch = Scratch::default();
+        for j in 0..torque_nm.joints() {
+            low_pass.filter_in_place(torque_nm.joint_mut(j), &mut scratch)?;
+        }
+        Ok(torque_nm.map_joints(|_, y| self.samples.iter().map(|&k| y[k]).collect()))
+    }
+}
+
+/// Inverse of the last digit of a rate that means anything, s.
+const RATE_DIGITS: f64 = 1e6;
+
+/// The plant's own controller, with decisions at every step and a log at the rate of the one replayed.
+pub(super) fn plant_config(rate_hz: f64) -> PlantConfig {
+    // A rate from time stamps carries their round-off.
+    let rate_hz = (rate_hz * RATE_DIGITS).round() / RATE_DIGITS;
+    let steps = (1.0 / (rate_hz * LONGEST_STEP_S) * (1.0 - 1e-6)).ceil().max(1.0);
+    PlantConfig {
+        step_s: 1.0 / (rate_hz * steps),
+        control_rate_hz: rate_hz * steps,
+        log_rate_hz: rate_hz,
+        ..PlantConfig::default()
+    }
+}

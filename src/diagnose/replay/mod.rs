@@ -1,0 +1,265 @@
+//! The loop closed: what was found goes back into the simulation, which replays the motion of the log.
+//!
+//! Enters: a [`Finding`]. Leaves: the simulation without and with the causes ([`ExtendedSimulation`]), and
+//! a [`Replay`]: how far its torque and its motion are from the log's, on the log and on logs that nothing
+//! was fitted to.
+//!
+//! The model that is fitted to a log is a sum of torques along the recorded motion. Here the causes act
+//! as physics in the integration of the equations of motion ([`plant::faults`](crate::plant::faults)),
+//! under a controller that does not know of them, and the two share no formula: that the torque of the
+//! log comes out is a test of the diagnosis, not a repetition of the fit.
+
+mod counterpart;
+mod course;
+mod error;
+mod simulated;
+
+use serde::Serialize;
+
+use super::diagnoser::{Diagnoser, Finding, rms_where};
+use super::held_out::Validation;
+use super::scene::Scene;
+use crate::plant::faults::Effect;
+use crate::robot::JointSignals;
+
+pub use counterpart::{Counterpart, Found};
+pub(super) use course::measured_nm;
+pub use error::ReplayError;
+pub use simulated::{ExtendedSimulation, NotReplayed, SimulatedArm};
+
+use course::Course;
+
+/// A simulation against logs, without and with the causes that were found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Replay {
+    /// The causes as they act in the simulated arm, with their parameters as scenarios have them.
+    pub effects: Vec<Effect>,
+    /// The others.
+    pub not_replayed: Vec<NotReplayed>,
+    /// How far the simulated arms are from the identified ones (rms over the base parameters, in standard
+    /// deviations of what the log says): without the causes, and with them. 0 where the identified
+    /// parameters are those of an arm that can exist; up to 1 it is nearer than the noise.
+    pub arm_distance: [f64; 2],
+    /// The log that was diagnosed.
+    pub log: ReplayedLog,
+    /// Logs that nothing was fitted to.
+    pub held_out: Vec<ReplayedLog>,
+}
+
+/// One log replayed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ReplayedLog {
+    /// The log.
+    pub log: String,
+    /// Noise of the torque that is compared (the mean over the periods), rms per joint, Nm; null for a
+    /// single run.
+    pub noise_nm: Option<Vec<f64>>,
+    /// Without the causes.
+    pub before: Distance,
+    /// With them.
+    pub after: Distance,
+    /// Share of the explainable mean square of the torque (beyond the noise; every joint in units of its
+    /// noise) that the causes remove; null for a single run.
+    pub removed_fraction: Option<f64>,
+    /// For pictures.
+    #[serde(skip)]
+    pub course: Torques,
+}
+
+/// How far a simulation is from a log.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Distance {
+    /// Logged minus simulated torque along the same motion, rms per joint, Nm.
+    pub torque_rms_nm: Vec<f64>,
+    /// Logged minus simulated angle, rms per joint, rad, where the simulation's own controller follows
+    /// the logged motion. It depends on that controller; the difference between before and after shows
+    /// what the causes do to the motion.
+    pub tracking_rms_rad: Vec<f64>,
+    /// What is left of it in the run whose torque is compared, rad.
+    pub motion_rms_rad: Vec<f64>,
+}
+
+/// Torque along a replayed motion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Torques {
+    /// Time of each sample from the start of the period or run, s.
+    pub time_s: Vec<f64>,
+    /// Logged, Nm.
+    pub measured_nm: JointSignals,
+    /// Simulated without the causes, Nm.
+    pub before_nm: JointSignals,
+    /// Simulated with them, Nm.
+    pub after_nm: JointSignals,
+}
+
+impl Diagnoser<'_> {
+    /// The simulation without and with what was found.
+    pub fn extended_simulation(
+        &self,
+        finding: &Finding,
+    ) -> Result<ExtendedSimulation, ReplayError> {
+        ExtendedSimulation::new(self.arm, self.set, &self.families, finding)
+    }
+
+    /// Lets the simulation replay the log behind `finding` and the logs `held_out`, without and with
+    /// what was found.
+    pub fn replay(
+        &mut self,
+        finding: &Finding,
+        held_out: &[Validation],
+    ) -> Result<Replay, ReplayError> {
+        let simulation = self.extended_simulation(finding)?;
+        let noise = finding.identification.replicates.as_ref().map(|r| &r.sigma[..]);
+        let course = Course {
+            scene: &finding.scene,
+            measured_nm: &finding.measured_nm,
+            samples: &finding.samples,
+            options: &self.options,
+        };
+        let log = simulation.replay(&course, noise, &finding.diagnosis.log)?;
+        let mut others = Vec::with_capacity(held_out.len());
+        for other in held_out {
+            let regression = self.identifier.regression(&other.measurement)?;
+            let prepared = &regression.prepared;
+            let scene = Scene::new(self.arm, self.set, &finding.extension.theta, prepared);
+            let samples: Vec<usize> = (0..regression.problem.samples)
+                .map(|k| regression.first_sample + k * regression.every)
+                .collect();
+            let course = Course {
+                scene: &scene,
+                measured_nm: &measured_nm(&regression),
+                samples: &samples,
+                options: &self.options,
+            };
+            let noise = prepared.replicates.as_ref().map(|r| &r.sigma[..]);
+            others.push(simulation.replay(&course, noise, other.measurement.source)?);
+        }
+        let ExtendedSimulation { null, extended, effects, not_replayed, .. } = simulation;
+        Ok(Replay {
+            effects,
+            not_replayed,
+            arm_distance: [null.distance, extended.distance],
+            log,
+            held_out: others,
+        })
+    }
+}
+
+impl ExtendedSimulation {
+    fn replay(
+        &self,
+        course: &Course,
+        noise_of_a_sample_nm: Option<&[f64]>,
+        log: &str,
+    ) -> Result<ReplayedLog, ReplayError> {
+        let nominal = &self.null.arm;
+        let (before, after) = std::thread::scope(|scope| {
+            let before = scope.spawn(|| course.replay(&self.null, &[], nominal));
+            let after = course.replay(&self.extended, &self.effects, nominal);
+            (before.join(), after)
+        });
+        let before = before.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
+        let after = after?;
+        let measured_nm = course.measured_nm;
+        let distance = |replayed: &course::Replayed| Distance {
+            torque_rms_nm: (0..measured_nm.joints())
+                .map(|j| {
+                    let pairs = measured_nm.joint(j).iter().zip(replayed.torque_nm.joint(j));
+                    rms_where(&pairs.map(|(m, s)| m - s).collect::<Vec<_>>(), |_| true)
+                })
+                .collect(),
+            tracking_rms_rad: replayed.tracking_rms_rad.clone(),
+            motion_rms_rad: replayed.motion_rms_rad.clone(),
+        };
+        let (left, right) = (distance(&before), distance(&after));
+        let noise_nm = noise_of_a_sample_nm.map(|sigma| {
+            let periods = course.scene.periods as f64;
+            sigma.iter().map(|sigma| sigma / periods.sqrt()).collect::<Vec<f64>>()
+        });
+        let removed_fraction = noise_nm.as_deref().and_then(|noise_nm| {
+            removed_fraction(&left.torque_rms_nm, &right.torque_rms_nm, noise_nm)
+        });
+        let rate_hz = course.scene.rate_hz;
+        Ok(ReplayedLog {
+            log: log.to_owned(),
+            noise_nm,
+            before: left,
+            after: right,
+            removed_fraction,
+            course: Torques {
+                time_s: course.samples.iter().map(|&k| k as f64 / rate_hz).collect(),
+                measured_nm: measured_nm.clone(),
+                before_nm: before.torque_nm,
+                after_nm: after.torque_nm,
+            },
+        })
+    }
+}
+
+/// Σ (b² − a²)/σ² over Σ (b² − σ²)/σ²; `None` where there was nothing to explain.
+fn removed_fraction(before_nm: &[f64], after_nm: &[f64], noise_nm: &[f64]) -> Option<f64> {
+    let (mut removed, mut explainable) = (0.0, 0.0);
+    for ((before, after), noise) in before_nm.iter().zip(after_nm).zip(noise_nm) {
+        removed += (before.powi(2) - after.powi(2)) / noise.powi(2);
+        explainable += (before.powi(2) - noise.powi(2)) / noise.powi(2);
+    }
+    (explainable > 0.0).then(|| removed / explainable)
+}
+
+/// An arm that is nearer than this to the identified one, in σ per parameter, is that arm: it adds a
+/// quarter to the mean square that the noise of the parameters makes.
+const WORTH_SAYING: f64 = 0.5;
+
+impl Replay {
+    /// In words.
+    pub fn sentences(&self) -> Vec<String> {
+        let mut out = Vec::new();
+        for (log, place) in std::iter::once((&self.log, ""))
+            .chain(self.held_out.iter().map(|log| (log, " on a log that was not used")))
+        {
+            let j = log.worst_joint();
+            let [before, after] =
+                [&log.before, &log.after].map(|distance| distance.torque_rms_nm[j]);
+            let mut text = format!(
+                "Replayed in the simulator{place}, joint {}'s torque is off by {before:.2} Nm before and \
+                 {after:.2} Nm after",
+                j + 1
+            );
+            if let Some(noise) = &log.noise_nm {
+                text += &format!(" (noise floor {:.2})", noise[j]);
+            }
+            if let Some(share) = log.removed_fraction {
+                text += &format!(
+                    "; over all joints that removes {:.0} % of what the noise leaves to explain",
+                    100.0 * share
+                );
+            }
+            out.push(text + ".");
+        }
+        for NotReplayed { kind, joint, reason } in &self.not_replayed {
+            let place = joint.map_or(String::new(), |j| format!(" at joint {j}"));
+            out.push(format!("Not in the simulation: {kind}{place}: {reason}."));
+        }
+        let [_, extended] = self.arm_distance;
+        if extended > WORTH_SAYING {
+            out.push(format!(
+                "No arm that can exist has the parameters that were identified with the causes; the nearest one, \
+                 which is simulated, is {extended:.1} σ per parameter away."
+            ));
+        }
+        out
+    }
+}
+
+impl ReplayedLog {
+    /// The joint (0-based) whose torque gains most, in units of its noise where that is known.
+    pub fn worst_joint(&self) -> usize {
+        let gain = |j: usize| {
+            let square = |distance: &Distance| distance.torque_rms_nm[j].powi(2);
+            let noise = self.noise_nm.as_ref().map_or(1.0, |noise| noise[j].powi(2));
+            (square(&self.before) - square(&self.after)) / noise
+        };
+        let joints = 0..self.before.torque_rms_nm.len();
+        joints.max_by(|&a, &b| gain(a).total_cmp(&gain(b))).unwrap_or(0)
+    }
+}

@@ -1,0 +1,171 @@
+//! The arms that go back into the simulation.
+
+use serde::Serialize;
+
+use super::counterpart::{Counterpart, Found};
+use super::course::plant_config;
+use super::error::ReplayError;
+use crate::base::BaseSet;
+use crate::diagnose::candidates::Candidate;
+use crate::diagnose::{Finding, Kind};
+use crate::dynamics::{Parameter, ParameterLayout};
+use crate::identify::Identification;
+use crate::identify::physical::{Information, PhysicalOptions, Pulling, Solver, Structure};
+use crate::plant::PlantConfig;
+use crate::plant::faults::{CurrentOffset, Effect};
+use crate::robot::Arm;
+
+/// An arm that the plant can be.
+#[derive(Debug, Clone)]
+pub struct SimulatedArm {
+    /// Bodies and drives.
+    pub arm: Arm,
+    /// Constant torques, Nm, for which an [`Arm`] has no place: one effect per joint that has one.
+    pub offsets: Vec<Effect>,
+    /// √(‖R (θ − θ̂)‖²/b): how far its b base parameters are from those that were identified, in standard
+    /// deviations of what the log says about them. Not 0 where no arm that can exist has those.
+    pub distance: f64,
+}
+
+/// A cause that is not in the simulation.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NotReplayed {
+    /// Family.
+    pub kind: Kind,
+    /// Joint, from 1; null for the arm as a whole.
+    pub joint: Option<usize>,
+    /// Why.
+    pub reason: &'static str,
+}
+
+/// The simulation without and with what was found.
+#[derive(Debug, Clone)]
+pub struct ExtendedSimulation {
+    /// The arm that the null model identifies.
+    pub null: SimulatedArm,
+    /// The arm that is identified together with the causes.
+    pub extended: SimulatedArm,
+    /// The causes.
+    pub effects: Vec<Effect>,
+    /// Faults of the record, which were repaired before the fit.
+    pub of_the_record: Vec<Effect>,
+    /// Causes that have no counterpart; the extended arm does as well without them as it can.
+    pub not_replayed: Vec<NotReplayed>,
+    /// Steps and rates: decisions of the plant's own controller at every step, a log at the rate of the
+    /// one that was diagnosed.
+    pub plant: PlantConfig,
+}
+
+impl ExtendedSimulation {
+    /// From what was found about logs of `nominal`.
+    pub(super) fn new(
+        nominal: &Arm,
+        set: &BaseSet,
+        families: &[Box<dyn Candidate>],
+        finding: &Finding,
+    ) -> Result<Self, ReplayError> {
+        let realise = Realise::new(nominal, set, &finding.identification)?;
+        let null = realise.arm(&finding.identification.fit.theta)?;
+        let mut out = Self {
+            plant: plant_config(finding.scene.rate_hz),
+            extended: null.clone(),
+            null,
+            effects: Vec::new(),
+            of_the_record: Vec::new(),
+            not_replayed: Vec::new(),
+        };
+        let mut theta = finding.extension.theta.clone();
+        let mut fitted = Vec::new();
+        for effect in &finding.extension.effects {
+            let family = &families[effect.family];
+            let quantities =
+                family.quantities(&finding.scene, effect.site, effect.shape, &effect.coefficients);
+            let quantities: Vec<_> = quantities.iter().map(|q| (q.name, q.value)).collect();
+            let (kind, joint) = (family.kind(), effect.site.map(|j| j + 1));
+            fitted.push((kind, joint));
+            let variant = effect.shape.variant;
+            if !out.take(Found { kind, joint, variant, quantities: &quantities }) {
+                theta.iter_mut().zip(&effect.absorbed).for_each(|(theta, more)| *theta += more);
+            }
+        }
+        if !fitted.is_empty() {
+            out.extended = realise.arm(&theta)?;
+        }
+        // What is named beside the fitted effects: faults of the record, events, moved parameters.
+        for cause in &finding.diagnosis.causes {
+            let (kind, joint) = (cause.kind, cause.joint);
+            if fitted.contains(&(kind, joint)) {
+                continue;
+            }
+            let found = Found { kind, joint, variant: 0, quantities: &[] };
+            if !matches!(found.kind, Kind::Contact) && !kind.is_of_the_record() {
+                let reason = "it moved the parameters, which were identified with it";
+                out.not_replayed.push(NotReplayed { kind, joint, reason });
+                continue;
+            }
+            let quantities: Vec<_> =
+                cause.parameters.iter().map(|(name, e)| (*name, e.value)).collect();
+            out.take(Found { quantities: &quantities, ..found });
+        }
+        Ok(out)
+    }
+
+    /// Takes a cause in; whether it has a counterpart.
+    fn take(&mut self, found: Found) -> bool {
+        match found.counterpart() {
+            Counterpart::InTheModel(effect) => self.effects.push(effect),
+            Counterpart::OfTheRecord(effect) => self.of_the_record.push(effect),
+            Counterpart::None(reason) => {
+                let Found { kind, joint, .. } = found;
+                self.not_replayed.push(NotReplayed { kind, joint, reason });
+                return false;
+            }
+        }
+        true
+    }
+}
+
+/// γ: a deviation of 10 000 % from the robot file costs as much as one σ.
+const PULL: f64 = 1e-4;
+
+/// Finds arms that can exist for base parameters of one log.
+///
+/// Base parameters are combinations. Among the arms that can exist it takes the one that minimises
+/// ‖R (θ − θ̂)‖² + γ ‖deviation from the robot file‖² with so small a γ that it decides only what the log
+/// leaves open.
+struct Realise<'a> {
+    nominal: &'a Arm,
+    solver: Solver,
+    information: Information,
+}
+
+impl<'a> Realise<'a> {
+    fn new(
+        nominal: &'a Arm,
+        set: &BaseSet,
+        identification: &Identification,
+    ) -> Result<Self, ReplayError> {
+        let margin = PhysicalOptions::default().margin;
+        let structure = Structure::new(nominal, set, nominal, margin)?;
+        let information = Information::of(&identification.fit, &identification.covariance);
+        Ok(Self { nominal, solver: Solver::new(structure), information })
+    }
+
+    fn arm(&self, theta: &[f64]) -> Result<SimulatedArm, ReplayError> {
+        let theta = nalgebra::DVector::from_column_slice(theta);
+        let information = Information { theta, ..self.information.clone() };
+        let solved = self.solver.constrained(&information, Pulling::squared(PULL))?;
+        let standard = self.solver.structure().standard(&solved.y);
+        let layout = ParameterLayout::new(self.nominal.dof());
+        let offsets = (0..self.nominal.dof()).filter_map(|j| {
+            let offset_nm = standard[layout.index(Parameter::Offset(j))];
+            let offset = CurrentOffset { joint: j + 1, offset_nm };
+            (offset_nm != 0.0).then_some(Effect::CurrentOffset(offset))
+        });
+        Ok(SimulatedArm {
+            offsets: offsets.collect(),
+            arm: layout.apply(&standard, self.nominal),
+            distance: (solved.distance / self.information.theta.len() as f64).sqrt(),
+        })
+    }
+}

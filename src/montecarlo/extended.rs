@@ -1,0 +1,154 @@
+//! What was found in a log as a scenario: the arm with its effects, the log's motion and its noise.
+
+use std::path::Path;
+
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use super::scenario::{Scenario, ScenarioError};
+use crate::base::BaseSet;
+use crate::diagnose::Finding;
+use crate::diagnose::replay::ExtendedSimulation;
+use crate::excitation::{Excitation, FourierSeries};
+use crate::identify::{Measurement, Options};
+use crate::output::{OutputError, write_atomically};
+use crate::plant::faults::Effect;
+use crate::plant::{PerJoint, PlantConfig, SensorConfig};
+use crate::robot::JointSignals;
+use crate::signal::replicate_noise;
+
+/// Run-in from rest, s.
+const RUN_IN_S: f64 = 2.0;
+/// Trials of a scenario that is made from a log.
+const TRIALS: u64 = 100;
+/// Its seed.
+const SEED: u64 = 1;
+
+/// A scenario as it stands in a file.
+#[derive(Serialize)]
+struct ScenarioText<'a> {
+    name: &'a str,
+    description: &'a str,
+    robot: &'a str,
+    seed: u64,
+    trials: u64,
+    controller_reads_sensors: bool,
+    motion: MotionText<'a>,
+    plant: &'a PlantConfig,
+    sensors: &'a SensorConfig,
+    processing: &'a Options,
+    effect: &'a [Effect],
+}
+
+#[derive(Serialize)]
+struct MotionText<'a> {
+    trajectory: &'a str,
+    periods: usize,
+    run_in_s: f64,
+}
+
+impl Scenario {
+    /// The scenario behind `log`, diagnosed as `finding`: the arm and the effects of `simulation`, faults of
+    /// the record included, the mean motion of the log up to its cutoff as a Fourier series, and white noise
+    /// of the size that the log's periods show. `set` is what was identified.
+    ///
+    /// # Errors
+    /// [`ScenarioError::OnePeriod`] where the motion does not repeat.
+    pub fn of_diagnosis(
+        simulation: &ExtendedSimulation,
+        finding: &Finding,
+        log: &Measurement,
+        set: &BaseSet,
+        processing: &Options,
+    ) -> Result<Self, ScenarioError> {
+        let scene = &finding.scene;
+        let Some(replicates) =
+            finding.identification.replicates.as_ref().filter(|_| scene.periodic)
+        else {
+            return Err(ScenarioError::OnePeriod { log: log.source.to_owned() });
+        };
+        let series =
+            FourierSeries::of_period(&scene.motion.q_rad, scene.rate_hz, processing.cutoff_hz)?;
+        let arm = simulation.extended.arm.clone();
+        let (effects, further) = (&simulation.effects, &simulation.of_the_record);
+        let effects = simulation.extended.offsets.iter().chain(effects).chain(further);
+        let mut scenario = Self {
+            name: "extended".to_owned(),
+            description: format!("{} with what was found in {}", arm.name, log.source),
+            sha256: String::new(),
+            set: set.clone(),
+            trajectory: String::new(),
+            excitation: Excitation::new(series, RUN_IN_S, scene.periods)?,
+            plant: simulation.plant.clone(),
+            sensors: SensorConfig {
+                torque_sd_nm: PerJoint::Each(replicates.sigma.clone()),
+                q_sd_rad: PerJoint::Each(scatter(finding, log, log.q_rad)),
+                qd_sd_rad_s: PerJoint::Each(scatter(finding, log, log.qd_rad_s)),
+                ..SensorConfig::default()
+            },
+            effects: effects.cloned().collect(),
+            controller_reads_sensors: false,
+            processing: processing.clone(),
+            seed: SEED,
+            trials: TRIALS,
+            arm,
+        };
+        let text = scenario.text("", "");
+        scenario.sha256 = Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect();
+        Ok(scenario)
+    }
+
+    /// Writes the scenario to `path`, and beside it the robot file `NAME.robot.toml` and the trajectory
+    /// `NAME.trajectory.json` that it names. (A reduced set of parameters is not written.)
+    pub fn save(&self, path: &Path) -> Result<(), OutputError> {
+        let (robot, trajectory) =
+            (path.with_extension("robot.toml"), path.with_extension("trajectory.json"));
+        let name = |path: &Path| path.file_name().unwrap_or_default().display().to_string();
+        let text = self.text(&name(&robot), &name(&trajectory));
+        let write = |path: &Path, text: String| {
+            write_atomically(path, |out| out.write_all(text.as_bytes()))
+        };
+        write(&robot, self.arm.to_toml())?;
+        write(&trajectory, self.excitation.series().to_json())?;
+        write(path, text)
+    }
+
+    fn text(&self, robot: &str, trajectory: &str) -> String {
+        let text = ScenarioText {
+            name: &self.name,
+            description: &self.description,
+            robot,
+            seed: self.seed,
+            trials: self.trials,
+            controller_reads_sensors: self.controller_reads_sensors,
+            motion: MotionText {
+                trajectory,
+                periods: self.excitation.periods(),
+                run_in_s: self.excitation.run_in_s(),
+            },
+            plant: &self.plant,
+            sensors: &self.sensors,
+            processing: &self.processing,
+            effect: &self.effects,
+        };
+        // Strings, numbers and tables of them always serialise.
+        toml::to_string(&text).unwrap_or_default()
+    }
+}
+
+/// Noise of one sample from the scatter between the periods of `signals`; zero where the log was put on
+/// another clock before it was used.
+fn scatter(finding: &Finding, log: &Measurement, signals: &JointSignals) -> Vec<f64> {
+    let processing = &finding.identification.processing;
+    let (n, periods) = (finding.scene.samples(), finding.scene.periods);
+    let start = (processing.window_s[0] - log.time_s[0]) * processing.rate_hz;
+    let window = start.round() as usize..start.round() as usize + n * periods;
+    let spacing =
+        (log.time_s.len() - 1) as f64 / (log.time_s[log.time_s.len() - 1] - log.time_s[0]);
+    let same_clock = !processing.resampled && (spacing / processing.rate_hz - 1.0).abs() < 1e-6;
+    if !same_clock || window.end > signals.samples() {
+        return vec![0.0; signals.joints()];
+    }
+    let noise = replicate_noise(&signals.slice(window), n);
+    noise.map_or(vec![0.0; signals.joints()], |noise| noise.sigma)
+}

@@ -1,0 +1,238 @@
+//! An effect means the same in the diagnosis and in the plant, which share no formula: a family's coefficients
+//! become physical parameters, these an effect, the plant makes a log with it, and the family has to predict that
+//! log's torque with the coefficients it began with.
+//!
+//! Along the log without noise, c = ⟨d, τ − τ₀⟩/⟨d, d⟩, with d the torque that the family predicts and τ₀ that of
+//! the arm without it, is 1 where both mean the same, and −1 or worse where a sign, a phase, a unit or a factor is not
+//! the same. The arm's own rigid torque is not exact along a sampled motion (its acceleration is a short series,
+//! friction reverses between samples), which is unlike d: what it adds to c is its size over that of d, divided by
+//! the root of the 20 or so independent stretches of a motion of ±5 reversals, 2 % where it is as large as d.
+
+use armid::base::{BaseSet, Parameterisation};
+use armid::diagnose::candidates::{self, Shape};
+use armid::diagnose::replay::{Counterpart, Found};
+use armid::diagnose::{Effect, Extension, Kind, Scene};
+use armid::dynamics::Model;
+use armid::excitation::{FourierSeries, Reference};
+use armid::identify::{Identifier, Measurement, Options, Regression};
+use armid::plant::faults::{self, FaultyPlant};
+use armid::plant::{PlantConfig, Recording};
+use armid::robot::Arm;
+
+const PERIOD: usize = 1250;
+const LEAD: usize = 125;
+const PERIODS: usize = 2;
+/// Largest |c − 1| of a family whose law is the plant's.
+const SAME: f64 = 0.05;
+
+/// One family at one joint (from 1; 0: all), and how far c may be from 1.
+struct Case {
+    kind: Kind,
+    joint: usize,
+    shape: Shape,
+    coefficients: Vec<f64>,
+    within: f64,
+}
+
+fn case(kind: Kind, joint: usize, shape: (usize, f64), coefficients: &[f64], within: f64) -> Case {
+    let shape = Shape { variant: shape.0, value: shape.1 };
+    Case { kind, joint, shape, coefficients: coefficients.to_vec(), within }
+}
+
+/// A series that goes on for `periods` after a lead.
+struct Periodic {
+    series: FourierSeries,
+    lead_s: f64,
+    periods: usize,
+}
+
+impl Reference for Periodic {
+    fn joints(&self) -> usize {
+        self.series.joints()
+    }
+
+    fn duration_s(&self) -> f64 {
+        self.lead_s + self.periods as f64 * self.series.period_s
+    }
+
+    fn sample(&self, t_s: f64, q_rad: &mut [f64], qd_rad_s: &mut [f64], qdd_rad_s2: &mut [f64]) {
+        self.series.sample(t_s - self.lead_s, q_rad, qd_rad_s, qdd_rad_s2);
+    }
+}
+
+struct Bench {
+    arm: Arm,
+    model: Model,
+    set: BaseSet,
+    clean: Recording,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let arm = Arm::built_in("ur5").unwrap();
+        let set = BaseSet::find(&arm, Parameterisation::full(arm.dof(), false)).unwrap();
+        Self { model: Model::new(&arm), clean: log(&arm, &[]), set, arm }
+    }
+
+    /// What every family sees of `run`, for the true parameters.
+    fn scene(&self, run: &Recording) -> (Scene, Regression) {
+        let mut identifier = Identifier::new(&self.model, &self.set, Options::default());
+        let measurement = Measurement {
+            source: "val_replay",
+            time_s: &run.time_s,
+            q_rad: &run.q_rad,
+            qd_rad_s: &run.qd_rad_s,
+            torque_nm: &run.torque_nm,
+        };
+        let regression = identifier.regression(&measurement).unwrap();
+        let theta = self.set.values(&self.model.standard_parameters());
+        (Scene::new(&self.arm, &self.set, &theta, &regression.prepared), regression)
+    }
+
+    /// c, and the rms of d over the joints that it is on, Nm.
+    fn slope(&self, case: &Case) -> (f64, f64) {
+        let families = candidates::all();
+        let family = families.iter().position(|f| f.kind() == case.kind).unwrap();
+        let site = case.joint.checked_sub(1);
+        let (scene, _) = self.scene(&self.clean);
+        let quantities = families[family].quantities(&scene, site, case.shape, &case.coefficients);
+        let quantities: Vec<_> = quantities.iter().map(|q| (q.name, q.value)).collect();
+        let found = Found {
+            kind: case.kind,
+            joint: site.map(|j| j + 1),
+            variant: case.shape.variant,
+            quantities: &quantities,
+        };
+        let Counterpart::InTheModel(hidden) = found.counterpart() else {
+            panic!("{} has no counterpart", case.kind);
+        };
+        let run = log(&self.arm, &[hidden]);
+        let (scene, regression) = self.scene(&run);
+        let theta = self.set.values(&self.model.standard_parameters());
+        let effect = Effect {
+            family,
+            site,
+            shape: case.shape,
+            coefficients: case.coefficients.clone(),
+            absorbed: Vec::new(),
+        };
+        let predict = |effects: Vec<Effect>| {
+            let model = Extension { theta: theta.clone(), effects };
+            model.torque_nm(&families, &scene, &regression.problem, None)
+        };
+        let (with, without) = (predict(vec![effect]), predict(Vec::new()));
+        let torque = &regression.prepared.torque_nm;
+        let n = regression.problem.samples;
+        let (mut product, mut square, mut count) = (0.0, 0.0, 0);
+        for j in 0..self.arm.dof() {
+            for k in 0..n {
+                let d = with.joint(j)[k] - without.joint(j)[k];
+                let periods = torque.joint(j).iter().skip(k).step_by(n);
+                let mean = periods.sum::<f64>() / PERIODS as f64;
+                product += d * (mean - without.joint(j)[k]);
+                square += d * d;
+                count += usize::from(d != 0.0);
+            }
+        }
+        (product / square, (square / count as f64).sqrt())
+    }
+
+    fn check(&self, cases: &[Case]) {
+        let mut wrong = Vec::new();
+        for case in cases {
+            let (slope, rms_nm) = self.slope(case);
+            let Case { kind, joint, within, .. } = case;
+            println!("{kind:20} joint {joint}: c = {slope:.3}, d {rms_nm:.3} Nm rms");
+            if (slope - 1.0).abs() > *within {
+                wrong.push((kind, joint, slope));
+            }
+        }
+        assert!(wrong.is_empty(), "{wrong:?}");
+    }
+}
+
+/// Two periods without noise. What repeats is run for one, entered a second before.
+fn log(arm: &Arm, effects: &[faults::Effect]) -> Recording {
+    let series = FourierSeries::built_in("ur5_identification").unwrap();
+    let repeats = effects.iter().all(faults::Effect::repeats);
+    let (lead, periods) = if repeats { (LEAD, 1) } else { (0, PERIODS) };
+    let reference = Periodic { series, lead_s: lead as f64 / 125.0, periods };
+    let plant = FaultyPlant::new(arm, effects, &PlantConfig::default()).unwrap();
+    let run = plant.run(&reference, None).unwrap();
+    run.repeated(lead + periods * PERIOD, PERIOD, lead + PERIODS * PERIOD)
+}
+
+const NO_SHAPE: (usize, f64) = (0, 0.0);
+
+fn friction(arm: &Arm) -> Vec<Case> {
+    vec![
+        case(Kind::Stribeck, 4, (0, 0.15), &[0.8], SAME),
+        case(Kind::Stribeck, 5, (1, 0.2), &[0.8], SAME),
+        case(Kind::NonlinearViscous, 2, (0, 0.5), &[3.0], SAME),
+        case(Kind::NonlinearViscous, 3, (1, 2.0), &[3.0], SAME),
+        case(Kind::AsymmetricFriction, 3, NO_SHAPE, &[1.5, 1.0], SAME),
+        case(Kind::LoadFriction, 2, NO_SHAPE, &[0.08], SAME),
+        case(Kind::PositionFriction, 1, NO_SHAPE, &[1.5, -2.0], SAME),
+        // The bristles carry the friction that the arm has.
+        case(Kind::Presliding, 5, (0, 100.0), &[arm.joints[4].drive.coulomb_nm], SAME),
+        // The plant heats by the power of friction, the family by the clock.
+        case(Kind::ThermalDrift, 1, (0, 15.0), &[-0.3], SAME),
+    ]
+}
+
+fn drives() -> Vec<Case> {
+    vec![
+        case(Kind::Ripple, 4, (0, 40.0), &[0.5, -0.4], SAME),
+        case(Kind::TorqueGain, 2, NO_SHAPE, &[0.08], SAME),
+        case(Kind::CurrentOffset, 4, NO_SHAPE, &[0.5], SAME),
+        case(Kind::Saturation, 2, (0, 40.0), &[1.0], SAME),
+        case(Kind::TimeSkew, 2, (0, 0.004), &[0.004], SAME),
+        case(Kind::TimeSkew, 0, (0, -0.004), &[-0.004], SAME),
+    ]
+}
+
+fn arm_and_surroundings() -> Vec<Case> {
+    vec![
+        case(Kind::Spring, 3, NO_SHAPE, &[6.0, -4.0], SAME),
+        case(Kind::BaseTilt, 0, NO_SHAPE, &[0.02, -0.03], SAME),
+        case(Kind::EncoderOffset, 2, NO_SHAPE, &[0.02], SAME),
+    ]
+}
+
+fn gears() -> Vec<Case> {
+    vec![
+        case(Kind::Elasticity, 2, NO_SHAPE, &[1.0 / 8000.0], SAME),
+        case(Kind::Backlash, 2, NO_SHAPE, &[0.004], SAME),
+    ]
+}
+
+#[test]
+fn friction_means_the_same() {
+    let bench = Bench::new();
+    bench.check(&friction(&bench.arm));
+}
+
+#[test]
+fn drives_mean_the_same() {
+    Bench::new().check(&drives());
+}
+
+#[test]
+fn arm_and_surroundings_mean_the_same() {
+    Bench::new().check(&arm_and_surroundings());
+}
+
+#[test]
+fn gears_mean_the_same() {
+    Bench::new().check(&gears());
+}
+
+#[test]
+fn no_family_is_left_out() {
+    let arm = Arm::built_in("ur5").unwrap();
+    let cases = [friction(&arm), drives(), arm_and_surroundings(), gears()];
+    for family in candidates::all() {
+        let kind = family.kind();
+        assert!(cases.iter().flatten().any(|case| case.kind == kind), "{kind} has no case");
+    }
+}
