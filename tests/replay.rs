@@ -227,7 +227,7 @@ fn torque_ripple() {
 
 #[test]
 fn a_gear_that_gives_way() {
-    let effect = "[[effect]]\nkind = \"elasticity\"\njoint = 2\nstiffness_nm_rad = 8000.0";
+    let effect = "[[effect]]\nkind = \"elasticity\"\njoint = 2\nstiffness_nm_rad = 10000.0";
     let kind = Kind::Elasticity;
     close(&Case { kind, joint: 2, effect, parameters: 1, mu: 0.0, elsewhere: false });
 }

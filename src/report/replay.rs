@@ -64,7 +64,8 @@ pub fn section(replay: &Replay) -> Result<Section, ReportError> {
         );
     }
     section = section.table(table(replay), "Rms of log minus simulation").paragraph(
-        "Torque is compared along the same motion. Tracking is logged minus simulated angle where the \
+        "Torque is compared along the same motion, up to the cutoff of the processing: within some tens of \
+         milliseconds of a reversal of friction the log and the simulation settle each in its own way. Tracking is logged minus simulated angle where the \
          simulation's own controller follows the logged motion without knowing the causes: its size depends on \
          that controller, which need not be the real one, and only its change from before to after says \
          something about the arm.",
