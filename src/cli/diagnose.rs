@@ -36,8 +36,8 @@ pub struct DiagnoseArgs {
     /// Mass of the body that the second log was recorded with, kg: tells the scale of the drive gains.
     #[arg(long = "known-payload", value_name = "KG", value_parser = mass)]
     known_payload_kg: Option<f64>,
-    /// Put what was found back into the simulation, and let it replay the log and the held-out ones: some
-    /// seconds per log.
+    /// Put what was found back into the simulation, and let it replay the log and the held-out ones: seconds
+    /// per log, minutes where stiff effects need short steps.
     #[arg(long)]
     replay: bool,
     /// Write the simulation with what was found as a scenario for `simulate` and `montecarlo`, with
@@ -95,6 +95,8 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
         finding.diagnosis.add_payload(payload);
     }
     if args.replay {
+        let logs = 1 + validations.len();
+        eprintln!("replaying {logs} log(s), without and with what was found");
         let replay = diagnoser.replay(&finding, &validations);
         finding.diagnosis.add_replay(replay);
     }

@@ -26,6 +26,11 @@ const ONE_EVENT: &str =
 const NO_SUCH_SIZE: &str = "the size that was found is none that the simulated effect can have";
 const INCOMPLETE: &str = "the log does not tell all of its numbers";
 
+/// Stiffest bristles that are simulated, 1/rad: friction then turns round within 0.1 mrad, less than a joint
+/// moves in one sample where its direction is in doubt, so that no log tells it from a stiffer one. The
+/// integrator's steps are as short as the bristles are stiff.
+const STIFFEST_PER_RAD: f64 = 1e4;
+
 /// A cause as the diagnosis has it.
 #[derive(Debug, Clone, Copy)]
 pub struct Found<'a> {
@@ -87,7 +92,7 @@ impl Found<'_> {
             // the same quantity, known less well.
             Kind::Presliding => in_the_model(Effect::Presliding(faults::Presliding {
                 joint: self.joint?,
-                stiffness_per_rad: value("stiffness_per_rad")?,
+                stiffness_per_rad: value("stiffness_per_rad")?.min(STIFFEST_PER_RAD),
             })),
             Kind::PositionFriction => {
                 in_the_model(Effect::PositionFriction(faults::PositionFriction {

@@ -35,8 +35,6 @@ pub(super) struct Replayed {
     pub(super) motion_rms_rad: Vec<f64>,
 }
 
-/// The last of these runs follows the log, the ones before show by how much the arm leaves it.
-const RUNS: usize = 2;
 /// A motion that repeats is entered this long before the period that counts, s: fifty times as long as
 /// the controller takes to forget how it started.
 const LEAD_S: f64 = 1.0;
@@ -73,35 +71,27 @@ impl Course<'_> {
             &plant_config(self.scene.rate_hz),
         )?;
         let repeats = effects.iter().all(Effect::repeats);
+        let mut reference = self.smooth(&self.scene.motion.q_rad)?;
+        let (q_rad, _) = self.follow(&plant, reference.clone(), repeats)?;
+        let lag_rad = self.behind_log(&q_rad);
+        let correction = self.smooth(&lag_rad)?;
+        add(&mut reference.q_rad, &correction.q_rad);
+        add(&mut reference.qd_rad_s, &correction.qd_rad_s);
+        add(&mut reference.qdd_rad_s2, &correction.qdd_rad_s2);
+        let (q_rad, torque_nm) = self.follow(&plant, reference, repeats)?;
+        Ok(Replayed {
+            torque_nm: self.as_compared(torque_nm)?,
+            tracking_rms_rad: rms_per_joint(&lag_rad),
+            motion_rms_rad: rms_per_joint(&self.behind_log(&q_rad)),
+        })
+    }
+
+    /// Logged minus simulated angles, rad.
+    fn behind_log(&self, q_rad: &JointSignals) -> JointSignals {
         let logged = &self.scene.motion.q_rad;
-        let mut reference = self.smooth(logged)?;
-        let mut tracking_rms_rad = Vec::new();
-        for run in 0.. {
-            let (q_rad, torque_nm) = self.follow(&plant, reference.clone(), repeats)?;
-            let off_rad = JointSignals::from_fn(logged.joints(), logged.samples(), |j, k| {
-                logged.joint(j)[k] - q_rad.joint(j)[k]
-            });
-            let motion_rms_rad: Vec<f64> =
-                (0..off_rad.joints()).map(|j| rms_where(off_rad.joint(j), |_| true)).collect();
-            if run == 0 {
-                tracking_rms_rad.clone_from(&motion_rms_rad);
-            }
-            if run + 1 == RUNS {
-                let torque_nm = self.as_compared(torque_nm)?;
-                return Ok(Replayed { torque_nm, tracking_rms_rad, motion_rms_rad });
-            }
-            let correction = self.smooth(&off_rad)?;
-            let add = |signals: &mut JointSignals, more: &JointSignals| {
-                for j in 0..signals.joints() {
-                    let pairs = signals.joint_mut(j).iter_mut().zip(more.joint(j));
-                    pairs.for_each(|(signal, more)| *signal += more);
-                }
-            };
-            add(&mut reference.q_rad, &correction.q_rad);
-            add(&mut reference.qd_rad_s, &correction.qd_rad_s);
-            add(&mut reference.qdd_rad_s2, &correction.qdd_rad_s2);
-        }
-        unreachable!("the loop ends in its last run")
+        JointSignals::from_fn(logged.joints(), logged.samples(), |j, k| {
+            logged.joint(j)[k] - q_rad.joint(j)[k]
+        })
     }
 
     /// Angles and torque of one run on the samples of the scene: of the mean period, where it repeats.
@@ -175,6 +165,17 @@ impl Course<'_> {
         }
         Ok(torque_nm.map_joints(|_, y| self.samples.iter().map(|&k| y[k]).collect()))
     }
+}
+
+fn add(signals: &mut JointSignals, more: &JointSignals) {
+    for j in 0..signals.joints() {
+        let pairs = signals.joint_mut(j).iter_mut().zip(more.joint(j));
+        pairs.for_each(|(signal, more)| *signal += more);
+    }
+}
+
+fn rms_per_joint(signals: &JointSignals) -> Vec<f64> {
+    (0..signals.joints()).map(|j| rms_where(signals.joint(j), |_| true)).collect()
 }
 
 /// Inverse of the last digit of a rate that means anything, s.

@@ -56,6 +56,9 @@ pub struct ExtendedSimulation {
     pub plant: PlantConfig,
 }
 
+/// Why a fault of the record is not replayed.
+const REPAIRED: &str = "a fault of the record, repaired before the model was fitted";
+
 impl ExtendedSimulation {
     /// From what was found about logs of `nominal`.
     pub(super) fn new(
@@ -114,7 +117,11 @@ impl ExtendedSimulation {
     fn take(&mut self, found: Found) -> bool {
         match found.counterpart() {
             Counterpart::InTheModel(effect) => self.effects.push(effect),
-            Counterpart::OfTheRecord(effect) => self.of_the_record.push(effect),
+            Counterpart::OfTheRecord(effect) => {
+                self.of_the_record.push(effect);
+                let Found { kind, joint, .. } = found;
+                self.not_replayed.push(NotReplayed { kind, joint, reason: REPAIRED });
+            }
             Counterpart::None(reason) => {
                 let Found { kind, joint, .. } = found;
                 self.not_replayed.push(NotReplayed { kind, joint, reason });
