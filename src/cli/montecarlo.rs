@@ -127,8 +127,7 @@ fn run_merge(folders: &[PathBuf], output: &OutputArgs) -> CommandResult {
         return conclude_blind(&merged, inputs, output);
     }
     let merged = merge(load_all::<Estimation>(&files)?)?;
-    // Shards hold sums only; what bounds σ is known where the scenario is.
-    conclude(&merged, merged.seconds, None, inputs, output)
+    conclude(&merged, merged.seconds, inputs, output)
 }
 
 fn run_trials(args: &RunArgs) -> CommandResult {
@@ -153,8 +152,7 @@ fn run_trials(args: &RunArgs) -> CommandResult {
                 return replay(&experiment, trial);
             }
             let (merged, wall_s) = run_all(&experiment, args)?;
-            let least_sigma = experiment.least_sigma()?;
-            conclude(&merged, wall_s, least_sigma.as_deref(), inputs, &args.output)
+            conclude(&merged, wall_s, inputs, &args.output)
         }
         Job::Blind(plan) => {
             let benchmark = Benchmark::prepare(*plan)?;
@@ -235,11 +233,10 @@ fn replay(experiment: &Experiment, trial: u64) -> CommandResult {
 fn conclude(
     merged: &Merged<Estimation>,
     wall_s: f64,
-    least_sigma: Option<&[f64]>,
     inputs: Vec<Input>,
     output: &OutputArgs,
 ) -> CommandResult {
-    let summary = Summary::of(merged, wall_s, least_sigma);
+    let summary = Summary::of(merged, wall_s);
     println!("{}", parameter_table(&summary).to_text());
     println!("{}", check_table(&summary).to_text());
     println!(

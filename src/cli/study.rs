@@ -65,11 +65,14 @@ pub fn run(args: &StudyArgs) -> CommandResult {
     }
 }
 
+const SCHEMA: &str = "armid.study-noise/1";
+
 fn noise(args: &NoiseArgs) -> CommandResult {
     args.output.check()?;
     let threads = threads_or_all(args.threads);
     let mut results = NoiseStudy { slow_every: args.slow_every, scenarios: Vec::new() };
     let mut inputs = Vec::new();
+    let program = |inputs: &[Input]| Program::new(std::env::args(), None, inputs.to_vec());
     for path in &args.scenarios {
         inputs.push(Input::of(path)?);
         let scenario = Scenario::load(Some(path))?;
@@ -81,7 +84,7 @@ fn noise(args: &NoiseArgs) -> CommandResult {
         let done = |n| progress.reached(n);
         results.scenarios.push(study(scenario, args.trials, args.slow_every, threads, &done)?);
         progress.finish();
+        args.output.save(SCHEMA, &results, program(&inputs), markdown, page)?;
     }
-    let program = Program::new(std::env::args(), None, inputs);
-    args.output.write("armid.study-noise/1", &results, program, markdown, page)
+    args.output.write(SCHEMA, &results, program(&inputs), markdown, page)
 }

@@ -41,9 +41,23 @@ impl StudyOutput {
         markdown: impl Fn(&T, &str) -> String,
         page: impl Fn(&T, Program) -> Result<Page, ReportError>,
     ) -> CommandResult {
-        let text = markdown(results, &program.command);
-        println!("{text}");
+        println!("{}", markdown(results, &program.command));
+        self.save(schema, results, program, markdown, page)?;
+        Ok(Outcome::Done)
+    }
+
+    /// Writes what was asked for: also of a study that is still running, so that one that is ended
+    /// early leaves what it has.
+    pub(super) fn save<T: Serialize>(
+        &self,
+        schema: &'static str,
+        results: &T,
+        program: Program,
+        markdown: impl Fn(&T, &str) -> String,
+        page: impl Fn(&T, Program) -> Result<Page, ReportError>,
+    ) -> Result<(), Box<dyn std::error::Error>> {
         if let Some(path) = &self.markdown {
+            let text = markdown(results, &program.command);
             write_atomically(path, |out| out.write_all(text.as_bytes()))?;
         }
         if let Some(path) = &self.json {
@@ -52,6 +66,6 @@ impl StudyOutput {
         if let Some(path) = &self.report {
             page(results, program)?.write(path)?;
         }
-        Ok(Outcome::Done)
+        Ok(())
     }
 }

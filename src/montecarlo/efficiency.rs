@@ -36,7 +36,7 @@ impl Experiment {
     /// whole periods of the noise-free motion, known exactly, under the scenario's torque noise at all
     /// frequencies. `None` where that noise has no known law (rounded readings), where the motion does
     /// not repeat, or where every trial has a motion of its own (sensors in the loop).
-    pub fn least_sigma(&self) -> Result<Option<Vec<f64>>, TrialError> {
+    pub(super) fn cramer_rao_bound(&self) -> Result<Option<Vec<f64>>, TrialError> {
         let Simulation { scenario, recording, .. } = &self.simulation;
         let Some(torque) = self.simulation.known_torque_noise() else { return Ok(None) };
         if scenario.controller_reads_sensors || torque.sd_nm.iter().any(|sd| *sd <= 0.0) {

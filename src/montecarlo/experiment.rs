@@ -22,6 +22,8 @@ pub struct Experiment {
     pub truth: Vec<f64>,
     /// σ of the pilot trial per parameter: the unit of the tally.
     pub scale: Vec<f64>,
+    /// The Cramér–Rao bound of every parameter; `None` where it is not known.
+    pub least_sigma: Option<Vec<f64>>,
     /// The estimator that the pilot's log calls for, and all trials' with it.
     pub estimator: Estimator,
     /// The covariance that the pilot's log calls for, and all trials' with it.
@@ -64,6 +66,7 @@ impl Experiment {
             model,
             truth,
             scale,
+            least_sigma: None,
             estimator: Estimator::Wls,
             covariance: CovarianceKind::Wls,
         };
@@ -71,6 +74,7 @@ impl Experiment {
         experiment.scale = pilot.sigma();
         experiment.estimator = pilot.estimator;
         experiment.covariance = pilot.covariance.kind;
+        experiment.least_sigma = experiment.cramer_rao_bound()?;
         Ok(experiment)
     }
 
@@ -172,11 +176,13 @@ pub struct ParameterHeader {
     pub truth: f64,
     /// Unit of the tally's sums.
     pub scale: f64,
+    /// The Cramér–Rao bound, where it is known.
+    pub sigma_least: Option<f64>,
 }
 
 impl Content for Estimation {
     type Gathered = Tally;
-    const SCHEMA: &'static str = "armid.shard/2";
+    const SCHEMA: &'static str = "armid.shard/3";
 
     fn nothing(&self) -> Tally {
         Tally::new(self.parameters.len())
@@ -215,6 +221,7 @@ impl Trials for Experiment {
                 unit: set.unit(k).to_owned(),
                 truth: self.truth[k],
                 scale: self.scale[k],
+                sigma_least: self.least_sigma.as_ref().map(|least| least[k]),
             })
             .collect();
         Estimation {

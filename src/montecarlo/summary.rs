@@ -110,9 +110,8 @@ impl CheckSummary {
 }
 
 impl Summary {
-    /// Of merged shards; `wall_s` is the wall time that the trials took, `least_sigma` the Cramér–Rao
-    /// bound of every parameter where it is known.
-    pub fn of(merged: &Merged<Estimation>, wall_s: f64, least_sigma: Option<&[f64]>) -> Self {
+    /// Of merged shards; `wall_s` is the wall time that the trials took.
+    pub fn of(merged: &Merged<Estimation>, wall_s: f64) -> Self {
         let Merged { header, tally, missing, .. } = merged;
         let content = &header.content;
         let calibration = Calibration::of(tally);
@@ -130,7 +129,7 @@ impl Summary {
                     mean: p.truth + s.bias * p.scale,
                     sigma_empirical: s.sigma_empirical * p.scale,
                     sigma_predicted: s.sigma_predicted * p.scale,
-                    sigma_least: least_sigma.map(|least| least[k]),
+                    sigma_least: p.sigma_least,
                     coverage: s.coverage,
                 }
             })
@@ -142,9 +141,9 @@ impl Summary {
         let checks = checks.map(|c| CheckSummary::of(c, |k| content.parameters[k].name.clone()));
         let sigma: Vec<f64> = parameters.iter().map(|p| p.sigma_empirical).collect();
         let name = |k: usize| parameters[k].name.clone();
-        let efficiency = least_sigma
-            .filter(|_| tally.succeeded > 1)
-            .map(|least| Efficiency::of(&sigma, least, name));
+        let least: Option<Vec<f64>> = parameters.iter().map(|p| p.sigma_least).collect();
+        let efficiency =
+            least.filter(|_| tally.succeeded > 1).map(|least| Efficiency::of(&sigma, &least, name));
         Self {
             scenario: header.scenario.clone(),
             trials: tally.trials(),

@@ -21,20 +21,15 @@
 //! The mean angle is the angle's own; a mean velocity (an offset of its sensor) is not used.
 
 use std::f64::consts::PI;
-use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use realfft::num_complex::Complex64;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::error::{SignalError, checked_rate_hz, enough, same};
+use super::spectra::{BAND_HARMONICS, Band, Spectra};
 use crate::robot::JointSignals;
 
-/// Harmonics pooled for one noise estimate and one test.
-const BAND_HARMONICS: usize = 8;
-/// Chance that a joint keeps a band without motion in it.
-const FALSE_BAND: f64 = 0.01;
 /// Noise in q̈, as a share of its mean square, that costs nothing: it attenuates an inertia by about
 /// as much, a small part of the σ that any practical record reaches.
 const FREE_NOISE: f64 = 1e-4;
@@ -49,12 +44,6 @@ pub struct PeriodicFit {
     forward: Arc<dyn RealToComplex<f64>>,
     inverse: Arc<dyn ComplexToReal<f64>>,
     bands: Vec<Band>,
-}
-
-/// Neighbouring harmonics and the F-ratio above which there is motion in them.
-struct Band {
-    harmonics: RangeInclusive<usize>,
-    threshold: f64,
 }
 
 /// Highest frequency of q̈ over the sampling rate. Where friction reverses, q̇ has a kink, whose
@@ -74,16 +63,6 @@ pub struct FitScratch {
     qd: Spectra,
     series: Vec<Complex64>,
     derived: Vec<Complex64>,
-}
-
-/// Coefficients of all periods of one signal, their mean, and the scatter per harmonic.
-#[derive(Default)]
-struct Spectra {
-    periods: Vec<Complex64>,
-    mean: Vec<Complex64>,
-    scatter: Vec<f64>,
-    /// Scatter that rounding alone makes.
-    floor: f64,
 }
 
 /// One period of a motion with its derivatives, and how noisy the record was.
@@ -136,7 +115,7 @@ impl PeriodicFit {
             rate_hz,
             forward: planner.plan_fft_forward(samples_per_period),
             inverse: planner.plan_fft_inverse(samples_per_period),
-            bands: bands(samples_per_period, periods),
+            bands: Band::all(harmonics_below(SERIES_END, samples_per_period), periods),
         })
     }
 
@@ -280,30 +259,14 @@ impl PeriodicFit {
             Complex64::ZERO,
         );
         out.periods.resize(bins * self.periods, Complex64::ZERO);
-        out.mean.clear();
-        out.mean.resize(bins, Complex64::ZERO);
-        out.scatter.clear();
-        out.scatter.resize(bins, 0.0);
         for (period, spectrum) in y.chunks_exact(n).zip(out.periods.chunks_exact_mut(bins)) {
             time.copy_from_slice(period);
             self.forward
                 .process_with_scratch(time, spectrum, fft)
                 .expect("all buffers have the plan's own lengths");
-            for (c, mean) in spectrum.iter_mut().zip(&mut out.mean) {
-                *c *= scale;
-                *mean += *c;
-            }
+            spectrum.iter_mut().for_each(|c| *c *= scale);
         }
-        out.mean.iter_mut().for_each(|mean| *mean /= self.periods as f64);
-        for spectrum in out.periods.chunks_exact(bins) {
-            for ((c, mean), scatter) in spectrum.iter().zip(&out.mean).zip(&mut out.scatter) {
-                *scatter += (c - mean).norm_sqr();
-            }
-        }
-        let freedom = (self.periods - 1) as f64;
-        out.scatter.iter_mut().for_each(|s| *s /= freedom);
-        let power: f64 = out.mean.iter().map(|c| c.norm_sqr()).sum();
-        out.floor = ((8.0 * f64::EPSILON).powi(2) * power * scale).max(f64::MIN_POSITIVE.sqrt());
+        out.average(n);
     }
 
     /// Steps 2 and 3: Q̂ into `scratch.series`; power of the harmonics kept in q̈.
@@ -379,55 +342,9 @@ fn weight(noise_q: f64, noise_qd: f64, w: f64) -> f64 {
     noise_q / (noise_q + noise_qd / (w * w))
 }
 
-impl Spectra {
-    /// Noise power of one coefficient of one period, pooled over the band.
-    fn noise(&self, band: &RangeInclusive<usize>) -> f64 {
-        let scatter = &self.scatter[band.clone()];
-        (scatter.iter().sum::<f64>() / scatter.len() as f64).max(self.floor)
-    }
-
-    /// Whether the mean's energy in the band exceeds what noise makes of it.
-    fn stands_out(&self, band: &Band, periods: f64) -> bool {
-        let mean = &self.mean[band.harmonics.clone()];
-        let energy = periods * mean.iter().map(|c| c.norm_sqr()).sum::<f64>() / mean.len() as f64;
-        energy > band.threshold * self.noise(&band.harmonics)
-    }
-
-    /// Rms noise of one sample of a period of `n`: Parseval's sum over all ±h.
-    fn sigma(&self, n: usize) -> f64 {
-        let all: f64 = self.scatter.iter().sum::<f64>();
-        let nyquist = if n.is_multiple_of(2) { self.scatter[n / 2] } else { 0.0 };
-        (2.0 * all - self.scatter[0] - nyquist).sqrt()
-    }
-}
-
 /// Harmonics of a period of n samples up to `share` of the sampling rate.
 fn harmonics_below(share: f64, samples_per_period: usize) -> usize {
     ((share * samples_per_period as f64) as usize).max(1)
-}
-
-/// Harmonics 1 … n·[`SERIES_END`] in bands of [`BAND_HARMONICS`]; the last takes the remainder.
-fn bands(samples_per_period: usize, periods: usize) -> Vec<Band> {
-    let highest = harmonics_below(SERIES_END, samples_per_period);
-    let count = (highest / BAND_HARMONICS).max(1);
-    let level = FALSE_BAND / (2 * count) as f64;
-    let threshold = |width: usize| {
-        let freedom = 2.0 * width as f64;
-        FisherSnedecor::new(freedom, freedom * (periods - 1) as f64)
-            .expect("both degrees of freedom are positive")
-            .inverse_cdf(1.0 - level)
-    };
-    let regular = threshold(BAND_HARMONICS);
-    (0..count)
-        .map(|b| {
-            let first = 1 + b * BAND_HARMONICS;
-            if b + 1 == count {
-                Band { harmonics: first..=highest, threshold: threshold(highest + 1 - first) }
-            } else {
-                Band { harmonics: first..=first + BAND_HARMONICS - 1, threshold: regular }
-            }
-        })
-        .collect()
 }
 
 /// A scatter that is not finite betrays a sample that is not: name it.

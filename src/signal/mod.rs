@@ -29,6 +29,7 @@ mod paper_filter;
 mod period;
 mod replicates;
 mod resample;
+mod spectra;
 mod spectrum;
 
 pub use activity::{Activity, quantum};

@@ -6,6 +6,7 @@ mod cutoff;
 mod error;
 mod mass_matrix;
 mod noise;
+mod noisy_friction;
 mod noisy_regressor;
 mod paper;
 mod paper_equations;

@@ -142,7 +142,6 @@ pub fn study(
         .into_par_iter()
         .map(share)
         .reduce(|| Tallies::new(experiment.truth.len()), Tallies::merged);
-    let least = experiment.least_sigma()?;
     let name = |k: usize| scenario.set.name(k).to_owned();
     let chosen = (experiment.estimator, experiment.covariance);
     let by_itself = METHODS.iter().zip(&tallies.methods).find(|((e, c, _), _)| (*e, *c) == chosen);
@@ -152,7 +151,7 @@ pub fn study(
         .filter(|(_, tally)| tally.succeeded > 1)
         .map(|((estimator, kind, _), tally)| {
             let names = [estimator.to_string(), kind.to_string()];
-            MethodResult::of(&experiment, names, tally, least.as_deref())
+            MethodResult::of(&experiment, names, tally)
         })
         .collect();
     Ok(ScenarioResult {
@@ -284,12 +283,7 @@ impl Tallies {
 }
 
 impl MethodResult {
-    fn of(
-        experiment: &Experiment,
-        [estimator, covariance]: [String; 2],
-        tally: &Tally,
-        least_sigma: Option<&[f64]>,
-    ) -> Self {
+    fn of(experiment: &Experiment, [estimator, covariance]: [String; 2], tally: &Tally) -> Self {
         let set = &experiment.simulation.scenario.set;
         let statistics: Vec<_> = (0..tally.parameters()).map(|k| tally.statistics(k)).collect();
         let furthest = |off: &dyn Fn(usize) -> f64| {
@@ -326,7 +320,9 @@ impl MethodResult {
             ],
             bias_worst: bias(biased),
             bias_worst_of: set.name(biased).to_owned(),
-            efficiency: least_sigma
+            efficiency: experiment
+                .least_sigma
+                .as_ref()
                 .map(|least| Efficiency::of(&sigma, least, |k| set.name(k).to_owned())),
         }
     }

@@ -36,6 +36,7 @@
 use nalgebra::{DMatrix, DVector};
 use realfft::num_complex::Complex64;
 
+use super::noisy_friction::NoisyFriction;
 use super::periodic::Periodic;
 use crate::base::BaseSet;
 use crate::dynamics::{Model, Motion};
@@ -108,14 +109,6 @@ fn columns(problem: &Problem) -> Columns {
         .collect()
 }
 
-/// Quadrature over a normal number: nodes and weights.
-fn normal_nodes() -> impl Iterator<Item = (f64, f64)> {
-    const STEP: f64 = 0.25;
-    let density = |x: f64| STEP * (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt();
-    // The trapezoidal rule converges faster than any power of the step; beyond 6 there is 1e-9 left.
-    (-24..=24).map(move |k| (STEP * f64::from(k), density(STEP * f64::from(k))))
-}
-
 impl<'a> NoisyRegressor<'a> {
     /// For one period `motion` of an arm with the base parameters `theta`.
     pub(super) fn new(
@@ -186,8 +179,13 @@ impl<'a> NoisyRegressor<'a> {
         let velocity_gain = self.periodic.noise_gain(how.velocity);
         let velocity_sd_rad_s = noise.velocity_sd_rad_s * velocity_gain.sqrt();
         let mut mean = assembled(self.model, self.set, &motion, self.rate_hz);
-        let friction: Vec<Friction> =
-            (0..joints).map(|j| self.friction(j, &motion, velocity_sd_rad_s)).collect();
+        let friction: Vec<NoisyFriction> = (0..joints)
+            .map(|j| {
+                let qd = motion.qd_rad_s.joint(j);
+                let epsilon = self.epsilon_rad_s;
+                NoisyFriction::new(self.set, &self.theta, j, qd, epsilon, velocity_sd_rad_s)
+            })
+            .collect();
         for (joint, friction) in mean.iter_mut().zip(&friction) {
             for (base, column) in joint.iter_mut() {
                 if Some(*base) == friction.coulomb {
@@ -274,7 +272,7 @@ impl<'a> NoisyRegressor<'a> {
         &self,
         seen: &Columns,
         how: &Treatment,
-        friction: &[Friction],
+        friction: &[NoisyFriction],
         i: usize,
         score: &mut DMatrix<f64>,
     ) {
@@ -318,64 +316,6 @@ impl<'a> NoisyRegressor<'a> {
             }
         }
         gram
-    }
-
-    fn friction(&self, joint: usize, motion: &Motion, velocity_sd_rad_s: f64) -> Friction {
-        let find = |name: String| (0..self.set.rank()).find(|&k| self.set.name(k) == name);
-        let viscous = find(format!("rv{}", joint + 1));
-        let coulomb = find(format!("rc{}", joint + 1));
-        let value = |k: Option<usize>| k.map_or(0.0, |k| self.theta[k]);
-        let (rv, rc) = (value(viscous), value(coulomb));
-        let mut out = Friction {
-            viscous,
-            coulomb,
-            mean_sign: Vec::new(),
-            slope_nm_s_rad: Vec::new(),
-            covariance: [0.0; 3],
-        };
-        for qd in motion.qd_rad_s.joint(joint) {
-            let [mut mean, mut square, mut cross, mut steep] = [0.0; 4];
-            for (node, weight) in normal_nodes() {
-                let v = velocity_sd_rad_s * node;
-                let sign = ((qd + v) / self.epsilon_rad_s).tanh();
-                mean += weight * sign;
-                square += weight * sign * sign;
-                cross += weight * v * sign;
-                steep += weight * (1.0 - sign * sign);
-            }
-            out.mean_sign.push(mean);
-            out.slope_nm_s_rad.push(rv + rc * steep / self.epsilon_rad_s);
-            let [vv, vs, ss] = &mut out.covariance;
-            *vv += velocity_sd_rad_s.powi(2);
-            *vs += cross;
-            *ss += square - mean * mean;
-        }
-        out
-    }
-}
-
-/// A joint's friction columns under velocity noise.
-struct Friction {
-    /// Base index of rv.
-    viscous: Option<usize>,
-    /// Base index of rc.
-    coulomb: Option<usize>,
-    /// E tanh((q̇ + v)/ε).
-    mean_sign: Vec<f64>,
-    /// rv + rc E[1 − tanh²]/ε.
-    slope_nm_s_rad: Vec<f64>,
-    /// Sums over the period of var(q̇ + v), their covariance, var(tanh).
-    covariance: [f64; 3],
-}
-
-impl Friction {
-    fn add_covariance(&self, information: &mut DMatrix<f64>, scale: f64) {
-        let (Some(v), Some(s)) = (self.viscous, self.coulomb) else { return };
-        let [vv, vs, ss] = self.covariance.map(|c| c * scale);
-        information[(v, v)] += vv;
-        information[(v, s)] += vs;
-        information[(s, v)] += vs;
-        information[(s, s)] += ss;
     }
 }
 

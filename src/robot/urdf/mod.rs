@@ -11,6 +11,7 @@ mod notice;
 mod read;
 #[cfg(test)]
 mod tests;
+mod unreadable;
 
 pub use fault::UrdfFault;
 pub use notice::UrdfNotice;

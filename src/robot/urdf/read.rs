@@ -9,6 +9,7 @@ use urdf_rs::{Geometry, Inertial, JointType, Link, Pose};
 use super::chain::{Body, bodies};
 use super::fault::UrdfFault;
 use super::notice::UrdfNotice;
+use super::unreadable;
 use crate::robot::arm::{Arm, Clearance, Drive, Joint, Limits, LinkBounds, Placement};
 use crate::robot::error::RobotError;
 use crate::robot::file::default_epsilon;
@@ -72,8 +73,12 @@ pub struct FixedFrame {
 /// [`RobotError::Urdf`] where it is no URDF, [`RobotError::UrdfArm`] where it is one, but not of a
 /// serial arm of physically possible bodies.
 pub fn read_urdf(text: &str, source: &str) -> Result<UrdfArm, RobotError> {
-    let robot = urdf_rs::read_from_string(text.trim_start_matches('\u{feff}'))
-        .map_err(|e| RobotError::Urdf { file: source.to_owned(), message: e.to_string() })?;
+    let robot = urdf_rs::read_from_string(text.trim_start_matches('\u{feff}')).map_err(|e| {
+        RobotError::Urdf {
+            file: source.to_owned(),
+            message: unreadable::reason(text, &e.to_string()),
+        }
+    })?;
     let mut reader = Reader::default();
     let joints = bodies(&robot)
         .and_then(|chain| reader.joints(&chain))

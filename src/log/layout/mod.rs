@@ -1,16 +1,22 @@
 //! Layouts: which column of a file is which quantity, and in which unit.
 
-use std::f64::consts::PI;
+mod block;
+mod columns;
+mod units;
 
 use serde::Deserialize;
 
 use super::error::{LayoutFault, LogError};
+pub(super) use block::Block;
+use columns::Blocks;
+pub(super) use columns::Columns;
+pub(super) use units::{Angle, AngularVelocity, TimeUnit, Units};
 
 /// Layouts built in, by the name given to `--layout`.
 const BUILT_IN: [(&str, &str); 3] = [
-    ("armid", include_str!("../../layouts/armid.toml")),
-    ("ur10e_innopolis", include_str!("../../layouts/ur10e_innopolis.toml")),
-    ("ur10e_innopolis_author", include_str!("../../layouts/ur10e_innopolis_author.toml")),
+    ("armid", include_str!("../../../layouts/armid.toml")),
+    ("ur10e_innopolis", include_str!("../../../layouts/ur10e_innopolis.toml")),
+    ("ur10e_innopolis_author", include_str!("../../../layouts/ur10e_innopolis_author.toml")),
 ];
 
 /// Names of the layouts built in; the first is the default.
@@ -77,272 +83,12 @@ pub(super) enum DelimiterChoice {
     Blank,
 }
 
-/// A group of columns with one meaning.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub(super) enum Block {
-    Time,
-    Q,
-    Qd,
-    Current,
-    Torque,
-    TargetQ,
-    TargetQd,
-    TargetQdd,
-    TargetCurrent,
-    TargetMoment,
-    Temperature,
-}
-
-impl Block {
-    pub(super) const ALL: [Self; 11] = [
-        Self::Time,
-        Self::Q,
-        Self::Qd,
-        Self::Current,
-        Self::Torque,
-        Self::TargetQ,
-        Self::TargetQd,
-        Self::TargetQdd,
-        Self::TargetCurrent,
-        Self::TargetMoment,
-        Self::Temperature,
-    ];
-
-    /// Its key in a layout file.
-    pub(super) fn key(self) -> &'static str {
-        match self {
-            Self::Time => "time",
-            Self::Q => "q",
-            Self::Qd => "qd",
-            Self::Current => "current",
-            Self::Torque => "torque",
-            Self::TargetQ => "target_q",
-            Self::TargetQd => "target_qd",
-            Self::TargetQdd => "target_qdd",
-            Self::TargetCurrent => "target_current",
-            Self::TargetMoment => "target_moment",
-            Self::Temperature => "temperature",
-        }
-    }
-
-    /// Largest magnitude that can be a measurement, in the SI unit (°C for temperatures). What lies beyond
-    /// is an uninitialised number. Angles and velocities are held to a tighter bound once their unit is sure.
-    pub(super) fn bound(self) -> f64 {
-        match self {
-            // Nanoseconds since 1970 stay below this until the year 2286.
-            Self::Time => 1e19,
-            // A thousand turns read in degrees without the layout saying so.
-            Self::Q | Self::Qd | Self::TargetQ | Self::TargetQd => 3.6e5,
-            // 30 000 rad/s² is 3000 times what arms do; in degrees 60 times.
-            Self::TargetQdd => 3e4,
-            // The drives of the largest arms take about 100 A and give about 10 kNm.
-            Self::Current | Self::TargetCurrent => 500.0,
-            Self::Torque | Self::TargetMoment => 5e4,
-            Self::Temperature => 1e3,
-        }
-    }
-}
-
-/// Where each block is.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Blocks {
-    time: Option<Columns>,
-    q: Option<Columns>,
-    qd: Option<Columns>,
-    current: Option<Columns>,
-    torque: Option<Columns>,
-    target_q: Option<Columns>,
-    target_qd: Option<Columns>,
-    target_qdd: Option<Columns>,
-    target_current: Option<Columns>,
-    target_moment: Option<Columns>,
-    temperature: Option<Columns>,
-}
-
-/// The columns of one block.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(
-    untagged,
-    expecting = "columns are a name (with {0} or {1} for the joint), a list of names, a column number, \
-                 or { first = 2, last = 7 }"
-)]
-pub(super) enum Columns {
-    Name(String),
-    Names(Vec<String>),
-    Number(usize),
-    Range(ColumnRange),
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ColumnRange {
-    first: usize,
-    last: usize,
-}
-
-impl Columns {
-    /// Names by joint; a pattern goes on for as many joints as asked. `None` for column numbers.
-    pub(super) fn name(&self, joint: usize) -> Option<String> {
-        match self {
-            Self::Name(pattern) => Some(
-                pattern.replace("{0}", &joint.to_string()).replace("{1}", &(joint + 1).to_string()),
-            ),
-            Self::Names(names) => names.get(joint).cloned(),
-            Self::Number(_) | Self::Range(_) => None,
-        }
-    }
-
-    /// Column numbers from 0, in the order of the joints. `None` for names.
-    pub(super) fn numbers(&self) -> Option<std::ops::Range<usize>> {
-        match *self {
-            Self::Number(n) => Some(n - 1..n),
-            Self::Range(ColumnRange { first, last }) => Some(first - 1..last),
-            Self::Name(_) | Self::Names(_) => None,
-        }
-    }
-
-    /// How many there are; `None` for a pattern.
-    pub(super) fn len(&self) -> Option<usize> {
-        match self {
-            Self::Name(_) => None,
-            Self::Names(names) => Some(names.len()),
-            Self::Number(_) | Self::Range(_) => self.numbers().map(|r| r.len()),
-        }
-    }
-
-    fn check(&self, block: Block, header: bool) -> Result<(), LayoutFault> {
-        let fault = |expected| {
-            Err(LayoutFault::BadColumns {
-                block: block.key(),
-                value: format!("{self:?}"),
-                expected,
-            })
-        };
-        let is_pattern = |name: &str| name.contains("{0}") || name.contains("{1}");
-        match self {
-            Self::Name(_) | Self::Names(_) if !header => {
-                fault("files without header have no names; give column numbers")
-            }
-            Self::Name(name) if block == Block::Time && is_pattern(name) => {
-                fault("the time is one column, without {0} or {1}")
-            }
-            Self::Name(name) if block != Block::Time && !is_pattern(name) => {
-                fault("a name for all joints needs {0} or {1} where the joint's number stands")
-            }
-            Self::Names(_) | Self::Range(_) if block == Block::Time => {
-                fault("the time is one column")
-            }
-            Self::Names(names) if names.is_empty() => fault("name at least one column"),
-            Self::Number(0) => fault("column numbers count from 1"),
-            Self::Range(r) if r.first == 0 || r.last < r.first => {
-                fault("column numbers count from 1, and last is not before first")
-            }
-            _ => Ok(()),
-        }
-    }
-}
-
 /// One width that files without header may have.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Width {
     pub(super) fields: usize,
     pub(super) blocks: Vec<Block>,
-}
-
-/// Units of a file.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub(super) struct Units {
-    pub(super) time: TimeUnit,
-    pub(super) q: Angle,
-    pub(super) qd: AngularVelocity,
-    qdd: AngularAcceleration,
-    current: Current,
-}
-
-impl Units {
-    /// Factor from the file's unit to the SI unit; `None` where nothing changes, so that numbers stay
-    /// the same to the last bit.
-    pub(super) fn factor(&self, block: Block) -> Option<f64> {
-        let degrees = |yes: bool| yes.then_some(PI / 180.0);
-        match block {
-            Block::Time => Some(self.time.seconds()).filter(|&s| s != 1.0),
-            Block::Q | Block::TargetQ => degrees(self.q == Angle::Deg),
-            Block::Qd | Block::TargetQd => degrees(self.qd == AngularVelocity::DegS),
-            Block::TargetQdd => degrees(self.qdd == AngularAcceleration::DegS2),
-            Block::Current | Block::TargetCurrent => (self.current == Current::Ma).then_some(1e-3),
-            Block::Torque | Block::TargetMoment | Block::Temperature => None,
-        }
-    }
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum TimeUnit {
-    #[default]
-    S,
-    Ms,
-    Us,
-    Ns,
-}
-
-impl TimeUnit {
-    pub(super) const ALL: [Self; 4] = [Self::S, Self::Ms, Self::Us, Self::Ns];
-
-    pub(super) fn seconds(self) -> f64 {
-        match self {
-            Self::S => 1.0,
-            Self::Ms => 1e-3,
-            Self::Us => 1e-6,
-            Self::Ns => 1e-9,
-        }
-    }
-
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::S => "s",
-            Self::Ms => "ms",
-            Self::Us => "us",
-            Self::Ns => "ns",
-        }
-    }
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum Angle {
-    #[default]
-    Rad,
-    Deg,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
-pub(super) enum AngularVelocity {
-    #[default]
-    #[serde(rename = "rad/s")]
-    RadS,
-    #[serde(rename = "deg/s")]
-    DegS,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
-enum AngularAcceleration {
-    #[default]
-    #[serde(rename = "rad/s2")]
-    RadS2,
-    #[serde(rename = "deg/s2")]
-    DegS2,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
-enum Current {
-    #[default]
-    A,
-    #[serde(rename = "mA")]
-    Ma,
 }
 
 impl Default for Layout {
@@ -385,21 +131,7 @@ impl Layout {
     }
 
     pub(super) fn columns(&self, block: Block) -> Option<&Columns> {
-        let c = &self.columns;
-        match block {
-            Block::Time => &c.time,
-            Block::Q => &c.q,
-            Block::Qd => &c.qd,
-            Block::Current => &c.current,
-            Block::Torque => &c.torque,
-            Block::TargetQ => &c.target_q,
-            Block::TargetQd => &c.target_qd,
-            Block::TargetQdd => &c.target_qdd,
-            Block::TargetCurrent => &c.target_current,
-            Block::TargetMoment => &c.target_moment,
-            Block::Temperature => &c.temperature,
-        }
-        .as_ref()
+        self.columns.of(block)
     }
 
     fn check(&self) -> Result<(), LayoutFault> {

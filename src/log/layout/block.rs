@@ -1,0 +1,70 @@
+//! What a group of columns means.
+
+use serde::Deserialize;
+
+/// A group of columns with one meaning.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(in crate::log) enum Block {
+    Time,
+    Q,
+    Qd,
+    Current,
+    Torque,
+    TargetQ,
+    TargetQd,
+    TargetQdd,
+    TargetCurrent,
+    TargetMoment,
+    Temperature,
+}
+
+impl Block {
+    pub(in crate::log) const ALL: [Self; 11] = [
+        Self::Time,
+        Self::Q,
+        Self::Qd,
+        Self::Current,
+        Self::Torque,
+        Self::TargetQ,
+        Self::TargetQd,
+        Self::TargetQdd,
+        Self::TargetCurrent,
+        Self::TargetMoment,
+        Self::Temperature,
+    ];
+
+    /// Its key in a layout file.
+    pub(in crate::log) fn key(self) -> &'static str {
+        match self {
+            Self::Time => "time",
+            Self::Q => "q",
+            Self::Qd => "qd",
+            Self::Current => "current",
+            Self::Torque => "torque",
+            Self::TargetQ => "target_q",
+            Self::TargetQd => "target_qd",
+            Self::TargetQdd => "target_qdd",
+            Self::TargetCurrent => "target_current",
+            Self::TargetMoment => "target_moment",
+            Self::Temperature => "temperature",
+        }
+    }
+
+    /// Largest magnitude that can be a measurement, in the SI unit (°C for temperatures). What lies beyond
+    /// is an uninitialised number. Angles and velocities are held to a tighter bound once their unit is sure.
+    pub(in crate::log) fn bound(self) -> f64 {
+        match self {
+            // Nanoseconds since 1970 stay below this until the year 2286.
+            Self::Time => 1e19,
+            // A thousand turns read in degrees without the layout saying so.
+            Self::Q | Self::Qd | Self::TargetQ | Self::TargetQd => 3.6e5,
+            // 30 000 rad/s² is 3000 times what arms do; in degrees 60 times.
+            Self::TargetQdd => 3e4,
+            // The drives of the largest arms take about 100 A and give about 10 kNm.
+            Self::Current | Self::TargetCurrent => 500.0,
+            Self::Torque | Self::TargetMoment => 5e4,
+            Self::Temperature => 1e3,
+        }
+    }
+}
