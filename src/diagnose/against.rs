@@ -56,14 +56,19 @@ pub fn moved(set: &BaseSet, simulation: &[f64], identification: &Identification)
         .collect()
 }
 
-/// The changes that explain how the data differ from the simulation, the one that explains most first.
-/// `accepted` are effects that no simulation of this kind has.
-pub fn explain(
-    study: &Study,
-    set: &BaseSet,
-    simulation: &[f64],
-    accepted: &[&Entry],
-) -> Vec<Cause> {
+/// How the data differ from a simulation.
+pub struct Explained {
+    /// The changes, the one that explains most first.
+    pub causes: Vec<Cause>,
+    /// Every change that was looked for: kind and joint from 1. What is one of them is judged here alone.
+    pub looked_for: Vec<(Kind, Option<usize>)>,
+    /// What the changes and `accepted` span outside the null model.
+    pub span: Span,
+}
+
+/// The changes that explain how the data differ from the simulation. `accepted` are effects that were found
+/// beside the null model.
+pub fn explain(study: &Study, set: &BaseSet, simulation: &[f64], accepted: &[&Entry]) -> Explained {
     let mut residual = study.torque.clone();
     for (column, theta) in study.null_columns.iter().zip(simulation) {
         residual.add(-theta, column);
@@ -79,7 +84,17 @@ pub fn explain(
     }
     let search = Search { study, changes, nuisance, residual };
     let taken = search.select();
-    (0..taken.len()).map(|index| search.cause(&taken, index)).collect()
+    let mut span = search.nuisance.clone();
+    let images = taken.iter().flat_map(|&c| &search.changes[c].images);
+    for image in images.filter_map(|image| study.outside_null(image.clone())) {
+        span.push(&image);
+    }
+    let place = |c: &Change| (c.kind, c.site.map(|j| j + 1));
+    Explained {
+        causes: (0..taken.len()).map(|index| search.cause(&taken, index)).collect(),
+        looked_for: search.changes.iter().map(place).collect(),
+        span,
+    }
 }
 
 struct Search<'a> {
@@ -131,7 +146,7 @@ impl Search<'_> {
             .filter(|c| !taken.contains(c))
             .map(|c| {
                 let site = self.changes[c].site;
-                let span = own(&self.changes[c], &others);
+                let span = Span::outside(&others, &self.changes[c].images);
                 let n = study.statistic.sample_count(site, rest.mean.len());
                 let price = span.len() as f64 * n.ln() + 2.0 * tests.ln();
                 Scored {
@@ -162,7 +177,7 @@ impl Search<'_> {
         let change = &self.changes[taken[index]];
         let rest = without(taken, index);
         let (others, left) = self.outside(&rest);
-        let span = own(change, &others);
+        let span = Span::outside(&others, &change.images);
         let b = span.solve(&left);
         let covariance = study.statistic.covariance(&span, &left);
         let scored = self.scored(&rest);
@@ -174,12 +189,13 @@ impl Search<'_> {
         signal.add(1.0, &left);
         let size = signal.square();
         let gain = study.statistic.gain(&span, change.site, &left);
-        let scale = gain / size.max(f64::MIN_POSITIVE);
+        let scale = study.statistic.lambda(&span, &left, gain) / size.max(f64::MIN_POSITIVE);
         let rivals: Vec<&Scored> = scored.iter().filter(|s| s.change != taken[index]).collect();
         let in_class: Vec<&Scored> = rivals
             .iter()
             .filter(|s| {
-                let explained = own(&self.changes[s.change], &others).explained(&signal);
+                let explained =
+                    Span::outside(&others, &self.changes[s.change].images).explained(&signal);
                 scale * (size - explained) < TELLS_APART
             })
             .copied()
@@ -211,7 +227,7 @@ impl Search<'_> {
             confidence: own_weight / all,
             parameters: estimates(change, &b, &covariance, study.statistic.quantile_95()),
             gain_fraction: None,
-            strength: gain.max(0.0).sqrt(),
+            strength: study.statistic.lambda(&span, &left, gain).max(0.0).sqrt(),
             in_words: change.in_words.to_owned(),
             rivals: behind.collect(),
         }
@@ -220,16 +236,6 @@ impl Search<'_> {
 
 fn without(taken: &[usize], index: usize) -> Vec<usize> {
     taken.iter().enumerate().filter(|(i, _)| *i != index).map(|(_, c)| *c).collect()
-}
-
-fn own(change: &Change, others: &Span) -> Span {
-    let mut span = Span::default();
-    for image in &change.images {
-        let mut image = image.clone();
-        others.residualise(&mut image);
-        span.push(&image);
-    }
-    span
 }
 
 /// Everything that is looked for.

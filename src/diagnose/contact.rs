@@ -56,9 +56,12 @@ pub struct Repeated {
     pub torque_nm: JointSignals,
 }
 
-/// Looks for contacts by comparing repetitions; `None` if the motion does not repeat often enough or
-/// nothing touched the arm.
-pub fn between_periods(m: &Measurement) -> Result<Option<Repeated>, SignalError> {
+/// Looks for contacts by comparing repetitions, not on the joints `left_out` (0-based); `None` if the
+/// motion does not repeat often enough or nothing touched the arm.
+pub fn between_periods(
+    m: &Measurement,
+    left_out: &[usize],
+) -> Result<Option<Repeated>, SignalError> {
     let rate_hz = natural_rate_hz(m.time_s)?;
     let grid = Resampler::new(m.time_s, rate_hz, LONGEST_GAP_STEPS / rate_hz)?;
     let whole = 0..grid.samples();
@@ -80,13 +83,15 @@ pub fn between_periods(m: &Measurement) -> Result<Option<Repeated>, SignalError>
     let mut smooth = JointSignals::zeros(joints, n);
     let mut counts = vec![vec![false; n]; joints];
     let mut sigma = vec![0.0; joints];
+    // The low-pass knows one side only of the record's ends.
+    let edge = ((rate_hz / CUTOFF_HZ) as usize).min(n / 2);
     for (j, counts) in counts.iter_mut().enumerate() {
         let mut values = torque.joint(j).to_vec();
         filter.filter_in_place(&mut values, &mut Scratch::default())?;
         for k in window.clone() {
             raw.joint_mut(j)[k] = deviation(torque.joint(j), k, refined, &window);
             smooth.joint_mut(j)[k] = deviation(&values, k, refined, &window);
-            counts[k] = true;
+            counts[k] = (edge..n - edge).contains(&k) && !left_out.contains(&j);
         }
         // Far apart, so that a drift counts as scatter.
         let lag = ((periods / 2) as f64 * refined) as usize;
@@ -324,7 +329,7 @@ mod tests {
             qd_rad_s: &qd_rad_s,
             torque_nm: &torque_nm,
         };
-        between_periods(&m).unwrap()
+        between_periods(&m, &[]).unwrap()
     }
 
     #[test]

@@ -10,6 +10,7 @@
 use std::collections::BTreeMap;
 
 use super::kind::Kind;
+use super::record::Record;
 use super::verdict::{Cause, Estimate};
 use crate::identify::Measurement;
 use crate::robot::JointSignals;
@@ -30,14 +31,30 @@ const BLOCKS: usize = 20;
 /// Student's t₁₉ for a chance of 10⁻⁵ in two tails, six joints.
 const LAG_T: f64 = 6.5;
 
-/// All faults of the record of `m`.
-pub fn find(m: &Measurement) -> Vec<Cause> {
-    let mut out = velocity_lag(m);
-    out.extend(clock_fault(m));
-    out.extend(repeated_or_missing(m));
-    out.extend(outliers(m));
-    out.extend(quantisation(m));
-    out
+/// All faults of the record of `m`, and the record without those that can be taken back. Rows that repeat
+/// and a clock that stalls hide what the velocity and the torque have: they are looked for first.
+pub fn find(m: &Measurement) -> (Vec<Cause>, Record) {
+    let mut out: Vec<Cause> = Vec::new();
+    let repeats = repeats(m);
+    out.extend(repeated_or_missing(m, &repeats));
+    let mut record = Record::without_rows(m, &repeats);
+    let stalls = stalls(&record.measurement(m.source));
+    if let Some(stalls) = &stalls {
+        out.push(stalls.cause());
+        record.give_back_time(&stalls.rows, stalls.lost_s);
+    }
+    let lags = velocity_lag(&record.measurement(m.source));
+    for lag in &lags {
+        record.undo_lag(lag.joint.map(|j| j - 1), lag.parameters["delay_s"].value);
+    }
+    let outliers = outliers(&record.torque_nm);
+    for (j, far) in &outliers {
+        record.replace_torque(*j, far);
+    }
+    out.extend(lags);
+    out.extend(outliers.iter().map(|(j, far)| outliers_cause(*j, far.len(), m.time_s.len())));
+    out.extend(quantisation(&record.torque_nm));
+    (out, record)
 }
 
 fn cause(
@@ -102,25 +119,6 @@ fn velocity_lag(m: &Measurement) -> Vec<Cause> {
         .collect()
 }
 
-/// The velocities of `m` without the lags found in it, by straight interpolation between samples.
-pub fn without_lag(m: &Measurement, faults: &[Cause]) -> JointSignals {
-    let mut out = m.qd_rad_s.clone();
-    for fault in faults.iter().filter(|f| f.kind == Kind::VelocityLag) {
-        let lag = fault.parameters["delay_s"].value;
-        let joints = fault.joint.map_or(0..out.joints(), |j| j - 1..j);
-        for j in joints {
-            let (t, qd) = (m.time_s, m.qd_rad_s.joint(j));
-            for (value, now) in out.joint_mut(j).iter_mut().zip(t) {
-                let at = now + lag;
-                let right = t.partition_point(|s| *s < at).clamp(1, t.len() - 1);
-                let u = ((at - t[right - 1]) / (t[right] - t[right - 1])).clamp(0.0, 1.0);
-                *value = qd[right - 1] * (1.0 - u) + qd[right] * u;
-            }
-        }
-    }
-    out
-}
-
 /// Lag of joint `j`'s velocity and its σ from the scatter between blocks, s.
 fn lag(m: &Measurement, j: usize) -> Option<(f64, f64)> {
     let (t, q, qd) = (m.time_s, m.q_rad.joint(j), m.qd_rad_s.joint(j));
@@ -155,10 +153,20 @@ fn lag(m: &Measurement, j: usize) -> Option<(f64, f64)> {
     Some((lag, variance.sqrt()))
 }
 
+/// A clock that stalled.
+struct Stalls {
+    /// Rows behind which time is lost.
+    rows: Vec<usize>,
+    /// Mean time lost, s.
+    lost_s: f64,
+    /// σ of one.
+    sigma_s: f64,
+}
+
 /// Rows between which more time passed than the time stamps say.
-fn clock_fault(m: &Measurement) -> Option<Cause> {
+fn stalls(m: &Measurement) -> Option<Stalls> {
     let joints = m.q_rad.joints();
-    let lost: Vec<f64> = (0..m.time_s.len() - 1)
+    let lost: Vec<f64> = (0..m.time_s.len().saturating_sub(1))
         .map(|k| {
             let dt = m.time_s[k + 1] - m.time_s[k];
             let (mut along, mut square) = (0.0, 0.0);
@@ -172,40 +180,48 @@ fn clock_fault(m: &Measurement) -> Option<Cause> {
             if square > 1e-2 { along / square } else { 0.0 }
         })
         .collect();
-    let sigma = robust_sigma(&lost);
-    let step_s = median_step(m.time_s);
-    let limit = (FAR * sigma).max(0.5 * step_s);
-    let at: Vec<usize> = (0..lost.len()).filter(|&k| lost[k] > limit).collect();
-    if at.len() < 3 {
+    let sigma_s = robust_sigma(&lost);
+    let limit = (FAR * sigma_s).max(0.5 * median_step(m.time_s));
+    let rows: Vec<usize> = (0..lost.len()).filter(|&k| lost[k] > limit).collect();
+    if rows.len() < 3 {
         return None;
     }
-    let lost_s = at.iter().map(|&k| lost[k]).sum::<f64>() / at.len() as f64;
-    let mut between: Vec<f64> = at.windows(2).map(|w| (w[1] - w[0]) as f64).collect();
-    let every = median(&mut between);
-    let reach = 1.96 * sigma / (at.len() as f64).sqrt();
-    let lost = Estimate { value: lost_s, unit: "s", ci95: [lost_s - reach, lost_s + reach] };
-    Some(cause(
-        Kind::ClockFault,
-        None,
-        "time that passed without the time stamps showing it",
-        lost_s / sigma.max(f64::MIN_POSITIVE),
-        &[("lost_s", lost), ("every_rows", exact(every, "rows"))],
-    ))
+    let lost_s = rows.iter().map(|&k| lost[k]).sum::<f64>() / rows.len() as f64;
+    Some(Stalls { rows, lost_s, sigma_s })
 }
 
-/// Rows that repeat the row before in every channel, or are missing by the time stamps.
-fn repeated_or_missing(m: &Measurement) -> Option<Cause> {
-    let rows = m.time_s.len();
+impl Stalls {
+    fn cause(&self) -> Cause {
+        let Self { rows, lost_s, sigma_s } = self;
+        let mut between: Vec<f64> = rows.windows(2).map(|w| (w[1] - w[0]) as f64).collect();
+        let every = median(&mut between);
+        let reach = 1.96 * sigma_s / (rows.len() as f64).sqrt();
+        let lost = Estimate { value: *lost_s, unit: "s", ci95: [lost_s - reach, lost_s + reach] };
+        cause(
+            Kind::ClockFault,
+            None,
+            "time that passed without the time stamps showing it",
+            lost_s / sigma_s.max(f64::MIN_POSITIVE),
+            &[("lost_s", lost), ("every_rows", exact(every, "rows"))],
+        )
+    }
+}
+
+/// Rows of a moving arm that repeat the row before in every channel.
+fn repeats(m: &Measurement) -> Vec<usize> {
+    let channels = [m.q_rad, m.qd_rad_s, m.torque_nm];
+    let moves = |k: usize| (0..m.q_rad.joints()).any(|j| m.qd_rad_s.joint(j)[k].abs() > 0.01);
+    let same =
+        |s: &JointSignals, k: usize| (0..s.joints()).all(|j| s.joint(j)[k] == s.joint(j)[k - 1]);
+    (1..m.time_s.len()).filter(|&k| moves(k) && channels.iter().all(|s| same(s, k))).collect()
+}
+
+/// Rows that repeat the one before, or are missing by the time stamps.
+fn repeated_or_missing(m: &Measurement, repeats: &[usize]) -> Option<Cause> {
     let step_s = median_step(m.time_s);
     let missing: f64 =
         m.time_s.windows(2).map(|t| ((t[1] - t[0]) / step_s - 1.0).round().max(0.0)).sum();
-    let channels = [m.q_rad, m.qd_rad_s, m.torque_nm];
-    let moves = |k: usize| (0..m.q_rad.joints()).any(|j| m.qd_rad_s.joint(j)[k].abs() > 0.01);
-    let repeats = (1..rows).filter(|&k| {
-        let same = |s: &JointSignals| (0..s.joints()).all(|j| s.joint(j)[k] == s.joint(j)[k - 1]);
-        moves(k) && channels.iter().all(|s| same(s))
-    });
-    let fraction = (missing + repeats.count() as f64) / rows as f64;
+    let fraction = (missing + repeats.len() as f64) / m.time_s.len() as f64;
     // Single missed samples of an ordinary recorder are no cause of anything.
     (fraction > 2e-3).then(|| {
         let words = "samples that are missing or repeat the one before";
@@ -214,19 +230,18 @@ fn repeated_or_missing(m: &Measurement) -> Option<Cause> {
     })
 }
 
-/// Joints with single torque values far off.
-fn outliers(m: &Measurement) -> Vec<Cause> {
-    (0..m.torque_nm.joints())
-        .filter_map(|j| {
-            let count = far_off(m.torque_nm.joint(j)).len();
-            (count >= 3).then(|| {
-                let parameters =
-                    [("fraction", exact(count as f64 / m.torque_nm.samples() as f64, ""))];
-                let words = "single values of torque that are far off";
-                cause(Kind::Outliers, Some(j), words, FAR, &parameters)
-            })
-        })
+/// Joints with single torque values far off: their samples, and what stands beside each.
+fn outliers(torque_nm: &JointSignals) -> Vec<(usize, Vec<(usize, f64)>)> {
+    (0..torque_nm.joints())
+        .map(|j| (j, far_off(torque_nm.joint(j))))
+        .filter(|(_, far)| far.len() >= 3)
         .collect()
+}
+
+fn outliers_cause(joint: usize, count: usize, rows: usize) -> Cause {
+    let parameters = [("fraction", exact(count as f64 / rows as f64, ""))];
+    let words = "single values of torque that are far off";
+    cause(Kind::Outliers, Some(joint), words, FAR, &parameters)
 }
 
 /// Samples far off the median of five, which follows a step, and that median.
@@ -240,17 +255,6 @@ fn far_off(y: &[f64]) -> Vec<(usize, f64)> {
         .collect()
 }
 
-/// The torques of `m` with the outliers named in `faults` replaced by what is beside them.
-pub fn without_outliers(m: &Measurement, faults: &[Cause]) -> JointSignals {
-    let mut out = m.torque_nm.clone();
-    for j in faults.iter().filter(|f| f.kind == Kind::Outliers).filter_map(|f| f.joint) {
-        for (k, middle) in far_off(m.torque_nm.joint(j - 1)) {
-            out.joint_mut(j - 1)[k] = middle;
-        }
-    }
-    out
-}
-
 /// Joints (0-based) whose torque is too coarse to say more than that.
 pub fn coarse_joints(faults: &[Cause]) -> Vec<usize> {
     let coarse = |f: &&Cause| f.kind == Kind::Quantisation && f.strength > TOO_COARSE;
@@ -258,10 +262,10 @@ pub fn coarse_joints(faults: &[Cause]) -> Vec<usize> {
 }
 
 /// Torques that are whole multiples of a step that is coarse against what changes between samples.
-fn quantisation(m: &Measurement) -> Vec<Cause> {
-    (0..m.torque_nm.joints())
+fn quantisation(torque_nm: &JointSignals) -> Vec<Cause> {
+    (0..torque_nm.joints())
         .filter_map(|j| {
-            let y = m.torque_nm.joint(j);
+            let y = torque_nm.joint(j);
             let mut values = y.to_vec();
             values.sort_by(f64::total_cmp);
             values.dedup();
@@ -329,14 +333,15 @@ mod tests {
     }
 
     fn found(lag_s: f64, stall: Option<usize>) -> Vec<Cause> {
-        let (time_s, [q_rad, qd_rad_s, torque_nm]) = record(lag_s, stall);
-        find(&Measurement {
-            source: "test",
-            time_s: &time_s,
-            q_rad: &q_rad,
-            qd_rad_s: &qd_rad_s,
-            torque_nm: &torque_nm,
-        })
+        let (time_s, signals) = record(lag_s, stall);
+        find_in(&time_s, &signals).0
+    }
+
+    fn find_in(
+        time_s: &[f64],
+        [q_rad, qd_rad_s, torque_nm]: &[JointSignals; 3],
+    ) -> (Vec<Cause>, Record) {
+        find(&Measurement { source: "test", time_s, q_rad, qd_rad_s, torque_nm })
     }
 
     #[test]
@@ -346,17 +351,11 @@ mod tests {
 
     #[test]
     fn coarse_torque_is_found_with_its_step_and_fine_torque_is_not() {
-        let (time_s, [q_rad, qd_rad_s, torque_nm]) = record(0.0, None);
+        let (time_s, [q, qd, torque]) = record(0.0, None);
         let rounded = |step: f64| {
-            let torque_nm =
-                torque_nm.map_joints(|_, y| y.iter().map(|v| (v / step).round() * step).collect());
-            find(&Measurement {
-                source: "test",
-                time_s: &time_s,
-                q_rad: &q_rad,
-                qd_rad_s: &qd_rad_s,
-                torque_nm: &torque_nm,
-            })
+            let torque =
+                torque.map_joints(|_, y| y.iter().map(|v| (v / step).round() * step).collect());
+            find_in(&time_s, &[q.clone(), qd.clone(), torque]).0
         };
         let coarse = rounded(0.8);
         assert_eq!(coarse.len(), 2, "both joints");
@@ -381,5 +380,28 @@ mod tests {
         let clock = faults.iter().find(|c| c.kind == Kind::ClockFault).unwrap();
         assert!((clock.parameters["lost_s"].value - 0.02).abs() < 1e-3);
         assert_eq!(clock.parameters["every_rows"].value, 250.0);
+    }
+
+    /// A stalled clock is set right: the time of the last row is what it was.
+    #[test]
+    fn lost_time_is_given_back() {
+        let (time_s, signals) = record(0.0, Some(250));
+        let (_, record) = find_in(&time_s, &signals);
+        let [shown, true_s] = [time_s[3999], time_s[3999] + 0.02 * 15.0];
+        let given_back = record.time_s[3999];
+        // Fifteen stalls, each known to better than a millisecond.
+        assert!((given_back - true_s).abs() < 2e-3, "{shown} {given_back} {true_s}");
+    }
+
+    /// Every hundredth row is written twice: the copies go, and nothing else is found.
+    #[test]
+    fn rows_written_twice_are_taken_out() {
+        let (time_s, signals) = record(0.0, None);
+        let of = |k: usize| if k % 100 == 99 { k - 1 } else { k };
+        let twice = signals.map(|s| JointSignals::from_fn(2, 4000, |j, k| s.joint(j)[of(k)]));
+        let (faults, record) = find_in(&time_s, &twice);
+        assert_eq!(faults.iter().map(|f| f.kind).collect::<Vec<_>>(), [Kind::DroppedSamples]);
+        // Where the arm rests nothing can be said.
+        assert!((3960..3970).contains(&record.time_s.len()), "{}", record.time_s.len());
     }
 }

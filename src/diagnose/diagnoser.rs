@@ -16,7 +16,7 @@ use super::misfit;
 use super::payload::{self, PayloadFinding};
 use super::replay::measured_nm;
 use super::scene::Scene;
-use super::selection::{Kept, Selected, select};
+use super::selection::{Kept, LEAST_EVIDENCE, Selected, select};
 use super::study::{Entry, Study};
 use super::verdict::{Cause, DetectionLimit, Diagnosis, Estimate, Rival, Rms, Verdict};
 use crate::base::BaseSet;
@@ -83,11 +83,10 @@ impl<'a> Diagnoser<'a> {
         held_out: &[Validation],
         simulation: Option<&[f64]>,
     ) -> Result<Finding, DiagnoseError> {
-        let mut faults = data_faults::find(m);
-        let qd_rad_s = data_faults::without_lag(m, &faults);
-        let torque_nm = data_faults::without_outliers(m, &faults);
-        let m = &Measurement { qd_rad_s: &qd_rad_s, torque_nm: &torque_nm, ..*m };
-        let touched = contact::between_periods(m)?;
+        let (mut faults, record) = data_faults::find(m);
+        let m = &record.measurement(m.source);
+        let coarse = data_faults::coarse_joints(&faults);
+        let touched = contact::between_periods(m, &coarse)?;
         let torque_nm = touched.as_ref().map_or(m.torque_nm, |t| &t.torque_nm);
         let m = &Measurement { torque_nm, ..*m };
         let mut regression = self.identifier.regression(m)?;
@@ -98,7 +97,7 @@ impl<'a> Diagnoser<'a> {
         let sources = (self.arm, self.set, &self.options);
         let estimate = (&fit.theta[..], &fit.joint_sigma_nm[..]);
         let mut first = Study::new(&self.families, sources, &regression, estimate, m.source)?;
-        first.leave_out(data_faults::coarse_joints(&faults));
+        first.leave_out(coarse);
         let null = Extension::fit(&first, &[], &first.torque);
         let found = select(&first);
         // The load on the gear is better known once friction is.
@@ -119,15 +118,13 @@ impl<'a> Diagnoser<'a> {
 
         let before_nm = residual(&study, &null);
         let after_nm = residual(&study, &extension);
-        let (accepted, rest) = kept.without(None);
-        let fitted = study.null.len() + accepted.len();
-        let lack = misfit::lack_of_fit(&study, &rest, fitted);
-        let unexplained = misfit::unexplained(&study, &accepted, &rest, lack);
         let gains = gain::on_other_periods(&study, &entries);
-        let physics = selected
+        let mut physics: Vec<Cause> = selected
             .iter()
             .enumerate()
-            .map(|(c, selected)| self.cause(&study, &kept, selected, c, gains[c], &extension));
+            .map(|(c, selected)| self.cause(&study, &kept, selected, c, gains[c], &extension))
+            .collect();
+        physics.sort_by(|a, b| b.strength.total_cmp(&a.strength));
         let touches = match &touched {
             Some(touched) => touched.causes.clone(),
             None if study.scene.periodic => Vec::new(),
@@ -136,12 +133,18 @@ impl<'a> Diagnoser<'a> {
         faults.extend(touches);
         let mut causes: Vec<Cause> = faults.into_iter().chain(physics).collect();
         let mut moved_parameters = Vec::new();
+        let (mut accepted, mut rest) = kept.without(None);
         if let Some(simulation) = simulation {
             moved_parameters = against::moved(self.set, simulation, &identification);
-            let changes = against::explain(&study, self.set, simulation, &entries);
-            causes.retain(|c| changes.iter().all(|n| (n.kind, n.joint) != (c.kind, c.joint)));
-            causes.extend(changes);
+            let explained = against::explain(&study, self.set, simulation, &entries);
+            causes.retain(|c| !explained.looked_for.contains(&(c.kind, c.joint)));
+            causes.extend(explained.causes);
+            rest = study.residual.clone();
+            explained.span.residualise(&mut rest);
+            accepted = explained.span;
         }
+        let lack = misfit::lack_of_fit(&study, &accepted, &rest);
+        let unexplained = misfit::unexplained(&study, &accepted, &rest, lack);
         let held_out = held_out
             .iter()
             .map(|log| {
@@ -247,7 +250,7 @@ impl<'a> Diagnoser<'a> {
             gain_fraction,
             separating_experiment: (!class.is_empty()).then(|| family.separating_experiment()),
             class,
-            strength: selected.contender.statistic.sqrt(),
+            strength: selected.contender.score.lambda.sqrt(),
             in_words: family.in_words().to_owned(),
             rivals: rivals.collect(),
         }
@@ -263,12 +266,6 @@ impl<'a> Diagnoser<'a> {
             for site in candidate.sites(study.scene.joints()) {
                 let entries: Vec<&Entry> =
                     study.entries.iter().filter(|e| (e.family, e.site) == (family, site)).collect();
-                let threshold = |k: usize| {
-                    let price = k as f64 * (study.residual.mean.len() as f64).ln()
-                        + 2.0 * (entries.len().max(1) as f64).ln()
-                        + 2.0 * (study.hypotheses() as f64).ln();
-                    price.sqrt() + POWER_Z
-                };
                 let Some(entry) = entries.get(entries.len() / 2) else { continue };
                 let span = study.span(entry, accepted);
                 if span.is_empty() {
@@ -277,7 +274,8 @@ impl<'a> Diagnoser<'a> {
                 // √λ of a coefficient b on column 1 alone is b ‖d⊥‖.
                 let length = span.first_length();
                 let mut b = vec![0.0; entry.images.len()];
-                b[0] = threshold(b.len()) / length;
+                let threshold = (study.price(entry) + LEAST_EVIDENCE).sqrt() + POWER_Z;
+                b[0] = threshold / length;
                 let q = candidate.quantities(&study.scene, site, entry.shape, &b);
                 let Some(quantity) = candidate.size(&q) else { continue };
                 out.push(DetectionLimit {

@@ -83,10 +83,9 @@ pub(super) fn held_out_gain(
     let manufacturer = match log.manufacturer_nm {
         Some(torque_nm) => {
             let given = identifier.regression(&Measurement { torque_nm, ..log.measurement })?;
-            let panels = &given.problem.panels;
-            Some(JointSignals::from_fn(joints, samples, |j, k| {
-                measured[j][k] - mean_period(&panels[j].y, samples)[k]
-            }))
+            let given: Vec<Vec<f64>> =
+                given.problem.panels.iter().map(|panel| mean_period(&panel.y, samples)).collect();
+            Some(JointSignals::from_fn(joints, samples, |j, k| measured[j][k] - given[j][k]))
         }
         None => None,
     };

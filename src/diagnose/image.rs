@@ -101,6 +101,17 @@ pub struct Span {
 const DEPENDENT: f64 = 1e-6;
 
 impl Span {
+    /// Of what `images` have outside `others`.
+    pub fn outside(others: &Self, images: &[Image]) -> Self {
+        let mut span = Self::default();
+        for image in images {
+            let mut image = image.clone();
+            others.residualise(&mut image);
+            span.push(&image);
+        }
+        span
+    }
+
     /// Dimensions.
     pub fn len(&self) -> usize {
         self.directions.len()

@@ -3,11 +3,13 @@
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::image::{Column, Image, Span};
+use super::statistic::Statistic;
 use super::study::Study;
 use super::verdict::Unexplained;
 
-/// Model errors live where the motion does: below this frequency.
-const BAND_HZ: f64 = 5.0;
+/// Edges of the bands in which the residual is compared with noise, Hz; the last one ends with the rows.
+/// Errors of friction and load live in the slow ones, of gears and clocks in the fast ones.
+const BANDS_HZ: [f64; 5] = [0.0, 2.0, 5.0, 10.0, 20.0];
 /// Chance that a log without faults is called unexplained, per test.
 const FALSE_ALARM: f64 = 0.0005;
 /// A part of the curve that keeps less than this share of its length belongs to the model.
@@ -15,23 +17,42 @@ const ABSORBED: f64 = 0.1;
 /// Knots of the curve along an axis.
 const KNOTS: usize = 10;
 
-/// Probability that noise alone leaves as much, below 5 Hz or in all; `None` for a single run.
-pub fn lack_of_fit(study: &Study, residual: &Image, fitted: usize) -> Option<f64> {
-    if !study.scene.periodic {
-        return None;
-    }
-    let joints = study.scene.joints();
-    let n = study.scene.samples();
-    let harmonics = (BAND_HZ * n as f64 / study.scene.rate_hz) as usize;
-    let slow = (joints * (1 + 2 * harmonics)).min(residual.mean.len());
-    let band = |rows: &[f64]| {
-        // Nearly all of the model's columns are slow: their degrees of freedom are taken from there.
-        let freedom = (rows.len().saturating_sub(fitted)).max(1) as f64;
-        let noise_freedom = rows.len() as f64 * (study.scene.periods - 1) as f64;
-        let mean_square = rows.iter().map(|r| r * r).sum::<f64>() / freedom;
-        FisherSnedecor::new(freedom, noise_freedom).map_or(1.0, |f| f.sf(mean_square))
+/// Probability that noise alone leaves as much in any band of any joint; `None` for a single run.
+///
+/// Per joint and band, Σ r² over its degrees of freedom is F(k, ν): k the rows less their share in what the
+/// null model and `accepted` have fitted (Σ of the leverages), ν what the periods know of the noise there.
+/// The smallest probability is multiplied by their number (Bonferroni).
+pub fn lack_of_fit(study: &Study, accepted: &Span, residual: &Image) -> Option<f64> {
+    let Statistic::Periods(knowledge) = &study.statistic else { return None };
+    let harmonic = |hz: f64| (hz * study.scene.samples() as f64 / study.scene.rate_hz) as usize;
+    let edges: Vec<usize> = BANDS_HZ
+        .iter()
+        .map(|hz| harmonic(*hz))
+        .chain([knowledge.harmonics()])
+        .take_while(|edge| *edge <= knowledge.harmonics())
+        .collect();
+    let fitted = |row: usize| -> f64 {
+        let directions = study.null.directions().iter().chain(accepted.directions());
+        directions.map(|d| d.mean[row] * d.mean[row]).sum()
     };
-    Some((2.0 * band(&residual.mean[..slow]).min(band(&residual.mean))).min(1.0))
+    let mut least = 1.0f64;
+    let mut tests = 0.0;
+    for joint in 0..study.scene.joints() {
+        for band in edges.windows(2).filter(|band| band[0] < band[1]) {
+            let (mut square, mut freedom) = (0.0, 0.0);
+            for row in (band[0]..band[1]).flat_map(|h| knowledge.rows(h, joint)) {
+                square += residual.mean[row] * residual.mean[row];
+                freedom += 1.0 - fitted(row);
+            }
+            let freedom = freedom.max(1.0);
+            let noise = knowledge.freedom_of_band(band[0]..band[1], joint);
+            let chance =
+                FisherSnedecor::new(freedom, noise).map_or(1.0, |f| f.sf(square / freedom));
+            least = least.min(chance);
+            tests += 1.0;
+        }
+    }
+    Some((tests * least).min(1.0))
 }
 
 /// The axis along which the residual is largest: a curve of 10 knots in each quantity of each joint.
@@ -70,7 +91,9 @@ pub fn unexplained(
                 let length = image.square();
                 study.null.residualise(&mut image);
                 accepted.residualise(&mut image);
-                if image.square() > ABSORBED * ABSORBED * length && span.push(&image) {
+                let mut own = image.clone();
+                span.residualise(&mut own);
+                if own.square() > ABSORBED * ABSORBED * length && span.push(&image) {
                     used.push(knot);
                 }
             }

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::candidates::ripple::strongest_orders;
 use super::image::{Image, Span};
 use super::kind::Kind;
-use super::study::{Entry, Study};
+use super::study::{Entry, Score, Study};
 
 /// Chance that a log without faults is given a cause.
 pub const FALSE_ALARM: f64 = 0.002;
@@ -13,7 +13,7 @@ pub const FALSE_ALARM: f64 = 0.002;
 /// cause.
 const FORM_ERROR: f64 = 0.05;
 /// 2 ln of the odds for a cause, at least: seven to one.
-const LEAST_EVIDENCE: f64 = 4.0;
+pub const LEAST_EVIDENCE: f64 = 4.0;
 /// Causes at most: a log that needs more has another kind of problem.
 const MOST_CAUSES: usize = 24;
 /// Families whose shapes are refined before one is chosen.
@@ -27,8 +27,8 @@ pub const TELLS_APART: f64 = 19.0;
 pub struct Contender {
     /// Family, site, shape and columns.
     pub entry: Entry,
-    /// Twice the gain in log-likelihood.
-    pub statistic: f64,
+    /// What it explains.
+    pub score: Score,
     /// Twice the log-evidence against no effect.
     pub evidence: f64,
 }
@@ -111,9 +111,9 @@ impl<'s, 'a> Kept<'s, 'a> {
     fn refine(&mut self, c: usize) {
         let (others, residual) = self.without(Some(c));
         let current = &self.causes[c].entry;
-        if let Some((entry, statistic)) = self.study.refined(current, &others, &residual) {
-            let evidence = self.evidence(&entry, statistic);
-            self.causes[c] = Contender { entry, statistic, evidence };
+        if let Some((entry, score)) = self.study.refined(current, &others, &residual) {
+            let evidence = self.evidence(&entry, score);
+            self.causes[c] = Contender { entry, score, evidence };
         }
     }
 
@@ -130,17 +130,9 @@ impl<'s, 'a> Kept<'s, 'a> {
         (span, residual)
     }
 
-    /// 2 ln of the evidence (Schwarz 1978) for adding `entry`: T − k ln n, less the price of having
-    /// looked at so many shapes and families, and of being rare.
-    fn evidence(&self, entry: &Entry, statistic: f64) -> f64 {
-        let study = self.study;
-        let n = study.statistic.sample_count(entry.site, study.residual.mean.len());
-        let grid = study.alternatives(entry);
-        statistic
-            - entry.images.len() as f64 * n.ln()
-            - 2.0 * grid.ln()
-            - 2.0 * (study.hypotheses() as f64).ln()
-            + 2.0 * study.families[entry.family].prior_odds(entry.site).ln()
+    /// 2 ln of the evidence for adding `entry`: what it explains, less its price.
+    fn evidence(&self, entry: &Entry, score: Score) -> f64 {
+        score.gain - self.study.price(entry)
     }
 
     /// The best shape of every family at every site that is free (`open` is the cause to be replaced,
@@ -159,21 +151,21 @@ impl<'s, 'a> Kept<'s, 'a> {
                     .any(|(c, cause)| Some(c) != open && is_taken(cause))
         };
         let mut best: Vec<Contender> = Vec::new();
-        let scores: Vec<Option<f64>> = study
+        let scores: Vec<Option<Score>> = study
             .entries
             .par_iter()
             .chain(orders.par_iter())
             .map(|entry| if taken(entry) { None } else { study.score(entry, others, residual) })
             .collect();
         for (entry, score) in study.entries.iter().chain(&orders).zip(scores) {
-            let Some(statistic) = score else { continue };
-            let evidence = self.evidence(entry, statistic);
+            let Some(score) = score else { continue };
+            let evidence = self.evidence(entry, score);
             let same =
                 |c: &&mut Contender| (c.entry.family, c.entry.site) == (entry.family, entry.site);
             match best.iter_mut().find(same) {
-                Some(old) if old.statistic >= statistic => {}
-                Some(old) => *old = Contender { entry: entry.clone(), statistic, evidence },
-                None => best.push(Contender { entry: entry.clone(), statistic, evidence }),
+                Some(old) if old.score.gain >= score.gain => {}
+                Some(old) => *old = Contender { entry: entry.clone(), score, evidence },
+                None => best.push(Contender { entry: entry.clone(), score, evidence }),
             }
         }
         best.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
@@ -181,9 +173,9 @@ impl<'s, 'a> Kept<'s, 'a> {
         let mut all: Vec<Contender> = head
             .par_iter()
             .map(|contender| match study.refined(&contender.entry, others, residual) {
-                Some((entry, statistic)) => {
-                    let evidence = self.evidence(&entry, statistic);
-                    Contender { entry, statistic, evidence }
+                Some((entry, score)) => {
+                    let evidence = self.evidence(&entry, score);
+                    Contender { entry, score, evidence }
                 }
                 None => contender.clone(),
             })
@@ -224,9 +216,9 @@ impl<'s, 'a> Kept<'s, 'a> {
             .iter()
             .filter(|c| (c.entry.family, c.entry.site) != (contender.entry.family, site))
             .filter(|c| c.entry.site.is_none() || site.is_none() || c.entry.site == site)
-            .map(|c| c.statistic)
+            .map(|c| c.score.lambda)
             .fold(0.0, f64::max);
-        if contender.statistic < FORM_ERROR * FORM_ERROR * beside {
+        if contender.score.lambda < FORM_ERROR * FORM_ERROR * beside {
             return false;
         }
         let span = study.span(&contender.entry, others);
@@ -303,7 +295,7 @@ impl<'s, 'a> Kept<'s, 'a> {
         let identity = (contender.entry.family, contender.entry.site);
         let mut rivals = self.contenders(Some(c), &others, &residual);
         rivals.retain(|r| (r.entry.family, r.entry.site) != identity);
-        let scale = contender.statistic / size.max(f64::MIN_POSITIVE);
+        let scale = contender.score.lambda / size.max(f64::MIN_POSITIVE);
         let class: Vec<(usize, Option<usize>)> = rivals
             .iter()
             .filter(|rival| {

@@ -4,12 +4,13 @@ use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use super::image::{Image, Span};
+use super::noise_power::NoiseKnowledge;
 use super::whitening::Whitening;
 
 /// How evidence is counted.
 pub enum Statistic {
-    /// Rows are independent with variance one: the explained square is χ².
-    Exact,
+    /// Rows are independent with variance one, as far as the periods tell that.
+    Periods(NoiseKnowledge),
     /// A single run: residuals have a memory and hold what the model gets wrong.
     Blocks {
         /// Block of time of every row.
@@ -31,9 +32,10 @@ const KEPT_SHARE: f64 = 0.5;
 impl Statistic {
     /// For the rows of `whitening`, with the null model's `residual`.
     pub fn new(whitening: &Whitening, residual: &Image, joints: usize) -> Self {
-        match whitening.blocks() {
-            None => Self::Exact,
-            Some(block_of) => {
+        match whitening {
+            Whitening::Periods(periods) => Self::Periods(periods.knowledge()),
+            Whitening::Run(run) => {
+                let block_of = run.blocks();
                 let rows = block_of.len() / joints;
                 let effective = residual
                     .mean
@@ -47,13 +49,14 @@ impl Statistic {
 
     /// Twice the gain in log-likelihood when the residual loses what `span` explains.
     ///
-    /// Exact: T = ‖P r‖². Blocks: T = n_e ln(S/(S − ‖P r‖²)) with S the square of the residual of the
+    /// Periods: ‖P r‖², less where noise is not well known ([`NoiseKnowledge::gain`]). Blocks:
+    /// T = n_e ln(S/(S − ‖P r‖²)) with S the square of the residual of the
     /// joint (or all) and n_e the independent rows in it.
     pub fn gain(&self, span: &Span, site: Option<usize>, residual: &Image) -> f64 {
-        let explained = span.explained(residual);
         match self {
-            Self::Exact => explained,
+            Self::Periods(knowledge) => knowledge.gain(span, residual),
             Self::Blocks { rows, effective, .. } => {
+                let explained = span.explained(residual);
                 let (square, effective) = match site {
                     Some(j) => {
                         let own = &residual.mean[j * rows..(j + 1) * rows];
@@ -67,10 +70,19 @@ impl Statistic {
         }
     }
 
+    /// λ̂ of what `span` explains: its length² in units of the noise; for a single run the gain, because
+    /// its noise is not known.
+    pub fn lambda(&self, span: &Span, residual: &Image, gain: f64) -> f64 {
+        match self {
+            Self::Periods(_) => span.explained(residual),
+            Self::Blocks { .. } => gain,
+        }
+    }
+
     /// Samples that count in the penalty for a coefficient.
     pub fn sample_count(&self, site: Option<usize>, all_rows: usize) -> f64 {
         match (self, site) {
-            (Self::Exact, _) => all_rows as f64,
+            (Self::Periods(_), _) => all_rows as f64,
             (Self::Blocks { effective, .. }, Some(j)) => effective[j],
             (Self::Blocks { effective, .. }, None) => effective.iter().sum(),
         }
@@ -78,12 +90,19 @@ impl Statistic {
 
     /// Probability of at least this much by chance alone, one test.
     ///
-    /// Exact: χ². Blocks: the Wald statistic bᵀV⁻¹b with V from the scatter of block sums, as
+    /// Periods: F(k, ν) with the degrees of freedom of [`NoiseKnowledge::freedom`]. Blocks: the Wald statistic bᵀV⁻¹b with V from the scatter of block sums, as
     /// F(k, B − k).
     pub fn probability(&self, span: &Span, residual: &Image) -> f64 {
         let k = span.len();
         match self {
-            Self::Exact => upper_chi_squared(span.explained(residual), k),
+            Self::Periods(knowledge) => {
+                let (explained, freedom) =
+                    (span.explained(residual), knowledge.freedom(span, residual));
+                if NoiseKnowledge::is_known(freedom) || k == 0 {
+                    return upper_chi_squared(explained, k);
+                }
+                FisherSnedecor::new(k as f64, freedom).map_or(1.0, |f| f.sf(explained / k as f64))
+            }
             Self::Blocks { .. } => {
                 let coordinates = DVector::from_vec(span.coordinates(residual));
                 let Some((scatter, blocks)) = self.scatter(span, residual, &coordinates) else {
@@ -170,7 +189,7 @@ impl Statistic {
     /// Half width of a 95 % interval in σ.
     pub fn quantile_95(&self) -> f64 {
         match self {
-            Self::Exact => 1.96,
+            Self::Periods(_) => 1.96,
             Self::Blocks { blocks, .. } => {
                 let freedom = (*blocks - 1).max(1) as f64;
                 statrs::distribution::StudentsT::new(0.0, 1.0, freedom)

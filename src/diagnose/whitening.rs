@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use nalgebra::{Complex, DMatrix};
 use realfft::{RealFftPlanner, RealToComplex};
-use statrs::function::gamma::digamma;
 
 use super::error::DiagnoseError;
 use super::image::{Column, Image};
+use super::noise_power::{NoiseKnowledge, NoisePower, trend};
 use super::scene::Scene;
 use crate::identify::{Options, Regression};
 use crate::robot::JointSignals;
@@ -38,6 +38,8 @@ pub struct PeriodWhitening {
     forward: Arc<dyn RealToComplex<f64>>,
     /// L⁻¹ per harmonic that is used, row-major N × N.
     factors: Vec<Vec<Complex<f64>>>,
+    /// Relative variance of the noise's power per harmonic and joint.
+    unknown: Vec<Vec<f64>>,
 }
 
 /// Rows of a single run: the regression's low-pass, then a weight per joint, and only samples in
@@ -77,7 +79,8 @@ impl PeriodWhitening {
         let problem = &regression.problem;
         let (n, periods, joints) = (problem.samples, problem.periods, problem.joints());
         let forward = RealFftPlanner::new().plan_fft_forward(n);
-        let mut whitening = Self { samples: n, periods, joints, forward, factors: Vec::new() };
+        let mut whitening =
+            Self { samples: n, periods, joints, forward, factors: Vec::new(), unknown: Vec::new() };
         let harmonics = n / 2 + 1;
         let used = (USED * n as f64) as usize;
         let corners: Vec<Vec<Complex<f64>>> =
@@ -104,7 +107,7 @@ impl PeriodWhitening {
             }
         }
         let last = (used + NEIGHBOURS.max(used / 4)).min(n / 2);
-        let trends: Vec<Vec<f64>> = (0..joints)
+        let trends: Vec<Vec<NoisePower>> = (0..joints)
             .map(|j| {
                 let floor = (FLOOR * FLOOR * power[j]).max(f64::MIN_POSITIVE);
                 let own: Vec<f64> =
@@ -113,8 +116,9 @@ impl PeriodWhitening {
             })
             .collect();
         // Per harmonic, the standard deviation that the trend gives every joint.
-        let sd: Vec<Vec<f64>> =
-            (0..=last).map(|k| trends.iter().map(|trend| trend[k].sqrt()).collect()).collect();
+        let sd: Vec<Vec<f64>> = (0..=last)
+            .map(|k| trends.iter().map(|trend| trend[k].value.sqrt()).collect())
+            .collect();
         scatter.truncate(last + 1);
         for (scatter, sd) in scatter.iter_mut().zip(&sd) {
             for (i, j) in pairs(joints) {
@@ -136,11 +140,19 @@ impl PeriodWhitening {
                 s.iter_mut().for_each(|v| v.im = 0.0);
             }
             let mut sd = sd.clone();
+            let mut unknown: Vec<f64> =
+                trends.iter().map(|trend| trend[k].relative_variance + 1.0 / freedom).collect();
             if k == 0 {
-                for (j, sd) in sd.iter_mut().enumerate() {
-                    *sd *= (scatter[0][(j, j)].re / s[(j, j)].re).max(1.0).sqrt();
+                for (j, (sd, unknown)) in sd.iter_mut().zip(&mut unknown).enumerate() {
+                    let drift = scatter[0][(j, j)].re / s[(j, j)].re;
+                    if drift > 1.0 {
+                        *sd *= drift.sqrt();
+                        // A real number per period.
+                        *unknown = unknown.max(2.0 / (periods - 1) as f64);
+                    }
                 }
             }
+            whitening.unknown.push(unknown);
             for (i, j) in pairs(joints) {
                 s[(i, j)] *= sd[i] * sd[j];
             }
@@ -158,6 +170,11 @@ impl PeriodWhitening {
             whitening.factors.push(inverse.transpose().iter().copied().collect());
         }
         Ok(whitening)
+    }
+
+    /// How well the noise of every row is known.
+    pub fn knowledge(&self) -> NoiseKnowledge {
+        NoiseKnowledge::new(self.unknown.clone())
     }
 
     /// Unitary Fourier coefficients of one period.
@@ -274,30 +291,6 @@ fn pairs(n: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..n).flat_map(move |i| (0..n).map(move |j| (i, j)))
 }
 
-/// The power of noise by harmonic, 0 … `last`, without its scatter: straight lines of ln power in
-/// ln harmonic over k ± max(2, k/4), five harmonics or more. `freedom` is that of one harmonic, ν, whose
-/// mean logarithm is low by ln ν − ψ(ν).
-fn trend(power: &[f64], freedom: usize, last: usize) -> Vec<f64> {
-    let end = power.len() - 1;
-    let bias = (freedom as f64).ln() - digamma(freedom as f64);
-    let points: Vec<(f64, f64)> =
-        power.iter().enumerate().map(|(h, p)| ((h as f64).ln(), p.ln() + bias)).collect();
-    let at = |k: usize| {
-        let reach = (k / 4).max(2);
-        let first = k.saturating_sub(reach).max(1);
-        let window = &points[first..=(k + reach).max(first + 4).min(end)];
-        let count = window.len() as f64;
-        let x0 = window.iter().map(|p| p.0).sum::<f64>() / count;
-        let y0 = window.iter().map(|p| p.1).sum::<f64>() / count;
-        let (xy, xx) = window.iter().fold((0.0, 0.0), |(xy, xx), (x, y)| {
-            (xy + (x - x0) * (y - y0), xx + (x - x0) * (x - x0))
-        });
-        (y0 + xy / xx * (points[k].0 - x0)).exp()
-    };
-    // The mean has no logarithm: it is as noisy as its neighbour, or as its own scatter says.
-    (0..=last.min(end)).map(|k| at(k.max(1))).collect()
-}
-
 impl RunWhitening {
     /// From a single run and the standard deviation of its residual per joint, Nm.
     pub fn new(
@@ -319,6 +312,13 @@ impl RunWhitening {
             counts: Self::moving_rows(regression),
             block_rows: ((BLOCK_S * rate_hz / regression.every as f64) as usize).max(1),
         })
+    }
+
+    /// Block of time of every row of an image.
+    pub fn blocks(&self) -> Vec<usize> {
+        let one_joint: Vec<usize> =
+            (0..self.rows).step_by(self.thin).map(|r| r / self.block_rows).collect();
+        one_joint.repeat(self.weights.len())
     }
 
     /// Per joint and row of the regression, whether the joint moves.
@@ -401,18 +401,6 @@ impl Whitening {
         }
     }
 
-    /// Block of time of every row of an image; `None` where rows are independent.
-    pub fn blocks(&self) -> Option<Vec<usize>> {
-        match self {
-            Self::Periods(_) => None,
-            Self::Run(run) => {
-                let rows = (0..run.rows).step_by(run.thin);
-                let one_joint: Vec<usize> = rows.map(|r| r / run.block_rows).collect();
-                Some(one_joint.repeat(run.weights.len()))
-            }
-        }
-    }
-
     /// Wᵀr in time: its correlation with a torque signal is that signal's score. `None` for a single run.
     pub fn in_time(&self, rows: &Image) -> Option<JointSignals> {
         match self {
@@ -434,42 +422,6 @@ impl Whitening {
         match self {
             Self::Periods(_) => true,
             Self::Run(run) => run.counts[joint][row],
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::trend;
-    use rand::{SeedableRng, rngs::ChaCha8Rng};
-    use rand_distr::{Distribution, StandardNormal};
-
-    /// Power that falls as 1/h² is found without a bend at its steep beginning.
-    #[test]
-    fn steep_noise_keeps_its_slope() {
-        const FREEDOM: usize = 7;
-        const TRIALS: usize = 200;
-        let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let mut mean = [0.0; 40];
-        for _ in 0..TRIALS {
-            let power: Vec<f64> = (0..200)
-                .map(|h: usize| {
-                    let square = |_| {
-                        let x: f64 = StandardNormal.sample(&mut rng);
-                        x * x
-                    };
-                    let chi: f64 = (0..2 * FREEDOM).map(square).sum();
-                    chi / (2 * FREEDOM) as f64 / (h.max(1) as f64).powi(2)
-                })
-                .collect();
-            for (k, (mean, found)) in mean.iter_mut().zip(trend(&power, FREEDOM, 39)).enumerate() {
-                *mean += (found * (k.max(1) as f64).powi(2)).ln() / TRIALS as f64;
-            }
-        }
-        // ln of χ²₁₄/14 has the variance ψ'(7) = 0.154; the line through five points ends with 0.77 of
-        // it at most: σ of the mean of 200 is 0.024. Six σ of forty fail in one of 10⁷ seeds.
-        for (k, mean) in mean.iter().enumerate() {
-            assert!(mean.abs() < 0.15, "harmonic {k}: off by {mean:.3}");
         }
     }
 }

@@ -14,8 +14,8 @@ pub struct Elasticity;
 /// Softness at which the torque change is taken, rad/Nm: small, so that it is linear.
 const SMALL_RAD_NM: f64 = 1e-6;
 
-/// Torques on all joints when joint `j` lags by `delta` (rad), per unit of `scale`.
-pub(super) fn give_way(scene: &Scene, j: usize, delta: &[f64], scale: f64) -> Column {
+/// The motion of the links when joint `j` is `delta` (rad) behind its encoder.
+pub(super) fn lagging_by(scene: &Scene, j: usize, delta: &[f64]) -> Motion {
     let rate = scene.derivative(delta);
     let acceleration = scene.derivative(&rate);
     let mut motion: Motion = scene.motion.clone();
@@ -24,7 +24,12 @@ pub(super) fn give_way(scene: &Scene, j: usize, delta: &[f64], scale: f64) -> Co
         motion.qd_rad_s.joint_mut(j)[k] -= rate[k];
         motion.qdd_rad_s2.joint_mut(j)[k] -= acceleration[k];
     }
-    Column::everywhere(&scene.torque_change(&scene.arm, &motion)).scaled(1.0 / scale)
+    motion
+}
+
+/// Torques on all joints when the links move as `motion`, per unit of `scale`.
+pub(super) fn give_way(scene: &Scene, motion: &Motion, scale: f64) -> Column {
+    Column::everywhere(&scene.torque_change(&scene.arm, motion)).scaled(1.0 / scale)
 }
 
 impl Candidate for Elasticity {
@@ -46,7 +51,7 @@ impl Candidate for Elasticity {
         let j = joint(site);
         let delta: Vec<f64> = scene.link_nm.joint(j).iter().map(|l| l * SMALL_RAD_NM).collect();
         if shape.variant == 0 {
-            return vec![give_way(scene, j, &delta, SMALL_RAD_NM)];
+            return vec![give_way(scene, &lagging_by(scene, j, &delta), SMALL_RAD_NM)];
         }
         let drive = &scene.arm.joints[j].drive;
         let softness = 1.0 / shape.value;

@@ -1,6 +1,6 @@
 //! An angle with a constant error: the torques are those of q − δ.
 
-use super::elasticity::give_way;
+use super::elasticity::{give_way, lagging_by};
 use super::*;
 
 /// See the module.
@@ -15,7 +15,8 @@ impl Candidate for EncoderOffset {
     }
 
     fn columns(&self, scene: &Scene, site: Option<usize>, _: Shape) -> Vec<Column> {
-        vec![give_way(scene, joint(site), &vec![SMALL_RAD; scene.samples()], SMALL_RAD)]
+        let turned = lagging_by(scene, joint(site), &vec![SMALL_RAD; scene.samples()]);
+        vec![give_way(scene, &turned, SMALL_RAD)]
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::case::{Case, Drawn, Secret, draw};
-use super::family::{Family, Judged};
+use super::family::{Family, Judged, kin};
 use super::plan::BlindPlan;
 use super::record::{Answer, HeldOutGain, Record, Records};
 use crate::diagnose::{DiagnoseError, Diagnoser, Diagnosis, Kind, Validation, candidates};
@@ -105,7 +105,10 @@ impl BlindWorker<'_> {
         let Benchmark { plan, model, simulation, .. } = self.benchmark;
         let mut families = candidates::all();
         if case.secret == Secret::Withheld {
-            families.retain(|f| case.hidden.iter().all(|h| h.kind != f.kind()));
+            let is_withheld = |kind: Kind| {
+                case.hidden.iter().any(|h| h.kind == kind || kin(h.kind).contains(&kind))
+            };
+            families.retain(|f| !is_withheld(f.kind()));
         }
         let Scenario { arm, set, processing, .. } = &plan.base;
         let mut diagnoser = Diagnoser::with_families(arm, model, set, processing.clone(), families);

@@ -89,6 +89,13 @@ const fn of_the_record(kind: Kind, sites: &'static [Option<usize>]) -> Family {
     Family { kind, judged: Judged::Record, sites }
 }
 
+/// Families whose torque is that of `kind` but for what no log shows: a constant is a friction that differs
+/// by direction, and a spring far from its rest. Where one is withheld, so are they.
+pub(super) fn kin(kind: Kind) -> &'static [Kind] {
+    const CONSTANT: &[Kind] = &[Kind::CurrentOffset, Kind::AsymmetricFriction, Kind::Spring];
+    if CONSTANT.contains(&kind) { CONSTANT } else { &[] }
+}
+
 /// What sizes are measured by.
 pub(super) struct Surroundings<'a> {
     /// The nominal arm.

@@ -100,7 +100,7 @@ impl HeldOutGain {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Answer {
-    /// Causes, strongest first.
+    /// Causes in the order of the diagnosis: faults of the record, then the strongest first.
     pub named: Vec<Named>,
     /// What is left over.
     pub left: Option<Left>,
@@ -111,10 +111,8 @@ pub struct Answer {
 impl Answer {
     /// Of a diagnosis.
     pub fn of(diagnosis: &Diagnosis, gain: Option<HeldOutGain>) -> Self {
-        let mut causes: Vec<&Cause> = diagnosis.causes.iter().collect();
-        causes.sort_by(|a, b| b.strength.total_cmp(&a.strength));
         Self {
-            named: causes.into_iter().map(Named::of).collect(),
+            named: diagnosis.causes.iter().map(Named::of).collect(),
             left: diagnosis.unexplained.as_ref().map(|u| Left {
                 axis: u.axis.to_owned(),
                 joint: u.joint,
