@@ -1,24 +1,23 @@
 //! From a log to a diagnosis: the procedure as a whole.
 
-use std::collections::BTreeMap;
-
 use super::against;
-use super::candidates::{self, Candidate, Quantity, Search, Shape};
+use super::candidates::{self, Candidate};
 use super::common_motion::move_to_common_motion;
 use super::contact;
 use super::data_faults;
 use super::error::DiagnoseError;
-use super::extension::{Effect, Extension, mean_period};
+use super::extension::{Extension, mean_period};
 use super::gain;
 use super::held_out::{Models, Validation, held_out_gain};
-use super::image::{Image, Span};
+use super::image::Span;
+use super::intervals;
 use super::misfit;
 use super::payload::{self, PayloadFinding};
 use super::replay::measured_nm;
 use super::scene::Scene;
 use super::selection::{Kept, LEAST_EVIDENCE, Selected, select};
 use super::study::{Entry, Study};
-use super::verdict::{Cause, DetectionLimit, Diagnosis, Estimate, Rival, Rms, Verdict};
+use super::verdict::{Cause, DetectionLimit, Diagnosis, Rival, Rms, Verdict};
 use crate::base::BaseSet;
 use crate::dynamics::Model;
 use crate::identify::{Identification, Identifier, Measurement, Options, Regression};
@@ -145,6 +144,9 @@ impl<'a> Diagnoser<'a> {
         }
         let lack = misfit::lack_of_fit(&study, &accepted, &rest);
         let unexplained = misfit::unexplained(&study, &accepted, &rest, lack);
+        if unexplained.is_some() {
+            causes.iter_mut().for_each(Cause::make_provisional);
+        }
         let held_out = held_out
             .iter()
             .map(|log| {
@@ -169,6 +171,7 @@ impl<'a> Diagnoser<'a> {
             causes,
             unexplained,
             after: rms(&after_nm),
+            base_parameters: intervals::base(&study, self.set, &extension),
             held_out,
             moved_parameters,
             payload: None,
@@ -246,7 +249,7 @@ impl<'a> Diagnoser<'a> {
             kind: family.kind(),
             joint: entry.site.map(|j| j + 1),
             confidence: selected.confidence,
-            parameters: estimates(study, kept, &extension.effects[index], index),
+            parameters: intervals::physical(study, kept, &extension.effects[index], index),
             gain_fraction,
             separating_experiment: (!class.is_empty()).then(|| family.separating_experiment()),
             class,
@@ -325,89 +328,4 @@ pub(super) fn rms_where(e: &[f64], counts: impl Fn(usize) -> bool) -> f64 {
         count += 1;
     }
     (square / count.max(1) as f64).sqrt()
-}
-
-/// Physical parameters of a cause with 95 % intervals by the delta method: coefficients and shape are
-/// linearised together, the other causes' coefficients free.
-fn estimates(
-    study: &Study,
-    kept: &Kept,
-    effect: &Effect,
-    index: usize,
-) -> BTreeMap<&'static str, Estimate> {
-    let (others, residual) = kept.without(Some(index));
-    let family = &study.families[effect.family];
-    let entry = &kept.causes()[index].entry;
-    let mut span = Span::default();
-    let project = |image: &Image| {
-        let mut image = image.clone();
-        others.residualise(&mut image);
-        image
-    };
-    for image in &entry.images {
-        span.push(&project(image));
-    }
-    let step = 1e-3 * effect.shape.value.abs();
-    if family.search() != Search::None && step > 0.0 {
-        let signal = |value: f64| {
-            let shape = Shape { value, ..effect.shape };
-            let columns = family.columns(&study.scene, effect.site, shape);
-            let mut sum = Image::default();
-            for (column, b) in columns.iter().zip(&effect.coefficients) {
-                let image: Image = study.whitening.image(column);
-                if sum.mean.is_empty() {
-                    sum = image;
-                    sum.scale(*b);
-                } else {
-                    sum.add(*b, &image);
-                }
-            }
-            sum
-        };
-        let mut slope = signal(effect.shape.value + step);
-        slope.add(-1.0, &signal(effect.shape.value - step));
-        slope.scale(0.5 / step);
-        study.null.residualise(&mut slope);
-        span.push(&project(&slope));
-    }
-    let covariance = study.statistic.covariance(&span, &residual);
-    let half = study.statistic.quantile_95();
-    let at = |b: &[f64], value: f64| -> Vec<Quantity> {
-        family.quantities(&study.scene, effect.site, Shape { value, ..effect.shape }, b)
-    };
-    let centre = at(&effect.coefficients, effect.shape.value);
-    let k = effect.coefficients.len();
-    let mut gradients = vec![vec![0.0; span.len()]; centre.len()];
-    for parameter in 0..span.len() {
-        let sigma = covariance[(parameter, parameter)].max(0.0).sqrt();
-        let h = 1e-3 * sigma.max(f64::MIN_POSITIVE);
-        let moved = |sign: f64| {
-            let mut b = effect.coefficients.clone();
-            let mut value = effect.shape.value;
-            if parameter < k {
-                b[parameter] += sign * h;
-            } else {
-                value += sign * h;
-            }
-            at(&b, value)
-        };
-        for (g, (up, down)) in gradients.iter_mut().zip(moved(1.0).iter().zip(moved(-1.0))) {
-            let mut difference = up.value - down.value;
-            if up.unit == "rad" && difference.abs() > std::f64::consts::PI {
-                difference -= difference.signum() * std::f64::consts::TAU;
-            }
-            g[parameter] = difference / (2.0 * h);
-        }
-    }
-    centre
-        .iter()
-        .zip(&gradients)
-        .map(|(quantity, gradient)| {
-            let g = nalgebra::DVector::from_column_slice(gradient);
-            let variance = (g.transpose() * &covariance * &g)[(0, 0)].max(0.0);
-            let reach = half * variance.sqrt();
-            let ci95 = [quantity.value - reach, quantity.value + reach];
-            (quantity.name, Estimate { value: quantity.value, unit: quantity.unit, ci95 })
-        })
-        .collect()
 }

@@ -25,6 +25,7 @@ mod extension;
 mod gain;
 mod held_out;
 mod image;
+mod intervals;
 mod kind;
 mod misfit;
 mod noise_power;
@@ -47,7 +48,7 @@ pub use kind::Kind;
 pub use payload::PayloadFinding;
 pub use scene::{Scene, equivalent_arm};
 pub use verdict::{
-    Cause, DIAGNOSE_SCHEMA, DetectionLimit, Diagnosis, Estimate, HeldOut, Moved, Rival, Rms,
-    Unexplained, Verdict,
+    BaseParameter, Cause, DIAGNOSE_SCHEMA, DetectionLimit, Diagnosis, Estimate, HeldOut, Moved,
+    Rival, Rms, Unexplained, Verdict,
 };
 pub use whitening::Whitening;

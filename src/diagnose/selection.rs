@@ -97,11 +97,6 @@ impl<'s, 'a> Kept<'s, 'a> {
         }
     }
 
-    /// The causes.
-    pub fn causes(&self) -> &[Contender] {
-        &self.causes
-    }
-
     /// The causes, judged.
     pub fn selected(&self) -> Vec<Selected> {
         (0..self.causes.len()).map(|c| self.judged(c)).collect()

@@ -134,6 +134,17 @@ pub struct Moved {
     pub z: f64,
 }
 
+/// A base parameter beside the causes that were found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BaseParameter {
+    /// Name, as in identification.
+    pub name: String,
+    /// Estimate.
+    pub value: f64,
+    /// σ; NaN (null) where the causes leave nothing to tell it by.
+    pub sigma: f64,
+}
+
 /// The result of a diagnosis: the body of the JSON.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {
@@ -149,6 +160,8 @@ pub struct Diagnosis {
     pub unexplained: Option<Unexplained>,
     /// Residual of the extended model.
     pub after: Rms,
+    /// Base parameters of the extended model.
+    pub base_parameters: Vec<BaseParameter>,
     /// Gains on other logs.
     pub held_out: Vec<HeldOut>,
     /// Parameters against the simulation.
@@ -230,7 +243,18 @@ impl Diagnosis {
     }
 }
 
+/// Beside something unexplained no physical cause is surer than this: it may be a part of what the
+/// dictionary lacks.
+const PROVISIONAL: f64 = 0.9;
+
 impl Cause {
+    /// Takes back what cannot be known while something is left unexplained.
+    pub(super) fn make_provisional(&mut self) {
+        if !self.kind.is_of_the_record() {
+            self.confidence = self.confidence.min(PROVISIONAL);
+        }
+    }
+
     fn sentence(&self) -> String {
         match self.kind {
             Kind::Contact => return self.contact_sentence(),

@@ -61,6 +61,9 @@ pub struct RunWhitening {
 /// Harmonics averaged on each side for one covariance: at least so many, and a quarter of the
 /// harmonic's number.
 const NEIGHBOURS: usize = 12;
+/// A mean torque that scatters with more than this times the power of its neighbours drifts: eight periods of
+/// white noise show that once in 30 joints.
+const DRIFTS: f64 = 3.0;
 /// Noise below this share of a joint's rms torque is not told from the rounding of a model.
 const FLOOR: f64 = 1e-4;
 /// Highest frequency that is used, over the rate: below the end of the periods' own motion.
@@ -145,7 +148,7 @@ impl PeriodWhitening {
             if k == 0 {
                 for (j, (sd, unknown)) in sd.iter_mut().zip(&mut unknown).enumerate() {
                     let drift = scatter[0][(j, j)].re / s[(j, j)].re;
-                    if drift > 1.0 {
+                    if drift > DRIFTS {
                         *sd *= drift.sqrt();
                         // A real number per period.
                         *unknown = unknown.max(2.0 / (periods - 1) as f64);

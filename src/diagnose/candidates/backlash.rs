@@ -101,8 +101,9 @@ impl Flight {
         if self.angle_rad.abs() >= self.half_gap_rad && self.rate_rad_s * self.angle_rad > 0.0 {
             self.angle_rad = self.half_gap_rad.copysign(self.angle_rad);
             self.rate_rad_s *= -self.restitution;
-            // What leaves the flank for less than a step stays there.
-            if self.rate_rad_s.abs() < acceleration.abs() * step_s {
+            // A step adds up to a Δt to every bounce: bounces end where that keeps them alive.
+            let kept_alive = acceleration.abs() * step_s / (1.0 - self.restitution);
+            if self.rate_rad_s.abs() < kept_alive {
                 self.rate_rad_s = 0.0;
             }
         }

@@ -97,7 +97,9 @@ impl BlindWorker<'_> {
         let sensors = &drawn.simulation.scenario.sensors;
         let sd_nm = sensors.torque_sd_per_joint_nm(benchmark.plan.base.arm.dof())?;
         let gain = diagnosis.held_out.first().map(|held_out| HeldOutGain::of(held_out, &sd_nm));
-        Ok(Record { trial, case: drawn.case, answer: Answer::of(&diagnosis, gain) })
+        let hidden_arm = Model::new(drawn.simulation.plant.true_arm());
+        let truth = benchmark.plan.base.set.values(&hidden_arm.standard_parameters());
+        Ok(Record { trial, case: drawn.case, answer: Answer::of(&diagnosis, gain, &truth) })
     }
 
     /// What the diagnosis makes of the log.

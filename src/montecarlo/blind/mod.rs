@@ -14,6 +14,8 @@ mod judge;
 mod plan;
 mod record;
 mod score;
+mod share;
+mod target;
 
 pub use benchmark::{Benchmark, BlindContent, BlindError, BlindWorker};
 pub use case::{Case, Hidden, Secret};
@@ -23,6 +25,8 @@ pub(super) use plan::BlindEntry;
 pub use plan::{BlindPlan, Motion, Shares};
 pub use record::{Answer, HeldOutGain, Interval, Left, Named, Record, Records};
 pub use score::{
-    ConfidenceBin, Confusion, DESIGN_FALSE_ALARM, FamilyScore, GainBin, SAID_NOTHING,
-    SAID_UNEXPLAINED, SCORES_SCHEMA, Scores, Share, StrengthBin, Target, power,
+    ConfidenceBin, Confusion, FamilyScore, GainBin, SAID_NOTHING, SAID_UNEXPLAINED, SCORES_SCHEMA,
+    Scores, StrengthBin, power,
 };
+pub use share::Share;
+pub use target::{DESIGN_FALSE_ALARM, Target};

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::case::Case;
-use crate::diagnose::{Cause, Diagnosis, HeldOut, Kind};
+use super::share::Share;
+use crate::diagnose::{BaseParameter, Cause, Diagnosis, HeldOut, Kind};
 use crate::montecarlo::trials::{Failure, Gathered};
 
 /// A parameter with its 95 % interval.
@@ -106,11 +107,21 @@ pub struct Answer {
     pub left: Option<Left>,
     /// Gain along another motion, where it was measured.
     pub gain: Option<HeldOutGain>,
+    /// Base parameters of the extended model whose 95 % interval holds the truth.
+    pub base: Share,
+}
+
+/// 95 % of a normal distribution lie within so many σ.
+const Z_95: f64 = 1.959_963_984_540_054;
+
+/// Base parameters whose 95 % interval holds the truth.
+fn covered(estimates: &[BaseParameter], truth: &[f64]) -> Share {
+    Share::of(estimates.iter().zip(truth), |(p, truth)| (p.value - **truth).abs() <= Z_95 * p.sigma)
 }
 
 impl Answer {
-    /// Of a diagnosis.
-    pub fn of(diagnosis: &Diagnosis, gain: Option<HeldOutGain>) -> Self {
+    /// Of a diagnosis; `truth` are the base parameters of the arm that was hidden.
+    pub fn of(diagnosis: &Diagnosis, gain: Option<HeldOutGain>, truth: &[f64]) -> Self {
         Self {
             named: diagnosis.causes.iter().map(Named::of).collect(),
             left: diagnosis.unexplained.as_ref().map(|u| Left {
@@ -118,6 +129,7 @@ impl Answer {
                 joint: u.joint,
                 rms_nm: u.rms_nm,
             }),
+            base: covered(&diagnosis.base_parameters, truth),
             gain: gain.filter(|g| g.before.is_finite() && g.after.is_finite()),
         }
     }

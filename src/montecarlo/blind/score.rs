@@ -3,13 +3,15 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
-use statrs::distribution::{Beta, ContinuousCDF, Normal};
+use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::benchmark::BlindContent;
-use super::case::{Case, Secret};
+use super::case::Secret;
 use super::family::Judged;
 use super::judge::{Outcome, is_at, is_right};
 use super::record::{Named, Record};
+use super::share::Share;
+use super::target::{DESIGN_FALSE_ALARM, Target, targets};
 use crate::diagnose::{Kind, candidates};
 use crate::montecarlo::calibration::Verdict;
 use crate::montecarlo::shard::Merged;
@@ -18,85 +20,10 @@ use crate::montecarlo::trials::Failure;
 /// Format of the JSON output.
 pub const SCORES_SCHEMA: &str = "armid.blind/1";
 
-/// Fewer trials than this say nothing about a share.
-const FEWEST: u64 = 20;
 /// Edges of the bins of √λ.
 const STRENGTHS: [f64; 12] = [0.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 30.0, 40.0, 60.0];
 /// Edges of the bins of stated confidence.
 const CONFIDENCES: [f64; 8] = [0.0, 0.5, 0.8, 0.9, 0.95, 0.99, 0.999, 1.0];
-/// Chance that a log without faults is given a cause, as it is designed.
-pub const DESIGN_FALSE_ALARM: f64 = 0.003;
-
-/// So many of so many, and what that says about the chance behind it.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct Share {
-    /// Trials of the wanted kind.
-    pub count: u64,
-    /// Trials.
-    pub of: u64,
-}
-
-impl Share {
-    /// Counts those of `all` that are `wanted`.
-    fn of<T>(all: impl IntoIterator<Item = T>, mut wanted: impl FnMut(&T) -> bool) -> Self {
-        let mut share = Self::default();
-        for one in all {
-            share.of += 1;
-            share.count += u64::from(wanted(&one));
-        }
-        share
-    }
-
-    /// The share; NaN of none.
-    pub fn value(&self) -> f64 {
-        self.count as f64 / self.of as f64
-    }
-
-    /// One-sided bounds of Clopper and Pearson (1934) at confidence 1 − `alpha` each.
-    pub fn bounds(&self, alpha: f64) -> [f64; 2] {
-        let (k, n) = (self.count as f64, self.of as f64);
-        let quantile =
-            |a: f64, b: f64, p: f64| Beta::new(a, b).map(|beta| beta.inverse_cdf(p)).ok();
-        // Without successes the lower bound is 0, without failures the upper one is 1.
-        let low = if self.count == 0 { None } else { quantile(k, n - k + 1.0, alpha) };
-        let high = if self.count == self.of { None } else { quantile(k + 1.0, n - k, 1.0 - alpha) };
-        [low.unwrap_or(0.0), high.unwrap_or(1.0)]
-    }
-}
-
-/// One target.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Target {
-    /// What is counted.
-    pub what: &'static str,
-    /// The count.
-    pub share: Share,
-    /// Measured value: the share, or its bound where the target is about that.
-    pub measured: f64,
-    /// Interval that holds the chance behind the share with 95 %.
-    pub interval: [f64; 2],
-    /// Least and greatest value that meets the target.
-    pub target: [f64; 2],
-    /// Whether the measured value does.
-    pub verdict: Verdict,
-}
-
-impl Target {
-    fn new(what: &'static str, share: Share, target: [f64; 2]) -> Self {
-        let measured = share.value();
-        Self::about(what, share, measured, target)
-    }
-
-    fn about(what: &'static str, share: Share, measured: f64, target: [f64; 2]) -> Self {
-        let verdict = match measured {
-            _ if share.of < FEWEST => Verdict::NotEvaluated,
-            m if m >= target[0] && m <= target[1] => Verdict::Pass,
-            _ => Verdict::Fail,
-        };
-        let interval = share.bounds(0.025);
-        Self { what, share, measured, interval, target, verdict }
-    }
-}
 
 /// Cases of a range of √λ.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -212,65 +139,6 @@ pub struct Scores {
     pub verdict: Verdict,
 }
 
-impl Case {
-    /// What the effects are judged by together: √λ, or √λ_sim of one that the model absorbs.
-    pub fn strength(&self) -> Option<f64> {
-        match &self.hidden[..] {
-            [only] => only.strength,
-            [] => None,
-            _ => Some(self.sqrt_lambda),
-        }
-    }
-
-    fn is_one(&self, judged: Judged) -> bool {
-        self.secret == Secret::One && self.hidden.iter().all(|h| h.judged == judged)
-    }
-
-    fn is_from(&self, low: f64) -> bool {
-        self.strength().is_some_and(|s| s >= low)
-    }
-}
-
-impl Record {
-    fn is_silent(&self) -> bool {
-        self.answer.named.is_empty() && self.answer.left.is_none()
-    }
-
-    fn first_is(&self, good: impl Fn(&Named, &super::case::Hidden) -> bool) -> bool {
-        match (self.answer.named.first(), self.case.hidden.first()) {
-            (Some(named), Some(hidden)) => good(named, hidden),
-            _ => false,
-        }
-    }
-
-    /// `(covered, all)` of the parameters of what was named by its own name.
-    fn covered(&self) -> Share {
-        let mut share = Share::default();
-        let Some(hidden) = self.case.hidden.first() else { return share };
-        let own = |n: &&Named| n.kind == hidden.kind && n.joint == hidden.joint;
-        let Some(named) = self.answer.named.first().filter(own) else { return share };
-        for (name, truth) in hidden.effect.parameters() {
-            let (Some(truth), Some(p)) = (truth.as_f64(), named.parameters.get(&name)) else {
-                continue;
-            };
-            // An interval without width is no claim about chance.
-            if p.high <= p.low {
-                continue;
-            }
-            let truth = if name.ends_with("phase_rad") { same_turn(truth, p.value) } else { truth };
-            share.of += 1;
-            share.count += u64::from(p.low <= truth && truth <= p.high);
-        }
-        share
-    }
-}
-
-/// The angle `a` plus the turns that bring it closest to `b`.
-fn same_turn(a: f64, b: f64) -> f64 {
-    let turn = std::f64::consts::TAU;
-    a + turn * ((b - a) / turn).round()
-}
-
 impl Scores {
     /// Of merged shards.
     pub fn of(merged: &Merged<BlindContent>) -> Self {
@@ -330,99 +198,8 @@ impl Scores {
     }
 }
 
-fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
-    let all = &merged.tally.records;
-    let is_right = |r: &&Record| r.outcome() == Outcome::Right;
-    let one = |judged: Judged, [low, high]: [f64; 2]| {
-        all.iter().filter(move |r| {
-            r.case.is_one(judged) && r.case.strength().is_some_and(|s| s >= low && s < high)
-        })
-    };
-    let above = |low: f64| [low, f64::INFINITY];
-    let alarms = Share::of(all.iter().filter(|r| r.case.secret == Secret::Nothing), |r| {
-        r.outcome() != Outcome::Right
-    });
-    let two = all.iter().filter(|r| {
-        r.case.secret == Secret::Two
-            && r.case.hidden.iter().all(|h| h.strength.is_some_and(|s| s >= 15.0))
-            && r.case.cosine.is_some_and(|c| c.abs() < 0.5)
-    });
-    let withheld = |low: f64| {
-        let of_them =
-            all.iter().filter(move |r| r.case.secret == Secret::Withheld && r.case.is_from(low));
-        Share::of(of_them, |r| r.outcome() == Outcome::Wrong)
-    };
-    let sure = causes(all).filter(|(named, _)| named.confidence >= 0.99);
-    let mut covered = Share::default();
-    for share in all.iter().filter(|r| r.case.secret == Secret::One).map(Record::covered) {
-        covered.count += share.count;
-        covered.of += share.of;
-    }
-    let large = all.iter().filter(|r| r.case.is_from(40.0)).filter_map(|r| r.answer.gain);
-    let residual = Judged::Residual;
-    vec![
-        Target::new("clean: a false alarm", alarms, [0.0, DESIGN_FALSE_ALARM]),
-        Target::about(
-            "clean: one-sided 95 % upper bound of the false alarms",
-            alarms,
-            alarms.bounds(0.05)[1],
-            [0.0, 0.01],
-        ),
-        Target::new(
-            "one effect, √λ ≥ 8: kind (class) and joint right",
-            Share::of(one(residual, above(8.0)), is_right),
-            [0.97, 1.0],
-        ),
-        Target::new(
-            "one effect, √λ 6 … 8: kind (class) and joint right",
-            Share::of(one(residual, [6.0, 8.0]), is_right),
-            [0.90, 1.0],
-        ),
-        Target::new(
-            "one effect, √λ ≥ 8: joint right",
-            Share::of(one(residual, above(8.0)), |r| r.first_is(is_at)),
-            [0.99, 1.0],
-        ),
-        Target::new(
-            "one effect against a simulation, √λ_sim ≥ 8: kind (class) and joint right",
-            Share::of(one(Judged::Simulation, above(8.0)), is_right),
-            [0.97, 1.0],
-        ),
-        Target::new(
-            "causes named with confidence ≥ 0.99: right",
-            Share::of(sure, |(_, right)| *right),
-            [0.99, 1.0],
-        ),
-        Target::new(
-            "two effects, both √λ ≥ 15, |cos| < 0.5: both named",
-            Share::of(two, is_right),
-            [0.90, 1.0],
-        ),
-        Target::new(
-            "family withheld, √λ ≥ 15: a wrong name without doubt",
-            withheld(15.0),
-            [0.0, 0.05],
-        ),
-        Target::new(
-            "family withheld, √λ ≥ 30: a wrong name without doubt",
-            withheld(30.0),
-            [0.0, 0.01],
-        ),
-        Target::new(
-            "95 % intervals of a named effect's parameters that hold the truth",
-            covered,
-            [0.93, 0.97],
-        ),
-        Target::new(
-            "√λ ≥ 40: at least 95 % of the explainable mean square removed on another motion",
-            Share::of(large, |gain| gain.share() >= 0.95),
-            [0.5, 1.0],
-        ),
-    ]
-}
-
 /// All causes named where no family is withheld, and whether each is something that was hidden.
-fn causes(all: &[Record]) -> impl Iterator<Item = (&Named, bool)> {
+pub fn causes(all: &[Record]) -> impl Iterator<Item = (&Named, bool)> {
     all.iter().filter(|r| r.case.secret != Secret::Withheld).flat_map(|r| {
         r.answer.named.iter().map(|n| (n, r.case.hidden.iter().any(|h| is_right(n, h))))
     })
@@ -587,22 +364,6 @@ fn median(mut values: Vec<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Rule of three: no event in n trials leaves at most 1 − 0.05^(1/n), about 3/n.
-    #[test]
-    fn bounds_are_those_of_clopper_and_pearson() {
-        let none = Share { count: 0, of: 1000 };
-        assert!((none.bounds(0.05)[1] - (1.0 - 0.05f64.powf(1e-3))).abs() < 1e-9);
-        assert_eq!(none.bounds(0.05)[0], 0.0);
-        // Published example: 10 of 100, two-sided 95 %: 4.90 … 17.62 %.
-        let [low, high] = Share { count: 10, of: 100 }.bounds(0.025);
-        assert!((low - 0.0490).abs() < 1e-4 && (high - 0.1762).abs() < 1e-4, "{low} {high}");
-    }
-
-    #[test]
-    fn angles_are_compared_on_the_same_turn() {
-        assert!((same_turn(3.1, -3.1) - (3.1 - std::f64::consts::TAU)).abs() < 1e-12);
-    }
 
     #[test]
     fn half_the_effects_at_the_threshold_are_found() {

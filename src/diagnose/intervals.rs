@@ -1,0 +1,126 @@
+//! How well the numbers of an extended model are known.
+
+use std::collections::BTreeMap;
+
+use super::candidates::{Quantity, Search, Shape};
+use super::extension::{Effect, Extension};
+use super::image::{Image, Span};
+use super::selection::Kept;
+use super::study::Study;
+use super::verdict::{BaseParameter, Estimate};
+use crate::base::BaseSet;
+
+/// Relative step of the derivative by a nonlinear parameter.
+const STEP: f64 = 1e-3;
+
+/// What `effect` adds to the whitened equations per unit of its coefficients, and of its nonlinear parameter
+/// where it has one.
+fn tangents(study: &Study, effect: &Effect) -> Vec<Image> {
+    let family = &study.families[effect.family];
+    let images = |value: f64| -> Vec<Image> {
+        let shape = Shape { value, ..effect.shape };
+        let columns = family.columns(&study.scene, effect.site, shape);
+        let used = columns.iter().take(effect.coefficients.len());
+        used.map(|column| study.whitening.image(column)).collect()
+    };
+    let mut out = images(effect.shape.value);
+    let step = STEP * effect.shape.value.abs();
+    if family.search() != Search::None && step > 0.0 {
+        let [above, below] = [1.0, -1.0].map(|sign| images(effect.shape.value + sign * step));
+        let mut slope = Image::default();
+        for ((mut above, below), b) in above.into_iter().zip(below).zip(&effect.coefficients) {
+            above.add(-1.0, &below);
+            above.scale(0.5 * b / step);
+            if slope.mean.is_empty() {
+                slope = above;
+            } else {
+                slope.add(1.0, &above);
+            }
+        }
+        out.push(slope);
+    }
+    out
+}
+
+/// Base parameters beside the effects of `extension` with their σ, the effects' own numbers unknown as well:
+/// the block of (XᵀX)⁻¹ that belongs to them, X with the tangents of the effects.
+pub fn base(study: &Study, set: &BaseSet, extension: &Extension) -> Vec<BaseParameter> {
+    let effects = extension.effects.iter().flat_map(|effect| tangents(study, effect));
+    let mut span = Span::default();
+    let mut taken = 0;
+    for image in effects {
+        taken += usize::from(span.push(&image));
+    }
+    for column in &study.null_columns {
+        span.push(column);
+    }
+    let covariance = study.statistic.covariance(&span, &study.torque);
+    (0..set.rank())
+        .map(|k| BaseParameter {
+            name: set.name(k).to_owned(),
+            value: extension.theta[k],
+            sigma: match covariance.get((taken + k, taken + k)) {
+                Some(variance) => variance.max(0.0).sqrt(),
+                None => f64::NAN,
+            },
+        })
+        .collect()
+}
+
+/// Physical parameters of a cause with 95 % intervals by the delta method: coefficients and shape are
+/// linearised together, the other causes' coefficients free.
+pub fn physical(
+    study: &Study,
+    kept: &Kept,
+    effect: &Effect,
+    index: usize,
+) -> BTreeMap<&'static str, Estimate> {
+    let (others, residual) = kept.without(Some(index));
+    let family = &study.families[effect.family];
+    let outside_null = |mut image: Image| {
+        study.null.residualise(&mut image);
+        image
+    };
+    let tangents: Vec<Image> = tangents(study, effect).into_iter().map(outside_null).collect();
+    let span = Span::outside(&others, &tangents);
+    let covariance = study.statistic.covariance(&span, &residual);
+    let half = study.statistic.quantile_95();
+    let at = |b: &[f64], value: f64| -> Vec<Quantity> {
+        family.quantities(&study.scene, effect.site, Shape { value, ..effect.shape }, b)
+    };
+    let centre = at(&effect.coefficients, effect.shape.value);
+    let k = effect.coefficients.len();
+    let mut gradients = vec![vec![0.0; span.len()]; centre.len()];
+    for parameter in 0..span.len() {
+        let sigma = covariance[(parameter, parameter)].max(0.0).sqrt();
+        let h = 1e-3 * sigma.max(f64::MIN_POSITIVE);
+        let moved = |sign: f64| {
+            let mut b = effect.coefficients.clone();
+            let mut value = effect.shape.value;
+            if parameter < k {
+                b[parameter] += sign * h;
+            } else {
+                value += sign * h;
+            }
+            at(&b, value)
+        };
+        for (g, (up, down)) in gradients.iter_mut().zip(moved(1.0).iter().zip(moved(-1.0))) {
+            let mut difference = up.value - down.value;
+            if up.unit == "rad" && difference.abs() > std::f64::consts::PI {
+                difference -= difference.signum() * std::f64::consts::TAU;
+            }
+            g[parameter] = difference / (2.0 * h);
+        }
+    }
+    centre
+        .iter()
+        .zip(&gradients)
+        .map(|(quantity, gradient)| {
+            let g = nalgebra::DVector::from_column_slice(gradient);
+            let variance = (g.transpose() * &covariance * &g)[(0, 0)].max(0.0);
+            let reach = half * variance.sqrt();
+            let ci95 = [quantity.value - reach, quantity.value + reach];
+            (quantity.name, Estimate { value: quantity.value, unit: quantity.unit, ci95 })
+        })
+        .collect()
+}

@@ -1,0 +1,155 @@
+//! What a blind benchmark is held to.
+
+use serde::Serialize;
+
+use super::benchmark::BlindContent;
+use super::case::Secret;
+use super::family::Judged;
+use super::judge::{Outcome, is_at};
+use super::record::Record;
+use super::score::causes;
+use super::share::Share;
+use crate::montecarlo::calibration::Verdict;
+use crate::montecarlo::shard::Merged;
+
+/// Fewer trials than this say nothing about a share.
+const FEWEST: u64 = 20;
+/// Chance that a log without faults is given a cause, as it is designed.
+pub const DESIGN_FALSE_ALARM: f64 = 0.003;
+
+/// One target.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Target {
+    /// What is counted.
+    pub what: &'static str,
+    /// The count.
+    pub share: Share,
+    /// Measured value: the share, or its bound where the target is about that.
+    pub measured: f64,
+    /// Interval that holds the chance behind the share with 95 %.
+    pub interval: [f64; 2],
+    /// Least and greatest value that meets the target.
+    pub target: [f64; 2],
+    /// Whether the measured value does.
+    pub verdict: Verdict,
+}
+
+impl Target {
+    fn new(what: &'static str, share: Share, target: [f64; 2]) -> Self {
+        let measured = share.value();
+        Self::about(what, share, measured, target)
+    }
+
+    fn about(what: &'static str, share: Share, measured: f64, target: [f64; 2]) -> Self {
+        let verdict = match measured {
+            _ if share.of < FEWEST => Verdict::NotEvaluated,
+            m if m >= target[0] && m <= target[1] => Verdict::Pass,
+            _ => Verdict::Fail,
+        };
+        let interval = share.bounds(0.025);
+        Self { what, share, measured, interval, target, verdict }
+    }
+}
+
+/// Every target, and what the trials say about it.
+pub fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
+    let all = &merged.tally.records;
+    let is_right = |r: &&Record| r.outcome() == Outcome::Right;
+    let one = |judged: Judged, [low, high]: [f64; 2]| {
+        all.iter().filter(move |r| {
+            r.case.is_one(judged) && r.case.strength().is_some_and(|s| s >= low && s < high)
+        })
+    };
+    let above = |low: f64| [low, f64::INFINITY];
+    let alarms = Share::of(all.iter().filter(|r| r.case.secret == Secret::Nothing), |r| {
+        r.outcome() != Outcome::Right
+    });
+    let two = all.iter().filter(|r| {
+        r.case.secret == Secret::Two
+            && r.case.hidden.iter().all(|h| h.strength.is_some_and(|s| s >= 15.0))
+            && r.case.cosine.is_some_and(|c| c.abs() < 0.5)
+    });
+    let withheld = |low: f64| {
+        let of_them =
+            all.iter().filter(move |r| r.case.secret == Secret::Withheld && r.case.is_from(low));
+        Share::of(of_them, |r| r.outcome() == Outcome::Wrong)
+    };
+    let residual = Judged::Residual;
+    let sure = causes(all).filter(|(named, _)| named.confidence >= 0.99);
+    let mut covered = Share::default();
+    for share in all.iter().filter(|r| r.case.secret == Secret::One).map(Record::covered) {
+        covered.count += share.count;
+        covered.of += share.of;
+    }
+    let is_one = |r: &&Record| r.case.is_one(residual) && r.outcome() == Outcome::Right;
+    let mut base = Share::default();
+    for covered in all.iter().filter(is_one).map(|r| r.answer.base) {
+        base.count += covered.count;
+        base.of += covered.of;
+    }
+    let large = all.iter().filter(|r| r.case.is_from(40.0)).filter_map(|r| r.answer.gain);
+    vec![
+        Target::new("clean: a false alarm", alarms, [0.0, DESIGN_FALSE_ALARM]),
+        Target::about(
+            "clean: one-sided 95 % upper bound of the false alarms",
+            alarms,
+            alarms.bounds(0.05)[1],
+            [0.0, 0.01],
+        ),
+        Target::new(
+            "one effect, √λ ≥ 8: kind (class) and joint right",
+            Share::of(one(residual, above(8.0)), is_right),
+            [0.97, 1.0],
+        ),
+        Target::new(
+            "one effect, √λ 6 … 8: kind (class) and joint right",
+            Share::of(one(residual, [6.0, 8.0]), is_right),
+            [0.90, 1.0],
+        ),
+        Target::new(
+            "one effect, √λ ≥ 8: joint right",
+            Share::of(one(residual, above(8.0)), |r| r.first_is(is_at)),
+            [0.99, 1.0],
+        ),
+        Target::new(
+            "one effect against a simulation, √λ_sim ≥ 8: kind (class) and joint right",
+            Share::of(one(Judged::Simulation, above(8.0)), is_right),
+            [0.97, 1.0],
+        ),
+        Target::new(
+            "causes named with confidence ≥ 0.99: right",
+            Share::of(sure, |(_, right)| *right),
+            [0.99, 1.0],
+        ),
+        Target::new(
+            "two effects, both √λ ≥ 15, |cos| < 0.5: both named",
+            Share::of(two, is_right),
+            [0.90, 1.0],
+        ),
+        Target::new(
+            "family withheld, √λ ≥ 15: a wrong name without doubt",
+            withheld(15.0),
+            [0.0, 0.05],
+        ),
+        Target::new(
+            "family withheld, √λ ≥ 30: a wrong name without doubt",
+            withheld(30.0),
+            [0.0, 0.01],
+        ),
+        Target::new(
+            "95 % intervals of a named effect's parameters that hold the truth",
+            covered,
+            [0.93, 0.97],
+        ),
+        Target::new(
+            "one effect, named rightly: 95 % intervals of the base parameters that hold the truth",
+            base,
+            [0.935, 0.965],
+        ),
+        Target::new(
+            "√λ ≥ 40: at least 95 % of the explainable mean square removed on another motion",
+            Share::of(large, |gain| gain.share() >= 0.95),
+            [0.5, 1.0],
+        ),
+    ]
+}
