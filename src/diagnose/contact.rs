@@ -15,14 +15,15 @@ use crate::robot::JointSignals;
 use crate::signal::{Resampler, Scratch, SignalError, ZeroPhase, find_period, natural_rate_hz};
 
 /// Deviations of this many robust σ belong to a contact. Between repetitions of a real arm without
-/// contacts they stay below 6; Gaussian noise passes 8 once in 10¹⁵ samples.
-const FAR: f64 = 8.0;
+/// contacts they stay below 6; Gaussian noise passes 6.5 once in 10¹⁰ samples.
+const FAR: f64 = 6.5;
 /// The same for a single run, whose deviations are mostly errors of the model.
 const FAR_OF_MODEL: f64 = 12.0;
 /// A contact lasts while the deviation is above this share of the threshold.
 const NEAR: f64 = 0.5;
-/// Low-pass on the deviations, Hz: a collision lasts a tenth of a second.
-const CUTOFF_HZ: f64 = 10.0;
+/// Low-passes on the deviations, Hz: a collision lasts a tenth of a second, a hand that leans on the arm a
+/// few seconds, and is seen deepest in the noise where the low-pass is as long as it is.
+const CUTOFFS_HZ: [f64; 4] = [10.0, 4.0, 1.6, 0.7];
 const ORDER: usize = 2;
 /// Parts closer than this are one contact, s.
 const TOGETHER_S: f64 = 0.3;
@@ -30,6 +31,8 @@ const TOGETHER_S: f64 = 0.3;
 const MARGIN_S: f64 = 0.2;
 /// The median over fewer periods is moved by one contact.
 const FEWEST_PERIODS: usize = 3;
+/// Stretches of a period that are compared as wholes.
+const STRETCHES: usize = 10;
 /// Joints that differ by less than this share of their rms amplitude, in the median, move alike.
 const SAME_MOTION: f64 = 0.02;
 /// σ over the median of |x| for Gaussian x.
@@ -44,6 +47,8 @@ const REVERSAL_S: f64 = 0.25;
 #[derive(Debug, Clone, PartialEq)]
 struct Touch {
     samples: Range<usize>,
+    /// Low-pass behind which it was seen, Hz.
+    cutoff_hz: f64,
     /// Per joint: largest deviation and its σ, Nm; `None` where the joint did not feel it.
     peaks: Vec<Option<(f64, f64)>>,
 }
@@ -77,30 +82,38 @@ pub fn between_periods(
         return Ok(None);
     }
     let torque = grid.straight(m.torque_nm)?;
-    let filter = ZeroPhase::new(CUTOFF_HZ.min(0.2 * rate_hz), ORDER, rate_hz)?;
     let (joints, n) = (torque.joints(), torque.samples());
-    let mut raw = JointSignals::zeros(joints, n);
-    let mut smooth = JointSignals::zeros(joints, n);
-    let mut counts = vec![vec![false; n]; joints];
-    let mut sigma = vec![0.0; joints];
-    // The low-pass knows one side only of the record's ends.
-    let edge = ((rate_hz / CUTOFF_HZ) as usize).min(n / 2);
-    for (j, counts) in counts.iter_mut().enumerate() {
-        let mut values = torque.joint(j).to_vec();
-        filter.filter_in_place(&mut values, &mut Scratch::default())?;
-        for k in window.clone() {
-            raw.joint_mut(j)[k] = deviation(torque.joint(j), k, refined, &window);
-            smooth.joint_mut(j)[k] = deviation(&values, k, refined, &window);
-            counts[k] = (edge..n - edge).contains(&k) && !left_out.contains(&j);
+    let mut found: Vec<Touch> = Vec::new();
+    for cutoff_hz in CUTOFFS_HZ {
+        let filter = ZeroPhase::new(cutoff_hz.min(0.2 * rate_hz), ORDER, rate_hz)?;
+        let mut smooth = JointSignals::zeros(joints, n);
+        let mut counts = vec![vec![false; n]; joints];
+        let mut sigma = vec![0.0; joints];
+        // The low-pass knows one side only of the record's ends.
+        let edge = ((rate_hz / cutoff_hz) as usize).min(n / 2);
+        for j in (0..joints).filter(|j| !left_out.contains(j)) {
+            let mut values = torque.joint(j).to_vec();
+            filter.filter_in_place(&mut values, &mut Scratch::default())?;
+            for k in window.clone() {
+                smooth.joint_mut(j)[k] = deviation(&values, k, refined, &window);
+                counts[j][k] = (edge..n - edge).contains(&k);
+            }
+            // Far apart, so that a drift counts as scatter.
+            let lag = ((periods / 2) as f64 * refined) as usize;
+            let pairs =
+                (window.start..window.end - lag).map(|k| (values[k + lag] - values[k]).abs());
+            sigma[j] = ROBUST * median(&mut pairs.collect::<Vec<_>>()) / std::f64::consts::SQRT_2;
         }
-        // Far apart, so that a drift counts as scatter.
-        let lag = ((periods / 2) as f64 * refined) as usize;
-        let pairs = (window.start..window.end - lag).map(|k| (values[k + lag] - values[k]).abs());
-        sigma[j] = ROBUST * median(&mut pairs.collect::<Vec<_>>()) / std::f64::consts::SQRT_2;
+        for touch in touches(&smooth, &counts, &sigma, rate_hz, cutoff_hz, FAR) {
+            // What lasts for half a period is no contact: friction that drifts, or another motion.
+            let is_short = (touch.samples.len() as f64) < 0.5 * refined;
+            if is_short && found.iter().all(|known| !known.overlaps(&touch)) {
+                found.push(touch);
+            }
+        }
     }
-    let mut touches = touches(&smooth, &counts, &sigma, rate_hz, FAR);
-    // What lasts for half a period is no contact: friction that drifts, or another motion.
-    touches.retain(|touch| (touch.samples.len() as f64) < 0.5 * refined);
+    let mut touches = found;
+    touches.sort_by_key(|touch| touch.samples.start);
     if touches.is_empty() {
         return Ok(None);
     }
@@ -115,8 +128,8 @@ pub fn between_periods(
     for j in 0..joints {
         for (value, &t) in torque_nm.joint_mut(j).iter_mut().zip(m.time_s) {
             let k = time_s.partition_point(|g| *g < t).min(n - 1);
-            if aside[k] {
-                *value -= raw.joint(j)[k];
+            if aside[k] && window.contains(&k) {
+                *value -= deviation(torque.joint(j), k, refined, &window);
             }
         }
     }
@@ -155,33 +168,35 @@ pub fn beside_model(
             ROBUST * median(&mut sizes)
         })
         .collect();
-    let touches = touches(error_nm, &counts, &sigma, rate_hz, FAR_OF_MODEL);
+    let touches = touches(error_nm, &counts, &sigma, rate_hz, CUTOFFS_HZ[0], FAR_OF_MODEL);
     touches.iter().map(|touch| touch.cause(time_s)).collect()
 }
 
-/// `window`, longer by whole periods in which most of the motion repeats: a contact moves the arm for a
-/// moment, and that period is then not among those that repeat throughout.
+/// `window`, longer by stretches in which most of the motion repeats: a contact moves the arm for a moment,
+/// and what is before or behind it is then not among what repeats throughout.
 fn with_disturbed_periods(q_rad: &JointSignals, period: f64, window: Range<usize>) -> Range<usize> {
     let step = period.round() as usize;
+    let stretch = (step / STRETCHES).max(1);
     let amplitude = |q: &[f64]| {
         let mean = q.iter().sum::<f64>() / q.len() as f64;
         (q.iter().map(|q| (q - mean).powi(2)).sum::<f64>() / q.len() as f64).sqrt()
     };
     let limits: Vec<f64> =
         (0..q_rad.joints()).map(|j| SAME_MOTION * amplitude(q_rad.joint(j)) + 1e-9).collect();
+    // Whether the stretch from `from` on is like the one from `to` on.
     let repeats = |from: usize, to: usize| {
         limits.iter().enumerate().all(|(j, limit)| {
             let q = q_rad.joint(j);
-            let differences = (0..step).map(|k| (q[from + k] - q[to + k]).abs());
+            let differences = (0..stretch).map(|k| (q[from + k] - q[to + k]).abs());
             median(&mut differences.collect::<Vec<_>>()) < *limit
         })
     };
     let Range { mut start, mut end } = window;
-    while start >= step && repeats(start - step, start) {
-        start -= step;
+    while start >= stretch && repeats(start - stretch, start - stretch + step) {
+        start -= stretch;
     }
-    while end + step <= q_rad.samples() && repeats(end, end - step) {
-        end += step;
+    while end + stretch <= q_rad.samples() && end >= step && repeats(end, end - step) {
+        end += stretch;
     }
     start..end
 }
@@ -214,6 +229,7 @@ fn touches(
     counts: &[Vec<bool>],
     sigma: &[f64],
     rate_hz: f64,
+    cutoff_hz: f64,
     far: f64,
 ) -> Vec<Touch> {
     let (joints, n) = (deviation_nm.joints(), deviation_nm.samples());
@@ -247,13 +263,17 @@ fn touches(
             })
             .collect();
         if peaks.iter().any(Option::is_some) {
-            out.push(Touch { samples, peaks });
+            out.push(Touch { samples, cutoff_hz, peaks });
         }
     }
     out
 }
 
 impl Touch {
+    fn overlaps(&self, other: &Self) -> bool {
+        self.samples.start < other.samples.end && other.samples.start < self.samples.end
+    }
+
     fn cause(&self, time_s: &[f64]) -> Cause {
         let felt: Vec<(usize, f64, f64)> = self
             .peaks
@@ -264,14 +284,17 @@ impl Touch {
         let (_, peak_nm, sigma) =
             felt.iter().copied().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).unwrap_or_default();
         // A low-pass moves an edge by up to a quarter of its shortest period.
-        let blur_s = 0.25 / CUTOFF_HZ;
+        let blur_s = 0.25 / self.cutoff_hz;
         let instant = |k: usize| {
             let t = time_s[k];
             Estimate { value: t, unit: "s", ci95: [t - blur_s, t + blur_s] }
         };
-        let reach = 1.96 * sigma;
-        let peak =
-            Estimate { value: peak_nm, unit: "Nm", ci95: [peak_nm - reach, peak_nm + reach] };
+        // A bump as long as the low-pass loses up to a third of its height.
+        let shrunk = if self.cutoff_hz < CUTOFFS_HZ[0] { 1.5 } else { 1.0 };
+        let reach = (1.96 * sigma).copysign(peak_nm);
+        let (near, far) = (peak_nm - reach, shrunk * (peak_nm + reach));
+        let ci95 = [near.min(far), near.max(far)];
+        let peak = Estimate { value: peak_nm, unit: "Nm", ci95 };
         let joints: Vec<String> =
             felt.iter().map(|(j, nm, _)| format!("joint {j} by {nm:+.1} Nm")).collect();
         Cause {
@@ -343,7 +366,7 @@ mod tests {
         assert_eq!(repeated.causes.len(), 1);
         let cause = &repeated.causes[0];
         assert_eq!(cause.joint, Some(1));
-        // The push is above half its threshold of 8 σ inside 24.0 … 24.4 s, and peaks at 6 Nm.
+        // The push is above half its threshold inside 24.0 … 24.4 s, and peaks at 6 Nm.
         assert!((24.0..24.2).contains(&cause.parameters["start_s"].value));
         assert!((24.2..24.4).contains(&cause.parameters["end_s"].value));
         assert!((cause.parameters["peak_nm"].value - 6.0).abs() < 1.0);

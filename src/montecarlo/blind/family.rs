@@ -212,7 +212,8 @@ impl Family {
                 Effect::LoadFriction(LoadFriction { joint, mu })
             }),
             Kind::Presliding => {
-                Recipe::growing(1e-3, [1.0 / 30_000.0, 1.0 / 30.0], 1.0, move |s| {
+                // Bristles of gears give way by 0.1 mrad and more.
+                Recipe::growing(1e-3, [1.0 / 10_000.0, 1.0 / 30.0], 1.0, move |s| {
                     Effect::Presliding(Presliding { joint, stiffness_per_rad: 1.0 / s })
                 })
             }
@@ -252,8 +253,9 @@ impl Family {
                     })
                 })
             }
-            // Each crossing of the gap leaves the rotor alone for a moment: seen long before the angle is.
-            Kind::Backlash => Recipe::growing(1e-5, [1e-7, 0.02], 0.6, move |gap_rad| {
+            // Each crossing of the gap leaves the rotor alone for a moment: seen before the angle is. Play
+            // below the encoder's noise is none.
+            Kind::Backlash => Recipe::growing(2e-5, [2e-5, 0.02], 0.6, move |gap_rad| {
                 Effect::Backlash(Backlash {
                     joint,
                     gap_rad,
