@@ -35,6 +35,8 @@ const FEWEST_PERIODS: usize = 3;
 const STRETCHES: usize = 10;
 /// Joints that differ by less than this share of their rms amplitude, in the median, move alike.
 const SAME_MOTION: f64 = 0.02;
+/// The same, at every instant of a stretch: more than a weak contact moves the arm, less than a run-in.
+const NO_CONTACT: f64 = 2e-3;
 /// σ over the median of |x| for Gaussian x.
 const ROBUST: f64 = 1.4826;
 /// Gaps up to this many steps are bridged.
@@ -89,14 +91,15 @@ pub fn between_periods(
         let mut smooth = JointSignals::zeros(joints, n);
         let mut counts = vec![vec![false; n]; joints];
         let mut sigma = vec![0.0; joints];
-        // The low-pass knows one side only of the record's ends.
-        let edge = ((rate_hz / cutoff_hz) as usize).min(n / 2);
+        // Behind the low-pass the window's ends feel what lies outside it: a run-in, or nothing.
+        let edge = ((rate_hz / cutoff_hz) as usize).min(window.len() / 2);
+        let inner = window.start + edge..window.end - edge;
         for j in (0..joints).filter(|j| !left_out.contains(j)) {
             let mut values = torque.joint(j).to_vec();
             filter.filter_in_place(&mut values, &mut Scratch::default())?;
             for k in window.clone() {
                 smooth.joint_mut(j)[k] = deviation(&values, k, refined, &window);
-                counts[j][k] = (edge..n - edge).contains(&k);
+                counts[j][k] = inner.contains(&k);
             }
             // Far apart, so that a drift counts as scatter.
             let lag = ((periods / 2) as f64 * refined) as usize;
@@ -172,31 +175,35 @@ pub fn beside_model(
     touches.iter().map(|touch| touch.cause(time_s)).collect()
 }
 
-/// `window`, longer by stretches in which most of the motion repeats: a contact moves the arm for a moment,
-/// and what is before or behind it is then not among what repeats throughout.
+/// `window`, longer by whole periods in which most of the motion repeats (a contact moves the arm for a
+/// moment, and that period is then not among those that repeat throughout), and by stretches in which all of
+/// it nearly does.
 fn with_disturbed_periods(q_rad: &JointSignals, period: f64, window: Range<usize>) -> Range<usize> {
     let step = period.round() as usize;
-    let stretch = (step / STRETCHES).max(1);
     let amplitude = |q: &[f64]| {
         let mean = q.iter().sum::<f64>() / q.len() as f64;
         (q.iter().map(|q| (q - mean).powi(2)).sum::<f64>() / q.len() as f64).sqrt()
     };
-    let limits: Vec<f64> =
-        (0..q_rad.joints()).map(|j| SAME_MOTION * amplitude(q_rad.joint(j)) + 1e-9).collect();
-    // Whether the stretch from `from` on is like the one from `to` on.
-    let repeats = |from: usize, to: usize| {
-        limits.iter().enumerate().all(|(j, limit)| {
+    let amplitudes: Vec<f64> =
+        (0..q_rad.joints()).map(|j| amplitude(q_rad.joint(j)) + 1e-6).collect();
+    // Whether `length` samples from `from` on are like those from `to` on.
+    let repeats = |from: usize, to: usize, length: usize| {
+        amplitudes.iter().enumerate().all(|(j, amplitude)| {
             let q = q_rad.joint(j);
-            let differences = (0..stretch).map(|k| (q[from + k] - q[to + k]).abs());
-            median(&mut differences.collect::<Vec<_>>()) < *limit
+            let differences = (0..length).map(|k| (q[from + k] - q[to + k]).abs() / amplitude);
+            let mut differences: Vec<f64> = differences.collect();
+            let largest = differences.iter().copied().fold(0.0, f64::max);
+            largest < NO_CONTACT || (length == step && median(&mut differences) < SAME_MOTION)
         })
     };
     let Range { mut start, mut end } = window;
-    while start >= stretch && repeats(start - stretch, start - stretch + step) {
-        start -= stretch;
-    }
-    while end + stretch <= q_rad.samples() && end >= step && repeats(end, end - step) {
-        end += stretch;
+    for length in [step, (step / STRETCHES).max(1)] {
+        while start >= length && repeats(start - length, start - length + step, length) {
+            start -= length;
+        }
+        while end + length <= q_rad.samples() && end >= step && repeats(end, end - step, length) {
+            end += length;
+        }
     }
     start..end
 }

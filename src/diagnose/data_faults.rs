@@ -244,13 +244,14 @@ fn outliers_cause(joint: usize, count: usize, rows: usize) -> Cause {
     cause(Kind::Outliers, Some(joint), words, FAR, &parameters)
 }
 
-/// Samples far off the median of five, which follows a step, and that median.
+/// Samples far off the median of nine, which follows a step and which four wild values in a row do not move,
+/// and that median.
 fn far_off(y: &[f64]) -> Vec<(usize, f64)> {
     let steps: Vec<f64> = y.windows(2).map(|w| w[1] - w[0]).collect();
     let limit = FAR * robust_sigma(&steps);
-    y.windows(5)
+    y.windows(9)
         .enumerate()
-        .map(|(k, window)| (k + 2, median(&mut window.to_vec())))
+        .map(|(k, window)| (k + 4, median(&mut window.to_vec())))
         .filter(|&(k, middle)| (y[k] - middle).abs() > limit)
         .collect()
 }

@@ -43,6 +43,8 @@ pub struct Scene {
     pub noise_nm: Vec<f64>,
     /// Estimated Coulomb friction, Nm.
     pub coulomb_nm: Vec<f64>,
+    /// Diagonal of the links' mass matrix along the motion, kg m².
+    pub own_inertia_kg_m2: JointSignals,
     /// Half-width of the interval around each recorded angle in which the true one lies, rad; zero for
     /// a motion that repeats, whose angles are averaged.
     pub angle_doubt_rad: Vec<f64>,
@@ -69,6 +71,7 @@ impl Scene {
             motion.qdd_rad_s2.joint(j).iter().map(|qdd| inertia * qdd).collect()
         };
         let recorded_nm = rigid_torque_along(&model, &motion);
+        let own_inertia_kg_m2 = own_inertia_along(&model, &motion, &recorded_nm);
         let mut link_nm = recorded_nm.clone();
         let mut rotor_nm = motion.qdd_rad_s2.map_joints(|j, _| rotor(j, &motion));
         if let Some(each) = &prepared.each_period {
@@ -103,6 +106,7 @@ impl Scene {
         let noise_nm = prepared.replicates.as_ref().map_or(vec![0.0; joints], |r| r.sigma.clone());
         Self {
             noise_nm,
+            own_inertia_kg_m2,
             angle_doubt_rad,
             coulomb_nm: (0..joints).map(|j| drive(j).coulomb_nm).collect(),
             rate_hz: prepared.processing.rate_hz,
@@ -182,6 +186,24 @@ impl Scene {
                     y[left] * (1.0 - u) + y[left + 1] * u
                 })
                 .collect(),
+        }
+    }
+
+    /// y behind a filter with the response `response(ω)`, ω in rad/s; y itself times the response at rest
+    /// where the motion does not repeat.
+    pub fn filtered(&self, y: &[f64], response: impl Fn(f64) -> Complex64) -> Vec<f64> {
+        match &self.derivative {
+            Derivative::Fourier { forward, inverse } => {
+                let omega = std::f64::consts::TAU * self.rate_hz / y.len() as f64;
+                transform(forward.as_ref(), inverse.as_ref(), y, |h, n| {
+                    let value = response(h as f64 * omega);
+                    if 2 * h == n { Complex64::new(value.re, 0.0) } else { value }
+                })
+            }
+            Derivative::Differences => {
+                let at_rest = response(0.0).re;
+                y.iter().map(|v| at_rest * v).collect()
+            }
         }
     }
 
@@ -273,6 +295,16 @@ fn transform(
     }
     let _ = inverse.process(&mut spectrum, &mut out);
     out
+}
+
+/// M_jj along `motion`, kg m²: what one rad/s² more takes, beside the torques `recorded_nm`.
+fn own_inertia_along(model: &Model, motion: &Motion, recorded_nm: &JointSignals) -> JointSignals {
+    recorded_nm.map_joints(|j, recorded| {
+        let mut faster = motion.clone();
+        faster.qdd_rad_s2.joint_mut(j).iter_mut().for_each(|qdd| *qdd += 1.0);
+        let torque = rigid_torque_along(model, &faster);
+        torque.joint(j).iter().zip(recorded).map(|(t, r)| t - r).collect()
+    })
 }
 
 /// An arm with the base parameters `theta`, and the constant torques that go with it, Nm.

@@ -15,8 +15,8 @@ use super::*;
 /// See the module.
 pub struct Backlash;
 
-/// Restitution of the flanks, by variant: from lead to hardened steel.
-const RESTITUTION: [f64; 3] = [0.0, 0.5, 0.85];
+/// Restitution of the flanks, by variant: from greased to dry hardened steel.
+const RESTITUTION: [f64; 2] = [0.3, 0.8];
 /// Steps of the flight per sample of the log.
 const STEPS: usize = 16;
 
@@ -27,7 +27,7 @@ impl Candidate for Backlash {
 
     fn shapes(&self, _: &Scene, _: Option<usize>) -> Vec<Shape> {
         (0..RESTITUTION.len())
-            .flat_map(|variant| geometric(1e-6, 1e-2, 9).map(move |value| Shape { variant, value }))
+            .flat_map(|variant| geometric(3e-6, 1e-2, 8).map(move |value| Shape { variant, value }))
             .collect()
     }
 
@@ -39,11 +39,7 @@ impl Candidate for Backlash {
         let j = joint(site);
         let load = scene.link_nm.joint(j);
         let n = load.len();
-        let inertia_kg_m2 = {
-            let mut faster = scene.motion.clone();
-            faster.qdd_rad_s2.joint_mut(j).iter_mut().for_each(|qdd| *qdd += 1.0);
-            scene.torque_change(&scene.arm, &faster)
-        };
+        let inertia = scene.own_inertia_kg_m2.joint(j);
         let rotor = scene.arm.joints[j].drive.rotor_inertia_kg_m2.max(f64::MIN_POSITIVE);
         let step_s = 1.0 / (scene.rate_hz * STEPS as f64);
         let phases: Vec<Vec<f64>> =
@@ -54,7 +50,7 @@ impl Candidate for Backlash {
         let rounds = if scene.periodic { 2 } else { 1 };
         for k in (0..rounds).flat_map(|_| 0..n) {
             delta[k] = flight.angle_rad;
-            let mobility = 1.0 / rotor + 1.0 / inertia_kg_m2.joint(j)[k].max(f64::MIN_POSITIVE);
+            let mobility = 1.0 / rotor + 1.0 / inertia[k].max(f64::MIN_POSITIVE);
             for phase in &phases {
                 flight.step(phase[k] * mobility, step_s);
             }

@@ -1,18 +1,21 @@
-//! A gear that gives way: link angle q_L, motor angle q_M, (q_M − q_L) k = τ_L.
+//! A gear that gives way: link angle q_L, motor angle q_M, k (q_M − q_L) = τ_L.
 //!
-//! Where the log has the motor's angle, the links move by δ = τ_L/k less: the torques change by
-//! τ(q − δ, q̇ − δ̇, q̈ − δ̈) − τ(q, q̇, q̈) on every joint (variant 0). Where it has the link's, the rotor
-//! and its friction move more: I_a δ̈ + F_v δ̇ + F_c [tanh((q̇ + δ̇)/ε) − tanh(q̇/ε)] on the joint itself
-//! (variant 1; the friction reverses where the motor does, so that the stiffness is in the shape as well).
+//! Where the log has the motor's angle, the links move by δ less than it says: the torques change by
+//! τ(q − δ, q̇ − δ̇, q̈ − δ̈) − τ(q, q̇, q̈) on every joint (variant 0). The link swings on its spring, so that
+//! δ = τ_L/(k − M_jj ω² + i d ω) at the frequency ω, τ_L the load of the motor's motion. Where the log has
+//! the link's angle, the rotor and its friction move more: I_a δ̈ + F_v δ̇ + F_c [tanh((q̇ + δ̇)/ε) −
+//! tanh(q̇/ε)] on the joint itself, δ = τ_L/k (variant 1; the friction reverses where the motor does). The
+//! stiffness is in the shape as well as in the coefficient 1/k.
 
 use super::*;
 use crate::dynamics::Motion;
+use realfft::num_complex::Complex64;
 
 /// See the module.
 pub struct Elasticity;
 
-/// Softness at which the torque change is taken, rad/Nm: small, so that it is linear.
-const SMALL_RAD_NM: f64 = 1e-6;
+/// Damping d over that of the rotor on the spring, 2 √(k Ia): a few percent in strain-wave gears.
+const DAMPING_RATIO: f64 = 0.05;
 
 /// The motion of the links when joint `j` is `delta` (rad) behind its encoder.
 pub(super) fn lagging_by(scene: &Scene, j: usize, delta: &[f64]) -> Motion {
@@ -38,9 +41,9 @@ impl Candidate for Elasticity {
     }
 
     fn shapes(&self, _: &Scene, _: Option<usize>) -> Vec<Shape> {
-        let linear = Shape { variant: 0, value: 0.0 };
-        let stiffness = geometric(2e3, 2e5, 5).map(|value| Shape { variant: 1, value });
-        std::iter::once(linear).chain(stiffness).collect()
+        (0..2)
+            .flat_map(|variant| geometric(2e3, 2e5, 5).map(move |value| Shape { variant, value }))
+            .collect()
     }
 
     fn search(&self) -> Search {
@@ -49,11 +52,17 @@ impl Candidate for Elasticity {
 
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let j = joint(site);
-        let delta: Vec<f64> = scene.link_nm.joint(j).iter().map(|l| l * SMALL_RAD_NM).collect();
-        if shape.variant == 0 {
-            return vec![give_way(scene, &lagging_by(scene, j, &delta), SMALL_RAD_NM)];
-        }
         let drive = &scene.arm.joints[j].drive;
+        if shape.variant == 0 {
+            let stiffness = shape.value;
+            let inertia = scene.own_inertia_kg_m2.joint(j);
+            let inertia = inertia.iter().sum::<f64>() / inertia.len() as f64;
+            let damping = 2.0 * DAMPING_RATIO * (stiffness * drive.rotor_inertia_kg_m2).sqrt();
+            let delta = scene.filtered(scene.link_nm.joint(j), |omega| {
+                Complex64::new(stiffness - inertia * omega * omega, damping * omega).inv()
+            });
+            return vec![give_way(scene, &lagging_by(scene, j, &delta), 1.0 / stiffness)];
+        }
         let softness = 1.0 / shape.value;
         let rate = scene.derivative(scene.link_nm.joint(j));
         let acceleration = scene.derivative(&rate);
