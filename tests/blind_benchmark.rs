@@ -138,7 +138,6 @@ fn records_that_are_damaged() {
 }
 
 #[test]
-#[ignore = "several wild values in a row are called a contact"]
 fn values_that_mean_nothing() {
     hide_and_find(&["outliers"]);
 }
@@ -155,9 +154,14 @@ fn what_the_model_absorbs_is_found_against_a_simulation() {
 }
 
 #[test]
-#[ignore = "named, but the little of it that the other motion shows is not removed"]
 fn friction_near_standstill() {
-    hide_and_find(&["stribeck", "presliding"]);
+    hide_and_find(&["stribeck"]);
+}
+
+#[test]
+#[ignore = "named, but bristles that give way within one sample are told too soft, and a rest is named beside them"]
+fn friction_before_it_slides() {
+    hide_and_find(&["presliding"]);
 }
 
 #[test]
@@ -177,13 +181,12 @@ fn torque_that_repeats_with_the_turn() {
 }
 
 #[test]
-#[ignore = "its signature is the rattling of the teeth, which no family knows"]
+#[ignore = "named, but play of the size of the encoder's noise is told three times too wide"]
 fn gears_with_play() {
     hide_and_find(&["backlash"]);
 }
 
 #[test]
-#[ignore = "a push of √λ = 10 is below the threshold for contacts"]
 fn something_touched() {
     hide_and_find(&["contact"]);
 }

@@ -143,7 +143,9 @@ impl Bench {
             let (slope, rms_nm) = self.slope(case);
             let Case { kind, joint, within, .. } = case;
             println!("{kind:20} joint {joint}: c = {slope:.3}, d {rms_nm:.3} Nm rms");
-            if (slope - 1.0).abs() > *within {
+            // NaN is wrong too.
+            let is_right = (slope - 1.0).abs() <= *within;
+            if !is_right {
                 wrong.push((kind, joint, slope));
             }
         }
@@ -203,8 +205,8 @@ fn arm_and_surroundings() -> Vec<Case> {
 
 fn gears() -> Vec<Case> {
     vec![
-        // The family bends the gear by the load of the rigid arm, to first order; the plant's arm swings on it.
-        case(Kind::Elasticity, 2, NO_SHAPE, &[1.0 / 8000.0], 0.2),
+        // The family's link swings with the mean of its inertia along the motion.
+        case(Kind::Elasticity, 2, (0, 8000.0), &[1.0 / 8000.0], 0.1),
     ]
 }
 
@@ -230,11 +232,12 @@ fn gears_mean_the_same() {
 }
 
 fn play() -> Vec<Case> {
-    vec![case(Kind::Backlash, 2, NO_SHAPE, &[0.004], 0.2)]
+    // The plant's flanks are a stiff spring with a damper, the family's a restitution.
+    vec![case(Kind::Backlash, 2, (1, 0.004), &[0.004], 0.3)]
 }
 
 #[test]
-#[ignore = "the family's link jumps across the gap at once, the plant's takes its time: c = 0"]
+#[ignore = "over the whole band the ring of the plant's flanks hides the flight across the gap: c = -0.03"]
 fn play_means_the_same() {
     Bench::new().check(&play());
 }

@@ -105,6 +105,14 @@ pub enum ScenarioError {
         /// The parser's message with line and key.
         message: String,
     },
+    /// JSON, as the results of other commands are.
+    #[error(
+        "{file}: is JSON, a scenario is TOML; `armid simulate --arm` takes a result of `armid identify --physical`"
+    )]
+    Json {
+        /// The file.
+        file: String,
+    },
     /// A blind benchmark where one arm is asked for.
     #[error("{file}: is a blind benchmark ([blind]), which only `montecarlo` can run")]
     Blind {
@@ -239,6 +247,9 @@ impl Source {
     }
 
     pub(super) fn parse(&self) -> Result<ScenarioFile, ScenarioError> {
+        if self.text.trim_start().starts_with('{') {
+            return Err(ScenarioError::Json { file: self.name.clone() });
+        }
         toml::from_str(&self.text)
             .map_err(|e| ScenarioError::Toml { file: self.name.clone(), message: e.to_string() })
     }

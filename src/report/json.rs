@@ -40,13 +40,20 @@ pub struct Program {
 }
 
 impl Program {
-    /// This program, run as `command` (the words of the command line).
+    /// This program, run as `command` (the words of the command line; the program's own folder is no part of
+    /// what has to be repeated).
     pub fn new(
         command: impl IntoIterator<Item = impl AsRef<str>>,
         seed: Option<u64>,
         inputs: Vec<Input>,
     ) -> Self {
-        let words: Vec<String> = command.into_iter().map(|word| quoted(word.as_ref())).collect();
+        let mut words: Vec<String> =
+            command.into_iter().map(|word| quoted(word.as_ref())).collect();
+        if let Some(program) = words.first_mut()
+            && let Some((_, name)) = program.rsplit_once('/')
+        {
+            *program = name.to_owned();
+        }
         Self { version: env!("CARGO_PKG_VERSION").into(), command: words.join(" "), seed, inputs }
     }
 }

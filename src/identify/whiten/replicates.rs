@@ -38,8 +38,9 @@ pub struct ReplicateWhitening {
 /// Highest frequency of the equations used over the sampling rate.
 const ROWS_END: f64 = 0.08;
 /// Noise in the acceleration that rows may have, as a share of its mean square. Ten times as much (velocity
-/// noise of 0.01 rad/s, eight periods) attenuated the inertia about joint 1 by 5e-5, a tenth of its σ.
-const HARMLESS_NOISE: f64 = 3e-6;
+/// noise of 0.01 rad/s, eight periods) attenuated the inertia about joint 1 by 5e-5, a tenth of its σ; half as
+/// much costs 1 % of σ under noise with a memory.
+const HARMLESS_NOISE: f64 = 5e-6;
 /// Share of the harmonics of the acceleration whose equations are used.
 const USED_HARMONICS: f64 = 0.8;
 /// Always used, so that a motion of few harmonics still gives equations for all parameters.

@@ -189,7 +189,7 @@ impl Trials for Benchmark {
     type Content = BlindContent;
     type Worker<'a> = BlindWorker<'a>;
     type Error = BlindError;
-    const BATCH_PER_THREAD: u64 = 2;
+    const BATCH_PER_THREAD: u64 = 8;
 
     fn scenario(&self) -> &Scenario {
         &self.plan.base
