@@ -9,6 +9,7 @@ pub mod dynamics;
 pub mod excitation;
 pub mod identify;
 pub mod log;
+mod median;
 pub mod montecarlo;
 pub mod output;
 pub mod plant;

@@ -13,6 +13,7 @@ use super::kind::Kind;
 use super::record::Record;
 use super::verdict::{Cause, Estimate};
 use crate::identify::Measurement;
+use crate::median::{median, median_step};
 use crate::robot::JointSignals;
 
 /// Deviations of this many robust standard deviations are no noise: in 10⁶ Gaussian values one in 10⁵
@@ -84,7 +85,7 @@ fn exact(value: f64, unit: &'static str) -> Estimate {
 
 /// A velocity channel that lags behind the angle, per joint or of all joints alike.
 fn velocity_lag(m: &Measurement) -> Vec<Cause> {
-    let step_s = median_step(m.time_s);
+    let step_s = step_s(m);
     let lags: Vec<Option<(f64, f64)>> = (0..m.q_rad.joints()).map(|j| lag(m, j)).collect();
     let is_late = |&(lag, sigma): &(f64, f64)| {
         lag.abs() > SMALL_LAG_SAMPLES * step_s && lag.abs() > LAG_T * sigma
@@ -181,7 +182,7 @@ fn stalls(m: &Measurement) -> Option<Stalls> {
         })
         .collect();
     let sigma_s = robust_sigma(&lost);
-    let limit = (FAR * sigma_s).max(0.5 * median_step(m.time_s));
+    let limit = (FAR * sigma_s).max(0.5 * step_s(m));
     let rows: Vec<usize> = (0..lost.len()).filter(|&k| lost[k] > limit).collect();
     if rows.len() < 3 {
         return None;
@@ -194,7 +195,7 @@ impl Stalls {
     fn cause(&self) -> Cause {
         let Self { rows, lost_s, sigma_s } = self;
         let mut between: Vec<f64> = rows.windows(2).map(|w| (w[1] - w[0]) as f64).collect();
-        let every = median(&mut between);
+        let every = median(&mut between).unwrap_or(f64::NAN);
         let reach = 1.96 * sigma_s / (rows.len() as f64).sqrt();
         let lost = Estimate { value: *lost_s, unit: "s", ci95: [lost_s - reach, lost_s + reach] };
         cause(
@@ -218,7 +219,7 @@ fn repeats(m: &Measurement) -> Vec<usize> {
 
 /// Rows that repeat the one before, or are missing by the time stamps.
 fn repeated_or_missing(m: &Measurement, repeats: &[usize]) -> Option<Cause> {
-    let step_s = median_step(m.time_s);
+    let step_s = step_s(m);
     let missing: f64 =
         m.time_s.windows(2).map(|t| ((t[1] - t[0]) / step_s - 1.0).round().max(0.0)).sum();
     let fraction = (missing + repeats.len() as f64) / m.time_s.len() as f64;
@@ -251,7 +252,7 @@ fn far_off(y: &[f64]) -> Vec<(usize, f64)> {
     let limit = FAR * robust_sigma(&steps);
     y.windows(9)
         .enumerate()
-        .map(|(k, window)| (k + 4, median(&mut window.to_vec())))
+        .filter_map(|(k, window)| Some((k + 4, median(&mut window.to_vec())?)))
         .filter(|&(k, middle)| (y[k] - middle).abs() > limit)
         .collect()
 }
@@ -292,22 +293,15 @@ fn quantisation(torque_nm: &JointSignals) -> Vec<Cause> {
         .collect()
 }
 
-fn median_step(time_s: &[f64]) -> f64 {
-    median(&mut time_s.windows(2).map(|t| t[1] - t[0]).collect::<Vec<f64>>())
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return f64::NAN;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+/// The record's usual step, s.
+fn step_s(m: &Measurement) -> f64 {
+    median_step(m.time_s).unwrap_or(f64::NAN)
 }
 
 /// Standard deviation of Gaussian values from the median of their sizes, 1/0.6745.
 fn robust_sigma(values: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = values.iter().map(|v| v.abs()).filter(|v| *v > 0.0).collect();
-    if sizes.is_empty() { 0.0 } else { 1.4826 * median(&mut sizes) }
+    median(&mut sizes).map_or(0.0, |median| 1.4826 * median)
 }
 
 #[cfg(test)]

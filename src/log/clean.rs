@@ -1,5 +1,6 @@
 //! Which rows of a log belong together.
 
+use crate::median::median_step;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
@@ -74,22 +75,6 @@ impl Motion<'_> {
 /// acceleration stays within ±a.
 fn angle_tolerance_rad(step_s: f64) -> f64 {
     STEP_TOLERANCE_RAD + ACCELERATION_RAD_S2 * step_s * step_s / 4.0
-}
-
-/// Median step of time among the steps forward, s; `None` without any.
-pub(super) fn median_step(time_s: &[f64]) -> Option<f64> {
-    let mut steps: Vec<f64> =
-        time_s.windows(2).map(|pair| pair[1] - pair[0]).filter(|&step| step > 0.0).collect();
-    median(&mut steps)
-}
-
-/// Upper median of finite values.
-pub(super) fn median(values: &mut [f64]) -> Option<f64> {
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        return None;
-    }
-    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 /// For every row why its time cannot stay, so that the times that stay increase strictly.

@@ -6,9 +6,10 @@
 use std::f64::consts::{PI, TAU};
 
 use super::account::LogWarning;
-use super::clean::{Motion, median, median_step};
+use super::clean::Motion;
 use super::error::UnitSuspicion;
 use super::layout::{Angle, AngularVelocity, TimeUnit, Units};
+use crate::median::{median, median_step};
 
 /// Motion within one span below which its ratio says nothing, rad: 200 steps of a 10⁻⁴ rad encoder.
 const MOVES_RAD: f64 = 0.02;

@@ -13,6 +13,7 @@ use super::record::{Named, Record};
 use super::share::Share;
 use super::target::{DESIGN_FALSE_ALARM, Target, targets};
 use crate::diagnose::{Kind, candidates};
+use crate::median::median;
 use crate::montecarlo::calibration::Verdict;
 use crate::montecarlo::shard::Merged;
 use crate::montecarlo::trials::Failure;
@@ -344,21 +345,17 @@ fn gains(all: &[Record], parameters: usize) -> Vec<GainBin> {
             let last = edges[1] == STRENGTHS[STRENGTHS.len() - 1];
             let inside = |s: f64| s >= edges[0] && (s < edges[1] || last);
             let here: Vec<&(f64, f64)> = with.iter().filter(|(s, _)| inside(*s)).collect();
+            let middle = |mut values: Vec<f64>| median(&mut values).unwrap_or(f64::NAN);
             let bound = |s: f64| 1.0 - (p + 1.0) / (s * s + p);
             GainBin {
                 range: [edges[0], if last { f64::INFINITY } else { edges[1] }],
                 cases: here.len() as u64,
-                removed: median(here.iter().map(|(_, share)| *share).collect()),
-                predicted: median(here.iter().map(|(s, _)| bound(*s)).collect()),
+                removed: middle(here.iter().map(|(_, share)| *share).collect()),
+                predicted: middle(here.iter().map(|(s, _)| bound(*s)).collect()),
             }
         })
         .filter(|bin| bin.cases > 0)
         .collect()
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 #[cfg(test)]
