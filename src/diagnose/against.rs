@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use super::candidates::{Candidate, Quantity, Shape};
 use super::image::{Column, Image, Span};
 use super::kind::Kind;
-use super::selection::{FALSE_ALARM, TELLS_APART};
+use super::selection::{FALSE_ALARM, TELLS_APART, probability_of_class};
 use super::study::{Entry, Study};
 use super::verdict::{Cause, Estimate, Moved, Rival};
 use crate::base::BaseSet;
@@ -183,37 +183,26 @@ impl Search<'_> {
         let scored = self.scored(&rest);
         let evidence = scored.iter().find(|s| s.change == taken[index]).map_or(0.0, |s| s.evidence);
         // The part of the residual that the change explains.
-        let mut signal = left.clone();
-        span.residualise(&mut signal);
-        signal.scale(-1.0);
-        signal.add(1.0, &left);
+        let signal = span.inside(&left);
         let size = signal.square();
         let gain = study.statistic.gain(&span, change.site, &left);
         let scale = study.statistic.lambda(&span, &left, gain) / size.max(f64::MIN_POSITIVE);
         let rivals: Vec<&Scored> = scored.iter().filter(|s| s.change != taken[index]).collect();
-        let in_class: Vec<&Scored> = rivals
-            .iter()
-            .filter(|s| {
-                let explained =
-                    Span::outside(&others, &self.changes[s.change].images).explained(&signal);
-                scale * (size - explained) < TELLS_APART
-            })
-            .copied()
-            .collect();
-        let name = |s: &&Scored| {
+        let is_alike = |s: &&Scored| {
+            let span = Span::outside(&others, &self.changes[s.change].images);
+            scale * (size - span.explained(&signal)) < TELLS_APART
+        };
+        let alike: Vec<bool> = rivals.iter().map(is_alike).collect();
+        let name = |(s, _): (&&Scored, &bool)| {
             let Change { kind, site, .. } = &self.changes[s.change];
             match site.filter(|_| *site != change.site) {
                 Some(j) => format!("{kind}@{}", j + 1),
                 None => kind.to_string(),
             }
         };
-        let top = rivals.iter().map(|s| s.evidence).fold(evidence, f64::max).max(0.0);
-        let weight = |evidence: f64| (0.5 * (evidence - top)).exp();
-        let own_weight =
-            weight(evidence) + in_class.iter().map(|s| weight(s.evidence)).sum::<f64>();
-        let all =
-            weight(0.0) + weight(evidence) + rivals.iter().map(|s| weight(s.evidence)).sum::<f64>();
-        let class: Vec<String> = in_class.iter().map(name).collect();
+        let evidences: Vec<f64> = rivals.iter().map(|s| s.evidence).collect();
+        let in_class = rivals.iter().zip(&alike).filter(|(_, alike)| **alike);
+        let class: Vec<String> = in_class.map(name).collect();
         let behind = rivals.iter().take(RIVALS).map(|s| Rival {
             kind: self.changes[s.change].kind,
             joint: self.changes[s.change].site.map(|j| j + 1),
@@ -224,7 +213,7 @@ impl Search<'_> {
             joint: change.site.map(|j| j + 1),
             separating_experiment: (!class.is_empty()).then(|| separating_experiment(change.kind)),
             class,
-            confidence: own_weight / all,
+            confidence: probability_of_class(evidence, &evidences, &alike),
             parameters: estimates(change, &b, &covariance, study.statistic.quantile_95()),
             gain_fraction: None,
             strength: study.statistic.lambda(&span, &left, gain).max(0.0).sqrt(),

@@ -20,7 +20,7 @@ use super::study::{Entry, Study};
 use super::verdict::{Cause, DetectionLimit, Diagnosis, Rival, Rms, Verdict};
 use crate::base::BaseSet;
 use crate::dynamics::Model;
-use crate::identify::{Identification, Identifier, Measurement, Options, Regression};
+use crate::identify::{Identification, Identifier, Measurement, Options};
 use crate::robot::{Arm, JointSignals};
 
 /// Everything that stays the same from log to log.
@@ -183,9 +183,7 @@ impl<'a> Diagnoser<'a> {
             warnings: identification.warnings.clone(),
         };
         diagnosis.sentences = diagnosis.in_sentences();
-        let samples = (0..study.regression.problem.samples)
-            .map(|k| regression.first_sample + k * regression.every)
-            .collect();
+        let samples = (0..regression.problem.samples).map(|row| regression.sample(row)).collect();
         let scene = study.scene;
         Ok(Finding {
             diagnosis,
@@ -297,8 +295,9 @@ impl<'a> Diagnoser<'a> {
 
 /// Contacts in the residual of the extended model along a single run.
 fn beside_model(study: &Study, after_nm: &JointSignals) -> Vec<Cause> {
-    let Regression { prepared, first_sample, every, .. } = study.regression;
-    let at = |row: usize| first_sample + row * every;
+    let regression = study.regression;
+    let prepared = &regression.prepared;
+    let at = |row: usize| regression.sample(row);
     let qd = &prepared.motion.qd_rad_s;
     let qd = JointSignals::from_fn(qd.joints(), after_nm.samples(), |j, k| qd.joint(j)[at(k)]);
     let (start_s, rate_hz) = (prepared.processing.window_s[0], prepared.processing.rate_hz);

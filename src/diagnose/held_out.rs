@@ -115,10 +115,10 @@ struct Rows {
 impl Rows {
     fn of(regression: &Regression) -> Self {
         let qd = &regression.prepared.motion.qd_rad_s;
-        let at = |row: usize| regression.first_sample + row * regression.every;
         let samples = regression.problem.samples;
-        let moves = (0..qd.joints())
-            .map(|j| (0..samples).map(|r| qd.joint(j)[at(r)].abs() > MOVING_RAD_S).collect());
+        let moves = (0..qd.joints()).map(|j| {
+            (0..samples).map(|r| qd.joint(j)[regression.sample(r)].abs() > MOVING_RAD_S).collect()
+        });
         let runs = RunWhitening::moving_rows(regression);
         let rests = runs.iter().map(|runs| runs.iter().map(|run| !run).collect());
         Self { moves: moves.collect(), rests: rests.collect() }

@@ -153,6 +153,15 @@ impl Span {
         }
     }
 
+    /// The part of `y` that is spanned.
+    pub fn inside(&self, y: &Image) -> Image {
+        let mut part = y.clone();
+        self.residualise(&mut part);
+        part.scale(-1.0);
+        part.add(1.0, y);
+        part
+    }
+
     /// ⟨direction, y⟩ for every direction.
     pub fn coordinates(&self, y: &Image) -> Vec<f64> {
         self.directions.iter().map(|d| d.dot(y)).collect()

@@ -282,32 +282,33 @@ impl<'s, 'a> Kept<'s, 'a> {
         let contender = self.causes[c].clone();
         let own = study.span(&contender.entry, &others);
         // The signal of the cause as the data show it.
-        let mut signal = residual.clone();
-        own.residualise(&mut signal);
-        signal.scale(-1.0);
-        signal.add(1.0, &residual);
+        let signal = own.inside(&residual);
         let size = signal.square();
         let identity = (contender.entry.family, contender.entry.site);
         let mut rivals = self.contenders(Some(c), &others, &residual);
         rivals.retain(|r| (r.entry.family, r.entry.site) != identity);
         let scale = contender.score.lambda / size.max(f64::MIN_POSITIVE);
-        let class: Vec<(usize, Option<usize>)> = rivals
-            .iter()
-            .filter(|rival| {
-                let explained = study.span(&rival.entry, &others).explained(&signal);
-                scale * (size - explained) < TELLS_APART
-            })
-            .map(|rival| (rival.entry.family, rival.entry.site))
-            .collect();
-        let top = rivals.iter().map(|r| r.evidence).fold(contender.evidence, f64::max).max(0.0);
-        let weight = |evidence: f64| (0.5 * (evidence - top)).exp();
-        let in_class = |r: &&Contender| class.contains(&(r.entry.family, r.entry.site));
-        let own_weight = weight(contender.evidence)
-            + rivals.iter().filter(in_class).map(|r| weight(r.evidence)).sum::<f64>();
-        let all = weight(0.0)
-            + weight(contender.evidence)
-            + rivals.iter().map(|r| weight(r.evidence)).sum::<f64>();
+        let is_alike = |rival: &Contender| {
+            let explained = study.span(&rival.entry, &others).explained(&signal);
+            scale * (size - explained) < TELLS_APART
+        };
+        let alike: Vec<bool> = rivals.iter().map(is_alike).collect();
+        let in_class = rivals.iter().zip(&alike).filter(|(_, alike)| **alike);
+        let class = in_class.map(|(rival, _)| (rival.entry.family, rival.entry.site)).collect();
+        let evidences: Vec<f64> = rivals.iter().map(|r| r.evidence).collect();
+        let confidence = probability_of_class(contender.evidence, &evidences, &alike);
         rivals.truncate(FINALISTS);
-        Selected { contender, confidence: own_weight / all, class, rivals }
+        Selected { contender, confidence, class, rivals }
     }
+}
+
+/// Posterior probability that a cause with `evidence` (2 ln, against no effect) or one of its class is there:
+/// of its rivals with their `evidences` those that are `alike`. The others and no effect at all are what else
+/// it may be.
+pub fn probability_of_class(evidence: f64, evidences: &[f64], alike: &[bool]) -> f64 {
+    let top = evidences.iter().copied().fold(evidence, f64::max).max(0.0);
+    let weight = |evidence: f64| (0.5 * (evidence - top)).exp();
+    let in_class = evidences.iter().zip(alike).filter(|(_, alike)| **alike);
+    let own = weight(evidence) + in_class.map(|(e, _)| weight(*e)).sum::<f64>();
+    own / (weight(0.0) + weight(evidence) + evidences.iter().map(|e| weight(*e)).sum::<f64>())
 }

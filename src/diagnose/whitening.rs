@@ -332,7 +332,7 @@ impl RunWhitening {
         (0..motion.joints())
             .map(|j| {
                 let moves = moving(motion.qd_rad_s.joint(j), rest, rest / 4);
-                let at = |r: usize| moves[regression.first_sample + r * regression.every];
+                let at = |r: usize| moves[regression.sample(r)];
                 rows.clone().map(at).collect()
             })
             .collect()

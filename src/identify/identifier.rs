@@ -119,6 +119,11 @@ pub struct Regression {
 }
 
 impl Regression {
+    /// The sample of `prepared` behind row `row` of one period (or of the run).
+    pub fn sample(&self, row: usize) -> usize {
+        self.first_sample + row * self.every
+    }
+
     /// Several logs as one: rows stand below each other. A repeated motion then counts as that many
     /// runs, and the processing reported is that of the first log.
     pub fn joined(regressions: Vec<Self>) -> Result<Self, IdentifyError> {

@@ -30,7 +30,6 @@ impl Prediction {
             measured_nm.joint(j)[k] - residual.joint(j)[k]
         });
         let processing = &regression.prepared.processing;
-        let source = |k: usize| regression.first_sample + (k % n) * regression.every;
         let rate_hz = processing.rate_hz;
         let start_s = processing.window_s[0] + regression.first_sample as f64 / rate_hz;
         let step_s = regression.every as f64 / rate_hz;
@@ -38,7 +37,7 @@ impl Prediction {
         Self {
             time_s: (0..n * periods).map(|k| start_s + k as f64 * step_s).collect(),
             qd_rad_s: JointSignals::from_fn(joints, n * periods, |j, k| {
-                motion.qd_rad_s.joint(j)[source(k)]
+                motion.qd_rad_s.joint(j)[regression.sample(k % n)]
             }),
             measured_nm,
             predicted_nm,

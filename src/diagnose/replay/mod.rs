@@ -122,9 +122,8 @@ impl Diagnoser<'_> {
             let regression = self.identifier.regression(&other.measurement)?;
             let prepared = &regression.prepared;
             let scene = Scene::new(self.arm, self.set, &finding.extension.theta, prepared);
-            let samples: Vec<usize> = (0..regression.problem.samples)
-                .map(|k| regression.first_sample + k * regression.every)
-                .collect();
+            let samples: Vec<usize> =
+                (0..regression.problem.samples).map(|row| regression.sample(row)).collect();
             let course = Course {
                 scene: &scene,
                 measured_nm: &measured_nm(&regression),
