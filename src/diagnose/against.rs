@@ -136,7 +136,7 @@ impl Search<'_> {
                 let price = span.len() as f64 * n.ln() + 2.0 * tests.ln();
                 Scored {
                     change: c,
-                    evidence: study.statistic.gain(&span, site, &rest) - price,
+                    evidence: study.statistic.gain(&span, &rest) - price,
                     probability: study.statistic.probability(&span, &rest),
                 }
             })
@@ -173,7 +173,7 @@ impl Search<'_> {
         signal.scale(-1.0);
         signal.add(1.0, &left);
         let size = signal.square();
-        let gain = study.statistic.gain(&span, change.site, &left);
+        let gain = study.statistic.gain(&span, &left);
         let scale = gain / size.max(f64::MIN_POSITIVE);
         let rivals: Vec<&Scored> = scored.iter().filter(|s| s.change != taken[index]).collect();
         let in_class: Vec<&Scored> = rivals

@@ -110,8 +110,7 @@ impl<'a> Diagnoser<'a> {
             // A single run is judged by its own residual, which is known only now.
             let (_, rest) = kept.without(None);
             study.judge_by(&rest);
-            kept = Kept::taken_over(&study, found);
-            kept.grow();
+            kept = Kept::of_a_single_run(&study, found);
         }
         let selected = kept.selected();
         let entries: Vec<&Entry> = selected.iter().map(|s| &s.contender.entry).collect();
@@ -124,16 +123,27 @@ impl<'a> Diagnoser<'a> {
         let lack = misfit::lack_of_fit(&study, &rest, fitted);
         let unexplained = misfit::unexplained(&study, &accepted, &rest, lack);
         let gains = gain::on_other_periods(&study, &entries);
-        let physics = selected
+        let mut physics: Vec<Cause> = selected
             .iter()
             .enumerate()
-            .map(|(c, selected)| self.cause(&study, &kept, selected, c, gains[c], &extension));
+            .map(|(c, selected)| {
+                let gain = gains[c].or(selected.left_out_gain);
+                self.cause(&study, &kept, selected, c, gain, &extension)
+            })
+            .collect();
         let touches = match &touched {
             Some(touched) => touched.causes.clone(),
             None if study.scene.periodic => Vec::new(),
             None => beside_model(&study, &after_nm),
         };
         faults.extend(touches);
+        if !study.scene.periodic {
+            // What matters most is said first, what only concerns the recording last.
+            let gain = |cause: &Cause| cause.gain_fraction.unwrap_or(0.0);
+            physics.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+            let of_the_record = faults.extract_if(.., |fault| fault.kind.is_of_the_record());
+            physics.extend(of_the_record);
+        }
         let mut causes: Vec<Cause> = faults.into_iter().chain(physics).collect();
         let mut moved_parameters = Vec::new();
         if let Some(simulation) = simulation {
@@ -145,6 +155,10 @@ impl<'a> Diagnoser<'a> {
         let held_out = held_out
             .iter()
             .map(|log| {
+                // The recorder lags on other days as it does here.
+                let qd_rad_s = data_faults::without_lag(&log.measurement, &causes);
+                let measurement = Measurement { qd_rad_s: &qd_rad_s, ..log.measurement };
+                let log = &Validation { measurement, manufacturer_nm: log.manufacturer_nm };
                 let models = Models { null: &null, extension: &extension };
                 held_out_gain(&mut self.identifier, sources, &self.families, log, &models)
             })

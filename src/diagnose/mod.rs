@@ -28,6 +28,7 @@ mod image;
 mod kind;
 mod misfit;
 mod payload;
+mod repeated;
 pub mod replay;
 mod scene;
 mod selection;
@@ -43,6 +44,7 @@ pub use held_out::Validation;
 pub use image::Column;
 pub use kind::Kind;
 pub use payload::PayloadFinding;
+pub use repeated::{Repeated, repeated};
 pub use scene::{Scene, equivalent_arm};
 pub use verdict::{
     Cause, DIAGNOSE_SCHEMA, DetectionLimit, Diagnosis, Estimate, HeldOut, Moved, Rival, Rms,

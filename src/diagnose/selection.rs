@@ -16,6 +16,10 @@ const FORM_ERROR: f64 = 0.05;
 const LEAST_EVIDENCE: f64 = 4.0;
 /// Causes at most: a log that needs more has another kind of problem.
 const MOST_CAUSES: usize = 24;
+/// Share of a cause's square that another explains as well, at least, if it may stand in for it.
+const SHARED: f64 = 0.5;
+/// Rounds in which causes of a single run are exchanged: two may replace each other for ever.
+const EXCHANGES: usize = 3;
 /// Families whose shapes are refined before one is chosen.
 const FINALISTS: usize = 10;
 /// Two effects are told apart with 99.9 % confidence and 90 % power where λ(1 − cos²) exceeds
@@ -44,17 +48,21 @@ pub struct Selected {
     pub class: Vec<(usize, Option<usize>)>,
     /// The others, best first.
     pub rivals: Vec<Contender>,
+    /// Share of the mean square that it removes in stretches of a single run left out of its fit.
+    pub left_out_gain: Option<f64>,
 }
 
 /// The causes kept so far.
 pub struct Kept<'s, 'a> {
     study: &'s Study<'a>,
     causes: Vec<Contender>,
+    /// Whether causes of the arm as a whole are looked for.
+    with_common: bool,
 }
 
 /// Adds families one by one while the data ask for it.
 pub fn select(study: &Study) -> Vec<Contender> {
-    let mut kept = Kept { study, causes: Vec::new() };
+    let mut kept = Kept { study, causes: Vec::new(), with_common: true };
     kept.grow();
     kept.causes
 }
@@ -67,10 +75,26 @@ impl<'s, 'a> Kept<'s, 'a> {
             let Entry { family, site, shape, .. } = cause.entry;
             Some(Contender { entry: study.entry(family, site, shape)?, ..cause })
         });
-        let mut kept = Self { study, causes: again.collect() };
+        let mut kept = Self { study, causes: again.collect(), with_common: true };
         for c in 0..kept.causes.len() {
             kept.refine(c);
         }
+        kept
+    }
+
+    /// The causes of a single run, by two ways: from `found`, and from single joints' causes alone, with
+    /// those of the arm as a whole only behind them. One cause of all joints may explain more than any on
+    /// one joint, and yet less than several together.
+    pub fn of_a_single_run(study: &'s Study<'a>, found: Vec<Contender>) -> Self {
+        let mut together = Self::taken_over(study, found);
+        together.grow();
+        let mut apart = Self { study, causes: Vec::new(), with_common: false };
+        apart.grow();
+        apart.with_common = true;
+        apart.grow();
+        let is_better = apart.total_evidence() > together.total_evidence();
+        let mut kept = if is_better { apart } else { together };
+        kept.exchange();
         kept
     }
 
@@ -97,6 +121,60 @@ impl<'s, 'a> Kept<'s, 'a> {
         }
     }
 
+    /// 2 ln of the evidence for all causes together against none.
+    fn total_evidence(&self) -> f64 {
+        let (span, _) = self.without(None);
+        let price: f64 = self.causes.iter().map(|c| self.price(&c.entry)).sum();
+        self.study.statistic.gain(&span, &self.study.residual) - price
+    }
+
+    /// Exchanges causes for what explains the log better beside all others, and grows again.
+    ///
+    /// What was found first may have stood in for a cause that came later, on any joint.
+    fn exchange(&mut self) {
+        for _ in 0..EXCHANGES {
+            let mut exchanged = false;
+            for c in 0..self.causes.len() {
+                let (others, residual) = self.without(Some(c));
+                let Some(best) = self.rivals(c, &others, &residual).into_iter().next() else {
+                    continue;
+                };
+                if best.evidence > self.causes[c].evidence + 1.0 {
+                    self.causes[c] = best;
+                    exchanged = true;
+                }
+            }
+            if !exchanged {
+                return;
+            }
+            for c in 0..self.causes.len() {
+                self.refine(c);
+            }
+            self.drop_unneeded();
+            self.grow();
+        }
+    }
+
+    /// What might be in the place of cause `c`, best first. What is ahead along a single run is in its place
+    /// only if it explains the same, and if it would be named there: more evidence in few stretches of time
+    /// alone makes no rival.
+    fn rivals(&self, c: usize, others: &Span, residual: &Image) -> Vec<Contender> {
+        let Entry { family, site, .. } = self.causes[c].entry;
+        let mut rivals = self.contenders(Some(c), others, residual);
+        rivals.retain(|r| (r.entry.family, r.entry.site) != (family, site));
+        if !self.study.scene.periodic {
+            let signal = self.signal(c, others, residual);
+            let size = signal.square();
+            let is_ahead = |r: &Contender| r.evidence > self.causes[c].evidence;
+            rivals.retain(|r| {
+                !is_ahead(r)
+                    || self.explains(r, others, &signal) > SHARED * size
+                        && self.is_significant(r, others, residual)
+            });
+        }
+        rivals
+    }
+
     /// The causes.
     pub fn causes(&self) -> &[Contender] {
         &self.causes
@@ -110,11 +188,25 @@ impl<'s, 'a> Kept<'s, 'a> {
     /// The best shape of cause `c`, the others given.
     fn refine(&mut self, c: usize) {
         let (others, residual) = self.without(Some(c));
-        let current = &self.causes[c].entry;
+        let current = self.best_start(&self.causes[c].entry, &others, &residual);
         if let Some((entry, statistic)) = self.study.refined(current, &others, &residual) {
             let evidence = self.evidence(&entry, statistic);
             self.causes[c] = Contender { entry, statistic, evidence };
         }
+    }
+
+    /// The best of `entry`'s shape and the family's starting shapes; several causes of one family on one
+    /// joint keep their own.
+    fn best_start<'e>(&'e self, entry: &'e Entry, others: &Span, residual: &Image) -> &'e Entry {
+        let study = self.study;
+        if study.scene.periodic || study.families[entry.family].is_repeatable() {
+            return entry;
+        }
+        let score = |e: &Entry| study.score(e, others, residual).unwrap_or(f64::NEG_INFINITY);
+        let same = |e: &&Entry| (e.family, e.site) == (entry.family, entry.site);
+        let start = (entry, score(entry));
+        let best = study.entries.iter().filter(same).map(|e| (e, score(e)));
+        best.fold(start, |best, e| if e.1 > best.1 { e } else { best }).0
     }
 
     /// Span of all causes but `left_out`, and the residual outside it.
@@ -133,14 +225,18 @@ impl<'s, 'a> Kept<'s, 'a> {
     /// 2 ln of the evidence (Schwarz 1978) for adding `entry`: T − k ln n, less the price of having
     /// looked at so many shapes and families, and of being rare.
     fn evidence(&self, entry: &Entry, statistic: f64) -> f64 {
+        statistic - self.price(entry)
+    }
+
+    /// What an entry has to explain before there is evidence for it.
+    fn price(&self, entry: &Entry) -> f64 {
         let study = self.study;
         let n = study.statistic.sample_count(entry.site, study.residual.mean.len());
         let grid = study.alternatives(entry);
-        statistic
-            - entry.images.len() as f64 * n.ln()
-            - 2.0 * grid.ln()
-            - 2.0 * (study.hypotheses() as f64).ln()
-            + 2.0 * study.families[entry.family].prior_odds(entry.site).ln()
+        entry.images.len() as f64 * n.ln()
+            + 2.0 * grid.ln()
+            + 2.0 * (study.hypotheses() as f64).ln()
+            - 2.0 * study.families[entry.family].prior_odds(entry.site).ln()
     }
 
     /// The best shape of every family at every site that is free (`open` is the cause to be replaced,
@@ -148,6 +244,13 @@ impl<'s, 'a> Kept<'s, 'a> {
     fn contenders(&self, open: Option<usize>, others: &Span, residual: &Image) -> Vec<Contender> {
         let study = self.study;
         let orders = self.ripple_orders(residual);
+        let open_site =
+            open.and_then(|c| self.causes[c].entry.site).filter(|_| !study.scene.periodic);
+        let left_out = |entry: &Entry| match entry.site {
+            None => !self.with_common,
+            // Along a single run what acts on another joint does not stand in for this one's cause.
+            site => open_site.is_some() && site != open_site,
+        };
         let taken = |entry: &Entry| {
             let place = (entry.family, entry.site);
             let is_taken = |c: &Contender| (c.entry.family, c.entry.site) == place;
@@ -163,7 +266,13 @@ impl<'s, 'a> Kept<'s, 'a> {
             .entries
             .par_iter()
             .chain(orders.par_iter())
-            .map(|entry| if taken(entry) { None } else { study.score(entry, others, residual) })
+            .map(|entry| {
+                if left_out(entry) || taken(entry) {
+                    None
+                } else {
+                    study.score(entry, others, residual)
+                }
+            })
             .collect();
         for (entry, score) in study.entries.iter().chain(&orders).zip(scores) {
             let Some(statistic) = score else { continue };
@@ -177,7 +286,13 @@ impl<'s, 'a> Kept<'s, 'a> {
             }
         }
         best.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
-        let (head, tail) = best.split_at(FINALISTS.min(best.len()));
+        let mut finalists = FINALISTS.min(best.len());
+        if !study.scene.periodic {
+            // A finer shape does not double the evidence.
+            let near = |c: &&Contender| c.evidence > 0.5 * best[0].evidence;
+            finalists = best.iter().take(finalists).take_while(near).count();
+        }
+        let (head, tail) = best.split_at(finalists);
         let mut all: Vec<Contender> = head
             .par_iter()
             .map(|contender| match study.refined(&contender.entry, others, residual) {
@@ -271,21 +386,37 @@ impl<'s, 'a> Kept<'s, 'a> {
                 break;
             }
         }
-        let mut newest_stays = true;
+        !self.drop_unneeded().contains(&newest)
+    }
+
+    /// Drops causes that are not needed beside the others; which they were.
+    fn drop_unneeded(&mut self) -> Vec<usize> {
+        let mut dropped = Vec::new();
         let mut c = 0;
-        let mut index = 0;
         while c < self.causes.len() {
             let (others, residual) = self.without(Some(c));
-            let needed = self.is_significant(&self.causes[c].clone(), &others, &residual);
-            if needed {
+            if self.is_significant(&self.causes[c], &others, &residual) {
                 c += 1;
             } else {
                 self.causes.remove(c);
-                newest_stays &= index != newest;
+                dropped.push(c + dropped.len());
             }
-            index += 1;
         }
-        newest_stays
+        dropped
+    }
+
+    /// Square that `contender` explains of `signal`, which `others` have left.
+    fn explains(&self, contender: &Contender, others: &Span, signal: &Image) -> f64 {
+        self.study.span(&contender.entry, others).explained(signal)
+    }
+
+    /// What cause `c` explains of `residual`, which `others` have left, as the data show it.
+    fn signal(&self, c: usize, others: &Span, residual: &Image) -> Image {
+        let mut signal = residual.clone();
+        self.study.span(&self.causes[c].entry, others).residualise(&mut signal);
+        signal.scale(-1.0);
+        signal.add(1.0, residual);
+        signal
     }
 
     /// Confidence, class and rivals of cause `c`, the others given.
@@ -294,33 +425,29 @@ impl<'s, 'a> Kept<'s, 'a> {
         let (others, residual) = self.without(Some(c));
         let contender = self.causes[c].clone();
         let own = study.span(&contender.entry, &others);
-        // The signal of the cause as the data show it.
-        let mut signal = residual.clone();
-        own.residualise(&mut signal);
-        signal.scale(-1.0);
-        signal.add(1.0, &residual);
+        let signal = self.signal(c, &others, &residual);
         let size = signal.square();
-        let identity = (contender.entry.family, contender.entry.site);
-        let mut rivals = self.contenders(Some(c), &others, &residual);
-        rivals.retain(|r| (r.entry.family, r.entry.site) != identity);
+        let mut rivals = self.rivals(c, &others, &residual);
         let scale = contender.statistic / size.max(f64::MIN_POSITIVE);
         let class: Vec<(usize, Option<usize>)> = rivals
             .iter()
-            .filter(|rival| {
-                let explained = study.span(&rival.entry, &others).explained(&signal);
-                scale * (size - explained) < TELLS_APART
-            })
+            .filter(|rival| scale * (size - self.explains(rival, &others, &signal)) < TELLS_APART)
             .map(|rival| (rival.entry.family, rival.entry.site))
             .collect();
         let top = rivals.iter().map(|r| r.evidence).fold(contender.evidence, f64::max).max(0.0);
         let weight = |evidence: f64| (0.5 * (evidence - top)).exp();
+        // Something else that the log shows beside the cause is no reason to doubt it.
+        let in_its_place = |r: &&Contender| {
+            study.scene.periodic || self.explains(r, &others, &signal) > SHARED * size
+        };
         let in_class = |r: &&Contender| class.contains(&(r.entry.family, r.entry.site));
         let own_weight = weight(contender.evidence)
             + rivals.iter().filter(in_class).map(|r| weight(r.evidence)).sum::<f64>();
         let all = weight(0.0)
             + weight(contender.evidence)
-            + rivals.iter().map(|r| weight(r.evidence)).sum::<f64>();
+            + rivals.iter().filter(in_its_place).map(|r| weight(r.evidence)).sum::<f64>();
         rivals.truncate(FINALISTS);
-        Selected { contender, confidence: own_weight / all, class, rivals }
+        let left_out_gain = study.left_out_gain(&contender.entry, &own, &residual);
+        Selected { contender, confidence: own_weight / all, class, rivals, left_out_gain }
     }
 }

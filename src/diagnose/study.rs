@@ -189,8 +189,18 @@ impl<'a> Study<'a> {
         if span.len() != entry.images.len() {
             return None;
         }
-        let possible = self.families[entry.family].is_possible(&span.solve(residual));
-        possible.then(|| self.statistic.gain(&span, entry.site, residual))
+        let possible = self.families[entry.family].is_possible(entry.shape, &span.solve(residual));
+        possible.then(|| self.statistic.gain(&span, residual))
+    }
+
+    /// Share of the mean square of the joint (or all) that `span` of `entry` takes from `residual` in
+    /// stretches of a single run that were left out of its fit.
+    pub fn left_out_gain(&self, entry: &Entry, span: &Span, residual: &Image) -> Option<f64> {
+        let gain = self.statistic.left_out_gain(span, residual)?;
+        let rows = residual.mean.len() / self.scene.joints();
+        let own = entry.site.map_or(0..residual.mean.len(), |j| j * rows..(j + 1) * rows);
+        let square: f64 = residual.mean[own].iter().map(|r| r * r).sum();
+        (square > 0.0).then(|| gain / square)
     }
 
     /// The best shape near `entry`, and its statistic.
