@@ -60,9 +60,10 @@ pub struct Kept<'s, 'a> {
     with_common: bool,
 }
 
-/// Adds families one by one while the data ask for it.
+/// Adds families one by one while the data ask for it; along a single run those of single joints.
 pub fn select(study: &Study) -> Vec<Contender> {
-    let mut kept = Kept { study, causes: Vec::new(), with_common: true };
+    let with_common = study.scene.periodic;
+    let mut kept = Kept { study, causes: Vec::new(), with_common };
     kept.grow();
     kept.causes
 }
@@ -82,18 +83,19 @@ impl<'s, 'a> Kept<'s, 'a> {
         kept
     }
 
-    /// The causes of a single run, by two ways: from `found`, and from single joints' causes alone, with
-    /// those of the arm as a whole only behind them. One cause of all joints may explain more than any on
-    /// one joint, and yet less than several together.
+    /// The causes of a single run: from `found` on single joints, then those of the arm as a whole beside
+    /// them. Where such a cause shows up, all are looked for together as well, and the better evidence
+    /// wins: one cause of all joints may explain more than any on one joint, and yet less than several.
     pub fn of_a_single_run(study: &'s Study<'a>, found: Vec<Contender>) -> Self {
-        let mut together = Self::taken_over(study, found);
-        together.grow();
-        let mut apart = Self { study, causes: Vec::new(), with_common: false };
-        apart.grow();
-        apart.with_common = true;
-        apart.grow();
-        let is_better = apart.total_evidence() > together.total_evidence();
-        let mut kept = if is_better { apart } else { together };
+        let mut kept = Self::taken_over(study, found);
+        kept.grow();
+        if kept.causes.iter().any(|c| c.entry.site.is_none()) {
+            let mut together = Self { study, causes: Vec::new(), with_common: true };
+            together.grow();
+            if together.total_evidence() > kept.total_evidence() {
+                kept = together;
+            }
+        }
         kept.exchange();
         kept
     }
