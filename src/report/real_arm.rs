@@ -530,15 +530,15 @@ impl RealArmStudy {
         let diagnosis = &self.finding.diagnosis;
         Part::new("What remains unexplained")
             .say(format!(
-                "With all causes the training run keeps {} Nm (joints 1 … 6) of {} Nm in moving samples. Most of it lies \
-                 above 3 Hz, where current noise of the moving drive and gear ripple beyond the filter live; without \
-                 repetitions the share of noise cannot be told.",
+                "With all causes the training run keeps {} Nm (joints 1 … 6) of {} Nm in moving samples. How much of \
+                 that is noise is said above, where the motion was recorded twice; what repeats beside the causes has \
+                 no name here.",
                 list(&diagnosis.after.rms_nm, 3),
                 list(&diagnosis.before.rms_nm, 3)
             ))
             .say(
-                "Friction differs between days: the gain on joint 1 is smallest where the run's friction differs most from \
-                 the training run's, and nothing in these logs (no temperatures) would predict that.",
+                "Friction differs between days (the rows “own friction” above say what that costs), and nothing in these \
+                 logs, which hold no temperatures, would predict it.",
             )
     }
 }
