@@ -7,7 +7,7 @@ use clap::Args;
 use super::identify::{LoadedLog, SourceArgs};
 use super::{CommandResult, Outcome};
 use crate::base::{BaseSet, Parameterisation};
-use crate::diagnose::{Cause, Diagnoser, Finding, Kind, Validation};
+use crate::diagnose::{Cause, Diagnoser, Finding, Kind, Validation, repeated};
 use crate::dynamics::Model;
 use crate::identify::Options;
 use crate::log::Effort;
@@ -75,6 +75,8 @@ pub(super) fn run(args: &RealArmArgs) -> CommandResult {
     let finding = diagnoser.diagnose(&training.measurement(), &validations, None)?;
 
     let loaded = read(&sources[0], LOADED)?;
+    let again = diagnoser.diagnose(&loaded.measurement(), &[], None)?;
+    let repeated = repeated(&finding, &again);
     let [unload, load] = [read(&sources[0], SECOND_PAIR[0])?, read(&sources[0], SECOND_PAIR[1])?];
     let second = diagnoser.diagnose(&unload.measurement(), &[], None)?;
     let mut pairs = Vec::new();
@@ -136,6 +138,7 @@ pub(super) fn run(args: &RealArmArgs) -> CommandResult {
         arm: arm.clone(),
         recorded,
         finding,
+        repeated,
         other_gains,
         gains_nm_a,
         pairs,

@@ -151,7 +151,7 @@ impl Search<'_> {
                 let price = span.len() as f64 * n.ln() + 2.0 * tests.ln();
                 Scored {
                     change: c,
-                    evidence: study.statistic.gain(&span, site, &rest) - price,
+                    evidence: study.statistic.gain(&span, &rest) - price,
                     probability: study.statistic.probability(&span, &rest),
                 }
             })
@@ -185,7 +185,7 @@ impl Search<'_> {
         // The part of the residual that the change explains.
         let signal = span.inside(&left);
         let size = signal.square();
-        let gain = study.statistic.gain(&span, change.site, &left);
+        let gain = study.statistic.gain(&span, &left);
         let scale = study.statistic.lambda(&span, &left, gain) / size.max(f64::MIN_POSITIVE);
         let rivals: Vec<&Scored> = scored.iter().filter(|s| s.change != taken[index]).collect();
         let is_alike = |s: &&Scored| {

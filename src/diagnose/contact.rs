@@ -120,11 +120,9 @@ pub fn between_periods(
     if touches.is_empty() {
         return Ok(None);
     }
-    let margin = (MARGIN_S * rate_hz) as usize;
     let mut aside = vec![false; n];
     for touch in &touches {
-        let Range { start, end } = touch.samples;
-        aside[start.saturating_sub(margin)..(end + margin).min(n)].fill(true);
+        aside[touch.disturbed(rate_hz, n)].fill(true);
     }
     let time_s = grid.time_s();
     let mut torque_nm = m.torque_nm.clone();
@@ -140,16 +138,25 @@ pub fn between_periods(
     Ok(Some(Repeated { causes, torque_nm }))
 }
 
+/// Contacts beside a model along a single run.
+#[derive(Default)]
+pub struct BesideModel {
+    /// One cause per contact.
+    pub causes: Vec<Cause>,
+    /// The samples that they disturb.
+    pub samples: Vec<Range<usize>>,
+}
+
 /// Contacts in the residual `error_nm` of a model along a single run with joint velocities `qd_rad_s`,
 /// sample by sample on the evenly spaced clock `time_s`.
 pub fn beside_model(
     error_nm: &JointSignals,
     qd_rad_s: &JointSignals,
     time_s: &[f64],
-) -> Vec<Cause> {
+) -> BesideModel {
     let n = time_s.len();
     if n < 2 {
-        return Vec::new();
+        return BesideModel::default();
     }
     let rate_hz = (n - 1) as f64 / (time_s[n - 1] - time_s[0]);
     let reach = (REVERSAL_S * rate_hz) as usize;
@@ -172,7 +179,10 @@ pub fn beside_model(
         })
         .collect();
     let touches = touches(error_nm, &counts, &sigma, rate_hz, CUTOFFS_HZ[0], FAR_OF_MODEL);
-    touches.iter().map(|touch| touch.cause(time_s)).collect()
+    BesideModel {
+        causes: touches.iter().map(|touch| touch.cause(time_s)).collect(),
+        samples: touches.iter().map(|touch| touch.disturbed(rate_hz, n)).collect(),
+    }
 }
 
 /// `window`, longer by whole periods in which most of the motion repeats (a contact moves the arm for a
@@ -279,6 +289,12 @@ fn touches(
 impl Touch {
     fn overlaps(&self, other: &Self) -> bool {
         self.samples.start < other.samples.end && other.samples.start < self.samples.end
+    }
+
+    /// Its samples and those beside it, of `n` in all.
+    fn disturbed(&self, rate_hz: f64, n: usize) -> Range<usize> {
+        let margin = (MARGIN_S * rate_hz) as usize;
+        self.samples.start.saturating_sub(margin)..(self.samples.end + margin).min(n)
     }
 
     fn cause(&self, time_s: &[f64]) -> Cause {

@@ -45,9 +45,7 @@ pub fn find(m: &Measurement) -> (Vec<Cause>, Record) {
         record.give_back_time(&stalls.rows, stalls.lost_s);
     }
     let lags = velocity_lag(&record.measurement(m.source));
-    for lag in &lags {
-        record.undo_lag(lag.joint.map(|j| j - 1), lag.parameters["delay_s"].value);
-    }
+    record.undo_lags(&lags);
     let outliers = outliers(&record.torque_nm);
     for (j, far) in &outliers {
         record.replace_torque(*j, far);

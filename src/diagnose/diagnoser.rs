@@ -3,7 +3,7 @@
 use super::against;
 use super::candidates::{self, Candidate};
 use super::common_motion::move_to_common_motion;
-use super::contact;
+use super::contact::{self, BesideModel};
 use super::data_faults;
 use super::error::DiagnoseError;
 use super::extension::{Extension, mean_period};
@@ -13,6 +13,7 @@ use super::image::Span;
 use super::intervals;
 use super::misfit;
 use super::payload::{self, PayloadFinding};
+use super::record::Record;
 use super::replay::measured_nm;
 use super::scene::Scene;
 use super::selection::{Kept, LEAST_EVIDENCE, Selected, select};
@@ -98,18 +99,20 @@ impl<'a> Diagnoser<'a> {
         let mut first = Study::new(&self.families, sources, &regression, estimate, m.source)?;
         first.leave_out(coarse);
         let null = Extension::fit(&first, &[], &first.torque);
+        let first = self.without_contacts(first, &null, m.source)?;
         let found = select(&first);
-        // The load on the gear is better known once friction is.
+        // The load on the gear is better known once friction is, and so is what touched the arm.
         let entries: Vec<&Entry> = found.iter().map(|c| &c.entry).collect();
         let refined = Extension::fit(&first, &entries, &first.torque);
-        let mut study = first.with_estimate(self.arm, self.set, &refined.theta);
+        let study = first.with_estimate(self.arm, self.set, &refined.theta);
+        let mut study = self.without_contacts(study, &refined, m.source)?;
+        let null = Extension::fit(&study, &[], &study.torque);
         let mut kept = Kept::taken_over(&study, found.clone());
         if !study.scene.periodic {
             // A single run is judged by its own residual, which is known only now.
             let (_, rest) = kept.without(None);
             study.judge_by(&rest);
-            kept = Kept::taken_over(&study, found);
-            kept.grow();
+            kept = Kept::of_a_single_run(&study, found);
         }
         let selected = kept.selected();
         let entries: Vec<&Entry> = selected.iter().map(|s| &s.contender.entry).collect();
@@ -121,15 +124,24 @@ impl<'a> Diagnoser<'a> {
         let mut physics: Vec<Cause> = selected
             .iter()
             .enumerate()
-            .map(|(c, selected)| self.cause(&study, &kept, selected, c, gains[c], &extension))
+            .map(|(c, selected)| {
+                let gain = gains[c].or(selected.left_out_gain);
+                self.cause(&study, &kept, selected, c, gain, &extension)
+            })
             .collect();
         physics.sort_by(|a, b| b.strength.total_cmp(&a.strength));
         let touches = match &touched {
             Some(touched) => touched.causes.clone(),
-            None if study.scene.periodic => Vec::new(),
-            None => beside_model(&study, &after_nm),
+            None => beside_model(&study, &after_nm).causes,
         };
         faults.extend(touches);
+        if !study.scene.periodic {
+            // What matters most is said first, what only concerns the recording last.
+            let gain = |cause: &Cause| cause.gain_fraction.unwrap_or(0.0);
+            physics.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+            let of_the_record = faults.extract_if(.., |fault| fault.kind.is_of_the_record());
+            physics.extend(of_the_record);
+        }
         let mut causes: Vec<Cause> = faults.into_iter().chain(physics).collect();
         let mut moved_parameters = Vec::new();
         let (mut accepted, mut rest) = kept.without(None);
@@ -150,6 +162,11 @@ impl<'a> Diagnoser<'a> {
         let held_out = held_out
             .iter()
             .map(|log| {
+                // The recorder lags on other days as it does here.
+                let mut record = Record::without_rows(&log.measurement, &[]);
+                record.undo_lags(&causes);
+                let measurement = record.measurement(log.measurement.source);
+                let log = &Validation { measurement, manufacturer_nm: log.manufacturer_nm };
                 let models = Models { null: &null, extension: &extension };
                 held_out_gain(&mut self.identifier, sources, &self.families, log, &models)
             })
@@ -217,6 +234,17 @@ impl<'a> Diagnoser<'a> {
         };
         let names = [reference.source, loaded.source];
         payload::between(&shared, &regressions[0], &regressions[1], names, known_mass_kg)
+    }
+
+    /// `study` of a single run without the rows in which something touched the arm beside `model`.
+    fn without_contacts<'s>(
+        &self,
+        study: Study<'s>,
+        model: &Extension,
+        log: &str,
+    ) -> Result<Study<'s>, DiagnoseError> {
+        let touched = beside_model(&study, &residual(&study, model));
+        study.without_rows(self.set, &touched.samples, log)
     }
 
     fn cause(
@@ -293,8 +321,12 @@ impl<'a> Diagnoser<'a> {
     }
 }
 
-/// Contacts in the residual of the extended model along a single run.
-fn beside_model(study: &Study, after_nm: &JointSignals) -> Vec<Cause> {
+/// Contacts in the residual of a model along a single run; none where a motion repeats, which shows them
+/// better ([`contact::between_periods`]).
+fn beside_model(study: &Study, after_nm: &JointSignals) -> BesideModel {
+    if study.scene.periodic {
+        return BesideModel::default();
+    }
     let regression = study.regression;
     let prepared = &regression.prepared;
     let at = |row: usize| regression.sample(row);

@@ -34,7 +34,10 @@ pub enum DiagnoseError {
         unknowns: usize,
     },
     /// A parameter's column vanishes in the whitened equations.
-    #[error("{log}: the motion does not excite {parameter} beyond its noise")]
+    #[error(
+        "{log}: declined, the motion does not excite {parameter}: without the rigid model there is nothing to \
+         diagnose; `armid identify` names all that is not excited, `armid excite` plans a motion that does"
+    )]
     NotExcited {
         /// The log.
         log: String,

@@ -11,11 +11,12 @@ use super::common_motion::move_to_common_motion;
 use super::diagnoser::rms_where;
 use super::error::DiagnoseError;
 use super::extension::{Extension, mean_period};
+use super::image::{Image, Span};
 use super::scene::Scene;
 use super::verdict::HeldOut;
 use super::whitening::{RunWhitening, Whitening};
 use crate::base::BaseSet;
-use crate::identify::{Identifier, MOVING_RAD_S, Measurement, Options, Regression};
+use crate::identify::{Identifier, MOVING_RAD_S, Measurement, Options, Problem, Regression};
 use crate::robot::{Arm, JointSignals};
 
 /// A log that no model has seen, to measure gains on.
@@ -80,6 +81,10 @@ pub(super) fn held_out_gain(
     let moving = |e: &JointSignals| -> Vec<f64> {
         (0..joints).map(|j| rms_where(e.joint(j), |k| rows.moves[j][k])).collect()
     };
+    let own_friction = |e: &JointSignals| -> Vec<f64> {
+        let of = |j: usize| without_friction_of(problem, set, j, e.joint(j), &rows.moves[j]);
+        (0..joints).map(of).collect()
+    };
     let manufacturer = match log.manufacturer_nm {
         Some(torque_nm) => {
             let given = identifier.regression(&Measurement { torque_nm, ..log.measurement })?;
@@ -97,6 +102,8 @@ pub(super) fn held_out_gain(
         after_rms_nm: all(&after),
         before_moving_rms_nm: moving(&before),
         after_moving_rms_nm: moving(&after),
+        before_own_friction_rms_nm: own_friction(&before),
+        after_own_friction_rms_nm: own_friction(&after),
         before_standstill_free_rms_nm: all(&outside_friction(models.null)),
         after_standstill_free_rms_nm: all(&outside_friction(models.extension)),
         manufacturer_rms_nm: manufacturer.as_ref().map(all),
@@ -130,6 +137,37 @@ impl Rows {
         };
         self.rests.iter().map(share).collect()
     }
+}
+
+/// Rms of the error `e` of joint `j` where it moves, without what its own Coulomb and viscous friction
+/// explain of it there, Nm.
+fn without_friction_of(
+    problem: &Problem,
+    set: &BaseSet,
+    j: usize,
+    e: &[f64],
+    moves: &[bool],
+) -> f64 {
+    let names = [format!("rc{}", j + 1), format!("rv{}", j + 1)];
+    let columns = problem.panels[j].x.chunks_exact(problem.samples);
+    let friction: Vec<&[f64]> = problem
+        .plan
+        .base_indices(j)
+        .zip(columns)
+        .filter(|(base, _)| names.iter().any(|name| name == set.name(*base)))
+        .map(|(_, column)| column)
+        .collect();
+    let where_moving = |y: &[f64]| -> Vec<f64> {
+        y.iter().zip(moves).map(|(y, moves)| if *moves { *y } else { 0.0 }).collect()
+    };
+    let image = |y: &[f64]| Image { mean: where_moving(y), contrast: Vec::new() };
+    let mut span = Span::default();
+    for column in friction {
+        span.push(&image(column));
+    }
+    let mut rest = image(e);
+    span.residualise(&mut rest);
+    rms_where(&rest.mean, |k| moves[k])
 }
 
 /// Coulomb friction of joint `j` in the base parameters `theta`, Nm.

@@ -1,5 +1,7 @@
 //! Signals in the whitened equations, and the space that known columns span there.
 
+use std::ops::Range;
+
 use nalgebra::DMatrix;
 
 /// A torque signal on some joints, in Nm (or Nm per unit of its coefficient).
@@ -44,11 +46,14 @@ pub struct Image {
 impl Image {
     /// ⟨self, other⟩.
     pub fn dot(&self, other: &Self) -> f64 {
-        let mut sum = dot(&self.mean, &other.mean);
-        if !self.contrast.is_empty() && !other.contrast.is_empty() {
-            sum += dot(&self.contrast, &other.contrast);
-        }
-        sum
+        dot(&self.mean, &other.mean) + dot_of_contrasts(self, other)
+    }
+
+    /// From the first to the last row of the mean that is not zero.
+    fn support(&self) -> Range<usize> {
+        let start = self.mean.iter().position(|v| *v != 0.0).unwrap_or(0);
+        let end = self.mean.iter().rposition(|v| *v != 0.0).map_or(start, |last| last + 1);
+        start..end
     }
 
     /// ⟨self, self⟩.
@@ -69,6 +74,11 @@ impl Image {
     pub fn scale(&mut self, factor: f64) {
         self.mean.iter_mut().chain(&mut self.contrast).for_each(|v| *v *= factor);
     }
+}
+
+/// ⟨a, b⟩ in the differences between periods; what repeats has none.
+fn dot_of_contrasts(a: &Image, b: &Image) -> f64 {
+    if a.contrast.is_empty() || b.contrast.is_empty() { 0.0 } else { dot(&a.contrast, &b.contrast) }
 }
 
 /// Sum of products in eight interleaved partial sums: fast, and a fixed order.
@@ -147,8 +157,8 @@ impl Span {
 
     /// Removes from `column` what is spanned.
     pub fn residualise(&self, column: &mut Image) {
-        for direction in &self.directions {
-            let along = direction.dot(column);
+        let along = self.coordinates(column);
+        for (direction, along) in self.directions.iter().zip(along) {
             column.add(-along, direction);
         }
     }
@@ -164,12 +174,18 @@ impl Span {
 
     /// ⟨direction, y⟩ for every direction.
     pub fn coordinates(&self, y: &Image) -> Vec<f64> {
-        self.directions.iter().map(|d| d.dot(y)).collect()
+        // What acts on one joint of a single run is zero in the rows of the others.
+        let support = y.support();
+        let on_support = |direction: &Image| {
+            let mean = dot(&direction.mean[support.clone()], &y.mean[support.clone()]);
+            mean + dot_of_contrasts(direction, y)
+        };
+        self.directions.iter().map(on_support).collect()
     }
 
     /// Length² of the part of `y` inside the span.
     pub fn explained(&self, y: &Image) -> f64 {
-        self.directions.iter().map(|d| d.dot(y).powi(2)).sum()
+        self.coordinates(y).iter().map(|along| along * along).sum()
     }
 
     /// Least-squares coefficients of `y` on the columns that were pushed.

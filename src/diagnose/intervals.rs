@@ -119,8 +119,17 @@ pub fn physical(
             let g = nalgebra::DVector::from_column_slice(gradient);
             let variance = (g.transpose() * &covariance * &g)[(0, 0)].max(0.0);
             let reach = half * variance.sqrt();
-            let ci95 = [quantity.value - reach, quantity.value + reach];
-            (quantity.name, Estimate { value: quantity.value, unit: quantity.unit, ci95 })
+            let value = quantity.value;
+            // What is searched on a logarithmic scale is positive, and a single run knows it to a factor.
+            let by_factor = !study.scene.periodic
+                && family.search() == Search::Logarithmic
+                && value == effect.shape.value;
+            let ci95 = if by_factor {
+                [value * (-reach / value).exp(), value * (reach / value).exp()]
+            } else {
+                [value - reach, value + reach]
+            };
+            (quantity.name, Estimate { value, unit: quantity.unit, ci95 })
         })
         .collect()
 }

@@ -31,6 +31,7 @@ mod misfit;
 mod noise_power;
 mod payload;
 mod record;
+mod repeated;
 pub mod replay;
 mod scene;
 mod selection;
@@ -46,6 +47,7 @@ pub use held_out::Validation;
 pub use image::Column;
 pub use kind::Kind;
 pub use payload::PayloadFinding;
+pub use repeated::{Repeated, repeated};
 pub use scene::{Scene, equivalent_arm};
 pub use verdict::{
     BaseParameter, Cause, DIAGNOSE_SCHEMA, DetectionLimit, Diagnosis, Estimate, HeldOut, Moved,

@@ -1,5 +1,7 @@
 //! A log's record with its faults taken back, as far as they can be.
 
+use super::kind::Kind;
+use super::verdict::Cause;
 use crate::identify::Measurement;
 use crate::robot::JointSignals;
 
@@ -49,9 +51,16 @@ impl Record {
         }
     }
 
+    /// Takes back the lags among `causes`.
+    pub fn undo_lags(&mut self, causes: &[Cause]) {
+        for lag in causes.iter().filter(|cause| cause.kind == Kind::VelocityLag) {
+            self.undo_lag(lag.joint.map(|j| j - 1), lag.parameters["delay_s"].value);
+        }
+    }
+
     /// The velocity of `joint` (of all: `None`) came `lag_s` late: straight lines between samples give what
     /// it was.
-    pub fn undo_lag(&mut self, joint: Option<usize>, lag_s: f64) {
+    fn undo_lag(&mut self, joint: Option<usize>, lag_s: f64) {
         let t = &self.time_s;
         for j in joint.map_or(0..self.qd_rad_s.joints(), |j| j..j + 1) {
             let late = self.qd_rad_s.joint(j).to_vec();

@@ -16,6 +16,10 @@ const FORM_ERROR: f64 = 0.05;
 pub const LEAST_EVIDENCE: f64 = 4.0;
 /// Causes at most: a log that needs more has another kind of problem.
 const MOST_CAUSES: usize = 24;
+/// Share of a cause's square that another explains as well, at least, if it may stand in for it.
+const SHARED: f64 = 0.5;
+/// Rounds in which causes of a single run are exchanged: two may replace each other for ever.
+const EXCHANGES: usize = 3;
 /// Families whose shapes are refined before one is chosen.
 const FINALISTS: usize = 10;
 /// Two effects are told apart with 99.9 % confidence and 90 % power where λ(1 − cos²) exceeds
@@ -44,17 +48,22 @@ pub struct Selected {
     pub class: Vec<(usize, Option<usize>)>,
     /// The others, best first.
     pub rivals: Vec<Contender>,
+    /// Share of the mean square that it removes in stretches of a single run left out of its fit.
+    pub left_out_gain: Option<f64>,
 }
 
 /// The causes kept so far.
 pub struct Kept<'s, 'a> {
     study: &'s Study<'a>,
     causes: Vec<Contender>,
+    /// Whether causes of the arm as a whole are looked for.
+    with_common: bool,
 }
 
-/// Adds families one by one while the data ask for it.
+/// Adds families one by one while the data ask for it; along a single run those of single joints.
 pub fn select(study: &Study) -> Vec<Contender> {
-    let mut kept = Kept { study, causes: Vec::new() };
+    let with_common = study.scene.periodic;
+    let mut kept = Kept { study, causes: Vec::new(), with_common };
     kept.grow();
     kept.causes
 }
@@ -67,10 +76,27 @@ impl<'s, 'a> Kept<'s, 'a> {
             let Entry { family, site, shape, .. } = cause.entry;
             Some(Contender { entry: study.entry(family, site, shape)?, ..cause })
         });
-        let mut kept = Self { study, causes: again.collect() };
+        let mut kept = Self { study, causes: again.collect(), with_common: true };
         for c in 0..kept.causes.len() {
             kept.refine(c);
         }
+        kept
+    }
+
+    /// The causes of a single run: from `found` on single joints, then those of the arm as a whole beside
+    /// them. Where such a cause shows up, all are looked for together as well, and the better evidence
+    /// wins: one cause of all joints may explain more than any on one joint, and yet less than several.
+    pub fn of_a_single_run(study: &'s Study<'a>, found: Vec<Contender>) -> Self {
+        let mut kept = Self::taken_over(study, found);
+        kept.grow();
+        if kept.causes.iter().any(|c| c.entry.site.is_none()) {
+            let mut together = Self { study, causes: Vec::new(), with_common: true };
+            together.grow();
+            if together.total_evidence() > kept.total_evidence() {
+                kept = together;
+            }
+        }
+        kept.exchange();
         kept
     }
 
@@ -97,6 +123,60 @@ impl<'s, 'a> Kept<'s, 'a> {
         }
     }
 
+    /// 2 ln of the evidence for all causes together against none.
+    fn total_evidence(&self) -> f64 {
+        let (span, _) = self.without(None);
+        let price: f64 = self.causes.iter().map(|c| self.study.price(&c.entry)).sum();
+        self.study.statistic.gain(&span, &self.study.residual) - price
+    }
+
+    /// Exchanges causes for what explains the log better beside all others, and grows again.
+    ///
+    /// What was found first may have stood in for a cause that came later, on any joint.
+    fn exchange(&mut self) {
+        for _ in 0..EXCHANGES {
+            let mut exchanged = false;
+            for c in 0..self.causes.len() {
+                let (others, residual) = self.without(Some(c));
+                let Some(best) = self.rivals(c, &others, &residual).into_iter().next() else {
+                    continue;
+                };
+                if best.evidence > self.causes[c].evidence + 1.0 {
+                    self.causes[c] = best;
+                    exchanged = true;
+                }
+            }
+            if !exchanged {
+                return;
+            }
+            for c in 0..self.causes.len() {
+                self.refine(c);
+            }
+            self.drop_unneeded(|_| true);
+            self.grow();
+        }
+    }
+
+    /// What might be in the place of cause `c`, best first. What is ahead along a single run is in its place
+    /// only if it explains the same, and if it would be named there: more evidence in few stretches of time
+    /// alone makes no rival.
+    fn rivals(&self, c: usize, others: &Span, residual: &Image) -> Vec<Contender> {
+        let Entry { family, site, .. } = self.causes[c].entry;
+        let mut rivals = self.contenders(Some(c), others, residual);
+        rivals.retain(|r| (r.entry.family, r.entry.site) != (family, site));
+        if !self.study.scene.periodic {
+            let signal = self.study.span(&self.causes[c].entry, others).inside(residual);
+            let size = signal.square();
+            let is_ahead = |r: &Contender| r.evidence > self.causes[c].evidence;
+            rivals.retain(|r| {
+                !is_ahead(r)
+                    || self.explains(r, others, &signal) > SHARED * size
+                        && self.is_significant(r, others, residual)
+            });
+        }
+        rivals
+    }
+
     /// The causes, judged.
     pub fn selected(&self) -> Vec<Selected> {
         (0..self.causes.len()).map(|c| self.judged(c)).collect()
@@ -105,11 +185,27 @@ impl<'s, 'a> Kept<'s, 'a> {
     /// The best shape of cause `c`, the others given.
     fn refine(&mut self, c: usize) {
         let (others, residual) = self.without(Some(c));
-        let current = &self.causes[c].entry;
+        let current = self.best_start(&self.causes[c].entry, &others, &residual);
         if let Some((entry, score)) = self.study.refined(current, &others, &residual) {
             let evidence = self.evidence(&entry, score);
             self.causes[c] = Contender { entry, score, evidence };
         }
+    }
+
+    /// The best of `entry`'s shape and the family's starting shapes; several causes of one family on one
+    /// joint keep their own.
+    fn best_start<'e>(&'e self, entry: &'e Entry, others: &Span, residual: &Image) -> &'e Entry {
+        let study = self.study;
+        if study.scene.periodic || study.families[entry.family].is_repeatable() {
+            return entry;
+        }
+        let score = |e: &Entry| {
+            study.score(e, others, residual).map_or(f64::NEG_INFINITY, |score| score.gain)
+        };
+        let same = |e: &&Entry| (e.family, e.site) == (entry.family, entry.site);
+        let start = (entry, score(entry));
+        let best = study.entries.iter().filter(same).map(|e| (e, score(e)));
+        best.fold(start, |best, e| if e.1 > best.1 { e } else { best }).0
     }
 
     /// Span of all causes but `left_out`, and the residual outside it.
@@ -135,6 +231,13 @@ impl<'s, 'a> Kept<'s, 'a> {
     fn contenders(&self, open: Option<usize>, others: &Span, residual: &Image) -> Vec<Contender> {
         let study = self.study;
         let orders = self.ripple_orders(residual);
+        let open_site =
+            open.and_then(|c| self.causes[c].entry.site).filter(|_| !study.scene.periodic);
+        let left_out = |entry: &Entry| match entry.site {
+            None => !self.with_common,
+            // Along a single run what acts on another joint does not stand in for this one's cause.
+            site => open_site.is_some() && site != open_site,
+        };
         let taken = |entry: &Entry| {
             let place = (entry.family, entry.site);
             let is_taken = |c: &Contender| (c.entry.family, c.entry.site) == place;
@@ -150,7 +253,13 @@ impl<'s, 'a> Kept<'s, 'a> {
             .entries
             .par_iter()
             .chain(orders.par_iter())
-            .map(|entry| if taken(entry) { None } else { study.score(entry, others, residual) })
+            .map(|entry| {
+                if left_out(entry) || taken(entry) {
+                    None
+                } else {
+                    study.score(entry, others, residual)
+                }
+            })
             .collect();
         for (entry, score) in study.entries.iter().chain(&orders).zip(scores) {
             let Some(score) = score else { continue };
@@ -164,7 +273,13 @@ impl<'s, 'a> Kept<'s, 'a> {
             }
         }
         best.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
-        let (head, tail) = best.split_at(FINALISTS.min(best.len()));
+        let mut finalists = FINALISTS.min(best.len());
+        if !study.scene.periodic {
+            // A finer shape does not double the evidence.
+            let near = |c: &&Contender| c.evidence > 0.5 * best[0].evidence;
+            finalists = best.iter().take(finalists).take_while(near).count();
+        }
+        let (head, tail) = best.split_at(finalists);
         let mut all: Vec<Contender> = head
             .par_iter()
             .map(|contender| match study.refined(&contender.entry, others, residual) {
@@ -202,7 +317,8 @@ impl<'s, 'a> Kept<'s, 'a> {
 
     /// Whether chance explains `contender` in fewer than one log without faults in 500, all
     /// families, sites and shapes counted, the evidence is for it, and it is more than what the
-    /// approximate form of the causes found beside it may leave.
+    /// approximate form of the causes found beside it may leave. Along a single run it also has to show in
+    /// stretches of time left out of its fit.
     fn is_significant(&self, contender: &Contender, others: &Span, residual: &Image) -> bool {
         let study = self.study;
         let site = contender.entry.site;
@@ -221,23 +337,31 @@ impl<'s, 'a> Kept<'s, 'a> {
         let tests = study.entries.len() as f64 + study.alternatives(&contender.entry);
         contender.evidence > LEAST_EVIDENCE
             && single * tests < FALSE_ALARM
-            && study.statistic.generalises(&span, residual)
+            && study.generalises(&contender.entry, &span, residual)
     }
 
     /// Refines all causes jointly, exchanges those that another family now replaces, and drops those
     /// that are not needed any more. `false` if the newest cause was dropped.
+    ///
+    /// Along a single run, whose causes are many, only those that share a joint with the newest: the others are
+    /// looked at once all are found ([`Self::exchange`]).
     fn settle(&mut self) -> bool {
         let newest = self.causes.len() - 1;
         let new_site = self.causes[newest].entry.site;
+        let shares_joint =
+            |site: Option<usize>| site.is_none() || new_site.is_none() || site == new_site;
+        let periodic = self.study.scene.periodic;
+        let is_looked_at = |site| periodic || shares_joint(site);
         for _ in 0..2 {
             for c in 0..self.causes.len() {
-                self.refine(c);
+                if is_looked_at(self.causes[c].entry.site) {
+                    self.refine(c);
+                }
             }
             let mut exchanged = false;
             for c in 0..self.causes.len().saturating_sub(1) {
                 // Only what shares a joint with the newest can have stood in for it.
-                let site = self.causes[c].entry.site;
-                if site.is_some() && new_site.is_some() && site != new_site {
+                if !shares_joint(self.causes[c].entry.site) {
                     continue;
                 }
                 let (others, residual) = self.without(Some(c));
@@ -258,21 +382,31 @@ impl<'s, 'a> Kept<'s, 'a> {
                 break;
             }
         }
-        let mut newest_stays = true;
+        !self.drop_unneeded(is_looked_at).contains(&newest)
+    }
+
+    /// Drops causes at these sites that are not needed beside the others; which they were.
+    fn drop_unneeded(&mut self, is_looked_at: impl Fn(Option<usize>) -> bool) -> Vec<usize> {
+        let mut dropped = Vec::new();
         let mut c = 0;
-        let mut index = 0;
         while c < self.causes.len() {
-            let (others, residual) = self.without(Some(c));
-            let needed = self.is_significant(&self.causes[c].clone(), &others, &residual);
-            if needed {
+            let is_needed = |kept: &Self| {
+                let (others, residual) = kept.without(Some(c));
+                kept.is_significant(&kept.causes[c], &others, &residual)
+            };
+            if !is_looked_at(self.causes[c].entry.site) || is_needed(self) {
                 c += 1;
             } else {
                 self.causes.remove(c);
-                newest_stays &= index != newest;
+                dropped.push(c + dropped.len());
             }
-            index += 1;
         }
-        newest_stays
+        dropped
+    }
+
+    /// Square that `contender` explains of `signal`, which `others` have left.
+    fn explains(&self, contender: &Contender, others: &Span, signal: &Image) -> f64 {
+        self.study.span(&contender.entry, others).explained(signal)
     }
 
     /// Confidence, class and rivals of cause `c`, the others given.
@@ -284,21 +418,27 @@ impl<'s, 'a> Kept<'s, 'a> {
         // The signal of the cause as the data show it.
         let signal = own.inside(&residual);
         let size = signal.square();
-        let identity = (contender.entry.family, contender.entry.site);
-        let mut rivals = self.contenders(Some(c), &others, &residual);
-        rivals.retain(|r| (r.entry.family, r.entry.site) != identity);
+        let mut rivals = self.rivals(c, &others, &residual);
         let scale = contender.score.lambda / size.max(f64::MIN_POSITIVE);
-        let is_alike = |rival: &Contender| {
-            let explained = study.span(&rival.entry, &others).explained(&signal);
-            scale * (size - explained) < TELLS_APART
-        };
-        let alike: Vec<bool> = rivals.iter().map(is_alike).collect();
-        let in_class = rivals.iter().zip(&alike).filter(|(_, alike)| **alike);
+        let explained: Vec<f64> =
+            rivals.iter().map(|rival| self.explains(rival, &others, &signal)).collect();
+        let is_alike = |explained: &f64| scale * (size - explained) < TELLS_APART;
+        let in_class = rivals.iter().zip(&explained).filter(|(_, explained)| is_alike(explained));
         let class = in_class.map(|(rival, _)| (rival.entry.family, rival.entry.site)).collect();
-        let evidences: Vec<f64> = rivals.iter().map(|r| r.evidence).collect();
+        // Something else that a single run shows beside the cause is no reason to doubt it.
+        let in_its_place = |explained: &f64| {
+            study.scene.periodic || is_alike(explained) || *explained > SHARED * size
+        };
+        let (evidences, alike): (Vec<f64>, Vec<bool>) = rivals
+            .iter()
+            .zip(&explained)
+            .filter(|(_, explained)| in_its_place(explained))
+            .map(|(rival, explained)| (rival.evidence, is_alike(explained)))
+            .unzip();
         let confidence = probability_of_class(contender.evidence, &evidences, &alike);
         rivals.truncate(FINALISTS);
-        Selected { contender, confidence, class, rivals }
+        let left_out_gain = study.left_out_gain(&contender.entry, &own, &residual);
+        Selected { contender, confidence, class, rivals, left_out_gain }
     }
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
-use super::image::{Image, Span};
+use super::image::{Image, Span, dot};
 use super::noise_power::NoiseKnowledge;
 use super::whitening::Whitening;
 
@@ -19,15 +19,15 @@ pub enum Statistic {
         blocks: usize,
         /// Rows per joint.
         rows: usize,
-        /// Independent rows per joint: rows over the correlation time of the null residual.
-        effective: Vec<f64>,
+        /// Autocorrelation of the residual per joint, lags 1, 2, … up to its first zero, a block at most.
+        memory: Vec<Vec<f64>>,
     },
 }
 
 /// Stretches of time of the cross-validation.
 const FOLDS: usize = 10;
-/// Share of the explained square that has to be explained in left-out stretches as well.
-const KEPT_SHARE: f64 = 0.5;
+/// Share of an effect's square on a joint below which the joint says nothing of it.
+const TRACE: f64 = 1e-3;
 
 impl Statistic {
     /// For the rows of `whitening`, with the null model's `residual`.
@@ -37,12 +37,13 @@ impl Statistic {
             Whitening::Run(run) => {
                 let block_of = run.blocks();
                 let rows = block_of.len() / joints;
-                let effective = residual
+                let block_rows = block_of.iter().take_while(|block| **block == 0).count();
+                let memory = residual
                     .mean
                     .chunks_exact(rows)
-                    .map(|r| rows as f64 / correlation_rows(r))
+                    .map(|r| autocorrelation(r, block_rows))
                     .collect();
-                Self::Blocks { blocks: block_of[rows - 1] + 1, block_of, rows, effective }
+                Self::Blocks { blocks: block_of[rows - 1] + 1, block_of, rows, memory }
             }
         }
     }
@@ -50,24 +51,30 @@ impl Statistic {
     /// Twice the gain in log-likelihood when the residual loses what `span` explains.
     ///
     /// Periods: ‖P r‖², less where noise is not well known ([`NoiseKnowledge::gain`]). Blocks:
-    /// T = n_e ln(S/(S − ‖P r‖²)) with S the square of the residual of the
-    /// joint (or all) and n_e the independent rows in it.
-    pub fn gain(&self, span: &Span, site: Option<usize>, residual: &Image) -> f64 {
-        match self {
-            Self::Periods(knowledge) => knowledge.gain(span, residual),
-            Self::Blocks { rows, effective, .. } => {
-                let explained = span.explained(residual);
-                let (square, effective) = match site {
-                    Some(j) => {
-                        let own = &residual.mean[j * rows..(j + 1) * rows];
-                        (own.iter().map(|r| r * r).sum::<f64>(), effective[j])
-                    }
-                    None => (residual.square(), effective.iter().sum()),
-                };
-                let left = (1.0 - explained / square).max(1e-6);
-                -effective * left.ln()
-            }
-        }
+    /// T = −Σ_j n_j ln(1 − (2⟨u, r⟩ − ‖u‖²)/‖r‖²) over the joints, u = P r, with n_j the rows that are
+    /// independent as far as u can tell: ⟨u, r⟩ has the variance ‖u‖² (1 + 2 Σ ρ_r ρ_u) per row (Bartlett 1946),
+    /// so that n_j = n/(1 + 2 Σ ρ_r ρ_u). Ripple, whose own correlation changes its sign, is told from slow
+    /// errors that way.
+    pub fn gain(&self, span: &Span, residual: &Image) -> f64 {
+        let (rows, memory) = match self {
+            Self::Periods(knowledge) => return knowledge.gain(span, residual),
+            Self::Blocks { rows, memory, .. } => (*rows, memory),
+        };
+        let signal = span.inside(residual);
+        let whole = signal.square();
+        let panels = signal.mean.chunks_exact(rows).zip(residual.mean.chunks_exact(rows));
+        panels
+            .zip(memory)
+            .map(|((u, r), memory)| {
+                let square = dot(r, r);
+                // The null model makes a trace of everything everywhere.
+                if square == 0.0 || dot(u, u) < TRACE * whole {
+                    return 0.0;
+                }
+                let explained = (2.0 * dot(u, r) - dot(u, u)) / square;
+                -independent(u, memory) * (1.0 - explained).max(1e-6).ln()
+            })
+            .sum()
     }
 
     /// λ̂ of what `span` explains: its length² in units of the noise; for a single run the gain, because
@@ -82,9 +89,8 @@ impl Statistic {
     /// Samples that count in the penalty for a coefficient.
     pub fn sample_count(&self, site: Option<usize>, all_rows: usize) -> f64 {
         match (self, site) {
-            (Self::Periods(_), _) => all_rows as f64,
-            (Self::Blocks { effective, .. }, Some(j)) => effective[j],
-            (Self::Blocks { effective, .. }, None) => effective.iter().sum(),
+            (Self::Blocks { rows, .. }, Some(_)) => *rows as f64,
+            _ => all_rows as f64,
         }
     }
 
@@ -119,14 +125,13 @@ impl Statistic {
         }
     }
 
-    /// Whether what `span` explains of `residual` is also explained in parts of the run that were left
-    /// out of the fit: blocked cross-validation in [`FOLDS`] stretches of time. Always true where noise
-    /// is known.
+    /// Square that `span` takes from `residual` in stretches left out of the fit: blocked cross-validation in
+    /// [`FOLDS`] stretches of time. `None` where noise is known.
     ///
     /// With s_f = Uᵀr and G_f = UᵀU over stretch f, b₋f = (I − G_f)⁻¹ (Uᵀr − s_f), and the gain is
     /// Σ_f 2 b₋fᵀ s_f − b₋fᵀ G_f b₋f.
-    pub fn generalises(&self, span: &Span, residual: &Image) -> bool {
-        let Self::Blocks { block_of, blocks, .. } = self else { return true };
+    pub fn left_out_gain(&self, span: &Span, residual: &Image) -> Option<f64> {
+        let Self::Blocks { block_of, blocks, .. } = self else { return None };
         let k = span.len();
         let whole = DVector::from_vec(span.coordinates(residual));
         let mut along = vec![DVector::<f64>::zeros(k); FOLDS];
@@ -144,10 +149,11 @@ impl Statistic {
         let mut gain = 0.0;
         for (s, g) in along.iter().zip(&gram) {
             let rest = DMatrix::identity(k, k) - g;
-            let Some(b) = rest.lu().solve(&(&whole - s)) else { return false };
+            // Nothing is known of a direction that lives in one stretch alone: its gain there is none.
+            let Some(b) = rest.lu().solve(&(&whole - s)) else { continue };
             gain += 2.0 * b.dot(s) - b.dot(&(g * &b));
         }
-        gain > KEPT_SHARE * whole.norm_squared()
+        Some(gain)
     }
 
     /// Covariance of the coordinates on `span` from the scatter of block sums of what is left.
@@ -204,20 +210,20 @@ pub fn upper_chi_squared(x: f64, k: usize) -> f64 {
     ChiSquared::new(k as f64).map_or(1.0, |d| d.sf(x.max(0.0)))
 }
 
-/// Integrated correlation time of a series, in samples: 1 + 2 Σ ρ up to the first ρ ≤ 0.
-fn correlation_rows(r: &[f64]) -> f64 {
-    let n = r.len();
-    let square: f64 = r.iter().map(|v| v * v).sum();
-    if square == 0.0 {
-        return 1.0;
-    }
-    let mut sum = 1.0;
-    for lag in 1..n / 4 {
-        let rho = r[lag..].iter().zip(r).map(|(a, b)| a * b).sum::<f64>() / square;
-        if rho <= 0.0 {
-            break;
-        }
-        sum += 2.0 * rho;
-    }
-    sum
+/// Autocorrelation of a series at lags 1, 2, … `longest` up to the first that is not positive.
+fn autocorrelation(r: &[f64], longest: usize) -> Vec<f64> {
+    let square = dot(r, r).max(f64::MIN_POSITIVE);
+    let at = |lag: usize| dot(&r[lag..], &r[..r.len() - lag]) / square;
+    (1..=longest.min(r.len() - 1)).map(at).take_while(|rho| *rho > 0.0).collect()
+}
+
+/// Rows of a residual with autocorrelation `memory` that are independent along `signal`.
+fn independent(signal: &[f64], memory: &[f64]) -> f64 {
+    let rows = signal.len();
+    let square = dot(signal, signal).max(f64::MIN_POSITIVE);
+    let sum: f64 = (1..)
+        .zip(memory)
+        .map(|(lag, rho)| rho * dot(&signal[lag..], &signal[..rows - lag]) / square)
+        .sum();
+    rows as f64 / (1.0 + 2.0 * sum).max(1.0)
 }

@@ -1,10 +1,12 @@
 //! One log made ready for tests: whitened, the null model projected out, and every family's columns.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::candidates::{Candidate, Search, Shape};
 use super::error::DiagnoseError;
-use super::image::{Column, Image, Span};
+use super::image::{Column, Image, Span, dot};
 use super::scene::Scene;
 use super::statistic::Statistic;
 use super::whitening::{PeriodWhitening, RunWhitening, Whitening};
@@ -64,6 +66,11 @@ pub struct Study<'a> {
 /// of it is the noise of the null model's accelerations, which the residual has as well. A spring on a joint
 /// without gravity keeps 2.7 %, and was found in one of 50 logs without one.
 const ABSORBED: f64 = 0.04;
+/// Share of the explained square that has to be explained in stretches left out of the fit as well.
+const KEPT_SHARE: f64 = 0.5;
+/// Share of its joint's mean square that a cause has to remove there: 2.5 % of the rms error are within what
+/// approximate laws leave beside each other.
+const LEAST_GAIN: f64 = 0.05;
 /// Steps of a golden-section search: the bracket shrinks to 1 %.
 const GOLDEN_STEPS: usize = 10;
 
@@ -82,6 +89,20 @@ impl<'a> Study<'a> {
         } else {
             Whitening::Run(RunWhitening::new(regression, options, sigma_nm)?)
         };
+        let mut study = Self::behind(whitening, scene, families, set, regression, log)?;
+        study.fill_entries();
+        Ok(study)
+    }
+
+    /// Everything but the entries.
+    fn behind(
+        whitening: Whitening,
+        scene: Scene,
+        families: &'a [Box<dyn Candidate>],
+        set: &BaseSet,
+        regression: &'a Regression,
+        log: &str,
+    ) -> Result<Self, DiagnoseError> {
         let problem = &regression.problem;
         let n = problem.samples;
         let columns: Vec<Column> = (0..problem.parameters())
@@ -108,7 +129,7 @@ impl<'a> Study<'a> {
         let mut residual = torque.clone();
         null.residualise(&mut residual);
         let statistic = Statistic::new(&whitening, &residual, problem.joints());
-        let mut study = Self {
+        Ok(Self {
             families,
             scene,
             regression,
@@ -120,7 +141,25 @@ impl<'a> Study<'a> {
             entries: Vec::new(),
             torque,
             left_out: Vec::new(),
-        };
+        })
+    }
+
+    /// The same study of a single run with `rows` of the regression left out: what touched the arm there
+    /// happened once, and no law of friction is to be bent by it.
+    pub fn without_rows(
+        mut self,
+        set: &BaseSet,
+        rows: &[Range<usize>],
+        log: &str,
+    ) -> Result<Self, DiagnoseError> {
+        let Whitening::Run(run) = &mut self.whitening else { return Ok(self) };
+        if rows.is_empty() {
+            return Ok(self);
+        }
+        run.leave_out(rows);
+        let Self { whitening, scene, families, regression, left_out, .. } = self;
+        let study = Self::behind(whitening, scene, families, set, regression, log)?;
+        let mut study = Self { left_out, ..study };
         study.fill_entries();
         Ok(study)
     }
@@ -196,11 +235,36 @@ impl<'a> Study<'a> {
         if span.len() != entry.images.len() {
             return None;
         }
-        let possible = self.families[entry.family].is_possible(&span.solve(residual));
+        let possible = self.families[entry.family].is_possible(entry.shape, &span.solve(residual));
         possible.then(|| {
-            let gain = self.statistic.gain(&span, entry.site, residual);
+            let gain = self.statistic.gain(&span, residual);
             Score { gain, lambda: self.statistic.lambda(&span, residual, gain) }
         })
+    }
+
+    /// Share of the mean square of the joint (or all) that `span` of `entry` takes from `residual` in
+    /// stretches of a single run that were left out of its fit.
+    pub fn left_out_gain(&self, entry: &Entry, span: &Span, residual: &Image) -> Option<f64> {
+        let gain = self.statistic.left_out_gain(span, residual)?;
+        let square = self.square(entry, residual);
+        (square > 0.0).then(|| gain / square)
+    }
+
+    /// Whether what `span` of `entry` explains of `residual` is also explained in stretches of a single run
+    /// that were left out of its fit, and is not too little to be told from approximate laws beside it. Always
+    /// true where noise is known.
+    pub fn generalises(&self, entry: &Entry, span: &Span, residual: &Image) -> bool {
+        self.statistic.left_out_gain(span, residual).is_none_or(|gain| {
+            gain > KEPT_SHARE * span.explained(residual)
+                && gain > LEAST_GAIN * self.square(entry, residual)
+        })
+    }
+
+    /// Square of `residual` on the joint of `entry` (or all) along a single run.
+    fn square(&self, entry: &Entry, residual: &Image) -> f64 {
+        let rows = residual.mean.len() / self.scene.joints();
+        let own = entry.site.map_or(0..residual.mean.len(), |j| j * rows..(j + 1) * rows);
+        dot(&residual.mean[own.clone()], &residual.mean[own])
     }
 
     /// The best shape near `entry`, and what it explains.

@@ -33,8 +33,9 @@ pub struct Cause {
     pub confidence: f64,
     /// Physical parameters.
     pub parameters: std::collections::BTreeMap<&'static str, Estimate>,
-    /// Share of the explainable mean square that it removes, on data not used for the fit; null where no
-    /// data were left for that.
+    /// Share of the explainable mean square that it removes, on data not used for the fit; along a single
+    /// run of the joint's whole mean square beside the other causes, in stretches of time left out of its
+    /// fit. Null where no data were left for that.
     pub gain_fraction: Option<f64>,
     /// What would separate it from its class; null where nothing has to be separated.
     pub separating_experiment: Option<&'static str>,
@@ -115,6 +116,11 @@ pub struct HeldOut {
     pub manufacturer_rms_nm: Option<Vec<f64>>,
     /// The manufacturer's feed-forward, samples in which the joint moves.
     pub manufacturer_moving_rms_nm: Option<Vec<f64>>,
+    /// Without the causes, samples in which the joint moves, had its Coulomb and viscous friction been
+    /// fitted to this log: shows what friction of another day costs, and is no gain.
+    pub before_own_friction_rms_nm: Vec<f64>,
+    /// With the causes, likewise.
+    pub after_own_friction_rms_nm: Vec<f64>,
     /// Share of samples in which the joint stands still.
     pub standstill_fraction: Vec<f64>,
 }
@@ -214,7 +220,8 @@ impl Diagnosis {
             self.verdict = Verdict::CauseNamed;
             self.sentences.clear();
         }
-        self.sentences.extend(cause.iter().map(Cause::sentence));
+        let noise_is_known = self.noise_floor_nm.is_some();
+        self.sentences.extend(cause.iter().map(|c| c.sentence(noise_is_known)));
         self.sentences.extend(payload.sentences());
         self.causes.extend(cause);
         self.payload = Some(payload);
@@ -222,7 +229,8 @@ impl Diagnosis {
 
     /// The first screen.
     pub(super) fn in_sentences(&self) -> Vec<String> {
-        let mut out: Vec<String> = self.causes.iter().map(Cause::sentence).collect();
+        let mut out: Vec<String> =
+            self.causes.iter().map(|c| c.sentence(self.noise_floor_nm.is_some())).collect();
         if let Some(unexplained) = &self.unexplained {
             out.push(format!(
                 "Joint {} shows {:.2} Nm (rms) that no known effect explains; it depends most clearly on the {}.",
@@ -255,7 +263,7 @@ impl Cause {
         }
     }
 
-    fn sentence(&self) -> String {
+    fn sentence(&self, noise_is_known: bool) -> String {
         match self.kind {
             Kind::Contact => return self.contact_sentence(),
             Kind::Payload => return self.payload_sentence(),
@@ -278,10 +286,12 @@ impl Cause {
             (false, _) => format!("{place} misses {} ({numbers}).", self.in_words),
         };
         if let Some(gain) = self.gain_fraction {
-            text += &format!(
-                " Adding it removes {:.0} % of what the noise floor leaves to explain, on data not used for the fit.",
-                100.0 * gain.clamp(0.0, 1.0)
-            );
+            let of = if noise_is_known {
+                "of what the noise floor leaves to explain, on data not used for the fit"
+            } else {
+                "of the error's mean square, in stretches of time left out of its fit"
+            };
+            text += &format!(" Adding it removes {:.0} % {of}.", 100.0 * gain.clamp(0.0, 1.0));
         }
         if !self.class.is_empty() {
             let class = self.class.join(", ");

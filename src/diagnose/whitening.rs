@@ -1,5 +1,6 @@
 //! The equations of a log in which noise is white: where every test is made.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{Complex, DMatrix};
@@ -336,6 +337,13 @@ impl RunWhitening {
                 rows.clone().map(at).collect()
             })
             .collect()
+    }
+
+    /// These rows of the regression count on no joint any more.
+    pub fn leave_out(&mut self, rows: &[Range<usize>]) {
+        for counts in &mut self.counts {
+            rows.iter().for_each(|rows| counts[rows.clone()].fill(false));
+        }
     }
 
     fn filtered(&self, y: &[f64]) -> Vec<f64> {

@@ -66,7 +66,7 @@ impl Candidate for Backlash {
         "hold the motor and push the link both ways: play gives no torque, a spring does"
     }
 
-    fn is_possible(&self, b: &[f64]) -> bool {
+    fn is_possible(&self, _: Shape, b: &[f64]) -> bool {
         b[0] > 0.0
     }
 

@@ -85,7 +85,7 @@ impl Candidate for Elasticity {
         "motor and link encoder in one log, or a tap on the link: the resonance tells the stiffness"
     }
 
-    fn is_possible(&self, b: &[f64]) -> bool {
+    fn is_possible(&self, _: Shape, b: &[f64]) -> bool {
         b[0] > 0.0
     }
 

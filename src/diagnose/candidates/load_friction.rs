@@ -1,24 +1,76 @@
 //! Friction of a loaded gear: τ = μ |τ_L| sign q̇, τ_L the torque the gear transmits.
+//!
+//! A single run is also asked for the exponent, τ = c |τ_L|^p sign q̇, and for friction under the bending
+//! moment on the joint's bearing. Of that moment the torque on the next joint is known, where its axis is
+//! perpendicular to this one's (variant 1). μ is the friction per load at the run's rms load.
 
 use super::*;
 
 /// See the module.
 pub struct LoadFriction;
 
+/// The variant whose load is the bending moment.
+const BENDING: usize = 1;
+/// Exponents to begin with along a single run.
+const EXPONENTS: [f64; 4] = [1.0, 1.5, 2.0, 2.5];
+
+/// Torque by which joint `j` is loaded, Nm.
+fn load(scene: &Scene, j: usize, variant: usize) -> &[f64] {
+    scene.link_nm.joint(if variant == BENDING { j + 1 } else { j })
+}
+
+/// Whether the axis behind joint `j` is perpendicular to its own, so that its torque bends joint `j`.
+fn is_bent(scene: &Scene, j: usize) -> bool {
+    // The cosine between both axes: the child's z in the parent's frame.
+    scene.arm.joints.get(j + 1).is_some_and(|next| next.placement.rotation[(2, 2)].abs() < 0.1)
+}
+
+/// p; a motion that repeats is not asked for it.
+fn exponent(shape: Shape) -> f64 {
+    if shape.value > 0.0 { shape.value } else { 1.0 }
+}
+
 impl Candidate for LoadFriction {
     fn kind(&self) -> Kind {
         Kind::LoadFriction
     }
 
-    fn columns(&self, scene: &Scene, site: Option<usize>, _: Shape) -> Vec<Column> {
-        let j = joint(site);
-        // The rotor sits on the motor's side of the gear: its torque is not transmitted.
-        let (load, sign) = (scene.link_nm.joint(j), scene.sign.joint(j));
-        vec![Column::on(j, samples(scene, |k| load[k].abs() * sign[k]))]
+    fn shapes(&self, scene: &Scene, site: Option<usize>) -> Vec<Shape> {
+        if scene.periodic {
+            return vec![Shape { variant: 0, value: 0.0 }];
+        }
+        let variants = if is_bent(scene, joint(site)) { 0..=BENDING } else { 0..=0 };
+        variants.flat_map(|variant| EXPONENTS.map(|value| Shape { variant, value })).collect()
     }
 
-    fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
-        vec![quantity("mu", b[0], "")]
+    fn search(&self) -> Search {
+        Search::Logarithmic
+    }
+
+    fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
+        let j = joint(site);
+        // The rotor sits on the motor's side of the gear: its torque is not transmitted.
+        let (load, sign) = (load(scene, j, shape.variant), scene.sign.joint(j));
+        let p = exponent(shape);
+        vec![Column::on(j, samples(scene, |k| load[k].abs().powf(p) * sign[k]))]
+    }
+
+    fn quantities(
+        &self,
+        scene: &Scene,
+        site: Option<usize>,
+        shape: Shape,
+        b: &[f64],
+    ) -> Vec<Quantity> {
+        let load = load(scene, joint(site), shape.variant);
+        let rms = (load.iter().map(|l| l * l).sum::<f64>() / load.len() as f64).sqrt();
+        let mu = b[0] * rms.powf(exponent(shape) - 1.0);
+        let name = if shape.variant == BENDING { "mu_bending" } else { "mu" };
+        let mut out = vec![quantity(name, mu, "")];
+        if shape.value > 0.0 {
+            out.push(quantity("exponent", shape.value, ""));
+        }
+        out
     }
 
     fn separating_experiment(&self) -> &'static str {

@@ -124,8 +124,8 @@ pub trait Candidate: Sync {
     /// The experiment that tells it from what it resembles.
     fn separating_experiment(&self) -> &'static str;
 
-    /// Whether coefficients `b` can belong to it at all.
-    fn is_possible(&self, _b: &[f64]) -> bool {
+    /// Whether coefficients `b` can belong to it at all, in this shape.
+    fn is_possible(&self, _shape: Shape, _b: &[f64]) -> bool {
         true
     }
 

@@ -1,20 +1,33 @@
-//! Friction curved in speed: τ = a |q̇|^p sign q̇, p < 1 concave, p > 1 convex, beside the linear law.
+//! Friction curved in speed beside the linear law: τ = a |q̇|^p sign q̇, p < 1 concave, p > 1 convex.
+//!
+//! Along a single run also friction that rises from one level to another around a speed v,
+//! τ = a (1 − e^{−(q̇/v)²}) sign q̇, a > 0 (variant 2; with a < 0 it is Stribeck's).
 
 use super::*;
 
 /// See the module.
 pub struct NonlinearViscous;
 
+/// The variant that rises around a speed.
+const STEP: usize = 2;
+
+/// The law at speed `v` (rad/s, ≥ 0), per unit of a.
+fn law(shape: Shape, v: f64) -> f64 {
+    if shape.variant == STEP { -(-(v / shape.value).powi(2)).exp_m1() } else { v.powf(shape.value) }
+}
+
 impl Candidate for NonlinearViscous {
     fn kind(&self) -> Kind {
         Kind::NonlinearViscous
     }
 
-    fn shapes(&self, _: &Scene, _: Option<usize>) -> Vec<Shape> {
+    fn shapes(&self, scene: &Scene, _: Option<usize>) -> Vec<Shape> {
         // At p = 0 and p = 1 the law is Coulomb's or linear: concave and convex are searched apart.
         let concave = [0.3, 0.5, 0.7].map(|value| Shape { variant: 0, value });
         let convex = [1.4, 1.8, 2.2, 3.0].map(|value| Shape { variant: 1, value });
-        concave.into_iter().chain(convex).collect()
+        let steps = if scene.periodic { &[][..] } else { &[0.15, 0.25, 0.4, 0.65, 1.0][..] };
+        let steps = steps.iter().map(|&value| Shape { variant: STEP, value });
+        concave.into_iter().chain(convex).chain(steps).collect()
     }
 
     fn search(&self) -> Search {
@@ -24,15 +37,25 @@ impl Candidate for NonlinearViscous {
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let j = joint(site);
         let (qd, sign) = (scene.motion.qd_rad_s.joint(j), scene.sign.joint(j));
-        vec![Column::on(j, samples(scene, |k| sign[k] * qd[k].abs().powf(shape.value)))]
+        vec![Column::on(j, samples(scene, |k| sign[k] * law(shape, qd[k].abs())))]
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, shape: Shape, b: &[f64]) -> Vec<Quantity> {
-        vec![quantity("amplitude_nm", b[0], "Nm"), quantity("exponent", shape.value, "")]
+        let amplitude = quantity("amplitude_nm", b[0] * law(shape, 1.0), "Nm");
+        let second = if shape.variant == STEP {
+            quantity("speed_rad_s", shape.value, "rad/s")
+        } else {
+            quantity("exponent", shape.value, "")
+        };
+        vec![amplitude, second]
     }
 
     fn separating_experiment(&self) -> &'static str {
         "constant speeds over the joint's whole range of speed, both directions, warm"
+    }
+
+    fn is_possible(&self, shape: Shape, b: &[f64]) -> bool {
+        shape.variant != STEP || b[0] > 0.0
     }
 
     fn in_words(&self) -> &'static str {

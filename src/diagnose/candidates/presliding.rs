@@ -98,7 +98,7 @@ impl Candidate for Presliding {
         "triangular motion of ±2 mrad: the torque follows the angle on a hysteresis loop"
     }
 
-    fn is_possible(&self, b: &[f64]) -> bool {
+    fn is_possible(&self, _: Shape, b: &[f64]) -> bool {
         b[0] > 0.0
     }
 

@@ -11,6 +11,15 @@ const HIGHEST_ORDER: f64 = 450.0;
 const LOWEST_ORDER: f64 = 20.0;
 /// Orders of a strain-wave gear in multiples of its ratio.
 const GEAR_MULTIPLES: [f64; 3] = [1.0, 2.0, 4.0];
+/// Orders of the motor's poles and slots in multiples of the ratio; looked for along single runs, whose
+/// slow parts show them.
+const MOTOR_MULTIPLES: [f64; 2] = [8.0, 12.0];
+
+/// Multiples of the gear's ratio that are looked at first.
+fn multiples(scene: &Scene) -> impl Iterator<Item = f64> {
+    let motor = if scene.periodic { &[][..] } else { &MOTOR_MULTIPLES[..] };
+    GEAR_MULTIPLES.into_iter().chain(motor.iter().copied())
+}
 /// Peaks of the order spectrum that are looked at closely.
 const PEAKS: usize = 3;
 
@@ -24,8 +33,7 @@ impl Candidate for Ripple {
         let ratio = scene.arm.joints[joint(site)].drive.gear_ratio;
         // Half the resolution on both sides brackets a peak of the order spectrum.
         let about = |order: f64| [-0.5, 0.0, 0.5].map(|u| order + u * spacing);
-        GEAR_MULTIPLES
-            .iter()
+        multiples(scene)
             .flat_map(|m| about(m * ratio))
             .map(|value| Shape { variant: 0, value })
             .collect()
@@ -44,7 +52,7 @@ impl Candidate for Ripple {
         let ratio = scene.arm.joints[joint(site)].drive.gear_ratio;
         let of_the_gear = |m: f64| (shape.value - m * ratio).abs() <= spacing;
         let any_order = (HIGHEST_ORDER - LOWEST_ORDER) / spacing;
-        (!GEAR_MULTIPLES.into_iter().any(of_the_gear)).then_some(any_order)
+        (!multiples(scene).any(of_the_gear)).then_some(any_order)
     }
 
     fn is_repeatable(&self) -> bool {
@@ -58,7 +66,13 @@ impl Candidate for Ripple {
         let column = |f: fn(f64) -> f64| {
             let ripple = |k: usize| {
                 let frequency_hz = shape.value * qd[k] / std::f64::consts::TAU;
-                seen_share(frequency_hz, scene.rate_hz) * f(shape.value * q[k])
+                let share = if scene.periodic {
+                    seen_share(frequency_hz, scene.rate_hz)
+                } else {
+                    // What was resampled from uneven times has no aliases that could be predicted.
+                    f64::from(frequency_hz.abs() < 0.5 * scene.rate_hz)
+                };
+                share * f(shape.value * q[k])
             };
             Column::on(j, samples(scene, ripple))
         };

@@ -48,7 +48,7 @@ impl Candidate for Saturation {
         "the same motion at half the speed: no torque reaches the limit"
     }
 
-    fn is_possible(&self, b: &[f64]) -> bool {
+    fn is_possible(&self, _: Shape, b: &[f64]) -> bool {
         b[0] > 0.0
     }
 

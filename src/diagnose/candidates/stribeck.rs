@@ -43,7 +43,7 @@ impl Candidate for Stribeck {
         "constant speeds in a slow staircase down to 0.005 rad/s, both directions"
     }
 
-    fn is_possible(&self, b: &[f64]) -> bool {
+    fn is_possible(&self, _: Shape, b: &[f64]) -> bool {
         b[0] > 0.0
     }
 

@@ -24,6 +24,7 @@ const IN_THE_PARAMETERS: &str = "the identified parameters hold it already";
 const ONE_EVENT: &str =
     "it happened once: no property of the arm, taken out of the log before the fit";
 const NO_SUCH_SIZE: &str = "the size that was found is none that the simulated effect can have";
+const NO_SUCH_LAW: &str = "the simulated arm has no friction of this law";
 const INCOMPLETE: &str = "the log does not tell all of its numbers";
 
 /// Stiffest bristles that are simulated, 1/rad: friction then turns round within 0.1 mrad, less than a joint
@@ -67,6 +68,13 @@ impl Found<'_> {
                 vs_rad_s: value("vs_rad_s")?,
                 exponent: if self.variant == 0 { 2 } else { 1 },
             })),
+            // Laws that only single runs are asked for.
+            Kind::NonlinearViscous if value("speed_rad_s").is_some() => {
+                Some(Counterpart::None(NO_SUCH_LAW))
+            }
+            Kind::LoadFriction if value("exponent").or(value("mu_bending")).is_some() => {
+                Some(Counterpart::None(NO_SUCH_LAW))
+            }
             Kind::NonlinearViscous => {
                 in_the_model(Effect::NonlinearViscous(faults::NonlinearViscous {
                     joint: self.joint?,

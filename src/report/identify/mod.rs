@@ -167,7 +167,10 @@ impl Result {
             })
             .collect();
         let mut warnings = identification.warnings.clone();
-        let ratio = gravity_ratio(arm, set, training.nominal, &identification.fit.theta);
+        let is_identified = identifies_the_arm(arm, set, &open);
+        // Masses that are not identified say nothing of gravity.
+        let ratio = gravity_ratio(arm, set, training.nominal, &identification.fit.theta)
+            .filter(|_| is_identified);
         if let Some(ratio) = ratio.filter(|r| !(1.0 / GRAVITY_OFF..GRAVITY_OFF).contains(r)) {
             warnings.push(format!(
                 "gravity torque is {ratio:.2} times what the description of {} says: another robot, \
@@ -192,7 +195,7 @@ impl Result {
             explainable_nm: identification.explainable_nm.clone(),
             intervals: Intervals::of(identification),
             condition: Condition::of(&regression.problem, set)?,
-            verdict: if identifies_the_arm(arm, set, &open) { IDENTIFIED } else { NOT_IDENTIFIED },
+            verdict: if is_identified { IDENTIFIED } else { NOT_IDENTIFIED },
             not_identified: open.iter().map(|&k| set.name(k).to_owned()).collect(),
             validation: validations.iter().map(ValidationJson::of).collect(),
             warnings,

@@ -1,0 +1,83 @@
+//! Two single runs of one motion: what of their residuals repeats.
+//!
+//! Noise does not repeat. With e₁ and e₂ the residuals of the same motion recorded twice, each behind its
+//! own fit, ρ = ⟨e₁, e₂⟩/(‖e₁‖ ‖e₂‖) is the share of the mean square that a function of the motion could
+//! explain, and 1 − √(1 − ρ) the share of the rms error that the best model of all could remove along it.
+//! What the fits themselves take up, and what changes between the runs, is not in ρ.
+
+use super::diagnoser::Finding;
+use crate::identify::MOVING_RAD_S;
+use crate::robot::JointSignals;
+
+/// What repeats, per joint, in samples in which the joint moves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Repeated {
+    /// Of the residual without causes.
+    pub before: Vec<f64>,
+    /// Of the residual with each run's causes.
+    pub after: Vec<f64>,
+}
+
+/// Longest shift between the runs' windows, s.
+const LONGEST_SHIFT_S: f64 = 3.0;
+/// The same motion: angles agree to this rms, rad.
+const SAME_RAD: f64 = 0.005;
+
+/// What repeats of the residuals of `first` and `second`; `None` if their motions differ.
+pub fn repeated(first: &Finding, second: &Finding) -> Option<Repeated> {
+    let (a, b) = (angles(first), angles(second));
+    let rates = [first, second].map(|f| f.identification.processing.rate_hz);
+    if (rates[0] / rates[1] - 1.0).abs() > 1e-6 {
+        return None;
+    }
+    let longest = (LONGEST_SHIFT_S * rates[0]) as isize;
+    let off = |shift: isize| {
+        let (mut square, mut count) = (0.0, 0);
+        for j in 0..a.joints() {
+            for (k, l) in pairs(a.samples(), b.samples(), shift) {
+                square += (a.joint(j)[k] - b.joint(j)[l]).powi(2);
+                count += 1;
+            }
+        }
+        square / f64::from(count.max(1))
+    };
+    let (shift, square) =
+        (-longest..=longest).map(|shift| (shift, off(shift))).min_by(|x, y| x.1.total_cmp(&y.1))?;
+    if square.sqrt() > SAME_RAD {
+        return None;
+    }
+    let share = |e: &JointSignals, f: &JointSignals| -> Vec<f64> {
+        let of = |j: usize| {
+            let qd = first.scene.motion.qd_rad_s.joint(j);
+            let mut sums = [0.0; 3];
+            for (k, l) in pairs(e.samples(), f.samples(), shift) {
+                if qd[first.samples[k]].abs() > MOVING_RAD_S {
+                    let (e, f) = (e.joint(j)[k], f.joint(j)[l]);
+                    sums[0] += e * f;
+                    sums[1] += e * e;
+                    sums[2] += f * f;
+                }
+            }
+            sums[0] / (sums[1] * sums[2]).sqrt()
+        };
+        (0..e.joints()).map(of).collect()
+    };
+    Some(Repeated {
+        before: share(&first.before_nm, &second.before_nm),
+        after: share(&first.after_nm, &second.after_nm),
+    })
+}
+
+/// Angles at the samples of the residuals.
+fn angles(finding: &Finding) -> JointSignals {
+    let q = &finding.scene.motion.q_rad;
+    JointSignals::from_fn(q.joints(), finding.samples.len(), |j, k| q.joint(j)[finding.samples[k]])
+}
+
+/// Samples k of one run and l = k + shift of another that lie in both.
+fn pairs(n: usize, m: usize, shift: isize) -> impl Iterator<Item = (usize, usize)> {
+    (0..n).filter_map(move |k| {
+        let l = k.checked_add_signed(shift)?;
+        (l < m).then_some((k, l))
+    })
+}
