@@ -4,7 +4,7 @@ use super::columns::ColumnPlan;
 use super::covariance::{Covariance, CovarianceError, CovarianceKind};
 use super::error::IdentifyError;
 use super::fit::{Estimator, Fit, FitError, Fitter, Weighting};
-use super::lack_of_fit::LackOfFit;
+use super::lack_of_fit::{Floor, LackOfFit};
 use super::options::Options;
 use super::problem::Problem;
 use super::whiten::{ReplicateWhitening, decimate, decorrelate, instrument, prewhiten};
@@ -145,9 +145,25 @@ impl Estimation {
         let mut fit = whitened.fitter.fit(&whitened.problem, set, weighting)?;
         let covariances = covariances(&whitened.problem, &fit, kinds);
         let lack_of_fit = (estimator == Estimator::Spectral)
-            .then(|| LackOfFit::of(&whitened.problem, &fit.theta));
+            .then(|| LackOfFit::of(&whitened.problem, &fit.theta, Floor::Torque));
         fit.state_residuals_of(problem);
         Ok(Estimate { fit, covariances, lack_of_fit })
+    }
+
+    /// Whether a model explains what repeats in the torque of `problem`, whose scatter between periods holds
+    /// the noise of the motion as well; `acceleration` as in [`MotionAids`].
+    pub fn lack_of_fit(
+        &mut self,
+        problem: &Problem,
+        set: &BaseSet,
+        acceleration: &[HarmonicPower],
+    ) -> Result<LackOfFit, IdentifyError> {
+        let plan = &self.plan;
+        let Whitened { problem: rows, fitter } =
+            self.mixed.get_or_insert_with(|| Whitened::new(plan.cumulative()));
+        self.whitening.whiten(problem, acceleration, rows);
+        let fit = fitter.fit(rows, set, Weighting::Equal)?;
+        Ok(LackOfFit::of(rows, &fit.theta, Floor::TorqueAndMotion))
     }
 }
 

@@ -6,6 +6,7 @@ use super::error::IdentifyError;
 use super::estimation::{Estimate, Estimation, MotionAids};
 use super::fit::{Estimator, Fit};
 use super::lack_of_fit::LackOfFit;
+use super::motion_noise::moved_to_mean;
 use super::options::Options;
 use super::prepare::{Measurement, Prepared, Preparer, Processing};
 use super::problem::{Assembler, Problem};
@@ -139,6 +140,7 @@ impl Regression {
         first.instruments.iter_mut().for_each(Problem::unfold);
         first.prepared.replicates = None;
         first.prepared.acceleration = None;
+        first.prepared.recorded = None;
         first.prepared.processing.periods = 1;
         for other in rest {
             let mut problem = other.problem;
@@ -350,6 +352,7 @@ impl<'a> Identifier<'a> {
             aids,
             &self.options,
         )?;
+        let estimate = self.with_motion_noise(estimate, &prepared)?;
         let Estimate { fit, mut covariances, lack_of_fit } = estimate;
         let covariance = covariances.swap_remove(0)?;
         let mut warnings = prepared.warnings;
@@ -375,6 +378,27 @@ impl<'a> Identifier<'a> {
         })
     }
 
+    /// `estimate` of the log `prepared`; where its model fails against the scatter of the torque, tested against
+    /// that of torque and motion.
+    fn with_motion_noise(
+        &mut self,
+        estimate: Estimate,
+        prepared: &Prepared,
+    ) -> Result<Estimate, IdentifyError> {
+        if estimate.lack_of_fit.is_none_or(|lack| lack.fits()) {
+            return Ok(estimate);
+        }
+        let deviations = self.preparer.deviations(prepared)?;
+        let (Some(deviations), Some(acceleration)) = (deviations, &prepared.acceleration) else {
+            return Ok(estimate);
+        };
+        let Self { problem, assembler, model, set, .. } = self;
+        let (mean, theta) = (&prepared.motion, &estimate.fit.theta);
+        let moved = moved_to_mean(problem, assembler, model, mean, &deviations, theta);
+        let lack_of_fit = Some(self.estimation.lack_of_fit(&moved, set, acceleration)?);
+        Ok(Estimate { lack_of_fit, ..estimate })
+    }
+
     /// Estimates from one log by several methods: estimators, each with its covariances.
     pub fn compare(
         &mut self,
@@ -389,8 +413,9 @@ impl<'a> Identifier<'a> {
             instruments: instruments.as_ref(),
         };
         let estimates = methods.iter().map(|(estimator, kinds)| {
-            let Self { estimation, problem, set, options, .. } = self;
-            estimation.estimate(problem, set, *estimator, kinds, aids, options)
+            let Self { estimation, problem, set, options, .. } = &mut *self;
+            let estimate = estimation.estimate(problem, set, *estimator, kinds, aids, options)?;
+            self.with_motion_noise(estimate, &prepared)
         });
         Ok(estimates.collect())
     }

@@ -12,6 +12,12 @@ use super::problem::Problem;
 /// PE = Σ_p‖y_p − ȳ‖²/ν₂ with ν₂ = rows (P − 1). Where the model holds, LoF/PE follows F(ν₁, ν₂)
 /// (Draper and Smith, Applied Regression Analysis; per Fourier coefficient because these are
 /// independent for noise of any colour).
+///
+/// The torque's own scatter comes first, and a model that passes against it passes. What is left of the motion's
+/// noise in the regressor is in ȳ − Xθ̂ and not in that scatter: a model that fails is tested again against the
+/// scatter of torque and motion together ([`Floor::TorqueAndMotion`]), with the rows whitened by it, and that answer
+/// counts. Only a model that fails twice is rejected, so that where it is right the chance is at most that of the
+/// second test.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LackOfFit {
     /// LoF/PE: 1 where the model explains everything but noise.
@@ -20,6 +26,18 @@ pub struct LackOfFit {
     pub degrees_of_freedom: [f64; 2],
     /// Chance of a larger statistic where the model holds.
     pub p_value: f64,
+    /// Whose scatter PE is.
+    pub floor: Floor,
+}
+
+/// What scatters between periods.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Floor {
+    /// The torque as recorded.
+    Torque,
+    /// The torque less what the model makes of each period's own motion.
+    TorqueAndMotion,
 }
 
 impl LackOfFit {
@@ -27,8 +45,9 @@ impl LackOfFit {
     /// the truth.
     pub const REJECT_BELOW: f64 = 1e-3;
 
-    /// Of the whitened rows `problem` in the frequency domain, with two periods or more.
-    pub(super) fn of(problem: &Problem, theta: &[f64]) -> Self {
+    /// Of the whitened rows `problem` in the frequency domain, with two periods or more, whose torque scatters as
+    /// `floor` says.
+    pub(super) fn of(problem: &Problem, theta: &[f64], floor: Floor) -> Self {
         let n = problem.samples;
         let periods = problem.periods as f64;
         let mut predicted = vec![0.0; n];
@@ -49,7 +68,7 @@ impl LackOfFit {
         let second = rows * (periods - 1.0);
         let statistic = lack / first / (scatter / second);
         let p_value = FisherSnedecor::new(first, second).map_or(f64::NAN, |f| f.sf(statistic));
-        Self { statistic, degrees_of_freedom: [first, second], p_value }
+        Self { statistic, degrees_of_freedom: [first, second], p_value, floor }
     }
 
     /// Whether the model explains what repeats.

@@ -63,6 +63,8 @@ pub struct Prepared {
     /// The motion of every period for itself, with all harmonics up to [`Preparer::WIDE`]; only where
     /// it was asked for and the motion repeats.
     pub each_period: Option<Motion>,
+    /// Angles and velocities of all periods as they were recorded, rad and rad/s; `None` for a single run.
+    pub recorded: Option<[JointSignals; 2]>,
     /// Smallest distance between two recorded angles, per joint, rad.
     pub angle_quantum_rad: Vec<f64>,
     /// How well the averaged acceleration is known, per joint; `None` for a single run.
@@ -225,6 +227,39 @@ impl Preparer {
         Ok(even)
     }
 
+    /// How far the motion of every period is off the averaged one, in the harmonics that this keeps; `None` for
+    /// a single run.
+    pub(super) fn deviations(
+        &mut self,
+        prepared: &Prepared,
+    ) -> Result<Option<Motion>, IdentifyError> {
+        let Some([q_rad, qd_rad_s]) = &prepared.recorded else { return Ok(None) };
+        let Processing { periods, rate_hz, .. } = prepared.processing;
+        let fit = self.periodic_fit(prepared.motion.samples(), periods, rate_hz)?;
+        let deviations = fit.deviations(q_rad, qd_rad_s, &mut self.fit);
+        self.periodic = Some(fit);
+        let [q_rad, qd_rad_s, qdd_rad_s2] = deviations?;
+        Ok(Some(Motion { q_rad, qd_rad_s, qdd_rad_s2 }))
+    }
+
+    /// The plans of the last log, where they are for motions like this one.
+    fn periodic_fit(
+        &mut self,
+        samples_per_period: usize,
+        periods: usize,
+        rate_hz: f64,
+    ) -> Result<PeriodicFit, IdentifyError> {
+        let fits = |fit: &PeriodicFit| {
+            fit.samples_per_period() == samples_per_period
+                && fit.periods() == periods
+                && fit.rate_hz() == rate_hz
+        };
+        Ok(match self.periodic.take().filter(fits) {
+            Some(fit) => fit,
+            None => PeriodicFit::new(samples_per_period, periods, rate_hz)?,
+        })
+    }
+
     fn periodic(
         &mut self,
         m: &Measurement,
@@ -233,15 +268,7 @@ impl Preparer {
         warnings: Vec<String>,
     ) -> Result<Prepared, IdentifyError> {
         let periods = window.len() / samples_per_period;
-        let fits = |fit: &PeriodicFit| {
-            fit.samples_per_period() == samples_per_period
-                && fit.periods() == periods
-                && fit.rate_hz() == even.rate_hz
-        };
-        let fit = match self.periodic.take().filter(fits) {
-            Some(fit) => fit,
-            None => PeriodicFit::new(samples_per_period, periods, even.rate_hz)?,
-        };
+        let fit = self.periodic_fit(samples_per_period, periods, even.rate_hz)?;
         let q_rad = even.q_rad.slice(window.clone());
         let qd_rad_s = even.qd_rad_s.slice(window.clone());
         let torque_nm = even.torque_nm.slice(window.clone());
@@ -265,6 +292,7 @@ impl Preparer {
                 qdd_rad_s2: averaged.qdd_rad_s2,
             },
             each_period,
+            recorded: Some([q_rad, qd_rad_s]),
             angle_quantum_rad: angle_quantum_rad(m),
             replicates: Some(replicate_noise(&torque_nm, samples_per_period)?),
             acceleration: Some(averaged.acceleration),
@@ -318,6 +346,7 @@ impl Preparer {
             },
             torque_nm: even.torque_nm.slice(window.clone()),
             each_period: None,
+            recorded: None,
             angle_quantum_rad: angle_quantum_rad(m),
             replicates: None,
             acceleration: None,

@@ -77,6 +77,13 @@ impl Spectra {
         self.floor = rounding.max(f64::MIN_POSITIVE.sqrt());
     }
 
+    /// Leaves of every period what it is off the mean.
+    pub(super) fn subtract_mean(&mut self) {
+        for spectrum in self.periods.chunks_exact_mut(self.mean.len()) {
+            spectrum.iter_mut().zip(&self.mean).for_each(|(c, mean)| *c -= mean);
+        }
+    }
+
     /// Noise power of one coefficient of one period, pooled over the band.
     pub(super) fn noise(&self, band: &RangeInclusive<usize>) -> f64 {
         let scatter = &self.scatter[band.clone()];

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::identify::{Identification, LackOfFit};
+use crate::identify::{Floor, Identification, LackOfFit};
 
 /// Whether the 95 % intervals may claim to hold the truth.
 #[derive(Debug, Clone, Serialize)]
@@ -42,16 +42,20 @@ impl Intervals {
             };
             return Self { trusted: None, reason, lack_of_fit: None };
         };
-        let LackOfFit { statistic, p_value, .. } = test;
+        let LackOfFit { statistic, p_value, floor, .. } = test;
+        let scatter = match floor {
+            Floor::Torque => "the scatter of the torque between periods",
+            Floor::TorqueAndMotion => "the scatter of torque and motion between periods",
+        };
         let reason = if test.fits() {
             format!(
-                "The model explains what repeats in the torque: what it leaves is {statistic:.2} times what the \
-                 scatter between periods leads to expect (chance {p_value:.2})."
+                "The model explains what repeats in the torque: what it leaves is {statistic:.2} times what \
+                 {scatter} leads to expect (chance {p_value:.2})."
             )
         } else {
             format!(
                 "The 95 % intervals are not to be trusted: what repeats in the torque and is not explained is \
-                 {statistic:.2} times what noise would leave (chance {p_value:.1e}). They cover the noise, not the \
+                 {statistic:.2} times what {scatter} would leave (chance {p_value:.1e}). They cover the noise, not the \
                  error of the model; armid diagnose looks for its cause."
             )
         };
