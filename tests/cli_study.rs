@@ -1,4 +1,5 @@
-//! `armid study paper` and `armid study cutoff` as a user runs them, with as few trials as there can be.
+//! `armid study paper`, `armid study cutoff` and `armid study noise` as a user runs them, with as few trials as there
+//! can be.
 
 use std::path::Path;
 use std::process::Command;
@@ -103,4 +104,37 @@ fn the_cutoff_has_a_best_value_and_e_n_falls_with_the_record() {
     let rms = |k: usize| result["sigmas"][k]["predicted"][1].as_f64().unwrap();
     assert!((rms(0) - 1.0).abs() < 0.03, "{}", rms(0));
     assert!((rms(1) - 0.3).abs() < 0.03, "{}", rms(1));
+}
+
+/// Scenarios run one by one and put together are the study of all of them.
+#[test]
+fn scenarios_of_noise_are_put_together_from_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let armid = |arguments: &[&str]| {
+        Command::new(env!("CARGO_BIN_EXE_armid")).args(["study", "noise"]).args(arguments).output()
+    };
+    let read = |name: &str| std::fs::read_to_string(file(name)).unwrap();
+    let json = |name: &str| serde_json::from_str::<Value>(&read(name)).unwrap();
+    for (name, scenario) in [("a.json", "default.toml"), ("b.json", "noise_white.toml")] {
+        let scenario = changed(scenario, "periods = 8", "periods = 4");
+        let path = scenario.path().to_str().unwrap();
+        let few = ["--trials", "2", "--slow-every", "2", "--json", &file(name)];
+        assert!(armid(&[&[path], &few[..]].concat()).unwrap().status.success());
+    }
+    let together = ["--from", &file("a.json"), &file("b.json"), "--json", &file("all.json")];
+    let outputs = ["--markdown", &file("all.md"), "--report", &file("all.html")];
+    assert!(armid(&[&together[..], &outputs].concat()).unwrap().status.success());
+    let all = json("all.json");
+    for (k, part) in ["a.json", "b.json"].iter().enumerate() {
+        assert_eq!(all["scenarios"][k], json(part)["scenarios"][0]);
+    }
+    assert!(read("all.md").contains("| default ") && read("all.md").contains("| white "));
+    let command = all["program"]["command"].as_str().unwrap();
+    assert_eq!(command.matches("armid study noise").count(), 3, "{command}");
+
+    let twice = armid(&["--from", &file("a.json"), &file("all.json")]).unwrap();
+    assert!(!twice.status.success());
+    assert!(String::from_utf8_lossy(&twice.stderr).contains("default is already there"));
+    assert!(!armid(&["--from", &file("all.md")]).unwrap().status.success());
 }

@@ -13,6 +13,7 @@ mod prior;
 pub mod simulate;
 pub mod study;
 mod study_cutoff;
+mod study_noise;
 mod study_output;
 mod study_paper;
 mod study_physical;

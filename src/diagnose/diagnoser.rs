@@ -18,7 +18,7 @@ use super::replay::measured_nm;
 use super::scene::Scene;
 use super::selection::{Kept, LEAST_EVIDENCE, Selected, select};
 use super::study::{Entry, Study};
-use super::verdict::{Cause, DetectionLimit, Diagnosis, Rival, Rms, Verdict};
+use super::verdict::{Cause, DetectionLimit, Diagnosis, Rival, Rms, Verdict, make_modest};
 use crate::base::BaseSet;
 use crate::dynamics::Model;
 use crate::identify::{Identification, Identifier, Measurement, Options};
@@ -154,6 +154,7 @@ impl<'a> Diagnoser<'a> {
             explained.span.residualise(&mut rest);
             accepted = explained.span;
         }
+        make_modest(&mut causes);
         let lack = misfit::lack_of_fit(&study, &accepted, &rest);
         let unexplained = misfit::unexplained(&study, &accepted, &rest, lack);
         if unexplained.is_some() {
@@ -199,6 +200,7 @@ impl<'a> Diagnoser<'a> {
             sentences: Vec::new(),
             warnings: identification.warnings.clone(),
         };
+
         diagnosis.sentences = diagnosis.in_sentences();
         let samples = (0..regression.problem.samples).map(|row| regression.sample(row)).collect();
         let scene = study.scene;

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+#[cfg(doc)]
+use super::candidates::Candidate;
 use super::candidates::{Quantity, Search, Shape};
 use super::extension::{Effect, Extension};
 use super::image::{Image, Span};
@@ -67,13 +69,46 @@ pub fn base(study: &Study, set: &BaseSet, extension: &Extension) -> Vec<BasePara
         .collect()
 }
 
-/// Physical parameters of a cause with 95 % intervals by the delta method: coefficients and shape are
-/// linearised together, the other causes' coefficients free.
+/// Physical parameters of a cause with 95 % intervals. Where the family has several forms (Stribeck's
+/// exponent, the stiffness of a gear's flanks), an interval reaches over all that the log allows: with
+/// D = 2 ln of the odds against a form, its own interval shrunk by √(1 − D/q²), q the normal one's
+/// quantile, which is where the likelihood falls below that of the best form by q². It also
+/// reaches to what the shape says of the same parameter, see [`Candidate::in_shape`].
 pub fn physical(
     study: &Study,
     kept: &Kept,
     effect: &Effect,
     index: usize,
+) -> BTreeMap<&'static str, Estimate> {
+    let mut out = of_one_form(study, kept, effect, index, 1.0);
+    let quantile = study.statistic.quantile_95();
+    for form in kept.other_forms(index) {
+        let left = 1.0 - form.behind / quantile.powi(2);
+        if left <= 0.0 {
+            continue;
+        }
+        for (name, other) in of_one_form(study, kept, &form.effect, index, left.sqrt()) {
+            if let Some(own) = out.get_mut(name) {
+                other.ci95.into_iter().for_each(|end| own.reach(end));
+            }
+        }
+    }
+    if let Some(again) = study.families[effect.family].in_shape(effect.shape)
+        && let Some(own) = out.get_mut(again.name)
+    {
+        own.reach(again.value);
+    }
+    out
+}
+
+/// By the delta method: coefficients and shape are linearised together, the other causes' coefficients
+/// free; `share` of the width.
+fn of_one_form(
+    study: &Study,
+    kept: &Kept,
+    effect: &Effect,
+    index: usize,
+    share: f64,
 ) -> BTreeMap<&'static str, Estimate> {
     let (others, residual) = kept.without(Some(index));
     let family = &study.families[effect.family];
@@ -84,7 +119,7 @@ pub fn physical(
     let tangents: Vec<Image> = tangents(study, effect).into_iter().map(outside_null).collect();
     let span = Span::outside(&others, &tangents);
     let covariance = study.statistic.covariance(&span, &residual);
-    let half = study.statistic.quantile_95();
+    let half = share * study.statistic.quantile_95();
     let at = |b: &[f64], value: f64| -> Vec<Quantity> {
         family.quantities(&study.scene, effect.site, Shape { value, ..effect.shape }, b)
     };

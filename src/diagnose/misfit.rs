@@ -3,6 +3,7 @@
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::image::{Column, Image, Span};
+use super::scene::Scene;
 use super::statistic::Statistic;
 use super::study::Study;
 use super::verdict::Unexplained;
@@ -16,6 +17,8 @@ const FALSE_ALARM: f64 = 0.0005;
 const ABSORBED: f64 = 0.1;
 /// Knots of the curve along an axis.
 const KNOTS: usize = 10;
+/// The first knot of the way behind a reversal, rad: bristles and teeth give way by more.
+const SHORTEST_WAY_RAD: f64 = 1e-4;
 
 /// Probability that noise alone leaves as much in any band of any joint; `None` for a single run.
 ///
@@ -81,9 +84,9 @@ pub fn unexplained(
             ("rate of the torque", &torque_rate),
             ("time within the period", &time),
         ];
-        for (axis, values) in axes {
+        let curves = axes.map(|(axis, values)| (axis, hats(values)));
+        for (axis, (knots, hats)) in curves.into_iter().chain(behind_reversals(scene, j)) {
             tests += 1.0;
-            let (knots, hats) = hats(values);
             let mut span = Span::default();
             let mut used = Vec::new();
             for (knot, hat) in hats.iter().enumerate() {
@@ -128,12 +131,45 @@ pub fn unexplained(
     fires.then_some(found)
 }
 
+/// What friction does behind a reversal, whatever its law: hats over the logarithm of the way since then, each
+/// times the direction of motion; `None` if the joint never turns.
+fn behind_reversals(scene: &Scene, j: usize) -> Option<(&'static str, Curves)> {
+    let (q, qd) = (scene.motion.q_rad.joint(j), scene.motion.qd_rad_s.joint(j));
+    let n = q.len();
+    let turns = |k: usize| qd[(k + n - 1) % n] * qd[k] < 0.0;
+    let first = (0..n).find(|&k| turns(k))?;
+    let mut way = vec![0.0; n];
+    let mut turn_rad = q[first];
+    for k in (first..first + n).map(|k| k % n) {
+        if turns(k) {
+            // Between two samples, where a straight velocity passes through zero.
+            let before = (k + n - 1) % n;
+            turn_rad = q[k] - 0.5 * qd[k] * qd[k] / ((qd[k] - qd[before]) * scene.rate_hz);
+        }
+        way[k] = (q[k] - turn_rad).abs().max(SHORTEST_WAY_RAD).ln();
+    }
+    let (low, high) = (SHORTEST_WAY_RAD.ln(), way.iter().copied().fold(f64::MIN, f64::max));
+    let knots = (0..KNOTS).map(|k| low + (high - low) * k as f64 / (KNOTS - 1) as f64).collect();
+    let (knots, mut hats) = hats_at(knots, &way);
+    for hat in &mut hats {
+        hat.iter_mut().zip(qd).for_each(|(h, qd)| *h = h.copysign(*qd));
+    }
+    Some(("way since the reversal", (knots.into_iter().map(f64::exp).collect(), hats)))
+}
+
+/// Knots, and what rises to 1 at each.
+type Curves = (Vec<f64>, Vec<Vec<f64>>);
+
 /// Knots at equal shares of the samples, and the piecewise linear hat of each.
-fn hats(values: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
+fn hats(values: &[f64]) -> Curves {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let last = sorted.len() - 1;
-    let knots: Vec<f64> = (0..KNOTS).map(|k| sorted[k * last / (KNOTS - 1)]).collect();
+    hats_at((0..KNOTS).map(|k| sorted[k * last / (KNOTS - 1)]).collect(), values)
+}
+
+/// The piecewise linear hat of each of `knots`.
+fn hats_at(knots: Vec<f64>, values: &[f64]) -> Curves {
     let mut hats = vec![vec![0.0; values.len()]; KNOTS];
     for (k, &x) in values.iter().enumerate() {
         let right = knots.partition_point(|knot| *knot < x).clamp(1, KNOTS - 1);

@@ -1,6 +1,6 @@
 //! What every candidate sees of a log: the motion, and what the current estimate makes of it.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use realfft::num_complex::Complex64;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
@@ -49,7 +49,12 @@ pub struct Scene {
     /// a motion that repeats, whose angles are averaged.
     pub angle_doubt_rad: Vec<f64>,
     derivative: Derivative,
+    /// See [`Self::fine_link_nm`].
+    fine_link_nm: Vec<OnceLock<Vec<f64>>>,
 }
+
+/// Instants per sample of [`Scene::fine_link_nm`].
+pub const FINE: usize = 16;
 
 /// How signals along this motion are differentiated and shifted in time.
 enum Derivative {
@@ -120,6 +125,7 @@ impl Scene {
             torque_nm,
             sign,
             derivative,
+            fine_link_nm: vec![OnceLock::new(); joints],
         }
     }
 
@@ -156,6 +162,19 @@ impl Scene {
                 out
             }
         }
+    }
+
+    /// The link torque of joint `j` at [`FINE`] instants per sample, for what happens between samples.
+    pub fn fine_link_nm(&self, j: usize) -> &[f64] {
+        self.fine_link_nm[j].get_or_init(|| {
+            let link = self.link_nm.joint(j);
+            let mut fine = vec![0.0; FINE * link.len()];
+            for i in 0..FINE {
+                let later = self.delayed(link, -(i as f64) / (FINE as f64 * self.rate_hz));
+                fine.iter_mut().skip(i).step_by(FINE).zip(&later).for_each(|(f, l)| *f = *l);
+            }
+            fine
+        })
     }
 
     /// The harmonics of a signal of n samples up to `highest_hz`, where the motion repeats; of a single run

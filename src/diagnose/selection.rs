@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::candidates::ripple::strongest_orders;
+use super::extension::Effect;
 use super::image::{Image, Span};
 use super::kind::Kind;
 use super::study::{Entry, Score, Study};
@@ -50,6 +51,14 @@ pub struct Selected {
     pub rivals: Vec<Contender>,
     /// Share of the mean square that it removes in stretches of a single run left out of its fit.
     pub left_out_gain: Option<f64>,
+}
+
+/// A cause in another form of its family.
+pub struct Form {
+    /// With its numbers.
+    pub effect: Effect,
+    /// 2 ln of the odds against it, prices aside.
+    pub behind: f64,
 }
 
 /// The causes kept so far.
@@ -182,17 +191,51 @@ impl<'s, 'a> Kept<'s, 'a> {
         (0..self.causes.len()).map(|c| self.judged(c)).collect()
     }
 
-    /// The best shape of cause `c`, the others given.
+    /// Cause `c` in its family's other variants, each at its best shape.
+    pub fn other_forms(&self, c: usize) -> Vec<Form> {
+        let (others, residual) = self.without(Some(c));
+        let own = self.causes[c].score.gain;
+        let variants = self.other_variants(c, &others, &residual).into_iter();
+        let form = |(entry, score): (Entry, Score)| {
+            let coefficients = self.study.span(&entry, &others).solve(&residual);
+            let Entry { family, site, shape, .. } = entry;
+            let effect = Effect { family, site, shape, coefficients, absorbed: Vec::new() };
+            Form { effect, behind: (own - score.gain).max(0.0) }
+        };
+        variants.map(form).collect()
+    }
+
+    fn other_variants(&self, c: usize, others: &Span, residual: &Image) -> Vec<(Entry, Score)> {
+        let study = self.study;
+        let Entry { family, site, shape, .. } = self.causes[c].entry;
+        let mut best: Vec<(&Entry, Score)> = Vec::new();
+        let is_other =
+            |e: &&Entry| (e.family, e.site) == (family, site) && e.shape.variant != shape.variant;
+        for entry in study.entries.iter().filter(is_other) {
+            let Some(score) = study.score(entry, others, residual) else { continue };
+            match best.iter_mut().find(|(b, _)| b.shape.variant == entry.shape.variant) {
+                Some(old) if old.1.gain >= score.gain => {}
+                Some(old) => *old = (entry, score),
+                None => best.push((entry, score)),
+            }
+        }
+        best.into_par_iter().filter_map(|(e, _)| study.refined(e, others, residual)).collect()
+    }
+
+    /// The best variant and shape of cause `c`, the others given.
     fn refine(&mut self, c: usize) {
         let (others, residual) = self.without(Some(c));
         let current = self.best_start(&self.causes[c].entry, &others, &residual);
-        if let Some((entry, score)) = self.study.refined(current, &others, &residual) {
+        let own = self.study.refined(current, &others, &residual);
+        let forms = self.other_variants(c, &others, &residual);
+        let best = own.into_iter().chain(forms).max_by(|a, b| a.1.gain.total_cmp(&b.1.gain));
+        if let Some((entry, score)) = best {
             let evidence = self.evidence(&entry, score);
             self.causes[c] = Contender { entry, score, evidence };
         }
     }
 
-    /// The best of `entry`'s shape and the family's starting shapes; several causes of one family on one
+    /// The best of `entry`'s shape and the starting shapes of its variant; several causes of one family on one
     /// joint keep their own.
     fn best_start<'e>(&'e self, entry: &'e Entry, others: &Span, residual: &Image) -> &'e Entry {
         let study = self.study;
@@ -202,7 +245,8 @@ impl<'s, 'a> Kept<'s, 'a> {
         let score = |e: &Entry| {
             study.score(e, others, residual).map_or(f64::NEG_INFINITY, |score| score.gain)
         };
-        let same = |e: &&Entry| (e.family, e.site) == (entry.family, entry.site);
+        let place = |e: &Entry| (e.family, e.site, e.shape.variant);
+        let same = |e: &&Entry| place(e) == place(entry);
         let start = (entry, score(entry));
         let best = study.entries.iter().filter(same).map(|e| (e, score(e)));
         best.fold(start, |best, e| if e.1 > best.1 { e } else { best }).0

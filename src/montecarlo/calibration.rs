@@ -1,6 +1,6 @@
 //! Is the σ true? The verdict over a tally.
 
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
 use super::tally::Tally;
@@ -27,7 +27,8 @@ pub mod claims {
 }
 
 /// Answer of one check, or of all.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// The claim holds as far as these trials can tell.
     Pass,
@@ -44,12 +45,6 @@ impl std::fmt::Display for Verdict {
             Self::Fail => "fail",
             Self::NotEvaluated => "not_evaluated",
         })
-    }
-}
-
-impl Serialize for Verdict {
-    fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
-        s.collect_str(self)
     }
 }
 

@@ -1,13 +1,13 @@
 //! How far the estimates are from the best that there can be.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::experiment::{Experiment, TrialError};
 use super::simulation::Simulation;
 use crate::identify::{Identifier, KnownNoise, Measurement, Options, cramer_rao};
 
 /// Empirical σ over the Cramér–Rao bound.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Efficiency {
     /// Root mean square over the parameters; 1 cannot be beaten without bias.
     pub rms: f64,

@@ -1,6 +1,6 @@
 //! What a run says, as the JSON that others read.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::calibration::{Calibration, Check, Verdict};
 use super::efficiency::Efficiency;
@@ -79,10 +79,10 @@ pub struct NamedValue {
 }
 
 /// One check with its bounds.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CheckSummary {
     /// In words.
-    pub what: &'static str,
+    pub what: String,
     /// The parameter that decided; null for statistics over all.
     pub parameter: Option<String>,
     /// Measured value.
@@ -99,7 +99,7 @@ impl CheckSummary {
     /// Of `check`, whose parameter k is called `name(k)`.
     pub fn of(check: &Check, name: impl Fn(usize) -> String) -> Self {
         Self {
-            what: check.what,
+            what: check.what.to_owned(),
             parameter: check.parameter.map(name),
             value: check.value,
             interval: check.interval,

@@ -72,7 +72,7 @@ pub fn check_table(summary: &Summary) -> Table {
         table.push_judged(
             Some(status(check.verdict)),
             [
-                check.what.to_owned(),
+                check.what.clone(),
                 check.parameter.clone().unwrap_or_else(|| "all".into()),
                 format!("{:.3}", check.value),
                 range(check.interval),

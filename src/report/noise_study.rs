@@ -334,7 +334,7 @@ fn efficiency_matrix(study: &NoiseStudy) -> Table {
     matrix(study, |m| if rms(m).is_nan() { "–".into() } else { format!("{:.2}", rms(m)) })
 }
 
-fn how(study: &NoiseStudy) -> String {
+fn how() -> String {
     format!(
         "Every trial draws fresh noise; its log is laid out once and solved by all methods. Coverage is the share of 95 % \
          intervals that hold the true value: the mean over the parameters (± 1.96 standard errors from the scatter between \
@@ -342,9 +342,8 @@ fn how(study: &NoiseStudy) -> String {
          its own bounds more often than one chosen beforehand). Least σ is the Cramér–Rao bound for noise of known law and a \
          motion known exactly, over all frequencies. Withheld are trials in which the lack-of-fit test at p < {} says that \
          the model does not explain what repeats. The slower methods (everything but ols, wls with wls, blocks or periods, and \
-         spectral) ran on one trial in {}.",
-        NoiseStudy::rejection_level(),
-        study.slow_every
+         spectral) ran on a share of the trials that stands with each scenario at the end.",
+        NoiseStudy::rejection_level()
     )
 }
 
@@ -360,7 +359,7 @@ pub fn page(study: &NoiseStudy, program: Program) -> Result<Page, ReportError> {
     let mut page = Page::new("Which σ is true under which noise?", "", verdict, program);
     page.push(
         Section::new(TITLE)
-            .paragraph(how(study))
+            .paragraph(how())
             .table(summary_table(study), "")
             .paragraph(lack_of_fit(study))
             .paragraph(targets())
@@ -386,7 +385,11 @@ pub fn page(study: &NoiseStudy, program: Program) -> Result<Page, ReportError> {
 }
 
 fn scenario_line(s: &ScenarioResult) -> String {
-    format!("{}: {}. {} trials in {:.0} s.", s.short_name(), s.description, s.trials, s.seconds)
+    let ScenarioResult { description, trials, slow_every, seconds, .. } = s;
+    format!(
+        "{}: {description}. {trials} trials in {seconds:.0} s, the slower methods on one in {slow_every}.",
+        s.short_name()
+    )
 }
 
 fn coverage_plot(study: &NoiseStudy) -> Result<String, ReportError> {
@@ -418,7 +421,7 @@ pub fn markdown(study: &NoiseStudy, command: &str) -> String {
     let (_, sentence) = sentence(study);
     let mut text = format!(
         "# Which σ is true under which noise?\n\n{sentence}\n\n    {command}\n\n{}\n",
-        how(study)
+        how()
     );
     let (lack_of_fit, targets) = (lack_of_fit(study), targets());
     let parts = [

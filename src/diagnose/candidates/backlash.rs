@@ -1,24 +1,27 @@
-//! Play in the gear. While the load presses rotor and link together they move as one; where it changes
-//! sign they part, and the rotor flies through the gap g to the other flank, alone:
+//! Play in the gear. While the load presses rotor and link together they move as one, but for what the flanks
+//! give way; where the load changes sign they part, and the rotor flies through the gap g to the other flank:
 //!
 //! ```text
-//! δ̈ = τ_L (1/I_a + 1/M_jj)   for |δ| < g/2,   δ̇ ← −e δ̇ at a flank,   δ = q_M − q_L
+//! δ̈ = (τ_L − T) (1/I_a + 1/M_jj),   T = k (δ ∓ g/2) + d δ̇ beyond ±g/2 as long as it pushes, 0 between
 //! ```
 //!
-//! with the load τ_L of the rigid arm, which passes through zero, and the restitution e of the flanks. The
-//! log has the motor's angle, so that the links have moved by δ less than it says. A flight lasts
-//! (6 g/δ⃛)^(1/3), a few milliseconds, and is seen by its jerk at both ends.
+//! with δ = q_M − q_L, the load τ_L of the rigid arm, which passes through zero, and flanks against which the
+//! rotor alone swings at √(k/I_a) with the damping d = 2 ζ √(k I_a). The log has the motor's angle, so that
+//! the links have moved by δ less than it says. A flight lasts (6 g/δ⃛)^(1/3), a few milliseconds, and is
+//! seen by its jerk at both ends and by the swinging after it.
 
 use super::elasticity::{give_way, lagging_by};
 use super::*;
+use crate::diagnose::scene::FINE;
 
 /// See the module.
 pub struct Backlash;
 
-/// Restitution of the flanks, by variant: from greased to dry hardened steel.
-const RESTITUTION: [f64; 2] = [0.3, 0.8];
-/// Steps of the flight per sample of the log.
-const STEPS: usize = 16;
+/// Frequencies of the rotor against its flanks, rad/s, by variant: from those of a gear that gives way to
+/// those that the log's rate can hardly tell from stiff ones.
+const FLANK_RAD_S: [f64; 4] = [150.0, 260.0, 450.0, 900.0];
+/// ζ of the flanks.
+const DAMPING_RATIO: f64 = 0.08;
 
 impl Candidate for Backlash {
     fn kind(&self) -> Kind {
@@ -26,7 +29,7 @@ impl Candidate for Backlash {
     }
 
     fn shapes(&self, _: &Scene, _: Option<usize>) -> Vec<Shape> {
-        (0..RESTITUTION.len())
+        (0..FLANK_RAD_S.len())
             .flat_map(|variant| geometric(3e-6, 1e-2, 8).map(move |value| Shape { variant, value }))
             .collect()
     }
@@ -41,18 +44,18 @@ impl Candidate for Backlash {
         let n = load.len();
         let inertia = scene.own_inertia_kg_m2.joint(j);
         let rotor = scene.arm.joints[j].drive.rotor_inertia_kg_m2.max(f64::MIN_POSITIVE);
-        let step_s = 1.0 / (scene.rate_hz * STEPS as f64);
-        let phases: Vec<Vec<f64>> =
-            (0..STEPS).map(|i| scene.delayed(load, -(i as f64) * step_s)).collect();
-        let mut flight = Flight::pressed(0.5 * shape.value, RESTITUTION[shape.variant], load[0]);
+        let step_s = 1.0 / (scene.rate_hz * FINE as f64);
+        let fine = scene.fine_link_nm(j);
+        let mut flight =
+            Flight::pressed(0.5 * shape.value, FLANK_RAD_S[shape.variant], rotor, load[0]);
         let mut delta = vec![0.0; n];
         // The second round begins as a motion that repeats does.
         let rounds = if scene.periodic { 2 } else { 1 };
         for k in (0..rounds).flat_map(|_| 0..n) {
             delta[k] = flight.angle_rad;
             let mobility = 1.0 / rotor + 1.0 / inertia[k].max(f64::MIN_POSITIVE);
-            for phase in &phases {
-                flight.step(phase[k] * mobility, step_s);
+            for load in &fine[FINE * k..FINE * (k + 1)] {
+                flight.step(*load, mobility, step_s);
             }
         }
         vec![give_way(scene, &lagging_by(scene, j, &delta), shape.value)]
@@ -60,6 +63,10 @@ impl Candidate for Backlash {
 
     fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
         vec![quantity("gap_rad", b[0], "rad")]
+    }
+
+    fn in_shape(&self, shape: Shape) -> Option<Quantity> {
+        Some(quantity("gap_rad", shape.value, "rad"))
     }
 
     fn separating_experiment(&self) -> &'static str {
@@ -81,29 +88,35 @@ struct Flight {
     angle_rad: f64,
     rate_rad_s: f64,
     half_gap_rad: f64,
-    restitution: f64,
+    stiffness_nm_rad: f64,
+    damping_nm_s_rad: f64,
 }
 
 impl Flight {
-    /// On the flank to which `load` presses it.
-    fn pressed(half_gap_rad: f64, restitution: f64, load: f64) -> Self {
-        Self { angle_rad: half_gap_rad.copysign(load), rate_rad_s: 0.0, half_gap_rad, restitution }
+    /// At rest on the flank to which `load_nm` presses it; alone it swings there at `flank_rad_s`.
+    fn pressed(half_gap_rad: f64, flank_rad_s: f64, rotor_kg_m2: f64, load_nm: f64) -> Self {
+        let stiffness_nm_rad = rotor_kg_m2 * flank_rad_s.powi(2);
+        Self {
+            angle_rad: half_gap_rad.copysign(load_nm) + load_nm / stiffness_nm_rad,
+            rate_rad_s: 0.0,
+            half_gap_rad,
+            stiffness_nm_rad,
+            damping_nm_s_rad: 2.0 * DAMPING_RATIO * rotor_kg_m2 * flank_rad_s,
+        }
     }
 
-    /// `step_s` later, with δ̈ = `acceleration` (rad/s²).
-    fn step(&mut self, acceleration: f64, step_s: f64) {
-        self.angle_rad += self.rate_rad_s * step_s + 0.5 * acceleration * step_s * step_s;
-        self.rate_rad_s += acceleration * step_s;
-        if self.angle_rad.abs() >= self.half_gap_rad && self.rate_rad_s * self.angle_rad > 0.0 {
-            self.angle_rad = self.half_gap_rad.copysign(self.angle_rad);
-            self.rate_rad_s *= -self.restitution;
-            // A step adds up to a Δt to every bounce: bounces end where that keeps them alive.
-            let kept_alive = acceleration.abs() * step_s / (1.0 - self.restitution);
-            if self.rate_rad_s.abs() < kept_alive {
-                self.rate_rad_s = 0.0;
-            }
-        }
-        self.angle_rad = self.angle_rad.clamp(-self.half_gap_rad, self.half_gap_rad);
+    /// Torque of the flanks, Nm: they push and do not pull.
+    fn torque_nm(&self) -> f64 {
+        let pressed = self.angle_rad - self.angle_rad.clamp(-self.half_gap_rad, self.half_gap_rad);
+        let torque = self.stiffness_nm_rad * pressed + self.damping_nm_s_rad * self.rate_rad_s;
+        if torque * pressed <= 0.0 { 0.0 } else { torque }
+    }
+
+    /// `step_s` later, under the load `load_nm` (semi-implicit Euler, which neither adds energy to a swing
+    /// nor takes any).
+    fn step(&mut self, load_nm: f64, mobility: f64, step_s: f64) {
+        self.rate_rad_s += (load_nm - self.torque_nm()) * mobility * step_s;
+        self.angle_rad += self.rate_rad_s * step_s;
     }
 }
 
@@ -115,22 +128,25 @@ mod tests {
     #[test]
     fn a_gap_is_crossed_in_the_time_of_a_cubic() {
         let (gap, slope, step_s) = (2e-5_f64, 300.0_f64, 1e-5);
-        let mut flight = Flight::pressed(0.5 * gap, 0.0, -1.0);
+        let mut flight = Flight::pressed(0.5 * gap, 900.0, 1.0, -1e-9);
         let mut t = 0.0;
         while flight.angle_rad < 0.5 * gap {
-            flight.step(slope * (t + 0.5 * step_s), step_s);
+            flight.step(slope * (t + 0.5 * step_s), 1.0, step_s);
             t += step_s;
         }
         // Steps of 10 µs.
         assert!((t - (6.0 * gap / slope).cbrt()).abs() < 2.0 * step_s, "{t}");
     }
 
+    /// Under a constant load the rotor ends T = load deep in the flank.
     #[test]
-    fn a_rotor_comes_to_rest_on_the_flank() {
-        let mut flight = Flight::pressed(1e-5, 0.85, -1.0);
-        for _ in 0..20_000 {
-            flight.step(5.0, 1e-5);
+    fn a_rotor_comes_to_rest_in_the_flank() {
+        let mut flight = Flight::pressed(1e-5, 300.0, 1.0, -1.0);
+        for _ in 0..100_000 {
+            flight.step(5.0, 1.0, 1e-5);
         }
-        assert_eq!((flight.angle_rad, flight.rate_rad_s), (1e-5, 0.0));
+        let at_rest = 1e-5 + 5.0 / 300.0_f64.powi(2);
+        // What is left of the swing after 1 s: e^(−0.08 · 300).
+        assert!((flight.angle_rad - at_rest).abs() < 1e-9 * at_rest, "{}", flight.angle_rad);
     }
 }

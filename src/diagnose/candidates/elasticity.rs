@@ -81,6 +81,10 @@ impl Candidate for Elasticity {
         vec![quantity("stiffness_nm_rad", 1.0 / b[0], "Nm/rad")]
     }
 
+    fn in_shape(&self, shape: Shape) -> Option<Quantity> {
+        Some(quantity("stiffness_nm_rad", shape.value, "Nm/rad"))
+    }
+
     fn separating_experiment(&self) -> &'static str {
         "motor and link encoder in one log, or a tap on the link: the resonance tells the stiffness"
     }

@@ -116,6 +116,13 @@ pub trait Candidate: Sync {
         b: &[f64],
     ) -> Vec<Quantity>;
 
+    /// The physical parameter that the shape holds as well as the coefficients, for laws that fix it twice (play
+    /// by how far the links lag and by how long a flight lasts). Where the two disagree the law is not quite that
+    /// of the arm, and the parameter is no better known than they differ.
+    fn in_shape(&self, _shape: Shape) -> Option<Quantity> {
+        None
+    }
+
     /// The quantity that says how large the effect is, for detection limits.
     fn size(&self, quantities: &[Quantity]) -> Option<Quantity> {
         quantities.first().copied()

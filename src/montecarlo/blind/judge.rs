@@ -119,8 +119,10 @@ impl Record {
             let (Some(truth), Some(p)) = (truth.as_f64(), named.parameters.get(&name)) else {
                 continue;
             };
-            // An interval without width is no claim about chance.
-            if p.high <= p.low {
+            // An interval without width is no claim about chance, and a force on the flange has no torque
+            // that a joint's could be compared with.
+            let is_force = hidden.joint.is_none() && name == "peak_nm";
+            if p.high <= p.low || is_force {
                 continue;
             }
             let truth = if name.ends_with("phase_rad") { same_turn(truth, p.value) } else { truth };

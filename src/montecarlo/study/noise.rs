@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::identify::covariance::CovarianceKind as C;
 use crate::identify::{Estimate, Estimator as E, Identifier, LackOfFit, Measurement};
@@ -40,16 +40,14 @@ const METHODS: [(E, C, bool); 17] = [
 ];
 
 /// All scenarios of a study.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NoiseStudy {
-    /// The slow methods ran on every so many trials.
-    pub slow_every: u64,
     /// One entry per scenario.
     pub scenarios: Vec<ScenarioResult>,
 }
 
 /// What all methods say of one scenario.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ScenarioResult {
     /// Name.
     pub name: String,
@@ -57,6 +55,8 @@ pub struct ScenarioResult {
     pub description: String,
     /// Trials run.
     pub trials: u64,
+    /// The slow methods ran on every so many of them.
+    pub slow_every: u64,
     /// Time for them, s.
     pub seconds: f64,
     /// Whether an effect is hidden that the model does not know.
@@ -76,7 +76,7 @@ pub struct ScenarioResult {
 }
 
 /// One method over all trials.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MethodResult {
     /// Estimator.
     pub estimator: String,
@@ -158,6 +158,7 @@ pub fn study(
         name: scenario.name.clone(),
         description: scenario.description.clone(),
         trials,
+        slow_every,
         seconds: begun.elapsed().as_secs_f64(),
         model_is_wrong: !scenario.effects.is_empty(),
         single_run: scenario.processing.period_s == Some(0.0),

@@ -1,0 +1,161 @@
+//! `armid study noise`: every method on the same logs, scenario by scenario, in one run or in several.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde::Deserialize;
+use thiserror::Error;
+
+use super::study_output::StudyOutput;
+use super::{CommandResult, Progress, threads_or_all};
+use crate::montecarlo::Scenario;
+use crate::montecarlo::study::{NoiseStudy, study};
+use crate::report::json::{Input, Program};
+use crate::report::noise_study::{markdown, page};
+
+#[derive(Debug, Args)]
+pub(super) struct NoiseArgs {
+    /// Scenario files.
+    #[arg(required_unless_present = "from")]
+    scenarios: Vec<PathBuf>,
+    /// Results of earlier runs (their --json), to stand in front of those of SCENARIOS.
+    #[arg(long, value_name = "JSON", num_args = 1..)]
+    from: Vec<PathBuf>,
+    /// At most this many trials per scenario; each scenario's own number where left out.
+    #[arg(long, value_parser = clap::value_parser!(u64).range(2..))]
+    trials: Option<u64>,
+    /// Run the costly methods (bootstrap, HAC, instruments, …) on every so many trials only.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..))]
+    slow_every: u64,
+    /// Threads; all cores where left out.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    #[command(flatten)]
+    output: StudyOutput,
+}
+
+/// Results that cannot be put together.
+#[derive(Debug, Error)]
+enum NoiseStudyError {
+    /// The file could not be read.
+    #[error("{file}: {source}")]
+    Read {
+        /// The file.
+        file: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Not a result of this study.
+    #[error("{file}: not a result of armid study noise --json: {message}")]
+    Format {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        message: String,
+    },
+    /// One scenario would stand there twice.
+    #[error("{file}: scenario {scenario} is already there")]
+    Twice {
+        /// The file that brings it again.
+        file: String,
+        /// Its name.
+        scenario: String,
+    },
+}
+
+const SCHEMA: &str = "armid.study-noise/2";
+
+/// A result file.
+#[derive(Deserialize)]
+struct Saved {
+    schema: String,
+    program: Program,
+    #[serde(flatten)]
+    study: NoiseStudy,
+}
+
+impl Saved {
+    fn load(path: &Path) -> Result<Self, NoiseStudyError> {
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| NoiseStudyError::Read { file: file.clone(), source })?;
+        let saved: Self = serde_json::from_str(&text).map_err(|error| NoiseStudyError::Format {
+            file: file.clone(),
+            message: error.to_string(),
+        })?;
+        if saved.schema != SCHEMA {
+            let message = format!("its schema is \"{}\", not \"{SCHEMA}\"", saved.schema);
+            return Err(NoiseStudyError::Format { file, message });
+        }
+        Ok(saved)
+    }
+}
+
+/// The study so far, and what made it.
+struct Collected {
+    study: NoiseStudy,
+    inputs: Vec<Input>,
+    /// Commands of the earlier runs, in their order.
+    commands: Vec<String>,
+}
+
+impl Collected {
+    /// The results in `files`.
+    fn load(files: &[PathBuf]) -> Result<Self, Box<dyn std::error::Error>> {
+        let study = NoiseStudy { scenarios: Vec::new() };
+        let mut all = Self { study, inputs: Vec::new(), commands: Vec::new() };
+        for file in files {
+            let Saved { study, program, .. } = Saved::load(file)?;
+            for scenario in study.scenarios {
+                all.check_new(file, &scenario.name)?;
+                all.study.scenarios.push(scenario);
+            }
+            all.inputs.extend(program.inputs);
+            all.inputs.push(Input::of(file)?);
+            all.commands.push(program.command);
+        }
+        Ok(all)
+    }
+
+    /// Refuses the scenario `name` of `file` if it is there.
+    fn check_new(&self, file: &Path, name: &str) -> Result<(), NoiseStudyError> {
+        if self.study.scenarios.iter().any(|known| known.name == name) {
+            let (file, scenario) = (file.display().to_string(), name.to_owned());
+            return Err(NoiseStudyError::Twice { file, scenario });
+        }
+        Ok(())
+    }
+
+    /// This program, its command behind those of the earlier runs.
+    fn program(&self) -> Program {
+        let own = Program::new(std::env::args(), None, self.inputs.clone());
+        let commands: Vec<&str> =
+            self.commands.iter().chain([&own.command]).map(|c| &**c).collect();
+        Program { command: commands.join(" && "), ..own }
+    }
+}
+
+pub(super) fn run(args: &NoiseArgs) -> CommandResult {
+    args.output.check()?;
+    let threads = threads_or_all(args.threads);
+    let mut all = Collected::load(&args.from)?;
+    // Whatever cannot be run is told before anything runs.
+    let mut scenarios = Vec::new();
+    for path in &args.scenarios {
+        let scenario = Scenario::load(Some(path))?;
+        all.check_new(path, &scenario.name)?;
+        scenarios.push((Input::of(path)?, scenario));
+    }
+    for (input, scenario) in scenarios {
+        eprintln!("{}: {}", scenario.name, scenario.description);
+        let trials = args.trials.map_or(scenario.trials, |most| most.min(scenario.trials));
+        let progress = Progress::new("trials", trials);
+        let done = |n| progress.reached(n);
+        let result = study(scenario, args.trials, args.slow_every, threads, &done)?;
+        progress.finish();
+        all.inputs.push(input);
+        all.study.scenarios.push(result);
+        args.output.save(SCHEMA, &all.study, all.program(), markdown, page)?;
+    }
+    args.output.write(SCHEMA, &all.study, all.program(), markdown, page)
+}
