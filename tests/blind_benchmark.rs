@@ -143,7 +143,6 @@ fn values_that_mean_nothing() {
 }
 
 #[test]
-#[ignore = "named, but the interval of the limit misses the truth by twice its width"]
 fn a_drive_at_its_limit() {
     hide_and_find(&["saturation"]);
 }

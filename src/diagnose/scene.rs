@@ -48,6 +48,8 @@ pub struct Scene {
     /// Half-width of the interval around each recorded angle in which the true one lies, rad; zero for
     /// a motion that repeats, whose angles are averaged.
     pub angle_doubt_rad: Vec<f64>,
+    /// ± the largest torque that is read, where readings are cut off there, Nm.
+    pub torque_limit_nm: Vec<Option<f64>>,
     derivative: Derivative,
     /// See [`Self::fine_link_nm`].
     fine_link_nm: Vec<OnceLock<Vec<f64>>>,
@@ -124,6 +126,7 @@ impl Scene {
             load_nm,
             torque_nm,
             sign,
+            torque_limit_nm: prepared.torque_limit_nm.clone(),
             derivative,
             fine_link_nm: vec![OnceLock::new(); joints],
         }

@@ -10,7 +10,8 @@ use crate::dynamics::Motion;
 use crate::robot::JointSignals;
 use crate::signal::{
     Activity, Decimator, FitScratch, HarmonicPower, PeriodSearch, PeriodicFit, Replicates,
-    Resampler, Scratch, ZeroPhase, central_4, natural_rate_hz, quantum, replicate_noise,
+    Resampler, Scratch, ZeroPhase, central_4, natural_rate_hz, quantum, reading_limit,
+    replicate_noise,
 };
 
 /// The channels identification needs of a log, borrowed.
@@ -67,6 +68,8 @@ pub struct Prepared {
     pub recorded: Option<[JointSignals; 2]>,
     /// Smallest distance between two recorded angles, per joint, rad.
     pub angle_quantum_rad: Vec<f64>,
+    /// ± the largest torque that is read, per joint, where readings are cut off there, Nm.
+    pub torque_limit_nm: Vec<Option<f64>>,
     /// How well the averaged acceleration is known, per joint; `None` for a single run.
     pub acceleration: Option<Vec<HarmonicPower>>,
     /// What was done.
@@ -294,6 +297,7 @@ impl Preparer {
             each_period,
             recorded: Some([q_rad, qd_rad_s]),
             angle_quantum_rad: angle_quantum_rad(m),
+            torque_limit_nm: torque_limit_nm(m),
             replicates: Some(replicate_noise(&torque_nm, samples_per_period)?),
             acceleration: Some(averaged.acceleration),
             torque_nm,
@@ -348,6 +352,7 @@ impl Preparer {
             each_period: None,
             recorded: None,
             angle_quantum_rad: angle_quantum_rad(m),
+            torque_limit_nm: torque_limit_nm(m),
             replicates: None,
             acceleration: None,
             processing: Processing {
@@ -368,6 +373,10 @@ impl Preparer {
 
 fn angle_quantum_rad(m: &Measurement) -> Vec<f64> {
     (0..m.q_rad.joints()).map(|j| quantum(m.q_rad.joint(j))).collect()
+}
+
+fn torque_limit_nm(m: &Measurement) -> Vec<Option<f64>> {
+    (0..m.torque_nm.joints()).map(|j| reading_limit(m.torque_nm.joint(j))).collect()
 }
 
 /// The samples of the experiment proper: the motion without standstill at its ends, and without

@@ -204,7 +204,7 @@ fn summary_table(study: &NoiseStudy) -> Table {
         let [low, high] = m.coverage_worst_within;
         let withheld = match s.tested_for_fit {
             0 => "not tested".to_owned(),
-            tested => format!("{} of {tested}", s.rejected_fits),
+            tested => format!("{} ({}) of {tested}", s.rejected_fits, s.tested_again),
         };
         table.push_judged(
             Some(scenario_status(s, m)),
@@ -341,7 +341,7 @@ fn how() -> String {
          trials) and the parameter furthest from 95 % with its binomial bounds (Wilson, 95 %; the furthest of 52 lies outside \
          its own bounds more often than one chosen beforehand). Least σ is the Cramér–Rao bound for noise of known law and a \
          motion known exactly, over all frequencies. Withheld are trials in which the lack-of-fit test at p < {} says that \
-         the model does not explain what repeats. The slower methods (everything but ols, wls with wls, blocks or periods, and \
+         the model does not explain what repeats (in brackets those that fail against the scatter of the torque alone). The slower methods (everything but ols, wls with wls, blocks or periods, and \
          spectral) ran on a share of the trials that stands with each scenario at the end.",
         NoiseStudy::rejection_level()
     )

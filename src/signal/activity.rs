@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::error::{SignalError, checked_rate_hz, enough};
 use super::noise::{block_noise, quantile};
+use super::readings::quantum;
 use crate::robot::JointSignals;
 
 /// Length of the blocks in which the noise is judged, s.
@@ -98,19 +99,6 @@ fn runs(flags: &[bool]) -> impl Iterator<Item = Range<usize>> {
         end += chunk.len();
         chunk[0].then_some(start..end)
     })
-}
-
-/// Smallest distance between two different values of the series: its resolution as recorded.
-/// Zero for a constant.
-pub fn quantum(series: &[f64]) -> f64 {
-    let mut values = series.to_vec();
-    values.sort_by(f64::total_cmp);
-    let scale =
-        [values.first(), values.last()].into_iter().flatten().fold(0.0, |s: f64, v| s.max(v.abs()));
-    // What differs by rounding alone is the same value.
-    let distances = values.windows(2).map(|v| v[1] - v[0]).filter(|d| *d > 1e-12 * scale);
-    let smallest = distances.fold(f64::INFINITY, f64::min);
-    if smallest.is_finite() { smallest } else { 0.0 }
 }
 
 #[cfg(test)]

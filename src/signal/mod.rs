@@ -15,6 +15,7 @@
 //! | does the motion repeat, and from where to where? | [`find_period`] |
 //! | the best estimate of a repeated motion and its derivatives | [`PeriodicFit`] |
 //! | how noisy is a signal, without any model of it? | [`replicate_noise`] |
+//! | how fine is a sensor, and where does it end? | [`quantum`], [`reading_limit`] |
 //! | at which frequencies is there energy? | [`welch`] |
 
 mod activity;
@@ -27,12 +28,13 @@ mod fourier;
 mod noise;
 mod paper_filter;
 mod period;
+mod readings;
 mod replicates;
 mod resample;
 mod spectra;
 mod spectrum;
 
-pub use activity::{Activity, quantum};
+pub use activity::Activity;
 pub use butterworth::{Scratch, ZeroPhase};
 pub use decimate::Decimator;
 pub use differentiate::{central_2, central_4, hermite_acceleration};
@@ -40,6 +42,7 @@ pub use error::SignalError;
 pub use fourier::{AveragedMotion, FitScratch, HarmonicPower, PeriodicFit};
 pub use paper_filter::{PaperDifferentiator, PaperReading};
 pub use period::{Period, PeriodSearch, find_period};
+pub use readings::{quantum, reading_limit};
 pub use replicates::{Replicates, replicate_noise};
 pub use resample::{Gap, Resampler, gaps, natural_rate_hz};
 pub use spectrum::{PowerSpectrum, welch};

@@ -24,6 +24,10 @@ impl Candidate for Saturation {
     }
 
     fn shapes(&self, scene: &Scene, site: Option<usize>) -> Vec<Shape> {
+        // Readings that stop at one number tell it.
+        if let Some(limit) = scene.torque_limit_nm[joint(site)] {
+            return vec![Shape { variant: 0, value: limit }];
+        }
         let peak = scene.torque_nm.joint(joint(site)).iter().fold(0.0, |m: f64, t| m.max(t.abs()));
         [0.6, 0.7, 0.8, 0.9, 0.97].map(|share| Shape { variant: 0, value: share * peak }).to_vec()
     }

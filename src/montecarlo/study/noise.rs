@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::identify::covariance::CovarianceKind as C;
-use crate::identify::{Estimate, Estimator as E, Identifier, LackOfFit, Measurement};
+use crate::identify::{Estimate, Estimator as E, Floor, Identifier, LackOfFit, Measurement};
 use crate::montecarlo::calibration::{Calibration, wilson};
 use crate::montecarlo::efficiency::Efficiency;
 use crate::montecarlo::experiment::{Experiment, TrialError};
@@ -71,6 +71,9 @@ pub struct ScenarioResult {
     pub methods: Vec<MethodResult>,
     /// Trials with a lack-of-fit test.
     pub tested_for_fit: u64,
+    /// Those of them that failed against the scatter of the torque alone, and were tested against that of torque and
+    /// motion.
+    pub tested_again: u64,
     /// Those of them in which it rejected the model (at [`LackOfFit::REJECT_BELOW`]).
     pub rejected_fits: u64,
 }
@@ -110,6 +113,7 @@ pub struct MethodResult {
 struct Tallies {
     methods: Vec<Tally>,
     tested: u64,
+    tested_again: u64,
     rejected: u64,
 }
 
@@ -166,6 +170,7 @@ pub fn study(
         checks: checks.iter().map(|check| CheckSummary::of(check, name)).collect(),
         methods,
         tested_for_fit: tallies.tested,
+        tested_again: tallies.tested_again,
         rejected_fits: tallies.rejected,
     })
 }
@@ -221,12 +226,14 @@ fn due(trial: u64, slow_every: u64) -> Vec<(E, Vec<usize>)> {
 
 impl Tallies {
     fn new(parameters: usize) -> Self {
-        Self { methods: vec![Tally::new(parameters); METHODS.len()], tested: 0, rejected: 0 }
+        let methods = vec![Tally::new(parameters); METHODS.len()];
+        Self { methods, tested: 0, tested_again: 0, rejected: 0 }
     }
 
     fn merged(mut self, other: Self) -> Self {
         self.methods.iter_mut().zip(&other.methods).for_each(|(a, b)| a.merge(b));
         self.tested += other.tested;
+        self.tested_again += other.tested_again;
         self.rejected += other.rejected;
         self
     }
@@ -261,8 +268,11 @@ impl Tallies {
                 return;
             }
         };
-        self.tested += u64::from(estimate.lack_of_fit.is_some());
-        self.rejected += u64::from(estimate.lack_of_fit.is_some_and(|lack| !lack.fits()));
+        if let Some(lack) = estimate.lack_of_fit {
+            self.tested += 1;
+            self.tested_again += u64::from(lack.floor == Floor::TorqueAndMotion);
+            self.rejected += u64::from(!lack.fits());
+        }
         for (covariance, &k) in estimate.covariances.iter().zip(indices) {
             let outcomes = match covariance {
                 Ok(covariance) => {

@@ -1,0 +1,56 @@
+//! What the values of a recorded series say of the sensor behind it.
+
+/// Smallest distance between two different values of the series: its resolution as recorded.
+/// Zero for a constant.
+pub fn quantum(series: &[f64]) -> f64 {
+    let mut values = series.to_vec();
+    values.sort_by(f64::total_cmp);
+    let scale =
+        [values.first(), values.last()].into_iter().flatten().fold(0.0, |s: f64, v| s.max(v.abs()));
+    // What differs by rounding alone is the same value.
+    let distances = values.windows(2).map(|v| v[1] - v[0]).filter(|d| *d > 1e-12 * scale);
+    let smallest = distances.fold(f64::INFINITY, f64::min);
+    if smallest.is_finite() { smallest } else { 0.0 }
+}
+
+/// Readings at the limit that are no accident, at least, and so many times those at the next value: in coarse
+/// steps the highest is no more frequent than the one before.
+const AT_LIMIT: usize = 4;
+const MORE_THAN_NEXT: usize = 3;
+
+/// ± the reading that the series does not pass, because it is cut off there: its largest size, where that
+/// very number is read again and again. `None` if nothing is cut off.
+pub fn reading_limit(series: &[f64]) -> Option<f64> {
+    let mut sizes: Vec<f64> = series.iter().map(|v| v.abs()).collect();
+    sizes.sort_by(|a, b| b.total_cmp(a));
+    let largest = *sizes.first().filter(|v| **v > 0.0)?;
+    // What differs by rounding alone is the same value.
+    let is_same = |a: f64, b: f64| (a - b).abs() <= 1e-12 * largest;
+    let count = |of: &[f64]| of.iter().take_while(|v| is_same(**v, of[0])).count();
+    let at_limit = count(&sizes);
+    let next = sizes.get(at_limit..).filter(|rest| !rest.is_empty()).map_or(0, count);
+    (at_limit >= AT_LIMIT && at_limit > MORE_THAN_NEXT * next).then_some(largest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wave(limit: f64, step: f64) -> Vec<f64> {
+        let value = |k: usize| 3.0 * (0.0371 * k as f64).sin() + 0.1 * (7.3 * k as f64).sin();
+        let round = |v: f64| if step > 0.0 { step * (v / step).round() } else { v };
+        (0..2000).map(|k| round(value(k)).clamp(-limit, limit)).collect()
+    }
+
+    #[test]
+    fn a_reading_that_is_cut_off_shows_its_limit() {
+        assert_eq!(reading_limit(&wave(2.8, 0.0)), Some(2.8));
+        assert_eq!(reading_limit(&wave(9.0, 0.0)), None);
+    }
+
+    #[test]
+    fn coarse_steps_are_no_limit() {
+        assert_eq!(reading_limit(&wave(9.0, 0.05)), None);
+        assert_eq!(reading_limit(&[0.0; 10]), None);
+    }
+}
