@@ -12,7 +12,7 @@ use crate::dynamics::Model;
 use crate::identify::Options;
 use crate::log::Effort;
 use crate::output::{check_writable, write_atomically};
-use crate::report::json::Program;
+use crate::report::json::{Input, Program};
 use crate::report::real_arm::{Pair, RealArmStudy, Recorded};
 use crate::robot::Arm;
 
@@ -28,6 +28,20 @@ pub(super) struct RealArmArgs {
     /// Write the report as one HTML page.
     #[arg(long)]
     report: Option<PathBuf>,
+}
+
+impl RealArmArgs {
+    /// The words of the command that makes the report anywhere: whoever has the logs says where they are.
+    fn command(&self) -> Vec<String> {
+        let mut words =
+            ["armid", "study", "real-arm", "--data", "FOLDER"].map(String::from).to_vec();
+        for (option, path) in [("--markdown", &self.markdown), ("--report", &self.report)] {
+            if let Some(path) = path {
+                words.extend([option.to_owned(), path.display().to_string()]);
+            }
+        }
+        words
+    }
 }
 
 /// The body that the authors bolted to the flange, kg.
@@ -83,16 +97,16 @@ pub(super) fn run(args: &RealArmArgs) -> CommandResult {
     let mut compare = |diagnoser: &mut Diagnoser,
                        finding: &Finding,
                        [first, other]: [&LoadedLog; 2],
-                       truth: &'static str,
+                       known_kg: Option<f64>,
                        gains: &'static str|
      -> CommandResult {
         let measurements = (first.measurement(), other.measurement());
         let finding =
             diagnoser.payload(finding, &measurements.0, &measurements.1, Some(KNOWN_KG))?;
-        pairs.push(Pair { file: name(other), truth, gains, finding });
+        pairs.push(Pair { file: name(other), known_kg, gains, finding });
         Ok(Outcome::Done)
     };
-    let (body, bare) = ("2.805 kg", "nothing");
+    let (body, bare) = (Some(KNOWN_KG), None);
     compare(&mut diagnoser, &finding, [&training, &loaded], body, "controller's")?;
     compare(&mut diagnoser, &second, [&unload, &load], body, "controller's")?;
     for log in held_out.iter().take(2).chain([&unload]) {
@@ -130,7 +144,8 @@ pub(super) fn run(args: &RealArmArgs) -> CommandResult {
         .into_iter()
         .chain(&held_out)
         .chain(&touched)
-        .map(|l| l.input.clone())
+        // The logs are no part of the project: the page names them within the folder it is told.
+        .map(|l| Input { path: name(l).into(), ..l.input.clone() })
         .collect();
     let gains_nm_a = [gains_of(&training, &arm), gains_of(&others[0], &arm)];
     let other_gains = other.diagnosis.causes;
@@ -144,7 +159,7 @@ pub(super) fn run(args: &RealArmArgs) -> CommandResult {
         pairs,
         contacts,
     };
-    let program = Program::new(std::env::args(), None, inputs);
+    let program = Program::new(args.command(), None, inputs);
     let text = study.markdown(&program.command)?;
     println!("{text}");
     if let Some(path) = &args.markdown {

@@ -21,7 +21,7 @@ use super::study::{Entry, Study};
 use super::verdict::{Cause, DetectionLimit, Diagnosis, Rival, Rms, Verdict, make_modest};
 use crate::base::BaseSet;
 use crate::dynamics::Model;
-use crate::identify::{Identification, Identifier, Measurement, Options};
+use crate::identify::{Identification, Identifier, Measurement, Options, gravity_remark};
 use crate::robot::{Arm, JointSignals};
 
 /// Everything that stays the same from log to log.
@@ -202,6 +202,13 @@ impl<'a> Diagnoser<'a> {
         };
 
         diagnosis.sentences = diagnosis.in_sentences();
+        let nominal = self.set.values(&Model::new(self.arm).standard_parameters());
+        if let Some(remark) = gravity_remark(self.arm, self.set, &nominal, &identification) {
+            // Of another robot's log nothing else matters.
+            diagnosis
+                .sentences
+                .insert(0, format!("Is this log of {}? The {remark}.", self.arm.name));
+        }
         let samples = (0..regression.problem.samples).map(|row| regression.sample(row)).collect();
         let scene = study.scene;
         Ok(Finding {

@@ -21,6 +21,19 @@ pub struct Estimate {
 }
 
 impl Estimate {
+    /// `value ± half unit`, or with both ends where they are far from even.
+    fn in_words(&self) -> String {
+        let [low, high] = self.ci95;
+        let (below, above) = (self.value - low, high - self.value);
+        if above > UNEVEN * below || below > UNEVEN * above {
+            let [value, low, high] = [self.value, low, high].map(two_digits);
+            return format!("{value} (between {low} and {high}) {}", self.unit)
+                .trim_end()
+                .to_owned();
+        }
+        pair(self.value, 0.5 * (high - low), self.unit)
+    }
+
     /// Makes the interval hold `value`.
     pub(super) fn reach(&mut self, value: f64) {
         let [low, high] = self.ci95;
@@ -226,7 +239,8 @@ impl Diagnosis {
         let cause = payload.cause();
         if let (Verdict::NothingFound, Some(_)) = (self.verdict, &cause) {
             self.verdict = Verdict::CauseNamed;
-            self.sentences.clear();
+            // The sentence that nothing was found is the last.
+            self.sentences.pop();
         }
         let noise_is_known = self.noise_floor_nm.is_some();
         self.sentences.extend(cause.iter().map(|c| c.sentence(noise_is_known)));
@@ -259,6 +273,8 @@ impl Diagnosis {
     }
 }
 
+/// An interval that reaches so much farther to one side than to the other is told by its ends.
+const UNEVEN: f64 = 1.5;
 /// No physical cause is surer than this beside something unexplained (it may be a part of what the dictionary
 /// lacks), in a record that had to be mended, or as one of several that may share one origin.
 const PROVISIONAL: f64 = 0.9;
@@ -322,9 +338,8 @@ impl Cause {
             .parameters
             .iter()
             .map(|(name, e)| {
-                let half = 0.5 * (e.ci95[1] - e.ci95[0]);
                 let name = name.trim_end_matches(&unit_suffix(e.unit)).replace('_', " ");
-                format!("{name} {}", pair(e.value, half, e.unit))
+                format!("{name} {}", e.in_words())
             })
             .collect();
         let numbers = numbers.join(", ");
@@ -379,6 +394,15 @@ impl Cause {
 /// The unit as parameter names carry it, such as `_nm`.
 fn unit_suffix(unit: &str) -> String {
     format!("_{}", unit.to_lowercase().replace(['/', ' '], "_").replace("1_", "per_"))
+}
+
+/// With two digits, or more before the point.
+fn two_digits(value: f64) -> String {
+    if value.abs() >= 1e6 {
+        return format!("{value:.1e}");
+    }
+    let decimals = (1.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{value:.decimals$}")
 }
 
 /// `value ± half unit`, digits by the uncertainty.

@@ -72,24 +72,6 @@ pub fn plausible_size(arm: &Arm, set: &BaseSet, k: usize) -> f64 {
     }
 }
 
-/// Identified over nominal first moments: the factor by which the gravity torque of the log exceeds
-/// what the robot's description says, by least squares over all first moments; `None` for a
-/// description without any.
-///
-/// Far from 1 it means another robot, a payload, or drive gains that are off; the fit itself cannot
-/// tell, because robots of one family differ in scale only.
-pub fn gravity_ratio(arm: &Arm, set: &BaseSet, nominal: &[f64], theta: &[f64]) -> Option<f64> {
-    let layout = ParameterLayout::new(arm.dof());
-    let is_first_moment =
-        |&k: &usize| matches!(layout.parameter(set.column(k)[0].0), Parameter::Body(_, 1..=3));
-    let (mut both, mut square) = (0.0, 0.0);
-    for k in (0..set.rank()).filter(is_first_moment) {
-        both += nominal[k] * theta[k];
-        square += nominal[k] * nominal[k];
-    }
-    (square > 0.0).then(|| both / square)
-}
-
 /// Least reach of a body, m: a wrist is not a point.
 const HAND_M: f64 = 0.05;
 

@@ -28,6 +28,10 @@ impl Candidate for Saturation {
         if let Some(limit) = scene.torque_limit_nm[joint(site)] {
             return vec![Shape { variant: 0, value: limit }];
         }
+        // Where nothing repeats, a law of friction that is not quite right looks like the top cut off.
+        if !scene.periodic {
+            return Vec::new();
+        }
         let peak = scene.torque_nm.joint(joint(site)).iter().fold(0.0, |m: f64, t| m.max(t.abs()));
         [0.6, 0.7, 0.8, 0.9, 0.97].map(|share| Shape { variant: 0, value: share * peak }).to_vec()
     }

@@ -28,9 +28,10 @@ impl Candidate for Spring {
         if shape.variant == 1 {
             return vec![quantity("pull_at_zero_nm", b[0], "Nm")];
         }
+        let mut out = vec![quantity("stiffness_nm_rad", b[0], "Nm/rad")];
         // The constant is the estimate's own where it fits offsets.
-        let rest_rad = b.get(1).map_or(f64::NAN, |constant| -constant / b[0]);
-        vec![quantity("stiffness_nm_rad", b[0], "Nm/rad"), quantity("rest_rad", rest_rad, "rad")]
+        out.extend(b.get(1).map(|constant| quantity("rest_rad", -constant / b[0], "rad")));
+        out
     }
 
     fn separating_experiment(&self) -> &'static str {

@@ -19,7 +19,7 @@ use crate::identify::covariance::CovarianceKind;
 use crate::identify::physical::PhysicalEstimate;
 use crate::identify::{
     Condition, Estimator, FitError, Identification, Prediction, Processing, Regression, Residual,
-    gravity_ratio, identifies_the_arm, not_identified,
+    gravity_remark, identifies_the_arm, not_identified,
 };
 use crate::log::Log;
 use crate::robot::Arm;
@@ -138,10 +138,6 @@ struct ValidationJson {
     manufacturer_moving_rms_nm: Option<Vec<f64>>,
 }
 
-/// Factor between gravity found and described beyond which it is remarked on: payloads and
-/// tolerances of drive gains stay below.
-const GRAVITY_OFF: f64 = 1.5;
-
 impl Result {
     /// Collects everything that is said.
     pub fn of(
@@ -168,16 +164,7 @@ impl Result {
             .collect();
         let mut warnings = identification.warnings.clone();
         let is_identified = identifies_the_arm(arm, set, &open);
-        // Masses that are not identified say nothing of gravity.
-        let ratio = gravity_ratio(arm, set, training.nominal, &identification.fit.theta)
-            .filter(|_| is_identified);
-        if let Some(ratio) = ratio.filter(|r| !(1.0 / GRAVITY_OFF..GRAVITY_OFF).contains(r)) {
-            warnings.push(format!(
-                "gravity torque is {ratio:.2} times what the description of {} says: another robot, \
-                 a payload, or drive gains that are off?",
-                arm.name
-            ));
-        }
+        warnings.extend(gravity_remark(arm, set, training.nominal, identification));
         Ok(Self {
             robot: arm.name.clone(),
             log: names(training.logs),

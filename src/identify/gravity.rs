@@ -1,0 +1,147 @@
+//! Whether the gravity torque of a log is that of the robot it is said to be of.
+//!
+//! Robots of one family differ little but in scale: a rigid model fits the log of a larger sister as well, with
+//! larger masses. Those can be compared with the robot's description, and with a body on its flange:
+//!
+//! g ≈ g₀ + P (m, m c),   g the first moments of the base set, g₀ by the description,
+//!
+//! with P the columns of the last body's mass and first moments.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::identifier::Identification;
+use super::quality::{identifies_the_arm, not_identified};
+use crate::base::BaseSet;
+use crate::dynamics::{Parameter, ParameterLayout};
+use crate::robot::Arm;
+
+/// Gravity found and gravity described.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GravityMatch {
+    /// Found over described, by least squares over all first moments.
+    pub ratio: f64,
+    /// Mass on the flange that comes nearest to what was found, kg; not positive where none helps.
+    pub body_kg: f64,
+    /// What the description with that body leaves, as a share of what it says.
+    pub left: f64,
+}
+
+/// Factor between gravity found and described beyond which it is remarked on: tolerances of drive gains and
+/// usual bodies on the flange stay below.
+const OFF: f64 = 1.5;
+/// Share that a body on the flange may leave if it explains what was found: published gains of one arm differ by
+/// as much.
+const LEFT: f64 = 0.2;
+/// Standard parameters of the last body that a body on the flange changes what gravity does by: mass, first
+/// moments.
+const BODY: usize = 4;
+
+impl GravityMatch {
+    /// Of base parameters `theta`; `None` for a description without masses.
+    pub fn of(arm: &Arm, set: &BaseSet, nominal: &[f64], theta: &[f64]) -> Option<Self> {
+        let layout = ParameterLayout::new(arm.dof());
+        let is_first_moment =
+            |&k: &usize| matches!(layout.parameter(set.column(k)[0].0), Parameter::Body(_, 1..=3));
+        let rows: Vec<usize> = (0..set.rank()).filter(is_first_moment).collect();
+        let described = DVector::from_iterator(rows.len(), rows.iter().map(|&k| nominal[k]));
+        let found = DVector::from_iterator(rows.len(), rows.iter().map(|&k| theta[k]));
+        let square = described.norm_squared();
+        if square == 0.0 {
+            return None;
+        }
+        let columns: Vec<DVector<f64>> = (0..BODY)
+            .map(|s| {
+                let mut standard = vec![0.0; layout.count()];
+                standard[layout.index(Parameter::Body(arm.dof() - 1, s))] = 1.0;
+                let values = set.values(&standard);
+                DVector::from_iterator(rows.len(), rows.iter().map(|&k| values[k]))
+            })
+            .collect();
+        let body = DMatrix::from_columns(&columns);
+        let more = &found - &described;
+        // Of what gravity cannot tell apart the smallest is taken.
+        let x = body.clone().svd(true, true).solve(&more, f64::EPSILON.sqrt()).ok()?;
+        let rest = if x[0] > 0.0 { &more - body * &x } else { more };
+        Some(Self {
+            ratio: described.dot(&found) / square,
+            body_kg: x[0],
+            left: (rest.norm_squared() / square).sqrt(),
+        })
+    }
+
+    /// What is to be said of it.
+    fn remark(&self, robot: &str) -> Option<String> {
+        let Self { ratio, body_kg, left } = *self;
+        if (1.0 / OFF..OFF).contains(&ratio) {
+            return None;
+        }
+        let far =
+            format!("gravity torque is {ratio:.2} times what the description of {robot} says");
+        Some(if body_kg > 0.0 && left < LEFT {
+            format!(
+                "{far}: a body of {body_kg:.1} kg on the flange would explain it, or drive gains that are off"
+            )
+        } else {
+            let nearest = if body_kg > 0.0 {
+                format!("a body of {body_kg:.1} kg on the flange, which comes nearest, leaves")
+            } else {
+                "no body on the flange explains".to_owned()
+            };
+            format!(
+                "{far}, and {nearest} {:.0} % of it: this is the log of another robot, or the drive gains are off",
+                100.0 * left
+            )
+        })
+    }
+}
+
+/// A remark where the gravity torque that was identified is not that of the arm's description; masses that are
+/// not identified say nothing of gravity.
+pub fn gravity_remark(
+    arm: &Arm,
+    set: &BaseSet,
+    nominal: &[f64],
+    identification: &Identification,
+) -> Option<String> {
+    let quantile = identification.covariance.quantile_95();
+    let half_width: Vec<f64> = identification.sigma().iter().map(|s| quantile * s).collect();
+    if !identifies_the_arm(arm, set, &not_identified(arm, set, &half_width)) {
+        return None;
+    }
+    GravityMatch::of(arm, set, nominal, &identification.fit.theta)?.remark(&arm.name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::Parameterisation;
+    use crate::dynamics::Model;
+
+    fn described(robot: &str) -> (Arm, BaseSet, Vec<f64>) {
+        let arm = Arm::built_in(robot).unwrap();
+        let set = BaseSet::find(&arm, Parameterisation::full(arm.dof(), true)).unwrap();
+        let standard = Model::new(&arm).standard_parameters();
+        (arm, set, standard)
+    }
+
+    #[test]
+    fn a_body_on_the_flange_is_told_from_a_larger_robot() {
+        let (arm, set, standard) = described("ur5e");
+        let nominal = set.values(&standard);
+        let own = GravityMatch::of(&arm, &set, &nominal, &nominal).unwrap();
+        assert!((own.ratio - 1.0).abs() < 1e-12 && own.remark("ur5e").is_none());
+
+        let layout = ParameterLayout::new(arm.dof());
+        let mut loaded = standard.clone();
+        loaded[layout.index(Parameter::Body(5, 0))] += 6.0;
+        loaded[layout.index(Parameter::Body(5, 3))] += 6.0 * 0.05;
+        let with_body = GravityMatch::of(&arm, &set, &nominal, &set.values(&loaded)).unwrap();
+        assert!((with_body.body_kg - 6.0).abs() < 1e-6 && with_body.left < 1e-6, "{with_body:?}");
+        assert!(with_body.remark("ur5e").unwrap().contains("a body of 6.0 kg"));
+
+        let (_, larger, standard) = described("ur10e");
+        assert!((0..set.rank()).all(|k| set.name(k) == larger.name(k)), "of one family");
+        let other = GravityMatch::of(&arm, &set, &nominal, &larger.values(&standard)).unwrap();
+        assert!(other.remark("ur5e").unwrap().contains("another robot"), "{other:?}");
+    }
+}

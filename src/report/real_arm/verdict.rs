@@ -1,0 +1,174 @@
+//! The first screen of the case study: what was found, in plain words, and what was aimed at and missed.
+
+use super::super::{Status, Verdict};
+use super::{RealArmStudy, file_name, mean, percents};
+use crate::diagnose::{Cause, HeldOut};
+use crate::report::number::{significant, with_sigma};
+
+/// Share of the rms error that is to be removed on held-out runs, in the mean of the joints.
+const AIM_MEAN: f64 = 0.35;
+/// The same on every single joint.
+const AIM_JOINT: f64 = 0.2;
+/// Kinds of cause on the first screen.
+const FIRST_SCREEN: usize = 4;
+
+/// Joints (from 1) whose gain is below the aim.
+fn short_of_aim(gains: &[f64]) -> Vec<usize> {
+    (1..).zip(gains).filter(|(_, gain)| **gain < AIM_JOINT).map(|(j, _)| j).collect()
+}
+
+fn reaches_aim(gains: &[f64]) -> bool {
+    mean(gains) >= AIM_MEAN && short_of_aim(gains).is_empty()
+}
+
+/// `joint 2`, `joints 2 and 3`, `joints 1, 2 and 3`.
+fn on_joints(joints: &[usize]) -> String {
+    let words: Vec<String> = joints.iter().map(usize::to_string).collect();
+    match words.split_last() {
+        None => "the arm as a whole".to_owned(),
+        Some((only, [])) => format!("joint {only}"),
+        Some((last, others)) => format!("joints {} and {last}", others.join(", ")),
+    }
+}
+
+impl RealArmStudy {
+    /// The verdict with its facts.
+    pub(super) fn verdict(&self) -> Verdict {
+        let (all, moving) = (self.all_gains(), self.moving_gains());
+        let percent = |gains: &[f64]| format!("{:.0} %", 100.0 * mean(gains));
+        let mut sentence = format!(
+            "On runs of other days, naming what the rigid model misses lowers its rms error by {} (mean of the \
+             joints)",
+            percent(&all)
+        );
+        if reaches_aim(&moving) {
+            sentence += &format!(", {} in samples in which the joint moves.", percent(&moving));
+        } else {
+            sentence += &format!(
+                "; in samples in which the joint moves by {}, less than aimed at.",
+                percent(&moving)
+            );
+        }
+        let is_good = reaches_aim(&all) && reaches_aim(&moving);
+        let mut facts: Vec<String> = self.physics();
+        facts.extend(self.record());
+        facts.push(self.aim("all samples", &all));
+        facts.push(self.aim("samples in which the joint moves", &moving));
+        facts.push(self.beside_the_manufacturer());
+        facts.push(self.body());
+        let status = if is_good { Status::Good } else { Status::Warn };
+        Verdict { status, sentence, facts }
+    }
+
+    /// One sentence per kind of cause, what matters most first.
+    fn physics(&self) -> Vec<String> {
+        let causes = self.finding.diagnosis.causes.iter();
+        let physics: Vec<&Cause> = causes.filter(|c| !c.kind.is_of_the_record()).collect();
+        let mut kinds = Vec::new();
+        for cause in &physics {
+            if !kinds.contains(&cause.kind) {
+                kinds.push(cause.kind);
+            }
+        }
+        let sentence = |kind| {
+            let alike: Vec<&&Cause> = physics.iter().filter(|c| c.kind == kind).collect();
+            let mut joints: Vec<usize> = alike.iter().filter_map(|c| c.joint).collect();
+            joints.sort_unstable();
+            joints.dedup();
+            let most = alike.iter().filter_map(|c| c.gain_fraction).fold(0.0, f64::max);
+            let words = alike.first().map_or("", |c| c.in_words.as_str());
+            format!(
+                "The model misses {words}, on {}: up to {:.0} % of a joint's mean square error.",
+                on_joints(&joints),
+                100.0 * most
+            )
+        };
+        kinds.into_iter().take(FIRST_SCREEN).map(sentence).collect()
+    }
+
+    /// What is wrong with the recording, not with the arm.
+    fn record(&self) -> Option<String> {
+        let causes = self.finding.diagnosis.causes.iter();
+        let late: Vec<&Cause> = causes.filter(|c| c.parameters.contains_key("delay_s")).collect();
+        let joints: Vec<usize> = late.iter().filter_map(|c| c.joint).collect();
+        let longest = late.iter().map(|c| c.parameters["delay_s"].value.abs()).fold(0.0, f64::max);
+        (longest > 0.0).then(|| {
+            format!(
+                "The recording's velocity lags behind its angle by up to {} ms on {}; both models read it back.",
+                significant(1e3 * longest, 2),
+                on_joints(&joints)
+            )
+        })
+    }
+
+    fn aim(&self, samples: &str, gains: &[f64]) -> String {
+        let aim = format!(
+            "{:.0} % in the mean, {:.0} % on every joint",
+            100.0 * AIM_MEAN,
+            100.0 * AIM_JOINT
+        );
+        let short = short_of_aim(gains);
+        let mut missed = Vec::new();
+        if mean(gains) < AIM_MEAN {
+            missed.push("in the mean".to_owned());
+        }
+        if !short.is_empty() {
+            missed.push(format!("on {}", on_joints(&short)));
+        }
+        let outcome = match missed.is_empty() {
+            true => "reached".to_owned(),
+            false => format!("missed {}", missed.join(" and ")),
+        };
+        format!(
+            "Error removed on held-out runs, {samples}, joints 1 … {}: {} (aim: {aim}; {outcome}).",
+            gains.len(),
+            percents(gains)
+        )
+    }
+
+    fn beside_the_manufacturer(&self) -> String {
+        let is_below = |log: &&HeldOut| {
+            let pairs = [
+                (&log.after_rms_nm, &log.manufacturer_rms_nm),
+                (&log.after_moving_rms_nm, &log.manufacturer_moving_rms_nm),
+            ];
+            pairs.iter().all(|(after, own)| {
+                own.as_ref()
+                    .is_some_and(|own| after.iter().zip(own).all(|(after, own)| after < own))
+            })
+        };
+        let held_out = &self.finding.diagnosis.held_out;
+        let below: Vec<String> =
+            held_out.iter().filter(is_below).map(|log| file_name(&log.log)).collect();
+        if below.is_empty() {
+            return "On no held-out run is the error below that of the controller's own feed-forward on every joint."
+                .to_owned();
+        }
+        format!(
+            "Below the error of the controller's own feed-forward on every joint of {} of {} held-out runs.",
+            below.len(),
+            held_out.len()
+        )
+    }
+
+    /// What was found on the flange.
+    fn body(&self) -> String {
+        let (loaded, bare): (Vec<_>, Vec<_>) =
+            self.pairs.iter().partition(|pair| pair.known_kg.is_some());
+        let masses: Vec<String> = loaded
+            .iter()
+            .map(|pair| {
+                let mass = &pair.finding.mass_kg;
+                let sigma = 0.25 * (mass.ci95[1] - mass.ci95[0]);
+                format!("{} kg with the {} gains", with_sigma(mass.value, sigma), pair.gains)
+            })
+            .collect();
+        let named = bare.iter().filter(|pair| pair.finding.is_named).count();
+        let known = loaded.first().and_then(|pair| pair.known_kg).unwrap_or(f64::NAN);
+        format!(
+            "The body that weighs {known} kg is found as {}; a body is found on {named} of {} runs without one.",
+            masses.join(", "),
+            bare.len()
+        )
+    }
+}
