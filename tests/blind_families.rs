@@ -82,6 +82,19 @@ fn one_hidden_effect_of_each_family_is_named_at_its_joint() {
     assert!(missed.is_empty(), "not named: {missed:?}");
 }
 
+/// A well damped gear, the encoder on its link: rotor and friction move more than the log says.
+#[test]
+fn a_gear_that_gives_way_is_seen_from_the_link_as_well() {
+    let gear = "stiffness_nm_rad = 8000.0\ndamping_ratio = 0.3\nencoder = \"link\"";
+    let (joint, d) = hide(112, "elasticity", &[2, 3], gear);
+    assert!(is_named(&d, "elasticity", Some(joint)));
+    let stiffness = &d.causes[0].parameters["stiffness_nm_rad"];
+    // Twice the half width: 3.9 σ, which one log in 10⁴ misses by chance.
+    let reach = stiffness.ci95[1] - stiffness.ci95[0];
+    assert!((stiffness.value - 8000.0).abs() < reach, "{stiffness:?}");
+    assert!(reach < 4000.0, "{stiffness:?}");
+}
+
 #[test]
 fn a_tilted_base_and_late_torque_belong_to_the_whole_arm() {
     let tilt = "[[effect]]\nkind = \"base_tilt\"\ntilt_x_rad = 0.01\ntilt_y_rad = -0.006\n";

@@ -21,6 +21,9 @@ const MOST_CAUSES: usize = 24;
 const SHARED: f64 = 0.5;
 /// Rounds in which causes of a single run are exchanged: two may replace each other for ever.
 const EXCHANGES: usize = 3;
+/// Causes of one family on one joint at most, where a family may be there more than once: gears and motors have
+/// a few orders of ripple, and more of them are what another cause leaves.
+const MOST_ALIKE: usize = 3;
 /// Families whose shapes are refined before one is chosen.
 const FINALISTS: usize = 10;
 /// Two effects are told apart with 99.9 % confidence and 90 % power where λ(1 − cos²) exceeds
@@ -284,13 +287,11 @@ impl<'s, 'a> Kept<'s, 'a> {
         };
         let taken = |entry: &Entry| {
             let place = (entry.family, entry.site);
-            let is_taken = |c: &Contender| (c.entry.family, c.entry.site) == place;
-            !study.families[entry.family].is_repeatable()
-                && self
-                    .causes
-                    .iter()
-                    .enumerate()
-                    .any(|(c, cause)| Some(c) != open && is_taken(cause))
+            let is_taken = |(c, cause): &(usize, &Contender)| {
+                Some(*c) != open && (cause.entry.family, cause.entry.site) == place
+            };
+            let most = if study.families[entry.family].is_repeatable() { MOST_ALIKE } else { 1 };
+            self.causes.iter().enumerate().filter(is_taken).count() >= most
         };
         let mut best: Vec<Contender> = Vec::new();
         let scores: Vec<Option<Score>> = study

@@ -4,8 +4,8 @@
 //! τ(q − δ, q̇ − δ̇, q̈ − δ̈) − τ(q, q̇, q̈) on every joint (variant 0). The link swings on its spring, so that
 //! δ = τ_L/(k − M_jj ω² + i d ω) at the frequency ω, τ_L the load of the motor's motion. Where the log has
 //! the link's angle, the rotor and its friction move more: I_a δ̈ + F_v δ̇ + F_c [tanh((q̇ + δ̇)/ε) −
-//! tanh(q̇/ε)] on the joint itself, δ = τ_L/k (variant 1; the friction reverses where the motor does). The
-//! stiffness is in the shape as well as in the coefficient 1/k.
+//! tanh(q̇/ε)] on the joint itself, δ = τ_L/(k + i d ω) (further variants; the friction reverses where the motor
+//! does). The stiffness is in the shape as well as in the coefficient 1/k.
 
 use super::*;
 use crate::dynamics::Motion;
@@ -16,6 +16,8 @@ pub struct Elasticity;
 
 /// Damping d over that of the rotor on the spring, 2 √(k Ia): a few percent in strain-wave gears.
 const DAMPING_RATIO: f64 = 0.05;
+/// The same where the encoder sits on the link, by variant: a loop closed over the gear needs damping.
+const LINK_DAMPING_RATIO: [f64; 2] = [0.05, 0.3];
 
 /// The motion of the links when joint `j` is `delta` (rad) behind its encoder.
 pub(super) fn lagging_by(scene: &Scene, j: usize, delta: &[f64]) -> Motion {
@@ -41,7 +43,7 @@ impl Candidate for Elasticity {
     }
 
     fn shapes(&self, _: &Scene, _: Option<usize>) -> Vec<Shape> {
-        (0..2)
+        (0..1 + LINK_DAMPING_RATIO.len())
             .flat_map(|variant| geometric(2e3, 2e5, 5).map(move |value| Shape { variant, value }))
             .collect()
     }
@@ -63,16 +65,21 @@ impl Candidate for Elasticity {
             });
             return vec![give_way(scene, &lagging_by(scene, j, &delta), 1.0 / stiffness)];
         }
-        let softness = 1.0 / shape.value;
-        let rate = scene.derivative(scene.link_nm.joint(j));
+        let (stiffness, ratio) = (shape.value, LINK_DAMPING_RATIO[shape.variant - 1]);
+        let damping = 2.0 * ratio * (stiffness * drive.rotor_inertia_kg_m2).sqrt();
+        let delta = scene.filtered(scene.link_nm.joint(j), |omega| {
+            Complex64::new(stiffness, damping * omega).inv()
+        });
+        let rate = scene.derivative(&delta);
         let acceleration = scene.derivative(&rate);
         let (qd, sign) = (scene.motion.qd_rad_s.joint(j), scene.sign.joint(j));
         let epsilon = scene.arm.friction_epsilon_rad_s;
         let extra = samples(scene, |k| {
-            let motor_sign = ((qd[k] + softness * rate[k]) / epsilon).tanh();
-            drive.rotor_inertia_kg_m2 * acceleration[k]
+            let motor_sign = ((qd[k] + rate[k]) / epsilon).tanh();
+            let more = drive.rotor_inertia_kg_m2 * acceleration[k]
                 + drive.viscous_nm_s_rad * rate[k]
-                + drive.coulomb_nm * (motor_sign - sign[k]) / softness
+                + drive.coulomb_nm * (motor_sign - sign[k]);
+            stiffness * more
         });
         vec![Column::on(j, extra)]
     }
@@ -82,7 +89,9 @@ impl Candidate for Elasticity {
     }
 
     fn in_shape(&self, shape: Shape) -> Option<Quantity> {
-        Some(quantity("stiffness_nm_rad", shape.value, "Nm/rad"))
+        // Seen by the link's encoder, the torque is 1/k times a shape that hardly depends on k.
+        let in_both = shape.variant == 0;
+        in_both.then(|| quantity("stiffness_nm_rad", shape.value, "Nm/rad"))
     }
 
     fn separating_experiment(&self) -> &'static str {
