@@ -5,12 +5,13 @@
 //! lags and a clock that stood still while the time stamps went on:
 //!
 //! - lag d of q̇: q̇ − Δq/Δt = −d q̈ in least squares;
-//! - time lost between two rows: l = Σ_j q̇_j (Δq_j − q̇_j Δt)/Σ_j q̇_j².
+//! - time lost between two rows: see [`stalls`](super::stalls).
 
 use std::collections::BTreeMap;
 
 use super::kind::Kind;
 use super::record::Record;
+use super::stalls::stalls;
 use super::verdict::{Cause, Estimate};
 use crate::identify::Measurement;
 use crate::median::{median, median_step};
@@ -18,7 +19,7 @@ use crate::robot::JointSignals;
 
 /// Deviations of this many robust standard deviations are no noise: in 10⁶ Gaussian values one in 10⁵
 /// logs has such a value.
-const FAR: f64 = 8.0;
+pub(super) const FAR: f64 = 8.0;
 /// A lag that a reader of a log need not care about, in samples.
 const SMALL_LAG_SAMPLES: f64 = 0.01;
 /// A step of this part of the rms change from sample to sample adds a tenth to the variance of the noise:
@@ -56,7 +57,7 @@ pub fn find(m: &Measurement) -> (Vec<Cause>, Record) {
     (out, record)
 }
 
-fn cause(
+pub(super) fn cause(
     kind: Kind,
     joint: Option<usize>,
     in_words: &str,
@@ -77,7 +78,7 @@ fn cause(
     }
 }
 
-fn exact(value: f64, unit: &'static str) -> Estimate {
+pub(super) fn exact(value: f64, unit: &'static str) -> Estimate {
     Estimate { value, unit, ci95: [value, value] }
 }
 
@@ -150,60 +151,6 @@ fn lag(m: &Measurement, j: usize) -> Option<(f64, f64)> {
         .sum();
     let variance = scatter * BLOCKS as f64 / (BLOCKS - 1) as f64 / square.powi(2);
     Some((lag, variance.sqrt()))
-}
-
-/// A clock that stalled.
-struct Stalls {
-    /// Rows behind which time is lost.
-    rows: Vec<usize>,
-    /// Mean time lost, s.
-    lost_s: f64,
-    /// σ of one.
-    sigma_s: f64,
-}
-
-/// Rows between which more time passed than the time stamps say.
-fn stalls(m: &Measurement) -> Option<Stalls> {
-    let joints = m.q_rad.joints();
-    let lost: Vec<f64> = (0..m.time_s.len().saturating_sub(1))
-        .map(|k| {
-            let dt = m.time_s[k + 1] - m.time_s[k];
-            let (mut along, mut square) = (0.0, 0.0);
-            for j in 0..joints {
-                let (q, qd) = (m.q_rad.joint(j), m.qd_rad_s.joint(j));
-                let mean = 0.5 * (qd[k] + qd[k + 1]);
-                along += mean * (q[k + 1] - q[k] - mean * dt);
-                square += mean * mean;
-            }
-            // Slower than this, the quantum of the angle is all that is seen.
-            if square > 1e-2 { along / square } else { 0.0 }
-        })
-        .collect();
-    let sigma_s = robust_sigma(&lost);
-    let limit = (FAR * sigma_s).max(0.5 * step_s(m));
-    let rows: Vec<usize> = (0..lost.len()).filter(|&k| lost[k] > limit).collect();
-    if rows.len() < 3 {
-        return None;
-    }
-    let lost_s = rows.iter().map(|&k| lost[k]).sum::<f64>() / rows.len() as f64;
-    Some(Stalls { rows, lost_s, sigma_s })
-}
-
-impl Stalls {
-    fn cause(&self) -> Cause {
-        let Self { rows, lost_s, sigma_s } = self;
-        let mut between: Vec<f64> = rows.windows(2).map(|w| (w[1] - w[0]) as f64).collect();
-        let every = median(&mut between).unwrap_or(f64::NAN);
-        let reach = 1.96 * sigma_s / (rows.len() as f64).sqrt();
-        let lost = Estimate { value: *lost_s, unit: "s", ci95: [lost_s - reach, lost_s + reach] };
-        cause(
-            Kind::ClockFault,
-            None,
-            "time that passed without the time stamps showing it",
-            lost_s / sigma_s.max(f64::MIN_POSITIVE),
-            &[("lost_s", lost), ("every_rows", exact(every, "rows"))],
-        )
-    }
 }
 
 /// Rows of a moving arm that repeat the row before in every channel.
@@ -292,12 +239,12 @@ fn quantisation(torque_nm: &JointSignals) -> Vec<Cause> {
 }
 
 /// The record's usual step, s.
-fn step_s(m: &Measurement) -> f64 {
+pub(super) fn step_s(m: &Measurement) -> f64 {
     median_step(m.time_s).unwrap_or(f64::NAN)
 }
 
 /// Standard deviation of Gaussian values from the median of their sizes, 1/0.6745.
-fn robust_sigma(values: &[f64]) -> f64 {
+pub(super) fn robust_sigma(values: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = values.iter().map(|v| v.abs()).filter(|v| *v > 0.0).collect();
     median(&mut sizes).map_or(0.0, |median| 1.4826 * median)
 }

@@ -11,6 +11,7 @@ use super::gain;
 use super::held_out::{Models, Validation, held_out_gain};
 use super::image::Span;
 use super::intervals;
+use super::kind::Kind;
 use super::misfit;
 use super::payload::{self, PayloadFinding};
 use super::record::Record;
@@ -86,7 +87,9 @@ impl<'a> Diagnoser<'a> {
         let (mut faults, record) = data_faults::find(m);
         let m = &record.measurement(m.source);
         let coarse = data_faults::coarse_joints(&faults);
-        let touched = contact::between_periods(m, &coarse)?;
+        // Across a mended stall torques are straight lines, which differ from period to period.
+        let is_mended = faults.iter().any(|fault| fault.kind == Kind::ClockFault);
+        let touched = if is_mended { None } else { contact::between_periods(m, &coarse)? };
         let torque_nm = touched.as_ref().map_or(m.torque_nm, |t| &t.torque_nm);
         let m = &Measurement { torque_nm, ..*m };
         let mut regression = self.identifier.regression(m)?;
@@ -201,6 +204,10 @@ impl<'a> Diagnoser<'a> {
             warnings: identification.warnings.clone(),
         };
 
+        if is_mended {
+            let warning = "the clock was mended: contacts are not looked for, and what sits beside is less sure";
+            diagnosis.warnings.push(warning.into());
+        }
         diagnosis.sentences = diagnosis.in_sentences();
         let nominal = self.set.values(&Model::new(self.arm).standard_parameters());
         if let Some(remark) = gravity_remark(self.arm, self.set, &nominal, &identification) {

@@ -35,6 +35,7 @@ mod repeated;
 pub mod replay;
 mod scene;
 mod selection;
+mod stalls;
 mod statistic;
 mod study;
 mod verdict;
