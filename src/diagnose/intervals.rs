@@ -87,8 +87,16 @@ pub fn physical(
         if left <= 0.0 {
             continue;
         }
-        for (name, other) in of_one_form(study, kept, &form.effect, index, left.sqrt()) {
-            if let Some(own) = out.get_mut(name) {
+        let other = of_one_form(study, kept, &form.effect, index, left.sqrt());
+        // A form with the other sign bends the other way where it counts for less: it is another statement.
+        let is_opposite = |(name, own): (&&str, &Estimate)| {
+            other.get(name).is_some_and(|other| own.value * other.value < 0.0)
+        };
+        if out.iter().any(is_opposite) {
+            continue;
+        }
+        for (name, own) in &mut out {
+            if let Some(other) = other.get(name) {
                 other.ci95.into_iter().for_each(|end| own.reach(end));
             }
         }

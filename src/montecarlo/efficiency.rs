@@ -6,6 +6,9 @@ use super::experiment::{Experiment, TrialError};
 use super::simulation::Simulation;
 use crate::identify::{Identifier, KnownNoise, Measurement, Options, cramer_rao};
 
+/// Noise of less than this share of its largest power has been filtered out: no sensor is that quiet.
+const FILTERED_OUT: f64 = 1e-9;
+
 /// Empirical σ over the Cramér–Rao bound.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Efficiency {
@@ -34,8 +37,9 @@ impl Efficiency {
 impl Experiment {
     /// The least σ of every parameter that an unbiased estimator can have: the Cramér–Rao bound of the
     /// whole periods of the noise-free motion, known exactly, under the scenario's torque noise at all
-    /// frequencies. `None` where that noise has no known law (rounded readings), where the motion does
-    /// not repeat, or where every trial has a motion of its own (sensors in the loop).
+    /// frequencies. `None` where that noise has no known law (rounded readings) or is filtered out of some
+    /// frequencies (what is said there would be known without error), where the motion does not repeat, or
+    /// where every trial has a motion of its own (sensors in the loop).
     pub(super) fn cramer_rao_bound(&self) -> Result<Option<Vec<f64>>, TrialError> {
         let Simulation { scenario, recording, .. } = &self.simulation;
         let Some(torque) = self.simulation.known_torque_noise() else { return Ok(None) };
@@ -55,12 +59,19 @@ impl Experiment {
             return Ok(None);
         }
         let rate_hz = regression.problem.rate_hz;
+        let harmonics = regression.problem.samples;
+        let powers = (1..=harmonics / 2)
+            .map(|k| torque.model.power(k as f64 * rate_hz / harmonics as f64, rate_hz));
+        let (least, most) =
+            powers.fold((f64::INFINITY, 0.0f64), |(least, most), p| (least.min(p), most.max(p)));
+        if least < FILTERED_OUT * most {
+            return Ok(None);
+        }
         let noise = KnownNoise {
             torque_sd_nm: torque.sd_nm,
             correlation: torque.model.cross_joint_correlation,
             power: &|frequency_hz| torque.model.power(frequency_hz, rate_hz),
         };
-        let harmonics = regression.problem.samples;
         let bound = cramer_rao(&regression.problem, &scenario.set, &noise, harmonics)
             .map_err(|e| TrialError::Identify(e.into()))?;
         // Without noise not even the last trace of the run-in is a period like the others; the logs of the
