@@ -26,6 +26,7 @@ mod gain;
 mod held_out;
 mod image;
 mod intervals;
+mod judgement;
 mod kind;
 mod misfit;
 mod noise_power;

@@ -3,7 +3,6 @@
 use rayon::prelude::*;
 
 use super::candidates::ripple::strongest_orders;
-use super::extension::Effect;
 use super::image::{Image, Span};
 use super::kind::Kind;
 use super::study::{Entry, Score, Study};
@@ -18,18 +17,14 @@ pub const LEAST_EVIDENCE: f64 = 4.0;
 /// Causes at most: a log that needs more has another kind of problem.
 const MOST_CAUSES: usize = 24;
 /// Share of a cause's square that another explains as well, at least, if it may stand in for it.
-const SHARED: f64 = 0.5;
+pub(super) const SHARED: f64 = 0.5;
 /// Rounds in which causes of a single run are exchanged: two may replace each other for ever.
 const EXCHANGES: usize = 3;
 /// Causes of one family on one joint at most, where a family may be there more than once: gears and motors have
 /// a few orders of ripple, and more of them are what another cause leaves.
 const MOST_ALIKE: usize = 3;
 /// Families whose shapes are refined before one is chosen.
-const FINALISTS: usize = 10;
-/// Two effects are told apart with 99.9 % confidence and 90 % power where λ(1 − cos²) exceeds
-/// (z₀.₉₉₉ + z₀.₉)² = (3.09 + 1.28)².
-pub const TELLS_APART: f64 = 19.0;
-
+pub(super) const FINALISTS: usize = 10;
 /// A family that was considered, at its best shape.
 #[derive(Debug, Clone)]
 pub struct Contender {
@@ -41,33 +36,10 @@ pub struct Contender {
     pub evidence: f64,
 }
 
-/// A cause that was kept, and what else it might be.
-#[derive(Debug, Clone)]
-pub struct Selected {
-    /// The cause.
-    pub contender: Contender,
-    /// Posterior probability of its class.
-    pub confidence: f64,
-    /// Others that the data cannot tell from it: family and site.
-    pub class: Vec<(usize, Option<usize>)>,
-    /// The others, best first.
-    pub rivals: Vec<Contender>,
-    /// Share of the mean square that it removes in stretches of a single run left out of its fit.
-    pub left_out_gain: Option<f64>,
-}
-
-/// A cause in another form of its family.
-pub struct Form {
-    /// With its numbers.
-    pub effect: Effect,
-    /// 2 ln of the odds against it, prices aside.
-    pub behind: f64,
-}
-
 /// The causes kept so far.
 pub struct Kept<'s, 'a> {
-    study: &'s Study<'a>,
-    causes: Vec<Contender>,
+    pub(super) study: &'s Study<'a>,
+    pub(super) causes: Vec<Contender>,
     /// Whether causes of the arm as a whole are looked for.
     with_common: bool,
 }
@@ -172,7 +144,7 @@ impl<'s, 'a> Kept<'s, 'a> {
     /// What might be in the place of cause `c`, best first. What is ahead along a single run is in its place
     /// only if it explains the same, and if it would be named there: more evidence in few stretches of time
     /// alone makes no rival.
-    fn rivals(&self, c: usize, others: &Span, residual: &Image) -> Vec<Contender> {
+    pub(super) fn rivals(&self, c: usize, others: &Span, residual: &Image) -> Vec<Contender> {
         let Entry { family, site, .. } = self.causes[c].entry;
         let mut rivals = self.contenders(Some(c), others, residual);
         rivals.retain(|r| (r.entry.family, r.entry.site) != (family, site));
@@ -189,26 +161,12 @@ impl<'s, 'a> Kept<'s, 'a> {
         rivals
     }
 
-    /// The causes, judged.
-    pub fn selected(&self) -> Vec<Selected> {
-        (0..self.causes.len()).map(|c| self.judged(c)).collect()
-    }
-
-    /// Cause `c` in its family's other variants, each at its best shape.
-    pub fn other_forms(&self, c: usize) -> Vec<Form> {
-        let (others, residual) = self.without(Some(c));
-        let own = self.causes[c].score.gain;
-        let variants = self.other_variants(c, &others, &residual).into_iter();
-        let form = |(entry, score): (Entry, Score)| {
-            let coefficients = self.study.span(&entry, &others).solve(&residual);
-            let Entry { family, site, shape, .. } = entry;
-            let effect = Effect { family, site, shape, coefficients, absorbed: Vec::new() };
-            Form { effect, behind: (own - score.gain).max(0.0) }
-        };
-        variants.map(form).collect()
-    }
-
-    fn other_variants(&self, c: usize, others: &Span, residual: &Image) -> Vec<(Entry, Score)> {
+    pub(super) fn other_variants(
+        &self,
+        c: usize,
+        others: &Span,
+        residual: &Image,
+    ) -> Vec<(Entry, Score)> {
         let study = self.study;
         let Entry { family, site, shape, .. } = self.causes[c].entry;
         let mut best: Vec<(&Entry, Score)> = Vec::new();
@@ -450,50 +408,7 @@ impl<'s, 'a> Kept<'s, 'a> {
     }
 
     /// Square that `contender` explains of `signal`, which `others` have left.
-    fn explains(&self, contender: &Contender, others: &Span, signal: &Image) -> f64 {
+    pub(super) fn explains(&self, contender: &Contender, others: &Span, signal: &Image) -> f64 {
         self.study.span(&contender.entry, others).explained(signal)
     }
-
-    /// Confidence, class and rivals of cause `c`, the others given.
-    fn judged(&self, c: usize) -> Selected {
-        let study = self.study;
-        let (others, residual) = self.without(Some(c));
-        let contender = self.causes[c].clone();
-        let own = study.span(&contender.entry, &others);
-        // The signal of the cause as the data show it.
-        let signal = own.inside(&residual);
-        let size = signal.square();
-        let mut rivals = self.rivals(c, &others, &residual);
-        let scale = contender.score.lambda / size.max(f64::MIN_POSITIVE);
-        let explained: Vec<f64> =
-            rivals.iter().map(|rival| self.explains(rival, &others, &signal)).collect();
-        let is_alike = |explained: &f64| scale * (size - explained) < TELLS_APART;
-        let in_class = rivals.iter().zip(&explained).filter(|(_, explained)| is_alike(explained));
-        let class = in_class.map(|(rival, _)| (rival.entry.family, rival.entry.site)).collect();
-        // Something else that a single run shows beside the cause is no reason to doubt it.
-        let in_its_place = |explained: &f64| {
-            study.scene.periodic || is_alike(explained) || *explained > SHARED * size
-        };
-        let (evidences, alike): (Vec<f64>, Vec<bool>) = rivals
-            .iter()
-            .zip(&explained)
-            .filter(|(_, explained)| in_its_place(explained))
-            .map(|(rival, explained)| (rival.evidence, is_alike(explained)))
-            .unzip();
-        let confidence = probability_of_class(contender.evidence, &evidences, &alike);
-        rivals.truncate(FINALISTS);
-        let left_out_gain = study.left_out_gain(&contender.entry, &own, &residual);
-        Selected { contender, confidence, class, rivals, left_out_gain }
-    }
-}
-
-/// Posterior probability that a cause with `evidence` (2 ln, against no effect) or one of its class is there:
-/// of its rivals with their `evidences` those that are `alike`. The others and no effect at all are what else
-/// it may be.
-pub fn probability_of_class(evidence: f64, evidences: &[f64], alike: &[bool]) -> f64 {
-    let top = evidences.iter().copied().fold(evidence, f64::max).max(0.0);
-    let weight = |evidence: f64| (0.5 * (evidence - top)).exp();
-    let in_class = evidences.iter().zip(alike).filter(|(_, alike)| **alike);
-    let own = weight(evidence) + in_class.map(|(e, _)| weight(*e)).sum::<f64>();
-    own / (weight(0.0) + weight(evidence) + evidences.iter().map(|e| weight(*e)).sum::<f64>())
 }
