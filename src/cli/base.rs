@@ -65,8 +65,8 @@ pub fn run(args: &BaseArgs) -> CommandResult {
     for k in 0..set.rank() {
         table.push([(k + 1).to_string(), set.formula(k), set.unit(k).to_owned()]);
     }
-    println!("{}", table.to_text());
-    println!(
+    say!("{}", table.to_text());
+    say!(
         "{}: {} base parameters from {} columns; independent columns stand at least {:.1e} of \
          their length off the others, dependent ones at most {:.1e}",
         arm.name,

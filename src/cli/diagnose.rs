@@ -109,23 +109,23 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
     }
     let diagnosis = &finding.diagnosis;
     for sentence in &diagnosis.sentences {
-        println!("{sentence}");
+        say!("{sentence}");
     }
-    println!();
+    say!("");
     if !diagnosis.causes.is_empty() {
-        println!("{}", cause_table(diagnosis).to_text());
+        say!("{}", cause_table(diagnosis).to_text());
     }
     if !diagnosis.held_out.is_empty() {
-        println!("{}", held_out_table(diagnosis).to_text());
+        say!("{}", held_out_table(diagnosis).to_text());
     }
     if let Some(replay) = &diagnosis.replay {
-        println!("{}", replay_table(replay).to_text());
+        say!("{}", replay_table(replay).to_text());
     }
     if !diagnosis.detection_limits.is_empty() {
-        println!("{}", limit_table(diagnosis).to_text());
+        say!("{}", limit_table(diagnosis).to_text());
     }
     for warning in &diagnosis.warnings {
-        println!("note: {warning}");
+        say!("note: {warning}");
     }
     let inputs = logs.iter().chain(&held_out).map(|l: &LoadedLog| l.input.clone()).collect();
     let program = Program::new(std::env::args(), None, inputs);
@@ -134,11 +134,11 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
         Document { schema: DIAGNOSE_SCHEMA, program: &program, body: &body }.write(path)?;
     }
     if let Some(path) = &args.extended_scenario {
-        println!("scenario: {}", path.display());
+        say!("scenario: {}", path.display());
     }
     if let Some(path) = &args.report {
         page(&finding, &arm, program)?.write(path)?;
-        println!("report: {}", path.display());
+        say!("report: {}", path.display());
     }
     Ok(Outcome::Done)
 }

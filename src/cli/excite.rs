@@ -341,7 +341,7 @@ impl Rounds {
 
 fn print_summary(base: &BaseSet, spec: &Specification, found: &Design, seconds: f64) {
     let p = &found.prediction;
-    println!(
+    say!(
         "cond(ΘᵀΘ) {:.1}, columns scaled {:.2}; predicted over {} s: geometric mean σ {:.6}, relative σ \
          median {:.2} %, 90th percentile {:.2} %",
         p.condition,
@@ -351,18 +351,18 @@ fn print_summary(base: &BaseSet, spec: &Specification, found: &Design, seconds: 
         100.0 * p.relative_quantile(0.5),
         100.0 * p.relative_quantile(0.9),
     );
-    println!("{} base parameters; margins left (least first):", base.rank());
+    say!("{} base parameters; margins left (least first):", base.rank());
     let mut margins: Vec<_> = found.margins.all().iter().collect();
     margins.sort_by(|a, b| a.share.total_cmp(&b.share));
     for margin in margins {
-        println!(
+        say!(
             "  {:<38} {:>16}  at {:8.3} s",
             margin.limit.to_string(),
             margin.in_words(),
             margin.time_s
         );
     }
-    println!(
+    say!(
         "{} of {} starts feasible, {} evaluations, {seconds:.1} s{}",
         found.feasible_starts,
         found.starts,

@@ -36,7 +36,7 @@ pub fn run(args: &ExportArgs) -> CommandResult {
     let frames = frames(args.robot.as_deref())?;
     let write = |path: &Path, text: &str| -> Result<(), crate::output::OutputError> {
         write_atomically(path, |file| file.write_all(text.as_bytes()))?;
-        println!("{}", path.display());
+        say!("{}", path.display());
         Ok(())
     };
     if let Some(path) = &args.urdf {
@@ -48,7 +48,7 @@ pub fn run(args: &ExportArgs) -> CommandResult {
     if let Some(path) = &args.mjcf {
         write(path, &mjcf(&arm, &frames)?)?;
         if offsets_nm.iter().any(|offset| *offset != 0.0) {
-            println!("note: torque offsets {offsets_nm:?} Nm have no place in an MJCF");
+            say!("note: torque offsets {offsets_nm:?} Nm have no place in an MJCF");
         }
     }
     Ok(Outcome::Done)

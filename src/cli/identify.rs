@@ -226,34 +226,34 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         let estimate = physical::solve(&arm, &set, fit, covariance, &options)?;
         result.set_physical(&estimate, &training);
     }
-    println!("{}", parameter_table(&result).to_text());
-    println!("{}", residual_table(&result).to_text());
+    say!("{}", parameter_table(&result).to_text());
+    say!("{}", residual_table(&result).to_text());
     for warning in &result.warnings {
-        println!("note: {warning}");
+        say!("note: {warning}");
     }
-    println!("\n{}", result.sentence());
+    say!("\n{}", result.sentence());
     for fact in result.physical().map_or_else(Vec::new, |physical| physical.facts()) {
-        println!("{fact}");
+        say!("{fact}");
     }
     if let Some(path) = &args.json {
         Document { schema: IDENTIFY_SCHEMA, program: &program, body: &result }.write(path)?;
     }
     if let Some(path) = &args.report {
         page(&result, &training, &validations, program)?.write(path)?;
-        println!("report: {}", path.display());
+        say!("report: {}", path.display());
     }
     Ok(if result.is_declined() { Outcome::Negative } else { Outcome::Done })
 }
 
 /// Writes what can be said of a log whose motion leaves parameters without any trace in the torque.
 fn decline(args: &IdentifyArgs, declined: &Declined, program: Program) -> CommandResult {
-    println!("\n{}", declined.sentence());
+    say!("\n{}", declined.sentence());
     if let Some(path) = &args.json {
         Document { schema: IDENTIFY_SCHEMA, program: &program, body: declined }.write(path)?;
     }
     if let Some(path) = &args.report {
         declined.page(program).write(path)?;
-        println!("report: {}", path.display());
+        say!("report: {}", path.display());
     }
     Ok(Outcome::Negative)
 }

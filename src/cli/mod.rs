@@ -2,6 +2,14 @@
 //!
 //! Enters: arguments. Leaves: files, text on the terminal and an exit code.
 
+/// Prints a line. What reads it may have gone (`| head`): files are written all the same.
+macro_rules! say {
+    ($($text:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stdout(), $($text)*);
+    }};
+}
+
 mod arm_result;
 pub mod base;
 pub mod diagnose;

@@ -219,12 +219,12 @@ fn replay(experiment: &Experiment, trial: u64) -> CommandResult {
     let set = &experiment.simulation.scenario.set;
     let identification = experiment.worker().identify(trial)?;
     let sigma = identification.sigma();
-    println!("trial {trial}, {} with {}", identification.estimator, experiment.covariance);
-    println!("{:<6} {:>24} {:>24} {:>24} {:>8}", "", "truth", "estimate", "sigma", "z");
+    say!("trial {trial}, {} with {}", identification.estimator, experiment.covariance);
+    say!("{:<6} {:>24} {:>24} {:>24} {:>8}", "", "truth", "estimate", "sigma", "z");
     for (k, sigma) in sigma.iter().enumerate() {
         let (truth, estimate) = (experiment.truth[k], identification.fit.theta[k]);
         let z = (estimate - truth) / sigma;
-        println!("{:<6} {truth:>24} {estimate:>24} {sigma:>24} {z:>8.3}", set.name(k));
+        say!("{:<6} {truth:>24} {estimate:>24} {sigma:>24} {z:>8.3}", set.name(k));
     }
     Ok(Outcome::Done)
 }
@@ -237,22 +237,24 @@ fn conclude(
     output: &OutputArgs,
 ) -> CommandResult {
     let summary = Summary::of(merged, wall_s);
-    println!("{}", parameter_table(&summary).to_text());
-    println!("{}", check_table(&summary).to_text());
-    println!(
+    say!("{}", parameter_table(&summary).to_text());
+    say!("{}", check_table(&summary).to_text());
+    say!(
         "{} trials ({} failed) in {wall_s:.1} s: {:.1} trials/s",
-        summary.trials, summary.failed, summary.trials_per_second
+        summary.trials,
+        summary.failed,
+        summary.trials_per_second
     );
     for failure in summary.failures.iter().take(5) {
-        println!("  trial {} failed: {}", failure.trial, failure.reason);
+        say!("  trial {} failed: {}", failure.trial, failure.reason);
     }
     for [start, end] in &summary.missing {
-        println!("  trials {start}…{} have not been run", end - 1);
+        say!("  trials {start}…{} have not been run", end - 1);
     }
     if let Some(efficiency) = &summary.efficiency {
-        println!("{}", efficiency_sentence(efficiency));
+        say!("{}", efficiency_sentence(efficiency));
     }
-    println!("\n{}: {}", summary.verdict.to_string().to_uppercase(), summary.sentence());
+    say!("\n{}: {}", summary.verdict.to_string().to_uppercase(), summary.sentence());
     let program = Program::new(std::env::args(), Some(merged.header.seed), inputs);
     if let Some(path) = &output.json {
         let document = Document { schema: SUMMARY_SCHEMA, program: &program, body: &summary };
@@ -260,7 +262,7 @@ fn conclude(
     }
     if let Some(path) = &output.report {
         write_text(path, &page(&summary, merged, program)?.to_html()?)?;
-        println!("report: {}", path.display());
+        say!("report: {}", path.display());
     }
     Ok(if summary.verdict == Verdict::Fail { Outcome::Negative } else { Outcome::Done })
 }
@@ -270,9 +272,9 @@ fn replay_blind(benchmark: &Benchmark, trial: u64) -> CommandResult {
     let begun = Instant::now();
     let record = benchmark.worker().trial(trial)?;
     for line in blind::replay_lines(&record) {
-        println!("{line}");
+        say!("{line}");
     }
-    println!("{:.1} s", begun.elapsed().as_secs_f64());
+    say!("{:.1} s", begun.elapsed().as_secs_f64());
     Ok(Outcome::Done)
 }
 
@@ -284,7 +286,7 @@ fn conclude_blind(
 ) -> CommandResult {
     let scores = Scores::of(merged);
     let program = Program::new(std::env::args(), Some(merged.header.seed), inputs);
-    println!("{}", blind::markdown(&scores, &program.command));
+    say!("{}", blind::markdown(&scores, &program.command));
     if let Some(path) = &output.json {
         let document = Document { schema: SCORES_SCHEMA, program: &program, body: &scores };
         write_text(path, &document.to_json()?)?;
@@ -294,7 +296,7 @@ fn conclude_blind(
     }
     if let Some(path) = &output.report {
         write_text(path, &blind::page(&scores, program)?.to_html()?)?;
-        println!("report: {}", path.display());
+        say!("report: {}", path.display());
     }
     Ok(if scores.verdict == Verdict::Fail { Outcome::Negative } else { Outcome::Done })
 }

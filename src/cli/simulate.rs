@@ -112,7 +112,7 @@ pub fn run(args: &SimulateArgs) -> CommandResult {
     };
     let log = Log::new(source, measured.time_s, measured.q_rad, measured.qd_rad_s, effort)?;
     let sha256 = write_log(&args.out, &log)?;
-    println!("{}: {samples} samples, sha256 {sha256}", args.out.display());
+    say!("{}: {samples} samples, sha256 {sha256}", args.out.display());
     if let Some(path) = &args.truth {
         let layout = ParameterLayout::new(scenario.arm.dof());
         let values = Model::new(&scenario.arm).standard_parameters();

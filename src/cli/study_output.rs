@@ -41,7 +41,7 @@ impl StudyOutput {
         markdown: impl Fn(&T, &str) -> String,
         page: impl Fn(&T, Program) -> Result<Page, ReportError>,
     ) -> CommandResult {
-        println!("{}", markdown(results, &program.command));
+        say!("{}", markdown(results, &program.command));
         self.save(schema, results, program, markdown, page)?;
         Ok(Outcome::Done)
     }

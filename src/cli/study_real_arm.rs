@@ -161,7 +161,7 @@ pub(super) fn run(args: &RealArmArgs) -> CommandResult {
     };
     let program = Program::new(args.command(), None, inputs);
     let text = study.markdown(&program.command)?;
-    println!("{text}");
+    say!("{text}");
     if let Some(path) = &args.markdown {
         write_atomically(path, |out| out.write_all(text.as_bytes()))?;
     }

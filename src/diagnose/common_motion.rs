@@ -18,14 +18,24 @@ use super::extension::mean_period;
 use super::scene::{equivalent_arm, load_along};
 use crate::base::BaseSet;
 use crate::dynamics::{Model, Motion};
-use crate::identify::{Assembler, Regression};
-use crate::robot::Arm;
+use crate::identify::{Assembler, Measurement, Regression};
+use crate::robot::{Arm, JointSignals};
+use crate::signal::Bracket;
 
-/// Moves the torque of `regression` to the mean of its periods' motion, by the base parameters `theta`,
-/// and its columns with it.
+/// Moves the torque of `regression` (of the log `m`) to the mean of its periods' motion, by the base parameters
+/// `theta`, and its columns with it.
+///
+/// Where the log was put on an even clock, its torque is a straight line between rows: corners of friction are
+/// cut off there, which looks like friction that builds up behind reversals and like a delay. What the model
+/// says of straight lines and of the true course is put in their place.
 ///
 /// Nothing changes for a single run: there is no motion but its own.
-pub fn move_to_common_motion(regression: &mut Regression, arm: &Arm, set: &BaseSet, theta: &[f64]) {
+pub fn move_to_common_motion(
+    regression: &mut Regression,
+    m: &Measurement,
+    (arm, set): (&Arm, &BaseSet),
+    theta: &[f64],
+) {
     let Some(each_period) = &regression.prepared.each_period else { return };
     let n = regression.problem.samples;
     let common = Motion {
@@ -37,10 +47,81 @@ pub fn move_to_common_motion(regression: &mut Regression, arm: &Arm, set: &BaseS
     let model = Model::new(&arm);
     let own_nm = load_along(&model, &arm, each_period);
     let common_nm = load_along(&model, &arm, &common);
-    let torque_nm = regression.prepared.torque_nm.map_joints(|j, y| {
+    let mut torque_nm = regression.prepared.torque_nm.map_joints(|j, y| {
         let moved = own_nm.joint(j).iter().zip(common_nm.joint(j).iter().cycle());
         y.iter().zip(moved).map(|(y, (own, common))| y - (own - common)).collect()
     });
+    if let Some(between) = &regression.prepared.between {
+        let processing = &regression.prepared.processing;
+        let rows = Rows { m, start_s: processing.window_s[0], rate_hz: processing.rate_hz };
+        for j in 0..torque_nm.joints() {
+            let lost = rows.lost_to_straight_lines(&arm, j, &own_nm, each_period, between);
+            torque_nm.joint_mut(j).iter_mut().zip(lost).for_each(|(y, lost)| *y += lost);
+        }
+    }
     Assembler::new(&model).assemble(&mut regression.problem, &model, &common, &torque_nm);
     regression.prepared.motion = common;
+}
+
+/// The rows of a log beside an even clock.
+struct Rows<'a> {
+    m: &'a Measurement<'a>,
+    start_s: f64,
+    rate_hz: f64,
+}
+
+impl Rows<'_> {
+    /// Predicted torque of joint `j` minus a straight line through its predictions at the rows, Nm, at every
+    /// sample of all periods. `load_nm` and `motion` are those of the periods.
+    fn lost_to_straight_lines(
+        &self,
+        arm: &Arm,
+        j: usize,
+        load_nm: &JointSignals,
+        motion: &Motion,
+        between: &[Bracket],
+    ) -> Vec<f64> {
+        let drive = &arm.joints[j].drive;
+        let dry = |qd: f64| drive.coulomb_nm * (qd / arm.friction_epsilon_rad_s).tanh();
+        let qd_rad_s = motion.qd_rad_s.joint(j);
+        let pairs = load_nm.joint(j).iter().zip(qd_rad_s);
+        // All that is smooth: rows lie between its samples.
+        let smooth: Vec<f64> = pairs.map(|(load, qd)| load + drive.viscous_nm_s_rad * qd).collect();
+        let at_row = |row: usize| {
+            let at = (self.m.time_s[row] - self.start_s) * self.rate_hz;
+            between_samples(&smooth, at) + dry(self.m.qd_rad_s.joint(j)[row])
+        };
+        let samples = smooth.iter().zip(qd_rad_s).zip(between);
+        samples
+            .map(|((smooth, qd), &Bracket { left, u })| {
+                if u == 0.0 {
+                    return 0.0;
+                }
+                smooth + dry(*qd) - (1.0 - u) * at_row(left) - u * at_row(left + 1)
+            })
+            .collect()
+    }
+}
+
+/// y at the fractional sample `at`: a cubic through two samples on either side (Catmull and Rom 1974).
+fn between_samples(y: &[f64], at: f64) -> f64 {
+    let at = at.clamp(1.0, (y.len() - 3) as f64);
+    let left = at.floor() as usize;
+    let u = at - left as f64;
+    let [a, b, c, d] = [y[left - 1], y[left], y[left + 1], y[left + 2]];
+    b + 0.5 * u * (c - a + u * (2.0 * a - 5.0 * b + 4.0 * c - d + u * (3.0 * (b - c) + d - a)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parabola_is_itself_between_its_samples() {
+        let parabola = |x: f64| 2.0 - 3.0 * x + 0.5 * x * x;
+        let y: Vec<f64> = (0..9).map(|k| parabola(k as f64)).collect();
+        for at in [1.0, 2.25, 4.5, 5.875] {
+            assert!((between_samples(&y, at) - parabola(at)).abs() < 1e-12);
+        }
+    }
 }

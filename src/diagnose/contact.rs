@@ -206,13 +206,21 @@ fn with_disturbed_periods(q_rad: &JointSignals, period: f64, window: Range<usize
             largest < NO_CONTACT || (length == step && median(&mut differences) < SAME_MOTION)
         })
     };
-    let Range { mut start, mut end } = window;
-    for length in [step, (step / STRETCHES).max(1)] {
+    let Range { mut start, mut end } = window.clone();
+    let stretch = (step / STRETCHES).max(1);
+    for length in [step, stretch] {
         while start >= length && repeats(start - length, start - length + step, length) {
             start -= length;
         }
         while end + length <= q_rad.samples() && end >= step && repeats(end, end - step, length) {
             end += length;
+        }
+        // A period most of which repeats may begin with the run-in, or end with the arm stopping.
+        while start < window.start && !repeats(start, start + step, stretch) {
+            start = (start + stretch).min(window.start);
+        }
+        while end > window.end && !repeats(end - stretch, end - stretch - step, stretch) {
+            end = (end - stretch).max(window.end);
         }
     }
     start..end

@@ -44,7 +44,7 @@ pub(super) fn held_out_gain(
     models: &Models,
 ) -> Result<HeldOut, DiagnoseError> {
     let mut regression = identifier.regression(&log.measurement)?;
-    move_to_common_motion(&mut regression, arm, set, &models.null.theta);
+    move_to_common_motion(&mut regression, &log.measurement, (arm, set), &models.null.theta);
     let prepared = &regression.prepared;
     let whitening = if prepared.replicates.is_some() {
         None

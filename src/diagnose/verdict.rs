@@ -289,7 +289,7 @@ const SEVERAL: usize = 3;
 /// Each confidence weighs a cause against its rivals with the other causes taken for granted. It is no more
 /// than [`PROVISIONAL`] where those may be wrong as well: for all of three or more that share a joint, for one
 /// beside another twice as strong, for two of the arm as a whole (a payload moves what a tilted base or a
-/// longer link moves), and wherever a clock was mended.
+/// longer link moves), and wherever a clock was mended. A contact is not sure on a joint with wild readings.
 pub(super) fn make_modest(causes: &mut [Cause]) {
     let is_mended = causes.iter().any(|c| c.kind == Kind::ClockFault);
     let of_the_arm = |kind: Kind| {
@@ -300,7 +300,15 @@ pub(super) fn make_modest(causes: &mut [Cause]) {
         .filter(|c| !c.kind.is_of_the_record() && c.kind != Kind::Contact)
         .map(|c| (c.kind, c.joint, c.strength))
         .collect();
-    for cause in causes.iter_mut().filter(|c| c.kind != Kind::Contact) {
+    let is_wild = |c: &&Cause| c.kind == Kind::Outliers;
+    let wild: Vec<Option<usize>> = causes.iter().filter(is_wild).map(|c| c.joint).collect();
+    for cause in causes.iter_mut() {
+        if cause.kind == Kind::Contact {
+            if wild.contains(&cause.joint) {
+                cause.make_provisional();
+            }
+            continue;
+        }
         let of_both = |kind: Kind| of_the_arm(kind) && of_the_arm(cause.kind);
         let beside = steady.iter().filter(|(kind, joint, _)| {
             let shares = *joint == cause.joint || joint.is_none() || cause.joint.is_none();

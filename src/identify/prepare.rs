@@ -9,7 +9,7 @@ use super::options::Options;
 use crate::dynamics::Motion;
 use crate::robot::JointSignals;
 use crate::signal::{
-    Activity, Decimator, FitScratch, HarmonicPower, PeriodSearch, PeriodicFit, Replicates,
+    Activity, Bracket, Decimator, FitScratch, HarmonicPower, PeriodSearch, PeriodicFit, Replicates,
     Resampler, Scratch, ZeroPhase, central_4, natural_rate_hz, quantum, reading_limit,
     replicate_noise,
 };
@@ -66,6 +66,9 @@ pub struct Prepared {
     pub each_period: Option<Motion>,
     /// Angles and velocities of all periods as they were recorded, rad and rad/s; `None` for a single run.
     pub recorded: Option<[JointSignals; 2]>,
+    /// Where the samples of `torque_nm` lie among the rows, between which the torque is a straight line; only
+    /// where an uneven log of a motion that repeats was put on an even clock.
+    pub between: Option<Vec<Bracket>>,
     /// Smallest distance between two recorded angles, per joint, rad.
     pub angle_quantum_rad: Vec<f64>,
     /// ± the largest torque that is read, per joint, where readings are cut off there, Nm.
@@ -100,6 +103,7 @@ struct Even<'a> {
     start_s: f64,
     rate_hz: f64,
     resampled: bool,
+    between: Option<Vec<Bracket>>,
     q_rad: std::borrow::Cow<'a, JointSignals>,
     qd_rad_s: std::borrow::Cow<'a, JointSignals>,
     torque_nm: std::borrow::Cow<'a, JointSignals>,
@@ -179,6 +183,7 @@ impl Preparer {
             start_s: m.time_s[0],
             rate_hz: natural_hz,
             resampled: false,
+            between: None,
             q_rad: Cow::Borrowed(m.q_rad),
             qd_rad_s: Cow::Borrowed(m.qd_rad_s),
             torque_nm: Cow::Borrowed(m.torque_nm),
@@ -207,6 +212,7 @@ impl Preparer {
             even.torque_nm = cut(grid.straight(m.torque_nm)?);
             even.rate_hz = grid_hz;
             even.resampled = true;
+            even.between = Some(grid.brackets()[longest].to_vec());
         }
         let highest = options.rate_hz.unwrap_or(Options::HIGHEST_RATE_HZ);
         let every = (even.rate_hz / highest * 0.999).ceil().max(1.0) as usize;
@@ -226,6 +232,7 @@ impl Preparer {
                 *signals = Cow::Owned(decimated);
             }
             even.rate_hz = decimator.rate_hz();
+            even.between = None;
         }
         Ok(even)
     }
@@ -296,6 +303,7 @@ impl Preparer {
             },
             each_period,
             recorded: Some([q_rad, qd_rad_s]),
+            between: even.between.as_ref().map(|between| between[window.clone()].to_vec()),
             angle_quantum_rad: angle_quantum_rad(m),
             torque_limit_nm: torque_limit_nm(m),
             replicates: Some(replicate_noise(&torque_nm, samples_per_period)?),
@@ -351,6 +359,7 @@ impl Preparer {
             torque_nm: even.torque_nm.slice(window.clone()),
             each_period: None,
             recorded: None,
+            between: None,
             angle_quantum_rad: angle_quantum_rad(m),
             torque_limit_nm: torque_limit_nm(m),
             replicates: None,

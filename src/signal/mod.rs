@@ -44,5 +44,5 @@ pub use paper_filter::{PaperDifferentiator, PaperReading};
 pub use period::{Period, PeriodSearch, find_period};
 pub use readings::{quantum, reading_limit};
 pub use replicates::{Replicates, replicate_noise};
-pub use resample::{Gap, Resampler, gaps, natural_rate_hz};
+pub use resample::{Bracket, Gap, Resampler, gaps, natural_rate_hz};
 pub use spectrum::{PowerSpectrum, welch};

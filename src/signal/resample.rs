@@ -38,6 +38,15 @@ struct Point {
     u: f64,
 }
 
+/// Where a grid sample lies: the row before it, and the share of the way to the next row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bracket {
+    /// Row at or before the sample.
+    pub left: usize,
+    /// 0 at that row, below 1.
+    pub u: f64,
+}
+
 /// The natural rate of a log: one over the median distance of its time stamps, Hz.
 ///
 /// Errors: fewer than two time stamps, time that does not increase.
@@ -108,6 +117,11 @@ impl Resampler {
         close_segment(&mut segments, &mut segment_start, points.len());
         let gaps = gaps(time_s, longest_gap_s);
         Ok(Self { source_s: time_s.to_vec(), rate_hz, points, segments, gaps })
+    }
+
+    /// Where every sample of the grid lies among the time stamps.
+    pub fn brackets(&self) -> Vec<Bracket> {
+        self.points.iter().map(|p| Bracket { left: p.left, u: p.u }).collect()
     }
 
     /// Number of samples on the grid, those in gaps not counted.
