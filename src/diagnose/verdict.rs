@@ -289,7 +289,8 @@ const SEVERAL: usize = 3;
 /// Each confidence weighs a cause against its rivals with the other causes taken for granted. It is no more
 /// than [`PROVISIONAL`] where those may be wrong as well: for all of three or more that share a joint, for one
 /// beside another twice as strong, for two of the arm as a whole (a payload moves what a tilted base or a
-/// longer link moves), and wherever a clock was mended. A contact is not sure on a joint with wild readings.
+/// longer link moves), and wherever a clock was mended. A contact is not sure on a joint with wild readings, or
+/// where rows are missing.
 pub(super) fn make_modest(causes: &mut [Cause]) {
     let is_mended = causes.iter().any(|c| c.kind == Kind::ClockFault);
     let of_the_arm = |kind: Kind| {
@@ -300,11 +301,12 @@ pub(super) fn make_modest(causes: &mut [Cause]) {
         .filter(|c| !c.kind.is_of_the_record() && c.kind != Kind::Contact)
         .map(|c| (c.kind, c.joint, c.strength))
         .collect();
-    let is_wild = |c: &&Cause| c.kind == Kind::Outliers;
-    let wild: Vec<Option<usize>> = causes.iter().filter(is_wild).map(|c| c.joint).collect();
+    let of_kind = |kind: Kind| causes.iter().filter(move |c| c.kind == kind).map(|c| c.joint);
+    let wild: Vec<Option<usize>> = of_kind(Kind::Outliers).collect();
+    let has_gaps = of_kind(Kind::DroppedSamples).next().is_some();
     for cause in causes.iter_mut() {
         if cause.kind == Kind::Contact {
-            if wild.contains(&cause.joint) {
+            if has_gaps || wild.contains(&cause.joint) {
                 cause.make_provisional();
             }
             continue;
