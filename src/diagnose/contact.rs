@@ -51,6 +51,8 @@ struct Touch {
     samples: Range<usize>,
     /// Low-pass behind which it was seen, Hz.
     cutoff_hz: f64,
+    /// Largest deviation over the threshold of a contact.
+    height: f64,
     /// Per joint: largest deviation and its σ, Nm; `None` where the joint did not feel it.
     peaks: Vec<Option<(f64, f64)>>,
 }
@@ -288,7 +290,9 @@ fn touches(
             })
             .collect();
         if peaks.iter().any(Option::is_some) {
-            out.push(Touch { samples, cutoff_hz, peaks });
+            let scores = (0..joints).flat_map(|j| samples.clone().map(move |k| (j, k)));
+            let height = scores.map(|(j, k)| score(j, k)).fold(1.0, f64::max);
+            out.push(Touch { samples, cutoff_hz, height, peaks });
         }
     }
     out
@@ -316,9 +320,14 @@ impl Touch {
             felt.iter().copied().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).unwrap_or_default();
         // A low-pass moves an edge by up to a quarter of its shortest period.
         let blur_s = 0.25 / self.cutoff_hz;
-        let instant = |k: usize| {
-            let t = time_s[k];
-            Estimate { value: t, unit: "s", ci95: [t - blur_s, t + blur_s] }
+        let (first, last) = (time_s[self.samples.start], time_s[self.samples.end - 1]);
+        // What rises and falls as sin² is above the share NEAR/height of its peak for 1 − f of its time only.
+        let unseen = (NEAR / self.height).sqrt().asin() / std::f64::consts::FRAC_PI_2;
+        let foot_s = 0.5 * (last - first) * unseen / (1.0 - unseen);
+        let estimate = |value: f64, before_s: f64, behind_s: f64| Estimate {
+            value,
+            unit: "s",
+            ci95: [value - before_s, value + behind_s],
         };
         // A bump as long as the low-pass loses up to a third of its height.
         let shrunk = if self.cutoff_hz < CUTOFFS_HZ[0] { 1.5 } else { 1.0 };
@@ -334,8 +343,8 @@ impl Touch {
             class: Vec::new(),
             confidence: 1.0,
             parameters: [
-                ("start_s", instant(self.samples.start)),
-                ("end_s", instant(self.samples.end - 1)),
+                ("start_s", estimate(first, blur_s + foot_s, blur_s)),
+                ("end_s", estimate(last, blur_s, blur_s + foot_s)),
                 ("peak_nm", peak),
             ]
             .into(),
