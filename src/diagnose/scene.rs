@@ -167,7 +167,7 @@ impl Scene {
         }
     }
 
-    /// The link torque of joint `j` at [`FINE`] instants per sample, for what happens between samples.
+    /// The link torque of joint `j` at `FINE` instants per sample, for what happens between samples.
     pub fn fine_link_nm(&self, j: usize) -> &[f64] {
         self.fine_link_nm[j].get_or_init(|| {
             let link = self.link_nm.joint(j);

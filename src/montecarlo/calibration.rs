@@ -218,7 +218,8 @@ pub fn wilson(share: f64, trials: f64, z: f64) -> [f64; 2] {
     let z2 = z * z / trials;
     let centre = (share + 0.5 * z2) / (1.0 + z2);
     let half = z / (1.0 + z2) * (share * (1.0 - share) / trials + 0.25 * z2 / trials).sqrt();
-    [centre - half, centre + half]
+    // Rounding must not carry the bounds of a share of 0 or 1 beyond it.
+    [(centre - half).max(0.0), (centre + half).min(1.0)]
 }
 
 #[cfg(test)]
