@@ -1,12 +1,15 @@
-//! The upper median: the value in the middle, of an even number of values the larger of the two there.
+//! The median: the value in the middle, of an even number of values the mean of the two there.
 
-/// Upper median of finite values, whose order changes; `None` of none.
+/// Median of finite values, whose order changes; `None` of none.
 pub fn median(values: &mut [f64]) -> Option<f64> {
     let middle = values.len() / 2;
     if values.is_empty() {
         return None;
     }
-    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
+    let is_even = values.len().is_multiple_of(2);
+    let (below, &mut upper, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
+    let lower = below.iter().copied().max_by(f64::total_cmp).filter(|_| is_even);
+    Some(lower.map_or(upper, |lower| 0.5 * (lower + upper)))
 }
 
 /// Median step of time among the steps forward, s; `None` without any.
@@ -14,4 +17,17 @@ pub fn median_step(time_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> =
         time_s.windows(2).map(|pair| pair[1] - pair[0]).filter(|&step| step > 0.0).collect();
     median(&mut steps)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_middle_of_odd_and_even_numbers_of_values() {
+        assert_eq!(median(&mut [3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median(&mut [4.0, 1.0, 3.0, 2.0]), Some(2.5));
+        assert_eq!(median(&mut [7.0]), Some(7.0));
+        assert_eq!(median(&mut []), None);
+    }
 }

@@ -10,57 +10,8 @@
 //! - its probability is that of F(k, ν), ν from the share that every harmonic has in what is explained
 //!   (Satterthwaite 1946).
 
-use statrs::function::gamma::digamma;
-
 use super::image::{Image, Span};
-
-/// Power of the noise of one joint at one harmonic.
-#[derive(Debug, Clone, Copy)]
-pub struct NoisePower {
-    /// Mean square of one period's coefficient, Nm².
-    pub value: f64,
-    /// Variance of its estimate over its square.
-    pub relative_variance: f64,
-}
-
-/// Harmonics on each side of harmonic k whose power says something about that of k.
-fn reach(k: usize) -> usize {
-    (k / 4).max(2)
-}
-
-/// The power of noise by harmonic, 0 … `last`, without its scatter: straight lines of ln power in
-/// ln harmonic over k ± max(2, k/4), five harmonics or more. `freedom` is that of one harmonic, ν, whose
-/// logarithm is low by ln ν − ψ(ν) in the mean, with the variance ψ'(ν).
-pub fn trend(power: &[f64], freedom: usize, last: usize) -> Vec<NoisePower> {
-    let end = power.len() - 1;
-    let bias = (freedom as f64).ln() - digamma(freedom as f64);
-    let variance = trigamma(freedom);
-    let points: Vec<(f64, f64)> =
-        power.iter().enumerate().map(|(h, p)| ((h as f64).ln(), p.ln() + bias)).collect();
-    let at = |k: usize| {
-        let first = k.saturating_sub(reach(k)).max(1);
-        let window = &points[first..=(k + reach(k)).max(first + 4).min(end)];
-        let count = window.len() as f64;
-        let x0 = window.iter().map(|p| p.0).sum::<f64>() / count;
-        let y0 = window.iter().map(|p| p.1).sum::<f64>() / count;
-        let (xy, xx) = window.iter().fold((0.0, 0.0), |(xy, xx), (x, y)| {
-            (xy + (x - x0) * (y - y0), xx + (x - x0) * (x - x0))
-        });
-        let from_middle = points[k].0 - x0;
-        NoisePower {
-            value: (y0 + xy / xx * from_middle).exp(),
-            relative_variance: variance * (1.0 / count + from_middle * from_middle / xx),
-        }
-    };
-    // The mean has no logarithm: it is as noisy as its neighbour.
-    (0..=last.min(end)).map(|k| at(k.max(1))).collect()
-}
-
-/// ψ'(n) = π²/6 − Σ 1/i², i < n.
-fn trigamma(n: usize) -> f64 {
-    let below: f64 = (1..n).map(|i| 1.0 / (i * i) as f64).sum();
-    std::f64::consts::PI.powi(2) / 6.0 - below
-}
+use crate::signal::pooled;
 
 /// How well the noise of whitened rows is known.
 #[derive(Debug, Clone)]
@@ -121,7 +72,7 @@ impl NoiseKnowledge {
 
     /// Degrees of freedom ν of the noise along what `span` explains of `residual`: 2/ν is the relative
     /// variance of the noise's power there, Σ w_h w_h' C_hh' with the shares w of the explained square and
-    /// the relative covariances C, alike within [`reach`] and none beyond.
+    /// the relative covariances C, alike within [`pooled`] and none beyond.
     pub fn freedom(&self, span: &Span, residual: &Image) -> f64 {
         let coordinates = span.coordinates(residual);
         let harmonics = self.harmonics();
@@ -165,8 +116,8 @@ impl NoiseKnowledge {
     /// Σ w_h w_h' C_hh' of one joint.
     fn variance(&self, share: &[f64], joint: usize) -> f64 {
         let term = |(harmonic, own): (usize, &f64)| {
-            let last = (harmonic + reach(harmonic)).min(share.len() - 1);
-            let near: f64 = share[harmonic.saturating_sub(reach(harmonic))..=last].iter().sum();
+            let last = (harmonic + pooled(harmonic)).min(share.len() - 1);
+            let near: f64 = share[harmonic.saturating_sub(pooled(harmonic))..=last].iter().sum();
             own * near * self.relative_variance[harmonic][joint]
         };
         share.iter().enumerate().map(term).sum()
@@ -183,35 +134,6 @@ mod tests {
     use super::*;
     use rand::{SeedableRng, rngs::ChaCha8Rng};
     use rand_distr::{Distribution, StandardNormal};
-
-    /// Power that falls as 1/h² is found without a bend at its steep beginning.
-    #[test]
-    fn steep_noise_keeps_its_slope() {
-        const FREEDOM: usize = 7;
-        const TRIALS: usize = 200;
-        let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let mut mean = [0.0; 40];
-        for _ in 0..TRIALS {
-            let power: Vec<f64> = (0..200)
-                .map(|h: usize| {
-                    let square = |_| {
-                        let x: f64 = StandardNormal.sample(&mut rng);
-                        x * x
-                    };
-                    let chi: f64 = (0..2 * FREEDOM).map(square).sum();
-                    chi / (2 * FREEDOM) as f64 / (h.max(1) as f64).powi(2)
-                })
-                .collect();
-            for (k, (mean, found)) in mean.iter_mut().zip(trend(&power, FREEDOM, 39)).enumerate() {
-                *mean += (found.value * (k.max(1) as f64).powi(2)).ln() / TRIALS as f64;
-            }
-        }
-        // ln of χ²₁₄/14 has the variance ψ'(7) = 0.154; the line through five points ends with 0.77 of
-        // it at most: σ of the mean of 200 is 0.024. Six σ of forty fail in one of 10⁷ seeds.
-        for (k, mean) in mean.iter().enumerate() {
-            assert!(mean.abs() < 0.15, "harmonic {k}: off by {mean:.3}");
-        }
-    }
 
     /// Ten million logs would be needed to see a chance of 10⁻⁷; a chance of 1/200 is seen in 20 000.
     /// A direction in one slow harmonic, its noise's scale estimated with ν degrees of freedom.

@@ -8,11 +8,11 @@ use realfft::{RealFftPlanner, RealToComplex};
 
 use super::error::DiagnoseError;
 use super::image::{Column, Image};
-use super::noise_power::{NoiseKnowledge, NoisePower, trend};
+use super::noise_power::NoiseKnowledge;
 use super::scene::Scene;
 use crate::identify::{Options, Regression};
 use crate::robot::JointSignals;
-use crate::signal::{Scratch, ZeroPhase};
+use crate::signal::{NoisePower, Scratch, ZeroPhase, noise_trend};
 
 /// From torques in time to whitened rows.
 pub enum Whitening {
@@ -116,7 +116,7 @@ impl PeriodWhitening {
                 let floor = (FLOOR * FLOOR * power[j]).max(f64::MIN_POSITIVE);
                 let own: Vec<f64> =
                     scatter.iter().map(|s| s[(j, j)].re.max(1e-6 * floor)).collect();
-                trend(&own, periods - 1, last)
+                noise_trend(&own, periods - 1, last)
             })
             .collect();
         // Per harmonic, the standard deviation that the trend gives every joint.

@@ -25,7 +25,7 @@ pub struct Options {
 
 impl Options {
     /// Faster logs are decimated to at most this rate: an arm moves at a few hertz.
-    pub const HIGHEST_RATE_HZ: f64 = 150.0;
+    pub const HIGHEST_RATE_HZ: f64 = 1000.0;
 
     /// Friction of a single run sees the velocity low-passed at this share of the sampling rate, where
     /// the series of a motion that repeats ends too.

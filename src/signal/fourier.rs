@@ -16,6 +16,7 @@
 //!    a share of it that costs nothing (`FREE_NOISE`, for q̈ and, much later, for q̇): what is too
 //!    weak to be seen band by band (the kink that friction leaves at a reversal fades as 1/h² in
 //!    q̇) is not too weak to bias the friction parameters.
+//!    q̈ ends earlier, at 0.2 f_s or 25 Hz.
 //! 4. q, q̇ = Σ ihω Q̂_h e^{ihωt}, q̈ = −Σ (hω)² Q̂_h e^{ihωt} on the period's grid.
 //!
 //! The mean angle is the angle's own; a mean velocity (an offset of its sensor) is not used.
@@ -50,6 +51,10 @@ pub struct PeriodicFit {
 /// spectrum falls only as 1/f²: sampled at f_s, q̇ at f holds (f/(f_s − f))² of what belongs to
 /// f_s − f, a sixteenth at 0.2 f_s, and its derivative is worth no more.
 const ALIAS_FREE: f64 = 0.2;
+/// Highest frequency of q̈ whatever the rate, Hz: an arm is moved at a few hertz. What friction adds to that
+/// stands out of the noise of a fast log much farther up, but there the noise in q̈, which grows with the square
+/// of the frequency, is more than what it is worth.
+const ACCELERATION_HZ: f64 = 25.0;
 /// The same for q and q̇. Friction looks at q̇ sample by sample: there what is folded belongs to the
 /// sample, and a series that ends at 0.2 f_s rounds the kink off by several mrad/s.
 const SERIES_END: f64 = 0.32;
@@ -346,7 +351,8 @@ impl PeriodicFit {
         // Mean square and noise so far: of q̇, of q̈.
         let (mut square, mut noise) = ([0.0; 2], [0.0; 2]);
         let mut in_qdd = true;
-        let last_of_qdd = harmonics_below(ALIAS_FREE, self.samples_per_period);
+        let share = ALIAS_FREE.min(ACCELERATION_HZ / self.rate_hz);
+        let last_of_qdd = harmonics_below(share, self.samples_per_period);
         for (b, band) in self.bands.iter().enumerate() {
             let (noise_q, noise_qd) = (q.noise(&band.harmonics), qd.noise(&band.harmonics));
             let weight = |w: f64| weight(noise_q, noise_qd, w);

@@ -15,6 +15,8 @@
 //! | does the motion repeat, and from where to where? | [`find_period`] |
 //! | the best estimate of a repeated motion and its derivatives | [`PeriodicFit`] |
 //! | how noisy is a signal, without any model of it? | [`replicate_noise`] |
+//! | how does the power of noise run over frequency? | [`noise_trend`] |
+//! | is there a bump in coloured noise? | [`MatchedFilter`] |
 //! | how fine is a sensor, and where does it end? | [`quantum`], [`reading_limit`] |
 //! | at which frequencies is there energy? | [`welch`] |
 
@@ -25,7 +27,9 @@ mod decimate;
 mod differentiate;
 mod error;
 mod fourier;
+mod matched;
 mod noise;
+mod noise_trend;
 mod paper_filter;
 mod period;
 mod readings;
@@ -40,6 +44,8 @@ pub use decimate::Decimator;
 pub use differentiate::{central_2, central_4, hermite_acceleration};
 pub use error::SignalError;
 pub use fourier::{AveragedMotion, FitScratch, HarmonicPower, PeriodicFit};
+pub use matched::{Heights, MatchedFilter};
+pub use noise_trend::{NoisePower, noise_trend, pooled};
 pub use paper_filter::{PaperDifferentiator, PaperReading};
 pub use period::{Period, PeriodSearch, find_period};
 pub use readings::{quantum, reading_limit};

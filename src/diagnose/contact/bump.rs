@@ -1,0 +1,267 @@
+//! Where a push begins, how high it is and where it ends, whatever its shape.
+
+use std::ops::Range;
+
+use nalgebra::DMatrix;
+
+use super::super::verdict::Estimate;
+use crate::signal::{Heights, MatchedFilter};
+
+/// Exponents p of (1 − u²)^p, |u| < 1: from a push that sets in at once to one that swells softly.
+const SHAPES: [f64; 4] = [0.5, 1.0, 2.0, 3.0];
+/// The shape by which bumps are looked for.
+pub(super) const ORDINARY: f64 = 1.0;
+/// Lengths around the first guess for which a bump is weighed: steps of ln, and how many to either side.
+const STEP: f64 = 0.07;
+const STEPS: i32 = 9;
+/// Heights count for the correlation between joints up to so many σ.
+const CLIPPED: f64 = 3.0;
+/// 95 % quantile of χ² with one degree of freedom.
+const CHI2_95: f64 = 3.841_458_820_694_1;
+/// Its 99.5 % quantile: a shape that far behind the best one is excluded.
+const EXCLUDED: f64 = 7.88;
+
+/// The bump of length `length_s` at the distance `t_s` from its middle; 1 there.
+pub(super) fn bump(shape: f64, length_s: f64, t_s: f64) -> f64 {
+    let u = 2.0 * t_s / length_s;
+    (1.0 - u * u).max(0.0).powf(shape)
+}
+
+/// What noise does to the heights of bumps in several joints.
+pub(super) struct Noise {
+    /// Of each joint, what [`MatchedFilter`]'s σ = 1/√N has to be multiplied by.
+    scale: Vec<f64>,
+    /// Inverse of the correlation between the joints.
+    precision: DMatrix<f64>,
+}
+
+impl Noise {
+    /// From the heights of bumps of one length, of which few hold any.
+    pub(super) fn of(heights: &Heights) -> Self {
+        let joints = heights.height.joints();
+        let scale: Vec<f64> = (0..joints).map(|j| heights.scale(j)).collect();
+        let clipped: Vec<Vec<f64>> = (0..joints)
+            .map(|j| {
+                let sigma = scale[j] / heights.information[j].sqrt();
+                let z = |h: &f64| if sigma > 0.0 { h / sigma } else { 0.0 };
+                heights.height.joint(j).iter().map(|h| z(h).clamp(-CLIPPED, CLIPPED)).collect()
+            })
+            .collect();
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let size: Vec<f64> = clipped.iter().map(|z| product(z, z).sqrt()).collect();
+        let correlation = DMatrix::from_fn(joints, joints, |i, j| match size[i] * size[j] {
+            _ if i == j => 1.0,
+            0.0 => 0.0,
+            both => product(&clipped[i], &clipped[j]) / both,
+        });
+        let identity = || DMatrix::identity(joints, joints);
+        Self { scale, precision: correlation.try_inverse().unwrap_or_else(identity) }
+    }
+
+    /// Heights at one sample over their σ.
+    pub(super) fn scores(&self, heights: &Heights, sample: usize) -> Vec<f64> {
+        let score = |(j, scale): (usize, &f64)| {
+            let height = heights.height.joint(j)[sample];
+            if *scale > 0.0 { height * heights.information[j].sqrt() / scale } else { 0.0 }
+        };
+        self.scale.iter().enumerate().map(score).collect()
+    }
+
+    /// zᵀ C⁻¹ z: twice what a bump in all joints gains in log-likelihood.
+    pub(super) fn gain(&self, z: &[f64]) -> f64 {
+        let n = z.len();
+        (0..n).map(|i| (0..n).map(|j| z[i] * self.precision[(i, j)] * z[j]).sum::<f64>()).sum()
+    }
+}
+
+/// A push as the log knows it.
+pub(super) struct Push {
+    /// Seconds from the first sample.
+    pub(super) start_s: Estimate,
+    pub(super) end_s: Estimate,
+    /// Of the joint that feels it most, Nm.
+    pub(super) peak_nm: Estimate,
+    /// Joints (0-based) that feel it, and how much, Nm.
+    pub(super) heights_nm: Vec<(usize, f64)>,
+    /// Twice what it gains in log-likelihood.
+    pub(super) gain: f64,
+    shape: f64,
+}
+
+impl Push {
+    /// Makes the intervals of begin and end hold those of `other`.
+    pub(super) fn reach_over(&mut self, other: &Self) {
+        for bound in other.start_s.ci95 {
+            self.start_s.reach(bound);
+        }
+        for bound in other.end_s.ci95 {
+            self.end_s.reach(bound);
+        }
+    }
+
+    /// On joint `joint` (0-based), Nm.
+    pub(super) fn torque_nm(&self, joint: usize, t_s: f64) -> f64 {
+        let height = self.heights_nm.iter().find(|(j, _)| *j == joint).map_or(0.0, |(_, nm)| *nm);
+        let [start_s, end_s] = [self.start_s.value, self.end_s.value];
+        height * bump(self.shape, end_s - start_s, t_s - 0.5 * (start_s + end_s))
+    }
+}
+
+/// A bump that explains what is seen.
+#[derive(Clone)]
+struct Fit {
+    shape: f64,
+    gain: f64,
+    /// Value and σ, seconds from the first sample.
+    start_s: [f64; 2],
+    end_s: [f64; 2],
+    /// Height on each joint and its σ.
+    heights_nm: Vec<[f64; 2]>,
+}
+
+/// Weighs bumps of all shapes on `joints` around one of the ordinary shape and `length_s` whose centre is among
+/// `centres`; `filter` and `noise` are those of the joints.
+///
+/// What the log knows of begin, end and height of a push of one shape is where they stay within χ²₁ of the best
+/// such bump. The shape itself is unknown: intervals reach over all that are not excluded.
+pub(super) fn weigh(
+    filter: &MatchedFilter,
+    noise: &Noise,
+    joints: &[usize],
+    centres: Range<usize>,
+    length_s: f64,
+) -> Option<Push> {
+    let of_shapes: Vec<Vec<Fit>> = SHAPES
+        .iter()
+        .filter_map(|&shape| fits(filter, noise, centres.clone(), length_s, shape))
+        .collect();
+    let tops: Vec<&Fit> = of_shapes.iter().filter_map(|fits| top(fits)).collect();
+    let best = tops.iter().copied().max_by(|a, b| a.gain.total_cmp(&b.gain))?;
+    let most = |a: &&[f64; 2], b: &&[f64; 2]| (a[0] / a[1]).abs().total_cmp(&(b[0] / b[1]).abs());
+    let main = best.heights_nm.iter().max_by(most)?;
+    let main = best.heights_nm.iter().position(|height| height == main)?;
+    let reach = |of: &dyn Fn(&Fit) -> [f64; 2], unit: &'static str| {
+        let mut ci95 = [f64::INFINITY, f64::NEG_INFINITY];
+        let possible =
+            of_shapes.iter().zip(&tops).filter(|(_, top)| top.gain > best.gain - EXCLUDED);
+        for (fit, top) in possible.flat_map(|(fits, top)| fits.iter().map(move |fit| (fit, top))) {
+            let left = CHI2_95 - (top.gain - fit.gain);
+            if left > 0.0 {
+                let [value, sigma] = of(fit);
+                ci95[0] = ci95[0].min(value - left.sqrt() * sigma);
+                ci95[1] = ci95[1].max(value + left.sqrt() * sigma);
+            }
+        }
+        Estimate { value: of(best)[0], unit, ci95 }
+    };
+    let heights_nm = best.heights_nm.iter().map(|[height, _]| *height);
+    Some(Push {
+        start_s: reach(&|fit| fit.start_s, "s"),
+        end_s: reach(&|fit| fit.end_s, "s"),
+        peak_nm: reach(&|fit| fit.heights_nm[main], "Nm"),
+        heights_nm: joints.iter().copied().zip(heights_nm).collect(),
+        gain: best.gain,
+        shape: best.shape,
+    })
+}
+
+fn top(fits: &[Fit]) -> Option<&Fit> {
+    fits.iter().max_by(|a, b| a.gain.total_cmp(&b.gain))
+}
+
+/// The best bumps of one shape: of each length, and of all lengths together.
+fn fits(
+    filter: &MatchedFilter,
+    noise: &Noise,
+    centres: Range<usize>,
+    length_s: f64,
+    shape: f64,
+) -> Option<Vec<Fit>> {
+    // (1 − u²)^p has the standard deviation 1/√(2p + 3) along u.
+    let guess_s = length_s * ((2.0 * shape + 3.0) / (2.0 * ORDINARY + 3.0)).sqrt();
+    let mut fits: Vec<Fit> = (-STEPS..=STEPS)
+        .map(|step| guess_s * (STEP * f64::from(step)).exp())
+        .map(|length_s| of_length(filter, noise, centres.clone(), length_s, shape))
+        .collect::<Option<_>>()?;
+    let top = (0..fits.len()).max_by(|&a, &b| fits[a].gain.total_cmp(&fits[b].gain))?;
+    let top = top.clamp(1, fits.len() - 2);
+    let around = [top - 1, top, top + 1].map(|i| &fits[i]);
+    let Summit { at, value, sigma } = summit(around.map(|fit| fit.gain));
+    // σ of a length known is widened by what the length's own σ moves.
+    let between = |of: &dyn Fn(&Fit) -> [f64; 2]| {
+        let [before, middle, behind] = around.map(of);
+        let slope = 0.5 * (behind[0] - before[0]);
+        [middle[0] + at * slope, middle[1].hypot(sigma * slope)]
+    };
+    let all = Fit {
+        shape,
+        gain: value,
+        start_s: between(&|fit| fit.start_s),
+        end_s: between(&|fit| fit.end_s),
+        heights_nm: (0..around[1].heights_nm.len())
+            .map(|j| between(&|fit| fit.heights_nm[j]))
+            .collect(),
+    };
+    fits.push(all);
+    Some(fits)
+}
+
+/// The best bump of one shape and length.
+fn of_length(
+    filter: &MatchedFilter,
+    noise: &Noise,
+    centres: Range<usize>,
+    length_s: f64,
+    shape: f64,
+) -> Option<Fit> {
+    let heights = filter.heights(|t_s| bump(shape, length_s, t_s));
+    let gain = |k: usize| noise.gain(&noise.scores(&heights, k));
+    let top = centres.max_by(|&a, &b| gain(a).total_cmp(&gain(b)))?;
+    let top = top.clamp(1, heights.height.samples().checked_sub(2)?);
+    let Summit { at, value, sigma } = summit([top - 1, top, top + 1].map(gain));
+    let rate_hz = filter.rate_hz();
+    let (centre_s, sigma_s) = ((top as f64 + at) / rate_hz, sigma / rate_hz);
+    let known = heights.information.iter().zip(&noise.scale).enumerate();
+    let height =
+        |(j, (n, scale)): (usize, (&f64, &f64))| [heights.height.joint(j)[top], scale / n.sqrt()];
+    Some(Fit {
+        shape,
+        gain: value,
+        start_s: [centre_s - 0.5 * length_s, sigma_s],
+        end_s: [centre_s + 0.5 * length_s, sigma_s],
+        heights_nm: known.map(height).collect(),
+    })
+}
+
+/// The top of a parabola through three values a step apart: where, from the middle one, in steps; how high;
+/// and the σ that twice a log-likelihood of this curvature stands for.
+struct Summit {
+    at: f64,
+    value: f64,
+    sigma: f64,
+}
+
+fn summit([before, middle, behind]: [f64; 3]) -> Summit {
+    let slope = 0.5 * (behind - before);
+    let curvature = before - 2.0 * middle + behind;
+    if curvature >= 0.0 {
+        // No top here: all that is known is the step.
+        return Summit { at: 0.0, value: middle, sigma: 1.0 };
+    }
+    let at = (-slope / curvature).clamp(-1.0, 1.0);
+    Summit { at, value: middle + 0.5 * slope * at, sigma: (-2.0 / curvature).sqrt() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parabola_has_its_summit() {
+        // 9 − 2 (x − 0.3)²: σ² = 2/4.
+        let y = |x: f64| 9.0 - 2.0 * (x - 0.3) * (x - 0.3);
+        let found = summit([y(-1.0), y(0.0), y(1.0)]);
+        assert!((found.at - 0.3).abs() < 1e-12 && (found.value - 9.0).abs() < 1e-12);
+        assert!((found.sigma - 0.5f64.sqrt()).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,68 @@
+//! Something touched the arm: torque that comes once and goes.
+//!
+//! A motion that repeats needs no model: at every phase the torque is compared with the median over the
+//! periods, which one contact cannot move, and what is left is searched for bumps ([`between_periods`]). A
+//! single run is compared with the extended model, in samples far from the joint's own reversals, where
+//! friction is known best ([`beside_model`]).
+
+mod beside_model;
+mod between_periods;
+mod bump;
+
+use std::ops::Range;
+
+use super::kind::Kind;
+use super::verdict::{Cause, Estimate};
+
+pub use beside_model::{BesideModel, beside_model};
+pub use between_periods::between_periods;
+
+/// Torque around a contact that is set aside with it, s.
+const MARGIN_S: f64 = 0.2;
+
+/// One contact.
+#[derive(Debug, Clone, PartialEq)]
+struct Touch {
+    /// Samples in which it is felt.
+    samples: Range<usize>,
+    start_s: Estimate,
+    end_s: Estimate,
+    /// Of the joint that feels it most, Nm.
+    peak_nm: Estimate,
+    /// Joints (1-based) that felt it, and by how much, Nm.
+    felt: Vec<(usize, f64)>,
+    /// In standard deviations of the noise.
+    strength: f64,
+}
+
+impl Touch {
+    /// Whether its samples are closer than `margin` to those of another.
+    fn is_near(&self, other: &Range<usize>, margin: usize) -> bool {
+        self.samples.start < other.end + margin && other.start < self.samples.end + margin
+    }
+
+    /// Its samples and those beside it, of `n` in all.
+    fn disturbed(&self, rate_hz: f64, n: usize) -> Range<usize> {
+        let margin = (MARGIN_S * rate_hz) as usize;
+        self.samples.start.saturating_sub(margin)..(self.samples.end + margin).min(n)
+    }
+
+    fn cause(&self) -> Cause {
+        let joints: Vec<String> =
+            self.felt.iter().map(|(j, nm)| format!("joint {j} by {nm:+.1} Nm")).collect();
+        let parameters =
+            [("start_s", &self.start_s), ("end_s", &self.end_s), ("peak_nm", &self.peak_nm)];
+        Cause {
+            kind: Kind::Contact,
+            joint: if self.felt.len() == 1 { Some(self.felt[0].0) } else { None },
+            class: Vec::new(),
+            confidence: 1.0,
+            parameters: parameters.map(|(name, estimate)| (name, estimate.clone())).into(),
+            gain_fraction: None,
+            separating_experiment: None,
+            strength: self.strength,
+            in_words: format!("something touched the arm: {}", joints.join(", ")),
+            rivals: Vec::new(),
+        }
+    }
+}
