@@ -41,3 +41,25 @@ fn presliding() {
     let found = Hidden::on(3, Law::Dahl { stiffness_per_rad: 300.0 }).diagnose(4);
     contains(only(&found, Kind::Presliding, Some(4)), "stiffness_per_rad", 300.0);
 }
+
+/// Bristles that give way within 0.1 mrad, a sample at 125 Hz: in a fast log they are told as they are.
+#[test]
+fn stiff_presliding_in_a_fast_log() {
+    let hidden = Hidden::on(2, Law::Dahl { stiffness_per_rad: 10_000.0 }).logged_at(500.0);
+    let found = hidden.diagnose(5);
+    contains(only(&found, Kind::Presliding, Some(3)), "stiffness_per_rad", 10_000.0);
+}
+
+/// No friction but Coulomb's and viscous friction: reversals are as sharp in the log as in the drive.
+#[test]
+fn a_fast_log_of_a_good_model_has_no_cause() {
+    for seed in [6, 7] {
+        let found = Hidden::on(1, Law::Load { mu: 0.0 }).logged_at(500.0).diagnose(seed);
+        assert_eq!(
+            found.diagnosis.verdict,
+            Verdict::NothingFound,
+            "{:?}",
+            found.diagnosis.sentences
+        );
+    }
+}

@@ -24,8 +24,11 @@ pub struct Options {
 }
 
 impl Options {
-    /// Faster logs are decimated to at most this rate: an arm moves at a few hertz.
-    pub const HIGHEST_RATE_HZ: f64 = 1000.0;
+    /// Faster logs are decimated to at most this rate. Much less would be enough for the motion, but not for dry
+    /// friction: behind the decimator's low-pass the velocity passes through zero more slowly than the drive, and
+    /// the friction looked up in it is not the torque's (at 125 Hz that shows as presliding and delays, at 250 Hz
+    /// no more).
+    pub const HIGHEST_RATE_HZ: f64 = 600.0;
 
     /// Friction of a single run sees the velocity low-passed at this share of the sampling rate, where
     /// the series of a motion that repeats ends too.

@@ -9,8 +9,8 @@ use super::options::Options;
 use crate::dynamics::Motion;
 use crate::robot::JointSignals;
 use crate::signal::{
-    Activity, Bracket, Decimator, FitScratch, HarmonicPower, PeriodSearch, PeriodicFit, Replicates,
-    Resampler, Scratch, ZeroPhase, central_4, natural_rate_hz, quantum, reading_limit,
+    Activity, Bracket, Decimator, FitScratch, HarmonicPower, Period, PeriodSearch, PeriodicFit,
+    Replicates, Resampler, Scratch, ZeroPhase, central_4, natural_rate_hz, quantum, reading_limit,
     replicate_noise,
 };
 
@@ -88,6 +88,11 @@ const EVEN_WITHIN: f64 = 0.02;
 /// Gaps up to this many natural steps are interpolated, longer ones end the record.
 const LONGEST_GAP_STEPS: f64 = 10.0;
 
+/// A log is put on another clock for the sake of this many periods: two tell little of the noise.
+const FEWEST_PERIODS: usize = 3;
+/// Clocks that are tried until a period is a whole number of samples: each knows its length better.
+const CLOCKS: usize = 3;
+
 /// Filters and plans kept from log to log.
 #[derive(Default)]
 pub struct Preparer {
@@ -141,9 +146,15 @@ impl Preparer {
             return Err(IdentifyError::TooShort { log, samples, needed: FEWEST_SAMPLES });
         }
         let mut warnings = Vec::new();
-        let even = self.even(m, options, &mut warnings)?;
+        let mut even = self.even(m, options, None, &mut warnings)?;
         let single_run = options.period_s == Some(0.0);
-        let period = if single_run { None } else { self.search.find(&even.q_rad)? };
+        let mut period = if single_run { None } else { self.search.find(&even.q_rad)? };
+        let is_misfit = |p: &&Period| !p.is_whole && p.periods >= FEWEST_PERIODS;
+        if let (Some(found), None) = (period.as_ref().filter(is_misfit), options.rate_hz) {
+            if let Some(fitting) = self.on_fitting_clock(m, options, found.clone())? {
+                (even, period, warnings) = (fitting.0, Some(fitting.1), fitting.2);
+            }
+        }
         if let (Some(wanted), false) = (options.period_s, single_run) {
             let found = period.as_ref().map(|p| p.samples as f64 / even.rate_hz);
             if found.is_none_or(|found| (found - wanted).abs() > 1.5 / even.rate_hz) {
@@ -167,11 +178,34 @@ impl Preparer {
         }
     }
 
-    /// Resamples an uneven log, decimates a fast one.
+    /// The log on a clock that runs so much faster or slower that its period is a whole number of samples, that
+    /// period, and remarks; `None` where no such clock is found.
+    fn on_fitting_clock<'a>(
+        &mut self,
+        m: &Measurement<'a>,
+        options: &Options,
+        mut period: Period,
+    ) -> Result<Option<(Even<'a>, Period, Vec<String>)>, IdentifyError> {
+        let mut faster = 1.0;
+        for _ in 0..CLOCKS {
+            faster *= period.samples as f64 / period.refined_samples;
+            let mut remarks = Vec::new();
+            let even = self.even(m, options, Some(faster), &mut remarks)?;
+            let Some(found) = self.search.find(&even.q_rad)? else { return Ok(None) };
+            if found.is_whole {
+                return Ok(Some((even, found, remarks)));
+            }
+            period = found;
+        }
+        Ok(None)
+    }
+
+    /// Resamples an uneven log, or one that is wanted on a clock so many times `faster`; decimates a fast one.
     fn even<'a>(
         &mut self,
         m: &Measurement<'a>,
         options: &Options,
+        faster: Option<f64>,
         warnings: &mut Vec<String>,
     ) -> Result<Even<'a>, IdentifyError> {
         use std::borrow::Cow;
@@ -193,8 +227,10 @@ impl Preparer {
             even.rate_hz =
                 (m.time_s.len() - 1) as f64 / (m.time_s[m.time_s.len() - 1] - m.time_s[0]);
         }
-        if !is_even || rate_hz < 0.999 * natural_hz || rate_hz > 1.001 * natural_hz {
-            let grid_hz = if rate_hz < natural_hz { natural_hz } else { rate_hz };
+        let is_natural = (0.999 * natural_hz..=1.001 * natural_hz).contains(&rate_hz);
+        if !is_even || !is_natural || faster.is_some() {
+            let plain_hz = if is_natural { even.rate_hz } else { rate_hz.max(natural_hz) };
+            let grid_hz = faster.unwrap_or(1.0) * plain_hz;
             let grid = Resampler::new(m.time_s, grid_hz, LONGEST_GAP_STEPS * step)?;
             let longest = longest(grid.segments());
             for gap in grid.gaps() {
@@ -407,4 +443,51 @@ fn experiment_window(activity: &Activity) -> Option<Range<usize>> {
 
 fn longest(segments: &[Range<usize>]) -> Range<usize> {
     segments.iter().max_by_key(|s| s.len()).cloned().unwrap_or(0..0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{SeedableRng, rngs::ChaCha8Rng};
+    use rand_distr::{Distribution, StandardNormal};
+
+    /// Six periods of 10 s, sampled `rate_hz` times a second.
+    fn prepared(rate_hz: f64) -> Prepared {
+        let samples = (62.0 * rate_hz) as usize;
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let mut noise = || -> f64 { StandardNormal.sample(&mut rng) };
+        let time_s: Vec<f64> = (0..samples).map(|k| k as f64 / rate_hz).collect();
+        let omega = std::f64::consts::TAU / 10.0;
+        let phase = |j: usize, k: usize| omega * (1.0 + j as f64) * time_s[k];
+        let q_rad = JointSignals::from_fn(2, samples, |j, k| phase(j, k).sin() + 2e-5 * noise());
+        let qd_rad_s = JointSignals::from_fn(2, samples, |j, k| {
+            omega * (1.0 + j as f64) * phase(j, k).cos() + 1e-3 * noise()
+        });
+        let torque_nm = JointSignals::from_fn(2, samples, |j, k| 9.0 * phase(j, k).sin() + noise());
+        let m = Measurement {
+            source: "test",
+            time_s: &time_s,
+            q_rad: &q_rad,
+            qd_rad_s: &qd_rad_s,
+            torque_nm: &torque_nm,
+        };
+        Preparer::default().prepare(&m, &Options::default()).unwrap()
+    }
+
+    #[test]
+    fn a_period_of_whole_samples_keeps_the_clock() {
+        let processing = prepared(100.0).processing;
+        assert_eq!((processing.periods, processing.resampled), (6, false));
+        assert!((processing.rate_hz - 100.0).abs() < 1e-9);
+    }
+
+    /// 937.3 samples: on a clock 0.03 % slower they are 937. The period is then known as well as that clock, to
+    /// a hundredth of a sample over the log.
+    #[test]
+    fn a_period_between_samples_is_put_on_a_clock_that_fits() {
+        let processing = prepared(93.73).processing;
+        assert_eq!((processing.periods, processing.resampled), (6, true));
+        let period_s = processing.period_s.unwrap();
+        assert!((period_s - 10.0).abs() < 0.01 / 93.73, "{period_s}");
+    }
 }

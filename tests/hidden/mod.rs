@@ -23,11 +23,16 @@ pub struct Hidden {
     joint: usize,
     law: Law,
     periods: usize,
+    log_rate_hz: f64,
 }
 
 impl Hidden {
     pub fn on(joint: usize, law: Law) -> Self {
-        Self { joint, law, periods: 8 }
+        Self { joint, law, periods: 8, log_rate_hz: 125.0 }
+    }
+
+    pub fn logged_at(self, log_rate_hz: f64) -> Self {
+        Self { log_rate_hz, ..self }
     }
 
     /// Simulates a log with noise of `seed` and diagnoses it.
@@ -35,7 +40,10 @@ impl Hidden {
         let arm = Arm::built_in("ur5").unwrap();
         let series = FourierSeries::built_in("ur5_identification").unwrap();
         let excitation = Excitation::new(series, 2.0, self.periods).unwrap();
-        let config = PlantConfig::default();
+        // Stiff bristles are integrated in short steps.
+        let step_s = 0.125 / self.log_rate_hz;
+        let config =
+            PlantConfig { log_rate_hz: self.log_rate_hz, step_s, ..PlantConfig::default() };
         let law = HiddenLaw::new(&arm, self.joint, self.law);
         let mut plant = Plant::with_drivetrain(&arm, &arm, Box::new(law), &config).unwrap();
         let recording = plant.run(&excitation, None).unwrap();

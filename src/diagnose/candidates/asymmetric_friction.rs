@@ -20,9 +20,8 @@ impl Candidate for AsymmetricFriction {
 
     fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
         // The constant is the estimate's own where it fits offsets.
-        let coulomb_nm = b.get(1).copied().unwrap_or(0.0);
         vec![
-            quantity("coulomb_nm", coulomb_nm, "Nm"),
+            quantity("coulomb_nm", second(b), "Nm"),
             quantity("viscous_nm_s_rad", b[0], "Nm s/rad"),
         ]
     }

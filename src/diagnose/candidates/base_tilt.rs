@@ -34,7 +34,7 @@ impl Candidate for BaseTilt {
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
-        vec![quantity("tilt_x_rad", b[0], "rad"), quantity("tilt_y_rad", b[1], "rad")]
+        vec![quantity("tilt_x_rad", b[0], "rad"), quantity("tilt_y_rad", second(b), "rad")]
     }
 
     fn separating_experiment(&self) -> &'static str {

@@ -62,6 +62,12 @@ fn quantity(name: &'static str, value: f64, unit: &'static str) -> Quantity {
     Quantity { name, value, unit }
 }
 
+/// The coefficient of a family's second column; zero where the null model absorbs that column, which a joint that
+/// hardly moves makes like the first.
+fn second(b: &[f64]) -> f64 {
+    b.get(1).copied().unwrap_or(0.0)
+}
+
 /// One family of effects.
 pub trait Candidate: Sync {
     /// Its name.

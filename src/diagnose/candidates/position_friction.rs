@@ -19,8 +19,8 @@ impl Candidate for PositionFriction {
 
     fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
         vec![
-            quantity("amplitude_nm", b[0].hypot(b[1]), "Nm"),
-            quantity("phase_rad", (-b[1]).atan2(b[0]), "rad"),
+            quantity("amplitude_nm", b[0].hypot(second(b)), "Nm"),
+            quantity("phase_rad", (-second(b)).atan2(b[0]), "rad"),
         ]
     }
 

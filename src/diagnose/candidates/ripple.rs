@@ -81,9 +81,9 @@ impl Candidate for Ripple {
 
     fn quantities(&self, _: &Scene, _: Option<usize>, shape: Shape, b: &[f64]) -> Vec<Quantity> {
         vec![
-            quantity("amplitude_nm", b[0].hypot(b[1]), "Nm"),
+            quantity("amplitude_nm", b[0].hypot(second(b)), "Nm"),
             quantity("order_per_turn", shape.value, "1/turn"),
-            quantity("phase_rad", (-b[1]).atan2(b[0]), "rad"),
+            quantity("phase_rad", (-second(b)).atan2(b[0]), "rad"),
         ]
     }
 
