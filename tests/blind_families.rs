@@ -10,6 +10,15 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
 /// A scenario with white noise and the effects of `toml`.
 fn diagnose(seed: u64, toml: &str) -> Diagnosis {
+    diagnose_rows(seed, toml, |samples, _| (0..samples).collect())
+}
+
+/// A log of which `rows` are left, drawn by the number of all and a source of chance.
+fn diagnose_rows(
+    seed: u64,
+    toml: &str,
+    rows: impl Fn(usize, &mut ChaCha8Rng) -> Vec<usize>,
+) -> Diagnosis {
     let text = format!(
         r#"
         name = "blind"
@@ -30,14 +39,19 @@ fn diagnose(seed: u64, toml: &str) -> Diagnosis {
     let (arm, set) = (scenario.arm.clone(), scenario.set.clone());
     let options = scenario.processing.clone();
     let log = Experiment::prepare(scenario).unwrap().simulation.log(0).unwrap();
-    let model = Model::new(&arm);
+    let rows = rows(log.time_s.len(), &mut ChaCha8Rng::seed_from_u64(seed));
+    let of = |s: &JointSignals| {
+        JointSignals::from_fn(s.joints(), rows.len(), |j, k| s.joint(j)[rows[k]])
+    };
+    let time_s: Vec<f64> = rows.iter().map(|&row| log.time_s[row]).collect();
     let measurement = Measurement {
         source: "blind",
-        time_s: &log.time_s,
-        q_rad: &log.q_rad,
-        qd_rad_s: &log.qd_rad_s,
-        torque_nm: &log.torque_nm,
+        time_s: &time_s,
+        q_rad: &of(&log.q_rad),
+        qd_rad_s: &of(&log.qd_rad_s),
+        torque_nm: &of(&log.torque_nm),
     };
+    let model = Model::new(&arm);
     let finding = Diagnoser::new(&arm, &model, &set, options).diagnose(&measurement, &[], None);
     finding.unwrap().diagnosis
 }
@@ -115,45 +129,13 @@ fn clean_logs_have_no_cause() {
 /// Rows 6, 8 and 10 ms apart with true time stamps: what lies between rows is no physics.
 #[test]
 fn an_uneven_clock_is_no_cause() {
-    let text = r#"
-        name = "uneven"
-        robot = "ur5"
-        seed = 7
-        trials = 1
-        [motion]
-        trajectory = "ur5_identification"
-        periods = 6
-        [plant]
-        log_rate_hz = 500.0
-        [sensors]
-        torque_sd_nm = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15]
-        q_sd_rad = 2e-5
-        qd_sd_rad_s = 1e-3
-        "#;
-    let scenario = Scenario::from_toml(text, "uneven", std::path::Path::new(".")).unwrap();
-    let (arm, set) = (scenario.arm.clone(), scenario.set.clone());
-    let options = scenario.processing.clone();
-    let log = Experiment::prepare(scenario).unwrap().simulation.log(0).unwrap();
-    let mut random = ChaCha8Rng::seed_from_u64(7);
-    let mut rows = vec![0];
-    while let Some(last) = rows.last().filter(|last| **last + 5 < log.time_s.len()) {
-        rows.push(last + [3, 4, 4, 4, 5][random.random_range(0..5)]);
-    }
-    let of = |s: &JointSignals| {
-        JointSignals::from_fn(s.joints(), rows.len(), |j, k| s.joint(j)[rows[k]])
-    };
-    let time_s: Vec<f64> = rows.iter().map(|&row| log.time_s[row]).collect();
-    let (q_rad, qd_rad_s, torque_nm) = (of(&log.q_rad), of(&log.qd_rad_s), of(&log.torque_nm));
-    let measurement = Measurement {
-        source: "uneven",
-        time_s: &time_s,
-        q_rad: &q_rad,
-        qd_rad_s: &qd_rad_s,
-        torque_nm: &torque_nm,
-    };
-    let model = Model::new(&arm);
-    let finding = Diagnoser::new(&arm, &model, &set, options).diagnose(&measurement, &[], None);
-    let d = finding.unwrap().diagnosis;
+    let d = diagnose_rows(7, "[plant]\nlog_rate_hz = 500.0", |samples, random| {
+        let mut rows = vec![0];
+        while let Some(last) = rows.last().filter(|last| **last + 5 < samples) {
+            rows.push(last + [3, 4, 4, 4, 5][random.random_range(0..5)]);
+        }
+        rows
+    });
     assert!(d.noise_floor_nm.is_some(), "the motion repeats");
     assert_eq!(d.verdict, Verdict::NothingFound, "{:?}", d.sentences);
 }

@@ -232,7 +232,7 @@ fn gears_mean_the_same() {
 }
 
 fn play() -> Vec<Case> {
-    // The plant's flanks are a stiff spring with a damper, the family's a restitution.
+    // The plant's flanks are stiffer than the softest of the family's.
     vec![case(Kind::Backlash, 2, (1, 0.004), &[0.004], 0.3)]
 }
 

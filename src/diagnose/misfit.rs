@@ -17,6 +17,10 @@ const FALSE_ALARM: f64 = 0.0005;
 const ABSORBED: f64 = 0.1;
 /// Knots of the curve along an axis.
 const KNOTS: usize = 10;
+/// Share of the samples beyond the outermost knots. A drive that feeds friction forward jumps at a reversal, and the
+/// torque changes there so fast that these few samples would have a knot for themselves: what is left of them is
+/// when they were taken.
+const OUTERMOST: f64 = 0.01;
 /// The first knot of the way behind a reversal, rad: bristles and teeth give way by more.
 const SHORTEST_WAY_RAD: f64 = 1e-4;
 
@@ -164,8 +168,9 @@ type Curves = (Vec<f64>, Vec<Vec<f64>>);
 fn hats(values: &[f64]) -> Curves {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let last = sorted.len() - 1;
-    hats_at((0..KNOTS).map(|k| sorted[k * last / (KNOTS - 1)]).collect(), values)
+    let last = (sorted.len() - 1) as f64;
+    let share = |k: usize| (k as f64 / (KNOTS - 1) as f64).clamp(OUTERMOST, 1.0 - OUTERMOST);
+    hats_at((0..KNOTS).map(|k| sorted[(share(k) * last) as usize]).collect(), values)
 }
 
 /// The piecewise linear hat of each of `knots`.

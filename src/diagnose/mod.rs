@@ -29,6 +29,7 @@ mod intervals;
 mod judgement;
 mod kind;
 mod misfit;
+mod modesty;
 mod noise_power;
 mod payload;
 mod record;

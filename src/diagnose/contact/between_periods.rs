@@ -33,6 +33,10 @@ const LENGTHEN: f64 = std::f64::consts::SQRT_2;
 const LONGEST_OF_PERIOD: f64 = 0.5;
 /// Two contacts are farther apart than this, s.
 const APART_S: f64 = 0.3;
+/// What comes so shortly before or behind a contact so many times as strong, s, is the arm swinging back: its torque
+/// is taken out with the contact's, and it is no contact of its own.
+const ECHO_S: f64 = 0.5;
+const ECHO_STRENGTH: f64 = 2.0;
 /// Contacts in one log.
 const MOST: usize = 40;
 /// The median over fewer periods is moved by one contact.
@@ -98,7 +102,14 @@ pub fn between_periods(
     if touches.is_empty() {
         return Ok(None);
     }
-    touches.sort_by(|a, b| a.start_s.value.total_cmp(&b.start_s.value));
+    let echo = (ECHO_S * rate_hz) as usize;
+    let is_echo = |touch: &Touch| {
+        let stronger = |other: &&Touch| other.strength > ECHO_STRENGTH * touch.strength;
+        touches.iter().filter(stronger).any(|other| other.is_near(&touch.samples, echo))
+    };
+    let mut causes: Vec<&Touch> = touches.iter().filter(|touch| !is_echo(touch)).collect();
+    causes.sort_by(|a, b| a.start_s.value.total_cmp(&b.start_s.value));
+    let causes = causes.into_iter().map(Touch::cause).collect();
     let mut torque_nm = m.torque_nm.clone();
     for j in 0..torque_nm.joints() {
         let of_joint = repeats.torque_nm.joint(j);
@@ -109,7 +120,7 @@ pub fn between_periods(
             }
         }
     }
-    Ok(Some(WithoutContacts { causes: touches.iter().map(Touch::cause).collect(), torque_nm }))
+    Ok(Some(WithoutContacts { causes, torque_nm }))
 }
 
 /// A log on an even clock whose motion repeats.
