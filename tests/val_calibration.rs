@@ -62,6 +62,13 @@ fn noise_of_a_real_arms_colour() {
     assert_calibrated(include_str!("../sims/noise_real_arm.toml"));
 }
 
+/// A log four times as fast halves every σ; friction is looked up in a velocity as sharp as the torque is.
+#[test]
+fn a_fast_log() {
+    let fast = format!("{}\n[plant]\nlog_rate_hz = 500.0\n", include_str!("../sims/default.toml"));
+    assert_calibrated(&fast);
+}
+
 /// Encoders ten times worse: what they leave in the averaged motion is noise, no lack of the model.
 #[test]
 fn noise_of_bad_encoders_withholds_no_interval() {

@@ -37,9 +37,9 @@ impl Efficiency {
 impl Experiment {
     /// The least σ of every parameter that an unbiased estimator can have: the Cramér–Rao bound of the
     /// whole periods of the noise-free motion, known exactly, under the scenario's torque noise at all
-    /// frequencies. `None` where that noise has no known law (rounded readings) or is filtered out of some
-    /// frequencies (what is said there would be known without error), where the motion does not repeat, or
-    /// where every trial has a motion of its own (sensors in the loop).
+    /// frequencies that the processing keeps. `None` where that noise has no known law (rounded readings) or
+    /// is filtered out of some frequencies (what is said there would be known without error), where the motion
+    /// does not repeat, or where every trial has a motion of its own (sensors in the loop).
     pub(super) fn cramer_rao_bound(&self) -> Result<Option<Vec<f64>>, TrialError> {
         let Simulation { scenario, recording, .. } = &self.simulation;
         let Some(torque) = self.simulation.known_torque_noise() else { return Ok(None) };
@@ -60,8 +60,11 @@ impl Experiment {
         }
         let rate_hz = regression.problem.rate_hz;
         let harmonics = regression.problem.samples;
-        let powers = (1..=harmonics / 2)
-            .map(|k| torque.model.power(k as f64 * rate_hz / harmonics as f64, rate_hz));
+        // Fewer samples hold, frequency by frequency, as much less of the noise's power.
+        let logged_hz = scenario.plant.log_rate_hz;
+        let power =
+            |frequency_hz| torque.model.power(frequency_hz, logged_hz) * rate_hz / logged_hz;
+        let powers = (1..=harmonics / 2).map(|k| power(k as f64 * rate_hz / harmonics as f64));
         let (least, most) =
             powers.fold((f64::INFINITY, 0.0f64), |(least, most), p| (least.min(p), most.max(p)));
         if least < FILTERED_OUT * most {
@@ -70,7 +73,7 @@ impl Experiment {
         let noise = KnownNoise {
             torque_sd_nm: torque.sd_nm,
             correlation: torque.model.cross_joint_correlation,
-            power: &|frequency_hz| torque.model.power(frequency_hz, rate_hz),
+            power: &power,
         };
         let bound = cramer_rao(&regression.problem, &scenario.set, &noise, harmonics)
             .map_err(|e| TrialError::Identify(e.into()))?;

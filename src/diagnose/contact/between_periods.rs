@@ -156,29 +156,30 @@ impl Candidate {
 
 impl Repeats {
     /// y(k) minus the median of y at the same phase in the other periods, without those that are set `aside`
-    /// there if any are left.
+    /// there if any are left. Of two others the median is as wrong as either: y(k) itself counts with them where it
+    /// is not set aside.
     fn deviation(&self, y: &[f64], k: usize, aside: &[bool]) -> f64 {
         let from_start = (k - self.window.start) as f64;
-        let own = (from_start / self.period).floor();
-        let phase = from_start - own * self.period;
-        let mut undisturbed: Vec<f64> = Vec::new();
-        let mut others: Vec<f64> = Vec::new();
+        let own = (from_start / self.period).floor() as usize;
+        let phase = from_start - own as f64 * self.period;
         let periods = (self.window.len() as f64 / self.period).ceil() as usize;
-        for period in (0..periods).filter(|&p| p != own as usize) {
-            let at = self.window.start as f64 + phase + period as f64 * self.period;
-            if at > (self.window.end - 1) as f64 {
-                break;
-            }
+        let at = |period: usize| self.window.start as f64 + phase + period as f64 * self.period;
+        let is_recorded = |period: &usize| at(*period) <= (self.window.end - 1) as f64;
+        let others: Vec<f64> =
+            (0..periods).filter(|p| *p != own && is_recorded(p)).map(at).collect();
+        let value = |at: f64| {
             let left = (at.floor() as usize).min(y.len() - 2);
             let u = at - left as f64;
-            let value = y[left] * (1.0 - u) + y[left + 1] * u;
-            others.push(value);
-            if !aside[left] {
-                undisturbed.push(value);
-            }
+            y[left] * (1.0 - u) + y[left + 1] * u
+        };
+        let undisturbed = others.iter().filter(|at| !aside[at.floor() as usize]);
+        let mut same: Vec<f64> = undisturbed.map(|at| value(*at)).collect();
+        if same.is_empty() {
+            same = others.iter().map(|at| value(*at)).collect();
+        } else if others.len() < FEWEST_PERIODS && !aside[k] {
+            same.push(y[k]);
         }
-        let middle = median(&mut undisturbed).or_else(|| median(&mut others));
-        y[k] - middle.unwrap_or(y[k])
+        y[k] - median(&mut same).unwrap_or(y[k])
     }
 
     /// Deviations of `joints` without the pushes that are `known`, samples of the window.
