@@ -41,7 +41,10 @@ impl Hidden {
         let series = FourierSeries::built_in("ur5_identification").unwrap();
         let excitation = Excitation::new(series, 2.0, self.periods).unwrap();
         // Stiff bristles are integrated in short steps.
-        let step_s = 0.125 / self.log_rate_hz;
+        let step_s = match self.law {
+            Law::Dahl { stiffness_per_rad } if stiffness_per_rad > 1000.0 => 0.00025,
+            _ => PlantConfig::default().step_s,
+        };
         let config =
             PlantConfig { log_rate_hz: self.log_rate_hz, step_s, ..PlantConfig::default() };
         let law = HiddenLaw::new(&arm, self.joint, self.law);

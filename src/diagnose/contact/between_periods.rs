@@ -31,13 +31,11 @@ const LONGEST_S: f64 = 6.0;
 const LENGTHEN: f64 = std::f64::consts::SQRT_2;
 /// What lasts longer than this share of a period is no contact: friction that drifts, or another motion.
 const LONGEST_OF_PERIOD: f64 = 0.5;
-/// Two contacts are farther apart than this, s.
+/// Bumps are looked for this far from those already found, s: closer ones are what their shape lacks.
 const APART_S: f64 = 0.3;
-/// What comes so shortly before or behind a contact so many times as strong, s, is the arm swinging back: its torque
-/// is taken out with the contact's, and it is no contact of its own.
-const ECHO_S: f64 = 0.5;
-const ECHO_STRENGTH: f64 = 2.0;
-/// Contacts in one log.
+/// Bumps closer than this are one contact, s: an arm that was hit swings on for a while.
+const TOGETHER_S: f64 = 0.5;
+/// Bumps in one log.
 const MOST: usize = 40;
 /// The median over fewer periods is moved by one contact.
 const FEWEST_PERIODS: usize = 3;
@@ -102,14 +100,16 @@ pub fn between_periods(
     if touches.is_empty() {
         return Ok(None);
     }
-    let echo = (ECHO_S * rate_hz) as usize;
-    let is_echo = |touch: &Touch| {
-        let stronger = |other: &&Touch| other.strength > ECHO_STRENGTH * touch.strength;
-        touches.iter().filter(stronger).any(|other| other.is_near(&touch.samples, echo))
-    };
-    let mut causes: Vec<&Touch> = touches.iter().filter(|touch| !is_echo(touch)).collect();
-    causes.sort_by(|a, b| a.start_s.value.total_cmp(&b.start_s.value));
-    let causes = causes.into_iter().map(Touch::cause).collect();
+    touches.sort_by_key(|touch| touch.samples.start);
+    let together = (TOGETHER_S * rate_hz) as usize;
+    let mut contacts: Vec<Touch> = Vec::new();
+    for touch in touches {
+        match contacts.last_mut().filter(|last| last.is_near(&touch.samples, together)) {
+            Some(last) => last.join(touch),
+            None => contacts.push(touch),
+        }
+    }
+    let causes = contacts.iter().map(Touch::cause).collect();
     let mut torque_nm = m.torque_nm.clone();
     for j in 0..torque_nm.joints() {
         let of_joint = repeats.torque_nm.joint(j);

@@ -41,6 +41,26 @@ impl Touch {
         self.samples.start < other.end + margin && other.start < self.samples.end + margin
     }
 
+    /// Takes in what follows as a part of itself.
+    fn join(&mut self, next: Self) {
+        self.samples.end = self.samples.end.max(next.samples.end);
+        if next.end_s.value > self.end_s.value {
+            self.end_s = next.end_s;
+        }
+        for (joint, nm) in next.felt {
+            match self.felt.iter_mut().find(|(j, _)| *j == joint) {
+                Some((_, known)) if known.abs() >= nm.abs() => {}
+                Some((_, known)) => *known = nm,
+                None => self.felt.push((joint, nm)),
+            }
+        }
+        self.felt.sort_by_key(|(joint, _)| *joint);
+        if next.peak_nm.value.abs() > self.peak_nm.value.abs() {
+            self.peak_nm = next.peak_nm;
+        }
+        self.strength = self.strength.max(next.strength);
+    }
+
     /// Its samples and those beside it, of `n` in all.
     fn disturbed(&self, rate_hz: f64, n: usize) -> Range<usize> {
         let margin = (MARGIN_S * rate_hz) as usize;
