@@ -12,6 +12,12 @@ pub fn median(values: &mut [f64]) -> Option<f64> {
     Some(lower.map_or(upper, |lower| 0.5 * (lower + upper)))
 }
 
+/// Standard deviation of Gaussian values from the median of their `sizes` |x|, whose order changes: median/0.6745;
+/// zero of none.
+pub fn robust_sigma(sizes: &mut [f64]) -> f64 {
+    1.4826 * median(sizes).unwrap_or(0.0)
+}
+
 /// Median step of time among the steps forward, s; `None` without any.
 pub fn median_step(time_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> =

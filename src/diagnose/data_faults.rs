@@ -14,7 +14,7 @@ use super::record::Record;
 use super::stalls::stalls;
 use super::verdict::{Cause, Estimate};
 use crate::identify::Measurement;
-use crate::median::{median, median_step};
+use crate::median::{median, median_step, robust_sigma};
 use crate::robot::JointSignals;
 
 /// Deviations of this many robust standard deviations are no noise: in 10⁶ Gaussian values one in 10⁵
@@ -194,7 +194,7 @@ fn outliers_cause(joint: usize, count: usize, rows: usize) -> Cause {
 /// and that median.
 fn far_off(y: &[f64]) -> Vec<(usize, f64)> {
     let steps: Vec<f64> = y.windows(2).map(|w| w[1] - w[0]).collect();
-    let limit = FAR * robust_sigma(&steps);
+    let limit = FAR * sigma_of_changes(&steps);
     y.windows(9)
         .enumerate()
         .filter_map(|(k, window)| Some((k + 4, median(&mut window.to_vec())?)))
@@ -243,10 +243,10 @@ pub(super) fn step_s(m: &Measurement) -> f64 {
     median_step(m.time_s).unwrap_or(f64::NAN)
 }
 
-/// Standard deviation of Gaussian values from the median of their sizes, 1/0.6745.
-pub(super) fn robust_sigma(values: &[f64]) -> f64 {
+/// [`robust_sigma`] of those values that are not zero: readings that did not change say nothing of noise.
+pub(super) fn sigma_of_changes(values: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = values.iter().map(|v| v.abs()).filter(|v| *v > 0.0).collect();
-    median(&mut sizes).map_or(0.0, |median| 1.4826 * median)
+    robust_sigma(&mut sizes)
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::data_faults::{FAR, cause, exact, robust_sigma, step_s};
+use super::data_faults::{FAR, cause, exact, sigma_of_changes, step_s};
 use super::kind::Kind;
 use super::verdict::{Cause, Estimate};
 use crate::identify::Measurement;
@@ -25,7 +25,7 @@ pub fn stalls(m: &Measurement) -> Option<Stalls> {
     let lost: Vec<f64> = (0..m.time_s.len().saturating_sub(1))
         .map(|k| passed_s(m, k).map_or(0.0, |passed| passed - (m.time_s[k + 1] - m.time_s[k])))
         .collect();
-    let sigma_s = robust_sigma(&lost);
+    let sigma_s = sigma_of_changes(&lost);
     let limit = (FAR * sigma_s).max(0.5 * step_s(m));
     let rows: Vec<usize> = (0..lost.len()).filter(|&k| lost[k] > limit).collect();
     if rows.len() < 3 {

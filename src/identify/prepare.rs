@@ -151,9 +151,10 @@ impl Preparer {
         let mut period = if single_run { None } else { self.search.find(&even.q_rad)? };
         let is_misfit = |p: &&Period| !p.is_whole && p.periods >= FEWEST_PERIODS;
         if let (Some(found), None) = (period.as_ref().filter(is_misfit), options.rate_hz)
-            && let Some(fitting) = self.on_fitting_clock(m, options, found.clone())?
+            && let Some((fitting, whole, remarks)) =
+                self.on_fitting_clock(m, options, found.clone())?
         {
-            (even, period, warnings) = (fitting.0, Some(fitting.1), fitting.2);
+            (even, period, warnings) = (fitting, Some(whole), remarks);
         }
         if let (Some(wanted), false) = (options.period_s, single_run) {
             let found = period.as_ref().map(|p| p.samples as f64 / even.rate_hz);

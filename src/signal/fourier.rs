@@ -51,13 +51,13 @@ pub struct PeriodicFit {
 /// spectrum falls only as 1/f²: sampled at f_s, q̇ at f holds (f/(f_s − f))² of what belongs to
 /// f_s − f, a sixteenth at 0.2 f_s, and its derivative is worth no more.
 const ALIAS_FREE: f64 = 0.2;
+/// The same for q and q̇. Friction looks at q̇ sample by sample: there what is folded belongs to the
+/// sample, and a series that ends at 0.2 f_s rounds the kink off by several mrad/s.
+const SERIES_END: f64 = 0.32;
 /// Highest frequency of q̈ whatever the rate, Hz: an arm is moved at a few hertz. What friction adds to that
 /// stands out of the noise of a fast log much farther up, but there the noise in q̈, which grows with the square
 /// of the frequency, is more than what it is worth.
 const ACCELERATION_HZ: f64 = 25.0;
-/// The same for q and q̇. Friction looks at q̇ sample by sample: there what is folded belongs to the
-/// sample, and a series that ends at 0.2 f_s rounds the kink off by several mrad/s.
-const SERIES_END: f64 = 0.32;
 
 /// Working memory of [`PeriodicFit::fit`], one per thread.
 #[derive(Default)]

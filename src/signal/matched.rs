@@ -16,7 +16,7 @@ use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
 use super::error::{SignalError, checked_rate_hz, enough};
 use super::noise_trend::noise_trend;
-use crate::median::median;
+use crate::median::{median, robust_sigma};
 use crate::robot::JointSignals;
 
 /// Stretches of this length tell the noise's spectrum, s: slower noise looks alike to any bump.
@@ -27,8 +27,6 @@ const STRETCHES: usize = 4;
 const MIRROR_S: f64 = 4.0;
 /// Noise below this share of its largest power is not believed: a sensor's own low-pass leaves none.
 const FLOOR: f64 = 1e-4;
-/// σ over the median of |x| for Gaussian x.
-const ROBUST: f64 = 1.4826;
 
 /// Signals that are looked through for bumps.
 ///
@@ -62,7 +60,7 @@ impl Heights {
     /// that S lacks.
     pub fn scale(&self, signal: usize) -> f64 {
         let mut sizes: Vec<f64> = self.height.joint(signal).iter().map(|h| h.abs()).collect();
-        ROBUST * median(&mut sizes).unwrap_or(0.0) * self.information[signal].sqrt()
+        robust_sigma(&mut sizes) * self.information[signal].sqrt()
     }
 }
 

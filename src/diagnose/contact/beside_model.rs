@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use super::Touch;
 use crate::diagnose::verdict::{Cause, Estimate};
-use crate::median::median;
+use crate::median::robust_sigma;
 use crate::robot::JointSignals;
 
 /// Deviations of this many robust σ belong to a contact: most of them are errors of the model.
@@ -19,8 +19,6 @@ const NEAR: f64 = 0.5;
 const CUTOFF_HZ: f64 = 10.0;
 /// Parts closer than this are one contact, s.
 const TOGETHER_S: f64 = 0.3;
-/// σ over the median of |x| for Gaussian x.
-const ROBUST: f64 = 1.4826;
 /// A joint slower than this, rad/s, or so shortly before or behind, s, may be held by friction.
 const SLOW_RAD_S: f64 = 0.05;
 const REVERSAL_S: f64 = 0.25;
@@ -62,7 +60,7 @@ pub fn beside_model(
         .map(|(j, counts)| {
             let values = error_nm.joint(j).iter().zip(counts);
             let mut sizes: Vec<f64> = values.filter(|(_, c)| **c).map(|(e, _)| e.abs()).collect();
-            ROBUST * median(&mut sizes).unwrap_or(0.0)
+            robust_sigma(&mut sizes)
         })
         .collect();
     let score = |j: usize, k: usize| {

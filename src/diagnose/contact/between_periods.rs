@@ -418,7 +418,8 @@ mod tests {
         assert!(left.abs() < 3.0, "{left}");
     }
 
-    /// Pushes of six times the noise of a sample are found in slow noise, where and when they are said to be.
+    /// Pushes of six times the noise of a sample are found in slow noise, where and when they are said to be. The
+    /// longest have a strength of 8 to 9; 8 is seen in 93 of 100 logs (1.5 σ above the threshold).
     /// Of three intervals in each of 60 logs nominally 9 miss, those of one log together: σ ≤ √(9 · 3) = 5.2,
     /// three σ above are 24.
     #[test]

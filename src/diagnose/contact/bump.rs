@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
-use super::super::verdict::Estimate;
+use crate::diagnose::verdict::Estimate;
 use crate::signal::{Heights, MatchedFilter};
 
 /// Exponents p of (1 − u²)^p, |u| < 1: from a push that sets in at once to one that swells softly.
@@ -108,7 +108,6 @@ impl Push {
 }
 
 /// A bump that explains what is seen.
-#[derive(Clone)]
 struct Fit {
     shape: f64,
     gain: f64,
@@ -135,11 +134,10 @@ pub(super) fn weigh(
         .iter()
         .filter_map(|&shape| fits(filter, noise, centres.clone(), length_s, shape))
         .collect();
-    let tops: Vec<&Fit> = of_shapes.iter().filter_map(|fits| top(fits)).collect();
-    let best = tops.iter().copied().max_by(|a, b| a.gain.total_cmp(&b.gain))?;
-    let most = |a: &&[f64; 2], b: &&[f64; 2]| (a[0] / a[1]).abs().total_cmp(&(b[0] / b[1]).abs());
-    let main = best.heights_nm.iter().max_by(most)?;
-    let main = best.heights_nm.iter().position(|height| height == main)?;
+    let tops: Vec<&Fit> = of_shapes.iter().filter_map(|fits| top(fits.iter())).collect();
+    let best = top(tops.iter().copied())?;
+    let over_sigma = |j: &usize| (best.heights_nm[*j][0] / best.heights_nm[*j][1]).abs();
+    let main = (0..joints.len()).max_by(|a, b| over_sigma(a).total_cmp(&over_sigma(b)))?;
     let reach = |of: &dyn Fn(&Fit) -> [f64; 2], unit: &'static str| {
         let mut ci95 = [f64::INFINITY, f64::NEG_INFINITY];
         let possible =
@@ -165,8 +163,8 @@ pub(super) fn weigh(
     })
 }
 
-fn top(fits: &[Fit]) -> Option<&Fit> {
-    fits.iter().max_by(|a, b| a.gain.total_cmp(&b.gain))
+fn top<'a>(fits: impl Iterator<Item = &'a Fit>) -> Option<&'a Fit> {
+    fits.max_by(|a, b| a.gain.total_cmp(&b.gain))
 }
 
 /// The best bumps of one shape: of each length, and of all lengths together.
