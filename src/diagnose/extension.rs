@@ -28,6 +28,8 @@ pub struct Effect {
 pub struct Extension {
     /// Base parameters.
     pub theta: Vec<f64>,
+    /// Joints, and the dry friction that their drives do not answer at once, Nm; see [`Scene::unanswered`].
+    pub unanswered_nm: Vec<(usize, f64)>,
     /// Effects.
     pub effects: Vec<Effect>,
 }
@@ -65,8 +67,12 @@ impl Extension {
                 own.add(b, &image);
             }
             effect.absorbed = study.null.solve(&own);
+            effect.absorbed.truncate(study.base_count());
         }
-        Self { theta: study.null.solve(&rest), effects }
+        let mut theta = study.null.solve(&rest);
+        let unanswered_nm = theta.split_off(study.base_count());
+        let unanswered_nm = study.unanswered.iter().copied().zip(unanswered_nm).collect();
+        Self { theta, unanswered_nm, effects }
     }
 
     /// Torque of one period (or of the run), Nm, as the regression sees it: joints × samples of `problem`.
@@ -80,6 +86,10 @@ impl Extension {
         let mut out = JointSignals::zeros(problem.joints(), problem.samples);
         for j in 0..problem.joints() {
             problem.predict(j, &self.theta, out.joint_mut(j));
+        }
+        for &(j, torque_nm) in &self.unanswered_nm {
+            let less = scene.unanswered(j).unwrap_or_default();
+            out.joint_mut(j).iter_mut().zip(&less).for_each(|(o, less)| *o += torque_nm * less);
         }
         for effect in &self.effects {
             for (column, b) in effect.columns(families, scene) {

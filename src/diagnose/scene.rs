@@ -9,7 +9,7 @@ use crate::base::BaseSet;
 use crate::dynamics::{
     LANES, Lanes, Model, Motion, Parameter, ParameterLayout, Workspace, rigid_torque,
 };
-use crate::identify::Prepared;
+use crate::identify::{Prepared, Preparer};
 use crate::robot::{Arm, JointSignals};
 use crate::signal::central_4;
 
@@ -53,10 +53,24 @@ pub struct Scene {
     derivative: Derivative,
     /// See [`Self::fine_link_nm`].
     fine_link_nm: Vec<OnceLock<Vec<f64>>>,
+    /// See [`Self::instants`].
+    instants: Vec<OnceLock<Instants>>,
 }
 
-/// Instants per sample of [`Scene::fine_link_nm`].
+/// Instants per sample of [`Scene::fine_link_nm`] and [`Scene::instants`].
 pub const FINE: usize = 16;
+
+/// The motion of one joint where friction is looked at.
+pub struct Instants {
+    /// Time between two of them, s.
+    pub step_s: f64,
+    /// Angles, rad.
+    pub q_rad: Vec<f64>,
+    /// Velocities, rad/s.
+    pub qd_rad_s: Vec<f64>,
+    /// tanh(q̇/ε).
+    pub sign: Vec<f64>,
+}
 
 /// How signals along this motion are differentiated and shifted in time.
 enum Derivative {
@@ -129,6 +143,7 @@ impl Scene {
             torque_limit_nm: prepared.torque_limit_nm.clone(),
             derivative,
             fine_link_nm: vec![OnceLock::new(); joints],
+            instants: (0..joints).map(|_| OnceLock::new()).collect(),
         }
     }
 
@@ -169,15 +184,84 @@ impl Scene {
 
     /// The link torque of joint `j` at `FINE` instants per sample, for what happens between samples.
     pub fn fine_link_nm(&self, j: usize) -> &[f64] {
-        self.fine_link_nm[j].get_or_init(|| {
-            let link = self.link_nm.joint(j);
-            let mut fine = vec![0.0; FINE * link.len()];
-            for i in 0..FINE {
-                let later = self.delayed(link, -(i as f64) / (FINE as f64 * self.rate_hz));
-                fine.iter_mut().skip(i).step_by(FINE).zip(&later).for_each(|(f, l)| *f = *l);
+        self.fine_link_nm[j].get_or_init(|| self.fine(self.link_nm.joint(j)))
+    }
+
+    /// Where friction of joint `j` is looked at: [`FINE`] times per sample of a motion that repeats, at the
+    /// samples of a single run, whose low-pass lies far below their rate.
+    pub fn instants(&self, j: usize) -> &Instants {
+        self.instants[j].get_or_init(|| {
+            let (q, qd) = (self.motion.q_rad.joint(j), self.motion.qd_rad_s.joint(j));
+            if !self.periodic {
+                return Instants {
+                    step_s: 1.0 / self.rate_hz,
+                    q_rad: q.to_vec(),
+                    qd_rad_s: qd.to_vec(),
+                    sign: self.sign.joint(j).to_vec(),
+                };
             }
-            fine
+            let qd_rad_s = self.fine(qd);
+            let epsilon = self.arm.friction_epsilon_rad_s;
+            Instants {
+                step_s: 1.0 / (self.rate_hz * FINE as f64),
+                q_rad: self.fine(q),
+                sign: qd_rad_s.iter().map(|v| (v / epsilon).tanh()).collect(),
+                qd_rad_s,
+            }
         })
+    }
+
+    /// [`Self::link_nm`] of joint `j` at its instants.
+    pub fn link_at_instants(&self, j: usize) -> &[f64] {
+        if self.periodic { self.fine_link_nm(j) } else { self.link_nm.joint(j) }
+    }
+
+    /// y at `FINE` instants per sample.
+    fn fine(&self, y: &[f64]) -> Vec<f64> {
+        let mut fine = vec![0.0; FINE * y.len()];
+        for i in 0..FINE {
+            let later = self.delayed(y, -(i as f64) / (FINE as f64 * self.rate_hz));
+            fine.iter_mut().skip(i).step_by(FINE).zip(&later).for_each(|(f, l)| *f = *l);
+        }
+        fine
+    }
+
+    /// What the samples of a log tell of a friction `torque_nm`, given at the instants, that the drive does
+    /// not answer at once.
+    ///
+    /// Such a friction F accelerates the links: q̇ holds −∫F dt/M, and the log has that at its samples only.
+    /// Differentiated as the series of those samples, with harmonics up to those of the motion, it comes back
+    /// as
+    ///
+    /// F̃_h = iω_h/(e^{iω_h T} − 1) · DFT_h[∫ F dt from one sample to the next], T the time between samples,
+    ///
+    /// and F̃ is what the torque minus M q̈ shows. F at the samples themselves is another signal: what is over
+    /// within a sample or two (a bristle behind a reversal) is missed by it or counted for too much.
+    pub fn as_logged(&self, torque_nm: Vec<f64>) -> Vec<f64> {
+        let Derivative::Fourier { forward, inverse } = &self.derivative else { return torque_nm };
+        let n = self.samples();
+        let next = torque_nm[FINE..].iter().step_by(FINE).chain(&torque_nm[..1]);
+        let mean: Vec<f64> = torque_nm
+            .chunks_exact(FINE)
+            .zip(next)
+            .map(|(cell, end)| (cell.iter().sum::<f64>() + 0.5 * (end - cell[0])) / FINE as f64)
+            .collect();
+        let highest = (Preparer::WIDE * n as f64) as usize;
+        transform(forward.as_ref(), inverse.as_ref(), &mean, |h, n| {
+            if h > highest {
+                return Complex64::ZERO;
+            }
+            let half = std::f64::consts::PI * h as f64 / n as f64;
+            let gain = if h == 0 { 1.0 } else { half / half.sin() };
+            Complex64::from_polar(gain, -half)
+        })
+    }
+
+    /// What a log shows otherwise of dry friction on joint `j`, per Nm, if the drive does not answer its
+    /// reversals at once; `None` for a single run. How much of it the drive feeds forward is not known.
+    pub fn unanswered(&self, j: usize) -> Option<Vec<f64>> {
+        let logged = self.periodic.then(|| self.as_logged(self.instants(j).sign.clone()))?;
+        Some(logged.iter().zip(self.sign.joint(j)).map(|(logged, now)| logged - now).collect())
     }
 
     /// The harmonics of a signal of n samples up to `highest_hz`, where the motion repeats; of a single run

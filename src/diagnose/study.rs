@@ -46,8 +46,11 @@ pub struct Study<'a> {
     pub regression: &'a Regression,
     /// Where tests are made.
     pub whitening: Whitening,
-    /// The null model's columns there.
+    /// The null model's columns there: base parameters, and behind them what is not known of how the drives
+    /// answer friction ([`Scene::unanswered`]), joint by joint, where the motion repeats.
     pub null_columns: Vec<Image>,
+    /// The joints of the latter.
+    pub unanswered: Vec<usize>,
     /// Their span.
     pub null: Span,
     /// Torque minus null model there.
@@ -114,13 +117,22 @@ impl<'a> Study<'a> {
                 Column { parts: (0..problem.joints()).filter_map(part).collect() }
             })
             .collect();
-        let images: Vec<Image> =
+        let mut images: Vec<Image> =
             columns.par_iter().map(|c| whitening.regression_image(c)).collect();
         let mut null = Span::default();
         for (k, image) in images.iter().enumerate() {
             if !null.push(image) {
                 let parameter = set.name(k).to_owned();
                 return Err(DiagnoseError::NotExcited { log: log.to_owned(), parameter });
+            }
+        }
+        let mut unanswered = Vec::new();
+        for j in 0..scene.joints() {
+            let Some(column) = scene.unanswered(j) else { break };
+            let image = whitening.image(&Column::on(j, column));
+            if null.push(&image) {
+                unanswered.push(j);
+                images.push(image);
             }
         }
         let torque = whitening.regression_image(&Column {
@@ -135,6 +147,7 @@ impl<'a> Study<'a> {
             regression,
             whitening,
             null_columns: images,
+            unanswered,
             null,
             residual,
             statistic,
@@ -356,6 +369,11 @@ impl<'a> Study<'a> {
         let mut torque = vec![0.0; problem.samples];
         problem.predict(j, theta, &mut torque);
         self.whitening.regression_image(&Column::on(j, torque))
+    }
+
+    /// Base parameters of the null model.
+    pub fn base_count(&self) -> usize {
+        self.null_columns.len() - self.unanswered.len()
     }
 
     /// Number of sites of all families.

@@ -14,9 +14,9 @@ const BENDING: usize = 1;
 /// Exponents to begin with along a single run.
 const EXPONENTS: [f64; 4] = [1.0, 1.5, 2.0, 2.5];
 
-/// Torque by which joint `j` is loaded, Nm.
+/// Torque by which joint `j` is loaded, at its instants, Nm.
 fn load(scene: &Scene, j: usize, variant: usize) -> &[f64] {
-    scene.link_nm.joint(if variant == BENDING { j + 1 } else { j })
+    scene.link_at_instants(if variant == BENDING { j + 1 } else { j })
 }
 
 /// Whether the axis behind joint `j` is perpendicular to its own, so that its torque bends joint `j`.
@@ -50,9 +50,9 @@ impl Candidate for LoadFriction {
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let j = joint(site);
         // The rotor sits on the motor's side of the gear: its torque is not transmitted.
-        let (load, sign) = (load(scene, j, shape.variant), scene.sign.joint(j));
+        let load = load(scene, j, shape.variant);
         let p = exponent(shape);
-        vec![Column::on(j, samples(scene, |k| load[k].abs().powf(p) * sign[k]))]
+        vec![dry_friction(scene, j, |_, k| load[k].abs().powf(p))]
     }
 
     fn quantities(

@@ -24,7 +24,7 @@ mod torque_gain;
 
 use super::image::Column;
 use super::kind::Kind;
-use super::scene::Scene;
+use super::scene::{Instants, Scene};
 
 /// A point in the nonlinear parameters of a family.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -172,6 +172,13 @@ pub fn all() -> Vec<Box<dyn Candidate>> {
 /// Samples of joint `j` made from angle, speed and load by `f(k)`.
 fn samples(scene: &Scene, f: impl Fn(usize) -> f64) -> Vec<f64> {
     (0..scene.samples()).map(f).collect()
+}
+
+/// Friction of joint `j` that turns with the direction of motion, `level(instants, k)` times the sign of q̇.
+fn dry_friction(scene: &Scene, j: usize, level: impl Fn(&Instants, usize) -> f64) -> Column {
+    let at = scene.instants(j);
+    let friction = (0..at.sign.len()).map(|k| at.sign[k] * level(at, k)).collect();
+    Column::on(j, scene.as_logged(friction))
 }
 
 /// The joint of a family that always sits on one.

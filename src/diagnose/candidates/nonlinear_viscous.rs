@@ -36,8 +36,7 @@ impl Candidate for NonlinearViscous {
 
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let j = joint(site);
-        let (qd, sign) = (scene.motion.qd_rad_s.joint(j), scene.sign.joint(j));
-        vec![Column::on(j, samples(scene, |k| sign[k] * law(shape, qd[k].abs())))]
+        vec![dry_friction(scene, j, |at, k| law(shape, at.qd_rad_s[k].abs()))]
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, shape: Shape, b: &[f64]) -> Vec<Quantity> {

@@ -12,8 +12,7 @@ impl Candidate for PositionFriction {
 
     fn columns(&self, scene: &Scene, site: Option<usize>, _: Shape) -> Vec<Column> {
         let j = joint(site);
-        let (q, sign) = (scene.motion.q_rad.joint(j), scene.sign.joint(j));
-        let column = |f: fn(f64) -> f64| Column::on(j, samples(scene, |k| f(q[k]) * sign[k]));
+        let column = |f: fn(f64) -> f64| dry_friction(scene, j, |at, k| f(at.q_rad[k]));
         vec![column(f64::cos), column(f64::sin)]
     }
 

@@ -12,13 +12,12 @@ use super::*;
 /// See the module.
 pub struct Presliding;
 
-/// z along joint `j`, for a stiffness `k` in 1/rad.
+/// z at the instants of joint `j`, for a stiffness `k` in 1/rad.
 fn deflection(scene: &Scene, j: usize, stiffness_per_rad: f64) -> Vec<f64> {
-    let q = with_play(scene.motion.q_rad.joint(j), scene.angle_doubt_rad[j]);
-    let qd = scene.motion.qd_rad_s.joint(j);
-    let step_s = 1.0 / scene.rate_hz;
+    let Instants { q_rad, qd_rad_s, sign, step_s } = scene.instants(j);
+    let (q, qd) = (with_play(q_rad, scene.angle_doubt_rad[j]), qd_rad_s);
     let mut z = vec![0.0; q.len()];
-    let mut state = scene.sign.joint(j)[0];
+    let mut state = sign[0];
     // One lap forgets where the state began if the joint travels a few times 1/k; two are plenty.
     let laps = if scene.periodic { 2 } else { 1 };
     for _ in 0..laps {
@@ -29,7 +28,7 @@ fn deflection(scene: &Scene, j: usize, stiffness_per_rad: f64) -> Vec<f64> {
             let way = if scene.angle_doubt_rad[j] > 0.0 {
                 [now.0 - previous.0, 0.0]
             } else {
-                legs(previous, now, step_s)
+                legs(previous, now, *step_s)
             };
             for leg in way {
                 let direction = if leg >= 0.0 { 1.0 } else { -1.0 };
@@ -79,8 +78,8 @@ impl Candidate for Presliding {
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let j = joint(site);
         let z = deflection(scene, j, shape.value);
-        let sign = scene.sign.joint(j);
-        vec![Column::on(j, samples(scene, |k| z[k] - sign[k]))]
+        let less = z.iter().zip(&scene.instants(j).sign).map(|(z, sign)| z - sign);
+        vec![Column::on(j, scene.as_logged(less.collect()))]
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, shape: Shape, b: &[f64]) -> Vec<Quantity> {

@@ -28,11 +28,9 @@ impl Candidate for Stribeck {
 
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let j = joint(site);
-        let (qd, sign) = (scene.motion.qd_rad_s.joint(j), scene.sign.joint(j));
         let exponent = if shape.variant == 0 { 2 } else { 1 };
-        let friction =
-            samples(scene, |k| sign[k] * (-(qd[k].abs() / shape.value).powi(exponent)).exp());
-        vec![Column::on(j, friction)]
+        let law = |v: f64| (-(v.abs() / shape.value).powi(exponent)).exp();
+        vec![dry_friction(scene, j, |at, k| law(at.qd_rad_s[k]))]
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, shape: Shape, b: &[f64]) -> Vec<Quantity> {
