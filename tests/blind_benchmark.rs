@@ -158,7 +158,6 @@ fn friction_near_standstill() {
 }
 
 #[test]
-#[ignore = "named, but bristles that give way within one sample are told too soft, and a rest is named beside them"]
 fn friction_before_it_slides() {
     hide_and_find(&["presliding"]);
 }

@@ -28,8 +28,8 @@ pub struct Effect {
 pub struct Extension {
     /// Base parameters.
     pub theta: Vec<f64>,
-    /// Joints, and the dry friction that their drives do not answer at once, Nm; see [`Scene::unanswered`].
-    pub unanswered_nm: Vec<(usize, f64)>,
+    /// Joint, place in [`Scene::answers`] and coefficient of how the drives answer friction.
+    pub answers: Vec<(usize, usize, f64)>,
     /// Effects.
     pub effects: Vec<Effect>,
 }
@@ -70,9 +70,9 @@ impl Extension {
             effect.absorbed.truncate(study.base_count());
         }
         let mut theta = study.null.solve(&rest);
-        let unanswered_nm = theta.split_off(study.base_count());
-        let unanswered_nm = study.unanswered.iter().copied().zip(unanswered_nm).collect();
-        Self { theta, unanswered_nm, effects }
+        let answers = theta.split_off(study.base_count());
+        let answers = study.answers.iter().zip(answers).map(|(&(j, which), b)| (j, which, b));
+        Self { theta, answers: answers.collect(), effects }
     }
 
     /// Torque of one period (or of the run), Nm, as the regression sees it: joints × samples of `problem`.
@@ -87,9 +87,10 @@ impl Extension {
         for j in 0..problem.joints() {
             problem.predict(j, &self.theta, out.joint_mut(j));
         }
-        for &(j, torque_nm) in &self.unanswered_nm {
-            let less = scene.unanswered(j).unwrap_or_default();
-            out.joint_mut(j).iter_mut().zip(&less).for_each(|(o, less)| *o += torque_nm * less);
+        for &(j, which, b) in &self.answers {
+            if let Some(column) = scene.answers(j).get(which) {
+                out.joint_mut(j).iter_mut().zip(column).for_each(|(o, y)| *o += b * y);
+            }
         }
         for effect in &self.effects {
             for (column, b) in effect.columns(families, scene) {

@@ -216,6 +216,27 @@ impl Scene {
         if self.periodic { self.fine_link_nm(j) } else { self.link_nm.joint(j) }
     }
 
+    /// The predicted drive torque of joint `j` a time `delay_s` before every sample, Nm. Of dry friction, which
+    /// reverses between two samples, the instant counts.
+    pub fn delayed_torque_nm(&self, j: usize, delay_s: f64) -> Vec<f64> {
+        let torque = self.torque_nm.joint(j);
+        if !self.periodic {
+            return self.delayed(torque, delay_s);
+        }
+        let (coulomb, sign) = (self.coulomb_nm[j], self.sign.joint(j));
+        let smooth: Vec<f64> = torque.iter().zip(sign).map(|(t, s)| t - coulomb * s).collect();
+        let mut out = self.delayed(&smooth, delay_s);
+        let instants = self.instants(j);
+        let n = instants.sign.len();
+        for (k, out) in out.iter_mut().enumerate() {
+            let at = (k * FINE) as f64 - delay_s / instants.step_s;
+            let (left, u) = (at.floor(), at - at.floor());
+            let left = (left as isize).rem_euclid(n as isize) as usize;
+            *out += coulomb * ((1.0 - u) * instants.sign[left] + u * instants.sign[(left + 1) % n]);
+        }
+        out
+    }
+
     /// y at `FINE` instants per sample.
     fn fine(&self, y: &[f64]) -> Vec<f64> {
         let mut fine = vec![0.0; FINE * y.len()];
@@ -257,11 +278,25 @@ impl Scene {
         })
     }
 
-    /// What a log shows otherwise of dry friction on joint `j`, per Nm, if the drive does not answer its
-    /// reversals at once; `None` for a single run. How much of it the drive feeds forward is not known.
-    pub fn unanswered(&self, j: usize) -> Option<Vec<f64>> {
-        let logged = self.periodic.then(|| self.as_logged(self.instants(j).sign.clone()))?;
-        Some(logged.iter().zip(self.sign.joint(j)).map(|(logged, now)| logged - now).collect())
+    /// How the drive of joint `j` may answer dry friction, as columns; none for a single run.
+    ///
+    /// With s(t) the sign of q̇ and s̃ the same [as logged](Self::as_logged), a drive that feeds the share β of
+    /// its friction F forward, where the wanted velocity reverses, a little δ before the true one does, leaves
+    /// in the log F (s̃ + β (s − s̃) + β δ (ṡ − s̃˙)) where the null model has F s: the columns are s̃ − s and its
+    /// rate. Neither β nor δ is known.
+    pub fn answers(&self, j: usize) -> Vec<Vec<f64>> {
+        if !self.periodic {
+            return Vec::new();
+        }
+        let Instants { sign, step_s, .. } = self.instants(j);
+        let n = sign.len();
+        let rate = |k: usize| (sign[(k + 1) % n] - sign[(k + n - 1) % n]) / (2.0 * step_s);
+        [sign.clone(), (0..n).map(rate).collect()]
+            .map(|y| {
+                let now: Vec<f64> = y.iter().step_by(FINE).copied().collect();
+                self.as_logged(y).iter().zip(now).map(|(logged, now)| logged - now).collect()
+            })
+            .into()
     }
 
     /// The harmonics of a signal of n samples up to `highest_hz`, where the motion repeats; of a single run

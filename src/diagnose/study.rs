@@ -46,11 +46,11 @@ pub struct Study<'a> {
     pub regression: &'a Regression,
     /// Where tests are made.
     pub whitening: Whitening,
-    /// The null model's columns there: base parameters, and behind them what is not known of how the drives
-    /// answer friction ([`Scene::unanswered`]), joint by joint, where the motion repeats.
+    /// The null model's columns there: base parameters, and behind them how the drives answer friction
+    /// ([`Scene::answers`]).
     pub null_columns: Vec<Image>,
-    /// The joints of the latter.
-    pub unanswered: Vec<usize>,
+    /// Joint and place in [`Scene::answers`] of the latter.
+    pub answers: Vec<(usize, usize)>,
     /// Their span.
     pub null: Span,
     /// Torque minus null model there.
@@ -126,13 +126,14 @@ impl<'a> Study<'a> {
                 return Err(DiagnoseError::NotExcited { log: log.to_owned(), parameter });
             }
         }
-        let mut unanswered = Vec::new();
+        let mut answers = Vec::new();
         for j in 0..scene.joints() {
-            let Some(column) = scene.unanswered(j) else { break };
-            let image = whitening.image(&Column::on(j, column));
-            if null.push(&image) {
-                unanswered.push(j);
-                images.push(image);
+            for (which, column) in scene.answers(j).into_iter().enumerate() {
+                let image = whitening.image(&Column::on(j, column));
+                if null.push(&image) {
+                    answers.push((j, which));
+                    images.push(image);
+                }
             }
         }
         let torque = whitening.regression_image(&Column {
@@ -147,7 +148,7 @@ impl<'a> Study<'a> {
             regression,
             whitening,
             null_columns: images,
-            unanswered,
+            answers,
             null,
             residual,
             statistic,
@@ -373,7 +374,7 @@ impl<'a> Study<'a> {
 
     /// Base parameters of the null model.
     pub fn base_count(&self) -> usize {
-        self.null_columns.len() - self.unanswered.len()
+        self.null_columns.len() - self.answers.len()
     }
 
     /// Number of sites of all families.

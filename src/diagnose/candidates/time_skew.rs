@@ -38,7 +38,7 @@ impl Candidate for TimeSkew {
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let change = |j: usize| {
             let torque = scene.torque_nm.joint(j);
-            let late = scene.delayed(torque, shape.value);
+            let late = scene.delayed_torque_nm(j, shape.value);
             late.iter().zip(torque).map(|(late, now)| (late - now) / shape.value).collect()
         };
         let joints = match site {
