@@ -14,6 +14,8 @@ pub const FALSE_ALARM: f64 = 0.002;
 const FORM_ERROR: f64 = 0.05;
 /// 2 ln of the odds for a cause, at least: seven to one.
 pub const LEAST_EVIDENCE: f64 = 4.0;
+/// 2 ln of the odds between two laws that leave no doubt: twenty to one.
+const FAR_AHEAD: f64 = 6.0;
 /// Causes at most: a log that needs more has another kind of problem.
 const MOST_CAUSES: usize = 24;
 /// Share of a cause's square that another explains as well, at least, if it may stand in for it.
@@ -96,7 +98,18 @@ impl<'s, 'a> Kept<'s, 'a> {
                 !dropped.contains(&(c.entry.family, c.entry.site))
                     && self.is_significant(c, &others, &residual)
             };
-            let Some(best) = contenders.into_iter().take(FINALISTS).find(significant) else {
+            let finalists = &contenders[..FINALISTS.min(contenders.len())];
+            // What explains a joint best without being its own law is in the place of something unknown, and
+            // what explains less is not that.
+            let foreign: Vec<&Contender> =
+                finalists.iter().filter(|c| !self.is_its_own(c, &others, &residual)).collect();
+            let is_behind = |c: &Contender| {
+                foreign.iter().any(|f| {
+                    f.evidence > c.evidence + FAR_AHEAD && !self.is_significant_beside(c, f)
+                })
+            };
+            let Some(best) = finalists.iter().find(|c| significant(c) && !is_behind(c)).cloned()
+            else {
                 break;
             };
             let place = (best.entry.family, best.entry.site);
@@ -318,6 +331,33 @@ impl<'s, 'a> Kept<'s, 'a> {
             .collect()
     }
 
+    /// Whether `contender` is needed beside `other`, which is on another joint, and all causes.
+    fn is_significant_beside(&self, contender: &Contender, other: &Contender) -> bool {
+        let (site, other_site) = (contender.entry.site, other.entry.site);
+        if site == other_site || site.is_none() || other_site.is_none() {
+            return false;
+        }
+        let (mut others, _) = self.without(None);
+        for image in &other.entry.images {
+            others.push(image);
+        }
+        let mut residual = self.study.residual.clone();
+        others.residualise(&mut residual);
+        let Some(score) = self.study.score(&contender.entry, &others, &residual) else {
+            return false;
+        };
+        let evidence = self.evidence(&contender.entry, score);
+        let beside = Contender { entry: contender.entry.clone(), score, evidence };
+        self.is_significant(&beside, &others, &residual)
+    }
+
+    /// See [`super::candidates::Candidate::is_its_own`].
+    fn is_its_own(&self, contender: &Contender, others: &Span, residual: &Image) -> bool {
+        let Entry { family, shape, .. } = contender.entry;
+        let b = self.study.span(&contender.entry, others).solve(residual);
+        self.study.families[family].is_its_own(&self.study.scene, shape, &b)
+    }
+
     /// Whether chance explains `contender` in fewer than one log without faults in 500, all
     /// families, sites and shapes counted, the evidence is for it, and it is more than what the
     /// approximate form of the causes found beside it may leave. Along a single run it also has to show in
@@ -340,6 +380,7 @@ impl<'s, 'a> Kept<'s, 'a> {
         let tests = study.entries.len() as f64 + study.alternatives(&contender.entry);
         contender.evidence > LEAST_EVIDENCE
             && single * tests < FALSE_ALARM
+            && self.is_its_own(contender, others, residual)
             && study.generalises(&contender.entry, &span, residual)
     }
 

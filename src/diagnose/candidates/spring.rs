@@ -38,6 +38,11 @@ impl Candidate for Spring {
         "slow motion over the joint's whole range with the cable on and off"
     }
 
+    /// What drives away from its rest is no cable.
+    fn is_possible(&self, shape: Shape, b: &[f64]) -> bool {
+        shape.variant == 1 || b[0] > 0.0
+    }
+
     fn in_words(&self) -> &'static str {
         "a cable or hose that pulls like a spring"
     }

@@ -6,17 +6,22 @@ use super::*;
 /// See the module.
 pub struct Stribeck;
 
+/// A curve that falls over more than this speed, rad/s, is no matter of slow motion.
+fn widest(scene: &Scene) -> f64 {
+    25.0 * scene.arm.friction_epsilon_rad_s
+}
+
 impl Candidate for Stribeck {
     fn kind(&self) -> Kind {
         Kind::Stribeck
     }
 
     fn shapes(&self, scene: &Scene, _: Option<usize>) -> Vec<Shape> {
-        // Slower than the width of the regularised sign it is a part of that sign.
+        // Up to twice the widest, to see where it would end. Slower than the width of the regularised sign it is a part of that sign.
         let slowest = scene.arm.friction_epsilon_rad_s;
         (0..2)
             .flat_map(|variant| {
-                geometric(1.2 * slowest, 25.0 * slowest, 7)
+                geometric(1.2 * slowest, 2.0 * widest(scene), 8)
                     .map(move |value| Shape { variant, value })
             })
             .collect()
@@ -43,6 +48,11 @@ impl Candidate for Stribeck {
 
     fn is_possible(&self, _: Shape, b: &[f64]) -> bool {
         b[0] > 0.0
+    }
+
+    /// Friction that falls over the whole range of speeds has another law.
+    fn is_its_own(&self, scene: &Scene, shape: Shape, _: &[f64]) -> bool {
+        shape.value <= widest(scene)
     }
 
     fn in_words(&self) -> &'static str {

@@ -10,6 +10,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
 use super::Touch;
 use super::bump::{self, Noise, ORDINARY, Push};
+use super::drift::Drift;
 use crate::diagnose::verdict::{Cause, Estimate};
 use crate::identify::Measurement;
 use crate::median::median;
@@ -80,12 +81,16 @@ pub fn between_periods(
         return Ok(None);
     }
     let joints: Vec<usize> = (0..m.torque_nm.joints()).filter(|j| !left_out.contains(j)).collect();
-    let repeats =
-        Repeats { torque_nm: grid.straight(m.torque_nm)?, joints, window, period, rate_hz };
+    let torque_nm = grid.straight(m.torque_nm)?;
+    let mut repeats = Repeats { torque_nm, joints, window, period, rate_hz, drift: None };
     let time_s = grid.time_s();
     let mut touches: Vec<Touch> = Vec::new();
     let mut known: Vec<Push> = Vec::new();
     let mut aside = vec![false; time_s.len()];
+    if repeats.search(&aside, &known, &touches)?.is_some() {
+        let qd_rad_s = grid.smooth(m.qd_rad_s)?.slice(repeats.window.clone());
+        repeats.drift = Some(Drift::new(qd_rad_s, period));
+    }
     while touches.len() < MOST
         && let Some(candidate) = repeats.search(&aside, &known, &touches)?
     {
@@ -133,6 +138,8 @@ struct Repeats {
     /// Samples per period.
     period: f64,
     rate_hz: f64,
+    /// What drifting friction does; not asked for where nothing deviates anyway.
+    drift: Option<Drift>,
 }
 
 /// Where a bump may be.
@@ -182,14 +189,21 @@ impl Repeats {
         y[k] - median(&mut same).unwrap_or(y[k])
     }
 
-    /// Deviations of `joints` without the pushes that are `known`, samples of the window.
+    /// Deviations of `joints` without the pushes that are `known` and without drifting friction, samples of the
+    /// window.
     fn deviations(&self, joints: &[usize], aside: &[bool], known: &[Push]) -> JointSignals {
-        JointSignals::from_fn(joints.len(), self.window.len(), |row, k| {
+        let mut out = JointSignals::from_fn(joints.len(), self.window.len(), |row, k| {
             let j = joints[row];
             let deviation = self.deviation(self.torque_nm.joint(j), self.window.start + k, aside);
             let t_s = k as f64 / self.rate_hz;
             deviation - known.iter().map(|push| push.torque_nm(j, t_s)).sum::<f64>()
-        })
+        });
+        if let Some(drift) = &self.drift {
+            for (row, j) in joints.iter().enumerate() {
+                drift.remove(*j, out.joint_mut(row), |k| !aside[self.window.start + k]);
+            }
+        }
+        out
     }
 
     /// The highest bump that noise would not make, apart from those already found.

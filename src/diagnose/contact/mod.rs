@@ -8,6 +8,7 @@
 mod beside_model;
 mod between_periods;
 mod bump;
+mod drift;
 
 use std::ops::Range;
 

@@ -1,0 +1,95 @@
+//! Friction that changes slowly, as it shows between repetitions: no contact, however large it is.
+//!
+//! Where friction φ of a joint is f times as large at the time t, a sample differs by φ (f(t) − f(t_m)) from the
+//! median over the other periods, t_m the median of their times at the same phase (f changes in one direction).
+//! φ is made of sign q̇ and q̇, f of a straight line and of what has faded after a quarter of the record; the
+//! shares of the four are least squares. They fit a push, which comes once and has one direction, hardly at all.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::robot::JointSignals;
+
+/// Slower than this, rad/s, dry friction has not built up.
+const STANDSTILL_RAD_S: f64 = 0.02;
+/// What fades does so with this share of the record as time constant.
+const FADES: f64 = 0.25;
+/// Laws of friction times courses in time.
+const COLUMNS: usize = 4;
+
+/// What drifting friction may do to the deviations of every joint.
+pub(super) struct Drift {
+    qd_rad_s: JointSignals,
+    /// f(t) − f(t_m) of both courses, per sample.
+    courses: [Vec<f64>; 2],
+}
+
+impl Drift {
+    /// For joints with the velocities `qd_rad_s`, whose motion repeats every `period` samples.
+    pub(super) fn new(qd_rad_s: JointSignals, period: f64) -> Self {
+        let n = qd_rad_s.samples();
+        let others = ((n as f64 / period).ceil() as usize).saturating_sub(1);
+        let fade = |t: f64| (-t / (FADES * n as f64)).exp();
+        let line = |t: f64| t / n as f64;
+        let course = |f: &dyn Fn(f64) -> f64| -> Vec<f64> {
+            let of = |k: usize| {
+                let own = (k as f64 / period) as usize;
+                let phase = k as f64 - own as f64 * period;
+                // The place-th of the other periods.
+                let at = |place: usize| phase + (place + usize::from(place >= own)) as f64 * period;
+                let [low, high] = [others.saturating_sub(1) / 2, others / 2].map(|m| f(at(m)));
+                f(k as f64) - 0.5 * (low + high)
+            };
+            (0..n).map(of).collect()
+        };
+        Self { qd_rad_s, courses: [course(&fade), course(&line)] }
+    }
+
+    /// Takes the best fit to the samples that are `used` out of the deviations `y` of joint `j`.
+    pub(super) fn remove(&self, j: usize, y: &mut [f64], used: impl Fn(usize) -> bool) {
+        let qd = self.qd_rad_s.joint(j);
+        let row = |k: usize| {
+            let friction = [(qd[k] / STANDSTILL_RAD_S).tanh(), qd[k]];
+            let [fade, line] = [self.courses[0][k], self.courses[1][k]];
+            [friction[0] * fade, friction[1] * fade, friction[0] * line, friction[1] * line]
+        };
+        let mut gram = DMatrix::<f64>::zeros(COLUMNS, COLUMNS);
+        let mut right = DVector::<f64>::zeros(COLUMNS);
+        for (k, y) in y.iter().enumerate().filter(|(k, _)| used(*k)) {
+            let x = DVector::from(row(k).to_vec());
+            gram.ger(1.0, &x, &x, 1.0);
+            right.axpy(*y, &x, 1.0);
+        }
+        // A joint that stands still has no friction that could drift.
+        let Some(gram) = gram.cholesky() else { return };
+        let b = gram.solve(&right);
+        for (k, y) in y.iter_mut().enumerate() {
+            *y -= row(k).iter().zip(b.iter()).map(|(x, b)| x * b).sum::<f64>();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A straight course is taken out whole: its median over the other periods is what the columns assume.
+    #[test]
+    fn friction_that_grows_evenly_is_taken_out() {
+        let (n, period) = (800, 100);
+        let omega = std::f64::consts::TAU / period as f64;
+        let qd = JointSignals::from_fn(1, n, |_, k| (omega * k as f64).sin());
+        let friction = |k: usize| 2.0 * (qd.joint(0)[k] / 0.02).tanh() + 0.5 * qd.joint(0)[k];
+        let torque = |k: usize| (1.0 + 1e-3 * k as f64) * friction(k);
+        let deviation = |k: usize| {
+            let (own, phase) = (k / period, k % period);
+            let mut others: Vec<f64> =
+                (0..8).filter(|p| *p != own).map(|p| torque(phase + p * period)).collect();
+            torque(k) - crate::median::median(&mut others).unwrap()
+        };
+        let mut y: Vec<f64> = (0..n).map(deviation).collect();
+        let largest = |y: &[f64]| y.iter().fold(0.0f64, |a, y| a.max(y.abs()));
+        assert!(largest(&y) > 0.9);
+        Drift::new(qd.clone(), period as f64).remove(0, &mut y, |_| true);
+        assert!(largest(&y) < 1e-9, "{}", largest(&y));
+    }
+}
