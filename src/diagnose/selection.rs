@@ -353,9 +353,9 @@ impl<'s, 'a> Kept<'s, 'a> {
 
     /// See [`super::candidates::Candidate::is_its_own`].
     fn is_its_own(&self, contender: &Contender, others: &Span, residual: &Image) -> bool {
-        let Entry { family, shape, .. } = contender.entry;
+        let Entry { family, site, shape, .. } = contender.entry;
         let b = self.study.span(&contender.entry, others).solve(residual);
-        self.study.families[family].is_its_own(&self.study.scene, shape, &b)
+        self.study.families[family].is_its_own(&self.study.scene, site, shape, &b)
     }
 
     /// Whether chance explains `contender` in fewer than one log without faults in 500, all

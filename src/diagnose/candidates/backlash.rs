@@ -80,7 +80,7 @@ impl Candidate for Backlash {
     /// Both tell the gap: how far the links lag, and how long a flight lasts. Flanks that are harder or softer
     /// than those assumed make a flight seem longer; a gap that is crossed in less time than half of it takes
     /// was none, but a gear that gives way.
-    fn is_its_own(&self, _: &Scene, shape: Shape, b: &[f64]) -> bool {
+    fn is_its_own(&self, _: &Scene, _: Option<usize>, shape: Shape, b: &[f64]) -> bool {
         b.first().is_none_or(|gap_rad| *gap_rad <= 2.0 * shape.value)
     }
 

@@ -145,7 +145,7 @@ pub trait Candidate: Sync {
     /// Whether the law, with this shape and these coefficients at their best, is the family's own. Where it is
     /// not, the law only stands in for one that resembles it at that end of its range: the data show
     /// something, and it is not this.
-    fn is_its_own(&self, _scene: &Scene, _shape: Shape, _b: &[f64]) -> bool {
+    fn is_its_own(&self, _scene: &Scene, _site: Option<usize>, _shape: Shape, _b: &[f64]) -> bool {
         true
     }
 

@@ -27,6 +27,12 @@ impl Candidate for PositionFriction {
         "the same motion with another payload or on a tilted base: this friction stays where it was"
     }
 
+    /// Over a turn friction varies by a part of its level. What would have to vary by more than three quarters is a
+    /// bent law of something else, seen over a small arc.
+    fn is_its_own(&self, scene: &Scene, site: Option<usize>, _: Shape, b: &[f64]) -> bool {
+        !scene.periodic || b[0].hypot(second(b)) < 0.75 * scene.coulomb_nm[joint(site)]
+    }
+
     fn in_words(&self) -> &'static str {
         "friction that depends on the angle"
     }

@@ -101,6 +101,12 @@ impl Candidate for Presliding {
         b[0] > 0.0
     }
 
+    /// All dry friction of a joint builds up behind a reversal. Where most of it does not, something else
+    /// happens there: a torque recorded late, or another law of speed.
+    fn is_its_own(&self, scene: &Scene, site: Option<usize>, _: Shape, b: &[f64]) -> bool {
+        !scene.periodic || b[0] > 0.5 * scene.coulomb_nm[joint(site)]
+    }
+
     fn in_words(&self) -> &'static str {
         "friction that builds up over a small angle behind every reversal (presliding)"
     }

@@ -51,7 +51,7 @@ impl Candidate for Stribeck {
     }
 
     /// Friction that falls over the whole range of speeds has another law.
-    fn is_its_own(&self, scene: &Scene, shape: Shape, _: &[f64]) -> bool {
+    fn is_its_own(&self, scene: &Scene, _: Option<usize>, shape: Shape, _: &[f64]) -> bool {
         shape.value <= widest(scene)
     }
 
