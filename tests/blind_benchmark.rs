@@ -224,13 +224,15 @@ fn of_two_effects_both_are_named() {
 /// At √λ above 30 a family that the dictionary lacks must not silently be called another.
 #[test]
 fn a_family_that_is_not_known_is_not_called_another() {
-    for families in [["position_friction"], ["elasticity"]] {
-        let mut benchmark = benchmark(WITHHELD, &families);
+    let cases =
+        [("position_friction", 0), ("elasticity", 0), ("elasticity", 1), ("nonlinear_viscous", 0)];
+    for (family, trial) in cases {
+        let mut benchmark = benchmark(WITHHELD, &[family]);
         benchmark.plan.sqrt_lambda = [30.0, 40.0];
-        let record = record(&benchmark, 0);
+        let record = record(&benchmark, trial);
         assert!(
             !matches!(record.outcome(), Outcome::Wrong | Outcome::Silent),
-            "{families:?}: {}",
+            "{family}: {}",
             record.outcome()
         );
     }

@@ -126,6 +126,46 @@ fn clean_logs_have_no_cause() {
     }
 }
 
+/// Controllers that know nothing of friction: where it reverses, the torque follows late and the links jerk.
+#[test]
+fn how_drives_answer_friction_is_no_cause() {
+    for (seed, feedforward) in [(20, 0.0), (21, 0.0), (22, 0.5)] {
+        let d = diagnose(seed, &format!("[plant]\nfriction_feedforward = {feedforward:?}"));
+        assert_eq!(d.verdict, Verdict::NothingFound, "{:?}", d.sentences);
+    }
+}
+
+/// What is over within a sample at 125 Hz: bristles that give way within 0.1 mrad, one joint's torque recorded
+/// 1.3 ms late. Each looks like the other in samples of friction, and is told by name and number.
+#[test]
+fn what_is_over_within_a_sample() {
+    let cases = [
+        ("presliding", 3, "stiffness_per_rad", 10_000.0),
+        ("presliding", 5, "stiffness_per_rad", 5000.0),
+        ("time_skew", 3, "delay_s", 0.0013),
+        ("time_skew", 4, "delay_s", 0.0010),
+    ];
+    for (seed, (kind, joint, parameter, truth)) in (30..).zip(cases) {
+        let (_, d) = hide(seed, kind, &[joint], &format!("{parameter} = {truth:?}"));
+        assert!(is_named(&d, kind, Some(joint)));
+        assert_eq!(d.causes.len(), 1, "{:?}", d.sentences);
+        let e = &d.causes[0].parameters[parameter];
+        // Twice the half width: 3.9 σ, which one log in 10⁴ misses by chance.
+        assert!((e.value - truth).abs() < e.ci95[1] - e.ci95[0], "{kind} {e:?}");
+    }
+}
+
+/// Friction that falls by a tenth within a minute changes more from one period to the next than a hand would.
+#[test]
+fn warming_is_no_contact() {
+    let drift = "fraction = -0.1\ntime_constant_s = 40.0";
+    for seed in [40, 41] {
+        let (joint, d) = hide(seed, "thermal_drift", &[1, 2, 3, 6], drift);
+        assert!(is_named(&d, "thermal_drift", Some(joint)));
+        assert_eq!(d.causes.len(), 1, "{:?}", d.sentences);
+    }
+}
+
 /// Rows 6, 8 and 10 ms apart with true time stamps: what lies between rows is no physics.
 #[test]
 fn an_uneven_clock_is_no_cause() {
