@@ -93,21 +93,33 @@ fn intervals_are_withheld_where_the_model_is_wrong() {
 /// within a sample, ending the series of the motion. Nothing of it may show in the σ of the noise.
 #[test]
 fn the_processing_biases_no_parameter_by_a_fifth_of_its_sigma() {
-    const QUIETER: f64 = 100.0;
     for toml in [include_str!("../sims/default.toml"), include_str!("../sims/noise_ar1.toml")] {
-        let sigma = experiment(toml).scale;
-        let loud =
-            "torque_sd_nm = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15]\nq_sd_rad = 2e-5\nqd_sd_rad_s = 1e-3";
-        assert!(toml.contains(loud));
-        let quiet =
-            toml.replace(loud, "torque_sd_nm = [0.01, 0.01, 0.007, 0.0015, 0.0015, 0.0015]");
-        let quiet = experiment(&quiet);
-        let found = quiet.worker().identify(0).unwrap();
-        let set = &quiet.simulation.scenario.set;
-        for (k, (theta, truth)) in found.fit.theta.iter().zip(&quiet.truth).enumerate() {
-            let bias = (theta - truth) / sigma[k];
-            // The noise that is left moves an estimate by 1/100 σ; 5 of that.
-            assert!(bias.abs() < 0.2 + 5.0 / QUIETER, "{}: {bias:.2} σ", set.name(k));
-        }
+        assert_bias_below(0.2, toml);
+    }
+}
+
+/// Friction that no drive feeds forward pushes the links at every reversal, for less than a sample. Of a bias of
+/// half a σ a 95 % interval loses 3 % of its coverage; without columns for what the drives do, the rotor inertia of
+/// joint 1 is off by 1.1 σ.
+#[test]
+fn drives_that_feed_no_friction_forward_bias_no_parameter_by_half_its_sigma() {
+    let toml = include_str!("../sims/default.toml");
+    assert_bias_below(0.5, &format!("{toml}\n[plant]\nfriction_feedforward = 0.0\n"));
+}
+
+fn assert_bias_below(bound: f64, toml: &str) {
+    const QUIETER: f64 = 100.0;
+    let sigma = experiment(toml).scale;
+    let loud =
+        "torque_sd_nm = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15]\nq_sd_rad = 2e-5\nqd_sd_rad_s = 1e-3";
+    assert!(toml.contains(loud));
+    let quiet = toml.replace(loud, "torque_sd_nm = [0.01, 0.01, 0.007, 0.0015, 0.0015, 0.0015]");
+    let quiet = experiment(&quiet);
+    let found = quiet.worker().identify(0).unwrap();
+    let set = &quiet.simulation.scenario.set;
+    for (k, (theta, truth)) in found.fit.theta.iter().zip(&quiet.truth).enumerate() {
+        let bias = (theta - truth) / sigma[k];
+        // The noise that is left moves an estimate by 1/100 σ; 5 of that.
+        assert!(bias.abs() < bound + 5.0 / QUIETER, "{}: {bias:.2} σ", set.name(k));
     }
 }

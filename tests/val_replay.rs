@@ -117,7 +117,7 @@ impl Bench {
             absorbed: Vec::new(),
         };
         let predict = |effects: Vec<Effect>| {
-            let model = Extension { theta: theta.clone(), effects };
+            let model = Extension { theta: theta.clone(), answers: Vec::new(), effects };
             model.torque_nm(&families, &scene, &regression.problem, None)
         };
         let (with, without) = (predict(vec![effect]), predict(Vec::new()));

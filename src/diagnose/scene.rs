@@ -9,9 +9,9 @@ use crate::base::BaseSet;
 use crate::dynamics::{
     LANES, Lanes, Model, Motion, Parameter, ParameterLayout, Workspace, rigid_torque,
 };
-use crate::identify::{Prepared, Preparer};
+use crate::identify::{Prepared, Preparer, drive_answers};
 use crate::robot::{Arm, JointSignals};
-use crate::signal::central_4;
+use crate::signal::{FineClock, central_4};
 
 /// The processed motion of one log and the torques that the estimate predicts along it.
 ///
@@ -55,6 +55,8 @@ pub struct Scene {
     fine_link_nm: Vec<OnceLock<Vec<f64>>>,
     /// See [`Self::instants`].
     instants: Vec<OnceLock<Instants>>,
+    /// Between the samples of a motion that repeats.
+    clock: Option<FineClock>,
 }
 
 /// Instants per sample of [`Scene::fine_link_nm`] and [`Scene::instants`].
@@ -144,6 +146,7 @@ impl Scene {
             derivative,
             fine_link_nm: vec![OnceLock::new(); joints],
             instants: (0..joints).map(|_| OnceLock::new()).collect(),
+            clock: periodic.then(|| FineClock::new(n, FINE)),
         }
     }
 
@@ -239,64 +242,35 @@ impl Scene {
 
     /// y at `FINE` instants per sample.
     fn fine(&self, y: &[f64]) -> Vec<f64> {
-        let mut fine = vec![0.0; FINE * y.len()];
-        for i in 0..FINE {
-            let later = self.delayed(y, -(i as f64) / (FINE as f64 * self.rate_hz));
-            fine.iter_mut().skip(i).step_by(FINE).zip(&later).for_each(|(f, l)| *f = *l);
+        if let Some(clock) = &self.clock {
+            return clock.refined(y);
         }
-        fine
+        let between = |k: usize| {
+            let next = y[(k + 1).min(y.len() - 1)];
+            (0..FINE).map(move |i| y[k] + (next - y[k]) * i as f64 / FINE as f64)
+        };
+        (0..y.len()).flat_map(between).collect()
     }
 
-    /// What the samples of a log tell of a friction `torque_nm`, given at the instants, that the drive does
-    /// not answer at once.
-    ///
-    /// Such a friction F accelerates the links: q̇ holds −∫F dt/M, and the log has that at its samples only.
-    /// Differentiated as the series of those samples, with harmonics up to those of the motion, it comes back
-    /// as
-    ///
-    /// F̃_h = iω_h/(e^{iω_h T} − 1) · DFT_h[∫ F dt from one sample to the next], T the time between samples,
-    ///
-    /// and F̃ is what the torque minus M q̈ shows. F at the samples themselves is another signal: what is over
-    /// within a sample or two (a bristle behind a reversal) is missed by it or counted for too much.
+    /// What the samples of a log show of a friction `torque_nm`, given at the instants, that the drive does not
+    /// answer at once ([`FineClock::as_logged`]).
     pub fn as_logged(&self, torque_nm: Vec<f64>) -> Vec<f64> {
-        let Derivative::Fourier { forward, inverse } = &self.derivative else { return torque_nm };
-        let n = self.samples();
-        let next = torque_nm[FINE..].iter().step_by(FINE).chain(&torque_nm[..1]);
-        let mean: Vec<f64> = torque_nm
-            .chunks_exact(FINE)
-            .zip(next)
-            .map(|(cell, end)| (cell.iter().sum::<f64>() + 0.5 * (end - cell[0])) / FINE as f64)
-            .collect();
-        let highest = (Preparer::WIDE * n as f64) as usize;
-        transform(forward.as_ref(), inverse.as_ref(), &mean, |h, n| {
-            if h > highest {
-                return Complex64::ZERO;
-            }
-            let half = std::f64::consts::PI * h as f64 / n as f64;
-            let gain = if h == 0 { 1.0 } else { half / half.sin() };
-            Complex64::from_polar(gain, -half)
-        })
+        match &self.clock {
+            Some(clock) => clock.as_logged(&torque_nm, self.highest_harmonic()),
+            None => torque_nm,
+        }
     }
 
-    /// How the drive of joint `j` may answer dry friction, as columns; none for a single run.
-    ///
-    /// With s(t) the sign of q̇ and s̃ the same [as logged](Self::as_logged), a drive that feeds the share β of
-    /// its friction F forward, where the wanted velocity reverses, a little δ before the true one does, leaves
-    /// in the log F (s̃ + β (s − s̃) + β δ (ṡ − s̃˙)) where the null model has F s: the columns are s̃ − s and its
-    /// rate. Neither β nor δ is known.
+    /// How the drive of joint `j` may answer dry friction, as columns ([`drive_answers`]); none for a single run.
     pub fn answers(&self, j: usize) -> Vec<Vec<f64>> {
-        if !self.periodic {
-            return Vec::new();
-        }
-        let Instants { sign, step_s, .. } = self.instants(j);
-        let n = sign.len();
-        let rate = |k: usize| (sign[(k + 1) % n] - sign[(k + n - 1) % n]) / (2.0 * step_s);
-        [sign.clone(), (0..n).map(rate).collect()]
-            .map(|y| {
-                let now: Vec<f64> = y.iter().step_by(FINE).copied().collect();
-                self.as_logged(y).iter().zip(now).map(|(logged, now)| logged - now).collect()
-            })
-            .into()
+        let columns =
+            |clock| drive_answers(clock, &self.instants(j).sign, self.highest_harmonic()).into();
+        self.clock.as_ref().map_or(Vec::new(), columns)
+    }
+
+    /// Up to which harmonic the periods' own accelerations are known.
+    fn highest_harmonic(&self) -> usize {
+        (Preparer::WIDE * self.samples() as f64) as usize
     }
 
     /// The harmonics of a signal of n samples up to `highest_hz`, where the motion repeats; of a single run

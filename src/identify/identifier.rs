@@ -2,6 +2,7 @@
 
 use super::columns::ColumnPlan;
 use super::covariance::{Covariance, CovarianceKind};
+use super::drive_answers::without_drive_answers;
 use super::error::IdentifyError;
 use super::estimation::{Estimate, Estimation, MotionAids};
 use super::fit::{Estimator, Fit};
@@ -14,7 +15,7 @@ use super::whiten::smoothed;
 use crate::base::BaseSet;
 use crate::dynamics::Model;
 use crate::robot::JointSignals;
-use crate::signal::{Replicates, Scratch, ZeroPhase};
+use crate::signal::{FineClock, Replicates, Scratch, ZeroPhase};
 
 /// Everything that stays the same from log to log, and the memory that is used again.
 pub struct Identifier<'a> {
@@ -26,6 +27,7 @@ pub struct Identifier<'a> {
     problem: Problem,
     estimation: Estimation,
     filter: Scratch,
+    clock: Option<FineClock>,
 }
 
 /// What a log says about the arm.
@@ -165,6 +167,9 @@ impl Regression {
 
 /// Single runs are processed in pieces of this many samples, so that memory stays bounded.
 const PIECE: usize = 1 << 16;
+/// Instants per sample at which reversals are looked at: a millisecond at 125 Hz, a tenth of what a joint takes to
+/// reverse its friction.
+const TICKS: usize = 8;
 /// Longest single run that keeps all its samples.
 const LONG_RUN: usize = 100_000;
 /// Rate kept behind the low-pass of a longer run, in multiples of the cutoff.
@@ -183,6 +188,7 @@ impl<'a> Identifier<'a> {
             estimation: Estimation::new(&problem),
             problem,
             filter: Scratch::default(),
+            clock: None,
         }
     }
 
@@ -343,6 +349,7 @@ impl<'a> Identifier<'a> {
                  short against a block",
             ),
         };
+        self.take_out_drive_answers(&prepared);
         let aids = MotionAids { acceleration: prepared.acceleration.as_deref(), instruments };
         let estimate = self.estimation.estimate(
             &self.problem,
@@ -378,6 +385,17 @@ impl<'a> Identifier<'a> {
         })
     }
 
+    /// Nothing changes for a single run: its low-pass lies far below what drives do at a reversal.
+    fn take_out_drive_answers(&mut self, prepared: &Prepared) {
+        let Some(acceleration) = &prepared.acceleration else { return };
+        let Self { clock, problem, model, .. } = self;
+        let clock = match clock.take().filter(|clock| clock.samples() == problem.samples) {
+            Some(fits) => clock.insert(fits),
+            None => clock.insert(FineClock::new(problem.samples, TICKS)),
+        };
+        without_drive_answers(problem, clock, model, &prepared.motion, acceleration);
+    }
+
     /// `estimate` of the log `prepared`; where its model fails against the scatter of the torque, tested against
     /// that of torque and motion.
     fn with_motion_noise(
@@ -408,6 +426,7 @@ impl<'a> Identifier<'a> {
         let (prepared, ..) = self.fill_from(m, false)?;
         let by_instruments = methods.iter().map(|(e, _)| *e).find(|e| *e == Estimator::Iv);
         let instruments = self.instruments_for(by_instruments, &prepared)?;
+        self.take_out_drive_answers(&prepared);
         let aids = MotionAids {
             acceleration: prepared.acceleration.as_deref(),
             instruments: instruments.as_ref(),

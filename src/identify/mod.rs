@@ -5,6 +5,7 @@ pub mod physical;
 
 mod bound;
 mod columns;
+mod drive_answers;
 mod error;
 mod estimation;
 mod fit;
@@ -22,6 +23,7 @@ mod whiten;
 
 pub use bound::{KnownNoise, cramer_rao};
 pub use columns::ColumnPlan;
+pub use drive_answers::drive_answers;
 pub use error::IdentifyError;
 pub use estimation::{Estimate, Estimation, MotionAids};
 pub use fit::{Estimator, Fit, FitError, Fitter, Weighting};

@@ -14,6 +14,7 @@
 //! | when does the arm move? | [`Activity`] |
 //! | does the motion repeat, and from where to where? | [`find_period`] |
 //! | the best estimate of a repeated motion and its derivatives | [`PeriodicFit`] |
+//! | what happens between the samples of a repeated motion? | [`FineClock`] |
 //! | how noisy is a signal, without any model of it? | [`replicate_noise`] |
 //! | how does the power of noise run over frequency? | [`noise_trend`] |
 //! | is there a bump in coloured noise? | [`MatchedFilter`] |
@@ -26,6 +27,7 @@ mod butterworth;
 mod decimate;
 mod differentiate;
 mod error;
+mod fine_clock;
 mod fourier;
 mod matched;
 mod noise;
@@ -43,6 +45,7 @@ pub use butterworth::{Scratch, ZeroPhase};
 pub use decimate::Decimator;
 pub use differentiate::{central_2, central_4, hermite_acceleration};
 pub use error::SignalError;
+pub use fine_clock::FineClock;
 pub use fourier::{AveragedMotion, FitScratch, HarmonicPower, PeriodicFit};
 pub use matched::{Heights, MatchedFilter};
 pub use noise_trend::{NoisePower, noise_trend, pooled};

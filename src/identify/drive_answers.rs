@@ -1,0 +1,70 @@
+//! How a drive may answer dry friction.
+//!
+//! A controller that feeds the share β of a joint's friction F forward does so where the wanted velocity reverses,
+//! a little δ before the true one does. What it does not feed forward accelerates the links for a moment. With s(t)
+//! the sign of q̇ and s̃ the same [as logged](FineClock::as_logged), the record holds
+//!
+//! F (s̃ + β (s − s̃) + β δ (ṡ − s̃˙))
+//!
+//! where the model has F s. Neither β nor δ is known: s̃ − s and its rate are columns beside the model's. They are of
+//! high frequency and tell nothing of the arm; left out, an arm without feed-forward has inertias that are wrong by
+//! more than σ.
+
+use super::problem::Problem;
+use crate::dynamics::{Model, Motion};
+use crate::signal::{FineClock, HarmonicPower};
+
+/// s̃ − s and its rate (per tick) at the samples of one period, of the sign `fine_sign` at every tick, with an
+/// acceleration that is known up to harmonic `highest`.
+pub fn drive_answers(clock: &FineClock, fine_sign: &[f64], highest: usize) -> [Vec<f64>; 2] {
+    let n = fine_sign.len();
+    let rate = |k: usize| 0.5 * (fine_sign[(k + 1) % n] - fine_sign[(k + n - 1) % n]);
+    let rates: Vec<f64> = (0..n).map(rate).collect();
+    [fine_sign, &rates].map(|fine| {
+        let logged = clock.as_logged(fine, highest);
+        logged.iter().zip(fine.iter().step_by(clock.ticks())).map(|(l, now)| l - now).collect()
+    })
+}
+
+/// Takes the answers of all drives out of `problem`, a motion that repeats and its periods of torque: X and y keep
+/// what is orthogonal to them, joint by joint, so that the solution is that of a fit with them (Frisch and Waugh
+/// 1933).
+pub fn without_drive_answers(
+    problem: &mut Problem,
+    clock: &FineClock,
+    model: &Model,
+    motion: &Motion,
+    acceleration: &[HarmonicPower],
+) {
+    let n = problem.samples;
+    for (j, (panel, known)) in problem.panels.iter_mut().zip(acceleration).enumerate() {
+        let qd = clock.refined(motion.qd_rad_s.joint(j));
+        let sign: Vec<f64> = qd.iter().map(|qd| model.friction_sign(*qd)).collect();
+        let mut directions: Vec<Vec<f64>> = Vec::new();
+        for mut column in drive_answers(clock, &sign, known.estimate.len()) {
+            directions.iter().for_each(|d| take_out(d, &mut column));
+            let length = column.iter().map(|x| x * x).sum::<f64>().sqrt();
+            // A joint that stands still has no reversals.
+            if length > 0.0 {
+                column.iter_mut().for_each(|x| *x /= length);
+                directions.push(column);
+            }
+        }
+        for direction in &directions {
+            panel.x.chunks_exact_mut(n).for_each(|x| take_out(direction, x));
+            // What repeats is taken out, what differs between the periods is noise.
+            let periods = panel.y.len() / n;
+            let along = |y: &[f64]| direction.iter().zip(y).map(|(d, y)| d * y).sum::<f64>();
+            let mean = panel.y.chunks_exact(n).map(along).sum::<f64>() / periods as f64;
+            for period in panel.y.chunks_exact_mut(n) {
+                period.iter_mut().zip(direction).for_each(|(y, d)| *y -= mean * d);
+            }
+        }
+    }
+}
+
+/// Removes from `y` what it has along the unit vector `direction`.
+fn take_out(direction: &[f64], y: &mut [f64]) {
+    let along: f64 = direction.iter().zip(&*y).map(|(d, y)| d * y).sum();
+    y.iter_mut().zip(direction).for_each(|(y, d)| *y -= along * d);
+}

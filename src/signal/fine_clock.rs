@@ -1,0 +1,142 @@
+//! What happens between the samples of a motion that repeats.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use realfft::num_complex::Complex64;
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+
+/// A clock that ticks several times per sample of one period, and plans for the way there and back.
+pub struct FineClock {
+    samples: usize,
+    ticks: usize,
+    forward: Arc<dyn RealToComplex<f64>>,
+    inverse: Arc<dyn ComplexToReal<f64>>,
+    fine_inverse: Arc<dyn ComplexToReal<f64>>,
+}
+
+impl FineClock {
+    /// For periods of `samples` samples, and `ticks` in each of them.
+    pub fn new(samples: usize, ticks: usize) -> Self {
+        let mut planner = RealFftPlanner::new();
+        Self {
+            samples,
+            ticks,
+            forward: planner.plan_fft_forward(samples),
+            inverse: planner.plan_fft_inverse(samples),
+            fine_inverse: planner.plan_fft_inverse(ticks * samples),
+        }
+    }
+
+    /// Samples of a period.
+    pub fn samples(&self) -> usize {
+        self.samples
+    }
+
+    /// Ticks per sample.
+    pub fn ticks(&self) -> usize {
+        self.ticks
+    }
+
+    /// One period of `y` at every tick, by its Fourier series.
+    pub fn refined(&self, y: &[f64]) -> Vec<f64> {
+        let mut spectrum = self.spectrum(y);
+        if self.samples.is_multiple_of(2) {
+            // The Nyquist harmonic is two of the longer series, which share it.
+            spectrum[self.samples / 2] *= 0.5;
+        }
+        spectrum.resize(self.ticks * self.samples / 2 + 1, Complex64::ZERO);
+        synthesised(&*self.fine_inverse, &mut spectrum)
+    }
+
+    /// What the samples of a log tell of a torque `fine_nm`, given at every tick, that no controller answers at
+    /// once: it accelerates the links, q̇ holds −∫τ dt/M, and the log has that at its samples only.
+    /// Differentiated as the series of those samples up to harmonic `highest`, it comes back as
+    ///
+    /// τ̃_h = iω_h/(e^{iω_h T} − 1) · DFT_h[∫ τ dt from one sample to the next], T the time between samples,
+    ///
+    /// and τ̃ is what a recorded torque minus M q̈ shows. τ at the samples themselves is another signal: what is
+    /// over within a sample or two (a bristle behind a reversal) is missed by it or counted for too much.
+    pub fn as_logged(&self, fine_nm: &[f64], highest: usize) -> Vec<f64> {
+        let next = fine_nm[self.ticks..].iter().step_by(self.ticks).chain(&fine_nm[..1]);
+        // By the trapezoidal rule.
+        let mean: Vec<f64> = fine_nm
+            .chunks_exact(self.ticks)
+            .zip(next)
+            .map(|(cell, end)| {
+                (cell.iter().sum::<f64>() + 0.5 * (end - cell[0])) / self.ticks as f64
+            })
+            .collect();
+        let mut spectrum = self.spectrum(&mean);
+        for (h, value) in spectrum.iter_mut().enumerate().skip(1) {
+            let half = PI * h as f64 / self.samples as f64;
+            let factor = if h > highest { 0.0 } else { half / half.sin() };
+            *value *= Complex64::from_polar(factor, -half);
+        }
+        synthesised(&*self.inverse, &mut spectrum)
+    }
+
+    /// Fourier coefficients of one period.
+    fn spectrum(&self, y: &[f64]) -> Vec<Complex64> {
+        let mut out = self.forward.make_output_vec();
+        self.forward.process(&mut y.to_vec(), &mut out).expect("y has one value per sample");
+        let scale = 1.0 / self.samples as f64;
+        out.iter_mut().for_each(|c| *c *= scale);
+        out
+    }
+}
+
+/// The series with these coefficients.
+fn synthesised(inverse: &dyn ComplexToReal<f64>, spectrum: &mut [Complex64]) -> Vec<f64> {
+    let last = spectrum.len() - 1;
+    spectrum[0].im = 0.0;
+    spectrum[last].im = 0.0;
+    let mut out = inverse.make_output_vec();
+    inverse.process(spectrum, &mut out).expect("the plan's own lengths, and the ends are real");
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const N: usize = 50;
+    const TICKS: usize = 16;
+
+    fn wave(samples: usize, harmonic: f64) -> Vec<f64> {
+        let phase = |k: usize| std::f64::consts::TAU * harmonic * k as f64 / samples as f64 + 0.3;
+        (0..samples).map(|k| phase(k).sin()).collect()
+    }
+
+    fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+        assert_eq!(a.len(), b.len());
+        a.iter().zip(b).fold(0.0, |d, (a, b)| d.max((a - b).abs()))
+    }
+
+    #[test]
+    fn a_wave_is_itself_between_its_samples() {
+        let fine = FineClock::new(N, TICKS).refined(&wave(N, 7.0));
+        assert!(largest_difference(&fine, &wave(TICKS * N, 7.0)) < 1e-13);
+    }
+
+    /// Integrated over its samples and differentiated, a slow wave is itself, but for the trapezoidal rule:
+    /// (ω Δt)²/12 with Δt a tick.
+    #[test]
+    fn what_is_slow_is_logged_as_it_is() {
+        let clock = FineClock::new(N, TICKS);
+        let logged = clock.as_logged(&wave(TICKS * N, 3.0), 20);
+        let tick = std::f64::consts::TAU * 3.0 / (TICKS * N) as f64;
+        assert!(largest_difference(&logged, &wave(N, 3.0)) < tick * tick / 12.0 + 1e-13);
+        assert!(largest_difference(&clock.as_logged(&wave(800, 21.0), 20), &[0.0; N]) < 1e-13);
+    }
+
+    /// A pulse between two samples, which no sample shows, is logged with all of its area.
+    #[test]
+    fn a_pulse_between_samples_is_logged() {
+        let clock = FineClock::new(N, TICKS);
+        let mut pulse = vec![0.0; TICKS * N];
+        pulse[TICKS * 10 + 8] = 1.0;
+        let area: f64 = clock.as_logged(&pulse, 20).iter().sum();
+        assert!((area - 1.0 / TICKS as f64).abs() < 1e-13, "{area}");
+    }
+}
