@@ -148,8 +148,8 @@ impl Search<'_> {
             .map(|c| {
                 let site = self.changes[c].site;
                 let span = Span::outside(&others, &self.changes[c].images);
-                let n = study.statistic.sample_count(site, rest.mean.len());
-                let price = span.len() as f64 * n.ln() + 2.0 * tests.ln();
+                let each = study.statistic.coefficient_price(site, rest.mean.len());
+                let price = span.len() as f64 * each + 2.0 * tests.ln();
                 Scored {
                     change: c,
                     evidence: study.statistic.gain(&span, &rest) - price,

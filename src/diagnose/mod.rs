@@ -26,6 +26,7 @@ mod data_faults;
 mod diagnoser;
 mod error;
 mod extension;
+mod friction_drift;
 mod gain;
 mod held_out;
 mod image;

@@ -24,6 +24,9 @@ pub enum Statistic {
     },
 }
 
+/// λ of an effect of the usual strength, √λ about 30. Schwarz's ln n takes n for it, an effect as large in every
+/// sample as the noise, and misses a third of those with √λ of 6 to 8.
+const USUAL_LAMBDA: f64 = 1000.0;
 /// Stretches of time of the cross-validation.
 const FOLDS: usize = 10;
 /// Share of an effect's square on a joint below which the joint says nothing of it.
@@ -86,12 +89,17 @@ impl Statistic {
         }
     }
 
-    /// Samples that count in the penalty for a coefficient.
-    pub fn sample_count(&self, site: Option<usize>, all_rows: usize) -> f64 {
-        match (self, site) {
-            (Self::Blocks { rows, .. }, Some(_)) => *rows as f64,
-            _ => all_rows as f64,
-        }
+    /// What a free coefficient costs in 2 ln of the evidence, `all_rows` of all joints given.
+    ///
+    /// Periods: ln(1 + λ₀) of a Gaussian prior in which the coefficient's own λ is [`USUAL_LAMBDA`] in the mean
+    /// (Zellner 1986). Blocks: ln n (Schwarz 1978), n the rows that see the site.
+    pub fn coefficient_price(&self, site: Option<usize>, all_rows: usize) -> f64 {
+        let rows = match (self, site) {
+            (Self::Periods(_), _) => return USUAL_LAMBDA.ln_1p(),
+            (Self::Blocks { rows, .. }, Some(_)) => *rows,
+            (Self::Blocks { .. }, None) => all_rows,
+        };
+        (rows as f64).ln()
     }
 
     /// Probability of at least this much by chance alone, one test.

@@ -382,11 +382,11 @@ impl<'a> Study<'a> {
         self.families.iter().map(|f| f.sites(self.scene.joints()).len()).sum()
     }
 
-    /// What `entry` has to explain before there is evidence for it: k ln n for its coefficients (Schwarz
-    /// 1978), and the price of having looked at so many shapes and families, and of being rare.
+    /// What `entry` has to explain before there is evidence for it: its coefficients, the price of having looked
+    /// at so many shapes and families, and of being rare.
     pub fn price(&self, entry: &Entry) -> f64 {
-        let n = self.statistic.sample_count(entry.site, self.residual.mean.len());
-        entry.images.len() as f64 * n.ln()
+        let rows = self.residual.mean.len();
+        entry.images.len() as f64 * self.statistic.coefficient_price(entry.site, rows)
             + 2.0 * self.alternatives(entry).ln()
             + 2.0 * (self.hypotheses() as f64).ln()
             - 2.0 * self.families[entry.family].prior_odds(entry.site).ln()

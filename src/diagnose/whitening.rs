@@ -7,6 +7,7 @@ use nalgebra::{Complex, DMatrix};
 use realfft::{RealFftPlanner, RealToComplex};
 
 use super::error::DiagnoseError;
+use super::friction_drift::FrictionDrift;
 use super::image::{Column, Image};
 use super::noise_power::NoiseKnowledge;
 use super::scene::Scene;
@@ -27,7 +28,8 @@ pub enum Whitening {
 ///
 /// S is the scatter between periods, divided by the trend of every joint's power over frequency so that
 /// steep noise does not bend it, averaged over neighbouring harmonics, and scaled by M/(M − N) (M complex
-/// degrees of freedom, N joints) so that ⟨Yᴴ S⁻¹ Y⟩ is that of the true covariance. Torques have been
+/// degrees of freedom, N joints) so that ⟨Yᴴ S⁻¹ Y⟩ is that of the true covariance. Friction that drifts
+/// ([`FrictionDrift`]) is no noise and left out of it. Torques have been
 /// moved to a common motion before, so that S is the noise of torque and acceleration together. To it comes
 /// what sampling does to the acceleration where friction reverses: the velocity has a kink there, whose
 /// spectrum falls as 1/f², and holds at f the share (f/(f_s − f))² of it that belongs to f_s − f. That
@@ -91,12 +93,13 @@ impl PeriodWhitening {
             (0..joints).map(|j| whitening.spectrum(scene.sign.joint(j))).collect();
         // Running sums over harmonics of Σ_p D Dᴴ/(P − 1), D the deviation from the mean period.
         let mut scatter = vec![DMatrix::<Complex<f64>>::zeros(joints, joints); harmonics];
-        let spectra: Vec<Vec<Complex<f64>>> = problem
-            .panels
-            .iter()
-            .flat_map(|panel| panel.y.chunks_exact(n))
-            .map(|period| whitening.spectrum(period))
-            .collect();
+        let drift = FrictionDrift::beside_mean(&scene.motion.qd_rad_s, periods);
+        let mut spectra: Vec<Vec<Complex<f64>>> = Vec::new();
+        for (j, panel) in problem.panels.iter().enumerate() {
+            let mut y = panel.y.clone();
+            drift.remove(j, &mut y, |_| true);
+            spectra.extend(y.chunks_exact(n).map(|period| whitening.spectrum(period)));
+        }
         let mut power = vec![0.0; joints];
         for (j, panel) in problem.panels.iter().enumerate() {
             power[j] = panel.y.iter().map(|y| y * y).sum::<f64>() / panel.y.len() as f64;

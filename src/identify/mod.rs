@@ -36,3 +36,4 @@ pub use prepare::{Measurement, Prepared, Preparer, Processing};
 pub use problem::{Assembler, Domain, Panel, Problem};
 pub use quality::{Condition, identifies_the_arm, not_identified, plausible_size};
 pub use triangle::Triangle;
+pub use whiten::Spectrum;

@@ -1,12 +1,14 @@
 //! How much of a hidden effect a log can show.
 
+use nalgebra::DMatrix;
 use serde::Serialize;
 
+use super::motion_noise::MotionNoise;
 use super::scenario::Scenario;
 use super::simulation::Simulation;
 use crate::dynamics::{Model, Motion};
 use crate::excitation::{Excitation, Reference};
-use crate::identify::{Assembler, ColumnPlan, Problem, Triangle};
+use crate::identify::{Assembler, ColumnPlan, Problem, Spectrum, Triangle};
 use crate::plant::faults::{Effect, FaultyPlant};
 use crate::plant::{PlantError, Recording, Whitening, repeated};
 use crate::robot::JointSignals;
@@ -14,8 +16,9 @@ use crate::robot::JointSignals;
 /// Size of what is hidden in a scenario, in units of the noise of one log.
 ///
 /// With d the noise-free torque minus that of the null model's truth along the same log (its angles,
-/// velocities and accelerations, all samples of the whole periods), W the whitening of the torque
-/// noise, and Q an orthonormal basis of the whitened regressor W X of the null model:
+/// velocities and accelerations, all samples of the whole periods), W the whitening of the noise of the equations
+/// (that of the torque readings, and that of the encoders times the inertia: above some 10 Hz it is the larger
+/// one), and Q an orthonormal basis of the whitened regressor W X of the null model:
 ///
 /// ```text
 /// λ     = ‖(1 − Q Qᵀ) W d‖²    what no parameters of the null model can explain
@@ -23,8 +26,8 @@ use crate::robot::JointSignals;
 /// ```
 ///
 /// λ is the noncentrality of the best test that could be made of the residuals, λ_sim that of the best
-/// test against a given simulation. Noise of the encoders is not counted, and neither are readings that
-/// go wrong one by one (outliers, lost rows, coarse steps). Accelerations are derivatives of the
+/// test against a given simulation. Readings that go wrong one by one (outliers, lost rows, coarse steps) are not
+/// counted. Accelerations are derivatives of the
 /// encoders' angles at the instants at which rows are read: a clock that stalls has no size of this kind.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct EffectSize {
@@ -34,7 +37,7 @@ pub struct EffectSize {
     pub lambda_sim: f64,
 }
 
-/// Samples whitened and eliminated together.
+/// Rows eliminated together.
 const BLOCK: usize = 128;
 /// Time after the run-in in which an arm forgets how it started, s: the slowest to forget is a soft gear
 /// (8000 Nm/rad, 5 % damping: it swings on with exp(−3.5 t)).
@@ -125,7 +128,12 @@ impl Simulation {
         for (j, panel) in problem.panels.iter_mut().enumerate() {
             panel.y.copy_from_slice(difference.joint(j));
         }
-        Ok(size(problem, &whitening))
+        let motion_noise = MotionNoise::new(&scenario.sensors, &model, &motion.q_rad, &whitening)?;
+        let whitening_at = |frequency_hz| {
+            let torque_power = scenario.sensors.torque_noise.power(frequency_hz, rate_hz);
+            motion_noise.whitening(frequency_hz, torque_power)
+        };
+        Ok(size(problem, &whitening, &whitening_at))
     }
 }
 
@@ -149,32 +157,44 @@ impl Reference for Begin<'_> {
     }
 }
 
-/// λ and λ_sim of d, which stands in place of the torque in `problem`.
-fn size(mut problem: Problem, whitening: &Whitening) -> EffectSize {
-    let (n, b) = (problem.samples, problem.parameters());
+/// λ and λ_sim of d, which stands in place of the torque in `problem`; `beside_torque` whitens at every frequency
+/// what `torque` has made white but for the noise of the motion.
+fn size(
+    mut problem: Problem,
+    torque: &Whitening,
+    beside_torque: &dyn Fn(f64) -> DMatrix<f64>,
+) -> EffectSize {
+    let (n, b, joints) = (problem.samples, problem.parameters(), problem.joints());
     for panel in &mut problem.panels {
-        panel.x.chunks_exact_mut(n).for_each(|column| whitening.in_time(column));
-        whitening.in_time(&mut panel.y);
+        panel.x.chunks_exact_mut(n).for_each(|column| torque.in_time(column));
+        torque.in_time(&mut panel.y);
     }
+    let mut rows = Problem::new(problem.plan.clone(), problem.rate_hz);
+    Spectrum::default().transform(&problem, n, &mut rows);
+    let across = DMatrix::from_fn(joints, joints, |i, k| torque.across(i)[k]);
+    let fundamental_hz = problem.rate_hz / n as f64;
+    let weights: Vec<DMatrix<f64>> = (0..=rows.samples / 2)
+        .map(|harmonic| beside_torque(harmonic as f64 * fundamental_hz) * &across)
+        .collect();
+    let n = rows.samples;
     let mut triangle = Triangle::new(b, 1);
     let mut block = Vec::new();
     for start in (0..n).step_by(BLOCK) {
-        let rows = BLOCK.min(n - start);
-        for joint in 0..problem.joints() {
+        let end = n.min(start + BLOCK);
+        for joint in 0..joints {
             block.clear();
-            block.resize((b + 1) * rows, 0.0);
-            for (source, &weight) in whitening.across(joint).iter().enumerate() {
-                let panel = &problem.panels[source];
-                let columns = problem.plan.base_indices(source).chain([b]);
+            block.resize((b + 1) * (end - start), 0.0);
+            for (source, panel) in rows.panels.iter().enumerate() {
+                let columns = rows.plan.base_indices(source).chain([b]);
                 let series = panel.x.chunks_exact(n).chain([panel.y.as_slice()]);
                 for (column, series) in columns.zip(series) {
-                    let target = &mut block[column * rows..][..rows];
-                    for (t, s) in target.iter_mut().zip(&series[start..start + rows]) {
-                        *t += weight * s;
+                    let target = &mut block[column * (end - start)..];
+                    for (t, row) in target.iter_mut().zip(start..end) {
+                        *t += weights[row.div_ceil(2)][(joint, source)] * series[row];
                     }
                 }
             }
-            triangle.append(&mut block, rows);
+            triangle.append(&mut block, end - start);
         }
     }
     let lambda_sim = triangle.rhs(0).iter().map(|z| z * z).sum();

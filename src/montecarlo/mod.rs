@@ -12,6 +12,7 @@ mod efficiency;
 mod experiment;
 mod extended;
 mod job;
+mod motion_noise;
 mod scenario;
 pub mod shard;
 mod simulation;

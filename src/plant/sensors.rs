@@ -96,6 +96,16 @@ impl SensorConfig {
     pub fn torque_sd_per_joint_nm(&self, joints: usize) -> Result<Vec<f64>, PlantError> {
         self.torque_sd_nm.resolve("torque_sd_nm", joints)
     }
+
+    /// Standard deviation of the position reading of each of `joints`, rad.
+    pub fn q_sd_per_joint_rad(&self, joints: usize) -> Result<Vec<f64>, PlantError> {
+        self.q_sd_rad.resolve("q_sd_rad", joints)
+    }
+
+    /// Standard deviation of the velocity reading of each of `joints`, rad/s.
+    pub fn qd_sd_per_joint_rad_s(&self, joints: usize) -> Result<Vec<f64>, PlantError> {
+        self.qd_sd_rad_s.resolve("qd_sd_rad_s", joints)
+    }
 }
 
 /// The sensors of one arm.
@@ -157,8 +167,8 @@ impl Sensors {
             })
             .collect();
         Ok(Self {
-            q_sd_rad: config.q_sd_rad.resolve("q_sd_rad", n)?,
-            qd_sd_rad_s: config.qd_sd_rad_s.resolve("qd_sd_rad_s", n)?,
+            q_sd_rad: config.q_sd_per_joint_rad(n)?,
+            qd_sd_rad_s: config.qd_sd_per_joint_rad_s(n)?,
             torque_sd_nm: config.torque_sd_per_joint_nm(n)?,
             torque_noise: config.torque_noise.clone(),
             q_step_rad: config.q_step_rad,

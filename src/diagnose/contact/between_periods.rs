@@ -10,7 +10,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
 use super::Touch;
 use super::bump::{self, Noise, ORDINARY, Push};
-use super::drift::Drift;
+use crate::diagnose::friction_drift::FrictionDrift;
 use crate::diagnose::verdict::{Cause, Estimate};
 use crate::identify::Measurement;
 use crate::median::median;
@@ -89,7 +89,7 @@ pub fn between_periods(
     let mut aside = vec![false; time_s.len()];
     if repeats.search(&aside, &known, &touches)?.is_some() {
         let qd_rad_s = grid.smooth(m.qd_rad_s)?.slice(repeats.window.clone());
-        repeats.drift = Some(Drift::new(qd_rad_s, period));
+        repeats.drift = Some(FrictionDrift::beside_others(qd_rad_s, period));
     }
     while touches.len() < MOST
         && let Some(candidate) = repeats.search(&aside, &known, &touches)?
@@ -139,7 +139,7 @@ struct Repeats {
     period: f64,
     rate_hz: f64,
     /// What drifting friction does; not asked for where nothing deviates anyway.
-    drift: Option<Drift>,
+    drift: Option<FrictionDrift>,
 }
 
 /// Where a bump may be.

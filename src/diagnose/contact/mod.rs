@@ -8,7 +8,6 @@
 mod beside_model;
 mod between_periods;
 mod bump;
-mod drift;
 
 use std::ops::Range;
 

@@ -16,4 +16,4 @@ pub(super) use cross_joint::{decorrelate, decorrelation, mix};
 pub(super) use decimate::decimate;
 pub(super) use instruments::{instrument, smoothed};
 pub(super) use replicates::ReplicateWhitening;
-pub(super) use spectrum::Spectrum;
+pub use spectrum::Spectrum;

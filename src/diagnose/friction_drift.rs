@@ -1,9 +1,10 @@
-//! Friction that changes slowly, as it shows between repetitions: no contact, however large it is.
+//! Friction that changes slowly, as it shows between repetitions: neither noise nor contact, however large it is.
 //!
-//! Where friction φ of a joint is f times as large at the time t, a sample differs by φ (f(t) − f(t_m)) from the
-//! median over the other periods, t_m the median of their times at the same phase (f changes in one direction).
-//! φ is made of sign q̇ and q̇, f of a straight line and of what has faded after a quarter of the record; the
-//! shares of the four are least squares. They fit a push, which comes once and has one direction, hardly at all.
+//! Where friction φ of a joint is f times as large at the time t, a sample differs by φ (f(t) − f̄) from what the
+//! repetitions have in common at its phase: their mean, or the median over the other periods. φ is made of sign q̇
+//! and q̇, f of a straight line and of what has faded after a quarter of the record; the shares of the four are least
+//! squares. They fit a push, which comes once and has one direction, hardly at all, and take four of the thousands
+//! of degrees of freedom of noise.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -17,35 +18,47 @@ const FADES: f64 = 0.25;
 const COLUMNS: usize = 4;
 
 /// What drifting friction may do to the deviations of every joint.
-pub(super) struct Drift {
+pub struct FrictionDrift {
     qd_rad_s: JointSignals,
-    /// f(t) − f(t_m) of both courses, per sample.
+    /// f(t) − f̄ of both courses, per sample.
     courses: [Vec<f64>; 2],
 }
 
-impl Drift {
-    /// For joints with the velocities `qd_rad_s`, whose motion repeats every `period` samples.
-    pub(super) fn new(qd_rad_s: JointSignals, period: f64) -> Self {
+impl FrictionDrift {
+    /// Deviations from the median over the other periods, for joints with the velocities `qd_rad_s`, whose motion
+    /// repeats every `period` samples.
+    pub fn beside_others(qd_rad_s: JointSignals, period: f64) -> Self {
+        let others = ((qd_rad_s.samples() as f64 / period).ceil() as usize).saturating_sub(1);
+        Self::new(qd_rad_s, |f, k| {
+            let own = (k as f64 / period) as usize;
+            let phase = k as f64 - own as f64 * period;
+            // The place-th of the other periods; f changes in one direction.
+            let at = |place: usize| phase + (place + usize::from(place >= own)) as f64 * period;
+            let [low, high] = [others.saturating_sub(1) / 2, others / 2].map(|m| f(at(m)));
+            0.5 * (low + high)
+        })
+    }
+
+    /// Deviations from the mean over all `periods`, each with the velocities `qd_rad_s`.
+    pub fn beside_mean(qd_rad_s: &JointSignals, periods: usize) -> Self {
         let n = qd_rad_s.samples();
-        let others = ((n as f64 / period).ceil() as usize).saturating_sub(1);
+        let all = qd_rad_s.map_joints(|_, qd| qd.repeat(periods));
+        Self::new(all, |f, k| {
+            (0..periods).map(|p| f((k % n + p * n) as f64)).sum::<f64>() / periods as f64
+        })
+    }
+
+    /// `common` of a course and a sample is what the repetitions have in common there.
+    fn new(qd_rad_s: JointSignals, common: impl Fn(&dyn Fn(f64) -> f64, usize) -> f64) -> Self {
+        let n = qd_rad_s.samples();
         let fade = |t: f64| (-t / (FADES * n as f64)).exp();
         let line = |t: f64| t / n as f64;
-        let course = |f: &dyn Fn(f64) -> f64| -> Vec<f64> {
-            let of = |k: usize| {
-                let own = (k as f64 / period) as usize;
-                let phase = k as f64 - own as f64 * period;
-                // The place-th of the other periods.
-                let at = |place: usize| phase + (place + usize::from(place >= own)) as f64 * period;
-                let [low, high] = [others.saturating_sub(1) / 2, others / 2].map(|m| f(at(m)));
-                f(k as f64) - 0.5 * (low + high)
-            };
-            (0..n).map(of).collect()
-        };
-        Self { qd_rad_s, courses: [course(&fade), course(&line)] }
+        let course = |f: &dyn Fn(f64) -> f64| (0..n).map(|k| f(k as f64) - common(f, k)).collect();
+        Self { courses: [course(&fade), course(&line)], qd_rad_s }
     }
 
     /// Takes the best fit to the samples that are `used` out of the deviations `y` of joint `j`.
-    pub(super) fn remove(&self, j: usize, y: &mut [f64], used: impl Fn(usize) -> bool) {
+    pub fn remove(&self, j: usize, y: &mut [f64], used: impl Fn(usize) -> bool) {
         let qd = self.qd_rad_s.joint(j);
         let row = |k: usize| {
             let friction = [(qd[k] / STANDSTILL_RAD_S).tanh(), qd[k]];
@@ -89,7 +102,12 @@ mod tests {
         let mut y: Vec<f64> = (0..n).map(deviation).collect();
         let largest = |y: &[f64]| y.iter().fold(0.0f64, |a, y| a.max(y.abs()));
         assert!(largest(&y) > 0.9);
-        Drift::new(qd.clone(), period as f64).remove(0, &mut y, |_| true);
+        FrictionDrift::beside_others(qd.clone(), period as f64).remove(0, &mut y, |_| true);
         assert!(largest(&y) < 1e-9, "{}", largest(&y));
+        let period_qd = qd.slice(0..period);
+        let mut y: Vec<f64> = (0..n).map(torque).collect();
+        FrictionDrift::beside_mean(&period_qd, n / period).remove(0, &mut y, |_| true);
+        let repeats = |k: usize| (y[k] - y[k % period]).abs();
+        assert!((0..n).map(repeats).fold(0.0, f64::max) < 1e-9);
     }
 }
