@@ -19,25 +19,30 @@ const COLOURED: &str = "[sensors.torque_noise]\ncross_joint_correlation = 0.3\n\
     components = [{ share = 0.6, colour = 'white' }, \
     { share = 0.4, colour = { ar1 = { time_constant_s = 0.1 } } }]";
 
-/// Nothing hidden: what is left is how well the equations of motion hold along a log, 1e-4 Nm and
-/// less: 7500 rows · (1e-4 / 0.15)² is 3e-3.
+/// Noise of encoders, times the inertia, is noise at high frequencies: a joint that is read late, which shows where
+/// friction reverses, is harder to see beside it; friction that depends on the angle is seen as before.
 #[test]
-fn without_effects_there_is_nothing_to_see() {
-    for noise in ["", COLOURED] {
-        let size = size_of("", noise);
-        println!("{size:?}");
-        assert!(size.lambda < 0.02 && size.lambda_sim < 0.02, "{size:?}");
-    }
+fn noise_of_encoders_hides_what_is_fast() {
+    let encoders = "q_sd_rad = 2e-5\nqd_sd_rad_s = 1e-3\n";
+    let share = |effect: &str| size_of(effect, encoders).lambda / size_of(effect, "").lambda;
+    let fast = share(
+        "[[effect]]\nkind='ripple'\njoint=2\namplitude_nm=0.5\norder_per_turn=202\nphase_rad=0",
+    );
+    let slow =
+        share("[[effect]]\nkind='position_friction'\njoint=2\namplitude_nm=0.5\nphase_rad=0.3");
+    println!("{fast} {slow}");
+    assert!(fast < 0.6 && slow > 0.8 && slow < 1.0, "{fast} {slow}");
 }
 
-/// A change of two parameters of the null model: all of it moves parameters.
+/// A change of two parameters of the null model: all of it moves parameters, but for what it does to reversals, which
+/// fall between other rows.
 #[test]
 fn what_the_null_model_absorbs_has_only_a_size_against_a_simulation() {
     let payload = "[[effect]]\nkind='payload'\nmass_kg=0.5\ncom_x_m=0\ncom_y_m=0\ncom_z_m=0.05";
     for noise in ["", COLOURED] {
         let size = size_of(payload, noise);
         println!("{size:?}");
-        assert!(size.lambda_sim > 1e3 && size.lambda < 0.02, "{size:?}");
+        assert!(size.lambda_sim > 1e3 && size.lambda < 1e-4 * size.lambda_sim, "{size:?}");
     }
 }
 
@@ -67,7 +72,7 @@ fn a_log_that_repeats_need_not_be_integrated() {
     );
     let scenario = || Scenario::from_toml(&text, "test", Path::new("")).unwrap();
     let whole = Simulation::run(scenario()).unwrap();
-    let (copied, size) = Simulation::run_sized(scenario()).unwrap();
+    let copied = Simulation::run_once(scenario()).unwrap();
     assert_eq!(whole.recording.time_s.len(), copied.recording.time_s.len());
     let sd = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15];
     // The last half second of the whole run lacks what a late channel would still read.
@@ -80,6 +85,6 @@ fn a_log_that_repeats_need_not_be_integrated() {
         // Ten thousand samples off by a hundredth of the noise are a λ of 1.
         assert!(worst < 0.01 * sd, "joint {}: {worst} Nm", j + 1);
     }
-    let lambda = whole.effect_size().unwrap().lambda;
-    assert!((size.lambda / lambda - 1.0).abs() < 0.01, "{} {lambda}", size.lambda);
+    let [of_whole, of_copied] = [&whole, &copied].map(|s| s.effect_size().unwrap().lambda);
+    assert!((of_copied / of_whole - 1.0).abs() < 0.01, "{of_copied} {of_whole}");
 }

@@ -1,9 +1,8 @@
 //! What every candidate sees of a log: the motion, and what the current estimate makes of it.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
 
 use realfft::num_complex::Complex64;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
 use crate::base::BaseSet;
 use crate::dynamics::{
@@ -50,7 +49,6 @@ pub struct Scene {
     pub angle_doubt_rad: Vec<f64>,
     /// ± the largest torque that is read, where readings are cut off there, Nm.
     pub torque_limit_nm: Vec<Option<f64>>,
-    derivative: Derivative,
     /// See [`Self::fine_link_nm`].
     fine_link_nm: Vec<OnceLock<Vec<f64>>>,
     /// See [`Self::instants`].
@@ -74,12 +72,6 @@ pub struct Instants {
     pub sign: Vec<f64>,
 }
 
-/// How signals along this motion are differentiated and shifted in time.
-enum Derivative {
-    Fourier { forward: Arc<dyn RealToComplex<f64>>, inverse: Arc<dyn ComplexToReal<f64>> },
-    Differences,
-}
-
 impl Scene {
     /// Along `prepared`, for the arm whose base parameters are `theta`.
     pub fn new(nominal: &Arm, set: &BaseSet, theta: &[f64], prepared: &Prepared) -> Self {
@@ -97,8 +89,9 @@ impl Scene {
         let own_inertia_kg_m2 = own_inertia_along(&model, &motion, &recorded_nm);
         let mut link_nm = recorded_nm.clone();
         let mut rotor_nm = motion.qdd_rad_s2.map_joints(|j, _| rotor(j, &motion));
-        if let Some(each) = &prepared.each_period {
-            let harmonics = TrustedHarmonics::new(n);
+        let clock = periodic.then(|| FineClock::new(n, FINE));
+        if let (Some(each), Some(clock)) = (&prepared.each_period, &clock) {
+            let harmonics = TrustedHarmonics { clock };
             let links = rigid_torque_along(&model, each);
             for j in 0..joints {
                 harmonics.keep(link_nm.joint_mut(j), links.joint(j));
@@ -116,13 +109,6 @@ impl Scene {
                 + drive(j).coulomb_nm * sign.joint(j)[k]
                 + offset_nm[j]
         });
-        let derivative = if periodic {
-            let mut planner = RealFftPlanner::new();
-            let (forward, inverse) = (planner.plan_fft_forward(n), planner.plan_fft_inverse(n));
-            Derivative::Fourier { forward, inverse }
-        } else {
-            Derivative::Differences
-        };
         // Rounded to a quantum Δ, the true angle lies within ±Δ/2.
         let doubt = |quantum: &f64| if periodic { 0.0 } else { 0.5 * quantum };
         let angle_doubt_rad = prepared.angle_quantum_rad.iter().map(doubt).collect();
@@ -143,10 +129,9 @@ impl Scene {
             torque_nm,
             sign,
             torque_limit_nm: prepared.torque_limit_nm.clone(),
-            derivative,
             fine_link_nm: vec![OnceLock::new(); joints],
             instants: (0..joints).map(|_| OnceLock::new()).collect(),
-            clock: periodic.then(|| FineClock::new(n, FINE)),
+            clock,
         }
     }
 
@@ -167,22 +152,13 @@ impl Scene {
 
     /// Time derivative of a signal of n samples.
     pub fn derivative(&self, y: &[f64]) -> Vec<f64> {
-        match &self.derivative {
-            Derivative::Fourier { forward, inverse } => {
-                let omega = std::f64::consts::TAU * self.rate_hz / y.len() as f64;
-                transform(forward.as_ref(), inverse.as_ref(), y, |h, n| {
-                    // The Nyquist harmonic of a real signal has no derivative on the grid.
-                    let keep = if 2 * h == n { 0.0 } else { 1.0 };
-                    Complex64::new(0.0, keep * h as f64 * omega)
-                })
-            }
-            Derivative::Differences => {
-                let mut out = vec![0.0; y.len()];
-                // Fewer than five samples never reach this point; a derivative of zero is harmless.
-                let _ = central_4(y, self.rate_hz, &mut out);
-                out
-            }
+        if let Some(clock) = &self.clock {
+            return clock.derivative(y, self.rate_hz);
         }
+        let mut out = vec![0.0; y.len()];
+        // Fewer than five samples never reach this point; a derivative of zero is harmless.
+        let _ = central_4(y, self.rate_hz, &mut out);
+        out
     }
 
     /// The link torque of joint `j` at `FINE` instants per sample, for what happens between samples.
@@ -276,50 +252,34 @@ impl Scene {
     /// The harmonics of a signal of n samples up to `highest_hz`, where the motion repeats; of a single run
     /// the signal itself.
     pub fn slow_part(&self, y: &[f64], highest_hz: f64) -> Vec<f64> {
-        let Derivative::Fourier { forward, inverse } = &self.derivative else { return y.to_vec() };
+        let Some(clock) = &self.clock else { return y.to_vec() };
         let last = (highest_hz * y.len() as f64 / self.rate_hz) as usize;
-        transform(forward.as_ref(), inverse.as_ref(), y, |h, _| {
-            if h <= last { Complex64::ONE } else { Complex64::ZERO }
-        })
+        clock.filtered(y, |h| if h <= last { Complex64::ONE } else { Complex64::ZERO })
     }
 
     /// y(t − delay) on the grid of y.
     pub fn delayed(&self, y: &[f64], delay_s: f64) -> Vec<f64> {
-        match &self.derivative {
-            Derivative::Fourier { forward, inverse } => {
-                let turn = -std::f64::consts::TAU * self.rate_hz * delay_s / y.len() as f64;
-                transform(forward.as_ref(), inverse.as_ref(), y, |h, n| {
-                    let shift = Complex64::from_polar(1.0, turn * h as f64);
-                    if 2 * h == n { Complex64::new(shift.re, 0.0) } else { shift }
-                })
-            }
-            Derivative::Differences => (0..y.len())
-                .map(|k| {
-                    let at = (k as f64 - delay_s * self.rate_hz).clamp(0.0, (y.len() - 1) as f64);
-                    let left = (at.floor() as usize).min(y.len() - 2);
-                    let u = at - left as f64;
-                    y[left] * (1.0 - u) + y[left + 1] * u
-                })
-                .collect(),
+        if self.clock.is_some() {
+            return self.filtered(y, |omega| Complex64::from_polar(1.0, -omega * delay_s));
         }
+        let value = |k: usize| {
+            let at = (k as f64 - delay_s * self.rate_hz).clamp(0.0, (y.len() - 1) as f64);
+            let left = (at.floor() as usize).min(y.len() - 2);
+            let u = at - left as f64;
+            y[left] * (1.0 - u) + y[left + 1] * u
+        };
+        (0..y.len()).map(value).collect()
     }
 
     /// y behind a filter with the response `response(ω)`, ω in rad/s; y itself times the response at rest
     /// where the motion does not repeat.
     pub fn filtered(&self, y: &[f64], response: impl Fn(f64) -> Complex64) -> Vec<f64> {
-        match &self.derivative {
-            Derivative::Fourier { forward, inverse } => {
-                let omega = std::f64::consts::TAU * self.rate_hz / y.len() as f64;
-                transform(forward.as_ref(), inverse.as_ref(), y, |h, n| {
-                    let value = response(h as f64 * omega);
-                    if 2 * h == n { Complex64::new(value.re, 0.0) } else { value }
-                })
-            }
-            Derivative::Differences => {
-                let at_rest = response(0.0).re;
-                y.iter().map(|v| at_rest * v).collect()
-            }
-        }
+        let Some(clock) = &self.clock else {
+            let at_rest = response(0.0).re;
+            return y.iter().map(|v| at_rest * v).collect();
+        };
+        let omega = std::f64::consts::TAU * self.rate_hz / y.len() as f64;
+        clock.filtered(y, |h| response(h as f64 * omega))
     }
 
     /// Change of the link torques, Nm, when `arm` moves as `motion` instead of what was recorded.
@@ -341,9 +301,8 @@ impl Scene {
 /// The acceleration's noise is in what the null model leaves and in what a family makes of the load; where
 /// the load is differentiated the two would be correlated for no physical reason. A band of harmonics of
 /// the mean load is kept if its power is a hundred times what the periods' scatter makes of it.
-struct TrustedHarmonics {
-    forward: Arc<dyn RealToComplex<f64>>,
-    inverse: Arc<dyn ComplexToReal<f64>>,
+struct TrustedHarmonics<'a> {
+    clock: &'a FineClock,
 }
 
 /// Power over noise of a band that is kept.
@@ -351,23 +310,11 @@ const TRUSTED: f64 = 100.0;
 /// Harmonics that are judged together.
 const BAND: usize = 8;
 
-impl TrustedHarmonics {
-    fn new(n: usize) -> Self {
-        let mut planner = RealFftPlanner::new();
-        Self { forward: planner.plan_fft_forward(n), inverse: planner.plan_fft_inverse(n) }
-    }
-
-    fn spectrum(&self, y: &[f64]) -> Vec<Complex64> {
-        let mut out = self.forward.make_output_vec();
-        // The length is the plan's own, so that the transform succeeds.
-        let _ = self.forward.process(&mut y.to_vec(), &mut out);
-        out
-    }
-
+impl TrustedHarmonics<'_> {
     /// `mean` loses the bands that the torque of all periods, one after the other, leaves uncertain.
     fn keep(&self, mean: &mut [f64], periods: &[f64]) {
         let spectra: Vec<Vec<Complex64>> =
-            periods.chunks_exact(mean.len()).map(|y| self.spectrum(y)).collect();
+            periods.chunks_exact(mean.len()).map(|y| self.clock.spectrum(y)).collect();
         let count = spectra.len() as f64;
         let kept: Vec<bool> = (0..spectra[0].len())
             .step_by(BAND)
@@ -381,35 +328,11 @@ impl TrustedHarmonics {
                 power > (1.0 + TRUSTED) * scatter / (count - 1.0)
             })
             .collect();
-        let out = transform(&*self.forward, &*self.inverse, mean, |h, _| {
-            if kept[h / BAND] { Complex64::ONE } else { Complex64::ZERO }
-        });
+        let out = self
+            .clock
+            .filtered(mean, |h| if kept[h / BAND] { Complex64::ONE } else { Complex64::ZERO });
         mean.copy_from_slice(&out);
     }
-}
-
-/// Multiplies the spectrum of `y` by `factor(harmonic, n)`.
-fn transform(
-    forward: &dyn RealToComplex<f64>,
-    inverse: &dyn ComplexToReal<f64>,
-    y: &[f64],
-    factor: impl Fn(usize, usize) -> Complex64,
-) -> Vec<f64> {
-    let n = y.len();
-    let mut time = y.to_vec();
-    let mut spectrum = forward.make_output_vec();
-    let mut out = inverse.make_output_vec();
-    // Lengths are the plans' own, so that both transforms succeed.
-    let _ = forward.process(&mut time, &mut spectrum);
-    for (h, value) in spectrum.iter_mut().enumerate() {
-        *value *= factor(h, n) / n as f64;
-    }
-    spectrum[0].im = 0.0;
-    if n.is_multiple_of(2) {
-        spectrum[n / 2].im = 0.0;
-    }
-    let _ = inverse.process(&mut spectrum, &mut out);
-    out
 }
 
 /// M_jj along `motion`, kg m²: what one rad/s² more takes, beside the torques `recorded_nm`.

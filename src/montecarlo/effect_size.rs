@@ -10,15 +10,16 @@ use crate::dynamics::{Model, Motion};
 use crate::excitation::{Excitation, Reference};
 use crate::identify::{Assembler, ColumnPlan, Problem, Spectrum, Triangle};
 use crate::plant::faults::{Effect, FaultyPlant};
-use crate::plant::{PlantError, Recording, Whitening, repeated};
-use crate::robot::JointSignals;
+use crate::plant::{PlantError, Recording, Whitening};
+use crate::signal::FineClock;
 
 /// Size of what is hidden in a scenario, in units of the noise of one log.
 ///
-/// With d the noise-free torque minus that of the null model's truth along the same log (its angles,
-/// velocities and accelerations, all samples of the whole periods), W the whitening of the noise of the equations
-/// (that of the torque readings, and that of the encoders times the inertia: above some 10 Hz it is the larger
-/// one), and Q an orthonormal basis of the whitened regressor W X of the null model:
+/// With d the noise-free torque minus that of the null model's truth along the same log (its angles, its velocities
+/// and their derivative, all samples of the whole periods), less the same of the arm without effects (what sampling
+/// does to friction that reverses), W the whitening of the noise of the equations (that of the torque readings, and
+/// that of the encoders times the inertia: above some 10 Hz it is the larger one), and Q an orthonormal basis of the
+/// whitened regressor W X of the null model:
 ///
 /// ```text
 /// λ     = ‖(1 − Q Qᵀ) W d‖²    what no parameters of the null model can explain
@@ -27,8 +28,7 @@ use crate::robot::JointSignals;
 ///
 /// λ is the noncentrality of the best test that could be made of the residuals, λ_sim that of the best
 /// test against a given simulation. Readings that go wrong one by one (outliers, lost rows, coarse steps) are not
-/// counted. Accelerations are derivatives of the
-/// encoders' angles at the instants at which rows are read: a clock that stalls has no size of this kind.
+/// counted, and a clock that stalls has no size of this kind.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct EffectSize {
     /// λ.
@@ -53,26 +53,15 @@ impl Simulation {
     /// [`PlantError::Setting`] where a joint's torque is read without noise: nothing is then too small
     /// to be seen.
     pub fn effect_size(&self) -> Result<EffectSize, PlantError> {
-        let (recording, qdd_rad_s2) =
-            self.plant.run_with_acceleration(&self.scenario.excitation)?;
-        self.size_along(&recording, &qdd_rad_s2)
+        let clean = Scenario { effects: Vec::new(), ..self.scenario.clone() };
+        self.size_beside(&Self::run_once(clean)?.recording)
     }
 
-    /// The plant of `scenario` run once, and the size of its effects along that run.
-    ///
-    /// # Errors
-    /// See [`Self::effect_size`].
-    pub fn run_sized(scenario: Scenario) -> Result<(Self, EffectSize), PlantError> {
-        let (simulation, qdd_rad_s2) = Self::run_once(scenario)?;
-        let size = simulation.size_along(&simulation.recording, &qdd_rad_s2)?;
-        Ok((simulation, size))
-    }
-
-    /// The plant of `scenario` run once, with the accelerations.
+    /// The plant of `scenario` run once.
     ///
     /// Where nothing in the arm drifts, little more than one period is integrated: what the log shows
     /// [`SETTLING_S`] after the run-in repeats from then on, and is copied.
-    pub(super) fn run_once(scenario: Scenario) -> Result<(Self, JointSignals), PlantError> {
+    pub fn run_once(scenario: Scenario) -> Result<Self, PlantError> {
         let plant = FaultyPlant::new(&scenario.arm, &scenario.effects, &scenario.plant)?;
         let excitation = &scenario.excitation;
         let rate_hz = scenario.plant.log_rate_hz;
@@ -80,7 +69,7 @@ impl Simulation {
         let period = samples_per_period.round() as usize;
         let is_whole = (samples_per_period - samples_per_period.round()).abs() < 1e-6;
         let repeats = scenario.effects.iter().all(Effect::repeats);
-        let (recording, qdd_rad_s2) = if excitation.periods() > 1 && is_whole && repeats {
+        let recording = if excitation.periods() > 1 && is_whole && repeats {
             let begin = Begin {
                 of: excitation,
                 duration_s: excitation.periodic_window_s()[0]
@@ -88,52 +77,62 @@ impl Simulation {
                     + SETTLING_S
                     + UNSETTLED_END_S,
             };
-            let (begun, qdd_rad_s2) = plant.run_with_acceleration(&begin)?;
+            let begun = plant.run(&begin, None)?;
             let samples = (excitation.duration_s() * rate_hz + 1e-6).floor() as usize + 1;
             let known = begun.time_s.len() - (UNSETTLED_END_S * rate_hz).ceil() as usize;
-            let qdd_rad_s2 = repeated(&qdd_rad_s2, known, period, samples);
-            (begun.repeated(known, period, samples), qdd_rad_s2)
+            begun.repeated(known, period, samples)
         } else {
-            plant.run_with_acceleration(excitation)?
+            plant.run(excitation, None)?
         };
-        Ok((Self::with_recording(scenario, plant, recording)?, qdd_rad_s2))
+        Self::with_recording(scenario, plant, recording)
     }
 
-    /// λ and λ_sim along a run with these accelerations.
-    fn size_along(
-        &self,
-        recording: &Recording,
-        qdd_rad_s2: &JointSignals,
-    ) -> Result<EffectSize, PlantError> {
+    /// λ and λ_sim of all effects, `clean` being the run of the arm without them along the same motion, or one that
+    /// goes on longer.
+    ///
+    /// # Errors
+    /// See [`Self::effect_size`].
+    pub fn size_beside(&self, clean: &Recording) -> Result<EffectSize, PlantError> {
         let scenario = &self.scenario;
         let rate_hz = scenario.plant.log_rate_hz;
         let sd = scenario.sensors.torque_sd_per_joint_nm(scenario.arm.dof())?;
         let whitening = Whitening::new(&scenario.sensors.torque_noise, &sd, rate_hz)?;
-        let [begin_s, end_s] = scenario.excitation.periodic_window_s();
-        let first = recording.time_s.partition_point(|t| *t < begin_s - 1e-9);
-        let behind = recording.time_s.partition_point(|t| *t < end_s - 1e-9);
-        let window = first..behind;
-        let motion = Motion {
-            q_rad: recording.q_rad.slice(window.clone()),
-            qd_rad_s: recording.qd_rad_s.slice(window.clone()),
-            qdd_rad_s2: qdd_rad_s2.slice(window.clone()),
-        };
         let model = Model::new(&scenario.arm);
-        let plan = ColumnPlan::new(&model, &scenario.set);
-        let mut problem = Problem::new(plan, rate_hz);
-        let torque = recording.torque_nm.slice(window);
-        Assembler::new(&model).assemble(&mut problem, &model, &motion, &torque);
+        let mut problem = self.equations(&model, &self.recording);
         let truth = scenario.set.values(&model.standard_parameters());
         let difference = problem.residuals(&truth);
+        let without = self.equations(&model, clean).residuals(&truth);
         for (j, panel) in problem.panels.iter_mut().enumerate() {
-            panel.y.copy_from_slice(difference.joint(j));
+            let pairs = difference.joint(j).iter().zip(without.joint(j));
+            panel.y.iter_mut().zip(pairs).for_each(|(y, (with, without))| *y = with - without);
         }
-        let motion_noise = MotionNoise::new(&scenario.sensors, &model, &motion.q_rad, &whitening)?;
+        let q_rad = &self.recording.q_rad;
+        let motion_noise = MotionNoise::new(&scenario.sensors, &model, q_rad, &whitening)?;
         let whitening_at = |frequency_hz| {
             let torque_power = scenario.sensors.torque_noise.power(frequency_hz, rate_hz);
             motion_noise.whitening(frequency_hz, torque_power)
         };
         Ok(size(problem, &whitening, &whitening_at))
+    }
+
+    /// The whole periods of `recording`.
+    fn equations(&self, model: &Model, recording: &Recording) -> Problem {
+        let Scenario { excitation, plant, set, .. } = &self.scenario;
+        let [begin_s, end_s] = excitation.periodic_window_s();
+        let first = recording.time_s.partition_point(|t| *t < begin_s - 1e-9);
+        let behind = recording.time_s.partition_point(|t| *t < end_s - 1e-9);
+        let window = first..behind;
+        let qd_rad_s = recording.qd_rad_s.slice(window.clone());
+        let clock = FineClock::new(window.len(), 1);
+        let motion = Motion {
+            q_rad: recording.q_rad.slice(window.clone()),
+            qdd_rad_s2: qd_rad_s.map_joints(|_, qd| clock.derivative(qd, plant.log_rate_hz)),
+            qd_rad_s,
+        };
+        let mut problem = Problem::new(ColumnPlan::new(model, set), plant.log_rate_hz);
+        let torque = recording.torque_nm.slice(window);
+        Assembler::new(model).assemble(&mut problem, model, &motion, &torque);
+        problem
     }
 }
 

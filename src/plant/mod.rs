@@ -30,7 +30,7 @@ pub use error::PlantError;
 pub use integrate::{RungeKutta4, State};
 pub use noise::{Colour, Component, NoiseModel};
 pub use rapier_arm::RapierArm;
-pub use recording::{Readings, Recording, repeated};
+pub use recording::{Readings, Recording};
 pub use sensors::{Effort, Encoders, Measured, PerJoint, SensorConfig, Sensors, TorqueNoise};
 pub use simulate::{Plant, simulate};
 pub use whitening::Whitening;

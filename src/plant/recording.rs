@@ -77,12 +77,7 @@ impl Recording {
 }
 
 /// `signals` gone on to `samples` samples: each beyond the first `known` is that of `period` before.
-pub fn repeated(
-    signals: &JointSignals,
-    known: usize,
-    period: usize,
-    samples: usize,
-) -> JointSignals {
+fn repeated(signals: &JointSignals, known: usize, period: usize, samples: usize) -> JointSignals {
     signals.map_joints(|_, y| {
         let back = |k: usize| k - (k + 1 - known).div_ceil(period) * period;
         (0..samples).map(|k| y[if k < known { k } else { back(k) }]).collect()

@@ -1,6 +1,6 @@
 //! What happens between the samples of a motion that repeats.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use realfft::num_complex::Complex64;
@@ -67,17 +67,32 @@ impl FineClock {
                 (cell.iter().sum::<f64>() + 0.5 * (end - cell[0])) / self.ticks as f64
             })
             .collect();
-        let mut spectrum = self.spectrum(&mean);
-        for (h, value) in spectrum.iter_mut().enumerate().skip(1) {
+        self.filtered(&mean, |h| {
             let half = PI * h as f64 / self.samples as f64;
-            let factor = if h > highest { 0.0 } else { half / half.sin() };
-            *value *= Complex64::from_polar(factor, -half);
-        }
+            match h {
+                0 => Complex64::ONE,
+                _ if h > highest => Complex64::ZERO,
+                _ => Complex64::from_polar(half / half.sin(), -half),
+            }
+        })
+    }
+
+    /// One period of `y` with `factor(h)` times its harmonic h: a derivative with ihω, a delay of T with
+    /// e^(−ihωT).
+    pub fn filtered(&self, y: &[f64], factor: impl Fn(usize) -> Complex64) -> Vec<f64> {
+        let mut spectrum = self.spectrum(y);
+        spectrum.iter_mut().enumerate().for_each(|(h, value)| *value *= factor(h));
         synthesised(&*self.inverse, &mut spectrum)
     }
 
-    /// Fourier coefficients of one period.
-    fn spectrum(&self, y: &[f64]) -> Vec<Complex64> {
+    /// The time derivative of one period of `y`, sampled at `rate_hz`, from its Fourier series.
+    pub fn derivative(&self, y: &[f64], rate_hz: f64) -> Vec<f64> {
+        let omega = TAU * rate_hz / self.samples as f64;
+        self.filtered(y, |h| Complex64::new(0.0, h as f64 * omega))
+    }
+
+    /// Fourier coefficients of one period, Σ_k y_k e^(−2πihk/n)/n.
+    pub fn spectrum(&self, y: &[f64]) -> Vec<Complex64> {
         let mut out = self.forward.make_output_vec();
         self.forward.process(&mut y.to_vec(), &mut out).expect("y has one value per sample");
         let scale = 1.0 / self.samples as f64;
@@ -86,7 +101,8 @@ impl FineClock {
     }
 }
 
-/// The series with these coefficients.
+/// The series with these coefficients. The mean and the harmonic at half the rate are real; what else they are
+/// given has no samples.
 fn synthesised(inverse: &dyn ComplexToReal<f64>, spectrum: &mut [Complex64]) -> Vec<f64> {
     let last = spectrum.len() - 1;
     spectrum[0].im = 0.0;
@@ -104,7 +120,7 @@ mod tests {
     const TICKS: usize = 16;
 
     fn wave(samples: usize, harmonic: f64) -> Vec<f64> {
-        let phase = |k: usize| std::f64::consts::TAU * harmonic * k as f64 / samples as f64 + 0.3;
+        let phase = |k: usize| TAU * harmonic * k as f64 / samples as f64 + 0.3;
         (0..samples).map(|k| phase(k).sin()).collect()
     }
 
@@ -119,13 +135,22 @@ mod tests {
         assert!(largest_difference(&fine, &wave(TICKS * N, 7.0)) < 1e-13);
     }
 
+    #[test]
+    fn a_wave_is_differentiated() {
+        let (clock, rate_hz) = (FineClock::new(N, 1), 25.0);
+        let omega = TAU * 7.0 * rate_hz / N as f64;
+        let later = clock
+            .filtered(&wave(N, 7.0), |h| Complex64::from_polar(omega, TAU / 4.0 * h as f64 / 7.0));
+        assert!(largest_difference(&clock.derivative(&wave(N, 7.0), rate_hz), &later) < 1e-11);
+    }
+
     /// Integrated over its samples and differentiated, a slow wave is itself, but for the trapezoidal rule:
     /// (ω Δt)²/12 with Δt a tick.
     #[test]
     fn what_is_slow_is_logged_as_it_is() {
         let clock = FineClock::new(N, TICKS);
         let logged = clock.as_logged(&wave(TICKS * N, 3.0), 20);
-        let tick = std::f64::consts::TAU * 3.0 / (TICKS * N) as f64;
+        let tick = TAU * 3.0 / (TICKS * N) as f64;
         assert!(largest_difference(&logged, &wave(N, 3.0)) < tick * tick / 12.0 + 1e-13);
         assert!(largest_difference(&clock.as_logged(&wave(800, 21.0), 20), &[0.0; N]) < 1e-13);
     }

@@ -8,9 +8,10 @@
 //! with δ = q_M − q_L, the load τ_L of the rigid arm, which passes through zero, and flanks against which the
 //! rotor alone swings at √(k/I_a) with the damping d = 2 ζ √(k I_a). The log has the motor's angle, so that
 //! the links have moved by δ less than it says. A flight lasts (6 g/δ⃛)^(1/3), a few milliseconds, and is
-//! seen by its jerk at both ends and by the swinging after it.
+//! seen by its jerk at both ends and by the swinging after it: the log has δ̇ at its samples only, and its
+//! acceleration is the derivative of these.
 
-use super::elasticity::{give_way, lagging_by};
+use super::elasticity::{give_way, lagging_at};
 use super::*;
 use crate::diagnose::scene::FINE;
 
@@ -48,17 +49,17 @@ impl Candidate for Backlash {
         let fine = scene.fine_link_nm(j);
         let mut flight =
             Flight::pressed(0.5 * shape.value, FLANK_RAD_S[shape.variant], rotor, load[0]);
-        let mut delta = vec![0.0; n];
+        let (mut delta, mut rate) = (vec![0.0; n], vec![0.0; n]);
         // The second round begins as a motion that repeats does.
         let rounds = if scene.periodic { 2 } else { 1 };
         for k in (0..rounds).flat_map(|_| 0..n) {
-            delta[k] = flight.angle_rad;
+            (delta[k], rate[k]) = (flight.angle_rad, flight.rate_rad_s);
             let mobility = 1.0 / rotor + 1.0 / inertia[k].max(f64::MIN_POSITIVE);
             for load in &fine[FINE * k..FINE * (k + 1)] {
                 flight.step(*load, mobility, step_s);
             }
         }
-        vec![give_way(scene, &lagging_by(scene, j, &delta), shape.value)]
+        vec![give_way(scene, &lagging_at(scene, j, &delta, &rate), shape.value)]
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {

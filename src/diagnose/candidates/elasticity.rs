@@ -21,8 +21,12 @@ const LINK_DAMPING_RATIO: [f64; 2] = [0.05, 0.3];
 
 /// The motion of the links when joint `j` is `delta` (rad) behind its encoder.
 pub(super) fn lagging_by(scene: &Scene, j: usize, delta: &[f64]) -> Motion {
-    let rate = scene.derivative(delta);
-    let acceleration = scene.derivative(&rate);
+    lagging_at(scene, j, delta, &scene.derivative(delta))
+}
+
+/// The same with the rate of `delta` at the samples, rad/s, which may hold more than their differences.
+pub(super) fn lagging_at(scene: &Scene, j: usize, delta: &[f64], rate: &[f64]) -> Motion {
+    let acceleration = scene.derivative(rate);
     let mut motion: Motion = scene.motion.clone();
     for k in 0..scene.samples() {
         motion.q_rad.joint_mut(j)[k] -= delta[k];

@@ -58,8 +58,7 @@ impl Benchmark {
             .map(|motion| {
                 let excitation = motion.excitation.clone();
                 let scenario = Scenario { excitation, ..plan.base.clone() };
-                let (simulation, _) = Simulation::run_sized(scenario)?;
-                Ok(simulation.recording)
+                Ok(Simulation::run_once(scenario)?.recording)
             })
             .collect::<Result<_, PlantError>>()?;
         let simulation = plan.base.set.values(&model.standard_parameters());

@@ -130,7 +130,8 @@ pub(super) fn draw(benchmark: &Benchmark, trial: u64) -> Result<Drawn, BlindErro
     case.against_simulation = case.hidden.iter().any(|h| h.judged == Judged::Simulation);
     let effects = case.hidden.iter().map(|h| h.effect.clone()).collect();
     let scenario = Scenario { effects, ..scenario };
-    let (simulation, size) = Simulation::run_sized(scenario)?;
+    let simulation = Simulation::run_once(scenario)?;
+    let size = simulation.size_beside(&benchmark.clean[motion])?;
     case.sqrt_lambda = size.lambda.sqrt();
     case.sqrt_lambda_sim = size.lambda_sim.sqrt();
     match &mut case.hidden[..] {
@@ -253,7 +254,8 @@ impl Maker<'_> {
             effects: vec![effect],
             ..self.scenario.clone()
         };
-        let (_, size) = Simulation::run_sized(scenario)?;
+        let clean = &self.benchmark.clean[self.motion];
+        let size = Simulation::run_once(scenario)?.size_beside(clean)?;
         Ok(strength(judged, size).map(|s| s * times.sqrt()))
     }
 }
