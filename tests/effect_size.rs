@@ -42,7 +42,7 @@ fn what_the_null_model_absorbs_has_only_a_size_against_a_simulation() {
     for noise in ["", COLOURED] {
         let size = size_of(payload, noise);
         println!("{size:?}");
-        assert!(size.lambda_sim > 1e3 && size.lambda < 1e-4 * size.lambda_sim, "{size:?}");
+        assert!(size.lambda_sim > 1e3 && size.lambda < 1e-3 * size.lambda_sim, "{size:?}");
     }
 }
 

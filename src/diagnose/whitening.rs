@@ -65,8 +65,8 @@ pub struct RunWhitening {
 /// harmonic's number.
 const NEIGHBOURS: usize = 12;
 /// A mean torque that scatters with more than this times the power of its neighbours drifts: eight periods of
-/// white noise show that once in 30 joints.
-const DRIFTS: f64 = 3.0;
+/// white noise show that once in 300 joints (F(7, 17): seven contrasts, and the trend's own freedom).
+const DRIFTS: f64 = 5.0;
 /// Noise below this share of a joint's rms torque is not told from the rounding of a model.
 const FLOOR: f64 = 1e-4;
 /// Highest frequency that is used, over the rate: below the end of the periods' own motion.

@@ -11,13 +11,17 @@ pub struct NoisePower {
     pub relative_variance: f64,
 }
 
-/// Harmonics on each side of harmonic k whose power says something about that of k: max(2, k/4).
+/// Harmonics on each side of harmonic k whose power says something about that of k: max(3, k/4).
 pub fn pooled(k: usize) -> usize {
-    (k / 4).max(2)
+    (k / 4).max(FEWEST)
 }
 
+/// With fewer, four periods know the noise of the slowest harmonics so badly that a spring of 15 σ may be chance; with
+/// more, a line misses how noise of two colours bends there.
+const FEWEST: usize = 3;
+
 /// The power of noise by harmonic, 0 … `last`, without its scatter: straight lines of ln power in
-/// ln harmonic over k ± max(2, k/4), five harmonics or more. `freedom` is that of one harmonic, ν, whose
+/// ln harmonic over k ± max(3, k/4), seven harmonics or more. `freedom` is that of one harmonic, ν, whose
 /// logarithm is low by ln ν − ψ(ν) in the mean, with the variance ψ'(ν).
 pub fn noise_trend(power: &[f64], freedom: usize, last: usize) -> Vec<NoisePower> {
     let end = power.len() - 1;
@@ -27,7 +31,7 @@ pub fn noise_trend(power: &[f64], freedom: usize, last: usize) -> Vec<NoisePower
         power.iter().enumerate().map(|(h, p)| ((h as f64).ln(), p.ln() + bias)).collect();
     let at = |k: usize| {
         let first = k.saturating_sub(pooled(k)).max(1);
-        let window = &points[first..=(k + pooled(k)).max(first + 4).min(end)];
+        let window = &points[first..=(k + pooled(k)).max(first + 2 * FEWEST).min(end)];
         let count = window.len() as f64;
         let x0 = window.iter().map(|p| p.0).sum::<f64>() / count;
         let y0 = window.iter().map(|p| p.1).sum::<f64>() / count;
@@ -80,8 +84,8 @@ mod tests {
                 *mean += (found.value * (k.max(1) as f64).powi(2)).ln() / TRIALS as f64;
             }
         }
-        // ln of χ²₁₄/14 has the variance ψ'(7) = 0.154; the line through five points ends with 0.77 of
-        // it at most: σ of the mean of 200 is 0.024. Six σ of forty fail in one of 10⁷ seeds.
+        // ln of χ²₁₄/14 has the variance ψ'(7) = 0.154; the line through seven points ends with 0.67 of
+        // it at most: σ of the mean of 200 is 0.023. Six σ of forty fail in one of 10⁷ seeds.
         for (k, mean) in mean.iter().enumerate() {
             assert!(mean.abs() < 0.15, "harmonic {k}: off by {mean:.3}");
         }
