@@ -377,7 +377,8 @@ impl<'s, 'a> Kept<'s, 'a> {
         }
         let span = study.span(&contender.entry, others);
         let single = study.statistic.probability(&span, residual);
-        let tests = study.entries.len() as f64 + study.alternatives(&contender.entry);
+        // The chance is shared out evenly between families and sites, and within one between its shapes.
+        let tests = study.hypotheses() as f64 * study.alternatives(&contender.entry);
         contender.evidence > LEAST_EVIDENCE
             && single * tests < FALSE_ALARM
             && self.is_its_own(contender, others, residual)
