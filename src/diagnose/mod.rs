@@ -5,7 +5,7 @@
 //! how much the extended model gains on data it was not fitted to.
 //!
 //! 1. The log is processed as for identification, and its equations are whitened ([`Whitening`]): with
-//!    periods by the scatter between them, without by the residual itself.
+//!    periods by the scatter between them (less what drifting friction does there), without by the residual itself.
 //!    How the drives answer dry friction belongs to the null model ([`Scene::answers`]), and friction is
 //!    looked at between the samples of a log ([`Scene::as_logged`]).
 //! 2. Every family's columns lose what the null model spans; the squared length of the residual along

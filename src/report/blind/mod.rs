@@ -55,8 +55,8 @@ fn facts(scores: &Scores) -> Vec<String> {
 
 const HOW: &str = "Each case draws what is hidden (nothing, one effect, two, or one whose family is taken out of the \
 dictionary), where, its shape and size, the motion and the colour of the noise. The effect is made by the plant's physics; \
-the diagnosis sees the log alone. √λ is the size of the effect in standard deviations of the noise of the best test that \
-could be made; where the null model absorbs the effect, √λ_sim, against a given simulation. A name is right if kind and \
+the diagnosis sees the log alone. √λ is the size of the effect in standard deviations of the noise (of torques and \
+encoders) of the best test that could be made; where the null model absorbs the effect, √λ_sim, against a given simulation. A name is right if kind and \
 joint are, or if the class that the diagnosis states holds them. Of one effect the first cause counts.";
 
 /// Misses listed in the report.
