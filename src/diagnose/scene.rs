@@ -166,7 +166,7 @@ impl Scene {
         self.fine_link_nm[j].get_or_init(|| self.fine(self.link_nm.joint(j)))
     }
 
-    /// Where friction of joint `j` is looked at: [`FINE`] times per sample of a motion that repeats, at the
+    /// Where friction of joint `j` is looked at: 16 times per sample of a motion that repeats, at the
     /// samples of a single run, whose low-pass lies far below their rate.
     pub fn instants(&self, j: usize) -> &Instants {
         self.instants[j].get_or_init(|| {
