@@ -19,8 +19,8 @@ const COLOURED: &str = "[sensors.torque_noise]\ncross_joint_correlation = 0.3\n\
     components = [{ share = 0.6, colour = 'white' }, \
     { share = 0.4, colour = { ar1 = { time_constant_s = 0.1 } } }]";
 
-/// Noise of encoders, times the inertia, is noise at high frequencies: a joint that is read late, which shows where
-/// friction reverses, is harder to see beside it; friction that depends on the angle is seen as before.
+/// More noise makes nothing easier to see. That of encoders, times the inertia, grows with frequency: it hides more
+/// of a ripple at tens of hertz than of friction that depends on the angle.
 #[test]
 fn noise_of_encoders_hides_what_is_fast() {
     let encoders = "q_sd_rad = 2e-5\nqd_sd_rad_s = 1e-3\n";
@@ -31,18 +31,18 @@ fn noise_of_encoders_hides_what_is_fast() {
     let slow =
         share("[[effect]]\nkind='position_friction'\njoint=2\namplitude_nm=0.5\nphase_rad=0.3");
     println!("{fast} {slow}");
-    assert!(fast < 0.6 && slow > 0.8 && slow < 1.0, "{fast} {slow}");
+    assert!(fast < slow && slow < 1.0, "{fast} {slow}");
 }
 
 /// A change of two parameters of the null model: all of it moves parameters, but for what it does to reversals, which
-/// fall between other rows.
+/// fall between other rows. That is less than a test of 3 σ sees.
 #[test]
 fn what_the_null_model_absorbs_has_only_a_size_against_a_simulation() {
     let payload = "[[effect]]\nkind='payload'\nmass_kg=0.5\ncom_x_m=0\ncom_y_m=0\ncom_z_m=0.05";
     for noise in ["", COLOURED] {
         let size = size_of(payload, noise);
         println!("{size:?}");
-        assert!(size.lambda_sim > 1e3 && size.lambda < 1e-3 * size.lambda_sim, "{size:?}");
+        assert!(size.lambda_sim > 1e3 && size.lambda < 9.0, "{size:?}");
     }
 }
 

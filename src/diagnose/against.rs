@@ -183,6 +183,7 @@ impl Search<'_> {
         let covariance = study.statistic.covariance(&span, &left);
         let scored = self.scored(&rest);
         let evidence = scored.iter().find(|s| s.change == taken[index]).map_or(0.0, |s| s.evidence);
+        let quantile = study.statistic.quantile_95(&span, &left);
         // The part of the residual that the change explains.
         let signal = span.inside(&left);
         let size = signal.square();
@@ -215,7 +216,7 @@ impl Search<'_> {
             separating_experiment: (!class.is_empty()).then(|| separating_experiment(change.kind)),
             class,
             confidence: probability_of_class(evidence, &evidences, &alike),
-            parameters: estimates(change, &b, &covariance, study.statistic.quantile_95()),
+            parameters: estimates(change, &b, &covariance, quantile),
             gain_fraction: None,
             strength: study.statistic.lambda(&span, &left, gain).max(0.0).sqrt(),
             in_words: change.in_words.to_owned(),

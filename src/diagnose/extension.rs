@@ -85,11 +85,14 @@ impl Extension {
     ) -> JointSignals {
         let mut out = JointSignals::zeros(problem.joints(), problem.samples);
         for j in 0..problem.joints() {
-            problem.predict(j, &self.theta, out.joint_mut(j));
-        }
-        for &(j, which, b) in &self.answers {
-            if let Some(column) = scene.answers(j).get(which) {
-                out.joint_mut(j).iter_mut().zip(column).for_each(|(o, y)| *o += b * y);
+            let out = out.joint_mut(j);
+            problem.predict(j, &self.theta, out);
+            let columns = scene.answers(j);
+            for &(_, which, b) in self.answers.iter().filter(|(joint, ..)| *joint == j) {
+                // A single run has none.
+                if let Some(column) = columns.get(which) {
+                    out.iter_mut().zip(column).for_each(|(o, y)| *o += b * y);
+                }
             }
         }
         for effect in &self.effects {

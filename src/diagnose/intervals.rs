@@ -80,14 +80,17 @@ pub fn physical(
     effect: &Effect,
     index: usize,
 ) -> BTreeMap<&'static str, Estimate> {
-    let mut out = of_one_form(study, kept, effect, index, 1.0);
-    let quantile = study.statistic.quantile_95();
+    let (others, residual) = kept.without(Some(index));
+    let span = tangent_span(study, &others, effect);
+    let quantile = study.statistic.quantile_95(&span, &residual);
+    let mut out = of_one_form(study, effect, (&span, &residual), quantile);
     for form in kept.other_forms(index) {
         let left = 1.0 - form.behind / quantile.powi(2);
         if left <= 0.0 {
             continue;
         }
-        let other = of_one_form(study, kept, &form.effect, index, left.sqrt());
+        let span = tangent_span(study, &others, &form.effect);
+        let other = of_one_form(study, &form.effect, (&span, &residual), left.sqrt() * quantile);
         // A form with the other sign bends the other way where it counts for less: it is another statement.
         let is_opposite = |(name, own): (&&str, &Estimate)| {
             other.get(name).is_some_and(|other| own.value * other.value < 0.0)
@@ -109,25 +112,26 @@ pub fn physical(
     out
 }
 
-/// By the delta method: coefficients and shape are linearised together, the other causes' coefficients
-/// free; `share` of the width.
-fn of_one_form(
-    study: &Study,
-    kept: &Kept,
-    effect: &Effect,
-    index: usize,
-    share: f64,
-) -> BTreeMap<&'static str, Estimate> {
-    let (others, residual) = kept.without(Some(index));
-    let family = &study.families[effect.family];
+/// The [`tangents`] of `effect` outside the null model and outside `others`.
+fn tangent_span(study: &Study, others: &Span, effect: &Effect) -> Span {
     let outside_null = |mut image: Image| {
         study.null.residualise(&mut image);
         image
     };
     let tangents: Vec<Image> = tangents(study, effect).into_iter().map(outside_null).collect();
-    let span = Span::outside(&others, &tangents);
-    let covariance = study.statistic.covariance(&span, &residual);
-    let half = share * study.statistic.quantile_95();
+    Span::outside(others, &tangents)
+}
+
+/// By the delta method: coefficients and shape are linearised together in `span`, the other causes' coefficients
+/// free; intervals of ± `half` σ.
+fn of_one_form(
+    study: &Study,
+    effect: &Effect,
+    (span, residual): (&Span, &Image),
+    half: f64,
+) -> BTreeMap<&'static str, Estimate> {
+    let family = &study.families[effect.family];
+    let covariance = study.statistic.covariance(span, residual);
     let at = |b: &[f64], value: f64| -> Vec<Quantity> {
         family.quantities(&study.scene, effect.site, Shape { value, ..effect.shape }, b)
     };

@@ -60,6 +60,10 @@ pub struct Scene {
 /// Instants per sample of [`Scene::fine_link_nm`] and [`Scene::instants`].
 pub const FINE: usize = 16;
 
+/// βδ of [`drive_answers`] at most, s. Arms whose drives feed any share of the friction forward, with feedback of 25
+/// to 100 rad/s, have up to 0.9 ms; behind 4 ms friction builds up over an angle, or a channel is recorded late.
+const LONGEST_LEAD_S: f64 = 0.002;
+
 /// The motion of one joint where friction is looked at.
 pub struct Instants {
     /// Time between two of them, s.
@@ -166,7 +170,7 @@ impl Scene {
         self.fine_link_nm[j].get_or_init(|| self.fine(self.link_nm.joint(j)))
     }
 
-    /// Where friction of joint `j` is looked at: 16 times per sample of a motion that repeats, at the
+    /// Where friction of joint `j` is looked at: [`FINE`] times per sample of a motion that repeats, at the
     /// samples of a single run, whose low-pass lies far below their rate.
     pub fn instants(&self, j: usize) -> &Instants {
         self.instants[j].get_or_init(|| {
@@ -242,6 +246,13 @@ impl Scene {
         let columns =
             |clock| drive_answers(clock, &self.instants(j).sign, self.highest_harmonic()).into();
         self.clock.as_ref().map_or(Vec::new(), columns)
+    }
+
+    /// Whether the drive of joint `j` may be what gives its answer number `which` ([`Self::answers`]) the coefficient
+    /// `b`: it does not lead or lag its joint by more than [`LONGEST_LEAD_S`].
+    pub fn can_answer(&self, j: usize, which: usize, b: f64) -> bool {
+        let lead_s = b * self.instants(j).step_s;
+        which == 0 || lead_s.abs() < LONGEST_LEAD_S * self.coulomb_nm[j].abs()
     }
 
     /// Up to which harmonic the periods' own accelerations are known.

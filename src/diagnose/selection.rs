@@ -9,6 +9,8 @@ use super::study::{Entry, Score, Study};
 
 /// Chance that a log without faults is given a cause.
 pub const FALSE_ALARM: f64 = 0.002;
+/// A law is another's only if its coefficient is so by more than so many σ.
+const DOUBT: f64 = 2.0;
 /// A family's law is right to this share of its own size: what is smaller on the same joint is no second
 /// cause.
 const FORM_ERROR: f64 = 0.05;
@@ -351,11 +353,19 @@ impl<'s, 'a> Kept<'s, 'a> {
         self.is_significant(&beside, &others, &residual)
     }
 
-    /// See [`super::candidates::Candidate::is_its_own`].
+    /// See [`super::candidates::Candidate::is_its_own`]; a coefficient counts as what is nearest to the law's own of
+    /// all that noise leaves possible.
     fn is_its_own(&self, contender: &Contender, others: &Span, residual: &Image) -> bool {
+        let study = self.study;
         let Entry { family, site, shape, .. } = contender.entry;
-        let b = self.study.span(&contender.entry, others).solve(residual);
-        self.study.families[family].is_its_own(&self.study.scene, site, shape, &b)
+        let span = study.span(&contender.entry, others);
+        let mut b = span.solve(residual);
+        let Some(&first) = b.first() else { return true };
+        let sigma = study.statistic.covariance(&span, residual)[(0, 0)].max(0.0).sqrt();
+        [0.0, -DOUBT, DOUBT].into_iter().any(|doubt| {
+            b[0] = first + doubt * sigma;
+            study.families[family].is_its_own(&study.scene, site, shape, &b)
+        })
     }
 
     /// Whether chance explains `contender` in fewer than one log without faults in 500, all

@@ -6,6 +6,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 use super::image::{Image, Span, dot};
 use super::noise_power::NoiseKnowledge;
 use super::whitening::Whitening;
+use crate::identify::covariance::quantile_95;
 
 /// How evidence is counted.
 pub enum Statistic {
@@ -25,7 +26,7 @@ pub enum Statistic {
 }
 
 /// λ of an effect of the usual strength, √λ about 30. Schwarz's ln n takes n for it, an effect as large in every
-/// sample as the noise, and misses a third of those with √λ of 6 to 8.
+/// sample as the noise.
 const USUAL_LAMBDA: f64 = 1000.0;
 /// Stretches of time of the cross-validation.
 const FOLDS: usize = 10;
@@ -104,8 +105,8 @@ impl Statistic {
 
     /// Probability of at least this much by chance alone, one test.
     ///
-    /// Periods: F(k, ν) with the degrees of freedom of [`NoiseKnowledge::freedom`]. Blocks: the Wald statistic bᵀV⁻¹b with V from the scatter of block sums, as
-    /// F(k, B − k).
+    /// Periods: F(k, ν) with the degrees of freedom of [`NoiseKnowledge::freedom`]. Blocks: the Wald statistic bᵀV⁻¹b
+    /// with V from the scatter of block sums, as F(k, B − k).
     pub fn probability(&self, span: &Span, residual: &Image) -> f64 {
         let k = span.len();
         match self {
@@ -200,16 +201,13 @@ impl Statistic {
         }
     }
 
-    /// Half width of a 95 % interval in σ.
-    pub fn quantile_95(&self) -> f64 {
-        match self {
-            Self::Periods(_) => 1.96,
-            Self::Blocks { blocks, .. } => {
-                let freedom = (*blocks - 1).max(1) as f64;
-                statrs::distribution::StudentsT::new(0.0, 1.0, freedom)
-                    .map_or(1.96, |t| t.inverse_cdf(0.975))
-            }
-        }
+    /// Half width, in σ, of a 95 % interval of what `span` says of `residual`: Student's t, for periods with the
+    /// degrees of freedom of [`NoiseKnowledge::freedom`].
+    pub fn quantile_95(&self, span: &Span, residual: &Image) -> f64 {
+        quantile_95(match self {
+            Self::Periods(knowledge) => knowledge.freedom(span, residual),
+            Self::Blocks { blocks, .. } => (*blocks - 1) as f64,
+        })
     }
 }
 

@@ -126,7 +126,11 @@ impl<'a> Study<'a> {
                 return Err(DiagnoseError::NotExcited { log: log.to_owned(), parameter });
             }
         }
+        let torque = whitening.regression_image(&Column {
+            parts: problem.panels.iter().enumerate().map(|(j, p)| (j, p.y.clone())).collect(),
+        });
         let mut answers = Vec::new();
+        let rigid = null.clone();
         for j in 0..scene.joints() {
             for (which, column) in scene.answers(j).into_iter().enumerate() {
                 let image = whitening.image(&Column::on(j, column));
@@ -136,9 +140,21 @@ impl<'a> Study<'a> {
                 }
             }
         }
-        let torque = whitening.regression_image(&Column {
-            parts: problem.panels.iter().enumerate().map(|(j, p)| (j, p.y.clone())).collect(),
-        });
+        let b = null.solve(&torque);
+        let is_a_drives =
+            |at: usize, (j, which): (usize, usize)| scene.can_answer(j, which, b[rigid.len() + at]);
+        if !answers.iter().enumerate().all(|(at, answer)| is_a_drives(at, *answer)) {
+            let (base, of_drives) = images.split_at(rigid.len());
+            let kept = answers.iter().enumerate().filter(|(at, answer)| is_a_drives(*at, **answer));
+            let (kept, of_drives): (Vec<_>, Vec<_>) =
+                kept.map(|(at, answer)| (*answer, of_drives[at].clone())).unzip();
+            null = rigid;
+            of_drives.iter().for_each(|image| {
+                null.push(image);
+            });
+            images = base.iter().cloned().chain(of_drives).collect();
+            answers = kept;
+        }
         let mut residual = torque.clone();
         null.residualise(&mut residual);
         let statistic = Statistic::new(&whitening, &residual, problem.joints());

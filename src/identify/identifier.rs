@@ -389,10 +389,8 @@ impl<'a> Identifier<'a> {
     fn take_out_drive_answers(&mut self, prepared: &Prepared) {
         let Some(acceleration) = &prepared.acceleration else { return };
         let Self { clock, problem, model, .. } = self;
-        let clock = match clock.take().filter(|clock| clock.samples() == problem.samples) {
-            Some(fits) => clock.insert(fits),
-            None => clock.insert(FineClock::new(problem.samples, TICKS)),
-        };
+        clock.take_if(|clock| clock.samples() != problem.samples);
+        let clock = clock.get_or_insert_with(|| FineClock::new(problem.samples, TICKS));
         without_drive_answers(problem, clock, model, &prepared.motion, acceleration);
     }
 

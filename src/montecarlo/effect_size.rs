@@ -59,8 +59,8 @@ impl Simulation {
 
     /// The plant of `scenario` run once.
     ///
-    /// Where nothing in the arm drifts, little more than one period is integrated: what the log shows
-    /// two seconds after the run-in repeats from then on, and is copied.
+    /// Where nothing in the arm drifts, little more than one period is integrated: what the log shows when the arm
+    /// has forgotten how it started (`SETTLING_S`) repeats from then on, and is copied.
     pub fn run_once(scenario: Scenario) -> Result<Self, PlantError> {
         let plant = FaultyPlant::new(&scenario.arm, &scenario.effects, &scenario.plant)?;
         let excitation = &scenario.excitation;

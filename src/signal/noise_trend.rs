@@ -16,8 +16,8 @@ pub fn pooled(k: usize) -> usize {
     (k / 4).max(FEWEST)
 }
 
-/// With fewer, four periods know the noise of the slowest harmonics so badly that a spring of 15 σ may be chance; with
-/// more, a line misses how noise of two colours bends there.
+/// With fewer, the scatter of few periods says little of the slowest harmonics' noise; with more, a line misses how
+/// noise of two colours bends there.
 const FEWEST: usize = 3;
 
 /// The power of noise by harmonic, 0 … `last`, without its scatter: straight lines of ln power in

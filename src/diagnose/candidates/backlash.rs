@@ -19,8 +19,12 @@ use crate::diagnose::scene::FINE;
 pub struct Backlash;
 
 /// Frequencies of the rotor against its flanks, rad/s, by variant: from those of a gear that gives way to
-/// those that the log's rate can hardly tell from stiff ones.
-const FLANK_RAD_S: [f64; 4] = [150.0, 260.0, 450.0, 900.0];
+/// those that the log's rate can hardly tell from stiff ones. What the samples show of a swing depends on where it
+/// is within their step: halfway between two of these its phase is off by one radian where it has faded to 1/e.
+const FLANK_RAD_S: [f64; 14] = [
+    130.0, 151.0, 175.0, 203.0, 236.0, 274.0, 318.0, 369.0, 428.0, 496.0, 576.0, 668.0, 775.0,
+    900.0,
+];
 /// ζ of the flanks.
 const DAMPING_RATIO: f64 = 0.08;
 

@@ -17,7 +17,8 @@ impl Candidate for Stribeck {
     }
 
     fn shapes(&self, scene: &Scene, _: Option<usize>) -> Vec<Shape> {
-        // Up to twice the widest, to see where it would end. Slower than the width of the regularised sign it is a part of that sign.
+        // Up to twice the widest, to see where it would end. Slower than the width of the regularised sign it is a
+        // part of that sign.
         let slowest = scene.arm.friction_epsilon_rad_s;
         (0..2)
             .flat_map(|variant| {

@@ -9,7 +9,6 @@ use super::plan::BlindPlan;
 use super::record::{Answer, HeldOutGain, Record, Records};
 use crate::diagnose::{DiagnoseError, Diagnoser, Diagnosis, Kind, Validation, candidates};
 use crate::dynamics::Model;
-use crate::excitation::Excitation;
 use crate::identify::Measurement;
 use crate::montecarlo::trials::{Content, Difference, Trials};
 use crate::montecarlo::{Scenario, Simulation};
@@ -44,9 +43,6 @@ pub enum BlindError {
     #[error("no family can be hidden here")]
     NothingToHide,
 }
-
-/// Periods of the held-out log.
-const HELD_OUT_PERIODS: usize = 2;
 
 impl Benchmark {
     /// Runs the clean arm along every motion.
@@ -139,20 +135,22 @@ impl BlindWorker<'_> {
     }
 
     /// The noise-free run of the same arm along the next motion, where the case is one of those whose
-    /// gain is measured.
+    /// gain is measured. A fault of the record adds nothing to the model of the arm that could be judged there.
     fn held_out(&self, drawn: &Drawn) -> Result<Option<Recording>, BlindError> {
         let plan = &self.benchmark.plan;
         let scenario = &drawn.simulation.scenario;
         let measured = drawn.measures_gain
             && scenario.effects.iter().all(Effect::repeats)
-            && drawn.case.hidden.iter().all(|h| h.judged == Judged::Residual);
+            && drawn.case.hidden.iter().all(|h| h.judged == Judged::Residual)
+            && !drawn.case.hidden.iter().any(|h| h.kind.is_of_the_record());
         if !measured {
             return Ok(None);
         }
         let next = &plan.motions[(drawn.motion + 1) % plan.motions.len()];
-        let excitation: Excitation = next.excitation.clone().with_periods(HELD_OUT_PERIODS);
+        let excitation = next.excitation.clone();
         let sensors = SensorConfig::default();
-        let simulation = Simulation::run(Scenario { excitation, sensors, ..scenario.clone() })?;
+        let simulation =
+            Simulation::run_once(Scenario { excitation, sensors, ..scenario.clone() })?;
         Ok(Some(simulation.recording))
     }
 }
