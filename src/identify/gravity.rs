@@ -20,6 +20,8 @@ use crate::robot::Arm;
 pub struct GravityMatch {
     /// Found over described, by least squares over all first moments.
     pub ratio: f64,
+    /// σ of the ratio.
+    pub ratio_sigma: f64,
     /// Mass on the flange that comes nearest to what was found, kg; not positive where none helps.
     pub body_kg: f64,
     /// What the description with that body leaves, as a share of what it says.
@@ -37,8 +39,14 @@ const LEFT: f64 = 0.2;
 const BODY: usize = 4;
 
 impl GravityMatch {
-    /// Of base parameters `theta`; `None` for a description without masses.
-    pub fn of(arm: &Arm, set: &BaseSet, nominal: &[f64], theta: &[f64]) -> Option<Self> {
+    /// Of base parameters `theta` with their covariance; `None` for a description without masses.
+    pub fn of(
+        arm: &Arm,
+        set: &BaseSet,
+        nominal: &[f64],
+        theta: &[f64],
+        covariance: &DMatrix<f64>,
+    ) -> Option<Self> {
         let layout = ParameterLayout::new(arm.dof());
         let is_first_moment =
             |&k: &usize| matches!(layout.parameter(set.column(k)[0].0), Parameter::Body(_, 1..=3));
@@ -62,17 +70,21 @@ impl GravityMatch {
         // Of what gravity cannot tell apart the smallest is taken.
         let x = body.clone().svd(true, true).solve(&more, f64::EPSILON.sqrt()).ok()?;
         let rest = if x[0] > 0.0 { &more - body * &x } else { more };
+        let of_moments = covariance.select_rows(&rows).select_columns(&rows);
+        let variance = described.dot(&(of_moments * &described)).max(0.0) / (square * square);
         Some(Self {
             ratio: described.dot(&found) / square,
+            ratio_sigma: variance.sqrt(),
             body_kg: x[0],
             left: (rest.norm_squared() / square).sqrt(),
         })
     }
 
-    /// What is to be said of it.
-    fn remark(&self, robot: &str) -> Option<String> {
-        let Self { ratio, body_kg, left } = *self;
-        if (1.0 / OFF..OFF).contains(&ratio) {
+    /// What is to be said of it, if the ratio is off by more than `quantile` σ of its own.
+    fn remark(&self, robot: &str, quantile: f64) -> Option<String> {
+        let Self { ratio, ratio_sigma, body_kg, left } = *self;
+        let doubt = quantile * ratio_sigma;
+        if ratio - doubt < OFF && ratio + doubt > 1.0 / OFF {
             return None;
         }
         let far =
@@ -108,7 +120,8 @@ pub fn gravity_remark(
     if !identifies_the_arm(arm, set, &not_identified(arm, set, &half_width)) {
         return None;
     }
-    GravityMatch::of(arm, set, nominal, &identification.fit.theta)?.remark(&arm.name)
+    let Identification { fit, covariance, .. } = identification;
+    GravityMatch::of(arm, set, nominal, &fit.theta, &covariance.matrix)?.remark(&arm.name, quantile)
 }
 
 #[cfg(test)]
@@ -124,24 +137,41 @@ mod tests {
         (arm, set, standard)
     }
 
+    /// ‖first moments‖ of base parameters.
+    fn known_length(set: &BaseSet, values: &[f64]) -> f64 {
+        let is_moment = |k: &usize| set.name(*k).starts_with('m');
+        (0..set.rank()).filter(is_moment).map(|k| values[k].powi(2)).sum::<f64>().sqrt()
+    }
+
     #[test]
     fn a_body_on_the_flange_is_told_from_a_larger_robot() {
         let (arm, set, standard) = described("ur5e");
         let nominal = set.values(&standard);
-        let own = GravityMatch::of(&arm, &set, &nominal, &nominal).unwrap();
-        assert!((own.ratio - 1.0).abs() < 1e-12 && own.remark("ur5e").is_none());
+        let known = DMatrix::zeros(set.rank(), set.rank());
+        let own = GravityMatch::of(&arm, &set, &nominal, &nominal, &known).unwrap();
+        assert!((own.ratio - 1.0).abs() < 1e-12 && own.remark("ur5e", 1.96).is_none());
 
         let layout = ParameterLayout::new(arm.dof());
         let mut loaded = standard.clone();
         loaded[layout.index(Parameter::Body(5, 0))] += 6.0;
         loaded[layout.index(Parameter::Body(5, 3))] += 6.0 * 0.05;
-        let with_body = GravityMatch::of(&arm, &set, &nominal, &set.values(&loaded)).unwrap();
+        let loaded = set.values(&loaded);
+        let with_body = GravityMatch::of(&arm, &set, &nominal, &loaded, &known).unwrap();
         assert!((with_body.body_kg - 6.0).abs() < 1e-6 && with_body.left < 1e-6, "{with_body:?}");
-        assert!(with_body.remark("ur5e").unwrap().contains("a body of 6.0 kg"));
+        assert!(with_body.remark("ur5e", 1.96).unwrap().contains("a body of 6.0 kg"));
 
         let (_, larger, standard) = described("ur10e");
         assert!((0..set.rank()).all(|k| set.name(k) == larger.name(k)), "of one family");
-        let other = GravityMatch::of(&arm, &set, &nominal, &larger.values(&standard)).unwrap();
-        assert!(other.remark("ur5e").unwrap().contains("another robot"), "{other:?}");
+        let larger = larger.values(&standard);
+        let other = GravityMatch::of(&arm, &set, &nominal, &larger, &known).unwrap();
+        assert!(other.remark("ur5e", 1.96).unwrap().contains("another robot"), "{other:?}");
+
+        // Where the moments are hardly known, twice the gravity is no news of the robot: σ of each of the moments
+        // makes that of the ratio, found over described, σ/‖described‖.
+        let vague = DMatrix::identity(set.rank(), set.rank()) * 100.0;
+        let doubtful = GravityMatch::of(&arm, &set, &nominal, &larger, &vague).unwrap();
+        let length = (1.0 / known_length(&set, &nominal)).abs();
+        assert!((doubtful.ratio_sigma - 10.0 * length).abs() < 1e-9, "{doubtful:?}");
+        assert!(doubtful.remark("ur5e", 1.96).is_none(), "{doubtful:?}");
     }
 }

@@ -1,7 +1,7 @@
 //! What `armid diagnose` shows: the verdict in words, the picture that convinces, the alternatives.
 
 use super::json::Program;
-use super::number::{percent, significant};
+use super::number::{percent, resolved, significant};
 use super::plot::{Axis, Colour, Grid, Mark};
 use super::{Column, Page, ReportError, Section, Status, Table, Verdict, replay};
 use crate::diagnose::{self, Cause, Diagnosis, Finding, Kind};
@@ -23,12 +23,13 @@ pub fn cause_table(diagnosis: &Diagnosis) -> Table {
     for cause in &diagnosis.causes {
         for (k, (name, estimate)) in cause.parameters.iter().enumerate() {
             let once = |text: String| if k == 0 { text } else { String::new() };
-            let [low, high] = estimate.ci95.map(|v| significant(v, 4));
+            let width = estimate.ci95[1] - estimate.ci95[0];
+            let [low, high] = estimate.ci95.map(|v| resolved(v, width));
             table.push([
                 once(cause.kind.to_string()),
                 once(joint(cause.joint)),
                 (*name).to_owned(),
-                significant(estimate.value, 4),
+                resolved(estimate.value, width),
                 format!("{low} … {high}"),
                 estimate.unit.to_owned(),
                 once(percent(cause.confidence, 3)),

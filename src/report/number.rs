@@ -29,6 +29,19 @@ pub fn significant(value: f64, digits: usize) -> String {
     }
 }
 
+/// `value` with four significant digits, or as many as show `width` with two: what lies between 1829.48 and 1829.58
+/// is not `1829 … 1830`.
+///
+/// ```
+/// use armid::report::number::resolved;
+/// assert_eq!(resolved(1829.4812, 0.1), "1829.48");
+/// assert_eq!(resolved(0.0208, 104.0), "0.02080");
+/// ```
+pub fn resolved(value: f64, width: f64) -> String {
+    let digits = 2 + rounded_magnitude(value, 4) - rounded_magnitude(width, 2);
+    significant(value, digits.clamp(4, 9) as usize)
+}
+
 /// `value ± sigma`, sigma with two significant digits and the value to the same place: `1.234 ± 0.012`,
 /// `(1.23 ± 0.12)e-6`. The rule is that of the GUM (JCGM 100:2008, 7.2.6).
 ///
