@@ -4,7 +4,7 @@
 use armid::diagnose::{Diagnoser, Diagnosis, Verdict};
 use armid::dynamics::Model;
 use armid::identify::Measurement;
-use armid::montecarlo::{Experiment, Scenario};
+use armid::montecarlo::{Scenario, Simulation};
 use armid::robot::JointSignals;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
@@ -44,7 +44,7 @@ fn diagnose_rows(
     let scenario = Scenario::from_toml(&text, "blind", std::path::Path::new(".")).unwrap();
     let (arm, set) = (scenario.arm.clone(), scenario.set.clone());
     let options = scenario.processing.clone();
-    let log = Experiment::prepare(scenario).unwrap().simulation.log(0).unwrap();
+    let log = Simulation::run_once(scenario).unwrap().log(0).unwrap();
     let rows = rows(log.time_s.len(), &mut ChaCha8Rng::seed_from_u64(seed));
     let of = |s: &JointSignals| {
         JointSignals::from_fn(s.joints(), rows.len(), |j, k| s.joint(j)[rows[k]])
