@@ -5,7 +5,7 @@ use armid::base::BaseSet;
 use armid::diagnose::{Cause, Diagnoser, Diagnosis};
 use armid::dynamics::Model;
 use armid::identify::{Measurement, Options};
-use armid::montecarlo::{Experiment, Scenario};
+use armid::montecarlo::{Scenario, Simulation};
 use armid::plant::Measured;
 use armid::robot::Arm;
 
@@ -28,7 +28,7 @@ impl Run {
         let scenario = Scenario::from_toml(&text, "changes", std::path::Path::new(".")).unwrap();
         let (arm, set) = (scenario.arm.clone(), scenario.set.clone());
         let options = scenario.processing.clone();
-        let log = Experiment::prepare(scenario).unwrap().simulation.log(0).unwrap();
+        let log = Simulation::run_once(scenario).unwrap().log(0).unwrap();
         Self { arm, set, options, log }
     }
 
