@@ -170,7 +170,7 @@ impl Scene {
         self.fine_link_nm[j].get_or_init(|| self.fine(self.link_nm.joint(j)))
     }
 
-    /// Where friction of joint `j` is looked at: [`FINE`] times per sample of a motion that repeats, at the
+    /// Where friction of joint `j` is looked at: `FINE` times per sample of a motion that repeats, at the
     /// samples of a single run, whose low-pass lies far below their rate.
     pub fn instants(&self, j: usize) -> &Instants {
         self.instants[j].get_or_init(|| {
@@ -249,7 +249,7 @@ impl Scene {
     }
 
     /// Whether the drive of joint `j` may be what gives its answer number `which` ([`Self::answers`]) the coefficient
-    /// `b`: it does not lead or lag its joint by more than [`LONGEST_LEAD_S`].
+    /// `b`: it does not lead or lag its joint by more than `LONGEST_LEAD_S`.
     pub fn can_answer(&self, j: usize, which: usize, b: f64) -> bool {
         let lead_s = b * self.instants(j).step_s;
         which == 0 || lead_s.abs() < LONGEST_LEAD_S * self.coulomb_nm[j].abs()
