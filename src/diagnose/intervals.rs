@@ -1,6 +1,7 @@
 //! How well the numbers of an extended model are known.
 
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 
 #[cfg(doc)]
 use super::candidates::Candidate;
@@ -8,7 +9,7 @@ use super::candidates::{Quantity, Search, Shape};
 use super::extension::{Effect, Extension};
 use super::image::{Image, Span};
 use super::selection::Kept;
-use super::study::Study;
+use super::study::{Entry, Study};
 use super::verdict::{BaseParameter, Estimate};
 use crate::base::BaseSet;
 
@@ -72,8 +73,10 @@ pub fn base(study: &Study, set: &BaseSet, extension: &Extension) -> Vec<BasePara
 /// Physical parameters of a cause with 95 % intervals. Where the family has several forms (Stribeck's
 /// exponent, the stiffness of a gear's flanks), an interval reaches over all that the log allows: with
 /// D = 2 ln of the odds against a form, its own interval shrunk by √(1 − D/q²), q the normal one's
-/// quantile, which is where the likelihood falls below that of the best form by q². It also
-/// reaches to what the shape says of the same parameter, see [`Candidate::in_shape`].
+/// quantile, which is where the likelihood falls below that of the best form by q². The nonlinear parameter of a
+/// motion that repeats is treated the same way, value by value: the interval is that of the profile of the likelihood
+/// (Venzon and Moolgavkar 1988), which need not be symmetric. It also reaches to what the shape says of the same
+/// parameter, see [`Candidate::in_shape`].
 pub fn physical(
     study: &Study,
     kept: &Kept,
@@ -84,6 +87,14 @@ pub fn physical(
     let span = tangent_span(study, &others, effect);
     let quantile = study.statistic.quantile_95(&span, &residual);
     let mut out = of_one_form(study, effect, (&span, &residual), quantile);
+    if study.scene.periodic && study.families[effect.family].search() != Search::None {
+        let covariance = study.statistic.covariance(&span, &residual);
+        let sigma = covariance.diagonal().as_slice().last().map_or(0.0, |v| v.max(0.0).sqrt());
+        let profile = Profile { study, effect, others: &others, residual: &residual, quantile };
+        if let Some(of_profile) = profile.intervals(sigma) {
+            out = of_profile;
+        }
+    }
     for form in kept.other_forms(index) {
         let left = 1.0 - form.behind / quantile.powi(2);
         if left <= 0.0 {
@@ -98,11 +109,7 @@ pub fn physical(
         if out.iter().any(is_opposite) {
             continue;
         }
-        for (name, own) in &mut out {
-            if let Some(other) = other.get(name) {
-                other.ci95.into_iter().for_each(|end| own.reach(end));
-            }
-        }
+        reach_over(&mut out, &other);
     }
     if let Some(again) = study.families[effect.family].in_shape(effect.shape)
         && let Some(own) = out.get_mut(again.name)
@@ -110,6 +117,107 @@ pub fn physical(
         own.reach(again.value);
     }
     out
+}
+
+/// The intervals `own` made long enough to hold those of `other`; phases are taken round the circle.
+fn reach_over(own: &mut BTreeMap<&'static str, Estimate>, other: &BTreeMap<&str, Estimate>) {
+    for (name, own) in own {
+        let Some(other) = other.get(name) else { continue };
+        let turns =
+            if *name == "phase_rad" { ((own.value - other.value) / TAU).round() } else { 0.0 };
+        other.ci95.into_iter().for_each(|end| own.reach(end + turns * TAU));
+    }
+}
+
+/// The likelihood along the nonlinear parameter of a cause, everything else at its best.
+struct Profile<'a> {
+    study: &'a Study<'a>,
+    effect: &'a Effect,
+    others: &'a Span,
+    residual: &'a Image,
+    quantile: f64,
+}
+
+/// Parts of the way to an end of the interval at which the profile is looked at.
+const PARTS: usize = 4;
+/// How often an end is looked for further out, and how often it is halved in.
+const STEPS_OUT: usize = 4;
+const HALVINGS: usize = 4;
+
+impl Profile<'_> {
+    /// What the profile says; `sigma` of the nonlinear parameter is where it begins to look for the ends.
+    fn intervals(&self, sigma: f64) -> Option<BTreeMap<&'static str, Estimate>> {
+        let best = self.gain_at(self.effect.shape.value)?;
+        let mut out = self.at(self.effect.shape.value, self.quantile)?;
+        for side in [-1.0, 1.0] {
+            let end = self.end(side * self.quantile * sigma, best);
+            for part in 1..=PARTS {
+                let value = self.moved(end * part as f64 / PARTS as f64);
+                let Some(gain) = self.gain_at(value) else { continue };
+                let left = self.quantile.powi(2) - (best - gain).max(0.0);
+                if let Some(there) = self.at(value, left.max(0.0).sqrt()) {
+                    reach_over(&mut out, &there);
+                }
+            }
+        }
+        Some(out)
+    }
+
+    /// How far, from the best value and in units of `step`'s scale, the gain falls by the square of the quantile.
+    fn end(&self, step: f64, best: f64) -> f64 {
+        let is_allowed = |way: f64| {
+            let gain = self.gain_at(self.moved(way));
+            gain.is_some_and(|gain| best - gain < self.quantile.powi(2))
+        };
+        let (mut inside, mut outside) = (0.0, step);
+        for _ in 0..STEPS_OUT {
+            if !is_allowed(outside) {
+                break;
+            }
+            (inside, outside) = (outside, 1.5 * outside);
+        }
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (inside + outside);
+            if is_allowed(middle) {
+                inside = middle;
+            } else {
+                outside = middle;
+            }
+        }
+        inside
+    }
+
+    /// The nonlinear parameter `way` from its best value; what is searched on a logarithmic scale goes by factors.
+    fn moved(&self, way: f64) -> f64 {
+        let value = self.effect.shape.value;
+        match self.study.families[self.effect.family].search() {
+            Search::Logarithmic => value * (way / value).exp(),
+            Search::Straight | Search::None => value + way,
+        }
+    }
+
+    fn entry(&self, value: f64) -> Option<Entry> {
+        let Effect { family, site, shape, .. } = *self.effect;
+        let entry = self.study.entry(family, site, Shape { value, ..shape })?;
+        (entry.images.len() == self.effect.coefficients.len()).then_some(entry)
+    }
+
+    fn gain_at(&self, value: f64) -> Option<f64> {
+        let entry = self.entry(value)?;
+        self.study.score(&entry, self.others, self.residual).map(|score| score.gain)
+    }
+
+    /// The parameters at `value`, with intervals of ± `half` σ of the coefficients alone.
+    fn at(&self, value: f64, half: f64) -> Option<BTreeMap<&'static str, Estimate>> {
+        let span = self.study.span(&self.entry(value)?, self.others);
+        let coefficients = span.solve(self.residual);
+        let effect = Effect {
+            coefficients,
+            shape: Shape { value, ..self.effect.shape },
+            ..self.effect.clone()
+        };
+        Some(of_one_form(self.study, &effect, (&span, self.residual), half))
+    }
 }
 
 /// The [`tangents`] of `effect` outside the null model and outside `others`.
@@ -154,7 +262,7 @@ fn of_one_form(
         for (g, (up, down)) in gradients.iter_mut().zip(moved(1.0).iter().zip(moved(-1.0))) {
             let mut difference = up.value - down.value;
             if up.unit == "rad" && difference.abs() > std::f64::consts::PI {
-                difference -= difference.signum() * std::f64::consts::TAU;
+                difference -= difference.signum() * TAU;
             }
             g[parameter] = difference / (2.0 * h);
         }

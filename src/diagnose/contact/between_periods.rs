@@ -42,6 +42,9 @@ const MOST: usize = 40;
 const FEWEST_PERIODS: usize = 3;
 /// Stretches of a period that are compared as wholes.
 const STRETCHES: usize = 10;
+/// Stretches in which the run-in and the stop are found: a contact near an end of the log is not to be taken
+/// for a part of them.
+const STRETCHES_AT_ENDS: usize = 40;
 /// Joints that differ by less than this share of their rms amplitude, in the median, move alike.
 const SAME_MOTION: f64 = 0.02;
 /// The same, at every instant of a stretch: more than a weak contact moves the arm, less than a run-in.
@@ -341,24 +344,33 @@ fn with_disturbed_periods(
             let mut differences: Vec<f64> = differences.collect();
             let largest = differences.iter().copied().fold(0.0, f64::max);
             let mut middle = || median(&mut differences).unwrap_or(0.0);
-            largest < NO_CONTACT || (length == step && middle() < SAME_MOTION)
+            largest < NO_CONTACT || (length >= half && middle() < SAME_MOTION)
         })
     };
     let Range { mut start, mut end } = window.clone();
     let stretch = (step / STRETCHES).max(1);
+    let at_end = (step / STRETCHES_AT_ENDS).max(1);
+    let half = step.div_ceil(2);
     for length in [step, stretch] {
-        while start >= length && repeats(start - length, start - length + step, length) {
-            start -= length;
+        // Of the first and the last period of a log a part may be missing.
+        let piece = |room: usize| Some(length.min(room)).filter(|p| *p == length || *p >= half);
+        while let Some(piece) = piece(start)
+            && repeats(start - piece, start - piece + step, piece)
+        {
+            start -= piece;
         }
-        while end + length <= q_rad.samples() && end >= step && repeats(end, end - step, length) {
-            end += length;
+        while let Some(piece) = piece(q_rad.samples() - end)
+            && end >= step
+            && repeats(end, end - step, piece)
+        {
+            end += piece;
         }
         // A period most of which repeats may begin with the run-in, or end with the arm stopping.
-        while start < window.start && !repeats(start, start + step, stretch) {
-            start = (start + stretch).min(window.start);
+        while start < window.start && !repeats(start, start + step, at_end) {
+            start = (start + at_end).min(window.start);
         }
-        while end > window.end && !repeats(end - stretch, end - stretch - step, stretch) {
-            end = (end - stretch).max(window.end);
+        while end > window.end && !repeats(end - at_end, end - at_end - step, at_end) {
+            end = (end - at_end).max(window.end);
         }
     }
     (start + edge).min(window.start)..end.saturating_sub(edge).max(window.end)
