@@ -212,7 +212,10 @@ impl<'a> Diagnoser<'a> {
         }
         diagnosis.sentences = diagnosis.in_sentences();
         let nominal = self.set.values(&Model::new(self.arm).standard_parameters());
-        if let Some(remark) = gravity_remark(self.arm, self.set, &nominal, &identification) {
+        // What touched the arm, and friction that the null model lacks, bend its gravity.
+        let theta = &extension.theta;
+        let covariance = &identification.covariance;
+        if let Some(remark) = gravity_remark(self.arm, self.set, &nominal, theta, covariance) {
             // Of another robot's log nothing else matters.
             diagnosis
                 .sentences

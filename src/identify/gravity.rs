@@ -9,7 +9,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::identifier::Identification;
+use super::covariance::Covariance;
 use super::quality::{identifies_the_arm, not_identified};
 use crate::base::BaseSet;
 use crate::dynamics::{Parameter, ParameterLayout};
@@ -107,21 +107,21 @@ impl GravityMatch {
     }
 }
 
-/// A remark where the gravity torque that was identified is not that of the arm's description; masses that are
-/// not identified say nothing of gravity.
+/// A remark where the gravity torque of the base parameters `theta` that were identified is not that of the arm's
+/// description; masses that are not identified say nothing of gravity.
 pub fn gravity_remark(
     arm: &Arm,
     set: &BaseSet,
     nominal: &[f64],
-    identification: &Identification,
+    theta: &[f64],
+    covariance: &Covariance,
 ) -> Option<String> {
-    let quantile = identification.covariance.quantile_95();
-    let half_width: Vec<f64> = identification.sigma().iter().map(|s| quantile * s).collect();
+    let quantile = covariance.quantile_95();
+    let half_width: Vec<f64> = covariance.sigma().iter().map(|s| quantile * s).collect();
     if !identifies_the_arm(arm, set, &not_identified(arm, set, &half_width)) {
         return None;
     }
-    let Identification { fit, covariance, .. } = identification;
-    GravityMatch::of(arm, set, nominal, &fit.theta, &covariance.matrix)?.remark(&arm.name, quantile)
+    GravityMatch::of(arm, set, nominal, theta, &covariance.matrix)?.remark(&arm.name, quantile)
 }
 
 #[cfg(test)]

@@ -164,7 +164,13 @@ impl Result {
             .collect();
         let mut warnings = identification.warnings.clone();
         let is_identified = identifies_the_arm(arm, set, &open);
-        warnings.extend(gravity_remark(arm, set, training.nominal, identification));
+        warnings.extend(gravity_remark(
+            arm,
+            set,
+            training.nominal,
+            &identification.fit.theta,
+            &identification.covariance,
+        ));
         Ok(Self {
             robot: arm.name.clone(),
             log: names(training.logs),
