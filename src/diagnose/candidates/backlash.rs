@@ -83,11 +83,11 @@ impl Candidate for Backlash {
     }
 
     /// Both tell the gap: how far the links lag, and how long a flight lasts. Flanks that are harder or softer
-    /// than those assumed make a flight seem longer or shorter; a gap that is crossed in less time than half of it
-    /// takes was none, but a gear that gives way, and links that lag by less than half of what they fly are not seen
-    /// to fly.
+    /// than those assumed make a flight seem longer; a gap that is crossed in less time than half of it takes was
+    /// none, but a gear that gives way, and one four times too wide for the lag of the links, which a flight 1.6 times
+    /// too long means, was not flown through.
     fn is_its_own(&self, _: &Scene, _: Option<usize>, shape: Shape, b: &[f64]) -> bool {
-        b.first().is_none_or(|gap_rad| (0.5..=2.0).contains(&(gap_rad / shape.value)))
+        b.first().is_none_or(|gap_rad| (0.25..=2.0).contains(&(gap_rad / shape.value)))
     }
 
     fn in_words(&self) -> &'static str {
