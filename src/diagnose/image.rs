@@ -81,6 +81,13 @@ fn dot_of_contrasts(a: &Image, b: &Image) -> f64 {
     if a.contrast.is_empty() || b.contrast.is_empty() { 0.0 } else { dot(&a.contrast, &b.contrast) }
 }
 
+/// ⟨direction, y⟩, with the rows of the mean in which y is not zero: what acts on one joint of a single run is
+/// zero in those of the others.
+fn dot_on(support: &Range<usize>, direction: &Image, y: &Image) -> f64 {
+    let mean = dot(&direction.mean[support.clone()], &y.mean[support.clone()]);
+    mean + dot_of_contrasts(direction, y)
+}
+
 /// Sum of products in eight interleaved partial sums: fast, and a fixed order.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (a8, a_rest) = a.as_chunks::<8>();
@@ -157,9 +164,21 @@ impl Span {
 
     /// Removes from `column` what is spanned.
     pub fn residualise(&self, column: &mut Image) {
-        let along = self.coordinates(column);
+        self.residualise_all(std::slice::from_mut(column));
+    }
+
+    /// Removes from `columns` what is spanned; every direction is fetched once for all of them.
+    pub fn residualise_all(&self, columns: &mut [Image]) {
+        let supports: Vec<Range<usize>> = columns.iter().map(Image::support).collect();
+        let along: Vec<Vec<f64>> = self
+            .directions
+            .iter()
+            .map(|d| columns.iter().zip(&supports).map(|(c, s)| dot_on(s, d, c)).collect())
+            .collect();
         for (direction, along) in self.directions.iter().zip(along) {
-            column.add(-along, direction);
+            for (column, along) in columns.iter_mut().zip(along) {
+                column.add(-along, direction);
+            }
         }
     }
 
@@ -174,13 +193,8 @@ impl Span {
 
     /// ⟨direction, y⟩ for every direction.
     pub fn coordinates(&self, y: &Image) -> Vec<f64> {
-        // What acts on one joint of a single run is zero in the rows of the others.
         let support = y.support();
-        let on_support = |direction: &Image| {
-            let mean = dot(&direction.mean[support.clone()], &y.mean[support.clone()]);
-            mean + dot_of_contrasts(direction, y)
-        };
-        self.directions.iter().map(on_support).collect()
+        self.directions.iter().map(|direction| dot_on(&support, direction, y)).collect()
     }
 
     /// Length² of the part of `y` inside the span.

@@ -69,6 +69,8 @@ pub struct Study<'a> {
 /// of it is the noise of the null model's accelerations, which the residual has as well. A spring on a joint
 /// without gravity keeps 2.7 %, and was found in one of 50 logs without one.
 const ABSORBED: f64 = 0.04;
+/// Shapes that are prepared at once.
+const BANK: usize = 8;
 /// Share of the explained square that has to be explained in stretches left out of the fit as well.
 const KEPT_SHARE: f64 = 0.5;
 /// Share of its joint's mean square that a cause has to remove there: 2.5 % of the rms error are within what
@@ -141,20 +143,21 @@ impl<'a> Study<'a> {
             }
         }
         let b = null.solve(&torque);
-        let is_a_drives =
-            |at: usize, (j, which): (usize, usize)| scene.can_answer(j, which, b[rigid.len() + at]);
-        if !answers.iter().enumerate().all(|(at, answer)| is_a_drives(at, *answer)) {
-            let (base, of_drives) = images.split_at(rigid.len());
-            let kept = answers.iter().enumerate().filter(|(at, answer)| is_a_drives(*at, **answer));
-            let (kept, of_drives): (Vec<_>, Vec<_>) =
-                kept.map(|(at, answer)| (*answer, of_drives[at].clone())).unzip();
+        let of_drives = images.split_off(rigid.len());
+        let count = answers.len();
+        let (answers, of_drives): (Vec<_>, Vec<_>) = answers
+            .into_iter()
+            .zip(of_drives)
+            .zip(&b[rigid.len()..])
+            .filter_map(|(kept, b)| scene.can_answer(kept.0.0, kept.0.1, *b).then_some(kept))
+            .unzip();
+        if answers.len() < count {
             null = rigid;
             of_drives.iter().for_each(|image| {
                 null.push(image);
             });
-            images = base.iter().cloned().chain(of_drives).collect();
-            answers = kept;
         }
+        images.extend(of_drives);
         let mut residual = torque.clone();
         null.residualise(&mut residual);
         let statistic = Statistic::new(&whitening, &residual, problem.joints());
@@ -214,7 +217,7 @@ impl<'a> Study<'a> {
 
     fn fill_entries(&mut self) {
         let study = &*self;
-        let wanted: Vec<(usize, Option<usize>, Shape)> = study
+        let wanted: Vec<(usize, Option<usize>, Vec<Shape>)> = study
             .families
             .iter()
             .enumerate()
@@ -225,32 +228,46 @@ impl<'a> Study<'a> {
                     |site: &Option<usize>| site.is_none_or(|j| !study.left_out.contains(&j));
                 sites.filter(looked_at).flat_map(move |site| {
                     let shapes = candidate.shapes(scene, site);
-                    shapes.into_iter().map(move |shape| (family, site, shape))
+                    let banks: Vec<_> =
+                        shapes.chunks(BANK).map(|s| (family, site, s.to_vec())).collect();
+                    banks
                 })
             })
             .collect();
-        let entries = wanted.par_iter().filter_map(|&(f, site, shape)| study.entry(f, site, shape));
-        self.entries = entries.collect();
+        let entries = wanted.par_iter().flat_map_iter(|(f, site, s)| study.bank(*f, *site, s));
+        self.entries = entries.flatten_iter().collect();
     }
 
     /// A family's columns, the null model projected out; `None` if it absorbs them.
     pub fn entry(&self, family: usize, site: Option<usize>, shape: Shape) -> Option<Entry> {
-        let columns = self.families[family].columns(&self.scene, site, shape);
-        let mut images = Vec::with_capacity(columns.len());
-        for column in &columns {
+        self.bank(family, site, &[shape]).remove(0)
+    }
+
+    /// [`Self::entry`] for each of `shapes`.
+    fn bank(&self, family: usize, site: Option<usize>, shapes: &[Shape]) -> Vec<Option<Entry>> {
+        let columns = self.families[family].bank(&self.scene, site, shapes);
+        let mut images: Vec<Image> =
+            columns.iter().flatten().map(|column| self.whitening.image(column)).collect();
+        let lengths: Vec<f64> = images.iter().map(Image::square).collect();
+        self.null.residualise_all(&mut images);
+        let mut outside = images.into_iter().zip(lengths);
+        let entry = |(shape, columns): (&Shape, Vec<Column>)| {
+            let own: Vec<(Image, f64)> = outside.by_ref().take(columns.len()).collect();
             // Columns behind an absorbed one are parameters that go with it.
-            let Some(image) = self.outside_null(self.whitening.image(column)) else { break };
-            images.push(image);
-        }
-        (!images.is_empty()).then_some(Entry { family, site, shape, images })
+            let images: Vec<Image> = own
+                .into_iter()
+                .map_while(|(image, length)| is_seen(&image, length).then_some(image))
+                .collect();
+            (!images.is_empty()).then_some(Entry { family, site, shape: *shape, images })
+        };
+        shapes.iter().zip(columns).map(entry).collect()
     }
 
     /// What `image` has outside the null model; `None` if that absorbs it.
     pub fn outside_null(&self, mut image: Image) -> Option<Image> {
         let length = image.square();
         self.null.residualise(&mut image);
-        let left = image.square();
-        (left > ABSORBED * ABSORBED * length).then_some(image)
+        is_seen(&image, length).then_some(image)
     }
 
     /// Span of an entry outside the null model and outside `others`.
@@ -416,4 +433,9 @@ impl<'a> Study<'a> {
             self.entries.iter().filter(same).count().max(1) as f64
         })
     }
+}
+
+/// Whether `image`, of the square `length` before the null model was projected out, still has enough to be seen.
+fn is_seen(image: &Image, length: f64) -> bool {
+    image.square() > ABSORBED * ABSORBED * length
 }

@@ -27,6 +27,10 @@ const FLANK_RAD_S: [f64; 14] = [
 ];
 /// ζ of the flanks.
 const DAMPING_RATIO: f64 = 0.08;
+/// Time in which how a flight began is forgotten, s: e^(−10) of a swing at the lowest of these frequencies.
+const RUN_IN_S: f64 = 1.0;
+/// Gaps that are flown through at once.
+const ABREAST: usize = 8;
 
 impl Candidate for Backlash {
     fn kind(&self) -> Kind {
@@ -44,26 +48,16 @@ impl Candidate for Backlash {
     }
 
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
+        self.bank(scene, site, &[shape]).remove(0)
+    }
+
+    fn bank(&self, scene: &Scene, site: Option<usize>, shapes: &[Shape]) -> Vec<Vec<Column>> {
         let j = joint(site);
-        let load = scene.link_nm.joint(j);
-        let n = load.len();
-        let inertia = scene.own_inertia_kg_m2.joint(j);
-        let rotor = scene.arm.joints[j].drive.rotor_inertia_kg_m2.max(f64::MIN_POSITIVE);
-        let step_s = 1.0 / (scene.rate_hz * FINE as f64);
-        let fine = scene.fine_link_nm(j);
-        let mut flight =
-            Flight::pressed(0.5 * shape.value, FLANK_RAD_S[shape.variant], rotor, load[0]);
-        let (mut delta, mut rate) = (vec![0.0; n], vec![0.0; n]);
-        // The second round begins as a motion that repeats does.
-        let rounds = if scene.periodic { 2 } else { 1 };
-        for k in (0..rounds).flat_map(|_| 0..n) {
-            (delta[k], rate[k]) = (flight.angle_rad, flight.rate_rad_s);
-            let mobility = 1.0 / rotor + 1.0 / inertia[k].max(f64::MIN_POSITIVE);
-            for load in &fine[FINE * k..FINE * (k + 1)] {
-                flight.step(*load, mobility, step_s);
-            }
-        }
-        vec![give_way(scene, &lagging_at(scene, j, &delta, &rate), shape.value)]
+        let column = |(shape, [delta, rate]): (&Shape, [Vec<f64>; 2])| {
+            vec![give_way(scene, &lagging_at(scene, j, &delta, &rate), shape.value)]
+        };
+        let abreast = shapes.chunks(ABREAST).flat_map(|some| some.iter().zip(fly(scene, j, some)));
+        abreast.map(column).collect()
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
@@ -95,11 +89,39 @@ impl Candidate for Backlash {
     }
 }
 
+/// δ (rad) and δ̇ (rad/s) at the samples of joint `j`, for each of up to [`ABREAST`] shapes.
+fn fly(scene: &Scene, j: usize, shapes: &[Shape]) -> Vec<[Vec<f64>; 2]> {
+    let load = scene.link_nm.joint(j);
+    let n = load.len();
+    let inertia = scene.own_inertia_kg_m2.joint(j);
+    let rotor = scene.arm.joints[j].drive.rotor_inertia_kg_m2.max(f64::MIN_POSITIVE);
+    let step_s = 1.0 / (scene.rate_hz * FINE as f64);
+    let fine = scene.fine_link_nm(j);
+    // A motion that repeats is entered a little before its beginning.
+    let run_in = if scene.periodic { ((RUN_IN_S * scene.rate_hz) as usize).min(n) } else { 0 };
+    let start_nm = load[(n - run_in) % n];
+    let pressed = |lane: usize| {
+        let shape = shapes[lane.min(shapes.len() - 1)];
+        Flight::pressed(0.5 * shape.value, FLANK_RAD_S[shape.variant], rotor, start_nm)
+    };
+    let mut flights = Flights::abreast(pressed);
+    let mut out: Vec<[Vec<f64>; 2]> = shapes.iter().map(|_| [vec![0.0; n], vec![0.0; n]]).collect();
+    for k in (n - run_in..n).chain(0..n) {
+        for (lane, [delta, rate]) in out.iter_mut().enumerate() {
+            (delta[k], rate[k]) = (flights.angle_rad[lane], flights.rate_rad_s[lane]);
+        }
+        let mobility = 1.0 / rotor + 1.0 / inertia[k].max(f64::MIN_POSITIVE);
+        for load in &fine[FINE * k..FINE * (k + 1)] {
+            flights.step(*load, mobility, step_s);
+        }
+    }
+    out
+}
+
 /// A rotor between the flanks of its gear.
 struct Flight {
     /// q_M − q_L, rad.
     angle_rad: f64,
-    rate_rad_s: f64,
     half_gap_rad: f64,
     stiffness_nm_rad: f64,
     damping_nm_s_rad: f64,
@@ -111,25 +133,47 @@ impl Flight {
         let stiffness_nm_rad = rotor_kg_m2 * flank_rad_s.powi(2);
         Self {
             angle_rad: half_gap_rad.copysign(load_nm) + load_nm / stiffness_nm_rad,
-            rate_rad_s: 0.0,
             half_gap_rad,
             stiffness_nm_rad,
             damping_nm_s_rad: 2.0 * DAMPING_RATIO * rotor_kg_m2 * flank_rad_s,
         }
     }
+}
 
-    /// Torque of the flanks, Nm: they push and do not pull.
-    fn torque_nm(&self) -> f64 {
-        let pressed = self.angle_rad - self.angle_rad.clamp(-self.half_gap_rad, self.half_gap_rad);
-        let torque = self.stiffness_nm_rad * pressed + self.damping_nm_s_rad * self.rate_rad_s;
-        if torque * pressed <= 0.0 { 0.0 } else { torque }
+/// Rotors under one load, number by number, so that a processor moves several at once.
+struct Flights {
+    angle_rad: [f64; ABREAST],
+    rate_rad_s: [f64; ABREAST],
+    half_gap_rad: [f64; ABREAST],
+    stiffness_nm_rad: [f64; ABREAST],
+    damping_nm_s_rad: [f64; ABREAST],
+}
+
+impl Flights {
+    fn abreast(flight: impl Fn(usize) -> Flight) -> Self {
+        let flights: [Flight; ABREAST] = std::array::from_fn(flight);
+        let each = |number: fn(&Flight) -> f64| std::array::from_fn(|lane| number(&flights[lane]));
+        Self {
+            angle_rad: each(|f| f.angle_rad),
+            rate_rad_s: [0.0; ABREAST],
+            half_gap_rad: each(|f| f.half_gap_rad),
+            stiffness_nm_rad: each(|f| f.stiffness_nm_rad),
+            damping_nm_s_rad: each(|f| f.damping_nm_s_rad),
+        }
     }
 
     /// `step_s` later, under the load `load_nm` (semi-implicit Euler, which neither adds energy to a swing
-    /// nor takes any).
+    /// nor takes any). The flanks push and do not pull.
     fn step(&mut self, load_nm: f64, mobility: f64, step_s: f64) {
-        self.rate_rad_s += (load_nm - self.torque_nm()) * mobility * step_s;
-        self.angle_rad += self.rate_rad_s * step_s;
+        for lane in 0..ABREAST {
+            let (angle, half_gap) = (self.angle_rad[lane], self.half_gap_rad[lane]);
+            let pressed = angle - angle.max(-half_gap).min(half_gap);
+            let flanks_nm = self.stiffness_nm_rad[lane] * pressed
+                + self.damping_nm_s_rad[lane] * self.rate_rad_s[lane];
+            let flanks_nm = if flanks_nm * pressed <= 0.0 { 0.0 } else { flanks_nm };
+            self.rate_rad_s[lane] += (load_nm - flanks_nm) * mobility * step_s;
+            self.angle_rad[lane] += self.rate_rad_s[lane] * step_s;
+        }
     }
 }
 
@@ -141,10 +185,10 @@ mod tests {
     #[test]
     fn a_gap_is_crossed_in_the_time_of_a_cubic() {
         let (gap, slope, step_s) = (2e-5_f64, 300.0_f64, 1e-5);
-        let mut flight = Flight::pressed(0.5 * gap, 900.0, 1.0, -1e-9);
+        let mut flights = Flights::abreast(|_| Flight::pressed(0.5 * gap, 900.0, 1.0, -1e-9));
         let mut t = 0.0;
-        while flight.angle_rad < 0.5 * gap {
-            flight.step(slope * (t + 0.5 * step_s), 1.0, step_s);
+        while flights.angle_rad[0] < 0.5 * gap {
+            flights.step(slope * (t + 0.5 * step_s), 1.0, step_s);
             t += step_s;
         }
         // Steps of 10 µs.
@@ -154,12 +198,16 @@ mod tests {
     /// Under a constant load the rotor ends T = load deep in the flank.
     #[test]
     fn a_rotor_comes_to_rest_in_the_flank() {
-        let mut flight = Flight::pressed(1e-5, 300.0, 1.0, -1.0);
+        let frequency = |lane: usize| 300.0 + 50.0 * lane as f64;
+        let mut flights =
+            Flights::abreast(|lane| Flight::pressed(1e-5, frequency(lane), 1.0, -1.0));
         for _ in 0..100_000 {
-            flight.step(5.0, 1.0, 1e-5);
+            flights.step(5.0, 1.0, 1e-5);
         }
-        let at_rest = 1e-5 + 5.0 / 300.0_f64.powi(2);
-        // What is left of the swing after 1 s: e^(−0.08 · 300).
-        assert!((flight.angle_rad - at_rest).abs() < 1e-9 * at_rest, "{}", flight.angle_rad);
+        for (lane, angle) in flights.angle_rad.iter().enumerate() {
+            let at_rest = 1e-5 + 5.0 / frequency(lane).powi(2);
+            // What is left of the swing after 1 s: e^(−0.08 · 300).
+            assert!((angle - at_rest).abs() < 1e-9 * at_rest, "{angle}");
+        }
     }
 }

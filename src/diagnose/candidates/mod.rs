@@ -113,6 +113,11 @@ pub trait Candidate: Sync {
     /// Torque per unit of each coefficient.
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column>;
 
+    /// [`Self::columns`] of several shapes, where that is less work at once.
+    fn bank(&self, scene: &Scene, site: Option<usize>, shapes: &[Shape]) -> Vec<Vec<Column>> {
+        shapes.iter().map(|shape| self.columns(scene, site, *shape)).collect()
+    }
+
     /// Physical parameters of the coefficients.
     fn quantities(
         &self,

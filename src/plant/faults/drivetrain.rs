@@ -3,7 +3,6 @@
 use nalgebra::{Rotation3, Vector3};
 
 use super::assembly::{Assembly, JointMechanics};
-use super::friction::Friction;
 use super::gear::EncoderSide;
 use super::surroundings::Contact;
 use crate::excitation::Reference;
@@ -55,6 +54,8 @@ struct Motor {
 struct Course {
     /// With room for what tracking adds, rad/s.
     largest_speed_rad_s: Vec<f64>,
+    /// Twice what the motion asks for, rad/s²: friction that gives way and pushes come on top.
+    largest_acceleration_rad_s2: Vec<f64>,
     /// Under nominal friction, W.
     mean_friction_power_w: Vec<f64>,
 }
@@ -74,15 +75,18 @@ impl Course {
         let samples = (reference.duration_s() * COURSE_RATE_HZ).ceil().max(1.0) as usize;
         let (mut q, mut qd, mut qdd) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         let (mut largest, mut power) = (vec![0.0_f64; n], vec![0.0; n]);
+        let mut acceleration = vec![0.0_f64; n];
         for k in 0..samples {
             reference.sample(k as f64 / COURSE_RATE_HZ, &mut q, &mut qd, &mut qdd);
             for (j, joint) in joints.iter().enumerate() {
                 largest[j] = largest[j].max(qd[j].abs());
+                acceleration[j] = acceleration[j].max(qdd[j].abs());
                 power[j] += joint.friction.nominal_power_w(qd[j]) / samples as f64;
             }
         }
         Self {
             largest_speed_rad_s: largest.iter().map(|v| 1.2 * v + 0.1).collect(),
+            largest_acceleration_rad_s2: acceleration.iter().map(|a| 2.0 * a + 1.0).collect(),
             mean_friction_power_w: power,
         }
     }
@@ -236,7 +240,7 @@ impl Drivetrain for HiddenDrivetrain {
     }
 
     /// The fastest of: friction against what it acts on, the swing of bristles and gears, bristles
-    /// passing by at the largest speed of the motion, ripple passing by. A swing of frequency ω counts
+    /// that turn round, ripple passing by at the largest speed of the motion. A swing of frequency ω counts
     /// as 2 ω: a step ω h = 1 resolves it.
     fn fastest_decay_per_s(&self, inverse_inertia_per_kg_m2: &[f64]) -> f64 {
         let mut fastest: f64 = 0.0;
@@ -253,7 +257,9 @@ impl Drivetrain for HiddenDrivetrain {
             let (viscous, bristles) = joint.friction.slopes(speed, self.limit_nm[j]);
             fastest = fastest.max(viscous * inverse).max(2.0 * (bristles * inverse).sqrt());
             if let Some(presliding) = &joint.friction.presliding {
-                fastest = fastest.max(presliding.stiffness_per_rad * speed);
+                let acceleration = self.course.largest_acceleration_rad_s2[j];
+                let turning = presliding.fastest_turn_per_s(acceleration);
+                fastest = fastest.max(turning.min(presliding.stiffness_per_rad * speed));
             }
             for ripple in &joint.ripples {
                 fastest = fastest.max(2.0 * ripple.order_per_turn * speed);
@@ -297,7 +303,9 @@ impl Drivetrain for HiddenDrivetrain {
             let speed = self.motor[j].qd_rad_s;
             if let (Some(presliding), Some(s)) = (&joint.friction.presliding, self.slots[j].bristle)
             {
-                states_rate[s] = Friction::bristle_rate(presliding, speed, stage.states[s]);
+                let turning =
+                    presliding.fastest_turn_per_s(self.course.largest_acceleration_rad_s2[j]);
+                states_rate[s] = presliding.bristle_rate(speed, turning, stage.states[s]);
             }
             if let (Some(thermal), Some(s)) = (&joint.friction.thermal, self.slots[j].warmth) {
                 let mean_w = self.course.mean_friction_power_w[j];

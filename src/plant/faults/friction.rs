@@ -88,12 +88,6 @@ impl Friction {
         level
     }
 
-    /// ż = k (q̇ − |q̇| z), 1/s.
-    #[inline]
-    pub(super) fn bristle_rate(presliding: &Presliding, qd_rad_s: f64, bristle: f64) -> f64 {
-        presliding.stiffness_per_rad * (qd_rad_s - qd_rad_s.abs() * bristle)
-    }
-
     /// Power lost at `qd_rad_s` under the nominal law, W.
     pub(super) fn nominal_power_w(&self, qd_rad_s: f64) -> f64 {
         let sign = (qd_rad_s / self.epsilon_rad_s).tanh();
@@ -279,6 +273,25 @@ pub struct Presliding {
     pub stiffness_per_rad: f64,
 }
 
+/// ln of 1/e^18 = 1.5e-8: what a bristle may lack to have turned round.
+const TURNED_ROUND: f64 = 18.0;
+
+impl Presliding {
+    /// ż = k (q̇ − |q̇| z), 1/s, which is a decay towards ±1 at k |q̇|; it counts up to `fastest_per_s`.
+    #[inline]
+    pub(super) fn bristle_rate(&self, qd_rad_s: f64, fastest_per_s: f64, bristle: f64) -> f64 {
+        let decay_per_s = (self.stiffness_per_rad * qd_rad_s.abs()).min(fastest_per_s);
+        decay_per_s * (qd_rad_s.signum() - bristle)
+    }
+
+    /// The fastest decay that matters, 1/s. Behind a reversal at the acceleration a the bristle lacks e^(−k d)
+    /// where the joint has turned by d at the speed √(2 a d): it has turned round for good before the decay k q̇
+    /// gets beyond √(2 a k · 18), and a bristle at rest at ±1 does not tell how fast it would go there.
+    pub(super) fn fastest_turn_per_s(&self, acceleration_rad_s2: f64) -> f64 {
+        (2.0 * acceleration_rad_s2 * self.stiffness_per_rad * TURNED_ROUND).sqrt()
+    }
+}
+
 impl Fault for Presliding {
     fn joint(&self) -> Option<usize> {
         Some(self.joint)
@@ -382,5 +395,30 @@ impl Fault for FrictionChange {
         friction.viscous_nm_s_rad += self.viscous_nm_s_rad;
         not_negative("coulomb_nm", friction.coulomb_nm)?;
         not_negative("viscous_nm_s_rad", friction.viscous_nm_s_rad)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Behind a reversal, q = a t²/2, the bristle goes from −1 to 1 as 1 − 2 e^(−k q), however fast it may decay.
+    #[test]
+    fn a_bristle_turns_round_as_if_no_decay_were_too_fast() {
+        let (presliding, a) = (Presliding { joint: 1, stiffness_per_rad: 1e4 }, 20.0);
+        let fastest = presliding.fastest_turn_per_s(a);
+        let step_s = 1e-6;
+        let (mut z, mut worst) = (-1.0, 0.0_f64);
+        for step in 0..20_000 {
+            let t = step as f64 * step_s;
+            // The midpoint rule.
+            let half = z + 0.5 * step_s * presliding.bristle_rate(a * t, fastest, z);
+            z += step_s * presliding.bristle_rate(a * (t + 0.5 * step_s), fastest, half);
+            let q = 0.5 * a * (t + step_s).powi(2);
+            worst = worst.max((z - 1.0 + 2.0 * (-1e4 * q).exp()).abs());
+        }
+        assert!(1e4 * a * 0.02 > fastest, "the decay was bounded");
+        // 2 e^(−18), and the rule's own error of (k a t h)² per decay.
+        assert!(worst < 4e-8 + (fastest * step_s).powi(2), "{worst}");
     }
 }
