@@ -86,15 +86,13 @@ pub fn physical(
     let (others, residual) = kept.without(Some(index));
     let span = tangent_span(study, &others, effect);
     let quantile = study.statistic.quantile_95(&span, &residual);
-    let mut out = of_one_form(study, effect, (&span, &residual), quantile);
-    if study.scene.periodic && study.families[effect.family].search() != Search::None {
-        let covariance = study.statistic.covariance(&span, &residual);
-        let sigma = covariance.diagonal().as_slice().last().map_or(0.0, |v| v.max(0.0).sqrt());
-        let profile = Profile { study, effect, others: &others, residual: &residual, quantile };
-        if let Some(of_profile) = profile.intervals(sigma) {
-            out = of_profile;
-        }
-    }
+    let has_profile =
+        study.scene.periodic && study.families[effect.family].search() != Search::None;
+    let profile = Profile { study, effect, others: &others, residual: &residual, quantile };
+    let mut out = has_profile
+        .then(|| profile.intervals(&span))
+        .flatten()
+        .unwrap_or_else(|| of_one_form(study, effect, (&span, &residual), quantile));
     for form in kept.other_forms(index) {
         let left = 1.0 - form.behind / quantile.powi(2);
         if left <= 0.0 {
@@ -145,19 +143,22 @@ const STEPS_OUT: usize = 4;
 const HALVINGS: usize = 4;
 
 impl Profile<'_> {
-    /// What the profile says; `sigma` of the nonlinear parameter is where it begins to look for the ends.
-    fn intervals(&self, sigma: f64) -> Option<BTreeMap<&'static str, Estimate>> {
-        let best = self.gain_at(self.effect.shape.value)?;
-        let mut out = self.at(self.effect.shape.value, self.quantile)?;
+    /// What the profile says; σ of the nonlinear parameter, the last of `tangents`, is where it begins to look for
+    /// the ends. `None` where the best value itself explains nothing beside the other causes.
+    fn intervals(&self, tangents: &Span) -> Option<BTreeMap<&'static str, Estimate>> {
+        let covariance = self.study.statistic.covariance(tangents, self.residual);
+        let sigma = covariance.diagonal().as_slice().last().map_or(0.0, |v| v.max(0.0).sqrt());
+        let centre = self.entry(self.effect.shape.value)?;
+        let best = self.gain(&centre)?;
+        let mut out = self.estimates(&centre, self.quantile);
         for side in [-1.0, 1.0] {
             let end = self.end(side * self.quantile * sigma, best);
             for part in 1..=PARTS {
                 let value = self.moved(end * part as f64 / PARTS as f64);
-                let Some(gain) = self.gain_at(value) else { continue };
+                let Some(entry) = self.entry(value) else { continue };
+                let Some(gain) = self.gain(&entry) else { continue };
                 let left = self.quantile.powi(2) - (best - gain).max(0.0);
-                if let Some(there) = self.at(value, left.max(0.0).sqrt()) {
-                    reach_over(&mut out, &there);
-                }
+                reach_over(&mut out, &self.estimates(&entry, left.max(0.0).sqrt()));
             }
         }
         Some(out)
@@ -166,7 +167,7 @@ impl Profile<'_> {
     /// How far, from the best value and in units of `step`'s scale, the gain falls by the square of the quantile.
     fn end(&self, step: f64, best: f64) -> f64 {
         let is_allowed = |way: f64| {
-            let gain = self.gain_at(self.moved(way));
+            let gain = self.entry(self.moved(way)).and_then(|entry| self.gain(&entry));
             gain.is_some_and(|gain| best - gain < self.quantile.powi(2))
         };
         let (mut inside, mut outside) = (0.0, step);
@@ -202,21 +203,19 @@ impl Profile<'_> {
         (entry.images.len() == self.effect.coefficients.len()).then_some(entry)
     }
 
-    fn gain_at(&self, value: f64) -> Option<f64> {
-        let entry = self.entry(value)?;
-        self.study.score(&entry, self.others, self.residual).map(|score| score.gain)
+    fn gain(&self, entry: &Entry) -> Option<f64> {
+        self.study.score(entry, self.others, self.residual).map(|score| score.gain)
     }
 
-    /// The parameters at `value`, with intervals of ± `half` σ of the coefficients alone.
-    fn at(&self, value: f64, half: f64) -> Option<BTreeMap<&'static str, Estimate>> {
-        let span = self.study.span(&self.entry(value)?, self.others);
-        let coefficients = span.solve(self.residual);
+    /// The parameters with the shape of `entry`, with intervals of ± `half` σ of the coefficients alone.
+    fn estimates(&self, entry: &Entry, half: f64) -> BTreeMap<&'static str, Estimate> {
+        let span = self.study.span(entry, self.others);
         let effect = Effect {
-            coefficients,
-            shape: Shape { value, ..self.effect.shape },
+            coefficients: span.solve(self.residual),
+            shape: entry.shape,
             ..self.effect.clone()
         };
-        Some(of_one_form(self.study, &effect, (&span, self.residual), half))
+        of_one_form(self.study, &effect, (&span, self.residual), half)
     }
 }
 

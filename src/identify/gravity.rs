@@ -138,7 +138,7 @@ mod tests {
     }
 
     /// ‖first moments‖ of base parameters.
-    fn known_length(set: &BaseSet, values: &[f64]) -> f64 {
+    fn length_of_moments(set: &BaseSet, values: &[f64]) -> f64 {
         let is_moment = |k: &usize| set.name(*k).starts_with('m');
         (0..set.rank()).filter(is_moment).map(|k| values[k].powi(2)).sum::<f64>().sqrt()
     }
@@ -170,8 +170,8 @@ mod tests {
         // makes that of the ratio, found over described, σ/‖described‖.
         let vague = DMatrix::identity(set.rank(), set.rank()) * 100.0;
         let doubtful = GravityMatch::of(&arm, &set, &nominal, &larger, &vague).unwrap();
-        let length = (1.0 / known_length(&set, &nominal)).abs();
-        assert!((doubtful.ratio_sigma - 10.0 * length).abs() < 1e-9, "{doubtful:?}");
+        let expected = 10.0 / length_of_moments(&set, &nominal);
+        assert!((doubtful.ratio_sigma - expected).abs() < 1e-9, "{doubtful:?}");
         assert!(doubtful.remark("ur5e", 1.96).is_none(), "{doubtful:?}");
     }
 }
