@@ -3,7 +3,8 @@
     pip install numpy scipy scikit-learn pin
     python reports/ur10e_ceiling.py FOLDER_WITH_UR10E_LOGS
 
-Independent of armid: Pinocchio's regressor, ordinary least squares, and gradient-boosted trees on what is left.
+Shares no code with armid: Pinocchio's regressor, least squares, and gradient-boosted trees on what is left. Which laws of
+friction are named, the stiffness of the bristles and the orders of the ripple are those of reports/ur10e.md.
 Rms errors of samples in which the joint moves, |qd| > 0.02 rad/s, behind a 10 Hz zero-phase low-pass.
 """
 
@@ -25,8 +26,10 @@ RUNS = {
     "ur-20_02_12-50sec_12harm": (355, 5090),
     "ur-20_01_17-ptp_10_points": (700, 4200),
 }
-BRISTLES_PER_RAD = [3000, 3000, 3000, 3300, 2300, 5300]
-RIPPLE_ORDERS = (101, 202, 303, 404, 808, 1212)
+BRISTLES_PER_RAD = [26820, 63520, 29130, 3299, 2311, 5329]
+NAMED_ORDERS = [(202,), (), (), (201,), (202, 808, 1212), ()]
+ORDERS = (101, 202, 303, 404, 808, 1212)
+TREES = ((4, 100), (12, 100), (12, 300))
 NUMERATOR, DENOMINATOR = butter(4, CUTOFF_HZ / (RATE_HZ / 2))
 
 
@@ -72,22 +75,22 @@ class Run:
     def ripple(self, j, orders):
         return [f(order * self.q[:, j]) for order in orders for f in (np.cos, np.sin)]
 
-    def friction(self, j, extended):
+    def friction(self, j, predicted):
+        """Rotor, viscous, Coulomb, offset; where the rigid model's torque is given, the named laws as well."""
         qd, sign = self.qd[:, j], self.sign[:, j]
         columns = [self.qdd[:, j], qd, sign, np.ones(len(qd))]
-        if extended:
-            columns += [self.bristle(j, BRISTLES_PER_RAD[j])] + self.ripple(j, [202])
+        if predicted is not None:
+            columns += [self.bristle(j, BRISTLES_PER_RAD[j])] + self.ripple(j, NAMED_ORDERS[j])
             if j == 0:
                 columns.append(np.sign(qd) * np.sqrt(np.abs(qd)))
             if j in (1, 2):
-                # The measured torque of these is nearly all load.
-                columns.append(np.abs(self.torque[:, j]) * sign)
+                columns.append(np.abs(predicted[:, j]) * sign)
         return smooth(np.stack(columns, 1))
 
 
-def linear_residuals(runs, extended):
-    """Errors of the linear model fitted to the first run, per run and joint."""
-    friction = [[run.friction(j, extended) for j in range(6)] for run in runs]
+def linear_model(runs, rigid):
+    """Torque of the linear model fitted to the first run, per run; with the named laws where `rigid` has that of the rigid one."""
+    friction = [[run.friction(j, r) for j in range(6)] for run, r in zip(runs, rigid)]
     ends = 60 + np.cumsum([0] + [f.shape[1] for f in friction[0]])
 
     def rows(i, j):
@@ -102,7 +105,7 @@ def linear_residuals(runs, extended):
     values, vectors = np.linalg.eigh((matrix / scale).T @ (matrix / scale))
     vectors, values = vectors[:, values > 1e-7 * values[-1]], values[values > 1e-7 * values[-1]]
     theta = vectors @ (vectors.T @ ((matrix / scale).T @ torque) / values) / scale
-    return [[run.torque[:, j] - rows(i, j) @ theta for j in range(6)] for i, run in enumerate(runs)]
+    return [np.stack([rows(i, j) @ theta for j in range(6)], 1) for i in range(len(runs))]
 
 
 def inputs(run, j, predicted, kinds):
@@ -112,7 +115,7 @@ def inputs(run, j, predicted, kinds):
         "bristles": [run.bristle(j, k) for k in (300, 1000, 3000, 10000)],
         "load": [predicted],
         "angle": [run.q[:, j]],
-        "ripple": [c * s for c in run.ripple(j, RIPPLE_ORDERS) for s in (1.0, run.sign[:, j])],
+        "ripple": [c * s for c in run.ripple(j, ORDERS) for s in (1.0, run.sign[:, j])],
         "others": [x[:, i] for x in (run.qd, run.qdd) for i in others] + [run.bristle(i, 1000) for i in others],
     }
     return np.stack([column for kind in kinds for column in columns[kind]], 1)
@@ -126,33 +129,36 @@ def main():
     folder = sys.argv[1]
     model = pin.buildModelFromUrdf(f"{folder}/ur10e.urdf")
     runs = [Run(folder, name, model) for name in RUNS]
-    rigid, extended = linear_residuals(runs, False), linear_residuals(runs, True)
-    error = lambda residuals, i, j: rms(residuals[i][j][runs[i].moving(j)])
-    held_out = range(1, len(runs))
-    gain = lambda after, i, j: 100 * (1 - after / error(rigid, i, j))
+    rigid = linear_model(runs, [None] * len(runs))
+    extended = linear_model(runs, rigid)
+    others = lambda i: [k for k in range(len(runs)) if k != i]
     extra = ("bristles", "load", "angle", "ripple", "others")
     sets = [("speed",) + s for n in range(3) for s in itertools.combinations(extra, n)] + [("speed",) + extra]
-    print("error removed, %: joint, linear extension, with the best trees taught by the training run,")
-    print("with the best trees taught by three runs and tried on the fourth, and their inputs")
-    for j in range(6):
-        own = [extended[i][j][runs[i].moving(j)] for i in range(len(runs))]
-        results = []
-        for kinds, leaves in itertools.product(sets, (4, 12)):
-            x = [inputs(r, j, r.torque[:, j] - e[j], kinds)[r.moving(j)] for r, e in zip(runs, extended)]
+    print("error removed on the held-out runs, %: mean (per run)")
+    for j in (3, 4, 5):
+        kept = [run.moving(j) for run in runs]
+        own = [(run.torque[:, j] - e[:, j])[k] for run, e, k in zip(runs, extended, kept)]
+        before = [rms((run.torque[:, j] - r[:, j])[k]) for run, r, k in zip(runs, rigid, kept)]
+        gains = lambda left: [100 * (1 - rms(left[i]) / before[i]) for i in range(1, len(runs))]
+        tell = lambda g: f"{np.mean(g):5.1f} ({', '.join(f'{v:.1f}' for v in g)})"
+        one, three = [], []
+        for kinds, (leaves, count) in itertools.product(sets, TREES):
+            x = [inputs(run, j, e[:, j], kinds)[k] for run, e, k in zip(runs, extended, kept)]
 
             def left(teachers, i):
                 trees = HistGradientBoostingRegressor(
-                    max_iter=100, learning_rate=0.05, max_leaf_nodes=leaves, min_samples_leaf=60, random_state=0
+                    max_iter=count, learning_rate=0.05, max_leaf_nodes=leaves, min_samples_leaf=60, random_state=0
                 )
                 trees.fit(np.vstack([x[k] for k in teachers]), np.concatenate([own[k] for k in teachers]))
-                return gain(rms(own[i] - trees.predict(x[i])), i, j)
+                return own[i] - trees.predict(x[i])
 
-            one = np.mean([left([0], i) for i in held_out])
-            three = np.mean([left([k for k in range(len(runs)) if k != i], i) for i in held_out])
-            results.append((one, three, kinds))
-        plain = np.mean([gain(rms(own[i]), i, j) for i in held_out])
-        one, three = max(results), max(results, key=lambda r: r[1])
-        print(f"{j + 1}  {plain:5.1f}  {one[0]:5.1f} ({', '.join(one[2])})  {three[1]:5.1f} ({', '.join(three[2])})", flush=True)
+            of = f"{' '.join(kinds)}, {count} trees of {leaves} leaves"
+            one.append((gains([left([0], i) for i in range(len(runs))]), of))
+            three.append((gains([left(others(i), i) for i in range(len(runs))]), of))
+        print(f"joint {j + 1}: named laws {tell(gains(own))}")
+        for name, results in (("the training run", one), ("the other three runs", three)):
+            best = max(results, key=lambda r: np.mean(r[0]))
+            print(f"    with the best of {len(results)} lots of trees, taught by {name}: {tell(best[0])} from {best[1]}", flush=True)
 
 
 if __name__ == "__main__":

@@ -161,7 +161,7 @@ fn simulated_parameters(
     }
     let text = std::fs::read_to_string(file).map_err(|e| format!("{}: {e}", file.display()))?;
     let result: IdentifiedParameters =
-        serde_json::from_str(&text).map_err(|e| format!("{}: {e}", file.display()))?;
+        serde_json::from_str(&text).map_err(|e| not_a_simulation(file, &e))?;
     (0..set.rank())
         .map(|k| {
             let name = set.name(k);
@@ -170,6 +170,15 @@ fn simulated_parameters(
             found.map(|p| p.value).ok_or_else(missing)
         })
         .collect()
+}
+
+/// Why `file` cannot be compared with.
+fn not_a_simulation(file: &Path, error: &serde_json::Error) -> String {
+    let file = file.display();
+    format!(
+        "{file}: neither a scenario (.toml) nor a result of `armid identify --json` ({error}); a second log goes \
+         behind the first, without --sim"
+    )
 }
 
 /// What is needed of an identification's JSON.

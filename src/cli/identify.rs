@@ -228,7 +228,7 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
     }
     say!("{}", parameter_table(&result).to_text());
     say!("{}", residual_table(&result).to_text());
-    for warning in &result.warnings {
+    for warning in result.notes() {
         say!("note: {warning}");
     }
     say!("\n{}", result.sentence());

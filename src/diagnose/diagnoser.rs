@@ -58,6 +58,10 @@ pub struct Finding {
 
 /// √λ at which a family is found with 90 % probability: z of its threshold plus 1.28.
 const POWER: f64 = 0.9;
+/// A column that keeps less than this share of its square beside the causes that were named is one of them.
+const ABSORBED_BESIDE: f64 = 0.04 * 0.04;
+/// No effect has a coefficient (Nm, Nm/rad, rad, 1 … in SI) as large as this: its column is rounding.
+const BEYOND_PHYSICS: f64 = 1e4;
 const POWER_Z: f64 = 1.281_551_565_544_6;
 
 impl<'a> Diagnoser<'a> {
@@ -200,7 +204,7 @@ impl<'a> Diagnoser<'a> {
             payload: None,
             replay: None,
             detection_limits: self.detection_limits(&study, &accepted),
-            lack_of_fit_probability: lack,
+            lack_of_fit_probability: lack.map(|lack| lack.probability),
             verdict,
             sentences: Vec::new(),
             warnings: identification.warnings.clone(),
@@ -323,17 +327,29 @@ impl<'a> Diagnoser<'a> {
                 }
                 // √λ of a coefficient b on column 1 alone is b ‖d⊥‖.
                 let length = span.first_length();
-                let mut b = vec![0.0; entry.images.len()];
                 let threshold = (study.price(entry) + LEAST_EVIDENCE).sqrt() + POWER_Z;
-                b[0] = threshold / length;
-                let q = candidate.quantities(&study.scene, site, entry.shape, &b);
-                let Some(quantity) = candidate.size(&q) else { continue };
+                let quantities = |coefficient: f64| {
+                    let mut b = vec![0.0; entry.images.len()];
+                    b[0] = coefficient;
+                    candidate.quantities(&study.scene, site, entry.shape, &b)
+                };
+                let of = quantities(threshold / length);
+                let Some(quantity) = candidate.size(&of) else { continue };
+                // What the coefficient does not change, the shape has given.
+                let given = of
+                    .iter()
+                    .zip(quantities(2.0 * threshold / length))
+                    .filter(|(one, two)| one.value == two.value && one.value != 0.0)
+                    .map(|(one, _)| (one.name, one.value));
+                let is_told = length * length > ABSORBED_BESIDE * entry.images[0].square()
+                    && threshold / length < BEYOND_PHYSICS;
                 out.push(DetectionLimit {
                     kind: candidate.kind(),
                     joint: site.map(|j| j + 1),
                     parameter: quantity.name,
-                    value: Some(quantity.value),
+                    value: is_told.then_some(quantity.value),
                     unit: quantity.unit,
+                    given: given.filter(|(name, _)| *name != quantity.name).collect(),
                     power: POWER,
                 });
             }

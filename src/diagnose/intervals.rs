@@ -144,7 +144,7 @@ const HALVINGS: usize = 4;
 
 impl Profile<'_> {
     /// What the profile says; σ of the nonlinear parameter, the last of `tangents`, is where it begins to look for
-    /// the ends. `None` where the best value itself explains nothing beside the other causes.
+    /// the ends. `None` where the columns at the best value hang on those of the other causes.
     fn intervals(&self, tangents: &Span) -> Option<BTreeMap<&'static str, Estimate>> {
         let covariance = self.study.statistic.covariance(tangents, self.residual);
         let sigma = covariance.diagonal().as_slice().last().map_or(0.0, |v| v.max(0.0).sqrt());

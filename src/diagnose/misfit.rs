@@ -1,5 +1,6 @@
 //! What is left behind the last cause: is it noise, and if not, on what does it depend?
 
+use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::image::{Column, Image, Span};
@@ -15,6 +16,8 @@ const BANDS_HZ: [f64; 5] = [0.0, 2.0, 5.0, 10.0, 20.0];
 const FALSE_ALARM: f64 = 0.0005;
 /// A part of the curve that keeps less than this share of its length belongs to the model.
 const ABSORBED: f64 = 0.1;
+/// A part of the curve that keeps less than this share has no height of its own that could be drawn.
+const VISIBLE: f64 = 0.3;
 /// Knots of the curve along an axis.
 const KNOTS: usize = 10;
 /// Share of the samples beyond the outermost knots. A drive that feeds friction forward jumps at a reversal, and the
@@ -24,12 +27,21 @@ const OUTERMOST: f64 = 0.01;
 /// The first knot of the way behind a reversal, rad: bristles and teeth give way by more.
 const SHORTEST_WAY_RAD: f64 = 1e-4;
 
-/// Probability that noise alone leaves as much in any band of any joint; `None` for a single run.
+/// How well noise explains what is left.
+#[derive(Debug, Clone, Copy)]
+pub struct LackOfFit {
+    /// Probability that noise alone leaves as much in any band of any joint.
+    pub probability: f64,
+    /// The joint (0-based) of which that is least likely.
+    pub joint: usize,
+}
+
+/// Whether noise alone leaves as much; `None` for a single run.
 ///
 /// Per joint and band, Σ r² over its degrees of freedom is F(k, ν): k the rows less their share in what the
 /// null model and `accepted` have fitted (Σ of the leverages), ν what the periods know of the noise there.
 /// The smallest probability is multiplied by their number (Bonferroni).
-pub fn lack_of_fit(study: &Study, accepted: &Span, residual: &Image) -> Option<f64> {
+pub fn lack_of_fit(study: &Study, accepted: &Span, residual: &Image) -> Option<LackOfFit> {
     let Statistic::Periods(knowledge) = &study.statistic else { return None };
     let harmonic = |hz: f64| (hz * study.scene.samples() as f64 / study.scene.rate_hz) as usize;
     let edges: Vec<usize> = BANDS_HZ
@@ -42,7 +54,7 @@ pub fn lack_of_fit(study: &Study, accepted: &Span, residual: &Image) -> Option<f
         let directions = study.null.directions().iter().chain(accepted.directions());
         directions.map(|d| d.mean[row] * d.mean[row]).sum()
     };
-    let mut least = 1.0f64;
+    let (mut least, mut worst) = (1.0f64, 0);
     let mut tests = 0.0;
     for joint in 0..study.scene.joints() {
         for band in edges.windows(2).filter(|band| band[0] < band[1]) {
@@ -55,27 +67,29 @@ pub fn lack_of_fit(study: &Study, accepted: &Span, residual: &Image) -> Option<f
             let noise = knowledge.freedom_of_band(band[0]..band[1], joint);
             let chance =
                 FisherSnedecor::new(freedom, noise).map_or(1.0, |f| f.sf(square / freedom));
-            least = least.min(chance);
+            if chance < least {
+                (least, worst) = (chance, joint);
+            }
             tests += 1.0;
         }
     }
-    Some((tests * least).min(1.0))
+    Some(LackOfFit { probability: (tests * least).min(1.0), joint: worst })
 }
 
 /// The axis along which the residual is largest: a curve of 10 knots in each quantity of each joint.
 ///
-/// `Some` if that curve, or the lack of fit as a whole, cannot be noise.
+/// `Some` if that curve cannot be noise; or if the lack of fit cannot, and then of the joint of which it is.
 pub fn unexplained(
     study: &Study,
     accepted: &Span,
     residual: &Image,
-    lack_of_fit: Option<f64>,
+    lack_of_fit: Option<LackOfFit>,
 ) -> Option<Unexplained> {
     if !study.scene.periodic {
         return None;
     }
     let scene = &study.scene;
-    let mut best: Option<(f64, f64, Unexplained)> = None;
+    let mut found: Vec<Curve> = Vec::new();
     let mut tests = 0.0;
     for j in (0..scene.joints()).filter(|j| !study.left_out.contains(j)) {
         let torque_rate = scene.derivative(scene.torque_nm.joint(j));
@@ -92,47 +106,82 @@ pub fn unexplained(
         for (axis, (knots, hats)) in curves.into_iter().chain(behind_reversals(scene, j)) {
             tests += 1.0;
             let mut span = Span::default();
-            let mut used = Vec::new();
-            for (knot, hat) in hats.iter().enumerate() {
-                let mut image = study.whitening.image(&Column::on(j, hat.clone()));
-                let length = image.square();
-                study.null.residualise(&mut image);
-                accepted.residualise(&mut image);
+            let image = |hat: &Vec<f64>| study.whitening.image(&Column::on(j, hat.clone()));
+            let raw: Vec<Image> = hats.iter().map(image).collect();
+            let mut outside = raw.clone();
+            study.null.residualise_all(&mut outside);
+            accepted.residualise_all(&mut outside);
+            for (raw, image) in raw.iter().zip(&outside) {
                 let mut own = image.clone();
                 span.residualise(&mut own);
-                if own.square() > ABSORBED * ABSORBED * length && span.push(&image) {
-                    used.push(knot);
+                if own.square() > ABSORBED * ABSORBED * raw.square() {
+                    span.push(image);
                 }
             }
             let explained = span.explained(residual);
             let probability = study.statistic.probability(&span, residual);
             let evidence = explained - span.len() as f64 * (residual.mean.len() as f64).ln();
-            if best.as_ref().is_some_and(|b| b.0 >= evidence) {
-                continue;
-            }
-            let mut heights = vec![0.0; KNOTS];
-            for (knot, b) in used.iter().zip(span.solve(residual)) {
-                heights[*knot] = b;
-            }
-            // The level belongs to the model; the curve is what varies.
-            let mean = heights.iter().sum::<f64>() / KNOTS as f64;
-            heights.iter_mut().for_each(|h| *h -= mean);
+            let heights = visible(&raw, &outside, residual);
             let curve_at =
                 |k: usize| -> f64 { hats.iter().zip(&heights).map(|(h, b)| h[k] * b).sum() };
             let n = scene.samples();
             let square: f64 = (0..n).map(|k| curve_at(k).powi(2)).sum();
-            let found = Unexplained {
+            let unexplained = Unexplained {
                 axis,
                 joint: j + 1,
                 rms_nm: (square / n as f64).sqrt(),
                 curve: knots.iter().zip(&heights).map(|(x, y)| [*x, *y]).collect(),
             };
-            best = Some((evidence, probability, found));
+            found.push(Curve { evidence, probability, unexplained });
         }
     }
-    let (_, probability, found) = best?;
-    let fires = probability * tests < FALSE_ALARM || lack_of_fit.is_some_and(|p| p < FALSE_ALARM);
-    fires.then_some(found)
+    let by_evidence = |a: &Curve, b: &Curve| a.evidence.total_cmp(&b.evidence);
+    found.sort_by(by_evidence);
+    let best = found.last()?;
+    if best.probability * tests < FALSE_ALARM {
+        return found.pop().map(|curve| curve.unexplained);
+    }
+    let lack = lack_of_fit.filter(|lack| lack.probability < FALSE_ALARM)?;
+    let of_joint = |curve: &Curve| curve.unexplained.joint == lack.joint + 1;
+    found.into_iter().rfind(of_joint).map(|curve| curve.unexplained)
+}
+
+/// A curve along one axis, and how clearly the residual shows it.
+struct Curve {
+    /// Twice the gain in log-likelihood less its price.
+    evidence: f64,
+    /// Of as much by chance.
+    probability: f64,
+    unexplained: Unexplained,
+}
+
+/// Heights of the knots that `residual` shows, without their mean, which belongs to the model: the least-squares curve
+/// without the parts of which the model and the causes leave less than [`VISIBLE`]. With the hats' images X, and `outside`
+/// of the model X⊥, X⊥ᵀX⊥ v = s² XᵀX v: the share that is left of the part v is s.
+fn visible(raw: &[Image], outside: &[Image], residual: &Image) -> Vec<f64> {
+    let n = raw.len();
+    let gram = |of: &[Image]| DMatrix::from_fn(n, n, |i, k| of[i].dot(&of[k]));
+    let mut heights = DVector::zeros(n);
+    let own = gram(raw);
+    // Knots may coincide.
+    let ridge = 1e-9 * own.trace() / n as f64;
+    if let Some(factor) = (own + DMatrix::identity(n, n) * ridge).cholesky() {
+        // L⁻¹ X⊥ᵀX⊥ L⁻ᵀ has the eigenvalues s²; its vectors are Lᵀ v.
+        let lower = factor.l();
+        let half = lower.solve_lower_triangular(&gram(outside)).unwrap_or_default();
+        let both = lower.solve_lower_triangular(&half.transpose()).unwrap_or_default();
+        let parts = both.symmetric_eigen();
+        let along = DVector::from_iterator(n, outside.iter().map(|image| image.dot(residual)));
+        for (share, w) in parts.eigenvalues.iter().zip(parts.eigenvectors.column_iter()) {
+            if *share > VISIBLE * VISIBLE
+                && let Some(v) = lower.tr_solve_lower_triangular(&w)
+            {
+                heights += &v * (v.dot(&along) / share);
+            }
+        }
+    }
+    heights.add_scalar_mut(-heights.mean());
+    heights.data.into()
 }
 
 /// What friction does behind a reversal, whatever its law: hats over the logarithm of the way since then, each

@@ -183,7 +183,14 @@ impl PayloadFinding {
     pub fn sentences(&self) -> Vec<String> {
         let pair = |e: &Estimate| format!("{:.3} ± {:.3}", e.value, 0.25 * (e.ci95[1] - e.ci95[0]));
         let mut out = Vec::new();
-        if !self.is_named {
+        if !self.is_named && self.mass_kg.ci95[1] < 0.0 {
+            out.push(format!(
+                "No body on the flange beside {}, but less of one: {} kg. The first log carries more than the second; \
+                 were they swapped?",
+                self.reference,
+                pair(&self.mass_kg)
+            ));
+        } else if !self.is_named {
             out.push(format!(
                 "No body on the flange beside {}: {} kg, which chance explains (p = {:.2}).",
                 self.reference,

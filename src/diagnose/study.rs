@@ -149,7 +149,8 @@ impl<'a> Study<'a> {
             .into_iter()
             .zip(of_drives)
             .zip(&b[rigid.len()..])
-            .filter_map(|(kept, b)| scene.can_answer(kept.0.0, kept.0.1, *b).then_some(kept))
+            .filter(|&(((j, which), _), b)| scene.can_answer(j, which, *b))
+            .map(|(answer, _)| answer)
             .unzip();
         if answers.len() < count {
             null = rigid;

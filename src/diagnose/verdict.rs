@@ -25,6 +25,12 @@ impl Estimate {
     fn in_words(&self) -> String {
         let [low, high] = self.ci95;
         let (below, above) = (self.value - low, high - self.value);
+        if self.says_nothing() {
+            let [low, high] = [low, high].map(two_digits);
+            return format!("hardly known (between {low} and {high}) {}", self.unit)
+                .trim_end()
+                .to_owned();
+        }
         if above > UNEVEN * below || below > UNEVEN * above {
             let [value, low, high] = [self.value, low, high].map(two_digits);
             return format!("{value} (between {low} and {high}) {}", self.unit)
@@ -34,12 +40,21 @@ impl Estimate {
         pair(self.value, 0.5 * (high - low), self.unit)
     }
 
+    /// Whether the interval spans a whole turn, or a factor of a thousand.
+    fn says_nothing(&self) -> bool {
+        let [low, high] = self.ci95;
+        self.unit == "rad" && high - low > std::f64::consts::TAU || low > 0.0 && high > VAST * low
+    }
+
     /// Makes the interval hold `value`.
     pub(super) fn reach(&mut self, value: f64) {
         let [low, high] = self.ci95;
         self.ci95 = [low.min(value), high.max(value)];
     }
 }
+
+/// Ends of an interval between which nothing is known.
+const VAST: f64 = 1000.0;
 
 /// A named cause.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -101,10 +116,13 @@ pub struct DetectionLimit {
     pub joint: Option<usize>,
     /// Name of the parameter.
     pub parameter: &'static str,
-    /// Value that is found with probability `power`; null where the null model absorbs the effect.
+    /// Value that is found with probability `power`; null where the null model, or a cause that was named, absorbs
+    /// the effect.
     pub value: Option<f64>,
     /// SI unit.
     pub unit: &'static str,
+    /// The effect's other parameters, SI, for which this holds.
+    pub given: std::collections::BTreeMap<&'static str, f64>,
     /// Probability of detection at that value.
     pub power: f64,
 }
@@ -262,19 +280,49 @@ impl Diagnosis {
         if out.is_empty() {
             out.push(match self.noise_floor_nm {
                 Some(_) => "Nothing found: what the model leaves is noise, as the scatter between periods shows; \
-                            the detection limits say what would have been seen."
+                            the detection limits say what would have been seen. What only moves the parameters (a \
+                            body on the flange, gravity, a longer link) shows beside a simulation (--sim) or a second \
+                            log."
                     .into(),
                 None => "Nothing found above what a single run can show; the motion does not repeat, so that \
                          the noise is judged from the residual itself."
                     .into(),
             });
         }
+        out.extend(self.held_out.iter().filter_map(|held_out| self.does_not_carry_over(held_out)));
         out
     }
 }
 
 /// An interval that reaches so much farther to one side than to the other is told by its ends.
-const UNEVEN: f64 = 1.5;
+const UNEVEN: f64 = 1.2;
+/// What is less sure than this is said with a "may".
+const EVEN_ODDS: f64 = 0.5;
+/// Times the error along the log from which on the error along another one is none of the same arm.
+const OF_ANOTHER_ARM: f64 = 3.0;
+
+impl Diagnosis {
+    /// The sentence about a log along which the model errs far more, friction at standstill left open.
+    fn does_not_carry_over(&self, held_out: &HeldOut) -> Option<String> {
+        let noise = |j: usize| self.noise_floor_nm.as_ref().map_or(0.0, |noise| noise[j]);
+        let expected = self.after.rms_nm.iter().enumerate().map(|(j, rms)| rms.hypot(noise(j)));
+        let (j, times) = held_out
+            .after_standstill_free_rms_nm
+            .iter()
+            .zip(expected)
+            .map(|(found, expected)| found / expected)
+            .enumerate()
+            .filter(|(_, times)| *times > OF_ANOTHER_ARM)
+            .max_by(|a, b| a.1.total_cmp(&b.1))?;
+        Some(format!(
+            "The model does not carry over to {}: on joint {} it errs {times:.0} times as much there. Another load, \
+             another gain, or a motion that shows what this log does not.",
+            held_out.log,
+            j + 1
+        ))
+    }
+}
+
 impl Cause {
     fn sentence(&self, noise_is_known: bool) -> String {
         match self.kind {
@@ -295,6 +343,9 @@ impl Cause {
         let mut text = match (self.kind.is_of_the_record(), self.joint) {
             (true, None) => format!("The record has {} ({numbers}).", self.in_words),
             (true, Some(j)) => format!("Joint {j}'s record has {} ({numbers}).", self.in_words),
+            (false, _) if self.confidence < EVEN_ODDS => {
+                format!("{place} may miss {} ({numbers}); other causes fit as well.", self.in_words)
+            }
             (false, _) => format!("{place} misses {} ({numbers}).", self.in_words),
         };
         if let Some(gain) = self.gain_fraction {

@@ -132,10 +132,12 @@ impl Estimation {
             }
             Estimator::Spectral => {
                 let acceleration = aids.acceleration.unwrap_or_default();
-                let moving = acceleration.iter().any(|power| !power.noise.is_empty());
-                if !moving || problem.periods < LEAST_PERIODS {
+                if problem.periods < LEAST_PERIODS {
                     let (periods, needed) = (problem.periods, LEAST_PERIODS);
                     return Err(FitError::TooFewPeriods { periods, needed }.into());
+                }
+                if acceleration.iter().all(|power| power.noise.is_empty()) {
+                    return Err(FitError::StandsStill.into());
                 }
                 let whitened = self.mixed.get_or_insert_with(mixed);
                 self.whitening.whiten(problem, acceleration, &mut whitened.problem);

@@ -79,6 +79,9 @@ pub enum FitError {
         /// Periods needed.
         needed: usize,
     },
+    /// Nothing moves.
+    #[error("the arm stands still, or its periods do not tell how it is accelerated")]
+    StandsStill,
     /// The smoother motion says nothing of some parameters.
     #[error(
         "the motion below the cutoff of the instruments does not excite all parameters: choose a \

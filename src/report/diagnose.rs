@@ -91,14 +91,17 @@ pub fn limit_table(diagnosis: &Diagnosis) -> Table {
         Column::text("parameter"),
         Column::number("value", ""),
         Column::text("unit"),
+        Column::text("for"),
     ]);
     for limit in &diagnosis.detection_limits {
+        let given = limit.given.iter().map(|(name, v)| format!("{name} {}", significant(*v, 2)));
         table.push([
             limit.kind.to_string(),
             joint(limit.joint),
             limit.parameter.to_owned(),
             limit.value.map_or("absorbed".to_owned(), |v| significant(v, 3)),
             limit.unit.to_owned(),
+            given.collect::<Vec<_>>().join(", "),
         ]);
     }
     table

@@ -26,6 +26,11 @@ impl Candidate for AsymmetricFriction {
         ]
     }
 
+    /// What the null model's offset leaves: the Coulomb part alone is one, but at reversals.
+    fn size(&self, quantities: &[Quantity]) -> Option<Quantity> {
+        quantities.get(1).copied()
+    }
+
     fn separating_experiment(&self) -> &'static str {
         "the current with brakes closed: what is left there is an offset, not friction"
     }

@@ -27,8 +27,9 @@ const FLANK_RAD_S: [f64; 14] = [
 ];
 /// ζ of the flanks.
 const DAMPING_RATIO: f64 = 0.08;
-/// Time in which how a flight began is forgotten, s: e^(−10) of a swing at the lowest of these frequencies.
-const RUN_IN_S: f64 = 1.0;
+/// Time in which how a flight began is forgotten, s: e^(−10) of a swing at the lowest of these frequencies takes one
+/// second in touch with the flanks; wide gaps are mostly out of touch.
+const RUN_IN_S: f64 = 3.0;
 /// Gaps that are flown through at once.
 const ABREAST: usize = 8;
 

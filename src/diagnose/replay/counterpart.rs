@@ -28,8 +28,7 @@ const NO_SUCH_LAW: &str = "the simulated arm has no friction of this law";
 const INCOMPLETE: &str = "the log does not tell all of its numbers";
 
 /// Stiffest bristles that are simulated, 1/rad: friction then turns round within 0.1 mrad, less than a joint
-/// moves in one sample where its direction is in doubt, so that no log tells it from a stiffer one. The
-/// integrator's steps are as short as the bristles are stiff.
+/// moves in one sample where its direction is in doubt, so that no log tells it from a stiffer one.
 const STIFFEST_PER_RAD: f64 = 1e4;
 
 /// A cause as the diagnosis has it.

@@ -16,6 +16,8 @@ pub struct BlockCluster;
 
 /// Longer than the memory of motor-current noise (about 1 s), short enough for many blocks.
 const BLOCK_S: f64 = 5.0;
+/// In short records blocks may be shorter, down to this, s.
+const SHORTEST_BLOCK_S: f64 = 1.0;
 /// Fewer blocks would leave the variance to chance.
 const LEAST_BLOCKS: usize = 6;
 
@@ -30,9 +32,9 @@ impl CovarianceMethod for BlockCluster {
         let length_s = BLOCK_S.min(seconds / LEAST_BLOCKS as f64);
         let length = ((length_s * problem.rate_hz) as usize).max(1);
         let blocks = (n / length) * problem.periods;
-        if blocks < LEAST_BLOCKS || length_s < 0.2 * BLOCK_S {
-            let needed = LEAST_BLOCKS;
-            return Err(CovarianceError::TooFewBlocks { seconds, blocks, needed });
+        if blocks < LEAST_BLOCKS || length_s < SHORTEST_BLOCK_S {
+            let needed_s = LEAST_BLOCKS as f64 * SHORTEST_BLOCK_S;
+            return Err(CovarianceError::TooShort { seconds, needed_s });
         }
         let residuals = problem.residuals(&fit.theta);
         // The last block of a period takes what is left over.

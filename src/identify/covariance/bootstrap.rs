@@ -30,8 +30,8 @@ impl CovarianceMethod for BlockBootstrap {
         let length = ((BLOCK_S * problem.rate_hz) as usize).max(1);
         if instants / length < LEAST_BLOCKS {
             let seconds = instants as f64 / problem.rate_hz;
-            let (blocks, needed) = (instants / length, LEAST_BLOCKS);
-            return Err(CovarianceError::TooFewBlocks { seconds, blocks, needed });
+            let needed_s = LEAST_BLOCKS as f64 * BLOCK_S;
+            return Err(CovarianceError::TooShort { seconds, needed_s });
         }
         let residuals = problem.residuals(&fit.theta);
         let mut rng = TrialStreams::new(0, b"bootstrap", 0).stream(Channel::Resampling, 0);

@@ -121,16 +121,13 @@ pub enum CovarianceError {
     },
     /// Needs a longer record.
     #[error(
-        "{seconds:.1} s of data make {blocks} blocks of time; at least {needed} are needed for a \
-         σ from blocks"
+        "{seconds:.1} s of data are too short for a σ from blocks of time; at least {needed_s} s are needed"
     )]
-    TooFewBlocks {
+    TooShort {
         /// Length of the record, s.
         seconds: f64,
-        /// Blocks it makes.
-        blocks: usize,
-        /// Blocks needed.
-        needed: usize,
+        /// Length needed, s.
+        needed_s: f64,
     },
 }
 

@@ -54,7 +54,7 @@ struct Motor {
 struct Course {
     /// With room for what tracking adds, rad/s.
     largest_speed_rad_s: Vec<f64>,
-    /// Twice what the motion asks for, rad/s²: friction that gives way and pushes come on top.
+    /// Twice what the motion asks for and a little more, rad/s², and what pushes make of the rotor alone.
     largest_acceleration_rad_s2: Vec<f64>,
     /// Under nominal friction, W.
     mean_friction_power_w: Vec<f64>,
@@ -70,7 +70,8 @@ const LOAD_ITERATIONS: usize = 48;
 const MOST_SUBSTEPS: usize = 64;
 
 impl Course {
-    fn of(reference: &dyn Reference, joints: &[JointMechanics]) -> Self {
+    fn of(reference: &dyn Reference, assembly: &Assembly) -> Self {
+        let joints = &assembly.joints;
         let n = joints.len();
         let samples = (reference.duration_s() * COURSE_RATE_HZ).ceil().max(1.0) as usize;
         let (mut q, mut qd, mut qdd) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
@@ -86,7 +87,15 @@ impl Course {
         }
         Self {
             largest_speed_rad_s: largest.iter().map(|v| 1.2 * v + 0.1).collect(),
-            largest_acceleration_rad_s2: acceleration.iter().map(|a| 2.0 * a + 1.0).collect(),
+            largest_acceleration_rad_s2: acceleration
+                .iter()
+                .zip(joints)
+                .map(|(a, joint)| {
+                    let pushes = joint.contacts.iter().chain(&assembly.flange_contacts);
+                    let push_nm: f64 = pushes.map(|c| c.peak_nm.abs()).sum();
+                    2.0 * a + 1.0 + push_nm / joint.rotor_inertia_kg_m2.max(f64::MIN_POSITIVE)
+                })
+                .collect(),
             mean_friction_power_w: power,
         }
     }
@@ -112,7 +121,7 @@ impl HiddenDrivetrain {
             .collect();
         let n = assembly.joints.len();
         Self {
-            course: Course::of(reference, &assembly.joints),
+            course: Course::of(reference, assembly),
             joints: assembly.joints.clone(),
             slots,
             states,
@@ -259,7 +268,9 @@ impl Drivetrain for HiddenDrivetrain {
             if let Some(presliding) = &joint.friction.presliding {
                 let acceleration = self.course.largest_acceleration_rad_s2[j];
                 let turning = presliding.fastest_turn_per_s(acceleration);
-                fastest = fastest.max(turning.min(presliding.stiffness_per_rad * speed));
+                let passing = presliding.stiffness_per_rad * speed;
+                // Twice: the decay has a kink where the joint reverses, within a step.
+                fastest = fastest.max(2.0 * turning.min(passing));
             }
             for ripple in &joint.ripples {
                 fastest = fastest.max(2.0 * ripple.order_per_turn * speed);

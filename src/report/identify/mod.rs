@@ -101,6 +101,9 @@ pub struct Result {
     validation: Vec<ValidationJson>,
     /// What the user should know.
     pub warnings: Vec<String>,
+    /// Of the warnings the one that doubts that the log is of this robot as described.
+    #[serde(skip)]
+    pub(super) doubt: Option<String>,
     rows: Rows,
     verdict: &'static str,
 }
@@ -164,13 +167,9 @@ impl Result {
             .collect();
         let mut warnings = identification.warnings.clone();
         let is_identified = identifies_the_arm(arm, set, &open);
-        warnings.extend(gravity_remark(
-            arm,
-            set,
-            training.nominal,
-            &identification.fit.theta,
-            &identification.covariance,
-        ));
+        let theta = &identification.fit.theta;
+        let doubt = gravity_remark(arm, set, training.nominal, theta, &identification.covariance);
+        warnings.extend(doubt.clone());
         Ok(Self {
             robot: arm.name.clone(),
             log: names(training.logs),
@@ -192,6 +191,7 @@ impl Result {
             not_identified: open.iter().map(|&k| set.name(k).to_owned()).collect(),
             validation: validations.iter().map(ValidationJson::of).collect(),
             warnings,
+            doubt,
             rows: Rows::of(training.logs),
         })
     }
@@ -214,6 +214,11 @@ impl Result {
     /// Whether the data do not identify the model.
     pub fn is_declined(&self) -> bool {
         self.verdict == NOT_IDENTIFIED
+    }
+
+    /// The warnings that the verdict does not begin with.
+    pub fn notes(&self) -> impl Iterator<Item = &String> {
+        self.warnings.iter().filter(|warning| self.doubt.as_ref() != Some(warning))
     }
 
     /// The verdict in a sentence.
@@ -243,8 +248,11 @@ impl Result {
             Some(false) => format!(" {}", self.intervals.reason),
             _ => String::new(),
         };
+        let doubt = self.doubt.as_ref().map_or(String::new(), |remark| {
+            format!("Is this log of {}? The {remark}. ", self.robot)
+        });
         format!(
-            "Identified {b} base parameters of {} from {} samples: what the model leaves of the \
+            "{doubt}Identified {b} base parameters of {} from {} samples: what the model leaves of the \
              torque is {low:.1} to {high:.1} % per joint.{open}{distrust}",
             self.robot, self.samples
         )

@@ -102,6 +102,7 @@ pub fn page(
     ];
     let status = match result.intervals.trusted {
         _ if result.is_declined() => Status::Bad,
+        _ if result.doubt.is_some() => Status::Warn,
         Some(false) => Status::Warn,
         _ => Status::Good,
     };
@@ -118,7 +119,7 @@ pub fn page(
         )
         .table(residual_table(result), "Root mean square over all samples used")
         .paragraph(&result.intervals.reason);
-    for warning in &result.warnings {
+    for warning in result.notes() {
         section = section.note(Status::Warn, warning);
     }
     page.push(section);
