@@ -17,10 +17,11 @@ const SEVERAL: usize = 3;
 /// Each confidence weighs a cause against its rivals with the other causes taken for granted. It is no more
 /// than [`PROVISIONAL`] where those may be wrong as well: for all of three or more that share a joint, for one
 /// beside another twice as strong, for two of the arm as a whole (a payload moves what a tilted base or a
-/// longer link moves), and wherever a clock was mended. A contact is not sure on a joint with wild readings, or
-/// where rows are missing.
+/// longer link moves), and wherever a clock was mended or a torque is rounded. A contact is not sure on a joint with
+/// wild readings, or where rows are missing.
 pub(super) fn make_modest(causes: &mut [Cause]) {
-    let is_mended = causes.iter().any(|c| c.kind == Kind::ClockFault);
+    let is_spoilt = |kind: Kind| matches!(kind, Kind::ClockFault | Kind::Quantisation);
+    let beside_a_spoilt_record = causes.iter().any(|c| is_spoilt(c.kind));
     let of_the_arm = |kind: Kind| {
         matches!(kind, Kind::Payload | Kind::Gravity | Kind::BaseTilt | Kind::LinkLength)
     };
@@ -51,7 +52,7 @@ pub(super) fn make_modest(causes: &mut [Cause]) {
             is_akin |= of_both(kind);
         }
         let is_overshadowed = cause.strength < OVERSHADOWED * strongest;
-        if is_mended || is_akin || is_overshadowed || count >= SEVERAL {
+        if beside_a_spoilt_record || is_akin || is_overshadowed || count >= SEVERAL {
             cause.make_provisional();
         }
     }
