@@ -2,7 +2,7 @@
 //! and contacts, which no fit absorbs. Everything hidden is made by the plant.
 
 use armid::base::BaseSet;
-use armid::diagnose::{Cause, Diagnoser, Diagnosis};
+use armid::diagnose::{Cause, Diagnoser, Diagnosis, Validation};
 use armid::dynamics::Model;
 use armid::identify::{Measurement, Options};
 use armid::montecarlo::{Scenario, Simulation};
@@ -136,6 +136,16 @@ fn a_body_between_two_logs_is_weighed_and_scales_the_gains() {
     assert!((scale.value - 1.0).abs() < 0.03, "{scale:?}");
     let none = against(&other);
     assert!(!none.is_named && none.cause().is_none(), "{none:?}");
+
+    // The other way round there is less than nothing on the flange, and the model fits the first log alone.
+    let bare_run = [Validation { measurement: bare.measurement(), manufacturer_nm: None }];
+    let of_loaded = diagnoser.diagnose(&loaded.measurement(), &bare_run, None).unwrap();
+    let swapped =
+        diagnoser.payload(&of_loaded, &loaded.measurement(), &bare.measurement(), None).unwrap();
+    assert!(swapped.mass_kg.value < 0.0 && swapped.cause().is_none(), "{swapped:?}");
+    assert!(swapped.sentences()[0].contains("swapped"), "{:?}", swapped.sentences());
+    let said = &of_loaded.diagnosis.sentences;
+    assert!(said.iter().any(|s| s.contains("does not carry over")), "{said:?}");
 }
 
 #[test]

@@ -234,3 +234,39 @@ fn hats_at(knots: Vec<f64>, values: &[f64]) -> Curves {
     }
     (knots, hats)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A model that follows a straight line but for 2 % of it: least squares would give what is left of the line fifty
+    /// times its height.
+    #[test]
+    fn what_the_model_absorbs_is_not_drawn() {
+        const ROWS: usize = 400;
+        let x: Vec<f64> = (0..ROWS).map(|k| k as f64 / (ROWS - 1) as f64).collect();
+        let image = |y: Vec<f64>| Image { mean: y, contrast: Vec::new() };
+        let (_, hats) = hats(&x);
+        let raw: Vec<Image> = hats.into_iter().map(image).collect();
+        let mut model = Span::default();
+        model.push(&image(vec![1.0; ROWS]));
+        model.push(&image(x.iter().map(|x| x + 0.02 * (60.0 * x).sin()).collect()));
+        let mut outside = raw.clone();
+        model.residualise_all(&mut outside);
+        // A bump of height one, and 25 times what is left of the line.
+        let bump = |x: f64| (1.0 - (x - 0.4).abs() / 0.1).max(0.0);
+        let mut residual = image(x.iter().map(|x| bump(*x) - 0.5 * (60.0 * x).sin()).collect());
+        model.residualise(&mut residual);
+        // The last knot's hat is one less the others.
+        let mut span = Span::default();
+        let pushed = outside.iter().filter(|image| span.push(image)).count();
+        let least_squares = span.solve(&residual);
+        assert!(pushed == KNOTS - 1 && least_squares[0].abs() > 20.0, "{least_squares:?}");
+
+        let heights = visible(&raw, &outside, &residual);
+        let highest = (0..KNOTS).max_by(|a, b| heights[*a].total_cmp(&heights[*b]));
+        assert!(matches!(highest, Some(3 | 4)), "{heights:?}");
+        assert!(heights.iter().all(|h| h.abs() < 1.2), "{heights:?}");
+        assert!(heights.iter().sum::<f64>().abs() < 1e-9);
+    }
+}
