@@ -16,7 +16,7 @@ use super::kind::Kind;
 use super::misfit;
 use super::modesty::make_modest;
 use super::payload::{self, PayloadFinding};
-use super::record::Record;
+use super::record::{Record, is_torn};
 use super::replay::measured_nm;
 use super::scene::Scene;
 use super::selection::{Kept, LEAST_EVIDENCE, select};
@@ -163,6 +163,11 @@ impl<'a> Diagnoser<'a> {
             explained.span.residualise(&mut rest);
             accepted = explained.span;
         }
+        let is_a_tear = |cause: &mut Cause| {
+            let at = |name| cause.parameters.get(name).map_or(f64::NAN, |e| e.value);
+            cause.kind == Kind::Contact && is_torn(m, [at("start_s"), at("end_s")])
+        };
+        let tears = causes.extract_if(.., is_a_tear).count();
         make_modest(&mut causes);
         let lack = misfit::lack_of_fit(&study, &accepted, &rest);
         let unexplained = misfit::unexplained(&study, &accepted, &rest, lack);
@@ -212,6 +217,10 @@ impl<'a> Diagnoser<'a> {
 
         if is_mended {
             let warning = "the clock was mended: contacts are not looked for, and what sits beside is less sure";
+            diagnosis.warnings.push(warning.into());
+        }
+        if tears > 0 {
+            let warning = "the angles jump as no arm can; what looks like a touch there is none";
             diagnosis.warnings.push(warning.into());
         }
         diagnosis.sentences = diagnosis.in_sentences();

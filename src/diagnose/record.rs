@@ -5,6 +5,27 @@ use super::verdict::Cause;
 use crate::identify::Measurement;
 use crate::robot::JointSignals;
 
+/// How far a joint may turn between two rows beyond what its speed says, rad.
+const TORN_RAD: f64 = 0.05;
+/// Times its speed at either row that a joint may have had between them.
+const FASTER: f64 = 3.0;
+/// How far what a filter makes of a torn record reaches, s.
+const REACH_S: f64 = 0.5;
+
+/// Whether the angles of `m` jump, as no arm can, from `start_s` to `end_s` or nearby: rows are missing or put together
+/// wrongly there, and what the torque shows is the jump.
+pub fn is_torn(m: &Measurement, [start_s, end_s]: [f64; 2]) -> bool {
+    let near = |k: &usize| (start_s - REACH_S..end_s + REACH_S).contains(&m.time_s[*k]);
+    (1..m.time_s.len()).filter(near).any(|k| {
+        let step_s = m.time_s[k] - m.time_s[k - 1];
+        (0..m.q_rad.joints()).any(|j| {
+            let (q, qd) = (m.q_rad.joint(j), m.qd_rad_s.joint(j));
+            let speed = qd[k].abs().max(qd[k - 1].abs());
+            (q[k] - q[k - 1]).abs() > TORN_RAD + FASTER * speed * step_s
+        })
+    })
+}
+
 /// See the module.
 pub struct Record {
     /// Time, s.
@@ -78,5 +99,33 @@ impl Record {
         for &(k, value) in samples {
             self.torque_nm.joint_mut(j)[k] = value;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A joint that turns at 2 rad/s, with a second missing, is where it has to be; turned by 0.3 rad within a row it
+    /// is not.
+    #[test]
+    fn a_gap_is_no_tear_and_a_jump_is_one() {
+        let time_s: Vec<f64> = (0..500).map(|k| 0.01 * k as f64 + f64::from(k >= 250)).collect();
+        let angles = |jump: f64| {
+            let after = |t: f64| if t > 4.0 { jump } else { 0.0 };
+            JointSignals::from_fn(1, 500, |_, k| 2.0 * time_s[k] + after(time_s[k]))
+        };
+        let (even, torn) = (angles(0.0), angles(0.3));
+        let speed = JointSignals::from_fn(1, 500, |_, _| 2.0);
+        let torque = JointSignals::zeros(1, 500);
+        let is_torn_at = |q_rad: &JointSignals, window: [f64; 2]| {
+            let (qd_rad_s, torque_nm) = (&speed, &torque);
+            is_torn(
+                &Measurement { source: "", time_s: &time_s, q_rad, qd_rad_s, torque_nm },
+                window,
+            )
+        };
+        assert!(!is_torn_at(&even, [0.0, 6.0]));
+        assert!(is_torn_at(&torn, [4.2, 4.4]) && !is_torn_at(&torn, [1.0, 3.0]));
     }
 }
