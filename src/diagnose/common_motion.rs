@@ -15,7 +15,8 @@
 //! in variables, to first order).
 
 use super::extension::mean_period;
-use super::scene::{equivalent_arm, load_along};
+use super::load::load_along;
+use super::scene::equivalent_arm;
 use crate::base::BaseSet;
 use crate::dynamics::{Model, Motion};
 use crate::identify::{Assembler, Measurement, Regression};

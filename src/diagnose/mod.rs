@@ -33,6 +33,7 @@ mod image;
 mod intervals;
 mod judgement;
 mod kind;
+mod load;
 mod misfit;
 mod modesty;
 mod noise_power;

@@ -4,10 +4,9 @@ use std::sync::OnceLock;
 
 use realfft::num_complex::Complex64;
 
+use super::load::{Loads, Periods, mass_along, rigid_torque_along};
 use crate::base::BaseSet;
-use crate::dynamics::{
-    LANES, Lanes, Model, Motion, Parameter, ParameterLayout, Workspace, rigid_torque,
-};
+use crate::dynamics::{Model, Motion, Parameter, ParameterLayout};
 use crate::identify::{Prepared, Preparer, drive_answers};
 use crate::robot::{Arm, JointSignals};
 use crate::signal::{FineClock, central_4};
@@ -29,11 +28,14 @@ pub struct Scene {
     pub periodic: bool,
     /// Torque that moves the links along the motion as it was recorded, Nm.
     recorded_nm: JointSignals,
-    /// Torque that moves the links, Nm. In a motion that repeats it, and the load, have only the
-    /// harmonics that are known a hundred times better than their noise.
+    /// Torque that moves the links, Nm ([`Loads`]).
     pub link_nm: JointSignals,
-    /// Torque on the gear: links and rotors, Nm.
+    /// Torque on the gear: links and rotors, Nm ([`Loads`]).
     pub load_nm: JointSignals,
+    /// What the links take beside `link_nm` where joints reverse, Nm ([`Loads`]).
+    jolt_nm: JointSignals,
+    /// How easily links and rotor are pressed apart, 1/(kg m²) ([`Loads`]).
+    pub mobility_per_kg_m2: JointSignals,
     /// Predicted drive torque: load, friction and offset, Nm.
     pub torque_nm: JointSignals,
     /// tanh(q̇/ε).
@@ -85,26 +87,23 @@ impl Scene {
         let (arm, offset_nm) = equivalent_arm(nominal, set, theta);
         let (joints, n) = (motion.joints(), motion.samples());
         let model = Model::new(&arm);
-        let drive = |j: usize| &arm.joints[j].drive;
-        let rotor = |j: usize, motion: &Motion| -> Vec<f64> {
-            let inertia = drive(j).rotor_inertia_kg_m2;
-            motion.qdd_rad_s2.joint(j).iter().map(|qdd| inertia * qdd).collect()
-        };
-        let recorded_nm = rigid_torque_along(&model, &motion);
-        let own_inertia_kg_m2 = own_inertia_along(&model, &motion, &recorded_nm);
-        let mut link_nm = recorded_nm.clone();
-        let mut rotor_nm = motion.qdd_rad_s2.map_joints(|j, _| rotor(j, &motion));
         let clock = periodic.then(|| FineClock::new(n, FINE));
-        if let (Some(each), Some(clock)) = (&prepared.each_period, &clock) {
-            let harmonics = TrustedHarmonics { clock };
-            let links = rigid_torque_along(&model, each);
-            for j in 0..joints {
-                harmonics.keep(link_nm.joint_mut(j), links.joint(j));
-                harmonics.keep(rotor_nm.joint_mut(j), &rotor(j, each));
+        let drive = |j: usize| &arm.joints[j].drive;
+        let recorded_nm = rigid_torque_along(&model, &motion);
+        let mass_kg_m2 = mass_along(&model, &motion, &recorded_nm);
+        let rate_hz = prepared.processing.rate_hz;
+        let loads = match (&prepared.each_period, &clock) {
+            (Some(each), Some(clock)) => {
+                let torque_nm = &prepared.torque_nm;
+                let highest = highest_harmonic(n);
+                let periods = Periods { each, torque_nm, clock, rate_hz, highest };
+                let along = (&recorded_nm, &mass_kg_m2[..]);
+                Loads::agreed((&model, &arm), &motion, along, &periods)
             }
-        }
-        let load_nm =
-            JointSignals::from_fn(joints, n, |j, k| link_nm.joint(j)[k] + rotor_nm.joint(j)[k]);
+            _ => Loads::as_recorded(&arm, &motion, &recorded_nm, &mass_kg_m2),
+        };
+        let Loads { link_nm, load_nm, jolt_nm, mobility_per_kg_m2 } = loads;
+        let own_inertia_kg_m2 = JointSignals::from_fn(joints, n, |j, k| mass_kg_m2[j].joint(j)[k]);
         let epsilon = arm.friction_epsilon_rad_s;
         let sign =
             motion.qd_rad_s.map_joints(|_, v| v.iter().map(|v| (v / epsilon).tanh()).collect());
@@ -123,7 +122,7 @@ impl Scene {
             own_inertia_kg_m2,
             angle_doubt_rad,
             coulomb_nm: (0..joints).map(|j| drive(j).coulomb_nm).collect(),
-            rate_hz: prepared.processing.rate_hz,
+            rate_hz,
             periods: prepared.processing.periods,
             arm,
             motion,
@@ -131,6 +130,8 @@ impl Scene {
             recorded_nm,
             link_nm,
             load_nm,
+            jolt_nm,
+            mobility_per_kg_m2,
             torque_nm,
             sign,
             torque_limit_nm: prepared.torque_limit_nm.clone(),
@@ -169,6 +170,11 @@ impl Scene {
     /// The link torque of joint `j` at `FINE` instants per sample, for what happens between samples.
     pub fn fine_link_nm(&self, j: usize) -> &[f64] {
         self.fine_link_nm[j].get_or_init(|| self.fine(self.link_nm.joint(j)))
+    }
+
+    /// What the links of joint `j` take where joints reverse, at `FINE` instants per sample, Nm.
+    pub fn fine_jolt_nm(&self, j: usize) -> Vec<f64> {
+        self.fine(self.jolt_nm.joint(j))
     }
 
     /// Where friction of joint `j` is looked at: `FINE` times per sample of a motion that repeats, at the
@@ -237,15 +243,16 @@ impl Scene {
     /// answer at once ([`FineClock::as_logged`]).
     pub fn as_logged(&self, torque_nm: Vec<f64>) -> Vec<f64> {
         match &self.clock {
-            Some(clock) => clock.as_logged(&torque_nm, self.highest_harmonic()),
+            Some(clock) => clock.as_logged(&torque_nm, highest_harmonic(self.samples())),
             None => torque_nm,
         }
     }
 
     /// How the drive of joint `j` may answer dry friction, as columns ([`drive_answers`]); none for a single run.
     pub fn answers(&self, j: usize) -> Vec<Vec<f64>> {
-        let columns =
-            |clock| drive_answers(clock, &self.instants(j).sign, self.highest_harmonic()).into();
+        let columns = |clock| {
+            drive_answers(clock, &self.instants(j).sign, highest_harmonic(self.samples())).into()
+        };
         self.clock.as_ref().map_or(Vec::new(), columns)
     }
 
@@ -254,11 +261,6 @@ impl Scene {
     pub fn can_answer(&self, j: usize, which: usize, b: f64) -> bool {
         let lead_s = b * self.instants(j).step_s;
         which == 0 || lead_s.abs() < LONGEST_LEAD_S * self.coulomb_nm[j].abs()
-    }
-
-    /// Up to which harmonic the periods' own accelerations are known.
-    fn highest_harmonic(&self) -> usize {
-        (Preparer::WIDE * self.samples() as f64) as usize
     }
 
     /// The harmonics of a signal of n samples up to `highest_hz`, where the motion repeats; of a single run
@@ -308,53 +310,9 @@ impl Scene {
     }
 }
 
-/// Removes from a predicted torque the harmonics that are known badly.
-///
-/// The acceleration's noise is in what the null model leaves and in what a family makes of the load; where
-/// the load is differentiated the two would be correlated for no physical reason. A band of harmonics of
-/// the mean load is kept if its power is a hundred times what the periods' scatter makes of it.
-struct TrustedHarmonics<'a> {
-    clock: &'a FineClock,
-}
-
-/// Power over noise of a band that is kept.
-const TRUSTED: f64 = 100.0;
-/// Harmonics that are judged together.
-const BAND: usize = 8;
-
-impl TrustedHarmonics<'_> {
-    /// `mean` loses the bands that the torque of all periods, one after the other, leaves uncertain.
-    fn keep(&self, mean: &mut [f64], periods: &[f64]) {
-        let spectra: Vec<Vec<Complex64>> =
-            periods.chunks_exact(mean.len()).map(|y| self.clock.spectrum(y)).collect();
-        let count = spectra.len() as f64;
-        let kept: Vec<bool> = (0..spectra[0].len())
-            .step_by(BAND)
-            .map(|first| {
-                let (mut power, mut scatter) = (0.0, 0.0);
-                for h in first..(first + BAND).min(spectra[0].len()) {
-                    let average = spectra.iter().map(|s| s[h]).sum::<Complex64>() / count;
-                    power += count * average.norm_sqr();
-                    scatter += spectra.iter().map(|s| (s[h] - average).norm_sqr()).sum::<f64>();
-                }
-                power > (1.0 + TRUSTED) * scatter / (count - 1.0)
-            })
-            .collect();
-        let out = self
-            .clock
-            .filtered(mean, |h| if kept[h / BAND] { Complex64::ONE } else { Complex64::ZERO });
-        mean.copy_from_slice(&out);
-    }
-}
-
-/// M_jj along `motion`, kg m²: what one rad/s² more takes, beside the torques `recorded_nm`.
-fn own_inertia_along(model: &Model, motion: &Motion, recorded_nm: &JointSignals) -> JointSignals {
-    recorded_nm.map_joints(|j, recorded| {
-        let mut faster = motion.clone();
-        faster.qdd_rad_s2.joint_mut(j).iter_mut().for_each(|qdd| *qdd += 1.0);
-        let torque = rigid_torque_along(model, &faster);
-        torque.joint(j).iter().zip(recorded).map(|(t, r)| t - r).collect()
-    })
+/// Up to which harmonic the accelerations of periods of `samples` samples are known.
+fn highest_harmonic(samples: usize) -> usize {
+    (Preparer::WIDE * samples as f64) as usize
 }
 
 /// An arm with the base parameters `theta`, and the constant torques that go with it, Nm.
@@ -387,40 +345,4 @@ pub fn equivalent_arm(nominal: &Arm, set: &BaseSet, theta: &[f64]) -> (Arm, Vec<
         }
     }
     (arm, offset_nm)
-}
-
-/// Torque on the gear of every sample, Nm: M q̈ + c + g of links and rotors, without friction.
-pub fn load_along(model: &Model, arm: &Arm, motion: &Motion) -> JointSignals {
-    let mut out = rigid_torque_along(model, motion);
-    for (j, joint) in arm.joints.iter().enumerate() {
-        let inertia = joint.drive.rotor_inertia_kg_m2;
-        let qdd = motion.qdd_rad_s2.joint(j);
-        out.joint_mut(j).iter_mut().zip(qdd).for_each(|(o, qdd)| *o += inertia * qdd);
-    }
-    out
-}
-
-/// M_links q̈ + c + g of every sample, eight samples at a time.
-fn rigid_torque_along(model: &Model, motion: &Motion) -> JointSignals {
-    let (joints, n) = (motion.joints(), motion.samples());
-    let mut workspace = Workspace::<Lanes>::new(model);
-    let mut out = JointSignals::zeros(joints, n);
-    let zero = <Lanes as crate::dynamics::Real>::constant(0.0);
-    let (mut q, mut qd, mut qdd) = (vec![zero; joints], vec![zero; joints], vec![zero; joints]);
-    let mut torque = vec![zero; joints];
-    for start in (0..n).step_by(LANES) {
-        let count = LANES.min(n - start);
-        for j in 0..joints {
-            for lane in 0..count {
-                q[j].0[lane] = motion.q_rad.joint(j)[start + lane];
-                qd[j].0[lane] = motion.qd_rad_s.joint(j)[start + lane];
-                qdd[j].0[lane] = motion.qdd_rad_s2.joint(j)[start + lane];
-            }
-        }
-        rigid_torque(model, &mut workspace, &q, &qd, &qdd, &mut torque);
-        for (j, torque) in torque.iter().enumerate() {
-            out.joint_mut(j)[start..start + count].copy_from_slice(&torque.0[..count]);
-        }
-    }
-    out
 }

@@ -2,16 +2,17 @@
 //! give way; where the load changes sign they part, and the rotor flies through the gap g to the other flank:
 //!
 //! ```text
-//! δ̈ = (τ_L − T) (1/I_a + 1/M_jj),   T = k (δ ∓ g/2) + d δ̇ beyond ±g/2 as long as it pushes, 0 between
+//! δ̈ = (τ_L − T) (1/I_a + [(M + I_a')⁻¹]_jj),   T = k (δ ∓ g/2) + d δ̇ beyond ±g/2 as long as it pushes, 0 between
 //! ```
 //!
-//! with δ = q_M − q_L, the load τ_L of the rigid arm, which passes through zero, and flanks against which the
+//! with δ = q_M − q_L, the load τ_L of the rigid arm, which passes through zero, the other joints free to move (with
+//! theirs held, flights at the elbow seemed half as wide as they were), and flanks against which the
 //! rotor alone swings at √(k/I_a) with the damping d = 2 ζ √(k I_a). The log has the motor's angle, so that
 //! the links have moved by δ less than it says. A flight lasts (6 g/δ⃛)^(1/3), a few milliseconds, and is
 //! seen by its jerk at both ends and by the swinging after it: the log has δ̇ at its samples only, and its
 //! acceleration is the derivative of these.
 
-use super::elasticity::{give_way, lagging_at};
+use super::elasticity::{Lag, RUN_IN_S, give_way};
 use super::*;
 use crate::diagnose::scene::FINE;
 
@@ -27,9 +28,6 @@ const FLANK_RAD_S: [f64; 14] = [
 ];
 /// ζ of the flanks.
 const DAMPING_RATIO: f64 = 0.08;
-/// Time in which how a flight began is forgotten, s: e^(−10) of a swing at the lowest of these frequencies takes one
-/// second in touch with the flanks; wide gaps are mostly out of touch.
-const RUN_IN_S: f64 = 3.0;
 /// Gaps that are flown through at once.
 const ABREAST: usize = 8;
 
@@ -55,7 +53,8 @@ impl Candidate for Backlash {
     fn bank(&self, scene: &Scene, site: Option<usize>, shapes: &[Shape]) -> Vec<Vec<Column>> {
         let j = joint(site);
         let column = |(shape, [delta, rate]): (&Shape, [Vec<f64>; 2])| {
-            vec![give_way(scene, &lagging_at(scene, j, &delta, &rate), shape.value)]
+            let links = Lag::logged(scene, delta, rate).of(scene, j);
+            vec![give_way(scene, &links, shape.value)]
         };
         let abreast = shapes.chunks(ABREAST).flat_map(|some| some.iter().zip(fly(scene, j, some)));
         abreast.map(column).collect()
@@ -94,10 +93,11 @@ impl Candidate for Backlash {
 fn fly(scene: &Scene, j: usize, shapes: &[Shape]) -> Vec<[Vec<f64>; 2]> {
     let load = scene.link_nm.joint(j);
     let n = load.len();
-    let inertia = scene.own_inertia_kg_m2.joint(j);
+    let mobility = scene.mobility_per_kg_m2.joint(j);
     let rotor = scene.arm.joints[j].drive.rotor_inertia_kg_m2.max(f64::MIN_POSITIVE);
     let step_s = 1.0 / (scene.rate_hz * FINE as f64);
     let fine = scene.fine_link_nm(j);
+    let jolts = scene.fine_jolt_nm(j);
     // A motion that repeats is entered a little before its beginning.
     let run_in = if scene.periodic { ((RUN_IN_S * scene.rate_hz) as usize).min(n) } else { 0 };
     let start_nm = load[(n - run_in) % n];
@@ -111,9 +111,9 @@ fn fly(scene: &Scene, j: usize, shapes: &[Shape]) -> Vec<[Vec<f64>; 2]> {
         for (lane, [delta, rate]) in out.iter_mut().enumerate() {
             (delta[k], rate[k]) = (flights.angle_rad[lane], flights.rate_rad_s[lane]);
         }
-        let mobility = 1.0 / rotor + 1.0 / inertia[k].max(f64::MIN_POSITIVE);
-        for load in &fine[FINE * k..FINE * (k + 1)] {
-            flights.step(*load, mobility, step_s);
+        let ticks = FINE * k..FINE * (k + 1);
+        for (load, jolt) in fine[ticks.clone()].iter().zip(&jolts[ticks]) {
+            flights.step(load + jolt, mobility[k], step_s);
         }
     }
     out

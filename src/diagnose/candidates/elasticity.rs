@@ -1,13 +1,27 @@
 //! A gear that gives way: link angle q_L, motor angle q_M, k (q_M − q_L) = τ_L.
 //!
 //! Where the log has the motor's angle, the links move by δ less than it says: the torques change by
-//! τ(q − δ, q̇ − δ̇, q̈ − δ̈) − τ(q, q̇, q̈) on every joint (variant 0). The link swings on its spring, so that
-//! δ = τ_L/(k − M_jj ω² + i d ω) at the frequency ω, τ_L the load of the motor's motion. Where the log has
+//! τ(q − δ, q̇ − δ̇, q̈ − δ̈) − τ(q, q̇, q̈) on every joint (variant 0). The link swings on its spring,
+//!
+//! ```text
+//! M_jj(q) δ̈ + d δ̇ + k δ = τ_L
+//! ```
+//!
+//! with τ_L the load of the motor's motion, as far as the log tells it. Its slow part bends the gear by τ_L/k. Jolts of the
+//! drive where joints reverse are too fast for the log to show the motor's answer; of them the links' share τ_J is known
+//! ([`Scene::fine_jolt_nm`]), and makes rotor and links swing against each other:
+//!
+//! ```text
+//! δ̈ = (τ_J − k δ − d δ̇) (I_a⁻¹ + [(M + I_a')⁻¹]_jj)
+//! ```
+//!
+//! by which a stiff gear is seen that hardly bends. Where the log has
 //! the link's angle, the rotor and its friction move more: I_a δ̈ + F_v δ̇ + F_c [tanh((q̇ + δ̇)/ε) −
 //! tanh(q̇/ε)] on the joint itself, δ = τ_L/(k + i d ω) (further variants; the friction reverses where the motor
 //! does). The stiffness is in the shape as well as in the coefficient 1/k.
 
 use super::*;
+use crate::diagnose::scene::FINE;
 use crate::dynamics::Motion;
 use realfft::num_complex::Complex64;
 
@@ -16,24 +30,117 @@ pub struct Elasticity;
 
 /// Damping d over that of the rotor on the spring, 2 √(k Ia): a few percent in strain-wave gears.
 const DAMPING_RATIO: f64 = 0.05;
+/// The same of what jolts make swing: the drive, which holds the rotor, and the rotor's own friction damp it as well. A
+/// tenth less and twice as much explain simulated gears about as well.
+const JOLTED_DAMPING_RATIO: f64 = 0.15;
+/// Stiffnesses, Nm/rad: neighbours are told by where the links swing.
+const STIFFNESSES: usize = 14;
+/// The same where they are told by nothing but how far the gear bends.
+const LINK_STIFFNESSES: usize = 3;
+/// Time in which how a swing began is forgotten, s: that of a gear of 8000 Nm/rad fades with exp(−3.5 t).
+pub(super) const RUN_IN_S: f64 = 3.0;
 /// The same where the encoder sits on the link, by variant: a loop closed over the gear needs damping.
 const LINK_DAMPING_RATIO: [f64; 2] = [0.05, 0.3];
 
-/// The motion of the links when joint `j` is `delta` (rad) behind its encoder.
-pub(super) fn lagging_by(scene: &Scene, j: usize, delta: &[f64]) -> Motion {
-    lagging_at(scene, j, delta, &scene.derivative(delta))
+/// How far the links of a joint are behind its encoder.
+pub(super) struct Lag {
+    /// δ at the samples, rad.
+    pub(super) angle_rad: Vec<f64>,
+    /// δ̇, rad/s.
+    pub(super) rate_rad_s: Vec<f64>,
+    /// δ̈ as the log would show it, rad/s².
+    pub(super) acceleration_rad_s2: Vec<f64>,
 }
 
-/// The same with the rate of `delta` at the samples, rad/s, which may hold more than their differences.
-pub(super) fn lagging_at(scene: &Scene, j: usize, delta: &[f64], rate: &[f64]) -> Motion {
-    let acceleration = scene.derivative(rate);
-    let mut motion: Motion = scene.motion.clone();
-    for k in 0..scene.samples() {
-        motion.q_rad.joint_mut(j)[k] -= delta[k];
-        motion.qd_rad_s.joint_mut(j)[k] -= rate[k];
-        motion.qdd_rad_s2.joint_mut(j)[k] -= acceleration[k];
+impl Lag {
+    /// With the rates of `angle_rad` as its samples tell them.
+    pub(super) fn slow(scene: &Scene, angle_rad: Vec<f64>) -> Self {
+        let rate_rad_s = scene.derivative(&angle_rad);
+        Self::logged(scene, angle_rad, rate_rad_s)
     }
-    motion
+
+    /// With a δ̇ that may hold more than the differences of δ, and of which the log has the samples only.
+    pub(super) fn logged(scene: &Scene, angle_rad: Vec<f64>, rate_rad_s: Vec<f64>) -> Self {
+        Self { acceleration_rad_s2: scene.derivative(&rate_rad_s), angle_rad, rate_rad_s }
+    }
+
+    /// The motion of the links when joint `j` lags by it.
+    pub(super) fn of(&self, scene: &Scene, j: usize) -> Motion {
+        let mut motion: Motion = scene.motion.clone();
+        for k in 0..scene.samples() {
+            motion.q_rad.joint_mut(j)[k] -= self.angle_rad[k];
+            motion.qd_rad_s.joint_mut(j)[k] -= self.rate_rad_s[k];
+            motion.qdd_rad_s2.joint_mut(j)[k] -= self.acceleration_rad_s2[k];
+        }
+        motion
+    }
+}
+
+/// How links on joint `j` swing behind a motor that moves as recorded. A single run, whose accelerations are those of
+/// its low-pass, shows no more than how far the gear bends.
+fn swing(scene: &Scene, j: usize, stiffness_nm_rad: f64) -> Lag {
+    if !scene.periodic {
+        let bent = |load: &f64| load / stiffness_nm_rad;
+        return Lag::slow(scene, scene.link_nm.joint(j).iter().map(bent).collect());
+    }
+    let n = scene.samples();
+    let (load, jolts) = (scene.fine_link_nm(j), scene.fine_jolt_nm(j));
+    let inertia = scene.own_inertia_kg_m2.joint(j);
+    let mobility = scene.mobility_per_kg_m2.joint(j);
+    let step_s = 1.0 / (scene.rate_hz * FINE as f64);
+    let run_in = ((RUN_IN_S * scene.rate_hz) as usize).min(n);
+    let critical = 2.0 * (stiffness_nm_rad * scene.arm.joints[j].drive.rotor_inertia_kg_m2).sqrt();
+    let start_nm = load[FINE * ((n - run_in) % n)];
+    let mut bent = Swing::bent(stiffness_nm_rad, DAMPING_RATIO * critical, start_nm);
+    let mut jolted = Swing::bent(stiffness_nm_rad, JOLTED_DAMPING_RATIO * critical, 0.0);
+    let mut lag = Lag {
+        angle_rad: vec![0.0; n],
+        rate_rad_s: vec![0.0; n],
+        acceleration_rad_s2: vec![0.0; n],
+    };
+    for k in (n - run_in..n).chain(0..n) {
+        lag.angle_rad[k] = bent.angle_rad + jolted.angle_rad;
+        lag.rate_rad_s[k] = bent.rate_rad_s + jolted.rate_rad_s;
+        lag.acceleration_rad_s2[k] = bent.acceleration_rad_s2 + jolted.acceleration_rad_s2;
+        for tick in FINE * k + 1..=FINE * (k + 1) {
+            let tick = tick % load.len();
+            bent.step(load[tick], inertia[k].max(f64::MIN_POSITIVE), step_s);
+            jolted.step(jolts[tick], 1.0 / mobility[k], step_s);
+        }
+    }
+    lag
+}
+
+/// An inertia on the spring of a gear.
+struct Swing {
+    stiffness_nm_rad: f64,
+    damping_nm_s_rad: f64,
+    angle_rad: f64,
+    rate_rad_s: f64,
+    acceleration_rad_s2: f64,
+}
+
+impl Swing {
+    /// At rest under `load_nm`.
+    fn bent(stiffness_nm_rad: f64, damping_nm_s_rad: f64, load_nm: f64) -> Self {
+        let angle_rad = load_nm / stiffness_nm_rad;
+        let (rate_rad_s, acceleration_rad_s2) = (0.0, 0.0);
+        Self { stiffness_nm_rad, damping_nm_s_rad, angle_rad, rate_rad_s, acceleration_rad_s2 }
+    }
+
+    /// `step_s` later, when the load is `load_nm` (Newmark 1959, average acceleration: stable for springs of any
+    /// stiffness, and neither adds energy to a swing nor takes any).
+    fn step(&mut self, load_nm: f64, inertia_kg_m2: f64, step_s: f64) {
+        let (k, d) = (self.stiffness_nm_rad, self.damping_nm_s_rad);
+        let half = 0.5 * step_s;
+        let rate = self.rate_rad_s + half * self.acceleration_rad_s2;
+        let angle = self.angle_rad + half * (self.rate_rad_s + rate);
+        let acceleration =
+            (load_nm - d * rate - k * angle) / (inertia_kg_m2 + half * (d + half * k));
+        self.rate_rad_s = rate + half * acceleration;
+        self.angle_rad = angle + half * half * acceleration;
+        self.acceleration_rad_s2 = acceleration;
+    }
 }
 
 /// Torques on all joints when the links move as `motion`, per unit of `scale`.
@@ -47,9 +154,11 @@ impl Candidate for Elasticity {
     }
 
     fn shapes(&self, _: &Scene, _: Option<usize>) -> Vec<Shape> {
-        (0..1 + LINK_DAMPING_RATIO.len())
-            .flat_map(|variant| geometric(2e3, 2e5, 5).map(move |value| Shape { variant, value }))
-            .collect()
+        let count = |variant| if variant == 0 { STIFFNESSES } else { LINK_STIFFNESSES };
+        let of = |variant| {
+            geometric(2e3, 2e5, count(variant)).map(move |value| Shape { variant, value })
+        };
+        (0..1 + LINK_DAMPING_RATIO.len()).flat_map(of).collect()
     }
 
     fn search(&self) -> Search {
@@ -61,13 +170,8 @@ impl Candidate for Elasticity {
         let drive = &scene.arm.joints[j].drive;
         if shape.variant == 0 {
             let stiffness = shape.value;
-            let inertia = scene.own_inertia_kg_m2.joint(j);
-            let inertia = inertia.iter().sum::<f64>() / inertia.len() as f64;
-            let damping = 2.0 * DAMPING_RATIO * (stiffness * drive.rotor_inertia_kg_m2).sqrt();
-            let delta = scene.filtered(scene.link_nm.joint(j), |omega| {
-                Complex64::new(stiffness - inertia * omega * omega, damping * omega).inv()
-            });
-            return vec![give_way(scene, &lagging_by(scene, j, &delta), 1.0 / stiffness)];
+            let links = swing(scene, j, stiffness).of(scene, j);
+            return vec![give_way(scene, &links, 1.0 / stiffness)];
         }
         let (stiffness, ratio) = (shape.value, LINK_DAMPING_RATIO[shape.variant - 1]);
         let damping = 2.0 * ratio * (stiffness * drive.rotor_inertia_kg_m2).sqrt();
@@ -108,5 +212,42 @@ impl Candidate for Elasticity {
 
     fn in_words(&self) -> &'static str {
         "a gear that gives way under load"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// k δ = load at rest; without damping a swing keeps its height, and its period is 2π √(M/k) but for (ω Δt)²/12.
+    #[test]
+    fn a_link_swings_on_its_gear() {
+        let (stiffness, inertia, step_s) = (2e4, 2.0, 5e-4);
+        let mut damped = Swing::bent(stiffness, 100.0, 0.0);
+        for _ in 0..20_000 {
+            damped.step(30.0, inertia, step_s);
+        }
+        // exp(−100/(2·2) · 10 s)
+        assert!((damped.angle_rad - 30.0 / stiffness).abs() < 1e-12);
+        let mut free = Swing::bent(stiffness, 0.0, 30.0);
+        free.acceleration_rad_s2 = -30.0 / inertia;
+        let (mut crossings, mut last, mut highest) = (Vec::new(), free.angle_rad, 0.0_f64);
+        for k in 1..=20_000 {
+            free.step(0.0, inertia, step_s);
+            if last < 0.0 && free.angle_rad >= 0.0 {
+                crossings.push(f64::from(k) - free.angle_rad / (free.angle_rad - last));
+            }
+            highest = if k > 19_000 { highest.max(free.angle_rad) } else { 0.0 };
+            last = free.angle_rad;
+        }
+        let periods = (crossings.len() - 1) as f64;
+        let period_s = (crossings[crossings.len() - 1] - crossings[0]) / periods * step_s;
+        let omega = (stiffness / inertia).sqrt();
+        let longer = period_s * omega / std::f64::consts::TAU - 1.0;
+        let expected = (omega * step_s).powi(2) / 12.0;
+        assert!((longer / expected - 1.0).abs() < 0.01, "{longer} {expected}");
+        // Between two samples a swing is higher by up to (ω Δt)²/8.
+        let height = highest * stiffness / 30.0;
+        assert!((1.0 - height).abs() < (omega * step_s).powi(2) / 8.0, "{height}");
     }
 }

@@ -1,6 +1,6 @@
 //! An angle with a constant error: the torques are those of q − δ.
 
-use super::elasticity::{give_way, lagging_by};
+use super::elasticity::{Lag, give_way};
 use super::*;
 
 /// See the module.
@@ -15,7 +15,7 @@ impl Candidate for EncoderOffset {
     }
 
     fn columns(&self, scene: &Scene, site: Option<usize>, _: Shape) -> Vec<Column> {
-        let turned = lagging_by(scene, joint(site), &vec![SMALL_RAD; scene.samples()]);
+        let turned = Lag::slow(scene, vec![SMALL_RAD; scene.samples()]).of(scene, joint(site));
         vec![give_way(scene, &turned, SMALL_RAD)]
     }
 

@@ -1,0 +1,390 @@
+//! What a log tells of the torque on links and rotors, harmonic by harmonic.
+//!
+//! The acceleration's noise is in what the null model leaves and in what a family makes of the load; where the load
+//! is differentiated the two would be correlated for no physical reason. Of a motion that repeats, slow harmonics are
+//! known well and taken as they are ([`Trusted`]). Fast ones are small and drown one by one, and yet they make gears
+//! swing; but they are no accident: a drive that does not answer dry friction at once jolts its joint, at every
+//! reversal in the same way. That common course is known ([`jolts`]), and better from the torque than from the motion.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+use realfft::num_complex::Complex64;
+
+use crate::dynamics::{LANES, Lanes, Model, Motion, Real, Workspace, rigid_torque};
+use crate::robot::{Arm, JointSignals};
+use crate::signal::FineClock;
+
+/// Torques of a rigid arm along the motion of a log, as far as it tells them.
+pub struct Loads {
+    /// What moves the links, Nm.
+    pub link_nm: JointSignals,
+    /// The same and what moves the rotors: the torque on the gears, Nm.
+    pub load_nm: JointSignals,
+    /// The links' share of what the drives give too fast for `link_nm`, as the joints' reversals tell it, Nm.
+    pub jolt_nm: JointSignals,
+    /// What a torque that presses the links and the rotor of a joint apart accelerates them by, 1/(kg m²), the other
+    /// joints being free to move: I_a⁻¹ + [(M + I_a')⁻¹]_jj, I_a' without the joint's own rotor.
+    pub mobility_per_kg_m2: JointSignals,
+}
+
+/// A motion that repeats, its periods one after the other.
+pub struct Periods<'a> {
+    /// Angles, velocities and accelerations of every period.
+    pub each: &'a Motion,
+    /// Recorded torque, Nm.
+    pub torque_nm: &'a JointSignals,
+    /// Between the samples of one.
+    pub clock: &'a FineClock,
+    /// Samples per second.
+    pub rate_hz: f64,
+    /// Up to which harmonic the accelerations are known.
+    pub highest: usize,
+}
+
+impl Loads {
+    /// Of a motion as it was recorded, along which the links take `link_nm`; `mass_kg_m2` as from [`mass_along`].
+    pub fn as_recorded(
+        arm: &Arm,
+        motion: &Motion,
+        link_nm: &JointSignals,
+        mass_kg_m2: &[JointSignals],
+    ) -> Self {
+        let still = link_nm.map_joints(|_, y| vec![0.0; y.len()]);
+        let (_, mobility_per_kg_m2) = apart(arm, mass_kg_m2, &still);
+        let load_nm = sum(link_nm, &rotors_along(arm, motion));
+        Self { link_nm: link_nm.clone(), load_nm, jolt_nm: still, mobility_per_kg_m2 }
+    }
+
+    /// Of the mean of `periods`, as far as they agree.
+    pub fn agreed(
+        (model, arm): (&Model, &Arm),
+        mean: &Motion,
+        (link_nm, mass_kg_m2): (&JointSignals, &[JointSignals]),
+        periods: &Periods,
+    ) -> Self {
+        let Periods { each, torque_nm, clock, .. } = *periods;
+        let trusted = |y: &JointSignals| -> Vec<Trusted> {
+            (0..y.joints()).map(|j| Trusted::of(clock, y.joint(j))).collect()
+        };
+        let part = |t: &[Trusted], y: &JointSignals| y.map_joints(|j, y| t[j].part(clock, y));
+        let (links, rotors) = (rigid_torque_along(model, each), rotors_along(arm, each));
+        let of_loads = trusted(&sum(&links, &rotors));
+        let of_links = trusted(&links);
+        let of_torques = trusted(torque_nm);
+        let jolt_nm = mean.qd_rad_s.map_joints(|j, qd| {
+            let sign = |qd: f64| (qd / arm.friction_epsilon_rad_s).tanh();
+            let fine_sign: Vec<f64> = clock.refined(qd).into_iter().map(sign).collect();
+            let coulomb_nm = arm.joints[j].drive.coulomb_nm;
+            jolts(periods, (&of_loads[j], &of_torques[j]), &fine_sign, coulomb_nm)
+                .unwrap_or_else(|| vec![0.0; qd.len()])
+        });
+        let (jolt_nm, mobility_per_kg_m2) = apart(arm, mass_kg_m2, &jolt_nm);
+        let jolt_nm = jolt_nm.map_joints(|j, y| of_links[j].rest(clock, y, periods.highest));
+        let rotor_nm = part(&trusted(&rotors), &rotors_along(arm, mean));
+        let link_nm = part(&of_links, link_nm);
+        Self { load_nm: sum(&link_nm, &rotor_nm), link_nm, jolt_nm, mobility_per_kg_m2 }
+    }
+}
+
+/// Links lighter than this share of the rotor have no say in how it swings.
+const LEAST_SHARE: f64 = 1e-6;
+
+/// Of torques on the gears what the links take, M (M + I_a)⁻¹ τ, and [`Loads::mobility_per_kg_m2`].
+fn apart(
+    arm: &Arm,
+    mass_kg_m2: &[JointSignals],
+    torque_nm: &JointSignals,
+) -> (JointSignals, JointSignals) {
+    let joints = torque_nm.joints();
+    let rotor = |j: usize| arm.joints[j].drive.rotor_inertia_kg_m2.max(f64::MIN_POSITIVE);
+    let mut links_nm = torque_nm.clone();
+    let mut mobility = torque_nm.clone();
+    for k in 0..torque_nm.samples() {
+        let total = DMatrix::from_fn(joints, joints, |i, j| {
+            mass_kg_m2[j].joint(i)[k] + if i == j { rotor(j) } else { 0.0 }
+        });
+        let tau = DVector::from_fn(joints, |j, _| torque_nm.joint(j)[k]);
+        let inverse = Cholesky::new(total).map(|total| total.inverse());
+        for j in 0..joints {
+            // An estimate may come to a mass matrix that no arm has.
+            let (acceleration, own) = match &inverse {
+                Some(inverse) => ((inverse.row(j) * &tau)[0], inverse[(j, j)]),
+                None => (0.0, 0.0),
+            };
+            links_nm.joint_mut(j)[k] -= rotor(j) * acceleration;
+            // Sherman and Morrison 1950; the share of the inertia that is not the rotor's is positive in an arm.
+            let of_links = (1.0 - rotor(j) * own).max(LEAST_SHARE);
+            mobility.joint_mut(j)[k] = 1.0 / (rotor(j) * of_links);
+        }
+    }
+    (links_nm, mobility)
+}
+
+/// Power over noise of a band of harmonics that is taken as it is.
+const TRUSTED: f64 = 100.0;
+/// Harmonics that are judged together.
+const BAND: usize = 8;
+
+/// Which bands of harmonics of a torque are known a hundred times better than their noise.
+struct Trusted {
+    bands: Vec<bool>,
+    /// Coefficients of the mean period.
+    mean: Vec<Complex64>,
+    /// Mean square of their noise.
+    noise: Vec<f64>,
+}
+
+impl Trusted {
+    /// Of `periods`, one after the other.
+    fn of(clock: &FineClock, periods: &[f64]) -> Self {
+        let spectra: Vec<Vec<Complex64>> =
+            periods.chunks_exact(clock.samples()).map(|y| clock.spectrum(y)).collect();
+        let count = spectra.len() as f64;
+        let harmonics = clock.samples() / 2 + 1;
+        let mean: Vec<Complex64> = (0..harmonics)
+            .map(|h| spectra.iter().map(|s| s[h]).sum::<Complex64>() / count)
+            .collect();
+        let (mut bands, mut noise) = (Vec::new(), Vec::with_capacity(harmonics));
+        for first in (0..harmonics).step_by(BAND) {
+            let band = first..(first + BAND).min(harmonics);
+            let (mut power, mut scatter) = (0.0, 0.0);
+            for h in band.clone() {
+                power += mean[h].norm_sqr();
+                scatter += spectra.iter().map(|s| (s[h] - mean[h]).norm_sqr()).sum::<f64>();
+            }
+            let of_mean = scatter / (count * (count - 1.0));
+            bands.push(power > (1.0 + TRUSTED) * of_mean);
+            noise.resize(band.end, of_mean / band.len() as f64);
+        }
+        Self { bands, mean, noise }
+    }
+
+    /// Whether harmonic `h` is one of them.
+    fn holds(&self, h: usize) -> bool {
+        self.bands[h / BAND]
+    }
+
+    /// `y` with these harmonics only.
+    fn part(&self, clock: &FineClock, y: &[f64]) -> Vec<f64> {
+        clock.filtered(y, |h| if self.holds(h) { Complex64::ONE } else { Complex64::ZERO })
+    }
+
+    /// `y` without them, up to the harmonic `highest`.
+    fn rest(&self, clock: &FineClock, y: &[f64], highest: usize) -> Vec<f64> {
+        let is_rest = |h: usize| h <= highest && !self.holds(h);
+        clock.filtered(y, |h| if is_rest(h) { Complex64::ONE } else { Complex64::ZERO })
+    }
+}
+
+/// Time between two delays, s; not less than that between two samples.
+const DELAY_S: f64 = 0.008;
+/// In steps of that.
+const DELAYS: std::ops::Range<i64> = -2..4;
+/// Faster than this, Hz, drives are not looked at.
+const FASTEST_HZ: f64 = 50.0;
+/// What the reversals explain of a torque over what they explain of noise. The noise of the c is in the residual of the
+/// log as well; all six shift a score by less than √(6/(6·10)) = 0.3 of its σ.
+const TOLD: f64 = 10.0;
+
+/// What the drive of a joint gives beside friction in the harmonics in which its load is not trusted, as its reversals
+/// tell it, Nm: Σ_i c_i s(t − iΔ), with s the sign of the velocity, given at every tick, and the c fitted to `torque`,
+/// the recorded one less friction, weighted by its noise. `None` where it drowns, or where the joint hardly reverses.
+///
+/// Six delays, from two before to three behind the reversal, hold what a drive does within some twenty milliseconds.
+fn jolts(
+    periods: &Periods,
+    (load, torque): (&Trusted, &Trusted),
+    sign: &[f64],
+    coulomb_nm: f64,
+) -> Option<Vec<f64>> {
+    let Periods { clock, rate_hz, highest, .. } = *periods;
+    let fastest = highest.min((FASTEST_HZ * clock.samples() as f64 / rate_hz) as usize);
+    let is_used = |h: &usize| !load.holds(*h) && torque.noise[*h] > 0.0;
+    let used: Vec<usize> = (1..=fastest).filter(is_used).collect();
+    let delay = (DELAY_S.max(1.0 / rate_hz) * rate_hz * clock.ticks() as f64).round() as i64;
+    let delayed = |i: i64| {
+        let mut delayed = sign.to_vec();
+        delayed.rotate_right((i * delay).rem_euclid(sign.len() as i64) as usize);
+        delayed
+    };
+    let signs: Vec<Vec<f64>> = DELAYS.map(delayed).collect();
+    let spectra: Vec<Vec<Complex64>> = signs
+        .iter()
+        .map(|s| clock.spectrum(&s.iter().copied().step_by(clock.ticks()).collect::<Vec<_>>()))
+        .collect();
+    let product = |x: &[Complex64], y: &[Complex64]| -> f64 {
+        used.iter().map(|&h| (x[h].conj() * y[h]).re / torque.noise[h]).sum()
+    };
+    let count = signs.len();
+    let normal = DMatrix::from_fn(count, count, |i, k| product(&spectra[i], &spectra[k]));
+    let score = DVector::from_fn(count, |i, _| product(&spectra[i], &torque.mean));
+    let c = Cholesky::new(normal)?.solve(&score);
+    // Noise alone would make this one: the mean square of a coefficient has two parts.
+    let told = 2.0 * c.dot(&score) / count as f64;
+    let beside_friction: Vec<f64> = (0..sign.len())
+        .map(|k| signs.iter().zip(&c).map(|(s, c)| c * s[k]).sum::<f64>() - coulomb_nm * sign[k])
+        .collect();
+    let every_tick = FineClock::new(sign.len(), 1);
+    let slow = every_tick.filtered(&beside_friction, |h| {
+        if h <= fastest && !load.holds(h) { Complex64::ONE } else { Complex64::ZERO }
+    });
+    (told > TOLD).then(|| slow.into_iter().step_by(clock.ticks()).collect())
+}
+
+/// Torque on the gear of every sample, Nm: M q̈ + c + g of links and rotors, without friction.
+pub fn load_along(model: &Model, arm: &Arm, motion: &Motion) -> JointSignals {
+    sum(&rigid_torque_along(model, motion), &rotors_along(arm, motion))
+}
+
+/// M_links q̈ + c + g of every sample, eight samples at a time.
+pub fn rigid_torque_along(model: &Model, motion: &Motion) -> JointSignals {
+    let (joints, n) = (motion.joints(), motion.samples());
+    let mut workspace = Workspace::<Lanes>::new(model);
+    let mut out = JointSignals::zeros(joints, n);
+    let zero = <Lanes as Real>::constant(0.0);
+    let (mut q, mut qd, mut qdd) = (vec![zero; joints], vec![zero; joints], vec![zero; joints]);
+    let mut torque = vec![zero; joints];
+    for start in (0..n).step_by(LANES) {
+        let count = LANES.min(n - start);
+        for j in 0..joints {
+            for lane in 0..count {
+                q[j].0[lane] = motion.q_rad.joint(j)[start + lane];
+                qd[j].0[lane] = motion.qd_rad_s.joint(j)[start + lane];
+                qdd[j].0[lane] = motion.qdd_rad_s2.joint(j)[start + lane];
+            }
+        }
+        rigid_torque(model, &mut workspace, &q, &qd, &qdd, &mut torque);
+        for (j, torque) in torque.iter().enumerate() {
+            out.joint_mut(j)[start..start + count].copy_from_slice(&torque.0[..count]);
+        }
+    }
+    out
+}
+
+/// M of every sample, kg m², column by column: what one rad/s² more of a joint takes on all of them, beside the
+/// torques `recorded_nm`.
+pub fn mass_along(model: &Model, motion: &Motion, recorded_nm: &JointSignals) -> Vec<JointSignals> {
+    (0..motion.joints())
+        .map(|j| {
+            let mut faster = motion.clone();
+            faster.qdd_rad_s2.joint_mut(j).iter_mut().for_each(|qdd| *qdd += 1.0);
+            let torque = rigid_torque_along(model, &faster);
+            torque
+                .map_joints(|i, t| t.iter().zip(recorded_nm.joint(i)).map(|(t, r)| t - r).collect())
+        })
+        .collect()
+}
+
+/// I_a q̈ of every sample, Nm.
+fn rotors_along(arm: &Arm, motion: &Motion) -> JointSignals {
+    motion.qdd_rad_s2.map_joints(|j, qdd| {
+        let inertia = arm.joints[j].drive.rotor_inertia_kg_m2;
+        qdd.iter().map(|qdd| inertia * qdd).collect()
+    })
+}
+
+fn sum(a: &JointSignals, b: &JointSignals) -> JointSignals {
+    a.map_joints(|j, a| a.iter().zip(b.joint(j)).map(|(a, b)| a + b).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const N: usize = 500;
+    const TICKS: usize = 16;
+    const RATE_HZ: f64 = 125.0;
+
+    fn ur5() -> (Arm, Model) {
+        let arm = Arm::built_in("ur5").unwrap();
+        let model = Model::new(&arm);
+        (arm, model)
+    }
+
+    /// A pose and one rad/s² of the elbow.
+    fn one_sample() -> Motion {
+        let of = |values: [f64; 6]| JointSignals::from_fn(6, 1, |j, _| values[j]);
+        Motion {
+            q_rad: of([0.3, -1.1, 0.9, 0.4, -0.7, 0.2]),
+            qd_rad_s: of([0.0; 6]),
+            qdd_rad_s2: of([0.0, 0.0, 1.0, 0.0, 0.0, 0.0]),
+        }
+    }
+
+    /// Two rows of M q̈ + I_a q̈ = τ written out: what accelerates the arm is the links' share and the rotors'.
+    #[test]
+    fn links_and_rotors_share_a_torque() {
+        let (arm, model) = ur5();
+        let motion = one_sample();
+        let at_rest =
+            Motion { qdd_rad_s2: motion.qdd_rad_s2.map_joints(|_, _| vec![0.0]), ..motion.clone() };
+        let gravity_nm = rigid_torque_along(&model, &at_rest);
+        let mass = mass_along(&model, &at_rest, &gravity_nm);
+        let less_gravity =
+            |y: JointSignals| y.map_joints(|j, y| vec![y[0] - gravity_nm.joint(j)[0]]);
+        let on_gears = less_gravity(load_along(&model, &arm, &motion));
+        let on_links = less_gravity(rigid_torque_along(&model, &motion));
+        let (links, mobility) = apart(&arm, &mass, &on_gears);
+        for j in 0..6 {
+            assert!((links.joint(j)[0] - on_links.joint(j)[0]).abs() < 1e-12 * 10.0);
+            let rotor = |i: usize| arm.joints[i].drive.rotor_inertia_kg_m2;
+            let free = DMatrix::from_fn(6, 6, |i, k| {
+                mass[k].joint(i)[0] + if i == k && i != j { rotor(i) } else { 0.0 }
+            });
+            let apart = 1.0 / rotor(j) + free.try_inverse().unwrap()[(j, j)];
+            // Light links: the last joint's share of its own rotor is 1e-4, which costs as many digits.
+            assert!((mobility.joint(j)[0] / apart - 1.0).abs() < 1e-9, "{j}");
+        }
+    }
+
+    /// A drive that feeds 90 % of the friction forward, 3 ms late, jolts its joint as it should be known to within the
+    /// six coefficients' noise and what steps of 8 ms lack of a delay of 3 ms.
+    #[test]
+    fn reversals_tell_the_jolts_of_a_drive() {
+        let (fine, coulomb_nm, late) = (N * TICKS, 8.0, 6);
+        let velocity = |k: usize| {
+            let phase = std::f64::consts::TAU * k as f64 / fine as f64;
+            (3.0 * phase + 0.4).sin() + 0.6 * (5.0 * phase + 1.0).cos() + 0.3 * (8.0 * phase).sin()
+        };
+        let sign: Vec<f64> = (0..fine).map(|k| (velocity(k) / 0.02).tanh()).collect();
+        let fed = |k: usize| 0.9 * coulomb_nm * sign[(k + fine - late) % fine];
+        let mut state = 1_u64;
+        let mut noise = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
+        };
+        let torque: Vec<f64> = (0..8 * N)
+            .map(|k| fed(k % N * TICKS) + 20.0 * velocity(k % N * TICKS) + noise())
+            .collect();
+        let load: Vec<f64> =
+            (0..8 * N).map(|k| 20.0 * velocity(k % N * TICKS) + 4.0 * noise()).collect();
+        let clock = FineClock::new(N, TICKS);
+        let still = Motion {
+            q_rad: JointSignals::zeros(1, N),
+            qd_rad_s: JointSignals::zeros(1, N),
+            qdd_rad_s2: JointSignals::zeros(1, N),
+        };
+        let periods = Periods {
+            each: &still,
+            torque_nm: &JointSignals::zeros(1, N),
+            clock: &clock,
+            rate_hz: RATE_HZ,
+            highest: 200,
+        };
+        let of_load = Trusted::of(&clock, &load);
+        assert!(of_load.holds(8) && !of_load.holds(50));
+        let known =
+            jolts(&periods, (&of_load, &Trusted::of(&clock, &torque)), &sign, coulomb_nm).unwrap();
+        let true_nm: Vec<f64> = (0..fine).map(|k| fed(k) - coulomb_nm * sign[k]).collect();
+        let band = FineClock::new(fine, 1).filtered(&true_nm, |h| {
+            if h <= 200 && !of_load.holds(h) { Complex64::ONE } else { Complex64::ZERO }
+        });
+        let truth: Vec<f64> = band.into_iter().step_by(TICKS).collect();
+        let square = |y: &[f64]| y.iter().map(|y| y * y).sum::<f64>();
+        let off: Vec<f64> = truth.iter().zip(&known).map(|(t, k)| t - k).collect();
+        // Six coefficients of unit noise beside what they explain, and what the steps lack: 0.03 without noise.
+        let share = square(&off) / square(&truth);
+        assert!(share < 0.1, "{share}");
+        let none = vec![1.0; fine];
+        assert!(jolts(&periods, (&of_load, &of_load), &none, coulomb_nm).is_none());
+    }
+}
