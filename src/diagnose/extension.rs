@@ -75,6 +75,15 @@ impl Extension {
         Self { theta, answers: answers.collect(), effects }
     }
 
+    /// The same model for another log ([`Candidate::elsewhere`]).
+    pub fn elsewhere(&self, families: &[Box<dyn Candidate>]) -> Self {
+        let mut out = self.clone();
+        for effect in &mut out.effects {
+            effect.shape = families[effect.family].elsewhere(effect.shape, &effect.coefficients);
+        }
+        out
+    }
+
     /// Torque of one period (or of the run), Nm, as the regression sees it: joints × samples of `problem`.
     pub fn torque_nm(
         &self,

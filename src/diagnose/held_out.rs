@@ -43,6 +43,7 @@ pub(super) fn held_out_gain(
     log: &Validation,
     models: &Models,
 ) -> Result<HeldOut, DiagnoseError> {
+    let extension = &models.extension.elsewhere(families);
     let mut regression = identifier.regression(&log.measurement)?;
     move_to_common_motion(&mut regression, &log.measurement, (arm, set), &models.null.theta);
     let prepared = &regression.prepared;
@@ -52,7 +53,7 @@ pub(super) fn held_out_gain(
         let weights = vec![1.0; arm.dof()];
         Some(Whitening::Run(RunWhitening::new(&regression, options, &weights)?))
     };
-    let scene = Scene::new(arm, set, &models.extension.theta, prepared);
+    let scene = Scene::new(arm, set, &extension.theta, prepared);
     let problem = &regression.problem;
     let (joints, samples) = (problem.joints(), problem.samples);
     let measured: Vec<Vec<f64>> =
@@ -94,7 +95,7 @@ pub(super) fn held_out_gain(
         }
         None => None,
     };
-    let (before, after) = (error(models.null), error(models.extension));
+    let (before, after) = (error(models.null), error(extension));
     Ok(HeldOut {
         log: log.measurement.source.to_owned(),
         standstill_fraction: rows.standstill_fractions(),
@@ -105,7 +106,7 @@ pub(super) fn held_out_gain(
         before_own_friction_rms_nm: own_friction(&before),
         after_own_friction_rms_nm: own_friction(&after),
         before_standstill_free_rms_nm: all(&outside_friction(models.null)),
-        after_standstill_free_rms_nm: all(&outside_friction(models.extension)),
+        after_standstill_free_rms_nm: all(&outside_friction(extension)),
         manufacturer_rms_nm: manufacturer.as_ref().map(all),
         manufacturer_moving_rms_nm: manufacturer.as_ref().map(moving),
     })

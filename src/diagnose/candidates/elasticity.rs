@@ -18,7 +18,7 @@
 //! by which a stiff gear is seen that hardly bends. Where the log has
 //! the link's angle, the rotor and its friction move more: I_a δ̈ + F_v δ̇ + F_c [tanh((q̇ + δ̇)/ε) −
 //! tanh(q̇/ε)] on the joint itself, δ = τ_L/(k + i d ω) (further variants; the friction reverses where the motor
-//! does). The stiffness is in the shape as well as in the coefficient 1/k.
+//! does). The stiffness is in the coefficient 1/k; the shape only says how fast the gear swings.
 
 use super::*;
 use crate::diagnose::scene::FINE;
@@ -196,10 +196,15 @@ impl Candidate for Elasticity {
         vec![quantity("stiffness_nm_rad", 1.0 / b[0], "Nm/rad")]
     }
 
-    fn in_shape(&self, shape: Shape) -> Option<Quantity> {
-        // Seen by the link's encoder, the torque is 1/k times a shape that hardly depends on k.
-        let in_both = shape.variant == 0;
-        in_both.then(|| quantity("stiffness_nm_rad", shape.value, "Nm/rad"))
+    /// How a gear bends tells k; how jolts make it swing also depends on the drive that holds its rotor, and shapes are
+    /// up to several times stiffer. Elsewhere it swings by its own k.
+    fn elsewhere(&self, shape: Shape, b: &[f64]) -> Shape {
+        match b {
+            [compliance] if shape.variant == 0 && *compliance > 0.0 => {
+                Shape { value: 1.0 / compliance, ..shape }
+            }
+            _ => shape,
+        }
     }
 
     fn separating_experiment(&self) -> &'static str {

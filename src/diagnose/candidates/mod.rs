@@ -134,6 +134,11 @@ pub trait Candidate: Sync {
         None
     }
 
+    /// The shape with which the law, fitted with `shape` and the coefficients `b` to one log, predicts another.
+    fn elsewhere(&self, shape: Shape, _b: &[f64]) -> Shape {
+        shape
+    }
+
     /// The quantity that says how large the effect is, for detection limits.
     fn size(&self, quantities: &[Quantity]) -> Option<Quantity> {
         quantities.first().copied()
