@@ -28,13 +28,13 @@ pub struct Scene {
     pub periodic: bool,
     /// Torque that moves the links along the motion as it was recorded, Nm.
     recorded_nm: JointSignals,
-    /// Torque that moves the links, Nm ([`Loads`]).
+    /// Torque that moves the links, Nm.
     pub link_nm: JointSignals,
-    /// Torque on the gear: links and rotors, Nm ([`Loads`]).
+    /// Torque on the gear: links and rotors, Nm.
     pub load_nm: JointSignals,
-    /// What the links take beside `link_nm` where joints reverse, Nm ([`Loads`]).
+    /// What the links take beside `link_nm` where joints reverse, Nm.
     jolt_nm: JointSignals,
-    /// How easily links and rotor are pressed apart, 1/(kg m²) ([`Loads`]).
+    /// How easily links and rotor are pressed apart, 1/(kg m²).
     pub mobility_per_kg_m2: JointSignals,
     /// Predicted drive torque: load, friction and offset, Nm.
     pub torque_nm: JointSignals,
