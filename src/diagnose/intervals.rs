@@ -76,7 +76,7 @@ pub fn base(study: &Study, set: &BaseSet, extension: &Extension) -> Vec<BasePara
 /// quantile, which is where the likelihood falls below that of the best form by q². The nonlinear parameter of a
 /// motion that repeats is treated the same way, value by value: the interval is that of the profile of the likelihood
 /// (Venzon and Moolgavkar 1988), which need not be symmetric. It also reaches to what the shape says of the same
-/// parameter, see [`Candidate::in_shape`].
+/// parameter, see [`Candidate::in_shape`], and holds what the law itself may be wrong by ([`Candidate::form_error`]).
 pub fn physical(
     study: &Study,
     kept: &Kept,
@@ -109,10 +109,15 @@ pub fn physical(
         }
         reach_over(&mut out, &other);
     }
-    if let Some(again) = study.families[effect.family].in_shape(effect.shape)
+    let family = &study.families[effect.family];
+    if let Some(again) = family.in_shape(effect.shape)
         && let Some(own) = out.get_mut(again.name)
     {
         own.reach(again.value);
+    }
+    let form_error = family.form_error(&study.scene, effect.shape);
+    for own in out.values_mut() {
+        own.widen(quantile * form_error * own.value.abs());
     }
     out
 }

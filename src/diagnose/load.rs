@@ -95,7 +95,7 @@ fn apart(
     torque_nm: &JointSignals,
 ) -> (JointSignals, JointSignals) {
     let joints = torque_nm.joints();
-    let rotor = |j: usize| arm.joints[j].drive.rotor_inertia_kg_m2.max(f64::MIN_POSITIVE);
+    let rotor = |j: usize| rotor_kg_m2(arm, j);
     let mut links_nm = torque_nm.clone();
     let mut mobility = torque_nm.clone();
     for k in 0..torque_nm.samples() {
@@ -179,8 +179,8 @@ impl Trusted {
 const DELAY_S: f64 = 0.008;
 /// In steps of that.
 const DELAYS: std::ops::Range<i64> = -2..4;
-/// Faster than this, Hz, drives are not looked at.
-const FASTEST_HZ: f64 = 50.0;
+/// Faster than this, Hz, drives are not looked at: no gear swings there that the log could show.
+const FASTEST_HZ: f64 = 60.0;
 /// What the reversals explain of a torque over what they explain of noise. The noise of the c is in the residual of the
 /// log as well; all six shift a score by less than √(6/(6·10)) = 0.3 of its σ.
 const TOLD: f64 = 10.0;
@@ -272,6 +272,11 @@ pub fn mass_along(model: &Model, motion: &Motion, recorded_nm: &JointSignals) ->
                 .map_joints(|i, t| t.iter().zip(recorded_nm.joint(i)).map(|(t, r)| t - r).collect())
         })
         .collect()
+}
+
+/// I_a of joint `j`, kg m², positive: a gear has two sides.
+pub fn rotor_kg_m2(arm: &Arm, j: usize) -> f64 {
+    arm.joints[j].drive.rotor_inertia_kg_m2.max(f64::MIN_POSITIVE)
 }
 
 /// I_a q̈ of every sample, Nm.

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use realfft::num_complex::Complex64;
 
-use super::load::{Loads, Periods, mass_along, rigid_torque_along};
+use super::load::{Loads, Periods, mass_along, rigid_torque_along, rotor_kg_m2};
 use crate::base::BaseSet;
 use crate::dynamics::{Model, Motion, Parameter, ParameterLayout};
 use crate::identify::{Prepared, Preparer, drive_answers};
@@ -139,6 +139,11 @@ impl Scene {
             instants: (0..joints).map(|_| OnceLock::new()).collect(),
             clock,
         }
+    }
+
+    /// I_a of joint `j`, kg m²; positive, so that what swings on it has an acceleration.
+    pub fn rotor_kg_m2(&self, j: usize) -> f64 {
+        rotor_kg_m2(&self.arm, j)
     }
 
     /// Number of joints.

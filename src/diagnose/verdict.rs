@@ -51,6 +51,12 @@ impl Estimate {
         let [low, high] = self.ci95;
         self.ci95 = [low.min(value), high.max(value)];
     }
+
+    /// Both halves of the interval made longer by an error of their own kind, of which `half` is 95 %.
+    pub(super) fn widen(&mut self, half: f64) {
+        let [low, high] = self.ci95.map(|end| (end - self.value).hypot(half));
+        self.ci95 = [self.value - low, self.value + high];
+    }
 }
 
 /// Ends of an interval between which nothing is known.

@@ -116,7 +116,7 @@ struct Even<'a> {
 
 impl Preparer {
     /// Highest frequency of a period's own motion over the rate.
-    pub const WIDE: f64 = 0.4;
+    pub const WIDE: f64 = 0.48;
 
     /// [`Self::prepare`], and the motion of every period for itself.
     pub fn prepare_with_periods(

@@ -2,17 +2,18 @@
 //! give way; where the load changes sign they part, and the rotor flies through the gap g to the other flank:
 //!
 //! ```text
-//! δ̈ = (τ_L − T) (1/I_a + [(M + I_a')⁻¹]_jj),   T = k (δ ∓ g/2) + d δ̇ beyond ±g/2 as long as it pushes, 0 between
+//! δ̈ = (τ_L − T − d_M δ̇) (1/I_a + [(M + I_a')⁻¹]_jj),   T = k (δ ∓ g/2) + d δ̇ beyond ±g/2 as long as it pushes, 0 between
 //! ```
 //!
 //! with δ = q_M − q_L, the load τ_L of the rigid arm, which passes through zero, the other joints free to move (with
 //! theirs held, flights at the elbow seemed half as wide as they were), and flanks against which the
-//! rotor alone swings at √(k/I_a) with the damping d = 2 ζ √(k I_a). The log has the motor's angle, so that
+//! rotor alone swings at √(k/I_a) with the damping d = 2 ζ √(k I_a); the drive damps by d_M, as it does where gears give
+//! way. The log has the motor's angle, so that
 //! the links have moved by δ less than it says. A flight lasts (6 g/δ⃛)^(1/3), a few milliseconds, and is
 //! seen by its jerk at both ends and by the swinging after it: the log has δ̇ at its samples only, and its
 //! acceleration is the derivative of these.
 
-use super::elasticity::{Lag, RUN_IN_S, give_way};
+use super::elasticity::{HELD_ERROR, Lag, RUN_IN_S, give_way, held_nm_s_rad};
 use super::*;
 use crate::diagnose::scene::FINE;
 
@@ -27,7 +28,7 @@ const FLANK_RAD_S: [f64; 14] = [
     900.0,
 ];
 /// ζ of the flanks.
-const DAMPING_RATIO: f64 = 0.08;
+const DAMPING_RATIO: f64 = 0.12;
 /// Gaps that are flown through at once.
 const ABREAST: usize = 8;
 
@@ -68,6 +69,10 @@ impl Candidate for Backlash {
         Some(quantity("gap_rad", shape.value, "rad"))
     }
 
+    fn form_error(&self, _: &Scene, _: Shape) -> f64 {
+        HELD_ERROR
+    }
+
     fn separating_experiment(&self) -> &'static str {
         "hold the motor and push the link both ways: play gives no torque, a spring does"
     }
@@ -76,12 +81,12 @@ impl Candidate for Backlash {
         b[0] > 0.0
     }
 
-    /// Both tell the gap: how far the links lag, and how long a flight lasts. Flanks that are harder or softer
-    /// than those assumed make a flight seem longer; a gap that is crossed in less time than half of it takes was
-    /// none, but a gear that gives way, and one four times too wide for the lag of the links, which a flight 1.6 times
-    /// too long means, was not flown through.
+    /// Both tell the gap: how far the links lag, and how long a flight lasts. Flanks and drives that are harder or softer
+    /// than those assumed make a flight seem longer or shorter; a gap that is crossed in less time than a third of it
+    /// takes was none, but a gear that gives way, and one four times too wide for the lag of the links, which a flight
+    /// 1.6 times too long means, was not flown through.
     fn is_its_own(&self, _: &Scene, _: Option<usize>, shape: Shape, b: &[f64]) -> bool {
-        b.first().is_none_or(|gap_rad| (0.25..=2.0).contains(&(gap_rad / shape.value)))
+        b.first().is_none_or(|gap_rad| (0.25..=3.0).contains(&(gap_rad / shape.value)))
     }
 
     fn in_words(&self) -> &'static str {
@@ -94,7 +99,7 @@ fn fly(scene: &Scene, j: usize, shapes: &[Shape]) -> Vec<[Vec<f64>; 2]> {
     let load = scene.link_nm.joint(j);
     let n = load.len();
     let mobility = scene.mobility_per_kg_m2.joint(j);
-    let rotor = scene.arm.joints[j].drive.rotor_inertia_kg_m2.max(f64::MIN_POSITIVE);
+    let rotor = scene.rotor_kg_m2(j);
     let step_s = 1.0 / (scene.rate_hz * FINE as f64);
     let fine = scene.fine_link_nm(j);
     let jolts = scene.fine_jolt_nm(j);
@@ -111,9 +116,10 @@ fn fly(scene: &Scene, j: usize, shapes: &[Shape]) -> Vec<[Vec<f64>; 2]> {
         for (lane, [delta, rate]) in out.iter_mut().enumerate() {
             (delta[k], rate[k]) = (flights.angle_rad[lane], flights.rate_rad_s[lane]);
         }
+        let held = held_nm_s_rad(mobility[k], rotor);
         let ticks = FINE * k..FINE * (k + 1);
         for (load, jolt) in fine[ticks.clone()].iter().zip(&jolts[ticks]) {
-            flights.step(load + jolt, mobility[k], step_s);
+            flights.step(load + jolt, held, mobility[k], step_s);
         }
     }
     out
@@ -163,16 +169,17 @@ impl Flights {
         }
     }
 
-    /// `step_s` later, under the load `load_nm` (semi-implicit Euler, which neither adds energy to a swing
-    /// nor takes any). The flanks push and do not pull.
-    fn step(&mut self, load_nm: f64, mobility: f64, step_s: f64) {
+    /// `step_s` later, under the load `load_nm` (semi-implicit Euler, which neither adds energy to a swing nor takes any;
+    /// the drive's damping implicit, which is stable for any). The flanks push and do not pull.
+    fn step(&mut self, load_nm: f64, held_nm_s_rad: f64, mobility: f64, step_s: f64) {
         for lane in 0..ABREAST {
             let (angle, half_gap) = (self.angle_rad[lane], self.half_gap_rad[lane]);
             let pressed = angle - angle.max(-half_gap).min(half_gap);
             let flanks_nm = self.stiffness_nm_rad[lane] * pressed
                 + self.damping_nm_s_rad[lane] * self.rate_rad_s[lane];
             let flanks_nm = if flanks_nm * pressed <= 0.0 { 0.0 } else { flanks_nm };
-            self.rate_rad_s[lane] += (load_nm - flanks_nm) * mobility * step_s;
+            let rate = self.rate_rad_s[lane] + (load_nm - flanks_nm) * mobility * step_s;
+            self.rate_rad_s[lane] = rate / (1.0 + held_nm_s_rad * mobility * step_s);
             self.angle_rad[lane] += self.rate_rad_s[lane] * step_s;
         }
     }
@@ -189,7 +196,7 @@ mod tests {
         let mut flights = Flights::abreast(|_| Flight::pressed(0.5 * gap, 900.0, 1.0, -1e-9));
         let mut t = 0.0;
         while flights.angle_rad[0] < 0.5 * gap {
-            flights.step(slope * (t + 0.5 * step_s), 1.0, step_s);
+            flights.step(slope * (t + 0.5 * step_s), 0.0, 1.0, step_s);
             t += step_s;
         }
         // Steps of 10 µs.
@@ -203,11 +210,11 @@ mod tests {
         let mut flights =
             Flights::abreast(|lane| Flight::pressed(1e-5, frequency(lane), 1.0, -1.0));
         for _ in 0..100_000 {
-            flights.step(5.0, 1.0, 1e-5);
+            flights.step(5.0, 0.0, 1.0, 1e-5);
         }
         for (lane, angle) in flights.angle_rad.iter().enumerate() {
             let at_rest = 1e-5 + 5.0 / frequency(lane).powi(2);
-            // What is left of the swing after 1 s: e^(−0.08 · 300).
+            // What is left of the swing after 1 s: e^(−0.12 · 300).
             assert!((angle - at_rest).abs() < 1e-9 * at_rest, "{angle}");
         }
     }

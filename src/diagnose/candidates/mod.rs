@@ -134,6 +134,12 @@ pub trait Candidate: Sync {
         None
     }
 
+    /// Standard error of its physical parameters beside that of the noise, over their value: what the law takes for
+    /// granted and the log does not tell.
+    fn form_error(&self, _scene: &Scene, _shape: Shape) -> f64 {
+        0.0
+    }
+
     /// The shape with which the law, fitted with `shape` and the coefficients `b` to one log, predicts another.
     fn elsewhere(&self, shape: Shape, _b: &[f64]) -> Shape {
         shape
