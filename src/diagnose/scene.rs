@@ -7,7 +7,7 @@ use realfft::num_complex::Complex64;
 use super::load::{Loads, Periods, mass_along, rigid_torque_along, rotor_kg_m2};
 use crate::base::BaseSet;
 use crate::dynamics::{Model, Motion, Parameter, ParameterLayout};
-use crate::identify::{Prepared, Preparer, drive_answers};
+use crate::identify::{Prepared, drive_answers};
 use crate::robot::{Arm, JointSignals};
 use crate::signal::{FineClock, central_4};
 
@@ -57,6 +57,8 @@ pub struct Scene {
     instants: Vec<OnceLock<Instants>>,
     /// Between the samples of a motion that repeats.
     clock: Option<FineClock>,
+    /// Up to which harmonic the accelerations of periods are known.
+    highest: usize,
 }
 
 /// Instants per sample of [`Scene::fine_link_nm`] and [`Scene::instants`].
@@ -92,10 +94,10 @@ impl Scene {
         let recorded_nm = rigid_torque_along(&model, &motion);
         let mass_kg_m2 = mass_along(&model, &motion, &recorded_nm);
         let rate_hz = prepared.processing.rate_hz;
+        let highest = (prepared.highest * n as f64) as usize;
         let loads = match (&prepared.each_period, &clock) {
             (Some(each), Some(clock)) => {
                 let torque_nm = &prepared.torque_nm;
-                let highest = highest_harmonic(n);
                 let periods = Periods { each, torque_nm, clock, rate_hz, highest };
                 let along = (&recorded_nm, &mass_kg_m2[..]);
                 Loads::agreed((&model, &arm), &motion, along, &periods)
@@ -138,6 +140,7 @@ impl Scene {
             fine_link_nm: vec![OnceLock::new(); joints],
             instants: (0..joints).map(|_| OnceLock::new()).collect(),
             clock,
+            highest,
         }
     }
 
@@ -248,16 +251,14 @@ impl Scene {
     /// answer at once ([`FineClock::as_logged`]).
     pub fn as_logged(&self, torque_nm: Vec<f64>) -> Vec<f64> {
         match &self.clock {
-            Some(clock) => clock.as_logged(&torque_nm, highest_harmonic(self.samples())),
+            Some(clock) => clock.as_logged(&torque_nm, self.highest),
             None => torque_nm,
         }
     }
 
     /// How the drive of joint `j` may answer dry friction, as columns ([`drive_answers`]); none for a single run.
     pub fn answers(&self, j: usize) -> Vec<Vec<f64>> {
-        let columns = |clock| {
-            drive_answers(clock, &self.instants(j).sign, highest_harmonic(self.samples())).into()
-        };
+        let columns = |clock| drive_answers(clock, &self.instants(j).sign, self.highest).into();
         self.clock.as_ref().map_or(Vec::new(), columns)
     }
 
@@ -313,11 +314,6 @@ impl Scene {
         }
         changed
     }
-}
-
-/// Up to which harmonic the accelerations of periods of `samples` samples are known.
-fn highest_harmonic(samples: usize) -> usize {
-    (Preparer::WIDE * samples as f64) as usize
 }
 
 /// An arm with the base parameters `theta`, and the constant torques that go with it, Nm.

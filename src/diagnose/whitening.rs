@@ -69,9 +69,9 @@ const NEIGHBOURS: usize = 12;
 const DRIFTS: f64 = 5.0;
 /// Noise below this share of a joint's rms torque is not told from the rounding of a model.
 const FLOOR: f64 = 1e-4;
-/// Highest frequency that is used, over the rate: below the end of the periods' own motion, and not far below, because
-/// half of what narrow play shows in 125 samples a second lies between 44 and 58 Hz.
-const USED: f64 = 0.46;
+/// How far, over the rate, what is used ends below the highest frequency of the periods' own motion. Not far, because half
+/// of what narrow play shows in 125 samples a second lies between 44 and 58 Hz.
+const BELOW_HIGHEST: f64 = 0.02;
 /// Rows kept of a single run, per second and hertz of its low-pass.
 const KEPT_RATE: f64 = 4.0;
 /// Blocks of a single run.
@@ -89,7 +89,7 @@ impl PeriodWhitening {
         let mut whitening =
             Self { samples: n, periods, joints, forward, factors: Vec::new(), unknown: Vec::new() };
         let harmonics = n / 2 + 1;
-        let used = (USED * n as f64) as usize;
+        let used = ((regression.prepared.highest - BELOW_HIGHEST) * n as f64).round() as usize;
         let corners: Vec<Vec<Complex<f64>>> =
             (0..joints).map(|j| whitening.spectrum(scene.sign.joint(j))).collect();
         // Running sums over harmonics of Σ_p D Dᴴ/(P − 1), D the deviation from the mean period.

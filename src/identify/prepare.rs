@@ -61,7 +61,7 @@ pub struct Prepared {
     pub torque_nm: JointSignals,
     /// Scatter of the torque between periods; `None` for a single run.
     pub replicates: Option<Replicates>,
-    /// The motion of every period for itself, with all harmonics up to [`Preparer::WIDE`]; only where
+    /// The motion of every period for itself, with all harmonics up to `highest`; only where
     /// it was asked for and the motion repeats.
     pub each_period: Option<Motion>,
     /// Angles and velocities of all periods as they were recorded, rad and rad/s; `None` for a single run.
@@ -69,6 +69,8 @@ pub struct Prepared {
     /// Where the samples of `torque_nm` lie among the rows, between which the torque is a straight line; only
     /// where an uneven log of a motion that repeats was put on an even clock.
     pub between: Option<Vec<Bracket>>,
+    /// Highest frequency, over the rate, at which the samples of a motion that repeats are those of the log.
+    pub highest: f64,
     /// Smallest distance between two recorded angles, per joint, rad.
     pub angle_quantum_rad: Vec<f64>,
     /// ± the largest torque that is read, per joint, where readings are cut off there, Nm.
@@ -108,6 +110,8 @@ struct Even<'a> {
     start_s: f64,
     rate_hz: f64,
     resampled: bool,
+    /// See [`Prepared::highest`].
+    highest: f64,
     between: Option<Vec<Bracket>>,
     q_rad: std::borrow::Cow<'a, JointSignals>,
     qd_rad_s: std::borrow::Cow<'a, JointSignals>,
@@ -115,8 +119,10 @@ struct Even<'a> {
 }
 
 impl Preparer {
-    /// Highest frequency of a period's own motion over the rate.
-    pub const WIDE: f64 = 0.48;
+    /// Highest frequency that samples show as the log has them, over the rate.
+    const AS_LOGGED: f64 = 0.48;
+    /// The same of samples that went through a decimator's low-pass, or lie on straight lines between rows.
+    const REWORKED: f64 = 0.37;
 
     /// [`Self::prepare`], and the motion of every period for itself.
     pub fn prepare_with_periods(
@@ -218,6 +224,7 @@ impl Preparer {
             start_s: m.time_s[0],
             rate_hz: natural_hz,
             resampled: false,
+            highest: Self::AS_LOGGED,
             between: None,
             q_rad: Cow::Borrowed(m.q_rad),
             qd_rad_s: Cow::Borrowed(m.qd_rad_s),
@@ -249,6 +256,7 @@ impl Preparer {
             even.torque_nm = cut(grid.straight(m.torque_nm)?);
             even.rate_hz = grid_hz;
             even.resampled = true;
+            even.highest = Self::REWORKED;
             even.between = Some(grid.brackets()[longest].to_vec());
         }
         let highest = options.rate_hz.unwrap_or(Options::HIGHEST_RATE_HZ);
@@ -269,6 +277,7 @@ impl Preparer {
                 *signals = Cow::Owned(decimated);
             }
             even.rate_hz = decimator.rate_hz();
+            even.highest = Self::REWORKED;
             even.between = None;
         }
         Ok(even)
@@ -322,7 +331,7 @@ impl Preparer {
         let averaged = fit.fit(&q_rad, &qd_rad_s, &mut self.fit);
         let each_period = self
             .keeps_periods
-            .then(|| fit.each_period(&q_rad, &qd_rad_s, Self::WIDE, &mut self.fit))
+            .then(|| fit.each_period(&q_rad, &qd_rad_s, even.highest, &mut self.fit))
             .transpose();
         self.periodic = Some(fit);
         let averaged = averaged?;
@@ -341,6 +350,7 @@ impl Preparer {
             each_period,
             recorded: Some([q_rad, qd_rad_s]),
             between: even.between.as_ref().map(|between| between[window.clone()].to_vec()),
+            highest: even.highest,
             angle_quantum_rad: angle_quantum_rad(m),
             torque_limit_nm: torque_limit_nm(m),
             replicates: Some(replicate_noise(&torque_nm, samples_per_period)?),
@@ -397,6 +407,7 @@ impl Preparer {
             each_period: None,
             recorded: None,
             between: None,
+            highest: even.highest,
             angle_quantum_rad: angle_quantum_rad(m),
             torque_limit_nm: torque_limit_nm(m),
             replicates: None,
