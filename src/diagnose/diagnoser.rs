@@ -24,7 +24,9 @@ use super::study::{Entry, Study};
 use super::verdict::{Cause, DetectionLimit, Diagnosis, Rival, Rms, Verdict};
 use crate::base::BaseSet;
 use crate::dynamics::Model;
-use crate::identify::{Identification, Identifier, Measurement, Options, gravity_remark};
+use crate::identify::{
+    Identification, Identifier, Measurement, Options, gravity_question, gravity_remark,
+};
 use crate::robot::{Arm, JointSignals};
 
 /// Everything that stays the same from log to log.
@@ -230,9 +232,7 @@ impl<'a> Diagnoser<'a> {
         let covariance = &identification.covariance;
         if let Some(remark) = gravity_remark(self.arm, self.set, &nominal, theta, covariance) {
             // Of another robot's log nothing else matters.
-            diagnosis
-                .sentences
-                .insert(0, format!("Is this log of {}? The {remark}.", self.arm.name));
+            diagnosis.sentences.insert(0, gravity_question(&self.arm.name, &remark));
         }
         let samples = (0..regression.problem.samples).map(|row| regression.sample(row)).collect();
         let scene = study.scene;

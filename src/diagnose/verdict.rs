@@ -279,8 +279,10 @@ impl Diagnosis {
             self.causes.iter().map(|c| c.sentence(self.noise_floor_nm.is_some())).collect();
         if let Some(unexplained) = &self.unexplained {
             out.push(format!(
-                "Joint {} shows {:.2} Nm (rms) that no known effect explains; it depends most clearly on the {}.",
-                unexplained.joint, unexplained.rms_nm, unexplained.axis
+                "Joint {} shows {} Nm (rms) that no known effect explains; it depends most clearly on the {}.",
+                unexplained.joint,
+                two_digits(unexplained.rms_nm),
+                unexplained.axis
             ));
         }
         if out.is_empty() {

@@ -124,6 +124,11 @@ pub fn gravity_remark(
     GravityMatch::of(arm, set, nominal, theta, &covariance.matrix)?.remark(&arm.name, quantile)
 }
 
+/// What a [`gravity_remark`] asks.
+pub fn gravity_question(robot: &str, remark: &str) -> String {
+    format!("Is this log of {robot}? The {remark}.")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

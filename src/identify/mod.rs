@@ -27,7 +27,7 @@ pub use drive_answers::drive_answers;
 pub use error::IdentifyError;
 pub use estimation::{Estimate, Estimation, MotionAids};
 pub use fit::{Estimator, Fit, FitError, Fitter, Weighting};
-pub use gravity::{GravityMatch, gravity_remark};
+pub use gravity::{GravityMatch, gravity_question, gravity_remark};
 pub use identifier::{Identification, Identifier, Regression, Residual};
 pub use lack_of_fit::{Floor, LackOfFit};
 pub use options::Options;

@@ -19,7 +19,7 @@ use crate::identify::covariance::CovarianceKind;
 use crate::identify::physical::PhysicalEstimate;
 use crate::identify::{
     Condition, Estimator, FitError, Identification, Prediction, Processing, Regression, Residual,
-    gravity_remark, identifies_the_arm, not_identified,
+    gravity_question, gravity_remark, identifies_the_arm, not_identified,
 };
 use crate::log::Log;
 use crate::robot::Arm;
@@ -248,9 +248,10 @@ impl Result {
             Some(false) => format!(" {}", self.intervals.reason),
             _ => String::new(),
         };
-        let doubt = self.doubt.as_ref().map_or(String::new(), |remark| {
-            format!("Is this log of {}? The {remark}. ", self.robot)
-        });
+        let doubt = self
+            .doubt
+            .as_ref()
+            .map_or(String::new(), |remark| gravity_question(&self.robot, remark) + " ");
         format!(
             "{doubt}Identified {b} base parameters of {} from {} samples: what the model leaves of the \
              torque is {low:.1} to {high:.1} % per joint.{open}{distrust}",
