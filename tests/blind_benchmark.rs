@@ -176,7 +176,6 @@ fn torque_that_repeats_with_the_turn() {
 }
 
 #[test]
-#[ignore = "named with the right gap, but the ring of its flanks, most of it on the other motion, is not predicted"]
 fn gears_with_play() {
     hide_and_find(&["backlash"]);
 }
