@@ -41,15 +41,16 @@ pub struct Periods<'a> {
 }
 
 impl Loads {
-    /// Of a motion as it was recorded, along which the links take `link_nm`; `mass_kg_m2` as from [`mass_along`].
+    /// Of a motion as it was recorded, along which the links take `link_nm`; `mass_kg_m2` as from [`mass_along`],
+    /// `rotor_kg_m2` as from [`rotors_kg_m2`].
     pub fn as_recorded(
         arm: &Arm,
         motion: &Motion,
         link_nm: &JointSignals,
-        mass_kg_m2: &[JointSignals],
+        (mass_kg_m2, rotor_kg_m2): (&[JointSignals], &[f64]),
     ) -> Self {
         let still = link_nm.map_joints(|_, y| vec![0.0; y.len()]);
-        let (_, mobility_per_kg_m2) = apart(arm, mass_kg_m2, &still);
+        let (_, mobility_per_kg_m2) = apart(mass_kg_m2, rotor_kg_m2, &still);
         let load_nm = sum(link_nm, &rotors_along(arm, motion));
         Self { link_nm: link_nm.clone(), load_nm, jolt_nm: still, mobility_per_kg_m2 }
     }
@@ -58,7 +59,7 @@ impl Loads {
     pub fn agreed(
         (model, arm): (&Model, &Arm),
         mean: &Motion,
-        (link_nm, mass_kg_m2): (&JointSignals, &[JointSignals]),
+        (link_nm, mass_kg_m2, rotor_kg_m2): (&JointSignals, &[JointSignals], &[f64]),
         periods: &Periods,
     ) -> Self {
         let Periods { each, torque_nm, clock, .. } = *periods;
@@ -74,10 +75,11 @@ impl Loads {
             let sign = |qd: f64| (qd / arm.friction_epsilon_rad_s).tanh();
             let fine_sign: Vec<f64> = clock.refined(qd).into_iter().map(sign).collect();
             let coulomb_nm = arm.joints[j].drive.coulomb_nm;
-            jolts(periods, (&of_loads[j], &of_torques[j]), &fine_sign, coulomb_nm)
+            let known = (&of_loads[j], &of_links[j]);
+            jolts(periods, known, &of_torques[j], &fine_sign, coulomb_nm)
                 .unwrap_or_else(|| vec![0.0; qd.len()])
         });
-        let (jolt_nm, mobility_per_kg_m2) = apart(arm, mass_kg_m2, &jolt_nm);
+        let (jolt_nm, mobility_per_kg_m2) = apart(mass_kg_m2, rotor_kg_m2, &jolt_nm);
         let jolt_nm = jolt_nm.map_joints(|j, y| of_links[j].rest(clock, y, periods.highest));
         let rotor_nm = part(&trusted(&rotors), &rotors_along(arm, mean));
         let link_nm = part(&of_links, link_nm);
@@ -85,17 +87,17 @@ impl Loads {
     }
 }
 
-/// Links lighter than this share of the rotor have no say in how it swings.
+/// Where links or rotor are lighter than this share of both, they have no say in how the other swings.
 const LEAST_SHARE: f64 = 1e-6;
 
 /// Of torques on the gears what the links take, M (M + I_a)⁻¹ τ, and [`Loads::mobility_per_kg_m2`].
 fn apart(
-    arm: &Arm,
     mass_kg_m2: &[JointSignals],
+    rotor_kg_m2: &[f64],
     torque_nm: &JointSignals,
 ) -> (JointSignals, JointSignals) {
     let joints = torque_nm.joints();
-    let rotor = |j: usize| rotor_kg_m2(arm, j);
+    let rotor = |j: usize| rotor_kg_m2[j];
     let mut links_nm = torque_nm.clone();
     let mut mobility = torque_nm.clone();
     for k in 0..torque_nm.samples() {
@@ -111,8 +113,8 @@ fn apart(
                 None => (0.0, 0.0),
             };
             links_nm.joint_mut(j)[k] -= rotor(j) * acceleration;
-            // Sherman and Morrison 1950; the share of the inertia that is not the rotor's is positive in an arm.
-            let of_links = (1.0 - rotor(j) * own).max(LEAST_SHARE);
+            // Sherman and Morrison 1950; the share of the inertia that is not the rotor's lies within 0 and 1 in an arm.
+            let of_links = (1.0 - rotor(j) * own).clamp(LEAST_SHARE, 1.0 - LEAST_SHARE);
             mobility.joint_mut(j)[k] = 1.0 / (rotor(j) * of_links);
         }
     }
@@ -185,14 +187,16 @@ const FASTEST_HZ: f64 = 60.0;
 /// log as well; all six shift a score by less than √(6/(6·10)) = 0.3 of its σ.
 const TOLD: f64 = 10.0;
 
-/// What the drive of a joint gives beside friction in the harmonics in which its load is not trusted, as its reversals
-/// tell it, Nm: Σ_i c_i s(t − iΔ) − F_c s(t), with s the sign of the velocity, given at every tick, and the c fitted to
-/// `torque`, as recorded, weighted by its noise. `None` where it drowns, or where the joint hardly reverses.
+/// What the drive of a joint gives beside friction in the harmonics in which the torque of its links is not trusted, as
+/// its reversals tell it, Nm: Σ_i c_i s(t − iΔ) − F_c s(t), with s the sign of the velocity, given at every tick, and the
+/// c fitted to `torque`, as recorded, weighted by its noise, in the harmonics in which its load is not trusted. `None`
+/// where it drowns, or where the joint hardly reverses.
 ///
 /// Six delays, from two before to three behind the reversal, hold what a drive does within some twenty milliseconds.
 fn jolts(
     periods: &Periods,
-    (load, torque): (&Trusted, &Trusted),
+    (load, links): (&Trusted, &Trusted),
+    torque: &Trusted,
     sign: &[f64],
     coulomb_nm: f64,
 ) -> Option<Vec<f64>> {
@@ -225,7 +229,7 @@ fn jolts(
         .collect();
     let every_tick = FineClock::new(sign.len(), 1);
     let slow = every_tick.filtered(&beside_friction, |h| {
-        if h <= fastest && !load.holds(h) { Complex64::ONE } else { Complex64::ZERO }
+        if h <= fastest && !links.holds(h) { Complex64::ONE } else { Complex64::ZERO }
     });
     (told > TOLD).then(|| slow.into_iter().step_by(clock.ticks()).collect())
 }
@@ -274,9 +278,18 @@ pub fn mass_along(model: &Model, motion: &Motion, recorded_nm: &JointSignals) ->
         .collect()
 }
 
-/// I_a of joint `j`, kg m², positive: a gear has two sides.
-pub fn rotor_kg_m2(arm: &Arm, j: usize) -> f64 {
-    arm.joints[j].drive.rotor_inertia_kg_m2.max(f64::MIN_POSITIVE)
+/// The lightest rotor, over the mean of what its links resist with: a gear that gives way has two sides, and models
+/// without rotors count them to the links.
+const LIGHTEST_ROTOR: f64 = 0.02;
+
+/// I_a of every joint, kg m², but no less than `LIGHTEST_ROTOR` allows; `mass_kg_m2` as from [`mass_along`].
+pub fn rotors_kg_m2(arm: &Arm, mass_kg_m2: &[JointSignals]) -> Vec<f64> {
+    let rotor = |(j, mass): (usize, &JointSignals)| {
+        let own = mass.joint(j);
+        let lightest = LIGHTEST_ROTOR * own.iter().sum::<f64>() / own.len() as f64;
+        arm.joints[j].drive.rotor_inertia_kg_m2.max(lightest).max(f64::MIN_POSITIVE)
+    };
+    mass_kg_m2.iter().enumerate().map(rotor).collect()
 }
 
 /// I_a q̈ of every sample, Nm.
@@ -328,7 +341,7 @@ mod tests {
             |y: JointSignals| y.map_joints(|j, y| vec![y[0] - gravity_nm.joint(j)[0]]);
         let on_gears = less_gravity(load_along(&model, &arm, &motion));
         let on_links = less_gravity(rigid_torque_along(&model, &motion));
-        let (links, mobility) = apart(&arm, &mass, &on_gears);
+        let (links, mobility) = apart(&mass, &rotors_kg_m2(&arm, &mass), &on_gears);
         for j in 0..6 {
             // Torques of some 10 Nm, through inertias whose largest and smallest are 1 : 100.
             assert!((links.joint(j)[0] - on_links.joint(j)[0]).abs() < 1e-11);
@@ -378,8 +391,8 @@ mod tests {
         };
         let of_load = Trusted::of(&clock, &load);
         assert!(of_load.holds(8) && !of_load.holds(50));
-        let known =
-            jolts(&periods, (&of_load, &Trusted::of(&clock, &torque)), &sign, coulomb_nm).unwrap();
+        let of_torque = Trusted::of(&clock, &torque);
+        let known = jolts(&periods, (&of_load, &of_load), &of_torque, &sign, coulomb_nm).unwrap();
         let true_nm: Vec<f64> = (0..fine).map(|k| fed(k) - coulomb_nm * sign[k]).collect();
         let band = FineClock::new(fine, 1).filtered(&true_nm, |h| {
             if h <= 200 && !of_load.holds(h) { Complex64::ONE } else { Complex64::ZERO }
@@ -391,6 +404,6 @@ mod tests {
         let share = square(&off) / square(&truth);
         assert!(share < 0.1, "{share}");
         let none = vec![1.0; fine];
-        assert!(jolts(&periods, (&of_load, &of_load), &none, coulomb_nm).is_none());
+        assert!(jolts(&periods, (&of_load, &of_load), &of_load, &none, coulomb_nm).is_none());
     }
 }

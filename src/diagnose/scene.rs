@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use realfft::num_complex::Complex64;
 
-use super::load::{Loads, Periods, mass_along, rigid_torque_along, rotor_kg_m2};
+use super::load::{Loads, Periods, mass_along, rigid_torque_along, rotors_kg_m2};
 use crate::base::BaseSet;
 use crate::dynamics::{Model, Motion, Parameter, ParameterLayout};
 use crate::identify::{Prepared, drive_answers};
@@ -34,6 +34,8 @@ pub struct Scene {
     pub load_nm: JointSignals,
     /// What the links take beside `link_nm` where joints reverse, Nm.
     jolt_nm: JointSignals,
+    /// I_a of every joint as far as gears swing, kg m² ([`rotors_kg_m2`]).
+    pub rotor_kg_m2: Vec<f64>,
     /// How easily links and rotor are pressed apart, 1/(kg m²).
     pub mobility_per_kg_m2: JointSignals,
     /// Predicted drive torque: load, friction and offset, Nm.
@@ -53,6 +55,8 @@ pub struct Scene {
     pub torque_limit_nm: Vec<Option<f64>>,
     /// See [`Self::fine_link_nm`].
     fine_link_nm: Vec<OnceLock<Vec<f64>>>,
+    /// See [`Self::fine_jolt_nm`].
+    fine_jolt_nm: Vec<OnceLock<Vec<f64>>>,
     /// See [`Self::instants`].
     instants: Vec<OnceLock<Instants>>,
     /// Between the samples of a motion that repeats.
@@ -93,16 +97,17 @@ impl Scene {
         let drive = |j: usize| &arm.joints[j].drive;
         let recorded_nm = rigid_torque_along(&model, &motion);
         let mass_kg_m2 = mass_along(&model, &motion, &recorded_nm);
+        let rotor_kg_m2 = rotors_kg_m2(&arm, &mass_kg_m2);
         let rate_hz = prepared.processing.rate_hz;
         let highest = (prepared.highest * n as f64) as usize;
         let loads = match (&prepared.each_period, &clock) {
             (Some(each), Some(clock)) => {
                 let torque_nm = &prepared.torque_nm;
                 let periods = Periods { each, torque_nm, clock, rate_hz, highest };
-                let along = (&recorded_nm, &mass_kg_m2[..]);
+                let along = (&recorded_nm, &mass_kg_m2[..], &rotor_kg_m2[..]);
                 Loads::agreed((&model, &arm), &motion, along, &periods)
             }
-            _ => Loads::as_recorded(&arm, &motion, &recorded_nm, &mass_kg_m2),
+            _ => Loads::as_recorded(&arm, &motion, &recorded_nm, (&mass_kg_m2, &rotor_kg_m2)),
         };
         let Loads { link_nm, load_nm, jolt_nm, mobility_per_kg_m2 } = loads;
         let own_inertia_kg_m2 = JointSignals::from_fn(joints, n, |j, k| mass_kg_m2[j].joint(j)[k]);
@@ -133,20 +138,17 @@ impl Scene {
             link_nm,
             load_nm,
             jolt_nm,
+            rotor_kg_m2,
             mobility_per_kg_m2,
             torque_nm,
             sign,
             torque_limit_nm: prepared.torque_limit_nm.clone(),
             fine_link_nm: vec![OnceLock::new(); joints],
+            fine_jolt_nm: vec![OnceLock::new(); joints],
             instants: (0..joints).map(|_| OnceLock::new()).collect(),
             clock,
             highest,
         }
-    }
-
-    /// I_a of joint `j`, kg m²; positive, so that what swings on it has an acceleration.
-    pub fn rotor_kg_m2(&self, j: usize) -> f64 {
-        rotor_kg_m2(&self.arm, j)
     }
 
     /// Number of joints.
@@ -162,6 +164,19 @@ impl Scene {
     /// Duration of the whole record, s.
     pub fn duration_s(&self) -> f64 {
         (self.samples() * self.periods) as f64 / self.rate_hz
+    }
+
+    /// Time between two of the `FINE` instants per sample, s.
+    pub fn instant_s(&self) -> f64 {
+        1.0 / (self.rate_hz * FINE as f64)
+    }
+
+    /// The samples in the order in which they follow each other; of a motion that repeats from `before_s` before its
+    /// beginning on.
+    pub fn entered(&self, before_s: f64) -> impl Iterator<Item = usize> + use<> {
+        let n = self.samples();
+        let before = if self.periodic { (before_s * self.rate_hz).ceil() as usize } else { 0 };
+        (0..before + n).map(move |k| (k + n - before % n) % n)
     }
 
     /// Time derivative of a signal of n samples.
@@ -181,8 +196,8 @@ impl Scene {
     }
 
     /// What the links of joint `j` take where joints reverse, at `FINE` instants per sample, Nm.
-    pub fn fine_jolt_nm(&self, j: usize) -> Vec<f64> {
-        self.fine(self.jolt_nm.joint(j))
+    pub fn fine_jolt_nm(&self, j: usize) -> &[f64] {
+        self.fine_jolt_nm[j].get_or_init(|| self.fine(self.jolt_nm.joint(j)))
     }
 
     /// Where friction of joint `j` is looked at: `FINE` times per sample of a motion that repeats, at the
@@ -201,7 +216,7 @@ impl Scene {
             let qd_rad_s = self.fine(qd);
             let epsilon = self.arm.friction_epsilon_rad_s;
             Instants {
-                step_s: 1.0 / (self.rate_hz * FINE as f64),
+                step_s: self.instant_s(),
                 q_rad: self.fine(q),
                 sign: qd_rad_s.iter().map(|v| (v / epsilon).tanh()).collect(),
                 qd_rad_s,

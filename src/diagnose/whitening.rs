@@ -114,7 +114,9 @@ impl PeriodWhitening {
                 *scatter += &deviation * deviation.adjoint() / Complex::from((periods - 1) as f64);
             }
         }
-        let last = (used + NEIGHBOURS.max(used / 4)).min(n / 2);
+        // Beyond it the torque was not moved to the common motion.
+        let moved = (regression.prepared.highest * n as f64) as usize;
+        let last = (used + NEIGHBOURS.max(used / 4)).min(moved).min(n / 2);
         let trends: Vec<Vec<NoisePower>> = (0..joints)
             .map(|j| {
                 let floor = (FLOOR * FLOOR * power[j]).max(f64::MIN_POSITIVE);

@@ -8,6 +8,7 @@ mod columns;
 mod drive_answers;
 mod error;
 mod estimation;
+mod even;
 mod fit;
 mod gravity;
 mod identifier;

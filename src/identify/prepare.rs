@@ -5,13 +5,13 @@ use std::ops::Range;
 use serde::Serialize;
 
 use super::error::IdentifyError;
+use super::even::Even;
 use super::options::Options;
 use crate::dynamics::Motion;
 use crate::robot::JointSignals;
 use crate::signal::{
-    Activity, Bracket, Decimator, FitScratch, HarmonicPower, Period, PeriodSearch, PeriodicFit,
-    Replicates, Resampler, Scratch, ZeroPhase, central_4, natural_rate_hz, quantum, reading_limit,
-    replicate_noise,
+    Activity, Bracket, FitScratch, HarmonicPower, Period, PeriodSearch, PeriodicFit, Replicates,
+    Scratch, ZeroPhase, central_4, quantum, reading_limit, replicate_noise,
 };
 
 /// The channels identification needs of a log, borrowed.
@@ -86,11 +86,6 @@ pub struct Prepared {
 
 /// Fewer samples than this are no experiment.
 const FEWEST_SAMPLES: usize = 64;
-/// Time stamps further off the median step than this share of it make a log uneven.
-const EVEN_WITHIN: f64 = 0.02;
-/// Gaps up to this many natural steps are interpolated, longer ones end the record.
-const LONGEST_GAP_STEPS: f64 = 10.0;
-
 /// A log is put on another clock for the sake of this many periods: two tell little of the noise.
 const FEWEST_PERIODS: usize = 3;
 /// Clocks that are tried until a period is a whole number of samples: each knows its length better.
@@ -106,26 +101,7 @@ pub struct Preparer {
     keeps_periods: bool,
 }
 
-/// The channels on an even clock.
-struct Even<'a> {
-    start_s: f64,
-    rate_hz: f64,
-    resampled: bool,
-    /// See [`Prepared::highest`].
-    highest: f64,
-    between: Option<Vec<Bracket>>,
-    q_rad: std::borrow::Cow<'a, JointSignals>,
-    qd_rad_s: std::borrow::Cow<'a, JointSignals>,
-    torque_nm: std::borrow::Cow<'a, JointSignals>,
-}
-
 impl Preparer {
-    /// [`Prepared::highest`] of samples as the log has them: half a cycle less what derivatives near it cost.
-    const AS_LOGGED: f64 = 0.48;
-    /// The same of samples that went through a decimator's low-pass, or lie on straight lines between rows: at 0.37 a line
-    /// between two rows keeps 62 % of an amplitude.
-    const REWORKED: f64 = 0.37;
-
     /// [`Self::prepare`], and the motion of every period for itself.
     pub fn prepare_with_periods(
         &mut self,
@@ -154,7 +130,7 @@ impl Preparer {
             return Err(IdentifyError::TooShort { log, samples, needed: FEWEST_SAMPLES });
         }
         let mut warnings = Vec::new();
-        let mut even = self.even(m, options, None, &mut warnings)?;
+        let mut even = Even::of(m, options, None, &mut self.filter, &mut warnings)?;
         let single_run = options.period_s == Some(0.0);
         let mut period = if single_run { None } else { self.search.find(&even.q_rad)? };
         let is_misfit = |p: &&Period| !p.is_whole && p.periods >= FEWEST_PERIODS;
@@ -199,7 +175,7 @@ impl Preparer {
         for _ in 0..CLOCKS {
             faster *= period.samples as f64 / period.refined_samples;
             let mut remarks = Vec::new();
-            let even = self.even(m, options, Some(faster), &mut remarks)?;
+            let even = Even::of(m, options, Some(faster), &mut self.filter, &mut remarks)?;
             let Some(found) = self.search.find(&even.q_rad)? else { return Ok(None) };
             if found.is_whole {
                 return Ok(Some((even, found, remarks)));
@@ -207,82 +183,6 @@ impl Preparer {
             period = found;
         }
         Ok(None)
-    }
-
-    /// Resamples an uneven log, or one that is wanted on a clock so many times `faster`; decimates a fast one.
-    fn even<'a>(
-        &mut self,
-        m: &Measurement<'a>,
-        options: &Options,
-        faster: Option<f64>,
-        warnings: &mut Vec<String>,
-    ) -> Result<Even<'a>, IdentifyError> {
-        use std::borrow::Cow;
-        let natural_hz = natural_rate_hz(m.time_s)?;
-        let step = 1.0 / natural_hz;
-        let is_even = m.time_s.windows(2).all(|w| ((w[1] - w[0]) / step - 1.0).abs() < EVEN_WITHIN);
-        let rate_hz = options.rate_hz.unwrap_or(natural_hz);
-        let mut even = Even {
-            start_s: m.time_s[0],
-            rate_hz: natural_hz,
-            resampled: false,
-            highest: Self::AS_LOGGED,
-            between: None,
-            q_rad: Cow::Borrowed(m.q_rad),
-            qd_rad_s: Cow::Borrowed(m.qd_rad_s),
-            torque_nm: Cow::Borrowed(m.torque_nm),
-        };
-        if is_even {
-            // The median step carries the rounding of the time stamps; their mean does not.
-            even.rate_hz =
-                (m.time_s.len() - 1) as f64 / (m.time_s[m.time_s.len() - 1] - m.time_s[0]);
-        }
-        let is_natural = (0.999 * natural_hz..=1.001 * natural_hz).contains(&rate_hz);
-        if !is_even || !is_natural || faster.is_some() {
-            let plain_hz = if is_natural { even.rate_hz } else { rate_hz.max(natural_hz) };
-            let grid_hz = faster.unwrap_or(1.0) * plain_hz;
-            let grid = Resampler::new(m.time_s, grid_hz, LONGEST_GAP_STEPS * step)?;
-            let longest = longest(grid.segments());
-            for gap in grid.gaps() {
-                warnings.push(format!(
-                    "no samples for {:.2} s from {:.2} s on: only the longest stretch without such \
-                     a gap is used",
-                    gap.end_s - gap.start_s,
-                    gap.start_s
-                ));
-            }
-            let cut = |signals: JointSignals| Cow::Owned(signals.slice(longest.clone()));
-            even.start_s = grid.time_s()[longest.start];
-            even.q_rad = cut(grid.angles(m.q_rad, m.qd_rad_s)?);
-            even.qd_rad_s = cut(grid.smooth(m.qd_rad_s)?);
-            even.torque_nm = cut(grid.straight(m.torque_nm)?);
-            even.rate_hz = grid_hz;
-            even.resampled = true;
-            even.highest = Self::REWORKED;
-            even.between = Some(grid.brackets()[longest].to_vec());
-        }
-        let highest = options.rate_hz.unwrap_or(Options::HIGHEST_RATE_HZ);
-        let every = (even.rate_hz / highest * 0.999).ceil().max(1.0) as usize;
-        if every > 1 {
-            let decimator = Decimator::new(every, even.rate_hz)?;
-            for signals in [&mut even.q_rad, &mut even.qd_rad_s, &mut even.torque_nm] {
-                let mut error = None;
-                let decimated = signals.map_joints(|_, y| {
-                    decimator.decimate(y, &mut self.filter).unwrap_or_else(|e| {
-                        error = Some(e);
-                        Vec::new()
-                    })
-                });
-                if let Some(error) = error {
-                    return Err(error.into());
-                }
-                *signals = Cow::Owned(decimated);
-            }
-            even.rate_hz = decimator.rate_hz();
-            even.highest = Self::REWORKED;
-            even.between = None;
-        }
-        Ok(even)
     }
 
     /// How far the motion of every period is off the averaged one, in the harmonics that this keeps; `None` for
@@ -453,10 +353,6 @@ fn experiment_window(activity: &Activity) -> Option<Range<usize>> {
         start = rest.end;
     }
     Some(if longest.len() > whole.len() / 2 { longest } else { whole })
-}
-
-fn longest(segments: &[Range<usize>]) -> Range<usize> {
-    segments.iter().max_by_key(|s| s.len()).cloned().unwrap_or(0..0)
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@
 //! seen by its jerk at both ends and by the swinging after it: the log has δ̇ at its samples only, and its
 //! acceleration is the derivative of these.
 
-use super::elasticity::{HELD_ERROR, Lag, RUN_IN_S, give_way, held_nm_s_rad};
+use super::elasticity::{HELD_ERROR, Lag, give_way, held_nm_s_rad};
 use super::*;
 use crate::diagnose::scene::FINE;
 
@@ -29,6 +29,11 @@ const FLANK_RAD_S: [f64; 14] = [
 ];
 /// ζ of the flanks.
 const DAMPING_RATIO: f64 = 0.12;
+/// The fastest swing that steps of h follow, times h: flanks are no stiffer. At sixteen instants per sample that is five
+/// times faster than what the samples can show; behind stiffer ones light links move with their rotor all the same.
+const FOLLOWED: f64 = 1.0;
+/// Time in which most of how a flight began is forgotten, s.
+const RUN_IN_S: f64 = 3.0;
 /// Gaps that are flown through at once.
 const ABREAST: usize = 8;
 
@@ -37,8 +42,13 @@ impl Candidate for Backlash {
         Kind::Backlash
     }
 
-    fn shapes(&self, _: &Scene, _: Option<usize>) -> Vec<Shape> {
+    /// Flanks too stiff to be followed are all alike.
+    fn shapes(&self, scene: &Scene, site: Option<usize>) -> Vec<Shape> {
+        let stiffness = |variant: &usize| {
+            Flanks::on(scene, joint(site), FLANK_RAD_S[*variant]).stiffness_nm_rad
+        };
         (0..FLANK_RAD_S.len())
+            .filter(|variant| *variant == 0 || stiffness(&(variant - 1)) < stiffness(variant))
             .flat_map(|variant| geometric(3e-6, 1e-2, 8).map(move |value| Shape { variant, value }))
             .collect()
     }
@@ -99,20 +109,19 @@ fn fly(scene: &Scene, j: usize, shapes: &[Shape]) -> Vec<[Vec<f64>; 2]> {
     let load = scene.link_nm.joint(j);
     let n = load.len();
     let mobility = scene.mobility_per_kg_m2.joint(j);
-    let rotor = scene.rotor_kg_m2(j);
-    let step_s = 1.0 / (scene.rate_hz * FINE as f64);
-    let fine = scene.fine_link_nm(j);
-    let jolts = scene.fine_jolt_nm(j);
-    // A motion that repeats is entered a little before its beginning.
-    let run_in = if scene.periodic { ((RUN_IN_S * scene.rate_hz) as usize).min(n) } else { 0 };
-    let start_nm = load[(n - run_in) % n];
+    let rotor = scene.rotor_kg_m2[j];
+    let step_s = scene.instant_s();
+    let (fine, jolts) = (scene.fine_link_nm(j), scene.fine_jolt_nm(j));
+    let mut entered = scene.entered(RUN_IN_S).peekable();
+    let start_nm = entered.peek().map_or(0.0, |k| load[*k]);
     let pressed = |lane: usize| {
         let shape = shapes[lane.min(shapes.len() - 1)];
-        Flight::pressed(0.5 * shape.value, FLANK_RAD_S[shape.variant], rotor, start_nm)
+        let flanks = Flanks::on(scene, j, FLANK_RAD_S[shape.variant]);
+        Flight::pressed(0.5 * shape.value, flanks, start_nm)
     };
     let mut flights = Flights::abreast(pressed);
     let mut out: Vec<[Vec<f64>; 2]> = shapes.iter().map(|_| [vec![0.0; n], vec![0.0; n]]).collect();
-    for k in (n - run_in..n).chain(0..n) {
+    for k in entered {
         for (lane, [delta, rate]) in out.iter_mut().enumerate() {
             (delta[k], rate[k]) = (flights.angle_rad[lane], flights.rate_rad_s[lane]);
         }
@@ -125,25 +134,49 @@ fn fly(scene: &Scene, j: usize, shapes: &[Shape]) -> Vec<[Vec<f64>; 2]> {
     out
 }
 
+/// What a rotor meets at the ends of its gap.
+#[derive(Clone, Copy)]
+struct Flanks {
+    stiffness_nm_rad: f64,
+    damping_nm_s_rad: f64,
+}
+
+impl Flanks {
+    /// On which the rotor of joint `j` swings at `flank_rad_s` were it alone, as far as instants can follow.
+    fn on(scene: &Scene, j: usize, flank_rad_s: f64) -> Self {
+        let mobility = scene.mobility_per_kg_m2.joint(j).iter().copied().fold(0.0, f64::max);
+        Self::alone(scene.rotor_kg_m2[j], flank_rad_s).followed(mobility, scene.instant_s())
+    }
+
+    fn alone(rotor_kg_m2: f64, flank_rad_s: f64) -> Self {
+        Self {
+            stiffness_nm_rad: rotor_kg_m2 * flank_rad_s.powi(2),
+            damping_nm_s_rad: 2.0 * DAMPING_RATIO * rotor_kg_m2 * flank_rad_s,
+        }
+    }
+
+    /// No stiffer than steps of `step_s` follow where rotor and links are as easily pressed apart as `mobility`, and not
+    /// damped more than what then comes to rest without a swing.
+    fn followed(self, mobility: f64, step_s: f64) -> Self {
+        let stiffness_nm_rad = self.stiffness_nm_rad.min((FOLLOWED / step_s).powi(2) / mobility);
+        let critical = 2.0 * (stiffness_nm_rad / mobility).sqrt();
+        Self { stiffness_nm_rad, damping_nm_s_rad: self.damping_nm_s_rad.min(critical) }
+    }
+}
+
 /// A rotor between the flanks of its gear.
 struct Flight {
     /// q_M − q_L, rad.
     angle_rad: f64,
     half_gap_rad: f64,
-    stiffness_nm_rad: f64,
-    damping_nm_s_rad: f64,
+    flanks: Flanks,
 }
 
 impl Flight {
-    /// At rest on the flank to which `load_nm` presses it; alone it swings there at `flank_rad_s`.
-    fn pressed(half_gap_rad: f64, flank_rad_s: f64, rotor_kg_m2: f64, load_nm: f64) -> Self {
-        let stiffness_nm_rad = rotor_kg_m2 * flank_rad_s.powi(2);
-        Self {
-            angle_rad: half_gap_rad.copysign(load_nm) + load_nm / stiffness_nm_rad,
-            half_gap_rad,
-            stiffness_nm_rad,
-            damping_nm_s_rad: 2.0 * DAMPING_RATIO * rotor_kg_m2 * flank_rad_s,
-        }
+    /// At rest on the flank to which `load_nm` presses it.
+    fn pressed(half_gap_rad: f64, flanks: Flanks, load_nm: f64) -> Self {
+        let angle_rad = half_gap_rad.copysign(load_nm) + load_nm / flanks.stiffness_nm_rad;
+        Self { angle_rad, half_gap_rad, flanks }
     }
 }
 
@@ -164,22 +197,22 @@ impl Flights {
             angle_rad: each(|f| f.angle_rad),
             rate_rad_s: [0.0; ABREAST],
             half_gap_rad: each(|f| f.half_gap_rad),
-            stiffness_nm_rad: each(|f| f.stiffness_nm_rad),
-            damping_nm_s_rad: each(|f| f.damping_nm_s_rad),
+            stiffness_nm_rad: each(|f| f.flanks.stiffness_nm_rad),
+            damping_nm_s_rad: each(|f| f.flanks.damping_nm_s_rad),
         }
     }
 
-    /// `step_s` later, under the load `load_nm` (semi-implicit Euler, which neither adds energy to a swing nor takes any;
-    /// the drive's damping implicit, which is stable for any). The flanks push and do not pull.
+    /// `step_s` later, under the load `load_nm`: semi-implicit Euler with all damping implicit, stable as long as √(k ·
+    /// mobility) · `step_s` < 2. The flanks push and do not pull.
     fn step(&mut self, load_nm: f64, held_nm_s_rad: f64, mobility: f64, step_s: f64) {
         for lane in 0..ABREAST {
             let (angle, half_gap) = (self.angle_rad[lane], self.half_gap_rad[lane]);
             let pressed = angle - angle.max(-half_gap).min(half_gap);
-            let flanks_nm = self.stiffness_nm_rad[lane] * pressed
-                + self.damping_nm_s_rad[lane] * self.rate_rad_s[lane];
-            let flanks_nm = if flanks_nm * pressed <= 0.0 { 0.0 } else { flanks_nm };
-            let rate = self.rate_rad_s[lane] + (load_nm - flanks_nm) * mobility * step_s;
-            self.rate_rad_s[lane] = rate / (1.0 + held_nm_s_rad * mobility * step_s);
+            let (spring, damping) = (self.stiffness_nm_rad[lane], self.damping_nm_s_rad[lane]);
+            let pulls = (spring * pressed + damping * self.rate_rad_s[lane]) * pressed <= 0.0;
+            let (spring, damping) = if pulls { (0.0, 0.0) } else { (spring, damping) };
+            let rate = self.rate_rad_s[lane] + (load_nm - spring * pressed) * mobility * step_s;
+            self.rate_rad_s[lane] = rate / (1.0 + (held_nm_s_rad + damping) * mobility * step_s);
             self.angle_rad[lane] += self.rate_rad_s[lane] * step_s;
         }
     }
@@ -193,7 +226,8 @@ mod tests {
     #[test]
     fn a_gap_is_crossed_in_the_time_of_a_cubic() {
         let (gap, slope, step_s) = (2e-5_f64, 300.0_f64, 1e-5);
-        let mut flights = Flights::abreast(|_| Flight::pressed(0.5 * gap, 900.0, 1.0, -1e-9));
+        let mut flights =
+            Flights::abreast(|_| Flight::pressed(0.5 * gap, Flanks::alone(1.0, 900.0), -1e-9));
         let mut t = 0.0;
         while flights.angle_rad[0] < 0.5 * gap {
             flights.step(slope * (t + 0.5 * step_s), 0.0, 1.0, step_s);
@@ -207,8 +241,9 @@ mod tests {
     #[test]
     fn a_rotor_comes_to_rest_in_the_flank() {
         let frequency = |lane: usize| 300.0 + 50.0 * lane as f64;
-        let mut flights =
-            Flights::abreast(|lane| Flight::pressed(1e-5, frequency(lane), 1.0, -1.0));
+        let mut flights = Flights::abreast(|lane| {
+            Flight::pressed(1e-5, Flanks::alone(1.0, frequency(lane)), -1.0)
+        });
         for _ in 0..100_000 {
             flights.step(5.0, 0.0, 1.0, 1e-5);
         }
@@ -217,5 +252,29 @@ mod tests {
             // What is left of the swing after 1 s: e^(−0.12 · 300).
             assert!((angle - at_rest).abs() < 1e-9 * at_rest, "{angle}");
         }
+    }
+
+    /// Links of a hundredth of the rotor's inertia on flanks that steps cannot follow: wherever they push they are as deep
+    /// as load/k, and nowhere else off the rotor by more than the gap.
+    #[test]
+    fn light_links_stay_with_their_rotor() {
+        let (rotor, share, step_s, half_gap) = (0.25, 0.01, 5e-4, 1e-4);
+        let mobility = 1.0 / (rotor * share);
+        let flanks = Flanks::alone(rotor, 900.0).followed(mobility, step_s);
+        let mut flights = Flights::abreast(|_| Flight::pressed(half_gap, flanks, 1.0));
+        for k in 0..100_000 {
+            let load = (0.01 * f64::from(k) * std::f64::consts::TAU * step_s).cos();
+            flights.step(load, 0.0, mobility, step_s);
+            let deepest = half_gap + 1.0 / flanks.stiffness_nm_rad;
+            // What the rotor flies through is short of the speed that the flank stops within a step.
+            assert!(flights.angle_rad[0].abs() < 1.5 * deepest, "{k} {}", flights.angle_rad[0]);
+        }
+        let at_rest = half_gap + 1.0 / flanks.stiffness_nm_rad;
+        // 50 s: half a period of the load, whose end presses to the other side.
+        assert!(
+            (flights.angle_rad[0] + at_rest).abs() < 1e-3 * at_rest,
+            "{}",
+            flights.angle_rad[0]
+        );
     }
 }

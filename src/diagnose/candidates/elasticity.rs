@@ -38,10 +38,11 @@ const LINK_DAMPING_RATIO: [f64; 2] = [0.05, 0.3];
 /// Stiffnesses, Nm/rad: neighbours are told by where the links swing.
 const STIFFNESSES: usize = 14;
 /// The same where they are told by nothing but how far the gear bends.
-const LINK_STIFFNESSES: usize = 3;
-/// Time in which most of how a swing began is forgotten, s: at the shoulder of a UR5 that of a gear of 8000 Nm/rad fades
-/// with exp(−2.7 t).
-pub(super) const RUN_IN_S: f64 = 3.0;
+const BENT_STIFFNESSES: usize = 3;
+/// A swing is entered so many times before as long as it takes to fade to 1/e: of what it began with 1 % is left.
+const FORGOTTEN: f64 = 4.6;
+/// No longer than this, s.
+const LONGEST_RUN_IN_S: f64 = 30.0;
 
 /// How far the links of a joint are behind its encoder.
 pub(super) struct Lag {
@@ -78,8 +79,7 @@ impl Lag {
 }
 
 /// How links on joint `j` swing behind a motor that moves as recorded, and against one that jolts where joints reverse.
-/// A single run, whose accelerations are those of
-/// its low-pass, shows no more than how far the gear bends.
+/// A single run, whose accelerations are those of its low-pass, shows no more than how far the gear bends.
 fn swing(scene: &Scene, j: usize, stiffness_nm_rad: f64) -> Lag {
     if !scene.periodic {
         let bent = |load: &f64| load / stiffness_nm_rad;
@@ -89,11 +89,13 @@ fn swing(scene: &Scene, j: usize, stiffness_nm_rad: f64) -> Lag {
     let (load, jolts) = (scene.fine_link_nm(j), scene.fine_jolt_nm(j));
     let inertia = scene.own_inertia_kg_m2.joint(j);
     let mobility = scene.mobility_per_kg_m2.joint(j);
-    let step_s = 1.0 / (scene.rate_hz * FINE as f64);
-    let run_in = ((RUN_IN_S * scene.rate_hz) as usize).min(n);
-    let rotor = scene.rotor_kg_m2(j);
+    let step_s = scene.instant_s();
+    let rotor = scene.rotor_kg_m2[j];
     let critical = 2.0 * (stiffness_nm_rad * rotor).sqrt();
-    let start_nm = load[FINE * ((n - run_in) % n)];
+    let heaviest = inertia.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    let fades_in_s = 2.0 * heaviest / (DAMPING_RATIO * critical);
+    let mut entered = scene.entered((FORGOTTEN * fades_in_s).min(LONGEST_RUN_IN_S)).peekable();
+    let start_nm = entered.peek().map_or(0.0, |k| load[FINE * k]);
     let mut bent = Swing::bent(stiffness_nm_rad, DAMPING_RATIO * critical, start_nm);
     let mut jolted = Swing::bent(stiffness_nm_rad, 0.0, 0.0);
     let mut lag = Lag {
@@ -101,7 +103,7 @@ fn swing(scene: &Scene, j: usize, stiffness_nm_rad: f64) -> Lag {
         rate_rad_s: vec![0.0; n],
         acceleration_rad_s2: vec![0.0; n],
     };
-    for k in (n - run_in..n).chain(0..n) {
+    for k in entered {
         lag.angle_rad[k] = bent.angle_rad + jolted.angle_rad;
         lag.rate_rad_s[k] = bent.rate_rad_s + jolted.rate_rad_s;
         lag.acceleration_rad_s2[k] = bent.acceleration_rad_s2 + jolted.acceleration_rad_s2;
@@ -125,15 +127,13 @@ const HELD_RAD_S: f64 = 80.0;
 /// log. Of 97 causes named in simulated arms, with drives of 100 rad/s, they are off by 0 to 20 % in the median of a joint,
 /// and half or twice [`HELD_RAD_S`] moves single ones by up to a fifth.
 pub(super) const HELD_ERROR: f64 = 0.15;
-/// Links heavier than the rotor by more than this are not told from a wall.
-const HEAVIEST: f64 = 1e6;
 
 /// Damping d_M of δ̇ by the drive, Nm s/rad, ω = [`HELD_RAD_S`]. It answers the rotor's speed with ω (M + I_a) q̇_M; of δ̇
 /// the rotor has the share s = M/(M + I_a), so that the power is that of d_M = ω (M + I_a) s² = ω I_a s²/(1 − s).
 /// `mobility_per_kg_m2` is I_a⁻¹ + M⁻¹ = 1/(I_a s), M what the links resist with where the other joints are free to move.
 pub(super) fn held_nm_s_rad(mobility_per_kg_m2: f64, rotor_kg_m2: f64) -> f64 {
     let share = 1.0 / (mobility_per_kg_m2 * rotor_kg_m2);
-    HELD_RAD_S * rotor_kg_m2 * share.powi(2) / (1.0 - share).max(1.0 / HEAVIEST)
+    HELD_RAD_S * rotor_kg_m2 * share.powi(2) / (1.0 - share)
 }
 
 /// An inertia on the spring of a gear.
@@ -178,8 +178,9 @@ impl Candidate for Elasticity {
         Kind::Elasticity
     }
 
-    fn shapes(&self, _: &Scene, _: Option<usize>) -> Vec<Shape> {
-        let count = |variant| if variant == 0 { STIFFNESSES } else { LINK_STIFFNESSES };
+    fn shapes(&self, scene: &Scene, _: Option<usize>) -> Vec<Shape> {
+        let swings = |variant| scene.periodic && variant == 0;
+        let count = |variant| if swings(variant) { STIFFNESSES } else { BENT_STIFFNESSES };
         let of = |variant| {
             geometric(2e3, 2e5, count(variant)).map(move |value| Shape { variant, value })
         };
@@ -199,7 +200,7 @@ impl Candidate for Elasticity {
             return vec![give_way(scene, &links, 1.0 / stiffness)];
         }
         let (stiffness, ratio) = (shape.value, LINK_DAMPING_RATIO[shape.variant - 1]);
-        let damping = 2.0 * ratio * (stiffness * drive.rotor_inertia_kg_m2).sqrt();
+        let damping = 2.0 * ratio * (stiffness * scene.rotor_kg_m2[j]).sqrt();
         let delta = scene.filtered(scene.link_nm.joint(j), |omega| {
             Complex64::new(stiffness, damping * omega).inv()
         });
