@@ -24,6 +24,7 @@ mod common_motion;
 mod contact;
 mod data_faults;
 mod diagnoser;
+mod distinct_shapes;
 mod error;
 mod extension;
 mod friction_drift;

@@ -34,7 +34,7 @@ pub struct Scene {
     pub load_nm: JointSignals,
     /// What the links take beside `link_nm` where joints reverse, Nm.
     jolt_nm: JointSignals,
-    /// I_a of every joint as far as gears swing, kg m² ([`rotors_kg_m2`]).
+    /// I_a of every joint, kg m², no less than a small share of what its links resist with: what gears swing against.
     pub rotor_kg_m2: Vec<f64>,
     /// How easily links and rotor are pressed apart, 1/(kg m²).
     pub mobility_per_kg_m2: JointSignals,

@@ -1,10 +1,12 @@
 //! One log made ready for tests: whitened, the null model projected out, and every family's columns.
 
+use std::collections::HashMap;
 use std::ops::Range;
 
 use rayon::prelude::*;
 
 use super::candidates::{Candidate, Search, Shape};
+use super::distinct_shapes::distinct_shapes;
 use super::error::DiagnoseError;
 use super::image::{Column, Image, Span, dot};
 use super::scene::Scene;
@@ -59,6 +61,8 @@ pub struct Study<'a> {
     pub statistic: Statistic,
     /// Every family at every site with every starting shape.
     pub entries: Vec<Entry>,
+    /// See [`Self::alternatives`]: of the starting shapes of a family at a site.
+    shapes: HashMap<(usize, Option<usize>), f64>,
     /// Measured torque there.
     pub torque: Image,
     /// Joints (0-based) whose readings are too bad to look for physics in them.
@@ -173,6 +177,7 @@ impl<'a> Study<'a> {
             residual,
             statistic,
             entries: Vec::new(),
+            shapes: HashMap::new(),
             torque,
             left_out: Vec::new(),
         })
@@ -237,6 +242,9 @@ impl<'a> Study<'a> {
             .collect();
         let entries = wanted.par_iter().flat_map_iter(|(f, site, s)| study.bank(*f, *site, s));
         self.entries = entries.flatten_iter().collect();
+        let place = |e: &Entry| (e.family, e.site);
+        let groups = self.entries.chunk_by(|a, b| place(a) == place(b));
+        self.shapes = groups.map(|same| (place(&same[0]), distinct_shapes(same))).collect();
     }
 
     /// A family's columns, the null model projected out; `None` if it absorbs them.
@@ -426,13 +434,13 @@ impl<'a> Study<'a> {
             - 2.0 * self.families[entry.family].prior_odds(entry.site).ln()
     }
 
-    /// Shapes that were to choose from when `entry` was taken.
+    /// Shapes that were to choose from when `entry` was taken, as many as can be told from each other
+    /// ([`distinct_shapes`]).
     pub fn alternatives(&self, entry: &Entry) -> f64 {
         let Entry { family, site, shape, .. } = *entry;
-        self.families[family].alternatives(&self.scene, site, shape).unwrap_or_else(|| {
-            let same = |e: &&Entry| (e.family, e.site) == (family, site);
-            self.entries.iter().filter(same).count().max(1) as f64
-        })
+        self.families[family]
+            .alternatives(&self.scene, site, shape)
+            .unwrap_or_else(|| self.shapes.get(&(family, site)).copied().unwrap_or(1.0))
     }
 }
 
