@@ -61,8 +61,8 @@ pub struct Scene {
     instants: Vec<OnceLock<Instants>>,
     /// Between the samples of a motion that repeats.
     clock: Option<FineClock>,
-    /// Up to which harmonic the accelerations of periods are known.
-    highest: usize,
+    /// Up to which harmonic, below n/2, the accelerations of periods are known.
+    pub highest: usize,
 }
 
 /// Instants per sample of [`Scene::fine_link_nm`] and [`Scene::instants`].

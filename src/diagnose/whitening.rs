@@ -115,8 +115,7 @@ impl PeriodWhitening {
             }
         }
         // Beyond it the torque was not moved to the common motion.
-        let moved = (regression.prepared.highest * n as f64) as usize;
-        let last = (used + NEIGHBOURS.max(used / 4)).min(moved).min(n / 2);
+        let last = (used + NEIGHBOURS.max(used / 4)).min(scene.highest);
         let trends: Vec<Vec<NoisePower>> = (0..joints)
             .map(|j| {
                 let floor = (FLOOR * FLOOR * power[j]).max(f64::MIN_POSITIVE);

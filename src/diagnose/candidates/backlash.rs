@@ -44,11 +44,9 @@ impl Candidate for Backlash {
 
     /// Flanks too stiff to be followed are all alike.
     fn shapes(&self, scene: &Scene, site: Option<usize>) -> Vec<Shape> {
-        let stiffness = |variant: &usize| {
-            Flanks::on(scene, joint(site), FLANK_RAD_S[*variant]).stiffness_nm_rad
-        };
+        let stiffness = Flanks::by_variant(scene, joint(site)).map(|f| f.stiffness_nm_rad);
         (0..FLANK_RAD_S.len())
-            .filter(|variant| *variant == 0 || stiffness(&(variant - 1)) < stiffness(variant))
+            .filter(|&variant| variant == 0 || stiffness[variant - 1] < stiffness[variant])
             .flat_map(|variant| geometric(3e-6, 1e-2, 8).map(move |value| Shape { variant, value }))
             .collect()
     }
@@ -114,10 +112,10 @@ fn fly(scene: &Scene, j: usize, shapes: &[Shape]) -> Vec<[Vec<f64>; 2]> {
     let (fine, jolts) = (scene.fine_link_nm(j), scene.fine_jolt_nm(j));
     let mut entered = scene.entered(RUN_IN_S).peekable();
     let start_nm = entered.peek().map_or(0.0, |k| load[*k]);
+    let flanks = Flanks::by_variant(scene, j);
     let pressed = |lane: usize| {
         let shape = shapes[lane.min(shapes.len() - 1)];
-        let flanks = Flanks::on(scene, j, FLANK_RAD_S[shape.variant]);
-        Flight::pressed(0.5 * shape.value, flanks, start_nm)
+        Flight::pressed(0.5 * shape.value, flanks[shape.variant], start_nm)
     };
     let mut flights = Flights::abreast(pressed);
     let mut out: Vec<[Vec<f64>; 2]> = shapes.iter().map(|_| [vec![0.0; n], vec![0.0; n]]).collect();
@@ -142,10 +140,11 @@ struct Flanks {
 }
 
 impl Flanks {
-    /// On which the rotor of joint `j` swings at `flank_rad_s` were it alone, as far as instants can follow.
-    fn on(scene: &Scene, j: usize, flank_rad_s: f64) -> Self {
+    /// Those of joint `j`, on which its rotor swings at [`FLANK_RAD_S`] were it alone, as far as instants can follow.
+    fn by_variant(scene: &Scene, j: usize) -> [Self; FLANK_RAD_S.len()] {
         let mobility = scene.mobility_per_kg_m2.joint(j).iter().copied().fold(0.0, f64::max);
-        Self::alone(scene.rotor_kg_m2[j], flank_rad_s).followed(mobility, scene.instant_s())
+        let rotor = scene.rotor_kg_m2[j];
+        FLANK_RAD_S.map(|flank| Self::alone(rotor, flank).followed(mobility, scene.instant_s()))
     }
 
     fn alone(rotor_kg_m2: f64, flank_rad_s: f64) -> Self {
