@@ -2,28 +2,39 @@
 //!
 //! The acceleration's noise is in what the null model leaves and in what a family makes of the load; where the load
 //! is differentiated the two would be correlated for no physical reason. Of a motion that repeats, slow harmonics are
-//! known well and taken as they are ([`Trusted`]). Fast ones are small and drown one by one, and yet they make gears
+//! known well and taken as they are ([`Harmonics`]). Fast ones are small and drown one by one, and yet they make gears
 //! swing; but they are no accident: a drive that does not answer dry friction at once jolts its joint, at every
 //! reversal in the same way. That common course is known ([`jolts`]), and better from the torque than from the motion.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use realfft::num_complex::Complex64;
 
+use super::extension::mean_period;
 use crate::dynamics::{LANES, Lanes, Model, Motion, Real, Workspace, rigid_torque};
 use crate::robot::{Arm, JointSignals};
 use crate::signal::FineClock;
 
 /// Torques of a rigid arm along the motion of a log, as far as it tells them.
 pub struct Loads {
-    /// What moves the links, Nm.
-    pub link_nm: JointSignals,
-    /// The same and what moves the rotors: the torque on the gears, Nm.
+    /// What moves the links, of what is known a hundred times better than its noise.
+    pub link: LinkTorque,
+    /// The same of what is known ten times better: a gear that gives way swings by what its motor does, up to
+    /// frequencies at which little is left of that, and knows no difference between a motor that is moved and one that
+    /// swings back.
+    pub bending: LinkTorque,
+    /// Torque on the gears, what moves links and rotors, Nm; of what is known a hundred times better than its noise.
     pub load_nm: JointSignals,
-    /// The links' share of what the drives give too fast for `link_nm`, as the joints' reversals tell it, Nm.
-    pub jolt_nm: JointSignals,
     /// What a torque that presses the links and the rotor of a joint apart accelerates them by, 1/(kg m²), the other
     /// joints being free to move: I_a⁻¹ + [(M + I_a')⁻¹]_jj, I_a' without the joint's own rotor.
     pub mobility_per_kg_m2: JointSignals,
+}
+
+/// Torque that moves the links of every joint, in two parts.
+pub struct LinkTorque {
+    /// What the motion tells, Nm.
+    pub told_nm: JointSignals,
+    /// The links' share of what the drives give too fast for that, as the joints' reversals tell it, Nm.
+    pub jolt_nm: JointSignals,
 }
 
 /// A motion that repeats, its periods one after the other.
@@ -49,41 +60,53 @@ impl Loads {
         link_nm: &JointSignals,
         (mass_kg_m2, rotor_kg_m2): (&[JointSignals], &[f64]),
     ) -> Self {
-        let still = link_nm.map_joints(|_, y| vec![0.0; y.len()]);
-        let (_, mobility_per_kg_m2) = apart(mass_kg_m2, rotor_kg_m2, &still);
+        let still = || link_nm.map_joints(|_, y| vec![0.0; y.len()]);
+        let (_, mobility_per_kg_m2) = apart(mass_kg_m2, rotor_kg_m2, &still());
         let load_nm = sum(link_nm, &rotors_along(arm, motion));
-        Self { link_nm: link_nm.clone(), load_nm, jolt_nm: still, mobility_per_kg_m2 }
+        let told = || LinkTorque { told_nm: link_nm.clone(), jolt_nm: still() };
+        Self { link: told(), bending: told(), load_nm, mobility_per_kg_m2 }
     }
 
-    /// Of the mean of `periods`, as far as they agree.
+    /// Of the mean of `periods`, as far as they agree. `link` is along the motion of the regressor, whose accelerations end
+    /// where noise begins to cost more than they tell; gears swing by those of the periods themselves, with all their
+    /// harmonics.
     pub fn agreed(
         (model, arm): (&Model, &Arm),
         mean: &Motion,
         (link_nm, mass_kg_m2, rotor_kg_m2): (&JointSignals, &[JointSignals], &[f64]),
         periods: &Periods,
     ) -> Self {
-        let Periods { each, torque_nm, clock, .. } = *periods;
-        let trusted = |y: &JointSignals| -> Vec<Trusted> {
-            (0..y.joints()).map(|j| Trusted::of(clock, y.joint(j))).collect()
+        let Periods { each, torque_nm, clock, highest, .. } = *periods;
+        let harmonics = |y: &JointSignals| -> Vec<Harmonics> {
+            (0..y.joints()).map(|j| Harmonics::of(clock, y.joint(j))).collect()
         };
-        let part = |t: &[Trusted], y: &JointSignals| y.map_joints(|j, y| t[j].part(clock, y));
+        let part = |of: &[Harmonics], y: &JointSignals, level: f64| {
+            y.map_joints(|j, y| of[j].part(clock, y, level))
+        };
         let (links, rotors) = (rigid_torque_along(model, each), rotors_along(arm, each));
-        let of_loads = trusted(&sum(&links, &rotors));
-        let of_links = trusted(&links);
-        let of_torques = trusted(torque_nm);
-        let jolt_nm = mean.qd_rad_s.map_joints(|j, qd| {
-            let sign = |qd: f64| (qd / arm.friction_epsilon_rad_s).tanh();
-            let fine_sign: Vec<f64> = clock.refined(qd).into_iter().map(sign).collect();
-            let coulomb_nm = arm.joints[j].drive.coulomb_nm;
-            let known = (&of_loads[j], &of_links[j]);
-            jolts(periods, known, &of_torques[j], &fine_sign, coulomb_nm)
-                .unwrap_or_else(|| vec![0.0; qd.len()])
-        });
-        let (jolt_nm, mobility_per_kg_m2) = apart(mass_kg_m2, rotor_kg_m2, &jolt_nm);
-        let jolt_nm = jolt_nm.map_joints(|j, y| of_links[j].rest(clock, y, periods.highest));
-        let rotor_nm = part(&trusted(&rotors), &rotors_along(arm, mean));
-        let link_nm = part(&of_links, link_nm);
-        Self { load_nm: sum(&link_nm, &rotor_nm), link_nm, jolt_nm, mobility_per_kg_m2 }
+        let of_loads = harmonics(&sum(&links, &rotors));
+        let of_links = harmonics(&links);
+        let of_torques = harmonics(torque_nm);
+        let jolts_beyond = |level: f64| {
+            let jolt_nm = mean.qd_rad_s.map_joints(|j, qd| {
+                let sign = |qd: f64| (qd / arm.friction_epsilon_rad_s).tanh();
+                let fine_sign: Vec<f64> = clock.refined(qd).into_iter().map(sign).collect();
+                let coulomb_nm = arm.joints[j].drive.coulomb_nm;
+                let known = (&of_loads[j], &of_links[j], level);
+                jolts(periods, known, &of_torques[j], &fine_sign, coulomb_nm)
+                    .unwrap_or_else(|| vec![0.0; qd.len()])
+            });
+            let (jolt_nm, mobility) = apart(mass_kg_m2, rotor_kg_m2, &jolt_nm);
+            let rest = |j: usize, y: &[f64]| of_links[j].rest(clock, y, level, highest);
+            (jolt_nm.map_joints(rest), mobility)
+        };
+        let (jolt_nm, mobility_per_kg_m2) = jolts_beyond(WELL_KNOWN);
+        let link = LinkTorque { told_nm: part(&of_links, link_nm, WELL_KNOWN), jolt_nm };
+        let mean_links = links.map_joints(|_, y| mean_period(y, clock.samples()));
+        let told_nm = part(&of_links, &mean_links, KNOWN);
+        let bending = LinkTorque { told_nm, jolt_nm: jolts_beyond(KNOWN).0 };
+        let rotor_nm = part(&harmonics(&rotors), &rotors_along(arm, mean), WELL_KNOWN);
+        Self { load_nm: sum(&link.told_nm, &rotor_nm), link, bending, mobility_per_kg_m2 }
     }
 }
 
@@ -122,20 +145,23 @@ fn apart(
 }
 
 /// Power over noise of a band of harmonics that is taken as it is.
-const TRUSTED: f64 = 100.0;
+const WELL_KNOWN: f64 = 100.0;
+/// The same for [`Loads::bending`].
+const KNOWN: f64 = 10.0;
 /// Harmonics that are judged together.
 const BAND: usize = 8;
 
-/// Which bands of harmonics of a torque are known a hundred times better than their noise.
-struct Trusted {
-    bands: Vec<bool>,
+/// How well the harmonics of a torque are known.
+struct Harmonics {
+    /// Power over noise, by band.
+    known: Vec<f64>,
     /// Coefficients of the mean period.
     mean: Vec<Complex64>,
     /// Mean square of their noise.
     noise: Vec<f64>,
 }
 
-impl Trusted {
+impl Harmonics {
     /// Of `periods`, one after the other.
     fn of(clock: &FineClock, periods: &[f64]) -> Self {
         let spectra: Vec<Vec<Complex64>> =
@@ -145,7 +171,7 @@ impl Trusted {
         let mean: Vec<Complex64> = (0..harmonics)
             .map(|h| spectra.iter().map(|s| s[h]).sum::<Complex64>() / count)
             .collect();
-        let (mut bands, mut noise) = (Vec::new(), Vec::with_capacity(harmonics));
+        let (mut known, mut noise) = (Vec::new(), Vec::with_capacity(harmonics));
         for first in (0..harmonics).step_by(BAND) {
             let band = first..(first + BAND).min(harmonics);
             let (mut power, mut scatter) = (0.0, 0.0);
@@ -154,25 +180,26 @@ impl Trusted {
                 scatter += spectra.iter().map(|s| (s[h] - mean[h]).norm_sqr()).sum::<f64>();
             }
             let of_mean = scatter / (count * (count - 1.0));
-            bands.push(power > (1.0 + TRUSTED) * of_mean);
+            known.push(if power > 0.0 { power / of_mean - 1.0 } else { 0.0 });
             noise.resize(band.end, of_mean / band.len() as f64);
         }
-        Self { bands, mean, noise }
+        Self { known, mean, noise }
     }
 
-    /// Whether harmonic `h` is one of them.
-    fn holds(&self, h: usize) -> bool {
-        self.bands[h / BAND]
+    /// Whether the power of harmonic `h` is more than `level` times its noise.
+    fn holds(&self, h: usize, level: f64) -> bool {
+        self.known[h / BAND] > level
     }
 
     /// `y` with these harmonics only.
-    fn part(&self, clock: &FineClock, y: &[f64]) -> Vec<f64> {
-        clock.filtered(y, |h| if self.holds(h) { Complex64::ONE } else { Complex64::ZERO })
+    fn part(&self, clock: &FineClock, y: &[f64], level: f64) -> Vec<f64> {
+        let gain = |h: usize| if self.holds(h, level) { Complex64::ONE } else { Complex64::ZERO };
+        clock.filtered(y, gain)
     }
 
     /// `y` without them, up to the harmonic `highest`.
-    fn rest(&self, clock: &FineClock, y: &[f64], highest: usize) -> Vec<f64> {
-        let is_rest = |h: usize| h <= highest && !self.holds(h);
+    fn rest(&self, clock: &FineClock, y: &[f64], level: f64, highest: usize) -> Vec<f64> {
+        let is_rest = |h: usize| h <= highest && !self.holds(h, level);
         clock.filtered(y, |h| if is_rest(h) { Complex64::ONE } else { Complex64::ZERO })
     }
 }
@@ -187,22 +214,22 @@ const FASTEST_HZ: f64 = 60.0;
 /// log as well; all six shift a score by less than √(6/(6·10)) = 0.3 of its σ.
 const TOLD: f64 = 10.0;
 
-/// What the drive of a joint gives beside friction in the harmonics in which the torque of its links is not trusted, as
-/// its reversals tell it, Nm: Σ_i c_i s(t − iΔ) − F_c s(t), with s the sign of the velocity, given at every tick, and the
-/// c fitted to `torque`, as recorded, weighted by its noise, in the harmonics in which its load is not trusted. `None`
+/// What the drive of a joint gives beside friction in the harmonics in which the torque of its links is not known to
+/// `level`, as its reversals tell it, Nm: Σ_i c_i s(t − iΔ) − F_c s(t), with s the sign of the velocity, given at every tick, and the
+/// c fitted to `torque`, as recorded, weighted by its noise, in the harmonics in which its load is not known to it. `None`
 /// where it drowns, or where the joint hardly reverses.
 ///
 /// Six delays, from two before to three behind the reversal, hold what a drive does within some twenty milliseconds.
 fn jolts(
     periods: &Periods,
-    (load, links): (&Trusted, &Trusted),
-    torque: &Trusted,
+    (load, links, level): (&Harmonics, &Harmonics, f64),
+    torque: &Harmonics,
     sign: &[f64],
     coulomb_nm: f64,
 ) -> Option<Vec<f64>> {
     let Periods { clock, rate_hz, highest, .. } = *periods;
     let fastest = highest.min((FASTEST_HZ * clock.samples() as f64 / rate_hz) as usize);
-    let is_used = |h: &usize| !load.holds(*h) && torque.noise[*h] > 0.0;
+    let is_used = |h: &usize| !load.holds(*h, level) && torque.noise[*h] > 0.0;
     let used: Vec<usize> = (1..=fastest).filter(is_used).collect();
     let delay = (DELAY_S.max(1.0 / rate_hz) * rate_hz * clock.ticks() as f64).round() as i64;
     let delayed = |i: i64| {
@@ -229,7 +256,7 @@ fn jolts(
         .collect();
     let every_tick = FineClock::new(sign.len(), 1);
     let slow = every_tick.filtered(&beside_friction, |h| {
-        if h <= fastest && !links.holds(h) { Complex64::ONE } else { Complex64::ZERO }
+        if h <= fastest && !links.holds(h, level) { Complex64::ONE } else { Complex64::ZERO }
     });
     (told > TOLD).then(|| slow.into_iter().step_by(clock.ticks()).collect())
 }
@@ -389,13 +416,14 @@ mod tests {
             rate_hz: RATE_HZ,
             highest: 200,
         };
-        let of_load = Trusted::of(&clock, &load);
-        assert!(of_load.holds(8) && !of_load.holds(50));
-        let of_torque = Trusted::of(&clock, &torque);
-        let known = jolts(&periods, (&of_load, &of_load), &of_torque, &sign, coulomb_nm).unwrap();
+        let of_load = Harmonics::of(&clock, &load);
+        assert!(of_load.holds(8, WELL_KNOWN) && !of_load.holds(50, WELL_KNOWN));
+        let of_torque = Harmonics::of(&clock, &torque);
+        let at = (&of_load, &of_load, WELL_KNOWN);
+        let known = jolts(&periods, at, &of_torque, &sign, coulomb_nm).unwrap();
         let true_nm: Vec<f64> = (0..fine).map(|k| fed(k) - coulomb_nm * sign[k]).collect();
         let band = FineClock::new(fine, 1).filtered(&true_nm, |h| {
-            if h <= 200 && !of_load.holds(h) { Complex64::ONE } else { Complex64::ZERO }
+            if h <= 200 && !of_load.holds(h, WELL_KNOWN) { Complex64::ONE } else { Complex64::ZERO }
         });
         let truth: Vec<f64> = band.into_iter().step_by(TICKS).collect();
         let square = |y: &[f64]| y.iter().map(|y| y * y).sum::<f64>();
@@ -404,6 +432,6 @@ mod tests {
         let share = square(&off) / square(&truth);
         assert!(share < 0.1, "{share}");
         let none = vec![1.0; fine];
-        assert!(jolts(&periods, (&of_load, &of_load), &of_load, &none, coulomb_nm).is_none());
+        assert!(jolts(&periods, at, &of_load, &none, coulomb_nm).is_none());
     }
 }

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use realfft::num_complex::Complex64;
 
-use super::load::{Loads, Periods, mass_along, rigid_torque_along, rotors_kg_m2};
+use super::load::{LinkTorque, Loads, Periods, mass_along, rigid_torque_along, rotors_kg_m2};
 use crate::base::BaseSet;
 use crate::dynamics::{Model, Motion, Parameter, ParameterLayout};
 use crate::identify::{Prepared, drive_answers};
@@ -34,6 +34,8 @@ pub struct Scene {
     pub load_nm: JointSignals,
     /// What the links take beside `link_nm` where joints reverse, Nm.
     jolt_nm: JointSignals,
+    /// What moves the links of gears that give way.
+    bending: LinkTorque,
     /// I_a of every joint, kg m², no less than a small share of what its links resist with: what gears swing against.
     pub rotor_kg_m2: Vec<f64>,
     /// How easily links and rotor are pressed apart, 1/(kg m²).
@@ -57,6 +59,8 @@ pub struct Scene {
     fine_link_nm: Vec<OnceLock<Vec<f64>>>,
     /// See [`Self::fine_jolt_nm`].
     fine_jolt_nm: Vec<OnceLock<Vec<f64>>>,
+    /// See [`Self::fine_bending_nm`].
+    fine_bending_nm: Vec<OnceLock<[Vec<f64>; 2]>>,
     /// See [`Self::instants`].
     instants: Vec<OnceLock<Instants>>,
     /// Between the samples of a motion that repeats.
@@ -109,7 +113,8 @@ impl Scene {
             }
             _ => Loads::as_recorded(&arm, &motion, &recorded_nm, (&mass_kg_m2, &rotor_kg_m2)),
         };
-        let Loads { link_nm, load_nm, jolt_nm, mobility_per_kg_m2 } = loads;
+        let Loads { link, bending, load_nm, mobility_per_kg_m2 } = loads;
+        let LinkTorque { told_nm: link_nm, jolt_nm } = link;
         let own_inertia_kg_m2 = JointSignals::from_fn(joints, n, |j, k| mass_kg_m2[j].joint(j)[k]);
         let epsilon = arm.friction_epsilon_rad_s;
         let sign =
@@ -138,6 +143,7 @@ impl Scene {
             link_nm,
             load_nm,
             jolt_nm,
+            bending,
             rotor_kg_m2,
             mobility_per_kg_m2,
             torque_nm,
@@ -145,6 +151,7 @@ impl Scene {
             torque_limit_nm: prepared.torque_limit_nm.clone(),
             fine_link_nm: vec![OnceLock::new(); joints],
             fine_jolt_nm: vec![OnceLock::new(); joints],
+            fine_bending_nm: vec![OnceLock::new(); joints],
             instants: (0..joints).map(|_| OnceLock::new()).collect(),
             clock,
             highest,
@@ -198,6 +205,14 @@ impl Scene {
     /// What the links of joint `j` take where joints reverse, at `FINE` instants per sample, Nm.
     pub fn fine_jolt_nm(&self, j: usize) -> &[f64] {
         self.fine_jolt_nm[j].get_or_init(|| self.fine(self.jolt_nm.joint(j)))
+    }
+
+    /// What makes a gear at joint `j` that gives way swing, at `FINE` instants per sample, Nm: torque of its links that
+    /// the motion tells, and what they take beside it where joints reverse.
+    pub fn fine_bending_nm(&self, j: usize) -> [&[f64]; 2] {
+        let LinkTorque { told_nm, jolt_nm } = &self.bending;
+        let fine = || [told_nm, jolt_nm].map(|y| self.fine(y.joint(j)));
+        self.fine_bending_nm[j].get_or_init(fine).each_ref().map(Vec::as_slice)
     }
 
     /// Where friction of joint `j` is looked at: `FINE` times per sample of a motion that repeats, at the

@@ -266,13 +266,27 @@ impl<'s, 'a> Kept<'s, 'a> {
             let most = if study.families[entry.family].is_repeatable() { MOST_ALIKE } else { 1 };
             self.causes.iter().enumerate().filter(is_taken).count() >= most
         };
+        // What all joints share is told from what single ones have by the majority: beside one of the arm as a whole, most
+        // joints with one of their own would say in many numbers that the others have another.
+        let outvoted = |entry: &Entry| {
+            let alike = |(c, cause): &(usize, &Contender)| {
+                Some(*c) != open && cause.entry.family == entry.family
+            };
+            let alike = self.causes.iter().enumerate().filter(alike);
+            let (single, common): (Vec<_>, Vec<_>) =
+                alike.partition(|(_, cause)| cause.entry.site.is_some());
+            match entry.site {
+                Some(_) => !common.is_empty() && !single.is_empty(),
+                None => single.len() > 1,
+            }
+        };
         let mut best: Vec<Contender> = Vec::new();
         let scores: Vec<Option<Score>> = study
             .entries
             .par_iter()
             .chain(orders.par_iter())
             .map(|entry| {
-                if left_out(entry) || taken(entry) {
+                if left_out(entry) || taken(entry) || outvoted(entry) {
                     None
                 } else {
                     study.score(entry, others, residual)
@@ -368,6 +382,12 @@ impl<'s, 'a> Kept<'s, 'a> {
         })
     }
 
+    /// The share of its own size to which the law of `entry` is right.
+    fn form_error(&self, entry: &Entry) -> f64 {
+        let study = self.study;
+        study.families[entry.family].form_error(&study.scene, entry.shape).max(FORM_ERROR)
+    }
+
     /// Whether chance explains `contender` in fewer than one log without faults in 500, all
     /// families, sites and shapes counted, the evidence is for it, and it is more than what the
     /// approximate form of the causes found beside it may leave. Along a single run it also has to show in
@@ -375,14 +395,18 @@ impl<'s, 'a> Kept<'s, 'a> {
     fn is_significant(&self, contender: &Contender, others: &Span, residual: &Image) -> bool {
         let study = self.study;
         let site = contender.entry.site;
-        let beside = self
-            .causes
-            .iter()
-            .filter(|c| (c.entry.family, c.entry.site) != (contender.entry.family, site))
-            .filter(|c| c.entry.site.is_none() || site.is_none() || c.entry.site == site)
-            .map(|c| c.score.lambda)
-            .fold(0.0, f64::max);
-        if contender.score.lambda < FORM_ERROR * FORM_ERROR * beside {
+        let own_error = self.form_error(&contender.entry);
+        let is_left_by = |c: &Contender| {
+            if (c.entry.family, c.entry.site) == (contender.entry.family, site) {
+                return false;
+            }
+            // What swings at one joint jolts all others: an error in how it swings looks like swings there.
+            let error = self.form_error(&c.entry);
+            let reaches = c.entry.site.is_none() || site.is_none() || c.entry.site == site;
+            let reaches = reaches || error.min(own_error) > FORM_ERROR;
+            reaches && contender.score.lambda < error * error * c.score.lambda
+        };
+        if self.causes.iter().any(is_left_by) {
             return false;
         }
         let span = study.span(&contender.entry, others);

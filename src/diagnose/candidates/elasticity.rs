@@ -1,7 +1,7 @@
 //! A gear that gives way: link angle q_L, motor angle q_M, k (q_M − q_L) = τ_L.
 //!
 //! Where the log has the motor's angle, the links move by δ less than it says: the torques change by
-//! τ(q − δ, q̇ − δ̇, q̈ − δ̈) − τ(q, q̇, q̈) on every joint (variant 0). The link swings on its spring,
+//! τ(q − δ, q̇ − δ̇, q̈ − δ̈) − τ(q, q̇, q̈) on every joint. The link swings on its spring,
 //!
 //! ```text
 //! M_jj(q) δ̈ + d₁ δ̇ + k δ = τ_L
@@ -33,7 +33,11 @@ pub struct Elasticity;
 const DAMPING_RATIO: f64 = 0.05;
 /// The same, d₂, of what jolts make swing, whose rotor is damped by its own friction as well.
 const JOLTED_DAMPING_RATIO: f64 = 0.15;
-/// The same where the encoder sits on the link, by variant: a loop closed over the gear needs damping.
+/// Variants with the encoder on the motor: in the first the links are driven by the part of the motion that is known a
+/// hundred times better than its noise, and by jolts beyond, which is what gears need that swing faster than that; in the
+/// second by what is known ten times better, for gears that swing within it.
+const ON_MOTOR: usize = 2;
+/// Damping where the encoder sits on the link, by further variants: a loop closed over the gear needs it.
 const LINK_DAMPING_RATIO: [f64; 2] = [0.05, 0.3];
 /// Stiffnesses, Nm/rad: neighbours are told by where the links swing.
 const STIFFNESSES: usize = 14;
@@ -80,13 +84,16 @@ impl Lag {
 
 /// How links on joint `j` swing behind a motor that moves as recorded, and against one that jolts where joints reverse.
 /// A single run, whose accelerations are those of its low-pass, shows no more than how far the gear bends.
-fn swing(scene: &Scene, j: usize, stiffness_nm_rad: f64) -> Lag {
+fn swing(scene: &Scene, j: usize, variant: usize, stiffness_nm_rad: f64) -> Lag {
     if !scene.periodic {
         let bent = |load: &f64| load / stiffness_nm_rad;
         return Lag::slow(scene, scene.link_nm.joint(j).iter().map(bent).collect());
     }
     let n = scene.samples();
-    let (load, jolts) = (scene.fine_link_nm(j), scene.fine_jolt_nm(j));
+    let [load, jolts] = match variant {
+        0 => [scene.fine_link_nm(j), scene.fine_jolt_nm(j)],
+        _ => scene.fine_bending_nm(j),
+    };
     let inertia = scene.own_inertia_kg_m2.joint(j);
     let mobility = scene.mobility_per_kg_m2.joint(j);
     let step_s = scene.instant_s();
@@ -180,12 +187,15 @@ impl Candidate for Elasticity {
     }
 
     fn shapes(&self, scene: &Scene, _: Option<usize>) -> Vec<Shape> {
-        let swings = |variant| scene.periodic && variant == 0;
-        let count = |variant| if swings(variant) { STIFFNESSES } else { BENT_STIFFNESSES };
+        let count = |variant| match (scene.periodic, variant < ON_MOTOR) {
+            (true, true) => STIFFNESSES,
+            (false, true) if variant > 0 => 0,
+            _ => BENT_STIFFNESSES,
+        };
         let of = |variant| {
             geometric(2e3, 2e5, count(variant)).map(move |value| Shape { variant, value })
         };
-        (0..1 + LINK_DAMPING_RATIO.len()).flat_map(of).collect()
+        (0..ON_MOTOR + LINK_DAMPING_RATIO.len()).flat_map(of).collect()
     }
 
     fn search(&self) -> Search {
@@ -195,12 +205,12 @@ impl Candidate for Elasticity {
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let j = joint(site);
         let drive = &scene.arm.joints[j].drive;
-        if shape.variant == 0 {
+        if shape.variant < ON_MOTOR {
             let stiffness = shape.value;
-            let links = swing(scene, j, stiffness).of(scene, j);
+            let links = swing(scene, j, shape.variant, stiffness).of(scene, j);
             return vec![give_way(scene, &links, 1.0 / stiffness)];
         }
-        let (stiffness, ratio) = (shape.value, LINK_DAMPING_RATIO[shape.variant - 1]);
+        let (stiffness, ratio) = (shape.value, LINK_DAMPING_RATIO[shape.variant - ON_MOTOR]);
         let damping = 2.0 * ratio * (stiffness * scene.rotor_kg_m2[j]).sqrt();
         let delta = scene.filtered(scene.link_nm.joint(j), |omega| {
             Complex64::new(stiffness, damping * omega).inv()
@@ -224,14 +234,14 @@ impl Candidate for Elasticity {
     }
 
     fn form_error(&self, scene: &Scene, shape: Shape) -> f64 {
-        if scene.periodic && shape.variant == 0 { HELD_ERROR } else { 0.0 }
+        if scene.periodic && shape.variant < ON_MOTOR { HELD_ERROR } else { 0.0 }
     }
 
     /// How a gear bends tells k; how jolts make it swing also depends on the drive that holds its rotor, and shapes are
     /// up to several times stiffer. Elsewhere it swings by its own k.
     fn elsewhere(&self, shape: Shape, b: &[f64]) -> Shape {
         match b {
-            [compliance] if shape.variant == 0 && *compliance > 0.0 => {
+            [compliance] if shape.variant < ON_MOTOR && *compliance > 0.0 => {
                 Shape { value: 1.0 / compliance, ..shape }
             }
             _ => shape,
