@@ -22,11 +22,24 @@ pub struct Loads {
     /// frequencies at which little is left of that, and knows no difference between a motor that is moved and one that
     /// swings back.
     pub bending: LinkTorque,
+    /// What the drives deliver for it and for dry friction, where periods tell it.
+    pub delivered: Option<Delivered>,
     /// Torque on the gears, what moves links and rotors, Nm; of what is known a hundred times better than its noise.
     pub load_nm: JointSignals,
     /// What a torque that presses the links and the rotor of a joint apart accelerates them by, 1/(kg m²), the other
     /// joints being free to move: I_a⁻¹ + [(M + I_a')⁻¹]_jj, I_a' without the joint's own rotor.
     pub mobility_per_kg_m2: JointSignals,
+}
+
+/// What the drives deliver, in two ranges of harmonics: for a load that is known, and beyond.
+pub struct Delivered {
+    /// Load, links and rotors, in the harmonics in which it is known ten times better than its noise, Nm.
+    pub load_nm: JointSignals,
+    /// Which these are, by joint.
+    pub known: Vec<Vec<bool>>,
+    /// What the drives deliver in the others, as reversals tell it, at every tick, Nm: load and dry friction together, of
+    /// which a drive may feed any share forward.
+    pub beyond_nm: Vec<Vec<f64>>,
 }
 
 /// Torque that moves the links of every joint, in two parts.
@@ -64,7 +77,7 @@ impl Loads {
         let (_, mobility_per_kg_m2) = apart(mass_kg_m2, rotor_kg_m2, &still());
         let load_nm = sum(link_nm, &rotors_along(arm, motion));
         let told = || LinkTorque { told_nm: link_nm.clone(), jolt_nm: still() };
-        Self { link: told(), bending: told(), load_nm, mobility_per_kg_m2 }
+        Self { link: told(), bending: told(), delivered: None, load_nm, mobility_per_kg_m2 }
     }
 
     /// Of the mean of `periods`, as far as they agree. `link` is along the motion of the regressor, whose accelerations end
@@ -87,14 +100,25 @@ impl Loads {
         let of_loads = harmonics(&sum(&links, &rotors));
         let of_links = harmonics(&links);
         let of_torques = harmonics(torque_nm);
-        let jolts_beyond = |level: f64| {
-            let jolt_nm = mean.qd_rad_s.map_joints(|j, qd| {
+        let fine_sign: Vec<Vec<f64>> = (0..mean.joints())
+            .map(|j| {
                 let sign = |qd: f64| (qd / arm.friction_epsilon_rad_s).tanh();
-                let fine_sign: Vec<f64> = clock.refined(qd).into_iter().map(sign).collect();
-                let coulomb_nm = arm.joints[j].drive.coulomb_nm;
-                let known = (&of_loads[j], &of_links[j], level);
-                jolts(periods, known, &of_torques[j], &fine_sign, coulomb_nm)
-                    .unwrap_or_else(|| vec![0.0; qd.len()])
+                clock.refined(mean.qd_rad_s.joint(j)).into_iter().map(sign).collect()
+            })
+            .collect();
+        let answer = |j: usize, level: f64| {
+            answer(periods, &of_loads[j], &of_torques[j], &fine_sign[j], level)
+        };
+        let coulomb_nm = |j: usize| arm.joints[j].drive.coulomb_nm;
+        let jolts_beyond = |level: f64| {
+            let jolt_nm = mean.qd_rad_s.map_joints(|j, qd| match answer(j, level) {
+                Some(delivered_nm) => {
+                    let dry = fine_sign[j].iter().map(|s| coulomb_nm(j) * s);
+                    let beside: Vec<f64> =
+                        delivered_nm.iter().zip(dry).map(|(d, dry)| d - dry).collect();
+                    jolts(periods, &of_links[j], level, &beside)
+                }
+                None => vec![0.0; qd.len()],
             });
             let (jolt_nm, mobility) = apart(mass_kg_m2, rotor_kg_m2, &jolt_nm);
             let rest = |j: usize, y: &[f64]| of_links[j].rest(clock, y, level, highest);
@@ -102,11 +126,26 @@ impl Loads {
         };
         let (jolt_nm, mobility_per_kg_m2) = jolts_beyond(WELL_KNOWN);
         let link = LinkTorque { told_nm: part(&of_links, link_nm, WELL_KNOWN), jolt_nm };
-        let mean_links = links.map_joints(|_, y| mean_period(y, clock.samples()));
-        let told_nm = part(&of_links, &mean_links, KNOWN);
+        let mean_of = |y: &JointSignals| y.map_joints(|_, y| mean_period(y, clock.samples()));
+        let told_nm = part(&of_links, &mean_of(&links), KNOWN);
         let bending = LinkTorque { told_nm, jolt_nm: jolts_beyond(KNOWN).0 };
+        let delivered = Delivered {
+            load_nm: part(&of_loads, &mean_of(&sum(&links, &rotors)), KNOWN),
+            known: of_loads
+                .iter()
+                .map(|of| (0..=highest).map(|h| of.holds(h, KNOWN)).collect())
+                .collect(),
+            beyond_nm: (0..mean.joints())
+                .map(|j| {
+                    answer(j, KNOWN)
+                        .unwrap_or_else(|| fine_sign[j].iter().map(|s| coulomb_nm(j) * s).collect())
+                })
+                .collect(),
+        };
         let rotor_nm = part(&harmonics(&rotors), &rotors_along(arm, mean), WELL_KNOWN);
-        Self { load_nm: sum(&link.told_nm, &rotor_nm), link, bending, mobility_per_kg_m2 }
+        let load_nm = sum(&link.told_nm, &rotor_nm);
+        let delivered = Some(delivered);
+        Self { load_nm, link, bending, delivered, mobility_per_kg_m2 }
     }
 }
 
@@ -214,23 +253,21 @@ const FASTEST_HZ: f64 = 60.0;
 /// log as well; all six shift a score by less than √(6/(6·10)) = 0.3 of its σ.
 const TOLD: f64 = 10.0;
 
-/// What the drive of a joint gives beside friction in the harmonics in which the torque of its links is not known to
-/// `level`, as its reversals tell it, Nm: Σ_i c_i s(t − iΔ) − F_c s(t), with s the sign of the velocity, given at every tick, and the
-/// c fitted to `torque`, as recorded, weighted by its noise, in the harmonics in which its load is not known to it. `None`
-/// where it drowns, or where the joint hardly reverses.
+/// What the drive of a joint gives in the harmonics in which its load is not known to `level`, as its reversals tell it, Nm,
+/// at every tick: Σ_i c_i s(t − iΔ), with s the sign of the velocity, given at every tick, and the c fitted to `torque`, as
+/// recorded, weighted by its noise. `None` where it drowns, or where the joint hardly reverses.
 ///
 /// Six delays, from two before to three behind the reversal, hold what a drive does within some twenty milliseconds.
-fn jolts(
+fn answer(
     periods: &Periods,
-    (load, links, level): (&Harmonics, &Harmonics, f64),
+    load: &Harmonics,
     torque: &Harmonics,
     sign: &[f64],
-    coulomb_nm: f64,
+    level: f64,
 ) -> Option<Vec<f64>> {
-    let Periods { clock, rate_hz, highest, .. } = *periods;
-    let fastest = highest.min((FASTEST_HZ * clock.samples() as f64 / rate_hz) as usize);
+    let Periods { clock, rate_hz, .. } = *periods;
     let is_used = |h: &usize| !load.holds(*h, level) && torque.noise[*h] > 0.0;
-    let used: Vec<usize> = (1..=fastest).filter(is_used).collect();
+    let used: Vec<usize> = (1..=fastest(periods)).filter(is_used).collect();
     let delay = (DELAY_S.max(1.0 / rate_hz) * rate_hz * clock.ticks() as f64).round() as i64;
     let delayed = |i: i64| {
         let mut delayed = sign.to_vec();
@@ -251,14 +288,25 @@ fn jolts(
     let c = Cholesky::new(normal)?.solve(&score);
     // Noise alone would make this one: the mean square of a coefficient has two parts.
     let told = 2.0 * c.dot(&score) / count as f64;
-    let beside_friction: Vec<f64> = (0..sign.len())
-        .map(|k| signs.iter().zip(&c).map(|(s, c)| c * s[k]).sum::<f64>() - coulomb_nm * sign[k])
-        .collect();
-    let every_tick = FineClock::new(sign.len(), 1);
-    let slow = every_tick.filtered(&beside_friction, |h| {
-        if h <= fastest && !links.holds(h, level) { Complex64::ONE } else { Complex64::ZERO }
+    let given = |k: usize| signs.iter().zip(&c).map(|(s, c)| c * s[k]).sum::<f64>();
+    (told > TOLD).then(|| (0..sign.len()).map(given).collect())
+}
+
+/// The last harmonic in which drives are looked at.
+fn fastest(periods: &Periods) -> usize {
+    let Periods { clock, rate_hz, highest, .. } = *periods;
+    highest.min((FASTEST_HZ * clock.samples() as f64 / rate_hz) as usize)
+}
+
+/// Of what a drive gives beside friction, Nm at every tick, the part in which the torque of its links is not known to `level`,
+/// at the samples.
+fn jolts(periods: &Periods, links: &Harmonics, level: f64, beside_friction_nm: &[f64]) -> Vec<f64> {
+    let last = fastest(periods);
+    let every_tick = FineClock::new(beside_friction_nm.len(), 1);
+    let fast = every_tick.filtered(beside_friction_nm, |h| {
+        if h <= last && !links.holds(h, level) { Complex64::ONE } else { Complex64::ZERO }
     });
-    (told > TOLD).then(|| slow.into_iter().step_by(clock.ticks()).collect())
+    fast.into_iter().step_by(periods.clock.ticks()).collect()
 }
 
 /// Torque on the gear of every sample, Nm: M q̈ + c + g of links and rotors, without friction.
@@ -419,8 +467,10 @@ mod tests {
         let of_load = Harmonics::of(&clock, &load);
         assert!(of_load.holds(8, WELL_KNOWN) && !of_load.holds(50, WELL_KNOWN));
         let of_torque = Harmonics::of(&clock, &torque);
-        let at = (&of_load, &of_load, WELL_KNOWN);
-        let known = jolts(&periods, at, &of_torque, &sign, coulomb_nm).unwrap();
+        let given = answer(&periods, &of_load, &of_torque, &sign, WELL_KNOWN).unwrap();
+        let beside: Vec<f64> =
+            given.iter().zip(&sign).map(|(given, s)| given - coulomb_nm * s).collect();
+        let known = jolts(&periods, &of_load, WELL_KNOWN, &beside);
         let true_nm: Vec<f64> = (0..fine).map(|k| fed(k) - coulomb_nm * sign[k]).collect();
         let band = FineClock::new(fine, 1).filtered(&true_nm, |h| {
             if h <= 200 && !of_load.holds(h, WELL_KNOWN) { Complex64::ONE } else { Complex64::ZERO }
@@ -432,6 +482,6 @@ mod tests {
         let share = square(&off) / square(&truth);
         assert!(share < 0.1, "{share}");
         let none = vec![1.0; fine];
-        assert!(jolts(&periods, at, &of_load, &none, coulomb_nm).is_none());
+        assert!(answer(&periods, &of_load, &of_load, &none, WELL_KNOWN).is_none());
     }
 }

@@ -4,7 +4,9 @@ use std::sync::OnceLock;
 
 use realfft::num_complex::Complex64;
 
-use super::load::{LinkTorque, Loads, Periods, mass_along, rigid_torque_along, rotors_kg_m2};
+use super::load::{
+    Delivered, LinkTorque, Loads, Periods, mass_along, rigid_torque_along, rotors_kg_m2,
+};
 use crate::base::BaseSet;
 use crate::dynamics::{Model, Motion, Parameter, ParameterLayout};
 use crate::identify::{Prepared, drive_answers};
@@ -36,6 +38,8 @@ pub struct Scene {
     jolt_nm: JointSignals,
     /// What moves the links of gears that give way.
     bending: LinkTorque,
+    /// What the drives deliver, where periods tell it.
+    delivered: Option<Delivered>,
     /// I_a of every joint, kg m², no less than a small share of what its links resist with: what gears swing against.
     pub rotor_kg_m2: Vec<f64>,
     /// How easily links and rotor are pressed apart, 1/(kg m²).
@@ -113,7 +117,7 @@ impl Scene {
             }
             _ => Loads::as_recorded(&arm, &motion, &recorded_nm, (&mass_kg_m2, &rotor_kg_m2)),
         };
-        let Loads { link, bending, load_nm, mobility_per_kg_m2 } = loads;
+        let Loads { link, bending, delivered, load_nm, mobility_per_kg_m2 } = loads;
         let LinkTorque { told_nm: link_nm, jolt_nm } = link;
         let own_inertia_kg_m2 = JointSignals::from_fn(joints, n, |j, k| mass_kg_m2[j].joint(j)[k]);
         let epsilon = arm.friction_epsilon_rad_s;
@@ -144,6 +148,7 @@ impl Scene {
             load_nm,
             jolt_nm,
             bending,
+            delivered,
             rotor_kg_m2,
             mobility_per_kg_m2,
             torque_nm,
@@ -207,6 +212,11 @@ impl Scene {
         self.fine_jolt_nm[j].get_or_init(|| self.fine(self.jolt_nm.joint(j)))
     }
 
+    /// Torque on the links of a gear at joint `j` that gives way, Nm, as far as the motion tells it.
+    pub fn bending_nm(&self, j: usize) -> &[f64] {
+        self.bending.told_nm.joint(j)
+    }
+
     /// What makes a gear at joint `j` that gives way swing, at `FINE` instants per sample, Nm: torque of its links that
     /// the motion tells, and what they take beside it where joints reverse.
     pub fn fine_bending_nm(&self, j: usize) -> [&[f64]; 2] {
@@ -244,25 +254,38 @@ impl Scene {
         if self.periodic { self.fine_link_nm(j) } else { self.link_nm.joint(j) }
     }
 
-    /// The predicted drive torque of joint `j` a time `delay_s` before every sample, Nm. Of dry friction, which
-    /// reverses between two samples, the instant counts.
+    /// The predicted drive torque of joint `j` a time `delay_s` before every sample, Nm. Of dry friction, which reverses
+    /// between two samples, the instant counts; and a drive that is slow to answer it lets the joint do so, so that load and
+    /// friction change together and the torque hardly does. Where the load drowns, reversals tell what the drive delivers.
     pub fn delayed_torque_nm(&self, j: usize, delay_s: f64) -> Vec<f64> {
-        let torque = self.torque_nm.joint(j);
-        if !self.periodic {
-            return self.delayed(torque, delay_s);
-        }
-        let (coulomb, sign) = (self.coulomb_nm[j], self.sign.joint(j));
-        let smooth: Vec<f64> = torque.iter().zip(sign).map(|(t, s)| t - coulomb * s).collect();
-        let mut out = self.delayed(&smooth, delay_s);
-        let instants = self.instants(j);
-        let n = instants.sign.len();
-        for (k, out) in out.iter_mut().enumerate() {
-            let at = (k * FINE) as f64 - delay_s / instants.step_s;
-            let (left, u) = (at.floor(), at - at.floor());
-            let left = (left as isize).rem_euclid(n as isize) as usize;
-            *out += coulomb * ((1.0 - u) * instants.sign[left] + u * instants.sign[(left + 1) % n]);
-        }
-        out
+        let (Some(clock), Some(delivered)) = (&self.clock, &self.delivered) else {
+            return self.delayed(self.torque_nm.joint(j), delay_s);
+        };
+        let known = &delivered.known[j];
+        let only = |y: &[f64], wanted: bool| {
+            clock.filtered(y, |h| {
+                if known.get(h) == Some(&wanted) { Complex64::ONE } else { Complex64::ZERO }
+            })
+        };
+        let at_instants = |fine: &[f64]| -> Vec<f64> {
+            let (n, late) = (fine.len(), delay_s / self.instant_s());
+            let value = |k: usize| {
+                let at = (k * FINE) as f64 - late;
+                let (left, u) = (at.floor(), at - at.floor());
+                let left = (left as isize).rem_euclid(n as isize) as usize;
+                (1.0 - u) * fine[left] + u * fine[(left + 1) % n]
+            };
+            (0..n / FINE).map(value).collect()
+        };
+        let (coulomb, viscous) = (self.coulomb_nm[j], self.arm.joints[j].drive.viscous_nm_s_rad);
+        let load = delivered.load_nm.joint(j);
+        let qd = self.motion.qd_rad_s.joint(j);
+        let smooth: Vec<f64> = load.iter().zip(qd).map(|(load, qd)| load + viscous * qd).collect();
+        let smooth = self.delayed(&smooth, delay_s);
+        let dry = only(&at_instants(&self.instants(j).sign), true);
+        let beyond = only(&at_instants(&delivered.beyond_nm[j]), false);
+        let sum = |((s, d), b): ((&f64, &f64), &f64)| s + coulomb * d + b;
+        smooth.iter().zip(&dry).zip(&beyond).map(sum).collect()
     }
 
     /// y at `FINE` instants per sample.

@@ -212,7 +212,7 @@ impl Candidate for Elasticity {
         }
         let (stiffness, ratio) = (shape.value, LINK_DAMPING_RATIO[shape.variant - ON_MOTOR]);
         let damping = 2.0 * ratio * (stiffness * scene.rotor_kg_m2[j]).sqrt();
-        let delta = scene.filtered(scene.link_nm.joint(j), |omega| {
+        let delta = scene.filtered(scene.bending_nm(j), |omega| {
             Complex64::new(stiffness, damping * omega).inv()
         });
         let rate = scene.derivative(&delta);

@@ -37,9 +37,8 @@ impl Candidate for TimeSkew {
 
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let change = |j: usize| {
-            let torque = scene.torque_nm.joint(j);
-            let late = scene.delayed_torque_nm(j, shape.value);
-            late.iter().zip(torque).map(|(late, now)| (late - now) / shape.value).collect()
+            let [late, now] = [shape.value, 0.0].map(|d| scene.delayed_torque_nm(j, d));
+            late.iter().zip(&now).map(|(late, now)| (late - now) / shape.value).collect()
         };
         let joints = match site {
             Some(j) => j..j + 1,
