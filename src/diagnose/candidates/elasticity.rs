@@ -187,15 +187,14 @@ impl Candidate for Elasticity {
     }
 
     fn shapes(&self, scene: &Scene, _: Option<usize>) -> Vec<Shape> {
-        let count = |variant| match (scene.periodic, variant < ON_MOTOR) {
-            (true, true) => STIFFNESSES,
-            (false, true) if variant > 0 => 0,
-            _ => BENT_STIFFNESSES,
-        };
+        // Of a single run the log's own motion is all there is.
+        let is_there = |variant: &usize| scene.periodic || *variant == 0 || *variant >= ON_MOTOR;
+        let swings = |variant| scene.periodic && variant < ON_MOTOR;
+        let count = |variant| if swings(variant) { STIFFNESSES } else { BENT_STIFFNESSES };
         let of = |variant| {
             geometric(2e3, 2e5, count(variant)).map(move |value| Shape { variant, value })
         };
-        (0..ON_MOTOR + LINK_DAMPING_RATIO.len()).flat_map(of).collect()
+        (0..ON_MOTOR + LINK_DAMPING_RATIO.len()).filter(is_there).flat_map(of).collect()
     }
 
     fn search(&self) -> Search {
