@@ -74,7 +74,7 @@ impl Loads {
         (mass_kg_m2, rotor_kg_m2): (&[JointSignals], &[f64]),
     ) -> Self {
         let still = || link_nm.map_joints(|_, y| vec![0.0; y.len()]);
-        let (_, mobility_per_kg_m2) = apart(mass_kg_m2, rotor_kg_m2, &still());
+        let ([], mobility_per_kg_m2) = apart(mass_kg_m2, rotor_kg_m2, []);
         let load_nm = sum(link_nm, &rotors_along(arm, motion));
         let told = || LinkTorque { told_nm: link_nm.clone(), jolt_nm: still() };
         Self { link: told(), bending: told(), delivered: None, load_nm, mobility_per_kg_m2 }
@@ -97,7 +97,8 @@ impl Loads {
             y.map_joints(|j, y| of[j].part(clock, y, level))
         };
         let (links, rotors) = (rigid_torque_along(model, each), rotors_along(arm, each));
-        let of_loads = harmonics(&sum(&links, &rotors));
+        let loads = sum(&links, &rotors);
+        let of_loads = harmonics(&loads);
         let of_links = harmonics(&links);
         let of_torques = harmonics(torque_nm);
         let fine_sign: Vec<Vec<f64>> = (0..mean.joints())
@@ -106,45 +107,45 @@ impl Loads {
                 clock.refined(mean.qd_rad_s.joint(j)).into_iter().map(sign).collect()
             })
             .collect();
-        let answer = |j: usize, level: f64| {
-            answer(periods, &of_loads[j], &of_torques[j], &fine_sign[j], level)
-        };
-        let coulomb_nm = |j: usize| arm.joints[j].drive.coulomb_nm;
-        let jolts_beyond = |level: f64| {
-            let jolt_nm = mean.qd_rad_s.map_joints(|j, qd| match answer(j, level) {
-                Some(delivered_nm) => {
-                    let dry = fine_sign[j].iter().map(|s| coulomb_nm(j) * s);
-                    let beside: Vec<f64> =
-                        delivered_nm.iter().zip(dry).map(|(d, dry)| d - dry).collect();
-                    jolts(periods, &of_links[j], level, &beside)
-                }
-                None => vec![0.0; qd.len()],
-            });
-            let (jolt_nm, mobility) = apart(mass_kg_m2, rotor_kg_m2, &jolt_nm);
-            let rest = |j: usize, y: &[f64]| of_links[j].rest(clock, y, level, highest);
-            (jolt_nm.map_joints(rest), mobility)
-        };
-        let (jolt_nm, mobility_per_kg_m2) = jolts_beyond(WELL_KNOWN);
-        let link = LinkTorque { told_nm: part(&of_links, link_nm, WELL_KNOWN), jolt_nm };
-        let mean_of = |y: &JointSignals| y.map_joints(|_, y| mean_period(y, clock.samples()));
-        let told_nm = part(&of_links, &mean_of(&links), KNOWN);
-        let bending = LinkTorque { told_nm, jolt_nm: jolts_beyond(KNOWN).0 };
-        let delivered = Delivered {
-            load_nm: part(&of_loads, &mean_of(&sum(&links, &rotors)), KNOWN),
-            known: of_loads
-                .iter()
-                .map(|of| (0..=highest).map(|h| of.holds(h, KNOWN)).collect())
-                .collect(),
-            beyond_nm: (0..mean.joints())
+        let dry = |j: usize| fine_sign[j].iter().map(move |s| arm.joints[j].drive.coulomb_nm * s);
+        // A drive of which nothing is told gives friction what it takes, and jolts nothing.
+        let delivered = |level: f64| -> Vec<Vec<f64>> {
+            (0..mean.joints())
                 .map(|j| {
-                    answer(j, KNOWN)
-                        .unwrap_or_else(|| fine_sign[j].iter().map(|s| coulomb_nm(j) * s).collect())
+                    answer(periods, &of_loads[j], &of_torques[j], &fine_sign[j], level)
+                        .unwrap_or_else(|| dry(j).collect())
                 })
-                .collect(),
+                .collect()
         };
+        let (well_beyond_nm, beyond_nm) = (delivered(WELL_KNOWN), delivered(KNOWN));
+        let jolts = |delivered_nm: &[Vec<f64>], level: f64| {
+            mean.qd_rad_s.map_joints(|j, _| {
+                let beside: Vec<f64> =
+                    delivered_nm[j].iter().zip(dry(j)).map(|(given, dry)| given - dry).collect();
+                jolts(periods, &of_links[j], level, &beside)
+            })
+        };
+        let jolts_nm = [&jolts(&well_beyond_nm, WELL_KNOWN), &jolts(&beyond_nm, KNOWN)];
+        let (of_jolts, mobility_per_kg_m2) = apart(mass_kg_m2, rotor_kg_m2, jolts_nm);
+        let [well_beyond, beyond] = of_jolts;
+        let rest = |y: JointSignals, level: f64| {
+            y.map_joints(|j, y| of_links[j].rest(clock, y, level, highest))
+        };
+        let link = LinkTorque {
+            told_nm: part(&of_links, link_nm, WELL_KNOWN),
+            jolt_nm: rest(well_beyond, WELL_KNOWN),
+        };
+        let mean_of = |y: &JointSignals| y.map_joints(|_, y| mean_period(y, clock.samples()));
+        let bending = LinkTorque {
+            told_nm: part(&of_links, &mean_of(&links), KNOWN),
+            jolt_nm: rest(beyond, KNOWN),
+        };
+        let known =
+            of_loads.iter().map(|of| (0..=highest).map(|h| of.holds(h, KNOWN)).collect()).collect();
+        let load_nm = part(&of_loads, &mean_of(&loads), KNOWN);
+        let delivered = Some(Delivered { load_nm, known, beyond_nm });
         let rotor_nm = part(&harmonics(&rotors), &rotors_along(arm, mean), WELL_KNOWN);
         let load_nm = sum(&link.told_nm, &rotor_nm);
-        let delivered = Some(delivered);
         Self { load_nm, link, bending, delivered, mobility_per_kg_m2 }
     }
 }
@@ -153,28 +154,31 @@ impl Loads {
 const LEAST_SHARE: f64 = 1e-6;
 
 /// Of torques on the gears what the links take, M (M + I_a)⁻¹ τ, and [`Loads::mobility_per_kg_m2`].
-fn apart(
+fn apart<const N: usize>(
     mass_kg_m2: &[JointSignals],
     rotor_kg_m2: &[f64],
-    torque_nm: &JointSignals,
-) -> (JointSignals, JointSignals) {
-    let joints = torque_nm.joints();
+    torques_nm: [&JointSignals; N],
+) -> ([JointSignals; N], JointSignals) {
+    let joints = mass_kg_m2.len();
+    let samples = mass_kg_m2.first().map_or(0, JointSignals::samples);
     let rotor = |j: usize| rotor_kg_m2[j];
-    let mut links_nm = torque_nm.clone();
-    let mut mobility = torque_nm.clone();
-    for k in 0..torque_nm.samples() {
+    let mut links_nm = torques_nm.map(Clone::clone);
+    let mut mobility = JointSignals::zeros(joints, samples);
+    for k in 0..samples {
         let total = DMatrix::from_fn(joints, joints, |i, j| {
             mass_kg_m2[j].joint(i)[k] + if i == j { rotor(j) } else { 0.0 }
         });
-        let tau = DVector::from_fn(joints, |j, _| torque_nm.joint(j)[k]);
+        // An estimate may come to a mass matrix that no arm has.
         let inverse = Cholesky::new(total).map(|total| total.inverse());
+        for (links_nm, torque_nm) in links_nm.iter_mut().zip(torques_nm) {
+            let Some(inverse) = &inverse else { continue };
+            let tau = DVector::from_fn(joints, |j, _| torque_nm.joint(j)[k]);
+            for j in 0..joints {
+                links_nm.joint_mut(j)[k] -= rotor(j) * (inverse.row(j) * &tau)[0];
+            }
+        }
         for j in 0..joints {
-            // An estimate may come to a mass matrix that no arm has.
-            let (acceleration, own) = match &inverse {
-                Some(inverse) => ((inverse.row(j) * &tau)[0], inverse[(j, j)]),
-                None => (0.0, 0.0),
-            };
-            links_nm.joint_mut(j)[k] -= rotor(j) * acceleration;
+            let own = inverse.as_ref().map_or(0.0, |inverse| inverse[(j, j)]);
             // Sherman and Morrison 1950; the share of the inertia that is not the rotor's lies within 0 and 1 in an arm.
             let of_links = (1.0 - rotor(j) * own).clamp(LEAST_SHARE, 1.0 - LEAST_SHARE);
             mobility.joint_mut(j)[k] = 1.0 / (rotor(j) * of_links);
@@ -416,7 +420,7 @@ mod tests {
             |y: JointSignals| y.map_joints(|j, y| vec![y[0] - gravity_nm.joint(j)[0]]);
         let on_gears = less_gravity(load_along(&model, &arm, &motion));
         let on_links = less_gravity(rigid_torque_along(&model, &motion));
-        let (links, mobility) = apart(&mass, &rotors_kg_m2(&arm, &mass), &on_gears);
+        let ([links], mobility) = apart(&mass, &rotors_kg_m2(&arm, &mass), [&on_gears]);
         for j in 0..6 {
             // Torques of some 10 Nm, through inertias whose largest and smallest are 1 : 100.
             assert!((links.joint(j)[0] - on_links.joint(j)[0]).abs() < 1e-11);

@@ -254,36 +254,38 @@ impl Scene {
         if self.periodic { self.fine_link_nm(j) } else { self.link_nm.joint(j) }
     }
 
-    /// The predicted drive torque of joint `j` a time `delay_s` before every sample, Nm. Of dry friction, which reverses
-    /// between two samples, the instant counts; and a drive that is slow to answer it lets the joint do so, so that load and
-    /// friction change together and the torque hardly does. Where the load drowns, reversals tell what the drive delivers.
-    pub fn delayed_torque_nm(&self, j: usize, delay_s: f64) -> Vec<f64> {
+    /// The predicted drive torque of joint `j` a time `delay_s` before every sample less that at the sample, Nm. Of dry
+    /// friction, which reverses between two samples, the instant counts; and a drive that is slow to answer it lets the
+    /// joint do so, so that load and friction change together and the torque hardly does. Where the load drowns, reversals
+    /// tell what the drive delivers.
+    pub fn change_by_delay_nm(&self, j: usize, delay_s: f64) -> Vec<f64> {
+        let less = |late: Vec<f64>, now: &[f64]| -> Vec<f64> {
+            late.iter().zip(now).map(|(late, now)| late - now).collect()
+        };
         let (Some(clock), Some(delivered)) = (&self.clock, &self.delivered) else {
-            return self.delayed(self.torque_nm.joint(j), delay_s);
+            let now = self.torque_nm.joint(j);
+            return less(self.delayed(now, delay_s), now);
         };
-        let known = &delivered.known[j];
-        let only = |y: &[f64], wanted: bool| {
-            clock.filtered(y, |h| {
-                if known.get(h) == Some(&wanted) { Complex64::ONE } else { Complex64::ZERO }
-            })
-        };
-        let at_instants = |fine: &[f64]| -> Vec<f64> {
+        let at_samples = |fine: &[f64], wanted: bool| {
             let (n, late) = (fine.len(), delay_s / self.instant_s());
-            let value = |k: usize| {
+            let change = |k: usize| {
                 let at = (k * FINE) as f64 - late;
                 let (left, u) = (at.floor(), at - at.floor());
                 let left = (left as isize).rem_euclid(n as isize) as usize;
-                (1.0 - u) * fine[left] + u * fine[(left + 1) % n]
+                (1.0 - u) * fine[left] + u * fine[(left + 1) % n] - fine[k * FINE]
             };
-            (0..n / FINE).map(value).collect()
+            let change: Vec<f64> = (0..n / FINE).map(change).collect();
+            clock.filtered(&change, |h| match delivered.known[j].get(h) {
+                Some(known) if *known == wanted => Complex64::ONE,
+                _ => Complex64::ZERO,
+            })
         };
         let (coulomb, viscous) = (self.coulomb_nm[j], self.arm.joints[j].drive.viscous_nm_s_rad);
-        let load = delivered.load_nm.joint(j);
-        let qd = self.motion.qd_rad_s.joint(j);
+        let (load, qd) = (delivered.load_nm.joint(j), self.motion.qd_rad_s.joint(j));
         let smooth: Vec<f64> = load.iter().zip(qd).map(|(load, qd)| load + viscous * qd).collect();
-        let smooth = self.delayed(&smooth, delay_s);
-        let dry = only(&at_instants(&self.instants(j).sign), true);
-        let beyond = only(&at_instants(&delivered.beyond_nm[j]), false);
+        let smooth = less(self.delayed(&smooth, delay_s), &smooth);
+        let dry = at_samples(&self.instants(j).sign, true);
+        let beyond = at_samples(&delivered.beyond_nm[j], false);
         let sum = |((s, d), b): ((&f64, &f64), &f64)| s + coulomb * d + b;
         smooth.iter().zip(&dry).zip(&beyond).map(sum).collect()
     }

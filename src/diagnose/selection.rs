@@ -269,16 +269,13 @@ impl<'s, 'a> Kept<'s, 'a> {
         // What all joints share is told from what single ones have by the majority: beside one of the arm as a whole, most
         // joints with one of their own would say in many numbers that the others have another.
         let outvoted = |entry: &Entry| {
-            let alike = |(c, cause): &(usize, &Contender)| {
-                Some(*c) != open && cause.entry.family == entry.family
-            };
-            let alike = self.causes.iter().enumerate().filter(alike);
-            let (single, common): (Vec<_>, Vec<_>) =
-                alike.partition(|(_, cause)| cause.entry.site.is_some());
-            match entry.site {
-                Some(_) => !common.is_empty() && !single.is_empty(),
-                None => single.len() > 1,
+            let (mut single, mut common) = (0, 0);
+            for (c, cause) in self.causes.iter().enumerate() {
+                if Some(c) != open && cause.entry.family == entry.family {
+                    *if cause.entry.site.is_some() { &mut single } else { &mut common } += 1;
+                }
             }
+            if entry.site.is_some() { common > 0 && single > 0 } else { single > 1 }
         };
         let mut best: Vec<Contender> = Vec::new();
         let scores: Vec<Option<Score>> = study

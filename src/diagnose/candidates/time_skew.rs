@@ -37,8 +37,8 @@ impl Candidate for TimeSkew {
 
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let change = |j: usize| {
-            let [late, now] = [shape.value, 0.0].map(|d| scene.delayed_torque_nm(j, d));
-            late.iter().zip(&now).map(|(late, now)| (late - now) / shape.value).collect()
+            let change = scene.change_by_delay_nm(j, shape.value);
+            change.into_iter().map(|change| change / shape.value).collect()
         };
         let joints = match site {
             Some(j) => j..j + 1,
