@@ -156,6 +156,11 @@ fn friction_near_standstill() {
 }
 
 #[test]
+fn friction_that_turns_round_elsewhere() {
+    hide_and_find(&["reversal_width"]);
+}
+
+#[test]
 fn friction_before_it_slides() {
     hide_and_find(&["presliding"]);
 }

@@ -80,10 +80,11 @@ fn is_named(d: &Diagnosis, kind: &str, joint: Option<usize>) -> bool {
 
 #[test]
 fn one_hidden_effect_of_each_family_is_named_at_its_joint() {
-    let cases: [(u64, &str, &[usize], &str); 11] = [
+    let cases: [(u64, &str, &[usize], &str); 12] = [
         (100, "stribeck", &[2, 3, 4, 5], "extra_nm = 1.2\nvs_rad_s = 0.1"),
         (102, "load_friction", &[2, 3], "mu = 0.05"),
         (103, "presliding", &[4, 5, 6], "stiffness_per_rad = 300.0"),
+        (112, "reversal_width", &[3, 4, 5, 6], "width_rad_s = 0.05"),
         (104, "position_friction", &[1, 2, 3, 5], "amplitude_nm = 1.0\nphase_rad = 0.4"),
         (105, "ripple", &[3, 4, 5], "amplitude_nm = 0.4\norder_per_turn = 202.0\nphase_rad = 0.3"),
         (106, "elasticity", &[2, 3], "stiffness_nm_rad = 8000.0"),
@@ -159,6 +160,27 @@ fn how_drives_answer_friction_is_no_cause() {
     for (seed, feedforward) in [(20, 0.0), (21, 0.0), (22, 0.5)] {
         let d = diagnose(seed, &format!("[plant]\nfriction_feedforward = {feedforward:?}"));
         assert_eq!(d.verdict, Verdict::NothingFound, "{:?}", d.sentences);
+    }
+}
+
+/// Friction that is sharper than its samples show, behind drives that expect another one and drives that know none: one
+/// width, which is all that is named.
+#[test]
+fn sharp_friction_is_one_cause() {
+    for (seed, feedforward) in [(50, 0.9), (51, 0.0)] {
+        let d = diagnose(
+            seed,
+            &format!(
+                "[plant]\nfriction_feedforward = {feedforward:?}\n\
+                 [[effect]]\nkind = \"reversal_width\"\nwidth_rad_s = 0.003\n"
+            ),
+        );
+        let named: Vec<_> = d.causes.iter().map(|c| (c.kind.name(), c.joint)).collect();
+        assert_eq!(named, [("reversal_width", None)], "{:?}", d.sentences);
+        let width = &d.causes[0].parameters["width_rad_s"];
+        // Twice the half width: 3.9 σ, which one log in 10⁴ misses by chance.
+        assert!((width.value - 0.003).abs() < width.ci95[1] - width.ci95[0], "{width:?}");
+        assert!(width.ci95[1] < 0.01, "{width:?}");
     }
 }
 

@@ -54,7 +54,7 @@ fn run(tables: &[&str], reference: &dyn Reference) -> Recording {
 }
 
 /// Every kind, of a size that a log shows, and, where there is such a thing, of no size at all.
-const KINDS: [(&str, Option<&str>); 27] = [
+const KINDS: [(&str, Option<&str>); 28] = [
     (
         "kind='stribeck'\njoint=4\nextra_nm=0.5\nvs_rad_s=0.1",
         Some("kind='stribeck'\njoint=4\nextra_nm=0\nvs_rad_s=0.1"),
@@ -69,6 +69,7 @@ const KINDS: [(&str, Option<&str>); 27] = [
     ),
     ("kind='load_friction'\njoint=2\nmu=0.06", Some("kind='load_friction'\njoint=2\nmu=0")),
     ("kind='presliding'\njoint=5\nstiffness_per_rad=1000", None),
+    ("kind='reversal_width'\nwidth_rad_s=0.005", Some("kind='reversal_width'\nwidth_rad_s=0.02")),
     (
         "kind='position_friction'\njoint=3\namplitude_nm=0.7\nphase_rad=1",
         Some("kind='position_friction'\njoint=3\namplitude_nm=0\nphase_rad=1"),

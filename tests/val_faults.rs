@@ -240,6 +240,19 @@ fn presliding_is_a_spring_first_and_coulomb_friction_later() {
     close(added(&keys, 0, 0.5), 0.0, 1e-4, "against Coulomb friction when sliding");
 }
 
+/// At constant speed v friction is rc tanh(v/w), where the arm's file has rc tanh(v/ε).
+#[test]
+fn friction_turns_round_within_its_width() {
+    let (width, speed) = (0.06, 0.03);
+    let arm = ur5();
+    let law = |width: f64| arm.joints[0].drive.coulomb_nm * (speed / width).tanh();
+    let expected = law(width) - law(arm.friction_epsilon_rad_s);
+    for site in ["", "joint=1;"] {
+        let keys = format!("kind='reversal_width';{site}width_rad_s={width}");
+        close(added(&keys, 0, speed), expected, 1e-3 * expected.abs(), "friction");
+    }
+}
+
 /// Over a turn dry friction varies by ±P and is rc on average.
 #[test]
 fn position_dependent_friction_averages_out_over_a_turn() {

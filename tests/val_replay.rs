@@ -175,6 +175,8 @@ fn friction(arm: &Arm) -> Vec<Case> {
         case(Kind::NonlinearViscous, 3, (1, 2.0), &[3.0], SAME),
         case(Kind::AsymmetricFriction, 3, NO_SHAPE, &[1.5, 1.0], SAME),
         case(Kind::LoadFriction, 2, NO_SHAPE, &[0.08], SAME),
+        // A drive that delivers what the file says jolts the other joints: the diagnosis takes that for its answer.
+        case(Kind::ReversalWidth, 5, (0, 0.2), &[0.2], SAME),
         case(Kind::PositionFriction, 1, NO_SHAPE, &[1.5, -2.0], SAME),
         // The bristles carry the friction that the arm has.
         case(Kind::Presliding, 5, (0, 100.0), &[arm.joints[4].drive.coulomb_nm], SAME),

@@ -120,7 +120,10 @@ class Physics:
 
     def friction(self, q, v):
         arm, e, j = self.arm, self.effect, self.site
-        sign = np.tanh(v / arm.epsilon)
+        width = np.full(len(v), arm.epsilon)
+        if self.kind == "reversal_width":
+            width[j if j >= 0 else slice(None)] = e["width_rad_s"]
+        sign = np.tanh(v / width)
         out = arm.coulomb * sign + arm.viscous * v
         if self.kind == "presliding":
             # Dahl: dz/dq = k (1 - z sgn) over the way since the step began.

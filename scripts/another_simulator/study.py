@@ -9,6 +9,7 @@ Logs go to --work and are kept. Two cases run at a time.
 
 import argparse
 import json
+import math
 import subprocess
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
@@ -24,6 +25,9 @@ EFFECTS = [
     {"kind": "load_friction", "joint": 5, "mu": 0.1},
     {"kind": "presliding", "joint": 4, "stiffness_per_rad": 1000.0},
     {"kind": "presliding", "joint": 2, "stiffness_per_rad": 2000.0},
+    {"kind": "reversal_width", "width_rad_s": 0.003},
+    {"kind": "reversal_width", "width_rad_s": 0.04},
+    {"kind": "reversal_width", "joint": 4, "width_rad_s": 0.005},
     {"kind": "asymmetric_friction", "joint": 3, "viscous_nm_s_rad": 0.15},
     {"kind": "nonlinear_viscous", "joint": 4, "amplitude_nm": 0.2, "exponent": 0.4},
     {"kind": "nonlinear_viscous", "joint": 2, "amplitude_nm": 0.5, "exponent": 2.0},
@@ -63,7 +67,10 @@ def diagnosed(job):
     """The causes that `armid diagnose` names in one log."""
     work, armid, number, effect, setting = job
     log, answer = work / f"{number}.csv", work / f"{number}.json"
-    write(log, simulate(Run(effect=effect, **setting)))
+    # Sharp friction asks for short steps.
+    step_s = min(1e-3, 0.1 * effect.get("width_rad_s", 1.0))
+    step_s = 1e-3 / math.ceil(1e-3 / step_s)
+    write(log, simulate(Run(effect=effect, step_s=step_s, **setting)))
     subprocess.run(
         [armid, "diagnose", log, "--robot", "ur5", "--json", answer], check=True, capture_output=True
     )

@@ -76,7 +76,8 @@ pub fn base(study: &Study, set: &BaseSet, extension: &Extension) -> Vec<BasePara
 /// quantile, which is where the likelihood falls below that of the best form by q². The nonlinear parameter of a
 /// motion that repeats is treated the same way, value by value: the interval is that of the profile of the likelihood
 /// (Venzon and Moolgavkar 1988), which need not be symmetric. It also reaches to what the shape says of the same
-/// parameter, see [`Candidate::in_shape`], and holds what the law itself may be wrong by ([`Candidate::form_error`]).
+/// parameter, see [`Candidate::in_shape`], holds what the law itself may be wrong by ([`Candidate::form_error`]), and nothing
+/// that makes no sense ([`Candidate::least`]).
 pub fn physical(
     study: &Study,
     kept: &Kept,
@@ -116,8 +117,10 @@ pub fn physical(
         own.reach(again.value);
     }
     let form_error = family.form_error(&study.scene, effect.shape);
+    let nothing = family.without_effect(&study.scene);
     for own in out.values_mut() {
-        own.widen(quantile * form_error * own.value.abs());
+        own.widen(quantile * form_error * (own.value - nothing).abs());
+        own.keep_above(family.least());
     }
     out
 }

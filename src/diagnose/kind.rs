@@ -16,6 +16,8 @@ pub enum Kind {
     LoadFriction,
     /// Friction that builds up over a small angle behind a reversal.
     Presliding,
+    /// Friction that turns round over another range of speeds than the model has it.
+    ReversalWidth,
     /// Friction that depends on the angle.
     PositionFriction,
     /// Friction that changes while the arm warms up.
@@ -71,6 +73,7 @@ impl Kind {
             Self::AsymmetricFriction => "asymmetric_friction",
             Self::LoadFriction => "load_friction",
             Self::Presliding => "presliding",
+            Self::ReversalWidth => "reversal_width",
             Self::PositionFriction => "position_friction",
             Self::ThermalDrift => "thermal_drift",
             Self::Ripple => "ripple",
@@ -107,6 +110,7 @@ impl Kind {
                 | Self::AsymmetricFriction
                 | Self::LoadFriction
                 | Self::Presliding
+                | Self::ReversalWidth
                 | Self::PositionFriction
                 | Self::ThermalDrift
                 | Self::FrictionChange

@@ -7,7 +7,7 @@
 //! 1. The log is processed as for identification, and its equations are whitened ([`Whitening`]): with
 //!    periods by the scatter between them (less what drifting friction does there), without by the residual itself.
 //!    How the drives answer dry friction belongs to the null model ([`Scene::answers`]), and friction is
-//!    looked at between the samples of a log ([`Scene::as_logged`]).
+//!    looked at between the samples of a log ([`Scene::as_logged`], [`Scene::turning_rad_s`]).
 //! 2. Every family's columns lose what the null model spans; the squared length of the residual along
 //!    them, T = ‖P r‖² ~ χ²_k(λ), is the score test of adding the family.
 //! 3. Nonlinear parameters are refined continuously, the best family is added if chance does not explain
@@ -42,6 +42,7 @@ mod payload;
 mod record;
 mod repeated;
 pub mod replay;
+mod reversals;
 mod scene;
 mod selection;
 mod stalls;

@@ -7,6 +7,7 @@ use realfft::num_complex::Complex64;
 use super::load::{
     Delivered, LinkTorque, Loads, Periods, mass_along, rigid_torque_along, rotors_kg_m2,
 };
+use super::reversals::{Bends, Turning};
 use crate::base::BaseSet;
 use crate::dynamics::{Model, Motion, Parameter, ParameterLayout};
 use crate::identify::{Prepared, drive_answers};
@@ -67,6 +68,8 @@ pub struct Scene {
     fine_bending_nm: Vec<OnceLock<[Vec<f64>; 2]>>,
     /// See [`Self::instants`].
     instants: Vec<OnceLock<Instants>>,
+    /// What the series of samples lacks of bends between them.
+    bends: OnceLock<Bends>,
     /// Between the samples of a motion that repeats.
     clock: Option<FineClock>,
     /// Up to which harmonic, below n/2, the accelerations of periods are known.
@@ -158,6 +161,7 @@ impl Scene {
             fine_jolt_nm: vec![OnceLock::new(); joints],
             fine_bending_nm: vec![OnceLock::new(); joints],
             instants: (0..joints).map(|_| OnceLock::new()).collect(),
+            bends: OnceLock::new(),
             clock,
             highest,
         }
@@ -238,8 +242,8 @@ impl Scene {
                     sign: self.sign.joint(j).to_vec(),
                 };
             }
-            let qd_rad_s = self.fine(qd);
             let epsilon = self.arm.friction_epsilon_rad_s;
+            let qd_rad_s = self.turning_rad_s(j, None, epsilon, |v| (v / epsilon).tanh());
             Instants {
                 step_s: self.instant_s(),
                 q_rad: self.fine(q),
@@ -247,6 +251,40 @@ impl Scene {
                 qd_rad_s,
             }
         })
+    }
+
+    /// Velocity of joint `j` at its instants, rad/s, while dry friction turns round by `law` within a few `width_rad_s` and
+    /// the drive delivers a share of what the model expects ([`Bends`]): `fed`, or what its answer to reversals tells.
+    pub fn turning_rad_s(
+        &self,
+        j: usize,
+        fed: Option<f64>,
+        width_rad_s: f64,
+        law: impl Fn(f64) -> f64,
+    ) -> Vec<f64> {
+        let series_rad_s = self.fine(self.motion.qd_rad_s.joint(j));
+        let (Some(clock), Some(delivered)) = (&self.clock, &self.delivered) else {
+            return series_rad_s;
+        };
+        // An estimate may come to no friction.
+        if self.coulomb_nm[j] <= 0.0 {
+            return series_rad_s;
+        }
+        let rotor = self.rotor_kg_m2[j];
+        let kick = |mobility: &f64| {
+            let acceleration_per_nm = (1.0 - 1.0 / (rotor * mobility)) / rotor;
+            let kick = acceleration_per_nm * self.coulomb_nm[j] * self.instant_s();
+            std::iter::repeat_n(kick, FINE)
+        };
+        let kick_rad_s: Vec<f64> = self.mobility_per_kg_m2.joint(j).iter().flat_map(kick).collect();
+        let epsilon = self.arm.friction_epsilon_rad_s;
+        let delivered: Vec<f64> = match fed {
+            Some(fed) => series_rad_s.iter().map(|v| fed * (v / epsilon).tanh()).collect(),
+            None => delivered.beyond_nm[j].iter().map(|nm| nm / self.coulomb_nm[j]).collect(),
+        };
+        let joint =
+            Turning { series_rad_s: &series_rad_s, kick_rad_s: &kick_rad_s, delivered: &delivered };
+        self.bends.get_or_init(|| Bends::new(clock)).between_samples(&joint, width_rad_s, law)
     }
 
     /// [`Self::link_nm`] of joint `j` at its instants.

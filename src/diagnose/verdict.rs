@@ -57,6 +57,12 @@ impl Estimate {
         let [low, high] = self.ci95.map(|end| (end - self.value).hypot(half));
         self.ci95 = [self.value - low, self.value + high];
     }
+
+    /// What lies below `least` is taken for `least`.
+    pub(super) fn keep_above(&mut self, least: f64) {
+        self.value = self.value.max(least);
+        self.ci95 = self.ci95.map(|end| end.max(least));
+    }
 }
 
 /// Ends of an interval between which nothing is known.
@@ -408,6 +414,9 @@ fn unit_suffix(unit: &str) -> String {
 fn two_digits(value: f64) -> String {
     if value.abs() >= 1e6 {
         return format!("{value:.1e}");
+    }
+    if value == 0.0 {
+        return "0".to_owned();
     }
     let decimals = (1.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 9.0) as usize;
     format!("{value:.decimals$}")

@@ -219,9 +219,11 @@ fn axis(finding: &Finding, kind: Kind, j: usize) -> (&'static str, &'static str,
     let scene = &finding.scene;
     let pick = |y: &[f64]| finding.samples.iter().map(|&k| y[k]).collect::<Vec<f64>>();
     match kind {
-        Kind::Stribeck | Kind::NonlinearViscous | Kind::AsymmetricFriction | Kind::Presliding => {
-            ("speed", "rad/s", pick(scene.motion.qd_rad_s.joint(j)))
-        }
+        Kind::Stribeck
+        | Kind::NonlinearViscous
+        | Kind::AsymmetricFriction
+        | Kind::Presliding
+        | Kind::ReversalWidth => ("speed", "rad/s", pick(scene.motion.qd_rad_s.joint(j))),
         Kind::LoadFriction => {
             let signed = scene.link_nm.joint(j).iter().zip(scene.sign.joint(j));
             (

@@ -14,6 +14,7 @@ mod load_friction;
 mod nonlinear_viscous;
 mod position_friction;
 mod presliding;
+mod reversal_width;
 pub(super) mod ripple;
 mod saturation;
 mod spring;
@@ -134,10 +135,20 @@ pub trait Candidate: Sync {
         None
     }
 
-    /// Standard error of its physical parameters beside that of the noise, over their value: what the law takes for
-    /// granted and the log does not tell.
+    /// What its physical parameters are where nothing is wrong.
+    fn without_effect(&self, _scene: &Scene) -> f64 {
+        0.0
+    }
+
+    /// Standard error of its physical parameters beside that of the noise, over what they are more or less than
+    /// [`Self::without_effect`]: what the law takes for granted and the log does not tell.
     fn form_error(&self, _scene: &Scene, _shape: Shape) -> f64 {
         0.0
+    }
+
+    /// What its physical parameters cannot be less than, though noise may say so.
+    fn least(&self) -> f64 {
+        f64::NEG_INFINITY
     }
 
     /// The shape with which the law, fitted with `shape` and the coefficients `b` to one log, predicts another.
@@ -176,6 +187,7 @@ pub fn all() -> Vec<Box<dyn Candidate>> {
         Box::new(nonlinear_viscous::NonlinearViscous),
         Box::new(load_friction::LoadFriction),
         Box::new(presliding::Presliding),
+        Box::new(reversal_width::ReversalWidth),
         Box::new(position_friction::PositionFriction),
         Box::new(asymmetric_friction::AsymmetricFriction),
         Box::new(current_offset::CurrentOffset),

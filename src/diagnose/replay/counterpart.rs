@@ -31,6 +31,10 @@ const INCOMPLETE: &str = "the log does not tell all of its numbers";
 /// moves in one sample where its direction is in doubt, so that no log tells it from a stiffer one.
 const STIFFEST_PER_RAD: f64 = 1e4;
 
+/// Sharpest reversal of friction that is simulated, rad/s: a joint that turns at 1 rad/s² is through it within a
+/// millisecond.
+const SHARPEST_RAD_S: f64 = 1e-3;
+
 /// A cause as the diagnosis has it.
 #[derive(Debug, Clone, Copy)]
 pub struct Found<'a> {
@@ -100,6 +104,10 @@ impl Found<'_> {
             Kind::Presliding => in_the_model(Effect::Presliding(faults::Presliding {
                 joint: self.joint?,
                 stiffness_per_rad: value("stiffness_per_rad")?.min(STIFFEST_PER_RAD),
+            })),
+            Kind::ReversalWidth => in_the_model(Effect::ReversalWidth(faults::ReversalWidth {
+                joint: self.joint,
+                width_rad_s: value("width_rad_s")?.max(SHARPEST_RAD_S),
             })),
             Kind::PositionFriction => {
                 in_the_model(Effect::PositionFriction(faults::PositionFriction {

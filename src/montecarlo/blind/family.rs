@@ -12,8 +12,8 @@ use crate::plant::faults::{
     AsymmetricFriction, Backlash, BaseTilt, ClockFault, Contact, CurrentOffset, DroppedSamples,
     Effect, Elasticity, EncoderOffset, EncoderSide, FrictionChange, Gravity, LinkLength,
     LoadFriction, NonlinearViscous, Outliers, Payload, PositionFriction, Presliding, Quantisation,
-    ReadingChannel, Ripple, Saturation, Spring, Stribeck, ThermalDrift, TimeSkew, TorqueGain,
-    VelocityLag,
+    ReadingChannel, ReversalWidth, Ripple, Saturation, Spring, Stribeck, ThermalDrift, TimeSkew,
+    TorqueGain, VelocityLag,
 };
 use crate::robot::{Arm, JointSignals};
 
@@ -46,7 +46,7 @@ const EACH_AND_ALL: &[Option<usize>] =
 const ARM: &[Option<usize>] = &[None];
 
 /// Every family, with equal chances to be drawn.
-pub const FAMILIES: [Family; 28] = [
+pub const FAMILIES: [Family; 29] = [
     residual(Kind::Stribeck, EACH),
     residual(Kind::NonlinearViscous, EACH),
     residual(Kind::AsymmetricFriction, EACH),
@@ -75,6 +75,7 @@ pub const FAMILIES: [Family; 28] = [
     of_the_record(Kind::DroppedSamples, ARM),
     of_the_record(Kind::Quantisation, EACH),
     of_the_record(Kind::Outliers, EACH),
+    residual(Kind::ReversalWidth, EACH_AND_ALL),
 ];
 
 const fn residual(kind: Kind, sites: &'static [Option<usize>]) -> Family {
@@ -215,6 +216,15 @@ impl Family {
                 // Bristles of gears give way by 0.1 mrad and more.
                 Recipe::growing(1e-3, [1.0 / 10_000.0, 1.0 / 30.0], 1.0, move |s| {
                     Effect::Presliding(Presliding { joint, stiffness_per_rad: 1.0 / s })
+                })
+            }
+            Kind::ReversalWidth => {
+                let epsilon = around.arm.friction_epsilon_rad_s;
+                // Twenty times as sharp or ten times as gradual.
+                let (sign, most) = if chance(rng, 0.5) { (-1.0, 0.95) } else { (1.0, 9.0) };
+                Recipe::growing(0.5, [0.01, most], 1.0, move |s| {
+                    let width_rad_s = epsilon * (1.0 + sign * s);
+                    Effect::ReversalWidth(ReversalWidth { joint: site, width_rad_s })
                 })
             }
             Kind::PositionFriction => {

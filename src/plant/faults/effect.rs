@@ -7,7 +7,7 @@ use super::assembly::Assembly;
 use super::drive::{CurrentOffset, Saturation, TorqueGain};
 use super::friction::{
     AsymmetricFriction, FrictionChange, LoadFriction, NonlinearViscous, PositionFriction,
-    Presliding, Stribeck, ThermalDrift,
+    Presliding, ReversalWidth, Stribeck, ThermalDrift,
 };
 use super::gear::{Backlash, Elasticity, Ripple};
 use super::readings::{DroppedSamples, Outliers, Quantisation};
@@ -103,6 +103,8 @@ effects! {
     LoadFriction = "load_friction",
     /// Friction that builds up over a small angle.
     Presliding = "presliding",
+    /// Friction that turns round over another range of speeds.
+    ReversalWidth = "reversal_width",
     /// Friction that varies with the angle.
     PositionFriction = "position_friction",
     /// Friction that changes as the joint warms up.

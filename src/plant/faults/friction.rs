@@ -308,6 +308,34 @@ impl Fault for Presliding {
     }
 }
 
+/// Dry friction that turns round over another range of speeds than the robot's file says: tanh(q̇/w) in place of
+/// tanh(q̇/ε). The controller feeds forward what the file says.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReversalWidth {
+    /// Joint, from 1; left out: all.
+    pub joint: Option<usize>,
+    /// w, rad/s.
+    pub width_rad_s: f64,
+}
+
+impl Fault for ReversalWidth {
+    fn joint(&self) -> Option<usize> {
+        self.joint
+    }
+
+    fn check(&self) -> Result<(), Complaint> {
+        positive("width_rad_s", self.width_rad_s)
+    }
+
+    fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
+        for j in assembly.indices(self.joint) {
+            assembly.joints[j].friction.epsilon_rad_s = self.width_rad_s;
+        }
+        Ok(())
+    }
+}
+
 /// Dry friction that varies over a turn: c = rc + P cos(q + ψ), from a gear or seal out of round.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

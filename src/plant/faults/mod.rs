@@ -22,6 +22,7 @@
 //! | [`asymmetric_friction`](AsymmetricFriction) | friction | `coulomb_nm`, `viscous_nm_s_rad` |
 //! | [`load_friction`](LoadFriction) | friction | `mu` |
 //! | [`presliding`](Presliding) | friction, state | `stiffness_per_rad` |
+//! | [`reversal_width`](ReversalWidth) | friction; no `joint`: all | `width_rad_s` |
 //! | [`position_friction`](PositionFriction) | friction | `amplitude_nm`, `phase_rad` |
 //! | [`thermal_drift`](ThermalDrift) | friction, state | `fraction`, `time_constant_s` |
 //! | [`friction_change`](FrictionChange) | friction | `coulomb_nm`, `viscous_nm_s_rad` |
@@ -63,7 +64,7 @@ pub use drivetrain::HiddenDrivetrain;
 pub use effect::Effect;
 pub use friction::{
     AsymmetricFriction, FrictionChange, LoadFriction, NonlinearViscous, PositionFriction,
-    Presliding, Stribeck, ThermalDrift,
+    Presliding, ReversalWidth, Stribeck, ThermalDrift,
 };
 pub use gear::{Backlash, Elasticity, EncoderSide, Ripple};
 pub use plant::FaultyPlant;

@@ -1,0 +1,100 @@
+//! Friction that turns round over another range of speeds than the model has it, of one joint or of all:
+//! τ = F (tanh(q̇/w) − tanh(q̇/ε)), F the joint's dry friction and ε the width of the robot's file.
+//!
+//! Friction that is all there at once has w = 0. What samples show of a reversal is the area under the law, which is
+//! proportional to w − ε: this is the coefficient, and the shape as well.
+//!
+//! Where friction turns round within a sample the joint does not move as the samples say: what the drive does not
+//! deliver at once bends its velocity ([`Scene::turning_rad_s`]). What its answer to reversals would tell is told by the
+//! width of the file; drives feed dry friction forward by that width, or not at all: these are the variants.
+
+use super::*;
+
+/// See the module.
+pub struct ReversalWidth;
+
+/// Two widths this close, as a share of ε, are one: their difference over their distance is the law's slope there.
+const APART: f64 = 1e-3;
+/// The sharpest law whose turn is followed, as a share of ε.
+const SHARPEST: f64 = 0.05;
+/// Changes that are tried, as shares of ε.
+const CHANGES: [f64; 11] = [-0.9, -0.8, -0.6, -0.35, -0.15, 0.15, 0.4, 0.8, 1.6, 3.2, 6.4];
+/// The coefficient over the shape: all dry friction of a joint turns round, and an estimate is off by less than this.
+const WHOLE: std::ops::RangeInclusive<f64> = 0.4..=2.5;
+
+impl Candidate for ReversalWidth {
+    fn kind(&self) -> Kind {
+        Kind::ReversalWidth
+    }
+
+    fn sites(&self, joints: usize) -> Vec<Option<usize>> {
+        std::iter::once(None).chain((0..joints).map(Some)).collect()
+    }
+
+    fn shapes(&self, scene: &Scene, _: Option<usize>) -> Vec<Shape> {
+        // The low-pass of a single run is slower than a reversal.
+        if !scene.periodic {
+            return Vec::new();
+        }
+        let epsilon = scene.arm.friction_epsilon_rad_s;
+        (0..2)
+            .flat_map(|variant| CHANGES.map(|share| Shape { variant, value: share * epsilon }))
+            .filter(|shape| shape.variant == 0 || shape.value < 0.0)
+            .collect()
+    }
+
+    fn search(&self) -> Search {
+        Search::Straight
+    }
+
+    fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
+        let epsilon = scene.arm.friction_epsilon_rad_s;
+        let apart = APART * epsilon;
+        let change = if shape.value.abs() < apart { apart } else { shape.value };
+        let width = (epsilon + change).max(SHARPEST * epsilon);
+        let change = width - epsilon;
+        let fed = shape.variant as f64;
+        let per_width = |j: usize| {
+            let law = |qd: f64| (qd / width).tanh();
+            let slope = |(qd, sign): (f64, &f64)| (law(qd) - sign) / change;
+            let qd = scene.turning_rad_s(j, Some(fed), width, law);
+            let unit = qd.into_iter().zip(&scene.instants(j).sign).map(slope).collect();
+            scene.as_logged(unit).into_iter().map(|u| scene.coulomb_nm[j] * u).collect()
+        };
+        let joints = match site {
+            Some(j) => j..j + 1,
+            None => 0..scene.joints(),
+        };
+        vec![Column { parts: joints.map(|j| (j, per_width(j))).collect() }]
+    }
+
+    fn quantities(&self, scene: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
+        vec![quantity("width_rad_s", scene.arm.friction_epsilon_rad_s + b[0], "rad/s")]
+    }
+
+    fn without_effect(&self, scene: &Scene) -> f64 {
+        scene.arm.friction_epsilon_rad_s
+    }
+
+    fn least(&self) -> f64 {
+        0.0
+    }
+
+    /// What a drive answers while friction turns round within a sample is not known. In logs of another simulator, whose
+    /// drives feed nothing forward, a width of 0.002 rad/s left 0.14 of its strength to late torques of the wrist.
+    fn form_error(&self, _: &Scene, shape: Shape) -> f64 {
+        if shape.value < 0.0 { 0.15 } else { 0.0 }
+    }
+
+    fn separating_experiment(&self) -> &'static str {
+        "slow triangles of speed through zero, ±0.05 rad/s within 10 s: the torque against the speed shows the width"
+    }
+
+    fn is_possible(&self, shape: Shape, b: &[f64]) -> bool {
+        WHOLE.contains(&(b[0] / shape.value))
+    }
+
+    fn in_words(&self) -> &'static str {
+        "friction that turns round over another range of speeds"
+    }
+}

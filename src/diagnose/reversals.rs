@@ -1,0 +1,203 @@
+//! How a joint moves between the samples of a log while its friction turns round.
+//!
+//! The samples of a velocity, joined by their Fourier series, say how the joint moves as long as nothing is over within a
+//! sample. Friction that turns round faster is: what the drive does not deliver at once bends the velocity, by
+//! −a F Δ(s(q̇) − β s_ε(q̇)), with a the joint's acceleration per torque, F its dry friction, s the law by which that turns
+//! round, and β s_ε what the drive gives it. Of a bend at t′ a series of samples lacks
+//!
+//! B(t, t′) = (t − t′)₊ − Σₙ (nT − t′)₊ sinc(t/T − n),
+//!
+//! T the time between samples, and the velocity is what solves q̇ = series − Σ B a F Δ(s − β s_ε).
+
+use super::scene::FINE;
+use crate::signal::FineClock;
+
+/// What the series of a log's samples lacks of a velocity that bends between them.
+#[derive(Debug)]
+pub struct Bends {
+    /// Of a slope that changes by one per tick, by the tick within a sample at which it does, from `REACH` ticks before to
+    /// `REACH` ticks behind it.
+    lacking: Vec<Vec<f64>>,
+    /// The largest of them.
+    most: f64,
+}
+
+/// Ticks over which a bend is followed: four samples. Further on a series lacks less than a hundredth of what it lacks at most.
+const REACH: usize = 4 * FINE;
+/// Widths of a law behind which friction has turned round but for 7e-4 of it.
+const WIDTHS: f64 = 4.0;
+/// Steps towards the solution, in units of what it takes to get there.
+const STEPS: f64 = 5.0;
+
+/// One joint whose friction turns round.
+pub struct Turning<'a> {
+    /// Velocity by the series of its samples, at every tick of one period, rad/s.
+    pub series_rad_s: &'a [f64],
+    /// Change of the velocity within a tick per dry friction that nothing balances, a F dt, rad/s.
+    pub kick_rad_s: &'a [f64],
+    /// Share β s_ε of dry friction that the drive delivers.
+    pub delivered: &'a [f64],
+}
+
+impl Bends {
+    /// For motions on `clock`.
+    pub fn new(clock: &FineClock) -> Self {
+        let (ticks, n) = (clock.ticks(), clock.ticks() * clock.samples());
+        let lacking = |phase: usize| -> Vec<f64> {
+            let bend = n / 2 / ticks * ticks + phase;
+            // A parabola over the period whose slope goes from −½ to ½ where it closes.
+            let whole: Vec<f64> = (0..n)
+                .map(|k| {
+                    let x = ((k + n - bend) % n) as f64;
+                    0.5 * x * (1.0 - x / n as f64)
+                })
+                .collect();
+            let samples: Vec<f64> = whole.iter().step_by(ticks).copied().collect();
+            let series = clock.refined(&samples);
+            (bend - REACH..=bend + REACH).map(|k| whole[k % n] - series[k % n]).collect()
+        };
+        let lacking: Vec<Vec<f64>> = (0..ticks).map(lacking).collect();
+        let most = lacking.iter().flatten().fold(0.0f64, |most, x| most.max(x.abs()));
+        Self { lacking, most }
+    }
+
+    /// Velocity at every tick where friction turns round by `law`, from −1 to 1 over a few `width_rad_s`.
+    pub fn between_samples(
+        &self,
+        joint: &Turning,
+        width_rad_s: f64,
+        law: impl Fn(f64) -> f64,
+    ) -> Vec<f64> {
+        let series = joint.series_rad_s;
+        let n = series.len();
+        let kick = joint.kick_rad_s.iter().fold(0.0f64, |most, k| most.max(k.abs()));
+        let near = WIDTHS * width_rad_s + 2.0 * kick * self.most;
+        let is_near = |k: usize| series[k % n].abs() < near;
+        let mut out = series.to_vec();
+        let Some(start) = (0..n).find(|k| !is_near(*k)) else { return out };
+        let mut k = start;
+        while k < start + n {
+            let end = (k..start + n).find(|k| !is_near(*k)).unwrap_or(start + n);
+            if end > k {
+                self.solve(joint, k..end, width_rad_s, &law, &mut out);
+            }
+            k = end + 1;
+        }
+        out
+    }
+
+    /// One turn, over `run` (ticks modulo the period).
+    fn solve(
+        &self,
+        joint: &Turning,
+        run: std::ops::Range<usize>,
+        width_rad_s: f64,
+        law: &impl Fn(f64) -> f64,
+        out: &mut [f64],
+    ) {
+        let Turning { series_rad_s: series, kick_rad_s: kick, delivered } = joint;
+        let n = series.len();
+        let unbalanced = |k: usize, qd: f64| law(qd) - delivered[k % n];
+        let mut qd: Vec<f64> = run.clone().map(|k| series[k % n]).collect();
+        // As steep as the law may be, the step still leads towards the solution.
+        let steepness = 2.0 * kick[run.start % n].abs() * self.most / width_rad_s;
+        let step = 1.0 / (1.0 + steepness);
+        let mut force = vec![0.0; qd.len() + 2];
+        let mut moved = vec![0.0; qd.len()];
+        for _ in 0..(STEPS / step).ceil() as usize {
+            force[0] = unbalanced(run.start + n - 1, series[(run.start + n - 1) % n]);
+            force[qd.len() + 1] = unbalanced(run.end, series[run.end % n]);
+            for (i, (k, qd)) in run.clone().zip(&qd).enumerate() {
+                force[i + 1] = unbalanced(k, *qd);
+            }
+            moved.iter_mut().zip(run.clone()).for_each(|(moved, k)| *moved = series[k % n]);
+            for (i, k) in run.clone().enumerate() {
+                let bend = -0.5 * kick[k % n] * (force[i + 2] - force[i]);
+                let lacking = &self.lacking[k % self.lacking.len()];
+                let first = i.saturating_sub(REACH);
+                let moved = &mut moved[first..qd.len().min(i + REACH + 1)];
+                let lacking = &lacking[first + REACH - i..];
+                moved.iter_mut().zip(lacking).for_each(|(moved, l)| *moved += bend * l);
+            }
+            qd.iter_mut().zip(&moved).for_each(|(qd, moved)| *qd += step * (moved - *qd));
+        }
+        run.zip(qd).for_each(|(k, qd)| out[k % n] = qd);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SAMPLES: usize = 250;
+    const SAMPLE_S: f64 = 0.008;
+    const WIDTH_RAD_S: f64 = 0.004;
+    /// Dry friction over inertia, rad/s².
+    const FRICTION: f64 = 3.0;
+
+    fn law(qd_rad_s: f64) -> f64 {
+        (qd_rad_s / WIDTH_RAD_S).tanh()
+    }
+
+    /// A joint pushed to and fro by a drive that knows nothing of friction, at every tick of its fourth period.
+    fn motion() -> Vec<f64> {
+        const STEPS: usize = 40;
+        let ticks = SAMPLES * FINE;
+        let period_s = SAMPLES as f64 * SAMPLE_S;
+        let step_s = period_s / (ticks * STEPS) as f64;
+        let rate = |t: f64, qd: f64| {
+            let omega = std::f64::consts::TAU / period_s;
+            7.0 * (omega * t).cos() + 4.0 * (3.0 * omega * t + 1.0).cos() - FRICTION * law(qd)
+        };
+        let (mut qd, mut out) = (0.0, Vec::new());
+        for k in 0..4 * ticks * STEPS {
+            if k >= 3 * ticks * STEPS && k.is_multiple_of(STEPS) {
+                out.push(qd);
+            }
+            let t = k as f64 * step_s;
+            let half = qd + 0.5 * step_s * rate(t, qd);
+            qd += step_s * rate(t + 0.5 * step_s, half);
+        }
+        out
+    }
+
+    fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+        a.iter().zip(b).fold(0.0, |most, (a, b)| most.max((a - b).abs()))
+    }
+
+    /// Between its samples the joint leaves the series by most of the width of its friction. What is found lies within the
+    /// trapezoids in which it is looked for: behind a turn at 10 rad/s² a tick takes the joint through 5 mrad/s, a width, and
+    /// an eighth of that is the error of one.
+    #[test]
+    fn a_joint_is_found_between_its_samples() {
+        let clock = FineClock::new(SAMPLES, FINE);
+        let truth = motion();
+        let samples: Vec<f64> = truth.iter().step_by(FINE).copied().collect();
+        let series = clock.refined(&samples);
+        let kick = vec![FRICTION * SAMPLE_S / FINE as f64; truth.len()];
+        let delivered = vec![0.0; truth.len()];
+        let joint = Turning { series_rad_s: &series, kick_rad_s: &kick, delivered: &delivered };
+        let found = Bends::new(&clock).between_samples(&joint, WIDTH_RAD_S, law);
+        let turning = |qd: &[f64]| -> Vec<f64> {
+            let is_turning = |(_, truth): &(&f64, &f64)| truth.abs() < WIDTHS * WIDTH_RAD_S;
+            qd.iter().zip(&truth).filter(is_turning).map(|(qd, _)| *qd).collect()
+        };
+        let [of_series, left] =
+            [&series, &found].map(|qd| largest_difference(&turning(&truth), &turning(qd)));
+        assert!(of_series > 0.5 * WIDTH_RAD_S);
+        assert!(left < WIDTH_RAD_S / 8.0);
+    }
+
+    /// A drive that delivers what friction takes leaves the joint where its samples say.
+    #[test]
+    fn what_is_delivered_bends_nothing() {
+        let clock = FineClock::new(SAMPLES, FINE);
+        let samples: Vec<f64> = (0..SAMPLES).map(|k| (0.1 * k as f64).sin()).collect();
+        let series = clock.refined(&samples);
+        let kick = vec![1e-3; series.len()];
+        let delivered: Vec<f64> = series.iter().map(|qd| law(*qd)).collect();
+        let joint = Turning { series_rad_s: &series, kick_rad_s: &kick, delivered: &delivered };
+        let found = Bends::new(&clock).between_samples(&joint, WIDTH_RAD_S, law);
+        assert!(largest_difference(&series, &found) < 1e-15);
+    }
+}
