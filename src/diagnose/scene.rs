@@ -254,7 +254,7 @@ impl Scene {
     }
 
     /// Velocity of joint `j` at its instants, rad/s, while dry friction turns round by `law` within a few `width_rad_s` and
-    /// the drive delivers a share of what the model expects ([`Bends`]): `fed`, or what its answer to reversals tells.
+    /// the drive delivers a share of what the model expects (see `reversals`): `fed`, or what its answer to reversals tells.
     pub fn turning_rad_s(
         &self,
         j: usize,
