@@ -70,6 +70,8 @@ pub struct Scene {
     instants: Vec<OnceLock<Instants>>,
     /// What the series of samples lacks of bends between them.
     bends: OnceLock<Bends>,
+    /// See [`Self::turning`].
+    turnings: Vec<OnceLock<Turning>>,
     /// Between the samples of a motion that repeats.
     clock: Option<FineClock>,
     /// Up to which harmonic, below n/2, the accelerations of periods are known.
@@ -162,6 +164,7 @@ impl Scene {
             fine_bending_nm: vec![OnceLock::new(); joints],
             instants: (0..joints).map(|_| OnceLock::new()).collect(),
             bends: OnceLock::new(),
+            turnings: (0..joints).map(|_| OnceLock::new()).collect(),
             clock,
             highest,
         }
@@ -262,29 +265,36 @@ impl Scene {
         width_rad_s: f64,
         law: impl Fn(f64) -> f64,
     ) -> Vec<f64> {
-        let series_rad_s = self.fine(self.motion.qd_rad_s.joint(j));
-        let (Some(clock), Some(delivered)) = (&self.clock, &self.delivered) else {
-            return series_rad_s;
-        };
+        let joint = self.turning(j);
         // An estimate may come to no friction.
-        if self.coulomb_nm[j] <= 0.0 {
-            return series_rad_s;
-        }
-        let rotor = self.rotor_kg_m2[j];
-        let kick = |mobility: &f64| {
-            let acceleration_per_nm = (1.0 - 1.0 / (rotor * mobility)) / rotor;
-            let kick = acceleration_per_nm * self.coulomb_nm[j] * self.instant_s();
-            std::iter::repeat_n(kick, FINE)
+        let (Some(clock), Some(told), true) =
+            (&self.clock, &self.delivered, self.coulomb_nm[j] > 0.0)
+        else {
+            return joint.series_rad_s.clone();
         };
-        let kick_rad_s: Vec<f64> = self.mobility_per_kg_m2.joint(j).iter().flat_map(kick).collect();
-        let epsilon = self.arm.friction_epsilon_rad_s;
         let delivered: Vec<f64> = match fed {
-            Some(fed) => series_rad_s.iter().map(|v| fed * (v / epsilon).tanh()).collect(),
-            None => delivered.beyond_nm[j].iter().map(|nm| nm / self.coulomb_nm[j]).collect(),
+            Some(fed) => joint.expected.iter().map(|sign| fed * sign).collect(),
+            None => told.beyond_nm[j].iter().map(|nm| nm / self.coulomb_nm[j]).collect(),
         };
-        let joint =
-            Turning { series_rad_s: &series_rad_s, kick_rad_s: &kick_rad_s, delivered: &delivered };
-        self.bends.get_or_init(|| Bends::new(clock)).between_samples(&joint, width_rad_s, law)
+        let bends = self.bends.get_or_init(|| Bends::new(clock));
+        bends.between_samples(joint, &delivered, width_rad_s, law)
+    }
+
+    /// What bends the velocity of joint `j` where its friction turns round.
+    fn turning(&self, j: usize) -> &Turning {
+        self.turnings[j].get_or_init(|| {
+            let series_rad_s = self.fine(self.motion.qd_rad_s.joint(j));
+            let epsilon = self.arm.friction_epsilon_rad_s;
+            let expected = series_rad_s.iter().map(|v| (v / epsilon).tanh()).collect();
+            let rotor = self.rotor_kg_m2[j];
+            let kick = |mobility: &f64| {
+                let acceleration_per_nm = (1.0 - 1.0 / (rotor * mobility)) / rotor;
+                let kick = acceleration_per_nm * self.coulomb_nm[j] * self.instant_s();
+                std::iter::repeat_n(kick, FINE)
+            };
+            let kick_rad_s = self.mobility_per_kg_m2.joint(j).iter().flat_map(kick).collect();
+            Turning { series_rad_s, expected, kick_rad_s }
+        })
     }
 
     /// [`Self::link_nm`] of joint `j` at its instants.

@@ -221,6 +221,16 @@ fn joint(site: Option<usize>) -> usize {
     site.unwrap_or_default()
 }
 
+/// Sites of a family that belongs to the arm as a whole or to one joint.
+fn arm_and_joints(joints: usize) -> Vec<Option<usize>> {
+    std::iter::once(None).chain((0..joints).map(Some)).collect()
+}
+
+/// The joints of such a site.
+fn joints_at(scene: &Scene, site: Option<usize>) -> std::ops::Range<usize> {
+    site.map_or(0..scene.joints(), |j| j..j + 1)
+}
+
 /// `count` values from `low` to `high` in equal ratios.
 fn geometric(low: f64, high: f64, count: usize) -> impl Iterator<Item = f64> {
     let ratio = (high / low).powf(1.0 / (count - 1) as f64);

@@ -28,7 +28,7 @@ impl Candidate for ReversalWidth {
     }
 
     fn sites(&self, joints: usize) -> Vec<Option<usize>> {
-        std::iter::once(None).chain((0..joints).map(Some)).collect()
+        arm_and_joints(joints)
     }
 
     fn shapes(&self, scene: &Scene, _: Option<usize>) -> Vec<Shape> {
@@ -53,19 +53,15 @@ impl Candidate for ReversalWidth {
         let change = if shape.value.abs() < apart { apart } else { shape.value };
         let width = (epsilon + change).max(SHARPEST * epsilon);
         let change = width - epsilon;
-        let fed = shape.variant as f64;
+        let fed = Some(shape.variant as f64);
         let per_width = |j: usize| {
             let law = |qd: f64| (qd / width).tanh();
             let slope = |(qd, sign): (f64, &f64)| (law(qd) - sign) / change;
-            let qd = scene.turning_rad_s(j, Some(fed), width, law);
+            let qd = scene.turning_rad_s(j, fed, width, law);
             let unit = qd.into_iter().zip(&scene.instants(j).sign).map(slope).collect();
             scene.as_logged(unit).into_iter().map(|u| scene.coulomb_nm[j] * u).collect()
         };
-        let joints = match site {
-            Some(j) => j..j + 1,
-            None => 0..scene.joints(),
-        };
-        vec![Column { parts: joints.map(|j| (j, per_width(j))).collect() }]
+        vec![Column { parts: joints_at(scene, site).map(|j| (j, per_width(j))).collect() }]
     }
 
     fn quantities(&self, scene: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {

@@ -11,7 +11,7 @@ impl Candidate for TimeSkew {
     }
 
     fn sites(&self, joints: usize) -> Vec<Option<usize>> {
-        std::iter::once(None).chain((0..joints).map(Some)).collect()
+        arm_and_joints(joints)
     }
 
     fn prior_odds(&self, site: Option<usize>) -> f64 {
@@ -40,11 +40,7 @@ impl Candidate for TimeSkew {
             let change = scene.change_by_delay_nm(j, shape.value);
             change.into_iter().map(|change| change / shape.value).collect()
         };
-        let joints = match site {
-            Some(j) => j..j + 1,
-            None => 0..scene.joints(),
-        };
-        vec![Column { parts: joints.map(|j| (j, change(j))).collect() }]
+        vec![Column { parts: joints_at(scene, site).map(|j| (j, change(j))).collect() }]
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
