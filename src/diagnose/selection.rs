@@ -385,6 +385,15 @@ impl<'s, 'a> Kept<'s, 'a> {
         study.families[entry.family].form_error(&study.scene, entry.shape).max(FORM_ERROR)
     }
 
+    /// Square of what cause `c`, which sits on another joint, does to joint `j`: what swings or turns round sharply jolts
+    /// all joints, and an error in how it does looks like a cause of theirs.
+    fn square_on(&self, j: usize, c: usize) -> f64 {
+        let (others, residual) = self.without(Some(c));
+        let entry = &self.causes[c].entry;
+        let b = self.study.span(entry, &others).solve(&residual);
+        self.study.square_on(j, entry, &b)
+    }
+
     /// Whether chance explains `contender` in fewer than one log without faults in 500, all
     /// families, sites and shapes counted, the evidence is for it, and it is more than what the
     /// approximate form of the causes found beside it may leave. Along a single run it also has to show in
@@ -392,18 +401,19 @@ impl<'s, 'a> Kept<'s, 'a> {
     fn is_significant(&self, contender: &Contender, others: &Span, residual: &Image) -> bool {
         let study = self.study;
         let site = contender.entry.site;
-        let own_error = self.form_error(&contender.entry);
-        let is_left_by = |c: &Contender| {
-            if (c.entry.family, c.entry.site) == (contender.entry.family, site) {
+        let is_left_by = |(c, cause): (usize, &Contender)| {
+            if (cause.entry.family, cause.entry.site) == (contender.entry.family, site) {
                 return false;
             }
-            // What swings at one joint jolts all others: an error in how it swings looks like swings there.
-            let error = self.form_error(&c.entry);
-            let reaches = c.entry.site.is_none() || site.is_none() || c.entry.site == site;
-            let reaches = reaches || error.min(own_error) > FORM_ERROR;
-            reaches && contender.score.lambda < error * error * c.score.lambda
+            let error = self.form_error(&cause.entry).powi(2);
+            let is_less = |square: f64| contender.score.lambda < error * square;
+            is_less(cause.score.lambda)
+                && match (cause.entry.site, site) {
+                    (Some(own), Some(j)) if own != j => is_less(self.square_on(j, c)),
+                    _ => true,
+                }
         };
-        if self.causes.iter().any(is_left_by) {
+        if self.causes.iter().enumerate().any(is_left_by) {
             return false;
         }
         let span = study.span(&contender.entry, others);

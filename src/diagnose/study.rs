@@ -284,6 +284,23 @@ impl<'a> Study<'a> {
         Span::outside(others, &entry.images)
     }
 
+    /// Square of what `entry` with the coefficients `b` does to joint `j`, the null model projected out.
+    pub fn square_on(&self, j: usize, entry: &Entry, b: &[f64]) -> f64 {
+        let columns = self.families[entry.family].columns(&self.scene, entry.site, entry.shape);
+        let on_joint = columns.into_iter().zip(b).filter_map(|(mut column, b)| {
+            column.parts.retain(|(joint, _)| *joint == j);
+            (!column.parts.is_empty()).then(|| self.whitening.image(&column.scaled(*b)))
+        });
+        let sum = on_joint.reduce(|mut sum, image| {
+            sum.add(1.0, &image);
+            sum
+        });
+        sum.map_or(0.0, |mut sum| {
+            self.null.residualise(&mut sum);
+            sum.square()
+        })
+    }
+
     /// What adding `entry` to `others` explains, given the residual of both null model and `others`;
     /// `None` if its coefficients are physically impossible.
     pub fn score(&self, entry: &Entry, others: &Span, residual: &Image) -> Option<Score> {
