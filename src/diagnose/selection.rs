@@ -365,10 +365,17 @@ impl<'s, 'a> Kept<'s, 'a> {
     }
 
     /// See [`super::candidates::Candidate::is_its_own`]; a coefficient counts as what is nearest to the law's own of
-    /// all that noise leaves possible.
+    /// all that noise leaves possible. A law that holds a parameter twice, so that it could be of any size by its
+    /// coefficients alone, is the family's own only where the data tell its shape from the smallest: play that is none
+    /// but for flanks that give way is a soft gear.
     fn is_its_own(&self, contender: &Contender, others: &Span, residual: &Image) -> bool {
         let study = self.study;
         let Entry { family, site, shape, .. } = contender.entry;
+        if study.families[family].in_shape(shape).is_some()
+            && self.ahead_of_smallest(&contender.entry, others, residual) < FAR_AHEAD
+        {
+            return false;
+        }
         let span = study.span(&contender.entry, others);
         let mut b = span.solve(residual);
         let Some(&first) = b.first() else { return true };
@@ -377,6 +384,16 @@ impl<'s, 'a> Kept<'s, 'a> {
             b[0] = first + doubt * sigma;
             study.families[family].is_its_own(&study.scene, site, shape, &b)
         })
+    }
+
+    /// 2 ln of the odds for the shape of `entry` against the smallest of its variant.
+    fn ahead_of_smallest(&self, entry: &Entry, others: &Span, residual: &Image) -> f64 {
+        let place = |e: &Entry| (e.family, e.site, e.shape.variant);
+        let same = self.study.entries.iter().filter(|e| place(e) == place(entry));
+        let smallest = same.min_by(|a, b| a.shape.value.total_cmp(&b.shape.value));
+        let gain = |e: &Entry| self.study.score(e, others, residual).map(|score| score.gain);
+        let of_smallest = smallest.and_then(gain).unwrap_or(0.0);
+        gain(entry).unwrap_or(0.0) - of_smallest
     }
 
     /// The share of its own size to which the law of `entry` is right.
