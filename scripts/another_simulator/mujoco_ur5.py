@@ -121,9 +121,12 @@ class Physics:
     def friction(self, q, v):
         arm, e, j = self.arm, self.effect, self.site
         width = np.full(len(v), arm.epsilon)
-        if self.kind == "reversal_width":
-            width[j if j >= 0 else slice(None)] = e["width_rad_s"]
+        turned = j if j >= 0 else slice(None)
+        if "width_rad_s" in e:
+            width[turned] = e["width_rad_s"]
         sign = np.tanh(v / width)
+        if "algebraic_width_rad_s" in e:
+            sign[turned] = v[turned] / np.sqrt(v[turned] ** 2 + e["algebraic_width_rad_s"] ** 2)
         out = arm.coulomb * sign + arm.viscous * v
         if self.kind == "presliding":
             # Dahl: dz/dq = k (1 - z sgn) over the way since the step began.

@@ -28,6 +28,9 @@ EFFECTS = [
     {"kind": "reversal_width", "width_rad_s": 0.003},
     {"kind": "reversal_width", "width_rad_s": 0.04},
     {"kind": "reversal_width", "joint": 4, "width_rad_s": 0.005},
+    # Another law than the one that is looked for, v / sqrt(v^2 + w^2), whose width is not the same number.
+    {"kind": "reversal_width", "algebraic_width_rad_s": 0.01},
+    {"kind": "reversal_width", "joint": 4, "algebraic_width_rad_s": 0.04},
     {"kind": "asymmetric_friction", "joint": 3, "viscous_nm_s_rad": 0.15},
     {"kind": "nonlinear_viscous", "joint": 4, "amplitude_nm": 0.2, "exponent": 0.4},
     {"kind": "nonlinear_viscous", "joint": 2, "amplitude_nm": 0.5, "exponent": 2.0},
@@ -68,7 +71,8 @@ def diagnosed(job):
     work, armid, number, effect, setting = job
     log, answer = work / f"{number}.csv", work / f"{number}.json"
     # Sharp friction asks for short steps.
-    step_s = min(1e-3, 0.1 * effect.get("width_rad_s", 1.0))
+    widths = [v for k, v in effect.items() if k.endswith("width_rad_s")]
+    step_s = min([1e-3] + [0.1 * width for width in widths])
     step_s = 1e-3 / math.ceil(1e-3 / step_s)
     write(log, simulate(Run(effect=effect, step_s=step_s, **setting)))
     subprocess.run(
