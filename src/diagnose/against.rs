@@ -14,7 +14,7 @@ use super::candidates::{Candidate, Quantity, Shape};
 use super::image::{Column, Image, Span};
 use super::judgement::{TELLS_APART, probability_of_class};
 use super::kind::Kind;
-use super::selection::FALSE_ALARM;
+use super::significance::FALSE_ALARM;
 use super::study::{Entry, Study};
 use super::verdict::{Cause, Estimate, Moved, Rival};
 use crate::base::BaseSet;

@@ -45,6 +45,7 @@ pub mod replay;
 mod reversals;
 mod scene;
 mod selection;
+mod significance;
 mod stalls;
 mod statistic;
 mod study;

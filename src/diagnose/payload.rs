@@ -19,7 +19,7 @@ use super::error::DiagnoseError;
 use super::extension::Extension;
 use super::kind::Kind;
 use super::scene::Scene;
-use super::selection::FALSE_ALARM;
+use super::significance::FALSE_ALARM;
 use super::verdict::{Cause, Estimate};
 use super::whitening::{RunWhitening, Whitening};
 use crate::base::BaseSet;

@@ -5,19 +5,9 @@ use rayon::prelude::*;
 use super::candidates::ripple::strongest_orders;
 use super::image::{Image, Span};
 use super::kind::Kind;
+use super::significance::FAR_AHEAD;
 use super::study::{Entry, Score, Study};
 
-/// Chance that a log without faults is given a cause.
-pub const FALSE_ALARM: f64 = 0.002;
-/// A law is another's only if its coefficient is so by more than so many σ.
-const DOUBT: f64 = 2.0;
-/// A family's law is right to this share of its own size: what is smaller on the same joint is no second
-/// cause.
-const FORM_ERROR: f64 = 0.05;
-/// 2 ln of the odds for a cause, at least: seven to one.
-pub const LEAST_EVIDENCE: f64 = 4.0;
-/// 2 ln of the odds between two laws that leave no doubt: twenty to one.
-const FAR_AHEAD: f64 = 6.0;
 /// Causes at most: a log that needs more has another kind of problem.
 const MOST_CAUSES: usize = 24;
 /// Share of a cause's square that another explains as well, at least, if it may stand in for it.
@@ -29,6 +19,7 @@ const EXCHANGES: usize = 3;
 const MOST_ALIKE: usize = 3;
 /// Families whose shapes are refined before one is chosen.
 pub(super) const FINALISTS: usize = 10;
+
 /// A family that was considered, at its best shape.
 #[derive(Debug, Clone)]
 pub struct Contender {
@@ -242,7 +233,7 @@ impl<'s, 'a> Kept<'s, 'a> {
     }
 
     /// 2 ln of the evidence for adding `entry`: what it explains, less its price.
-    fn evidence(&self, entry: &Entry, score: Score) -> f64 {
+    pub(super) fn evidence(&self, entry: &Entry, score: Score) -> f64 {
         score.gain - self.study.price(entry)
     }
 
@@ -342,105 +333,6 @@ impl<'s, 'a> Kept<'s, 'a> {
                     .collect::<Vec<_>>()
             })
             .collect()
-    }
-
-    /// Whether `contender` is needed beside `other`, which is on another joint, and all causes.
-    fn is_significant_beside(&self, contender: &Contender, other: &Contender) -> bool {
-        let (site, other_site) = (contender.entry.site, other.entry.site);
-        if site == other_site || site.is_none() || other_site.is_none() {
-            return false;
-        }
-        let (mut others, _) = self.without(None);
-        for image in &other.entry.images {
-            others.push(image);
-        }
-        let mut residual = self.study.residual.clone();
-        others.residualise(&mut residual);
-        let Some(score) = self.study.score(&contender.entry, &others, &residual) else {
-            return false;
-        };
-        let evidence = self.evidence(&contender.entry, score);
-        let beside = Contender { entry: contender.entry.clone(), score, evidence };
-        self.is_significant(&beside, &others, &residual)
-    }
-
-    /// See [`super::candidates::Candidate::is_its_own`]; a coefficient counts as what is nearest to the law's own of
-    /// all that noise leaves possible. A law that holds a parameter twice, so that it could be of any size by its
-    /// coefficients alone, is the family's own only where the data tell its shape from the smallest: play that is none
-    /// but for flanks that give way is a soft gear.
-    fn is_its_own(&self, contender: &Contender, others: &Span, residual: &Image) -> bool {
-        let study = self.study;
-        let Entry { family, site, shape, .. } = contender.entry;
-        if study.families[family].in_shape(shape).is_some()
-            && self.ahead_of_smallest(&contender.entry, others, residual) < FAR_AHEAD
-        {
-            return false;
-        }
-        let span = study.span(&contender.entry, others);
-        let mut b = span.solve(residual);
-        let Some(&first) = b.first() else { return true };
-        let sigma = study.statistic.covariance(&span, residual)[(0, 0)].max(0.0).sqrt();
-        [0.0, -DOUBT, DOUBT].into_iter().any(|doubt| {
-            b[0] = first + doubt * sigma;
-            study.families[family].is_its_own(&study.scene, site, shape, &b)
-        })
-    }
-
-    /// 2 ln of the odds for the shape of `entry` against the smallest of its variant.
-    fn ahead_of_smallest(&self, entry: &Entry, others: &Span, residual: &Image) -> f64 {
-        let place = |e: &Entry| (e.family, e.site, e.shape.variant);
-        let same = self.study.entries.iter().filter(|e| place(e) == place(entry));
-        let smallest = same.min_by(|a, b| a.shape.value.total_cmp(&b.shape.value));
-        let gain = |e: &Entry| self.study.score(e, others, residual).map(|score| score.gain);
-        let of_smallest = smallest.and_then(gain).unwrap_or(0.0);
-        gain(entry).unwrap_or(0.0) - of_smallest
-    }
-
-    /// The share of its own size to which the law of `entry` is right.
-    fn form_error(&self, entry: &Entry) -> f64 {
-        let study = self.study;
-        study.families[entry.family].form_error(&study.scene, entry.shape).max(FORM_ERROR)
-    }
-
-    /// Square of what cause `c`, which sits on another joint, does to joint `j`: what swings or turns round sharply jolts
-    /// all joints, and an error in how it does looks like a cause of theirs.
-    fn square_on(&self, j: usize, c: usize) -> f64 {
-        let (others, residual) = self.without(Some(c));
-        let entry = &self.causes[c].entry;
-        let b = self.study.span(entry, &others).solve(&residual);
-        self.study.square_on(j, entry, &b)
-    }
-
-    /// Whether chance explains `contender` in fewer than one log without faults in 500, all
-    /// families, sites and shapes counted, the evidence is for it, and it is more than what the
-    /// approximate form of the causes found beside it may leave. Along a single run it also has to show in
-    /// stretches of time left out of its fit.
-    fn is_significant(&self, contender: &Contender, others: &Span, residual: &Image) -> bool {
-        let study = self.study;
-        let site = contender.entry.site;
-        let is_left_by = |(c, cause): (usize, &Contender)| {
-            if (cause.entry.family, cause.entry.site) == (contender.entry.family, site) {
-                return false;
-            }
-            let error = self.form_error(&cause.entry).powi(2);
-            let is_less = |square: f64| contender.score.lambda < error * square;
-            is_less(cause.score.lambda)
-                && match (cause.entry.site, site) {
-                    (Some(own), Some(j)) if own != j => is_less(self.square_on(j, c)),
-                    _ => true,
-                }
-        };
-        if self.causes.iter().enumerate().any(is_left_by) {
-            return false;
-        }
-        let span = study.span(&contender.entry, others);
-        let single = study.statistic.probability(&span, residual);
-        // The chance is shared out evenly between families and sites, and within one between its shapes.
-        let tests = study.hypotheses() as f64 * study.alternatives(&contender.entry);
-        contender.evidence > LEAST_EVIDENCE
-            && single * tests < FALSE_ALARM
-            && self.is_its_own(contender, others, residual)
-            && study.generalises(&contender.entry, &span, residual)
     }
 
     /// Refines all causes jointly, exchanges those that another family now replaces, and drops those
