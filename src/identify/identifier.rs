@@ -53,7 +53,7 @@ pub struct Identification {
     pub explainable_nm: Option<Vec<f64>>,
     /// Test of the model against the scatter between periods; known for the spectral estimator.
     pub lack_of_fit: Option<LackOfFit>,
-    /// What the user should know.
+    /// What the user should know about how the log was used.
     pub warnings: Vec<String>,
 }
 
@@ -362,14 +362,6 @@ impl<'a> Identifier<'a> {
         let estimate = self.with_motion_noise(estimate, &prepared)?;
         let Estimate { fit, mut covariances, lack_of_fit } = estimate;
         let covariance = covariances.swap_remove(0)?;
-        let mut warnings = prepared.warnings;
-        if let Some(lack) = lack_of_fit.filter(|lack| !lack.fits()) {
-            warnings.push(format!(
-                "the model does not explain all that repeats in the torque (lack of fit {:.2}, \
-                 p = {:.1e}): σ covers the noise, not the error of the model",
-                lack.statistic, lack.p_value
-            ));
-        }
         Ok(Identification {
             estimator,
             samples: self.problem.samples * self.problem.periods,
@@ -380,7 +372,7 @@ impl<'a> Identifier<'a> {
             processing: prepared.processing,
             replicates: prepared.replicates,
             lack_of_fit,
-            warnings,
+            warnings: prepared.warnings,
             fit,
         })
     }

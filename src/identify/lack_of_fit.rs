@@ -75,4 +75,15 @@ impl LackOfFit {
     pub fn fits(&self) -> bool {
         self.p_value >= Self::REJECT_BELOW
     }
+
+    /// What to say where it does not.
+    pub fn warning(&self) -> Option<String> {
+        let (statistic, p) = (self.statistic, self.p_value);
+        (!self.fits()).then(|| {
+            format!(
+                "the model does not explain all that repeats in the torque (lack of fit {statistic:.2}, p = {p:.1e}): \
+                 σ covers the noise, not the error of the model"
+            )
+        })
+    }
 }

@@ -185,7 +185,13 @@ fn cause_section(finding: &Finding, cause: &Cause) -> Result<Section, ReportErro
     };
     let j = cause.joint.map_or(0, |j| j - 1);
     let (label, unit, axis) = axis(finding, cause.kind, j);
-    let mut grid = Grid::new("", Axis::linear(label, unit), Axis::linear("residual", "Nm"));
+    // One scale for both, so that the gain is seen.
+    let both = [&finding.before_nm, &finding.after_nm].map(|residual| residual.joint(j));
+    let largest = both.into_iter().flatten().fold(0.0, |largest: f64, y| largest.max(y.abs()));
+    let residual = Axis::linear("residual", "Nm");
+    let residual =
+        if largest > 0.0 { residual.between(-1.05 * largest, 1.05 * largest) } else { residual };
+    let mut grid = Grid::new("", Axis::linear(label, unit), residual);
     grid.columns = 2;
     for (name, residual, colour) in [
         ("before", &finding.before_nm, Colour::BEFORE),

@@ -166,6 +166,7 @@ impl Result {
             })
             .collect();
         let mut warnings = identification.warnings.clone();
+        warnings.extend(identification.lack_of_fit.and_then(|lack| lack.warning()));
         let is_identified = identifies_the_arm(arm, set, &open);
         let theta = &identification.fit.theta;
         let doubt = gravity_remark(arm, set, training.nominal, theta, &identification.covariance);
