@@ -221,6 +221,28 @@ fn play_that_rings_faster_than_the_log() {
     assert!(is_named(&d, "backlash", Some(3)));
 }
 
+/// Two hundred waves per turn at 3 rad/s are 95 Hz, above the Nyquist frequency of the log: most of what its samples
+/// show are aliases. The second order is no gear's, and has to be found among all.
+#[test]
+fn ripple_that_is_faster_than_the_log() {
+    let cases =
+        [(44, "ur5_identification", 4, 202.0, 0.12), (45, "ur5_validation", 2, 195.05, 0.8)];
+    for (seed, trajectory, joint, order, amplitude) in cases {
+        let toml = format!(
+            "[[effect]]\nkind = \"ripple\"\njoint = {joint}\norder_per_turn = {order:?}\n\
+             amplitude_nm = {amplitude}\nphase_rad = 1.1"
+        );
+        let d = diagnose_along(trajectory, seed, &toml);
+        assert!(is_named(&d, "ripple", Some(joint)));
+        assert_eq!(d.causes.len(), 1, "{:?}", d.sentences);
+        for (parameter, truth) in [("amplitude_nm", amplitude), ("order_per_turn", order)] {
+            let e = &d.causes[0].parameters[parameter];
+            // Twice the half width: 3.9 σ, which one log in 10⁴ misses by chance.
+            assert!((e.value - truth).abs() < e.ci95[1] - e.ci95[0], "{parameter} {e:?}");
+        }
+    }
+}
+
 /// Friction that falls by a tenth within a minute changes more from one period to the next than a hand would.
 #[test]
 fn warming_is_no_contact() {

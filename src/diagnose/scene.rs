@@ -359,6 +359,12 @@ impl Scene {
         }
     }
 
+    /// Weights of the means of a torque from one sample to the next in Σ y_k τ̃_k, τ̃ as logged
+    /// ([`FineClock::before_logged`]); `None` for a single run.
+    pub fn before_logged(&self, y: &[f64]) -> Option<Vec<f64>> {
+        Some(self.clock.as_ref()?.before_logged(y, self.highest))
+    }
+
     /// How the drive of joint `j` may answer dry friction, as columns ([`drive_answers`]); none for a single run.
     pub fn answers(&self, j: usize) -> Vec<Vec<f64>> {
         let columns = |clock| drive_answers(clock, &self.instants(j).sign, self.highest).into();

@@ -67,14 +67,22 @@ impl FineClock {
                 (cell.iter().sum::<f64>() + 0.5 * (end - cell[0])) / self.ticks as f64
             })
             .collect();
-        self.filtered(&mean, |h| {
-            let half = PI * h as f64 / self.samples as f64;
-            match h {
-                0 => Complex64::ONE,
-                _ if h > highest => Complex64::ZERO,
-                _ => Complex64::from_polar(half / half.sin(), -half),
-            }
-        })
+        self.filtered(&mean, |h| self.of_mean(h, highest))
+    }
+
+    /// The adjoint of [`Self::as_logged`]: w for which Σ y_k τ̃_k is Σ w_k ∫ τ dt/T, the integral from sample k to the next.
+    pub fn before_logged(&self, y: &[f64], highest: usize) -> Vec<f64> {
+        self.filtered(y, |h| self.of_mean(h, highest).conj())
+    }
+
+    /// iω_h T/(e^{iω_h T} − 1) up to harmonic `highest`.
+    fn of_mean(&self, h: usize, highest: usize) -> Complex64 {
+        let half = PI * h as f64 / self.samples as f64;
+        match h {
+            0 => Complex64::ONE,
+            _ if h > highest => Complex64::ZERO,
+            _ => Complex64::from_polar(half / half.sin(), -half),
+        }
     }
 
     /// One period of `y` with `factor(h)` times its harmonic h: a derivative with ihω, a delay of T with
@@ -153,6 +161,22 @@ mod tests {
         let tick = TAU * 3.0 / (TICKS * N) as f64;
         assert!(largest_difference(&logged, &wave(N, 3.0)) < tick * tick / 12.0 + 1e-13);
         assert!(largest_difference(&clock.as_logged(&wave(800, 21.0), 20), &[0.0; N]) < 1e-13);
+    }
+
+    /// The adjoint weighs what lies between two samples as the log shows it, but for rounding.
+    #[test]
+    fn weights_of_what_is_logged() {
+        let clock = FineClock::new(N, TICKS);
+        let (y, fine) = (wave(N, 5.0), wave(TICKS * N, 55.0));
+        let logged = clock.as_logged(&fine, 20);
+        let direct: f64 = y.iter().zip(logged).map(|(y, logged)| y * logged).sum();
+        let next = |k: usize| fine[(k + TICKS) % fine.len()];
+        let ends = |k: usize| 0.5 * (next(k * TICKS) - fine[k * TICKS]);
+        let means = (0..N)
+            .map(|k| (fine[k * TICKS..][..TICKS].iter().sum::<f64>() + ends(k)) / TICKS as f64);
+        let weighed: f64 =
+            clock.before_logged(&y, 20).iter().zip(means).map(|(w, mean)| w * mean).sum();
+        assert!((direct - weighed).abs() < 1e-12 && direct.abs() > 1e-3, "{direct} {weighed}");
     }
 
     /// A pulse between two samples, which no sample shows, is logged with all of its area.

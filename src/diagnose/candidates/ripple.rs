@@ -1,5 +1,7 @@
 //! Torque that repeats many times per turn: τ = A cos(N q + φ), of the gear's teeth (even multiples of the
-//! ratio) or the motor's poles.
+//! ratio) or the motor's poles. Fast ripple goes into the acceleration of the links, not into the torque, and above half
+//! the rate the samples hold its alias: a log shows it as it shows whatever no controller answers at once
+//! ([`Scene::as_logged`]).
 
 use super::*;
 
@@ -20,6 +22,8 @@ fn multiples(scene: &Scene) -> impl Iterator<Item = f64> {
     let motor = if scene.periodic { &[][..] } else { &MOTOR_MULTIPLES[..] };
     GEAR_MULTIPLES.into_iter().chain(motor.iter().copied())
 }
+/// A joint that turns by less from one sample to the next shows no order.
+const STANDSTILL_RAD: f64 = 1e-8;
 /// Peaks of the order spectrum that are looked at closely.
 const PEAKS: usize = 3;
 
@@ -61,22 +65,23 @@ impl Candidate for Ripple {
 
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let j = joint(site);
-        let q = scene.motion.q_rad.joint(j);
-        let qd = scene.motion.qd_rad_s.joint(j);
-        let column = |f: fn(f64) -> f64| {
-            let ripple = |k: usize| {
-                let frequency_hz = shape.value * qd[k] / std::f64::consts::TAU;
-                let share = if scene.periodic {
-                    seen_share(frequency_hz, scene.rate_hz)
-                } else {
-                    // What was resampled from uneven times has no aliases that could be predicted.
-                    f64::from(frequency_hz.abs() < 0.5 * scene.rate_hz)
-                };
-                share * f(shape.value * q[k])
-            };
-            Column::on(j, samples(scene, ripple))
+        let at = scene.instants(j);
+        // What was resampled from uneven times has no aliases that could be predicted.
+        let fastest_rad_s = if scene.periodic {
+            f64::INFINITY
+        } else {
+            0.5 * scene.rate_hz * std::f64::consts::TAU / shape.value
         };
-        vec![column(f64::cos), column(f64::sin)]
+        let (sin, cos) = at
+            .q_rad
+            .iter()
+            .zip(&at.qd_rad_s)
+            .map(|(q, qd)| match qd.abs() < fastest_rad_s {
+                true => (shape.value * q).sin_cos(),
+                false => (0.0, 0.0),
+            })
+            .unzip();
+        [cos, sin].map(|ripple| Column::on(j, scene.as_logged(ripple))).into()
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, shape: Shape, b: &[f64]) -> Vec<Quantity> {
@@ -96,22 +101,25 @@ impl Candidate for Ripple {
     }
 }
 
-/// Share of a ripple of this frequency that is left between torque and inertia times acceleration.
-///
-/// Fast ripple goes into the acceleration of the links, not into the torque. Above half the rate it has
-/// its alias there: the velocity it makes, 1/f as large as the acceleration, is differentiated at the
-/// frequency f − f_s round(f/f_s) at which it appears.
-fn seen_share(frequency_hz: f64, rate_hz: f64) -> f64 {
-    let turns = frequency_hz / rate_hz;
-    if turns.abs() <= 0.5 { 1.0 } else { (turns - turns.round()) / turns }
-}
-
 /// Resolution in orders per turn: one cycle more over the joint's range.
 fn order_spacing(scene: &Scene, j: usize) -> f64 {
     let q = scene.motion.q_rad.joint(j);
     let (low, high) =
         q.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &q| (l.min(q), h.max(q)));
     std::f64::consts::TAU / (high - low).max(1e-2)
+}
+
+/// v for which Σ v_k e^{iNq_k} is iN Σ w_k c_k, c_k the mean of e^{iNq} from sample k of a period to the next, where
+/// q goes straight: c_k = (e^{iNq_{k+1}} − e^{iNq_k})/(iN (q_{k+1} − q_k)).
+fn of_phasors(w: &[f64], q: &[f64]) -> Vec<f64> {
+    let next = q[1..].iter().chain(&q[..1]);
+    let per_turn: Vec<f64> = w
+        .iter()
+        .zip(q.iter().zip(next))
+        .map(|(w, (q, next))| if (next - q).abs() > STANDSTILL_RAD { w / (next - q) } else { 0.0 })
+        .collect();
+    let before = per_turn.last().into_iter().chain(&per_turn);
+    before.zip(&per_turn).map(|(before, own)| before - own).collect()
 }
 
 /// Orders at which `residual_nm` of joint `j` has most power: shapes to begin with.
@@ -121,20 +129,23 @@ pub(in crate::diagnose) fn strongest_orders(
     residual_nm: &[f64],
 ) -> Vec<Shape> {
     let q = scene.motion.q_rad.joint(j);
+    let weights = scene.before_logged(residual_nm).map(|w| of_phasors(&w, q));
+    let (weights, is_mean) = (weights.as_deref().unwrap_or(residual_nm), weights.is_some());
     let step = 0.5 * order_spacing(scene, j).min(2.0);
     let count = ((HIGHEST_ORDER - LOWEST_ORDER) / step) as usize;
     let mut power = vec![0.0; count];
     let mut phasors: Vec<(f64, f64)> = q.iter().map(|q| (LOWEST_ORDER * q).sin_cos()).collect();
     let turns: Vec<(f64, f64)> = q.iter().map(|q| (step * q).sin_cos()).collect();
-    for power in &mut power {
+    for (k, power) in power.iter_mut().enumerate() {
         let (mut re, mut im) = (0.0, 0.0);
-        for ((phasor, turn), r) in phasors.iter_mut().zip(&turns).zip(residual_nm) {
+        for ((phasor, turn), r) in phasors.iter_mut().zip(&turns).zip(weights) {
             re += r * phasor.1;
             im += r * phasor.0;
             *phasor =
                 (phasor.0 * turn.1 + phasor.1 * turn.0, phasor.1 * turn.1 - phasor.0 * turn.0);
         }
-        *power = re * re + im * im;
+        let order = LOWEST_ORDER + step * k as f64;
+        *power = (re * re + im * im) / if is_mean { order * order } else { 1.0 };
     }
     let mut peaks: Vec<usize> = (1..count.saturating_sub(1))
         .filter(|&k| power[k] >= power[k - 1] && power[k] >= power[k + 1])
@@ -146,4 +157,34 @@ pub(in crate::diagnose) fn strongest_orders(
         .flat_map(|k| [-1.0, 0.0, 1.0].map(|u| LOWEST_ORDER + step * (k as f64 + u)))
         .map(|value| Shape { variant: 0, value })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Complex;
+
+    use super::*;
+
+    /// Of a joint that turns at constant speed between samples, the weights of its phasors give back what the means do.
+    #[test]
+    fn means_are_differences_of_phasors() {
+        const N: usize = 12;
+        let q: Vec<f64> = (0..N).map(|k| 0.02 * ((k * k) % 7) as f64).collect();
+        let w: Vec<f64> = (0..N).map(|k| ((k * 5) % 3) as f64 - 0.8).collect();
+        let order = 90.0;
+        let phasor = |q: f64| Complex::from_polar(1.0, order * q);
+        let turned = |k: usize| (q[(k + 1) % N] - q[k]) * order;
+        // sinc(x) e^{iN(q_k + q_{k+1})/2}, x half of what the cell turns.
+        let mean = |k: usize| {
+            let x = 0.5 * turned(k);
+            phasor(q[k] + x / order) * if x == 0.0 { 1.0 } else { x.sin() / x }
+        };
+        // A cell that stands still is left out.
+        let cells = (0..N).filter(|&k| turned(k) != 0.0);
+        let by_means: Complex<f64> = cells.map(|k| mean(k) * w[k]).sum();
+        let by_phasors: Complex<f64> =
+            of_phasors(&w, &q).iter().zip(&q).map(|(v, q)| phasor(*q) * *v).sum();
+        let difference = by_means * Complex::new(0.0, order) - by_phasors;
+        assert!(difference.norm() < 1e-10 * by_phasors.norm(), "{by_means} {by_phasors}");
+    }
 }
