@@ -10,10 +10,11 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
 use super::Touch;
 use super::bump::{self, Noise, ORDINARY, Push};
+use super::disturbed::with_disturbed_periods;
 use crate::diagnose::friction_drift::FrictionDrift;
 use crate::diagnose::verdict::{Cause, Estimate};
 use crate::identify::Measurement;
-use crate::median::median;
+use crate::median::{median, robust_sigma};
 use crate::robot::JointSignals;
 use crate::signal::{MatchedFilter, Resampler, SignalError, find_period, natural_rate_hz};
 
@@ -40,13 +41,6 @@ const TOGETHER_S: f64 = 0.5;
 const MOST: usize = 40;
 /// The median over fewer periods is moved by one contact.
 const FEWEST_PERIODS: usize = 3;
-/// Stretches of a period in which the run-in and the stop are found: a contact near an end of the log is not to be
-/// taken for a part of them.
-const STRETCHES: usize = 40;
-/// Joints that differ by less than this share of their rms amplitude, in the median, move alike.
-const SAME_MOTION: f64 = 0.02;
-/// The same, at every instant of a stretch: more than a weak contact moves the arm, less than a run-in.
-const NO_CONTACT: f64 = 2e-3;
 /// At an end where the repetitions were prolonged so much is left out, s: the last of a run-in moves the arm so
 /// little beside the repetitions that angles do not show it, and takes torque.
 const EDGE_S: f64 = 0.5;
@@ -204,6 +198,8 @@ impl Repeats {
                 drift.remove(*j, out.joint_mut(row), |k| !aside[self.window.start + k]);
             }
         }
+        let reach = if SHORTEST_S * self.rate_hz >= 8.0 { 2 } else { 1 };
+        (0..joints.len()).for_each(|row| level_wild_values(out.joint_mut(row), reach));
         out
     }
 
@@ -308,6 +304,24 @@ impl Repeats {
     }
 }
 
+/// Puts what stands `reach` samples before and behind in place of values that stand out alone: a reading that went
+/// wild, and what resampling makes of it, is over before anything that touches the arm has begun.
+fn level_wild_values(y: &mut [f64], reach: usize) {
+    let measured = y.to_vec();
+    let beside = |k: usize| [measured[k - reach], measured[k + reach]];
+    let level = |k: usize| 0.5 * beside(k).iter().sum::<f64>();
+    let all = reach..measured.len().saturating_sub(reach);
+    let mut changes: Vec<f64> = all.clone().map(|k| (measured[k] - level(k)).abs()).collect();
+    // Of three values that know nothing of each other.
+    let sigma = robust_sigma(&mut changes) / 1.5f64.sqrt();
+    for k in all {
+        let size = measured[k].abs();
+        if size > FAR * sigma && beside(k).iter().all(|y| y.abs() < 0.5 * size) {
+            y[k + 1 - reach..k + reach].fill(level(k));
+        }
+    }
+}
+
 fn farthest(scores: &[f64]) -> f64 {
     scores.iter().fold(0.0, |a, z| a.max(z.abs()))
 }
@@ -316,68 +330,6 @@ fn farthest(scores: &[f64]) -> f64 {
 fn far_together(joints: usize) -> f64 {
     let chance = 2.0 * Normal::standard().cdf(-FAR);
     ChiSquared::new(joints as f64).map_or(FAR, |chi2| chi2.inverse_cdf(1.0 - chance).sqrt())
-}
-
-/// `window`, longer by whole periods in which most of the motion repeats (a contact moves the arm for a
-/// moment, and that period is then not among those that repeat throughout) and by what is there of another one, up to
-/// the outermost stretch in which all of it does, less `edge` samples of what is added.
-fn with_disturbed_periods(
-    q_rad: &JointSignals,
-    period: f64,
-    window: Range<usize>,
-    edge: usize,
-) -> Range<usize> {
-    let step = period.round() as usize;
-    let stretch = (step / STRETCHES).max(1);
-    let amplitude = |q: &[f64]| {
-        let mean = q.iter().sum::<f64>() / q.len() as f64;
-        (q.iter().map(|q| (q - mean).powi(2)).sum::<f64>() / q.len() as f64).sqrt()
-    };
-    let amplitudes: Vec<f64> =
-        (0..q_rad.joints()).map(|j| amplitude(q_rad.joint(j)) + 1e-6).collect();
-    // Whether `measure` of the differences between the samples `own` and those from `other` on is below `limit`.
-    let is_below = |measure: fn(&mut [f64]) -> f64, limit: f64, own: Range<usize>, other: usize| {
-        amplitudes.iter().enumerate().all(|(j, amplitude)| {
-            let q = q_rad.joint(j);
-            let pairs = q[own.clone()].iter().zip(&q[other..]);
-            let mut differences: Vec<f64> = pairs.map(|(a, b)| (a - b).abs() / amplitude).collect();
-            measure(&mut differences) < limit
-        })
-    };
-    let repeats = |own, other| is_below(largest, NO_CONTACT, own, other);
-    let mostly_repeats = |own, other| is_below(middle, SAME_MOTION, own, other);
-    let Range { mut start, mut end } = window.clone();
-    while start >= step && mostly_repeats(start - step..start, start) {
-        start -= step;
-    }
-    while end + step <= q_rad.samples() && mostly_repeats(end..end + step, end - step) {
-        end += step;
-    }
-    // A period most of which repeats may begin with the run-in, or end with the arm stopping; and of the first and the
-    // last period of the log only a part may be there.
-    let first = (start.saturating_sub(step)..window.start).step_by(stretch).find(|&k| {
-        repeats(k..k + stretch, k + step) && (k >= start || mostly_repeats(k..start, k + step))
-    });
-    let last_first = end + step.min(q_rad.samples() - end);
-    let last = (0..=(last_first - window.end) / stretch)
-        .map(|stretches| last_first - stretches * stretch)
-        .take_while(|&k| k >= window.end.max(step) + stretch)
-        .find(|&k| {
-            repeats(k - stretch..k, k - stretch - step)
-                && (k <= end || mostly_repeats(end..k, end - step))
-        });
-    let (start, end) = (first.unwrap_or(window.start), last.unwrap_or(window.end));
-    (start + edge).min(window.start)..end.saturating_sub(edge).max(window.end)
-}
-
-/// The largest of `values`.
-fn largest(values: &mut [f64]) -> f64 {
-    values.iter().copied().fold(0.0, f64::max)
-}
-
-/// Their median; zero of none.
-fn middle(values: &mut [f64]) -> f64 {
-    median(values).unwrap_or(0.0)
 }
 
 #[cfg(test)]
@@ -472,6 +424,25 @@ mod tests {
         }
         assert!(seen >= 57, "{seen}");
         assert!(misses < 24, "{misses} of {}", 3 * seen);
+    }
+
+    /// Thirty times the noise in one sample, and what is left of that by a clock between two.
+    #[test]
+    fn wild_readings_are_no_contact() {
+        let nothing = Hidden { start_s: 24.0, end_s: 25.0, nm: [0.0, 0.0] };
+        let (time_s, [q_rad, qd_rad_s, mut torque_nm]) = log(3, &nothing);
+        let y = torque_nm.joint_mut(0);
+        y[1234] += 15.0;
+        y[2600] -= 10.0;
+        y[2601] -= 5.0;
+        let m = Measurement {
+            source: "test",
+            time_s: &time_s,
+            q_rad: &q_rad,
+            qd_rad_s: &qd_rad_s,
+            torque_nm: &torque_nm,
+        };
+        assert!(between_periods(&m, &[]).unwrap().is_none());
     }
 
     /// What no joint could tell alone is told by both together, and called a push on the arm.

@@ -8,6 +8,7 @@
 mod beside_model;
 mod between_periods;
 mod bump;
+mod disturbed;
 
 use std::ops::Range;
 
