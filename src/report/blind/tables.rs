@@ -57,6 +57,11 @@ pub fn target_table(scores: &Scores) -> Table {
     table
 }
 
+/// The values of a bin, kept on one line.
+fn range([low, high]: [f64; 2]) -> String {
+    if high.is_finite() { format!("{low}\u{a0}…\u{a0}{high}") } else { format!("≥\u{a0}{low}") }
+}
+
 /// Detection by size.
 pub(super) fn strength_table(bins: &[StrengthBin], right: &str) -> Table {
     let mut table = Table::new([
@@ -69,11 +74,8 @@ pub(super) fn strength_table(bins: &[StrengthBin], right: &str) -> Table {
         Column::number("power of the best test", ""),
     ]);
     for bin in bins {
-        let [low, high] = bin.range;
-        let range =
-            if high.is_finite() { format!("{low} … {high}") } else { format!("≥ {low}") };
         table.push([
-            range,
+            range(bin.range),
             format!("{:.1}", bin.mean),
             of(bin.detected),
             of(bin.right),
@@ -127,8 +129,7 @@ pub(super) fn confidence_table(scores: &Scores) -> Table {
         Column::number("right", ""),
     ]);
     for bin in &scores.confidence {
-        let [low, high] = bin.range;
-        table.push([format!("{low} … {high}"), format!("{:.4}", bin.stated), of(bin.right)]);
+        table.push([range(bin.range), format!("{:.4}", bin.stated), of(bin.right)]);
     }
     table
 }
@@ -141,9 +142,8 @@ pub(super) fn gain_table(scores: &Scores) -> Table {
         Column::number("what the parameters' noise allows", ""),
     ]);
     for bin in &scores.gains {
-        let [low, high] = bin.range;
         table.push([
-            if high.is_finite() { format!("{low} … {high}") } else { format!("≥ {low}") },
+            range(bin.range),
             bin.cases.to_string(),
             percent(bin.removed, 3),
             percent(bin.predicted, 3),
