@@ -22,18 +22,19 @@
 //! | at which frequencies is there energy? | [`welch`] |
 
 mod activity;
+mod averaged_motion;
 mod biquad;
 mod butterworth;
 mod decimate;
 mod differentiate;
 mod error;
 mod fine_clock;
-mod fourier;
 mod matched;
 mod noise;
 mod noise_trend;
 mod paper_filter;
 mod period;
+mod periodic_fit;
 mod readings;
 mod replicates;
 mod resample;
@@ -41,16 +42,17 @@ mod spectra;
 mod spectrum;
 
 pub use activity::Activity;
+pub use averaged_motion::{AveragedMotion, HarmonicPower};
 pub use butterworth::{Scratch, ZeroPhase};
 pub use decimate::Decimator;
 pub use differentiate::{central_2, central_4, hermite_acceleration};
 pub use error::SignalError;
 pub use fine_clock::FineClock;
-pub use fourier::{AveragedMotion, FitScratch, HarmonicPower, PeriodicFit};
 pub use matched::{Heights, MatchedFilter};
 pub use noise_trend::{NoisePower, noise_trend, pooled};
 pub use paper_filter::{PaperDifferentiator, PaperReading};
 pub use period::{Period, PeriodSearch, find_period};
+pub use periodic_fit::{FitScratch, PeriodicFit};
 pub use readings::{quantum, reading_limit};
 pub use replicates::{Replicates, replicate_noise};
 pub use resample::{Bracket, Gap, Resampler, gaps, natural_rate_hz};

@@ -1,27 +1,18 @@
-//! The equations of a log in which noise is white: where every test is made.
+//! Noise known from the scatter between periods.
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{Complex, DMatrix};
 use realfft::{RealFftPlanner, RealToComplex};
 
-use super::error::DiagnoseError;
-use super::friction_drift::FrictionDrift;
-use super::image::{Column, Image};
-use super::noise_power::NoiseKnowledge;
-use super::scene::Scene;
-use crate::identify::{Options, Regression};
+use crate::diagnose::error::DiagnoseError;
+use crate::diagnose::friction_drift::FrictionDrift;
+use crate::diagnose::image::{Column, Image};
+use crate::diagnose::noise_power::NoiseKnowledge;
+use crate::diagnose::scene::Scene;
+use crate::identify::{Problem, Regression};
 use crate::robot::JointSignals;
-use crate::signal::{NoisePower, Scratch, ZeroPhase, noise_trend};
-
-/// From torques in time to whitened rows.
-pub enum Whitening {
-    /// A motion that repeats: noise known from the scatter between periods.
-    Periods(PeriodWhitening),
-    /// A single run: rows of moving samples, divided by the scatter of the fit's residual.
-    Run(RunWhitening),
-}
+use crate::signal::{NoisePower, noise_trend};
 
 /// Per harmonic, with S the 6 × 6 noise covariance of one period's Fourier coefficients:
 /// rows √P L⁻¹ Ȳ_k of the mean period and L⁻¹ C_k of P − 1 orthonormal contrasts, S = L Lᴴ.
@@ -45,22 +36,6 @@ pub struct PeriodWhitening {
     unknown: Vec<Vec<f64>>,
 }
 
-/// Rows of a single run: the regression's low-pass, then a weight per joint, and only samples in
-/// which the joint moves: at rest dry friction may be anything between ±Fc.
-pub struct RunWhitening {
-    filter: ZeroPhase,
-    first_sample: usize,
-    every: usize,
-    rows: usize,
-    /// Every so many rows are tested: behind a low-pass neighbours say the same.
-    thin: usize,
-    weights: Vec<f64>,
-    /// Per joint and row.
-    counts: Vec<Vec<bool>>,
-    /// Rows per block of time, for tests that allow noise with a memory.
-    block_rows: usize,
-}
-
 /// Harmonics averaged on each side for one covariance: at least so many, and a quarter of the
 /// harmonic's number.
 const NEIGHBOURS: usize = 12;
@@ -72,14 +47,6 @@ const FLOOR: f64 = 1e-4;
 /// How far, over the rate, what is used ends below the highest frequency of the periods' own motion. Not far, because half
 /// of what narrow play shows in 125 samples a second lies between 44 and 58 Hz.
 const BELOW_HIGHEST: f64 = 0.02;
-/// Rows kept of a single run, per second and hertz of its low-pass.
-const KEPT_RATE: f64 = 4.0;
-/// Blocks of a single run.
-const BLOCK_S: f64 = 1.0;
-/// A joint slower than this, rad/s, for as long as [`REST_S`] stands still.
-const REST_RAD_S: f64 = 0.02;
-const REST_S: f64 = 0.25;
-
 impl PeriodWhitening {
     /// From the periods of a log.
     pub fn new(regression: &Regression, scene: &Scene, log: &str) -> Result<Self, DiagnoseError> {
@@ -88,66 +55,30 @@ impl PeriodWhitening {
         let forward = RealFftPlanner::new().plan_fft_forward(n);
         let mut whitening =
             Self { samples: n, periods, joints, forward, factors: Vec::new(), unknown: Vec::new() };
-        let harmonics = n / 2 + 1;
         let used = ((regression.prepared.highest - BELOW_HIGHEST) * n as f64).round() as usize;
-        let corners: Vec<Vec<Complex<f64>>> =
-            (0..joints).map(|j| whitening.spectrum(scene.sign.joint(j))).collect();
-        // Running sums over harmonics of Σ_p D Dᴴ/(P − 1), D the deviation from the mean period.
-        let mut scatter = vec![DMatrix::<Complex<f64>>::zeros(joints, joints); harmonics];
-        let drift = FrictionDrift::beside_mean(&scene.motion.qd_rad_s, periods);
-        let mut spectra: Vec<Vec<Complex<f64>>> = Vec::new();
-        for (j, panel) in problem.panels.iter().enumerate() {
-            let mut y = panel.y.clone();
-            drift.remove(j, &mut y, |_| true);
-            spectra.extend(y.chunks_exact(n).map(|period| whitening.spectrum(period)));
-        }
-        let mut power = vec![0.0; joints];
-        for (j, panel) in problem.panels.iter().enumerate() {
-            power[j] = panel.y.iter().map(|y| y * y).sum::<f64>() / panel.y.len() as f64;
-        }
-        for (k, scatter) in scatter.iter_mut().enumerate() {
-            for p in 0..periods {
-                let deviation = nalgebra::DVector::from_fn(joints, |j, _| {
-                    let of = |p: usize| spectra[j * periods + p][k];
-                    of(p) - (0..periods).map(of).sum::<Complex<f64>>() / periods as f64
-                });
-                *scatter += &deviation * deviation.adjoint() / Complex::from((periods - 1) as f64);
-            }
-        }
         // Beyond it the torque was not moved to the common motion.
         let last = (used + NEIGHBOURS.max(used / 4)).min(scene.highest);
-        let trends: Vec<Vec<NoisePower>> = (0..joints)
-            .map(|j| {
-                let floor = (FLOOR * FLOOR * power[j]).max(f64::MIN_POSITIVE);
-                let own: Vec<f64> =
-                    scatter.iter().map(|s| s[(j, j)].re.max(1e-6 * floor)).collect();
-                noise_trend(&own, periods - 1, last)
-            })
+        let mut scatter = whitening.scatter(problem, scene);
+        let power: Vec<f64> = problem
+            .panels
+            .iter()
+            .map(|panel| panel.y.iter().map(|y| y * y).sum::<f64>() / panel.y.len() as f64)
             .collect();
+        let trends = trends(&scatter, &power, periods, last);
+        scatter.truncate(last + 1);
         // Per harmonic, the standard deviation that the trend gives every joint.
-        let sd: Vec<Vec<f64>> = (0..=last)
+        let sd: Vec<Vec<f64>> = (0..scatter.len())
             .map(|k| trends.iter().map(|trend| trend[k].value.sqrt()).collect())
             .collect();
-        scatter.truncate(last + 1);
         for (scatter, sd) in scatter.iter_mut().zip(&sd) {
             for (i, j) in pairs(joints) {
                 scatter[(i, j)] /= sd[i] * sd[j];
             }
         }
+        let corners: Vec<Vec<Complex<f64>>> =
+            (0..joints).map(|j| whitening.spectrum(scene.sign.joint(j))).collect();
         for (k, sd) in sd[..=used].iter().enumerate() {
-            let reach = NEIGHBOURS.max(k / 4);
-            // The mean torque drifts more than its neighbours: it is left out of their average.
-            let range = k.saturating_sub(reach).max(1)..(k + reach + 1).min(scatter.len());
-            let count = range.len();
-            let mut s = DMatrix::<Complex<f64>>::zeros(joints, joints);
-            for scatter in &scatter[range] {
-                s += scatter;
-            }
-            let freedom = (count * (periods - 1)) as f64;
-            s *= Complex::from(1.0 / count as f64 * freedom / (freedom - joints as f64).max(1.0));
-            if k == 0 || 2 * k == n {
-                s.iter_mut().for_each(|v| v.im = 0.0);
-            }
+            let (mut s, freedom) = whitening.averaged(&scatter, k);
             let mut sd = sd.clone();
             let mut unknown: Vec<f64> =
                 trends.iter().map(|trend| trend[k].relative_variance + 1.0 / freedom).collect();
@@ -179,6 +110,52 @@ impl PeriodWhitening {
             whitening.factors.push(inverse.transpose().iter().copied().collect());
         }
         Ok(whitening)
+    }
+
+    /// Σ_p D Dᴴ/(P − 1) of every harmonic, D the deviation from the mean period, N × N.
+    fn scatter(&self, problem: &Problem, scene: &Scene) -> Vec<DMatrix<Complex<f64>>> {
+        let Self { samples: n, periods, joints, .. } = *self;
+        let drift = FrictionDrift::beside_mean(&scene.motion.qd_rad_s, periods);
+        let mut spectra: Vec<Vec<Complex<f64>>> = Vec::new();
+        for (j, panel) in problem.panels.iter().enumerate() {
+            let mut y = panel.y.clone();
+            drift.remove(j, &mut y, |_| true);
+            spectra.extend(y.chunks_exact(n).map(|period| self.spectrum(period)));
+        }
+        let of_harmonic = |k: usize| {
+            let mut scatter = DMatrix::zeros(joints, joints);
+            for p in 0..periods {
+                let deviation = nalgebra::DVector::from_fn(joints, |j, _| {
+                    let of = |p: usize| spectra[j * periods + p][k];
+                    of(p) - (0..periods).map(of).sum::<Complex<f64>>() / periods as f64
+                });
+                scatter += &deviation * deviation.adjoint() / Complex::from((periods - 1) as f64);
+            }
+            scatter
+        };
+        (0..n / 2 + 1).map(of_harmonic).collect()
+    }
+
+    /// `scatter` averaged about harmonic `k`, scaled for its inverse, and its complex degrees of freedom M.
+    fn averaged(
+        &self,
+        scatter: &[DMatrix<Complex<f64>>],
+        k: usize,
+    ) -> (DMatrix<Complex<f64>>, f64) {
+        let reach = NEIGHBOURS.max(k / 4);
+        // Where the mean torque drifts more than its neighbours, it is left out of their average.
+        let range = k.saturating_sub(reach).max(1)..(k + reach + 1).min(scatter.len());
+        let count = range.len();
+        let mut s = DMatrix::<Complex<f64>>::zeros(self.joints, self.joints);
+        for scatter in &scatter[range] {
+            s += scatter;
+        }
+        let freedom = (count * (self.periods - 1)) as f64;
+        s *= Complex::from(1.0 / count as f64 * freedom / (freedom - self.joints as f64).max(1.0));
+        if k == 0 || 2 * k == self.samples {
+            s.iter_mut().for_each(|v| v.im = 0.0);
+        }
+        (s, freedom)
     }
 
     /// How well the noise of every row is known.
@@ -223,7 +200,7 @@ impl PeriodWhitening {
     }
 
     /// The adjoint of [`Self::rows`], per joint over one period.
-    fn in_time(&self, rows: &[f64]) -> JointSignals {
+    pub(super) fn in_time(&self, rows: &[f64]) -> JointSignals {
         let n = self.samples;
         let inverse = RealFftPlanner::new().plan_fft_inverse(n);
         let mut spectra = vec![inverse.make_input_vec(); self.joints];
@@ -256,7 +233,8 @@ impl PeriodWhitening {
         out
     }
 
-    fn image(&self, column: &Column) -> Image {
+    /// See [`super::Whitening::image`].
+    pub(super) fn image(&self, column: &Column) -> Image {
         let n = self.samples;
         let repeats = column.parts.iter().all(|(_, y)| y.len() == n);
         let weight = (self.periods as f64).sqrt();
@@ -295,149 +273,23 @@ impl PeriodWhitening {
     }
 }
 
+/// How the power of every joint's noise runs over the harmonics of `scatter` up to `last`; no less than [`FLOOR`] of `power`, the mean
+/// square of its torque.
+fn trends(
+    scatter: &[DMatrix<Complex<f64>>],
+    power: &[f64],
+    periods: usize,
+    last: usize,
+) -> Vec<Vec<NoisePower>> {
+    let of_joint = |(j, power): (usize, &f64)| {
+        let floor = (FLOOR * FLOOR * power).max(f64::MIN_POSITIVE);
+        let own: Vec<f64> = scatter.iter().map(|s| s[(j, j)].re.max(1e-6 * floor)).collect();
+        noise_trend(&own, periods - 1, last)
+    };
+    power.iter().enumerate().map(of_joint).collect()
+}
+
 /// All (i, j) of a square matrix.
 fn pairs(n: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..n).flat_map(move |i| (0..n).map(move |j| (i, j)))
-}
-
-impl RunWhitening {
-    /// From a single run and the standard deviation of its residual per joint, Nm.
-    pub fn new(
-        regression: &Regression,
-        options: &Options,
-        sigma_nm: &[f64],
-    ) -> Result<Self, DiagnoseError> {
-        let rate_hz = regression.prepared.processing.rate_hz;
-        let filter = ZeroPhase::new(options.cutoff_hz, options.order, rate_hz)?;
-        let rows = regression.problem.samples;
-        Ok(Self {
-            filter,
-            first_sample: regression.first_sample,
-            every: regression.every,
-            rows,
-            thin: ((rate_hz / regression.every as f64 / (KEPT_RATE * options.cutoff_hz)) as usize)
-                .max(1),
-            weights: sigma_nm.iter().map(|s| 1.0 / s).collect(),
-            counts: Self::moving_rows(regression),
-            block_rows: ((BLOCK_S * rate_hz / regression.every as f64) as usize).max(1),
-        })
-    }
-
-    /// Block of time of every row of an image.
-    pub fn blocks(&self) -> Vec<usize> {
-        let one_joint: Vec<usize> =
-            (0..self.rows).step_by(self.thin).map(|r| r / self.block_rows).collect();
-        one_joint.repeat(self.weights.len())
-    }
-
-    /// Per joint and row of the regression, whether the joint moves.
-    pub fn moving_rows(regression: &Regression) -> Vec<Vec<bool>> {
-        let motion = &regression.prepared.motion;
-        let rest = (REST_S * regression.prepared.processing.rate_hz).ceil() as usize;
-        let rows = 0..regression.problem.samples;
-        (0..motion.joints())
-            .map(|j| {
-                let moves = moving(motion.qd_rad_s.joint(j), rest, rest / 4);
-                let at = |r: usize| moves[regression.sample(r)];
-                rows.clone().map(at).collect()
-            })
-            .collect()
-    }
-
-    /// These rows of the regression count on no joint any more.
-    pub fn leave_out(&mut self, rows: &[Range<usize>]) {
-        for counts in &mut self.counts {
-            rows.iter().for_each(|rows| counts[rows.clone()].fill(false));
-        }
-    }
-
-    fn filtered(&self, y: &[f64]) -> Vec<f64> {
-        let mut filtered = y.to_vec();
-        // The run is longer than the filter's memory, or there would be no regression of it.
-        let _ = self.filter.filter_in_place(&mut filtered, &mut Scratch::default());
-        filtered
-            .iter()
-            .skip(self.first_sample)
-            .step_by(self.every)
-            .take(self.rows)
-            .copied()
-            .collect()
-    }
-
-    fn image(&self, column: &Column, is_filtered: bool) -> Image {
-        let rows = self.rows.div_ceil(self.thin);
-        let mut mean = vec![0.0; rows * self.weights.len()];
-        for (j, y) in &column.parts {
-            let filtered = if is_filtered { y.clone() } else { self.filtered(y) };
-            let out = &mut mean[j * rows..(j + 1) * rows];
-            for (k, (out, value)) in
-                out.iter_mut().zip(filtered.iter().step_by(self.thin)).enumerate()
-            {
-                if self.counts[*j][k * self.thin] {
-                    *out += self.weights[*j] * value;
-                }
-            }
-        }
-        Image { mean, contrast: Vec::new() }
-    }
-}
-
-/// Samples in which a joint moves: not within a rest of `rest` samples or longer, nor `margin`
-/// samples beside one.
-fn moving(qd_rad_s: &[f64], rest: usize, margin: usize) -> Vec<bool> {
-    let n = qd_rad_s.len();
-    let mut moves = vec![true; n];
-    let mut start = 0;
-    for k in 0..=n {
-        if k < n && qd_rad_s[k].abs() < REST_RAD_S {
-            continue;
-        }
-        if k - start >= rest {
-            moves[start.saturating_sub(margin)..(k + margin).min(n)].fill(false);
-        }
-        start = k + 1;
-    }
-    moves
-}
-
-impl Whitening {
-    /// Rows of a torque signal given in time.
-    pub fn image(&self, column: &Column) -> Image {
-        match self {
-            Self::Periods(periods) => periods.image(column),
-            Self::Run(run) => run.image(column, false),
-        }
-    }
-
-    /// Rows of a column of the regression, which has been through its filter.
-    pub fn regression_image(&self, column: &Column) -> Image {
-        match self {
-            Self::Periods(periods) => periods.image(column),
-            Self::Run(run) => run.image(column, true),
-        }
-    }
-
-    /// Wᵀr in time: its correlation with a torque signal is that signal's score. `None` for a single run.
-    pub fn in_time(&self, rows: &Image) -> Option<JointSignals> {
-        match self {
-            Self::Periods(periods) => Some(periods.in_time(&rows.mean)),
-            Self::Run(_) => None,
-        }
-    }
-
-    /// Torque in time (n samples) as the regression sees it: filtered and cut for a single run.
-    pub fn as_regressed(&self, y: &[f64]) -> Vec<f64> {
-        match self {
-            Self::Periods(_) => y.to_vec(),
-            Self::Run(run) => run.filtered(y),
-        }
-    }
-
-    /// Whether row `row` of joint `joint` in the regression's time counts (the joint moves).
-    pub fn counts(&self, joint: usize, row: usize) -> bool {
-        match self {
-            Self::Periods(_) => true,
-            Self::Run(run) => run.counts[joint][row],
-        }
-    }
 }

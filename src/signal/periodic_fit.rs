@@ -27,6 +27,7 @@ use std::sync::Arc;
 use realfft::num_complex::Complex64;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
+use super::averaged_motion::{AveragedMotion, HarmonicPower};
 use super::error::{SignalError, checked_rate_hz, enough, same};
 use super::spectra::{BAND_HARMONICS, Band, Spectra};
 use crate::robot::JointSignals;
@@ -68,36 +69,6 @@ pub struct FitScratch {
     qd: Spectra,
     series: Vec<Complex64>,
     derived: Vec<Complex64>,
-}
-
-/// One period of a motion with its derivatives, and how noisy the record was.
-#[derive(Debug, Clone, PartialEq)]
-pub struct AveragedMotion {
-    /// Joint angles over one period, rad.
-    pub q_rad: JointSignals,
-    /// Joint velocities over one period, rad/s.
-    pub qd_rad_s: JointSignals,
-    /// Joint accelerations over one period, rad/s².
-    pub qdd_rad_s2: JointSignals,
-    /// Highest harmonic kept in the acceleration, per joint; 0 for a joint that stands still.
-    pub harmonics: Vec<usize>,
-    /// How well the acceleration is known, harmonic by harmonic, per joint.
-    pub acceleration: Vec<HarmonicPower>,
-    /// Noise of one raw sample of q, per joint, rad: rms scatter between periods.
-    pub sigma_q_rad: Vec<f64>,
-    /// Noise of one raw sample of q̇, per joint, rad/s.
-    pub sigma_qd_rad_s: Vec<f64>,
-    /// Noise left in `qdd_rad_s2`, per joint, rad/s²: √(Σ 2(hω)⁴ v_h).
-    pub sigma_qdd_rad_s2: Vec<f64>,
-}
-
-/// Mean squares of harmonics 1, 2, … of a joint's averaged acceleration, rad²/s⁴.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct HarmonicPower {
-    /// Of the estimate.
-    pub estimate: Vec<f64>,
-    /// Of the noise in it.
-    pub noise: Vec<f64>,
 }
 
 /// What the average keeps of one joint's series.
@@ -171,11 +142,9 @@ impl PeriodicFit {
             sigma_qdd_rad_s2: Vec::with_capacity(joints),
         };
         for j in 0..joints {
-            let FitScratch { time, fft, q, qd, .. } = &mut *scratch;
-            self.analyse(q_rad.joint(j), time, fft, q);
-            self.analyse(qd_rad_s.joint(j), time, fft, qd);
-            motion.sigma_q_rad.push(checked_sigma("angle", q_rad, j, q.sigma(n))?);
-            motion.sigma_qd_rad_s.push(checked_sigma("velocity", qd_rad_s, j, qd.sigma(n))?);
+            let [sigma_q_rad, sigma_qd_rad_s] = self.analyse_joint(q_rad, qd_rad_s, j, scratch)?;
+            motion.sigma_q_rad.push(sigma_q_rad);
+            motion.sigma_qd_rad_s.push(sigma_qd_rad_s);
 
             let Kept { acceleration, .. } = self.combine(scratch);
             let in_qdd = acceleration.noise.len();
@@ -203,25 +172,9 @@ impl PeriodicFit {
         share: f64,
         scratch: &mut FitScratch,
     ) -> Result<[JointSignals; 3], SignalError> {
-        let (n, joints) = (self.samples_per_period, q_rad.joints());
-        self.check_sizes(q_rad, qd_rad_s)?;
+        let n = self.samples_per_period;
         let highest = ((share * n as f64) as usize).clamp(1, n / 2);
-        let mut out = [(); 3].map(|()| JointSignals::zeros(joints, n * self.periods));
-        for j in 0..joints {
-            let FitScratch { time, fft, q, qd, .. } = &mut *scratch;
-            self.analyse(q_rad.joint(j), time, fft, q);
-            self.analyse(qd_rad_s.joint(j), time, fft, qd);
-            checked_sigma("angle", q_rad, j, q.sigma(n))?;
-            checked_sigma("velocity", qd_rad_s, j, qd.sigma(n))?;
-            for p in 0..self.periods {
-                let FitScratch { q, qd, series, .. } = &mut *scratch;
-                self.combine_period(q, qd, p, highest, series);
-                let period = p * n..(p + 1) * n;
-                let out = out.each_mut().map(|signals| &mut signals.joint_mut(j)[period.clone()]);
-                self.synthesise_motion(scratch, highest, out);
-            }
-        }
-        Ok(out)
+        self.period_by_period(q_rad, qd_rad_s, scratch, |_| [highest, highest])
     }
 
     /// How far every period is off the mean of all, in the harmonics that [`Self::fit`] keeps: angle, velocity
@@ -236,24 +189,35 @@ impl PeriodicFit {
         qd_rad_s: &JointSignals,
         scratch: &mut FitScratch,
     ) -> Result<[JointSignals; 3], SignalError> {
+        self.period_by_period(q_rad, qd_rad_s, scratch, |scratch| {
+            let Kept { highest, acceleration } = self.combine(scratch);
+            scratch.q.subtract_mean();
+            scratch.qd.subtract_mean();
+            [highest, acceleration.noise.len()]
+        })
+    }
+
+    /// Angle, velocity and acceleration (joints × P·n samples), period by period as in step 2, of what `highest` leaves in
+    /// the spectra of a joint; it says up to which harmonics: of angle and velocity, of the acceleration.
+    fn period_by_period(
+        &self,
+        q_rad: &JointSignals,
+        qd_rad_s: &JointSignals,
+        scratch: &mut FitScratch,
+        mut highest: impl FnMut(&mut FitScratch) -> [usize; 2],
+    ) -> Result<[JointSignals; 3], SignalError> {
         let (n, joints) = (self.samples_per_period, q_rad.joints());
         self.check_sizes(q_rad, qd_rad_s)?;
         let mut out = [(); 3].map(|()| JointSignals::zeros(joints, n * self.periods));
         for j in 0..joints {
-            let FitScratch { time, fft, q, qd, .. } = &mut *scratch;
-            self.analyse(q_rad.joint(j), time, fft, q);
-            self.analyse(qd_rad_s.joint(j), time, fft, qd);
-            checked_sigma("angle", q_rad, j, q.sigma(n))?;
-            checked_sigma("velocity", qd_rad_s, j, qd.sigma(n))?;
-            let Kept { highest, acceleration } = self.combine(scratch);
-            scratch.q.subtract_mean();
-            scratch.qd.subtract_mean();
+            self.analyse_joint(q_rad, qd_rad_s, j, scratch)?;
+            let [in_qd, in_qdd] = highest(scratch);
             for p in 0..self.periods {
                 let FitScratch { q, qd, series, .. } = &mut *scratch;
-                self.combine_period(q, qd, p, highest, series);
+                self.combine_period(q, qd, p, in_qd, series);
                 let period = p * n..(p + 1) * n;
                 let out = out.each_mut().map(|signals| &mut signals.joint_mut(j)[period.clone()]);
-                self.synthesise_motion(scratch, acceleration.noise.len(), out);
+                self.synthesise_motion(scratch, in_qdd, out);
             }
         }
         Ok(out)
@@ -310,6 +274,24 @@ impl PeriodicFit {
     /// ω of harmonic `h`, rad/s.
     fn angular_frequency(&self, h: usize) -> f64 {
         2.0 * PI * self.rate_hz * h as f64 / self.samples_per_period as f64
+    }
+
+    /// Step 1 for both channels of joint `j`; noise of one raw sample of each.
+    fn analyse_joint(
+        &self,
+        q_rad: &JointSignals,
+        qd_rad_s: &JointSignals,
+        j: usize,
+        scratch: &mut FitScratch,
+    ) -> Result<[f64; 2], SignalError> {
+        let n = self.samples_per_period;
+        let FitScratch { time, fft, q, qd, .. } = scratch;
+        self.analyse(q_rad.joint(j), time, fft, q);
+        self.analyse(qd_rad_s.joint(j), time, fft, qd);
+        Ok([
+            checked_sigma("angle", q_rad, j, q.sigma(n))?,
+            checked_sigma("velocity", qd_rad_s, j, qd.sigma(n))?,
+        ])
     }
 
     /// Step 1: coefficients of every period, their mean, and their scatter pooled over bands.

@@ -1,0 +1,139 @@
+//! Noise of a single run, of which only the fit's residual tells.
+
+use std::ops::Range;
+
+use crate::diagnose::error::DiagnoseError;
+use crate::diagnose::image::{Column, Image};
+use crate::identify::{Options, Regression};
+use crate::signal::{Scratch, ZeroPhase};
+
+/// Rows of a single run: the regression's low-pass, then a weight per joint, and only samples in
+/// which the joint moves: at rest dry friction may be anything between ±Fc.
+pub struct RunWhitening {
+    filter: ZeroPhase,
+    first_sample: usize,
+    every: usize,
+    rows: usize,
+    /// Every so many rows are tested: behind a low-pass neighbours say the same.
+    thin: usize,
+    weights: Vec<f64>,
+    /// Per joint and row.
+    counts: Vec<Vec<bool>>,
+    /// Rows per block of time, for tests that allow noise with a memory.
+    block_rows: usize,
+}
+
+/// Rows kept of a single run, per second and hertz of its low-pass.
+const KEPT_RATE: f64 = 4.0;
+/// Blocks of a single run.
+const BLOCK_S: f64 = 1.0;
+/// A joint slower than this, rad/s, for as long as [`REST_S`] stands still.
+const REST_RAD_S: f64 = 0.02;
+const REST_S: f64 = 0.25;
+
+impl RunWhitening {
+    /// From a single run and the standard deviation of its residual per joint, Nm.
+    pub fn new(
+        regression: &Regression,
+        options: &Options,
+        sigma_nm: &[f64],
+    ) -> Result<Self, DiagnoseError> {
+        let rate_hz = regression.prepared.processing.rate_hz;
+        let filter = ZeroPhase::new(options.cutoff_hz, options.order, rate_hz)?;
+        let rows = regression.problem.samples;
+        Ok(Self {
+            filter,
+            first_sample: regression.first_sample,
+            every: regression.every,
+            rows,
+            thin: ((rate_hz / regression.every as f64 / (KEPT_RATE * options.cutoff_hz)) as usize)
+                .max(1),
+            weights: sigma_nm.iter().map(|s| 1.0 / s).collect(),
+            counts: Self::moving_rows(regression),
+            block_rows: ((BLOCK_S * rate_hz / regression.every as f64) as usize).max(1),
+        })
+    }
+
+    /// Block of time of every row of an image.
+    pub fn blocks(&self) -> Vec<usize> {
+        let one_joint: Vec<usize> =
+            (0..self.rows).step_by(self.thin).map(|r| r / self.block_rows).collect();
+        one_joint.repeat(self.weights.len())
+    }
+
+    /// Per joint and row of the regression, whether the joint moves.
+    pub fn moving_rows(regression: &Regression) -> Vec<Vec<bool>> {
+        let motion = &regression.prepared.motion;
+        let rest = (REST_S * regression.prepared.processing.rate_hz).ceil() as usize;
+        let rows = 0..regression.problem.samples;
+        (0..motion.joints())
+            .map(|j| {
+                let moves = moving(motion.qd_rad_s.joint(j), rest, rest / 4);
+                let at = |r: usize| moves[regression.sample(r)];
+                rows.clone().map(at).collect()
+            })
+            .collect()
+    }
+
+    /// These rows of the regression count on no joint any more.
+    pub fn leave_out(&mut self, rows: &[Range<usize>]) {
+        for counts in &mut self.counts {
+            rows.iter().for_each(|rows| counts[rows.clone()].fill(false));
+        }
+    }
+
+    /// Whether row `row` of joint `joint` in the regression's time counts (the joint moves).
+    pub fn counts(&self, joint: usize, row: usize) -> bool {
+        self.counts[joint][row]
+    }
+
+    /// `y` in time as the regression sees it.
+    pub(super) fn filtered(&self, y: &[f64]) -> Vec<f64> {
+        let mut filtered = y.to_vec();
+        // The run is longer than the filter's memory, or there would be no regression of it.
+        let _ = self.filter.filter_in_place(&mut filtered, &mut Scratch::default());
+        filtered
+            .iter()
+            .skip(self.first_sample)
+            .step_by(self.every)
+            .take(self.rows)
+            .copied()
+            .collect()
+    }
+
+    /// See [`super::Whitening::image`]; `is_filtered` is what has been through the regression's filter.
+    pub(super) fn image(&self, column: &Column, is_filtered: bool) -> Image {
+        let rows = self.rows.div_ceil(self.thin);
+        let mut mean = vec![0.0; rows * self.weights.len()];
+        for (j, y) in &column.parts {
+            let filtered = if is_filtered { y.clone() } else { self.filtered(y) };
+            let out = &mut mean[j * rows..(j + 1) * rows];
+            for (k, (out, value)) in
+                out.iter_mut().zip(filtered.iter().step_by(self.thin)).enumerate()
+            {
+                if self.counts[*j][k * self.thin] {
+                    *out += self.weights[*j] * value;
+                }
+            }
+        }
+        Image { mean, contrast: Vec::new() }
+    }
+}
+
+/// Samples in which a joint moves: not within a rest of `rest` samples or longer, nor `margin`
+/// samples beside one.
+fn moving(qd_rad_s: &[f64], rest: usize, margin: usize) -> Vec<bool> {
+    let n = qd_rad_s.len();
+    let mut moves = vec![true; n];
+    let mut start = 0;
+    for k in 0..=n {
+        if k < n && qd_rad_s[k].abs() < REST_RAD_S {
+            continue;
+        }
+        if k - start >= rest {
+            moves[start.saturating_sub(margin)..(k + margin).min(n)].fill(false);
+        }
+        start = k + 1;
+    }
+    moves
+}
