@@ -197,21 +197,21 @@ impl PeriodicFit {
         })
     }
 
-    /// Angle, velocity and acceleration (joints × P·n samples), period by period as in step 2, of what `highest` leaves in
-    /// the spectra of a joint; it says up to which harmonics: of angle and velocity, of the acceleration.
+    /// Angle, velocity and acceleration (joints × P·n samples), period by period as in step 2. `prepare` may change the
+    /// spectra of a joint before, and says up to which harmonics they are used: for angle and velocity, for the acceleration.
     fn period_by_period(
         &self,
         q_rad: &JointSignals,
         qd_rad_s: &JointSignals,
         scratch: &mut FitScratch,
-        mut highest: impl FnMut(&mut FitScratch) -> [usize; 2],
+        prepare: impl Fn(&mut FitScratch) -> [usize; 2],
     ) -> Result<[JointSignals; 3], SignalError> {
         let (n, joints) = (self.samples_per_period, q_rad.joints());
         self.check_sizes(q_rad, qd_rad_s)?;
         let mut out = [(); 3].map(|()| JointSignals::zeros(joints, n * self.periods));
         for j in 0..joints {
             self.analyse_joint(q_rad, qd_rad_s, j, scratch)?;
-            let [in_qd, in_qdd] = highest(scratch);
+            let [in_qd, in_qdd] = prepare(scratch);
             for p in 0..self.periods {
                 let FitScratch { q, qd, series, .. } = &mut *scratch;
                 self.combine_period(q, qd, p, in_qd, series);

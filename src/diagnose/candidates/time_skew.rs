@@ -6,8 +6,7 @@ use super::*;
 pub struct TimeSkew;
 
 /// Standard error of the law beside that of the noise, over the delay: most likely for the errors of the delays named in
-/// 72 arms, which are 1.26 σ in rms without it and 1.0 with it. What a drive delivers beyond its load is told by the torque
-/// that is late itself.
+/// 72 arms, which are 1.26 σ in rms without it and 1.0 with it.
 const FORM_ERROR: f64 = 0.035;
 
 impl Candidate for TimeSkew {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Complex, DMatrix};
+use nalgebra::{Complex, DMatrix, DVector};
 use realfft::{RealFftPlanner, RealToComplex};
 
 use crate::diagnose::error::DiagnoseError;
@@ -47,6 +47,7 @@ const FLOOR: f64 = 1e-4;
 /// How far, over the rate, what is used ends below the highest frequency of the periods' own motion. Not far, because half
 /// of what narrow play shows in 125 samples a second lies between 44 and 58 Hz.
 const BELOW_HIGHEST: f64 = 0.02;
+
 impl PeriodWhitening {
     /// From the periods of a log.
     pub fn new(regression: &Regression, scene: &Scene, log: &str) -> Result<Self, DiagnoseError> {
@@ -125,7 +126,7 @@ impl PeriodWhitening {
         let of_harmonic = |k: usize| {
             let mut scatter = DMatrix::zeros(joints, joints);
             for p in 0..periods {
-                let deviation = nalgebra::DVector::from_fn(joints, |j, _| {
+                let deviation = DVector::from_fn(joints, |j, _| {
                     let of = |p: usize| spectra[j * periods + p][k];
                     of(p) - (0..periods).map(of).sum::<Complex<f64>>() / periods as f64
                 });
@@ -143,7 +144,7 @@ impl PeriodWhitening {
         k: usize,
     ) -> (DMatrix<Complex<f64>>, f64) {
         let reach = NEIGHBOURS.max(k / 4);
-        // Where the mean torque drifts more than its neighbours, it is left out of their average.
+        // The mean torque drifts more than its neighbours: it is left out of their average.
         let range = k.saturating_sub(reach).max(1)..(k + reach + 1).min(scatter.len());
         let count = range.len();
         let mut s = DMatrix::<Complex<f64>>::zeros(self.joints, self.joints);
@@ -273,8 +274,8 @@ impl PeriodWhitening {
     }
 }
 
-/// How the power of every joint's noise runs over the harmonics of `scatter` up to `last`; no less than [`FLOOR`] of `power`, the mean
-/// square of its torque.
+/// How the power of every joint's noise runs over the harmonics of `scatter` up to `last`. Where nothing scatters it is a
+/// trace of `power`, the mean square of the joint's torque: powers are averaged as logarithms.
 fn trends(
     scatter: &[DMatrix<Complex<f64>>],
     power: &[f64],

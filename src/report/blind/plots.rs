@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::tables::range;
 use crate::montecarlo::blind::{SAID_NOTHING, SAID_UNEXPLAINED, Scores, Share, StrengthBin, power};
 use crate::report::ReportError;
 use crate::report::plot::{Axis, Band, Colour, HeatMap, IntervalPlot, IntervalRow, Mark, XyPlot};
@@ -84,7 +85,7 @@ pub(super) fn confidence_plot(scores: &Scores) -> Result<String, ReportError> {
         .map(|bin| {
             let [low, high] = bin.right.bounds(0.025);
             IntervalRow {
-                name: format!("{} … {} ({})", bin.range[0], bin.range[1], bin.right.of),
+                name: format!("{} ({})", range(bin.range), bin.right.of),
                 value: 100.0 * bin.right.value(),
                 low: 100.0 * low,
                 high: 100.0 * high,

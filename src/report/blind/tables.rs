@@ -58,7 +58,7 @@ pub fn target_table(scores: &Scores) -> Table {
 }
 
 /// The values of a bin, kept on one line.
-fn range([low, high]: [f64; 2]) -> String {
+pub(super) fn range([low, high]: [f64; 2]) -> String {
     if high.is_finite() { format!("{low}\u{a0}…\u{a0}{high}") } else { format!("≥\u{a0}{low}") }
 }
 
