@@ -58,9 +58,9 @@ pub fn on_other_periods(study: &Study, entries: &[&Entry]) -> Vec<Option<f64>> {
         .collect()
 }
 
-/// An orthonormal basis of a model's columns.
+/// A model's columns: those of the null model, and outside them those of causes.
 struct Model<'a> {
-    null: &'a [Image],
+    null: &'a Span,
     causes: Span,
 }
 
@@ -70,26 +70,20 @@ impl<'a> Model<'a> {
         for image in entries.iter().flat_map(|entry| &entry.images) {
             causes.push(image);
         }
-        Self { null: study.null.directions(), causes }
-    }
-
-    fn directions(&self) -> impl Iterator<Item = &Image> {
-        self.null.iter().chain(self.causes.directions())
+        Self { null: &study.null, causes }
     }
 
     /// P y.
     fn prediction(&self, y: &Image) -> Image {
-        let mut out = Image { mean: vec![0.0; y.mean.len()], contrast: Vec::new() };
-        for direction in self.directions() {
-            out.add(direction.dot(y), direction);
-        }
-        out
+        let mut prediction = self.null.inside(y);
+        prediction.add(1.0, &self.causes.inside(y));
+        prediction
     }
 
     /// Trace of P over `rows`.
     fn trace(&self, rows: &[usize]) -> f64 {
-        let of = |d: &Image| rows.iter().map(|&r| d.mean[r] * d.mean[r]).sum::<f64>();
-        self.directions().map(of).sum()
+        let directions = self.null.directions().chain(self.causes.directions());
+        directions.flat_map(|d| rows.iter().map(|&r| d.mean[r] * d.mean[r])).sum()
     }
 }
 

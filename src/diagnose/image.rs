@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatRef, Par};
 use nalgebra::DMatrix;
 
 /// A torque signal on some joints, in Nm (or Nm per unit of its coefficient).
@@ -46,7 +48,7 @@ pub struct Image {
 impl Image {
     /// ⟨self, other⟩.
     pub fn dot(&self, other: &Self) -> f64 {
-        dot(&self.mean, &other.mean) + dot_of_contrasts(self, other)
+        dot(&self.mean, &other.mean) + dot_of_contrasts(&self.contrast, &other.contrast)
     }
 
     /// From the first to the last row of the mean that is not zero.
@@ -64,9 +66,13 @@ impl Image {
     /// self += factor · other.
     pub fn add(&mut self, factor: f64, other: &Self) {
         axpy(&mut self.mean, factor, &other.mean);
-        if !other.contrast.is_empty() {
-            self.contrast.resize(other.contrast.len(), 0.0);
-            axpy(&mut self.contrast, factor, &other.contrast);
+        self.add_contrast(factor, &other.contrast);
+    }
+
+    fn add_contrast(&mut self, factor: f64, contrast: &[f64]) {
+        if !contrast.is_empty() {
+            self.contrast.resize(contrast.len(), 0.0);
+            axpy(&mut self.contrast, factor, contrast);
         }
     }
 
@@ -77,15 +83,8 @@ impl Image {
 }
 
 /// ⟨a, b⟩ in the differences between periods; what repeats has none.
-fn dot_of_contrasts(a: &Image, b: &Image) -> f64 {
-    if a.contrast.is_empty() || b.contrast.is_empty() { 0.0 } else { dot(&a.contrast, &b.contrast) }
-}
-
-/// ⟨direction, y⟩, with the rows of the mean in which y is not zero: what acts on one joint of a single run is
-/// zero in those of the others.
-fn dot_on(support: &Range<usize>, direction: &Image, y: &Image) -> f64 {
-    let mean = dot(&direction.mean[support.clone()], &y.mean[support.clone()]);
-    mean + dot_of_contrasts(direction, y)
+fn dot_of_contrasts(a: &[f64], b: &[f64]) -> f64 {
+    if a.is_empty() || b.is_empty() { 0.0 } else { dot(a, b) }
 }
 
 /// Sum of products in eight interleaved partial sums: fast, and a fixed order.
@@ -109,9 +108,21 @@ fn axpy(y: &mut [f64], factor: f64, x: &[f64]) {
 /// An orthonormal basis of the span of columns, with the triangle that made it.
 #[derive(Debug, Clone, Default)]
 pub struct Span {
-    directions: Vec<Image>,
+    /// Means of the directions, one behind the other.
+    means: Vec<f64>,
+    /// Their contrasts.
+    contrasts: Vec<Vec<f64>>,
     /// Column k of R: coefficients of column k on directions 0…k.
     triangle: Vec<Vec<f64>>,
+}
+
+/// A direction of a [`Span`], with the rows of an [`Image`].
+#[derive(Debug, Clone, Copy)]
+pub struct Direction<'a> {
+    /// Rows of the mean period.
+    pub mean: &'a [f64],
+    /// Rows of the differences between periods; empty for what repeats.
+    pub contrast: &'a [f64],
 }
 
 /// A column that keeps less than this share of its length is a combination of those before it.
@@ -124,32 +135,33 @@ impl Span {
         for image in images {
             let mut image = image.clone();
             others.residualise(&mut image);
-            span.push(&image);
+            span.take(image);
         }
         span
     }
 
     /// Dimensions.
     pub fn len(&self) -> usize {
-        self.directions.len()
+        self.triangle.len()
     }
 
     /// Whether nothing is spanned.
     pub fn is_empty(&self) -> bool {
-        self.directions.is_empty()
+        self.triangle.is_empty()
     }
 
     /// Takes `column` in; `false`, and nothing changes, if it is already spanned.
     pub fn push(&mut self, column: &Image) -> bool {
-        let length = column.square().sqrt();
-        let mut rest = column.clone();
+        self.take(column.clone())
+    }
+
+    /// [`Self::push`] by classical Gram-Schmidt, twice: as orthogonal as rounding allows (Giraud et al. 2005).
+    fn take(&mut self, mut rest: Image) -> bool {
+        let length = rest.square().sqrt();
         let mut coefficients = vec![0.0; self.len()];
         for _ in 0..2 {
-            for (direction, coefficient) in self.directions.iter().zip(&mut coefficients) {
-                let along = direction.dot(&rest);
-                *coefficient += along;
-                rest.add(-along, direction);
-            }
+            let along = self.project_out(std::slice::from_mut(&mut rest));
+            coefficients.iter_mut().zip(along.col_as_slice(0)).for_each(|(c, a)| *c += a);
         }
         let outside = rest.square().sqrt();
         if outside.is_nan() || outside <= DEPENDENT * length {
@@ -157,7 +169,8 @@ impl Span {
         }
         rest.scale(1.0 / outside);
         coefficients.push(outside);
-        self.directions.push(rest);
+        self.means.extend(rest.mean);
+        self.contrasts.push(rest.contrast);
         self.triangle.push(coefficients);
         true
     }
@@ -167,19 +180,60 @@ impl Span {
         self.residualise_all(std::slice::from_mut(column));
     }
 
-    /// Removes from `columns` what is spanned; every direction is fetched once for all of them.
+    /// Removes from `columns` what is spanned, from all of them at once.
     pub fn residualise_all(&self, columns: &mut [Image]) {
-        let supports: Vec<Range<usize>> = columns.iter().map(Image::support).collect();
-        let along: Vec<Vec<f64>> = self
-            .directions
-            .iter()
-            .map(|d| columns.iter().zip(&supports).map(|(c, s)| dot_on(s, d, c)).collect())
-            .collect();
-        for (direction, along) in self.directions.iter().zip(along) {
-            for (column, along) in columns.iter_mut().zip(along) {
-                column.add(-along, direction);
+        self.project_out(columns);
+    }
+
+    /// Removes from `columns` what is spanned, and returns its coordinates, a column for each.
+    fn project_out(&self, columns: &mut [Image]) -> Mat<f64> {
+        let along = self.along(columns);
+        if self.is_empty() {
+            return along;
+        }
+        let mut spanned = Mat::zeros(self.rows(), columns.len());
+        matmul(&mut spanned, Accum::Replace, self.means(), &along, 1.0, Par::Seq);
+        for (c, column) in columns.iter_mut().enumerate() {
+            axpy(&mut column.mean, -1.0, spanned.col_as_slice(c));
+            for (contrast, along) in self.contrasts.iter().zip(along.col_as_slice(c)) {
+                column.add_contrast(-along, contrast);
             }
         }
+        along
+    }
+
+    /// ⟨direction, column⟩, a row for every direction: one matrix product over the rows of the means in which any of
+    /// `columns` is not zero. What acts on one joint of a single run is zero in those of the others.
+    fn along(&self, columns: &[Image]) -> Mat<f64> {
+        let mut along = Mat::zeros(self.len(), columns.len());
+        if self.is_empty() {
+            return along;
+        }
+        let supports = columns.iter().map(Image::support).filter(|support| !support.is_empty());
+        if let Some(support) = supports.reduce(|a, b| a.start.min(b.start)..a.end.max(b.end)) {
+            let mut means = Vec::<f64>::with_capacity(support.len() * columns.len());
+            columns.iter().for_each(|column| means.extend(&column.mean[support.clone()]));
+            let means = MatRef::from_column_major_slice(&means, support.len(), columns.len());
+            let directions = self.means().subrows(support.start, support.len()).transpose();
+            matmul(&mut along, Accum::Replace, directions, means, 1.0, Par::Seq);
+        }
+        for (c, column) in columns.iter().enumerate() {
+            let along = along.col_as_slice_mut(c);
+            for (along, contrast) in along.iter_mut().zip(&self.contrasts) {
+                *along += dot_of_contrasts(contrast, &column.contrast);
+            }
+        }
+        along
+    }
+
+    /// Means of the directions, rows × dimensions.
+    fn means(&self) -> MatRef<'_, f64> {
+        MatRef::from_column_major_slice(&self.means, self.rows(), self.len())
+    }
+
+    /// Rows of a mean.
+    fn rows(&self) -> usize {
+        self.means.len() / self.len().max(1)
     }
 
     /// The part of `y` that is spanned.
@@ -193,8 +247,7 @@ impl Span {
 
     /// ⟨direction, y⟩ for every direction.
     pub fn coordinates(&self, y: &Image) -> Vec<f64> {
-        let support = y.support();
-        self.directions.iter().map(|direction| dot_on(&support, direction, y)).collect()
+        self.along(std::slice::from_ref(y)).col_as_slice(0).to_vec()
     }
 
     /// Length² of the part of `y` inside the span.
@@ -221,8 +274,12 @@ impl Span {
     }
 
     /// The orthonormal directions.
-    pub fn directions(&self) -> &[Image] {
-        &self.directions
+    pub fn directions(&self) -> impl ExactSizeIterator<Item = Direction<'_>> {
+        let rows = self.rows();
+        self.contrasts.iter().enumerate().map(move |(k, contrast)| Direction {
+            mean: &self.means[k * rows..(k + 1) * rows],
+            contrast,
+        })
     }
 
     /// R⁻¹, with columns = directions · R.

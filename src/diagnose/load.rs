@@ -318,11 +318,17 @@ pub fn load_along(model: &Model, arm: &Arm, motion: &Motion) -> JointSignals {
     sum(&rigid_torque_along(model, motion), &rotors_along(arm, motion))
 }
 
-/// M_links q̈ + c + g of every sample, eight samples at a time.
+/// M_links q̈ + c + g of every sample, eight samples at a time with the widest registers of the machine.
 pub fn rigid_torque_along(model: &Model, motion: &Motion) -> JointSignals {
+    let mut out = JointSignals::zeros(motion.joints(), motion.samples());
+    pulp::Arch::new().dispatch(|| fill_rigid_torque(model, motion, &mut out));
+    out
+}
+
+#[inline(always)]
+fn fill_rigid_torque(model: &Model, motion: &Motion, out: &mut JointSignals) {
     let (joints, n) = (motion.joints(), motion.samples());
     let mut workspace = Workspace::<Lanes>::new(model);
-    let mut out = JointSignals::zeros(joints, n);
     let zero = <Lanes as Real>::constant(0.0);
     let (mut q, mut qd, mut qdd) = (vec![zero; joints], vec![zero; joints], vec![zero; joints]);
     let mut torque = vec![zero; joints];
@@ -340,7 +346,6 @@ pub fn rigid_torque_along(model: &Model, motion: &Motion) -> JointSignals {
             out.joint_mut(j)[start..start + count].copy_from_slice(&torque.0[..count]);
         }
     }
-    out
 }
 
 /// M of every sample, kg m², column by column: what one rad/s² more of a joint takes on all of them, beside the

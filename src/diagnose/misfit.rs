@@ -51,7 +51,7 @@ pub fn lack_of_fit(study: &Study, accepted: &Span, residual: &Image) -> Option<L
         .take_while(|edge| *edge <= knowledge.harmonics())
         .collect();
     let fitted = |row: usize| -> f64 {
-        let directions = study.null.directions().iter().chain(accepted.directions());
+        let directions = study.null.directions().chain(accepted.directions());
         directions.map(|d| d.mean[row] * d.mean[row]).sum()
     };
     let (mut least, mut worst) = (1.0f64, 0);

@@ -10,7 +10,7 @@
 //! - its probability is that of F(k, ν), ν from the share that every harmonic has in what is explained
 //!   (Satterthwaite 1946).
 
-use super::image::{Image, Span};
+use super::image::{Direction, Image, Span};
 use crate::signal::pooled;
 
 /// How well the noise of whitened rows is known.
@@ -56,7 +56,7 @@ impl NoiseKnowledge {
                 let (mut before, mut after, mut count) = (0.0, 0.0, 0.0);
                 for row in self.rows(harmonic, joint) {
                     let r = residual.mean[row];
-                    let terms = span.directions().iter().zip(&coordinates);
+                    let terms = span.directions().zip(&coordinates);
                     let left = r - terms.map(|(d, c)| d.mean[row] * c).sum::<f64>();
                     before += r * r;
                     after += left * left;
@@ -78,17 +78,17 @@ impl NoiseKnowledge {
         let harmonics = self.harmonics();
         let mut share = vec![vec![0.0; harmonics]; self.joints];
         let rows = residual.mean.len();
-        let of_row = |image: &Image, period: usize, row: usize| match period {
+        let of_row = |image: Direction, period: usize, row: usize| match period {
             0 => image.mean[row],
             p => image.contrast.get((p - 1) * rows + row).copied().unwrap_or(0.0),
         };
-        let longest = span.directions().iter().map(|d| d.contrast.len()).max().unwrap_or(0);
+        let longest = span.directions().map(|d| d.contrast.len()).max().unwrap_or(0);
         let mut all = 0.0;
         for (joint, share) in share.iter_mut().enumerate() {
             for (harmonic, share) in share.iter_mut().enumerate() {
                 for row in self.rows(harmonic, joint) {
                     for period in 0..=longest / rows.max(1) {
-                        let terms = span.directions().iter().zip(&coordinates);
+                        let terms = span.directions().zip(&coordinates);
                         let value: f64 = terms.map(|(d, c)| of_row(d, period, row) * c).sum();
                         *share += value * value;
                     }

@@ -145,7 +145,7 @@ impl Statistic {
         let whole = DVector::from_vec(span.coordinates(residual));
         let mut along = vec![DVector::<f64>::zeros(k); FOLDS];
         let mut gram = vec![DMatrix::<f64>::zeros(k, k); FOLDS];
-        let directions: Vec<&[f64]> = span.directions().iter().map(|d| d.mean.as_slice()).collect();
+        let directions: Vec<&[f64]> = span.directions().map(|d| d.mean).collect();
         for (row, (r, &block)) in residual.mean.iter().zip(block_of).enumerate() {
             let fold = block * FOLDS / blocks;
             for i in 0..k {
@@ -177,7 +177,7 @@ impl Statistic {
         span.residualise(&mut left);
         let k = coordinates.len();
         let mut sums = vec![DVector::<f64>::zeros(k); *blocks];
-        for (i, direction) in span.directions().iter().enumerate() {
+        for (i, direction) in span.directions().enumerate() {
             for ((d, r), &block) in direction.mean.iter().zip(&left.mean).zip(block_of) {
                 sums[block][i] += d * r;
             }
