@@ -5,6 +5,7 @@ use super::candidates::{self, Candidate};
 use super::common_motion::move_to_common_motion;
 use super::contact::{self, BesideModel};
 use super::data_faults;
+use super::drives::Drives;
 use super::error::DiagnoseError;
 use super::extension::{Extension, mean_period};
 use super::gain;
@@ -19,7 +20,7 @@ use super::payload::{self, PayloadFinding};
 use super::record::{Record, is_torn};
 use super::replay::measured_nm;
 use super::scene::Scene;
-use super::selection::{Kept, select};
+use super::selection::{Kept, odds_of_alike, select};
 use super::significance::LEAST_EVIDENCE;
 use super::study::{Entry, Study};
 use super::verdict::{Cause, DetectionLimit, Diagnosis, Rival, Rms, Verdict};
@@ -108,16 +109,31 @@ impl<'a> Diagnoser<'a> {
         move_to_common_motion(&mut regression, m, (self.arm, self.set), &fit.theta);
         let sources = (self.arm, self.set, &self.options);
         let estimate = (&fit.theta[..], &fit.joint_sigma_nm[..]);
-        let mut first = Study::new(&self.families, sources, &regression, estimate, m.source)?;
-        first.leave_out(coarse);
-        let null = Extension::fit(&first, &[], &first.torque);
-        let first = self.without_contacts(first, &null, m.source)?;
-        let found = select(&first);
+        let judged = |drives: Drives| {
+            let mut study =
+                Study::new(&self.families, sources, &regression, estimate, drives, m.source)?;
+            study.leave_out(coarse.clone());
+            let null = Extension::fit(&study, &[], &study.torque);
+            let study = without_contacts(study, self.set, &null, m.source)?;
+            let found = select(&study);
+            Ok::<_, DiagnoseError>((study, found))
+        };
+        let (mut first, mut found) = judged(Drives::Differ)?;
+        if first.odd_drives > 0 {
+            let (alike, of_alike) = judged(Drives::Alike)?;
+            if odds_of_alike((&alike, &of_alike), (&first, &found)) > 0.0 {
+                (first, found) = (alike, of_alike);
+            }
+        }
         // The load on the gear is better known once friction is, and so is what touched the arm.
-        let entries: Vec<&Entry> = found.iter().map(|c| &c.entry).collect();
-        let refined = Extension::fit(&first, &entries, &first.torque);
-        let study = first.with_estimate(self.arm, self.set, &refined.theta);
-        let mut study = self.without_contacts(study, &refined, m.source)?;
+        let mut study = if found.is_empty() && first.scene.periodic {
+            first
+        } else {
+            let entries: Vec<&Entry> = found.iter().map(|c| &c.entry).collect();
+            let refined = Extension::fit(&first, &entries, &first.torque);
+            let study = first.with_estimate(self.arm, self.set, &refined.theta);
+            without_contacts(study, self.set, &refined, m.source)?
+        };
         let null = Extension::fit(&study, &[], &study.torque);
         let mut kept = Kept::taken_over(&study, found.clone());
         if !study.scene.periodic {
@@ -271,17 +287,6 @@ impl<'a> Diagnoser<'a> {
         payload::between(&shared, &regressions[0], &regressions[1], names, known_mass_kg)
     }
 
-    /// `study` of a single run without the rows in which something touched the arm beside `model`.
-    fn without_contacts<'s>(
-        &self,
-        study: Study<'s>,
-        model: &Extension,
-        log: &str,
-    ) -> Result<Study<'s>, DiagnoseError> {
-        let touched = beside_model(&study, &residual(&study, model));
-        study.without_rows(self.set, &touched.samples, log)
-    }
-
     fn cause(
         &self,
         study: &Study,
@@ -366,6 +371,17 @@ impl<'a> Diagnoser<'a> {
         }
         out
     }
+}
+
+/// `study` of a single run without the rows in which something touched the arm beside `model`.
+fn without_contacts<'s>(
+    study: Study<'s>,
+    set: &BaseSet,
+    model: &Extension,
+    log: &str,
+) -> Result<Study<'s>, DiagnoseError> {
+    let touched = beside_model(&study, &residual(&study, model));
+    study.without_rows(set, &touched.samples, log)
 }
 
 /// Contacts in the residual of a model along a single run; none where a motion repeats, which shows them

@@ -1,6 +1,7 @@
 //! The extended model: base parameters and effects together.
 
 use super::candidates::{Candidate, Shape};
+use super::drives::Answer;
 use super::image::{Column, Image, Span};
 use super::scene::Scene;
 use super::study::{Entry, Study};
@@ -28,8 +29,8 @@ pub struct Effect {
 pub struct Extension {
     /// Base parameters.
     pub theta: Vec<f64>,
-    /// Joint, place in [`Scene::answers`] and coefficient of how the drives answer friction.
-    pub answers: Vec<(usize, usize, f64)>,
+    /// How the drives answer friction.
+    pub answers: Answer,
     /// Effects.
     pub effects: Vec<Effect>,
 }
@@ -71,8 +72,11 @@ impl Extension {
         }
         let mut theta = study.null.solve(&rest);
         let answers = theta.split_off(study.base_count());
-        let answers = study.answers.iter().zip(answers).map(|(&(j, which), b)| (j, which, b));
-        Self { theta, answers: answers.collect(), effects }
+        let parts = |(answer, b): (&Answer, f64)| -> Answer {
+            answer.iter().map(|(j, which, factor)| (*j, *which, factor * b)).collect()
+        };
+        let answers = study.answers.iter().zip(answers).flat_map(parts).collect();
+        Self { theta, answers, effects }
     }
 
     /// The same model for another log ([`Candidate::elsewhere`]).

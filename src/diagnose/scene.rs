@@ -258,6 +258,7 @@ impl Scene {
 
     /// Velocity of joint `j` at its instants, rad/s, while dry friction turns round by `law` within a few `width_rad_s` and
     /// the drive delivers a share of what the model expects (see `reversals`): `fed`, or what its answer to reversals tells.
+    /// Of a single run it is what was recorded.
     pub fn turning_rad_s(
         &self,
         j: usize,
@@ -265,6 +266,9 @@ impl Scene {
         width_rad_s: f64,
         law: impl Fn(f64) -> f64,
     ) -> Vec<f64> {
+        if !self.periodic {
+            return self.motion.qd_rad_s.joint(j).to_vec();
+        }
         let joint = self.turning(j);
         // An estimate may come to no friction.
         let (Some(clock), Some(told), true) =

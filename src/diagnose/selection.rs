@@ -47,6 +47,23 @@ pub fn select(study: &Study) -> Vec<Contender> {
     kept.causes
 }
 
+/// 2 ln of the odds for one share of friction that all drives feed forward, with what is found beside it, against a share of
+/// each.
+///
+/// Of the latter a share of its own is paid for, as a cause's coefficient, where it seems odd; elsewhere it fits noise, and
+/// is given back what it explains of that.
+pub fn odds_of_alike(alike: (&Study, &[Contender]), differ: (&Study, &[Contender])) -> f64 {
+    let evidence = |(study, causes): (&Study, &[Contender])| {
+        let kept = Kept { study, causes: causes.to_vec(), with_common: study.scene.periodic };
+        kept.total_evidence() - study.residual.square()
+    };
+    let study = differ.0;
+    let price = study.statistic.coefficient_price(None, study.residual.mean.len());
+    let freed = study.answers.len() as f64 - alike.0.answers.len() as f64;
+    let odd = study.odd_drives as f64;
+    evidence(alike) - evidence(differ) + odd * price + (freed - odd)
+}
+
 impl<'s, 'a> Kept<'s, 'a> {
     /// `causes` found in another study of the same log (its load estimated with another model),
     /// taken over into `study`, refined and judged.

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::candidates::{Candidate, Search, Shape};
 use super::distinct_shapes::distinct_shapes;
+use super::drives::{Answer, Answers, Drives};
 use super::error::DiagnoseError;
 use super::image::{Column, Image, Span, dot};
 use super::scene::Scene;
@@ -48,11 +49,12 @@ pub struct Study<'a> {
     pub regression: &'a Regression,
     /// Where tests are made.
     pub whitening: Whitening,
-    /// The null model's columns there: base parameters, and behind them how the drives answer friction
-    /// ([`Scene::answers`]).
+    /// The null model's columns there: base parameters, and behind them how the drives answer friction.
     pub null_columns: Vec<Image>,
-    /// Joint and place in [`Scene::answers`] of the latter.
-    pub answers: Vec<(usize, usize)>,
+    /// What is in each of the latter.
+    pub answers: Vec<Answer>,
+    /// See [`Answers::odd`].
+    pub odd_drives: usize,
     /// Their span.
     pub null: Span,
     /// Torque minus null model there.
@@ -90,6 +92,7 @@ impl<'a> Study<'a> {
         (arm, set, options): (&Arm, &BaseSet, &Options),
         regression: &'a Regression,
         (theta, sigma_nm): (&[f64], &[f64]),
+        drives: Drives,
         log: &str,
     ) -> Result<Self, DiagnoseError> {
         let scene = Scene::new(arm, set, theta, &regression.prepared);
@@ -98,18 +101,18 @@ impl<'a> Study<'a> {
         } else {
             Whitening::Run(RunWhitening::new(regression, options, sigma_nm)?)
         };
-        let mut study = Self::behind(whitening, scene, families, set, regression, log)?;
+        let mut study = Self::behind((whitening, scene), families, set, regression, drives, log)?;
         study.fill_entries();
         Ok(study)
     }
 
     /// Everything but the entries.
     fn behind(
-        whitening: Whitening,
-        scene: Scene,
+        (whitening, scene): (Whitening, Scene),
         families: &'a [Box<dyn Candidate>],
         set: &BaseSet,
         regression: &'a Regression,
+        drives: Drives,
         log: &str,
     ) -> Result<Self, DiagnoseError> {
         let problem = &regression.problem;
@@ -135,34 +138,15 @@ impl<'a> Study<'a> {
         let torque = whitening.regression_image(&Column {
             parts: problem.panels.iter().enumerate().map(|(j, p)| (j, p.y.clone())).collect(),
         });
+        let of_drives = Answers::of(&scene, &whitening, &null, &torque);
+        let odd_drives = of_drives.odd(&scene.coulomb_nm);
         let mut answers = Vec::new();
-        let rigid = null.clone();
-        for j in 0..scene.joints() {
-            for (which, column) in scene.answers(j).into_iter().enumerate() {
-                let image = whitening.image(&Column::on(j, column));
-                if null.push(&image) {
-                    answers.push((j, which));
-                    images.push(image);
-                }
+        for (answer, image) in of_drives.columns(&scene.coulomb_nm, drives) {
+            if null.push(&image) {
+                answers.push(answer);
+                images.push(image);
             }
         }
-        let b = null.solve(&torque);
-        let of_drives = images.split_off(rigid.len());
-        let count = answers.len();
-        let (answers, of_drives): (Vec<_>, Vec<_>) = answers
-            .into_iter()
-            .zip(of_drives)
-            .zip(&b[rigid.len()..])
-            .filter(|&(((j, which), _), b)| scene.can_answer(j, which, *b))
-            .map(|(answer, _)| answer)
-            .unzip();
-        if answers.len() < count {
-            null = rigid;
-            of_drives.iter().for_each(|image| {
-                null.push(image);
-            });
-        }
-        images.extend(of_drives);
         let mut residual = torque.clone();
         null.residualise(&mut residual);
         let statistic = Statistic::new(&whitening, &residual, problem.joints());
@@ -173,6 +157,7 @@ impl<'a> Study<'a> {
             whitening,
             null_columns: images,
             answers,
+            odd_drives,
             null,
             residual,
             statistic,
@@ -197,7 +182,8 @@ impl<'a> Study<'a> {
         }
         run.leave_out(rows);
         let Self { whitening, scene, families, regression, left_out, .. } = self;
-        let study = Self::behind(whitening, scene, families, set, regression, log)?;
+        let of_run = (whitening, scene);
+        let study = Self::behind(of_run, families, set, regression, Drives::Differ, log)?;
         let mut study = Self { left_out, ..study };
         study.fill_entries();
         Ok(study)

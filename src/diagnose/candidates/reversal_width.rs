@@ -9,6 +9,7 @@
 //! width of the file; drives feed dry friction forward by that width, or not at all: these are the variants.
 
 use super::*;
+use crate::dynamics::Real;
 
 /// See the module.
 pub struct ReversalWidth;
@@ -21,6 +22,10 @@ const SHARPEST: f64 = 0.05;
 const CHANGES: [f64; 11] = [-0.9, -0.8, -0.6, -0.35, -0.15, 0.15, 0.4, 0.8, 1.6, 3.2, 6.4];
 /// The coefficient over the shape: all dry friction of a joint turns round, and an estimate is off by less than this.
 const WHOLE: std::ops::RangeInclusive<f64> = 0.4..=2.5;
+/// Standard error of widths less than the model's, over what they are less: what a drive answers while friction turns round
+/// within a sample is not known. In logs of another simulator, whose drives feed nothing forward, a width of 0.002 rad/s left
+/// 0.14 of its strength to late torques of the wrist.
+const SHARP_ERROR: f64 = 0.15;
 
 impl Candidate for ReversalWidth {
     fn kind(&self) -> Kind {
@@ -55,7 +60,7 @@ impl Candidate for ReversalWidth {
         let change = width - epsilon;
         let fed = Some(shape.variant as f64);
         let per_width = |j: usize| {
-            let law = |qd: f64| (qd / width).tanh();
+            let law = |qd: f64| Real::tanh(qd / width);
             let slope = |(qd, sign): (f64, &f64)| (law(qd) - sign) / change;
             let qd = scene.turning_rad_s(j, fed, width, law);
             let unit = qd.into_iter().zip(&scene.instants(j).sign).map(slope).collect();
@@ -76,10 +81,8 @@ impl Candidate for ReversalWidth {
         0.0
     }
 
-    /// What a drive answers while friction turns round within a sample is not known. In logs of another simulator, whose
-    /// drives feed nothing forward, a width of 0.002 rad/s left 0.14 of its strength to late torques of the wrist.
     fn form_error(&self, _: &Scene, shape: Shape) -> f64 {
-        if shape.value < 0.0 { 0.15 } else { 0.0 }
+        if shape.value < 0.0 { SHARP_ERROR } else { 0.0 }
     }
 
     fn separating_experiment(&self) -> &'static str {
@@ -88,6 +91,12 @@ impl Candidate for ReversalWidth {
 
     fn is_possible(&self, shape: Shape, b: &[f64]) -> bool {
         WHOLE.contains(&(b[0] / shape.value))
+    }
+
+    /// No friction turns round faster than at once: a coefficient beyond that is of friction that there is more of.
+    fn is_its_own(&self, scene: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> bool {
+        let at_once = -scene.arm.friction_epsilon_rad_s;
+        b[0] >= (1.0 + 2.0 * SHARP_ERROR) * at_once
     }
 
     fn in_words(&self) -> &'static str {

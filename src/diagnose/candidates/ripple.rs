@@ -4,6 +4,7 @@
 //! ([`Scene::as_logged`]).
 
 use super::*;
+use crate::dynamics::Real;
 
 /// See the module.
 pub struct Ripple;
@@ -73,7 +74,7 @@ impl Candidate for Ripple {
             0.5 * scene.rate_hz * std::f64::consts::TAU / shape.value
         };
         let wave = |(q, qd): (&f64, &f64)| {
-            if qd.abs() < fastest_rad_s { (shape.value * q).sin_cos() } else { (0.0, 0.0) }
+            if qd.abs() < fastest_rad_s { Real::sin_cos(shape.value * q) } else { (0.0, 0.0) }
         };
         let (sin, cos) = at.q_rad.iter().zip(&at.qd_rad_s).map(wave).unzip();
         [cos, sin].map(|ripple| Column::on(j, scene.as_logged(ripple))).into()
