@@ -27,6 +27,8 @@ pub struct Scene {
     pub rate_hz: f64,
     /// Repetitions P.
     pub periods: usize,
+    /// Time from the beginning of the log to the first sample, s.
+    pub lead_in_s: f64,
     /// Whether the motion closes on itself.
     pub periodic: bool,
     /// Torque that moves the links along the motion as it was recorded, Nm.
@@ -145,6 +147,7 @@ impl Scene {
             coulomb_nm: (0..joints).map(|j| drive(j).coulomb_nm).collect(),
             rate_hz,
             periods: prepared.processing.periods,
+            lead_in_s: prepared.lead_in_s,
             arm,
             motion,
             periodic,

@@ -57,6 +57,9 @@ pub struct Processing {
 pub struct Prepared {
     /// One period of the averaged motion, or the whole single run.
     pub motion: Motion,
+    /// Time from the beginning of the log to the first sample used, s: where a motion that repeats does so at first with
+    /// others than its later periods, these are left out.
+    pub lead_in_s: f64,
     /// Torque of all periods one after the other, or of the single run, Nm.
     pub torque_nm: JointSignals,
     /// Scatter of the torque between periods; `None` for a single run.
@@ -249,6 +252,7 @@ impl Preparer {
                 qd_rad_s: averaged.qd_rad_s,
                 qdd_rad_s2: averaged.qdd_rad_s2,
             },
+            lead_in_s: window.start as f64 / even.rate_hz,
             each_period,
             recorded: Some([q_rad, qd_rad_s]),
             between: even.between.as_ref().map(|between| between[window.clone()].to_vec()),
@@ -305,6 +309,7 @@ impl Preparer {
                 qd_rad_s: qd_rad_s.slice(window.clone()),
                 qdd_rad_s2: qdd_rad_s2.slice(window.clone()),
             },
+            lead_in_s: window.start as f64 / rate_hz,
             torque_nm: even.torque_nm.slice(window.clone()),
             each_period: None,
             recorded: None,

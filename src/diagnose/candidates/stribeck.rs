@@ -15,6 +15,10 @@ pub struct Stribeck;
 /// usual; between 0.2 and 0.8 the turn moves estimates of F by 4 %, between none and 0.2 by more than their σ.
 const USUAL_SHARE: f64 = 0.5;
 
+/// Standard error of F and v_s over their value, for that. Of 97 arms in which it was found the intervals held 93 and 94
+/// truths (F and v_s) with it, 92 and 88 without.
+const TURN_ERROR: f64 = 0.04;
+
 /// A curve that falls over more than this speed, rad/s, is no matter of slow motion.
 fn widest(scene: &Scene) -> f64 {
     25.0 * scene.arm.friction_epsilon_rad_s
@@ -55,6 +59,14 @@ impl Candidate for Stribeck {
 
     fn quantities(&self, _: &Scene, _: Option<usize>, shape: Shape, b: &[f64]) -> Vec<Quantity> {
         vec![quantity("extra_nm", b[0], "Nm"), quantity("vs_rad_s", shape.value, "rad/s")]
+    }
+
+    fn least(&self) -> f64 {
+        0.0
+    }
+
+    fn form_error(&self, scene: &Scene, _: Shape) -> f64 {
+        if scene.periodic { TURN_ERROR } else { 0.0 }
     }
 
     fn separating_experiment(&self) -> &'static str {

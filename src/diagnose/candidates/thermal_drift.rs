@@ -1,5 +1,6 @@
 //! Friction that changes while the arm warms up: τ = f (F_c sign q̇ + F_v q̇)(1 − e^{−t/T}), t from the
-//! start of the record. It does not repeat, so that the differences between periods show it.
+//! start of the record, not of what is used of it: a motion that changes with its friction repeats later. It does not
+//! repeat itself, so that the differences between periods show it.
 
 use super::*;
 
@@ -29,7 +30,8 @@ impl Candidate for ThermalDrift {
         let (qd, sign) = (scene.motion.qd_rad_s.joint(j), scene.sign.joint(j));
         let n = scene.samples();
         let friction = (0..n * scene.periods).map(|k| {
-            let warm = 1.0 - (-(k as f64) / scene.rate_hz / shape.value).exp();
+            let time_s = scene.lead_in_s + k as f64 / scene.rate_hz;
+            let warm = 1.0 - (-time_s / shape.value).exp();
             warm * (drive.coulomb_nm * sign[k % n] + drive.viscous_nm_s_rad * qd[k % n])
         });
         vec![Column::on(j, friction.collect())]
