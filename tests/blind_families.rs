@@ -254,6 +254,30 @@ fn warming_is_no_contact() {
     }
 }
 
+/// The first periods of a joint whose friction changes fast are no repetitions of the later ones and are left out; its
+/// friction is that of the beginning all the same.
+#[test]
+fn warming_begins_with_the_log() {
+    let toml = "[[effect]]\nkind = \"thermal_drift\"\njoint = 4\nfraction = 0.25\n\
+                time_constant_s = 23.0";
+    let d = diagnose_along("ur5_validation", 1, toml);
+    assert!(is_named(&d, "thermal_drift", Some(4)));
+    let e = &d.causes[0].parameters["fraction"];
+    // Twice the half width: 3.9 σ, which one log in 10⁴ misses by chance.
+    let width = e.ci95[1] - e.ci95[0];
+    assert!((e.value - 0.25).abs() < width && width < 0.2, "{e:?}");
+}
+
+/// More friction near rest does to the torque what another share of it that a drive feeds forward does; but the other five
+/// drives tell that share.
+#[test]
+fn friction_near_rest_is_no_odd_drive() {
+    let toml = "[[effect]]\nkind = \"stribeck\"\njoint = 1\nextra_nm = 3.2\nvs_rad_s = 0.06";
+    let d = diagnose_along("ur5_identification", 7, toml);
+    assert!(is_named(&d, "stribeck", Some(1)));
+    assert_eq!(d.causes.len(), 1, "{:?}", d.sentences);
+}
+
 /// Rows 6, 8 and 10 ms apart with true time stamps: what lies between rows is no physics.
 #[test]
 fn an_uneven_clock_is_no_cause() {

@@ -6,7 +6,7 @@
 //!
 //! 1. The log is processed as for identification, and its equations are whitened ([`Whitening`]): with
 //!    periods by the scatter between them (less what drifting friction does there), without by the residual itself.
-//!    How the drives answer dry friction belongs to the null model ([`Answers`]), and friction is
+//!    How the drives answer dry friction belongs to the null model (`drives`), and friction is
 //!    looked at between the samples of a log ([`Scene::as_logged`], [`Scene::turning_rad_s`]).
 //! 2. Every family's columns lose what the null model spans; the squared length of the residual along
 //!    them, T = ‖P r‖² ~ χ²_k(λ), is the score test of adding the family.

@@ -386,14 +386,14 @@ impl<'a> Study<'a> {
         if let Some(half_width) = self.families[entry.family].half_width(&self.scene, entry.site) {
             return Some([value - half_width, value + half_width]);
         }
-        let same = self.entries.iter().filter(|e| {
-            (e.family, e.site, e.shape.variant) == (entry.family, entry.site, entry.shape.variant)
-        });
+        // Also of those which the null model absorbs: what lies between one of them and this one need not be.
+        let shapes = self.families[entry.family].shapes(&self.scene, entry.site);
+        let same = shapes.iter().filter(|shape| shape.variant == entry.shape.variant);
         let near = 1e-9 * value.abs();
         let (mut low, mut high) = (value, value);
         let mut below = f64::NEG_INFINITY;
         let mut above = f64::INFINITY;
-        for other in same.map(|e| e.shape.value) {
+        for other in same.map(|shape| shape.value) {
             if other < value - near {
                 below = below.max(other);
             } else if other > value + near {
