@@ -93,7 +93,8 @@ impl Candidate for ReversalWidth {
         WHOLE.contains(&(b[0] / shape.value))
     }
 
-    /// No friction turns round faster than at once: a coefficient beyond that is of friction that there is more of.
+    /// No friction turns round faster than at once: a coefficient beyond that by two standard errors of the law is of
+    /// friction that there is more of.
     fn is_its_own(&self, scene: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> bool {
         let at_once = -scene.arm.friction_epsilon_rad_s;
         b[0] >= (1.0 + 2.0 * SHARP_ERROR) * at_once
