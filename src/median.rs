@@ -1,4 +1,4 @@
-//! The median: the value in the middle, of an even number of values the mean of the two there.
+//! The median (the value in the middle, of an even number of values the mean of the two there), and what is like it.
 
 /// Median of finite values, whose order changes; `None` of none.
 pub fn median(values: &mut [f64]) -> Option<f64> {
@@ -10,6 +10,19 @@ pub fn median(values: &mut [f64]) -> Option<f64> {
     let (below, &mut upper, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
     let lower = below.iter().copied().max_by(f64::total_cmp).filter(|_| is_even);
     Some(lower.map_or(upper, |lower| 0.5 * (lower + upper)))
+}
+
+/// Mean of all values but the least and the greatest, whose order changes: one wild value does not move it, and of seven
+/// Gaussian values it has 7 % more variance than the mean of all, where their median has 47 % more. Of one or two values
+/// their mean; `None` of none.
+pub fn trimmed_mean(values: &mut [f64]) -> Option<f64> {
+    values.sort_unstable_by(f64::total_cmp);
+    let inner = match values.len() {
+        0 => return None,
+        1 | 2 => &*values,
+        n => &values[1..n - 1],
+    };
+    Some(inner.iter().sum::<f64>() / inner.len() as f64)
 }
 
 /// Standard deviation of Gaussian values from the median of their `sizes` |x|, whose order changes: median/0.6745;
@@ -35,5 +48,14 @@ mod tests {
         assert_eq!(median(&mut [4.0, 1.0, 3.0, 2.0]), Some(2.5));
         assert_eq!(median(&mut [7.0]), Some(7.0));
         assert_eq!(median(&mut []), None);
+    }
+
+    #[test]
+    fn one_wild_value_does_not_move_a_trimmed_mean() {
+        assert_eq!(trimmed_mean(&mut [1e9, 1.0, 4.0, 2.0, 3.0]), Some(3.0));
+        assert_eq!(trimmed_mean(&mut [4.0, 1.0, 3.0, 2.0]), Some(2.5));
+        assert_eq!(trimmed_mean(&mut [4.0, 1.0]), Some(2.5));
+        assert_eq!(trimmed_mean(&mut [7.0]), Some(7.0));
+        assert_eq!(trimmed_mean(&mut []), None);
     }
 }

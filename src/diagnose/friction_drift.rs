@@ -1,13 +1,14 @@
 //! Friction that changes slowly, as it shows between repetitions: neither noise nor contact, however large it is.
 //!
 //! Where friction φ of a joint is f times as large at the time t, a sample differs by φ (f(t) − f̄) from what the
-//! repetitions have in common at its phase: their mean, or the median over the other periods. φ is made of sign q̇
+//! repetitions have in common at its phase: their mean, or the trimmed mean of the other periods. φ is made of sign q̇
 //! and q̇, f of a straight line and of what has faded after a quarter of the record; the shares of the four are least
 //! squares. They fit a push, which comes once and has one direction, hardly at all, and take four of the thousands
 //! of degrees of freedom of noise.
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::median::trimmed_mean;
 use crate::robot::JointSignals;
 
 /// Slower than this, rad/s, dry friction has not built up.
@@ -25,17 +26,17 @@ pub struct FrictionDrift {
 }
 
 impl FrictionDrift {
-    /// Deviations from the median over the other periods, for joints with the velocities `qd_rad_s`, whose motion
+    /// Deviations from the trimmed mean of the other periods, for joints with the velocities `qd_rad_s`, whose motion
     /// repeats every `period` samples.
     pub fn beside_others(qd_rad_s: JointSignals, period: f64) -> Self {
         let others = ((qd_rad_s.samples() as f64 / period).ceil() as usize).saturating_sub(1);
+        let mut same = vec![0.0; others];
         Self::new(qd_rad_s, |f, k| {
             let own = (k as f64 / period) as usize;
             let phase = k as f64 - own as f64 * period;
-            // The place-th of the other periods; f changes in one direction.
             let at = |place: usize| phase + (place + usize::from(place >= own)) as f64 * period;
-            let [low, high] = [others.saturating_sub(1) / 2, others / 2].map(|m| f(at(m)));
-            0.5 * (low + high)
+            same.iter_mut().enumerate().for_each(|(place, value)| *value = f(at(place)));
+            trimmed_mean(&mut same).unwrap_or(f(k as f64))
         })
     }
 
@@ -49,11 +50,15 @@ impl FrictionDrift {
     }
 
     /// `common` of a course and a sample is what the repetitions have in common there.
-    fn new(qd_rad_s: JointSignals, common: impl Fn(&dyn Fn(f64) -> f64, usize) -> f64) -> Self {
+    fn new(
+        qd_rad_s: JointSignals,
+        mut common: impl FnMut(&dyn Fn(f64) -> f64, usize) -> f64,
+    ) -> Self {
         let n = qd_rad_s.samples();
         let fade = |t: f64| (-t / (FADES * n as f64)).exp();
         let line = |t: f64| t / n as f64;
-        let course = |f: &dyn Fn(f64) -> f64| (0..n).map(|k| f(k as f64) - common(f, k)).collect();
+        let mut course =
+            |f: &dyn Fn(f64) -> f64| (0..n).map(|k| f(k as f64) - common(f, k)).collect();
         Self { courses: [course(&fade), course(&line)], qd_rad_s }
     }
 
@@ -85,7 +90,7 @@ impl FrictionDrift {
 mod tests {
     use super::*;
 
-    /// A straight course is taken out whole: its median over the other periods is what the columns assume.
+    /// A straight course is taken out whole: its trimmed mean over the other periods is what the columns assume.
     #[test]
     fn friction_that_grows_evenly_is_taken_out() {
         let (n, period) = (800, 100);
@@ -97,7 +102,7 @@ mod tests {
             let (own, phase) = (k / period, k % period);
             let mut others: Vec<f64> =
                 (0..8).filter(|p| *p != own).map(|p| torque(phase + p * period)).collect();
-            torque(k) - crate::median::median(&mut others).unwrap()
+            torque(k) - trimmed_mean(&mut others).unwrap()
         };
         let mut y: Vec<f64> = (0..n).map(deviation).collect();
         let largest = |y: &[f64]| y.iter().fold(0.0f64, |a, y| a.max(y.abs()));

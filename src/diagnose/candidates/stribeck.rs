@@ -19,10 +19,12 @@ const USUAL_SHARE: f64 = 0.5;
 /// which it was found of those it was chosen with (`reports/blind_findings.md`).
 const TURN_ERROR: f64 = 0.04;
 
-/// A curve that falls over more than this speed, rad/s, is no matter of slow motion.
-fn widest(scene: &Scene) -> f64 {
-    25.0 * scene.arm.friction_epsilon_rad_s
-}
+/// A curve that falls over more than so many times the width of the regularised sign is no matter of slow motion.
+const WIDEST: f64 = 25.0;
+/// The narrowest that is looked for; slower than the sign turns round it would be a part of that.
+const NARROWEST: f64 = 1.2;
+/// What is best explained by a curve no wider than this is narrower than any: another way in which friction turns round.
+const AT_THE_END: f64 = 1.25;
 
 impl Candidate for Stribeck {
     fn kind(&self) -> Kind {
@@ -30,12 +32,11 @@ impl Candidate for Stribeck {
     }
 
     fn shapes(&self, scene: &Scene, _: Option<usize>) -> Vec<Shape> {
-        // Up to twice the widest, to see where it would end. Slower than the width of the regularised sign it is a
-        // part of that sign.
-        let slowest = scene.arm.friction_epsilon_rad_s;
+        // Up to twice the widest, to see where it would end.
+        let epsilon = scene.arm.friction_epsilon_rad_s;
         (0..2)
             .flat_map(|variant| {
-                geometric(1.2 * slowest, 2.0 * widest(scene), 8)
+                geometric(NARROWEST * epsilon, 2.0 * WIDEST * epsilon, 8)
                     .map(move |value| Shape { variant, value })
             })
             .collect()
@@ -77,9 +78,10 @@ impl Candidate for Stribeck {
         b[0] > 0.0
     }
 
-    /// Friction that falls over the whole range of speeds has another law.
+    /// Friction that falls over the whole range of speeds has another law, and so has what falls while the sign turns round.
     fn is_its_own(&self, scene: &Scene, _: Option<usize>, shape: Shape, _: &[f64]) -> bool {
-        shape.value <= widest(scene)
+        let widths = shape.value / scene.arm.friction_epsilon_rad_s;
+        widths > AT_THE_END && widths <= WIDEST
     }
 
     fn in_words(&self) -> &'static str {

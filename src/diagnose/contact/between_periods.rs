@@ -1,26 +1,27 @@
 //! Contacts in a motion that repeats: torque that one period has and the others have not.
 //!
-//! What the median over the other periods leaves of the torque is noise, coloured and alike between joints,
-//! and what came once. Bumps of every length are looked for by the matched filter of every joint and in all joints
-//! together; the highest is taken out with its samples, until none is left that noise would not make.
+//! What the trimmed mean of the other periods leaves of the torque is noise, coloured and alike between joints,
+//! and what came once. Bumps of every length are looked for by the matched filter, in one joint with the noise that the
+//! others show of it taken out, and in all joints together; the highest is taken out with its samples, until none is left
+//! that noise would not make.
 
 use std::ops::Range;
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
 use super::Touch;
-use super::bump::{self, Noise, ORDINARY, Push};
+use super::bump::{self, Felt, Noise, ORDINARY, Push};
 use super::disturbed::with_disturbed_periods;
 use crate::diagnose::friction_drift::FrictionDrift;
 use crate::diagnose::verdict::{Cause, Estimate};
 use crate::identify::Measurement;
-use crate::median::{median, robust_sigma};
+use crate::median::{robust_sigma, trimmed_mean};
 use crate::robot::JointSignals;
 use crate::signal::{MatchedFilter, Resampler, SignalError, find_period, natural_rate_hz};
 
-/// A bump of so many σ in one joint is a contact, and one as rare in all joints together. Between repetitions of
-/// a real arm without contacts deviations stay below 6; Gaussian noise passes 6.5 once in 10¹⁰ samples.
-const FAR: f64 = 6.5;
+/// A bump of so many σ in one joint is a contact, and one as rare in all joints together. Noise makes one once in 10⁸ places,
+/// and of a log of 80 s some 10⁵ places know nothing of each other.
+const FAR: f64 = 5.8;
 /// A joint felt a contact that is known to be there if it deviates by so many σ (once in 10⁴ by chance), and by
 /// this share of the joint that felt it most: the arm that gives way moves the other joints a little.
 const FELT: f64 = 4.0;
@@ -39,7 +40,7 @@ const APART_S: f64 = 0.3;
 const TOGETHER_S: f64 = 0.5;
 /// Bumps in one log.
 const MOST: usize = 40;
-/// The median over fewer periods is moved by one contact.
+/// The trimmed mean of fewer periods is moved by one contact.
 const FEWEST_PERIODS: usize = 3;
 /// At an end where the repetitions were prolonged so much is left out, s: the last of a run-in moves the arm so
 /// little beside the repetitions that angles do not show it, and takes torque.
@@ -51,7 +52,7 @@ const LONGEST_GAP_STEPS: f64 = 10.0;
 pub struct WithoutContacts {
     /// One cause per contact.
     pub causes: Vec<Cause>,
-    /// Torque with the median over the other periods in place of the contacts, Nm.
+    /// Torque with the trimmed mean of the other periods in place of the contacts, Nm.
     pub torque_nm: JointSignals,
 }
 
@@ -89,7 +90,7 @@ pub fn between_periods(
     while touches.len() < MOST
         && let Some(candidate) = repeats.search(&aside, &known, &touches)?
     {
-        // Its own torque moves the median of the others.
+        // Its own torque moves the mean of the others.
         aside[candidate.samples(&repeats)].fill(true);
         let Some(push) = repeats.weigh(&candidate, &aside, &known)? else { break };
         let touch = repeats.touch(&push, time_s[repeats.window.start]);
@@ -142,8 +143,10 @@ struct Candidate {
     /// Sample of the window.
     centre: usize,
     length_s: f64,
-    /// Joints (0-based) that felt it.
+    /// Which of the joints that are compared felt it.
     felt: Vec<usize>,
+    /// Which of them show noise alone.
+    quiet: Vec<usize>,
 }
 
 impl Candidate {
@@ -157,8 +160,8 @@ impl Candidate {
 }
 
 impl Repeats {
-    /// y(k) minus the median of y at the same phase in the other periods, without those that are set `aside`
-    /// there if any are left. Of two others the median is as wrong as either: y(k) itself counts with them where it
+    /// y(k) minus the trimmed mean of y at the same phase in the other periods, without those that are set `aside`
+    /// there if any are left. Of two others their mean is wrong by half of either: y(k) itself counts with them where it
     /// is not set aside.
     fn deviation(&self, y: &[f64], k: usize, aside: &[bool]) -> f64 {
         let from_start = (k - self.window.start) as f64;
@@ -181,12 +184,13 @@ impl Repeats {
         } else if others.len() < FEWEST_PERIODS && !aside[k] {
             same.push(y[k]);
         }
-        y[k] - median(&mut same).unwrap_or(y[k])
+        y[k] - trimmed_mean(&mut same).unwrap_or(y[k])
     }
 
-    /// Deviations of `joints` without the pushes that are `known` and without drifting friction, samples of the
-    /// window.
-    fn deviations(&self, joints: &[usize], aside: &[bool], known: &[Push]) -> JointSignals {
+    /// Deviations of all joints that are compared, without the pushes that are `known` and without drifting friction,
+    /// samples of the window.
+    fn deviations(&self, aside: &[bool], known: &[Push]) -> JointSignals {
+        let joints = &self.joints;
         let mut out = JointSignals::from_fn(joints.len(), self.window.len(), |row, k| {
             let j = joints[row];
             let deviation = self.deviation(self.torque_nm.joint(j), self.window.start + k, aside);
@@ -211,9 +215,10 @@ impl Repeats {
         known: &[Push],
         touches: &[Touch],
     ) -> Result<Option<Candidate>, SignalError> {
-        let deviation_nm = self.deviations(&self.joints, aside, known);
+        let deviation_nm = self.deviations(aside, known);
         let filter = MatchedFilter::new(&deviation_nm, self.rate_hz)?;
-        let far_together = far_together(self.joints.len());
+        let rows: Vec<usize> = (0..self.joints.len()).collect();
+        let far_together = far_in(rows.len());
         let apart = (APART_S * self.rate_hz) as usize;
         let longest_s = LONGEST_S.min(LONGEST_OF_PERIOD * self.period / self.rate_hz);
         let mut highest = 1.0;
@@ -222,6 +227,9 @@ impl Repeats {
         while length_s < longest_s {
             let heights = filter.heights(|t_s| bump::bump(ORDINARY, length_s, t_s));
             let noise = Noise::of(&heights);
+            let together = noise.felt_by(&rows, &[]);
+            let others = |j: usize| [&rows[..j], &rows[j + 1..]].concat();
+            let alone: Vec<Felt> = rows.iter().map(|j| noise.felt_by(&[*j], &others(*j))).collect();
             let reach = (0.5 * length_s * self.rate_hz) as usize;
             for centre in reach..self.window.len() - reach {
                 let at = self.window.start + centre;
@@ -230,23 +238,24 @@ impl Repeats {
                     continue;
                 }
                 let scores = noise.scores(&heights, centre);
-                let together = noise.gain(&scores).sqrt();
-                let score = (farthest(&scores) / FAR).max(together / far_together);
+                let gain = noise.gain(&scores);
+                // What is not so far in all joints is not in any.
+                if gain <= (highest * FAR).powi(2) {
+                    continue;
+                }
+                let far = |felt: &Felt| felt.of_known_noise(felt.gain(&scores)).sqrt();
+                let alone: Vec<f64> = alone.iter().map(far).collect();
+                let together = together.of_known_noise(gain).sqrt();
+                let score = (farthest(&alone) / FAR).max(together / far_together);
                 if score > highest {
                     highest = score;
-                    best = Some(Candidate { centre, length_s, felt: self.felt(&scores) });
+                    let [felt, quiet] = felt_and_quiet(&scores, &alone);
+                    best = Some(Candidate { centre, length_s, felt, quiet });
                 }
             }
             length_s *= LENGTHEN;
         }
         Ok(best)
-    }
-
-    /// Joints (0-based) that felt a bump with these scores.
-    fn felt(&self, scores: &[f64]) -> Vec<usize> {
-        let limit = (FELT_SHARE * farthest(scores)).max(FELT).min(farthest(scores));
-        let joints = self.joints.iter().zip(scores);
-        joints.filter(|(_, score)| score.abs() >= limit).map(|(j, _)| *j).collect()
     }
 
     /// What the log knows of the push at `candidate`: where several joints feel it, whose levers change while
@@ -257,31 +266,25 @@ impl Repeats {
         aside: &[bool],
         known: &[Push],
     ) -> Result<Option<Push>, SignalError> {
-        let all = self.weigh_on(&candidate.felt, candidate, aside, known)?;
-        // What its neighbourhood tells of the noise may make it less than it seemed.
-        let Some(mut all) = all.filter(|push| push.gain > FAR * FAR) else { return Ok(None) };
-        if candidate.felt.len() > 1 {
-            for j in &candidate.felt {
-                let own = self.weigh_on(std::slice::from_ref(j), candidate, aside, known)?;
-                own.iter().for_each(|own| all.reach_over(own));
-            }
-        }
-        Ok(Some(all))
-    }
-
-    fn weigh_on(
-        &self,
-        joints: &[usize],
-        candidate: &Candidate,
-        aside: &[bool],
-        known: &[Push],
-    ) -> Result<Option<Push>, SignalError> {
         let &Candidate { centre, length_s, .. } = candidate;
-        let filter = MatchedFilter::new(&self.deviations(joints, aside, known), self.rate_hz)?;
+        let filter = MatchedFilter::new(&self.deviations(aside, known), self.rate_hz)?;
         let noise = Noise::of(&filter.heights(|t_s| bump::bump(ORDINARY, length_s, t_s)));
         let reach = (0.5 * length_s * self.rate_hz) as usize + 1;
         let centres = centre.saturating_sub(reach)..(centre + reach).min(self.window.len());
-        Ok(bump::weigh(&filter, &noise, joints, centres, length_s))
+        let felt_by = |felt: &[usize]| noise.felt_by(felt, &candidate.quiet);
+        let weigh_on =
+            |felt: &Felt| bump::weigh(&filter, felt, &self.joints, centres.clone(), length_s);
+        let felt = felt_by(&candidate.felt);
+        let far = far_in(candidate.felt.len());
+        // What its neighbourhood tells of the noise may make it less than it seemed.
+        let is_far = |push: &Push| felt.of_known_noise(push.gain) > far * far;
+        let Some(mut all) = weigh_on(&felt).filter(is_far) else { return Ok(None) };
+        if candidate.felt.len() > 1 {
+            for row in candidate.felt.chunks(1) {
+                weigh_on(&felt_by(row)).iter().for_each(|own| all.reach_over(own));
+            }
+        }
+        Ok(Some(all))
     }
 
     fn touch(&self, push: &Push, begin_s: f64) -> Touch {
@@ -323,12 +326,22 @@ fn level_wild_values(y: &mut [f64], reach: usize) {
     }
 }
 
+/// Which joints felt a bump with these scores, each by itself and `alone` among all, and which show noise alone.
+fn felt_and_quiet(scores: &[f64], alone: &[f64]) -> [Vec<usize>; 2] {
+    let limit = FELT.max(FELT_SHARE * farthest(scores));
+    let most = (0..alone.len()).max_by(|a, b| alone[*a].total_cmp(&alone[*b]));
+    let is_felt = |j: &usize| scores[*j].abs() >= limit || Some(*j) == most;
+    let is_quiet = |j: &usize| scores[*j].abs() < FELT && !is_felt(j);
+    let joints = 0..scores.len();
+    [joints.clone().filter(is_felt).collect(), joints.filter(is_quiet).collect()]
+}
+
 fn farthest(scores: &[f64]) -> f64 {
     scores.iter().fold(0.0, |a, z| a.max(z.abs()))
 }
 
 /// √(zᵀ C⁻¹ z) of `joints` joints that noise passes as rarely as one joint passes [`FAR`].
-fn far_together(joints: usize) -> f64 {
+fn far_in(joints: usize) -> f64 {
     let chance = 2.0 * Normal::standard().cdf(-FAR);
     ChiSquared::new(joints as f64).map_or(FAR, |chi2| chi2.inverse_cdf(1.0 - chance).sqrt())
 }
@@ -395,7 +408,7 @@ mod tests {
         let without = found(1, &push).unwrap();
         assert_eq!(without.causes.len(), 1);
         assert_eq!(without.causes[0].joint, Some(1));
-        // What is left in its place is the torque of the other periods: their median is within its noise, six
+        // What is left in its place is the torque of the other periods: their mean is within its noise, six
         // times 0.5 Nm.
         let left =
             without.torque_nm.joint(0)[2420] - 20.0 * (0.1 * 24.2 * std::f64::consts::TAU).cos();
@@ -448,10 +461,10 @@ mod tests {
         assert_eq!(cause.joint, None);
     }
 
-    /// scipy.stats.chi2.isf(8.03e-11, 6) ** 0.5 = 7.666, 6.5 for one joint.
+    /// χ²₆ exceeds x with the probability exp(−x/2) (1 + x/2 + x²/8); 7.0181² does so as one Gaussian exceeds 5.8: with 6.63 · 10⁻⁹.
     #[test]
     fn a_bump_in_all_joints_is_as_rare_as_one_in_one() {
-        assert!((far_together(1) - 6.5).abs() < 1e-3);
-        assert!((far_together(6) - 7.666).abs() < 1e-3, "{}", far_together(6));
+        assert!((far_in(1) - 5.8).abs() < 1e-3);
+        assert!((far_in(6) - 7.0181).abs() < 1e-3, "{}", far_in(6));
     }
 }

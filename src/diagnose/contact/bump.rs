@@ -31,7 +31,11 @@ pub(super) fn bump(shape: f64, length_s: f64, t_s: f64) -> f64 {
 pub(super) struct Noise {
     /// Of each joint, what [`MatchedFilter`]'s σ = 1/√N has to be multiplied by.
     scale: Vec<f64>,
-    /// Inverse of the correlation between the joints.
+    /// How well it is known: degrees of freedom.
+    freedom: Vec<f64>,
+    /// Between the joints.
+    correlation: DMatrix<f64>,
+    /// Its inverse.
     precision: DMatrix<f64>,
 }
 
@@ -54,8 +58,8 @@ impl Noise {
             0.0 => 0.0,
             both => product(&clipped[i], &clipped[j]) / both,
         });
-        let identity = || DMatrix::identity(joints, joints);
-        Self { scale, precision: correlation.try_inverse().unwrap_or_else(identity) }
+        let freedom = heights.freedom.clone();
+        Self { scale, freedom, precision: inverse(correlation.clone()), correlation }
     }
 
     /// Heights at one sample over their σ.
@@ -67,10 +71,78 @@ impl Noise {
         self.scale.iter().enumerate().map(score).collect()
     }
 
-    /// zᵀ C⁻¹ z: twice what a bump in all joints gains in log-likelihood.
+    /// zᵀ C⁻¹ z: twice what a bump in all signals gains in log-likelihood, and no less than one in some of them.
     pub(super) fn gain(&self, z: &[f64]) -> f64 {
         let n = z.len();
         (0..n).map(|i| (0..n).map(|j| z[i] * self.precision[(i, j)] * z[j]).sum::<f64>()).sum()
+    }
+
+    /// Bumps that the signals `felt` feel and the signals `quiet` do not.
+    pub(super) fn felt_by(&self, felt: &[usize], quiet: &[usize]) -> Felt<'_> {
+        let signals = [felt, quiet].concat();
+        let correlation = self.correlation.select_rows(&signals).select_columns(&signals);
+        let precision = inverse(correlation).rows(0, felt.len()).into_owned();
+        let covariance = inverse(precision.columns(0, felt.len()).into_owned());
+        Felt { noise: self, signals, precision, covariance }
+    }
+}
+
+/// The inverse of a correlation, or of a part of one; of one that has none the identity.
+fn inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
+    let n = matrix.nrows();
+    matrix.try_inverse().unwrap_or_else(|| DMatrix::identity(n, n))
+}
+
+/// Noise beside a bump that some signals feel, F, and others do not. With their scores z, their correlation C and P = C⁻¹ the
+/// heights on F are b = P_FF⁻¹ (P z)_F in their σ, the noise taken out that the others show, their covariance is P_FF⁻¹, and
+/// twice the gain in log-likelihood is (P z)_Fᵀ b.
+pub(super) struct Felt<'a> {
+    noise: &'a Noise,
+    /// F, and behind it the others.
+    signals: Vec<usize>,
+    /// Rows F of P.
+    precision: DMatrix<f64>,
+    /// P_FF⁻¹.
+    covariance: DMatrix<f64>,
+}
+
+impl Felt<'_> {
+    /// F.
+    fn felt(&self) -> &[usize] {
+        &self.signals[..self.covariance.nrows()]
+    }
+
+    /// (P z) of the a-th signal that feels the bump.
+    fn weighed(&self, a: usize, z: &[f64]) -> f64 {
+        self.signals.iter().enumerate().map(|(b, j)| self.precision[(a, b)] * z[*j]).sum()
+    }
+
+    /// Twice what the bump gains in log-likelihood.
+    pub(super) fn gain(&self, z: &[f64]) -> f64 {
+        (0..self.covariance.nrows()).map(|a| self.weighed(a, z) * self.score(a, z)).sum()
+    }
+
+    /// The gain that would be as rare if noise were known: with k signals and ν degrees of freedom of the noise of the least
+    /// known one (ν + k/2 − 1) ln(1 + gain/ν) is χ²ₖ (Bartlett 1938).
+    pub(super) fn of_known_noise(&self, gain: f64) -> f64 {
+        let k = self.felt().len() as f64;
+        let freedom = self.felt().iter().map(|j| self.noise.freedom[*j]).fold(f64::MAX, f64::min);
+        (freedom + 0.5 * k - 1.0) * (gain / freedom).ln_1p()
+    }
+
+    /// Height on the a-th signal that feels the bump, over what σ would be there without the others.
+    fn score(&self, a: usize, z: &[f64]) -> f64 {
+        (0..self.covariance.nrows()).map(|b| self.covariance[(a, b)] * self.weighed(b, z)).sum()
+    }
+
+    /// Heights on the signals that feel the bump, and their σ.
+    fn heights(&self, heights: &Heights, sample: usize) -> Vec<[f64; 2]> {
+        let z = self.noise.scores(heights, sample);
+        let height = |(a, j): (usize, &usize)| {
+            let unit = self.noise.scale[*j] / heights.information[*j].sqrt();
+            [self.score(a, &z) * unit, self.covariance[(a, a)].sqrt() * unit]
+        };
+        self.felt().iter().enumerate().map(height).collect()
     }
 }
 
@@ -118,26 +190,26 @@ struct Fit {
     heights_nm: Vec<[f64; 2]>,
 }
 
-/// Weighs bumps of all shapes on `joints` around one of the ordinary shape and `length_s` whose centre is among
-/// `centres`; `filter` and `noise` are those of the joints.
+/// Weighs bumps of all shapes that are `felt` around one of the ordinary shape and `length_s` whose centre is among
+/// `centres`; `joints` are those of the signals of `filter`.
 ///
 /// What the log knows of begin, end and height of a push of one shape is where they stay within χ²₁ of the best
 /// such bump. The shape itself is unknown: intervals reach over all that are not excluded.
 pub(super) fn weigh(
     filter: &MatchedFilter,
-    noise: &Noise,
+    felt: &Felt,
     joints: &[usize],
     centres: Range<usize>,
     length_s: f64,
 ) -> Option<Push> {
     let of_shapes: Vec<Vec<Fit>> = SHAPES
         .iter()
-        .filter_map(|&shape| fits(filter, noise, centres.clone(), length_s, shape))
+        .filter_map(|&shape| fits(filter, felt, centres.clone(), length_s, shape))
         .collect();
     let tops: Vec<&Fit> = of_shapes.iter().filter_map(|fits| top(fits.iter())).collect();
     let best = top(tops.iter().copied())?;
-    let over_sigma = |j: &usize| (best.heights_nm[*j][0] / best.heights_nm[*j][1]).abs();
-    let main = (0..joints.len()).max_by(|a, b| over_sigma(a).total_cmp(&over_sigma(b)))?;
+    let over_sigma = |a: &usize| (best.heights_nm[*a][0] / best.heights_nm[*a][1]).abs();
+    let main = (0..felt.felt().len()).max_by(|a, b| over_sigma(a).total_cmp(&over_sigma(b)))?;
     let reach = |of: &dyn Fn(&Fit) -> [f64; 2], unit: &'static str| {
         let mut ci95 = [f64::INFINITY, f64::NEG_INFINITY];
         let possible =
@@ -157,7 +229,7 @@ pub(super) fn weigh(
         start_s: reach(&|fit| fit.start_s, "s"),
         end_s: reach(&|fit| fit.end_s, "s"),
         peak_nm: reach(&|fit| fit.heights_nm[main], "Nm"),
-        heights_nm: joints.iter().copied().zip(heights_nm).collect(),
+        heights_nm: felt.felt().iter().map(|j| joints[*j]).zip(heights_nm).collect(),
         gain: best.gain,
         shape: best.shape,
     })
@@ -170,7 +242,7 @@ fn top<'a>(fits: impl Iterator<Item = &'a Fit>) -> Option<&'a Fit> {
 /// The best bumps of one shape: of each length, and of all lengths together.
 fn fits(
     filter: &MatchedFilter,
-    noise: &Noise,
+    felt: &Felt,
     centres: Range<usize>,
     length_s: f64,
     shape: f64,
@@ -179,7 +251,7 @@ fn fits(
     let guess_s = length_s * ((2.0 * shape + 3.0) / (2.0 * ORDINARY + 3.0)).sqrt();
     let mut fits: Vec<Fit> = (-STEPS..=STEPS)
         .map(|step| guess_s * (STEP * f64::from(step)).exp())
-        .map(|length_s| of_length(filter, noise, centres.clone(), length_s, shape))
+        .map(|length_s| of_length(filter, felt, centres.clone(), length_s, shape))
         .collect::<Option<_>>()?;
     let top = (0..fits.len()).max_by(|&a, &b| fits[a].gain.total_cmp(&fits[b].gain))?;
     let top = top.clamp(1, fits.len() - 2);
@@ -207,27 +279,24 @@ fn fits(
 /// The best bump of one shape and length.
 fn of_length(
     filter: &MatchedFilter,
-    noise: &Noise,
+    felt: &Felt,
     centres: Range<usize>,
     length_s: f64,
     shape: f64,
 ) -> Option<Fit> {
     let heights = filter.heights(|t_s| bump(shape, length_s, t_s));
-    let gain = |k: usize| noise.gain(&noise.scores(&heights, k));
+    let gain = |k: usize| felt.gain(&felt.noise.scores(&heights, k));
     let top = centres.max_by(|&a, &b| gain(a).total_cmp(&gain(b)))?;
     let top = top.clamp(1, heights.height.samples().checked_sub(2)?);
     let Summit { at, value, sigma } = summit([top - 1, top, top + 1].map(gain));
     let rate_hz = filter.rate_hz();
     let (centre_s, sigma_s) = ((top as f64 + at) / rate_hz, sigma / rate_hz);
-    let known = heights.information.iter().zip(&noise.scale).enumerate();
-    let height =
-        |(j, (n, scale)): (usize, (&f64, &f64))| [heights.height.joint(j)[top], scale / n.sqrt()];
     Some(Fit {
         shape,
         gain: value,
         start_s: [centre_s - 0.5 * length_s, sigma_s],
         end_s: [centre_s + 0.5 * length_s, sigma_s],
-        heights_nm: known.map(height).collect(),
+        heights_nm: felt.heights(&heights, top),
     })
 }
 
@@ -253,6 +322,7 @@ fn summit([before, middle, behind]: [f64; 3]) -> Summit {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
     #[test]
     fn a_parabola_has_its_summit() {
@@ -261,5 +331,46 @@ mod tests {
         let found = summit([y(-1.0), y(0.0), y(1.0)]);
         assert!((found.at - 0.3).abs() < 1e-12 && (found.value - 9.0).abs() < 1e-12);
         assert!((found.sigma - 0.5f64.sqrt()).abs() < 1e-12);
+    }
+
+    /// Of known noise a gain is what it is; of noise known with ν degrees of freedom it is as rare as one of F(k, ν), to a few
+    /// percent of a σ down to once in 10⁸.
+    #[test]
+    fn gains_of_poorly_known_noise_are_less_rare() {
+        let noise = |freedom: f64| Noise {
+            scale: vec![1.0; 3],
+            freedom: vec![freedom; 3],
+            correlation: DMatrix::identity(3, 3),
+            precision: DMatrix::identity(3, 3),
+        };
+        for felt in [&[1][..], &[0, 1, 2]] {
+            let k = felt.len() as f64;
+            let of_known = |freedom, gain| noise(freedom).felt_by(felt, &[]).of_known_noise(gain);
+            assert!((of_known(1e9, 40.0) - 40.0).abs() < 1e-4);
+            for freedom in [20.0, 100.0, 1000.0] {
+                let f = FisherSnedecor::new(k, freedom).unwrap();
+                let gain = k * f.inverse_cdf(1.0 - 1e-8);
+                let known = ChiSquared::new(k).unwrap().inverse_cdf(1.0 - 1e-8);
+                let off = of_known(freedom, gain).sqrt() - known.sqrt();
+                assert!(off.abs() < 0.05, "{k} {freedom}: {off}");
+            }
+        }
+    }
+
+    /// Noise that two signals share, seen in the one that nothing touched, is taken out of the other: with the correlation c
+    /// what is left of it has σ √(1 − c²).
+    #[test]
+    fn a_quiet_signal_tells_the_noise_of_another() {
+        let correlation = DMatrix::from_row_slice(2, 2, &[1.0, 0.6, 0.6, 1.0]);
+        let precision = inverse(correlation.clone());
+        let noise = Noise { scale: vec![1.0; 2], freedom: vec![1e9; 2], correlation, precision };
+        let z = [5.0, -1.0];
+        let beside = noise.felt_by(&[0], &[1]);
+        // 5 + 0.6, over 0.8.
+        assert!((beside.gain(&z).sqrt() - 7.0).abs() < 1e-12);
+        assert!((beside.score(0, &z) - 5.6).abs() < 1e-12);
+        assert!((noise.felt_by(&[0], &[]).gain(&z).sqrt() - 5.0).abs() < 1e-12);
+        let both = noise.felt_by(&[0, 1], &[]);
+        assert!((both.gain(&z) - noise.gain(&z)).abs() < 1e-12);
     }
 }
