@@ -268,14 +268,40 @@ fn warming_begins_with_the_log() {
     assert!((e.value - 0.25).abs() < width && width < 0.2, "{e:?}");
 }
 
-/// More friction near rest does to the torque what another share of it that a drive feeds forward does; but the other five
-/// drives tell that share.
+/// More friction near rest does to the torque what another share of it that a drive feeds forward does, but not quite.
 #[test]
 fn friction_near_rest_is_no_odd_drive() {
     let toml = "[[effect]]\nkind = \"stribeck\"\njoint = 1\nextra_nm = 3.2\nvs_rad_s = 0.06";
     let d = diagnose_along("ur5_identification", 7, toml);
     assert!(is_named(&d, "stribeck", Some(1)));
     assert_eq!(d.causes.len(), 1, "{:?}", d.sentences);
+}
+
+/// A drive that does not feed its friction forward among five that feed nine tenths of it.
+#[test]
+fn a_drive_that_feeds_nothing_forward() {
+    let toml = "[[effect]]\nkind = \"feed_forward\"\njoint = 1\nshare_less = 0.9";
+    let d = diagnose_along("ur5_identification", 3, toml);
+    assert!(is_named(&d, "feed_forward", Some(1)));
+    assert_eq!(d.causes.len(), 1, "{:?}", d.sentences);
+    let e = &d.causes[0].parameters["share_less"];
+    // Twice the half width: 3.9 σ, which one log in 10⁴ misses by chance.
+    assert!((e.value - 0.9).abs() < e.ci95[1] - e.ci95[0], "{e:?}");
+}
+
+/// No controller knows the friction of its joints better than to a tenth: shares that differ by that are no cause, and are
+/// not taken for friction near rest.
+#[test]
+fn drives_that_differ_as_drives_do() {
+    let of_joint = |(j, less): (usize, &f64)| {
+        format!("[[effect]]\nkind = \"feed_forward\"\njoint = {}\nshare_less = {less:?}\n", j + 1)
+    };
+    let less = [0.1, -0.1, 0.1, -0.1, 0.1, -0.1];
+    let toml: String = less.iter().enumerate().map(of_joint).collect();
+    for trajectory in ["ur5_identification", "ur5_validation"] {
+        let d = diagnose_along(trajectory, 3, &toml);
+        assert_eq!(d.verdict, Verdict::NothingFound, "{:?}", d.sentences);
+    }
 }
 
 /// Rows 6, 8 and 10 ms apart with true time stamps: what lies between rows is no physics.

@@ -202,7 +202,7 @@ fn a_drivetrain_may_have_states_of_its_own() {
     }
     let config = PlantConfig::default();
     let run = |drivetrain: Box<dyn Drivetrain>| {
-        Plant::with_drivetrain(&arm, &arm, drivetrain, &config)
+        Plant::with_drivetrain(&arm, &arm, &[config.friction_feedforward; 6], drivetrain, &config)
             .unwrap()
             .run(&motion(), None)
             .unwrap()

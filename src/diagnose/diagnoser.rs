@@ -5,7 +5,6 @@ use super::candidates::{self, Candidate};
 use super::common_motion::move_to_common_motion;
 use super::contact::{self, BesideModel};
 use super::data_faults;
-use super::drives::Drives;
 use super::error::DiagnoseError;
 use super::extension::{Extension, mean_period};
 use super::gain;
@@ -20,7 +19,7 @@ use super::payload::{self, PayloadFinding};
 use super::record::{Record, is_torn};
 use super::replay::measured_nm;
 use super::scene::Scene;
-use super::selection::{Kept, odds_of_alike, select};
+use super::selection::{Kept, select};
 use super::significance::LEAST_EVIDENCE;
 use super::study::{Entry, Study};
 use super::verdict::{Cause, DetectionLimit, Diagnosis, Rival, Rms, Verdict};
@@ -109,22 +108,11 @@ impl<'a> Diagnoser<'a> {
         move_to_common_motion(&mut regression, m, (self.arm, self.set), &fit.theta);
         let sources = (self.arm, self.set, &self.options);
         let estimate = (&fit.theta[..], &fit.joint_sigma_nm[..]);
-        let judged = |drives: Drives| {
-            let mut study =
-                Study::new(&self.families, sources, &regression, estimate, drives, m.source)?;
-            study.leave_out(coarse.clone());
-            let null = Extension::fit(&study, &[], &study.torque);
-            let study = without_contacts(study, self.set, &null, m.source)?;
-            let found = select(&study);
-            Ok::<_, DiagnoseError>((study, found))
-        };
-        let (mut first, mut found) = judged(Drives::Differ)?;
-        if first.odd_drives > 0 {
-            let (alike, of_alike) = judged(Drives::Alike)?;
-            if odds_of_alike((&alike, &of_alike), (&first, &found)) > 0.0 {
-                (first, found) = (alike, of_alike);
-            }
-        }
+        let mut first = Study::new(&self.families, sources, &regression, estimate, m.source)?;
+        first.leave_out(coarse);
+        let null = Extension::fit(&first, &[], &first.torque);
+        let first = without_contacts(first, self.set, &null, m.source)?;
+        let found = select(&first);
         // The load on the gear is better known once friction is, and so is what touched the arm.
         let mut study = if found.is_empty() && first.scene.periodic {
             first

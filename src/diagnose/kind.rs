@@ -34,6 +34,8 @@ pub enum Kind {
     CurrentOffset,
     /// A drive at its limit.
     Saturation,
+    /// A drive that feeds another share of its friction forward than the others.
+    FeedForward,
     /// Torque and motion recorded at different times.
     TimeSkew,
     /// A velocity that lags behind the angle.
@@ -82,6 +84,7 @@ impl Kind {
             Self::TorqueGain => "torque_gain",
             Self::CurrentOffset => "current_offset",
             Self::Saturation => "saturation",
+            Self::FeedForward => "feed_forward",
             Self::TimeSkew => "time_skew",
             Self::VelocityLag => "velocity_lag",
             Self::EncoderOffset => "encoder_offset",
@@ -113,6 +116,7 @@ impl Kind {
                 | Self::ReversalWidth
                 | Self::PositionFriction
                 | Self::ThermalDrift
+                | Self::FeedForward
                 | Self::FrictionChange
         )
     }

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::candidates::ripple::strongest_orders;
 use super::image::{Image, Span};
 use super::kind::Kind;
-use super::significance::FAR_AHEAD;
+use super::significance::{FAR_AHEAD, LEAST_EVIDENCE};
 use super::study::{Entry, Score, Study};
 
 /// Causes at most: a log that needs more has another kind of problem.
@@ -45,23 +45,6 @@ pub fn select(study: &Study) -> Vec<Contender> {
     let mut kept = Kept { study, causes: Vec::new(), with_common };
     kept.grow();
     kept.causes
-}
-
-/// 2 ln of the odds for one share of friction that all drives feed forward, with what is found beside it, against a share of
-/// each.
-///
-/// Of the latter a share of its own is paid for, as a cause's coefficient, where it seems odd; elsewhere it fits noise, and
-/// is given back what it explains of that.
-pub fn odds_of_alike(alike: (&Study, &[Contender]), differ: (&Study, &[Contender])) -> f64 {
-    let evidence = |(study, causes): (&Study, &[Contender])| {
-        let kept = Kept { study, causes: causes.to_vec(), with_common: study.scene.periodic };
-        kept.total_evidence() - study.residual.square()
-    };
-    let study = differ.0;
-    let price = study.statistic.coefficient_price(None, study.residual.mean.len());
-    let freed = study.answers.len() as f64 - alike.0.answers.len() as f64;
-    let odd = study.odd_drives as f64;
-    evidence(alike) - evidence(differ) + odd * price + (freed - odd)
 }
 
 impl<'s, 'a> Kept<'s, 'a> {
@@ -236,12 +219,23 @@ impl<'s, 'a> Kept<'s, 'a> {
         best.fold(start, |best, e| if e.1 > best.1 { e } else { best }).0
     }
 
-    /// Span of all causes but `left_out`, and the residual outside it.
+    /// Span of all causes but `left_out`, with the shares that drives feed forward where these blur reversals, and the
+    /// residual outside it.
     pub fn without(&self, left_out: Option<usize>) -> (Span, Image) {
+        let study = self.study;
         let mut span = Span::default();
+        let mut blurred = Vec::new();
         for (_, cause) in self.causes.iter().enumerate().filter(|(c, _)| Some(*c) != left_out) {
             for image in &cause.entry.images {
                 span.push(image);
+            }
+            if study.families[cause.entry.family].blurs_reversals() {
+                blurred.push(cause.entry.site);
+            }
+        }
+        for (j, share) in &study.shares {
+            if blurred.iter().any(|site| site.is_none_or(|own| own == *j)) {
+                span.push(share);
             }
         }
         let mut residual = self.study.residual.clone();
@@ -404,7 +398,7 @@ impl<'s, 'a> Kept<'s, 'a> {
         while c < self.causes.len() {
             let is_needed = |kept: &Self| {
                 let (others, residual) = kept.without(Some(c));
-                kept.is_significant(&kept.causes[c], &others, &residual)
+                kept.is_significant(&kept.causes[c], &others, &residual) && kept.is_more_with(c)
             };
             if !is_looked_at(self.causes[c].entry.site) || is_needed(self) {
                 c += 1;
@@ -414,6 +408,21 @@ impl<'s, 'a> Kept<'s, 'a> {
             }
         }
         dropped
+    }
+
+    /// Whether all causes explain more with cause `c`, what it costs counted, than they would without it: others on its joint
+    /// may have the shapes that they have because of it.
+    fn is_more_with(&self, c: usize) -> bool {
+        let site = self.causes[c].entry.site;
+        let mut without = Self { causes: self.causes.clone(), ..*self };
+        without.causes.remove(c);
+        let beside: Vec<usize> =
+            (0..without.causes.len()).filter(|o| without.causes[*o].entry.site == site).collect();
+        if beside.is_empty() || !self.study.scene.periodic {
+            return true;
+        }
+        beside.into_iter().for_each(|o| without.refine(o));
+        self.total_evidence() - without.total_evidence() > LEAST_EVIDENCE
     }
 
     /// Square that `contender` explains of `signal`, which `others` have left.

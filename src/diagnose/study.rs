@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::candidates::{Candidate, Search, Shape};
 use super::distinct_shapes::distinct_shapes;
-use super::drives::{Answer, Answers, Drives};
+use super::drives::{self, Answer};
 use super::error::DiagnoseError;
 use super::image::{Column, Image, Span, dot};
 use super::scene::Scene;
@@ -53,10 +53,10 @@ pub struct Study<'a> {
     pub null_columns: Vec<Image>,
     /// What is in each of the latter.
     pub answers: Vec<Answer>,
-    /// See [`Answers::odd`].
-    pub odd_drives: usize,
     /// Their span.
     pub null: Span,
+    /// By joint (0-based) what the drive's own share of friction fed forward adds to the null model.
+    pub shares: Vec<(usize, Image)>,
     /// Torque minus null model there.
     pub residual: Image,
     /// How scores become statistics.
@@ -92,7 +92,6 @@ impl<'a> Study<'a> {
         (arm, set, options): (&Arm, &BaseSet, &Options),
         regression: &'a Regression,
         (theta, sigma_nm): (&[f64], &[f64]),
-        drives: Drives,
         log: &str,
     ) -> Result<Self, DiagnoseError> {
         let scene = Scene::new(arm, set, theta, &regression.prepared);
@@ -101,22 +100,24 @@ impl<'a> Study<'a> {
         } else {
             Whitening::Run(RunWhitening::new(regression, options, sigma_nm)?)
         };
-        let mut study = Self::behind((whitening, scene), families, set, regression, drives, log)?;
+        let mut study = Self::behind((whitening, scene), families, set, regression, log)?;
         study.fill_entries();
         Ok(study)
     }
 
     /// Everything but the entries.
     fn behind(
-        (whitening, scene): (Whitening, Scene),
+        (mut whitening, scene): (Whitening, Scene),
         families: &'a [Box<dyn Candidate>],
         set: &BaseSet,
         regression: &'a Regression,
-        drives: Drives,
         log: &str,
     ) -> Result<Self, DiagnoseError> {
         let problem = &regression.problem;
         let n = problem.samples;
+        if let Whitening::Periods(periods) = &mut whitening {
+            periods.with_repeating_noise(&drives::differences(&scene));
+        }
         let columns: Vec<Column> = (0..problem.parameters())
             .map(|base| {
                 let part = |j: usize| {
@@ -138,10 +139,8 @@ impl<'a> Study<'a> {
         let torque = whitening.regression_image(&Column {
             parts: problem.panels.iter().enumerate().map(|(j, p)| (j, p.y.clone())).collect(),
         });
-        let of_drives = Answers::of(&scene, &whitening, &null, &torque);
-        let odd_drives = of_drives.odd(&scene.coulomb_nm);
         let mut answers = Vec::new();
-        for (answer, image) in of_drives.columns(&scene.coulomb_nm, drives) {
+        for (answer, image) in drives::answers(&scene, &whitening, &null, &torque) {
             if null.push(&image) {
                 answers.push(answer);
                 images.push(image);
@@ -149,6 +148,12 @@ impl<'a> Study<'a> {
         }
         let mut residual = torque.clone();
         null.residualise(&mut residual);
+        let shares = drives::differences(&scene).into_iter().map(|column| {
+            let mut image = whitening.image(&column);
+            null.residualise(&mut image);
+            (column.parts[0].0, image)
+        });
+        let shares = shares.collect();
         let statistic = Statistic::new(&whitening, &residual, problem.joints());
         Ok(Self {
             families,
@@ -157,8 +162,8 @@ impl<'a> Study<'a> {
             whitening,
             null_columns: images,
             answers,
-            odd_drives,
             null,
+            shares,
             residual,
             statistic,
             entries: Vec::new(),
@@ -183,7 +188,7 @@ impl<'a> Study<'a> {
         run.leave_out(rows);
         let Self { whitening, scene, families, regression, left_out, .. } = self;
         let of_run = (whitening, scene);
-        let study = Self::behind(of_run, families, set, regression, Drives::Differ, log)?;
+        let study = Self::behind(of_run, families, set, regression, log)?;
         let mut study = Self { left_out, ..study };
         study.fill_entries();
         Ok(study)

@@ -28,12 +28,13 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// A controller that believes in `nominal`, with gains and feed-forward from `config`.
-    pub fn new(nominal: &Arm, config: &PlantConfig) -> Self {
+    /// A controller that believes in `nominal`, with gains from `config` and the share `fed_forward` of its friction on each
+    /// joint.
+    pub fn new(nominal: &Arm, fed_forward: &[f64], config: &PlantConfig) -> Self {
         let mut believed = nominal.clone();
-        for joint in &mut believed.joints {
-            joint.drive.viscous_nm_s_rad *= config.friction_feedforward;
-            joint.drive.coulomb_nm *= config.friction_feedforward;
+        for (joint, share) in believed.joints.iter_mut().zip(fed_forward) {
+            joint.drive.viscous_nm_s_rad *= share;
+            joint.drive.coulomb_nm *= share;
         }
         let model = Model::new(&believed);
         let zeros = vec![0.0; nominal.dof()];

@@ -24,13 +24,16 @@ pub struct Plant {
 impl Plant {
     /// `arm` as it is, behind a stiff gear, with a controller that knows it.
     pub fn new(arm: &Arm, config: &PlantConfig) -> Result<Self, PlantError> {
-        Self::with_drivetrain(arm, arm, Box::new(RigidDrivetrain::new(arm)), config)
+        let fed_forward = vec![config.friction_feedforward; arm.dof()];
+        Self::with_drivetrain(arm, arm, &fed_forward, Box::new(RigidDrivetrain::new(arm)), config)
     }
 
-    /// `arm` as it is, behind `drivetrain`, with a controller that takes it for `nominal`.
+    /// `arm` as it is, behind `drivetrain`, with a controller that takes it for `nominal` and feeds the share `fed_forward`
+    /// of that friction forward on each joint.
     pub fn with_drivetrain(
         arm: &Arm,
         nominal: &Arm,
+        fed_forward: &[f64],
         drivetrain: Box<dyn Drivetrain>,
         config: &PlantConfig,
     ) -> Result<Self, PlantError> {
@@ -39,7 +42,7 @@ impl Plant {
         Ok(Self {
             arm: arm.clone(),
             drivetrain,
-            controller: Controller::new(nominal, config),
+            controller: Controller::new(nominal, fed_forward, config),
             config: config.clone(),
         })
     }

@@ -229,7 +229,8 @@ fn axis(finding: &Finding, kind: Kind, j: usize) -> (&'static str, &'static str,
         | Kind::NonlinearViscous
         | Kind::AsymmetricFriction
         | Kind::Presliding
-        | Kind::ReversalWidth => ("speed", "rad/s", pick(scene.motion.qd_rad_s.joint(j))),
+        | Kind::ReversalWidth
+        | Kind::FeedForward => ("speed", "rad/s", pick(scene.motion.qd_rad_s.joint(j))),
         Kind::LoadFriction => {
             let signed = scene.link_nm.joint(j).iter().zip(scene.sign.joint(j));
             (

@@ -48,7 +48,14 @@ impl Hidden {
         let config =
             PlantConfig { log_rate_hz: self.log_rate_hz, step_s, ..PlantConfig::default() };
         let law = HiddenLaw::new(&arm, self.joint, self.law);
-        let mut plant = Plant::with_drivetrain(&arm, &arm, Box::new(law), &config).unwrap();
+        let mut plant = Plant::with_drivetrain(
+            &arm,
+            &arm,
+            &[config.friction_feedforward; 6],
+            Box::new(law),
+            &config,
+        )
+        .unwrap();
         let recording = plant.run(&excitation, None).unwrap();
         let sensors = SensorConfig {
             torque_sd_nm: PerJoint::Each(vec![1.0, 1.0, 0.7, 0.15, 0.15, 0.15]),

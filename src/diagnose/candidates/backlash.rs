@@ -55,6 +55,10 @@ impl Candidate for Backlash {
         Search::Logarithmic
     }
 
+    fn blurs_reversals(&self) -> bool {
+        true
+    }
+
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         self.bank(scene, site, &[shape]).remove(0)
     }

@@ -201,6 +201,10 @@ impl Candidate for Elasticity {
         Search::Logarithmic
     }
 
+    fn blurs_reversals(&self) -> bool {
+        true
+    }
+
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let j = joint(site);
         let drive = &scene.arm.joints[j].drive;

@@ -10,6 +10,7 @@ mod base_tilt;
 mod current_offset;
 mod elasticity;
 mod encoder_offset;
+mod feed_forward;
 mod load_friction;
 mod nonlinear_viscous;
 mod position_friction;
@@ -111,6 +112,12 @@ pub trait Candidate: Sync {
         false
     }
 
+    /// Whether it changes what is seen where its joint reverses, so that beside it the log does not tell which share of its
+    /// friction a drive feeds forward.
+    fn blurs_reversals(&self) -> bool {
+        false
+    }
+
     /// Torque per unit of each coefficient.
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column>;
 
@@ -197,6 +204,7 @@ pub fn all() -> Vec<Box<dyn Candidate>> {
         Box::new(backlash::Backlash),
         Box::new(torque_gain::TorqueGain),
         Box::new(saturation::Saturation),
+        Box::new(feed_forward::FeedForward),
         Box::new(time_skew::TimeSkew),
         Box::new(encoder_offset::EncoderOffset),
         Box::new(base_tilt::BaseTilt),

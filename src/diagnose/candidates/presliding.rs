@@ -83,6 +83,10 @@ impl Candidate for Presliding {
         Search::Logarithmic
     }
 
+    fn blurs_reversals(&self) -> bool {
+        true
+    }
+
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let j = joint(site);
         let z = deflection(scene, j, shape.value);

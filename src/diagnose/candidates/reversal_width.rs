@@ -52,6 +52,10 @@ impl Candidate for ReversalWidth {
         Search::Straight
     }
 
+    fn blurs_reversals(&self) -> bool {
+        true
+    }
+
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let epsilon = scene.arm.friction_epsilon_rad_s;
         let apart = APART * epsilon;

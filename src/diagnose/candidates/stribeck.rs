@@ -46,6 +46,10 @@ impl Candidate for Stribeck {
         Search::Logarithmic
     }
 
+    fn blurs_reversals(&self) -> bool {
+        true
+    }
+
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let j = joint(site);
         let exponent = if shape.variant == 0 { 2 } else { 1 };

@@ -39,6 +39,10 @@ impl Candidate for TimeSkew {
         Search::Straight
     }
 
+    fn blurs_reversals(&self) -> bool {
+        true
+    }
+
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let change = |j: usize| {
             let change = scene.change_by_delay_nm(j, shape.value);

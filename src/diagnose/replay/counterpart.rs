@@ -161,6 +161,10 @@ impl Found<'_> {
                 joint: self.joint?,
                 limit_nm: value("limit_nm")?,
             })),
+            Kind::FeedForward => in_the_model(Effect::FeedForward(faults::FeedForward {
+                joint: self.joint?,
+                share_less: value("share_less")?,
+            })),
             Kind::TimeSkew => in_the_model(Effect::TimeSkew(faults::TimeSkew {
                 joint: self.joint,
                 delay_s: value("delay_s")?,

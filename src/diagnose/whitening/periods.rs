@@ -7,7 +7,7 @@ use realfft::{RealFftPlanner, RealToComplex};
 
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::friction_drift::FrictionDrift;
-use crate::diagnose::image::{Column, Image};
+use crate::diagnose::image::{Column, Image, Span, dot};
 use crate::diagnose::noise_power::NoiseKnowledge;
 use crate::diagnose::scene::Scene;
 use crate::identify::{Problem, Regression};
@@ -34,6 +34,44 @@ pub struct PeriodWhitening {
     factors: Vec<Vec<Complex<f64>>>,
     /// Relative variance of the noise's power per harmonic and joint.
     unknown: Vec<Vec<f64>>,
+    repeating: Option<RepeatingNoise>,
+}
+
+/// Torques of unknown height that repeat in every period, as noise of the mean period: with A the rows of torques whose height
+/// has the standard deviation one, its covariance I + A Aᵀ is whitened by I + Q (√(I + R Rᵀ)⁻¹ − I) Qᵀ, A = Q R.
+struct RepeatingNoise {
+    /// Q.
+    directions: Span,
+    /// √(I + R Rᵀ)⁻¹ − I.
+    change: DMatrix<f64>,
+}
+
+impl RepeatingNoise {
+    fn new(columns: &[Image]) -> Self {
+        let mut directions = Span::default();
+        columns.iter().for_each(|column| {
+            directions.push(column);
+        });
+        let k = directions.len();
+        let coordinates =
+            columns.iter().map(|column| DVector::from(directions.coordinates(column)));
+        let mut covariance = DMatrix::identity(k, k);
+        coordinates.for_each(|c| covariance += &c * c.transpose());
+        let parts = covariance.symmetric_eigen();
+        let shrunk =
+            DMatrix::from_diagonal(&parts.eigenvalues.map(|square| square.powf(-0.5) - 1.0));
+        let change = &parts.eigenvectors * shrunk * parts.eigenvectors.transpose();
+        Self { directions, change }
+    }
+
+    /// Whitens `rows` of a mean period; symmetric, it is its own adjoint.
+    fn whiten(&self, rows: &mut [f64]) {
+        let along = self.directions.directions().map(|direction| dot(direction.mean, rows));
+        let change = &self.change * DVector::from_iterator(self.directions.len(), along);
+        for (direction, change) in self.directions.directions().zip(change.iter()) {
+            rows.iter_mut().zip(direction.mean).for_each(|(row, d)| *row += change * d);
+        }
+    }
 }
 
 /// Harmonics averaged on each side for one covariance: at least so many, and a quarter of the
@@ -54,8 +92,15 @@ impl PeriodWhitening {
         let problem = &regression.problem;
         let (n, periods, joints) = (problem.samples, problem.periods, problem.joints());
         let forward = RealFftPlanner::new().plan_fft_forward(n);
-        let mut whitening =
-            Self { samples: n, periods, joints, forward, factors: Vec::new(), unknown: Vec::new() };
+        let mut whitening = Self {
+            samples: n,
+            periods,
+            joints,
+            forward,
+            factors: Vec::new(),
+            unknown: Vec::new(),
+            repeating: None,
+        };
         let used = ((regression.prepared.highest - BELOW_HIGHEST) * n as f64).round() as usize;
         // Beyond it the torque was not moved to the common motion.
         let last = (used + NEIGHBOURS.max(used / 4)).min(scene.highest);
@@ -111,6 +156,13 @@ impl PeriodWhitening {
             whitening.factors.push(inverse.transpose().iter().copied().collect());
         }
         Ok(whitening)
+    }
+
+    /// Takes torques that repeat in every period and whose heights have the standard deviation one for noise.
+    pub fn with_repeating_noise(&mut self, torques: &[Column]) {
+        self.repeating = None;
+        let images: Vec<Image> = torques.iter().map(|torque| self.image(torque)).collect();
+        self.repeating = Some(RepeatingNoise::new(&images));
     }
 
     /// Σ_p D Dᴴ/(P − 1) of every harmonic, D the deviation from the mean period, N × N.
@@ -203,6 +255,8 @@ impl PeriodWhitening {
     /// The adjoint of [`Self::rows`], per joint over one period.
     pub(super) fn in_time(&self, rows: &[f64]) -> JointSignals {
         let n = self.samples;
+        let mut rows = rows.to_vec();
+        self.repeating.iter().for_each(|noise| noise.whiten(&mut rows));
         let inverse = RealFftPlanner::new().plan_fft_inverse(n);
         let mut spectra = vec![inverse.make_input_vec(); self.joints];
         let mut row = 0;
@@ -236,6 +290,13 @@ impl PeriodWhitening {
 
     /// See [`super::Whitening::image`].
     pub(super) fn image(&self, column: &Column) -> Image {
+        let mut image = self.image_in_noise(column);
+        self.repeating.iter().for_each(|noise| noise.whiten(&mut image.mean));
+        image
+    }
+
+    /// [`Self::image`] but for noise that repeats.
+    fn image_in_noise(&self, column: &Column) -> Image {
         let n = self.samples;
         let repeats = column.parts.iter().all(|(_, y)| y.len() == n);
         let weight = (self.periods as f64).sqrt();
@@ -293,4 +354,28 @@ fn trends(
 /// All (i, j) of a square matrix.
 fn pairs(n: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..n).flat_map(move |i| (0..n).map(move |j| (i, j)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// W (I + A Aᵀ) W = I, for torques that resemble each other.
+    #[test]
+    fn noise_that_repeats_is_whitened() {
+        let columns = [[3.0, 1.0, 0.0, 0.5], [2.5, 1.5, 0.0, 0.0]];
+        let image = |rows: &[f64; 4]| Image { mean: rows.to_vec(), contrast: Vec::new() };
+        let noise = RepeatingNoise::new(&columns.each_ref().map(image));
+        let a = DMatrix::from_fn(4, 2, |row, k| columns[k][row]);
+        let whitener = DMatrix::from_fn(4, 4, |row, k| {
+            let mut unit = [0.0; 4];
+            unit[k] = 1.0;
+            noise.whiten(&mut unit);
+            unit[row]
+        });
+        let covariance = DMatrix::identity(4, 4) + &a * a.transpose();
+        let whitened = &whitener * covariance * whitener.transpose();
+        assert!((whitened - DMatrix::identity(4, 4)).norm() < 1e-13);
+        assert!((&whitener - whitener.transpose()).norm() < 1e-14);
+    }
 }

@@ -10,10 +10,10 @@ use crate::diagnose::Kind;
 use crate::plant::SensorConfig;
 use crate::plant::faults::{
     AsymmetricFriction, Backlash, BaseTilt, ClockFault, Contact, CurrentOffset, DroppedSamples,
-    Effect, Elasticity, EncoderOffset, EncoderSide, FrictionChange, Gravity, LinkLength,
-    LoadFriction, NonlinearViscous, Outliers, Payload, PositionFriction, Presliding, Quantisation,
-    ReadingChannel, ReversalWidth, Ripple, Saturation, Spring, Stribeck, ThermalDrift, TimeSkew,
-    TorqueGain, VelocityLag,
+    Effect, Elasticity, EncoderOffset, EncoderSide, FeedForward, FrictionChange, Gravity,
+    LinkLength, LoadFriction, NonlinearViscous, Outliers, Payload, PositionFriction, Presliding,
+    Quantisation, ReadingChannel, ReversalWidth, Ripple, Saturation, Spring, Stribeck,
+    ThermalDrift, TimeSkew, TorqueGain, VelocityLag,
 };
 use crate::robot::{Arm, JointSignals};
 
@@ -46,7 +46,7 @@ const EACH_AND_ALL: &[Option<usize>] =
 const ARM: &[Option<usize>] = &[None];
 
 /// Every family, with equal chances to be drawn.
-pub const FAMILIES: [Family; 29] = [
+pub const FAMILIES: [Family; 30] = [
     residual(Kind::Stribeck, EACH),
     residual(Kind::NonlinearViscous, EACH),
     residual(Kind::AsymmetricFriction, EACH),
@@ -60,6 +60,7 @@ pub const FAMILIES: [Family; 29] = [
     residual(Kind::TorqueGain, &[Some(2), Some(3)]),
     residual(Kind::CurrentOffset, EACH),
     residual(Kind::Saturation, EACH),
+    residual(Kind::FeedForward, EACH),
     residual(Kind::TimeSkew, EACH_AND_ALL),
     residual(Kind::VelocityLag, EACH_AND_ALL),
     residual(Kind::BaseTilt, ARM),
@@ -286,6 +287,9 @@ impl Family {
                     Effect::CurrentOffset(CurrentOffset { joint, offset_nm: sign * s })
                 })
             }
+            Kind::FeedForward => Recipe::linear(0.1, 0.9, move |share_less| {
+                Effect::FeedForward(FeedForward { joint, share_less })
+            }),
             Kind::Saturation => Recipe::growing(0.1, [1e-3, 0.6], 1.5, move |s| {
                 Effect::Saturation(Saturation { joint, limit_nm: peak_nm * (1.0 - s) })
             }),

@@ -41,6 +41,8 @@ pub(super) struct JointMechanics {
     pub(super) gain_error: f64,
     /// Logged minus true torque, Nm.
     pub(super) offset_nm: f64,
+    /// Share of its friction that the controller feeds forward.
+    pub(super) fed_forward: f64,
     /// Largest torque the reading can show, Nm.
     pub(super) reading_limit_nm: f64,
     /// Reading of the encoder minus its true angle, rad.
@@ -52,8 +54,8 @@ pub(super) struct JointMechanics {
 }
 
 impl Assembly {
-    /// The nominal arm.
-    pub(super) fn new(arm: &Arm) -> Self {
+    /// The nominal arm, its friction fed forward as the controller's configuration says.
+    pub(super) fn new(arm: &Arm, friction_feedforward: f64) -> Self {
         let mechanics = |joint: &crate::robot::Joint| JointMechanics {
             rotor_inertia_kg_m2: joint.drive.rotor_inertia_kg_m2,
             friction: Friction::nominal(&joint.drive, arm.friction_epsilon_rad_s),
@@ -62,6 +64,7 @@ impl Assembly {
             ripples: Vec::new(),
             gain_error: 0.0,
             offset_nm: 0.0,
+            fed_forward: friction_feedforward,
             reading_limit_nm: f64::INFINITY,
             encoder_offset_rad: 0.0,
             springs: Vec::new(),

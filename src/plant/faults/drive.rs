@@ -59,6 +59,36 @@ impl Fault for CurrentOffset {
     }
 }
 
+/// A drive that feeds another share of its friction forward than the controller's
+/// [`friction_feedforward`](crate::plant::PlantConfig::friction_feedforward): less by Δ.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FeedForward {
+    /// Joint, from 1.
+    pub joint: usize,
+    /// Δ; negative where it feeds more forward.
+    pub share_less: f64,
+}
+
+impl Fault for FeedForward {
+    fn joint(&self) -> Option<usize> {
+        Some(self.joint)
+    }
+
+    fn check(&self) -> Result<(), Complaint> {
+        finite("share_less", self.share_less)
+    }
+
+    fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
+        let fed_forward = &mut assembly.joint(self.joint).fed_forward;
+        *fed_forward -= self.share_less;
+        let is_share = (0.0..=2.0).contains(fed_forward);
+        let requirement =
+            "must leave a share between 0 and 2 of the controller's friction_feedforward";
+        require(is_share, "share_less", self.share_less, requirement)
+    }
+}
+
 /// A current reading that ends at a limit which the current itself passes: the log shows
 /// clamp(τ, ±limit). (A drive that cannot give more than it is asked for is a limit of the arm,
 /// `torque_nm`; its log is true.)

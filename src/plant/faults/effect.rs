@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::arm::{BaseTilt, EncoderOffset, Gravity, LinkLength, Payload};
 use super::assembly::Assembly;
-use super::drive::{CurrentOffset, Saturation, TorqueGain};
+use super::drive::{CurrentOffset, FeedForward, Saturation, TorqueGain};
 use super::friction::{
     AsymmetricFriction, FrictionChange, LoadFriction, NonlinearViscous, PositionFriction,
     Presliding, ReversalWidth, Stribeck, ThermalDrift,
@@ -123,6 +123,8 @@ effects! {
     CurrentOffset = "current_offset",
     /// A current reading that ends at a limit.
     Saturation = "saturation",
+    /// A drive that feeds another share of its friction forward.
+    FeedForward = "feed_forward",
     /// A cable or dress pack that pulls.
     Spring = "spring",
     /// Something touched on the way.

@@ -32,6 +32,7 @@
 //! | [`torque_gain`](TorqueGain) | drive | `error_fraction` |
 //! | [`current_offset`](CurrentOffset) | drive | `offset_nm` |
 //! | [`saturation`](Saturation) | reading | `limit_nm` |
+//! | [`feed_forward`](FeedForward) | controller | `share_less` |
 //! | [`spring`](Spring) | surroundings | `stiffness_nm_rad`, `rest_rad` |
 //! | [`contact`](Contact) | surroundings; no `joint`: at the flange | `start_s`, `end_s`, `peak_nm` |
 //! | [`payload`](Payload) | arm | `mass_kg`, `com_x_m`, `com_y_m`, `com_z_m` |
@@ -59,7 +60,7 @@ mod surroundings;
 mod timing;
 
 pub use arm::{BaseTilt, EncoderOffset, Gravity, LinkLength, Payload};
-pub use drive::{CurrentOffset, Saturation, TorqueGain};
+pub use drive::{CurrentOffset, FeedForward, Saturation, TorqueGain};
 pub use drivetrain::HiddenDrivetrain;
 pub use effect::Effect;
 pub use friction::{

@@ -39,7 +39,7 @@ impl FaultyPlant {
         config: &PlantConfig,
     ) -> Result<Self, PlantError> {
         config.validate()?;
-        let mut assembly = Assembly::new(arm);
+        let mut assembly = Assembly::new(arm, config.friction_feedforward);
         for (i, effect) in effects.iter().enumerate() {
             let install = |assembly: &mut Assembly| {
                 let fault = effect.as_fault();
@@ -129,7 +129,8 @@ impl FaultyPlant {
             return Err(PlantError::Joints { what: "the reference", found, expected });
         }
         let drivetrain = Box::new(HiddenDrivetrain::new(&self.assembly, reference));
-        Plant::with_drivetrain(&self.assembly.arm, &self.nominal, drivetrain, config)
+        let fed_forward: Vec<f64> = self.assembly.joints.iter().map(|j| j.fed_forward).collect();
+        Plant::with_drivetrain(&self.assembly.arm, &self.nominal, &fed_forward, drivetrain, config)
     }
 
     /// A configuration that logs at every decision of the controller (or at every step, where the

@@ -1,0 +1,44 @@
+//! A drive that feeds another share of its friction forward than the others: with F its dry friction, s the sign of q̇ and
+//! s̃ the same as logged, τ = F Δ (s̃ − s), Δ the share that it feeds forward less than the others ([`Scene::answers`]).
+
+use super::*;
+use crate::diagnose::drives::SHARE;
+
+/// See the module.
+pub struct FeedForward;
+
+/// A drive feeds no more than twice its friction forward, and no less than nothing.
+const MOST_LESS: f64 = 2.0;
+
+impl Candidate for FeedForward {
+    fn kind(&self) -> Kind {
+        Kind::FeedForward
+    }
+
+    fn shapes(&self, scene: &Scene, site: Option<usize>) -> Vec<Shape> {
+        let is_there = scene.periodic && scene.coulomb_nm[joint(site)] > 0.0;
+        is_there.then_some(Shape { variant: 0, value: 0.0 }).into_iter().collect()
+    }
+
+    fn columns(&self, scene: &Scene, site: Option<usize>, _: Shape) -> Vec<Column> {
+        let j = joint(site);
+        let share = scene.answers(j).into_iter().nth(SHARE);
+        share.into_iter().map(|y| Column::on(j, y).scaled(scene.coulomb_nm[j])).collect()
+    }
+
+    fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
+        vec![quantity("share_less", b[0], "")]
+    }
+
+    fn separating_experiment(&self) -> &'static str {
+        "the same motion with the friction feed-forward of that drive switched off"
+    }
+
+    fn is_possible(&self, _: Shape, b: &[f64]) -> bool {
+        b[0].abs() < MOST_LESS
+    }
+
+    fn in_words(&self) -> &'static str {
+        "a drive that feeds another share of its friction forward than the others"
+    }
+}
