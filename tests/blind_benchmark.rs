@@ -146,11 +146,6 @@ fn a_drive_at_its_limit() {
 }
 
 #[test]
-fn a_drive_unlike_the_others() {
-    hide_and_find(&["feed_forward"]);
-}
-
-#[test]
 fn what_the_model_absorbs_is_found_against_a_simulation() {
     hide_and_find(&["payload", "friction_change"]);
 }

@@ -6,14 +6,15 @@
 //!
 //! 1. The log is processed as for identification, and its equations are whitened ([`Whitening`]): with
 //!    periods by the scatter between them (less what drifting friction does there), without by the residual itself.
-//!    How the drives answer dry friction belongs to the null model (`drives`), and friction is
-//!    looked at between the samples of a log ([`Scene::as_logged`], [`Scene::turning_rad_s`]).
+//!    How the drives answer dry friction belongs to the null model (`drives`), what single ones differ by to the
+//!    noise, and friction is looked at between the samples of a log ([`Scene::as_logged`], [`Scene::turning_rad_s`]).
 //! 2. Every family's columns lose what the null model spans; the squared length of the residual along
 //!    them, T = ‖P r‖² ~ χ²_k(λ), is the score test of adding the family.
 //! 3. Nonlinear parameters are refined continuously, the best family is added if chance does not explain
 //!    it, all causes are refined together, exchanged and removed where another set is better, and again.
 //!    Where a law explains a joint best at an end of its range that is not its own (play without a flight,
-//!    Stribeck's curve over the whole range of speeds), it stands in for something unknown and is not named.
+//!    Stribeck's curve over the whole range of speeds, or while the sign turns round), it stands in for something
+//!    unknown and is not named.
 //! 4. What is left is tested against noise; if it is none and no family fits, the answer says so.
 
 pub mod candidates;

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::family::{FAMILIES, Family};
+use super::family::{FAMILIES, Family, ON_REQUEST};
 use crate::diagnose::Kind;
 use crate::excitation::Excitation;
 use crate::montecarlo::scenario::{MotionEntry, Scenario, ScenarioError, Source};
@@ -61,7 +61,7 @@ pub(in crate::montecarlo) struct BlindEntry {
     sqrt_lambda_of_two: [f64; 2],
     against_simulation: f64,
     held_out: f64,
-    /// Only these families are hidden; all of them where left out.
+    /// Only these families are hidden; those that are drawn where left out.
     families: Option<Vec<Kind>>,
     #[serde(default)]
     motion: Vec<MotionEntry>,
@@ -99,9 +99,13 @@ impl BlindPlan {
         let none = base.effects.is_empty();
         let hidden = base.effects.len() as f64;
         source.check(none, "effect", hidden, "tables are what a blind benchmark draws itself")?;
-        let is_wanted =
-            |f: &&Family| entry.families.as_ref().is_none_or(|kinds| kinds.contains(&f.kind));
-        let families: Vec<Family> = FAMILIES.iter().filter(is_wanted).copied().collect();
+        let families: Vec<Family> = match &entry.families {
+            None => FAMILIES.to_vec(),
+            Some(kinds) => {
+                let all = FAMILIES.iter().chain(&ON_REQUEST);
+                all.filter(|family| kinds.contains(&family.kind)).copied().collect()
+            }
+        };
         let first = Motion { name: base.trajectory.clone(), excitation: base.excitation.clone() };
         let mut motions = vec![first];
         for motion in &entry.motion {
