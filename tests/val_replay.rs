@@ -194,6 +194,8 @@ fn drives() -> Vec<Case> {
         case(Kind::TimeSkew, 2, (0, 0.004), &[0.004], SAME),
         // At the wrists most of the change is that of friction where it reverses, within less than a sample.
         case(Kind::TimeSkew, 0, (0, -0.004), &[-0.004], 0.15),
+        // The plant's controller leaves a tenth of friction to the feedback in any case: c is 1 + 0.1/0.9 where both mean the same.
+        case(Kind::FeedForward, 1, NO_SHAPE, &[0.9], 0.1 / 0.9 + SAME),
     ]
 }
 
