@@ -1,6 +1,6 @@
 //! Something touched the arm: torque that comes once and goes.
 //!
-//! A motion that repeats needs no model: at every phase the torque is compared with the median over the
+//! A motion that repeats needs no model: at every phase the torque is compared with the trimmed mean of the other
 //! periods, which one contact cannot move, and what is left is searched for bumps ([`between_periods`]). A
 //! single run is compared with the extended model, in samples far from the joint's own reversals, where
 //! friction is known best ([`beside_model`]).
