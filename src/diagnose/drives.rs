@@ -14,17 +14,20 @@ use super::whitening::Whitening;
 pub type Answer = Vec<(usize, usize, f64)>;
 
 /// Place of the share in [`Scene::answers`].
-pub(super) const SHARE: usize = 0;
+const SHARE: usize = 0;
 
 /// Standard deviation of the shares that drives of one arm feed forward: how well a controller knows the friction of a joint.
 const ALIKE: f64 = 0.1;
 
-/// Torques by which the drives of an arm differ from each other, each of standard deviation one: without the common share.
-pub fn differences(scene: &Scene) -> Vec<Column> {
-    let of_joint = |j: usize| {
-        let share = scene.answers(j).into_iter().nth(SHARE)?;
-        Some(Column::on(j, share).scaled(ALIKE * scene.coulomb_nm[j]))
-    };
+/// What a drive's feeding nothing of its friction forward adds to the torque; `None` for a single run.
+pub fn share(scene: &Scene, joint: usize) -> Option<Column> {
+    let answer = scene.answers(joint).into_iter().nth(SHARE)?;
+    Some(Column::on(joint, answer).scaled(scene.coulomb_nm[joint]))
+}
+
+/// By joint, torques by which the drives of an arm differ from each other, each of standard deviation one.
+pub fn differences(scene: &Scene) -> Vec<(usize, Column)> {
+    let of_joint = |j: usize| Some((j, share(scene, j)?.scaled(ALIKE)));
     (0..scene.joints()).filter_map(of_joint).collect()
 }
 

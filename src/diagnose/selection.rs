@@ -414,14 +414,17 @@ impl<'s, 'a> Kept<'s, 'a> {
     /// may have the shapes that they have because of it.
     fn is_more_with(&self, c: usize) -> bool {
         let site = self.causes[c].entry.site;
-        let mut without = Self { causes: self.causes.clone(), ..*self };
-        without.causes.remove(c);
-        let beside: Vec<usize> =
-            (0..without.causes.len()).filter(|o| without.causes[*o].entry.site == site).collect();
-        if beside.is_empty() || !self.study.scene.periodic {
+        let share_site = self.causes.iter().filter(|cause| cause.entry.site == site).count();
+        if share_site == 1 || !self.study.scene.periodic {
             return true;
         }
-        beside.into_iter().for_each(|o| without.refine(o));
+        let mut without = Self { causes: self.causes.clone(), ..*self };
+        without.causes.remove(c);
+        for other in 0..without.causes.len() {
+            if without.causes[other].entry.site == site {
+                without.refine(other);
+            }
+        }
         self.total_evidence() - without.total_evidence() > LEAST_EVIDENCE
     }
 

@@ -115,8 +115,9 @@ impl<'a> Study<'a> {
     ) -> Result<Self, DiagnoseError> {
         let problem = &regression.problem;
         let n = problem.samples;
+        let differences = drives::differences(&scene);
         if let Whitening::Periods(periods) = &mut whitening {
-            periods.with_repeating_noise(&drives::differences(&scene));
+            periods.with_repeating_noise(differences.iter().map(|(_, torque)| torque));
         }
         let columns: Vec<Column> = (0..problem.parameters())
             .map(|base| {
@@ -148,10 +149,10 @@ impl<'a> Study<'a> {
         }
         let mut residual = torque.clone();
         null.residualise(&mut residual);
-        let shares = drives::differences(&scene).into_iter().map(|column| {
-            let mut image = whitening.image(&column);
+        let shares = differences.iter().map(|(j, torque)| {
+            let mut image = whitening.image(torque);
             null.residualise(&mut image);
-            (column.parts[0].0, image)
+            (*j, image)
         });
         let shares = shares.collect();
         let statistic = Statistic::new(&whitening, &residual, problem.joints());

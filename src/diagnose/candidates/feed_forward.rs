@@ -2,7 +2,7 @@
 //! s̃ the same as logged, τ = F Δ (s̃ − s), Δ the share that it feeds forward less than the others ([`Scene::answers`]).
 
 use super::*;
-use crate::diagnose::drives::SHARE;
+use crate::diagnose::drives;
 
 /// See the module.
 pub struct FeedForward;
@@ -21,9 +21,7 @@ impl Candidate for FeedForward {
     }
 
     fn columns(&self, scene: &Scene, site: Option<usize>, _: Shape) -> Vec<Column> {
-        let j = joint(site);
-        let share = scene.answers(j).into_iter().nth(SHARE);
-        share.into_iter().map(|y| Column::on(j, y).scaled(scene.coulomb_nm[j])).collect()
+        drives::share(scene, joint(site)).into_iter().collect()
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {

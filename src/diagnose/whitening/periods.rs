@@ -159,9 +159,8 @@ impl PeriodWhitening {
     }
 
     /// Takes torques that repeat in every period and whose heights have the standard deviation one for noise.
-    pub fn with_repeating_noise(&mut self, torques: &[Column]) {
-        self.repeating = None;
-        let images: Vec<Image> = torques.iter().map(|torque| self.image(torque)).collect();
+    pub fn with_repeating_noise<'c>(&mut self, torques: impl Iterator<Item = &'c Column>) {
+        let images: Vec<Image> = torques.map(|torque| self.image_in_noise(torque)).collect();
         self.repeating = Some(RepeatingNoise::new(&images));
     }
 
