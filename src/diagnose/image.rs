@@ -6,6 +6,8 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 use nalgebra::DMatrix;
 
+use crate::dynamics::with_widest_registers;
+
 /// A torque signal on some joints, in Nm (or Nm per unit of its coefficient).
 ///
 /// Each part is a joint and either n samples, which repeat in every period, or P·n samples.
@@ -89,6 +91,14 @@ fn dot_of_contrasts(a: &[f64], b: &[f64]) -> f64 {
 
 /// Sum of products in eight interleaved partial sums: fast, and a fixed order.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    with_widest_registers(
+        #[inline(always)]
+        || dot_in_order(a, b),
+    )
+}
+
+#[inline(always)]
+fn dot_in_order(a: &[f64], b: &[f64]) -> f64 {
     let (a8, a_rest) = a.as_chunks::<8>();
     let (b8, b_rest) = b.as_chunks::<8>();
     let mut partial = [0.0; 8];
@@ -211,9 +221,16 @@ impl Span {
         }
         let supports = columns.iter().map(Image::support).filter(|support| !support.is_empty());
         if let Some(support) = supports.reduce(|a, b| a.start.min(b.start)..a.end.max(b.end)) {
-            let mut means = Vec::<f64>::with_capacity(support.len() * columns.len());
-            columns.iter().for_each(|column| means.extend(&column.mean[support.clone()]));
-            let means = MatRef::from_column_major_slice(&means, support.len(), columns.len());
+            let mut copies = Vec::new();
+            let means = match columns {
+                [column] => &column.mean[support.clone()],
+                _ => {
+                    copies.reserve_exact(support.len() * columns.len());
+                    columns.iter().for_each(|column| copies.extend(&column.mean[support.clone()]));
+                    &copies
+                }
+            };
+            let means = MatRef::from_column_major_slice(means, support.len(), columns.len());
             let directions = self.means().subrows(support.start, support.len()).transpose();
             matmul(&mut along, Accum::Replace, directions, means, 1.0, Par::Seq);
         }

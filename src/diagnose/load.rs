@@ -10,7 +10,9 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use realfft::num_complex::Complex64;
 
 use super::extension::mean_period;
-use crate::dynamics::{LANES, Lanes, Model, Motion, Real, Workspace, rigid_torque};
+use crate::dynamics::{
+    LANES, Lanes, Model, Motion, Real, Workspace, rigid_torque, with_widest_registers,
+};
 use crate::robot::{Arm, JointSignals};
 use crate::signal::FineClock;
 
@@ -321,7 +323,10 @@ pub fn load_along(model: &Model, arm: &Arm, motion: &Motion) -> JointSignals {
 /// M_links q̈ + c + g of every sample, eight samples at a time with the widest registers of the machine.
 pub fn rigid_torque_along(model: &Model, motion: &Motion) -> JointSignals {
     let mut out = JointSignals::zeros(motion.joints(), motion.samples());
-    pulp::Arch::new().dispatch(|| fill_rigid_torque(model, motion, &mut out));
+    with_widest_registers(
+        #[inline(always)]
+        || fill_rigid_torque(model, motion, &mut out),
+    );
     out
 }
 

@@ -10,6 +10,7 @@
 //! T the time between samples, and the velocity is what solves q̇ = series − Σ B a F Δ(s − β s_ε).
 
 use super::scene::FINE;
+use crate::dynamics::{map_pairs, with_widest_registers};
 use crate::signal::FineClock;
 
 /// What the series of a log's samples lacks of a velocity that bends between them.
@@ -70,53 +71,61 @@ impl Bends {
         joint: &Turning,
         delivered: &[f64],
         width_rad_s: f64,
-        law: impl Fn(f64) -> f64,
+        law: impl Fn(f64) -> f64 + Copy,
     ) -> Vec<f64> {
         let series = &joint.series_rad_s;
         let n = series.len();
         let kick = joint.kick_rad_s.iter().fold(0.0f64, |most, k| most.max(k.abs()));
         let near = WIDTHS * width_rad_s + 2.0 * kick * self.most;
-        let is_near = |k: usize| series[k % n].abs() < near;
+        let is_near = |k: usize| series[if k < n { k } else { k - n }].abs() < near;
         let mut out = series.clone();
         let Some(start) = (0..n).find(|k| !is_near(*k)) else { return out };
         let mut k = start;
         while k < start + n {
             let end = (k..start + n).find(|k| !is_near(*k)).unwrap_or(start + n);
             if end > k {
-                let force = |k: usize, qd: f64| law(qd) - delivered[k % n];
-                self.solve(joint, k..end, width_rad_s, force, &mut out);
+                with_widest_registers(
+                    #[inline(always)]
+                    || self.solve(joint, k..end, width_rad_s, law, delivered, &mut out),
+                );
             }
             k = end + 1;
         }
         out
     }
 
-    /// One turn, over `run` (ticks modulo the period), where `unbalanced` is what the velocity at a tick leaves unbalanced of
-    /// dry friction.
+    /// One turn, over `run` (ticks modulo the period).
+    #[inline(always)]
     fn solve(
         &self,
         joint: &Turning,
         run: std::ops::Range<usize>,
         width_rad_s: f64,
-        unbalanced: impl Fn(usize, f64) -> f64,
+        law: impl Fn(f64) -> f64,
+        delivered: &[f64],
         out: &mut [f64],
     ) {
         let Turning { series_rad_s: series, kick_rad_s: kick, .. } = joint;
         let n = series.len();
         let by_samples: Vec<f64> = run.clone().map(|k| series[k % n]).collect();
         let mut qd = by_samples.clone();
+        let inner = 1..=qd.len();
         // As steep as the law may be, the step still leads towards the solution.
         let steepness = 2.0 * kick[run.start % n].abs() * self.most / width_rad_s;
         let step = 1.0 / (1.0 + steepness);
-        // With what is unbalanced at the ticks before and behind the run, where the joint follows the series.
-        let before = run.start + n - 1;
-        let mut force: Vec<f64> =
-            (before..=before + 1 + qd.len()).map(|k| unbalanced(k, series[k % n])).collect();
+        // What is unbalanced, with the ticks before and behind the run, where the joint follows the series.
+        let around = || (run.start + n - 1..=run.end + n).map(|k| k % n);
+        let given: Vec<f64> = around().map(|k| delivered[k]).collect();
+        let mut force: Vec<f64> = around().map(|k| law(series[k]) - delivered[k]).collect();
         let mut moved = qd.clone();
         for _ in 0..(STEPS / step).ceil() as usize {
-            for (i, (k, qd)) in run.clone().zip(&qd).enumerate() {
-                force[i + 1] = unbalanced(k, *qd);
-            }
+            force[inner.clone()].copy_from_slice(&qd);
+            map_pairs(
+                &mut force[inner.clone()],
+                &given[inner.clone()],
+                #[inline(always)]
+                |qd, given| law(qd) - given,
+            );
             moved.copy_from_slice(&by_samples);
             for (i, k) in run.clone().enumerate() {
                 let bend = -0.5 * kick[k % n] * (force[i + 2] - force[i]);

@@ -267,7 +267,7 @@ impl Scene {
         j: usize,
         fed: Option<f64>,
         width_rad_s: f64,
-        law: impl Fn(f64) -> f64,
+        law: impl Fn(f64) -> f64 + Copy,
     ) -> Vec<f64> {
         if !self.periodic {
             return self.motion.qd_rad_s.joint(j).to_vec();

@@ -15,7 +15,7 @@ use super::model::Model;
 use super::motion::Motion;
 use super::newton_euler::BodyMotion;
 use super::parameters::{Parameter, ParameterLayout};
-use super::real::{LANES, Lanes, Real};
+use super::real::{LANES, Lanes, Real, with_widest_registers};
 use super::vector::Vec3;
 use super::workspace::Workspace;
 
@@ -180,9 +180,10 @@ impl RegressorBlock {
     ) {
         assert!(range.len() <= self.capacity && range.end <= motion.samples());
         self.samples = range.len();
-        // Instruction sets are chosen at run time; no fused multiply-add is used, so all of them
-        // give the same bits.
-        pulp::Arch::new().dispatch(|| self.fill_lanes(model, ws, motion, range.start));
+        with_widest_registers(
+            #[inline(always)]
+            || self.fill_lanes(model, ws, motion, range.start),
+        );
     }
 
     #[inline(always)]

@@ -13,7 +13,7 @@
 use super::model::Model;
 use super::motion::Motion;
 use super::newton_euler::BodyMotion;
-use super::real::{LANES, Lanes, Real};
+use super::real::{LANES, Lanes, Real, with_widest_registers};
 use super::regressor::RegressorBlock;
 use super::vector::Vec3;
 use super::workspace::Workspace;
@@ -150,8 +150,10 @@ impl RegressorBlock {
         gradient: &mut Motion,
     ) {
         assert!(range.len() == self.samples && range.end <= motion.samples());
-        pulp::Arch::new()
-            .dispatch(|| self.pull_back_lanes(model, ws, motion, range.start, gradient));
+        with_widest_registers(
+            #[inline(always)]
+            || self.pull_back_lanes(model, ws, motion, range.start, gradient),
+        );
     }
 
     #[inline(always)]

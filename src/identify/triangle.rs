@@ -1,5 +1,7 @@
 //! Least squares by QR, fed block by block: only the triangle is kept.
 
+use crate::dynamics::with_widest_registers;
+
 /// R and QᵀY of X = Q R, with the part of Y outside the span of X, for any number of rows.
 ///
 /// Rows are appended in blocks that stay in cache; the whole X never goes through memory. The
@@ -74,7 +76,10 @@ impl Triangle {
         assert_eq!(block.len(), rows * (self.columns + self.right_hand_sides));
         if rows > 0 {
             self.rows += rows;
-            pulp::Arch::new().dispatch(|| self.eliminate(block, rows));
+            with_widest_registers(
+                #[inline(always)]
+                || self.eliminate(block, rows),
+            );
         }
     }
 

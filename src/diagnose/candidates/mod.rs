@@ -27,6 +27,7 @@ mod torque_gain;
 use super::image::Column;
 use super::kind::Kind;
 use super::scene::{Instants, Scene};
+use crate::dynamics::{map_pairs, with_widest_registers};
 
 /// A point in the nonlinear parameters of a family.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -222,6 +223,15 @@ fn dry_friction(scene: &Scene, j: usize, level: impl Fn(&Instants, usize) -> f64
     let at = scene.instants(j);
     let friction = (0..at.sign.len()).map(|k| at.sign[k] * level(at, k)).collect();
     Column::on(j, scene.as_logged(friction))
+}
+
+/// `f(a, b)` of all pairs, with the widest registers of the machine where `f` is inlined.
+fn of_pairs(mut a: Vec<f64>, b: &[f64], f: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+    with_widest_registers(
+        #[inline(always)]
+        || map_pairs(&mut a, b, &f),
+    );
+    a
 }
 
 /// The joint of a family that always sits on one.

@@ -8,6 +8,7 @@
 //! angles (their rounding) demands. Without, rounding at standstill would shake the friction loose.
 
 use super::*;
+use crate::dynamics::Real;
 
 /// See the module.
 pub struct Presliding;
@@ -24,29 +25,48 @@ const MOST_ERROR: f64 = 0.15;
 fn deflection(scene: &Scene, j: usize, stiffness_per_rad: f64) -> Vec<f64> {
     let Instants { q_rad, qd_rad_s, sign, step_s } = scene.instants(j);
     let (q, qd) = (with_play(q_rad, scene.angle_doubt_rad[j]), qd_rad_s);
+    let first = if scene.periodic { q.len() - 1 } else { 0 };
+    let before = std::iter::once(first).chain(0..q.len() - 1);
+    let way = |(k, now): (usize, usize)| {
+        // An angle that is known to a quantum only says itself where it went.
+        if scene.angle_doubt_rad[j] > 0.0 {
+            [q[now] - q[k], 0.0]
+        } else {
+            legs((q[k], qd[k]), (q[now], qd[now]), *step_s)
+        }
+    };
+    let (ways, behind): (Vec<f64>, Vec<f64>) =
+        before.zip(0..q.len()).map(way).map(|[way, behind]| (way, behind)).unzip();
+    let lefts = of_pairs(
+        ways.clone(),
+        &ways,
+        #[inline(always)]
+        |leg, _| left_behind(leg, stiffness_per_rad),
+    );
+    let towards = |state: f64, leg: f64, left: f64| {
+        let direction = if leg >= 0.0 { 1.0 } else { -1.0 };
+        direction + (state - direction) * left
+    };
     let mut z = vec![0.0; q.len()];
     let mut state = sign[0];
     // One lap forgets where the state began if the joint travels a few times 1/k; two are plenty.
     let laps = if scene.periodic { 2 } else { 1 };
     for _ in 0..laps {
-        let first = if scene.periodic { q.len() - 1 } else { 0 };
-        let mut previous = (q[first], qd[first]);
-        for (z, now) in z.iter_mut().zip(q.iter().copied().zip(qd.iter().copied())) {
-            // An angle that is known to a quantum only says itself where it went.
-            let way = if scene.angle_doubt_rad[j] > 0.0 {
-                [now.0 - previous.0, 0.0]
-            } else {
-                legs(previous, now, *step_s)
-            };
-            for leg in way {
-                let direction = if leg >= 0.0 { 1.0 } else { -1.0 };
-                state = direction + (state - direction) * (-stiffness_per_rad * leg.abs()).exp();
+        for (((z, way), left_of_way), behind) in z.iter_mut().zip(&ways).zip(&lefts).zip(&behind) {
+            state = towards(state, *way, *left_of_way);
+            if *behind != 0.0 {
+                state = towards(state, *behind, left_behind(*behind, stiffness_per_rad));
             }
             *z = state;
-            previous = now;
         }
     }
     z
+}
+
+/// What is left of a deflection behind a leg of the way.
+#[inline(always)]
+fn left_behind(leg: f64, stiffness_per_rad: f64) -> f64 {
+    Real::exp(-stiffness_per_rad * leg.abs())
 }
 
 /// Signed lengths of the way from one (angle, velocity) to the next: there and back where the velocity,

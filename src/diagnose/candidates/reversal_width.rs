@@ -64,11 +64,20 @@ impl Candidate for ReversalWidth {
         let change = width - epsilon;
         let fed = Some(shape.variant as f64);
         let per_width = |j: usize| {
-            let law = |qd: f64| Real::tanh(qd / width);
-            let slope = |(qd, sign): (f64, &f64)| (law(qd) - sign) / change;
-            let qd = scene.turning_rad_s(j, fed, width, law);
-            let unit = qd.into_iter().zip(&scene.instants(j).sign).map(slope).collect();
-            scene.as_logged(unit).into_iter().map(|u| scene.coulomb_nm[j] * u).collect()
+            let qd = scene.turning_rad_s(
+                j,
+                fed,
+                width,
+                #[inline(always)]
+                |qd| Real::tanh(qd / width),
+            );
+            let slope = of_pairs(
+                qd,
+                &scene.instants(j).sign,
+                #[inline(always)]
+                |qd, sign| (Real::tanh(qd / width) - sign) / change,
+            );
+            scene.as_logged(slope).into_iter().map(|u| scene.coulomb_nm[j] * u).collect()
         };
         vec![Column { parts: joints_at(scene, site).map(|j| (j, per_width(j))).collect() }]
     }

@@ -73,10 +73,17 @@ impl Candidate for Ripple {
         } else {
             0.5 * scene.rate_hz * std::f64::consts::TAU / shape.value
         };
-        let wave = |(q, qd): (&f64, &f64)| {
-            if qd.abs() < fastest_rad_s { Real::sin_cos(shape.value * q) } else { (0.0, 0.0) }
-        };
-        let (sin, cos) = at.q_rad.iter().zip(&at.qd_rad_s).map(wave).unzip();
+        let (mut sin, mut cos) = (at.q_rad.clone(), at.q_rad.clone());
+        with_widest_registers(
+            #[inline(always)]
+            || {
+                for ((sin, cos), qd) in sin.iter_mut().zip(&mut cos).zip(&at.qd_rad_s) {
+                    let seen = if qd.abs() < fastest_rad_s { 1.0 } else { 0.0 };
+                    let wave = Real::sin_cos(shape.value * *sin);
+                    (*sin, *cos) = (seen * wave.0, seen * wave.1);
+                }
+            },
+        );
         [cos, sin].map(|ripple| Column::on(j, scene.as_logged(ripple))).into()
     }
 

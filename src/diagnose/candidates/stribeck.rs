@@ -26,6 +26,14 @@ const NARROWEST: f64 = 1.2;
 /// What is best explained by a curve no wider than this is narrower than any: another way in which friction turns round.
 const AT_THE_END: f64 = 1.25;
 
+/// Friction over Coulomb's with [`USUAL_SHARE`] more of it near rest, which falls with the speed `v`, rad/s.
+#[inline(always)]
+fn usual(shape: Shape, epsilon_rad_s: f64, v: f64) -> f64 {
+    let x = v.abs() / shape.value;
+    let more = Real::exp(-if shape.variant == 0 { x * x } else { x });
+    Real::tanh(v / epsilon_rad_s) * (1.0 + USUAL_SHARE * more)
+}
+
 impl Candidate for Stribeck {
     fn kind(&self) -> Kind {
         Kind::Stribeck
@@ -52,14 +60,21 @@ impl Candidate for Stribeck {
 
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let j = joint(site);
-        let exponent = if shape.variant == 0 { 2 } else { 1 };
-        let law = |v: f64| (-(v.abs() / shape.value).powi(exponent)).exp();
         let epsilon = scene.arm.friction_epsilon_rad_s;
-        let all = |v: f64| Real::tanh(v / epsilon) * (1.0 + USUAL_SHARE * law(v));
-        let velocity = scene.turning_rad_s(j, None, epsilon, all);
-        let beside = |(v, own): (f64, &f64)| (all(v) - own) / USUAL_SHARE;
-        let friction = velocity.into_iter().zip(&scene.instants(j).sign).map(beside).collect();
-        vec![Column::on(j, scene.as_logged(friction))]
+        let velocity = scene.turning_rad_s(
+            j,
+            None,
+            epsilon,
+            #[inline(always)]
+            |v| usual(shape, epsilon, v),
+        );
+        let beside = of_pairs(
+            velocity,
+            &scene.instants(j).sign,
+            #[inline(always)]
+            |v, sign| (usual(shape, epsilon, v) - sign) / USUAL_SHARE,
+        );
+        vec![Column::on(j, scene.as_logged(beside))]
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, shape: Shape, b: &[f64]) -> Vec<Quantity> {
