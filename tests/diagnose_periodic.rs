@@ -36,6 +36,23 @@ fn load_friction() {
     contains(only(&found, Kind::LoadFriction, Some(2)), "mu", 0.03);
 }
 
+/// Where something rubs on the motor's side of a wrist's gear, the rotor loads it more than the links do.
+#[test]
+fn load_friction_on_the_motors_side() {
+    let found = Hidden::on(4, Law::MotorLoad { mu: 0.15 }).diagnose(3);
+    contains(only(&found, Kind::LoadFriction, Some(5)), "mu", 0.15);
+}
+
+/// A quarter of the largest torque is cut off: what is left bends the fit of the null model, and that is put right.
+#[test]
+fn a_reading_that_ends_before_its_noise() {
+    let found = Hidden::on(1, Law::CutBeforeNoise { share: 0.74 }).diagnose(8);
+    let cause = only(&found, Kind::Saturation, Some(2));
+    let most = found.scene.torque_nm.joint(1).iter().fold(0.0f64, |most, t| most.max(t.abs()));
+    // The motion's largest torque is known a hundred times better than this.
+    assert!((cause.parameters["limit_nm"].value / most - 0.74).abs() < 0.01);
+}
+
 #[test]
 fn presliding() {
     let found = Hidden::on(3, Law::Dahl { stiffness_per_rad: 300.0 }).diagnose(4);

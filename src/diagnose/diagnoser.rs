@@ -19,7 +19,7 @@ use super::payload::{self, PayloadFinding};
 use super::record::{Record, is_torn};
 use super::replay::measured_nm;
 use super::scene::Scene;
-use super::selection::{Kept, select};
+use super::selection::{Contender, Found, Kept, select};
 use super::significance::LEAST_EVIDENCE;
 use super::study::{Entry, Study};
 use super::verdict::{Cause, DetectionLimit, Diagnosis, Rival, Rms, Verdict};
@@ -66,6 +66,10 @@ const ABSORBED_BESIDE: f64 = 0.04 * 0.04;
 /// No effect has a coefficient (Nm, Nm/rad, rad, 1 … in SI) as large as this: its column is rounding.
 const BEYOND_PHYSICS: f64 = 1e4;
 const POWER_Z: f64 = 1.281_551_565_544_6;
+/// Rounds of causes and estimate at most.
+const ROUNDS: usize = 4;
+/// 2 ln of the evidence below which another round changes nothing that counts.
+const SETTLED: f64 = 4.0;
 
 impl<'a> Diagnoser<'a> {
     /// For logs of `arm`, with all families.
@@ -113,23 +117,21 @@ impl<'a> Diagnoser<'a> {
         let null = Extension::fit(&first, &[], &first.torque);
         let first = without_contacts(first, self.set, &null, m.source)?;
         let found = select(&first);
-        // The load on the gear is better known once friction is, and so is what touched the arm.
-        let mut study = if found.is_empty() && first.scene.periodic {
-            first
+        let (mut study, found) = if found.causes.is_empty() && first.scene.periodic {
+            (first, found.causes)
         } else {
-            let entries: Vec<&Entry> = found.iter().map(|c| &c.entry).collect();
-            let refined = Extension::fit(&first, &entries, &first.torque);
-            let study = first.with_estimate(self.arm, self.set, &refined.theta);
-            without_contacts(study, self.set, &refined, m.source)?
+            self.settled(first, found, m.source)?
         };
         let null = Extension::fit(&study, &[], &study.torque);
-        let mut kept = Kept::taken_over(&study, found.clone());
         if !study.scene.periodic {
             // A single run is judged by its own residual, which is known only now.
-            let (_, rest) = kept.without(None);
+            let (_, rest) = Kept::taken_over(&study, found.clone()).without(None);
             study.judge_by(&rest);
-            kept = Kept::of_a_single_run(&study, found);
         }
+        let kept = match study.scene.periodic {
+            true => Kept::settled(&study, found),
+            false => Kept::of_a_single_run(&study, found),
+        };
         let selected = kept.selected();
         let entries: Vec<&Entry> = selected.iter().map(|s| &s.contender.entry).collect();
         let extension = Extension::fit(&study, &entries, &study.torque);
@@ -251,6 +253,37 @@ impl<'a> Diagnoser<'a> {
             measured_nm,
             samples,
         })
+    }
+
+    /// The load on the gear is better known once friction is, and so is what touched the arm: what was `found`, and the
+    /// estimate of the arm beside it, until one no longer changes the other.
+    ///
+    /// Of a motion that repeats, what was found only because the estimate was bent is dropped on the way.
+    fn settled<'s>(
+        &self,
+        mut study: Study<'s>,
+        found: Found,
+        log: &str,
+    ) -> Result<(Study<'s>, Vec<Contender>), DiagnoseError> {
+        let Found { mut causes, mut evidence } = found;
+        for _ in 0..ROUNDS {
+            let entries: Vec<&Entry> = causes.iter().map(|c| &c.entry).collect();
+            let refined = Extension::fit(&study, &entries, &study.torque);
+            study = study.with_estimate(self.arm, self.set, &refined.theta);
+            study = without_contacts(study, self.set, &refined, log)?;
+            if !study.scene.periodic {
+                break;
+            }
+            let mut kept = Kept::taken_over(&study, causes);
+            let dropped = kept.drop_unneeded(|_| true);
+            let gained = kept.total_evidence() - evidence;
+            evidence += gained;
+            causes = kept.causes;
+            if dropped.is_empty() && gained < SETTLED {
+                break;
+            }
+        }
+        Ok((study, causes))
     }
 
     /// Says whether `loaded` was recorded with a body on the flange that `reference`, diagnosed as

@@ -76,8 +76,8 @@ pub fn base(study: &Study, set: &BaseSet, extension: &Extension) -> Vec<BasePara
 /// quantile, which is where the likelihood falls below that of the best form by q². The nonlinear parameter of a
 /// motion that repeats is treated the same way, value by value: the interval is that of the profile of the likelihood
 /// (Venzon and Moolgavkar 1988), which need not be symmetric. It also reaches to what the shape says of the same
-/// parameter, see [`Candidate::in_shape`], holds what the law itself may be wrong by ([`Candidate::form_error`]), and nothing
-/// that makes no sense ([`Candidate::least`]).
+/// parameter, see [`Candidate::in_shape`], to all that an absorbed column leaves open ([`Candidate::left_open`]), holds what
+/// the law itself may be wrong by ([`Candidate::form_error`]), and nothing that makes no sense ([`Candidate::least`]).
 pub fn physical(
     study: &Study,
     kept: &Kept,
@@ -115,6 +115,11 @@ pub fn physical(
         && let Some(own) = out.get_mut(again.name)
     {
         own.reach(again.value);
+    }
+    let Effect { site, shape, coefficients, .. } = effect;
+    for (name, ends) in family.left_open(&study.scene, *site, *shape, coefficients) {
+        let own = out.get_mut(name).into_iter();
+        own.for_each(|own| ends.into_iter().for_each(|end| own.reach(end)));
     }
     let form_error = family.form_error(&study.scene, effect.shape);
     let nothing = family.without_effect(&study.scene);

@@ -1,5 +1,6 @@
 //! What every candidate sees of a log: the motion, and what the current estimate makes of it.
 
+use std::borrow::Cow;
 use std::sync::OnceLock;
 
 use realfft::num_complex::Complex64;
@@ -304,6 +305,11 @@ impl Scene {
         })
     }
 
+    /// `y`, given at the samples, at the instants of a joint.
+    pub fn at_instants<'y>(&self, y: &'y [f64]) -> Cow<'y, [f64]> {
+        if self.periodic { self.fine(y).into() } else { y.into() }
+    }
+
     /// [`Self::link_nm`] of joint `j` at its instants.
     pub fn link_at_instants(&self, j: usize) -> &[f64] {
         if self.periodic { self.fine_link_nm(j) } else { self.link_nm.joint(j) }
@@ -321,6 +327,12 @@ impl Scene {
             let now = self.torque_nm.joint(j);
             return less(self.delayed(now, delay_s), now);
         };
+        let part = |y: &[f64], wanted: bool| {
+            clock.filtered(y, |h| match delivered.known[j].get(h) {
+                Some(known) if *known == wanted => Complex64::ONE,
+                _ => Complex64::ZERO,
+            })
+        };
         let at_samples = |fine: &[f64], wanted: bool| {
             let (n, late) = (fine.len(), delay_s / self.instant_s());
             let change = |k: usize| {
@@ -330,14 +342,13 @@ impl Scene {
                 (1.0 - u) * fine[left] + u * fine[(left + 1) % n] - fine[k * FINE]
             };
             let change: Vec<f64> = (0..n / FINE).map(change).collect();
-            clock.filtered(&change, |h| match delivered.known[j].get(h) {
-                Some(known) if *known == wanted => Complex64::ONE,
-                _ => Complex64::ZERO,
-            })
+            part(&change, wanted)
         };
         let (coulomb, viscous) = (self.coulomb_nm[j], self.arm.joints[j].drive.viscous_nm_s_rad);
-        let (load, qd) = (delivered.load_nm.joint(j), self.motion.qd_rad_s.joint(j));
-        let smooth: Vec<f64> = load.iter().zip(qd).map(|(load, qd)| load + viscous * qd).collect();
+        let load = delivered.load_nm.joint(j);
+        // Elsewhere the velocity's noise, differentiated, is that of the acceleration, which the residual holds as well.
+        let qd = part(self.motion.qd_rad_s.joint(j), true);
+        let smooth: Vec<f64> = load.iter().zip(&qd).map(|(load, qd)| load + viscous * qd).collect();
         let smooth = less(self.delayed(&smooth, delay_s), &smooth);
         let dry = at_samples(&self.instants(j).sign, true);
         let beyond = at_samples(&delivered.beyond_nm[j], false);

@@ -39,15 +39,26 @@ pub struct Kept<'s, 'a> {
     with_common: bool,
 }
 
+/// Causes, and twice the log-evidence for all of them together against none.
+pub struct Found {
+    pub causes: Vec<Contender>,
+    pub evidence: f64,
+}
+
 /// Adds families one by one while the data ask for it; along a single run those of single joints.
-pub fn select(study: &Study) -> Vec<Contender> {
+pub fn select(study: &Study) -> Found {
     let with_common = study.scene.periodic;
     let mut kept = Kept { study, causes: Vec::new(), with_common };
     kept.grow();
-    kept.causes
+    Found { evidence: kept.total_evidence(), causes: kept.causes }
 }
 
 impl<'s, 'a> Kept<'s, 'a> {
+    /// `causes` as they were found in this `study`.
+    pub fn settled(study: &'s Study<'a>, causes: Vec<Contender>) -> Self {
+        Self { study, causes, with_common: true }
+    }
+
     /// `causes` found in another study of the same log (its load estimated with another model),
     /// taken over into `study`, refined and judged.
     pub fn taken_over(study: &'s Study<'a>, causes: Vec<Contender>) -> Self {
@@ -114,7 +125,7 @@ impl<'s, 'a> Kept<'s, 'a> {
     }
 
     /// 2 ln of the evidence for all causes together against none.
-    fn total_evidence(&self) -> f64 {
+    pub(super) fn total_evidence(&self) -> f64 {
         let (span, _) = self.without(None);
         let price: f64 = self.causes.iter().map(|c| self.study.price(&c.entry)).sum();
         self.study.statistic.gain(&span, &self.study.residual) - price
@@ -392,7 +403,10 @@ impl<'s, 'a> Kept<'s, 'a> {
     }
 
     /// Drops causes at these sites that are not needed beside the others; which they were.
-    fn drop_unneeded(&mut self, is_looked_at: impl Fn(Option<usize>) -> bool) -> Vec<usize> {
+    pub(super) fn drop_unneeded(
+        &mut self,
+        is_looked_at: impl Fn(Option<usize>) -> bool,
+    ) -> Vec<usize> {
         let mut dropped = Vec::new();
         let mut c = 0;
         while c < self.causes.len() {

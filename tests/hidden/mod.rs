@@ -14,8 +14,21 @@ use armid::robot::Arm;
 /// What is hidden.
 #[derive(Debug, Clone, Copy)]
 pub enum Law {
-    Load { mu: f64 },
-    Dahl { stiffness_per_rad: f64 },
+    /// Friction under the torque that the gear transmits.
+    Load {
+        mu: f64,
+    },
+    /// Friction under the torque on the motor's side of the gear.
+    MotorLoad {
+        mu: f64,
+    },
+    Dahl {
+        stiffness_per_rad: f64,
+    },
+    /// A reading that ends at this share of the largest torque; the noise comes behind it.
+    CutBeforeNoise {
+        share: f64,
+    },
 }
 
 /// A hidden effect and where it sits.
@@ -56,7 +69,12 @@ impl Hidden {
             &config,
         )
         .unwrap();
-        let recording = plant.run(&excitation, None).unwrap();
+        let mut recording = plant.run(&excitation, None).unwrap();
+        if let Law::CutBeforeNoise { share } = self.law {
+            let torque = recording.torque_nm.joint_mut(self.joint);
+            let limit = share * torque.iter().fold(0.0f64, |most, t| most.max(t.abs()));
+            torque.iter_mut().for_each(|t| *t = t.clamp(-limit, limit));
+        }
         let sensors = SensorConfig {
             torque_sd_nm: PerJoint::Each(vec![1.0, 1.0, 0.7, 0.15, 0.15, 0.15]),
             q_sd_rad: PerJoint::All(2e-5),
@@ -98,7 +116,7 @@ impl Drivetrain for HiddenLaw {
     fn states(&self) -> usize {
         match self.law {
             Law::Dahl { .. } => 1,
-            Law::Load { .. } => 0,
+            Law::Load { .. } | Law::MotorLoad { .. } | Law::CutBeforeNoise { .. } => 0,
         }
     }
 
@@ -148,6 +166,12 @@ impl Drivetrain for HiddenLaw {
                     self.link_nm[h] = before - mu * transmitted.abs() * sign;
                 }
             }
+            Law::MotorLoad { mu } => {
+                // L of the drive's torque, which bears this friction as well.
+                let carried = self.link_nm[h] / (1.0 + mu * sign * self.link_nm[h].signum());
+                self.link_nm[h] = carried;
+            }
+            Law::CutBeforeNoise { .. } => {}
             Law::Dahl { stiffness_per_rad } => {
                 let z = stage.states[0];
                 states_rate[0] = stiffness_per_rad * (v - v.abs() * z);

@@ -2,21 +2,32 @@
 //!
 //! A single run is also asked for the exponent, τ = c |τ_L|^p sign q̇, and for friction under the bending
 //! moment on the joint's bearing. Of that moment the torque on the next joint is known, where its axis is
-//! perpendicular to this one's (variant 1). μ is the friction per load at the run's rms load.
+//! perpendicular to this one's (variant 1). μ is the friction per load at the run's rms load. A motion that repeats is
+//! asked whether the rotor's torque counts as well (variant 2): where something on the motor's side of the gear rubs.
+
+use std::borrow::Cow;
 
 use super::*;
 
 /// See the module.
 pub struct LoadFriction;
 
+/// The variant whose load is the torque that the gear transmits: the rotor sits on the motor's side.
+const GEAR: usize = 0;
 /// The variant whose load is the bending moment.
 const BENDING: usize = 1;
+/// The variant whose load is the torque on the motor's side of the gear, the rotor's with it.
+pub const MOTOR_SIDE: usize = 2;
 /// Exponents to begin with along a single run.
 const EXPONENTS: [f64; 4] = [1.0, 1.5, 2.0, 2.5];
 
 /// Torque by which joint `j` is loaded, at its instants, Nm.
-fn load(scene: &Scene, j: usize, variant: usize) -> &[f64] {
-    scene.link_at_instants(if variant == BENDING { j + 1 } else { j })
+fn load(scene: &Scene, j: usize, variant: usize) -> Cow<'_, [f64]> {
+    match variant {
+        MOTOR_SIDE => scene.at_instants(scene.load_nm.joint(j)),
+        BENDING => scene.link_at_instants(j + 1).into(),
+        _ => scene.link_at_instants(j).into(),
+    }
 }
 
 /// Whether the axis behind joint `j` is perpendicular to its own, so that its torque bends joint `j`.
@@ -37,9 +48,9 @@ impl Candidate for LoadFriction {
 
     fn shapes(&self, scene: &Scene, site: Option<usize>) -> Vec<Shape> {
         if scene.periodic {
-            return vec![Shape { variant: 0, value: 0.0 }];
+            return [GEAR, MOTOR_SIDE].map(|variant| Shape { variant, value: 0.0 }).into();
         }
-        let variants = if is_bent(scene, joint(site)) { 0..=BENDING } else { 0..=0 };
+        let variants = if is_bent(scene, joint(site)) { GEAR..=BENDING } else { GEAR..=GEAR };
         variants.flat_map(|variant| EXPONENTS.map(|value| Shape { variant, value })).collect()
     }
 
@@ -49,7 +60,6 @@ impl Candidate for LoadFriction {
 
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let j = joint(site);
-        // The rotor sits on the motor's side of the gear: its torque is not transmitted.
         let load = load(scene, j, shape.variant);
         let p = exponent(shape);
         vec![dry_friction(scene, j, |_, k| load[k].abs().powf(p))]

@@ -11,7 +11,7 @@ mod current_offset;
 mod elasticity;
 mod encoder_offset;
 mod feed_forward;
-mod load_friction;
+pub(super) mod load_friction;
 mod nonlinear_viscous;
 mod position_friction;
 mod presliding;
@@ -157,6 +157,18 @@ pub trait Candidate: Sync {
     /// What its physical parameters cannot be less than, though noise may say so.
     fn least(&self) -> f64 {
         f64::NEG_INFINITY
+    }
+
+    /// Between which values its physical parameters may lie where the null model absorbs a column, so that the log tells
+    /// only the coefficients `b` of those before it.
+    fn left_open(
+        &self,
+        _scene: &Scene,
+        _site: Option<usize>,
+        _shape: Shape,
+        _b: &[f64],
+    ) -> Vec<(&'static str, [f64; 2])> {
+        Vec::new()
     }
 
     /// The shape with which the law, fitted with `shape` and the coefficients `b` to one log, predicts another.

@@ -1,6 +1,12 @@
-//! Coulomb friction that depends on the angle: τ = (a cos q + b sin q) sign q̇ = A cos(q + φ) sign q̇.
+//! Coulomb friction that depends on the angle: τ = (a sin(q − q₀) + b cos(q − q₀)) sign q̇ = A cos(q + φ) sign q̇.
+//!
+//! q₀ lies in the middle of the angles: over a small arc b is Coulomb friction, which the null model has, and a is what
+//! can be seen.
 
 use super::*;
+
+/// Over a turn friction varies by a part of its level, at most this.
+const MOST: f64 = 0.75;
 
 /// See the module.
 pub struct PositionFriction;
@@ -10,27 +16,54 @@ impl Candidate for PositionFriction {
         Kind::PositionFriction
     }
 
-    fn columns(&self, scene: &Scene, site: Option<usize>, _: Shape) -> Vec<Column> {
-        let j = joint(site);
-        let column = |f: fn(f64) -> f64| dry_friction(scene, j, |at, k| f(at.q_rad[k]));
-        vec![column(f64::cos), column(f64::sin)]
+    fn shapes(&self, scene: &Scene, site: Option<usize>) -> Vec<Shape> {
+        let q = scene.motion.q_rad.joint(joint(site));
+        let ends = |[low, high]: [f64; 2], q: &f64| [low.min(*q), high.max(*q)];
+        let [low, high] = q.iter().fold([f64::INFINITY, f64::NEG_INFINITY], ends);
+        vec![Shape { variant: 0, value: 0.5 * (low + high) }]
     }
 
-    fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
+    fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
+        let middle = shape.value;
+        let column =
+            |f: fn(f64) -> f64| dry_friction(scene, joint(site), |at, k| f(at.q_rad[k] - middle));
+        vec![column(f64::sin), column(f64::cos)]
+    }
+
+    fn quantities(&self, _: &Scene, _: Option<usize>, shape: Shape, b: &[f64]) -> Vec<Quantity> {
+        let (sin, cos) = ((-b[0]).atan2(second(b)) - shape.value).sin_cos();
         vec![
             quantity("amplitude_nm", b[0].hypot(second(b)), "Nm"),
-            quantity("phase_rad", (-second(b)).atan2(b[0]), "rad"),
+            quantity("phase_rad", sin.atan2(cos), "rad"),
         ]
+    }
+
+    /// Of a law of which only the slope a is seen, −A sin(q₀ + φ) = a, A is at least |a|.
+    fn left_open(
+        &self,
+        scene: &Scene,
+        site: Option<usize>,
+        shape: Shape,
+        b: &[f64],
+    ) -> Vec<(&'static str, [f64; 2])> {
+        let [slope] = b else { return Vec::new() };
+        let most = (MOST * scene.coulomb_nm[joint(site)]).max(slope.abs());
+        let turn = std::f64::consts::FRAC_PI_2 - (slope.abs() / most).asin();
+        let quantities = self.quantities(scene, site, shape, b);
+        let reach = |q: &Quantity| match q.name {
+            "phase_rad" => (q.name, [q.value - turn, q.value + turn]),
+            name => (name, [slope.abs(), most]),
+        };
+        quantities.iter().map(reach).collect()
     }
 
     fn separating_experiment(&self) -> &'static str {
         "the same motion with another payload or on a tilted base: this friction stays where it was"
     }
 
-    /// Over a turn friction varies by a part of its level. What would have to vary by more than three quarters is a
-    /// bent law of something else, seen over a small arc.
+    /// What would have to vary by more than [`MOST`] is a bent law of something else, seen over a small arc.
     fn is_its_own(&self, scene: &Scene, site: Option<usize>, _: Shape, b: &[f64]) -> bool {
-        !scene.periodic || b[0].hypot(second(b)) < 0.75 * scene.coulomb_nm[joint(site)]
+        !scene.periodic || b[0].hypot(second(b)) < MOST * scene.coulomb_nm[joint(site)]
     }
 
     fn in_words(&self) -> &'static str {

@@ -1,11 +1,17 @@
 //! A drive at its limit: torque beyond ±c is cut off, and its noise with it. With σ the noise of one sample,
-//! the mean of what is cut above is E max(0, τ + n − c) = x Φ(x/σ) + σ φ(x/σ), x = τ − c.
+//! the mean of what is cut above is E max(0, τ + n − c) = x Φ(x/σ) + σ φ(x/σ), x = τ − c. Noise that comes to the
+//! reading behind the limit is not cut: max(0, x) (variant 1).
 
 use super::*;
 use statrs::function::erf::erfc;
 
 /// See the module.
 pub struct Saturation;
+
+/// The variant whose noise comes behind the limit.
+const BEFORE_NOISE: usize = 1;
+/// Limits to begin with, over the largest torque that the model expects.
+const SHARES: [f64; 5] = [0.6, 0.7, 0.8, 0.9, 0.97];
 
 /// E max(0, x + n), n normal with standard deviation `sigma`.
 fn beyond(x: f64, sigma: f64) -> f64 {
@@ -33,7 +39,8 @@ impl Candidate for Saturation {
             return Vec::new();
         }
         let peak = scene.torque_nm.joint(joint(site)).iter().fold(0.0, |m: f64, t| m.max(t.abs()));
-        [0.6, 0.7, 0.8, 0.9, 0.97].map(|share| Shape { variant: 0, value: share * peak }).to_vec()
+        let shapes = |variant| SHARES.map(|share| Shape { variant, value: share * peak });
+        [0, BEFORE_NOISE].into_iter().flat_map(shapes).collect()
     }
 
     fn search(&self) -> Search {
@@ -43,7 +50,7 @@ impl Candidate for Saturation {
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let j = joint(site);
         let torque = scene.torque_nm.joint(j);
-        let noise_nm = scene.noise_nm[j];
+        let noise_nm = if shape.variant == BEFORE_NOISE { 0.0 } else { scene.noise_nm[j] };
         let cut = |t: f64| beyond(-t - shape.value, noise_nm) - beyond(t - shape.value, noise_nm);
         vec![Column::on(j, samples(scene, |k| cut(torque[k])))]
     }

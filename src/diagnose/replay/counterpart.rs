@@ -5,6 +5,7 @@
 //! the same, it says so here.
 
 use crate::diagnose::Kind;
+use crate::diagnose::candidates::load_friction::MOTOR_SIDE;
 use crate::plant::faults::{self, Effect};
 
 /// What becomes of a cause when the simulation is extended by it.
@@ -76,6 +77,9 @@ impl Found<'_> {
                 Some(Counterpart::None(NO_SUCH_LAW))
             }
             Kind::LoadFriction if value("exponent").or(value("mu_bending")).is_some() => {
+                Some(Counterpart::None(NO_SUCH_LAW))
+            }
+            Kind::LoadFriction if self.variant == MOTOR_SIDE => {
                 Some(Counterpart::None(NO_SUCH_LAW))
             }
             Kind::NonlinearViscous => {
