@@ -92,9 +92,7 @@ pub fn unexplained(
     let mut found: Vec<Curve> = Vec::new();
     let mut tests = 0.0;
     for j in (0..scene.joints()).filter(|j| !study.left_out.contains(j)) {
-        let sample_s = 1.0 / scene.rate_hz;
-        let torque_rate: Vec<f64> =
-            scene.change_by_delay_nm(j, sample_s).iter().map(|nm| -nm / sample_s).collect();
+        let torque_rate = scene.torque_rate_nm_s(j);
         let time: Vec<f64> = (0..scene.samples()).map(|k| k as f64 / scene.rate_hz).collect();
         let axes: [(&'static str, &[f64]); 6] = [
             ("angle", scene.motion.q_rad.joint(j)),

@@ -356,6 +356,12 @@ impl Scene {
         smooth.iter().zip(&dry).zip(&beyond).map(sum).collect()
     }
 
+    /// Rate of the predicted drive torque of joint `j`, Nm/s: what a delay by one sample changes.
+    pub fn torque_rate_nm_s(&self, j: usize) -> Vec<f64> {
+        let change_nm = self.change_by_delay_nm(j, 1.0 / self.rate_hz);
+        change_nm.into_iter().map(|nm| -nm * self.rate_hz).collect()
+    }
+
     /// y at `FINE` instants per sample.
     fn fine(&self, y: &[f64]) -> Vec<f64> {
         if let Some(clock) = &self.clock {

@@ -4,7 +4,7 @@ use super::json::Program;
 use super::number::{percent, resolved, significant};
 use super::plot::{Axis, Colour, Grid, Mark};
 use super::{Column, Page, ReportError, Section, Status, Table, Verdict, replay};
-use crate::diagnose::{self, Cause, Diagnosis, Finding, Kind};
+use crate::diagnose::{self, Cause, DetectionLimit, Diagnosis, Finding, Kind};
 use crate::robot::Arm;
 
 /// The causes with their numbers.
@@ -43,68 +43,85 @@ pub fn cause_table(diagnosis: &Diagnosis) -> Table {
 
 /// Gains on logs that were not used.
 pub fn held_out_table(diagnosis: &Diagnosis) -> Table {
-    let mut table = Table::new([
-        Column::text("held-out log"),
-        Column::text("rms, Nm"),
-        Column::text("joints 1, 2, …"),
-    ]);
+    let columns = [Column::text("held-out log"), Column::text("rms"), Column::text("model")];
+    let mut table = Table::new(columns.into_iter().chain(joint_columns(diagnosis, "Nm")));
+    let list =
+        |values: &[f64]| -> Vec<String> { values.iter().map(|v| significant(*v, 3)).collect() };
+    let change = |before: &[f64], after: &[f64]| -> Vec<String> {
+        let pairs = before.iter().zip(after);
+        pairs.map(|(b, a)| format!("{:+.0} %", 100.0 * (a / b - 1.0))).collect()
+    };
     for log in &diagnosis.held_out {
-        let list = |values: &[f64]| {
-            values.iter().map(|v| significant(*v, 3)).collect::<Vec<_>>().join("  ")
-        };
-        let gain = |before: &[f64], after: &[f64]| {
-            let pairs = before.iter().zip(after);
-            pairs
-                .map(|(b, a)| format!("{:+.0} %", 100.0 * (a / b - 1.0)))
-                .collect::<Vec<_>>()
-                .join("  ")
-        };
-        let mut push = |what: &str, text: String| {
-            table.push([log.log.clone(), what.to_owned(), text]);
-        };
-        push("moving, before", list(&log.before_moving_rms_nm));
-        push("moving, after", list(&log.after_moving_rms_nm));
-        push("moving, change", gain(&log.before_moving_rms_nm, &log.after_moving_rms_nm));
-        push("all, before", list(&log.before_rms_nm));
-        push("all, after", list(&log.after_rms_nm));
-        push("all, change", gain(&log.before_rms_nm, &log.after_rms_nm));
-        let (before, after) =
-            (&log.before_standstill_free_rms_nm, &log.after_standstill_free_rms_nm);
-        push("standstill free, before", list(before));
-        push("standstill free, after", list(after));
-        push("standstill free, change", gain(before, after));
-        if let Some(manufacturer) = &log.manufacturer_moving_rms_nm {
-            push("moving, manufacturer", list(manufacturer));
-        }
-        if let Some(manufacturer) = &log.manufacturer_rms_nm {
-            push("all, manufacturer", list(manufacturer));
+        let free = (&log.before_standstill_free_rms_nm, &log.after_standstill_free_rms_nm);
+        let kinds = [
+            (
+                "moving",
+                (&log.before_moving_rms_nm, &log.after_moving_rms_nm),
+                &log.manufacturer_moving_rms_nm,
+            ),
+            ("all", (&log.before_rms_nm, &log.after_rms_nm), &log.manufacturer_rms_nm),
+            ("standstill free", free, &None),
+        ];
+        let mut name = file_name(&log.log);
+        for (mut samples, (before, after), manufacturer) in kinds {
+            let manufacturer = manufacturer.iter().map(|m| ("manufacturer", list(m)));
+            let rows = [
+                ("before", list(before)),
+                ("after", list(after)),
+                ("change", change(before, after)),
+            ];
+            for (model, cells) in rows.into_iter().chain(manufacturer) {
+                table.push([name, samples, model].map(str::to_owned).into_iter().chain(cells));
+                (name, samples) = ("", "");
+            }
         }
     }
     table
 }
 
-/// What would not have been seen.
+/// What would not have been seen: a row for each family, a column for each joint.
 pub fn limit_table(diagnosis: &Diagnosis) -> Table {
-    let mut table = Table::new([
-        Column::text("found with 90 % probability from"),
-        Column::number("joint", ""),
-        Column::text("parameter"),
-        Column::number("value", ""),
-        Column::text("unit"),
-        Column::text("for"),
-    ]);
-    for limit in &diagnosis.detection_limits {
-        let given = limit.given.iter().map(|(name, v)| format!("{name} {}", significant(*v, 2)));
-        table.push([
-            limit.kind.to_string(),
-            joint(limit.joint),
-            limit.parameter.to_owned(),
-            limit.value.map_or("absorbed".to_owned(), |v| significant(v, 3)),
-            limit.unit.to_owned(),
-            given.collect::<Vec<_>>().join(", "),
-        ]);
+    let whole = [Column::number("arm", "")];
+    let columns = [Column::text("found with 90 % probability from"), Column::text("parameter")];
+    let columns = columns.into_iter().chain([Column::text("unit")]).chain(whole);
+    let columns = columns.chain(joint_columns(diagnosis, "")).chain([Column::text("for")]);
+    let mut table = Table::new(columns);
+    let same =
+        |a: &DetectionLimit, b: &DetectionLimit| (a.kind, a.parameter) == (b.kind, b.parameter);
+    for limits in diagnosis.detection_limits.chunk_by(same) {
+        let at = |joint: Option<usize>| match limits.iter().find(|limit| limit.joint == joint) {
+            Some(limit) => limit.value.map_or("absorbed".to_owned(), |v| significant(v, 3)),
+            None => String::new(),
+        };
+        let first = &limits[0];
+        let head = [first.kind.to_string(), first.parameter.to_owned(), first.unit.to_owned()];
+        let joints = (1..=diagnosis.before.rms_nm.len()).map(Some);
+        let values = std::iter::once(None).chain(joints).map(at);
+        table.push(head.into_iter().chain(values).chain([given(limits)]));
     }
     table
+}
+
+/// The shapes for which `limits` hold.
+fn given(limits: &[DetectionLimit]) -> String {
+    let ranges = limits[0].given.iter().map(|(name, _)| {
+        let values =
+            limits.iter().flat_map(|limit| &limit.given).filter(|(other, _)| other == &name);
+        let ends = |[low, high]: [f64; 2], (_, v): (&&str, &f64)| [low.min(*v), high.max(*v)];
+        let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], ends);
+        let [low, high] = [low, high].map(|v| significant(v, 2));
+        if low == high { format!("{name} {low}") } else { format!("{name} {low} … {high}") }
+    });
+    ranges.collect::<Vec<_>>().join(", ")
+}
+
+fn joint_columns<'a>(diagnosis: &Diagnosis, unit: &'a str) -> impl Iterator<Item = Column> + 'a {
+    (1..=diagnosis.before.rms_nm.len()).map(move |j| Column::number(format!("joint {j}"), unit))
+}
+
+/// The last part of a path.
+fn file_name(path: &str) -> &str {
+    path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 
 fn joint(joint: Option<usize>) -> String {
@@ -239,9 +256,7 @@ fn axis(finding: &Finding, kind: Kind, j: usize) -> (&'static str, &'static str,
                 pick(&signed.map(|(l, s)| l.abs() * s).collect::<Vec<_>>()),
             )
         }
-        Kind::TimeSkew => {
-            ("rate of the torque", "Nm/s", pick(&scene.derivative(scene.torque_nm.joint(j))))
-        }
+        Kind::TimeSkew => ("rate of the torque", "Nm/s", pick(&scene.torque_rate_nm_s(j))),
         Kind::TorqueGain | Kind::Saturation => ("torque", "Nm", pick(scene.torque_nm.joint(j))),
         _ => ("angle", "rad", pick(scene.motion.q_rad.joint(j))),
     }
