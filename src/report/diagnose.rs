@@ -202,12 +202,7 @@ fn cause_section(finding: &Finding, cause: &Cause) -> Result<Section, ReportErro
     };
     let j = cause.joint.map_or(0, |j| j - 1);
     let (label, unit, axis) = axis(finding, cause.kind, j);
-    // One scale for both, so that the gain is seen.
-    let both = [&finding.before_nm, &finding.after_nm].map(|residual| residual.joint(j));
-    let largest = both.into_iter().flatten().fold(0.0, |largest: f64, y| largest.max(y.abs()));
-    let residual = Axis::linear("residual", "Nm");
-    let residual =
-        if largest > 0.0 { residual.between(-1.05 * largest, 1.05 * largest) } else { residual };
+    let residual = residual_axis(finding, j, "residual");
     let mut grid = Grid::new("", Axis::linear(label, unit), residual);
     grid.columns = 2;
     for (name, residual, colour) in [
@@ -235,6 +230,14 @@ fn cause_section(finding: &Finding, cause: &Cause) -> Result<Section, ReportErro
     Ok(Section::new(title)
         .figure(grid.to_svg()?, "Residual of the model without and with the causes.")
         .table(table, "What else was tried in its place, best first"))
+}
+
+/// One scale for the residual of joint `j` before and after, so that the gain is seen.
+pub(super) fn residual_axis(finding: &Finding, j: usize, name: &str) -> Axis {
+    let both = [&finding.before_nm, &finding.after_nm].map(|residual| residual.joint(j));
+    let largest = both.into_iter().flatten().fold(0.0, |largest: f64, y| largest.max(y.abs()));
+    let axis = Axis::linear(name, "Nm");
+    if largest > 0.0 { axis.between(-1.05 * largest, 1.05 * largest) } else { axis }
 }
 
 /// The quantity against which a family's residual is drawn.

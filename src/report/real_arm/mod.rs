@@ -5,6 +5,7 @@ mod gains;
 mod surroundings;
 mod verdict;
 
+use super::diagnose::residual_axis;
 use super::json::Program;
 use super::number::{significant, with_sigma};
 use super::plot::{Axis, Colour, Grid, Mark};
@@ -215,7 +216,6 @@ impl RealArmStudy {
         let speed = |j: usize| -> Vec<f64> {
             finding.samples.iter().map(|&k| scene.motion.qd_rad_s.joint(j)[k].abs()).collect()
         };
-        let residual = || Axis::linear("residual in the direction of motion", "Nm");
         let pictures = [
             (Axis::linear("torque on the gear", "Nm"), 1, load(1), "Joint 2"),
             (Axis::linear("torque on the gear", "Nm"), 2, load(2), "Joint 3"),
@@ -223,7 +223,8 @@ impl RealArmStudy {
             (Axis::linear("speed", "rad/s"), 4, speed(4), "Joint 5"),
         ];
         for (x, j, values, name) in pictures {
-            let mut grid = Grid::new("", x, residual());
+            let residual = residual_axis(finding, j, "residual in the direction of motion");
+            let mut grid = Grid::new("", x, residual);
             grid.columns = 2;
             for (when, e, colour) in [
                 ("rigid model", &finding.before_nm, Colour::BEFORE),
