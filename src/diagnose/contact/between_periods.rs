@@ -14,6 +14,7 @@ use super::bump::{self, Felt, Noise, ORDINARY, Push};
 use super::disturbed::with_disturbed_periods;
 use crate::diagnose::friction_drift::FrictionDrift;
 use crate::diagnose::verdict::{Cause, Estimate};
+use crate::diagnose::whitening::FLOOR;
 use crate::identify::Measurement;
 use crate::median::{robust_sigma, trimmed_mean};
 use crate::robot::JointSignals;
@@ -93,6 +94,9 @@ pub fn between_periods(
         // Its own torque moves the mean of the others.
         aside[candidate.samples(&repeats)].fill(true);
         let Some(push) = repeats.weigh(&candidate, &aside, &known)? else { break };
+        if repeats.is_rounding(&push) {
+            break;
+        }
         let touch = repeats.touch(&push, time_s[repeats.window.start]);
         aside[touch.disturbed(rate_hz, time_s.len())].fill(true);
         known.push(push);
@@ -287,6 +291,16 @@ impl Repeats {
         Ok(Some(all))
     }
 
+    /// Whether `push` is nowhere more than what rounding leaves of the torque: periods that are alike to the last digit
+    /// of a file differ by that alone, and have no noise beside which it would be small.
+    fn is_rounding(&self, push: &Push) -> bool {
+        push.heights_nm.iter().all(|(j, height)| {
+            let torque_nm = &self.torque_nm.joint(*j)[self.window.clone()];
+            let square = torque_nm.iter().map(|t| t * t).sum::<f64>() / torque_nm.len() as f64;
+            height.abs() < FLOOR * square.sqrt()
+        })
+    }
+
     fn touch(&self, push: &Push, begin_s: f64) -> Touch {
         let shifted = |estimate: &Estimate| Estimate {
             value: begin_s + estimate.value,
@@ -451,6 +465,27 @@ mod tests {
         y[2600] -= 10.0;
         y[2601] -= 5.0;
         assert!(contacts(&time_s, &signals).is_none());
+    }
+
+    /// Simulated without noise, periods differ in the last digits of the file alone: bumps of them are no contact, a push is.
+    #[test]
+    fn last_digits_are_no_contact() {
+        let nothing = Hidden { start_s: 24.0, end_s: 25.0, nm: [0.0, 0.0] };
+        let (time_s, mut signals) = log(5, &nothing);
+        let omega = std::f64::consts::TAU / 10.0;
+        for j in 0..2 {
+            for (y, t) in signals[2].joint_mut(j).iter_mut().zip(&time_s) {
+                // Noise of 0.5 Nm becomes one of 5e-10.
+                let smooth = 20.0 * (omega * t).cos();
+                *y = smooth + 1e-9 * (*y - smooth);
+            }
+        }
+        assert!(contacts(&time_s, &signals).is_none());
+        let y = signals[2].joint_mut(1);
+        for (k, y) in y[2400..2440].iter_mut().enumerate() {
+            *y += 0.3 * (std::f64::consts::PI * k as f64 / 40.0).sin().powi(2);
+        }
+        assert_eq!(contacts(&time_s, &signals).unwrap().causes[0].joint, Some(2));
     }
 
     /// What no joint could tell alone is told by both together, and called a push on the arm.

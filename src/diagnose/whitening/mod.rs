@@ -7,7 +7,7 @@
 mod periods;
 mod run;
 
-pub use periods::PeriodWhitening;
+pub use periods::{FLOOR, PeriodWhitening};
 pub use run::RunWhitening;
 
 use super::image::{Column, Image};

@@ -80,8 +80,8 @@ const NEIGHBOURS: usize = 12;
 /// A mean torque that scatters with more than this times the power of its neighbours drifts: eight periods of
 /// white noise show that once in 300 joints (F(7, 17): seven contrasts, and the trend's own freedom).
 const DRIFTS: f64 = 5.0;
-/// Noise below this share of a joint's rms torque is not told from the rounding of a model.
-const FLOOR: f64 = 1e-4;
+/// Torque below this share of a joint's rms torque is not told from the rounding of a model.
+pub const FLOOR: f64 = 1e-4;
 /// How far, over the rate, what is used ends below the highest frequency of the periods' own motion. Not far, because half
 /// of what narrow play shows in 125 samples a second lies between 44 and 58 Hz.
 const BELOW_HIGHEST: f64 = 0.02;
