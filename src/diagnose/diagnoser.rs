@@ -3,13 +3,13 @@
 use super::against;
 use super::candidates::{self, Candidate};
 use super::common_motion::move_to_common_motion;
-use super::contact::{self, BesideModel};
+use super::contact;
 use super::data_faults;
+use super::detection_limits::detection_limits;
 use super::error::DiagnoseError;
-use super::extension::{Extension, mean_period};
+use super::extension::Extension;
 use super::gain;
 use super::held_out::{Models, Validation, held_out_gain};
-use super::image::Span;
 use super::intervals;
 use super::judgement::Selected;
 use super::kind::Kind;
@@ -19,10 +19,10 @@ use super::payload::{self, PayloadFinding};
 use super::record::{Record, is_torn};
 use super::replay::measured_nm;
 use super::scene::Scene;
-use super::selection::{Contender, Found, Kept, select};
-use super::significance::LEAST_EVIDENCE;
+use super::selection::{Kept, select};
+use super::settled::{beside_model, residual, settled, without_contacts};
 use super::study::{Entry, Study};
-use super::verdict::{Cause, DetectionLimit, Diagnosis, Rival, Rms, Verdict};
+use super::verdict::{Cause, Diagnosis, Rival, Rms, Verdict};
 use crate::base::BaseSet;
 use crate::dynamics::Model;
 use crate::identify::{
@@ -58,18 +58,6 @@ pub struct Finding {
     /// Sample of the scene behind each residual.
     pub samples: Vec<usize>,
 }
-
-/// √λ at which a family is found with 90 % probability: z of its threshold plus 1.28.
-const POWER: f64 = 0.9;
-/// A column that keeps less than this share of its square beside the causes that were named is one of them.
-const ABSORBED_BESIDE: f64 = 0.04 * 0.04;
-/// No effect has a coefficient (Nm, Nm/rad, rad, 1 … in SI) as large as this: its column is rounding.
-const BEYOND_PHYSICS: f64 = 1e4;
-const POWER_Z: f64 = 1.281_551_565_544_6;
-/// Rounds of causes and estimate at most.
-const ROUNDS: usize = 4;
-/// 2 ln of the evidence below which another round changes nothing that counts.
-const SETTLED: f64 = 4.0;
 
 impl<'a> Diagnoser<'a> {
     /// For logs of `arm`, with all families.
@@ -120,7 +108,7 @@ impl<'a> Diagnoser<'a> {
         let (mut study, found) = if found.causes.is_empty() && first.scene.periodic {
             (first, found.causes)
         } else {
-            self.settled(first, found, m.source)?
+            settled(first, found, (self.arm, self.set), m.source)?
         };
         let null = Extension::fit(&study, &[], &study.torque);
         if !study.scene.periodic {
@@ -217,7 +205,7 @@ impl<'a> Diagnoser<'a> {
             moved_parameters,
             payload: None,
             replay: None,
-            detection_limits: self.detection_limits(&study, &accepted),
+            detection_limits: detection_limits(&study, &accepted),
             lack_of_fit_probability: lack.map(|lack| lack.probability),
             verdict,
             sentences: Vec::new(),
@@ -253,37 +241,6 @@ impl<'a> Diagnoser<'a> {
             measured_nm,
             samples,
         })
-    }
-
-    /// The load on the gear is better known once friction is, and so is what touched the arm: what was `found`, and the
-    /// estimate of the arm beside it, until one no longer changes the other.
-    ///
-    /// Of a motion that repeats, what was found only because the estimate was bent is dropped on the way.
-    fn settled<'s>(
-        &self,
-        mut study: Study<'s>,
-        found: Found,
-        log: &str,
-    ) -> Result<(Study<'s>, Vec<Contender>), DiagnoseError> {
-        let Found { mut causes, mut evidence } = found;
-        for _ in 0..ROUNDS {
-            let entries: Vec<&Entry> = causes.iter().map(|c| &c.entry).collect();
-            let refined = Extension::fit(&study, &entries, &study.torque);
-            study = study.with_estimate(self.arm, self.set, &refined.theta);
-            study = without_contacts(study, self.set, &refined, log)?;
-            if !study.scene.periodic {
-                break;
-            }
-            let mut kept = Kept::taken_over(&study, causes);
-            let dropped = kept.drop_unneeded(|_| true);
-            let gained = kept.total_evidence() - evidence;
-            evidence += gained;
-            causes = kept.causes;
-            if dropped.is_empty() && gained < SETTLED {
-                break;
-            }
-        }
-        Ok((study, causes))
     }
 
     /// Says whether `loaded` was recorded with a body on the flange that `reference`, diagnosed as
@@ -345,94 +302,6 @@ impl<'a> Diagnoser<'a> {
             rivals: rivals.collect(),
         }
     }
-
-    /// Per family and site the size that would be found with 90 % probability.
-    fn detection_limits(&self, study: &Study, accepted: &Span) -> Vec<DetectionLimit> {
-        if !study.scene.periodic {
-            return Vec::new();
-        }
-        let mut out = Vec::new();
-        for (family, candidate) in self.families.iter().enumerate() {
-            for site in candidate.sites(study.scene.joints()) {
-                let entries: Vec<&Entry> =
-                    study.entries.iter().filter(|e| (e.family, e.site) == (family, site)).collect();
-                let Some(entry) = entries.get(entries.len() / 2) else { continue };
-                let span = study.span(entry, accepted);
-                if span.is_empty() {
-                    continue;
-                }
-                // √λ of a coefficient b on column 1 alone is b ‖d⊥‖.
-                let length = span.first_length();
-                let threshold = (study.price(entry) + LEAST_EVIDENCE).sqrt() + POWER_Z;
-                let quantities = |coefficient: f64| {
-                    let mut b = vec![0.0; entry.images.len()];
-                    b[0] = coefficient;
-                    candidate.quantities(&study.scene, site, entry.shape, &b)
-                };
-                let of = quantities(threshold / length);
-                let Some(quantity) = candidate.size(&of) else { continue };
-                // What the coefficient does not change, the shape has given.
-                let given = of
-                    .iter()
-                    .zip(quantities(2.0 * threshold / length))
-                    .filter(|(one, two)| one.value == two.value && one.value != 0.0)
-                    .map(|(one, _)| (one.name, one.value));
-                let is_told = length * length > ABSORBED_BESIDE * entry.images[0].square()
-                    && threshold / length < BEYOND_PHYSICS;
-                out.push(DetectionLimit {
-                    kind: candidate.kind(),
-                    joint: site.map(|j| j + 1),
-                    parameter: quantity.name,
-                    value: is_told.then_some(quantity.value),
-                    unit: quantity.unit,
-                    given: given.filter(|(name, _)| *name != quantity.name).collect(),
-                    power: POWER,
-                });
-            }
-        }
-        out
-    }
-}
-
-/// `study` of a single run without the rows in which something touched the arm beside `model`.
-fn without_contacts<'s>(
-    study: Study<'s>,
-    set: &BaseSet,
-    model: &Extension,
-    log: &str,
-) -> Result<Study<'s>, DiagnoseError> {
-    let touched = beside_model(&study, &residual(&study, model));
-    study.without_rows(set, &touched.samples, log)
-}
-
-/// Contacts in the residual of a model along a single run; none where a motion repeats, which shows them
-/// better ([`contact::between_periods`]).
-fn beside_model(study: &Study, after_nm: &JointSignals) -> BesideModel {
-    if study.scene.periodic {
-        return BesideModel::default();
-    }
-    let regression = study.regression;
-    let prepared = &regression.prepared;
-    let at = |row: usize| regression.sample(row);
-    let qd = &prepared.motion.qd_rad_s;
-    let qd = JointSignals::from_fn(qd.joints(), after_nm.samples(), |j, k| qd.joint(j)[at(k)]);
-    let (start_s, rate_hz) = (prepared.processing.window_s[0], prepared.processing.rate_hz);
-    let time_s: Vec<f64> =
-        (0..after_nm.samples()).map(|k| start_s + at(k) as f64 / rate_hz).collect();
-    contact::beside_model(after_nm, &qd, &time_s)
-}
-
-/// Residual of `model` in time, Nm: of the mean period, or of the run.
-fn residual(study: &Study, model: &Extension) -> JointSignals {
-    let problem = &study.regression.problem;
-    let predicted = model.torque_nm(study.families, &study.scene, problem, Some(&study.whitening));
-    let mut out = JointSignals::zeros(problem.joints(), problem.samples);
-    for (j, panel) in problem.panels.iter().enumerate() {
-        let y = mean_period(&panel.y, problem.samples);
-        let pairs = y.iter().zip(predicted.joint(j));
-        out.joint_mut(j).iter_mut().zip(pairs).for_each(|(o, (y, p))| *o = y - p);
-    }
-    out
 }
 
 /// Rms of the samples that count, Nm.

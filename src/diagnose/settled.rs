@@ -1,0 +1,89 @@
+//! Causes and the estimate of the arm, fitted in turn.
+//!
+//! Causes are looked for along loads, friction and torques that an estimate predicts, and what is wrong bends the estimate.
+//! The load on a gear is better known once friction is, and so is what touched the arm, and what a reading cuts off.
+
+use super::contact::{self, BesideModel};
+use super::error::DiagnoseError;
+use super::extension::{Extension, mean_period};
+use super::selection::{Contender, Found, Kept};
+use super::study::{Entry, Study};
+use crate::base::BaseSet;
+use crate::robot::{Arm, JointSignals};
+
+/// Rounds of causes and estimate at most.
+const ROUNDS: usize = 4;
+/// 2 ln of the evidence below which another round changes nothing that counts.
+const SETTLED: f64 = 4.0;
+
+/// What was `found` in `study`, and the estimate of the arm beside it, until one no longer changes the other.
+///
+/// Of a motion that repeats, what was found only because the estimate was bent is dropped on the way; a single run has one
+/// round, because what it shows is judged by what the causes leave ([`Kept::of_a_single_run`]).
+pub fn settled<'s>(
+    mut study: Study<'s>,
+    found: Found,
+    (arm, set): (&Arm, &BaseSet),
+    log: &str,
+) -> Result<(Study<'s>, Vec<Contender>), DiagnoseError> {
+    let Found { mut causes, mut evidence } = found;
+    for _ in 0..ROUNDS {
+        let entries: Vec<&Entry> = causes.iter().map(|c| &c.entry).collect();
+        let refined = Extension::fit(&study, &entries, &study.torque);
+        study = study.with_estimate(arm, set, &refined.theta);
+        study = without_contacts(study, set, &refined, log)?;
+        if !study.scene.periodic {
+            break;
+        }
+        let mut kept = Kept::taken_over(&study, causes);
+        let dropped = kept.drop_unneeded(|_| true);
+        let gained = kept.total_evidence() - evidence;
+        evidence += gained;
+        causes = kept.causes;
+        if dropped.is_empty() && gained < SETTLED {
+            break;
+        }
+    }
+    Ok((study, causes))
+}
+
+/// `study` of a single run without the rows in which something touched the arm beside `model`.
+pub fn without_contacts<'s>(
+    study: Study<'s>,
+    set: &BaseSet,
+    model: &Extension,
+    log: &str,
+) -> Result<Study<'s>, DiagnoseError> {
+    let touched = beside_model(&study, &residual(&study, model));
+    study.without_rows(set, &touched.samples, log)
+}
+
+/// Contacts in the residual of a model along a single run; none where a motion repeats, which shows them
+/// better ([`contact::between_periods`]).
+pub fn beside_model(study: &Study, after_nm: &JointSignals) -> BesideModel {
+    if study.scene.periodic {
+        return BesideModel::default();
+    }
+    let regression = study.regression;
+    let prepared = &regression.prepared;
+    let at = |row: usize| regression.sample(row);
+    let qd = &prepared.motion.qd_rad_s;
+    let qd = JointSignals::from_fn(qd.joints(), after_nm.samples(), |j, k| qd.joint(j)[at(k)]);
+    let (start_s, rate_hz) = (prepared.processing.window_s[0], prepared.processing.rate_hz);
+    let time_s: Vec<f64> =
+        (0..after_nm.samples()).map(|k| start_s + at(k) as f64 / rate_hz).collect();
+    contact::beside_model(after_nm, &qd, &time_s)
+}
+
+/// Residual of `model` in time, Nm: of the mean period, or of the run.
+pub fn residual(study: &Study, model: &Extension) -> JointSignals {
+    let problem = &study.regression.problem;
+    let predicted = model.torque_nm(study.families, &study.scene, problem, Some(&study.whitening));
+    let mut out = JointSignals::zeros(problem.joints(), problem.samples);
+    for (j, panel) in problem.panels.iter().enumerate() {
+        let y = mean_period(&panel.y, problem.samples);
+        let pairs = y.iter().zip(predicted.joint(j));
+        out.joint_mut(j).iter_mut().zip(pairs).for_each(|(o, (y, p))| *o = y - p);
+    }
+    out
+}
