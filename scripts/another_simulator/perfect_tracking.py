@@ -57,7 +57,7 @@ def draw_effect(rng, kind):
         "presliding": lambda: {"stiffness_per_rad": u(300, 3000)},
         "reversal_width": lambda: {"width_rad_s": float(rng.choice([0.003, 0.006, 0.04, 0.06])), "joint": either()},
         "position_friction": lambda: {"amplitude_nm": u(0.5, 1.5) * large},
-        "thermal_drift": lambda: {"fraction": u(0.03, 0.2), "time_constant_s": u(20, 200)},
+        "thermal_drift": lambda: {"fraction": sign * u(0.03, 0.2), "time_constant_s": u(20, 200)},
         "ripple": lambda: {"amplitude_nm": u(0.2, 0.6) * large, "order_per_turn": float(rng.choice([50, 101, 202, 404]))},
         "torque_gain": lambda: {"error_fraction": sign * u(0.02, 0.08), "joint": int(rng.integers(2, 4))},
         "current_offset": lambda: {"offset_nm": sign * u(0.3, 1) * large},
@@ -187,7 +187,7 @@ class Case:
         elif kind == "position_friction":
             extra[j] = e["amplitude_nm"] * np.sin(q[j] + 0.5) * sign[j]
         elif kind == "thermal_drift":
-            extra[j] = -e["fraction"] * (1 - np.exp(-np.maximum(t, 0) / e["time_constant_s"])) * friction[j]
+            extra[j] = e["fraction"] * (1 - np.exp(-np.maximum(t, 0) / e["time_constant_s"])) * friction[j]
         elif kind == "ripple":
             extra[j] = e["amplitude_nm"] * np.sin(e["order_per_turn"] * q[j] + 0.7)
         elif kind == "spring":
@@ -308,16 +308,17 @@ def judge(case, answer):
 
 
 def intervals(case, answer):
-    """How many hidden parameters have an interval, and how many of these hold the truth."""
-    held, counted = 0, 0
+    """Of the hidden parameters that are told: name, truth, value, and whether its interval holds the truth."""
+    out = []
     for cause in answer["causes"]:
         if cause["kind"] != case.kind or cause["joint"] != (case.effect["joint"] or None) or case.kind == "contact":
             continue
         for name, truth in case.effect.items():
             if name in cause["parameters"] and name != "fraction" or (name, cause["kind"]) == ("fraction", "thermal_drift"):
-                low, high = cause["parameters"][name]["ci95"]
-                held, counted = held + (low <= truth <= high), counted + 1
-    return held, counted
+                told = cause["parameters"][name]
+                low, high = told["ci95"]
+                out.append((name, truth, told["value"], low <= truth <= high))
+    return out
 
 
 def words(effect):
@@ -346,7 +347,6 @@ def main():
     args = parser.parse_args()
     readings = {"nothing", "outliers", "dropped_samples", "quantisation", "velocity_lag"}
     counts, misses = collections.defaultdict(collections.Counter), []
-    held = collections.Counter()
     for number in range(args.rounds):
         for place, kind in enumerate(args.kinds.split(",")):
             case = Case(100_000 * args.seed + 1000 * number + place, kind)
@@ -357,15 +357,18 @@ def main():
             small = strength is not None and strength < 8
             counts[kind]["small" if small else verdict] += 1
             counts[kind]["small, wrong"] += small and verdict == "wrong"
-            if not small:
-                now, of = intervals(case, answer)
-                held.update({"held": now, "counted": of})
+            told = [] if small else intervals(case, answer)
+            for name, truth, value, holds in told:
+                counts[kind]["told"] += 1
+                counts[kind]["held"] += holds
+                if not holds:
+                    print(f"    {name}: {value:.4g}, truth {truth:.4g}", file=sys.stderr)
             if verdict != "right" and not (small and verdict == "silent"):
                 misses.append((words(case.effect), "–" if strength is None else f"{strength:.1f}", str(case), said(answer)))
-    Path(args.out).write_text(report(args, counts, held, misses))
+    Path(args.out).write_text(report(args, counts, misses))
 
 
-def report(args, counts, held, misses):
+def report(args, counts, misses):
     verdicts = ["right", "more", "unexplained", "silent", "wrong"]
     total = sum((c for kind, c in counts.items() if kind != "nothing"), collections.Counter())
     seen, clean = sum(total[v] for v in verdicts), counts["nothing"]
@@ -379,17 +382,18 @@ def report(args, counts, held, misses):
         f"    python3 scripts/another_simulator/perfect_tracking.py --seed {args.seed} --rounds {args.rounds} --out reports/perfect_tracking.md",
         "",
         f"**Of {seen} logs with an effect of √λ ≥ 8 or a fault of the record {total['right']} name what was hidden and nothing else; of"
-        f" {sum(clean[v] for v in verdicts)} without any {clean['right']} are given nothing; the intervals hold {held['held']} of"
-        f" {held['counted']} of the hidden parameters.**",
+        f" {sum(clean[v] for v in verdicts)} without any {clean['right']} are given nothing; the intervals hold {total['held']} of"
+        f" {total['told']} of the hidden parameters.**",
         "",
         "√λ is the length of the effect outside the null model in standard deviations of the torque's noise; smaller ones are counted",
-        "in the last two columns. “More”: named, and something else beside it.",
+        "apart. “More”: named, and something else beside it.",
         "",
-        "| hidden | " + " | ".join(verdicts) + " | √λ < 8 | of these wrong |",
-        "|---|" + "---:|" * (len(verdicts) + 2),
+        "| hidden | " + " | ".join(verdicts) + " | √λ < 8 | of these wrong | intervals that hold |",
+        "|---|" + "---:|" * (len(verdicts) + 3),
     ]
     for kind, c in counts.items():
-        lines.append(f"| {kind} | " + " | ".join(str(c[v]) for v in [*verdicts, "small", "small, wrong"]) + " |")
+        numbers = [str(c[v]) for v in [*verdicts, "small", "small, wrong"]]
+        lines.append(f"| {' | '.join([kind, *numbers])} | " + (f"{c['held']} of {c['told']} |" if c["told"] else "– |"))
     lines += ["", "## What was not right", "", "| hidden | √λ | log | gets |", "|---|---:|---|---|"]
     lines += [f"| {' | '.join(miss)} |" for miss in misses]
     return "\n".join(lines) + "\n"

@@ -104,7 +104,7 @@ pub fn limit_table(diagnosis: &Diagnosis) -> Table {
 
 /// The shapes for which `limits` hold.
 fn given(limits: &[DetectionLimit]) -> String {
-    let ranges = limits[0].given.iter().map(|(name, _)| {
+    let ranges = limits[0].given.keys().map(|name| {
         let values =
             limits.iter().flat_map(|limit| &limit.given).filter(|(other, _)| other == &name);
         let ends = |[low, high]: [f64; 2], (_, v): (&&str, &f64)| [low.min(*v), high.max(*v)];
