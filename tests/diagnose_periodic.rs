@@ -53,6 +53,17 @@ fn a_reading_that_ends_before_its_noise() {
     assert!((cause.parameters["limit_nm"].value / most - 0.74).abs() < 0.01);
 }
 
+/// Waves that no torque moves the links by, up to 96 of them a second: in 125 samples a second their aliases are as high as
+/// they are. The first harmonic of a zigzag is 8/π² of its height.
+#[test]
+fn ripple_of_the_current_alone() {
+    let zigzag = Law::ZigzagOfTheCurrent { height_nm: 0.12, per_turn: 202.0 };
+    let found = Hidden::on(3, zigzag).diagnose(9);
+    let cause = only(&found, Kind::Ripple, Some(4));
+    contains(cause, "order_per_turn", 202.0);
+    contains(cause, "amplitude_nm", 0.12 * 8.0 / std::f64::consts::PI.powi(2));
+}
+
 #[test]
 fn presliding() {
     let found = Hidden::on(3, Law::Dahl { stiffness_per_rad: 300.0 }).diagnose(4);

@@ -294,6 +294,9 @@ def judge(case, answer):
         return "unexplained" if answer["unexplained"] else "silent"
 
     def is_it(cause):
+        if case.kind == cause["kind"] == "ripple":
+            order = cause["parameters"]["order_per_turn"]["value"]
+            return cause["joint"] == joint and abs(order / case.effect["order_per_turn"] - 1) < 0.01
         names = {(cause["kind"], cause["joint"])}
         for other in cause["class"]:
             kind, _, at = other.partition("@")

@@ -29,6 +29,11 @@ pub enum Law {
     CutBeforeNoise {
         share: f64,
     },
+    /// Current that zigzags between plus and minus this as the motor turns, and moves nothing.
+    ZigzagOfTheCurrent {
+        height_nm: f64,
+        per_turn: f64,
+    },
 }
 
 /// A hidden effect and where it sits.
@@ -75,6 +80,14 @@ impl Hidden {
             let limit = share * torque.iter().fold(0.0f64, |most, t| most.max(t.abs()));
             torque.iter_mut().for_each(|t| *t = t.clamp(-limit, limit));
         }
+        if let Law::ZigzagOfTheCurrent { height_nm, per_turn } = self.law {
+            let q_rad = recording.q_rad.joint(self.joint).to_vec();
+            let torque = recording.torque_nm.joint_mut(self.joint);
+            for (t, q) in torque.iter_mut().zip(q_rad) {
+                let turn = (q * per_turn / std::f64::consts::TAU + 0.1).rem_euclid(1.0);
+                *t += height_nm * (1.0 - 4.0 * (turn - 0.5).abs());
+            }
+        }
         let sensors = SensorConfig {
             torque_sd_nm: PerJoint::Each(vec![1.0, 1.0, 0.7, 0.15, 0.15, 0.15]),
             q_sd_rad: PerJoint::All(2e-5),
@@ -116,7 +129,7 @@ impl Drivetrain for HiddenLaw {
     fn states(&self) -> usize {
         match self.law {
             Law::Dahl { .. } => 1,
-            Law::Load { .. } | Law::MotorLoad { .. } | Law::CutBeforeNoise { .. } => 0,
+            _ => 0,
         }
     }
 
@@ -171,7 +184,7 @@ impl Drivetrain for HiddenLaw {
                 let carried = self.link_nm[h] / (1.0 + mu * sign * self.link_nm[h].signum());
                 self.link_nm[h] = carried;
             }
-            Law::CutBeforeNoise { .. } => {}
+            Law::CutBeforeNoise { .. } | Law::ZigzagOfTheCurrent { .. } => {}
             Law::Dahl { stiffness_per_rad } => {
                 let z = stage.states[0];
                 states_rate[0] = stiffness_per_rad * (v - v.abs() * z);

@@ -1,13 +1,24 @@
 //! Torque that repeats many times per turn: τ = A cos(N q + φ), of the gear's teeth (even multiples of the
 //! ratio) or the motor's poles. Fast ripple goes into the acceleration of the links, not into the torque, and above half
 //! the rate the samples hold its alias: a log shows it as it shows whatever no controller answers at once
-//! ([`Scene::as_logged`]).
+//! ([`Scene::as_logged`]). Ripple that the drive answers, or that only its current has, is in the torque as it is at
+//! every sample (variant 1).
 
 use super::*;
 use crate::dynamics::Real;
 
 /// See the module.
 pub struct Ripple;
+
+/// The variant that no drive answers.
+const OF_THE_LINKS: usize = 0;
+/// The variant that is in the torque at once. Along a single run, behind its low-pass, both are the same.
+const OF_THE_DRIVE: usize = 1;
+
+/// Forms that a log can tell.
+fn variants(scene: &Scene) -> std::ops::RangeInclusive<usize> {
+    OF_THE_LINKS..=if scene.periodic { OF_THE_DRIVE } else { OF_THE_LINKS }
+}
 
 /// Orders that a strain-wave gear of ratio 100 makes, per turn of the joint, and their neighbours.
 const HIGHEST_ORDER: f64 = 450.0;
@@ -38,10 +49,9 @@ impl Candidate for Ripple {
         let ratio = scene.arm.joints[joint(site)].drive.gear_ratio;
         // Half the resolution on both sides brackets a peak of the order spectrum.
         let about = |order: f64| [-0.5, 0.0, 0.5].map(|u| order + u * spacing);
-        multiples(scene)
-            .flat_map(|m| about(m * ratio))
-            .map(|value| Shape { variant: 0, value })
-            .collect()
+        let orders: Vec<f64> = multiples(scene).flat_map(|m| about(m * ratio)).collect();
+        let shapes = |variant| orders.iter().map(move |&value| Shape { variant, value });
+        variants(scene).flat_map(shapes).collect()
     }
 
     fn search(&self) -> Search {
@@ -56,7 +66,7 @@ impl Candidate for Ripple {
         let spacing = order_spacing(scene, joint(site));
         let ratio = scene.arm.joints[joint(site)].drive.gear_ratio;
         let of_the_gear = |m: f64| (shape.value - m * ratio).abs() <= spacing;
-        let any_order = (HIGHEST_ORDER - LOWEST_ORDER) / spacing;
+        let any_order = variants(scene).count() as f64 * (HIGHEST_ORDER - LOWEST_ORDER) / spacing;
         (!multiples(scene).any(of_the_gear)).then_some(any_order)
     }
 
@@ -66,6 +76,11 @@ impl Candidate for Ripple {
 
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let j = joint(site);
+        if shape.variant == OF_THE_DRIVE {
+            let q = scene.motion.q_rad.joint(j);
+            let wave = |f: fn(f64) -> f64| samples(scene, |k| f(shape.value * q[k]));
+            return [wave(f64::cos), wave(f64::sin)].map(|ripple| Column::on(j, ripple)).into();
+        }
         let at = scene.instants(j);
         // What was resampled from uneven times has no aliases that could be predicted.
         let fastest_rad_s = if scene.periodic {
@@ -132,14 +147,30 @@ pub(in crate::diagnose) fn strongest_orders(
     residual_nm: &[f64],
 ) -> Vec<Shape> {
     let q = scene.motion.q_rad.joint(j);
-    let weights = scene.before_logged(residual_nm).map(|w| of_phasors(&w, q));
-    let (weights, is_mean) = (weights.as_deref().unwrap_or(residual_nm), weights.is_some());
+    let of_links = scene.before_logged(residual_nm).map(|w| of_phasors(&w, q));
+    // A mean of phasors is a difference of them over the order.
+    let of_links = of_links.map(|weights| power_of_orders(scene, j, &weights, -2));
+    let of_drive = power_of_orders(scene, j, residual_nm, 0);
+    // Along a single run what is read is what there is.
+    let powers = of_links.into_iter().chain([of_drive]).enumerate();
+    let shape = |variant| move |value| Shape { variant, value };
+    powers.flat_map(|(variant, power)| power.peaks().map(shape(variant))).collect()
+}
+
+/// Power over equally spaced orders.
+struct OrderSpectrum {
+    step: f64,
+    power: Vec<f64>,
+}
+
+/// |Σ w_k e^{iNq_k}|² N^`tilt` over the orders N.
+fn power_of_orders(scene: &Scene, j: usize, weights: &[f64], tilt: i32) -> OrderSpectrum {
+    let q = scene.motion.q_rad.joint(j);
     let step = 0.5 * order_spacing(scene, j).min(2.0);
     let count = ((HIGHEST_ORDER - LOWEST_ORDER) / step) as usize;
-    let mut power = vec![0.0; count];
     let mut phasors: Vec<(f64, f64)> = q.iter().map(|q| (LOWEST_ORDER * q).sin_cos()).collect();
     let turns: Vec<(f64, f64)> = q.iter().map(|q| (step * q).sin_cos()).collect();
-    for (k, power) in power.iter_mut().enumerate() {
+    let mut power_at = |k: usize| {
         let (mut re, mut im) = (0.0, 0.0);
         for ((phasor, turn), r) in phasors.iter_mut().zip(&turns).zip(weights) {
             re += r * phasor.1;
@@ -148,18 +179,23 @@ pub(in crate::diagnose) fn strongest_orders(
                 (phasor.0 * turn.1 + phasor.1 * turn.0, phasor.1 * turn.1 - phasor.0 * turn.0);
         }
         let order = LOWEST_ORDER + step * k as f64;
-        *power = (re * re + im * im) / if is_mean { order * order } else { 1.0 };
+        (re * re + im * im) * order.powi(tilt)
+    };
+    OrderSpectrum { step, power: (0..count).map(&mut power_at).collect() }
+}
+
+impl OrderSpectrum {
+    /// The orders of its highest peaks, and those beside them.
+    fn peaks(self) -> impl Iterator<Item = f64> {
+        let Self { step, power } = self;
+        let mut peaks: Vec<usize> = (1..power.len().saturating_sub(1))
+            .filter(|&k| power[k] >= power[k - 1] && power[k] >= power[k + 1])
+            .collect();
+        peaks.sort_by(|&a, &b| power[b].total_cmp(&power[a]));
+        peaks.truncate(PEAKS);
+        let about = move |k: usize| [-1.0, 0.0, 1.0].map(|u| LOWEST_ORDER + step * (k as f64 + u));
+        peaks.into_iter().flat_map(about)
     }
-    let mut peaks: Vec<usize> = (1..count.saturating_sub(1))
-        .filter(|&k| power[k] >= power[k - 1] && power[k] >= power[k + 1])
-        .collect();
-    peaks.sort_by(|&a, &b| power[b].total_cmp(&power[a]));
-    peaks
-        .into_iter()
-        .take(PEAKS)
-        .flat_map(|k| [-1.0, 0.0, 1.0].map(|u| LOWEST_ORDER + step * (k as f64 + u)))
-        .map(|value| Shape { variant: 0, value })
-        .collect()
 }
 
 #[cfg(test)]
