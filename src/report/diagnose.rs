@@ -81,11 +81,14 @@ pub fn held_out_table(diagnosis: &Diagnosis) -> Table {
 
 /// What would not have been seen: a row for each family, a column for each joint.
 pub fn limit_table(diagnosis: &Diagnosis) -> Table {
-    let whole = [Column::number("arm", "")];
-    let columns = [Column::text("found with 90 % probability from"), Column::text("parameter")];
-    let columns = columns.into_iter().chain([Column::text("unit")]).chain(whole);
-    let columns = columns.chain(joint_columns(diagnosis, "")).chain([Column::text("for")]);
-    let mut table = Table::new(columns);
+    let head = [
+        Column::text("found with 90 % probability from"),
+        Column::text("parameter"),
+        Column::text("unit"),
+        Column::number("arm", ""),
+    ];
+    let joints = joint_columns(diagnosis, "");
+    let mut table = Table::new(head.into_iter().chain(joints).chain([Column::text("for")]));
     let same =
         |a: &DetectionLimit, b: &DetectionLimit| (a.kind, a.parameter) == (b.kind, b.parameter);
     for limits in diagnosis.detection_limits.chunk_by(same) {

@@ -225,6 +225,12 @@ pub fn all() -> Vec<Box<dyn Candidate>> {
     ]
 }
 
+/// The lowest and the highest angle of joint `j`, rad.
+fn range_rad(scene: &Scene, j: usize) -> [f64; 2] {
+    let ends = |[low, high]: [f64; 2], q: &f64| [low.min(*q), high.max(*q)];
+    scene.motion.q_rad.joint(j).iter().fold([f64::INFINITY, f64::NEG_INFINITY], ends)
+}
+
 /// Samples of joint `j` made from angle, speed and load by `f(k)`.
 fn samples(scene: &Scene, f: impl Fn(usize) -> f64) -> Vec<f64> {
     (0..scene.samples()).map(f).collect()

@@ -17,9 +17,7 @@ impl Candidate for PositionFriction {
     }
 
     fn shapes(&self, scene: &Scene, site: Option<usize>) -> Vec<Shape> {
-        let q = scene.motion.q_rad.joint(joint(site));
-        let ends = |[low, high]: [f64; 2], q: &f64| [low.min(*q), high.max(*q)];
-        let [low, high] = q.iter().fold([f64::INFINITY, f64::NEG_INFINITY], ends);
+        let [low, high] = range_rad(scene, joint(site));
         vec![Shape { variant: 0, value: 0.5 * (low + high) }]
     }
 

@@ -121,9 +121,7 @@ impl Candidate for Ripple {
 
 /// Resolution in orders per turn: one cycle more over the joint's range.
 fn order_spacing(scene: &Scene, j: usize) -> f64 {
-    let q = scene.motion.q_rad.joint(j);
-    let (low, high) =
-        q.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &q| (l.min(q), h.max(q)));
+    let [low, high] = range_rad(scene, j);
     std::f64::consts::TAU / (high - low).max(1e-2)
 }
 

@@ -72,14 +72,14 @@ impl Found<'_> {
                 vs_rad_s: value("vs_rad_s")?,
                 exponent: if self.variant == 0 { 2 } else { 1 },
             })),
-            // Laws that only single runs are asked for.
+            // Laws that the plant does not have, most of which only single runs are asked for.
             Kind::NonlinearViscous if value("speed_rad_s").is_some() => {
                 Some(Counterpart::None(NO_SUCH_LAW))
             }
-            Kind::LoadFriction if value("exponent").or(value("mu_bending")).is_some() => {
-                Some(Counterpart::None(NO_SUCH_LAW))
-            }
-            Kind::LoadFriction if self.variant == MOTOR_SIDE => {
+            Kind::LoadFriction
+                if self.variant == MOTOR_SIDE
+                    || value("exponent").or(value("mu_bending")).is_some() =>
+            {
                 Some(Counterpart::None(NO_SUCH_LAW))
             }
             Kind::NonlinearViscous => {
