@@ -6,12 +6,10 @@ use super::error::IdentifyError;
 use super::options::Options;
 use super::prepare::Measurement;
 use crate::robot::JointSignals;
-use crate::signal::{Bracket, Decimator, Resampler, Scratch, natural_rate_hz};
+use crate::signal::{Bracket, Decimator, Resampler, Scratch, bridged_gap_s, natural_rate_hz};
 
 /// Time stamps further off the median step than this share of it make a log uneven.
 const EVEN_WITHIN: f64 = 0.02;
-/// Gaps up to this many natural steps are interpolated, longer ones end the record.
-const LONGEST_GAP_STEPS: f64 = 10.0;
 /// [`Even::highest`] of samples as the log has them: half a cycle less what derivatives near it cost.
 const AS_LOGGED: f64 = 0.48;
 /// The same of samples that went through a decimator's low-pass, or lie on straight lines between rows: at 0.37 a line
@@ -67,7 +65,7 @@ impl<'a> Even<'a> {
         if !is_even || !is_natural || faster.is_some() {
             let plain_hz = if is_natural { even.rate_hz } else { wanted_hz.max(natural_hz) };
             let grid_hz = faster.unwrap_or(1.0) * plain_hz;
-            let grid = Resampler::new(m.time_s, grid_hz, LONGEST_GAP_STEPS * step)?;
+            let grid = Resampler::new(m.time_s, grid_hz, bridged_gap_s(natural_hz))?;
             even.put_on(&grid, grid_hz, m, warnings)?;
         }
         let highest_hz = options.rate_hz.unwrap_or(Options::HIGHEST_RATE_HZ);

@@ -55,5 +55,5 @@ pub use period::{Period, PeriodSearch, find_period};
 pub use periodic_fit::{FitScratch, PeriodicFit};
 pub use readings::{quantum, reading_limit};
 pub use replicates::{Replicates, replicate_noise};
-pub use resample::{Bracket, Gap, Resampler, gaps, natural_rate_hz};
+pub use resample::{Bracket, Gap, Resampler, bridged_gap_s, gaps, natural_rate_hz};
 pub use spectrum::{PowerSpectrum, welch};

@@ -61,6 +61,12 @@ pub fn natural_rate_hz(time_s: &[f64]) -> Result<f64, SignalError> {
     Ok((rate_hz / unit).round() * unit)
 }
 
+/// The longest gap that is bridged in a log of `rate_hz`, s: ten samples, and in a fast log what ten samples of 125 Hz
+/// last. How far a motion can be interpolated depends on the motion, not on how often it is read.
+pub fn bridged_gap_s(rate_hz: f64) -> f64 {
+    10.0 / rate_hz.min(125.0)
+}
+
 /// Stretches between neighbouring time stamps that are longer than `limit_s`.
 pub fn gaps(time_s: &[f64], limit_s: f64) -> Vec<Gap> {
     time_s

@@ -18,7 +18,9 @@ use crate::diagnose::whitening::FLOOR;
 use crate::identify::Measurement;
 use crate::median::{robust_sigma, trimmed_mean};
 use crate::robot::JointSignals;
-use crate::signal::{MatchedFilter, Resampler, SignalError, find_period, natural_rate_hz};
+use crate::signal::{
+    MatchedFilter, Resampler, SignalError, bridged_gap_s, find_period, natural_rate_hz,
+};
 
 /// A bump of so many σ in one joint is a contact, and one as rare in all joints together. Noise makes one once in 10⁸ places,
 /// and of a log of 80 s some 10⁵ places know nothing of each other.
@@ -46,8 +48,6 @@ const FEWEST_PERIODS: usize = 3;
 /// At an end where the repetitions were prolonged so much is left out, s: the last of a run-in moves the arm so
 /// little beside the repetitions that angles do not show it, and takes torque.
 const EDGE_S: f64 = 0.5;
-/// Gaps up to this many steps are bridged.
-const LONGEST_GAP_STEPS: f64 = 10.0;
 
 /// Contacts in a log whose motion repeats, and the torque as it would be without them.
 pub struct WithoutContacts {
@@ -64,7 +64,7 @@ pub fn between_periods(
     left_out: &[usize],
 ) -> Result<Option<WithoutContacts>, SignalError> {
     let rate_hz = natural_rate_hz(m.time_s)?;
-    let grid = Resampler::new(m.time_s, rate_hz, LONGEST_GAP_STEPS / rate_hz)?;
+    let grid = Resampler::new(m.time_s, rate_hz, bridged_gap_s(rate_hz))?;
     let whole = 0..grid.samples();
     if grid.segments() != [whole] {
         return Ok(None);

@@ -37,8 +37,13 @@ pub enum BlindError {
     #[error("the plant: {0}")]
     Plant(#[from] PlantError),
     /// The log was not diagnosed.
-    #[error(transparent)]
-    Diagnose(#[from] DiagnoseError),
+    #[error("{source}; the log: {case}")]
+    Diagnose {
+        /// What is in the log.
+        case: Box<Case>,
+        /// Why it got no answer.
+        source: DiagnoseError,
+    },
     /// No family fits what was drawn.
     #[error("no family can be hidden here")]
     NothingToHide,
@@ -88,7 +93,9 @@ impl BlindWorker<'_> {
         self.log = Measured::like(&drawn.simulation.recording);
         drawn.simulation.log_into(trial, &mut self.log)?;
         let held_out = self.held_out(&drawn)?;
-        let diagnosis = self.diagnose(&drawn.case, held_out.as_ref())?;
+        let diagnosis = self.diagnose(&drawn.case, held_out.as_ref()).map_err(|source| {
+            BlindError::Diagnose { case: Box::new(drawn.case.clone()), source }
+        })?;
         let sensors = &drawn.simulation.scenario.sensors;
         let sd_nm = sensors.torque_sd_per_joint_nm(benchmark.plan.base.arm.dof())?;
         let gain = diagnosis.held_out.first().map(|held_out| HeldOutGain::of(held_out, &sd_nm));
@@ -98,7 +105,11 @@ impl BlindWorker<'_> {
     }
 
     /// What the diagnosis makes of the log.
-    fn diagnose(&self, case: &Case, held_out: Option<&Recording>) -> Result<Diagnosis, BlindError> {
+    fn diagnose(
+        &self,
+        case: &Case,
+        held_out: Option<&Recording>,
+    ) -> Result<Diagnosis, DiagnoseError> {
         let Benchmark { plan, model, simulation, .. } = self.benchmark;
         let mut families = candidates::all();
         if case.secret == Secret::Withheld {

@@ -77,6 +77,34 @@ pub struct Case {
     pub cosine: Option<f64>,
 }
 
+/// A site in words.
+pub fn place(joint: Option<usize>) -> String {
+    joint.map_or_else(|| "arm".into(), |j| format!("joint {j}"))
+}
+
+impl std::fmt::Display for Hidden {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} at {} (", self.kind, place(self.joint))?;
+        for (k, (key, value)) in self.effect.parameters().iter().enumerate() {
+            f.write_str(if k == 0 { "" } else { ", " })?;
+            match value.as_f64() {
+                Some(value) => write!(f, "{key} {value:.5}")?,
+                None => write!(f, "{key} {value}")?,
+            }
+        }
+        f.write_str(")")?;
+        self.strength.map_or(Ok(()), |s| write!(f, ", √λ {s:.1}"))
+    }
+}
+
+impl std::fmt::Display for Case {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let against = if self.against_simulation { ", against the nominal simulation" } else { "" };
+        write!(f, "{}, {} noise{against}, {}", self.motion, self.noise, self.secret)?;
+        self.hidden.iter().try_for_each(|hidden| write!(f, "\n  hidden: {hidden}"))
+    }
+}
+
 /// Sizes tried for an effect whose √λ is not proportional to its size.
 const PILOTS: usize = 3;
 /// A pilot this close to the √λ that is wanted is good enough.

@@ -18,7 +18,7 @@ mod share;
 mod target;
 
 pub use benchmark::{Benchmark, BlindContent, BlindError, BlindWorker};
-pub use case::{Case, Hidden, Secret};
+pub use case::{Case, Hidden, Secret, place};
 pub use family::{FAMILIES, Family, Judged};
 pub use judge::{Outcome, is_at, is_right};
 pub(super) use plan::BlindEntry;

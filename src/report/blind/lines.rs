@@ -1,27 +1,7 @@
 //! What a trial hides and what is said of it, in lines of text.
 
-use crate::montecarlo::blind::{Hidden, Named, Record};
+use crate::montecarlo::blind::{Named, Record, place};
 use crate::report::number::percent;
-
-/// A site in words.
-pub(super) fn place(joint: Option<usize>) -> String {
-    joint.map_or_else(|| "arm".into(), |j| format!("joint {j}"))
-}
-
-/// A hidden effect in a line.
-pub(super) fn hidden_line(hidden: &Hidden) -> String {
-    let numbers: Vec<String> = hidden
-        .effect
-        .parameters()
-        .iter()
-        .map(|(key, value)| match value.as_f64() {
-            Some(value) => format!("{key} {value:.5}"),
-            None => format!("{key} {value}"),
-        })
-        .collect();
-    let size = hidden.strength.map_or_else(String::new, |s| format!(", √λ {s:.1}"));
-    format!("{} at {} ({}){size}", hidden.kind, place(hidden.joint), numbers.join(", "))
-}
 
 /// A named cause in a line.
 fn named_line(named: &Named) -> String {
@@ -48,16 +28,11 @@ fn named_line(named: &Named) -> String {
 /// A case, its truth and its answer, for the terminal.
 pub fn replay_lines(record: &Record) -> Vec<String> {
     let case = &record.case;
-    let against = if case.against_simulation { ", against the nominal simulation" } else { "" };
     let mut lines = vec![
-        format!("trial {}: {}, {} noise{against}", record.trial, case.motion, case.noise),
-        format!(
-            "secret: {}, √λ {:.1}, √λ_sim {:.1}",
-            case.secret, case.sqrt_lambda, case.sqrt_lambda_sim
-        ),
+        format!("trial {}: {case}", record.trial),
+        format!("  √λ {:.1}, √λ_sim {:.1}", case.sqrt_lambda, case.sqrt_lambda_sim),
     ];
     lines.extend(case.cosine.map(|c| format!("  cosine between the two {c:.2}")));
-    lines.extend(case.hidden.iter().map(|h| format!("  hidden: {}", hidden_line(h))));
     lines.extend(record.answer.named.iter().map(|n| format!("  named: {}", named_line(n))));
     lines.extend(
         record

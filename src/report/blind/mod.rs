@@ -7,9 +7,8 @@ mod tables;
 use super::json::Program;
 use super::number::percent;
 use super::{Page, ReportError, Section, Table, Verdict};
-use crate::montecarlo::blind::{Record, Scores};
+use crate::montecarlo::blind::{Record, Scores, place};
 
-use lines::{hidden_line, place};
 use plots::{confidence_plot, confusion_plot, detection_plot};
 use tables::{
     condition_table, confidence_table, confusion_table, family_table, gain_table, status,
@@ -64,7 +63,7 @@ const LISTED: usize = 60;
 
 fn misses(scores: &Scores) -> Vec<String> {
     let line = |r: &Record| {
-        let hidden: Vec<String> = r.case.hidden.iter().map(hidden_line).collect();
+        let hidden: Vec<String> = r.case.hidden.iter().map(ToString::to_string).collect();
         let named: Vec<String> = r
             .answer
             .named
