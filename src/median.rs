@@ -38,9 +38,28 @@ pub fn median_step(time_s: &[f64]) -> Option<f64> {
     median(&mut steps)
 }
 
+/// Steps of `typical_s` that are missing between stamps `k` − 1 and `k` of `time_s`, not rounded. What a stamp is late
+/// makes the step before it longer and the one behind it shorter: that is jitter, and nothing is missing.
+pub fn missing_steps(time_s: &[f64], k: usize, typical_s: f64) -> f64 {
+    let excess =
+        |k: usize| Some((time_s.get(k)? - time_s.get(k.checked_sub(1)?)?) / typical_s - 1.0);
+    let deficit = |k: Option<usize>| k.and_then(excess).map_or(0.0, |e| e.min(0.0));
+    excess(k).map_or(0.0, |e| e + deficit(k.checked_sub(1)) + deficit(Some(k + 1))).max(0.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn late_stamps_miss_nothing_and_left_out_rows_do() {
+        let late = [0.0, 1.0, 2.6, 3.0, 4.0, 5.4, 5.6, 7.0];
+        assert!((1..late.len()).all(|k| missing_steps(&late, k, 1.0).round() == 0.0));
+        let left_out = [0.0, 1.1, 1.9, 3.1, 6.0, 6.9];
+        let found: Vec<f64> =
+            (1..left_out.len()).map(|k| missing_steps(&left_out, k, 1.0).round()).collect();
+        assert_eq!(found, [0.0, 0.0, 0.0, 2.0, 0.0]);
+    }
 
     #[test]
     fn the_middle_of_odd_and_even_numbers_of_values() {

@@ -78,6 +78,25 @@ fn stiff_presliding_in_a_fast_log() {
     contains(only(&found, Kind::Presliding, Some(3)), "stiffness_per_rad", 10_000.0);
 }
 
+/// The joint reverses within two samples of this log: what its drive did between them is not what a late reading shows.
+#[test]
+fn a_late_reading_of_a_sharp_reversal() {
+    let found = Hidden::on(0, Law::Late { ms: 2 }).logged_at(250.0).diagnose(10);
+    contains(only(&found, Kind::TimeSkew, Some(1)), "delay_s", 0.002);
+}
+
+/// Five gaps of a tenth to four tenths of a second: the other periods tell what is missing, and all of the log counts.
+#[test]
+fn gaps_of_a_log_that_repeats() {
+    let lost = [1203..1223, 2790..2841, 4125..4144, 6000..6012, 8700..8733];
+    let found = Hidden::on(1, Law::Load { mu: 0.03 }).without_rows(&lost).diagnose(2);
+    let d = &found.diagnosis;
+    let named: Vec<_> = d.causes.iter().map(|c| (c.kind, c.joint)).collect();
+    assert_eq!(named, [(Kind::DroppedSamples, None), (Kind::LoadFriction, Some(2))]);
+    contains(&d.causes[1], "mu", 0.03);
+    assert!(d.warnings.iter().any(|w| w.contains("5 gaps")), "{:?}", d.warnings);
+}
+
 /// Coulomb and viscous friction alone: reversals are as sharp in the log as in the drive.
 #[test]
 fn a_fast_log_of_a_good_model_has_no_cause() {

@@ -107,7 +107,12 @@ fn resampling_equals_scipy_interpolators() {
     let golden = golden().resample;
     let y = series(60);
     let grid = Resampler::new(&golden.time_s, 250.0, 1.0).unwrap();
-    assert_near(&grid.hermite(&y, &golden.slope).unwrap(), &golden.hermite, 1e-13, "hermite");
-    assert_near(&grid.monotone(&y).unwrap(), &golden.monotone, 1e-13, "monotone");
-    assert_near(&grid.linear(&y).unwrap(), &golden.linear, 1e-13, "linear");
+    assert_near(
+        &grid.instants().hermite(&y, &golden.slope).unwrap(),
+        &golden.hermite,
+        1e-13,
+        "hermite",
+    );
+    assert_near(&grid.instants().monotone(&y).unwrap(), &golden.monotone, 1e-13, "monotone");
+    assert_near(&grid.instants().linear(&y).unwrap(), &golden.linear, 1e-13, "linear");
 }

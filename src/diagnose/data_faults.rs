@@ -14,8 +14,9 @@ use super::record::Record;
 use super::stalls::stalls;
 use super::verdict::{Cause, Estimate};
 use crate::identify::Measurement;
-use crate::median::{median, median_step, robust_sigma};
+use crate::median::{median, median_step, missing_steps, robust_sigma};
 use crate::robot::JointSignals;
+use crate::signal::SignalError;
 
 /// Deviations of this many robust standard deviations are no noise: in 10⁶ Gaussian values one in 10⁵
 /// logs has such a value.
@@ -33,9 +34,19 @@ const BLOCKS: usize = 20;
 /// Student's t₁₉ for a chance of 10⁻⁵ in two tails, six joints.
 const LAG_T: f64 = 6.5;
 
-/// All faults of the record of `m`, and the record without those that can be taken back. Rows that repeat
-/// and a clock that stalls hide what the velocity and the torque have: they are looked for first.
-pub fn find(m: &Measurement) -> (Vec<Cause>, Record) {
+/// The faults of a record.
+pub struct Faults {
+    /// As causes.
+    pub causes: Vec<Cause>,
+    /// The record without those that can be taken back.
+    pub record: Record,
+    /// What a user should know of it.
+    pub warning: Option<String>,
+}
+
+/// All faults of the record of `m`. Rows that repeat, a clock that stalls and gaps hide what the velocity and the torque
+/// have: they are looked for first.
+pub fn find(m: &Measurement) -> Result<Faults, SignalError> {
     let mut out: Vec<Cause> = Vec::new();
     let repeats = repeats(m);
     out.extend(repeated_or_missing(m, &repeats));
@@ -45,6 +56,7 @@ pub fn find(m: &Measurement) -> (Vec<Cause>, Record) {
         out.push(stalls.cause());
         record.give_back_time(&stalls.rows, stalls.lost_s);
     }
+    let warning = record.fill_gaps()?;
     let lags = velocity_lag(&record.measurement(m.source));
     record.undo_lags(&lags);
     let outliers = outliers(&record.torque_nm);
@@ -54,7 +66,7 @@ pub fn find(m: &Measurement) -> (Vec<Cause>, Record) {
     out.extend(lags);
     out.extend(outliers.iter().map(|(j, far)| outliers_cause(*j, far.len(), m.time_s.len())));
     out.extend(quantisation(&record.torque_nm));
-    (out, record)
+    Ok(Faults { causes: out, record, warning })
 }
 
 pub(super) fn cause(
@@ -166,7 +178,7 @@ fn repeats(m: &Measurement) -> Vec<usize> {
 fn repeated_or_missing(m: &Measurement, repeats: &[usize]) -> Option<Cause> {
     let step_s = step_s(m);
     let missing: f64 =
-        m.time_s.windows(2).map(|t| ((t[1] - t[0]) / step_s - 1.0).round().max(0.0)).sum();
+        (1..m.time_s.len()).map(|k| missing_steps(m.time_s, k, step_s).round()).sum();
     let fraction = (missing + repeats.len() as f64) / m.time_s.len() as f64;
     // Single missed samples of an ordinary recorder are no cause of anything.
     (fraction > 2e-3).then(|| {
@@ -274,14 +286,11 @@ mod tests {
 
     fn found(lag_s: f64, stall: Option<usize>) -> Vec<Cause> {
         let (time_s, signals) = record(lag_s, stall);
-        find_in(&time_s, &signals).0
+        find_in(&time_s, &signals).causes
     }
 
-    fn find_in(
-        time_s: &[f64],
-        [q_rad, qd_rad_s, torque_nm]: &[JointSignals; 3],
-    ) -> (Vec<Cause>, Record) {
-        find(&Measurement { source: "test", time_s, q_rad, qd_rad_s, torque_nm })
+    fn find_in(time_s: &[f64], [q_rad, qd_rad_s, torque_nm]: &[JointSignals; 3]) -> Faults {
+        find(&Measurement { source: "test", time_s, q_rad, qd_rad_s, torque_nm }).unwrap()
     }
 
     #[test]
@@ -295,7 +304,7 @@ mod tests {
         let rounded = |step: f64| {
             let torque =
                 torque.map_joints(|_, y| y.iter().map(|v| (v / step).round() * step).collect());
-            find_in(&time_s, &[q.clone(), qd.clone(), torque]).0
+            find_in(&time_s, &[q.clone(), qd.clone(), torque]).causes
         };
         let coarse = rounded(0.8);
         assert_eq!(coarse.len(), 2, "both joints");
@@ -326,7 +335,7 @@ mod tests {
     #[test]
     fn lost_time_is_given_back() {
         let (time_s, signals) = record(0.0, Some(250));
-        let (_, record) = find_in(&time_s, &signals);
+        let record = find_in(&time_s, &signals).record;
         let [shown, true_s] = [time_s[3999], time_s[3999] + 0.02 * 15.0];
         let given_back = record.time_s[3999];
         // Fifteen stalls, each known to better than a millisecond.
@@ -339,8 +348,8 @@ mod tests {
         let (time_s, signals) = record(0.0, None);
         let of = |k: usize| if k % 100 == 99 { k - 1 } else { k };
         let twice = signals.map(|s| JointSignals::from_fn(2, 4000, |j, k| s.joint(j)[of(k)]));
-        let (faults, record) = find_in(&time_s, &twice);
-        assert_eq!(faults.iter().map(|f| f.kind).collect::<Vec<_>>(), [Kind::DroppedSamples]);
+        let Faults { causes, record, .. } = find_in(&time_s, &twice);
+        assert_eq!(causes.iter().map(|f| f.kind).collect::<Vec<_>>(), [Kind::DroppedSamples]);
         // Where the arm rests nothing can be said.
         assert!((3960..3970).contains(&record.time_s.len()), "{}", record.time_s.len());
     }

@@ -4,7 +4,7 @@ use super::against;
 use super::candidates::{self, Candidate};
 use super::common_motion::move_to_common_motion;
 use super::contact;
-use super::data_faults;
+use super::data_faults::{self, Faults};
 use super::detection_limits::detection_limits;
 use super::error::DiagnoseError;
 use super::extension::Extension;
@@ -85,7 +85,7 @@ impl<'a> Diagnoser<'a> {
         held_out: &[Validation],
         simulation: Option<&[f64]>,
     ) -> Result<Finding, DiagnoseError> {
-        let (mut faults, record) = data_faults::find(m);
+        let Faults { causes: mut faults, record, warning } = data_faults::find(m)?;
         let m = &record.measurement(m.source);
         let coarse = data_faults::coarse_joints(&faults);
         // Across a mended stall torques are straight lines, which differ from period to period.
@@ -209,7 +209,7 @@ impl<'a> Diagnoser<'a> {
             lack_of_fit_probability: lack.map(|lack| lack.probability),
             verdict,
             sentences: Vec::new(),
-            warnings: identification.warnings.clone(),
+            warnings: warning.into_iter().chain(identification.warnings.clone()).collect(),
         };
 
         if is_mended {

@@ -10,6 +10,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use realfft::num_complex::Complex64;
 
 use super::extension::mean_period;
+use super::reversal_answer::{ReversalAnswer, TorqueHarmonic};
 use crate::dynamics::{
     LANES, Lanes, Model, Motion, Real, Workspace, rigid_torque, with_widest_registers,
 };
@@ -42,6 +43,8 @@ pub struct Delivered {
     /// What the drives deliver in the others, as reversals tell it, at every tick, Nm: load and dry friction together, of
     /// which a drive may feed any share forward.
     pub beyond_nm: Vec<Vec<f64>>,
+    /// Where these are from, by joint.
+    pub answers: Vec<ReversalAnswer>,
 }
 
 /// Torque that moves the links of every joint, in two parts.
@@ -91,7 +94,7 @@ impl Loads {
         (link_nm, mass_kg_m2, rotor_kg_m2): (&JointSignals, &[JointSignals], &[f64]),
         periods: &Periods,
     ) -> Self {
-        let Periods { each, torque_nm, clock, highest, .. } = *periods;
+        let Periods { each, torque_nm, clock, rate_hz, highest } = *periods;
         let harmonics = |y: &JointSignals| -> Vec<Harmonics> {
             (0..y.joints()).map(|j| Harmonics::of(clock, y.joint(j))).collect()
         };
@@ -109,17 +112,22 @@ impl Loads {
                 clock.refined(mean.qd_rad_s.joint(j)).into_iter().map(sign).collect()
             })
             .collect();
-        let dry = |j: usize| fine_sign[j].iter().map(move |s| arm.joints[j].drive.coulomb_nm * s);
-        // A drive of which nothing is told gives friction what it takes, and jolts nothing.
-        let delivered = |level: f64| -> Vec<Vec<f64>> {
-            (0..mean.joints())
-                .map(|j| {
-                    answer(periods, &of_loads[j], &of_torques[j], &fine_sign[j], level)
-                        .unwrap_or_else(|| dry(j).collect())
-                })
-                .collect()
+        let coulomb_nm = |j: usize| arm.joints[j].drive.coulomb_nm;
+        let dry = |j: usize| fine_sign[j].iter().map(move |s| coulomb_nm(j) * s);
+        // In the harmonics in which the load is not known to `level`.
+        let answers = |level: f64| -> Vec<ReversalAnswer> {
+            let of_joint = |j: usize| {
+                let torque = of_torques[j].beyond(&of_loads[j], level, fastest(periods));
+                let sign = fine_sign[j].clone();
+                ReversalAnswer::new((clock, rate_hz), sign, coulomb_nm(j), torque)
+            };
+            (0..mean.joints()).map(of_joint).collect()
         };
-        let (well_beyond_nm, beyond_nm) = (delivered(WELL_KNOWN), delivered(KNOWN));
+        let given = |answers: &[ReversalAnswer]| -> Vec<Vec<f64>> {
+            answers.iter().map(|answer| answer.given_nm(clock, 0.0)).collect()
+        };
+        let (well_beyond_nm, answers) = (given(&answers(WELL_KNOWN)), answers(KNOWN));
+        let beyond_nm = given(&answers);
         let jolts = |delivered_nm: &[Vec<f64>], level: f64| {
             mean.qd_rad_s.map_joints(|j, _| {
                 let beside: Vec<f64> =
@@ -145,7 +153,7 @@ impl Loads {
         let known =
             of_loads.iter().map(|of| (0..=highest).map(|h| of.holds(h, KNOWN)).collect()).collect();
         let load_nm = part(&of_loads, &mean_of(&loads), KNOWN);
-        let delivered = Some(Delivered { load_nm, known, beyond_nm });
+        let delivered = Some(Delivered { load_nm, known, beyond_nm, answers });
         let rotor_nm = part(&harmonics(&rotors), &rotors_along(arm, mean), WELL_KNOWN);
         let load_nm = sum(&link.told_nm, &rotor_nm);
         Self { load_nm, link, bending, delivered, mobility_per_kg_m2 }
@@ -236,6 +244,14 @@ impl Harmonics {
         self.known[h / BAND] > level
     }
 
+    /// Those up to `last` in which `load` is not known to `level`.
+    fn beyond(&self, load: &Self, level: f64, last: usize) -> Vec<TorqueHarmonic> {
+        let harmonic =
+            |h: usize| TorqueHarmonic { number: h, mean: self.mean[h], noise: self.noise[h] };
+        let is_beyond = |h: &TorqueHarmonic| !load.holds(h.number, level) && h.noise > 0.0;
+        (1..=last).map(harmonic).filter(is_beyond).collect()
+    }
+
     /// `y` with these harmonics only.
     fn part(&self, clock: &FineClock, y: &[f64], level: f64) -> Vec<f64> {
         let gain = |h: usize| if self.holds(h, level) { Complex64::ONE } else { Complex64::ZERO };
@@ -249,54 +265,8 @@ impl Harmonics {
     }
 }
 
-/// Time between two delays, s; not less than that between two samples.
-const DELAY_S: f64 = 0.008;
-/// In steps of that.
-const DELAYS: std::ops::Range<i64> = -2..4;
 /// Faster than this, Hz, drives are not looked at: delays of 8 ms tell nothing beyond half their rate.
 const FASTEST_HZ: f64 = 60.0;
-/// What the reversals explain of a torque over what they explain of noise. The noise of the c is in the residual of the
-/// log as well; all six shift a score by less than √(6/(6·10)) = 0.3 of its σ.
-const TOLD: f64 = 10.0;
-
-/// What the drive of a joint gives in the harmonics in which its load is not known to `level`, as its reversals tell it, Nm,
-/// at every tick: Σ_i c_i s(t − iΔ), with s the sign of the velocity, given at every tick, and the c fitted to `torque`, as
-/// recorded, weighted by its noise. `None` where it drowns, or where the joint hardly reverses.
-///
-/// Six delays, from two before to three behind the reversal, hold what a drive does within some twenty milliseconds.
-fn answer(
-    periods: &Periods,
-    load: &Harmonics,
-    torque: &Harmonics,
-    sign: &[f64],
-    level: f64,
-) -> Option<Vec<f64>> {
-    let Periods { clock, rate_hz, .. } = *periods;
-    let is_used = |h: &usize| !load.holds(*h, level) && torque.noise[*h] > 0.0;
-    let used: Vec<usize> = (1..=fastest(periods)).filter(is_used).collect();
-    let delay = (DELAY_S.max(1.0 / rate_hz) * rate_hz * clock.ticks() as f64).round() as i64;
-    let delayed = |i: i64| {
-        let mut delayed = sign.to_vec();
-        delayed.rotate_right((i * delay).rem_euclid(sign.len() as i64) as usize);
-        delayed
-    };
-    let signs: Vec<Vec<f64>> = DELAYS.map(delayed).collect();
-    let spectra: Vec<Vec<Complex64>> = signs
-        .iter()
-        .map(|s| clock.spectrum(&s.iter().copied().step_by(clock.ticks()).collect::<Vec<_>>()))
-        .collect();
-    let product = |x: &[Complex64], y: &[Complex64]| -> f64 {
-        used.iter().map(|&h| (x[h].conj() * y[h]).re / torque.noise[h]).sum()
-    };
-    let count = signs.len();
-    let normal = DMatrix::from_fn(count, count, |i, k| product(&spectra[i], &spectra[k]));
-    let score = DVector::from_fn(count, |i, _| product(&spectra[i], &torque.mean));
-    let c = Cholesky::new(normal)?.solve(&score);
-    // Noise alone would make this one: the mean square of a coefficient has two parts.
-    let told = 2.0 * c.dot(&score) / count as f64;
-    let given = |k: usize| signs.iter().zip(&c).map(|(s, c)| c * s[k]).sum::<f64>();
-    (told > TOLD).then(|| (0..sign.len()).map(given).collect())
-}
 
 /// The last harmonic in which drives are looked at.
 fn fastest(periods: &Periods) -> usize {
@@ -481,7 +451,9 @@ mod tests {
         let of_load = Harmonics::of(&clock, &load);
         assert!(of_load.holds(8, WELL_KNOWN) && !of_load.holds(50, WELL_KNOWN));
         let of_torque = Harmonics::of(&clock, &torque);
-        let given = answer(&periods, &of_load, &of_torque, &sign, WELL_KNOWN).unwrap();
+        let torque = of_torque.beyond(&of_load, WELL_KNOWN, fastest(&periods));
+        let answer = ReversalAnswer::new((&clock, RATE_HZ), sign.clone(), coulomb_nm, torque);
+        let given = answer.given_nm(&clock, 0.0);
         let beside: Vec<f64> =
             given.iter().zip(&sign).map(|(given, s)| given - coulomb_nm * s).collect();
         let known = jolts(&periods, &of_load, WELL_KNOWN, &beside);
@@ -495,7 +467,5 @@ mod tests {
         // Six coefficients of unit noise beside what they explain, and what the steps lack: 0.03 without noise.
         let share = square(&off) / square(&truth);
         assert!(share < 0.1, "{share}");
-        let none = vec![1.0; fine];
-        assert!(answer(&periods, &of_load, &of_load, &none, WELL_KNOWN).is_none());
     }
 }

@@ -45,6 +45,7 @@ mod payload;
 mod record;
 mod repeated;
 pub mod replay;
+mod reversal_answer;
 mod reversals;
 mod scene;
 mod selection;

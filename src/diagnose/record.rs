@@ -4,6 +4,7 @@ use super::kind::Kind;
 use super::verdict::Cause;
 use crate::identify::Measurement;
 use crate::robot::JointSignals;
+use crate::signal::{Filled, SignalError, fill_gaps};
 
 /// How far a joint may turn between two rows beyond what its speed says, rad.
 const TORN_RAD: f64 = 0.05;
@@ -94,6 +95,18 @@ impl Record {
         for (k, time) in self.time_s.iter_mut().enumerate() {
             *time += lost_s * rows.partition_point(|row| *row < k) as f64;
         }
+    }
+
+    /// Rows for its gaps, where the motion repeats; what a user should know of them.
+    pub fn fill_gaps(&mut self) -> Result<Option<String>, SignalError> {
+        let Self { time_s, q_rad, qd_rad_s, torque_nm } = &*self;
+        let Some(filled) = fill_gaps(time_s, q_rad, qd_rad_s, torque_nm)? else {
+            return Ok(None);
+        };
+        let warning = filled.warning();
+        let Filled { time_s, q_rad, qd_rad_s, torque_nm, .. } = filled;
+        *self = Self { time_s, q_rad, qd_rad_s, torque_nm };
+        Ok(Some(warning))
     }
 
     /// Takes back the lags among `causes`.

@@ -8,6 +8,7 @@ use realfft::num_complex::Complex64;
 use super::load::{
     Delivered, LinkTorque, Loads, Periods, mass_along, rigid_torque_along, rotors_kg_m2,
 };
+use super::reversal_answer::shifted;
 use super::reversals::{Bends, Turning};
 use crate::base::BaseSet;
 use crate::dynamics::{Model, Motion, Parameter, ParameterLayout};
@@ -333,16 +334,11 @@ impl Scene {
                 _ => Complex64::ZERO,
             })
         };
+        let late_ticks = delay_s / self.instant_s();
         let at_samples = |fine: &[f64], wanted: bool| {
-            let (n, late) = (fine.len(), delay_s / self.instant_s());
-            let change = |k: usize| {
-                let at = (k * FINE) as f64 - late;
-                let (left, u) = (at.floor(), at - at.floor());
-                let left = (left as isize).rem_euclid(n as isize) as usize;
-                (1.0 - u) * fine[left] + u * fine[(left + 1) % n] - fine[k * FINE]
-            };
-            let change: Vec<f64> = (0..n / FINE).map(change).collect();
-            part(&change, wanted)
+            let late = shifted(fine, late_ticks);
+            let change = late.iter().zip(fine).step_by(FINE).map(|(late, now)| late - now);
+            part(&change.collect::<Vec<_>>(), wanted)
         };
         let (coulomb, viscous) = (self.coulomb_nm[j], self.arm.joints[j].drive.viscous_nm_s_rad);
         let load = delivered.load_nm.joint(j);
@@ -351,7 +347,7 @@ impl Scene {
         let smooth: Vec<f64> = load.iter().zip(&qd).map(|(load, qd)| load + viscous * qd).collect();
         let smooth = less(self.delayed(&smooth, delay_s), &smooth);
         let dry = at_samples(&self.instants(j).sign, true);
-        let beyond = at_samples(&delivered.beyond_nm[j], false);
+        let beyond = at_samples(&delivered.answers[j].given_nm(clock, late_ticks), false);
         let sum = |((s, d), b): ((&f64, &f64), &f64)| s + coulomb * d + b;
         smooth.iter().zip(&dry).zip(&beyond).map(sum).collect()
     }

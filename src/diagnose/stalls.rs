@@ -20,11 +20,21 @@ pub struct Stalls {
     sigma_s: f64,
 }
 
+/// Across a longer gap, in usual steps, velocities at its ends do not tell how far joints went.
+const GAP_STEPS: f64 = 4.5;
+
 /// Rows between which more time passed than the time stamps say.
 pub fn stalls(m: &Measurement) -> Option<Stalls> {
-    let lost: Vec<f64> = (0..m.time_s.len().saturating_sub(1))
-        .map(|k| passed_s(m, k).map_or(0.0, |passed| passed - (m.time_s[k + 1] - m.time_s[k])))
-        .collect();
+    let step = |k: usize| m.time_s[k + 1] - m.time_s[k];
+    let gap_s = GAP_STEPS * step_s(m);
+    let last = m.time_s.len().saturating_sub(1);
+    // Accelerations beside a step are from its neighbours.
+    let beside_gap = |k: usize| (k.saturating_sub(1)..(k + 2).min(last)).any(|k| step(k) > gap_s);
+    let lost = |k: usize| match passed_s(m, k) {
+        Some(passed) if !beside_gap(k) => passed - step(k),
+        _ => 0.0,
+    };
+    let lost: Vec<f64> = (0..last).map(lost).collect();
     let sigma_s = sigma_of_changes(&lost);
     let limit = (FAR * sigma_s).max(0.5 * step_s(m));
     let rows: Vec<usize> = (0..lost.len()).filter(|&k| lost[k] > limit).collect();

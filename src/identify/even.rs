@@ -94,13 +94,13 @@ impl<'a> Even<'a> {
         let longest = grid.segments().iter().max_by_key(|s| s.len()).cloned().unwrap_or(0..0);
         let cut = |signals: JointSignals| Cow::Owned(signals.slice(longest.clone()));
         self.start_s = grid.time_s()[longest.start];
-        self.q_rad = cut(grid.angles(m.q_rad, m.qd_rad_s)?);
-        self.qd_rad_s = cut(grid.smooth(m.qd_rad_s)?);
-        self.torque_nm = cut(grid.straight(m.torque_nm)?);
+        self.q_rad = cut(grid.instants().angles(m.q_rad, m.qd_rad_s)?);
+        self.qd_rad_s = cut(grid.instants().smooth(m.qd_rad_s)?);
+        self.torque_nm = cut(grid.instants().straight(m.torque_nm)?);
         self.rate_hz = grid_hz;
         self.resampled = true;
         self.highest = REWORKED;
-        self.between = Some(grid.brackets()[longest].to_vec());
+        self.between = Some(grid.instants().places()[longest].to_vec());
         Ok(())
     }
 

@@ -15,7 +15,7 @@ use super::whiten::smoothed;
 use crate::base::BaseSet;
 use crate::dynamics::Model;
 use crate::robot::JointSignals;
-use crate::signal::{FineClock, Replicates, Scratch, ZeroPhase};
+use crate::signal::{Filled, FineClock, Replicates, Scratch, ZeroPhase, fill_gaps};
 
 /// Everything that stays the same from log to log, and the memory that is used again.
 pub struct Identifier<'a> {
@@ -231,11 +231,25 @@ impl<'a> Identifier<'a> {
             let (found, expected) = (m.q_rad.joints(), self.model.dof());
             return Err(IdentifyError::Joints { log: m.source.to_owned(), found, expected });
         }
-        let prepared = if with_periods {
+        let is_single_run = self.options.period_s == Some(0.0);
+        let filled = if is_single_run {
+            None
+        } else {
+            fill_gaps(m.time_s, m.q_rad, m.qd_rad_s, m.torque_nm)?
+        };
+        let m = &filled.as_ref().map_or(*m, |filled| Measurement {
+            source: m.source,
+            time_s: &filled.time_s,
+            q_rad: &filled.q_rad,
+            qd_rad_s: &filled.qd_rad_s,
+            torque_nm: &filled.torque_nm,
+        });
+        let mut prepared = if with_periods {
             self.preparer.prepare_with_periods(m, &self.options)?
         } else {
             self.preparer.prepare(m, &self.options)?
         };
+        prepared.warnings.extend(filled.as_ref().map(Filled::warning));
         let (first, every) = self.lay_out(&prepared)?;
         Ok((prepared, first, every))
     }

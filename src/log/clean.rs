@@ -1,6 +1,6 @@
 //! Which rows of a log belong together.
 
-use crate::median::median_step;
+use crate::median::{median_step, missing_steps};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
@@ -216,10 +216,10 @@ pub(super) fn missed_samples(motion: &Motion) -> Option<(usize, LogWarning)> {
     let (mut missed, mut gaps, mut longest_s, mut after_row) = (0_usize, 0, 0.0, 0);
     for k in 1..motion.rows() {
         let step_s = motion.time_s[k] - motion.time_s[k - 1];
-        let steps = (step_s / typical_s).round();
-        let in_file = motion.row[k] - motion.row[k - 1];
+        let set_aside = motion.row[k] - motion.row[k - 1] - 1;
         // A float beyond the range becomes the largest integer, so a clock that leaps cannot overflow.
-        let here = (steps as usize).saturating_sub(in_file);
+        let here =
+            (missing_steps(motion.time_s, k, typical_s).round() as usize).saturating_sub(set_aside);
         if here > 0 {
             missed = missed.saturating_add(here);
             gaps += 1;

@@ -10,7 +10,7 @@
 //! | remove what is faster than the motion, keep its place in time | [`ZeroPhase`], [`Decimator`] |
 //! | accelerations as the paper makes them | [`PaperDifferentiator`] |
 //! | accelerations of a noise-free log | [`hermite_acceleration`], [`central_4`] |
-//! | time stamps jitter, samples are missing | [`Resampler`] |
+//! | time stamps jitter, samples are missing | [`Resampler`], [`fill_gaps`] |
 //! | when does the arm move? | [`Activity`] |
 //! | does the motion repeat, and from where to where? | [`find_period`] |
 //! | the best estimate of a repeated motion and its derivatives | [`PeriodicFit`] |
@@ -29,6 +29,8 @@ mod decimate;
 mod differentiate;
 mod error;
 mod fine_clock;
+mod gap_filling;
+mod instants;
 mod matched;
 mod noise;
 mod noise_trend;
@@ -48,6 +50,8 @@ pub use decimate::Decimator;
 pub use differentiate::{central_2, central_4, hermite_acceleration};
 pub use error::SignalError;
 pub use fine_clock::FineClock;
+pub use gap_filling::{Filled, fill_gaps};
+pub use instants::{Bracket, Instants};
 pub use matched::{Heights, MatchedFilter};
 pub use noise_trend::{NoisePower, noise_trend, pooled};
 pub use paper_filter::{PaperDifferentiator, PaperReading};
@@ -55,5 +59,5 @@ pub use period::{Period, PeriodSearch, find_period};
 pub use periodic_fit::{FitScratch, PeriodicFit};
 pub use readings::{quantum, reading_limit};
 pub use replicates::{Replicates, replicate_noise};
-pub use resample::{Bracket, Gap, Resampler, bridged_gap_s, gaps, natural_rate_hz};
+pub use resample::{Gap, Resampler, bridged_gap_s, gaps, natural_rate_hz};
 pub use spectrum::{PowerSpectrum, welch};

@@ -7,8 +7,8 @@
 
 use std::ops::Range;
 
-use super::error::{SignalError, checked_rate_hz, enough, same};
-use crate::robot::JointSignals;
+use super::error::{SignalError, checked_rate_hz, enough};
+use super::instants::{Bracket, Instants};
 
 /// A stretch of time without samples, longer than the caller lets be interpolated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,32 +19,16 @@ pub struct Gap {
     pub end_s: f64,
 }
 
-/// Where each grid point lies between the time stamps; applies to any number of signals.
+/// A uniform grid over the time stamps of a log; applies to any number of signals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Resampler {
-    source_s: Vec<f64>,
+    start_s: f64,
     rate_hz: f64,
-    points: Vec<Point>,
+    /// Numbers of the points on the grid, gaps counted.
+    ticks: Vec<usize>,
+    instants: Instants,
     segments: Vec<Range<usize>>,
     gaps: Vec<Gap>,
-}
-
-/// A grid point at the fraction `u` of the interval from time stamp `left` to the next.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Point {
-    /// Number of the point on the grid, gaps counted.
-    tick: usize,
-    left: usize,
-    u: f64,
-}
-
-/// Where a grid sample lies: the row before it, and the share of the way to the next row.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bracket {
-    /// Row at or before the sample.
-    pub left: usize,
-    /// 0 at that row, below 1.
-    pub u: f64,
 }
 
 /// The natural rate of a log: one over the median distance of its time stamps, Hz.
@@ -76,7 +60,7 @@ pub fn gaps(time_s: &[f64], limit_s: f64) -> Vec<Gap> {
         .collect()
 }
 
-fn check_time(time_s: &[f64]) -> Result<(), SignalError> {
+pub(super) fn check_time(time_s: &[f64]) -> Result<(), SignalError> {
     enough("a time grid", time_s.len(), 2)?;
     let fails = |t: &[f64]| !(t[1] - t[0] > 0.0 && (t[1] - t[0]).is_finite());
     match time_s.windows(2).position(fails) {
@@ -97,42 +81,44 @@ impl Resampler {
             return Err(SignalError::GapLimit { limit_s: longest_gap_s });
         }
         let start_s = time_s[0];
-        let mut points = Vec::new();
+        let (mut ticks, mut places) = (Vec::new(), Vec::new());
         let mut segments = Vec::new();
         let mut segment_start = 0;
         for (left, t) in time_s.windows(2).enumerate() {
             let step_s = t[1] - t[0];
             if step_s > longest_gap_s {
                 // A grid point exactly on the time stamp before the gap needs no interpolation.
-                push_on_stamp(&mut points, left, t[0] - start_s, rate_hz);
-                close_segment(&mut segments, &mut segment_start, points.len());
+                push_on_stamp(&mut ticks, &mut places, left, (t[0] - start_s) * rate_hz);
+                close_segment(&mut segments, &mut segment_start, ticks.len());
                 continue;
             }
-            let first = points.last().map_or(0, |p: &Point| p.tick + 1);
+            let first = ticks.last().map_or(0, |tick| tick + 1);
             let first = first.max(((t[0] - start_s) * rate_hz - ROUNDING_TICKS).ceil() as usize);
             let offset_s = t[0] - start_s;
-            points.extend(
-                (first..)
-                    .map(|tick| (tick, tick as f64 / rate_hz - offset_s))
-                    .take_while(|(_, dt)| *dt * rate_hz < step_s * rate_hz - ROUNDING_TICKS)
-                    .map(|(tick, dt)| Point { tick, left, u: (dt / step_s).max(0.0) }),
-            );
+            let inside = (first..)
+                .map(|tick| (tick, tick as f64 / rate_hz - offset_s))
+                .take_while(|(_, dt)| *dt * rate_hz < step_s * rate_hz - ROUNDING_TICKS);
+            for (tick, dt) in inside {
+                ticks.push(tick);
+                places.push(Bracket { left, u: (dt / step_s).max(0.0) });
+            }
         }
         let last = time_s.len() - 1;
-        push_on_stamp(&mut points, last, time_s[last] - start_s, rate_hz);
-        close_segment(&mut segments, &mut segment_start, points.len());
+        push_on_stamp(&mut ticks, &mut places, last, (time_s[last] - start_s) * rate_hz);
+        close_segment(&mut segments, &mut segment_start, ticks.len());
         let gaps = gaps(time_s, longest_gap_s);
-        Ok(Self { source_s: time_s.to_vec(), rate_hz, points, segments, gaps })
+        let instants = Instants::of(time_s.to_vec(), places);
+        Ok(Self { start_s, rate_hz, ticks, instants, segments, gaps })
     }
 
-    /// Where every sample of the grid lies among the time stamps.
-    pub fn brackets(&self) -> Vec<Bracket> {
-        self.points.iter().map(|p| Bracket { left: p.left, u: p.u }).collect()
+    /// Where the samples of the grid lie among the time stamps, which tells their values.
+    pub fn instants(&self) -> &Instants {
+        &self.instants
     }
 
     /// Number of samples on the grid, those in gaps not counted.
     pub fn samples(&self) -> usize {
-        self.points.len()
+        self.ticks.len()
     }
 
     /// Rate of the grid, Hz.
@@ -142,7 +128,7 @@ impl Resampler {
 
     /// Times of the samples, s, on the clock of the time stamps.
     pub fn time_s(&self) -> Vec<f64> {
-        self.points.iter().map(|p| self.source_s[0] + p.tick as f64 / self.rate_hz).collect()
+        self.ticks.iter().map(|tick| self.start_s + *tick as f64 / self.rate_hz).collect()
     }
 
     /// Ranges of samples without a gap inside; one range if there is no gap.
@@ -154,90 +140,19 @@ impl Resampler {
     pub fn gaps(&self) -> &[Gap] {
         &self.gaps
     }
-
-    /// Straight lines between the time stamps: for signals that jump, such as currents.
-    pub fn linear(&self, y: &[f64]) -> Result<Vec<f64>, SignalError> {
-        self.check(y)?;
-        Ok(self.points.iter().map(|p| lerp(y, p)).collect())
-    }
-
-    /// Piecewise cubic with the known slope at every time stamp: for angles with their velocity.
-    ///
-    /// Error for a smooth y: at most step⁴/384 · max|y⁗|.
-    pub fn hermite(&self, y: &[f64], slope_per_s: &[f64]) -> Result<Vec<f64>, SignalError> {
-        self.check(y)?;
-        self.check(slope_per_s)?;
-        Ok(self.points.iter().map(|p| self.cubic(y, slope_per_s, p)).collect())
-    }
-
-    /// Piecewise cubic that never overshoots its samples: for smooth signals without known slope.
-    ///
-    /// Slopes are the weighted harmonic mean of the neighbouring differences, zero at extrema
-    /// (F. Fritsch and J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300–304).
-    pub fn monotone(&self, y: &[f64]) -> Result<Vec<f64>, SignalError> {
-        self.check(y)?;
-        let slopes = monotone_slopes(&self.source_s, y);
-        Ok(self.points.iter().map(|p| self.cubic(y, &slopes, p)).collect())
-    }
-
-    /// Angles by [`Self::hermite`] with their velocities as slopes.
-    pub fn angles(
-        &self,
-        q_rad: &JointSignals,
-        qd_rad_s: &JointSignals,
-    ) -> Result<JointSignals, SignalError> {
-        same("joints of angle and velocity", q_rad.joints(), qd_rad_s.joints())?;
-        self.all_joints(q_rad, |j, q| self.hermite(q, qd_rad_s.joint(j)))
-    }
-
-    /// Every joint by [`Self::monotone`].
-    pub fn smooth(&self, y: &JointSignals) -> Result<JointSignals, SignalError> {
-        self.all_joints(y, |_, series| self.monotone(series))
-    }
-
-    /// Every joint by [`Self::linear`].
-    pub fn straight(&self, y: &JointSignals) -> Result<JointSignals, SignalError> {
-        self.all_joints(y, |_, series| self.linear(series))
-    }
-
-    fn all_joints(
-        &self,
-        y: &JointSignals,
-        f: impl Fn(usize, &[f64]) -> Result<Vec<f64>, SignalError>,
-    ) -> Result<JointSignals, SignalError> {
-        let mut out = JointSignals::zeros(y.joints(), self.samples());
-        for j in 0..y.joints() {
-            out.joint_mut(j).copy_from_slice(&f(j, y.joint(j))?);
-        }
-        Ok(out)
-    }
-
-    fn check(&self, y: &[f64]) -> Result<(), SignalError> {
-        same("values for the time stamps", self.source_s.len(), y.len())
-    }
-
-    fn cubic(&self, y: &[f64], slope: &[f64], p: &Point) -> f64 {
-        if p.u == 0.0 {
-            return y[p.left];
-        }
-        let (i, u) = (p.left, p.u);
-        let h = self.source_s[i + 1] - self.source_s[i];
-        let rise = y[i + 1] - y[i];
-        let (bend_0, bend_1) = (h * slope[i] - rise, h * slope[i + 1] - rise);
-        lerp(y, p) + u * (1.0 - u) * ((1.0 - u) * bend_0 - u * bend_1)
-    }
 }
 
 /// A grid point this close to a time stamp, in grid steps, is on it: rounding of t · f_s.
 const ROUNDING_TICKS: f64 = 1e-6;
 
-/// Adds the grid point that coincides with time stamp `index`, if there is one and it is new.
-fn push_on_stamp(points: &mut Vec<Point>, index: usize, offset_s: f64, rate_hz: f64) {
-    let ticks = offset_s * rate_hz;
-    let tick = ticks.round() as usize;
-    let is_new = points.last().is_none_or(|p| p.tick < tick);
-    if (ticks - ticks.round()).abs() <= ROUNDING_TICKS && is_new {
-        points.push(Point { tick, left: index, u: 0.0 });
+/// Adds the grid point that coincides with time stamp `index`, `after` ticks from the first, if there is one and it is
+/// new.
+fn push_on_stamp(ticks: &mut Vec<usize>, places: &mut Vec<Bracket>, index: usize, after: f64) {
+    let tick = after.round() as usize;
+    let is_new = ticks.last().is_none_or(|last| *last < tick);
+    if (after - after.round()).abs() <= ROUNDING_TICKS && is_new {
+        ticks.push(tick);
+        places.push(Bracket { left: index, u: 0.0 });
     }
 }
 
@@ -246,43 +161,6 @@ fn close_segment(segments: &mut Vec<Range<usize>>, start: &mut usize, end: usize
         segments.push(*start..end);
     }
     *start = end;
-}
-
-fn lerp(y: &[f64], p: &Point) -> f64 {
-    if p.u == 0.0 { y[p.left] } else { y[p.left] + p.u * (y[p.left + 1] - y[p.left]) }
-}
-
-fn monotone_slopes(t: &[f64], y: &[f64]) -> Vec<f64> {
-    let n = y.len();
-    let step = |i: usize| t[i + 1] - t[i];
-    let secant = |i: usize| (y[i + 1] - y[i]) / step(i);
-    if n == 2 {
-        return vec![secant(0); 2];
-    }
-    let inner = |i: usize| {
-        let (left, right) = (secant(i - 1), secant(i));
-        if left * right <= 0.0 {
-            return 0.0;
-        }
-        let (w1, w2) = (2.0 * step(i) + step(i - 1), step(i) + 2.0 * step(i - 1));
-        (w1 + w2) / (w1 / left + w2 / right)
-    };
-    // Three-point formula at the ends, limited so that the curve keeps to the samples' side.
-    let end = |h0: f64, h1: f64, d0: f64, d1: f64| {
-        let slope = ((2.0 * h0 + h1) * d0 - h0 * d1) / (h0 + h1);
-        if slope * d0 <= 0.0 {
-            0.0
-        } else if d0 * d1 <= 0.0 && slope.abs() > 3.0 * d0.abs() {
-            3.0 * d0
-        } else {
-            slope
-        }
-    };
-    let mut slopes = Vec::with_capacity(n);
-    slopes.push(end(step(0), step(1), secant(0), secant(1)));
-    slopes.extend((1..n - 1).map(inner));
-    slopes.push(end(step(n - 2), step(n - 3), secant(n - 2), secant(n - 3)));
-    slopes
 }
 
 #[cfg(test)]
@@ -298,7 +176,7 @@ mod tests {
         let grid = Resampler::new(&time_s, 125.0, 0.1).unwrap();
         assert_eq!(grid.samples(), 1000);
         assert_eq!(grid.segments(), std::slice::from_ref(&(0..1000)));
-        for (k, v) in grid.linear(&y).unwrap().iter().enumerate() {
+        for (k, v) in grid.instants().linear(&y).unwrap().iter().enumerate() {
             // Time stamps at 838 s are rounded to 1e-13 s.
             assert!((v - y[k]).abs() < 1e-9);
         }
@@ -314,7 +192,7 @@ mod tests {
             let values: Vec<f64> = t.iter().map(|t| q(*t)).collect();
             let slopes: Vec<f64> = t.iter().map(|t| qd(*t)).collect();
             let grid = Resampler::new(&t, 1000.0, 1.0).unwrap();
-            let y = grid.hermite(&values, &slopes).unwrap();
+            let y = grid.instants().hermite(&values, &slopes).unwrap();
             y.iter().zip(grid.time_s()).map(|(y, t)| (y - q(t)).abs()).fold(0.0, f64::max)
         };
         assert!(worst(0.04, |t| t * t * t - t, |t| 3.0 * t * t - 1.0) < 1e-12);
@@ -335,7 +213,7 @@ mod tests {
         assert!((grid.gaps()[0].start_s - 5.39).abs() < 1e-12);
         assert!((grid.gaps()[0].end_s - 5.60).abs() < 1e-12);
         assert_eq!(grid.segments(), [0..40, 40..80]);
-        for (t, v) in grid.time_s().iter().zip(grid.linear(&y).unwrap()) {
+        for (t, v) in grid.time_s().iter().zip(grid.instants().linear(&y).unwrap()) {
             assert!((v - 2.0 * t).abs() < 1e-12);
             assert!(*t < 5.391 || *t > 5.599, "a sample was invented at {t} s");
         }

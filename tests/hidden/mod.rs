@@ -1,15 +1,18 @@
 //! A drivetrain with one hidden effect, and the log of the arm behind it.
 
+use std::ops::Range;
+
 use armid::base::{BaseSet, Parameterisation};
 use armid::diagnose::{Diagnoser, Finding};
 use armid::dynamics::Model;
 use armid::excitation::{Excitation, FourierSeries};
 use armid::identify::{Measurement, Options};
 use armid::plant::{
-    Drivetrain, Measured, PerJoint, Plant, PlantConfig, RapierArm, SensorConfig, Sensors, Stage,
+    Drivetrain, Measured, PerJoint, Plant, PlantConfig, RapierArm, Recording, SensorConfig,
+    Sensors, Stage,
 };
 use armid::random::TrialStreams;
-use armid::robot::Arm;
+use armid::robot::{Arm, JointSignals};
 
 /// What is hidden.
 #[derive(Debug, Clone, Copy)]
@@ -34,6 +37,10 @@ pub enum Law {
         height_nm: f64,
         per_turn: f64,
     },
+    /// Torque that is read so many milliseconds before the rest of its row.
+    Late {
+        ms: usize,
+    },
 }
 
 /// A hidden effect and where it sits.
@@ -42,11 +49,17 @@ pub struct Hidden {
     law: Law,
     periods: usize,
     log_rate_hz: f64,
+    lost_rows: Vec<Range<usize>>,
 }
 
 impl Hidden {
     pub fn on(joint: usize, law: Law) -> Self {
-        Self { joint, law, periods: 8, log_rate_hz: 125.0 }
+        Self { joint, law, periods: 8, log_rate_hz: 125.0, lost_rows: Vec::new() }
+    }
+
+    /// The recorder drops these rows.
+    pub fn without_rows(self, lost_rows: &[Range<usize>]) -> Self {
+        Self { lost_rows: lost_rows.to_vec(), ..self }
     }
 
     pub fn logged_at(self, log_rate_hz: f64) -> Self {
@@ -63,8 +76,10 @@ impl Hidden {
             Law::Dahl { stiffness_per_rad } if stiffness_per_rad > 1000.0 => 0.00025,
             _ => PlantConfig::default().step_s,
         };
-        let config =
-            PlantConfig { log_rate_hz: self.log_rate_hz, step_s, ..PlantConfig::default() };
+        // Delays are whole rows of a log of 1 kHz.
+        let log_rate_hz =
+            if matches!(self.law, Law::Late { .. }) { 1000.0 } else { self.log_rate_hz };
+        let config = PlantConfig { log_rate_hz, step_s, ..PlantConfig::default() };
         let law = HiddenLaw::new(&arm, self.joint, self.law);
         let mut plant = Plant::with_drivetrain(
             &arm,
@@ -88,13 +103,20 @@ impl Hidden {
                 *t += height_nm * (1.0 - 4.0 * (turn - 0.5).abs());
             }
         }
+        if let Law::Late { ms } = self.law {
+            let torque = recording.torque_nm.joint_mut(self.joint);
+            torque.copy_within(..torque.len() - ms, ms);
+            let every = (1000.0 / self.log_rate_hz) as usize;
+            recording = only_rows(recording, |k| k % every == 0);
+        }
+        recording = only_rows(recording, |k| !self.lost_rows.iter().any(|lost| lost.contains(&k)));
         let sensors = SensorConfig {
             torque_sd_nm: PerJoint::Each(vec![1.0, 1.0, 0.7, 0.15, 0.15, 0.15]),
             q_sd_rad: PerJoint::All(2e-5),
             qd_sd_rad_s: PerJoint::All(1e-3),
             ..SensorConfig::default()
         };
-        let sensors = Sensors::new(&sensors, &arm, config.log_rate_hz).unwrap();
+        let sensors = Sensors::new(&sensors, &arm, self.log_rate_hz).unwrap();
         let mut measured = Measured::like(&recording);
         sensors.measure(&recording, &TrialStreams::new(seed, b"hidden", 0), &mut measured);
         let model = Model::new(&arm);
@@ -109,6 +131,21 @@ impl Hidden {
             torque_nm: &measured.torque_nm,
         };
         diagnoser.diagnose(&measurement, &[], None).unwrap()
+    }
+}
+
+/// The rows of `recording` that are `kept`.
+fn only_rows(recording: Recording, kept: impl Fn(usize) -> bool) -> Recording {
+    let rows: Vec<usize> = (0..recording.time_s.len()).filter(|k| kept(*k)).collect();
+    let of = |signals: &JointSignals| {
+        JointSignals::from_fn(signals.joints(), rows.len(), |j, k| signals.joint(j)[rows[k]])
+    };
+    Recording {
+        time_s: rows.iter().map(|k| recording.time_s[*k]).collect(),
+        q_rad: of(&recording.q_rad),
+        qd_rad_s: of(&recording.qd_rad_s),
+        torque_nm: of(&recording.torque_nm),
+        ..recording
     }
 }
 
@@ -184,7 +221,7 @@ impl Drivetrain for HiddenLaw {
                 let carried = self.link_nm[h] / (1.0 + mu * sign * self.link_nm[h].signum());
                 self.link_nm[h] = carried;
             }
-            Law::CutBeforeNoise { .. } | Law::ZigzagOfTheCurrent { .. } => {}
+            Law::CutBeforeNoise { .. } | Law::ZigzagOfTheCurrent { .. } | Law::Late { .. } => {}
             Law::Dahl { stiffness_per_rad } => {
                 let z = stage.states[0];
                 states_rate[0] = stiffness_per_rad * (v - v.abs() * z);

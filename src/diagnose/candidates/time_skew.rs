@@ -5,10 +5,6 @@ use super::*;
 /// See the module.
 pub struct TimeSkew;
 
-/// Standard error of the law beside that of the noise, over the delay: most likely for the errors of the delays named in
-/// 72 arms, which are 1.26 σ in rms without it and 1.0 with it.
-const FORM_ERROR: f64 = 0.035;
-
 impl Candidate for TimeSkew {
     fn kind(&self) -> Kind {
         Kind::TimeSkew
@@ -53,10 +49,6 @@ impl Candidate for TimeSkew {
 
     fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
         vec![quantity("delay_s", b[0], "s")]
-    }
-
-    fn form_error(&self, _: &Scene, _: Shape) -> f64 {
-        FORM_ERROR
     }
 
     fn separating_experiment(&self) -> &'static str {

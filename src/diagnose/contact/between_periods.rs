@@ -69,7 +69,7 @@ pub fn between_periods(
     if grid.segments() != [whole] {
         return Ok(None);
     }
-    let q_rad = grid.angles(m.q_rad, m.qd_rad_s)?;
+    let q_rad = grid.instants().angles(m.q_rad, m.qd_rad_s)?;
     let Some(found) = find_period(&q_rad)? else { return Ok(None) };
     let period = found.refined_samples;
     let edge = (EDGE_S * rate_hz) as usize;
@@ -78,14 +78,14 @@ pub fn between_periods(
         return Ok(None);
     }
     let joints: Vec<usize> = (0..m.torque_nm.joints()).filter(|j| !left_out.contains(j)).collect();
-    let torque_nm = grid.straight(m.torque_nm)?;
+    let torque_nm = grid.instants().straight(m.torque_nm)?;
     let mut repeats = Repeats { torque_nm, joints, window, period, rate_hz, drift: None };
     let time_s = grid.time_s();
     let mut touches: Vec<Touch> = Vec::new();
     let mut known: Vec<Push> = Vec::new();
     let mut aside = vec![false; time_s.len()];
     if repeats.search(&aside, &known, &touches)?.is_some() {
-        let qd_rad_s = grid.smooth(m.qd_rad_s)?.slice(repeats.window.clone());
+        let qd_rad_s = grid.instants().smooth(m.qd_rad_s)?.slice(repeats.window.clone());
         repeats.drift = Some(FrictionDrift::beside_others(qd_rad_s, period));
     }
     while touches.len() < MOST

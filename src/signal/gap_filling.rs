@@ -1,0 +1,266 @@
+//! Rows for the gaps of a log whose motion repeats: what the arm did there it did in the other periods as well.
+//!
+//! A gap too long to be interpolated would end the record, and of a log with five of them a fifth would be used. Where
+//! the motion repeats, every missing row becomes the mean of the rows at its phase in the periods that have them. It is what
+//! averaging over periods takes a period without that row for, so that it moves no estimate; the scatter between periods
+//! becomes too small by the share of rows that are filled in, a tenth at most.
+
+use super::error::SignalError;
+use super::instants::Instants;
+use super::period::find_period;
+use super::resample::{Gap, Resampler, bridged_gap_s, gaps, natural_rate_hz};
+use crate::robot::JointSignals;
+
+/// Shorter gaps, in usual steps, are for straight lines. Longer ones hold the reversal of a joint, and a straight line
+/// across it stands out beside the other periods as a touch does.
+const SHORT_STEPS: f64 = 2.5;
+/// More of a log is not filled in, as a share of its rows.
+const MOST: f64 = 0.1;
+/// Shorter logs show no period.
+const FEWEST_ROWS: usize = 64;
+/// Other periods whose rows make one: the scatter between two periods of which one is a copy would be none.
+const FEWEST: usize = 2;
+/// How far an arm may be from where the other periods have it at both ends of a gap, over the rms of its angle about
+/// the mean: else it waited in the gap, or was driven elsewhere.
+const REPEATS_WITHIN: f64 = 0.02;
+
+/// A log with rows in its gaps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Filled {
+    /// Time, s.
+    pub time_s: Vec<f64>,
+    /// Angles, rad.
+    pub q_rad: JointSignals,
+    /// Velocities, rad/s.
+    pub qd_rad_s: JointSignals,
+    /// Torques, Nm.
+    pub torque_nm: JointSignals,
+    /// The gaps that have rows now.
+    pub gaps: Vec<Gap>,
+}
+
+impl Filled {
+    /// What a user should know.
+    pub fn warning(&self) -> String {
+        let length_s = |gap: &Gap| gap.end_s - gap.start_s;
+        let longest = self.gaps.iter().max_by(|a, b| length_s(a).total_cmp(&length_s(b)));
+        let from = longest.map_or_else(String::new, |gap| {
+            format!(", the longest of {:.3} s from {:.2} s on", length_s(gap), gap.start_s)
+        });
+        format!(
+            "{} gaps without samples, {:.2} s in all{from}: the mean of the other periods takes their place",
+            self.gaps.len(),
+            self.gaps.iter().map(length_s).sum::<f64>()
+        )
+    }
+}
+
+/// `None` where nothing is missing for longer than what is interpolated, or where the other periods cannot tell.
+///
+/// Errors: time that does not increase, values that are not finite.
+pub fn fill_gaps(
+    time_s: &[f64],
+    q_rad: &JointSignals,
+    qd_rad_s: &JointSignals,
+    torque_nm: &JointSignals,
+) -> Result<Option<Filled>, SignalError> {
+    if time_s.len() < FEWEST_ROWS {
+        return Ok(None);
+    }
+    let rate_hz = natural_rate_hz(time_s)?;
+    let found = gaps(time_s, SHORT_STEPS / rate_hz);
+    let missing_s: f64 = found.iter().map(|gap| gap.end_s - gap.start_s).sum();
+    if found.is_empty() || missing_s > MOST * (time_s[time_s.len() - 1] - time_s[0]) {
+        return Ok(None);
+    }
+    let angles = |longest_gap_s: f64| {
+        let grid = Resampler::new(time_s, rate_hz, longest_gap_s)?;
+        let longest = grid.segments().iter().max_by_key(|s| s.len()).cloned().unwrap_or(0..0);
+        Ok::<_, SignalError>(grid.instants().angles(q_rad, qd_rad_s)?.slice(longest))
+    };
+    // What is interpolated across a long gap may not repeat, and the longest stretch may be too short.
+    let bridged = angles(f64::INFINITY)?;
+    let mut period = find_period(&bridged)?;
+    if period.is_none() {
+        let longest = angles(bridged_gap_s(rate_hz))?;
+        period = if longest.samples() < FEWEST_ROWS { None } else { find_period(&longest)? };
+    }
+    let Some(period) = period else { return Ok(None) };
+    let log = Log {
+        time_s,
+        channels: [q_rad, qd_rad_s, torque_nm],
+        gaps: &found,
+        period_s: period.refined_samples / rate_hz,
+        tolerance_rad: (0..q_rad.joints()).map(|j| REPEATS_WITHIN * sd(bridged.joint(j))).collect(),
+    };
+    let patches: Vec<Patch> = found
+        .iter()
+        .filter_map(|gap| log.patch(gap, rate_hz).transpose())
+        .collect::<Result<_, _>>()?;
+    Ok((!patches.is_empty()).then(|| log.with(patches)))
+}
+
+/// Rows for one gap.
+struct Patch {
+    gap: Gap,
+    time_s: Vec<f64>,
+    /// Angles, velocities, torques.
+    channels: [JointSignals; 3],
+}
+
+struct Log<'a> {
+    time_s: &'a [f64],
+    /// Angles, velocities, torques.
+    channels: [&'a JointSignals; 3],
+    gaps: &'a [Gap],
+    period_s: f64,
+    /// How far off an angle may be that repeats, per joint.
+    tolerance_rad: Vec<f64>,
+}
+
+impl Log<'_> {
+    /// What the other periods have in `gap`.
+    fn patch(&self, gap: &Gap, rate_hz: f64) -> Result<Option<Patch>, SignalError> {
+        let steps = ((gap.end_s - gap.start_s) * rate_hz).round().max(1.0) as usize;
+        let way = (gap.end_s - gap.start_s) / steps as f64;
+        let instants: Vec<f64> = (0..=steps).map(|i| gap.start_s + i as f64 * way).collect();
+        let (first, last) = (self.time_s[0], self.time_s[self.time_s.len() - 1]);
+        let before = ((gap.start_s - first) / self.period_s).floor() as i64;
+        let after = ((last - gap.end_s) / self.period_s).floor() as i64;
+        let mut sum =
+            [(); 3].map(|()| JointSignals::zeros(self.tolerance_rad.len(), instants.len()));
+        let mut periods = 0_usize;
+        for shift in (-before..=after).filter(|shift| *shift != 0) {
+            let shift_s = shift as f64 * self.period_s;
+            let [start_s, end_s] = [gap.start_s + shift_s, gap.end_s + shift_s];
+            if self.gaps.iter().any(|other| other.start_s < end_s && start_s < other.end_s) {
+                continue;
+            }
+            let there = Instants::new(self.time_s, instants.iter().map(|t| t + shift_s))?;
+            let [q_rad, qd_rad_s, torque_nm] = self.channels;
+            let values = [
+                there.angles(q_rad, qd_rad_s)?,
+                there.straight(qd_rad_s)?,
+                there.straight(torque_nm)?,
+            ];
+            for (sum, values) in sum.iter_mut().zip(&values) {
+                for j in 0..sum.joints() {
+                    let both = sum.joint_mut(j).iter_mut().zip(values.joint(j));
+                    both.for_each(|(sum, value)| *sum += value);
+                }
+            }
+            periods += 1;
+        }
+        let mean = |sum: &JointSignals| {
+            sum.map_joints(|_, y| y.iter().map(|v| v / periods as f64).collect())
+        };
+        let channels = sum.each_ref().map(mean);
+        let repeats = [(0, gap.start_s), (steps, gap.end_s)].into_iter().all(|(i, t)| {
+            let k = self.time_s.partition_point(|s| *s < t);
+            let off = |j: usize| (channels[0].joint(j)[i] - self.channels[0].joint(j)[k]).abs();
+            self.tolerance_rad.iter().enumerate().all(|(j, tolerance)| off(j) <= *tolerance)
+        });
+        if periods < FEWEST || !repeats {
+            return Ok(None);
+        }
+        let inner = 1..steps;
+        Ok(Some(Patch {
+            gap: *gap,
+            time_s: instants[inner.clone()].to_vec(),
+            channels: channels.map(|signals| signals.slice(inner.clone())),
+        }))
+    }
+
+    fn with(&self, patches: Vec<Patch>) -> Filled {
+        // Where each row comes from: the log, or a patch; and its number there.
+        let mut rows: Vec<(Option<&Patch>, usize)> = Vec::with_capacity(self.time_s.len());
+        let mut next = patches.iter().peekable();
+        for (k, t) in self.time_s.iter().enumerate() {
+            rows.push((None, k));
+            if let Some(patch) = next.next_if(|patch| patch.gap.start_s <= *t) {
+                rows.extend((0..patch.time_s.len()).map(|i| (Some(patch), i)));
+            }
+        }
+        let of = |channel: usize| {
+            let whole = self.channels[channel];
+            JointSignals::from_fn(whole.joints(), rows.len(), |j, row| match rows[row] {
+                (None, k) => whole.joint(j)[k],
+                (Some(patch), i) => patch.channels[channel].joint(j)[i],
+            })
+        };
+        let time =
+            |(patch, i): &(Option<&Patch>, usize)| patch.map_or(self.time_s, |p| &p.time_s)[*i];
+        Filled {
+            time_s: rows.iter().map(time).collect(),
+            q_rad: of(0),
+            qd_rad_s: of(1),
+            torque_nm: of(2),
+            gaps: patches.iter().map(|patch| patch.gap).collect(),
+        }
+    }
+}
+
+/// Root of the mean square about the mean.
+fn sd(y: &[f64]) -> f64 {
+    let mean = y.iter().sum::<f64>() / y.len() as f64;
+    (y.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / y.len() as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RATE_HZ: f64 = 100.0;
+    const PERIOD_S: f64 = 2.0;
+    const ROWS: usize = 1000;
+
+    /// One joint in a dance of 2 s, for 10 s, without the rows `left_out`; behind `paused` it comes a tenth of a second later.
+    fn log(left_out: &[std::ops::Range<usize>], paused: usize) -> (Vec<f64>, [JointSignals; 3]) {
+        let kept: Vec<usize> =
+            (0..ROWS).filter(|k| !left_out.iter().any(|gap| gap.contains(k))).collect();
+        let w = std::f64::consts::TAU / PERIOD_S;
+        let phase = |k: usize| w * (k as f64 / RATE_HZ - if k > paused { 0.1 } else { 0.0 });
+        let of =
+            |f: &dyn Fn(f64) -> f64| JointSignals::from_fn(1, kept.len(), |_, i| f(phase(kept[i])));
+        let channels = [
+            of(&|x| x.sin() + 0.3 * (2.0 * x).cos()),
+            of(&|x| w * (x.cos() - 0.6 * (2.0 * x).sin())),
+            of(&|x| 5.0 * (3.0 * x).sin()),
+        ];
+        (kept.iter().map(|k| *k as f64 / RATE_HZ).collect(), channels)
+    }
+
+    fn filled(left_out: &[std::ops::Range<usize>], paused: usize) -> Option<Filled> {
+        let (time_s, [q, qd, torque]) = log(left_out, paused);
+        fill_gaps(&time_s, &q, &qd, &torque).unwrap()
+    }
+
+    #[test]
+    fn what_the_other_periods_have_is_put_in() {
+        let gaps = [130..150, 517..560];
+        let filled = filled(&gaps, ROWS).unwrap();
+        let (time_s, whole) = log(&[], ROWS);
+        assert_eq!(filled.gaps.len(), 2);
+        assert_eq!(filled.time_s.len(), time_s.len());
+        // The period is known to 1e-3 of a row, within which the torque changes by 5·3·π·1e-5 Nm.
+        for (signals, whole) in [filled.q_rad, filled.qd_rad_s, filled.torque_nm].iter().zip(&whole)
+        {
+            let off = signals.joint(0).iter().zip(whole.joint(0)).map(|(a, b)| (a - b).abs());
+            assert!(off.fold(0.0, f64::max) < 1e-3);
+        }
+        let off = filled.time_s.iter().zip(&time_s).map(|(a, b)| (a - b).abs());
+        assert!(off.fold(0.0, f64::max) < 1e-9);
+    }
+
+    #[test]
+    fn nothing_is_invented() {
+        // Short enough for a straight line; too much; an arm that waited meanwhile.
+        assert_eq!(filled(&[130..131], ROWS), None);
+        assert_eq!(filled(&[130..150, 300..400], ROWS), None);
+        assert_eq!(filled(&[500..530], 515), None);
+        // Four others have the first gap, and one what is missing in four of five periods.
+        let gaps = [105..118, 220..233, 420..433, 620..633, 820..833];
+        let filled = filled(&gaps, ROWS).unwrap();
+        assert_eq!(filled.gaps.len(), 1);
+    }
+}

@@ -1,0 +1,157 @@
+//! Values of signals between the time stamps of a log.
+
+use super::error::{SignalError, same};
+use super::resample::check_time;
+use crate::robot::JointSignals;
+
+/// Where an instant lies: the row before it, and the share of the way to the next row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bracket {
+    /// Row at or before the instant.
+    pub left: usize,
+    /// 0 at that row, below 1.
+    pub u: f64,
+}
+
+/// Instants between the time stamps of a log; applies to any number of signals.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Instants {
+    source_s: Vec<f64>,
+    places: Vec<Bracket>,
+}
+
+impl Instants {
+    /// `instants` from the first to the last of the strictly increasing `time_s`.
+    pub fn new(time_s: &[f64], instants: impl Iterator<Item = f64>) -> Result<Self, SignalError> {
+        check_time(time_s)?;
+        let last = time_s.len() - 1;
+        let place = |t: f64| match time_s.partition_point(|s| *s <= t) {
+            0 => Bracket { left: 0, u: 0.0 },
+            right if right > last => Bracket { left: last, u: 0.0 },
+            right => {
+                let step_s = time_s[right] - time_s[right - 1];
+                Bracket { left: right - 1, u: (t - time_s[right - 1]) / step_s }
+            }
+        };
+        Ok(Self { places: instants.map(place).collect(), source_s: time_s.to_vec() })
+    }
+
+    /// With places that are known.
+    pub(super) fn of(source_s: Vec<f64>, places: Vec<Bracket>) -> Self {
+        Self { source_s, places }
+    }
+
+    /// Where they lie among the time stamps.
+    pub fn places(&self) -> &[Bracket] {
+        &self.places
+    }
+
+    /// Straight lines between the time stamps: for signals that jump, such as currents.
+    pub fn linear(&self, y: &[f64]) -> Result<Vec<f64>, SignalError> {
+        self.check(y)?;
+        Ok(self.places.iter().map(|p| lerp(y, p)).collect())
+    }
+
+    /// Piecewise cubic with the known slope at every time stamp: for angles with their velocity.
+    ///
+    /// Error for a smooth y: at most step⁴/384 · max|y⁗|.
+    pub fn hermite(&self, y: &[f64], slope_per_s: &[f64]) -> Result<Vec<f64>, SignalError> {
+        self.check(y)?;
+        self.check(slope_per_s)?;
+        Ok(self.places.iter().map(|p| self.cubic(y, slope_per_s, p)).collect())
+    }
+
+    /// Piecewise cubic that never overshoots its samples: for smooth signals without known slope.
+    ///
+    /// Slopes are the weighted harmonic mean of the neighbouring differences, zero at extrema
+    /// (F. Fritsch and J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300–304).
+    pub fn monotone(&self, y: &[f64]) -> Result<Vec<f64>, SignalError> {
+        self.check(y)?;
+        let slopes = monotone_slopes(&self.source_s, y);
+        Ok(self.places.iter().map(|p| self.cubic(y, &slopes, p)).collect())
+    }
+
+    /// Angles by [`Self::hermite`] with their velocities as slopes.
+    pub fn angles(
+        &self,
+        q_rad: &JointSignals,
+        qd_rad_s: &JointSignals,
+    ) -> Result<JointSignals, SignalError> {
+        same("joints of angle and velocity", q_rad.joints(), qd_rad_s.joints())?;
+        self.all_joints(q_rad, |j, q| self.hermite(q, qd_rad_s.joint(j)))
+    }
+
+    /// Every joint by [`Self::monotone`].
+    pub fn smooth(&self, y: &JointSignals) -> Result<JointSignals, SignalError> {
+        self.all_joints(y, |_, series| self.monotone(series))
+    }
+
+    /// Every joint by [`Self::linear`].
+    pub fn straight(&self, y: &JointSignals) -> Result<JointSignals, SignalError> {
+        self.all_joints(y, |_, series| self.linear(series))
+    }
+
+    fn all_joints(
+        &self,
+        y: &JointSignals,
+        f: impl Fn(usize, &[f64]) -> Result<Vec<f64>, SignalError>,
+    ) -> Result<JointSignals, SignalError> {
+        let mut out = JointSignals::zeros(y.joints(), self.places.len());
+        for j in 0..y.joints() {
+            out.joint_mut(j).copy_from_slice(&f(j, y.joint(j))?);
+        }
+        Ok(out)
+    }
+
+    fn check(&self, y: &[f64]) -> Result<(), SignalError> {
+        same("values for the time stamps", self.source_s.len(), y.len())
+    }
+
+    fn cubic(&self, y: &[f64], slope: &[f64], p: &Bracket) -> f64 {
+        if p.u == 0.0 {
+            return y[p.left];
+        }
+        let (i, u) = (p.left, p.u);
+        let h = self.source_s[i + 1] - self.source_s[i];
+        let rise = y[i + 1] - y[i];
+        let (bend_0, bend_1) = (h * slope[i] - rise, h * slope[i + 1] - rise);
+        lerp(y, p) + u * (1.0 - u) * ((1.0 - u) * bend_0 - u * bend_1)
+    }
+}
+
+fn lerp(y: &[f64], p: &Bracket) -> f64 {
+    if p.u == 0.0 { y[p.left] } else { y[p.left] + p.u * (y[p.left + 1] - y[p.left]) }
+}
+
+fn monotone_slopes(t: &[f64], y: &[f64]) -> Vec<f64> {
+    let n = y.len();
+    let step = |i: usize| t[i + 1] - t[i];
+    let secant = |i: usize| (y[i + 1] - y[i]) / step(i);
+    if n == 2 {
+        return vec![secant(0); 2];
+    }
+    let inner = |i: usize| {
+        let (left, right) = (secant(i - 1), secant(i));
+        if left * right <= 0.0 {
+            return 0.0;
+        }
+        let (w1, w2) = (2.0 * step(i) + step(i - 1), step(i) + 2.0 * step(i - 1));
+        (w1 + w2) / (w1 / left + w2 / right)
+    };
+    // Three-point formula at the ends, limited so that the curve keeps to the samples' side.
+    let end = |h0: f64, h1: f64, d0: f64, d1: f64| {
+        let slope = ((2.0 * h0 + h1) * d0 - h0 * d1) / (h0 + h1);
+        if slope * d0 <= 0.0 {
+            0.0
+        } else if d0 * d1 <= 0.0 && slope.abs() > 3.0 * d0.abs() {
+            3.0 * d0
+        } else {
+            slope
+        }
+    };
+    let mut slopes = Vec::with_capacity(n);
+    slopes.push(end(step(0), step(1), secant(0), secant(1)));
+    slopes.extend((1..n - 1).map(inner));
+    slopes.push(end(step(n - 2), step(n - 3), secant(n - 2), secant(n - 3)));
+    slopes
+}
