@@ -208,6 +208,8 @@ fn sd(y: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use std::slice::from_ref;
+
     use super::*;
 
     const RATE_HZ: f64 = 100.0;
@@ -255,9 +257,9 @@ mod tests {
     #[test]
     fn nothing_is_invented() {
         // Short enough for a straight line; too much; an arm that waited meanwhile.
-        assert_eq!(filled(&[130..131], ROWS), None);
+        assert_eq!(filled(from_ref(&(130..131)), ROWS), None);
         assert_eq!(filled(&[130..150, 300..400], ROWS), None);
-        assert_eq!(filled(&[500..530], 515), None);
+        assert_eq!(filled(from_ref(&(500..530)), 515), None);
         // Four others have the first gap, and one what is missing in four of five periods.
         let gaps = [105..118, 220..233, 420..433, 620..633, 820..833];
         let filled = filled(&gaps, ROWS).unwrap();
