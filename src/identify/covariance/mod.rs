@@ -121,7 +121,7 @@ pub enum CovarianceError {
     },
     /// Needs a longer record.
     #[error(
-        "{seconds:.1} s of data are too short for a σ from blocks of time; at least {needed_s} s are needed"
+        "{seconds:.1} s of motion without a gap are too short for a σ from blocks of time; at least {needed_s} s are needed"
     )]
     TooShort {
         /// Length of the record, s.
