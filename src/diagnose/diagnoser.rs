@@ -88,7 +88,7 @@ impl<'a> Diagnoser<'a> {
         let Faults { causes: mut faults, record, warning } = data_faults::find(m)?;
         let m = &record.measurement(m.source);
         let coarse = data_faults::coarse_joints(&faults);
-        // Across a mended stall torques are straight lines, which differ from period to period.
+        // Across a short mended stall torques are straight lines, which differ from period to period.
         let is_mended = faults.iter().any(|fault| fault.kind == Kind::ClockFault);
         let touched = if is_mended { None } else { contact::between_periods(m, &coarse)? };
         let torque_nm = touched.as_ref().map_or(m.torque_nm, |t| &t.torque_nm);

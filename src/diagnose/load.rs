@@ -10,7 +10,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use realfft::num_complex::Complex64;
 
 use super::extension::mean_period;
-use super::reversal_answer::{ReversalAnswer, TorqueHarmonic};
+use super::reversal_answer::{FASTEST_HZ, ReversalAnswer, TorqueHarmonic};
 use crate::dynamics::{
     LANES, Lanes, Model, Motion, Real, Workspace, rigid_torque, with_widest_registers,
 };
@@ -264,9 +264,6 @@ impl Harmonics {
         clock.filtered(y, |h| if is_rest(h) { Complex64::ONE } else { Complex64::ZERO })
     }
 }
-
-/// Faster than this, Hz, drives are not looked at: delays of 8 ms tell nothing beyond half their rate.
-const FASTEST_HZ: f64 = 60.0;
 
 /// The last harmonic in which drives are looked at.
 fn fastest(periods: &Periods) -> usize {

@@ -17,6 +17,8 @@ use crate::signal::FineClock;
 const DELAY_S: f64 = 0.008;
 /// In steps of that.
 const DELAYS: std::ops::Range<i64> = -2..4;
+/// Faster than this, Hz, drives are not looked at: delays of 8 ms tell nothing beyond half their rate.
+pub const FASTEST_HZ: f64 = 60.0;
 /// What the reversals explain of a torque over what they explain of noise. The noise of the c is in the residual of the
 /// log as well; all six shift a score by less than √(6/(6·10)) = 0.3 of its σ.
 const TOLD: f64 = 10.0;
@@ -59,7 +61,7 @@ impl ReversalAnswer {
     pub fn given_nm(&self, clock: &FineClock, late_ticks: f64) -> Vec<f64> {
         match self.coefficients(clock, late_ticks) {
             Some(c) => {
-                let signs: Vec<Vec<f64>> = self.delayed(0.0).collect();
+                let signs: Vec<Vec<f64>> = self.delayed(0.0, 1).collect();
                 let sum = |k: usize| signs.iter().zip(&c).map(|(s, c)| c * s[k]).sum::<f64>();
                 (0..self.sign.len()).map(sum).collect()
             }
@@ -69,10 +71,8 @@ impl ReversalAnswer {
 
     /// The c, Nm; `None` where the answer drowns, or where the joint hardly reverses.
     fn coefficients(&self, clock: &FineClock, late_ticks: f64) -> Option<Vec<f64>> {
-        let spectra: Vec<Vec<Complex64>> = self
-            .delayed(late_ticks)
-            .map(|s| clock.spectrum(&s.into_iter().step_by(clock.ticks()).collect::<Vec<_>>()))
-            .collect();
+        let spectra: Vec<Vec<Complex64>> =
+            self.delayed(late_ticks, clock.ticks()).map(|s| clock.spectrum(&s)).collect();
         let count = spectra.len();
         let weighted = |i: usize, y: &dyn Fn(&TorqueHarmonic) -> Complex64| -> f64 {
             let product = |h: &TorqueHarmonic| (spectra[i][h.number].conj() * y(h)).re / h.noise;
@@ -86,26 +86,22 @@ impl ReversalAnswer {
         (told > TOLD).then(|| c.as_slice().to_vec())
     }
 
-    /// s(t − iΔ − d) at every tick, by delay.
-    fn delayed(&self, late_ticks: f64) -> impl Iterator<Item = Vec<f64>> {
-        DELAYS.map(move |i| shifted(&self.sign, i as f64 * self.delay + late_ticks))
+    /// s(t − iΔ − d) at every so many ticks, by delay.
+    fn delayed(&self, late_ticks: f64, every: usize) -> impl Iterator<Item = Vec<f64>> {
+        DELAYS.map(move |i| shifted(&self.sign, i as f64 * self.delay + late_ticks, every))
     }
 }
 
-/// y(t − `ticks`) of a series that repeats, straight between its ticks.
-pub fn shifted(y: &[f64], ticks: f64) -> Vec<f64> {
+/// y(t − `ticks`) of a series that repeats, straight between its ticks, at every so many of them.
+pub fn shifted(y: &[f64], ticks: f64, every: usize) -> Vec<f64> {
     let n = y.len();
-    let (whole, u) = (-ticks.floor(), ticks - ticks.floor());
-    let mut out = y.to_vec();
-    out.rotate_left((whole as i64).rem_euclid(n.max(1) as i64) as usize);
-    if u > 0.0 {
-        let first_before = out[n - 1];
-        for k in (1..n).rev() {
-            out[k] += u * (out[k - 1] - out[k]);
-        }
-        out[0] += u * (first_before - out[0]);
-    }
-    out
+    let (whole, u) = (ticks.floor() as i64, ticks - ticks.floor());
+    let at = |k: usize| {
+        let right = (k as i64 - whole).rem_euclid(n as i64) as usize;
+        let left = if right == 0 { n - 1 } else { right - 1 };
+        y[right] + u * (y[left] - y[right])
+    };
+    (0..n).step_by(every).map(at).collect()
 }
 
 #[cfg(test)]
@@ -126,10 +122,10 @@ mod tests {
         let sign: Vec<f64> = (0..N * TICKS).map(|k| (velocity(k) / 0.03).tanh()).collect();
         let mut given = vec![0.0; N * TICKS];
         for &(share, ticks) in shares {
-            let part = shifted(&sign, ticks);
+            let part = shifted(&sign, ticks, 1);
             given.iter_mut().zip(part).for_each(|(sum, s)| *sum += 8.0 * share * s);
         }
-        let recorded: Vec<f64> = shifted(&given, late_ticks).into_iter().step_by(TICKS).collect();
+        let recorded = shifted(&given, late_ticks, TICKS);
         let mean = clock.spectrum(&recorded);
         let torque = (20..200)
             .map(|number| TorqueHarmonic { number, mean: mean[number], noise: 1e-4 })
@@ -167,8 +163,9 @@ mod tests {
     #[test]
     fn a_series_is_shifted_by_parts_of_a_tick() {
         let y = [0.0, 1.0, 4.0, 9.0];
-        assert_eq!(shifted(&y, 1.0), [9.0, 0.0, 1.0, 4.0]);
-        assert_eq!(shifted(&y, -1.0), [1.0, 4.0, 9.0, 0.0]);
-        assert_eq!(shifted(&y, 0.25), [2.25, 0.75, 3.25, 7.75]);
+        assert_eq!(shifted(&y, 1.0, 1), [9.0, 0.0, 1.0, 4.0]);
+        assert_eq!(shifted(&y, -1.0, 1), [1.0, 4.0, 9.0, 0.0]);
+        assert_eq!(shifted(&y, 0.25, 1), [2.25, 0.75, 3.25, 7.75]);
+        assert_eq!(shifted(&y, 0.25, 2), [2.25, 3.25]);
     }
 }

@@ -336,8 +336,8 @@ impl Scene {
         };
         let late_ticks = delay_s / self.instant_s();
         let at_samples = |fine: &[f64], wanted: bool| {
-            let late = shifted(fine, late_ticks);
-            let change = late.iter().zip(fine).step_by(FINE).map(|(late, now)| late - now);
+            let late = shifted(fine, late_ticks, FINE);
+            let change = late.iter().zip(fine.iter().step_by(FINE)).map(|(late, now)| late - now);
             part(&change.collect::<Vec<_>>(), wanted)
         };
         let (coulomb, viscous) = (self.coulomb_nm[j], self.arm.joints[j].drive.viscous_nm_s_rad);

@@ -91,7 +91,7 @@ impl<'a> Even<'a> {
                 gap.start_s
             ));
         }
-        let longest = grid.segments().iter().max_by_key(|s| s.len()).cloned().unwrap_or(0..0);
+        let longest = grid.longest_segment();
         let cut = |signals: JointSignals| Cow::Owned(signals.slice(longest.clone()));
         self.start_s = grid.time_s()[longest.start];
         self.q_rad = cut(grid.instants().angles(m.q_rad, m.qd_rad_s)?);

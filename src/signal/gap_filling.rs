@@ -7,7 +7,7 @@
 
 use super::error::SignalError;
 use super::instants::Instants;
-use super::period::find_period;
+use super::period::{find_period, variance_of};
 use super::resample::{Gap, Resampler, bridged_gap_s, gaps, natural_rate_hz};
 use crate::robot::JointSignals;
 
@@ -64,7 +64,7 @@ pub fn fill_gaps(
     qd_rad_s: &JointSignals,
     torque_nm: &JointSignals,
 ) -> Result<Option<Filled>, SignalError> {
-    if time_s.len() < FEWEST_ROWS {
+    if time_s.len() < FEWEST_ROWS || is_even(time_s) {
         return Ok(None);
     }
     let rate_hz = natural_rate_hz(time_s)?;
@@ -75,8 +75,8 @@ pub fn fill_gaps(
     }
     let angles = |longest_gap_s: f64| {
         let grid = Resampler::new(time_s, rate_hz, longest_gap_s)?;
-        let longest = grid.segments().iter().max_by_key(|s| s.len()).cloned().unwrap_or(0..0);
-        Ok::<_, SignalError>(grid.instants().angles(q_rad, qd_rad_s)?.slice(longest))
+        let angles = grid.instants().angles(q_rad, qd_rad_s)?;
+        Ok::<_, SignalError>(angles.slice(grid.longest_segment()))
     };
     // What is interpolated across a long gap may not repeat, and the longest stretch may be too short.
     let bridged = angles(f64::INFINITY)?;
@@ -91,13 +91,26 @@ pub fn fill_gaps(
         channels: [q_rad, qd_rad_s, torque_nm],
         gaps: &found,
         period_s: period.refined_samples / rate_hz,
-        tolerance_rad: (0..q_rad.joints()).map(|j| REPEATS_WITHIN * sd(bridged.joint(j))).collect(),
+        tolerance_rad: (0..q_rad.joints())
+            .map(|j| REPEATS_WITHIN * variance_of(bridged.joint(j)).sqrt())
+            .collect(),
     };
     let patches: Vec<Patch> = found
         .iter()
         .filter_map(|gap| log.patch(gap, rate_hz).transpose())
         .collect::<Result<_, _>>()?;
     Ok((!patches.is_empty()).then(|| log.with(patches)))
+}
+
+/// Whether no step is a gap beside the shortest one, and so none beside the usual one: most logs, of which thousands may
+/// be looked at in a row.
+fn is_even(time_s: &[f64]) -> bool {
+    let ends = |[least, most]: [f64; 2], t: &[f64]| {
+        let step_s = t[1] - t[0];
+        [least.min(step_s), most.max(step_s)]
+    };
+    let [least_s, most_s] = time_s.windows(2).fold([f64::INFINITY, f64::NEG_INFINITY], ends);
+    most_s <= SHORT_STEPS * least_s
 }
 
 /// Rows for one gap.
@@ -198,12 +211,6 @@ impl Log<'_> {
             gaps: patches.iter().map(|patch| patch.gap).collect(),
         }
     }
-}
-
-/// Root of the mean square about the mean.
-fn sd(y: &[f64]) -> f64 {
-    let mean = y.iter().sum::<f64>() / y.len() as f64;
-    (y.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / y.len() as f64).sqrt()
 }
 
 #[cfg(test)]

@@ -391,7 +391,8 @@ fn blocks(count: usize, length: usize) -> impl Iterator<Item = Range<usize>> {
     })
 }
 
-fn variance_of(y: &[f64]) -> f64 {
+/// Mean square about the mean.
+pub(super) fn variance_of(y: &[f64]) -> f64 {
     let n = y.len() as f64;
     let mean = y.iter().sum::<f64>() / n;
     y.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n

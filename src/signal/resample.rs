@@ -136,6 +136,11 @@ impl Resampler {
         &self.segments
     }
 
+    /// The segment of most samples; the last of several.
+    pub fn longest_segment(&self) -> Range<usize> {
+        self.segments.iter().max_by_key(|s| s.len()).cloned().unwrap_or(0..0)
+    }
+
     /// Gaps that were not bridged.
     pub fn gaps(&self) -> &[Gap] {
         &self.gaps
