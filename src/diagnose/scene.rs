@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 
 use realfft::num_complex::Complex64;
 
+use super::extension::mean_period;
 use super::load::{
     Delivered, LinkTorque, Loads, Periods, mass_along, rigid_torque_along, rotors_kg_m2,
 };
@@ -12,7 +13,7 @@ use super::reversal_answer::shifted;
 use super::reversals::{Bends, Turning};
 use crate::base::BaseSet;
 use crate::dynamics::{Model, Motion, Parameter, ParameterLayout};
-use crate::identify::{Prepared, drive_answers};
+use crate::identify::{Prepared, drive_answer, drive_answers};
 use crate::robot::{Arm, JointSignals};
 use crate::signal::{FineClock, central_4};
 
@@ -33,6 +34,8 @@ pub struct Scene {
     pub lead_in_s: f64,
     /// Whether the motion closes on itself.
     pub periodic: bool,
+    /// Mean angles and velocities of the periods as they were recorded, rad and rad/s.
+    recorded: Option<[JointSignals; 2]>,
     /// Torque that moves the links along the motion as it was recorded, Nm.
     recorded_nm: JointSignals,
     /// Torque that moves the links, Nm.
@@ -106,6 +109,9 @@ impl Scene {
     /// Along `prepared`, for the arm whose base parameters are `theta`.
     pub fn new(nominal: &Arm, set: &BaseSet, theta: &[f64], prepared: &Prepared) -> Self {
         let periodic = prepared.replicates.is_some();
+        let mean_of =
+            |y: &JointSignals| y.map_joints(|_, y| mean_period(y, prepared.motion.samples()));
+        let recorded = prepared.recorded.as_ref().map(|both| both.each_ref().map(mean_of));
         let motion = prepared.motion.clone();
         let (arm, offset_nm) = equivalent_arm(nominal, set, theta);
         let (joints, n) = (motion.joints(), motion.samples());
@@ -153,6 +159,7 @@ impl Scene {
             arm,
             motion,
             periodic,
+            recorded,
             recorded_nm,
             link_nm,
             load_nm,
@@ -254,7 +261,7 @@ impl Scene {
             let qd_rad_s = self.turning_rad_s(j, None, epsilon, |v| (v / epsilon).tanh());
             Instants {
                 step_s: self.instant_s(),
-                q_rad: self.fine(q),
+                q_rad: self.fine_angles_rad(j),
                 sign: qd_rad_s.iter().map(|v| (v / epsilon).tanh()).collect(),
                 qd_rad_s,
             }
@@ -287,6 +294,11 @@ impl Scene {
         };
         let bends = self.bends.get_or_init(|| Bends::new(clock));
         bends.between_samples(joint, &delivered, width_rad_s, law)
+    }
+
+    /// Change of the velocity of joint `j` within an instant per dry friction that nothing balances, rad/s.
+    pub fn kick_rad_s(&self, j: usize) -> &[f64] {
+        &self.turning(j).kick_rad_s
     }
 
     /// What bends the velocity of joint `j` where its friction turns round.
@@ -358,6 +370,17 @@ impl Scene {
         change_nm.into_iter().map(|nm| -nm * self.rate_hz).collect()
     }
 
+    /// Angles of joint `j` at `FINE` instants per sample, from those and the velocities that the samples of a motion that
+    /// repeats have in the mean: where it bends between two of them is in their difference, and in no series of harmonics
+    /// that ends before half the rate.
+    fn fine_angles_rad(&self, j: usize) -> Vec<f64> {
+        let (Some(clock), Some([q_rad, qd_rad_s])) = (&self.clock, &self.recorded) else {
+            return self.fine(self.motion.q_rad.joint(j));
+        };
+        let per_sample: Vec<f64> = qd_rad_s.joint(j).iter().map(|qd| qd / self.rate_hz).collect();
+        clock.between(q_rad.joint(j), &per_sample)
+    }
+
     /// y at `FINE` instants per sample.
     fn fine(&self, y: &[f64]) -> Vec<f64> {
         if let Some(clock) = &self.clock {
@@ -383,6 +406,15 @@ impl Scene {
     /// ([`FineClock::before_logged`]); `None` for a single run.
     pub fn before_logged(&self, y: &[f64]) -> Option<Vec<f64>> {
         Some(self.clock.as_ref()?.before_logged(y, self.highest))
+    }
+
+    /// What the samples of a log have less of a torque, given at the instants, that the drive delivers at once:
+    /// τ̃ − τ at the samples; nothing of a single run.
+    pub fn answer(&self, given: Vec<f64>) -> Vec<f64> {
+        match &self.clock {
+            Some(clock) => drive_answer(clock, &given, self.highest),
+            None => vec![0.0; given.len()],
+        }
     }
 
     /// How the drive of joint `j` may answer dry friction, as columns ([`drive_answers`]); none for a single run.

@@ -49,6 +49,23 @@ impl FineClock {
         synthesised(&*self.fine_inverse, &mut spectrum)
     }
 
+    /// One period of `y` at every tick, of which the samples tell the rate `y_per_sample` as well: the cubic through both
+    /// between each sample and the next. Where y bends between two samples it is nearer than the series of y alone.
+    pub fn between(&self, y: &[f64], y_per_sample: &[f64]) -> Vec<f64> {
+        let (n, ticks) = (self.samples, self.ticks);
+        let cell = |k: usize| {
+            let (start, end) = (y[k], y[(k + 1) % n]);
+            let (rate, rate_at_end) = (y_per_sample[k], y_per_sample[(k + 1) % n]);
+            let mean_rate = end - start;
+            (0..ticks).map(move |i| {
+                let u = i as f64 / ticks as f64;
+                let bends = (1.0 - u) * (rate - mean_rate) - u * (rate_at_end - mean_rate);
+                start + u * (mean_rate + (1.0 - u) * bends)
+            })
+        };
+        (0..n).flat_map(cell).collect()
+    }
+
     /// What the samples of a log tell of a torque `fine_nm`, given at every tick, that no controller answers at
     /// once: it accelerates the links, q̇ holds −∫τ dt/M, and the log has that at its samples only.
     /// Differentiated as the series of those samples up to harmonic `highest`, it comes back as
@@ -141,6 +158,19 @@ mod tests {
     fn a_wave_is_itself_between_its_samples() {
         let fine = FineClock::new(N, TICKS).refined(&wave(N, 7.0));
         assert!(largest_difference(&fine, &wave(TICKS * N, 7.0)) < 1e-13);
+    }
+
+    /// A cubic is told by its values and rates; that of a wave is off by (ω T)⁴/384 of it.
+    #[test]
+    fn values_and_rates_tell_what_is_between() {
+        let (clock, harmonic) = (FineClock::new(N, TICKS), 3.0);
+        let omega = TAU * harmonic / N as f64;
+        let phase = |k: usize| omega * k as f64 + 0.3;
+        let rates: Vec<f64> = (0..N).map(|k| omega * phase(k).cos()).collect();
+        let found = clock.between(&wave(N, harmonic), &rates);
+        let off = largest_difference(&found, &wave(TICKS * N, harmonic));
+        let theory = omega.powi(4) / 384.0;
+        assert!(off < theory && off > 0.8 * theory, "{off} {theory}");
     }
 
     #[test]

@@ -50,16 +50,22 @@ pub struct Hidden {
     periods: usize,
     log_rate_hz: f64,
     lost_rows: Vec<Range<usize>>,
+    noise: f64,
 }
 
 impl Hidden {
     pub fn on(joint: usize, law: Law) -> Self {
-        Self { joint, law, periods: 8, log_rate_hz: 125.0, lost_rows: Vec::new() }
+        Self { joint, law, periods: 8, log_rate_hz: 125.0, lost_rows: Vec::new(), noise: 1.0 }
     }
 
     /// The recorder drops these rows.
     pub fn without_rows(self, lost_rows: &[Range<usize>]) -> Self {
         Self { lost_rows: lost_rows.to_vec(), ..self }
+    }
+
+    /// So many times the usual noise.
+    pub fn with_noise(self, noise: f64) -> Self {
+        Self { noise, ..self }
     }
 
     pub fn logged_at(self, log_rate_hz: f64) -> Self {
@@ -111,9 +117,11 @@ impl Hidden {
         }
         recording = only_rows(recording, |k| !self.lost_rows.iter().any(|lost| lost.contains(&k)));
         let sensors = SensorConfig {
-            torque_sd_nm: PerJoint::Each(vec![1.0, 1.0, 0.7, 0.15, 0.15, 0.15]),
-            q_sd_rad: PerJoint::All(2e-5),
-            qd_sd_rad_s: PerJoint::All(1e-3),
+            torque_sd_nm: PerJoint::Each(
+                [1.0, 1.0, 0.7, 0.15, 0.15, 0.15].map(|sd| self.noise * sd).to_vec(),
+            ),
+            q_sd_rad: PerJoint::All(self.noise * 2e-5),
+            qd_sd_rad_s: PerJoint::All(self.noise * 1e-3),
             ..SensorConfig::default()
         };
         let sensors = Sensors::new(&sensors, &arm, self.log_rate_hz).unwrap();
