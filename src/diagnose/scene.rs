@@ -13,7 +13,7 @@ use super::reversal_answer::shifted;
 use super::reversals::{Bends, Turning};
 use crate::base::BaseSet;
 use crate::dynamics::{Model, Motion, Parameter, ParameterLayout};
-use crate::identify::{Prepared, drive_answer, drive_answers};
+use crate::identify::{Prepared, drive_answers};
 use crate::robot::{Arm, JointSignals};
 use crate::signal::{FineClock, central_4};
 
@@ -97,9 +97,9 @@ const LONGEST_LEAD_S: f64 = 0.002;
 pub struct Instants {
     /// Time between two of them, s.
     pub step_s: f64,
-    /// Angles, rad.
+    /// Angles, rad; of a motion that repeats as its samples have them, with their velocities.
     pub q_rad: Vec<f64>,
-    /// Velocities, rad/s.
+    /// Velocities, rad/s; of a motion that repeats as the model's friction bends them, which is not quite the rate of the angles.
     pub qd_rad_s: Vec<f64>,
     /// tanh(q̇/ε).
     pub sign: Vec<f64>,
@@ -372,12 +372,15 @@ impl Scene {
 
     /// Angles of joint `j` at `FINE` instants per sample, from those and the velocities that the samples of a motion that
     /// repeats have in the mean: where it bends between two of them is in their difference, and in no series of harmonics
-    /// that ends before half the rate.
+    /// that ends before half the rate. The mean velocity of such a motion is the offset of its sensor.
     fn fine_angles_rad(&self, j: usize) -> Vec<f64> {
         let (Some(clock), Some([q_rad, qd_rad_s])) = (&self.clock, &self.recorded) else {
             return self.fine(self.motion.q_rad.joint(j));
         };
-        let per_sample: Vec<f64> = qd_rad_s.joint(j).iter().map(|qd| qd / self.rate_hz).collect();
+        let qd_rad_s = qd_rad_s.joint(j);
+        let offset_rad_s = qd_rad_s.iter().sum::<f64>() / qd_rad_s.len() as f64;
+        let per_sample: Vec<f64> =
+            qd_rad_s.iter().map(|qd| (qd - offset_rad_s) / self.rate_hz).collect();
         clock.between(q_rad.joint(j), &per_sample)
     }
 
@@ -408,13 +411,14 @@ impl Scene {
         Some(self.clock.as_ref()?.before_logged(y, self.highest))
     }
 
-    /// What the samples of a log have less of a torque, given at the instants, that the drive delivers at once:
-    /// τ̃ − τ at the samples; nothing of a single run.
-    pub fn answer(&self, given: Vec<f64>) -> Vec<f64> {
-        match &self.clock {
-            Some(clock) => drive_answer(clock, &given, self.highest),
-            None => vec![0.0; given.len()],
-        }
+    /// What the samples of a log show of a friction, given at the instants, of which the drive answers `delivered` at once.
+    pub fn as_logged_but(&self, mut torque_nm: Vec<f64>, delivered: &[f64]) -> Vec<f64> {
+        torque_nm.iter_mut().zip(delivered).for_each(|(nm, at_once)| *nm -= at_once);
+        let mut logged = self.as_logged(torque_nm);
+        let every = if self.clock.is_some() { FINE } else { 1 };
+        let at_samples = delivered.iter().step_by(every);
+        logged.iter_mut().zip(at_samples).for_each(|(nm, at_once)| *nm += at_once);
+        logged
     }
 
     /// How the drive of joint `j` may answer dry friction, as columns ([`drive_answers`]); none for a single run.

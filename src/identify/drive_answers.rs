@@ -20,13 +20,10 @@ pub fn drive_answers(clock: &FineClock, fine_sign: &[f64], highest: usize) -> [V
     let n = fine_sign.len();
     let rate = |k: usize| 0.5 * (fine_sign[(k + 1) % n] - fine_sign[(k + n - 1) % n]);
     let rates: Vec<f64> = (0..n).map(rate).collect();
-    [fine_sign, &rates].map(|fine| drive_answer(clock, fine, highest))
-}
-
-/// τ̃ − τ at the samples of one period, of a torque `fine` at every tick that a drive may deliver at once.
-pub fn drive_answer(clock: &FineClock, fine: &[f64], highest: usize) -> Vec<f64> {
-    let logged = clock.as_logged(fine, highest);
-    logged.iter().zip(fine.iter().step_by(clock.ticks())).map(|(l, now)| l - now).collect()
+    [fine_sign, &rates].map(|fine| {
+        let logged = clock.as_logged(fine, highest);
+        logged.iter().zip(fine.iter().step_by(clock.ticks())).map(|(l, now)| l - now).collect()
+    })
 }
 
 /// Takes the answers of all drives out of `problem`, a motion that repeats and its periods of torque: X and y keep

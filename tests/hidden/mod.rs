@@ -51,11 +51,22 @@ pub struct Hidden {
     log_rate_hz: f64,
     lost_rows: Vec<Range<usize>>,
     noise: f64,
+    fed_forward: f64,
+    velocity_offset_rad_s: f64,
 }
 
 impl Hidden {
     pub fn on(joint: usize, law: Law) -> Self {
-        Self { joint, law, periods: 8, log_rate_hz: 125.0, lost_rows: Vec::new(), noise: 1.0 }
+        Self {
+            joint,
+            law,
+            periods: 8,
+            log_rate_hz: 125.0,
+            lost_rows: Vec::new(),
+            noise: 1.0,
+            fed_forward: PlantConfig::default().friction_feedforward,
+            velocity_offset_rad_s: 0.0,
+        }
     }
 
     /// The recorder drops these rows.
@@ -66,6 +77,16 @@ impl Hidden {
     /// So many times the usual noise.
     pub fn with_noise(self, noise: f64) -> Self {
         Self { noise, ..self }
+    }
+
+    /// Behind drives that feed this share of friction forward.
+    pub fn fed_forward(self, share: f64) -> Self {
+        Self { fed_forward: share, ..self }
+    }
+
+    /// With so much more in all velocities.
+    pub fn with_velocity_offset(self, rad_s: f64) -> Self {
+        Self { velocity_offset_rad_s: rad_s, ..self }
     }
 
     pub fn logged_at(self, log_rate_hz: f64) -> Self {
@@ -87,14 +108,9 @@ impl Hidden {
             if matches!(self.law, Law::Late { .. }) { 1000.0 } else { self.log_rate_hz };
         let config = PlantConfig { log_rate_hz, step_s, ..PlantConfig::default() };
         let law = HiddenLaw::new(&arm, self.joint, self.law);
-        let mut plant = Plant::with_drivetrain(
-            &arm,
-            &arm,
-            &[config.friction_feedforward; 6],
-            Box::new(law),
-            &config,
-        )
-        .unwrap();
+        let mut plant =
+            Plant::with_drivetrain(&arm, &arm, &[self.fed_forward; 6], Box::new(law), &config)
+                .unwrap();
         let mut recording = plant.run(&excitation, None).unwrap();
         if let Law::CutBeforeNoise { share } = self.law {
             let torque = recording.torque_nm.joint_mut(self.joint);
@@ -127,6 +143,10 @@ impl Hidden {
         let sensors = Sensors::new(&sensors, &arm, self.log_rate_hz).unwrap();
         let mut measured = Measured::like(&recording);
         sensors.measure(&recording, &TrialStreams::new(seed, b"hidden", 0), &mut measured);
+        for j in 0..arm.dof() {
+            let velocities = measured.qd_rad_s.joint_mut(j).iter_mut();
+            velocities.for_each(|qd| *qd += self.velocity_offset_rad_s);
+        }
         let model = Model::new(&arm);
         let full = Parameterisation::full(arm.dof(), arm.torque_offsets);
         let set = BaseSet::find(&arm, full).unwrap();
