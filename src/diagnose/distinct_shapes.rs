@@ -10,8 +10,8 @@ const TYPICAL_Z: f64 = 4.5;
 ///
 /// Two shapes whose columns are an angle θ apart exceed z one without the other with a chance of no more than (θ/π)
 /// exp(−z²/2), twice the up-crossings on the way from one to the other (Efron 1997, the length heuristic), or that of one
-/// test, 2 Φ(−z) ≈ √(2/π) exp(−z²/2)/z. Each shape joins the nearer of those before it (Worsley 1982): the one before it in
-/// its variant, and the one in its place in the variant before. Of families with several coefficients every shape counts.
+/// test, 2 Φ(−z) ≈ √(2/π) exp(−z²/2)/z. Each shape joins the nearest of those before it (Worsley 1982): the one before it in
+/// its variant, and all of the variant before. Of families with several coefficients every shape counts.
 pub fn distinct_shapes(entries: &[Entry]) -> f64 {
     tests(entries, TYPICAL_Z)
 }
@@ -30,12 +30,10 @@ fn tests(entries: &[Entry], z: f64) -> f64 {
     for (v, variant) in variants.iter().enumerate() {
         for (k, entry) in variant.iter().enumerate() {
             let before = k.checked_sub(1).map(|k| &variant[k]);
-            let beside = v.checked_sub(1).and_then(|v| variants[v].get(k));
+            let beside = v.checked_sub(1).into_iter().flat_map(|v| variants[v]);
             let nearest = before.into_iter().chain(beside).map(|other| angle(entry, other));
             if let Some(angle) = nearest.min_by(f64::total_cmp) {
                 count += (angle * z / std::f64::consts::TAU.sqrt()).min(1.0);
-            } else if v > 0 {
-                count += 1.0;
             }
         }
     }

@@ -42,7 +42,8 @@ impl Kept<'_, '_> {
     pub fn other_forms(&self, c: usize) -> Vec<Form> {
         let (others, residual) = self.without(Some(c));
         let own = self.causes[c].score.gain;
-        let variants = self.other_variants(c, &others, &residual).into_iter();
+        let variants =
+            self.other_variants(&self.causes[c].entry, 0.0, &others, &residual).into_iter();
         let form = |(entry, score): (Entry, Score)| {
             let coefficients = self.study.span(&entry, &others).solve(&residual);
             let Entry { family, site, shape, .. } = entry;

@@ -20,6 +20,10 @@ const MOST_ALIKE: usize = 3;
 /// Families whose shapes are refined before one is chosen.
 pub(super) const FINALISTS: usize = 10;
 
+/// Share of what a family explains at the best of all its starting shapes which another variant explains at its own, at
+/// least, if it may explain more between them: from one starting shape to the best near it Stribeck's curve gains 3 %.
+const BETWEEN_SHAPES: f64 = 0.8;
+
 /// A family that was considered, at its best shape.
 #[derive(Debug, Clone)]
 pub struct Contender {
@@ -178,14 +182,17 @@ impl<'s, 'a> Kept<'s, 'a> {
         rivals
     }
 
+    /// `entry` in the other variants of its family, each at its best shape, those alone which at their best starting shape
+    /// explain the share `least` of what it explains.
     pub(super) fn other_variants(
         &self,
-        c: usize,
+        entry: &Entry,
+        least: f64,
         others: &Span,
         residual: &Image,
     ) -> Vec<(Entry, Score)> {
         let study = self.study;
-        let Entry { family, site, shape, .. } = self.causes[c].entry;
+        let Entry { family, site, shape, .. } = *entry;
         let mut best: Vec<(&Entry, Score)> = Vec::new();
         let is_other =
             |e: &&Entry| (e.family, e.site) == (family, site) && e.shape.variant != shape.variant;
@@ -197,17 +204,30 @@ impl<'s, 'a> Kept<'s, 'a> {
                 None => best.push((entry, score)),
             }
         }
+        if least > 0.0 {
+            let own = study.score(entry, others, residual).map_or(0.0, |score| score.gain);
+            best.retain(|(_, score)| score.gain > least * own);
+        }
         best.into_par_iter().filter_map(|(e, _)| study.refined(e, others, residual)).collect()
+    }
+
+    /// The best variant and shape near `entry`.
+    fn at_its_best(
+        &self,
+        entry: &Entry,
+        others: &Span,
+        residual: &Image,
+    ) -> Option<(Entry, Score)> {
+        let own = self.study.refined(entry, others, residual);
+        let forms = self.other_variants(entry, BETWEEN_SHAPES, others, residual);
+        own.into_iter().chain(forms).max_by(|a, b| a.1.gain.total_cmp(&b.1.gain))
     }
 
     /// The best variant and shape of cause `c`, the others given.
     fn refine(&mut self, c: usize) {
         let (others, residual) = self.without(Some(c));
         let current = self.best_start(&self.causes[c].entry, &others, &residual);
-        let own = self.study.refined(current, &others, &residual);
-        let forms = self.other_variants(c, &others, &residual);
-        let best = own.into_iter().chain(forms).max_by(|a, b| a.1.gain.total_cmp(&b.1.gain));
-        if let Some((entry, score)) = best {
+        if let Some((entry, score)) = self.at_its_best(current, &others, &residual) {
             let evidence = self.evidence(&entry, score);
             self.causes[c] = Contender { entry, score, evidence };
         }
@@ -324,7 +344,7 @@ impl<'s, 'a> Kept<'s, 'a> {
         let (head, tail) = best.split_at(finalists);
         let mut all: Vec<Contender> = head
             .par_iter()
-            .map(|contender| match study.refined(&contender.entry, others, residual) {
+            .map(|contender| match self.at_its_best(&contender.entry, others, residual) {
                 Some((entry, score)) => {
                     let evidence = self.evidence(&entry, score);
                     Contender { entry, score, evidence }

@@ -12,8 +12,8 @@ const DOUBT: f64 = 2.0;
 /// A family's law is right to this share of its own size: what is smaller on the same joint is no second
 /// cause.
 const FORM_ERROR: f64 = 0.05;
-/// 2 ln of the odds for a cause, at least: seven to one.
-pub const LEAST_EVIDENCE: f64 = 4.0;
+/// 2 ln of the odds for a cause, at least: e to one.
+pub const LEAST_EVIDENCE: f64 = 2.0;
 /// 2 ln of the odds between two laws that leave no doubt: twenty to one.
 pub(super) const FAR_AHEAD: f64 = 6.0;
 
