@@ -277,6 +277,16 @@ fn friction_near_rest_is_no_odd_drive() {
     assert_eq!(d.causes.len(), 1, "{:?}", d.sentences);
 }
 
+/// A curve that falls within two widths of the sign lies between two of the shapes that are looked for first, where a narrower
+/// one of the other exponent, which no curve may be, explains more than either.
+#[test]
+fn friction_near_rest_that_falls_at_once() {
+    let toml = "[[effect]]\nkind = \"stribeck\"\njoint = 4\nextra_nm = 1.25\nvs_rad_s = 0.0347\nexponent = 2";
+    let d = diagnose_along("ur5_validation", 5, toml);
+    assert!(is_named(&d, "stribeck", Some(4)), "{:?}", d.sentences);
+    assert_eq!(d.causes.len(), 1, "{:?}", d.sentences);
+}
+
 /// A drive that does not feed its friction forward among five that feed nine tenths of it.
 #[test]
 fn a_drive_that_feeds_nothing_forward() {

@@ -109,8 +109,10 @@ impl<'s, 'a> Kept<'s, 'a> {
             let finalists = &contenders[..FINALISTS.min(contenders.len())];
             // What explains a joint best without being its own law is in the place of something unknown, and
             // what explains less is not that.
-            let foreign: Vec<&Contender> =
-                finalists.iter().filter(|c| !self.is_its_own(c, &others, &residual)).collect();
+            let foreign: Vec<&Contender> = finalists
+                .iter()
+                .filter(|c| !self.is_its_own(&c.entry, &others, &residual))
+                .collect();
             let is_behind = |c: &Contender| {
                 foreign.iter().any(|f| {
                     f.evidence > c.evidence + FAR_AHEAD && !self.is_significant_beside(c, f)
@@ -211,7 +213,8 @@ impl<'s, 'a> Kept<'s, 'a> {
         best.into_par_iter().filter_map(|(e, _)| study.refined(e, others, residual)).collect()
     }
 
-    /// The best variant and shape near `entry`.
+    /// The best variant and shape near `entry`. What is the family's own goes before what is not ([`Self::is_its_own`]), unless
+    /// that is far ahead: the narrowest curve of one law looks like a wider one of another.
     fn at_its_best(
         &self,
         entry: &Entry,
@@ -220,7 +223,14 @@ impl<'s, 'a> Kept<'s, 'a> {
     ) -> Option<(Entry, Score)> {
         let own = self.study.refined(entry, others, residual);
         let forms = self.other_variants(entry, BETWEEN_SHAPES, others, residual);
-        own.into_iter().chain(forms).max_by(|a, b| a.1.gain.total_cmp(&b.1.gain))
+        let mut forms: Vec<(Entry, Score)> = own.into_iter().chain(forms).collect();
+        forms.sort_by(|a, b| b.1.gain.total_cmp(&a.1.gain));
+        let best = forms.first()?.1.gain;
+        let near = forms.iter().take_while(|form| best - form.1.gain < FAR_AHEAD).count();
+        let is_own =
+            |form: &(Entry, Score)| near == 1 || self.is_its_own(&form.0, others, residual);
+        let place = forms[..near].iter().position(is_own).unwrap_or(0);
+        Some(forms.swap_remove(place))
     }
 
     /// The best variant and shape of cause `c`, the others given.

@@ -51,7 +51,7 @@ impl Kept<'_, '_> {
         let tests = study.hypotheses() as f64 * study.alternatives(&contender.entry);
         contender.evidence > LEAST_EVIDENCE
             && single * tests < FALSE_ALARM
-            && self.is_its_own(contender, others, residual)
+            && self.is_its_own(&contender.entry, others, residual)
             && study.generalises(&contender.entry, &span, residual)
     }
 
@@ -79,20 +79,15 @@ impl Kept<'_, '_> {
     /// all that noise leaves possible. A law that holds a parameter twice, so that it could be of any size by its
     /// coefficients alone, is the family's own only where the data tell its shape from the smallest: play that is none
     /// but for flanks that give way is a soft gear.
-    pub(super) fn is_its_own(
-        &self,
-        contender: &Contender,
-        others: &Span,
-        residual: &Image,
-    ) -> bool {
+    pub(super) fn is_its_own(&self, entry: &Entry, others: &Span, residual: &Image) -> bool {
         let study = self.study;
-        let Entry { family, site, shape, .. } = contender.entry;
+        let Entry { family, site, shape, .. } = *entry;
         if study.families[family].in_shape(shape).is_some()
-            && self.ahead_of_smallest(&contender.entry, others, residual) < FAR_AHEAD
+            && self.ahead_of_smallest(entry, others, residual) < FAR_AHEAD
         {
             return false;
         }
-        let span = study.span(&contender.entry, others);
+        let span = study.span(entry, others);
         let mut b = span.solve(residual);
         let Some(&first) = b.first() else { return true };
         let sigma = study.statistic.covariance(&span, residual)[(0, 0)].max(0.0).sqrt();
