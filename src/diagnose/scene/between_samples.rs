@@ -163,7 +163,7 @@ impl Scene {
     }
 
     /// What the samples of a log show of a friction `torque_nm`, given at the instants, that the drive does not
-    /// answer at once ([`FineClock::as_logged`]).
+    /// answer at once ([`FineClock::as_logged`](crate::signal::FineClock::as_logged)).
     pub fn as_logged(&self, torque_nm: Vec<f64>) -> Vec<f64> {
         match &self.clock {
             Some(clock) => clock.as_logged(&torque_nm, self.highest),
@@ -172,7 +172,7 @@ impl Scene {
     }
 
     /// Weights of the means of a torque from one sample to the next in Σ y_k τ̃_k, τ̃ as logged
-    /// ([`FineClock::before_logged`]); `None` for a single run.
+    /// ([`FineClock::before_logged`](crate::signal::FineClock::before_logged)); `None` for a single run.
     pub fn before_logged(&self, y: &[f64]) -> Option<Vec<f64>> {
         Some(self.clock.as_ref()?.before_logged(y, self.highest))
     }
