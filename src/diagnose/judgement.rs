@@ -42,15 +42,15 @@ impl Kept<'_, '_> {
     pub fn other_forms(&self, c: usize) -> Vec<Form> {
         let (others, residual) = self.without(Some(c));
         let own = self.causes[c].score.gain;
-        let variants =
-            self.other_variants(&self.causes[c].entry, 0.0, &others, &residual).into_iter();
+        let entry = &self.causes[c].entry;
+        let variants = self.other_variants(entry, f64::NEG_INFINITY, &others, &residual);
         let form = |(entry, score): (Entry, Score)| {
             let coefficients = self.study.span(&entry, &others).solve(&residual);
             let Entry { family, site, shape, .. } = entry;
             let effect = Effect { family, site, shape, coefficients, absorbed: Vec::new() };
             Form { effect, behind: (own - score.gain).max(0.0) }
         };
-        variants.map(form).collect()
+        variants.into_iter().map(form).collect()
     }
 
     /// Confidence, class and rivals of cause `c`, the others given.

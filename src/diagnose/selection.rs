@@ -184,8 +184,8 @@ impl<'s, 'a> Kept<'s, 'a> {
         rivals
     }
 
-    /// `entry` in the other variants of its family, each at its best shape, those alone which at their best starting shape
-    /// explain the share `least` of what it explains.
+    /// `entry` in the other variants of its family, each at its best shape: those whose best starting shape gains more than
+    /// `least`.
     pub(super) fn other_variants(
         &self,
         entry: &Entry,
@@ -206,10 +206,7 @@ impl<'s, 'a> Kept<'s, 'a> {
                 None => best.push((entry, score)),
             }
         }
-        if least > 0.0 {
-            let own = study.score(entry, others, residual).map_or(0.0, |score| score.gain);
-            best.retain(|(_, score)| score.gain > least * own);
-        }
+        best.retain(|(_, score)| score.gain > least);
         best.into_par_iter().filter_map(|(e, _)| study.refined(e, others, residual)).collect()
     }
 
@@ -222,7 +219,8 @@ impl<'s, 'a> Kept<'s, 'a> {
         residual: &Image,
     ) -> Option<(Entry, Score)> {
         let own = self.study.refined(entry, others, residual);
-        let forms = self.other_variants(entry, BETWEEN_SHAPES, others, residual);
+        let start = self.study.score(entry, others, residual).map_or(0.0, |score| score.gain);
+        let forms = self.other_variants(entry, BETWEEN_SHAPES * start, others, residual);
         let mut forms: Vec<(Entry, Score)> = own.into_iter().chain(forms).collect();
         forms.sort_by(|a, b| b.1.gain.total_cmp(&a.1.gain));
         let best = forms.first()?.1.gain;

@@ -52,8 +52,8 @@ const TURNED: f64 = 8.0;
 /// thousandfold; where an estimate of it is not positive, what stands for it is larger by more.
 const LEAST_MOBILITY: f64 = 1e-3;
 
-/// Share of dry friction that the law has at least. Of bristles with dz/dq = k (1 − z sign q̇)^i (Dahl 1968), i from ½ to 2, it is
-/// best fitted with 1.10 (i = ½), 0.86 (i = 3/2) and 0.72 (i = 2) of their friction.
+/// Share of dry friction that the law has at least. Of bristles with dz/dq = k (1 − z sign q̇)^i (Dahl 1968) it is best
+/// fitted with 1.10 (i = ½), 0.86 (i = 3/2) and 0.72 (i = 2) of their friction.
 const LEAST_SHARE: f64 = 0.7;
 
 /// The way of a joint to each of its instants from the one before, rad.
@@ -304,6 +304,7 @@ mod tests {
         let root = |x: f64| (2f64.sqrt() - 0.5 * x).max(0.0).powi(2);
         let three_halves = |x: f64| (0.5f64.sqrt() + 0.5 * x).powi(-2);
         let square = |x: f64| 1.0 / (0.5 + x);
+        // Its own law between two of the stiffnesses, which are 1.2 % apart.
         assert!((fitted_share(|x| 2.0 * (-x).exp()) - 1.0).abs() < 0.01);
         // Half of the last digit that the constant's comment gives.
         assert!((fitted_share(root) - 1.10).abs() < 0.005);
