@@ -287,6 +287,17 @@ fn friction_near_rest_that_falls_at_once() {
     assert_eq!(d.causes.len(), 1, "{:?}", d.sentences);
 }
 
+/// Concave friction of which the model takes up all but a twenty-fifth, the least that is looked for: whether it keeps a little
+/// more or less of it beside the next estimate of the arm does not matter, once it is found.
+#[test]
+fn friction_that_the_model_nearly_absorbs() {
+    let toml =
+        "[[effect]]\nkind = \"nonlinear_viscous\"\njoint = 2\namplitude_nm = 6.4\nexponent = 0.64";
+    let d = diagnose_along("ur5_validation", 1, toml);
+    assert!(is_named(&d, "nonlinear_viscous", Some(2)), "{:?}", d.sentences);
+    assert_eq!(d.causes.len(), 1, "{:?}", d.sentences);
+}
+
 /// A drive that does not feed its friction forward among five that feed nine tenths of it.
 #[test]
 fn a_drive_that_feeds_nothing_forward() {

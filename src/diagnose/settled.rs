@@ -30,7 +30,7 @@ pub fn settled<'s>(
     for _ in 0..ROUNDS {
         let entries: Vec<&Entry> = causes.iter().map(|c| &c.entry).collect();
         let refined = Extension::fit(&study, &entries, &study.torque);
-        study = study.with_estimate(arm, set, &refined.theta);
+        study = study.with_estimate(arm, set, &refined.theta, &entries);
         study = without_contacts(study, set, &refined, log)?;
         if !study.scene.periodic {
             break;

@@ -69,12 +69,17 @@ pub struct Study<'a> {
     pub torque: Image,
     /// Joints (0-based) whose readings are too bad to look for physics in them.
     pub left_out: Vec<usize>,
+    /// Families and sites of causes that an earlier estimate of the arm has shown.
+    shown: Vec<(usize, Option<usize>)>,
 }
 
 /// A column that keeps less than this share of its length outside the null model is not seen: what is left
 /// of it is the noise of the null model's accelerations, which the residual has as well. A spring on a joint
 /// without gravity keeps 2.7 %, and was found in one of 50 logs without one.
 const ABSORBED: f64 = 0.04;
+/// Of a cause that was found beside one estimate of the arm, beside the next: the shares differ a little, and a cause that
+/// comes and goes with them settles nothing.
+const ABSORBED_AGAIN: f64 = 0.5 * ABSORBED;
 /// Shapes that are prepared at once.
 const BANK: usize = 8;
 /// Share of the explained square that has to be explained in stretches left out of the fit as well.
@@ -171,6 +176,7 @@ impl<'a> Study<'a> {
             shapes: HashMap::new(),
             torque,
             left_out: Vec::new(),
+            shown: Vec::new(),
         })
     }
 
@@ -187,17 +193,24 @@ impl<'a> Study<'a> {
             return Ok(self);
         }
         run.leave_out(rows);
-        let Self { whitening, scene, families, regression, left_out, .. } = self;
+        let Self { whitening, scene, families, regression, left_out, shown, .. } = self;
         let of_run = (whitening, scene);
         let study = Self::behind(of_run, families, set, regression, log)?;
-        let mut study = Self { left_out, ..study };
+        let mut study = Self { left_out, shown, ..study };
         study.fill_entries();
         Ok(study)
     }
 
-    /// The same study with torques predicted by other base parameters.
-    pub fn with_estimate(mut self, arm: &Arm, set: &BaseSet, theta: &[f64]) -> Self {
+    /// The same study with torques predicted by other base parameters, `entries` found with the old ones.
+    pub fn with_estimate(
+        mut self,
+        arm: &Arm,
+        set: &BaseSet,
+        theta: &[f64],
+        entries: &[&Entry],
+    ) -> Self {
         self.scene = Scene::new(arm, set, theta, &self.regression.prepared);
+        self.shown = entries.iter().map(|entry| (entry.family, entry.site)).collect();
         self.fill_entries();
         self
     }
@@ -252,12 +265,13 @@ impl<'a> Study<'a> {
         let lengths: Vec<f64> = images.iter().map(Image::square).collect();
         self.null.residualise_all(&mut images);
         let mut outside = images.into_iter().zip(lengths);
+        let least = if self.shown.contains(&(family, site)) { ABSORBED_AGAIN } else { ABSORBED };
         let entry = |(shape, columns): (&Shape, Vec<Column>)| {
             let own: Vec<(Image, f64)> = outside.by_ref().take(columns.len()).collect();
             // Columns behind an absorbed one are parameters that go with it.
             let images: Vec<Image> = own
                 .into_iter()
-                .map_while(|(image, length)| is_seen(&image, length).then_some(image))
+                .map_while(|(image, length)| is_seen(&image, length, least).then_some(image))
                 .collect();
             (!images.is_empty()).then_some(Entry { family, site, shape: *shape, images })
         };
@@ -268,7 +282,7 @@ impl<'a> Study<'a> {
     pub fn outside_null(&self, mut image: Image) -> Option<Image> {
         let length = image.square();
         self.null.residualise(&mut image);
-        is_seen(&image, length).then_some(image)
+        is_seen(&image, length, ABSORBED).then_some(image)
     }
 
     /// Span of an entry outside the null model and outside `others`.
@@ -453,7 +467,8 @@ impl<'a> Study<'a> {
     }
 }
 
-/// Whether `image`, of the square `length` before the null model was projected out, still has enough to be seen.
-fn is_seen(image: &Image, length: f64) -> bool {
-    image.square() > ABSORBED * ABSORBED * length
+/// Whether `image`, of the square `length` before the null model was projected out, keeps more than the share `least` of its
+/// length.
+fn is_seen(image: &Image, length: f64, least: f64) -> bool {
+    image.square() > least * least * length
 }

@@ -6,6 +6,9 @@ use std::sync::Arc;
 use realfft::num_complex::Complex64;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
+/// An answer that began so many of its own times before has forgotten what it began with but for its rounding.
+const FORGOTTEN: f64 = 37.0;
+
 /// A clock that ticks several times per sample of one period, and plans for the way there and back.
 pub struct FineClock {
     samples: usize,
@@ -74,7 +77,21 @@ impl FineClock {
     ///
     /// and τ̃ is what a recorded torque minus M q̈ shows. τ at the samples themselves is another signal: what is
     /// over within a sample or two (a bristle behind a reversal) is missed by it or counted for too much.
-    pub fn as_logged(&self, fine_nm: &[f64], highest: usize) -> Vec<f64> {
+    ///
+    /// A drive answers q̇ a little later with ω M q̇, with which q̇ fades, so that its torque is ȧ = ω (τ − a), ω here
+    /// `feedback_per_tick`. Of that torque the log has the samples, of the rest of τ what they tell: a + (τ − a)˜. For what
+    /// is slower than half the rate the two are alike, and faster ripple comes back with another height and phase.
+    pub fn as_logged(&self, fine_nm: &[f64], highest: usize, feedback_per_tick: f64) -> Vec<f64> {
+        let answered = answered(fine_nm, feedback_per_tick);
+        let rest: Vec<f64> = fine_nm.iter().zip(&answered).map(|(nm, a)| nm - a).collect();
+        let mut logged = self.unanswered_as_logged(&rest, highest);
+        let at_samples = answered.iter().step_by(self.ticks);
+        logged.iter_mut().zip(at_samples).for_each(|(nm, a)| *nm += a);
+        logged
+    }
+
+    /// τ̃ of [`Self::as_logged`].
+    fn unanswered_as_logged(&self, fine_nm: &[f64], highest: usize) -> Vec<f64> {
         let next = fine_nm[self.ticks..].iter().step_by(self.ticks).chain(&fine_nm[..1]);
         // By the trapezoidal rule.
         let mean: Vec<f64> = fine_nm
@@ -87,7 +104,8 @@ impl FineClock {
         self.filtered(&mean, |h| self.of_mean(h, highest))
     }
 
-    /// The adjoint of [`Self::as_logged`]: w for which Σ y_k τ̃_k is Σ w_k ∫ τ dt/T, the integral from sample k to the next.
+    /// The adjoint of [`Self::as_logged`] where no drive answers: w for which Σ y_k τ̃_k is Σ w_k ∫ τ dt/T, the integral from
+    /// sample k to the next.
     pub fn before_logged(&self, y: &[f64], highest: usize) -> Vec<f64> {
         self.filtered(y, |h| self.of_mean(h, highest).conj())
     }
@@ -112,8 +130,14 @@ impl FineClock {
 
     /// The time derivative of one period of `y`, sampled at `rate_hz`, from its Fourier series.
     pub fn derivative(&self, y: &[f64], rate_hz: f64) -> Vec<f64> {
+        self.derivative_up_to(y, rate_hz, self.samples)
+    }
+
+    /// [`Self::derivative`] of the harmonics up to `highest`.
+    pub fn derivative_up_to(&self, y: &[f64], rate_hz: f64, highest: usize) -> Vec<f64> {
         let omega = TAU * rate_hz / self.samples as f64;
-        self.filtered(y, |h| Complex64::new(0.0, h as f64 * omega))
+        let rate = |h: usize| if h > highest { 0.0 } else { h as f64 * omega };
+        self.filtered(y, |h| Complex64::new(0.0, rate(h)))
     }
 
     /// Fourier coefficients of one period, Σ_k y_k e^(−2πihk/n)/n.
@@ -124,6 +148,25 @@ impl FineClock {
         out.iter_mut().for_each(|c| *c *= scale);
         out
     }
+}
+
+/// ȧ = ω (τ − a) of one period of a torque that repeats, τ straight from one tick to the next and ω `per_tick`.
+fn answered(torque_nm: &[f64], per_tick: f64) -> Vec<f64> {
+    let n = torque_nm.len();
+    let keep = (-per_tick).exp();
+    let step = |a: f64, k: usize| {
+        let before = torque_nm[k.checked_sub(1).unwrap_or(n - 1)];
+        a * keep + (1.0 - keep) * 0.5 * (before + torque_nm[k])
+    };
+    // What it began with is forgotten within the ticks before.
+    let run_in = ((FORGOTTEN / per_tick) as usize).min(n);
+    let mut a = (n - run_in..n).fold(0.0, step);
+    (0..n)
+        .map(|k| {
+            a = step(a, k);
+            a
+        })
+        .collect()
 }
 
 /// The series with these coefficients. The mean and the harmonic at half the rate are real; what else they are
@@ -187,10 +230,10 @@ mod tests {
     #[test]
     fn what_is_slow_is_logged_as_it_is() {
         let clock = FineClock::new(N, TICKS);
-        let logged = clock.as_logged(&wave(TICKS * N, 3.0), 20);
+        let logged = clock.as_logged(&wave(TICKS * N, 3.0), 20, 0.0);
         let tick = TAU * 3.0 / (TICKS * N) as f64;
         assert!(largest_difference(&logged, &wave(N, 3.0)) < tick * tick / 12.0 + 1e-13);
-        assert!(largest_difference(&clock.as_logged(&wave(800, 21.0), 20), &[0.0; N]) < 1e-13);
+        assert!(largest_difference(&clock.as_logged(&wave(800, 21.0), 20, 0.0), &[0.0; N]) < 1e-13);
     }
 
     /// The adjoint weighs what lies between two samples as the log shows it, but for rounding.
@@ -198,7 +241,7 @@ mod tests {
     fn weights_of_what_is_logged() {
         let clock = FineClock::new(N, TICKS);
         let (y, fine) = (wave(N, 5.0), wave(TICKS * N, 55.0));
-        let logged = clock.as_logged(&fine, 20);
+        let logged = clock.as_logged(&fine, 20, 0.0);
         let direct: f64 = y.iter().zip(logged).map(|(y, logged)| y * logged).sum();
         let next = |k: usize| fine[(k + TICKS) % fine.len()];
         let ends = |k: usize| 0.5 * (next(k * TICKS) - fine[k * TICKS]);
@@ -209,13 +252,37 @@ mod tests {
         assert!((direct - weighed).abs() < 1e-12 && direct.abs() > 1e-3, "{direct} {weighed}");
     }
 
+    /// Links of M = 1 under a wave of friction τ faster than half the rate, held by a drive's a = −ω q̇: of q̈ = a − τ the log
+    /// has the samples of a and of q̇, and shows a less the derivative of the latter.
+    #[test]
+    fn a_wave_that_a_drive_answers_is_logged_as_its_alias() {
+        let (clock, harmonic, per_tick) = (FineClock::new(N, TICKS), 31.0, 0.04);
+        let (per_sample, omega) = (per_tick * TICKS as f64, TAU * harmonic / N as f64);
+        // By ȧ = ω (τ − a), per sample.
+        let response = per_sample / Complex64::new(per_sample, omega);
+        let answer: Vec<f64> = (0..N)
+            .map(|k| (Complex64::from_polar(1.0, omega * k as f64 + 0.3) * response).im)
+            .collect();
+        let velocity: Vec<f64> = answer.iter().map(|a| -a / per_sample).collect();
+        let acceleration = clock.derivative(&velocity, 1.0);
+        let shown: Vec<f64> = answer.iter().zip(&acceleration).map(|(a, qdd)| a - qdd).collect();
+        let fine = wave(TICKS * N, harmonic);
+        let logged = clock.as_logged(&fine, 20, per_tick);
+        // Straight from tick to tick a wave of height one loses (ω Δ)²/12 in what is answered and in the means of its cells.
+        let lost = (omega / TICKS as f64).powi(2) / 6.0;
+        let off = largest_difference(&logged, &shown);
+        assert!(off < lost, "{off} {lost}");
+        // Without the answer it were another wave.
+        assert!(largest_difference(&clock.as_logged(&fine, 20, 0.0), &shown) > 10.0 * lost);
+    }
+
     /// A pulse between two samples, which no sample shows, is logged with all of its area.
     #[test]
     fn a_pulse_between_samples_is_logged() {
         let clock = FineClock::new(N, TICKS);
         let mut pulse = vec![0.0; TICKS * N];
         pulse[TICKS * 10 + 8] = 1.0;
-        let area: f64 = clock.as_logged(&pulse, 20).iter().sum();
+        let area: f64 = clock.as_logged(&pulse, 20, 0.0).iter().sum();
         assert!((area - 1.0 / TICKS as f64).abs() < 1e-13, "{area}");
     }
 }

@@ -24,6 +24,7 @@
 use super::*;
 use crate::diagnose::scene::FINE;
 use crate::dynamics::Motion;
+use crate::identify::FEEDBACK_RAD_S;
 use realfft::num_complex::Complex64;
 
 /// See the module.
@@ -67,7 +68,7 @@ impl Lag {
 
     /// With a δ̇ that may hold more than the differences of δ, and of which the log has the samples only.
     pub(super) fn logged(scene: &Scene, angle_rad: Vec<f64>, rate_rad_s: Vec<f64>) -> Self {
-        Self { acceleration_rad_s2: scene.derivative(&rate_rad_s), angle_rad, rate_rad_s }
+        Self { acceleration_rad_s2: scene.accelerations(&rate_rad_s), angle_rad, rate_rad_s }
     }
 
     /// The motion of the links when joint `j` lags by it.
@@ -125,23 +126,18 @@ fn swing(scene: &Scene, j: usize, variant: usize, stiffness_nm_rad: f64) -> Lag 
     lag
 }
 
-/// How fast a drive stops its rotor and the links on it, rad/s. Of arms simulated with drives of 2 ζ ω = 100 rad/s, 60 to
-/// 120 explain gears and play about as well; without it gears at the shoulder seemed a third stiffer than they were, and play
-/// a quarter narrower.
-const HELD_RAD_S: f64 = 80.0;
-
 /// Standard error of stiffnesses and gaps that are told by a swing, over their value: how a drive damps is not in the
 /// log. Of 97 causes named in simulated arms with drives of 2 ζ ω = 100 rad/s they are off by 0 to 20 % in the median of a
-/// joint, and half or twice [`HELD_RAD_S`] moves single ones by up to a fifth. Of drives of 50, 100 and 400 rad/s the
+/// joint, and half or twice [`FEEDBACK_RAD_S`] moves single ones by up to a fifth. Of drives of 50, 100 and 400 rad/s the
 /// intervals that this makes held 86 of 91, 92 of 97 and 89 of 90 truths.
 pub(super) const HELD_ERROR: f64 = 0.15;
 
-/// Damping d_M of δ̇ by the drive, Nm s/rad, ω = [`HELD_RAD_S`]. It answers the rotor's speed with ω (M + I_a) q̇_M; of δ̇
+/// Damping d_M of δ̇ by the drive, Nm s/rad, ω = [`FEEDBACK_RAD_S`]. It answers the rotor's speed with ω (M + I_a) q̇_M; of δ̇
 /// the rotor has the share s = M/(M + I_a), so that the power is that of d_M = ω (M + I_a) s² = ω I_a s²/(1 − s).
 /// `mobility_per_kg_m2` is I_a⁻¹ + M⁻¹ = 1/(I_a s), M what the links resist with where the other joints are free to move.
 pub(super) fn held_nm_s_rad(mobility_per_kg_m2: f64, rotor_kg_m2: f64) -> f64 {
     let share = 1.0 / (mobility_per_kg_m2 * rotor_kg_m2);
-    HELD_RAD_S * rotor_kg_m2 * share.powi(2) / (1.0 - share)
+    FEEDBACK_RAD_S * rotor_kg_m2 * share.powi(2) / (1.0 - share)
 }
 
 /// An inertia on the spring of a gear.
@@ -219,7 +215,7 @@ impl Candidate for Elasticity {
             Complex64::new(stiffness, damping * omega).inv()
         });
         let rate = scene.derivative(&delta);
-        let acceleration = scene.derivative(&rate);
+        let acceleration = scene.accelerations(&rate);
         let (qd, sign) = (scene.motion.qd_rad_s.joint(j), scene.sign.joint(j));
         let epsilon = scene.arm.friction_epsilon_rad_s;
         let extra = samples(scene, |k| {
@@ -321,7 +317,7 @@ mod tests {
             link[0] += step_s * link[1];
         }
         let mobility = 1.0 / rotor + 1.0 / links;
-        let held = held_nm_s_rad(mobility, rotor) / HELD_RAD_S * omega;
+        let held = held_nm_s_rad(mobility, rotor) / FEEDBACK_RAD_S * omega;
         let faded = (energy(&motor, &link) / before).ln();
         let expected = -held * mobility * f64::from(count) * step_s;
         // The energy falls in waves: within one of them by up to d_M/(μ ω_0).

@@ -1,5 +1,5 @@
 //! Torque that repeats many times per turn: τ = A cos(N q + φ), of the gear's teeth (even multiples of the
-//! ratio) or the motor's poles. Fast ripple goes into the acceleration of the links, not into the torque, and above half
+//! ratio) or the motor's poles. Fast ripple goes into the acceleration of the links, hardly into the torque, and above half
 //! the rate the samples hold its alias: a log shows it as it shows whatever no controller answers at once
 //! ([`Scene::as_logged`]). Ripple that the drive answers, or that only its current has, is in the torque as it is at
 //! every sample (variant 1).

@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use super::Scene;
 use crate::diagnose::load::LinkTorque;
 use crate::diagnose::reversals::{Bends, Turning};
-use crate::identify::drive_answers;
+use crate::identify::{FEEDBACK_RAD_S, drive_answers};
 
 /// Instants per sample of [`Scene::fine_link_nm`] and [`Scene::instants`].
 pub const FINE: usize = 16;
@@ -163,10 +163,12 @@ impl Scene {
     }
 
     /// What the samples of a log show of a friction `torque_nm`, given at the instants, that the drive does not
-    /// answer at once ([`FineClock::as_logged`](crate::signal::FineClock::as_logged)).
+    /// answer at once but by its feedback ([`FineClock::as_logged`](crate::signal::FineClock::as_logged)).
     pub fn as_logged(&self, torque_nm: Vec<f64>) -> Vec<f64> {
         match &self.clock {
-            Some(clock) => clock.as_logged(&torque_nm, self.highest),
+            Some(clock) => {
+                clock.as_logged(&torque_nm, self.highest, FEEDBACK_RAD_S * self.instant_s())
+            }
             None => torque_nm,
         }
     }
@@ -189,8 +191,8 @@ impl Scene {
 
     /// How the drive of joint `j` may answer dry friction, as columns ([`drive_answers`]); none for a single run.
     pub fn answers(&self, j: usize) -> Vec<Vec<f64>> {
-        let columns = |clock| drive_answers(clock, &self.instants(j).sign, self.highest).into();
-        self.clock.as_ref().map_or(Vec::new(), columns)
+        let Some(clock) = &self.clock else { return Vec::new() };
+        drive_answers(clock, &self.instants(j).sign, self.highest, self.rate_hz).into()
     }
 
     /// Whether the drive of joint `j` may be what gives its answer number `which` ([`Self::answers`]) the coefficient

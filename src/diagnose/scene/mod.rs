@@ -199,6 +199,15 @@ impl Scene {
         out
     }
 
+    /// Accelerations (rad/s²) of velocities `qd_rad_s` at the samples, as far as those of the log are known: of a motion that
+    /// repeats up to the highest harmonic that is.
+    pub fn accelerations(&self, qd_rad_s: &[f64]) -> Vec<f64> {
+        match &self.clock {
+            Some(clock) => clock.derivative_up_to(qd_rad_s, self.rate_hz, self.highest),
+            None => self.derivative(qd_rad_s),
+        }
+    }
+
     /// Torque on the links of a gear at joint `j` that gives way, Nm, as far as the motion tells it.
     pub fn bending_nm(&self, j: usize) -> &[f64] {
         self.bending.told_nm.joint(j)
