@@ -82,11 +82,15 @@ impl FineClock {
     /// `feedback_per_tick`. Of that torque the log has the samples, of the rest of τ what they tell: a + (τ − a)˜. For what
     /// is slower than half the rate the two are alike, and faster ripple comes back with another height and phase.
     pub fn as_logged(&self, fine_nm: &[f64], highest: usize, feedback_per_tick: f64) -> Vec<f64> {
-        let answered = answered(fine_nm, feedback_per_tick);
-        let rest: Vec<f64> = fine_nm.iter().zip(&answered).map(|(nm, a)| nm - a).collect();
+        self.as_logged_but(fine_nm, &answered(fine_nm, feedback_per_tick), highest)
+    }
+
+    /// [`Self::as_logged`] where `given_nm` is all that a drive gives for it.
+    pub fn as_logged_but(&self, fine_nm: &[f64], given_nm: &[f64], highest: usize) -> Vec<f64> {
+        let rest: Vec<f64> = fine_nm.iter().zip(given_nm).map(|(nm, given)| nm - given).collect();
         let mut logged = self.unanswered_as_logged(&rest, highest);
-        let at_samples = answered.iter().step_by(self.ticks);
-        logged.iter_mut().zip(at_samples).for_each(|(nm, a)| *nm += a);
+        let at_samples = given_nm.iter().step_by(self.ticks);
+        logged.iter_mut().zip(at_samples).for_each(|(nm, given)| *nm += given);
         logged
     }
 

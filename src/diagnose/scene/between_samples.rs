@@ -179,14 +179,13 @@ impl Scene {
         Some(self.clock.as_ref()?.before_logged(y, self.highest))
     }
 
-    /// What the samples of a log show of a friction, given at the instants, of which the drive answers `delivered` at once.
-    pub fn as_logged_but(&self, mut torque_nm: Vec<f64>, delivered: &[f64]) -> Vec<f64> {
-        torque_nm.iter_mut().zip(delivered).for_each(|(nm, at_once)| *nm -= at_once);
-        let mut logged = self.as_logged(torque_nm);
-        let every = if self.clock.is_some() { FINE } else { 1 };
-        let at_samples = delivered.iter().step_by(every);
-        logged.iter_mut().zip(at_samples).for_each(|(nm, at_once)| *nm += at_once);
-        logged
+    /// What the samples of a log show of a friction `torque_nm`, given at the instants, for which the drive gives `given_nm`
+    /// in all.
+    pub fn as_logged_but(&self, torque_nm: Vec<f64>, given_nm: &[f64]) -> Vec<f64> {
+        match &self.clock {
+            Some(clock) => clock.as_logged_but(&torque_nm, given_nm, self.highest),
+            None => torque_nm,
+        }
     }
 
     /// How the drive of joint `j` may answer dry friction, as columns ([`drive_answers`]); none for a single run.
