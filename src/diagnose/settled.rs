@@ -18,7 +18,8 @@ const SETTLED: f64 = 4.0;
 
 /// What was `found` in `study`, and the estimate of the arm beside it, until one no longer changes the other.
 ///
-/// Of a motion that repeats, what was found only because the estimate was bent is dropped on the way; a single run has one
+/// Of a motion that repeats, what was found only because the estimate was bent is dropped on the way, and the arm estimated
+/// without it; a single run has one
 /// round, because what it shows is judged by what the causes leave ([`Kept::of_a_single_run`]).
 pub fn settled<'s>(
     mut study: Study<'s>,
@@ -35,12 +36,14 @@ pub fn settled<'s>(
         if !study.scene.periodic {
             break;
         }
+        let found = causes.len();
         let mut kept = Kept::taken_over(&study, causes);
+        let is_complete = kept.causes.len() == found;
         let dropped = kept.drop_unneeded(|_| true);
         let gained = kept.total_evidence() - evidence;
         evidence += gained;
         causes = kept.causes;
-        if dropped.is_empty() && gained < SETTLED {
+        if is_complete && dropped.is_empty() && gained < SETTLED {
             break;
         }
     }

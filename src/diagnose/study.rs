@@ -69,8 +69,16 @@ pub struct Study<'a> {
     pub torque: Image,
     /// Joints (0-based) whose readings are too bad to look for physics in them.
     pub left_out: Vec<usize>,
-    /// Families and sites of causes that an earlier estimate of the arm has shown.
-    shown: Vec<(usize, Option<usize>)>,
+    /// Causes that an earlier estimate of the arm has shown.
+    shown: Vec<Shown>,
+}
+
+/// A law of which an estimate of the arm left so many columns to be seen.
+struct Shown {
+    family: usize,
+    site: Option<usize>,
+    variant: usize,
+    columns: usize,
 }
 
 /// A column that keeps less than this share of its length outside the null model is not seen: what is left
@@ -210,7 +218,13 @@ impl<'a> Study<'a> {
         entries: &[&Entry],
     ) -> Self {
         self.scene = Scene::new(arm, set, theta, &self.regression.prepared);
-        self.shown = entries.iter().map(|entry| (entry.family, entry.site)).collect();
+        let shown = |&&Entry { family, site, shape, ref images }: &&Entry| Shown {
+            family,
+            site,
+            variant: shape.variant,
+            columns: images.len(),
+        };
+        self.shown = entries.iter().map(shown).collect();
         self.fill_entries();
         self
     }
@@ -265,17 +279,27 @@ impl<'a> Study<'a> {
         let lengths: Vec<f64> = images.iter().map(Image::square).collect();
         self.null.residualise_all(&mut images);
         let mut outside = images.into_iter().zip(lengths);
-        let least = if self.shown.contains(&(family, site)) { ABSORBED_AGAIN } else { ABSORBED };
         let entry = |(shape, columns): (&Shape, Vec<Column>)| {
             let own: Vec<(Image, f64)> = outside.by_ref().take(columns.len()).collect();
+            let shown = self.shown_columns(family, site, shape.variant);
+            let least = |column: usize| if column < shown { ABSORBED_AGAIN } else { ABSORBED };
             // Columns behind an absorbed one are parameters that go with it.
             let images: Vec<Image> = own
                 .into_iter()
-                .map_while(|(image, length)| is_seen(&image, length, least).then_some(image))
+                .enumerate()
+                .map_while(|(k, (image, length))| {
+                    is_seen(&image, length, least(k)).then_some(image)
+                })
                 .collect();
             (!images.is_empty()).then_some(Entry { family, site, shape: *shape, images })
         };
         shapes.iter().zip(columns).map(entry).collect()
+    }
+
+    /// How many columns of a law an earlier estimate of the arm has shown.
+    fn shown_columns(&self, family: usize, site: Option<usize>, variant: usize) -> usize {
+        let is_it = |s: &&Shown| (s.family, s.site, s.variant) == (family, site, variant);
+        self.shown.iter().filter(is_it).map(|s| s.columns).max().unwrap_or(0)
     }
 
     /// What `image` has outside the null model; `None` if that absorbs it.

@@ -19,6 +19,11 @@ use crate::signal::{FineClock, HarmonicPower};
 /// a quarter narrower, and of ripple faster than half the rate half was left along another motion.
 pub const FEEDBACK_RAD_S: f64 = 80.0;
 
+/// The same per tick of `tick_s`.
+pub fn feedback_per_tick(tick_s: f64) -> f64 {
+    FEEDBACK_RAD_S * tick_s
+}
+
 /// s̃ − s and its rate (per tick) at the samples of one period, of the sign `fine_sign` at every tick, with an
 /// acceleration that is known up to harmonic `highest`; `rate_hz` is that of the samples.
 pub fn drive_answers(
@@ -28,7 +33,7 @@ pub fn drive_answers(
     rate_hz: f64,
 ) -> [Vec<f64>; 2] {
     let n = fine_sign.len();
-    let feedback_per_tick = FEEDBACK_RAD_S / (rate_hz * clock.ticks() as f64);
+    let feedback_per_tick = feedback_per_tick(1.0 / (rate_hz * clock.ticks() as f64));
     let rate = |k: usize| 0.5 * (fine_sign[(k + 1) % n] - fine_sign[(k + n - 1) % n]);
     let rates: Vec<f64> = (0..n).map(rate).collect();
     [fine_sign, &rates].map(|fine| {

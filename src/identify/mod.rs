@@ -24,7 +24,7 @@ mod whiten;
 
 pub use bound::{KnownNoise, cramer_rao};
 pub use columns::ColumnPlan;
-pub use drive_answers::{FEEDBACK_RAD_S, drive_answers};
+pub use drive_answers::{FEEDBACK_RAD_S, drive_answers, feedback_per_tick};
 pub use error::IdentifyError;
 pub use estimation::{Estimate, Estimation, MotionAids};
 pub use fit::{Estimator, Fit, FitError, Fitter, Weighting};

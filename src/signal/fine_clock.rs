@@ -79,8 +79,9 @@ impl FineClock {
     /// over within a sample or two (a bristle behind a reversal) is missed by it or counted for too much.
     ///
     /// A drive answers q̇ a little later with ω M q̇, with which q̇ fades, so that its torque is ȧ = ω (τ − a), ω here
-    /// `feedback_per_tick`. Of that torque the log has the samples, of the rest of τ what they tell: a + (τ − a)˜. For what
-    /// is slower than half the rate the two are alike, and faster ripple comes back with another height and phase.
+    /// `feedback_per_tick` ([`answered`]). Of that torque the log has the samples, of the rest of τ what they tell: a + (τ − a)˜.
+    /// For what is slower than `highest` the two are alike; ripple faster than half the rate comes back with another height and
+    /// phase.
     pub fn as_logged(&self, fine_nm: &[f64], highest: usize, feedback_per_tick: f64) -> Vec<f64> {
         self.as_logged_but(fine_nm, &answered(fine_nm, feedback_per_tick), highest)
     }
@@ -154,17 +155,21 @@ impl FineClock {
     }
 }
 
-/// ȧ = ω (τ − a) of one period of a torque that repeats, τ straight from one tick to the next and ω `per_tick`.
-fn answered(torque_nm: &[f64], per_tick: f64) -> Vec<f64> {
+/// a of ȧ = ω (τ − a) along one period of a torque that repeats, τ from one tick to the next the mean of both and ω
+/// `per_tick`; nothing where ω is zero.
+pub fn answered(torque_nm: &[f64], per_tick: f64) -> Vec<f64> {
     let n = torque_nm.len();
     let keep = (-per_tick).exp();
     let step = |a: f64, k: usize| {
         let before = torque_nm[k.checked_sub(1).unwrap_or(n - 1)];
         a * keep + (1.0 - keep) * 0.5 * (before + torque_nm[k])
     };
-    // What it began with is forgotten within the ticks before.
     let run_in = ((FORGOTTEN / per_tick) as usize).min(n);
     let mut a = (n - run_in..n).fold(0.0, step);
+    if run_in == n && keep < 1.0 {
+        // Of a short period all those before it count.
+        a /= 1.0 - keep.powi(n as i32);
+    }
     (0..n)
         .map(|k| {
             a = step(a, k);

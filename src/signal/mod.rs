@@ -49,7 +49,7 @@ pub use butterworth::{Scratch, ZeroPhase};
 pub use decimate::Decimator;
 pub use differentiate::{central_2, central_4, hermite_acceleration};
 pub use error::SignalError;
-pub use fine_clock::FineClock;
+pub use fine_clock::{FineClock, answered};
 pub use gap_filling::{Filled, fill_gaps};
 pub use instants::{Bracket, Instants};
 pub use matched::{Heights, MatchedFilter};

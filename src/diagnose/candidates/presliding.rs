@@ -184,7 +184,10 @@ fn column(scene: &Scene, j: usize, way: &Way, z: &[f64], drive: Drive) -> Column
     let column = match drive {
         Drive::ByWantedVelocity(omega) if moves_alike(scene, j) => {
             let given = given(scene, j, way, z, omega);
-            let more: Vec<f64> = given.iter().zip(sign).map(|(g, sign)| g - FED * sign).collect();
+            // Beside what it gives for friction that turns round with the sign.
+            let by_feedback = scene.answered(sign);
+            let by_sign = sign.iter().zip(by_feedback).map(|(s, a)| FED * s + (1.0 - FED) * a);
+            let more: Vec<f64> = given.iter().zip(by_sign).map(|(g, own)| g - own).collect();
             scene.as_logged_but(less, &more)
         }
         Drive::Bristles => scene.as_logged_but(less.clone(), &less),

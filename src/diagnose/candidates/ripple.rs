@@ -10,7 +10,7 @@ use crate::dynamics::Real;
 /// See the module.
 pub struct Ripple;
 
-/// The variant that no drive answers.
+/// The variant that no drive answers at once.
 const OF_THE_LINKS: usize = 0;
 /// The variant that is in the torque at once. Along a single run, behind its low-pass, both are the same.
 const OF_THE_DRIVE: usize = 1;
@@ -138,7 +138,7 @@ fn of_phasors(w: &[f64], q: &[f64]) -> Vec<f64> {
     before.zip(&per_turn).map(|(before, own)| before - own).collect()
 }
 
-/// Orders at which `residual_nm` of joint `j` has most power: shapes to begin with.
+/// Orders at which `residual_nm` of joint `j` has most power, feedback of its drive aside: shapes to begin with.
 pub(in crate::diagnose) fn strongest_orders(
     scene: &Scene,
     j: usize,

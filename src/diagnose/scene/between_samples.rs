@@ -6,7 +6,8 @@ use std::borrow::Cow;
 use super::Scene;
 use crate::diagnose::load::LinkTorque;
 use crate::diagnose::reversals::{Bends, Turning};
-use crate::identify::{FEEDBACK_RAD_S, drive_answers};
+use crate::identify::{drive_answers, feedback_per_tick};
+use crate::signal::answered;
 
 /// Instants per sample of [`Scene::fine_link_nm`] and [`Scene::instants`].
 pub const FINE: usize = 16;
@@ -166,14 +167,21 @@ impl Scene {
     /// answer at once but by its feedback ([`FineClock::as_logged`](crate::signal::FineClock::as_logged)).
     pub fn as_logged(&self, torque_nm: Vec<f64>) -> Vec<f64> {
         match &self.clock {
-            Some(clock) => {
-                clock.as_logged(&torque_nm, self.highest, FEEDBACK_RAD_S * self.instant_s())
+            Some(_) => {
+                let given_nm = self.answered(&torque_nm);
+                self.as_logged_but(torque_nm, &given_nm)
             }
             None => torque_nm,
         }
     }
 
-    /// Weights of the means of a torque from one sample to the next in Σ y_k τ̃_k, τ̃ as logged
+    /// What feedback gives for a torque at the instants of a motion that repeats.
+    pub fn answered(&self, torque_nm: &[f64]) -> Vec<f64> {
+        answered(torque_nm, feedback_per_tick(self.instant_s()))
+    }
+
+    /// Weights of the means of a torque from one sample to the next in Σ y_k τ̃_k, τ̃ as logged where no
+    /// drive answers
     /// ([`FineClock::before_logged`](crate::signal::FineClock::before_logged)); `None` for a single run.
     pub fn before_logged(&self, y: &[f64]) -> Option<Vec<f64>> {
         Some(self.clock.as_ref()?.before_logged(y, self.highest))
