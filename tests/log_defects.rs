@@ -222,6 +222,13 @@ fn implausible_values_of_each_quantity() {
     }
 }
 
+/// Currents in milliamperes: only the rows near a zero of all joints could be currents in amperes.
+#[test]
+fn a_unit_in_which_most_rows_are_implausible() {
+    let result = edited(|rows| scale(rows, 13..19, 1000.0));
+    assert_says(result, &["run.csv", "implausible", "row 2", "actual_current_0", "units"]);
+}
+
 #[test]
 fn rows_of_another_width() {
     let result = edited(|rows| rows[51].truncate(12));

@@ -327,3 +327,22 @@ fn nonsense_is_refused_with_its_place_and_key() {
         assert!(toml::from_str::<File>(&text).is_err(), "{unknown}");
     }
 }
+
+/// `sims/effects.toml` shows every kind of effect, with every key that it has.
+#[test]
+fn the_list_of_effects_is_complete() {
+    let file = std::path::Path::new("sims/effects.toml");
+    let scenario = armid::montecarlo::Scenario::load(Some(file)).unwrap();
+    let mut shown: Vec<&str> = scenario.effects.iter().map(Effect::kind).collect();
+    let mut all = Effect::KINDS.to_vec();
+    shown.sort_unstable();
+    all.sort_unstable();
+    assert_eq!(shown, all);
+    let text = std::fs::read_to_string(file).unwrap();
+    let tables: Vec<&str> = text.split("[[effect]]").skip(1).collect();
+    for (effect, table) in scenario.effects.iter().zip(tables) {
+        for key in effect.parameters().keys() {
+            assert!(table.contains(&format!("\n{key} = ")), "{key} of {}", effect.kind());
+        }
+    }
+}

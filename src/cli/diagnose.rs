@@ -14,6 +14,7 @@ use crate::log::RowAccount;
 use crate::montecarlo::Scenario;
 use crate::output::check_writable;
 use crate::report::diagnose::{cause_table, held_out_table, limit_table, page};
+use crate::report::identify::IDENTIFY_SCHEMA;
 use crate::report::json::{Document, Program};
 use crate::report::replay::table as replay_table;
 
@@ -162,6 +163,10 @@ fn simulated_parameters(
     let text = std::fs::read_to_string(file).map_err(|e| format!("{}: {e}", file.display()))?;
     let result: IdentifiedParameters =
         serde_json::from_str(&text).map_err(|e| not_a_simulation(file, &e))?;
+    if result.schema != IDENTIFY_SCHEMA {
+        let why = format!("its schema is \"{}\"", result.schema);
+        return Err(not_a_simulation(file, &why).into());
+    }
     (0..set.rank())
         .map(|k| {
             let name = set.name(k);
@@ -173,10 +178,10 @@ fn simulated_parameters(
 }
 
 /// Why `file` cannot be compared with.
-fn not_a_simulation(file: &Path, error: &serde_json::Error) -> String {
+fn not_a_simulation(file: &Path, why: &dyn std::fmt::Display) -> String {
     let file = file.display();
     format!(
-        "{file}: neither a scenario (.toml) nor a result of `armid identify --json` ({error}); a second log goes \
+        "{file}: neither a scenario (.toml) nor a result of `armid identify --json` ({why}); a second log goes \
          behind the first, without --sim"
     )
 }
@@ -184,6 +189,7 @@ fn not_a_simulation(file: &Path, error: &serde_json::Error) -> String {
 /// What is needed of an identification's JSON.
 #[derive(Deserialize)]
 struct IdentifiedParameters {
+    schema: String,
     base_parameters: Vec<IdentifiedParameter>,
 }
 
@@ -219,5 +225,23 @@ impl Rows {
         let part = |p: &crate::log::SetAside| SetAside { reason: p.reason.text(), count: p.count };
         let set_aside = account.set_aside.iter().map(part).collect();
         Self { read: account.read, used: account.used, set_aside }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::Arm;
+
+    /// The JSON of a diagnosis has base parameters as well, but no simulation is described by what is left beside its causes.
+    #[test]
+    fn a_diagnosis_is_no_simulation() {
+        let arm = Arm::built_in("ur5").unwrap();
+        let set = BaseSet::find(&arm, Parameterisation::full(arm.dof(), true)).unwrap();
+        let file = tempfile::Builder::new().suffix(".json").tempfile().unwrap();
+        let diagnosis = r#"{"schema": "armid.diagnose/1", "base_parameters": []}"#;
+        std::fs::write(file.path(), diagnosis).unwrap();
+        let error = simulated_parameters(file.path(), &set).unwrap_err().to_string();
+        assert!(error.contains("its schema is \"armid.diagnose/1\""), "{error}");
     }
 }

@@ -16,7 +16,7 @@ use crate::identify::{
 use crate::log::{Layout, Log, read_log};
 use crate::output::check_writable;
 use crate::report::identify::{
-    Declined, IDENTIFY_SCHEMA, Result as IdentifyResult, Training, Validation, page,
+    Declined, IDENTIFY_SCHEMA, Result as IdentifyResult, Training, Validation, facts, page,
     parameter_table, residual_table,
 };
 use crate::report::json::{Document, Input, Program};
@@ -231,7 +231,13 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
     for warning in result.notes() {
         say!("note: {warning}");
     }
+    for fact in facts(&result) {
+        say!("{fact}");
+    }
     say!("\n{}", result.sentence());
+    if let Some(trust) = result.trust() {
+        say!("{trust}");
+    }
     for fact in result.physical().map_or_else(Vec::new, |physical| physical.facts()) {
         say!("{fact}");
     }

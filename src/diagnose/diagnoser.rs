@@ -26,7 +26,8 @@ use super::verdict::{Cause, Diagnosis, Rival, Rms, Verdict};
 use crate::base::BaseSet;
 use crate::dynamics::Model;
 use crate::identify::{
-    Identification, Identifier, Measurement, Options, gravity_question, gravity_remark,
+    Identification, Identifier, Measurement, Options, drive_limit_remark, gravity_question,
+    gravity_remark,
 };
 use crate::robot::{Arm, JointSignals};
 
@@ -216,6 +217,7 @@ impl<'a> Diagnoser<'a> {
             let warning = "the clock was mended: contacts are not looked for, and what sits beside is less sure";
             diagnosis.warnings.push(warning.into());
         }
+        diagnosis.warnings.extend(drive_limit_remark(self.arm, m.torque_nm));
         if tears > 0 {
             let warning = "the angles jump as no arm can; what looks like a touch there is none";
             diagnosis.warnings.push(warning.into());

@@ -196,7 +196,7 @@ pub enum LogError {
         /// What was seen, where, and what to put into the layout.
         suspicion: UnitSuspicion,
     },
-    /// Fewer than two rows are left.
+    /// Fewer than two rows are left, or most rows hold what the quantities cannot be.
     #[error("{file}: of {} rows read {} can be used{}", account.read, account.used, main_reason(account))]
     NoUsableRows {
         /// The file.
@@ -336,7 +336,7 @@ pub enum LayoutFault {
 pub enum UnitSuspicion {
     /// Positions and velocities are related by the factor of another unit.
     #[error(
-        "rows {first_row} to {last_row}, joint {joint}: the position moves {ratio:.4e} times as far as the integral of \
+        "rows {first_row} to {last_row}, joint {joint}: the position moves {ratio:.4} times as far as the integral of \
          the velocity (from {q_from:.4} to {q_to:.4} rad as read): {quantity} looks like {unit}; \
          put {quantity} = \"{unit}\" under [units] in a layout file (--layout)"
     )]

@@ -34,7 +34,7 @@ const WIDTH_ROWS: usize = 50;
 ///
 /// # Errors
 /// Any [`LogError`] about files, layouts, units and joints; [`LogError::NoUsableRows`] if fewer than two
-/// rows are left.
+/// rows are left, or most hold what the quantities cannot be.
 pub fn read_log(path: &Path, layout: &Layout, joints: usize) -> Result<Log, LogError> {
     let file = path.display().to_string();
     if path.is_dir() {
@@ -278,7 +278,8 @@ impl Table {
 
     fn require_two(&self, account: &mut RowAccount, file: &str) -> Result<(), LogError> {
         account.used = self.rows.len();
-        if account.used < 2 {
+        // What most rows have is no garbage, but another quantity or unit.
+        if account.used < 2 || 2 * account.count(Reason::Implausible) > account.read {
             return Err(LogError::NoUsableRows {
                 file: file.to_owned(),
                 account: std::mem::take(account),

@@ -285,6 +285,36 @@ mod tests {
         assert!(largest_difference(&clock.as_logged(&fine, 20, 0.0), &shown) > 10.0 * lost);
     }
 
+    /// What is slow is shown as it is, whatever a drive answers: the mean over a tick and the sums over a cell lose (ω Δ)²/12 each.
+    #[test]
+    fn what_is_slow_is_logged_as_it_is_behind_a_drive() {
+        let clock = FineClock::new(N, TICKS);
+        let logged = clock.as_logged(&wave(TICKS * N, 3.0), 20, 0.04);
+        let tick = TAU * 3.0 / (TICKS * N) as f64;
+        assert!(largest_difference(&logged, &wave(N, 3.0)) < tick * tick / 6.0 + 1e-13);
+    }
+
+    /// A period that is over before an answer is forgotten is answered as often as it repeats; a constant in full.
+    #[test]
+    fn short_periods_are_answered_as_many() {
+        for per_tick in [1e-3, 0.1, 50.0] {
+            let short = answered(&wave(30, 2.0), per_tick);
+            let periods = (FORGOTTEN / per_tick / 30.0).ceil() as usize + 1;
+            let long = answered(&wave(30, 2.0).repeat(periods), per_tick);
+            assert!(largest_difference(&short, &long[..30]) < 1e-13, "{per_tick}");
+            assert!(largest_difference(&answered(&[2.0; 30], per_tick), &[2.0; 30]) < 1e-13);
+        }
+        assert_eq!(answered(&wave(30, 2.0), 0.0), [0.0; 30]);
+    }
+
+    #[test]
+    fn a_derivative_ends_where_it_is_told() {
+        let clock = FineClock::new(N, TICKS);
+        let both: Vec<f64> = wave(N, 3.0).iter().zip(wave(N, 15.0)).map(|(a, b)| a + b).collect();
+        let slow = clock.derivative_up_to(&both, 125.0, 10);
+        assert!(largest_difference(&slow, &clock.derivative(&wave(N, 3.0), 125.0)) < 1e-10);
+    }
+
     /// A pulse between two samples, which no sample shows, is logged with all of its area.
     #[test]
     fn a_pulse_between_samples_is_logged() {

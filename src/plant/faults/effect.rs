@@ -76,6 +76,9 @@ macro_rules! effects {
         }
 
         impl Effect {
+            /// All kinds.
+            pub const KINDS: &[&str] = &[$($kind),*];
+
             /// Its `kind`.
             pub fn kind(&self) -> &'static str {
                 match self {

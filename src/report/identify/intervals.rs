@@ -47,15 +47,17 @@ impl Intervals {
             Floor::Torque => "the scatter of the torque between periods",
             Floor::TorqueAndMotion => "the scatter of torque and motion between periods",
         };
+        let chance =
+            if p_value < 0.01 { format!("{p_value:.1e}") } else { format!("{p_value:.2}") };
         let reason = if test.fits() {
             format!(
                 "The model explains what repeats in the torque: what it leaves is {statistic:.2} times what \
-                 {scatter} leads to expect (chance {p_value:.2})."
+                 {scatter} leads to expect (chance {chance})."
             )
         } else {
             format!(
                 "The 95 % intervals are not to be trusted: what repeats in the torque and is not explained is \
-                 {statistic:.2} times what {scatter} would leave (chance {p_value:.1e}). They cover the noise, not the \
+                 {statistic:.2} times what {scatter} would leave (chance {chance}). They cover the noise, not the \
                  error of the model; armid diagnose looks for its cause."
             )
         };

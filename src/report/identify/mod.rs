@@ -11,7 +11,7 @@ use serde::Serialize;
 
 pub use declined::Declined;
 pub use intervals::{Intervals, TestResult};
-pub use page::{page, parameter_table, residual_table};
+pub use page::{facts, page, parameter_table, residual_table};
 
 use super::physical::{Physical, StandardParameter, standard_parameters};
 use crate::base::BaseSet;
@@ -19,7 +19,7 @@ use crate::identify::covariance::CovarianceKind;
 use crate::identify::physical::PhysicalEstimate;
 use crate::identify::{
     Condition, Estimator, FitError, Identification, Prediction, Processing, Regression, Residual,
-    gravity_question, gravity_remark, identifies_the_arm, not_identified,
+    drive_limit_remark, gravity_question, gravity_remark, identifies_the_arm, not_identified,
 };
 use crate::log::Log;
 use crate::robot::Arm;
@@ -171,6 +171,9 @@ impl Result {
         let theta = &identification.fit.theta;
         let doubt = gravity_remark(arm, set, training.nominal, theta, &identification.covariance);
         warnings.extend(doubt.clone());
+        // Logs whose torques could not be read came no further than that.
+        let torques = training.logs.iter().filter_map(|log| log.torque_nm(arm).ok());
+        warnings.extend(torques.filter_map(|torque_nm| drive_limit_remark(arm, &torque_nm)));
         Ok(Self {
             robot: arm.name.clone(),
             log: names(training.logs),
@@ -217,6 +220,11 @@ impl Result {
         self.verdict == NOT_IDENTIFIED
     }
 
+    /// Why the intervals are trusted, or why nothing is known of that; distrust stands in [`Self::sentence`].
+    pub fn trust(&self) -> Option<&str> {
+        (self.intervals.trusted != Some(false)).then_some(&*self.intervals.reason)
+    }
+
     /// The warnings that the verdict does not begin with.
     pub fn notes(&self) -> impl Iterator<Item = &String> {
         self.warnings.iter().filter(|warning| self.doubt.as_ref() != Some(warning))
@@ -240,8 +248,8 @@ impl Result {
         let open = match self.not_identified.len() {
             0 => String::new(),
             n => format!(
-                " {n} moments of inertia of light bodies stay open ({}): no torque in this motion \
-                 depends on them.",
+                " {n} moments of inertia of light bodies stay open ({}): the torque of this motion depends on \
+                 them too little.",
                 self.not_identified.join(", ")
             ),
         };

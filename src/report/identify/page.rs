@@ -71,13 +71,8 @@ pub fn residual_table(result: &Result) -> Table {
     table
 }
 
-/// The page: verdict, torque measured and predicted, residuals, parameters.
-pub fn page(
-    result: &Result,
-    training: &Training,
-    validations: &[Validation],
-    program: Program,
-) -> std::result::Result<Page, ReportError> {
+/// How the log was read and the numbers were made.
+pub fn facts(result: &Result) -> Vec<String> {
     let processing = &result.processing;
     let periods = match processing.period_s {
         Some(period) => format!(
@@ -89,7 +84,7 @@ pub fn page(
             processing.cutoff_hz.unwrap_or(f64::NAN)
         ),
     };
-    let facts = vec![
+    vec![
         format!("{} rows read, {} used; {periods}", result.rows.read, result.rows.used),
         format!(
             "estimator {}, σ from {}: {}",
@@ -99,14 +94,23 @@ pub fn page(
             "condition of the regressor {:.0}, with columns of unit length {:.1}; e_N = {:.4}",
             result.condition.regressor, result.condition.scaled, result.residual.e_n
         ),
-    ];
+    ]
+}
+
+/// The page: verdict, torque measured and predicted, residuals, parameters.
+pub fn page(
+    result: &Result,
+    training: &Training,
+    validations: &[Validation],
+    program: Program,
+) -> std::result::Result<Page, ReportError> {
     let status = match result.intervals.trusted {
         _ if result.is_declined() => Status::Bad,
         _ if result.doubt.is_some() => Status::Warn,
         Some(false) => Status::Warn,
         _ => Status::Good,
     };
-    let verdict = Verdict { status, sentence: result.sentence(), facts };
+    let verdict = Verdict { status, sentence: result.sentence(), facts: facts(result) };
     let subtitle = format!("{} from {}", result.robot, result.log);
     let mut page = Page::new("Identified parameters", subtitle, verdict, program);
     let fit = Prediction::of(training.regression, &training.identification.fit.theta);
