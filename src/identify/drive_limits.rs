@@ -23,8 +23,8 @@ pub fn drive_limit_remark(arm: &Arm, torque_nm: &JointSignals) -> Option<String>
     (!joints.is_empty()).then(|| {
         format!(
             "drives are at their torque limits in some samples: {}; what torque does where it leaves the limit is faster \
-             than the log and may look like a gear that gives way, and what was designed within limits is better \
-             measured with less speed or load",
+             than the log and may look like a gear that gives way or a torque that is recorded late; with less speed or \
+             load the motion is followed",
             joints.join(", ")
         )
     })
