@@ -395,14 +395,14 @@ impl Cause {
             (estimate.map_or(f64::NAN, |e| e.value), half)
         };
         let (mass, mass_sigma) = pair("mass_kg");
-        let missing = if mass < 0.0 { " less than in the simulation" } else { "" };
+        let which = if mass < 0.0 { "missing from" } else { "on" };
         let mass = mass.abs();
         let com = ["com_x_m", "com_y_m", "com_z_m"].map(pair);
         let place = com.map(|(value, _)| format!("{value:.4}")).join(", ");
         let sigma = com.map(|(_, sigma)| format!("{sigma:.4}")).join(", ");
         format!(
-            "A body of {mass:.3} ± {mass_sigma:.3} kg at ({place}) ± ({sigma}) m on the flange{missing} (± one σ, \
-             last joint's frame)."
+            "A body of {mass:.3} ± {mass_sigma:.3} kg at ({place}) ± ({sigma}) m {which} the flange (± one σ, last \
+             joint's frame)."
         )
     }
 }
