@@ -1,6 +1,7 @@
 //! When a family's law counts as a cause: chance does not explain it, the evidence is for it, it is its family's own,
 //! and it is more than what the other causes leave by the approximate form of their laws.
 
+use super::candidates::Shape;
 use super::image::{Image, Span};
 use super::selection::{Contender, Kept};
 use super::study::Entry;
@@ -76,7 +77,8 @@ impl Kept<'_, '_> {
     }
 
     /// See [`super::candidates::Candidate::is_its_own`]; a coefficient counts as what is nearest to the law's own of
-    /// all that noise leaves possible. A law that holds a parameter twice, so that it could be of any size by its
+    /// all that noise leaves possible, and so does one with which the shape does not go
+    /// ([`super::candidates::Candidate::agreeing`]) unless that which does explains as much. A law that holds a parameter twice, so that it could be of any size by its
     /// coefficients alone, is the family's own only where the data tell its shape from the smallest: play that is none
     /// but for flanks that give way is a soft gear.
     pub(super) fn is_its_own(&self, entry: &Entry, others: &Span, residual: &Image) -> bool {
@@ -88,13 +90,31 @@ impl Kept<'_, '_> {
             return false;
         }
         let span = study.span(entry, others);
-        let mut b = span.solve(residual);
+        let b = span.solve(residual);
         let Some(&first) = b.first() else { return true };
         let sigma = study.statistic.covariance(&span, residual)[(0, 0)].max(0.0).sqrt();
-        [0.0, -DOUBT, DOUBT].into_iter().any(|doubt| {
-            b[0] = first + doubt * sigma;
-            study.families[family].is_its_own(&study.scene, site, shape, &b)
-        })
+        let law = &study.families[family];
+        let some_doubt = |holds: &dyn Fn(&[f64]) -> bool| {
+            let mut b = b.clone();
+            [0.0, -DOUBT, DOUBT].into_iter().any(|doubt| {
+                b[0] = first + doubt * sigma;
+                holds(&b)
+            })
+        };
+        some_doubt(&|b| law.is_its_own(&study.scene, site, shape, b))
+            && (some_doubt(&|b| law.agreeing(shape, b) == shape)
+                || self.is_as_good(entry, law.agreeing(shape, &b), others, residual))
+    }
+
+    /// Whether `entry` explains hardly more than it would with another `shape`.
+    fn is_as_good(&self, entry: &Entry, shape: Shape, others: &Span, residual: &Image) -> bool {
+        let study = self.study;
+        let gain = |e: &Entry| study.score(e, others, residual).map(|score| score.gain);
+        let other = study.entry(entry.family, entry.site, shape);
+        match (gain(entry), other.as_ref().and_then(gain)) {
+            (Some(own), Some(other)) => own - other < FAR_AHEAD,
+            _ => false,
+        }
     }
 
     /// 2 ln of the odds for the shape of `entry` against the smallest of its variant.

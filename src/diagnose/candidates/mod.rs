@@ -176,6 +176,12 @@ pub trait Candidate: Sync {
         shape
     }
 
+    /// The shape nearest to `shape` that goes with the coefficients `b`, for laws whose shape is known from them too. What
+    /// only another shape explains is not quite the law's own.
+    fn agreeing(&self, shape: Shape, _b: &[f64]) -> Shape {
+        shape
+    }
+
     /// The quantity that says how large the effect is, for detection limits.
     fn size(&self, quantities: &[Quantity]) -> Option<Quantity> {
         quantities.first().copied()

@@ -22,6 +22,9 @@ const SHARPEST: f64 = 0.05;
 const CHANGES: [f64; 11] = [-0.9, -0.8, -0.6, -0.35, -0.15, 0.15, 0.4, 0.8, 1.6, 3.2, 6.4];
 /// The coefficient over the shape: all dry friction of a joint turns round, and an estimate is off by less than this.
 const WHOLE: std::ops::RangeInclusive<f64> = 0.4..=2.5;
+/// The same at most where friction turns round and does nothing else. Of widths in 82 logs that tell the shape it was up to
+/// 1.4; friction that falls while it turns round, under the same law, goes to the end of what is possible.
+const MOST_WHOLE: f64 = 1.5;
 /// Standard error of widths less than the model's, over what they are less: what a drive answers while friction turns round
 /// within a sample is not known. In logs of another simulator, whose drives feed nothing forward, a width of 0.002 rad/s left
 /// 0.14 of its strength to late torques of the wrist.
@@ -84,6 +87,14 @@ impl Candidate for ReversalWidth {
 
     fn quantities(&self, scene: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
         vec![quantity("width_rad_s", scene.arm.friction_epsilon_rad_s + b[0], "rad/s")]
+    }
+
+    fn agreeing(&self, shape: Shape, b: &[f64]) -> Shape {
+        if b[0] / shape.value > MOST_WHOLE {
+            Shape { value: b[0] / MOST_WHOLE, ..shape }
+        } else {
+            shape
+        }
     }
 
     fn without_effect(&self, scene: &Scene) -> f64 {

@@ -78,7 +78,8 @@ impl Scene {
     }
 
     /// Velocity of joint `j` at its instants, rad/s, while dry friction turns round by `law` within a few `width_rad_s` and
-    /// the drive delivers a share of what the model expects (see `reversals`): `fed`, or what its answer to reversals tells.
+    /// the drive delivers a share of what the model expects (see `reversals`): `fed`, and of the rest what its feedback gives; or
+    /// what its answer to reversals tells.
     /// Of a single run it is what was recorded.
     pub fn turning_rad_s(
         &self,
@@ -98,7 +99,13 @@ impl Scene {
             return joint.series_rad_s.clone();
         };
         let delivered: Vec<f64> = match fed {
-            Some(fed) => joint.expected.iter().map(|sign| fed * sign).collect(),
+            Some(fed) => {
+                let lacks = |(qd, sign): (&f64, &f64)| law(*qd) - fed * sign;
+                let lacking: Vec<f64> =
+                    joint.series_rad_s.iter().zip(&joint.expected).map(lacks).collect();
+                let back = self.answered(&lacking);
+                joint.expected.iter().zip(back).map(|(sign, back)| fed * sign + back).collect()
+            }
             None => told.beyond_nm[j].iter().map(|nm| nm / self.coulomb_nm[j]).collect(),
         };
         let bends = self.bends.get_or_init(|| Bends::new(clock));
