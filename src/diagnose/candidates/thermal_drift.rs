@@ -27,7 +27,9 @@ impl Candidate for ThermalDrift {
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let j = joint(site);
         let drive = &scene.arm.joints[j].drive;
-        let (qd, sign) = (scene.motion.qd_rad_s.joint(j), scene.sign.joint(j));
+        let qd = scene.motion.qd_rad_s.joint(j);
+        // What a drive feeds forward does not warm up with the friction.
+        let sign = scene.as_logged(scene.instants(j).sign.clone());
         let n = scene.samples();
         let friction = (0..n * scene.periods).map(|k| {
             let time_s = scene.lead_in_s + k as f64 / scene.rate_hz;
