@@ -7,11 +7,10 @@
 
 use std::ops::Range;
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
-
 use super::Touch;
 use super::bump::{self, Felt, Noise, ORDINARY, Push};
 use super::disturbed::with_disturbed_periods;
+use super::rarity::{as_far_in, far};
 use crate::diagnose::friction_drift::FrictionDrift;
 use crate::diagnose::verdict::{Cause, Estimate};
 use crate::diagnose::whitening::FLOOR;
@@ -22,9 +21,6 @@ use crate::signal::{
     MatchedFilter, Resampler, SignalError, bridged_gap_s, find_period, natural_rate_hz,
 };
 
-/// A bump of so many σ in one joint is a contact, and one as rare in all joints together. Noise makes one once in 10⁸ places,
-/// and of a log of 80 s some 10⁵ places know nothing of each other.
-const FAR: f64 = 5.8;
 /// A joint felt a contact that is known to be there if it deviates by so many σ (once in 10⁴ by chance), and by
 /// this share of the joint that felt it most: the arm that gives way moves the other joints a little.
 const FELT: f64 = 4.0;
@@ -41,6 +37,8 @@ const LONGEST_OF_PERIOD: f64 = 0.5;
 const APART_S: f64 = 0.3;
 /// Bumps closer than this are one contact, s: an arm that was hit swings on for a while.
 const TOGETHER_S: f64 = 0.5;
+/// A reading of so many σ that stands alone is wild.
+const WILD: f64 = 5.8;
 /// Bumps in one log.
 const MOST: usize = 40;
 /// The trimmed mean of fewer periods is moved by one contact.
@@ -222,13 +220,12 @@ impl Repeats {
         let deviation_nm = self.deviations(aside, known);
         let filter = MatchedFilter::new(&deviation_nm, self.rate_hz)?;
         let rows: Vec<usize> = (0..self.joints.len()).collect();
-        let far_together = far_in(rows.len());
         let apart = (APART_S * self.rate_hz) as usize;
-        let longest_s = LONGEST_S.min(LONGEST_OF_PERIOD * self.period / self.rate_hz);
         let mut highest = 1.0;
         let mut best = None;
-        let mut length_s = SHORTEST_S.max(4.0 / self.rate_hz);
-        while length_s < longest_s {
+        for length_s in self.lengths_s() {
+            let far = self.far(length_s);
+            let far_together = as_far_in(rows.len(), far);
             let heights = filter.heights(|t_s| bump::bump(ORDINARY, length_s, t_s));
             let noise = Noise::of(&heights);
             let together = noise.felt_by(&rows, &[]);
@@ -244,22 +241,36 @@ impl Repeats {
                 let scores = noise.scores(&heights, centre);
                 let gain = noise.gain(&scores);
                 // What is not so far in all joints is not in any.
-                if gain <= (highest * FAR).powi(2) {
+                if gain <= (highest * far).powi(2) {
                     continue;
                 }
-                let far = |felt: &Felt| felt.of_known_noise(felt.gain(&scores)).sqrt();
-                let alone: Vec<f64> = alone.iter().map(far).collect();
+                let known = |felt: &Felt| felt.of_known_noise(felt.gain(&scores)).sqrt();
+                let alone: Vec<f64> = alone.iter().map(known).collect();
                 let together = together.of_known_noise(gain).sqrt();
-                let score = (farthest(&alone) / FAR).max(together / far_together);
+                let score = (farthest(&alone) / far).max(together / far_together);
                 if score > highest {
                     highest = score;
                     let [felt, quiet] = felt_and_quiet(&scores, &alone);
                     best = Some(Candidate { centre, length_s, felt, quiet });
                 }
             }
-            length_s *= LENGTHEN;
         }
         Ok(best)
+    }
+
+    /// Lengths of the bumps that are looked for, s.
+    fn lengths_s(&self) -> Vec<f64> {
+        let longest_s = LONGEST_S.min(LONGEST_OF_PERIOD * self.period / self.rate_hz);
+        let shortest_s = SHORTEST_S.max(4.0 / self.rate_hz);
+        std::iter::successors(Some(shortest_s), |length_s| Some(LENGTHEN * length_s))
+            .take_while(|length_s| *length_s < longest_s)
+            .collect()
+    }
+
+    /// σ from which on a bump of `length_s` in one joint is a contact.
+    fn far(&self, length_s: f64) -> f64 {
+        let duration_s = self.window.len() as f64 / self.rate_hz;
+        far(length_s, duration_s, self.lengths_s().len(), self.joints.len())
     }
 
     /// What the log knows of the push at `candidate`: where several joints feel it, whose levers change while
@@ -279,7 +290,7 @@ impl Repeats {
         let weigh_on =
             |felt: &Felt| bump::weigh(&filter, felt, &self.joints, centres.clone(), length_s);
         let felt = felt_by(&candidate.felt);
-        let far = far_in(candidate.felt.len());
+        let far = as_far_in(candidate.felt.len(), self.far(length_s));
         // What its neighbourhood tells of the noise may make it less than it seemed.
         let is_far = |push: &Push| felt.of_known_noise(push.gain) > far * far;
         let Some(mut all) = weigh_on(&felt).filter(is_far) else { return Ok(None) };
@@ -334,7 +345,7 @@ fn level_wild_values(y: &mut [f64], reach: usize) {
     let sigma = robust_sigma(&mut changes) / 1.5f64.sqrt();
     for k in all {
         let size = measured[k].abs();
-        if size > FAR * sigma && beside(k).iter().all(|y| y.abs() < 0.5 * size) {
+        if size > WILD * sigma && beside(k).iter().all(|y| y.abs() < 0.5 * size) {
             y[k + 1 - reach..k + reach].fill(level(k));
         }
     }
@@ -352,12 +363,6 @@ fn felt_and_quiet(scores: &[f64], alone: &[f64]) -> [Vec<usize>; 2] {
 
 fn farthest(scores: &[f64]) -> f64 {
     scores.iter().fold(0.0, |a, z| a.max(z.abs()))
-}
-
-/// √(zᵀ C⁻¹ z) of `joints` joints that noise passes as rarely as one joint passes [`FAR`].
-fn far_in(joints: usize) -> f64 {
-    let chance = 2.0 * Normal::standard().cdf(-FAR);
-    ChiSquared::new(joints as f64).map_or(FAR, |chi2| chi2.inverse_cdf(1.0 - chance).sqrt())
 }
 
 #[cfg(test)]
@@ -494,12 +499,5 @@ mod tests {
         let push = Hidden { start_s: 31.0, end_s: 31.8, nm: [1.2, -1.2] };
         let cause = &found(7, &push).unwrap().causes[0];
         assert_eq!(cause.joint, None);
-    }
-
-    /// χ²₆ exceeds x with the probability exp(−x/2) (1 + x/2 + x²/8); 7.0181² does so as one Gaussian exceeds 5.8: with 6.63 · 10⁻⁹.
-    #[test]
-    fn a_bump_in_all_joints_is_as_rare_as_one_in_one() {
-        assert!((far_in(1) - 5.8).abs() < 1e-3);
-        assert!((far_in(6) - 7.0181).abs() < 1e-3, "{}", far_in(6));
     }
 }

@@ -9,6 +9,7 @@ mod beside_model;
 mod between_periods;
 mod bump;
 mod disturbed;
+mod rarity;
 
 use std::ops::Range;
 
