@@ -7,6 +7,7 @@ use thiserror::Error;
 
 use crate::dynamics::{Model, Parameter, ParameterLayout};
 use crate::report::identify::IDENTIFY_SCHEMA;
+use crate::report::saved::{SavedError, load};
 use crate::robot::{Arm, RobotError};
 
 /// An identified arm.
@@ -21,22 +22,9 @@ pub struct ArmResult {
 /// A result file that holds no arm.
 #[derive(Debug, Error)]
 pub enum ResultError {
-    /// The file could not be read.
-    #[error("{file}: {source}")]
-    Read {
-        /// The file.
-        file: String,
-        /// Why.
-        source: std::io::Error,
-    },
     /// Not a result of `armid identify`.
-    #[error("{file}: not a result of armid identify --physical --json: {message}")]
-    Format {
-        /// The file.
-        file: String,
-        /// What is wrong.
-        message: String,
-    },
+    #[error("{0} (expected is a result of armid identify --physical --json)")]
+    Saved(#[from] SavedError),
     /// Only combinations were identified.
     #[error(
         "{file}: it has no standard parameters, only combinations of them: run identify --physical"
@@ -72,7 +60,6 @@ pub enum ResultError {
 
 #[derive(Deserialize)]
 struct ResultFile {
-    schema: String,
     robot: String,
     standard_parameters: Option<Vec<Value>>,
 }
@@ -87,14 +74,7 @@ impl ArmResult {
     /// Reads the result in `path`; it is about `robot`, or the built-in arm it names.
     pub fn load(path: &Path, robot: Option<&str>) -> Result<Self, ResultError> {
         let file = path.display().to_string();
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| ResultError::Read { file: file.clone(), source })?;
-        let format = |message: String| ResultError::Format { file: file.clone(), message };
-        let result: ResultFile =
-            serde_json::from_str(&text).map_err(|error| format(error.to_string()))?;
-        if result.schema != IDENTIFY_SCHEMA {
-            return Err(format(format!("its schema is \"{}\"", result.schema)));
-        }
+        let result: ResultFile = load(path, IDENTIFY_SCHEMA)?;
         let values = result.standard_parameters.filter(|values| !values.is_empty());
         let values = values.ok_or_else(|| ResultError::BaseOnly { file: file.clone() })?;
         let arm = Arm::load(robot.unwrap_or(&result.robot))?;

@@ -17,6 +17,7 @@ use crate::report::diagnose::{cause_table, held_out_table, limit_table, page};
 use crate::report::identify::IDENTIFY_SCHEMA;
 use crate::report::json::{Document, Program};
 use crate::report::replay::table as replay_table;
+use crate::report::saved::{SavedFault, load};
 
 /// Say what the rigid model with linear friction gets wrong along a log, and what explains it.
 #[derive(Debug, Args)]
@@ -160,13 +161,11 @@ fn simulated_parameters(
         let scenario = Scenario::load(Some(file))?;
         return Ok(set.values(&Model::new(&scenario.arm).standard_parameters()));
     }
-    let text = std::fs::read_to_string(file).map_err(|e| format!("{}: {e}", file.display()))?;
     let result: IdentifiedParameters =
-        serde_json::from_str(&text).map_err(|e| not_a_simulation(file, &e))?;
-    if result.schema != IDENTIFY_SCHEMA {
-        let why = format!("its schema is \"{}\"", result.schema);
-        return Err(not_a_simulation(file, &why).into());
-    }
+        load(file, IDENTIFY_SCHEMA).map_err(|error| match error.fault {
+            SavedFault::Read(_) => error.to_string(),
+            fault => not_a_simulation(file, &fault),
+        })?;
     (0..set.rank())
         .map(|k| {
             let name = set.name(k);
@@ -189,7 +188,6 @@ fn not_a_simulation(file: &Path, why: &dyn std::fmt::Display) -> String {
 /// What is needed of an identification's JSON.
 #[derive(Deserialize)]
 struct IdentifiedParameters {
-    schema: String,
     base_parameters: Vec<IdentifiedParameter>,
 }
 

@@ -6,12 +6,13 @@ use serde::Deserialize;
 
 use crate::base::BaseSet;
 use crate::excitation::design::DesignError;
+use crate::report::identify::IDENTIFY_SCHEMA;
+use crate::report::saved::load;
 use crate::robot::Arm;
 
 /// The part of a result file that is read; its other fields are for others.
 #[derive(Deserialize)]
 struct ResultFile {
-    schema: String,
     robot: String,
     base_parameters: Vec<Known>,
 }
@@ -22,17 +23,12 @@ struct Known {
     sigma: Option<f64>,
 }
 
-const SCHEMA: &str = "armid.identify/1";
-
 /// σ of every base parameter of `base` from the result file; ∞ where the file does not know it.
 pub fn sigmas(path: &Path, arm: &Arm, base: &BaseSet) -> Result<Vec<f64>, DesignError> {
     let file = path.display().to_string();
     let fault = |message: String| DesignError::Prior { file: file.clone(), message };
-    let text = std::fs::read_to_string(path).map_err(|e| fault(e.to_string()))?;
-    let result: ResultFile = serde_json::from_str(&text).map_err(|e| fault(e.to_string()))?;
-    if result.schema != SCHEMA {
-        return Err(fault(format!("its schema is \"{}\", expected \"{SCHEMA}\"", result.schema)));
-    }
+    let result: ResultFile =
+        load(path, IDENTIFY_SCHEMA).map_err(|error| fault(error.fault.to_string()))?;
     if result.robot != arm.name {
         return Err(fault(format!("it is about \"{}\", not \"{}\"", result.robot, arm.name)));
     }

@@ -12,6 +12,7 @@ use crate::montecarlo::Scenario;
 use crate::montecarlo::study::{NoiseStudy, study};
 use crate::report::json::{Input, Program};
 use crate::report::noise_study::{markdown, page};
+use crate::report::saved::{SavedError, load};
 
 #[derive(Debug, Args)]
 pub(super) struct NoiseArgs {
@@ -37,22 +38,9 @@ pub(super) struct NoiseArgs {
 /// Results that cannot be put together.
 #[derive(Debug, Error)]
 enum NoiseStudyError {
-    /// The file could not be read.
-    #[error("{file}: {source}")]
-    Read {
-        /// The file.
-        file: String,
-        /// Why.
-        source: std::io::Error,
-    },
     /// Not a result of this study.
-    #[error("{file}: not a result of armid study noise --json: {message}")]
-    Format {
-        /// The file.
-        file: String,
-        /// What is wrong.
-        message: String,
-    },
+    #[error("{0} (expected is a result of armid study noise --json)")]
+    Saved(#[from] SavedError),
     /// One scenario would stand there twice.
     #[error("{file}: scenario {scenario} is already there")]
     Twice {
@@ -68,27 +56,9 @@ const SCHEMA: &str = "armid.study-noise/2";
 /// A result file.
 #[derive(Deserialize)]
 struct Saved {
-    schema: String,
     program: Program,
     #[serde(flatten)]
     study: NoiseStudy,
-}
-
-impl Saved {
-    fn load(path: &Path) -> Result<Self, NoiseStudyError> {
-        let file = path.display().to_string();
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| NoiseStudyError::Read { file: file.clone(), source })?;
-        let saved: Self = serde_json::from_str(&text).map_err(|error| NoiseStudyError::Format {
-            file: file.clone(),
-            message: error.to_string(),
-        })?;
-        if saved.schema != SCHEMA {
-            let message = format!("its schema is \"{}\", not \"{SCHEMA}\"", saved.schema);
-            return Err(NoiseStudyError::Format { file, message });
-        }
-        Ok(saved)
-    }
 }
 
 /// The study so far, and what made it.
@@ -105,7 +75,8 @@ impl Collected {
         let study = NoiseStudy { scenarios: Vec::new() };
         let mut all = Self { study, inputs: Vec::new(), commands: Vec::new() };
         for file in files {
-            let Saved { study, program, .. } = Saved::load(file)?;
+            let Saved { study, program, .. } =
+                load(file, SCHEMA).map_err(NoiseStudyError::Saved)?;
             for scenario in study.scenarios {
                 all.check_new(file, &scenario.name)?;
                 all.study.scenarios.push(scenario);

@@ -1,0 +1,85 @@
+//! Reads back what [`Document`](super::json::Document) wrote.
+
+use std::path::Path;
+
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use thiserror::Error;
+
+/// A file that is no document of the schema that was asked for.
+#[derive(Debug, Error)]
+#[error("{file}: {fault}")]
+pub struct SavedError {
+    /// The file.
+    pub file: String,
+    /// What is wrong with it.
+    pub fault: SavedFault,
+}
+
+/// See [`SavedError`].
+#[derive(Debug, Error)]
+pub enum SavedFault {
+    /// It cannot be read.
+    #[error(transparent)]
+    Read(#[from] std::io::Error),
+    /// It is no JSON, or lacks a field.
+    #[error(transparent)]
+    Json(#[from] serde_json::Error),
+    /// It is another document.
+    #[error("its schema is \"{found}\", expected \"{expected}\"")]
+    OtherSchema {
+        /// The file's.
+        found: String,
+        /// The one that was asked for.
+        expected: &'static str,
+    },
+}
+
+#[derive(Deserialize)]
+struct Head {
+    schema: String,
+}
+
+/// The fields that `T` has of the document in `path`, which has to be of `schema`.
+///
+/// Errors: the file cannot be read, is no JSON, is of another schema, or lacks a field of `T`.
+pub fn load<T: DeserializeOwned>(path: &Path, schema: &'static str) -> Result<T, SavedError> {
+    let read = || -> Result<T, SavedFault> {
+        let text = std::fs::read_to_string(path)?;
+        let Head { schema: found } = serde_json::from_str(&text)?;
+        if found != schema {
+            return Err(SavedFault::OtherSchema { found, expected: schema });
+        }
+        Ok(serde_json::from_str(&text)?)
+    };
+    read().map_err(|fault| SavedError { file: path.display().to_string(), fault })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, Deserialize)]
+    struct Sigma {
+        sigma: f64,
+    }
+
+    fn loaded(text: &str) -> Result<f64, String> {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        let saved: Result<Sigma, _> = load(file.path(), "armid.sigma/2");
+        saved.map(|saved| saved.sigma).map_err(|error| error.to_string())
+    }
+
+    /// Another document is said to be one, whatever fields it has.
+    #[test]
+    fn what_is_wrong_is_said() {
+        assert_eq!(loaded(r#"{"schema": "armid.sigma/2", "sigma": 0.5, "n": 3}"#), Ok(0.5));
+        let error = loaded(r#"{"schema": "armid.sigma/1", "s": 0.5}"#).unwrap_err();
+        assert!(error.ends_with("its schema is \"armid.sigma/1\", expected \"armid.sigma/2\""));
+        let error = loaded(r#"{"schema": "armid.sigma/2"}"#).unwrap_err();
+        assert!(error.contains("missing field `sigma`"), "{error}");
+        assert!(loaded("{}").unwrap_err().contains("missing field `schema`"));
+        assert!(loaded("").unwrap_err().contains("EOF"));
+    }
+}
