@@ -26,13 +26,13 @@ impl Estimate {
         let [low, high] = self.ci95;
         let (below, above) = (self.value - low, high - self.value);
         if self.says_nothing() {
-            let [low, high] = [low, high].map(two_digits);
+            let [low, high] = [low, high].map(|v| digits(v, 2));
             return format!("hardly known (between {low} and {high}) {}", self.unit)
                 .trim_end()
                 .to_owned();
         }
         if above > UNEVEN * below || below > UNEVEN * above {
-            let [value, low, high] = [self.value, low, high].map(two_digits);
+            let [value, low, high] = [self.value, low, high].map(|v| digits(v, 2));
             return format!("{value} (between {low} and {high}) {}", self.unit)
                 .trim_end()
                 .to_owned();
@@ -287,7 +287,7 @@ impl Diagnosis {
             out.push(format!(
                 "Joint {} shows {} Nm (rms) that no known effect explains; it depends most clearly on the {}.",
                 unexplained.joint,
-                two_digits(unexplained.rms_nm),
+                digits(unexplained.rms_nm, 2),
                 unexplained.axis
             ));
         }
@@ -303,7 +303,9 @@ impl Diagnosis {
                     .into(),
             });
         }
-        out.extend(self.held_out.iter().filter_map(|held_out| self.does_not_carry_over(held_out)));
+        let along =
+            |held_out| self.does_not_carry_over(held_out).or_else(|| self.gain_along(held_out));
+        out.extend(self.held_out.iter().filter_map(along));
         out
     }
 }
@@ -316,6 +318,26 @@ const EVEN_ODDS: f64 = 0.5;
 const OF_ANOTHER_ARM: f64 = 3.0;
 
 impl Diagnosis {
+    /// The sentence about what the causes change along another log, on the joint of which they change most.
+    fn gain_along(&self, held_out: &HeldOut) -> Option<String> {
+        if self.causes.is_empty() {
+            return None;
+        }
+        let HeldOut { before_rms_nm, after_rms_nm, .. } = held_out;
+        let both = before_rms_nm.iter().zip(after_rms_nm);
+        let (j, (before, after)) = both.enumerate().max_by(|(_, a), (_, b)| {
+            let change = |(before, after): (&f64, &f64)| (before / after).ln().abs();
+            change(*a).total_cmp(&change(*b))
+        })?;
+        Some(format!(
+            "Along {} the error of joint {}, noise included, is {} Nm rms with what is named and {} Nm without.",
+            held_out.log,
+            j + 1,
+            digits(*after, 3),
+            digits(*before, 3)
+        ))
+    }
+
     /// The sentence about a log along which the model errs far more, friction at standstill left open.
     fn does_not_carry_over(&self, held_out: &HeldOut) -> Option<String> {
         let noise = |j: usize| self.noise_floor_nm.as_ref().map_or(0.0, |noise| noise[j]);
@@ -364,7 +386,7 @@ impl Cause {
         };
         if let Some(gain) = self.gain_fraction {
             let of = if noise_is_known {
-                "of what the noise floor leaves to explain, on data not used for the fit"
+                "of what the noise floor leaves to explain, in periods of this log that were not used for the fit"
             } else {
                 "of the error's mean square, in stretches of time left out of its fit"
             };
@@ -412,15 +434,16 @@ fn unit_suffix(unit: &str) -> String {
     format!("_{}", unit.to_lowercase().replace(['/', ' '], "_").replace("1_", "per_"))
 }
 
-/// With two digits, or more before the point.
-fn two_digits(value: f64) -> String {
+/// With so many digits, or more before the point.
+fn digits(value: f64, count: usize) -> String {
     if value.abs() >= 1e6 {
         return format!("{value:.1e}");
     }
     if value == 0.0 {
         return "0".to_owned();
     }
-    let decimals = (1.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 9.0) as usize;
+    let decimals =
+        (count as f64 - 1.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 9.0) as usize;
     format!("{value:.decimals$}")
 }
 
