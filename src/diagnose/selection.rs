@@ -108,13 +108,16 @@ impl<'s, 'a> Kept<'s, 'a> {
             };
             let finalists = &contenders[..FINALISTS.min(contenders.len())];
             // What explains a joint best without being its own law is in the place of something unknown, and
-            // what explains less is not that.
+            // what explains less is not that. What all joints have in common is no single one's: several with a law each look
+            // like another one of the arm.
             let foreign: Vec<&Contender> = finalists
                 .iter()
                 .filter(|c| !self.is_its_own(&c.entry, &others, &residual))
                 .collect();
             let is_behind = |c: &Contender| {
-                foreign.iter().any(|f| {
+                let may_stand_for =
+                    |f: &Contender| f.entry.site.is_some() || c.entry.site.is_none();
+                foreign.iter().filter(|f| may_stand_for(f)).any(|f| {
                     f.evidence > c.evidence + FAR_AHEAD && !self.is_significant_beside(c, f)
                 })
             };
