@@ -297,6 +297,23 @@ fn friction_near_rest_that_falls_at_once() {
     assert_eq!(d.causes.len(), 1, "{:?}", d.sentences);
 }
 
+/// Such curves on several joints look like one sharper turn of all of them, with more friction in it than there is.
+#[test]
+fn friction_near_rest_of_several_joints() {
+    let joints = [3, 4, 5, 6];
+    let curve = |joint: usize| {
+        let extra_nm = if joint < 4 { 3.0 } else { 0.45 };
+        format!(
+            "[[effect]]\nkind = \"stribeck\"\njoint = {joint}\nextra_nm = {extra_nm:?}\nvs_rad_s = 0.05\n\
+             exponent = 2\n"
+        )
+    };
+    let d = diagnose_along("ur5_validation", 5, &joints.map(curve).concat());
+    let mut named: Vec<_> = d.causes.iter().map(|c| (c.kind, c.joint)).collect();
+    named.sort_by_key(|(_, joint)| *joint);
+    assert_eq!(named, joints.map(|j| (Kind::Stribeck, Some(j))), "{:?}", d.sentences);
+}
+
 /// Beside such a curve a sharper turn with more friction in it than there is explains much: who does not know the curve is
 /// told that something is left, not that the turn is sharp.
 #[test]

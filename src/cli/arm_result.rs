@@ -22,8 +22,8 @@ pub struct ArmResult {
 /// A result file that holds no arm.
 #[derive(Debug, Error)]
 pub enum ResultError {
-    /// Not a result of `armid identify`.
-    #[error("{0} (expected is a result of armid identify --physical --json)")]
+    /// The file cannot be read, or is no result of `armid identify`.
+    #[error("{0} (wanted: a result of armid identify --physical --json)")]
     Saved(#[from] SavedError),
     /// Only combinations were identified.
     #[error(

@@ -38,8 +38,8 @@ pub(super) struct NoiseArgs {
 /// Results that cannot be put together.
 #[derive(Debug, Error)]
 enum NoiseStudyError {
-    /// Not a result of this study.
-    #[error("{0} (expected is a result of armid study noise --json)")]
+    /// The file cannot be read, or is no result of this study.
+    #[error("{0} (wanted: a result of armid study noise --json)")]
     Saved(#[from] SavedError),
     /// One scenario would stand there twice.
     #[error("{file}: scenario {scenario} is already there")]

@@ -3,7 +3,7 @@
 //! The samples of a velocity, joined by their Fourier series, say how the joint moves as long as nothing is over within a
 //! sample. Friction that turns round faster is: what the drive does not deliver at once bends the velocity, by
 //! −a F Δ(s(q̇) − β s_ε(q̇)), with a the joint's acceleration per torque, F its dry friction, s the law by which that turns
-//! round, and β s_ε what the drive gives it. Of a bend at t′ a series of samples lacks
+//! round, and β s_ε what the drive gives it, forward and by its feedback. Of a bend at t′ a series of samples lacks
 //!
 //! B(t, t′) = (t − t′)₊ − Σₙ (nT − t′)₊ sinc(t/T − n),
 //!

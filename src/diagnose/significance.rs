@@ -78,9 +78,9 @@ impl Kept<'_, '_> {
 
     /// See [`super::candidates::Candidate::is_its_own`]; a coefficient counts as what is nearest to the law's own of
     /// all that noise leaves possible, and so does one with which the shape does not go
-    /// ([`super::candidates::Candidate::agreeing`]) unless that which does explains as much. A law that holds a parameter twice, so that it could be of any size by its
-    /// coefficients alone, is the family's own only where the data tell its shape from the smallest: play that is none
-    /// but for flanks that give way is a soft gear.
+    /// ([`super::candidates::Candidate::agreeing`]) unless that which does explains as much. A law that holds a parameter
+    /// twice, so that it could be of any size by its coefficients alone, is the family's own only where the data tell its
+    /// shape from the smallest: play that is none but for flanks that give way is a soft gear.
     pub(super) fn is_its_own(&self, entry: &Entry, others: &Span, residual: &Image) -> bool {
         let study = self.study;
         let Entry { family, site, shape, .. } = *entry;

@@ -81,7 +81,7 @@ pub struct Cause {
     pub confidence: f64,
     /// Physical parameters.
     pub parameters: std::collections::BTreeMap<&'static str, Estimate>,
-    /// Share of the explainable mean square that it removes, on data not used for the fit; along a single
+    /// Share of the explainable mean square that it removes, in other periods than its size is fitted to; along a single
     /// run of the joint's whole mean square beside the other causes, in stretches of time left out of its
     /// fit. Null where no data were left for that.
     pub gain_fraction: Option<f64>,
@@ -269,8 +269,7 @@ impl Diagnosis {
         let cause = payload.cause();
         if let (Verdict::NothingFound, Some(_)) = (self.verdict, &cause) {
             self.verdict = Verdict::CauseNamed;
-            // The sentence that nothing was found is the last.
-            self.sentences.pop();
+            self.sentences.retain(|sentence| !sentence.starts_with(NOTHING_FOUND));
         }
         let noise_is_known = self.noise_floor_nm.is_some();
         self.sentences.extend(cause.iter().map(|c| c.sentence(noise_is_known)));
@@ -310,6 +309,8 @@ impl Diagnosis {
     }
 }
 
+/// How the sentence begins that says so.
+const NOTHING_FOUND: &str = "Nothing found";
 /// An interval that reaches so much farther to one side than to the other is told by its ends.
 const UNEVEN: f64 = 1.2;
 /// What is less sure than this is said with a "may".
@@ -318,19 +319,28 @@ const EVEN_ODDS: f64 = 0.5;
 const OF_ANOTHER_ARM: f64 = 3.0;
 
 impl Diagnosis {
-    /// The sentence about what the causes change along another log, on the joint of which they change most.
+    /// The sentence about what laws change along another log while joints move, on the joint with a cause of which they
+    /// change most.
     fn gain_along(&self, held_out: &HeldOut) -> Option<String> {
-        if self.causes.is_empty() {
-            return None;
-        }
-        let HeldOut { before_rms_nm, after_rms_nm, .. } = held_out;
-        let both = before_rms_nm.iter().zip(after_rms_nm);
-        let (j, (before, after)) = both.enumerate().max_by(|(_, a), (_, b)| {
+        let is_a_law = |cause: &&Cause| {
+            let once = matches!(cause.kind, Kind::Contact | Kind::Payload);
+            !once && !cause.kind.is_of_the_record()
+        };
+        let has_cause = |j: usize| {
+            let mut laws = self.causes.iter().filter(is_a_law);
+            laws.any(|cause| cause.joint.is_none_or(|joint| joint == j + 1))
+        };
+        let HeldOut { before_moving_rms_nm, after_moving_rms_nm, .. } = held_out;
+        let both = before_moving_rms_nm.iter().zip(after_moving_rms_nm).enumerate();
+        let told =
+            both.filter(|(j, (before, after))| has_cause(*j) && **before > 0.0 && **after > 0.0);
+        let (j, (before, after)) = told.max_by(|(_, a), (_, b)| {
             let change = |(before, after): (&f64, &f64)| (before / after).ln().abs();
             change(*a).total_cmp(&change(*b))
         })?;
         Some(format!(
-            "Along {} the error of joint {}, noise included, is {} Nm rms with what is named and {} Nm without.",
+            "Along {} the error of joint {} while it moves, noise included, is {} Nm rms with what is named and {} Nm \
+             without.",
             held_out.log,
             j + 1,
             digits(*after, 3),
@@ -386,7 +396,7 @@ impl Cause {
         };
         if let Some(gain) = self.gain_fraction {
             let of = if noise_is_known {
-                "of what the noise floor leaves to explain, in periods of this log that were not used for the fit"
+                "of what the noise floor leaves to explain, in other periods of this log than its size is fitted to"
             } else {
                 "of the error's mean square, in stretches of time left out of its fit"
             };

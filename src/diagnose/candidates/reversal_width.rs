@@ -6,7 +6,8 @@
 //!
 //! Where friction turns round within a sample the joint does not move as the samples say: what the drive does not
 //! deliver at once bends its velocity ([`Scene::turning_rad_s`]). What its answer to reversals would tell is told by the
-//! width of the file; drives feed dry friction forward by that width, or not at all: these are the variants.
+//! width of the file; drives feed dry friction forward by that width, or not at all, and give of the rest what their feedback
+//! does: these are the variants.
 
 use super::*;
 use crate::dynamics::Real;

@@ -78,8 +78,8 @@ impl Scene {
     }
 
     /// Velocity of joint `j` at its instants, rad/s, while dry friction turns round by `law` within a few `width_rad_s` and
-    /// the drive delivers a share of what the model expects (see `reversals`): `fed`, and of the rest what its feedback gives; or
-    /// what its answer to reversals tells.
+    /// the drive delivers what it gives of that (see `reversals`). It feeds the share `fed` of what the model expects forward, and
+    /// gives by its feedback what is lacking along the samples; `None`: what its answer to reversals tells.
     /// Of a single run it is what was recorded.
     pub fn turning_rad_s(
         &self,
