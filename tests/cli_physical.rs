@@ -198,7 +198,7 @@ fn results_that_hold_no_arm_are_refused_with_what_to_do() {
     };
     refused("nothing.json", &["nothing.json"]);
     std::fs::write(folder.join("cut.json"), &good[..good.len() / 2]).unwrap();
-    refused("cut.json", &["cut.json", "a result of armid identify"]);
+    refused("cut.json", &["cut.json", "wanted: a result of armid identify --physical --json"]);
     refused("truth.json", &["truth.json", "armid.truth/1"]);
     edited("base.json", &|v| v["standard_parameters"] = Value::Null);
     refused("base.json", &["base.json", "run identify --physical"]);

@@ -75,8 +75,7 @@ impl Collected {
         let study = NoiseStudy { scenarios: Vec::new() };
         let mut all = Self { study, inputs: Vec::new(), commands: Vec::new() };
         for file in files {
-            let Saved { study, program, .. } =
-                load(file, SCHEMA).map_err(NoiseStudyError::Saved)?;
+            let Saved { study, program } = load(file, SCHEMA).map_err(NoiseStudyError::Saved)?;
             for scenario in study.scenarios {
                 all.check_new(file, &scenario.name)?;
                 all.study.scenarios.push(scenario);

@@ -269,7 +269,8 @@ impl Diagnosis {
         let cause = payload.cause();
         if let (Verdict::NothingFound, Some(_)) = (self.verdict, &cause) {
             self.verdict = Verdict::CauseNamed;
-            self.sentences.retain(|sentence| !sentence.starts_with(NOTHING_FOUND));
+            let nothing_found = self.nothing_found();
+            self.sentences.retain(|sentence| sentence != nothing_found);
         }
         let noise_is_known = self.noise_floor_nm.is_some();
         self.sentences.extend(cause.iter().map(|c| c.sentence(noise_is_known)));
@@ -291,16 +292,7 @@ impl Diagnosis {
             ));
         }
         if out.is_empty() {
-            out.push(match self.noise_floor_nm {
-                Some(_) => "Nothing found: what the model leaves is noise, as the scatter between periods shows; \
-                            the detection limits say what would have been seen. What only moves the parameters (a \
-                            body on the flange, gravity, a longer link) shows beside a simulation (--sim) or a second \
-                            log."
-                    .into(),
-                None => "Nothing found above what a single run can show; the motion does not repeat, so that \
-                         the noise is judged from the residual itself."
-                    .into(),
-            });
+            out.push(self.nothing_found().into());
         }
         let along =
             |held_out| self.does_not_carry_over(held_out).or_else(|| self.gain_along(held_out));
@@ -309,8 +301,6 @@ impl Diagnosis {
     }
 }
 
-/// How the sentence begins that says so.
-const NOTHING_FOUND: &str = "Nothing found";
 /// An interval that reaches so much farther to one side than to the other is told by its ends.
 const UNEVEN: f64 = 1.2;
 /// What is less sure than this is said with a "may".
@@ -319,6 +309,21 @@ const EVEN_ODDS: f64 = 0.5;
 const OF_ANOTHER_ARM: f64 = 3.0;
 
 impl Diagnosis {
+    /// The sentence where nothing is named.
+    fn nothing_found(&self) -> &'static str {
+        match self.noise_floor_nm {
+            Some(_) => {
+                "Nothing found: what the model leaves is noise, as the scatter between periods shows; the detection \
+                 limits say what would have been seen. What only moves the parameters (a body on the flange, gravity, \
+                 a longer link) shows beside a simulation (--sim) or a second log."
+            }
+            None => {
+                "Nothing found above what a single run can show; the motion does not repeat, so that the noise is \
+                 judged from the residual itself."
+            }
+        }
+    }
+
     /// The sentence about what laws change along another log while joints move, on the joint with a cause of which they
     /// change most.
     fn gain_along(&self, held_out: &HeldOut) -> Option<String> {

@@ -10,7 +10,7 @@ use std::ops::Range;
 use super::Touch;
 use super::bump::{self, Felt, Noise, ORDINARY, Push};
 use super::disturbed::with_disturbed_periods;
-use super::rarity::{as_far_in, far};
+use super::rarity;
 use crate::diagnose::friction_drift::FrictionDrift;
 use crate::diagnose::verdict::{Cause, Estimate};
 use crate::diagnose::whitening::FLOOR;
@@ -37,7 +37,7 @@ const LONGEST_OF_PERIOD: f64 = 0.5;
 const APART_S: f64 = 0.3;
 /// Bumps closer than this are one contact, s: an arm that was hit swings on for a while.
 const TOGETHER_S: f64 = 0.5;
-/// A reading of so many σ that stands alone is wild.
+/// A reading of so many σ that stands alone is wild: noise makes one of 10⁸.
 const WILD: f64 = 5.8;
 /// Bumps in one log.
 const MOST: usize = 40;
@@ -228,7 +228,7 @@ impl Repeats {
         let mut best = None;
         for length_s in self.lengths_s() {
             let far = self.far(length_s);
-            let far_together = as_far_in(rows.len(), far);
+            let far_together = rarity::as_far_in(rows.len(), far);
             let heights = filter.heights(|t_s| bump::bump(ORDINARY, length_s, t_s));
             let noise = Noise::of(&heights);
             let together = noise.felt_by(&rows, &[]);
@@ -273,7 +273,7 @@ impl Repeats {
     /// σ from which on a bump of `length_s` in one joint is a contact.
     fn far(&self, length_s: f64) -> f64 {
         let duration_s = self.window.len() as f64 / self.rate_hz;
-        far(length_s, duration_s, self.lengths_s().len(), self.joints.len())
+        rarity::far(length_s, duration_s, self.lengths_s().len(), self.joints.len())
     }
 
     /// What the log knows of the push at `candidate`: where several joints feel it, whose levers change while
@@ -293,7 +293,7 @@ impl Repeats {
         let weigh_on =
             |felt: &Felt| bump::weigh(&filter, felt, &self.joints, centres.clone(), length_s);
         let felt = felt_by(&candidate.felt);
-        let far = as_far_in(candidate.felt.len(), self.far(length_s));
+        let far = rarity::as_far_in(candidate.felt.len(), self.far(length_s));
         // What its neighbourhood tells of the noise may make it less than it seemed.
         let is_far = |push: &Push| felt.of_known_noise(push.gain) > far * far;
         let Some(mut all) = weigh_on(&felt).filter(is_far) else { return Ok(None) };

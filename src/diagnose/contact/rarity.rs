@@ -7,7 +7,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 const FALSE_ALARM: f64 = 0.001;
 
 /// How often per length of itself a bump that is looked for with 1 − u² passes a height of z σ either way in white noise, over
-/// e^{−z²/2}: 2 √(∫b'²/∫b²)/(2π) = √10/π (Rice 1945). Whitened by coloured noise bumps are narrower, and pass two to six times
+/// e^{−z²/2}: 2 √(∫b'²/∫b²)/(2π) = √10/π (Rice 1945). Whitened by coloured noise bumps are narrower, and pass up to eight times
 /// as often. Bumps of neighbouring lengths are half of the time the same one, and heights of noise that few samples tell count as
 /// lower: in simulated noise of several colours the three together leave a quarter to one and a half of the chance.
 const PASSES: f64 = 1.006_6;
