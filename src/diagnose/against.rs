@@ -11,10 +11,10 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use super::candidates::{Candidate, Quantity, Shape};
+use super::chance;
 use super::image::{Column, Image, Span};
 use super::judgement::{TELLS_APART, probability_of_class};
 use super::kind::Kind;
-use super::significance::FALSE_ALARM;
 use super::study::{Entry, Study};
 use super::verdict::{Cause, Estimate, Moved, Rival};
 use crate::base::BaseSet;
@@ -116,7 +116,7 @@ impl Search<'_> {
     /// Forward selection, with removal of what a later change makes needless.
     fn select(&self) -> Vec<usize> {
         let tests = self.changes.len() as f64;
-        let significant = |s: &Scored| s.evidence > 0.0 && s.probability * tests < FALSE_ALARM;
+        let significant = |s: &Scored| s.evidence > 0.0 && s.probability * tests < chance::CHANGE;
         let mut taken: Vec<usize> = Vec::new();
         while taken.len() < MOST_CHANGES {
             let Some(best) = self.scored(&taken).into_iter().next().filter(significant) else {

@@ -6,7 +6,7 @@
 //! squares. They fit a push, which comes once and has one direction, hardly at all, and take four of the thousands
 //! of degrees of freedom of noise.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, Const, SMatrix, SVector};
 
 use crate::median::trimmed_mean;
 use crate::robot::JointSignals;
@@ -64,25 +64,50 @@ impl FrictionDrift {
 
     /// Takes the best fit to the samples that are `used` out of the deviations `y` of joint `j`.
     pub fn remove(&self, j: usize, y: &mut [f64], used: impl Fn(usize) -> bool) {
-        let qd = self.qd_rad_s.joint(j);
-        let row = |k: usize| {
-            let friction = [(qd[k] / STANDSTILL_RAD_S).tanh(), qd[k]];
-            let [fade, line] = [self.courses[0][k], self.courses[1][k]];
-            [friction[0] * fade, friction[1] * fade, friction[0] * line, friction[1] * line]
-        };
-        let mut gram = DMatrix::<f64>::zeros(COLUMNS, COLUMNS);
-        let mut right = DVector::<f64>::zeros(COLUMNS);
+        let Some(gram) = self.gram(j, &used) else { return };
+        let mut right = SVector::<f64, COLUMNS>::zeros();
         for (k, y) in y.iter().enumerate().filter(|(k, _)| used(*k)) {
-            let x = DVector::from(row(k).to_vec());
-            gram.ger(1.0, &x, &x, 1.0);
-            right.axpy(*y, &x, 1.0);
+            right += self.row(j, k) * *y;
         }
-        // A joint that stands still has no friction that could drift.
-        let Some(gram) = gram.cholesky() else { return };
         let b = gram.solve(&right);
         for (k, y) in y.iter_mut().enumerate() {
-            *y -= row(k).iter().zip(b.iter()).map(|(x, b)| x * b).sum::<f64>();
+            *y -= self.row(j, k).dot(&b);
         }
+    }
+
+    /// Orthonormal deviations of joint `j` that [`Self::remove`] leaves nothing of, by sample.
+    pub fn directions(&self, j: usize) -> Vec<Vec<f64>> {
+        let whitened = self.gram(j, |_| true).and_then(|gram| gram.l().try_inverse());
+        let Some(inverse) = whitened else { return Vec::new() };
+        let n = self.qd_rad_s.samples();
+        let rows = |c: usize| (0..n).map(move |k| (k, c));
+        (0..COLUMNS)
+            .map(|c| {
+                rows(c).map(|(k, c)| inverse.row(c).dot(&self.row(j, k).transpose())).collect()
+            })
+            .collect()
+    }
+
+    /// What the four shares do to sample `k`.
+    fn row(&self, j: usize, k: usize) -> SVector<f64, COLUMNS> {
+        let qd = self.qd_rad_s.joint(j)[k];
+        let friction = [(qd / STANDSTILL_RAD_S).tanh(), qd];
+        let [fade, line] = [self.courses[0][k], self.courses[1][k]];
+        [friction[0] * fade, friction[1] * fade, friction[0] * line, friction[1] * line].into()
+    }
+
+    /// Of the samples that are `used`; `None` for a joint that stands still, which has no friction that could drift.
+    fn gram(
+        &self,
+        j: usize,
+        used: impl Fn(usize) -> bool,
+    ) -> Option<Cholesky<f64, Const<COLUMNS>>> {
+        let mut gram = SMatrix::<f64, COLUMNS, COLUMNS>::zeros();
+        for k in (0..self.qd_rad_s.samples()).filter(|k| used(*k)) {
+            let x = self.row(j, k);
+            gram += x * x.transpose();
+        }
+        gram.cholesky()
     }
 }
 
@@ -114,5 +139,25 @@ mod tests {
         FrictionDrift::beside_mean(&period_qd, n / period).remove(0, &mut y, |_| true);
         let repeats = |k: usize| (y[k] - y[k % period]).abs();
         assert!((0..n).map(repeats).fold(0.0, f64::max) < 1e-9);
+    }
+
+    /// Directions are of length one and at right angles, and of each nothing is left.
+    #[test]
+    fn directions_are_what_is_removed() {
+        let (n, periods) = (200, 4);
+        let omega = std::f64::consts::TAU / n as f64;
+        let qd = JointSignals::from_fn(1, n, |_, k| (omega * k as f64).sin());
+        let drift = FrictionDrift::beside_mean(&qd, periods);
+        let directions = drift.directions(0);
+        assert_eq!(directions.len(), COLUMNS);
+        for (i, a) in directions.iter().enumerate() {
+            for (k, b) in directions.iter().enumerate() {
+                let product: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
+                assert!((product - f64::from(u8::from(i == k))).abs() < 1e-9, "{i} {k} {product}");
+            }
+            let mut left = a.clone();
+            drift.remove(0, &mut left, |_| true);
+            assert!(left.iter().all(|left| left.abs() < 1e-9));
+        }
     }
 }

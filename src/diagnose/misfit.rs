@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
+use super::chance;
 use super::image::{Column, Image, Span};
 use super::scene::Scene;
 use super::statistic::Statistic;
@@ -12,8 +13,6 @@ use super::verdict::Unexplained;
 /// Edges of the bands in which the residual is compared with noise, Hz; the last one ends with the rows.
 /// Errors of friction and load live in the slow ones, of gears and clocks in the fast ones.
 const BANDS_HZ: [f64; 5] = [0.0, 2.0, 5.0, 10.0, 20.0];
-/// Chance that a log without faults is called unexplained, per test.
-const FALSE_ALARM: f64 = 0.0005;
 /// A part of the curve that keeps less than this share of its length belongs to the model.
 const ABSORBED: f64 = 0.1;
 /// A part of the curve that keeps less than this share has no height of its own that could be drawn.
@@ -138,10 +137,10 @@ pub fn unexplained(
     let by_evidence = |a: &Curve, b: &Curve| a.evidence.total_cmp(&b.evidence);
     found.sort_by(by_evidence);
     let best = found.last()?;
-    if best.probability * tests < FALSE_ALARM {
+    if best.probability * tests < chance::UNEXPLAINED {
         return found.pop().map(|curve| curve.unexplained);
     }
-    let lack = lack_of_fit.filter(|lack| lack.probability < FALSE_ALARM)?;
+    let lack = lack_of_fit.filter(|lack| lack.probability < chance::UNEXPLAINED)?;
     let of_joint = |curve: &Curve| curve.unexplained.joint == lack.joint + 1;
     found.into_iter().rfind(of_joint).map(|curve| curve.unexplained)
 }

@@ -20,6 +20,7 @@
 pub mod candidates;
 
 mod against;
+mod chance;
 mod clustered;
 mod common_motion;
 mod contact;
@@ -57,6 +58,7 @@ mod study;
 mod verdict;
 mod whitening;
 
+pub use chance::FALSE_ALARM;
 pub use diagnoser::{Diagnoser, Finding};
 pub use error::DiagnoseError;
 pub use extension::{Effect, Extension};

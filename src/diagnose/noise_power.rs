@@ -11,14 +11,28 @@
 //!   (Satterthwaite 1946).
 
 use super::image::{Direction, Image, Span};
-use crate::signal::pooled;
+use crate::signal::{pooled, pooled_level};
 
 /// How well the noise of whitened rows is known.
 #[derive(Debug, Clone)]
 pub struct NoiseKnowledge {
-    /// Relative variance of the noise's power, per harmonic and joint.
-    relative_variance: Vec<Vec<f64>>,
-    joints: usize,
+    /// Per harmonic from 0.
+    harmonics: Vec<Uncertainty>,
+}
+
+/// Relative variance of the noise's power at one harmonic.
+#[derive(Debug, Clone)]
+pub struct Uncertainty {
+    /// Of every joint's own.
+    pub own: Vec<f64>,
+    /// Of what all joints share.
+    pub shared: f64,
+}
+
+impl Uncertainty {
+    fn of(&self, joint: usize) -> f64 {
+        self.own[joint] + self.shared
+    }
 }
 
 /// Noise that is known with more degrees of freedom than this counts as known in what a family explains.
@@ -27,10 +41,13 @@ const WELL_KNOWN: f64 = 200.0;
 const MANY: f64 = 1e5;
 
 impl NoiseKnowledge {
-    /// From the relative variance of the power of every harmonic from 0 and every joint.
-    pub fn new(relative_variance: Vec<Vec<f64>>) -> Self {
-        let joints = relative_variance.first().map_or(0, Vec::len);
-        Self { relative_variance, joints }
+    /// From what is not known of every harmonic from 0.
+    pub fn new(harmonics: Vec<Uncertainty>) -> Self {
+        Self { harmonics }
+    }
+
+    fn joints(&self) -> usize {
+        self.harmonics.first().map_or(0, |known| known.own.len())
     }
 
     /// First row, behind those of other harmonics, and number of rows of (harmonic, joint): one of the mean,
@@ -39,7 +56,7 @@ impl NoiseKnowledge {
         if harmonic == 0 {
             return joint..joint + 1;
         }
-        let first = self.joints * (2 * harmonic - 1) + 2 * joint;
+        let first = self.joints() * (2 * harmonic - 1) + 2 * joint;
         first..first + 2
     }
 
@@ -47,12 +64,12 @@ impl NoiseKnowledge {
     pub fn gain(&self, span: &Span, residual: &Image) -> f64 {
         let coordinates = span.coordinates(residual);
         let mut gain: f64 = coordinates.iter().map(|c| c * c).sum();
-        let poorly_known = |v: &Vec<f64>| v.iter().any(|v| 2.0 / v < WELL_KNOWN);
-        for (harmonic, variances) in self.relative_variance.iter().enumerate() {
-            if !poorly_known(variances) {
+        let joints = self.joints();
+        for (harmonic, unknown) in self.harmonics.iter().enumerate() {
+            if (0..joints).all(|joint| 2.0 / unknown.of(joint) >= WELL_KNOWN) {
                 continue;
             }
-            for (joint, variance) in variances.iter().enumerate() {
+            for joint in 0..joints {
                 let (mut before, mut after, mut count) = (0.0, 0.0, 0.0);
                 for row in self.rows(harmonic, joint) {
                     let r = residual.mean[row];
@@ -62,7 +79,7 @@ impl NoiseKnowledge {
                     after += left * left;
                     count += 1.0;
                 }
-                let freedom = 2.0 / variance;
+                let freedom = 2.0 / unknown.of(joint);
                 let student = |square: f64| (freedom + count) * (square / freedom).ln_1p();
                 gain += student(before) - student(after) - (before - after);
             }
@@ -72,11 +89,12 @@ impl NoiseKnowledge {
 
     /// Degrees of freedom ν of the noise along what `span` explains of `residual`: 2/ν is the relative
     /// variance of the noise's power there, Σ w_h w_h' C_hh' with the shares w of the explained square and
-    /// the relative covariances C, alike within [`pooled`] and none beyond.
+    /// the relative covariances C: of what is a joint's own alike within [`pooled_level`] and none beyond, of what all share
+    /// alike within [`pooled`].
     pub fn freedom(&self, span: &Span, residual: &Image) -> f64 {
         let coordinates = span.coordinates(residual);
         let harmonics = self.harmonics();
-        let mut share = vec![vec![0.0; harmonics]; self.joints];
+        let mut share = vec![vec![0.0; harmonics]; self.joints()];
         let rows = residual.mean.len();
         let of_row = |image: Direction, period: usize, row: usize| match period {
             0 => image.mean[row],
@@ -96,31 +114,31 @@ impl NoiseKnowledge {
                 all += *share;
             }
         }
-        let variances = share.iter().enumerate().map(|(j, share)| self.variance(share, j));
-        (2.0 * all * all / variances.sum::<f64>()).min(MANY)
+        (2.0 * all * all / self.variance(&share)).min(MANY)
     }
 
     /// Degrees of freedom of the noise's power in a band of harmonics of one joint.
     pub fn freedom_of_band(&self, band: std::ops::Range<usize>, joint: usize) -> f64 {
-        let mut share = vec![0.0; self.harmonics()];
+        let mut share = vec![vec![0.0; self.harmonics()]; self.joints()];
         let harmonics = band.len() as f64;
-        share[band].fill(1.0 / harmonics);
-        (2.0 / self.variance(&share, joint)).min(MANY)
+        share[joint][band].fill(1.0 / harmonics);
+        (2.0 / self.variance(&share)).min(MANY)
     }
 
     /// Harmonics from 0 whose rows are used.
     pub fn harmonics(&self) -> usize {
-        self.relative_variance.len()
+        self.harmonics.len()
     }
 
-    /// Σ w_h w_h' C_hh' of one joint.
-    fn variance(&self, share: &[f64], joint: usize) -> f64 {
-        let term = |(harmonic, own): (usize, &f64)| {
-            let last = (harmonic + pooled(harmonic)).min(share.len() - 1);
-            let near: f64 = share[harmonic.saturating_sub(pooled(harmonic))..=last].iter().sum();
-            own * near * self.relative_variance[harmonic][joint]
-        };
-        share.iter().enumerate().map(term).sum()
+    /// Σ w w' C over harmonics and joints, `share` the w of each joint.
+    fn variance(&self, share: &[Vec<f64>]) -> f64 {
+        let together: Vec<f64> =
+            (0..self.harmonics()).map(|h| share.iter().map(|share| share[h]).sum()).collect();
+        let own = share
+            .iter()
+            .enumerate()
+            .map(|(joint, share)| of_alike(share, pooled_level, |h| self.harmonics[h].own[joint]));
+        own.sum::<f64>() + of_alike(&together, pooled, |h| self.harmonics[h].shared)
     }
 
     /// Whether ν is so large that noise is known.
@@ -129,11 +147,25 @@ impl NoiseKnowledge {
     }
 }
 
+/// Σ w_h w_h' v_h over all harmonics and those that are within `reach` of them.
+fn of_alike(share: &[f64], reach: fn(usize) -> usize, variance: impl Fn(usize) -> f64) -> f64 {
+    let term = |(harmonic, own): (usize, &f64)| {
+        let last = (harmonic + reach(harmonic)).min(share.len() - 1);
+        let near: f64 = share[harmonic.saturating_sub(reach(harmonic))..=last].iter().sum();
+        own * near * variance(harmonic)
+    };
+    share.iter().enumerate().map(term).sum()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use rand::{SeedableRng, rngs::ChaCha8Rng};
     use rand_distr::{Distribution, StandardNormal};
+
+    fn one_joint(relative_variance: f64) -> NoiseKnowledge {
+        NoiseKnowledge::new(vec![Uncertainty { own: vec![relative_variance], shared: 0.0 }; 3])
+    }
 
     /// Ten million logs would be needed to see a chance of 10⁻⁷; a chance of 1/200 is seen in 20 000.
     /// A direction in one slow harmonic, its noise's scale estimated with ν degrees of freedom.
@@ -141,7 +173,7 @@ mod tests {
     fn chance_along_one_harmonic_is_that_of_student() {
         const TRIALS: usize = 20_000;
         let relative_variance = 0.13;
-        let knowledge = NoiseKnowledge::new(vec![vec![relative_variance]; 3]);
+        let knowledge = one_joint(relative_variance);
         let mut span = Span::default();
         let mut direction = Image { mean: vec![0.0; 5], contrast: Vec::new() };
         direction.mean[1] = 1.0;
@@ -169,9 +201,9 @@ mod tests {
         let mut direction = Image { mean: vec![0.0; 5], contrast: Vec::new() };
         direction.mean[1] = 1.0;
         span.push(&direction);
-        let known = NoiseKnowledge::new(vec![vec![1e-9]; 3]);
+        let known = one_joint(1e-9);
         assert!((known.gain(&span, &residual) - 36.0).abs() < 1e-9);
-        let poorly = NoiseKnowledge::new(vec![vec![0.13]; 3]);
+        let poorly = one_joint(0.13);
         // (ν + 2) ln((1 + 37/ν)/(1 + 1/ν)) by hand, ν = 2/0.13.
         let nu: f64 = 2.0 / 0.13;
         let expected = (nu + 2.0) * ((1.0 + 37.0 / nu) / (1.0 + 1.0 / nu)).ln();

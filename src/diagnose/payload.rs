@@ -14,12 +14,12 @@ use serde::Serialize;
 use nalgebra::{DMatrix, DVector};
 
 use super::candidates::Candidate;
+use super::chance;
 use super::clustered::{Equations, Solution, solve};
 use super::error::DiagnoseError;
 use super::extension::Extension;
 use super::kind::Kind;
 use super::scene::Scene;
-use super::significance::FALSE_ALARM;
 use super::verdict::{Cause, Estimate};
 use super::whitening::{RunWhitening, Whitening};
 use crate::base::BaseSet;
@@ -128,7 +128,7 @@ pub(super) fn between(
         estimate(x[a] / mass, &g, "m")
     });
     let probability = solution.probability(layout.body, STATIC);
-    let is_named = probability < FALSE_ALARM && mass_kg.ci95[0] > 0.0;
+    let is_named = probability < chance::LAW && mass_kg.ci95[0] > 0.0;
     let gain_scale = known_mass_kg
         .filter(|_| is_named)
         .map(|known| estimate(known / mass, &[-known / (mass * mass), 0.0, 0.0, 0.0], ""));

@@ -2,12 +2,11 @@
 //! and it is more than what the other causes leave by the approximate form of their laws.
 
 use super::candidates::Shape;
+use super::chance;
 use super::image::{Image, Span};
 use super::selection::{Contender, Kept};
 use super::study::Entry;
 
-/// Chance that a log without faults is given a cause.
-pub const FALSE_ALARM: f64 = 0.002;
 /// A law is another's only if its coefficient is so by more than so many σ.
 const DOUBT: f64 = 2.0;
 /// A family's law is right to this share of its own size: what is smaller on the same joint is no second
@@ -19,7 +18,7 @@ pub const LEAST_EVIDENCE: f64 = 2.0;
 pub(super) const FAR_AHEAD: f64 = 6.0;
 
 impl Kept<'_, '_> {
-    /// Whether chance explains `contender` in fewer than one log without faults in 500, all
+    /// Whether chance explains `contender` in fewer logs without faults than [`chance::LAW`], all
     /// families, sites and shapes counted, the evidence is for it, and it is more than what the
     /// approximate form of the causes found beside it may leave. Along a single run it also has to show in
     /// stretches of time left out of its fit.
@@ -51,7 +50,7 @@ impl Kept<'_, '_> {
         // The chance is shared out evenly between families and sites, and within one between its shapes.
         let tests = study.hypotheses() as f64 * study.alternatives(&contender.entry);
         contender.evidence > LEAST_EVIDENCE
-            && single * tests < FALSE_ALARM
+            && single * tests < chance::LAW
             && self.is_its_own(&contender.entry, others, residual)
             && study.generalises(&contender.entry, &span, residual)
     }

@@ -16,7 +16,7 @@
 //! | the best estimate of a repeated motion and its derivatives | [`PeriodicFit`] |
 //! | what happens between the samples of a repeated motion? | [`FineClock`] |
 //! | how noisy is a signal, without any model of it? | [`replicate_noise`] |
-//! | how does the power of noise run over frequency? | [`noise_trend`] |
+//! | how does the power of noise run over frequency? | [`noise_trend`], of several channels [`noise_trends`] |
 //! | is there a bump in coloured noise? | [`MatchedFilter`] |
 //! | how fine is a sensor, and where does it end? | [`quantum`], [`reading_limit`] |
 //! | at which frequencies is there energy? | [`welch`] |
@@ -53,7 +53,7 @@ pub use fine_clock::{FineClock, answered};
 pub use gap_filling::{Filled, fill_gaps};
 pub use instants::{Bracket, Instants};
 pub use matched::{Heights, MatchedFilter};
-pub use noise_trend::{NoisePower, noise_trend, pooled};
+pub use noise_trend::{NoisePower, noise_trend, noise_trends, pooled, pooled_level};
 pub use paper_filter::{PaperDifferentiator, PaperReading};
 pub use period::{Period, PeriodSearch, find_period};
 pub use periodic_fit::{FitScratch, PeriodicFit};

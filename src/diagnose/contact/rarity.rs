@@ -2,9 +2,7 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
-/// Chance that noise makes a bump in one joint, anywhere in the log, that is called a contact. It is shared out evenly
-/// between lengths and joints.
-const FALSE_ALARM: f64 = 0.001;
+use crate::diagnose::chance;
 
 /// How often per length of itself a bump that is looked for with 1 − u² passes a height of z σ either way in white noise, over
 /// e^{−z²/2}: 2 √(∫b'²/∫b²)/(2π) = √10/π (Rice 1945). Whitened by coloured noise bumps are narrower, and pass up to eight times
@@ -13,10 +11,10 @@ const FALSE_ALARM: f64 = 0.001;
 const PASSES: f64 = 1.006_6;
 
 /// σ from which on a bump of `length_s` in one joint is a contact, in a log of `duration_s` that is looked through for
-/// bumps of so many `lengths` in so many `joints`.
+/// bumps of so many `lengths` in so many `joints`, between which the chance is shared out evenly.
 pub(super) fn far(length_s: f64, duration_s: f64, lengths: usize, joints: usize) -> f64 {
     let places = PASSES * duration_s / length_s * (lengths * joints) as f64;
-    (2.0 * (places.max(1.0) / FALSE_ALARM).ln()).sqrt()
+    (2.0 * (places.max(1.0) / chance::CONTACT).ln()).sqrt()
 }
 
 /// √(zᵀ C⁻¹ z) of `joints` joints that noise passes as rarely as one joint passes `far`.
@@ -72,8 +70,8 @@ mod tests {
     #[test]
     fn what_lasts_has_fewer_places() {
         let heights = [0.1, 1.0, 6.0].map(|length_s| far(length_s, 80.0, 12, 6));
-        // 2 ln(72 · 1.0066 · 80/L/0.001), by hand.
-        for (height, by_hand) in heights.iter().zip([5.979, 5.581, 5.250]) {
+        // √(2 ln(72 · 1.0066 · 80/L/0.000 45)), by hand.
+        for (height, by_hand) in heights.iter().zip([6.111, 5.722, 5.400]) {
             assert!((height - by_hand).abs() < 1e-3, "{heights:?}");
         }
     }

@@ -8,19 +8,19 @@ use realfft::{RealFftPlanner, RealToComplex};
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::friction_drift::FrictionDrift;
 use crate::diagnose::image::{Column, Image, Span, dot};
-use crate::diagnose::noise_power::NoiseKnowledge;
+use crate::diagnose::noise_power::{NoiseKnowledge, Uncertainty};
 use crate::diagnose::scene::Scene;
 use crate::identify::{Problem, Regression};
 use crate::robot::JointSignals;
-use crate::signal::{NoisePower, noise_trend};
+use crate::signal::{NoisePower, noise_trends, pooled_level};
 
 /// Per harmonic, with S the 6 × 6 noise covariance of one period's Fourier coefficients:
 /// rows √P L⁻¹ Ȳ_k of the mean period and L⁻¹ C_k of P − 1 orthonormal contrasts, S = L Lᴴ.
 ///
-/// S is the scatter between periods, divided by the trend of every joint's power over frequency so that
+/// S is the scatter between periods, divided by the trend of every joint's power over frequency ([`noise_trends`]) so that
 /// steep noise does not bend it, averaged over neighbouring harmonics, and scaled by M/(M − N) (M complex
 /// degrees of freedom, N joints) so that ⟨Yᴴ S⁻¹ Y⟩ is that of the true covariance. Friction that drifts
-/// ([`FrictionDrift`]) is no noise and left out of it. Torques have been
+/// ([`FrictionDrift`]) is no noise, left out of it, and what it takes of noise is made up for. Torques have been
 /// moved to a common motion before, so that S is the noise of torque and acceleration together. To it comes
 /// what sampling does to the acceleration where friction reverses: the velocity has a kink there, whose
 /// spectrum falls as 1/f², and holds at f the share (f/(f_s − f))² of it that belongs to f_s − f. What is not followed
@@ -32,8 +32,8 @@ pub struct PeriodWhitening {
     forward: Arc<dyn RealToComplex<f64>>,
     /// L⁻¹ per harmonic that is used, row-major N × N.
     factors: Vec<Vec<Complex<f64>>>,
-    /// Relative variance of the noise's power per harmonic and joint.
-    unknown: Vec<Vec<f64>>,
+    /// How well the noise's power is known, per harmonic.
+    unknown: Vec<Uncertainty>,
     repeating: Option<RepeatingNoise>,
 }
 
@@ -74,17 +74,16 @@ impl RepeatingNoise {
     }
 }
 
-/// Harmonics averaged on each side for one covariance: at least so many, and a quarter of the
-/// harmonic's number.
-const NEIGHBOURS: usize = 12;
 /// A mean torque that scatters with more than this times the power of its neighbours drifts: eight periods of
-/// white noise show that once in 300 joints (F(7, 17): seven contrasts, and the trend's own freedom).
-const DRIFTS: f64 = 5.0;
+/// white noise show that once in 300 joints (F(7, 50): seven contrasts, and the trend's own freedom).
+const DRIFTS: f64 = 3.6;
 /// Share of Coulomb's torque whose kink is not followed between samples. In the fastest eighth of the harmonics of clean logs
 /// with a twentieth of the benchmark's noise, whose drives feed 0, 0.5 and 0.9 of friction forward along both its motions,
 /// what residuals have beyond that noise is left by 0.01 to 0.4 of it, on joint 2 behind drives that feed half by 0.9: 0.2 in
 /// rms.
 const NOT_FOLLOWED: f64 = 0.2;
+/// Of two periods drifting friction may take nearly all that a harmonic says of noise; of eight it takes a tenth.
+const LEAST_KEPT: f64 = 0.25;
 /// Torque below this share of a joint's rms torque is not told from the rounding of a model.
 pub const FLOOR: f64 = 1e-4;
 /// How far, over the rate, what is used ends below the highest frequency of the periods' own motion. Not far, because half
@@ -108,7 +107,7 @@ impl PeriodWhitening {
         };
         let used = ((regression.prepared.highest - BELOW_HIGHEST) * n as f64).round() as usize;
         // Beyond it the torque was not moved to the common motion.
-        let last = (used + NEIGHBOURS.max(used / 4)).min(scene.highest);
+        let last = (used + pooled_level(used)).min(scene.highest);
         let mut scatter = whitening.scatter(problem, scene);
         let power: Vec<f64> = problem
             .panels
@@ -131,10 +130,14 @@ impl PeriodWhitening {
         for (k, sd) in sd[..=used].iter().enumerate() {
             let (mut s, freedom) = whitening.averaged(&scatter, k);
             let mut sd = sd.clone();
-            let mut unknown: Vec<f64> =
-                trends.iter().map(|trend| trend[k].relative_variance + 1.0 / freedom).collect();
+            // The level is that of S, whatever that of the trend.
+            let own = |trend: &Vec<NoisePower>| trend[k].colour_variance + 1.0 / freedom;
+            let mut unknown = Uncertainty {
+                own: trends.iter().map(own).collect(),
+                shared: trends[0][k].shared_variance,
+            };
             if k == 0 {
-                for (j, (sd, unknown)) in sd.iter_mut().zip(&mut unknown).enumerate() {
+                for (j, (sd, unknown)) in sd.iter_mut().zip(&mut unknown.own).enumerate() {
                     let drift = scatter[0][(j, j)].re / s[(j, j)].re;
                     if drift > DRIFTS {
                         *sd *= drift.sqrt();
@@ -173,11 +176,23 @@ impl PeriodWhitening {
     fn scatter(&self, problem: &Problem, scene: &Scene) -> Vec<DMatrix<Complex<f64>>> {
         let Self { samples: n, periods, joints, .. } = *self;
         let drift = FrictionDrift::beside_mean(&scene.motion.qd_rad_s, periods);
+        let freedom = (periods - 1) as f64;
         let mut spectra: Vec<Vec<Complex<f64>>> = Vec::new();
+        // By joint and harmonic, what drifting friction has left of noise's standard deviation.
+        let mut kept: Vec<Vec<f64>> = Vec::new();
         for (j, panel) in problem.panels.iter().enumerate() {
             let mut y = panel.y.clone();
             drift.remove(j, &mut y, |_| true);
             spectra.extend(y.chunks_exact(n).map(|period| self.spectrum(period)));
+            let mut lost = vec![0.0; n / 2 + 1];
+            for direction in drift.directions(j) {
+                for period in direction.chunks_exact(n) {
+                    let spectrum = self.spectrum(period);
+                    lost.iter_mut().zip(&spectrum).for_each(|(lost, c)| *lost += c.norm_sqr());
+                }
+            }
+            let share = |lost: &f64| (1.0 - lost / freedom).max(LEAST_KEPT).sqrt();
+            kept.push(lost.iter().map(share).collect());
         }
         let of_harmonic = |k: usize| {
             let mut scatter = DMatrix::zeros(joints, joints);
@@ -186,7 +201,10 @@ impl PeriodWhitening {
                     let of = |p: usize| spectra[j * periods + p][k];
                     of(p) - (0..periods).map(of).sum::<Complex<f64>>() / periods as f64
                 });
-                scatter += &deviation * deviation.adjoint() / Complex::from((periods - 1) as f64);
+                scatter += &deviation * deviation.adjoint() / Complex::from(freedom);
+            }
+            for (i, j) in pairs(joints) {
+                scatter[(i, j)] /= kept[i][k] * kept[j][k];
             }
             scatter
         };
@@ -199,7 +217,7 @@ impl PeriodWhitening {
         scatter: &[DMatrix<Complex<f64>>],
         k: usize,
     ) -> (DMatrix<Complex<f64>>, f64) {
-        let reach = NEIGHBOURS.max(k / 4);
+        let reach = pooled_level(k);
         // The mean torque drifts more than its neighbours: it is left out of their average.
         let range = k.saturating_sub(reach).max(1)..(k + reach + 1).min(scatter.len());
         let count = range.len();
@@ -347,12 +365,34 @@ fn trends(
     periods: usize,
     last: usize,
 ) -> Vec<Vec<NoisePower>> {
-    let of_joint = |(j, power): (usize, &f64)| {
+    let of_joint = |(j, power): (usize, &f64)| -> Vec<f64> {
         let floor = (FLOOR * FLOOR * power).max(f64::MIN_POSITIVE);
-        let own: Vec<f64> = scatter.iter().map(|s| s[(j, j)].re.max(1e-6 * floor)).collect();
-        noise_trend(&own, periods - 1, last)
+        scatter.iter().map(|s| s[(j, j)].re.max(1e-6 * floor)).collect()
     };
-    power.iter().enumerate().map(of_joint).collect()
+    let own: Vec<Vec<f64>> = power.iter().enumerate().map(of_joint).collect();
+    noise_trends(&own, periods - 1, likeness(scatter, periods - 1), last)
+}
+
+/// Mean squared coherence between two joints over the harmonics of `scatter`, each of which chance alone gives
+/// 1/M with M complex degrees of freedom (Carter, Knapp and Nuttall 1973).
+fn likeness(scatter: &[DMatrix<Complex<f64>>], freedom: usize) -> f64 {
+    let joints = scatter.first().map_or(0, DMatrix::nrows);
+    let (mut sum, mut count) = (0.0, 0.0);
+    for s in scatter.iter().skip(1) {
+        for (i, j) in pairs(joints).filter(|(i, j)| i < j) {
+            let power = s[(i, i)].re * s[(j, j)].re;
+            if power > 0.0 {
+                sum += s[(i, j)].norm_sqr() / power;
+                count += 1.0;
+            }
+        }
+    }
+    let chance = 1.0 / freedom as f64;
+    // Two periods, or joints without noise, say nothing.
+    if chance == 1.0 || count == 0.0 {
+        return 0.0;
+    }
+    ((sum / count - chance) / (1.0 - chance)).clamp(0.0, 1.0)
 }
 
 /// All (i, j) of a square matrix.

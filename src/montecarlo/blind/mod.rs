@@ -29,4 +29,4 @@ pub use score::{
     Scores, StrengthBin, power,
 };
 pub use share::Share;
-pub use target::{DESIGN_FALSE_ALARM, Target};
+pub use target::Target;

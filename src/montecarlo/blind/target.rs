@@ -9,13 +9,12 @@ use super::judge::{Outcome, is_at};
 use super::record::Record;
 use super::score::causes;
 use super::share::Share;
+use crate::diagnose::FALSE_ALARM;
 use crate::montecarlo::calibration::Verdict;
 use crate::montecarlo::shard::Merged;
 
 /// Fewer trials than this say nothing about a share.
 const FEWEST: u64 = 20;
-/// Chance that a log without faults is given a cause, as it is designed.
-pub const DESIGN_FALSE_ALARM: f64 = 0.003;
 
 /// One target.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -89,7 +88,7 @@ pub fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
     }
     let large = all.iter().filter(|r| r.case.is_from(40.0)).filter_map(|r| r.answer.gain);
     vec![
-        Target::new("clean: a false alarm", alarms, [0.0, DESIGN_FALSE_ALARM]),
+        Target::new("clean: a false alarm", alarms, [0.0, FALSE_ALARM]),
         Target::about(
             "clean: one-sided 95 % upper bound of the false alarms",
             alarms,
