@@ -20,7 +20,7 @@
 pub mod candidates;
 
 mod against;
-mod chance;
+pub mod chance;
 mod clustered;
 mod common_motion;
 mod contact;
@@ -58,7 +58,6 @@ mod study;
 mod verdict;
 mod whitening;
 
-pub use chance::FALSE_ALARM;
 pub use diagnoser::{Diagnoser, Finding};
 pub use error::DiagnoseError;
 pub use extension::{Effect, Extension};

@@ -1,7 +1,8 @@
 //! The power of the noise between periods by harmonic, and how well it is known.
 //!
 //! P periods tell the noise of one harmonic of one joint with P − 1 complex degrees of freedom. Harmonics
-//! beside each other share what they say, but at the slow end, where a motion and the torques of gravity
+//! beside each other share what they say, and so do joints whose noise is of one kind
+//! ([`noise_trends`](crate::signal::noise_trends)), but at the slow end, where a motion and the torques of gravity
 //! and springs live, there are few of them: a test that took the noise for known would find springs in
 //! every hundredth log. Two corrections follow:
 //!
@@ -23,15 +24,20 @@ pub struct NoiseKnowledge {
 /// Relative variance of the noise's power at one harmonic.
 #[derive(Debug, Clone)]
 pub struct Uncertainty {
-    /// Of every joint's own.
-    pub own: Vec<f64>,
-    /// Of what all joints share.
+    /// Of what all joints share, alike within [`pooled`].
     pub shared: f64,
+    /// Of how strong the noise of a joint is, alike within [`pooled_level`].
+    pub level: f64,
+    /// Mean squared coherence of the joints' noise: what two of them have in common of that.
+    pub likeness: f64,
+    /// Of what the noise of every joint has beside both, alike within [`pooled`].
+    pub colour: Vec<f64>,
 }
 
 impl Uncertainty {
-    fn of(&self, joint: usize) -> f64 {
-        self.own[joint] + self.shared
+    /// Of one joint, in all.
+    pub fn of(&self, joint: usize) -> f64 {
+        self.shared + self.level + self.colour[joint]
     }
 }
 
@@ -47,7 +53,7 @@ impl NoiseKnowledge {
     }
 
     fn joints(&self) -> usize {
-        self.harmonics.first().map_or(0, |known| known.own.len())
+        self.harmonics.first().map_or(0, |known| known.colour.len())
     }
 
     /// First row, behind those of other harmonics, and number of rows of (harmonic, joint): one of the mean,
@@ -88,9 +94,8 @@ impl NoiseKnowledge {
     }
 
     /// Degrees of freedom ν of the noise along what `span` explains of `residual`: 2/ν is the relative
-    /// variance of the noise's power there, Σ w_h w_h' C_hh' with the shares w of the explained square and
-    /// the relative covariances C: of what is a joint's own alike within [`pooled_level`] and none beyond, of what all share
-    /// alike within [`pooled`].
+    /// variance of the noise's power there, Σ w w' C over harmonics and joints with the shares w of the explained square and
+    /// the relative covariances C ([`Uncertainty`]).
     pub fn freedom(&self, span: &Span, residual: &Image) -> f64 {
         let coordinates = span.coordinates(residual);
         let harmonics = self.harmonics();
@@ -134,11 +139,14 @@ impl NoiseKnowledge {
     fn variance(&self, share: &[Vec<f64>]) -> f64 {
         let together: Vec<f64> =
             (0..self.harmonics()).map(|h| share.iter().map(|share| share[h]).sum()).collect();
-        let own = share
-            .iter()
-            .enumerate()
-            .map(|(joint, share)| of_alike(share, pooled_level, |h| self.harmonics[h].own[joint]));
-        own.sum::<f64>() + of_alike(&together, pooled, |h| self.harmonics[h].shared)
+        let at = |h: usize| &self.harmonics[h];
+        let own = share.iter().enumerate().map(|(joint, share)| {
+            let level = of_alike(share, pooled_level, |h| at(h).level * (1.0 - at(h).likeness));
+            level + of_alike(share, pooled, |h| at(h).colour[joint])
+        });
+        own.sum::<f64>()
+            + of_alike(&together, pooled_level, |h| at(h).level * at(h).likeness)
+            + of_alike(&together, pooled, |h| at(h).shared)
     }
 
     /// Whether ν is so large that noise is known.
@@ -164,7 +172,9 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     fn one_joint(relative_variance: f64) -> NoiseKnowledge {
-        NoiseKnowledge::new(vec![Uncertainty { own: vec![relative_variance], shared: 0.0 }; 3])
+        let unknown =
+            Uncertainty { shared: 0.0, level: 0.0, likeness: 0.0, colour: vec![relative_variance] };
+        NoiseKnowledge::new(vec![unknown; 3])
     }
 
     /// Ten million logs would be needed to see a chance of 10⁻⁷; a chance of 1/200 is seen in 20 000.
@@ -208,5 +218,23 @@ mod tests {
         let nu: f64 = 2.0 / 0.13;
         let expected = (nu + 2.0) * ((1.0 + 37.0 / nu) / (1.0 + 1.0 / nu)).ln();
         assert!((poorly.gain(&span, &residual) - expected).abs() < 1e-9);
+    }
+
+    /// Two joints, all of the explained square in one harmonic, half on each: what is shared and what is coherent counts whole,
+    /// the rest half.
+    #[test]
+    fn what_joints_share_is_no_better_known_on_two() {
+        let unknown =
+            Uncertainty { shared: 0.01, level: 0.02, likeness: 0.25, colour: vec![0.04; 2] };
+        let knowledge = NoiseKnowledge::new(vec![unknown; 3]);
+        let mut direction = Image { mean: vec![0.0; 10], contrast: Vec::new() };
+        for joint in 0..2 {
+            direction.mean[knowledge.rows(1, joint).start] = 0.5_f64.sqrt();
+        }
+        let mut span = Span::default();
+        span.push(&direction);
+        let expected = 0.01 + 0.25 * 0.02 + 0.5 * (0.75 * 0.02 + 0.04);
+        let freedom = knowledge.freedom(&span, &direction);
+        assert!((2.0 / freedom / expected - 1.0).abs() < 1e-9, "{freedom}");
     }
 }

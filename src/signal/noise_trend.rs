@@ -10,9 +10,7 @@ pub struct NoisePower {
     pub value: f64,
     /// Variance of its estimate over its square, of what all channels share.
     pub shared_variance: f64,
-    /// Of how far all noise of the channel lies above that of the others.
-    pub level_variance: f64,
-    /// Of what one harmonic has beside both.
+    /// Of what is the channel's own, but for its level: the mean of ln power over the harmonics near by.
     pub colour_variance: f64,
 }
 
@@ -31,6 +29,12 @@ pub fn pooled_level(k: usize) -> usize {
 const FEWEST: usize = 3;
 /// What one channel's noise has beside that of the others is mostly how strong it is, and hardly its colour.
 const LEVEL: usize = 12;
+/// Chance that the noise of a channel is of another colour than that of the others.
+const OTHER_COLOUR: f64 = 0.2;
+/// Variance of such a colour over that of its estimate.
+const SPREAD: f64 = 10.0;
+/// Standard deviation of ln power at one harmonic by which colours of one kind differ.
+const ALIKE: f64 = 0.2;
 
 /// The power of noise by harmonic, 0 … `last`, without its scatter: straight lines of ln power in
 /// ln harmonic over k ± max(3, k/4), seven harmonics or more. `freedom` is that of one harmonic, ν, whose
@@ -44,7 +48,6 @@ pub fn noise_trend(power: &[f64], freedom: usize, last: usize) -> Vec<NoisePower
         NoisePower {
             value: fit.value(&logarithms).exp(),
             shared_variance: 0.0,
-            level_variance: 0.0,
             colour_variance: noise.variance * fit.square(),
         }
     };
@@ -52,18 +55,17 @@ pub fn noise_trend(power: &[f64], freedom: usize, last: usize) -> Vec<NoisePower
     (0..=last.min(end)).map(|k| at(k.max(1))).collect()
 }
 
-/// [`noise_trend`] of J channels whose noise is of one kind, as that of an arm's drives is; `likeness` is the mean squared
-/// coherence between them.
+/// [`noise_trend`] of J channels, equally long, whose noise is of one kind, as that of an arm's drives is. `likeness` is the
+/// mean squared coherence between them by harmonic; where it is `None`, channels count as independent in what is one's own,
+/// and as one in what they share.
 ///
-/// The mean of their ln powers, J times as well known as one channel's, is followed by parabolas over the same harmonics: at the
-/// slowest ones lines miss noise of two colours by a tenth. How far a channel lies above the mean is a level, of harmonics
-/// k ± max(12, k/4). Where the channels' colours differ, level and slope over the near harmonics are further from
-/// it than chance has them, by χ² of 2 (J − 1) degrees of freedom, and the line through these counts with the weight
-/// 1 − 2 (J − 1)/χ² (James and Stein 1961, for the mean of normal numbers).
+/// The mean of their ln powers, up to J times as well known as one channel's, is followed by parabolas over the same harmonics:
+/// at the slowest ones lines miss noise of two colours by a tenth. How far a channel lies above the mean is a level, of
+/// harmonics k ± max(12, k/4), and what it has beside that its [`Colour`].
 pub fn noise_trends(
     power: &[Vec<f64>],
     freedom: usize,
-    likeness: f64,
+    likeness: &[Option<f64>],
     last: usize,
 ) -> Vec<Vec<NoisePower>> {
     let channels = power.len() as f64;
@@ -76,46 +78,83 @@ pub fn noise_trends(
     let mean: Vec<f64> =
         (0..=end).map(|h| beside.iter().map(|own| own[h]).sum::<f64>() / channels).collect();
     beside.iter_mut().for_each(|own| own.iter_mut().zip(&mean).for_each(|(own, m)| *own -= m));
-    let shared_variance = noise.variance * (1.0 + (channels - 1.0) * likeness) / channels;
-    let own_variance = noise.variance * (1.0 - likeness).max(0.0);
-    // All deviations from the mean together are none.
-    let share = own_variance * (1.0 - 1.0 / channels);
 
     let mut trends = vec![Vec::with_capacity(last + 1); power.len()];
     for k in (0..=last.min(end)).map(|k| k.max(1)) {
+        let likeness = likeness[k.min(likeness.len() - 1)];
+        let shared = (1.0 + (channels - 1.0) * likeness.unwrap_or(1.0)) / channels;
+        // All deviations from the mean together are none.
+        let own = (1.0 - likeness.unwrap_or(0.0)) * (1.0 - 1.0 / channels);
         let parabola = LocalFit::new(near(k, end), k, 2);
-        let line = LocalFit::new(near(k, end), k, 1);
-        let level = LocalFit::new(around(k, pooled_level(k), end), k, 0);
-        let near_level = LocalFit::new(near(k, end), k, 0);
-        // What the near harmonics have beyond the level, in standard deviations: their own level, and their slope.
-        let of_level = own_variance * (near_level.square() - level.square());
-        let of_slope = own_variance * (line.square() - near_level.square());
-        let (mut square, mut terms) = (0.0, 0.0);
-        for (lines, variance) in
-            [([&near_level, &level], of_level), ([&line, &near_level], of_slope)]
-        {
-            if variance > 1e-9 * own_variance {
-                let differ = |own: &Vec<f64>| lines[0].value(own) - lines[1].value(own);
-                square += beside.iter().map(|own| differ(own).powi(2)).sum::<f64>() / variance;
-                terms += channels - 1.0;
-            }
-        }
-        let weight = if square > terms { 1.0 - terms / square } else { 0.0 };
-        let (level_square, line_square) = (level.square(), line.square());
+        let fits = ColourFits::new(k, end, own * noise.variance);
         for (trend, own) in trends.iter_mut().zip(&beside) {
-            let (level, line) = (level.value(own), line.value(own));
+            let colour = fits.colour(own);
             trend.push(NoisePower {
-                value: (parabola.value(&mean) + level + weight * (line - level)).exp(),
-                shared_variance: shared_variance * parabola.square(),
-                level_variance: share * level_square,
-                colour_variance: share * weight * (line_square - level_square),
+                value: (parabola.value(&mean) + fits.level.value(own) + colour.value).exp(),
+                shared_variance: shared * noise.variance * parabola.square(),
+                colour_variance: colour.variance,
             });
         }
     }
     trends
 }
 
-/// Harmonics near `k` of 1 … `end` whose power says something about it, seven or more.
+/// What the ln power of a channel's noise at one harmonic has beside the channel's level.
+struct Colour {
+    value: f64,
+    variance: f64,
+}
+
+/// How colours are fitted at one harmonic: lines and levels over the harmonics near by.
+struct ColourFits {
+    level: LocalFit,
+    near_level: LocalFit,
+    line: LocalFit,
+    /// Variance of one harmonic.
+    variance: f64,
+}
+
+impl ColourFits {
+    fn new(k: usize, end: usize, variance: f64) -> Self {
+        Self {
+            level: LocalFit::new(around(k, pooled_level(k), end), k, 0),
+            near_level: LocalFit::new(near(k, end), k, 0),
+            line: LocalFit::new(near(k, end), k, 1),
+            variance,
+        }
+    }
+
+    /// Mean and variance of the colour of a channel whose ln powers are `own` beside the mean of all channels.
+    ///
+    /// Either the channel's noise is of the others' kind, and its colour has the standard deviation [`ALIKE`]; or, with the
+    /// chance [`OTHER_COLOUR`], it is of another, and the variance is [`SPREAD`] times that of its estimate, in level and
+    /// slope over the near harmonics (a spike and a slab; Mitchell and Beauchamp 1988). With χ² of these two in units of
+    /// their variance the odds of the first are (1 + g)^(m/2) exp(−χ² g/(2 (1 + g))) times those before, m the number of the
+    /// two that differ at all; the mean is that of both posterior means, and the variance holds how far they are apart.
+    fn colour(&self, own: &[f64]) -> Colour {
+        let Self { level, near_level, line, variance } = self;
+        let (mut square, mut terms) = (0.0, 0.0);
+        for (of, beside) in [(near_level, level), (line, near_level)] {
+            let variance = variance * (of.square() - beside.square());
+            if variance > 1e-9 {
+                square += (of.value(own) - beside.value(own)).powi(2) / variance;
+                terms += 1.0;
+            }
+        }
+        let odds_before = (1.0 - OTHER_COLOUR) / OTHER_COLOUR;
+        let kept = SPREAD / (1.0 + SPREAD);
+        let odds = odds_before * (1.0 + SPREAD).powf(0.5 * terms) * (-0.5 * square * kept).exp();
+        let other = 1.0 / (1.0 + odds);
+        let found = line.value(own) - level.value(own);
+        let variance = variance * (line.square() - level.square()).max(0.0);
+        let kept_alike = ALIKE * ALIKE / (ALIKE * ALIKE + variance);
+        let mean = other * kept + (1.0 - other) * kept_alike;
+        let apart = other * (1.0 - other) * (kept - kept_alike).powi(2);
+        Colour { value: mean * found, variance: mean * variance + apart * found * found }
+    }
+}
+
+/// Harmonics near `k` of 1 … `end` whose power says something about it, seven or more but at the end.
 fn near(k: usize, end: usize) -> std::ops::RangeInclusive<usize> {
     around(k, pooled(k), end)
 }
@@ -160,14 +199,14 @@ impl LocalFit {
             RowVector3::new(1.0, x, x * x)
         };
         let mut normal = Matrix3::identity();
-        let size = degree + 1;
+        // So few harmonics bear no more.
+        let size = (degree + 1).min(harmonics.clone().count());
         normal.view_mut((0, 0), (size, size)).fill(0.0);
         for h in harmonics.clone() {
             let row = row(h);
             let mut corner = normal.view_mut((0, 0), (size, size));
             corner += row.columns(0, size).transpose() * row.columns(0, size);
         }
-        // Seven or more harmonics that differ bear a parabola.
         let solution = normal.try_inverse().unwrap_or_else(Matrix3::zeros).column(0).into_owned();
         let weight = |h| (row(h).columns(0, size) * solution.rows(0, size))[(0, 0)];
         Self { first, weights: harmonics.map(weight).collect() }
@@ -194,6 +233,7 @@ mod tests {
     use super::*;
     use rand::{SeedableRng, rngs::ChaCha8Rng};
     use rand_distr::{Distribution, StandardNormal};
+    use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
     /// Power that falls as 1/h² is found without a bend at its steep beginning.
     #[test]
@@ -243,65 +283,100 @@ mod tests {
         truth.iter().map(|p| (0..=last).map(|h| of(p(h.max(1) as f64))).collect()).collect()
     }
 
-    fn variance(power: &NoisePower) -> f64 {
-        power.shared_variance + power.level_variance + power.colour_variance
+    const FREEDOM: usize = 7;
+    const TRIALS: usize = 400;
+    /// Harmonics whose trend is looked at, and that are there.
+    const LAST: usize = 24;
+    const ALL: usize = 60;
+
+    /// Chance by which noise is told from what is no noise.
+    const RARE: f64 = 1e-4;
+
+    /// By harmonic from 1, mean and mean square of the errors of ln power of `joint`, its level that of the scatter over the near
+    /// harmonics; the variance that is claimed; and how often noise is taken for something else, over `RARE`.
+    fn errors(truth: &[Box<dyn Fn(f64) -> f64>], joint: usize, together: bool) -> Vec<[f64; 4]> {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let mut sums = vec![[0.0; 4]; LAST];
+        let likeness = [Some(0.0); ALL + 1];
+        for _ in 0..TRIALS {
+            let power = scattered(&mut rng, FREEDOM, truth, ALL);
+            let found = match together {
+                true => noise_trends(&power, FREEDOM, &likeness, 2 * LAST).swap_remove(joint),
+                false => noise_trend(&power[joint], FREEDOM, 2 * LAST),
+            };
+            let error: Vec<f64> = (0..=2 * LAST)
+                .map(|h| (found[h].value / truth[joint](h.max(1) as f64)).ln())
+                .collect();
+            let ratio = |h: usize| power[joint][h] / found[h].value;
+            for (h, sums) in (1..).zip(&mut sums) {
+                let near = around(h, pooled_level(h), 2 * LAST);
+                let count = near.clone().count() as f64;
+                let level = (near.map(ratio).sum::<f64>() / count).ln();
+                let error = error[h] + level;
+                let claimed = found[h].shared_variance
+                    + found[h].colour_variance
+                    + 1.0 / (count * FREEDOM as f64);
+                // F(1, ν) is the square of Student's t.
+                let limit =
+                    StudentsT::new(0.0, 1.0, 2.0 / claimed).unwrap().inverse_cdf(0.5 * RARE);
+                let chance = 2.0 * Normal::standard().cdf(limit * (0.5 * error).exp());
+                let terms = [error, error * error, claimed, chance / RARE];
+                sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term / TRIALS as f64);
+            }
+        }
+        sums
     }
 
-    /// Noise of six drives of different strength, half of it white, a fifth slower than the motion: errors are as
-    /// large as they are said to be, half of those of one drive alone, and nowhere is the mean off by much.
+    fn of_two_colours(level: f64) -> Box<dyn Fn(f64) -> f64> {
+        Box::new(move |h| level * (0.03 + 1.0 / (1.0 + (h / 1.6).powi(2))))
+    }
+
+    /// Noise of six drives of different strength, half of it white, a fifth slower than the motion: no error is larger than it is
+    /// said to be, and those of the slowest harmonic have less than 0.6 of the square of those of one drive alone.
     #[test]
     fn drives_of_one_kind_say_more_together() {
-        const FREEDOM: usize = 7;
-        const TRIALS: usize = 400;
-        const LAST: usize = 60;
-        let of_drive = |level: f64| -> Box<dyn Fn(f64) -> f64> {
-            Box::new(move |h| level * (0.03 + 1.0 / (1.0 + (h / 1.6).powi(2))))
-        };
-        let truth = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15].map(of_drive);
-        let mut rng = ChaCha8Rng::seed_from_u64(3);
-        let mut sums = [[0.0; 3]; LAST + 1];
-        let mut alone = 0.0;
-        for _ in 0..TRIALS {
-            let power = scattered(&mut rng, FREEDOM, &truth, 200);
-            let trends = noise_trends(&power, FREEDOM, 0.0, LAST);
-            for (h, sums) in sums.iter_mut().enumerate() {
-                let found = trends[3][h];
-                let error = (found.value / truth[3](h.max(1) as f64)).ln();
-                sums[0] += error / TRIALS as f64;
-                sums[1] += error * error / TRIALS as f64;
-                sums[2] += variance(&found) / TRIALS as f64;
-            }
-            alone += variance(&noise_trend(&power[3], FREEDOM, 1)[1]) / TRIALS as f64;
+        let truth = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15].map(of_two_colours);
+        let together = errors(&truth, 3, true);
+        for (h, [mean, square, claimed, false_alarms]) in (1..).zip(&together) {
+            // Half a standard deviation is known to 0.2/√400 = 0.01 and belongs to where two colours bend more than a parabola.
+            assert!(mean.abs() < 0.5 * claimed.sqrt(), "harmonic {h}: off by {mean}");
+            // A mean square of 400 scatters by 7 %: three and a half of these.
+            assert!(square / claimed < 1.25, "harmonic {h}: {square} {claimed}");
+            // A chance of 10⁻⁴ changes by e^{7 error} or so: its mean of 400 scatters by 15 %, two of these.
+            assert!(*false_alarms < 1.3, "harmonic {h}: {false_alarms}");
         }
-        for (h, [mean, square, claimed]) in sums.into_iter().enumerate().skip(1) {
-            // The mean is known to 0.2/√400 = 0.01, of which this is four, and a parabola over ln 7 is off by 0.06 where two colours bend
-            // most.
-            assert!(mean.abs() < 0.1, "harmonic {h}: off by {mean}");
-            // A mean square of 400 scatters by 7 %, of which this is five, but for the square of 0.06.
-            let ratio = (square - 0.0036) / claimed;
-            assert!(ratio < 1.35 && square / claimed > 0.65, "harmonic {h}: {square} {claimed}");
-        }
-        assert!(sums[1][2] < 0.5 * alone, "{} {alone}", sums[1][2]);
+        let alone = errors(&truth, 3, false);
+        assert!(together[0][1] < 0.6 * alone[0][1], "{} {}", together[0][1], alone[0][1]);
     }
 
-    /// One drive whose slow noise has ten times the power that it has in the others: its level alone would miss ln 10 = 2.3.
+    /// One drive whose slow noise has so many times the power that it has in the others; by its level alone it would be missed by
+    /// up to ln 10 = 2.3. Noise of that drive, and of another, is taken for something else three times as often at most.
     #[test]
     fn a_drive_of_another_colour_is_followed() {
-        const FREEDOM: usize = 7;
-        const TRIALS: usize = 200;
-        let other: Box<dyn Fn(f64) -> f64> = Box::new(|h| if h < 5.0 { 10.0 } else { 1.0 });
-        let like = || -> Box<dyn Fn(f64) -> f64> { Box::new(|_| 1.0) };
-        let truth = [other, like(), like(), like(), like(), like()];
-        let mut rng = ChaCha8Rng::seed_from_u64(4);
-        let mut mean = 0.0;
-        let mut alone = 0.0;
-        for _ in 0..TRIALS {
-            let power = scattered(&mut rng, FREEDOM, &truth, 200);
-            let ln = |trend: &[NoisePower]| (trend[2].value / 10.0).ln() / TRIALS as f64;
-            mean += ln(&noise_trends(&power, FREEDOM, 0.0, 2)[0]);
-            alone += ln(&noise_trend(&power[0], FREEDOM, 2));
+        for factor in [1.5, 2.0, 4.0, 10.0] {
+            let other: Box<dyn Fn(f64) -> f64> =
+                Box::new(move |h| 1.0 + (factor - 1.0) / (1.0 + (h / 3.0).powi(2)));
+            let like = || -> Box<dyn Fn(f64) -> f64> { Box::new(|_| 1.0) };
+            let truth = [other, like(), like(), like(), like(), like()];
+            for joint in [0, 1] {
+                for (h, [.., false_alarms]) in (1..).zip(errors(&truth, joint, true)) {
+                    assert!(false_alarms < 3.0, "{factor} on {joint} at {h}: {false_alarms}");
+                }
+            }
         }
-        // A line through its own seven harmonics misses the step by as much.
-        assert!((mean - alone).abs() < 0.35, "{mean} {alone}");
+    }
+
+    /// Fewer harmonics or channels than a parabola and a line over seven need, and no noise at all in a channel, leave numbers.
+    #[test]
+    fn short_records_and_still_channels_leave_numbers() {
+        for (channels, end) in [(1, 1), (2, 2), (3, 4), (6, 9)] {
+            let power: Vec<Vec<f64>> =
+                (0..channels).map(|j| vec![if j == 0 { 1e-12 } else { 2.0 }; end + 1]).collect();
+            let trends = noise_trends(&power, 2, &[None], end);
+            for power in trends.iter().flatten() {
+                assert!(power.value > 0.0 && power.value.is_finite(), "{channels} {end} {power:?}");
+                assert!(power.shared_variance >= 0.0 && power.colour_variance >= 0.0, "{power:?}");
+            }
+        }
     }
 }

@@ -4,6 +4,7 @@
 //! one, of the mean of periods that repeat and of their differences, or of the samples of a single run in which joints
 //! move.
 
+mod coherence;
 mod periods;
 mod run;
 

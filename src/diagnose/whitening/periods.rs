@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use nalgebra::{Complex, DMatrix, DVector};
 use realfft::{RealFftPlanner, RealToComplex};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
+use super::coherence::coherence;
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::friction_drift::FrictionDrift;
 use crate::diagnose::image::{Column, Image, Span, dot};
@@ -14,7 +16,7 @@ use crate::identify::{Problem, Regression};
 use crate::robot::JointSignals;
 use crate::signal::{NoisePower, noise_trends, pooled_level};
 
-/// Per harmonic, with S the 6 × 6 noise covariance of one period's Fourier coefficients:
+/// Per harmonic, with S the N × N noise covariance of one period's Fourier coefficients:
 /// rows √P L⁻¹ Ȳ_k of the mean period and L⁻¹ C_k of P − 1 orthonormal contrasts, S = L Lᴴ.
 ///
 /// S is the scatter between periods, divided by the trend of every joint's power over frequency ([`noise_trends`]) so that
@@ -74,15 +76,15 @@ impl RepeatingNoise {
     }
 }
 
-/// A mean torque that scatters with more than this times the power of its neighbours drifts: eight periods of
-/// white noise show that once in 300 joints (F(7, 50): seven contrasts, and the trend's own freedom).
-const DRIFTS: f64 = 3.6;
+/// A mean torque that scatters so much more than its neighbours that noise shows it less often than this, drifts.
+const DRIFTS: f64 = 1.0 / 300.0;
 /// Share of Coulomb's torque whose kink is not followed between samples. In the fastest eighth of the harmonics of clean logs
 /// with a twentieth of the benchmark's noise, whose drives feed 0, 0.5 and 0.9 of friction forward along both its motions,
 /// what residuals have beyond that noise is left by 0.01 to 0.4 of it, on joint 2 behind drives that feed half by 0.9: 0.2 in
 /// rms.
 const NOT_FOLLOWED: f64 = 0.2;
-/// Of two periods drifting friction may take nearly all that a harmonic says of noise; of eight it takes a tenth.
+/// Of two periods drifting friction may take most of what a slow harmonic says of noise; of eight it takes 5 to 15 %. What is
+/// left is divided by what would be left of white noise: of noise that rises as that of two colours does it is 0.96 to 1.08.
 const LEAST_KEPT: f64 = 0.25;
 /// Torque below this share of a joint's rms torque is not told from the rounding of a model.
 pub const FLOOR: f64 = 1e-4;
@@ -114,7 +116,8 @@ impl PeriodWhitening {
             .iter()
             .map(|panel| panel.y.iter().map(|y| y * y).sum::<f64>() / panel.y.len() as f64)
             .collect();
-        let trends = trends(&scatter, &power, periods, last);
+        let likeness = coherence(&scatter[..=last], periods - 1, pooled_level);
+        let trends = trends(&scatter, &power, &likeness, (periods, last));
         scatter.truncate(last + 1);
         // Per harmonic, the standard deviation that the trend gives every joint.
         let sd: Vec<Vec<f64>> = (0..scatter.len())
@@ -130,19 +133,24 @@ impl PeriodWhitening {
         for (k, sd) in sd[..=used].iter().enumerate() {
             let (mut s, freedom) = whitening.averaged(&scatter, k);
             let mut sd = sd.clone();
-            // The level is that of S, whatever that of the trend.
-            let own = |trend: &Vec<NoisePower>| trend[k].colour_variance + 1.0 / freedom;
             let mut unknown = Uncertainty {
-                own: trends.iter().map(own).collect(),
                 shared: trends[0][k].shared_variance,
+                // The level is that of S, whatever that of the trend.
+                level: 1.0 / freedom,
+                likeness: likeness[k].unwrap_or(1.0),
+                colour: trends.iter().map(|trend| trend[k].colour_variance).collect(),
             };
             if k == 0 {
-                for (j, (sd, unknown)) in sd.iter_mut().zip(&mut unknown.own).enumerate() {
+                for (j, sd) in sd.iter_mut().enumerate() {
                     let drift = scatter[0][(j, j)].re / s[(j, j)].re;
-                    if drift > DRIFTS {
+                    // A real number per period.
+                    let own_freedom = (periods - 1) as f64;
+                    // S is larger than the scatter by M/(M − N).
+                    let ratio = drift * freedom / (freedom - joints as f64).max(1.0);
+                    let chance = FisherSnedecor::new(own_freedom, 2.0 / unknown.of(j));
+                    if chance.is_ok_and(|f| f.sf(ratio) < DRIFTS) {
                         *sd *= drift.sqrt();
-                        // A real number per period.
-                        *unknown = unknown.max(2.0 / (periods - 1) as f64);
+                        unknown.colour[j] = unknown.colour[j].max(2.0 / own_freedom);
                     }
                 }
             }
@@ -362,37 +370,15 @@ impl PeriodWhitening {
 fn trends(
     scatter: &[DMatrix<Complex<f64>>],
     power: &[f64],
-    periods: usize,
-    last: usize,
+    likeness: &[Option<f64>],
+    (periods, last): (usize, usize),
 ) -> Vec<Vec<NoisePower>> {
     let of_joint = |(j, power): (usize, &f64)| -> Vec<f64> {
         let floor = (FLOOR * FLOOR * power).max(f64::MIN_POSITIVE);
         scatter.iter().map(|s| s[(j, j)].re.max(1e-6 * floor)).collect()
     };
     let own: Vec<Vec<f64>> = power.iter().enumerate().map(of_joint).collect();
-    noise_trends(&own, periods - 1, likeness(scatter, periods - 1), last)
-}
-
-/// Mean squared coherence between two joints over the harmonics of `scatter`, each of which chance alone gives
-/// 1/M with M complex degrees of freedom (Carter, Knapp and Nuttall 1973).
-fn likeness(scatter: &[DMatrix<Complex<f64>>], freedom: usize) -> f64 {
-    let joints = scatter.first().map_or(0, DMatrix::nrows);
-    let (mut sum, mut count) = (0.0, 0.0);
-    for s in scatter.iter().skip(1) {
-        for (i, j) in pairs(joints).filter(|(i, j)| i < j) {
-            let power = s[(i, i)].re * s[(j, j)].re;
-            if power > 0.0 {
-                sum += s[(i, j)].norm_sqr() / power;
-                count += 1.0;
-            }
-        }
-    }
-    let chance = 1.0 / freedom as f64;
-    // Two periods, or joints without noise, say nothing.
-    if chance == 1.0 || count == 0.0 {
-        return 0.0;
-    }
-    ((sum / count - chance) / (1.0 - chance)).clamp(0.0, 1.0)
+    noise_trends(&own, periods - 1, likeness, last)
 }
 
 /// All (i, j) of a square matrix.

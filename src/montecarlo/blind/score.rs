@@ -12,7 +12,7 @@ use super::judge::{Outcome, is_at, is_right};
 use super::record::{Named, Record};
 use super::share::Share;
 use super::target::{Target, targets};
-use crate::diagnose::{FALSE_ALARM, Kind, candidates};
+use crate::diagnose::{Kind, candidates, chance};
 use crate::median::median;
 use crate::montecarlo::calibration::Verdict;
 use crate::montecarlo::shard::Merged;
@@ -211,7 +211,7 @@ pub fn causes(all: &[Record]) -> impl Iterator<Item = (&Named, bool)> {
 pub fn power(sqrt_lambda: f64) -> f64 {
     let tests: usize = candidates::all().iter().map(|f| f.sites(6).len()).sum();
     let normal = Normal::standard();
-    let threshold = normal.inverse_cdf(1.0 - 0.5 * FALSE_ALARM / tests as f64);
+    let threshold = normal.inverse_cdf(1.0 - 0.5 * chance::LAW / tests as f64);
     normal.cdf(sqrt_lambda - threshold)
 }
 

@@ -9,7 +9,7 @@ use super::judge::{Outcome, is_at};
 use super::record::Record;
 use super::score::causes;
 use super::share::Share;
-use crate::diagnose::FALSE_ALARM;
+use crate::diagnose::chance::FALSE_ALARM;
 use crate::montecarlo::calibration::Verdict;
 use crate::montecarlo::shard::Merged;
 

@@ -98,7 +98,7 @@ fn parts(scores: &Scores) -> Vec<(&'static str, &'static str, Table)> {
         (
             "Detection by size",
             "Single effects that the residual shows. The power is that of a test of one coefficient among as many as the \
-             dictionary has families and sites, at the design's rate of false alarms.",
+             dictionary has families and sites, at the rate of false alarms by which laws are named.",
             strength_table(&scores.residual, "right"),
         ),
         (

@@ -10,7 +10,7 @@ use super::json::Program;
 use super::number::{significant, with_sigma};
 use super::plot::{Axis, Colour, Grid, Mark};
 use super::{Column, Page, ReportError, Section, Table, Verdict};
-use crate::diagnose::{Cause, Estimate, Finding, Kind, PayloadFinding, Repeated};
+use crate::diagnose::{Cause, Estimate, Finding, Kind, PayloadFinding, Repeated, chance};
 use crate::robot::Arm;
 
 /// A log that was used.
@@ -271,13 +271,14 @@ impl RealArmStudy {
              on every joint and is not there."
         };
         Part::new("Causes named, and what was rejected")
-            .say(
+            .say(format!(
                 "A cause is named when it explains more than its coefficients cost (Schwarz's criterion, with the price \
-                 of having looked at every family, joint and shape), when chance explains it with less than 0.2 % over \
+                 of having looked at every family, joint and shape), when chance explains it with less than {:.2} % over \
                  all tests (Wald, covariance from block sums), and when it keeps at least half of what it explains in \
                  stretches of time left out of the fit, 5 % of its joint's mean square or more. What touched the arm is \
                  taken out before.",
-            )
+                100.0 * chance::LAW,
+            ))
             .say(trap)
             .table("Named causes", super::diagnose::cause_table(diagnosis))
             .table("What was tried in their place", tried)
