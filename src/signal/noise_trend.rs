@@ -61,7 +61,8 @@ pub fn noise_trend(power: &[f64], freedom: usize, last: usize) -> Vec<NoisePower
 ///
 /// The mean of their ln powers, up to J times as well known as one channel's, is followed by parabolas over the same harmonics:
 /// at the slowest ones lines miss noise of two colours by a tenth. How far a channel lies above the mean is a level, of
-/// harmonics k ± max(12, k/4), and what it has beside that its [`Colour`].
+/// harmonics k ± max(12, k/4), and what it has beside that its colour, alike
+/// within a standard deviation of 0.2 or, with the chance of a fifth, another one.
 pub fn noise_trends(
     power: &[Vec<f64>],
     freedom: usize,
