@@ -61,8 +61,8 @@ pub fn noise_trend(power: &[f64], freedom: usize, last: usize) -> Vec<NoisePower
 ///
 /// The mean of their ln powers, up to J times as well known as one channel's, is followed by parabolas over the same harmonics:
 /// at the slowest ones lines miss noise of two colours by a tenth. How far a channel lies above the mean is a level, of
-/// harmonics k ± max(12, k/4), and what it has beside that its colour, alike
-/// within a standard deviation of 0.2 or, with the chance of a fifth, another one.
+/// harmonics k ± max(12, k/4), and what it has beside that its colour, alike within a standard deviation of 0.2 or, with the
+/// chance of a fifth, another one.
 pub fn noise_trends(
     power: &[Vec<f64>],
     freedom: usize,
@@ -239,21 +239,11 @@ mod tests {
     /// Power that falls as 1/h² is found without a bend at its steep beginning.
     #[test]
     fn steep_noise_keeps_its_slope() {
-        const FREEDOM: usize = 7;
         const TRIALS: usize = 200;
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let mut mean = [0.0; 40];
         for _ in 0..TRIALS {
-            let power: Vec<f64> = (0..200)
-                .map(|h: usize| {
-                    let square = |_| {
-                        let x: f64 = StandardNormal.sample(&mut rng);
-                        x * x
-                    };
-                    let chi: f64 = (0..2 * FREEDOM).map(square).sum();
-                    chi / (2 * FREEDOM) as f64 / (h.max(1) as f64).powi(2)
-                })
-                .collect();
+            let power = scattered(&mut rng, FREEDOM, &[Box::new(|h| h.powi(-2))], 199).remove(0);
             for (k, (mean, found)) in
                 mean.iter_mut().zip(noise_trend(&power, FREEDOM, 39)).enumerate()
             {

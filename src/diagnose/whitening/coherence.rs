@@ -60,7 +60,8 @@ mod tests {
     }
 
     /// Independent noise has none; noise of which 0.3 of the power is common has 0.3², the squared correlation, but for
-    /// what the correction for chance is low by, (1 − γ²)² γ²/M · 2 (Carter, Knapp and Nuttall 1973), a tenth of it.
+    /// what the correction for chance is low by: γ² + (1 − γ²)² (1 + 2 γ²/M)/M is to be expected uncorrected, 0.080 corrected,
+    /// a tenth less.
     #[test]
     fn coherence_is_that_of_the_noise() {
         const FREEDOM: usize = 7;
