@@ -24,17 +24,27 @@ pub fn detection_limits(study: &Study, accepted: &Span) -> Vec<DetectionLimit> {
         for site in candidate.sites(study.scene.joints()) {
             let entries: Vec<&Entry> =
                 study.entries.iter().filter(|e| (e.family, e.site) == (family, site)).collect();
+            // √λ of a coefficient b on column 1 alone is b ‖d⊥‖.
+            let least = |entry: &Entry| {
+                let length = study.span(entry, accepted).first_length();
+                let threshold = (study.price(entry) + LEAST_EVIDENCE).sqrt() + POWER_Z;
+                (length, threshold)
+            };
+            // A shape in which an effect of that size may be.
+            let may_be = |entry: &&&Entry| {
+                let (length, threshold) = least(entry);
+                length > 0.0
+                    && candidate.is_possible(entry.shape, &first_alone(entry, threshold / length))
+            };
+            let possible: Vec<&Entry> = entries.iter().filter(may_be).copied().collect();
+            let entries = if possible.is_empty() { entries } else { possible };
             let Some(entry) = entries.get(entries.len() / 2) else { continue };
-            let span = study.span(entry, accepted);
-            if span.is_empty() {
+            let (length, threshold) = least(entry);
+            if length == 0.0 {
                 continue;
             }
-            // √λ of a coefficient b on column 1 alone is b ‖d⊥‖.
-            let length = span.first_length();
-            let threshold = (study.price(entry) + LEAST_EVIDENCE).sqrt() + POWER_Z;
             let quantities = |coefficient: f64| {
-                let mut b = vec![0.0; entry.images.len()];
-                b[0] = coefficient;
+                let b = first_alone(entry, coefficient);
                 candidate.quantities(&study.scene, site, entry.shape, &b)
             };
             let of = quantities(threshold / length);
@@ -59,4 +69,11 @@ pub fn detection_limits(study: &Study, accepted: &Span) -> Vec<DetectionLimit> {
         }
     }
     out
+}
+
+/// Coefficients of `entry` of which only the first is not zero.
+fn first_alone(entry: &Entry, coefficient: f64) -> Vec<f64> {
+    let mut b = vec![0.0; entry.images.len()];
+    b[0] = coefficient;
+    b
 }

@@ -4,6 +4,8 @@ use super::study::Entry;
 
 /// The z of noise that has to be exceeded by what is named, about.
 const TYPICAL_Z: f64 = 4.5;
+/// The same where noise is known with 20 degrees of freedom: Student's t of the chance of the former.
+const MOST_Z: f64 = 6.0;
 
 /// How many tests the shapes of one family at one site are together: the chance that noise exceeds z in any of them, over
 /// that in one.
@@ -12,25 +14,44 @@ const TYPICAL_Z: f64 = 4.5;
 /// exp(−z²/2), twice the up-crossings on the way from one to the other (Efron 1997, the length heuristic), or that of one
 /// test, 2 Φ(−z) ≈ √(2/π) exp(−z²/2)/z. Each shape joins the nearest of those before it (Worsley 1982): the one before it in
 /// its variant, and all of the variant before. Of families with several coefficients every shape counts.
-pub fn distinct_shapes(entries: &[Entry]) -> f64 {
-    tests(entries, TYPICAL_Z)
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DistinctShapes {
+    /// Whatever their coefficients.
+    pub all: f64,
+    /// Of those to which a coefficient may belong that noise makes as large as what is named has to be.
+    pub within_reach: f64,
 }
 
-fn tests(entries: &[Entry], z: f64) -> f64 {
-    if entries.iter().any(|e| e.images.len() > 1) {
-        return entries.len() as f64;
+impl DistinctShapes {
+    /// Of `entries`; `is_possible` says whether a coefficient may belong to one.
+    pub fn of(entries: &[Entry], is_possible: impl Fn(&Entry, f64) -> bool) -> Self {
+        if entries.iter().any(|e| e.images.len() > 1) {
+            let all = entries.len() as f64;
+            return Self { all, within_reach: all };
+        }
+        let is_within = |e: &&Entry| {
+            let sigma = 1.0 / e.images[0].square().sqrt();
+            [-MOST_Z, -TYPICAL_Z, TYPICAL_Z, MOST_Z].iter().any(|z| is_possible(e, z * sigma))
+        };
+        let all: Vec<&Entry> = entries.iter().collect();
+        let within_reach: Vec<&Entry> = entries.iter().filter(is_within).collect();
+        Self { all: tests(&all, TYPICAL_Z), within_reach: tests(&within_reach, TYPICAL_Z) }
     }
+}
+
+/// Of entries with one column each.
+fn tests(entries: &[&Entry], z: f64) -> f64 {
     let angle = |a: &Entry, b: &Entry| {
         let (a, b) = (&a.images[0], &b.images[0]);
         (a.dot(b).abs() / (a.square() * b.square()).sqrt()).min(1.0).acos()
     };
-    let variants: Vec<&[Entry]> =
+    let variants: Vec<&[&Entry]> =
         entries.chunk_by(|a, b| a.shape.variant == b.shape.variant).collect();
     let mut count = 1.0;
     for (v, variant) in variants.iter().enumerate() {
         for (k, entry) in variant.iter().enumerate() {
-            let before = k.checked_sub(1).map(|k| &variant[k]);
-            let beside = v.checked_sub(1).into_iter().flat_map(|v| variants[v]);
+            let before = k.checked_sub(1).map(|k| variant[k]);
+            let beside = v.checked_sub(1).into_iter().flat_map(|v| variants[v].iter().copied());
             let nearest = before.into_iter().chain(beside).map(|other| angle(entry, other));
             if let Some(angle) = nearest.min_by(f64::total_cmp) {
                 count += (angle * z / std::f64::consts::TAU.sqrt()).min(1.0);
@@ -51,6 +72,9 @@ mod tests {
         Entry { family: 0, site: None, shape: Shape { variant, value }, images }
     }
 
+    /// A family whose coefficients go with every shape.
+    const ANY: fn(&Entry, f64) -> bool = |_, _| true;
+
     fn quarter_circle(steps: usize) -> Vec<Entry> {
         let angle = |k: usize| std::f64::consts::FRAC_PI_2 * k as f64 / steps as f64;
         let columns = (0..=steps).map(|k| [angle(k).cos(), angle(k).sin()]);
@@ -64,14 +88,27 @@ mod tests {
     fn shapes_that_resemble_each_other_are_counted_once() {
         let expected = 1.0 + std::f64::consts::FRAC_PI_2 * TYPICAL_Z / std::f64::consts::TAU.sqrt();
         for steps in [10, 100] {
-            let tests = distinct_shapes(&quarter_circle(steps));
+            let tests = DistinctShapes::of(&quarter_circle(steps), ANY).all;
             assert!((tests / expected - 1.0).abs() < 1e-9, "{tests} {expected}");
         }
         let apart = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let mut entries: Vec<Entry> = (0..3).map(|k| entry(0, k as f64, &apart[k])).collect();
-        assert_eq!(distinct_shapes(&entries), 3.0);
+        assert_eq!(DistinctShapes::of(&entries, ANY).all, 3.0);
         entries.extend([2, 0].map(|k| entry(1, k as f64, &apart[k])));
-        assert_eq!(distinct_shapes(&entries), 3.0);
+        assert_eq!(DistinctShapes::of(&entries, ANY).all, 3.0);
+    }
+
+    /// Of shapes that hold their coefficient those count that noise reaches: with σ = 1/‖x‖ = 1 and a coefficient within half
+    /// of its shape's value, 5 and −6 of these four; without one there is still the test that is made.
+    #[test]
+    fn what_noise_does_not_reach_is_no_test() {
+        let apart = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.6, 0.8]];
+        let values = [5.0, 1.0, 20.0, -6.0];
+        let entries: Vec<Entry> = (0..4).map(|k| entry(0, values[k], &apart[k])).collect();
+        let agrees = |e: &Entry, b: f64| (b / e.shape.value - 1.0).abs() < 0.5;
+        let tests = |entries: &[Entry]| DistinctShapes::of(entries, agrees);
+        assert_eq!(tests(&entries).within_reach, 2.0);
+        assert_eq!(tests(&entries[1..3]), DistinctShapes { all: 2.0, within_reach: 1.0 });
     }
 
     /// The chance that noise exceeds z in any of the columns on a quarter of a circle, over that in one, is the tests that
@@ -94,7 +131,7 @@ mod tests {
             any += f64::from(u8::from(columns.iter().any(exceeds)));
             one += f64::from(u8::from(exceeds(&columns[0])));
         }
-        let counted = tests(&columns, z);
+        let counted = tests(&columns.iter().collect::<Vec<_>>(), z);
         let at_most = 1.0 + (counted - 1.0) / (1.0 - z.powi(-2));
         // 2500 cases of one and 4400 more of the others: the ratio is known to 1.6 %, of which this is four. Exceeding at
         // both ends with different signs, which is counted twice, has 0.3 %.

@@ -6,7 +6,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::candidates::{Candidate, Search, Shape};
-use super::distinct_shapes::distinct_shapes;
+use super::distinct_shapes::DistinctShapes;
 use super::drives::{self, Answer};
 use super::error::DiagnoseError;
 use super::image::{Column, Image, Span, dot};
@@ -63,8 +63,8 @@ pub struct Study<'a> {
     pub statistic: Statistic,
     /// Every family at every site with every starting shape.
     pub entries: Vec<Entry>,
-    /// See [`Self::alternatives`]: of the starting shapes of a family at a site.
-    shapes: HashMap<(usize, Option<usize>), f64>,
+    /// How many starting shapes of a family at a site can be told from each other.
+    shapes: HashMap<(usize, Option<usize>), DistinctShapes>,
     /// Measured torque there.
     pub torque: Image,
     /// Joints (0-based) whose readings are too bad to look for physics in them.
@@ -263,7 +263,12 @@ impl<'a> Study<'a> {
         self.entries = entries.flatten_iter().collect();
         let place = |e: &Entry| (e.family, e.site);
         let groups = self.entries.chunk_by(|a, b| place(a) == place(b));
-        self.shapes = groups.map(|same| (place(&same[0]), distinct_shapes(same))).collect();
+        // The noise of a single run is not known, and what it makes of a coefficient neither.
+        let is_possible = |e: &Entry, b: f64| {
+            !self.scene.periodic || self.families[e.family].is_possible(e.shape, &[b])
+        };
+        let distinct = |same: &[Entry]| (place(&same[0]), DistinctShapes::of(same, is_possible));
+        self.shapes = groups.map(distinct).collect();
     }
 
     /// A family's columns, the null model projected out; `None` if it absorbs them.
@@ -481,13 +486,25 @@ impl<'a> Study<'a> {
             - 2.0 * self.families[entry.family].prior_odds(entry.site).ln()
     }
 
-    /// Shapes that were to choose from when `entry` was taken, as many as can be told from each other
-    /// ([`distinct_shapes`]).
-    pub fn alternatives(&self, entry: &Entry) -> f64 {
+    /// Shapes that were to choose from when `entry` was taken, as many as can be told from each other; where the shape is the
+    /// coefficient, those that go with it.
+    fn alternatives(&self, entry: &Entry) -> f64 {
+        if self.families[entry.family].shape_is_coefficient() {
+            return self.tests(entry);
+        }
+        self.of_shapes(entry, |shapes| shapes.all)
+    }
+
+    /// How many tests the shapes are together of which `entry` has one.
+    pub fn tests(&self, entry: &Entry) -> f64 {
+        self.of_shapes(entry, |shapes| shapes.within_reach)
+    }
+
+    fn of_shapes(&self, entry: &Entry, count: impl Fn(&DistinctShapes) -> f64) -> f64 {
         let Entry { family, site, shape, .. } = *entry;
         self.families[family]
             .alternatives(&self.scene, site, shape)
-            .unwrap_or_else(|| self.shapes.get(&(family, site)).copied().unwrap_or(1.0))
+            .unwrap_or_else(|| self.shapes.get(&(family, site)).map_or(1.0, count))
     }
 }
 

@@ -102,6 +102,11 @@ pub trait Candidate: Sync {
         None
     }
 
+    /// Whether shape and coefficient are one parameter, so that beside the latter there is hardly a shape to choose.
+    fn shape_is_coefficient(&self) -> bool {
+        false
+    }
+
     /// How many shapes were to choose from when this one was taken, where there were more than the
     /// starting ones.
     fn alternatives(&self, _scene: &Scene, _site: Option<usize>, _shape: Shape) -> Option<f64> {

@@ -1,9 +1,35 @@
 //! Torque recorded later than the motion by a delay d: τ(t − d) − τ(t), of one joint or of all.
+//!
+//! d is the shape, and the coefficient as well: what a delay changes is divided by it. Where the two disagree the law is
+//! another one that looks like a delay of the shape: drives with slow feedback lead or lag by a little more at one reversal than
+//! at the other, which is a sixteenth of what half a sample would change.
 
 use super::*;
 
 /// See the module.
 pub struct TimeSkew;
+
+/// Delays to begin with, s. Where the leads that drives may have take what a delay changes to first order, the rest is in
+/// proportion to its square, and a shape d reaches delays from d/√3 to √3 d.
+const DELAYS_S: [f64; 12] = [
+    -0.04,
+    -0.015,
+    -5.5e-3,
+    -2e-3,
+    -7e-4,
+    -SHORTEST_S,
+    SHORTEST_S,
+    7e-4,
+    2e-3,
+    5.5e-3,
+    0.015,
+    0.04,
+];
+/// Below this delay, s, what it changes is in proportion to it: to (ω d)²/6 = 0.15 % at the 60 Hz up to which drives are looked
+/// at.
+const SHORTEST_S: f64 = 2.5e-4;
+/// The coefficient over the shape, at most, and its inverse at least.
+const AGREES: f64 = 3.0;
 
 impl Candidate for TimeSkew {
     fn kind(&self) -> Kind {
@@ -25,10 +51,11 @@ impl Candidate for TimeSkew {
         if site.is_some() && !scene.periodic {
             return Vec::new();
         }
-        let sample_s = 1.0 / scene.rate_hz;
-        [-3.0, -1.0, -0.2, 0.2, 1.0, 3.0]
-            .map(|d| Shape { variant: 0, value: d * sample_s })
-            .to_vec()
+        DELAYS_S.map(|value| Shape { variant: 0, value }).to_vec()
+    }
+
+    fn shape_is_coefficient(&self) -> bool {
+        true
     }
 
     fn search(&self) -> Search {
@@ -51,11 +78,40 @@ impl Candidate for TimeSkew {
         vec![quantity("delay_s", b[0], "s")]
     }
 
+    fn is_possible(&self, shape: Shape, b: &[f64]) -> bool {
+        let ratio = b[0] / shape.value;
+        let least = if shape.value.abs() <= SHORTEST_S { 0.0 } else { 1.0 / AGREES };
+        (least..=AGREES).contains(&ratio)
+    }
+
     fn separating_experiment(&self) -> &'static str {
         "a sharp tap on the standing arm: both channels must show it in the same sample"
     }
 
     fn in_words(&self) -> &'static str {
         "torque that is recorded later than the motion"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whether the law stays the same between the shape and the delay or goes with its square: some shape to begin with takes
+    /// every delay up to 60 ms, and none takes one that is a tenth of it or runs the other way.
+    #[test]
+    fn every_delay_begins_somewhere() {
+        let is_taken =
+            |shape: f64, b: f64| TimeSkew.is_possible(Shape { variant: 0, value: shape }, &[b]);
+        for step in 0..200 {
+            let delay = 1e-5 * (0.06_f64 / 1e-5).powf(f64::from(step) / 199.0);
+            for delay in [-delay, delay] {
+                assert!(DELAYS_S.iter().any(|d| is_taken(*d, delay)), "{delay}");
+                if delay.abs() > SHORTEST_S {
+                    assert!(DELAYS_S.iter().any(|d| is_taken(*d, delay * delay / d)), "{delay}");
+                }
+            }
+        }
+        assert!(!is_taken(-4.5e-3, -2.8e-4) && !is_taken(2e-3, -2e-3) && !is_taken(2e-4, -1e-4));
     }
 }
