@@ -109,6 +109,10 @@ mod tests {
         let tests = |entries: &[Entry]| DistinctShapes::of(entries, agrees);
         assert_eq!(tests(&entries).within_reach, 2.0);
         assert_eq!(tests(&entries[1..3]), DistinctShapes { all: 2.0, within_reach: 1.0 });
+        // Of two columns one coefficient does not tell where the other is.
+        let mut both = entries;
+        both.iter_mut().for_each(|e| e.images.push(e.images[0].clone()));
+        assert_eq!(tests(&both), DistinctShapes { all: 4.0, within_reach: 4.0 });
     }
 
     /// The chance that noise exceeds z in any of the columns on a quarter of a circle, over that in one, is the tests that
