@@ -22,24 +22,22 @@ pub fn detection_limits(study: &Study, accepted: &Span) -> Vec<DetectionLimit> {
     let mut out = Vec::new();
     for (family, candidate) in study.families.iter().enumerate() {
         for site in candidate.sites(study.scene.joints()) {
-            let entries: Vec<&Entry> =
-                study.entries.iter().filter(|e| (e.family, e.site) == (family, site)).collect();
+            let here = study.entries.iter().filter(|e| (e.family, e.site) == (family, site));
             // √λ of a coefficient b on column 1 alone is b ‖d⊥‖.
-            let least = |entry: &Entry| {
-                let length = study.span(entry, accepted).first_length();
-                let threshold = (study.price(entry) + LEAST_EVIDENCE).sqrt() + POWER_Z;
-                (length, threshold)
-            };
+            let sized: Vec<(&Entry, f64, f64)> = here
+                .map(|entry| {
+                    let threshold = (study.price(entry) + LEAST_EVIDENCE).sqrt() + POWER_Z;
+                    (entry, study.span(entry, accepted).first_length(), threshold)
+                })
+                .collect();
             // A shape in which an effect of that size may be.
-            let may_be = |entry: &&&Entry| {
-                let (length, threshold) = least(entry);
+            let may_be = |&&(entry, length, threshold): &&(&Entry, f64, f64)| {
                 length > 0.0
                     && candidate.is_possible(entry.shape, &first_alone(entry, threshold / length))
             };
-            let possible: Vec<&Entry> = entries.iter().filter(may_be).copied().collect();
-            let entries = if possible.is_empty() { entries } else { possible };
-            let Some(entry) = entries.get(entries.len() / 2) else { continue };
-            let (length, threshold) = least(entry);
+            let possible: Vec<_> = sized.iter().filter(may_be).copied().collect();
+            let sized = if possible.is_empty() { sized } else { possible };
+            let Some(&(entry, length, threshold)) = sized.get(sized.len() / 2) else { continue };
             if length == 0.0 {
                 continue;
             }

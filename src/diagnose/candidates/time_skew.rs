@@ -98,7 +98,7 @@ mod tests {
     use super::*;
 
     /// Whether the law stays the same between the shape and the delay or goes with its square: some shape to begin with takes
-    /// every delay up to 60 ms, and none takes one that is a tenth of it or runs the other way.
+    /// every delay up to 60 ms, and none takes one that is a sixteenth of it or runs the other way.
     #[test]
     fn every_delay_begins_somewhere() {
         let is_taken =
