@@ -148,8 +148,9 @@ impl Search<'_> {
             .map(|c| {
                 let site = self.changes[c].site;
                 let span = Span::outside(&others, &self.changes[c].images);
-                let each = study.statistic.coefficient_price(site, rest.mean.len());
-                let price = span.len() as f64 * each + 2.0 * tests.ln();
+                let rows = rest.mean.len();
+                let price =
+                    study.statistic.coefficients_price(span.len(), site, rows) + 2.0 * tests.ln();
                 Scored {
                     change: c,
                     evidence: study.statistic.gain(&span, &rest) - price,

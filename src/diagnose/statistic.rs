@@ -90,17 +90,18 @@ impl Statistic {
         }
     }
 
-    /// What a free coefficient costs in 2 ln of the evidence, `all_rows` of all joints given.
+    /// What `count` free coefficients of one effect cost in 2 ln of the evidence, `all_rows` of all joints given.
     ///
-    /// Periods: ln(1 + λ₀) of a Gaussian prior in which the coefficient's own λ is [`USUAL_LAMBDA`] in the mean
-    /// (Zellner 1986). Blocks: ln n (Schwarz 1978), n the rows that see the site.
-    pub fn coefficient_price(&self, site: Option<usize>, all_rows: usize) -> f64 {
+    /// Periods: k ln(1 + λ₀/k) of a Gaussian prior in which the effect's λ is [`USUAL_LAMBDA`] in the mean, however many
+    /// coefficients it has (Zellner 1986). Blocks: k ln n (Schwarz 1978), n the rows that see the site.
+    pub fn coefficients_price(&self, count: usize, site: Option<usize>, all_rows: usize) -> f64 {
+        let k = count as f64;
         let rows = match (self, site) {
-            (Self::Periods(_), _) => return USUAL_LAMBDA.ln_1p(),
+            (Self::Periods(_), _) => return k * (USUAL_LAMBDA / k.max(1.0)).ln_1p(),
             (Self::Blocks { rows, .. }, Some(_)) => *rows,
             (Self::Blocks { .. }, None) => all_rows,
         };
-        (rows as f64).ln()
+        k * (rows as f64).ln()
     }
 
     /// Probability of at least this much by chance alone, one test.

@@ -480,7 +480,7 @@ impl<'a> Study<'a> {
     /// at so many shapes and families, and of being rare.
     pub fn price(&self, entry: &Entry) -> f64 {
         let rows = self.residual.mean.len();
-        entry.images.len() as f64 * self.statistic.coefficient_price(entry.site, rows)
+        self.statistic.coefficients_price(entry.images.len(), entry.site, rows)
             + 2.0 * self.alternatives(entry).ln()
             + 2.0 * (self.hypotheses() as f64).ln()
             - 2.0 * self.families[entry.family].prior_odds(entry.site).ln()

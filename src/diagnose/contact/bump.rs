@@ -153,8 +153,8 @@ pub(super) struct Push {
     pub(super) end_s: Estimate,
     /// Of the joint that feels it most, Nm.
     pub(super) peak_nm: Estimate,
-    /// Joints (0-based) that feel it, and how much, Nm.
-    pub(super) heights_nm: Vec<(usize, f64)>,
+    /// Joints (0-based) on which it was weighed, and how much they feel it and its σ, Nm.
+    pub(super) heights_nm: Vec<(usize, [f64; 2])>,
     /// Twice what it gains in log-likelihood.
     pub(super) gain: f64,
     shape: f64,
@@ -171,9 +171,17 @@ impl Push {
         }
     }
 
+    /// Those of its joints that feel it by `least` σ or more, and the one that feels it most.
+    pub(super) fn felt(&self, least: f64) -> impl Iterator<Item = &(usize, [f64; 2])> {
+        let sigmas = |(_, [height, sigma]): &(usize, [f64; 2])| (height / sigma).abs();
+        let most = self.heights_nm.iter().map(sigmas).fold(0.0, f64::max);
+        self.heights_nm.iter().filter(move |on_joint| sigmas(on_joint) >= least.min(most))
+    }
+
     /// On joint `joint` (0-based), Nm.
     pub(super) fn torque_nm(&self, joint: usize, t_s: f64) -> f64 {
-        let height = self.heights_nm.iter().find(|(j, _)| *j == joint).map_or(0.0, |(_, nm)| *nm);
+        let on_joint = self.heights_nm.iter().find(|(j, _)| *j == joint);
+        let height = on_joint.map_or(0.0, |(_, [height, _])| *height);
         let [start_s, end_s] = [self.start_s.value, self.end_s.value];
         height * bump(self.shape, end_s - start_s, t_s - 0.5 * (start_s + end_s))
     }
@@ -224,12 +232,11 @@ pub(super) fn weigh(
         }
         Estimate { value: of(best)[0], unit, ci95 }
     };
-    let heights_nm = best.heights_nm.iter().map(|[height, _]| *height);
     Some(Push {
         start_s: reach(&|fit| fit.start_s, "s"),
         end_s: reach(&|fit| fit.end_s, "s"),
         peak_nm: reach(&|fit| fit.heights_nm[main], "Nm"),
-        heights_nm: felt.felt().iter().map(|j| joints[*j]).zip(heights_nm).collect(),
+        heights_nm: felt.felt().iter().map(|j| joints[*j]).zip(best.heights_nm.clone()).collect(),
         gain: best.gain,
         shape: best.shape,
     })
