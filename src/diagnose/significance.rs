@@ -47,8 +47,7 @@ impl Kept<'_, '_> {
         }
         let span = study.span(&contender.entry, others);
         let single = study.statistic.probability(&span, residual);
-        // The chance is shared out evenly between families and sites, and within one between its shapes.
-        let tests = study.hypotheses() as f64 * study.tests(&contender.entry);
+        let tests = study.hypotheses(&contender.entry) * study.tests(&contender.entry);
         contender.evidence > LEAST_EVIDENCE
             && single * tests < chance::LAW
             && self.is_its_own(&contender.entry, others, residual)

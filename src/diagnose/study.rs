@@ -471,9 +471,11 @@ impl<'a> Study<'a> {
         self.null_columns.len() - self.answers.len()
     }
 
-    /// Number of sites of all families.
-    pub fn hypotheses(&self) -> usize {
-        self.families.iter().map(|f| f.sites(self.scene.joints()).len()).sum()
+    /// One over the share that the family of `entry` at its site has in the chance and in the odds before: families share them
+    /// evenly, and the sites of one what it has. What only the arm as a whole can have is not as rare as on one joint.
+    pub fn hypotheses(&self, entry: &Entry) -> f64 {
+        let sites = self.families[entry.family].sites(self.scene.joints()).len();
+        (self.families.len() * sites) as f64
     }
 
     /// What `entry` has to explain before there is evidence for it: its coefficients, the price of having looked
@@ -482,7 +484,7 @@ impl<'a> Study<'a> {
         let rows = self.residual.mean.len();
         self.statistic.coefficients_price(entry.images.len(), entry.site, rows)
             + 2.0 * self.alternatives(entry).ln()
-            + 2.0 * (self.hypotheses() as f64).ln()
+            + 2.0 * self.hypotheses(entry).ln()
             - 2.0 * self.families[entry.family].prior_odds(entry.site).ln()
     }
 
