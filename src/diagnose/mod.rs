@@ -43,6 +43,7 @@ mod misfit;
 mod modesty;
 mod noise_power;
 mod payload;
+mod price;
 mod record;
 mod repeated;
 pub mod replay;

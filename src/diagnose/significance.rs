@@ -47,9 +47,8 @@ impl Kept<'_, '_> {
         }
         let span = study.span(&contender.entry, others);
         let single = study.statistic.probability(&span, residual);
-        let tests = study.hypotheses(&contender.entry) * study.tests(&contender.entry);
         contender.evidence > LEAST_EVIDENCE
-            && single * tests < chance::LAW
+            && single * study.tests(&contender.entry) < chance::LAW
             && self.is_its_own(&contender.entry, others, residual)
             && study.generalises(&contender.entry, &span, residual)
     }

@@ -64,7 +64,7 @@ pub struct Study<'a> {
     /// Every family at every site with every starting shape.
     pub entries: Vec<Entry>,
     /// How many starting shapes of a family at a site can be told from each other.
-    shapes: HashMap<(usize, Option<usize>), DistinctShapes>,
+    pub(super) shapes: HashMap<(usize, Option<usize>), DistinctShapes>,
     /// Measured torque there.
     pub torque: Image,
     /// Joints (0-based) whose readings are too bad to look for physics in them.
@@ -469,44 +469,6 @@ impl<'a> Study<'a> {
     /// Base parameters of the null model.
     pub fn base_count(&self) -> usize {
         self.null_columns.len() - self.answers.len()
-    }
-
-    /// One over the share that the family of `entry` at its site has in the chance and in the odds before: families share them
-    /// evenly, and the sites of one what it has. What only the arm as a whole can have is not as rare as on one joint.
-    pub fn hypotheses(&self, entry: &Entry) -> f64 {
-        let sites = self.families[entry.family].sites(self.scene.joints()).len();
-        (self.families.len() * sites) as f64
-    }
-
-    /// What `entry` has to explain before there is evidence for it: its coefficients, the price of having looked
-    /// at so many shapes and families, and of being rare.
-    pub fn price(&self, entry: &Entry) -> f64 {
-        let rows = self.residual.mean.len();
-        self.statistic.coefficients_price(entry.images.len(), entry.site, rows)
-            + 2.0 * self.alternatives(entry).ln()
-            + 2.0 * self.hypotheses(entry).ln()
-            - 2.0 * self.families[entry.family].prior_odds(entry.site).ln()
-    }
-
-    /// Shapes that were to choose from when `entry` was taken, as many as can be told from each other; where the shape is the
-    /// coefficient, those that go with it.
-    fn alternatives(&self, entry: &Entry) -> f64 {
-        if self.families[entry.family].shape_is_coefficient() {
-            return self.tests(entry);
-        }
-        self.of_shapes(entry, |shapes| shapes.all)
-    }
-
-    /// How many tests the shapes are together of which `entry` has one.
-    pub fn tests(&self, entry: &Entry) -> f64 {
-        self.of_shapes(entry, |shapes| shapes.within_reach)
-    }
-
-    fn of_shapes(&self, entry: &Entry, count: impl Fn(&DistinctShapes) -> f64) -> f64 {
-        let Entry { family, site, shape, .. } = *entry;
-        self.families[family]
-            .alternatives(&self.scene, site, shape)
-            .unwrap_or_else(|| self.shapes.get(&(family, site)).map_or(1.0, count))
     }
 }
 

@@ -1,0 +1,45 @@
+//! What it costs to have looked for a law in so many places.
+//!
+//! Families share the chance of a false alarm and the odds before evenly, and the sites of one what it has: what only the arm
+//! as a whole can have is not as rare as the same on one joint of six. What a site has is shared between the shapes of the
+//! law that can be told from each other there.
+
+use super::distinct_shapes::DistinctShapes;
+use super::study::{Entry, Study};
+
+impl Study<'_> {
+    /// How many tests the one of `entry` stands for: times its own probability, no more than [`LAW`](super::chance::LAW).
+    pub fn tests(&self, entry: &Entry) -> f64 {
+        self.places(entry) * self.of_shapes(entry, |shapes| shapes.within_reach)
+    }
+
+    /// 2 ln of the evidence that `entry` has to have before there is any for it: its coefficients, the places and shapes that
+    /// were looked at, and how common its family is there.
+    pub fn price(&self, entry: &Entry) -> f64 {
+        let rows = self.residual.mean.len();
+        self.statistic.coefficients_price(entry.images.len(), entry.site, rows)
+            + 2.0 * self.places(entry).ln()
+            + 2.0 * self.alternatives(entry).ln()
+            - 2.0 * self.families[entry.family].prior_odds(entry.site).ln()
+    }
+
+    /// Families, and sites of the family of `entry`.
+    fn places(&self, entry: &Entry) -> f64 {
+        let sites = self.families[entry.family].sites(self.scene.joints()).len();
+        (self.families.len() * sites) as f64
+    }
+
+    /// Shapes that were to choose from when `entry` was taken, as many as can be told from each other; where the shape is the
+    /// coefficient, those that go with it.
+    fn alternatives(&self, entry: &Entry) -> f64 {
+        let is_bound = self.families[entry.family].shape_is_coefficient();
+        self.of_shapes(entry, |shapes| if is_bound { shapes.within_reach } else { shapes.all })
+    }
+
+    fn of_shapes(&self, entry: &Entry, count: impl Fn(&DistinctShapes) -> f64) -> f64 {
+        let Entry { family, site, shape, .. } = *entry;
+        self.families[family]
+            .alternatives(&self.scene, site, shape)
+            .unwrap_or_else(|| self.shapes.get(&(family, site)).map_or(1.0, count))
+    }
+}
