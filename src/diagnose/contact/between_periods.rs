@@ -526,4 +526,24 @@ mod tests {
         assert!(seen >= 46, "{seen}");
         assert!(on_arm >= 31, "{on_arm} of {seen}");
     }
+
+    /// A joint whose torque is not recorded (zero all along) has no noise in which to be found, and does not say how high the
+    /// push of the others is.
+    #[test]
+    fn a_joint_without_noise_feels_nothing() {
+        let push = Hidden { start_s: 31.0, end_s: 31.8, nm: [1.8, -1.8] };
+        let (time_s, signals) = log(7, &push);
+        let with_silent = signals.map(|two| {
+            JointSignals::from_fn(
+                3,
+                two.samples(),
+                |j, k| if j < 2 { two.joint(j)[k] } else { 0.0 },
+            )
+        });
+        let cause = &contacts(&time_s, &with_silent).unwrap().causes[0];
+        assert_eq!(cause.joint, None);
+        assert!(!cause.in_words.contains("joint 3"), "{}", cause.in_words);
+        let [low, high] = cause.parameters["peak_nm"].ci95;
+        assert!(low < high && low * high > 0.0, "{low} {high}");
+    }
 }

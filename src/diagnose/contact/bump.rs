@@ -173,9 +173,8 @@ impl Push {
 
     /// Those of its joints that feel it by `least` σ or more, and the one that feels it most.
     pub(super) fn felt(&self, least: f64) -> impl Iterator<Item = &(usize, [f64; 2])> {
-        let sigmas = |(_, [height, sigma]): &(usize, [f64; 2])| (height / sigma).abs();
-        let most = self.heights_nm.iter().map(sigmas).fold(0.0, f64::max);
-        self.heights_nm.iter().filter(move |on_joint| sigmas(on_joint) >= least.min(most))
+        let most = self.heights_nm.iter().map(|on_joint| sigmas(on_joint.1)).fold(0.0, f64::max);
+        self.heights_nm.iter().filter(move |on_joint| sigmas(on_joint.1) >= least.min(most))
     }
 
     /// On joint `joint` (0-based), Nm.
@@ -185,6 +184,11 @@ impl Push {
         let [start_s, end_s] = [self.start_s.value, self.end_s.value];
         height * bump(self.shape, end_s - start_s, t_s - 0.5 * (start_s + end_s))
     }
+}
+
+/// Size of a height over its σ; none of a joint without noise, whose heights are none either.
+fn sigmas([height, sigma]: [f64; 2]) -> f64 {
+    if sigma > 0.0 { (height / sigma).abs() } else { 0.0 }
 }
 
 /// A bump that explains what is seen.
@@ -216,7 +220,7 @@ pub(super) fn weigh(
         .collect();
     let tops: Vec<&Fit> = of_shapes.iter().filter_map(|fits| top(fits.iter())).collect();
     let best = top(tops.iter().copied())?;
-    let over_sigma = |a: &usize| (best.heights_nm[*a][0] / best.heights_nm[*a][1]).abs();
+    let over_sigma = |a: &usize| sigmas(best.heights_nm[*a]);
     let main = (0..felt.felt().len()).max_by(|a, b| over_sigma(a).total_cmp(&over_sigma(b)))?;
     let reach = |of: &dyn Fn(&Fit) -> [f64; 2], unit: &'static str| {
         let mut ci95 = [f64::INFINITY, f64::NEG_INFINITY];
