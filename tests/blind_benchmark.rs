@@ -225,7 +225,7 @@ fn of_two_effects_both_are_named() {
 }
 
 /// Drives that feed half of friction forward and have slow feedback reverse early or late by what their joint does, which
-/// looks like a sixteenth of what a longer delay does. Of these ten logs five were called late; by chance less than 0.2 % of
+/// looks like a sixteenth of what a longer delay does. Of these ten logs five were called late; by chance less than 0.21 % of
 /// logs are given any law.
 #[test]
 fn slow_drives_are_not_late() {

@@ -128,7 +128,7 @@ pub(super) fn between(
         estimate(x[a] / mass, &g, "m")
     });
     let probability = solution.probability(layout.body, STATIC);
-    let is_named = probability < chance::LAW && mass_kg.ci95[0] > 0.0;
+    let is_named = probability < chance::PAYLOAD && mass_kg.ci95[0] > 0.0;
     let gain_scale = known_mass_kg
         .filter(|_| is_named)
         .map(|known| estimate(known / mass, &[-known / (mass * mass), 0.0, 0.0, 0.0], ""));

@@ -1,14 +1,16 @@
 //! What it costs to have looked for a law in so many places.
 //!
-//! Families share the chance of a false alarm and the odds before evenly, and the sites of one what it has: what only the arm
-//! as a whole can have is not as rare as the same on one joint of six. What a site has is shared between the shapes of the
-//! law that can be told from each other there.
+//! Families share the chance of a false alarm evenly, and the sites of one what it has: what only the arm as a whole can have is
+//! not as rare as the same on one joint of six. What a site has is shared between the shapes of the law that can be told from
+//! each other there. The odds before are shared likewise, times what a family says of a site
+//! ([`prior_odds`](super::candidates::Candidate::prior_odds)), which takes from it and gives nothing to the others.
 
 use super::distinct_shapes::DistinctShapes;
 use super::study::{Entry, Study};
 
 impl Study<'_> {
-    /// How many tests the one of `entry` stands for: times its own probability, no more than [`LAW`](super::chance::LAW).
+    /// By how much the probability of `entry` alone is multiplied before it is held against [`LAW`](super::chance::LAW): the
+    /// places, and the tests that its family's shapes are at its own.
     pub fn tests(&self, entry: &Entry) -> f64 {
         self.places(entry) * self.of_shapes(entry, |shapes| shapes.within_reach)
     }

@@ -25,8 +25,6 @@ use crate::signal::{
 /// this share of the joint that felt it most: the arm that gives way moves the other joints a little.
 const FELT: f64 = 4.0;
 const FELT_SHARE: f64 = 0.1;
-/// The same of what was weighed on several joints, where one needs not show it alone (once in 400).
-const FELT_WITH_OTHERS: f64 = 3.0;
 /// Shortest bump, s; a collision lasts a tenth of a second.
 const SHORTEST_S: f64 = 0.1;
 /// The longest, s: a hand that leans on the arm.
@@ -305,7 +303,7 @@ impl Repeats {
         let is_far = |push: &Push| felt.of_known_noise(push.gain) > far * far;
         let Some(mut all) = weigh_on(&felt).filter(is_far) else { return Ok(None) };
         if candidate.felt.len() > 1 {
-            let felt: Vec<usize> = all.felt(FELT_WITH_OTHERS).map(|(j, _)| *j).collect();
+            let felt: Vec<usize> = all.felt().map(|(j, _)| *j).collect();
             for row in candidate.felt.chunks(1).filter(|row| felt.contains(&self.joints[row[0]])) {
                 weigh_on(&felt_by(row)).iter().for_each(|own| all.reach_over(own));
             }
@@ -313,10 +311,10 @@ impl Repeats {
         Ok(Some(all))
     }
 
-    /// Whether `push` is nowhere more than what rounding leaves of the torque: periods that are alike to the last digit
+    /// Whether `push` is nowhere where it is felt more than what rounding leaves of the torque: periods that are alike to the last digit
     /// of a file differ by that alone, and have no noise beside which it would be small.
     fn is_rounding(&self, push: &Push) -> bool {
-        push.heights_nm.iter().all(|(j, [height, _])| {
+        push.felt().all(|(j, [height, _])| {
             let torque_nm = &self.torque_nm.joint(*j)[self.window.clone()];
             let square = torque_nm.iter().map(|t| t * t).sum::<f64>() / torque_nm.len() as f64;
             height.abs() < FLOOR * square.sqrt()
@@ -338,7 +336,7 @@ impl Repeats {
             start_s: shifted(&push.start_s),
             end_s: shifted(&push.end_s),
             peak_nm: push.peak_nm.clone(),
-            felt: push.felt(FELT_WITH_OTHERS).map(|(j, [height, _])| (j + 1, *height)).collect(),
+            felt: push.felt().map(|(j, [height, _])| (j + 1, *height)).collect(),
             strength: push.gain.sqrt(),
         }
     }
@@ -426,6 +424,14 @@ mod tests {
         contacts(&time_s, &signals)
     }
 
+    /// `signals` and a third joint, at rest, whose torque is zero.
+    fn with_a_silent_joint(signals: &[JointSignals; 3]) -> [JointSignals; 3] {
+        signals.each_ref().map(|two| {
+            let value = |j, k| if j < 2 { two.joint(j)[k] } else { 0.0 };
+            JointSignals::from_fn(3, two.samples(), value)
+        })
+    }
+
     #[test]
     fn repetitions_without_a_contact_have_none() {
         let nothing = Hidden { start_s: 24.0, end_s: 25.0, nm: [0.0, 0.0] };
@@ -497,6 +503,7 @@ mod tests {
             }
         }
         assert!(contacts(&time_s, &signals).is_none());
+        assert!(contacts(&time_s, &with_a_silent_joint(&signals)).is_none());
         let y = signals[2].joint_mut(1);
         for (k, y) in y[2400..2440].iter_mut().enumerate() {
             *y += 0.3 * (std::f64::consts::PI * k as f64 / 40.0).sin().powi(2);
@@ -533,14 +540,7 @@ mod tests {
     fn a_joint_without_noise_feels_nothing() {
         let push = Hidden { start_s: 31.0, end_s: 31.8, nm: [1.8, -1.8] };
         let (time_s, signals) = log(7, &push);
-        let with_silent = signals.map(|two| {
-            JointSignals::from_fn(
-                3,
-                two.samples(),
-                |j, k| if j < 2 { two.joint(j)[k] } else { 0.0 },
-            )
-        });
-        let cause = &contacts(&time_s, &with_silent).unwrap().causes[0];
+        let cause = &contacts(&time_s, &with_a_silent_joint(&signals)).unwrap().causes[0];
         assert_eq!(cause.joint, None);
         assert!(!cause.in_words.contains("joint 3"), "{}", cause.in_words);
         let [low, high] = cause.parameters["peak_nm"].ci95;

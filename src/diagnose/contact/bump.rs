@@ -14,6 +14,8 @@ pub(super) const ORDINARY: f64 = 1.0;
 /// Lengths around the first guess for which a bump is weighed: steps of ln, and how many to either side.
 const STEP: f64 = 0.07;
 const STEPS: i32 = 9;
+/// A joint feels a push that was weighed on it if it shows so many σ of it, which noise does once in 370 joints.
+const FELT: f64 = 3.0;
 /// Heights count for the correlation between joints up to so many σ.
 const CLIPPED: f64 = 3.0;
 /// 95 % quantile of χ² with one degree of freedom.
@@ -171,10 +173,10 @@ impl Push {
         }
     }
 
-    /// Those of its joints that feel it by `least` σ or more, and the one that feels it most.
-    pub(super) fn felt(&self, least: f64) -> impl Iterator<Item = &(usize, [f64; 2])> {
+    /// Those of its joints that feel it, as far as its noise tells ([`FELT`]), and the one that feels it most.
+    pub(super) fn felt(&self) -> impl Iterator<Item = &(usize, [f64; 2])> {
         let most = self.heights_nm.iter().map(|on_joint| sigmas(on_joint.1)).fold(0.0, f64::max);
-        self.heights_nm.iter().filter(move |on_joint| sigmas(on_joint.1) >= least.min(most))
+        self.heights_nm.iter().filter(move |on_joint| sigmas(on_joint.1) >= FELT.min(most))
     }
 
     /// On joint `joint` (0-based), Nm.
