@@ -115,8 +115,8 @@ struct Scored {
 impl Search<'_> {
     /// Forward selection, with removal of what a later change makes needless.
     fn select(&self) -> Vec<usize> {
-        let tests = self.changes.len() as f64;
-        let significant = |s: &Scored| s.evidence > 0.0 && s.probability * tests < chance::CHANGE;
+        let significant =
+            |s: &Scored| s.evidence > 0.0 && s.probability * self.places(s.change) < chance::CHANGE;
         let mut taken: Vec<usize> = Vec::new();
         while taken.len() < MOST_CHANGES {
             let Some(best) = self.scored(&taken).into_iter().next().filter(significant) else {
@@ -138,19 +138,30 @@ impl Search<'_> {
         taken
     }
 
+    /// Kinds of changes, and sites of the kind of `change`: chance and odds are shared as those of laws are
+    /// ([`price`](super::price)).
+    fn places(&self, change: usize) -> f64 {
+        let is_first = |(c, change): &(usize, &Change)| {
+            self.changes[..*c].iter().all(|before| before.kind != change.kind)
+        };
+        let kinds = self.changes.iter().enumerate().filter(is_first).count();
+        let kind = self.changes[change].kind;
+        let sites = self.changes.iter().filter(|change| change.kind == kind).count();
+        (kinds * sites) as f64
+    }
+
     /// All changes that are not `taken`, best first.
     fn scored(&self, taken: &[usize]) -> Vec<Scored> {
         let study = self.study;
         let (others, rest) = self.outside(taken);
-        let tests = self.changes.len() as f64;
         let mut out: Vec<Scored> = (0..self.changes.len())
             .filter(|c| !taken.contains(c))
             .map(|c| {
                 let site = self.changes[c].site;
                 let span = Span::outside(&others, &self.changes[c].images);
                 let rows = rest.mean.len();
-                let price =
-                    study.statistic.coefficients_price(span.len(), site, rows) + 2.0 * tests.ln();
+                let price = study.statistic.coefficients_price(span.len(), site, rows)
+                    + 2.0 * self.places(c).ln();
                 Scored {
                     change: c,
                     evidence: study.statistic.gain(&span, &rest) - price,

@@ -2,8 +2,8 @@
 //!
 //! Families share the chance of a false alarm evenly, and the sites of one what it has: what only the arm as a whole can have is
 //! not as rare as the same on one joint of six. What a site has is shared between the shapes of the law that can be told from
-//! each other there. The odds before are shared likewise, times what a family says of a site
-//! ([`prior_odds`](super::candidates::Candidate::prior_odds)), which takes from it and gives nothing to the others.
+//! each other there. The odds before are shared likewise, but between the sites by what the family says of them
+//! ([`prior_odds`](super::candidates::Candidate::prior_odds)).
 
 use super::distinct_shapes::DistinctShapes;
 use super::study::{Entry, Study};
@@ -22,13 +22,21 @@ impl Study<'_> {
         self.statistic.coefficients_price(entry.images.len(), entry.site, rows)
             + 2.0 * self.places(entry).ln()
             + 2.0 * self.alternatives(entry).ln()
-            - 2.0 * self.families[entry.family].prior_odds(entry.site).ln()
+            - 2.0 * self.odds_over_mean(entry).ln()
     }
 
     /// Families, and sites of the family of `entry`.
     fn places(&self, entry: &Entry) -> f64 {
         let sites = self.families[entry.family].sites(self.scene.joints()).len();
         (self.families.len() * sites) as f64
+    }
+
+    /// How common the family of `entry` is at its site, over the mean of all its sites.
+    fn odds_over_mean(&self, entry: &Entry) -> f64 {
+        let family = &self.families[entry.family];
+        let sites = family.sites(self.scene.joints());
+        let all: f64 = sites.iter().map(|site| family.prior_odds(*site)).sum();
+        family.prior_odds(entry.site) * sites.len() as f64 / all
     }
 
     /// Shapes that were to choose from when `entry` was taken, as many as can be told from each other; where the shape is the

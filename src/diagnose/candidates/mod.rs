@@ -81,7 +81,7 @@ pub trait Candidate: Sync {
         (0..joints).map(Some).collect()
     }
 
-    /// How common it is there beside the other families, before the log was seen.
+    /// How common it is there beside its other sites, before the log was seen.
     fn prior_odds(&self, _site: Option<usize>) -> f64 {
         1.0
     }

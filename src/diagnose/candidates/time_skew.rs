@@ -42,7 +42,7 @@ impl Candidate for TimeSkew {
 
     fn prior_odds(&self, site: Option<usize>) -> f64 {
         // Joints are recorded together: one of them alone is rarely late.
-        if site.is_some() { 0.3 } else { 1.0 }
+        if site.is_some() { 0.06 } else { 1.0 }
     }
 
     fn shapes(&self, scene: &Scene, site: Option<usize>) -> Vec<Shape> {

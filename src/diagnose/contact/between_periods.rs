@@ -8,7 +8,7 @@
 use std::ops::Range;
 
 use super::Touch;
-use super::bump::{self, Felt, Noise, ORDINARY, Push};
+use super::bump::{self, FELT_SHARE, Felt, Noise, ORDINARY, Push};
 use super::disturbed::with_disturbed_periods;
 use super::rarity;
 use crate::diagnose::friction_drift::FrictionDrift;
@@ -22,9 +22,8 @@ use crate::signal::{
 };
 
 /// A joint felt a contact that is known to be there if it deviates by so many σ (once in 10⁴ by chance), and by
-/// this share of the joint that felt it most: the arm that gives way moves the other joints a little.
+/// [`FELT_SHARE`] of the joint that felt it most.
 const FELT: f64 = 4.0;
-const FELT_SHARE: f64 = 0.1;
 /// Shortest bump, s; a collision lasts a tenth of a second.
 const SHORTEST_S: f64 = 0.1;
 /// The longest, s: a hand that leans on the arm.
@@ -159,6 +158,12 @@ impl Candidate {
         centre.saturating_sub(reach).max(repeats.window.start)
             ..(centre + reach).min(repeats.window.end)
     }
+
+    /// The rows that felt it, apart by what is said of them.
+    fn split(&self, is: impl Fn(usize) -> bool) -> [Vec<usize>; 2] {
+        let (yes, no) = self.felt.iter().partition(|row| is(**row));
+        [yes, no]
+    }
 }
 
 impl Repeats {
@@ -278,7 +283,9 @@ impl Repeats {
     /// σ from which on a bump of `length_s` in one joint is a contact.
     fn far(&self, length_s: f64) -> f64 {
         let duration_s = self.window.len() as f64 / self.rate_hz;
-        rarity::far(length_s, duration_s, self.lengths_s().len(), self.joints.len())
+        // Each by itself, and all together.
+        let tests = if self.joints.len() > 1 { self.joints.len() + 1 } else { 1 };
+        rarity::far(length_s, duration_s, self.lengths_s().len(), tests)
     }
 
     /// What the log knows of the push at `candidate`: where several joints feel it, whose levers change while
@@ -298,24 +305,37 @@ impl Repeats {
         let weigh_on =
             |felt: &Felt| bump::weigh(&filter, felt, &self.joints, centres.clone(), length_s);
         let felt = felt_by(&candidate.felt);
-        let far = rarity::as_far_in(candidate.felt.len(), self.far(length_s));
+        let far = self.far(length_s);
         // What its neighbourhood tells of the noise may make it less than it seemed.
-        let is_far = |push: &Push| felt.of_known_noise(push.gain) > far * far;
-        let Some(mut all) = weigh_on(&felt).filter(is_far) else { return Ok(None) };
+        let is_far = |felt: &Felt, push: &Push| {
+            felt.of_known_noise(push.gain) > rarity::as_far_in(felt.count(), far).powi(2)
+        };
+        let Some(mut all) = weigh_on(&felt).filter(|push| is_far(&felt, push)) else {
+            return Ok(None);
+        };
         if candidate.felt.len() > 1 {
-            let felt: Vec<usize> = all.felt().map(|(j, _)| *j).collect();
-            for row in candidate.felt.chunks(1).filter(|row| felt.contains(&self.joints[row[0]])) {
-                weigh_on(&felt_by(row)).iter().for_each(|own| all.reach_over(own));
+            // Where no joint shows it by itself the log does not tell that one alone felt it.
+            while let Some(next) = all.next_to_feel() {
+                let [felt, rest] = candidate.split(|row| all.is_felt_on(self.joints[row]));
+                let felt = noise.felt_by(&felt, &[rest, candidate.quiet.clone()].concat());
+                if weigh_on(&felt).is_some_and(|push| is_far(&felt, &push)) {
+                    break;
+                }
+                all.felt.push(next);
+            }
+            let [felt, _] = candidate.split(|row| all.is_felt_on(self.joints[row]));
+            for row in felt {
+                weigh_on(&felt_by(&[row])).iter().for_each(|own| all.reach_over(own));
             }
         }
         Ok(Some(all))
     }
 
-    /// Whether `push` is nowhere where it is felt more than what rounding leaves of the torque: periods that are alike to the last digit
-    /// of a file differ by that alone, and have no noise beside which it would be small.
+    /// Whether `push` is nowhere where it is felt more than what rounding leaves of the torque: periods that are alike to the
+    /// last digit of a file differ by that alone, and have no noise beside which it would be small.
     fn is_rounding(&self, push: &Push) -> bool {
-        push.felt().all(|(j, [height, _])| {
-            let torque_nm = &self.torque_nm.joint(*j)[self.window.clone()];
+        push.felt_nm().all(|(j, height)| {
+            let torque_nm = &self.torque_nm.joint(j)[self.window.clone()];
             let square = torque_nm.iter().map(|t| t * t).sum::<f64>() / torque_nm.len() as f64;
             height.abs() < FLOOR * square.sqrt()
         })
@@ -336,7 +356,7 @@ impl Repeats {
             start_s: shifted(&push.start_s),
             end_s: shifted(&push.end_s),
             peak_nm: push.peak_nm.clone(),
-            felt: push.felt().map(|(j, [height, _])| (j + 1, *height)).collect(),
+            felt: push.felt_nm().map(|(j, height)| (j + 1, height)).collect(),
             strength: push.gain.sqrt(),
         }
     }

@@ -14,8 +14,10 @@ pub(super) const ORDINARY: f64 = 1.0;
 /// Lengths around the first guess for which a bump is weighed: steps of ln, and how many to either side.
 const STEP: f64 = 0.07;
 const STEPS: i32 = 9;
-/// A joint feels a push that was weighed on it if it shows so many σ of it, which noise does once in 370 joints.
+/// A joint feels a push that was weighed on it if it shows so many σ of it, which noise does once in 370 joints, and
+/// this share of the σ of the joint that feels it most: the arm that gives way moves the other joints a little.
 const FELT: f64 = 3.0;
+pub(super) const FELT_SHARE: f64 = 0.1;
 /// Heights count for the correlation between joints up to so many σ.
 const CLIPPED: f64 = 3.0;
 /// 95 % quantile of χ² with one degree of freedom.
@@ -111,7 +113,12 @@ pub(super) struct Felt<'a> {
 impl Felt<'_> {
     /// F.
     fn felt(&self) -> &[usize] {
-        &self.signals[..self.covariance.nrows()]
+        &self.signals[..self.count()]
+    }
+
+    /// How many signals feel the bump.
+    pub(super) fn count(&self) -> usize {
+        self.covariance.nrows()
     }
 
     /// (P z) of the a-th signal that feels the bump.
@@ -121,20 +128,20 @@ impl Felt<'_> {
 
     /// Twice what the bump gains in log-likelihood.
     pub(super) fn gain(&self, z: &[f64]) -> f64 {
-        (0..self.covariance.nrows()).map(|a| self.weighed(a, z) * self.score(a, z)).sum()
+        (0..self.count()).map(|a| self.weighed(a, z) * self.score(a, z)).sum()
     }
 
     /// The gain that would be as rare if noise were known: with k signals and ν degrees of freedom of the noise of the least
     /// known one (ν + k/2 − 1) ln(1 + gain/ν) is χ²ₖ (Bartlett 1938).
     pub(super) fn of_known_noise(&self, gain: f64) -> f64 {
-        let k = self.felt().len() as f64;
+        let k = self.count() as f64;
         let freedom = self.felt().iter().map(|j| self.noise.freedom[*j]).fold(f64::MAX, f64::min);
         (freedom + 0.5 * k - 1.0) * (gain / freedom).ln_1p()
     }
 
     /// Height on the a-th signal that feels the bump, over what σ would be there without the others.
     fn score(&self, a: usize, z: &[f64]) -> f64 {
-        (0..self.covariance.nrows()).map(|b| self.covariance[(a, b)] * self.weighed(b, z)).sum()
+        (0..self.count()).map(|b| self.covariance[(a, b)] * self.weighed(b, z)).sum()
     }
 
     /// Heights on the signals that feel the bump, and their σ.
@@ -156,7 +163,9 @@ pub(super) struct Push {
     /// Of the joint that feels it most, Nm.
     pub(super) peak_nm: Estimate,
     /// Joints (0-based) on which it was weighed, and how much they feel it and its σ, Nm.
-    pub(super) heights_nm: Vec<(usize, [f64; 2])>,
+    heights_nm: Vec<(usize, [f64; 2])>,
+    /// Those that feel it.
+    pub(super) felt: Vec<usize>,
     /// Twice what it gains in log-likelihood.
     pub(super) gain: f64,
     shape: f64,
@@ -173,10 +182,21 @@ impl Push {
         }
     }
 
-    /// Those of its joints that feel it, as far as its noise tells ([`FELT`]), and the one that feels it most.
-    pub(super) fn felt(&self) -> impl Iterator<Item = &(usize, [f64; 2])> {
-        let most = self.heights_nm.iter().map(|on_joint| sigmas(on_joint.1)).fold(0.0, f64::max);
-        self.heights_nm.iter().filter(move |on_joint| sigmas(on_joint.1) >= FELT.min(most))
+    /// Whether joint `joint` (0-based) feels it.
+    pub(super) fn is_felt_on(&self, joint: usize) -> bool {
+        self.felt.contains(&joint)
+    }
+
+    /// The joints (0-based) that feel it, in their order, and how much, Nm.
+    pub(super) fn felt_nm(&self) -> impl Iterator<Item = (usize, f64)> {
+        let felt = self.heights_nm.iter().filter(|(j, _)| self.is_felt_on(*j));
+        felt.map(|(j, [height, _])| (*j, *height))
+    }
+
+    /// The joint that shows most of it of those that do not feel it.
+    pub(super) fn next_to_feel(&self) -> Option<usize> {
+        let others = self.heights_nm.iter().filter(|(j, _)| !self.is_felt_on(*j));
+        others.max_by(|a, b| sigmas(a.1).total_cmp(&sigmas(b.1))).map(|(j, _)| *j)
     }
 
     /// On joint `joint` (0-based), Nm.
@@ -222,8 +242,10 @@ pub(super) fn weigh(
         .collect();
     let tops: Vec<&Fit> = of_shapes.iter().filter_map(|fits| top(fits.iter())).collect();
     let best = top(tops.iter().copied())?;
-    let over_sigma = |a: &usize| sigmas(best.heights_nm[*a]);
-    let main = (0..felt.felt().len()).max_by(|a, b| over_sigma(a).total_cmp(&over_sigma(b)))?;
+    let over_sigma = |a: usize| sigmas(best.heights_nm[a]);
+    let on = |a: usize| joints[felt.felt()[a]];
+    let main = (0..felt.count()).max_by(|a, b| over_sigma(*a).total_cmp(&over_sigma(*b)))?;
+    let least = FELT.max(FELT_SHARE * over_sigma(main)).min(over_sigma(main));
     let reach = |of: &dyn Fn(&Fit) -> [f64; 2], unit: &'static str| {
         let mut ci95 = [f64::INFINITY, f64::NEG_INFINITY];
         let possible =
@@ -242,7 +264,8 @@ pub(super) fn weigh(
         start_s: reach(&|fit| fit.start_s, "s"),
         end_s: reach(&|fit| fit.end_s, "s"),
         peak_nm: reach(&|fit| fit.heights_nm[main], "Nm"),
-        heights_nm: felt.felt().iter().map(|j| joints[*j]).zip(best.heights_nm.clone()).collect(),
+        felt: (0..felt.count()).filter(|a| over_sigma(*a) >= least).map(on).collect(),
+        heights_nm: (0..felt.count()).map(on).zip(best.heights_nm.clone()).collect(),
         gain: best.gain,
         shape: best.shape,
     })
