@@ -119,9 +119,7 @@ impl Search<'_> {
             |s: &Scored| s.evidence > 0.0 && s.probability * self.places(s.change) < chance::CHANGE;
         let mut taken: Vec<usize> = Vec::new();
         while taken.len() < MOST_CHANGES {
-            let Some(best) = self.scored(&taken).into_iter().next().filter(significant) else {
-                break;
-            };
+            let Some(best) = self.scored(&taken).into_iter().find(significant) else { break };
             taken.push(best.change);
             let mut c = 0;
             while c + 1 < taken.len() {
@@ -138,8 +136,8 @@ impl Search<'_> {
         taken
     }
 
-    /// Kinds of changes, and sites of the kind of `change`: chance and odds are shared as those of laws are
-    /// ([`price`](super::price)).
+    /// Kinds of changes times sites of the kind of `change`, between which chance and odds are shared evenly: first between the
+    /// kinds, then between the sites of each, as laws share theirs ([`price`](super::price)).
     fn places(&self, change: usize) -> f64 {
         let is_first = |(c, change): &(usize, &Change)| {
             self.changes[..*c].iter().all(|before| before.kind != change.kind)

@@ -7,15 +7,15 @@ pub const FALSE_ALARM: f64 = 0.003;
 
 /// A law of the dictionary; most, because most of what is wrong with an arm is one.
 pub const LAW: f64 = 0.7 * FALSE_ALARM;
-/// Something that differs from a given simulation; little, because all 45 changes with √λ_sim of 6 to 8 of the published
-/// benchmark were seen with three times as much.
+/// Something that differs from a given simulation; little, because changes are seen well beside one: a third of the chance asks
+/// for a quarter of a σ more.
 pub(super) const CHANGE: f64 = 0.05 * FALSE_ALARM;
 /// A contact.
 pub(super) const CONTACT: f64 = 0.15 * FALSE_ALARM;
 /// Something left unexplained, by the size of what is left; and as much again by the curve that it makes.
 pub(super) const UNEXPLAINED: f64 = 0.05 * FALSE_ALARM;
 
-/// A body on the flange between two logs, which is not of the budget.
+/// A body on the flange between two logs: a test of its own, as rare as one that is asked for has to be.
 pub(super) const PAYLOAD: f64 = 0.6 * FALSE_ALARM;
 
 const ALL: f64 = LAW + CHANGE + CONTACT + 2.0 * UNEXPLAINED;

@@ -19,11 +19,11 @@ use super::load::load_along;
 use super::scene::equivalent_arm;
 use crate::base::BaseSet;
 use crate::dynamics::{Model, Motion};
-use crate::identify::{Assembler, Measurement, Regression};
+use crate::identify::{Assembler, BetweenRows, Regression};
 use crate::robot::{Arm, JointSignals};
 use crate::signal::Bracket;
 
-/// Moves the torque of `regression` (of the log `m`) to the mean of its periods' motion, by the base parameters
+/// Moves the torque of `regression` to the mean of its periods' motion, by the base parameters
 /// `theta`, and its columns with it.
 ///
 /// Where the log was put on an even clock, its torque is a straight line between rows: corners of friction are
@@ -33,7 +33,6 @@ use crate::signal::Bracket;
 /// Nothing changes for a single run: there is no motion but its own.
 pub fn move_to_common_motion(
     regression: &mut Regression,
-    m: &Measurement,
     (arm, set): (&Arm, &BaseSet),
     theta: &[f64],
 ) {
@@ -54,9 +53,10 @@ pub fn move_to_common_motion(
     });
     if let Some(between) = &regression.prepared.between {
         let processing = &regression.prepared.processing;
-        let rows = Rows { m, start_s: processing.window_s[0], rate_hz: processing.rate_hz };
+        let (start_s, rate_hz) = (processing.window_s[0], processing.rate_hz);
+        let rows = Rows { between, start_s, rate_hz };
         for j in 0..torque_nm.joints() {
-            let lost = rows.lost_to_straight_lines(&arm, j, &own_nm, each_period, between);
+            let lost = rows.lost_to_straight_lines(&arm, j, &own_nm, each_period);
             torque_nm.joint_mut(j).iter_mut().zip(lost).for_each(|(y, lost)| *y += lost);
         }
     }
@@ -66,7 +66,7 @@ pub fn move_to_common_motion(
 
 /// The rows of a log beside an even clock.
 struct Rows<'a> {
-    m: &'a Measurement<'a>,
+    between: &'a BetweenRows,
     start_s: f64,
     rate_hz: f64,
 }
@@ -80,7 +80,6 @@ impl Rows<'_> {
         j: usize,
         load_nm: &JointSignals,
         motion: &Motion,
-        between: &[Bracket],
     ) -> Vec<f64> {
         let drive = &arm.joints[j].drive;
         let dry = |qd: f64| drive.coulomb_nm * (qd / arm.friction_epsilon_rad_s).tanh();
@@ -89,10 +88,10 @@ impl Rows<'_> {
         // All that is smooth: rows lie between its samples.
         let smooth: Vec<f64> = pairs.map(|(load, qd)| load + drive.viscous_nm_s_rad * qd).collect();
         let at_row = |row: usize| {
-            let at = (self.m.time_s[row] - self.start_s) * self.rate_hz;
-            between_samples(&smooth, at) + dry(self.m.qd_rad_s.joint(j)[row])
+            let at = (self.between.time_s[row] - self.start_s) * self.rate_hz;
+            between_samples(&smooth, at) + dry(self.between.qd_rad_s.joint(j)[row])
         };
-        let samples = smooth.iter().zip(qd_rad_s).zip(between);
+        let samples = smooth.iter().zip(qd_rad_s).zip(&self.between.places);
         samples
             .map(|((smooth, qd), &Bracket { left, u })| {
                 if u == 0.0 {

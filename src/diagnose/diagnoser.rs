@@ -98,7 +98,7 @@ impl<'a> Diagnoser<'a> {
         let identification = self.identifier.identify_regression(&regression)?;
         let measured_nm = measured_nm(&regression);
         let fit = &identification.fit;
-        move_to_common_motion(&mut regression, m, (self.arm, self.set), &fit.theta);
+        move_to_common_motion(&mut regression, (self.arm, self.set), &fit.theta);
         let sources = (self.arm, self.set, &self.options);
         let estimate = (&fit.theta[..], &fit.joint_sigma_nm[..]);
         let mut first = Study::new(&self.families, sources, &regression, estimate, m.source)?;

@@ -45,7 +45,7 @@ pub(super) fn held_out_gain(
 ) -> Result<HeldOut, DiagnoseError> {
     let extension = &models.extension.elsewhere(families);
     let mut regression = identifier.regression(&log.measurement)?;
-    move_to_common_motion(&mut regression, &log.measurement, (arm, set), &models.null.theta);
+    move_to_common_motion(&mut regression, (arm, set), &models.null.theta);
     let prepared = &regression.prepared;
     let whitening = if prepared.replicates.is_some() {
         None

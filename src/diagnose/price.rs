@@ -10,7 +10,7 @@ use super::study::{Entry, Study};
 
 impl Study<'_> {
     /// By how much the probability of `entry` alone is multiplied before it is held against [`LAW`](super::chance::LAW): the
-    /// places, and the tests that its family's shapes are at its own.
+    /// places, times the shapes of its family at its site that noise can reach and that can be told from each other.
     pub fn tests(&self, entry: &Entry) -> f64 {
         self.places(entry) * self.of_shapes(entry, |shapes| shapes.within_reach)
     }

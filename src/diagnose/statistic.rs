@@ -202,13 +202,19 @@ impl Statistic {
         }
     }
 
-    /// Half width, in σ, of a 95 % interval of what `span` says of `residual`: Student's t, for periods with the
-    /// degrees of freedom of [`NoiseKnowledge::freedom`].
+    /// Half width, in σ, of a 95 % interval of what `span` says of `residual`: Student's t with the degrees of
+    /// [`Self::freedom`].
     pub fn quantile_95(&self, span: &Span, residual: &Image) -> f64 {
-        quantile_95(match self {
+        quantile_95(self.freedom(span, residual))
+    }
+
+    /// Degrees of freedom of the noise along what `span` explains of `residual`: those of [`NoiseKnowledge::freedom`], or of
+    /// the scatter of B block sums B − 1.
+    pub fn freedom(&self, span: &Span, residual: &Image) -> f64 {
+        match self {
             Self::Periods(knowledge) => knowledge.freedom(span, residual),
             Self::Blocks { blocks, .. } => (*blocks - 1) as f64,
-        })
+        }
     }
 }
 

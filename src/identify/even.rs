@@ -16,6 +16,17 @@ const AS_LOGGED: f64 = 0.48;
 /// between two rows keeps 62 % of an amplitude.
 const REWORKED: f64 = 0.37;
 
+/// The rows of a log, those in its gaps included, and where samples on an even clock lie among them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BetweenRows {
+    /// Of the rows, s.
+    pub time_s: Vec<f64>,
+    /// In the rows, rad/s.
+    pub qd_rad_s: JointSignals,
+    /// Of every sample.
+    pub places: Vec<Bracket>,
+}
+
 /// See the module.
 pub(super) struct Even<'a> {
     /// Instant of the first sample, s, on the log's clock.
@@ -27,7 +38,7 @@ pub(super) struct Even<'a> {
     /// Highest frequency, in cycles per sample, at which the samples show what the log does.
     pub(super) highest: f64,
     /// Where resampled ones lie among the rows; `None` for rows, and for what was decimated since.
-    pub(super) between: Option<Vec<Bracket>>,
+    pub(super) between: Option<BetweenRows>,
     /// Joint angles, rad.
     pub(super) q_rad: Cow<'a, JointSignals>,
     /// Joint velocities, rad/s.
@@ -100,7 +111,11 @@ impl<'a> Even<'a> {
         self.rate_hz = grid_hz;
         self.resampled = true;
         self.highest = REWORKED;
-        self.between = Some(grid.instants().places()[longest].to_vec());
+        self.between = Some(BetweenRows {
+            time_s: m.time_s.to_vec(),
+            qd_rad_s: m.qd_rad_s.clone(),
+            places: grid.instants().places()[longest].to_vec(),
+        });
         Ok(())
     }
 

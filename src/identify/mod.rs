@@ -29,6 +29,7 @@ pub use drive_answers::{FEEDBACK_RAD_S, drive_answers, feedback_per_tick};
 pub use drive_limits::drive_limit_remark;
 pub use error::IdentifyError;
 pub use estimation::{Estimate, Estimation, MotionAids};
+pub use even::BetweenRows;
 pub use fit::{Estimator, Fit, FitError, Fitter, Weighting};
 pub use gravity::{GravityMatch, gravity_question, gravity_remark};
 pub use identifier::{Identification, Identifier, Regression, Residual};

@@ -5,13 +5,13 @@ use std::ops::Range;
 use serde::Serialize;
 
 use super::error::IdentifyError;
-use super::even::Even;
+use super::even::{BetweenRows, Even};
 use super::options::Options;
 use crate::dynamics::Motion;
 use crate::robot::JointSignals;
 use crate::signal::{
-    Activity, Bracket, FitScratch, HarmonicPower, Period, PeriodSearch, PeriodicFit, Replicates,
-    Scratch, ZeroPhase, central_4, quantum, reading_limit, replicate_noise,
+    Activity, FitScratch, HarmonicPower, Period, PeriodSearch, PeriodicFit, Replicates, Scratch,
+    ZeroPhase, central_4, quantum, reading_limit, replicate_noise,
 };
 
 /// The channels identification needs of a log, borrowed.
@@ -71,7 +71,7 @@ pub struct Prepared {
     pub recorded: Option<[JointSignals; 2]>,
     /// Where the samples of `torque_nm` lie among the rows, between which the torque is a straight line; only
     /// where an uneven log of a motion that repeats was put on an even clock.
-    pub between: Option<Vec<Bracket>>,
+    pub between: Option<BetweenRows>,
     /// Highest frequency, in cycles per sample, at which the samples of a motion that repeats show what the log does;
     /// harmonics of `each_period` end there. Of no use for a single run.
     pub highest: f64,
@@ -255,7 +255,10 @@ impl Preparer {
             lead_in_s: window.start as f64 / even.rate_hz,
             each_period,
             recorded: Some([q_rad, qd_rad_s]),
-            between: even.between.as_ref().map(|between| between[window.clone()].to_vec()),
+            between: even.between.as_ref().map(|rows| BetweenRows {
+                places: rows.places[window.clone()].to_vec(),
+                ..rows.clone()
+            }),
             highest: even.highest,
             angle_quantum_rad: angle_quantum_rad(m),
             torque_limit_nm: torque_limit_nm(m),

@@ -41,7 +41,7 @@ impl Candidate for TimeSkew {
     }
 
     fn prior_odds(&self, site: Option<usize>) -> f64 {
-        // Joints are recorded together: one of them alone is rarely late.
+        // Joints are recorded together: one of six alone is late a third as often as the arm.
         if site.is_some() { 0.06 } else { 1.0 }
     }
 

@@ -7,10 +7,10 @@
 
 use std::ops::Range;
 
-use super::Touch;
 use super::bump::{self, FELT_SHARE, Felt, Noise, ORDINARY, Push};
 use super::disturbed::with_disturbed_periods;
 use super::rarity;
+use super::{Touch, are_near};
 use crate::diagnose::friction_drift::FrictionDrift;
 use crate::diagnose::verdict::{Cause, Estimate};
 use crate::diagnose::whitening::FLOOR;
@@ -21,9 +21,9 @@ use crate::signal::{
     MatchedFilter, Resampler, SignalError, bridged_gap_s, find_period, natural_rate_hz,
 };
 
-/// A joint felt a contact that is known to be there if it deviates by so many σ (once in 10⁴ by chance), and by
+/// A joint felt a contact that another one shows by itself if it deviates by so many σ (once in 10⁴ by chance), and by
 /// [`FELT_SHARE`] of the joint that felt it most.
-const FELT: f64 = 4.0;
+const FELT_BESIDE: f64 = 4.0;
 /// Shortest bump, s; a collision lasts a tenth of a second.
 const SHORTEST_S: f64 = 0.1;
 /// The longest, s: a hand that leans on the arm.
@@ -38,7 +38,7 @@ const APART_S: f64 = 0.3;
 const TOGETHER_S: f64 = 0.5;
 /// A reading of so many σ that stands alone is wild: noise makes one of 10⁸.
 const WILD: f64 = 5.8;
-/// Bumps in one log.
+/// Bumps that are weighed in one log.
 const MOST: usize = 40;
 /// The trimmed mean of fewer periods is moved by one contact.
 const FEWEST_PERIODS: usize = 3;
@@ -80,22 +80,31 @@ pub fn between_periods(
     let time_s = grid.time_s();
     let mut touches: Vec<Touch> = Vec::new();
     let mut known: Vec<Push> = Vec::new();
+    let mut looked_at: Vec<Range<usize>> = Vec::new();
     let mut aside = vec![false; time_s.len()];
-    if repeats.search(&aside, &known, &touches)?.is_some() {
+    if repeats.search(&aside, &known, &looked_at)?.is_some() {
         let qd_rad_s = grid.instants().smooth(m.qd_rad_s)?.slice(repeats.window.clone());
         repeats.drift = Some(FrictionDrift::beside_others(qd_rad_s, period));
     }
-    while touches.len() < MOST
-        && let Some(candidate) = repeats.search(&aside, &known, &touches)?
+    while looked_at.len() < MOST
+        && let Some(candidate) = repeats.search(&aside, &known, &looked_at)?
     {
+        let before = aside.clone();
         // Its own torque moves the mean of the others.
         aside[candidate.samples(&repeats)].fill(true);
-        let Some(push) = repeats.weigh(&candidate, &aside, &known)? else { break };
+        let Some(push) = repeats.weigh(&candidate, &aside, &known)? else {
+            looked_at.push(candidate.samples(&repeats));
+            aside = before;
+            continue;
+        };
         if repeats.is_rounding(&push) {
-            break;
+            repeats.joints.retain(|j| !push.is_felt_on(*j));
+            aside = before;
+            continue;
         }
         let touch = repeats.touch(&push, time_s[repeats.window.start]);
         aside[touch.disturbed(rate_hz, time_s.len())].fill(true);
+        looked_at.push(touch.samples.clone());
         known.push(push);
         touches.push(touch);
     }
@@ -106,7 +115,8 @@ pub fn between_periods(
     let together = (TOGETHER_S * rate_hz) as usize;
     let mut contacts: Vec<Touch> = Vec::new();
     for touch in touches {
-        match contacts.last_mut().filter(|last| last.is_near(&touch.samples, together)) {
+        let is_near = |last: &&mut Touch| are_near(&last.samples, &touch.samples, together);
+        match contacts.last_mut().filter(is_near) {
             Some(last) => last.join(touch),
             None => contacts.push(touch),
         }
@@ -157,12 +167,6 @@ impl Candidate {
         let centre = repeats.window.start + self.centre;
         centre.saturating_sub(reach).max(repeats.window.start)
             ..(centre + reach).min(repeats.window.end)
-    }
-
-    /// The rows that felt it, apart by what is said of them.
-    fn split(&self, is: impl Fn(usize) -> bool) -> [Vec<usize>; 2] {
-        let (yes, no) = self.felt.iter().partition(|row| is(**row));
-        [yes, no]
     }
 }
 
@@ -215,12 +219,12 @@ impl Repeats {
         out
     }
 
-    /// The highest bump that noise would not make, apart from those already found.
+    /// The highest bump that noise would not make, apart from the samples that were `looked_at`.
     fn search(
         &self,
         aside: &[bool],
         known: &[Push],
-        touches: &[Touch],
+        looked_at: &[Range<usize>],
     ) -> Result<Option<Candidate>, SignalError> {
         let deviation_nm = self.deviations(aside, known);
         let filter = MatchedFilter::new(&deviation_nm, self.rate_hz)?;
@@ -243,7 +247,7 @@ impl Repeats {
             for centre in reach..self.window.len() - reach {
                 let at = self.window.start + centre;
                 let samples = at.saturating_sub(reach)..at + reach;
-                if touches.iter().any(|touch| touch.is_near(&samples, apart)) {
+                if looked_at.iter().any(|other| are_near(other, &samples, apart)) {
                     continue;
                 }
                 let scores = noise.scores(&heights, centre);
@@ -313,26 +317,28 @@ impl Repeats {
         let Some(mut all) = weigh_on(&felt).filter(|push| is_far(&felt, push)) else {
             return Ok(None);
         };
+        let rows = |push: &Push| -> Vec<usize> {
+            let is_felt = |row: &usize| push.is_felt_on(self.joints[*row]);
+            candidate.felt.iter().copied().filter(is_felt).collect()
+        };
         if candidate.felt.len() > 1 {
-            // Where no joint shows it by itself the log does not tell that one alone felt it.
+            for row in rows(&all) {
+                weigh_on(&felt_by(&[row])).iter().for_each(|own| all.reach_over(own));
+            }
+            // Where they do not show it by themselves the log does not tell that the others did not feel it.
             while let Some(next) = all.next_to_feel() {
-                let [felt, rest] = candidate.split(|row| all.is_felt_on(self.joints[row]));
-                let felt = noise.felt_by(&felt, &[rest, candidate.quiet.clone()].concat());
+                let felt = felt_by(&rows(&all));
                 if weigh_on(&felt).is_some_and(|push| is_far(&felt, &push)) {
                     break;
                 }
                 all.felt.push(next);
-            }
-            let [felt, _] = candidate.split(|row| all.is_felt_on(self.joints[row]));
-            for row in felt {
-                weigh_on(&felt_by(&[row])).iter().for_each(|own| all.reach_over(own));
             }
         }
         Ok(Some(all))
     }
 
     /// Whether `push` is nowhere where it is felt more than what rounding leaves of the torque: periods that are alike to the
-    /// last digit of a file differ by that alone, and have no noise beside which it would be small.
+    /// last digit of a file differ by that alone, and have no noise beside which it would be small: such joints tell nothing.
     fn is_rounding(&self, push: &Push) -> bool {
         push.felt_nm().all(|(j, height)| {
             let torque_nm = &self.torque_nm.joint(j)[self.window.clone()];
@@ -382,10 +388,10 @@ fn level_wild_values(y: &mut [f64], reach: usize) {
 
 /// Which joints felt a bump with these scores, each by itself and `alone` among all, and which show noise alone.
 fn felt_and_quiet(scores: &[f64], alone: &[f64]) -> [Vec<usize>; 2] {
-    let limit = FELT.max(FELT_SHARE * farthest(scores));
+    let limit = FELT_BESIDE.max(FELT_SHARE * farthest(scores));
     let most = (0..alone.len()).max_by(|a, b| alone[*a].total_cmp(&alone[*b]));
     let is_felt = |j: &usize| scores[*j].abs() >= limit || Some(*j) == most;
-    let is_quiet = |j: &usize| scores[*j].abs() < FELT && !is_felt(j);
+    let is_quiet = |j: &usize| scores[*j].abs() < FELT_BESIDE && !is_felt(j);
     let joints = 0..scores.len();
     [joints.clone().filter(is_felt).collect(), joints.filter(is_quiet).collect()]
 }
@@ -514,14 +520,7 @@ mod tests {
     fn last_digits_are_no_contact() {
         let nothing = Hidden { start_s: 24.0, end_s: 25.0, nm: [0.0, 0.0] };
         let (time_s, mut signals) = log(5, &nothing);
-        let omega = std::f64::consts::TAU / 10.0;
-        for j in 0..2 {
-            for (y, t) in signals[2].joint_mut(j).iter_mut().zip(&time_s) {
-                // Noise of 0.5 Nm becomes one of 5e-10.
-                let smooth = 20.0 * (omega * t).cos();
-                *y = smooth + 1e-9 * (*y - smooth);
-            }
-        }
+        (0..2).for_each(|j| leave_last_digits(&time_s, signals[2].joint_mut(j)));
         assert!(contacts(&time_s, &signals).is_none());
         assert!(contacts(&time_s, &with_a_silent_joint(&signals)).is_none());
         let y = signals[2].joint_mut(1);
@@ -529,6 +528,25 @@ mod tests {
             *y += 0.3 * (std::f64::consts::PI * k as f64 / 40.0).sin().powi(2);
         }
         assert_eq!(contacts(&time_s, &signals).unwrap().causes[0].joint, Some(2));
+    }
+
+    /// Torque of [`log`] without its noise: of 0.5 Nm are left 5e-10, as of the last digits of a file.
+    fn leave_last_digits(time_s: &[f64], torque_nm: &mut [f64]) {
+        let omega = std::f64::consts::TAU / 10.0;
+        for (y, t) in torque_nm.iter_mut().zip(time_s) {
+            let smooth = 20.0 * (omega * t).cos();
+            *y = smooth + 1e-9 * (*y - smooth);
+        }
+    }
+
+    /// What stands out of the last digits of one joint, by however much, is no reason not to look at another.
+    #[test]
+    fn a_joint_of_last_digits_hides_no_push_on_another() {
+        let push = Hidden { start_s: 31.0, end_s: 31.8, nm: [20.0, 2.5] };
+        let (time_s, mut signals) = log(5, &push);
+        leave_last_digits(&time_s, signals[2].joint_mut(0));
+        let without = contacts(&time_s, &signals).unwrap();
+        assert_eq!(without.causes.iter().map(|c| c.joint).collect::<Vec<_>>(), [Some(2)]);
     }
 
     /// What no joint could tell alone is told by both together, and called a push on the arm.

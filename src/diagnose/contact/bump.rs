@@ -15,7 +15,7 @@ pub(super) const ORDINARY: f64 = 1.0;
 const STEP: f64 = 0.07;
 const STEPS: i32 = 9;
 /// A joint feels a push that was weighed on it if it shows so many σ of it, which noise does once in 370 joints, and
-/// this share of the σ of the joint that feels it most: the arm that gives way moves the other joints a little.
+/// this share of as many as the joint that feels it most: the arm that gives way moves the other joints a little.
 const FELT: f64 = 3.0;
 pub(super) const FELT_SHARE: f64 = 0.1;
 /// Heights count for the correlation between joints up to so many σ.

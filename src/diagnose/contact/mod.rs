@@ -37,12 +37,12 @@ struct Touch {
     strength: f64,
 }
 
-impl Touch {
-    /// Whether its samples are closer than `margin` to those of another.
-    fn is_near(&self, other: &Range<usize>, margin: usize) -> bool {
-        self.samples.start < other.end + margin && other.start < self.samples.end + margin
-    }
+/// Whether two stretches of samples are closer than `margin`.
+fn are_near(a: &Range<usize>, b: &Range<usize>, margin: usize) -> bool {
+    a.start < b.end + margin && b.start < a.end + margin
+}
 
+impl Touch {
     /// Takes in what follows as a part of itself.
     fn join(&mut self, next: Self) {
         self.samples.end = self.samples.end.max(next.samples.end);

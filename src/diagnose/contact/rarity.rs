@@ -11,9 +11,9 @@ use crate::diagnose::chance;
 const PASSES: f64 = 1.006_6;
 
 /// σ from which on a bump of `length_s` in one joint is a contact, in a log of `duration_s` that is looked through for
-/// bumps of so many `lengths` in so many `joints`, between which the chance is shared out evenly.
-pub(super) fn far(length_s: f64, duration_s: f64, lengths: usize, joints: usize) -> f64 {
-    let places = PASSES * duration_s / length_s * (lengths * joints) as f64;
+/// bumps of so many `lengths` in so many `ways` (each joint, and all together), between which the chance is shared out evenly.
+pub(super) fn far(length_s: f64, duration_s: f64, lengths: usize, ways: usize) -> f64 {
+    let places = PASSES * duration_s / length_s * (lengths * ways) as f64;
     (2.0 * (places.max(1.0) / chance::CONTACT).ln()).sqrt()
 }
 

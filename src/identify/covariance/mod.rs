@@ -56,9 +56,14 @@ impl Covariance {
 
 /// 97.5 % quantile of Student's t; 1.96 for infinitely many degrees of freedom.
 pub fn quantile_95(degrees_of_freedom: f64) -> f64 {
+    student_quantile(0.975, degrees_of_freedom)
+}
+
+/// What a value of Student's t with so many degrees of freedom, one at least, is below with `probability`.
+pub fn student_quantile(probability: f64, degrees_of_freedom: f64) -> f64 {
     // Beyond 1e6 the quantile differs from the normal one by less than 3e-6.
     match StudentsT::new(0.0, 1.0, degrees_of_freedom.clamp(1.0, 1e6)) {
-        Ok(t) => t.inverse_cdf(0.975),
+        Ok(t) => t.inverse_cdf(probability),
         Err(_) => f64::NAN,
     }
 }
