@@ -203,7 +203,7 @@ impl Statistic {
     }
 
     /// Half width, in σ, of a 95 % interval of what `span` says of `residual`: Student's t with the degrees of
-    /// [`Self::freedom`].
+    /// freedom of [`Self::freedom`].
     pub fn quantile_95(&self, span: &Span, residual: &Image) -> f64 {
         quantile_95(self.freedom(span, residual))
     }

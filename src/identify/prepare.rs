@@ -256,8 +256,9 @@ impl Preparer {
             each_period,
             recorded: Some([q_rad, qd_rad_s]),
             between: even.between.as_ref().map(|rows| BetweenRows {
+                time_s: rows.time_s.clone(),
+                qd_rad_s: rows.qd_rad_s.clone(),
                 places: rows.places[window.clone()].to_vec(),
-                ..rows.clone()
             }),
             highest: even.highest,
             angle_quantum_rad: angle_quantum_rad(m),

@@ -89,19 +89,18 @@ pub fn between_periods(
     while looked_at.len() < MOST
         && let Some(candidate) = repeats.search(&aside, &known, &looked_at)?
     {
-        let before = aside.clone();
         // Its own torque moves the mean of the others.
-        aside[candidate.samples(&repeats)].fill(true);
-        let Some(push) = repeats.weigh(&candidate, &aside, &known)? else {
+        let mut aside_with_it = aside.clone();
+        aside_with_it[candidate.samples(&repeats)].fill(true);
+        let Some(push) = repeats.weigh(&candidate, &aside_with_it, &known)? else {
             looked_at.push(candidate.samples(&repeats));
-            aside = before;
             continue;
         };
         if repeats.is_rounding(&push) {
             repeats.joints.retain(|j| !push.is_felt_on(*j));
-            aside = before;
             continue;
         }
+        aside = aside_with_it;
         let touch = repeats.touch(&push, time_s[repeats.window.start]);
         aside[touch.disturbed(rate_hz, time_s.len())].fill(true);
         looked_at.push(touch.samples.clone());
