@@ -271,6 +271,18 @@ fn a_family_that_is_not_known_is_not_called_another() {
     }
 }
 
+/// Friction that drifts shows in what periods have beside their mean alone: nothing of it is in the mean period's residual.
+#[test]
+fn drift_that_is_not_known_depends_on_the_time() {
+    let mut benchmark = benchmark(WITHHELD, &["thermal_drift"]);
+    benchmark.plan.sqrt_lambda = [30.0, 40.0];
+    for trial in 0..3 {
+        let record = record(&benchmark, trial);
+        let left = record.answer.left.as_ref().map(|left| (left.axis.as_str(), Some(left.joint)));
+        assert_eq!(left, Some(("time since the start", record.case.hidden[0].joint)), "{trial}");
+    }
+}
+
 /// Whatever the number of threads and the split into shards, and after a detour through the file.
 #[test]
 fn threads_and_shards_give_the_same_records() {

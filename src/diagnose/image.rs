@@ -262,6 +262,16 @@ impl Span {
         part
     }
 
+    /// Σ coordinate · direction.
+    pub fn combination(&self, coordinates: &[f64]) -> Image {
+        let mut sum = Image { mean: vec![0.0; self.rows()], contrast: Vec::new() };
+        for (direction, coordinate) in self.directions().zip(coordinates) {
+            axpy(&mut sum.mean, *coordinate, direction.mean);
+            sum.add_contrast(*coordinate, direction.contrast);
+        }
+        sum
+    }
+
     /// ⟨direction, y⟩ for every direction.
     pub fn coordinates(&self, y: &Image) -> Vec<f64> {
         self.along(std::slice::from_ref(y)).col_as_slice(0).to_vec()

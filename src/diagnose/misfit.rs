@@ -102,7 +102,8 @@ pub fn unexplained(
             ("time within the period", &time),
         ];
         let curves = axes.map(|(axis, values)| (axis, hats(values)));
-        for (axis, (knots, hats)) in curves.into_iter().chain(behind_reversals(scene, j)) {
+        let of_friction = behind_reversals(scene, j).into_iter().chain(since_the_start(scene, j));
+        for (axis, (knots, hats)) in curves.into_iter().chain(of_friction) {
             tests += 1.0;
             let mut span = Span::default();
             let image = |hat: &Vec<f64>| study.whitening.image(&Column::on(j, hat.clone()));
@@ -123,7 +124,7 @@ pub fn unexplained(
             let heights = visible(&raw, &outside, residual);
             let curve_at =
                 |k: usize| -> f64 { hats.iter().zip(&heights).map(|(h, b)| h[k] * b).sum() };
-            let n = scene.samples();
+            let n = hats[0].len();
             let square: f64 = (0..n).map(|k| curve_at(k).powi(2)).sum();
             let unexplained = Unexplained {
                 axis,
@@ -209,6 +210,27 @@ fn behind_reversals(scene: &Scene, j: usize) -> Option<(&'static str, Curves)> {
     Some(("way since the reversal", (knots.into_iter().map(f64::exp).collect(), hats)))
 }
 
+/// Friction that changes as the log goes on, whatever its course: hats over time, each times the direction of motion, a knot to
+/// a period or as many as other curves have; `None` if the joint never turns. It is told by what periods have beside
+/// their mean.
+fn since_the_start(scene: &Scene, j: usize) -> Option<(&'static str, Curves)> {
+    let sign = scene.sign.joint(j);
+    let (n, knots) = (sign.len(), scene.periods.min(KNOTS));
+    let turns = sign.iter().any(|s| *s > 0.0) && sign.iter().any(|s| *s < 0.0);
+    if !turns || knots < 2 {
+        return None;
+    }
+    let time: Vec<f64> = (0..n * scene.periods).map(|k| k as f64 / scene.rate_hz).collect();
+    // Half a period inside both ends, where the mean of what a period knows lies.
+    let step = scene.periods as f64 / knots as f64 * n as f64 / scene.rate_hz;
+    let at = (0..knots).map(|k| (k as f64 + 0.5) * step).collect();
+    let (knots, mut hats) = hats_at(at, &time);
+    for hat in &mut hats {
+        hat.iter_mut().zip(sign.iter().cycle()).for_each(|(h, sign)| *h *= sign);
+    }
+    Some(("time since the start", (knots, hats)))
+}
+
 /// Knots, and what rises to 1 at each.
 type Curves = (Vec<f64>, Vec<Vec<f64>>);
 
@@ -223,9 +245,9 @@ fn hats(values: &[f64]) -> Curves {
 
 /// The piecewise linear hat of each of `knots`.
 fn hats_at(knots: Vec<f64>, values: &[f64]) -> Curves {
-    let mut hats = vec![vec![0.0; values.len()]; KNOTS];
+    let mut hats = vec![vec![0.0; values.len()]; knots.len()];
     for (k, &x) in values.iter().enumerate() {
-        let right = knots.partition_point(|knot| *knot < x).clamp(1, KNOTS - 1);
+        let right = knots.partition_point(|knot| *knot < x).clamp(1, knots.len() - 1);
         let width = knots[right] - knots[right - 1];
         let u = if width > 0.0 { ((x - knots[right - 1]) / width).clamp(0.0, 1.0) } else { 1.0 };
         hats[right - 1][k] = 1.0 - u;

@@ -11,7 +11,7 @@
 //! - its probability is that of F(k, ν), ν from the share that every harmonic has in what is explained
 //!   (Satterthwaite 1946).
 
-use super::image::{Direction, Image, Span};
+use super::image::{Image, Span};
 use crate::signal::{pooled, pooled_level};
 
 /// How well the noise of whitened rows is known.
@@ -68,8 +68,12 @@ impl NoiseKnowledge {
 
     /// Twice the gain in log-likelihood when the residual loses what `span` explains.
     pub fn gain(&self, span: &Span, residual: &Image) -> f64 {
+        if span.is_empty() {
+            return 0.0;
+        }
         let coordinates = span.coordinates(residual);
         let mut gain: f64 = coordinates.iter().map(|c| c * c).sum();
+        let explained = span.combination(&coordinates);
         let joints = self.joints();
         for (harmonic, unknown) in self.harmonics.iter().enumerate() {
             if (0..joints).all(|joint| 2.0 / unknown.of(joint) >= WELL_KNOWN) {
@@ -79,8 +83,7 @@ impl NoiseKnowledge {
                 let (mut before, mut after, mut count) = (0.0, 0.0, 0.0);
                 for row in self.rows(harmonic, joint) {
                     let r = residual.mean[row];
-                    let terms = span.directions().zip(&coordinates);
-                    let left = r - terms.map(|(d, c)| d.mean[row] * c).sum::<f64>();
+                    let left = r - explained.mean[row];
                     before += r * r;
                     after += left * left;
                     count += 1.0;
@@ -97,26 +100,22 @@ impl NoiseKnowledge {
     /// variance of the noise's power there, Σ w w' C over harmonics and joints with the shares w of the explained square and
     /// the relative covariances C ([`Uncertainty`]).
     pub fn freedom(&self, span: &Span, residual: &Image) -> f64 {
-        let coordinates = span.coordinates(residual);
+        if span.is_empty() {
+            return MANY;
+        }
+        let explained = span.combination(&span.coordinates(residual));
         let harmonics = self.harmonics();
         let mut share = vec![vec![0.0; harmonics]; self.joints()];
-        let rows = residual.mean.len();
-        let of_row = |image: Direction, period: usize, row: usize| match period {
-            0 => image.mean[row],
-            p => image.contrast.get((p - 1) * rows + row).copied().unwrap_or(0.0),
-        };
-        let longest = span.directions().map(|d| d.contrast.len()).max().unwrap_or(0);
+        let periods = explained.contrast.chunks_exact(explained.mean.len());
         let mut all = 0.0;
-        for (joint, share) in share.iter_mut().enumerate() {
-            for (harmonic, share) in share.iter_mut().enumerate() {
-                for row in self.rows(harmonic, joint) {
-                    for period in 0..=longest / rows.max(1) {
-                        let terms = span.directions().zip(&coordinates);
-                        let value: f64 = terms.map(|(d, c)| of_row(d, period, row) * c).sum();
-                        *share += value * value;
-                    }
+        for rows in periods.chain([&explained.mean[..]]) {
+            for (joint, share) in share.iter_mut().enumerate() {
+                for (harmonic, share) in share.iter_mut().enumerate() {
+                    let square =
+                        rows[self.rows(harmonic, joint)].iter().map(|v| v * v).sum::<f64>();
+                    *share += square;
+                    all += square;
                 }
-                all += *share;
             }
         }
         (2.0 * all * all / self.variance(&share)).min(MANY)
@@ -157,9 +156,16 @@ impl NoiseKnowledge {
 
 /// Σ w_h w_h' v_h over all harmonics and those that are within `reach` of them.
 fn of_alike(share: &[f64], reach: fn(usize) -> usize, variance: impl Fn(usize) -> f64) -> f64 {
+    // Of all harmonics below each.
+    let mut below = Vec::with_capacity(share.len() + 1);
+    below.push(0.0);
+    below.extend(share.iter().scan(0.0, |sum, share| {
+        *sum += share;
+        Some(*sum)
+    }));
     let term = |(harmonic, own): (usize, &f64)| {
-        let last = (harmonic + reach(harmonic)).min(share.len() - 1);
-        let near: f64 = share[harmonic.saturating_sub(reach(harmonic))..=last].iter().sum();
+        let end = (harmonic + reach(harmonic) + 1).min(share.len());
+        let near = below[end] - below[harmonic.saturating_sub(reach(harmonic))];
         own * near * variance(harmonic)
     };
     share.iter().enumerate().map(term).sum()
