@@ -9,7 +9,6 @@ use super::judge::{Outcome, is_at};
 use super::record::Record;
 use super::score::causes;
 use super::share::Share;
-use crate::diagnose::chance::FALSE_ALARM;
 use crate::montecarlo::calibration::Verdict;
 use crate::montecarlo::shard::Merged;
 
@@ -88,7 +87,7 @@ pub fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
     }
     let large = all.iter().filter(|r| r.case.is_from(40.0)).filter_map(|r| r.answer.gain);
     vec![
-        Target::new("clean: a false alarm", alarms, [0.0, FALSE_ALARM]),
+        Target::new("clean: a false alarm", alarms, [0.0, 0.003]),
         Target::about(
             "clean: one-sided 95 % upper bound of the false alarms",
             alarms,
