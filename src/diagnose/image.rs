@@ -213,7 +213,8 @@ impl Span {
     }
 
     /// ⟨direction, column⟩, a row for every direction: one matrix product over the rows of the means in which any of
-    /// `columns` is not zero. What acts on one joint of a single run is zero in those of the others.
+    /// `columns` is not zero, products of vectors for one column alone. What acts on one joint of a single run is zero in
+    /// those of the others.
     fn along(&self, columns: &[Image]) -> Mat<f64> {
         let mut along = Mat::zeros(self.len(), columns.len());
         if self.is_empty() {
@@ -221,18 +222,18 @@ impl Span {
         }
         let supports = columns.iter().map(Image::support).filter(|support| !support.is_empty());
         if let Some(support) = supports.reduce(|a, b| a.start.min(b.start)..a.end.max(b.end)) {
-            let mut copies = Vec::new();
-            let means = match columns {
-                [column] => &column.mean[support.clone()],
-                _ => {
-                    copies.reserve_exact(support.len() * columns.len());
-                    columns.iter().for_each(|column| copies.extend(&column.mean[support.clone()]));
-                    &copies
+            if let [column] = columns {
+                let of_directions = along.col_as_slice_mut(0).iter_mut().zip(self.directions());
+                for (along, direction) in of_directions {
+                    *along = dot(&direction.mean[support.clone()], &column.mean[support.clone()]);
                 }
-            };
-            let means = MatRef::from_column_major_slice(means, support.len(), columns.len());
-            let directions = self.means().subrows(support.start, support.len()).transpose();
-            matmul(&mut along, Accum::Replace, directions, means, 1.0, Par::Seq);
+            } else {
+                let mut means: Vec<f64> = Vec::with_capacity(support.len() * columns.len());
+                columns.iter().for_each(|column| means.extend(&column.mean[support.clone()]));
+                let means = MatRef::from_column_major_slice(&means, support.len(), columns.len());
+                let directions = self.means().subrows(support.start, support.len()).transpose();
+                matmul(&mut along, Accum::Replace, directions, means, 1.0, Par::Seq);
+            }
         }
         for (c, column) in columns.iter().enumerate() {
             let along = along.col_as_slice_mut(c);
