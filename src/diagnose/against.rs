@@ -83,7 +83,8 @@ pub fn explain(study: &Study, set: &BaseSet, simulation: &[f64], accepted: &[&En
     for image in accepted.iter().filter(|e| !is_change(e)).flat_map(|e| &e.images) {
         nuisance.push(image);
     }
-    let search = Search { study, changes, nuisance, residual };
+    let places = places(&changes);
+    let search = Search { study, changes, places, nuisance, residual };
     let taken = search.select();
     let mut span = search.nuisance.clone();
     let images = taken.iter().flat_map(|&c| &search.changes[c].images);
@@ -101,6 +102,8 @@ pub fn explain(study: &Study, set: &BaseSet, simulation: &[f64], accepted: &[&En
 struct Search<'a> {
     study: &'a Study<'a>,
     changes: Vec<Change<'a>>,
+    /// See [`places`].
+    places: Vec<f64>,
     nuisance: Span,
     residual: Image,
 }
@@ -116,7 +119,7 @@ impl Search<'_> {
     /// Forward selection, with removal of what a later change makes needless.
     fn select(&self) -> Vec<usize> {
         let significant =
-            |s: &Scored| s.evidence > 0.0 && s.probability * self.places(s.change) < chance::CHANGE;
+            |s: &Scored| s.evidence > 0.0 && s.probability * self.places[s.change] < chance::CHANGE;
         let mut taken: Vec<usize> = Vec::new();
         while taken.len() < MOST_CHANGES {
             let Some(best) = self.scored(&taken).into_iter().find(significant) else { break };
@@ -136,18 +139,6 @@ impl Search<'_> {
         taken
     }
 
-    /// Kinds of changes times sites of the kind of `change`, between which chance and odds are shared evenly: first between the
-    /// kinds, then between the sites of each, as laws share theirs ([`price`](super::price)).
-    fn places(&self, change: usize) -> f64 {
-        let is_first = |(c, change): &(usize, &Change)| {
-            self.changes[..*c].iter().all(|before| before.kind != change.kind)
-        };
-        let kinds = self.changes.iter().enumerate().filter(is_first).count();
-        let kind = self.changes[change].kind;
-        let sites = self.changes.iter().filter(|change| change.kind == kind).count();
-        (kinds * sites) as f64
-    }
-
     /// All changes that are not `taken`, best first.
     fn scored(&self, taken: &[usize]) -> Vec<Scored> {
         let study = self.study;
@@ -159,7 +150,7 @@ impl Search<'_> {
                 let span = Span::outside(&others, &self.changes[c].images);
                 let rows = rest.mean.len();
                 let price = study.statistic.coefficients_price(span.len(), site, rows)
-                    + 2.0 * self.places(c).ln();
+                    + 2.0 * self.places[c].ln();
                 Scored {
                     change: c,
                     evidence: study.statistic.gain(&span, &rest) - price,
@@ -233,6 +224,16 @@ impl Search<'_> {
             rivals: behind.collect(),
         }
     }
+}
+
+/// Kinds of changes times sites of the kind of each, between which chance and odds are shared evenly: first between the kinds,
+/// then between the sites of each, as laws share theirs ([`price`](super::price)).
+fn places(changes: &[Change]) -> Vec<f64> {
+    let mut sites: BTreeMap<Kind, usize> = BTreeMap::new();
+    for change in changes {
+        *sites.entry(change.kind).or_default() += 1;
+    }
+    changes.iter().map(|change| (sites.len() * sites[&change.kind]) as f64).collect()
 }
 
 fn without(taken: &[usize], index: usize) -> Vec<usize> {

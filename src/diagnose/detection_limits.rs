@@ -1,5 +1,6 @@
 //! How small an effect this log would still show.
 
+use super::candidates::Shape;
 use super::chance;
 use super::image::Span;
 use super::significance::LEAST_EVIDENCE;
@@ -13,7 +14,8 @@ const POWER: f64 = 0.9;
 const ABSORBED_BESIDE: f64 = 0.04 * 0.04;
 /// No effect has a coefficient (Nm, Nm/rad, rad, 1 … in SI) as large as this: its column is rounding.
 const BEYOND_PHYSICS: f64 = 1e4;
-/// √λ beyond which nothing is looked for, and how well the least is told.
+/// √λ that most families need, beyond which nothing is looked for, and how well the least is told.
+const USUAL: f64 = 8.0;
 const LARGEST: f64 = 1000.0;
 const TOLD_TO: f64 = 0.01;
 
@@ -27,35 +29,36 @@ pub fn detection_limits(study: &Study, accepted: &Span) -> Vec<DetectionLimit> {
     for (family, candidate) in study.families.iter().enumerate() {
         for site in candidate.sites(study.scene.joints()) {
             let here = study.entries.iter().filter(|e| (e.family, e.site) == (family, site));
-            let spans: Vec<(&Entry, Span)> = here
-                .map(|entry| (entry, study.span(entry, accepted)))
-                .filter(|(_, span)| span.first_length() > 0.0)
+            // The law that bears the family's name: the same parameter of another one is another size.
+            let Some(law) = here.clone().map(|entry| entry.shape.variant).min() else { continue };
+            let visible: Vec<Visible> = here
+                .filter(|entry| entry.shape.variant == law)
+                .map(|entry| Visible::beside(study, accepted, entry.clone()))
+                .filter(|visible| visible.span.first_length() > 0.0)
                 .collect();
-            let Some(middle) = spans.get(spans.len() / 2) else { continue };
-            let about = needed(study, middle.0, &middle.1);
-            // A shape in which an effect of that size may be; √λ of a coefficient b on column 1 alone is b ‖d⊥‖.
-            let may_be = |(entry, span): &&(&Entry, Span)| {
-                candidate.is_possible(entry.shape, &first_alone(entry, about / span.first_length()))
+            let is_the_shape = visible.iter().any(|v| candidate.whole(v.entry.shape).is_some());
+            let least = match is_the_shape {
+                true => least_shape(study, accepted, visible),
+                false => least_coefficient(study, visible),
             };
-            let possible: Vec<&(&Entry, Span)> = spans.iter().filter(may_be).collect();
-            let (entry, span) = possible.get(possible.len() / 2).copied().unwrap_or(middle);
-            let needed = needed(study, entry, span);
-            let length = span.first_length();
+            let Some(Least { visible, coefficient, sqrt_lambda }) = least else { continue };
+            let Visible { entry, span } = visible;
             let quantities = |coefficient: f64| {
-                let b = first_alone(entry, coefficient);
+                let b = first_alone(&entry, coefficient);
                 candidate.quantities(&study.scene, site, entry.shape, &b)
             };
-            let of = quantities(needed / length);
+            let of = quantities(coefficient);
             let Some(quantity) = candidate.size(&of) else { continue };
             // What the coefficient does not change, the shape has given.
             let given = of
                 .iter()
-                .zip(quantities(2.0 * needed / length))
+                .zip(quantities(2.0 * coefficient))
                 .filter(|(one, two)| one.value == two.value && one.value != 0.0)
                 .map(|(one, _)| (one.name, one.value));
-            let is_told = needed < LARGEST
+            let length = span.first_length();
+            let is_told = sqrt_lambda < LARGEST
                 && length * length > ABSORBED_BESIDE * entry.images[0].square()
-                && needed / length < BEYOND_PHYSICS;
+                && coefficient < BEYOND_PHYSICS;
             out.push(DetectionLimit {
                 kind: candidate.kind(),
                 joint: site.map(|j| j + 1),
@@ -63,11 +66,89 @@ pub fn detection_limits(study: &Study, accepted: &Span) -> Vec<DetectionLimit> {
                 value: is_told.then_some(quantity.value),
                 unit: quantity.unit,
                 given: given.filter(|(name, _)| *name != quantity.name).collect(),
+                sqrt_lambda: is_told.then_some(sqrt_lambda),
                 power: POWER,
             });
         }
     }
     out
+}
+
+/// A law in one shape, and what of it is seen beside the causes that were named.
+struct Visible {
+    entry: Entry,
+    span: Span,
+}
+
+impl Visible {
+    fn beside(study: &Study, accepted: &Span, entry: Entry) -> Self {
+        let span = study.span(&entry, accepted);
+        Self { entry, span }
+    }
+
+    /// See [`needed`].
+    fn needed(&self, study: &Study) -> f64 {
+        needed(study, &self.entry, &self.span)
+    }
+}
+
+/// The least of a law that is found.
+struct Least {
+    visible: Visible,
+    /// Of the first column, which alone is there.
+    coefficient: f64,
+    sqrt_lambda: f64,
+}
+
+/// The least coefficient in the middle one of the shapes in which an effect of about that size may be.
+fn least_coefficient(study: &Study, mut shapes: Vec<Visible>) -> Option<Least> {
+    let middle = shapes.get(shapes.len() / 2)?;
+    let candidate = &study.families[middle.entry.family];
+    let about = middle.needed(study);
+    // √λ of a coefficient b on column 1 alone is b ‖d⊥‖.
+    let may_be = |Visible { entry, span }: &Visible| {
+        candidate.is_possible(entry.shape, &first_alone(entry, about / span.first_length()))
+    };
+    let possible: Vec<usize> = (0..shapes.len()).filter(|i| may_be(&shapes[*i])).collect();
+    let chosen = possible.get(possible.len() / 2).copied().unwrap_or(shapes.len() / 2);
+    let visible = shapes.swap_remove(chosen);
+    let sqrt_lambda = visible.needed(study);
+    let coefficient = sqrt_lambda / visible.span.first_length();
+    Some(Least { visible, coefficient, sqrt_lambda })
+}
+
+/// The weakest shape that is found where shapes say how large an effect is: between the weakest of `shapes` that is and the next
+/// one.
+fn least_shape(study: &Study, accepted: &Span, shapes: Vec<Visible>) -> Option<Least> {
+    let whole = |Visible { entry, .. }: &Visible| {
+        study.families[entry.family].whole(entry.shape).unwrap_or(0.0)
+    };
+    let excess =
+        |visible: &Visible| whole(visible) * visible.span.first_length() - visible.needed(study);
+    let mut by_excess: Vec<(f64, Visible)> =
+        shapes.into_iter().map(|visible| (excess(&visible), visible)).collect();
+    by_excess.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let first = by_excess.partition_point(|(excess, _)| *excess < 0.0);
+    let value = |i: usize| by_excess.get(i).map(|(_, visible)| visible.entry.shape.value);
+    let found = value(first)?;
+    // Weaker than all shapes there are as the weakest is than the one before it.
+    let mut silent = match first.checked_sub(1).and_then(value) {
+        Some(silent) => silent,
+        None => found * found / value(1)?,
+    };
+    let mut least = by_excess.swap_remove(first).1;
+    while (silent / least.entry.shape.value).ln().abs() > TOLD_TO {
+        let Entry { family, site, shape, .. } = least.entry;
+        let between = Shape { value: (silent * shape.value).sqrt(), ..shape };
+        let seen = study.entry(family, site, between);
+        let seen = seen.map(|entry| Visible::beside(study, accepted, entry));
+        match seen.filter(|visible| excess(visible) >= 0.0) {
+            Some(visible) => least = visible,
+            None => silent = between.value,
+        }
+    }
+    let (coefficient, sqrt_lambda) = (whole(&least), least.needed(study));
+    Some(Least { visible: least, coefficient, sqrt_lambda })
 }
 
 /// √λ of an effect along the first column of `entry`, whose `span` that is, from which on it is found with the probability
@@ -85,7 +166,10 @@ fn needed(study: &Study, entry: &Entry, span: &Span) -> f64 {
         seen.scale(sqrt_lambda / span.first_length());
         statistic.gain(span, &seen) > worth && statistic.probability(span, &seen) < rare
     };
-    let [mut silent, mut found] = [0.0, LARGEST];
+    let [mut silent, mut found] = [0.0, USUAL];
+    while found < LARGEST && !is_found(found) {
+        [silent, found] = [found, (2.0 * found).min(LARGEST)];
+    }
     while found - silent > TOLD_TO {
         let between = 0.5 * (silent + found);
         if is_found(between) { found = between } else { silent = between }

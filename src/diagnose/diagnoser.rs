@@ -168,7 +168,12 @@ impl<'a> Diagnoser<'a> {
         let tears = causes.extract_if(.., is_a_tear).count();
         make_modest(&mut causes);
         let lack = misfit::lack_of_fit(&study, &accepted, &rest);
-        let unexplained = misfit::unexplained(&study, &accepted, &rest, lack);
+        // What is left of a law of drift is another form of it.
+        let drifts = |j: usize| {
+            causes.iter().any(|c| c.kind == Kind::ThermalDrift && c.joint == Some(j + 1))
+        };
+        let can_differ = |j: usize| !is_mended && !drifts(j);
+        let unexplained = misfit::unexplained(&study, &accepted, &rest, lack, can_differ);
         if unexplained.is_some() {
             causes.iter_mut().for_each(Cause::make_provisional);
         }

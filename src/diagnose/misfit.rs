@@ -23,6 +23,8 @@ const KNOTS: usize = 10;
 /// torque changes there so fast that these few samples would have a knot for themselves: what is left of them is
 /// when they were taken.
 const OUTERMOST: f64 = 0.01;
+/// Of fewer periods, drifting friction takes more than a third of what slow harmonics say of noise.
+const FEWEST_PERIODS: usize = 4;
 /// The first knot of the way behind a reversal, rad: bristles and teeth give way by more.
 const SHORTEST_WAY_RAD: f64 = 1e-4;
 
@@ -77,12 +79,14 @@ pub fn lack_of_fit(study: &Study, accepted: &Span, residual: &Image) -> Option<L
 
 /// The axis along which the residual is largest: a curve of 10 knots in each quantity of each joint.
 ///
-/// `Some` if that curve cannot be noise; or if the lack of fit cannot, and then of the joint of which it is.
+/// `Some` if that curve cannot be noise; or if the lack of fit cannot, and then of the joint of which it is. Whether friction
+/// changes as the log goes on is asked of the joints whose periods `can_differ` by nothing else that is known.
 pub fn unexplained(
     study: &Study,
     accepted: &Span,
     residual: &Image,
     lack_of_fit: Option<LackOfFit>,
+    can_differ: impl Fn(usize) -> bool,
 ) -> Option<Unexplained> {
     if !study.scene.periodic {
         return None;
@@ -93,17 +97,18 @@ pub fn unexplained(
     for j in (0..scene.joints()).filter(|j| !study.left_out.contains(j)) {
         let torque_rate = scene.torque_rate_nm_s(j);
         let time: Vec<f64> = (0..scene.samples()).map(|k| k as f64 / scene.rate_hz).collect();
-        let axes: [(&'static str, &[f64]); 6] = [
-            ("angle", scene.motion.q_rad.joint(j)),
-            ("speed", scene.motion.qd_rad_s.joint(j)),
-            ("acceleration", scene.motion.qdd_rad_s2.joint(j)),
-            ("torque", scene.torque_nm.joint(j)),
-            ("rate of the torque", &torque_rate),
-            ("time within the period", &time),
+        let axes: [(Axis, &[f64]); 6] = [
+            (("angle", "rad"), scene.motion.q_rad.joint(j)),
+            (("speed", "rad/s"), scene.motion.qd_rad_s.joint(j)),
+            (("acceleration", "rad/s²"), scene.motion.qdd_rad_s2.joint(j)),
+            (("torque", "Nm"), scene.torque_nm.joint(j)),
+            (("rate of the torque", "Nm/s"), &torque_rate),
+            (("time within the period", "s"), &time),
         ];
         let curves = axes.map(|(axis, values)| (axis, hats(values)));
-        let of_friction = behind_reversals(scene, j).into_iter().chain(since_the_start(scene, j));
-        for (axis, (knots, hats)) in curves.into_iter().chain(of_friction) {
+        let course = if can_differ(j) { since_the_start(scene, j) } else { None };
+        let of_friction = behind_reversals(scene, j).into_iter().chain(course);
+        for ((axis, unit), (knots, hats)) in curves.into_iter().chain(of_friction) {
             tests += 1.0;
             let mut span = Span::default();
             let image = |hat: &Vec<f64>| study.whitening.image(&Column::on(j, hat.clone()));
@@ -128,21 +133,23 @@ pub fn unexplained(
             let square: f64 = (0..n).map(|k| curve_at(k).powi(2)).sum();
             let unexplained = Unexplained {
                 axis,
+                unit,
                 joint: j + 1,
                 rms_nm: (square / n as f64).sqrt(),
                 curve: knots.iter().zip(&heights).map(|(x, y)| [*x, *y]).collect(),
             };
-            found.push(Curve { evidence, probability, unexplained });
+            let repeats = n == scene.samples();
+            found.push(Curve { evidence, probability, repeats, unexplained });
         }
     }
-    let by_evidence = |a: &Curve, b: &Curve| a.evidence.total_cmp(&b.evidence);
-    found.sort_by(by_evidence);
-    let best = found.last()?;
-    if best.probability * tests < chance::UNEXPLAINED {
-        return found.pop().map(|curve| curve.unexplained);
+    found.sort_by(|a, b| a.evidence.total_cmp(&b.evidence));
+    // Curves of fewer knots may be worth more and still be noise.
+    if let Some(clear) = found.iter().rposition(|c| c.probability * tests < chance::UNEXPLAINED) {
+        return Some(found.swap_remove(clear).unexplained);
     }
     let lack = lack_of_fit.filter(|lack| lack.probability < chance::UNEXPLAINED)?;
-    let of_joint = |curve: &Curve| curve.unexplained.joint == lack.joint + 1;
+    // The lack is one of the mean period.
+    let of_joint = |curve: &Curve| curve.repeats && curve.unexplained.joint == lack.joint + 1;
     found.into_iter().rfind(of_joint).map(|curve| curve.unexplained)
 }
 
@@ -152,6 +159,8 @@ struct Curve {
     evidence: f64,
     /// Of as much by chance.
     probability: f64,
+    /// Whether every period has it.
+    repeats: bool,
     unexplained: Unexplained,
 }
 
@@ -186,7 +195,7 @@ fn visible(raw: &[Image], outside: &[Image], residual: &Image) -> Vec<f64> {
 
 /// What friction does behind a reversal, whatever its law: hats over the logarithm of the way since then, each
 /// times the direction of motion; `None` if the joint never turns.
-fn behind_reversals(scene: &Scene, j: usize) -> Option<(&'static str, Curves)> {
+fn behind_reversals(scene: &Scene, j: usize) -> Option<(Axis, Curves)> {
     let (q, qd) = (scene.motion.q_rad.joint(j), scene.motion.qd_rad_s.joint(j));
     let n = q.len();
     let turns = |k: usize| qd[(k + n - 1) % n] * qd[k] < 0.0;
@@ -207,30 +216,34 @@ fn behind_reversals(scene: &Scene, j: usize) -> Option<(&'static str, Curves)> {
     for hat in &mut hats {
         hat.iter_mut().zip(qd).for_each(|(h, qd)| *h = h.copysign(*qd));
     }
-    Some(("way since the reversal", (knots.into_iter().map(f64::exp).collect(), hats)))
+    Some((("way since the reversal", "rad"), (knots.into_iter().map(f64::exp).collect(), hats)))
 }
 
-/// Friction that changes as the log goes on, whatever its course: hats over time, each times the direction of motion, a knot to
-/// a period or as many as other curves have; `None` if the joint never turns. It is told by what periods have beside
-/// their mean.
-fn since_the_start(scene: &Scene, j: usize) -> Option<(&'static str, Curves)> {
+/// Friction that changes as the log goes on: hats over time, each times the direction of motion, a knot to a period or as many as
+/// other curves have; `None` if the joint never turns, or few periods leave little of the noise that is not drift. It is told by
+/// what periods have beside their mean, from which the whitening takes drifts that fade or go on evenly before it
+/// asks how strong the noise is: others hide a little of themselves.
+fn since_the_start(scene: &Scene, j: usize) -> Option<(Axis, Curves)> {
     let sign = scene.sign.joint(j);
     let (n, knots) = (sign.len(), scene.periods.min(KNOTS));
-    let turns = sign.iter().any(|s| *s > 0.0) && sign.iter().any(|s| *s < 0.0);
-    if !turns || knots < 2 {
+    let turns = sign.iter().any(|s| *s > 0.5) && sign.iter().any(|s| *s < -0.5);
+    if !turns || scene.periods < FEWEST_PERIODS {
         return None;
     }
-    let time: Vec<f64> = (0..n * scene.periods).map(|k| k as f64 / scene.rate_hz).collect();
-    // Half a period inside both ends, where the mean of what a period knows lies.
-    let step = scene.periods as f64 / knots as f64 * n as f64 / scene.rate_hz;
-    let at = (0..knots).map(|k| (k as f64 + 0.5) * step).collect();
+    let samples = n * scene.periods;
+    let time = (0..samples).map(|k| scene.lead_in_s + k as f64 / scene.rate_hz).collect::<Vec<_>>();
+    // In the middle of equal parts.
+    let part_s = samples as f64 / scene.rate_hz / knots as f64;
+    let at = (0..knots).map(|k| scene.lead_in_s + (k as f64 + 0.5) * part_s).collect();
     let (knots, mut hats) = hats_at(at, &time);
     for hat in &mut hats {
         hat.iter_mut().zip(sign.iter().cycle()).for_each(|(h, sign)| *h *= sign);
     }
-    Some(("time since the start", (knots, hats)))
+    Some((("time since the start", "s"), (knots, hats)))
 }
 
+/// Name and unit of a quantity.
+type Axis = (&'static str, &'static str);
 /// Knots, and what rises to 1 at each.
 type Curves = (Vec<f64>, Vec<Vec<f64>>);
 

@@ -1,11 +1,10 @@
 //! A clock that stood still while the arm moved on: angles and velocities tell how long.
 
-use statrs::distribution::{ContinuousCDF, StudentsT};
-
 use super::data_faults::{FAR, cause, exact, sigma_of_changes, step_s};
 use super::kind::Kind;
 use super::verdict::{Cause, Estimate};
 use crate::identify::Measurement;
+use crate::identify::covariance::quantile_95;
 use crate::median::median;
 
 /// A clock that stalled.
@@ -44,8 +43,7 @@ pub fn stalls(m: &Measurement) -> Option<Stalls> {
     let count = rows.len() as f64;
     let lost_s = rows.iter().map(|&k| lost[k]).sum::<f64>() / count;
     let square: f64 = rows.iter().map(|&k| (lost[k] - lost_s).powi(2)).sum();
-    let quantile = StudentsT::new(0.0, 1.0, count - 1.0).map_or(1.96, |t| t.inverse_cdf(0.975));
-    let reach_s = quantile * (square / (count - 1.0) / count).sqrt();
+    let reach_s = quantile_95(count - 1.0) * (square / (count - 1.0) / count).sqrt();
     Some(Stalls { rows, lost_s, reach_s, sigma_s })
 }
 

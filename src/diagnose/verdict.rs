@@ -111,6 +111,8 @@ pub struct Rival {
 pub struct Unexplained {
     /// Quantity on which it depends most clearly.
     pub axis: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
     /// Joint (1-based).
     pub joint: usize,
     /// Size of that dependence, Nm.
@@ -135,6 +137,8 @@ pub struct DetectionLimit {
     pub unit: &'static str,
     /// The effect's other parameters, SI, for which this holds.
     pub given: std::collections::BTreeMap<&'static str, f64>,
+    /// √λ of the effect at that value: what it does to the torque, in units of the noise and outside the model.
+    pub sqrt_lambda: Option<f64>,
     /// Probability of detection at that value.
     pub power: f64,
 }

@@ -165,8 +165,11 @@ pub fn page(finding: &Finding, arm: &Arm, program: Program) -> Result<Page, Repo
     if let Some(unexplained) = &diagnosis.unexplained {
         let [x, y]: [Vec<f64>; 2] =
             [0, 1].map(|k| unexplained.curve.iter().map(|point| point[k]).collect());
-        let mut grid =
-            Grid::new("", Axis::linear(unexplained.axis, ""), Axis::linear("torque", "Nm"));
+        let mut grid = Grid::new(
+            "",
+            Axis::linear(unexplained.axis, unexplained.unit),
+            Axis::linear("torque", "Nm"),
+        );
         let panel = grid.panel(format!("Joint {}", unexplained.joint));
         grid.panels.push(panel.with("unexplained", &x, &y, Colour::MEASURED, Mark::DotsAndLine));
         page.push(
@@ -174,7 +177,8 @@ pub fn page(finding: &Finding, arm: &Arm, program: Program) -> Result<Page, Repo
                 .paragraph("No known effect explains this part; the curve says on what it depends.")
                 .figure(
                     grid.to_svg()?,
-                    "Mean of the unexplained torque along the axis on which it depends most.",
+                    "Mean of the unexplained torque along the axis on which it depends most; behind reversals and since \
+                     the start, in the direction of motion.",
                 ),
         );
     }

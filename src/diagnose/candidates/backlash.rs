@@ -81,6 +81,10 @@ impl Candidate for Backlash {
         Some(quantity("gap_rad", shape.value, "rad"))
     }
 
+    fn whole(&self, shape: Shape) -> Option<f64> {
+        Some(shape.value)
+    }
+
     fn form_error(&self, _: &Scene, _: Shape) -> f64 {
         HELD_ERROR
     }

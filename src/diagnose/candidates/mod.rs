@@ -192,6 +192,11 @@ pub trait Candidate: Sync {
         quantities.first().copied()
     }
 
+    /// The first coefficient of an effect of this `shape`, where the shape says how large it is.
+    fn whole(&self, _shape: Shape) -> Option<f64> {
+        None
+    }
+
     /// The experiment that tells it from what it resembles.
     fn separating_experiment(&self) -> &'static str;
 

@@ -59,6 +59,10 @@ impl Candidate for Saturation {
         vec![quantity("limit_nm", shape.value, "Nm"), quantity("share_cut", b[0], "")]
     }
 
+    fn whole(&self, _: Shape) -> Option<f64> {
+        Some(1.0)
+    }
+
     fn separating_experiment(&self) -> &'static str {
         "the same motion at half the speed: no torque reaches the limit"
     }

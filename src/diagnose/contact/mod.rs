@@ -10,6 +10,7 @@ mod between_periods;
 mod bump;
 mod disturbed;
 mod rarity;
+mod repeats;
 
 use std::ops::Range;
 
