@@ -47,6 +47,9 @@ pub fn settled<'s>(
             break;
         }
     }
+    if study.scene.periodic {
+        study.look_everywhere();
+    }
     Ok((study, causes))
 }
 

@@ -61,10 +61,10 @@ pub struct Study<'a> {
     pub residual: Image,
     /// How scores become statistics.
     pub statistic: Statistic,
-    /// Every family at every site with every starting shape.
+    /// Every family at every site with every starting shape; see [`Self::with_estimate`].
     pub entries: Vec<Entry>,
     /// How many starting shapes of a family at a site can be told from each other.
-    pub(super) shapes: HashMap<(usize, Option<usize>), DistinctShapes>,
+    pub(super) shapes: HashMap<Place, DistinctShapes>,
     /// Measured torque there.
     pub torque: Image,
     /// Joints (0-based) whose readings are too bad to look for physics in them.
@@ -72,6 +72,9 @@ pub struct Study<'a> {
     /// Causes that an earlier estimate of the arm has shown.
     shown: Vec<Shown>,
 }
+
+/// A family and a site.
+type Place = (usize, Option<usize>);
 
 /// A law of which an estimate of the arm left so many columns to be seen.
 struct Shown {
@@ -114,7 +117,7 @@ impl<'a> Study<'a> {
             Whitening::Run(RunWhitening::new(regression, options, sigma_nm)?)
         };
         let mut study = Self::behind((whitening, scene), families, set, regression, log)?;
-        study.fill_entries();
+        study.fill_entries(|_| true);
         Ok(study)
     }
 
@@ -205,11 +208,12 @@ impl<'a> Study<'a> {
         let of_run = (whitening, scene);
         let study = Self::behind(of_run, families, set, regression, log)?;
         let mut study = Self { left_out, shown, ..study };
-        study.fill_entries();
+        study.fill_entries(|_| true);
         Ok(study)
     }
 
-    /// The same study with torques predicted by other base parameters, `entries` found with the old ones.
+    /// The same study with torques predicted by other base parameters, `entries` found with the old ones. Of a motion that repeats it
+    /// knows no other laws, and these nowhere else, until it is to [look everywhere](Self::look_everywhere) again.
     pub fn with_estimate(
         mut self,
         arm: &Arm,
@@ -225,8 +229,15 @@ impl<'a> Study<'a> {
             columns: images.len(),
         };
         self.shown = entries.iter().map(shown).collect();
-        self.fill_entries();
+        let places: Vec<Place> = entries.iter().map(|entry| (entry.family, entry.site)).collect();
+        let is_periodic = self.scene.periodic;
+        self.fill_entries(|place| !is_periodic || places.contains(place));
         self
+    }
+
+    /// Prepares every family at every site with every starting shape.
+    pub fn look_everywhere(&mut self) {
+        self.fill_entries(|_| true);
     }
 
     /// Lets `residual` (of a better model than the null model) say how many rows are independent.
@@ -240,7 +251,7 @@ impl<'a> Study<'a> {
         self.left_out = joints;
     }
 
-    fn fill_entries(&mut self) {
+    fn fill_entries(&mut self, is_wanted: impl Fn(&Place) -> bool) {
         let study = &*self;
         let wanted: Vec<(usize, Option<usize>, Vec<Shape>)> = study
             .families
@@ -251,7 +262,9 @@ impl<'a> Study<'a> {
                 let sites = candidate.sites(scene.joints()).into_iter();
                 let looked_at =
                     |site: &Option<usize>| site.is_none_or(|j| !study.left_out.contains(&j));
-                sites.filter(looked_at).flat_map(move |site| {
+                let is_wanted = &is_wanted;
+                let sites = sites.filter(looked_at).filter(move |s| is_wanted(&(family, *s)));
+                sites.flat_map(move |site| {
                     let shapes = candidate.shapes(scene, site);
                     let banks: Vec<_> =
                         shapes.chunks(BANK).map(|s| (family, site, s.to_vec())).collect();
