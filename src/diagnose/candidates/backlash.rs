@@ -20,12 +20,12 @@ use crate::diagnose::scene::FINE;
 /// See the module.
 pub struct Backlash;
 
-/// Frequencies of the rotor against its flanks, rad/s, by variant: from those of a gear that gives way to
-/// those that the log's rate can hardly tell from stiff ones. What the samples show of a swing depends on where it
+/// Frequencies of the rotor against its flanks, rad/s, by variant: from those that the log's rate can hardly tell from stiff ones to
+/// those of a gear that gives way. What the samples show of a swing depends on where it
 /// is within their step: halfway between two of these its phase is off by one radian where it has faded to 1/e.
 const FLANK_RAD_S: [f64; 14] = [
-    130.0, 151.0, 175.0, 203.0, 236.0, 274.0, 318.0, 369.0, 428.0, 496.0, 576.0, 668.0, 775.0,
-    900.0,
+    900.0, 775.0, 668.0, 576.0, 496.0, 428.0, 369.0, 318.0, 274.0, 236.0, 203.0, 175.0, 151.0,
+    130.0,
 ];
 /// ζ of the flanks.
 const DAMPING_RATIO: f64 = 0.12;
@@ -46,7 +46,7 @@ impl Candidate for Backlash {
     fn shapes(&self, scene: &Scene, site: Option<usize>) -> Vec<Shape> {
         let stiffness = Flanks::by_variant(scene, joint(site)).map(|f| f.stiffness_nm_rad);
         (0..FLANK_RAD_S.len())
-            .filter(|&variant| variant == 0 || stiffness[variant - 1] < stiffness[variant])
+            .filter(|&v| stiffness.get(v + 1).is_none_or(|softer| *softer < stiffness[v]))
             .flat_map(|variant| geometric(3e-6, 1e-2, 8).map(move |value| Shape { variant, value }))
             .collect()
     }
