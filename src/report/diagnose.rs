@@ -165,11 +165,11 @@ pub fn page(finding: &Finding, arm: &Arm, program: Program) -> Result<Page, Repo
     if let Some(unexplained) = &diagnosis.unexplained {
         let [x, y]: [Vec<f64>; 2] =
             [0, 1].map(|k| unexplained.curve.iter().map(|point| point[k]).collect());
-        let mut grid = Grid::new(
-            "",
-            Axis::linear(unexplained.axis, unexplained.unit),
-            Axis::linear("torque", "Nm"),
-        );
+        // The ways since a reversal reach from 0.1 mrad to radians.
+        let is_wide = x.first().zip(x.last()).is_some_and(|(a, b)| *a > 0.0 && *b > 100.0 * a);
+        let scaled = if is_wide { Axis::log } else { Axis::linear };
+        let axis = scaled(unexplained.axis, unexplained.unit);
+        let mut grid = Grid::new("", axis, Axis::linear("torque", "Nm"));
         let panel = grid.panel(format!("Joint {}", unexplained.joint));
         grid.panels.push(panel.with("unexplained", &x, &y, Colour::MEASURED, Mark::DotsAndLine));
         page.push(
