@@ -1,5 +1,7 @@
 //! How small an effect this log would still show.
 
+use std::borrow::Cow;
+
 use super::candidates::Shape;
 use super::chance;
 use super::image::Span;
@@ -33,7 +35,7 @@ pub fn detection_limits(study: &Study, accepted: &Span) -> Vec<DetectionLimit> {
             let Some(law) = here.clone().map(|entry| entry.shape.variant).min() else { continue };
             let visible: Vec<Visible> = here
                 .filter(|entry| entry.shape.variant == law)
-                .map(|entry| Visible::beside(study, accepted, entry.clone()))
+                .map(|entry| Visible::beside(study, accepted, Cow::Borrowed(entry)))
                 .filter(|visible| visible.span.first_length() > 0.0)
                 .collect();
             let is_the_shape = visible.iter().any(|v| candidate.whole(v.entry.shape).is_some());
@@ -75,13 +77,13 @@ pub fn detection_limits(study: &Study, accepted: &Span) -> Vec<DetectionLimit> {
 }
 
 /// A law in one shape, and what of it is seen beside the causes that were named.
-struct Visible {
-    entry: Entry,
+struct Visible<'e> {
+    entry: Cow<'e, Entry>,
     span: Span,
 }
 
-impl Visible {
-    fn beside(study: &Study, accepted: &Span, entry: Entry) -> Self {
+impl<'e> Visible<'e> {
+    fn beside(study: &Study, accepted: &Span, entry: Cow<'e, Entry>) -> Self {
         let span = study.span(&entry, accepted);
         Self { entry, span }
     }
@@ -93,16 +95,17 @@ impl Visible {
 }
 
 /// The least of a law that is found.
-struct Least {
-    visible: Visible,
+struct Least<'e> {
+    visible: Visible<'e>,
     /// Of the first column, which alone is there.
     coefficient: f64,
     sqrt_lambda: f64,
 }
 
 /// The least coefficient in the middle one of the shapes in which an effect of about that size may be.
-fn least_coefficient(study: &Study, mut shapes: Vec<Visible>) -> Option<Least> {
-    let middle = shapes.get(shapes.len() / 2)?;
+fn least_coefficient<'e>(study: &Study, mut shapes: Vec<Visible<'e>>) -> Option<Least<'e>> {
+    let place = shapes.len() / 2;
+    let middle = shapes.get(place)?;
     let candidate = &study.families[middle.entry.family];
     let about = middle.needed(study);
     // √λ of a coefficient b on column 1 alone is b ‖d⊥‖.
@@ -110,16 +113,16 @@ fn least_coefficient(study: &Study, mut shapes: Vec<Visible>) -> Option<Least> {
         candidate.is_possible(entry.shape, &first_alone(entry, about / span.first_length()))
     };
     let possible: Vec<usize> = (0..shapes.len()).filter(|i| may_be(&shapes[*i])).collect();
-    let chosen = possible.get(possible.len() / 2).copied().unwrap_or(shapes.len() / 2);
+    let chosen = possible.get(possible.len() / 2).copied().unwrap_or(place);
     let visible = shapes.swap_remove(chosen);
-    let sqrt_lambda = visible.needed(study);
+    let sqrt_lambda = if chosen == place { about } else { visible.needed(study) };
     let coefficient = sqrt_lambda / visible.span.first_length();
     Some(Least { visible, coefficient, sqrt_lambda })
 }
 
 /// The weakest shape that is found where shapes say how large an effect is: between the weakest of `shapes` that is and the next
 /// one.
-fn least_shape(study: &Study, accepted: &Span, shapes: Vec<Visible>) -> Option<Least> {
+fn least_shape<'e>(study: &Study, accepted: &Span, shapes: Vec<Visible<'e>>) -> Option<Least<'e>> {
     let whole = |Visible { entry, .. }: &Visible| {
         study.families[entry.family].whole(entry.shape).unwrap_or(0.0)
     };
@@ -138,10 +141,10 @@ fn least_shape(study: &Study, accepted: &Span, shapes: Vec<Visible>) -> Option<L
     };
     let mut least = by_excess.swap_remove(first).1;
     while (silent / least.entry.shape.value).ln().abs() > TOLD_TO {
-        let Entry { family, site, shape, .. } = least.entry;
+        let Entry { family, site, shape, .. } = *least.entry;
         let between = Shape { value: (silent * shape.value).sqrt(), ..shape };
         let seen = study.entry(family, site, between);
-        let seen = seen.map(|entry| Visible::beside(study, accepted, entry));
+        let seen = seen.map(|entry| Visible::beside(study, accepted, Cow::Owned(entry)));
         match seen.filter(|visible| excess(visible) >= 0.0) {
             Some(visible) => least = visible,
             None => silent = between.value,

@@ -117,7 +117,7 @@ impl<'a> Study<'a> {
             Whitening::Run(RunWhitening::new(regression, options, sigma_nm)?)
         };
         let mut study = Self::behind((whitening, scene), families, set, regression, log)?;
-        study.fill_entries(|_| true);
+        study.look_everywhere();
         Ok(study)
     }
 
@@ -208,7 +208,7 @@ impl<'a> Study<'a> {
         let of_run = (whitening, scene);
         let study = Self::behind(of_run, families, set, regression, log)?;
         let mut study = Self { left_out, shown, ..study };
-        study.fill_entries(|_| true);
+        study.look_everywhere();
         Ok(study)
     }
 
