@@ -20,7 +20,7 @@ use crate::dynamics::Real;
 pub struct Presliding;
 
 /// Standard error of 1/k, rad, of a motion that repeats: the noise of the angles between which a joint turns round is in no
-/// residual. Over eight periods with angles known to 2e-5 rad (32 arms, `reports/blind_findings.md`) estimates scatter by 0.9
+/// residual. Over eight periods with angles known to 2e-5 rad (32 arms, `reports/blind_history.md`) estimates scatter by 0.9
 /// of what they claim with it. It does not follow the noise of other logs.
 const TURN_RAD: f64 = 4.5e-6;
 /// The same over 1/k, at most.

@@ -17,7 +17,7 @@ const USUAL_SHARE: f64 = 0.5;
 
 /// How the drive answers while friction turns round: by its feedback alone. What its answer to reversals tells is no better a
 /// guess on joints 3 to 6, and on joints 1 and 2, which turn round within few samples, made F 1.8 to 2.6 times as large in six of 84
-/// logs (`reports/blind_findings.md`).
+/// logs (`reports/blind_history.md`).
 const FED: Option<f64> = Some(0.0);
 
 /// Standard error of F and v_s over their value, for both: with it the intervals hold 77 and 79 truths of those 84 logs.
