@@ -273,6 +273,50 @@ fn one_time_far_ahead_costs_one_row_and_not_all_that_follow() {
 }
 
 #[test]
+fn a_few_times_far_ahead_cost_their_rows_and_not_all_that_follow() {
+    let ahead = |k: usize, times: &[f64]| {
+        let log = edited(|rows| {
+            for (row, time) in rows[k..].iter_mut().zip(times) {
+                row[0] = time.to_string();
+            }
+        });
+        log.unwrap().rows
+    };
+    for k in [1, 51] {
+        for count in [2_usize, 8] {
+            let times: Vec<f64> = (0..count).map(|i| 5000.0 + STEP_S * i as f64).collect();
+            let rows = ahead(k, &times);
+            assert_eq!(
+                (rows.count(Reason::TimeAhead), rows.used),
+                (count, SAMPLES - count),
+                "{rows}"
+            );
+            assert_eq!(rows.set_aside[0].first_row, k + 1);
+            assert_eq!(rows.missed_samples, 0, "{rows}");
+        }
+    }
+    // A clock that stands or jumps about up there.
+    for times in [[5000.0, 5000.0, 5000.0], [5000.0, 4000.0, 6000.0]] {
+        assert_eq!(ahead(51, &times).used, SAMPLES - 3);
+    }
+}
+
+#[test]
+fn a_log_that_goes_on_behind_a_pause_is_kept() {
+    // Three rows behind a minute's pause two times of before it, which are too few to be believed.
+    let log = edited(|rows| {
+        for row in &mut rows[51..] {
+            row[0] = (row[0].parse::<f64>().unwrap() + 60.0).to_string();
+        }
+        for (row, time) in [(54, "101"), (55, "102")] {
+            rows[row][0] = time.into();
+        }
+    });
+    let rows = log.unwrap().rows;
+    assert_eq!((rows.count(Reason::TimeBackwards), rows.used), (2, SAMPLES - 2), "{rows}");
+}
+
+#[test]
 fn a_row_shifted_by_a_column() {
     let result = edited(|rows| rows[51][1..].rotate_right(1));
     let log = result.unwrap();
@@ -301,18 +345,136 @@ fn missed_samples_are_counted() {
     assert!(warning.contains("3 samples") && warning.contains("row 51"), "{warning}");
 }
 
-#[test]
-fn a_wrapped_angle_is_a_warning() {
+/// Adds `offset_rad` to the angle of joint 2 from row 201 of the file on.
+fn with_a_jump(offset_rad: f64) -> Log {
     let log = edited(|rows| {
         for row in &mut rows[200..] {
-            row[2] = (row[2].parse::<f64>().unwrap() + 2.0 * PI).to_string();
+            row[2] = (row[2].parse::<f64>().unwrap() + offset_rad).to_string();
+        }
+    });
+    log.unwrap()
+}
+
+fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn an_angle_that_jumps_by_a_turn_is_unwrapped() {
+    let expected = edited(|_| {}).unwrap();
+    for offset_rad in [2.0 * PI, -2.0 * PI] {
+        let log = with_a_jump(offset_rad);
+        assert_eq!((log.samples(), log.rows.warnings.len()), (SAMPLES, 1), "{}", log.rows);
+        let warning = log.rows.warnings[0].to_string();
+        for part in ["row 200", "joint 2", "unwrapped 1 times"] {
+            assert!(warning.contains(part), "{warning}");
+        }
+        // Two roundings of numbers below 16.
+        assert!(largest_difference(log.q_rad.joint(1), expected.q_rad.joint(1)) < 4e-15);
+        assert_eq!(log.q_rad.joint(2), expected.q_rad.joint(2));
+    }
+}
+
+#[test]
+fn a_jump_that_is_no_turn_stays() {
+    let expected = edited(|_| {}).unwrap();
+    let log = with_a_jump(3.0);
+    let warning = log.rows.warnings[0].to_string();
+    for part in ["jumps 1 times", "row 200", "joint 2", "3.0"] {
+        assert!(warning.contains(part), "{warning}");
+    }
+    let jump_rad = log.q_rad.joint(1)[300] - expected.q_rad.joint(1)[300];
+    assert!((jump_rad - 3.0).abs() < 1e-14);
+}
+
+/// Angles from −1 to 2π − 1: each joint passes the seam in the middle of its motion, on its way up and down.
+#[test]
+fn wrapped_angles_and_their_targets_are_put_together_again() {
+    let wrapped = |q: f64| if q < -1.0 { q + 2.0 * PI } else { q };
+    // The target is ahead, and passes the seam in other rows.
+    let target_rad = |j: usize, t: f64| angle_rad(j, t + 0.05);
+    let mut seams = 0;
+    let log = edited(|rows| {
+        rows[0].extend((0..JOINTS).map(|j| format!("target_q_{j}")));
+        for row in &mut rows[1..] {
+            let t: f64 = row[0].parse().unwrap();
+            for j in 0..JOINTS {
+                row[1 + j] = wrapped(angle_rad(j, t)).to_string();
+                row.push(wrapped(target_rad(j, t)).to_string());
+            }
+        }
+        let is_high = |row: &[String], j: usize| row[1 + j].parse::<f64>().unwrap() > 1.0;
+        for pair in rows[1..].windows(2) {
+            seams += (0..JOINTS).filter(|&j| is_high(&pair[0], j) != is_high(&pair[1], j)).count();
         }
     })
     .unwrap();
+    assert!(seams > JOINTS);
     assert_eq!(log.samples(), SAMPLES);
-    let warning = log.rows.warnings[0].to_string();
-    assert!(warning.contains("row 200") && warning.contains("joint 2"), "{warning}");
-    assert!(warning.contains("wrapped"), "{warning}");
+    assert!(
+        matches!(log.rows.warnings[..], [LogWarning::Unwrapped { count, .. }] if count == seams)
+    );
+    let target = log.target_q_rad.unwrap();
+    for j in 0..JOINTS {
+        // What a joint began with stays.
+        let begin = log.q_rad.joint(j)[0] - angle_rad(j, log.time_s[0]);
+        let of = |f: &dyn Fn(usize, f64) -> f64| -> Vec<f64> {
+            log.time_s.iter().map(|&t| begin + f(j, t)).collect()
+        };
+        assert!(largest_difference(log.q_rad.joint(j), &of(&angle_rad)) < 1e-14);
+        assert!(largest_difference(target.joint(j), &of(&target_rad)) < 1e-14);
+    }
+}
+
+/// Column of the first desired moment in [`with_optional_blocks`]; the temperatures are behind these.
+const MOMENT: usize = 19;
+
+/// The log after `edit` was done to the fields of the valid one with desired moments and temperatures.
+fn with_optional_blocks(edit: impl FnOnce(&mut Vec<Vec<String>>)) -> Log {
+    let log = edited(|rows| {
+        for name in ["target_moment", "joint_temperatures"] {
+            rows[0].extend((0..JOINTS).map(|j| format!("{name}_{j}")));
+            for row in &mut rows[1..] {
+                row.extend((0..JOINTS).map(|j| format!("{j}.5")));
+            }
+        }
+        edit(rows);
+    });
+    log.unwrap()
+}
+
+#[test]
+fn a_bad_field_that_nothing_needs_costs_its_block_and_no_row() {
+    let log = with_optional_blocks(|_| {});
+    assert!(log.rows.warnings.is_empty() && log.target_effort.is_some(), "{}", log.rows);
+    for value in ["", "NaN", "n/a", "1e293"] {
+        let log = with_optional_blocks(|rows| {
+            rows[51][MOMENT + 2] = value.into();
+            rows[71][MOMENT] = value.into();
+        });
+        assert_eq!((log.samples(), log.rows.set_aside.len()), (SAMPLES, 0), "{}", log.rows);
+        assert!(log.target_effort.is_none() && log.temperature_c.is_some());
+        let warning = log.rows.warnings[0].to_string();
+        for part in ["2 fields", "target_moment", "row 52", "column 22 (target_moment_2)"] {
+            assert!(warning.contains(part), "{warning}");
+        }
+    }
+    let blank = with_optional_blocks(|rows| {
+        rows[1..].iter_mut().for_each(|row| row[MOMENT + JOINTS..].fill(String::new()));
+    });
+    assert_eq!((blank.samples(), blank.rows.warnings.len()), (SAMPLES, 1), "{}", blank.rows);
+    assert!(blank.target_effort.is_some() && blank.temperature_c.is_none());
+    let warning = blank.rows.warnings[0].to_string();
+    assert!(warning.contains(&format!("{} fields", SAMPLES * JOINTS)), "{warning}");
+}
+
+#[test]
+fn a_bad_field_in_a_row_that_is_set_aside_costs_no_block() {
+    let log = with_optional_blocks(|rows| rows[51][1..].fill("1e293".into()));
+    assert_eq!(log.rows.count(Reason::Implausible), 1, "{}", log.rows);
+    assert!(log.rows.warnings.is_empty(), "{}", log.rows);
+    assert!(log.target_effort.is_some() && log.temperature_c.is_some());
 }
 
 #[test]

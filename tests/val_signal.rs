@@ -1,6 +1,6 @@
 //! The signal chapter against SciPy: `tests/golden/signal_scipy.py` makes `signal.json`.
 
-use armid::signal::{PaperDifferentiator, PaperReading, Resampler, Scratch, ZeroPhase, welch};
+use armid::signal::{PaperDifferentiator, PaperReading, Resampler, Scratch, ZeroPhase};
 use serde::Deserialize;
 
 const RATE_HZ: f64 = 125.0;
@@ -13,7 +13,6 @@ struct Golden {
     filters: Vec<Filtered>,
     literal: Vec<f64>,
     intended_interior: Vec<f64>,
-    welch: Vec<Welch>,
     resample: Resampled,
 }
 
@@ -22,13 +21,6 @@ struct Filtered {
     order: usize,
     cutoff_hz: f64,
     y: Vec<f64>,
-}
-
-#[derive(Deserialize)]
-struct Welch {
-    segment: usize,
-    frequency_hz: Vec<f64>,
-    density: Vec<f64>,
 }
 
 #[derive(Deserialize)]
@@ -91,15 +83,6 @@ fn both_readings_of_the_paper_filter_equal_filtfilt() {
     assert_near(&apply(PaperReading::Literal), &golden.literal, 1e-9, "literal");
     let intended = apply(PaperReading::Intended);
     assert_near(&intended[2..398], &golden.intended_interior, 1e-11, "intended");
-}
-
-#[test]
-fn the_spectrum_equals_scipy_welch() {
-    for case in golden().welch {
-        let found = welch(&series(400), RATE_HZ, case.segment).unwrap();
-        assert_near(&found.frequency_hz, &case.frequency_hz, 1e-12, "frequencies");
-        assert_near(&found.density, &case.density, 1e-15, "densities");
-    }
 }
 
 #[test]

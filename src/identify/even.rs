@@ -8,7 +8,7 @@ use super::prepare::Measurement;
 use crate::robot::JointSignals;
 use crate::signal::{Bracket, Decimator, Resampler, Scratch, bridged_gap_s, natural_rate_hz};
 
-/// Time stamps further off the median step than this share of it make a log uneven.
+/// Time stamps further off the natural step than this share of it make a log uneven.
 const EVEN_WITHIN: f64 = 0.02;
 /// [`Even::highest`] of samples as the log has them: half a cycle less what derivatives near it cost.
 const AS_LOGGED: f64 = 0.48;
@@ -73,14 +73,18 @@ impl<'a> Even<'a> {
             torque_nm: Cow::Borrowed(m.torque_nm),
         };
         let is_natural = (0.999 * natural_hz..=1.001 * natural_hz).contains(&wanted_hz);
+        // A decimator keeps whole parts of the grid's rate, which is that multiple of a wanted rate below the log's.
+        let parts = if is_natural { 1 } else { whole_parts(natural_hz, wanted_hz) };
         if !is_even || !is_natural || faster.is_some() {
-            let plain_hz = if is_natural { even.rate_hz } else { wanted_hz.max(natural_hz) };
+            let plain_hz = if is_natural { even.rate_hz } else { parts as f64 * wanted_hz };
             let grid_hz = faster.unwrap_or(1.0) * plain_hz;
             let grid = Resampler::new(m.time_s, grid_hz, bridged_gap_s(natural_hz))?;
             even.put_on(&grid, grid_hz, m, warnings)?;
         }
-        let highest_hz = options.rate_hz.unwrap_or(Options::HIGHEST_RATE_HZ);
-        let every = (even.rate_hz / highest_hz * 0.999).ceil().max(1.0) as usize;
+        let every = match options.rate_hz {
+            Some(_) => parts,
+            None => whole_parts(even.rate_hz, Options::HIGHEST_RATE_HZ),
+        };
         if every > 1 {
             even.decimate(&Decimator::new(every, even.rate_hz)?, filter)?;
         }
@@ -141,5 +145,63 @@ impl<'a> Even<'a> {
         self.highest = REWORKED;
         self.between = None;
         Ok(())
+    }
+}
+
+/// Parts into which `rate_hz` is divided so that one is at most `highest_hz`, or a thousandth more.
+fn whole_parts(rate_hz: f64, highest_hz: f64) -> usize {
+    (rate_hz / highest_hz * 0.999).ceil().max(1.0) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const START_S: f64 = 7.0;
+    const OMEGA_RAD_S: f64 = 3.0;
+
+    /// Ten seconds of a joint that swings, in `log_hz` rows a second, with `rate_hz` asked for: the rate of the samples, and
+    /// how far their angles are off the motion, at least two seconds from both ends, rad.
+    fn sampled(log_hz: f64, rate_hz: Option<f64>) -> (f64, f64) {
+        let rows = (10.0 * log_hz) as usize;
+        let time_s: Vec<f64> = (0..rows).map(|k| START_S + k as f64 / log_hz).collect();
+        let angle_rad = |t: f64| (OMEGA_RAD_S * t).sin();
+        let q_rad = JointSignals::from_fn(1, rows, |_, k| angle_rad(time_s[k]));
+        let qd_rad_s =
+            JointSignals::from_fn(1, rows, |_, k| OMEGA_RAD_S * (OMEGA_RAD_S * time_s[k]).cos());
+        let m = Measurement {
+            source: "test",
+            time_s: &time_s,
+            q_rad: &q_rad,
+            qd_rad_s: &qd_rad_s,
+            torque_nm: &q_rad,
+        };
+        let options = Options { rate_hz, ..Options::default() };
+        let even = Even::of(&m, &options, None, &mut Scratch::default(), &mut Vec::new()).unwrap();
+        let off = even.q_rad.joint(0).iter().enumerate().map(|(k, q)| {
+            let t = even.start_s + k as f64 / even.rate_hz;
+            (t, (q - angle_rad(t)).abs())
+        });
+        let inner = off.filter(|(t, _)| (START_S + 2.0..START_S + 8.0).contains(t));
+        (even.rate_hz, inner.map(|(_, off)| off).fold(0.0, f64::max))
+    }
+
+    #[test]
+    fn samples_come_at_the_rate_that_was_asked_for() {
+        for wanted_hz in [20.0, 30.0, 50.0, 62.5, 100.0, 120.0, 124.0, 200.0] {
+            let (rate_hz, off_rad) = sampled(125.0, Some(wanted_hz));
+            assert!((rate_hz - wanted_hz).abs() < 1e-9, "{rate_hz} instead of {wanted_hz} Hz");
+            // Cubics between rows are off by (ω/125 Hz)⁴/384 = 9e-10, and the ends of the slowest low-pass by e⁻²⁰.
+            assert!(off_rad < 1e-8, "{off_rad:e} rad at {wanted_hz} Hz");
+        }
+    }
+
+    #[test]
+    fn the_rate_of_the_log_is_its_own_up_to_the_highest() {
+        let own = sampled(125.0, None);
+        assert!((own.0 - 125.0).abs() < 1e-9 && own.1 < 1e-12, "{own:?}");
+        assert_eq!(sampled(125.0, Some(125.0)), own);
+        assert!((sampled(500.0, None).0 - 250.0).abs() < 1e-9);
+        assert!((sampled(500.0, Some(500.0)).0 - 500.0).abs() < 1e-9);
     }
 }

@@ -23,7 +23,7 @@ pub enum Reason {
     TimeRepeated,
     /// A time before that of the row before.
     TimeBackwards,
-    /// A single time far ahead of both its neighbours.
+    /// A time far ahead of the rows before and behind, alone or with a few others.
     TimeAhead,
     /// Positions that do not follow from the neighbouring rows' positions and velocities.
     Inconsistent,
@@ -125,6 +125,27 @@ pub enum LogWarning {
         /// By how much, rad.
         jump_rad: f64,
     },
+    /// Angles that were given within one turn and jumped at its ends, put together again.
+    Unwrapped {
+        /// How many jumps of one turn, in all joints.
+        count: usize,
+        /// The row before the first.
+        after_row: usize,
+        /// The joint that jumps there, counted from 1.
+        joint: usize,
+    },
+    /// A block that a log need not have, with fields that are empty, no numbers or beyond what the quantity can be: it is
+    /// not used.
+    LeftOut {
+        /// The block's key in a layout.
+        block: &'static str,
+        /// How many such fields in the rows used.
+        fields: usize,
+        /// The first row with one.
+        first_row: usize,
+        /// The column it is in.
+        column: String,
+    },
 }
 
 impl fmt::Display for LogWarning {
@@ -147,12 +168,16 @@ impl fmt::Display for LogWarning {
             Self::PositionJumps { count, after_row, joint, jump_rad } => write!(
                 f,
                 "the position jumps {count} times; first after row {after_row}, joint {joint} by \
-                 {jump_rad:.3} rad{}",
-                if (jump_rad.abs() - std::f64::consts::TAU).abs() < 0.1 {
-                    " (one turn: the angle is wrapped)"
-                } else {
-                    ""
-                }
+                 {jump_rad:.3} rad"
+            ),
+            Self::Unwrapped { count, after_row, joint } => write!(
+                f,
+                "angles are wrapped, first joint {joint}'s after row {after_row}: unwrapped {count} times"
+            ),
+            Self::LeftOut { block, fields, first_row, ref column } => write!(
+                f,
+                "{fields} fields of {block} hold nothing that can be used, the first in row {first_row}, {column}: \
+                 the block is left out"
             ),
         }
     }

@@ -27,6 +27,8 @@ const SHORT_STRETCH: usize = 10;
 const OPEN_STRETCHES: usize = 16;
 /// A step of time this many times the median is far ahead.
 const FAR_AHEAD_STEPS: f64 = 20.0;
+/// Rows in a row whose time is taken for wrong where it is far ahead; more are a pause behind which the clock was set back.
+const AHEAD_ROWS: usize = 8;
 
 /// The columns of motion of a log, one entry per row.
 pub(super) struct Motion<'a> {
@@ -65,6 +67,15 @@ impl Motion<'_> {
             .fold(0.0, f64::max)
     }
 
+    /// The turn (+1 or −1) that the angle lost on the way to row `k` from the one before: no motion jumps so far, and a
+    /// wrapped angle does.
+    fn lost_turn(&self, joint: usize, k: usize) -> Option<f64> {
+        let tolerance_rad = angle_tolerance_rad(self.time_s[k] - self.time_s[k - 1]);
+        let jump_rad = self.defect(joint, k - 1, k);
+        let is_turn = (jump_rad.abs() - TAU).abs() <= tolerance_rad;
+        (is_turn && jump_rad.abs() > tolerance_rad).then(|| -jump_rad.signum())
+    }
+
     fn is_plausible(&self, k: usize) -> bool {
         self.q.iter().all(|q| q[k].abs() <= ANGLE_BOUND_RAD)
             && self.qd.iter().all(|qd| qd[k].abs() <= VELOCITY_BOUND_RAD_S)
@@ -79,32 +90,35 @@ fn angle_tolerance_rad(step_s: f64) -> f64 {
 
 /// For every row why its time cannot stay, so that the times that stay increase strictly.
 ///
-/// A time not after the one before it is set aside, unless the one before is a lone value far ahead of
-/// the rows on both its sides; then that one is.
+/// A time not after the one before it is set aside, unless the one before, or up to [`AHEAD_ROWS`] of them, are far
+/// ahead of the rows on both sides, and as many rows go on behind; then these are.
 pub(super) fn order_of_time(time_s: &[f64]) -> Vec<Option<Reason>> {
     let mut verdicts = vec![None; time_s.len()];
     let far = FAR_AHEAD_STEPS * median_step(time_s).unwrap_or(0.0);
-    let mut last: Option<usize> = None;
-    let mut before: Option<usize> = None;
-    for k in 0..time_s.len() {
-        let Some(previous) = last.filter(|&i| time_s[k] <= time_s[i]) else {
-            before = last;
-            last = Some(k);
+    // Those that stay so far.
+    let mut kept: Vec<usize> = Vec::with_capacity(time_s.len());
+    for (k, &t) in time_s.iter().enumerate() {
+        let (before, ahead) = kept.split_at(kept.partition_point(|&i| time_s[i] < t));
+        let Some(&first) = ahead.first() else {
+            kept.push(k);
             continue;
         };
-        let follows = |i: usize| time_s[k] > time_s[i] && time_s[previous] - time_s[i] > far;
-        let lone = before.is_none_or(follows)
-            && time_s[previous] - time_s[k] > far
-            && time_s.get(k + 1).is_some_and(|&t| t > time_s[k] && t < time_s[previous]);
-        if lone {
-            verdicts[previous] = Some(Reason::TimeAhead);
-            last = Some(k);
+        let goes_on = |next: &[f64]| next.iter().all(|&s| s > t && s < time_s[first]);
+        let are_wrong = ahead.len() <= AHEAD_ROWS
+            && time_s[first] - t > far
+            && before.last().is_none_or(|&i| time_s[first] - time_s[i] > far)
+            && time_s.get(k + 1..=k + ahead.len()).is_some_and(goes_on);
+        if are_wrong {
+            for &i in ahead {
+                verdicts[i] = Some(Reason::TimeAhead);
+            }
+            let stay = before.len();
+            kept.truncate(stay);
+            kept.push(k);
         } else {
-            verdicts[k] = Some(if time_s[k] == time_s[previous] {
-                Reason::TimeRepeated
-            } else {
-                Reason::TimeBackwards
-            });
+            let is_repeated = ahead.last().is_some_and(|&i| time_s[i] == t);
+            verdicts[k] =
+                Some(if is_repeated { Reason::TimeRepeated } else { Reason::TimeBackwards });
         }
     }
     verdicts
@@ -185,6 +199,52 @@ fn believed(stretches: &[Stretch]) -> Vec<bool> {
         }
     }
     believed
+}
+
+/// One joint's angles without jumps of a turn.
+pub(super) struct Unwrapped {
+    /// Counted from 0.
+    pub(super) joint: usize,
+    /// Of every row, rad.
+    pub(super) q: Vec<f64>,
+}
+
+impl Unwrapped {
+    /// Brings the angles that were asked for into the turn of these; they may be wrapped at other rows, or not at all.
+    pub(super) fn bring_along(&self, target_q: &mut [f64]) {
+        for (target, q) in target_q.iter_mut().zip(&self.q) {
+            *target += TAU * ((q - *target) / TAU).round();
+        }
+    }
+}
+
+/// The joints whose angles jump by one turn between the rows that are left, put together again, and what to say of it.
+pub(super) fn unwrapped(motion: &Motion) -> (Vec<Unwrapped>, Option<LogWarning>) {
+    let mut joints = Vec::new();
+    let mut count = 0;
+    // The first row behind a jump, and its joint.
+    let mut first: Option<(usize, usize)> = None;
+    for joint in 0..motion.q.len() {
+        let jumps: Vec<(usize, f64)> =
+            (1..motion.rows()).filter_map(|k| Some((k, motion.lost_turn(joint, k)?))).collect();
+        let Some(&(earliest, _)) = jumps.first() else { continue };
+        first = first.filter(|&(k, _)| k <= earliest).or(Some((earliest, joint)));
+        count += jumps.len();
+        let mut q = motion.q[joint].clone();
+        let mut turns = 0.0;
+        let mut jumps = jumps.into_iter().peekable();
+        for (k, angle) in q.iter_mut().enumerate() {
+            turns += jumps.next_if(|&(at, _)| at == k).map_or(0.0, |(_, turn)| turn);
+            *angle += turns * TAU;
+        }
+        joints.push(Unwrapped { joint, q });
+    }
+    let warning = first.map(|(k, joint)| LogWarning::Unwrapped {
+        count,
+        after_row: motion.row[k - 1],
+        joint: joint + 1,
+    });
+    (joints, warning)
 }
 
 /// Whether the angles jump between the rows that are left.

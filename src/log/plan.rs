@@ -96,7 +96,7 @@ impl Plan {
             fields.extend(found.map_err(|missing| header.missing(missing))?);
         }
         fields.extend(header.effort()?);
-        for block in Block::ALL.into_iter().skip_while(|&block| block != Block::TargetQ) {
+        for block in Block::OPTIONAL {
             if layout.columns(block).is_some() {
                 fields.extend(header.block(block)?.unwrap_or_default());
             }
@@ -117,6 +117,10 @@ impl Plan {
         };
         let mut fields = Vec::new();
         for &block in &known.blocks {
+            // Torques are taken where both are there.
+            if block == Block::Current && known.blocks.contains(&Block::Torque) {
+                continue;
+            }
             let numbers = layout.columns(block).and_then(Columns::numbers).unwrap_or_default();
             check_joints(block, numbers.len(), joints, file)?;
             fields.extend(numbers.map(|column| Field {

@@ -22,15 +22,18 @@ const WIDTH_ROWS: usize = 50;
 /// Only the columns of the layout are read, row by row; memory is that of the numbers kept, 8 bytes each.
 /// Numbers are converted to SI units. Then, in this order:
 ///
-/// 1. Rows are set aside that have another number of fields than the file, an empty field, text, NaN,
-///    an infinity, or a magnitude beyond: angle and velocity 3.6·10⁵, acceleration 3·10⁴ rad/s²,
+/// 1. Rows are set aside that have another number of fields than the file, or in time, angles, velocities or effort an
+///    empty field, text, NaN, an infinity, or a magnitude beyond: angle and velocity 3.6·10⁵, acceleration 3·10⁴ rad/s²,
 ///    current 500 A, torque 5·10⁴ Nm, temperature 1000 °C, time 10¹⁹ s.
-/// 2. Times must increase: repeated, backward and lone far-ahead times are set aside.
+/// 2. Times must increase: repeated and backward times are set aside, and up to 8 in a row that are far ahead.
 /// 3. Units: Δq is compared with ∫q̇ dt, and the clock with what recorders do. Numbers that say degrees,
 ///    milli-, micro- or nanoseconds are an error that names the layout's remedy.
 /// 4. Angles beyond 1000 rad and velocities beyond 100 rad/s are set aside, and so are rows whose angles
 ///    and velocities do not follow from their neighbours': stretches of fewer than 10 rows, or
 ///    interleaved with a longer one, that no acceleration below 20 rad/s² connects to the rest.
+/// 5. Angles that jump by one turn are unwrapped, and the angles asked for with them.
+/// 6. Targets and temperatures with fields as in 1 in the rows that are left are no part of the log. Nothing is identified
+///    from them, and they cost no rows.
 ///
 /// # Errors
 /// Any [`LogError`] about files, layouts, units and joints; [`LogError::NoUsableRows`] if fewer than two
@@ -206,12 +209,7 @@ impl Table {
         let order = clean::order_of_time(&self.columns[time]);
         self.retain(&order, account, |table, k, _| format!("time {} s", table.columns[time][k]));
         self.require_two(account, file)?;
-        let motion = clean::Motion {
-            time_s: &self.columns[time],
-            q: &self.columns[q.clone()],
-            qd: &self.columns[qd.clone()],
-            row: &self.rows,
-        };
+        let motion = self.motion(plan);
         // Many garbage rows can hide how angles and velocities are related: then they go first.
         let mut related = units::check(&motion, &layout.units);
         if let Err(suspicion) = &related
@@ -231,16 +229,12 @@ impl Table {
             format!("{} = {}", plan.fields[c].place(), table.columns[c][k])
         });
         self.require_two(account, file)?;
-        let motion = clean::Motion {
-            time_s: &self.columns[time],
-            q: &self.columns[q.clone()],
-            qd: &self.columns[qd],
-            row: &self.rows,
-        };
         if related.is_err() {
-            related = units::check(&motion, &layout.units);
+            related = units::check(&self.motion(plan), &layout.units);
         }
         let mut warnings = related.map_err(fault)?;
+        warnings.extend(self.unwrap_angles(plan));
+        let motion = self.motion(plan);
         warnings.extend(clean::jumps(&motion));
         if let Some((missed, warning)) = clean::missed_samples(&motion) {
             account.missed_samples = missed;
@@ -250,7 +244,49 @@ impl Table {
         if set_aside * 10 > account.read {
             warnings.push(LogWarning::ManySetAside { set_aside, read: account.read });
         }
+        warnings.extend(Block::OPTIONAL.into_iter().filter_map(|b| self.left_out(plan, b)));
         Ok(warnings)
+    }
+
+    fn motion(&self, plan: &Plan) -> clean::Motion<'_> {
+        let (time, q, qd) = motion_ranges(plan);
+        clean::Motion {
+            time_s: &self.columns[time],
+            q: &self.columns[q],
+            qd: &self.columns[qd],
+            row: &self.rows,
+        }
+    }
+
+    /// Step 5 of [`read_log`].
+    fn unwrap_angles(&mut self, plan: &Plan) -> Option<LogWarning> {
+        let (_, q, _) = motion_ranges(plan);
+        let (joints, warning) = clean::unwrapped(&self.motion(plan));
+        for unwrapped in joints {
+            if let Some(target_q) = plan.range(Block::TargetQ) {
+                unwrapped.bring_along(&mut self.columns[target_q.start + unwrapped.joint]);
+            }
+            self.columns[q.start + unwrapped.joint] = unwrapped.q;
+        }
+        warning
+    }
+
+    /// Step 6 of [`read_log`]: what to say of an optional block that is not used.
+    fn left_out(&self, plan: &Plan, block: Block) -> Option<LogWarning> {
+        let range = plan.range(block)?;
+        let columns = &self.columns[range.clone()];
+        let first_bad = |values: &Vec<f64>| values.iter().position(|v| v.is_nan());
+        let (k, place) = columns
+            .iter()
+            .zip(range)
+            .filter_map(|(values, place)| Some((first_bad(values)?, place)))
+            .min()?;
+        Some(LogWarning::LeftOut {
+            block: block.key(),
+            fields: columns.iter().flatten().filter(|v| v.is_nan()).count(),
+            first_row: self.rows[k],
+            column: plan.fields[place].place(),
+        })
     }
 
     /// Keeps the rows without a reason against them and counts the others.
@@ -296,7 +332,10 @@ impl Table {
         source: &str,
         sha256: String,
     ) -> Log {
-        let mut signals = |block| plan.range(block).map(|range| self.signals(range));
+        let mut signals = |block| {
+            let range = plan.range(block).filter(|_| self.left_out(plan, block).is_none())?;
+            Some(self.signals(range))
+        };
         let gain = || layout.drive_gain_nm_a.clone();
         let current = |ampere| Effort::Current { ampere, gain_nm_a: gain() };
         // A plan has torques or currents: without either there is no plan.
@@ -338,7 +377,7 @@ fn motion_ranges(plan: &Plan) -> (usize, std::ops::Range<usize>, std::ops::Range
     (range(Block::Time).start, range(Block::Q), range(Block::Qd))
 }
 
-/// One row's numbers in SI units into `values`.
+/// One row's numbers in SI units into `values`; NaN in an optional block where it has none that can be.
 fn parse(plan: &Plan, line: &Line, values: &mut [f64]) -> Result<(), Defect> {
     let mut defect = None;
     let mut count = 0;
@@ -347,15 +386,16 @@ fn parse(plan: &Plan, line: &Line, values: &mut [f64]) -> Result<(), Defect> {
         count += 1;
         last_is_empty = text.is_empty();
         let Some(&Some(place)) = plan.place.get(at) else { continue };
-        match number(text, plan.decimal_comma) {
-            Ok(raw) => {
-                let field = &plan.fields[place];
-                let value = field.factor.map_or(raw, |factor| raw * factor);
-                values[place] = value;
-                if value.abs() > field.block.bound() && defect.is_none() {
-                    defect = Some(Defect { reason: Reason::Implausible, at });
-                }
-            }
+        let field = &plan.fields[place];
+        let value = number(text, plan.decimal_comma)
+            .map(|raw| field.factor.map_or(raw, |factor| raw * factor))
+            .and_then(|value| {
+                let is_plausible = value.abs() <= field.block.bound();
+                if is_plausible { Ok(value) } else { Err(Reason::Implausible) }
+            });
+        match value {
+            Ok(value) => values[place] = value,
+            Err(_) if field.block.is_optional() => values[place] = f64::NAN,
             Err(reason) => defect = defect.or(Some(Defect { reason, at })),
         }
     }

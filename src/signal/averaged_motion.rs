@@ -2,7 +2,7 @@
 
 use crate::robot::JointSignals;
 
-/// One period of a motion with its derivatives, and how noisy the record was.
+/// One period of a motion with its derivatives, and how well they are known.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AveragedMotion {
     /// Joint angles over one period, rad.
@@ -15,12 +15,6 @@ pub struct AveragedMotion {
     pub harmonics: Vec<usize>,
     /// How well the acceleration is known, harmonic by harmonic, per joint.
     pub acceleration: Vec<HarmonicPower>,
-    /// Noise of one raw sample of q, per joint, rad: rms scatter between periods.
-    pub sigma_q_rad: Vec<f64>,
-    /// Noise of one raw sample of q̇, per joint, rad/s.
-    pub sigma_qd_rad_s: Vec<f64>,
-    /// Noise left in `qdd_rad_s2`, per joint, rad/s²: √(Σ 2(hω)⁴ v_h).
-    pub sigma_qdd_rad_s2: Vec<f64>,
 }
 
 /// Mean squares of harmonics 1, 2, … of a joint's averaged acceleration, rad²/s⁴.
@@ -28,6 +22,6 @@ pub struct AveragedMotion {
 pub struct HarmonicPower {
     /// Of the estimate.
     pub estimate: Vec<f64>,
-    /// Of the noise in it.
+    /// Of the noise in it: 2(hω)⁴ v_h.
     pub noise: Vec<f64>,
 }

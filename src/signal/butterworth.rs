@@ -112,24 +112,6 @@ impl ZeroPhase {
         self.rate_hz / PI * warped.atan()
     }
 
-    /// Share of the variance of white noise that passes: (2/f_s) ∫₀^{f_s/2} G² df.
-    ///
-    /// For f_c ≪ f_s this is (2f_c/f_s) · (1 − 1/2n) · (π/2n)/sin(π/2n) with the single-pass
-    /// cutoff f_c. The exact integral is taken here, by the trapezoidal rule in φ with
-    /// Ω/Ω_c = tan φ, in which the integrand is smooth and periodic.
-    pub fn noise_gain(&self) -> f64 {
-        const STEPS: usize = 2000;
-        let c = self.warped_cutoff;
-        let step = 0.5 * PI / STEPS as f64;
-        let integrand = |k: usize| {
-            let t = (k as f64 * step).tan();
-            let g = 1.0 / (1.0 + t.powi(2 * self.order as i32));
-            g * g * c * (1.0 + t * t) / (1.0 + (c * t).powi(2))
-        };
-        let sum: f64 = (1..STEPS).map(integrand).sum::<f64>() + 0.5 * integrand(0);
-        2.0 / PI * step * sum
-    }
-
     /// Samples at each end over which the guess about what lies beyond the record fades to one
     /// percent (slowest pole); what is closer to an end should not be trusted.
     pub fn edge_samples(&self) -> usize {
@@ -188,35 +170,20 @@ mod tests {
     fn constants_and_straight_lines_pass_unchanged() {
         for order in [1, 2, 3, 4, 7] {
             let filter = ZeroPhase::new(3.0, order, 500.0).unwrap();
-            let line: Vec<f64> = (0..500).map(|k| 5.0 - 0.01 * k as f64).collect();
-            let mut x = line.clone();
-            filter.filter_in_place(&mut x, &mut Scratch::default()).unwrap();
             // A line is only kept where the transient of its slope has faded.
             let edge = filter.edge_samples() * 5;
-            for k in edge..500_usize.saturating_sub(edge) {
+            let line: Vec<f64> = (0..2 * edge + 500).map(|k| 5.0 - 0.01 * k as f64).collect();
+            let mut x = line.clone();
+            filter.filter_in_place(&mut x, &mut Scratch::default()).unwrap();
+            let inner = edge..line.len() - edge;
+            assert!(!inner.is_empty());
+            for k in inner {
                 assert!((x[k] - line[k]).abs() < 1e-9, "order {order}, sample {k}");
             }
             let mut constant = vec![-2.5; 200];
             filter.filter_in_place(&mut constant, &mut Scratch::default()).unwrap();
             assert!(constant.iter().all(|y| (y + 2.5).abs() < 1e-9));
         }
-    }
-
-    #[test]
-    fn the_noise_gain_is_the_energy_of_the_impulse_response() {
-        for (cutoff, order) in [(10.0, 2), (10.0, 4), (40.0, 3), (1.0, 5)] {
-            let filter = ZeroPhase::with_single_pass_cutoff(cutoff, order, 125.0).unwrap();
-            let mut x = vec![0.0; 8001];
-            x[4000] = 1.0;
-            filter.filter_in_place(&mut x, &mut Scratch::default()).unwrap();
-            let energy: f64 = x.iter().map(|y| y * y).sum();
-            assert!((energy / filter.noise_gain() - 1.0).abs() < 1e-9, "{cutoff} Hz, {order}");
-        }
-        // The low-frequency limit quoted in the doc: 0.833 of the cutoff for order 2.
-        let slow = ZeroPhase::with_single_pass_cutoff(0.1, 2, 125.0).unwrap();
-        let half = PI / 4.0;
-        let formula = (0.1 / 62.5) * 0.75 * half / half.sin();
-        assert!((slow.noise_gain() / formula - 1.0).abs() < 1e-4);
     }
 
     #[test]

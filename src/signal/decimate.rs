@@ -29,30 +29,11 @@ impl Decimator {
             0 => Err(SignalError::Factor),
             1 => Ok(Self { filter: None, every, rate_hz }),
             _ => {
-                let cutoff_hz = ANTI_ALIAS_SHARE * rate_hz / (2 * every) as f64;
+                let cutoff_hz = ANTI_ALIAS_SHARE * rate_hz / (2.0 * every as f64);
                 let filter = ZeroPhase::new(cutoff_hz, ANTI_ALIAS_ORDER, rate_hz)?;
                 Ok(Self { filter: Some(filter), every, rate_hz })
             }
         }
-    }
-
-    /// Every `every`-th sample behind a low-pass of the caller's choice, whose cutoff must lie
-    /// below the new Nyquist frequency.
-    pub fn with_filter(
-        every: usize,
-        cutoff_hz: f64,
-        order: usize,
-        rate_hz: f64,
-    ) -> Result<Self, SignalError> {
-        if every == 0 {
-            return Err(SignalError::Factor);
-        }
-        let new_rate_hz = checked_rate_hz(rate_hz)? / every as f64;
-        if cutoff_hz >= new_rate_hz / 2.0 {
-            return Err(SignalError::Cutoff { cutoff_hz, rate_hz: new_rate_hz });
-        }
-        let filter = ZeroPhase::new(cutoff_hz, order, rate_hz)?;
-        Ok(Self { filter: Some(filter), every, rate_hz })
     }
 
     /// Rate of the result, Hz.
@@ -119,9 +100,5 @@ mod tests {
         let one = Decimator::new(1, 125.0).unwrap();
         assert_eq!(one.decimate(&x, &mut Scratch::default()).unwrap(), x);
         assert_eq!(Decimator::new(0, 125.0).unwrap_err(), SignalError::Factor);
-        assert!(matches!(
-            Decimator::with_filter(5, 50.0, 2, 500.0),
-            Err(SignalError::Cutoff { rate_hz: 100.0, .. })
-        ));
     }
 }

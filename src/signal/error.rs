@@ -63,6 +63,17 @@ pub enum SignalError {
         /// Its own time, s.
         after_s: f64,
     },
+    /// Time stamps that tell when rows arrived, not when they were measured.
+    #[error(
+        "time stamps come in bursts: most follow each other at {rate_hz:.0} Hz, and yet there are {rows_hz:.0} rows in a \
+         second; log the time at which a row is measured"
+    )]
+    Bursts {
+        /// One over the usual step between time stamps, Hz.
+        rate_hz: f64,
+        /// Rows per second, pauses left out, Hz.
+        rows_hz: f64,
+    },
     /// The longest bridged gap is not a positive time.
     #[error("the longest gap to interpolate across is {limit_s} s; it must be positive")]
     GapLimit {

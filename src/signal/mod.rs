@@ -9,7 +9,7 @@
 //! |---|---|
 //! | remove what is faster than the motion, keep its place in time | [`ZeroPhase`], [`Decimator`] |
 //! | accelerations as the paper makes them | [`PaperDifferentiator`] |
-//! | accelerations of a noise-free log | [`hermite_acceleration`], [`central_4`] |
+//! | derivative of a smooth series | [`central_4`] |
 //! | time stamps jitter, samples are missing | [`Resampler`], [`fill_gaps`] |
 //! | when does the arm move? | [`Activity`] |
 //! | does the motion repeat, and from where to where? | [`find_period`] |
@@ -19,7 +19,6 @@
 //! | how does the power of noise run over frequency? | [`noise_trend`], of several channels [`noise_trends`] |
 //! | is there a bump in coloured noise? | [`MatchedFilter`] |
 //! | how fine is a sensor, and where does it end? | [`quantum`], [`reading_limit`] |
-//! | at which frequencies is there energy? | [`welch`] |
 
 mod activity;
 mod averaged_motion;
@@ -41,13 +40,12 @@ mod readings;
 mod replicates;
 mod resample;
 mod spectra;
-mod spectrum;
 
 pub use activity::Activity;
 pub use averaged_motion::{AveragedMotion, HarmonicPower};
 pub use butterworth::{Scratch, ZeroPhase};
 pub use decimate::Decimator;
-pub use differentiate::{central_2, central_4, hermite_acceleration};
+pub use differentiate::central_4;
 pub use error::SignalError;
 pub use fine_clock::{FineClock, answered};
 pub use gap_filling::{Filled, fill_gaps};
@@ -60,4 +58,3 @@ pub use periodic_fit::{FitScratch, PeriodicFit};
 pub use readings::{quantum, reading_limit};
 pub use replicates::{Replicates, replicate_noise};
 pub use resample::{Gap, Resampler, bridged_gap_s, gaps, natural_rate_hz};
-pub use spectrum::{PowerSpectrum, welch};

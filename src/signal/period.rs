@@ -55,8 +55,6 @@ pub struct Period {
     pub periods: usize,
     /// Samples of the log that hold the whole periods; `periods` × `samples` long.
     pub window: Range<usize>,
-    /// Rms over joints and samples of the difference between neighbouring periods, over √2, rad.
-    pub scatter_rad: f64,
 }
 
 /// Plans and memory of the search, kept from log to log.
@@ -306,15 +304,7 @@ impl<'a> Record<'a> {
         let (refined_samples, scatter_square) = self.refine(&window, lag, periods);
         let slip = (refined_samples - lag as f64).abs() * (periods - 1) as f64;
         let hidden = (scatter_square / self.step_square).sqrt().max(NO_SLIP);
-        let neighbours = mean(&(start..start + pairs_used));
-        Some(Period {
-            samples: lag,
-            refined_samples,
-            is_whole: slip <= hidden,
-            periods,
-            window,
-            scatter_rad: (0.5 * neighbours / self.q_rad.joints() as f64).sqrt(),
-        })
+        Some(Period { samples: lag, refined_samples, is_whole: slip <= hidden, periods, window })
     }
 
     /// Longest run of neighbouring blocks below `limit` that spans a period of difference (hence
@@ -449,7 +439,6 @@ mod tests {
             assert!(found.window.end <= rest + run_in + 10020, "{found:?}");
             if sigma > 0.0 && rest == 0 {
                 assert_eq!(found.periods, 8);
-                assert!((found.scatter_rad / sigma - 1.0).abs() < 0.1, "{found:?}");
             }
         }
     }

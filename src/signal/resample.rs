@@ -31,18 +31,40 @@ pub struct Resampler {
     gaps: Vec<Gap>,
 }
 
-/// The natural rate of a log: one over the median distance of its time stamps, Hz.
+/// Longer steps, in median ones, miss rows.
+const LONGEST_STEP: f64 = 1.8;
+/// Up to this share the median step may be off the mean one: a grid that much faster or slower than its rows takes
+/// nothing from them, and a median is a round number that late rows do not move.
+const TYPICAL_WITHIN: f64 = 0.1;
+/// Samples of a grid per row, at most: more would be made up.
+const MOST_PER_ROW: f64 = 10.0;
+
+/// The natural rate of a log, Hz: one over the median distance of its time stamps, or over the mean distance where the
+/// median is not typical (stamps in whole milliseconds of a log at 400 Hz are 2 and 3 ms apart).
 ///
-/// Errors: fewer than two time stamps, time that does not increase.
+/// Errors: fewer than two time stamps, time that does not increase, time stamps in bursts.
 pub fn natural_rate_hz(time_s: &[f64]) -> Result<f64, SignalError> {
     check_time(time_s)?;
     let mut steps: Vec<f64> = time_s.windows(2).map(|t| t[1] - t[0]).collect();
     let middle = steps.len() / 2;
-    let (_, median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
+    let (_, &mut median_s, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
+    let single = steps.iter().filter(|step_s| **step_s <= LONGEST_STEP * median_s);
+    let (sum_s, count) =
+        single.fold((0.0_f64, 0_usize), |(sum_s, n), step_s| (sum_s + step_s, n + 1));
+    let mean_s = sum_s / count as f64;
+    let is_typical = (mean_s / median_s - 1.0).abs() <= TYPICAL_WITHIN;
+    let step_s = if is_typical { median_s } else { mean_s };
     // Differences of large time stamps carry rounding; no clock is known to more than nine digits.
-    let rate_hz = 1.0 / *median;
+    let rate_hz = 1.0 / step_s;
     let unit = 10f64.powi(rate_hz.log10().floor() as i32 - 8);
-    Ok((rate_hz / unit).round() * unit)
+    let rate_hz = (rate_hz / unit).round() * unit;
+    let longest_s = bridged_gap_s(rate_hz);
+    let covered_s: f64 = steps.iter().map(|step_s| step_s.min(longest_s)).sum();
+    let rows_hz = steps.len() as f64 / covered_s;
+    if rate_hz > MOST_PER_ROW * rows_hz {
+        return Err(SignalError::Bursts { rate_hz, rows_hz });
+    }
+    Ok(rate_hz)
 }
 
 /// The longest gap that is bridged in a log of `rate_hz`, s: ten samples, and in a fast log what ten samples of 125 Hz
@@ -184,6 +206,44 @@ mod tests {
         for (k, v) in grid.instants().linear(&y).unwrap().iter().enumerate() {
             // Time stamps at 838 s are rounded to 1e-13 s.
             assert!((v - y[k]).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn rounded_stamps_and_missing_rows_leave_the_rate() {
+        fn rate(stamps: impl Iterator<Item = f64>) -> f64 {
+            natural_rate_hz(&stamps.collect::<Vec<f64>>()).unwrap()
+        }
+        // 400 Hz in whole milliseconds: 2 and 3 ms, either of which may be the median; with a pause of a second in it.
+        let pause_ms = |k: usize| if k > 600 { 1000.0 } else { 0.0 };
+        let rounded = |k: usize| (2.5 * k as f64 + pause_ms(k)).round() / 1e3;
+        for rows in [1000, 1001] {
+            let found_hz = rate((0..rows).map(rounded));
+            assert!((found_hz / 400.0 - 1.0).abs() < 1e-3, "{rows} rows: {found_hz} Hz");
+        }
+        // Steps of 10, 10 and 12 ms are 10 ms, and those of a log without every fifth row 8 ms.
+        let uneven = |k: usize| 0.01 * k as f64 + 0.002 * (k / 3) as f64;
+        assert!((rate((0..1000).map(uneven)) - 100.0).abs() < 1e-6);
+        let kept = (0..1000).filter(|k| k % 5 != 0);
+        assert!((rate(kept.map(|k| 0.008 * k as f64)) - 125.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn stamps_in_bursts_are_refused_and_pauses_are_not() {
+        // Eight rows at a time, stamped as they are read.
+        let bursts: Vec<f64> =
+            (0..1000).map(|k| 0.064 * (k / 8) as f64 + 5e-6 * (k % 8) as f64).collect();
+        match natural_rate_hz(&bursts) {
+            Err(SignalError::Bursts { rate_hz, rows_hz }) => {
+                assert!((rate_hz / 2e5 - 1.0).abs() < 1e-6, "{rate_hz} Hz");
+                assert!((rows_hz / 125.0 - 1.0).abs() < 0.01, "{rows_hz} Hz");
+            }
+            other => panic!("{other:?}"),
+        }
+        for rate_hz in [125.0, 1000.0] {
+            let stamp = |k: usize| k as f64 / rate_hz + 1000.0 * (k / 100) as f64;
+            let paused: Vec<f64> = (0..1000).map(stamp).collect();
+            assert!((natural_rate_hz(&paused).unwrap() / rate_hz - 1.0).abs() < 1e-6);
         }
     }
 

@@ -96,11 +96,4 @@ impl Spectra {
         let energy = periods * mean.iter().map(|c| c.norm_sqr()).sum::<f64>() / mean.len() as f64;
         energy > band.threshold * self.noise(&band.harmonics)
     }
-
-    /// Rms noise of one sample of a period of `n`: Parseval's sum over all ±h.
-    pub(super) fn sigma(&self, n: usize) -> f64 {
-        let all: f64 = self.scatter.iter().sum::<f64>();
-        let nyquist = if n.is_multiple_of(2) { self.scatter[n / 2] } else { 0.0 };
-        (2.0 * all - self.scatter[0] - nyquist).sqrt()
-    }
 }

@@ -37,11 +37,6 @@ literal = signal.filtfilt([b, -b], a, x)
 low = signal.filtfilt([k / (1.0 + k)] * 2, a, x)
 fourth = (low[:-4] - 8 * low[1:-3] + 8 * low[3:-1] - low[4:]) * RATE / 12.0
 
-welch = []
-for segment in (64, 101):
-    f, p = signal.welch(x, RATE, nperseg=segment)
-    welch.append({"segment": segment, "frequency_hz": list(f), "density": list(p)})
-
 # Jittered time stamps, in steps of 1/1024 s: exact in binary.
 steps = 8 + (np.floor(series(60) * 4) % 5)
 t = np.concatenate([[0.0], np.cumsum(steps)])[:60] / 1024.0
@@ -63,7 +58,6 @@ print(
             "filters": filters,
             "literal": list(literal),
             "intended_interior": list(fourth),
-            "welch": welch,
             "resample": resample,
         }
     )

@@ -34,6 +34,21 @@ impl Block {
         Self::Temperature,
     ];
 
+    /// Those that a log need not have.
+    pub(in crate::log) const OPTIONAL: [Self; 6] = [
+        Self::TargetQ,
+        Self::TargetQd,
+        Self::TargetQdd,
+        Self::TargetCurrent,
+        Self::TargetMoment,
+        Self::Temperature,
+    ];
+
+    /// Whether a log need not have it.
+    pub(in crate::log) fn is_optional(self) -> bool {
+        Self::OPTIONAL.contains(&self)
+    }
+
     /// Its key in a layout file.
     pub(in crate::log) fn key(self) -> &'static str {
         match self {
