@@ -110,6 +110,37 @@ fn nothing_is_named_against_the_simulation_that_made_the_log() {
     assert!(d.causes.is_empty());
     // 52 parameters: the largest of as many |t| stays below 5 with a chance of 10⁻³ at most.
     assert!(d.moved_parameters.iter().all(|m| m.z.abs() < 5.0));
+    assert!(!says_that_contacts_are_not_looked_for(&d), "{:?}", d.warnings);
+}
+
+fn says_that_contacts_are_not_looked_for(d: &Diagnosis) -> bool {
+    d.warnings.iter().any(|warning| warning.starts_with("contacts are not looked for"))
+}
+
+/// Where two periods differ neither is the one that was touched.
+#[test]
+fn of_two_periods_contacts_are_not_looked_for() {
+    let mut run = Run::new(19, 2, "");
+    // Two periods are too few to be found.
+    run.options.period_s = Some(10.0);
+    let d = run.against_nominal();
+    assert!(says_that_contacts_are_not_looked_for(&d), "{:?}", d.warnings);
+}
+
+/// A link that is longer by 5 mm is in the parameters that any fit finds: nothing is added to these that could be worth
+/// something along another log.
+#[test]
+fn what_only_moves_the_parameters_gains_nothing() {
+    let toml = "[[effect]]\nkind = \"link_length\"\njoint = 3\nerror_m = 0.005\n";
+    let (run, other) = (Run::new(20, 4, toml), Run::new(21, 3, toml));
+    let model = Model::new(&run.arm);
+    let nominal = run.set.values(&model.standard_parameters());
+    let held_out = [Validation { measurement: other.measurement(), manufacturer_nm: None }];
+    let mut diagnoser = Diagnoser::new(&run.arm, &model, &run.set, run.options.clone());
+    let finding = diagnoser.diagnose(&run.measurement(), &held_out, Some(&nominal)).unwrap();
+    let d = &finding.diagnosis;
+    assert!(finding.extension.effects.is_empty() && !d.causes.is_empty(), "{:?}", d.sentences);
+    assert!(!d.sentences.iter().any(|s| s.contains("with what is named")), "{:?}", d.sentences);
 }
 
 #[test]

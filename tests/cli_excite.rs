@@ -71,3 +71,26 @@ fn bad_input_is_named_before_the_work() {
     fails("--robot ur5 --out t.json --period-range 1,2,3", "LOW,HIGH");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
+
+/// What a URDF leaves open is said, and what cannot be watched is not promised.
+#[test]
+fn a_robot_without_shapes_has_no_clearance() {
+    let folder = tempfile::tempdir().unwrap();
+    let arm = armid::robot::Arm::built_in("ur5").unwrap();
+    let urdf = armid::robot::export::urdf(&arm, &armid::robot::Frames::default()).unwrap();
+    std::fs::write(folder.path().join("arm.urdf"), &urdf).unwrap();
+    let run = |words: &str, code: i32, expected: &str| {
+        let output = excite(folder.path(), &words.split_whitespace().collect::<Vec<_>>());
+        assert_eq!(output.status.code(), Some(code), "{words}: {}", message(&output));
+        assert!(message(&output).contains(expected), "{words}: {}", message(&output));
+    };
+    let words = "--robot arm.urdf --order 2 --starts 1 --finalists 1 --out t.json";
+    run(&format!("{words} --report t.html"), 0, "the robot has no capsules");
+    let page = std::fs::read_to_string(folder.path().join("t.html")).unwrap();
+    assert!(page.contains("is not watched") && !page.contains("Clearance model"));
+    run(&format!("{words} --box 0.4,-0.5,0,0.9,0.5,0.3"), 1, "--box");
+    let unlimited = urdf.replacen("effort=\"150\"", "effort=\"0\"", 1);
+    assert_ne!(unlimited, urdf);
+    std::fs::write(folder.path().join("arm.urdf"), unlimited).unwrap();
+    run(words, 1, "--noise-nm");
+}

@@ -94,6 +94,23 @@ fn usage_errors_of_the_main_job_exit_with_2() {
     assert_says(&montecarlo(&["merge", "no-folder"]), 1, &["no-folder"]);
 }
 
+/// A run of a few trials that have no place to say more than their number.
+#[test]
+fn the_main_job_writes_what_it_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (toml, markdown) = (path("s.toml"), path("mc.md"));
+    let scenario = include_str!("../sims/default.toml").replace("periods = 8", "periods = 4");
+    std::fs::write(&toml, scenario).unwrap();
+    let words = ["--scenario", &toml, "--trials", "3", "--markdown", &markdown];
+    assert_says(&montecarlo(&words), 0, &["3 trials with an estimate are too few"]);
+    let text = std::fs::read_to_string(&markdown).unwrap();
+    assert!(text.contains("## Parameters") && text.contains("| rv1"), "{text}");
+    // One trial alone has no summary to write.
+    let alone = montecarlo(&["--scenario", &toml, "--trial", "1", "--json", &path("t.json")]);
+    assert_says(&alone, 2, &["--json"]);
+}
+
 #[test]
 fn unknown_keys_of_a_scenario_are_errors_that_name_them() {
     let folder = tempfile::tempdir().unwrap();
@@ -133,6 +150,18 @@ fn a_simulated_log_goes_through_identify_and_the_base_set_is_printed() {
     assert!(z.abs() < 8.0, "z = {z}");
     assert_eq!(result["processing"]["periods"], 4);
     assert!(std::fs::read_to_string(&report).unwrap().contains("Identified parameters"));
+
+    // Another day's log of the same arm beside it: one page, and no word of periods that were averaged.
+    let second = path("second.csv");
+    let words = ["simulate", "--scenario", &toml, "--out", &second, "--trial", "1"];
+    assert_says(&armid(&words), 0, &["samples"]);
+    let both = path("both.html");
+    let words = ["identify", &log, &second, "--robot", "ur5", "--report", &both, "--json", &json];
+    assert_says(&armid(&words), 0, &["2 logs one below the other", "several logs"]);
+    assert!(std::fs::read_to_string(&both).unwrap().contains("Torque along the training log"));
+    let of_both = read(&json);
+    assert_eq!(of_both["samples"].as_u64(), Some(2 * result["samples"].as_u64().unwrap()));
+    assert_says(&armid(&["identify", &log, &log, "--robot", "ur5"]), 1, &["are the same log"]);
     assert_says(
         &armid(&["base", "--robot", "ur5", "--reduced", "paper"]),
         0,

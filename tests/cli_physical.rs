@@ -150,14 +150,16 @@ fn both_formats_are_exported_and_the_urdf_comes_back_with_its_drives() {
     assert!(text.contains("a.drives.toml"), "{text}");
 }
 
-/// URDF in, URDF out: the same links, joints, limits and frames of another identification.
+/// URDF in, URDF out: the same links, joints, limits and frames of another identification. Its arm stands in a world, as
+/// those of ROS do: "base_link" is no root.
 #[test]
 fn a_robot_that_came_as_urdf_leaves_as_urdf() {
     let folder = identified();
     says(&armid(folder, "export result.json --urdf in.urdf"), 0, &[]);
     let with_tool = std::fs::read_to_string(folder.join("in.urdf")).unwrap().replace(
         "</robot>",
-        "<link name=\"tool0\"/><joint name=\"tool\" type=\"fixed\"><origin xyz=\"0 0 0.1\" rpy=\"0 0.5 0\"/>\
+        "<link name=\"world\"/><joint name=\"stand\" type=\"fixed\"><parent link=\"world\"/><child link=\"base_link\"/>\
+         </joint><link name=\"tool0\"/><joint name=\"tool\" type=\"fixed\"><origin xyz=\"0 0 0.1\" rpy=\"0 0.5 0\"/>\
          <parent link=\"wrist_3_link\"/><child link=\"tool0\"/></joint></robot>",
     );
     std::fs::write(folder.join("in.urdf"), with_tool).unwrap();
@@ -168,8 +170,9 @@ fn a_robot_that_came_as_urdf_leaves_as_urdf() {
         |name: &str| read_urdf(&std::fs::read_to_string(folder.join(name)).unwrap(), name).unwrap();
     let (before, after) = (read("in.urdf"), read("out.urdf"));
     assert_eq!(before.arm.name, after.arm.name);
-    assert_eq!(before.frames.len(), 1);
-    for (a, b) in before.frames.iter().zip(&after.frames) {
+    assert_eq!((&*before.frames.root, before.frames.fixed.len()), ("world", 2));
+    assert_eq!(before.frames.root, after.frames.root);
+    for (a, b) in before.frames.fixed.iter().zip(&after.frames.fixed) {
         assert_eq!((&a.name, a.body), (&b.name, b.body));
         assert!((a.placement.rotation - b.placement.rotation).norm() < 1e-14);
         assert!((a.placement.translation_m - b.placement.translation_m).norm() < 1e-15);
@@ -181,6 +184,18 @@ fn a_robot_that_came_as_urdf_leaves_as_urdf() {
     }
     let other = armid(folder, "export in.json --urdf x.urdf --robot ur10e");
     says(&other, 1, &["in.json", "\"ur5\"", "\"ur10e\""]);
+    // Of the same name, and its wrist a centimetre longer.
+    let arm = Arm::built_in("ur5").unwrap();
+    let longer = arm.to_toml().replacen("xyz_m = [-0.39225,", "xyz_m = [-0.40225,", 1);
+    assert_ne!(longer, arm.to_toml());
+    std::fs::write(folder.join("longer.toml"), longer).unwrap();
+    let words = "export result.json --robot longer.toml --urdf x.urdf";
+    says(&armid(folder, words), 1, &["another \"ur5\"", "joint 4", "1.00e-2 m"]);
+    let words = "diagnose log.csv --robot longer.toml --sim result.json";
+    says(&armid(folder, words), 1, &["result.json", "another \"ur5\""]);
+    let words = "diagnose log.csv --robot ur10e --sim quiet.toml";
+    says(&armid(folder, words), 1, &["quiet.toml", "another arm than \"ur10e\""]);
+    assert!(!folder.join("x.urdf").exists());
 }
 
 #[test]

@@ -15,7 +15,7 @@ use std::path::PathBuf;
 
 use armid::dynamics::{Model, ParameterLayout, Workspace, inverse_dynamics, mass_matrix};
 use armid::robot::export::{mjcf, urdf};
-use armid::robot::{Arm, FixedFrame, Placement, read_urdf};
+use armid::robot::{Arm, FixedFrame, Frames, Placement, read_urdf};
 use nalgebra::DMatrix;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -41,9 +41,10 @@ fn arms() -> [Arm; 2] {
     [golden::tilted(), identified]
 }
 
-fn frames() -> Vec<FixedFrame> {
+fn frames() -> Frames {
     let placement = Placement::from_xyz_rpy([0.01, 0.0, 0.1], [0.3, -0.2, 1.0]);
-    vec![FixedFrame { name: "tool0".into(), body: DOF, placement }]
+    let tool = FixedFrame { name: "tool0".into(), body: DOF, placement };
+    Frames { fixed: vec![tool], ..Frames::default() }
 }
 
 struct Golden {
@@ -137,7 +138,7 @@ fn pinocchio_and_mujoco_give_our_torque() {
 fn a_urdf_that_is_read_again_is_the_same_arm() {
     for mut arm in arms() {
         let read = read_urdf(&urdf(&arm, &frames()).unwrap(), "exported.urdf").unwrap();
-        assert_eq!(read.frames.len(), 1);
+        assert_eq!(read.frames.fixed.len(), 1);
         let mut back = read.arm;
         // What a URDF has no place for.
         back.gravity_m_s2 = arm.gravity_m_s2;

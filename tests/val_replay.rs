@@ -117,7 +117,8 @@ impl Bench {
             absorbed: Vec::new(),
         };
         let predict = |effects: Vec<Effect>| {
-            let model = Extension { theta: theta.clone(), answers: Vec::new(), effects };
+            let (theta, instant_s) = (theta.clone(), scene.instant_s());
+            let model = Extension { theta, answers: Vec::new(), instant_s, effects };
             model.torque_nm(&families, &scene, &regression.problem, None)
         };
         let (with, without) = (predict(vec![effect]), predict(Vec::new()));
@@ -211,6 +212,8 @@ fn gears() -> Vec<Case> {
     vec![
         // The family's link swings with the mean of its inertia along the motion.
         case(Kind::Elasticity, 2, (0, 8000.0), &[1.0 / 8000.0], 0.1),
+        // A soft gear has its encoder on the motor as well.
+        case(Kind::Elasticity, 2, (1, 8000.0), &[1.0 / 8000.0], 0.1),
     ]
 }
 

@@ -1,14 +1,15 @@
 //! The arm in a result of `armid identify --physical`.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use thiserror::Error;
 
+use super::robot::{OtherRobot, SavedRobot, load_robot};
 use crate::dynamics::{Model, Parameter, ParameterLayout};
 use crate::report::identify::IDENTIFY_SCHEMA;
 use crate::report::saved::{SavedError, load};
-use crate::robot::{Arm, RobotError};
+use crate::robot::{Arm, Frames, LoadedArm, RobotError};
 
 /// An identified arm.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,6 +18,10 @@ pub struct ArmResult {
     pub arm: Arm,
     /// Constant torque per joint, Nm; an [`Arm`] has no place for it.
     pub offsets_nm: Vec<f64>,
+    /// Named frames on its bodies.
+    pub frames: Frames,
+    /// Files that describe the robot.
+    pub files: Vec<PathBuf>,
 }
 
 /// A result file that holds no arm.
@@ -34,14 +39,12 @@ pub enum ResultError {
         file: String,
     },
     /// The result is about another robot than the one given.
-    #[error("{file}: it is about \"{found}\", not \"{expected}\"")]
+    #[error("{file}: {fault}")]
     OtherRobot {
         /// The file.
         file: String,
-        /// Robot of the result.
-        found: String,
-        /// Robot given.
-        expected: String,
+        /// How it is another.
+        fault: OtherRobot,
     },
     /// A parameter is unknown, missing, twice there or not a number.
     #[error("{file}: standard parameter \"{name}\" {fault}")]
@@ -60,7 +63,8 @@ pub enum ResultError {
 
 #[derive(Deserialize)]
 struct ResultFile {
-    robot: String,
+    #[serde(flatten)]
+    about: SavedRobot,
     standard_parameters: Option<Vec<Value>>,
 }
 
@@ -77,13 +81,12 @@ impl ArmResult {
         let result: ResultFile = load(path, IDENTIFY_SCHEMA)?;
         let values = result.standard_parameters.filter(|values| !values.is_empty());
         let values = values.ok_or_else(|| ResultError::BaseOnly { file: file.clone() })?;
-        let arm = Arm::load(robot.unwrap_or(&result.robot))?;
-        if arm.name != result.robot {
-            let (found, expected) = (result.robot, arm.name);
-            return Err(ResultError::OtherRobot { file, found, expected });
-        }
+        let LoadedArm { arm, frames, files, .. } =
+            load_robot(robot.unwrap_or(&result.about.robot))?;
+        let other = |fault| ResultError::OtherRobot { file: file.clone(), fault };
+        result.about.check(&arm).map_err(other)?;
         let standard = standard(&arm, &values).map_err(|(name, fault)| ResultError::Parameter {
-            file,
+            file: file.clone(),
             name,
             fault,
         })?;
@@ -92,6 +95,8 @@ impl ArmResult {
         Ok(Self {
             offsets_nm: (0..arm.dof()).map(offset).collect(),
             arm: layout.apply(&standard, &arm),
+            frames,
+            files,
         })
     }
 }

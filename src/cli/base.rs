@@ -5,12 +5,13 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
+use super::robot::{inputs, load_robot};
 use super::{CommandResult, Outcome};
 use crate::base::{BaseSet, Parameterisation};
 use crate::output::check_writable;
 use crate::report::json::{Document, Program};
 use crate::report::{Column, Table};
-use crate::robot::Arm;
+use crate::robot::LoadedArm;
 
 /// Print the base parameters of an arm: the combinations that torque can reveal.
 #[derive(Debug, Args)]
@@ -51,10 +52,7 @@ pub fn run(args: &BaseArgs) -> CommandResult {
     if let Some(path) = &args.json {
         check_writable(path)?;
     }
-    let (arm, notices) = Arm::load_with_notices(&args.robot)?;
-    for notice in notices {
-        eprintln!("note: {}: {notice}", args.robot);
-    }
+    let LoadedArm { arm, files, .. } = load_robot(&args.robot)?;
     let parameterisation = match &args.reduced {
         Some(name) => Parameterisation::reduced(name, &arm)?,
         None => Parameterisation::full(arm.dof(), arm.torque_offsets),
@@ -90,7 +88,7 @@ pub fn run(args: &BaseArgs) -> CommandResult {
                 })
                 .collect(),
         };
-        let program = Program::new(std::env::args(), None, Vec::new());
+        let program = Program::new(std::env::args(), None, inputs(&files)?);
         Document { schema: "armid.base/1", program: &program, body: &result }.write(path)?;
     }
     Ok(Outcome::Done)

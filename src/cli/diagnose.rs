@@ -6,18 +6,20 @@ use clap::Args;
 use serde::{Deserialize, Serialize};
 
 use super::identify::{LoadedLog, ProcessingArgs, SourceArgs};
+use super::robot::SavedRobot;
 use super::{CommandResult, Outcome};
 use crate::base::{BaseSet, Parameterisation};
 use crate::diagnose::{DIAGNOSE_SCHEMA, Diagnoser, Diagnosis, Validation};
 use crate::dynamics::Model;
-use crate::log::RowAccount;
 use crate::montecarlo::Scenario;
 use crate::output::check_writable;
 use crate::report::diagnose::{cause_table, held_out_table, limit_table, page};
 use crate::report::identify::IDENTIFY_SCHEMA;
-use crate::report::json::{Document, Program};
+use crate::report::json::{Document, Input, Program};
 use crate::report::replay::table as replay_table;
+use crate::report::rows::{Rows, log_warnings};
 use crate::report::saved::{SavedFault, load};
+use crate::robot::{Arm, Kinematics};
 
 /// Say what the rigid model with linear friction gets wrong along a log, and what explains it.
 #[derive(Debug, Args)]
@@ -56,14 +58,17 @@ pub struct DiagnoseArgs {
 
 /// Runs the command.
 pub fn run(args: &DiagnoseArgs) -> CommandResult {
-    for path in [&args.json, &args.report, &args.extended_scenario].into_iter().flatten() {
+    for path in [&args.json, &args.report].into_iter().flatten() {
         check_writable(path)?;
+    }
+    for path in args.extended_scenario.iter().flat_map(|path| Scenario::files_of(path)) {
+        check_writable(&path)?;
     }
     if args.known_payload_kg.is_some() && args.logs.len() < 2 {
         return Err("--known-payload needs two logs: without the body, and with it".into());
     }
     let options = args.processing.options()?;
-    let arm = args.source.arm()?;
+    let (arm, mut inputs) = args.source.arm()?;
     let set = BaseSet::find(&arm, Parameterisation::full(arm.dof(), arm.torque_offsets))?;
     let model = Model::new(&arm);
     let logs = args.source.read(&arm, &args.logs)?;
@@ -85,16 +90,21 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
         })
         .collect();
     let simulation =
-        args.sim.as_deref().map(|file| simulated_parameters(file, &set)).transpose()?;
+        args.sim.as_deref().map(|file| simulated_parameters(file, (&arm, &set))).transpose()?;
     let mut diagnoser = Diagnoser::new(&arm, &model, &set, options.clone());
     let Some(log) = logs.first() else { return Ok(Outcome::Done) };
     let mut finding =
         diagnoser.diagnose(&log.measurement(), &validations, simulation.as_deref())?;
+    // What fails behind the diagnosis must not take it along: it is told when all else is printed and written.
+    let mut failed = None;
     if let Some(loaded) = logs.get(1) {
         let measurements = (&log.measurement(), &loaded.measurement());
         let payload =
-            diagnoser.payload(&finding, measurements.0, measurements.1, args.known_payload_kg)?;
-        finding.diagnosis.add_payload(payload);
+            diagnoser.payload(&finding, measurements.0, measurements.1, args.known_payload_kg);
+        match payload {
+            Ok(payload) => finding.diagnosis.add_payload(payload),
+            Err(error) => failed = Some(error),
+        }
     }
     if args.replay {
         let logs = 1 + validations.len();
@@ -102,13 +112,8 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
         let replay = diagnoser.replay(&finding, &validations);
         finding.diagnosis.add_replay(replay);
     }
-    if let Some(path) = &args.extended_scenario {
-        let simulation = diagnoser.extended_simulation(&finding)?;
-        let measurement = log.measurement();
-        Scenario::of_diagnosis(&simulation, &finding, &measurement, &set, &options)?.save(path)?;
-        // What was written has to be what a scenario may be.
-        Scenario::load(Some(path))?;
-    }
+    let of_the_logs = logs.iter().chain(&held_out).flat_map(|log| log_warnings(&log.log));
+    finding.diagnosis.warnings.extend(of_the_logs);
     let diagnosis = &finding.diagnosis;
     for sentence in &diagnosis.sentences {
         say!("{sentence}");
@@ -129,20 +134,31 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
     for warning in &diagnosis.warnings {
         say!("note: {warning}");
     }
-    let inputs = logs.iter().chain(&held_out).map(|l: &LoadedLog| l.input.clone()).collect();
+    for file in args.sim.iter() {
+        inputs.push(Input::of(file)?);
+    }
+    inputs.extend(logs.iter().chain(&held_out).map(|l: &LoadedLog| l.input.clone()));
     let program = Program::new(std::env::args(), None, inputs);
     if let Some(path) = &args.json {
-        let body = WithRows { diagnosis, rows: Rows::of(&log.log.rows) };
+        let body = WithRows { diagnosis, rows: Rows::of(&[&log.log]) };
         Document { schema: DIAGNOSE_SCHEMA, program: &program, body: &body }.write(path)?;
-    }
-    if let Some(path) = &args.extended_scenario {
-        say!("scenario: {}", path.display());
     }
     if let Some(path) = &args.report {
         page(&finding, &arm, program)?.write(path)?;
         say!("report: {}", path.display());
     }
-    Ok(Outcome::Done)
+    if let Some(path) = &args.extended_scenario {
+        let simulation = diagnoser.extended_simulation(&finding)?;
+        let measurement = log.measurement();
+        Scenario::of_diagnosis(&simulation, &finding, &measurement, &set, &options)?.save(path)?;
+        // What was written has to be what a scenario may be.
+        Scenario::load(Some(path))?;
+        say!("scenario: {}", path.display());
+    }
+    match failed {
+        Some(error) => Err(error.into()),
+        None => Ok(Outcome::Done),
+    }
 }
 
 /// A mass in kg.
@@ -152,13 +168,22 @@ fn mass(text: &str) -> Result<f64, String> {
     if is_mass { Ok(mass) } else { Err("must be a positive number".into()) }
 }
 
-/// Base parameters of the simulation that `file` describes, in the order of `set`.
+/// Base parameters of the simulation of `arm` that `file` describes, in the order of `set`.
 fn simulated_parameters(
     file: &Path,
-    set: &BaseSet,
+    (arm, set): (&Arm, &BaseSet),
 ) -> Result<Vec<f64>, Box<dyn std::error::Error>> {
     if file.extension().is_some_and(|e| e == "toml") {
         let scenario = Scenario::load(Some(file))?;
+        if let Some(difference) = Kinematics::of(&scenario.arm).difference(arm) {
+            let (file, name) = (file.display(), &arm.name);
+            let message = format!("{file}: it simulates another arm than \"{name}\": {difference}");
+            return Err(message.into());
+        }
+        if !scenario.effects.is_empty() {
+            let file = file.display();
+            eprintln!("note: {file}: its arm alone is compared with, not its [[effect]] tables");
+        }
         return Ok(set.values(&Model::new(&scenario.arm).standard_parameters()));
     }
     let result: IdentifiedParameters =
@@ -166,6 +191,7 @@ fn simulated_parameters(
             SavedFault::Read(_) => error.to_string(),
             fault => not_a_simulation(file, &fault),
         })?;
+    result.about.check(arm).map_err(|other| format!("{}: {other}", file.display()))?;
     (0..set.rank())
         .map(|k| {
             let name = set.name(k);
@@ -188,6 +214,8 @@ fn not_a_simulation(file: &Path, why: &dyn std::fmt::Display) -> String {
 /// What is needed of an identification's JSON.
 #[derive(Deserialize)]
 struct IdentifiedParameters {
+    #[serde(flatten)]
+    about: SavedRobot,
     base_parameters: Vec<IdentifiedParameter>,
 }
 
@@ -205,31 +233,9 @@ struct WithRows<'a> {
     rows: Rows,
 }
 
-#[derive(Serialize)]
-struct Rows {
-    read: usize,
-    used: usize,
-    set_aside: Vec<SetAside>,
-}
-
-#[derive(Serialize)]
-struct SetAside {
-    reason: &'static str,
-    count: usize,
-}
-
-impl Rows {
-    fn of(account: &RowAccount) -> Self {
-        let part = |p: &crate::log::SetAside| SetAside { reason: p.reason.text(), count: p.count };
-        let set_aside = account.set_aside.iter().map(part).collect();
-        Self { read: account.read, used: account.used, set_aside }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::Arm;
 
     /// The JSON of a diagnosis has base parameters as well, but no simulation is described by what is left beside its causes.
     #[test]
@@ -239,7 +245,7 @@ mod tests {
         let file = tempfile::Builder::new().suffix(".json").tempfile().unwrap();
         let diagnosis = r#"{"schema": "armid.diagnose/1", "base_parameters": []}"#;
         std::fs::write(file.path(), diagnosis).unwrap();
-        let error = simulated_parameters(file.path(), &set).unwrap_err().to_string();
+        let error = simulated_parameters(file.path(), (&arm, &set)).unwrap_err().to_string();
         assert!(error.contains("its schema is \"armid.diagnose/1\""), "{error}");
     }
 }

@@ -1,7 +1,7 @@
 //! `armid excite`: design an excitation and write it for people, programs and the robot.
 
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
@@ -10,17 +10,18 @@ use nalgebra::Vector3;
 use serde::Serialize;
 use thiserror::Error as ThisError;
 
+use super::robot::{inputs, load_robot};
 use super::{CommandResult, Outcome, Progress, interrupt_flag, prior};
 use crate::base::{BaseSet, Parameterisation};
 use crate::excitation::design::{
     self, Budget, Criterion, Design, DesignError, Experiment, Specification, Variables,
 };
 use crate::excitation::export::{Playback, urscript, write_csv};
-use crate::excitation::{Requirements, TRAJECTORY_SCHEMA};
+use crate::excitation::{ClearanceModel, Requirements, TRAJECTORY_SCHEMA};
 use crate::output::{check_writable, write_atomically};
-use crate::report::excitation::page;
-use crate::report::json::{Document, Input, Program};
-use crate::robot::{Arm, CellBox, Joint};
+use crate::report::excitation::{NO_CLEARANCE, page};
+use crate::report::json::{Document, Program};
+use crate::robot::{Arm, CellBox, Joint, LoadedArm};
 
 /// Design the motion that tells most about the parameters, inside all limits.
 #[derive(Debug, Args)]
@@ -131,6 +132,12 @@ struct BadOption {
     message: String,
 }
 
+impl BadOption {
+    fn new(option: &'static str, value: impl ToString, message: impl Into<String>) -> Self {
+        Self { option, value: value.to_string(), message: message.into() }
+    }
+}
+
 /// The design block of a trajectory file.
 #[derive(Serialize)]
 struct Record<'a> {
@@ -178,33 +185,45 @@ struct FinalistRecord {
 
 /// Designs, prints what was found, and writes it.
 pub fn run(args: &ExciteArgs) -> CommandResult {
-    let mut arm = Arm::load(&args.robot)?;
+    let LoadedArm { mut arm, files, .. } = load_robot(&args.robot)?;
     for corners in &args.boxes {
         arm.clearance.boxes.push(cell_box(corners)?);
     }
     let arm = arm;
-    let base = BaseSet::find(&arm, Parameterisation::full(arm.dof(), false))?;
+    if ClearanceModel::new(&arm).is_empty() {
+        if !args.boxes.is_empty() {
+            let message = "the robot has no capsules whose distance could be watched: describe them in a .toml";
+            return Err(BadOption::new("box", args.boxes.join(" "), message).into());
+        }
+        eprintln!("note: {}: {NO_CLEARANCE}", args.robot);
+    }
+    let base = BaseSet::find(&arm, Parameterisation::full(arm.dof(), arm.torque_offsets))?;
     let spec = specification(args, &arm, &base)?;
     let outputs =
         [Some(&args.out), args.csv.as_ref(), args.urscript.as_ref(), args.report.as_ref()];
     for path in outputs.into_iter().flatten() {
         check_writable(path)?;
     }
-    let robot_file = Path::new(&args.robot);
-    let read = args.prior.as_deref().into_iter().chain(robot_file.extension().map(|_| robot_file));
-    let inputs = read.map(Input::of).collect::<Result<Vec<_>, _>>()?;
+    let inputs = inputs(files.iter().chain(&args.prior))?;
     let program = Program::new(std::env::args(), Some(args.seed), inputs);
 
     let begun = Instant::now();
     let budget = Budget {
-        deadline: begun.checked_add(Duration::from_secs_f64(args.seconds)),
+        // A time beyond all clocks is none.
+        deadline: Duration::try_from_secs_f64(args.seconds)
+            .ok()
+            .and_then(|time| begun.checked_add(time)),
         stop: interrupt_flag(),
     };
     let rounds = Rounds { criterion: spec.criterion, current: Mutex::new(None) };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.into()).build()?;
     let found = pool.install(|| design::design(&arm, &base, &spec, &budget, &|p| rounds.report(p)));
     let found = match found {
-        Err(e @ (DesignError::Infeasible { .. } | DesignError::CheckFailed { .. })) => {
+        Err(
+            e @ (DesignError::Infeasible { .. }
+            | DesignError::OutOfTime { .. }
+            | DesignError::CheckFailed { .. }),
+        ) => {
             eprintln!("no design: {e}; nothing was written");
             return Ok(Outcome::Negative);
         }
@@ -222,34 +241,26 @@ fn specification(
     base: &BaseSet,
 ) -> Result<Specification, Box<dyn Error>> {
     if !(args.seconds > 0.0 && args.seconds.is_finite()) {
-        return Err(BadOption {
-            option: "seconds",
-            value: args.seconds.to_string(),
-            message: "must be positive".into(),
-        }
-        .into());
+        return Err(BadOption::new("seconds", args.seconds, "must be positive").into());
     }
     if !(args.speed > 0.0 && args.speed <= 1.0) {
-        return Err(BadOption {
-            option: "speed",
-            value: args.speed.to_string(),
-            message: "must be in (0, 1]".into(),
-        }
-        .into());
+        return Err(BadOption::new("speed", args.speed, "must be in (0, 1]").into());
     }
     let period_range_s = match args.period_range.as_deref() {
         None => None,
         Some([low, high]) => Some([*low, *high]),
         Some(other) => {
-            return Err(BadOption {
-                option: "period-range",
-                value: format!("{other:?}"),
-                message: "two numbers LOW,HIGH are expected".into(),
-            }
-            .into());
+            let message = "two numbers LOW,HIGH are expected";
+            return Err(BadOption::new("period-range", format!("{other:?}"), message).into());
         }
     };
     let noise_of_limit = |j: &Joint| 0.006 * j.limits.torque_nm;
+    let unlimited = arm.joints.iter().find(|joint| joint.limits.torque_nm.is_infinite());
+    if let (None, Some(joint)) = (&args.noise_nm, unlimited) {
+        let message =
+            format!("joint \"{}\" has no torque limit to guess the noise from", joint.name);
+        return Err(BadOption::new("noise-nm", "(not given)", message).into());
+    }
     let spec = Specification {
         criterion: args.criterion.into(),
         variables: Variables {
@@ -295,11 +306,7 @@ fn cell_box(corners: &str) -> Result<CellBox, BadOption> {
             let (a, b) = (Vector3::new(x0, y0, z0), Vector3::new(x1, y1, z1));
             Ok(CellBox { low_m: a.inf(&b), high_m: a.sup(&b) })
         }
-        _ => Err(BadOption {
-            option: "box",
-            value: corners.to_owned(),
-            message: "six numbers X0,Y0,Z0,X1,Y1,Z1 are expected".into(),
-        }),
+        _ => Err(BadOption::new("box", corners, "six numbers X0,Y0,Z0,X1,Y1,Z1 are expected")),
     }
 }
 
@@ -309,10 +316,9 @@ fn offsets(list: Option<&str>, dof: usize) -> Result<Vec<Option<f64>>, BadOption
     list.split(',')
         .map(|word| match word.trim() {
             "free" => Ok(None),
-            number => number.parse().map(Some).map_err(|_| BadOption {
-                option: "offsets",
-                value: list.to_owned(),
-                message: format!("\"{number}\" is neither a number nor `free`"),
+            number => number.parse().map(Some).map_err(|_| {
+                let message = format!("\"{number}\" is neither a number nor `free`");
+                BadOption::new("offsets", list, message)
             }),
         })
         .collect()

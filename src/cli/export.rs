@@ -8,7 +8,6 @@ use super::arm_result::ArmResult;
 use super::{CommandResult, Outcome};
 use crate::output::{check_writable, write_atomically};
 use crate::robot::export::{drive_file, mjcf, urdf};
-use crate::robot::{FixedFrame, UrdfArm, read_urdf};
 
 /// Write an identified arm as URDF or MJCF.
 #[derive(Debug, Args)]
@@ -32,8 +31,8 @@ pub fn run(args: &ExportArgs) -> CommandResult {
     for path in [&args.urdf, &drives, &args.mjcf].into_iter().flatten() {
         check_writable(path)?;
     }
-    let ArmResult { arm, offsets_nm } = ArmResult::load(&args.result, args.robot.as_deref())?;
-    let frames = frames(args.robot.as_deref())?;
+    let ArmResult { arm, offsets_nm, frames, .. } =
+        ArmResult::load(&args.result, args.robot.as_deref())?;
     let write = |path: &Path, text: &str| -> Result<(), crate::output::OutputError> {
         write_atomically(path, |file| file.write_all(text.as_bytes()))?;
         say!("{}", path.display());
@@ -52,11 +51,4 @@ pub fn run(args: &ExportArgs) -> CommandResult {
         }
     }
     Ok(Outcome::Done)
-}
-
-/// Named frames of a robot that came as a URDF.
-fn frames(robot: Option<&str>) -> Result<Vec<FixedFrame>, Box<dyn std::error::Error>> {
-    let Some(file) = robot.filter(|name| name.ends_with(".urdf")) else { return Ok(Vec::new()) };
-    let UrdfArm { frames, .. } = read_urdf(&std::fs::read_to_string(file)?, file)?;
-    Ok(frames)
 }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::robot::{inputs, load_robot};
 use super::{CommandResult, Outcome};
 use crate::base::{BaseSet, Parameterisation};
 use crate::dynamics::Model;
@@ -20,7 +21,7 @@ use crate::report::identify::{
     parameter_table, residual_table,
 };
 use crate::report::json::{Document, Input, Program};
-use crate::robot::{Arm, JointSignals};
+use crate::robot::{Arm, JointSignals, LoadedArm};
 
 /// Identify the base parameters of an arm from logs of its motion.
 #[derive(Debug, Args)]
@@ -135,13 +136,13 @@ impl LoadedLog {
 }
 
 impl SourceArgs {
-    /// The arm; what was assumed about it goes to the terminal.
-    pub fn arm(&self) -> Result<Arm, crate::robot::RobotError> {
-        let (arm, notices) = Arm::load_with_notices(&self.robot)?;
-        for notice in notices {
-            eprintln!("note: {}: {notice}", self.robot);
-        }
-        Ok(arm)
+    /// The arm, and the files that say what it is and how its logs are read; what was assumed about it goes to the
+    /// terminal.
+    pub fn arm(&self) -> Result<(Arm, Vec<Input>), Box<dyn std::error::Error>> {
+        let LoadedArm { arm, mut files, .. } = load_robot(&self.robot)?;
+        let layout = Path::new(&self.layout);
+        files.extend(layout.extension().map(|_| layout.to_owned()));
+        Ok((arm, inputs(&files)?))
     }
 
     /// Reads logs and prints what became of their rows.
@@ -168,7 +169,7 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         check_writable(path)?;
     }
     let options = args.processing.options()?;
-    let arm = args.source.arm()?;
+    let (arm, mut inputs) = args.source.arm()?;
     let parameterisation = match &args.reduced {
         Some(name) => Parameterisation::reduced(name, &arm)?,
         None => Parameterisation::full(arm.dof(), arm.torque_offsets),
@@ -177,6 +178,15 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
     let model = Model::new(&arm);
     let logs = args.source.read(&arm, &args.logs)?;
     let validation_logs = args.source.read(&arm, &args.validate)?;
+    for (k, log) in logs.iter().enumerate() {
+        if let Some(same) = logs[..k].iter().find(|l| l.input.sha256 == log.input.sha256) {
+            let [one, other] = [same, log].map(|l| l.input.path.display());
+            return Err(format!(
+                "{one} and {other} are the same log: counted twice, it would claim to know more than it does"
+            )
+            .into());
+        }
+    }
     for validation in &validation_logs {
         if let Some(same) = logs.iter().find(|l| l.input.sha256 == validation.input.sha256) {
             return Err(format!(
@@ -194,7 +204,7 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         .map(|log| identifier.regression(&log.measurement()))
         .collect::<Result<_, _>>()?;
     let regression = Regression::joined(regressions)?;
-    let inputs = logs.iter().chain(&validation_logs).map(|l| l.input.clone()).collect();
+    inputs.extend(logs.iter().chain(&validation_logs).map(|l| l.input.clone()));
     let program = Program::new(std::env::args(), None, inputs);
     let logs: Vec<&Log> = logs.iter().map(|l| &l.log).collect();
     let identification = match identifier.identify_regression(&regression) {
@@ -279,5 +289,5 @@ fn validate(
         }
         None => None,
     };
-    Ok(Validation::new(Path::new(&log.log.source), &regression, manufacturer.as_ref(), theta))
+    Ok(Validation::new(&log.log, &regression, manufacturer.as_ref(), theta))
 }

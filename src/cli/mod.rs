@@ -18,6 +18,7 @@ pub mod export;
 pub mod identify;
 pub mod montecarlo;
 mod prior;
+mod robot;
 pub mod simulate;
 pub mod study;
 mod study_cutoff;
@@ -39,6 +40,8 @@ pub enum Outcome {
     Done,
     /// It ran, outputs are written, and the answer is no: exit code 3.
     Negative,
+    /// Ctrl-C ended it before all was done; outputs are of what was: exit code 130, the shell's for that signal.
+    Interrupted,
 }
 
 /// Whatever went wrong, already in words for the user.
@@ -49,6 +52,7 @@ pub fn exit_code(result: CommandResult) -> ExitCode {
     match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::Negative) => ExitCode::from(3),
+        Ok(Outcome::Interrupted) => ExitCode::from(130),
         Err(error) => {
             eprintln!("error: {error}");
             ExitCode::FAILURE

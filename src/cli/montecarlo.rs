@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use clap::{Args, Parser, Subcommand};
 
+use super::robot::inputs;
 use super::{CommandResult, Outcome, Progress, interrupt_flag, threads_or_all};
 use crate::montecarlo::blind::{Benchmark, BlindContent, SCORES_SCHEMA, Scores};
 use crate::montecarlo::calibration::Verdict;
@@ -18,7 +19,9 @@ use crate::montecarlo::{Estimation, Experiment, Job, SUMMARY_SCHEMA, Summary};
 use crate::output::{check_writable, write_atomically};
 use crate::report::blind;
 use crate::report::json::{Document, Input, Program};
-use crate::report::montecarlo::{check_table, efficiency_sentence, page, parameter_table};
+use crate::report::montecarlo::{
+    check_table, efficiency_sentence, markdown, page, parameter_table,
+};
 
 /// Simulate an arm with a known truth, identify it from noisy logs thousands of times, and check
 /// that the predicted uncertainty is true.
@@ -52,7 +55,7 @@ struct RunArgs {
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
     trials: Option<u64>,
     /// Run this one trial alone (from 0) and print its estimates.
-    #[arg(long, conflicts_with_all = ["shard", "out", "resume"])]
+    #[arg(long, conflicts_with_all = ["shard", "out", "resume", "json", "report", "markdown"])]
     trial: Option<u64>,
     /// Seed instead of the scenario's.
     #[arg(long)]
@@ -81,7 +84,7 @@ struct OutputArgs {
     /// Write the report as one HTML page.
     #[arg(long)]
     report: Option<PathBuf>,
-    /// Write the report of a blind benchmark as Markdown.
+    /// Write the report as Markdown.
     #[arg(long)]
     markdown: Option<PathBuf>,
 }
@@ -120,7 +123,7 @@ pub fn run(command: Command) -> CommandResult {
 fn run_merge(folders: &[PathBuf], output: &OutputArgs) -> CommandResult {
     output.check()?;
     let files = shard_files(folders)?;
-    let inputs = files.iter().map(|file| Input::of(file)).collect::<Result<Vec<_>, _>>()?;
+    let inputs = inputs(&files)?;
     let schema = files.first().map(|file| schema_of(file)).transpose()?;
     if schema.as_deref() == Some(BlindContent::SCHEMA) {
         let merged = merge(load_all::<BlindContent>(&files)?)?;
@@ -132,12 +135,9 @@ fn run_merge(folders: &[PathBuf], output: &OutputArgs) -> CommandResult {
 
 fn run_trials(args: &RunArgs) -> CommandResult {
     args.output.check()?;
-    let mut inputs = Vec::new();
-    if let Some(file) = &args.scenario {
-        inputs.push(Input::of(file)?);
-    }
     let mut job = Job::load(args.scenario.as_deref())?;
     let scenario = job.scenario_mut();
+    let inputs = inputs(args.scenario.iter().chain(&scenario.files))?;
     scenario.seed = args.seed.unwrap_or(scenario.seed);
     eprintln!("{}: {}", scenario.name, scenario.description);
     eprintln!(
@@ -152,7 +152,8 @@ fn run_trials(args: &RunArgs) -> CommandResult {
                 return replay(&experiment, trial);
             }
             let (merged, wall_s) = run_all(&experiment, args)?;
-            conclude(&merged, wall_s, inputs, &args.output)
+            let outcome = conclude(&merged, wall_s, inputs, &args.output)?;
+            Ok(unless_interrupted(outcome, &merged))
         }
         Job::Blind(plan) => {
             let benchmark = Benchmark::prepare(*plan)?;
@@ -160,9 +161,15 @@ fn run_trials(args: &RunArgs) -> CommandResult {
                 return replay_blind(&benchmark, trial);
             }
             let (merged, _) = run_all(&benchmark, args)?;
-            conclude_blind(&merged, inputs, &args.output)
+            let outcome = conclude_blind(&merged, inputs, &args.output)?;
+            Ok(unless_interrupted(outcome, &merged))
         }
     }
+}
+
+/// What is said of a part of the trials is not the answer: whatever started the run has to go on with it.
+fn unless_interrupted<C: Content>(outcome: Outcome, merged: &Merged<C>) -> Outcome {
+    if merged.missing.is_empty() { outcome } else { Outcome::Interrupted }
 }
 
 /// Something with the wall time that it took, s.
@@ -259,6 +266,9 @@ fn conclude(
     if let Some(path) = &output.json {
         let document = Document { schema: SUMMARY_SCHEMA, program: &program, body: &summary };
         write_text(path, &document.to_json()?)?;
+    }
+    if let Some(path) = &output.markdown {
+        write_text(path, &markdown(&summary, &program.command))?;
     }
     if let Some(path) = &output.report {
         write_text(path, &page(&summary, merged, program)?.to_html()?)?;

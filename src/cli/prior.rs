@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
+use super::robot::SavedRobot;
 use crate::base::BaseSet;
 use crate::excitation::design::DesignError;
 use crate::report::identify::IDENTIFY_SCHEMA;
@@ -13,7 +14,8 @@ use crate::robot::Arm;
 /// The part of a result file that is read; its other fields are for others.
 #[derive(Deserialize)]
 struct ResultFile {
-    robot: String,
+    #[serde(flatten)]
+    about: SavedRobot,
     base_parameters: Vec<Known>,
 }
 
@@ -29,9 +31,7 @@ pub fn sigmas(path: &Path, arm: &Arm, base: &BaseSet) -> Result<Vec<f64>, Design
     let fault = |message: String| DesignError::Prior { file: file.clone(), message };
     let result: ResultFile =
         load(path, IDENTIFY_SCHEMA).map_err(|error| fault(error.fault.to_string()))?;
-    if result.robot != arm.name {
-        return Err(fault(format!("it is about \"{}\", not \"{}\"", result.robot, arm.name)));
-    }
+    result.about.check(arm).map_err(|other| fault(other.to_string()))?;
     let mut sigma = vec![f64::INFINITY; base.rank()];
     let mut used = 0;
     for (k, sigma) in sigma.iter_mut().enumerate() {

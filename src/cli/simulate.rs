@@ -6,6 +6,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::arm_result::ArmResult;
+use super::robot::inputs;
 use super::{CommandResult, Outcome};
 use crate::dynamics::Model;
 use crate::dynamics::ParameterLayout;
@@ -14,7 +15,7 @@ use crate::montecarlo::{EffectSize, Scenario, Simulation};
 use crate::output::check_writable;
 use crate::plant::SensorConfig;
 use crate::plant::faults::Effect;
-use crate::report::json::{Document, Input, Program};
+use crate::report::json::{Document, Program};
 
 /// Simulate one trial of a scenario and write its log.
 #[derive(Debug, Args)]
@@ -84,8 +85,10 @@ pub fn run(args: &SimulateArgs) -> CommandResult {
         check_writable(path)?;
     }
     let mut scenario = Scenario::load(args.scenario.as_deref())?;
+    let mut robot_files = Vec::new();
     if let Some(path) = &args.arm {
-        let ArmResult { arm, offsets_nm } = ArmResult::load(path, args.robot.as_deref())?;
+        let ArmResult { arm, offsets_nm, files, .. } =
+            ArmResult::load(path, args.robot.as_deref())?;
         if arm.dof() != scenario.arm.dof() {
             let (found, expected) = (arm.dof(), scenario.arm.dof());
             let file = path.display();
@@ -95,6 +98,7 @@ pub fn run(args: &SimulateArgs) -> CommandResult {
             eprintln!("note: the plant has no torque offsets; left out: {offsets_nm:?} Nm");
         }
         scenario.arm = arm;
+        robot_files = files;
     }
     let simulation = Simulation::run(scenario)?;
     let measured = simulation.log(args.trial)?;
@@ -130,8 +134,9 @@ pub fn run(args: &SimulateArgs) -> CommandResult {
             lambda: size.map(|s| s.lambda),
             lambda_sim: size.map(|s| s.lambda_sim),
         };
-        let files = args.scenario.iter().chain(&args.arm);
-        let inputs = files.map(|file| Input::of(file)).collect::<Result<_, _>>()?;
+        let inputs = inputs(
+            args.scenario.iter().chain(&args.arm).chain(&scenario.files).chain(&robot_files),
+        )?;
         let program = Program::new(std::env::args(), Some(scenario.seed), inputs);
         Document { schema: "armid.truth/1", program: &program, body: &truth }.write(path)?;
     }

@@ -65,7 +65,7 @@ pub(super) fn run(args: &RealArmArgs) -> CommandResult {
     let inside = args.data.join("ur10e");
     let folder = if inside.is_dir() { inside } else { args.data.clone() };
     let sources = LAYOUTS.map(|layout| SourceArgs { robot: "ur10e".into(), layout: layout.into() });
-    let arm = sources[0].arm()?;
+    let (arm, _) = sources[0].arm()?;
     let set = BaseSet::find(&arm, Parameterisation::full(arm.dof(), arm.torque_offsets))?;
     let model = Model::new(&arm);
     let read = |source: &SourceArgs, file: &str| -> Result<LoadedLog, Box<dyn std::error::Error>> {

@@ -24,19 +24,22 @@ use crate::robot::{Arm, JointSignals};
 
 /// Changes at most.
 const MOST_CHANGES: usize = 8;
+/// Rounds in which one is added and others are removed: two may replace each other for ever.
+const ROUNDS: usize = 2 * MOST_CHANGES;
 /// Alternatives that are reported.
 const RIVALS: usize = 5;
 /// Steps of the numerical derivatives: small against what matters, large against rounding.
 const LENGTH_STEP_M: f64 = 1e-4;
 const GRAVITY_STEP: f64 = 1e-4;
 
-/// Physical parameters of coefficients.
-type Quantities<'a> = Box<dyn Fn(&[f64]) -> Vec<Quantity> + 'a>;
+/// Physical parameters of coefficients, as far as the data tell these.
+type Quantities<'a> = Box<dyn Fn(&[Option<f64>]) -> Vec<Quantity> + 'a>;
 
 /// A change that may have moved the parameters.
 struct Change<'a> {
     kind: Kind,
     site: Option<usize>,
+    /// By coefficient; zero where it moves nothing.
     images: Vec<Image>,
     quantities: Quantities<'a>,
     in_words: &'static str,
@@ -79,14 +82,16 @@ pub fn explain(study: &Study, set: &BaseSet, simulation: &[f64], accepted: &[&En
         let place = (study.families[entry.family].kind(), entry.site);
         changes.iter().any(|c| (c.kind, c.site) == place)
     };
-    let mut nuisance = Span::default();
-    for image in accepted.iter().filter(|e| !is_change(e)).flat_map(|e| &e.images) {
+    let beside: Vec<&Entry> = accepted.iter().filter(|e| !is_change(e)).copied().collect();
+    let mut span = study.span_of_all(&beside);
+    // How its drives answer friction no simulation says, and the residual holds it.
+    let mut nuisance = span.clone();
+    for image in &study.null_columns[study.base_count()..] {
         nuisance.push(image);
     }
     let places = places(&changes);
     let search = Search { study, changes, places, nuisance, residual };
     let taken = search.select();
-    let mut span = search.nuisance.clone();
     let images = taken.iter().flat_map(|&c| &search.changes[c].images);
     for image in images.filter_map(|image| study.outside_null(image.clone())) {
         span.push(&image);
@@ -121,7 +126,10 @@ impl Search<'_> {
         let significant =
             |s: &Scored| s.evidence > 0.0 && s.probability * self.places[s.change] < chance::CHANGE;
         let mut taken: Vec<usize> = Vec::new();
-        while taken.len() < MOST_CHANGES {
+        for _ in 0..ROUNDS {
+            if taken.len() == MOST_CHANGES {
+                break;
+            }
             let Some(best) = self.scored(&taken).into_iter().find(significant) else { break };
             taken.push(best.change);
             let mut c = 0;
@@ -148,8 +156,7 @@ impl Search<'_> {
             .map(|c| {
                 let site = self.changes[c].site;
                 let span = Span::outside(&others, &self.changes[c].images);
-                let rows = rest.mean.len();
-                let price = study.statistic.coefficients_price(span.len(), site, rows)
+                let price = study.statistic.coefficients_price(span.len(), site)
                     + 2.0 * self.places[c].ln();
                 Scored {
                     change: c,
@@ -179,7 +186,7 @@ impl Search<'_> {
         let change = &self.changes[taken[index]];
         let rest = without(taken, index);
         let (others, left) = self.outside(&rest);
-        let span = Span::outside(&others, &change.images);
+        let (span, places) = Span::telling(&others, &change.images);
         let b = span.solve(&left);
         let covariance = study.statistic.covariance(&span, &left);
         let scored = self.scored(&rest);
@@ -217,7 +224,7 @@ impl Search<'_> {
             separating_experiment: (!class.is_empty()).then(|| separating_experiment(change.kind)),
             class,
             confidence: probability_of_class(evidence, &evidences, &alike),
-            parameters: estimates(change, &b, &covariance, quantile),
+            parameters: estimates(change, (&b, &places), &covariance, quantile),
             gain_fraction: None,
             strength: study.statistic.lambda(&span, &left, gain).max(0.0).sqrt(),
             in_words: change.in_words.to_owned(),
@@ -254,16 +261,15 @@ fn changes<'a>(study: &'a Study<'a>, set: &BaseSet, simulation: &[f64]) -> Vec<C
     let mut out = vec![Change {
         kind: Kind::Payload,
         site: None,
-        images: (0..10).filter_map(|k| image(Parameter::Body(last, k))).collect(),
+        images: (0..10).map(|k| image(Parameter::Body(last, k))).collect(),
         quantities: Box::new(payload),
         in_words: "a body on the flange",
     }];
     for j in 0..joints {
-        let images = [Parameter::Coulomb(j), Parameter::Viscous(j)].map(image);
         out.push(Change {
             kind: Kind::FrictionChange,
             site: Some(j),
-            images: images.into_iter().flatten().collect(),
+            images: [Parameter::Coulomb(j), Parameter::Viscous(j)].map(image).into(),
             quantities: Box::new(friction),
             in_words: "friction that is not what the simulation assumes",
         });
@@ -271,7 +277,7 @@ fn changes<'a>(study: &'a Study<'a>, set: &BaseSet, simulation: &[f64]) -> Vec<C
             kind: Kind::TorqueGain,
             site: Some(j),
             images: vec![study.torque_on(j, simulation)],
-            quantities: Box::new(|b| vec![quantity("error_fraction", b[0], "")]),
+            quantities: Box::new(|b| told("error_fraction", b[0], "")),
             in_words: "a wrong torque constant",
         });
         let length_m = scene.arm.joints[j].placement.translation_m.norm();
@@ -280,7 +286,7 @@ fn changes<'a>(study: &'a Study<'a>, set: &BaseSet, simulation: &[f64]) -> Vec<C
                 kind: Kind::LinkLength,
                 site: Some(j),
                 images: vec![study.whitening.image(&longer(study, j))],
-                quantities: Box::new(|b| vec![quantity("error_m", b[0], "m")]),
+                quantities: Box::new(|b| told("error_m", b[0], "m")),
                 in_words: "a link that is longer or shorter than drawn",
             });
         }
@@ -293,7 +299,7 @@ fn changes<'a>(study: &'a Study<'a>, set: &BaseSet, simulation: &[f64]) -> Vec<C
             site: None,
             images: vec![study.whitening.image(&heavier)],
             quantities: Box::new(move |b| {
-                vec![quantity("g_m_s2", gravity_m_s2 * (1.0 + b[0]), "m/s²")]
+                told("g_m_s2", b[0].map(|b| gravity_m_s2 * (1.0 + b)), "m/s²")
             }),
             in_words: "another gravity than the simulation's",
         });
@@ -309,7 +315,8 @@ fn changes<'a>(study: &'a Study<'a>, set: &BaseSet, simulation: &[f64]) -> Vec<C
             );
         }
     }
-    out.retain(|change| change.images.iter().any(|i| i.square() > 0.0));
+    let is_looked_at = |site: Option<usize>| site.is_none_or(|j| !study.left_out.contains(&j));
+    out.retain(|c| is_looked_at(c.site) && c.images.iter().any(|i| i.square() > 0.0));
     out
 }
 
@@ -327,7 +334,7 @@ fn of_family<'a>(
         kind: family.kind(),
         site,
         images: columns.iter().map(|c| study.whitening.image(c)).collect(),
-        quantities: Box::new(move |b| family.quantities(scene, site, shape, b)),
+        quantities: Box::new(move |b| of_told(b, |b| family.quantities(scene, site, shape, b))),
         in_words: family.in_words(),
     }
 }
@@ -348,18 +355,12 @@ fn with_arm(study: &Study, step: f64, change: impl Fn(&mut Arm)) -> Column {
     Column::everywhere(&torque_nm).scaled(1.0 / step)
 }
 
-/// Σ b_k column_k; `None` if every b_k is zero.
-fn combined(columns: &[Image], b: &[f64]) -> Option<Image> {
-    let mut sum: Option<Image> = None;
+/// Σ b_k column_k.
+fn combined(columns: &[Image], b: &[f64]) -> Image {
+    let mut sum = columns.first().cloned().unwrap_or_default();
+    sum.scale(0.0);
     for (column, &b) in columns.iter().zip(b).filter(|(_, b)| **b != 0.0) {
-        match &mut sum {
-            Some(sum) => sum.add(b, column),
-            None => {
-                let mut first = column.clone();
-                first.scale(b);
-                sum = Some(first);
-            }
-        }
+        sum.add(b, column);
     }
     sum
 }
@@ -375,41 +376,64 @@ fn separating_experiment(kind: Kind) -> &'static str {
     }
 }
 
-fn quantity(name: &'static str, value: f64, unit: &'static str) -> Quantity {
-    Quantity { name, value, unit }
+/// The quantity of a coefficient; none where the data do not tell that.
+fn told(name: &'static str, value: Option<f64>, unit: &'static str) -> Vec<Quantity> {
+    value.map(|value| Quantity { name, value, unit }).into_iter().collect()
 }
 
-fn payload(b: &[f64]) -> Vec<Quantity> {
-    let m = b[0];
-    let com = |axis: usize| b.get(axis).copied().unwrap_or(0.0) / m;
-    vec![
-        quantity("mass_kg", m, "kg"),
-        quantity("com_x_m", com(1), "m"),
-        quantity("com_y_m", com(2), "m"),
-        quantity("com_z_m", com(3), "m"),
-    ]
+/// A body by its mass and where that sits, or by its first moments where no mass is told.
+fn payload(b: &[Option<f64>]) -> Vec<Quantity> {
+    let (mass_kg, first_moment_kg_m) = (b[0], &b[1..4]);
+    let names = match mass_kg {
+        Some(_) => ["com_x_m", "com_y_m", "com_z_m"],
+        None => ["moment_x_kg_m", "moment_y_kg_m", "moment_z_kg_m"],
+    };
+    let mut out = told("mass_kg", mass_kg, "kg");
+    for (name, moment) in names.into_iter().zip(first_moment_kg_m) {
+        out.extend(match mass_kg {
+            Some(mass_kg) => told(name, moment.map(|moment| moment / mass_kg), "m"),
+            None => told(name, *moment, "kg m"),
+        });
+    }
+    out
 }
 
-fn friction(b: &[f64]) -> Vec<Quantity> {
-    let viscous = b.get(1).copied().unwrap_or(0.0);
-    vec![quantity("coulomb_nm", b[0], "Nm"), quantity("viscous_nm_s_rad", viscous, "Nm s/rad")]
+fn friction(b: &[Option<f64>]) -> Vec<Quantity> {
+    let both = [told("coulomb_nm", b[0], "Nm"), told("viscous_nm_s_rad", b[1], "Nm s/rad")];
+    both.into_iter().flatten().collect()
 }
 
-/// Quantities of coefficients `b` with 95 % intervals by the delta method.
+/// The `quantities` of a family as far as its coefficients `b` are told.
+fn of_told(b: &[Option<f64>], quantities: impl Fn(&[f64]) -> Vec<Quantity>) -> Vec<Quantity> {
+    // What stands last goes with what stands before it where it is not told.
+    let Some(last) = b.iter().rposition(Option::is_some) else { return Vec::new() };
+    let b: Vec<f64> = b[..=last].iter().map(|b| b.unwrap_or(f64::NAN)).collect();
+    quantities(&b).into_iter().filter(|quantity| !quantity.value.is_nan()).collect()
+}
+
+/// Quantities of the coefficients `b` with 95 % intervals by the delta method; of each its place in the change, and whether
+/// it is told.
 fn estimates(
     change: &Change,
-    b: &[f64],
+    (b, places): (&[f64], &[(usize, bool)]),
     covariance: &DMatrix<f64>,
     half: f64,
 ) -> BTreeMap<&'static str, Estimate> {
-    let centre = (change.quantities)(b);
+    let quantities = |b: &[f64]| {
+        let mut all = vec![None; change.images.len()];
+        for (b, (place, is_told)) in b.iter().zip(places) {
+            all[*place] = is_told.then_some(*b);
+        }
+        (change.quantities)(&all)
+    };
+    let centre = quantities(b);
     let mut gradients = vec![DVector::<f64>::zeros(b.len()); centre.len()];
     for k in 0..b.len() {
         let h = 1e-3 * covariance[(k, k)].max(0.0).sqrt().max(f64::MIN_POSITIVE);
         let at = |sign: f64| {
             let mut moved = b.to_vec();
             moved[k] += sign * h;
-            (change.quantities)(&moved)
+            quantities(&moved)
         };
         for (g, (up, down)) in gradients.iter_mut().zip(at(1.0).iter().zip(at(-1.0))) {
             g[k] = (up.value - down.value) / (2.0 * h);
@@ -424,4 +448,34 @@ fn estimates(
             (q.name, Estimate { value: q.value, unit: q.unit, ci95 })
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn numbers(quantities: Vec<Quantity>) -> Vec<(&'static str, f64)> {
+        quantities.into_iter().map(|quantity| (quantity.name, quantity.value)).collect()
+    }
+
+    /// One joint feels moments across its axis alone, two parallel ones the mass as well.
+    #[test]
+    fn a_body_is_told_as_far_as_the_joints_feel_it() {
+        let moments = payload(&[None, Some(0.2), Some(0.1), None]);
+        assert_eq!(numbers(moments), [("moment_x_kg_m", 0.2), ("moment_y_kg_m", 0.1)]);
+        let in_a_plane = payload(&[Some(2.0), Some(0.2), Some(0.5), None]);
+        assert_eq!(numbers(in_a_plane), [("mass_kg", 2.0), ("com_x_m", 0.1), ("com_y_m", 0.25)]);
+    }
+
+    /// A tilt about an axis that the arm does not feel is not taken for the one that it feels.
+    #[test]
+    fn a_coefficient_keeps_its_place() {
+        let tilt = |b: &[f64]| -> Vec<Quantity> {
+            let names = ["tilt_x_rad", "tilt_y_rad"].into_iter().zip(b);
+            names.map(|(name, b)| Quantity { name, value: *b, unit: "rad" }).collect()
+        };
+        assert_eq!(numbers(of_told(&[None, Some(0.3)], tilt)), [("tilt_y_rad", 0.3)]);
+        assert_eq!(numbers(of_told(&[Some(0.3), None], tilt)), [("tilt_x_rad", 0.3)]);
+        assert!(of_told(&[None, None], tilt).is_empty());
+    }
 }

@@ -111,12 +111,16 @@ impl Solution {
         Estimate { value, unit, ci95: [value - reach, value + reach] }
     }
 
-    /// Probability that the `count` unknowns from `first` on are this far from zero by chance.
-    pub(super) fn probability(&self, first: usize, count: usize) -> f64 {
-        let x = self.x.rows(first, count);
-        let part = self.covariance.view((first, first), (count, count)).into_owned();
-        let Some(inverse) = part.try_inverse().filter(|_| self.blocks > count) else { return 1.0 };
-        let wald = (x.transpose() * inverse * x)[(0, 0)];
+    /// Probability that these unknowns are this far from zero by chance.
+    pub(super) fn probability(&self, unknowns: &[usize]) -> f64 {
+        let count = unknowns.len();
+        let x = DVector::from_fn(count, |k, _| self.x[unknowns[k]]);
+        let covariance = |i: usize, k: usize| self.covariance[(unknowns[i], unknowns[k])];
+        let inverse = DMatrix::from_fn(count, count, covariance).try_inverse();
+        let Some(inverse) = inverse.filter(|_| count > 0 && self.blocks > count) else {
+            return 1.0;
+        };
+        let wald = (x.transpose() * inverse * &x)[(0, 0)];
         let free = (self.blocks - count) as f64;
         let f = wald * free / (count * (self.blocks - 1)) as f64;
         FisherSnedecor::new(count as f64, free).map_or(1.0, |d| d.sf(f))

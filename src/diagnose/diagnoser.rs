@@ -3,7 +3,7 @@
 use super::against;
 use super::candidates::{self, Candidate};
 use super::common_motion::move_to_common_motion;
-use super::contact;
+use super::contact::{self, Compared};
 use super::data_faults::{self, Faults};
 use super::detection_limits::detection_limits;
 use super::error::DiagnoseError;
@@ -91,8 +91,13 @@ impl<'a> Diagnoser<'a> {
         let coarse = data_faults::coarse_joints(&faults);
         // Across a short mended stall torques are straight lines, which differ from period to period.
         let is_mended = faults.iter().any(|fault| fault.kind == Kind::ClockFault);
-        let touched = if is_mended { None } else { contact::between_periods(m, &coarse)? };
-        let torque_nm = touched.as_ref().map_or(m.torque_nm, |t| &t.torque_nm);
+        let compared =
+            if is_mended { Compared::TooFew } else { contact::between_periods(m, &coarse)? };
+        let touched = match &compared {
+            Compared::Touched(touched) => Some(touched),
+            Compared::TooFew | Compared::Alike => None,
+        };
+        let torque_nm = touched.map_or(m.torque_nm, |t| &t.torque_nm);
         let m = &Measurement { torque_nm, ..*m };
         let mut regression = self.identifier.regression(m)?;
         let identification = self.identifier.identify_regression(&regression)?;
@@ -123,10 +128,10 @@ impl<'a> Diagnoser<'a> {
         };
         let selected = kept.selected();
         let entries: Vec<&Entry> = selected.iter().map(|s| &s.contender.entry).collect();
-        let extension = Extension::fit(&study, &entries, &study.torque);
+        let mut extension = Extension::fit(&study, &entries, &study.torque);
 
         let before_nm = residual(&study, &null);
-        let after_nm = residual(&study, &extension);
+        let mut after_nm = residual(&study, &extension);
         let gains = gain::on_other_periods(&study, &entries);
         let mut physics: Vec<Cause> = selected
             .iter()
@@ -137,7 +142,7 @@ impl<'a> Diagnoser<'a> {
             })
             .collect();
         physics.sort_by(|a, b| b.strength.total_cmp(&a.strength));
-        let touches = match &touched {
+        let touches = match touched {
             Some(touched) => touched.causes.clone(),
             None => beside_model(&study, &after_nm).causes,
         };
@@ -160,6 +165,16 @@ impl<'a> Diagnoser<'a> {
             rest = study.residual.clone();
             explained.span.residualise(&mut rest);
             accepted = explained.span;
+            // What is not found again beside the simulation is not a part of the model either.
+            let is_named = |entry: &&Entry| {
+                let place = (self.families[entry.family].kind(), entry.site.map(|j| j + 1));
+                causes.iter().any(|cause| (cause.kind, cause.joint) == place)
+            };
+            let named: Vec<&Entry> = entries.iter().copied().filter(is_named).collect();
+            if named.len() < entries.len() {
+                extension = Extension::fit(&study, &named, &study.torque);
+                after_nm = residual(&study, &extension);
+            }
         }
         let is_a_tear = |cause: &mut Cause| {
             let at = |name| cause.parameters.get(name).map_or(f64::NAN, |e| e.value);
@@ -221,13 +236,23 @@ impl<'a> Diagnoser<'a> {
         if is_mended {
             let warning = "the clock was mended: contacts are not looked for, and what sits beside is less sure";
             diagnosis.warnings.push(warning.into());
+        } else if study.scene.periodic && matches!(compared, Compared::TooFew) {
+            let warning = "contacts are not looked for: too few periods follow each other without a gap to be compared; \
+                           repeat the motion three times or more";
+            diagnosis.warnings.push(warning.into());
         }
         diagnosis.warnings.extend(drive_limit_remark(self.arm, m.torque_nm));
+        for held_out in &diagnosis.held_out {
+            let with_name = |warning: &String| format!("{}: {warning}", held_out.log);
+            diagnosis.warnings.extend(held_out.warnings.iter().map(with_name));
+        }
         if tears > 0 {
             let warning = "the angles jump as no arm can; what looks like a touch there is none";
             diagnosis.warnings.push(warning.into());
         }
-        diagnosis.sentences = diagnosis.in_sentences();
+        let laws: Vec<Option<usize>> =
+            extension.effects.iter().map(|effect| effect.site.map(|j| j + 1)).collect();
+        diagnosis.sentences = diagnosis.in_sentences(&laws);
         let nominal = self.set.values(&Model::new(self.arm).standard_parameters());
         // What touched the arm, and friction that the null model lacks, bend its gravity.
         let theta = &extension.theta;

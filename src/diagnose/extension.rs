@@ -29,8 +29,10 @@ pub struct Effect {
 pub struct Extension {
     /// Base parameters.
     pub theta: Vec<f64>,
-    /// How the drives answer friction.
+    /// How the drives answer friction, rates of which are per [`Self::instant_s`].
     pub answers: Answer,
+    /// Time between two instants of the log that was fitted, s ([`Scene::instant_s`]).
+    pub instant_s: f64,
     /// Effects.
     pub effects: Vec<Effect>,
 }
@@ -76,7 +78,7 @@ impl Extension {
             answer.iter().map(|(j, which, factor)| (*j, *which, factor * b)).collect()
         };
         let answers = study.answers.iter().zip(answers).flat_map(parts).collect();
-        Self { theta, answers, effects }
+        Self { theta, answers, instant_s: study.scene.instant_s(), effects }
     }
 
     /// The same model for another log ([`Candidate::elsewhere`]).
@@ -104,6 +106,7 @@ impl Extension {
             for &(_, which, b) in self.answers.iter().filter(|(joint, ..)| *joint == j) {
                 // A single run has none.
                 if let Some(column) = columns.get(which) {
+                    let b = scene.answer_from(self.instant_s, which, b);
                     out.iter_mut().zip(column).for_each(|(o, y)| *o += b * y);
                 }
             }

@@ -98,6 +98,7 @@ pub(super) fn held_out_gain(
     let (before, after) = (error(models.null), error(extension));
     Ok(HeldOut {
         log: log.measurement.source.to_owned(),
+        warnings: regression.prepared.warnings.clone(),
         standstill_fraction: rows.standstill_fractions(),
         before_rms_nm: all(&before),
         after_rms_nm: all(&after),

@@ -150,6 +150,27 @@ impl Span {
         span
     }
 
+    /// [`Self::outside`], and for each of its columns which of `images` it is and whether its coefficient is told: others of
+    /// them do not add up to it.
+    pub fn telling(others: &Self, images: &[Image]) -> (Self, Vec<(usize, bool)>) {
+        let outside = |image: &Image| {
+            let mut image = image.clone();
+            others.residualise(&mut image);
+            image
+        };
+        let images: Vec<Image> = images.iter().map(outside).collect();
+        let mut span = Self::default();
+        let taken: Vec<usize> = (0..images.len()).filter(|&k| span.push(&images[k])).collect();
+        let is_told = |k: usize| {
+            let mut rest = Self::default();
+            for (_, image) in images.iter().enumerate().filter(|(other, _)| *other != k) {
+                rest.push(image);
+            }
+            rest.push(&images[k])
+        };
+        (span, taken.into_iter().map(|k| (k, is_told(k))).collect())
+    }
+
     /// Dimensions.
     pub fn len(&self) -> usize {
         self.triangle.len()
@@ -346,6 +367,17 @@ mod tests {
             assert!((entry - expected).abs() < 1e-14);
         }
         assert!(!span.push(&image(&[1.0, 2.0, 3.0, 4.0])), "a combination of both");
+    }
+
+    /// Nothing, a column of its own, and two that are alike.
+    #[test]
+    fn a_coefficient_is_told_where_no_other_column_stands_in_for_its_own() {
+        let alike = [[0.0, 1.0, 1.0, 0.0], [0.0, -2.0, -2.0, 0.0]];
+        let columns = [[0.0; 4], [1.0, 2.0, 0.0, 1.0], alike[0], alike[1]].map(|c| image(&c));
+        let (span, told) = Span::telling(&Span::default(), &columns);
+        assert_eq!(told, [(1, true), (2, false)]);
+        let b = span.solve(&columns[1]);
+        assert!((b[0] - 1.0).abs() < 1e-14 && b[1].abs() < 1e-14, "{b:?}");
     }
 
     #[test]

@@ -37,7 +37,7 @@ pub struct LackOfFit {
     pub joint: usize,
 }
 
-/// Whether noise alone leaves as much; `None` for a single run.
+/// Whether noise alone leaves as much on the joints that are looked at; `None` for a single run.
 ///
 /// Per joint and band, Σ r² over its degrees of freedom is F(k, ν): k the rows less their share in what the
 /// null model and `accepted` have fitted (Σ of the leverages), ν what the periods know of the noise there.
@@ -45,19 +45,14 @@ pub struct LackOfFit {
 pub fn lack_of_fit(study: &Study, accepted: &Span, residual: &Image) -> Option<LackOfFit> {
     let Statistic::Periods(knowledge) = &study.statistic else { return None };
     let harmonic = |hz: f64| (hz * study.scene.samples() as f64 / study.scene.rate_hz) as usize;
-    let edges: Vec<usize> = BANDS_HZ
-        .iter()
-        .map(|hz| harmonic(*hz))
-        .chain([knowledge.harmonics()])
-        .take_while(|edge| *edge <= knowledge.harmonics())
-        .collect();
+    let edges = band_edges(BANDS_HZ.map(harmonic), knowledge.harmonics());
     let fitted = |row: usize| -> f64 {
         let directions = study.null.directions().chain(accepted.directions());
         directions.map(|d| d.mean[row] * d.mean[row]).sum()
     };
     let (mut least, mut worst) = (1.0f64, 0);
     let mut tests = 0.0;
-    for joint in 0..study.scene.joints() {
+    for joint in (0..study.scene.joints()).filter(|j| !study.left_out.contains(j)) {
         for band in edges.windows(2).filter(|band| band[0] < band[1]) {
             let (mut square, mut freedom) = (0.0, 0.0);
             for row in (band[0]..band[1]).flat_map(|h| knowledge.rows(h, joint)) {
@@ -74,7 +69,12 @@ pub fn lack_of_fit(study: &Study, accepted: &Span, residual: &Image) -> Option<L
             tests += 1.0;
         }
     }
-    Some(LackOfFit { probability: (tests * least).min(1.0), joint: worst })
+    (tests > 0.0).then(|| LackOfFit { probability: (tests * least).min(1.0), joint: worst })
+}
+
+/// Those of `first` below the harmonic at which the rows end, and that.
+fn band_edges(first: [usize; BANDS_HZ.len()], end: usize) -> Vec<usize> {
+    first.into_iter().take_while(|edge| *edge < end).chain([end]).collect()
 }
 
 /// The axis along which the residual is largest: a curve of 10 knots in each quantity of each joint.
@@ -212,10 +212,9 @@ fn behind_reversals(scene: &Scene, j: usize) -> Option<(Axis, Curves)> {
     }
     let (low, high) = (SHORTEST_WAY_RAD.ln(), way.iter().copied().fold(f64::MIN, f64::max));
     let knots = (0..KNOTS).map(|k| low + (high - low) * k as f64 / (KNOTS - 1) as f64).collect();
-    let (knots, mut hats) = hats_at(knots, &way);
-    for hat in &mut hats {
-        hat.iter_mut().zip(qd).for_each(|(h, qd)| *h = h.copysign(*qd));
-    }
+    let (knots, hats) = hats_at(knots, &way);
+    let direction: Vec<f64> = qd.iter().map(|qd| qd.signum()).collect();
+    let hats = times(hats, &direction);
     Some((("way since the reversal", "rad"), (knots.into_iter().map(f64::exp).collect(), hats)))
 }
 
@@ -235,11 +234,16 @@ fn since_the_start(scene: &Scene, j: usize) -> Option<(Axis, Curves)> {
     // In the middle of equal parts.
     let part_s = samples as f64 / scene.rate_hz / knots as f64;
     let at = (0..knots).map(|k| scene.lead_in_s + (k as f64 + 0.5) * part_s).collect();
-    let (knots, mut hats) = hats_at(at, &time);
+    let (knots, hats) = hats_at(at, &time);
+    Some((("time since the start", "s"), (knots, times(hats, sign))))
+}
+
+/// Hats times the `direction` of motion, which is the same in every period.
+fn times(mut hats: Vec<Vec<f64>>, direction: &[f64]) -> Vec<Vec<f64>> {
     for hat in &mut hats {
-        hat.iter_mut().zip(sign.iter().cycle()).for_each(|(h, sign)| *h *= sign);
+        hat.iter_mut().zip(direction.iter().cycle()).for_each(|(h, sign)| *h *= sign);
     }
-    Some((("time since the start", "s"), (knots, hats)))
+    hats
 }
 
 /// Name and unit of a quantity.
@@ -272,6 +276,15 @@ fn hats_at(knots: Vec<f64>, values: &[f64]) -> Curves {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Of periods of 10 s: where rows end beyond 20 Hz, within the bands, and at an edge.
+    #[test]
+    fn bands_reach_to_the_last_row() {
+        let first = [0, 20, 50, 100, 200];
+        assert_eq!(band_edges(first, 600), [0, 20, 50, 100, 200, 600]);
+        assert_eq!(band_edges(first, 80), [0, 20, 50, 80]);
+        assert_eq!(band_edges(first, 100), [0, 20, 50, 100]);
+    }
 
     /// A model that follows a straight line but for 2 % of it: least squares would give what is left of the line fifty
     /// times its height.

@@ -70,6 +70,6 @@ pub use repeated::{Repeated, repeated};
 pub use scene::{Scene, equivalent_arm};
 pub use verdict::{
     BaseParameter, Cause, DIAGNOSE_SCHEMA, DetectionLimit, Diagnosis, Estimate, HeldOut, Moved,
-    Rival, Rms, Unexplained, Verdict,
+    Rival, Rms, Unexplained, Verdict, class_holds,
 };
 pub use whitening::Whitening;

@@ -18,6 +18,7 @@ use super::chance;
 use super::clustered::{Equations, Solution, solve};
 use super::error::DiagnoseError;
 use super::extension::Extension;
+use super::image::{Image, Span};
 use super::kind::Kind;
 use super::scene::Scene;
 use super::verdict::{Cause, Estimate};
@@ -32,9 +33,9 @@ use crate::robot::Arm;
 pub struct PayloadFinding {
     /// The log without the body.
     pub reference: String,
-    /// Mass, kg.
+    /// Mass, kg; NaN (null) where the joints of this arm do not tell it from the body's other parameters.
     pub mass_kg: Estimate,
-    /// First moments m·c about the last joint's frame, kg m.
+    /// First moments m·c about the last joint's frame, kg m; NaN likewise.
     pub first_moment_kg_m: [Estimate; 3],
     /// Centre of mass in the last joint's frame, m; meaningful where the body is named.
     pub com_m: [Estimate; 3],
@@ -83,7 +84,7 @@ pub(super) fn between(
 ) -> Result<PayloadFinding, DiagnoseError> {
     let set = shared.set;
     let joints = shared.arm.dof();
-    let body = body_in_base(set, joints);
+    let Body { terms, told } = Body::new(set, joints);
     let mut loaded_theta = shared.extension.theta.clone();
     let layout = Layout::new(set, shared.extension, joints);
     let unloaded = equations(shared, &layout, first, &shared.extension.theta, 0)?;
@@ -94,7 +95,7 @@ pub(super) fn between(
         let mut loaded = equations(shared, &layout, second, &loaded_theta, offset)?;
         for e in &mut loaded {
             layout.add_friction_change(e);
-            for (c, terms) in body.iter().enumerate() {
+            for (c, terms) in terms.iter().enumerate() {
                 let column = combination(&e.columns, terms);
                 e.columns.set_column(layout.body + c, &column);
             }
@@ -102,7 +103,7 @@ pub(super) fn between(
         all.extend(loaded);
         let solution = solve(&all, joints, names[1])?;
         for (k, theta) in loaded_theta.iter_mut().enumerate() {
-            let change: f64 = (0..BODY).map(|c| body[c][k] * solution.x[layout.body + c]).sum();
+            let change: f64 = (0..BODY).map(|c| terms[c][k] * solution.x[layout.body + c]).sum();
             *theta = solution.x[k] + change;
         }
         fit = Some((all, solution));
@@ -119,15 +120,21 @@ pub(super) fn between(
     };
     let estimate =
         |value: f64, g: &[f64], unit: &'static str| solution.estimate(value, layout.body, g, unit);
-    let mass_kg = estimate(mass, &unit_vector(0), "kg");
-    let first_moment_kg_m = [1, 2, 3].map(|a| estimate(x[a], &unit_vector(a), "kg m"));
+    let if_told = |is_told: bool, known: Estimate| match is_told {
+        true => known,
+        false => Estimate { value: f64::NAN, ci95: [f64::NAN; 2], ..known },
+    };
+    let mass_kg = if_told(told[0], estimate(mass, &unit_vector(0), "kg"));
+    let first_moment_kg_m =
+        [1, 2, 3].map(|a| if_told(told[a], estimate(x[a], &unit_vector(a), "kg m")));
     let com_m = [1, 2, 3].map(|a| {
         let mut g = [0.0; STATIC];
         g[a] = 1.0 / mass;
         g[0] = -x[a] / (mass * mass);
-        estimate(x[a] / mass, &g, "m")
+        if_told(told[0] && told[a], estimate(x[a] / mass, &g, "m"))
     });
-    let probability = solution.probability(layout.body, STATIC);
+    let unknowns: Vec<usize> = (0..STATIC).filter(|c| told[*c]).map(|c| layout.body + c).collect();
+    let probability = solution.probability(&unknowns);
     let is_named = probability < chance::PAYLOAD && mass_kg.ci95[0] > 0.0;
     let gain_scale = known_mass_kg
         .filter(|_| is_named)
@@ -163,14 +170,15 @@ impl PayloadFinding {
         }
         let sigma = 0.25 * (self.mass_kg.ci95[1] - self.mass_kg.ci95[0]);
         let [x, y, z] = self.com_m.clone();
-        let parameters =
+        let all =
             [("mass_kg", self.mass_kg.clone()), ("com_x_m", x), ("com_y_m", y), ("com_z_m", z)];
+        let parameters = all.into_iter().filter(|(_, estimate)| !estimate.value.is_nan());
         Some(Cause {
             kind: Kind::Payload,
             joint: None,
             class: Vec::new(),
             confidence: 1.0 - self.probability,
-            parameters: parameters.into(),
+            parameters: parameters.collect(),
             gain_fraction: None,
             separating_experiment: None,
             strength: self.mass_kg.value / sigma,
@@ -181,27 +189,14 @@ impl PayloadFinding {
 
     /// What is said where no body is named, and what a known mass says about the drives.
     pub fn sentences(&self) -> Vec<String> {
-        let pair = |e: &Estimate| format!("{:.3} ± {:.3}", e.value, 0.25 * (e.ci95[1] - e.ci95[0]));
         let mut out = Vec::new();
-        if !self.is_named && self.mass_kg.ci95[1] < 0.0 {
-            out.push(format!(
-                "No body on the flange beside {}, but less of one: {} kg. The first log carries more than the second; \
-                 were they swapped?",
-                self.reference,
-                pair(&self.mass_kg)
-            ));
-        } else if !self.is_named {
-            out.push(format!(
-                "No body on the flange beside {}: {} kg, which chance explains (p = {:.2}).",
-                self.reference,
-                pair(&self.mass_kg),
-                self.probability
-            ));
+        if !self.is_named {
+            out.push(self.no_body());
         }
         if let Some(scale) = &self.gain_scale {
             out.push(format!(
                 "With the mass known, all drive gains are to be multiplied by {}.",
-                pair(scale)
+                with_sigma(scale)
             ));
         }
         if let Some(scales) = &self.joint_gain_scales {
@@ -211,7 +206,7 @@ impl PayloadFinding {
                 .map(|(j, scale)| {
                     let half = 0.5 * (scale.ci95[1] - scale.ci95[0]);
                     if half < TOLD_WITHIN * scale.value {
-                        format!("joint {}: {}", j + 1, pair(scale))
+                        format!("joint {}: {}", j + 1, with_sigma(scale))
                     } else {
                         format!("joint {}: not told by these motions", j + 1)
                     }
@@ -221,6 +216,52 @@ impl PayloadFinding {
         }
         out
     }
+
+    /// What is said where no body is named.
+    fn no_body(&self) -> String {
+        let Self { reference, probability, mass_kg, .. } = self;
+        let axes = ["x", "y", "z"].into_iter().zip(&self.first_moment_kg_m);
+        let moments: Vec<String> = axes
+            .filter(|(_, moment)| !moment.value.is_nan())
+            .map(|(axis, moment)| format!("{axis} {}", with_sigma(moment)))
+            .collect();
+        let moments = moments.join(", ");
+        let by_chance = *probability >= chance::PAYLOAD;
+        if mass_kg.value.is_nan() {
+            let first = "These motions cannot tell a mass on the flange";
+            return match (moments.is_empty(), by_chance) {
+                (true, _) => format!("{first}, nor its first moments."),
+                (false, true) => format!(
+                    "{first}. First moments are those of {reference}: {moments} kg m more, which chance explains (p = \
+                     {probability:.2})."
+                ),
+                (false, false) => format!(
+                    "{first}. First moments are not those of {reference}: {moments} kg m more."
+                ),
+            };
+        }
+        let mass = with_sigma(mass_kg);
+        if by_chance {
+            return format!(
+                "No body on the flange beside {reference}: {mass} kg, which chance explains (p = {probability:.2})."
+            );
+        }
+        if mass_kg.ci95[1] < 0.0 {
+            return format!(
+                "No body on the flange beside {reference}, but less of one: {mass} kg. The first log carries more than the \
+                 second; were they swapped?"
+            );
+        }
+        format!(
+            "The same mass on the flange as in {reference}, {mass} kg more, but with other first moments: {moments} kg m \
+             more. Was a body turned, moved or exchanged for one as heavy?"
+        )
+    }
+}
+
+/// `value ± σ`.
+fn with_sigma(estimate: &Estimate) -> String {
+    format!("{:.3} ± {:.3}", estimate.value, 0.25 * (estimate.ci95[1] - estimate.ci95[0]))
 }
 
 /// A gain is told if its 95 % interval is within this share of it: two sources rarely differ by less.
@@ -261,15 +302,38 @@ impl Layout {
     }
 }
 
-/// The last body's ten parameters in base parameters.
-fn body_in_base(set: &BaseSet, joints: usize) -> Vec<Vec<f64>> {
-    let layout = ParameterLayout::new(joints);
-    let of = |k: usize| {
-        let mut standard = vec![0.0; layout.count()];
-        standard[layout.index(Parameter::Body(joints - 1, k))] = 1.0;
-        set.values(&standard)
-    };
-    (0..BODY).map(of).collect()
+/// The last body's ten parameters.
+struct Body {
+    /// Each in base parameters; zero where the joints do not feel it, or those before it add up to the same.
+    terms: Vec<Vec<f64>>,
+    /// Whether the joints tell it from all others.
+    told: [bool; BODY],
+}
+
+impl Body {
+    fn new(set: &BaseSet, joints: usize) -> Self {
+        let layout = ParameterLayout::new(joints);
+        let of = |k: usize| {
+            let mut standard = vec![0.0; layout.count()];
+            standard[layout.index(Parameter::Body(joints - 1, k))] = 1.0;
+            set.values(&standard)
+        };
+        Self::felt((0..BODY).map(of).collect())
+    }
+
+    /// Of `all` terms those that add something to the ones before.
+    fn felt(all: Vec<Vec<f64>>) -> Self {
+        let image = |terms: &Vec<f64>| Image { mean: terms.clone(), contrast: Vec::new() };
+        let images: Vec<Image> = all.iter().map(image).collect();
+        let (_, taken) = Span::telling(&Span::default(), &images);
+        let mut terms: Vec<Vec<f64>> = all.iter().map(|terms| vec![0.0; terms.len()]).collect();
+        let mut told = [false; BODY];
+        for (k, is_told) in taken {
+            terms[k].clone_from(&all[k]);
+            told[k] = is_told;
+        }
+        Self { terms, told }
+    }
 }
 
 /// Σ_k terms_k column_k of the base parameters' columns.
@@ -327,17 +391,18 @@ fn equations(
                 *value = x[row % n];
             }
         }
-        let mut at = layout.base;
+        let mut first = layout.base;
         for effect in &extension.effects {
-            for (column, _) in effect.columns(families, &scene) {
+            // Of what a drive feeds forward a single run has no columns.
+            for (at, (column, _)) in (first..).zip(effect.columns(families, &scene)) {
                 for (_, y) in column.parts.iter().filter(|(joint, _)| *joint == j) {
                     let y = whitening.as_ref().map_or_else(|| y.clone(), |w| w.as_regressed(y));
                     for (value, row) in columns.column_mut(at).iter_mut().zip(&rows) {
                         *value = y[row % y.len()];
                     }
                 }
-                at += 1;
             }
+            first += effect.coefficients.len();
         }
         out.push(Equations {
             joint: j,
@@ -393,4 +458,71 @@ fn joint_gains(
         }
     }
     Ok(scales)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::Parameterisation;
+
+    fn told(joints: usize) -> [bool; BODY] {
+        let mut arm = Arm::built_in("ur5").unwrap();
+        arm.joints.truncate(joints);
+        let set = BaseSet::find(&arm, Parameterisation::full(joints, false)).unwrap();
+        Body::new(&set, joints).told
+    }
+
+    /// A vertical joint feels an inertia alone; one across it, on the same point, the moments in its plane as well, but
+    /// nothing of a mass; six feel all.
+    #[test]
+    fn an_arm_tells_what_its_joints_feel_of_a_body() {
+        assert_eq!(told(1)[..STATIC], [false; STATIC]);
+        assert_eq!(told(2)[..STATIC], [false, true, true, false]);
+        assert_eq!(told(6), [true; BODY]);
+    }
+
+    /// Of two parameters that are felt alike neither is told, and one is left out.
+    #[test]
+    fn what_adds_up_to_the_same_is_not_told() {
+        let mut all = vec![vec![0.0; 3]; BODY];
+        (all[0], all[1], all[2]) = (vec![1.0, 0.0, 0.5], vec![0.0, 2.0, 0.0], vec![0.0, -1.0, 0.0]);
+        let Body { terms, told } = Body::felt(all.clone());
+        assert_eq!(told[..3], [true, false, false]);
+        assert_eq!(terms[..3], [all[0].clone(), all[1].clone(), vec![0.0; 3]]);
+    }
+
+    /// What is said of a second log with so much more on the flange, and this probability of as much by chance.
+    fn said(mass_kg: f64, moment_kg_m: f64, probability: f64) -> String {
+        let known_to = |half: f64| {
+            move |value: f64| Estimate { value, unit: "", ci95: [value - half, value + half] }
+        };
+        let finding = PayloadFinding {
+            reference: "bare.csv".to_owned(),
+            mass_kg: known_to(0.02)(mass_kg),
+            first_moment_kg_m: [moment_kg_m, 0.0, f64::NAN].map(known_to(0.004)),
+            com_m: [0.0; 3].map(known_to(0.01)),
+            probability,
+            is_named: false,
+            gain_scale: None,
+            joint_gain_scales: None,
+            coulomb_change_nm: Vec::new(),
+        };
+        finding.sentences().join(" ")
+    }
+
+    /// A gripper that was turned, or exchanged for one as heavy, is no accident.
+    #[test]
+    fn chance_is_named_where_it_explains_a_difference() {
+        let chance = |mass_kg, moment_kg_m, probability| {
+            said(mass_kg, moment_kg_m, probability).contains("chance explains")
+        };
+        assert!(chance(0.01, 0.002, 0.4) && chance(-0.03, 0.0, 0.02) && chance(f64::NAN, 0.0, 0.4));
+        let turned = said(0.01, 0.1, 1e-9);
+        assert!(turned.starts_with("The same mass on the flange as in bare.csv"), "{turned}");
+        assert!(turned.contains("x 0.100 ± 0.002, y 0.000 ± 0.002 kg m"), "{turned}");
+        assert!(said(-2.0, 0.1, 1e-9).contains("swapped"));
+        let unknown = said(f64::NAN, 0.1, 1e-9);
+        assert!(unknown.starts_with("These motions cannot tell a mass"), "{unknown}");
+        assert!(unknown.contains("are not those of bare.csv: x 0.100 ± 0.002"), "{unknown}");
+    }
 }

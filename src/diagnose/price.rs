@@ -18,8 +18,7 @@ impl Study<'_> {
     /// 2 ln of the evidence that `entry` has to have before there is any for it: its coefficients, the places and shapes that
     /// were looked at, and how common its family is there.
     pub fn price(&self, entry: &Entry) -> f64 {
-        let rows = self.residual.mean.len();
-        self.statistic.coefficients_price(entry.images.len(), entry.site, rows)
+        self.statistic.coefficients_price(entry.images.len(), entry.site)
             + 2.0 * self.places(entry).ln()
             + 2.0 * self.alternatives(entry).ln()
             - 2.0 * self.odds_over_mean(entry).ln()

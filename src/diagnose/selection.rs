@@ -265,21 +265,9 @@ impl<'s, 'a> Kept<'s, 'a> {
     /// residual outside it.
     pub fn without(&self, left_out: Option<usize>) -> (Span, Image) {
         let study = self.study;
-        let mut span = Span::default();
-        let mut blurred = Vec::new();
-        for (_, cause) in self.causes.iter().enumerate().filter(|(c, _)| Some(*c) != left_out) {
-            for image in &cause.entry.images {
-                span.push(image);
-            }
-            if study.families[cause.entry.family].blurs_reversals() {
-                blurred.push(cause.entry.site);
-            }
-        }
-        for (j, share) in &study.shares {
-            if blurred.iter().any(|site| site.is_none_or(|own| own == *j)) {
-                span.push(share);
-            }
-        }
+        let others = self.causes.iter().enumerate().filter(|(c, _)| Some(*c) != left_out);
+        let entries: Vec<&Entry> = others.map(|(_, cause)| &cause.entry).collect();
+        let span = study.span_of_all(&entries);
         let mut residual = self.study.residual.clone();
         span.residualise(&mut residual);
         (span, residual)

@@ -16,10 +16,14 @@ pub enum Statistic {
     Blocks {
         /// Block of time of every row.
         block_of: Vec<usize>,
-        /// Number of blocks B.
+        /// Number of blocks.
         blocks: usize,
+        /// Number of those, B, with rows that count.
+        used: usize,
         /// Rows per joint.
         rows: usize,
+        /// Per joint, number n of those that count.
+        counting: Vec<usize>,
         /// Autocorrelation of the residual per joint, lags 1, 2, … up to its first zero, a block at most.
         memory: Vec<Vec<f64>>,
     },
@@ -38,45 +42,50 @@ impl Statistic {
     pub fn new(whitening: &Whitening, residual: &Image, joints: usize) -> Self {
         match whitening {
             Whitening::Periods(periods) => Self::Periods(periods.knowledge()),
-            Whitening::Run(run) => {
-                let block_of = run.blocks();
-                let rows = block_of.len() / joints;
-                let block_rows = block_of.iter().take_while(|block| **block == 0).count();
-                let memory = residual
-                    .mean
-                    .chunks_exact(rows)
-                    .map(|r| autocorrelation(r, block_rows))
-                    .collect();
-                Self::Blocks { blocks: block_of[rows - 1] + 1, block_of, rows, memory }
-            }
+            Whitening::Run(run) => Self::of_blocks(run.blocks(), &run.counting(), residual, joints),
         }
+    }
+
+    /// For rows in blocks of time, of which those that do not count are zero.
+    fn of_blocks(block_of: Vec<usize>, counts: &[bool], residual: &Image, joints: usize) -> Self {
+        let rows = block_of.len() / joints;
+        let block_rows = block_of.iter().take_while(|block| **block == 0).count();
+        let memory =
+            residual.mean.chunks_exact(rows).map(|r| autocorrelation(r, block_rows)).collect();
+        let of_joint = |counts: &[bool]| counts.iter().filter(|counts| **counts).count();
+        let counting = counts.chunks_exact(rows).map(of_joint).collect();
+        let blocks = block_of[rows - 1] + 1;
+        let mut is_used = vec![false; blocks];
+        block_of.iter().zip(counts).for_each(|(block, counts)| is_used[*block] |= counts);
+        let used = is_used.into_iter().filter(|used| *used).count();
+        Self::Blocks { block_of, blocks, used, rows, counting, memory }
     }
 
     /// Twice the gain in log-likelihood when the residual loses what `span` explains.
     ///
     /// Periods: ‖P r‖², less where noise is not well known ([`NoiseKnowledge::gain`]). Blocks:
     /// T = −Σ_j n_j ln(1 − (2⟨u, r⟩ − ‖u‖²)/‖r‖²) over the joints, u = P r, with n_j the rows that are
-    /// independent as far as u can tell: ⟨u, r⟩ has the variance ‖u‖² (1 + 2 Σ ρ_r ρ_u) per row (Bartlett 1946),
-    /// so that n_j = n/(1 + 2 Σ ρ_r ρ_u). Ripple, whose own correlation changes its sign, is told from slow
+    /// independent as far as u can tell: ⟨u, r⟩ has the variance ‖r‖²/n ‖u‖² (1 + 2 Σ ρ_r ρ_u) of the n rows that count
+    /// (Bartlett 1946), so that n_j = n/(1 + 2 Σ ρ_r ρ_u). Ripple, whose own correlation changes its sign, is told from slow
     /// errors that way.
     pub fn gain(&self, span: &Span, residual: &Image) -> f64 {
-        let (rows, memory) = match self {
+        let (rows, counting, memory) = match self {
             Self::Periods(knowledge) => return knowledge.gain(span, residual),
-            Self::Blocks { rows, memory, .. } => (*rows, memory),
+            Self::Blocks { rows, counting, memory, .. } => (*rows, counting, memory),
         };
         let signal = span.inside(residual);
         let whole = signal.square();
         let panels = signal.mean.chunks_exact(rows).zip(residual.mean.chunks_exact(rows));
         panels
-            .zip(memory)
-            .map(|((u, r), memory)| {
+            .zip(counting.iter().zip(memory))
+            .map(|((u, r), (counting, memory))| {
                 let square = dot(r, r);
                 // The null model makes a trace of everything everywhere.
                 if square == 0.0 || dot(u, u) < TRACE * whole {
                     return 0.0;
                 }
                 let explained = (2.0 * dot(u, r) - dot(u, u)) / square;
-                -independent(u, memory) * (1.0 - explained).max(1e-6).ln()
+                -independent(u, *counting, memory) * (1.0 - explained).max(1e-6).ln()
             })
             .sum()
     }
@@ -90,18 +99,18 @@ impl Statistic {
         }
     }
 
-    /// What `count` free coefficients of one effect cost in 2 ln of the evidence, `all_rows` of all joints given.
+    /// What `count` free coefficients of one effect cost in 2 ln of the evidence.
     ///
     /// Periods: k ln(1 + λ₀/k) of a Gaussian prior in which the effect's λ is [`USUAL_LAMBDA`] in the mean, however many
     /// coefficients it has (Zellner 1986). Blocks: k ln n (Schwarz 1978), n the rows that see the site.
-    pub fn coefficients_price(&self, count: usize, site: Option<usize>, all_rows: usize) -> f64 {
+    pub fn coefficients_price(&self, count: usize, site: Option<usize>) -> f64 {
         let k = count as f64;
-        let rows = match (self, site) {
+        let rows: usize = match (self, site) {
             (Self::Periods(_), _) => return k * (USUAL_LAMBDA / k.max(1.0)).ln_1p(),
-            (Self::Blocks { rows, .. }, Some(_)) => *rows,
-            (Self::Blocks { .. }, None) => all_rows,
+            (Self::Blocks { counting, .. }, Some(j)) => counting[j],
+            (Self::Blocks { counting, .. }, None) => counting.iter().sum(),
         };
-        k * (rows as f64).ln()
+        k * (rows.max(1) as f64).ln()
     }
 
     /// Probability of at least this much by chance alone, one test.
@@ -173,7 +182,7 @@ impl Statistic {
         residual: &Image,
         coordinates: &DVector<f64>,
     ) -> Option<(DMatrix<f64>, usize)> {
-        let Self::Blocks { block_of, blocks, .. } = self else { return None };
+        let Self::Blocks { block_of, blocks, used, .. } = self else { return None };
         let mut left = residual.clone();
         span.residualise(&mut left);
         let k = coordinates.len();
@@ -187,7 +196,7 @@ impl Statistic {
         for sum in &sums {
             scatter += sum * sum.transpose();
         }
-        Some((scatter * (*blocks as f64 / (*blocks - 1).max(1) as f64), *blocks))
+        Some((scatter * (*used as f64 / used.saturating_sub(1).max(1) as f64), *used))
     }
 
     /// Covariance of the least-squares coefficients of `residual` on the columns of `span`.
@@ -213,7 +222,7 @@ impl Statistic {
     pub fn freedom(&self, span: &Span, residual: &Image) -> f64 {
         match self {
             Self::Periods(knowledge) => knowledge.freedom(span, residual),
-            Self::Blocks { blocks, .. } => (*blocks - 1) as f64,
+            Self::Blocks { used, .. } => used.saturating_sub(1) as f64,
         }
     }
 }
@@ -230,13 +239,55 @@ fn autocorrelation(r: &[f64], longest: usize) -> Vec<f64> {
     (1..=longest.min(r.len() - 1)).map(at).take_while(|rho| *rho > 0.0).collect()
 }
 
-/// Rows of a residual with autocorrelation `memory` that are independent along `signal`.
-fn independent(signal: &[f64], memory: &[f64]) -> f64 {
+/// Rows, of those `counting` of a residual with autocorrelation `memory`, that are independent along `signal`.
+fn independent(signal: &[f64], counting: usize, memory: &[f64]) -> f64 {
     let rows = signal.len();
     let square = dot(signal, signal).max(f64::MIN_POSITIVE);
     let sum: f64 = (1..)
         .zip(memory)
         .map(|(lag, rho)| rho * dot(&signal[lag..], &signal[..rows - lag]) / square)
         .sum();
-    rows as f64 / (1.0 + 2.0 * sum).max(1.0)
+    counting as f64 / (1.0 + 2.0 * sum).max(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ROWS_PER_BLOCK: usize = 8;
+    const BLOCKS: usize = 40;
+
+    /// What a run of one joint says of a wave in a residual with a memory, after which the joint rests for so many blocks.
+    fn told(rest_blocks: usize) -> [f64; 5] {
+        let (moving, all) = (ROWS_PER_BLOCK * BLOCKS, ROWS_PER_BLOCK * (BLOCKS + rest_blocks));
+        let while_moving = |y: &dyn Fn(usize) -> f64| Image {
+            mean: (0..all).map(|k| if k < moving { y(k) } else { 0.0 }).collect(),
+            contrast: Vec::new(),
+        };
+        let wave = |k: usize| (0.3 * k as f64).sin();
+        let noise = |k: usize| ((k * 7919) % 1009) as f64 / 1009.0 - 0.5;
+        let residual = while_moving(&|k| noise(k) + noise(k + 1) + 0.05 * wave(k));
+        let mut span = Span::default();
+        span.push(&while_moving(&wave));
+        let block_of = (0..all).map(|k| k / ROWS_PER_BLOCK).collect();
+        let counts: Vec<bool> = (0..all).map(|k| k < moving).collect();
+        let statistic = Statistic::of_blocks(block_of, &counts, &residual, 1);
+        [
+            statistic.gain(&span, &residual),
+            statistic.probability(&span, &residual),
+            statistic.covariance(&span, &residual)[(0, 0)],
+            statistic.freedom(&span, &residual),
+            statistic.coefficients_price(1, Some(0)),
+        ]
+    }
+
+    /// While a joint rests a run says nothing of it.
+    #[test]
+    fn rows_that_do_not_count_tell_nothing() {
+        let (moving, resting) = (told(0), told(25));
+        assert!(moving.iter().all(|value| *value > 0.0), "{moving:?}");
+        for (with, without) in resting.iter().zip(moving) {
+            assert!((with / without - 1.0).abs() < 1e-9, "{resting:?} {moving:?}");
+        }
+    }
 }

@@ -332,6 +332,22 @@ impl<'a> Study<'a> {
         Span::outside(others, &entry.images)
     }
 
+    /// Span of all `entries` outside the null model, with the shares that drives feed forward where these blur reversals.
+    pub fn span_of_all(&self, entries: &[&Entry]) -> Span {
+        let mut span = Span::default();
+        for image in entries.iter().flat_map(|entry| &entry.images) {
+            span.push(image);
+        }
+        let is_blurred = |j: usize| {
+            let mut blurs = entries.iter().filter(|e| self.families[e.family].blurs_reversals());
+            blurs.any(|entry| entry.site.is_none_or(|own| own == j))
+        };
+        for (_, share) in self.shares.iter().filter(|(j, _)| is_blurred(*j)) {
+            span.push(share);
+        }
+        span
+    }
+
     /// Square of what `entry` with the coefficients `b` does to joint `j`, the null model projected out.
     pub fn square_on(&self, j: usize, entry: &Entry, b: &[f64]) -> f64 {
         let columns = self.families[entry.family].columns(&self.scene, entry.site, entry.shape);

@@ -155,6 +155,8 @@ pub struct Rms {
 pub struct HeldOut {
     /// The log.
     pub log: String,
+    /// What was made of it that the user should know.
+    pub warnings: Vec<String>,
     /// Without the causes, all samples.
     pub before_rms_nm: Vec<f64>,
     /// With the causes, all samples.
@@ -283,8 +285,8 @@ impl Diagnosis {
         self.payload = Some(payload);
     }
 
-    /// The first screen.
-    pub(super) fn in_sentences(&self) -> Vec<String> {
+    /// The first screen; `laws` are the sites of the extended model's effects: joint (1-based), or the arm as a whole.
+    pub(super) fn in_sentences(&self, laws: &[Option<usize>]) -> Vec<String> {
         let mut out: Vec<String> =
             self.causes.iter().map(|c| c.sentence(self.noise_floor_nm.is_some())).collect();
         if let Some(unexplained) = &self.unexplained {
@@ -299,7 +301,7 @@ impl Diagnosis {
             out.push(self.nothing_found().into());
         }
         let along =
-            |held_out| self.does_not_carry_over(held_out).or_else(|| self.gain_along(held_out));
+            |held_out| self.does_not_carry_over(held_out).or_else(|| gain_along(held_out, laws));
         out.extend(self.held_out.iter().filter_map(along));
         out
     }
@@ -328,35 +330,6 @@ impl Diagnosis {
         }
     }
 
-    /// The sentence about what laws change along another log while joints move, on the joint with a cause of which they
-    /// change most.
-    fn gain_along(&self, held_out: &HeldOut) -> Option<String> {
-        let is_a_law = |cause: &&Cause| {
-            let once = matches!(cause.kind, Kind::Contact | Kind::Payload);
-            !once && !cause.kind.is_of_the_record()
-        };
-        let has_cause = |j: usize| {
-            let mut laws = self.causes.iter().filter(is_a_law);
-            laws.any(|cause| cause.joint.is_none_or(|joint| joint == j + 1))
-        };
-        let HeldOut { before_moving_rms_nm, after_moving_rms_nm, .. } = held_out;
-        let both = before_moving_rms_nm.iter().zip(after_moving_rms_nm).enumerate();
-        let told =
-            both.filter(|(j, (before, after))| has_cause(*j) && **before > 0.0 && **after > 0.0);
-        let (j, (before, after)) = told.max_by(|(_, a), (_, b)| {
-            let change = |(before, after): (&f64, &f64)| (before / after).ln().abs();
-            change(*a).total_cmp(&change(*b))
-        })?;
-        Some(format!(
-            "Along {} the error of joint {} while it moves, noise included, is {} Nm rms with what is named and {} Nm \
-             without.",
-            held_out.log,
-            j + 1,
-            digits(*after, 3),
-            digits(*before, 3)
-        ))
-    }
-
     /// The sentence about a log along which the model errs far more, friction at standstill left open.
     fn does_not_carry_over(&self, held_out: &HeldOut) -> Option<String> {
         let noise = |j: usize| self.noise_floor_nm.as_ref().map_or(0.0, |noise| noise[j]);
@@ -378,6 +351,40 @@ impl Diagnosis {
     }
 }
 
+/// The sentence about what `laws` at these sites change along another log while joints move, on the joint with one of which
+/// they change most. What only moved the parameters is in both models, and what happened once in none.
+fn gain_along(held_out: &HeldOut, laws: &[Option<usize>]) -> Option<String> {
+    let has_law = |j: usize| laws.iter().any(|joint| joint.is_none_or(|joint| joint == j + 1));
+    let HeldOut { before_moving_rms_nm, after_moving_rms_nm, .. } = held_out;
+    let both = before_moving_rms_nm.iter().zip(after_moving_rms_nm).enumerate();
+    let told = both.filter(|(j, (before, after))| has_law(*j) && **before > 0.0 && **after > 0.0);
+    let (j, (before, after)) = told.max_by(|(_, a), (_, b)| {
+        let change = |(before, after): (&f64, &f64)| (before / after).ln().abs();
+        change(*a).total_cmp(&change(*b))
+    })?;
+    Some(format!(
+        "Along {} the error of joint {} while it moves, noise included, is {} Nm rms with what is named and {} Nm \
+         without.",
+        held_out.log,
+        j + 1,
+        digits(*after, 3),
+        digits(*before, 3)
+    ))
+}
+
+/// Whether a `class` (of a cause at `site`) holds `kind` at `joint`: kinds at another joint than the cause's have it behind
+/// an @.
+pub fn class_holds(
+    class: &[String],
+    site: Option<usize>,
+    kind: Kind,
+    joint: Option<usize>,
+) -> bool {
+    let here = joint == site || joint.is_none();
+    let elsewhere = joint.map(|j| format!("{kind}@{j}"));
+    class.iter().any(|c| here && c == kind.name() || Some(c) == elsewhere.as_ref())
+}
+
 impl Cause {
     fn sentence(&self, noise_is_known: bool) -> String {
         match self.kind {
@@ -386,22 +393,14 @@ impl Cause {
             _ => {}
         }
         let place = self.joint.map_or("The model".to_owned(), |j| format!("Joint {j}'s model"));
-        let numbers: Vec<String> = self
-            .parameters
-            .iter()
-            .map(|(name, e)| {
-                let name = name.trim_end_matches(&unit_suffix(e.unit)).replace('_', " ");
-                format!("{name} {}", e.in_words())
-            })
-            .collect();
-        let numbers = numbers.join(", ");
+        let what = format!("{}{}", self.in_words, self.numbers());
         let mut text = match (self.kind.is_of_the_record(), self.joint) {
-            (true, None) => format!("The record has {} ({numbers}).", self.in_words),
-            (true, Some(j)) => format!("Joint {j}'s record has {} ({numbers}).", self.in_words),
+            (true, None) => format!("The record has {what}."),
+            (true, Some(j)) => format!("Joint {j}'s record has {what}."),
             (false, _) if self.confidence < EVEN_ODDS => {
-                format!("{place} may miss {} ({numbers}); other causes fit as well.", self.in_words)
+                format!("{place} may miss {what}; other causes fit as well.")
             }
-            (false, _) => format!("{place} misses {} ({numbers}).", self.in_words),
+            (false, _) => format!("{place} misses {what}."),
         };
         if let Some(gain) = self.gain_fraction {
             let of = if noise_is_known {
@@ -429,18 +428,35 @@ impl Cause {
         format!("From {:.2} s to {:.2} s {}.", value("start_s"), value("end_s"), self.in_words)
     }
 
+    /// The parameters in brackets, with a blank before; nothing where none is told.
+    fn numbers(&self) -> String {
+        let number = |(name, e): (&&str, &Estimate)| {
+            let name = name.trim_end_matches(&unit_suffix(e.unit)).replace('_', " ");
+            format!("{name} {}", e.in_words())
+        };
+        match self.parameters.iter().map(number).collect::<Vec<_>>().join(", ") {
+            numbers if numbers.is_empty() => numbers,
+            numbers => format!(" ({numbers})"),
+        }
+    }
+
     fn payload_sentence(&self) -> String {
         let pair = |name: &str| {
-            let estimate = self.parameters.get(name);
-            let half = estimate.map_or(f64::NAN, |e| 0.25 * (e.ci95[1] - e.ci95[0]));
-            (estimate.map_or(f64::NAN, |e| e.value), half)
+            let estimate = self.parameters.get(name)?;
+            Some((estimate.value, 0.25 * (estimate.ci95[1] - estimate.ci95[0])))
         };
-        let (mass, mass_sigma) = pair("mass_kg");
+        let Some((mass, mass_sigma)) = pair("mass_kg") else {
+            let numbers = self.numbers();
+            return format!(
+                "The flange carries something else{numbers}; these motions cannot tell its mass."
+            );
+        };
         let which = if mass < 0.0 { "missing from" } else { "on" };
         let mass = mass.abs();
         let com = ["com_x_m", "com_y_m", "com_z_m"].map(pair);
-        let place = com.map(|(value, _)| format!("{value:.4}")).join(", ");
-        let sigma = com.map(|(_, sigma)| format!("{sigma:.4}")).join(", ");
+        let four = |told: Option<f64>| told.map_or("?".to_owned(), |value| format!("{value:.4}"));
+        let place = com.map(|com| four(com.map(|(value, _)| value))).join(", ");
+        let sigma = com.map(|com| four(com.map(|(_, sigma)| sigma))).join(", ");
         format!(
             "A body of {mass:.3} ± {mass_sigma:.3} kg at ({place}) ± ({sigma}) m {which} the flange (± one σ, last \
              joint's frame)."

@@ -1,6 +1,7 @@
 //! From a raw log to θ̂ and σ: the one function that real logs and simulated trials go through.
 
 use super::columns::ColumnPlan;
+use super::course::Course;
 use super::covariance::{Covariance, CovarianceKind};
 use super::drive_answers::without_drive_answers;
 use super::error::IdentifyError;
@@ -39,8 +40,6 @@ pub struct Identification {
     pub fit: Fit,
     /// Its covariance.
     pub covariance: Covariance,
-    /// Why this estimator was chosen.
-    pub estimator_reason: &'static str,
     /// Why this covariance was chosen.
     pub covariance_reason: &'static str,
     /// What was done to the log.
@@ -119,12 +118,19 @@ pub struct Regression {
     pub first_sample: usize,
     /// Samples of `prepared` per sample of `problem` (long logs are thinned behind the filter).
     pub every: usize,
+    /// Of several logs, of which `prepared` holds the first.
+    course: Option<Course>,
 }
 
 impl Regression {
     /// The sample of `prepared` behind row `row` of one period (or of the run).
     pub fn sample(&self, row: usize) -> usize {
         self.first_sample + row * self.every
+    }
+
+    /// Time and velocity of every row.
+    pub fn course(&self) -> Course {
+        self.course.clone().unwrap_or_else(|| Course::of(self))
     }
 
     /// Several logs as one: rows stand below each other. A repeated motion then counts as that many
@@ -138,13 +144,16 @@ impl Regression {
         if logs == 1 {
             return Ok(first);
         }
+        let mut course = first.course();
         first.problem.unfold();
         first.instruments.iter_mut().for_each(Problem::unfold);
         first.prepared.replicates = None;
         first.prepared.acceleration = None;
         first.prepared.recorded = None;
-        first.prepared.processing.periods = 1;
+        let processing = &mut first.prepared.processing;
+        *processing = Processing { logs, periods: 1, harmonics: None, ..processing.clone() };
         for other in rest {
+            course.append(&other.course());
             let mut problem = other.problem;
             problem.unfold();
             let (found_hz, expected_hz) = (problem.rate_hz, first.problem.rate_hz);
@@ -161,6 +170,7 @@ impl Regression {
             }
             first.prepared.warnings.extend(other.prepared.warnings);
         }
+        first.course = Some(course);
         Ok(first)
     }
 }
@@ -210,7 +220,7 @@ impl<'a> Identifier<'a> {
         let instruments = self.instruments_for(self.options.estimator, &prepared)?;
         let empty = Problem::new(self.problem.plan.clone(), 0.0);
         let problem = std::mem::replace(&mut self.problem, empty);
-        Ok(Regression { problem, instruments, prepared, first_sample, every })
+        Ok(Regression { problem, instruments, prepared, first_sample, every, course: None })
     }
 
     /// Solves a log laid out before.
@@ -343,25 +353,34 @@ impl<'a> Identifier<'a> {
         instruments: Option<&Problem>,
     ) -> Result<Identification, IdentifyError> {
         let repeats = prepared.processing.periods >= MANY_PERIODS;
-        let (estimator, estimator_reason) = match self.options.estimator {
-            Some(estimator) => (estimator, "asked for"),
-            None if repeats => (
-                Estimator::Spectral,
-                "the motion repeats: the periods show the noise at every frequency and joint",
-            ),
-            None => (Estimator::Wls, "a single run: the residuals show the noise of every joint"),
+        let estimator = match self.options.estimator {
+            Some(estimator) => estimator,
+            None if repeats => Estimator::Spectral,
+            None => Estimator::Wls,
         };
-        let (kind, covariance_reason) = match self.options.covariance {
-            Some(kind) => (kind, "asked for"),
-            None if repeats => (
-                CovarianceKind::Spectral,
-                "the motion repeats: the scatter between periods holds for noise of any colour",
-            ),
-            None => (
-                CovarianceKind::Blocks,
-                "a single run: the scatter between blocks of time holds for noise with a memory \
-                 short against a block",
-            ),
+        // What works harmonic by harmonic has no blocks of time.
+        let default_kind = match estimator {
+            Estimator::Spectral => CovarianceKind::Spectral,
+            _ if repeats => CovarianceKind::Spectral,
+            _ => CovarianceKind::Blocks,
+        };
+        let kind = self.options.covariance.unwrap_or(default_kind);
+        let Processing { logs, periods, .. } = prepared.processing;
+        let covariance_reason = match (self.options.covariance, default_kind) {
+            (Some(_), _) => "asked for",
+            (None, CovarianceKind::Spectral) => {
+                "the motion repeats: the scatter between periods holds for noise of any colour"
+            }
+            (None, _) if logs > 1 => {
+                "several logs: the scatter between blocks of time holds for noise with a memory short against a block"
+            }
+            (None, _) if periods > 1 => {
+                "few periods: the scatter between blocks of time holds for noise with a memory short against a block; \
+                 from four periods on their own scatter holds for noise of any colour"
+            }
+            (None, _) => {
+                "a single run: the scatter between blocks of time holds for noise with a memory short against a block"
+            }
         };
         self.take_out_drive_answers(&prepared);
         let aids = MotionAids { acceleration: prepared.acceleration.as_deref(), instruments };
@@ -381,7 +400,6 @@ impl<'a> Identifier<'a> {
             samples: self.problem.samples * self.problem.periods,
             explainable_nm: prepared.replicates.as_ref().map(|r| explainable(&fit, r)),
             covariance,
-            estimator_reason,
             covariance_reason,
             processing: prepared.processing,
             replicates: prepared.replicates,
@@ -462,7 +480,7 @@ fn explainable(fit: &Fit, replicates: &Replicates) -> Vec<f64> {
 }
 
 /// With fewer periods their scatter has so few degrees of freedom that blocks tell more.
-const MANY_PERIODS: usize = 4;
+pub const MANY_PERIODS: usize = 4;
 
 impl Identification {
     /// Residual of the fit over all samples used.

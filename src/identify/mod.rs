@@ -5,6 +5,7 @@ pub mod physical;
 
 mod bound;
 mod columns;
+mod course;
 mod drive_answers;
 mod drive_limits;
 mod error;
@@ -25,6 +26,7 @@ mod whiten;
 
 pub use bound::{KnownNoise, cramer_rao};
 pub use columns::ColumnPlan;
+pub use course::Course;
 pub use drive_answers::{FEEDBACK_RAD_S, drive_answers, feedback_per_tick};
 pub use drive_limits::drive_limit_remark;
 pub use error::IdentifyError;
@@ -32,7 +34,7 @@ pub use estimation::{Estimate, Estimation, MotionAids};
 pub use even::BetweenRows;
 pub use fit::{Estimator, Fit, FitError, Fitter, Weighting};
 pub use gravity::{GravityMatch, gravity_question, gravity_remark};
-pub use identifier::{Identification, Identifier, Regression, Residual};
+pub use identifier::{Identification, Identifier, MANY_PERIODS, Regression, Residual};
 pub use lack_of_fit::{Floor, LackOfFit};
 pub use options::Options;
 pub use prediction::{MOVING_RAD_S, Prediction};

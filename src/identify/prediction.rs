@@ -1,12 +1,13 @@
 //! Torque as measured and as a set of parameters predicts it, sample by sample.
 
+use super::course::Course;
 use super::identifier::{Regression, Residual};
 use crate::robot::JointSignals;
 
-/// Measured and predicted torque along one log, with the processing of the regression.
+/// Measured and predicted torque along a log or several, with the processing of the regression.
 #[derive(Debug, Clone)]
 pub struct Prediction {
-    /// Time on the log's clock, s.
+    /// See [`Course`], s.
     pub time_s: Vec<f64>,
     /// Joint velocity, rad/s: to tell motion from standstill.
     pub qd_rad_s: JointSignals,
@@ -29,19 +30,8 @@ impl Prediction {
         let predicted_nm = JointSignals::from_fn(joints, n * periods, |j, k| {
             measured_nm.joint(j)[k] - residual.joint(j)[k]
         });
-        let processing = &regression.prepared.processing;
-        let rate_hz = processing.rate_hz;
-        let start_s = processing.window_s[0] + regression.first_sample as f64 / rate_hz;
-        let step_s = regression.every as f64 / rate_hz;
-        let motion = &regression.prepared.motion;
-        Self {
-            time_s: (0..n * periods).map(|k| start_s + k as f64 * step_s).collect(),
-            qd_rad_s: JointSignals::from_fn(joints, n * periods, |j, k| {
-                motion.qd_rad_s.joint(j)[regression.sample(k % n)]
-            }),
-            measured_nm,
-            predicted_nm,
-        }
+        let Course { time_s, qd_rad_s } = regression.course();
+        Self { time_s, qd_rad_s, measured_nm, predicted_nm }
     }
 
     /// Number of samples.

@@ -38,14 +38,16 @@ pub struct Processing {
     pub order: Option<usize>,
     /// Rate of the samples used, Hz.
     pub rate_hz: f64,
-    /// First and last instant used, s, on the log's clock.
+    /// Begin of the first and end of the last sample used, s, on the log's clock.
     pub window_s: [f64; 2],
     /// Whether the torque went through the low-pass.
     pub torque_filtered: bool,
     /// Period of the motion, s; null for a single run.
     pub period_s: Option<f64>,
-    /// Whole periods used; 1 for a single run.
+    /// Whole periods used; 1 for a single run, and for several logs, each of which is one then.
     pub periods: usize,
+    /// Logs whose rows stand below each other; all else is said of the first.
+    pub logs: usize,
     /// Whether time stamps were uneven and the log was resampled.
     pub resampled: bool,
     /// Highest harmonic of the averaged acceleration, per joint; null for a single run.
@@ -274,6 +276,7 @@ impl Preparer {
                 torque_filtered: false,
                 period_s: Some(samples_per_period as f64 / even.rate_hz),
                 periods,
+                logs: 1,
                 resampled: even.resampled,
                 harmonics: Some(averaged.harmonics),
             },
@@ -331,6 +334,7 @@ impl Preparer {
                 torque_filtered: true,
                 period_s: None,
                 periods: 1,
+                logs: 1,
                 resampled: even.resampled,
                 harmonics: None,
             },

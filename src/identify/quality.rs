@@ -47,7 +47,8 @@ fn condition_number(triangle: &Triangle, scale: impl Fn(usize) -> f64) -> f64 {
 /// With M the mass and ℓ the reach of everything from the parameter's body outward: M for masses,
 /// M ℓ for first moments, M ℓ² for moments of inertia; the drive's torque limit over its speed
 /// limit for viscous friction, the torque limit for Coulomb friction and offsets, and that limit
-/// over the acceleration limit for rotor inertias.
+/// over the acceleration limit for rotor inertias. Where the torque limit is not known it is what holds and accelerates
+/// the whole arm outstretched.
 pub fn plausible_size(arm: &Arm, set: &BaseSet, k: usize) -> f64 {
     let layout = ParameterLayout::new(arm.dof());
     let (standard, _) = set.column(k)[0];
@@ -58,17 +59,19 @@ pub fn plausible_size(arm: &Arm, set: &BaseSet, k: usize) -> f64 {
         let last = arm.joints.last().and_then(|j| j.link.com_m()).map_or(0.0, |c| c.norm());
         (mass, later.sum::<f64>() + last + HAND_M)
     };
+    let torque_nm = |j: usize| {
+        let limits = &arm.joints[j].limits;
+        let (mass_kg, reach_m) = outward(0);
+        let holding = arm.gravity_m_s2.norm() + limits.acceleration_rad_s2 * reach_m;
+        if limits.torque_nm.is_finite() { limits.torque_nm } else { mass_kg * reach_m * holding }
+    };
     match layout.parameter(standard) {
         Parameter::Body(body, 0) => outward(body).0,
         Parameter::Body(body, 1..=3) => outward(body).0 * outward(body).1,
         Parameter::Body(body, _) => outward(body).0 * outward(body).1.powi(2),
-        Parameter::RotorInertia(j) => {
-            arm.joints[j].limits.torque_nm / arm.joints[j].limits.acceleration_rad_s2
-        }
-        Parameter::Viscous(j) => {
-            arm.joints[j].limits.torque_nm / arm.joints[j].limits.velocity_rad_s
-        }
-        Parameter::Coulomb(j) | Parameter::Offset(j) => arm.joints[j].limits.torque_nm,
+        Parameter::RotorInertia(j) => torque_nm(j) / arm.joints[j].limits.acceleration_rad_s2,
+        Parameter::Viscous(j) => torque_nm(j) / arm.joints[j].limits.velocity_rad_s,
+        Parameter::Coulomb(j) | Parameter::Offset(j) => torque_nm(j),
     }
 }
 
@@ -90,4 +93,25 @@ pub fn identifies_the_arm(arm: &Arm, set: &BaseSet, open: &[usize]) -> bool {
 pub fn not_identified(arm: &Arm, set: &BaseSet, half_width: &[f64]) -> Vec<usize> {
     let open = |&k: &usize| half_width[k].is_nan() || half_width[k] > plausible_size(arm, set, k);
     (0..set.rank()).filter(open).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::Parameterisation;
+
+    /// A URDF that gives no torque limits leaves a bound that an interval can be wider than.
+    #[test]
+    fn what_has_no_torque_limit_can_still_be_open() {
+        let mut arm = Arm::built_in("ur5").unwrap();
+        let set = BaseSet::find(&arm, Parameterisation::full(arm.dof(), true)).unwrap();
+        let limited: Vec<f64> = (0..set.rank()).map(|k| plausible_size(&arm, &set, k)).collect();
+        arm.joints.iter_mut().for_each(|joint| joint.limits.torque_nm = f64::INFINITY);
+        for (k, limited) in limited.iter().enumerate() {
+            let unlimited = plausible_size(&arm, &set, k);
+            assert!(unlimited.is_finite() && unlimited >= *limited, "{}", set.name(k));
+        }
+        let hopeless = vec![1e9; set.rank()];
+        assert_eq!(not_identified(&arm, &set, &hopeless).len(), set.rank());
+    }
 }

@@ -1,11 +1,10 @@
 //! What was found in a log as a scenario: the arm with its effects, the log's motion and its noise.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use sha2::{Digest, Sha256};
 
-use super::scenario::{Scenario, ScenarioError};
+use super::scenario::{Scenario, ScenarioError, fingerprint};
 use crate::base::BaseSet;
 use crate::diagnose::Finding;
 use crate::diagnose::replay::ExtendedSimulation;
@@ -76,6 +75,7 @@ impl Scenario {
             name: "extended".to_owned(),
             description: format!("{} with what was found in {}", arm.name, log.source),
             sha256: String::new(),
+            files: Vec::new(),
             set: set.clone(),
             trajectory: String::new(),
             excitation: Excitation::new(series, RUN_IN_S, scene.periods)?,
@@ -93,16 +93,21 @@ impl Scenario {
             trials: TRIALS,
             arm,
         };
-        let text = scenario.text("", "");
-        scenario.sha256 = Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect();
+        let (robot, motion) = (scenario.arm.to_toml(), scenario.excitation.series().to_json());
+        scenario.sha256 = fingerprint([&scenario.text("", ""), &robot, &motion]);
         Ok(scenario)
+    }
+
+    /// The files that [`Self::save`] writes to `path`.
+    pub fn files_of(path: &Path) -> [PathBuf; 3] {
+        let beside = |extension: &str| path.with_extension(extension);
+        [path.to_owned(), beside("robot.toml"), beside("trajectory.json")]
     }
 
     /// Writes the scenario to `path`, and beside it the robot file `NAME.robot.toml` and the trajectory
     /// `NAME.trajectory.json` that it names. (A reduced set of parameters is not written.)
     pub fn save(&self, path: &Path) -> Result<(), OutputError> {
-        let (robot, trajectory) =
-            (path.with_extension("robot.toml"), path.with_extension("trajectory.json"));
+        let [_, robot, trajectory] = Self::files_of(path);
         let name = |path: &Path| path.file_name().unwrap_or_default().display().to_string();
         let text = self.text(&name(&robot), &name(&trajectory));
         let write = |path: &Path, text: String| {

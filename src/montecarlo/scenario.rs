@@ -12,7 +12,7 @@ use crate::excitation::{Excitation, ExcitationError, FourierSeries, Requirements
 use crate::identify::Options;
 use crate::plant::faults::{Effect, FaultyPlant};
 use crate::plant::{PlantConfig, PlantError, SensorConfig, Sensors};
-use crate::robot::{Arm, RobotError};
+use crate::robot::{Arm, LoadedArm, RobotError};
 
 /// The scenario that runs when none is named.
 const DEFAULT: &str = include_str!("../../sims/default.toml");
@@ -24,8 +24,10 @@ pub struct Scenario {
     pub name: String,
     /// What it is for, in a sentence.
     pub description: String,
-    /// SHA-256 of its text.
+    /// SHA-256 of its text and of the robot and the motions that it names.
     pub sha256: String,
+    /// The files that it names: robot and motions that are not built in.
+    pub files: Vec<PathBuf>,
     /// The arm, its truth included.
     pub arm: Arm,
     /// Base parameters that are identified.
@@ -174,19 +176,21 @@ impl Scenario {
     /// From a parsed file.
     pub(super) fn from_file(file: ScenarioFile, source: &Source) -> Result<Self, ScenarioError> {
         source.check(file.trials > 0, "trials", 0.0, "must be at least 1")?;
-        let arm = Arm::load(&source.beside(&file.robot))?;
+        let LoadedArm { arm, mut files, .. } = LoadedArm::load(&source.beside(&file.robot))?;
         let parameterisation = match &file.reduced {
             Some(name) => Parameterisation::reduced(name, &arm)?,
             None => Parameterisation::full(arm.dof(), arm.torque_offsets),
         };
         let excitation = file.motion.excitation(&arm, source)?;
+        files.extend(file.motion.file(source));
         FaultyPlant::new(&arm, &file.effects, &file.plant)?;
         Sensors::new(&file.sensors, &arm, file.plant.log_rate_hz)?;
         Ok(Self {
             set: BaseSet::find(&arm, parameterisation)?,
             name: file.name,
             description: file.description,
-            sha256: Sha256::digest(&source.text).iter().map(|byte| format!("{byte:02x}")).collect(),
+            sha256: fingerprint([&source.text, &arm.to_toml(), &excitation.series().to_json()]),
+            files,
             arm,
             excitation,
             trajectory: file.motion.trajectory,
@@ -201,7 +205,20 @@ impl Scenario {
     }
 }
 
+/// SHA-256 of all `texts`.
+pub(super) fn fingerprint<'a>(texts: impl IntoIterator<Item = &'a String>) -> String {
+    let mut hasher = Sha256::new();
+    texts.into_iter().for_each(|text| hasher.update(text));
+    hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
 impl MotionEntry {
+    /// Its trajectory's file; `None` for one that is built in.
+    pub(super) fn file(&self, source: &Source) -> Option<PathBuf> {
+        let path = PathBuf::from(source.beside(&self.trajectory));
+        path.extension().is_some().then_some(path)
+    }
+
     /// The motion of `arm`.
     pub(super) fn excitation(
         &self,

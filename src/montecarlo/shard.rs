@@ -22,7 +22,7 @@ pub struct Header<C: Content> {
     pub version: String,
     /// Name of the scenario.
     pub scenario: String,
-    /// SHA-256 of the scenario's text.
+    /// SHA-256 of the scenario's text, its robot and its motions.
     pub scenario_sha256: String,
     /// Seed of all random numbers.
     pub seed: u64,
@@ -325,7 +325,11 @@ pub fn same_run<C: Content>(
     let parts: [(&'static str, String, String); 5] = [
         ("program version", found.version.clone(), expected.version.clone()),
         ("scenario", found.scenario.clone(), expected.scenario.clone()),
-        ("scenario text", found.scenario_sha256.clone(), expected.scenario_sha256.clone()),
+        (
+            "scenario text, robot or motion",
+            found.scenario_sha256.clone(),
+            expected.scenario_sha256.clone(),
+        ),
         ("seed", found.seed.to_string(), expected.seed.to_string()),
         ("number of trials", found.trials.to_string(), expected.trials.to_string()),
     ];

@@ -186,8 +186,8 @@ impl Summary {
                 format!("The claim does not hold{reason}.")
             }
             Verdict::NotEvaluated => format!(
-                "{} trials are too few to tell whether the predicted σ is true.",
-                self.trials
+                "{} trials with an estimate are too few to tell whether the predicted σ is true.",
+                self.trials - self.failed
             ),
         }
     }

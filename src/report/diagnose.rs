@@ -4,7 +4,7 @@ use super::json::Program;
 use super::number::{percent, resolved, significant};
 use super::plot::{Axis, Colour, Grid, Mark};
 use super::{Column, Page, ReportError, Section, Status, Table, Verdict, replay};
-use crate::diagnose::{self, Cause, DetectionLimit, Diagnosis, Finding, Kind};
+use crate::diagnose::{self, Cause, DetectionLimit, Diagnosis, Finding, Kind, class_holds};
 use crate::robot::Arm;
 
 /// The causes with their numbers.
@@ -226,7 +226,7 @@ fn cause_section(finding: &Finding, cause: &Cause) -> Result<Section, ReportErro
         Column::text("told apart"),
     ]);
     for rival in &cause.rivals {
-        let in_class = cause.class.iter().any(|c| c.split('@').next() == Some(rival.kind.name()));
+        let in_class = class_holds(&cause.class, cause.joint, rival.kind, rival.joint);
         table.push([
             rival.kind.to_string(),
             joint(rival.joint),

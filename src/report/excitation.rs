@@ -14,6 +14,10 @@ use super::{Column, Page, ReportError, Section, Status, Table, Verdict, number};
 /// Samples of one period in the figures.
 const SAMPLES: usize = 600;
 
+/// Of a robot whose bodies have no shapes.
+pub const NO_CLEARANCE: &str =
+    "the robot has no capsules: its distance from itself, the floor and the cell is not watched";
+
 /// The report page of a design.
 pub fn page(
     arm: &Arm,
@@ -24,10 +28,15 @@ pub fn page(
 ) -> Result<Page, ReportError> {
     let p = &found.prediction;
     let worst = found.margins.worst();
+    let is_watched = !ClearanceModel::new(arm).is_empty();
+    let limits = match is_watched {
+        true => "A motion inside every limit".to_owned(),
+        false => format!("A motion inside every limit of the joints ({NO_CLEARANCE})"),
+    };
     let verdict = Verdict {
-        status: if found.cut_short { Status::Warn } else { Status::Good },
+        status: if found.cut_short || !is_watched { Status::Warn } else { Status::Good },
         sentence: format!(
-            "A motion inside every limit, checked at {} Hz: {}.",
+            "{limits}, checked at {} Hz: {}.",
             spec.requirements.check_rate_hz,
             spec.criterion.in_words(found.value)
         ),
@@ -62,14 +71,16 @@ pub fn page(
     );
     let motion = Samples::of(arm, found);
     let mut page = Page::new("Excitation", subtitle, verdict, program);
-    page.push(
-        Section::new("The motion")
-            .figure(motion.against_limits(arm, 0)?, "Angles; dashed: limits.")
-            .figure(motion.against_limits(arm, 1)?, "Velocities; dashed: limits.")
-            .figure(motion.against_limits(arm, 2)?, "Accelerations; dashed: limits.")
-            .figure(motion.clearance(arm, spec)?, "Smallest distances over one period; dashed: what is required.")
-            .figure(swept(arm, &motion)?, "Postures over one period (pale), where it is closest to itself, and the way of the flange."),
-    );
+    let mut section = Section::new("The motion")
+        .figure(motion.against_limits(arm, 0)?, "Angles; dashed: limits.")
+        .figure(motion.against_limits(arm, 1)?, "Velocities; dashed: limits.")
+        .figure(motion.against_limits(arm, 2)?, "Accelerations; dashed: limits.");
+    if is_watched {
+        let caption = "Smallest distances over one period; dashed: what is required.";
+        section = section.figure(motion.clearance(arm, spec)?, caption);
+    }
+    let caption = "Postures over one period (pale), where it is closest to itself, and the way of the flange.";
+    page.push(section.figure(swept(arm, &motion)?, caption));
     page.push(
         Section::new("What it will tell")
             .paragraph(
@@ -84,12 +95,14 @@ pub fn page(
             "What the whole motion, run-in and run-out included, leaves free.",
         ),
     );
-    page.push(
-        Section::new("Clearance model")
-            .paragraph("Capsules fixed in the bodies; ends in the joint frame of the body, body 0 is the base.")
-            .table(capsules(arm), "")
-            .figure(drawn_capsules(arm, &motion)?, "Axes of the capsules at the start of the period."),
-    );
+    if is_watched {
+        page.push(
+            Section::new("Clearance model")
+                .paragraph("Capsules fixed in the bodies; ends in the joint frame of the body, body 0 is the base.")
+                .table(capsules(arm), "")
+                .figure(drawn_capsules(arm, &motion)?, "Axes of the capsules at the start of the period."),
+        );
+    }
     Ok(page)
 }
 
@@ -228,12 +241,14 @@ fn swept(arm: &Arm, motion: &Samples) -> Result<String, PlotError> {
         colour: Colour::MODEL,
         style: StickStyle::Path,
     });
-    sticks.push(Stick {
-        name: "closest".into(),
-        points_m: skeleton(arm, &motion.pose(motion.closest())),
-        colour: Colour::MEASURED,
-        style: StickStyle::Posture,
-    });
+    if !motion.distances_m.is_empty() {
+        sticks.push(Stick {
+            name: "closest".into(),
+            points_m: skeleton(arm, &motion.pose(motion.closest())),
+            colour: Colour::MEASURED,
+            style: StickStyle::Posture,
+        });
+    }
     StickFigure { title: "The swept arm".into(), sticks, size: Size::wide(420.0) }.to_svg()
 }
 

@@ -20,6 +20,7 @@ pub mod physical_study;
 pub mod plot;
 pub mod real_arm;
 pub mod replay;
+pub mod rows;
 pub mod saved;
 mod status;
 mod table;

@@ -4,7 +4,7 @@ use super::json::Program;
 use super::number::{percent, significant};
 use super::plot::{Axis, Bars, Colour, IntervalPlot, IntervalRow, Mark, Span, XyPlot};
 use super::{Column, Page, ReportError, Section, Status, Table, Verdict};
-use crate::montecarlo::calibration::{self, claims, wilson};
+use crate::montecarlo::calibration::{claims, wilson};
 use crate::montecarlo::tally::BIN_WIDTH;
 use crate::montecarlo::{Efficiency, Estimation, Summary, shard::Merged};
 
@@ -70,7 +70,7 @@ pub fn check_table(summary: &Summary) -> Table {
     for check in &summary.checks {
         let range = |[low, high]: [f64; 2]| format!("{low:.3} … {high:.3}");
         table.push_judged(
-            Some(status(check.verdict)),
+            Some(check.verdict.into()),
             [
                 check.what.clone(),
                 check.parameter.clone().unwrap_or_else(|| "all".into()),
@@ -84,21 +84,9 @@ pub fn check_table(summary: &Summary) -> Table {
     table
 }
 
-fn status(verdict: calibration::Verdict) -> Status {
-    match verdict {
-        calibration::Verdict::Pass => Status::Good,
-        calibration::Verdict::Fail => Status::Bad,
-        calibration::Verdict::NotEvaluated => Status::Warn,
-    }
-}
-
-/// The page: verdict, coverage and ratio per parameter, distribution of the errors, tables.
-pub fn page(
-    summary: &Summary,
-    merged: &Merged<Estimation>,
-    program: Program,
-) -> Result<Page, ReportError> {
-    let facts = vec![
+/// What the verdict rests on.
+fn facts(summary: &Summary) -> Vec<String> {
+    let mut facts = vec![
         format!(
             "{} trials, {} failed; estimator {}, covariance {}",
             summary.trials, summary.failed, summary.estimator, summary.covariance
@@ -112,9 +100,44 @@ pub fn page(
         format!("empirical over predicted σ, pooled: {:.3}", summary.sigma_ratio_pooled),
         format!("{:.0} trials per second", summary.trials_per_second),
     ];
-    let efficiency = summary.efficiency.as_ref().map(efficiency_sentence);
-    let facts = facts.into_iter().chain(efficiency).collect();
-    let verdict = Verdict { status: status(summary.verdict), sentence: summary.sentence(), facts };
+    let missing: u64 = summary.missing.iter().map(|[start, end]| end - start).sum();
+    if missing > 0 {
+        facts.push(format!("{missing} trials of the scenario have not been run"));
+    }
+    facts.extend(summary.efficiency.as_ref().map(efficiency_sentence));
+    facts
+}
+
+/// In Markdown: verdict, checks, parameters.
+pub fn markdown(summary: &Summary, command: &str) -> String {
+    let mut text = format!("# Is the σ true?\n\n{}\n\n    {command}\n", summary.sentence());
+    for fact in facts(summary) {
+        text += &format!("\n- {fact}");
+    }
+    text += &format!("\n\n## What was checked\n\n{}", check_table(summary).to_markdown());
+    text += &format!("\n## Parameters\n\n{}", parameter_table(summary).to_markdown());
+    if summary.failed > 0 {
+        text += "\n## Failed trials\n";
+        for f in &summary.failures {
+            text += &format!("\n- trial {}: {}", f.trial, f.reason);
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// The page: verdict, coverage and ratio per parameter, distribution of the errors, tables.
+pub fn page(
+    summary: &Summary,
+    merged: &Merged<Estimation>,
+    program: Program,
+) -> Result<Page, ReportError> {
+    // Shards that were not run may say something else.
+    let status = match summary.verdict.into() {
+        Status::Good if !summary.missing.is_empty() => Status::Warn,
+        status => status,
+    };
+    let verdict = Verdict { status, sentence: summary.sentence(), facts: facts(summary) };
     let subtitle = format!("Scenario {}", summary.scenario);
     let mut page = Page::new("Is the σ true?", subtitle, verdict, program);
     page.push(

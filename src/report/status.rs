@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use crate::montecarlo::calibration::Verdict;
+
 /// A judgement, with one colour in tables, figures and on the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -12,6 +14,16 @@ pub enum Status {
     Warn,
     /// Not as it should be.
     Bad,
+}
+
+impl From<Verdict> for Status {
+    fn from(verdict: Verdict) -> Self {
+        match verdict {
+            Verdict::Pass => Self::Good,
+            Verdict::Fail => Self::Bad,
+            Verdict::NotEvaluated => Self::Warn,
+        }
+    }
 }
 
 impl Status {

@@ -71,6 +71,11 @@ impl Placement {
         }
     }
 
+    /// Roll, pitch and yaw of [`Self::from_xyz_rpy`], rad.
+    pub fn rpy_rad(&self) -> [f64; 3] {
+        Rotation3::from_matrix_unchecked(self.rotation).euler_angles().into()
+    }
+
     /// No rotation, no translation.
     pub fn identity() -> Self {
         Self { rotation: Matrix3::identity(), translation_m: Vector3::zeros() }

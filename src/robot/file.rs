@@ -2,6 +2,8 @@
 
 mod write;
 
+use std::path::{Path, PathBuf};
+
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +11,7 @@ use super::arm::{Arm, Capsule, CellBox, Clearance, Drive, Joint, Limits, LinkBou
 use super::error::RobotError;
 use super::export::apply_drive_file;
 use super::inertia::LinkInertia;
-use super::urdf::{UrdfArm, UrdfNotice, read_urdf};
+use super::urdf::{Frames, UrdfArm, UrdfNotice, read_urdf};
 
 /// Arms built in, by the name given to `--robot`.
 const BUILT_IN: [(&str, &str); 4] = [
@@ -37,32 +39,7 @@ impl Arm {
     /// What `--robot` accepts: a built-in name, a `.urdf` file (with its drive file, where
     /// `NAME.drives.toml` lies beside it) or a `.toml` robot file.
     pub fn load(name_or_path: &str) -> Result<Self, RobotError> {
-        Self::load_with_notices(name_or_path).map(|(arm, _)| arm)
-    }
-
-    /// As [`Arm::load`], with what had to be assumed; only a URDF leaves anything open.
-    pub fn load_with_notices(name_or_path: &str) -> Result<(Self, Vec<UrdfNotice>), RobotError> {
-        let path = std::path::Path::new(name_or_path);
-        let read_from = |path: &std::path::Path| {
-            std::fs::read_to_string(path)
-                .map_err(|source| RobotError::Read { file: path.display().to_string(), source })
-        };
-        let read = || read_from(path);
-        match path.extension().and_then(|e| e.to_str()) {
-            Some("urdf") => {
-                let UrdfArm { mut arm, mut notices, .. } = read_urdf(&read()?, name_or_path)?;
-                let drives = path.with_extension("drives.toml");
-                if drives.exists() {
-                    let file = drives.display().to_string();
-                    apply_drive_file(&mut arm, &read_from(&drives)?, &file)?;
-                    notices.retain(|notice| !notice.is_settled_by_drive_file());
-                    notices.push(UrdfNotice::DriveFile { file });
-                }
-                Ok((arm, notices))
-            }
-            Some("toml") => Ok((Self::from_toml(&read()?, name_or_path)?, Vec::new())),
-            _ => Ok((Self::built_in(name_or_path)?, Vec::new())),
-        }
+        LoadedArm::load(name_or_path).map(|loaded| loaded.arm)
     }
 
     /// From the text of a robot file; `source` names it in messages.
@@ -70,6 +47,54 @@ impl Arm {
         let file: RobotFile = toml::from_str(text)
             .map_err(|e| RobotError::Toml { file: source.to_owned(), message: e.to_string() })?;
         file.into_arm(source)
+    }
+}
+
+/// An arm, and where it comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoadedArm {
+    /// The arm.
+    pub arm: Arm,
+    /// What had to be assumed; only a URDF leaves anything open.
+    pub notices: Vec<UrdfNotice>,
+    /// Named frames on its bodies; only a URDF has any.
+    pub frames: Frames,
+    /// Files it was read from: none for a built-in arm, two for a URDF with a drive file.
+    pub files: Vec<PathBuf>,
+}
+
+impl LoadedArm {
+    /// As [`Arm::load`].
+    pub fn load(name_or_path: &str) -> Result<Self, RobotError> {
+        let path = Path::new(name_or_path);
+        let own = |arm| Self {
+            arm,
+            notices: Vec::new(),
+            frames: Frames::default(),
+            files: vec![path.to_owned()],
+        };
+        let read_from = |path: &Path| {
+            std::fs::read_to_string(path)
+                .map_err(|source| RobotError::Read { file: path.display().to_string(), source })
+        };
+        let read = || read_from(path);
+        match path.extension().and_then(|e| e.to_str()) {
+            Some("urdf") => {
+                let UrdfArm { arm, frames, notices } = read_urdf(&read()?, name_or_path)?;
+                let mut loaded = Self { notices, frames, ..own(arm) };
+                let drives = path.with_extension("drives.toml");
+                if drives.exists() {
+                    let file = drives.display().to_string();
+                    apply_drive_file(&mut loaded.arm, &read_from(&drives)?, &file)?;
+                    loaded.notices.retain(|notice| !notice.is_settled_by_drive_file());
+                    loaded.notices.push(UrdfNotice::DriveFile { file });
+                    loaded.files.push(drives);
+                }
+                Ok(loaded)
+            }
+            Some("toml") => Ok(own(Arm::from_toml(&read()?, name_or_path)?)),
+            _ => Ok(Self { files: Vec::new(), ..own(Arm::built_in(name_or_path)?) }),
+        }
     }
 }
 
@@ -264,11 +289,15 @@ impl JointEntry {
             ("torque_constant_nm_a", self.torque_constant_nm_a),
             ("velocity_rad_s", self.velocity_rad_s),
             ("acceleration_rad_s2", self.acceleration_rad_s2),
-            ("torque_nm", self.torque_nm),
         ] {
             if !(value > 0.0 && value.is_finite()) {
                 return Err(fault(format!("{name} = {value} must be positive")));
             }
+        }
+        // A URDF need not say it.
+        let torque_nm = self.torque_nm;
+        if torque_nm.is_nan() || torque_nm <= 0.0 {
+            return Err(fault(format!("torque_nm = {torque_nm} must be positive, inf if unknown")));
         }
         let [low, high] = self.position_rad;
         if low.is_nan() || high.is_nan() || low >= high {

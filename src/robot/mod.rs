@@ -9,12 +9,14 @@ mod arm;
 mod error;
 mod file;
 mod inertia;
+mod kinematics;
 mod signals;
 mod urdf;
 
 pub use arm::{Arm, Capsule, CellBox, Clearance, Drive, Joint, Limits, LinkBounds, Placement};
 pub use error::RobotError;
-pub use file::built_in_names;
+pub use file::{LoadedArm, built_in_names};
 pub use inertia::LinkInertia;
+pub use kinematics::{Kinematics, KinematicsDifference};
 pub use signals::JointSignals;
-pub use urdf::{FixedFrame, UrdfArm, UrdfFault, UrdfNotice, read_urdf};
+pub use urdf::{FixedFrame, Frames, UrdfArm, UrdfFault, UrdfNotice, read_urdf};

@@ -37,7 +37,7 @@ const JOLTED_DAMPING_RATIO: f64 = 0.15;
 /// Variants with the encoder on the motor: in the first the links are driven by the part of the motion that is known a
 /// hundred times better than its noise, and by jolts beyond, which is what gears need that swing faster than that; in the
 /// second by what is known ten times better, for gears that swing within it.
-const ON_MOTOR: usize = 2;
+pub const ON_MOTOR: usize = 2;
 /// Damping where the encoder sits on the link, by further variants: a loop closed over the gear needs it.
 const LINK_DAMPING_RATIO: [f64; 2] = [0.05, 0.3];
 /// Stiffnesses, Nm/rad: neighbours are told by where the links swing.

@@ -8,7 +8,7 @@ mod asymmetric_friction;
 mod backlash;
 mod base_tilt;
 mod current_offset;
-mod elasticity;
+pub(super) mod elasticity;
 mod encoder_offset;
 mod feed_forward;
 pub(super) mod load_friction;

@@ -29,11 +29,18 @@ const GEAR_MULTIPLES: [f64; 3] = [1.0, 2.0, 4.0];
 /// slow parts show them.
 const MOTOR_MULTIPLES: [f64; 2] = [8.0, 12.0];
 
-/// Multiples of the gear's ratio that are looked at first.
-fn multiples(scene: &Scene) -> impl Iterator<Item = f64> {
-    let motor = if scene.periodic { &[][..] } else { &MOTOR_MULTIPLES[..] };
-    GEAR_MULTIPLES.into_iter().chain(motor.iter().copied())
+/// Orders that are looked at first, of a gear of this `ratio` and its motor; none of an arm without drives, which says 1.
+fn expected_orders(ratio: f64, is_periodic: bool) -> impl Iterator<Item = f64> {
+    let motor = if is_periodic { &[][..] } else { &MOTOR_MULTIPLES[..] };
+    let multiples = GEAR_MULTIPLES.into_iter().chain(motor.iter().copied());
+    multiples.map(move |m| m * ratio).filter(|order| *order >= LOWEST_ORDER)
 }
+
+/// The same of joint `j`.
+fn expected_on(scene: &Scene, j: usize) -> impl Iterator<Item = f64> {
+    expected_orders(scene.arm.joints[j].drive.gear_ratio, scene.periodic)
+}
+
 /// A joint that turns by less from one sample to the next shows no order.
 const STANDSTILL_RAD: f64 = 1e-8;
 /// Peaks of the order spectrum that are looked at closely.
@@ -46,10 +53,9 @@ impl Candidate for Ripple {
 
     fn shapes(&self, scene: &Scene, site: Option<usize>) -> Vec<Shape> {
         let spacing = order_spacing(scene, joint(site));
-        let ratio = scene.arm.joints[joint(site)].drive.gear_ratio;
         // Half the resolution on both sides brackets a peak of the order spectrum.
         let about = |order: f64| [-0.5, 0.0, 0.5].map(|u| order + u * spacing);
-        let orders: Vec<f64> = multiples(scene).flat_map(|m| about(m * ratio)).collect();
+        let orders: Vec<f64> = expected_on(scene, joint(site)).flat_map(about).collect();
         let shapes = |variant| orders.iter().map(move |&value| Shape { variant, value });
         variants(scene).flat_map(shapes).collect()
     }
@@ -64,10 +70,9 @@ impl Candidate for Ripple {
 
     fn alternatives(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Option<f64> {
         let spacing = order_spacing(scene, joint(site));
-        let ratio = scene.arm.joints[joint(site)].drive.gear_ratio;
-        let of_the_gear = |m: f64| (shape.value - m * ratio).abs() <= spacing;
+        let is_near = |order: f64| (shape.value - order).abs() <= spacing;
         let any_order = variants(scene).count() as f64 * (HIGHEST_ORDER - LOWEST_ORDER) / spacing;
-        (!multiples(scene).any(of_the_gear)).then_some(any_order)
+        (!expected_on(scene, joint(site)).any(is_near)).then_some(any_order)
     }
 
     fn is_repeatable(&self) -> bool {
@@ -201,6 +206,16 @@ mod tests {
     use nalgebra::Complex;
 
     use super::*;
+
+    /// A robot file without drives says nothing of gears, and its ratio of one is none.
+    #[test]
+    fn no_order_is_expected_of_a_gear_that_is_not_known() {
+        let expected = |ratio, is_periodic| expected_orders(ratio, is_periodic).collect::<Vec<_>>();
+        assert_eq!(expected(101.0, true), [101.0, 202.0, 404.0]);
+        assert_eq!(expected(101.0, false), [101.0, 202.0, 404.0, 808.0, 1212.0]);
+        assert_eq!(expected(10.0, true), [20.0, 40.0]);
+        assert!(expected(1.0, true).is_empty() && expected(1.0, false).is_empty());
+    }
 
     /// Of a joint that turns at constant speed between samples, the weights of its phasors give back what the means do.
     #[test]

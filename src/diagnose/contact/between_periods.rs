@@ -33,25 +33,31 @@ pub struct WithoutContacts {
     pub torque_nm: JointSignals,
 }
 
-/// Looks for contacts by comparing repetitions, not on the joints `left_out` (0-based); `None` if the
-/// motion does not repeat often enough or nothing touched the arm.
-pub fn between_periods(
-    m: &Measurement,
-    left_out: &[usize],
-) -> Result<Option<WithoutContacts>, SignalError> {
+/// What repetitions beside each other say of contacts.
+pub enum Compared {
+    /// Nothing: the motion does not repeat often enough without a gap.
+    TooFew,
+    /// Nothing touched the arm.
+    Alike,
+    /// Something did.
+    Touched(WithoutContacts),
+}
+
+/// Looks for contacts by comparing repetitions, not on the joints `left_out` (0-based).
+pub fn between_periods(m: &Measurement, left_out: &[usize]) -> Result<Compared, SignalError> {
     let rate_hz = natural_rate_hz(m.time_s)?;
     let grid = Resampler::new(m.time_s, rate_hz, bridged_gap_s(rate_hz))?;
     let whole = 0..grid.samples();
     if grid.segments() != [whole] {
-        return Ok(None);
+        return Ok(Compared::TooFew);
     }
     let q_rad = grid.instants().angles(m.q_rad, m.qd_rad_s)?;
-    let Some(found) = find_period(&q_rad)? else { return Ok(None) };
+    let Some(found) = find_period(&q_rad)? else { return Ok(Compared::TooFew) };
     let period = found.refined_samples;
     let edge = (EDGE_S * rate_hz) as usize;
     let window = with_disturbed_periods(&q_rad, period, found.window, edge);
     if ((window.len() as f64 / period + 0.01) as usize) < FEWEST_PERIODS {
-        return Ok(None);
+        return Ok(Compared::TooFew);
     }
     let joints: Vec<usize> = (0..m.torque_nm.joints()).filter(|j| !left_out.contains(j)).collect();
     let torque_nm = grid.instants().straight(m.torque_nm)?;
@@ -87,7 +93,7 @@ pub fn between_periods(
         touches.push(touch);
     }
     if touches.is_empty() {
-        return Ok(None);
+        return Ok(Compared::Alike);
     }
     touches.sort_by_key(|touch| touch.samples.start);
     let together = (TOGETHER_S * rate_hz) as usize;
@@ -110,7 +116,7 @@ pub fn between_periods(
             }
         }
     }
-    Ok(Some(WithoutContacts { causes, torque_nm }))
+    Ok(Compared::Touched(WithoutContacts { causes, torque_nm }))
 }
 
 #[cfg(test)]
@@ -150,12 +156,17 @@ mod tests {
         (time_s, [q, qd, torque])
     }
 
-    fn contacts(
-        time_s: &[f64],
-        [q_rad, qd_rad_s, torque_nm]: &[JointSignals; 3],
-    ) -> Option<WithoutContacts> {
+    fn compared(time_s: &[f64], [q_rad, qd_rad_s, torque_nm]: &[JointSignals; 3]) -> Compared {
         let m = Measurement { source: "test", time_s, q_rad, qd_rad_s, torque_nm };
         between_periods(&m, &[]).unwrap()
+    }
+
+    fn contacts(time_s: &[f64], signals: &[JointSignals; 3]) -> Option<WithoutContacts> {
+        match compared(time_s, signals) {
+            Compared::TooFew => panic!("six periods can be compared"),
+            Compared::Alike => None,
+            Compared::Touched(without) => Some(without),
+        }
     }
 
     fn found(seed: u64, hidden: &Hidden) -> Option<WithoutContacts> {
@@ -175,6 +186,15 @@ mod tests {
     fn repetitions_without_a_contact_have_none() {
         let nothing = Hidden { start_s: 24.0, end_s: 25.0, nm: [0.0, 0.0] };
         assert!((0..20).all(|seed| found(seed, &nothing).is_none()));
+    }
+
+    /// Of two periods either may be the one that was touched.
+    #[test]
+    fn of_two_periods_nothing_is_said() {
+        let push = Hidden { start_s: 14.0, end_s: 14.4, nm: [6.0, 0.0] };
+        let (time_s, signals) = log(1, &push);
+        let two = signals.map(|s| s.slice(0..2000));
+        assert!(matches!(compared(&time_s[..2000], &two), Compared::TooFew));
     }
 
     #[test]

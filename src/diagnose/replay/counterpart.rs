@@ -5,6 +5,7 @@
 //! the same, it says so here.
 
 use crate::diagnose::Kind;
+use crate::diagnose::candidates::elasticity::ON_MOTOR;
 use crate::diagnose::candidates::load_friction::MOTOR_SIDE;
 use crate::plant::faults::{self, Effect};
 
@@ -138,8 +139,9 @@ impl Found<'_> {
             })),
             Kind::Elasticity => {
                 let stiffness_nm_rad = value("stiffness_nm_rad")?;
-                let side = [faults::EncoderSide::Motor, faults::EncoderSide::Link];
-                let encoder = side[self.variant.min(1)];
+                let on_motor = self.variant < ON_MOTOR;
+                let encoder =
+                    if on_motor { faults::EncoderSide::Motor } else { faults::EncoderSide::Link };
                 in_the_model(Effect::Elasticity(faults::Elasticity::new(
                     self.joint?,
                     stiffness_nm_rad,

@@ -209,6 +209,12 @@ impl Scene {
         drive_answers(clock, &self.instants(j).sign, self.highest, self.rate_hz).into()
     }
 
+    /// The coefficient of answer number `which` ([`Self::answers`]) that is `b` along a log whose instants are `instant_s` apart:
+    /// rates are per instant.
+    pub fn answer_from(&self, instant_s: f64, which: usize, b: f64) -> f64 {
+        if which == 0 { b } else { b * (instant_s / self.instant_s()) }
+    }
+
     /// Whether the drive of joint `j` may be what gives its answer number `which` ([`Self::answers`]) the coefficient
     /// `b`: it does not lead or lag its joint by more than `LONGEST_LEAD_S`.
     pub fn can_answer(&self, j: usize, which: usize, b: f64) -> bool {

@@ -61,6 +61,11 @@ impl RunWhitening {
         one_joint.repeat(self.weights.len())
     }
 
+    /// Whether a row of an image counts.
+    pub fn counting(&self) -> Vec<bool> {
+        self.counts.iter().flat_map(|counts| counts.iter().step_by(self.thin).copied()).collect()
+    }
+
     /// Per joint and row of the regression, whether the joint moves.
     pub fn moving_rows(regression: &Regression) -> Vec<Vec<bool>> {
         let motion = &regression.prepared.motion;

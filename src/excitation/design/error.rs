@@ -64,6 +64,17 @@ pub enum DesignError {
         /// Name of the arm.
         arm: String,
     },
+    /// Time was over before a start became a motion inside the limits.
+    #[error(
+        "time was over after {tried} of {starts} starts, and none of these is a motion inside the limits: give more \
+         --seconds"
+    )]
+    OutOfTime {
+        /// How many were looked at.
+        tried: usize,
+        /// How many there are.
+        starts: usize,
+    },
     /// Designs were found, but none passed the check on the fine grid together with a run-in.
     #[error("{candidates} designs were found, none of which passes the final check: {last}")]
     CheckFailed {

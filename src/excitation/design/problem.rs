@@ -163,7 +163,7 @@ pub(super) mod tests {
         let arm = Arm::built_in("ur5").unwrap();
         let model = Model::new(&arm);
         let base = BaseSet::find(&arm, Parameterisation::full(6, false)).unwrap();
-        let scales = parameter_scales(&base, &base.values(&model.standard_parameters()));
+        let scales = parameter_scales(&base, &model);
         let variables = Variables {
             order: 2,
             period_s: 8.0,

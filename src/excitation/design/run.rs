@@ -15,7 +15,7 @@ use super::search::{Candidate, Effort, Progress, Round, search};
 use super::space::DesignSpace;
 use super::specification::Specification;
 use crate::base::BaseSet;
-use crate::dynamics::{Model, Workspace, inverse_dynamics};
+use crate::dynamics::{Model, Parameter, ParameterLayout, Workspace, inverse_dynamics};
 use crate::excitation::{
     ClearanceModel, Excitation, ExcitationError, FourierSeries, Margins, Reference, check,
 };
@@ -89,14 +89,22 @@ fn rounds(spec: &Specification) -> Vec<Round> {
 }
 
 /// Scale of every base parameter for the relative criteria: its own size, but at least a thousandth
-/// of the largest of the same unit, so that what is nearly zero does not rule the design.
-pub fn parameter_scales(base: &BaseSet, theta: &[f64]) -> Vec<f64> {
+/// of the largest of the same unit, so that what is nearly zero does not rule the design; offsets, which are nominally zero,
+/// count as the largest.
+pub fn parameter_scales(base: &BaseSet, model: &Model) -> Vec<f64> {
     const FLOOR: f64 = 1e-3;
+    let theta = base.values(&model.standard_parameters());
+    let layout = ParameterLayout::new(model.dof());
+    let is_offset = |i: usize| {
+        let (standard, _) = base.column(i)[0];
+        matches!(layout.parameter(standard), Parameter::Offset(_))
+    };
     (0..base.rank())
         .map(|i| {
             let same = (0..base.rank()).filter(|&k| base.unit(k) == base.unit(i));
             let largest = same.map(|k| theta[k].abs()).fold(0.0, f64::max);
-            theta[i].abs().max(FLOOR * largest).max(f64::MIN_POSITIVE)
+            let floor = if is_offset(i) { largest } else { FLOOR * largest };
+            theta[i].abs().max(floor).max(f64::MIN_POSITIVE)
         })
         .collect()
 }
@@ -114,7 +122,7 @@ pub fn design(
 ) -> Result<Design, DesignError> {
     spec.check(arm)?;
     let model = Model::new(arm);
-    let scales = parameter_scales(base, &base.values(&model.standard_parameters()));
+    let scales = parameter_scales(base, &model);
     // Λ is averaged over the samples of one period; the experiment has so many of them.
     let samples = spec.experiment.samples();
     let weights = if spec.criterion.whitened() {
@@ -147,6 +155,10 @@ pub fn design(
         stop: budget.stop,
     };
     let found = search(arm, at, &effort, &rounds(spec), progress);
+    let tried = found.tried_starts;
+    if found.candidates.is_empty() && tried < spec.starts {
+        return Err(DesignError::OutOfTime { tried, starts: spec.starts });
+    }
     if found.candidates.is_empty() {
         return Err(DesignError::Infeasible {
             starts: spec.starts,

@@ -71,6 +71,8 @@ pub struct Candidate {
 pub struct Found {
     /// Survivors, best first.
     pub candidates: Vec<Candidate>,
+    /// Starts that were looked at before time was over.
+    pub tried_starts: usize,
     /// Starts for which a feasible motion was found.
     pub feasible_starts: usize,
     /// Points evaluated.
@@ -93,6 +95,7 @@ pub fn search(
 ) -> Found {
     let mut candidates: Vec<Candidate> = Vec::new();
     let (mut feasible_starts, mut evaluations, mut cut_short) = (0, 0, false);
+    let tried_starts = AtomicUsize::new(0);
     for (index, round) in rounds.iter().enumerate() {
         let problem = problem_at(round.samples);
         let entrants: Vec<(usize, Option<DVector<f64>>)> = if index == 0 {
@@ -116,6 +119,9 @@ pub fn search(
                     // there is something feasible to return.
                     if effort.over() && index == 0 && start > 0 {
                         return None;
+                    }
+                    if index == 0 {
+                        tried_starts.fetch_add(1, Ordering::Relaxed);
                     }
                     let from = match x {
                         Some(x) => x,
@@ -154,7 +160,8 @@ pub fn search(
             break;
         }
     }
-    Found { candidates, feasible_starts, evaluations, cut_short }
+    let tried_starts = tried_starts.into_inner();
+    Found { candidates, tried_starts, feasible_starts, evaluations, cut_short }
 }
 
 /// `x` if it is strictly feasible in `problem`, or the largest of a few smaller motions about the

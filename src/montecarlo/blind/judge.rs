@@ -3,17 +3,14 @@
 use super::case::{Case, Hidden, Secret};
 use super::family::Judged;
 use super::record::{Named, Record};
-use super::share::Share;
+use crate::diagnose::class_holds;
+use crate::montecarlo::share::Share;
 
 /// Whether `named`, or something that it says it cannot be told from, is what was hidden.
 pub fn is_right(named: &Named, hidden: &Hidden) -> bool {
-    let name = hidden.kind.name();
-    if named.kind == hidden.kind && named.joint == hidden.joint {
-        return true;
-    }
-    let elsewhere = hidden.joint.map(|j| format!("{name}@{j}"));
-    let here = named.joint == hidden.joint || hidden.joint.is_none();
-    named.class.iter().any(|c| here && c == name || Some(c) == elsewhere.as_ref())
+    let (kind, joint) = (hidden.kind, hidden.joint);
+    named.kind == kind && named.joint == joint
+        || class_holds(&named.class, named.joint, kind, joint)
 }
 
 /// Whether `named` sits where `hidden` does, whatever it is.

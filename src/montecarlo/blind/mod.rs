@@ -14,7 +14,6 @@ mod judge;
 mod plan;
 mod record;
 mod score;
-mod share;
 mod target;
 
 pub use benchmark::{Benchmark, BlindContent, BlindError, BlindWorker};
@@ -28,5 +27,4 @@ pub use score::{
     ConfidenceBin, Confusion, FamilyScore, GainBin, SAID_NOTHING, SAID_UNEXPLAINED, SCORES_SCHEMA,
     Scores, StrengthBin, power,
 };
-pub use share::Share;
 pub use target::Target;

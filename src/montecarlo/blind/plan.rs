@@ -5,7 +5,7 @@ use serde::Deserialize;
 use super::family::{FAMILIES, Family, ON_REQUEST};
 use crate::diagnose::Kind;
 use crate::excitation::Excitation;
-use crate::montecarlo::scenario::{MotionEntry, Scenario, ScenarioError, Source};
+use crate::montecarlo::scenario::{MotionEntry, Scenario, ScenarioError, Source, fingerprint};
 use crate::plant::{SensorConfig, Sensors};
 
 /// A blind benchmark that has been read and checked.
@@ -72,7 +72,7 @@ pub(in crate::montecarlo) struct BlindEntry {
 impl BlindPlan {
     /// Checks `entry`; its motions and sensors are those of `base` and more.
     pub(in crate::montecarlo) fn new(
-        base: Scenario,
+        mut base: Scenario,
         entry: BlindEntry,
         source: &Source,
     ) -> Result<Self, ScenarioError> {
@@ -110,6 +110,8 @@ impl BlindPlan {
         let mut motions = vec![first];
         for motion in &entry.motion {
             let excitation = motion.excitation(&base.arm, source)?;
+            base.sha256 = fingerprint([&base.sha256, &excitation.series().to_json()]);
+            base.files.extend(motion.file(source));
             motions.push(Motion { name: motion.trajectory.clone(), excitation });
         }
         let mut sensors = vec![base.sensors.clone()];

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::case::Case;
-use super::share::Share;
 use crate::diagnose::{BaseParameter, Cause, Diagnosis, HeldOut, Kind};
+use crate::montecarlo::share::Share;
 use crate::montecarlo::trials::{Failure, Gathered};
 
 /// A parameter with its 95 % interval.

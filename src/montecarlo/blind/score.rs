@@ -10,12 +10,12 @@ use super::case::Secret;
 use super::family::Judged;
 use super::judge::{Outcome, is_at, is_right};
 use super::record::{Named, Record};
-use super::share::Share;
 use super::target::{Target, targets};
 use crate::diagnose::{Kind, candidates, chance};
 use crate::median::median;
 use crate::montecarlo::calibration::Verdict;
 use crate::montecarlo::shard::Merged;
+use crate::montecarlo::share::Share;
 use crate::montecarlo::trials::Failure;
 
 /// Format of the JSON output.

@@ -8,9 +8,9 @@ use super::family::Judged;
 use super::judge::{Outcome, is_at};
 use super::record::Record;
 use super::score::causes;
-use super::share::Share;
 use crate::montecarlo::calibration::Verdict;
 use crate::montecarlo::shard::Merged;
+use crate::montecarlo::share::Share;
 
 /// Fewer trials than this say nothing about a share.
 const FEWEST: u64 = 20;
@@ -86,6 +86,9 @@ pub fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
         base.of += covered.of;
     }
     let large = all.iter().filter(|r| r.case.is_from(40.0)).filter_map(|r| r.answer.gain);
+    // The other targets are about cases that have an answer.
+    let failures = merged.tally.failures.len() as u64;
+    let silent = Share { count: failures, of: all.len() as u64 + failures };
     vec![
         Target::new("clean: a false alarm", alarms, [0.0, 0.003]),
         Target::about(
@@ -149,5 +152,6 @@ pub fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
             Share::of(large, |gain| gain.share() >= 0.95),
             [0.5, 1.0],
         ),
+        Target::new("cases without an answer", silent, [0.0, 0.005]),
     ]
 }

@@ -113,8 +113,10 @@ impl Friction {
     /// Steepest slope dτ_f/dq̇ at speeds up to `largest_rad_s` with gear loads up to `load_nm`, and
     /// steepest slope dτ_f/dq of the bristles: Nm s/rad and Nm/rad. Upper bounds.
     pub(super) fn slopes(&self, largest_rad_s: f64, load_nm: f64) -> (f64, f64) {
+        // Without the law no load matters, even one that has no limit.
+        let loaded = if self.mu == 0.0 { 0.0 } else { self.mu * load_nm };
         let level = self.coulomb_nm
-            + self.mu * load_nm
+            + loaded
             + self.stribeck.iter().map(|p| p.extra_nm.abs()).sum::<f64>()
             + self.positions.iter().map(|p| p.amplitude_nm.abs()).sum::<f64>();
         let power = |p: &NonlinearViscous| {

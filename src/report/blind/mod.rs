@@ -11,8 +11,7 @@ use crate::montecarlo::blind::{Record, Scores, place};
 
 use plots::{confidence_plot, confusion_plot, detection_plot};
 use tables::{
-    condition_table, confidence_table, confusion_table, family_table, gain_table, status,
-    strength_table,
+    condition_table, confidence_table, confusion_table, family_table, gain_table, strength_table,
 };
 
 pub use lines::replay_lines;
@@ -165,11 +164,8 @@ pub fn markdown(scores: &Scores, command: &str) -> String {
 
 /// The page.
 pub fn page(scores: &Scores, program: Program) -> Result<Page, ReportError> {
-    let verdict = Verdict {
-        status: status(scores.verdict),
-        sentence: sentence(scores),
-        facts: facts(scores),
-    };
+    let verdict =
+        Verdict { status: scores.verdict.into(), sentence: sentence(scores), facts: facts(scores) };
     let subtitle = format!("Scenario {}", scores.scenario);
     let mut page = Page::new("Does the diagnosis find what is hidden?", subtitle, verdict, program);
     for (heading, words, table) in parts(scores) {

@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::tables::range;
-use crate::montecarlo::blind::{SAID_NOTHING, SAID_UNEXPLAINED, Scores, Share, StrengthBin, power};
+use crate::montecarlo::Share;
+use crate::montecarlo::blind::{SAID_NOTHING, SAID_UNEXPLAINED, Scores, StrengthBin, power};
 use crate::report::ReportError;
 use crate::report::plot::{Axis, Band, Colour, HeatMap, IntervalPlot, IntervalRow, Mark, XyPlot};
 

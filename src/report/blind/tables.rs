@@ -1,17 +1,9 @@
 //! The scores in tables.
 
-use crate::montecarlo::blind::{Judged, Scores, Share, StrengthBin, Target};
-use crate::montecarlo::calibration;
+use crate::montecarlo::Share;
+use crate::montecarlo::blind::{Judged, Scores, StrengthBin, Target};
 use crate::report::number::percent;
 use crate::report::{Column, Status, Table};
-
-pub(super) fn status(verdict: calibration::Verdict) -> Status {
-    match verdict {
-        calibration::Verdict::Pass => Status::Good,
-        calibration::Verdict::Fail => Status::Bad,
-        calibration::Verdict::NotEvaluated => Status::Warn,
-    }
-}
 
 /// `12 of 40, 30.0 %`.
 fn of(share: Share) -> String {
@@ -43,7 +35,7 @@ pub fn target_table(scores: &Scores) -> Table {
     for target in &scores.targets {
         let [low, high] = target.interval;
         table.push_judged(
-            Some(status(target.verdict)),
+            Some(target.verdict.into()),
             [
                 target.what.to_owned(),
                 target_in_words(target),

@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-use super::rows::{Rows, names};
 use super::{BaseParameter, NOT_IDENTIFIED};
 use crate::identify::{Processing, Regression};
 use crate::log::Log;
 use crate::report::json::Program;
+use crate::report::rows::{Rows, names};
 use crate::report::{Page, Status, Verdict};
 use crate::robot::Arm;
 

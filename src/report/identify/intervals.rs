@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::identify::{Floor, Identification, LackOfFit};
+use crate::identify::{Floor, Identification, LackOfFit, MANY_PERIODS, Processing};
 
 /// Whether the 95 % intervals may claim to hold the truth.
 #[derive(Debug, Clone, Serialize)]
@@ -29,16 +29,26 @@ impl Intervals {
     /// Of what a log said.
     pub fn of(identification: &Identification) -> Self {
         let Some(test) = identification.lack_of_fit else {
-            let reason = if identification.replicates.is_some() {
+            let asked_for = identification.estimator;
+            let Processing { logs, periods, .. } = identification.processing;
+            let reason = if logs > 1 {
+                "Whether the intervals hold cannot be tested: several logs as one do not tell noise from what the model \
+                 lacks. Identify from one that repeats its motion four times or more."
+                    .to_owned()
+            } else if periods >= MANY_PERIODS {
                 format!(
                     "Whether the intervals hold was not tested: lack of fit is measured with the weights of the \
-                     spectral estimator, and {} was asked for.",
-                    identification.estimator
+                     spectral estimator, and {asked_for} was asked for."
                 )
             } else {
-                "Whether the intervals hold cannot be tested: a single run does not tell noise from what the model \
-                 lacks. Repeat the motion four times or more."
-                    .to_owned()
+                let too_few = match periods {
+                    1 => "a single run does not".to_owned(),
+                    few => format!("{few} periods do not"),
+                };
+                format!(
+                    "Whether the intervals hold cannot be tested: {too_few} tell noise from what the model lacks. \
+                     Repeat the motion {MANY_PERIODS} times or more."
+                )
             };
             return Self { trusted: None, reason, lack_of_fit: None };
         };

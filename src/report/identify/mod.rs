@@ -3,9 +3,8 @@
 mod declined;
 mod intervals;
 mod page;
-mod rows;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde::Serialize;
 
@@ -14,6 +13,7 @@ pub use intervals::{Intervals, TestResult};
 pub use page::{facts, page, parameter_table, residual_table};
 
 use super::physical::{Physical, StandardParameter, standard_parameters};
+use super::rows::{Rows, log_warnings, names};
 use crate::base::BaseSet;
 use crate::identify::covariance::CovarianceKind;
 use crate::identify::physical::PhysicalEstimate;
@@ -22,8 +22,7 @@ use crate::identify::{
     drive_limit_remark, gravity_question, gravity_remark, identifies_the_arm, not_identified,
 };
 use crate::log::Log;
-use crate::robot::Arm;
-use rows::{Rows, names};
+use crate::robot::{Arm, Kinematics};
 
 /// Format of the JSON output.
 pub const IDENTIFY_SCHEMA: &str = "armid.identify/1";
@@ -55,13 +54,15 @@ pub struct Validation {
     pub prediction: Prediction,
     /// The manufacturer's feed-forward torque with the same processing, Nm.
     pub manufacturer: Option<Prediction>,
+    /// What should be known of the log and of what was made of it.
+    pub warnings: Vec<String>,
 }
 
 impl Validation {
     /// Of `theta` along `regression`; `manufacturer` is the same log laid out with the
     /// manufacturer's torque in place of the measured one.
     pub fn new(
-        log: &Path,
+        log: &Log,
         regression: &Regression,
         manufacturer: Option<&Regression>,
         theta: &[f64],
@@ -71,7 +72,10 @@ impl Validation {
             predicted_nm: Prediction::of(m, theta).measured_nm,
             ..prediction.clone()
         });
-        Self { log: log.to_owned(), prediction, manufacturer }
+        let processing = &regression.prepared.warnings;
+        let processing = processing.iter().map(|warning| format!("{}: {warning}", log.source));
+        let warnings = log_warnings(log).chain(processing).collect();
+        Self { log: PathBuf::from(&log.source), prediction, manufacturer, warnings }
     }
 }
 
@@ -79,6 +83,7 @@ impl Validation {
 #[derive(Debug, Clone, Serialize)]
 pub struct Result {
     robot: String,
+    kinematics: Kinematics,
     log: String,
     samples: usize,
     rate_hz: f64,
@@ -134,6 +139,7 @@ impl From<Residual> for ResidualJson {
 #[derive(Debug, Clone, Serialize)]
 struct ValidationJson {
     log: String,
+    samples: usize,
     #[serde(flatten)]
     residual: ResidualJson,
     moving_rms_nm: Vec<f64>,
@@ -165,7 +171,9 @@ impl Result {
                 }
             })
             .collect();
-        let mut warnings = identification.warnings.clone();
+        let mut warnings: Vec<String> =
+            training.logs.iter().flat_map(|log| log_warnings(log)).collect();
+        warnings.extend(identification.warnings.clone());
         warnings.extend(identification.lack_of_fit.and_then(|lack| lack.warning()));
         let is_identified = identifies_the_arm(arm, set, &open);
         let theta = &identification.fit.theta;
@@ -174,8 +182,10 @@ impl Result {
         // Logs whose torques could not be read came no further than that.
         let torques = training.logs.iter().filter_map(|log| log.torque_nm(arm).ok());
         warnings.extend(torques.filter_map(|torque_nm| drive_limit_remark(arm, &torque_nm)));
+        warnings.extend(validations.iter().flat_map(|validation| validation.warnings.clone()));
         Ok(Self {
             robot: arm.name.clone(),
+            kinematics: Kinematics::of(arm),
             log: names(training.logs),
             samples: identification.samples,
             rate_hz: regression.problem.rate_hz,
@@ -274,6 +284,7 @@ impl ValidationJson {
         let rms = |f: fn(&Prediction) -> Residual| v.manufacturer.as_ref().map(|m| f(m).rms_nm);
         Self {
             log: v.log.display().to_string(),
+            samples: v.prediction.samples(),
             residual: v.prediction.residual().into(),
             moving_rms_nm: v.prediction.moving_residual().rms_nm,
             manufacturer_rms_nm: rms(Prediction::residual),

@@ -75,6 +75,10 @@ pub fn residual_table(result: &Result) -> Table {
 pub fn facts(result: &Result) -> Vec<String> {
     let processing = &result.processing;
     let periods = match processing.period_s {
+        _ if processing.logs > 1 => format!(
+            "{} logs one below the other: what repeats in one of them tells nothing of the noise here",
+            processing.logs
+        ),
         Some(period) => format!(
             "{} periods of {period:.3} s averaged and differentiated as a Fourier series",
             processing.periods

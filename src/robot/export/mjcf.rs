@@ -6,7 +6,7 @@ use nalgebra::{Rotation3, UnitQuaternion};
 
 use super::xml::{about_com, escaped, frames_of, numbers};
 use super::{ExportError, UNKNOWN_TORQUE_NM, check, link_name};
-use crate::robot::{Arm, FixedFrame, Joint, Placement};
+use crate::robot::{Arm, FixedFrame, Frames, Joint, Placement};
 
 /// The arm as MJCF, with `frames` as sites and one motor per joint.
 ///
@@ -14,8 +14,9 @@ use crate::robot::{Arm, FixedFrame, Joint, Placement};
 /// a constraint that holds at standstill, not our tanh(q̇/ε), so the two differ below a few ε. Position
 /// limits and the motors' torque limits are written; speed and acceleration limits, ε, offsets and
 /// clearance capsules have no place.
-pub fn mjcf(arm: &Arm, frames: &[FixedFrame]) -> Result<String, ExportError> {
-    check(arm, frames.iter().map(|frame| frame.name.as_str()))?;
+pub fn mjcf(arm: &Arm, frames: &Frames) -> Result<String, ExportError> {
+    check(arm, frames)?;
+    let frames = &frames.fixed;
     let mut out = String::new();
     // Writing to a String cannot fail, so the results carry no information.
     let _ = write!(

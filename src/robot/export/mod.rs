@@ -12,6 +12,7 @@ mod xml;
 use thiserror::Error;
 
 use super::arm::Arm;
+use super::urdf::Frames;
 
 pub use drives::{apply_drive_file, drive_file};
 pub use mjcf::mjcf;
@@ -63,7 +64,7 @@ pub enum ExportError {
 const UNKNOWN_TORQUE_NM: f64 = 1e9;
 
 /// Refuses an arm that could not run, and names that would collide.
-fn check<'a>(arm: &'a Arm, frames: impl Iterator<Item = &'a str>) -> Result<(), ExportError> {
+fn check(arm: &Arm, frames: &Frames) -> Result<(), ExportError> {
     for joint in &arm.joints {
         let drive = [
             ("rotor inertia", joint.drive.rotor_inertia_kg_m2),
@@ -88,17 +89,15 @@ fn check<'a>(arm: &'a Arm, frames: impl Iterator<Item = &'a str>) -> Result<(), 
             return Err(ExportError::Impossible { joint: name(), smallest });
         }
     }
-    let mut seen = std::collections::HashSet::from([BASE_LINK.to_owned()]);
+    let mut seen = std::collections::HashSet::from([frames.root.clone()]);
     let links = arm.joints.iter().map(|joint| link_name(&joint.name));
-    for name in links.chain(frames.map(str::to_owned)) {
+    for name in links.chain(frames.fixed.iter().map(|frame| frame.name.clone())) {
         if !seen.insert(name.clone()) {
             return Err(ExportError::DuplicateName { name });
         }
     }
     Ok(())
 }
-
-const BASE_LINK: &str = "base_link";
 
 /// Name of the link that a joint moves.
 fn link_name(joint: &str) -> String {
@@ -110,16 +109,20 @@ mod tests {
     use super::*;
     use crate::robot::{FixedFrame, Placement, UrdfArm, read_urdf};
 
-    fn frames() -> Vec<FixedFrame> {
+    /// A robot on a stand: its base is a frame of the root link.
+    fn frames() -> Frames {
         let frame = |name: &str, body, xyz, rpy| FixedFrame {
             name: name.into(),
             body,
             placement: Placement::from_xyz_rpy(xyz, rpy),
         };
-        vec![
-            frame("stand", 0, [0.1, 0.0, -0.3], [0.0, 0.0, 0.3]),
-            frame("tool & <tip>", 6, [0.0, 0.01, 0.1], [0.4, -1.2, 2.0]),
-        ]
+        Frames {
+            root: "wor<l>d".into(),
+            fixed: vec![
+                frame("base_link", 0, [0.1, 0.0, -0.3], [0.0, 0.0, 0.3]),
+                frame("tool & <tip>", 6, [0.0, 0.01, 0.1], [0.4, -1.2, 2.0]),
+            ],
+        }
     }
 
     /// Rotations go through three angles and back (a few roundings), moments through the centre of
@@ -143,7 +146,8 @@ mod tests {
                     assert!((x - y).abs() < 1e-14, "{name} {}: {x} {y}", a.name);
                 }
             }
-            for (a, b) in frames().iter().zip(&read_frames) {
+            assert_eq!(frames().root, read_frames.root);
+            for (a, b) in frames().fixed.iter().zip(&read_frames.fixed) {
                 assert_eq!((&a.name, a.body), (&b.name, b.body));
                 assert!((a.placement.rotation - b.placement.rotation).norm() < 1e-14);
                 assert!((a.placement.translation_m - b.placement.translation_m).norm() < 1e-15);
@@ -160,26 +164,26 @@ mod tests {
     fn what_no_simulator_runs_is_not_written() {
         let mut arm = Arm::built_in("ur5").unwrap();
         arm.joints[3].drive.rotor_inertia_kg_m2 = -0.1;
-        let message = urdf(&arm, &[]).unwrap_err().to_string();
+        let message = urdf(&arm, &Frames::default()).unwrap_err().to_string();
         assert!(message.contains("wrist_1") && message.contains("--physical"), "{message}");
         let mut arm = Arm::built_in("ur5").unwrap();
         arm.joints[5].link.parameters[4] = 1.0;
-        let message = mjcf(&arm, &[]).unwrap_err().to_string();
+        let message = mjcf(&arm, &Frames::default()).unwrap_err().to_string();
         assert!(message.contains("wrist_3") && message.contains("cannot exist"), "{message}");
         let mut arm = Arm::built_in("ur5").unwrap();
         arm.joints[1].link.parameters[0] = f64::NAN;
-        assert!(matches!(mjcf(&arm, &[]), Err(ExportError::NotFinite { .. })));
+        assert!(matches!(mjcf(&arm, &Frames::default()), Err(ExportError::NotFinite { .. })));
         let mut arm = Arm::built_in("ur5").unwrap();
         arm.joints[1].name = arm.joints[0].name.clone();
-        assert!(matches!(urdf(&arm, &[]), Err(ExportError::DuplicateName { .. })));
+        assert!(matches!(urdf(&arm, &Frames::default()), Err(ExportError::DuplicateName { .. })));
     }
 
     #[test]
     fn an_unknown_torque_limit_is_a_large_number() {
         let mut arm = Arm::built_in("ur5").unwrap();
         arm.joints[0].limits.torque_nm = f64::INFINITY;
-        assert!(urdf(&arm, &[]).unwrap().contains("effort=\"1000000000\""));
-        assert!(mjcf(&arm, &[]).unwrap().contains("-1000000000 1000000000"));
+        assert!(urdf(&arm, &Frames::default()).unwrap().contains("effort=\"1000000000\""));
+        assert!(mjcf(&arm, &Frames::default()).unwrap().contains("-1000000000 1000000000"));
     }
 
     #[test]
@@ -196,7 +200,7 @@ mod tests {
     #[test]
     fn the_drive_file_gives_a_urdf_its_drives_back() {
         let arm = Arm::built_in("ur5").unwrap();
-        let mut read = read_urdf(&urdf(&arm, &[]).unwrap(), "x.urdf").unwrap().arm;
+        let mut read = read_urdf(&urdf(&arm, &Frames::default()).unwrap(), "x.urdf").unwrap().arm;
         apply_drive_file(&mut read, &drive_file(&arm, &[0.0; 6]), "x.drives.toml").unwrap();
         assert_eq!(read.gravity_m_s2, arm.gravity_m_s2);
         assert_eq!(read.friction_epsilon_rad_s, arm.friction_epsilon_rad_s);

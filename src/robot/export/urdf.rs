@@ -2,28 +2,27 @@
 
 use std::fmt::Write;
 
-use nalgebra::Rotation3;
-
 use super::xml::{about_com, escaped, frames_of, numbers};
-use super::{BASE_LINK, ExportError, UNKNOWN_TORQUE_NM, check, link_name};
-use crate::robot::{Arm, FixedFrame, Joint, Placement};
+use super::{ExportError, UNKNOWN_TORQUE_NM, check, link_name};
+use crate::robot::{Arm, FixedFrame, Frames, Joint, Placement};
 
 /// The arm as URDF, with `frames` as links without mass.
 ///
-/// - One link per body, named `<joint>_link` behind `base_link`; its frame is our joint frame, so
+/// - One link per body, named `<joint>_link` behind the root link; its frame is our joint frame, so
 ///   every axis is `0 0 1`; inertia about the centre of mass, in the link's axes.
 /// - `damping` is rv in Nm s/rad, `friction` rc in Nm (tanh(q̇/ε) in our model, a sign or
 ///   a constraint in others).
 /// - Rotor inertia, acceleration limit, gear ratio, torque constant, ε, torque offsets and gravity have no place: they
 ///   are in the [`drive_file`](super::drive_file). Clearance capsules are left out.
-pub fn urdf(arm: &Arm, frames: &[FixedFrame]) -> Result<String, ExportError> {
-    check(arm, frames.iter().map(|frame| frame.name.as_str()))?;
+pub fn urdf(arm: &Arm, frames: &Frames) -> Result<String, ExportError> {
+    check(arm, frames)?;
+    let Frames { root, fixed: frames } = frames;
     let mut out = String::from("<?xml version=\"1.0\"?>\n");
     // Writing to a String cannot fail, so the results carry no information.
     let _ = writeln!(out, "<robot name=\"{}\">", escaped(&arm.name));
-    let _ = writeln!(out, "  <link name=\"{BASE_LINK}\"/>");
-    write_frames(&mut out, frames, 0, BASE_LINK);
-    let mut parent = BASE_LINK.to_owned();
+    let _ = writeln!(out, "  <link name=\"{}\"/>", escaped(root));
+    write_frames(&mut out, frames, 0, root);
+    let mut parent = root.clone();
     for (body, joint) in arm.joints.iter().enumerate() {
         let child = link_name(&joint.name);
         write_link(&mut out, joint, &child);
@@ -87,8 +86,6 @@ fn write_frames(out: &mut String, frames: &[FixedFrame], body: usize, parent: &s
 
 /// Translation and fixed-axis roll, pitch, yaw.
 fn origin(placement: &Placement) -> String {
-    let rotation = Rotation3::from_matrix_unchecked(placement.rotation);
-    let (roll, pitch, yaw) = rotation.euler_angles();
     let xyz = numbers(placement.translation_m.iter());
-    format!("<origin xyz=\"{xyz}\" rpy=\"{}\"/>", numbers([&roll, &pitch, &yaw]))
+    format!("<origin xyz=\"{xyz}\" rpy=\"{}\"/>", numbers(&placement.rpy_rad()))
 }

@@ -1,7 +1,5 @@
 //! Robot files written.
 
-use nalgebra::Rotation3;
-
 use super::{BoxEntry, CapsuleEntry, JointEntry, RobotFile, Tensor};
 use crate::robot::{Arm, Capsule, Joint};
 
@@ -30,13 +28,11 @@ impl Arm {
 impl JointEntry {
     fn of(joint: &Joint) -> Self {
         let Joint { name, placement, link, drive, limits, bounds } = joint;
-        let (roll, pitch, yaw) =
-            Rotation3::from_matrix_unchecked(placement.rotation).euler_angles();
         let t = link.inertia_com_kg_m2().unwrap_or_default();
         Self {
             name: name.clone(),
             xyz_m: placement.translation_m.into(),
-            rpy_rad: [roll, pitch, yaw],
+            rpy_rad: placement.rpy_rad(),
             mass_kg: link.mass_kg(),
             com_m: link.com_m().unwrap_or_default().into(),
             inertia_com_kg_m2: Tensor {
@@ -83,7 +79,9 @@ mod tests {
     #[test]
     fn every_built_in_arm_comes_back() {
         for name in built_in_names() {
-            let arm = Arm::built_in(name).unwrap();
+            let mut arm = Arm::built_in(name).unwrap();
+            // A limit that a URDF does not give.
+            arm.joints[0].limits.torque_nm = f64::INFINITY;
             let again = Arm::from_toml(&arm.to_toml(), "written").unwrap();
             assert_eq!(again.clearance, arm.clearance);
             assert_eq!(again.torque_offsets, arm.torque_offsets);

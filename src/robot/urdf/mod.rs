@@ -15,4 +15,4 @@ mod unreadable;
 
 pub use fault::UrdfFault;
 pub use notice::UrdfNotice;
-pub use read::{FixedFrame, UrdfArm, read_urdf};
+pub use read::{FixedFrame, Frames, UrdfArm, read_urdf};

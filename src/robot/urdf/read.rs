@@ -30,9 +30,25 @@ pub struct UrdfArm {
     /// The arm.
     pub arm: Arm,
     /// Named links without mass on the bodies: flange, tool0.
-    pub frames: Vec<FixedFrame>,
+    pub frames: Frames,
     /// What was assumed, merged or left out, in words by `Display`.
     pub notices: Vec<UrdfNotice>,
+}
+
+/// Named frames of an arm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frames {
+    /// Name of the base frame: the root link.
+    pub root: String,
+    /// All others.
+    pub fixed: Vec<FixedFrame>,
+}
+
+/// No frame but the base, "base_link".
+impl Default for Frames {
+    fn default() -> Self {
+        Self { root: "base_link".into(), fixed: Vec::new() }
+    }
 }
 
 /// A named frame fixed in a body.
@@ -80,8 +96,8 @@ pub fn read_urdf(text: &str, source: &str) -> Result<UrdfArm, RobotError> {
         }
     })?;
     let mut reader = Reader::default();
-    let joints = bodies(&robot)
-        .and_then(|chain| reader.joints(&chain))
+    let (root, joints) = bodies(&robot)
+        .and_then(|chain| Ok((chain[0].links[0].0.name.clone(), reader.joints(&chain)?)))
         .map_err(|fault| RobotError::UrdfArm { file: source.to_owned(), fault })?;
     let files = missing_meshes(&robot, source);
     if !files.is_empty() {
@@ -96,7 +112,7 @@ pub fn read_urdf(text: &str, source: &str) -> Result<UrdfArm, RobotError> {
             joints,
             clearance: Clearance::default(),
         },
-        frames: reader.frames,
+        frames: Frames { root, fixed: reader.frames },
         notices: reader.notices,
     })
 }

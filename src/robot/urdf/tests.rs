@@ -72,7 +72,7 @@ fn a_plain_chain_is_read_as_written() {
     let UrdfArm { arm, frames, notices } = read(&robot(&two_joints()));
     assert_eq!(arm.name, "toy");
     assert_eq!(arm.dof(), 2);
-    assert!(frames.is_empty());
+    assert!(frames.root == "base" && frames.fixed.is_empty());
     let joint = &arm.joints[0];
     assert_eq!(joint.name, "j1");
     assert_eq!(joint.placement.translation_m, Vector3::new(0.0, 0.0, 0.5));
@@ -115,7 +115,8 @@ fn links_ahead_of_the_first_joint_are_folded_into_its_placement() {
     let placement = arm.joints[0].placement;
     assert_eq!(placement.translation_m, Vector3::new(1.0, 0.0, 0.5));
     assert_eq!(placement.rotation * Vector3::x(), Vector3::y());
-    assert_eq!((frames[0].name.as_str(), frames[0].body), ("base", 0));
+    assert_eq!(frames.root, "world");
+    assert_eq!((frames.fixed[0].name.as_str(), frames.fixed[0].body), ("base", 0));
     assert!(notices.contains(&UrdfNotice::Gravity { root: "world".into() }));
 }
 
@@ -133,8 +134,8 @@ fn a_fixed_link_with_mass_is_merged_and_one_without_becomes_a_frame() {
     assert_abs_diff_eq!(body.com_m().unwrap(), Vector3::new(0.0, 0.0, 0.5), epsilon = 1e-15);
     // B about the joint: 2 (0.02 + 2·0.1²) + 2 kg·1 m².
     assert_abs_diff_eq!(body.parameters[5], 2.08, epsilon = 1e-14);
-    assert_eq!((frames[0].name.as_str(), frames[0].body), ("tool0", 2));
-    assert_eq!(frames[0].placement.translation_m, Vector3::new(0.0, 0.0, 1.5));
+    assert_eq!((frames.fixed[0].name.as_str(), frames.fixed[0].body), ("tool0", 2));
+    assert_eq!(frames.fixed[0].placement.translation_m, Vector3::new(0.0, 0.0, 1.5));
     let merged = UrdfNotice::Merged { link: "gripper".into(), joint: "j2".into(), mass_kg: 2.0 };
     assert!(notices.contains(&merged));
 }

@@ -4,8 +4,9 @@ use serde::Serialize;
 
 use crate::log::Log;
 
+/// What became of the rows of one or several logs.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct Rows {
+pub struct Rows {
     pub(super) read: usize,
     pub(super) used: usize,
     set_aside: Vec<SetAside>,
@@ -22,8 +23,14 @@ pub(super) fn names(logs: &[&Log]) -> String {
     logs.iter().map(|log| log.source.as_str()).collect::<Vec<_>>().join(", ")
 }
 
+/// What should be known of a log that could be read, with its name.
+pub fn log_warnings(log: &Log) -> impl Iterator<Item = String> {
+    log.rows.warnings.iter().map(|warning| format!("{}: {warning}", log.source))
+}
+
 impl Rows {
-    pub(super) fn of(logs: &[&Log]) -> Self {
+    /// Of all `logs` together.
+    pub fn of(logs: &[&Log]) -> Self {
         let mut rows = Self { read: 0, used: 0, set_aside: Vec::new() };
         for log in logs {
             rows.read += log.rows.read;

@@ -1,0 +1,41 @@
+//! When the rows of a regression were recorded, and how fast the joints moved then.
+
+use super::identifier::Regression;
+use crate::robot::JointSignals;
+
+/// Time and velocity of every row, all periods.
+#[derive(Debug, Clone)]
+pub struct Course {
+    /// On the log's clock, s; of several logs on that of the first, one log behind the other.
+    pub time_s: Vec<f64>,
+    /// Joints × rows, rad/s.
+    pub qd_rad_s: JointSignals,
+}
+
+impl Course {
+    /// Of a single log.
+    pub(super) fn of(regression: &Regression) -> Self {
+        let (n, periods) = (regression.problem.samples, regression.problem.periods);
+        let processing = &regression.prepared.processing;
+        let rate_hz = processing.rate_hz;
+        let start_s = processing.window_s[0] + regression.first_sample as f64 / rate_hz;
+        let step_s = regression.every as f64 / rate_hz;
+        let qd_rad_s = &regression.prepared.motion.qd_rad_s;
+        Self {
+            time_s: (0..n * periods).map(|k| start_s + k as f64 * step_s).collect(),
+            qd_rad_s: JointSignals::from_fn(qd_rad_s.joints(), n * periods, |j, k| {
+                qd_rad_s.joint(j)[regression.sample(k % n)]
+            }),
+        }
+    }
+
+    /// Puts `other` behind this one, a step of its own later.
+    pub(super) fn append(&mut self, other: &Self) {
+        if let (Some(last), [first, second, ..]) = (self.time_s.last(), &other.time_s[..]) {
+            let shift_s = last + (second - first) - first;
+            self.time_s.extend(other.time_s.iter().map(|time_s| time_s + shift_s));
+            let both = |j: usize, own: &[f64]| [own, other.qd_rad_s.joint(j)].concat();
+            self.qd_rad_s = self.qd_rad_s.map_joints(both);
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! Where the joints of an arm stand and how it hangs: what its parameters are about.
+
+use nalgebra::{Rotation3, Vector3};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::arm::{Arm, Placement};
+
+/// Frames that are apart by less are the same, m and rad: files print as many digits.
+const SAME: f64 = 1e-6;
+
+/// Joint frames and gravity of an arm, as results carry them.
+///
+/// The name of a robot does not say them: two files describe one robot by other joint frames, and parameters about the frames
+/// of one are wrong about those of the other.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Kinematics {
+    /// Gravity in the base frame, m/s².
+    gravity_m_s2: [f64; 3],
+    /// From base to flange.
+    joint_frames: Vec<JointFrame>,
+}
+
+/// Pose of a joint frame at q = 0 in its parent's: translation, and roll, pitch and yaw about fixed axes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct JointFrame {
+    xyz_m: [f64; 3],
+    rpy_rad: [f64; 3],
+}
+
+/// How an arm differs from the one that a result is about.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum KinematicsDifference {
+    /// In the number of joints.
+    #[error("it has {found} joints, not {expected}")]
+    Joints {
+        /// Of the result.
+        found: usize,
+        /// Of the arm.
+        expected: usize,
+    },
+    /// In a joint frame.
+    #[error("the frame of joint {joint} is {distance_m:.2e} m and {angle_rad:.2e} rad elsewhere")]
+    Frame {
+        /// From 1.
+        joint: usize,
+        /// Between the origins.
+        distance_m: f64,
+        /// Between the axes.
+        angle_rad: f64,
+    },
+    /// In the gravity.
+    #[error("its gravity is {found:?} m/s², not {expected:?}")]
+    Gravity {
+        /// Of the result.
+        found: [f64; 3],
+        /// Of the arm.
+        expected: [f64; 3],
+    },
+}
+
+impl Kinematics {
+    /// Of `arm`.
+    pub fn of(arm: &Arm) -> Self {
+        let frame = |placement: &Placement| JointFrame {
+            xyz_m: placement.translation_m.into(),
+            rpy_rad: placement.rpy_rad(),
+        };
+        Self {
+            gravity_m_s2: arm.gravity_m_s2.into(),
+            joint_frames: arm.joints.iter().map(|joint| frame(&joint.placement)).collect(),
+        }
+    }
+
+    /// The first difference between this and `arm`; `None` where parameters mean the same.
+    pub fn difference(&self, arm: &Arm) -> Option<KinematicsDifference> {
+        let (found, expected) = (self.joint_frames.len(), arm.dof());
+        if found != expected {
+            return Some(KinematicsDifference::Joints { found, expected });
+        }
+        for (j, (own, joint)) in self.joint_frames.iter().zip(&arm.joints).enumerate() {
+            let own = Placement::from_xyz_rpy(own.xyz_m, own.rpy_rad);
+            let distance_m = (own.translation_m - joint.placement.translation_m).norm();
+            let turn = own.rotation.transpose() * joint.placement.rotation;
+            let angle_rad = Rotation3::from_matrix_unchecked(turn).angle();
+            // Also what is no number is a difference.
+            if !(distance_m < SAME && angle_rad < SAME) {
+                return Some(KinematicsDifference::Frame { joint: j + 1, distance_m, angle_rad });
+            }
+        }
+        let found = self.gravity_m_s2;
+        let is_same = (Vector3::from(found) - arm.gravity_m_s2).norm() < SAME;
+        let expected = arm.gravity_m_s2.into();
+        (!is_same).then_some(KinematicsDifference::Gravity { found, expected })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::built_in_names;
+
+    #[test]
+    fn an_arm_is_the_same_as_itself_and_no_other() {
+        let arms = || built_in_names().map(|name| Arm::built_in(name).unwrap());
+        for one in arms() {
+            let written = serde_json::to_string(&Kinematics::of(&one)).unwrap();
+            let own: Kinematics = serde_json::from_str(&written).unwrap();
+            for other in arms() {
+                assert_eq!(own.difference(&other).is_none(), one.name == other.name);
+            }
+        }
+    }
+
+    #[test]
+    fn what_differs_is_said() {
+        let arm = Arm::built_in("ur5").unwrap();
+        let own = Kinematics::of(&arm);
+        let says = |change: &dyn Fn(&mut Arm)| {
+            let mut other = arm.clone();
+            change(&mut other);
+            own.difference(&other).unwrap().to_string()
+        };
+        let shifted = says(&|arm| arm.joints[2].placement.translation_m.x += 1e-3);
+        assert!(shifted.contains("joint 3") && shifted.contains("1.00e-3 m"), "{shifted}");
+        let turn = Placement::from_xyz_rpy([0.0; 3], [0.0, 0.0, 0.5]);
+        let turned = says(&|arm| arm.joints[4].placement = arm.joints[4].placement.compose(&turn));
+        assert!(turned.contains("joint 5") && turned.contains("5.00e-1 rad"), "{turned}");
+        assert!(says(&|arm| arm.gravity_m_s2.z = -9.7).contains("-9.81"));
+        assert!(says(&|arm| arm.joints.truncate(5)).contains("6 joints, not 5"));
+    }
+}
