@@ -2,7 +2,7 @@
 //! and contacts, which no fit absorbs. Everything hidden is made by the plant.
 
 use armid::base::BaseSet;
-use armid::diagnose::{Cause, Diagnoser, Diagnosis, Validation};
+use armid::diagnose::{Cause, Diagnoser, Diagnosis, Kind, Validation};
 use armid::dynamics::Model;
 use armid::identify::{Measurement, Options};
 use armid::montecarlo::{Scenario, Simulation};
@@ -113,6 +113,19 @@ fn nothing_is_named_against_the_simulation_that_made_the_log() {
     assert!(!says_that_contacts_are_not_looked_for(&d), "{:?}", d.warnings);
 }
 
+/// What the parameters of a model cannot follow of another gravity looks like something else beside it, and is nothing beside
+/// the gravity.
+#[test]
+fn another_gravity_is_nothing_else() {
+    let run = Run::new(22, 4, "[[effect]]\nkind = \"gravity\"\ng_m_s2 = 9.2\n");
+    let model = Model::new(&run.arm);
+    let mut diagnoser = Diagnoser::new(&run.arm, &model, &run.set, run.options.clone());
+    let alone = diagnoser.diagnose(&run.measurement(), &[], None).unwrap().diagnosis;
+    assert!(!alone.causes.is_empty(), "{:?}", alone.sentences);
+    let named: Vec<_> = run.against_nominal().causes.into_iter().map(|cause| cause.kind).collect();
+    assert_eq!(named, [Kind::Gravity]);
+}
+
 fn says_that_contacts_are_not_looked_for(d: &Diagnosis) -> bool {
     d.warnings.iter().any(|warning| warning.starts_with("contacts are not looked for"))
 }
@@ -120,9 +133,13 @@ fn says_that_contacts_are_not_looked_for(d: &Diagnosis) -> bool {
 /// Where two periods differ neither is the one that was touched.
 #[test]
 fn of_two_periods_contacts_are_not_looked_for() {
-    let mut run = Run::new(19, 2, "");
-    // Two periods are too few to be found.
-    run.options.period_s = Some(10.0);
+    let mut run = Run::new(19, 3, "");
+    // The third is cut off.
+    let rows = 0..3200;
+    run.log.time_s.truncate(rows.end);
+    for signals in [&mut run.log.q_rad, &mut run.log.qd_rad_s, &mut run.log.torque_nm] {
+        *signals = signals.slice(rows.clone());
+    }
     let d = run.against_nominal();
     assert!(says_that_contacts_are_not_looked_for(&d), "{:?}", d.warnings);
 }

@@ -15,6 +15,7 @@ use super::chance;
 use super::image::{Column, Image, Span};
 use super::judgement::{TELLS_APART, probability_of_class};
 use super::kind::Kind;
+use super::significance::LEAST_EVIDENCE;
 use super::study::{Entry, Study};
 use super::verdict::{Cause, Estimate, Moved, Rival};
 use crate::base::BaseSet;
@@ -64,9 +65,10 @@ pub fn moved(set: &BaseSet, simulation: &[f64], identification: &Identification)
 pub struct Explained {
     /// The changes, the one that explains most first.
     pub causes: Vec<Cause>,
-    /// Every change that was looked for: kind and joint from 1. What is one of them is judged here alone.
-    pub looked_for: Vec<(Kind, Option<usize>)>,
-    /// What the changes and `accepted` span outside the null model.
+    /// Every change that was looked for, and every effect that is needless beside those found: kind and joint from 1. What is
+    /// one of them is judged here alone.
+    pub judged: Vec<(Kind, Option<usize>)>,
+    /// What the changes and the effects that are needed span outside the null model.
     pub span: Span,
 }
 
@@ -82,26 +84,37 @@ pub fn explain(study: &Study, set: &BaseSet, simulation: &[f64], accepted: &[&En
         let place = (study.families[entry.family].kind(), entry.site);
         changes.iter().any(|c| (c.kind, c.site) == place)
     };
-    let beside: Vec<&Entry> = accepted.iter().filter(|e| !is_change(e)).copied().collect();
-    let mut span = study.span_of_all(&beside);
-    // How its drives answer friction no simulation says, and the residual holds it.
-    let mut nuisance = span.clone();
-    for image in &study.null_columns[study.base_count()..] {
-        nuisance.push(image);
-    }
+    let mut beside: Vec<&Entry> = accepted.iter().filter(|e| !is_change(e)).copied().collect();
+    let place = |c: &Change| (c.kind, c.site.map(|j| j + 1));
+    let mut judged: Vec<(Kind, Option<usize>)> = changes.iter().map(place).collect();
     let places = places(&changes);
-    let search = Search { study, changes, places, nuisance, residual };
-    let taken = search.select();
+    let nuisance = nuisance(study, &beside);
+    let mut search = Search { study, changes, places, nuisance, residual };
+    let mut taken = search.select();
+    // What the null model could not absorb of a change may have been taken for an effect.
+    while let Some(needless) = (0..beside.len()).find(|&e| !search.needs(e, &beside, &taken)) {
+        let entry = beside.remove(needless);
+        judged.push((study.families[entry.family].kind(), entry.site.map(|j| j + 1)));
+        search.nuisance = self::nuisance(study, &beside);
+        taken = search.select();
+    }
+    let mut span = study.span_of_all(&beside);
     let images = taken.iter().flat_map(|&c| &search.changes[c].images);
     for image in images.filter_map(|image| study.outside_null(image.clone())) {
         span.push(&image);
     }
-    let place = |c: &Change| (c.kind, c.site.map(|j| j + 1));
-    Explained {
-        causes: (0..taken.len()).map(|index| search.cause(&taken, index)).collect(),
-        looked_for: search.changes.iter().map(place).collect(),
-        span,
+    let causes = (0..taken.len()).map(|index| search.cause(&taken, index)).collect();
+    Explained { causes, judged, span }
+}
+
+/// What the residual of a simulation holds beside changes: the effects `beside`, and how drives answer friction, which no
+/// simulation says.
+fn nuisance(study: &Study, beside: &[&Entry]) -> Span {
+    let mut span = study.span_of_all(beside);
+    for image in &study.null_columns[study.base_count()..] {
+        span.push(image);
     }
+    span
 }
 
 struct Search<'a> {
@@ -147,6 +160,23 @@ impl Search<'_> {
         taken
     }
 
+    /// Whether effect number `e` of those `beside` is worth its price beside the others and the changes `taken`; true where none
+    /// is, which is how it was found, and of one of several of a family at its site, which are judged together.
+    fn needs(&self, e: usize, beside: &[&Entry], taken: &[usize]) -> bool {
+        let study = self.study;
+        let entry = beside[e];
+        let alike = beside.iter().filter(|b| (b.family, b.site) == (entry.family, entry.site));
+        if taken.is_empty() || alike.count() > 1 {
+            return true;
+        }
+        let others = nuisance(study, &[&beside[..e], &beside[e + 1..]].concat());
+        let (others, rest) = self.outside_of(others, taken);
+        let span = Span::outside(&others, &entry.images);
+        let gain = study.statistic.gain(&span, &rest);
+        let probability = study.statistic.probability(&span, &rest) * study.tests(entry);
+        gain - study.price(entry) > LEAST_EVIDENCE && probability < chance::LAW
+    }
+
     /// All changes that are not `taken`, best first.
     fn scored(&self, taken: &[usize]) -> Vec<Scored> {
         let study = self.study;
@@ -171,7 +201,11 @@ impl Search<'_> {
 
     /// Span of the changes `taken` and of what no simulation has, and the residual outside it.
     fn outside(&self, taken: &[usize]) -> (Span, Image) {
-        let mut span = self.nuisance.clone();
+        self.outside_of(self.nuisance.clone(), taken)
+    }
+
+    /// The same of the changes `taken` and `span`.
+    fn outside_of(&self, mut span: Span, taken: &[usize]) -> (Span, Image) {
         for image in taken.iter().flat_map(|&c| &self.changes[c].images) {
             span.push(image);
         }

@@ -160,7 +160,7 @@ impl<'a> Diagnoser<'a> {
         if let Some(simulation) = simulation {
             moved_parameters = against::moved(self.set, simulation, &identification);
             let explained = against::explain(&study, self.set, simulation, &entries);
-            causes.retain(|c| !explained.looked_for.contains(&(c.kind, c.joint)));
+            causes.retain(|c| !explained.judged.contains(&(c.kind, c.joint)));
             causes.extend(explained.causes);
             rest = study.residual.clone();
             explained.span.residualise(&mut rest);
