@@ -349,8 +349,7 @@ fn changes<'a>(study: &'a Study<'a>, set: &BaseSet, simulation: &[f64]) -> Vec<C
             );
         }
     }
-    let is_looked_at = |site: Option<usize>| site.is_none_or(|j| !study.left_out.contains(&j));
-    out.retain(|c| is_looked_at(c.site) && c.images.iter().any(|i| i.square() > 0.0));
+    out.retain(|c| study.looks_at(c.site) && c.images.iter().any(|i| i.square() > 0.0));
     out
 }
 

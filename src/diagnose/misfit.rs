@@ -52,7 +52,7 @@ pub fn lack_of_fit(study: &Study, accepted: &Span, residual: &Image) -> Option<L
     };
     let (mut least, mut worst) = (1.0f64, 0);
     let mut tests = 0.0;
-    for joint in (0..study.scene.joints()).filter(|j| !study.left_out.contains(j)) {
+    for joint in (0..study.scene.joints()).filter(|j| study.looks_at(Some(*j))) {
         for band in edges.windows(2).filter(|band| band[0] < band[1]) {
             let (mut square, mut freedom) = (0.0, 0.0);
             for row in (band[0]..band[1]).flat_map(|h| knowledge.rows(h, joint)) {
@@ -94,7 +94,7 @@ pub fn unexplained(
     let scene = &study.scene;
     let mut found: Vec<Curve> = Vec::new();
     let mut tests = 0.0;
-    for j in (0..scene.joints()).filter(|j| !study.left_out.contains(j)) {
+    for j in (0..scene.joints()).filter(|j| study.looks_at(Some(*j))) {
         let torque_rate = scene.torque_rate_nm_s(j);
         let time: Vec<f64> = (0..scene.samples()).map(|k| k as f64 / scene.rate_hz).collect();
         let axes: [(Axis, &[f64]); 6] = [

@@ -365,7 +365,7 @@ impl<'s, 'a> Kept<'s, 'a> {
         let Some(torque) = study.whitening.in_time(residual) else { return Vec::new() };
         (0..study.scene.joints())
             .into_par_iter()
-            .filter(|j| !study.left_out.contains(j))
+            .filter(|j| study.looks_at(Some(*j)))
             .flat_map(|j| {
                 let shapes = strongest_orders(&study.scene, j, torque.joint(j));
                 shapes

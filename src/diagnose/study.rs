@@ -251,6 +251,11 @@ impl<'a> Study<'a> {
         self.left_out = joints;
     }
 
+    /// Whether something is looked for at `site`: on a joint that is not left out, or in the arm as a whole.
+    pub fn looks_at(&self, site: Option<usize>) -> bool {
+        site.is_none_or(|j| !self.left_out.contains(&j))
+    }
+
     fn fill_entries(&mut self, is_wanted: impl Fn(&Place) -> bool) {
         let study = &*self;
         let wanted: Vec<(usize, Option<usize>, Vec<Shape>)> = study
@@ -260,8 +265,7 @@ impl<'a> Study<'a> {
             .flat_map(|(family, candidate)| {
                 let scene = &study.scene;
                 let sites = candidate.sites(scene.joints()).into_iter();
-                let looked_at =
-                    |site: &Option<usize>| site.is_none_or(|j| !study.left_out.contains(&j));
+                let looked_at = |site: &Option<usize>| study.looks_at(*site);
                 let is_wanted = &is_wanted;
                 let sites = sites.filter(looked_at).filter(move |s| is_wanted(&(family, *s)));
                 sites.flat_map(move |site| {

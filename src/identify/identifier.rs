@@ -359,10 +359,9 @@ impl<'a> Identifier<'a> {
             None => Estimator::Wls,
         };
         // What works harmonic by harmonic has no blocks of time.
-        let default_kind = match estimator {
-            Estimator::Spectral => CovarianceKind::Spectral,
-            _ if repeats => CovarianceKind::Spectral,
-            _ => CovarianceKind::Blocks,
+        let default_kind = match repeats || estimator == Estimator::Spectral {
+            true => CovarianceKind::Spectral,
+            false => CovarianceKind::Blocks,
         };
         let kind = self.options.covariance.unwrap_or(default_kind);
         let Processing { logs, periods, .. } = prepared.processing;

@@ -96,7 +96,7 @@ impl Plan {
             fields.extend(found.map_err(|missing| header.missing(missing))?);
         }
         fields.extend(header.effort()?);
-        for block in Block::OPTIONAL {
+        for block in Block::optional() {
             if layout.columns(block).is_some() {
                 fields.extend(header.block(block)?.unwrap_or_default());
             }

@@ -244,7 +244,7 @@ impl Table {
         if set_aside * 10 > account.read {
             warnings.push(LogWarning::ManySetAside { set_aside, read: account.read });
         }
-        warnings.extend(Block::OPTIONAL.into_iter().filter_map(|b| self.left_out(plan, b)));
+        warnings.extend(Block::optional().filter_map(|b| self.left_out(plan, b)));
         Ok(warnings)
     }
 

@@ -35,18 +35,13 @@ impl Block {
     ];
 
     /// Those that a log need not have.
-    pub(in crate::log) const OPTIONAL: [Self; 6] = [
-        Self::TargetQ,
-        Self::TargetQd,
-        Self::TargetQdd,
-        Self::TargetCurrent,
-        Self::TargetMoment,
-        Self::Temperature,
-    ];
+    pub(in crate::log) fn optional() -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().filter(|block| block.is_optional())
+    }
 
     /// Whether a log need not have it.
     pub(in crate::log) fn is_optional(self) -> bool {
-        Self::OPTIONAL.contains(&self)
+        !matches!(self, Self::Time | Self::Q | Self::Qd | Self::Current | Self::Torque)
     }
 
     /// Its key in a layout file.
