@@ -21,7 +21,7 @@ use crate::base::BaseSet;
 use crate::dynamics::{Model, Motion};
 use crate::identify::{Assembler, BetweenRows, Regression};
 use crate::robot::{Arm, JointSignals};
-use crate::signal::Bracket;
+use crate::signal::{Bracket, cubic_at};
 
 /// Moves the torque of `regression` to the mean of its periods' motion, by the base parameters
 /// `theta`, and its columns with it.
@@ -89,7 +89,7 @@ impl Rows<'_> {
         let smooth: Vec<f64> = pairs.map(|(load, qd)| load + drive.viscous_nm_s_rad * qd).collect();
         let at_row = |row: usize| {
             let at = (self.between.time_s[row] - self.start_s) * self.rate_hz;
-            between_samples(&smooth, at) + dry(self.between.qd_rad_s.joint(j)[row])
+            cubic_at(&smooth, at) + dry(self.between.qd_rad_s.joint(j)[row])
         };
         let samples = smooth.iter().zip(qd_rad_s).zip(&self.between.places);
         samples
@@ -100,28 +100,5 @@ impl Rows<'_> {
                 smooth + dry(*qd) - (1.0 - u) * at_row(left) - u * at_row(left + 1)
             })
             .collect()
-    }
-}
-
-/// y at the fractional sample `at`: a cubic through two samples on either side (Catmull and Rom 1974).
-fn between_samples(y: &[f64], at: f64) -> f64 {
-    let at = at.clamp(1.0, (y.len() - 3) as f64);
-    let left = at.floor() as usize;
-    let u = at - left as f64;
-    let [a, b, c, d] = [y[left - 1], y[left], y[left + 1], y[left + 2]];
-    b + 0.5 * u * (c - a + u * (2.0 * a - 5.0 * b + 4.0 * c - d + u * (3.0 * (b - c) + d - a)))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_parabola_is_itself_between_its_samples() {
-        let parabola = |x: f64| 2.0 - 3.0 * x + 0.5 * x * x;
-        let y: Vec<f64> = (0..9).map(|k| parabola(k as f64)).collect();
-        for at in [1.0, 2.25, 4.5, 5.875] {
-            assert!((between_samples(&y, at) - parabola(at)).abs() < 1e-12);
-        }
     }
 }

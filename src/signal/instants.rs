@@ -119,6 +119,24 @@ impl Instants {
     }
 }
 
+/// The straight line between the samples of y around the fractional sample `at`.
+pub fn linear_at(y: &[f64], at: f64) -> f64 {
+    let left = (at.floor() as usize).min(y.len() - 2);
+    lerp(y, &Bracket { left, u: at - left as f64 })
+}
+
+/// y at the fractional sample `at`: a cubic through two samples on either side (Catmull and Rom 1974); a straight line where one
+/// of them is missing.
+pub fn cubic_at(y: &[f64], at: f64) -> f64 {
+    let left = at.floor() as usize;
+    if left == 0 || left + 2 >= y.len() {
+        return linear_at(y, at);
+    }
+    let u = at - left as f64;
+    let [a, b, c, d] = [y[left - 1], y[left], y[left + 1], y[left + 2]];
+    b + 0.5 * u * (c - a + u * (2.0 * a - 5.0 * b + 4.0 * c - d + u * (3.0 * (b - c) + d - a)))
+}
+
 fn lerp(y: &[f64], p: &Bracket) -> f64 {
     if p.u == 0.0 { y[p.left] } else { y[p.left] + p.u * (y[p.left + 1] - y[p.left]) }
 }
@@ -154,4 +172,23 @@ fn monotone_slopes(t: &[f64], y: &[f64]) -> Vec<f64> {
     slopes.extend((1..n - 1).map(inner));
     slopes.push(end(step(n - 2), step(n - 3), secant(n - 2), secant(n - 3)));
     slopes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parabola_is_itself_between_its_samples() {
+        let parabola = |x: f64| 2.0 - 3.0 * x + 0.5 * x * x;
+        let y: Vec<f64> = (0..9).map(|k| parabola(k as f64)).collect();
+        for at in [1.0, 2.25, 4.5, 6.875] {
+            assert!((cubic_at(&y, at) - parabola(at)).abs() < 1e-12, "{at}");
+        }
+        for (at, by_hand) in [(0.5, 0.5 * (y[0] + y[1])), (7.25, 0.75 * y[7] + 0.25 * y[8])] {
+            assert!((cubic_at(&y, at) - by_hand).abs() < 1e-12, "{at}");
+            assert!((linear_at(&y, at) - by_hand).abs() < 1e-12, "{at}");
+        }
+        assert_eq!([cubic_at(&y, 8.0), linear_at(&y, 8.0)], [y[8]; 2]);
+    }
 }

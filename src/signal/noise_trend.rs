@@ -41,14 +41,13 @@ const ALIKE: f64 = 0.2;
 const FLAT_BELOW: f64 = 2.25;
 
 /// The power of noise by harmonic, 0 … `last`, without its scatter: beyond the mean straight lines of ln power in
-/// ln harmonic over k ± max(3, k/4), seven harmonics or more. `freedom` is that of one harmonic, ν, whose
-/// logarithm is low by ln ν − ψ(ν) in the mean, with the variance ψ'(ν).
+/// ln harmonic over k ± max(3, k/4), seven harmonics or more. `freedom` is that of one harmonic, complex numbers.
 ///
 /// The mean is told by its seven neighbours, in ln √(h² + 2.25): noise that is slower than a few harmonics still rises from
-/// the first of them to the mean. What the mean itself shows is not used, because means drift.
+/// the first of them to the mean. What the mean itself shows is not used: means drift, and have half the degrees of freedom.
 pub fn noise_trend(power: &[f64], freedom: usize, last: usize) -> Vec<NoisePower> {
     let end = power.len() - 1;
-    let noise = Scatter::of(freedom);
+    let noise = LogScatter::of(2 * freedom);
     let logarithms = noise.logarithms(power);
     let at = |k: usize| {
         let fit = LocalFit::new(near(k, end), k, 1);
@@ -80,7 +79,7 @@ pub fn noise_trends(
     if power.len() == 1 {
         return vec![noise_trend(&power[0], freedom, last)];
     }
-    let noise = Scatter::of(freedom);
+    let noise = LogScatter::of(2 * freedom);
     let mut beside: Vec<Vec<f64>> = power.iter().map(|p| noise.logarithms(p)).collect();
     let mean: Vec<f64> =
         (0..=end).map(|h| beside.iter().map(|own| own[h]).sum::<f64>() / channels).collect();
@@ -172,22 +171,28 @@ fn around(k: usize, reach: usize, end: usize) -> std::ops::RangeInclusive<usize>
     first..=(k + reach).max(first + 2 * FEWEST).min(end)
 }
 
-/// How the estimated power of one harmonic scatters.
-struct Scatter {
-    /// ln ν − ψ(ν).
+/// How the logarithm of an estimated power scatters.
+pub struct LogScatter {
+    /// ln (ν/2) − ψ(ν/2), by which it is low.
     bias: f64,
-    /// ψ'(ν).
-    variance: f64,
+    /// ψ'(ν/2).
+    pub variance: f64,
 }
 
-impl Scatter {
-    fn of(freedom: usize) -> Self {
-        let nu = freedom as f64;
-        Self { bias: nu.ln() - digamma(nu), variance: trigamma(freedom) }
+impl LogScatter {
+    /// Of a mean square of ν real numbers, `freedom`.
+    pub fn of(freedom: usize) -> Self {
+        let half = 0.5 * freedom as f64;
+        Self { bias: half.ln() - digamma(half), variance: trigamma_of_half(freedom) }
+    }
+
+    /// The logarithm of a power, not low.
+    pub fn logarithm(&self, power: f64) -> f64 {
+        power.ln() + self.bias
     }
 
     fn logarithms(&self, power: &[f64]) -> Vec<f64> {
-        power.iter().map(|p| p.ln() + self.bias).collect()
+        power.iter().map(|p| self.logarithm(*p)).collect()
     }
 }
 
@@ -233,10 +238,15 @@ impl LocalFit {
     }
 }
 
-/// ψ'(n) = π²/6 − Σ 1/i², i < n.
-fn trigamma(n: usize) -> f64 {
-    let below: f64 = (1..n).map(|i| 1.0 / (i * i) as f64).sum();
-    std::f64::consts::PI.powi(2) / 6.0 - below
+/// ψ'(ν/2): π²/6 − Σ 1/i², i < ν/2, of an even ν; π²/2 − 4 Σ 1/i², i < ν and odd, of an odd one.
+fn trigamma_of_half(nu: usize) -> f64 {
+    let square = std::f64::consts::PI.powi(2);
+    let below = |i: usize| 1.0 / (i * i) as f64;
+    if nu.is_multiple_of(2) {
+        square / 6.0 - (1..nu / 2).map(below).sum::<f64>()
+    } else {
+        0.5 * square - 4.0 * (1..nu).step_by(2).map(below).sum::<f64>()
+    }
 }
 
 #[cfg(test)]

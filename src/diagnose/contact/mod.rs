@@ -1,7 +1,8 @@
 //! Something touched the arm: torque that comes once and goes.
 //!
 //! A motion that repeats needs no model: at every phase the torque is compared with the trimmed mean of the other
-//! periods, which one contact cannot move, and what is left is searched for bumps ([`between_periods`]). A
+//! periods, which one contact cannot move, and what is left is searched for bumps ([`between_periods`]), lower ones where the
+//! angles show that the arm moved otherwise: a drive yields to a push by far more than an encoder's noise. A
 //! single run is compared with the extended model, in samples far from the joint's own reversals, where
 //! friction is known best ([`beside_model`]).
 
@@ -9,6 +10,7 @@ mod beside_model;
 mod between_periods;
 mod bump;
 mod disturbed;
+mod moves;
 mod rarity;
 mod repeats;
 

@@ -2,19 +2,21 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
-use crate::diagnose::chance;
-
 /// How often per length of itself a bump that is looked for with 1 − u² passes a height of z σ either way in white noise, over
 /// e^{−z²/2}: 2 √(∫b'²/∫b²)/(2π) = √10/π (Rice 1945). Whitened by coloured noise bumps are narrower, and pass up to eight times
 /// as often. Bumps of neighbouring lengths are half of the time the same one, and heights of noise that few samples tell count as
 /// lower: in simulated noise of several colours the three together leave a quarter to one and a half of the chance.
 const PASSES: f64 = 1.006_6;
 
-/// σ from which on a bump of `length_s` in one joint is a contact, in a log of `duration_s` that is looked through for
-/// bumps of so many `lengths` in so many `ways` (each joint, and all together), between which the chance is shared out evenly.
-pub(super) fn far(length_s: f64, duration_s: f64, lengths: usize, ways: usize) -> f64 {
-    let places = PASSES * duration_s / length_s * (lengths * ways) as f64;
-    (2.0 * (places.max(1.0) / chance::CONTACT).ln()).sqrt()
+/// How often noise makes bumps of `length_s`, over e^{−z²/2} of their height z σ, where so many `kinds` of them (lengths, joints) are
+/// looked for during `duration_s`; but for those that are high already when it begins, which add a fifth in the shortest places.
+pub(super) fn bumps(length_s: f64, duration_s: f64, kinds: usize) -> f64 {
+    PASSES * duration_s / length_s * kinds as f64
+}
+
+/// σ from which on a bump is made by noise with the `chance` at most, if noise makes so many [`bumps`].
+pub(super) fn far(bumps: f64, chance: f64) -> f64 {
+    (2.0 * (bumps.max(1.0) / chance).ln()).sqrt()
 }
 
 /// √(zᵀ C⁻¹ z) of `joints` joints that noise passes as rarely as one joint passes `far`.
@@ -69,7 +71,7 @@ mod tests {
     /// In the log of the paper's length a push of a second has to be less high than a knock.
     #[test]
     fn what_lasts_has_fewer_places() {
-        let heights = [0.1, 1.0, 6.0].map(|length_s| far(length_s, 80.0, 12, 6));
+        let heights = [0.1, 1.0, 6.0].map(|length_s| far(bumps(length_s, 80.0, 12 * 6), 0.000_3));
         // √(2 ln(72 · 1.0066 · 80/L/0.0003)), by hand.
         for (height, by_hand) in heights.iter().zip([6.177, 5.793, 5.475]) {
             assert!((height - by_hand).abs() < 1e-3, "{heights:?}");

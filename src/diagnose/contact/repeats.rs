@@ -3,8 +3,10 @@
 use std::ops::Range;
 
 use super::bump::{self, FELT_SHARE, Felt, Noise, ORDINARY, Push};
+use super::moves::Move;
 use super::rarity;
 use super::{Touch, are_near};
+use crate::diagnose::chance;
 use crate::diagnose::friction_drift::FrictionDrift;
 use crate::diagnose::verdict::Estimate;
 use crate::diagnose::whitening::FLOOR;
@@ -32,8 +34,11 @@ pub(super) const FEWEST_PERIODS: usize = 3;
 
 /// A log on an even clock whose motion repeats.
 pub(super) struct Repeats {
-    pub(super) torque_nm: JointSignals,
-    /// Joints (0-based) whose torque can be compared.
+    /// What is compared: torques, Nm, or angles, rad.
+    pub(super) signals: JointSignals,
+    /// Their values at a fractional sample.
+    pub(super) between_samples: fn(&[f64], f64) -> f64,
+    /// Joints (0-based) that can be compared.
     pub(super) joints: Vec<usize>,
     /// Samples of the repetitions.
     pub(super) window: Range<usize>,
@@ -42,17 +47,35 @@ pub(super) struct Repeats {
     pub(super) rate_hz: f64,
     /// What drifting friction does; not asked for where nothing deviates anyway.
     pub(super) drift: Option<FrictionDrift>,
+    /// Where the arm did not move as it did in the other periods.
+    pub(super) moves: Vec<Move>,
 }
 
 /// Where a bump may be.
 pub(super) struct Candidate {
     /// Sample of the window.
-    centre: usize,
-    length_s: f64,
+    pub(super) centre: usize,
+    pub(super) length_s: f64,
     /// Which of the joints that are compared felt it.
-    felt: Vec<usize>,
+    pub(super) felt: Vec<usize>,
     /// Which of them show noise alone.
     quiet: Vec<usize>,
+    /// σ from which on a bump there in one joint is none of noise.
+    far: f64,
+    /// Whether it is looked for because the arm moved otherwise there: which move it is.
+    pub(super) of_move: Option<usize>,
+}
+
+/// Where bumps are looked for.
+struct Place {
+    /// Samples of the window that may be their middle.
+    centres: Range<usize>,
+    /// Which of the joints that are compared may feel them alone.
+    rows: Vec<usize>,
+    /// σ from which on one in one joint is none of noise.
+    far: f64,
+    /// See [`Candidate::of_move`].
+    of_move: Option<usize>,
 }
 
 impl Candidate {
@@ -78,11 +101,7 @@ impl Repeats {
         let is_recorded = |period: &usize| at(*period) <= (self.window.end - 1) as f64;
         let others: Vec<f64> =
             (0..periods).filter(|p| *p != own && is_recorded(p)).map(at).collect();
-        let value = |at: f64| {
-            let left = (at.floor() as usize).min(y.len() - 2);
-            let u = at - left as f64;
-            y[left] * (1.0 - u) + y[left + 1] * u
-        };
+        let value = |at: f64| (self.between_samples)(y, at);
         let undisturbed = others.iter().filter(|at| !aside[at.floor() as usize]);
         let mut same: Vec<f64> = undisturbed.map(|at| value(*at)).collect();
         if same.is_empty() {
@@ -95,11 +114,11 @@ impl Repeats {
 
     /// Deviations of all joints that are compared, without the pushes that are `known` and without drifting friction,
     /// samples of the window.
-    fn deviations(&self, aside: &[bool], known: &[Push]) -> JointSignals {
+    pub(super) fn deviations(&self, aside: &[bool], known: &[Push]) -> JointSignals {
         let joints = &self.joints;
         let mut out = JointSignals::from_fn(joints.len(), self.window.len(), |row, k| {
             let j = joints[row];
-            let deviation = self.deviation(self.torque_nm.joint(j), self.window.start + k, aside);
+            let deviation = self.deviation(self.signals.joint(j), self.window.start + k, aside);
             let t_s = k as f64 / self.rate_hz;
             deviation - known.iter().map(|push| push.torque_nm(j, t_s)).sum::<f64>()
         });
@@ -114,60 +133,102 @@ impl Repeats {
         out
     }
 
-    /// The highest bump that noise would not make, apart from the samples that were `looked_at`.
+    /// The bump that is highest beside what noise would not make, apart from the samples that were `looked_at`; `None` of one below
+    /// `least` times that.
     pub(super) fn search(
         &self,
         aside: &[bool],
         known: &[Push],
         looked_at: &[Range<usize>],
+        least: f64,
     ) -> Result<Option<Candidate>, SignalError> {
-        let deviation_nm = self.deviations(aside, known);
-        let filter = MatchedFilter::new(&deviation_nm, self.rate_hz)?;
+        let deviations = self.deviations(aside, known);
+        let filter = MatchedFilter::new(&deviations, self.rate_hz)?;
         let rows: Vec<usize> = (0..self.joints.len()).collect();
         if rows.is_empty() {
             return Ok(None);
         }
         let apart = (APART_S * self.rate_hz) as usize;
-        let mut highest = 1.0;
+        let mut highest = least;
         let mut best = None;
         for length_s in self.lengths_s() {
-            let far = self.far(length_s);
-            let far_together = rarity::as_far_in(rows.len(), far);
             let heights = filter.heights(|t_s| bump::bump(ORDINARY, length_s, t_s));
             let noise = Noise::of(&heights);
-            let together = noise.felt_by(&rows, &[]);
             let others = |j: usize| [&rows[..j], &rows[j + 1..]].concat();
             let alone: Vec<Felt> = rows.iter().map(|j| noise.felt_by(&[*j], &others(*j))).collect();
             let reach = (0.5 * length_s * self.rate_hz) as usize;
-            for centre in reach..self.window.len() - reach {
-                let at = self.window.start + centre;
-                let samples = at.saturating_sub(reach)..at + reach;
-                if looked_at.iter().any(|other| are_near(other, &samples, apart)) {
-                    continue;
-                }
-                let scores = noise.scores(&heights, centre);
-                let gain = noise.gain(&scores);
-                // What is not so far in all joints is not in any.
-                if gain <= (highest * far).powi(2) {
-                    continue;
-                }
-                let as_known = |felt: &Felt| felt.of_known_noise(felt.gain(&scores)).sqrt();
-                let alone: Vec<f64> = alone.iter().map(as_known).collect();
-                let together = together.of_known_noise(gain).sqrt();
-                let [of_one, of_all] = [farthest(&alone) / far, together / far_together];
-                if of_one.max(of_all) > highest {
-                    highest = of_one.max(of_all);
-                    // A joint that shows little of what all show is not quiet.
-                    let [felt, quiet] = if of_all > of_one {
-                        [rows.clone(), Vec::new()]
-                    } else {
-                        felt_and_quiet(&scores, &alone)
+            for Place { centres, rows: telling, far, of_move } in self.looked_through(length_s) {
+                let together = noise.felt_by(&telling, &[]);
+                let far_together = rarity::as_far_in(telling.len(), far);
+                for centre in centres.start.max(reach)..centres.end.min(self.window.len() - reach) {
+                    let at = self.window.start + centre;
+                    let samples = at.saturating_sub(reach)..at + reach;
+                    if looked_at.iter().any(|other| are_near(other, &samples, apart)) {
+                        continue;
+                    }
+                    let scores = noise.scores(&heights, centre);
+                    // What is not so far in all joints is not in any.
+                    if noise.gain(&scores) <= (highest * far).powi(2) {
+                        continue;
+                    }
+                    let as_known = |felt: &Felt| felt.of_known_noise(felt.gain(&scores)).sqrt();
+                    let alone: Vec<f64> = alone.iter().map(as_known).collect();
+                    let of_one = telling.iter().map(|j| alone[*j]).fold(0.0, f64::max) / far;
+                    let of_all = match telling.len() {
+                        1 => 0.0,
+                        _ => as_known(&together) / far_together,
                     };
-                    best = Some(Candidate { centre, length_s, felt, quiet });
+                    if of_one.max(of_all) > highest {
+                        highest = of_one.max(of_all);
+                        let [mut felt, mut quiet] = felt_and_quiet(&scores, &alone, &telling);
+                        if of_all > of_one {
+                            // A joint that shows little of what all show is not quiet.
+                            felt.extend(&telling);
+                            felt.sort_unstable();
+                            felt.dedup();
+                            quiet.clear();
+                        }
+                        best = Some(Candidate { centre, length_s, felt, quiet, far, of_move });
+                    }
                 }
             }
         }
         Ok(best)
+    }
+
+    /// Where bumps of `length_s` are looked for on which joints: all along the log on all of them, and where the arm moved
+    /// otherwise on those that did, each with half of the chance. Noise of the torques does not choose where the angles differ, as
+    /// long as no feedback brings it into them.
+    fn looked_through(&self, length_s: f64) -> Vec<Place> {
+        let all = 0..self.joints.len();
+        let everywhere = Place {
+            centres: 0..self.window.len(),
+            rows: all.clone().collect(),
+            far: 0.0,
+            of_move: None,
+        };
+        let of_move = |(number, own): (usize, &Move)| Place {
+            centres: own.centres.clone(),
+            rows: all.clone().filter(|row| own.joints.contains(&self.joints[*row])).collect(),
+            far: 0.0,
+            of_move: Some(number),
+        };
+        let mut where_moved: Vec<Place> = self.moves.iter().enumerate().map(of_move).collect();
+        where_moved.retain(|place| !place.rows.is_empty());
+        let share = if where_moved.is_empty() { 1.0 } else { 0.5 };
+        let mut everywhere = vec![everywhere];
+        for group in [&mut everywhere, &mut where_moved] {
+            let bumps = group.iter().map(|place| {
+                // Each joint by itself, and all together.
+                let ways = if place.rows.len() > 1 { place.rows.len() + 1 } else { 1 };
+                let duration_s = place.centres.len() as f64 / self.rate_hz;
+                rarity::bumps(length_s, duration_s, self.lengths_s().len() * ways)
+            });
+            let far = rarity::far(bumps.sum(), share * chance::CONTACT);
+            group.iter_mut().for_each(|place| place.far = far);
+        }
+        everywhere.append(&mut where_moved);
+        everywhere
     }
 
     /// Lengths of the bumps that are looked for, s.
@@ -179,14 +240,6 @@ impl Repeats {
             .collect()
     }
 
-    /// σ from which on a bump of `length_s` in one joint is a contact.
-    fn far(&self, length_s: f64) -> f64 {
-        let duration_s = self.window.len() as f64 / self.rate_hz;
-        // Each by itself, and all together.
-        let tests = if self.joints.len() > 1 { self.joints.len() + 1 } else { 1 };
-        rarity::far(length_s, duration_s, self.lengths_s().len(), tests)
-    }
-
     /// What the log knows of the push at `candidate`: where several joints feel it, whose levers change while
     /// the arm moves on, its begin and end are where any of them may see them.
     pub(super) fn weigh(
@@ -195,7 +248,7 @@ impl Repeats {
         aside: &[bool],
         known: &[Push],
     ) -> Result<Option<Push>, SignalError> {
-        let &Candidate { centre, length_s, .. } = candidate;
+        let &Candidate { centre, length_s, far, .. } = candidate;
         let filter = MatchedFilter::new(&self.deviations(aside, known), self.rate_hz)?;
         let noise = Noise::of(&filter.heights(|t_s| bump::bump(ORDINARY, length_s, t_s)));
         let reach = (0.5 * length_s * self.rate_hz) as usize + 1;
@@ -204,7 +257,6 @@ impl Repeats {
         let weigh_on =
             |felt: &Felt| bump::weigh(&filter, felt, &self.joints, centres.clone(), length_s);
         let felt = felt_by(&candidate.felt);
-        let far = self.far(length_s);
         // What its neighbourhood tells of the noise may make it less than it seemed.
         let is_far = |felt: &Felt, push: &Push| {
             felt.of_known_noise(push.gain) > rarity::as_far_in(felt.count(), far).powi(2)
@@ -236,7 +288,7 @@ impl Repeats {
     /// last digit of a file differ by that alone, and have no noise beside which it would be small: such joints tell nothing.
     pub(super) fn is_rounding(&self, push: &Push) -> bool {
         push.felt_nm().all(|(j, height)| {
-            let torque_nm = &self.torque_nm.joint(j)[self.window.clone()];
+            let torque_nm = &self.signals.joint(j)[self.window.clone()];
             let square = torque_nm.iter().map(|t| t * t).sum::<f64>() / torque_nm.len() as f64;
             height.abs() < FLOOR * square.sqrt()
         })
@@ -282,11 +334,12 @@ fn level_wild_values(y: &mut [f64], reach: usize) {
     }
 }
 
-/// Which joints felt a bump with these scores, each by itself and `alone` among all, and which show noise alone.
-fn felt_and_quiet(scores: &[f64], alone: &[f64]) -> [Vec<usize>; 2] {
+/// Which joints felt a bump with these scores, each by itself and `alone` among all, and which show noise alone; the one of those
+/// `telling` that shows most of it felt it.
+fn felt_and_quiet(scores: &[f64], alone: &[f64], telling: &[usize]) -> [Vec<usize>; 2] {
     let limit = FELT_BESIDE.max(FELT_SHARE * farthest(scores));
-    let most = (0..alone.len()).max_by(|a, b| alone[*a].total_cmp(&alone[*b]));
-    let is_felt = |j: &usize| scores[*j].abs() >= limit || Some(*j) == most;
+    let most = telling.iter().max_by(|a, b| alone[**a].total_cmp(&alone[**b]));
+    let is_felt = |j: &usize| scores[*j].abs() >= limit || Some(j) == most;
     let is_quiet = |j: &usize| scores[*j].abs() < FELT_BESIDE && !is_felt(j);
     let joints = 0..scores.len();
     [joints.clone().filter(is_felt).collect(), joints.filter(is_quiet).collect()]

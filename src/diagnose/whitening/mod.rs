@@ -5,6 +5,7 @@
 //! move.
 
 mod coherence;
+mod mean_noise;
 mod periods;
 mod run;
 

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use nalgebra::{Complex, DMatrix, DVector};
 use realfft::{RealFftPlanner, RealToComplex};
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::coherence::coherence;
+use super::mean_noise::with_own_scatter;
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::friction_drift::FrictionDrift;
 use crate::diagnose::image::{Column, Image, Span, dot};
@@ -76,8 +76,6 @@ impl RepeatingNoise {
     }
 }
 
-/// A mean torque that scatters so much more than its neighbours that noise shows it less often than this, drifts.
-const DRIFTS: f64 = 1.0 / 300.0;
 /// Share of Coulomb's torque whose kink is not followed between samples. In the fastest eighth of the harmonics of clean logs
 /// with a twentieth of the benchmark's noise, whose drives feed 0, 0.5 and 0.9 of friction forward along both its motions,
 /// what residuals have beyond that noise is left by 0.01 to 0.4 of it, on joint 2 behind drives that feed half by 0.9: 0.2 in
@@ -141,18 +139,13 @@ impl PeriodWhitening {
                 colour: trends.iter().map(|trend| trend[k].colour_variance).collect(),
             };
             if k == 0 {
-                for (j, sd) in sd.iter_mut().enumerate() {
-                    let drift = scatter[0][(j, j)].re / s[(j, j)].re;
-                    // A real number per period.
-                    let own_freedom = (periods - 1) as f64;
-                    // S is larger than the scatter by M/(M − N).
-                    let ratio = drift * freedom / (freedom - joints as f64).max(1.0);
-                    let chance = FisherSnedecor::new(own_freedom, 2.0 / unknown.of(j));
-                    if chance.is_ok_and(|f| f.sf(ratio) < DRIFTS) {
-                        *sd *= drift.sqrt();
-                        unknown.colour[j] = unknown.colour[j].max(2.0 / own_freedom);
-                    }
-                }
+                // S is larger than the scatter by M/(M − N).
+                let scale = freedom / (freedom - joints as f64).max(1.0);
+                let ratio = |j: usize| scale * scatter[0][(j, j)].re / s[(j, j)].re;
+                let ratio: Vec<f64> = (0..joints).map(ratio).collect();
+                // A real number per period.
+                let factor = with_own_scatter(&ratio, periods - 1, &mut unknown);
+                sd.iter_mut().zip(factor).for_each(|(sd, factor)| *sd *= factor.sqrt());
             }
             whitening.unknown.push(unknown);
             for (i, j) in pairs(joints) {

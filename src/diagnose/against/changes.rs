@@ -1,0 +1,269 @@
+//! What may differ between an arm and a simulation of it, and the torque that each difference adds.
+//!
+//! A body on the flange adds X K δ, δ its ten inertial parameters and K the map to base parameters; other friction
+//! adds multiples of its columns; a wrong torque constant a share of the joint's torque; gravity, tilt and
+//! length add what the inverse dynamics of the changed arm add.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::base::BaseSet;
+use crate::diagnose::candidates::{Candidate, Quantity, Shape};
+use crate::diagnose::image::{Column, Image};
+use crate::diagnose::kind::Kind;
+use crate::diagnose::study::Study;
+use crate::diagnose::verdict::Estimate;
+use crate::dynamics::{Parameter, ParameterLayout};
+use crate::robot::{Arm, JointSignals};
+
+/// Steps of the numerical derivatives: small against what matters, large against rounding.
+const LENGTH_STEP_M: f64 = 1e-4;
+const GRAVITY_STEP: f64 = 1e-4;
+
+/// Physical parameters of coefficients, as far as the data tell these.
+type Quantities<'a> = Box<dyn Fn(&[Option<f64>]) -> Vec<Quantity> + 'a>;
+
+/// A change that may have moved the parameters.
+pub(super) struct Change<'a> {
+    pub(super) kind: Kind,
+    pub(super) site: Option<usize>,
+    /// By coefficient; zero where it moves nothing.
+    pub(super) images: Vec<Image>,
+    quantities: Quantities<'a>,
+    pub(super) in_words: &'static str,
+}
+
+impl Change<'_> {
+    pub(super) fn separating_experiment(&self) -> &'static str {
+        match self.kind {
+            Kind::Payload => "the same motion with the flange bare",
+            Kind::FrictionChange => "the same motion after half an hour of work",
+            Kind::TorqueGain => "a known payload: it scales every torque constant",
+            Kind::LinkLength => "a measurement of the kinematics",
+            Kind::Gravity => "a known payload, weighed at the same place",
+            _ => "a level on the base, and the same motion with joint 1 turned by 180°",
+        }
+    }
+
+    /// Quantities of the coefficients `b` with 95 % intervals by the delta method; of each its place in the change, and whether
+    /// it is told.
+    pub(super) fn estimates(
+        &self,
+        (b, places): (&[f64], &[(usize, bool)]),
+        covariance: &DMatrix<f64>,
+        half: f64,
+    ) -> BTreeMap<&'static str, Estimate> {
+        let quantities = |b: &[f64]| {
+            let mut all = vec![None; self.images.len()];
+            for (b, (place, is_told)) in b.iter().zip(places) {
+                all[*place] = is_told.then_some(*b);
+            }
+            (self.quantities)(&all)
+        };
+        let centre = quantities(b);
+        let mut gradients = vec![DVector::<f64>::zeros(b.len()); centre.len()];
+        for k in 0..b.len() {
+            let h = 1e-3 * covariance[(k, k)].max(0.0).sqrt().max(f64::MIN_POSITIVE);
+            let at = |sign: f64| {
+                let mut moved = b.to_vec();
+                moved[k] += sign * h;
+                quantities(&moved)
+            };
+            for (g, (up, down)) in gradients.iter_mut().zip(at(1.0).iter().zip(at(-1.0))) {
+                g[k] = (up.value - down.value) / (2.0 * h);
+            }
+        }
+        centre
+            .iter()
+            .zip(&gradients)
+            .map(|(q, g)| {
+                let reach = half * (g.transpose() * covariance * g)[(0, 0)].max(0.0).sqrt();
+                let ci95 = [q.value - reach, q.value + reach];
+                (q.name, Estimate { value: q.value, unit: q.unit, ci95 })
+            })
+            .collect()
+    }
+}
+
+/// Everything that is looked for.
+pub(super) fn all<'a>(study: &'a Study<'a>, set: &BaseSet, simulation: &[f64]) -> Vec<Change<'a>> {
+    let scene = &study.scene;
+    let joints = scene.joints();
+    let layout = ParameterLayout::new(joints);
+    let image = |parameter: Parameter| {
+        let mut standard = vec![0.0; layout.count()];
+        standard[layout.index(parameter)] = 1.0;
+        combined(&study.null_columns, &set.values(&standard))
+    };
+    let last = joints - 1;
+    let mut out = vec![Change {
+        kind: Kind::Payload,
+        site: None,
+        images: (0..10).map(|k| image(Parameter::Body(last, k))).collect(),
+        quantities: Box::new(payload),
+        in_words: "a body on the flange",
+    }];
+    for j in 0..joints {
+        out.push(Change {
+            kind: Kind::FrictionChange,
+            site: Some(j),
+            images: [Parameter::Coulomb(j), Parameter::Viscous(j)].map(image).into(),
+            quantities: Box::new(friction),
+            in_words: "friction that is not what the simulation assumes",
+        });
+        out.push(Change {
+            kind: Kind::TorqueGain,
+            site: Some(j),
+            images: vec![study.torque_on(j, simulation)],
+            quantities: Box::new(|b| told("error_fraction", b[0], "")),
+            in_words: "a wrong torque constant",
+        });
+        let length_m = scene.arm.joints[j].placement.translation_m.norm();
+        if j > 0 && length_m > 0.0 {
+            out.push(Change {
+                kind: Kind::LinkLength,
+                site: Some(j),
+                images: vec![study.whitening.image(&longer(study, j))],
+                quantities: Box::new(|b| told("error_m", b[0], "m")),
+                in_words: "a link that is longer or shorter than drawn",
+            });
+        }
+    }
+    let gravity_m_s2 = scene.arm.gravity_m_s2.norm();
+    if gravity_m_s2 > 0.0 {
+        let heavier = with_arm(study, GRAVITY_STEP, |arm| arm.gravity_m_s2 *= 1.0 + GRAVITY_STEP);
+        out.push(Change {
+            kind: Kind::Gravity,
+            site: None,
+            images: vec![study.whitening.image(&heavier)],
+            quantities: Box::new(move |b| {
+                told("g_m_s2", b[0].map(|b| gravity_m_s2 * (1.0 + b)), "m/s²")
+            }),
+            in_words: "another gravity than the simulation's",
+        });
+    }
+    for family in study.families {
+        let wanted = [Kind::BaseTilt, Kind::EncoderOffset, Kind::CurrentOffset, Kind::Spring];
+        if wanted.contains(&family.kind()) {
+            out.extend(
+                family
+                    .sites(joints)
+                    .into_iter()
+                    .map(|site| of_family(study, family.as_ref(), site)),
+            );
+        }
+    }
+    out.retain(|c| study.looks_at(c.site) && c.images.iter().any(|i| i.square() > 0.0));
+    out
+}
+
+/// A family of the catalogue, whose columns the null model may absorb here.
+fn of_family<'a>(
+    study: &'a Study<'a>,
+    family: &'a dyn Candidate,
+    site: Option<usize>,
+) -> Change<'a> {
+    let scene = &study.scene;
+    let shapes = family.shapes(scene, site);
+    let shape = shapes.first().copied().unwrap_or(Shape { variant: 0, value: 0.0 });
+    let columns = family.columns(scene, site, shape);
+    Change {
+        kind: family.kind(),
+        site,
+        images: columns.iter().map(|c| study.whitening.image(c)).collect(),
+        quantities: Box::new(move |b| of_told(b, |b| family.quantities(scene, site, shape, b))),
+        in_words: family.in_words(),
+    }
+}
+
+/// Torque per metre by which the way to joint `j`'s frame is longer, Nm/m.
+fn longer(study: &Study, j: usize) -> Column {
+    with_arm(study, LENGTH_STEP_M, |arm| {
+        let way_m = &mut arm.joints[j].placement.translation_m;
+        *way_m += way_m.normalize() * LENGTH_STEP_M;
+    })
+}
+
+/// Torque per unit of a small `change` of the arm of size `step`.
+fn with_arm(study: &Study, step: f64, change: impl Fn(&mut Arm)) -> Column {
+    let mut arm = study.scene.arm.clone();
+    change(&mut arm);
+    let torque_nm: JointSignals = study.scene.torque_change(&arm, &study.scene.motion);
+    Column::everywhere(&torque_nm).scaled(1.0 / step)
+}
+
+/// Σ b_k column_k.
+fn combined(columns: &[Image], b: &[f64]) -> Image {
+    let mut sum = columns.first().cloned().unwrap_or_default();
+    sum.scale(0.0);
+    for (column, &b) in columns.iter().zip(b).filter(|(_, b)| **b != 0.0) {
+        sum.add(b, column);
+    }
+    sum
+}
+
+/// The quantity of a coefficient; none where the data do not tell that.
+fn told(name: &'static str, value: Option<f64>, unit: &'static str) -> Vec<Quantity> {
+    value.map(|value| Quantity { name, value, unit }).into_iter().collect()
+}
+
+/// A body by its mass and where that sits, or by its first moments where no mass is told.
+fn payload(b: &[Option<f64>]) -> Vec<Quantity> {
+    let (mass_kg, first_moment_kg_m) = (b[0], &b[1..4]);
+    let names = match mass_kg {
+        Some(_) => ["com_x_m", "com_y_m", "com_z_m"],
+        None => ["moment_x_kg_m", "moment_y_kg_m", "moment_z_kg_m"],
+    };
+    let mut out = told("mass_kg", mass_kg, "kg");
+    for (name, moment) in names.into_iter().zip(first_moment_kg_m) {
+        out.extend(match mass_kg {
+            Some(mass_kg) => told(name, moment.map(|moment| moment / mass_kg), "m"),
+            None => told(name, *moment, "kg m"),
+        });
+    }
+    out
+}
+
+fn friction(b: &[Option<f64>]) -> Vec<Quantity> {
+    let both = [told("coulomb_nm", b[0], "Nm"), told("viscous_nm_s_rad", b[1], "Nm s/rad")];
+    both.into_iter().flatten().collect()
+}
+
+/// The `quantities` of a family as far as its coefficients `b` are told.
+fn of_told(b: &[Option<f64>], quantities: impl Fn(&[f64]) -> Vec<Quantity>) -> Vec<Quantity> {
+    // What stands last goes with what stands before it where it is not told.
+    let Some(last) = b.iter().rposition(Option::is_some) else { return Vec::new() };
+    let b: Vec<f64> = b[..=last].iter().map(|b| b.unwrap_or(f64::NAN)).collect();
+    quantities(&b).into_iter().filter(|quantity| !quantity.value.is_nan()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn numbers(quantities: Vec<Quantity>) -> Vec<(&'static str, f64)> {
+        quantities.into_iter().map(|quantity| (quantity.name, quantity.value)).collect()
+    }
+
+    /// One joint feels moments across its axis alone, two parallel ones the mass as well.
+    #[test]
+    fn a_body_is_told_as_far_as_the_joints_feel_it() {
+        let moments = payload(&[None, Some(0.2), Some(0.1), None]);
+        assert_eq!(numbers(moments), [("moment_x_kg_m", 0.2), ("moment_y_kg_m", 0.1)]);
+        let in_a_plane = payload(&[Some(2.0), Some(0.2), Some(0.5), None]);
+        assert_eq!(numbers(in_a_plane), [("mass_kg", 2.0), ("com_x_m", 0.1), ("com_y_m", 0.25)]);
+    }
+
+    /// A tilt about an axis that the arm does not feel is not taken for the one that it feels.
+    #[test]
+    fn a_coefficient_keeps_its_place() {
+        let tilt = |b: &[f64]| -> Vec<Quantity> {
+            let names = ["tilt_x_rad", "tilt_y_rad"].into_iter().zip(b);
+            names.map(|(name, b)| Quantity { name, value: *b, unit: "rad" }).collect()
+        };
+        assert_eq!(numbers(of_told(&[None, Some(0.3)], tilt)), [("tilt_y_rad", 0.3)]);
+        assert_eq!(numbers(of_told(&[Some(0.3), None], tilt)), [("tilt_x_rad", 0.3)]);
+        assert!(of_told(&[None, None], tilt).is_empty());
+    }
+}

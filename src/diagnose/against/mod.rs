@@ -1,0 +1,261 @@
+//! A log against a given simulation: which of its parameters moved, and which physical changes moved them.
+//!
+//! Nothing is fitted first: the residual is y − X θ_sim, and a change explains its own torque of it ([`changes`]). Effects that any
+//! fit would absorb stand out here.
+
+mod changes;
+
+use std::collections::BTreeMap;
+
+use changes::Change;
+
+use super::chance;
+use super::image::{Image, Span};
+use super::judgement::{TELLS_APART, probability_of_class};
+use super::kind::Kind;
+use super::significance::LEAST_EVIDENCE;
+use super::study::{Entry, Study};
+use super::verdict::{Cause, Moved, Rival};
+use crate::base::BaseSet;
+use crate::identify::Identification;
+
+/// Changes at most.
+const MOST_CHANGES: usize = 8;
+/// Rounds in which one is added and others are removed: two may replace each other for ever.
+const ROUNDS: usize = 2 * MOST_CHANGES;
+/// Alternatives that are reported.
+const RIVALS: usize = 5;
+/// Every base parameter in the simulation and in the data.
+pub fn moved(set: &BaseSet, simulation: &[f64], identification: &Identification) -> Vec<Moved> {
+    let sigma = identification.sigma();
+    let theta = &identification.fit.theta;
+    (0..set.rank())
+        .map(|k| Moved {
+            name: set.name(k).to_owned(),
+            simulation: simulation[k],
+            data: theta[k],
+            sigma: sigma[k],
+            z: (theta[k] - simulation[k]) / sigma[k],
+        })
+        .collect()
+}
+
+/// How the data differ from a simulation.
+pub struct Explained {
+    /// The changes, the one that explains most first.
+    pub causes: Vec<Cause>,
+    /// Every change that was looked for, and every effect that is needless beside those found: kind and joint from 1. What is
+    /// one of them is judged here alone.
+    pub judged: Vec<(Kind, Option<usize>)>,
+    /// What the changes and the effects that are needed span outside the null model.
+    pub span: Span,
+}
+
+/// The changes that explain how the data differ from the simulation. `accepted` are effects that were found
+/// beside the null model.
+pub fn explain(study: &Study, set: &BaseSet, simulation: &[f64], accepted: &[&Entry]) -> Explained {
+    let mut residual = study.torque.clone();
+    for (column, theta) in study.null_columns.iter().zip(simulation) {
+        residual.add(-theta, column);
+    }
+    let changes = changes::all(study, set, simulation);
+    let is_change = |entry: &Entry| {
+        let place = (study.families[entry.family].kind(), entry.site);
+        changes.iter().any(|c| (c.kind, c.site) == place)
+    };
+    let mut beside: Vec<&Entry> = accepted.iter().filter(|e| !is_change(e)).copied().collect();
+    let place = |c: &Change| (c.kind, c.site.map(|j| j + 1));
+    let mut judged: Vec<(Kind, Option<usize>)> = changes.iter().map(place).collect();
+    let places = places(&changes);
+    let nuisance = nuisance(study, &beside);
+    let mut search = Search { study, changes, places, nuisance, residual };
+    let mut taken = search.select();
+    // What the null model could not absorb of a change may have been taken for an effect.
+    while let Some(needless) = (0..beside.len()).find(|&e| !search.needs(e, &beside, &taken)) {
+        let entry = beside.remove(needless);
+        judged.push((study.families[entry.family].kind(), entry.site.map(|j| j + 1)));
+        search.nuisance = self::nuisance(study, &beside);
+        taken = search.select();
+    }
+    let mut span = study.span_of_all(&beside);
+    let images = taken.iter().flat_map(|&c| &search.changes[c].images);
+    for image in images.filter_map(|image| study.outside_null(image.clone())) {
+        span.push(&image);
+    }
+    let causes = (0..taken.len()).map(|index| search.cause(&taken, index)).collect();
+    Explained { causes, judged, span }
+}
+
+/// What the residual of a simulation holds beside changes: the effects `beside`, and how drives answer friction, which no
+/// simulation says.
+fn nuisance(study: &Study, beside: &[&Entry]) -> Span {
+    let mut span = study.span_of_all(beside);
+    for image in &study.null_columns[study.base_count()..] {
+        span.push(image);
+    }
+    span
+}
+
+struct Search<'a> {
+    study: &'a Study<'a>,
+    changes: Vec<Change<'a>>,
+    /// See [`places`].
+    places: Vec<f64>,
+    nuisance: Span,
+    residual: Image,
+}
+
+/// A change with 2 ln of the evidence for it and the probability of as much by chance.
+struct Scored {
+    change: usize,
+    evidence: f64,
+    probability: f64,
+}
+
+impl Search<'_> {
+    /// Forward selection, with removal of what a later change makes needless.
+    fn select(&self) -> Vec<usize> {
+        let significant =
+            |s: &Scored| s.evidence > 0.0 && s.probability * self.places[s.change] < chance::CHANGE;
+        let mut taken: Vec<usize> = Vec::new();
+        for _ in 0..ROUNDS {
+            if taken.len() == MOST_CHANGES {
+                break;
+            }
+            let Some(best) = self.scored(&taken).into_iter().find(significant) else { break };
+            taken.push(best.change);
+            let mut c = 0;
+            while c + 1 < taken.len() {
+                let rest = without(&taken, c);
+                let again = self.scored(&rest);
+                let own = again.iter().find(|s| s.change == taken[c]);
+                if own.is_some_and(significant) {
+                    c += 1;
+                } else {
+                    taken.remove(c);
+                }
+            }
+        }
+        taken
+    }
+
+    /// Whether effect number `e` of those `beside` is worth its price beside the others and the changes `taken`; true where none
+    /// is, which is how it was found, and of one of several of a family at its site, which are judged together.
+    fn needs(&self, e: usize, beside: &[&Entry], taken: &[usize]) -> bool {
+        let study = self.study;
+        let entry = beside[e];
+        let alike = beside.iter().filter(|b| (b.family, b.site) == (entry.family, entry.site));
+        if taken.is_empty() || alike.count() > 1 {
+            return true;
+        }
+        let others = nuisance(study, &[&beside[..e], &beside[e + 1..]].concat());
+        let (others, rest) = self.outside_of(others, taken);
+        let span = Span::outside(&others, &entry.images);
+        let gain = study.statistic.gain(&span, &rest);
+        let probability = study.statistic.probability(&span, &rest) * study.tests(entry);
+        gain - study.price(entry) > LEAST_EVIDENCE && probability < chance::LAW
+    }
+
+    /// All changes that are not `taken`, best first.
+    fn scored(&self, taken: &[usize]) -> Vec<Scored> {
+        let study = self.study;
+        let (others, rest) = self.outside(taken);
+        let mut out: Vec<Scored> = (0..self.changes.len())
+            .filter(|c| !taken.contains(c))
+            .map(|c| {
+                let site = self.changes[c].site;
+                let span = Span::outside(&others, &self.changes[c].images);
+                let price = study.statistic.coefficients_price(span.len(), site)
+                    + 2.0 * self.places[c].ln();
+                Scored {
+                    change: c,
+                    evidence: study.statistic.gain(&span, &rest) - price,
+                    probability: study.statistic.probability(&span, &rest),
+                }
+            })
+            .collect();
+        out.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+        out
+    }
+
+    /// Span of the changes `taken` and of what no simulation has, and the residual outside it.
+    fn outside(&self, taken: &[usize]) -> (Span, Image) {
+        self.outside_of(self.nuisance.clone(), taken)
+    }
+
+    /// The same of the changes `taken` and `span`.
+    fn outside_of(&self, mut span: Span, taken: &[usize]) -> (Span, Image) {
+        for image in taken.iter().flat_map(|&c| &self.changes[c].images) {
+            span.push(image);
+        }
+        let mut rest = self.residual.clone();
+        span.residualise(&mut rest);
+        (span, rest)
+    }
+
+    /// Change `taken[index]` with its numbers, the others given.
+    fn cause(&self, taken: &[usize], index: usize) -> Cause {
+        let study = self.study;
+        let change = &self.changes[taken[index]];
+        let rest = without(taken, index);
+        let (others, left) = self.outside(&rest);
+        let (span, places) = Span::telling(&others, &change.images);
+        let b = span.solve(&left);
+        let covariance = study.statistic.covariance(&span, &left);
+        let scored = self.scored(&rest);
+        let evidence = scored.iter().find(|s| s.change == taken[index]).map_or(0.0, |s| s.evidence);
+        let quantile = study.statistic.quantile_95(&span, &left);
+        // The part of the residual that the change explains.
+        let signal = span.inside(&left);
+        let size = signal.square();
+        let gain = study.statistic.gain(&span, &left);
+        let scale = study.statistic.lambda(&span, &left, gain) / size.max(f64::MIN_POSITIVE);
+        let rivals: Vec<&Scored> = scored.iter().filter(|s| s.change != taken[index]).collect();
+        let is_alike = |s: &&Scored| {
+            let span = Span::outside(&others, &self.changes[s.change].images);
+            scale * (size - span.explained(&signal)) < TELLS_APART
+        };
+        let alike: Vec<bool> = rivals.iter().map(is_alike).collect();
+        let name = |(s, _): (&&Scored, &bool)| {
+            let Change { kind, site, .. } = &self.changes[s.change];
+            match site.filter(|_| *site != change.site) {
+                Some(j) => format!("{kind}@{}", j + 1),
+                None => kind.to_string(),
+            }
+        };
+        let evidences: Vec<f64> = rivals.iter().map(|s| s.evidence).collect();
+        let in_class = rivals.iter().zip(&alike).filter(|(_, alike)| **alike);
+        let class: Vec<String> = in_class.map(name).collect();
+        let behind = rivals.iter().take(RIVALS).map(|s| Rival {
+            kind: self.changes[s.change].kind,
+            joint: self.changes[s.change].site.map(|j| j + 1),
+            evidence_behind: evidence - s.evidence,
+        });
+        Cause {
+            kind: change.kind,
+            joint: change.site.map(|j| j + 1),
+            separating_experiment: (!class.is_empty()).then(|| change.separating_experiment()),
+            class,
+            confidence: probability_of_class(evidence, &evidences, &alike),
+            parameters: change.estimates((&b, &places), &covariance, quantile),
+            gain_fraction: None,
+            strength: study.statistic.lambda(&span, &left, gain).max(0.0).sqrt(),
+            in_words: change.in_words.to_owned(),
+            rivals: behind.collect(),
+        }
+    }
+}
+
+/// Kinds of changes times sites of the kind of each, between which chance and odds are shared evenly: first between the kinds,
+/// then between the sites of each, as laws share theirs ([`price`](super::price)).
+fn places(changes: &[Change]) -> Vec<f64> {
+    let mut sites: BTreeMap<Kind, usize> = BTreeMap::new();
+    for change in changes {
+        *sites.entry(change.kind).or_default() += 1;
+    }
+    changes.iter().map(|change| (sites.len() * sites[&change.kind]) as f64).collect()
+}
+
+fn without(taken: &[usize], index: usize) -> Vec<usize> {
+    taken.iter().enumerate().filter(|(i, _)| *i != index).map(|(_, c)| *c).collect()
+}
