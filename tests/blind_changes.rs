@@ -126,6 +126,28 @@ fn another_gravity_is_nothing_else() {
     assert_eq!(named, [Kind::Gravity]);
 }
 
+/// What a fit would absorb of an effect is no change of the arm: load friction has the whole of Coulomb's curve in it.
+#[test]
+fn effects_beside_a_simulation_are_no_changes() {
+    let friction = "[[effect]]\nkind = \"load_friction\"\njoint = 2\nmu = 0.06\n\
+                    [[effect]]\nkind = \"stribeck\"\njoint = 4\nextra_nm = 0.4\nvs_rad_s = 0.08\n";
+    let payload = "[[effect]]\nkind = \"payload\"\nmass_kg = 1.0\ncom_x_m = 0.02\ncom_y_m = 0.0\ncom_z_m = 0.06\n";
+    let named = |d: &Diagnosis| {
+        let mut named: Vec<_> = d.causes.iter().map(|c| (c.kind, c.joint)).collect();
+        named.sort_unstable();
+        named
+    };
+    let effects = [(Kind::Stribeck, Some(4)), (Kind::LoadFriction, Some(2))];
+    let d = Run::new(31, 4, friction).against_nominal();
+    assert_eq!(named(&d), effects);
+    // As above: nothing of it has moved a parameter.
+    assert!(d.moved_parameters.iter().all(|m| m.z.abs() < 5.0), "{:?}", d.moved_parameters);
+    let d = Run::new(32, 4, &(friction.to_owned() + payload)).against_nominal();
+    assert_eq!(named(&d), [effects[0], effects[1], (Kind::Payload, None)]);
+    let body = d.causes.iter().find(|c| c.kind == Kind::Payload).unwrap();
+    assert_near(body, "mass_kg", 1.0);
+}
+
 fn says_that_contacts_are_not_looked_for(d: &Diagnosis) -> bool {
     d.warnings.iter().any(|warning| warning.starts_with("contacts are not looked for"))
 }

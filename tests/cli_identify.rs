@@ -84,6 +84,33 @@ fn a_motion_that_does_not_excite_the_arm_is_a_negative_result_not_an_error() {
     assert!(result["not_identified"].as_array().unwrap().iter().any(|name| name == "rv4"));
 }
 
+/// What was not recorded is no motion that excites too little.
+#[test]
+fn a_torque_that_never_changes_is_told_by_its_joint() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("log.csv");
+    write_log(&file, [0.5; 6], 1000);
+    let text = std::fs::read_to_string(&file).unwrap();
+    let without = |dead: std::ops::Range<usize>| {
+        let of_row = |(row, line): (usize, &str)| {
+            let torque = |(column, field): (usize, &str)| match row > 0 && dead.contains(&column) {
+                true => "0".to_owned(),
+                false => field.to_owned(),
+            };
+            line.split(',').enumerate().map(torque).collect::<Vec<_>>().join(",")
+        };
+        text.lines().enumerate().map(of_row).collect::<Vec<_>>().join("\n")
+    };
+    // Behind the time six angles and six velocities.
+    for (dead, joint) in [(13..19, "joint 1"), (15..16, "joint 3")] {
+        std::fs::write(&file, without(dead)).unwrap();
+        for task in ["identify", "diagnose"] {
+            let output = armid(&[task, file.to_str().unwrap(), "--robot", "ur5"]);
+            assert_says(&output, 1, &["log.csv", joint, "0 Nm in every row"]);
+        }
+    }
+}
+
 #[test]
 fn usage_errors_of_the_main_job_exit_with_2() {
     assert_says(&montecarlo(&["--trials", "0"]), 2, &["--trials"]);

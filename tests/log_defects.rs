@@ -167,7 +167,7 @@ fn a_log_of_another_arm() {
     assert_says(three, &["run.csv", "3 joints", "arm has 6"]);
     let result =
         read_log_from(text(&valid(), ",", "\n").as_bytes(), "run.csv", &Layout::default(), 3);
-    assert_says(result, &["run.csv", "4 joints", "arm has 3"]);
+    assert_says(result, &["run.csv", "6 joints", "arm has 3"]);
     let layout = Layout::load("ur10e_innopolis").unwrap();
     let rows = text(&valid()[1..], ",", "\n");
     let result = read_log_from(rows.as_bytes(), "run.csv", &layout, 3);

@@ -192,6 +192,12 @@ fn simulated_parameters(
             fault => not_a_simulation(file, &fault),
         })?;
     result.about.check(arm).map_err(|other| format!("{}: {other}", file.display()))?;
+    if result.intervals.trusted == Some(false) {
+        let file = file.display();
+        eprintln!(
+            "note: {file}: the model is wrong along the log that this result is of, so that what differs from it here may have              been wrong there; `armid diagnose` of that log names its cause"
+        );
+    }
     (0..set.rank())
         .map(|k| {
             let name = set.name(k);
@@ -217,6 +223,13 @@ struct IdentifiedParameters {
     #[serde(flatten)]
     about: SavedRobot,
     base_parameters: Vec<IdentifiedParameter>,
+    #[serde(default)]
+    intervals: Intervals,
+}
+
+#[derive(Default, Deserialize)]
+struct Intervals {
+    trusted: Option<bool>,
 }
 
 #[derive(Deserialize)]

@@ -17,7 +17,7 @@ pub struct ExportArgs {
     /// Robot that the result is about, where it is not a built-in one: a .urdf or .toml file.
     #[arg(long)]
     robot: Option<String>,
-    /// Write a URDF, and beside it `NAME.drives.toml` with what a URDF has no place for.
+    /// This, --mjcf or both: write a URDF, and beside it `NAME.drives.toml` with what a URDF has no place for.
     #[arg(long, value_name = "FILE", required_unless_present = "mjcf")]
     urdf: Option<PathBuf>,
     /// Write an MJCF.

@@ -33,12 +33,14 @@ use std::process::ExitCode;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::diagnose::DiagnoseError;
+
 /// How a command ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     /// It did what was asked: exit code 0.
     Done,
-    /// It ran, outputs are written, and the answer is no: exit code 3.
+    /// It ran, outputs are written, and the answer is no: exit code 3, as where the data do not identify what was asked for.
     Negative,
     /// Ctrl-C ended it before all was done; outputs are of what was: exit code 130, the shell's for that signal.
     Interrupted,
@@ -55,7 +57,8 @@ pub fn exit_code(result: CommandResult) -> ExitCode {
         Ok(Outcome::Interrupted) => ExitCode::from(130),
         Err(error) => {
             eprintln!("error: {error}");
-            ExitCode::FAILURE
+            let declined = error.downcast_ref().is_some_and(DiagnoseError::is_about_the_motion);
+            if declined { ExitCode::from(3) } else { ExitCode::FAILURE }
         }
     }
 }

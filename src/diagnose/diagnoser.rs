@@ -155,10 +155,8 @@ impl<'a> Diagnoser<'a> {
             physics.extend(of_the_record);
         }
         let mut causes: Vec<Cause> = faults.into_iter().chain(physics).collect();
-        let mut moved_parameters = Vec::new();
         let (mut accepted, mut rest) = kept.without(None);
         if let Some(simulation) = simulation {
-            moved_parameters = against::moved(self.set, simulation, &identification);
             let explained = against::explain(&study, self.set, simulation, &entries);
             causes.retain(|c| !explained.judged.contains(&(c.kind, c.joint)));
             causes.extend(explained.causes);
@@ -176,6 +174,9 @@ impl<'a> Diagnoser<'a> {
                 after_nm = residual(&study, &extension);
             }
         }
+        let base_parameters = intervals::base(&study, self.set, &extension);
+        let moved_parameters =
+            simulation.map_or(Vec::new(), |s| against::moved(s, &base_parameters));
         let is_a_tear = |cause: &mut Cause| {
             let at = |name| cause.parameters.get(name).map_or(f64::NAN, |e| e.value);
             cause.kind == Kind::Contact && is_torn(m, [at("start_s"), at("end_s")])
@@ -221,7 +222,7 @@ impl<'a> Diagnoser<'a> {
             causes,
             unexplained,
             after: rms(&after_nm),
-            base_parameters: intervals::base(&study, self.set, &extension),
+            base_parameters,
             held_out,
             moved_parameters,
             payload: None,

@@ -45,3 +45,10 @@ pub enum DiagnoseError {
         parameter: String,
     },
 }
+
+impl DiagnoseError {
+    /// Whether the log is sound, but its motion does not identify what was asked for.
+    pub fn is_about_the_motion(&self) -> bool {
+        matches!(self, Self::Singular { .. } | Self::NotExcited { .. })
+    }
+}

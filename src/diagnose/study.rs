@@ -342,14 +342,26 @@ impl<'a> Study<'a> {
         for image in entries.iter().flat_map(|entry| &entry.images) {
             span.push(image);
         }
+        self.blurred_shares(entries).for_each(|share| {
+            span.push(share);
+        });
+        span
+    }
+
+    /// The shares that drives feed forward where one of `entries` blurs reversals, the null model projected out.
+    pub fn blurred_shares(&self, entries: &[&Entry]) -> impl Iterator<Item = &Image> {
         let is_blurred = |j: usize| {
             let mut blurs = entries.iter().filter(|e| self.families[e.family].blurs_reversals());
             blurs.any(|entry| entry.site.is_none_or(|own| own == j))
         };
-        for (_, share) in self.shares.iter().filter(|(j, _)| is_blurred(*j)) {
-            span.push(share);
-        }
-        span
+        self.shares.iter().filter(move |(j, _)| is_blurred(*j)).map(|(_, share)| share)
+    }
+
+    /// The columns of `entry` with what the null model absorbs of them.
+    pub fn whole_images(&self, entry: &Entry) -> Vec<Image> {
+        let columns = self.families[entry.family].columns(&self.scene, entry.site, entry.shape);
+        let seen = columns.iter().take(entry.images.len());
+        seen.map(|column| self.whitening.image(column)).collect()
     }
 
     /// Square of what `entry` with the coefficients `b` does to joint `j`, the null model projected out.

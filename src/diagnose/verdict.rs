@@ -300,6 +300,7 @@ impl Diagnosis {
         if out.is_empty() {
             out.push(self.nothing_found().into());
         }
+        out.extend(self.moved());
         let along =
             |held_out| self.does_not_carry_over(held_out).or_else(|| gain_along(held_out, laws));
         out.extend(self.held_out.iter().filter_map(along));
@@ -311,6 +312,8 @@ impl Diagnosis {
 const UNEVEN: f64 = 1.2;
 /// What is less sure than this is said with a "may".
 const EVEN_ODDS: f64 = 0.5;
+/// σ beyond which a parameter differs from a simulation: noise shows one in 300 comparisons of fifty parameters.
+const MOVED: f64 = 4.0;
 /// Times the error along the log from which on the error along another one is none of the same arm.
 const OF_ANOTHER_ARM: f64 = 3.0;
 
@@ -328,6 +331,19 @@ impl Diagnosis {
                  judged from the residual itself."
             }
         }
+    }
+
+    /// The sentence about the parameters beside those of a simulation.
+    fn moved(&self) -> Option<String> {
+        let far = |a: &&Moved, b: &&Moved| a.z.abs().total_cmp(&b.z.abs());
+        let farthest = self.moved_parameters.iter().max_by(far)?;
+        let moved = self.moved_parameters.iter().filter(|m| m.z.abs() > MOVED).count();
+        Some(format!(
+            "Beside the simulation {moved} of {} base parameters differ by more than {MOVED} σ; {} differs most, by {} σ.",
+            self.moved_parameters.len(),
+            farthest.name,
+            digits(farthest.z.abs(), 2),
+        ))
     }
 
     /// The sentence about a log along which the model errs far more, friction at standstill left open.

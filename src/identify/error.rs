@@ -25,6 +25,18 @@ pub enum IdentifyError {
         /// The log.
         log: String,
     },
+    /// The torque of joints that move never changes.
+    #[error(
+        "{log}: while joint {joint} moves its torque is {torque_nm} Nm in every row: no torque was recorded there, or its column is another one"
+    )]
+    DeadTorque {
+        /// The log.
+        log: String,
+        /// The first such joint (from 1).
+        joint: usize,
+        /// What is recorded, Nm.
+        torque_nm: f64,
+    },
     /// Another number of joints than the arm's.
     #[error("{log}: {found} joints, but the arm has {expected}")]
     Joints {

@@ -150,7 +150,7 @@ pub enum LogError {
         file: String,
         /// What was counted.
         what: &'static str,
-        /// Joints there (for a log with more than expected: at least).
+        /// Joints there.
         found: usize,
         /// Joints of the arm.
         expected: usize,

@@ -241,7 +241,11 @@ impl Header<'_> {
                 let one_more = columns.len().is_none().then(|| columns.name(count)).flatten();
                 let one_more = one_more.filter(|_| block != Block::Time);
                 match one_more.map(|name| self.find(&name)).transpose()?.flatten() {
-                    Some(_) => Err(joint_count(count + 1)),
+                    Some(_) => {
+                        let names = (0..).map_while(|joint| columns.name(joint));
+                        let there = names.take_while(|name| matches!(self.find(name), Ok(Some(_))));
+                        Err(joint_count(there.count()))
+                    }
                     None => Ok(Ok(found)),
                 }
             }

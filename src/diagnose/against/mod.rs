@@ -15,9 +15,8 @@ use super::judgement::{TELLS_APART, probability_of_class};
 use super::kind::Kind;
 use super::significance::LEAST_EVIDENCE;
 use super::study::{Entry, Study};
-use super::verdict::{Cause, Moved, Rival};
+use super::verdict::{BaseParameter, Cause, Moved, Rival};
 use crate::base::BaseSet;
-use crate::identify::Identification;
 
 /// Changes at most.
 const MOST_CHANGES: usize = 8;
@@ -25,17 +24,16 @@ const MOST_CHANGES: usize = 8;
 const ROUNDS: usize = 2 * MOST_CHANGES;
 /// Alternatives that are reported.
 const RIVALS: usize = 5;
-/// Every base parameter in the simulation and in the data.
-pub fn moved(set: &BaseSet, simulation: &[f64], identification: &Identification) -> Vec<Moved> {
-    let sigma = identification.sigma();
-    let theta = &identification.fit.theta;
-    (0..set.rank())
-        .map(|k| Moved {
-            name: set.name(k).to_owned(),
-            simulation: simulation[k],
-            data: theta[k],
-            sigma: sigma[k],
-            z: (theta[k] - simulation[k]) / sigma[k],
+/// Every base parameter in the simulation and in the data, beside the causes that were found in these.
+pub fn moved(simulation: &[f64], data: &[BaseParameter]) -> Vec<Moved> {
+    let pairs = simulation.iter().zip(data);
+    pairs
+        .map(|(&simulation, data)| Moved {
+            name: data.name.clone(),
+            simulation,
+            data: data.value,
+            sigma: data.sigma,
+            z: (data.value - simulation) / data.sigma,
         })
         .collect()
 }
@@ -86,11 +84,14 @@ pub fn explain(study: &Study, set: &BaseSet, simulation: &[f64], accepted: &[&En
     Explained { causes, judged, span }
 }
 
-/// What the residual of a simulation holds beside changes: the effects `beside`, and how drives answer friction, which no
-/// simulation says.
+/// What the residual of a simulation holds beside changes: the effects `beside`, with what a fit of the null model would absorb of
+/// them, and how drives answer friction, which no simulation says.
 fn nuisance(study: &Study, beside: &[&Entry]) -> Span {
-    let mut span = study.span_of_all(beside);
-    for image in &study.null_columns[study.base_count()..] {
+    let mut span = Span::default();
+    for image in beside.iter().flat_map(|entry| study.whole_images(entry)) {
+        span.push(&image);
+    }
+    for image in study.blurred_shares(beside).chain(&study.null_columns[study.base_count()..]) {
         span.push(image);
     }
     span
@@ -150,7 +151,7 @@ impl Search<'_> {
         }
         let others = nuisance(study, &[&beside[..e], &beside[e + 1..]].concat());
         let (others, rest) = self.outside_of(others, taken);
-        let span = Span::outside(&others, &entry.images);
+        let span = Span::outside(&others, &study.whole_images(entry));
         let gain = study.statistic.gain(&span, &rest);
         let probability = study.statistic.probability(&span, &rest) * study.tests(entry);
         gain - study.price(entry) > LEAST_EVIDENCE && probability < chance::LAW

@@ -51,8 +51,8 @@ impl Evidence {
             );
         }
         let found = format!(
-            "no links have the unconstrained base parameters (short by {:.2e} of the robot file's \
-             values); the repair cost {distance:.1} units of noise",
+            "no arm that can exist has the base parameters of the fit (its bodies would lack {:.2} times the robot file's \
+             pseudo-inertias); making it one cost {distance:.1} units of noise",
             -realisable
         );
         match self.p_value() {

@@ -1,5 +1,7 @@
 //! Where a block's columns are: by name, by pattern, by number.
 
+use std::fmt;
+
 use serde::Deserialize;
 
 use super::block::Block;
@@ -63,6 +65,20 @@ pub(in crate::log) struct ColumnRange {
     last: usize,
 }
 
+/// As a layout file says it.
+impl fmt::Display for Columns {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Name(name) => write!(f, "{name:?}"),
+            Self::Names(names) => write!(f, "{names:?}"),
+            Self::Number(number) => write!(f, "{number}"),
+            Self::Range(ColumnRange { first, last }) => {
+                write!(f, "{{ first = {first}, last = {last} }}")
+            }
+        }
+    }
+}
+
 impl Columns {
     /// Names by joint; a pattern goes on for as many joints as asked. `None` for column numbers.
     pub(in crate::log) fn name(&self, joint: usize) -> Option<String> {
@@ -95,11 +111,7 @@ impl Columns {
 
     pub(super) fn check(&self, block: Block, header: bool) -> Result<(), LayoutFault> {
         let fault = |expected| {
-            Err(LayoutFault::BadColumns {
-                block: block.key(),
-                value: format!("{self:?}"),
-                expected,
-            })
+            Err(LayoutFault::BadColumns { block: block.key(), value: self.to_string(), expected })
         };
         let is_pattern = |name: &str| name.contains("{0}") || name.contains("{1}");
         match self {
