@@ -195,7 +195,7 @@ fn simulated_parameters(
     if result.intervals.trusted == Some(false) {
         let file = file.display();
         eprintln!(
-            "note: {file}: the model is wrong along the log that this result is of, so that what differs from it here may have              been wrong there; `armid diagnose` of that log names its cause"
+            "note: {file}: the model is wrong along the log that this result is of, so that what differs from it here may have been wrong there; `armid diagnose` of that log names its cause"
         );
     }
     (0..set.rank())

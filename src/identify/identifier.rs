@@ -10,7 +10,6 @@ use super::fit::{Estimator, Fit};
 use super::lack_of_fit::LackOfFit;
 use super::motion_noise::moved_to_mean;
 use super::options::Options;
-use super::prediction::MOVING_RAD_S;
 use super::prepare::{Measurement, Prepared, Preparer, Processing};
 use super::problem::{Assembler, Problem};
 use super::whiten::smoothed;
@@ -242,7 +241,7 @@ impl<'a> Identifier<'a> {
             let (found, expected) = (m.q_rad.joints(), self.model.dof());
             return Err(IdentifyError::Joints { log: m.source.to_owned(), found, expected });
         }
-        if let Some(joint) = (0..m.q_rad.joints()).find(|j| is_dead(m, *j)) {
+        if let Some(joint) = (0..m.q_rad.joints()).find(|j| m.is_dead(*j)) {
             let (log, torque_nm) = (m.source.to_owned(), m.torque_nm.joint(joint)[0]);
             return Err(IdentifyError::DeadTorque { log, joint: joint + 1, torque_nm });
         }
@@ -464,13 +463,6 @@ impl<'a> Identifier<'a> {
         });
         Ok(estimates.collect())
     }
-}
-
-/// Whether joint `j` of `m` moves and its torque never changes.
-fn is_dead(m: &Measurement, j: usize) -> bool {
-    let torque = m.torque_nm.joint(j);
-    let moves = m.qd_rad_s.joint(j).iter().any(|qd| qd.abs() > MOVING_RAD_S);
-    moves && torque.iter().all(|t| *t == torque[0])
 }
 
 /// Rms per joint of what repeats in the torque and is not explained, Nm: the residual of the mean

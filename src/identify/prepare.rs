@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::error::IdentifyError;
 use super::even::{BetweenRows, Even};
 use super::options::Options;
+use super::prediction::MOVING_RAD_S;
 use crate::dynamics::Motion;
 use crate::robot::JointSignals;
 use crate::signal::{
@@ -27,6 +28,15 @@ pub struct Measurement<'a> {
     pub qd_rad_s: &'a JointSignals,
     /// Drive torque at the joint i_G k I, Nm.
     pub torque_nm: &'a JointSignals,
+}
+
+impl Measurement<'_> {
+    /// Whether joint `j` moves and its torque never changes.
+    pub(super) fn is_dead(&self, j: usize) -> bool {
+        let torque = self.torque_nm.joint(j);
+        let moves = self.qd_rad_s.joint(j).iter().any(|qd| qd.abs() > MOVING_RAD_S);
+        moves && torque.iter().all(|t| *t == torque[0])
+    }
 }
 
 /// What was done to a log before the regression.

@@ -217,12 +217,13 @@ impl Repeats {
         where_moved.retain(|place| !place.rows.is_empty());
         let share = if where_moved.is_empty() { 1.0 } else { 0.5 };
         let mut everywhere = vec![everywhere];
+        let lengths = self.lengths_s().len();
         for group in [&mut everywhere, &mut where_moved] {
             let bumps = group.iter().map(|place| {
                 // Each joint by itself, and all together.
                 let ways = if place.rows.len() > 1 { place.rows.len() + 1 } else { 1 };
                 let duration_s = place.centres.len() as f64 / self.rate_hz;
-                rarity::bumps(length_s, duration_s, self.lengths_s().len() * ways)
+                rarity::bumps(length_s, duration_s, lengths * ways)
             });
             let far = rarity::far(bumps.sum(), share * chance::CONTACT);
             group.iter_mut().for_each(|place| place.far = far);
