@@ -52,10 +52,11 @@ fn benchmark(shares: Shares, families: &[&str]) -> Benchmark {
     benchmark
 }
 
-const ONE: Shares = Shares { one: 1.0, two: 0.0, withheld: 0.0 };
-const TWO: Shares = Shares { one: 0.0, two: 1.0, withheld: 0.0 };
-const WITHHELD: Shares = Shares { one: 0.0, two: 0.0, withheld: 1.0 };
-const NOTHING: Shares = Shares { one: 0.0, two: 0.0, withheld: 0.0 };
+const NOTHING: Shares = Shares { one: 0.0, two: 0.0, withheld: 0.0, beside: 0.0 };
+const ONE: Shares = Shares { one: 1.0, ..NOTHING };
+const TWO: Shares = Shares { two: 1.0, ..NOTHING };
+const WITHHELD: Shares = Shares { withheld: 1.0, ..NOTHING };
+const BESIDE: Shares = Shares { beside: 1.0, ..NOTHING };
 
 fn record(benchmark: &Benchmark, trial: u64) -> Record {
     let record = benchmark.worker().trial(trial).unwrap();
@@ -235,6 +236,19 @@ fn of_two_effects_both_are_named() {
         benchmark(TWO, &["nonlinear_viscous", "load_friction", "spring", "torque_gain"]);
     for trial in 0..2 {
         assert_eq!(record(&benchmark, trial).outcome(), Outcome::Right, "trial {trial}");
+    }
+}
+
+/// What the model absorbs shows against the simulation, and what it does not in the residual; neither makes the other's
+/// parameters look moved.
+#[test]
+fn of_a_change_and_a_law_both_are_named() {
+    let benchmark =
+        benchmark(BESIDE, &["nonlinear_viscous", "load_friction", "payload", "friction_change"]);
+    for trial in 0..3 {
+        let record = record(&benchmark, trial);
+        assert_eq!(record.outcome(), Outcome::Right, "trial {trial}");
+        assert_eq!(record.answer.named.len(), 2, "trial {trial}");
     }
 }
 

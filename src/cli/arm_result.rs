@@ -8,6 +8,7 @@ use thiserror::Error;
 use super::robot::{OtherRobot, SavedRobot, load_robot};
 use crate::dynamics::{Model, Parameter, ParameterLayout};
 use crate::report::identify::IDENTIFY_SCHEMA;
+use crate::report::physical::DecidedBy;
 use crate::report::saved::{SavedError, load};
 use crate::robot::{Arm, Frames, LoadedArm, RobotError};
 
@@ -18,6 +19,8 @@ pub struct ArmResult {
     pub arm: Arm,
     /// Constant torque per joint, Nm; an [`Arm`] has no place for it.
     pub offsets_nm: Vec<f64>,
+    /// Standard parameters that the robot file decided, not the data.
+    pub by_prior: Vec<String>,
     /// Named frames on its bodies.
     pub frames: Frames,
     /// Files that describe the robot.
@@ -72,6 +75,7 @@ struct ResultFile {
 struct Value {
     name: String,
     value: Option<f64>,
+    decided_by: Option<DecidedBy>,
 }
 
 impl ArmResult {
@@ -91,10 +95,12 @@ impl ArmResult {
             fault,
         })?;
         let layout = ParameterLayout::new(arm.dof());
+        let by_prior = values.into_iter().filter(|v| v.decided_by == Some(DecidedBy::Prior));
         let offset = |j| standard[layout.index(Parameter::Offset(j))];
         Ok(Self {
             offsets_nm: (0..arm.dof()).map(offset).collect(),
             arm: layout.apply(&standard, &arm),
+            by_prior: by_prior.map(|v| v.name).collect(),
             frames,
             files,
         })
@@ -106,7 +112,7 @@ impl ArmResult {
 fn standard(arm: &Arm, values: &[Value]) -> Result<Vec<f64>, (String, &'static str)> {
     let layout = ParameterLayout::new(arm.dof());
     let mut standard: Vec<Option<f64>> = vec![None; layout.count()];
-    for Value { name, value } in values {
+    for Value { name, value, .. } in values {
         let index = (0..layout.count())
             .find(|&k| layout.name(k) == *name)
             .ok_or_else(|| (name.clone(), "is not one of this arm"))?;

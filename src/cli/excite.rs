@@ -174,6 +174,8 @@ struct MarginRecord {
     limit: String,
     free: f64,
     unit: &'static str,
+    /// Of half the range of a position, of the largest velocity, acceleration or torque, of 0.1 m for a distance.
+    share: f64,
     time_s: f64,
 }
 
@@ -357,13 +359,15 @@ fn print_summary(base: &BaseSet, spec: &Specification, found: &Design, seconds: 
         100.0 * p.relative_quantile(0.5),
         100.0 * p.relative_quantile(0.9),
     );
-    say!("{} base parameters; margins left (least first):", base.rank());
-    let mut margins: Vec<_> = found.margins.all().iter().collect();
-    margins.sort_by(|a, b| a.share.total_cmp(&b.share));
-    for margin in margins {
+    say!(
+        "{} base parameters; margins left (smallest share of its limit first; of clearance, of 0.1 m):",
+        base.rank()
+    );
+    for margin in found.margins.least_first() {
         say!(
-            "  {:<38} {:>16}  at {:8.3} s",
+            "  {:<38} {:>5.1} %  {:>16}  at {:8.3} s",
             margin.limit.to_string(),
+            100.0 * margin.share,
             margin.in_words(),
             margin.time_s
         );
@@ -410,6 +414,7 @@ fn write_outputs(
                     limit: m.limit.to_string(),
                     free: m.free,
                     unit: m.limit.unit(),
+                    share: m.share,
                     time_s: m.time_s,
                 })
                 .collect(),

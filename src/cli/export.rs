@@ -31,7 +31,7 @@ pub fn run(args: &ExportArgs) -> CommandResult {
     for path in [&args.urdf, &drives, &args.mjcf].into_iter().flatten() {
         check_writable(path)?;
     }
-    let ArmResult { arm, offsets_nm, frames, .. } =
+    let ArmResult { arm, offsets_nm, by_prior, frames, .. } =
         ArmResult::load(&args.result, args.robot.as_deref())?;
     let write = |path: &Path, text: &str| -> Result<(), crate::output::OutputError> {
         write_atomically(path, |file| file.write_all(text.as_bytes()))?;
@@ -49,6 +49,14 @@ pub fn run(args: &ExportArgs) -> CommandResult {
         if offsets_nm.iter().any(|offset| *offset != 0.0) {
             say!("note: torque offsets {offsets_nm:?} Nm have no place in an MJCF");
         }
+    }
+    if !by_prior.is_empty() {
+        say!(
+            "note: of {} standard parameters ({}) the log tells only combinations with others; how these are shared between them \
+             is taken from the robot file, and does not change the torques.",
+            by_prior.len(),
+            by_prior.join(", ")
+        );
     }
     Ok(Outcome::Done)
 }

@@ -12,7 +12,7 @@ use crate::identify::covariance::CovarianceKind;
 use crate::identify::physical::{self, PhysicalOptions, PriorMetric, PriorWeight};
 use crate::identify::{
     Estimator, FitError, Identification, Identifier, IdentifyError, Measurement, Options,
-    Regression,
+    Regression, Several, each_alone, pooled,
 };
 use crate::log::{Layout, Log, read_log};
 use crate::output::check_writable;
@@ -202,12 +202,23 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
     let regressions = logs
         .iter()
         .map(|log| identifier.regression(&log.measurement()))
-        .collect::<Result<_, _>>()?;
-    let regression = Regression::joined(regressions)?;
+        .collect::<Result<Vec<_>, _>>()?;
+    let several = each_alone(&mut identifier, &regressions)?;
+    let mut regression = Regression::joined(regressions)?;
+    if let Several::Together { log, reason } = &several {
+        let name = logs[*log].input.path.display();
+        regression.prepared.warnings.push(format!(
+            "all logs count as single runs together, because {name} cannot stand alone: {reason}"
+        ));
+    }
     inputs.extend(logs.iter().chain(&validation_logs).map(|l| l.input.clone()));
     let program = Program::new(std::env::args(), None, inputs);
     let logs: Vec<&Log> = logs.iter().map(|l| &l.log).collect();
-    let identification = match identifier.identify_regression(&regression) {
+    let identified = match several {
+        Several::Apart(parts) => Ok(pooled(&parts, &regression)),
+        Several::AsOne | Several::Together { .. } => identifier.identify_regression(&regression),
+    };
+    let identification = match identified {
         Err(IdentifyError::Fit(FitError::NotExcited { parameters })) => {
             return decline(args, &Declined::new(&arm, &logs, &regression, parameters), program);
         }

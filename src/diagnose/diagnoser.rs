@@ -1,13 +1,13 @@
 //! From a log to a diagnosis: the procedure as a whole.
 
-use super::against;
+use super::against::{self, Found};
 use super::candidates::{self, Candidate};
 use super::common_motion::move_to_common_motion;
 use super::contact::{self, Compared};
 use super::data_faults::{self, Faults};
 use super::detection_limits::detection_limits;
 use super::error::DiagnoseError;
-use super::extension::Extension;
+use super::extension::{Effect, Extension};
 use super::gain;
 use super::held_out::{Models, Validation, held_out_gain};
 use super::intervals;
@@ -157,7 +157,13 @@ impl<'a> Diagnoser<'a> {
         let mut causes: Vec<Cause> = faults.into_iter().chain(physics).collect();
         let (mut accepted, mut rest) = kept.without(None);
         if let Some(simulation) = simulation {
-            let explained = against::explain(&study, self.set, simulation, &entries);
+            let found = selected.iter().zip(&extension.effects).map(|(selected, effect)| Found {
+                entry: &selected.contender.entry,
+                effect,
+                alike: selected.alike(),
+            });
+            let found: Vec<Found> = found.collect();
+            let explained = against::explain(&study, self.set, simulation, &found);
             causes.retain(|c| !explained.judged.contains(&(c.kind, c.joint)));
             causes.extend(explained.causes);
             rest = study.residual.clone();
@@ -322,16 +328,27 @@ impl<'a> Diagnoser<'a> {
             joint: rival.entry.site.map(|j| j + 1),
             evidence_behind: selected.contender.evidence - rival.evidence,
         });
+        let effect = &extension.effects[index];
+        let parameters = intervals::physical(study, kept, effect, index);
+        let Effect { site, shape, coefficients, .. } = effect;
+        // Of several coefficients one may be none beside the others.
+        let size = (coefficients.len() == 1)
+            .then(|| family.size(&family.quantities(&study.scene, *site, *shape, coefficients)))
+            .flatten()
+            .and_then(|size| parameters.get(size.name));
+        let nothing = family.without_effect(&study.scene);
+        let may_be_none = size.is_some_and(|size| size.holds(nothing));
         Cause {
             kind: family.kind(),
             joint: entry.site.map(|j| j + 1),
             confidence: selected.confidence,
-            parameters: intervals::physical(study, kept, &extension.effects[index], index),
+            parameters,
             gain_fraction,
             separating_experiment: (!class.is_empty()).then(|| family.separating_experiment()),
             class,
             strength: selected.contender.score.lambda.sqrt(),
             in_words: family.in_words().to_owned(),
+            may_be_none,
             rivals: rivals.collect(),
         }
     }

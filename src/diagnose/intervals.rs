@@ -18,7 +18,7 @@ const STEP: f64 = 1e-3;
 
 /// What `effect` adds to the whitened equations per unit of its coefficients, and of its nonlinear parameter
 /// where it has one.
-fn tangents(study: &Study, effect: &Effect) -> Vec<Image> {
+pub(super) fn tangents(study: &Study, effect: &Effect) -> Vec<Image> {
     let family = &study.families[effect.family];
     let images = |value: f64| -> Vec<Image> {
         let shape = Shape { value, ..effect.shape };

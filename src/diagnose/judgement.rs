@@ -24,6 +24,15 @@ pub struct Selected {
     pub left_out_gain: Option<f64>,
 }
 
+impl Selected {
+    /// Those of its rivals that the data cannot tell from it, at their best shapes.
+    pub fn alike(&self) -> Vec<&Entry> {
+        let in_class =
+            |rival: &&Contender| self.class.contains(&(rival.entry.family, rival.entry.site));
+        self.rivals.iter().filter(in_class).map(|rival| &rival.entry).collect()
+    }
+}
+
 /// A cause in another form of its family.
 pub struct Form {
     /// With its numbers.

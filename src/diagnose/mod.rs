@@ -51,6 +51,7 @@ mod reversal_answer;
 mod reversals;
 mod scene;
 mod selection;
+mod sentences;
 mod settled;
 mod significance;
 mod stalls;

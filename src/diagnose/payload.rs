@@ -183,6 +183,7 @@ impl PayloadFinding {
             separating_experiment: None,
             strength: self.mass_kg.value / sigma,
             in_words: "a body on the flange".to_owned(),
+            may_be_none: false,
             rivals: Vec::new(),
         })
     }

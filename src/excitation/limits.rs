@@ -135,6 +135,13 @@ impl Margins {
         &self.all
     }
 
+    /// All of them, the smallest share first.
+    pub fn least_first(&self) -> Vec<&Margin> {
+        let mut sorted: Vec<&Margin> = self.all.iter().collect();
+        sorted.sort_by(|a, b| a.share.total_cmp(&b.share));
+        sorted
+    }
+
     /// Whether no limit is passed.
     pub fn feasible(&self) -> bool {
         self.worst().free >= 0.0

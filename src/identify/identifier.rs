@@ -10,12 +10,13 @@ use super::fit::{Estimator, Fit};
 use super::lack_of_fit::LackOfFit;
 use super::motion_noise::moved_to_mean;
 use super::options::Options;
+use super::pooled::Agreement;
 use super::prepare::{Measurement, Prepared, Preparer, Processing};
 use super::problem::{Assembler, Problem};
+use super::residual::Residual;
 use super::whiten::smoothed;
 use crate::base::BaseSet;
 use crate::dynamics::Model;
-use crate::robot::JointSignals;
 use crate::signal::{Filled, FineClock, Replicates, Scratch, ZeroPhase, fill_gaps};
 
 /// Everything that stays the same from log to log, and the memory that is used again.
@@ -52,58 +53,10 @@ pub struct Identification {
     pub explainable_nm: Option<Vec<f64>>,
     /// Test of the model against the scatter between periods; known for the spectral estimator.
     pub lack_of_fit: Option<LackOfFit>,
+    /// Whether several logs tell of one arm; known where each repeats its motion.
+    pub agreement: Option<Agreement>,
     /// What the user should know about how the log was used.
     pub warnings: Vec<String>,
-}
-
-/// How far a prediction is off.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Residual {
-    /// Root mean square per joint, Nm.
-    pub rms_nm: Vec<f64>,
-    /// 100 ‖e_j‖/‖τ_j‖ per joint, percent.
-    pub relative_percent: Vec<f64>,
-    /// The paper's (21): √(eᵀe)/m, e over all joints, m time samples. Not an rms: it shrinks with
-    /// the length of the record.
-    pub e_n: f64,
-}
-
-impl Residual {
-    /// From ‖e_j‖² and ‖τ_j‖² over `samples` time samples.
-    pub fn from_squares(residual: &[f64], torque: &[f64], samples: usize) -> Self {
-        let m = samples as f64;
-        let pairs = residual.iter().zip(torque);
-        Self {
-            rms_nm: residual.iter().map(|e| (e / m).sqrt()).collect(),
-            relative_percent: pairs.map(|(e, t)| 100.0 * (e / t).sqrt()).collect(),
-            e_n: residual.iter().sum::<f64>().sqrt() / m,
-        }
-    }
-
-    /// Of the samples of `error` and `torque_nm` (same shape) for which `counts(joint, sample)`.
-    pub fn of(
-        error_nm: &JointSignals,
-        torque_nm: &JointSignals,
-        counts: impl Fn(usize, usize) -> bool,
-    ) -> Self {
-        let (n, samples) = (error_nm.joints(), error_nm.samples());
-        let mut rms_nm = Vec::with_capacity(n);
-        let mut relative_percent = Vec::with_capacity(n);
-        let mut all = 0.0;
-        for j in 0..n {
-            let mut squares = [0.0; 2];
-            let mut counted = 0usize;
-            for k in (0..samples).filter(|&k| counts(j, k)) {
-                squares[0] += error_nm.joint(j)[k].powi(2);
-                squares[1] += torque_nm.joint(j)[k].powi(2);
-                counted += 1;
-            }
-            rms_nm.push((squares[0] / counted as f64).sqrt());
-            relative_percent.push(100.0 * (squares[0] / squares[1]).sqrt());
-            all += squares[0];
-        }
-        Self { rms_nm, relative_percent, e_n: all.sqrt() / samples as f64 }
-    }
 }
 
 /// A log laid out for regression.
@@ -205,6 +158,13 @@ impl<'a> Identifier<'a> {
     /// The base set that is identified.
     pub fn base_set(&self) -> &'a BaseSet {
         self.set
+    }
+
+    /// Whether the noise that periods show may weigh a log that repeats: nothing else was asked for.
+    pub fn may_weigh_by_periods(&self) -> bool {
+        let Options { estimator, covariance, .. } = self.options;
+        estimator.is_none_or(|e| e == Estimator::Spectral)
+            && covariance.is_none_or(|c| c == CovarianceKind::Spectral)
     }
 
     /// Identifies from one log.
@@ -407,6 +367,7 @@ impl<'a> Identifier<'a> {
             processing: prepared.processing,
             replicates: prepared.replicates,
             lack_of_fit,
+            agreement: None,
             warnings: prepared.warnings,
             fit,
         })

@@ -1,7 +1,8 @@
 //! Torque as measured and as a set of parameters predicts it, sample by sample.
 
 use super::course::Course;
-use super::identifier::{Regression, Residual};
+use super::identifier::Regression;
+use super::residual::Residual;
 use crate::robot::JointSignals;
 
 /// Measured and predicted torque along a log or several, with the processing of the regression.

@@ -54,9 +54,9 @@ pub struct Processing {
     pub torque_filtered: bool,
     /// Period of the motion, s; null for a single run.
     pub period_s: Option<f64>,
-    /// Whole periods used; 1 for a single run, and for several logs, each of which is one then.
+    /// Whole periods used, of several logs together; 1 for a single run, and for several logs that are taken for single runs.
     pub periods: usize,
-    /// Logs whose rows stand below each other; all else is said of the first.
+    /// Logs used together; all but the number of periods is said of the first.
     pub logs: usize,
     /// Whether time stamps were uneven and the log was resampled.
     pub resampled: bool,

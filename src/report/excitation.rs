@@ -92,7 +92,8 @@ pub fn page(
     page.push(
         Section::new("Margins").table(
             margins(found),
-            "What the whole motion, run-in and run-out included, leaves free.",
+            "What the whole motion, run-in and run-out included, leaves free, also as a share of half the range of a position, of \
+             the largest velocity, acceleration or torque, and of 0.1 m of clearance.",
         ),
     );
     if is_watched {
@@ -299,13 +300,15 @@ fn margins(found: &Design) -> Table {
         Column::text("limit"),
         Column::number("left", ""),
         Column::text("unit"),
+        Column::number("of the limit", "%"),
         Column::number("at", "s"),
     ]);
-    for margin in found.margins.all() {
+    for margin in found.margins.least_first() {
         table.push([
             margin.limit.to_string(),
             number::significant(margin.free, 3),
             margin.limit.unit().to_owned(),
+            format!("{:.1}", 100.0 * margin.share),
             format!("{:.3}", margin.time_s),
         ]);
     }

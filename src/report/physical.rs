@@ -1,6 +1,6 @@
 //! Standard parameters that an arm can have: JSON and section of the page.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::number::{significant, with_sigma};
 use super::{Column, Section, Status, Table};
@@ -15,8 +15,31 @@ pub struct StandardParameter {
     name: String,
     value: f64,
     unit: &'static str,
-    /// As far as the data decide the value; what the prior decides scatters with no log.
-    sigma: f64,
+    decided_by: DecidedBy,
+    /// `None` where the data do not decide the value: it scatters with no log, and how wrong the robot file is no log knows.
+    sigma: Option<f64>,
+}
+
+/// What puts a standard parameter where it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DecidedBy {
+    /// The data.
+    Data,
+    /// The robot file, as far as the log tells only combinations.
+    Prior,
+    /// The choice of parameters: it is zero (torque offsets, and what a reduced set leaves out).
+    NotFitted,
+}
+
+impl DecidedBy {
+    fn of(estimate: &PhysicalEstimate, k: usize) -> Self {
+        match estimate.is_prior(k) {
+            true => Self::Prior,
+            false if estimate.scatter.released.standard[k] > 0.0 => Self::Data,
+            false => Self::NotFitted,
+        }
+    }
 }
 
 /// All of them; torque offsets are zero where they were not fitted.
@@ -24,11 +47,15 @@ pub fn standard_parameters(estimate: &PhysicalEstimate, arm: &Arm) -> Vec<Standa
     let layout = ParameterLayout::new(arm.dof());
     let values = estimate.standard.iter().zip(&estimate.scatter.released.standard).enumerate();
     values
-        .map(|(k, (&value, &sigma))| StandardParameter {
-            name: layout.name(k),
-            value,
-            unit: layout.unit(k),
-            sigma,
+        .map(|(k, (&value, &sigma))| {
+            let decided_by = DecidedBy::of(estimate, k);
+            StandardParameter {
+                name: layout.name(k),
+                value,
+                unit: layout.unit(k),
+                decided_by,
+                sigma: (decided_by == DecidedBy::Data).then_some(sigma),
+            }
         })
         .collect()
 }
@@ -43,6 +70,9 @@ pub struct Physical {
     model_is_wrong: bool,
     prior_metric: PriorMetric,
     prior_weight: f64,
+    /// Standard parameters that a robot file wrong by the share `file_error` moves by more than their σ.
+    prior_decides: usize,
+    file_error: f64,
     cross_validation: Option<Vec<TriedWeight>>,
     active: Vec<String>,
     objective: f64,
@@ -82,6 +112,8 @@ impl Physical {
             model_is_wrong: evidence.model_is_wrong(),
             prior_metric: estimate.prior.metric,
             prior_weight: estimate.prior.weight,
+            prior_decides: (0..estimate.standard.len()).filter(|&k| estimate.is_prior(k)).count(),
+            file_error: estimate.file_error(),
             cross_validation: estimate.cross_validation.as_ref().map(tried),
             active: estimate.active.iter().map(ToString::to_string).collect(),
             objective,
@@ -116,10 +148,13 @@ impl Physical {
             ),
             format!(
                 "The robot file's values are the prior ({}, weight {:.0e}{}): combinations that no \
-                 torque depends on are where it puts them.",
+                 torque depends on are where it puts them, and {} standard parameters with them, which \
+                 come without σ (half of a file's error would stay, or one of {:.0} % be more than it).",
                 self.prior_metric,
                 self.prior_weight,
-                if self.cross_validation.is_some() { " chosen by cross-validation" } else { "" }
+                if self.cross_validation.is_some() { " chosen by cross-validation" } else { "" },
+                self.prior_decides,
+                100.0 * self.file_error
             ),
         ];
         if !self.active.is_empty() {
@@ -158,7 +193,13 @@ impl Physical {
             Column::number("estimate ± σ", ""),
         ]);
         for p in standard {
-            table.push([p.name.clone(), p.unit.to_owned(), with_sigma(p.value, p.sigma)]);
+            let alone = significant(p.value, 4);
+            let value = match (p.sigma, p.decided_by) {
+                (Some(sigma), _) => with_sigma(p.value, sigma),
+                (None, DecidedBy::NotFitted) => format!("{alone} (not fitted)"),
+                (None, _) => format!("{alone} (prior)"),
+            };
+            table.push([p.name.clone(), p.unit.to_owned(), value]);
         }
         section.details(Section::new("All standard parameters").table(table, ""))
     }

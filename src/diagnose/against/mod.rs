@@ -10,7 +10,9 @@ use std::collections::BTreeMap;
 use changes::Change;
 
 use super::chance;
+use super::extension::Effect;
 use super::image::{Image, Span};
+use super::intervals::tangents;
 use super::judgement::{TELLS_APART, probability_of_class};
 use super::kind::Kind;
 use super::significance::LEAST_EVIDENCE;
@@ -38,6 +40,32 @@ pub fn moved(simulation: &[f64], data: &[BaseParameter]) -> Vec<Moved> {
         .collect()
 }
 
+/// An effect that was found beside the null model.
+pub struct Found<'a> {
+    /// At its best shape.
+    pub entry: &'a Entry,
+    /// With its numbers.
+    pub effect: &'a Effect,
+    /// What the data cannot tell from it.
+    pub alike: Vec<&'a Entry>,
+}
+
+/// An effect and the room that the residual of a simulation leaves it: its columns with what a fit of the null model would absorb of
+/// them, most of what they are; how these change with its shape; and those of what the data cannot tell from it. A law whose
+/// exponent is off by a tenth, or that is another of its class, is none the less not a change of the arm.
+struct Beside<'a> {
+    entry: &'a Entry,
+    room: Vec<Image>,
+}
+
+impl<'a> Beside<'a> {
+    fn new(study: &Study, found: &Found<'a>) -> Self {
+        let mut room = tangents(study, found.effect);
+        room.extend(found.alike.iter().flat_map(|entry| study.whole_images(entry)));
+        Self { entry: found.entry, room }
+    }
+}
+
 /// How the data differ from a simulation.
 pub struct Explained {
     /// The changes, the one that explains most first.
@@ -51,7 +79,7 @@ pub struct Explained {
 
 /// The changes that explain how the data differ from the simulation. `accepted` are effects that were found
 /// beside the null model.
-pub fn explain(study: &Study, set: &BaseSet, simulation: &[f64], accepted: &[&Entry]) -> Explained {
+pub fn explain(study: &Study, set: &BaseSet, simulation: &[f64], accepted: &[Found]) -> Explained {
     let mut residual = study.torque.clone();
     for (column, theta) in study.null_columns.iter().zip(simulation) {
         residual.add(-theta, column);
@@ -61,21 +89,23 @@ pub fn explain(study: &Study, set: &BaseSet, simulation: &[f64], accepted: &[&En
         let place = (study.families[entry.family].kind(), entry.site);
         changes.iter().any(|c| (c.kind, c.site) == place)
     };
-    let mut beside: Vec<&Entry> = accepted.iter().filter(|e| !is_change(e)).copied().collect();
+    let is_beside = |found: &&Found| !is_change(found.entry);
+    let mut beside: Vec<Beside> =
+        accepted.iter().filter(is_beside).map(|found| Beside::new(study, found)).collect();
     let place = |c: &Change| (c.kind, c.site.map(|j| j + 1));
     let mut judged: Vec<(Kind, Option<usize>)> = changes.iter().map(place).collect();
     let places = places(&changes);
-    let nuisance = nuisance(study, &beside);
+    let nuisance = nuisance(study, beside.iter());
     let mut search = Search { study, changes, places, nuisance, residual };
     let mut taken = search.select();
     // What the null model could not absorb of a change may have been taken for an effect.
     while let Some(needless) = (0..beside.len()).find(|&e| !search.needs(e, &beside, &taken)) {
-        let entry = beside.remove(needless);
+        let entry = beside.remove(needless).entry;
         judged.push((study.families[entry.family].kind(), entry.site.map(|j| j + 1)));
-        search.nuisance = self::nuisance(study, &beside);
+        search.nuisance = self::nuisance(study, beside.iter());
         taken = search.select();
     }
-    let mut span = study.span_of_all(&beside);
+    let mut span = study.span_of_all(&beside.iter().map(|b| b.entry).collect::<Vec<_>>());
     let images = taken.iter().flat_map(|&c| &search.changes[c].images);
     for image in images.filter_map(|image| study.outside_null(image.clone())) {
         span.push(&image);
@@ -84,14 +114,18 @@ pub fn explain(study: &Study, set: &BaseSet, simulation: &[f64], accepted: &[&En
     Explained { causes, judged, span }
 }
 
-/// What the residual of a simulation holds beside changes: the effects `beside`, with what a fit of the null model would absorb of
-/// them, and how drives answer friction, which no simulation says.
-fn nuisance(study: &Study, beside: &[&Entry]) -> Span {
+/// What the residual of a simulation holds beside changes: the effects `beside` with their room, and how drives answer friction,
+/// which no simulation says.
+fn nuisance<'a>(study: &Study, beside: impl Iterator<Item = &'a Beside<'a>>) -> Span {
     let mut span = Span::default();
-    for image in beside.iter().flat_map(|entry| study.whole_images(entry)) {
-        span.push(&image);
+    let mut entries = Vec::new();
+    for Beside { entry, room } in beside {
+        entries.push(*entry);
+        room.iter().for_each(|image| {
+            span.push(image);
+        });
     }
-    for image in study.blurred_shares(beside).chain(&study.null_columns[study.base_count()..]) {
+    for image in study.blurred_shares(&entries).chain(&study.null_columns[study.base_count()..]) {
         span.push(image);
     }
     span
@@ -142,14 +176,15 @@ impl Search<'_> {
 
     /// Whether effect number `e` of those `beside` is worth its price beside the others and the changes `taken`; true where none
     /// is, which is how it was found, and of one of several of a family at its site, which are judged together.
-    fn needs(&self, e: usize, beside: &[&Entry], taken: &[usize]) -> bool {
+    fn needs(&self, e: usize, beside: &[Beside], taken: &[usize]) -> bool {
         let study = self.study;
-        let entry = beside[e];
-        let alike = beside.iter().filter(|b| (b.family, b.site) == (entry.family, entry.site));
+        let entry = beside[e].entry;
+        let place = |entry: &Entry| (entry.family, entry.site);
+        let alike = beside.iter().filter(|b| place(b.entry) == place(entry));
         if taken.is_empty() || alike.count() > 1 {
             return true;
         }
-        let others = nuisance(study, &[&beside[..e], &beside[e + 1..]].concat());
+        let others = nuisance(study, beside[..e].iter().chain(&beside[e + 1..]));
         let (others, rest) = self.outside_of(others, taken);
         let span = Span::outside(&others, &study.whole_images(entry));
         let gain = study.statistic.gain(&span, &rest);
@@ -242,6 +277,7 @@ impl Search<'_> {
             gain_fraction: None,
             strength: study.statistic.lambda(&span, &left, gain).max(0.0).sqrt(),
             in_words: change.in_words.to_owned(),
+            may_be_none: false,
             rivals: behind.collect(),
         }
     }

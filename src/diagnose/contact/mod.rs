@@ -87,6 +87,7 @@ impl Touch {
             separating_experiment: None,
             strength: self.strength,
             in_words: format!("something touched the arm: {}", joints.join(", ")),
+            may_be_none: false,
             rivals: Vec::new(),
         }
     }

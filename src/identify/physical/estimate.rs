@@ -7,7 +7,7 @@ use super::evidence::{Evidence, bootstrap, noise_root};
 use super::information::Information;
 use super::program::{ConeProgram, ConeSolution, ProgramError};
 use super::realisable::realisability;
-use super::scatter::{Scatter, Sigma};
+use super::scatter::{FileError, Scatter, Sigma};
 use super::structure::{Structure, Subject};
 use super::weight::{CrossValidation, PriorMetric, PriorWeight, Pulling, cross_validate};
 use crate::base::BaseSet;
@@ -52,6 +52,8 @@ pub struct PhysicalEstimate {
     pub base: Vec<f64>,
     /// How both scatter.
     pub scatter: Scatter,
+    /// What an error of the robot file does to each standard parameter.
+    pub file_errors: Vec<FileError>,
     /// The unconstrained base parameters θ̂.
     pub unconstrained: Vec<f64>,
     /// Their σ.
@@ -66,6 +68,21 @@ pub struct PhysicalEstimate {
     pub prior: Pulling,
     /// How it was chosen, where the data chose it.
     pub cross_validation: Option<CrossValidation>,
+}
+
+impl PhysicalEstimate {
+    /// By which share the robot file may be wrong: what its weight γ says, 1/√γ, but no more than by all of it.
+    pub fn file_error(&self) -> f64 {
+        self.prior.weight.sqrt().recip().min(1.0)
+    }
+
+    /// Whether the robot file decides standard parameter `k`, rather than the data: more than half of its error stays, or a
+    /// file as wrong as it may be moves the estimate by more than its σ. That σ knows only the noise of the data, and would
+    /// not be the parameter's uncertainty.
+    pub fn is_prior(&self, k: usize) -> bool {
+        let FileError { stays, share } = self.file_errors[k];
+        share > 0.5 || self.file_error() * stays > self.scatter.released.standard[k]
+    }
 }
 
 /// Proof of optimality.
@@ -160,15 +177,18 @@ impl Solver {
         let by_delta = |curvature: &Cholesky<f64, Dyn>| {
             Sigma::by_delta_method(&self.structure, curvature, &data.map, &noise)
         };
-        let free = Cholesky::new(data.program.hessian.clone()).ok_or(ProgramError::NotConvex)?;
+        // The entropic program has its prior's curvature in its barriers.
+        let curvature = data.map.tr_mul(&data.map) + weight * self.structure.pull_curvature();
+        let curvature = Cholesky::new(curvature).ok_or(ProgramError::NotConvex)?;
         let exceeded = draws.as_ref().map(|draws| draws.exceeded);
         let scatter = Scatter {
             held: by_delta(&constrained.solution.stiffness),
-            released: by_delta(&free),
+            released: by_delta(&curvature),
             drawn: draws.map(|draws| draws.sigma),
         };
         Ok(PhysicalEstimate {
             standard: self.structure.standard(&constrained.y),
+            file_errors: FileError::of(&self.structure, &curvature, weight),
             base: (&self.structure.base_map * &constrained.y).as_slice().to_vec(),
             scatter,
             unconstrained: fit.theta.clone(),

@@ -37,6 +37,6 @@ pub use estimate::{Certificate, Constrained, PhysicalEstimate, PhysicalOptions, 
 pub use evidence::Evidence;
 pub use information::Information;
 pub use program::{ConeProgram, ConeSolution, Constraint, ProgramError};
-pub use scatter::{Scatter, Sigma};
+pub use scatter::{FileError, Scatter, Sigma};
 pub use structure::{Structure, Subject};
 pub use weight::{CrossValidation, PriorMetric, PriorWeight, Pulling};

@@ -26,7 +26,7 @@ pub struct Sigma {
 pub struct Scatter {
     /// With the full curvature. An active bound holds its direction, and this σ leaves it out.
     pub held: Sigma,
-    /// With Gauss and Newton's curvature, which knows only the data and the prior: as if no bound
+    /// With Gauss and Newton's curvature, which knows only the data and the prior (as it is at the prior): as if no bound
     /// were there. In log-Cholesky parameters this is the textbook formula J (JᵀHJ)⁻¹Jᵀ = H⁻¹.
     pub released: Sigma,
     /// Root mean square distance from the estimate of estimates drawn around it (parametric
@@ -46,9 +46,47 @@ impl Sigma {
         let scatter = |of: &DMatrix<f64>| -> Vec<f64> {
             let linear = of * &sensitivity;
             let spread = &linear * noise;
-            linear.row_iter().zip(spread.row_iter()).map(|(a, b)| a.dot(&b).sqrt()).collect()
+            linear
+                .row_iter()
+                .zip(spread.row_iter())
+                .map(|(a, b)| a.dot(&b).max(0.0).sqrt())
+                .collect()
         };
         Self { base: scatter(&structure.base_map), standard: scatter(&structure.standard_map()) }
+    }
+}
+
+/// What an error of the prior does to a standard parameter, free of noise and bounds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FileError {
+    /// Root mean square error of the estimate where the prior is wrong by 100 % in every direction of its metric, in the
+    /// parameter's unit. In proportion for other errors.
+    pub stays: f64,
+    /// That over the error of the prior itself: 0 where the data decide, 1 where nothing but the prior does.
+    pub share: f64,
+}
+
+impl FileError {
+    /// Of every standard parameter. With A the prior's curvature, γ its weight and the `curvature` S = (R K)ᵀ(R K) + γ A the
+    /// estimate is off by S⁻¹ γ A times the prior's error, whose covariance is A⁻¹: by γ √diag(E S⁻¹ A S⁻¹ Eᵀ), out of
+    /// √diag(E A⁻¹ Eᵀ).
+    pub(super) fn of(
+        structure: &Structure,
+        curvature: &Cholesky<f64, Dyn>,
+        weight: f64,
+    ) -> Vec<Self> {
+        let pulls = structure.pull_curvature();
+        let columns = structure.standard_map().transpose();
+        let of_prior = Cholesky::new(pulls.clone()).map(|pulls| pulls.solve(&columns));
+        let stays = weight * curvature.solve(&columns);
+        let squares = (pulls * &stays).component_mul(&stays).row_sum();
+        let whole = of_prior.map(|of_prior| of_prior.component_mul(&columns).row_sum());
+        let error = |k: usize| {
+            let stays = squares[k].max(0.0).sqrt();
+            let whole = whole.as_ref().map_or(f64::INFINITY, |whole| whole[k].max(0.0).sqrt());
+            Self { stays, share: if whole > 0.0 { stays / whole } else { 0.0 } }
+        };
+        (0..columns.ncols()).map(error).collect()
     }
 }
 

@@ -171,6 +171,13 @@ impl Structure {
         self.pulls.iter().map(|pull| pull.add_square(weight, h, c)).sum()
     }
 
+    /// A = Σ AᵀA of the pulls, n × n: the curvature at the prior of what pulls to it, per unit of its weight.
+    pub fn pull_curvature(&self) -> DMatrix<f64> {
+        let mut pulls = DMatrix::zeros(self.unknowns(), self.unknowns());
+        self.add_pulls(1.0, &mut pulls, &mut DVector::zeros(self.unknowns()));
+        pulls
+    }
+
     /// Adds weight·D of every pull, D = tr(A y) − ln det(A y) − d: the logarithm as a barrier among
     /// `constraints`, the trace to −cᵀy; returns −Σ weight·d. Where the prior is zero there is no
     /// logarithm, and the pull is the square. H is given `ENTROPIC_CURVATURE` of the square as well,

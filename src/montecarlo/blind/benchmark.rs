@@ -7,12 +7,13 @@ use super::case::{Case, Drawn, Secret, draw};
 use super::family::{Family, Judged, kin};
 use super::plan::BlindPlan;
 use super::record::{Answer, HeldOutGain, Record, Records};
-use crate::diagnose::{DiagnoseError, Diagnoser, Diagnosis, Kind, Validation, candidates};
+use crate::diagnose::candidates::Candidate;
+use crate::diagnose::{DiagnoseError, Diagnoser, Diagnosis, HeldOut, Kind, Validation, candidates};
 use crate::dynamics::Model;
 use crate::identify::Measurement;
 use crate::montecarlo::trials::{Content, Difference, Trials};
 use crate::montecarlo::{Scenario, Simulation};
-use crate::plant::faults::Effect;
+use crate::plant::faults::{Effect, FaultyPlant};
 use crate::plant::{Measured, PlantError, Recording, SensorConfig};
 
 /// What all trials share.
@@ -73,6 +74,34 @@ impl Benchmark {
         family.judged == Judged::Residual && self.known.contains(&family.kind)
     }
 
+    /// The families that are hidden and that `wanted` accepts.
+    pub(super) fn open(&self, wanted: impl Fn(&Family) -> bool) -> Vec<&Family> {
+        self.plan.families.iter().filter(|f| wanted(f)).collect()
+    }
+
+    /// The arm of `scenario` without its effects along motion `motion`.
+    pub(super) fn clean_simulation(
+        &self,
+        scenario: Scenario,
+        motion: usize,
+    ) -> Result<Simulation, PlantError> {
+        let scenario = Scenario { effects: Vec::new(), ..scenario };
+        let plant = FaultyPlant::new(&scenario.arm, &[], &scenario.plant)?;
+        Simulation::with_recording(scenario, plant, self.clean[motion].clone())
+    }
+
+    /// The dictionary without what is withheld in `case`.
+    fn dictionary(&self, case: &Case) -> Vec<Box<dyn Candidate>> {
+        let mut families = candidates::all();
+        if case.secret == Secret::Withheld {
+            let is_withheld = |kind: Kind| {
+                case.hidden.iter().any(|h| h.kind == kind || kin(h.kind).contains(&kind))
+            };
+            families.retain(|f| !is_withheld(f.kind()));
+        }
+        families
+    }
+
     /// What one thread needs.
     pub fn worker(&self) -> BlindWorker<'_> {
         BlindWorker { benchmark: self, log: Measured::like(&self.clean[0]) }
@@ -93,31 +122,35 @@ impl BlindWorker<'_> {
         self.log = Measured::like(&drawn.simulation.recording);
         drawn.simulation.log_into(trial, &mut self.log)?;
         let held_out = self.held_out(&drawn)?;
-        let diagnosis = self.diagnose(&drawn.case, held_out.as_ref()).map_err(|source| {
-            BlindError::Diagnose { case: Box::new(drawn.case.clone()), source }
-        })?;
+        let simulation = drawn.case.against_simulation.then_some(&benchmark.simulation[..]);
+        let diagnosis = self
+            .diagnose(benchmark.dictionary(&drawn.case), held_out.as_ref(), simulation)
+            .map_err(|source| BlindError::Diagnose {
+                case: Box::new(drawn.case.clone()),
+                source,
+            })?;
         let sensors = &drawn.simulation.scenario.sensors;
         let sd_nm = sensors.torque_sd_per_joint_nm(benchmark.plan.base.arm.dof())?;
-        let gain = diagnosis.held_out.first().map(|held_out| HeldOutGain::of(held_out, &sd_nm));
+        let gain = match diagnosis.held_out.first() {
+            None => None,
+            Some(hidden) => {
+                let clean = self.clean_held_out(&drawn, trial)?;
+                clean.map(|clean| HeldOutGain::of(hidden, &clean, &sd_nm))
+            }
+        };
         let hidden_arm = Model::new(drawn.simulation.plant.true_arm());
         let truth = benchmark.plan.base.set.values(&hidden_arm.standard_parameters());
         Ok(Record { trial, case: drawn.case, answer: Answer::of(&diagnosis, gain, &truth) })
     }
 
-    /// What the diagnosis makes of the log.
+    /// What the diagnosis with these families makes of the log.
     fn diagnose(
         &self,
-        case: &Case,
+        families: Vec<Box<dyn Candidate>>,
         held_out: Option<&Recording>,
+        simulation: Option<&[f64]>,
     ) -> Result<Diagnosis, DiagnoseError> {
-        let Benchmark { plan, model, simulation, .. } = self.benchmark;
-        let mut families = candidates::all();
-        if case.secret == Secret::Withheld {
-            let is_withheld = |kind: Kind| {
-                case.hidden.iter().any(|h| h.kind == kind || kin(h.kind).contains(&kind))
-            };
-            families.retain(|f| !is_withheld(f.kind()));
-        }
+        let Benchmark { plan, model, .. } = self.benchmark;
         let Scenario { arm, set, processing, .. } = &plan.base;
         let mut diagnoser = Diagnoser::with_families(arm, model, set, processing.clone(), families);
         let log = &self.log;
@@ -141,7 +174,6 @@ impl BlindWorker<'_> {
                 manufacturer_nm: None,
             })
             .collect();
-        let simulation = case.against_simulation.then_some(&simulation[..]);
         Ok(diagnoser.diagnose(&measurement, &held_out, simulation)?.diagnosis)
     }
 
@@ -157,12 +189,29 @@ impl BlindWorker<'_> {
         if !measured {
             return Ok(None);
         }
-        let next = &plan.motions[(drawn.motion + 1) % plan.motions.len()];
+        let next = &plan.motions[self.next_motion(drawn)];
         let excitation = next.excitation.clone();
         let sensors = SensorConfig::default();
         let simulation =
             Simulation::run_once(Scenario { excitation, sensors, ..scenario.clone() })?;
         Ok(Some(simulation.recording))
+    }
+
+    /// The motion along which the gain is measured.
+    fn next_motion(&self, drawn: &Drawn) -> usize {
+        (drawn.motion + 1) % self.benchmark.plan.motions.len()
+    }
+
+    /// The next motion of the arm without effects, predicted from a log of that arm with the noise of this trial: all that
+    /// is wrong there is the noise of the parameters, which the right cause cannot remove either. `None` where that log, which is
+    /// not the trial's, gets no answer.
+    fn clean_held_out(&mut self, drawn: &Drawn, trial: u64) -> Result<Option<HeldOut>, PlantError> {
+        let benchmark = self.benchmark;
+        let scenario = drawn.simulation.scenario.clone();
+        self.log = benchmark.clean_simulation(scenario, drawn.motion)?.log(trial)?;
+        let next = &benchmark.clean[self.next_motion(drawn)];
+        let diagnosis = self.diagnose(Vec::new(), Some(next), None).ok();
+        Ok(diagnosis.and_then(|diagnosis| diagnosis.held_out.into_iter().next()))
     }
 }
 
@@ -172,13 +221,11 @@ impl BlindWorker<'_> {
 pub struct BlindContent {
     /// Families of the dictionary.
     pub known: Vec<Kind>,
-    /// Base parameters of the null model.
-    pub parameters: usize,
 }
 
 impl Content for BlindContent {
     type Gathered = Records;
-    const SCHEMA: &'static str = "armid.blind-shard/1";
+    const SCHEMA: &'static str = "armid.blind-shard/2";
 
     fn nothing(&self) -> Records {
         Records::default()
@@ -204,7 +251,7 @@ impl Trials for Benchmark {
     }
 
     fn content(&self) -> BlindContent {
-        BlindContent { known: self.known.clone(), parameters: self.simulation.len() }
+        BlindContent { known: self.known.clone() }
     }
 
     fn worker(&self) -> BlindWorker<'_> {

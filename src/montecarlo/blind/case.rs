@@ -11,7 +11,7 @@ use super::plan::Shares;
 use crate::diagnose::Kind;
 use crate::montecarlo::{EffectSize, Scenario, Simulation};
 use crate::plant::NoiseModel;
-use crate::plant::faults::{Effect, FaultyPlant};
+use crate::plant::faults::Effect;
 use crate::random::{Channel, TrialStreams};
 
 /// What is hidden.
@@ -26,6 +26,8 @@ pub enum Secret {
     Two,
     /// One effect whose family the diagnosis does not know.
     Withheld,
+    /// A change of the arm that the null model absorbs, and a law that it does not.
+    Beside,
 }
 
 impl std::fmt::Display for Secret {
@@ -35,6 +37,7 @@ impl std::fmt::Display for Secret {
             Self::One => "one effect",
             Self::Two => "two effects",
             Self::Withheld => "family withheld",
+            Self::Beside => "a change and a law",
         })
     }
 }
@@ -145,14 +148,13 @@ pub(super) fn draw(benchmark: &Benchmark, trial: u64) -> Result<Drawn, BlindErro
         cosine: None,
     };
     if secret == Secret::Nothing {
-        let plant = FaultyPlant::new(&scenario.arm, &[], &scenario.plant)?;
-        let recording = benchmark.clean[motion].clone();
-        let simulation = Simulation::with_recording(scenario, plant, recording)?;
+        let simulation = benchmark.clean_simulation(scenario, motion)?;
         return Ok(Drawn { case, simulation, motion, measures_gain });
     }
     let mut maker = Maker { benchmark, scenario: &scenario, motion, rng: &mut rng };
     case.hidden = match secret {
         Secret::Two => maker.two()?,
+        Secret::Beside => maker.beside()?,
         _ => vec![maker.one(secret == Secret::Withheld, plan.sqrt_lambda)?],
     };
     case.against_simulation = case.hidden.iter().any(|h| h.judged == Judged::Simulation);
@@ -164,7 +166,7 @@ pub(super) fn draw(benchmark: &Benchmark, trial: u64) -> Result<Drawn, BlindErro
     case.sqrt_lambda_sim = size.lambda_sim.sqrt();
     match &mut case.hidden[..] {
         [only] => only.strength = strength(only.judged, size),
-        [a, b] => {
+        [a, b] if secret == Secret::Two => {
             if let (Some(a), Some(b)) = (a.strength, b.strength) {
                 case.cosine = Some((size.lambda - a * a - b * b) / (2.0 * a * b));
             }
@@ -180,6 +182,7 @@ fn secret(rng: &mut ChaCha8Rng, shares: Shares) -> Secret {
         u if u < shares.one => Secret::One,
         u if u < shares.one + shares.two => Secret::Two,
         u if u < shares.one + shares.two + shares.withheld => Secret::Withheld,
+        u if u < shares.one + shares.two + shares.withheld + shares.beside => Secret::Beside,
         _ => Secret::Nothing,
     }
 }
@@ -208,16 +211,15 @@ struct Maker<'a> {
 impl Maker<'_> {
     /// One effect; of a family that can be withheld, if `withheld`.
     fn one(&mut self, withheld: bool, range: [f64; 2]) -> Result<Hidden, BlindError> {
-        let can_be = |f: &&Family| !withheld || self.benchmark.can_be_withheld(f);
-        let open: Vec<&Family> = self.benchmark.plan.families.iter().filter(can_be).collect();
-        self.hidden(&open, range)
+        let benchmark = self.benchmark;
+        self.hidden(&benchmark.open(|f| !withheld || benchmark.can_be_withheld(f)), range)
     }
 
     /// Two effects of different families or at different joints, both to be seen in the residual.
     fn two(&mut self) -> Result<Vec<Hidden>, BlindError> {
-        let range = self.benchmark.plan.sqrt_lambda_of_two;
-        let is_open = |f: &&Family| self.benchmark.can_be_withheld(f);
-        let open: Vec<&Family> = self.benchmark.plan.families.iter().filter(is_open).collect();
+        let benchmark = self.benchmark;
+        let range = benchmark.plan.sqrt_lambda_of_two;
+        let open = benchmark.open(|f| benchmark.can_be_withheld(f));
         let first = self.hidden(&open, range)?;
         loop {
             let second = self.hidden(&open, range)?;
@@ -225,6 +227,15 @@ impl Maker<'_> {
                 return Ok(vec![first, second]);
             }
         }
+    }
+
+    /// A change that a simulation shows, and a law that the residual does.
+    fn beside(&mut self) -> Result<Vec<Hidden>, BlindError> {
+        let benchmark = self.benchmark;
+        let range = benchmark.plan.sqrt_lambda_of_two;
+        let change = self.hidden(&benchmark.open(|f| f.judged == Judged::Simulation), range)?;
+        let law = self.hidden(&benchmark.open(|f| benchmark.can_be_withheld(f)), range)?;
+        Ok(vec![change, law])
     }
 
     /// An effect of one of `families` whose strength lies in `range`, where its physics allows.

@@ -46,7 +46,7 @@ impl std::fmt::Display for Outcome {
 }
 
 impl Record {
-    /// How it turned out. Of two effects, both must be named; where the family is withheld no name is
+    /// How it turned out. Of two effects (or a change and a law), both must be named; where the family is withheld no name is
     /// right.
     pub fn outcome(&self) -> Outcome {
         let (named, hidden) = (&self.answer.named, &self.case.hidden);
@@ -61,7 +61,9 @@ impl Record {
         let right = match self.case.secret {
             Secret::Nothing | Secret::Withheld => false,
             Secret::One => hidden.iter().all(|h| is_right(first, h)),
-            Secret::Two => hidden.iter().all(|h| named.iter().any(|n| is_right(n, h))),
+            Secret::Two | Secret::Beside => {
+                hidden.iter().all(|h| named.iter().any(|n| is_right(n, h)))
+            }
         };
         match (right, is_flagged) {
             (true, _) => Outcome::Right,

@@ -21,7 +21,7 @@ pub struct BlindPlan {
     pub shares: Shares,
     /// Range of √λ of single effects, drawn evenly on a logarithmic scale.
     pub sqrt_lambda: [f64; 2],
-    /// The same for each of two effects.
+    /// The same for each of two effects, and for √λ_sim of a change beside a law.
     pub sqrt_lambda_of_two: [f64; 2],
     /// Families that are hidden.
     pub families: Vec<Family>,
@@ -50,6 +50,9 @@ pub struct Shares {
     pub two: f64,
     /// One effect whose family the diagnosis does not know.
     pub withheld: f64,
+    /// A change that the model absorbs and a law beside it, compared with the nominal simulation.
+    #[serde(default)]
+    pub beside: f64,
 }
 
 /// The table as it is written.
@@ -76,12 +79,13 @@ impl BlindPlan {
         entry: BlindEntry,
         source: &Source,
     ) -> Result<Self, ScenarioError> {
-        let Shares { one, two, withheld } = entry.shares;
+        let Shares { one, two, withheld, beside } = entry.shares;
         let shares = [
             ("blind.shares.one", one),
             ("blind.shares.two", two),
             ("blind.shares.withheld", withheld),
-            ("blind.shares, their sum", one + two + withheld),
+            ("blind.shares.beside", beside),
+            ("blind.shares, their sum", one + two + withheld + beside),
             ("blind.against_simulation", entry.against_simulation),
             ("blind.held_out", entry.held_out),
         ];

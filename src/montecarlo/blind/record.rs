@@ -81,19 +81,32 @@ pub struct HeldOutGain {
     pub before: f64,
     /// Of the extended model.
     pub after: f64,
+    /// Of a model that is right, with parameters identified under the same noise: the same arm without effects, its
+    /// log, and its next motion.
+    pub least: f64,
 }
 
 impl HeldOutGain {
-    /// Of the residuals of `held_out`, with the standard deviations `sd_nm` of the noise.
-    pub fn of(held_out: &HeldOut, sd_nm: &[f64]) -> Self {
+    /// Of the residuals of `hidden` and of those of the arm without effects, with the standard deviations `sd_nm` of
+    /// the noise.
+    pub fn of(hidden: &HeldOut, clean: &HeldOut, sd_nm: &[f64]) -> Self {
         let sum =
             |rms_nm: &[f64]| rms_nm.iter().zip(sd_nm).map(|(rms, sd)| (rms / sd).powi(2)).sum();
-        Self { before: sum(&held_out.before_rms_nm), after: sum(&held_out.after_rms_nm) }
+        Self {
+            before: sum(&hidden.before_rms_nm),
+            after: sum(&hidden.after_rms_nm),
+            least: sum(&clean.before_rms_nm),
+        }
     }
 
     /// Share that the causes remove.
     pub fn share(&self) -> f64 {
         1.0 - self.after / self.before
+    }
+
+    /// Share that the right cause could remove at most: the rest is the noise of the arm's parameters.
+    pub fn possible(&self) -> f64 {
+        1.0 - self.least / self.before
     }
 }
 
@@ -130,7 +143,8 @@ impl Answer {
                 rms_nm: u.rms_nm,
             }),
             base: covered(&diagnosis.base_parameters, truth),
-            gain: gain.filter(|g| g.before.is_finite() && g.after.is_finite()),
+            gain: gain
+                .filter(|g| [g.before, g.after, g.least].iter().all(|square| square.is_finite())),
         }
     }
 }

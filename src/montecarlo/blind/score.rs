@@ -9,7 +9,7 @@ use super::benchmark::BlindContent;
 use super::case::Secret;
 use super::family::Judged;
 use super::judge::{Outcome, is_at, is_right};
-use super::record::{Named, Record};
+use super::record::{HeldOutGain, Named, Record};
 use super::target::{Target, targets};
 use crate::diagnose::{Kind, candidates, chance};
 use crate::median::median;
@@ -19,7 +19,7 @@ use crate::montecarlo::share::Share;
 use crate::montecarlo::trials::Failure;
 
 /// Format of the JSON output.
-pub const SCORES_SCHEMA: &str = "armid.blind/1";
+pub const SCORES_SCHEMA: &str = "armid.blind/2";
 
 /// Edges of the bins of √λ.
 const STRENGTHS: [f64; 12] = [0.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 30.0, 40.0, 60.0];
@@ -96,7 +96,7 @@ pub struct GainBin {
     /// Share of the explainable mean square that is removed, median.
     pub removed: f64,
     /// What the parameters' own noise allows, median.
-    pub predicted: f64,
+    pub possible: f64,
 }
 
 /// What a blind benchmark says.
@@ -133,7 +133,7 @@ pub struct Scores {
     pub calibration_error: f64,
     /// By √λ.
     pub gains: Vec<GainBin>,
-    /// Answers that are not right: false alarms, single effects with √λ ≥ 8, two effects, and wrong
+    /// Answers that are not right: false alarms, single effects with √λ ≥ 8, pairs, and wrong
     /// names of withheld families.
     pub misses: Vec<Record>,
     /// All targets together.
@@ -164,7 +164,7 @@ impl Scores {
                     && r.outcome() != Outcome::Right
             }
             Secret::Withheld => r.outcome() == Outcome::Wrong,
-            Secret::Nothing | Secret::Two => r.outcome() != Outcome::Right,
+            Secret::Nothing | Secret::Two | Secret::Beside => r.outcome() != Outcome::Right,
         };
         Self {
             scenario: merged.header.scenario.clone(),
@@ -186,7 +186,7 @@ impl Scores {
                 .sum::<f64>()
                 / stated.max(1) as f64,
             confidence,
-            gains: gains(all, merged.header.content.parameters),
+            gains: gains(all),
             misses: all.iter().filter(is_miss).cloned().collect(),
             targets,
         }
@@ -329,29 +329,28 @@ fn confidence(all: &[Record]) -> Vec<ConfidenceBin> {
         .collect()
 }
 
-/// Along a motion that excites the arm as the log's did, the p parameters of the null model leave a
-/// mean square of p per log in units of the noise, and with an effect's k coefficients p + k: of
-/// λ + p, at most 1 − (p + k)/(λ + p) can be removed; k is taken as 1.
-fn gains(all: &[Record], parameters: usize) -> Vec<GainBin> {
-    let p = parameters as f64;
-    let with: Vec<(f64, f64)> = all
+fn gains(all: &[Record]) -> Vec<GainBin> {
+    let with: Vec<(f64, HeldOutGain)> = all
         .iter()
-        .filter_map(|r| Some((r.case.sqrt_lambda, r.answer.gain?.share())))
-        .filter(|(_, share)| share.is_finite())
+        .filter_map(|r| Some((r.case.sqrt_lambda, r.answer.gain?)))
+        .filter(|(_, gain)| gain.before > 0.0)
         .collect();
     STRENGTHS
         .windows(2)
         .map(|edges| {
             let last = edges[1] == STRENGTHS[STRENGTHS.len() - 1];
             let inside = |s: f64| s >= edges[0] && (s < edges[1] || last);
-            let here: Vec<&(f64, f64)> = with.iter().filter(|(s, _)| inside(*s)).collect();
-            let middle = |mut values: Vec<f64>| median(&mut values).unwrap_or(f64::NAN);
-            let bound = |s: f64| 1.0 - (p + 1.0) / (s * s + p);
+            let here: Vec<HeldOutGain> =
+                with.iter().filter(|(s, _)| inside(*s)).map(|(_, gain)| *gain).collect();
+            let middle = |of: &dyn Fn(&HeldOutGain) -> f64| {
+                let mut values: Vec<f64> = here.iter().map(of).collect();
+                median(&mut values).unwrap_or(f64::NAN)
+            };
             GainBin {
                 range: [edges[0], if last { f64::INFINITY } else { edges[1] }],
                 cases: here.len() as u64,
-                removed: middle(here.iter().map(|(_, share)| *share).collect()),
-                predicted: middle(here.iter().map(|(s, _)| bound(*s)).collect()),
+                removed: middle(&HeldOutGain::share),
+                possible: middle(&HeldOutGain::possible),
             }
         })
         .filter(|bin| bin.cases > 0)

@@ -67,6 +67,10 @@ pub fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
             && r.case.hidden.iter().all(|h| h.strength.is_some_and(|s| s >= 15.0))
             && r.case.cosine.is_some_and(|c| c.abs() < 0.5)
     });
+    let beside = all.iter().filter(|r| {
+        r.case.secret == Secret::Beside
+            && r.case.hidden.iter().all(|h| h.strength.is_some_and(|s| s >= 15.0))
+    });
     let withheld = |low: f64| {
         let of_them =
             all.iter().filter(move |r| r.case.secret == Secret::Withheld && r.case.is_from(low));
@@ -85,7 +89,7 @@ pub fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
         base.count += covered.count;
         base.of += covered.of;
     }
-    let large = all.iter().filter(|r| r.case.is_from(40.0)).filter_map(|r| r.answer.gain);
+    let large = || all.iter().filter(|r| r.case.is_from(40.0)).filter_map(|r| r.answer.gain);
     // The other targets are about cases that have an answer.
     let failures = merged.tally.failures.len() as u64;
     let silent = Share { count: failures, of: all.len() as u64 + failures };
@@ -128,6 +132,11 @@ pub fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
             [0.90, 1.0],
         ),
         Target::new(
+            "a change and a law, √λ_sim and √λ ≥ 15: both named",
+            Share::of(beside, is_right),
+            [0.90, 1.0],
+        ),
+        Target::new(
             "family withheld, √λ ≥ 15: a wrong name without doubt",
             withheld(15.0),
             [0.0, 0.05],
@@ -149,7 +158,12 @@ pub fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
         ),
         Target::new(
             "√λ ≥ 40: at least 95 % of the explainable mean square removed on another motion",
-            Share::of(large, |gain| gain.share() >= 0.95),
+            Share::of(large(), |gain| gain.share() >= 0.95),
+            [0.5, 1.0],
+        ),
+        Target::new(
+            "√λ ≥ 40: at least 95 % of what a right model under the same noise removes",
+            Share::of(large(), |gain| gain.share() >= 0.95 * gain.possible()),
             [0.5, 1.0],
         ),
         Target::new("cases without an answer", silent, [0.0, 0.005]),

@@ -42,8 +42,11 @@ pub fn replay_lines(record: &Record) -> Vec<String> {
             .map(|l| format!("  left: {:.3} Nm on joint {}, by the {}", l.rms_nm, l.joint, l.axis)),
     );
     lines.extend(record.answer.gain.map(|g| {
-        let removed = percent(g.share(), 3);
-        format!("  held out: {:.3} before, {:.3} after: {removed} removed", g.before, g.after)
+        let [removed, possible] = [g.share(), g.possible()].map(|share| percent(share, 3));
+        format!(
+            "  held out: {:.3} before, {:.3} after: {removed} removed of {possible} that a right model removes",
+            g.before, g.after
+        )
     }));
     lines.push(format!("outcome: {}", record.outcome()));
     lines

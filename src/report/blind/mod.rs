@@ -51,8 +51,8 @@ fn facts(scores: &Scores) -> Vec<String> {
     facts
 }
 
-const HOW: &str = "Each case draws what is hidden (nothing, one effect, two, or one whose family is taken out of the \
-dictionary), where, its shape and size, the motion and the colour of the noise. The effect is made by the plant's physics; \
+const HOW: &str = "Each case draws what is hidden (nothing, one effect, two, one whose family is taken out of the \
+dictionary, or a change of the arm with a law beside it, which is compared with the arm's simulation), where, its shape and size, the motion and the colour of the noise. The effect is made by the plant's physics; \
 the diagnosis sees the log alone. √λ is the size of the effect in standard deviations of the noise (of torques and \
 encoders) of the best test that could be made; where the null model absorbs the effect, √λ_sim, against a given simulation. A name is right if kind and \
 joint are, or if the class that the diagnosis states holds them. Of one effect the first cause counts.";
@@ -126,8 +126,9 @@ fn parts(scores: &Scores) -> Vec<(&'static str, &'static str, Table)> {
     if !scores.gains.is_empty() {
         parts.push((
             "Gain on another motion",
-            "Mean square, without noise, along a motion that was not used: the share that the named causes remove. What is \
-             left of it even by the right cause is the noise of the estimated parameters.",
+            "Mean square, without noise, along a motion that was not used: the share that the named causes remove, and the \
+             share that a right model removes whose parameters are identified under the same noise (the arm without the \
+             effect is logged, identified and predicted along that motion).",
             gain_table(scores),
         ));
     }

@@ -138,7 +138,7 @@ pub(super) fn gain_table(scores: &Scores) -> Table {
             range(bin.range),
             bin.cases.to_string(),
             percent(bin.removed, 3),
-            percent(bin.predicted, 3),
+            percent(bin.possible, 3),
         ]);
     }
     table

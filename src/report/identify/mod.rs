@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 pub use declined::Declined;
-pub use intervals::{Intervals, TestResult};
+pub use intervals::{AgreementResult, Intervals, TestResult};
 pub use page::{facts, page, parameter_table, residual_table};
 
 use super::physical::{Physical, StandardParameter, standard_parameters};
@@ -199,7 +199,7 @@ impl Result {
             residual: identification.residual().into(),
             noise_floor_nm: identification.replicates.as_ref().map(|r| r.sigma.clone()),
             explainable_nm: identification.explainable_nm.clone(),
-            intervals: Intervals::of(identification),
+            intervals: Intervals::of(training),
             condition: Condition::of(&regression.problem, set)?,
             verdict: if is_identified { IDENTIFIED } else { NOT_IDENTIFIED },
             not_identified: open.iter().map(|&k| set.name(k).to_owned()).collect(),

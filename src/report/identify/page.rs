@@ -75,6 +75,10 @@ pub fn residual_table(result: &Result) -> Table {
 pub fn facts(result: &Result) -> Vec<String> {
     let processing = &result.processing;
     let periods = match processing.period_s {
+        _ if processing.logs > 1 && processing.periods > 1 => format!(
+            "{} logs with {} periods in all, each log weighted by the noise that its own periods show",
+            processing.logs, processing.periods
+        ),
         _ if processing.logs > 1 => format!(
             "{} logs one below the other: what repeats in one of them tells nothing of the noise here",
             processing.logs

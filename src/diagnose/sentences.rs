@@ -1,0 +1,273 @@
+//! What a diagnosis says, in words.
+
+use super::kind::Kind;
+use super::verdict::{Cause, Diagnosis, Estimate, HeldOut, Moved};
+
+/// An interval that reaches so much farther to one side than to the other is told by its ends.
+const UNEVEN: f64 = 1.2;
+/// What is less sure than this is said with a "may".
+const EVEN_ODDS: f64 = 0.5;
+/// σ beyond which a parameter differs from a simulation: noise shows one in 300 comparisons of fifty parameters.
+const MOVED: f64 = 4.0;
+/// Times the error along the log from which on the error along another one is none of the same arm.
+const OF_ANOTHER_ARM: f64 = 3.0;
+/// Ends of an interval between which nothing is known.
+const VAST: f64 = 1000.0;
+
+impl Diagnosis {
+    /// The first screen; `laws` are the sites of the extended model's effects: joint (1-based), or the arm as a whole.
+    pub(super) fn in_sentences(&self, laws: &[Option<usize>]) -> Vec<String> {
+        let mut out: Vec<String> =
+            self.causes.iter().map(|c| c.sentence(self.noise_floor_nm.is_some())).collect();
+        if let Some(unexplained) = &self.unexplained {
+            out.push(format!(
+                "Joint {} shows {} Nm (rms) that no known effect explains; it depends most clearly on the {}.",
+                unexplained.joint,
+                digits(unexplained.rms_nm, 2),
+                unexplained.axis
+            ));
+        }
+        if out.is_empty() {
+            out.push(self.nothing_found().into());
+        }
+        out.extend(self.moved());
+        let along =
+            |held_out| self.does_not_carry_over(held_out).or_else(|| gain_along(held_out, laws));
+        out.extend(self.held_out.iter().filter_map(along));
+        out
+    }
+
+    /// The sentence where nothing is named.
+    pub(super) fn nothing_found(&self) -> &'static str {
+        match self.noise_floor_nm {
+            Some(_) => {
+                "Nothing found: what the model leaves is noise, as the scatter between periods shows; the detection \
+                 limits say what would have been seen. What only moves the parameters (a body on the flange, gravity, \
+                 a longer link) shows beside a simulation (--sim) or a second log."
+            }
+            None => {
+                "Nothing found above what a single run can show; the motion does not repeat, so that the noise is \
+                 judged from the residual itself."
+            }
+        }
+    }
+
+    /// The sentence about the parameters beside those of a simulation.
+    fn moved(&self) -> Option<String> {
+        let far = |a: &&Moved, b: &&Moved| a.z.abs().total_cmp(&b.z.abs());
+        let farthest = self.moved_parameters.iter().max_by(far)?;
+        let moved = self.moved_parameters.iter().filter(|m| m.z.abs() > MOVED).count();
+        Some(format!(
+            "Beside the simulation {moved} of {} base parameters differ by more than {MOVED} σ; {} differs most, by {} σ.",
+            self.moved_parameters.len(),
+            farthest.name,
+            digits(farthest.z.abs(), 2),
+        ))
+    }
+
+    /// The sentence about a log along which the model errs far more, friction at standstill left open.
+    fn does_not_carry_over(&self, held_out: &HeldOut) -> Option<String> {
+        let noise = |j: usize| self.noise_floor_nm.as_ref().map_or(0.0, |noise| noise[j]);
+        let expected = self.after.rms_nm.iter().enumerate().map(|(j, rms)| rms.hypot(noise(j)));
+        let (j, times) = held_out
+            .after_standstill_free_rms_nm
+            .iter()
+            .zip(expected)
+            .map(|(found, expected)| found / expected)
+            .enumerate()
+            .filter(|(_, times)| *times > OF_ANOTHER_ARM)
+            .max_by(|a, b| a.1.total_cmp(&b.1))?;
+        Some(format!(
+            "The model does not carry over to {}: on joint {} it errs {times:.0} times as much there. Another load, \
+             another gain, or a motion that shows what this log does not.",
+            held_out.log,
+            j + 1
+        ))
+    }
+}
+
+/// The sentence about what `laws` at these sites change along another log while joints move, on the joint with one of which
+/// they change most. What only moved the parameters is in both models, and what happened once in none.
+fn gain_along(held_out: &HeldOut, laws: &[Option<usize>]) -> Option<String> {
+    let has_law = |j: usize| laws.iter().any(|joint| joint.is_none_or(|joint| joint == j + 1));
+    let HeldOut { before_moving_rms_nm, after_moving_rms_nm, .. } = held_out;
+    let both = before_moving_rms_nm.iter().zip(after_moving_rms_nm).enumerate();
+    let told = both.filter(|(j, (before, after))| has_law(*j) && **before > 0.0 && **after > 0.0);
+    let (j, (before, after)) = told.max_by(|(_, a), (_, b)| {
+        let change = |(before, after): (&f64, &f64)| (before / after).ln().abs();
+        change(*a).total_cmp(&change(*b))
+    })?;
+    Some(format!(
+        "Along {} the error of joint {} while it moves, noise included, is {} Nm rms with what is named and {} Nm \
+         without.",
+        held_out.log,
+        j + 1,
+        digits(*after, 3),
+        digits(*before, 3)
+    ))
+}
+
+impl Estimate {
+    /// `value ± half unit`, or with both ends where they are far from even.
+    fn in_words(&self) -> String {
+        let [low, high] = self.ci95;
+        let (below, above) = (self.value - low, high - self.value);
+        if self.says_nothing() {
+            let [low, high] = [low, high].map(|v| digits(v, 2));
+            return format!("hardly known (between {low} and {high}) {}", self.unit)
+                .trim_end()
+                .to_owned();
+        }
+        if above > UNEVEN * below || below > UNEVEN * above {
+            let [value, low, high] = [self.value, low, high].map(|v| digits(v, 2));
+            return format!("{value} (between {low} and {high}) {}", self.unit)
+                .trim_end()
+                .to_owned();
+        }
+        pair(self.value, 0.5 * (high - low), self.unit)
+    }
+
+    /// Whether the interval spans a whole turn, or a factor of a thousand.
+    fn says_nothing(&self) -> bool {
+        let [low, high] = self.ci95;
+        self.unit == "rad" && high - low > std::f64::consts::TAU || low > 0.0 && high > VAST * low
+    }
+}
+
+impl Cause {
+    pub(super) fn sentence(&self, noise_is_known: bool) -> String {
+        match self.kind {
+            Kind::Contact => return self.contact_sentence(),
+            Kind::Payload => return self.payload_sentence(),
+            _ => {}
+        }
+        let place = self.joint.map_or("The model".to_owned(), |j| format!("Joint {j}'s model"));
+        let what = format!("{}{}", self.in_words, self.numbers());
+        let mut text = match (self.kind.is_of_the_record(), self.joint) {
+            (true, None) => format!("The record has {what}."),
+            (true, Some(j)) => format!("Joint {j}'s record has {what}."),
+            (false, _) if self.confidence < EVEN_ODDS => {
+                format!("{place} may miss {what}; other causes fit as well.")
+            }
+            (false, _) if self.may_be_none => {
+                format!("{place} may miss {what}; as far as its size is known, there may be none.")
+            }
+            (false, _) => format!("{place} misses {what}."),
+        };
+        if let Some(gain) = self.gain_fraction {
+            let of = if noise_is_known {
+                "of what the noise floor leaves to explain, in other periods of this log than its size is fitted to"
+            } else {
+                "of the error's mean square, in stretches of time left out of its fit"
+            };
+            text += &format!(" Adding it removes {:.0} % {of}.", 100.0 * gain.clamp(0.0, 1.0));
+        }
+        if !self.class.is_empty() {
+            let class = self.class.join(", ");
+            text += &format!(" These data cannot tell it from {class}");
+            if let Some(experiment) = self.separating_experiment {
+                text += &format!("; this would: {experiment}");
+            }
+            text.push('.');
+        }
+        text
+    }
+
+    fn contact_sentence(&self) -> String {
+        let value = |name: &str| self.parameters.get(name).map_or(f64::NAN, |e| e.value);
+        format!("From {:.2} s to {:.2} s {}.", value("start_s"), value("end_s"), self.in_words)
+    }
+
+    /// The parameters in brackets, with a blank before; nothing where none is told.
+    fn numbers(&self) -> String {
+        let number = |(name, e): (&&str, &Estimate)| {
+            let name = name.trim_end_matches(&unit_suffix(e.unit)).replace('_', " ");
+            format!("{name} {}", e.in_words())
+        };
+        match self.parameters.iter().map(number).collect::<Vec<_>>().join(", ") {
+            numbers if numbers.is_empty() => numbers,
+            numbers => format!(" ({numbers})"),
+        }
+    }
+
+    fn payload_sentence(&self) -> String {
+        let pair = |name: &str| {
+            let estimate = self.parameters.get(name)?;
+            Some((estimate.value, 0.25 * (estimate.ci95[1] - estimate.ci95[0])))
+        };
+        let Some((mass, mass_sigma)) = pair("mass_kg") else {
+            let numbers = self.numbers();
+            return format!(
+                "The flange carries something else{numbers}; these motions cannot tell its mass."
+            );
+        };
+        let which = if mass < 0.0 { "missing from" } else { "on" };
+        let mass = mass.abs();
+        let com = ["com_x_m", "com_y_m", "com_z_m"].map(pair);
+        let four = |told: Option<f64>| told.map_or("?".to_owned(), |value| format!("{value:.4}"));
+        let place = com.map(|com| four(com.map(|(value, _)| value))).join(", ");
+        let sigma = com.map(|com| four(com.map(|(_, sigma)| sigma))).join(", ");
+        format!(
+            "A body of {mass:.3} ± {mass_sigma:.3} kg at ({place}) ± ({sigma}) m {which} the flange (± one σ, last \
+             joint's frame)."
+        )
+    }
+}
+
+/// The unit as parameter names carry it, such as `_nm`.
+fn unit_suffix(unit: &str) -> String {
+    format!("_{}", unit.to_lowercase().replace(['/', ' '], "_").replace("1_", "per_"))
+}
+
+/// With so many digits, or more before the point.
+fn digits(value: f64, count: usize) -> String {
+    if value.abs() >= 1e6 {
+        return format!("{value:.1e}");
+    }
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let decimals =
+        (count as f64 - 1.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{value:.decimals$}")
+}
+
+/// `value ± half unit`, digits by the uncertainty.
+fn pair(value: f64, half: f64, unit: &str) -> String {
+    if !value.is_finite() || !half.is_finite() || half <= 0.0 {
+        return format!("{value:.3} {unit}").trim_end().to_owned();
+    }
+    let decimals = (1.0 - half.log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{value:.decimals$} ± {half:.decimals$} {unit}").trim_end().to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::data_faults::cause;
+    use super::*;
+
+    #[test]
+    fn what_may_be_none_is_said_with_a_may() {
+        let estimate = |ci95| Estimate { value: 0.02, unit: "", ci95 };
+        let known = cause(
+            Kind::LoadFriction,
+            Some(1),
+            "friction by load",
+            5.0,
+            &[("mu", estimate([0.01, 0.03]))],
+        );
+        let open = Cause {
+            may_be_none: true,
+            parameters: [("mu", estimate([-0.01, 0.05]))].into(),
+            ..known.clone()
+        };
+        let unsure = Cause { confidence: 0.4, ..open.clone() };
+        assert_eq!(
+            known.sentence(true),
+            "Joint 2's model misses friction by load (mu 0.020 ± 0.010)."
+        );
+        let said = "Joint 2's model may miss friction by load (mu 0.020 ± 0.030); as far as its size is known, there may be none.";
+        assert_eq!(open.sentence(true), said);
+        assert!(unsure.sentence(true).ends_with("; other causes fit as well."));
+    }
+}
