@@ -65,7 +65,7 @@ impl AgreementResult {
         let Self { parameter, log, sigmas, .. } = self;
         let side = if *sigmas > 0.0 { "above" } else { "below" };
         format!(
-            "the logs contradict each other. Their own estimates lie {} apart, farthest in {parameter}, which {log} alone puts \
+            "the logs contradict each other. Their own estimates lie apart {}, farthest in {parameter}, which {log} alone puts \
              {:.1} σ {side} the common estimate",
             self.times(),
             sigmas.abs()
@@ -96,7 +96,7 @@ impl Intervals {
         let (trusted, reason) = match (agreement.holds(), alone.trusted) {
             (true, _) => {
                 let reason = format!(
-                    "{} The logs do not contradict each other: their own estimates lie {} apart.",
+                    "{} The logs do not contradict each other: their own estimates lie apart {}.",
                     alone.reason,
                     result.times()
                 );
@@ -153,18 +153,18 @@ impl Intervals {
             Floor::TorqueAndMotion => "the scatter of torque and motion between periods",
         };
         let chance = chance(p_value);
-        let which = match identification.agreement {
-            Some(_) => "Along the log that fits worst: ",
+        let along = match identification.agreement {
+            Some(_) => " along the log that fits worst",
             None => "",
         };
         let reason = if test.fits() {
             format!(
-                "{which}The model explains what repeats in the torque: what it leaves is {statistic:.2} times what \
+                "The model explains what repeats in the torque: what it leaves{along} is {statistic:.2} times what \
                  {scatter} leads to expect (chance {chance})."
             )
         } else {
             format!(
-                "{which}The 95 % intervals are not to be trusted: what repeats in the torque and is not explained is \
+                "The 95 % intervals are not to be trusted: what repeats in the torque and is not explained{along} is \
                  {statistic:.2} times what {scatter} would leave (chance {chance}). They cover the noise, not the \
                  error of the model; armid diagnose looks for its cause."
             )
