@@ -121,9 +121,9 @@ fn nuisance<'a>(study: &Study, beside: impl Iterator<Item = &'a Beside<'a>>) -> 
     let mut entries = Vec::new();
     for Beside { entry, room } in beside {
         entries.push(*entry);
-        room.iter().for_each(|image| {
+        for image in room {
             span.push(image);
-        });
+        }
     }
     for image in study.blurred_shares(&entries).chain(&study.null_columns[study.base_count()..]) {
         span.push(image);

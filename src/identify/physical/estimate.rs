@@ -178,7 +178,8 @@ impl Solver {
             Sigma::by_delta_method(&self.structure, curvature, &data.map, &noise)
         };
         // The entropic program has its prior's curvature in its barriers.
-        let curvature = data.map.tr_mul(&data.map) + weight * self.structure.pull_curvature();
+        let pulls = self.structure.pull_curvature();
+        let curvature = data.map.tr_mul(&data.map) + weight * &pulls;
         let curvature = Cholesky::new(curvature).ok_or(ProgramError::NotConvex)?;
         let exceeded = draws.as_ref().map(|draws| draws.exceeded);
         let scatter = Scatter {
@@ -188,7 +189,7 @@ impl Solver {
         };
         Ok(PhysicalEstimate {
             standard: self.structure.standard(&constrained.y),
-            file_errors: FileError::of(&self.structure, &curvature, weight),
+            file_errors: FileError::of(&self.structure, &curvature, &pulls, weight),
             base: (&self.structure.base_map * &constrained.y).as_slice().to_vec(),
             scatter,
             unconstrained: fit.theta.clone(),

@@ -67,15 +67,15 @@ pub struct FileError {
 }
 
 impl FileError {
-    /// Of every standard parameter. With A the prior's curvature, γ its weight and the `curvature` S = (R K)ᵀ(R K) + γ A the
+    /// Of every standard parameter. With the prior's curvature A = `pulls`, its weight γ and the `curvature` S = (R K)ᵀ(R K) + γ A the
     /// estimate is off by S⁻¹ γ A times the prior's error, whose covariance is A⁻¹: by γ √diag(E S⁻¹ A S⁻¹ Eᵀ), out of
     /// √diag(E A⁻¹ Eᵀ).
     pub(super) fn of(
         structure: &Structure,
         curvature: &Cholesky<f64, Dyn>,
+        pulls: &DMatrix<f64>,
         weight: f64,
     ) -> Vec<Self> {
-        let pulls = structure.pull_curvature();
         let columns = structure.standard_map().transpose();
         let of_prior = Cholesky::new(pulls.clone()).map(|pulls| pulls.solve(&columns));
         let stays = weight * curvature.solve(&columns);

@@ -62,15 +62,14 @@ pub fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
     let alarms = Share::of(all.iter().filter(|r| r.case.secret == Secret::Nothing), |r| {
         r.outcome() != Outcome::Right
     });
-    let two = all.iter().filter(|r| {
-        r.case.secret == Secret::Two
-            && r.case.hidden.iter().all(|h| h.strength.is_some_and(|s| s >= 15.0))
-            && r.case.cosine.is_some_and(|c| c.abs() < 0.5)
-    });
-    let beside = all.iter().filter(|r| {
-        r.case.secret == Secret::Beside
-            && r.case.hidden.iter().all(|h| h.strength.is_some_and(|s| s >= 15.0))
-    });
+    let strong = |secret: Secret| {
+        all.iter().filter(move |r| {
+            r.case.secret == secret
+                && r.case.hidden.iter().all(|h| h.strength.is_some_and(|s| s >= 15.0))
+        })
+    };
+    let two = strong(Secret::Two).filter(|r| r.case.cosine.is_some_and(|c| c.abs() < 0.5));
+    let beside = strong(Secret::Beside);
     let withheld = |low: f64| {
         let of_them =
             all.iter().filter(move |r| r.case.secret == Secret::Withheld && r.case.is_from(low));
