@@ -15,6 +15,9 @@ pub const LAW: f64 = 0.7 * FALSE_ALARM;
 pub(super) const CHANGE: f64 = 0.05 * FALSE_ALARM;
 /// A contact.
 pub(super) const CONTACT: f64 = 0.15 * FALSE_ALARM;
+/// A contact where the arm moved as noise does not let it, which is asked only whether a torque goes with it. It takes nothing of
+/// [`FALSE_ALARM`]: noise makes no such place.
+pub(super) const CONTACT_WHERE_MOVED: f64 = 0.02;
 /// Something left unexplained, by the size of what is left; and as much again by the curve that it makes.
 pub(super) const UNEXPLAINED: f64 = 0.05 * FALSE_ALARM;
 

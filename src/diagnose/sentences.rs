@@ -175,7 +175,14 @@ impl Cause {
 
     fn contact_sentence(&self) -> String {
         let value = |name: &str| self.parameters.get(name).map_or(f64::NAN, |e| e.value);
-        format!("From {:.2} s to {:.2} s {}.", value("start_s"), value("end_s"), self.in_words)
+        let when = format!("From {:.2} s to {:.2} s", value("start_s"), value("end_s"));
+        match self.separating_experiment {
+            None => format!("{when} {}.", self.in_words),
+            Some(experiment) => format!(
+                "{when} {}. Other joints moved as well: these data cannot tell whether they were pushed too; {experiment}, would.",
+                self.in_words
+            ),
+        }
     }
 
     /// The parameters in brackets, with a blank before; nothing where none is told.

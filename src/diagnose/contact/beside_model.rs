@@ -134,5 +134,6 @@ fn touch(
         peak_nm: estimate(peak_nm, reach_nm, reach_nm, "Nm"),
         felt: felt.iter().map(|touch| (touch.0 + 1, height_nm(touch))).collect(),
         strength: peak_nm.abs() / sigma_nm.max(f64::MIN_POSITIVE),
+        moved_others: false,
     })
 }

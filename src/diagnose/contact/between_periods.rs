@@ -95,7 +95,7 @@ pub fn between_periods(m: &Measurement, left_out: &[usize]) -> Result<Compared, 
             continue;
         }
         aside = aside_with_it;
-        let touch = repeats.touch(&push, time_s[repeats.window.start]);
+        let touch = repeats.touch(&candidate, &push, time_s[repeats.window.start]);
         aside[touch.disturbed(rate_hz, time_s.len())].fill(true);
         looked_at.push(touch.samples.clone());
         known.push(push);
@@ -339,9 +339,9 @@ mod tests {
             let found = contacts(&time_s, &signals);
             soft += i32::from(found.is_some_and(|f| f.causes[0].joint == Some(1)));
         }
-        // By hand a push of 0.8 s has to pass 5.6 σ all along the log, and 4.9 where the arm yields, which of 40 pushes of 5.9 ± 1 σ
-        // ten do that do not pass the first: binomial, σ is 2.7, and three of these below is two.
-        assert!(soft >= rigid + 2, "{rigid} {soft}");
+        // By hand a push of 0.8 s has to pass 5.6 σ all along the log, and 3.8 where the arm yields, which of 40 pushes of 5.9 ± 1 σ
+        // 15 do that do not pass the first: binomial, σ is 3.1, and three of these below is six.
+        assert!(soft >= rigid + 6, "{rigid} {soft}");
     }
 
     /// A push of both joints, to which one of them yields, is one of both.

@@ -25,6 +25,9 @@ pub use between_periods::{Compared, between_periods};
 /// Torque around a contact that is set aside with it, s.
 const MARGIN_S: f64 = 0.2;
 
+/// What tells a push on one joint from one on the arm.
+const HARDER: &str = "the same touch, harder or longer";
+
 /// One contact.
 #[derive(Debug, Clone, PartialEq)]
 struct Touch {
@@ -38,6 +41,8 @@ struct Touch {
     felt: Vec<(usize, f64)>,
     /// In standard deviations of the noise.
     strength: f64,
+    /// Whether joints moved otherwise whose torque does not tell a push on them from an arm that gives way.
+    moved_others: bool,
 }
 
 /// Whether two stretches of samples are closer than `margin`.
@@ -64,6 +69,7 @@ impl Touch {
             self.peak_nm = next.peak_nm;
         }
         self.strength = self.strength.max(next.strength);
+        self.moved_others |= next.moved_others;
     }
 
     /// Its samples and those beside it, of `n` in all.
@@ -77,14 +83,18 @@ impl Touch {
             self.felt.iter().map(|(j, nm)| format!("joint {j} by {nm:+.1} Nm")).collect();
         let parameters =
             [("start_s", &self.start_s), ("end_s", &self.end_s), ("peak_nm", &self.peak_nm)];
+        let joint = if self.felt.len() == 1 { Some(self.felt[0].0) } else { None };
+        let may_be_of_the_arm = joint.is_some() && self.moved_others;
+        let class =
+            if may_be_of_the_arm { vec![Kind::Contact.name().to_owned()] } else { Vec::new() };
         Cause {
             kind: Kind::Contact,
-            joint: if self.felt.len() == 1 { Some(self.felt[0].0) } else { None },
-            class: Vec::new(),
+            joint,
+            class,
             confidence: 1.0,
             parameters: parameters.map(|(name, estimate)| (name, estimate.clone())).into(),
             gain_fraction: None,
-            separating_experiment: None,
+            separating_experiment: may_be_of_the_arm.then_some(HARDER),
             strength: self.strength,
             in_words: format!("something touched the arm: {}", joints.join(", ")),
             may_be_none: false,

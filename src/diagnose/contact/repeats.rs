@@ -197,8 +197,8 @@ impl Repeats {
     }
 
     /// Where bumps of `length_s` are looked for on which joints: all along the log on all of them, and where the arm moved
-    /// otherwise on those that did, each with half of the chance. Noise of the torques does not choose where the angles differ, as
-    /// long as no feedback brings it into them.
+    /// otherwise on those that did. Noise of the torques does not choose where the angles differ, as long as no feedback brings it
+    /// into them: it is asked there only whether a torque goes with a move that noise did not make.
     fn looked_through(&self, length_s: f64) -> Vec<Place> {
         let all = 0..self.joints.len();
         let everywhere = Place {
@@ -215,17 +215,17 @@ impl Repeats {
         };
         let mut where_moved: Vec<Place> = self.moves.iter().enumerate().map(of_move).collect();
         where_moved.retain(|place| !place.rows.is_empty());
-        let share = if where_moved.is_empty() { 1.0 } else { 0.5 };
         let mut everywhere = vec![everywhere];
         let lengths = self.lengths_s().len();
-        for group in [&mut everywhere, &mut where_moved] {
+        let chances = [chance::CONTACT, chance::CONTACT_WHERE_MOVED];
+        for (group, chance) in [&mut everywhere, &mut where_moved].into_iter().zip(chances) {
             let bumps = group.iter().map(|place| {
                 // Each joint by itself, and all together.
                 let ways = if place.rows.len() > 1 { place.rows.len() + 1 } else { 1 };
                 let duration_s = place.centres.len() as f64 / self.rate_hz;
                 rarity::bumps(length_s, duration_s, lengths * ways)
             });
-            let far = rarity::far(bumps.sum(), share * chance::CONTACT);
+            let far = rarity::far(bumps.sum(), chance);
             group.iter_mut().for_each(|place| place.far = far);
         }
         everywhere.append(&mut where_moved);
@@ -295,8 +295,9 @@ impl Repeats {
         })
     }
 
-    /// `push` as a contact of the log, whose window begins at `begin_s`.
-    pub(super) fn touch(&self, push: &Push, begin_s: f64) -> Touch {
+    /// `push` at `candidate` as a contact of the log, whose window begins at `begin_s`.
+    pub(super) fn touch(&self, candidate: &Candidate, push: &Push, begin_s: f64) -> Touch {
+        let moved = candidate.of_move.map_or(&[][..], |number| &self.moves[number].joints);
         let shifted = |estimate: &Estimate| Estimate {
             value: begin_s + estimate.value,
             unit: estimate.unit,
@@ -313,6 +314,7 @@ impl Repeats {
             peak_nm: push.peak_nm.clone(),
             felt: push.felt_nm().map(|(j, height)| (j + 1, height)).collect(),
             strength: push.gain.sqrt(),
+            moved_others: moved.iter().any(|j| !push.is_felt_on(*j)),
         }
     }
 }
