@@ -38,12 +38,15 @@ pub fn median_step(time_s: &[f64]) -> Option<f64> {
     median(&mut steps)
 }
 
-/// Steps of `typical_s` that are missing between stamps `k` − 1 and `k` of `time_s`, not rounded. What a stamp is late
-/// makes the step before it longer and the one behind it shorter: that is jitter, and nothing is missing.
+/// Steps of `typical_s` that are missing between stamps `k` − 1 and `k` of `time_s`, not rounded.
 pub fn missing_steps(time_s: &[f64], k: usize, typical_s: f64) -> f64 {
-    let excess =
-        |k: usize| Some((time_s.get(k)? - time_s.get(k.checked_sub(1)?)?) / typical_s - 1.0);
-    let deficit = |k: Option<usize>| k.and_then(excess).map_or(0.0, |e| e.min(0.0));
+    lasting(k, |k| Some((time_s.get(k)? - time_s.get(k.checked_sub(1)?)?) / typical_s - 1.0))
+}
+
+/// What the steps beside step `k` do not take back of its `excess`, or 0. What one stamp is late makes the step before it
+/// longer and the one behind it shorter: that is jitter, and nothing lasts.
+pub fn lasting(k: usize, excess: impl Fn(usize) -> Option<f64>) -> f64 {
+    let deficit = |k: Option<usize>| k.and_then(&excess).map_or(0.0, |e| e.min(0.0));
     excess(k).map_or(0.0, |e| e + deficit(k.checked_sub(1)) + deficit(Some(k + 1))).max(0.0)
 }
 

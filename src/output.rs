@@ -33,6 +33,18 @@ pub enum OutputError {
         /// Why.
         source: io::Error,
     },
+    /// Something that is read would be lost.
+    #[error("{}: the command reads this file; name another one to write", path.display())]
+    IsInput {
+        /// The output asked for.
+        path: PathBuf,
+    },
+    /// One of two outputs would be lost.
+    #[error("{}: two outputs would go to this file; name two", path.display())]
+    Twice {
+        /// The output asked for.
+        path: PathBuf,
+    },
     /// No space is left.
     #[error("{}: the disk is full; nothing was written, free some space and run again", path.display())]
     DiskFull {
@@ -63,6 +75,41 @@ pub fn check_writable(path: &Path) -> Result<(), OutputError> {
         }
     }
     Ok(())
+}
+
+/// Whether all `outputs` can be written ([`check_writable`]), and none of them takes the place of another one or of one of the
+/// `inputs`.
+pub fn check_outputs(
+    outputs: impl IntoIterator<Item = impl AsRef<Path>>,
+    inputs: impl IntoIterator<Item = impl AsRef<Path>>,
+) -> Result<(), OutputError> {
+    let inputs: Vec<PathBuf> =
+        inputs.into_iter().filter_map(|input| place(input.as_ref())).collect();
+    let mut taken: Vec<PathBuf> = Vec::new();
+    for output in outputs {
+        let path = output.as_ref();
+        check_writable(path)?;
+        let Some(place) = place(path) else { continue };
+        if inputs.contains(&place) {
+            return Err(OutputError::IsInput { path: path.to_owned() });
+        }
+        if taken.contains(&place) {
+            return Err(OutputError::Twice { path: path.to_owned() });
+        }
+        taken.push(place);
+    }
+    Ok(())
+}
+
+/// The file that `path` names, by whatever links, there already or not; `None` of a device, which nothing takes the place of.
+fn place(path: &Path) -> Option<PathBuf> {
+    match Target::find(path).ok()? {
+        Target::Device => None,
+        Target::File { path, .. } => {
+            let folder = fs::canonicalize(folder_of(&path)).ok()?;
+            Some(folder.join(path.file_name()?))
+        }
+    }
 }
 
 /// Writes `path` as a whole: into a temporary file beside it, forced to the disk, then renamed. On any
@@ -227,6 +274,22 @@ mod tests {
         fs::set_permissions(&locked, permissions).unwrap();
         let error = check_writable(&locked).unwrap_err();
         assert!(error.to_string().contains("read-only"), "{error}");
+    }
+
+    #[test]
+    fn no_output_takes_the_place_of_an_input_or_of_another_output() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::write(at("log.csv"), "measured").unwrap();
+        let same = at("../").join(folder.path().file_name().unwrap()).join("log.csv");
+        assert!(matches!(
+            check_outputs([&same], [at("log.csv")]),
+            Err(OutputError::IsInput { .. })
+        ));
+        let twice = check_outputs([at("a.json"), at("./a.json")], [at("log.csv")]);
+        assert!(matches!(twice, Err(OutputError::Twice { .. })));
+        check_outputs([at("a.json"), at("a.html")], [at("log.csv"), at("missing.csv")]).unwrap();
+        assert_eq!(names(folder.path()), ["log.csv"]);
     }
 
     #[cfg(target_os = "linux")]

@@ -66,6 +66,12 @@ fn record(benchmark: &Benchmark, trial: u64) -> Record {
     record
 }
 
+/// Two effects cannot be drawn of a family that has one place alone.
+#[test]
+fn two_effects_need_two_places() {
+    assert!(benchmark(TWO, &["base_tilt"]).worker().trial(0).is_err());
+}
+
 /// What is wrong with the answer to one hidden effect.
 fn complaint(record: &Record) -> Option<String> {
     let hidden = &record.case.hidden[0];

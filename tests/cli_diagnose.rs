@@ -36,6 +36,18 @@ fn what_the_example_hides_is_named() {
     assert_eq!(same.status.code(), Some(1));
     assert!(said(&same).contains("is held out, but it is also the log"), "{}", said(&same));
 
+    // Nor does a result of itself say what moved since.
+    let result = file("result.json");
+    let identified = armid(&["identify", &log, "--robot", "ur5", "--json", &result]);
+    assert!(identified.status.success(), "{}", said(&identified));
+    let itself = armid(&["diagnose", &log, "--robot", "ur5", "--sim", &result]);
+    assert_eq!(itself.status.code(), Some(1));
+    assert!(
+        said(&itself).contains("identified from the log that is diagnosed"),
+        "{}",
+        said(&itself)
+    );
+
     let (json, page, found) = (file("why.json"), file("why.html"), file("found.toml"));
     let outputs = ["--json", &json, "--report", &page, "--extended-scenario", &found];
     let mut arguments = vec!["diagnose", &log, "--robot", "ur5", "--held-out", &other];

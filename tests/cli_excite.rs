@@ -3,6 +3,9 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
+use armid::excitation::Reference;
+use armid::robot::Arm;
+
 fn excite(folder: &Path, words: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_armid"))
         .current_dir(folder)
@@ -20,12 +23,20 @@ fn message(output: &Output) -> String {
 fn a_small_design_writes_every_output() {
     let folder = tempfile::tempdir().unwrap();
     let words = "--robot ur5 --order 3 --starts 2 --finalists 1 --out t.json --csv t.csv \
-                 --urscript t.script --report t.html --box 0.4,-0.5,0,0.9,0.5,0.3";
+                 --urscript t.script --report t.html --box 0.4,-0.5,0,0.9,0.5,0.3 --velocity-share 0.5";
     let output = excite(folder.path(), &words.split_whitespace().collect::<Vec<_>>());
     assert_eq!(output.status.code(), Some(0), "{}", message(&output));
     let series =
         armid::excitation::FourierSeries::load(folder.path().join("t.json").to_str().unwrap());
-    assert_eq!(series.unwrap().order(), 3);
+    let series = series.unwrap();
+    assert_eq!(series.order(), 3);
+    let limits: Vec<f64> =
+        Arm::built_in("ur5").unwrap().joints.iter().map(|j| j.limits.velocity_rad_s).collect();
+    for k in 0..1000 {
+        let (mut q, mut qd, mut qdd) = ([0.0; 6], [0.0; 6], [0.0; 6]);
+        series.sample(1e-3 * f64::from(k) * series.period_s, &mut q, &mut qd, &mut qdd);
+        assert!(qd.iter().zip(&limits).all(|(qd, limit)| qd.abs() <= 0.5 * limit), "{qd:?}");
+    }
     let text = std::fs::read_to_string(folder.path().join("t.json")).unwrap();
     let json: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert_eq!(json["design"]["cut_short"], false);
@@ -65,6 +76,7 @@ fn bad_input_is_named_before_the_work() {
     fails("--robot ur5 --out t.json --period nan", "NaN");
     fails("--robot ur5 --out t.json --seconds 0", "seconds");
     fails("--robot ur5 --out t.json --speed 2", "speed");
+    fails("--robot ur5 --out t.json --velocity-share 0", "velocity-share");
     fails("--robot ur5 --out t.json --clearance=-1", "-1");
     fails("--robot ur5 --out t.json --prior no.json", "no.json");
     fails("--robot ur5 --out t.json --box 0,1,2", "six numbers");

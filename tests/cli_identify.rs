@@ -67,6 +67,15 @@ fn bad_input_ends_in_a_message_that_names_it() {
         armid(&["identify", log, "--robot", "ur5", "--json", "/no/such/folder/x.json"]);
     assert_says(&unwritable, 1, &["/no/such/folder"]);
     assert_says(&armid(&["identify", log]), 2, &["--robot"]);
+    let measured = std::fs::read(log).unwrap();
+    for command in ["identify", "diagnose"] {
+        let over = armid(&[command, log, "--robot", "ur5", "--report", log]);
+        assert_says(&over, 1, &["reads this file"]);
+        let twice = armid(&[command, log, "--robot", "ur5", "--report", "x", "--json", "./x"]);
+        assert_says(&twice, 1, &["two outputs would go to this file"]);
+    }
+    assert_says(&montecarlo(&["--trials", "2", "--out", log]), 1, &["this is a file"]);
+    assert_eq!(std::fs::read(log).unwrap(), measured);
 }
 
 #[test]
@@ -82,6 +91,12 @@ fn a_motion_that_does_not_excite_the_arm_is_a_negative_result_not_an_error() {
     assert_eq!(result["schema"], "armid.identify/1");
     assert_eq!(result["verdict"], "not_identified");
     assert!(result["not_identified"].as_array().unwrap().iter().any(|name| name == "rv4"));
+    // The same of a diagnosis, which needs the model.
+    let arguments = ["diagnose", arguments[1], "--robot", "ur5", "--json", arguments[5]];
+    assert_says(&armid(&arguments), 3, &["declined", "armid excite"]);
+    let result: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
+    assert_eq!(result["verdict"], "declined");
 }
 
 /// What was not recorded is no motion that excites too little.
@@ -146,6 +161,11 @@ fn unknown_keys_of_a_scenario_are_errors_that_name_them() {
     std::fs::write(&scenario, default.replace("trials =", "trails =")).unwrap();
     let output = montecarlo(&["--scenario", scenario.to_str().unwrap()]);
     assert_says(&output, 1, &["x.toml", "trails"]);
+    // So are things that the plant does not have.
+    let effect = "\n[[effect]]\nkind = \"load_friction\"\njoint = 7\nmu = 0.05\n";
+    std::fs::write(&scenario, default.to_owned() + effect).unwrap();
+    let output = montecarlo(&["--scenario", scenario.to_str().unwrap()]);
+    assert_says(&output, 1, &["x.toml: effect 1", "joint = 7"]);
 }
 
 #[test]

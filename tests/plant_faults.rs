@@ -313,6 +313,16 @@ fn nonsense_is_refused_with_its_place_and_key() {
             other => panic!("{table}: {:?}", other.err()),
         }
     }
+    let mut arm = Arm::built_in("ur5").unwrap();
+    arm.joints[1].limits.torque_nm = f64::INFINITY;
+    for (table, is_refused) in [
+        ("kind='outliers'\nfraction=0.1", true),
+        ("kind='outliers'\njoint=1\nfraction=0.1", false),
+        ("kind='load_friction'\njoint=2\nmu=0.1", true),
+    ] {
+        let found = FaultyPlant::new(&arm, &effects(&[table]), &PlantConfig::default());
+        assert_eq!(found.is_err(), is_refused, "{table}");
+    }
     let driving = plant(&["kind='stribeck'\njoint=1\nextra_nm=-20\nvs_rad_s=1"]);
     assert!(matches!(driving, Err(PlantError::FrictionDrives { joint: 1, .. })));
     let stiff = plant(&["kind='elasticity'\njoint=6\nstiffness_nm_rad=1e9"]).unwrap();

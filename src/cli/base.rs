@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::robot::{inputs, load_robot};
 use super::{CommandResult, Outcome};
 use crate::base::{BaseSet, Parameterisation};
-use crate::output::check_writable;
+use crate::output::check_outputs;
 use crate::report::json::{Document, Program};
 use crate::report::{Column, Table};
 use crate::robot::LoadedArm;
@@ -49,9 +49,7 @@ struct Term<'a> {
 
 /// Runs the command.
 pub fn run(args: &BaseArgs) -> CommandResult {
-    if let Some(path) = &args.json {
-        check_writable(path)?;
-    }
+    check_outputs(&args.json, [&args.robot])?;
     let LoadedArm { arm, files, .. } = load_robot(&args.robot)?;
     let parameterisation = match &args.reduced {
         Some(name) => Parameterisation::reduced(name, &arm)?,
@@ -88,7 +86,7 @@ pub fn run(args: &BaseArgs) -> CommandResult {
                 })
                 .collect(),
         };
-        let program = Program::new(std::env::args(), None, inputs(&files)?);
+        let program = Program::started(None, inputs(&files)?);
         Document { schema: "armid.base/1", program: &program, body: &result }.write(path)?;
     }
     Ok(Outcome::Done)

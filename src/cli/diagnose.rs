@@ -9,16 +9,18 @@ use super::identify::{LoadedLog, ProcessingArgs, SourceArgs};
 use super::robot::SavedRobot;
 use super::{CommandResult, Outcome};
 use crate::base::{BaseSet, Parameterisation};
-use crate::diagnose::{DIAGNOSE_SCHEMA, Diagnoser, Diagnosis, Validation};
+use crate::diagnose::{DIAGNOSE_SCHEMA, DiagnoseError, Diagnoser, Diagnosis, Validation};
 use crate::dynamics::Model;
+use crate::log::Log;
 use crate::montecarlo::Scenario;
-use crate::output::check_writable;
+use crate::output::check_outputs;
 use crate::report::diagnose::{cause_table, held_out_table, limit_table, page};
 use crate::report::identify::IDENTIFY_SCHEMA;
 use crate::report::json::{Document, Input, Program};
 use crate::report::replay::table as replay_table;
 use crate::report::rows::{Rows, log_warnings};
 use crate::report::saved::{SavedFault, load};
+use crate::report::{Page, Status, Verdict};
 use crate::robot::{Arm, Kinematics};
 
 /// Say what the rigid model with linear friction gets wrong along a log, and what explains it.
@@ -58,14 +60,19 @@ pub struct DiagnoseArgs {
 
 /// Runs the command.
 pub fn run(args: &DiagnoseArgs) -> CommandResult {
-    for path in [&args.json, &args.report].into_iter().flatten() {
-        check_writable(path)?;
-    }
-    for path in args.extended_scenario.iter().flat_map(|path| Scenario::files_of(path)) {
-        check_writable(&path)?;
-    }
+    let extended = args.extended_scenario.iter().flat_map(|path| Scenario::files_of(path));
+    let outputs = [&args.json, &args.report].into_iter().flatten().cloned().chain(extended);
+    let logs = args.logs.iter().chain(&args.held_out).chain(&args.sim).map(PathBuf::as_path);
+    check_outputs(outputs, args.source.files().chain(logs))?;
     if args.known_payload_kg.is_some() && args.logs.len() < 2 {
         return Err("--known-payload needs two logs: without the body, and with it".into());
+    }
+    if let [first, second] = &args.logs[..] {
+        eprintln!(
+            "note: {} is asked what its flange carries beside {}; several logs of one arm are for `armid identify`",
+            second.display(),
+            first.display()
+        );
     }
     let options = args.processing.options()?;
     let (arm, mut inputs) = args.source.arm()?;
@@ -89,12 +96,24 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
             manufacturer_nm: manufacturer_nm.as_ref(),
         })
         .collect();
+    let sha256 = logs.first().map_or("", |log| &log.input.sha256);
     let simulation =
-        args.sim.as_deref().map(|file| simulated_parameters(file, (&arm, &set))).transpose()?;
+        args.sim.as_deref().map(|file| Simulated::load(file, (&arm, &set), sha256)).transpose()?;
     let mut diagnoser = Diagnoser::new(&arm, &model, &set, options.clone());
     let Some(log) = logs.first() else { return Ok(Outcome::Done) };
-    let mut finding =
-        diagnoser.diagnose(&log.measurement(), &validations, simulation.as_deref())?;
+    for file in args.sim.iter() {
+        inputs.push(Input::of(file)?);
+    }
+    inputs.extend(logs.iter().chain(&held_out).map(|l: &LoadedLog| l.input.clone()));
+    let program = Program::started(None, inputs);
+    let theta = simulation.as_ref().map(|simulation| &simulation.theta[..]);
+    let mut finding = match diagnoser.diagnose(&log.measurement(), &validations, theta) {
+        Err(error) if error.is_about_the_motion() => {
+            return decline(args, &log.log, &error, program);
+        }
+        finding => finding?,
+    };
+    finding.diagnosis.warnings.extend(simulation.and_then(|simulation| simulation.warning));
     // What fails behind the diagnosis must not take it along: it is told when all else is printed and written.
     let mut failed = None;
     if let Some(loaded) = logs.get(1) {
@@ -134,11 +153,6 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
     for warning in &diagnosis.warnings {
         say!("note: {warning}");
     }
-    for file in args.sim.iter() {
-        inputs.push(Input::of(file)?);
-    }
-    inputs.extend(logs.iter().chain(&held_out).map(|l: &LoadedLog| l.input.clone()));
-    let program = Program::new(std::env::args(), None, inputs);
     if let Some(path) = &args.json {
         let body = WithRows { diagnosis, rows: Rows::of(&[&log.log]) };
         Document { schema: DIAGNOSE_SCHEMA, program: &program, body: &body }.write(path)?;
@@ -168,44 +182,104 @@ fn mass(text: &str) -> Result<f64, String> {
     if is_mass { Ok(mass) } else { Err("must be a positive number".into()) }
 }
 
-/// Base parameters of the simulation of `arm` that `file` describes, in the order of `set`.
-fn simulated_parameters(
-    file: &Path,
-    (arm, set): (&Arm, &BaseSet),
-) -> Result<Vec<f64>, Box<dyn std::error::Error>> {
-    if file.extension().is_some_and(|e| e == "toml") {
-        let scenario = Scenario::load(Some(file))?;
-        if let Some(difference) = Kinematics::of(&scenario.arm).difference(arm) {
-            let (file, name) = (file.display(), &arm.name);
-            let message = format!("{file}: it simulates another arm than \"{name}\": {difference}");
-            return Err(message.into());
-        }
-        if !scenario.effects.is_empty() {
-            let file = file.display();
-            eprintln!("note: {file}: its arm alone is compared with, not its [[effect]] tables");
-        }
-        return Ok(set.values(&Model::new(&scenario.arm).standard_parameters()));
+/// Writes what can be said of a log whose motion does not identify the model that is to be diagnosed.
+fn decline(
+    args: &DiagnoseArgs,
+    log: &Log,
+    error: &DiagnoseError,
+    program: Program,
+) -> CommandResult {
+    let sentence = match error {
+        DiagnoseError::Identify(error) => format!(
+            "{}: declined, {error}; without the rigid model there is nothing to diagnose; `armid excite` plans a motion that \
+             identifies it",
+            log.source
+        ),
+        error => error.to_string(),
+    };
+    say!("{sentence}");
+    let rows = Rows::of(&[log]);
+    if let Some(path) = &args.json {
+        let (log, verdict) = (&log.source, "declined");
+        let body = Declined { log, verdict, sentences: [&sentence], rows: &rows };
+        Document { schema: DIAGNOSE_SCHEMA, program: &program, body: &body }.write(path)?;
     }
-    let result: IdentifiedParameters =
-        load(file, IDENTIFY_SCHEMA).map_err(|error| match error.fault {
-            SavedFault::Read(_) => error.to_string(),
-            fault => not_a_simulation(file, &fault),
-        })?;
-    result.about.check(arm).map_err(|other| format!("{}: {other}", file.display()))?;
-    if result.intervals.trusted == Some(false) {
-        let file = file.display();
-        eprintln!(
-            "note: {file}: the model is wrong along the log that this result is of, so that what differs from it here may have been wrong there; `armid diagnose` of that log names its cause"
-        );
+    if let Some(path) = &args.report {
+        let facts = vec![rows.in_words()];
+        let verdict = Verdict { status: Status::Bad, sentence, facts };
+        Page::new("Diagnosis", log.source.clone(), verdict, program).write(path)?;
+        say!("report: {}", path.display());
     }
-    (0..set.rank())
-        .map(|k| {
-            let name = set.name(k);
-            let found = result.base_parameters.iter().find(|p| p.name == name);
-            let missing = || format!("{}: no base parameter {name}", file.display()).into();
-            found.map(|p| p.value).ok_or_else(missing)
-        })
-        .collect()
+    Ok(Outcome::Negative)
+}
+
+/// The JSON of a log that gives no diagnosis.
+#[derive(Serialize)]
+struct Declined<'a> {
+    log: &'a str,
+    verdict: &'static str,
+    sentences: [&'a str; 1],
+    rows: &'a Rows,
+}
+
+/// A simulation that a log is compared with.
+struct Simulated {
+    /// Base parameters.
+    theta: Vec<f64>,
+    /// What should be known of it.
+    warning: Option<String>,
+}
+
+impl Simulated {
+    /// The simulation of `arm` that `file` describes, its parameters in the order of `set`; not a result of the log that is
+    /// compared with it, whose file has the hash `sha256`.
+    fn load(
+        file: &Path,
+        (arm, set): (&Arm, &BaseSet),
+        sha256: &str,
+    ) -> Result<Self, Box<dyn std::error::Error>> {
+        let name = file.display();
+        if file.extension().is_some_and(|e| e == "toml") {
+            let scenario = Scenario::load(Some(file))?;
+            if let Some(difference) = Kinematics::of(&scenario.arm).difference(arm) {
+                let arm = &arm.name;
+                let message =
+                    format!("{name}: it simulates another arm than \"{arm}\": {difference}");
+                return Err(message.into());
+            }
+            let has_effects = !scenario.effects.is_empty();
+            return Ok(Self {
+                theta: set.values(&Model::new(&scenario.arm).standard_parameters()),
+                warning: has_effects.then(|| {
+                    format!("{name}: its arm alone is compared with, not its [[effect]] tables")
+                }),
+            });
+        }
+        let result: IdentifiedParameters =
+            load(file, IDENTIFY_SCHEMA).map_err(|error| match error.fault {
+                SavedFault::Read(_) => error.to_string(),
+                fault => not_a_simulation(file, &fault),
+            })?;
+        result.about.check(arm).map_err(|other| format!("{name}: {other}"))?;
+        if result.program.inputs.iter().any(|input| input.sha256 == sha256) {
+            let message = "it was identified from the log that is diagnosed: nothing could differ but what the model gets wrong; \
+                           compare another log with it, or leave --sim out";
+            return Err(format!("{name}: {message}").into());
+        }
+        let is_bent = result.intervals.trusted == Some(false);
+        let warning = is_bent.then(|| {
+            format!(
+                "{name}: the model is wrong along the log that this result is of, so that what differs from it here may have \
+                 been wrong there; `armid diagnose` of that log names its cause"
+            )
+        });
+        let parameter = |k: usize| {
+            let parameter = set.name(k);
+            let found = result.base_parameters.iter().find(|p| p.name == parameter);
+            found.map(|p| p.value).ok_or_else(|| format!("{name}: no base parameter {parameter}"))
+        };
+        Ok(Self { theta: (0..set.rank()).map(parameter).collect::<Result<_, _>>()?, warning })
+    }
 }
 
 /// Why `file` cannot be compared with.
@@ -225,6 +299,18 @@ struct IdentifiedParameters {
     base_parameters: Vec<IdentifiedParameter>,
     #[serde(default)]
     intervals: Intervals,
+    #[serde(default)]
+    program: SavedProgram,
+}
+
+#[derive(Default, Deserialize)]
+struct SavedProgram {
+    inputs: Vec<SavedInput>,
+}
+
+#[derive(Deserialize)]
+struct SavedInput {
+    sha256: String,
 }
 
 #[derive(Default, Deserialize)]
@@ -258,7 +344,7 @@ mod tests {
         let file = tempfile::Builder::new().suffix(".json").tempfile().unwrap();
         let diagnosis = r#"{"schema": "armid.diagnose/1", "base_parameters": []}"#;
         std::fs::write(file.path(), diagnosis).unwrap();
-        let error = simulated_parameters(file.path(), (&arm, &set)).unwrap_err().to_string();
+        let error = Simulated::load(file.path(), (&arm, &set), "").err().unwrap().to_string();
         assert!(error.contains("its schema is \"armid.diagnose/1\""), "{error}");
     }
 }

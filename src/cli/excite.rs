@@ -18,7 +18,7 @@ use crate::excitation::design::{
 };
 use crate::excitation::export::{Playback, urscript, write_csv};
 use crate::excitation::{ClearanceModel, Requirements, TRAJECTORY_SCHEMA};
-use crate::output::{check_writable, write_atomically};
+use crate::output::{check_outputs, write_atomically};
 use crate::report::excitation::{NO_CLEARANCE, page};
 use crate::report::json::{Document, Program};
 use crate::robot::{Arm, CellBox, Joint, LoadedArm};
@@ -54,6 +54,9 @@ pub struct ExciteArgs {
     /// A box in the cell to stay clear of, two corners in the base frame, m; may be given again.
     #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1", allow_hyphen_values = true)]
     boxes: Vec<String>,
+    /// Share of the speed limits the motion may use: drives overshoot, and a controller stops at its limit.
+    #[arg(long, value_name = "0…1", default_value_t = 1.0)]
+    velocity_share: f64,
     /// Share of the torque limits the nominal model may need.
     #[arg(long, value_name = "0…1", default_value_t = 0.9)]
     torque_share: f64,
@@ -191,6 +194,13 @@ pub fn run(args: &ExciteArgs) -> CommandResult {
     for corners in &args.boxes {
         arm.clearance.boxes.push(cell_box(corners)?);
     }
+    if !(args.velocity_share > 0.0 && args.velocity_share <= 1.0) {
+        let message = "must be in (0, 1]";
+        return Err(BadOption::new("velocity-share", args.velocity_share, message).into());
+    }
+    for joint in &mut arm.joints {
+        joint.limits.velocity_rad_s *= args.velocity_share;
+    }
     let arm = arm;
     if ClearanceModel::new(&arm).is_empty() {
         if !args.boxes.is_empty() {
@@ -203,11 +213,9 @@ pub fn run(args: &ExciteArgs) -> CommandResult {
     let spec = specification(args, &arm, &base)?;
     let outputs =
         [Some(&args.out), args.csv.as_ref(), args.urscript.as_ref(), args.report.as_ref()];
-    for path in outputs.into_iter().flatten() {
-        check_writable(path)?;
-    }
+    check_outputs(outputs.into_iter().flatten(), files.iter().chain(&args.prior))?;
     let inputs = inputs(files.iter().chain(&args.prior))?;
-    let program = Program::new(std::env::args(), Some(args.seed), inputs);
+    let program = Program::started(Some(args.seed), inputs);
 
     let begun = Instant::now();
     let budget = Budget {
@@ -360,8 +368,10 @@ fn print_summary(base: &BaseSet, spec: &Specification, found: &Design, seconds: 
         100.0 * p.relative_quantile(0.9),
     );
     say!(
-        "{} base parameters; margins left (smallest share of its limit first; of clearance, of 0.1 m):",
-        base.rank()
+        "{} base parameters; what is left to each limit, the least share of it first (of clearance, beyond the {} m asked for, of \
+         0.1 m; the arm is as described, without a tool that the description does not have):",
+        base.rank(),
+        spec.requirements.clearance_m
     );
     for margin in found.margins.least_first() {
         say!(

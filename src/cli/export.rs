@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::arm_result::ArmResult;
 use super::{CommandResult, Outcome};
-use crate::output::{check_writable, write_atomically};
+use crate::output::{check_outputs, write_atomically};
 use crate::robot::export::{drive_file, mjcf, urdf};
 
 /// Write an identified arm as URDF or MJCF.
@@ -28,9 +28,11 @@ pub struct ExportArgs {
 /// Runs the command.
 pub fn run(args: &ExportArgs) -> CommandResult {
     let drives = args.urdf.as_ref().map(|path| path.with_extension("drives.toml"));
-    for path in [&args.urdf, &drives, &args.mjcf].into_iter().flatten() {
-        check_writable(path)?;
-    }
+    let robot = args.robot.as_ref().map(PathBuf::from);
+    check_outputs(
+        [&args.urdf, &drives, &args.mjcf].into_iter().flatten(),
+        robot.iter().chain([&args.result]),
+    )?;
     let ArmResult { arm, offsets_nm, by_prior, frames, .. } =
         ArmResult::load(&args.result, args.robot.as_deref())?;
     let write = |path: &Path, text: &str| -> Result<(), crate::output::OutputError> {

@@ -15,7 +15,7 @@ use crate::identify::{
     Regression, Several, each_alone, pooled,
 };
 use crate::log::{Layout, Log, read_log};
-use crate::output::check_writable;
+use crate::output::check_outputs;
 use crate::report::identify::{
     Declined, IDENTIFY_SCHEMA, Result as IdentifyResult, Training, Validation, facts, page,
     parameter_table, residual_table,
@@ -66,6 +66,13 @@ pub struct SourceArgs {
     /// Layout of the logs: a built-in name or a .toml file.
     #[arg(long, default_value = "armid")]
     pub layout: String,
+}
+
+impl SourceArgs {
+    /// What may be files.
+    pub(super) fn files(&self) -> impl Iterator<Item = &Path> {
+        [&self.robot, &self.layout].into_iter().map(Path::new)
+    }
 }
 
 /// How logs are processed.
@@ -165,9 +172,11 @@ impl SourceArgs {
 
 /// Runs the command.
 pub fn run(args: &IdentifyArgs) -> CommandResult {
-    for path in [&args.json, &args.report].into_iter().flatten() {
-        check_writable(path)?;
-    }
+    let outputs = [&args.json, &args.report].into_iter().flatten();
+    check_outputs(outputs, {
+        let logs = args.logs.iter().chain(&args.validate).map(PathBuf::as_path);
+        args.source.files().chain(logs)
+    })?;
     let options = args.processing.options()?;
     let (arm, mut inputs) = args.source.arm()?;
     let parameterisation = match &args.reduced {
@@ -212,7 +221,7 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         ));
     }
     inputs.extend(logs.iter().chain(&validation_logs).map(|l| l.input.clone()));
-    let program = Program::new(std::env::args(), None, inputs);
+    let program = Program::started(None, inputs);
     let logs: Vec<&Log> = logs.iter().map(|l| &l.log).collect();
     let identified = match several {
         Several::Apart(parts) => Ok(pooled(&parts, &regression)),
@@ -293,12 +302,26 @@ fn validate(
     theta: &[f64],
 ) -> Result<Validation, Box<dyn std::error::Error>> {
     let regression = identifier.regression(&log.measurement())?;
+    let mut dead = None;
     let manufacturer = match log.log.target_torque_nm(arm)? {
         Some(torque_nm) => {
             let measurement = Measurement { torque_nm: &torque_nm, ..log.measurement() };
-            Some(identifier.regression(&measurement)?)
+            match identifier.regression(&measurement) {
+                Err(IdentifyError::DeadTorque { joint, .. }) => {
+                    dead = Some(joint);
+                    None
+                }
+                regression => Some(regression?),
+            }
         }
         None => None,
     };
-    Ok(Validation::new(&log.log, &regression, manufacturer.as_ref(), theta))
+    let mut validation = Validation::new(&log.log, &regression, manufacturer.as_ref(), theta);
+    validation.warnings.extend(dead.map(|joint| {
+        format!(
+            "{}: the manufacturer's torque of joint {joint} is the same in every row; nothing is compared with it",
+            log.log.source
+        )
+    }));
+    Ok(validation)
 }

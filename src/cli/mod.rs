@@ -34,6 +34,8 @@ use std::process::ExitCode;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::diagnose::DiagnoseError;
+use crate::excitation::Reference;
+use crate::montecarlo::Scenario;
 
 /// How a command ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,6 +63,12 @@ pub fn exit_code(result: CommandResult) -> ExitCode {
             if declined { ExitCode::from(3) } else { ExitCode::FAILURE }
         }
     }
+}
+
+/// What takes its time in the beginning.
+fn simulating(scenario: &Scenario) -> String {
+    let duration_s = scenario.excitation.duration_s();
+    format!("simulating {duration_s:.0} s of {} in rapier …", scenario.arm.name)
 }
 
 /// Threads asked for, or one per core.

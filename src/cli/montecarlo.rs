@@ -8,7 +8,7 @@ use std::time::Instant;
 use clap::{Args, Parser, Subcommand};
 
 use super::robot::inputs;
-use super::{CommandResult, Outcome, Progress, interrupt_flag, threads_or_all};
+use super::{CommandResult, Outcome, Progress, interrupt_flag, simulating, threads_or_all};
 use crate::montecarlo::blind::{Benchmark, BlindContent, SCORES_SCHEMA, Scores};
 use crate::montecarlo::calibration::Verdict;
 use crate::montecarlo::shard::{
@@ -16,7 +16,7 @@ use crate::montecarlo::shard::{
 };
 use crate::montecarlo::trials::{Content, Trials};
 use crate::montecarlo::{Estimation, Experiment, Job, SUMMARY_SCHEMA, Summary};
-use crate::output::{check_writable, write_atomically};
+use crate::output::{check_outputs, check_writable, write_atomically};
 use crate::report::blind;
 use crate::report::json::{Document, Input, Program};
 use crate::report::montecarlo::{
@@ -121,8 +121,8 @@ pub fn run(command: Command) -> CommandResult {
 }
 
 fn run_merge(folders: &[PathBuf], output: &OutputArgs) -> CommandResult {
-    output.check()?;
     let files = shard_files(folders)?;
+    output.check(&files)?;
     let inputs = inputs(&files)?;
     let schema = files.first().map(|file| schema_of(file)).transpose()?;
     if schema.as_deref() == Some(BlindContent::SCHEMA) {
@@ -134,17 +134,13 @@ fn run_merge(folders: &[PathBuf], output: &OutputArgs) -> CommandResult {
 }
 
 fn run_trials(args: &RunArgs) -> CommandResult {
-    args.output.check()?;
+    args.output.check(args.scenario.as_slice())?;
     let mut job = Job::load(args.scenario.as_deref())?;
     let scenario = job.scenario_mut();
     let inputs = inputs(args.scenario.iter().chain(&scenario.files))?;
     scenario.seed = args.seed.unwrap_or(scenario.seed);
     eprintln!("{}: {}", scenario.name, scenario.description);
-    eprintln!(
-        "simulating {:.0} s of {} in rapier …",
-        crate::excitation::Reference::duration_s(&scenario.excitation),
-        scenario.arm.name
-    );
+    eprintln!("{}", simulating(scenario));
     match job {
         Job::Estimates(scenario) => {
             let experiment = Experiment::prepare(*scenario)?;
@@ -180,6 +176,13 @@ fn run_all<T: Trials>(experiment: &T, args: &RunArgs) -> Timed<Merged<T::Content
     let trials = args.trials.unwrap_or(experiment.scenario().trials);
     let range = args.shard.map_or(0..trials, |s| shard_range(trials, s.index, s.count));
     if let Some(folder) = &args.out {
+        if folder.is_file() {
+            return Err(format!(
+                "{}: this is a file; name a folder for the shard",
+                folder.display()
+            )
+            .into());
+        }
         std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
         check_writable(&shard_path(folder, &range))?;
     }
@@ -262,7 +265,7 @@ fn conclude(
         say!("{}", efficiency_sentence(efficiency));
     }
     say!("\n{}: {}", summary.verdict.to_string().to_uppercase(), summary.sentence());
-    let program = Program::new(std::env::args(), Some(merged.header.seed), inputs);
+    let program = Program::started(Some(merged.header.seed), inputs);
     if let Some(path) = &output.json {
         let document = Document { schema: SUMMARY_SCHEMA, program: &program, body: &summary };
         write_text(path, &document.to_json()?)?;
@@ -295,7 +298,7 @@ fn conclude_blind(
     output: &OutputArgs,
 ) -> CommandResult {
     let scores = Scores::of(merged);
-    let program = Program::new(std::env::args(), Some(merged.header.seed), inputs);
+    let program = Program::started(Some(merged.header.seed), inputs);
     say!("{}", blind::markdown(&scores, &program.command));
     if let Some(path) = &output.json {
         let document = Document { schema: SCORES_SCHEMA, program: &program, body: &scores };
@@ -316,10 +319,7 @@ fn write_text(path: &Path, text: &str) -> Result<(), crate::output::OutputError>
 }
 
 impl OutputArgs {
-    fn check(&self) -> Result<(), crate::output::OutputError> {
-        [&self.json, &self.report, &self.markdown]
-            .into_iter()
-            .flatten()
-            .try_for_each(|path| check_writable(path))
+    fn check(&self, inputs: &[PathBuf]) -> Result<(), crate::output::OutputError> {
+        check_outputs([&self.json, &self.report, &self.markdown].into_iter().flatten(), inputs)
     }
 }

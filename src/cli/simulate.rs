@@ -7,12 +7,12 @@ use serde::Serialize;
 
 use super::arm_result::ArmResult;
 use super::robot::inputs;
-use super::{CommandResult, Outcome};
+use super::{CommandResult, Outcome, simulating};
 use crate::dynamics::Model;
 use crate::dynamics::ParameterLayout;
 use crate::log::{Effort, Log, write_log};
 use crate::montecarlo::{EffectSize, Scenario, Simulation};
-use crate::output::check_writable;
+use crate::output::check_outputs;
 use crate::plant::SensorConfig;
 use crate::plant::faults::Effect;
 use crate::report::json::{Document, Program};
@@ -81,9 +81,11 @@ fn size(simulation: &Simulation) -> Result<Option<EffectSize>, crate::plant::Pla
 
 /// Runs the command.
 pub fn run(args: &SimulateArgs) -> CommandResult {
-    for path in [Some(&args.out), args.truth.as_ref()].into_iter().flatten() {
-        check_writable(path)?;
-    }
+    let robot = args.robot.as_ref().map(PathBuf::from);
+    check_outputs(
+        [Some(&args.out), args.truth.as_ref()].into_iter().flatten(),
+        robot.iter().chain(&args.scenario).chain(&args.arm),
+    )?;
     let mut scenario = Scenario::load(args.scenario.as_deref())?;
     let mut robot_files = Vec::new();
     if let Some(path) = &args.arm {
@@ -100,6 +102,7 @@ pub fn run(args: &SimulateArgs) -> CommandResult {
         scenario.arm = arm;
         robot_files = files;
     }
+    eprintln!("{}", simulating(&scenario));
     let simulation = Simulation::run(scenario)?;
     let measured = simulation.log(args.trial)?;
     let scenario = &simulation.scenario;
@@ -137,7 +140,7 @@ pub fn run(args: &SimulateArgs) -> CommandResult {
         let inputs = inputs(
             args.scenario.iter().chain(&args.arm).chain(&scenario.files).chain(&robot_files),
         )?;
-        let program = Program::new(std::env::args(), Some(scenario.seed), inputs);
+        let program = Program::started(Some(scenario.seed), inputs);
         Document { schema: "armid.truth/1", program: &program, body: &truth }.write(path)?;
     }
     Ok(Outcome::Done)

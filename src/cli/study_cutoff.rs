@@ -24,13 +24,13 @@ pub(super) struct CutoffArgs {
 }
 
 pub(super) fn run(args: &CutoffArgs) -> CommandResult {
-    args.output.check()?;
+    args.output.check(std::slice::from_ref(&args.scenario))?;
     let inputs = vec![Input::of(&args.scenario)?];
     let scenario = Scenario::load(Some(&args.scenario))?;
     let trials = args.trials.unwrap_or(scenario.trials).max(2);
     let progress = Progress::new("trials", cutoff_study_trials(trials));
     let result = cutoff_study(&scenario, trials, &|n| progress.reached(n))?;
     progress.finish();
-    let program = Program::new(std::env::args(), Some(scenario.seed), inputs);
+    let program = Program::started(Some(scenario.seed), inputs);
     args.output.write("armid.study-cutoff/1", &result, program, markdown, page)
 }

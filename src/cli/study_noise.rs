@@ -98,7 +98,7 @@ impl Collected {
 
     /// This program, its command behind those of the earlier runs.
     fn program(&self) -> Program {
-        let own = Program::new(std::env::args(), None, self.inputs.clone());
+        let own = Program::started(None, self.inputs.clone());
         let commands: Vec<&str> =
             self.commands.iter().chain([&own.command]).map(|c| &**c).collect();
         Program { command: commands.join(" && "), ..own }
@@ -106,7 +106,7 @@ impl Collected {
 }
 
 pub(super) fn run(args: &NoiseArgs) -> CommandResult {
-    args.output.check()?;
+    args.output.check(&[&args.scenarios[..], &args.from[..]].concat())?;
     let threads = threads_or_all(args.threads);
     let mut all = Collected::load(&args.from)?;
     // Whatever cannot be run is told before anything runs.

@@ -6,7 +6,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::{CommandResult, Outcome};
-use crate::output::{OutputError, check_writable, write_atomically};
+use crate::output::{OutputError, check_outputs, write_atomically};
 use crate::report::json::{Document, Program};
 use crate::report::{Page, ReportError};
 
@@ -24,12 +24,9 @@ pub(super) struct StudyOutput {
 }
 
 impl StudyOutput {
-    /// Refuses paths that cannot be written before any work is done.
-    pub(super) fn check(&self) -> Result<(), OutputError> {
-        [&self.markdown, &self.report, &self.json]
-            .into_iter()
-            .flatten()
-            .try_for_each(|path| check_writable(path))
+    /// Refuses paths that cannot be written, or where one of the `inputs` stands, before any work is done.
+    pub(super) fn check(&self, inputs: &[PathBuf]) -> Result<(), OutputError> {
+        check_outputs([&self.markdown, &self.report, &self.json].into_iter().flatten(), inputs)
     }
 
     /// Prints `markdown` of the results and writes what was asked for.

@@ -28,7 +28,7 @@ pub(super) struct PaperArgs {
 }
 
 pub(super) fn run(args: &PaperArgs) -> CommandResult {
-    args.output.check()?;
+    args.output.check(std::slice::from_ref(&args.scenario))?;
     let inputs = vec![Input::of(&args.scenario)?];
     let scenario = Scenario::load(Some(&args.scenario))?;
     let validation = FourierSeries::load(&args.validation)?;
@@ -36,6 +36,6 @@ pub(super) fn run(args: &PaperArgs) -> CommandResult {
     let progress = Progress::new("runs of the arm", paper_study_runs());
     let result = paper_study(&scenario, validation, trials, &|n| progress.reached(n))?;
     progress.finish();
-    let program = Program::new(std::env::args(), Some(scenario.seed), inputs);
+    let program = Program::started(Some(scenario.seed), inputs);
     args.output.write("armid.study-paper/1", &result, program, markdown, page)
 }

@@ -29,7 +29,7 @@ pub struct PhysicalArgs {
 
 /// Runs the study.
 pub fn run(args: &PhysicalArgs) -> CommandResult {
-    args.output.check()?;
+    args.output.check(&args.scenarios)?;
     let threads = threads_or_all(args.threads);
     let mut study = PhysicalStudy { cases: Vec::new() };
     let mut inputs = Vec::new();
@@ -43,6 +43,6 @@ pub fn run(args: &PhysicalArgs) -> CommandResult {
         study.cases.push(case);
         progress.finish();
     }
-    let program = Program::new(std::env::args(), None, inputs);
+    let program = Program::started(None, inputs);
     args.output.write("armid.study-physical/1", &study, program, markdown, page)
 }

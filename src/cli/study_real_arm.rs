@@ -11,7 +11,7 @@ use crate::diagnose::{Cause, Diagnoser, Finding, Kind, Validation, repeated};
 use crate::dynamics::Model;
 use crate::identify::Options;
 use crate::log::Effort;
-use crate::output::{check_writable, write_atomically};
+use crate::output::{check_outputs, write_atomically};
 use crate::report::json::{Input, Program};
 use crate::report::real_arm::{Pair, RealArmStudy, Recorded};
 use crate::robot::Arm;
@@ -59,9 +59,7 @@ const LAYOUTS: [&str; 2] = ["ur10e_innopolis", "ur10e_innopolis_author"];
 
 /// Runs the command.
 pub(super) fn run(args: &RealArmArgs) -> CommandResult {
-    for path in [&args.markdown, &args.report].into_iter().flatten() {
-        check_writable(path)?;
-    }
+    check_outputs([&args.markdown, &args.report].into_iter().flatten(), [&args.data])?;
     let inside = args.data.join("ur10e");
     let folder = if inside.is_dir() { inside } else { args.data.clone() };
     let sources = LAYOUTS.map(|layout| SourceArgs { robot: "ur10e".into(), layout: layout.into() });

@@ -107,11 +107,13 @@ fn velocity_lag(m: &Measurement) -> Vec<Cause> {
         let reach = 2.09 * sigma;
         [("delay_s", Estimate { value: lag, unit: "s", ci95: [lag - reach, lag + reach] })]
     };
-    let late: Vec<(f64, f64)> = lags.iter().flatten().copied().filter(is_late).collect();
-    if late.len() == lags.len() && late.len() > 1 {
+    let known: Vec<(f64, f64)> = lags.iter().flatten().copied().collect();
+    let late: Vec<(f64, f64)> = known.iter().copied().filter(is_late).collect();
+    // A joint that does not move contradicts nothing.
+    if 2 * late.len() > lags.len() && late.len() > 1 {
         let weight: f64 = late.iter().map(|(_, s)| s.powi(-2)).sum();
         let mean = late.iter().map(|(d, s)| d / (s * s)).sum::<f64>() / weight;
-        let alike = late.iter().all(|(d, s)| (d - mean).abs() < 5.0 * s + 0.1 * mean.abs());
+        let alike = known.iter().all(|(d, s)| (d - mean).abs() < 5.0 * s + 0.1 * mean.abs());
         if alike {
             let sigma = weight.powf(-0.5);
             return vec![cause(
@@ -138,6 +140,7 @@ fn lag(m: &Measurement, j: usize) -> Option<(f64, f64)> {
     let n = t.len();
     // Two samples to each side: the difference is the mean velocity over four steps, and so is what it
     // is compared with, so that the curvature of the motion drops out.
+    let (mut alike, mut all) = (0.0, 0.0);
     let terms: Vec<(f64, f64)> = (2..n.saturating_sub(2))
         .map(|k| {
             let span = t[k + 2] - t[k - 2];
@@ -146,12 +149,16 @@ fn lag(m: &Measurement, j: usize) -> Option<(f64, f64)> {
                     / span;
             let slope = (q[k + 2] - q[k - 2]) / span;
             let acceleration = (qd[k + 2] - qd[k - 2]) / span;
+            alike += mean * slope;
+            all += mean * mean;
             (-(mean - slope) * acceleration, acceleration * acceleration)
         })
         .collect();
     let sum = |part: &[(f64, f64)]| part.iter().fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
     let (product, square) = sum(&terms);
-    if square.is_nan() || square <= 0.0 || terms.len() < 10 * BLOCKS {
+    // Of a joint at rest velocity and angle are noise, which is never late.
+    let moves = alike > 0.5 * all;
+    if square.is_nan() || square <= 0.0 || !moves || terms.len() < 10 * BLOCKS {
         return None;
     }
     let lag = product / square;
@@ -180,7 +187,7 @@ fn repeated_or_missing(m: &Measurement, repeats: &[usize]) -> Option<Cause> {
     let step_s = step_s(m);
     let missing: f64 =
         (1..m.time_s.len()).map(|k| missing_steps(m.time_s, k, step_s).round()).sum();
-    let fraction = (missing + repeats.len() as f64) / m.time_s.len() as f64;
+    let fraction = (missing + repeats.len() as f64) / (missing + m.time_s.len() as f64);
     // Single missed samples of an ordinary recorder are no cause of anything.
     (fraction > 2e-3).then(|| {
         let words = "samples that are missing or repeat the one before";
@@ -265,6 +272,8 @@ pub(super) fn sigma_of_changes(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::{SeedableRng, rngs::ChaCha8Rng};
+    use rand_distr::{Distribution, StandardNormal};
 
     const RATE_HZ: f64 = 125.0;
 
@@ -322,6 +331,49 @@ mod tests {
         assert_eq!(faults.len(), 1);
         assert_eq!((faults[0].kind, faults[0].joint), (Kind::VelocityLag, None));
         assert!((faults[0].parameters["delay_s"].value - 0.004).abs() < 1e-4);
+    }
+
+    /// A third joint at rest, of which nothing is known but noise, says nothing against a delay of all.
+    #[test]
+    fn a_joint_at_rest_contradicts_no_late_velocity() {
+        let (time_s, signals) = record(0.004, None);
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let mut noise_sd = [1e-5, 1e-3, 0.3].into_iter();
+        let three = signals.each_ref().map(|two| {
+            let sd = noise_sd.next().unwrap();
+            JointSignals::from_fn(3, time_s.len(), |j, k| match j {
+                2 => sd * Distribution::<f64>::sample(&StandardNormal, &mut rng),
+                _ => two.joint(j)[k],
+            })
+        });
+        let faults = find_in(&time_s, &three).causes;
+        assert_eq!(faults.len(), 1, "{faults:?}");
+        assert_eq!((faults[0].kind, faults[0].joint), (Kind::VelocityLag, None));
+    }
+
+    /// A stamp that came late makes one step longer and the next one shorter: no time is lost.
+    #[test]
+    fn stamps_that_come_late_are_no_stalls() {
+        let (mut time_s, signals) = record(0.0, None);
+        for k in [1000, 2000, 3000] {
+            time_s[k] += 0.005;
+        }
+        assert_eq!(find_in(&time_s, &signals).causes, []);
+    }
+
+    /// Of five rows two are missing.
+    #[test]
+    fn missing_rows_are_a_share_of_all_that_should_be_there() {
+        let (time_s, signals) = record(0.0, None);
+        let kept: Vec<usize> = (0..time_s.len()).filter(|k| k % 5 < 3).collect();
+        let times: Vec<f64> = kept.iter().map(|k| time_s[*k]).collect();
+        let signals = signals
+            .each_ref()
+            .map(|all| JointSignals::from_fn(2, kept.len(), |j, k| all.joint(j)[kept[k]]));
+        let [q_rad, qd_rad_s, torque_nm] = &signals;
+        let m = Measurement { source: "test", time_s: &times, q_rad, qd_rad_s, torque_nm };
+        let cause = repeated_or_missing(&m, &[]).unwrap();
+        assert!((cause.parameters["fraction"].value - 0.4).abs() < 1e-3);
     }
 
     #[test]

@@ -144,7 +144,7 @@ impl<'a> Diagnoser<'a> {
         physics.sort_by(|a, b| b.strength.total_cmp(&a.strength));
         let touches = match touched {
             Some(touched) => touched.causes.clone(),
-            None => beside_model(&study, &after_nm).causes,
+            None => beside_model(&study, &after_nm)?.causes,
         };
         faults.extend(touches);
         if !study.scene.periodic {
@@ -291,8 +291,12 @@ impl<'a> Diagnoser<'a> {
         loaded: &Measurement,
         known_mass_kg: Option<f64>,
     ) -> Result<PayloadFinding, DiagnoseError> {
-        let regressions =
-            [self.identifier.regression(reference)?, self.identifier.regression(loaded)?];
+        let mended = |m: &Measurement| data_faults::find(m).map(|faults| faults.record);
+        let records = [mended(reference)?, mended(loaded)?];
+        let regressions = [
+            self.identifier.regression(&records[0].measurement(reference.source))?,
+            self.identifier.regression(&records[1].measurement(loaded.source))?,
+        ];
         let shared = payload::Shared {
             arm: self.arm,
             set: self.set,

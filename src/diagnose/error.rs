@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::identify::IdentifyError;
+use crate::identify::{FitError, IdentifyError};
 use crate::signal::SignalError;
 
 /// A log without a diagnosis, with the numbers that say why.
@@ -49,6 +49,13 @@ pub enum DiagnoseError {
 impl DiagnoseError {
     /// Whether the log is sound, but its motion does not identify what was asked for.
     pub fn is_about_the_motion(&self) -> bool {
-        matches!(self, Self::Singular { .. } | Self::NotExcited { .. })
+        let of_the_fit = |error: &IdentifyError| {
+            matches!(error, IdentifyError::Fit(FitError::NotExcited { .. } | FitError::StandsStill))
+        };
+        match self {
+            Self::Singular { .. } | Self::NotExcited { .. } => true,
+            Self::Identify(error) => of_the_fit(error),
+            Self::Signal(_) | Self::NoNoise { .. } => false,
+        }
     }
 }

@@ -10,6 +10,7 @@ use nalgebra::{Cholesky, Const, SMatrix, SVector};
 
 use crate::median::trimmed_mean;
 use crate::robot::JointSignals;
+use crate::signal::other_periods;
 
 /// Slower than this, rad/s, dry friction has not built up.
 const STANDSTILL_RAD_S: f64 = 0.02;
@@ -19,6 +20,7 @@ const FADES: f64 = 0.25;
 const COLUMNS: usize = 4;
 
 /// What drifting friction may do to the deviations of every joint.
+#[derive(Clone)]
 pub struct FrictionDrift {
     qd_rad_s: JointSignals,
     /// f(t) − f̄ of both courses, per sample.
@@ -29,13 +31,11 @@ impl FrictionDrift {
     /// Deviations from the trimmed mean of the other periods, for joints with the velocities `qd_rad_s`, whose motion
     /// repeats every `period` samples.
     pub fn beside_others(qd_rad_s: JointSignals, period: f64) -> Self {
-        let others = ((qd_rad_s.samples() as f64 / period).ceil() as usize).saturating_sub(1);
-        let mut same = vec![0.0; others];
+        let samples = qd_rad_s.samples();
+        let mut same = Vec::new();
         Self::new(qd_rad_s, |f, k| {
-            let own = (k as f64 / period) as usize;
-            let phase = k as f64 - own as f64 * period;
-            let at = |place: usize| phase + (place + usize::from(place >= own)) as f64 * period;
-            same.iter_mut().enumerate().for_each(|(place, value)| *value = f(at(place)));
+            same.clear();
+            same.extend(other_periods(k, period, samples).map(f));
             trimmed_mean(&mut same).unwrap_or(f(k as f64))
         })
     }

@@ -16,7 +16,9 @@ use super::scene::Scene;
 use super::verdict::HeldOut;
 use super::whitening::{RunWhitening, Whitening};
 use crate::base::BaseSet;
-use crate::identify::{Identifier, MOVING_RAD_S, Measurement, Options, Problem, Regression};
+use crate::identify::{
+    Identifier, IdentifyError, MOVING_RAD_S, Measurement, Options, Problem, Regression,
+};
 use crate::robot::{Arm, JointSignals};
 
 /// A log that no model has seen, to measure gains on.
@@ -88,10 +90,17 @@ pub(super) fn held_out_gain(
     };
     let manufacturer = match log.manufacturer_nm {
         Some(torque_nm) => {
-            let given = identifier.regression(&Measurement { torque_nm, ..log.measurement })?;
-            let given: Vec<Vec<f64>> =
-                given.problem.panels.iter().map(|panel| mean_period(&panel.y, samples)).collect();
-            Some(JointSignals::from_fn(joints, samples, |j, k| measured[j][k] - given[j][k]))
+            match identifier.regression(&Measurement { torque_nm, ..log.measurement }) {
+                // Feed-forward that is not recorded says nothing.
+                Err(IdentifyError::DeadTorque { .. }) => None,
+                regression => {
+                    let given = regression?;
+                    let of = |j: usize| mean_period(&given.problem.panels[j].y, samples);
+                    let given: Vec<Vec<f64>> = (0..joints).map(of).collect();
+                    let error = |j: usize, k: usize| measured[j][k] - given[j][k];
+                    Some(JointSignals::from_fn(joints, samples, error))
+                }
+            }
         }
         None => None,
     };

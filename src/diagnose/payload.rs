@@ -197,7 +197,7 @@ impl PayloadFinding {
         if let Some(scale) = &self.gain_scale {
             out.push(format!(
                 "With the mass known, all drive gains are to be multiplied by {}.",
-                with_sigma(scale)
+                with_interval(scale)
             ));
         }
         if let Some(scales) = &self.joint_gain_scales {
@@ -207,7 +207,7 @@ impl PayloadFinding {
                 .map(|(j, scale)| {
                     let half = 0.5 * (scale.ci95[1] - scale.ci95[0]);
                     if half < TOLD_WITHIN * scale.value {
-                        format!("joint {}: {}", j + 1, with_sigma(scale))
+                        format!("joint {}: {}", j + 1, with_interval(scale))
                     } else {
                         format!("joint {}: not told by these motions", j + 1)
                     }
@@ -224,7 +224,7 @@ impl PayloadFinding {
         let axes = ["x", "y", "z"].into_iter().zip(&self.first_moment_kg_m);
         let moments: Vec<String> = axes
             .filter(|(_, moment)| !moment.value.is_nan())
-            .map(|(axis, moment)| format!("{axis} {}", with_sigma(moment)))
+            .map(|(axis, moment)| format!("{axis} {}", with_interval(moment)))
             .collect();
         let moments = moments.join(", ");
         let by_chance = *probability >= chance::PAYLOAD;
@@ -241,7 +241,7 @@ impl PayloadFinding {
                 ),
             };
         }
-        let mass = with_sigma(mass_kg);
+        let mass = with_interval(mass_kg);
         if by_chance {
             return format!(
                 "No body on the flange beside {reference}: {mass} kg, which chance explains (p = {probability:.2})."
@@ -260,9 +260,9 @@ impl PayloadFinding {
     }
 }
 
-/// `value ± σ`.
-fn with_sigma(estimate: &Estimate) -> String {
-    format!("{:.3} ± {:.3}", estimate.value, 0.25 * (estimate.ci95[1] - estimate.ci95[0]))
+/// Value ± half of the 95 % interval.
+fn with_interval(estimate: &Estimate) -> String {
+    format!("{:.3} ± {:.3}", estimate.value, 0.5 * (estimate.ci95[1] - estimate.ci95[0]))
 }
 
 /// A gain is told if its 95 % interval is within this share of it: two sources rarely differ by less.
@@ -520,10 +520,10 @@ mod tests {
         assert!(chance(0.01, 0.002, 0.4) && chance(-0.03, 0.0, 0.02) && chance(f64::NAN, 0.0, 0.4));
         let turned = said(0.01, 0.1, 1e-9);
         assert!(turned.starts_with("The same mass on the flange as in bare.csv"), "{turned}");
-        assert!(turned.contains("x 0.100 ± 0.002, y 0.000 ± 0.002 kg m"), "{turned}");
+        assert!(turned.contains("x 0.100 ± 0.004, y 0.000 ± 0.004 kg m"), "{turned}");
         assert!(said(-2.0, 0.1, 1e-9).contains("swapped"));
         let unknown = said(f64::NAN, 0.1, 1e-9);
         assert!(unknown.starts_with("These motions cannot tell a mass"), "{unknown}");
-        assert!(unknown.contains("are not those of bare.csv: x 0.100 ± 0.002"), "{unknown}");
+        assert!(unknown.contains("are not those of bare.csv: x 0.100 ± 0.004"), "{unknown}");
     }
 }

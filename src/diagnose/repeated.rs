@@ -30,7 +30,10 @@ pub fn repeated(first: &Finding, second: &Finding) -> Option<Repeated> {
     if (rates[0] / rates[1] - 1.0).abs() > 1e-6 {
         return None;
     }
-    let longest = (LONGEST_SHIFT_S * rates[0]) as isize;
+    let [every, other] =
+        [first, second].map(|f| f.samples.get(1).zip(f.samples.first()).map(|(b, a)| b - a));
+    let every = every.filter(|_| every == other)?;
+    let longest = (LONGEST_SHIFT_S * rates[0] / every as f64) as isize;
     let off = |shift: isize| {
         let (mut square, mut count) = (0.0, 0);
         for j in 0..a.joints() {

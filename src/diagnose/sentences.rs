@@ -179,7 +179,7 @@ impl Cause {
         match self.separating_experiment {
             None => format!("{when} {}.", self.in_words),
             Some(experiment) => format!(
-                "{when} {}. Other joints moved as well: these data cannot tell whether they were pushed too; {experiment}, would.",
+                "{when} {}. Other joints moved as well and may have been pushed too; this would tell: {experiment}.",
                 self.in_words
             ),
         }

@@ -10,6 +10,7 @@ use super::selection::{Contender, Found, Kept};
 use super::study::{Entry, Study};
 use crate::base::BaseSet;
 use crate::robot::{Arm, JointSignals};
+use crate::signal::{SignalError, ZeroPhase};
 
 /// Rounds of causes and estimate at most.
 const ROUNDS: usize = 4;
@@ -60,25 +61,29 @@ pub fn without_contacts<'s>(
     model: &Extension,
     log: &str,
 ) -> Result<Study<'s>, DiagnoseError> {
-    let touched = beside_model(&study, &residual(&study, model));
+    let touched = beside_model(&study, &residual(&study, model))?;
     study.without_rows(set, &touched.samples, log)
 }
 
 /// Contacts in the residual of a model along a single run; none where a motion repeats, which shows them
 /// better ([`contact::between_periods`]).
-pub fn beside_model(study: &Study, after_nm: &JointSignals) -> BesideModel {
-    if study.scene.periodic {
-        return BesideModel::default();
-    }
+pub fn beside_model(study: &Study, after_nm: &JointSignals) -> Result<BesideModel, SignalError> {
     let regression = study.regression;
     let prepared = &regression.prepared;
+    let processing = &prepared.processing;
+    let (false, Some(cutoff_hz), Some(order)) =
+        (study.scene.periodic, processing.cutoff_hz, processing.order)
+    else {
+        return Ok(BesideModel::default());
+    };
+    let low_pass = ZeroPhase::new(cutoff_hz, order, processing.rate_hz)?;
     let at = |row: usize| regression.sample(row);
     let qd = &prepared.motion.qd_rad_s;
     let qd = JointSignals::from_fn(qd.joints(), after_nm.samples(), |j, k| qd.joint(j)[at(k)]);
-    let (start_s, rate_hz) = (prepared.processing.window_s[0], prepared.processing.rate_hz);
+    let (start_s, rate_hz) = (processing.window_s[0], processing.rate_hz);
     let time_s: Vec<f64> =
         (0..after_nm.samples()).map(|k| start_s + at(k) as f64 / rate_hz).collect();
-    contact::beside_model(after_nm, &qd, &time_s)
+    contact::beside_model(after_nm, &qd, &time_s, &low_pass)
 }
 
 /// Residual of `model` in time, Nm: of the mean period, or of the run.

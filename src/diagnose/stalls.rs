@@ -5,7 +5,7 @@ use super::kind::Kind;
 use super::verdict::{Cause, Estimate};
 use crate::identify::Measurement;
 use crate::identify::covariance::quantile_95;
-use crate::median::median;
+use crate::median::{lasting, median};
 
 /// A clock that stalled.
 pub struct Stalls {
@@ -36,7 +36,8 @@ pub fn stalls(m: &Measurement) -> Option<Stalls> {
     let lost: Vec<f64> = (0..last).map(lost).collect();
     let sigma_s = sigma_of_changes(&lost);
     let limit = (FAR * sigma_s).max(0.5 * step_s(m));
-    let rows: Vec<usize> = (0..lost.len()).filter(|&k| lost[k] > limit).collect();
+    let lasts = |&k: &usize| lasting(k, |k| lost.get(k).copied()) > limit;
+    let rows: Vec<usize> = (0..lost.len()).filter(lasts).collect();
     if rows.len() < 3 {
         return None;
     }

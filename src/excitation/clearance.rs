@@ -13,9 +13,9 @@ use crate::robot::{Arm, CellBox};
 ///
 /// Two capsules with segments S₁, S₂ and radii r₁, r₂ are d = dist(S₁, S₂) − r₁ − r₂ apart; d < 0 is
 /// the depth by which they overlap (as long as the segments do not cross, where d = −r₁ − r₂). The
-/// distance of a capsule from the floor at z_f is min(z of its ends) − r − z_f; the base and the
-/// first body are left out, since they do not approach the floor whatever the arm does, and from the
-/// boxes of the cell likewise. A capsule whose segment enters a box is −r from it.
+/// distance of a capsule from the floor at z_f is min(z of its ends) − r − z_f. What no motion brings
+/// nearer is left out: the base, a capsule of the first body along its axis, and beside the floor all of a first body that turns
+/// about the vertical. A capsule whose segment enters a box is −r from it.
 ///
 /// Immutable; what changes is in [`ClearanceWorkspace`].
 #[derive(Debug, Clone)]
@@ -36,6 +36,17 @@ struct Shape {
     body: usize,
     ends_m: [Vector3<f64>; 2],
     radius_m: f64,
+}
+
+/// What lies off an axis by less than this, m, or is tilted by less, turns on the spot.
+const ON_AXIS: f64 = 1e-9;
+
+impl Shape {
+    /// Whether any motion of the arm moves it.
+    fn moves(&self) -> bool {
+        let is_off_axis = |end: &Vector3<f64>| end.x.hypot(end.y) > ON_AXIS;
+        self.body >= 2 || self.body == 1 && self.ends_m.iter().any(is_off_axis)
+    }
 }
 
 /// Two things whose distance is watched, as positions in the model's lists.
@@ -67,12 +78,19 @@ impl ClearanceModel {
                 radius_m: c.radius_m,
             })
             .collect::<Vec<_>>();
-        let approaching: Vec<usize> =
-            (0..capsules.len()).filter(|&c| capsules[c].body >= 2).collect();
+        let moving: Vec<usize> = (0..capsules.len()).filter(|&c| capsules[c].moves()).collect();
         let boxes = arm.clearance.boxes.clone();
         let box_pairs =
-            (0..boxes.len()).flat_map(|b| approaching.iter().map(move |&c| [c, b])).collect();
-        let floor = arm.clearance.floor_z_m.map(|_| approaching.clone()).unwrap_or_default();
+            (0..boxes.len()).flat_map(|b| moving.iter().map(move |&c| [c, b])).collect();
+        let is_upright = arm.joints.first().is_some_and(|first| {
+            let axis = first.placement.rotation.column(2);
+            axis.x.hypot(axis.y) < ON_AXIS
+        });
+        let rises = |c: &usize| capsules[*c].body >= 2 || !is_upright;
+        let floor = match arm.clearance.floor_z_m {
+            Some(_) => moving.iter().copied().filter(rises).collect(),
+            None => Vec::new(),
+        };
         Self {
             placements: arm
                 .joints
@@ -308,6 +326,28 @@ mod tests {
             width *= 0.5;
         }
         best
+    }
+
+    /// The shoulder of a UR5 turns about the vertical: it may hit a box, and the floor only of an arm that is mounted otherwise.
+    #[test]
+    fn a_first_body_that_turns_is_watched() {
+        let watched = |arm: &Arm| {
+            let model = ClearanceModel::new(arm);
+            let limits: Vec<String> =
+                (0..model.len()).map(|k| model.limit(k).to_string()).collect();
+            ["clearance of shoulder and box 1", "clearance of shoulder and floor"]
+                .map(|limit| limits.iter().any(|l| l == limit))
+        };
+        let mut arm = Arm::built_in("ur5").unwrap();
+        arm.clearance.floor_z_m = Some(0.0);
+        arm.clearance.boxes.push(CellBox {
+            low_m: Vector3::new(0.3, -1.0, 0.0),
+            high_m: Vector3::new(0.5, 1.0, 1.0),
+        });
+        assert_eq!(watched(&arm), [true, false]);
+        let tilt = Rotation3::from_axis_angle(&Vector3::x_axis(), 0.5);
+        arm.joints[0].placement.rotation = tilt.matrix() * arm.joints[0].placement.rotation;
+        assert_eq!(watched(&arm), [true, true]);
     }
 
     #[test]

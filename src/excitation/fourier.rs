@@ -86,7 +86,8 @@ impl FourierSeries {
             }
         };
         expect("q0_rad".to_owned(), q0_rad.len(), a_rad_s.len().max(1))?;
-        expect("b_rad_s".to_owned(), b_rad_s.len(), a_rad_s.len())?;
+        expect("a_rad_s".to_owned(), a_rad_s.len(), q0_rad.len())?;
+        expect("b_rad_s".to_owned(), b_rad_s.len(), q0_rad.len())?;
         let order = a_rad_s[0].len();
         for (name, rows) in [("a_rad_s", &a_rad_s), ("b_rad_s", &b_rad_s)] {
             for (j, row) in rows.iter().enumerate() {
@@ -186,12 +187,6 @@ impl FourierSeries {
         serde_json::to_string_pretty(&file).unwrap_or_default() + "\n"
     }
 
-    /// Writes the trajectory file.
-    pub fn save(&self, path: &Path) -> Result<(), ExcitationError> {
-        std::fs::write(path, self.to_json())
-            .map_err(|source| ExcitationError::File { file: path.display().to_string(), source })
-    }
-
     /// Order L.
     pub fn order(&self) -> usize {
         self.a_rad_s[0].len()
@@ -267,6 +262,12 @@ mod tests {
         let (mut q, mut qd, mut qdd) = ([0.0; 2], [0.0; 2], [0.0; 2]);
         series.sample(t, &mut q, &mut qd, &mut qdd);
         [q, qd, qdd]
+    }
+
+    #[test]
+    fn a_joint_without_coefficients_is_refused() {
+        let refused = FourierSeries::new(4.0, vec![0.5], Vec::new(), Vec::new());
+        assert!(matches!(refused, Err(ExcitationError::Length { found: 0, expected: 1, .. })));
     }
 
     /// Central differences of q and q̇ at h = 1e-5: truncation h²/6·max|q⁽³⁾| ≈ 1e-9 and round-off

@@ -89,7 +89,9 @@ impl GravityMatch {
         }
         let far =
             format!("gravity torque is {ratio:.2} times what the description of {robot} says");
-        Some(if body_kg > 0.0 && left < LEFT {
+        Some(if ratio + doubt < 0.0 {
+            format!("{far}: torques or angles are logged with the other sign")
+        } else if body_kg > 0.0 && left < LEFT {
             format!(
                 "{far}: a body of {body_kg:.1} kg on the flange would explain it, or drive gains that are off"
             )
@@ -170,6 +172,10 @@ mod tests {
         let larger = larger.values(&standard);
         let other = GravityMatch::of(&arm, &set, &nominal, &larger, &known).unwrap();
         assert!(other.remark("ur5e", 1.96).unwrap().contains("another robot"), "{other:?}");
+
+        let turned: Vec<f64> = nominal.iter().map(|value| -value).collect();
+        let turned = GravityMatch::of(&arm, &set, &nominal, &turned, &known).unwrap();
+        assert!(turned.remark("ur5e", 1.96).unwrap().contains("the other sign"), "{turned:?}");
 
         // Where the moments are hardly known, twice the gravity is no news of the robot: σ of each of the moments
         // makes that of the ratio, found over described, σ/‖described‖.

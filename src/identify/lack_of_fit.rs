@@ -78,12 +78,20 @@ impl LackOfFit {
 
     /// What to say where it does not.
     pub fn warning(&self) -> Option<String> {
-        let (statistic, p) = (self.statistic, self.p_value);
+        let (statistic, p) = (self.statistic, chance_in_words(self.p_value));
         (!self.fits()).then(|| {
             format!(
-                "the model does not explain all that repeats in the torque (lack of fit {statistic:.2}, p = {p:.1e}): \
+                "the model does not explain all that repeats in the torque (lack of fit {statistic:.2}, chance {p}): \
                  σ covers the noise, not the error of the model"
             )
         })
+    }
+}
+/// A probability as it is told.
+pub fn chance_in_words(p_value: f64) -> String {
+    match p_value {
+        p if p < f64::MIN_POSITIVE => "below 1e-300".to_owned(),
+        p if p < 0.01 => format!("{p:.1e}"),
+        p => format!("{p:.2}"),
     }
 }

@@ -37,7 +37,7 @@ pub use even::BetweenRows;
 pub use fit::{Estimator, Fit, FitError, Fitter, Weighting};
 pub use gravity::{GravityMatch, gravity_question, gravity_remark};
 pub use identifier::{Identification, Identifier, MANY_PERIODS, Regression};
-pub use lack_of_fit::{Floor, LackOfFit};
+pub use lack_of_fit::{Floor, LackOfFit, chance_in_words};
 pub use options::Options;
 pub use pooled::{Agreement, Several, each_alone, pooled};
 pub use prediction::{MOVING_RAD_S, Prediction};

@@ -30,7 +30,8 @@ impl Job {
         Ok(match file.blind.take() {
             Some(entry) => {
                 let base = Scenario::from_file(file, source)?;
-                Self::Blind(Box::new(BlindPlan::new(base, entry, source)?))
+                let plan = BlindPlan::new(base, entry, source);
+                Self::Blind(Box::new(plan.map_err(|error| error.within(&source.name))?))
             }
             None => Self::Estimates(Box::new(Scenario::from_file(file, source)?)),
         })

@@ -139,6 +139,14 @@ pub enum ScenarioError {
         /// The log.
         log: String,
     },
+    /// Something that the file asks for.
+    #[error("{file}: {source}")]
+    Within {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        source: Box<ScenarioError>,
+    },
     /// The arm.
     #[error(transparent)]
     Robot(#[from] RobotError),
@@ -154,6 +162,20 @@ pub enum ScenarioError {
     /// Plant or sensors.
     #[error(transparent)]
     Plant(#[from] PlantError),
+}
+
+impl ScenarioError {
+    /// The same with the file's name, where it has none.
+    pub(super) fn within(self, file: &str) -> Self {
+        match self {
+            Self::Robot(_)
+            | Self::Parameters(_)
+            | Self::Base(_)
+            | Self::Excitation(_)
+            | Self::Plant(_) => Self::Within { file: file.to_owned(), source: Box::new(self) },
+            named => named,
+        }
+    }
 }
 
 impl Scenario {
@@ -175,6 +197,10 @@ impl Scenario {
 
     /// From a parsed file.
     pub(super) fn from_file(file: ScenarioFile, source: &Source) -> Result<Self, ScenarioError> {
+        Self::asked_for(file, source).map_err(|error| error.within(&source.name))
+    }
+
+    fn asked_for(file: ScenarioFile, source: &Source) -> Result<Self, ScenarioError> {
         source.check(file.trials > 0, "trials", 0.0, "must be at least 1")?;
         let LoadedArm { arm, mut files, .. } = LoadedArm::load(&source.beside(&file.robot))?;
         let parameterisation = match &file.reduced {

@@ -82,7 +82,7 @@ pub fn held_out_table(diagnosis: &Diagnosis) -> Table {
 /// What would not have been seen: a row for each family, a column for each joint.
 pub fn limit_table(diagnosis: &Diagnosis) -> Table {
     let head = [
-        Column::text("found with 90 % probability from"),
+        Column::text("found with 90 % probability"),
         Column::text("parameter"),
         Column::text("unit"),
         Column::number("arm", ""),
@@ -151,7 +151,10 @@ pub fn page(finding: &Finding, arm: &Arm, program: Program) -> Result<Page, Repo
         list(&diagnosis.after.rms_nm)
     ));
     if let Some(floor) = &diagnosis.noise_floor_nm {
-        facts.push(format!("Noise of one sample per joint: {} Nm.", list(floor)));
+        facts.push(format!(
+            "Noise of one sample per joint: {} Nm; residuals are of the mean of the periods, whose noise is less.",
+            list(floor)
+        ));
     }
     let verdict = Verdict { status, sentence, facts };
     let subtitle = format!("{}, {}", arm.name, diagnosis.log);

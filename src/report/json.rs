@@ -40,6 +40,12 @@ pub struct Program {
 }
 
 impl Program {
+    /// This program as it was started.
+    pub fn started(seed: Option<u64>, inputs: Vec<Input>) -> Self {
+        let words = std::env::args_os().map(|word| word.to_string_lossy().into_owned());
+        Self::new(words, seed, inputs)
+    }
+
     /// This program, run as `command` (the words of the command line; the program's own folder is no part of
     /// what has to be repeated).
     pub fn new(

@@ -29,6 +29,11 @@ pub fn log_warnings(log: &Log) -> impl Iterator<Item = String> {
 }
 
 impl Rows {
+    /// How many were read and used.
+    pub fn in_words(&self) -> String {
+        format!("{} rows read, {} used", self.read, self.used)
+    }
+
     /// Of all `logs` together.
     pub fn of(logs: &[&Log]) -> Self {
         let mut rows = Self { read: 0, used: 0, set_aside: Vec::new() };

@@ -101,6 +101,11 @@ impl ZeroPhase {
         1.0 / (1.0 + ratio.powi(2 * self.order as i32))
     }
 
+    /// Rate of the series it is for, Hz.
+    pub fn rate_hz(&self) -> f64 {
+        self.rate_hz
+    }
+
     /// Frequency at which one pass is −3 dB and both are −6 dB, Hz.
     pub fn single_pass_cutoff_hz(&self) -> f64 {
         self.rate_hz / PI * self.warped_cutoff.atan()

@@ -146,15 +146,22 @@ impl Log<'_> {
         for shift in (-before..=after).filter(|shift| *shift != 0) {
             let shift_s = shift as f64 * self.period_s;
             let [start_s, end_s] = [gap.start_s + shift_s, gap.end_s + shift_s];
-            if self.gaps.iter().any(|other| other.start_s < end_s && start_s < other.end_s) {
+            let next = self.gaps.partition_point(|other| other.end_s <= start_s);
+            if self.gaps.get(next).is_some_and(|other| other.start_s < end_s) {
                 continue;
             }
-            let there = Instants::new(self.time_s, instants.iter().map(|t| t + shift_s))?;
-            let [q_rad, qd_rad_s, torque_nm] = self.channels;
+            // The rows around it: a log has many gaps, and each many periods.
+            let begin = self.time_s.partition_point(|t| *t <= start_s).saturating_sub(1);
+            let behind = self.time_s.partition_point(|t| *t < end_s) + 1;
+            let rows = begin..behind.min(self.time_s.len());
+            let shifted = instants.iter().map(|t| t + shift_s);
+            let there = Instants::new(&self.time_s[rows.clone()], shifted)?;
+            let [q_rad, qd_rad_s, torque_nm] =
+                self.channels.map(|signals| signals.slice(rows.clone()));
             let values = [
-                there.angles(q_rad, qd_rad_s)?,
-                there.straight(qd_rad_s)?,
-                there.straight(torque_nm)?,
+                there.angles(&q_rad, &qd_rad_s)?,
+                there.straight(&qd_rad_s)?,
+                there.straight(&torque_nm)?,
             ];
             for (sum, values) in sum.iter_mut().zip(&values) {
                 for j in 0..sum.joints() {

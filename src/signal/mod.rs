@@ -53,7 +53,7 @@ pub use instants::{Bracket, Instants, cubic_at, linear_at};
 pub use matched::{Heights, MatchedFilter};
 pub use noise_trend::{LogScatter, NoisePower, noise_trend, noise_trends, pooled, pooled_level};
 pub use paper_filter::{PaperDifferentiator, PaperReading};
-pub use period::{Period, PeriodSearch, find_period};
+pub use period::{Period, PeriodSearch, find_period, other_periods};
 pub use periodic_fit::{FitScratch, PeriodicFit};
 pub use readings::{quantum, reading_limit};
 pub use replicates::{Replicates, replicate_noise};

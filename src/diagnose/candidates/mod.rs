@@ -273,9 +273,10 @@ fn joint(site: Option<usize>) -> usize {
     site.unwrap_or_default()
 }
 
-/// Sites of a family that belongs to the arm as a whole or to one joint.
+/// Sites of a family that belongs to the arm as a whole or to one joint; an arm of one joint is that joint.
 fn arm_and_joints(joints: usize) -> Vec<Option<usize>> {
-    std::iter::once(None).chain((0..joints).map(Some)).collect()
+    let arm = (joints > 1).then_some(None);
+    arm.into_iter().chain((0..joints).map(Some)).collect()
 }
 
 /// The joints of such a site.

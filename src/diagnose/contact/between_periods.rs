@@ -67,15 +67,19 @@ pub fn between_periods(m: &Measurement, left_out: &[usize]) -> Result<Compared, 
     let (drift, moves) = (None, Vec::new());
     let mut repeats =
         Repeats { signals, between_samples, joints, window, period, rate_hz, drift, moves };
-    repeats.moves = repeats.find_moves(q_rad)?;
+    let window = repeats.window.clone();
+    let drift = || {
+        let qd_rad_s = grid.instants().smooth(m.qd_rad_s)?.slice(window.clone());
+        Ok(FrictionDrift::beside_others(qd_rad_s, period))
+    };
+    repeats.moves = repeats.find_moves(q_rad, drift)?;
     let time_s = grid.time_s();
     let mut touches: Vec<Touch> = Vec::new();
     let mut known: Vec<Push> = Vec::new();
     let mut looked_at: Vec<Range<usize>> = Vec::new();
     let mut aside = vec![false; time_s.len()];
     if repeats.search(&aside, &known, &looked_at, 1.0)?.is_some() {
-        let qd_rad_s = grid.instants().smooth(m.qd_rad_s)?.slice(repeats.window.clone());
-        repeats.drift = Some(FrictionDrift::beside_others(qd_rad_s, period));
+        repeats.drift = Some(drift()?);
     }
     while looked_at.len() < MOST
         && let Some(candidate) = repeats.search(&aside, &known, &looked_at, 1.0)?
@@ -354,6 +358,49 @@ mod tests {
             let cause = &contacts(&time_s, &signals).unwrap().causes[0];
             assert_eq!(cause.joint, None, "{}", cause.in_words);
         }
+    }
+
+    /// The arm may have been pushed where another joint than the one whose torque shows it moved as well.
+    #[test]
+    fn a_push_that_moved_another_joint_may_be_one_on_the_arm() {
+        let push = Hidden { start_s: 31.0, end_s: 31.8, nm: [3.0, 0.0] };
+        for (yields_rad, class) in [([5e-4, 3e-4], &["contact"][..]), ([5e-4, 0.0], &[])] {
+            let (time_s, mut signals) = log(3, &push);
+            yielding(&mut signals, 3, &push, yields_rad);
+            let cause = &contacts(&time_s, &signals).unwrap().causes[0];
+            assert_eq!(cause.joint, Some(1));
+            assert_eq!(cause.class, class);
+            assert_eq!(cause.separating_experiment.is_some(), !class.is_empty());
+        }
+    }
+
+    /// A third joint trembles by 2 mrad: its encoder's noise is more of that than a contact moves an arm, and says nothing of where the
+    /// motion repeats. The push moves the arm, and its period is not among those that repeat throughout.
+    #[test]
+    fn a_joint_that_hardly_moves_hides_no_push() {
+        let push = Hidden { start_s: 31.0, end_s: 31.8, nm: [6.0, 0.0] };
+        let (time_s, mut signals) = log(3, &push);
+        yielding(&mut signals, 3, &push, [2e-2, 0.0]);
+        let mut rng = ChaCha8Rng::seed_from_u64(77);
+        let omega = std::f64::consts::TAU / 10.0;
+        let [q, qd, torque] = signals.each_ref().map(|two| {
+            let noise: Vec<f64> =
+                two.joint(0).iter().map(|_| StandardNormal.sample(&mut rng)).collect();
+            (two.clone(), noise)
+        });
+        let third =
+            |(two, noise): &(JointSignals, Vec<f64>), value: &dyn Fn(f64) -> f64, sd: f64| {
+                JointSignals::from_fn(3, noise.len(), |j, k| {
+                    if j < 2 { two.joint(j)[k] } else { value(time_s[k]) + sd * noise[k] }
+                })
+            };
+        let signals = [
+            third(&q, &|t| 2e-3 * (omega * t).sin(), 2e-5),
+            third(&qd, &|t| 2e-3 * omega * (omega * t).cos(), 0.0),
+            third(&torque, &|_| 0.0, 0.1),
+        ];
+        let found = contacts(&time_s, &signals).unwrap();
+        assert_eq!(found.causes.iter().map(|c| c.joint).collect::<Vec<_>>(), [Some(1)]);
     }
 
     /// Angles that differ say nothing of torques.

@@ -168,6 +168,8 @@ pub(super) struct Push {
     pub(super) felt: Vec<usize>,
     /// Twice what it gains in log-likelihood.
     pub(super) gain: f64,
+    /// How sure it is that something pushed.
+    pub(super) confidence: f64,
     shape: f64,
 }
 
@@ -267,6 +269,7 @@ pub(super) fn weigh(
         felt: (0..felt.count()).filter(|a| over_sigma(*a) >= least).map(on).collect(),
         heights_nm: (0..felt.count()).map(on).zip(best.heights_nm.clone()).collect(),
         gain: best.gain,
+        confidence: 1.0,
         shape: best.shape,
     })
 }

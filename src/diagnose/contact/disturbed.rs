@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
-use crate::median::median;
+use crate::median::{median, robust_sigma};
 use crate::robot::JointSignals;
+use crate::signal::cubic_at;
 
 /// Stretches of a period in which the run-in and the stop are found: a contact near an end of the log is not to be
 /// taken for a part of them.
@@ -12,6 +13,8 @@ const STRETCHES: usize = 40;
 const SAME_MOTION: f64 = 0.02;
 /// The same, at every instant of a stretch: more than a weak contact moves the arm, less than a run-in.
 const NO_CONTACT: f64 = 2e-3;
+/// A joint that hardly moves may differ by so many σ of its encoder's noise: at any of a million instants it does once.
+const NOISE: f64 = 5.0;
 
 /// `window`, longer by whole periods in which most of the motion repeats (a contact moves the arm for a
 /// moment, and that period is then not among those that repeat throughout) and by what is there of another one, up to
@@ -30,37 +33,41 @@ pub(super) fn with_disturbed_periods(
     };
     let amplitudes: Vec<f64> =
         (0..q_rad.joints()).map(|j| amplitude(q_rad.joint(j)) + 1e-6).collect();
-    // Whether `measure` of the differences between the samples `own` and those from `other` on is below `limit`.
-    let is_below = |measure: fn(&mut [f64]) -> f64, limit: f64, own: Range<usize>, other: usize| {
-        amplitudes.iter().enumerate().all(|(j, amplitude)| {
-            let q = q_rad.joint(j);
-            let pairs = q[own.clone()].iter().zip(&q[other..]);
-            let mut differences: Vec<f64> = pairs.map(|(a, b)| (a - b).abs() / amplitude).collect();
-            measure(&mut differences) < limit
+    // Between the samples `own` of joint `j` and those a period behind, or before.
+    let differences = |j: usize, own: Range<usize>, periods: f64| -> Vec<f64> {
+        let q = q_rad.joint(j);
+        own.map(|k| (q[k] - cubic_at(q, k as f64 + periods * period)).abs()).collect()
+    };
+    let repeated = window.start..window.end.saturating_sub(step).max(window.start);
+    let noise_rad: Vec<f64> = (0..q_rad.joints())
+        .map(|j| robust_sigma(&mut differences(j, repeated.clone(), 1.0)))
+        .collect();
+    // Whether `measure` of the differences is below the share `limit` of the amplitude, or what noise makes of it.
+    let is_below = |measure: fn(&mut [f64]) -> f64, limit: f64, own: Range<usize>, periods: f64| {
+        (0..q_rad.joints()).all(|j| {
+            let limit_rad = (limit * amplitudes[j]).max(NOISE * noise_rad[j]);
+            measure(&mut differences(j, own.clone(), periods)) < limit_rad
         })
     };
-    let repeats = |own, other| is_below(largest, NO_CONTACT, own, other);
-    let mostly_repeats = |own, other| is_below(middle, SAME_MOTION, own, other);
+    let repeats = |own, periods| is_below(largest, NO_CONTACT, own, periods);
+    let mostly_repeats = |own, periods| is_below(middle, SAME_MOTION, own, periods);
     let Range { mut start, mut end } = window.clone();
-    while start >= step && mostly_repeats(start - step..start, start) {
+    while start >= step && mostly_repeats(start - step..start, 1.0) {
         start -= step;
     }
-    while end + step <= q_rad.samples() && mostly_repeats(end..end + step, end - step) {
+    while end + step <= q_rad.samples() && mostly_repeats(end..end + step, -1.0) {
         end += step;
     }
     // A period most of which repeats may begin with the run-in, or end with the arm stopping; and of the first and the
     // last period of the log only a part may be there.
-    let first = (start.saturating_sub(step)..window.start).step_by(stretch).find(|&k| {
-        repeats(k..k + stretch, k + step) && (k >= start || mostly_repeats(k..start, k + step))
-    });
+    let first = (start.saturating_sub(step)..window.start)
+        .step_by(stretch)
+        .find(|&k| repeats(k..k + stretch, 1.0) && (k >= start || mostly_repeats(k..start, 1.0)));
     let last_first = end + step.min(q_rad.samples() - end);
     let last = (0..=(last_first - window.end) / stretch)
         .map(|stretches| last_first - stretches * stretch)
         .take_while(|&k| k >= window.end.max(step) + stretch)
-        .find(|&k| {
-            repeats(k - stretch..k, k - stretch - step)
-                && (k <= end || mostly_repeats(end..k, end - step))
-        });
+        .find(|&k| repeats(k - stretch..k, -1.0) && (k <= end || mostly_repeats(end..k, -1.0)));
     let (start, end) = (first.unwrap_or(window.start), last.unwrap_or(window.end));
     (start + edge).min(window.start)..end.saturating_sub(edge).max(window.end)
 }

@@ -43,6 +43,8 @@ struct Touch {
     strength: f64,
     /// Whether joints moved otherwise whose torque does not tell a push on them from an arm that gives way.
     moved_others: bool,
+    /// How sure it is.
+    confidence: f64,
 }
 
 /// Whether two stretches of samples are closer than `margin`.
@@ -70,6 +72,7 @@ impl Touch {
         }
         self.strength = self.strength.max(next.strength);
         self.moved_others |= next.moved_others;
+        self.confidence = self.confidence.max(next.confidence);
     }
 
     /// Its samples and those beside it, of `n` in all.
@@ -91,7 +94,7 @@ impl Touch {
             kind: Kind::Contact,
             joint,
             class,
-            confidence: 1.0,
+            confidence: self.confidence,
             parameters: parameters.map(|(name, estimate)| (name, estimate.clone())).into(),
             gain_fraction: None,
             separating_experiment: may_be_of_the_arm.then_some(HARDER),

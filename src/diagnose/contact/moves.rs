@@ -7,6 +7,7 @@ use std::ops::Range;
 
 use super::are_near;
 use super::repeats::Repeats;
+use crate::diagnose::friction_drift::FrictionDrift;
 use crate::median::robust_sigma;
 use crate::robot::JointSignals;
 use crate::signal::{SignalError, cubic_at};
@@ -41,8 +42,13 @@ impl Move {
 }
 
 impl Repeats {
-    /// Where the angles `q_rad` differ from those of the other periods as noise does not.
-    pub(super) fn find_moves(&self, q_rad: JointSignals) -> Result<Vec<Move>, SignalError> {
+    /// Where the angles `q_rad` differ from those of the other periods as noise does not, nor the `drift` of friction to which
+    /// drives yield.
+    pub(super) fn find_moves(
+        &self,
+        q_rad: JointSignals,
+        drift: impl FnOnce() -> Result<FrictionDrift, SignalError>,
+    ) -> Result<Vec<Move>, SignalError> {
         let mut angles = Self {
             signals: q_rad,
             // What turns at 3 rad/s² bends by 24 µrad between samples at 125 Hz: as much as encoders scatter.
@@ -61,6 +67,10 @@ impl Repeats {
         };
         angles.joints =
             (0..self.joints.len()).filter(scatters).map(|row| self.joints[row]).collect();
+        if angles.search(&aside, &[], &[], CLEARLY)?.is_none() {
+            return Ok(Vec::new());
+        }
+        angles.drift = Some(drift()?);
         let mut seen: Vec<Range<usize>> = Vec::new();
         let mut moves: Vec<Move> = Vec::new();
         while let Some(found) = angles.search(&aside, &[], &seen, CLEARLY)? {
@@ -93,11 +103,25 @@ mod tests {
     /// Six periods of 1000.3 samples behind 1.5 s that are none of them, angles known to 20 µrad; each move is its middle, s, its length,
     /// s, its joint and height, rad.
     fn moves(seed: u64, moved: &[(f64, f64, usize, f64)]) -> Vec<Move> {
+        moves_beside(seed, moved, |_, _| 0.0)
+    }
+
+    /// The same of drives that yield besides by `yields_rad(q̇, t)` to friction.
+    fn moves_beside(
+        seed: u64,
+        moved: &[(f64, f64, usize, f64)],
+        yields_rad: impl Fn(f64, f64) -> f64,
+    ) -> Vec<Move> {
         const PERIOD: f64 = 1000.3;
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let window = 150..150 + (6.0 * PERIOD) as usize;
+        let phase = |k: usize| std::f64::consts::TAU * k as f64 / PERIOD;
+        let qd_rad_s = JointSignals::from_fn(2, window.end, |j, k| {
+            let turns = (phase(k) + j as f64).cos() - 3.0 * (3.0 * phase(k)).sin();
+            turns * std::f64::consts::TAU * RATE_HZ / PERIOD
+        });
         let q_rad = JointSignals::from_fn(2, window.end, |j, k| {
-            let phase = std::f64::consts::TAU * k as f64 / PERIOD;
+            let phase = phase(k);
             let noise: f64 = StandardNormal.sample(&mut rng);
             let push = |&(at_s, length_s, joint, rad): &(f64, f64, usize, f64)| {
                 let u = 2.0 * (k as f64 / RATE_HZ - at_s) / length_s;
@@ -107,6 +131,7 @@ mod tests {
                 + (3.0 * phase).cos()
                 + 2e-5 * noise
                 + moved.iter().map(push).sum::<f64>()
+                + yields_rad(qd_rad_s.joint(j)[k], k as f64 / RATE_HZ)
         });
         let torques = Repeats {
             signals: JointSignals::zeros(2, window.end),
@@ -118,7 +143,8 @@ mod tests {
             drift: None,
             moves: Vec::new(),
         };
-        torques.find_moves(q_rad).unwrap()
+        let qd_rad_s = qd_rad_s.slice(torques.window.clone());
+        torques.find_moves(q_rad, || Ok(FrictionDrift::beside_others(qd_rad_s, PERIOD))).unwrap()
     }
 
     /// Also of a period that is no whole number of samples: straight lines between them would be off by up to two σ of the noise.
@@ -136,6 +162,17 @@ mod tests {
             assert_eq!(found[0].joints, [1]);
             // The window begins at 1.5 s.
             assert!(found[0].centres.contains(&3150), "{:?}", found[0].centres);
+        }
+    }
+
+    /// Drives yield to friction that warms up as they do to a push, all along a period: that is no place of its own.
+    #[test]
+    fn friction_that_drifts_moves_nothing() {
+        let fades = |qd: f64, t_s: f64| 3e-4 * (qd / 0.02).tanh() * (-t_s / 15.0).exp();
+        for seed in 0..5 {
+            assert!(moves_beside(seed, &[], fades).is_empty());
+            let found = moves_beside(seed, &[(33.0, 2.0, 1, 1e-3)], fades);
+            assert!(found.iter().any(|own| own.centres.contains(&3150)));
         }
     }
 

@@ -12,13 +12,13 @@ use crate::diagnose::verdict::Estimate;
 use crate::diagnose::whitening::FLOOR;
 use crate::median::{robust_sigma, trimmed_mean};
 use crate::robot::JointSignals;
-use crate::signal::{MatchedFilter, SignalError};
+use crate::signal::{MatchedFilter, SignalError, other_periods};
 
 /// A joint felt a contact that another one shows by itself if it deviates by so many σ (once in 10⁴ by chance), and by
 /// [`FELT_SHARE`] of the joint that felt it most.
 const FELT_BESIDE: f64 = 4.0;
 /// Shortest bump, s; a collision lasts a tenth of a second.
-const SHORTEST_S: f64 = 0.1;
+pub(super) const SHORTEST_S: f64 = 0.1;
 /// The longest, s: a hand that leans on the arm.
 const LONGEST_S: f64 = 6.0;
 /// Step between lengths: a bump √√2 too long or short is seen with 97 % of its height.
@@ -62,6 +62,8 @@ pub(super) struct Candidate {
     quiet: Vec<usize>,
     /// σ from which on a bump there in one joint is none of noise.
     far: f64,
+    /// The same of a bump of its length anywhere in the log.
+    far_anywhere: f64,
     /// Whether it is looked for because the arm moved otherwise there: which move it is.
     pub(super) of_move: Option<usize>,
 }
@@ -93,20 +95,14 @@ impl Repeats {
     /// there if any are left. Of two others their mean is wrong by half of either: y(k) itself counts with them where it
     /// is not set aside.
     pub(super) fn deviation(&self, y: &[f64], k: usize, aside: &[bool]) -> f64 {
-        let from_start = (k - self.window.start) as f64;
-        let own = (from_start / self.period).floor() as usize;
-        let phase = from_start - own as f64 * self.period;
-        let periods = (self.window.len() as f64 / self.period).ceil() as usize;
-        let at = |period: usize| self.window.start as f64 + phase + period as f64 * self.period;
-        let is_recorded = |period: &usize| at(*period) <= (self.window.end - 1) as f64;
-        let others: Vec<f64> =
-            (0..periods).filter(|p| *p != own && is_recorded(p)).map(at).collect();
+        let Range { start, end } = self.window.clone();
+        let others = other_periods(k - start, self.period, end - start).map(|at| start as f64 + at);
         let value = |at: f64| (self.between_samples)(y, at);
-        let undisturbed = others.iter().filter(|at| !aside[at.floor() as usize]);
-        let mut same: Vec<f64> = undisturbed.map(|at| value(*at)).collect();
+        let undisturbed = others.clone().filter(|at| !aside[at.floor() as usize]);
+        let mut same: Vec<f64> = undisturbed.map(value).collect();
         if same.is_empty() {
-            same = others.iter().map(|at| value(*at)).collect();
-        } else if others.len() < FEWEST_PERIODS && !aside[k] {
+            same = others.map(value).collect();
+        } else if others.count() < FEWEST_PERIODS && !aside[k] {
             same.push(y[k]);
         }
         y[k] - trimmed_mean(&mut same).unwrap_or(y[k])
@@ -157,7 +153,9 @@ impl Repeats {
             let others = |j: usize| [&rows[..j], &rows[j + 1..]].concat();
             let alone: Vec<Felt> = rows.iter().map(|j| noise.felt_by(&[*j], &others(*j))).collect();
             let reach = (0.5 * length_s * self.rate_hz) as usize;
-            for Place { centres, rows: telling, far, of_move } in self.looked_through(length_s) {
+            let places = self.looked_through(length_s);
+            let far_anywhere = places[0].far;
+            for Place { centres, rows: telling, far, of_move } in places {
                 let together = noise.felt_by(&telling, &[]);
                 let far_together = rarity::as_far_in(telling.len(), far);
                 for centre in centres.start.max(reach)..centres.end.min(self.window.len() - reach) {
@@ -188,7 +186,15 @@ impl Repeats {
                             felt.dedup();
                             quiet.clear();
                         }
-                        best = Some(Candidate { centre, length_s, felt, quiet, far, of_move });
+                        best = Some(Candidate {
+                            centre,
+                            length_s,
+                            felt,
+                            quiet,
+                            far,
+                            far_anywhere,
+                            of_move,
+                        });
                     }
                 }
             }
@@ -196,7 +202,7 @@ impl Repeats {
         Ok(best)
     }
 
-    /// Where bumps of `length_s` are looked for on which joints: all along the log on all of them, and where the arm moved
+    /// Where bumps of `length_s` are looked for on which joints: first all along the log on all of them, and where the arm moved
     /// otherwise on those that did. Noise of the torques does not choose where the angles differ, as long as no feedback brings it
     /// into them: it is asked there only whether a torque goes with a move that noise did not make.
     fn looked_through(&self, length_s: f64) -> Vec<Place> {
@@ -249,7 +255,7 @@ impl Repeats {
         aside: &[bool],
         known: &[Push],
     ) -> Result<Option<Push>, SignalError> {
-        let &Candidate { centre, length_s, far, .. } = candidate;
+        let &Candidate { centre, length_s, far, far_anywhere, .. } = candidate;
         let filter = MatchedFilter::new(&self.deviations(aside, known), self.rate_hz)?;
         let noise = Noise::of(&filter.heights(|t_s| bump::bump(ORDINARY, length_s, t_s)));
         let reach = (0.5 * length_s * self.rate_hz) as usize + 1;
@@ -259,12 +265,15 @@ impl Repeats {
             |felt: &Felt| bump::weigh(&filter, felt, &self.joints, centres.clone(), length_s);
         let felt = felt_by(&candidate.felt);
         // What its neighbourhood tells of the noise may make it less than it seemed.
-        let is_far = |felt: &Felt, push: &Push| {
+        let is_far = |felt: &Felt, push: &Push, far: f64| {
             felt.of_known_noise(push.gain) > rarity::as_far_in(felt.count(), far).powi(2)
         };
-        let Some(mut all) = weigh_on(&felt).filter(|push| is_far(&felt, push)) else {
+        let Some(mut all) = weigh_on(&felt).filter(|push| is_far(&felt, push, far)) else {
             return Ok(None);
         };
+        if !is_far(&felt, &all, far_anywhere) {
+            all.confidence = 1.0 - chance::CONTACT_WHERE_MOVED;
+        }
         let rows = |push: &Push| -> Vec<usize> {
             let is_felt = |row: &usize| push.is_felt_on(self.joints[*row]);
             candidate.felt.iter().copied().filter(is_felt).collect()
@@ -276,7 +285,7 @@ impl Repeats {
             // Where they do not show it by themselves the log does not tell that the others did not feel it.
             while let Some(next) = all.next_to_feel() {
                 let felt = felt_by(&rows(&all));
-                if weigh_on(&felt).is_some_and(|push| is_far(&felt, &push)) {
+                if weigh_on(&felt).is_some_and(|push| is_far(&felt, &push, far)) {
                     break;
                 }
                 all.felt.push(next);
@@ -297,7 +306,8 @@ impl Repeats {
 
     /// `push` at `candidate` as a contact of the log, whose window begins at `begin_s`.
     pub(super) fn touch(&self, candidate: &Candidate, push: &Push, begin_s: f64) -> Touch {
-        let moved = candidate.of_move.map_or(&[][..], |number| &self.moves[number].joints);
+        let here = self.moves.iter().filter(|own| own.centres.contains(&candidate.centre));
+        let mut moved = here.flat_map(|own| &own.joints);
         let shifted = |estimate: &Estimate| Estimate {
             value: begin_s + estimate.value,
             unit: estimate.unit,
@@ -314,7 +324,8 @@ impl Repeats {
             peak_nm: push.peak_nm.clone(),
             felt: push.felt_nm().map(|(j, height)| (j + 1, height)).collect(),
             strength: push.gain.sqrt(),
-            moved_others: moved.iter().any(|j| !push.is_felt_on(*j)),
+            moved_others: moved.any(|j| !push.is_felt_on(*j)),
+            confidence: push.confidence,
         }
     }
 }

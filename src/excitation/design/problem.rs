@@ -99,6 +99,10 @@ impl Problem {
         let mut torque_barrier = 0.0;
         for (joint, limit) in self.torque_nm.iter().enumerate() {
             let range = joint * samples..(joint + 1) * samples;
+            if limit.is_infinite() {
+                ws.torque_bar[range].fill(0.0);
+                continue;
+            }
             for (tau, bar) in ws.torque_nm[range.clone()].iter().zip(&mut ws.torque_bar[range]) {
                 let free = (limit - tau) * (limit + tau);
                 if free.is_nan() || free <= 0.0 || tau.abs() >= *limit {
@@ -197,6 +201,19 @@ pub(super) mod tests {
             b_rad_s: (0..6).map(|j| (0..2).map(|l| wave(j + 7, l)).collect()).collect(),
         };
         DVector::from_vec(problem.space.project(&series))
+    }
+
+    /// A drive without a torque limit has no torque barrier.
+    #[test]
+    fn a_torque_without_limit_bars_nothing() {
+        let mut problem = small_problem(Criterion::D);
+        let mut ws = problem.workspace();
+        let x = feasible_point(&problem);
+        let all = problem.point(&mut ws, x.clone(), 0.3, 6.0).unwrap();
+        problem.torque_nm[2] = f64::INFINITY;
+        let without = problem.point(&mut ws, x, 0.3, 6.0).unwrap();
+        assert!(without.torque_barrier < all.torque_barrier);
+        assert!(without.gradient.iter().all(|slope| slope.is_finite()));
     }
 
     /// The whole chain criterion, information, regressor, motion, coefficients against central

@@ -28,14 +28,12 @@ impl CovarianceMethod for BlockCluster {
         }
         let n = problem.samples;
         let seconds = (n * problem.periods) as f64 / problem.rate_hz;
-        // Short records get shorter blocks rather than none.
-        let length_s = BLOCK_S.min(seconds / LEAST_BLOCKS as f64);
-        let length = ((length_s * problem.rate_hz) as usize).max(1);
-        let blocks = (n / length) * problem.periods;
-        if blocks < LEAST_BLOCKS || length_s < SHORTEST_BLOCK_S {
-            let needed_s = LEAST_BLOCKS as f64 * SHORTEST_BLOCK_S;
+        let least_per_period = LEAST_BLOCKS.div_ceil(problem.periods);
+        let Some(length) = block_length(n, least_per_period, problem.rate_hz) else {
+            let needed_s = (least_per_period * problem.periods) as f64 * SHORTEST_BLOCK_S;
             return Err(CovarianceError::TooShort { seconds, needed_s });
-        }
+        };
+        let blocks = (n / length) * problem.periods;
         let residuals = problem.residuals(&fit.theta);
         // The last block of a period takes what is left over.
         let per_period = n / length;
@@ -69,5 +67,26 @@ impl CovarianceMethod for BlockCluster {
             matrix: sandwich(fit, &omega) / (repeats * repeats),
             degrees_of_freedom: count - 1.0,
         })
+    }
+}
+
+/// Samples of a block: of a period of `samples` at least so many `per_period`; short records get shorter blocks rather than none.
+/// `None` where they would be too short.
+fn block_length(samples: usize, per_period: usize, rate_hz: f64) -> Option<usize> {
+    let length = ((BLOCK_S * rate_hz) as usize).min(samples / per_period);
+    (length > 0 && length >= (SHORTEST_BLOCK_S * rate_hz) as usize).then_some(length)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of one run six of a second at least; of four periods of 5 s two each; five seconds where the record is long.
+    #[test]
+    fn blocks_lie_in_a_period() {
+        assert_eq!(block_length(750, 6, 125.0), Some(125));
+        assert_eq!(block_length(749, 6, 125.0), None);
+        assert_eq!(block_length(625, 2, 125.0), Some(312));
+        assert_eq!(block_length(10_000, 6, 125.0), Some(625));
     }
 }

@@ -64,7 +64,8 @@ impl CovarianceMethod for BlockBootstrap {
         Ok(Covariance {
             kind: CovarianceKind::Bootstrap,
             matrix: matrix / REPLICATES as f64,
-            degrees_of_freedom: REPLICATES as f64,
+            // The blocks of the record tell the variance, however often they are drawn.
+            degrees_of_freedom: (instants / length - 1).min(REPLICATES) as f64,
         })
     }
 }

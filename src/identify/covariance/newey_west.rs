@@ -28,6 +28,11 @@ impl CovarianceMethod for NeweyWest {
         let lags = self.lags.unwrap_or_else(|| andrews(&scores)).min(instants / 2);
         let omega = bartlett(&scores, lags);
         let periods = problem.periods as f64;
+        if instants <= b {
+            let seconds = instants as f64 * periods / problem.rate_hz;
+            let needed_s = (b + 1) as f64 * periods / problem.rate_hz;
+            return Err(CovarianceError::TooShort { seconds, needed_s });
+        }
         let t = instants as f64;
         let correction = t / (t - b as f64) / (periods * periods);
         Ok(Covariance {

@@ -223,6 +223,16 @@ mod tests {
         blocks = ["time", "q", "qd", "torque"]
     "#;
 
+    /// The commented example says all that a layout can.
+    #[test]
+    fn the_example_is_whole_and_valid() {
+        let text = include_str!("../../../layouts/example.toml");
+        let layout = Layout::from_toml(text, "example.toml").unwrap();
+        let optional = [Block::Current, Block::Torque, Block::TargetMoment, Block::Temperature];
+        assert!(optional.iter().all(|block| layout.columns(*block).is_some()));
+        assert_eq!(layout.units.factor(Block::Time), Some(1e-3));
+    }
+
     fn fault_of(from: &str, to: &str) -> String {
         assert!(VALID.contains(from));
         Layout::from_toml(&VALID.replacen(from, to, 1), "mine.toml").unwrap_err().to_string()

@@ -220,6 +220,9 @@ impl Maker<'_> {
         let benchmark = self.benchmark;
         let range = benchmark.plan.sqrt_lambda_of_two;
         let open = benchmark.open(|f| benchmark.can_be_withheld(f));
+        if open.iter().map(|family| family.sites.len()).sum::<usize>() < 2 {
+            return Err(BlindError::NothingToHide);
+        }
         let first = self.hidden(&open, range)?;
         loop {
             let second = self.hidden(&open, range)?;

@@ -40,6 +40,8 @@ pub struct Family {
     pub sites: &'static [Option<usize>],
 }
 
+/// Joints of the arms in which effects are hidden.
+pub(super) const JOINTS: usize = 6;
 const EACH: &[Option<usize>] = &[Some(1), Some(2), Some(3), Some(4), Some(5), Some(6)];
 const EACH_AND_ALL: &[Option<usize>] =
     &[None, Some(1), Some(2), Some(3), Some(4), Some(5), Some(6)];

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::family::{FAMILIES, Family, ON_REQUEST};
+use super::family::{FAMILIES, Family, JOINTS, ON_REQUEST};
 use crate::diagnose::Kind;
 use crate::excitation::Excitation;
 use crate::montecarlo::scenario::{MotionEntry, Scenario, ScenarioError, Source, fingerprint};
@@ -110,6 +110,9 @@ impl BlindPlan {
                 all.filter(|family| kinds.contains(&family.kind)).copied().collect()
             }
         };
+        let dof = base.arm.dof() as f64;
+        let requirement = "is the number of joints of the robot; effects are hidden in arms of 6";
+        source.check(base.arm.dof() == JOINTS, "robot", dof, requirement)?;
         let first = Motion { name: base.trajectory.clone(), excitation: base.excitation.clone() };
         let mut motions = vec![first];
         for motion in &entry.motion {

@@ -1,5 +1,6 @@
 //! The plant under construction: what the effects have put into it so far.
 
+use super::effect::{Complaint, require};
 use super::friction::Friction;
 use super::gear::{EncoderSide, Ripple, Transmission};
 use super::readings::ReadingFault;
@@ -78,6 +79,17 @@ impl Assembly {
             number: 0,
             arm: arm.clone(),
         }
+    }
+
+    /// Complains of joint `index` (from 0) whose drive has no torque limit, by which a fault is sized.
+    pub(super) fn require_torque_limit(&self, index: usize) -> Result<(), Complaint> {
+        let limit_nm = self.arm.joints[index].limits.torque_nm;
+        require(
+            limit_nm.is_finite(),
+            "torque_nm",
+            limit_nm,
+            "of the arm's joint must be a finite limit",
+        )
     }
 
     /// Mechanics of joint `joint`, from 1.

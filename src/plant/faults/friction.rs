@@ -258,6 +258,7 @@ impl Fault for LoadFriction {
     }
 
     fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
+        assembly.require_torque_limit(self.joint - 1)?;
         let friction = &mut assembly.joint(self.joint).friction;
         friction.mu += self.mu;
         require(friction.mu <= 0.5, "mu", friction.mu, "must not sum to more than 0.5 on a joint")

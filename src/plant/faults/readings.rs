@@ -129,6 +129,9 @@ impl Fault for Outliers {
     }
 
     fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
+        for j in joints(self.joint, assembly.joints.len()) {
+            assembly.require_torque_limit(j)?;
+        }
         assembly.readings.push((assembly.number, ReadingFault::Nonsense(*self)));
         Ok(())
     }

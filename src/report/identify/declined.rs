@@ -53,7 +53,7 @@ impl Declined {
 
     /// A page with the verdict alone.
     pub fn page(&self, program: Program) -> Page {
-        let facts = vec![format!("{} rows read, {} used", self.rows.read, self.rows.used)];
+        let facts = vec![self.rows.in_words()];
         let verdict = Verdict { status: Status::Bad, sentence: self.sentence(), facts };
         let subtitle = format!("{} from {}", self.robot, self.log);
         Page::new("Identified parameters", subtitle, verdict, program)

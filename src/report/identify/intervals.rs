@@ -3,7 +3,9 @@
 use serde::Serialize;
 
 use super::Training;
-use crate::identify::{Agreement, Floor, Identification, LackOfFit, MANY_PERIODS, Processing};
+use crate::identify::{
+    Agreement, Floor, Identification, LackOfFit, MANY_PERIODS, Processing, chance_in_words,
+};
 
 /// Whether the 95 % intervals may claim to hold the truth.
 #[derive(Debug, Clone, Serialize)]
@@ -57,7 +59,7 @@ impl AgreementResult {
         format!(
             "{:.2} times as far as their noise leads to expect (chance {})",
             self.statistic.sqrt(),
-            chance(self.p_value)
+            chance_in_words(self.p_value)
         )
     }
 
@@ -71,10 +73,6 @@ impl AgreementResult {
             sigmas.abs()
         )
     }
-}
-
-fn chance(p_value: f64) -> String {
-    if p_value < 0.01 { format!("{p_value:.1e}") } else { format!("{p_value:.2}") }
 }
 
 /// The lack-of-fit test and its answer.
@@ -152,7 +150,7 @@ impl Intervals {
             Floor::Torque => "the scatter of the torque between periods",
             Floor::TorqueAndMotion => "the scatter of torque and motion between periods",
         };
-        let chance = chance(p_value);
+        let chance = chance_in_words(p_value);
         let along = match identification.agreement {
             Some(_) => " along the log that fits worst",
             None => "",

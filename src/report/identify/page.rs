@@ -52,7 +52,7 @@ pub fn residual_table(result: &Result) -> Table {
     row("residual of the fit".into(), "Nm", &result.residual.rms_nm);
     row("… of the torque".into(), "%", &result.residual.relative_percent);
     if let Some(floor) = &result.noise_floor_nm {
-        row("noise floor (scatter between periods)".into(), "Nm", floor);
+        row("noise floor of single samples (scatter between periods)".into(), "Nm", floor);
     }
     if let Some(explainable) = &result.explainable_nm {
         row("repeats and is not explained".into(), "Nm", explainable);

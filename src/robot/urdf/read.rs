@@ -19,8 +19,8 @@ use crate::robot::inertia::LinkInertia;
 const ASSUMED_VELOCITY_RAD_S: f64 = PI;
 /// Acceleration limit where the file gives none; the built-in arms' as well.
 const ASSUMED_ACCELERATION_RAD_S2: f64 = 10.0;
-/// π/2 printed to five digits is off by 3.7e-6 rad.
-const RIGHT_ANGLE_RAD: f64 = 5e-6;
+/// Half of the last of four decimals: files print 1.5708 and 3.1416.
+const RIGHT_ANGLE_RAD: f64 = 5e-5;
 /// Axes such as (0.577, 0.577, 0.577) have unit length to three digits.
 const AXIS_LENGTH: f64 = 1e-3;
 
@@ -82,7 +82,7 @@ pub struct FixedFrame {
 /// - **What URDF does not have**: rotor inertia is 0, gear ratio 1 and torque constant 1 (a current
 ///   column then reads as joint torque), gravity 9.81 m/s² along −z of the root link, acceleration
 ///   limit 10 rad/s² unless the file has one. Transmissions are not read.
-/// - **Angles** within 5e-6 rad of a multiple of π/2 are that multiple: files print 1.5708 for π/2,
+/// - **Angles** within 5e-5 rad of a multiple of π/2 are that multiple: files print 1.5708 for π/2,
 ///   and parallel axes that are nearly parallel blur which parameters can be known.
 ///
 /// # Errors

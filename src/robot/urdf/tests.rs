@@ -207,6 +207,14 @@ fn a_right_angle_printed_short_is_a_right_angle_and_is_said() {
         let notice = UrdfNotice::RightAngle { place, written_rad, used_rad: FRAC_PI_2 };
         assert!(notices.contains(&notice), "{notices:?}");
     }
+    for (written, turns) in [("3.1416", 2.0), ("-3.1416", -2.0), ("4.7124", 3.0), ("6.2832", 4.0)] {
+        let inside = format!(r#"{LIMIT}<origin xyz="0 0 0" rpy="{written} 0 0"/>"#);
+        let mut parts = two_joints();
+        parts[4] = joint("j2", "revolute", "a", "b", &inside);
+        let used_rad = turns * FRAC_PI_2;
+        let is_said = |n: &UrdfNotice| matches!(n, UrdfNotice::RightAngle { used_rad: u, .. } if *u == used_rad);
+        assert!(read(&robot(&parts)).notices.iter().any(is_said), "{written}");
+    }
     // A calibrated angle is left alone.
     let inside = format!(r#"{LIMIT}<origin xyz="0 0 0" rpy="1.5709 0 0"/>"#);
     let mut parts = two_joints();
