@@ -160,13 +160,14 @@ impl RealArmStudy {
             .map(|pair| {
                 let mass = &pair.finding.mass_kg;
                 let sigma = 0.25 * (mass.ci95[1] - mass.ci95[0]);
-                format!("{} kg with the {} gains", with_sigma(mass.value, sigma), pair.gains)
+                let mass = with_sigma(mass.value, sigma);
+                format!("{mass} kg in {} with the {} gains", pair.file, pair.gains)
             })
             .collect();
         let named = bare.iter().filter(|pair| pair.finding.is_named).count();
         let known = loaded.first().and_then(|pair| pair.known_kg).unwrap_or(f64::NAN);
         format!(
-            "The body that weighs {known} kg is found as {}; a body is found on {named} of {} runs without one.",
+            "The body that weighs {known} kg is found as (± one σ) {}; a body is found on {named} of {} runs without one.",
             masses.join(", "),
             bare.len()
         )
