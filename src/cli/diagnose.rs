@@ -1,12 +1,12 @@
 //! `armid diagnose`: what the model of an arm gets wrong, from its log.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::identify::{LoadedLog, ProcessingArgs, SourceArgs};
-use super::robot::SavedRobot;
+use super::simulated::Simulated;
 use super::{CommandResult, Outcome};
 use crate::base::{BaseSet, Parameterisation};
 use crate::diagnose::{DIAGNOSE_SCHEMA, DiagnoseError, Diagnoser, Diagnosis, Validation};
@@ -15,13 +15,10 @@ use crate::log::Log;
 use crate::montecarlo::Scenario;
 use crate::output::check_outputs;
 use crate::report::diagnose::{cause_table, held_out_table, limit_table, page};
-use crate::report::identify::IDENTIFY_SCHEMA;
 use crate::report::json::{Document, Input, Program};
 use crate::report::replay::table as replay_table;
 use crate::report::rows::{Rows, log_warnings};
-use crate::report::saved::{SavedFault, load};
 use crate::report::{Page, Status, Verdict};
-use crate::robot::{Arm, Kinematics};
 
 /// Say what the rigid model with linear friction gets wrong along a log, and what explains it.
 #[derive(Debug, Args)]
@@ -222,129 +219,10 @@ struct Declined<'a> {
     rows: &'a Rows,
 }
 
-/// A simulation that a log is compared with.
-struct Simulated {
-    /// Base parameters.
-    theta: Vec<f64>,
-    /// What should be known of it.
-    warning: Option<String>,
-}
-
-impl Simulated {
-    /// The simulation of `arm` that `file` describes, its parameters in the order of `set`; not a result of the log that is
-    /// compared with it, whose file has the hash `sha256`.
-    fn load(
-        file: &Path,
-        (arm, set): (&Arm, &BaseSet),
-        sha256: &str,
-    ) -> Result<Self, Box<dyn std::error::Error>> {
-        let name = file.display();
-        if file.extension().is_some_and(|e| e == "toml") {
-            let scenario = Scenario::load(Some(file))?;
-            if let Some(difference) = Kinematics::of(&scenario.arm).difference(arm) {
-                let arm = &arm.name;
-                let message =
-                    format!("{name}: it simulates another arm than \"{arm}\": {difference}");
-                return Err(message.into());
-            }
-            let has_effects = !scenario.effects.is_empty();
-            return Ok(Self {
-                theta: set.values(&Model::new(&scenario.arm).standard_parameters()),
-                warning: has_effects.then(|| {
-                    format!("{name}: its arm alone is compared with, not its [[effect]] tables")
-                }),
-            });
-        }
-        let result: IdentifiedParameters =
-            load(file, IDENTIFY_SCHEMA).map_err(|error| match error.fault {
-                SavedFault::Read(_) => error.to_string(),
-                fault => not_a_simulation(file, &fault),
-            })?;
-        result.about.check(arm).map_err(|other| format!("{name}: {other}"))?;
-        if result.program.inputs.iter().any(|input| input.sha256 == sha256) {
-            let message = "it was identified from the log that is diagnosed: nothing could differ but what the model gets wrong; \
-                           compare another log with it, or leave --sim out";
-            return Err(format!("{name}: {message}").into());
-        }
-        let is_bent = result.intervals.trusted == Some(false);
-        let warning = is_bent.then(|| {
-            format!(
-                "{name}: the model is wrong along the log that this result is of, so that what differs from it here may have \
-                 been wrong there; `armid diagnose` of that log names its cause"
-            )
-        });
-        let parameter = |k: usize| {
-            let parameter = set.name(k);
-            let found = result.base_parameters.iter().find(|p| p.name == parameter);
-            found.map(|p| p.value).ok_or_else(|| format!("{name}: no base parameter {parameter}"))
-        };
-        Ok(Self { theta: (0..set.rank()).map(parameter).collect::<Result<_, _>>()?, warning })
-    }
-}
-
-/// Why `file` cannot be compared with.
-fn not_a_simulation(file: &Path, why: &dyn std::fmt::Display) -> String {
-    let file = file.display();
-    format!(
-        "{file}: neither a scenario (.toml) nor a result of `armid identify --json` ({why}); a second log goes \
-         behind the first, without --sim"
-    )
-}
-
-/// What is needed of an identification's JSON.
-#[derive(Deserialize)]
-struct IdentifiedParameters {
-    #[serde(flatten)]
-    about: SavedRobot,
-    base_parameters: Vec<IdentifiedParameter>,
-    #[serde(default)]
-    intervals: Intervals,
-    #[serde(default)]
-    program: SavedProgram,
-}
-
-#[derive(Default, Deserialize)]
-struct SavedProgram {
-    inputs: Vec<SavedInput>,
-}
-
-#[derive(Deserialize)]
-struct SavedInput {
-    sha256: String,
-}
-
-#[derive(Default, Deserialize)]
-struct Intervals {
-    trusted: Option<bool>,
-}
-
-#[derive(Deserialize)]
-struct IdentifiedParameter {
-    name: String,
-    value: f64,
-}
-
 /// The diagnosis with what became of the log's rows.
 #[derive(Serialize)]
 struct WithRows<'a> {
     #[serde(flatten)]
     diagnosis: &'a Diagnosis,
     rows: Rows,
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The JSON of a diagnosis has base parameters as well, but no simulation is described by what is left beside its causes.
-    #[test]
-    fn a_diagnosis_is_no_simulation() {
-        let arm = Arm::built_in("ur5").unwrap();
-        let set = BaseSet::find(&arm, Parameterisation::full(arm.dof(), true)).unwrap();
-        let file = tempfile::Builder::new().suffix(".json").tempfile().unwrap();
-        let diagnosis = r#"{"schema": "armid.diagnose/1", "base_parameters": []}"#;
-        std::fs::write(file.path(), diagnosis).unwrap();
-        let error = Simulated::load(file.path(), (&arm, &set), "").err().unwrap().to_string();
-        assert!(error.contains("its schema is \"armid.diagnose/1\""), "{error}");
-    }
 }

@@ -20,6 +20,7 @@ pub mod montecarlo;
 mod prior;
 mod robot;
 pub mod simulate;
+mod simulated;
 pub mod study;
 mod study_cutoff;
 mod study_noise;

@@ -1,0 +1,133 @@
+//! The simulation that a log is compared with: a scenario, or what was identified from another log.
+
+use std::path::Path;
+
+use serde::Deserialize;
+
+use super::robot::SavedRobot;
+use crate::base::BaseSet;
+use crate::dynamics::Model;
+use crate::montecarlo::Scenario;
+use crate::report::identify::IDENTIFY_SCHEMA;
+use crate::report::saved::{SavedFault, load};
+use crate::robot::{Arm, Kinematics};
+
+/// A simulation that a log is compared with.
+pub(super) struct Simulated {
+    /// Base parameters.
+    pub(super) theta: Vec<f64>,
+    /// What should be known of it.
+    pub(super) warning: Option<String>,
+}
+
+impl Simulated {
+    /// The simulation of `arm` that `file` describes, its parameters in the order of `set`; not a result of the log that is
+    /// compared with it, whose file has the hash `sha256`.
+    pub(super) fn load(
+        file: &Path,
+        (arm, set): (&Arm, &BaseSet),
+        sha256: &str,
+    ) -> Result<Self, Box<dyn std::error::Error>> {
+        let name = file.display();
+        if file.extension().is_some_and(|e| e == "toml") {
+            let scenario = Scenario::load(Some(file))?;
+            if let Some(difference) = Kinematics::of(&scenario.arm).difference(arm) {
+                let arm = &arm.name;
+                let message =
+                    format!("{name}: it simulates another arm than \"{arm}\": {difference}");
+                return Err(message.into());
+            }
+            let has_effects = !scenario.effects.is_empty();
+            return Ok(Self {
+                theta: set.values(&Model::new(&scenario.arm).standard_parameters()),
+                warning: has_effects.then(|| {
+                    format!("{name}: its arm alone is compared with, not its [[effect]] tables")
+                }),
+            });
+        }
+        let result: IdentifiedParameters =
+            load(file, IDENTIFY_SCHEMA).map_err(|error| match error.fault {
+                SavedFault::Read(_) => error.to_string(),
+                fault => not_a_simulation(file, &fault),
+            })?;
+        result.about.check(arm).map_err(|other| format!("{name}: {other}"))?;
+        if result.program.inputs.iter().any(|input| input.sha256 == sha256) {
+            let message = "it was identified from the log that is diagnosed: nothing could differ but what the model gets wrong; \
+                           compare another log with it, or leave --sim out";
+            return Err(format!("{name}: {message}").into());
+        }
+        let is_bent = result.intervals.trusted == Some(false);
+        let warning = is_bent.then(|| {
+            format!(
+                "{name}: the model is wrong along the log that this result is of, so that what differs from it here may have \
+                 been wrong there; `armid diagnose` of that log names its cause"
+            )
+        });
+        let parameter = |k: usize| {
+            let parameter = set.name(k);
+            let found = result.base_parameters.iter().find(|p| p.name == parameter);
+            found.map(|p| p.value).ok_or_else(|| format!("{name}: no base parameter {parameter}"))
+        };
+        Ok(Self { theta: (0..set.rank()).map(parameter).collect::<Result<_, _>>()?, warning })
+    }
+}
+
+/// Why `file` cannot be compared with.
+fn not_a_simulation(file: &Path, why: &dyn std::fmt::Display) -> String {
+    let file = file.display();
+    format!(
+        "{file}: neither a scenario (.toml) nor a result of `armid identify --json` ({why}); a second log goes \
+         behind the first, without --sim"
+    )
+}
+
+/// What is needed of an identification's JSON.
+#[derive(Deserialize)]
+struct IdentifiedParameters {
+    #[serde(flatten)]
+    about: SavedRobot,
+    base_parameters: Vec<IdentifiedParameter>,
+    #[serde(default)]
+    intervals: Intervals,
+    #[serde(default)]
+    program: SavedProgram,
+}
+
+#[derive(Default, Deserialize)]
+struct SavedProgram {
+    inputs: Vec<SavedInput>,
+}
+
+#[derive(Deserialize)]
+struct SavedInput {
+    sha256: String,
+}
+
+#[derive(Default, Deserialize)]
+struct Intervals {
+    trusted: Option<bool>,
+}
+
+#[derive(Deserialize)]
+struct IdentifiedParameter {
+    name: String,
+    value: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::Parameterisation;
+
+    /// The JSON of a diagnosis has base parameters as well, but no simulation is described by what is left beside its causes.
+    #[test]
+    fn a_diagnosis_is_no_simulation() {
+        let arm = Arm::built_in("ur5").unwrap();
+        let set = BaseSet::find(&arm, Parameterisation::full(arm.dof(), true)).unwrap();
+        let file = tempfile::Builder::new().suffix(".json").tempfile().unwrap();
+        let diagnosis = r#"{"schema": "armid.diagnose/1", "base_parameters": []}"#;
+        std::fs::write(file.path(), diagnosis).unwrap();
+        let error = Simulated::load(file.path(), (&arm, &set), "").err().unwrap().to_string();
+        assert!(error.contains("its schema is \"armid.diagnose/1\""), "{error}");
+    }
+}
