@@ -2,7 +2,7 @@
 //! and contacts, which no fit absorbs. Everything hidden is made by the plant.
 
 use armid::base::BaseSet;
-use armid::diagnose::{Cause, Diagnoser, Diagnosis, Kind, Validation};
+use armid::diagnose::{Cause, Diagnoser, Diagnosis, Kind, Nominal, Validation};
 use armid::dynamics::Model;
 use armid::identify::{Measurement, Options};
 use armid::montecarlo::{Scenario, Simulation};
@@ -47,7 +47,8 @@ impl Run {
         let model = Model::new(&self.arm);
         let nominal = self.set.values(&model.standard_parameters());
         let mut diagnoser = Diagnoser::new(&self.arm, &model, &self.set, self.options.clone());
-        let finding = diagnoser.diagnose(&self.measurement(), &[], Some(&nominal)).unwrap();
+        let finding =
+            diagnoser.diagnose(&self.measurement(), &[], Some(Nominal::certain(&nominal))).unwrap();
         println!("{:#?}", finding.diagnosis.sentences);
         for cause in &finding.diagnosis.causes {
             println!(
@@ -176,7 +177,9 @@ fn what_only_moves_the_parameters_gains_nothing() {
     let nominal = run.set.values(&model.standard_parameters());
     let held_out = [Validation { measurement: other.measurement(), manufacturer_nm: None }];
     let mut diagnoser = Diagnoser::new(&run.arm, &model, &run.set, run.options.clone());
-    let finding = diagnoser.diagnose(&run.measurement(), &held_out, Some(&nominal)).unwrap();
+    let finding = diagnoser
+        .diagnose(&run.measurement(), &held_out, Some(Nominal::certain(&nominal)))
+        .unwrap();
     let d = &finding.diagnosis;
     assert!(finding.extension.effects.is_empty() && !d.causes.is_empty(), "{:?}", d.sentences);
     assert!(!d.sentences.iter().any(|s| s.contains("with what is named")), "{:?}", d.sentences);

@@ -48,6 +48,20 @@ fn what_the_example_hides_is_named() {
         said(&itself)
     );
 
+    // Of another log it says little, because it is bent by what the log hides.
+    let doubtful = file("doubtful.json");
+    let beside =
+        armid(&["diagnose", &other, "--robot", "ur5", "--sim", &result, "--json", &doubtful]);
+    assert!(beside.status.success(), "{}", said(&beside));
+    let answer: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(doubtful).unwrap()).unwrap();
+    assert!(
+        answer["sentences"][0].as_str().unwrap().starts_with("The model is wrong along the log")
+    );
+    for cause in answer["causes"].as_array().unwrap() {
+        assert!(cause["confidence"].as_f64().unwrap() <= 0.9, "{cause}");
+    }
+
     let (json, page, found) = (file("why.json"), file("why.html"), file("found.toml"));
     let outputs = ["--json", &json, "--report", &page, "--extended-scenario", &found];
     let mut arguments = vec!["diagnose", &log, "--robot", "ur5", "--held-out", &other];

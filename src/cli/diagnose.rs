@@ -103,14 +103,20 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
     }
     inputs.extend(logs.iter().chain(&held_out).map(|l: &LoadedLog| l.input.clone()));
     let program = Program::started(None, inputs);
-    let theta = simulation.as_ref().map(|simulation| &simulation.theta[..]);
-    let mut finding = match diagnoser.diagnose(&log.measurement(), &validations, theta) {
+    let nominal = simulation.as_ref().map(Simulated::nominal);
+    let mut finding = match diagnoser.diagnose(&log.measurement(), &validations, nominal) {
         Err(error) if error.is_about_the_motion() => {
             return decline(args, &log.log, &error, program);
         }
         finding => finding?,
     };
-    finding.diagnosis.warnings.extend(simulation.and_then(|simulation| simulation.warning));
+    if let Some(Simulated { warning: Some(warning), is_doubtful, .. }) = simulation {
+        match is_doubtful {
+            // Whatever is said next rests on it.
+            true => finding.diagnosis.sentences.insert(0, warning),
+            false => finding.diagnosis.warnings.push(warning),
+        }
+    }
     // What fails behind the diagnosis must not take it along: it is told when all else is printed and written.
     let mut failed = None;
     if let Some(loaded) = logs.get(1) {

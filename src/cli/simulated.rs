@@ -6,6 +6,7 @@ use serde::Deserialize;
 
 use super::robot::SavedRobot;
 use crate::base::BaseSet;
+use crate::diagnose::Nominal;
 use crate::dynamics::Model;
 use crate::montecarlo::Scenario;
 use crate::report::identify::IDENTIFY_SCHEMA;
@@ -15,7 +16,9 @@ use crate::robot::{Arm, Kinematics};
 /// A simulation that a log is compared with.
 pub(super) struct Simulated {
     /// Base parameters.
-    pub(super) theta: Vec<f64>,
+    theta: Vec<f64>,
+    /// Whether they are of a log that the model does not explain.
+    pub(super) is_doubtful: bool,
     /// What should be known of it.
     pub(super) warning: Option<String>,
 }
@@ -39,6 +42,7 @@ impl Simulated {
             }
             let has_effects = !scenario.effects.is_empty();
             return Ok(Self {
+                is_doubtful: false,
                 theta: set.values(&Model::new(&scenario.arm).standard_parameters()),
                 warning: has_effects.then(|| {
                     format!("{name}: its arm alone is compared with, not its [[effect]] tables")
@@ -56,11 +60,11 @@ impl Simulated {
                            compare another log with it, or leave --sim out";
             return Err(format!("{name}: {message}").into());
         }
-        let is_bent = result.intervals.trusted == Some(false);
-        let warning = is_bent.then(|| {
+        let is_doubtful = result.intervals.trusted == Some(false);
+        let warning = is_doubtful.then(|| {
             format!(
-                "{name}: the model is wrong along the log that this result is of, so that what differs from it here may have \
-                 been wrong there; `armid diagnose` of that log names its cause"
+                "The model is wrong along the log of which {name} is, so that what differs from it here may have been wrong there; \
+                 `armid diagnose` of that log names the cause."
             )
         });
         let parameter = |k: usize| {
@@ -68,7 +72,13 @@ impl Simulated {
             let found = result.base_parameters.iter().find(|p| p.name == parameter);
             found.map(|p| p.value).ok_or_else(|| format!("{name}: no base parameter {parameter}"))
         };
-        Ok(Self { theta: (0..set.rank()).map(parameter).collect::<Result<_, _>>()?, warning })
+        let theta = (0..set.rank()).map(parameter).collect::<Result<_, _>>()?;
+        Ok(Self { theta, is_doubtful, warning })
+    }
+
+    /// What a diagnosis compares with.
+    pub(super) fn nominal(&self) -> Nominal<'_> {
+        Nominal { theta: &self.theta, is_doubtful: self.is_doubtful }
     }
 }
 

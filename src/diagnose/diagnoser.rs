@@ -1,6 +1,6 @@
 //! From a log to a diagnosis: the procedure as a whole.
 
-use super::against::{self, Found};
+use super::against::{self, Found, Nominal};
 use super::candidates::{self, Candidate};
 use super::common_motion::move_to_common_motion;
 use super::contact::{self, Compared};
@@ -79,12 +79,12 @@ impl<'a> Diagnoser<'a> {
     }
 
     /// Says what the model gets wrong along `m`; `held_out` logs measure the gain;
-    /// `simulation`, base parameters of a simulation of the arm, is compared with what the log says.
+    /// a `simulation` of the arm is compared with what the log says.
     pub fn diagnose(
         &mut self,
         m: &Measurement,
         held_out: &[Validation],
-        simulation: Option<&[f64]>,
+        simulation: Option<Nominal>,
     ) -> Result<Finding, DiagnoseError> {
         let Faults { causes: mut faults, record, warning } = data_faults::find(m)?;
         let m = &record.measurement(m.source);
@@ -163,7 +163,10 @@ impl<'a> Diagnoser<'a> {
                 alike: selected.alike(),
             });
             let found: Vec<Found> = found.collect();
-            let explained = against::explain(&study, self.set, simulation, &found);
+            let mut explained = against::explain(&study, self.set, simulation.theta, &found);
+            if simulation.is_doubtful {
+                explained.causes.iter_mut().for_each(Cause::make_provisional);
+            }
             causes.retain(|c| !explained.judged.contains(&(c.kind, c.joint)));
             causes.extend(explained.causes);
             rest = study.residual.clone();
@@ -182,7 +185,7 @@ impl<'a> Diagnoser<'a> {
         }
         let base_parameters = intervals::base(&study, self.set, &extension);
         let moved_parameters =
-            simulation.map_or(Vec::new(), |s| against::moved(s, &base_parameters));
+            simulation.map_or(Vec::new(), |s| against::moved(s.theta, &base_parameters));
         let is_a_tear = |cause: &mut Cause| {
             let at = |name| cause.parameters.get(name).map_or(f64::NAN, |e| e.value);
             cause.kind == Kind::Contact && is_torn(m, [at("start_s"), at("end_s")])

@@ -60,6 +60,7 @@ mod study;
 mod verdict;
 mod whitening;
 
+pub use against::Nominal;
 pub use diagnoser::{Diagnoser, Finding};
 pub use error::DiagnoseError;
 pub use extension::{Effect, Extension};

@@ -26,6 +26,23 @@ const MOST_CHANGES: usize = 8;
 const ROUNDS: usize = 2 * MOST_CHANGES;
 /// Alternatives that are reported.
 const RIVALS: usize = 5;
+/// The simulation that a log is compared with.
+#[derive(Debug, Clone, Copy)]
+pub struct Nominal<'a> {
+    /// Its base parameters.
+    pub theta: &'a [f64],
+    /// Whether these were identified along a log which the model does not explain: what differs from them may have been wrong
+    /// there, and no change is sure.
+    pub is_doubtful: bool,
+}
+
+impl<'a> Nominal<'a> {
+    /// A simulation that is as it says.
+    pub fn certain(theta: &'a [f64]) -> Self {
+        Self { theta, is_doubtful: false }
+    }
+}
+
 /// Every base parameter in the simulation and in the data, beside the causes that were found in these.
 pub fn moved(simulation: &[f64], data: &[BaseParameter]) -> Vec<Moved> {
     let pairs = simulation.iter().zip(data);

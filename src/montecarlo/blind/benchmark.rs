@@ -8,7 +8,9 @@ use super::family::{Family, Judged, kin};
 use super::plan::BlindPlan;
 use super::record::{Answer, HeldOutGain, Record, Records};
 use crate::diagnose::candidates::Candidate;
-use crate::diagnose::{DiagnoseError, Diagnoser, Diagnosis, HeldOut, Kind, Validation, candidates};
+use crate::diagnose::{
+    DiagnoseError, Diagnoser, Diagnosis, HeldOut, Kind, Nominal, Validation, candidates,
+};
 use crate::dynamics::Model;
 use crate::identify::Measurement;
 use crate::montecarlo::trials::{Content, Difference, Trials};
@@ -122,7 +124,8 @@ impl BlindWorker<'_> {
         self.log = Measured::like(&drawn.simulation.recording);
         drawn.simulation.log_into(trial, &mut self.log)?;
         let held_out = self.held_out(&drawn)?;
-        let simulation = drawn.case.against_simulation.then_some(&benchmark.simulation[..]);
+        let simulation =
+            drawn.case.against_simulation.then(|| Nominal::certain(&benchmark.simulation));
         let diagnosis = self
             .diagnose(benchmark.dictionary(&drawn.case), held_out.as_ref(), simulation)
             .map_err(|source| BlindError::Diagnose {
@@ -148,7 +151,7 @@ impl BlindWorker<'_> {
         &self,
         families: Vec<Box<dyn Candidate>>,
         held_out: Option<&Recording>,
-        simulation: Option<&[f64]>,
+        simulation: Option<Nominal>,
     ) -> Result<Diagnosis, DiagnoseError> {
         let Benchmark { plan, model, .. } = self.benchmark;
         let Scenario { arm, set, processing, .. } = &plan.base;
