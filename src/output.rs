@@ -101,7 +101,8 @@ pub fn check_outputs(
     Ok(())
 }
 
-/// The file that `path` names, by whatever links, there already or not; `None` of a device, which nothing takes the place of.
+/// The file that `path` names, by whatever links, there already or not; `None` of what nothing can take the place of: a device, a
+/// folder, a file that cannot be written.
 fn place(path: &Path) -> Option<PathBuf> {
     match Target::find(path).ok()? {
         Target::Device => None,

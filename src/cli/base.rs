@@ -49,8 +49,8 @@ struct Term<'a> {
 
 /// Runs the command.
 pub fn run(args: &BaseArgs) -> CommandResult {
-    check_outputs(&args.json, [&args.robot])?;
     let LoadedArm { arm, files, .. } = load_robot(&args.robot)?;
+    check_outputs(&args.json, &files)?;
     let parameterisation = match &args.reduced {
         Some(name) => Parameterisation::reduced(name, &arm)?,
         None => Parameterisation::full(arm.dof(), arm.torque_offsets),

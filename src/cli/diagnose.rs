@@ -57,22 +57,21 @@ pub struct DiagnoseArgs {
 
 /// Runs the command.
 pub fn run(args: &DiagnoseArgs) -> CommandResult {
-    let extended = args.extended_scenario.iter().flat_map(|path| Scenario::files_of(path));
-    let outputs = [&args.json, &args.report].into_iter().flatten().cloned().chain(extended);
-    let logs = args.logs.iter().chain(&args.held_out).chain(&args.sim).map(PathBuf::as_path);
-    check_outputs(outputs, args.source.files().chain(logs))?;
-    if args.known_payload_kg.is_some() && args.logs.len() < 2 {
-        return Err("--known-payload needs two logs: without the body, and with it".into());
-    }
     if let [first, second] = &args.logs[..] {
         eprintln!(
-            "note: {} is asked what its flange carries beside {}; several logs of one arm are for `armid identify`",
+            "note: {} is compared with {} for what its flange carries; several logs of one arm are for `armid identify`",
             second.display(),
             first.display()
         );
     }
     let options = args.processing.options()?;
     let (arm, mut inputs) = args.source.arm()?;
+    let extended = args.extended_scenario.iter().flat_map(|path| Scenario::files_of(path));
+    let logs = args.logs.iter().chain(&args.held_out).chain(&args.sim);
+    check_outputs(
+        [&args.json, &args.report].into_iter().flatten().cloned().chain(extended),
+        inputs.iter().map(|input| &input.path).chain(logs),
+    )?;
     let set = BaseSet::find(&arm, Parameterisation::full(arm.dof(), arm.torque_offsets))?;
     let model = Model::new(&arm);
     let logs = args.source.read(&arm, &args.logs)?;
@@ -110,13 +109,7 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
         }
         finding => finding?,
     };
-    if let Some(Simulated { warning: Some(warning), is_doubtful, .. }) = simulation {
-        match is_doubtful {
-            // Whatever is said next rests on it.
-            true => finding.diagnosis.sentences.insert(0, warning),
-            false => finding.diagnosis.warnings.push(warning),
-        }
-    }
+    finding.diagnosis.warnings.extend(simulation.and_then(|simulation| simulation.warning));
     // What fails behind the diagnosis must not take it along: it is told when all else is printed and written.
     let mut failed = None;
     if let Some(loaded) = logs.get(1) {
@@ -192,19 +185,18 @@ fn decline(
     error: &DiagnoseError,
     program: Program,
 ) -> CommandResult {
-    let sentence = match error {
-        DiagnoseError::Identify(error) => format!(
-            "{}: declined, {error}; without the rigid model there is nothing to diagnose; `armid excite` plans a motion that \
-             identifies it",
-            log.source
-        ),
-        error => error.to_string(),
-    };
+    let sentence = error.declined(&log.source);
     say!("{sentence}");
     let rows = Rows::of(&[log]);
     if let Some(path) = &args.json {
-        let (log, verdict) = (&log.source, "declined");
-        let body = Declined { log, verdict, sentences: [&sentence], rows: &rows };
+        let body = Declined {
+            log: &log.source,
+            verdict: "declined",
+            causes: [],
+            sentences: [&sentence],
+            warnings: log_warnings(log).collect(),
+            rows: &rows,
+        };
         Document { schema: DIAGNOSE_SCHEMA, program: &program, body: &body }.write(path)?;
     }
     if let Some(path) = &args.report {
@@ -221,7 +213,9 @@ fn decline(
 struct Declined<'a> {
     log: &'a str,
     verdict: &'static str,
+    causes: [(); 0],
     sentences: [&'a str; 1],
+    warnings: Vec<String>,
     rows: &'a Rows,
 }
 

@@ -368,8 +368,8 @@ fn print_summary(base: &BaseSet, spec: &Specification, found: &Design, seconds: 
         100.0 * p.relative_quantile(0.9),
     );
     say!(
-        "{} base parameters; what is left to each limit, the least share of it first (of clearance, beyond the {} m asked for, of \
-         0.1 m; the arm is as described, without a tool that the description does not have):",
+        "{} base parameters; margins, the smallest share of a limit first (of clearance: what is left beyond {} m, over 0.1 m; a tool \
+         that the robot's description lacks is not kept clear):",
         base.rank(),
         spec.requirements.clearance_m
     );

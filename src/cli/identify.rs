@@ -12,7 +12,7 @@ use crate::identify::covariance::CovarianceKind;
 use crate::identify::physical::{self, PhysicalOptions, PriorMetric, PriorWeight};
 use crate::identify::{
     Estimator, FitError, Identification, Identifier, IdentifyError, Measurement, Options,
-    Regression, Several, each_alone, pooled,
+    Regression, Several, dead_feed_forward, each_alone, pooled,
 };
 use crate::log::{Layout, Log, read_log};
 use crate::output::check_outputs;
@@ -66,13 +66,6 @@ pub struct SourceArgs {
     /// Layout of the logs: a built-in name or a .toml file.
     #[arg(long, default_value = "armid")]
     pub layout: String,
-}
-
-impl SourceArgs {
-    /// What may be files.
-    pub(super) fn files(&self) -> impl Iterator<Item = &Path> {
-        [&self.robot, &self.layout].into_iter().map(Path::new)
-    }
 }
 
 /// How logs are processed.
@@ -172,13 +165,12 @@ impl SourceArgs {
 
 /// Runs the command.
 pub fn run(args: &IdentifyArgs) -> CommandResult {
-    let outputs = [&args.json, &args.report].into_iter().flatten();
-    check_outputs(outputs, {
-        let logs = args.logs.iter().chain(&args.validate).map(PathBuf::as_path);
-        args.source.files().chain(logs)
-    })?;
     let options = args.processing.options()?;
     let (arm, mut inputs) = args.source.arm()?;
+    check_outputs(
+        [&args.json, &args.report].into_iter().flatten(),
+        inputs.iter().map(|input| &input.path).chain(&args.logs).chain(&args.validate),
+    )?;
     let parameterisation = match &args.reduced {
         Some(name) => Parameterisation::reduced(name, &arm)?,
         None => Parameterisation::full(arm.dof(), arm.torque_offsets),
@@ -317,11 +309,7 @@ fn validate(
         None => None,
     };
     let mut validation = Validation::new(&log.log, &regression, manufacturer.as_ref(), theta);
-    validation.warnings.extend(dead.map(|joint| {
-        format!(
-            "{}: the manufacturer's torque of joint {joint} is the same in every row; nothing is compared with it",
-            log.log.source
-        )
-    }));
+    let named = |joint| format!("{}: {}", log.log.source, dead_feed_forward(joint));
+    validation.warnings.extend(dead.map(named));
     Ok(validation)
 }

@@ -134,9 +134,14 @@ fn run_merge(folders: &[PathBuf], output: &OutputArgs) -> CommandResult {
 }
 
 fn run_trials(args: &RunArgs) -> CommandResult {
-    args.output.check(args.scenario.as_slice())?;
     let mut job = Job::load(args.scenario.as_deref())?;
     let scenario = job.scenario_mut();
+    args.output.check(&[args.scenario.as_slice(), &scenario.files].concat())?;
+    if let Some(file) = args.out.as_ref().filter(|folder| folder.is_file()) {
+        return Err(
+            format!("{}: this is a file; name a folder for the shard", file.display()).into()
+        );
+    }
     let inputs = inputs(args.scenario.iter().chain(&scenario.files))?;
     scenario.seed = args.seed.unwrap_or(scenario.seed);
     eprintln!("{}: {}", scenario.name, scenario.description);
@@ -176,13 +181,6 @@ fn run_all<T: Trials>(experiment: &T, args: &RunArgs) -> Timed<Merged<T::Content
     let trials = args.trials.unwrap_or(experiment.scenario().trials);
     let range = args.shard.map_or(0..trials, |s| shard_range(trials, s.index, s.count));
     if let Some(folder) = &args.out {
-        if folder.is_file() {
-            return Err(format!(
-                "{}: this is a file; name a folder for the shard",
-                folder.display()
-            )
-            .into());
-        }
         std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
         check_writable(&shard_path(folder, &range))?;
     }

@@ -81,12 +81,12 @@ fn size(simulation: &Simulation) -> Result<Option<EffectSize>, crate::plant::Pla
 
 /// Runs the command.
 pub fn run(args: &SimulateArgs) -> CommandResult {
+    let mut scenario = Scenario::load(args.scenario.as_deref())?;
     let robot = args.robot.as_ref().map(PathBuf::from);
     check_outputs(
         [Some(&args.out), args.truth.as_ref()].into_iter().flatten(),
-        robot.iter().chain(&args.scenario).chain(&args.arm),
+        robot.iter().chain(&args.scenario).chain(&args.arm).chain(&scenario.files),
     )?;
-    let mut scenario = Scenario::load(args.scenario.as_deref())?;
     let mut robot_files = Vec::new();
     if let Some(path) = &args.arm {
         let ArmResult { arm, offsets_nm, files, .. } =

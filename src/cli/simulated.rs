@@ -17,9 +17,9 @@ use crate::robot::{Arm, Kinematics};
 pub(super) struct Simulated {
     /// Base parameters.
     theta: Vec<f64>,
-    /// Whether they are of a log that the model does not explain.
-    pub(super) is_doubtful: bool,
-    /// What should be known of it.
+    /// Why they are doubtful, if they are.
+    doubt: Option<String>,
+    /// What else should be known of it.
     pub(super) warning: Option<String>,
 }
 
@@ -42,7 +42,7 @@ impl Simulated {
             }
             let has_effects = !scenario.effects.is_empty();
             return Ok(Self {
-                is_doubtful: false,
+                doubt: None,
                 theta: set.values(&Model::new(&scenario.arm).standard_parameters()),
                 warning: has_effects.then(|| {
                     format!("{name}: its arm alone is compared with, not its [[effect]] tables")
@@ -55,13 +55,13 @@ impl Simulated {
                 fault => not_a_simulation(file, &fault),
             })?;
         result.about.check(arm).map_err(|other| format!("{name}: {other}"))?;
-        if result.program.inputs.iter().any(|input| input.sha256 == sha256) {
+        let is_itself = |input: &SavedInput| input.sha256 == sha256 && input.path == result.log;
+        if result.program.inputs.iter().any(is_itself) {
             let message = "it was identified from the log that is diagnosed: nothing could differ but what the model gets wrong; \
                            compare another log with it, or leave --sim out";
             return Err(format!("{name}: {message}").into());
         }
-        let is_doubtful = result.intervals.trusted == Some(false);
-        let warning = is_doubtful.then(|| {
+        let doubt = (result.intervals.trusted == Some(false)).then(|| {
             format!(
                 "The model is wrong along the log of which {name} is, so that what differs from it here may have been wrong there; \
                  `armid diagnose` of that log names the cause."
@@ -73,12 +73,12 @@ impl Simulated {
             found.map(|p| p.value).ok_or_else(|| format!("{name}: no base parameter {parameter}"))
         };
         let theta = (0..set.rank()).map(parameter).collect::<Result<_, _>>()?;
-        Ok(Self { theta, is_doubtful, warning })
+        Ok(Self { theta, doubt, warning: None })
     }
 
     /// What a diagnosis compares with.
     pub(super) fn nominal(&self) -> Nominal<'_> {
-        Nominal { theta: &self.theta, is_doubtful: self.is_doubtful }
+        Nominal { theta: &self.theta, doubt: self.doubt.as_deref() }
     }
 }
 
@@ -96,6 +96,8 @@ fn not_a_simulation(file: &Path, why: &dyn std::fmt::Display) -> String {
 struct IdentifiedParameters {
     #[serde(flatten)]
     about: SavedRobot,
+    #[serde(default)]
+    log: String,
     base_parameters: Vec<IdentifiedParameter>,
     #[serde(default)]
     intervals: Intervals,
@@ -110,6 +112,7 @@ struct SavedProgram {
 
 #[derive(Deserialize)]
 struct SavedInput {
+    path: String,
     sha256: String,
 }
 

@@ -28,7 +28,7 @@ pub(super) struct PaperArgs {
 }
 
 pub(super) fn run(args: &PaperArgs) -> CommandResult {
-    args.output.check(std::slice::from_ref(&args.scenario))?;
+    args.output.check(&[args.scenario.clone(), args.validation.clone().into()])?;
     let inputs = vec![Input::of(&args.scenario)?];
     let scenario = Scenario::load(Some(&args.scenario))?;
     let validation = FourierSeries::load(&args.validation)?;

@@ -59,9 +59,13 @@ const LAYOUTS: [&str; 2] = ["ur10e_innopolis", "ur10e_innopolis_author"];
 
 /// Runs the command.
 pub(super) fn run(args: &RealArmArgs) -> CommandResult {
-    check_outputs([&args.markdown, &args.report].into_iter().flatten(), [&args.data])?;
     let inside = args.data.join("ur10e");
     let folder = if inside.is_dir() { inside } else { args.data.clone() };
+    let logs = HELD_OUT.iter().chain(&SECOND_PAIR).chain(&CONTACTS).chain([&TRAINING, &LOADED]);
+    check_outputs(
+        [&args.markdown, &args.report].into_iter().flatten(),
+        logs.map(|log| folder.join(log)),
+    )?;
     let sources = LAYOUTS.map(|layout| SourceArgs { robot: "ur10e".into(), layout: layout.into() });
     let (arm, _) = sources[0].arm()?;
     let set = BaseSet::find(&arm, Parameterisation::full(arm.dof(), arm.torque_offsets))?;

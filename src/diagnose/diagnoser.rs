@@ -164,7 +164,7 @@ impl<'a> Diagnoser<'a> {
             });
             let found: Vec<Found> = found.collect();
             let mut explained = against::explain(&study, self.set, simulation.theta, &found);
-            if simulation.is_doubtful {
+            if simulation.doubt.is_some() {
                 explained.causes.iter_mut().for_each(Cause::make_provisional);
             }
             causes.retain(|c| !explained.judged.contains(&(c.kind, c.joint)));
@@ -263,6 +263,10 @@ impl<'a> Diagnoser<'a> {
         let laws: Vec<Option<usize>> =
             extension.effects.iter().map(|effect| effect.site.map(|j| j + 1)).collect();
         diagnosis.sentences = diagnosis.in_sentences(&laws);
+        if let Some(doubt) = simulation.and_then(|simulation| simulation.doubt) {
+            // Whatever is said next rests on it.
+            diagnosis.sentences.insert(0, doubt.to_owned());
+        }
         let nominal = self.set.values(&Model::new(self.arm).standard_parameters());
         // What touched the arm, and friction that the null model lacks, bend its gravity.
         let theta = &extension.theta;

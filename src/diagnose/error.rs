@@ -36,7 +36,7 @@ pub enum DiagnoseError {
     /// A parameter's column vanishes in the whitened equations.
     #[error(
         "{log}: declined, the motion does not excite {parameter}: without the rigid model there is nothing to \
-         diagnose; `armid identify` names all that is not excited, `armid excite` plans a motion that does"
+         diagnose; {WHAT_TO_DO}"
     )]
     NotExcited {
         /// The log.
@@ -46,7 +46,19 @@ pub enum DiagnoseError {
     },
 }
 
+/// What helps where a motion tells too little.
+const WHAT_TO_DO: &str =
+    "`armid identify` names all that is not excited, `armid excite` plans a motion that excites it";
+
 impl DiagnoseError {
+    /// The sentence about the log `log` whose motion tells too little.
+    pub fn declined(&self, log: &str) -> String {
+        match self {
+            Self::Identify(error) => format!("{log}: declined, {error}; {WHAT_TO_DO}"),
+            error => error.to_string(),
+        }
+    }
+
     /// Whether the log is sound, but its motion does not identify what was asked for.
     pub fn is_about_the_motion(&self) -> bool {
         let of_the_fit = |error: &IdentifyError| {

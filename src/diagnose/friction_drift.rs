@@ -20,7 +20,6 @@ const FADES: f64 = 0.25;
 const COLUMNS: usize = 4;
 
 /// What drifting friction may do to the deviations of every joint.
-#[derive(Clone)]
 pub struct FrictionDrift {
     qd_rad_s: JointSignals,
     /// f(t) − f̄ of both courses, per sample.

@@ -18,6 +18,7 @@ use super::whitening::{RunWhitening, Whitening};
 use crate::base::BaseSet;
 use crate::identify::{
     Identifier, IdentifyError, MOVING_RAD_S, Measurement, Options, Problem, Regression,
+    dead_feed_forward,
 };
 use crate::robot::{Arm, JointSignals};
 
@@ -88,11 +89,14 @@ pub(super) fn held_out_gain(
         let of = |j: usize| without_friction_of(problem, set, j, e.joint(j), &rows.moves[j]);
         (0..joints).map(of).collect()
     };
+    let mut warnings = regression.prepared.warnings.clone();
     let manufacturer = match log.manufacturer_nm {
         Some(torque_nm) => {
             match identifier.regression(&Measurement { torque_nm, ..log.measurement }) {
-                // Feed-forward that is not recorded says nothing.
-                Err(IdentifyError::DeadTorque { .. }) => None,
+                Err(IdentifyError::DeadTorque { joint, .. }) => {
+                    warnings.push(dead_feed_forward(joint));
+                    None
+                }
                 regression => {
                     let given = regression?;
                     let of = |j: usize| mean_period(&given.problem.panels[j].y, samples);
@@ -107,7 +111,7 @@ pub(super) fn held_out_gain(
     let (before, after) = (error(models.null), error(extension));
     Ok(HeldOut {
         log: log.measurement.source.to_owned(),
-        warnings: regression.prepared.warnings.clone(),
+        warnings,
         standstill_fraction: rows.standstill_fractions(),
         before_rms_nm: all(&before),
         after_rms_nm: all(&after),

@@ -14,8 +14,8 @@ use crate::robot::{Arm, CellBox};
 /// Two capsules with segments S₁, S₂ and radii r₁, r₂ are d = dist(S₁, S₂) − r₁ − r₂ apart; d < 0 is
 /// the depth by which they overlap (as long as the segments do not cross, where d = −r₁ − r₂). The
 /// distance of a capsule from the floor at z_f is min(z of its ends) − r − z_f. What no motion brings
-/// nearer is left out: the base, a capsule of the first body along its axis, and beside the floor all of a first body that turns
-/// about the vertical. A capsule whose segment enters a box is −r from it.
+/// nearer is left out: the base, a capsule of the first body along its axis, and of a first body that turns about the vertical the
+/// floor and what lies under it. A capsule whose segment enters a box is −r from it.
 ///
 /// Immutable; what changes is in [`ClearanceWorkspace`].
 #[derive(Debug, Clone)]
@@ -46,6 +46,18 @@ impl Shape {
     fn moves(&self) -> bool {
         let is_off_axis = |end: &Vector3<f64>| end.x.hypot(end.y) > ON_AXIS;
         self.body >= 2 || self.body == 1 && self.ends_m.iter().any(is_off_axis)
+    }
+}
+
+impl Shape {
+    /// Whether all that it sweeps, turning about the vertical through `axis_m`, lies above or below `cell_box`: a table under the arm.
+    fn stays_over(&self, cell_box: &CellBox, axis_m: &Vector3<f64>) -> bool {
+        let far = self.ends_m.iter().map(|end| end.x.hypot(end.y)).fold(0.0, f64::max);
+        let reach_m = far + self.radius_m;
+        let holds = |i: usize| {
+            cell_box.low_m[i] <= axis_m[i] - reach_m && axis_m[i] + reach_m <= cell_box.high_m[i]
+        };
+        holds(0) && holds(1)
     }
 }
 
@@ -80,13 +92,18 @@ impl ClearanceModel {
             .collect::<Vec<_>>();
         let moving: Vec<usize> = (0..capsules.len()).filter(|&c| capsules[c].moves()).collect();
         let boxes = arm.clearance.boxes.clone();
-        let box_pairs =
-            (0..boxes.len()).flat_map(|b| moving.iter().map(move |&c| [c, b])).collect();
         let is_upright = arm.joints.first().is_some_and(|first| {
             let axis = first.placement.rotation.column(2);
             axis.x.hypot(axis.y) < ON_AXIS
         });
         let rises = |c: &usize| capsules[*c].body >= 2 || !is_upright;
+        let axis_m = arm.joints.first().map_or(Vector3::zeros(), |j| j.placement.translation_m);
+        let nears = |c: usize, b: &CellBox| rises(&c) || !capsules[c].stays_over(b, &axis_m);
+        let pairs = |(number, b): (usize, &CellBox)| {
+            let near = moving.iter().copied().filter(|c| nears(*c, b));
+            near.map(|c| [c, number]).collect::<Vec<_>>()
+        };
+        let box_pairs = boxes.iter().enumerate().flat_map(pairs).collect();
         let floor = match arm.clearance.floor_z_m {
             Some(_) => moving.iter().copied().filter(rises).collect(),
             None => Vec::new(),
@@ -345,6 +362,12 @@ mod tests {
             high_m: Vector3::new(0.5, 1.0, 1.0),
         });
         assert_eq!(watched(&arm), [true, false]);
+        // No turn brings it nearer to a table.
+        let table =
+            CellBox { low_m: Vector3::new(-1.0, -1.0, -0.5), high_m: Vector3::new(1.0, 1.0, 0.0) };
+        let aside = std::mem::replace(&mut arm.clearance.boxes[0], table);
+        assert_eq!(watched(&arm), [false, false]);
+        arm.clearance.boxes[0] = aside;
         let tilt = Rotation3::from_axis_angle(&Vector3::x_axis(), 0.5);
         arm.joints[0].placement.rotation = tilt.matrix() * arm.joints[0].placement.rotation;
         assert_eq!(watched(&arm), [true, true]);

@@ -89,8 +89,10 @@ impl GravityMatch {
         }
         let far =
             format!("gravity torque is {ratio:.2} times what the description of {robot} says");
-        Some(if ratio + doubt < 0.0 {
-            format!("{far}: torques or angles are logged with the other sign")
+        Some(if (1.0 / OFF..OFF).contains(&-ratio) {
+            format!(
+                "{far}: torques or angles are logged with the other sign, or the arm hangs upside down and its description does not"
+            )
         } else if body_kg > 0.0 && left < LEFT {
             format!(
                 "{far}: a body of {body_kg:.1} kg on the flange would explain it, or drive gains that are off"

@@ -73,7 +73,10 @@ pub fn page(
     let mut page = Page::new("Excitation", subtitle, verdict, program);
     let mut section = Section::new("The motion")
         .figure(motion.against_limits(arm, 0)?, "Angles; dashed: limits.")
-        .figure(motion.against_limits(arm, 1)?, "Velocities; dashed: limits.")
+        .figure(
+            motion.against_limits(arm, 1)?,
+            "Velocities; dashed: what the motion may use of the limits.",
+        )
         .figure(motion.against_limits(arm, 2)?, "Accelerations; dashed: limits.");
     if is_watched {
         let caption = "Smallest distances over one period; dashed: what is required.";

@@ -13,10 +13,15 @@ use crate::output::write_atomically;
 /// A file that was read.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Input {
-    /// Path as the user gave it.
+    /// Path as the user gave it; in the document what Unicode has of it.
+    #[serde(serialize_with = "as_text")]
     pub path: PathBuf,
     /// SHA-256 of its contents, 64 lowercase hexadecimal digits.
     pub sha256: String,
+}
+
+fn as_text<S: serde::Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&path.to_string_lossy())
 }
 
 impl Input {

@@ -31,15 +31,15 @@ const RIVALS: usize = 5;
 pub struct Nominal<'a> {
     /// Its base parameters.
     pub theta: &'a [f64],
-    /// Whether these were identified along a log which the model does not explain: what differs from them may have been wrong
-    /// there, and no change is sure.
-    pub is_doubtful: bool,
+    /// What is said first where these were identified along a log which the model does not explain: what differs from them may
+    /// have been wrong there, and no change is sure.
+    pub doubt: Option<&'a str>,
 }
 
 impl<'a> Nominal<'a> {
     /// A simulation that is as it says.
     pub fn certain(theta: &'a [f64]) -> Self {
-        Self { theta, is_doubtful: false }
+        Self { theta, doubt: None }
     }
 }
 

@@ -126,7 +126,7 @@ pub enum CovarianceError {
     },
     /// Needs a longer record.
     #[error(
-        "{seconds:.1} s of motion without a gap are too short for a σ from blocks of time; at least {needed_s} s are needed"
+        "{seconds:.2} s of motion without a gap are too short for this kind of σ; at least {needed_s:.2} s are needed"
     )]
     TooShort {
         /// Length of the record, s.

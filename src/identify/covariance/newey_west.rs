@@ -25,14 +25,13 @@ impl CovarianceMethod for NeweyWest {
         }
         let scores = time_scores(problem, fit);
         let (instants, b) = scores.shape();
+        if instants <= b {
+            let [seconds, needed_s] = [instants, b + 1].map(|rows| rows as f64 / problem.rate_hz);
+            return Err(CovarianceError::TooShort { seconds, needed_s });
+        }
         let lags = self.lags.unwrap_or_else(|| andrews(&scores)).min(instants / 2);
         let omega = bartlett(&scores, lags);
         let periods = problem.periods as f64;
-        if instants <= b {
-            let seconds = instants as f64 * periods / problem.rate_hz;
-            let needed_s = (b + 1) as f64 * periods / problem.rate_hz;
-            return Err(CovarianceError::TooShort { seconds, needed_s });
-        }
         let t = instants as f64;
         let correction = t / (t - b as f64) / (periods * periods);
         Ok(Covariance {

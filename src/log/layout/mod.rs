@@ -228,8 +228,7 @@ mod tests {
     fn the_example_is_whole_and_valid() {
         let text = include_str!("../../../layouts/example.toml");
         let layout = Layout::from_toml(text, "example.toml").unwrap();
-        let optional = [Block::Current, Block::Torque, Block::TargetMoment, Block::Temperature];
-        assert!(optional.iter().all(|block| layout.columns(*block).is_some()));
+        assert!(Block::ALL.iter().all(|block| layout.columns(*block).is_some()));
         assert_eq!(layout.units.factor(Block::Time), Some(1e-3));
     }
 

@@ -167,7 +167,7 @@ impl RealArmStudy {
         let named = bare.iter().filter(|pair| pair.finding.is_named).count();
         let known = loaded.first().and_then(|pair| pair.known_kg).unwrap_or(f64::NAN);
         format!(
-            "The body that weighs {known} kg is found as (± one σ) {}; a body is found on {named} of {} runs without one.",
+            "The body that weighs {known} kg is found (± one σ) to weigh {}; a body is found on {named} of {} runs without one.",
             masses.join(", "),
             bare.len()
         )
