@@ -12,7 +12,7 @@ use crate::identify::covariance::CovarianceKind;
 use crate::identify::physical::{self, PhysicalOptions, PriorMetric, PriorWeight};
 use crate::identify::{
     Estimator, FitError, Identification, Identifier, IdentifyError, Measurement, Options,
-    Regression, Several, dead_feed_forward, each_alone, pooled,
+    Regression, Several, each_alone, pooled,
 };
 use crate::log::{Layout, Log, read_log};
 use crate::output::check_outputs;
@@ -294,22 +294,16 @@ fn validate(
     theta: &[f64],
 ) -> Result<Validation, Box<dyn std::error::Error>> {
     let regression = identifier.regression(&log.measurement())?;
-    let mut dead = None;
+    let mut warnings = Vec::new();
     let manufacturer = match log.log.target_torque_nm(arm)? {
         Some(torque_nm) => {
-            let measurement = Measurement { torque_nm: &torque_nm, ..log.measurement() };
-            match identifier.regression(&measurement) {
-                Err(IdentifyError::DeadTorque { joint, .. }) => {
-                    dead = Some(joint);
-                    None
-                }
-                regression => Some(regression?),
-            }
+            let given = Measurement { torque_nm: &torque_nm, ..log.measurement() };
+            identifier.feed_forward(&given, &mut warnings)?
         }
         None => None,
     };
     let mut validation = Validation::new(&log.log, &regression, manufacturer.as_ref(), theta);
-    let named = |joint| format!("{}: {}", log.log.source, dead_feed_forward(joint));
-    validation.warnings.extend(dead.map(named));
+    let with_name = |warning| format!("{}: {warning}", log.log.source);
+    validation.warnings.extend(warnings.into_iter().map(with_name));
     Ok(validation)
 }

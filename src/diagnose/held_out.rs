@@ -16,10 +16,7 @@ use super::scene::Scene;
 use super::verdict::HeldOut;
 use super::whitening::{RunWhitening, Whitening};
 use crate::base::BaseSet;
-use crate::identify::{
-    Identifier, IdentifyError, MOVING_RAD_S, Measurement, Options, Problem, Regression,
-    dead_feed_forward,
-};
+use crate::identify::{Identifier, MOVING_RAD_S, Measurement, Options, Problem, Regression};
 use crate::robot::{Arm, JointSignals};
 
 /// A log that no model has seen, to measure gains on.
@@ -92,19 +89,12 @@ pub(super) fn held_out_gain(
     let mut warnings = regression.prepared.warnings.clone();
     let manufacturer = match log.manufacturer_nm {
         Some(torque_nm) => {
-            match identifier.regression(&Measurement { torque_nm, ..log.measurement }) {
-                Err(IdentifyError::DeadTorque { joint, .. }) => {
-                    warnings.push(dead_feed_forward(joint));
-                    None
-                }
-                regression => {
-                    let given = regression?;
-                    let of = |j: usize| mean_period(&given.problem.panels[j].y, samples);
-                    let given: Vec<Vec<f64>> = (0..joints).map(of).collect();
-                    let error = |j: usize, k: usize| measured[j][k] - given[j][k];
-                    Some(JointSignals::from_fn(joints, samples, error))
-                }
-            }
+            let given = Measurement { torque_nm, ..log.measurement };
+            identifier.feed_forward(&given, &mut warnings)?.map(|given| {
+                let of = |j: usize| mean_period(&given.problem.panels[j].y, samples);
+                let given: Vec<Vec<f64>> = (0..joints).map(of).collect();
+                JointSignals::from_fn(joints, samples, |j, k| measured[j][k] - given[j][k])
+            })
         }
         None => None,
     };

@@ -47,9 +47,7 @@ impl Shape {
         let is_off_axis = |end: &Vector3<f64>| end.x.hypot(end.y) > ON_AXIS;
         self.body >= 2 || self.body == 1 && self.ends_m.iter().any(is_off_axis)
     }
-}
 
-impl Shape {
     /// Whether all that it sweeps, turning about the vertical through `axis_m`, lies above or below `cell_box`: a table under the arm.
     fn stays_over(&self, cell_box: &CellBox, axis_m: &Vector3<f64>) -> bool {
         let far = self.ends_m.iter().map(|end| end.x.hypot(end.y)).fold(0.0, f64::max);

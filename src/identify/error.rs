@@ -84,10 +84,3 @@ pub enum IdentifyError {
     #[error(transparent)]
     Covariance(#[from] CovarianceError),
 }
-
-/// What is said of a manufacturer's torque that is no feed-forward, of joint `joint` (from 1).
-pub fn dead_feed_forward(joint: usize) -> String {
-    format!(
-        "the manufacturer's torque of joint {joint} is the same in every row; nothing is compared with it"
-    )
-}

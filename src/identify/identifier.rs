@@ -174,6 +174,27 @@ impl<'a> Identifier<'a> {
         self.solve(prepared, instruments.as_ref())
     }
 
+    /// `m`, whose torque is the manufacturer's feed-forward, laid out for regression; none where that is the same in every row
+    /// of a joint that moves, which is then told in the `warnings`.
+    ///
+    /// # Errors
+    /// As [`Self::regression`].
+    pub fn feed_forward(
+        &mut self,
+        m: &Measurement,
+        warnings: &mut Vec<String>,
+    ) -> Result<Option<Regression>, IdentifyError> {
+        match self.regression(m) {
+            Err(IdentifyError::DeadTorque { joint, .. }) => {
+                warnings.push(format!(
+                    "the manufacturer's torque of joint {joint} is the same in every row; nothing is compared with it"
+                ));
+                Ok(None)
+            }
+            regression => regression.map(Some),
+        }
+    }
+
     /// Lays a log out for regression without solving: for validation and diagnosis.
     pub fn regression(&mut self, m: &Measurement) -> Result<Regression, IdentifyError> {
         let (prepared, first_sample, every) = self.fill_from(m, true)?;

@@ -31,7 +31,7 @@ pub use columns::ColumnPlan;
 pub use course::Course;
 pub use drive_answers::{FEEDBACK_RAD_S, drive_answers, feedback_per_tick};
 pub use drive_limits::drive_limit_remark;
-pub use error::{IdentifyError, dead_feed_forward};
+pub use error::IdentifyError;
 pub use estimation::{Estimate, Estimation, MotionAids};
 pub use even::BetweenRows;
 pub use fit::{Estimator, Fit, FitError, Fitter, Weighting};

@@ -72,14 +72,15 @@ pub fn between_periods(m: &Measurement, left_out: &[usize]) -> Result<Compared, 
         let qd_rad_s = grid.instants().smooth(m.qd_rad_s)?.slice(window.clone());
         Ok(FrictionDrift::beside_others(qd_rad_s, period))
     };
-    repeats.moves = repeats.find_moves(q_rad, drift)?;
+    let (moves, of_moves) = repeats.find_moves(q_rad, drift)?;
+    repeats.moves = moves;
     let time_s = grid.time_s();
     let mut touches: Vec<Touch> = Vec::new();
     let mut known: Vec<Push> = Vec::new();
     let mut looked_at: Vec<Range<usize>> = Vec::new();
     let mut aside = vec![false; time_s.len()];
     if repeats.search(&aside, &known, &looked_at, 1.0)?.is_some() {
-        repeats.drift = Some(drift()?);
+        repeats.drift = Some(of_moves.map_or_else(drift, Ok)?);
     }
     while looked_at.len() < MOST
         && let Some(candidate) = repeats.search(&aside, &known, &looked_at, 1.0)?

@@ -43,12 +43,12 @@ impl Move {
 
 impl Repeats {
     /// Where the angles `q_rad` differ from those of the other periods as noise does not, nor the `drift` of friction to which
-    /// drives yield.
+    /// drives yield; and that, if it had to be made.
     pub(super) fn find_moves(
         &self,
         q_rad: JointSignals,
         drift: impl FnOnce() -> Result<FrictionDrift, SignalError>,
-    ) -> Result<Vec<Move>, SignalError> {
+    ) -> Result<(Vec<Move>, Option<FrictionDrift>), SignalError> {
         let mut angles = Self {
             signals: q_rad,
             // What turns at 3 rad/s² bends by 24 µrad between samples at 125 Hz: as much as encoders scatter.
@@ -68,7 +68,7 @@ impl Repeats {
         angles.joints =
             (0..self.joints.len()).filter(scatters).map(|row| self.joints[row]).collect();
         if angles.search(&aside, &[], &[], CLEARLY)?.is_none() {
-            return Ok(Vec::new());
+            return Ok((Vec::new(), None));
         }
         angles.drift = Some(drift()?);
         let mut seen: Vec<Range<usize>> = Vec::new();
@@ -84,11 +84,11 @@ impl Repeats {
             let joints = found.felt.iter().map(|row| angles.joints[*row]).collect();
             match moves.iter().position(|m| are_near(&m.centres, &centres, 0)) {
                 Some(longer) => moves[longer].join(centres, joints),
-                None if moves.len() == MOST => return Ok(Vec::new()),
+                None if moves.len() == MOST => return Ok((Vec::new(), angles.drift)),
                 None => moves.push(Move { centres, joints }),
             }
         }
-        Ok(moves)
+        Ok((moves, angles.drift))
     }
 }
 
@@ -144,7 +144,8 @@ mod tests {
             moves: Vec::new(),
         };
         let qd_rad_s = qd_rad_s.slice(torques.window.clone());
-        torques.find_moves(q_rad, || Ok(FrictionDrift::beside_others(qd_rad_s, PERIOD))).unwrap()
+        let drift = || Ok(FrictionDrift::beside_others(qd_rad_s, PERIOD));
+        torques.find_moves(q_rad, drift).unwrap().0
     }
 
     /// Also of a period that is no whole number of samples: straight lines between them would be off by up to two σ of the noise.
