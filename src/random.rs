@@ -4,7 +4,8 @@
 //! trial k can be replayed alone, and results are the same bits for any number of threads and any
 //! split into shards. The generator is ChaCha8, which is counter-based: its 256-bit key is
 //! SHA-256("armid/random/1" ‖ seed ‖ trial ‖ scenario) and its 64-bit stream number holds the channel
-//! and the joint. Nothing else in the crate makes a generator from a seed.
+//! and the joint. No other generator has a say in what a trial is: those that choose starting points or test motions
+//! do so the same way each time.
 
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;

@@ -127,10 +127,12 @@ fn run_merge(folders: &[PathBuf], output: &OutputArgs) -> CommandResult {
     let schema = files.first().map(|file| schema_of(file)).transpose()?;
     if schema.as_deref() == Some(BlindContent::SCHEMA) {
         let merged = merge(load_all::<BlindContent>(&files)?)?;
-        return conclude_blind(&merged, inputs, output);
+        let outcome = conclude_blind(&merged, inputs, output)?;
+        return Ok(unless_interrupted(outcome, &merged));
     }
     let merged = merge(load_all::<Estimation>(&files)?)?;
-    conclude(&merged, merged.seconds, inputs, output)
+    let outcome = conclude(&merged, merged.seconds, inputs, output)?;
+    Ok(unless_interrupted(outcome, &merged))
 }
 
 fn run_trials(args: &RunArgs) -> CommandResult {

@@ -60,7 +60,8 @@ pub fn detection_limits(study: &Study, accepted: &Span) -> Vec<DetectionLimit> {
             let length = span.first_length();
             let is_told = sqrt_lambda < LARGEST
                 && length * length > ABSORBED_BESIDE * entry.images[0].square()
-                && coefficient < BEYOND_PHYSICS;
+                && coefficient < BEYOND_PHYSICS
+                && quantity.value.abs() < candidate.largest();
             out.push(DetectionLimit {
                 kind: candidate.kind(),
                 joint: site.map(|j| j + 1),

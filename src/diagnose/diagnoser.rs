@@ -100,6 +100,7 @@ impl<'a> Diagnoser<'a> {
         let torque_nm = touched.map_or(m.torque_nm, |t| &t.torque_nm);
         let m = &Measurement { torque_nm, ..*m };
         let mut regression = self.identifier.regression(m)?;
+        regression.prepared.count_filled(&record.filled);
         let identification = self.identifier.identify_regression(&regression)?;
         let measured_nm = measured_nm(&regression);
         let fit = &identification.fit;

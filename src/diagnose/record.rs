@@ -4,7 +4,7 @@ use super::kind::Kind;
 use super::verdict::Cause;
 use crate::identify::Measurement;
 use crate::robot::JointSignals;
-use crate::signal::{Filled, SignalError, fill_gaps};
+use crate::signal::{Filled, Gap, SignalError, fill_gaps};
 
 /// How far a joint may turn between two rows beyond what its speed says, rad.
 const TORN_RAD: f64 = 0.05;
@@ -61,6 +61,8 @@ pub struct Record {
     pub qd_rad_s: JointSignals,
     /// Torques, Nm.
     pub torque_nm: JointSignals,
+    /// Gaps that have rows of other periods now.
+    pub filled: Vec<Gap>,
 }
 
 impl Record {
@@ -76,6 +78,7 @@ impl Record {
             q_rad: of(m.q_rad),
             qd_rad_s: of(m.qd_rad_s),
             torque_nm: of(m.torque_nm),
+            filled: Vec::new(),
         }
     }
 
@@ -99,13 +102,13 @@ impl Record {
 
     /// Rows for its gaps, where the motion repeats; what a user should know of them.
     pub fn fill_gaps(&mut self) -> Result<Option<String>, SignalError> {
-        let Self { time_s, q_rad, qd_rad_s, torque_nm } = &*self;
+        let Self { time_s, q_rad, qd_rad_s, torque_nm, .. } = &*self;
         let Some(filled) = fill_gaps(time_s, q_rad, qd_rad_s, torque_nm)? else {
             return Ok(None);
         };
         let warning = filled.warning();
-        let Filled { time_s, q_rad, qd_rad_s, torque_nm, .. } = filled;
-        *self = Self { time_s, q_rad, qd_rad_s, torque_nm };
+        let Filled { time_s, q_rad, qd_rad_s, torque_nm, gaps } = filled;
+        *self = Self { time_s, q_rad, qd_rad_s, torque_nm, filled: gaps };
         Ok(Some(warning))
     }
 

@@ -111,7 +111,7 @@ pub struct DetectionLimit {
     /// Name of the parameter.
     pub parameter: &'static str,
     /// Value that is found with probability `power`; null where the null model, or a cause that was named, absorbs
-    /// the effect.
+    /// the effect, or where no effect is that large.
     pub value: Option<f64>,
     /// SI unit.
     pub unit: &'static str,

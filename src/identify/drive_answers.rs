@@ -43,8 +43,8 @@ pub fn drive_answers(
 }
 
 /// Takes the answers of all drives out of `problem`, a motion that repeats and its periods of torque: X and y keep
-/// what is orthogonal to them, joint by joint, so that the solution is that of a fit with them (Frisch and Waugh
-/// 1933).
+/// what is orthogonal to them, joint by joint, as in a fit with them (Frisch and Waugh 1933). Of equal weights it is the same
+/// solution; rows that are weighted afterwards have another one, as free of the answers.
 pub fn without_drive_answers(
     problem: &mut Problem,
     clock: &FineClock,

@@ -61,6 +61,20 @@ pub enum IdentifyError {
         /// Rate of the first log, Hz.
         expected_hz: f64,
     },
+    /// `--rate` asks for many samples between two rows.
+    #[error(
+        "{log}: it has {natural_hz:.1} rows a second; a rate of {wanted_hz} Hz is more than can be made of them ({most_hz:.0} Hz)"
+    )]
+    RateAboveLog {
+        /// The log.
+        log: String,
+        /// Rate asked for, Hz.
+        wanted_hz: f64,
+        /// Rate of the log, Hz.
+        natural_hz: f64,
+        /// Highest rate that is made of it, Hz.
+        most_hz: f64,
+    },
     /// `--period` names a period that the motion does not have.
     #[error(
         "{log}: the motion does not repeat every {wanted_s} s{}",

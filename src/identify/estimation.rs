@@ -46,6 +46,19 @@ pub struct Estimate {
     pub lack_of_fit: Option<LackOfFit>,
 }
 
+impl Estimate {
+    /// What it is worth where only the parts `kept` of the periods make their mean and their scatter
+    /// ([`Prepared::kept`](super::prepare::Prepared::kept)).
+    pub(super) fn of_fewer_rows(mut self, kept: [f64; 2]) -> Self {
+        let kept = kept[0] * kept[1];
+        for covariance in self.covariances.iter_mut().flatten() {
+            covariance.matrix /= kept;
+        }
+        self.lack_of_fit = self.lack_of_fit.map(|lack| lack.scaled(kept));
+        self
+    }
+}
+
 struct Whitened {
     problem: Problem,
     fitter: Fitter,

@@ -8,6 +8,8 @@ use super::prepare::Measurement;
 use crate::robot::JointSignals;
 use crate::signal::{Bracket, Decimator, Resampler, Scratch, bridged_gap_s, natural_rate_hz};
 
+/// More samples for each row are no use to anybody.
+const MOST_BETWEEN_ROWS: f64 = 10.0;
 /// Time stamps further off the natural step than this share of it make a log uneven.
 const EVEN_WITHIN: f64 = 0.02;
 /// [`Even::highest`] of samples as the log has them: half a cycle less what derivatives near it cost.
@@ -72,6 +74,16 @@ impl<'a> Even<'a> {
             qd_rad_s: Cow::Borrowed(m.qd_rad_s),
             torque_nm: Cow::Borrowed(m.torque_nm),
         };
+        if wanted_hz > MOST_BETWEEN_ROWS * natural_hz {
+            let (log, most_hz) = (m.source.to_owned(), MOST_BETWEEN_ROWS * natural_hz);
+            return Err(IdentifyError::RateAboveLog { log, wanted_hz, natural_hz, most_hz });
+        }
+        if wanted_hz > 1.001 * natural_hz {
+            warnings.push(format!(
+                "{wanted_hz} Hz is more than the {natural_hz:.1} Hz of the log: samples between its rows are interpolated and \
+                 tell nothing new, and a σ that counts samples (ols, wls) is too small"
+            ));
+        }
         let is_natural = (0.999 * natural_hz..=1.001 * natural_hz).contains(&wanted_hz);
         // A decimator keeps whole parts of the grid's rate, which is that multiple of a wanted rate below the log's.
         let parts = if is_natural { 1 } else { whole_parts(natural_hz, wanted_hz) };
@@ -194,6 +206,22 @@ mod tests {
             // Cubics between rows are off by (ω/125 Hz)⁴/384 = 9e-10, and the ends of the slowest low-pass by e⁻²⁰.
             assert!(off_rad < 1e-8, "{off_rad:e} rad at {wanted_hz} Hz");
         }
+    }
+
+    #[test]
+    fn no_thousand_samples_are_made_of_a_row() {
+        let time_s: Vec<f64> = (0..1000).map(|k| k as f64 / 125.0).collect();
+        let swing = JointSignals::from_fn(1, 1000, |_, k| (OMEGA_RAD_S * time_s[k]).sin());
+        let [q_rad, qd_rad_s, torque_nm] = [&swing; 3];
+        let m = Measurement { source: "test", time_s: &time_s, q_rad, qd_rad_s, torque_nm };
+        let made_of = |rate_hz: f64| {
+            let options = Options { rate_hz: Some(rate_hz), ..Options::default() };
+            let mut warnings = Vec::new();
+            Even::of(&m, &options, None, &mut Scratch::default(), &mut warnings)?;
+            Ok::<_, IdentifyError>(warnings.len())
+        };
+        assert!(matches!(made_of(1e9), Err(IdentifyError::RateAboveLog { .. })));
+        assert_eq!((made_of(500.0).unwrap(), made_of(125.0).unwrap()), (1, 0));
     }
 
     #[test]

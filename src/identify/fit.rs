@@ -295,7 +295,7 @@ impl Fitter {
                     }
                 }
                 share *= weights[j] * weights[j];
-                let equations = (problem.periods * problem.samples) as f64;
+                let equations = problem.equations(j) as f64;
                 (squares[j] / (equations - share).max(1.0)).sqrt()
             })
             .collect()

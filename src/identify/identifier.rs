@@ -17,7 +17,7 @@ use super::residual::Residual;
 use super::whiten::smoothed;
 use crate::base::BaseSet;
 use crate::dynamics::Model;
-use crate::signal::{Filled, FineClock, Replicates, Scratch, ZeroPhase, fill_gaps};
+use crate::signal::{FineClock, Replicates, Scratch, ZeroPhase, fill_gaps};
 
 /// Everything that stays the same from log to log, and the memory that is used again.
 pub struct Identifier<'a> {
@@ -244,7 +244,10 @@ impl<'a> Identifier<'a> {
         } else {
             self.preparer.prepare(m, &self.options)?
         };
-        prepared.warnings.extend(filled.as_ref().map(Filled::warning));
+        if let Some(filled) = &filled {
+            prepared.count_filled(&filled.gaps);
+            prepared.warnings.push(filled.warning());
+        }
         let (first, every) = self.lay_out(&prepared)?;
         Ok((prepared, first, every))
     }
@@ -353,14 +356,15 @@ impl<'a> Identifier<'a> {
         let covariance_reason = match (self.options.covariance, default_kind) {
             (Some(_), _) => "asked for",
             (None, CovarianceKind::Spectral) => {
-                "the motion repeats: the scatter between periods holds for noise of any colour"
+                "the motion repeats: the scatter between periods holds for noise of any colour whose memory is short \
+                 against a period"
             }
             (None, _) if logs > 1 => {
                 "several logs: the scatter between blocks of time holds for noise with a memory short against a block"
             }
             (None, _) if periods > 1 => {
                 "few periods: the scatter between blocks of time holds for noise with a memory short against a block; \
-                 from four periods on their own scatter holds for noise of any colour"
+                 from four periods on their own scatter holds for noise of any colour whose memory is short against a period"
             }
             (None, _) => {
                 "a single run: the scatter between blocks of time holds for noise with a memory short against a block"
@@ -376,9 +380,11 @@ impl<'a> Identifier<'a> {
             aids,
             &self.options,
         )?;
-        let estimate = self.with_motion_noise(estimate, &prepared)?;
+        let estimate = self.with_motion_noise(estimate, &prepared)?.of_fewer_rows(prepared.kept());
         let Estimate { fit, mut covariances, lack_of_fit } = estimate;
         let covariance = covariances.swap_remove(0)?;
+        let mut warnings = prepared.warnings;
+        warnings.extend(few_blocks_warning(&covariance));
         Ok(Identification {
             estimator,
             samples: self.problem.samples * self.problem.periods,
@@ -389,7 +395,7 @@ impl<'a> Identifier<'a> {
             replicates: prepared.replicates,
             lack_of_fit,
             agreement: None,
-            warnings: prepared.warnings,
+            warnings,
             fit,
         })
     }
@@ -441,7 +447,7 @@ impl<'a> Identifier<'a> {
         let estimates = methods.iter().map(|(estimator, kinds)| {
             let Self { estimation, problem, set, options, .. } = &mut *self;
             let estimate = estimation.estimate(problem, set, *estimator, kinds, aids, options)?;
-            self.with_motion_noise(estimate, &prepared)
+            Ok(self.with_motion_noise(estimate, &prepared)?.of_fewer_rows(prepared.kept()))
         });
         Ok(estimates.collect())
     }
@@ -462,6 +468,22 @@ fn explainable(fit: &Fit, replicates: &Replicates) -> Vec<f64> {
             (of_mean - variance / periods * (1.0 - fitted)).max(0.0).sqrt()
         })
         .collect()
+}
+
+/// Blocks of time below which intervals are visibly too narrow: parameters bend the residual of each block towards it. Of a
+/// single run of 10 s in six blocks they held the truth in 92 % (white noise) and 90 % (noise of a real arm) of 300 and 200
+/// trials, and σ was 1.2 and 1.3 times what was said.
+const ENOUGH_BLOCKS: f64 = 12.0;
+
+fn few_blocks_warning(covariance: &Covariance) -> Option<String> {
+    let blocks = covariance.degrees_of_freedom + 1.0;
+    let is_few = covariance.kind == CovarianceKind::Blocks && blocks < ENOUGH_BLOCKS;
+    is_few.then(|| {
+        format!(
+            "intervals rest on {blocks:.0} blocks of time, which is few: σ may be a fourth larger than it says; record for \
+             a minute, or repeat the motion four times"
+        )
+    })
 }
 
 /// With fewer periods their scatter has so few degrees of freedom that blocks tell more.

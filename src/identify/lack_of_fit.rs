@@ -66,9 +66,21 @@ impl LackOfFit {
         }
         let first = (rows - theta.len() as f64).max(1.0);
         let second = rows * (periods - 1.0);
-        let statistic = lack / first / (scatter / second);
+        Self::new(lack / first / (scatter / second), [first, second], floor)
+    }
+
+    fn new(statistic: f64, degrees_of_freedom: [f64; 2], floor: Floor) -> Self {
+        let [first, second] = degrees_of_freedom;
         let p_value = FisherSnedecor::new(first, second).map_or(f64::NAN, |f| f.sf(statistic));
-        Self { statistic, degrees_of_freedom: [first, second], p_value, floor }
+        Self { statistic, degrees_of_freedom, p_value, floor }
+    }
+
+    /// With so many times the statistic.
+    pub(super) fn scaled(self, factor: f64) -> Self {
+        if factor == 1.0 {
+            return self;
+        }
+        Self::new(factor * self.statistic, self.degrees_of_freedom, self.floor)
     }
 
     /// Whether the model explains what repeats.

@@ -111,6 +111,14 @@ impl Problem {
         self.plan.base_count()
     }
 
+    /// Equations of joint `joint`: rows of all periods but those whose weight is nothing.
+    pub fn equations(&self, joint: usize) -> usize {
+        let Panel { x, y } = &self.panels[joint];
+        let n = self.samples;
+        let is_zero = |values: &[f64], k: usize| values[k..].iter().step_by(n).all(|v| *v == 0.0);
+        (0..n).filter(|&k| !(is_zero(y, k) && is_zero(x, k))).count() * self.periods
+    }
+
     /// Turns P periods with one X into one run with X repeated P times.
     pub fn unfold(&mut self) {
         let (n, periods) = (self.samples, self.periods);

@@ -90,7 +90,10 @@ impl Calibration {
         let b = tally.parameters();
         let n = tally.succeeded as f64;
         if tally.succeeded < 2 || b == 0 {
-            return Self { checks: Vec::new(), verdict: Verdict::NotEvaluated };
+            // A failed trial is an interval that misses: of so many that have nothing else, five of a hundred were allowed.
+            let failed = 0.05_f64.powf(tally.failures.len() as f64) < FALSE_FAILURE_RATE;
+            let verdict = if failed { Verdict::Fail } else { Verdict::NotEvaluated };
+            return Self { checks: Vec::new(), verdict };
         }
         let statistics: Vec<_> = (0..b).map(|k| tally.statistics(k)).collect();
         let single = FALSE_FAILURE_RATE / CHECKS;
@@ -229,6 +232,7 @@ pub fn wilson(share: f64, trials: f64, z: f64) -> [f64; 2] {
 mod tests {
     use super::*;
     use crate::montecarlo::tally::Outcome;
+    use crate::montecarlo::trials::Failure;
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
 
@@ -258,6 +262,19 @@ mod tests {
         assert_eq!(experiment(2000, 1.3, 0.0), Verdict::Fail);
         assert_eq!(experiment(2000, 0.7, 0.0), Verdict::Fail);
         assert_eq!(experiment(2000, 1.0, 0.4), Verdict::Fail);
+    }
+
+    #[test]
+    fn trials_that_all_fail_are_no_open_question() {
+        let failed = |count: u64| {
+            let mut tally = Tally::new(20);
+            for trial in 0..count {
+                tally.failures.push(Failure { trial, reason: String::new() });
+            }
+            Calibration::of(&tally).verdict
+        };
+        assert_eq!(failed(100), Verdict::Fail);
+        assert_eq!(failed(1), Verdict::NotEvaluated);
     }
 
     #[test]

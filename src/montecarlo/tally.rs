@@ -8,11 +8,11 @@ use super::trials::{Failure, Gathered};
 ///
 /// Integer addition is exact and associative, so a tally does not depend on the number of threads,
 /// on the split into shards or on the order of merging, and its size not on the number of trials.
-/// 2¹²⁷ units hold 1e9 trials of |z| ≤ 1e6 with their squares.
+/// 2¹²⁷ units hold 1e10 trials of |z| ≤ 1e4 with the squares of their squares.
 const UNITS_PER_ONE: f64 = (1u64 << 40) as f64;
 
 /// Largest |z| a tally takes; a trial beyond it has failed.
-pub const LARGEST_Z: f64 = 1e6;
+pub const LARGEST_Z: f64 = 1e4;
 
 /// Histogram of (θ̂ − θ)/σ̂ pooled over the parameters: bins of [`BIN_WIDTH`] from −[`BIN_RANGE`] to
 /// it, one bin beyond each end.

@@ -3,7 +3,8 @@
 //! A gap too long to be interpolated would end the record, and of a log with five of them a fifth would be used. Where
 //! the motion repeats, every missing row becomes the mean of the rows at its phase in the periods that have them. It is what
 //! averaging over periods takes a period without that row for, so that it moves no estimate; the scatter between periods
-//! becomes too small by the share of rows that are filled in, a tenth at most.
+//! becomes too small by about the share of rows that are filled in, a tenth at most, and the mean is that of fewer: see
+//! [`Prepared::count_filled`](crate::identify::Prepared::count_filled).
 
 use super::error::SignalError;
 use super::instants::Instants;
@@ -76,21 +77,25 @@ pub fn fill_gaps(
     let angles = |longest_gap_s: f64| {
         let grid = Resampler::new(time_s, rate_hz, longest_gap_s)?;
         let angles = grid.instants().angles(q_rad, qd_rad_s)?;
-        Ok::<_, SignalError>(angles.slice(grid.longest_segment()))
+        let longest = grid.longest_segment();
+        Ok::<_, SignalError>((grid.time_s()[longest.start], angles.slice(longest)))
     };
     // What is interpolated across a long gap may not repeat, and the longest stretch may be too short.
-    let bridged = angles(f64::INFINITY)?;
+    let (mut start_s, bridged) = angles(f64::INFINITY)?;
     let mut period = find_period(&bridged)?;
     if period.is_none() {
-        let longest = angles(bridged_gap_s(rate_hz))?;
+        let longest;
+        (start_s, longest) = angles(bridged_gap_s(rate_hz))?;
         period = if longest.samples() < FEWEST_ROWS { None } else { find_period(&longest)? };
     }
     let Some(period) = period else { return Ok(None) };
+    let at_s = |sample: usize| start_s + sample as f64 / rate_hz;
     let log = Log {
         time_s,
         channels: [q_rad, qd_rad_s, torque_nm],
         gaps: &found,
         period_s: period.refined_samples / rate_hz,
+        repeats_s: [at_s(period.window.start), at_s(period.window.end)],
         tolerance_rad: (0..q_rad.joints())
             .map(|j| REPEATS_WITHIN * variance_of(bridged.joint(j)).sqrt())
             .collect(),
@@ -127,6 +132,8 @@ struct Log<'a> {
     channels: [&'a JointSignals; 3],
     gaps: &'a [Gap],
     period_s: f64,
+    /// From when to when it is known to repeat: before and behind that are run-in, and rest.
+    repeats_s: [f64; 2],
     /// How far off an angle may be that repeats, per joint.
     tolerance_rad: Vec<f64>,
 }
@@ -137,7 +144,8 @@ impl Log<'_> {
         let steps = ((gap.end_s - gap.start_s) * rate_hz).round().max(1.0) as usize;
         let way = (gap.end_s - gap.start_s) / steps as f64;
         let instants: Vec<f64> = (0..=steps).map(|i| gap.start_s + i as f64 * way).collect();
-        let (first, last) = (self.time_s[0], self.time_s[self.time_s.len() - 1]);
+        let [first, last] = self.repeats_s;
+        // Less than nothing where the gap itself is before it, or behind it.
         let before = ((gap.start_s - first) / self.period_s).floor() as i64;
         let after = ((last - gap.end_s) / self.period_s).floor() as i64;
         let mut sum =
@@ -266,6 +274,24 @@ mod tests {
         }
         let off = filled.time_s.iter().zip(&time_s).map(|(a, b)| (a - b).abs());
         assert!(off.fold(0.0, f64::max) < 1e-9);
+    }
+
+    /// What comes before the dance, one period of it at half the size, is none of the others.
+    #[test]
+    fn the_way_there_is_no_period() {
+        let gaps = [530..550];
+        let (time_s, channels) = log(&gaps, ROWS);
+        let [q, qd, torque] = channels.map(|signals| {
+            let first = (PERIOD_S * RATE_HZ) as usize;
+            let small = |k: usize, v: f64| if k < first { 0.5 * v } else { v };
+            signals.map_joints(|_, y| y.iter().enumerate().map(|(k, v)| small(k, *v)).collect())
+        });
+        let filled = fill_gaps(&time_s, &q, &qd, &torque).unwrap().unwrap();
+        let (_, [_, _, whole]) = log(&[], ROWS);
+        for k in 530..550 {
+            let off = filled.torque_nm.joint(0)[k] - whole.joint(0)[k];
+            assert!(off.abs() < 1e-3, "{off}");
+        }
     }
 
     #[test]

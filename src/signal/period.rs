@@ -332,27 +332,47 @@ impl<'a> Record<'a> {
     }
 
     /// The period from the shift that carries the first period of `window` onto its last, and the
-    /// mean square that no shift removes. Parabola through the three best whole shifts.
+    /// mean square that no shift removes.
+    ///
+    /// It may be half a sample off `lag`. Where that adds up to a good part of a period over all of them, so few are
+    /// compared first that it does not.
     fn refine(&self, window: &Range<usize>, lag: usize, periods: usize) -> (f64, f64) {
-        let far = (periods - 1) * lag;
-        let reach = periods.div_ceil(2) + 1;
-        let (from, to) = (far.saturating_sub(reach), far + reach);
-        let last = (window.start + lag).min(self.q_rad.samples() - to.min(self.q_rad.samples()));
-        if last < window.start + lag / 2 {
-            // No room behind the window: compare what is left of the first period.
+        let few = periods.min(lag / 4);
+        let reach = few.div_ceil(2) + 1;
+        let Some(rough) = self.refined_over(window, lag, few, (few - 1) * lag, reach) else {
             return (lag as f64, 0.0);
+        };
+        if few == periods {
+            return rough;
+        }
+        let far = (rough.0 * (periods - 1) as f64).round() as usize;
+        self.refined_over(window, lag, periods, far, periods.div_ceil(few) + 1).unwrap_or(rough)
+    }
+
+    /// [`Self::refine`] from the shifts within `reach` of `far`, which carry the first period onto the last of so many; `None`
+    /// where there is no room behind them. Parabola through the three best.
+    fn refined_over(
+        &self,
+        window: &Range<usize>,
+        lag: usize,
+        periods: usize,
+        far: usize,
+        reach: usize,
+    ) -> Option<(f64, f64)> {
+        let (from, to) = (far.saturating_sub(reach), far + reach);
+        let last = (window.start + lag).min(self.q_rad.samples().saturating_sub(to));
+        if last < window.start + lag / 2 {
+            return None;
         }
         let costs: Vec<f64> =
             (from..=to).map(|shift| self.difference(&(window.start..last), shift, 1)).collect();
         let inner = 1..costs.len() - 1;
-        let Some(i) = inner.min_by(|a, b| costs[*a].total_cmp(&costs[*b])) else {
-            return (lag as f64, costs[0]);
-        };
+        let i = inner.min_by(|a, b| costs[*a].total_cmp(&costs[*b]))?;
         let (left, middle, right) = (costs[i - 1], costs[i], costs[i + 1]);
         let bend = left - 2.0 * middle + right;
         let shift = if bend > 0.0 { (0.5 * (left - right) / bend).clamp(-1.0, 1.0) } else { 0.0 };
         let residue = (middle - 0.5 * bend * shift * shift).max(0.0);
-        (((from + i) as f64 + shift) / (periods - 1) as f64, residue)
+        Some((((from + i) as f64 + shift) / (periods - 1) as f64, residue))
     }
 }
 
@@ -440,6 +460,16 @@ mod tests {
             if sigma > 0.0 && rest == 0 {
                 assert_eq!(found.periods, 8);
             }
+        }
+    }
+
+    /// Two hundred periods of 99.6 samples are 80 samples shorter than as many of 100.
+    #[test]
+    fn many_short_periods_show_what_each_is_off() {
+        for (period, whole) in [(99.6, false), (124.7, false), (100.0, true)] {
+            let found = find_period(&log(period, 200.0, 0, 0, 2e-5, 6)).unwrap().expect("periods");
+            assert_eq!(found.is_whole, whole, "{found:?}");
+            assert!((found.refined_samples - period).abs() < 1e-3, "{found:?}");
         }
     }
 

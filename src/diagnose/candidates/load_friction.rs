@@ -83,6 +83,11 @@ impl Candidate for LoadFriction {
         out
     }
 
+    /// A gear whose friction is its load does not turn.
+    fn largest(&self) -> f64 {
+        1.0
+    }
+
     fn separating_experiment(&self) -> &'static str {
         "the same motion with and without a known payload: this friction scales with the load"
     }

@@ -192,6 +192,11 @@ pub trait Candidate: Sync {
         quantities.first().copied()
     }
 
+    /// What [`Self::size`] says of no effect that can be there.
+    fn largest(&self) -> f64 {
+        f64::INFINITY
+    }
+
     /// The first coefficient of an effect of this `shape`, where the shape says how large it is.
     fn whole(&self, _shape: Shape) -> Option<f64> {
         None

@@ -17,7 +17,8 @@ use crate::robot::JointSignals;
 use crate::signal::{NoisePower, noise_trends, pooled_level};
 
 /// Per harmonic, with S the N × N noise covariance of one period's Fourier coefficients:
-/// rows √P L⁻¹ Ȳ_k of the mean period and L⁻¹ C_k of P − 1 orthonormal contrasts, S = L Lᴴ.
+/// rows √P L⁻¹ Ȳ_k of the mean period and L⁻¹ C_k of P − 1 orthonormal contrasts, S = L Lᴴ. Where rows of a log are the mean of
+/// other periods, P and S are those of the rest ([`Prepared::kept`](crate::identify::Prepared::kept)).
 ///
 /// S is the scatter between periods, divided by the trend of every joint's power over frequency ([`noise_trends`]) so that
 /// steep noise does not bend it, averaged over neighbouring harmonics, and scaled by M/(M − N) (M complex
@@ -31,6 +32,8 @@ pub struct PeriodWhitening {
     samples: usize,
     periods: usize,
     joints: usize,
+    /// Periods that make the mean, where some rows are the mean of others.
+    of_mean: f64,
     forward: Arc<dyn RealToComplex<f64>>,
     /// L⁻¹ per harmonic that is used, row-major N × N.
     factors: Vec<Vec<Complex<f64>>>,
@@ -100,6 +103,7 @@ impl PeriodWhitening {
             samples: n,
             periods,
             joints,
+            of_mean: regression.prepared.kept()[0] * periods as f64,
             forward,
             factors: Vec::new(),
             unknown: Vec::new(),
@@ -109,6 +113,8 @@ impl PeriodWhitening {
         // Beyond it the torque was not moved to the common motion.
         let last = (used + pooled_level(used)).min(scene.highest);
         let mut scatter = whitening.scatter(problem, scene);
+        let [_, kept] = regression.prepared.kept();
+        scatter.iter_mut().for_each(|scatter| *scatter /= Complex::from(kept));
         let power: Vec<f64> = problem
             .panels
             .iter()
@@ -322,7 +328,7 @@ impl PeriodWhitening {
     fn image_in_noise(&self, column: &Column) -> Image {
         let n = self.samples;
         let repeats = column.parts.iter().all(|(_, y)| y.len() == n);
-        let weight = (self.periods as f64).sqrt();
+        let weight = self.of_mean.sqrt();
         if repeats {
             let spectra: Vec<_> =
                 column.parts.iter().map(|(j, y)| (*j, self.spectrum(y))).collect();

@@ -12,8 +12,8 @@ impl CovarianceMethod for OrdinaryLeastSquares {
     fn covariance(&self, problem: &Problem, fit: &Fit) -> Result<Covariance, CovarianceError> {
         let squares: f64 =
             fit.residual_squares.iter().zip(&fit.weights).map(|(e, w)| e * w * w).sum();
-        let equations = problem.joints() * problem.samples * problem.periods;
-        let degrees_of_freedom = (equations - problem.parameters()) as f64;
+        let equations: usize = (0..problem.joints()).map(|j| problem.equations(j)).sum();
+        let degrees_of_freedom = equations.saturating_sub(problem.parameters()).max(1) as f64;
         let variance = squares / degrees_of_freedom;
         Ok(Covariance {
             kind: CovarianceKind::Ols,
