@@ -1,6 +1,6 @@
 //! Covariances against statsmodels (`golden/covariance.py`): ordinary and weighted least squares,
-//! clusters of time, Newey–West with the joints of one instant added up, and generalised least squares
-//! with autoregressive noise (GLSAR), instrumental variables (IV2SLS).
+//! Newey–West with the joints of one instant added up, generalised least squares with autoregressive noise (GLSAR),
+//! instrumental variables (IV2SLS), and blocks of time: corrected in row space, and without that statsmodels' clusters.
 
 use armid::base::{BaseSet, Parameterisation};
 use armid::identify::covariance::{
@@ -17,7 +17,6 @@ const COLUMNS: usize = 3;
 const LAGS: usize = 9;
 /// Blocks of 5 s are then 40 samples.
 const RATE_HZ: f64 = 8.0;
-const BLOCKS: f64 = 6.0;
 /// Both sides solve a well-conditioned problem in double precision.
 const TOLERANCE: f64 = 1e-10;
 
@@ -27,7 +26,8 @@ struct Golden {
     ols: Vec<Vec<f64>>,
     wls_theta: Vec<f64>,
     hac: Vec<Vec<f64>>,
-    cluster: Vec<Vec<f64>>,
+    blocks: Vec<Vec<f64>>,
+    blocks_freedom: f64,
     glsar_theta: Vec<f64>,
     glsar: Vec<Vec<f64>>,
     iv_theta: Vec<f64>,
@@ -99,11 +99,13 @@ fn scores_in_lags_and_in_blocks_of_time() {
         assert!((found - expected).abs() < TOLERANCE);
     }
     let hac = NeweyWest { lags: Some(LAGS) }.covariance(&problem, &fit).unwrap();
-    // statsmodels without its small-sample factors; ours are T/(T − b) and B/(B − 1).
+    // statsmodels without its small-sample factor; ours is T/(T − b).
     let lost = SAMPLES as f64 / (SAMPLES - COLUMNS) as f64;
     assert_close(&hac, lost, &golden.hac);
     let blocks = BlockCluster.covariance(&problem, &fit).unwrap();
-    assert_close(&blocks, BLOCKS / (BLOCKS - 1.0), &golden.cluster);
+    assert_close(&blocks, 1.0, &golden.blocks);
+    let freedom = blocks.degrees_of_freedom;
+    assert!((freedom / golden.blocks_freedom - 1.0).abs() < TOLERANCE, "{freedom}");
 }
 
 /// The first joint alone by `estimator`.

@@ -383,8 +383,6 @@ impl<'a> Identifier<'a> {
         let estimate = self.with_motion_noise(estimate, &prepared)?.of_fewer_rows(prepared.kept());
         let Estimate { fit, mut covariances, lack_of_fit } = estimate;
         let covariance = covariances.swap_remove(0)?;
-        let mut warnings = prepared.warnings;
-        warnings.extend(few_blocks_warning(&covariance));
         Ok(Identification {
             estimator,
             samples: self.problem.samples * self.problem.periods,
@@ -395,7 +393,7 @@ impl<'a> Identifier<'a> {
             replicates: prepared.replicates,
             lack_of_fit,
             agreement: None,
-            warnings,
+            warnings: prepared.warnings,
             fit,
         })
     }
@@ -468,22 +466,6 @@ fn explainable(fit: &Fit, replicates: &Replicates) -> Vec<f64> {
             (of_mean - variance / periods * (1.0 - fitted)).max(0.0).sqrt()
         })
         .collect()
-}
-
-/// Blocks of time below which intervals are visibly too narrow: parameters bend the residual of each block towards it. Of a
-/// single run of 10 s in six blocks they held the truth in 92 % (white noise) and 90 % (noise of a real arm) of 300 and 200
-/// trials, and σ was 1.2 and 1.3 times what was said.
-const ENOUGH_BLOCKS: f64 = 12.0;
-
-fn few_blocks_warning(covariance: &Covariance) -> Option<String> {
-    let blocks = covariance.degrees_of_freedom + 1.0;
-    let is_few = covariance.kind == CovarianceKind::Blocks && blocks < ENOUGH_BLOCKS;
-    is_few.then(|| {
-        format!(
-            "intervals rest on {blocks:.0} blocks of time, which is few: σ may be a fourth larger than it says; record for \
-             a minute, or repeat the motion four times"
-        )
-    })
 }
 
 /// With fewer periods their scatter has so few degrees of freedom that blocks tell more.

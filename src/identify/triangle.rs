@@ -157,7 +157,7 @@ impl Triangle {
 /// Sum of products in sixteen interleaved partial sums, which the compiler can keep in registers:
 /// a fixed order, hence fixed bits.
 #[inline(always)]
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     const WAYS: usize = 16;
     let mut partial = [0.0; WAYS];
     let (a_whole, a_rest) = a.as_chunks::<WAYS>();

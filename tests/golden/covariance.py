@@ -42,6 +42,34 @@ hac = wls.get_robustcov_results(
 cluster = wls.get_robustcov_results(
     "cluster", groups=time // BLOCK, use_correction=False, df_correction=False
 )
+
+
+def by_blocks(corrected):
+    """Of the weighted rows, block by block: (I − H_bb)^(−1/2) e_b in row space (Bell and McCaffrey 2002), and the degrees of
+    freedom of every parameter (Imbens and Kolesár 2016); without the correction what statsmodels says."""
+    root = np.sqrt(weights)
+    rows, e = stacked * root[:, None], (torque - stacked @ wls.params) * root
+    bread = np.linalg.inv(rows.T @ rows)
+    left = np.eye(len(e)) - rows @ bread @ rows.T
+    covariance, told = np.zeros((COLUMNS, COLUMNS)), []
+    for block in np.unique(time // BLOCK):
+        own = np.flatnonzero(time // BLOCK == block)
+        value, vector = np.linalg.eigh(left[np.ix_(own, own)])
+        power = value ** -0.5 if corrected else np.ones_like(value)
+        weighing = (vector * power) @ vector.T @ rows[own] @ bread
+        said = weighing.T @ e[own]
+        covariance += np.outer(said, said)
+        told.append(left[:, own] @ weighing)
+    freedom = []
+    for parameter in range(COLUMNS):
+        z = np.array([block[:, parameter] for block in told])
+        gamma = z @ z.T
+        freedom.append(np.trace(gamma) ** 2 / np.sum(gamma**2))
+    return covariance, COLUMNS / np.sum(1.0 / np.array(freedom))
+
+
+assert np.allclose(by_blocks(False)[0], np.asarray(cluster.cov_params()), rtol=1e-9)
+blocks, blocks_freedom = by_blocks(True)
 # The first joint alone, its noise an autoregression of the order of least BIC (0 … n/10).
 residual = sm.OLS(y[0], X[0]).fit().resid
 
@@ -64,7 +92,8 @@ print(json.dumps({
     "ols": ols.cov_params().tolist(),
     "wls_theta": wls.params.tolist(),
     "hac": np.asarray(hac.cov_params()).tolist(),
-    "cluster": np.asarray(cluster.cov_params()).tolist(),
+    "blocks": blocks.tolist(),
+    "blocks_freedom": blocks_freedom,
     "glsar_rho": rho.tolist(),
     "glsar_theta": glsar.params.tolist(),
     "glsar": np.asarray(glsar.cov_params()).tolist(),

@@ -1,13 +1,21 @@
 //! Scatter between blocks of time.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 
-use super::{Covariance, CovarianceError, CovarianceKind, CovarianceMethod, sandwich};
+use super::{Covariance, CovarianceError, CovarianceKind, CovarianceMethod};
 use crate::identify::fit::Fit;
 use crate::identify::problem::{Domain, Problem};
+use crate::identify::triangle::dot;
 
-/// V = A⁻¹ Ω A⁻¹ with the scores G_b = Σ_{t in block b} X_tᵀW²e_t of B blocks of time,
-/// Ω = B/(B − 1) Σ G_b G_bᵀ, and Student's t of B − 1 degrees of freedom.
+/// V = A⁻¹ (Σ_b G̃_b G̃_bᵀ) A⁻¹ with A = XᵀW²X over B blocks of time, whose scores are G_b = Σ_{t in block b} X_tᵀW²e_t.
+///
+/// The fit bends towards every block, most where a parameter is told by few of them, so that residuals are too small by
+/// another factor in each. With S_b = X_bᵀW²X_b, A = L Lᵀ and T_b = L⁻¹ S_b L⁻ᵀ, G̃_b = L (1 − T_b)^(−½) L⁻¹ G_b makes up for
+/// it: of white noise V is then true in the mean (Bell and McCaffrey 2002, their CR2). The degrees of freedom are Satterthwaite's
+/// for white noise, ν_i = (tr Γ)²/tr Γ² with the covariances Γ_bc of what the blocks say of parameter i (Imbens and Kolesár
+/// 2016), and of the parameters together their harmonic mean.
 ///
 /// Holds for noise of any colour and any correlation between joints whose memory is short against
 /// a block; made for a single run without repetitions. Unlike the scatter between periods it sees
@@ -33,41 +41,116 @@ impl CovarianceMethod for BlockCluster {
             let needed_s = (least_per_period * problem.periods) as f64 * SHORTEST_BLOCK_S;
             return Err(CovarianceError::TooShort { seconds, needed_s });
         };
-        let blocks = (n / length) * problem.periods;
-        let residuals = problem.residuals(&fit.theta);
         // The last block of a period takes what is left over.
         let per_period = n / length;
-        let mut scores = vec![DVector::zeros(problem.parameters()); blocks];
+        let parts: Vec<Range<usize>> = (0..per_period)
+            .map(|k| k * length..if k + 1 == per_period { n } else { (k + 1) * length })
+            .collect();
+        let repeats = problem.periods as f64;
+        let leverages: Vec<Leverage> =
+            parts.iter().map(|part| Leverage::of(problem, fit, part)).collect();
+        // L⁻¹ G̃_b, with L Lᵀ = A of one period.
+        let mut scores = DMatrix::zeros(problem.parameters(), per_period * problem.periods);
+        let raw = scores_by_block(problem, fit, &parts);
+        for ((b, raw), mut score) in raw.iter().enumerate().zip(scores.column_iter_mut()) {
+            let Leverage { correction, .. } = &leverages[b % per_period];
+            score.copy_from(&(correction * fit.inverse.tr_mul(raw)));
+        }
+        let effects = &fit.inverse * scores / repeats;
+        Ok(Covariance {
+            kind: CovarianceKind::Blocks,
+            matrix: &effects * effects.transpose(),
+            degrees_of_freedom: degrees_of_freedom(fit, &leverages, problem.periods),
+        })
+    }
+}
+
+/// What a block tells of the whole record.
+struct Leverage {
+    /// T_b.
+    share: DMatrix<f64>,
+    /// (1 − T_b)^(−½).
+    correction: DMatrix<f64>,
+}
+
+/// No residual is made up for more than tenfold: what a single block tells, no scatter shows.
+const LEAST_LEFT: f64 = 0.01;
+
+impl Leverage {
+    fn of(problem: &Problem, fit: &Fit, part: &Range<usize>) -> Self {
+        let b = problem.parameters();
+        let mut normal = DMatrix::zeros(b, b);
         for (j, panel) in problem.panels.iter().enumerate() {
             let weight = fit.weights[j] * fit.weights[j];
-            for (base, column) in problem.plan.base_indices(j).zip(panel.x.chunks_exact(n)) {
-                for (p, period) in residuals.joint(j).chunks_exact(n).enumerate() {
-                    for k in 0..per_period {
-                        let end = if k + 1 == per_period { n } else { (k + 1) * length };
-                        let part = k * length..end;
-                        let score: f64 = column[part.clone()]
-                            .iter()
-                            .zip(&period[part])
-                            .map(|(x, e)| x * e)
-                            .sum();
-                        scores[p * per_period + k][base] += weight * score;
-                    }
+            let columns: Vec<(usize, &[f64])> = problem
+                .plan
+                .base_indices(j)
+                .zip(panel.x.chunks_exact(problem.samples).map(|column| &column[part.clone()]))
+                .collect();
+            for (at, (i, x)) in columns.iter().enumerate() {
+                for (k, y) in &columns[..=at] {
+                    normal[(*i, *k)] += weight * dot(x, y);
                 }
             }
         }
-        let mut omega = DMatrix::zeros(problem.parameters(), problem.parameters());
-        for score in &scores {
-            omega.ger(1.0, score, score, 1.0);
-        }
-        let count = blocks as f64;
-        omega *= count / (count - 1.0);
-        let repeats = problem.periods as f64;
-        Ok(Covariance {
-            kind: CovarianceKind::Blocks,
-            matrix: sandwich(fit, &omega) / (repeats * repeats),
-            degrees_of_freedom: count - 1.0,
-        })
+        normal.fill_upper_triangle_with_lower_triangle();
+        let share = fit.inverse.tr_mul(&normal) * &fit.inverse / problem.periods as f64;
+        let parts = share.clone().symmetric_eigen();
+        let factor = parts.eigenvalues.map(|t| (1.0 - t).max(LEAST_LEFT).powf(-0.5));
+        let correction =
+            &parts.eigenvectors * DMatrix::from_diagonal(&factor) * parts.eigenvectors.transpose();
+        Self { share, correction }
     }
+}
+
+/// G_b of all blocks, those of one period after those of another.
+fn scores_by_block(problem: &Problem, fit: &Fit, parts: &[Range<usize>]) -> Vec<DVector<f64>> {
+    let n = problem.samples;
+    let residuals = problem.residuals(&fit.theta);
+    let mut scores = vec![DVector::zeros(problem.parameters()); parts.len() * problem.periods];
+    for (j, panel) in problem.panels.iter().enumerate() {
+        let weight = fit.weights[j] * fit.weights[j];
+        for (base, column) in problem.plan.base_indices(j).zip(panel.x.chunks_exact(n)) {
+            for (p, period) in residuals.joint(j).chunks_exact(n).enumerate() {
+                for (k, part) in parts.iter().enumerate() {
+                    let score = dot(&column[part.clone()], &period[part.clone()]);
+                    scores[p * parts.len() + k][base] += weight * score;
+                }
+            }
+        }
+    }
+    scores
+}
+
+/// Harmonic mean of the ν_i. Of parameter i block b says w_bᵀ L⁻¹ G_b with w_b = (1 − T_b)^(−½) L⁻¹ e_i, and of white noise
+/// cov(L⁻¹ G_b, L⁻¹ G_c) = δ_bc T_b − T_b T_c.
+fn degrees_of_freedom(fit: &Fit, leverages: &[Leverage], periods: usize) -> f64 {
+    let b = fit.inverse.nrows();
+    let mut inverse_sum = 0.0;
+    for i in 0..b {
+        let unit = fit.inverse.row(i).transpose();
+        let told: Vec<(f64, DVector<f64>)> = leverages
+            .iter()
+            .map(|Leverage { share, correction }| {
+                let w = correction * &unit;
+                let through = share * &w;
+                (w.dot(&through), through)
+            })
+            .collect();
+        let mut trace = 0.0;
+        let mut squares = 0.0;
+        for (at, (own, through)) in told.iter().enumerate() {
+            let same = through.norm_squared();
+            trace += own - same;
+            // The block itself, its likes in other periods, and the other blocks in all.
+            squares += (own - same).powi(2) + (periods - 1) as f64 * same * same;
+            for (_, other) in &told[..at] {
+                squares += 2.0 * periods as f64 * through.dot(other).powi(2);
+            }
+        }
+        inverse_sum += squares / (periods as f64 * trace * trace);
+    }
+    b as f64 / inverse_sum
 }
 
 /// Samples of a block: of a period of `samples` at least so many `per_period`; short records get shorter blocks rather than none.
