@@ -199,6 +199,15 @@ fn a_simulated_log_goes_through_identify_and_the_base_set_is_printed() {
     assert!(std::fs::read_to_string(&report).unwrap().contains("Identified parameters"));
 
     assert_says(&armid(&["identify", &log, &log, "--robot", "ur5"]), 1, &["are the same log"]);
+    // Nor does it become another one by other line ends, or by its second half.
+    let text = std::fs::read_to_string(&log).unwrap();
+    let rows: Vec<&str> = text.lines().collect();
+    let half = [&rows[..1], &rows[rows.len() / 2..]].concat().join("\r\n");
+    let copy = path("copy.csv");
+    std::fs::write(&copy, half + "\r\n").unwrap();
+    assert_says(&armid(&["identify", &log, &copy, "--robot", "ur5"]), 1, &["are the same log"]);
+    let validated = armid(&["identify", &log, "--validate", &copy, "--robot", "ur5"]);
+    assert_says(&validated, 1, &["or a part of it"]);
     assert_says(
         &armid(&["base", "--robot", "ur5", "--reduced", "paper"]),
         0,

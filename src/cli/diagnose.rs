@@ -64,6 +64,12 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
             first.display()
         );
     }
+    if let (Some(mass_kg), 1) = (args.known_payload_kg, args.logs.len()) {
+        return Err(format!(
+            "--known-payload {mass_kg}: it tells what the second of two logs was recorded with, and there is one"
+        )
+        .into());
+    }
     let options = args.processing.options()?;
     let (arm, mut inputs) = args.source.arm()?;
     let extended = args.extended_scenario.iter().flat_map(|path| Scenario::files_of(path));
@@ -76,9 +82,7 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
     let model = Model::new(&arm);
     let logs = args.source.read(&arm, &args.logs)?;
     let held_out = args.source.read(&arm, &args.held_out)?;
-    if let Some(same) =
-        held_out.iter().find(|h| logs.iter().any(|l| l.input.sha256 == h.input.sha256))
-    {
+    if let Some(same) = held_out.iter().find(|h| logs.iter().any(|log| h.is_of(log))) {
         let file = same.input.path.display();
         return Err(format!("{file} is held out, but it is also the log that is diagnosed").into());
     }
@@ -110,6 +114,8 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
         finding => finding?,
     };
     finding.diagnosis.warnings.extend(simulation.and_then(|simulation| simulation.warning));
+    let unused = args.processing.unused(&finding.identification.processing);
+    finding.diagnosis.warnings.extend(unused);
     // What fails behind the diagnosis must not take it along: it is told when all else is printed and written.
     let mut failed = None;
     if let Some(loaded) = logs.get(1) {

@@ -1,5 +1,6 @@
 //! `armid identify`: parameters with their uncertainty from the logs of a real or simulated arm.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -12,7 +13,7 @@ use crate::identify::covariance::CovarianceKind;
 use crate::identify::physical::{self, PhysicalOptions, PriorMetric, PriorWeight};
 use crate::identify::{
     Estimator, FitError, Identification, Identifier, IdentifyError, Measurement, Options,
-    Regression, Several, each_alone, pooled,
+    Processing, Regression, Several, each_alone, pooled,
 };
 use crate::log::{Layout, Log, read_log};
 use crate::output::check_outputs;
@@ -110,6 +111,14 @@ impl ProcessingArgs {
             ..default
         })
     }
+
+    /// What to say of an option that `processing` had no use for.
+    pub fn unused(&self, processing: &Processing) -> Option<String> {
+        (self.cutoff_hz.is_some() && processing.cutoff_hz.is_none()).then(|| {
+            "--cutoff is not used: the motion repeats, and is averaged in place of filtered (--period 0 treats it as a single run)"
+                .to_owned()
+        })
+    }
 }
 
 /// A log with its torque in Nm.
@@ -132,6 +141,26 @@ impl LoadedLog {
             qd_rad_s: &self.log.qd_rad_s,
             torque_nm: &self.torque_nm,
         }
+    }
+}
+
+/// Share of the rows of a log that are in another one, from which on it is not another one: at rest, and in readings that are
+/// rounded, some rows are alike by chance.
+const SAME: f64 = 0.5;
+
+impl LoadedLog {
+    /// Whether it holds what `other` does, or what a part of it does.
+    pub fn is_of(&self, other: &Self) -> bool {
+        fn row(log: &LoadedLog, k: usize) -> Vec<u64> {
+            let channels = [&log.log.q_rad, &log.log.qd_rad_s, &log.torque_nm];
+            let joints = channels.into_iter().flat_map(|y| (0..y.joints()).map(|j| y.joint(j)));
+            joints.map(|y| y[k].to_bits()).collect()
+        }
+        let rows = |log: &Self| 0..log.log.time_s.len();
+        let known: HashSet<Vec<u64>> = rows(other).map(|k| row(other, k)).collect();
+        let common = rows(self).filter(|k| known.contains(&row(self, *k))).count();
+        let shorter = self.log.time_s.len().min(other.log.time_s.len());
+        common as f64 > SAME * shorter as f64
     }
 }
 
@@ -180,18 +209,18 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
     let logs = args.source.read(&arm, &args.logs)?;
     let validation_logs = args.source.read(&arm, &args.validate)?;
     for (k, log) in logs.iter().enumerate() {
-        if let Some(same) = logs[..k].iter().find(|l| l.input.sha256 == log.input.sha256) {
+        if let Some(same) = logs[..k].iter().find(|other| log.is_of(other)) {
             let [one, other] = [same, log].map(|l| l.input.path.display());
             return Err(format!(
-                "{one} and {other} are the same log: counted twice, it would claim to know more than it does"
+                "{one} and {other} are the same log, or parts of it: counted twice, it would claim to know more than it does"
             )
             .into());
         }
     }
     for validation in &validation_logs {
-        if let Some(same) = logs.iter().find(|l| l.input.sha256 == validation.input.sha256) {
+        if let Some(same) = logs.iter().find(|log| validation.is_of(log)) {
             return Err(format!(
-                "{} is validated on, but it is the training log {}: a fit always describes its \
+                "{} is validated on, but it is the training log {}, or a part of it: a fit always describes its \
                  own data",
                 validation.input.path.display(),
                 same.input.path.display()
@@ -206,6 +235,8 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         .collect::<Result<Vec<_>, _>>()?;
     let several = each_alone(&mut identifier, &regressions)?;
     let mut regression = Regression::joined(regressions)?;
+    let unused = args.processing.unused(&regression.prepared.processing);
+    regression.prepared.warnings.extend(unused);
     if let Several::Together { log, reason } = &several {
         let name = logs[*log].input.path.display();
         regression.prepared.warnings.push(format!(
@@ -238,6 +269,8 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         validations.push(validate(&arm, &mut identifier, log, &identification.fit.theta)?);
     }
     let mut result = IdentifyResult::of(&training, &validations)?;
+    // What fails behind the identification must not take it along.
+    let mut failed = None;
     if args.physical {
         let options = PhysicalOptions {
             metric: args.prior,
@@ -245,8 +278,10 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
             ..PhysicalOptions::default()
         };
         let Identification { fit, covariance, .. } = &identification;
-        let estimate = physical::solve(&arm, &set, fit, covariance, &options)?;
-        result.set_physical(&estimate, &training);
+        match physical::solve(&arm, &set, fit, covariance, &options) {
+            Ok(estimate) => result.set_physical(&estimate, &training),
+            Err(error) => failed = Some(error),
+        }
     }
     say!("{}", parameter_table(&result).to_text());
     say!("{}", residual_table(&result).to_text());
@@ -270,7 +305,10 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         page(&result, &training, &validations, program)?.write(path)?;
         say!("report: {}", path.display());
     }
-    Ok(if result.is_declined() { Outcome::Negative } else { Outcome::Done })
+    match failed {
+        Some(error) => Err(error.into()),
+        None => Ok(if result.is_declined() { Outcome::Negative } else { Outcome::Done }),
+    }
 }
 
 /// Writes what can be said of a log whose motion leaves parameters without any trace in the torque.

@@ -69,7 +69,6 @@ pub struct Cause {
     /// The effect in words.
     pub in_words: String,
     /// Whether it is a law of one coefficient whose size may be none by its interval: said with a "may".
-    #[serde(skip)]
     pub may_be_none: bool,
     /// The families that came next, and by how much evidence (2 ln) they lost.
     pub rivals: Vec<Rival>,

@@ -31,6 +31,8 @@ pub struct GravityMatch {
 /// Factor between gravity found and described beyond which it is remarked on: tolerances of drive gains and
 /// usual bodies on the flange stay below.
 const OFF: f64 = 1.5;
+/// Of the logarithm of a factor of 1000: twice as much or half.
+const OFF_THOUSAND: f64 = 0.1;
 /// Share that a body on the flange may leave if it explains what was found: published gains of one arm differ by
 /// as much.
 const LEFT: f64 = 0.2;
@@ -87,9 +89,16 @@ impl GravityMatch {
         if ratio - doubt < OFF && ratio + doubt > 1.0 / OFF {
             return None;
         }
-        let far =
-            format!("gravity torque is {ratio:.2} times what the description of {robot} says");
-        Some(if (1.0 / OFF..OFF).contains(&-ratio) {
+        let times = if (0.01..100.0).contains(&ratio.abs()) {
+            format!("{ratio:.2}")
+        } else {
+            format!("{ratio:.1e}")
+        };
+        let far = format!("gravity torque is {times} times what the description of {robot} says");
+        let thousands = ratio.abs().log10() / 3.0;
+        Some(if (thousands.abs() - 1.0).abs() < OFF_THOUSAND {
+            format!("{far}: a current or torque is logged in another unit (mA for A, mNm for Nm)")
+        } else if (1.0 / OFF..OFF).contains(&-ratio) {
             format!(
                 "{far}: torques or angles are logged with the other sign, or the arm hangs upside down and its description does not"
             )
@@ -178,6 +187,13 @@ mod tests {
         let turned: Vec<f64> = nominal.iter().map(|value| -value).collect();
         let turned = GravityMatch::of(&arm, &set, &nominal, &turned, &known).unwrap();
         assert!(turned.remark("ur5e", 1.96).unwrap().contains("the other sign"), "{turned:?}");
+
+        for factor in [1e-3, 1.3e3] {
+            let scaled: Vec<f64> = nominal.iter().map(|value| factor * value).collect();
+            let scaled = GravityMatch::of(&arm, &set, &nominal, &scaled, &known).unwrap();
+            let remark = scaled.remark("ur5e", 1.96).unwrap();
+            assert!(remark.contains("another unit") && !remark.contains("0.00 times"), "{remark}");
+        }
 
         // Where the moments are hardly known, twice the gravity is no news of the robot: σ of each of the moments
         // makes that of the ratio, found over described, σ/‖described‖.

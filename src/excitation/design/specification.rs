@@ -29,6 +29,9 @@ pub struct Specification {
     pub seed: u64,
 }
 
+/// More of a period are no use: 1000 s at 1 kHz.
+const MOST_SAMPLES: f64 = 1e6;
+
 impl Specification {
     /// Whether this can be asked of `arm`.
     pub fn check(&self, arm: &Arm) -> Result<(), DesignError> {
@@ -36,6 +39,15 @@ impl Specification {
         positive("the period", v.period_s)?;
         positive("the length of the data", self.experiment.data_s)?;
         positive("the sampling rate", self.experiment.rate_hz)?;
+        let longest_s = v.period_range_s.map_or(v.period_s, |[_, high]| high.max(v.period_s));
+        let samples = longest_s * self.experiment.rate_hz;
+        if samples > MOST_SAMPLES {
+            let (what, must) = (
+                "the number of samples of a period".to_owned(),
+                format!("at most {MOST_SAMPLES:.0}"),
+            );
+            return Err(DesignError::Value { what, value: samples, must });
+        }
         at_least("the order", v.order, if v.rest_start { 2 } else { 1 })?;
         at_least("the number of starts", self.starts, 1)?;
         at_least("the number of finalists", self.finalists, 1)?;

@@ -24,7 +24,7 @@ pub struct Target {
     pub share: Share,
     /// Measured value: the share, or its bound where the target is about that.
     pub measured: f64,
-    /// Interval that holds the chance behind the share with 95 %.
+    /// Interval that holds the chance behind the share with 95 %; of what one case has many of, from the scatter between cases.
     pub interval: [f64; 2],
     /// Least and greatest value that meets the target.
     pub target: [f64; 2],
@@ -36,6 +36,22 @@ impl Target {
     fn new(what: &'static str, share: Share, target: [f64; 2]) -> Self {
         let measured = share.value();
         Self::about(what, share, measured, target)
+    }
+
+    /// About the sum of what is counted in each of `cases`, in which it goes together: the interval is from the scatter between
+    /// them, the variance of Σ c/Σ n being Σ (c − n Σ c/Σ n)²/(Σ n)².
+    fn of_cases(what: &'static str, cases: Vec<Share>, target: [f64; 2]) -> Self {
+        let sum = |f: &dyn Fn(&Share) -> u64| cases.iter().map(f).sum();
+        let all = Share { count: sum(&|case| case.count), of: sum(&|case| case.of) };
+        let off = |case: &Share| case.count as f64 - case.of as f64 * all.value();
+        let square: f64 = cases.iter().map(|case| off(case).powi(2)).sum();
+        let count = cases.len() as f64;
+        let half = 1.96 * (square * count / (count - 1.0)).sqrt() / all.of as f64;
+        let mut target = Self::new(what, all, target);
+        if cases.len() > 1 {
+            target.interval = [all.value() - half, all.value() + half];
+        }
+        target
     }
 
     fn about(what: &'static str, share: Share, measured: f64, target: [f64; 2]) -> Self {
@@ -93,17 +109,9 @@ pub fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
     };
     let residual = Judged::Residual;
     let sure = causes(all).filter(|(named, _)| named.confidence >= 0.99);
-    let mut covered = Share::default();
-    for share in all.iter().filter(|r| r.case.secret == Secret::One).map(Record::covered) {
-        covered.count += share.count;
-        covered.of += share.of;
-    }
+    let covered = all.iter().filter(|r| r.case.secret == Secret::One).map(Record::covered);
     let is_one = |r: &&Record| r.case.is_one(residual) && r.outcome() == Outcome::Right;
-    let mut base = Share::default();
-    for covered in all.iter().filter(is_one).map(|r| r.answer.base) {
-        base.count += covered.count;
-        base.of += covered.of;
-    }
+    let base = all.iter().filter(is_one).map(|r| r.answer.base);
     let large = || all.iter().filter(|r| r.case.is_from(40.0)).filter_map(|r| r.answer.gain);
     // The other targets are about cases that have an answer.
     let failures = merged.tally.failures.len() as u64;
@@ -156,14 +164,14 @@ pub fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
             withheld(30.0),
             [0.0, 0.01],
         ),
-        Target::new(
+        Target::of_cases(
             "95 % intervals of a named effect's parameters that hold the truth",
-            covered,
+            covered.collect(),
             [0.93, 0.97],
         ),
-        Target::new(
+        Target::of_cases(
             "one effect, named rightly: 95 % intervals of the base parameters that hold the truth",
-            base,
+            base.collect(),
             [0.935, 0.965],
         ),
         Target::new(
@@ -183,6 +191,15 @@ pub fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Cases of which half have all and half have none: 100 of them say as much as 100 intervals, and no more.
+    #[test]
+    fn what_goes_together_counts_once() {
+        let cases = (0..100).map(|i| Share { count: 50 * (i % 2), of: 50 }).collect();
+        let [low, high] = Target::of_cases("", cases, [0.0, 1.0]).interval;
+        let half = 1.96 * (0.25_f64 / 99.0).sqrt();
+        assert!((low - 0.5 + half).abs() < 1e-12 && (high - 0.5 - half).abs() < 1e-12);
+    }
 
     /// Not even none of 100 is below one of a hundred with 95 %: 0.05^(1/100) is 0.970. None of 299 is.
     #[test]

@@ -19,7 +19,8 @@ use crate::identify::covariance::CovarianceKind;
 use crate::identify::physical::PhysicalEstimate;
 use crate::identify::{
     Condition, Estimator, FitError, Identification, Prediction, Processing, Regression, Residual,
-    drive_limit_remark, gravity_question, gravity_remark, identifies_the_arm, not_identified,
+    drive_limit_remark, gravity_question, gravity_remark, identifies_the_arm,
+    negative_friction_remark, not_identified,
 };
 use crate::log::Log;
 use crate::robot::{Arm, Kinematics};
@@ -179,6 +180,9 @@ impl Result {
         let theta = &identification.fit.theta;
         let doubt = gravity_remark(arm, set, training.nominal, theta, &identification.covariance);
         warnings.extend(doubt.clone());
+        warnings.extend(negative_friction_remark(arm, set, theta, &identification.covariance));
+        let fit = identification.residual();
+        warnings.extend(validations.iter().filter_map(|validation| foreign(validation, &fit)));
         // Logs whose torques could not be read came no further than that.
         let torques = training.logs.iter().filter_map(|log| log.torque_nm(arm).ok());
         warnings.extend(torques.filter_map(|torque_nm| drive_limit_remark(arm, &torque_nm)));
@@ -277,6 +281,33 @@ impl Result {
             self.robot, self.samples
         )
     }
+}
+
+/// Times the error of the fit from which on a log that was not used for it is not that of the same arm: of another motion a
+/// model that lacks something is wrong by up to twice as much.
+const FOREIGN: f64 = 3.0;
+
+/// A remark where what was identified does not describe the log it is validated on.
+fn foreign(validation: &Validation, fit: &Residual) -> Option<String> {
+    let found = validation.prediction.residual();
+    let is_far = |&j: &usize| found.rms_nm[j] > FOREIGN * fit.rms_nm[j];
+    let joint = |j: usize| {
+        let times = found.rms_nm[j] / fit.rms_nm[j];
+        format!(
+            "joint {} by {:.3} Nm, {times:.0} times the error of the fit",
+            j + 1,
+            found.rms_nm[j]
+        )
+    };
+    let joints: Vec<String> = (0..fit.rms_nm.len()).filter(is_far).map(joint).collect();
+    (!joints.is_empty()).then(|| {
+        format!(
+            "{}: what was identified does not describe this log (off on {}): another load, arm or mounting, or channels that were \
+             recorded otherwise",
+            validation.log.display(),
+            joints.join(", ")
+        )
+    })
 }
 
 impl ValidationJson {
