@@ -21,6 +21,8 @@ pub struct ArmResult {
     pub offsets_nm: Vec<f64>,
     /// Standard parameters that the robot file decided, not the data.
     pub by_prior: Vec<String>,
+    /// What the result says against it, where the model was wrong along the log.
+    pub doubt: Option<String>,
     /// Named frames on its bodies.
     pub frames: Frames,
     /// Files that describe the robot.
@@ -69,6 +71,14 @@ struct ResultFile {
     #[serde(flatten)]
     about: SavedRobot,
     standard_parameters: Option<Vec<Value>>,
+    physical: Option<Found>,
+}
+
+/// How the standard parameters were found.
+#[derive(Deserialize)]
+struct Found {
+    sentence: String,
+    model_is_wrong: bool,
 }
 
 #[derive(Deserialize)]
@@ -101,6 +111,9 @@ impl ArmResult {
             offsets_nm: (0..arm.dof()).map(offset).collect(),
             arm: layout.apply(&standard, &arm),
             by_prior: by_prior.map(|v| v.name).collect(),
+            doubt: result.physical.filter(|found| found.model_is_wrong).map(|found| {
+                format!("{file}: an arm with these parameters does not move as the recorded one did: {}", found.sentence)
+            }),
             frames,
             files,
         })

@@ -33,7 +33,7 @@ pub fn run(args: &ExportArgs) -> CommandResult {
         [&args.urdf, &drives, &args.mjcf].into_iter().flatten(),
         robot.iter().chain([&args.result]),
     )?;
-    let ArmResult { arm, offsets_nm, by_prior, frames, .. } =
+    let ArmResult { arm, offsets_nm, by_prior, doubt, frames, .. } =
         ArmResult::load(&args.result, args.robot.as_deref())?;
     let write = |path: &Path, text: &str| -> Result<(), crate::output::OutputError> {
         write_atomically(path, |file| file.write_all(text.as_bytes()))?;
@@ -52,10 +52,13 @@ pub fn run(args: &ExportArgs) -> CommandResult {
             say!("note: torque offsets {offsets_nm:?} Nm have no place in an MJCF");
         }
     }
+    if let Some(doubt) = doubt {
+        say!("note: {doubt}");
+    }
     if !by_prior.is_empty() {
         say!(
             "note: of {} standard parameters ({}) the log tells only combinations with others; how these are shared between them \
-             is taken from the robot file, and does not change the torques.",
+             follows from the robot file, which need not keep its values, and hardly changes the torques.",
             by_prior.len(),
             by_prior.join(", ")
         );

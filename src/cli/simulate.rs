@@ -89,12 +89,15 @@ pub fn run(args: &SimulateArgs) -> CommandResult {
     )?;
     let mut robot_files = Vec::new();
     if let Some(path) = &args.arm {
-        let ArmResult { arm, offsets_nm, files, .. } =
+        let ArmResult { arm, offsets_nm, doubt, files, .. } =
             ArmResult::load(path, args.robot.as_deref())?;
         if arm.dof() != scenario.arm.dof() {
             let (found, expected) = (arm.dof(), scenario.arm.dof());
             let file = path.display();
             return Err(format!("{file}: {found} joints, the scenario's arm has {expected}").into());
+        }
+        if let Some(doubt) = doubt {
+            eprintln!("note: {doubt}");
         }
         if offsets_nm.iter().any(|offset| *offset != 0.0) {
             eprintln!("note: the plant has no torque offsets; left out: {offsets_nm:?} Nm");

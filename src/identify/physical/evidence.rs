@@ -55,9 +55,11 @@ impl Evidence {
              pseudo-inertias); making it one cost {distance:.1} units of noise",
             -realisable
         );
+        // No draw at all: the chance is below what so many can show.
+        let is = if self.exceeded.is_some_and(|(larger, _)| larger == 0) { "≤" } else { "=" };
         match self.p_value() {
             Some(p) if p < SIGNIFICANT => format!(
-                "{found}, more than noise explains (p = {p:.3}): the model is wrong, not only \
+                "{found}, more than noise explains (p {is} {p:.3}): the model is wrong, not only \
                  noisy. Run armid diagnose"
             ),
             Some(p) => format!("{found}, which noise explains (p = {p:.2})"),
