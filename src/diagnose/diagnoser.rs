@@ -27,7 +27,7 @@ use crate::base::BaseSet;
 use crate::dynamics::Model;
 use crate::identify::{
     Identification, Identifier, Measurement, Options, drive_limit_remark, gravity_question,
-    gravity_remark,
+    gravity_remark, negative_friction_remark,
 };
 use crate::robot::{Arm, JointSignals};
 
@@ -272,6 +272,8 @@ impl<'a> Diagnoser<'a> {
         // What touched the arm, and friction that the null model lacks, bend its gravity.
         let theta = &extension.theta;
         let covariance = &identification.covariance;
+        let pushes = negative_friction_remark(self.arm, self.set, theta, covariance);
+        diagnosis.warnings.extend(pushes);
         if let Some(remark) = gravity_remark(self.arm, self.set, &nominal, theta, covariance) {
             // Of another robot's log nothing else matters.
             diagnosis.sentences.insert(0, gravity_question(&self.arm.name, &remark));
