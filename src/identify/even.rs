@@ -6,10 +6,10 @@ use super::error::IdentifyError;
 use super::options::Options;
 use super::prepare::Measurement;
 use crate::robot::JointSignals;
-use crate::signal::{Bracket, Decimator, Resampler, Scratch, bridged_gap_s, natural_rate_hz};
+use crate::signal::{
+    Bracket, Decimator, MOST_PER_ROW, Resampler, Scratch, bridged_gap_s, natural_rate_hz,
+};
 
-/// More samples for each row are no use to anybody.
-const MOST_BETWEEN_ROWS: f64 = 10.0;
 /// Time stamps further off the natural step than this share of it make a log uneven.
 const EVEN_WITHIN: f64 = 0.02;
 /// [`Even::highest`] of samples as the log has them: half a cycle less what derivatives near it cost.
@@ -74,8 +74,8 @@ impl<'a> Even<'a> {
             qd_rad_s: Cow::Borrowed(m.qd_rad_s),
             torque_nm: Cow::Borrowed(m.torque_nm),
         };
-        if wanted_hz > MOST_BETWEEN_ROWS * natural_hz {
-            let (log, most_hz) = (m.source.to_owned(), MOST_BETWEEN_ROWS * natural_hz);
+        if wanted_hz > MOST_PER_ROW * natural_hz {
+            let (log, most_hz) = (m.source.to_owned(), MOST_PER_ROW * natural_hz);
             return Err(IdentifyError::RateAboveLog { log, wanted_hz, natural_hz, most_hz });
         }
         if wanted_hz > 1.001 * natural_hz {

@@ -59,4 +59,4 @@ pub use period::{Period, PeriodSearch, find_period};
 pub use periodic_fit::{FitScratch, PeriodicFit};
 pub use readings::{quantum, reading_limit};
 pub use replicates::{Replicates, replicate_noise};
-pub use resample::{Gap, Resampler, bridged_gap_s, gaps, natural_rate_hz};
+pub use resample::{Gap, MOST_PER_ROW, Resampler, bridged_gap_s, gaps, natural_rate_hz};

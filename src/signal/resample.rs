@@ -37,7 +37,7 @@ const LONGEST_STEP: f64 = 1.8;
 /// nothing from them, and a median is a round number that late rows do not move.
 const TYPICAL_WITHIN: f64 = 0.1;
 /// Samples of a grid per row, at most: more would be made up.
-const MOST_PER_ROW: f64 = 10.0;
+pub const MOST_PER_ROW: f64 = 10.0;
 
 /// The natural rate of a log, Hz: one over the median distance of its time stamps, or over the mean distance where the
 /// median is not typical (stamps in whole milliseconds of a log at 400 Hz are 2 and 3 ms apart).
