@@ -11,8 +11,24 @@
 //! second the mean angles and velocities with all their harmonics, at which friction is looked at, and the
 //! short series of the acceleration. What is left is regressed on that motion, whose columns are almost
 //! free of noise, while the scatter of y* between the periods is that of the equations: noise of the torque
-//! and of the acceleration together. Whitened by it, noisy harmonics count for what they are worth (errors
-//! in variables, to first order).
+//! and of the motion together. Whitened by it, noisy harmonics count for what they are worth (errors
+//! in variables, to first order). What the noise d_p of period p's velocity does to friction φ is added to it,
+//!
+//! δ_p = √P [φ(q̇̄ + d_p/√P) − mean over p of the same],
+//!
+//! by the step that the mean may be off: friction turns round within a few hundredths of a rad/s, where the noise of one period
+//! is not small. The mean of y* over the periods stays what it is.
+//!
+//! The acceleration, and the velocity of a joint that rests, have the harmonics alone in which they stand out of their noise. What is
+//! noise in them is in the equations as well, with the other sign, and looks like whatever hangs on it: a few percent of the harmonics of
+//! an inertia's column are noise, but where that of the torque falls steeply with frequency it is they that count most, and friction
+//! of a joint that rests turns with the noise of its velocity. Of a joint that turns round the velocity keeps all its harmonics: they
+//! make the kink there, and friction that turns too softly looks like one that comes late.
+
+use std::sync::Arc;
+
+use realfft::num_complex::Complex;
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
 use super::extension::mean_period;
 use super::load::load_along;
@@ -38,10 +54,16 @@ pub fn move_to_common_motion(
 ) {
     let Some(each_period) = &regression.prepared.each_period else { return };
     let n = regression.problem.samples;
+    let joints = 0..each_period.qd_rad_s.joints();
+    let bands: Vec<Bands> =
+        joints.map(|j| Bands::that_stand_out(each_period.qd_rad_s.joint(j), n)).collect();
+    let own_rad_s = each_period
+        .qd_rad_s
+        .map_joints(|j, qd| bands[j].without_noise_at_rest(qd, regression.problem.rate_hz));
     let common = Motion {
         q_rad: each_period.q_rad.map_joints(|_, q| mean_period(q, n)),
-        qd_rad_s: each_period.qd_rad_s.map_joints(|_, qd| mean_period(qd, n)),
-        qdd_rad_s2: regression.prepared.motion.qdd_rad_s2.clone(),
+        qd_rad_s: own_rad_s.map_joints(|_, qd| mean_period(qd, n)),
+        qdd_rad_s2: regression.prepared.motion.qdd_rad_s2.map_joints(|j, qdd| bands[j].of(qdd)),
     };
     let (arm, _) = equivalent_arm(arm, set, theta);
     let model = Model::new(&arm);
@@ -51,6 +73,11 @@ pub fn move_to_common_motion(
         let moved = own_nm.joint(j).iter().zip(common_nm.joint(j).iter().cycle());
         y.iter().zip(moved).map(|(y, (own, common))| y - (own - common)).collect()
     });
+    for j in 0..torque_nm.joints() {
+        let (own, mean) = (own_rad_s.joint(j), common.qd_rad_s.joint(j));
+        let noise = friction_noise(&arm, j, own, mean);
+        torque_nm.joint_mut(j).iter_mut().zip(noise).for_each(|(y, noise)| *y -= noise);
+    }
     if let Some(between) = &regression.prepared.between {
         let processing = &regression.prepared.processing;
         let (start_s, rate_hz) = (processing.window_s[0], processing.rate_hz);
@@ -62,6 +89,110 @@ pub fn move_to_common_motion(
     }
     Assembler::new(&model).assemble(&mut regression.problem, &model, &common, &torque_nm);
     regression.prepared.motion = common;
+}
+
+/// Neighbouring harmonics that are judged together.
+const BAND: usize = 8;
+/// Power of a band in the mean of the periods, over that of the noise in it, from which on it has more motion than noise.
+const STANDS_OUT: f64 = 2.0;
+
+/// A joint rests while its velocity is no more than so many σ of what noise there is in the bands that are left out, for so long
+/// before and behind, s: one that turns round is faster by then.
+const AT_REST: f64 = 15.0;
+const NEAR_S: f64 = 0.04;
+
+/// Bands of harmonics in which a motion is kept.
+struct Bands {
+    kept: Vec<bool>,
+    forward: Arc<dyn RealToComplex<f64>>,
+    inverse: Arc<dyn ComplexToReal<f64>>,
+}
+
+impl Bands {
+    /// Those in which the mean of the periods of `n` samples in `y` stands out of what they scatter.
+    fn that_stand_out(y: &[f64], n: usize) -> Self {
+        let mut planner = RealFftPlanner::new();
+        let mut bands = Self {
+            kept: Vec::new(),
+            forward: planner.plan_fft_forward(n),
+            inverse: planner.plan_fft_inverse(n),
+        };
+        let periods: Vec<Vec<Complex<f64>>> =
+            y.chunks_exact(n).map(|period| bands.spectrum(period)).collect();
+        let count = periods.len() as f64;
+        // Power of a harmonic in the mean, and of its noise there.
+        let power = |h: usize| {
+            let mean = periods.iter().map(|spectrum| spectrum[h]).sum::<Complex<f64>>() / count;
+            let off = periods.iter().map(|spectrum| (spectrum[h] - mean).norm_sqr()).sum::<f64>();
+            [mean.norm_sqr(), off / (count * (count - 1.0).max(1.0))]
+        };
+        let powers: Vec<[f64; 2]> = (1..n / 2 + 1).map(power).collect();
+        let stands_out = |band: &[[f64; 2]]| {
+            let sum = |which: usize| band.iter().map(|power| power[which]).sum::<f64>();
+            sum(0) >= STANDS_OUT * sum(1)
+        };
+        bands.kept = powers.chunks(BAND).map(stands_out).collect();
+        bands
+    }
+
+    /// One period of a motion in the bands that are kept.
+    fn of(&self, period: &[f64]) -> Vec<f64> {
+        let mut spectrum = self.spectrum(period);
+        for (harmonics, kept) in spectrum[1..].chunks_mut(BAND).zip(&self.kept) {
+            if !kept {
+                harmonics.fill(Complex::ZERO);
+            }
+        }
+        let mut out = self.inverse.make_output_vec();
+        // The lengths are the plans' own, so that the transforms succeed.
+        let _ = self.inverse.process(&mut spectrum, &mut out);
+        out.iter_mut().for_each(|v| *v /= period.len() as f64);
+        out
+    }
+
+    /// The velocities `own` of all periods, while their joint rests in the bands that are kept.
+    fn without_noise_at_rest(&self, own: &[f64], rate_hz: f64) -> Vec<f64> {
+        let n = self.forward.len();
+        let mean = mean_period(own, n);
+        let told = self.of(&mean);
+        let noise = mean.iter().zip(&told).map(|(all, told)| (all - told).powi(2)).sum::<f64>();
+        let slow = AT_REST * (noise / n as f64).sqrt();
+        let is_slow: Vec<bool> = told.iter().map(|qd| qd.abs() < slow).collect();
+        let near = ((NEAR_S * rate_hz).ceil() as usize).min(n / 2);
+        // The period closes.
+        let rests = |k: usize| (n + k - near..=n + k + near).all(|at| is_slow[at % n]);
+        let rests: Vec<bool> = (0..n).map(rests).collect();
+        let periods = own.chunks_exact(n).flat_map(|period| {
+            let told = self.of(period);
+            let of_row = |(k, told)| if rests[k] { told } else { period[k] };
+            told.into_iter().enumerate().map(of_row).collect::<Vec<f64>>()
+        });
+        periods.collect()
+    }
+
+    fn spectrum(&self, period: &[f64]) -> Vec<Complex<f64>> {
+        let mut spectrum = self.forward.make_output_vec();
+        let _ = self.forward.process(&mut period.to_vec(), &mut spectrum);
+        spectrum
+    }
+}
+
+/// δ_p (see the module) of joint `j`, Nm, at every sample of all periods, whose velocities are `own` and in the mean `mean`.
+fn friction_noise(arm: &Arm, j: usize, own: &[f64], mean: &[f64]) -> Vec<f64> {
+    let (n, drive) = (mean.len(), &arm.joints[j].drive);
+    let periods = own.len() / n;
+    let scale = (periods as f64).sqrt();
+    let friction = |qd: f64| {
+        drive.coulomb_nm * (qd / arm.friction_epsilon_rad_s).tanh() + drive.viscous_nm_s_rad * qd
+    };
+    let of_mean = mean.iter().cycle().zip(own);
+    let mut noise: Vec<f64> =
+        of_mean.map(|(mean, own)| scale * friction(mean + (own - mean) / scale)).collect();
+    for k in 0..n {
+        let common = noise[k..].iter().step_by(n).sum::<f64>() / periods as f64;
+        noise[k..].iter_mut().step_by(n).for_each(|noise| *noise -= common);
+    }
+    noise
 }
 
 /// The rows of a log beside an even clock.

@@ -10,11 +10,13 @@
 use std::collections::BTreeMap;
 
 use super::kind::Kind;
+use super::outliers;
 use super::record::Record;
+use super::stale;
 use super::stalls::stalls;
 use super::verdict::{Cause, Estimate};
 use crate::identify::Measurement;
-use crate::median::{median, median_step, missing_steps, robust_sigma};
+use crate::median::{median_step, missing_steps, robust_sigma};
 use crate::robot::JointSignals;
 use crate::signal::SignalError;
 
@@ -51,6 +53,8 @@ pub fn find(m: &Measurement) -> Result<Faults, SignalError> {
     let repeats = repeats(m);
     out.extend(repeated_or_missing(m, &repeats));
     let mut record = Record::without_rows(m, &repeats);
+    out.extend(stale::mend(&mut record));
+    let mut strays = outliers::mend_motion(&mut record);
     let stalls = stalls(&record.measurement(m.source));
     if let Some(stalls) = &stalls {
         out.push(stalls.cause());
@@ -59,12 +63,9 @@ pub fn find(m: &Measurement) -> Result<Faults, SignalError> {
     let warning = record.fill_gaps()?;
     let lags = velocity_lag(&record.measurement(m.source));
     record.undo_lags(&lags);
-    let outliers = outliers(&record.torque_nm);
-    for (j, far) in &outliers {
-        record.replace_torque(*j, far);
-    }
+    strays.extend(outliers::mend_torque(&mut record));
     out.extend(lags);
-    out.extend(outliers.iter().map(|(j, far)| outliers_cause(*j, far.len(), m.time_s.len())));
+    out.extend(outliers::causes(&strays, m.time_s.len()));
     out.extend(quantisation(&record.torque_nm));
     Ok(Faults { causes: out, record, warning })
 }
@@ -194,32 +195,6 @@ fn repeated_or_missing(m: &Measurement, repeats: &[usize]) -> Option<Cause> {
         let parameters = [("fraction", exact(fraction, ""))];
         cause(Kind::DroppedSamples, None, words, f64::INFINITY, &parameters)
     })
-}
-
-/// Joints with single torque values far off: their samples, and what stands beside each.
-fn outliers(torque_nm: &JointSignals) -> Vec<(usize, Vec<(usize, f64)>)> {
-    (0..torque_nm.joints())
-        .map(|j| (j, far_off(torque_nm.joint(j))))
-        .filter(|(_, far)| far.len() >= 3)
-        .collect()
-}
-
-fn outliers_cause(joint: usize, count: usize, rows: usize) -> Cause {
-    let parameters = [("fraction", exact(count as f64 / rows as f64, ""))];
-    let words = "single values of torque that are far off";
-    cause(Kind::Outliers, Some(joint), words, FAR, &parameters)
-}
-
-/// Samples far off the median of nine, which follows a step and which four wild values in a row do not move,
-/// and that median.
-fn far_off(y: &[f64]) -> Vec<(usize, f64)> {
-    let steps: Vec<f64> = y.windows(2).map(|w| w[1] - w[0]).collect();
-    let limit = FAR * sigma_of_changes(&steps);
-    y.windows(9)
-        .enumerate()
-        .filter_map(|(k, window)| Some((k + 4, median(&mut window.to_vec())?)))
-        .filter(|&(k, middle)| (y[k] - middle).abs() > limit)
-        .collect()
 }
 
 /// Joints (0-based) whose torque is too coarse to say more than that.

@@ -200,8 +200,8 @@ impl<'a> Diagnoser<'a> {
         };
         let can_differ = |j: usize| !is_mended && !drifts(j);
         let unexplained = misfit::unexplained(&study, &accepted, &rest, lack, can_differ);
-        if unexplained.is_some() {
-            causes.iter_mut().for_each(Cause::make_provisional);
+        if let Some(unknown) = &unexplained {
+            causes.iter_mut().for_each(|cause| cause.make_modest_beside_unknown(unknown.joint));
         }
         let held_out = held_out
             .iter()
@@ -252,6 +252,7 @@ impl<'a> Diagnoser<'a> {
                            repeat the motion three times or more";
             diagnosis.warnings.push(warning.into());
         }
+        diagnosis.warnings.extend(drift_remark(&study, &diagnosis.causes));
         diagnosis.warnings.extend(drive_limit_remark(self.arm, m.torque_nm));
         for held_out in &diagnosis.held_out {
             let with_name = |warning: &String| format!("{}: {warning}", held_out.log);
@@ -366,6 +367,25 @@ impl<'a> Diagnoser<'a> {
             rivals: rivals.collect(),
         }
     }
+}
+
+/// What a user should know of mean torques that drift, but for those of joints whose friction is said to.
+fn drift_remark(study: &Study, causes: &[Cause]) -> Option<String> {
+    let is_said = |joint: usize| {
+        causes.iter().any(|c| c.kind == Kind::ThermalDrift && c.joint == Some(joint))
+    };
+    let drifting = study.whitening.drifting().iter().map(|&(j, sd_nm)| (j + 1, sd_nm));
+    let own: Vec<String> = drifting
+        .filter(|(joint, _)| !is_said(*joint))
+        .map(|(joint, sd_nm)| format!("joint {joint} by {sd_nm:.3} Nm rms"))
+        .collect();
+    (!own.is_empty()).then(|| {
+        format!(
+            "the mean torque changes from period to period more than the noise beside it does ({}): a current sensor whose zero drifts, \
+             or a load that changes; what is constant there, offsets and gravity, is less well known, as its intervals say",
+            own.join(", ")
+        )
+    })
 }
 
 /// Rms of the samples that count, Nm.

@@ -3,9 +3,12 @@
 use super::kind::Kind;
 use super::verdict::Cause;
 
-/// No physical cause is surer than this beside something unexplained (it may be a part of what the dictionary
-/// lacks), in a record that had to be mended, or as one of several that may share one origin.
+/// No physical cause is surer than this in a log that shows something unexplained as well, in a record that had to be mended, or as
+/// one of several that may share one origin.
 const PROVISIONAL: f64 = 0.9;
+/// Nor surer than this where what is unexplained sits on its own joint, or where it is one of the arm as a whole: it may be a part of
+/// what the dictionary lacks.
+const BESIDE_UNKNOWN: f64 = 0.5;
 /// A cause of less than this share of the strength of another one beside it may be what the other's law
 /// leaves.
 const OVERSHADOWED: f64 = 0.5;
@@ -59,10 +62,20 @@ pub(super) fn make_modest(causes: &mut [Cause]) {
 }
 
 impl Cause {
-    /// Takes back what cannot be known while something is left unexplained.
+    /// Takes back what cannot be known while other things may be wrong as well.
     pub(super) fn make_provisional(&mut self) {
+        self.is_no_surer_than(PROVISIONAL);
+    }
+
+    /// Takes back what cannot be known while something is left unexplained on `joint` (from 1).
+    pub(super) fn make_modest_beside_unknown(&mut self, joint: usize) {
+        let is_there = self.joint.is_none_or(|own| own == joint);
+        self.is_no_surer_than(if is_there { BESIDE_UNKNOWN } else { PROVISIONAL });
+    }
+
+    fn is_no_surer_than(&mut self, most: f64) {
         if !self.kind.is_of_the_record() {
-            self.confidence = self.confidence.min(PROVISIONAL);
+            self.confidence = self.confidence.min(most);
         }
     }
 }

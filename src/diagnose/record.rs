@@ -137,13 +137,6 @@ impl Record {
             }
         }
     }
-
-    /// Puts other torques in place of single samples of joint `j`.
-    pub fn replace_torque(&mut self, j: usize, samples: &[(usize, f64)]) {
-        for &(k, value) in samples {
-            self.torque_nm.joint_mut(j)[k] = value;
-        }
-    }
 }
 
 #[cfg(test)]

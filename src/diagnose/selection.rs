@@ -50,11 +50,28 @@ pub struct Found {
 }
 
 /// Adds families one by one while the data ask for it; along a single run those of single joints.
+///
+/// A cause of the arm as a whole, found first because no single joint's explains as much, may stand for another one that all joints
+/// have: causes of single joints alone take its place where the evidence leaves no doubt, unless they are the same one, joint by joint.
 pub fn select(study: &Study) -> Found {
-    let with_common = study.scene.periodic;
-    let mut kept = Kept { study, causes: Vec::new(), with_common };
-    kept.grow();
-    Found { evidence: kept.total_evidence(), causes: kept.causes }
+    let grown = |with_common: bool| {
+        let mut kept = Kept { study, causes: Vec::new(), with_common };
+        kept.grow();
+        Found { evidence: kept.total_evidence(), causes: kept.causes }
+    };
+    let found = grown(study.scene.periodic);
+    if found.causes.iter().all(|cause| cause.entry.site.is_some()) {
+        return found;
+    }
+    let of_joints = grown(false);
+    let is_same = |common: &Contender| {
+        let alike = of_joints.causes.iter().filter(|own| own.entry.family == common.entry.family);
+        common.entry.site.is_none() && alike.count() > 1
+    };
+    if found.causes.iter().any(is_same) {
+        return found;
+    }
+    if of_joints.evidence > found.evidence + FAR_AHEAD { of_joints } else { found }
 }
 
 impl<'s, 'a> Kept<'s, 'a> {

@@ -155,7 +155,8 @@ impl PeriodicFit {
     /// velocity combined as in step 2, all harmonics up to `share` of the rate and nothing averaged.
     ///
     /// What differs between the periods is noise of the encoders as the acceleration shows it, and
-    /// motion that does not repeat.
+    /// motion that does not repeat. Where readings are so coarse that their rounding repeats, it has the harmonics
+    /// of [`Self::fit`]: the others are rounding that looks like motion.
     ///
     /// Errors: as for [`Self::fit`].
     pub fn each_period(
@@ -167,7 +168,14 @@ impl PeriodicFit {
     ) -> Result<[JointSignals; 3], SignalError> {
         let n = self.samples_per_period;
         let highest = ((share * n as f64) as usize).clamp(1, n / 2);
-        self.period_by_period(q_rad, qd_rad_s, scratch, |_| [highest, highest])
+        self.period_by_period(q_rad, qd_rad_s, scratch, |scratch| {
+            if scratch.q.is_coarse || scratch.qd.is_coarse {
+                let kept = self.combine(scratch);
+                [highest.min(kept.highest), highest.min(kept.acceleration.noise.len())]
+            } else {
+                [highest, highest]
+            }
+        })
     }
 
     /// How far every period is off the mean of all, in the harmonics that [`Self::fit`] keeps: angle, velocity
@@ -303,7 +311,7 @@ impl PeriodicFit {
                 .expect("all buffers have the plan's own lengths");
             spectrum.iter_mut().for_each(|c| *c *= scale);
         }
-        out.average(n);
+        out.average(y, n);
     }
 
     /// Steps 2 and 3: Q̂ into `scratch.series`; what is kept of it.

@@ -43,6 +43,11 @@ impl Candidate for ThermalDrift {
         vec![quantity("fraction", b[0], ""), quantity("time_constant_s", shape.value, "s")]
     }
 
+    /// Friction does not drive, and does not grow fourfold.
+    fn is_possible(&self, _: Shape, b: &[f64]) -> bool {
+        (-1.0..3.0).contains(&b[0])
+    }
+
     fn separating_experiment(&self) -> &'static str {
         "the same motion again after half an hour of work, joint temperatures recorded"
     }

@@ -5,6 +5,9 @@ use super::*;
 /// See the module.
 pub struct TorqueGain;
 
+/// Errors that a torque constant can have.
+const LARGEST: std::ops::Range<f64> = -0.5..1.0;
+
 impl Candidate for TorqueGain {
     fn kind(&self) -> Kind {
         Kind::TorqueGain
@@ -17,6 +20,11 @@ impl Candidate for TorqueGain {
 
     fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
         vec![quantity("error_fraction", b[0], "")]
+    }
+
+    /// A log of twice the torque, or of half, is of another arm.
+    fn is_possible(&self, _: Shape, b: &[f64]) -> bool {
+        LARGEST.contains(&b[0])
     }
 
     fn separating_experiment(&self) -> &'static str {

@@ -10,6 +10,7 @@ mod beside_model;
 mod between_periods;
 mod bump;
 mod disturbed;
+mod loudness;
 mod moves;
 mod rarity;
 mod repeats;

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::bump::{self, FELT_SHARE, Felt, Noise, ORDINARY, Push};
+use super::loudness::Loudness;
 use super::moves::Move;
 use super::rarity;
 use super::{Touch, are_near};
@@ -140,6 +141,7 @@ impl Repeats {
     ) -> Result<Option<Candidate>, SignalError> {
         let deviations = self.deviations(aside, known);
         let filter = MatchedFilter::new(&deviations, self.rate_hz)?;
+        let loudness = Loudness::of(&deviations, self.rate_hz);
         let rows: Vec<usize> = (0..self.joints.len()).collect();
         if rows.is_empty() {
             return Ok(None);
@@ -149,10 +151,10 @@ impl Repeats {
         let mut best = None;
         for length_s in self.lengths_s() {
             let heights = filter.heights(|t_s| bump::bump(ORDINARY, length_s, t_s));
-            let noise = Noise::of(&heights);
+            let reach = (0.5 * length_s * self.rate_hz) as usize;
+            let noise = Noise::of(&heights, &loudness, reach);
             let others = |j: usize| [&rows[..j], &rows[j + 1..]].concat();
             let alone: Vec<Felt> = rows.iter().map(|j| noise.felt_by(&[*j], &others(*j))).collect();
-            let reach = (0.5 * length_s * self.rate_hz) as usize;
             let places = self.looked_through(length_s);
             let far_anywhere = places[0].far;
             for Place { centres, rows: telling, far, of_move } in places {
@@ -256,9 +258,12 @@ impl Repeats {
         known: &[Push],
     ) -> Result<Option<Push>, SignalError> {
         let &Candidate { centre, length_s, far, far_anywhere, .. } = candidate;
-        let filter = MatchedFilter::new(&self.deviations(aside, known), self.rate_hz)?;
-        let noise = Noise::of(&filter.heights(|t_s| bump::bump(ORDINARY, length_s, t_s)));
+        let deviations = self.deviations(aside, known);
+        let filter = MatchedFilter::new(&deviations, self.rate_hz)?;
+        let loudness = Loudness::of(&deviations, self.rate_hz);
         let reach = (0.5 * length_s * self.rate_hz) as usize + 1;
+        let heights = filter.heights(|t_s| bump::bump(ORDINARY, length_s, t_s));
+        let noise = Noise::of(&heights, &loudness, reach);
         let centres = centre.saturating_sub(reach)..(centre + reach).min(self.window.len());
         let felt_by = |felt: &[usize]| noise.felt_by(felt, &candidate.quiet);
         let weigh_on =

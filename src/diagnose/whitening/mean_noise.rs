@@ -9,6 +9,21 @@ use crate::signal::LogScatter;
 /// scatters so much less tells nothing, as where a still joint's torque is rounded.
 const RARE: f64 = 1.0 / 300.0;
 
+/// A mean torque that scatters so much that noise does it less often than this, in any joint of a log, is worth a remark.
+const REMARKABLE: f64 = 1e-5;
+
+/// Probability that noise makes a mean torque scatter less than `ratio` times what the harmonics beside it let expect, of which not
+/// more is known than its logarithm's variance `unknown`; `None` where nothing scatters at all.
+fn below(ratio: f64, freedom: usize, unknown: f64) -> Option<f64> {
+    let of_noise = FisherSnedecor::new(freedom as f64, 2.0 / unknown).ok();
+    of_noise.filter(|_| ratio.is_finite()).map(|of_noise| of_noise.cdf(ratio))
+}
+
+/// Whether a mean torque that scatters by `ratio` changes more than noise can, see [`with_own_scatter`].
+pub fn drifts(ratio: f64, freedom: usize, unknown: f64) -> bool {
+    below(ratio, freedom, unknown).is_some_and(|below| below > 1.0 - REMARKABLE)
+}
+
 /// Corrects the power of the mean's noise by what its own scatter over the periods tells; what it has to be multiplied by, per
 /// joint, and in `unknown` what is not known of it then. `ratio` is the scatter of every joint's mean over what the
 /// harmonics beside it let expect, with ν degrees of `freedom`.
@@ -20,10 +35,7 @@ const RARE: f64 = 1.0 / 300.0;
 pub fn with_own_scatter(ratio: &[f64], freedom: usize, unknown: &mut Uncertainty) -> Vec<f64> {
     let (mut steady, mut drifting) = (Vec::new(), Vec::new());
     for (j, &ratio) in ratio.iter().enumerate() {
-        let of_noise = FisherSnedecor::new(freedom as f64, 2.0 / unknown.of(j));
-        // Where nothing scatters at all there is no ratio.
-        let told = of_noise.ok().filter(|_| ratio.is_finite());
-        match told.map_or(0.0, |of_noise| of_noise.cdf(ratio)) {
+        match below(ratio, freedom, unknown.of(j)).unwrap_or(0.0) {
             below if below > 1.0 - RARE => drifting.push(j),
             below if below < RARE => {}
             _ => steady.push(j),

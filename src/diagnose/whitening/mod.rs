@@ -48,6 +48,14 @@ impl Whitening {
         }
     }
 
+    /// Joints (0-based) whose mean torque changes from period to period more than noise does, and by how much, Nm rms.
+    pub fn drifting(&self) -> &[(usize, f64)] {
+        match self {
+            Self::Periods(periods) => periods.drifting(),
+            Self::Run(_) => &[],
+        }
+    }
+
     /// Torque in time (n samples) as the regression sees it: filtered and cut for a single run.
     pub fn as_regressed(&self, y: &[f64]) -> Vec<f64> {
         match self {

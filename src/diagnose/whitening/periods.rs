@@ -6,12 +6,13 @@ use nalgebra::{Complex, DMatrix, DVector};
 use realfft::{RealFftPlanner, RealToComplex};
 
 use super::coherence::coherence;
-use super::mean_noise::with_own_scatter;
+use super::mean_noise::{drifts, with_own_scatter};
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::friction_drift::FrictionDrift;
 use crate::diagnose::image::{Column, Image, Span, dot};
 use crate::diagnose::noise_power::{NoiseKnowledge, Uncertainty};
 use crate::diagnose::scene::Scene;
+use crate::diagnose::statistic::upper_chi_squared;
 use crate::identify::{Problem, Regression};
 use crate::robot::JointSignals;
 use crate::signal::{NoisePower, noise_trends, pooled_level};
@@ -39,6 +40,11 @@ pub struct PeriodWhitening {
     factors: Vec<Vec<Complex<f64>>>,
     /// How well the noise's power is known, per harmonic.
     unknown: Vec<Uncertainty>,
+    /// Joints (0-based) whose mean torque changes from period to period more than noise does, and its standard deviation, Nm.
+    drifting: Vec<(usize, f64)>,
+    /// Steps that slow noise makes in one period, per joint, as high as their standard deviation.
+    steps: Vec<Image>,
+    stepping: Option<RepeatingNoise>,
     repeating: Option<RepeatingNoise>,
 }
 
@@ -87,6 +93,11 @@ const NOT_FOLLOWED: f64 = 0.2;
 /// Of two periods drifting friction may take most of what a slow harmonic says of noise; of eight it takes 5 to 15 %. What is
 /// left is divided by what would be left of white noise: of noise that rises as that of two colours does it is 0.96 to 1.08.
 const LEAST_KEPT: f64 = 0.25;
+/// Chance that steps as large as those of all joints and periods are no more than what S lets expect, at most, if they are noise of
+/// their own.
+const STEPS_BY_CHANCE: f64 = 0.01;
+/// Steps of a joint's own that those of all joints count for.
+const OF_ALL: f64 = 7.0;
 /// Torque below this share of a joint's rms torque is not told from the rounding of a model.
 pub const FLOOR: f64 = 1e-4;
 /// How far, over the rate, what is used ends below the highest frequency of the periods' own motion. Not far, because half
@@ -107,6 +118,9 @@ impl PeriodWhitening {
             forward,
             factors: Vec::new(),
             unknown: Vec::new(),
+            drifting: Vec::new(),
+            steps: Vec::new(),
+            stepping: None,
             repeating: None,
         };
         let used = ((regression.prepared.highest - BELOW_HIGHEST) * n as f64).round() as usize;
@@ -150,6 +164,9 @@ impl PeriodWhitening {
                 let ratio = |j: usize| scale * scatter[0][(j, j)].re / s[(j, j)].re;
                 let ratio: Vec<f64> = (0..joints).map(ratio).collect();
                 // A real number per period.
+                let is_drift = |j: &usize| drifts(ratio[*j], periods - 1, unknown.of(*j));
+                let of_mean = |j: usize| (j, (scatter[0][(j, j)].re / n as f64).sqrt() * sd[j]);
+                whitening.drifting = (0..joints).filter(is_drift).map(of_mean).collect();
                 let factor = with_own_scatter(&ratio, periods - 1, &mut unknown);
                 sd.iter_mut().zip(factor).for_each(|(sd, factor)| *sd *= factor.sqrt());
             }
@@ -170,12 +187,53 @@ impl PeriodWhitening {
             };
             whitening.factors.push(inverse.transpose().iter().copied().collect());
         }
+        whitening.find_steps(problem, scene);
         Ok(whitening)
+    }
+
+    /// Noise slower than a period ends it elsewhere than it began it: to Fourier coefficients a step, which all harmonics share,
+    /// though S takes them for independent. Of a Brownian motion its square is as large as all the rest, and without it the
+    /// coefficients are independent (Watson 1961). Where steps are larger than S lets expect, they are noise of their own.
+    fn find_steps(&mut self, problem: &Problem, scene: &Scene) {
+        let n = self.samples;
+        let ramp: Vec<f64> = (0..n).map(|k| (k as f64 + 0.5) / n as f64 - 0.5).collect();
+        let steps: Vec<Column> = (0..self.joints).map(|j| Column::on(j, ramp.clone())).collect();
+        let drift = FrictionDrift::beside_mean(&scene.motion.qd_rad_s, self.periods);
+        let parts = problem.panels.iter().enumerate().map(|(j, panel)| {
+            let mut y = panel.y.clone();
+            drift.remove(j, &mut y, |_| true);
+            (j, y)
+        });
+        let contrasts = self.image_in_noise(&Column { parts: parts.collect() }).contrast;
+        let mut steps: Vec<Image> = steps.iter().map(|step| self.image_in_noise(step)).collect();
+        // Of every joint the mean of z², z the height of its steps over the σ that S gives it.
+        let own = (self.periods - 1) as f64;
+        let square = |step: &mut Image| {
+            step.scale(1.0 / step.square().sqrt());
+            let heights = contrasts.chunks_exact(step.mean.len());
+            heights.map(|contrast| dot(&step.mean, contrast).powi(2)).sum::<f64>() / own
+        };
+        let squares: Vec<f64> = steps.iter_mut().map(square).collect();
+        let freedom = self.joints * (self.periods - 1);
+        let pooled = squares.iter().sum::<f64>() / self.joints as f64;
+        if upper_chi_squared(pooled * freedom as f64, freedom) > STEPS_BY_CHANCE {
+            return;
+        }
+        for (step, square) in steps.iter_mut().zip(&squares) {
+            let square = (own * square + OF_ALL * pooled) / (own + OF_ALL);
+            step.scale((square - 1.0).max(0.0).sqrt());
+        }
+        self.stepping = Some(RepeatingNoise::new(&steps));
+        self.steps = steps;
     }
 
     /// Takes torques that repeat in every period and whose heights have the standard deviation one for noise.
     pub fn with_repeating_noise<'c>(&mut self, torques: impl Iterator<Item = &'c Column>) {
-        let images: Vec<Image> = torques.map(|torque| self.image_in_noise(torque)).collect();
+        // Steps of periods that follow each other take each other back, so that their mean has the first and the last end alone.
+        let mut steps = self.steps.clone();
+        steps.iter_mut().for_each(|step| step.scale((2.0 / self.periods as f64).sqrt()));
+        let images = torques.map(|torque| self.image_in_noise(torque));
+        let images: Vec<Image> = images.chain(steps).collect();
         self.repeating = Some(RepeatingNoise::new(&images));
     }
 
@@ -238,6 +296,11 @@ impl PeriodWhitening {
             s.iter_mut().for_each(|v| v.im = 0.0);
         }
         (s, freedom)
+    }
+
+    /// Joints (0-based) whose mean torque drifts, and by how much, Nm rms.
+    pub fn drifting(&self) -> &[(usize, f64)] {
+        &self.drifting
     }
 
     /// How well the noise of every row is known.
@@ -321,6 +384,10 @@ impl PeriodWhitening {
     pub(super) fn image(&self, column: &Column) -> Image {
         let mut image = self.image_in_noise(column);
         self.repeating.iter().for_each(|noise| noise.whiten(&mut image.mean));
+        if let Some(noise) = &self.stepping {
+            let rows = image.mean.len();
+            image.contrast.chunks_exact_mut(rows).for_each(|contrast| noise.whiten(contrast));
+        }
         image
     }
 

@@ -1,0 +1,141 @@
+//! Single readings far off what stands beside them, and what they are replaced by.
+//!
+//! Torques are compared with the median of nine, which follows a step and which four wild values in a row do not move. Angles and
+//! velocities move from row to row more than noise: of an angle q − ∫q̇ dt is looked at, of a velocity q̇ − Δq/Δt.
+
+use super::data_faults::{FAR, cause, exact, sigma_of_changes, step_s};
+use super::kind::Kind;
+use super::record::Record;
+use super::verdict::Cause;
+use crate::median::median;
+use crate::robot::JointSignals;
+
+/// Wild readings of one channel of a joint, at least: a single one is an accident.
+const FEWEST: usize = 3;
+/// What is off by less than this share of what an angle changes between two rows is not wild.
+const SMALL_STRAY: f64 = 0.5;
+/// Rows to either side of the median.
+const REACH: usize = 4;
+
+/// Wild readings of one channel of a joint.
+pub struct Strays {
+    /// 0-based.
+    joint: usize,
+    channel: &'static str,
+    rows: Vec<usize>,
+}
+
+/// Puts torques far off on the median of nine.
+pub fn mend_torque(record: &mut Record) -> Vec<Strays> {
+    let of_joint = |j: usize| far_off(record.torque_nm.joint(j));
+    let found = (0..record.torque_nm.joints()).map(|j| (j, of_joint(j))).collect();
+    replace(&mut record.torque_nm, "torque", found)
+}
+
+/// Puts angles and velocities far off where the other says that they should be.
+///
+/// A stamp that came late moves ∫q̇ dt as a wild angle does, and a row that came late moves the angle: what is far off neither by
+/// the stamps nor by even steps is not wild.
+pub fn mend_motion(record: &mut Record) -> Vec<Strays> {
+    let joints = record.q_rad.joints();
+    let even_s = step_s(&record.measurement(""));
+    let stamped: Vec<f64> = record.time_s.windows(2).map(|w| w[1] - w[0]).collect();
+    let even: Vec<f64> = stamped.iter().map(|s| even_s * (s / even_s).round().max(1.0)).collect();
+    let of_angle = |j: usize| {
+        let (q, qd) = (record.q_rad.joint(j), record.qd_rad_s.joint(j));
+        let far = [&stamped, &even].map(|steps| {
+            let mut way = 0.0;
+            let beside = q.iter().enumerate().map(|(k, q)| {
+                if k > 0 {
+                    way += 0.5 * (qd[k - 1] + qd[k]) * steps[k - 1];
+                }
+                q - way
+            });
+            far_off(&beside.collect::<Vec<f64>>())
+        });
+        let mut far = by_all(q, far);
+        let usual_rad = sigma_of_changes(&q.windows(2).map(|w| w[1] - w[0]).collect::<Vec<f64>>());
+        far.retain(|stray| stray.off.abs() > SMALL_STRAY * usual_rad);
+        far
+    };
+    let angles = (0..joints).map(|j| (j, of_angle(j))).collect();
+    let mut strays = replace(&mut record.q_rad, "angle", angles);
+    let of_velocity = |j: usize| {
+        let (q, qd) = (record.q_rad.joint(j), record.qd_rad_s.joint(j));
+        let [stamped, even] = [&stamped, &even].map(|steps| {
+            let inner = qd.iter().enumerate().map(|(k, qd)| match (k, q.get(k + 1)) {
+                (1.., Some(next)) => qd - (next - q[k - 1]) / (steps[k - 1] + steps[k]),
+                _ => 0.0,
+            });
+            far_off(&inner.collect::<Vec<f64>>())
+        });
+        // Where the acceleration jumps Δq/Δt is not q̇, but no velocity is far from those beside it.
+        by_all(qd, [far_off(qd), stamped, even])
+    };
+    let velocities = (0..joints).map(|j| (j, of_velocity(j))).collect();
+    strays.extend(replace(&mut record.qd_rad_s, "velocity", velocities));
+    strays
+}
+
+/// What is far off by all ways to look at `y`, and what `y` should be there by the last.
+fn by_all<const N: usize>(y: &[f64], ways: [Vec<Stray>; N]) -> Vec<Stray> {
+    let is_in = |way: &[Stray], row| way.binary_search_by_key(&row, |stray| stray.row).is_ok();
+    let Some((last, others)) = ways.split_last() else { return Vec::new() };
+    let all = last.iter().filter(|stray| others.iter().all(|way| is_in(way, stray.row)));
+    all.map(|&Stray { row, off, .. }| Stray { row, off, instead: y[row] - off }).collect()
+}
+
+/// Puts what is found in place of the readings where a joint has several.
+fn replace(
+    signals: &mut JointSignals,
+    channel: &'static str,
+    found: Vec<(usize, Vec<Stray>)>,
+) -> Vec<Strays> {
+    let several = found.into_iter().filter(|(_, far)| far.len() >= FEWEST);
+    several
+        .map(|(joint, far)| {
+            let y = signals.joint_mut(joint);
+            far.iter().for_each(|stray| y[stray.row] = stray.instead);
+            Strays { joint, channel, rows: far.iter().map(|stray| stray.row).collect() }
+        })
+        .collect()
+}
+
+/// One cause for every joint with wild readings, of a record with so many `rows`.
+pub fn causes(strays: &[Strays], rows: usize) -> Vec<Cause> {
+    let mut joints: Vec<usize> = strays.iter().map(|stray| stray.joint).collect();
+    joints.sort_unstable();
+    joints.dedup();
+    let of_joint = |joint: usize| {
+        let own: Vec<&Strays> = strays.iter().filter(|stray| stray.joint == joint).collect();
+        let mut wild: Vec<usize> = own.iter().flat_map(|stray| &stray.rows).copied().collect();
+        wild.sort_unstable();
+        wild.dedup();
+        let channels: Vec<&str> = own.iter().map(|stray| stray.channel).collect();
+        let words = format!("single values of {} that are far off", channels.join(" and "));
+        let parameters = [("fraction", exact(wild.len() as f64 / rows as f64, ""))];
+        cause(Kind::Outliers, Some(joint), &words, FAR, &parameters)
+    };
+    joints.into_iter().map(of_joint).collect()
+}
+
+/// One value far off.
+struct Stray {
+    row: usize,
+    /// How far.
+    off: f64,
+    /// What stands beside it.
+    instead: f64,
+}
+
+/// Values of `y` far off the median of nine, in rising order.
+fn far_off(y: &[f64]) -> Vec<Stray> {
+    let steps: Vec<f64> = y.windows(2).map(|w| w[1] - w[0]).collect();
+    let limit = FAR * sigma_of_changes(&steps);
+    y.windows(2 * REACH + 1)
+        .enumerate()
+        .filter_map(|(k, window)| Some((k + REACH, median(&mut window.to_vec())?)))
+        .map(|(row, instead)| Stray { row, off: y[row] - instead, instead })
+        .filter(|stray| stray.off.abs() > limit)
+        .collect()
+}

@@ -1,0 +1,189 @@
+//! Readings of single channels that repeat the one before: the recorder asked again before the sensor had anything new.
+//!
+//! A signal with steps Δ that changes by c from reading to reading repeats one by chance about as often as Δ/c. Readings that repeat
+//! far more often than that while their joint moves are stale, unless they stand at the end of what can be read.
+
+use super::data_faults::{cause, exact};
+use super::kind::Kind;
+use super::record::Record;
+use super::verdict::Cause;
+use crate::median::median;
+use crate::robot::JointSignals;
+use crate::signal::quantum;
+
+/// So many times as often as chance repeats a reading, and at least this share of all: a few missed samples are no cause of anything.
+const BEYOND_CHANCE: f64 = 3.0;
+const LEAST_SHARE: f64 = 2e-3;
+/// Of a channel that repeats most of its readings there is no other record to mend it by: it is read at a lower rate.
+const MOST_SHARE: f64 = 0.5;
+/// Slower than this for so many rows before and behind a joint may as well stand still, rad/s.
+const MOVES_RAD_S: f64 = 0.01;
+const NEAR_ROWS: usize = 25;
+/// Share of the rows that may be taken out because of stale readings.
+const MOST_ROWS: f64 = 0.4;
+/// So many readings alike are a sensor that hangs: what stands between its neighbours in time is not known any more.
+const HANGS: usize = 6;
+/// A signal is noisy where it changes its slope by this share of what it changes, from reading to reading: white noise does by 1.7,
+/// smooth motion by less than 0.2.
+const NOISY: f64 = 0.5;
+/// Share of the stale readings of one joint that are those of all, at least, where the whole recorder hangs.
+const ALIKE: f64 = 0.9;
+
+/// Channels of one joint.
+const CHANNELS: [&str; 3] = ["angle", "velocity", "torque"];
+
+/// Stale readings of one joint.
+struct OfJoint {
+    joint: usize,
+    /// By channel, in the order of [`CHANNELS`].
+    readings: [Vec<usize>; 3],
+    /// Rows in which the torque hangs.
+    hangs: Vec<usize>,
+}
+
+impl OfJoint {
+    /// Rows with a stale reading, in rising order.
+    fn rows(&self) -> Vec<usize> {
+        in_order(self.readings.iter().chain([&self.hangs]).flatten().copied())
+    }
+}
+
+/// Each of `rows` once, in rising order.
+fn in_order(rows: impl Iterator<Item = usize>) -> Vec<usize> {
+    let mut rows: Vec<usize> = rows.collect();
+    rows.sort_unstable();
+    rows.dedup();
+    rows
+}
+
+/// Takes the rows with stale readings out of `record`, whose gaps other periods fill. Of too many rows those in which a torque hangs
+/// alone: the other readings are put between their neighbours. What is said of it.
+pub fn mend(record: &mut Record) -> Vec<Cause> {
+    let joints = record.torque_nm.joints();
+    let samples = record.time_s.len();
+    let found: Vec<OfJoint> = (0..joints).map(|j| of_joint(record, j)).collect();
+    let all = in_order(found.iter().flat_map(OfJoint::rows));
+    let left_out = if all.len() as f64 <= MOST_ROWS * samples as f64 {
+        all
+    } else {
+        for stale in &found {
+            let [q, qd, torque] = &stale.readings;
+            let Record { time_s, q_rad, qd_rad_s, torque_nm, .. } = record;
+            interpolate(time_s, q_rad, stale.joint, q);
+            interpolate(time_s, qd_rad_s, stale.joint, qd);
+            interpolate(time_s, torque_nm, stale.joint, torque);
+        }
+        in_order(found.iter().flat_map(|stale| stale.hangs.iter().copied()))
+    };
+    if !left_out.is_empty() {
+        *record = Record::without_rows(&record.measurement(""), &left_out);
+    }
+    causes(&found, samples)
+}
+
+/// One cause for all joints where they repeat the same rows, else one for every joint that repeats any.
+fn causes(found: &[OfJoint], samples: usize) -> Vec<Cause> {
+    let rows: Vec<Vec<usize>> = found.iter().map(OfJoint::rows).collect();
+    let said = |joint: Option<usize>, rows: &[usize], channels: String| {
+        let parameters = [("fraction", exact(rows.len() as f64 / samples as f64, ""))];
+        let words = format!("readings of the {channels} that repeat the one before");
+        cause(Kind::DroppedSamples, joint, &words, f64::INFINITY, &parameters)
+    };
+    let channels = |stale: &[&OfJoint]| {
+        let is_stale = |c: usize| {
+            stale.iter().any(|s| !s.readings[c].is_empty() || c == 2 && !s.hangs.is_empty())
+        };
+        let names: Vec<&str> = (0..3).filter(|c| is_stale(*c)).map(|c| CHANNELS[c]).collect();
+        names.join(" and ")
+    };
+    let is_in_all = |row: &&usize| rows.iter().all(|other| other.binary_search(row).is_ok());
+    let common = rows.first().map_or(0, |first| first.iter().filter(is_in_all).count());
+    let most = rows.iter().map(Vec::len).max().unwrap_or(0);
+    if most > 0 && rows.len() > 1 && common as f64 > ALIKE * most as f64 {
+        let all: Vec<&OfJoint> = found.iter().collect();
+        return vec![said(None, &rows[0], channels(&all))];
+    }
+    let stale = found.iter().zip(&rows).filter(|(_, rows)| !rows.is_empty());
+    stale.map(|(stale, rows)| said(Some(stale.joint), rows, channels(&[stale]))).collect()
+}
+
+fn of_joint(record: &Record, joint: usize) -> OfJoint {
+    let Record { time_s, q_rad, qd_rad_s, torque_nm, .. } = record;
+    let speed = qd_rad_s.joint(joint);
+    // A reversal is no rest.
+    let moves = |k: usize| {
+        let near = k.saturating_sub(NEAR_ROWS)..(k + NEAR_ROWS).min(speed.len());
+        speed[near].iter().any(|speed| speed.abs() > MOVES_RAD_S)
+    };
+    // An angle says itself how little it has to change, and a velocity of nothing is said of what is too slow to be seen.
+    let turns = |k: usize, step: f64| {
+        let speed = speed[k].abs();
+        speed > MOVES_RAD_S && (time_s[k] - time_s[k - 1]) * speed > BEYOND_CHANCE * step
+    };
+    let is_seen = |k: usize, _: f64| speed[k] != 0.0 && moves(k);
+    let is_moving = |k: usize, _: f64| moves(k);
+    let (angles, _) = stale(q_rad.joint(joint), turns);
+    let (velocities, _) = stale(speed, is_seen);
+    let (torques, hangs) = stale(torque_nm.joint(joint), is_moving);
+    OfJoint { joint, readings: [angles, velocities, torques], hangs }
+}
+
+/// Readings of `y` that repeat the one before where, by the steps that `y` has, they should not: those that stand alone or nearly
+/// so, and those of a noisy sensor that hangs.
+fn stale(y: &[f64], should_change: impl Fn(usize, f64) -> bool) -> (Vec<usize>, Vec<usize>) {
+    let step = quantum(y);
+    let ends =
+        y.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(*v), b.max(*v)]);
+    let is_stale = |k: usize| y[k] == y[k - 1] && !ends.contains(&y[k]) && should_change(k, step);
+    let (mut single, mut hanging) = (Vec::new(), Vec::new());
+    let all: Vec<usize> = (1..y.len()).filter(|k| is_stale(*k)).collect();
+    for run in all.chunk_by(|a, b| b - a == 1) {
+        if run.len() < HANGS { &mut single } else { &mut hanging }.extend_from_slice(run);
+    }
+    let sizes = |steps: Vec<f64>| -> f64 {
+        let mut sizes: Vec<f64> = steps.into_iter().map(f64::abs).filter(|v| *v > 0.0).collect();
+        median(&mut sizes).unwrap_or(0.0)
+    };
+    let change = sizes(y.windows(2).map(|w| w[1] - w[0]).collect());
+    let bend = sizes(y.windows(3).map(|w| w[2] - 2.0 * w[1] + w[0]).collect());
+    if bend < NOISY * change {
+        // What runs smoothly may as well stand.
+        hanging.clear();
+    }
+    let chance = if change > 0.0 { BEYOND_CHANCE * step / change } else { 1.0 };
+    let share = single.len() as f64 / y.len() as f64;
+    if !(chance.max(LEAST_SHARE)..MOST_SHARE).contains(&share) {
+        single.clear();
+    }
+    if !(LEAST_SHARE..MOST_SHARE).contains(&(hanging.len() as f64 / y.len() as f64))
+        || chance > MOST_SHARE
+    {
+        hanging.clear();
+    }
+    (single, hanging)
+}
+
+/// Puts joint `j` of `signals` at the `stale` samples between its neighbours: on the cubic through two good readings on either side,
+/// on the straight line through one where there are no two.
+fn interpolate(time_s: &[f64], signals: &mut JointSignals, j: usize, stale: &[usize]) {
+    let y = signals.joint_mut(j);
+    let is_good = |k: &usize| stale.binary_search(k).is_err();
+    for &k in stale {
+        let before: Vec<usize> = (0..k).rev().filter(is_good).take(2).collect();
+        let behind: Vec<usize> = (k + 1..y.len()).filter(is_good).take(2).collect();
+        let nodes: Vec<usize> = if before.len() == 2 && behind.len() == 2 {
+            before.into_iter().chain(behind).collect()
+        } else {
+            before.into_iter().take(1).chain(behind.into_iter().take(1)).collect()
+        };
+        // Lagrange's polynomial.
+        let weight = |at: usize| -> f64 {
+            let others = nodes.iter().filter(|other| **other != at);
+            others
+                .map(|&other| (time_s[k] - time_s[other]) / (time_s[at] - time_s[other]))
+                .product()
+        };
+        let value = nodes.iter().map(|&at| weight(at) * y[at]).sum();
+        y[k] = value;
+    }
+}
