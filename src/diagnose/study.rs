@@ -112,7 +112,7 @@ impl<'a> Study<'a> {
     ) -> Result<Self, DiagnoseError> {
         let scene = Scene::new(arm, set, theta, &regression.prepared);
         let whitening = if scene.periodic {
-            Whitening::Periods(PeriodWhitening::new(regression, &scene, log)?)
+            Whitening::Periods(Box::new(PeriodWhitening::new(regression, &scene, log)?))
         } else {
             Whitening::Run(RunWhitening::new(regression, options, sigma_nm)?)
         };

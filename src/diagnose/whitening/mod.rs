@@ -7,6 +7,7 @@
 mod coherence;
 mod mean_noise;
 mod periods;
+mod repeating;
 mod run;
 
 pub use periods::{FLOOR, PeriodWhitening};
@@ -18,7 +19,7 @@ use crate::robot::JointSignals;
 /// From torques in time to whitened rows.
 pub enum Whitening {
     /// A motion that repeats: noise known from the scatter between periods.
-    Periods(PeriodWhitening),
+    Periods(Box<PeriodWhitening>),
     /// A single run: rows of moving samples, divided by the scatter of the fit's residual.
     Run(RunWhitening),
 }

@@ -7,9 +7,10 @@ use realfft::{RealFftPlanner, RealToComplex};
 
 use super::coherence::coherence;
 use super::mean_noise::{drifts, with_own_scatter};
+use super::repeating::RepeatingNoise;
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::friction_drift::FrictionDrift;
-use crate::diagnose::image::{Column, Image, Span, dot};
+use crate::diagnose::image::{Column, Image, dot};
 use crate::diagnose::noise_power::{NoiseKnowledge, Uncertainty};
 use crate::diagnose::scene::Scene;
 use crate::diagnose::statistic::upper_chi_squared;
@@ -46,43 +47,6 @@ pub struct PeriodWhitening {
     steps: Vec<Image>,
     stepping: Option<RepeatingNoise>,
     repeating: Option<RepeatingNoise>,
-}
-
-/// Torques of unknown height that repeat in every period, as noise of the mean period: with A the rows of torques whose height
-/// has the standard deviation one, its covariance I + A Aᵀ is whitened by I + Q (√(I + R Rᵀ)⁻¹ − I) Qᵀ, A = Q R.
-struct RepeatingNoise {
-    /// Q.
-    directions: Span,
-    /// √(I + R Rᵀ)⁻¹ − I.
-    change: DMatrix<f64>,
-}
-
-impl RepeatingNoise {
-    fn new(columns: &[Image]) -> Self {
-        let mut directions = Span::default();
-        columns.iter().for_each(|column| {
-            directions.push(column);
-        });
-        let k = directions.len();
-        let coordinates =
-            columns.iter().map(|column| DVector::from(directions.coordinates(column)));
-        let mut covariance = DMatrix::identity(k, k);
-        coordinates.for_each(|c| covariance += &c * c.transpose());
-        let parts = covariance.symmetric_eigen();
-        let shrunk =
-            DMatrix::from_diagonal(&parts.eigenvalues.map(|square| square.powf(-0.5) - 1.0));
-        let change = &parts.eigenvectors * shrunk * parts.eigenvectors.transpose();
-        Self { directions, change }
-    }
-
-    /// Whitens `rows` of a mean period; symmetric, it is its own adjoint.
-    fn whiten(&self, rows: &mut [f64]) {
-        let along = self.directions.directions().map(|direction| dot(direction.mean, rows));
-        let change = &self.change * DVector::from_iterator(self.directions.len(), along);
-        for (direction, change) in self.directions.directions().zip(change.iter()) {
-            rows.iter_mut().zip(direction.mean).for_each(|(row, d)| *row += change * d);
-        }
-    }
 }
 
 /// Share of Coulomb's torque whose kink is not followed between samples. In the fastest eighth of the harmonics of clean logs
@@ -450,28 +414,4 @@ fn trends(
 /// All (i, j) of a square matrix.
 fn pairs(n: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..n).flat_map(move |i| (0..n).map(move |j| (i, j)))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// W (I + A Aᵀ) W = I, for torques that resemble each other.
-    #[test]
-    fn noise_that_repeats_is_whitened() {
-        let columns = [[3.0, 1.0, 0.0, 0.5], [2.5, 1.5, 0.0, 0.0]];
-        let image = |rows: &[f64; 4]| Image { mean: rows.to_vec(), contrast: Vec::new() };
-        let noise = RepeatingNoise::new(&columns.each_ref().map(image));
-        let a = DMatrix::from_fn(4, 2, |row, k| columns[k][row]);
-        let whitener = DMatrix::from_fn(4, 4, |row, k| {
-            let mut unit = [0.0; 4];
-            unit[k] = 1.0;
-            noise.whiten(&mut unit);
-            unit[row]
-        });
-        let covariance = DMatrix::identity(4, 4) + &a * a.transpose();
-        let whitened = &whitener * covariance * whitener.transpose();
-        assert!((whitened - DMatrix::identity(4, 4)).norm() < 1e-13);
-        assert!((&whitener - whitener.transpose()).norm() < 1e-14);
-    }
 }
