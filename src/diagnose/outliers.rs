@@ -14,6 +14,8 @@ use crate::robot::JointSignals;
 const FEWEST: usize = 3;
 /// What is off by less than this share of what an angle changes between two rows is not wild.
 const SMALL_STRAY: f64 = 0.5;
+/// So many steps of time a stamp may be off: what its joint goes in that time is not wild.
+const STAMPS_OFF: f64 = 1.5;
 /// Rows to either side of the median.
 const REACH: usize = 4;
 
@@ -55,7 +57,10 @@ pub fn mend_motion(record: &mut Record) -> Vec<Strays> {
         });
         let mut far = by_all(q, far);
         let usual_rad = sigma_of_changes(&q.windows(2).map(|w| w[1] - w[0]).collect::<Vec<f64>>());
-        far.retain(|stray| stray.off.abs() > SMALL_STRAY * usual_rad);
+        far.retain(|stray| {
+            let way_rad = STAMPS_OFF * qd[stray.row].abs() * even_s;
+            stray.off.abs() > way_rad.max(SMALL_STRAY * usual_rad)
+        });
         far
     };
     let angles = (0..joints).map(|j| (j, of_angle(j))).collect();

@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
-use super::loudness::Loudness;
 use crate::diagnose::verdict::Estimate;
 use crate::signal::{Heights, MatchedFilter};
 
@@ -33,7 +32,7 @@ pub(super) fn bump(shape: f64, length_s: f64, t_s: f64) -> f64 {
 }
 
 /// What noise does to the heights of bumps in several joints.
-pub(super) struct Noise<'a> {
+pub(super) struct Noise {
     /// Of each joint, what [`MatchedFilter`]'s σ = 1/√N has to be multiplied by.
     scale: Vec<f64>,
     /// How well it is known: degrees of freedom.
@@ -42,15 +41,11 @@ pub(super) struct Noise<'a> {
     correlation: DMatrix<f64>,
     /// Its inverse.
     precision: DMatrix<f64>,
-    /// Where it is louder than elsewhere.
-    loudness: &'a Loudness,
-    /// Samples to either side of its middle over which a bump lasts.
-    reach: usize,
 }
 
-impl<'a> Noise<'a> {
-    /// From the heights of bumps that last `reach` samples to either side of their middle, of which few hold any.
-    pub(super) fn of(heights: &Heights, loudness: &'a Loudness, reach: usize) -> Self {
+impl Noise {
+    /// From the heights of bumps of one length, of which few hold any.
+    pub(super) fn of(heights: &Heights) -> Self {
         let joints = heights.height.joints();
         let scale: Vec<f64> = (0..joints).map(|j| heights.scale(j)).collect();
         let clipped: Vec<Vec<f64>> = (0..joints)
@@ -68,21 +63,14 @@ impl<'a> Noise<'a> {
             both => product(&clipped[i], &clipped[j]) / both,
         });
         let freedom = heights.freedom.clone();
-        let precision = inverse(correlation.clone());
-        Self { scale, freedom, precision, correlation, loudness, reach }
-    }
-
-    /// σ of the height of a bump at `sample` of signal `j`, over what it usually is.
-    fn louder(&self, j: usize, sample: usize) -> f64 {
-        self.loudness.over(j, sample.saturating_sub(self.reach)..sample + self.reach + 1)
+        Self { scale, freedom, precision: inverse(correlation.clone()), correlation }
     }
 
     /// Heights at one sample over their σ.
     pub(super) fn scores(&self, heights: &Heights, sample: usize) -> Vec<f64> {
         let score = |(j, scale): (usize, &f64)| {
             let height = heights.height.joint(j)[sample];
-            let unit = scale * self.louder(j, sample);
-            if unit > 0.0 { height * heights.information[j].sqrt() / unit } else { 0.0 }
+            if *scale > 0.0 { height * heights.information[j].sqrt() / scale } else { 0.0 }
         };
         self.scale.iter().enumerate().map(score).collect()
     }
@@ -113,7 +101,7 @@ fn inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
 /// heights on F are b = P_FF⁻¹ (P z)_F in their σ, the noise taken out that the others show, their covariance is P_FF⁻¹, and
 /// twice the gain in log-likelihood is (P z)_Fᵀ b.
 pub(super) struct Felt<'a> {
-    noise: &'a Noise<'a>,
+    noise: &'a Noise,
     /// F, and behind it the others.
     signals: Vec<usize>,
     /// Rows F of P.
@@ -124,7 +112,7 @@ pub(super) struct Felt<'a> {
 
 impl Felt<'_> {
     /// F.
-    fn felt(&self) -> &[usize] {
+    pub(super) fn felt(&self) -> &[usize] {
         &self.signals[..self.count()]
     }
 
@@ -160,8 +148,7 @@ impl Felt<'_> {
     fn heights(&self, heights: &Heights, sample: usize) -> Vec<[f64; 2]> {
         let z = self.noise.scores(heights, sample);
         let height = |(a, j): (usize, &usize)| {
-            let louder = self.noise.louder(*j, sample);
-            let unit = louder * self.noise.scale[*j] / heights.information[*j].sqrt();
+            let unit = self.noise.scale[*j] / heights.information[*j].sqrt();
             [self.score(a, &z) * unit, self.covariance[(a, a)].sqrt() * unit]
         };
         self.felt().iter().enumerate().map(height).collect()
@@ -374,7 +361,6 @@ fn summit([before, middle, behind]: [f64; 3]) -> Summit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::JointSignals;
     use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
     #[test]
@@ -390,10 +376,7 @@ mod tests {
     /// percent of a σ down to once in 10⁸.
     #[test]
     fn gains_of_poorly_known_noise_are_less_rare() {
-        let loudness = Loudness::of(&JointSignals::zeros(3, 1), 1.0);
         let noise = |freedom: f64| Noise {
-            loudness: &loudness,
-            reach: 0,
             scale: vec![1.0; 3],
             freedom: vec![freedom; 3],
             correlation: DMatrix::identity(3, 3),
@@ -419,9 +402,7 @@ mod tests {
     fn a_quiet_signal_tells_the_noise_of_another() {
         let correlation = DMatrix::from_row_slice(2, 2, &[1.0, 0.6, 0.6, 1.0]);
         let precision = inverse(correlation.clone());
-        let loudness = &Loudness::of(&JointSignals::zeros(2, 1), 1.0);
-        let (scale, freedom, reach) = (vec![1.0; 2], vec![1e9; 2], 0);
-        let noise = Noise { scale, freedom, correlation, precision, loudness, reach };
+        let noise = Noise { scale: vec![1.0; 2], freedom: vec![1e9; 2], correlation, precision };
         let z = [5.0, -1.0];
         let beside = noise.felt_by(&[0], &[1]);
         // 5 + 0.6, over 0.8.

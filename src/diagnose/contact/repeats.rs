@@ -151,10 +151,10 @@ impl Repeats {
         let mut best = None;
         for length_s in self.lengths_s() {
             let heights = filter.heights(|t_s| bump::bump(ORDINARY, length_s, t_s));
-            let reach = (0.5 * length_s * self.rate_hz) as usize;
-            let noise = Noise::of(&heights, &loudness, reach);
+            let noise = Noise::of(&heights);
             let others = |j: usize| [&rows[..j], &rows[j + 1..]].concat();
             let alone: Vec<Felt> = rows.iter().map(|j| noise.felt_by(&[*j], &others(*j))).collect();
+            let reach = (0.5 * length_s * self.rate_hz) as usize;
             let places = self.looked_through(length_s);
             let far_anywhere = places[0].far;
             for Place { centres, rows: telling, far, of_move } in places {
@@ -178,7 +178,13 @@ impl Repeats {
                         1 => 0.0,
                         _ => as_known(&together) / far_together,
                     };
-                    if of_one.max(of_all) > highest {
+                    // Where it is louder noise makes higher bumps; which of those that it does not make is highest tells it not.
+                    let louder = || {
+                        let of_row =
+                            |row: &usize| loudness.over(*row, centre - reach..centre + reach);
+                        telling.iter().map(of_row).fold(1.0, f64::max)
+                    };
+                    if of_one.max(of_all) > highest && of_one.max(of_all) > least * louder() {
                         highest = of_one.max(of_all);
                         let [mut felt, mut quiet] = felt_and_quiet(&scores, &alone, &telling);
                         if of_all > of_one {
@@ -261,9 +267,8 @@ impl Repeats {
         let deviations = self.deviations(aside, known);
         let filter = MatchedFilter::new(&deviations, self.rate_hz)?;
         let loudness = Loudness::of(&deviations, self.rate_hz);
+        let noise = Noise::of(&filter.heights(|t_s| bump::bump(ORDINARY, length_s, t_s)));
         let reach = (0.5 * length_s * self.rate_hz) as usize + 1;
-        let heights = filter.heights(|t_s| bump::bump(ORDINARY, length_s, t_s));
-        let noise = Noise::of(&heights, &loudness, reach);
         let centres = centre.saturating_sub(reach)..(centre + reach).min(self.window.len());
         let felt_by = |felt: &[usize]| noise.felt_by(felt, &candidate.quiet);
         let weigh_on =
@@ -271,7 +276,11 @@ impl Repeats {
         let felt = felt_by(&candidate.felt);
         // What its neighbourhood tells of the noise may make it less than it seemed.
         let is_far = |felt: &Felt, push: &Push, far: f64| {
-            felt.of_known_noise(push.gain) > rarity::as_far_in(felt.count(), far).powi(2)
+            let [start, end] =
+                [&push.start_s, &push.end_s].map(|at| (at.value * self.rate_hz) as usize);
+            let louder = felt.felt().iter().map(|row| loudness.over(*row, start..end));
+            let gain = push.gain / louder.fold(1.0, f64::max).powi(2);
+            felt.of_known_noise(gain) > rarity::as_far_in(felt.count(), far).powi(2)
         };
         let Some(mut all) = weigh_on(&felt).filter(|push| is_far(&felt, push, far)) else {
             return Ok(None);
