@@ -44,6 +44,8 @@ pub struct Faults {
     pub record: Record,
     /// What a user should know of it.
     pub warning: Option<String>,
+    /// Joints (0-based) whose torque cannot be believed.
+    pub unreadable: Vec<usize>,
 }
 
 /// All faults of the record of `m`. Rows that repeat, a clock that stalls and gaps hide what the velocity and the torque
@@ -53,21 +55,45 @@ pub fn find(m: &Measurement) -> Result<Faults, SignalError> {
     let repeats = repeats(m);
     out.extend(repeated_or_missing(m, &repeats));
     let mut record = Record::without_rows(m, &repeats);
-    out.extend(stale::mend(&mut record));
+    let stale = stale::mend(&mut record);
     let mut strays = outliers::mend_motion(&mut record);
     let stalls = stalls(&record.measurement(m.source));
     if let Some(stalls) = &stalls {
         out.push(stalls.cause());
         record.give_back_time(&stalls.rows, stalls.lost_s);
     }
-    let warning = record.fill_gaps()?;
+    let (warning, unreadable) = without_hanging_torques(&mut record, &stale)?;
+    out.extend(stale.causes);
     let lags = velocity_lag(&record.measurement(m.source));
     record.undo_lags(&lags);
     strays.extend(outliers::mend_torque(&mut record));
     out.extend(lags);
     out.extend(outliers::causes(&strays, m.time_s.len()));
     out.extend(quantisation(&record.torque_nm));
-    Ok(Faults { causes: out, record, warning })
+    Ok(Faults { causes: out, record, warning, unreadable })
+}
+
+/// Share of the rows that other periods have to fill if a torque hangs there, at most; of a longer one the rest of the log is used.
+const SHORT_HANG: f64 = 0.1;
+
+/// Fills the gaps of `record`, and puts other periods in place of the rows in which a torque hangs. Where these are few and nothing
+/// repeats they stay: what is warned of, and the joints (0-based) whose torque is not to be believed.
+fn without_hanging_torques(
+    record: &mut Record,
+    stale: &stale::Found,
+) -> Result<(Option<String>, Vec<usize>), SignalError> {
+    let rows = stale.hanging_rows();
+    if !rows.is_empty() {
+        let mut without = Record::without_rows(&record.measurement(""), &rows);
+        let warning = without.fill_gaps()?;
+        let is_long = rows.len() as f64 > SHORT_HANG * record.time_s.len() as f64;
+        if is_long || !without.filled.is_empty() {
+            *record = without;
+            return Ok((warning, Vec::new()));
+        }
+    }
+    let hanging = stale.hangs.iter().map(|(joint, _)| *joint).collect();
+    Ok((record.fill_gaps()?, hanging))
 }
 
 pub(super) fn cause(

@@ -86,9 +86,10 @@ impl<'a> Diagnoser<'a> {
         held_out: &[Validation],
         simulation: Option<Nominal>,
     ) -> Result<Finding, DiagnoseError> {
-        let Faults { causes: mut faults, record, warning } = data_faults::find(m)?;
+        let Faults { causes: mut faults, record, warning, unreadable } = data_faults::find(m)?;
         let m = &record.measurement(m.source);
-        let coarse = data_faults::coarse_joints(&faults);
+        let mut coarse = data_faults::coarse_joints(&faults);
+        coarse.extend(unreadable);
         // Across a short mended stall torques are straight lines, which differ from period to period.
         let is_mended = faults.iter().any(|fault| fault.kind == Kind::ClockFault);
         let compared =

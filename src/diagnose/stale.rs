@@ -14,15 +14,17 @@ use crate::signal::quantum;
 /// So many times as often as chance repeats a reading, and at least this share of all: a few missed samples are no cause of anything.
 const BEYOND_CHANCE: f64 = 3.0;
 const LEAST_SHARE: f64 = 2e-3;
-/// Of a channel that repeats most of its readings there is no other record to mend it by: it is read at a lower rate.
-const MOST_SHARE: f64 = 0.5;
-/// Slower than this for so many rows before and behind a joint may as well stand still, rad/s.
+/// A channel that repeats half of its readings, or more of them, is read at a lower rate.
+const MOST_SHARE: f64 = 0.4;
+/// Slower than this for most of so long before and behind a joint may as well stand still, rad/s and s.
 const MOVES_RAD_S: f64 = 0.01;
-const NEAR_ROWS: usize = 25;
+const NEAR_S: f64 = 0.2;
 /// Share of the rows that may be taken out because of stale readings.
 const MOST_ROWS: f64 = 0.4;
 /// So many readings alike are a sensor that hangs: what stands between its neighbours in time is not known any more.
 const HANGS: usize = 6;
+/// Share of the runs of equal readings that may have the same number by chance.
+const ONE_NUMBER: f64 = 0.05;
 /// A signal is noisy where it changes its slope by this share of what it changes, from reading to reading: white noise does by 1.7,
 /// smooth motion by less than 0.2.
 const NOISY: f64 = 0.5;
@@ -56,16 +58,30 @@ fn in_order(rows: impl Iterator<Item = usize>) -> Vec<usize> {
     rows
 }
 
-/// Takes the rows with stale readings out of `record`, whose gaps other periods fill. Of too many rows those in which a torque hangs
-/// alone: the other readings are put between their neighbours. What is said of it.
-pub fn mend(record: &mut Record) -> Vec<Cause> {
+/// What is said of stale readings, and where torques hang.
+pub struct Found {
+    pub causes: Vec<Cause>,
+    /// By joint (0-based) the rows of the record in which its torque hangs.
+    pub hangs: Vec<(usize, Vec<usize>)>,
+}
+
+impl Found {
+    /// All rows in which a torque hangs, in rising order.
+    pub fn hanging_rows(&self) -> Vec<usize> {
+        in_order(self.hangs.iter().flat_map(|(_, rows)| rows.iter().copied()))
+    }
+}
+
+/// Takes the rows with stale readings out of `record`; of too many rows none: the readings are put between their neighbours. A torque that
+/// hangs stays where it is.
+pub fn mend(record: &mut Record) -> Found {
     let joints = record.torque_nm.joints();
     let samples = record.time_s.len();
     let found: Vec<OfJoint> = (0..joints).map(|j| of_joint(record, j)).collect();
-    let all = in_order(found.iter().flat_map(OfJoint::rows));
-    let left_out = if all.len() as f64 <= MOST_ROWS * samples as f64 {
-        all
-    } else {
+    let single = found.iter().flat_map(|stale| stale.readings.iter().flatten().copied());
+    let mut left_out = in_order(single);
+    if left_out.len() as f64 > MOST_ROWS * samples as f64 {
+        left_out.clear();
         for stale in &found {
             let [q, qd, torque] = &stale.readings;
             let Record { time_s, q_rad, qd_rad_s, torque_nm, .. } = record;
@@ -73,12 +89,17 @@ pub fn mend(record: &mut Record) -> Vec<Cause> {
             interpolate(time_s, qd_rad_s, stale.joint, qd);
             interpolate(time_s, torque_nm, stale.joint, torque);
         }
-        in_order(found.iter().flat_map(|stale| stale.hangs.iter().copied()))
-    };
-    if !left_out.is_empty() {
+    } else if !left_out.is_empty() {
         *record = Record::without_rows(&record.measurement(""), &left_out);
     }
-    causes(&found, samples)
+    let causes = causes(&found, samples);
+    let is_left = |k: &usize| left_out.binary_search(k).is_err();
+    let place = |k: usize| k - left_out.partition_point(|row| *row < k);
+    let hanging = found.into_iter().filter(|stale| !stale.hangs.is_empty());
+    let hangs = hanging.map(|OfJoint { joint, hangs, .. }| {
+        (joint, hangs.into_iter().filter(is_left).map(place).collect())
+    });
+    Found { causes, hangs: hangs.collect() }
 }
 
 /// One cause for all joints where they repeat the same rows, else one for every joint that repeats any.
@@ -110,10 +131,13 @@ fn causes(found: &[OfJoint], samples: usize) -> Vec<Cause> {
 fn of_joint(record: &Record, joint: usize) -> OfJoint {
     let Record { time_s, q_rad, qd_rad_s, torque_nm, .. } = record;
     let speed = qd_rad_s.joint(joint);
+    let span_s = time_s.last().unwrap_or(&0.0) - time_s.first().unwrap_or(&0.0);
+    let reach = (NEAR_S * time_s.len() as f64 / span_s).clamp(1.0, time_s.len() as f64) as usize;
     // A reversal is no rest.
     let moves = |k: usize| {
-        let near = k.saturating_sub(NEAR_ROWS)..(k + NEAR_ROWS).min(speed.len());
-        speed[near].iter().any(|speed| speed.abs() > MOVES_RAD_S)
+        let near = k.saturating_sub(reach)..(k + reach).min(speed.len());
+        let fast = speed[near.clone()].iter().filter(|speed| speed.abs() > MOVES_RAD_S).count();
+        4 * fast > near.len()
     };
     // An angle says itself how little it has to change, and a velocity of nothing is said of what is too slow to be seen.
     let turns = |k: usize, step: f64| {
@@ -138,8 +162,25 @@ fn stale(y: &[f64], should_change: impl Fn(usize, f64) -> bool) -> (Vec<usize>, 
     let is_stale = |k: &usize| y[*k] == y[k - 1] && !ends.contains(&y[*k]);
     let (mut single, mut hanging) = (Vec::new(), Vec::new());
     let all: Vec<usize> = changing.iter().copied().filter(is_stale).collect();
-    for run in all.chunk_by(|a, b| b - a == 1) {
-        if run.len() < HANGS { &mut single } else { &mut hanging }.extend_from_slice(run);
+    let runs: Vec<&[usize]> = all.chunk_by(|a, b| b - a == 1).collect();
+    // A number that is read again and again is one that is not passed: a drive's limit.
+    let mut values: Vec<f64> = runs.iter().map(|run| y[run[0]]).filter(|v| *v != 0.0).collect();
+    values.sort_by(f64::total_cmp);
+    let often = (ONE_NUMBER * runs.len() as f64).max(2.0);
+    let is_often = |same: &&[f64]| same.len() as f64 > often;
+    let limits: Vec<f64> = values.chunk_by(|a, b| a == b).filter(is_often).map(|v| v[0]).collect();
+    for run in runs {
+        let (first, last) = (run[0], run[run.len() - 1]);
+        // Where what stands around it is as good as the same, it need not have changed.
+        let around = y.get(last + 1).zip(first.checked_sub(2).map(|k| y[k]));
+        let changes =
+            around.is_some_and(|(next, before)| (next - before).abs() > BEYOND_CHANCE * step);
+        match run.len() {
+            _ if limits.contains(&y[first]) => {}
+            HANGS.. => hanging.extend_from_slice(run),
+            _ if changes => single.extend_from_slice(run),
+            _ => {}
+        }
     }
     let sizes = |steps: Vec<f64>| -> f64 {
         let mut sizes: Vec<f64> = steps.into_iter().map(f64::abs).filter(|v| *v > 0.0).collect();
@@ -217,10 +258,14 @@ mod tests {
     fn rest_and_a_limit_are_not_stale() {
         for noise_nm in [0.0, 0.3] {
             let mut still = record(4.0, noise_nm);
-            assert_eq!(mend(&mut still), []);
+            assert_eq!(mend(&mut still).causes, []);
             let mut limited = record(4.0, noise_nm);
             limited.torque_nm.joint_mut(0).iter_mut().for_each(|t| *t = t.clamp(-6.0, 6.0));
-            assert_eq!(mend(&mut limited), []);
+            assert_eq!(mend(&mut limited).causes, []);
+            // Beside wild readings the limit is not the largest one.
+            limited.torque_nm.joint_mut(0)[100] = 40.0;
+            limited.torque_nm.joint_mut(0)[400] = -40.0;
+            assert_eq!(mend(&mut limited).causes, []);
         }
     }
 
@@ -229,11 +274,15 @@ mod tests {
     fn coarse_and_slow_readings_are_not_stale() {
         let mut coarse = record(4.0, 0.3);
         coarse.torque_nm.joint_mut(0).iter_mut().for_each(|t| *t = (*t / 0.3).round() * 0.3);
-        assert_eq!(mend(&mut coarse), []);
+        assert_eq!(mend(&mut coarse).causes, []);
         let mut held = record(4.0, 0.3);
         let torque = held.torque_nm.joint_mut(0);
         (0..torque.len()).for_each(|k| torque[k] = torque[k - k % 4]);
-        assert_eq!(mend(&mut held), []);
+        assert_eq!(mend(&mut held).causes, []);
+        let mut half = record(4.0, 0.3);
+        let torque = half.torque_nm.joint_mut(0);
+        (0..torque.len()).for_each(|k| torque[k] = torque[k - k % 2]);
+        assert_eq!(mend(&mut half).causes, []);
     }
 
     /// One in ten angles is the one before: its rows go, and the words say which channel it was.
@@ -248,7 +297,7 @@ mod tests {
                 q[k] = q[k - 1];
             }
         });
-        let causes = mend(&mut record);
+        let causes = mend(&mut record).causes;
         assert_eq!(causes.len(), 1);
         assert_eq!((causes[0].kind, causes[0].joint), (Kind::DroppedSamples, Some(1)));
         assert_eq!(causes[0].in_words, "readings of the angle that repeat the one before");

@@ -52,7 +52,7 @@ const READ_AGAIN: f64 = 0.05;
 /// No scatter between periods shows it, and no average takes it away.
 pub(super) fn repeated_rounding(y: &[f64], n: usize, noise: f64) -> f64 {
     let again = y.windows(n + 1).filter(|w| w[0] == w[n]).count();
-    if (again as f64) < READ_AGAIN * y.len() as f64 {
+    if (again as f64) < READ_AGAIN * y.len().saturating_sub(n) as f64 {
         return 0.0;
     }
     let step = quantum(y).powi(2);

@@ -13,9 +13,8 @@ const BEFORE_NOISE: usize = 1;
 /// Limits to begin with, over the largest torque that the model expects.
 const SHARES: [f64; 5] = [0.6, 0.7, 0.8, 0.9, 0.97];
 
-/// Shares of what is beyond the limit that may be cut off, as far as the noise of the model's torque, by which the limit is set, leaves
-/// it known.
-const SHARE_CUT: std::ops::Range<f64> = 0.5..1.5;
+/// Share of what is beyond the limit that has to be cut off. Of two sensors whose reading bends the best limits cut off 0.02 and 0.06.
+const LEAST_CUT: f64 = 0.5;
 
 /// E max(0, x + n), n normal with standard deviation `sigma`.
 fn beyond(x: f64, sigma: f64) -> f64 {
@@ -75,9 +74,10 @@ impl Candidate for Saturation {
         b[0] > 0.0
     }
 
-    /// All is cut off beyond a limit. A sensor whose reading bends cuts off a share, and its best limit is none.
-    fn is_its_own(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> bool {
-        SHARE_CUT.contains(&b[0])
+    /// All is cut off beyond a limit, and more than that of what a model says that is bent by it. A sensor whose reading bends cuts off
+    /// a share, and no reading stops at its limit.
+    fn is_its_own(&self, scene: &Scene, site: Option<usize>, _: Shape, b: &[f64]) -> bool {
+        b[0] > LEAST_CUT || scene.torque_limit_nm[joint(site)].is_some()
     }
 
     fn in_words(&self) -> &'static str {

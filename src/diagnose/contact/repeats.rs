@@ -153,7 +153,8 @@ impl Repeats {
             let heights = filter.heights(|t_s| bump::bump(ORDINARY, length_s, t_s));
             let noise = Noise::of(&heights);
             let others = |j: usize| [&rows[..j], &rows[j + 1..]].concat();
-            let alone: Vec<Felt> = rows.iter().map(|j| noise.felt_by(&[*j], &others(*j))).collect();
+            let alone_felt: Vec<Felt> =
+                rows.iter().map(|j| noise.felt_by(&[*j], &others(*j))).collect();
             let reach = (0.5 * length_s * self.rate_hz) as usize;
             let places = self.looked_through(length_s);
             let far_anywhere = places[0].far;
@@ -172,19 +173,26 @@ impl Repeats {
                         continue;
                     }
                     let as_known = |felt: &Felt| felt.of_known_noise(felt.gain(&scores)).sqrt();
-                    let alone: Vec<f64> = alone.iter().map(as_known).collect();
+                    let alone: Vec<f64> = alone_felt.iter().map(as_known).collect();
                     let of_one = telling.iter().map(|j| alone[*j]).fold(0.0, f64::max) / far;
                     let of_all = match telling.len() {
                         1 => 0.0,
                         _ => as_known(&together) / far_together,
                     };
-                    // Where it is louder noise makes higher bumps; which of those that it does not make is highest tells it not.
-                    let louder = || {
-                        let of_row =
-                            |row: &usize| loudness.over(*row, centre - reach..centre + reach);
-                        telling.iter().map(of_row).fold(1.0, f64::max)
+                    // Where it is louder noise makes higher bumps; which of those that it does not make is highest it does not tell.
+                    let louder =
+                        |row: &usize| loudness.over(*row, centre - reach..centre + reach).powi(2);
+                    let beside = |felt: &Felt, louder: f64| {
+                        felt.of_known_noise(felt.gain(&scores) / louder).sqrt()
                     };
-                    if of_one.max(of_all) > highest && of_one.max(of_all) > least * louder() {
+                    let stands_out = || {
+                        telling.iter().any(|j| beside(&alone_felt[*j], louder(j)) > least * far)
+                            || telling.len() > 1 && {
+                                let loudest = telling.iter().map(louder).fold(1.0, f64::max);
+                                beside(&together, loudest) > least * far_together
+                            }
+                    };
+                    if of_one.max(of_all) > highest && stands_out() {
                         highest = of_one.max(of_all);
                         let [mut felt, mut quiet] = felt_and_quiet(&scores, &alone, &telling);
                         if of_all > of_one {

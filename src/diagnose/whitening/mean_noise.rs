@@ -9,7 +9,7 @@ use crate::signal::LogScatter;
 /// scatters so much less tells nothing, as where a still joint's torque is rounded.
 const RARE: f64 = 1.0 / 300.0;
 
-/// A mean torque that scatters so much that noise does it less often than this, in any joint of a log, is worth a remark.
+/// A joint's mean torque that scatters so much that noise does it less often than this is worth a remark.
 const REMARKABLE: f64 = 1e-5;
 
 /// Probability that noise makes a mean torque scatter less than `ratio` times what the harmonics beside it let expect, of which not

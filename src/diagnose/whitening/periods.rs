@@ -15,6 +15,7 @@ use crate::diagnose::noise_power::{NoiseKnowledge, Uncertainty};
 use crate::diagnose::scene::Scene;
 use crate::diagnose::statistic::upper_chi_squared;
 use crate::identify::{Problem, Regression};
+use crate::median::median;
 use crate::robot::JointSignals;
 use crate::signal::{NoisePower, noise_trends, pooled_level};
 
@@ -57,7 +58,7 @@ const NOT_FOLLOWED: f64 = 0.2;
 /// Of two periods drifting friction may take most of what a slow harmonic says of noise; of eight it takes 5 to 15 %. What is
 /// left is divided by what would be left of white noise: of noise that rises as that of two colours does it is 0.96 to 1.08.
 const LEAST_KEPT: f64 = 0.25;
-/// Chance that steps as large as those of all joints and periods are no more than what S lets expect, at most, if they are noise of
+/// Chance that steps as large as those of most joints (or of one) are no more than what S lets expect, at most, if they are noise of
 /// their own.
 const STEPS_BY_CHANCE: f64 = 0.01;
 /// Steps of a joint's own that those of all joints count for.
@@ -178,13 +179,23 @@ impl PeriodWhitening {
             heights.map(|contrast| dot(&step.mean, contrast).powi(2)).sum::<f64>() / own
         };
         let squares: Vec<f64> = steps.iter_mut().map(square).collect();
-        let freedom = self.joints * (self.periods - 1);
-        let pooled = squares.iter().sum::<f64>() / self.joints as f64;
-        if upper_chi_squared(pooled * freedom as f64, freedom) > STEPS_BY_CHANCE {
+        let freedom = self.periods - 1;
+        let by_chance =
+            |square: f64, freedom: usize| upper_chi_squared(square * freedom as f64, freedom);
+        // One sensor that drifts says nothing of the others' noise.
+        let usual = median(&mut squares.clone()).unwrap_or(0.0);
+        let all_step = by_chance(usual, self.joints * freedom) < STEPS_BY_CHANCE;
+        let steps_alone =
+            |square: f64| by_chance(square, freedom) < STEPS_BY_CHANCE / self.joints as f64;
+        if !all_step && !squares.iter().any(|square| steps_alone(*square)) {
             return;
         }
-        for (step, square) in steps.iter_mut().zip(&squares) {
-            let square = (own * square + OF_ALL * pooled) / (own + OF_ALL);
+        for (step, &square) in steps.iter_mut().zip(&squares) {
+            let square = match (all_step, steps_alone(square)) {
+                (true, _) => (own * square + OF_ALL * usual) / (own + OF_ALL),
+                (false, true) => square,
+                (false, false) => 1.0,
+            };
             step.scale((square - 1.0).max(0.0).sqrt());
         }
         self.stepping = Some(RepeatingNoise::new(&steps));
@@ -193,7 +204,8 @@ impl PeriodWhitening {
 
     /// Takes torques that repeat in every period and whose heights have the standard deviation one for noise.
     pub fn with_repeating_noise<'c>(&mut self, torques: impl Iterator<Item = &'c Column>) {
-        // Steps of periods that follow each other take each other back, so that their mean has the first and the last end alone.
+        // Steps of periods that follow each other take each other back, so that their mean has the first and the last end alone: 1/P of one
+        // step's variance where noise forgets within a period, 2/P where its memory is as long as one.
         let mut steps = self.steps.clone();
         steps.iter_mut().for_each(|step| step.scale((2.0 / self.periods as f64).sqrt()));
         let images = torques.map(|torque| self.image_in_noise(torque));

@@ -21,6 +21,9 @@ impl RepeatingNoise {
             directions.push(column);
         });
         let k = directions.len();
+        if k == 0 {
+            return Self { directions, change: DMatrix::zeros(0, 0) };
+        }
         let coordinates =
             columns.iter().map(|column| DVector::from(directions.coordinates(column)));
         let mut covariance = DMatrix::identity(k, k);
