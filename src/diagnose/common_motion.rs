@@ -188,10 +188,8 @@ fn friction_noise(arm: &Arm, j: usize, own: &[f64], mean: &[f64]) -> Vec<f64> {
     let of_mean = mean.iter().cycle().zip(own);
     let mut noise: Vec<f64> =
         of_mean.map(|(mean, own)| scale * friction(mean + (own - mean) / scale)).collect();
-    for k in 0..n {
-        let common = noise[k..].iter().step_by(n).sum::<f64>() / periods as f64;
-        noise[k..].iter_mut().step_by(n).for_each(|noise| *noise -= common);
-    }
+    let common = mean_period(&noise, n);
+    noise.iter_mut().zip(common.iter().cycle()).for_each(|(noise, common)| *noise -= common);
     noise
 }
 

@@ -41,7 +41,7 @@ pub fn mend_torque(record: &mut Record) -> Vec<Strays> {
 pub fn mend_motion(record: &mut Record) -> Vec<Strays> {
     let joints = record.q_rad.joints();
     let even_s = step_s(&record.measurement(""));
-    let stamped: Vec<f64> = record.time_s.windows(2).map(|w| w[1] - w[0]).collect();
+    let stamped = steps(&record.time_s);
     let even: Vec<f64> = stamped.iter().map(|s| even_s * (s / even_s).round().max(1.0)).collect();
     let of_angle = |j: usize| {
         let (q, qd) = (record.q_rad.joint(j), record.qd_rad_s.joint(j));
@@ -56,7 +56,7 @@ pub fn mend_motion(record: &mut Record) -> Vec<Strays> {
             far_off(&beside.collect::<Vec<f64>>())
         });
         let mut far = by_all(q, far);
-        let usual_rad = sigma_of_changes(&q.windows(2).map(|w| w[1] - w[0]).collect::<Vec<f64>>());
+        let usual_rad = sigma_of_changes(&steps(q));
         far.retain(|stray| {
             let way_rad = STAMPS_OFF * qd[stray.row].abs() * even_s;
             stray.off.abs() > way_rad.max(SMALL_STRAY * usual_rad)
@@ -135,12 +135,16 @@ struct Stray {
 
 /// Values of `y` far off the median of nine, in rising order.
 fn far_off(y: &[f64]) -> Vec<Stray> {
-    let steps: Vec<f64> = y.windows(2).map(|w| w[1] - w[0]).collect();
-    let limit = FAR * sigma_of_changes(&steps);
+    let limit = FAR * sigma_of_changes(&steps(y));
     y.windows(2 * REACH + 1)
         .enumerate()
         .filter_map(|(k, window)| Some((k + REACH, median(&mut window.to_vec())?)))
         .map(|(row, instead)| Stray { row, off: y[row] - instead, instead })
         .filter(|stray| stray.off.abs() > limit)
         .collect()
+}
+
+/// From one value to the next.
+fn steps(y: &[f64]) -> Vec<f64> {
+    y.windows(2).map(|w| w[1] - w[0]).collect()
 }

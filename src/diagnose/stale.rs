@@ -132,7 +132,8 @@ fn of_joint(record: &Record, joint: usize) -> OfJoint {
     let Record { time_s, q_rad, qd_rad_s, torque_nm, .. } = record;
     let speed = qd_rad_s.joint(joint);
     let span_s = time_s.last().unwrap_or(&0.0) - time_s.first().unwrap_or(&0.0);
-    let reach = (NEAR_S * time_s.len() as f64 / span_s).clamp(1.0, time_s.len() as f64) as usize;
+    // A record without rows has no rate.
+    let reach = (NEAR_S * time_s.len() as f64 / span_s).max(1.0).min(time_s.len() as f64) as usize;
     // A reversal is no rest.
     let moves = |k: usize| {
         let near = k.saturating_sub(reach)..(k + reach).min(speed.len());
