@@ -11,10 +11,9 @@ use std::hint::black_box;
 use armid::dynamics::Motion;
 use armid::identify::covariance::CovarianceKind;
 use armid::identify::{
-    Assembler, ColumnPlan, Estimator, Fitter, Identifier, Measurement, Options, Problem, Weighting,
+    Assembler, ColumnPlan, Estimator, Fitter, Identifier, Options, Problem, Weighting,
 };
 use armid::montecarlo::{Scenario, Simulation};
-use armid::plant::Measured;
 use armid::signal::{FitScratch, PeriodicFit, find_period, replicate_noise};
 use rand::rngs::ChaCha8Rng;
 use rand::{Rng, SeedableRng};
@@ -78,16 +77,6 @@ fn median_ms(repeats: usize, mut call: impl FnMut()) -> Result<f64, Box<dyn Erro
     Ok(times[repeats / 2])
 }
 
-fn measurement(log: &Measured) -> Measurement<'_> {
-    Measurement {
-        source: "simulated log",
-        time_s: &log.time_s,
-        q_rad: &log.q_rad,
-        qd_rad_s: &log.qd_rad_s,
-        torque_nm: &log.torque_nm,
-    }
-}
-
 fn main() -> Result<(), Box<dyn Error>> {
     let repeats = std::env::args().nth(1).map_or(Ok(100), |n| n.parse::<usize>())?.max(1);
     let simulation = Simulation::run(Scenario::load(None)?)?;
@@ -104,9 +93,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         ..Options::default()
     };
     let mut identifier = Identifier::new(&model, set, wls);
-    let result = identifier.identify(&measurement(&log))?;
+    let result = identifier.identify(&log.measurement("simulated log"))?;
     let wls_periods_ms = median_ms(repeats, || {
-        black_box(identifier.identify(&measurement(&log)).ok());
+        black_box(identifier.identify(&log.measurement("simulated log")).ok());
     })?;
     let mut own = log.clone();
     let mut spectral = Identifier::new(&model, set, Options::default());
@@ -114,7 +103,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let default_trial_ms = median_ms(repeats, || {
         trial += 1;
         simulation.log_into(trial, &mut own).ok();
-        black_box(spectral.identify(&measurement(&own)).ok());
+        black_box(spectral.identify(&own.measurement("simulated log")).ok());
     })?;
 
     let noise_ms = median_ms(repeats, || {

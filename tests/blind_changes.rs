@@ -1,63 +1,28 @@
 //! Hide and find what any fit would absorb: against the simulation without it, or against a second log;
 //! and contacts, which no fit absorbs. Everything hidden is made by the plant.
 
-use armid::base::BaseSet;
-use armid::diagnose::{Cause, Diagnoser, Diagnosis, Kind, Nominal, Validation};
-use armid::dynamics::Model;
-use armid::identify::{Measurement, Options};
-use armid::montecarlo::{Scenario, Simulation};
-use armid::plant::Measured;
-use armid::robot::Arm;
+use armid::diagnose::{Cause, Diagnosis, Kind, Nominal, Validation};
+use armid::identify::Measurement;
 
-/// An arm and one log of it.
-struct Run {
-    arm: Arm,
-    set: BaseSet,
-    options: Options,
-    log: Measured,
+mod simulated;
+
+use simulated::{NOISE, Run, scenario};
+
+/// `periods` of the identification motion with the effects of `toml`.
+fn run(seed: u64, periods: usize, toml: &str) -> Run {
+    Run::new(scenario(("changes", seed), ("ur5_identification", periods), NOISE, toml))
 }
 
-impl Run {
-    /// `periods` of the identification motion with the effects of `toml`.
-    fn new(seed: u64, periods: usize, toml: &str) -> Self {
-        let text = format!(
-            "name = \"changes\"\nrobot = \"ur5\"\nseed = {seed}\ntrials = 1\n[motion]\n\
-             trajectory = \"ur5_identification\"\nperiods = {periods}\n[sensors]\n\
-             torque_sd_nm = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15]\nq_sd_rad = 2e-5\nqd_sd_rad_s = 1e-3\n{toml}"
-        );
-        let scenario = Scenario::from_toml(&text, "changes", std::path::Path::new(".")).unwrap();
-        let (arm, set) = (scenario.arm.clone(), scenario.set.clone());
-        let options = scenario.processing.clone();
-        let log = Simulation::run_once(scenario).unwrap().log(0).unwrap();
-        Self { arm, set, options, log }
+/// The diagnosis against the simulation of the nominal arm.
+fn against_nominal(run: &Run) -> Diagnosis {
+    let nominal = run.set.values(&run.model.standard_parameters());
+    let log = run.log.measurement("changes");
+    let finding = run.diagnoser().diagnose(&log, &[], Some(Nominal::certain(&nominal))).unwrap();
+    println!("{:#?}", finding.diagnosis.sentences);
+    for cause in &finding.diagnosis.causes {
+        println!("{} {:?} {:.1} {:?}", cause.kind, cause.joint, cause.strength, cause.parameters);
     }
-
-    fn measurement(&self) -> Measurement<'_> {
-        Measurement {
-            source: "changes",
-            time_s: &self.log.time_s,
-            q_rad: &self.log.q_rad,
-            qd_rad_s: &self.log.qd_rad_s,
-            torque_nm: &self.log.torque_nm,
-        }
-    }
-
-    /// The diagnosis against the simulation of the nominal arm.
-    fn against_nominal(&self) -> Diagnosis {
-        let model = Model::new(&self.arm);
-        let nominal = self.set.values(&model.standard_parameters());
-        let mut diagnoser = Diagnoser::new(&self.arm, &model, &self.set, self.options.clone());
-        let finding =
-            diagnoser.diagnose(&self.measurement(), &[], Some(Nominal::certain(&nominal))).unwrap();
-        println!("{:#?}", finding.diagnosis.sentences);
-        for cause in &finding.diagnosis.causes {
-            println!(
-                "{} {:?} {:.1} {:?}",
-                cause.kind, cause.joint, cause.strength, cause.parameters
-            );
-        }
-        finding.diagnosis
-    }
+    finding.diagnosis
 }
 
 fn strongest(d: &Diagnosis) -> &Cause {
@@ -75,7 +40,7 @@ fn assert_near(cause: &Cause, name: &str, truth: f64) {
 fn a_payload_is_named_against_the_simulation() {
     let toml = "[[effect]]\nkind = \"payload\"\nmass_kg = 1.5\ncom_x_m = 0.02\ncom_y_m = -0.03\n\
                 com_z_m = 0.06\n";
-    let d = Run::new(11, 4, toml).against_nominal();
+    let d = against_nominal(&run(11, 4, toml));
     let cause = strongest(&d);
     assert_eq!((cause.kind.name(), cause.joint), ("payload", None));
     assert_near(cause, "mass_kg", 1.5);
@@ -89,7 +54,7 @@ fn a_payload_is_named_against_the_simulation() {
 #[test]
 fn a_tilted_base_is_named_against_the_simulation() {
     let toml = "[[effect]]\nkind = \"base_tilt\"\ntilt_x_rad = 0.02\ntilt_y_rad = -0.01\n";
-    let d = Run::new(12, 4, toml).against_nominal();
+    let d = against_nominal(&run(12, 4, toml));
     let cause = strongest(&d);
     assert_eq!((cause.kind.name(), cause.joint), ("base_tilt", None));
     assert_near(cause, "tilt_x_rad", 0.02);
@@ -99,7 +64,7 @@ fn a_tilted_base_is_named_against_the_simulation() {
 #[test]
 fn a_wrong_gain_is_named_at_its_joint_against_the_simulation() {
     let toml = "[[effect]]\nkind = \"torque_gain\"\njoint = 3\nerror_fraction = 0.05\n";
-    let d = Run::new(13, 4, toml).against_nominal();
+    let d = against_nominal(&run(13, 4, toml));
     let cause = strongest(&d);
     assert_eq!((cause.kind.name(), cause.joint), ("torque_gain", Some(3)));
     assert_near(cause, "error_fraction", 0.05);
@@ -107,7 +72,7 @@ fn a_wrong_gain_is_named_at_its_joint_against_the_simulation() {
 
 #[test]
 fn nothing_is_named_against_the_simulation_that_made_the_log() {
-    let d = Run::new(14, 4, "").against_nominal();
+    let d = against_nominal(&run(14, 4, ""));
     assert!(d.causes.is_empty());
     // 52 parameters: the largest of as many |t| stays below 5 with a chance of 10⁻³ at most.
     assert!(d.moved_parameters.iter().all(|m| m.z.abs() < 5.0));
@@ -118,12 +83,11 @@ fn nothing_is_named_against_the_simulation_that_made_the_log() {
 /// the gravity.
 #[test]
 fn another_gravity_is_nothing_else() {
-    let run = Run::new(22, 4, "[[effect]]\nkind = \"gravity\"\ng_m_s2 = 9.2\n");
-    let model = Model::new(&run.arm);
-    let mut diagnoser = Diagnoser::new(&run.arm, &model, &run.set, run.options.clone());
-    let alone = diagnoser.diagnose(&run.measurement(), &[], None).unwrap().diagnosis;
+    let run = run(22, 4, "[[effect]]\nkind = \"gravity\"\ng_m_s2 = 9.2\n");
+    let log = run.log.measurement("changes");
+    let alone = run.diagnoser().diagnose(&log, &[], None).unwrap().diagnosis;
     assert!(!alone.causes.is_empty(), "{:?}", alone.sentences);
-    let named: Vec<_> = run.against_nominal().causes.into_iter().map(|cause| cause.kind).collect();
+    let named: Vec<_> = against_nominal(&run).causes.into_iter().map(|cause| cause.kind).collect();
     assert_eq!(named, [Kind::Gravity]);
 }
 
@@ -139,11 +103,11 @@ fn effects_beside_a_simulation_are_no_changes() {
         named
     };
     let effects = [(Kind::Stribeck, Some(4)), (Kind::LoadFriction, Some(2))];
-    let d = Run::new(31, 4, friction).against_nominal();
+    let d = against_nominal(&run(31, 4, friction));
     assert_eq!(named(&d), effects);
     // As above: nothing of it has moved a parameter.
     assert!(d.moved_parameters.iter().all(|m| m.z.abs() < 5.0), "{:?}", d.moved_parameters);
-    let d = Run::new(32, 4, &(friction.to_owned() + payload)).against_nominal();
+    let d = against_nominal(&run(32, 4, &(friction.to_owned() + payload)));
     assert_eq!(named(&d), [effects[0], effects[1], (Kind::Payload, None)]);
     let body = d.causes.iter().find(|c| c.kind == Kind::Payload).unwrap();
     assert_near(body, "mass_kg", 1.0);
@@ -156,14 +120,14 @@ fn says_that_contacts_are_not_looked_for(d: &Diagnosis) -> bool {
 /// Where two periods differ neither is the one that was touched.
 #[test]
 fn of_two_periods_contacts_are_not_looked_for() {
-    let mut run = Run::new(19, 3, "");
+    let mut run = run(19, 3, "");
     // The third is cut off.
     let rows = 0..3200;
     run.log.time_s.truncate(rows.end);
     for signals in [&mut run.log.q_rad, &mut run.log.qd_rad_s, &mut run.log.torque_nm] {
         *signals = signals.slice(rows.clone());
     }
-    let d = run.against_nominal();
+    let d = against_nominal(&run);
     assert!(says_that_contacts_are_not_looked_for(&d), "{:?}", d.warnings);
 }
 
@@ -172,14 +136,12 @@ fn of_two_periods_contacts_are_not_looked_for() {
 #[test]
 fn what_only_moves_the_parameters_gains_nothing() {
     let toml = "[[effect]]\nkind = \"link_length\"\njoint = 3\nerror_m = 0.005\n";
-    let (run, other) = (Run::new(20, 4, toml), Run::new(21, 3, toml));
-    let model = Model::new(&run.arm);
-    let nominal = run.set.values(&model.standard_parameters());
-    let held_out = [Validation { measurement: other.measurement(), manufacturer_nm: None }];
-    let mut diagnoser = Diagnoser::new(&run.arm, &model, &run.set, run.options.clone());
-    let finding = diagnoser
-        .diagnose(&run.measurement(), &held_out, Some(Nominal::certain(&nominal)))
-        .unwrap();
+    let (run, other) = (run(20, 4, toml), run(21, 3, toml));
+    let nominal = run.set.values(&run.model.standard_parameters());
+    let [log, other] = [&run, &other].map(|run| run.log.measurement("changes"));
+    let held_out = [Validation { measurement: other, manufacturer_nm: None }];
+    let finding =
+        run.diagnoser().diagnose(&log, &held_out, Some(Nominal::certain(&nominal))).unwrap();
     let d = &finding.diagnosis;
     assert!(finding.extension.effects.is_empty() && !d.causes.is_empty(), "{:?}", d.sentences);
     assert!(!d.sentences.iter().any(|s| s.contains("with what is named")), "{:?}", d.sentences);
@@ -189,15 +151,12 @@ fn what_only_moves_the_parameters_gains_nothing() {
 fn a_body_between_two_logs_is_weighed_and_scales_the_gains() {
     let body = "[[effect]]\nkind = \"payload\"\nmass_kg = 2.0\ncom_x_m = 0.01\ncom_y_m = 0.04\n\
                 com_z_m = 0.05\n";
-    let bare = Run::new(15, 3, "");
-    let loaded = Run::new(16, 3, body);
-    let other = Run::new(17, 3, "");
-    let model = Model::new(&bare.arm);
-    let mut diagnoser = Diagnoser::new(&bare.arm, &model, &bare.set, bare.options.clone());
-    let finding = diagnoser.diagnose(&bare.measurement(), &[], None).unwrap();
-    let mut against = |run: &Run| {
-        diagnoser.payload(&finding, &bare.measurement(), &run.measurement(), Some(2.0)).unwrap()
-    };
+    let runs = [(15, ""), (16, body), (17, "")].map(|(seed, body)| run(seed, 3, body));
+    let [bare, loaded, other] = [0, 1, 2].map(|k| runs[k].log.measurement("changes"));
+    let mut diagnoser = runs[0].diagnoser();
+    let finding = diagnoser.diagnose(&bare, &[], None).unwrap();
+    let mut against =
+        |log: &Measurement| diagnoser.payload(&finding, &bare, log, Some(2.0)).unwrap();
     let weighed = against(&loaded);
     println!("{weighed:#?}");
     let cause = weighed.cause().expect("a body is named");
@@ -211,10 +170,9 @@ fn a_body_between_two_logs_is_weighed_and_scales_the_gains() {
     assert!(!none.is_named && none.cause().is_none(), "{none:?}");
 
     // The other way round there is less than nothing on the flange, and the model fits the first log alone.
-    let bare_run = [Validation { measurement: bare.measurement(), manufacturer_nm: None }];
-    let of_loaded = diagnoser.diagnose(&loaded.measurement(), &bare_run, None).unwrap();
-    let swapped =
-        diagnoser.payload(&of_loaded, &loaded.measurement(), &bare.measurement(), None).unwrap();
+    let bare_run = [Validation { measurement: bare, manufacturer_nm: None }];
+    let of_loaded = diagnoser.diagnose(&loaded, &bare_run, None).unwrap();
+    let swapped = diagnoser.payload(&of_loaded, &loaded, &bare, None).unwrap();
     assert!(swapped.mass_kg.value < 0.0 && swapped.cause().is_none(), "{swapped:?}");
     assert!(swapped.sentences()[0].contains("swapped"), "{:?}", swapped.sentences());
     let said = &of_loaded.diagnosis.sentences;
@@ -226,7 +184,7 @@ fn a_push_is_found_when_and_where_it_was() {
     // 20 s to 20.5 s: the third period of a motion of 10 s that begins after its run-in.
     let toml =
         "[[effect]]\nkind = \"contact\"\njoint = 2\nstart_s = 24.0\nend_s = 24.5\npeak_nm = 25.0\n";
-    let d = Run::new(18, 4, toml).against_nominal();
+    let d = against_nominal(&run(18, 4, toml));
     let touched: Vec<&Cause> = d.causes.iter().filter(|c| c.kind.name() == "contact").collect();
     assert_eq!(touched.len(), 1);
     let start_s = touched[0].parameters["start_s"].value;

@@ -2,12 +2,12 @@
 //! the log alone.
 
 use armid::diagnose::candidates::{self, Candidate};
-use armid::diagnose::{Diagnoser, Diagnosis, Kind, Verdict};
-use armid::dynamics::Model;
-use armid::identify::Measurement;
-use armid::montecarlo::{Scenario, Simulation};
-use armid::robot::JointSignals;
+use armid::diagnose::{Diagnosis, Kind, Verdict};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+
+mod simulated;
+
+use simulated::{NOISE, Run, scenario};
 
 /// A scenario with white noise and the effects of `toml`.
 fn diagnose(seed: u64, toml: &str) -> Diagnosis {
@@ -35,41 +35,15 @@ fn diagnose_by(
     (trajectory, seed, toml): (&str, u64, &str),
     rows: impl Fn(usize, &mut ChaCha8Rng) -> Vec<usize>,
 ) -> Diagnosis {
-    let text = format!(
-        r#"
-        name = "blind"
-        robot = "ur5"
-        seed = {seed}
-        trials = 1
-        [motion]
-        trajectory = "{trajectory}"
-        periods = 6
-        [sensors]
-        torque_sd_nm = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15]
-        q_sd_rad = 2e-5
-        qd_sd_rad_s = 1e-3
-        {toml}
-        "#
-    );
-    let scenario = Scenario::from_toml(&text, "blind", std::path::Path::new(".")).unwrap();
-    let (arm, set) = (scenario.arm.clone(), scenario.set.clone());
-    let options = scenario.processing.clone();
-    let log = Simulation::run_once(scenario).unwrap().log(0).unwrap();
-    let rows = rows(log.time_s.len(), &mut ChaCha8Rng::seed_from_u64(seed));
-    let of = |s: &JointSignals| {
-        JointSignals::from_fn(s.joints(), rows.len(), |j, k| s.joint(j)[rows[k]])
-    };
-    let time_s: Vec<f64> = rows.iter().map(|&row| log.time_s[row]).collect();
-    let measurement = Measurement {
-        source: "blind",
-        time_s: &time_s,
-        q_rad: &of(&log.q_rad),
-        qd_rad_s: &of(&log.qd_rad_s),
-        torque_nm: &of(&log.torque_nm),
-    };
-    let model = Model::new(&arm);
-    let mut diagnoser = Diagnoser::with_families(&arm, &model, &set, options, families);
-    diagnoser.diagnose(&measurement, &[], None).unwrap().diagnosis
+    let mut run = Run::new(scenario(("blind", seed), (trajectory, 6), NOISE, toml));
+    let rows = rows(run.log.time_s.len(), &mut ChaCha8Rng::seed_from_u64(seed));
+    let log = &mut run.log;
+    log.time_s = rows.iter().map(|&row| log.time_s[row]).collect();
+    for signals in [&mut log.q_rad, &mut log.qd_rad_s, &mut log.torque_nm] {
+        *signals = signals.map_joints(|_, y| rows.iter().map(|&row| y[row]).collect());
+    }
+    let mut diagnoser = run.diagnoser_with(families);
+    diagnoser.diagnose(&run.log.measurement("blind"), &[], None).unwrap().diagnosis
 }
 
 /// One effect of `kind` at a joint drawn from `joints`, with `parameters`.

@@ -1,19 +1,13 @@
 //! Hide and find: what a recorder, a sensor or its noise does to a log is not taken for physics, and physics that all joints have
 //! not for the recorder's.
 
-use armid::diagnose::{Diagnoser, Diagnosis, Kind};
-use armid::dynamics::Model;
-use armid::identify::Measurement;
-use armid::montecarlo::{Scenario, Simulation};
+use armid::diagnose::{Diagnosis, Kind};
 use armid::plant::Measured;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
-/// Of the sensors but for their seeds.
-const SENSORS: &str = r#"
-    torque_sd_nm = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15]
-    q_sd_rad = 2e-5
-    qd_sd_rad_s = 1e-3
-"#;
+mod simulated;
+
+use simulated::{NOISE, Run, TORQUE_NOISE, scenario};
 
 /// The log of six periods behind `sensors`, with the effects of `rest`, changed by `change`.
 fn diagnose(
@@ -21,35 +15,10 @@ fn diagnose(
     (sensors, rest): (&str, &str),
     change: impl Fn(&mut Measured, &mut ChaCha8Rng),
 ) -> Diagnosis {
-    let text = format!(
-        r#"
-        name = "blind"
-        robot = "ur5"
-        seed = {seed}
-        trials = 1
-        [motion]
-        trajectory = "ur5_identification"
-        periods = 6
-        [sensors]
-        {sensors}
-        {rest}
-        "#
-    );
-    let scenario = Scenario::from_toml(&text, "blind", std::path::Path::new(".")).unwrap();
-    let (arm, set) = (scenario.arm.clone(), scenario.set.clone());
-    let options = scenario.processing.clone();
-    let mut log = Simulation::run_once(scenario).unwrap().log(0).unwrap();
-    change(&mut log, &mut ChaCha8Rng::seed_from_u64(seed));
-    let measurement = Measurement {
-        source: "blind",
-        time_s: &log.time_s,
-        q_rad: &log.q_rad,
-        qd_rad_s: &log.qd_rad_s,
-        torque_nm: &log.torque_nm,
-    };
-    let model = Model::new(&arm);
-    let mut diagnoser = Diagnoser::new(&arm, &model, &set, options);
-    let diagnosis = diagnoser.diagnose(&measurement, &[], None).unwrap().diagnosis;
+    let mut run = Run::new(scenario(("blind", seed), ("ur5_identification", 6), sensors, rest));
+    change(&mut run.log, &mut ChaCha8Rng::seed_from_u64(seed));
+    let diagnosis =
+        run.diagnoser().diagnose(&run.log.measurement("blind"), &[], None).unwrap().diagnosis;
     println!("{:#?}", diagnosis.sentences);
     diagnosis
 }
@@ -66,12 +35,10 @@ fn named(diagnosis: &Diagnosis) -> Vec<(Kind, Option<usize>)> {
 /// three none is in 991 of 1000.
 #[test]
 fn steep_noise_is_no_fault() {
-    let steep = format!(
-        "{SENSORS}\n[sensors.torque_noise]\n\
-         components = [{{ share = 1.0, colour = {{ ar1 = {{ time_constant_s = 0.5 }} }} }}]"
-    );
+    let steep = "[sensors.torque_noise]\n\
+                 components = [{ share = 1.0, colour = { ar1 = { time_constant_s = 0.5 } } }]";
     for seed in [301, 302, 303] {
-        let diagnosis = diagnose(seed, (&steep, ""), as_recorded);
+        let diagnosis = diagnose(seed, (NOISE, steep), as_recorded);
         assert_eq!(named(&diagnosis), [], "seed {seed}");
         assert!(diagnosis.unexplained.is_none(), "seed {seed}");
     }
@@ -80,9 +47,8 @@ fn steep_noise_is_no_fault() {
 /// Angles in steps of 10 µrad of an arm that moves alike to far less in every period: no scatter between periods shows the rounding.
 #[test]
 fn rounded_angles_of_a_motion_that_repeats_exactly_are_no_fault() {
-    let rounded = "torque_sd_nm = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15]\nq_sd_rad = 0.0\n\
-                   q_step_rad = 1e-5\nqd_sd_rad_s = 1e-3";
-    let diagnosis = diagnose(311, (rounded, ""), as_recorded);
+    let rounded = format!("{TORQUE_NOISE}q_step_rad = 1e-5\nqd_sd_rad_s = 1e-3");
+    let diagnosis = diagnose(311, (&rounded, ""), as_recorded);
     assert_eq!(named(&diagnosis), []);
     assert!(diagnosis.unexplained.is_none());
 }
@@ -94,7 +60,7 @@ fn presliding_of_all_joints_is_no_clock() {
         format!("[[effect]]\nkind = \"presliding\"\njoint = {joint}\nstiffness_per_rad = 300.0\n")
     };
     let everywhere: String = (1..=6).map(of_joint).collect();
-    let diagnosis = diagnose(321, (SENSORS, &everywhere), as_recorded);
+    let diagnosis = diagnose(321, (NOISE, &everywhere), as_recorded);
     let named = named(&diagnosis);
     for joint in 1..=6 {
         assert!(named.contains(&(Kind::Presliding, Some(joint))), "joint {joint}: {named:?}");
@@ -105,7 +71,7 @@ fn presliding_of_all_joints_is_no_clock() {
 /// One in five readings of the torque of one joint, drawn by chance, is the one before.
 #[test]
 fn torque_readings_that_repeat_are_no_physics() {
-    let diagnosis = diagnose(331, (SENSORS, ""), |log, rng| {
+    let diagnosis = diagnose(331, (NOISE, ""), |log, rng| {
         let torque = log.torque_nm.joint_mut(2);
         for k in 1..torque.len() {
             if rng.random_bool(0.2) {
@@ -122,7 +88,7 @@ fn torque_readings_that_repeat_are_no_physics() {
 /// The torque sensor of one joint hangs for two seconds.
 #[test]
 fn a_torque_that_hangs_is_no_contact() {
-    let diagnosis = diagnose(341, (SENSORS, ""), |log, _| {
+    let diagnosis = diagnose(341, (NOISE, ""), |log, _| {
         let from = log.time_s.partition_point(|t| *t < 22.0);
         let to = log.time_s.partition_point(|t| *t < 24.0);
         let torque = log.torque_nm.joint_mut(1);
@@ -135,7 +101,7 @@ fn a_torque_that_hangs_is_no_contact() {
 /// One in a hundred angles of every joint is off by 40 mrad either way.
 #[test]
 fn wild_angles_are_outliers_and_no_clock() {
-    let diagnosis = diagnose(351, (SENSORS, ""), |log, rng| {
+    let diagnosis = diagnose(351, (NOISE, ""), |log, rng| {
         for j in 0..log.q_rad.joints() {
             for q in log.q_rad.joint_mut(j) {
                 if rng.random_bool(0.01) {

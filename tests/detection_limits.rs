@@ -1,37 +1,26 @@
 //! The limits that a diagnosis prints, in the plant: an effect of that size is as strong as it says.
 
-use std::path::Path;
-
 use armid::diagnose::{DetectionLimit, Diagnoser};
 use armid::dynamics::Model;
-use armid::identify::Measurement;
 use armid::montecarlo::{Scenario, Simulation};
+
+mod simulated;
+
+use simulated::{TORQUE_NOISE, scenario};
 
 /// Four periods of an arm with `effects`.
 fn run(effects: &str) -> Simulation {
-    let text = format!(
-        "name = 'limits'\nrobot = 'ur5'\nseed = 5\ntrials = 1\n\
-         [motion]\ntrajectory = 'ur5_identification'\nperiods = 4\n\
-         [sensors]\ntorque_sd_nm = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15]\n{effects}"
-    );
-    let scenario = Scenario::from_toml(&text, "limits", Path::new("")).unwrap();
-    Simulation::run_once(scenario).unwrap()
+    let along = ("ur5_identification", 4);
+    Simulation::run_once(scenario(("limits", 5), along, TORQUE_NOISE, effects)).unwrap()
 }
 
 /// Of the log of `clean`.
 fn limits_of(clean: &Simulation) -> Vec<DetectionLimit> {
     let Scenario { arm, set, processing, .. } = &clean.scenario;
     let log = clean.log(0).unwrap();
-    let measurement = Measurement {
-        source: "limits",
-        time_s: &log.time_s,
-        q_rad: &log.q_rad,
-        qd_rad_s: &log.qd_rad_s,
-        torque_nm: &log.torque_nm,
-    };
     let model = Model::new(arm);
     let mut diagnoser = Diagnoser::new(arm, &model, set, processing.clone());
-    diagnoser.diagnose(&measurement, &[], None).unwrap().diagnosis.detection_limits
+    diagnoser.diagnose(&log.measurement("limits"), &[], None).unwrap().diagnosis.detection_limits
 }
 
 /// What the plant does with an effect of the size of its limit has the √λ that goes with it, however different the plant's way of

@@ -1,17 +1,15 @@
 //! The size of a hidden effect in units of the noise.
 
-use std::path::Path;
+use armid::montecarlo::{EffectSize, Simulation};
 
-use armid::montecarlo::{EffectSize, Scenario, Simulation};
+mod simulated;
+
+use simulated::{TORQUE_NOISE, scenario};
 
 /// One period of the default scenario's motion, with its own noise.
 fn size_of(effects: &str, noise: &str) -> EffectSize {
-    let text = format!(
-        "name = 'size'\nrobot = 'ur5'\nseed = 1\ntrials = 1\n\
-         [motion]\ntrajectory = 'ur5_identification'\nperiods = 1\n\
-         [sensors]\ntorque_sd_nm = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15]\n{noise}\n{effects}"
-    );
-    let scenario = Scenario::from_toml(&text, "test", Path::new("")).unwrap();
+    let sensors = TORQUE_NOISE.to_owned() + noise;
+    let scenario = scenario(("size", 1), ("ur5_identification", 1), &sensors, effects);
     Simulation::run(scenario).unwrap().effect_size().unwrap()
 }
 
@@ -65,12 +63,7 @@ fn a_log_that_repeats_need_not_be_integrated() {
     let effects = "[[effect]]\nkind='presliding'\njoint=4\nstiffness_per_rad=300\n\
                    [[effect]]\nkind='elasticity'\njoint=2\nstiffness_nm_rad=8000\n\
                    [[effect]]\nkind='time_skew'\njoint=3\ndelay_s=-0.004";
-    let text = format!(
-        "name = 'size'\nrobot = 'ur5'\nseed = 1\ntrials = 1\n\
-         [motion]\ntrajectory = 'ur5_identification'\nperiods = 2\n\
-         [sensors]\ntorque_sd_nm = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15]\n{effects}"
-    );
-    let scenario = || Scenario::from_toml(&text, "test", Path::new("")).unwrap();
+    let scenario = || scenario(("size", 1), ("ur5_identification", 2), TORQUE_NOISE, effects);
     let whole = Simulation::run(scenario()).unwrap();
     let copied = Simulation::run_once(scenario()).unwrap();
     assert_eq!(whole.recording.time_s.len(), copied.recording.time_s.len());

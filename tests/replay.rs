@@ -18,12 +18,14 @@ use armid::diagnose::replay::{Replay, ReplayedLog};
 use armid::diagnose::{Diagnoser, Finding, Kind, Validation};
 use armid::dynamics::Model;
 use armid::excitation::{FourierSeries, Reference};
-use armid::identify::{Identifier, Measurement, Options};
+use armid::identify::{Identifier, Options};
 use armid::montecarlo::Scenario;
 use armid::plant::faults::FaultyPlant;
 use armid::plant::{Measured, PerJoint, PlantConfig, Recording, SensorConfig, Sensors};
 use armid::random::TrialStreams;
 use armid::robot::JointSignals;
+
+mod simulated;
 
 const RATE_HZ: f64 = 125.0;
 const PERIOD: usize = 1250;
@@ -40,11 +42,7 @@ struct Hidden {
 
 /// `effects` as in a scenario.
 fn hide(trajectory: &str, effects: &str, seed: u64) -> Hidden {
-    let text = format!(
-        "name = \"replay\"\nrobot = \"ur5\"\nseed = 1\ntrials = 1\n[motion]\ntrajectory = \
-         \"{trajectory}\"\nperiods = 1\n{effects}"
-    );
-    let scenario = Scenario::from_toml(&text, "replay", std::path::Path::new(".")).unwrap();
+    let scenario = simulated::scenario(("replay", 1), (trajectory, 1), "", effects);
     let series = FourierSeries::built_in(trajectory).unwrap();
     // One period, entered a second before it begins, and then again and again.
     let periodic = Periodic { series, lead_s: LEAD as f64 / RATE_HZ };
@@ -85,16 +83,6 @@ impl Reference for Periodic {
     }
 }
 
-fn measurement<'a>(source: &'a str, log: &'a Measured) -> Measurement<'a> {
-    Measurement {
-        source,
-        time_s: &log.time_s,
-        q_rad: &log.q_rad,
-        qd_rad_s: &log.qd_rad_s,
-        torque_nm: &log.torque_nm,
-    }
-}
-
 /// Σ_j (rms of simulated minus true torque / σ_j)² along one period of `log`.
 fn off(simulated_nm: &JointSignals, hidden: &Hidden, start_s: f64) -> f64 {
     let first = (start_s * RATE_HZ).round() as usize;
@@ -111,7 +99,7 @@ fn off(simulated_nm: &JointSignals, hidden: &Hidden, start_s: f64) -> f64 {
 
 /// Σ_j mean_k (x V xᵀ)/σ_j² along `log`, and where its periods start, s.
 fn known_to(finding: &Finding, identifier: &mut Identifier, log: &Measured) -> (f64, f64) {
-    let regression = identifier.regression(&measurement("known", log)).unwrap();
+    let regression = identifier.regression(&log.measurement("known")).unwrap();
     let problem = &regression.problem;
     let factor = finding.identification.covariance.matrix.clone().cholesky().unwrap().l();
     let mut sum = 0.0;
@@ -170,14 +158,14 @@ fn close(case: &Case) -> Replay {
     let full = armid::base::Parameterisation::full(6, false);
     let set = armid::base::BaseSet::find(&arm, full).unwrap();
     let mut diagnoser = Diagnoser::new(&arm, &model, &set, Options::default());
-    let finding = diagnoser.diagnose(&measurement("log", &hidden.log), &[], None).unwrap();
+    let finding = diagnoser.diagnose(&hidden.log.measurement("log"), &[], None).unwrap();
     println!("{:#?}", finding.diagnosis.sentences);
     let named: Vec<_> = finding.diagnosis.causes.iter().map(|c| (c.kind, c.joint)).collect();
     assert_eq!(named, [(case.kind, Some(case.joint))]);
     println!("√λ {:.0}", finding.diagnosis.causes[0].strength);
     let validations: Vec<Validation> = other
         .iter()
-        .map(|h| Validation { measurement: measurement("other", &h.log), manufacturer_nm: None })
+        .map(|h| Validation { measurement: h.log.measurement("other"), manufacturer_nm: None })
         .collect();
     let replay = diagnoser.replay(&finding, &validations).unwrap();
     println!("{:#?} {:?}", replay.sentences(), replay.arm_distance);
@@ -244,7 +232,7 @@ fn the_extended_simulation_is_a_scenario() {
     let set = armid::base::BaseSet::find(&arm, full).unwrap();
     let options = Options::default();
     let mut diagnoser = Diagnoser::new(&arm, &model, &set, options.clone());
-    let log = measurement("log", &hidden.log);
+    let log = hidden.log.measurement("log");
     let finding = diagnoser.diagnose(&log, &[], None).unwrap();
     println!("{:#?}", finding.diagnosis.sentences);
     let simulation = diagnoser.extended_simulation(&finding).unwrap();

@@ -2,34 +2,27 @@
 
 use armid::dynamics::Model;
 use armid::identify::covariance::Covariance;
-use armid::identify::{
-    Identification, Identifier, Measurement, Regression, Several, each_alone, pooled,
-};
-use armid::montecarlo::{Scenario, Simulation};
+use armid::identify::{Identification, Identifier, Regression, Several, each_alone, pooled};
+use armid::montecarlo::Simulation;
 use armid::plant::Measured;
+
+mod simulated;
+
+use simulated::scenario;
 
 /// Four periods of `trajectory`, with noise that remembers and that joints share, `times` as loud as on the UR5.
 fn simulation(trajectory: &str, times: f64, effects: &str) -> Simulation {
     let sd_nm = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15].map(|sd| times * sd);
-    let text = format!(
-        "name = \"several\"\nrobot = \"ur5\"\nseed = 11\ntrials = 1\n[motion]\ntrajectory = \"{trajectory}\"\n\
-         periods = 4\n[sensors]\ntorque_sd_nm = {sd_nm:?}\nq_sd_rad = 2e-5\nqd_sd_rad_s = 1e-3\n\
-         [sensors.torque_noise]\ncomponents = [{{ share = 0.5, colour = \"white\" }}, \
+    let sensors = format!("torque_sd_nm = {sd_nm:?}\nq_sd_rad = 2e-5\nqd_sd_rad_s = 1e-3");
+    let rest = format!(
+        "[sensors.torque_noise]\ncomponents = [{{ share = 0.5, colour = \"white\" }}, \
          {{ share = 0.5, colour = {{ ar1 = {{ time_constant_s = 0.1 }} }} }}]\ncross_joint_correlation = 0.3\n{effects}"
     );
-    let scenario = Scenario::from_toml(&text, "several", std::path::Path::new(".")).unwrap();
-    Simulation::run_once(scenario).unwrap()
+    Simulation::run_once(scenario(("several", 11), (trajectory, 4), &sensors, &rest)).unwrap()
 }
 
 fn laid_out(identifier: &mut Identifier, log: &Measured) -> Regression {
-    let measurement = Measurement {
-        source: "several",
-        time_s: &log.time_s,
-        q_rad: &log.q_rad,
-        qd_rad_s: &log.qd_rad_s,
-        torque_nm: &log.torque_nm,
-    };
-    identifier.regression(&measurement).unwrap()
+    identifier.regression(&log.measurement("several")).unwrap()
 }
 
 /// Of each log alone, and of all together.

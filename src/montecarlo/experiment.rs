@@ -9,7 +9,7 @@ use super::tally::{Outcome, Tally};
 use super::trials::{Content, Difference, Trials};
 use crate::dynamics::Model;
 use crate::identify::covariance::CovarianceKind;
-use crate::identify::{Estimator, Identification, Identifier, IdentifyError, Measurement, Options};
+use crate::identify::{Estimator, Identification, Identifier, IdentifyError, Options};
 use crate::plant::{Measured, PlantError};
 
 /// A scenario whose plant has run: what all trials share.
@@ -130,13 +130,7 @@ impl Worker<'_> {
     pub fn identify(&mut self, trial: u64) -> Result<Identification, TrialError> {
         let experiment = self.experiment;
         experiment.simulation.log_into(trial, &mut self.measured)?;
-        Ok(self.identifier.identify(&Measurement {
-            source: "simulated log",
-            time_s: &self.measured.time_s,
-            q_rad: &self.measured.q_rad,
-            qd_rad_s: &self.measured.qd_rad_s,
-            torque_nm: &self.measured.torque_nm,
-        })?)
+        Ok(self.identifier.identify(&self.measured.measurement("simulated log"))?)
     }
 
     /// Runs trial `trial` and compares with the truth.

@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use super::scenario::Scenario;
+use crate::identify::Measurement;
 use crate::plant::faults::FaultyPlant;
 use crate::plant::{Measured, PlantError, Recording, SensorConfig, Sensors, TorqueNoise};
 use crate::random::TrialStreams;
@@ -89,5 +90,18 @@ impl Simulation {
         self.sensors.measure(&recording, &streams, log);
         self.plant.spoil(&streams, log);
         Ok(())
+    }
+}
+
+impl Measured {
+    /// As identification and diagnosis read it; `source` names it in messages.
+    pub fn measurement<'a>(&'a self, source: &'a str) -> Measurement<'a> {
+        Measurement {
+            source,
+            time_s: &self.time_s,
+            q_rad: &self.q_rad,
+            qd_rad_s: &self.qd_rad_s,
+            torque_nm: &self.torque_nm,
+        }
     }
 }

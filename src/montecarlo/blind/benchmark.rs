@@ -156,14 +156,6 @@ impl BlindWorker<'_> {
         let Benchmark { plan, model, .. } = self.benchmark;
         let Scenario { arm, set, processing, .. } = &plan.base;
         let mut diagnoser = Diagnoser::with_families(arm, model, set, processing.clone(), families);
-        let log = &self.log;
-        let measurement = Measurement {
-            source: "hidden",
-            time_s: &log.time_s,
-            q_rad: &log.q_rad,
-            qd_rad_s: &log.qd_rad_s,
-            torque_nm: &log.torque_nm,
-        };
         let held_out: Vec<Validation> = held_out
             .iter()
             .map(|run| Validation {
@@ -177,7 +169,7 @@ impl BlindWorker<'_> {
                 manufacturer_nm: None,
             })
             .collect();
-        Ok(diagnoser.diagnose(&measurement, &held_out, simulation)?.diagnosis)
+        Ok(diagnoser.diagnose(&self.log.measurement("hidden"), &held_out, simulation)?.diagnosis)
     }
 
     /// The noise-free run of the same arm along the next motion, where the case is one of those whose

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::identify::covariance::CovarianceKind as C;
-use crate::identify::{Estimate, Estimator as E, Floor, Identifier, LackOfFit, Measurement};
+use crate::identify::{Estimate, Estimator as E, Floor, Identifier, LackOfFit};
 use crate::montecarlo::calibration::{Calibration, wilson};
 use crate::montecarlo::efficiency::Efficiency;
 use crate::montecarlo::experiment::{Experiment, TrialError};
@@ -197,13 +197,7 @@ impl<'a> Bench<'a> {
 
     fn estimate(&mut self, trial: u64, requests: &[(E, Vec<C>)]) -> Result<Estimates, TrialError> {
         self.experiment.simulation.log_into(trial, &mut self.measured)?;
-        let measurement = Measurement {
-            source: "simulated log",
-            time_s: &self.measured.time_s,
-            q_rad: &self.measured.q_rad,
-            qd_rad_s: &self.measured.qd_rad_s,
-            torque_nm: &self.measured.torque_nm,
-        };
+        let measurement = self.measured.measurement("simulated log");
         let estimates = self.identifier.compare(&measurement, requests)?;
         Ok(estimates.into_iter().map(|e| e.map_err(TrialError::from)).collect())
     }

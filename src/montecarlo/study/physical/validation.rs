@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use crate::excitation::{Excitation, FourierSeries, Requirements};
-use crate::identify::{Identifier, Measurement, Options, Problem, Triangle};
+use crate::identify::{Identifier, Options, Problem, Triangle};
 use crate::montecarlo::experiment::TrialError;
 use crate::montecarlo::scenario::{Scenario, ScenarioError};
 use crate::montecarlo::simulation::Simulation;
@@ -28,15 +28,9 @@ impl Validation {
         let log = simulation.log(0).map_err(TrialError::from)?;
         let options = Options { period_s: Some(0.0), ..scenario.processing.clone() };
         let model = crate::dynamics::Model::new(arm);
-        let measurement = Measurement {
-            source: trajectory,
-            time_s: &log.time_s,
-            q_rad: &log.q_rad,
-            qd_rad_s: &log.qd_rad_s,
-            torque_nm: &log.torque_nm,
-        };
         let mut identifier = Identifier::new(&model, &scenario.set, options);
-        let regression = identifier.regression(&measurement).map_err(TrialError::from)?;
+        let regression =
+            identifier.regression(&log.measurement(trajectory)).map_err(TrialError::from)?;
         Ok(Self { triangle: reduced(&regression.problem) })
     }
 
