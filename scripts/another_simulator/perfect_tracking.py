@@ -360,6 +360,7 @@ def main():
             small = strength is not None and strength < 8
             counts[kind]["small" if small else verdict] += 1
             counts[kind]["small, wrong"] += small and verdict == "wrong"
+            counts[kind]["right, rest"] += not small and verdict == "right" and bool(answer["unexplained"])
             told = [] if small else intervals(case, answer)
             for name, truth, value, holds in told:
                 counts[kind]["told"] += 1
@@ -375,6 +376,7 @@ def report(args, counts, misses):
     verdicts = ["right", "more", "unexplained", "silent", "wrong"]
     total = sum((c for kind, c in counts.items() if kind != "nothing"), collections.Counter())
     seen, clean = sum(total[v] for v in verdicts), counts["nothing"]
+    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True).stdout.strip()
     lines = [
         "# Logs of an arm that follows its motion perfectly",
         "",
@@ -385,7 +387,10 @@ def report(args, counts, misses):
         "",
         f"    python3 scripts/another_simulator/perfect_tracking.py --seed {args.seed} --rounds {args.rounds} --out reports/perfect_tracking.md",
         "",
-        f"**Of {seen} logs with an effect of √λ ≥ 8 or a fault of the record {total['right']} name what was hidden and nothing else; of"
+        f"with the program of commit {commit}.",
+        "",
+        f"**Of {seen} logs with an effect of √λ ≥ 8 or a fault of the record {total['right']} name what was hidden and nothing else, {total['right, rest']} of these"
+        f" with something left unexplained beside it; of"
         f" {sum(clean[v] for v in verdicts)} without any {clean['right']} are given nothing; the intervals hold {total['held']} of"
         f" {total['told']} of the hidden parameters.**",
         "",

@@ -142,7 +142,9 @@ def main():
     with ProcessPoolExecutor(2) as pool:
         answers = list(pool.map(diagnosed, jobs))
     right = [is_right(job[3], answer["causes"]) for job, answer in zip(jobs, answers)]
+    beside = sum(1 for is_it, answer in zip(right, answers) if is_it and unexplained(answer))
     counts = [held(job[3], answer["causes"]) for job, answer in zip(jobs, answers)]
+    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True).stdout.strip()
     lines = [
         "# Logs of another simulator",
         "",
@@ -151,7 +153,10 @@ def main():
         "",
         "    python3 scripts/another_simulator/study.py --out reports/another_simulator.md",
         "",
-        f"**What was hidden, and nothing else, is named in {sum(right)} of {len(right)} logs; the intervals hold "
+        f"with the program of commit {commit}.",
+        "",
+        f"**What was hidden, and nothing else, is named in {sum(right)} of {len(right)} logs, in {beside} of them with something "
+        f"left unexplained beside it; the intervals hold "
         f"{sum(c[0] for c in counts)} of {sum(c[1] for c in counts)} of the hidden parameters.**",
     ]
     for s, (name, _) in enumerate(SETTINGS):
@@ -165,7 +170,7 @@ def main():
                 f"| {hidden_in_words(jobs[r][3])} | {named_in_words(answers[r]['causes'])}{rest} | {'yes' if right[r] else 'no'} |"
             )
     options.out.write_text("\n".join(lines) + "\n")
-    print(lines[7])
+    print(next(line for line in lines if line.startswith("**")))
 
 
 def unexplained(answer):

@@ -66,7 +66,7 @@ pub struct ExciteArgs {
     /// Length of the data that will be recorded, s.
     #[arg(long = "data", value_name = "S", default_value_t = 80.0)]
     data_s: f64,
-    /// Rate of the data and of the CSV, Hz.
+    /// Rate of the data, of the CSV and of the set points in the URScript, Hz: a CB-series controller takes 125, an e-Series up to 500.
     #[arg(long = "rate", value_name = "HZ", default_value_t = 125.0)]
     rate_hz: f64,
     /// Result of an earlier identification: design for what is still poorly known.
@@ -87,7 +87,7 @@ pub struct ExciteArgs {
     /// Threads; 0: all cores. The result does not depend on it.
     #[arg(long, default_value_t = 0)]
     threads: u16,
-    /// Trajectory file, for `simulate` and `montecarlo`.
+    /// Trajectory file; a scenario for `simulate` and `montecarlo` names it as `[motion] trajectory`.
     #[arg(long, value_name = "FILE.json")]
     out: PathBuf,
     /// Samples of the whole motion.

@@ -72,16 +72,16 @@ pub struct SourceArgs {
 /// How logs are processed.
 #[derive(Debug, Args)]
 pub struct ProcessingArgs {
-    /// Low-pass on torque and regressor of a single run, Hz.
+    /// Low-pass on torque and regressor of a single run, Hz [default: 10]; a motion that repeats needs none.
     #[arg(long = "cutoff", value_name = "HZ")]
     cutoff_hz: Option<f64>,
-    /// Rate the log is resampled to, Hz; its own where left out.
+    /// Rate the log is resampled to, Hz. Left out: its own; logs above 300 Hz are decimated to 150 to 300 Hz.
     #[arg(long = "rate", value_name = "HZ")]
     rate_hz: Option<f64>,
     /// Period of the motion, s; found where left out, 0 to treat it as a single run.
     #[arg(long = "period", value_name = "S")]
     period_s: Option<f64>,
-    /// Estimator.
+    /// Estimator; left out: spectral where at least four periods repeat, wls elsewhere.
     #[arg(long, value_enum)]
     estimator: Option<Estimator>,
     /// Method of the covariance; chosen by what the log offers where left out.

@@ -10,6 +10,7 @@ use super::robot::inputs;
 use super::{CommandResult, Outcome, simulating};
 use crate::dynamics::Model;
 use crate::dynamics::ParameterLayout;
+use crate::excitation::{ExcitationError, Margin, Requirements, check};
 use crate::log::{Effort, Log, write_log};
 use crate::montecarlo::{EffectSize, Scenario, Simulation};
 use crate::output::check_outputs;
@@ -79,14 +80,29 @@ fn size(simulation: &Simulation) -> Result<Option<EffectSize>, crate::plant::Pla
     if sd.contains(&0.0) { Ok(None) } else { simulation.effect_size().map(Some) }
 }
 
+/// The limit of its arm that a scenario's motion passes furthest: the plant has none.
+fn passed_limit(scenario: &Scenario) -> Result<Option<String>, ExcitationError> {
+    let requirements =
+        Requirements { clearance_m: 0.0, torque_share: 1.0, ..Requirements::default() };
+    let margins = check(&scenario.arm, &requirements, &scenario.excitation)?;
+    let worst = margins.worst();
+    let said = || {
+        let Margin { limit, free, time_s, .. } = worst;
+        format!(
+            "{limit}: the motion {} passes the limit of {} by {:.3} {} at {time_s:.2} s; the simulated arm has no limits",
+            scenario.trajectory,
+            scenario.arm.name,
+            -free,
+            limit.unit()
+        )
+    };
+    Ok((!margins.feasible()).then(said))
+}
+
 /// Runs the command.
 pub fn run(args: &SimulateArgs) -> CommandResult {
     let mut scenario = Scenario::load(args.scenario.as_deref())?;
     let robot = args.robot.as_ref().map(PathBuf::from);
-    check_outputs(
-        [Some(&args.out), args.truth.as_ref()].into_iter().flatten(),
-        robot.iter().chain(&args.scenario).chain(&args.arm).chain(&scenario.files),
-    )?;
     let mut robot_files = Vec::new();
     if let Some(path) = &args.arm {
         let ArmResult { arm, offsets_nm, doubt, files, .. } =
@@ -104,6 +120,18 @@ pub fn run(args: &SimulateArgs) -> CommandResult {
         }
         scenario.arm = arm;
         robot_files = files;
+    }
+    check_outputs(
+        [Some(&args.out), args.truth.as_ref()].into_iter().flatten(),
+        robot
+            .iter()
+            .chain(&args.scenario)
+            .chain(&args.arm)
+            .chain(&scenario.files)
+            .chain(&robot_files),
+    )?;
+    if let Some(passed) = passed_limit(&scenario)? {
+        eprintln!("note: {passed}");
     }
     eprintln!("{}", simulating(&scenario));
     let simulation = Simulation::run(scenario)?;

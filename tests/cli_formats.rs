@@ -1,0 +1,112 @@
+//! `docs/formats.md` knows every key that the commands write.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+
+/// Runs a command in `folder`.
+fn run(folder: &Path, program: &str, words: &str) {
+    let output =
+        Command::new(program).current_dir(folder).args(words.split_whitespace()).output().unwrap();
+    // The few trials here end as they may.
+    assert!(
+        output.status.success(),
+        "{words}: {}{}",
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    );
+}
+
+/// All keys of the objects in `value`.
+fn keys(value: &Value, found: &mut BTreeSet<String>) {
+    match value {
+        Value::Object(map) => map.iter().for_each(|(key, value)| {
+            found.insert(key.clone());
+            keys(value, found);
+        }),
+        Value::Array(values) => values.iter().for_each(|value| keys(value, found)),
+        _ => {}
+    }
+}
+
+/// What stands in back ticks in `markdown`, and the keys of the scenarios that it refers to.
+fn documented(markdown: &str) -> BTreeSet<String> {
+    let quoted = markdown.split('`').skip(1).step_by(2);
+    let scenarios =
+        [include_str!("../sims/example.toml"), include_str!("../sims/effects.toml")].concat();
+    let words = |text: &str| -> Vec<String> {
+        let split = text.split(|c: char| !c.is_alphanumeric() && c != '_');
+        split.map(str::to_owned).collect()
+    };
+    let of_scenarios = scenarios.lines().filter_map(|line| line.split_once('='));
+    quoted.flat_map(words).chain(of_scenarios.flat_map(|(key, _)| words(key))).collect()
+}
+
+#[test]
+fn every_key_of_every_result_is_described() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let (armid, montecarlo) = (env!("CARGO_BIN_EXE_armid"), env!("CARGO_BIN_EXE_montecarlo"));
+    let hidden = include_str!("../sims/hidden.toml").replace("periods = 8", "periods = 4");
+    std::fs::write(here.join("hidden.toml"), hidden).unwrap();
+    let other =
+        include_str!("../sims/hidden_other_motion.toml").replace("periods = 8", "periods = 4");
+    std::fs::write(here.join("other.toml"), other).unwrap();
+    for (program, words) in [
+        (armid, "simulate --scenario hidden.toml --out log.csv --truth truth.json"),
+        (armid, "simulate --scenario other.toml --out other.csv"),
+        (armid, "simulate --scenario hidden.toml --out again.csv --trial 1"),
+        (armid, "base --robot ur5 --json base.json"),
+        (
+            armid,
+            "identify log.csv --robot ur5 --physical --validate other.csv --json identified.json",
+        ),
+        (armid, "identify log.csv again.csv --robot ur5 --json both.json"),
+        (
+            armid,
+            "diagnose log.csv again.csv --robot ur5 --known-payload 1 --held-out other.csv --json why.json",
+        ),
+        (armid, "diagnose again.csv --robot ur5 --sim identified.json --json moved.json"),
+        (armid, "excite --robot ur5 --order 2 --starts 2 --finalists 1 --out motion.json"),
+        (montecarlo, "--scenario hidden.toml --trials 3 --json trials.json"),
+    ] {
+        run(here, program, words);
+    }
+    let known = documented(include_str!("../docs/formats.md"));
+    for file in ["truth", "base", "identified", "both", "why", "moved", "motion", "trials"] {
+        let text = std::fs::read_to_string(here.join(file).with_extension("json")).unwrap();
+        let mut found = BTreeSet::new();
+        keys(&serde_json::from_str(&text).unwrap(), &mut found);
+        let missing: Vec<&String> = found.difference(&known).collect();
+        assert!(missing.is_empty(), "{file}: {missing:?}");
+    }
+}
+
+/// `sims/example.toml` has every key of the tables that it shows, and a left-out line of `[plant]` and `[processing]` means what
+/// stands there.
+#[test]
+fn the_example_of_a_scenario_is_complete() {
+    use armid::identify::Options;
+    use armid::montecarlo::Scenario;
+    use armid::plant::{PlantConfig, SensorConfig};
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("sims/example.toml");
+    let scenario = Scenario::load(Some(&file)).unwrap();
+    assert_eq!(scenario.plant, PlantConfig::default());
+    assert_eq!(scenario.processing, Options::default());
+    let text = std::fs::read_to_string(&file).unwrap();
+    let mut wanted = BTreeSet::new();
+    keys(&serde_json::to_value(PlantConfig::default()).unwrap(), &mut wanted);
+    keys(&serde_json::to_value(SensorConfig::default()).unwrap(), &mut wanted);
+    keys(&serde_json::to_value(Options::default()).unwrap(), &mut wanted);
+    for key in wanted {
+        let is_shown = [
+            format!("\n{key} = "),
+            format!("\n# {key} = "),
+            format!(".{key}]"),
+            format!("{{ {key} = "),
+        ];
+        assert!(is_shown.iter().any(|shown| text.contains(shown)), "{key}");
+    }
+}
