@@ -168,6 +168,25 @@ fn unknown_keys_of_a_scenario_are_errors_that_name_them() {
     assert_says(&output, 1, &["x.toml: effect 1", "joint = 7"]);
 }
 
+/// The simulated arm has no limits; a motion for another one is said to be none for it.
+#[test]
+fn a_motion_that_is_too_fast_for_its_arm_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (toml, log) = (path("s.toml"), path("log.csv"));
+    let words = ["simulate", "--scenario", &toml, "--out", &log];
+    for (robot, said) in [("ur10e", true), ("ur5", false)] {
+        let scenario = include_str!("../sims/default.toml")
+            .replace("periods = 8", "periods = 1\nrun_in_s = 3.0")
+            .replace("robot = \"ur5\"", &format!("robot = \"{robot}\""));
+        std::fs::write(&toml, scenario).unwrap();
+        let output = armid(&words);
+        assert_says(&output, 0, &["samples"]);
+        let note = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(note.contains("velocity of joint"), said, "{note}");
+    }
+}
+
 #[test]
 fn a_simulated_log_goes_through_identify_and_the_base_set_is_printed() {
     let folder = tempfile::tempdir().unwrap();

@@ -229,6 +229,19 @@ fn a_unit_in_which_most_rows_are_implausible() {
     assert_says(result, &["run.csv", "implausible", "row 2", "actual_current_0", "units"]);
 }
 
+/// A delimiter at the end of every row makes no field, with a header or without.
+#[test]
+fn delimiters_at_the_ends_of_rows_without_a_header() {
+    let layout = Layout::load("ur10e_innopolis").unwrap();
+    let read = |end: &str| {
+        let rows = text(&valid()[1..], ",", end);
+        read_log_from(rows.as_bytes(), "run.csv", &layout, JOINTS).unwrap_or_else(|e| panic!("{e}"))
+    };
+    let (plain, ended) = (read("\n"), read(",\n"));
+    assert_eq!((plain.samples(), plain.rows), (ended.samples(), ended.rows));
+    assert_eq!(plain.effort.signals(), ended.effort.signals());
+}
+
 #[test]
 fn rows_of_another_width() {
     let result = edited(|rows| rows[51].truncate(12));

@@ -56,7 +56,8 @@ pub fn find(m: &Measurement) -> Result<Faults, SignalError> {
     out.extend(repeated_or_missing(m, &repeats));
     let mut record = Record::without_rows(m, &repeats);
     let stale = stale::mend(&mut record);
-    let mut strays = outliers::mend_motion(&mut record);
+    let strays = outliers::mend(&mut record);
+    let wild = outliers::causes(&strays, record.time_s.len());
     let stalls = stalls(&record.measurement(m.source));
     if let Some(stalls) = &stalls {
         out.push(stalls.cause());
@@ -66,9 +67,8 @@ pub fn find(m: &Measurement) -> Result<Faults, SignalError> {
     out.extend(stale.causes);
     let lags = velocity_lag(&record.measurement(m.source));
     record.undo_lags(&lags);
-    strays.extend(outliers::mend_torque(&mut record));
     out.extend(lags);
-    out.extend(outliers::causes(&strays, m.time_s.len()));
+    out.extend(wild);
     out.extend(quantisation(&record.torque_nm));
     Ok(Faults { causes: out, record, warning, unreadable })
 }

@@ -10,6 +10,7 @@ use super::error::DiagnoseError;
 use super::extension::{Effect, Extension};
 use super::gain;
 use super::held_out::{Models, Validation, held_out_gain};
+use super::image::{Image, Span};
 use super::intervals;
 use super::judgement::Selected;
 use super::kind::Kind;
@@ -18,6 +19,7 @@ use super::modesty::make_modest;
 use super::payload::{self, PayloadFinding};
 use super::record::{Record, is_torn};
 use super::replay::measured_nm;
+use super::rms::rms_where;
 use super::scene::Scene;
 use super::selection::{Kept, select};
 use super::settled::{beside_model, residual, settled, without_contacts};
@@ -26,8 +28,8 @@ use super::verdict::{Cause, Diagnosis, Rival, Rms, Verdict};
 use crate::base::BaseSet;
 use crate::dynamics::Model;
 use crate::identify::{
-    Identification, Identifier, Measurement, Options, drive_limit_remark, gravity_question,
-    gravity_remark, negative_friction_remark,
+    Identification, Identifier, Measurement, Options, Regression, drive_limit_remark,
+    gravity_question, gravity_remark, negative_friction_remark,
 };
 use crate::robot::{Arm, JointSignals};
 
@@ -129,62 +131,17 @@ impl<'a> Diagnoser<'a> {
             false => Kept::of_a_single_run(&study, found),
         };
         let selected = kept.selected();
-        let entries: Vec<&Entry> = selected.iter().map(|s| &s.contender.entry).collect();
-        let mut extension = Extension::fit(&study, &entries, &study.torque);
-
         let before_nm = residual(&study, &null);
-        let mut after_nm = residual(&study, &extension);
-        let gains = gain::on_other_periods(&study, &entries);
-        let mut physics: Vec<Cause> = selected
-            .iter()
-            .enumerate()
-            .map(|(c, selected)| {
-                let gain = gains[c].or(selected.left_out_gain);
-                self.cause(&study, &kept, selected, c, gain, &extension)
-            })
-            .collect();
-        physics.sort_by(|a, b| b.strength.total_cmp(&a.strength));
-        let touches = match touched {
+        let mut model = self.extended(&study, &kept, &selected);
+        faults.extend(match touched {
             Some(touched) => touched.causes.clone(),
-            None => beside_model(&study, &after_nm)?.causes,
-        };
-        faults.extend(touches);
-        if !study.scene.periodic {
-            // What matters most is said first, what only concerns the recording last.
-            let gain = |cause: &Cause| cause.gain_fraction.unwrap_or(0.0);
-            physics.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
-            let of_the_record = faults.extract_if(.., |fault| fault.kind.is_of_the_record());
-            physics.extend(of_the_record);
-        }
-        let mut causes: Vec<Cause> = faults.into_iter().chain(physics).collect();
-        let (mut accepted, mut rest) = kept.without(None);
+            None => beside_model(&study, &model.after_nm)?.causes,
+        });
+        model.causes = in_order(faults, model.causes, study.scene.periodic);
         if let Some(simulation) = simulation {
-            let found = selected.iter().zip(&extension.effects).map(|(selected, effect)| Found {
-                entry: &selected.contender.entry,
-                effect,
-                alike: selected.alike(),
-            });
-            let found: Vec<Found> = found.collect();
-            let mut explained = against::explain(&study, self.set, simulation.theta, &found);
-            if simulation.doubt.is_some() {
-                explained.causes.iter_mut().for_each(Cause::make_provisional);
-            }
-            causes.retain(|c| !explained.judged.contains(&(c.kind, c.joint)));
-            causes.extend(explained.causes);
-            rest = study.residual.clone();
-            explained.span.residualise(&mut rest);
-            accepted = explained.span;
-            // What is not found again beside the simulation is not a part of the model either.
-            let is_named = |entry: &&Entry| {
-                let place = (self.families[entry.family].kind(), entry.site.map(|j| j + 1));
-                causes.iter().any(|cause| (cause.kind, cause.joint) == place)
-            };
-            let named: Vec<&Entry> = entries.iter().copied().filter(is_named).collect();
-            if named.len() < entries.len() {
-                extension = Extension::fit(&study, &named, &study.torque);
-                after_nm = residual(&study, &extension);
-            }
+            self.compare(&study, &selected, simulation, &mut model);
         }
+        let Extended { mut causes, extension, after_nm, accepted, rest } = model;
         let base_parameters = intervals::base(&study, self.set, &extension);
         let moved_parameters =
             simulation.map_or(Vec::new(), |s| against::moved(s.theta, &base_parameters));
@@ -216,20 +173,36 @@ impl<'a> Diagnoser<'a> {
                 held_out_gain(&mut self.identifier, sources, &self.families, log, &models)
             })
             .collect::<Result<Vec<_>, _>>()?;
+        // What touched the arm, and friction that the null model lacks, bend the null model's gravity.
+        let (theta, covariance) = (&extension.theta, &identification.covariance);
+        let mut warnings: Vec<String> =
+            warning.into_iter().chain(identification.warnings.clone()).collect();
+        warnings.extend(contact_remark(&study, &compared, is_mended));
+        warnings.extend(drift_remark(&study, &causes));
+        warnings.extend(drive_limit_remark(self.arm, m.torque_nm));
+        for held_out in &held_out {
+            let with_name = |warning: &String| format!("{}: {warning}", held_out.log);
+            warnings.extend(held_out.warnings.iter().map(with_name));
+        }
+        if tears > 0 {
+            let warning = "the angles jump as no arm can; what looks like a touch there is none";
+            warnings.push(warning.into());
+        }
+        warnings.extend(negative_friction_remark(self.arm, self.set, theta, covariance));
         let rms = |e: &JointSignals| Rms {
             rms_nm: (0..e.joints())
                 .map(|j| rms_where(e.joint(j), |k| study.whitening.counts(j, k)))
                 .collect(),
         };
-        let verdict = match (&unexplained, causes.is_empty()) {
-            (Some(_), _) => Verdict::Unexplained,
-            (None, true) => Verdict::NothingFound,
-            (None, false) => Verdict::CauseNamed,
-        };
         let mut diagnosis = Diagnosis {
             log: m.source.to_owned(),
             noise_floor_nm: identification.replicates.as_ref().map(|r| r.sigma.clone()),
             before: rms(&before_nm),
+            verdict: match (&unexplained, causes.is_empty()) {
+                (Some(_), _) => Verdict::Unexplained,
+                (None, true) => Verdict::NothingFound,
+                (None, false) => Verdict::CauseNamed,
+            },
             causes,
             unexplained,
             after: rms(&after_nm),
@@ -240,29 +213,9 @@ impl<'a> Diagnoser<'a> {
             replay: None,
             detection_limits: detection_limits(&study, &accepted),
             lack_of_fit_probability: lack.map(|lack| lack.probability),
-            verdict,
             sentences: Vec::new(),
-            warnings: warning.into_iter().chain(identification.warnings.clone()).collect(),
+            warnings,
         };
-
-        if is_mended {
-            let warning = "the clock was mended: contacts are not looked for, and what sits beside is less sure";
-            diagnosis.warnings.push(warning.into());
-        } else if study.scene.periodic && matches!(compared, Compared::TooFew) {
-            let warning = "contacts are not looked for: too few periods follow each other without a gap to be compared; \
-                           repeat the motion three times or more";
-            diagnosis.warnings.push(warning.into());
-        }
-        diagnosis.warnings.extend(drift_remark(&study, &diagnosis.causes));
-        diagnosis.warnings.extend(drive_limit_remark(self.arm, m.torque_nm));
-        for held_out in &diagnosis.held_out {
-            let with_name = |warning: &String| format!("{}: {warning}", held_out.log);
-            diagnosis.warnings.extend(held_out.warnings.iter().map(with_name));
-        }
-        if tears > 0 {
-            let warning = "the angles jump as no arm can; what looks like a touch there is none";
-            diagnosis.warnings.push(warning.into());
-        }
         let laws: Vec<Option<usize>> =
             extension.effects.iter().map(|effect| effect.site.map(|j| j + 1)).collect();
         diagnosis.sentences = diagnosis.in_sentences(&laws);
@@ -271,11 +224,6 @@ impl<'a> Diagnoser<'a> {
             diagnosis.sentences.insert(0, doubt.to_owned());
         }
         let nominal = self.set.values(&Model::new(self.arm).standard_parameters());
-        // What touched the arm, and friction that the null model lacks, bend its gravity.
-        let theta = &extension.theta;
-        let covariance = &identification.covariance;
-        let pushes = negative_friction_remark(self.arm, self.set, theta, covariance);
-        diagnosis.warnings.extend(pushes);
         if let Some(remark) = gravity_remark(self.arm, self.set, &nominal, theta, covariance) {
             // Of another robot's log nothing else matters.
             diagnosis.sentences.insert(0, gravity_question(&self.arm.name, &remark));
@@ -294,6 +242,57 @@ impl<'a> Diagnoser<'a> {
         })
     }
 
+    /// The model of `study` with the causes `selected` of those `kept`, the strongest first.
+    fn extended(&self, study: &Study, kept: &Kept, selected: &[Selected]) -> Extended {
+        let entries: Vec<&Entry> = selected.iter().map(|s| &s.contender.entry).collect();
+        let extension = Extension::fit(study, &entries, &study.torque);
+        let gains = gain::on_other_periods(study, &entries);
+        let cause = |(c, selected): (usize, &Selected)| {
+            let gain = gains[c].or(selected.left_out_gain);
+            self.cause(study, kept, selected, c, gain, &extension)
+        };
+        let mut causes: Vec<Cause> = selected.iter().enumerate().map(cause).collect();
+        causes.sort_by(|a, b| b.strength.total_cmp(&a.strength));
+        let (accepted, rest) = kept.without(None);
+        Extended { causes, after_nm: residual(study, &extension), extension, accepted, rest }
+    }
+
+    /// Judges what differs from a `simulation` in place of what any fit would absorb.
+    fn compare(
+        &self,
+        study: &Study,
+        selected: &[Selected],
+        simulation: Nominal,
+        model: &mut Extended,
+    ) {
+        let found = selected.iter().zip(&model.extension.effects).map(|(selected, effect)| Found {
+            entry: &selected.contender.entry,
+            effect,
+            alike: selected.alike(),
+        });
+        let found: Vec<Found> = found.collect();
+        let mut explained = against::explain(study, self.set, simulation.theta, &found);
+        if simulation.doubt.is_some() {
+            explained.causes.iter_mut().for_each(Cause::make_provisional);
+        }
+        model.causes.retain(|c| !explained.judged.contains(&(c.kind, c.joint)));
+        model.causes.extend(explained.causes);
+        model.rest = study.residual.clone();
+        explained.span.residualise(&mut model.rest);
+        model.accepted = explained.span;
+        // What is not found again beside the simulation is not a part of the model either.
+        let is_named = |entry: &&Entry| {
+            let place = (self.families[entry.family].kind(), entry.site.map(|j| j + 1));
+            model.causes.iter().any(|cause| (cause.kind, cause.joint) == place)
+        };
+        let entries = selected.iter().map(|s| &s.contender.entry);
+        let named: Vec<&Entry> = entries.filter(is_named).collect();
+        if named.len() < selected.len() {
+            model.extension = Extension::fit(study, &named, &study.torque);
+            model.after_nm = residual(study, &model.extension);
+        }
+    }
+
     /// Says whether `loaded` was recorded with a body on the flange that `reference`, diagnosed as
     /// `finding`, did not have; a known mass also tells the drives' gains.
     pub fn payload(
@@ -303,12 +302,13 @@ impl<'a> Diagnoser<'a> {
         loaded: &Measurement,
         known_mass_kg: Option<f64>,
     ) -> Result<PayloadFinding, DiagnoseError> {
-        let mended = |m: &Measurement| data_faults::find(m).map(|faults| faults.record);
-        let records = [mended(reference)?, mended(loaded)?];
-        let regressions = [
-            self.identifier.regression(&records[0].measurement(reference.source))?,
-            self.identifier.regression(&records[1].measurement(loaded.source))?,
-        ];
+        let mut mended = |m: &Measurement| -> Result<Regression, DiagnoseError> {
+            let record = data_faults::find(m)?.record;
+            let mut regression = self.identifier.regression(&record.measurement(m.source))?;
+            regression.prepared.count_filled(&record.filled);
+            Ok(regression)
+        };
+        let [reference_rows, loaded_rows] = [mended(reference)?, mended(loaded)?];
         let shared = payload::Shared {
             arm: self.arm,
             set: self.set,
@@ -317,7 +317,7 @@ impl<'a> Diagnoser<'a> {
             extension: &finding.extension,
         };
         let names = [reference.source, loaded.source];
-        payload::between(&shared, &regressions[0], &regressions[1], names, known_mass_kg)
+        payload::between(&shared, &reference_rows, &loaded_rows, names, known_mass_kg)
     }
 
     fn cause(
@@ -370,6 +370,42 @@ impl<'a> Diagnoser<'a> {
     }
 }
 
+/// The model with causes, and what is said of these.
+struct Extended {
+    causes: Vec<Cause>,
+    extension: Extension,
+    /// Its residual, Nm.
+    after_nm: JointSignals,
+    /// What the causes span outside the null model, and what they leave of its residual.
+    accepted: Span,
+    rest: Image,
+}
+
+/// Faults of the record before physics, of a motion that repeats. Of a single run what matters most is said first, what only concerns
+/// the recording last.
+fn in_order(mut faults: Vec<Cause>, mut physics: Vec<Cause>, periodic: bool) -> Vec<Cause> {
+    if !periodic {
+        let gain = |cause: &Cause| cause.gain_fraction.unwrap_or(0.0);
+        physics.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+        physics.extend(faults.extract_if(.., |fault| fault.kind.is_of_the_record()));
+    }
+    faults.into_iter().chain(physics).collect()
+}
+
+/// Why contacts were not looked for.
+fn contact_remark(study: &Study, compared: &Compared, is_mended: bool) -> Option<String> {
+    if is_mended {
+        let remark =
+            "the clock was mended: contacts are not looked for, and what sits beside is less sure";
+        return Some(remark.to_owned());
+    }
+    (study.scene.periodic && matches!(compared, Compared::TooFew)).then(|| {
+        "contacts are not looked for: too few periods follow each other without a gap to be compared; repeat the motion three \
+         times or more"
+            .to_owned()
+    })
+}
+
 /// What a user should know of mean torques that drift, but for those of joints whose friction is said to.
 fn drift_remark(study: &Study, causes: &[Cause]) -> Option<String> {
     let is_said = |joint: usize| {
@@ -387,14 +423,4 @@ fn drift_remark(study: &Study, causes: &[Cause]) -> Option<String> {
             own.join(", ")
         )
     })
-}
-
-/// Rms of the samples that count, Nm.
-pub(super) fn rms_where(e: &[f64], counts: impl Fn(usize) -> bool) -> f64 {
-    let (mut square, mut count) = (0.0, 0usize);
-    for (_, e) in e.iter().enumerate().filter(|(k, _)| counts(*k)) {
-        square += e * e;
-        count += 1;
-    }
-    (square / count.max(1) as f64).sqrt()
 }

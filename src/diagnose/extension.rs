@@ -8,6 +8,7 @@ use super::study::{Entry, Study};
 use super::whitening::Whitening;
 use crate::identify::Problem;
 use crate::robot::JointSignals;
+use crate::signal::mean_period;
 
 /// An effect with its numbers.
 #[derive(Debug, Clone)]
@@ -44,19 +45,21 @@ impl Extension {
         let mut residual = torque.clone();
         study.null.residualise(&mut residual);
         let mut span = Span::default();
-        let mut counts = Vec::with_capacity(entries.len());
-        for entry in entries {
-            counts.push(entry.images.iter().filter(|image| span.push(image)).count());
-        }
-        let mut coefficients = span.solve(&residual).into_iter();
+        let mut telling = |entry: &&Entry| -> Vec<bool> {
+            entry.images.iter().map(|image| span.push(image)).collect()
+        };
+        let telling: Vec<Vec<bool>> = entries.iter().map(&mut telling).collect();
+        let mut solved = span.solve(&residual).into_iter();
+        // A column that those before it add up to has nothing of its own.
+        let mut coefficient = |told| if told { solved.next().unwrap_or(0.0) } else { 0.0 };
         let mut effects: Vec<Effect> = entries
             .iter()
-            .zip(counts)
-            .map(|(entry, count)| Effect {
+            .zip(telling)
+            .map(|(entry, telling)| Effect {
                 family: entry.family,
                 site: entry.site,
                 shape: entry.shape,
-                coefficients: coefficients.by_ref().take(count).collect(),
+                coefficients: telling.into_iter().map(&mut coefficient).collect(),
                 absorbed: Vec::new(),
             })
             .collect();
@@ -135,10 +138,4 @@ impl Effect {
         let columns = families[self.family].columns(scene, self.site, self.shape);
         columns.into_iter().zip(self.coefficients.iter().copied()).collect()
     }
-}
-
-/// Mean over the periods of n samples.
-pub fn mean_period(y: &[f64], n: usize) -> Vec<f64> {
-    let periods = y.len() / n;
-    (0..n).map(|k| y.iter().skip(k).step_by(n).sum::<f64>() / periods as f64).collect()
 }

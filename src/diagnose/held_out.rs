@@ -8,16 +8,17 @@
 
 use super::candidates::Candidate;
 use super::common_motion::move_to_common_motion;
-use super::diagnoser::rms_where;
 use super::error::DiagnoseError;
-use super::extension::{Extension, mean_period};
+use super::extension::Extension;
 use super::image::{Image, Span};
+use super::rms::rms_where;
 use super::scene::Scene;
 use super::verdict::HeldOut;
 use super::whitening::{RunWhitening, Whitening};
 use crate::base::BaseSet;
 use crate::identify::{Identifier, MOVING_RAD_S, Measurement, Options, Problem, Regression};
 use crate::robot::{Arm, JointSignals};
+use crate::signal::mean_period;
 
 /// A log that no model has seen, to measure gains on.
 pub struct Validation<'a> {

@@ -50,19 +50,21 @@ pub(super) fn tangents(study: &Study, effect: &Effect) -> Vec<Image> {
 pub fn base(study: &Study, set: &BaseSet, extension: &Extension) -> Vec<BaseParameter> {
     let effects = extension.effects.iter().flat_map(|effect| tangents(study, effect));
     let mut span = Span::default();
-    let mut taken = 0;
-    for image in effects {
-        taken += usize::from(span.push(&image));
-    }
-    for column in &study.null_columns {
-        span.push(column);
-    }
+    effects.for_each(|image| {
+        span.push(&image);
+    });
+    // Where each is in the span; the effects may leave nothing of one.
+    let place = |column| {
+        let next = span.len();
+        span.push(column).then_some(next)
+    };
+    let places: Vec<Option<usize>> = study.null_columns.iter().map(place).collect();
     let covariance = study.statistic.covariance(&span, &study.torque);
     (0..set.rank())
         .map(|k| BaseParameter {
             name: set.name(k).to_owned(),
             value: extension.theta[k],
-            sigma: match covariance.get((taken + k, taken + k)) {
+            sigma: match places[k].and_then(|at| covariance.get((at, at))) {
                 Some(variance) => variance.max(0.0).sqrt(),
                 None => f64::NAN,
             },

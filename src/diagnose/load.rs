@@ -9,13 +9,12 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 use realfft::num_complex::Complex64;
 
-use super::extension::mean_period;
 use super::reversal_answer::{FASTEST_HZ, ReversalAnswer, TorqueHarmonic};
 use crate::dynamics::{
     LANES, Lanes, Model, Motion, Real, Workspace, rigid_torque, with_widest_registers,
 };
 use crate::robot::{Arm, JointSignals};
-use crate::signal::FineClock;
+use crate::signal::{FineClock, mean_period};
 
 /// Torques of a rigid arm along the motion of a log, as far as it tells them.
 pub struct Loads {
@@ -108,7 +107,7 @@ impl Loads {
         let of_torques = harmonics(torque_nm);
         let fine_sign: Vec<Vec<f64>> = (0..mean.joints())
             .map(|j| {
-                let sign = |qd: f64| (qd / arm.friction_epsilon_rad_s).tanh();
+                let sign = |qd: f64| arm.friction_sign(qd);
                 clock.refined(mean.qd_rad_s.joint(j)).into_iter().map(sign).collect()
             })
             .collect();

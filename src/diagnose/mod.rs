@@ -50,6 +50,7 @@ mod repeated;
 pub mod replay;
 mod reversal_answer;
 mod reversals;
+mod rms;
 mod scene;
 mod selection;
 mod sentences;

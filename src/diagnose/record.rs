@@ -139,6 +139,28 @@ impl Record {
     }
 }
 
+/// For tests of what records go through: a joint that moves for `moves_s` and rests for as long, three times, 125 times a second, its
+/// torque with noise of `noise_nm`.
+#[cfg(test)]
+pub fn moves_and_rests(moves_s: f64, noise_nm: f64) -> Record {
+    use rand::{SeedableRng, rngs::ChaCha8Rng};
+    use rand_distr::{Distribution, StandardNormal};
+    use std::f64::consts::TAU;
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let mut noise = || -> f64 { StandardNormal.sample(&mut rng) };
+    let rate_hz = 125.0;
+    let samples = (6.0 * moves_s * rate_hz) as usize;
+    let time_s: Vec<f64> = (0..samples).map(|k| k as f64 / rate_hz).collect();
+    let phase = |t: f64| TAU * (t % (2.0 * moves_s)).min(moves_s) / moves_s;
+    let of = |f: &dyn Fn(f64) -> f64| JointSignals::from_fn(1, samples, |_, k| f(phase(time_s[k])));
+    let speed = TAU / moves_s;
+    let q_rad = of(&|p| 1.0 - p.cos());
+    let qd_rad_s = of(&|p| if p < TAU { speed * p.sin() } else { 0.0 });
+    let clean = of(&|p| 8.0 * (0.7 * p).cos());
+    let torque_nm = clean.map_joints(|_, y| y.iter().map(|y| y + noise_nm * noise()).collect());
+    Record { time_s, q_rad, qd_rad_s, torque_nm, filled: Vec::new() }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -5,12 +5,12 @@
 
 use super::contact::{self, BesideModel};
 use super::error::DiagnoseError;
-use super::extension::{Extension, mean_period};
+use super::extension::Extension;
 use super::selection::{Contender, Found, Kept};
 use super::study::{Entry, Study};
 use crate::base::BaseSet;
 use crate::robot::{Arm, JointSignals};
-use crate::signal::{SignalError, ZeroPhase};
+use crate::signal::{SignalError, ZeroPhase, mean_period};
 
 /// Rounds of causes and estimate at most.
 const ROUNDS: usize = 4;

@@ -232,27 +232,8 @@ fn interpolate(time_s: &[f64], signals: &mut JointSignals, j: usize, stale: &[us
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::record::moves_and_rests as record;
     use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
-    use rand_distr::{Distribution, StandardNormal};
-
-    const RATE_HZ: f64 = 125.0;
-
-    /// A joint that moves for `moves_s` and rests for as long, three times, its torque with noise of `noise_nm`.
-    fn record(moves_s: f64, noise_nm: f64) -> Record {
-        let mut rng = ChaCha8Rng::seed_from_u64(9);
-        let mut noise = || -> f64 { StandardNormal.sample(&mut rng) };
-        let samples = (6.0 * moves_s * RATE_HZ) as usize;
-        let time_s: Vec<f64> = (0..samples).map(|k| k as f64 / RATE_HZ).collect();
-        let phase = |t: f64| std::f64::consts::TAU * (t % (2.0 * moves_s)).min(moves_s) / moves_s;
-        let of =
-            |f: &dyn Fn(f64) -> f64| JointSignals::from_fn(1, samples, |_, k| f(phase(time_s[k])));
-        let speed = std::f64::consts::TAU / moves_s;
-        let q_rad = of(&|p| 1.0 - p.cos());
-        let qd_rad_s = of(&|p| if p < std::f64::consts::TAU { speed * p.sin() } else { 0.0 });
-        let clean = of(&|p| 8.0 * (0.7 * p).cos());
-        let torque_nm = clean.map_joints(|_, y| y.iter().map(|y| y + noise_nm * noise()).collect());
-        Record { time_s, q_rad, qd_rad_s, torque_nm, filled: Vec::new() }
-    }
 
     /// Without noise all channels of a joint that rests stand still, and a drive at its limit reads one number.
     #[test]

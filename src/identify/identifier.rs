@@ -98,6 +98,7 @@ impl Regression {
             return Ok(first);
         }
         let mut course = first.course();
+        let mut filled_rows = first.filled_rows();
         first.problem.unfold();
         first.instruments.iter_mut().for_each(Problem::unfold);
         first.prepared.replicates = None;
@@ -107,6 +108,7 @@ impl Regression {
         *processing = Processing { logs, periods: 1, harmonics: None, ..processing.clone() };
         for other in rest {
             course.append(&other.course());
+            filled_rows += other.filled_rows();
             let mut problem = other.problem;
             problem.unfold();
             let (found_hz, expected_hz) = (problem.rate_hz, first.problem.rate_hz);
@@ -123,8 +125,14 @@ impl Regression {
             }
             first.prepared.warnings.extend(other.prepared.warnings);
         }
+        first.prepared.filled_share = filled_rows / first.problem.samples as f64;
         first.course = Some(course);
         Ok(first)
+    }
+
+    /// Rows that are in no row of the log.
+    fn filled_rows(&self) -> f64 {
+        self.prepared.filled_share * (self.problem.samples * self.problem.periods) as f64
     }
 }
 
@@ -386,7 +394,10 @@ impl<'a> Identifier<'a> {
         Ok(Identification {
             estimator,
             samples: self.problem.samples * self.problem.periods,
-            explainable_nm: prepared.replicates.as_ref().map(|r| explainable(&fit, r)),
+            explainable_nm: prepared
+                .replicates
+                .as_ref()
+                .map(|r| explainable(&fit.residual_squares, fit.theta.len(), r, prepared.kept())),
             covariance,
             covariance_reason,
             processing: prepared.processing,
@@ -451,19 +462,25 @@ impl<'a> Identifier<'a> {
     }
 }
 
-/// Rms per joint of what repeats in the torque and is not explained, Nm: the residual of the mean
-/// period less the share that its noise, σ²/P, has in it.
-fn explainable(fit: &Fit, replicates: &Replicates) -> Vec<f64> {
+/// Rms per joint of what repeats in the torque and is not explained, Nm: of the squares ‖e_j‖² that so many `parameters` leave
+/// over all periods, those of the mean period less the share that its noise, σ²/P, has in them; P and σ² are less in the rows by
+/// the parts that are `kept` ([`Prepared::kept`](super::Prepared::kept)).
+fn explainable(
+    residual_squares: &[f64],
+    parameters: usize,
+    replicates: &Replicates,
+    kept: [f64; 2],
+) -> Vec<f64> {
     let n = replicates.mean.samples() as f64;
     let periods = replicates.periods as f64;
     let joints = replicates.sigma.len() as f64;
-    let fitted = fit.theta.len() as f64 / (joints * n);
-    let pairs = fit.residual_squares.iter().zip(&replicates.sigma);
+    let fitted = parameters as f64 / (joints * n);
+    let pairs = residual_squares.iter().zip(&replicates.sigma);
     pairs
         .map(|(squares, sigma)| {
             let variance = sigma * sigma;
-            let of_mean = (squares - variance * n * (periods - 1.0)) / (n * periods);
-            (of_mean - variance / periods * (1.0 - fitted)).max(0.0).sqrt()
+            let of_mean = (squares - kept[1] * variance * n * (periods - 1.0)) / (n * periods);
+            (of_mean - variance / (kept[0] * periods) * (1.0 - fitted)).max(0.0).sqrt()
         })
         .collect()
 }
@@ -480,5 +497,43 @@ impl Identification {
     /// σ of every base parameter.
     pub fn sigma(&self) -> Vec<f64> {
         self.covariance.sigma()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::JointSignals;
+    use crate::signal::replicate_noise;
+    use rand::{SeedableRng, rngs::ChaCha8Rng};
+    use rand_distr::{Distribution, StandardNormal};
+
+    /// Eight periods of an error of 0.3 Nm rms that repeats, under noise of 1 Nm; a twelfth of the rows, at other phases in each period, are
+    /// the mean of the other periods. The mean square of the mean period is 0.09 and 1/(8 · 11/12) Nm², known to √(2/8000) of the second
+    /// and twice the root of both products over 8000: 0.0048 Nm². Five of them leave 0.257 to 0.338; without what is kept it were 0.16.
+    #[test]
+    fn rows_that_were_filled_in_explain_nothing() {
+        const N: usize = 8000;
+        const PERIODS: usize = 8;
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let mut noise = || -> f64 { StandardNormal.sample(&mut rng) };
+        let error = |k: usize| 0.3 * std::f64::consts::SQRT_2 * (0.01 * k as f64).sin();
+        let mut y: Vec<f64> = (0..N * PERIODS).map(|k| error(k % N) + noise()).collect();
+        let is_filled = |k: usize, period: usize| k % 12 == period;
+        for k in 0..N {
+            for period in (0..PERIODS).filter(|period| is_filled(k, *period)) {
+                let others = (0..PERIODS).filter(|other| *other != period);
+                y[period * N + k] = others.map(|other| y[other * N + k]).sum::<f64>() / 7.0;
+            }
+        }
+        let filled = (0..N * PERIODS).filter(|k| is_filled(k % N, k / N)).count();
+        let f = filled as f64 / (N * PERIODS) as f64;
+        let kept = [1.0 - f, 1.0 - f * 8.0 / 7.0];
+        let signals = JointSignals::from_fn(1, N * PERIODS, |_, k| y[k]);
+        let mut replicates = replicate_noise(&signals, N).unwrap();
+        replicates.sigma[0] /= kept[1].sqrt();
+        let squares = y.iter().map(|y| y * y).sum::<f64>();
+        let found = explainable(&[squares], 0, &replicates, kept)[0];
+        assert!((0.257..0.338).contains(&found), "{found}");
     }
 }

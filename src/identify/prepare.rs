@@ -118,10 +118,12 @@ impl Prepared {
     }
 
     /// Of P periods with the share f of their samples filled in: the part of them that makes the mean, 1 − f, whose noise has the
-    /// variance σ²/(P (1 − f)), and the part of their P − 1 degrees of freedom that makes their scatter, 1 − f P/(P − 1).
+    /// variance σ²/(P (1 − f)), and the part of their P − 1 degrees of freedom that makes their scatter, 1 − f P/(P − 1). Of logs that
+    /// were laid below each other, whose rows count one by one, it is 1 − f both times.
     pub fn kept(&self) -> [f64; 2] {
         let (periods, f) = (self.processing.periods as f64, self.filled_share);
-        if periods < 2.0 { [1.0; 2] } else { [1.0 - f, 1.0 - f * periods / (periods - 1.0)] }
+        let of_scatter = if periods < 2.0 { f } else { f * periods / (periods - 1.0) };
+        [1.0 - f, 1.0 - of_scatter]
     }
 }
 
@@ -290,7 +292,7 @@ impl Preparer {
                 qd_rad_s: averaged.qd_rad_s,
                 qdd_rad_s2: averaged.qdd_rad_s2,
             },
-            lead_in_s: window.start as f64 / even.rate_hz,
+            lead_in_s: even.start_s - m.time_s[0] + window.start as f64 / even.rate_hz,
             each_period,
             recorded: Some([q_rad, qd_rad_s]),
             between: even.between.as_ref().map(|rows| BetweenRows {
@@ -353,7 +355,7 @@ impl Preparer {
                 qd_rad_s: qd_rad_s.slice(window.clone()),
                 qdd_rad_s2: qdd_rad_s2.slice(window.clone()),
             },
-            lead_in_s: window.start as f64 / rate_hz,
+            lead_in_s: even.start_s - m.time_s[0] + window.start as f64 / rate_hz,
             torque_nm: even.torque_nm.slice(window.clone()),
             each_period: None,
             recorded: None,
@@ -462,6 +464,21 @@ mod tests {
         for (sigma, before) in prepared.replicates.unwrap().sigma.iter().zip(before) {
             assert!((sigma - 1.0).abs() < 0.035 && before < 0.965, "{sigma} {before}");
         }
+    }
+
+    /// Behind a gap at 7 s lies the longest stretch: what is used begins there, and not where the log does, at 100 s by its clock.
+    #[test]
+    fn time_before_the_longest_stretch_has_passed() {
+        let (time_s, channels) = log(100.0);
+        let rows: Vec<usize> = (0..time_s.len()).filter(|k| !(500..700).contains(k)).collect();
+        let of =
+            |y: &JointSignals| JointSignals::from_fn(2, rows.len(), |j, i| y.joint(j)[rows[i]]);
+        let time_s: Vec<f64> = rows.iter().map(|k| 100.0 + time_s[*k]).collect();
+        let channels = channels.each_ref().map(of);
+        let prepared = prepared_from(&time_s, channels.each_ref());
+        let [start_s, _] = prepared.processing.window_s;
+        assert!((start_s - 100.0 - prepared.lead_in_s).abs() < 1e-9, "{}", prepared.lead_in_s);
+        assert!(prepared.lead_in_s > 6.9, "{}", prepared.lead_in_s);
     }
 
     #[test]

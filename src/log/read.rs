@@ -113,9 +113,8 @@ fn plan_by_width(
     while ahead.len() < WIDTH_ROWS && lines.next_into(&mut line)? {
         ahead.push(line.clone());
     }
-    let rows_of = |fields: usize| {
-        ahead.iter().filter(|line| delimiter.split(&line.bytes).count() == fields).count()
-    };
+    let rows_of =
+        |fields: usize| ahead.iter().filter(|line| has_fields(delimiter, line, fields)).count();
     let common = layout.widths.iter().map(|w| w.fields).max_by_key(|&fields| rows_of(fields));
     let plan = match common.filter(|&fields| rows_of(fields) > 0) {
         Some(fields) => Plan::from_width(layout, joints, delimiter, fields, file)?,
@@ -131,6 +130,12 @@ fn plan_by_width(
             layout: layout.name.clone(),
         }),
     }
+}
+
+/// Whether a row has so many fields, and no more behind them than a delimiter that ends it.
+fn has_fields(delimiter: Delimiter, line: &Line, fields: usize) -> bool {
+    let mut behind = delimiter.split(&line.bytes).skip(fields.saturating_sub(1));
+    behind.next().is_some() && behind.next().is_none_or(<[u8]>::is_empty) && behind.next().is_none()
 }
 
 /// The numbers read so far, column by column, and where each row stood in the file.
@@ -196,7 +201,7 @@ impl Table {
         Ok(())
     }
 
-    /// Steps 2 to 4 of [`read_log`].
+    /// Steps 2 to 6 of [`read_log`].
     fn clean(
         &mut self,
         plan: &Plan,

@@ -160,6 +160,11 @@ impl<C: Content> Shard<C> {
             let trials = shard.tally.trials();
             return Err(format(format!("{trials} trials do not fit {start}…{}", shard.next)));
         }
+        if !shard.tally.fits(&shard.header.content.nothing()) {
+            return Err(format(
+                "its sums are not those of the parameters in its header".to_owned(),
+            ));
+        }
         Ok(shard)
     }
 

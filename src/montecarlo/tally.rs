@@ -114,6 +114,11 @@ impl Gathered for Tally {
     fn trials(&self) -> u64 {
         Self::trials(self)
     }
+
+    fn fits(&self, other: &Self) -> bool {
+        self.parameters.len() == other.parameters.len()
+            && self.histogram.len() == other.histogram.len()
+    }
 }
 
 /// Statistics of one parameter over the trials, in units of its scale.
@@ -247,6 +252,11 @@ impl Tally {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sums_of_other_parameters_do_not_fit() {
+        assert!(Tally::new(3).fits(&Tally::new(3)) && !Tally::new(3).fits(&Tally::new(2)));
+    }
 
     fn outcome(k: u64, parameter: u64) -> Outcome {
         let z = ((k * 7 + parameter * 13) as f64 * 0.37).sin() * 2.2;

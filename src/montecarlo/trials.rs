@@ -84,6 +84,9 @@ pub trait Gathered: Debug + Clone + PartialEq + Serialize + DeserializeOwned + S
 
     /// Trials so far, those that gave nothing included.
     fn trials(&self) -> u64;
+
+    /// Whether the two can be merged without loss.
+    fn fits(&self, other: &Self) -> bool;
 }
 
 /// A trial that gave nothing.

@@ -180,6 +180,11 @@ impl Arm {
         self.joints.len()
     }
 
+    /// The regularised sign tanh(q̇/ε) of dry friction at a velocity, rad/s: the paper's (3).
+    pub fn friction_sign(&self, qd_rad_s: f64) -> f64 {
+        (qd_rad_s / self.friction_epsilon_rad_s).tanh()
+    }
+
     /// Pose of every joint frame in the base frame at configuration `q_rad` (length N).
     pub fn frames(&self, q_rad: &[f64]) -> Vec<Placement> {
         let mut pose = Placement::identity();

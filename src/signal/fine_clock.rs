@@ -44,7 +44,7 @@ impl FineClock {
     /// One period of `y` at every tick, by its Fourier series.
     pub fn refined(&self, y: &[f64]) -> Vec<f64> {
         let mut spectrum = self.spectrum(y);
-        if self.samples.is_multiple_of(2) {
+        if self.samples.is_multiple_of(2) && self.ticks > 1 {
             // The Nyquist harmonic is two of the longer series, which share it.
             spectrum[self.samples / 2] *= 0.5;
         }
@@ -178,13 +178,14 @@ pub fn answered(torque_nm: &[f64], per_tick: f64) -> Vec<f64> {
         .collect()
 }
 
-/// The series with these coefficients. The mean and the harmonic at half the rate are real; what else they are
-/// given has no samples.
+/// The series with these coefficients. The mean and the harmonic at half the rate, which an odd number of samples does not have, are
+/// real; what else they are given has no samples.
 fn synthesised(inverse: &dyn ComplexToReal<f64>, spectrum: &mut [Complex64]) -> Vec<f64> {
-    let last = spectrum.len() - 1;
-    spectrum[0].im = 0.0;
-    spectrum[last].im = 0.0;
     let mut out = inverse.make_output_vec();
+    spectrum[0].im = 0.0;
+    if out.len().is_multiple_of(2) {
+        spectrum[out.len() / 2].im = 0.0;
+    }
     inverse.process(spectrum, &mut out).expect("the plan's own lengths, and the ends are real");
     out
 }
@@ -223,6 +224,18 @@ mod tests {
         let off = largest_difference(&found, &wave(TICKS * N, harmonic));
         let theory = omega.powi(4) / 384.0;
         assert!(off < theory && off > 0.8 * theory, "{off} {theory}");
+    }
+
+    /// The highest harmonic of an odd number of samples is one as any other, and without ticks between the samples that of an even
+    /// number is what it is.
+    #[test]
+    fn the_highest_harmonic_stays() {
+        for n in [50, 51] {
+            let clock = FineClock::new(n, 1);
+            let y: Vec<f64> = (0..n).map(|k| (k * k % 7) as f64).collect();
+            assert!(largest_difference(&clock.filtered(&y, |_| Complex64::ONE), &y) < 1e-13);
+            assert!(largest_difference(&clock.refined(&y), &y) < 1e-13);
+        }
     }
 
     #[test]

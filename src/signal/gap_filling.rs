@@ -6,10 +6,13 @@
 //! becomes too small by about the share of rows that are filled in, a tenth at most, and the mean is that of fewer: see
 //! [`Prepared::count_filled`](crate::identify::Prepared::count_filled).
 
+use std::f64::consts::SQRT_2;
+
 use super::error::SignalError;
-use super::instants::Instants;
+use super::instants::{Instants, linear_at};
 use super::period::{find_period, variance_of};
 use super::resample::{Gap, Resampler, bridged_gap_s, gaps, natural_rate_hz};
+use crate::median::robust_sigma;
 use crate::robot::JointSignals;
 
 /// Shorter gaps, in usual steps, are for straight lines. Longer ones hold the reversal of a joint, and a straight line
@@ -24,6 +27,9 @@ const FEWEST: usize = 2;
 /// How far an arm may be from where the other periods have it at both ends of a gap, over the rms of its angle about
 /// the mean: else it waited in the gap, or was driven elsewhere.
 const REPEATS_WITHIN: f64 = 0.02;
+/// Or over the noise of that angle, whichever is more: a joint that is held moves by nothing else. Beside the mean of three
+/// periods or more one of the twelve readings at the ends of a gap is further off in one of some 10⁴ gaps.
+const REPEATS_BEYOND_NOISE: f64 = 5.0;
 
 /// A log with rows in its gaps.
 #[derive(Debug, Clone, PartialEq)]
@@ -97,7 +103,7 @@ pub fn fill_gaps(
         period_s: period.refined_samples / rate_hz,
         repeats_s: [at_s(period.window.start), at_s(period.window.end)],
         tolerance_rad: (0..q_rad.joints())
-            .map(|j| REPEATS_WITHIN * variance_of(bridged.joint(j)).sqrt())
+            .map(|j| tolerance_rad(bridged.joint(j), period.refined_samples))
             .collect(),
     };
     let patches: Vec<Patch> = found
@@ -105,6 +111,18 @@ pub fn fill_gaps(
         .filter_map(|gap| log.patch(gap, rate_hz).transpose())
         .collect::<Result<_, _>>()?;
     Ok((!patches.is_empty()).then(|| log.with(patches)))
+}
+
+/// How far the angles `q_rad` of a joint may be from those of other periods, each of so many `samples`.
+fn tolerance_rad(q_rad: &[f64], samples: f64) -> f64 {
+    let repeating = (q_rad.len() as f64 - samples).max(0.0) as usize;
+    let pairs = (0..repeating).map(|k| (q_rad[k] - linear_at(q_rad, k as f64 + samples)).abs());
+    let noise = robust_sigma(&mut pairs.collect::<Vec<f64>>()) / SQRT_2;
+    // The mean of equal numbers is one of them to within their last digits.
+    let largest = q_rad.iter().fold(0.0, |most: f64, q| most.max(q.abs()));
+    let rounding = 8.0 * f64::EPSILON * largest;
+    let moved = REPEATS_WITHIN * variance_of(q_rad).sqrt();
+    moved.max(REPEATS_BEYOND_NOISE * noise).max(rounding)
 }
 
 /// Whether no step is a gap beside the shortest one, and so none beside the usual one: most logs, of which thousands may
@@ -232,6 +250,9 @@ impl Log<'_> {
 mod tests {
     use std::slice::from_ref;
 
+    use rand::{SeedableRng, rngs::ChaCha8Rng};
+    use rand_distr::{Distribution, StandardNormal};
+
     use super::*;
 
     const RATE_HZ: f64 = 100.0;
@@ -291,6 +312,26 @@ mod tests {
         for k in gap {
             let off = filled.torque_nm.joint(0)[k] - whole.joint(0)[k];
             assert!(off.abs() < 1e-3, "{off}");
+        }
+    }
+
+    /// A joint that is held, with the noise of its encoder and without any, speaks for no pause.
+    #[test]
+    fn a_joint_at_rest_repeats() {
+        for noise_rad in [2e-5, 0.0] {
+            let gaps = [130..150, 517..560];
+            let (time_s, channels) = log(&gaps, ROWS);
+            let mut rng = ChaCha8Rng::seed_from_u64(2);
+            let mut held = |at: f64| -> Vec<f64> {
+                let mut noise = || -> f64 { StandardNormal.sample(&mut rng) };
+                time_s.iter().map(|_| at + noise_rad * noise()).collect()
+            };
+            let [q, qd, torque] = channels.map(|signals| {
+                let both = [signals.joint(0).to_vec(), held(0.3)];
+                JointSignals::from_fn(2, time_s.len(), |j, k| both[j][k])
+            });
+            let filled = fill_gaps(&time_s, &q, &qd, &torque).unwrap().unwrap();
+            assert_eq!(filled.gaps.len(), 2);
         }
     }
 

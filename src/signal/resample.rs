@@ -9,6 +9,7 @@ use std::ops::Range;
 
 use super::error::{SignalError, checked_rate_hz, enough};
 use super::instants::{Bracket, Instants};
+use crate::median::median;
 
 /// A stretch of time without samples, longer than the caller lets be interpolated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,8 +47,8 @@ pub const MOST_PER_ROW: f64 = 10.0;
 pub fn natural_rate_hz(time_s: &[f64]) -> Result<f64, SignalError> {
     check_time(time_s)?;
     let mut steps: Vec<f64> = time_s.windows(2).map(|t| t[1] - t[0]).collect();
-    let middle = steps.len() / 2;
-    let (_, &mut median_s, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
+    // `check_time` has seen two stamps.
+    let median_s = median(&mut steps).unwrap_or(f64::NAN);
     let single = steps.iter().filter(|step_s| **step_s <= LONGEST_STEP * median_s);
     let (sum_s, count) =
         single.fold((0.0_f64, 0_usize), |(sum_s, n), step_s| (sum_s + step_s, n + 1));

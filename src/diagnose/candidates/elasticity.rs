@@ -217,9 +217,8 @@ impl Candidate for Elasticity {
         let rate = scene.derivative(&delta);
         let acceleration = scene.accelerations(&rate);
         let (qd, sign) = (scene.motion.qd_rad_s.joint(j), scene.sign.joint(j));
-        let epsilon = scene.arm.friction_epsilon_rad_s;
         let extra = samples(scene, |k| {
-            let motor_sign = ((qd[k] + rate[k]) / epsilon).tanh();
+            let motor_sign = scene.arm.friction_sign(qd[k] + rate[k]);
             let more = drive.rotor_inertia_kg_m2 * acceleration[k]
                 + drive.viscous_nm_s_rad * rate[k]
                 + drive.coulomb_nm * (motor_sign - sign[k]);

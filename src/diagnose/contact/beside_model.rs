@@ -50,7 +50,7 @@ pub fn beside_model(
         .map(|j| {
             let mut counts = vec![true; n];
             for k in (0..n).filter(|&k| qd_rad_s.joint(j)[k].abs() < SLOW_RAD_S) {
-                counts[k.saturating_sub(reach)..(k + reach).min(n)].fill(false);
+                counts[k.saturating_sub(reach)..=(k + reach).min(n - 1)].fill(false);
             }
             counts
         })

@@ -3,15 +3,14 @@
 use super::error::ReplayError;
 use super::simulated::SimulatedArm;
 use crate::diagnose::Scene;
-use crate::diagnose::diagnoser::rms_where;
-use crate::diagnose::extension::mean_period;
+use crate::diagnose::rms::rms_where;
 use crate::dynamics::Motion;
 use crate::excitation::SampledMotion;
 use crate::identify::{Options, Regression};
 use crate::plant::faults::{Effect, FaultyPlant};
 use crate::plant::{PlantConfig, PlantError, Recording};
 use crate::robot::{Arm, JointSignals};
-use crate::signal::{Scratch, SignalError, ZeroPhase, central_4};
+use crate::signal::{Scratch, SignalError, ZeroPhase, central_4, mean_period};
 
 /// A log as it is to be replayed.
 pub(super) struct Course<'a> {

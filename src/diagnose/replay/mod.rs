@@ -16,8 +16,9 @@ mod simulated;
 
 use serde::Serialize;
 
-use super::diagnoser::{Diagnoser, Finding, rms_where};
+use super::diagnoser::{Diagnoser, Finding};
 use super::held_out::Validation;
+use super::rms::rms_where;
 use super::scene::Scene;
 use crate::plant::faults::Effect;
 use crate::robot::JointSignals;

@@ -67,11 +67,12 @@ impl Scene {
                 };
             }
             let epsilon = self.arm.friction_epsilon_rad_s;
-            let qd_rad_s = self.turning_rad_s(j, None, epsilon, |v| (v / epsilon).tanh());
+            let sign = |v: f64| self.arm.friction_sign(v);
+            let qd_rad_s = self.turning_rad_s(j, None, epsilon, sign);
             Instants {
                 step_s: self.instant_s(),
                 q_rad: self.fine_angles_rad(j),
-                sign: qd_rad_s.iter().map(|v| (v / epsilon).tanh()).collect(),
+                sign: qd_rad_s.iter().map(|v| sign(*v)).collect(),
                 qd_rad_s,
             }
         })
@@ -121,8 +122,7 @@ impl Scene {
     fn turning(&self, j: usize) -> &Turning {
         self.turnings[j].get_or_init(|| {
             let series_rad_s = self.fine(self.motion.qd_rad_s.joint(j));
-            let epsilon = self.arm.friction_epsilon_rad_s;
-            let expected = series_rad_s.iter().map(|v| (v / epsilon).tanh()).collect();
+            let expected = series_rad_s.iter().map(|v| self.arm.friction_sign(*v)).collect();
             let rotor = self.rotor_kg_m2[j];
             let kick = |mobility: &f64| {
                 let acceleration_per_nm = (1.0 - 1.0 / (rotor * mobility)) / rotor;

@@ -8,7 +8,6 @@ use std::sync::OnceLock;
 
 use realfft::num_complex::Complex64;
 
-use super::extension::mean_period;
 use super::load::{
     Delivered, LinkTorque, Loads, Periods, mass_along, rigid_torque_along, rotors_kg_m2,
 };
@@ -18,7 +17,7 @@ use crate::base::BaseSet;
 use crate::dynamics::{Model, Motion, Parameter, ParameterLayout};
 use crate::identify::Prepared;
 use crate::robot::{Arm, JointSignals};
-use crate::signal::{FineClock, central_4};
+use crate::signal::{FineClock, central_4, linear_at, mean_period};
 
 /// The processed motion of one log and the torques that the estimate predicts along it.
 ///
@@ -118,9 +117,8 @@ impl Scene {
         let Loads { link, bending, delivered, load_nm, mobility_per_kg_m2 } = loads;
         let LinkTorque { told_nm: link_nm, jolt_nm } = link;
         let own_inertia_kg_m2 = JointSignals::from_fn(joints, n, |j, k| mass_kg_m2[j].joint(j)[k]);
-        let epsilon = arm.friction_epsilon_rad_s;
         let sign =
-            motion.qd_rad_s.map_joints(|_, v| v.iter().map(|v| (v / epsilon).tanh()).collect());
+            motion.qd_rad_s.map_joints(|_, v| v.iter().map(|v| arm.friction_sign(*v)).collect());
         let torque_nm = JointSignals::from_fn(joints, n, |j, k| {
             load_nm.joint(j)[k]
                 + drive(j).viscous_nm_s_rad * motion.qd_rad_s.joint(j)[k]
@@ -269,10 +267,7 @@ impl Scene {
             return self.filtered(y, |omega| Complex64::from_polar(1.0, -omega * delay_s));
         }
         let value = |k: usize| {
-            let at = (k as f64 - delay_s * self.rate_hz).clamp(0.0, (y.len() - 1) as f64);
-            let left = (at.floor() as usize).min(y.len() - 2);
-            let u = at - left as f64;
-            y[left] * (1.0 - u) + y[left + 1] * u
+            linear_at(y, (k as f64 - delay_s * self.rate_hz).clamp(0.0, (y.len() - 1) as f64))
         };
         (0..y.len()).map(value).collect()
     }

@@ -9,6 +9,7 @@ mod mean_noise;
 mod periods;
 mod repeating;
 mod run;
+mod steps;
 
 pub use periods::{FLOOR, PeriodWhitening};
 pub use run::RunWhitening;

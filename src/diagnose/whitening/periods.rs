@@ -8,14 +8,13 @@ use realfft::{RealFftPlanner, RealToComplex};
 use super::coherence::coherence;
 use super::mean_noise::{drifts, with_own_scatter};
 use super::repeating::RepeatingNoise;
+use super::steps::steps;
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::friction_drift::FrictionDrift;
-use crate::diagnose::image::{Column, Image, dot};
+use crate::diagnose::image::{Column, Image};
 use crate::diagnose::noise_power::{NoiseKnowledge, Uncertainty};
 use crate::diagnose::scene::Scene;
-use crate::diagnose::statistic::upper_chi_squared;
-use crate::identify::{Problem, Regression};
-use crate::median::median;
+use crate::identify::{Panel, Regression};
 use crate::robot::JointSignals;
 use crate::signal::{NoisePower, noise_trends, pooled_level};
 
@@ -58,11 +57,6 @@ const NOT_FOLLOWED: f64 = 0.2;
 /// Of two periods drifting friction may take most of what a slow harmonic says of noise; of eight it takes 5 to 15 %. What is
 /// left is divided by what would be left of white noise: of noise that rises as that of two colours does it is 0.96 to 1.08.
 const LEAST_KEPT: f64 = 0.25;
-/// Chance that steps as large as those of most joints (or of one) are no more than what S lets expect, at most, if they are noise of
-/// their own.
-const STEPS_BY_CHANCE: f64 = 0.01;
-/// Steps of a joint's own that those of all joints count for.
-const OF_ALL: f64 = 7.0;
 /// Torque below this share of a joint's rms torque is not told from the rounding of a model.
 pub const FLOOR: f64 = 1e-4;
 /// How far, over the rate, what is used ends below the highest frequency of the periods' own motion. Not far, because half
@@ -89,9 +83,18 @@ impl PeriodWhitening {
             repeating: None,
         };
         let used = ((regression.prepared.highest - BELOW_HIGHEST) * n as f64).round() as usize;
+        let used = used.min(scene.highest);
         // Beyond it the torque was not moved to the common motion.
         let last = (used + pooled_level(used)).min(scene.highest);
-        let mut scatter = whitening.scatter(problem, scene);
+        let drift = FrictionDrift::beside_mean(&scene.motion.qd_rad_s, periods);
+        let without_drift = |(j, panel): (usize, &Panel)| {
+            let mut y = panel.y.clone();
+            drift.remove(j, &mut y, |_| true);
+            (j, y)
+        };
+        let parts = problem.panels.iter().enumerate().map(without_drift).collect();
+        let torque = Column { parts };
+        let mut scatter = whitening.scatter(&torque, &drift);
         let [_, kept] = regression.prepared.kept();
         scatter.iter_mut().for_each(|scatter| *scatter /= Complex::from(kept));
         let power: Vec<f64> = problem
@@ -152,54 +155,10 @@ impl PeriodWhitening {
             };
             whitening.factors.push(inverse.transpose().iter().copied().collect());
         }
-        whitening.find_steps(problem, scene);
+        whitening.steps = steps(&whitening, &torque);
+        whitening.stepping =
+            (!whitening.steps.is_empty()).then(|| RepeatingNoise::new(&whitening.steps));
         Ok(whitening)
-    }
-
-    /// Noise slower than a period ends it elsewhere than it began it: to Fourier coefficients a step, which all harmonics share,
-    /// though S takes them for independent. Of a Brownian motion its square is as large as all the rest, and without it the
-    /// coefficients are independent (Watson 1961). Where steps are larger than S lets expect, they are noise of their own.
-    fn find_steps(&mut self, problem: &Problem, scene: &Scene) {
-        let n = self.samples;
-        let ramp: Vec<f64> = (0..n).map(|k| (k as f64 + 0.5) / n as f64 - 0.5).collect();
-        let steps: Vec<Column> = (0..self.joints).map(|j| Column::on(j, ramp.clone())).collect();
-        let drift = FrictionDrift::beside_mean(&scene.motion.qd_rad_s, self.periods);
-        let parts = problem.panels.iter().enumerate().map(|(j, panel)| {
-            let mut y = panel.y.clone();
-            drift.remove(j, &mut y, |_| true);
-            (j, y)
-        });
-        let contrasts = self.image_in_noise(&Column { parts: parts.collect() }).contrast;
-        let mut steps: Vec<Image> = steps.iter().map(|step| self.image_in_noise(step)).collect();
-        // Of every joint the mean of z², z the height of its steps over the σ that S gives it.
-        let own = (self.periods - 1) as f64;
-        let square = |step: &mut Image| {
-            step.scale(1.0 / step.square().sqrt());
-            let heights = contrasts.chunks_exact(step.mean.len());
-            heights.map(|contrast| dot(&step.mean, contrast).powi(2)).sum::<f64>() / own
-        };
-        let squares: Vec<f64> = steps.iter_mut().map(square).collect();
-        let freedom = self.periods - 1;
-        let by_chance =
-            |square: f64, freedom: usize| upper_chi_squared(square * freedom as f64, freedom);
-        // One sensor that drifts says nothing of the others' noise.
-        let usual = median(&mut squares.clone()).unwrap_or(0.0);
-        let all_step = by_chance(usual, self.joints * freedom) < STEPS_BY_CHANCE;
-        let steps_alone =
-            |square: f64| by_chance(square, freedom) < STEPS_BY_CHANCE / self.joints as f64;
-        if !all_step && !squares.iter().any(|square| steps_alone(*square)) {
-            return;
-        }
-        for (step, &square) in steps.iter_mut().zip(&squares) {
-            let square = match (all_step, steps_alone(square)) {
-                (true, _) => (own * square + OF_ALL * usual) / (own + OF_ALL),
-                (false, true) => square,
-                (false, false) => 1.0,
-            };
-            step.scale((square - 1.0).max(0.0).sqrt());
-        }
-        self.stepping = Some(RepeatingNoise::new(&steps));
-        self.steps = steps;
     }
 
     /// Takes torques that repeat in every period and whose heights have the standard deviation one for noise.
@@ -213,20 +172,18 @@ impl PeriodWhitening {
         self.repeating = Some(RepeatingNoise::new(&images));
     }
 
-    /// Σ_p D Dᴴ/(P − 1) of every harmonic, D the deviation from the mean period, N × N.
-    fn scatter(&self, problem: &Problem, scene: &Scene) -> Vec<DMatrix<Complex<f64>>> {
+    /// Σ_p D Dᴴ/(P − 1) of every harmonic, D the deviation from the mean period, N × N, of the `torque` of all periods that `drift`
+    /// has been taken out of.
+    fn scatter(&self, torque: &Column, drift: &FrictionDrift) -> Vec<DMatrix<Complex<f64>>> {
         let Self { samples: n, periods, joints, .. } = *self;
-        let drift = FrictionDrift::beside_mean(&scene.motion.qd_rad_s, periods);
         let freedom = (periods - 1) as f64;
         let mut spectra: Vec<Vec<Complex<f64>>> = Vec::new();
         // By joint and harmonic, what drifting friction has left of noise's standard deviation.
         let mut kept: Vec<Vec<f64>> = Vec::new();
-        for (j, panel) in problem.panels.iter().enumerate() {
-            let mut y = panel.y.clone();
-            drift.remove(j, &mut y, |_| true);
+        for (j, y) in &torque.parts {
             spectra.extend(y.chunks_exact(n).map(|period| self.spectrum(period)));
             let mut lost = vec![0.0; n / 2 + 1];
-            for direction in drift.directions(j) {
+            for direction in drift.directions(*j) {
                 for period in direction.chunks_exact(n) {
                     let spectrum = self.spectrum(period);
                     lost.iter_mut().zip(&spectrum).for_each(|(lost, c)| *lost += c.norm_sqr());
@@ -272,6 +229,19 @@ impl PeriodWhitening {
             s.iter_mut().for_each(|v| v.im = 0.0);
         }
         (s, freedom)
+    }
+
+    /// Samples of a period.
+    pub(super) fn samples(&self) -> usize {
+        self.samples
+    }
+
+    pub(super) fn periods(&self) -> usize {
+        self.periods
+    }
+
+    pub(super) fn joints(&self) -> usize {
+        self.joints
     }
 
     /// Joints (0-based) whose mean torque drifts, and by how much, Nm rms.
@@ -368,7 +338,7 @@ impl PeriodWhitening {
     }
 
     /// [`Self::image`] but for noise that repeats.
-    fn image_in_noise(&self, column: &Column) -> Image {
+    pub(super) fn image_in_noise(&self, column: &Column) -> Image {
         let n = self.samples;
         let repeats = column.parts.iter().all(|(_, y)| y.len() == n);
         let weight = self.of_mean.sqrt();
@@ -404,6 +374,27 @@ impl PeriodWhitening {
             contrast.extend(self.rows(&combine(&weights), 1.0));
         }
         Image { mean, contrast }
+    }
+}
+
+#[cfg(test)]
+impl PeriodWhitening {
+    /// Of noise with variance one that no harmonics and no joints share.
+    pub(super) fn of_white_noise(samples: usize, periods: usize, joints: usize) -> Self {
+        let identity = DMatrix::<Complex<f64>>::identity(joints, joints);
+        Self {
+            samples,
+            periods,
+            joints,
+            of_mean: periods as f64,
+            forward: RealFftPlanner::new().plan_fft_forward(samples),
+            factors: vec![identity.iter().copied().collect(); samples / 2 + 1],
+            unknown: Vec::new(),
+            drifting: Vec::new(),
+            steps: Vec::new(),
+            stepping: None,
+            repeating: None,
+        }
     }
 }
 

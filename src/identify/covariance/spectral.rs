@@ -8,6 +8,7 @@ use super::{Covariance, CovarianceError, CovarianceKind, CovarianceMethod};
 use crate::identify::fit::Fit;
 use crate::identify::problem::{Domain, Problem};
 use crate::identify::whiten::Spectrum;
+use crate::signal::subtract_mean_period;
 
 /// V = Σ_k Σ_p z_kp z_kpᵀ / (P(P − 1)), z_kp = A⁻¹ X_kᵀW²(Y_pk − Ȳ_k): what the deviation of period
 /// p at harmonic k does to θ̂.
@@ -55,10 +56,7 @@ fn scores(rows: &Problem, weights: &[f64]) -> DMatrix<f64> {
     for (j, panel) in rows.panels.iter().enumerate() {
         deviations.clear();
         deviations.extend_from_slice(&panel.y);
-        for k in 0..n {
-            let mean = panel.y[k..].iter().step_by(n).sum::<f64>() / periods as f64;
-            deviations[k..].iter_mut().step_by(n).for_each(|d| *d -= mean);
-        }
+        subtract_mean_period(&mut deviations, n);
         let weight = weights[j] * weights[j];
         for (base, x) in rows.plan.base_indices(j).zip(panel.x.chunks_exact(n)) {
             let mut column = scores.column_mut(base);

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::cross_joint::{correlation, decorrelation, mix};
 use super::spectrum::Spectrum;
 use crate::identify::problem::Problem;
-use crate::signal::HarmonicPower;
+use crate::signal::{HarmonicPower, subtract_mean_period};
 
 /// Whitening by the scatter between periods.
 ///
@@ -67,7 +67,7 @@ impl ReplicateWhitening {
         self.weights.resize(rows.joints(), Vec::new());
         let mut noisiest: f64 = 0.0;
         for (deviations, weights) in deviations.iter_mut().zip(&mut self.weights) {
-            subtract_mean(deviations, n);
+            subtract_mean_period(deviations, n);
             *weights = vec![0.0; n];
             for period in deviations.chunks_exact(n) {
                 weights.iter_mut().zip(period).for_each(|(w, d)| *w += d * d);
@@ -104,15 +104,6 @@ fn cut(weights: &mut [f64], acceleration: &HarmonicPower) {
             weights[2 * h - 1..].fill(0.0);
             return;
         }
-    }
-}
-
-/// y − ȳ, with the mean over the chunks of `n`.
-fn subtract_mean(y: &mut [f64], n: usize) {
-    let periods = (y.len() / n) as f64;
-    for k in 0..n {
-        let mean = y[k..].iter().step_by(n).sum::<f64>() / periods;
-        y[k..].iter_mut().step_by(n).for_each(|v| *v -= mean);
     }
 }
 
@@ -158,7 +149,7 @@ mod tests {
     #[test]
     fn deviations_sum_to_zero() {
         let mut y: Vec<f64> = (0..12).map(|k| (k * k) as f64).collect();
-        subtract_mean(&mut y, 4);
+        subtract_mean_period(&mut y, 4);
         for k in 0..4 {
             assert!((y[k] + y[k + 4] + y[k + 8]).abs() < 1e-12);
         }

@@ -1,24 +1,19 @@
 //! Series of one period behind a filter of known response.
 
-use std::sync::Arc;
-
 use realfft::num_complex::Complex64;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
-/// Transforms of series with one number of samples.
+use crate::signal::FineClock;
+
+/// Series with one number of samples.
 pub(super) struct Periodic {
     samples: usize,
     rate_hz: f64,
-    forward: Arc<dyn RealToComplex<f64>>,
-    inverse: Arc<dyn ComplexToReal<f64>>,
+    clock: FineClock,
 }
 
 impl Periodic {
     pub(super) fn new(samples: usize, rate_hz: f64) -> Self {
-        let mut planner = RealFftPlanner::new();
-        let forward = planner.plan_fft_forward(samples);
-        let inverse = planner.plan_fft_inverse(samples);
-        Self { samples, rate_hz, forward, inverse }
+        Self { samples, rate_hz, clock: FineClock::new(samples, 1) }
     }
 
     fn frequency_hz(&self, bin: usize) -> f64 {
@@ -28,22 +23,7 @@ impl Periodic {
     /// One period of a series as it is in the steady state behind a filter with `response`, a
     /// function of the frequency in Hz.
     pub(super) fn filtered(&self, x: &[f64], response: impl Fn(f64) -> Complex64) -> Vec<f64> {
-        const LENGTHS: &str = "all buffers have the plan's own lengths";
-        let mut input = x.to_vec();
-        let mut spectrum = self.forward.make_output_vec();
-        self.forward.process(&mut input, &mut spectrum).expect(LENGTHS);
-        let scale = 1.0 / self.samples as f64;
-        for (bin, value) in spectrum.iter_mut().enumerate() {
-            *value *= response(self.frequency_hz(bin)) * scale;
-        }
-        // A real series has no imaginary part at frequency zero and at half the sampling rate.
-        spectrum[0].im = 0.0;
-        if self.samples.is_multiple_of(2) {
-            spectrum[self.samples / 2].im = 0.0;
-        }
-        let mut out = self.inverse.make_output_vec();
-        self.inverse.process(&mut spectrum, &mut out).expect(LENGTHS);
-        out
+        self.clock.filtered(x, |bin| response(self.frequency_hz(bin)))
     }
 
     /// Variance of unit white noise behind a filter whose gain is `gain`: the mean of its square over
