@@ -35,6 +35,16 @@ const TOO_COARSE: f64 = 1.0;
 const BLOCKS: usize = 20;
 /// Student's t₁₉ for a chance of 10⁻⁵ in two tails, six joints.
 const LAG_T: f64 = 6.5;
+/// Lags of single joints are those of all where none is off their mean by so many of its own σ and this share of the mean: the lag of
+/// a filter that all channels have depends a little on how fast a joint moves.
+const ALIKE: [f64; 2] = [5.0, 0.1];
+/// Angle and velocity of a joint that moves go together: the mean of their product is at least this share of the velocity's square. Of a
+/// joint at rest both are noise, and it is nothing but chance.
+const GO_TOGETHER: f64 = 0.5;
+/// Slower than this, rad/s, a joint may repeat its readings.
+const MOVES_RAD_S: f64 = 0.01;
+/// Share of rows that an ordinary recorder misses: no cause of anything.
+const MISSED: f64 = 2e-3;
 
 /// The faults of a record.
 pub struct Faults {
@@ -140,7 +150,8 @@ fn velocity_lag(m: &Measurement) -> Vec<Cause> {
     if 2 * late.len() > lags.len() && late.len() > 1 {
         let weight: f64 = late.iter().map(|(_, s)| s.powi(-2)).sum();
         let mean = late.iter().map(|(d, s)| d / (s * s)).sum::<f64>() / weight;
-        let alike = known.iter().all(|(d, s)| (d - mean).abs() < 5.0 * s + 0.1 * mean.abs());
+        let alike =
+            known.iter().all(|(d, s)| (d - mean).abs() < ALIKE[0] * s + ALIKE[1] * mean.abs());
         if alike {
             let sigma = weight.powf(-0.5);
             return vec![cause(
@@ -184,7 +195,7 @@ fn lag(m: &Measurement, j: usize) -> Option<(f64, f64)> {
     let sum = |part: &[(f64, f64)]| part.iter().fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
     let (product, square) = sum(&terms);
     // Of a joint at rest velocity and angle are noise, which is never late.
-    let moves = alike > 0.5 * all;
+    let moves = alike > GO_TOGETHER * all;
     if square.is_nan() || square <= 0.0 || !moves || terms.len() < 10 * BLOCKS {
         return None;
     }
@@ -203,7 +214,8 @@ fn lag(m: &Measurement, j: usize) -> Option<(f64, f64)> {
 /// Rows of a moving arm that repeat the row before in every channel.
 fn repeats(m: &Measurement) -> Vec<usize> {
     let channels = [m.q_rad, m.qd_rad_s, m.torque_nm];
-    let moves = |k: usize| (0..m.q_rad.joints()).any(|j| m.qd_rad_s.joint(j)[k].abs() > 0.01);
+    let moves =
+        |k: usize| (0..m.q_rad.joints()).any(|j| m.qd_rad_s.joint(j)[k].abs() > MOVES_RAD_S);
     let same =
         |s: &JointSignals, k: usize| (0..s.joints()).all(|j| s.joint(j)[k] == s.joint(j)[k - 1]);
     (1..m.time_s.len()).filter(|&k| moves(k) && channels.iter().all(|s| same(s, k))).collect()
@@ -215,8 +227,7 @@ fn repeated_or_missing(m: &Measurement, repeats: &[usize]) -> Option<Cause> {
     let missing: f64 =
         (1..m.time_s.len()).map(|k| missing_steps(m.time_s, k, step_s).round()).sum();
     let fraction = (missing + repeats.len() as f64) / (missing + m.time_s.len() as f64);
-    // Single missed samples of an ordinary recorder are no cause of anything.
-    (fraction > 2e-3).then(|| {
+    (fraction > MISSED).then(|| {
         let words = "samples that are missing or repeat the one before";
         let parameters = [("fraction", exact(fraction, ""))];
         cause(Kind::DroppedSamples, None, words, f64::INFINITY, &parameters)

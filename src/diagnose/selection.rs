@@ -14,6 +14,8 @@ const MOST_CAUSES: usize = 24;
 pub(super) const SHARED: f64 = 0.5;
 /// Rounds in which causes of a single run are exchanged: two may replace each other for ever.
 const EXCHANGES: usize = 3;
+/// 2 ln of the odds by which another has to be ahead of a cause to take its place: two that say much the same would take turns.
+const CLEARLY_BETTER: f64 = 1.0;
 /// Causes of one family on one joint at most, where a family may be there more than once: gears and motors have
 /// a few orders of ripple, and more of them are what another cause leaves.
 const MOST_ALIKE: usize = 3;
@@ -168,7 +170,7 @@ impl<'s, 'a> Kept<'s, 'a> {
                 let Some(best) = self.rivals(c, &others, &residual).into_iter().next() else {
                     continue;
                 };
-                if best.evidence > self.causes[c].evidence + 1.0 {
+                if best.evidence > self.causes[c].evidence + CLEARLY_BETTER {
                     self.causes[c] = best;
                     exchanged = true;
                 }
@@ -423,7 +425,7 @@ impl<'s, 'a> Kept<'s, 'a> {
                     continue;
                 };
                 let current = &self.causes[c];
-                if best.evidence > current.evidence + 1.0
+                if best.evidence > current.evidence + CLEARLY_BETTER
                     && (best.entry.family, best.entry.site)
                         != (current.entry.family, current.entry.site)
                 {

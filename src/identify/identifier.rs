@@ -143,8 +143,8 @@ const PIECE: usize = 1 << 16;
 const TICKS: usize = 8;
 /// Longest single run that keeps all its samples.
 const LONG_RUN: usize = 100_000;
-/// Rate kept behind the low-pass of a longer run, in multiples of the cutoff.
-const KEPT_RATE: f64 = 4.0;
+/// Rate kept behind a low-pass where a run is long or its rows are counted, in multiples of the cutoff.
+pub const KEPT_RATE: f64 = 4.0;
 
 impl<'a> Identifier<'a> {
     /// For logs of one arm.

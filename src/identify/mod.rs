@@ -1,4 +1,9 @@
 //! From a log to parameters with an uncertainty: sections III-D and IV-B of the paper.
+//!
+//! Enters: time stamps, angles, velocities and torques of one log or of several ([`Measurement`]), the [`Model`](crate::dynamics::Model) of
+//! the arm and its [`BaseSet`](crate::base::BaseSet). Leaves: the log on an even clock, laid out as equations ([`Regression`]); base
+//! parameters with their covariance and a test of what the model lacks ([`Identification`]); torque predicted along other
+//! logs ([`Prediction`]); standard parameters that an arm can have ([`physical`]).
 
 pub mod covariance;
 pub mod physical;
@@ -37,7 +42,7 @@ pub use estimation::{Estimate, Estimation, MotionAids};
 pub use even::BetweenRows;
 pub use fit::{Estimator, Fit, FitError, Fitter, Weighting};
 pub use gravity::{GravityMatch, gravity_question, gravity_remark};
-pub use identifier::{Identification, Identifier, MANY_PERIODS, Regression};
+pub use identifier::{Identification, Identifier, KEPT_RATE, MANY_PERIODS, Regression};
 pub use lack_of_fit::{Floor, LackOfFit, chance_in_words};
 pub use negative_friction::negative_friction_remark;
 pub use options::Options;

@@ -143,7 +143,7 @@ impl NoiseModel {
             Colour::LowPass { cutoff_hz } => {
                 let ratio =
                     (0.5 * omega).tan() / (std::f64::consts::PI * cutoff_hz / rate_hz).tan();
-                let settled = (4.5 * rate_hz / cutoff_hz).ceil() as usize;
+                let settled = settled(cutoff_hz, rate_hz);
                 let energy = Butterworth2::new(cutoff_hz / rate_hz).energy(settled);
                 1.0 / (1.0 + ratio.powi(4)) / energy
             }

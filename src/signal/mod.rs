@@ -56,7 +56,7 @@ pub use matched::{Heights, MatchedFilter};
 pub use noise_trend::{LogScatter, NoisePower, noise_trend, noise_trends, pooled, pooled_level};
 pub use other_periods::other_periods;
 pub use paper_filter::{PaperDifferentiator, PaperReading};
-pub use period::{Period, PeriodSearch, find_period};
+pub use period::{Period, PeriodSearch, find_period, variance_of};
 pub use periodic_fit::{FitScratch, PeriodicFit};
 pub use periods::{mean_period, subtract_mean_period};
 pub use readings::{quantum, reading_limit};

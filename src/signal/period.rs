@@ -402,7 +402,7 @@ fn blocks(count: usize, length: usize) -> impl Iterator<Item = Range<usize>> {
 }
 
 /// Mean square about the mean.
-pub(super) fn variance_of(y: &[f64]) -> f64 {
+pub fn variance_of(y: &[f64]) -> f64 {
     let n = y.len() as f64;
     let mean = y.iter().sum::<f64>() / n;
     y.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n

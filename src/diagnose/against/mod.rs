@@ -2,6 +2,9 @@
 //!
 //! Nothing is fitted first: the residual is y − X θ_sim, and a change explains its own torque of it ([`changes`]). Effects that any
 //! fit would absorb stand out here.
+//!
+//! Enters: the study of a log, the base parameters of the simulation, and the effects that were found without it. Leaves: the changes that
+//! explain the difference, as causes, and which parameters moved by how much.
 
 mod changes;
 

@@ -3,6 +3,9 @@
 //! A family turns the processed motion of a log into the torque it would add to it, per unit of its
 //! coefficients. Adding a family is one file and one line in [`all`]. Nothing here is shared with the
 //! plant, which makes the same effects by physics.
+//!
+//! Enters: the [`Scene`] of a log, a joint, and a [`Shape`]: the numbers that a law is not linear in. Leaves: columns of torque, physical
+//! parameters with units from their coefficients, and what the family is confounded with.
 
 mod asymmetric_friction;
 mod backlash;

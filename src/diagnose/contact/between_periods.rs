@@ -26,6 +26,8 @@ const MOST: usize = 40;
 /// At an end where the repetitions were prolonged so much is left out, s: the last of a run-in moves the arm so
 /// little beside the repetitions that angles do not show it, and takes torque.
 const EDGE_S: f64 = 0.5;
+/// A last period that lacks no more than this share is a whole one.
+const WHOLE_WITHIN: f64 = 0.01;
 
 /// Contacts in a log whose motion repeats, and the torque as it would be without them.
 pub struct WithoutContacts {
@@ -58,7 +60,7 @@ pub fn between_periods(m: &Measurement, left_out: &[usize]) -> Result<Compared, 
     let period = found.refined_samples;
     let edge = (EDGE_S * rate_hz) as usize;
     let window = with_disturbed_periods(&q_rad, period, found.window, edge);
-    if ((window.len() as f64 / period + 0.01) as usize) < FEWEST_PERIODS {
+    if ((window.len() as f64 / period + WHOLE_WITHIN) as usize) < FEWEST_PERIODS {
         return Ok(Compared::TooFew);
     }
     let joints: Vec<usize> = (0..m.torque_nm.joints()).filter(|j| !left_out.contains(j)).collect();

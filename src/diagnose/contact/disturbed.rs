@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::median::{median, robust_sigma};
 use crate::robot::JointSignals;
-use crate::signal::cubic_at;
+use crate::signal::{cubic_at, variance_of};
 
 /// Stretches of a period in which the run-in and the stop are found: a contact near an end of the log is not to be
 /// taken for a part of them.
@@ -15,6 +15,9 @@ const SAME_MOTION: f64 = 0.02;
 const NO_CONTACT: f64 = 2e-3;
 /// A joint that hardly moves may differ by so many σ of its encoder's noise: at any of a million instants it does once.
 const NOISE: f64 = 5.0;
+
+/// A joint that moves by less than this, rad, is held: what differs there from period to period is rounding.
+const HELD_RAD: f64 = 1e-6;
 
 /// `window`, longer by whole periods in which most of the motion repeats (a contact moves the arm for a
 /// moment, and that period is then not among those that repeat throughout) and by what is there of another one, up to
@@ -27,12 +30,8 @@ pub(super) fn with_disturbed_periods(
 ) -> Range<usize> {
     let step = period.round() as usize;
     let stretch = (step / STRETCHES).max(1);
-    let amplitude = |q: &[f64]| {
-        let mean = q.iter().sum::<f64>() / q.len() as f64;
-        (q.iter().map(|q| (q - mean).powi(2)).sum::<f64>() / q.len() as f64).sqrt()
-    };
-    let amplitudes: Vec<f64> =
-        (0..q_rad.joints()).map(|j| amplitude(q_rad.joint(j)) + 1e-6).collect();
+    let amplitude = |j: usize| variance_of(q_rad.joint(j)).sqrt() + HELD_RAD;
+    let amplitudes: Vec<f64> = (0..q_rad.joints()).map(amplitude).collect();
     // Between the samples `own` of joint `j` and those a period behind, or before.
     let differences = |j: usize, own: Range<usize>, periods: f64| -> Vec<f64> {
         let q = q_rad.joint(j);

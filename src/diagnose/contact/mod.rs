@@ -5,6 +5,8 @@
 //! angles show that the arm moved otherwise: a drive yields to a push by far more than an encoder's noise. A
 //! single run is compared with the extended model, in samples far from the joint's own reversals, where
 //! friction is known best ([`beside_model`]).
+//!
+//! Enters: the channels of a log, or the residual of a model along it. Leaves: contacts as causes, and the torque without them.
 
 mod beside_model;
 mod between_periods;

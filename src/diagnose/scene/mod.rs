@@ -1,4 +1,7 @@
 //! What every candidate sees of a log: the motion, and what the current estimate makes of it.
+//!
+//! Enters: the prepared log and base parameters. Leaves: motion, loads, friction's sign and inertias at every sample and, where the motion
+//! repeats, between the samples.
 
 mod between_samples;
 

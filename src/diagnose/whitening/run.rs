@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::image::{Column, Image};
-use crate::identify::{Options, Regression};
+use crate::identify::{KEPT_RATE, MOVING_RAD_S, Options, Regression};
 use crate::signal::{Scratch, ZeroPhase};
 
 /// Rows of a single run: the regression's low-pass, then a weight per joint, and only samples in
@@ -23,12 +23,9 @@ pub struct RunWhitening {
     block_rows: usize,
 }
 
-/// Rows kept of a single run, per second and hertz of its low-pass.
-const KEPT_RATE: f64 = 4.0;
 /// Blocks of a single run.
 const BLOCK_S: f64 = 1.0;
-/// A joint slower than this, rad/s, for as long as [`REST_S`] stands still.
-const REST_RAD_S: f64 = 0.02;
+/// A joint that does not move ([`MOVING_RAD_S`]) for so long, s, stands still.
 const REST_S: f64 = 0.25;
 
 impl RunWhitening {
@@ -132,7 +129,7 @@ fn moving(qd_rad_s: &[f64], rest: usize, margin: usize) -> Vec<bool> {
     let mut moves = vec![true; n];
     let mut start = 0;
     for k in 0..=n {
-        if k < n && qd_rad_s[k].abs() < REST_RAD_S {
+        if k < n && qd_rad_s[k].abs() < MOVING_RAD_S {
             continue;
         }
         if k - start >= rest {

@@ -18,14 +18,18 @@ pub fn decorrelate(problem: &Problem, fit: &Fit, out: &mut Problem) {
     mix(problem, &weights, &decorrelation(&correlation(&products)), out);
 }
 
+/// Standard deviation of a joint's noise beside what the others tell of it, over its own. Below it rows would be weighed by 10⁴ for what may
+/// be rounding of a channel that was copied.
+const ALL_BUT_ALIKE: f64 = 1e-4;
+
 /// U, upper triangular, with U C Uᵀ = 1 for a correlation matrix C: row j mixes joint j with those
-/// behind it only, so that wrist equations keep their few columns. The identity where C is not
-/// positive definite to within rounding.
+/// behind it only, so that wrist equations keep their few columns. The identity where one joint's noise is that of the others to within
+/// [`ALL_BUT_ALIKE`].
 pub fn decorrelation(correlation: &DMatrix<f64>) -> DMatrix<f64> {
     let n = correlation.nrows();
     let reversed = DMatrix::from_fn(n, n, |i, k| correlation[(n - 1 - i, n - 1 - k)]);
     let inverse = nalgebra::Cholesky::new(reversed)
-        .filter(|factor| factor.l_dirty().diagonal().min() > 1e-4)
+        .filter(|factor| factor.l_dirty().diagonal().min() > ALL_BUT_ALIKE)
         .and_then(|factor| factor.l().try_inverse());
     match inverse {
         Some(inverse) => DMatrix::from_fn(n, n, |i, k| inverse[(n - 1 - i, n - 1 - k)]),

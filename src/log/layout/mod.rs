@@ -1,4 +1,7 @@
 //! Layouts: which column of a file is which quantity, and in which unit.
+//!
+//! Enters: a TOML file, or the name of a built-in layout. Leaves: names or numbers of columns per quantity, the factors that bring them to SI
+//! units, and the widths that files may have.
 
 mod block;
 mod columns;

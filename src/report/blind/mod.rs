@@ -1,4 +1,6 @@
 //! The blind benchmark: page, Markdown and what a replay prints.
+//!
+//! Enters: [`Scores`] of a run, or the [`Record`] of one trial. Leaves: a [`Page`], or lines.
 
 mod lines;
 mod plots;

@@ -1,4 +1,7 @@
 //! What `armid identify` says: JSON, tables and page.
+//!
+//! Enters: the logs, what was identified from them, and the logs that it is validated on. Leaves: the [`Result`] that becomes JSON, or
+//! why there is none ([`Declined`]), and a [`Page`](crate::report::Page).
 
 mod declined;
 mod intervals;

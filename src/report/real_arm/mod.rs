@@ -1,4 +1,6 @@
 //! The case study of a real UR10e: what its logs say about the rigid model, told to a stranger.
+//!
+//! Enters: the diagnoses of its logs, one by one and in pairs. Leaves: a [`Page`].
 
 mod drives;
 mod gains;

@@ -2,6 +2,8 @@
 //!
 //! The arm of a scenario is replaced by one [as built](as_built), the robot file stays the prior.
 //! Every trial is identified with and without constraints, and both predict another motion.
+//!
+//! Enters: scenarios. Leaves: scatter and model error of both kinds of estimates, and how often a wrong model is called one.
 
 mod as_built;
 mod statistics;
