@@ -5,12 +5,13 @@ use std::error::Error;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 
+use armid::number;
 use armid::report::json::Program;
 use armid::report::plot::{
     Across, Axis, Band, Colour, Grid, HeatMap, Histogram, IntervalPlot, IntervalRow, Mark,
     PlotError, Span, Stick, StickFigure, StickStyle, XyPlot,
 };
-use armid::report::{Column, Page, Section, Status, Table, Verdict, number};
+use armid::report::{Column, Page, Section, Status, Table, Verdict};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

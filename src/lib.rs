@@ -11,6 +11,7 @@ pub mod identify;
 pub mod log;
 mod median;
 pub mod montecarlo;
+pub mod number;
 pub mod output;
 pub mod plant;
 pub mod random;

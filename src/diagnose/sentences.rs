@@ -2,6 +2,7 @@
 
 use super::kind::Kind;
 use super::verdict::{Cause, Diagnosis, Estimate, HeldOut, Moved};
+use crate::number::{significant, with_sigma};
 
 /// An interval that reaches so much farther to one side than to the other is told by its ends.
 const UNEVEN: f64 = 1.2;
@@ -23,7 +24,7 @@ impl Diagnosis {
             out.push(format!(
                 "Joint {} shows {} Nm (rms) that no known effect explains; it depends most clearly on the {}.",
                 unexplained.joint,
-                digits(unexplained.rms_nm, 2),
+                significant(unexplained.rms_nm, 2),
                 unexplained.axis
             ));
         }
@@ -61,7 +62,7 @@ impl Diagnosis {
             "Beside the simulation {moved} of {} base parameters differ by more than {MOVED} σ; {} differs most, by {} σ.",
             self.moved_parameters.len(),
             farthest.name,
-            digits(farthest.z.abs(), 2),
+            significant(farthest.z.abs(), 2),
         ))
     }
 
@@ -102,8 +103,8 @@ fn gain_along(held_out: &HeldOut, laws: &[Option<usize>]) -> Option<String> {
          without.",
         held_out.log,
         j + 1,
-        digits(*after, 3),
-        digits(*before, 3)
+        significant(*after, 3),
+        significant(*before, 3)
     ))
 }
 
@@ -113,13 +114,13 @@ impl Estimate {
         let [low, high] = self.ci95;
         let (below, above) = (self.value - low, high - self.value);
         if self.says_nothing() {
-            let [low, high] = [low, high].map(|v| digits(v, 2));
+            let [low, high] = [low, high].map(|v| significant(v, 2));
             return format!("hardly known (between {low} and {high}) {}", self.unit)
                 .trim_end()
                 .to_owned();
         }
         if above > UNEVEN * below || below > UNEVEN * above {
-            let [value, low, high] = [self.value, low, high].map(|v| digits(v, 2));
+            let [value, low, high] = [self.value, low, high].map(|v| significant(v, 2));
             return format!("{value} (between {low} and {high}) {}", self.unit)
                 .trim_end()
                 .to_owned();
@@ -198,25 +199,24 @@ impl Cause {
     }
 
     fn payload_sentence(&self) -> String {
-        let pair = |name: &str| {
+        let told = |name: &str| {
             let estimate = self.parameters.get(name)?;
-            Some((estimate.value, 0.25 * (estimate.ci95[1] - estimate.ci95[0])))
+            let [low, high] = estimate.ci95;
+            Some((estimate.value, 0.5 * (high - low)))
         };
-        let Some((mass, mass_sigma)) = pair("mass_kg") else {
+        let Some((mass, half)) = told("mass_kg") else {
             let numbers = self.numbers();
             return format!(
                 "The flange carries something else{numbers}; these motions cannot tell its mass."
             );
         };
         let which = if mass < 0.0 { "missing from" } else { "on" };
-        let mass = mass.abs();
-        let com = ["com_x_m", "com_y_m", "com_z_m"].map(pair);
-        let four = |told: Option<f64>| told.map_or("?".to_owned(), |value| format!("{value:.4}"));
-        let place = com.map(|com| four(com.map(|(value, _)| value))).join(", ");
-        let sigma = com.map(|com| four(com.map(|(_, sigma)| sigma))).join(", ");
+        let place = ["com_x_m", "com_y_m", "com_z_m"]
+            .map(|name| told(name).map_or("?".to_owned(), |(value, half)| with_sigma(value, half)));
         format!(
-            "A body of {mass:.3} ± {mass_sigma:.3} kg at ({place}) ± ({sigma}) m {which} the flange (± one σ, last \
-             joint's frame)."
+            "A body of {} kg {which} the flange, its centre at ({}) m in the last joint's frame.",
+            with_sigma(mass.abs(), half),
+            place.join(", ")
         )
     }
 }
@@ -226,26 +226,14 @@ fn unit_suffix(unit: &str) -> String {
     format!("_{}", unit.to_lowercase().replace(['/', ' '], "_").replace("1_", "per_"))
 }
 
-/// With so many digits, or more before the point.
-fn digits(value: f64, count: usize) -> String {
-    if value.abs() >= 1e6 {
-        return format!("{value:.1e}");
-    }
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    let decimals =
-        (count as f64 - 1.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 9.0) as usize;
-    format!("{value:.decimals$}")
-}
-
-/// `value ± half unit`, digits by the uncertainty.
+/// `value ± half unit`.
 fn pair(value: f64, half: f64, unit: &str) -> String {
-    if !value.is_finite() || !half.is_finite() || half <= 0.0 {
-        return format!("{value:.3} {unit}").trim_end().to_owned();
-    }
-    let decimals = (1.0 - half.log10().floor()).clamp(0.0, 9.0) as usize;
-    format!("{value:.decimals$} ± {half:.decimals$} {unit}").trim_end().to_owned()
+    let number = if half.is_finite() && half > 0.0 {
+        with_sigma(value, half)
+    } else {
+        significant(value, 3)
+    };
+    format!("{number} {unit}").trim_end().to_owned()
 }
 
 #[cfg(test)]

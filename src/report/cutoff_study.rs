@@ -1,10 +1,10 @@
 //! The study of the cutoff: page, Markdown and tables.
 
 use super::json::Program;
-use super::number::{percent, significant};
 use super::plot::{Axis, Colour, Grid, Mark, XyPlot};
 use super::{Column, Page, ReportError, Section, Status, Table, Verdict};
 use crate::montecarlo::study::{Curve, CutoffStudy, Method, Point, SigmaCase};
+use crate::number::{percent, significant};
 
 const HOW: &str = "The error of an estimate is stated in units of the least σ that the torque noise of the record allows, root mean \
 square over the 52 parameters; it joins bias and scatter. Left branch: what a low cutoff takes from the motion. Right branch: noise of \

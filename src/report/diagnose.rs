@@ -1,10 +1,10 @@
 //! What `armid diagnose` shows: the verdict in words, the picture that convinces, the alternatives.
 
 use super::json::Program;
-use super::number::{percent, resolved, significant};
 use super::plot::{Axis, Colour, Grid, Mark};
 use super::{Column, Page, ReportError, Section, Status, Table, Verdict, replay};
 use crate::diagnose::{self, Cause, DetectionLimit, Diagnosis, Finding, Kind, class_holds};
+use crate::number::{percent, resolved, significant};
 use crate::robot::Arm;
 
 /// The causes with their numbers.

@@ -3,13 +3,14 @@
 use crate::base::BaseSet;
 use crate::excitation::design::{Design, Specification};
 use crate::excitation::{ClearanceModel, LimitKind, Reference};
+use crate::number;
 use crate::robot::Arm;
 
 use super::json::Program;
 use super::plot::{
     Across, Axis, Colour, Grid, Mark, PlotError, Size, Stick, StickFigure, StickStyle, XyPlot,
 };
-use super::{Column, Page, ReportError, Section, Status, Table, Verdict, number};
+use super::{Column, Page, ReportError, Section, Status, Table, Verdict};
 
 /// Samples of one period in the figures.
 const SAMPLES: usize = 600;

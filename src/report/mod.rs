@@ -12,7 +12,6 @@ pub mod identify;
 pub mod json;
 pub mod montecarlo;
 pub mod noise_study;
-pub mod number;
 mod page;
 pub mod paper_study;
 pub mod physical;

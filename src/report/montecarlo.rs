@@ -1,12 +1,12 @@
 //! The Monte Carlo's page and its table for the terminal.
 
 use super::json::Program;
-use super::number::{percent, significant};
 use super::plot::{Axis, Bars, Colour, IntervalPlot, IntervalRow, Mark, Span, XyPlot};
 use super::{Column, Page, ReportError, Section, Status, Table, Verdict};
 use crate::montecarlo::calibration::{claims, wilson};
 use crate::montecarlo::tally::BIN_WIDTH;
 use crate::montecarlo::{Efficiency, Estimation, Summary, shard::Merged};
+use crate::number::{percent, significant};
 
 /// Every base parameter: truth, mean, bias, σ found and claimed, coverage.
 pub fn parameter_table(summary: &Summary) -> Table {

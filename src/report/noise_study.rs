@@ -1,12 +1,12 @@
 //! The study of noise: page, Markdown and tables.
 
 use super::json::Program;
-use super::number::percent;
 use super::plot::{Axis, IntervalPlot, IntervalRow, Span};
 use super::{Column, Page, ReportError, Section, Status, Table, Verdict};
 use crate::montecarlo::CheckSummary;
 use crate::montecarlo::calibration::{claims, wilson};
 use crate::montecarlo::study::{MethodResult, NoiseStudy, ScenarioResult};
+use crate::number::percent;
 
 impl ScenarioResult {
     /// The name without what all scenarios of noise have in common.

@@ -1,10 +1,10 @@
 //! The paper's section IV on the simulated arm: page, Markdown and tables.
 
 use super::json::Program;
-use super::number::{percent, significant};
 use super::plot::{Axis, Colour, Grid, Mark, XyPlot};
 use super::{Column, Page, ReportError, Section, Status, Table, Verdict};
 use crate::montecarlo::study::{ErrorResult, Mechanism, MechanismResult, PaperStudy, Trace};
+use crate::number::{percent, significant};
 use crate::robot::JointSignals;
 
 /// The paper's (34) and (35).

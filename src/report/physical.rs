@@ -2,11 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::number::{significant, with_sigma};
 use super::{Column, Section, Status, Table};
 use crate::dynamics::ParameterLayout;
 use crate::identify::Problem;
 use crate::identify::physical::{Certificate, CrossValidation, PhysicalEstimate, PriorMetric};
+use crate::number::{significant, with_sigma};
 use crate::robot::Arm;
 
 /// One standard parameter.

@@ -1,13 +1,13 @@
 //! The study of physical consistency: page, Markdown and tables.
 
 use super::json::Program;
-use super::number::percent;
 use super::plot::{Axis, IntervalPlot, IntervalRow};
 use super::{Column, Page, ReportError, Section, Status, Table, Verdict};
 use crate::montecarlo::study::physical::{
     CaseResult, Coverage, METHODS, Method, PhysicalStudy, Prediction, SIGMAS, THOROUGH_EVERY,
     VALIDATED_ON,
 };
+use crate::number::percent;
 
 const HOW: &str = "The simulated arm is not the one of the robot file: every body's log-Cholesky parameters are off by \
 10 %, rotor inertias and friction by 20 % (one random draw, the same arm in all cases). Each trial draws fresh noise, is identified \

@@ -1,9 +1,9 @@
 //! What the simulation says about a diagnosis: torque and motion of the logs, without and with the causes.
 
-use super::number::{percent, significant};
 use super::plot::{Axis, Colour, Grid, Mark};
 use super::{Column, ReportError, Section, Table};
 use crate::diagnose::replay::{Replay, ReplayedLog};
+use crate::number::{percent, significant};
 
 /// Torque and angles of every log, joint by joint.
 pub fn table(replay: &Replay) -> Table {

@@ -50,7 +50,7 @@ impl Column {
 /// A row: one cell per column, and a judgement that colours it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Row {
-    /// The cells, already formatted (see [`super::number`]).
+    /// The cells, already formatted (see [`crate::number`]).
     pub cells: Vec<String>,
     /// `None` for a row without judgement.
     pub status: Option<Status>,

@@ -1,7 +1,7 @@
 //! What a trial hides and what is said of it, in lines of text.
 
 use crate::montecarlo::blind::{Named, Record, place};
-use crate::report::number::percent;
+use crate::number::percent;
 
 /// A named cause in a line.
 fn named_line(named: &Named) -> String {

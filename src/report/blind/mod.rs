@@ -7,9 +7,9 @@ mod plots;
 mod tables;
 
 use super::json::Program;
-use super::number::percent;
 use super::{Page, ReportError, Section, Table, Verdict};
 use crate::montecarlo::blind::{Record, Scores, place};
+use crate::number::percent;
 
 use plots::{confidence_plot, confusion_plot, detection_plot};
 use tables::{

@@ -2,7 +2,7 @@
 
 use crate::montecarlo::Share;
 use crate::montecarlo::blind::{Judged, Scores, StrengthBin, Target};
-use crate::report::number::percent;
+use crate::number::percent;
 use crate::report::{Column, Status, Table};
 
 /// `12 of 40, 30.0 %`.

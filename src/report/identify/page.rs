@@ -4,8 +4,8 @@ use std::path::Path;
 
 use super::{Result, Training, Validation};
 use crate::identify::Prediction;
+use crate::number::{significant, with_sigma};
 use crate::report::json::Program;
-use crate::report::number::{significant, with_sigma};
 use crate::report::plot::{Axis, Colour, Grid, IntervalPlot, IntervalRow, Mark};
 use crate::report::{Column, Page, ReportError, Section, Status, Table, Verdict};
 use crate::robot::JointSignals;

@@ -2,7 +2,7 @@
 
 use super::{Part, RealArmStudy, file_name, list, mean, percents};
 use crate::diagnose::HeldOut;
-use crate::report::number::percent;
+use crate::number::percent;
 use crate::report::{Column, Table};
 
 /// Mean over the held-out logs of 1 − after/before per joint.

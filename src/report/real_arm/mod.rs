@@ -9,10 +9,10 @@ mod verdict;
 
 use super::diagnose::residual_axis;
 use super::json::Program;
-use super::number::{significant, with_sigma};
 use super::plot::{Axis, Colour, Grid, Mark};
 use super::{Column, Page, ReportError, Section, Table, Verdict};
 use crate::diagnose::{Cause, Estimate, Finding, Kind, PayloadFinding, Repeated, chance};
+use crate::number::{significant, with_sigma};
 use crate::robot::Arm;
 
 /// A log that was used.

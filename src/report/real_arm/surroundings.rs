@@ -1,7 +1,7 @@
 //! What the arm carried, and what touched it.
 
 use super::{Part, RealArmStudy, pair};
-use crate::report::number::significant;
+use crate::number::significant;
 use crate::report::{Column, Table};
 
 fn chance(probability: f64) -> String {

@@ -3,7 +3,7 @@
 use super::super::{Status, Verdict};
 use super::{RealArmStudy, file_name, mean, percents};
 use crate::diagnose::{Cause, HeldOut};
-use crate::report::number::{significant, with_sigma};
+use crate::number::{significant, with_sigma};
 
 /// Share of the rms error that is to be removed on held-out runs, in the mean of the joints.
 const AIM_MEAN: f64 = 0.35;

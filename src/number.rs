@@ -8,7 +8,7 @@ pub const NONE: &str = "—";
 /// An exponent is used below 10⁻⁴ and from 10⁶ on.
 ///
 /// ```
-/// use armid::report::number::significant;
+/// use armid::number::significant;
 /// assert_eq!(significant(0.123456, 3), "0.123");
 /// assert_eq!(significant(-1.5e-7, 3), "-1.50e-7");
 /// assert_eq!(significant(f64::NAN, 3), "—");
@@ -33,7 +33,7 @@ pub fn significant(value: f64, digits: usize) -> String {
 /// is not `1829 … 1830`.
 ///
 /// ```
-/// use armid::report::number::resolved;
+/// use armid::number::resolved;
 /// assert_eq!(resolved(1829.4812, 0.1), "1829.48");
 /// assert_eq!(resolved(0.0208, 104.0), "0.02080");
 /// ```
@@ -46,7 +46,7 @@ pub fn resolved(value: f64, width: f64) -> String {
 /// `(1.23 ± 0.12)e-6`. The rule is that of the GUM (JCGM 100:2008, 7.2.6).
 ///
 /// ```
-/// use armid::report::number::with_sigma;
+/// use armid::number::with_sigma;
 /// assert_eq!(with_sigma(1.23456, 0.0123), "1.235 ± 0.012");
 /// assert_eq!(with_sigma(-4.0e-7, 1.0e-8), "(-4.00 ± 0.10)e-7");
 /// ```
@@ -85,7 +85,7 @@ pub fn percent(fraction: f64, digits: usize) -> String {
 /// A number with a prefixed unit: `2e-5`, `rad` is `20.0 µrad` with three digits.
 ///
 /// ```
-/// use armid::report::number::prefixed;
+/// use armid::number::prefixed;
 /// assert_eq!(prefixed(0.0153, "Nm", 3), "15.3 mNm");
 /// assert_eq!(prefixed(0.9999, "s", 2), "1.0 s");
 /// ```
