@@ -229,6 +229,55 @@ fn a_unit_in_which_most_rows_are_implausible() {
     assert_says(result, &["run.csv", "implausible", "row 2", "actual_current_0", "units"]);
 }
 
+/// The line through 400 stamps that are off by 10 ms/√12 is known to 0.15 ms in the middle, and to twice that at its ends: five times
+/// as much.
+#[test]
+fn stamps_that_are_coarser_than_the_rows() {
+    let rounded = |rows: &mut Vec<Vec<String>>| {
+        for row in &mut rows[1..] {
+            let t: f64 = row[0].parse().unwrap();
+            row[0] = format!("{:.2}", t);
+        }
+    };
+    for lost in [None, Some(200)] {
+        let log = edited(|rows| {
+            rounded(rows);
+            // A row that is set aside keeps its place.
+            lost.into_iter().for_each(|k: usize| rows[k][3] = "x".into());
+        })
+        .unwrap();
+        assert_eq!(log.samples(), SAMPLES - lost.iter().count());
+        for (t, row) in log.time_s.iter().zip((0..SAMPLES).filter(|k| lost != Some(k + 1))) {
+            assert!((t - 100.0 - STEP_S * row as f64).abs() < 1.5e-3, "{t} {row}");
+        }
+        assert!(log.rows.warnings.iter().any(|w| matches!(w, LogWarning::RoundedStamps { .. })));
+    }
+}
+
+/// Patterns of stamps that rounding makes as well: every twentieth row missing, every row written twice. The motion says that the stamps
+/// are right.
+#[test]
+fn stamps_that_only_look_rounded() {
+    let is_rounded =
+        |log: &Log| log.rows.warnings.iter().any(|w| matches!(w, LogWarning::RoundedStamps { .. }));
+    let missing = edited(|rows| {
+        let mut k = 0;
+        rows.retain(|_| {
+            k += 1;
+            k % 20 != 0
+        });
+    })
+    .unwrap();
+    assert!(!is_rounded(&missing));
+    assert_eq!(missing.samples(), SAMPLES - SAMPLES / 20);
+    let twice = edited(|rows| {
+        *rows = rows.iter().flat_map(|row| [row.clone(), row.clone()]).skip(1).collect();
+    })
+    .unwrap();
+    assert!(!is_rounded(&twice));
+    assert_eq!(twice.rows.count(Reason::TimeRepeated), SAMPLES);
+}
+
 /// A delimiter at the end of every row makes no field, with a header or without.
 #[test]
 fn delimiters_at_the_ends_of_rows_without_a_header() {

@@ -254,6 +254,10 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         Err(IdentifyError::Fit(FitError::NotExcited { parameters })) => {
             return decline(args, &Declined::new(&arm, &logs, &regression, parameters), program);
         }
+        Err(IdentifyError::Fit(FitError::StandsStill)) => {
+            let all = (0..set.rank()).map(|k| set.name(k).to_owned()).collect();
+            return decline(args, &Declined::new(&arm, &logs, &regression, all), program);
+        }
         other => other?,
     };
     let training = Training {

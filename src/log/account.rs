@@ -100,6 +100,13 @@ pub enum LogWarning {
         /// The row before the longest step.
         after_row: usize,
     },
+    /// Time stamps that are coarser than half of what rows are apart: evenly recorded rows are put on the line through them.
+    RoundedStamps {
+        /// What they are rounded to, s.
+        quantum_s: f64,
+        /// Rows a second.
+        rate_hz: f64,
+    },
     /// More than one row in ten was set aside.
     ManySetAside {
         /// Rows set aside.
@@ -155,6 +162,11 @@ impl fmt::Display for LogWarning {
                 f,
                 "{missed} samples are missing in {gaps} gaps; the longest step is {longest_s:.4} s, \
                  after row {after_row}"
+            ),
+            Self::RoundedStamps { quantum_s, rate_hz } => write!(
+                f,
+                "time stamps are rounded to {quantum_s:.4} s: rows are taken to be evenly apart, {rate_hz:.3} a second, as the motion \
+                 says that they are"
             ),
             Self::ManySetAside { set_aside, read } => write!(
                 f,

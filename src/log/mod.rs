@@ -8,6 +8,7 @@
 mod account;
 mod clean;
 mod error;
+mod even_stamps;
 mod layout;
 mod lines;
 mod plan;

@@ -7,6 +7,7 @@ use std::path::Path;
 use super::account::{LogWarning, Reason, RowAccount};
 use super::clean;
 use super::error::{LogError, UnitSuspicion};
+use super::even_stamps::{EvenStamps, even_stamps};
 use super::layout::{Block, Layout};
 use super::lines::{Line, Lines};
 use super::plan::{Delimiter, Plan};
@@ -25,7 +26,9 @@ const WIDTH_ROWS: usize = 50;
 /// 1. Rows are set aside that have another number of fields than the file, or in time, angles, velocities or effort an
 ///    empty field, text, NaN, an infinity, or a magnitude beyond: angle and velocity 3.6·10⁵, acceleration 3·10⁴ rad/s²,
 ///    current 500 A, torque 5·10⁴ Nm, temperature 1000 °C, time 10¹⁹ s.
-/// 2. Times must increase: repeated and backward times are set aside, and up to 8 in a row that are far ahead.
+/// 2. Times that are rounded more coarsely than half of what rows are apart are put on the straight line through them, if the motion says
+///    that rows are even. Then times must increase: repeated and backward times are set aside, and up to 8 in a row that
+///    are far ahead.
 /// 3. Units: Δq is compared with ∫q̇ dt, and the clock with what recorders do. Numbers that say degrees,
 ///    milli-, micro- or nanoseconds are an error that names the layout's remedy.
 /// 4. Angles beyond 1000 rad and velocities beyond 100 rad/s are set aside, and so are rows whose angles
@@ -211,6 +214,11 @@ impl Table {
     ) -> Result<Vec<LogWarning>, LogError> {
         let fault = |suspicion| LogError::Units { file: file.to_owned(), suspicion };
         let (time, q, qd) = motion_ranges(plan);
+        let even = even_stamps(&self.motion(plan));
+        let rounded = even.map(|EvenStamps { time_s, quantum_s, rate_hz }| {
+            self.columns[time] = time_s;
+            LogWarning::RoundedStamps { quantum_s, rate_hz }
+        });
         let order = clean::order_of_time(&self.columns[time]);
         self.retain(&order, account, |table, k, _| format!("time {} s", table.columns[time][k]));
         self.require_two(account, file)?;
@@ -238,6 +246,7 @@ impl Table {
             related = units::check(&self.motion(plan), &layout.units);
         }
         let mut warnings = related.map_err(fault)?;
+        warnings.splice(0..0, rounded);
         warnings.extend(self.unwrap_angles(plan));
         let motion = self.motion(plan);
         warnings.extend(clean::jumps(&motion));

@@ -9,6 +9,8 @@ pub struct FeedForward;
 
 /// A drive feeds no more than twice its friction forward, and no less than nothing.
 const MOST_LESS: f64 = 2.0;
+/// Of a drive beside others that feed all of theirs nothing more can be missing.
+const ALL: f64 = 1.0;
 
 impl Candidate for FeedForward {
     fn kind(&self) -> Kind {
@@ -34,6 +36,10 @@ impl Candidate for FeedForward {
 
     fn is_possible(&self, _: Shape, b: &[f64]) -> bool {
         b[0].abs() < MOST_LESS
+    }
+
+    fn largest(&self) -> f64 {
+        ALL
     }
 
     fn in_words(&self) -> &'static str {
