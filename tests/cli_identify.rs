@@ -183,7 +183,7 @@ fn a_motion_that_is_too_fast_for_its_arm_is_told() {
         let output = armid(&words);
         assert_says(&output, 0, &["samples"]);
         let note = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(note.contains("velocity of joint"), said, "{note}");
+        assert_eq!(note.contains("passes the limit of ur10e"), said, "{note}");
     }
 }
 

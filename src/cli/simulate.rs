@@ -10,7 +10,7 @@ use super::robot::inputs;
 use super::{CommandResult, Outcome, simulating};
 use crate::dynamics::Model;
 use crate::dynamics::ParameterLayout;
-use crate::excitation::{ExcitationError, Margin, Requirements, check};
+use crate::excitation::{ExcitationError, LimitKind, Margin, Requirements, check};
 use crate::log::{Effort, Log, write_log};
 use crate::montecarlo::{EffectSize, Scenario, Simulation};
 use crate::output::check_outputs;
@@ -80,23 +80,25 @@ fn size(simulation: &Simulation) -> Result<Option<EffectSize>, crate::plant::Pla
     if sd.contains(&0.0) { Ok(None) } else { simulation.effect_size().map(Some) }
 }
 
-/// The limit of its arm that a scenario's motion passes furthest: the plant has none.
+/// The limit of a joint that a scenario's motion passes furthest: the plant has none.
 fn passed_limit(scenario: &Scenario) -> Result<Option<String>, ExcitationError> {
     let requirements =
         Requirements { clearance_m: 0.0, torque_share: 1.0, ..Requirements::default() };
     let margins = check(&scenario.arm, &requirements, &scenario.excitation)?;
-    let worst = margins.worst();
-    let said = || {
-        let Margin { limit, free, time_s, .. } = worst;
-        format!(
-            "{limit}: the motion {} passes the limit of {} by {:.3} {} at {time_s:.2} s; the simulated arm has no limits",
-            scenario.trajectory,
-            scenario.arm.name,
-            -free,
-            limit.unit()
+    let of_a_joint = |margin: &&Margin| {
+        let limit = &margin.limit;
+        !matches!(
+            limit,
+            LimitKind::Clearance { .. } | LimitKind::Floor { .. } | LimitKind::Box { .. }
         )
     };
-    Ok((!margins.feasible()).then(said))
+    let worst = margins.least_first().into_iter().find(of_a_joint);
+    Ok(worst.filter(|margin| margin.free < 0.0).map(|Margin { limit, free, time_s, .. }| {
+        format!(
+            "{limit}: the motion {} passes the limit of {} by {:.3} {} at {time_s:.2} s; the simulated arm has no limits",
+            scenario.trajectory, scenario.arm.name, -free, limit.unit()
+        )
+    }))
 }
 
 /// Runs the command.

@@ -61,7 +61,7 @@ pub fn detection_limits(study: &Study, accepted: &Span) -> Vec<DetectionLimit> {
             let is_told = sqrt_lambda < LARGEST
                 && length * length > ABSORBED_BESIDE * entry.images[0].square()
                 && coefficient < BEYOND_PHYSICS
-                && quantity.value.abs() < candidate.largest();
+                && candidate.can_be(&study.scene, site, quantity.value);
             out.push(DetectionLimit {
                 kind: candidate.kind(),
                 joint: site.map(|j| j + 1),

@@ -26,7 +26,6 @@ use super::whitening::{RunWhitening, Whitening};
 use crate::base::BaseSet;
 use crate::dynamics::{Parameter, ParameterLayout};
 use crate::identify::{Options, Regression};
-use crate::number::with_sigma;
 use crate::robot::Arm;
 
 /// What a second log says about a body on the flange.
@@ -263,7 +262,7 @@ impl PayloadFinding {
 
 /// Value ± half of the 95 % interval.
 fn with_interval(estimate: &Estimate) -> String {
-    with_sigma(estimate.value, 0.5 * (estimate.ci95[1] - estimate.ci95[0]))
+    format!("{:.3} ± {:.3}", estimate.value, 0.5 * (estimate.ci95[1] - estimate.ci95[0]))
 }
 
 /// A gain is told if its 95 % interval is within this share of it: two sources rarely differ by less.

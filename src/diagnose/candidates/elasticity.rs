@@ -44,6 +44,8 @@ const LINK_DAMPING_RATIO: [f64; 2] = [0.05, 0.3];
 const STIFFNESSES: usize = 14;
 /// The same where they are told by nothing but how far the gear bends.
 const BENT_STIFFNESSES: usize = 3;
+/// No gear gives way by more than this, rad: its teeth would not meet.
+const MOST_TWIST_RAD: f64 = 0.1;
 /// A swing is entered so many times before as long as it takes to fade to 1/e: of what it began with 1 % is left.
 const FORGOTTEN: f64 = 4.6;
 /// No longer than this, s.
@@ -252,6 +254,12 @@ impl Candidate for Elasticity {
 
     fn is_possible(&self, _: Shape, b: &[f64]) -> bool {
         b[0] > 0.0
+    }
+
+    fn can_be(&self, scene: &Scene, site: Option<usize>, stiffness_nm_rad: f64) -> bool {
+        let load =
+            scene.bending_nm(joint(site)).iter().fold(0.0, |most: f64, nm| most.max(nm.abs()));
+        stiffness_nm_rad * MOST_TWIST_RAD > load
     }
 
     fn in_words(&self) -> &'static str {

@@ -38,8 +38,8 @@ impl Candidate for FeedForward {
         b[0].abs() < MOST_LESS
     }
 
-    fn largest(&self) -> f64 {
-        ALL
+    fn can_be(&self, _: &Scene, _: Option<usize>, share_less: f64) -> bool {
+        share_less.abs() < ALL
     }
 
     fn in_words(&self) -> &'static str {

@@ -84,8 +84,8 @@ impl Candidate for LoadFriction {
     }
 
     /// A gear whose friction is its load does not turn.
-    fn largest(&self) -> f64 {
-        1.0
+    fn can_be(&self, _: &Scene, _: Option<usize>, mu: f64) -> bool {
+        mu.abs() < 1.0
     }
 
     fn separating_experiment(&self) -> &'static str {

@@ -195,9 +195,9 @@ pub trait Candidate: Sync {
         quantities.first().copied()
     }
 
-    /// What [`Self::size`] says of no effect that can be there.
-    fn largest(&self) -> f64 {
-        f64::INFINITY
+    /// Whether an effect whose [`Self::size`] has this value can be there.
+    fn can_be(&self, _scene: &Scene, _site: Option<usize>, _size: f64) -> bool {
+        true
     }
 
     /// The first coefficient of an effect of this `shape`, where the shape says how large it is.
