@@ -290,9 +290,10 @@ impl Result {
 /// model that lacks something is wrong by up to twice as much.
 const FOREIGN: f64 = 3.0;
 
-/// A remark where what was identified does not describe the log it is validated on.
+/// A remark where what was identified does not describe the log it is validated on. At rest friction may be anything up to Coulomb's,
+/// along any log of any arm: joints count while they move.
 fn foreign(validation: &Validation, fit: &Residual) -> Option<String> {
-    let found = validation.prediction.residual();
+    let found = validation.prediction.moving_residual();
     let is_far = |&j: &usize| found.rms_nm[j] > FOREIGN * fit.rms_nm[j];
     let joint = |j: usize| {
         let times = found.rms_nm[j] / fit.rms_nm[j];
