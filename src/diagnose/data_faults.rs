@@ -42,7 +42,7 @@ const ALIKE: [f64; 2] = [5.0, 0.1];
 /// joint at rest both are noise, and it is nothing but chance.
 const GO_TOGETHER: f64 = 0.5;
 /// Slower than this, rad/s, a joint may repeat its readings.
-const MOVES_RAD_S: f64 = 0.01;
+pub(super) const MOVES_RAD_S: f64 = 0.01;
 /// Share of rows that an ordinary recorder misses: no cause of anything.
 const MISSED: f64 = 2e-3;
 

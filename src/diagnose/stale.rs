@@ -3,7 +3,7 @@
 //! A signal with steps Δ that changes by c from reading to reading repeats one by chance about as often as Δ/c. Readings that repeat
 //! far more often than that while their joint moves are stale, unless they stand at the end of what can be read.
 
-use super::data_faults::{cause, exact};
+use super::data_faults::{MOVES_RAD_S, cause, exact};
 use super::kind::Kind;
 use super::record::Record;
 use super::verdict::Cause;
@@ -16,8 +16,7 @@ const BEYOND_CHANCE: f64 = 3.0;
 const LEAST_SHARE: f64 = 2e-3;
 /// A channel that repeats half of its readings, or more of them, is read at a lower rate.
 const MOST_SHARE: f64 = 0.4;
-/// Slower than this for most of so long before and behind a joint may as well stand still, rad/s and s.
-const MOVES_RAD_S: f64 = 0.01;
+/// Slower than [`MOVES_RAD_S`] for most of so long before and behind, s, a joint may as well stand still.
 const NEAR_S: f64 = 0.2;
 /// Share of the rows that may be taken out because of stale readings.
 const MOST_ROWS: f64 = 0.4;

@@ -44,13 +44,13 @@ pub(super) fn even_stamps(motion: &Motion) -> Option<EvenStamps> {
         let steps = (t - first_s) / quantum_s;
         (steps - steps.round()).abs() < ROUNDING
     };
-    // Rows that were set aside have their place in the file.
-    let place: Vec<f64> = rows.iter().map(|row| row.abs_diff(first_row) as f64).collect();
     let apart_s = (time_s[time_s.len() - 1] - first_s) / (time_s.len() - 1) as f64;
     let is_coarse = quantum_s >= COARSE * apart_s;
     if !is_coarse || !time_s.iter().all(is_on_grid) {
         return None;
     }
+    // Rows that were set aside have their place in the file.
+    let place: Vec<f64> = rows.iter().map(|row| row.abs_diff(first_row) as f64).collect();
     let count = time_s.len() as f64;
     let middle = place.iter().sum::<f64>() / count;
     let mean_s = first_s + time_s.iter().map(|t| t - first_s).sum::<f64>() / count;
