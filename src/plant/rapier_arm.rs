@@ -45,6 +45,7 @@ pub struct RapierArm {
     world: PhysicsWorld,
     multibody: MultibodyIndex,
     displacement: Vec<f64>,
+    response: DVector<f64>,
 }
 
 impl std::fmt::Debug for RapierArm {
@@ -84,7 +85,8 @@ impl RapierArm {
             .map(|link| link.multibody)
             .ok_or(PlantError::Joints { what: "the plant", found: 0, expected: 1 })?;
 
-        let mut built = Self { world, multibody, displacement: vec![0.0; arm.dof()] };
+        let (displacement, response) = (vec![0.0; arm.dof()], DVector::zeros(arm.dof()));
+        let mut built = Self { world, multibody, displacement, response };
         // Only after one pass of forward kinematics has the fixed base lost the six freedoms it is
         // born with, and do the vectors below have their final places.
         let PhysicsWorld { multibody_joints, bodies, .. } = &mut built.world;
@@ -130,6 +132,17 @@ impl RapierArm {
         self.world.step();
         let multibody = multibody_mut(&mut self.world, self.multibody);
         qdd_rad_s2.copy_from_slice(multibody.generalized_acceleration().as_slice());
+    }
+
+    /// Adds M⁻¹ Δτ to `qdd_rad_s2`, which [`Self::forward_dynamics`] has found last: what more torque, Δτ = `more_nm`, adds to it
+    /// in the same state. The engine's factors of its mass matrix are those of that call, of whose work this is a small part.
+    pub fn add_response(&mut self, more_nm: &[f64], qdd_rad_s2: &mut [f64]) {
+        self.response.copy_from_slice(more_nm);
+        let multibody = multibody_mut(&mut self.world, self.multibody);
+        // Factors that are not finite solve nothing; nor is the acceleration finite then.
+        if multibody.inv_augmented_mass().solve_mut(&mut self.response) {
+            qdd_rad_s2.iter_mut().zip(&self.response).for_each(|(qdd, more)| *qdd += more);
+        }
     }
 
     /// Accelerations at rest without any torque (rad/s²), and what a unit torque on each joint adds to

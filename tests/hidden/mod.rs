@@ -238,11 +238,16 @@ impl Drivetrain for HiddenLaw {
                 // The torque behind the gear: what is left of the drive's behind rotor and friction,
                 // where the rotor's share follows from the acceleration. A few rounds converge as μ^k.
                 let before = self.link_nm[h];
-                for _ in 0..4 {
-                    arm.forward_dynamics(stage.q_rad, stage.qd_rad_s, &self.link_nm, qdd);
+                arm.forward_dynamics(stage.q_rad, stage.qd_rad_s, &self.link_nm, qdd);
+                for _ in 0..5 {
                     let transmitted = self.link_nm[h] - drive.rotor_inertia_kg_m2 * qdd[h];
-                    self.link_nm[h] = before - mu * transmitted.abs() * sign;
+                    let now = before - mu * transmitted.abs() * sign;
+                    let mut more = vec![0.0; qdd.len()];
+                    more[h] = now - self.link_nm[h];
+                    self.link_nm[h] = now;
+                    arm.add_response(&more, qdd);
                 }
+                return;
             }
             Law::MotorLoad { mu } => {
                 // L of the drive's torque, which bears this friction as well.

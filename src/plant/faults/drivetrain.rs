@@ -29,6 +29,8 @@ pub struct HiddenDrivetrain {
     motor: Vec<Motor>,
     resistance_nm: Vec<f64>,
     link_torque_nm: Vec<f64>,
+    /// What the link torques are more than before: scratch.
+    more_nm: Vec<f64>,
 }
 
 /// Where a joint's own states are.
@@ -131,6 +133,7 @@ impl HiddenDrivetrain {
             motor: vec![Motor::default(); n],
             resistance_nm: vec![0.0; n],
             link_torque_nm: vec![0.0; n],
+            more_nm: vec![0.0; n],
         }
     }
 
@@ -153,16 +156,18 @@ impl HiddenDrivetrain {
         friction.torque_nm(motor.q_rad, motor.qd_rad_s, bristle, warmth, self.load_nm[j])
     }
 
-    /// Link torques of all joints with a stiff gear, and the accelerations they make.
-    fn accelerate(&mut self, arm: &mut RapierArm, stage: &Stage<'_>, qdd_rad_s2: &mut [f64]) {
+    /// Finds the link torques of all joints with a stiff gear, and by how much they are more than before.
+    fn find_link_torques(&mut self, stage: &Stage<'_>) {
         for j in 0..self.joints.len() {
+            self.more_nm[j] = 0.0;
             if self.slots[j].rotor.is_none() {
                 let friction = self.friction_nm(j, stage.states);
                 let gear = self.motor[j].drive_nm - friction;
+                let before = self.link_torque_nm[j];
                 self.link_torque_nm[j] = gear - self.resistance_nm[j];
+                self.more_nm[j] = self.link_torque_nm[j] - before;
             }
         }
-        arm.forward_dynamics(stage.q_rad, stage.qd_rad_s, &self.link_torque_nm, qdd_rad_s2);
     }
 
     /// Finds the loads of stiff gears with load-dependent friction and the accelerations that go with
@@ -182,7 +187,8 @@ impl HiddenDrivetrain {
             if change < LOAD_ACCURACY_NM {
                 return;
             }
-            self.accelerate(arm, stage, qdd_rad_s2);
+            self.find_link_torques(stage);
+            arm.add_response(&self.more_nm, qdd_rad_s2);
         }
     }
 }
@@ -308,7 +314,8 @@ impl Drivetrain for HiddenDrivetrain {
                 states_rate[s + 1] = (drive_nm - friction - torque) / joint.rotor_inertia_kg_m2;
             }
         }
-        self.accelerate(arm, stage, qdd_rad_s2);
+        self.find_link_torques(stage);
+        arm.forward_dynamics(stage.q_rad, stage.qd_rad_s, &self.link_torque_nm, qdd_rad_s2);
         self.settle_loads(arm, stage, qdd_rad_s2);
         for (j, joint) in self.joints.iter().enumerate() {
             let speed = self.motor[j].qd_rad_s;
