@@ -135,6 +135,12 @@ fn clean_logs_have_no_cause() {
     for seed in 0..10 {
         let d = diagnose(seed, "");
         assert_eq!(d.verdict, Verdict::NothingFound, "{:?}", d.sentences);
+        // The residual is noise, less what some ten parameters per joint take of 1250 samples. Both are known to 1/√(2·1250) of them,
+        // the scatter of five periods to less: five σ of the two are one part in six.
+        let noise_nm = d.noise_of_mean_nm.as_ref().expect("the motion repeats");
+        for (left, noise) in d.before.rms_nm.iter().zip(noise_nm) {
+            assert!((left / noise - 1.0).abs() < 0.16, "{left} Nm left of noise of {noise} Nm");
+        }
     }
 }
 

@@ -99,6 +99,40 @@ fn a_motion_that_does_not_excite_the_arm_is_a_negative_result_not_an_error() {
     assert_eq!(result["verdict"], "declined");
 }
 
+/// Torques of which the sign was exchanged fit as well as others: drives push then, and the arm falls upward.
+#[test]
+fn what_no_arm_has_is_a_negative_result() {
+    let folder = tempfile::tempdir().unwrap();
+    let (log, json) = (folder.path().join("log.csv"), folder.path().join("result.json"));
+    let [file, result] = [&log, &json].map(|path| path.to_str().unwrap());
+    let simulated = armid(&[
+        "simulate",
+        "--scenario",
+        concat!(env!("CARGO_MANIFEST_DIR"), "/sims/default.toml"),
+        "--out",
+        file,
+    ]);
+    assert_says(&simulated, 0, &[]);
+    let text = std::fs::read_to_string(&log).unwrap();
+    let turned = |line: &str| {
+        let turn = |(column, field): (usize, &str)| match field.strip_prefix('-') {
+            _ if column < 13 || field.starts_with(char::is_alphabetic) => field.to_owned(),
+            Some(positive) => positive.to_owned(),
+            None => format!("-{field}"),
+        };
+        line.split(',').enumerate().map(turn).collect::<Vec<_>>().join(",")
+    };
+    std::fs::write(&log, text.lines().map(turned).collect::<Vec<_>>().join("\n")).unwrap();
+    for command in ["identify", "diagnose"] {
+        let output = armid(&[command, file, "--robot", "ur5", "--json", result]);
+        let told = ["No arm has what was identified", "friction is negative", "the other sign"];
+        assert_says(&output, 3, &told);
+        let result: serde_json::Value =
+            serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
+        assert_eq!(result["verdict"], "contradicted");
+    }
+}
+
 /// What was not recorded is no motion that excites too little.
 #[test]
 fn a_torque_that_never_changes_is_told_by_its_joint() {

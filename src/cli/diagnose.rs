@@ -173,6 +173,7 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
     }
     match failed {
         Some(error) => Err(error.into()),
+        None if finding.diagnosis.is_contradicted() => Ok(Outcome::Negative),
         None => Ok(Outcome::Done),
     }
 }

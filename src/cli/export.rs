@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{ArgGroup, Args};
 
 use super::arm_result::ArmResult;
 use super::{CommandResult, Outcome};
@@ -11,14 +11,15 @@ use crate::robot::export::{drive_file, mjcf, urdf};
 
 /// Write an identified arm as URDF or MJCF.
 #[derive(Debug, Args)]
+#[command(group = ArgGroup::new("output").args(["urdf", "mjcf"]).multiple(true).required(true))]
 pub struct ExportArgs {
     /// Result of `armid identify --physical --json`.
     result: PathBuf,
     /// Robot that the result is about, where it is not a built-in one: a .urdf or .toml file.
     #[arg(long)]
     robot: Option<String>,
-    /// This, --mjcf or both: write a URDF, and beside it `NAME.drives.toml` with what a URDF has no place for.
-    #[arg(long, value_name = "FILE", required_unless_present = "mjcf")]
+    /// Write a URDF, and beside it `NAME.drives.toml` with what a URDF has no place for.
+    #[arg(long, value_name = "FILE")]
     urdf: Option<PathBuf>,
     /// Write an MJCF.
     #[arg(long, value_name = "FILE")]

@@ -48,7 +48,7 @@ pub struct IdentifyArgs {
     prior: PriorMetric,
     /// Weight of the robot file's values in them, or auto for cross-validation: 1/s² makes a relative
     /// deviation of s as unlikely as one σ of noise.
-    #[arg(long, requires = "physical", default_value = "1e-4")]
+    #[arg(long, requires = "physical", default_value_t)]
     prior_weight: PriorWeight,
     /// Write the result as JSON.
     #[arg(long)]
@@ -311,7 +311,8 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
     }
     match failed {
         Some(error) => Err(error.into()),
-        None => Ok(if result.is_declined() { Outcome::Negative } else { Outcome::Done }),
+        None if result.is_declined() || result.is_contradicted() => Ok(Outcome::Negative),
+        None => Ok(Outcome::Done),
     }
 }
 

@@ -87,6 +87,26 @@ pub fn move_to_common_motion(
     regression.prepared.motion = common;
 }
 
+/// σ of the mean over the periods, sample by sample, Nm: what noise of torque and motion leaves of an error there, and whatever else
+/// differs from period to period. `None` where nothing repeats. For a `regression` that was moved to its common motion.
+pub fn noise_of_mean(regression: &Regression) -> Option<JointSignals> {
+    let (n, periods) = (regression.problem.samples, regression.problem.periods);
+    if periods < 2 {
+        return None;
+    }
+    let [of_mean, of_scatter] = regression.prepared.kept();
+    let panels = &regression.problem.panels;
+    let scatter = panels.iter().map(|panel| {
+        let mut off = panel.y.clone();
+        subtract_mean_period(&mut off, n);
+        off.iter_mut().for_each(|off| *off *= *off);
+        mean_period(&off, n)
+    });
+    let scatter: Vec<Vec<f64>> = scatter.collect();
+    let share = 1.0 / ((periods - 1) as f64 * of_scatter * of_mean);
+    Some(JointSignals::from_fn(panels.len(), n, |j, k| (scatter[j][k] * share).sqrt()))
+}
+
 /// Neighbouring harmonics that are judged together.
 const BAND: usize = 8;
 /// Power of a band in the mean of the periods, over that of the noise in it, from which on it has more motion than noise.

@@ -2,7 +2,7 @@
 
 use super::against::{self, Found, Nominal};
 use super::candidates::{self, Candidate};
-use super::common_motion::move_to_common_motion;
+use super::common_motion::{move_to_common_motion, noise_of_mean};
 use super::contact::{self, Compared};
 use super::data_faults::{self, Faults};
 use super::detection_limits::detection_limits;
@@ -28,8 +28,7 @@ use super::verdict::{Cause, Diagnosis, Rival, Rms, Verdict};
 use crate::base::BaseSet;
 use crate::dynamics::Model;
 use crate::identify::{
-    Identification, Identifier, Measurement, Options, Regression, drive_limit_remark,
-    gravity_question, gravity_remark, negative_friction_remark,
+    Doubt, Identification, Identifier, Measurement, Options, Regression, drive_limit_remark,
 };
 use crate::robot::{Arm, JointSignals};
 
@@ -108,6 +107,7 @@ impl<'a> Diagnoser<'a> {
         let measured_nm = measured_nm(&regression);
         let fit = &identification.fit;
         move_to_common_motion(&mut regression, (self.arm, self.set), &fit.theta);
+        let noise_nm = noise_of_mean(&regression);
         let sources = (self.arm, self.set, &self.options);
         let estimate = (&fit.theta[..], &fit.joint_sigma_nm[..]);
         let mut first = Study::new(&self.families, sources, &regression, estimate, m.source)?;
@@ -188,16 +188,15 @@ impl<'a> Diagnoser<'a> {
             let warning = "the angles jump as no arm can; what looks like a touch there is none";
             warnings.push(warning.into());
         }
-        warnings.extend(negative_friction_remark(self.arm, self.set, theta, covariance));
-        let rms = |e: &JointSignals| Rms {
-            rms_nm: (0..e.joints())
-                .map(|j| rms_where(e.joint(j), |k| study.whitening.counts(j, k)))
-                .collect(),
+        let rms = |e: &JointSignals| -> Vec<f64> {
+            let of = |j: usize| rms_where(e.joint(j), |k| study.whitening.counts(j, k));
+            (0..e.joints()).map(of).collect()
         };
         let mut diagnosis = Diagnosis {
             log: m.source.to_owned(),
             noise_floor_nm: identification.replicates.as_ref().map(|r| r.sigma.clone()),
-            before: rms(&before_nm),
+            noise_of_mean_nm: noise_nm.as_ref().map(rms),
+            before: Rms { rms_nm: rms(&before_nm) },
             verdict: match (&unexplained, causes.is_empty()) {
                 (Some(_), _) => Verdict::Unexplained,
                 (None, true) => Verdict::NothingFound,
@@ -205,7 +204,7 @@ impl<'a> Diagnoser<'a> {
             },
             causes,
             unexplained,
-            after: rms(&after_nm),
+            after: Rms { rms_nm: rms(&after_nm) },
             base_parameters,
             held_out,
             moved_parameters,
@@ -224,9 +223,12 @@ impl<'a> Diagnoser<'a> {
             diagnosis.sentences.insert(0, doubt.to_owned());
         }
         let nominal = self.set.values(&Model::new(self.arm).standard_parameters());
-        if let Some(remark) = gravity_remark(self.arm, self.set, &nominal, theta, covariance) {
+        if let Some(doubt) = Doubt::of(self.arm, self.set, &nominal, theta, covariance) {
             // Of another robot's log nothing else matters.
-            diagnosis.sentences.insert(0, gravity_question(&self.arm.name, &remark));
+            diagnosis.sentences.insert(0, doubt.sentence);
+            if doubt.is_contradiction {
+                diagnosis.verdict = Verdict::Contradicted;
+            }
         }
         let samples = (0..regression.problem.samples).map(|row| regression.sample(row)).collect();
         let scene = study.scene;

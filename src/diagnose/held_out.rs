@@ -7,7 +7,7 @@
 //! predict it: the third score leaves out what is unpredictable, for every model alike.
 
 use super::candidates::Candidate;
-use super::common_motion::move_to_common_motion;
+use super::common_motion::{move_to_common_motion, noise_of_mean};
 use super::error::DiagnoseError;
 use super::extension::Extension;
 use super::image::{Image, Span};
@@ -100,10 +100,13 @@ pub(super) fn held_out_gain(
         None => None,
     };
     let (before, after) = (error(models.null), error(extension));
+    let noise = noise_of_mean(&regression);
     Ok(HeldOut {
         log: log.measurement.source.to_owned(),
         warnings,
         standstill_fraction: rows.standstill_fractions(),
+        noise_rms_nm: noise.as_ref().map(all),
+        noise_moving_rms_nm: noise.as_ref().map(moving),
         before_rms_nm: all(&before),
         after_rms_nm: all(&after),
         before_moving_rms_nm: moving(&before),

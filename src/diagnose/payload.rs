@@ -196,7 +196,7 @@ impl PayloadFinding {
         }
         if let Some(scale) = &self.gain_scale {
             out.push(format!(
-                "With the mass known, all drive gains are to be multiplied by {}.",
+                "With the mass known, the drive gains are to be multiplied by {}, were it the same for all drives.",
                 with_interval(scale)
             ));
         }
@@ -205,8 +205,7 @@ impl PayloadFinding {
                 .iter()
                 .enumerate()
                 .map(|(j, scale)| {
-                    let half = 0.5 * (scale.ci95[1] - scale.ci95[0]);
-                    if half < TOLD_WITHIN * scale.value {
+                    if is_told(scale) {
                         format!("joint {}: {}", j + 1, with_interval(scale))
                     } else {
                         format!("joint {}: not told by these motions", j + 1)
@@ -214,8 +213,22 @@ impl PayloadFinding {
                 })
                 .collect();
             out.push(format!("Joint by joint: {}.", told.join(", ")));
+            out.extend(self.apart().map(|joints| {
+                format!("One scale for all drives does not fit joint {joints}: take those of the joints.")
+            }));
         }
         out
+    }
+
+    /// Joints whose own scale of gains is not that of all.
+    fn apart(&self) -> Option<String> {
+        let (all, own) = self.gain_scale.as_ref().zip(self.joint_gain_scales.as_ref())?;
+        let is_apart = |scale: &Estimate| {
+            is_told(scale) && (scale.ci95[1] < all.ci95[0] || scale.ci95[0] > all.ci95[1])
+        };
+        let joints = (1..).zip(own).filter(|(_, scale)| is_apart(scale));
+        let joints: Vec<String> = joints.map(|(j, _)| j.to_string()).collect();
+        (!joints.is_empty()).then(|| joints.join(", "))
     }
 
     /// What is said where no body is named.
@@ -267,6 +280,11 @@ fn with_interval(estimate: &Estimate) -> String {
 
 /// A gain is told if its 95 % interval is within this share of it: two sources rarely differ by less.
 const TOLD_WITHIN: f64 = 0.1;
+
+/// Whether the motions tell a scale of gains.
+fn is_told(scale: &Estimate) -> bool {
+    0.5 * (scale.ci95[1] - scale.ci95[0]) < TOLD_WITHIN * scale.value
+}
 
 /// Where the unknowns stand.
 struct Layout {

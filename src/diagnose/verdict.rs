@@ -136,6 +136,10 @@ pub struct HeldOut {
     pub log: String,
     /// What was made of it that the user should know.
     pub warnings: Vec<String>,
+    /// What noise of torque and motion leaves of any model's error, all samples; null where nothing repeats.
+    pub noise_rms_nm: Option<Vec<f64>>,
+    /// The same, samples in which the joint moves.
+    pub noise_moving_rms_nm: Option<Vec<f64>>,
     /// Without the causes, all samples.
     pub before_rms_nm: Vec<f64>,
     /// With the causes, all samples.
@@ -194,6 +198,9 @@ pub struct Diagnosis {
     pub log: String,
     /// Rms noise of one sample per joint from the scatter between periods, Nm; null for a single run.
     pub noise_floor_nm: Option<Vec<f64>>,
+    /// What noise of torque and motion leaves of any model's residual, which is that of the mean of the periods, Nm; null for a
+    /// single run.
+    pub noise_of_mean_nm: Option<Vec<f64>>,
     /// Residual of the model without causes.
     pub before: Rms,
     /// What was found.
@@ -235,9 +242,16 @@ pub enum Verdict {
     CauseNamed,
     /// Something is left that no family explains.
     Unexplained,
+    /// No arm has the base parameters that were identified.
+    Contradicted,
 }
 
 impl Diagnosis {
+    /// Whether no arm has what was identified.
+    pub fn is_contradicted(&self) -> bool {
+        self.verdict == Verdict::Contradicted
+    }
+
     /// Takes in what the simulation says, or why it says nothing.
     pub fn add_replay<E: std::fmt::Display>(&mut self, replay: Result<Replay, E>) {
         match replay {

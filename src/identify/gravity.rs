@@ -28,6 +28,15 @@ pub struct GravityMatch {
     pub left: f64,
 }
 
+/// What is to be said of gravity that is not the description's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GravityRemark {
+    /// In words.
+    pub text: String,
+    /// Whether it pulls upward for certain: then no arm has what was identified, as it is mounted.
+    pub is_reversed: bool,
+}
+
 /// Factor between gravity found and described beyond which it is remarked on: tolerances of drive gains and
 /// usual bodies on the flange stay below.
 const OFF: f64 = 1.5;
@@ -83,12 +92,17 @@ impl GravityMatch {
     }
 
     /// What is to be said of it, if the ratio is off by more than `quantile` σ of its own.
-    fn remark(&self, robot: &str, quantile: f64) -> Option<String> {
-        let Self { ratio, ratio_sigma, body_kg, left } = *self;
-        let doubt = quantile * ratio_sigma;
-        if ratio - doubt < OFF && ratio + doubt > 1.0 / OFF {
-            return None;
-        }
+    fn remark(&self, robot: &str, quantile: f64) -> Option<GravityRemark> {
+        let doubt = quantile * self.ratio_sigma;
+        let is_as_described = self.ratio - doubt < OFF && self.ratio + doubt > 1.0 / OFF;
+        (!is_as_described).then(|| GravityRemark {
+            text: self.in_words(robot),
+            is_reversed: self.ratio + doubt < 0.0,
+        })
+    }
+
+    fn in_words(&self, robot: &str) -> String {
+        let Self { ratio, body_kg, left, .. } = *self;
         let times = if (0.01..100.0).contains(&ratio.abs()) {
             format!("{ratio:.2}")
         } else {
@@ -96,7 +110,7 @@ impl GravityMatch {
         };
         let far = format!("gravity torque is {times} times what the description of {robot} says");
         let thousands = ratio.abs().log10() / 3.0;
-        Some(if (thousands.abs() - 1.0).abs() < OFF_THOUSAND {
+        if (thousands.abs() - 1.0).abs() < OFF_THOUSAND {
             format!("{far}: a current or torque is logged in another unit (mA for A, mNm for Nm)")
         } else if (1.0 / OFF..OFF).contains(&-ratio) {
             format!(
@@ -116,7 +130,7 @@ impl GravityMatch {
                 "{far}, and {nearest} {:.0} % of it: this is the log of another robot, or the drive gains are off",
                 100.0 * left
             )
-        })
+        }
     }
 }
 
@@ -128,18 +142,13 @@ pub fn gravity_remark(
     nominal: &[f64],
     theta: &[f64],
     covariance: &Covariance,
-) -> Option<String> {
+) -> Option<GravityRemark> {
     let quantile = covariance.quantile_95();
     let half_width: Vec<f64> = covariance.sigma().iter().map(|s| quantile * s).collect();
     if !identifies_the_arm(arm, set, &not_identified(arm, set, &half_width)) {
         return None;
     }
     GravityMatch::of(arm, set, nominal, theta, &covariance.matrix)?.remark(&arm.name, quantile)
-}
-
-/// What a [`gravity_remark`] asks.
-pub fn gravity_question(robot: &str, remark: &str) -> String {
-    format!("Is this log of {robot}? The {remark}.")
 }
 
 #[cfg(test)]
@@ -176,22 +185,25 @@ mod tests {
         let loaded = set.values(&loaded);
         let with_body = GravityMatch::of(&arm, &set, &nominal, &loaded, &known).unwrap();
         assert!((with_body.body_kg - 6.0).abs() < 1e-6 && with_body.left < 1e-6, "{with_body:?}");
-        assert!(with_body.remark("ur5e", 1.96).unwrap().contains("a body of 6.0 kg"));
+        let remark = |found: GravityMatch| found.remark("ur5e", 1.96).unwrap();
+        assert!(remark(with_body).text.contains("a body of 6.0 kg"));
 
         let (_, larger, standard) = described("ur10e");
         assert!((0..set.rank()).all(|k| set.name(k) == larger.name(k)), "of one family");
         let larger = larger.values(&standard);
         let other = GravityMatch::of(&arm, &set, &nominal, &larger, &known).unwrap();
-        assert!(other.remark("ur5e", 1.96).unwrap().contains("another robot"), "{other:?}");
+        let other = remark(other);
+        assert!(other.text.contains("another robot") && !other.is_reversed, "{other:?}");
 
         let turned: Vec<f64> = nominal.iter().map(|value| -value).collect();
         let turned = GravityMatch::of(&arm, &set, &nominal, &turned, &known).unwrap();
-        assert!(turned.remark("ur5e", 1.96).unwrap().contains("the other sign"), "{turned:?}");
+        let turned = remark(turned);
+        assert!(turned.text.contains("the other sign") && turned.is_reversed, "{turned:?}");
 
         for factor in [1e-3, 1.3e3] {
             let scaled: Vec<f64> = nominal.iter().map(|value| factor * value).collect();
             let scaled = GravityMatch::of(&arm, &set, &nominal, &scaled, &known).unwrap();
-            let remark = scaled.remark("ur5e", 1.96).unwrap();
+            let remark = remark(scaled).text;
             assert!(remark.contains("another unit") && !remark.contains("0.00 times"), "{remark}");
         }
 

@@ -29,7 +29,7 @@ pub fn negative_friction_remark(
     let joints: Vec<String> = (0..set.rank()).filter_map(of_parameter).collect();
     (!joints.is_empty()).then(|| {
         format!(
-            "Coulomb friction is negative, which no drive has: {}; is the torque there logged with the other sign, or in the \
+            "Coulomb friction is negative, which no drive has: {}. Is the torque there logged with the other sign, or in the \
              column of another joint?",
             joints.join(", ")
         )

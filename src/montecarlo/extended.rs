@@ -8,7 +8,7 @@ use super::scenario::{Scenario, ScenarioError, fingerprint};
 use crate::base::BaseSet;
 use crate::diagnose::Finding;
 use crate::diagnose::replay::ExtendedSimulation;
-use crate::excitation::{Excitation, FourierSeries};
+use crate::excitation::{Excitation, ExcitationError, FourierSeries, Requirements};
 use crate::identify::{Measurement, Options};
 use crate::output::{OutputError, write_atomically};
 use crate::plant::faults::Effect;
@@ -16,7 +16,7 @@ use crate::plant::{PerJoint, PlantConfig, SensorConfig};
 use crate::robot::JointSignals;
 use crate::signal::replicate_noise;
 
-/// Run-in from rest, s.
+/// Run-in from rest where none keeps the limits of the arm, s.
 const RUN_IN_S: f64 = 2.0;
 /// Trials of a scenario that is made from a log.
 const TRIALS: u64 = 100;
@@ -69,6 +69,20 @@ impl Scenario {
         let series =
             FourierSeries::of_period(&scene.motion.q_rad, scene.rate_hz, processing.cutoff_hz)?;
         let arm = simulation.extended.arm.clone();
+        // The log does not tell how its motion was begun.
+        let fitted = Excitation::fitted(
+            &arm,
+            &Requirements::default(),
+            series.clone(),
+            scene.periods,
+            false,
+        );
+        let excitation = match fitted {
+            Err(ExcitationError::NoRunIn { .. }) => {
+                Excitation::new(series, RUN_IN_S, scene.periods)
+            }
+            other => other,
+        }?;
         let (effects, further) = (&simulation.effects, &simulation.of_the_record);
         let effects = simulation.extended.offsets.iter().chain(effects).chain(further);
         let mut scenario = Self {
@@ -78,7 +92,7 @@ impl Scenario {
             files: Vec::new(),
             set: set.clone(),
             trajectory: String::new(),
-            excitation: Excitation::new(series, RUN_IN_S, scene.periods)?,
+            excitation,
             plant: simulation.plant.clone(),
             sensors: SensorConfig {
                 torque_sd_nm: PerJoint::Each(replicates.sigma.clone()),

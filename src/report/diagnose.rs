@@ -57,20 +57,25 @@ pub fn held_out_table(diagnosis: &Diagnosis) -> Table {
             (
                 "moving",
                 (&log.before_moving_rms_nm, &log.after_moving_rms_nm),
-                &log.manufacturer_moving_rms_nm,
+                [&log.noise_moving_rms_nm, &log.manufacturer_moving_rms_nm],
             ),
-            ("all", (&log.before_rms_nm, &log.after_rms_nm), &log.manufacturer_rms_nm),
-            ("standstill free", free, &None),
+            (
+                "all",
+                (&log.before_rms_nm, &log.after_rms_nm),
+                [&log.noise_rms_nm, &log.manufacturer_rms_nm],
+            ),
+            ("standstill free", free, [&None, &None]),
         ];
         let mut name = file_name(&log.log);
-        for (mut samples, (before, after), manufacturer) in kinds {
-            let manufacturer = manufacturer.iter().map(|m| ("manufacturer", list(m)));
+        for (mut samples, (before, after), others) in kinds {
+            let others = ["noise alone", "manufacturer"].into_iter().zip(others);
+            let others = others.filter_map(|(model, rms)| Some((model, list(rms.as_ref()?))));
             let rows = [
                 ("before", list(before)),
                 ("after", list(after)),
                 ("change", change(before, after)),
             ];
-            for (model, cells) in rows.into_iter().chain(manufacturer) {
+            for (model, cells) in rows.into_iter().chain(others) {
                 table.push([name, samples, model].map(str::to_owned).into_iter().chain(cells));
                 (name, samples) = ("", "");
             }
@@ -137,7 +142,7 @@ pub fn page(finding: &Finding, arm: &Arm, program: Program) -> Result<Page, Repo
     let status = match diagnosis.verdict {
         diagnose::Verdict::NothingFound => Status::Good,
         diagnose::Verdict::CauseNamed => Status::Warn,
-        diagnose::Verdict::Unexplained => Status::Bad,
+        diagnose::Verdict::Unexplained | diagnose::Verdict::Contradicted => Status::Bad,
     };
     let mut sentences = diagnosis.sentences.iter().cloned();
     let list =
@@ -150,9 +155,10 @@ pub fn page(finding: &Finding, arm: &Arm, program: Program) -> Result<Page, Repo
         list(&diagnosis.before.rms_nm),
         list(&diagnosis.after.rms_nm)
     ));
-    if let Some(floor) = &diagnosis.noise_floor_nm {
+    if let (Some(of_mean), Some(floor)) = (&diagnosis.noise_of_mean_nm, &diagnosis.noise_floor_nm) {
         facts.push(format!(
-            "Noise of one sample per joint: {} Nm; residuals are of the mean of the periods, whose noise is less.",
+            "Of these, noise of the mean of the periods, torque and encoders together: {} Nm. Noise of one sample of torque: {} Nm.",
+            list(of_mean),
             list(floor)
         ));
     }

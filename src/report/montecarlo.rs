@@ -24,10 +24,8 @@ pub fn parameter_table(summary: &Summary) -> Table {
     ]);
     for p in &summary.parameters {
         let ratio = p.sigma_empirical / p.sigma_predicted;
-        let [low, high] = claims::EACH_COVERAGE;
-        let status = (p.coverage < low || p.coverage > high).then_some(Status::Warn);
         table.push_judged(
-            status,
+            covered(p.coverage, summary),
             [
                 p.name.clone(),
                 p.unit.clone(),
@@ -46,6 +44,22 @@ pub fn parameter_table(summary: &Summary) -> Table {
         );
     }
     table
+}
+
+/// σ of a share beyond which chance alone carries that of one parameter in 5 % of runs.
+const UNUSUAL: f64 = 1.96;
+/// The same of any of 60 parameters, once in a thousand runs.
+const IMPOSSIBLE: f64 = 4.3;
+
+/// What is to be said of the coverage of one parameter: nothing where chance can explain it.
+fn covered(coverage: f64, summary: &Summary) -> Option<Status> {
+    let trials = (summary.trials - summary.failed) as f64;
+    let is_outside = |z: f64| {
+        let [low, high] = wilson(coverage, trials, z);
+        high < claims::EACH_COVERAGE[0] || low > claims::EACH_COVERAGE[1]
+    };
+    let statuses = [(IMPOSSIBLE, Status::Bad), (UNUSUAL, Status::Warn)];
+    statuses.into_iter().find(|(z, _)| is_outside(*z)).map(|(_, status)| status)
 }
 
 /// Empirical σ against the Cramér–Rao bound.

@@ -73,7 +73,7 @@ pub fn section(replay: &Replay) -> Result<Section, ReportError> {
     if !replay.not_replayed.is_empty() {
         section = section.list(replay.not_replayed.iter().map(|not| {
             let place = not.joint.map_or(String::new(), |j| format!(", joint {j}"));
-            format!("Not in the simulation: {}{place}: {}.", not.kind, not.reason)
+            format!("Not in the simulation as an effect: {}{place}: {}.", not.kind, not.reason)
         }));
     }
     Ok(section)

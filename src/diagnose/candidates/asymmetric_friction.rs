@@ -19,16 +19,14 @@ impl Candidate for AsymmetricFriction {
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
-        // The constant is the estimate's own where it fits offsets.
-        vec![
-            quantity("coulomb_nm", second(b), "Nm"),
-            quantity("viscous_nm_s_rad", b[0], "Nm s/rad"),
-        ]
+        // Where the null model fits offsets, the constant is one of them, and nothing is known of it as friction.
+        let constant = b.get(1).map(|constant| quantity("coulomb_nm", *constant, "Nm"));
+        constant.into_iter().chain([quantity("viscous_nm_s_rad", b[0], "Nm s/rad")]).collect()
     }
 
     /// What the null model's offset leaves: the Coulomb part alone is one, but at reversals.
     fn size(&self, quantities: &[Quantity]) -> Option<Quantity> {
-        quantities.get(1).copied()
+        quantities.last().copied()
     }
 
     fn separating_experiment(&self) -> &'static str {

@@ -93,7 +93,8 @@ impl Found<'_> {
             Kind::AsymmetricFriction => {
                 in_the_model(Effect::AsymmetricFriction(faults::AsymmetricFriction {
                     joint: self.joint?,
-                    coulomb_nm: value("coulomb_nm")?,
+                    // Not told where it is an offset, which the arm has already.
+                    coulomb_nm: value("coulomb_nm").unwrap_or(0.0),
                     viscous_nm_s_rad: value("viscous_nm_s_rad")?,
                 }))
             }

@@ -238,7 +238,7 @@ impl Replay {
         }
         for NotReplayed { kind, joint, reason } in &self.not_replayed {
             let place = joint.map_or(String::new(), |j| format!(" at joint {j}"));
-            out.push(format!("Not in the simulation: {kind}{place}: {reason}."));
+            out.push(format!("Not in the simulation as an effect: {kind}{place}: {reason}."));
         }
         let [_, extended] = self.arm_distance;
         if extended > WORTH_SAYING {

@@ -10,7 +10,9 @@ use crate::diagnose::candidates::Candidate;
 use crate::diagnose::{Finding, Kind};
 use crate::dynamics::{Parameter, ParameterLayout};
 use crate::identify::Identification;
-use crate::identify::physical::{Information, PhysicalOptions, Pulling, Solver, Structure};
+use crate::identify::physical::{
+    Information, PhysicalOptions, PriorWeight, Pulling, Solver, Structure,
+};
 use crate::plant::PlantConfig;
 use crate::plant::faults::{CurrentOffset, Effect};
 use crate::robot::Arm;
@@ -102,7 +104,7 @@ impl ExtendedSimulation {
             }
             let found = Found { kind, joint, variant: 0, quantities: &[] };
             if !matches!(found.kind, Kind::Contact) && !kind.is_of_the_record() {
-                let reason = "it moved the parameters, which were identified with it";
+                let reason = "the arm's parameters, which were identified with it, hold it";
                 out.not_replayed.push(NotReplayed { kind, joint, reason });
                 continue;
             }
@@ -132,14 +134,11 @@ impl ExtendedSimulation {
     }
 }
 
-/// γ: a deviation of 10 000 % from the robot file costs as much as one σ.
-const PULL: f64 = 1e-4;
-
 /// Finds arms that can exist for base parameters of one log.
 ///
 /// Base parameters are combinations. Among the arms that can exist it takes the one that minimises
-/// ‖R (θ − θ̂)‖² + γ ‖deviation from the robot file‖² with so small a γ that it decides only what the log
-/// leaves open.
+/// ‖R (θ − θ̂)‖² + γ ‖deviation from the robot file‖² with a γ that decides only what the log leaves open
+/// ([`PriorWeight::WEAK`]).
 struct Realise<'a> {
     nominal: &'a Arm,
     solver: Solver,
@@ -161,7 +160,7 @@ impl<'a> Realise<'a> {
     fn arm(&self, theta: &[f64]) -> Result<SimulatedArm, ReplayError> {
         let theta = nalgebra::DVector::from_column_slice(theta);
         let information = Information { theta, ..self.information.clone() };
-        let solved = self.solver.constrained(&information, Pulling::squared(PULL))?;
+        let solved = self.solver.constrained(&information, Pulling::squared(PriorWeight::WEAK))?;
         let standard = self.solver.structure().standard(&solved.y);
         let layout = ParameterLayout::new(self.nominal.dof());
         let offsets = (0..self.nominal.dof()).filter_map(|j| {

@@ -87,9 +87,10 @@ impl Pull {
 /// Share of the squared pull that is added to the entropic one.
 pub const ENTROPIC_CURVATURE: f64 = 1e-4;
 /// Size of a drive parameter whose prior is zero (a URDF has no rotor inertia): what counts as
-/// a deviation of 100 %. In kg m², Nm s/rad and Nm.
-const UNKNOWN_ROTOR_INERTIA: f64 = 0.1;
-const UNKNOWN_FRICTION: f64 = 1.0;
+/// a deviation of 100 %, as much as the first joints of an arm of 20 kg have, so that it pulls none to nothing. In kg m²,
+/// Nm s/rad and Nm.
+const UNKNOWN_ROTOR_INERTIA: f64 = 1.0;
+const UNKNOWN_FRICTION: f64 = 10.0;
 /// A torque offset of this size counts as a deviation of 100 %, Nm.
 const USUAL_OFFSET_NM: f64 = 1.0;
 /// Priors below this share of their size are on the boundary.

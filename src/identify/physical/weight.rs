@@ -63,23 +63,38 @@ pub enum PriorWeight {
     CrossValidated,
 }
 
-/// A deviation of 10 000 % from the prior is one σ: it decides only what the data do not.
-const WEAK: f64 = 1e-4;
+impl PriorWeight {
+    /// A deviation of 100 % from the prior is one σ: what the data know to less than that they decide. A weaker pull leaves what
+    /// they hardly know to their noise, and links of a thousandth of their mass come out.
+    pub const WEAK: f64 = 1.0;
+}
 
 impl Default for PriorWeight {
     fn default() -> Self {
-        Self::Fixed(WEAK)
+        Self::Fixed(Self::WEAK)
     }
 }
+
+impl std::fmt::Display for PriorWeight {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Fixed(weight) => write!(f, "{weight}"),
+            Self::CrossValidated => f.write_str(AUTO),
+        }
+    }
+}
+
+/// What asks for cross-validation.
+const AUTO: &str = "auto";
 
 impl FromStr for PriorWeight {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
         match (text, text.parse()) {
-            ("auto", _) => Ok(Self::CrossValidated),
+            (AUTO, _) => Ok(Self::CrossValidated),
             (_, Ok(weight)) if weight > 0.0 && f64::is_finite(weight) => Ok(Self::Fixed(weight)),
-            _ => Err("expected a positive number or auto".into()),
+            _ => Err(format!("expected a positive number or {AUTO}")),
         }
     }
 }

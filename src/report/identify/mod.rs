@@ -21,9 +21,8 @@ use crate::base::BaseSet;
 use crate::identify::covariance::CovarianceKind;
 use crate::identify::physical::PhysicalEstimate;
 use crate::identify::{
-    Condition, Estimator, FitError, Identification, Prediction, Processing, Regression, Residual,
-    drive_limit_remark, gravity_question, gravity_remark, identifies_the_arm,
-    negative_friction_remark, not_identified,
+    Condition, Doubt, Estimator, FitError, Identification, Prediction, Processing, Regression,
+    Residual, drive_limit_remark, identifies_the_arm, not_identified,
 };
 use crate::log::Log;
 use crate::robot::{Arm, Kinematics};
@@ -33,6 +32,7 @@ pub const IDENTIFY_SCHEMA: &str = "armid.identify/1";
 
 const IDENTIFIED: &str = "identified";
 const NOT_IDENTIFIED: &str = "not_identified";
+const CONTRADICTED: &str = "contradicted";
 
 /// What was identified, from what.
 pub struct Training<'a> {
@@ -110,9 +110,9 @@ pub struct Result {
     validation: Vec<ValidationJson>,
     /// What the user should know.
     pub warnings: Vec<String>,
-    /// Of the warnings the one that doubts that the log is of this robot as described.
+    /// Of the warnings the one that doubts that what was identified is this robot, or any.
     #[serde(skip)]
-    pub(super) doubt: Option<String>,
+    pub(super) doubt: Option<Doubt>,
     rows: Rows,
     verdict: &'static str,
 }
@@ -181,9 +181,8 @@ impl Result {
         warnings.extend(identification.lack_of_fit.and_then(|lack| lack.warning()));
         let is_identified = identifies_the_arm(arm, set, &open);
         let theta = &identification.fit.theta;
-        let doubt = gravity_remark(arm, set, training.nominal, theta, &identification.covariance);
-        warnings.extend(doubt.clone());
-        warnings.extend(negative_friction_remark(arm, set, theta, &identification.covariance));
+        let doubt = Doubt::of(arm, set, training.nominal, theta, &identification.covariance);
+        warnings.extend(doubt.iter().map(|doubt| doubt.sentence.clone()));
         let fit = identification.residual();
         warnings.extend(validations.iter().filter_map(|validation| foreign(validation, &fit)));
         // Logs whose torques could not be read came no further than that.
@@ -208,7 +207,11 @@ impl Result {
             explainable_nm: identification.explainable_nm.clone(),
             intervals: Intervals::of(training),
             condition: Condition::of(&regression.problem, set)?,
-            verdict: if is_identified { IDENTIFIED } else { NOT_IDENTIFIED },
+            verdict: match &doubt {
+                _ if !is_identified => NOT_IDENTIFIED,
+                Some(doubt) if doubt.is_contradiction => CONTRADICTED,
+                _ => IDENTIFIED,
+            },
             not_identified: open.iter().map(|&k| set.name(k).to_owned()).collect(),
             validation: validations.iter().map(ValidationJson::of).collect(),
             warnings,
@@ -237,6 +240,11 @@ impl Result {
         self.verdict == NOT_IDENTIFIED
     }
 
+    /// Whether no arm has what was identified.
+    pub fn is_contradicted(&self) -> bool {
+        self.verdict == CONTRADICTED
+    }
+
     /// Why the intervals are trusted, or why nothing is known of that; distrust stands in [`Self::sentence`].
     pub fn trust(&self) -> Option<&str> {
         (self.intervals.trusted != Some(false)).then_some(&*self.intervals.reason)
@@ -244,7 +252,8 @@ impl Result {
 
     /// The warnings that the verdict does not begin with.
     pub fn notes(&self) -> impl Iterator<Item = &String> {
-        self.warnings.iter().filter(|warning| self.doubt.as_ref() != Some(warning))
+        let leads = |warning: &String| self.doubt.as_ref().is_some_and(|d| d.sentence == *warning);
+        self.warnings.iter().filter(move |warning| !leads(warning))
     }
 
     /// The verdict in a sentence.
@@ -274,10 +283,7 @@ impl Result {
             Some(false) => format!(" {}", self.intervals.reason),
             _ => String::new(),
         };
-        let doubt = self
-            .doubt
-            .as_ref()
-            .map_or(String::new(), |remark| gravity_question(&self.robot, remark) + " ");
+        let doubt = self.doubt.as_ref().map_or(String::new(), |doubt| doubt.sentence.clone() + " ");
         format!(
             "{doubt}Identified {b} base parameters of {} from {} samples: what the model leaves of the \
              torque is {low:.1} to {high:.1} % per joint.{open}{distrust}",

@@ -113,7 +113,7 @@ pub fn page(
     program: Program,
 ) -> std::result::Result<Page, ReportError> {
     let status = match result.intervals.trusted {
-        _ if result.is_declined() => Status::Bad,
+        _ if result.is_declined() || result.is_contradicted() => Status::Bad,
         _ if result.doubt.is_some() => Status::Warn,
         Some(false) => Status::Warn,
         _ => Status::Good,

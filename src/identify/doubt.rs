@@ -1,0 +1,73 @@
+//! Whether what was identified is the arm that it is said to be, or any.
+
+use super::covariance::Covariance;
+use super::gravity::gravity_remark;
+use super::negative_friction::negative_friction_remark;
+use crate::base::BaseSet;
+use crate::robot::Arm;
+
+/// A reason not to take what was identified for what it is said to be.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Doubt {
+    /// Whether no arm at all has it: drives that push, or gravity that pulls upward. Else it may be another arm, or another load.
+    pub is_contradiction: bool,
+    /// What is doubted and why, to be said before anything that rests on it.
+    pub sentence: String,
+}
+
+impl Doubt {
+    /// Of base parameters `theta` of `arm`, which are `nominal` by its description.
+    pub fn of(
+        arm: &Arm,
+        set: &BaseSet,
+        nominal: &[f64],
+        theta: &[f64],
+        covariance: &Covariance,
+    ) -> Option<Self> {
+        let gravity = gravity_remark(arm, set, nominal, theta, covariance);
+        let pushing = negative_friction_remark(arm, set, theta, covariance);
+        let is_contradiction = pushing.is_some() || gravity.as_ref().is_some_and(|g| g.is_reversed);
+        let head = is_contradiction.then(|| "No arm has what was identified.".to_owned());
+        let question =
+            gravity.map(|gravity| format!("Is this log of {}? The {}.", arm.name, gravity.text));
+        let parts: Vec<String> = head.into_iter().chain(pushing).chain(question).collect();
+        (!parts.is_empty()).then(|| Self { is_contradiction, sentence: parts.join(" ") })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::Parameterisation;
+    use crate::dynamics::Model;
+    use crate::identify::covariance::CovarianceKind;
+    use nalgebra::DMatrix;
+
+    #[test]
+    fn another_arm_is_a_question_and_no_arm_a_contradiction() {
+        let arm = Arm::built_in("ur5").unwrap();
+        let set = BaseSet::find(&arm, Parameterisation::full(6, true)).unwrap();
+        let nominal = set.values(&Model::new(&arm).standard_parameters());
+        let covariance = Covariance {
+            kind: CovarianceKind::Spectral,
+            matrix: DMatrix::identity(set.rank(), set.rank()) * 1e-6,
+            degrees_of_freedom: f64::INFINITY,
+        };
+        let doubt = |theta: &[f64]| Doubt::of(&arm, &set, &nominal, theta, &covariance);
+        assert_eq!(doubt(&nominal), None);
+        let scaled = |prefix: &str, factor: f64| -> Vec<f64> {
+            let value = |k: usize| match set.name(k).starts_with(prefix) {
+                true => factor * nominal[k],
+                false => nominal[k],
+            };
+            (0..set.rank()).map(value).collect()
+        };
+        let larger = doubt(&scaled("m", 2.0)).unwrap();
+        assert!(!larger.is_contradiction && larger.sentence.starts_with("Is this log of ur5?"));
+        let hanging = doubt(&scaled("m", -1.0)).unwrap();
+        assert!(hanging.is_contradiction && hanging.sentence.contains("the other sign"));
+        let pushing = doubt(&scaled("rc3", -1.0)).unwrap();
+        assert!(pushing.is_contradiction && pushing.sentence.contains("joint 3 (-"));
+        assert!(!pushing.sentence.contains("Is this log"), "{pushing:?}");
+    }
+}
