@@ -84,6 +84,17 @@ fn bad_input_is_named_before_the_work() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
+/// A box around the shoulder: the answer is no, at once, and says why.
+#[test]
+fn what_no_motion_keeps_clear_of_is_a_negative_result() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = "--robot ur5 --box -0.3,-0.3,0,0.3,0.3,0.3 --out t.json";
+    let output = excite(folder.path(), &words.split_whitespace().collect::<Vec<_>>());
+    assert_eq!(output.status.code(), Some(3), "{}", message(&output));
+    assert!(message(&output).contains("clearance of upper arm and box 1"), "{}", message(&output));
+    assert!(!folder.path().join("t.json").exists());
+}
+
 /// What a URDF leaves open is said, and what cannot be watched is not promised.
 #[test]
 fn a_robot_without_shapes_has_no_clearance() {

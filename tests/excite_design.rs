@@ -147,8 +147,8 @@ fn specifications_that_make_no_sense_are_refused_with_the_number() {
         s.variables.fixed_offsets_rad = [0.0, 0.5, 0.0, 0.0, 0.0, 0.0].map(Some).to_vec();
     };
     assert!(message(flat).contains("floor"));
-    // No motion keeps a metre from itself.
-    assert!(message(|s| s.requirements.clearance_m = 1.0).contains("no motion inside the limits"));
+    // No pose keeps a metre from itself.
+    assert!(message(|s| s.requirements.clearance_m = 1.0).contains("poses all over the range"));
 }
 
 /// The prediction is the textbook formula: σ² on the diagonal of the inverse information, which falls

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use super::robot::{OtherRobot, SavedRobot, load_robot};
 use crate::dynamics::{Model, Parameter, ParameterLayout};
-use crate::report::identify::IDENTIFY_SCHEMA;
+use crate::report::identify::{CONTRADICTED, IDENTIFY_SCHEMA};
 use crate::report::physical::DecidedBy;
 use crate::report::saved::{SavedError, load};
 use crate::robot::{Arm, Frames, LoadedArm, RobotError};
@@ -72,6 +72,8 @@ struct ResultFile {
     about: SavedRobot,
     standard_parameters: Option<Vec<Value>>,
     physical: Option<Found>,
+    #[serde(default)]
+    verdict: String,
 }
 
 /// How the standard parameters were found.
@@ -111,9 +113,16 @@ impl ArmResult {
             offsets_nm: (0..arm.dof()).map(offset).collect(),
             arm: layout.apply(&standard, &arm),
             by_prior: by_prior.map(|v| v.name).collect(),
-            doubt: result.physical.filter(|found| found.model_is_wrong).map(|found| {
-                format!("{file}: an arm with these parameters does not move as the recorded one did: {}", found.sentence)
-            }),
+            doubt: match result.physical {
+                _ if result.verdict == CONTRADICTED => Some(format!(
+                    "{file}: no arm has what was identified there; this is the nearest one"
+                )),
+                Some(found) if found.model_is_wrong => Some(format!(
+                    "{file}: an arm with these parameters does not move as the recorded one did: {}",
+                    found.sentence
+                )),
+                _ => None,
+            },
             frames,
             files,
         })

@@ -9,7 +9,7 @@ use crate::base::BaseSet;
 use crate::diagnose::Nominal;
 use crate::dynamics::Model;
 use crate::montecarlo::Scenario;
-use crate::report::identify::IDENTIFY_SCHEMA;
+use crate::report::identify::{CONTRADICTED, IDENTIFY_SCHEMA};
 use crate::report::saved::{SavedFault, load};
 use crate::robot::{Arm, Kinematics};
 
@@ -61,12 +61,18 @@ impl Simulated {
                            compare another log with it, or leave --sim out";
             return Err(format!("{name}: {message}").into());
         }
-        let doubt = (result.intervals.trusted == Some(false)).then(|| {
-            format!(
+        let doubt = if result.verdict == CONTRADICTED {
+            Some(format!(
+                "No arm has what was identified in {name}, and nothing that differs from it says what changed."
+            ))
+        } else if result.intervals.trusted == Some(false) {
+            Some(format!(
                 "The model is wrong along the log of which {name} is, so that what differs from it here may have been wrong there; \
                  `armid diagnose` of that log names the cause."
-            )
-        });
+            ))
+        } else {
+            None
+        };
         let parameter = |k: usize| {
             let parameter = set.name(k);
             let found = result.base_parameters.iter().find(|p| p.name == parameter);
@@ -98,6 +104,8 @@ struct IdentifiedParameters {
     about: SavedRobot,
     #[serde(default)]
     log: String,
+    #[serde(default)]
+    verdict: String,
     base_parameters: Vec<IdentifiedParameter>,
     #[serde(default)]
     intervals: Intervals,

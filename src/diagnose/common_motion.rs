@@ -27,6 +27,7 @@
 
 use realfft::num_complex::Complex;
 
+use super::friction_drift::FrictionDrift;
 use super::load::load_along;
 use super::scene::equivalent_arm;
 use crate::base::BaseSet;
@@ -87,8 +88,8 @@ pub fn move_to_common_motion(
     regression.prepared.motion = common;
 }
 
-/// σ of the mean over the periods, sample by sample, Nm: what noise of torque and motion leaves of an error there, and whatever else
-/// differs from period to period. `None` where nothing repeats. For a `regression` that was moved to its common motion.
+/// σ of the mean over the periods, sample by sample, Nm: what noise of torque and motion leaves of an error there, drift of friction
+/// left out. `None` where nothing repeats. For a `regression` that was moved to its common motion.
 pub fn noise_of_mean(regression: &Regression) -> Option<JointSignals> {
     let (n, periods) = (regression.problem.samples, regression.problem.periods);
     if periods < 2 {
@@ -96,8 +97,10 @@ pub fn noise_of_mean(regression: &Regression) -> Option<JointSignals> {
     }
     let [of_mean, of_scatter] = regression.prepared.kept();
     let panels = &regression.problem.panels;
-    let scatter = panels.iter().map(|panel| {
+    let drift = FrictionDrift::beside_mean(&regression.prepared.motion.qd_rad_s, periods);
+    let scatter = panels.iter().enumerate().map(|(j, panel)| {
         let mut off = panel.y.clone();
+        drift.remove(j, &mut off, |_| true);
         subtract_mean_period(&mut off, n);
         off.iter_mut().for_each(|off| *off *= *off);
         mean_period(&off, n)

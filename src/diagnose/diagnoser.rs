@@ -223,7 +223,9 @@ impl<'a> Diagnoser<'a> {
             diagnosis.sentences.insert(0, doubt.to_owned());
         }
         let nominal = self.set.values(&Model::new(self.arm).standard_parameters());
-        if let Some(doubt) = Doubt::of(self.arm, self.set, &nominal, theta, covariance) {
+        let sigma = sigma_of_friction_alone(&diagnosis, self.set);
+        let doubt = Doubt::of(self.arm, self.set, &nominal, theta, &sigma, covariance);
+        if let Some(doubt) = doubt {
             // Of another robot's log nothing else matters.
             diagnosis.sentences.insert(0, doubt.sentence);
             if doubt.is_contradiction {
@@ -381,6 +383,18 @@ struct Extended {
     /// What the causes span outside the null model, and what they leave of its residual.
     accepted: Span,
     rest: Image,
+}
+
+/// σ of the base parameters beside the causes; ∞ of the Coulomb friction of joints that have another law of friction beside it, so that
+/// it may be negative where all friction is not.
+fn sigma_of_friction_alone(diagnosis: &Diagnosis, set: &BaseSet) -> Vec<f64> {
+    let has_law = |name: &str| {
+        let laws = diagnosis.causes.iter().filter(|cause| cause.kind.is_friction());
+        let mut joints = laws.map(|cause| cause.joint);
+        joints.any(|joint| joint.is_none_or(|joint| name == format!("rc{joint}")))
+    };
+    let known = diagnosis.base_parameters.iter().enumerate();
+    known.map(|(k, p)| if has_law(set.name(k)) { f64::INFINITY } else { p.sigma }).collect()
 }
 
 /// Faults of the record before physics, of a motion that repeats. Of a single run what matters most is said first, what only concerns

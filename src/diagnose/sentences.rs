@@ -98,12 +98,12 @@ fn gain_along(held_out: &HeldOut, laws: &[Option<usize>]) -> Option<String> {
         let change = |(before, after): (&f64, &f64)| (before / after).ln().abs();
         change(*a).total_cmp(&change(*b))
     })?;
-    let noise = match &held_out.noise_moving_rms_nm {
-        Some(noise) => format!("of which noise alone makes {}", significant(noise[j], 3)),
-        None => "noise included".to_owned(),
+    let (included, alone) = match &held_out.noise_moving_rms_nm {
+        Some(noise) => ("", format!("; noise alone makes {} Nm", significant(noise[j], 3))),
+        None => (", noise included,", String::new()),
     };
     Some(format!(
-        "Along {} the error of joint {} while it moves, {noise}, is {} Nm rms with what is named and {} Nm without.",
+        "Along {} the error of joint {} while it moves{included} is {} Nm rms with what is named and {} Nm without{alone}.",
         held_out.log,
         j + 1,
         significant(*after, 3),

@@ -1,6 +1,10 @@
 //! How far the arm is from itself, from the floor and from its cell: capsules on the links.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{Matrix3, Rotation3, Vector3};
+use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
 use rapier3d::math::{Pose, Vector as ParryVector};
 use rapier3d::parry::query::ClosestPoints;
 use rapier3d::parry::query::details::closest_points_segment_segment;
@@ -37,6 +41,9 @@ struct Shape {
     ends_m: [Vector3<f64>; 2],
     radius_m: f64,
 }
+
+/// Poses in which a distance is looked at before it is said never to be kept.
+pub const POSES_TRIED: usize = 5000;
 
 /// What lies off an axis by less than this, m, or is tilted by less, turns on the spot.
 const ON_AXIS: f64 = 1e-9;
@@ -164,6 +171,27 @@ impl ClearanceModel {
             Between::Floor { capsule } => LimitKind::Floor { capsule: name(capsule) },
             Between::Box { capsule, which } => LimitKind::Box { capsule: name(capsule), which },
         }
+    }
+
+    /// What is nearer than `clearance_m` in every one of [`POSES_TRIED`] poses all over the range of the joints, and its largest distance
+    /// there, m.
+    pub fn never_kept(&self, arm: &Arm, clearance_m: f64) -> Option<(LimitKind, f64)> {
+        let mut ws = self.workspace();
+        let mut distances_m = vec![0.0; self.len()];
+        let mut most_m = vec![f64::NEG_INFINITY; self.len()];
+        let mut q_rad = vec![0.0; arm.dof()];
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        for _ in 0..POSES_TRIED {
+            for (q, joint) in q_rad.iter_mut().zip(&arm.joints) {
+                let [low, high] = joint.limits.position_rad;
+                let low = if low.is_finite() { low } else { 0.0 };
+                *q = low + rng.random::<f64>() * (high - low).min(TAU);
+            }
+            self.distances(&mut ws, &q_rad, &mut distances_m);
+            most_m.iter_mut().zip(&distances_m).for_each(|(most, d)| *most = most.max(*d));
+        }
+        let index = most_m.iter().position(|most| *most < clearance_m)?;
+        Some((self.limit(index), most_m[index]))
     }
 
     /// Ends (m, base frame) and radius (m) of every capsule at `q_rad`, for drawing.
@@ -312,9 +340,9 @@ fn nearest_points(
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
-    use rand::rngs::ChaCha8Rng;
-    use rand::{RngExt, SeedableRng};
 
     fn poses(count: usize) -> Vec<[f64; 6]> {
         let mut rng = ChaCha8Rng::seed_from_u64(11);
@@ -369,6 +397,27 @@ mod tests {
         let tilt = Rotation3::from_axis_angle(&Vector3::x_axis(), 0.5);
         arm.joints[0].placement.rotation = tilt.matrix() * arm.joints[0].placement.rotation;
         assert_eq!(watched(&arm), [true, true]);
+    }
+
+    /// Where a box is around the shoulder, the upper arm always reaches into it; from one beside it joint 1 turns it away.
+    #[test]
+    fn what_no_motion_keeps_clear_of_is_told() {
+        let within = |range_rad: [f64; 2], low_m: [f64; 3], high_m: [f64; 3]| {
+            let mut arm = Arm::built_in("ur5").unwrap();
+            arm.joints[0].limits.position_rad = range_rad;
+            let (low_m, high_m) = (low_m.into(), high_m.into());
+            arm.clearance.boxes.push(CellBox { low_m, high_m });
+            ClearanceModel::new(&arm).never_kept(&arm, 0.02).map(|(limit, _)| limit.to_string())
+        };
+        let never_kept = |low_m, high_m| within([-TAU, TAU], low_m, high_m);
+        let around = never_kept([-0.3, -0.3, 0.0], [0.3, 0.3, 0.3]);
+        assert_eq!(around.as_deref(), Some("clearance of upper arm and box 1"));
+        assert_eq!(never_kept([0.12, -1.0, 0.0], [0.5, 1.0, 1.0]), None);
+        assert_eq!(never_kept([2.0, -1.0, 0.0], [2.5, 1.0, 1.0]), None);
+        // Where joint 1 may turn away from it counts, and nothing else.
+        let beside = ([0.12, -1.0, 0.0], [0.5, 1.0, 1.0]);
+        let halves = [[0.0, PI], [PI, TAU]].map(|range| within(range, beside.0, beside.1));
+        assert!(halves.iter().any(Option::is_none), "{halves:?}");
     }
 
     #[test]

@@ -15,7 +15,7 @@ mod reference;
 mod run_in;
 mod sampled;
 
-pub use clearance::{ClearanceModel, ClearanceWorkspace};
+pub use clearance::{ClearanceModel, ClearanceWorkspace, POSES_TRIED};
 pub use error::ExcitationError;
 pub use fourier::{FourierSeries, TRAJECTORY_SCHEMA, built_in_names};
 pub use limits::{LimitKind, Margin, Margins, Requirements, check};

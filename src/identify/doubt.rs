@@ -9,25 +9,34 @@ use crate::robot::Arm;
 /// A reason not to take what was identified for what it is said to be.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Doubt {
-    /// Whether no arm at all has it: drives that push, or gravity that pulls upward. Else it may be another arm, or another load.
+    /// Whether no arm at all has it, or none that is mounted as described: drives that push, or gravity that pulls the other way. Else
+    /// it may be another arm, or another load.
     pub is_contradiction: bool,
     /// What is doubted and why, to be said before anything that rests on it.
     pub sentence: String,
 }
 
 impl Doubt {
-    /// Of base parameters `theta` of `arm`, which are `nominal` by its description.
+    /// Of base parameters `theta` of `arm`, which are `nominal` by its description, known to `sigma` and with the `covariance` that
+    /// they have among each other. (Of a parameter that says nothing by itself, σ is infinite.)
     pub fn of(
         arm: &Arm,
         set: &BaseSet,
         nominal: &[f64],
         theta: &[f64],
+        sigma: &[f64],
         covariance: &Covariance,
     ) -> Option<Self> {
         let gravity = gravity_remark(arm, set, nominal, theta, covariance);
-        let pushing = negative_friction_remark(arm, set, theta, covariance);
-        let is_contradiction = pushing.is_some() || gravity.as_ref().is_some_and(|g| g.is_reversed);
-        let head = is_contradiction.then(|| "No arm has what was identified.".to_owned());
+        let pushing = negative_friction_remark(arm, set, theta, sigma);
+        let is_reversed = gravity.as_ref().is_some_and(|g| g.is_reversed);
+        let head = match (&pushing, is_reversed) {
+            (Some(_), _) => Some("No arm has what was identified."),
+            (None, true) => Some("No arm that is mounted as described has what was identified."),
+            (None, false) => None,
+        };
+        let head = head.map(str::to_owned);
+        let is_contradiction = head.is_some();
         let question =
             gravity.map(|gravity| format!("Is this log of {}? The {}.", arm.name, gravity.text));
         let parts: Vec<String> = head.into_iter().chain(pushing).chain(question).collect();
@@ -53,7 +62,9 @@ mod tests {
             matrix: DMatrix::identity(set.rank(), set.rank()) * 1e-6,
             degrees_of_freedom: f64::INFINITY,
         };
-        let doubt = |theta: &[f64]| Doubt::of(&arm, &set, &nominal, theta, &covariance);
+        let doubt = |theta: &[f64]| {
+            Doubt::of(&arm, &set, &nominal, theta, &covariance.sigma(), &covariance)
+        };
         assert_eq!(doubt(&nominal), None);
         let scaled = |prefix: &str, factor: f64| -> Vec<f64> {
             let value = |k: usize| match set.name(k).starts_with(prefix) {
@@ -65,6 +76,7 @@ mod tests {
         let larger = doubt(&scaled("m", 2.0)).unwrap();
         assert!(!larger.is_contradiction && larger.sentence.starts_with("Is this log of ur5?"));
         let hanging = doubt(&scaled("m", -1.0)).unwrap();
+        assert!(hanging.sentence.starts_with("No arm that is mounted as described"));
         assert!(hanging.is_contradiction && hanging.sentence.contains("the other sign"));
         let pushing = doubt(&scaled("rc3", -1.0)).unwrap();
         assert!(pushing.is_contradiction && pushing.sentence.contains("joint 3 (-"));

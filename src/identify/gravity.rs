@@ -33,13 +33,15 @@ pub struct GravityMatch {
 pub struct GravityRemark {
     /// In words.
     pub text: String,
-    /// Whether it pulls upward for certain: then no arm has what was identified, as it is mounted.
+    /// Whether it is that of the description with the other sign, for certain: no arm has it that is mounted so.
     pub is_reversed: bool,
 }
 
 /// Factor between gravity found and described beyond which it is remarked on: tolerances of drive gains and
 /// usual bodies on the flange stay below.
 const OFF: f64 = 1.5;
+/// σ from none from which on noise is no excuse for a sign.
+const CERTAIN: f64 = 5.0;
 /// Of the logarithm of a factor of 1000: twice as much or half.
 const OFF_THOUSAND: f64 = 0.1;
 /// Share that a body on the flange may leave if it explains what was found: published gains of one arm differ by
@@ -97,8 +99,13 @@ impl GravityMatch {
         let is_as_described = self.ratio - doubt < OFF && self.ratio + doubt > 1.0 / OFF;
         (!is_as_described).then(|| GravityRemark {
             text: self.in_words(robot),
-            is_reversed: self.ratio + doubt < 0.0,
+            is_reversed: self.is_reversed() && self.ratio + CERTAIN * self.ratio_sigma < 0.0,
         })
+    }
+
+    /// As large as described, with the other sign.
+    fn is_reversed(&self) -> bool {
+        (1.0 / OFF..OFF).contains(&-self.ratio)
     }
 
     fn in_words(&self, robot: &str) -> String {
@@ -112,7 +119,7 @@ impl GravityMatch {
         let thousands = ratio.abs().log10() / 3.0;
         if (thousands.abs() - 1.0).abs() < OFF_THOUSAND {
             format!("{far}: a current or torque is logged in another unit (mA for A, mNm for Nm)")
-        } else if (1.0 / OFF..OFF).contains(&-ratio) {
+        } else if self.is_reversed() {
             format!(
                 "{far}: torques or angles are logged with the other sign, or the arm hangs upside down and its description does not"
             )

@@ -147,7 +147,7 @@ impl Physical {
                 list(&self.unconstrained_rms_nm)
             ),
             format!(
-                "The robot file's values are the prior ({}, weight {:.0e}{}): combinations that no \
+                "The robot file's values are the prior ({}, weight {}{}): combinations that no \
                  torque depends on are where it puts them, and {} standard parameters with them, which \
                  come without σ (half of a file's error would stay, or one of {:.0} % be more than it).",
                 self.prior_metric,

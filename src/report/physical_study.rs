@@ -11,14 +11,15 @@ use crate::number::percent;
 
 const HOW: &str = "The simulated arm is not the one of the robot file: every body's log-Cholesky parameters are off by \
 10 %, rotor inertias and friction by 20 % (one random draw, the same arm in all cases). Each trial draws fresh noise, is identified \
-without constraints and with them, and predicts the torque of another motion of the same arm without noise, faults included. \
+without constraints and with them (beside the robot file's values, which count as known to 100 %), and predicts the torque of another motion of the same arm without noise, faults included. \
 The error is in percent of the torque, root mean square over the joints; its scatter changes from trial to trial (variance), its \
 systematic part is the same in all trials (model error).";
 
 const SIGMA: &str = "Which 95 % intervals hold the true base parameters. unconstrained: least squares and its own σ. The other \
 three are about the constrained estimate: held, delta method in log-Cholesky parameters with the full curvature, so that a \
 direction held by a bound counts as known; released, the same with Gauss and Newton's curvature, as if no bound were there; \
-drawn, root mean square over estimates drawn around the estimate.";
+drawn, root mean square over estimates drawn around the estimate. All three are σ of the data's noise: where that is large the robot file decides some combinations, and its errors are not \
+in them (`identify --physical` states no σ for standard parameters of which this holds).";
 
 fn of(case: &CaseResult, method: Method) -> Option<&Prediction> {
     case.predictions[method as usize].as_ref()
@@ -48,8 +49,8 @@ fn sentence(study: &PhysicalStudy) -> String {
         format!("{least:.2} to {most:.2}")
     };
     format!(
-        "Where noise is all that is wrong, the constraint leaves {} of the scatter of predictions; \
-         where the model is wrong, {} of the systematic error stays: it makes every arm \
+        "Where noise is all that is wrong, constraints and a robot file known to 100 % leave {} of the scatter of predictions; \
+         where the model is wrong, {} of the systematic error stays: they make every arm \
          runnable, but no wrong model right.",
         list(false, |(scatter, _)| scatter),
         list(true, |(_, systematic)| systematic)

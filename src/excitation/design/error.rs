@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use crate::base::{AmbiguousRank, ParameterisationError};
-use crate::excitation::ExcitationError;
+use crate::excitation::{ExcitationError, POSES_TRIED};
 
 /// A specification that cannot be met or makes no sense.
 #[derive(Debug, Error)]
@@ -29,6 +29,18 @@ pub enum DesignError {
         arm: String,
         /// How many there must be.
         dof: usize,
+    },
+    /// Something is too near wherever the arm is.
+    #[error(
+        "{limit}: at most {most_m:.3} m in {POSES_TRIED} poses all over the range of the joints, and {clearance_m} m are asked for"
+    )]
+    NeverClear {
+        /// What is too near.
+        limit: String,
+        /// The largest distance, m; negative where they overlap.
+        most_m: f64,
+        /// What is asked for, m.
+        clearance_m: f64,
     },
     /// Fixed offsets at which the arm may not even stand.
     #[error("the fixed offsets are no pose the arm may take: {limit} is short by {short}")]

@@ -4,7 +4,7 @@ use super::criterion::Criterion;
 use super::error::DesignError;
 use super::prediction::Experiment;
 use super::space::Variables;
-use crate::excitation::{FourierSeries, Requirements, check};
+use crate::excitation::{ClearanceModel, FourierSeries, Requirements, check};
 use crate::robot::Arm;
 
 /// What a design is asked for.
@@ -68,6 +68,10 @@ impl Specification {
         if !(clearance_m >= 0.0 && clearance_m.is_finite()) {
             let (what, must) = ("the clearance".to_owned(), "finite and not negative".to_owned());
             return Err(DesignError::Value { what, value: clearance_m, must });
+        }
+        if let Some((limit, most_m)) = ClearanceModel::new(arm).never_kept(arm, clearance_m) {
+            let limit = limit.to_string();
+            return Err(DesignError::NeverClear { limit, most_m, clearance_m });
         }
         let share = self.requirements.torque_share;
         if !(share > 0.0 && share <= 1.0) {

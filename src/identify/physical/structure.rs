@@ -66,7 +66,7 @@ pub struct Pull {
     columns: Vec<usize>,
     map: DMatrix<f64>,
     target: DVector<f64>,
-    /// The cone whose unit a is; `None` where the prior is zero.
+    /// The cone whose unit a is; `None` where the prior is zero, or as good as that.
     cone: Option<Cone>,
 }
 
@@ -91,8 +91,11 @@ pub const ENTROPIC_CURVATURE: f64 = 1e-4;
 /// Nm s/rad and Nm.
 const UNKNOWN_ROTOR_INERTIA: f64 = 1.0;
 const UNKNOWN_FRICTION: f64 = 10.0;
-/// A torque offset of this size counts as a deviation of 100 %, Nm.
-const USUAL_OFFSET_NM: f64 = 1.0;
+/// A drive parameter whose prior is less than this share of that was not measured (a URDF's damping of 0.1), and is pulled as gently
+/// as none.
+const PLACEHOLDER: f64 = 0.02;
+/// A torque offset of this size counts as a deviation of 100 %, Nm: as gentle a pull as that of friction that is not known.
+const USUAL_OFFSET_NM: f64 = 10.0;
 /// Priors below this share of their size are on the boundary.
 const ON_BOUNDARY: f64 = 1e-2;
 
@@ -266,7 +269,8 @@ impl Structure {
     fn add_drive(&mut self, parameter: Parameter, standard: &[f64], unknown: f64) {
         let index = self.layout.index(parameter);
         let prior = standard[index].max(0.0);
-        let size = if prior > 0.0 { prior } else { unknown };
+        let is_known = prior >= PLACEHOLDER * unknown;
+        let size = if is_known { prior } else { unknown };
         let (columns, mut map) = self.block(index..index + 1);
         if columns.is_empty() {
             return;
@@ -276,7 +280,7 @@ impl Structure {
             self.start[*only] = size;
         }
         let target = DVector::from_element(1, prior / size);
-        let cone = (prior > 0.0).then_some(Cone::NonNegative);
+        let cone = is_known.then_some(Cone::NonNegative);
         self.pulls.push(Pull { columns: columns.clone(), map: map.clone(), target, cone });
         self.push(Subject::Drive(parameter), Cone::NonNegative, columns, map, DVector::zeros(1));
     }

@@ -32,7 +32,8 @@ pub const IDENTIFY_SCHEMA: &str = "armid.identify/1";
 
 const IDENTIFIED: &str = "identified";
 const NOT_IDENTIFIED: &str = "not_identified";
-const CONTRADICTED: &str = "contradicted";
+/// Verdict where no arm has what was identified.
+pub const CONTRADICTED: &str = "contradicted";
 
 /// What was identified, from what.
 pub struct Training<'a> {
@@ -181,7 +182,8 @@ impl Result {
         warnings.extend(identification.lack_of_fit.and_then(|lack| lack.warning()));
         let is_identified = identifies_the_arm(arm, set, &open);
         let theta = &identification.fit.theta;
-        let doubt = Doubt::of(arm, set, training.nominal, theta, &identification.covariance);
+        let doubt =
+            Doubt::of(arm, set, training.nominal, theta, &sigma, &identification.covariance);
         warnings.extend(doubt.iter().map(|doubt| doubt.sentence.clone()));
         let fit = identification.residual();
         warnings.extend(validations.iter().filter_map(|validation| foreign(validation, &fit)));
@@ -252,7 +254,8 @@ impl Result {
 
     /// The warnings that the verdict does not begin with.
     pub fn notes(&self) -> impl Iterator<Item = &String> {
-        let leads = |warning: &String| self.doubt.as_ref().is_some_and(|d| d.sentence == *warning);
+        let doubt = self.doubt.as_ref().filter(|_| !self.is_declined());
+        let leads = move |warning: &String| doubt.is_some_and(|d| d.sentence == *warning);
         self.warnings.iter().filter(move |warning| !leads(warning))
     }
 

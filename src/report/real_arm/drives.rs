@@ -63,7 +63,7 @@ impl RealArmStudy {
             )
             .say(
                 "A known mass breaks this: the same body must come out right. The scale below is what the gains are to \
-                 be multiplied by; where a joint hardly feels the body its interval is wide.",
+                 be multiplied by; where a joint hardly feels the body its interval is wide (± is half of it, at 95 %).",
             )
             .table("Published gains", table)
             .table("What the body of known mass says", scales)

@@ -101,8 +101,9 @@ fn percents(values: &[f64]) -> String {
     values.iter().map(|v| format!("{:.0} %", 100.0 * v)).collect::<Vec<_>>().join("  ")
 }
 
+/// Value ± half of the 95 % interval.
 fn pair(e: &Estimate) -> String {
-    with_sigma(e.value, 0.25 * (e.ci95[1] - e.ci95[0]))
+    with_sigma(e.value, 0.5 * (e.ci95[1] - e.ci95[0]))
 }
 
 impl RealArmStudy {

@@ -36,7 +36,7 @@ impl RealArmStudy {
         Part::new("A body on the flange")
             .say(
                 "Two runs share one model; the second may have a body on the flange and friction of another size. \
-                 Coordinates are those of the last joint's frame. ± is one σ from the scatter of 2 s blocks; errors of \
+                 Coordinates are those of the last joint's frame. ± is half of the 95 % interval from the scatter of 2 s blocks; errors of \
                  the kinematics and of the gains are not in it.",
             )
             .table("", table)

@@ -3,7 +3,7 @@
 use super::super::{Status, Verdict};
 use super::{RealArmStudy, file_name, mean, percents};
 use crate::diagnose::{Cause, HeldOut};
-use crate::number::{significant, with_sigma};
+use crate::number::significant;
 
 /// Share of the rms error that is to be removed on held-out runs, in the mean of the joints.
 const AIM_MEAN: f64 = 0.35;
@@ -158,16 +158,14 @@ impl RealArmStudy {
         let masses: Vec<String> = loaded
             .iter()
             .map(|pair| {
-                let mass = &pair.finding.mass_kg;
-                let sigma = 0.25 * (mass.ci95[1] - mass.ci95[0]);
-                let mass = with_sigma(mass.value, sigma);
+                let mass = super::pair(&pair.finding.mass_kg);
                 format!("{mass} kg in {} with the {} gains", pair.file, pair.gains)
             })
             .collect();
         let named = bare.iter().filter(|pair| pair.finding.is_named).count();
         let known = loaded.first().and_then(|pair| pair.known_kg).unwrap_or(f64::NAN);
         format!(
-            "The body that weighs {known} kg is found (± one σ) to weigh {}; a body is found on {named} of {} runs without one.",
+            "The body that weighs {known} kg is found to weigh (± half of the 95 % interval) {}; a body is found on {named} of {} runs without one.",
             masses.join(", "),
             bare.len()
         )

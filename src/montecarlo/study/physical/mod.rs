@@ -31,7 +31,7 @@ use validation::Validation;
 pub enum Method {
     /// Least squares.
     Unconstrained = 0,
-    /// With the constraints and a prior that decides nothing that the data know.
+    /// With the constraints and the default prior, which decides what the data know to less than 100 % of the robot file.
     Constrained = 1,
     /// With the constant pull-back to the robot file, its weight by cross-validation.
     PullBack = 2,
