@@ -6,6 +6,9 @@ use super::negative_friction::negative_friction_remark;
 use crate::base::BaseSet;
 use crate::robot::Arm;
 
+/// σ from none from which on noise is no excuse for a sign: of all joints of a hundred thousand arms it turns one.
+pub(super) const CERTAIN: f64 = 5.0;
+
 /// A reason not to take what was identified for what it is said to be.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Doubt {

@@ -10,6 +10,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::covariance::Covariance;
+use super::doubt::CERTAIN;
 use super::quality::{identifies_the_arm, not_identified};
 use crate::base::BaseSet;
 use crate::dynamics::{Parameter, ParameterLayout};
@@ -40,8 +41,6 @@ pub struct GravityRemark {
 /// Factor between gravity found and described beyond which it is remarked on: tolerances of drive gains and
 /// usual bodies on the flange stay below.
 const OFF: f64 = 1.5;
-/// σ from none from which on noise is no excuse for a sign.
-const CERTAIN: f64 = 5.0;
 /// Of the logarithm of a factor of 1000: twice as much or half.
 const OFF_THOUSAND: f64 = 0.1;
 /// Share that a body on the flange may leave if it explains what was found: published gains of one arm differ by

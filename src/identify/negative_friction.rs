@@ -1,11 +1,9 @@
 //! Whether friction came out as something that pushes.
 
+use super::doubt::CERTAIN;
 use crate::base::BaseSet;
 use crate::dynamics::{Parameter, ParameterLayout};
 use crate::robot::Arm;
-
-/// σ below none from which on noise is no excuse: of all joints of a hundred thousand arms it makes one so.
-const CERTAIN: f64 = 5.0;
 
 /// A remark where the Coulomb friction that was identified, known to `sigma`, is negative, which no drive has; `None` where none is. Nearly always
 /// the torque of that joint has the other sign, or is that of another one.
