@@ -3,6 +3,6 @@
 # Needs: pip install pin numpy cvxpy clarabel. Clarabel's Rust crate is no dependency because its semidefinite cone needs BLAS.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-cargo test --test val_physical --no-run
+cargo test --test all --no-run
 python3 tests/golden/physical.py --print
-cargo test --test val_physical -- --nocapture --test-threads 1 a_solve_takes_milliseconds the_optimum_is_clarabels
+cargo test --test all -- --nocapture --test-threads 1 a_solve_takes_milliseconds the_optimum_is_clarabels

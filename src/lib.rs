@@ -5,6 +5,7 @@
 pub mod base;
 pub mod cli;
 pub mod diagnose;
+mod dot;
 pub mod dynamics;
 pub mod excitation;
 pub mod identify;

@@ -251,7 +251,7 @@ fn of_two_effects_both_are_named() {
 fn of_a_change_and_a_law_both_are_named() {
     let benchmark =
         benchmark(BESIDE, &["nonlinear_viscous", "load_friction", "payload", "friction_change"]);
-    for trial in 0..3 {
+    for trial in 0..2 {
         let record = record(&benchmark, trial);
         assert_eq!(record.outcome(), Outcome::Right, "trial {trial}");
         assert_eq!(record.answer.named.len(), 2, "trial {trial}");
@@ -259,8 +259,8 @@ fn of_a_change_and_a_law_both_are_named() {
 }
 
 /// Drives that feed half of friction forward and have slow feedback reverse early or late by what their joint does, which
-/// looks like a sixteenth of what a longer delay does. Of these ten logs five were called late; by chance less than 0.14 % of
-/// logs are given any law.
+/// looks like a sixteenth of what a longer delay does. Half of such logs were called late once, so that all of these are right by
+/// chance once in 32 times; by chance less than 0.14 % of logs are given any law.
 #[test]
 fn slow_drives_are_not_late() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("sims/blind_slow_drive.toml");
@@ -268,7 +268,7 @@ fn slow_drives_are_not_late() {
         unreachable!("the scenario has a [blind] table")
     };
     let benchmark = Benchmark::prepare(*plan).unwrap();
-    for trial in 0..10 {
+    for trial in 0..5 {
         let named = record(&benchmark, trial).answer.named;
         assert!(named.iter().all(|cause| cause.kind != Kind::TimeSkew), "trial {trial}");
     }
@@ -299,7 +299,7 @@ fn a_family_that_is_not_known_is_not_called_another() {
 fn drift_that_is_not_known_depends_on_the_time() {
     let mut benchmark = benchmark(WITHHELD, &["thermal_drift"]);
     benchmark.plan.sqrt_lambda = [30.0, 40.0];
-    for trial in 0..3 {
+    for trial in 0..2 {
         let record = record(&benchmark, trial);
         let left = record.answer.left.as_ref().map(|left| (left.axis.as_str(), Some(left.joint)));
         assert_eq!(left, Some(("time since the start", record.case.hidden[0].joint)), "{trial}");
@@ -312,16 +312,16 @@ fn threads_and_shards_give_the_same_records() {
     let benchmark = benchmark(NOTHING, &[]);
     let stop = std::sync::atomic::AtomicBool::new(false);
     let run = |range: std::ops::Range<u64>, threads: usize| {
-        let mut shard = Shard::new(&benchmark, 3, range);
+        let mut shard = Shard::new(&benchmark, 2, range);
         shard.run(&benchmark, threads, None, &stop, &|_| ()).unwrap();
         let text = serde_json::to_string(&shard).unwrap();
         let read: Shard<BlindContent> = serde_json::from_str(&text).unwrap();
         assert_eq!(read, shard);
         (std::path::PathBuf::new(), shard)
     };
-    let whole = merge(vec![run(0..3, 1)]).unwrap();
-    let parts = merge(vec![run(2..3, 1), run(0..2, 2)]).unwrap();
+    let whole = merge(vec![run(0..2, 2)]).unwrap();
+    let parts = merge(vec![run(1..2, 1), run(0..1, 1)]).unwrap();
     assert_eq!((&whole.header, &whole.tally), (&parts.header, &parts.tally));
-    assert_eq!(whole.tally.records.len(), 3);
+    assert_eq!(whole.tally.records.len(), 2);
     assert!(whole.missing.is_empty() && parts.missing.is_empty());
 }

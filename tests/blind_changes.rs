@@ -4,9 +4,7 @@
 use armid::diagnose::{Cause, Diagnosis, Kind, Nominal, Validation};
 use armid::identify::Measurement;
 
-mod simulated;
-
-use simulated::{NOISE, Run, scenario};
+use crate::simulated::{NOISE, Run, scenario};
 
 /// `periods` of the identification motion with the effects of `toml`.
 fn run(seed: u64, periods: usize, toml: &str) -> Run {

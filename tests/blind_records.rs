@@ -5,9 +5,7 @@ use armid::diagnose::{Diagnosis, Kind};
 use armid::plant::Measured;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
-mod simulated;
-
-use simulated::{NOISE, Run, TORQUE_NOISE, scenario};
+use crate::simulated::{NOISE, Run, TORQUE_NOISE, scenario};
 
 /// The log of six periods behind `sensors`, with the effects of `rest`, changed by `change`.
 fn diagnose(

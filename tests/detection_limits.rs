@@ -4,14 +4,12 @@ use armid::diagnose::{DetectionLimit, Diagnoser};
 use armid::dynamics::Model;
 use armid::montecarlo::{Scenario, Simulation};
 
-mod simulated;
-
-use simulated::{TORQUE_NOISE, scenario};
+use crate::simulated::{TORQUE_NOISE, scenario};
 
 /// Four periods of an arm with `effects`.
 fn run(effects: &str) -> Simulation {
     let along = ("ur5_identification", 4);
-    Simulation::run_once(scenario(("limits", 5), along, TORQUE_NOISE, effects)).unwrap()
+    Simulation::run(scenario(("limits", 5), along, TORQUE_NOISE, effects)).unwrap()
 }
 
 /// Of the log of `clean`.

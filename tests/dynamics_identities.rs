@@ -7,14 +7,12 @@
 //! error ε f/h, both about 1e-11 f; the trigonometric f of six joints in series have third
 //! derivatives up to 6³ times their size, and √ε ≈ 1.5e-8 relative bounds the sum.
 
-mod golden;
-
+use crate::golden::State;
 use armid::dynamics::{
     Lanes, Model, Motion, ParameterLayout, RegressorBlock, Workspace, forward_dynamics,
     inverse_dynamics, kinetic_energy, mass_matrix, potential_energy, regressor,
 };
 use armid::robot::JointSignals;
-use golden::State;
 use nalgebra::{DMatrix, DVector};
 
 const EXACT: f64 = 1e-10;
@@ -23,7 +21,7 @@ const STEP: f64 = 6e-6;
 
 /// Every golden state of every arm.
 fn each_state(mut check: impl FnMut(&Model, &mut Workspace<f64>, &State, &str)) {
-    for (arm, states) in golden::all() {
+    for (arm, states) in crate::golden::all() {
         let model = Model::new(&arm);
         let mut ws = Workspace::new(&model);
         for (s, state) in states.iter().enumerate() {
@@ -200,7 +198,7 @@ fn forward_dynamics_undoes_inverse_dynamics() {
 /// a block starts inside a motion.
 #[test]
 fn a_block_of_samples_has_the_bits_of_single_samples() {
-    for (arm, states) in golden::all() {
+    for (arm, states) in crate::golden::all() {
         let model = Model::new(&arm);
         let n = model.dof();
         let layout = ParameterLayout::new(n);

@@ -1,10 +1,9 @@
 //! The size of a hidden effect in units of the noise.
 
 use armid::montecarlo::{EffectSize, Simulation};
+use armid::plant::faults::FaultyPlant;
 
-mod simulated;
-
-use simulated::{TORQUE_NOISE, scenario};
+use crate::simulated::{TORQUE_NOISE, scenario};
 
 /// One period of the default scenario's motion, with its own noise.
 fn size_of(effects: &str, noise: &str) -> EffectSize {
@@ -63,9 +62,12 @@ fn a_log_that_repeats_need_not_be_integrated() {
     let effects = "[[effect]]\nkind='presliding'\njoint=4\nstiffness_per_rad=300\n\
                    [[effect]]\nkind='elasticity'\njoint=2\nstiffness_nm_rad=8000\n\
                    [[effect]]\nkind='time_skew'\njoint=3\ndelay_s=-0.004";
-    let scenario = || scenario(("size", 1), ("ur5_identification", 2), TORQUE_NOISE, effects);
-    let whole = Simulation::run(scenario()).unwrap();
-    let copied = Simulation::run_once(scenario()).unwrap();
+    let scenario = scenario(("size", 1), ("ur5_identification", 2), TORQUE_NOISE, effects);
+    let plant = FaultyPlant::new(&scenario.arm, &scenario.effects, &scenario.plant).unwrap();
+    let recording = plant.run(&scenario.excitation, None).unwrap();
+    let copied = Simulation::run(scenario.clone()).unwrap();
+    let mut whole = Simulation::run(scenario).unwrap();
+    whole.recording = recording;
     assert_eq!(whole.recording.time_s.len(), copied.recording.time_s.len());
     let sd = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15];
     // The last half second of the whole run lacks what a late channel would still read.

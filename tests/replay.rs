@@ -25,8 +25,6 @@ use armid::plant::{Measured, PerJoint, PlantConfig, Recording, SensorConfig, Sen
 use armid::random::TrialStreams;
 use armid::robot::JointSignals;
 
-mod simulated;
-
 const RATE_HZ: f64 = 125.0;
 const PERIOD: usize = 1250;
 const LEAD: usize = 125;
@@ -42,7 +40,7 @@ struct Hidden {
 
 /// `effects` as in a scenario.
 fn hide(trajectory: &str, effects: &str, seed: u64) -> Hidden {
-    let scenario = simulated::scenario(("replay", 1), (trajectory, 1), "", effects);
+    let scenario = crate::simulated::scenario(("replay", 1), (trajectory, 1), "", effects);
     let series = FourierSeries::built_in(trajectory).unwrap();
     // One period, entered a second before it begins, and then again and again.
     let periodic = Periodic { series, lead_s: LEAD as f64 / RATE_HZ };

@@ -6,9 +6,7 @@ use armid::identify::{Identification, Identifier, Regression, Several, each_alon
 use armid::montecarlo::Simulation;
 use armid::plant::Measured;
 
-mod simulated;
-
-use simulated::scenario;
+use crate::simulated::scenario;
 
 /// Four periods of `trajectory`, with noise that remembers and that joints share, `times` as loud as on the UR5.
 fn simulation(trajectory: &str, times: f64, effects: &str) -> Simulation {
@@ -18,7 +16,7 @@ fn simulation(trajectory: &str, times: f64, effects: &str) -> Simulation {
         "[sensors.torque_noise]\ncomponents = [{{ share = 0.5, colour = \"white\" }}, \
          {{ share = 0.5, colour = {{ ar1 = {{ time_constant_s = 0.1 }} }} }}]\ncross_joint_correlation = 0.3\n{effects}"
     );
-    Simulation::run_once(scenario(("several", 11), (trajectory, 4), &sensors, &rest)).unwrap()
+    Simulation::run(scenario(("several", 11), (trajectory, 4), &sensors, &rest)).unwrap()
 }
 
 fn laid_out(identifier: &mut Identifier, log: &Measured) -> Regression {

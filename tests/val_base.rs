@@ -1,8 +1,6 @@
 //! Base parameters against Pinocchio's regressor, SVD ranks and least squares (`golden/base.py`):
 //! every rank, every combination and every coefficient of three arms.
 
-mod golden;
-
 use std::collections::BTreeMap;
 
 use armid::base::{BaseSet, Parameterisation};
@@ -32,7 +30,7 @@ struct Term {
 fn goldens() -> Vec<(Arm, Golden)> {
     let all: Vec<Golden> = serde_json::from_str(include_str!("golden/base.json")).unwrap();
     let arm_of = |name: &str| match name {
-        "tilted" => golden::tilted(),
+        "tilted" => crate::golden::tilted(),
         built_in => Arm::built_in(built_in).unwrap(),
     };
     all.into_iter().map(|golden| (arm_of(&golden.robot), golden)).collect()

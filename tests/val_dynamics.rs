@@ -8,14 +8,12 @@
 //! tests are to find is far larger: the sign of the least of all products of inertia (1.5e-6 kg m²,
 //! UR5 wrist) moves the torque by 5e-6 of its size.
 
-mod golden;
-
+use crate::golden::State;
 use armid::dynamics::{
     Model, Workspace, forward_dynamics, inverse_dynamics, kinetic_energy, mass_matrix,
     potential_energy, regressor,
 };
 use armid::robot::Arm;
-use golden::State;
 use nalgebra::DMatrix;
 
 const RELATIVE: f64 = 1e-10;
@@ -37,7 +35,7 @@ fn compare(
     mut actual: impl FnMut(&Model, &mut Workspace<f64>, &State) -> Vec<f64>,
     expected: impl Fn(&State) -> Vec<f64>,
 ) {
-    for (arm, states) in golden::all() {
+    for (arm, states) in crate::golden::all() {
         let model = Model::new(&arm);
         let mut ws = Workspace::new(&model);
         assert!(states.len() >= 200);
@@ -132,7 +130,7 @@ fn kinetic_and_potential_energy_are_pinocchios() {
 /// order, signs and the reference point of `LinkInertia` are the documented ones.
 #[test]
 fn pinocchios_regressor_takes_our_parameters_to_pinocchios_torque() {
-    for (arm, states) in golden::all() {
+    for (arm, states) in crate::golden::all() {
         assert!(states.len() >= 200);
         let parameters = inertial_parameters(&arm);
         for (s, state) in states.iter().enumerate() {

@@ -9,8 +9,6 @@
 //! (1e-13); MuJoCo also turns each tensor into principal axes and a quaternion and back. A wrong
 //! frame, sign or axis is in percent.
 
-mod golden;
-
 use std::path::PathBuf;
 
 use armid::dynamics::{Model, ParameterLayout, Workspace, inverse_dynamics, mass_matrix};
@@ -38,7 +36,7 @@ fn arms() -> [Arm; 2] {
     let mut identified =
         ParameterLayout::new(DOF).apply(&noisy.standard, &Arm::built_in("ur5").unwrap());
     identified.name = "identified".into();
-    [golden::tilted(), identified]
+    [crate::golden::tilted(), identified]
 }
 
 fn frames() -> Frames {

@@ -1,8 +1,6 @@
 //! The plant against Pinocchio and against this crate's own dynamics; neither shares code with the
 //! engine.
 
-mod golden;
-
 use armid::dynamics::{
     Model, Workspace, forward_dynamics, inverse_dynamics, kinetic_energy, potential_energy,
 };
@@ -66,7 +64,7 @@ impl Reference for Sines {
 /// and a thousand operations is 1e-10.
 #[test]
 fn forward_dynamics_agrees_with_pinocchio() {
-    for (arm, states) in golden::all() {
+    for (arm, states) in crate::golden::all() {
         let mut plant = RapierArm::new(&arm).unwrap();
         let mut worst: f64 = 0.0;
         for s in &states {

@@ -25,7 +25,7 @@
 //! of a joint that rests turns with the noise of its velocity. Of a joint that turns round the velocity keeps all its harmonics: they
 //! make the kink there, and friction that turns too softly looks like one that comes late.
 
-use realfft::num_complex::Complex;
+use fourier::Complex64;
 
 use super::friction_drift::FrictionDrift;
 use super::load::load_along;
@@ -130,12 +130,12 @@ impl Bands {
     /// Those in which the mean of the periods of `n` samples in `y` stands out of what they scatter.
     fn that_stand_out(y: &[f64], n: usize) -> Self {
         let clock = FineClock::new(n, 1);
-        let periods: Vec<Vec<Complex<f64>>> =
+        let periods: Vec<Vec<Complex64>> =
             y.chunks_exact(n).map(|period| clock.spectrum(period)).collect();
         let count = periods.len() as f64;
         // Power of a harmonic in the mean, and of its noise there.
         let power = |h: usize| {
-            let mean = periods.iter().map(|spectrum| spectrum[h]).sum::<Complex<f64>>() / count;
+            let mean = periods.iter().map(|spectrum| spectrum[h]).sum::<Complex64>() / count;
             let off = periods.iter().map(|spectrum| (spectrum[h] - mean).norm_sqr()).sum::<f64>();
             [mean.norm_sqr(), off / (count * (count - 1.0).max(1.0))]
         };
@@ -150,7 +150,7 @@ impl Bands {
     /// One period of a motion in the bands that are kept.
     fn of(&self, period: &[f64]) -> Vec<f64> {
         let is_kept = |h: usize| h == 0 || self.kept[(h - 1) / BAND];
-        self.clock.filtered(period, |h| if is_kept(h) { Complex::ONE } else { Complex::ZERO })
+        self.clock.filtered(period, |h| if is_kept(h) { Complex64::ONE } else { Complex64::ZERO })
     }
 
     /// The velocities `own` of all periods, while their joint rests in the bands that are kept.

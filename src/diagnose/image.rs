@@ -89,26 +89,12 @@ fn dot_of_contrasts(a: &[f64], b: &[f64]) -> f64 {
     if a.is_empty() || b.is_empty() { 0.0 } else { dot(a, b) }
 }
 
-/// Sum of products in eight interleaved partial sums: fast, and a fixed order.
+/// ⟨a, b⟩ of long series.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     with_widest_registers(
         #[inline(always)]
-        || dot_in_order(a, b),
+        || crate::dot::dot(a, b),
     )
-}
-
-#[inline(always)]
-fn dot_in_order(a: &[f64], b: &[f64]) -> f64 {
-    let (a8, a_rest) = a.as_chunks::<8>();
-    let (b8, b_rest) = b.as_chunks::<8>();
-    let mut partial = [0.0; 8];
-    for (x, y) in a8.iter().zip(b8) {
-        for k in 0..8 {
-            partial[k] += x[k] * y[k];
-        }
-    }
-    let rest: f64 = a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum();
-    partial.iter().sum::<f64>() + rest
 }
 
 fn axpy(y: &mut [f64], factor: f64, x: &[f64]) {

@@ -6,8 +6,8 @@
 //! swing; but they are no accident: a drive that does not answer dry friction at once jolts its joint, at every
 //! reversal in the same way. That common course is known ([`jolts`]), and better from the torque than from the motion.
 
+use fourier::Complex64;
 use nalgebra::{Cholesky, DMatrix, DVector};
-use realfft::num_complex::Complex64;
 
 use super::reversal_answer::{FASTEST_HZ, ReversalAnswer, TorqueHarmonic};
 use crate::dynamics::{

@@ -8,8 +8,8 @@
 //! A torque that is recorded late shows the same sum later, which between two samples is not another set of c: under a
 //! delay d that is asked for, the c are those of Σ_i c_i s(t − iΔ − d).
 
+use fourier::Complex64;
 use nalgebra::{Cholesky, DMatrix, DVector};
-use realfft::num_complex::Complex64;
 
 use crate::signal::FineClock;
 

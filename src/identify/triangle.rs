@@ -1,5 +1,6 @@
 //! Least squares by QR, fed block by block: only the triangle is kept.
 
+use crate::dot::dot;
 use crate::dynamics::with_widest_registers;
 
 /// R and QᵀY of X = Q R, with the part of Y outside the span of X, for any number of rows.
@@ -152,23 +153,6 @@ impl Triangle {
         }
         squares
     }
-}
-
-/// Sum of products in sixteen interleaved partial sums, which the compiler can keep in registers:
-/// a fixed order, hence fixed bits.
-#[inline(always)]
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    const WAYS: usize = 16;
-    let mut partial = [0.0; WAYS];
-    let (a_whole, a_rest) = a.as_chunks::<WAYS>();
-    let (b_whole, b_rest) = b.as_chunks::<WAYS>();
-    for (x, y) in a_whole.iter().zip(b_whole) {
-        for k in 0..WAYS {
-            partial[k] += x[k] * y[k];
-        }
-    }
-    let rest: f64 = a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum();
-    partial.iter().sum::<f64>() + rest
 }
 
 #[cfg(test)]

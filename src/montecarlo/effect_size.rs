@@ -7,9 +7,7 @@ use super::motion_noise::MotionNoise;
 use super::scenario::Scenario;
 use super::simulation::Simulation;
 use crate::dynamics::{Model, Motion};
-use crate::excitation::{Excitation, Reference};
 use crate::identify::{Assembler, ColumnPlan, Problem, Spectrum, Triangle};
-use crate::plant::faults::{Effect, FaultyPlant};
 use crate::plant::{PlantError, Recording, Whitening};
 use crate::signal::FineClock;
 
@@ -39,13 +37,6 @@ pub struct EffectSize {
 
 /// Rows eliminated together.
 const BLOCK: usize = 128;
-/// Time after the run-in in which an arm forgets how it started, s: the slowest to forget is a soft gear
-/// (8000 Nm/rad, 5 % damping: it swings on with exp(−3.5 t)).
-const SETTLING_S: f64 = 2.0;
-/// The last rows of a run may lack what comes after them (a channel that is read late), by at most the
-/// longest delay there is, s.
-const UNSETTLED_END_S: f64 = 0.5;
-
 impl Simulation {
     /// λ and λ_sim of all effects of the scenario together.
     ///
@@ -54,37 +45,7 @@ impl Simulation {
     /// to be seen.
     pub fn effect_size(&self) -> Result<EffectSize, PlantError> {
         let clean = Scenario { effects: Vec::new(), ..self.scenario.clone() };
-        self.size_beside(&Self::run_once(clean)?.recording)
-    }
-
-    /// The plant of `scenario` run once.
-    ///
-    /// Where nothing in the arm drifts, little more than one period is integrated: what the log shows when the arm
-    /// has forgotten how it started (`SETTLING_S`) repeats from then on, and is copied.
-    pub fn run_once(scenario: Scenario) -> Result<Self, PlantError> {
-        let plant = FaultyPlant::new(&scenario.arm, &scenario.effects, &scenario.plant)?;
-        let excitation = &scenario.excitation;
-        let rate_hz = scenario.plant.log_rate_hz;
-        let samples_per_period = excitation.series().period_s * rate_hz;
-        let period = samples_per_period.round() as usize;
-        let is_whole = (samples_per_period - samples_per_period.round()).abs() < 1e-6;
-        let repeats = scenario.effects.iter().all(Effect::repeats);
-        let recording = if excitation.periods() > 1 && is_whole && repeats {
-            let begin = Begin {
-                of: excitation,
-                duration_s: excitation.periodic_window_s()[0]
-                    + excitation.series().period_s
-                    + SETTLING_S
-                    + UNSETTLED_END_S,
-            };
-            let begun = plant.run(&begin, None)?;
-            let samples = (excitation.duration_s() * rate_hz + 1e-6).floor() as usize + 1;
-            let known = begun.time_s.len() - (UNSETTLED_END_S * rate_hz).ceil() as usize;
-            begun.repeated(known, period, samples)
-        } else {
-            plant.run(excitation, None)?
-        };
-        Self::with_recording(scenario, plant, recording)
+        self.size_beside(&Self::run(clean)?.recording)
     }
 
     /// λ and λ_sim of all effects, `clean` being the run of the arm without them along the same motion, or one that
@@ -133,26 +94,6 @@ impl Simulation {
         let torque = recording.torque_nm.slice(window);
         Assembler::new(model).assemble(&mut problem, model, &motion, &torque);
         problem
-    }
-}
-
-/// The beginning of a motion.
-struct Begin<'a> {
-    of: &'a Excitation,
-    duration_s: f64,
-}
-
-impl Reference for Begin<'_> {
-    fn joints(&self) -> usize {
-        self.of.joints()
-    }
-
-    fn duration_s(&self) -> f64 {
-        self.duration_s
-    }
-
-    fn sample(&self, t_s: f64, q_rad: &mut [f64], qd_rad_s: &mut [f64], qdd_rad_s2: &mut [f64]) {
-        self.of.sample(t_s, q_rad, qd_rad_s, qdd_rad_s2);
     }
 }
 

@@ -3,9 +3,12 @@
 use std::borrow::Cow;
 
 use super::scenario::Scenario;
+use crate::excitation::Reference;
 use crate::identify::Measurement;
-use crate::plant::faults::FaultyPlant;
-use crate::plant::{Measured, PlantError, Recording, SensorConfig, Sensors, TorqueNoise};
+use crate::plant::faults::{Effect, FaultyPlant};
+use crate::plant::{
+    Measured, PlantError, Recording, SensorConfig, Sensors, TorqueNoise, run_repeating,
+};
 use crate::random::TrialStreams;
 
 /// A scenario whose plant has run: what the logs of all its trials share.
@@ -19,10 +22,15 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// Runs the plant once without noise.
+    /// Runs the plant once without noise; where nothing in the arm drifts, of a motion that repeats by [`run_repeating`].
     pub fn run(scenario: Scenario) -> Result<Self, PlantError> {
         let plant = FaultyPlant::new(&scenario.arm, &scenario.effects, &scenario.plant)?;
-        let recording = plant.run(&scenario.excitation, None)?;
+        let excitation = &scenario.excitation;
+        let run = |reference: &dyn Reference| plant.run(reference, None);
+        let recording = match scenario.effects.iter().all(Effect::repeats) {
+            true => run_repeating(excitation, scenario.plant.log_rate_hz, run)?,
+            false => run(excitation)?,
+        };
         Self::with_recording(scenario, plant, recording)
     }
 

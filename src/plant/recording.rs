@@ -22,7 +22,7 @@ pub struct Recording {
     pub target_qdd_rad_s2: JointSignals,
     /// What the controller read at these instants, where it did not read the truth.
     pub readings: Option<Readings>,
-    /// Decisions of the controller at which at least one drive was at its limit.
+    /// Decisions of the controller at which at least one drive was at its limit, in what was integrated.
     pub saturated_decisions: usize,
 }
 

@@ -32,13 +32,27 @@ pub fn cause_table(diagnosis: &Diagnosis) -> Table {
                 resolved(estimate.value, width),
                 format!("{low} … {high}"),
                 estimate.unit.to_owned(),
-                once(percent(cause.confidence, 3)),
+                once(confidence(cause)),
                 once(significant(cause.strength, 3)),
                 once(cause.gain_fraction.map_or("–".to_owned(), |g| percent(g, 3))),
             ]);
         }
     }
     table
+}
+
+/// How sure a cause is: no more digits than a probability between laws that are all approximate has; "if any" where its size may be
+/// none.
+fn confidence(cause: &Cause) -> String {
+    let mut text = match cause.confidence {
+        c if c < 1e-3 => "< 0.1 %".to_owned(),
+        c if c > 0.999 => "> 99.9 %".to_owned(),
+        c => percent(c, 3),
+    };
+    if cause.may_be_none {
+        text += ", if any";
+    }
+    text
 }
 
 /// Gains on logs that were not used.

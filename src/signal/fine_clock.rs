@@ -1,10 +1,8 @@
 //! What happens between the samples of a motion that repeats.
 
 use std::f64::consts::{PI, TAU};
-use std::sync::Arc;
 
-use realfft::num_complex::Complex64;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use fourier::{Complex64, ComplexToReal, Forward, Inverse};
 
 /// An answer that began so many of its own times before has forgotten what it began with but for its rounding.
 const FORGOTTEN: f64 = 37.0;
@@ -13,21 +11,20 @@ const FORGOTTEN: f64 = 37.0;
 pub struct FineClock {
     samples: usize,
     ticks: usize,
-    forward: Arc<dyn RealToComplex<f64>>,
-    inverse: Arc<dyn ComplexToReal<f64>>,
-    fine_inverse: Arc<dyn ComplexToReal<f64>>,
+    forward: Forward,
+    inverse: Inverse,
+    fine_inverse: Inverse,
 }
 
 impl FineClock {
     /// For periods of `samples` samples, and `ticks` in each of them.
     pub fn new(samples: usize, ticks: usize) -> Self {
-        let mut planner = RealFftPlanner::new();
         Self {
             samples,
             ticks,
-            forward: planner.plan_fft_forward(samples),
-            inverse: planner.plan_fft_inverse(samples),
-            fine_inverse: planner.plan_fft_inverse(ticks * samples),
+            forward: fourier::forward(samples),
+            inverse: fourier::inverse(samples),
+            fine_inverse: fourier::inverse(ticks * samples),
         }
     }
 

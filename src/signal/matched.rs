@@ -9,10 +9,7 @@
 //! overlapping stretches, which a bump in one of them does not move, and its trend over frequency, times a factor that does not depend on
 //! frequency: N carries its inverse, and [`Heights::scale`] tells it from what the filter leaves elsewhere.
 
-use std::sync::Arc;
-
-use realfft::num_complex::Complex64;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use fourier::{Complex64, Forward, Inverse, RealToComplex};
 
 use super::error::{SignalError, checked_rate_hz, enough};
 use super::noise_trend::noise_trend;
@@ -39,8 +36,8 @@ pub struct MatchedFilter {
     /// Samples in all.
     extended: usize,
     rate_hz: f64,
-    forward: Arc<dyn RealToComplex<f64>>,
-    inverse: Arc<dyn ComplexToReal<f64>>,
+    forward: Forward,
+    inverse: Inverse,
     /// Per signal 1/S at the frequencies of the whole record.
     weights: Vec<Vec<f64>>,
     /// Per signal X/S.
@@ -92,21 +89,20 @@ impl MatchedFilter {
         enough("a matched filter", samples, 64)?;
         let mirror = ((MIRROR_S * rate_hz) as usize).min(samples - 1);
         let extended = fast_length(samples + 2 * mirror);
-        let mut planner = RealFftPlanner::new();
         let mut filter = Self {
             samples,
             before: mirror,
             extended,
             rate_hz,
-            forward: planner.plan_fft_forward(extended),
-            inverse: planner.plan_fft_inverse(extended),
+            forward: fourier::forward(extended),
+            inverse: fourier::inverse(extended),
             weights: Vec::new(),
             weighted: Vec::new(),
         };
         let stretch = ((STRETCH_S * rate_hz) as usize).clamp(8, samples / STRETCHES);
-        let plan = planner.plan_fft_forward(stretch);
+        let plan = fourier::forward(stretch);
         for signal in (0..signals.joints()).map(|j| signals.joint(j)) {
-            let mut power = median_power(signal, &plan);
+            let mut power = median_power(signal, &*plan);
             let largest = power.iter().copied().fold(0.0, f64::max);
             // Of a signal without noise nothing is known: any spectrum does.
             let least = if largest > 0.0 { FLOOR * largest } else { 1.0 };
@@ -208,7 +204,7 @@ fn fast_length(least: usize) -> usize {
 }
 
 /// Median over half-overlapping Hann-windowed stretches of |spectrum|², by frequency.
-fn median_power(signal: &[f64], plan: &Arc<dyn RealToComplex<f64>>) -> Vec<f64> {
+fn median_power(signal: &[f64], plan: &dyn RealToComplex<f64>) -> Vec<f64> {
     let length = plan.len();
     let mut spectra: Vec<Vec<f64>> = Vec::new();
     for part in signal.windows(length).step_by(length / 2) {

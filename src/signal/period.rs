@@ -14,10 +14,8 @@
 //! 5. The lag of the first period against the last, interpolated, refines the period.
 
 use std::ops::Range;
-use std::sync::Arc;
 
-use realfft::num_complex::Complex64;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use fourier::{Complex64, Forward, Inverse};
 
 use super::error::{SignalError, enough};
 use super::noise::{block_noise, quantile};
@@ -73,8 +71,8 @@ pub struct PeriodSearch {
 /// Transforms of one length.
 struct Plans {
     length: usize,
-    forward: Arc<dyn RealToComplex<f64>>,
-    inverse: Arc<dyn ComplexToReal<f64>>,
+    forward: Forward,
+    inverse: Inverse,
 }
 
 /// [`PeriodSearch::find`] for a single log.
@@ -181,9 +179,7 @@ impl PeriodSearch {
 
 impl Plans {
     fn new(length: usize) -> Self {
-        let mut planner = RealFftPlanner::new();
-        let (forward, inverse) =
-            (planner.plan_fft_forward(length), planner.plan_fft_inverse(length));
+        let (forward, inverse) = (fourier::forward(length), fourier::inverse(length));
         Self { length, forward, inverse }
     }
 }

@@ -22,10 +22,8 @@
 //! The mean angle is the angle's own; a mean velocity (an offset of its sensor) is not used.
 
 use std::f64::consts::PI;
-use std::sync::Arc;
 
-use realfft::num_complex::Complex64;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use fourier::{Complex64, Forward, Inverse};
 
 use super::averaged_motion::{AveragedMotion, HarmonicPower};
 use super::error::{SignalError, checked_rate_hz, enough, same};
@@ -43,8 +41,8 @@ pub struct PeriodicFit {
     samples_per_period: usize,
     periods: usize,
     rate_hz: f64,
-    forward: Arc<dyn RealToComplex<f64>>,
-    inverse: Arc<dyn ComplexToReal<f64>>,
+    forward: Forward,
+    inverse: Inverse,
     bands: Vec<Band>,
 }
 
@@ -93,13 +91,12 @@ impl PeriodicFit {
             let samples = samples_per_period * periods;
             return Err(SignalError::Periods { samples, samples_per_period });
         }
-        let mut planner = RealFftPlanner::new();
         Ok(Self {
             samples_per_period,
             periods,
             rate_hz,
-            forward: planner.plan_fft_forward(samples_per_period),
-            inverse: planner.plan_fft_inverse(samples_per_period),
+            forward: fourier::forward(samples_per_period),
+            inverse: fourier::inverse(samples_per_period),
             bands: Band::all(harmonics_below(SERIES_END, samples_per_period), periods),
         })
     }

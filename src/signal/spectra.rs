@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use realfft::num_complex::Complex64;
+use fourier::Complex64;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::readings::quantum;

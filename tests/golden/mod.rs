@@ -1,5 +1,4 @@
 //! Reader of the goldens written by `dynamics.py`; the formats are described there.
-#![allow(dead_code, reason = "each test program uses its part")]
 
 use armid::robot::Arm;
 

@@ -9,7 +9,7 @@ use armid::excitation::{Excitation, FourierSeries};
 use armid::identify::{Measurement, Options};
 use armid::plant::{
     Drivetrain, Measured, PerJoint, Plant, PlantConfig, RapierArm, Recording, SensorConfig,
-    Sensors, Stage,
+    Sensors, Stage, run_repeating,
 };
 use armid::random::TrialStreams;
 use armid::robot::{Arm, JointSignals};
@@ -111,7 +111,8 @@ impl Hidden {
         let mut plant =
             Plant::with_drivetrain(&arm, &arm, &[self.fed_forward; 6], Box::new(law), &config)
                 .unwrap();
-        let mut recording = plant.run(&excitation, None).unwrap();
+        let mut recording =
+            run_repeating(&excitation, log_rate_hz, |begin| plant.run(begin, None)).unwrap();
         if let Law::CutBeforeNoise { share } = self.law {
             let torque = recording.torque_nm.joint_mut(self.joint);
             let limit = share * torque.iter().fold(0.0f64, |most, t| most.max(t.abs()));

@@ -1,5 +1,4 @@
 //! Logs of the simulated UR5, with what a scenario hides in them.
-#![allow(dead_code, reason = "each test program uses its part")]
 
 use std::path::Path;
 
@@ -46,10 +45,14 @@ pub struct Run {
 
 impl Run {
     pub fn new(scenario: Scenario) -> Self {
-        let (arm, set) = (scenario.arm.clone(), scenario.set.clone());
-        let options = scenario.processing.clone();
-        let log = Simulation::run_once(scenario).unwrap().log(0).unwrap();
-        Self { model: Model::new(&arm), arm, set, options, log }
+        Self::of(&Simulation::run(scenario).unwrap(), 0)
+    }
+
+    /// One of several logs of a plant that has run.
+    pub fn of(simulation: &Simulation, trial: u64) -> Self {
+        let Scenario { arm, set, processing, .. } = &simulation.scenario;
+        let (arm, set, options) = (arm.clone(), set.clone(), processing.clone());
+        Self { model: Model::new(&arm), arm, set, options, log: simulation.log(trial).unwrap() }
     }
 
     /// One that knows all families.

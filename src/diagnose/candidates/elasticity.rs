@@ -25,7 +25,7 @@ use super::*;
 use crate::diagnose::scene::FINE;
 use crate::dynamics::Motion;
 use crate::identify::FEEDBACK_RAD_S;
-use realfft::num_complex::Complex64;
+use fourier::Complex64;
 
 /// See the module.
 pub struct Elasticity;

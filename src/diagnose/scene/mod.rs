@@ -9,7 +9,7 @@ pub use between_samples::{FINE, Instants};
 
 use std::sync::OnceLock;
 
-use realfft::num_complex::Complex64;
+use fourier::Complex64;
 
 use super::load::{
     Delivered, LinkTorque, Loads, Periods, mass_along, rigid_torque_along, rotors_kg_m2,

@@ -1,9 +1,7 @@
 //! Noise known from the scatter between periods.
 
-use std::sync::Arc;
-
+use fourier::Forward;
 use nalgebra::{Complex, DMatrix, DVector};
-use realfft::{RealFftPlanner, RealToComplex};
 
 use super::coherence::coherence;
 use super::mean_noise::{drifts, with_own_scatter};
@@ -36,7 +34,7 @@ pub struct PeriodWhitening {
     joints: usize,
     /// Periods that make the mean, where some rows are the mean of others.
     of_mean: f64,
-    forward: Arc<dyn RealToComplex<f64>>,
+    forward: Forward,
     /// L⁻¹ per harmonic that is used, row-major N × N.
     factors: Vec<Vec<Complex<f64>>>,
     /// How well the noise's power is known, per harmonic.
@@ -68,7 +66,7 @@ impl PeriodWhitening {
     pub fn new(regression: &Regression, scene: &Scene, log: &str) -> Result<Self, DiagnoseError> {
         let problem = &regression.problem;
         let (n, periods, joints) = (problem.samples, problem.periods, problem.joints());
-        let forward = RealFftPlanner::new().plan_fft_forward(n);
+        let forward = fourier::forward(n);
         let mut whitening = Self {
             samples: n,
             periods,
@@ -295,7 +293,7 @@ impl PeriodWhitening {
         let n = self.samples;
         let mut rows = rows.to_vec();
         self.repeating.iter().for_each(|noise| noise.whiten(&mut rows));
-        let inverse = RealFftPlanner::new().plan_fft_inverse(n);
+        let inverse = fourier::inverse(n);
         let mut spectra = vec![inverse.make_input_vec(); self.joints];
         let mut row = 0;
         for (k, factor) in self.factors.iter().enumerate() {
@@ -387,7 +385,7 @@ impl PeriodWhitening {
             periods,
             joints,
             of_mean: periods as f64,
-            forward: RealFftPlanner::new().plan_fft_forward(samples),
+            forward: fourier::forward(samples),
             factors: vec![identity.iter().copied().collect(); samples / 2 + 1],
             unknown: Vec::new(),
             drifting: Vec::new(),

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::dot::dot;
 use crate::dynamics::Motion;
 use crate::excitation::FourierSeries;
 
@@ -263,10 +264,6 @@ impl DesignSpace {
             }
         }
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
 /// `out += factor · matrix · x`.

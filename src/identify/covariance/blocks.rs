@@ -5,9 +5,9 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 
 use super::{Covariance, CovarianceError, CovarianceKind, CovarianceMethod};
+use crate::dot::dot;
 use crate::identify::fit::Fit;
 use crate::identify::problem::{Domain, Problem};
-use crate::identify::triangle::dot;
 
 /// V = A⁻¹ (Σ_b G̃_b G̃_bᵀ) A⁻¹ with A = XᵀW²X over B blocks of time, whose scores are G_b = Σ_{t in block b} X_tᵀW²e_t.
 ///

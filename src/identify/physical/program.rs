@@ -4,6 +4,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, DVectorView, Dyn};
 use thiserror::Error;
 
 use super::cone::{Cone, Scaling};
+use crate::dot::dot;
 
 /// minimise ½ yᵀH y − cᵀy − Σ γ_i ln det s_i subject to s_i = A_i y + b_i ∈ K_i for every
 /// constraint i.
@@ -207,10 +208,6 @@ impl Constraint {
             target[column] += factor * entries.dot(&z);
         }
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Where the iteration stands: y, s = A y + b and z.

@@ -2,6 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
+use crate::dot::dot;
 use crate::dynamics::Motion;
 use crate::identify::fit::FitError;
 use crate::identify::problem::Problem;
@@ -124,10 +125,6 @@ pub fn instrument(
         panel.y.extend(torque.map(|(y, e)| weight * y + e));
     }
     Ok(())
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]

@@ -1,16 +1,13 @@
 //! A periodic problem, frequency by frequency.
 
-use std::sync::Arc;
-
-use realfft::num_complex::Complex64;
-use realfft::{RealFftPlanner, RealToComplex};
+use fourier::{Complex64, Forward, RealToComplex};
 
 use crate::identify::problem::{Domain, Problem};
 
 /// Brings problems in time into the frequency domain.
 #[derive(Default)]
 pub struct Spectrum {
-    plan: Option<Arc<dyn RealToComplex<f64>>>,
+    plan: Option<Forward>,
     time: Vec<f64>,
     coefficients: Vec<Complex64>,
     scratch: Vec<Complex64>,
@@ -24,7 +21,7 @@ impl Spectrum {
         let harmonics = harmonics.min((n - 1) / 2);
         let plan = match self.plan.take().filter(|plan| plan.len() == n) {
             Some(plan) => plan,
-            None => RealFftPlanner::new().plan_fft_forward(n),
+            None => fourier::forward(n),
         };
         self.time.resize(n, 0.0);
         self.coefficients.resize(n / 2 + 1, Complex64::ZERO);

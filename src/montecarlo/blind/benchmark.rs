@@ -62,7 +62,7 @@ impl Benchmark {
             .map(|motion| {
                 let excitation = motion.excitation.clone();
                 let scenario = Scenario { excitation, ..plan.base.clone() };
-                Ok(Simulation::run_once(scenario)?.recording)
+                Ok(Simulation::run(scenario)?.recording)
             })
             .collect::<Result<_, PlantError>>()?;
         let simulation = plan.base.set.values(&model.standard_parameters());
@@ -187,8 +187,7 @@ impl BlindWorker<'_> {
         let next = &plan.motions[self.next_motion(drawn)];
         let excitation = next.excitation.clone();
         let sensors = SensorConfig::default();
-        let simulation =
-            Simulation::run_once(Scenario { excitation, sensors, ..scenario.clone() })?;
+        let simulation = Simulation::run(Scenario { excitation, sensors, ..scenario.clone() })?;
         Ok(Some(simulation.recording))
     }
 

@@ -160,7 +160,7 @@ pub(super) fn draw(benchmark: &Benchmark, trial: u64) -> Result<Drawn, BlindErro
     case.against_simulation = case.hidden.iter().any(|h| h.judged == Judged::Simulation);
     let effects = case.hidden.iter().map(|h| h.effect.clone()).collect();
     let scenario = Scenario { effects, ..scenario };
-    let simulation = Simulation::run_once(scenario)?;
+    let simulation = Simulation::run(scenario)?;
     let size = simulation.size_beside(&benchmark.clean[motion])?;
     case.sqrt_lambda = size.lambda.sqrt();
     case.sqrt_lambda_sim = size.lambda_sim.sqrt();
@@ -297,7 +297,7 @@ impl Maker<'_> {
             ..self.scenario.clone()
         };
         let clean = &self.benchmark.clean[self.motion];
-        let size = Simulation::run_once(scenario)?.size_beside(clean)?;
+        let size = Simulation::run(scenario)?.size_beside(clean)?;
         Ok(strength(judged, size).map(|s| s * times.sqrt()))
     }
 }

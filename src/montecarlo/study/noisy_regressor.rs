@@ -33,12 +33,13 @@
 //! g_i = jA* [Σ_j w_j² (G_x X̄)_j (D_iθ)_j] + L [w_i² (G_x X̄)_i (rv_i + rc_i E[1 − tanh²]/ε)]
 //! ```
 
+use fourier::Complex64;
 use nalgebra::{DMatrix, DVector};
-use realfft::num_complex::Complex64;
 
 use super::noisy_friction::NoisyFriction;
 use super::periodic::Periodic;
 use crate::base::BaseSet;
+use crate::dot::dot;
 use crate::dynamics::{Model, Motion};
 use crate::identify::{Assembler, ColumnPlan, Problem};
 use crate::robot::JointSignals;
@@ -333,10 +334,6 @@ fn product(joint: &[(usize, Vec<f64>)], theta: &[f64], samples: usize) -> Vec<f6
         sum.iter_mut().zip(column).for_each(|(s, x)| *s += theta[*base] * x);
     }
     sum
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Inverse of a symmetric positive definite matrix, scaled to a unit diagonal first; NaN where it is none.

@@ -1,8 +1,7 @@
 //! Series of one period behind a filter of known response.
 
-use realfft::num_complex::Complex64;
-
 use crate::signal::FineClock;
+use fourier::Complex64;
 
 /// Series with one number of samples.
 pub(super) struct Periodic {
