@@ -1,8 +1,9 @@
 //! The sum of products, ⟨a, b⟩ = Σ aₖ bₖ.
 
-/// ⟨a, b⟩ in sixteen interleaved partial sums, which the compiler can keep in registers: a fixed order, hence fixed bits.
+/// ⟨a, b⟩ of as many values in sixteen interleaved partial sums, which the compiler can keep in registers: a fixed order, hence fixed bits.
 #[inline(always)]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    debug_assert_eq!(a.len(), b.len());
     const WAYS: usize = 16;
     let mut partial = [0.0; WAYS];
     let (a_whole, a_rest) = a.as_chunks::<WAYS>();

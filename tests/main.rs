@@ -44,3 +44,18 @@ mod val_replay;
 mod val_signal;
 mod val_ur10e;
 mod val_urdf;
+
+/// A file that is not named above would never be compiled.
+#[test]
+fn every_file_is_a_part_of_this_program() {
+    let parts = include_str!("main.rs");
+    for file in std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/tests")).unwrap() {
+        let path = file.unwrap().path();
+        let name = path.file_stem().unwrap().to_str().unwrap();
+        let is_source = path.is_dir() || path.extension().is_some_and(|end| end == "rs");
+        assert!(
+            !is_source || name == "main" || parts.contains(&format!("mod {name};\n")),
+            "{name}"
+        );
+    }
+}

@@ -47,8 +47,12 @@ fn hide(trajectory: &str, effects: &str, seed: u64) -> Hidden {
     let config = PlantConfig::default();
     let plant = FaultyPlant::new(&scenario.arm, &scenario.effects, &config).unwrap();
     let known = LEAD + PERIOD;
-    let truth =
-        plant.run(&periodic, None).unwrap().repeated(known, PERIOD, LEAD + PERIODS * PERIOD);
+    let truth = plant.run(&periodic, None).unwrap().repeated(
+        known,
+        PERIOD,
+        LEAD + PERIODS * PERIOD,
+        RATE_HZ,
+    );
     let sensors = SensorConfig {
         torque_sd_nm: PerJoint::Each(SIGMA_NM.to_vec()),
         q_sd_rad: PerJoint::All(2e-5),

@@ -162,7 +162,7 @@ fn log(arm: &Arm, effects: &[faults::Effect]) -> Recording {
     let reference = Periodic { series, lead_s: lead as f64 / 125.0, periods };
     let plant = FaultyPlant::new(arm, effects, &PlantConfig::default()).unwrap();
     let run = plant.run(&reference, None).unwrap();
-    run.repeated(lead + periods * PERIOD, PERIOD, lead + PERIODS * PERIOD)
+    run.repeated(lead + periods * PERIOD, PERIOD, lead + PERIODS * PERIOD, 125.0)
 }
 
 const NO_SHAPE: (usize, f64) = (0, 0.0);

@@ -69,7 +69,7 @@ pub fn exit_code(result: CommandResult) -> ExitCode {
 /// What takes its time in the beginning.
 fn simulating(scenario: &Scenario) -> String {
     let duration_s = scenario.excitation.duration_s();
-    format!("simulating {duration_s:.0} s of {} in rapier …", scenario.arm.name)
+    format!("simulating a log of {duration_s:.0} s of {} in rapier …", scenario.arm.name)
 }
 
 /// Threads asked for, or one per core.

@@ -37,6 +37,7 @@ pub struct EffectSize {
 
 /// Rows eliminated together.
 const BLOCK: usize = 128;
+
 impl Simulation {
     /// λ and λ_sim of all effects of the scenario together.
     ///

@@ -28,7 +28,7 @@ impl Simulation {
         let excitation = &scenario.excitation;
         let run = |reference: &dyn Reference| plant.run(reference, None);
         let recording = match scenario.effects.iter().all(Effect::repeats) {
-            true => run_repeating(excitation, scenario.plant.log_rate_hz, run)?,
+            true => run_repeating(excitation, &scenario.plant, run)?,
             false => run(excitation)?,
         };
         Self::with_recording(scenario, plant, recording)

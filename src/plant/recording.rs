@@ -38,12 +38,11 @@ pub struct Readings {
 impl Recording {
     /// The same run gone on to `samples` rows: each row beyond the first `known` is the row of one
     /// period (`period` rows) before.
-    pub fn repeated(&self, known: usize, period: usize, samples: usize) -> Self {
+    pub fn repeated(&self, known: usize, period: usize, samples: usize, log_rate_hz: f64) -> Self {
         let signals = |s: &JointSignals| repeated(s, known, period, samples);
-        let step_s = self.time_s[known - 1] / (known - 1) as f64;
         Self {
             time_s: (0..samples)
-                .map(|k| if k < known { self.time_s[k] } else { k as f64 * step_s })
+                .map(|k| if k < known { self.time_s[k] } else { k as f64 / log_rate_hz })
                 .collect(),
             q_rad: signals(&self.q_rad),
             qd_rad_s: signals(&self.qd_rad_s),

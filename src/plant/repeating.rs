@@ -1,37 +1,62 @@
 //! Runs of a motion that repeats, of which little more than one period is integrated.
 
-use super::{PlantError, Recording};
+use super::{PlantConfig, PlantError, Recording};
 use crate::excitation::{Excitation, Reference};
 
-/// Time after the run-in in which an arm forgets how it started, s: the slowest to forget is a soft gear
-/// (8000 Nm/rad, 5 % damping: it swings on with exp(−3.5 t)).
+/// Time after the run-in in which most arms forget how they started, s. Soft gears that hardly damp do not, which
+/// [`has_forgotten`] sees.
 const SETTLING_S: f64 = 2.0;
 /// The last rows of a run may lack what comes after them (a channel that is read late), by at most the
 /// longest delay there is, s.
 const UNSETTLED_END_S: f64 = 0.5;
+/// Time before the end of what is settled that is compared with the same a period earlier, s: two swings of a gear at 4 Hz.
+const COMPARED_S: f64 = 0.5;
+/// What of its largest value a signal may still owe to the start: of 100 Nm a five-hundredth of a torque sensor's usual noise, of
+/// 2 rad/s a twenty-fifth of an encoder's.
+const FORGOTTEN: f64 = 2e-5;
 
-/// The recording of an arm that follows `excitation`, its beginning made by `run`: what the log of `log_rate_hz` shows when the arm has
-/// forgotten how it started repeats from then on, and is copied. For arms in which nothing drifts. Where a period is no whole number
-/// of rows, or is the only one, `run` is asked for all of it.
+/// The recording of an arm that follows `excitation`, made by `run`: what its log shows when the arm has forgotten how it started repeats
+/// from then on, and is copied. For arms in which nothing drifts. `run` is asked for all of the motion where that saves nothing, where
+/// its period is not a whole number of rows and of the controller's decisions, and where the arm has not forgotten its start in time.
 ///
 /// # Errors
 /// Those of `run`.
 pub fn run_repeating(
     excitation: &Excitation,
-    log_rate_hz: f64,
-    run: impl FnOnce(&dyn Reference) -> Result<Recording, PlantError>,
+    config: &PlantConfig,
+    mut run: impl FnMut(&dyn Reference) -> Result<Recording, PlantError>,
 ) -> Result<Recording, PlantError> {
     let period_s = excitation.series().period_s;
-    let rows = period_s * log_rate_hz;
-    if excitation.periods() == 1 || (rows - rows.round()).abs() > 1e-6 {
+    let is_whole = |rate_hz: f64| {
+        let count = period_s * rate_hz;
+        (count - count.round()).abs() < 1e-6
+    };
+    let [begin_s, end_s] = excitation.periodic_window_s();
+    let duration_s = begin_s + period_s + SETTLING_S + UNSETTLED_END_S;
+    let is_worth_it = duration_s < end_s && end_s == excitation.duration_s();
+    if !is_worth_it || !is_whole(config.log_rate_hz) || !is_whole(config.control_rate_hz) {
         return run(excitation);
     }
-    let begin_s = excitation.periodic_window_s()[0];
-    let duration_s = begin_s + period_s + SETTLING_S + UNSETTLED_END_S;
+    let rows = |time_s: f64| (time_s * config.log_rate_hz).round() as usize;
     let begun = run(&Begin { of: excitation, duration_s })?;
-    let samples = (excitation.duration_s() * log_rate_hz + 1e-6).floor() as usize + 1;
-    let known = begun.time_s.len() - (UNSETTLED_END_S * log_rate_hz).ceil() as usize;
-    Ok(begun.repeated(known, rows.round() as usize, samples))
+    let known = begun.time_s.len() - rows(UNSETTLED_END_S);
+    if !has_forgotten(&begun, known, rows(period_s), rows(COMPARED_S)) {
+        return run(excitation);
+    }
+    let samples = (excitation.duration_s() * config.log_rate_hz + 1e-6).floor() as usize + 1;
+    Ok(begun.repeated(known, rows(period_s), samples, config.log_rate_hz))
+}
+
+/// Whether the last `compared` rows of the first `known` are those of one `period` before.
+fn has_forgotten(begun: &Recording, known: usize, period: usize, compared: usize) -> bool {
+    [&begun.q_rad, &begun.qd_rad_s, &begun.torque_nm].into_iter().all(|signals| {
+        (0..signals.joints()).all(|j| {
+            let y = &signals.joint(j)[..known];
+            let most = y.iter().fold(0.0f64, |most, y| most.max(y.abs()));
+            let first = known - compared.min(known - period);
+            (first..known).all(|k| (y[k] - y[k - period]).abs() <= FORGOTTEN * most)
+        })
+    })
 }
 
 /// The beginning of a motion.

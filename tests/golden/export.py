@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What Pinocchio and MuJoCo say about exported arms.
 
-    ARMID_UPDATE=1 cargo test val_export::the_files      # writes exported_<arm>.urdf and .xml
+    ARMID_UPDATE=1 cargo test val_export::the_files            # writes exported_<arm>.urdf and .xml
     python3 tests/golden/export.py                             # needs: pip install pin mujoco numpy
 
 loads the files and writes `export.bin`, little-endian, N = 6 joints, S = 1000 states, no padding:

@@ -112,7 +112,7 @@ impl Hidden {
             Plant::with_drivetrain(&arm, &arm, &[self.fed_forward; 6], Box::new(law), &config)
                 .unwrap();
         let mut recording =
-            run_repeating(&excitation, log_rate_hz, |begin| plant.run(begin, None)).unwrap();
+            run_repeating(&excitation, &config, |begin| plant.run(begin, None)).unwrap();
         if let Law::CutBeforeNoise { share } = self.law {
             let torque = recording.torque_nm.joint_mut(self.joint);
             let limit = share * torque.iter().fold(0.0f64, |most, t| most.max(t.abs()));

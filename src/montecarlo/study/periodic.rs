@@ -1,7 +1,8 @@
 //! Series of one period behind a filter of known response.
 
-use crate::signal::FineClock;
 use fourier::Complex64;
+
+use crate::signal::FineClock;
 
 /// Series with one number of samples.
 pub(super) struct Periodic {
