@@ -83,6 +83,11 @@ impl Scenario {
             }
             other => other,
         }?;
+        // Its periods begin with a row, as those of the log do.
+        let rate_hz = simulation.plant.log_rate_hz;
+        let run_in_rows = (excitation.run_in_s() * rate_hz - 1e-6).ceil();
+        let series = excitation.series().clone();
+        let excitation = Excitation::new(series, run_in_rows / rate_hz, scene.periods)?;
         let (effects, further) = (&simulation.effects, &simulation.of_the_record);
         let effects = simulation.extended.offsets.iter().chain(effects).chain(further);
         let mut scenario = Self {
