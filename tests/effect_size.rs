@@ -82,8 +82,8 @@ fn a_log_that_repeats_need_not_be_integrated() {
         let angle = worst(|run| &run.q_rad, j) / 2e-5;
         let velocity = worst(|run| &run.qd_rad_s, j) / 1e-3;
         println!("joint {}: {torque:.2e}, {angle:.2e} and {velocity:.2e} σ", j + 1);
-        // Ten thousand samples off by a hundredth of the noise are a λ of 1. Angles are compared where they begin, their noise is the least.
-        assert!(torque < 0.01 && velocity < 0.05 && angle < 0.5, "joint {}", j + 1);
+        // Ten thousand samples off by a hundredth of the noise are a λ of 1.
+        assert!(torque.max(angle).max(velocity) < 0.01, "joint {}", j + 1);
     }
     let [of_whole, of_copied] = [&whole, &copied].map(|s| s.effect_size().unwrap().lambda);
     assert!((of_copied / of_whole - 1.0).abs() < 0.01, "{of_copied} {of_whole}");

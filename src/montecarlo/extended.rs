@@ -70,24 +70,15 @@ impl Scenario {
             FourierSeries::of_period(&scene.motion.q_rad, scene.rate_hz, processing.cutoff_hz)?;
         let arm = simulation.extended.arm.clone();
         // The log does not tell how its motion was begun.
-        let fitted = Excitation::fitted(
-            &arm,
-            &Requirements::default(),
-            series.clone(),
-            scene.periods,
-            false,
-        );
-        let excitation = match fitted {
-            Err(ExcitationError::NoRunIn { .. }) => {
-                Excitation::new(series, RUN_IN_S, scene.periods)
-            }
-            other => other,
-        }?;
+        let requirements = Requirements::default();
+        let run_in_s = match Excitation::fitted(&arm, &requirements, series.clone(), 1, false) {
+            Err(ExcitationError::NoRunIn { .. }) => RUN_IN_S,
+            fitted => fitted?.run_in_s(),
+        };
         // Its periods begin with a row, as those of the log do.
         let rate_hz = simulation.plant.log_rate_hz;
-        let run_in_rows = (excitation.run_in_s() * rate_hz - 1e-6).ceil();
-        let series = excitation.series().clone();
-        let excitation = Excitation::new(series, run_in_rows / rate_hz, scene.periods)?;
+        let run_in_s = (run_in_s * rate_hz - 1e-6).ceil() / rate_hz;
+        let excitation = Excitation::new(series, run_in_s, scene.periods)?;
         let (effects, further) = (&simulation.effects, &simulation.of_the_record);
         let effects = simulation.extended.offsets.iter().chain(effects).chain(further);
         let mut scenario = Self {

@@ -11,9 +11,9 @@ const SETTLING_S: f64 = 2.0;
 const UNSETTLED_END_S: f64 = 0.5;
 /// Time before the end of what is settled that is compared with the same a period earlier, s: two swings of a gear at 4 Hz.
 const COMPARED_S: f64 = 0.5;
-/// What of its largest value a signal may still owe to the start: of 100 Nm a five-hundredth of a torque sensor's usual noise, of
-/// 2 rad/s a twenty-fifth of an encoder's.
-const FORGOTTEN: f64 = 2e-5;
+/// What of its largest value a signal may still owe to the start. Of 3 rad, 2 rad/s and 100 Nm it is a seventieth, a five-thousandth and a
+/// hundred-thousandth of the usual noise (2e-5 rad, 1e-3 rad/s, 1 Nm).
+const FORGOTTEN: f64 = 1e-7;
 
 /// The recording of an arm that follows `excitation`, made by `run`: what its log shows when the arm has forgotten how it started repeats
 /// from then on, and is copied. For arms in which nothing drifts. `run` is asked for all of the motion where that saves nothing, where
