@@ -78,7 +78,8 @@ fn stiff_presliding_in_a_fast_log() {
 
 /// The same in samples at 125 Hz, told by what the drive gives while the joint turns round, whatever share of friction it feeds
 /// forward and whatever offset its velocities have. Of the drive the bandwidth of its feedback is guessed, which moves the
-/// stiffness by 2 % at most, and noise a thirtieth of the usual by less than a thousandth. (With less of it what is approximate in every other law counts as well, which takes longer.)
+/// stiffness by 2 % at most, and noise a thirtieth of the usual by less than a thousandth. (With less of it what is
+/// approximate in every other law counts as well, which takes longer.)
 #[test]
 fn stiff_presliding_behind_a_drive_that_feeds_friction() {
     let hidden = || Hidden::on(3, Law::Dahl { stiffness_per_rad: 10_000.0 }).with_noise(0.03);
