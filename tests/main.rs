@@ -9,6 +9,7 @@ mod blind_benchmark;
 mod blind_changes;
 mod blind_families;
 mod blind_records;
+mod blind_single_runs;
 mod cli_diagnose;
 mod cli_excite;
 mod cli_formats;

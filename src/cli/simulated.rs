@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use nalgebra::{DMatrix, DVector};
 use serde::Deserialize;
 
 use super::robot::SavedRobot;
@@ -17,6 +18,8 @@ use crate::robot::{Arm, Kinematics};
 pub(super) struct Simulated {
     /// Base parameters.
     theta: Vec<f64>,
+    /// Their covariance, where they were identified.
+    covariance: Option<DMatrix<f64>>,
     /// Why they are doubtful, if they are.
     doubt: Option<String>,
     /// What else should be known of it.
@@ -43,6 +46,7 @@ impl Simulated {
             let has_effects = !scenario.effects.is_empty();
             return Ok(Self {
                 doubt: None,
+                covariance: None,
                 theta: set.values(&Model::new(&scenario.arm).standard_parameters()),
                 warning: has_effects.then(|| {
                     format!("{name}: its arm alone is compared with, not its [[effect]] tables")
@@ -73,18 +77,50 @@ impl Simulated {
         } else {
             None
         };
-        let parameter = |k: usize| {
+        let place = |k: usize| {
             let parameter = set.name(k);
-            let found = result.base_parameters.iter().find(|p| p.name == parameter);
-            found.map(|p| p.value).ok_or_else(|| format!("{name}: no base parameter {parameter}"))
+            let found = result.base_parameters.iter().position(|p| p.name == parameter);
+            found.ok_or_else(|| format!("{name}: no base parameter {parameter}"))
         };
-        let theta = (0..set.rank()).map(parameter).collect::<Result<_, _>>()?;
-        Ok(Self { theta, doubt, warning: None })
+        let places: Vec<usize> = (0..set.rank()).map(place).collect::<Result<_, _>>()?;
+        let (covariance, warning) = match &result.base_covariance {
+            Some(rows) => {
+                let entry = |i: usize, k: usize| rows.get(i).and_then(|row| row.get(k)).copied();
+                let is_whole =
+                    places.iter().all(|&i| places.iter().all(|&k| entry(i, k).is_some()));
+                if !is_whole {
+                    let count = result.base_parameters.len();
+                    return Err(format!("{name}: base_covariance is not {count} × {count}").into());
+                }
+                let entry = |i, k| entry(places[i], places[k]).unwrap_or(0.0);
+                (DMatrix::from_fn(places.len(), places.len(), entry), None)
+            }
+            None => {
+                let sigma = |&place: &usize| {
+                    let IdentifiedParameter { name: parameter, sigma, .. } =
+                        &result.base_parameters[place];
+                    sigma.ok_or_else(|| format!("{name}: no sigma of {parameter}"))
+                };
+                let sigma: Vec<f64> = places.iter().map(sigma).collect::<Result<_, _>>()?;
+                let warning = format!(
+                    "{name}: it has σ but no covariance of the base parameters (base_covariance), as results of older programs; \
+                     small changes are not told until it is identified again"
+                );
+                let variance = DVector::from_iterator(sigma.len(), sigma.iter().map(|s| s * s));
+                (DMatrix::from_diagonal(&variance), Some(warning))
+            }
+        };
+        let theta = places.iter().map(|&k| result.base_parameters[k].value).collect();
+        Ok(Self { theta, covariance: Some(covariance), doubt, warning })
     }
 
     /// What a diagnosis compares with.
     pub(super) fn nominal(&self) -> Nominal<'_> {
-        Nominal { theta: &self.theta, doubt: self.doubt.as_deref() }
+        Nominal {
+            theta: &self.theta,
+            covariance: self.covariance.as_ref(),
+            doubt: self.doubt.as_deref(),
+        }
     }
 }
 
@@ -107,6 +143,7 @@ struct IdentifiedParameters {
     #[serde(default)]
     verdict: String,
     base_parameters: Vec<IdentifiedParameter>,
+    base_covariance: Option<Vec<Vec<f64>>>,
     #[serde(default)]
     intervals: Intervals,
     #[serde(default)]
@@ -133,6 +170,8 @@ struct Intervals {
 struct IdentifiedParameter {
     name: String,
     value: f64,
+    #[serde(default)]
+    sigma: Option<f64>,
 }
 
 #[cfg(test)]

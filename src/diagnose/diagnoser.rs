@@ -144,7 +144,7 @@ impl<'a> Diagnoser<'a> {
         let Extended { mut causes, extension, after_nm, accepted, rest } = model;
         let base_parameters = intervals::base(&study, self.set, &extension);
         let moved_parameters =
-            simulation.map_or(Vec::new(), |s| against::moved(s.theta, &base_parameters));
+            simulation.map_or(Vec::new(), |s| against::moved(s, &base_parameters));
         let is_a_tear = |cause: &mut Cause| {
             let at = |name| cause.parameters.get(name).map_or(f64::NAN, |e| e.value);
             cause.kind == Kind::Contact && is_torn(m, [at("start_s"), at("end_s")])
@@ -157,7 +157,11 @@ impl<'a> Diagnoser<'a> {
             causes.iter().any(|c| c.kind == Kind::ThermalDrift && c.joint == Some(j + 1))
         };
         let can_differ = |j: usize| !is_mended && !drifts(j);
-        let unexplained = misfit::unexplained(&study, &accepted, &rest, lack, can_differ);
+        let has_law = |j: usize| {
+            let is_there = |cause: &Cause| cause.joint.is_none_or(|own| own == j + 1);
+            causes.iter().any(|cause| !cause.kind.is_of_the_record() && is_there(cause))
+        };
+        let unexplained = misfit::unexplained(&study, &accepted, &rest, lack, has_law, can_differ);
         if let Some(unknown) = &unexplained {
             causes.iter_mut().for_each(|cause| cause.make_modest_beside_unknown(unknown.joint));
         }
@@ -275,12 +279,14 @@ impl<'a> Diagnoser<'a> {
             alike: selected.alike(),
         });
         let found: Vec<Found> = found.collect();
-        let mut explained = against::explain(study, self.set, simulation.theta, &found);
-        if simulation.doubt.is_some() {
-            explained.causes.iter_mut().for_each(Cause::make_provisional);
-        }
+        let moved = against::moved(simulation, &intervals::base(study, self.set, &model.extension));
+        let explained = against::explain(study, self.set, (simulation, &moved), &found);
         model.causes.retain(|c| !explained.judged.contains(&(c.kind, c.joint)));
         model.causes.extend(explained.causes);
+        if simulation.doubt.is_some() {
+            // The laws as well: they are what is needed beside the changes.
+            model.causes.iter_mut().for_each(Cause::make_provisional);
+        }
         model.rest = study.residual.clone();
         explained.span.residualise(&mut model.rest);
         model.accepted = explained.span;

@@ -90,7 +90,7 @@ impl Kept<'_, '_> {
             .unzip();
         let confidence = probability_of_class(contender.evidence, &evidences, &alike);
         rivals.truncate(FINALISTS);
-        let left_out_gain = study.left_out_gain(&contender.entry, &own, &residual);
+        let left_out_gain = study.left_out_gain(contender.entry.site, &own, &residual);
         Selected { contender, confidence, class, rivals, left_out_gain }
     }
 }

@@ -39,6 +39,7 @@ mod intervals;
 mod judgement;
 mod kind;
 mod load;
+mod memory;
 mod misfit;
 mod modesty;
 mod noise_power;

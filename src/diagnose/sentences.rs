@@ -1,5 +1,6 @@
 //! What a diagnosis says, in words.
 
+use super::against::MOVED;
 use super::kind::Kind;
 use super::verdict::{Cause, Diagnosis, Estimate, HeldOut, Moved};
 use crate::number::{significant, with_sigma};
@@ -8,8 +9,6 @@ use crate::number::{significant, with_sigma};
 const UNEVEN: f64 = 1.2;
 /// What is less sure than this is said with a "may".
 const EVEN_ODDS: f64 = 0.5;
-/// σ beyond which a parameter differs from a simulation: noise shows one in 300 comparisons of fifty parameters.
-const MOVED: f64 = 4.0;
 /// Times the error along the log from which on the error along another one is none of the same arm.
 const OF_ANOTHER_ARM: f64 = 3.0;
 /// Ends of an interval between which nothing is known.

@@ -50,7 +50,7 @@ impl Kept<'_, '_> {
         contender.evidence > LEAST_EVIDENCE
             && single * study.tests(&contender.entry) < chance::LAW
             && self.is_its_own(&contender.entry, others, residual)
-            && study.generalises(&contender.entry, &span, residual)
+            && study.generalises(site, &span, residual)
     }
 
     /// Whether `contender` is needed beside `other`, which is on another joint, and all causes.

@@ -10,6 +10,7 @@ use super::distinct_shapes::DistinctShapes;
 use super::drives::{self, Answer};
 use super::error::DiagnoseError;
 use super::image::{Column, Image, Span, dot};
+use super::memory::Memory;
 use super::scene::Scene;
 use super::statistic::Statistic;
 use super::whitening::{PeriodWhitening, RunWhitening, Whitening};
@@ -28,6 +29,14 @@ pub struct Entry {
     pub shape: Shape,
     /// Whitened columns, the null model projected out.
     pub images: Vec<Image>,
+}
+
+impl Entry {
+    /// Bytes of its columns.
+    pub fn bytes(&self) -> usize {
+        let rows = self.images.iter().map(|image| image.mean.len() + image.contrast.len());
+        rows.sum::<usize>() * size_of::<f64>()
+    }
 }
 
 /// What an entry explains.
@@ -71,6 +80,8 @@ pub struct Study<'a> {
     pub left_out: Vec<usize>,
     /// Causes that an earlier estimate of the arm has shown.
     shown: Vec<Shown>,
+    /// Entries with other shapes that were worked out.
+    memory: Memory,
 }
 
 /// A family and a site.
@@ -133,7 +144,11 @@ impl<'a> Study<'a> {
         let n = problem.samples;
         let differences = drives::differences(&scene);
         if let Whitening::Periods(periods) = &mut whitening {
-            periods.with_repeating_noise(differences.iter().map(|(_, torque)| torque));
+            periods.with_noise_of_joints(&drives::unknown_pulses(&scene));
+            let of_drives: Vec<Column> =
+                drives::leads(&scene).chain(drives::turns(&scene)).collect();
+            let shares = differences.iter().map(|(_, torque)| torque);
+            periods.with_repeating_noise(shares.chain(&of_drives));
         }
         let columns: Vec<Column> = (0..problem.parameters())
             .map(|base| {
@@ -188,6 +203,7 @@ impl<'a> Study<'a> {
             torque,
             left_out: Vec::new(),
             shown: Vec::new(),
+            memory: Memory::default(),
         })
     }
 
@@ -222,6 +238,7 @@ impl<'a> Study<'a> {
         entries: &[&Entry],
     ) -> Self {
         self.scene = Scene::new(arm, set, theta, &self.regression.prepared);
+        self.memory = Memory::default();
         let shown = |&&Entry { family, site, shape, ref images }: &&Entry| Shown {
             family,
             site,
@@ -290,7 +307,7 @@ impl<'a> Study<'a> {
 
     /// A family's columns, the null model projected out; `None` if it absorbs them.
     pub fn entry(&self, family: usize, site: Option<usize>, shape: Shape) -> Option<Entry> {
-        self.bank(family, site, &[shape]).remove(0)
+        self.memory.entry((family, site, shape), || self.bank(family, site, &[shape]).remove(0))
     }
 
     /// [`Self::entry`] for each of `shapes`.
@@ -395,28 +412,28 @@ impl<'a> Study<'a> {
         })
     }
 
-    /// Share of the mean square of the joint (or all) that `span` of `entry` takes from `residual` in
+    /// Share of the mean square of the joint `site` (or all) that `span` takes from `residual` in
     /// stretches of a single run that were left out of its fit.
-    pub fn left_out_gain(&self, entry: &Entry, span: &Span, residual: &Image) -> Option<f64> {
+    pub fn left_out_gain(&self, site: Option<usize>, span: &Span, residual: &Image) -> Option<f64> {
         let gain = self.statistic.left_out_gain(span, residual)?;
-        let square = self.square(entry, residual);
+        let square = self.square(site, residual);
         (square > 0.0).then(|| gain / square)
     }
 
-    /// Whether what `span` of `entry` explains of `residual` is also explained in stretches of a single run
+    /// Whether what `span` at `site` explains of `residual` is also explained in stretches of a single run
     /// that were left out of its fit, and is not too little to be told from approximate laws beside it. Always
     /// true where noise is known.
-    pub fn generalises(&self, entry: &Entry, span: &Span, residual: &Image) -> bool {
+    pub fn generalises(&self, site: Option<usize>, span: &Span, residual: &Image) -> bool {
         self.statistic.left_out_gain(span, residual).is_none_or(|gain| {
             gain > KEPT_SHARE * span.explained(residual)
-                && gain > LEAST_GAIN * self.square(entry, residual)
+                && gain > LEAST_GAIN * self.square(site, residual)
         })
     }
 
-    /// Square of `residual` on the joint of `entry` (or all) along a single run.
-    fn square(&self, entry: &Entry, residual: &Image) -> f64 {
+    /// Square of `residual` on the joint `site` (or all) along a single run.
+    fn square(&self, site: Option<usize>, residual: &Image) -> f64 {
         let rows = residual.mean.len() / self.scene.joints();
-        let own = entry.site.map_or(0..residual.mean.len(), |j| j * rows..(j + 1) * rows);
+        let own = site.map_or(0..residual.mean.len(), |j| j * rows..(j + 1) * rows);
         dot(&residual.mean[own.clone()], &residual.mean[own])
     }
 

@@ -194,7 +194,7 @@ fn with_arm(study: &Study, step: f64, change: impl Fn(&mut Arm)) -> Column {
 }
 
 /// Σ b_k column_k.
-fn combined(columns: &[Image], b: &[f64]) -> Image {
+pub(super) fn combined(columns: &[Image], b: &[f64]) -> Image {
     let mut sum = columns.first().cloned().unwrap_or_default();
     sum.scale(0.0);
     for (column, &b) in columns.iter().zip(b).filter(|(_, b)| **b != 0.0) {

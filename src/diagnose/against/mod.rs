@@ -1,7 +1,8 @@
 //! A log against a given simulation: which of its parameters moved, and which physical changes moved them.
 //!
 //! Nothing is fitted first: the residual is y − X θ_sim, and a change explains its own torque of it ([`changes`]). Effects that any
-//! fit would absorb stand out here.
+//! fit would absorb stand out here. Where the simulation was identified from a log, θ_sim has the covariance C of that: X C Xᵀ is
+//! noise of the residual like that of the log itself.
 //!
 //! Enters: the study of a log, the base parameters of the simulation, and the effects that were found without it. Leaves: the changes that
 //! explain the difference, as causes, and which parameters moved by how much.
@@ -10,7 +11,8 @@ mod changes;
 
 use std::collections::BTreeMap;
 
-use changes::Change;
+use changes::{Change, combined};
+use nalgebra::DMatrix;
 
 use super::chance;
 use super::extension::Effect;
@@ -20,7 +22,8 @@ use super::judgement::{TELLS_APART, probability_of_class};
 use super::kind::Kind;
 use super::significance::LEAST_EVIDENCE;
 use super::study::{Entry, Study};
-use super::verdict::{BaseParameter, Cause, Moved, Rival};
+use super::verdict::{BaseParameter, Cause, Estimate, Moved, Rival};
+use super::whitening::RepeatingNoise;
 use crate::base::BaseSet;
 
 /// Changes at most.
@@ -29,11 +32,16 @@ const MOST_CHANGES: usize = 8;
 const ROUNDS: usize = 2 * MOST_CHANGES;
 /// Alternatives that are reported.
 const RIVALS: usize = 5;
+/// σ beyond which a parameter differs from a simulation: noise shows one in 300 comparisons of fifty parameters.
+pub const MOVED: f64 = 4.0;
+
 /// The simulation that a log is compared with.
 #[derive(Debug, Clone, Copy)]
 pub struct Nominal<'a> {
     /// Its base parameters.
     pub theta: &'a [f64],
+    /// Their covariance, where they were identified.
+    pub covariance: Option<&'a DMatrix<f64>>,
     /// What is said first where these were identified along a log which the model does not explain: what differs from them may
     /// have been wrong there, and no change is sure.
     pub doubt: Option<&'a str>,
@@ -42,22 +50,20 @@ pub struct Nominal<'a> {
 impl<'a> Nominal<'a> {
     /// A simulation that is as it says.
     pub fn certain(theta: &'a [f64]) -> Self {
-        Self { theta, doubt: None }
+        Self { theta, covariance: None, doubt: None }
     }
 }
 
 /// Every base parameter in the simulation and in the data, beside the causes that were found in these.
-pub fn moved(simulation: &[f64], data: &[BaseParameter]) -> Vec<Moved> {
-    let pairs = simulation.iter().zip(data);
-    pairs
-        .map(|(&simulation, data)| Moved {
-            name: data.name.clone(),
-            simulation,
-            data: data.value,
-            sigma: data.sigma,
-            z: (data.value - simulation) / data.sigma,
-        })
-        .collect()
+pub fn moved(simulation: Nominal, data: &[BaseParameter]) -> Vec<Moved> {
+    let of_parameter = |(k, data): (usize, &BaseParameter)| {
+        let variance = simulation.covariance.map_or(0.0, |covariance| covariance[(k, k)]);
+        let sigma = data.sigma.hypot(variance.sqrt());
+        let simulation = simulation.theta[k];
+        let z = (data.value - simulation) / sigma;
+        Moved { name: data.name.clone(), simulation, data: data.value, sigma, z }
+    };
+    data.iter().enumerate().map(of_parameter).collect()
 }
 
 /// An effect that was found beside the null model.
@@ -79,10 +85,43 @@ struct Beside<'a> {
 }
 
 impl<'a> Beside<'a> {
-    fn new(study: &Study, found: &Found<'a>) -> Self {
+    fn new(study: &Study, found: &Found<'a>, unknown: &Unknown) -> Self {
         let mut room = tangents(study, found.effect);
         room.extend(found.alike.iter().flat_map(|entry| study.whole_images(entry)));
-        Self { entry: found.entry, room }
+        Self { entry: found.entry, room: unknown.whitened(room) }
+    }
+}
+
+/// What is not known of the simulation, as noise of its residual.
+struct Unknown(Option<RepeatingNoise>);
+
+impl Unknown {
+    /// Of a simulation whose base parameters have the `covariance`, whose roots times the null model's columns are torques of
+    /// standard deviation one.
+    fn new(study: &Study, covariance: Option<&DMatrix<f64>>) -> Self {
+        let noise = covariance.map(|covariance| {
+            let parts = covariance.clone().symmetric_eigen();
+            // What rounding makes of zero.
+            let roots = parts.eigenvalues.map(|variance| variance.max(0.0).sqrt());
+            let torque = |(direction, root): (nalgebra::DVectorView<f64>, &f64)| {
+                let coefficients: Vec<f64> = direction.iter().map(|d| root * d).collect();
+                combined(&study.null_columns, &coefficients)
+            };
+            let columns = parts.eigenvectors.column_iter().zip(&roots);
+            RepeatingNoise::new(&columns.map(torque).collect::<Vec<_>>())
+        });
+        Self(noise)
+    }
+
+    /// `image` where this noise is white as well.
+    fn whiten(&self, image: &mut Image) {
+        self.0.iter().for_each(|noise| noise.whiten(&mut image.mean));
+    }
+
+    /// [`Self::whiten`] of all.
+    fn whitened(&self, mut images: Vec<Image>) -> Vec<Image> {
+        images.iter_mut().for_each(|image| self.whiten(image));
+        images
     }
 }
 
@@ -97,32 +136,52 @@ pub struct Explained {
     pub span: Span,
 }
 
-/// The changes that explain how the data differ from the simulation. `accepted` are effects that were found
-/// beside the null model.
-pub fn explain(study: &Study, set: &BaseSet, simulation: &[f64], accepted: &[Found]) -> Explained {
+/// The changes that explain how the data differ from the simulation, whose base parameters have `moved`. `accepted` are effects
+/// that were found beside the null model.
+///
+/// Of a simulation that was identified, what a fit would absorb is no change where no single base parameter has moved: their σ are
+/// what Monte Carlo runs confirm, and some of their combinations are told fifty times better than any of them, by less than
+/// what logs of two rates or two drives differ by.
+pub fn explain(
+    study: &Study,
+    set: &BaseSet,
+    (simulation, moved): (Nominal, &[Moved]),
+    accepted: &[Found],
+) -> Explained {
+    let Nominal { theta, covariance, .. } = simulation;
+    let unknown = Unknown::new(study, covariance);
     let mut residual = study.torque.clone();
-    for (column, theta) in study.null_columns.iter().zip(simulation) {
+    for (column, theta) in study.null_columns.iter().zip(theta) {
         residual.add(-theta, column);
     }
-    let changes = changes::all(study, set, simulation);
+    unknown.whiten(&mut residual);
+    let mut changes = changes::all(study, set, theta);
+    if covariance.is_some() && !moved.iter().any(|m| m.z.abs() > MOVED) {
+        let is_seen = |image: &Image| study.outside_null(image.clone()).is_some();
+        changes.retain(|change| change.images.iter().any(is_seen));
+    }
+    let images = changes.iter().map(|change| unknown.whitened(change.images.clone())).collect();
     let is_change = |entry: &Entry| {
         let place = (study.families[entry.family].kind(), entry.site);
         changes.iter().any(|c| (c.kind, c.site) == place)
     };
     let is_beside = |found: &&Found| !is_change(found.entry);
-    let mut beside: Vec<Beside> =
-        accepted.iter().filter(is_beside).map(|found| Beside::new(study, found)).collect();
+    let mut beside: Vec<Beside> = accepted
+        .iter()
+        .filter(is_beside)
+        .map(|found| Beside::new(study, found, &unknown))
+        .collect();
     let place = |c: &Change| (c.kind, c.site.map(|j| j + 1));
     let mut judged: Vec<(Kind, Option<usize>)> = changes.iter().map(place).collect();
     let places = places(&changes);
-    let nuisance = nuisance(study, beside.iter());
-    let mut search = Search { study, changes, places, nuisance, residual };
+    let nuisance = nuisance(study, &unknown, beside.iter());
+    let mut search = Search { study, changes, images, places, unknown, nuisance, residual };
     let mut taken = search.select();
     // What the null model could not absorb of a change may have been taken for an effect.
     while let Some(needless) = (0..beside.len()).find(|&e| !search.needs(e, &beside, &taken)) {
         let entry = beside.remove(needless).entry;
         judged.push((study.families[entry.family].kind(), entry.site.map(|j| j + 1)));
-        search.nuisance = self::nuisance(study, beside.iter());
+        search.nuisance = self::nuisance(study, &search.unknown, beside.iter());
         taken = search.select();
     }
     let mut span = study.span_of_all(&beside.iter().map(|b| b.entry).collect::<Vec<_>>());
@@ -136,7 +195,11 @@ pub fn explain(study: &Study, set: &BaseSet, simulation: &[f64], accepted: &[Fou
 
 /// What the residual of a simulation holds beside changes: the effects `beside` with their room, and how drives answer friction,
 /// which no simulation says.
-fn nuisance<'a>(study: &Study, beside: impl Iterator<Item = &'a Beside<'a>>) -> Span {
+fn nuisance<'a>(
+    study: &Study,
+    unknown: &Unknown,
+    beside: impl Iterator<Item = &'a Beside<'a>>,
+) -> Span {
     let mut span = Span::default();
     let mut entries = Vec::new();
     for Beside { entry, room } in beside {
@@ -145,8 +208,10 @@ fn nuisance<'a>(study: &Study, beside: impl Iterator<Item = &'a Beside<'a>>) -> 
             span.push(image);
         }
     }
-    for image in study.blurred_shares(&entries).chain(&study.null_columns[study.base_count()..]) {
-        span.push(image);
+    let answers = &study.null_columns[study.base_count()..];
+    let of_drives = study.blurred_shares(&entries).chain(answers).cloned().collect();
+    for image in unknown.whitened(of_drives) {
+        span.push(&image);
     }
     span
 }
@@ -154,8 +219,11 @@ fn nuisance<'a>(study: &Study, beside: impl Iterator<Item = &'a Beside<'a>>) -> 
 struct Search<'a> {
     study: &'a Study<'a>,
     changes: Vec<Change<'a>>,
+    /// Of each change, where what is not known of the simulation is white.
+    images: Vec<Vec<Image>>,
     /// See [`places`].
     places: Vec<f64>,
+    unknown: Unknown,
     nuisance: Span,
     residual: Image,
 }
@@ -204,9 +272,9 @@ impl Search<'_> {
         if taken.is_empty() || alike.count() > 1 {
             return true;
         }
-        let others = nuisance(study, beside[..e].iter().chain(&beside[e + 1..]));
+        let others = nuisance(study, &self.unknown, beside[..e].iter().chain(&beside[e + 1..]));
         let (others, rest) = self.outside_of(others, taken);
-        let span = Span::outside(&others, &study.whole_images(entry));
+        let span = Span::outside(&others, &self.unknown.whitened(study.whole_images(entry)));
         let gain = study.statistic.gain(&span, &rest);
         let probability = study.statistic.probability(&span, &rest) * study.tests(entry);
         gain - study.price(entry) > LEAST_EVIDENCE && probability < chance::LAW
@@ -220,7 +288,7 @@ impl Search<'_> {
             .filter(|c| !taken.contains(c))
             .map(|c| {
                 let site = self.changes[c].site;
-                let span = Span::outside(&others, &self.changes[c].images);
+                let span = Span::outside(&others, &self.images[c]);
                 let price = study.statistic.coefficients_price(span.len(), site)
                     + 2.0 * self.places[c].ln();
                 Scored {
@@ -241,7 +309,7 @@ impl Search<'_> {
 
     /// The same of the changes `taken` and `span`.
     fn outside_of(&self, mut span: Span, taken: &[usize]) -> (Span, Image) {
-        for image in taken.iter().flat_map(|&c| &self.changes[c].images) {
+        for image in taken.iter().flat_map(|&c| &self.images[c]) {
             span.push(image);
         }
         let mut rest = self.residual.clone();
@@ -255,7 +323,7 @@ impl Search<'_> {
         let change = &self.changes[taken[index]];
         let rest = without(taken, index);
         let (others, left) = self.outside(&rest);
-        let (span, places) = Span::telling(&others, &change.images);
+        let (span, places) = Span::telling(&others, &self.images[taken[index]]);
         let b = span.solve(&left);
         let covariance = study.statistic.covariance(&span, &left);
         let scored = self.scored(&rest);
@@ -268,7 +336,7 @@ impl Search<'_> {
         let scale = study.statistic.lambda(&span, &left, gain) / size.max(f64::MIN_POSITIVE);
         let rivals: Vec<&Scored> = scored.iter().filter(|s| s.change != taken[index]).collect();
         let is_alike = |s: &&Scored| {
-            let span = Span::outside(&others, &self.changes[s.change].images);
+            let span = Span::outside(&others, &self.images[s.change]);
             scale * (size - span.explained(&signal)) < TELLS_APART
         };
         let alike: Vec<bool> = rivals.iter().map(is_alike).collect();
@@ -287,17 +355,20 @@ impl Search<'_> {
             joint: self.changes[s.change].site.map(|j| j + 1),
             evidence_behind: evidence - s.evidence,
         });
+        let parameters = change.estimates((&b, &places), &covariance, quantile);
+        let holds_none = |e: &Estimate| e.ci95[0] <= 0.0 && 0.0 <= e.ci95[1];
         Cause {
             kind: change.kind,
             joint: change.site.map(|j| j + 1),
             separating_experiment: (!class.is_empty()).then(|| change.separating_experiment()),
             class,
             confidence: probability_of_class(evidence, &evidences, &alike),
-            parameters: change.estimates((&b, &places), &covariance, quantile),
+            may_be_none: change.kind == Kind::Payload
+                && parameters.get("mass_kg").is_some_and(holds_none),
+            parameters,
             gain_fraction: None,
             strength: study.statistic.lambda(&span, &left, gain).max(0.0).sqrt(),
             in_words: change.in_words.to_owned(),
-            may_be_none: false,
             rivals: behind.collect(),
         }
     }

@@ -42,6 +42,10 @@ impl Candidate for FeedForward {
         share_less.abs() < ALL
     }
 
+    fn is_its_own(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> bool {
+        b[0].abs() <= ALL
+    }
+
     fn in_words(&self) -> &'static str {
         "a drive that feeds another share of its friction forward than the others"
     }

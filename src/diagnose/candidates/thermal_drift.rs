@@ -7,17 +7,23 @@ use super::*;
 /// See the module.
 pub struct ThermalDrift;
 
+/// Time constants this close to the fastest are not told from it.
+const TOLD: f64 = 1.02;
+
+/// The fastest time constant, s.
+fn fastest_s(scene: &Scene) -> f64 {
+    scene.duration_s() / if scene.periodic { 20.0 } else { 8.0 }
+}
+
 impl Candidate for ThermalDrift {
     fn kind(&self) -> Kind {
         Kind::ThermalDrift
     }
 
     fn shapes(&self, scene: &Scene, _: Option<usize>) -> Vec<Shape> {
-        // Slower than ten records the drift is a straight line in time. What ends early in a single run
-        // may be anything that happened once.
-        let record = scene.duration_s();
-        let fastest = if scene.periodic { record / 20.0 } else { record / 2.0 };
-        geometric(fastest, 5.0 * record, 5).map(|value| Shape { variant: 0, value }).collect()
+        // Slower than ten records the drift is a straight line in time.
+        let slowest = 5.0 * scene.duration_s();
+        geometric(fastest_s(scene), slowest, 5).map(|value| Shape { variant: 0, value }).collect()
     }
 
     fn search(&self) -> Search {
@@ -46,6 +52,11 @@ impl Candidate for ThermalDrift {
     /// Friction does not drive, and does not grow fourfold.
     fn is_possible(&self, _: Shape, b: &[f64]) -> bool {
         (-1.0..3.0).contains(&b[0])
+    }
+
+    /// What ends early in a single run may be anything that happened once.
+    fn is_its_own(&self, scene: &Scene, _: Option<usize>, shape: Shape, _: &[f64]) -> bool {
+        scene.periodic || shape.value > TOLD * fastest_s(scene)
     }
 
     fn separating_experiment(&self) -> &'static str {

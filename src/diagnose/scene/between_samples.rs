@@ -113,6 +113,16 @@ impl Scene {
         bends.between_samples(joint, &delivered, width_rad_s, law)
     }
 
+    /// tanh(q̇/ε) of joint `j` at its instants, as it turns round where the drive feeds `fed` times its dry friction forward, 0 or 1.
+    pub fn sign_if_fed(&self, j: usize, fed: usize) -> &[f64] {
+        self.signs_if_fed[j][fed].get_or_init(|| {
+            let epsilon = self.arm.friction_epsilon_rad_s;
+            let sign = |v: f64| self.arm.friction_sign(v);
+            let qd_rad_s = self.turning_rad_s(j, Some(fed as f64), epsilon, sign);
+            qd_rad_s.into_iter().map(sign).collect()
+        })
+    }
+
     /// Change of the velocity of joint `j` within an instant per dry friction that nothing balances, rad/s.
     pub fn kick_rad_s(&self, j: usize) -> &[f64] {
         &self.turning(j).kick_rad_s

@@ -80,6 +80,8 @@ pub struct Scene {
     fine_bending_nm: Vec<OnceLock<[Vec<f64>; 2]>>,
     /// See [`Self::instants`].
     instants: Vec<OnceLock<Instants>>,
+    /// See [`Self::sign_if_fed`].
+    signs_if_fed: Vec<[OnceLock<Vec<f64>>; 2]>,
     /// What the series of samples lacks of bends between them.
     bends: OnceLock<Bends>,
     /// See [`Self::turning`].
@@ -159,6 +161,7 @@ impl Scene {
             fine_jolt_nm: vec![OnceLock::new(); joints],
             fine_bending_nm: vec![OnceLock::new(); joints],
             instants: (0..joints).map(|_| OnceLock::new()).collect(),
+            signs_if_fed: (0..joints).map(|_| Default::default()).collect(),
             bends: OnceLock::new(),
             turnings: (0..joints).map(|_| OnceLock::new()).collect(),
             clock,

@@ -12,6 +12,7 @@ mod run;
 mod steps;
 
 pub use periods::{FLOOR, PeriodWhitening};
+pub use repeating::RepeatingNoise;
 pub use run::RunWhitening;
 
 use super::image::{Column, Image};

@@ -2,6 +2,7 @@
 
 use fourier::Forward;
 use nalgebra::{Complex, DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::coherence::coherence;
 use super::mean_noise::{drifts, with_own_scatter};
@@ -27,7 +28,9 @@ use crate::signal::{NoisePower, noise_trends, pooled_level};
 /// moved to a common motion before, so that S is the noise of torque and acceleration together. To it comes
 /// what sampling does to the acceleration where friction reverses: the velocity has a kink there, whose
 /// spectrum falls as 1/f², and holds at f the share (f/(f_s − f))² of it that belongs to f_s − f. What is not followed
-/// of it between the samples ([`NOT_FOLLOWED`]) is an error of the equations that no period tells from another.
+/// of it between the samples ([`NOT_FOLLOWED`]) is an error of the equations that no period tells from another. What torques of
+/// unknown height do around reversals, on single joints ([`PeriodWhitening::with_noise_of_joints`]) or anywhere
+/// ([`PeriodWhitening::with_repeating_noise`]), is whitened behind L⁻¹.
 pub struct PeriodWhitening {
     samples: usize,
     periods: usize,
@@ -44,6 +47,8 @@ pub struct PeriodWhitening {
     /// Steps that slow noise makes in one period, per joint, as high as their standard deviation.
     steps: Vec<Image>,
     stepping: Option<RepeatingNoise>,
+    /// Of every joint, its rows and noise that repeats in them.
+    of_joints: Vec<(Vec<usize>, RepeatingNoise)>,
     repeating: Option<RepeatingNoise>,
 }
 
@@ -78,6 +83,7 @@ impl PeriodWhitening {
             drifting: Vec::new(),
             steps: Vec::new(),
             stepping: None,
+            of_joints: Vec::new(),
             repeating: None,
         };
         let used = ((regression.prepared.highest - BELOW_HIGHEST) * n as f64).round() as usize;
@@ -159,6 +165,22 @@ impl PeriodWhitening {
         Ok(whitening)
     }
 
+    /// Takes torques on single joints that repeat in every period and whose heights have the standard deviation one for noise,
+    /// joint by joint: as far as its own rows have them, which those of the joints behind it resemble by their common noise alone.
+    pub fn with_noise_of_joints(&mut self, torques: &[(usize, Vec<Column>)]) {
+        let of_joint = |(joint, torques): &(usize, Vec<Column>)| {
+            let rows = self.rows_of(*joint);
+            let image = |torque: &Column| {
+                let whole = self.image_in_noise(torque).mean;
+                Image { mean: rows.iter().map(|row| whole[*row]).collect(), contrast: Vec::new() }
+            };
+            let images: Vec<Image> = torques.iter().map(image).collect();
+            (rows, RepeatingNoise::new(&images))
+        };
+        let of_joints: Vec<_> = torques.par_iter().map(of_joint).collect();
+        self.of_joints = of_joints;
+    }
+
     /// Takes torques that repeat in every period and whose heights have the standard deviation one for noise.
     pub fn with_repeating_noise<'c>(&mut self, torques: impl Iterator<Item = &'c Column>) {
         // Steps of periods that follow each other take each other back, so that their mean has the first and the last end alone: 1/P of one
@@ -166,7 +188,8 @@ impl PeriodWhitening {
         let mut steps = self.steps.clone();
         steps.iter_mut().for_each(|step| step.scale((2.0 / self.periods as f64).sqrt()));
         let images = torques.map(|torque| self.image_in_noise(torque));
-        let images: Vec<Image> = images.chain(steps).collect();
+        let mut images: Vec<Image> = images.chain(steps).collect();
+        images.iter_mut().for_each(|image| self.whiten_joints(&mut image.mean));
         self.repeating = Some(RepeatingNoise::new(&images));
     }
 
@@ -227,6 +250,32 @@ impl PeriodWhitening {
             s.iter_mut().for_each(|v| v.im = 0.0);
         }
         (s, freedom)
+    }
+
+    /// Rows of joint `j` in the mean period ([`Self::rows`]).
+    fn rows_of(&self, j: usize) -> Vec<usize> {
+        let harmonics = 0..self.factors.len();
+        let mut first = 0;
+        let rows = harmonics.flat_map(|k| {
+            let parts = if k == 0 || 2 * k == self.samples { 1 } else { 2 };
+            let own = first + j * parts;
+            first += self.joints * parts;
+            own..own + parts
+        });
+        rows.collect()
+    }
+
+    /// Whitens rows of the mean period for noise of single joints; its own adjoint.
+    fn whiten_joints(&self, rows: &mut [f64]) {
+        for (own_rows, noise) in &self.of_joints {
+            let mut own: Vec<f64> = own_rows.iter().map(|row| rows[*row]).collect();
+            // What does not act on the joint is zero there, and stays it.
+            if own.iter().all(|row| *row == 0.0) {
+                continue;
+            }
+            noise.whiten(&mut own);
+            own_rows.iter().zip(own).for_each(|(row, value)| rows[*row] = value);
+        }
     }
 
     /// Samples of a period.
@@ -293,6 +342,7 @@ impl PeriodWhitening {
         let n = self.samples;
         let mut rows = rows.to_vec();
         self.repeating.iter().for_each(|noise| noise.whiten(&mut rows));
+        self.whiten_joints(&mut rows);
         let inverse = fourier::inverse(n);
         let mut spectra = vec![inverse.make_input_vec(); self.joints];
         let mut row = 0;
@@ -327,6 +377,7 @@ impl PeriodWhitening {
     /// See [`super::Whitening::image`].
     pub(super) fn image(&self, column: &Column) -> Image {
         let mut image = self.image_in_noise(column);
+        self.whiten_joints(&mut image.mean);
         self.repeating.iter().for_each(|noise| noise.whiten(&mut image.mean));
         if let Some(noise) = &self.stepping {
             let rows = image.mean.len();
@@ -391,6 +442,7 @@ impl PeriodWhitening {
             drifting: Vec::new(),
             steps: Vec::new(),
             stepping: None,
+            of_joints: Vec::new(),
             repeating: None,
         }
     }
@@ -415,4 +467,38 @@ fn trends(
 /// All (i, j) of a square matrix.
 fn pairs(n: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..n).flat_map(move |i| (0..n).map(move |j| (i, j)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// ⟨W c, r⟩ = ⟨c, Wᵀ r⟩ with noise of single joints and noise of all, and W (I + A Aᵀ) Wᵀ = I along it.
+    #[test]
+    fn noise_of_joints_is_whitened_and_in_time_is_the_adjoint() {
+        const SAMPLES: usize = 40;
+        let wave = |joint: usize, harmonic: f64, height: f64| {
+            let at = |k: usize| height * (harmonic * k as f64 + joint as f64).sin();
+            Column::on(joint, (0..SAMPLES).map(at).collect())
+        };
+        let mut whitening = PeriodWhitening::of_white_noise(SAMPLES, 3, 2);
+        let plain = whitening.image(&wave(1, 0.7, 2.0));
+        whitening.with_noise_of_joints(&[(1, vec![wave(1, 0.7, 2.0), wave(1, 1.1, 0.5)])]);
+        // Along a torque a the noise has the variance 1 + |a|², and a is seen as large as a/√(1 + |a|²) at most.
+        let square = plain.square();
+        let seen = whitening.image(&wave(1, 0.7, 2.0)).square();
+        assert!(seen < square / (1.0 + square) * (1.0 + 1e-12), "{seen}, {square}");
+        let elsewhere = wave(0, 0.7, 2.0);
+        assert_eq!(whitening.image(&elsewhere), whitening.image_in_noise(&elsewhere));
+
+        let everywhere = wave(0, 0.3, 1.0);
+        whitening.with_repeating_noise([&everywhere].into_iter());
+        let torque = wave(1, 0.9, 1.0);
+        let rows = whitening.image(&wave(1, 0.4, 3.0));
+        let in_time = whitening.in_time(&rows.mean);
+        let of_time: f64 = torque.parts[0].1.iter().zip(in_time.joint(1)).map(|(a, b)| a * b).sum();
+        // In time a row is not yet weighted by the periods that make the mean.
+        let of_rows = whitening.image(&torque).dot(&rows) / 3f64.sqrt();
+        assert!((of_time - of_rows).abs() < 1e-12 * of_rows.abs().max(1.0), "{of_time} {of_rows}");
+    }
 }

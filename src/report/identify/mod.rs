@@ -97,6 +97,8 @@ pub struct Result {
     covariance: CovarianceKind,
     covariance_reason: &'static str,
     base_parameters: Vec<BaseParameter>,
+    /// Their covariance, row by row.
+    base_covariance: Vec<Vec<f64>>,
     /// Null: only combinations are known.
     standard_parameters: Option<Vec<StandardParameter>>,
     /// How the standard parameters were found; null without `--physical`.
@@ -160,6 +162,7 @@ impl Result {
     ) -> std::result::Result<Self, FitError> {
         let Training { arm, set, identification, regression, .. } = training;
         let sigma = identification.sigma();
+        let covariance = &identification.covariance.matrix;
         let quantile = identification.covariance.quantile_95();
         let half_width: Vec<f64> = sigma.iter().map(|s| quantile * s).collect();
         let open = not_identified(arm, set, &half_width);
@@ -202,6 +205,10 @@ impl Result {
             covariance: identification.covariance.kind,
             covariance_reason: identification.covariance_reason,
             base_parameters,
+            base_covariance: covariance
+                .row_iter()
+                .map(|row| row.iter().copied().collect())
+                .collect(),
             standard_parameters: None,
             physical: None,
             residual: identification.residual().into(),
