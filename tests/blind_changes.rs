@@ -77,8 +77,6 @@ fn nothing_is_named_against_the_simulation_that_made_the_log() {
     assert!(!says_that_contacts_are_not_looked_for(&d), "{:?}", d.warnings);
 }
 
-/// What the parameters of a model cannot follow of another gravity looks like something else beside it, and is nothing beside
-/// the gravity.
 /// A simulation that was identified from another clean log, along another motion with twice the noise: what it is wrong by is in its
 /// covariance. Taken for exact, it had changes named in these logs.
 #[test]
@@ -115,6 +113,8 @@ fn what_an_identified_simulation_does_not_know_is_no_change() {
     assert!(as_if_exact > 0, "a test that cannot fail");
 }
 
+/// What the parameters of a model cannot follow of another gravity looks like something else beside it, and is nothing beside
+/// the gravity.
 #[test]
 fn another_gravity_is_nothing_else() {
     let run = run(22, 4, "[[effect]]\nkind = \"gravity\"\ng_m_s2 = 9.2\n");

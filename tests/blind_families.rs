@@ -119,11 +119,11 @@ fn sensors(share: f64) -> String {
     format!("torque_sd_nm = {torque_nm:?}\nq_sd_rad = {q:?}\nqd_sd_rad_s = {qd:?}\n")
 }
 
-/// With so little noise what is approximate in how drives answer friction stands 15 to 22 σ out of it, and had the names of a
-/// Stribeck curve, of another width and of a late torque, all with a confidence of one.
+/// With so little noise what is approximate in how drives answer friction stands ten and more σ out of it, and had the names of a
+/// Stribeck curve, of another width and of a late torque.
 #[test]
 fn what_is_approximate_at_reversals_has_no_name() {
-    let quiet = scenario(("quiet", 11), ("ur5_identification", 8), &sensors(1.0 / 30.0), "");
+    let quiet = scenario(("quiet", 11), ("ur5_identification", 8), &sensors(1.0 / 20.0), "");
     let simulation = Simulation::run(quiet).unwrap();
     for trial in 0..2 {
         let run = Run::of(&simulation, trial);

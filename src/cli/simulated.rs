@@ -85,14 +85,17 @@ impl Simulated {
         let places: Vec<usize> = (0..set.rank()).map(place).collect::<Result<_, _>>()?;
         let (covariance, warning) = match &result.base_covariance {
             Some(rows) => {
-                let entry = |i: usize, k: usize| rows.get(i).and_then(|row| row.get(k)).copied();
-                let is_whole =
-                    places.iter().all(|&i| places.iter().all(|&k| entry(i, k).is_some()));
-                if !is_whole {
-                    let count = result.base_parameters.len();
-                    return Err(format!("{name}: base_covariance is not {count} × {count}").into());
+                let count = result.base_parameters.len();
+                let is_variance = |(i, row): (usize, &Vec<Option<f64>>)| {
+                    row.len() == count
+                        && row.iter().all(Option::is_some)
+                        && row[i].is_some_and(|variance| variance >= 0.0)
+                };
+                if rows.len() != count || !rows.iter().enumerate().all(is_variance) {
+                    let message = "base_covariance is no covariance of its base parameters";
+                    return Err(format!("{name}: {message} ({count} × {count} numbers)").into());
                 }
-                let entry = |i, k| entry(places[i], places[k]).unwrap_or(0.0);
+                let entry = |i: usize, k: usize| rows[places[i]][places[k]].unwrap_or_default();
                 (DMatrix::from_fn(places.len(), places.len(), entry), None)
             }
             None => {
@@ -143,7 +146,7 @@ struct IdentifiedParameters {
     #[serde(default)]
     verdict: String,
     base_parameters: Vec<IdentifiedParameter>,
-    base_covariance: Option<Vec<Vec<f64>>>,
+    base_covariance: Option<Vec<Vec<Option<f64>>>>,
     #[serde(default)]
     intervals: Intervals,
     #[serde(default)]
@@ -170,7 +173,6 @@ struct Intervals {
 struct IdentifiedParameter {
     name: String,
     value: f64,
-    #[serde(default)]
     sigma: Option<f64>,
 }
 

@@ -159,7 +159,7 @@ impl<'a> Diagnoser<'a> {
         let can_differ = |j: usize| !is_mended && !drifts(j);
         let has_law = |j: usize| {
             let is_there = |cause: &Cause| cause.joint.is_none_or(|own| own == j + 1);
-            causes.iter().any(|cause| !cause.kind.is_of_the_record() && is_there(cause))
+            causes.iter().any(|cause| cause.kind.is_a_law() && is_there(cause))
         };
         let unexplained = misfit::unexplained(&study, &accepted, &rest, lack, has_law, can_differ);
         if let Some(unknown) = &unexplained {
@@ -285,7 +285,8 @@ impl<'a> Diagnoser<'a> {
         model.causes.extend(explained.causes);
         if simulation.doubt.is_some() {
             // The laws as well: they are what is needed beside the changes.
-            model.causes.iter_mut().for_each(Cause::make_provisional);
+            let judged = model.causes.iter_mut().filter(|cause| cause.kind.is_a_law());
+            judged.for_each(Cause::make_provisional);
         }
         model.rest = study.residual.clone();
         explained.span.residualise(&mut model.rest);

@@ -12,7 +12,7 @@
 use rayon::prelude::*;
 
 use super::image::{Column, Image, Span};
-use super::scene::{FINE, Scene};
+use super::scene::{FINE, LONGEST_LEAD_S, Scene};
 use super::whitening::Whitening;
 
 /// A column of the null model: joint, place in [`Scene::answers`] and factor of each of its parts.
@@ -26,7 +26,7 @@ const LEAD: usize = 1;
 /// Standard deviation of the shares that drives of one arm feed forward: how well a controller knows the friction of a joint.
 const ALIKE: f64 = 0.1;
 /// Standard deviation of leads, s: half of the longest that any drive has ([`Scene::can_answer`]).
-const USUAL_LEAD_S: f64 = 0.001;
+const USUAL_LEAD_S: f64 = 0.5 * LONGEST_LEAD_S;
 
 /// What a drive's feeding nothing of its friction forward adds to the torque; `None` for a single run.
 pub fn share(scene: &Scene, joint: usize) -> Option<Column> {
@@ -41,7 +41,7 @@ pub fn differences(scene: &Scene) -> Vec<(usize, Column)> {
     (0..scene.joints()).filter_map(of_joint).collect()
 }
 
-/// By joint, the lead of its drive as a torque of standard deviation one, for drives whose lead is no column of the null model.
+/// By joint, the lead of its drive as a torque of standard deviation one. Where the null model has it as a column that takes it, too.
 pub fn leads(scene: &Scene) -> impl Iterator<Item = Column> {
     let of_joint = |j: usize| {
         let answer = scene.answers(j).into_iter().nth(LEAD)?;
@@ -51,23 +51,28 @@ pub fn leads(scene: &Scene) -> impl Iterator<Item = Column> {
     (0..scene.joints()).filter_map(of_joint)
 }
 
-/// By joint, what the record would show of friction if its drive fed nothing or all of it forward, less what its answer to reversals
-/// tells, each as a torque of standard deviation one: between two samples a joint turns round as the drive lets it.
+/// By joint, a share of what the record would show of friction if its drive fed nothing or all of it forward, less what its answer
+/// to reversals tells, each as a torque of standard deviation one: between two samples a joint turns round as the drive lets it.
 pub fn turns(scene: &Scene) -> impl Iterator<Item = Column> {
     let joints = if scene.periodic { scene.joints() } else { 0 };
     let if_fed = |(j, fed): (usize, usize)| {
         let pairs = scene.sign_if_fed(j, fed).iter().zip(&scene.instants(j).sign);
-        let change_nm = pairs.map(|(fed, told)| scene.coulomb_nm[j] * (fed - told)).collect();
+        let change_nm =
+            pairs.map(|(fed, told)| TURN * scene.coulomb_nm[j] * (fed - told)).collect();
         Column::on(j, scene.as_logged(change_nm))
     };
     (0..joints).flat_map(|j| [(j, 0), (j, 1)]).map(if_fed)
 }
 
+/// Standard deviation of what drives do about a reversal beside what it tells, over the difference to nothing or to all. Beside causes
+/// that have nothing to do with reversals 1 of it was seen behind drives that feed half forward.
+const TURN: f64 = 0.25;
+
 /// How long before a reversal and how long behind it a drive may give what it does not know, s, in pulses of half the time between
 /// samples.
 const AROUND_S: [f64; 2] = [0.004, 0.008];
-/// Standard deviation of a pulse of 4 ms over the step 2 F_c of friction; shorter ones are as independent as longer ones. In logs of clean arms with a thousandth of the benchmark's noise,
-/// whose drives feed 0, 0.5 and 0.9 of friction forward with feedback of 25 to 100 rad/s along both its motions, likelihood
+/// Standard deviation of a pulse of 4 ms over the step 2 F_c of friction; shorter ones are as independent as longer ones. In
+/// logs of clean arms with a thousandth of the benchmark's noise, whose drives feed 0, 0.5 and 0.9 of friction forward with feedback of 25 to 100 rad/s along both its motions, likelihood
 /// says 0.004 to 0.03 (of joint 1 along the first 0.07), 0.014 in the median; pulses hold 0.7 to 0.95 of what those leave.
 const PULSE_SHARE: f64 = 0.015;
 /// Of such a pulse, s.

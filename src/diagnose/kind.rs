@@ -121,6 +121,11 @@ impl Kind {
         )
     }
 
+    /// Whether it is a law of the arm, neither a fault of the recording nor something that happened once.
+    pub fn is_a_law(self) -> bool {
+        !self.is_of_the_record() && self != Self::Contact
+    }
+
     /// Whether it is a fault of the recording, not of the arm.
     pub fn is_of_the_record(self) -> bool {
         matches!(

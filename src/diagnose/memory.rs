@@ -3,12 +3,12 @@
 //! A search for the best shape begins where the one before it began, and the shapes it looks at first are the same.
 
 use std::collections::HashMap;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::candidates::Shape;
 use super::study::Entry;
 
-/// Bytes of columns that are kept at most: what is beyond is worked out again.
+/// Bytes of columns that are kept at most: what comes later is worked out each time.
 const MOST_BYTES: usize = 64 << 20;
 
 /// A family, a site and a shape.
@@ -22,7 +22,7 @@ pub struct Memory {
 
 #[derive(Default)]
 struct Known {
-    entries: HashMap<Key, Option<Entry>>,
+    entries: HashMap<Key, Option<Arc<Entry>>>,
     bytes: usize,
 }
 
@@ -36,13 +36,15 @@ impl Memory {
         let key = (family, site, shape.variant, shape.value.to_bits());
         // Entries are put in whole: a panic elsewhere leaves none half made.
         let lock = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(known) = lock().entries.get(&key) {
-            return known.clone();
+        let known = lock().entries.get(&key).cloned();
+        if let Some(entry) = known {
+            return entry.map(|entry| (*entry).clone());
         }
         let made = make();
         let bytes = made.as_ref().map_or(0, Entry::bytes);
+        let kept = made.clone().map(Arc::new);
         let mut known = lock();
-        if known.bytes + bytes <= MOST_BYTES && known.entries.insert(key, made.clone()).is_none() {
+        if known.bytes + bytes <= MOST_BYTES && known.entries.insert(key, kept).is_none() {
             known.bytes += bytes;
         }
         made

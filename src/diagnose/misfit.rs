@@ -84,10 +84,9 @@ fn band_edges(first: [usize; BANDS_HZ.len()], end: usize) -> Vec<usize> {
 
 /// The axis along which the residual is largest: a curve of 10 knots in each quantity of each joint.
 ///
-/// `Some` if that curve cannot be noise; or if the lack of fit cannot, and then of the joint of which it is. Along a single run the curve
-/// has to show in stretches of time that were left out of its fit as well, and be more than laws leave on a joint that
-/// `has_law`. Whether friction
-/// changes as the log goes on is asked of the joints whose periods `can_differ` by nothing else that is known.
+/// `Some` if that curve cannot be noise; or if the lack of fit cannot, and then of the joint of which it is. Along a single run the
+/// curve has to show in stretches of time that were left out of its fit as well, and be more than laws leave on a joint that
+/// `has_law`. Whether friction changes as the log goes on is asked of the joints whose periods `can_differ` by nothing else that is known.
 pub fn unexplained(
     study: &Study,
     accepted: &Span,
@@ -212,10 +211,13 @@ fn behind_reversals(scene: &Scene, j: usize) -> Option<(Axis, Curves)> {
     let (q, qd) = (scene.motion.q_rad.joint(j), scene.motion.qd_rad_s.joint(j));
     let n = q.len();
     let turns = |k: usize| qd[(k + n - 1) % n] * qd[k] < 0.0;
-    let first = (0..n).find(|&k| turns(k))?;
+    // The end of a single run is not followed by its beginning.
+    let start = if scene.periodic { 0 } else { 1 };
+    let first = (start..n).find(|&k| turns(k))?;
+    let end = if scene.periodic { first + n } else { n };
     let mut way = vec![0.0; n];
     let mut turn_rad = q[first];
-    for k in (first..first + n).map(|k| k % n) {
+    for k in (first..end).map(|k| k % n) {
         if turns(k) {
             // Between two samples, where a straight velocity passes through zero.
             let before = (k + n - 1) % n;

@@ -30,7 +30,7 @@ pub(super) fn make_modest(causes: &mut [Cause]) {
     };
     let steady: Vec<(Kind, Option<usize>, f64)> = causes
         .iter()
-        .filter(|c| !c.kind.is_of_the_record() && c.kind != Kind::Contact)
+        .filter(|c| c.kind.is_a_law())
         .map(|c| (c.kind, c.joint, c.strength))
         .collect();
     let of_kind = |kind: Kind| causes.iter().filter(move |c| c.kind == kind).map(|c| c.joint);

@@ -22,7 +22,7 @@ use super::judgement::{TELLS_APART, probability_of_class};
 use super::kind::Kind;
 use super::significance::LEAST_EVIDENCE;
 use super::study::{Entry, Study};
-use super::verdict::{BaseParameter, Cause, Estimate, Moved, Rival};
+use super::verdict::{BaseParameter, Cause, Moved, Rival};
 use super::whitening::RepeatingNoise;
 use crate::base::BaseSet;
 
@@ -92,8 +92,13 @@ impl<'a> Beside<'a> {
     }
 }
 
-/// What is not known of the simulation, as noise of its residual.
-struct Unknown(Option<RepeatingNoise>);
+/// What is not known of the simulation.
+struct Unknown {
+    /// As noise of its residual.
+    noise: Option<RepeatingNoise>,
+    /// Columns of the null model that no change is to explain, where noise is white.
+    absorbed: Vec<Image>,
+}
 
 impl Unknown {
     /// Of a simulation whose base parameters have the `covariance`, whose roots times the null model's columns are torques of
@@ -110,12 +115,18 @@ impl Unknown {
             let columns = parts.eigenvectors.column_iter().zip(&roots);
             RepeatingNoise::new(&columns.map(torque).collect::<Vec<_>>())
         });
-        Self(noise)
+        Self { noise, absorbed: Vec::new() }
+    }
+
+    /// The same where what a fit would absorb is no change.
+    fn absorbing(self, study: &Study) -> Self {
+        let absorbed = self.whitened(study.null_columns[..study.base_count()].to_vec());
+        Self { absorbed, ..self }
     }
 
     /// `image` where this noise is white as well.
     fn whiten(&self, image: &mut Image) {
-        self.0.iter().for_each(|noise| noise.whiten(&mut image.mean));
+        self.noise.iter().for_each(|noise| noise.whiten(&mut image.mean));
     }
 
     /// [`Self::whiten`] of all.
@@ -149,17 +160,16 @@ pub fn explain(
     accepted: &[Found],
 ) -> Explained {
     let Nominal { theta, covariance, .. } = simulation;
-    let unknown = Unknown::new(study, covariance);
+    let mut unknown = Unknown::new(study, covariance);
+    if covariance.is_some() && !moved.iter().any(|m| m.z.abs() > MOVED) {
+        unknown = unknown.absorbing(study);
+    }
     let mut residual = study.torque.clone();
     for (column, theta) in study.null_columns.iter().zip(theta) {
         residual.add(-theta, column);
     }
     unknown.whiten(&mut residual);
-    let mut changes = changes::all(study, set, theta);
-    if covariance.is_some() && !moved.iter().any(|m| m.z.abs() > MOVED) {
-        let is_seen = |image: &Image| study.outside_null(image.clone()).is_some();
-        changes.retain(|change| change.images.iter().any(is_seen));
-    }
+    let changes = changes::all(study, set, theta);
     let images = changes.iter().map(|change| unknown.whitened(change.images.clone())).collect();
     let is_change = |entry: &Entry| {
         let place = (study.families[entry.family].kind(), entry.site);
@@ -210,8 +220,8 @@ fn nuisance<'a>(
     }
     let answers = &study.null_columns[study.base_count()..];
     let of_drives = study.blurred_shares(&entries).chain(answers).cloned().collect();
-    for image in unknown.whitened(of_drives) {
-        span.push(&image);
+    for image in unknown.whitened(of_drives).iter().chain(&unknown.absorbed) {
+        span.push(image);
     }
     span
 }
@@ -356,7 +366,6 @@ impl Search<'_> {
             evidence_behind: evidence - s.evidence,
         });
         let parameters = change.estimates((&b, &places), &covariance, quantile);
-        let holds_none = |e: &Estimate| e.ci95[0] <= 0.0 && 0.0 <= e.ci95[1];
         Cause {
             kind: change.kind,
             joint: change.site.map(|j| j + 1),
@@ -364,7 +373,7 @@ impl Search<'_> {
             class,
             confidence: probability_of_class(evidence, &evidences, &alike),
             may_be_none: change.kind == Kind::Payload
-                && parameters.get("mass_kg").is_some_and(holds_none),
+                && parameters.get("mass_kg").is_some_and(|mass| mass.holds(0.0)),
             parameters,
             gain_fraction: None,
             strength: study.statistic.lambda(&span, &left, gain).max(0.0).sqrt(),

@@ -42,6 +42,7 @@ impl Candidate for FeedForward {
         share_less.abs() < ALL
     }
 
+    /// Beyond that it stands in for something else about reversals.
     fn is_its_own(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> bool {
         b[0].abs() <= ALL
     }

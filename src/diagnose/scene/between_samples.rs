@@ -15,7 +15,7 @@ pub const FINE: usize = 16;
 /// βδ of [`drive_answers`] at most, s. In logs of clean arms whose drives feed any share of the friction forward, with
 /// feedback of 25 to 100 rad/s, up to 0.9 ms were measured on joints 1 to 3 and 5, 1.3 ms on joint 4 and 1.6 ms on joint
 /// 6, where it is noise; behind 4 ms friction builds up over an angle, or a channel is recorded late.
-const LONGEST_LEAD_S: f64 = 0.002;
+pub const LONGEST_LEAD_S: f64 = 0.002;
 
 /// The motion of one joint where friction is looked at.
 pub struct Instants {

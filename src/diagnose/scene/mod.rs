@@ -5,7 +5,7 @@
 
 mod between_samples;
 
-pub use between_samples::{FINE, Instants};
+pub use between_samples::{FINE, Instants, LONGEST_LEAD_S};
 
 use std::sync::OnceLock;
 
