@@ -83,36 +83,13 @@ impl Simulated {
             found.ok_or_else(|| format!("{name}: no base parameter {parameter}"))
         };
         let places: Vec<usize> = (0..set.rank()).map(place).collect::<Result<_, _>>()?;
-        let (covariance, warning) = match &result.base_covariance {
-            Some(rows) => {
-                let count = result.base_parameters.len();
-                let is_variance = |(i, row): (usize, &Vec<Option<f64>>)| {
-                    row.len() == count
-                        && row.iter().all(Option::is_some)
-                        && row[i].is_some_and(|variance| variance >= 0.0)
-                };
-                if rows.len() != count || !rows.iter().enumerate().all(is_variance) {
-                    let message = "base_covariance is no covariance of its base parameters";
-                    return Err(format!("{name}: {message} ({count} × {count} numbers)").into());
-                }
-                let entry = |i: usize, k: usize| rows[places[i]][places[k]].unwrap_or_default();
-                (DMatrix::from_fn(places.len(), places.len(), entry), None)
-            }
-            None => {
-                let sigma = |&place: &usize| {
-                    let IdentifiedParameter { name: parameter, sigma, .. } =
-                        &result.base_parameters[place];
-                    sigma.ok_or_else(|| format!("{name}: no sigma of {parameter}"))
-                };
-                let sigma: Vec<f64> = places.iter().map(sigma).collect::<Result<_, _>>()?;
-                let warning = format!(
-                    "{name}: it has σ but no covariance of the base parameters (base_covariance), as results of older programs; \
-                     small changes are not told until it is identified again"
-                );
-                let variance = DVector::from_iterator(sigma.len(), sigma.iter().map(|s| s * s));
-                (DMatrix::from_diagonal(&variance), Some(warning))
-            }
-        };
+        let covariance = result.covariance(&places).map_err(|fault| format!("{name}: {fault}"))?;
+        let warning = result.base_covariance.is_none().then(|| {
+            format!(
+                "{name}: it has σ but no covariance of the base parameters (base_covariance), as results of older programs; \
+                 small changes are not told until it is identified again"
+            )
+        });
         let theta = places.iter().map(|&k| result.base_parameters[k].value).collect();
         Ok(Self { theta, covariance: Some(covariance), doubt, warning })
     }
@@ -151,6 +128,32 @@ struct IdentifiedParameters {
     intervals: Intervals,
     #[serde(default)]
     program: SavedProgram,
+}
+
+impl IdentifiedParameters {
+    /// The covariance of the base parameters at `places`, by σ alone where it was not saved; or what is wrong with it.
+    fn covariance(&self, places: &[usize]) -> Result<DMatrix<f64>, String> {
+        let count = self.base_parameters.len();
+        let Some(rows) = &self.base_covariance else {
+            let variance = |&place: &usize| {
+                let IdentifiedParameter { name, sigma, .. } = &self.base_parameters[place];
+                sigma.map(|sigma| sigma * sigma).ok_or_else(|| format!("no sigma of {name}"))
+            };
+            let variances: Vec<f64> = places.iter().map(variance).collect::<Result<_, _>>()?;
+            return Ok(DMatrix::from_diagonal(&DVector::from_vec(variances)));
+        };
+        let is_variance = |(i, row): (usize, &Vec<Option<f64>>)| {
+            row.len() == count
+                && row.iter().all(Option::is_some)
+                && row[i].is_some_and(|variance| variance >= 0.0)
+        };
+        if rows.len() != count || !rows.iter().enumerate().all(is_variance) {
+            let message = "base_covariance is no covariance of its base parameters";
+            return Err(format!("{message} ({count} × {count} numbers)"));
+        }
+        let entry = |i: usize, k: usize| rows[places[i]][places[k]].unwrap_or_default();
+        Ok(DMatrix::from_fn(places.len(), places.len(), entry))
+    }
 }
 
 #[derive(Default, Deserialize)]

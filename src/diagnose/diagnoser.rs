@@ -279,8 +279,9 @@ impl<'a> Diagnoser<'a> {
             alike: selected.alike(),
         });
         let found: Vec<Found> = found.collect();
-        let moved = against::moved(simulation, &intervals::base(study, self.set, &model.extension));
-        let explained = against::explain(study, self.set, (simulation, &moved), &found);
+        let base_parameters = || intervals::base(study, self.set, &model.extension);
+        let has_moved = against::has_moved(simulation, base_parameters);
+        let explained = against::explain(study, self.set, (simulation, has_moved), &found);
         model.causes.retain(|c| !explained.judged.contains(&(c.kind, c.joint)));
         model.causes.extend(explained.causes);
         if simulation.doubt.is_some() {

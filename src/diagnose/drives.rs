@@ -7,7 +7,8 @@
 //! A drive that differs by more is a cause like others (`candidates/feed_forward.rs`).
 //!
 //! A controller acts at its ticks, and its feedback is not quite what the model takes it for: what a drive gives while friction
-//! turns round is a little more or less at every single reversal ([`unknown_pulses`]), noise as well.
+//! turns round is a little more or less at every single reversal ([`unknown_pulses`]), and so is how the joint turns ([`turns`]), both
+//! noise as well.
 
 use rayon::prelude::*;
 
@@ -27,6 +28,22 @@ const LEAD: usize = 1;
 const ALIKE: f64 = 0.1;
 /// Standard deviation of leads, s: half of the longest that any drive has ([`Scene::can_answer`]).
 const USUAL_LEAD_S: f64 = 0.5 * LONGEST_LEAD_S;
+/// Standard deviation of what drives do about a reversal beside what it tells, over the difference to feeding nothing or all forward.
+/// Chosen, not derived: behind drives that feed half forward 1 of it stands in logs of little noise. With 0.35 and more steep
+/// noise has something unexplained, with less clean logs of a thirtieth of the noise have a name (`reports/blind_history.md`).
+const TURN: f64 = 0.25;
+/// How long before a reversal and how long behind it a drive may give what it does not know, s, in pulses of half the time between
+/// samples.
+const AROUND_S: [f64; 2] = [0.004, 0.008];
+/// A pulse of this length, s, …
+const PULSE_S: f64 = 0.004;
+/// … has this standard deviation over the step 2 F_c of friction; shorter ones are as independent as longer ones. In logs of
+/// clean arms with a thousandth of the benchmark's noise, whose drives feed 0, 0.5 and 0.9 of friction forward with feedback of 25 to
+/// 100 rad/s along both its motions, likelihood says 0.004 to 0.03 (of joint 1 along the first 0.07), 0.014 in the median;
+/// pulses hold 0.7 to 0.95 of what those leave.
+const PULSE_SHARE: f64 = 0.015;
+/// Reversals of a joint in one period that have pulses of their own; more share them in turn.
+const MOST_REVERSALS: usize = 64;
 
 /// What a drive's feeding nothing of its friction forward adds to the torque; `None` for a single run.
 pub fn share(scene: &Scene, joint: usize) -> Option<Column> {
@@ -63,22 +80,6 @@ pub fn turns(scene: &Scene) -> impl Iterator<Item = Column> {
     };
     (0..joints).flat_map(|j| [(j, 0), (j, 1)]).map(if_fed)
 }
-
-/// Standard deviation of what drives do about a reversal beside what it tells, over the difference to nothing or to all. Beside causes
-/// that have nothing to do with reversals 1 of it was seen behind drives that feed half forward.
-const TURN: f64 = 0.25;
-
-/// How long before a reversal and how long behind it a drive may give what it does not know, s, in pulses of half the time between
-/// samples.
-const AROUND_S: [f64; 2] = [0.004, 0.008];
-/// Standard deviation of a pulse of 4 ms over the step 2 F_c of friction; shorter ones are as independent as longer ones. In
-/// logs of clean arms with a thousandth of the benchmark's noise, whose drives feed 0, 0.5 and 0.9 of friction forward with feedback of 25 to 100 rad/s along both its motions, likelihood
-/// says 0.004 to 0.03 (of joint 1 along the first 0.07), 0.014 in the median; pulses hold 0.7 to 0.95 of what those leave.
-const PULSE_SHARE: f64 = 0.015;
-/// Of such a pulse, s.
-const PULSE_S: f64 = 0.004;
-/// Reversals of a joint in one period that have pulses of their own; more share them in turn.
-const MOST_REVERSALS: usize = 64;
 
 /// By joint, what its drive may give more or less around single reversals, each of standard deviation one; none for a single run.
 pub fn unknown_pulses(scene: &Scene) -> Vec<(usize, Vec<Column>)> {

@@ -7,7 +7,7 @@ use super::chance;
 use super::image::{Column, Image, Span};
 use super::scene::Scene;
 use super::statistic::Statistic;
-use super::study::Study;
+use super::study::{LEAST_GAIN, Study};
 use super::verdict::Unexplained;
 
 /// Edges of the bands in which the residual is compared with noise, Hz; the last one ends with the rows.
@@ -130,13 +130,12 @@ pub fn unexplained(
                 }
             }
             let explained = span.explained(residual);
-            let is_left_by_a_law = has_law(j)
-                && study
-                    .left_out_gain(Some(j), &span, residual)
-                    .is_some_and(|share| share < LEFT_BY_LAWS);
-            let is_kept = !is_left_by_a_law && study.generalises(Some(j), &span, residual);
-            let probability =
-                if is_kept { study.statistic.probability(&span, residual) } else { 1.0 };
+            let least = if has_law(j) { LEFT_BY_LAWS } else { LEAST_GAIN };
+            let probability = if study.generalises(Some(j), &span, residual, least) {
+                study.statistic.probability(&span, residual)
+            } else {
+                1.0
+            };
             let evidence = explained - span.len() as f64 * (residual.mean.len() as f64).ln();
             let heights = visible(&raw, &outside, residual);
             let curve_at =
@@ -211,7 +210,7 @@ fn behind_reversals(scene: &Scene, j: usize) -> Option<(Axis, Curves)> {
     let (q, qd) = (scene.motion.q_rad.joint(j), scene.motion.qd_rad_s.joint(j));
     let n = q.len();
     let turns = |k: usize| qd[(k + n - 1) % n] * qd[k] < 0.0;
-    // The end of a single run is not followed by its beginning.
+    // The end of a single run is not followed by its beginning, where a joint counts as a radian from its reversal.
     let start = if scene.periodic { 0 } else { 1 };
     let first = (start..n).find(|&k| turns(k))?;
     let end = if scene.periodic { first + n } else { n };

@@ -5,7 +5,7 @@ use super::candidates::Shape;
 use super::chance;
 use super::image::{Image, Span};
 use super::selection::{Contender, Kept};
-use super::study::Entry;
+use super::study::{Entry, LEAST_GAIN};
 
 /// A law is another's only if its coefficient is so by more than so many σ.
 const DOUBT: f64 = 2.0;
@@ -50,7 +50,7 @@ impl Kept<'_, '_> {
         contender.evidence > LEAST_EVIDENCE
             && single * study.tests(&contender.entry) < chance::LAW
             && self.is_its_own(&contender.entry, others, residual)
-            && study.generalises(site, &span, residual)
+            && study.generalises(site, &span, residual, LEAST_GAIN)
     }
 
     /// Whether `contender` is needed beside `other`, which is on another joint, and all causes.

@@ -108,7 +108,7 @@ const BANK: usize = 8;
 const KEPT_SHARE: f64 = 0.5;
 /// Share of its joint's mean square that a cause has to remove there: 2.5 % of the rms error are within what
 /// approximate laws leave beside each other.
-const LEAST_GAIN: f64 = 0.05;
+pub(super) const LEAST_GAIN: f64 = 0.05;
 /// Steps of a golden-section search: the bracket shrinks to 1 %.
 const GOLDEN_STEPS: usize = 10;
 
@@ -421,12 +421,18 @@ impl<'a> Study<'a> {
     }
 
     /// Whether what `span` at `site` explains of `residual` is also explained in stretches of a single run
-    /// that were left out of its fit, and is not too little to be told from approximate laws beside it. Always
+    /// that were left out of its fit, and there takes more than the share `least` of the mean square away. Always
     /// true where noise is known.
-    pub fn generalises(&self, site: Option<usize>, span: &Span, residual: &Image) -> bool {
+    pub fn generalises(
+        &self,
+        site: Option<usize>,
+        span: &Span,
+        residual: &Image,
+        least: f64,
+    ) -> bool {
         self.statistic.left_out_gain(span, residual).is_none_or(|gain| {
             gain > KEPT_SHARE * span.explained(residual)
-                && gain > LEAST_GAIN * self.square(site, residual)
+                && gain > least * self.square(site, residual)
         })
     }
 

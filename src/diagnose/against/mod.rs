@@ -66,6 +66,14 @@ pub fn moved(simulation: Nominal, data: &[BaseParameter]) -> Vec<Moved> {
     data.iter().enumerate().map(of_parameter).collect()
 }
 
+/// Whether a change that a fit would absorb may be one, `data` being the base parameters of the log: of a simulation that was
+/// identified only where a single one of them has moved. Their σ are what Monte Carlo runs confirm, and some of their
+/// combinations are told fifty times better than any of them, by less than what logs of two rates or two drives differ by.
+pub fn has_moved(simulation: Nominal, data: impl FnOnce() -> Vec<BaseParameter>) -> bool {
+    simulation.covariance.is_none()
+        || moved(simulation, &data()).iter().any(|moved| moved.z.abs() > MOVED)
+}
+
 /// An effect that was found beside the null model.
 pub struct Found<'a> {
     /// At its best shape.
@@ -147,21 +155,17 @@ pub struct Explained {
     pub span: Span,
 }
 
-/// The changes that explain how the data differ from the simulation, whose base parameters have `moved`. `accepted` are effects
-/// that were found beside the null model.
-///
-/// Of a simulation that was identified, what a fit would absorb is no change where no single base parameter has moved: their σ are
-/// what Monte Carlo runs confirm, and some of their combinations are told fifty times better than any of them, by less than
-/// what logs of two rates or two drives differ by.
+/// The changes that explain how the data differ from the simulation; what a fit would absorb is one only if its parameters
+/// [`has_moved`]. `accepted` are effects that were found beside the null model.
 pub fn explain(
     study: &Study,
     set: &BaseSet,
-    (simulation, moved): (Nominal, &[Moved]),
+    (simulation, has_moved): (Nominal, bool),
     accepted: &[Found],
 ) -> Explained {
     let Nominal { theta, covariance, .. } = simulation;
     let mut unknown = Unknown::new(study, covariance);
-    if covariance.is_some() && !moved.iter().any(|m| m.z.abs() > MOVED) {
+    if !has_moved {
         unknown = unknown.absorbing(study);
     }
     let mut residual = study.torque.clone();
