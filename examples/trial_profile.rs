@@ -139,7 +139,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     })?;
     let solved = fitter.fit(&problem, set, Weighting::PerJoint)?;
     let covariance_ms = median_ms(repeats, || {
-        black_box(CovarianceKind::Periods.method().covariance(&problem, &solved).ok());
+        black_box(CovarianceKind::Periods.covariance(&problem, &solved).ok());
     })?;
 
     let n = period.samples as f64;

@@ -30,8 +30,7 @@ fn run(toml: &str, trials: u64) -> Run {
     let mut run = Run { tally: Tally::new(experiment.truth.len()), tested_twice: 0, withheld: 0 };
     for trial in 0..trials {
         let found = worker.identify(trial).unwrap();
-        let quantile = found.covariance.quantile_95();
-        let outcomes = experiment.outcomes(&found.fit.theta, &found.sigma(), quantile);
+        let outcomes = experiment.outcomes(&found.fit.theta, &found.covariance);
         run.tally.add(&outcomes.unwrap());
         let lack = found.lack_of_fit.unwrap();
         run.tested_twice += usize::from(lack.floor == Floor::TorqueAndMotion);
@@ -49,6 +48,8 @@ fn assert_calibrated(toml: &str) -> Run {
     assert!((coverage - 0.95).abs() < 0.015 + STANDARD_ERRORS * error, "{coverage} ± {error}");
     let (ratio, error) = run.tally.pooled_ratio();
     assert!((ratio - 1.0).abs() < 0.05 + STANDARD_ERRORS * error, "{ratio} ± {error}");
+    let (ratio, error) = run.tally.joint_ratio().unwrap();
+    assert!((ratio - 1.0).abs() < 0.05 + STANDARD_ERRORS * error, "joint {ratio} ± {error}");
     run
 }
 

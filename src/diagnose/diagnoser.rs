@@ -279,9 +279,7 @@ impl<'a> Diagnoser<'a> {
             alike: selected.alike(),
         });
         let found: Vec<Found> = found.collect();
-        let base_parameters = || intervals::base(study, self.set, &model.extension);
-        let has_moved = against::has_moved(simulation, base_parameters);
-        let explained = against::explain(study, self.set, (simulation, has_moved), &found);
+        let explained = against::explain(study, self.set, simulation, &found);
         model.causes.retain(|c| !explained.judged.contains(&(c.kind, c.joint)));
         model.causes.extend(explained.causes);
         if simulation.doubt.is_some() {

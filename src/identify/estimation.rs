@@ -187,5 +187,5 @@ fn covariances(
     fit: &Fit,
     kinds: &[CovarianceKind],
 ) -> Vec<Result<Covariance, CovarianceError>> {
-    kinds.iter().map(|kind| kind.method().covariance(problem, fit)).collect()
+    kinds.iter().map(|kind| kind.covariance(problem, fit)).collect()
 }

@@ -21,6 +21,8 @@ pub mod claims {
     pub const BIAS: [f64; 2] = [-0.2, 0.2];
     /// Empirical over predicted σ, pooled over the parameters.
     pub const POOLED_RATIO: [f64; 2] = [0.95, 1.05];
+    /// Error of all parameters together in units of their predicted covariance: the same of all their combinations.
+    pub const JOINT_RATIO: [f64; 2] = [0.95, 1.05];
     /// Empirical over predicted σ of each parameter.
     pub const EACH_RATIO: [f64; 2] = [0.85, 1.15];
     /// Most that the empirical σ may be of the least possible one, rms over the parameters.
@@ -76,7 +78,7 @@ pub struct Calibration {
 }
 
 /// Number of claims that share [`FALSE_FAILURE_RATE`].
-const CHECKS: f64 = 5.0;
+const CHECKS: f64 = 6.0;
 
 impl Calibration {
     /// Checks every claim against `tally`.
@@ -112,7 +114,11 @@ impl Calibration {
             statistics.iter().map(|s| s.sigma_empirical / s.sigma_predicted).collect();
         let (pooled, pooled_error) = tally.pooled_ratio();
         // Again no less than for independent parameters: σ of s/σ is 1/√(2n) each.
-        let pooled_half = t_single * pooled_error.max((0.5 / (n * b as f64)).sqrt());
+        let least = (0.5 / (n * b as f64)).sqrt();
+        let around = |ratio: f64, error: f64| {
+            let half = t_single * error.max(least);
+            [(None, ratio, [ratio - half, ratio + half])]
+        };
         let ratio_interval = |ratio: f64, alpha: f64| {
             // (n − 1) s²/σ² ~ χ²(n − 1).
             match ChiSquared::new(n - 1.0) {
@@ -123,7 +129,7 @@ impl Calibration {
                 Err(_) => [0.0, f64::INFINITY],
             }
         };
-        let checks = vec![
+        let mut checks = vec![
             Check::new(
                 "coverage of 95 % intervals, mean over parameters",
                 claims::MEAN_COVERAGE,
@@ -150,7 +156,7 @@ impl Calibration {
             Check::new(
                 "empirical over predicted σ, pooled over parameters",
                 claims::POOLED_RATIO,
-                [(None, pooled, [pooled - pooled_half, pooled + pooled_half])],
+                around(pooled, pooled_error),
             ),
             Check::new(
                 "empirical over predicted σ, worst parameter",
@@ -158,6 +164,11 @@ impl Calibration {
                 ratios.iter().enumerate().map(|(k, &r)| (Some(k), r, ratio_interval(r, each))),
             ),
         ];
+        let joint = |(ratio, error)| {
+            let what = "error over predicted covariance, all parameters together";
+            Check::new(what, claims::JOINT_RATIO, around(ratio, error))
+        };
+        checks.extend(tally.joint_ratio().map(joint));
         let any = |wanted| checks.iter().any(|check: &Check| check.verdict == wanted);
         let verdict = if any(Verdict::Fail) {
             Verdict::Fail
@@ -231,7 +242,7 @@ pub fn wilson(share: f64, trials: f64, z: f64) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::montecarlo::tally::Outcome;
+    use crate::montecarlo::tally::{Outcome, Outcomes};
     use crate::montecarlo::trials::Failure;
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
@@ -251,7 +262,8 @@ mod tests {
                     Outcome { z: bias + true_sigma * z, sigma: 1.0, quantile_95: 1.96 }
                 })
                 .collect();
-            tally.add(&outcomes);
+            let distance = outcomes.iter().map(|o| o.z * o.z).sum::<f64>() / 20.0;
+            tally.add(&Outcomes { parameters: outcomes, distance: Some(distance) });
         }
         Calibration::of(&tally).verdict
     }
@@ -299,7 +311,8 @@ mod tests {
         let mut tally = Tally::new(1);
         for k in 0..2000 {
             let z = if k % 20 == 0 { 2.5 } else { 0.9 * f64::from(k % 3 - 1) };
-            tally.add(&[Outcome { z, sigma: 1.0, quantile_95: 1.96 }]);
+            let parameters = vec![Outcome { z, sigma: 1.0, quantile_95: 1.96 }];
+            tally.add(&Outcomes { parameters, distance: Some(z * z) });
         }
         for trial in 2000..4000 {
             tally.add_failure(crate::montecarlo::trials::Failure { trial, reason: "x".into() });

@@ -5,10 +5,10 @@ use thiserror::Error;
 
 use super::scenario::Scenario;
 use super::simulation::Simulation;
-use super::tally::{Outcome, Tally};
+use super::tally::{Outcome, Outcomes, Tally};
 use super::trials::{Content, Difference, Trials};
 use crate::dynamics::Model;
-use crate::identify::covariance::CovarianceKind;
+use crate::identify::covariance::{Covariance, CovarianceKind};
 use crate::identify::{Estimator, Identification, Identifier, IdentifyError, Options};
 use crate::plant::{Measured, PlantError};
 
@@ -51,6 +51,15 @@ pub enum TrialError {
         z: f64,
         /// σ̂/scale.
         sigma: f64,
+    },
+    /// A combination of parameters that is said to be known without error.
+    #[error("the covariance of the base parameters is singular")]
+    Singular,
+    /// All parameters together so far off that this is no estimate.
+    #[error("all parameters together: squared error {squared:.3e} in units of their covariance")]
+    TooFar {
+        /// (θ̂ − θ)ᵀV⁻¹(θ̂ − θ).
+        squared: f64,
     },
 }
 
@@ -95,26 +104,28 @@ impl Experiment {
         }
     }
 
-    /// Estimates `theta` with their `sigma` against the truth, in units of the tally.
-    pub fn outcomes(
-        &self,
-        theta: &[f64],
-        sigma: &[f64],
-        quantile_95: f64,
-    ) -> Result<Vec<Outcome>, TrialError> {
+    /// Estimates `theta` with their `covariance` against the truth, in units of the tally.
+    pub fn outcomes(&self, theta: &[f64], covariance: &Covariance) -> Result<Outcomes, TrialError> {
         let Self { truth, scale, simulation, .. } = self;
-        let estimates = theta.iter().zip(sigma).zip(truth.iter().zip(scale)).enumerate();
-        estimates
-            .map(|(k, ((theta, sigma), (truth, scale)))| {
-                let outcome =
-                    Outcome { z: (theta - truth) / scale, sigma: sigma / scale, quantile_95 };
-                if outcome.is_sound() {
-                    return Ok(outcome);
-                }
-                let parameter = simulation.scenario.set.name(k).to_owned();
-                Err(TrialError::Unsound { parameter, z: outcome.z, sigma: outcome.sigma })
-            })
-            .collect()
+        let (sigma, quantile_95) = (covariance.sigma(), covariance.quantile_95());
+        let error: Vec<f64> = theta.iter().zip(truth).map(|(theta, truth)| theta - truth).collect();
+        let outcome = |(k, ((error, sigma), scale)): (usize, ((&f64, &f64), &f64))| {
+            let outcome = Outcome { z: error / scale, sigma: sigma / scale, quantile_95 };
+            if outcome.is_sound() {
+                return Ok(outcome);
+            }
+            let parameter = simulation.scenario.set.name(k).to_owned();
+            Err(TrialError::Unsound { parameter, z: outcome.z, sigma: outcome.sigma })
+        };
+        let estimates = error.iter().zip(&sigma).zip(scale).enumerate();
+        let parameters: Vec<Outcome> = estimates.map(outcome).collect::<Result<_, _>>()?;
+        let squared = covariance.squared_distance(&error).ok_or(TrialError::Singular)?;
+        let distance = covariance.mean_distance().map(|mean| squared / mean);
+        let outcomes = Outcomes { parameters, distance };
+        match outcomes.is_sound() {
+            true => Ok(outcomes),
+            false => Err(TrialError::TooFar { squared }),
+        }
     }
 }
 
@@ -134,13 +145,9 @@ impl Worker<'_> {
     }
 
     /// Runs trial `trial` and compares with the truth.
-    pub fn trial(&mut self, trial: u64) -> Result<Vec<Outcome>, TrialError> {
+    pub fn trial(&mut self, trial: u64) -> Result<Outcomes, TrialError> {
         let identification = self.identify(trial)?;
-        self.experiment.outcomes(
-            &identification.fit.theta,
-            &identification.sigma(),
-            identification.covariance.quantile_95(),
-        )
+        self.experiment.outcomes(&identification.fit.theta, &identification.covariance)
     }
 }
 
@@ -176,7 +183,7 @@ pub struct ParameterHeader {
 
 impl Content for Estimation {
     type Gathered = Tally;
-    const SCHEMA: &'static str = "armid.shard/3";
+    const SCHEMA: &'static str = "armid.shard/4";
 
     fn nothing(&self) -> Tally {
         Tally::new(self.parameters.len())
@@ -229,7 +236,7 @@ impl Trials for Experiment {
         Self::worker(self)
     }
 
-    fn trial(worker: &mut Worker<'_>, trial: u64) -> Result<Vec<Outcome>, TrialError> {
+    fn trial(worker: &mut Worker<'_>, trial: u64) -> Result<Outcomes, TrialError> {
         worker.trial(trial)
     }
 }

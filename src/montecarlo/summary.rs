@@ -36,6 +36,8 @@ pub struct Summary {
     pub coverage_worst: NamedValue,
     /// Empirical over predicted σ, pooled over parameters.
     pub sigma_ratio_pooled: f64,
+    /// Error of all parameters together in units of their predicted covariance; null where it cannot be told.
+    pub joint_ratio: Option<f64>,
     /// Empirical σ over the Cramér–Rao bound; null where the noise has no known law.
     pub efficiency: Option<Efficiency>,
     /// The checks behind the verdict.
@@ -158,6 +160,7 @@ impl Summary {
                 |p| NamedValue { name: p.name.clone(), value: p.coverage },
             ),
             sigma_ratio_pooled: tally.pooled_ratio().0,
+            joint_ratio: tally.joint_ratio().map(|(ratio, _)| ratio),
             efficiency,
             checks: checks.collect(),
             trials_per_second: tally.trials() as f64 / wall_s,
@@ -172,9 +175,12 @@ impl Summary {
         match self.verdict {
             Verdict::Pass => format!(
                 "The predicted σ is true: {} of the 95 % intervals hold the true value, and the \
-                 estimates scatter {:.3} times as far as predicted.",
+                 estimates scatter {:.3} times as far as predicted{}.",
                 percent(self.coverage_mean),
-                self.sigma_ratio_pooled
+                self.sigma_ratio_pooled,
+                self.joint_ratio.map_or_else(String::new, |ratio| format!(
+                    ", their combinations {ratio:.3} times"
+                )),
             ),
             Verdict::Fail => {
                 let failed = self.checks.iter().find(|c| c.verdict == Verdict::Fail);

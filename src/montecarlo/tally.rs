@@ -51,6 +51,23 @@ impl Outcome {
     }
 }
 
+/// What one trial says of all parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcomes {
+    /// Of each.
+    pub parameters: Vec<Outcome>,
+    /// Squared error of all together in units of the covariance that was predicted, (θ̂ − θ)ᵀV⁻¹(θ̂ − θ), over what it is on
+    /// average where V is right; `None` where that is not known.
+    pub distance: Option<f64>,
+}
+
+impl Outcomes {
+    /// Whether the tally can hold what is said of all together.
+    pub fn is_sound(&self) -> bool {
+        self.distance.is_none_or(|distance| (0.0..=LARGEST_Z * LARGEST_Z).contains(&distance))
+    }
+}
+
 /// Exact sums over trials.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -68,6 +85,12 @@ pub struct Tally {
     spread: i128,
     #[serde(with = "decimal")]
     spread_squared: i128,
+    /// Trials with a [`Outcomes::distance`], Σ of it and of its square.
+    measured: u64,
+    #[serde(with = "decimal")]
+    distance: i128,
+    #[serde(with = "decimal")]
+    distance_squared: i128,
     histogram: Vec<u64>,
 }
 
@@ -97,9 +120,9 @@ mod decimal {
 }
 
 impl Gathered for Tally {
-    type Outcome = Vec<Outcome>;
+    type Outcome = Outcomes;
 
-    fn gather(&mut self, _trial: u64, outcomes: Vec<Outcome>) {
+    fn gather(&mut self, _trial: u64, outcomes: Outcomes) {
         self.add(&outcomes);
     }
 
@@ -145,6 +168,9 @@ impl Tally {
             covered_squared: 0,
             spread: 0,
             spread_squared: 0,
+            measured: 0,
+            distance: 0,
+            distance_squared: 0,
             histogram: vec![0; BINS],
         }
     }
@@ -160,10 +186,10 @@ impl Tally {
     }
 
     /// Adds a trial's estimates.
-    pub fn add(&mut self, outcomes: &[Outcome]) {
+    pub fn add(&mut self, Outcomes { parameters, distance }: &Outcomes) {
         self.succeeded += 1;
         let mut covered = 0;
-        for (sums, outcome) in self.parameters.iter_mut().zip(outcomes) {
+        for (sums, outcome) in self.parameters.iter_mut().zip(parameters) {
             sums.z += to_units(outcome.z);
             sums.z_squared += to_units(outcome.z * outcome.z);
             sums.sigma_squared += to_units(outcome.sigma * outcome.sigma);
@@ -174,9 +200,14 @@ impl Tally {
         }
         self.covered += covered;
         self.covered_squared += covered * covered;
-        let spread = outcomes.iter().map(|o| o.z * o.z).sum::<f64>() / outcomes.len() as f64;
+        let spread = parameters.iter().map(|o| o.z * o.z).sum::<f64>() / parameters.len() as f64;
         self.spread += to_units(spread);
         self.spread_squared += to_units(spread * spread);
+        if let Some(distance) = distance {
+            self.measured += 1;
+            self.distance += to_units(*distance);
+            self.distance_squared += to_units(distance * distance);
+        }
     }
 
     /// Adds a trial that failed.
@@ -199,6 +230,9 @@ impl Tally {
         self.covered_squared += other.covered_squared;
         self.spread += other.spread;
         self.spread_squared += other.spread_squared;
+        self.measured += other.measured;
+        self.distance += other.distance;
+        self.distance_squared += other.distance_squared;
         self.histogram.iter_mut().zip(&other.histogram).for_each(|(a, b)| *a += b);
     }
 
@@ -231,12 +265,19 @@ impl Tally {
     /// error, again from the scatter between trials.
     pub fn pooled_ratio(&self) -> (f64, f64) {
         let n = self.succeeded as f64;
-        let spread = from_units(self.spread) / n;
-        let variance = (from_units(self.spread_squared) / n - spread * spread) * n / (n - 1.0);
+        let (spread, error) = mean(self.succeeded, self.spread, self.spread_squared);
         let predicted: i128 = self.parameters.iter().map(|sums| sums.sigma_squared).sum();
         let predicted = from_units(predicted) / n / self.parameters.len() as f64;
         let ratio = (spread / predicted).sqrt();
-        (ratio, 0.5 * ratio * (variance.max(0.0) / n).sqrt() / spread)
+        (ratio, 0.5 * ratio * error / spread)
+    }
+
+    /// Error over predicted covariance of all parameters together, the root of the mean of [`Outcomes::distance`], and its
+    /// standard error. What the pooled ratio is of each σ, this is of every combination of the parameters. `None` where fewer
+    /// than two trials tell it.
+    pub fn joint_ratio(&self) -> Option<(f64, f64)> {
+        let (mean, error) = mean(self.measured, self.distance, self.distance_squared);
+        (self.measured > 1).then(|| (mean.sqrt(), 0.5 * error / mean.sqrt()))
     }
 
     /// `(bin centre, share of all)` of (θ̂ − θ)/σ̂ pooled over parameters and trials; the first and
@@ -247,6 +288,14 @@ impl Tally {
         let share = |count: u64| count as f64 / all.max(1) as f64;
         self.histogram.iter().enumerate().map(|(bin, &c)| (centre(bin), share(c))).collect()
     }
+}
+
+/// Mean of so many `trials` whose values and their squares add up to these, and its standard error.
+fn mean(trials: u64, sum: i128, squares: i128) -> (f64, f64) {
+    let n = trials as f64;
+    let mean = from_units(sum) / n;
+    let variance = (from_units(squares) / n - mean * mean) * n / (n - 1.0);
+    (mean, (variance.max(0.0) / n).sqrt())
 }
 
 #[cfg(test)]
@@ -263,13 +312,18 @@ mod tests {
         Outcome { z, sigma: 1.0 + 0.01 * (k % 5) as f64, quantile_95: 1.96 }
     }
 
+    fn distance(k: u64) -> f64 {
+        1.0 + (k as f64).sin()
+    }
+
     fn tally(trials: impl Iterator<Item = u64>) -> Tally {
         let mut tally = Tally::new(3);
         for k in trials {
             if k % 10 == 9 {
                 tally.add_failure(Failure { trial: k, reason: "did not converge".into() });
             } else {
-                tally.add(&[outcome(k, 0), outcome(k, 1), outcome(k, 2)]);
+                let parameters = vec![outcome(k, 0), outcome(k, 1), outcome(k, 2)];
+                tally.add(&Outcomes { parameters, distance: Some(distance(k)) });
             }
         }
         tally
@@ -299,6 +353,12 @@ mod tests {
         assert!((statistics.sigma_empirical - sd).abs() < 1e-11);
         let covered = (0..100).filter(|k| k % 10 != 9).filter(|&k| outcome(k, 1).covered()).count();
         assert_eq!(statistics.coverage, covered as f64 / n);
+        let distances: Vec<f64> = (0..100).filter(|k| k % 10 != 9).map(distance).collect();
+        let mean = distances.iter().sum::<f64>() / n;
+        let sd = (distances.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+        let (joint, error) = whole.joint_ratio().unwrap();
+        assert!((joint - mean.sqrt()).abs() < 1e-11);
+        assert!((error - sd / n.sqrt() / (2.0 * mean.sqrt())).abs() < 1e-11);
         assert!(
             (whole.histogram().iter().map(|(_, share)| share).sum::<f64>() - 1.0).abs() < 1e-12
         );

@@ -112,8 +112,11 @@ fn facts(summary: &Summary) -> Vec<String> {
             summary.coverage_worst.name
         ),
         format!("empirical over predicted σ, pooled: {:.3}", summary.sigma_ratio_pooled),
-        format!("{:.0} trials per second", summary.trials_per_second),
     ];
+    facts.extend(summary.joint_ratio.map(|ratio| {
+        format!("error of all parameters together over their predicted covariance: {ratio:.3}")
+    }));
+    facts.push(format!("{:.0} trials per second", summary.trials_per_second));
     let missing: u64 = summary.missing.iter().map(|[start, end]| end - start).sum();
     if missing > 0 {
         facts.push(format!("{missing} trials of the scenario have not been run"));

@@ -66,14 +66,6 @@ pub fn moved(simulation: Nominal, data: &[BaseParameter]) -> Vec<Moved> {
     data.iter().enumerate().map(of_parameter).collect()
 }
 
-/// Whether a change that a fit would absorb may be one, `data` being the base parameters of the log: of a simulation that was
-/// identified only where a single one of them has moved. Their σ are what Monte Carlo runs confirm, and some of their
-/// combinations are told fifty times better than any of them, by less than what logs of two rates or two drives differ by.
-pub fn has_moved(simulation: Nominal, data: impl FnOnce() -> Vec<BaseParameter>) -> bool {
-    simulation.covariance.is_none()
-        || moved(simulation, &data()).iter().any(|moved| moved.z.abs() > MOVED)
-}
-
 /// An effect that was found beside the null model.
 pub struct Found<'a> {
     /// At its best shape.
@@ -100,19 +92,14 @@ impl<'a> Beside<'a> {
     }
 }
 
-/// What is not known of the simulation.
-struct Unknown {
-    /// As noise of its residual.
-    noise: Option<RepeatingNoise>,
-    /// Columns of the null model that no change is to explain, where noise is white.
-    absorbed: Vec<Image>,
-}
+/// What is not known of the simulation, as noise of its residual.
+struct Unknown(Option<RepeatingNoise>);
 
 impl Unknown {
     /// Of a simulation whose base parameters have the `covariance`, whose roots times the null model's columns are torques of
     /// standard deviation one.
     fn new(study: &Study, covariance: Option<&DMatrix<f64>>) -> Self {
-        let noise = covariance.map(|covariance| {
+        Self(covariance.map(|covariance| {
             let parts = covariance.clone().symmetric_eigen();
             // What rounding makes of zero.
             let roots = parts.eigenvalues.map(|variance| variance.max(0.0).sqrt());
@@ -122,19 +109,12 @@ impl Unknown {
             };
             let columns = parts.eigenvectors.column_iter().zip(&roots);
             RepeatingNoise::new(&columns.map(torque).collect::<Vec<_>>())
-        });
-        Self { noise, absorbed: Vec::new() }
-    }
-
-    /// The same where what a fit would absorb is no change.
-    fn absorbing(self, study: &Study) -> Self {
-        let absorbed = self.whitened(study.null_columns[..study.base_count()].to_vec());
-        Self { absorbed, ..self }
+        }))
     }
 
     /// `image` where this noise is white as well.
     fn whiten(&self, image: &mut Image) {
-        self.noise.iter().for_each(|noise| noise.whiten(&mut image.mean));
+        self.0.iter().for_each(|noise| noise.whiten(&mut image.mean));
     }
 
     /// [`Self::whiten`] of all.
@@ -155,19 +135,10 @@ pub struct Explained {
     pub span: Span,
 }
 
-/// The changes that explain how the data differ from the simulation; what a fit would absorb is one only if its parameters
-/// [`has_moved`]. `accepted` are effects that were found beside the null model.
-pub fn explain(
-    study: &Study,
-    set: &BaseSet,
-    (simulation, has_moved): (Nominal, bool),
-    accepted: &[Found],
-) -> Explained {
+/// The changes that explain how the data differ from the simulation; `accepted` are effects that were found beside the null model.
+pub fn explain(study: &Study, set: &BaseSet, simulation: Nominal, accepted: &[Found]) -> Explained {
     let Nominal { theta, covariance, .. } = simulation;
-    let mut unknown = Unknown::new(study, covariance);
-    if !has_moved {
-        unknown = unknown.absorbing(study);
-    }
+    let unknown = Unknown::new(study, covariance);
     let mut residual = study.torque.clone();
     for (column, theta) in study.null_columns.iter().zip(theta) {
         residual.add(-theta, column);
@@ -224,8 +195,8 @@ fn nuisance<'a>(
     }
     let answers = &study.null_columns[study.base_count()..];
     let of_drives = study.blurred_shares(&entries).chain(answers).cloned().collect();
-    for image in unknown.whitened(of_drives).iter().chain(&unknown.absorbed) {
-        span.push(image);
+    for image in unknown.whitened(of_drives) {
+        span.push(&image);
     }
     span
 }

@@ -8,6 +8,8 @@
 
 mod blocks;
 mod bootstrap;
+mod correlations;
+mod equations;
 mod newey_west;
 mod ols;
 mod paper;
@@ -16,7 +18,7 @@ mod scores;
 mod spectral;
 mod wls;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use thiserror::Error;
@@ -29,6 +31,9 @@ pub use paper::Paper;
 pub use periods::PeriodReplicates;
 pub use spectral::SpectralSandwich;
 pub use wls::WeightedLeastSquares;
+
+use correlations::correlations;
+use equations::of_equations;
 
 use super::fit::Fit;
 use super::problem::Problem;
@@ -48,6 +53,21 @@ impl Covariance {
     /// σ of every parameter.
     pub fn sigma(&self) -> Vec<f64> {
         self.matrix.diagonal().iter().map(|v| v.sqrt()).collect()
+    }
+
+    /// eᵀV⁻¹e of the `error` e of all parameters; `None` where V is singular.
+    pub fn squared_distance(&self, error: &[f64]) -> Option<f64> {
+        let sigma = DVector::from_vec(self.sigma());
+        let root = correlations(&self.matrix).cholesky()?.unpack();
+        let error = DVector::from_column_slice(error).component_div(&sigma);
+        root.solve_lower_triangular(&error).map(|e| e.norm_squared())
+    }
+
+    /// What [`squared_distance`](Self::squared_distance) is on average: b ν/(ν − 2), the mean square of Student's t for each
+    /// parameter. `None` with four degrees of freedom and fewer, where it has no variance, and no mean of trials tells it.
+    pub fn mean_distance(&self) -> Option<f64> {
+        let freedom = self.degrees_of_freedom;
+        (freedom > 4.0).then(|| self.matrix.nrows() as f64 * (1.0 + 2.0 / (freedom - 2.0)))
     }
 
     /// Half-width of the 95 % interval in units of σ: Student's t with the degrees of freedom.
@@ -145,8 +165,28 @@ pub trait CovarianceMethod {
 }
 
 impl CovarianceKind {
-    /// The method itself.
-    pub fn method(self) -> &'static dyn CovarianceMethod {
+    /// V of `fit`, which solved `problem`. Where it is a scatter of few parts, its correlations are shrunk towards those that the
+    /// equations make of each joint's noise, as far as chance alone may have put them apart; σ stays as the method has it.
+    ///
+    /// # Errors
+    /// [`CovarianceError`] where the data have not what the method asks for.
+    pub fn covariance(self, problem: &Problem, fit: &Fit) -> Result<Covariance, CovarianceError> {
+        let found = self.method().covariance(problem, fit)?;
+        if !self.is_scatter() {
+            return Ok(found);
+        }
+        Ok(found.with_correlations_towards(&of_equations(problem, fit)?))
+    }
+
+    /// Whether the noise's covariance is counted from what the log shows, of which correlations take more than there is.
+    fn is_scatter(self) -> bool {
+        match self {
+            Self::Paper | Self::Ols | Self::Wls => false,
+            Self::Periods | Self::Spectral | Self::Blocks | Self::Hac | Self::Bootstrap => true,
+        }
+    }
+
+    fn method(self) -> &'static dyn CovarianceMethod {
         match self {
             Self::Paper => &Paper,
             Self::Ols => &OrdinaryLeastSquares,

@@ -3,7 +3,7 @@
 use super::{Covariance, CovarianceError, CovarianceKind, CovarianceMethod, sandwich};
 use crate::identify::fit::Fit;
 use crate::identify::problem::Problem;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DMatrixView};
 
 /// V = A⁻¹ (Σ_j w_j⁴ s_j² X_jᵀX_j) A⁻¹ / P, A = XᵀW²X: white noise of its own standard deviation
 /// s_j on every joint. With the weights of weighted least squares, w_j = 1/s_j, this is the usual
@@ -12,8 +12,6 @@ pub struct WeightedLeastSquares;
 
 impl CovarianceMethod for WeightedLeastSquares {
     fn covariance(&self, problem: &Problem, fit: &Fit) -> Result<Covariance, CovarianceError> {
-        let b = problem.parameters();
-        let n = problem.samples;
         let scale: Vec<f64> =
             fit.weights.iter().zip(&fit.joint_sigma_nm).map(|(w, s)| w * s).collect();
         // With w_j s_j = 1 the meat is A itself and nothing has to be summed.
@@ -21,23 +19,7 @@ impl CovarianceMethod for WeightedLeastSquares {
         let matrix = if one {
             &fit.inverse * fit.inverse.transpose()
         } else {
-            let mut meat = DMatrix::zeros(b, b);
-            for (j, panel) in problem.panels.iter().enumerate() {
-                let base: Vec<usize> = problem.plan.base_indices(j).collect();
-                let factor = (scale[j] * fit.weights[j]).powi(2);
-                let columns: Vec<&[f64]> = panel.x.chunks_exact(n).collect();
-                for (p, &row) in base.iter().enumerate() {
-                    for (q, &column) in base.iter().enumerate().take(p + 1) {
-                        let product: f64 =
-                            columns[p].iter().zip(columns[q]).map(|(a, b)| a * b).sum();
-                        meat[(row, column)] += factor * product;
-                        if p != q {
-                            meat[(column, row)] += factor * product;
-                        }
-                    }
-                }
-            }
-            sandwich(fit, &meat)
+            sandwich(fit, &meat(problem, fit, &fit.joint_sigma_nm, |_, _| {}))
         };
         Ok(Covariance {
             kind: CovarianceKind::Wls,
@@ -45,4 +27,29 @@ impl CovarianceMethod for WeightedLeastSquares {
             degrees_of_freedom: (problem.samples * problem.periods) as f64,
         })
     }
+}
+
+/// Σ_j w_j⁴ s_j² X̃_jᵀX̃_j of one period, where `colour` makes X̃_j of the columns of joint j.
+pub(super) fn meat(
+    problem: &Problem,
+    fit: &Fit,
+    sigma_nm: &[f64],
+    colour: impl Fn(usize, &mut [f64]),
+) -> DMatrix<f64> {
+    let (n, b) = (problem.samples, problem.parameters());
+    let mut meat = DMatrix::zeros(b, b);
+    for (j, panel) in problem.panels.iter().enumerate() {
+        let factor = (sigma_nm[j] * fit.weights[j] * fit.weights[j]).powi(2);
+        let mut x = panel.x.clone();
+        x.chunks_exact_mut(n).for_each(|column| colour(j, column));
+        let x = DMatrixView::from_slice(&x, n, x.len() / n);
+        let products = x.tr_mul(&x);
+        let base: Vec<usize> = problem.plan.base_indices(j).collect();
+        for (product, &column) in products.column_iter().zip(&base) {
+            for (product, &row) in product.iter().zip(&base) {
+                meat[(row, column)] += factor * product;
+            }
+        }
+    }
+    meat
 }

@@ -11,7 +11,7 @@ mod instruments;
 mod replicates;
 mod spectrum;
 
-pub(super) use autoregression::prewhiten;
+pub(super) use autoregression::{autoregression, prewhiten};
 pub(super) use cross_joint::{decorrelate, decorrelation, mix};
 pub(super) use decimate::decimate;
 pub(super) use instruments::{instrument, smoothed};

@@ -269,10 +269,7 @@ impl Tallies {
         }
         for (covariance, &k) in estimate.covariances.iter().zip(indices) {
             let outcomes = match covariance {
-                Ok(covariance) => {
-                    let (sigma, quantile) = (covariance.sigma(), covariance.quantile_95());
-                    experiment.outcomes(&estimate.fit.theta, &sigma, quantile)
-                }
+                Ok(covariance) => experiment.outcomes(&estimate.fit.theta, covariance),
                 Err(error) => Err(TrialError::Identify(error.clone().into())),
             };
             match outcomes {

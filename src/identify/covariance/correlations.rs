@@ -1,0 +1,112 @@
+//! Correlations that a scatter is too short to tell.
+
+use nalgebra::DMatrix;
+
+use super::Covariance;
+
+impl Covariance {
+    /// The same σ with correlations (1 − a) r_ik + a t_ik, the found r shrunk towards those of `target`, t; in
+    /// a = Σ_{i≠k} (1 − r_ik²)²/ν / Σ_{i≠k} (r_ik − t_ik)², at most 1, the numerator is what chance alone puts between them
+    /// with ν degrees of freedom (Schäfer and Strimmer 2005, their target C with correlations in place of none).
+    ///
+    /// A scatter with ν degrees of freedom between b parameters says next to nothing of the b(b − 1)/2 correlations where ν is
+    /// not many times b: with fewer than b it is singular, and with twice as many b + 1 of its errors squared in its own units,
+    /// which should add up to b, add up to about 2b. How the parameters hang together is what the motion makes of noise,
+    /// and that the equations know; how large each is the scatter knows.
+    pub(super) fn with_correlations_towards(mut self, target: &DMatrix<f64>) -> Self {
+        let [found, known] = [&self.matrix, target].map(correlations);
+        let (mut by_chance, mut apart) = (0.0, 0.0);
+        for (r, t) in found.iter().zip(&known) {
+            // On the diagonal both are one.
+            by_chance += (1.0 - r * r).powi(2) / self.degrees_of_freedom;
+            apart += (r - t).powi(2);
+        }
+        // Without any scatter there is nothing to hold on to but the target.
+        let towards = (by_chance / apart).min(1.0);
+        let sigma = self.sigma();
+        self.matrix = DMatrix::from_fn(sigma.len(), sigma.len(), |i, k| {
+            if i == k {
+                return self.matrix[(i, i)];
+            }
+            let (r, t) = (found[(i, k)], known[(i, k)]);
+            sigma[i] * sigma[k] * (r + towards * (t - r))
+        });
+        self
+    }
+}
+
+/// m_ik/√(m_ii m_kk); no correlation with what does not scatter.
+pub(super) fn correlations(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+    let scale = matrix.diagonal().map(f64::sqrt);
+    DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, k| {
+        let product = scale[i] * scale[k];
+        match i == k {
+            true => 1.0,
+            false if product > 0.0 => matrix[(i, k)] / product,
+            false => 0.0,
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::CovarianceKind;
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    const B: usize = 12;
+
+    /// ρ^|i − k| with σ_i = i + 1.
+    fn law(rho: f64) -> DMatrix<f64> {
+        let sigma = |i: usize| (i + 1) as f64;
+        DMatrix::from_fn(B, B, |i, k| sigma(i) * sigma(k) * rho.powi(i.abs_diff(k) as i32))
+    }
+
+    /// The scatter of `freedom` draws from `law`.
+    fn scatter(law: &DMatrix<f64>, freedom: usize, seed: u64) -> Covariance {
+        let mut rng = rand::rngs::ChaCha8Rng::seed_from_u64(seed);
+        let root = law.clone().cholesky().unwrap().unpack();
+        let draws = root * DMatrix::from_fn(B, freedom, |_, _| StandardNormal.sample(&mut rng));
+        Covariance {
+            kind: CovarianceKind::Periods,
+            matrix: &draws * draws.transpose() / freedom as f64,
+            degrees_of_freedom: freedom as f64,
+        }
+    }
+
+    #[test]
+    fn a_short_scatter_keeps_its_sigmas_and_takes_over_the_correlations() {
+        let law = law(0.7);
+        for seed in 0..20 {
+            let found = scatter(&law, 5, seed);
+            let sigma = found.sigma();
+            let whole = found.with_correlations_towards(&law);
+            assert_eq!(whole.sigma(), sigma);
+            assert!(whole.matrix.clone().cholesky().is_some(), "not positive definite");
+        }
+    }
+
+    /// One of many thousand degrees of freedom knows better: a target that is wrong has no weight.
+    #[test]
+    fn a_long_scatter_keeps_its_correlations() {
+        let found = scatter(&law(0.7), 20_000, 3);
+        let before = found.matrix.clone();
+        let apart = (correlations(&before) - correlations(&law(0.0))).norm_squared();
+        let after = found.with_correlations_towards(&law(0.0)).matrix;
+        let moved = (correlations(&after) - correlations(&before)).norm_squared();
+        // a is at most the B² pairs of one over ν each.
+        let bound = (B * B) as f64 / 20_000.0 / apart;
+        assert!(moved.sqrt() <= bound * apart.sqrt(), "{moved} {bound}");
+    }
+
+    #[test]
+    fn no_scatter_stays_none() {
+        let nothing = Covariance {
+            kind: CovarianceKind::Spectral,
+            matrix: DMatrix::zeros(B, B),
+            degrees_of_freedom: f64::NAN,
+        };
+        assert_eq!(nothing.with_correlations_towards(&law(0.5)).matrix, DMatrix::zeros(B, B));
+    }
+}
