@@ -77,15 +77,17 @@ fn nothing_is_named_against_the_simulation_that_made_the_log() {
     assert!(!says_that_contacts_are_not_looked_for(&d), "{:?}", d.warnings);
 }
 
-/// A simulation that was identified from another clean log, along another motion with twice the noise: what it is wrong by is in its
-/// covariance. Taken for exact, it had changes named in these logs.
+/// A simulation that was identified from another clean log, along another motion with twice the noise, at twice the rate and behind
+/// other drives: what it is wrong by is in its covariance, in all combinations of its parameters. Taken for exact, it had changes
+/// named in these logs.
 #[test]
 fn what_an_identified_simulation_does_not_know_is_no_change() {
     let loud =
         "torque_sd_nm = [2.0, 2.0, 1.4, 0.3, 0.3, 0.3]\nq_sd_rad = 4e-5\nqd_sd_rad_s = 2e-3\n";
     let mut as_if_exact = 0;
     for seed in [41, 42] {
-        let before = Run::new(scenario(("before", seed), ("ur5_validation", 6), loud, ""));
+        let plant = "[plant]\nlog_rate_hz = 250.0\nfriction_feedforward = 0.5\n";
+        let before = Run::new(scenario(("before", seed), ("ur5_validation", 6), loud, plant));
         let mut identifier = Identifier::new(&before.model, &before.set, before.options.clone());
         let identified = identifier.identify(&before.log.measurement("before")).unwrap();
         let simulation = Nominal {
@@ -102,6 +104,9 @@ fn what_an_identified_simulation_does_not_know_is_no_change() {
         assert!(d.causes.is_empty(), "{:?}", d.sentences);
         // 58 parameters in two logs: noise shows one of them 5 σ away in one of 15 000 such tests.
         assert!(d.moved_parameters.iter().all(|moved| moved.z.abs() < 5.0));
+        let together = d.moved_together.unwrap();
+        // One of 10⁴ such logs has less.
+        assert!(together.p_value > 1e-4, "{together:?}");
         as_if_exact += against(&clean, Nominal::certain(simulation.theta)).causes.len();
 
         let body = "[[effect]]\nkind = \"payload\"\nmass_kg = 0.5\ncom_x_m = 0.0\ncom_y_m = 0.02\n\
@@ -110,6 +115,7 @@ fn what_an_identified_simulation_does_not_know_is_no_change() {
         let named: Vec<_> = d.causes.iter().map(|c| c.kind).collect();
         assert_eq!(named, [Kind::Payload], "{:?}", d.sentences);
         assert_near(&d.causes[0], "mass_kg", 0.5);
+        assert!(d.moved_together.unwrap().p_value < 1e-9);
     }
     assert!(as_if_exact > 0, "a test that cannot fail");
 }

@@ -142,9 +142,11 @@ impl<'a> Diagnoser<'a> {
             self.compare(&study, &selected, simulation, &mut model);
         }
         let Extended { mut causes, extension, after_nm, accepted, rest } = model;
-        let base_parameters = intervals::base(&study, self.set, &extension);
+        let (base_parameters, of_base) = intervals::base(&study, self.set, &extension);
         let moved_parameters =
             simulation.map_or(Vec::new(), |s| against::moved(s, &base_parameters));
+        let moved_together = simulation
+            .and_then(|s| against::moved_together(&study, s, &base_parameters, &of_base));
         let is_a_tear = |cause: &mut Cause| {
             let at = |name| cause.parameters.get(name).map_or(f64::NAN, |e| e.value);
             cause.kind == Kind::Contact && is_torn(m, [at("start_s"), at("end_s")])
@@ -212,6 +214,7 @@ impl<'a> Diagnoser<'a> {
             base_parameters,
             held_out,
             moved_parameters,
+            moved_together,
             payload: None,
             replay: None,
             detection_limits: detection_limits(&study, &accepted),

@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
+use nalgebra::DMatrix;
+
 #[cfg(doc)]
 use super::candidates::Candidate;
 use super::candidates::{Quantity, Search, Shape};
@@ -46,8 +48,13 @@ pub(super) fn tangents(study: &Study, effect: &Effect) -> Vec<Image> {
 }
 
 /// Base parameters beside the effects of `extension` with their σ, the effects' own numbers unknown as well:
-/// the block of (XᵀX)⁻¹ that belongs to them, X with the tangents of the effects.
-pub fn base(study: &Study, set: &BaseSet, extension: &Extension) -> Vec<BaseParameter> {
+/// the block of (XᵀX)⁻¹ that belongs to them, X with the tangents of the effects, which is returned as well (NaN where the effects
+/// leave nothing of one).
+pub fn base(
+    study: &Study,
+    set: &BaseSet,
+    extension: &Extension,
+) -> (Vec<BaseParameter>, DMatrix<f64>) {
     let effects = extension.effects.iter().flat_map(|effect| tangents(study, effect));
     let mut span = Span::default();
     effects.for_each(|image| {
@@ -59,17 +66,18 @@ pub fn base(study: &Study, set: &BaseSet, extension: &Extension) -> Vec<BasePara
         span.push(column).then_some(next)
     };
     let places: Vec<Option<usize>> = study.null_columns.iter().map(place).collect();
-    let covariance = study.statistic.covariance(&span, &study.torque);
-    (0..set.rank())
-        .map(|k| BaseParameter {
-            name: set.name(k).to_owned(),
-            value: extension.theta[k],
-            sigma: match places[k].and_then(|at| covariance.get((at, at))) {
-                Some(variance) => variance.max(0.0).sqrt(),
-                None => f64::NAN,
-            },
-        })
-        .collect()
+    let of_all = study.statistic.covariance(&span, &study.torque);
+    let covariance = DMatrix::from_fn(set.rank(), set.rank(), |i, k| match (places[i], places[k]) {
+        (Some(i), Some(k)) => of_all[(i, k)],
+        _ => f64::NAN,
+    });
+    let parameter = |k: usize| BaseParameter {
+        name: set.name(k).to_owned(),
+        value: extension.theta[k],
+        // What is NaN stays it.
+        sigma: covariance[(k, k)].clamp(0.0, f64::INFINITY).sqrt(),
+    };
+    ((0..set.rank()).map(parameter).collect(), covariance)
 }
 
 /// Physical parameters of a cause with 95 % intervals. Where the family has several forms (Stribeck's

@@ -3,7 +3,7 @@
 use super::against::MOVED;
 use super::kind::Kind;
 use super::verdict::{Cause, Diagnosis, Estimate, HeldOut, Moved};
-use crate::number::{significant, with_sigma};
+use crate::number::{percent, significant, with_sigma};
 
 /// An interval that reaches so much farther to one side than to the other is told by its ends.
 const UNEVEN: f64 = 1.2;
@@ -11,6 +11,8 @@ const UNEVEN: f64 = 1.2;
 const EVEN_ODDS: f64 = 0.5;
 /// Times the error along the log from which on the error along another one is none of the same arm.
 const OF_ANOTHER_ARM: f64 = 3.0;
+/// Chances below this are all alike.
+const RARE: f64 = 1e-4;
 /// Ends of an interval between which nothing is known.
 const VAST: f64 = 1000.0;
 
@@ -57,8 +59,15 @@ impl Diagnosis {
         let far = |a: &&Moved, b: &&Moved| a.z.abs().total_cmp(&b.z.abs());
         let farthest = self.moved_parameters.iter().max_by(far)?;
         let moved = self.moved_parameters.iter().filter(|m| m.z.abs() > MOVED).count();
+        let together = self.moved_together.map_or_else(String::new, |together| {
+            let share = match together.p_value < RARE {
+                true => format!("less than {}", percent(RARE, 1)),
+                false => percent(together.p_value, 2),
+            };
+            format!("; noise alone carries all of them together as far in {share} of logs")
+        });
         Some(format!(
-            "Beside the simulation {moved} of {} base parameters differ by more than {MOVED} σ; {} differs most, by {} σ.",
+            "Beside the simulation {moved} of {} base parameters differ by more than {MOVED} σ; {} differs most, by {} σ{together}.",
             self.moved_parameters.len(),
             farthest.name,
             significant(farthest.z.abs(), 2),

@@ -180,6 +180,17 @@ pub struct Moved {
     pub z: f64,
 }
 
+/// All parameters of the simulation together against the data.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct MovedTogether {
+    /// dᵀV⁻¹d of the differences d with their covariance V: as many as there are parameters on average where nothing moved.
+    pub squared_distance: f64,
+    /// Of χ² that it is compared with: the parameters.
+    pub degrees_of_freedom: usize,
+    /// Probability that noise alone carries them so far.
+    pub p_value: f64,
+}
+
 /// A base parameter beside the causes that were found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BaseParameter {
@@ -215,6 +226,8 @@ pub struct Diagnosis {
     pub held_out: Vec<HeldOut>,
     /// Parameters against the simulation.
     pub moved_parameters: Vec<Moved>,
+    /// All of them together; null for a single run, and without a simulation.
+    pub moved_together: Option<MovedTogether>,
     /// A second log against this one.
     pub payload: Option<PayloadFinding>,
     /// The simulation against the logs, without and with the causes; null where it was not asked for or

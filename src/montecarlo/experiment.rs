@@ -8,7 +8,7 @@ use super::simulation::Simulation;
 use super::tally::{Outcome, Outcomes, Tally};
 use super::trials::{Content, Difference, Trials};
 use crate::dynamics::Model;
-use crate::identify::covariance::{Covariance, CovarianceKind};
+use crate::identify::covariance::{Covariance, CovarianceKind, squared_distance};
 use crate::identify::{Estimator, Identification, Identifier, IdentifyError, Options};
 use crate::plant::{Measured, PlantError};
 
@@ -119,7 +119,7 @@ impl Experiment {
         };
         let estimates = error.iter().zip(&sigma).zip(scale).enumerate();
         let parameters: Vec<Outcome> = estimates.map(outcome).collect::<Result<_, _>>()?;
-        let squared = covariance.squared_distance(&error).ok_or(TrialError::Singular)?;
+        let squared = squared_distance(&covariance.matrix, &error).ok_or(TrialError::Singular)?;
         let distance = covariance.mean_distance().map(|mean| squared / mean);
         let outcomes = Outcomes { parameters, distance };
         match outcomes.is_sound() {

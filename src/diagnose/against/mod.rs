@@ -21,10 +21,12 @@ use super::intervals::tangents;
 use super::judgement::{TELLS_APART, probability_of_class};
 use super::kind::Kind;
 use super::significance::LEAST_EVIDENCE;
+use super::statistic::upper_chi_squared;
 use super::study::{Entry, Study};
-use super::verdict::{BaseParameter, Cause, Moved, Rival};
+use super::verdict::{BaseParameter, Cause, Moved, MovedTogether, Rival};
 use super::whitening::RepeatingNoise;
 use crate::base::BaseSet;
+use crate::identify::covariance::squared_distance;
 
 /// Changes at most.
 const MOST_CHANGES: usize = 8;
@@ -64,6 +66,27 @@ pub fn moved(simulation: Nominal, data: &[BaseParameter]) -> Vec<Moved> {
         Moved { name: data.name.clone(), simulation, data: data.value, sigma, z }
     };
     data.iter().enumerate().map(of_parameter).collect()
+}
+
+/// How far the `data`, whose base parameters have the `covariance`, lie from a simulation in all parameters together: of a log that
+/// repeats, whose noise the `study` knows. Combinations of parameters are told far better than any of them.
+pub fn moved_together(
+    study: &Study,
+    simulation: Nominal,
+    data: &[BaseParameter],
+    covariance: &DMatrix<f64>,
+) -> Option<MovedTogether> {
+    if !study.scene.periodic {
+        return None;
+    }
+    let covariance = match simulation.covariance {
+        Some(unknown) => covariance + unknown,
+        None => covariance.clone(),
+    };
+    let difference = data.iter().zip(simulation.theta).map(|(data, theta)| data.value - theta);
+    let squared_distance = squared_distance(&covariance, &difference.collect::<Vec<_>>())?;
+    let p_value = upper_chi_squared(squared_distance, data.len());
+    Some(MovedTogether { squared_distance, degrees_of_freedom: data.len(), p_value })
 }
 
 /// An effect that was found beside the null model.

@@ -55,15 +55,7 @@ impl Covariance {
         self.matrix.diagonal().iter().map(|v| v.sqrt()).collect()
     }
 
-    /// eᵀV⁻¹e of the `error` e of all parameters; `None` where V is singular.
-    pub fn squared_distance(&self, error: &[f64]) -> Option<f64> {
-        let sigma = DVector::from_vec(self.sigma());
-        let root = correlations(&self.matrix).cholesky()?.unpack();
-        let error = DVector::from_column_slice(error).component_div(&sigma);
-        root.solve_lower_triangular(&error).map(|e| e.norm_squared())
-    }
-
-    /// What [`squared_distance`](Self::squared_distance) is on average: b ν/(ν − 2), the mean square of Student's t for each
+    /// What [`squared_distance`] of an error is on average: b ν/(ν − 2), the mean square of Student's t for each
     /// parameter. `None` with four degrees of freedom and fewer, where it has no variance, and no mean of trials tells it.
     pub fn mean_distance(&self) -> Option<f64> {
         let freedom = self.degrees_of_freedom;
@@ -74,6 +66,15 @@ impl Covariance {
     pub fn quantile_95(&self) -> f64 {
         quantile_95(self.degrees_of_freedom)
     }
+}
+
+/// eᵀV⁻¹e of an `error` e with the covariance V, `matrix`; `None` where that is singular.
+pub fn squared_distance(matrix: &DMatrix<f64>, error: &[f64]) -> Option<f64> {
+    // Units differ: only correlations tell whether it is singular.
+    let root = correlations(matrix).cholesky()?.unpack();
+    let sigma = matrix.diagonal().map(f64::sqrt);
+    let error = DVector::from_column_slice(error).component_div(&sigma);
+    root.solve_lower_triangular(&error).map(|e| e.norm_squared())
 }
 
 /// 97.5 % quantile of Student's t; 1.96 for infinitely many degrees of freedom.
