@@ -184,6 +184,38 @@ mod tests {
     use super::*;
     use crate::base::Parameterisation;
 
+    /// Of a result with the two parameters `a` and `b` and this `base_covariance`, taken in the order b, a.
+    fn covariance(rows: &str) -> Result<DMatrix<f64>, String> {
+        let result = serde_json::json!({
+            "robot": "ur5",
+            "base_parameters": [
+                {"name": "a", "value": 1.0, "sigma": 2.0},
+                {"name": "b", "value": 1.0, "sigma": 3.0},
+            ],
+            "base_covariance": serde_json::from_str::<serde_json::Value>(rows).unwrap(),
+        });
+        serde_json::from_value::<IdentifiedParameters>(result).unwrap().covariance(&[1, 0])
+    }
+
+    #[test]
+    fn a_covariance_is_put_in_the_order_of_the_parameters() {
+        let found = covariance("[[4.0, 1.5], [1.5, 9.0]]").unwrap();
+        assert_eq!(found, DMatrix::from_row_slice(2, 2, &[9.0, 1.5, 1.5, 4.0]));
+        // Results of older programs have σ alone.
+        let found = covariance("null").unwrap();
+        assert_eq!(found, DMatrix::from_row_slice(2, 2, &[9.0, 0.0, 0.0, 4.0]));
+    }
+
+    #[test]
+    fn what_is_no_covariance_is_refused() {
+        let not_square = ["[[4.0, 1.5]]", "[[4.0], [1.5, 9.0]]", "[]"];
+        let no_numbers = ["[[4.0, null], [1.5, 9.0]]", "[[-4.0, 1.5], [1.5, 9.0]]"];
+        for rows in not_square.iter().chain(&no_numbers) {
+            let error = covariance(rows).unwrap_err();
+            assert!(error.contains("no covariance of its base parameters (2 × 2"), "{error}");
+        }
+    }
+
     /// The JSON of a diagnosis has base parameters as well, but no simulation is described by what is left beside its causes.
     #[test]
     fn a_diagnosis_is_no_simulation() {
