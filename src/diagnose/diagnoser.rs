@@ -145,8 +145,8 @@ impl<'a> Diagnoser<'a> {
         let (base_parameters, of_base) = intervals::base(&study, self.set, &extension);
         let moved_parameters =
             simulation.map_or(Vec::new(), |s| against::moved(s, &base_parameters));
-        let moved_together = simulation
-            .and_then(|s| against::moved_together(&study, s, &base_parameters, &of_base));
+        let moved_together =
+            simulation.and_then(|s| against::moved_together(&study, s, &base_parameters, &of_base));
         let is_a_tear = |cause: &mut Cause| {
             let at = |name| cause.parameters.get(name).map_or(f64::NAN, |e| e.value);
             cause.kind == Kind::Contact && is_torn(m, [at("start_s"), at("end_s")])

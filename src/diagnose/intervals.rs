@@ -67,10 +67,11 @@ pub fn base(
     };
     let places: Vec<Option<usize>> = study.null_columns.iter().map(place).collect();
     let of_all = study.statistic.covariance(&span, &study.torque);
-    let covariance = DMatrix::from_fn(set.rank(), set.rank(), |i, k| match (places[i], places[k]) {
-        (Some(i), Some(k)) => of_all[(i, k)],
-        _ => f64::NAN,
-    });
+    let covariance =
+        DMatrix::from_fn(set.rank(), set.rank(), |i, k| match (places[i], places[k]) {
+            (Some(i), Some(k)) => of_all[(i, k)],
+            _ => f64::NAN,
+        });
     let parameter = |k: usize| BaseParameter {
         name: set.name(k).to_owned(),
         value: extension.theta[k],

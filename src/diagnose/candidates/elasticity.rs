@@ -18,8 +18,9 @@
 //! by which a stiff gear is seen that hardly bends; the drive, which holds the rotor, damps by d_M ([`held_nm_s_rad`]).
 //! Where the log has the link's angle, the rotor and its friction move more:
 //! I_a δ̈ + F_v δ̇ + F_c [tanh((q̇ + δ̇)/ε) − tanh(q̇/ε)] on the joint itself, δ = τ_L/(k + i d ω) (further variants; the
-//! friction reverses where the motor does). The stiffness is in the coefficient 1/k; the shape only says how fast the gear
-//! swings.
+//! friction reverses where the motor does). There τ_L is differentiated twice, and ends where it is no longer known a hundred times
+//! better than its noise: that noise is in the residual as well, and with a load that was known ten times better the two together
+//! made stiff gears of clean logs. The stiffness is in the coefficient 1/k; the shape only says how fast the gear swings.
 
 use super::*;
 use crate::diagnose::scene::FINE;
@@ -213,7 +214,7 @@ impl Candidate for Elasticity {
         }
         let (stiffness, ratio) = (shape.value, LINK_DAMPING_RATIO[shape.variant - ON_MOTOR]);
         let damping = 2.0 * ratio * (stiffness * scene.rotor_kg_m2[j]).sqrt();
-        let delta = scene.filtered(scene.bending_nm(j), |omega| {
+        let delta = scene.filtered(scene.link_nm.joint(j), |omega| {
             Complex64::new(stiffness, damping * omega).inv()
         });
         let rate = scene.derivative(&delta);
