@@ -18,9 +18,13 @@
 //! by which a stiff gear is seen that hardly bends; the drive, which holds the rotor, damps by d_M ([`held_nm_s_rad`]).
 //! Where the log has the link's angle, the rotor and its friction move more:
 //! I_a δ̈ + F_v δ̇ + F_c [tanh((q̇ + δ̇)/ε) − tanh(q̇/ε)] on the joint itself, δ = τ_L/(k + i d ω) (further variants; the
-//! friction reverses where the motor does). There τ_L is differentiated twice, and ends where it is no longer known a hundred times
-//! better than its noise: that noise is in the residual as well, and with a load that was known ten times better the two together
-//! made stiff gears of clean logs. The stiffness is in the coefficient 1/k; the shape only says how fast the gear swings.
+//! friction reverses where the motor does). There τ_L is differentiated twice, and its noise is in the residual as well: of a load that
+//! is known ten times better than that, the two together make stiff gears of clean logs. So far it is taken for soft gears alone
+//! ([`stiffest_nm_rad`]), and as far as it is known a hundred times better for all. The stiffness is in the coefficient 1/k; the
+//! shape only says how fast the gear swings.
+
+use std::f64::consts::TAU;
+use std::ops::Range;
 
 use super::*;
 use crate::diagnose::scene::FINE;
@@ -41,7 +45,13 @@ const JOLTED_DAMPING_RATIO: f64 = 0.15;
 pub const ON_MOTOR: usize = 2;
 /// Damping where the encoder sits on the link, by further variants: a loop closed over the gear needs it.
 const LINK_DAMPING_RATIO: [f64; 2] = [0.05, 0.3];
-/// Stiffnesses, Nm/rad: neighbours are told by where the links swing.
+/// The first variants of these know the load ten times better than its noise, the others, from here on, a hundred times.
+const WELL_KNOWN_ON_LINK: usize = ON_MOTOR + LINK_DAMPING_RATIO.len();
+/// The range of stiffnesses, Nm/rad.
+const SOFTEST_NM_RAD: f64 = 2e3;
+/// See [`SOFTEST_NM_RAD`].
+const STIFFEST_NM_RAD: f64 = 2e5;
+/// Stiffnesses: neighbours are told by where the links swing.
 const STIFFNESSES: usize = 14;
 /// The same where they are told by nothing but how far the gear bends.
 const BENT_STIFFNESSES: usize = 3;
@@ -175,6 +185,12 @@ impl Swing {
     }
 }
 
+/// The stiffest gear that a load known ten times better than its noise tells where the encoder sits on the link: one on which the rotor
+/// swings within half the harmonics that a log can have. In clean logs noise made gears of four to ten times that.
+fn stiffest_nm_rad(scene: &Scene, j: usize) -> f64 {
+    scene.rotor_kg_m2[j] * (0.25 * TAU * scene.rate_hz).powi(2)
+}
+
 /// Torques on all joints when the links move as `motion`, per unit of `scale`.
 pub(super) fn give_way(scene: &Scene, motion: &Motion, scale: f64) -> Column {
     Column::everywhere(&scene.torque_change(&scene.arm, motion)).scaled(1.0 / scale)
@@ -185,15 +201,28 @@ impl Candidate for Elasticity {
         Kind::Elasticity
     }
 
-    fn shapes(&self, scene: &Scene, _: Option<usize>) -> Vec<Shape> {
-        // Of a single run the log's own motion is all there is.
-        let is_there = |variant: &usize| scene.periodic || *variant == 0 || *variant >= ON_MOTOR;
-        let swings = |variant| scene.periodic && variant < ON_MOTOR;
-        let count = |variant| if swings(variant) { STIFFNESSES } else { BENT_STIFFNESSES };
-        let of = |variant| {
-            geometric(2e3, 2e5, count(variant)).map(move |value| Shape { variant, value })
+    fn shapes(&self, scene: &Scene, site: Option<usize>) -> Vec<Shape> {
+        let on_motor = 0..ON_MOTOR;
+        let on_link = ON_MOTOR..WELL_KNOWN_ON_LINK;
+        let well_known_on_link = WELL_KNOWN_ON_LINK..WELL_KNOWN_ON_LINK + LINK_DAMPING_RATIO.len();
+        let of = |(variants, stiffest, count): (Range<usize>, f64, usize)| {
+            variants.flat_map(move |variant| {
+                geometric(SOFTEST_NM_RAD, stiffest, count)
+                    .map(move |value| Shape { variant, value })
+            })
         };
-        (0..ON_MOTOR + LINK_DAMPING_RATIO.len()).filter(is_there).flat_map(of).collect()
+        if !scene.periodic {
+            // Of a single run the log's own motion is all there is.
+            let parts = [0..1, well_known_on_link].map(|v| (v, STIFFEST_NM_RAD, BENT_STIFFNESSES));
+            return parts.into_iter().flat_map(of).collect();
+        }
+        let stiffest = stiffest_nm_rad(scene, joint(site)).clamp(SOFTEST_NM_RAD, STIFFEST_NM_RAD);
+        let parts = [
+            (on_motor, STIFFEST_NM_RAD, STIFFNESSES),
+            (on_link, stiffest, BENT_STIFFNESSES),
+            (well_known_on_link, STIFFEST_NM_RAD, BENT_STIFFNESSES),
+        ];
+        parts.into_iter().flat_map(of).collect()
     }
 
     fn search(&self) -> Search {
@@ -212,11 +241,15 @@ impl Candidate for Elasticity {
             let links = swing(scene, j, shape.variant, stiffness).of(scene, j);
             return vec![give_way(scene, &links, 1.0 / stiffness)];
         }
-        let (stiffness, ratio) = (shape.value, LINK_DAMPING_RATIO[shape.variant - ON_MOTOR]);
+        let form = shape.variant - ON_MOTOR;
+        let (stiffness, ratio) = (shape.value, LINK_DAMPING_RATIO[form % LINK_DAMPING_RATIO.len()]);
         let damping = 2.0 * ratio * (stiffness * scene.rotor_kg_m2[j]).sqrt();
-        let delta = scene.filtered(scene.link_nm.joint(j), |omega| {
-            Complex64::new(stiffness, damping * omega).inv()
-        });
+        let load_nm = match shape.variant < WELL_KNOWN_ON_LINK {
+            true => scene.bending_nm(j),
+            false => scene.link_nm.joint(j),
+        };
+        let delta =
+            scene.filtered(load_nm, |omega| Complex64::new(stiffness, damping * omega).inv());
         let rate = scene.derivative(&delta);
         let acceleration = scene.accelerations(&rate);
         let (qd, sign) = (scene.motion.qd_rad_s.joint(j), scene.sign.joint(j));
@@ -253,8 +286,9 @@ impl Candidate for Elasticity {
         "motor and link encoder in one log, or a tap on the link: the resonance tells the stiffness"
     }
 
-    fn is_possible(&self, _: Shape, b: &[f64]) -> bool {
-        b[0] > 0.0
+    fn is_possible(&self, shape: Shape, b: &[f64]) -> bool {
+        let may_be_stiffer = !(ON_MOTOR..WELL_KNOWN_ON_LINK).contains(&shape.variant);
+        b[0] > 0.0 && (may_be_stiffer || 1.0 / b[0] <= shape.value)
     }
 
     fn can_be(&self, scene: &Scene, site: Option<usize>, stiffness_nm_rad: f64) -> bool {
