@@ -10,9 +10,9 @@ impl Covariance {
     /// with ν degrees of freedom (Schäfer and Strimmer 2005, their target C with correlations in place of none).
     ///
     /// A scatter with ν degrees of freedom between b parameters says next to nothing of the b(b − 1)/2 correlations where ν is
-    /// not many times b: with fewer than b it is singular, and with twice as many b + 1 of its errors squared in its own units,
-    /// which should add up to b, add up to about 2b. How the parameters hang together is what the motion makes of noise,
-    /// and that the equations know; how large each is the scatter knows.
+    /// not many times b: with fewer than b it is singular, and with 2 (b + 1) squared errors in units of it, eᵀV⁻¹e, add up to 2b
+    /// where they should add up to b. How the parameters hang together is what the motion makes of noise, and that the
+    /// equations know; how large the error of each is the scatter knows.
     pub(super) fn with_correlations_towards(mut self, target: &DMatrix<f64>) -> Self {
         let [found, known] = [&self.matrix, target].map(correlations);
         let (mut by_chance, mut apart) = (0.0, 0.0);
