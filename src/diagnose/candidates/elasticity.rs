@@ -186,7 +186,7 @@ impl Swing {
 }
 
 /// The stiffest gear that a load known ten times better than its noise tells where the encoder sits on the link: one on which the rotor
-/// swings within half the harmonics that a log can have. In clean logs noise made gears of four to ten times that.
+/// swings within half the harmonics that a log can have. In clean logs noise made gears of four to sixteen times that.
 fn stiffest_nm_rad(scene: &Scene, j: usize) -> f64 {
     scene.rotor_kg_m2[j] * (0.25 * TAU * scene.rate_hz).powi(2)
 }
