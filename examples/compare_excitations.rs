@@ -2,7 +2,7 @@
 //! `cargo run --release --example compare_excitations -- FILE.json…`
 //!
 //! A file is a trajectory of `armid excite`, or a collection `{"designs": [{criterion, period_s, order,
-//! rest_start, q0_rad, a_rad_s, b_rad_s}]}`. Robot: UR5; 80 s at 125 Hz with noise 1/1/.7/.15/.15/.15 Nm.
+//! rest_start, max_acceleration_rad_s2, q0_rad, a_rad_s, b_rad_s}]}`. Robot: UR5; 80 s at 125 Hz with noise 1/1/.7/.15/.15/.15 Nm.
 
 use std::error::Error;
 

@@ -32,7 +32,7 @@ fn page() -> Result<Page, Box<dyn Error>> {
         status: Status::Warn,
         sentence: "Joint 2's model misses friction that grows with load (6.3 ± 0.3 % of the gear torque).".into(),
         facts: vec![
-            "Adding it removes 71 % of what the noise floor leaves to explain, in other periods of this log than its size is fitted to.".into(),
+            "Adding it removes 71 % of what the noise floor leaves to explain, on periods that were not used to fit it.".into(),
             "Held-out torque error of joint 2: 3.1 Nm before, 1.7 Nm after; noise floor 1.2 Nm.".into(),
             format!("{} of {} rows used; 214 set aside as standstill.", number::count(9_786), number::count(10_000)),
             "Everything on this page is made up.".into(),

@@ -35,13 +35,36 @@ fn words(text: &str) -> Vec<String> {
     split.map(str::to_owned).collect()
 }
 
-/// What stands in back ticks in `markdown`, or outside of comments in the scenarios that it refers to.
-fn documented(markdown: &str) -> BTreeSet<String> {
-    let quoted = markdown.split('`').skip(1).step_by(2);
+/// What stands in back ticks in `markdown`.
+fn quoted(markdown: &str) -> BTreeSet<String> {
+    markdown.split('`').skip(1).step_by(2).flat_map(words).collect()
+}
+
+/// What stands outside of comments in the scenarios that the description refers to.
+fn of_scenarios() -> BTreeSet<String> {
     let scenarios =
         [include_str!("../sims/example.toml"), include_str!("../sims/effects.toml")].concat();
     let lines = scenarios.lines().filter_map(|line| line.split('#').next());
-    quoted.chain(lines).flat_map(words).collect()
+    lines.flat_map(words).collect()
+}
+
+/// The part of `markdown` below `heading`, down to the next heading of the same level or a higher one.
+fn section<'a>(markdown: &'a str, heading: &str) -> &'a str {
+    let level = heading.split(' ').next().unwrap().len();
+    let start = markdown.find(&format!("{heading}\n")).unwrap_or_else(|| panic!("{heading}"));
+    let body = &markdown[start + heading.len()..];
+    let is_end = |line: &str| {
+        let hashes = line.bytes().take_while(|byte| *byte == b'#').count();
+        (1..=level).contains(&hashes)
+    };
+    let mut end = 0;
+    for line in body.split_inclusive('\n') {
+        if end > 0 && is_end(line) {
+            break;
+        }
+        end += line.len();
+    }
+    &body[..end]
 }
 
 #[test]
@@ -77,8 +100,23 @@ fn every_key_of_every_result_is_described() {
     ] {
         run(here, program, words);
     }
-    let known = documented(include_str!("../docs/formats.md"));
-    for file in ["truth", "base", "identified", "both", "why", "moved", "motion", "trials"] {
+    let description = include_str!("../docs/formats.md");
+    let of_all = section(description, "## Results").split("\n### ").next().unwrap();
+    for (file, heading) in [
+        ("truth", "### The others"),
+        ("base", "### The others"),
+        ("trials", "### The others"),
+        ("motion", "#### Trajectory"),
+        ("identified", "### `armid identify --json`"),
+        ("both", "### `armid identify --json`"),
+        ("why", "### `armid diagnose --json`"),
+        ("moved", "### `armid diagnose --json`"),
+    ] {
+        let mut known = quoted(&[of_all, section(description, heading)].concat());
+        if file == "truth" {
+            // It repeats what was hidden and the noise, as the scenario has them.
+            known.extend(of_scenarios());
+        }
         let text = std::fs::read_to_string(here.join(file).with_extension("json")).unwrap();
         let mut found = BTreeSet::new();
         keys(&serde_json::from_str(&text).unwrap(), &mut found);

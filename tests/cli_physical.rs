@@ -146,6 +146,8 @@ fn the_weight_of_the_prior_is_cross_validated_and_shown() {
     }
     let words = "identify log.csv --robot ur5 --period 0 --physical --prior-weight auto";
     says(&armid(folder, words), 1, &["repeats at least 3 times", "give the weight as a number"]);
+    let words = "identify log.csv log.csv --robot ur5 --physical --prior-weight auto";
+    says(&armid(folder, words), 1, &["--prior-weight auto", "of several logs give it as a number"]);
     let words = "identify log.csv --robot ur5 --physical --prior-weight 0";
     says(&armid(folder, words), 2, &["positive number or auto"]);
     says(&armid(folder, "identify log.csv --robot ur5 --prior entropic"), 2, &["--physical"]);
@@ -161,7 +163,8 @@ fn a_wrong_model_is_called_wrong_and_sent_to_diagnose() {
     says(&armid(folder.path(), "simulate --scenario late.toml --out late.csv"), 0, &[]);
     let words = "identify late.csv --robot ur5 --physical --json late.json --report late.html";
     let wrong = "the model is wrong, not only noisy";
-    let told = [wrong, "Run armid diagnose", "Ia6 ≥ 0", "No arm has what was identified"];
+    let told =
+        [wrong, "Run armid diagnose", "Ia6 ≥ 0", "What was identified is physically impossible"];
     says(&armid(folder.path(), words), 3, &told);
     let result = json(folder.path().join("late.json"));
     assert!(parameter(&result, "base_parameters", "Ia6") < 0.0);

@@ -11,6 +11,7 @@ use armid::excitation::design::{
 };
 use armid::excitation::{FourierSeries, Requirements, check};
 use armid::robot::Arm;
+use faer::Mat;
 
 fn specification(criterion: Criterion) -> Specification {
     Specification {
@@ -28,7 +29,7 @@ fn specification(criterion: Criterion) -> Specification {
             rate_hz: 125.0,
             torque_noise_nm: vec![1.0, 1.0, 0.7, 0.15, 0.15, 0.15],
         },
-        prior_sigma: None,
+        prior: None,
         starts: 3,
         finalists: 2,
         seed: 5,
@@ -100,11 +101,13 @@ fn a_free_period_and_a_prior_are_used() {
     let (_, base) = ur5();
     let friction: Vec<usize> =
         (0..base.rank()).filter(|&k| base.name(k).starts_with('r')).collect();
-    let mut sigma: Vec<f64> = plain.prediction.sigma.iter().map(|s| s / 10.0).collect();
-    for &k in &friction {
-        sigma[k] = f64::INFINITY;
-    }
-    let next = run(&Specification { prior_sigma: Some(sigma), ..spec }, 2).unwrap();
+    let known = |k: usize| match friction.contains(&k) {
+        true => 0.0,
+        false => (10.0 / plain.prediction.sigma[k]).powi(2),
+    };
+    let rank = base.rank();
+    let prior = Mat::from_fn(rank, rank, |i, k| if i == k { known(k) } else { 0.0 });
+    let next = run(&Specification { prior: Some(prior), ..spec }, 2).unwrap();
     let mean = |d: &Design| {
         friction.iter().map(|&k| d.prediction.sigma[k].ln()).sum::<f64>() / friction.len() as f64
     };
@@ -137,9 +140,10 @@ fn specifications_that_make_no_sense_are_refused_with_the_number() {
     assert!(message(|s| s.experiment.torque_noise_nm[4] = 0.0).contains("joint 5"));
     assert!(message(|s| s.requirements.torque_share = 1.5).contains("1.5"));
     assert!(message(|s| s.starts = 0).contains("starts"));
+    assert!(message(|s| s.experiment.data_s = 1e9).contains("1000000000 must be at most"));
     let unused = |s: &mut Specification| {
         s.criterion = Criterion::Cond;
-        s.prior_sigma = Some(vec![1.0; 52]);
+        s.prior = Some(Mat::identity(52, 52));
     };
     assert!(message(unused).contains("prior"));
     // Lying on the floor is no pose to move about.
@@ -149,6 +153,21 @@ fn specifications_that_make_no_sense_are_refused_with_the_number() {
     assert!(message(flat).contains("floor"));
     // No pose keeps a metre from itself.
     assert!(message(|s| s.requirements.clearance_m = 1.0).contains("poses all over the range"));
+}
+
+/// What is promised is promised of the motion that is written, which is no shorter than the data that are asked for.
+#[test]
+fn the_prediction_is_of_the_periods_that_are_played() {
+    let (arm, base) = ur5();
+    let mut spec = specification(Criterion::D);
+    spec.experiment.data_s = 14.0;
+    let found = run(&spec, 2).unwrap();
+    assert_eq!(found.excitation.periods(), 2);
+    assert_eq!(found.experiment.data_s, 20.0);
+    let series = found.excitation.series();
+    let expected =
+        Prediction::of(&Model::new(&arm), &base, &found.experiment, series, None).unwrap();
+    assert_eq!(found.prediction, expected);
 }
 
 /// The prediction is the textbook formula: σ² on the diagonal of the inverse information, which falls

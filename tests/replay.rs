@@ -20,7 +20,7 @@ use armid::dynamics::Model;
 use armid::excitation::{FourierSeries, Reference};
 use armid::identify::{Identifier, Options};
 use armid::montecarlo::Scenario;
-use armid::plant::faults::FaultyPlant;
+use armid::plant::faults::{Effect, FaultyPlant};
 use armid::plant::{Measured, PerJoint, PlantConfig, Recording, SensorConfig, Sensors};
 use armid::random::TrialStreams;
 use armid::robot::JointSignals;
@@ -266,4 +266,45 @@ fn the_extended_simulation_is_a_scenario() {
         // differs by what the controller leaves.
         assert!(rms < 0.5 * sigma_nm, "joint {}: {rms} Nm", j + 1);
     }
+}
+
+/// A drive that feeds nothing forward may be found to feed less than that; and a velocity that is early, as one behind angles
+/// that are late, is none that the simulated sensors have. Neither costs the rest of what was found its place.
+#[test]
+fn what_no_simulation_has_does_not_take_the_rest_along() {
+    let drive = "[[effect]]\nkind = \"feed_forward\"\njoint = 1\nshare_less = 0.9\n";
+    let gain = "[[effect]]\nkind = \"torque_gain\"\njoint = 2\nerror_fraction = 0.06";
+    let mut hidden = hide("ur5_identification", gain, 3);
+    let early = hidden.log.qd_rad_s.map_joints(|_, qd| {
+        let next = qd[1..].iter().chain(qd.last());
+        qd.iter().zip(next).map(|(now, next)| 0.5 * (now + next)).collect()
+    });
+    hidden.log.qd_rad_s = early;
+    let arm = armid::robot::Arm::built_in("ur5").unwrap();
+    let model = Model::new(&arm);
+    let full = armid::base::Parameterisation::full(6, false);
+    let set = armid::base::BaseSet::find(&arm, full).unwrap();
+    let mut diagnoser = Diagnoser::new(&arm, &model, &set, Options::default());
+    let mut found = |hidden: &Hidden| {
+        let finding = diagnoser.diagnose(&hidden.log.measurement("log"), &[], None).unwrap();
+        println!("{:#?}", finding.diagnosis.sentences);
+        let simulation = diagnoser.extended_simulation(&finding).unwrap();
+        FaultyPlant::new(&arm, &simulation.effects, &simulation.plant).unwrap();
+        (finding, simulation)
+    };
+    let (_, simulation) = found(&hide("ur5_identification", drive, 3));
+    let [Effect::FeedForward(fed)] = &simulation.effects[..] else {
+        panic!("{:?}", simulation.effects)
+    };
+    assert!((0.8..=0.9).contains(&fed.share_less), "{fed:?}");
+
+    let (finding, simulation) = found(&hidden);
+    let lag = finding.diagnosis.causes.iter().find(|c| c.kind == Kind::VelocityLag).unwrap();
+    assert!((lag.parameters["delay_s"].value + 0.004).abs() < 2e-4, "{lag:?}");
+    let kinds: Vec<&str> = simulation.effects.iter().map(|effect| effect.kind()).collect();
+    assert_eq!(kinds, ["torque_gain"]);
+    assert!(simulation.of_the_record.is_empty());
+    let [not] = &simulation.not_replayed[..] else { panic!("{:?}", simulation.not_replayed) };
+    assert_eq!(not.kind, Kind::VelocityLag);
+    assert!(not.reason.contains("cannot have delay_s = -0.0040"), "{}", not.reason);
 }

@@ -115,7 +115,7 @@ impl ArmResult {
             by_prior: by_prior.map(|v| v.name).collect(),
             doubt: match result.physical {
                 _ if result.verdict == CONTRADICTED => Some(format!(
-                    "{file}: no arm has what was identified there; this is the nearest one"
+                    "{file}: what was identified there is physically impossible; this is the nearest arm that can exist"
                 )),
                 Some(found) if found.model_is_wrong => Some(format!(
                     "{file}: an arm with these parameters does not move as the recorded one did: {}",

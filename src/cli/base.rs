@@ -16,7 +16,7 @@ use crate::robot::LoadedArm;
 /// Print the base parameters of an arm: the combinations that torque can reveal.
 #[derive(Debug, Args)]
 pub struct BaseArgs {
-    /// Robot: a built-in name, a .urdf or a .toml file.
+    /// Robot: ur5, ur10e, ur3e, ur5e, or a .urdf or .toml file.
     #[arg(long)]
     robot: String,
     /// Reduced parameter set instead of the full one: paper.
@@ -63,8 +63,8 @@ pub fn run(args: &BaseArgs) -> CommandResult {
     }
     say!("{}", table.to_text());
     say!(
-        "{}: {} base parameters from {} columns; independent columns stand at least {:.1e} of \
-         their length off the others, dependent ones at most {:.1e}",
+        "{}: {} base parameters from {} columns; outside the span of the others, independent \
+         columns keep at least {:.1e} of their length, dependent ones at most {:.1e}",
         arm.name,
         set.rank(),
         set.parameterisation.count(),

@@ -13,9 +13,9 @@ use crate::diagnose::{DIAGNOSE_SCHEMA, DiagnoseError, Diagnoser, Diagnosis, Vali
 use crate::dynamics::Model;
 use crate::log::Log;
 use crate::montecarlo::Scenario;
-use crate::output::check_outputs;
+use crate::output::{OutputError, check_outputs};
 use crate::report::diagnose::{cause_table, held_out_table, limit_table, page};
-use crate::report::json::{Document, Input, Program};
+use crate::report::json::{Document, Program};
 use crate::report::replay::table as replay_table;
 use crate::report::rows::{Rows, log_warnings};
 use crate::report::{Page, Status, Verdict};
@@ -23,7 +23,7 @@ use crate::report::{Page, Status, Verdict};
 /// Say what the rigid model with linear friction gets wrong along a log, and what explains it.
 #[derive(Debug, Args)]
 pub struct DiagnoseArgs {
-    /// The log; with a second one: what that has on its flange that the first has not.
+    /// The log. With a second one: the body that its flange carries and that of the first log does not.
     #[arg(required = true, num_args = 1..=2)]
     logs: Vec<PathBuf>,
     #[command(flatten)]
@@ -55,6 +55,18 @@ pub struct DiagnoseArgs {
     report: Option<PathBuf>,
 }
 
+impl DiagnoseArgs {
+    /// Refuses outputs that cannot be written, or where one of the `inputs` stands.
+    fn check_outputs<'a>(
+        &self,
+        inputs: impl IntoIterator<Item = &'a PathBuf>,
+    ) -> Result<(), OutputError> {
+        let extended = self.extended_scenario.iter().flat_map(|path| Scenario::files_of(path));
+        let outputs = [&self.json, &self.report].into_iter().flatten().cloned().chain(extended);
+        check_outputs(outputs, inputs)
+    }
+}
+
 /// Runs the command.
 pub fn run(args: &DiagnoseArgs) -> CommandResult {
     if let [first, second] = &args.logs[..] {
@@ -72,12 +84,8 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
     }
     let options = args.processing.options()?;
     let (arm, mut inputs) = args.source.arm()?;
-    let extended = args.extended_scenario.iter().flat_map(|path| Scenario::files_of(path));
     let logs = args.logs.iter().chain(&args.held_out).chain(&args.sim);
-    check_outputs(
-        [&args.json, &args.report].into_iter().flatten().cloned().chain(extended),
-        inputs.iter().map(|input| &input.path).chain(logs),
-    )?;
+    args.check_outputs(inputs.iter().map(|input| &input.path).chain(logs))?;
     let set = BaseSet::find(&arm, Parameterisation::full(arm.dof(), arm.torque_offsets))?;
     let model = Model::new(&arm);
     let logs = args.source.read(&arm, &args.logs)?;
@@ -101,8 +109,9 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
         args.sim.as_deref().map(|file| Simulated::load(file, (&arm, &set), sha256)).transpose()?;
     let mut diagnoser = Diagnoser::new(&arm, &model, &set, options.clone());
     let Some(log) = logs.first() else { return Ok(Outcome::Done) };
-    for file in args.sim.iter() {
-        inputs.push(Input::of(file)?);
+    if let Some(Simulated { files, .. }) = &simulation {
+        args.check_outputs(files)?;
+        inputs.extend(super::robot::inputs(files)?);
     }
     inputs.extend(logs.iter().chain(&held_out).map(|l: &LoadedLog| l.input.clone()));
     let program = Program::started(None, inputs);

@@ -10,8 +10,9 @@ use nalgebra::Vector3;
 use serde::Serialize;
 use thiserror::Error as ThisError;
 
+use super::prior::Prior;
 use super::robot::{inputs, load_robot};
-use super::{CommandResult, Outcome, Progress, interrupt_flag, prior};
+use super::{CommandResult, Outcome, Progress, interrupt_flag};
 use crate::base::{BaseSet, Parameterisation};
 use crate::excitation::design::{
     self, Budget, Criterion, Design, DesignError, Experiment, Specification, Variables,
@@ -26,7 +27,7 @@ use crate::robot::{Arm, CellBox, Joint, LoadedArm};
 /// Design the motion that tells most about the parameters, inside all limits.
 #[derive(Debug, Args)]
 pub struct ExciteArgs {
-    /// Robot: a built-in name, a .urdf or a .toml file.
+    /// Robot: ur5, ur10e, ur3e, ur5e, or a .urdf or .toml file.
     #[arg(long)]
     robot: String,
     /// d: volume of the confidence ellipsoid; a: mean relative variance; e: worst combination;
@@ -63,7 +64,7 @@ pub struct ExciteArgs {
     /// Torque noise per joint, Nm; without it 0.6 % of the torque limits.
     #[arg(long, value_name = "LIST", value_delimiter = ',', num_args = 1)]
     noise_nm: Option<Vec<f64>>,
-    /// Length of the data that will be recorded, s.
+    /// Length of the data that will be recorded, s: the motion is as many whole periods as cover it.
     #[arg(long = "data", value_name = "S", default_value_t = 80.0)]
     data_s: f64,
     /// Rate of the data, of the CSV and of the set points in the URScript, Hz: a CB-series controller takes 125, an e-Series up to 500.
@@ -294,8 +295,12 @@ fn specification(
                 None => arm.joints.iter().map(noise_of_limit).collect(),
             },
         },
-        prior_sigma: match &args.prior {
-            Some(path) => Some(prior::sigmas(path, arm, base)?),
+        prior: match &args.prior {
+            Some(path) => {
+                let Prior { information, notes } = Prior::load(path, arm, base)?;
+                notes.iter().for_each(|note| eprintln!("note: {note}"));
+                Some(information)
+            }
             None => None,
         },
         starts: args.starts,
@@ -350,7 +355,9 @@ impl Rounds {
         bar.reached(p.done as u64);
         if p.done == p.of {
             bar.finish();
-            eprintln!("round {round}: best {}", self.criterion.in_words(p.best));
+            if p.best.is_finite() {
+                eprintln!("round {round}: best {}", self.criterion.in_words(p.best));
+            }
         }
     }
 }
@@ -358,11 +365,12 @@ impl Rounds {
 fn print_summary(base: &BaseSet, spec: &Specification, found: &Design, seconds: f64) {
     let p = &found.prediction;
     say!(
-        "cond(ΘᵀΘ) {:.1}, columns scaled {:.2}; predicted over {} s: geometric mean σ {:.6}, relative σ \
+        "cond(ΘᵀΘ) {:.1}, columns scaled {:.2}; predicted from {} periods, {:.1} s: geometric mean σ {:.6}, relative σ \
          median {:.2} %, 90th percentile {:.2} %",
         p.condition,
         p.scaled_condition,
-        spec.experiment.data_s,
+        found.excitation.periods(),
+        found.experiment.data_s,
         p.geometric_mean_sigma(),
         100.0 * p.relative_quantile(0.5),
         100.0 * p.relative_quantile(0.9),

@@ -32,7 +32,7 @@ pub struct IdentifyArgs {
     logs: Vec<PathBuf>,
     #[command(flatten)]
     source: SourceArgs,
-    /// Reduced parameter set instead of the full one: paper.
+    /// Reduced parameter set instead of the full one: paper (section IV-A, of a UR5).
     #[arg(long)]
     reduced: Option<String>,
     #[command(flatten)]
@@ -43,11 +43,11 @@ pub struct IdentifyArgs {
     /// Also estimate standard parameters that an arm can have, for simulators.
     #[arg(long)]
     physical: bool,
-    /// How deviations from the robot file's values are measured.
+    /// How deviations from the robot file's values are measured, of those that the data do not decide.
     #[arg(long, requires = "physical", value_enum, default_value = "pull_back")]
     prior: PriorMetric,
-    /// Weight of the robot file's values in them, or auto for cross-validation: 1/s² makes a relative
-    /// deviation of s as unlikely as one σ of noise.
+    /// Weight of the robot file's values: 1/s² treats them as known to a relative σ of s (1: to 100 %); auto: the weight that
+    /// predicts left-out periods best.
     #[arg(long, requires = "physical", default_value_t)]
     prior_weight: PriorWeight,
     /// Write the result as JSON.
@@ -61,10 +61,10 @@ pub struct IdentifyArgs {
 /// Which arm and which kind of log.
 #[derive(Debug, Args)]
 pub struct SourceArgs {
-    /// Robot: a built-in name, a .urdf or a .toml file.
+    /// Robot: ur5, ur10e, ur3e, ur5e, or a .urdf or .toml file.
     #[arg(long)]
     pub robot: String,
-    /// Layout of the logs: a built-in name or a .toml file.
+    /// Layout of the logs: armid (RTDE names), ur10e_innopolis, ur10e_innopolis_author, or a .toml file.
     #[arg(long, default_value = "armid")]
     pub layout: String,
 }
@@ -195,6 +195,10 @@ impl SourceArgs {
 /// Runs the command.
 pub fn run(args: &IdentifyArgs) -> CommandResult {
     let options = args.processing.options()?;
+    if args.logs.len() > 1 && args.prior_weight == PriorWeight::CrossValidated {
+        let message = "the weight is found by leaving out periods of one log in turn; of several logs give it as a number";
+        return Err(format!("--prior-weight auto: {message}").into());
+    }
     let (arm, mut inputs) = args.source.arm()?;
     check_outputs(
         [&args.json, &args.report].into_iter().flatten(),
@@ -229,10 +233,17 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         }
     }
     let mut identifier = Identifier::new(&model, &set, options);
-    let regressions = logs
+    let mut regressions = logs
         .iter()
         .map(|log| identifier.regression(&log.measurement()))
         .collect::<Result<Vec<_>, _>>()?;
+    if logs.len() > 1 {
+        for (regression, log) in regressions.iter_mut().zip(&logs) {
+            let of_log = |warning: &String| format!("{}: {warning}", log.log.source);
+            let warnings = &mut regression.prepared.warnings;
+            *warnings = warnings.iter().map(of_log).collect();
+        }
+    }
     let several = each_alone(&mut identifier, &regressions)?;
     let mut regression = Regression::joined(regressions)?;
     let unused = args.processing.unused(&regression.prepared.processing);
@@ -267,6 +278,7 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         nominal: &set.values(&model.standard_parameters()),
         regression: &regression,
         identification: &identification,
+        reduced: args.reduced.as_deref(),
     };
     let mut validations = Vec::new();
     for log in &validation_logs {

@@ -13,6 +13,7 @@ macro_rules! say {
 mod arm_result;
 pub mod base;
 pub mod diagnose;
+mod earlier;
 pub mod excite;
 pub mod export;
 pub mod identify;

@@ -45,6 +45,14 @@ pub enum OtherRobot {
         /// Of the robot given.
         expected: String,
     },
+    /// With parameters about other frames.
+    #[error(
+        "it was identified with --reduced {set}, whose parameters are not those of the full set: identify without --reduced"
+    )]
+    Reduced {
+        /// Name of its parameter set.
+        set: String,
+    },
     /// Of the same name, and yet another.
     #[error(
         "it is about another \"{name}\" than the one given: {difference}; give the robot that was identified \

@@ -120,7 +120,7 @@ pub fn run(args: &SimulateArgs) -> CommandResult {
         if offsets_nm.iter().any(|offset| *offset != 0.0) {
             eprintln!("note: the plant has no torque offsets; left out: {offsets_nm:?} Nm");
         }
-        scenario.arm = arm;
+        scenario = scenario.with_arm(arm)?;
         robot_files = files;
     }
     check_outputs(

@@ -4,12 +4,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::robot::inputs;
 use super::study_output::StudyOutput;
 use super::{CommandResult, Progress};
 use crate::montecarlo::Scenario;
 use crate::montecarlo::study::{cutoff_study, cutoff_study_trials};
 use crate::report::cutoff_study::{markdown, page};
-use crate::report::json::{Input, Program};
+use crate::report::json::Program;
 
 #[derive(Debug, Args)]
 pub(super) struct CutoffArgs {
@@ -24,9 +25,10 @@ pub(super) struct CutoffArgs {
 }
 
 pub(super) fn run(args: &CutoffArgs) -> CommandResult {
-    args.output.check(std::slice::from_ref(&args.scenario))?;
-    let inputs = vec![Input::of(&args.scenario)?];
     let scenario = Scenario::load(Some(&args.scenario))?;
+    let files = scenario.sources(&args.scenario);
+    args.output.check(&files)?;
+    let inputs = inputs(&files)?;
     let trials = args.trials.unwrap_or(scenario.trials).max(2);
     let progress = Progress::new("trials", cutoff_study_trials(trials));
     let result = cutoff_study(&scenario, trials, &|n| progress.reached(n))?;

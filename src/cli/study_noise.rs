@@ -6,6 +6,7 @@ use clap::Args;
 use serde::Deserialize;
 use thiserror::Error;
 
+use super::robot::inputs;
 use super::study_output::StudyOutput;
 use super::{CommandResult, Progress, threads_or_all};
 use crate::montecarlo::Scenario;
@@ -106,7 +107,7 @@ impl Collected {
 }
 
 pub(super) fn run(args: &NoiseArgs) -> CommandResult {
-    args.output.check(&[&args.scenarios[..], &args.from[..]].concat())?;
+    args.output.check(&args.from)?;
     let threads = threads_or_all(args.threads);
     let mut all = Collected::load(&args.from)?;
     // Whatever cannot be run is told before anything runs.
@@ -114,16 +115,18 @@ pub(super) fn run(args: &NoiseArgs) -> CommandResult {
     for path in &args.scenarios {
         let scenario = Scenario::load(Some(path))?;
         all.check_new(path, &scenario.name)?;
-        scenarios.push((Input::of(path)?, scenario));
+        let files = scenario.sources(path);
+        args.output.check(&files)?;
+        scenarios.push((inputs(&files)?, scenario));
     }
-    for (input, scenario) in scenarios {
+    for (inputs, scenario) in scenarios {
         eprintln!("{}: {}", scenario.name, scenario.description);
         let trials = args.trials.map_or(scenario.trials, |most| most.min(scenario.trials));
         let progress = Progress::new("trials", trials);
         let done = |n| progress.reached(n);
         let result = study(scenario, args.trials, args.slow_every, threads, &done)?;
         progress.finish();
-        all.inputs.push(input);
+        all.inputs.extend(inputs);
         all.study.scenarios.push(result);
         args.output.save(SCHEMA, &all.study, all.program(), markdown, page)?;
     }

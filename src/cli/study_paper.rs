@@ -4,12 +4,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::robot::inputs;
 use super::study_output::StudyOutput;
 use super::{CommandResult, Progress};
 use crate::excitation::FourierSeries;
 use crate::montecarlo::Scenario;
 use crate::montecarlo::study::{paper_study, paper_study_runs};
-use crate::report::json::{Input, Program};
+use crate::report::json::Program;
 use crate::report::paper_study::{markdown, page};
 
 #[derive(Debug, Args)]
@@ -28,9 +29,11 @@ pub(super) struct PaperArgs {
 }
 
 pub(super) fn run(args: &PaperArgs) -> CommandResult {
-    args.output.check(&[args.scenario.clone(), args.validation.clone().into()])?;
-    let inputs = vec![Input::of(&args.scenario)?];
     let scenario = Scenario::load(Some(&args.scenario))?;
+    let mut files = scenario.sources(&args.scenario);
+    files.extend(Some(PathBuf::from(&args.validation)).filter(|path| path.extension().is_some()));
+    args.output.check(&files)?;
+    let inputs = inputs(&files)?;
     let validation = FourierSeries::load(&args.validation)?;
     let trials = args.trials.unwrap_or(scenario.trials).max(2);
     let progress = Progress::new("runs of the arm", paper_study_runs());

@@ -4,11 +4,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::robot::inputs;
 use super::study_output::StudyOutput;
 use super::{CommandResult, Progress, threads_or_all};
 use crate::montecarlo::Scenario;
 use crate::montecarlo::study::physical::{PhysicalStudy, THOROUGH_EVERY, physical_case};
-use crate::report::json::{Input, Program};
+use crate::report::json::Program;
 use crate::report::physical_study::{markdown, page};
 
 /// Which scenarios, and where to write.
@@ -29,13 +30,18 @@ pub struct PhysicalArgs {
 
 /// Runs the study.
 pub fn run(args: &PhysicalArgs) -> CommandResult {
-    args.output.check(&args.scenarios)?;
     let threads = threads_or_all(args.threads);
     let mut study = PhysicalStudy { cases: Vec::new() };
-    let mut inputs = Vec::new();
+    // Whatever cannot be run is told before anything runs.
+    let (mut scenarios, mut files) = (Vec::new(), Vec::new());
     for path in &args.scenarios {
-        inputs.push(Input::of(path)?);
         let scenario = Scenario::load(Some(path))?;
+        files.extend(scenario.sources(path));
+        scenarios.push(scenario);
+    }
+    args.output.check(&files)?;
+    let inputs = inputs(&files)?;
+    for scenario in scenarios {
         eprintln!("{}: {}", scenario.name, scenario.description);
         let progress = Progress::new("trials", args.trials.unwrap_or(scenario.trials));
         let reached = |n| progress.reached(n);

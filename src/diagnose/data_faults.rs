@@ -59,8 +59,8 @@ pub struct Faults {
 }
 
 /// All faults of the record of `m`. Rows that repeat, a clock that stalls and gaps hide what the velocity and the torque
-/// have: they are looked for first.
-pub fn find(m: &Measurement) -> Result<Faults, SignalError> {
+/// have: they are looked for first. Rows that are missing are made of other periods unless the motion counts as a `single_run`.
+pub fn find(m: &Measurement, single_run: bool) -> Result<Faults, SignalError> {
     let mut out: Vec<Cause> = Vec::new();
     let repeats = repeats(m);
     out.extend(repeated_or_missing(m, &repeats));
@@ -73,7 +73,7 @@ pub fn find(m: &Measurement) -> Result<Faults, SignalError> {
         out.push(stalls.cause());
         record.give_back_time(&stalls.rows, stalls.lost_s);
     }
-    let (warning, unreadable) = without_hanging_torques(&mut record, &stale)?;
+    let (warning, unreadable) = without_hanging_torques(&mut record, &stale, single_run)?;
     out.extend(stale.causes);
     let lags = velocity_lag(&record.measurement(m.source));
     record.undo_lags(&lags);
@@ -91,11 +91,13 @@ const SHORT_HANG: f64 = 0.1;
 fn without_hanging_torques(
     record: &mut Record,
     stale: &stale::Found,
+    single_run: bool,
 ) -> Result<(Option<String>, Vec<usize>), SignalError> {
+    let filled = |record: &mut Record| if single_run { Ok(None) } else { record.fill_gaps() };
     let rows = stale.hanging_rows();
     if !rows.is_empty() {
         let mut without = Record::without_rows(&record.measurement(""), &rows);
-        let warning = without.fill_gaps()?;
+        let warning = filled(&mut without)?;
         let is_long = rows.len() as f64 > SHORT_HANG * record.time_s.len() as f64;
         if is_long || !without.filled.is_empty() {
             *record = without;
@@ -103,7 +105,7 @@ fn without_hanging_torques(
         }
     }
     let hanging = stale.hangs.iter().map(|(joint, _)| *joint).collect();
-    Ok((record.fill_gaps()?, hanging))
+    Ok((filled(record)?, hanging))
 }
 
 pub(super) fn cause(
@@ -312,7 +314,7 @@ mod tests {
     }
 
     fn find_in(time_s: &[f64], [q_rad, qd_rad_s, torque_nm]: &[JointSignals; 3]) -> Faults {
-        find(&Measurement { source: "test", time_s, q_rad, qd_rad_s, torque_nm }).unwrap()
+        find(&Measurement { source: "test", time_s, q_rad, qd_rad_s, torque_nm }, false).unwrap()
     }
 
     #[test]

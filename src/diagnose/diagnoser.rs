@@ -87,7 +87,8 @@ impl<'a> Diagnoser<'a> {
         held_out: &[Validation],
         simulation: Option<Nominal>,
     ) -> Result<Finding, DiagnoseError> {
-        let Faults { causes: mut faults, record, warning, unreadable } = data_faults::find(m)?;
+        let Faults { causes: mut faults, record, warning, unreadable } =
+            data_faults::find(m, self.options.is_single_run())?;
         let m = &record.measurement(m.source);
         let mut coarse = data_faults::coarse_joints(&faults);
         coarse.extend(unreadable);
@@ -137,16 +138,14 @@ impl<'a> Diagnoser<'a> {
             Some(touched) => touched.causes.clone(),
             None => beside_model(&study, &model.after_nm)?.causes,
         });
-        model.causes = in_order(faults, model.causes, study.scene.periodic);
         if let Some(simulation) = simulation {
             self.compare(&study, &selected, simulation, &mut model);
         }
+        model.causes = in_order(faults, model.causes, study.scene.periodic);
         let Extended { mut causes, extension, after_nm, accepted, rest } = model;
-        let (base_parameters, of_base) = intervals::base(&study, self.set, &extension);
-        let moved_parameters =
-            simulation.map_or(Vec::new(), |s| against::moved(s, &base_parameters));
-        let moved_together =
-            simulation.and_then(|s| against::moved_together(&study, s, &base_parameters, &of_base));
+        let base = intervals::base(&study, self.set, &extension);
+        let moved_parameters = simulation.map_or(Vec::new(), |s| against::moved(s, &base));
+        let moved_together = simulation.and_then(|s| against::moved_together(&study, s, &base));
         let is_a_tear = |cause: &mut Cause| {
             let at = |name| cause.parameters.get(name).map_or(f64::NAN, |e| e.value);
             cause.kind == Kind::Contact && is_torn(m, [at("start_s"), at("end_s")])
@@ -211,7 +210,7 @@ impl<'a> Diagnoser<'a> {
             causes,
             unexplained,
             after: Rms { rms_nm: rms(&after_nm) },
-            base_parameters,
+            base_parameters: base.parameters,
             held_out,
             moved_parameters,
             moved_together,
@@ -253,7 +252,7 @@ impl<'a> Diagnoser<'a> {
         })
     }
 
-    /// The model of `study` with the causes `selected` of those `kept`, the strongest first.
+    /// The model of `study` with the causes `selected` of those `kept`.
     fn extended(&self, study: &Study, kept: &Kept, selected: &[Selected]) -> Extended {
         let entries: Vec<&Entry> = selected.iter().map(|s| &s.contender.entry).collect();
         let extension = Extension::fit(study, &entries, &study.torque);
@@ -262,8 +261,7 @@ impl<'a> Diagnoser<'a> {
             let gain = gains[c].or(selected.left_out_gain);
             self.cause(study, kept, selected, c, gain, &extension)
         };
-        let mut causes: Vec<Cause> = selected.iter().enumerate().map(cause).collect();
-        causes.sort_by(|a, b| b.strength.total_cmp(&a.strength));
+        let causes = selected.iter().enumerate().map(cause).collect();
         let (accepted, rest) = kept.without(None);
         Extended { causes, after_nm: residual(study, &extension), extension, accepted, rest }
     }
@@ -316,7 +314,7 @@ impl<'a> Diagnoser<'a> {
         known_mass_kg: Option<f64>,
     ) -> Result<PayloadFinding, DiagnoseError> {
         let mut mended = |m: &Measurement| -> Result<Regression, DiagnoseError> {
-            let record = data_faults::find(m)?.record;
+            let record = data_faults::find(m, self.options.is_single_run())?.record;
             let mut regression = self.identifier.regression(&record.measurement(m.source))?;
             regression.prepared.count_filled(&record.filled);
             Ok(regression)
@@ -406,9 +404,10 @@ fn sigma_of_friction_alone(diagnosis: &Diagnosis, set: &BaseSet) -> Vec<f64> {
     known.map(|(k, p)| if has_law(set.name(k)) { f64::INFINITY } else { p.sigma }).collect()
 }
 
-/// Faults of the record before physics, of a motion that repeats. Of a single run what matters most is said first, what only concerns
-/// the recording last.
+/// Faults of the record before physics, the strongest first, of a motion that repeats. Of a single run what matters most is said first,
+/// what only concerns the recording last.
 fn in_order(mut faults: Vec<Cause>, mut physics: Vec<Cause>, periodic: bool) -> Vec<Cause> {
+    physics.sort_by(|a, b| b.strength.total_cmp(&a.strength));
     if !periodic {
         let gain = |cause: &Cause| cause.gain_fraction.unwrap_or(0.0);
         physics.sort_by(|a, b| gain(b).total_cmp(&gain(a)));

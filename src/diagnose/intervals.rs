@@ -50,11 +50,7 @@ pub(super) fn tangents(study: &Study, effect: &Effect) -> Vec<Image> {
 /// Base parameters beside the effects of `extension` with their σ, the effects' own numbers unknown as well:
 /// the block of (XᵀX)⁻¹ that belongs to them, X with the tangents of the effects, which is returned as well (NaN where the effects
 /// leave nothing of one).
-pub fn base(
-    study: &Study,
-    set: &BaseSet,
-    extension: &Extension,
-) -> (Vec<BaseParameter>, DMatrix<f64>) {
+pub fn base(study: &Study, set: &BaseSet, extension: &Extension) -> Base {
     let effects = extension.effects.iter().flat_map(|effect| tangents(study, effect));
     let mut span = Span::default();
     effects.for_each(|image| {
@@ -78,7 +74,23 @@ pub fn base(
         // What is NaN stays it.
         sigma: covariance[(k, k)].clamp(0.0, f64::INFINITY).sqrt(),
     };
-    ((0..set.rank()).map(parameter).collect(), covariance)
+    let of_span = study.statistic.freedom_of_coefficients(&span);
+    let freedom = places.iter().map(|place| place.map_or(f64::NAN, |place| of_span[place]));
+    Base {
+        parameters: (0..set.rank()).map(parameter).collect(),
+        freedom: freedom.take(set.rank()).collect(),
+        covariance,
+    }
+}
+
+/// Base parameters beside what was found.
+pub struct Base {
+    /// With their σ.
+    pub parameters: Vec<BaseParameter>,
+    /// Of these, b × b.
+    pub covariance: DMatrix<f64>,
+    /// How well each σ is known, in degrees of freedom.
+    pub freedom: Vec<f64>,
 }
 
 /// Physical parameters of a cause with 95 % intervals. Where the family has several forms (Stribeck's

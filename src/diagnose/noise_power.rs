@@ -11,6 +11,8 @@
 //! - its probability is that of F(k, ν), ν from the share that every harmonic has in what is explained
 //!   (Satterthwaite 1946).
 
+use std::ops::Range;
+
 use super::image::{Image, Span};
 use crate::signal::{pooled, pooled_level};
 
@@ -46,6 +48,16 @@ const WELL_KNOWN: f64 = 200.0;
 /// Degrees of freedom beyond which F(k, ν) is χ²ₖ/k.
 const MANY: f64 = 1e5;
 
+/// Rows of (harmonic, joint) among the whitened rows of a period, harmonic by harmonic and joint by joint: one of the mean, real and
+/// imaginary part of the others. The highest harmonic that is used lies below half the rate.
+pub fn rows_of(joints: usize, harmonic: usize, joint: usize) -> Range<usize> {
+    if harmonic == 0 {
+        return joint..joint + 1;
+    }
+    let first = joints * (2 * harmonic - 1) + 2 * joint;
+    first..first + 2
+}
+
 impl NoiseKnowledge {
     /// From what is not known of every harmonic from 0.
     pub fn new(harmonics: Vec<Uncertainty>) -> Self {
@@ -56,14 +68,9 @@ impl NoiseKnowledge {
         self.harmonics.first().map_or(0, |known| known.colour.len())
     }
 
-    /// First row, behind those of other harmonics, and number of rows of (harmonic, joint): one of the mean,
-    /// real and imaginary part of the others.
-    pub fn rows(&self, harmonic: usize, joint: usize) -> std::ops::Range<usize> {
-        if harmonic == 0 {
-            return joint..joint + 1;
-        }
-        let first = self.joints() * (2 * harmonic - 1) + 2 * joint;
-        first..first + 2
+    /// Its [`rows_of`] (harmonic, joint).
+    pub fn rows(&self, harmonic: usize, joint: usize) -> Range<usize> {
+        rows_of(self.joints(), harmonic, joint)
     }
 
     /// Twice the gain in log-likelihood when the residual loses what `span` explains.
@@ -103,12 +110,16 @@ impl NoiseKnowledge {
         if span.is_empty() {
             return MANY;
         }
-        let explained = span.combination(&span.coordinates(residual));
+        self.freedom_along(&span.combination(&span.coordinates(residual)))
+    }
+
+    /// The same along one `direction`.
+    pub fn freedom_along(&self, direction: &Image) -> f64 {
         let harmonics = self.harmonics();
         let mut share = vec![vec![0.0; harmonics]; self.joints()];
-        let periods = explained.contrast.chunks_exact(explained.mean.len());
+        let periods = direction.contrast.chunks_exact(direction.mean.len());
         let mut all = 0.0;
-        for rows in periods.chain([&explained.mean[..]]) {
+        for rows in periods.chain([&direction.mean[..]]) {
             for (joint, share) in share.iter_mut().enumerate() {
                 for (harmonic, share) in share.iter_mut().enumerate() {
                     let square =
@@ -122,7 +133,7 @@ impl NoiseKnowledge {
     }
 
     /// Degrees of freedom of the noise's power in a band of harmonics of one joint.
-    pub fn freedom_of_band(&self, band: std::ops::Range<usize>, joint: usize) -> f64 {
+    pub fn freedom_of_band(&self, band: Range<usize>, joint: usize) -> f64 {
         let mut share = vec![vec![0.0; self.harmonics()]; self.joints()];
         let harmonics = band.len() as f64;
         share[joint][band].fill(1.0 / harmonics);

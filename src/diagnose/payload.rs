@@ -26,6 +26,7 @@ use super::whitening::{RunWhitening, Whitening};
 use crate::base::BaseSet;
 use crate::dynamics::{Parameter, ParameterLayout};
 use crate::identify::{Options, Regression};
+use crate::number::significant;
 use crate::robot::Arm;
 
 /// What a second log says about a body on the flange.
@@ -196,7 +197,7 @@ impl PayloadFinding {
         }
         if let Some(scale) = &self.gain_scale {
             out.push(format!(
-                "With the mass known, the drive gains are to be multiplied by {}, were it the same for all drives.",
+                "With the mass known, the drive gains are to be multiplied by {}, if one factor is right for all drives.",
                 with_interval(scale)
             ));
         }
@@ -241,13 +242,14 @@ impl PayloadFinding {
             .collect();
         let moments = moments.join(", ");
         let by_chance = *probability >= chance::PAYLOAD;
+        let chance = significant(*probability, 2);
         if mass_kg.value.is_nan() {
             let first = "These motions cannot tell a mass on the flange";
             return match (moments.is_empty(), by_chance) {
                 (true, _) => format!("{first}, nor its first moments."),
                 (false, true) => format!(
                     "{first}. First moments are those of {reference}: {moments} kg m more, which chance explains (p = \
-                     {probability:.2})."
+                     {chance})."
                 ),
                 (false, false) => format!(
                     "{first}. First moments are not those of {reference}: {moments} kg m more."
@@ -257,7 +259,7 @@ impl PayloadFinding {
         let mass = with_interval(mass_kg);
         if by_chance {
             return format!(
-                "No body on the flange beside {reference}: {mass} kg, which chance explains (p = {probability:.2})."
+                "No body on the flange beside {reference}: {mass} kg, which chance explains (p = {chance})."
             );
         }
         if mass_kg.ci95[1] < 0.0 {

@@ -64,10 +64,10 @@ impl Diagnosis {
                 true => format!("less than {}", percent(RARE, 1)),
                 false => percent(together.p_value, 2),
             };
-            format!("; noise alone carries all of them together as far in {share} of logs")
+            format!("; had nothing changed, noise alone would take all of them together as far in {share} of logs")
         });
         Some(format!(
-            "Beside the simulation {moved} of {} base parameters differ by more than {MOVED} σ; {} differs most, by {} σ{together}.",
+            "Compared with the simulation, {moved} of {} base parameters differ by more than {MOVED} σ; {} differs most, by {} σ{together}.",
             self.moved_parameters.len(),
             farthest.name,
             significant(farthest.z.abs(), 2),
@@ -168,7 +168,7 @@ impl Cause {
         };
         if let Some(gain) = self.gain_fraction {
             let of = if noise_is_known {
-                "of what the noise floor leaves to explain, in other periods of this log than its size is fitted to"
+                "of what the noise floor leaves to explain, on periods that were not used to fit it"
             } else {
                 "of the error's mean square, in stretches of time left out of its fit"
             };
@@ -234,7 +234,10 @@ impl Cause {
 
 /// The unit as parameter names carry it, such as `_nm`.
 fn unit_suffix(unit: &str) -> String {
-    format!("_{}", unit.to_lowercase().replace(['/', ' '], "_").replace("1_", "per_"))
+    format!(
+        "_{}",
+        unit.to_lowercase().replace(['/', ' '], "_").replace('²', "2").replace("1_", "per_")
+    )
 }
 
 /// `value ± half unit`.

@@ -123,10 +123,10 @@ impl Statistic {
             Self::Periods(knowledge) => {
                 let (explained, freedom) =
                     (span.explained(residual), knowledge.freedom(span, residual));
-                if NoiseKnowledge::is_known(freedom) || k == 0 {
+                if k == 0 {
                     return upper_chi_squared(explained, k);
                 }
-                FisherSnedecor::new(k as f64, freedom).map_or(1.0, |f| f.sf(explained / k as f64))
+                upper_fisher(explained / k as f64, k, freedom)
             }
             Self::Blocks { .. } => {
                 let coordinates = DVector::from_vec(span.coordinates(residual));
@@ -225,6 +225,29 @@ impl Statistic {
             Self::Blocks { used, .. } => used.saturating_sub(1) as f64,
         }
     }
+
+    /// The same along each coefficient of `span`, which is R⁻¹ of its directions.
+    pub fn freedom_of_coefficients(&self, span: &Span) -> Vec<f64> {
+        match self {
+            Self::Periods(knowledge) => {
+                let along = |row: nalgebra::DMatrixView<f64>| {
+                    let row: Vec<f64> = row.iter().copied().collect();
+                    knowledge.freedom_along(&span.combination(&row))
+                };
+                let inverse = span.inverse_triangle();
+                (0..span.len()).map(|k| along(inverse.view((k, 0), (1, span.len())))).collect()
+            }
+            Self::Blocks { used, .. } => vec![used.saturating_sub(1) as f64; span.len()],
+        }
+    }
+}
+
+/// P(F_{k,ν} > x), which is that of χ²_k/k where ν is many.
+pub fn upper_fisher(x: f64, k: usize, freedom: f64) -> f64 {
+    if NoiseKnowledge::is_known(freedom) {
+        return upper_chi_squared(x * k as f64, k);
+    }
+    FisherSnedecor::new(k as f64, freedom).map_or(1.0, |f| f.sf(x.max(0.0)))
 }
 
 /// P(χ²_k > x).

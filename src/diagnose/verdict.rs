@@ -176,7 +176,7 @@ pub struct Moved {
     pub data: f64,
     /// Of the difference.
     pub sigma: f64,
-    /// Difference over σ.
+    /// Difference over σ, as the Gaussian deviate that is as improbable: σ is known with the degrees of freedom that the log gives it.
     pub z: f64,
 }
 
@@ -185,8 +185,8 @@ pub struct Moved {
 pub struct MovedTogether {
     /// dᵀV⁻¹d of the differences d with their covariance V: as many as there are parameters on average where nothing moved.
     pub squared_distance: f64,
-    /// Of χ² that it is compared with: the parameters.
-    pub degrees_of_freedom: usize,
+    /// b and ν: over b, the number of parameters, it is compared with F(b, ν), ν what the noise is known with.
+    pub degrees_of_freedom: [f64; 2],
     /// Probability that noise alone carries them so far.
     pub p_value: f64,
 }

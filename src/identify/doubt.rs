@@ -34,8 +34,10 @@ impl Doubt {
         let pushing = negative_friction_remark(arm, set, theta, sigma);
         let is_reversed = gravity.as_ref().is_some_and(|g| g.is_reversed);
         let head = match (&pushing, is_reversed) {
-            (Some(_), _) => Some("No arm has what was identified."),
-            (None, true) => Some("No arm that is mounted as described has what was identified."),
+            (Some(_), _) => Some("What was identified is physically impossible."),
+            (None, true) => {
+                Some("What was identified is impossible for an arm mounted as described.")
+            }
             (None, false) => None,
         };
         let head = head.map(str::to_owned);
@@ -79,7 +81,11 @@ mod tests {
         let larger = doubt(&scaled("m", 2.0)).unwrap();
         assert!(!larger.is_contradiction && larger.sentence.starts_with("Is this log of ur5?"));
         let hanging = doubt(&scaled("m", -1.0)).unwrap();
-        assert!(hanging.sentence.starts_with("No arm that is mounted as described"));
+        assert!(
+            hanging
+                .sentence
+                .starts_with("What was identified is impossible for an arm mounted as described")
+        );
         assert!(hanging.is_contradiction && hanging.sentence.contains("the other sign"));
         let pushing = doubt(&scaled("rc3", -1.0)).unwrap();
         assert!(pushing.is_contradiction && pushing.sentence.contains("joint 3 (-"));

@@ -2,7 +2,7 @@
 
 use super::columns::ColumnPlan;
 use super::course::Course;
-use super::covariance::{Covariance, CovarianceKind};
+use super::covariance::{Covariance, CovarianceError, CovarianceKind};
 use super::drive_answers::without_drive_answers;
 use super::error::IdentifyError;
 use super::estimation::{Estimate, Estimation, MotionAids};
@@ -136,6 +136,8 @@ impl Regression {
     }
 }
 
+const ALIKE_TO_THE_LAST_DIGIT: &str = "the periods are alike to the last digit, and their scatter says nothing: that of the \
+     residual between blocks of time holds for noise with a memory short against a block";
 /// Single runs are processed in pieces of this many samples, so that memory stays bounded.
 const PIECE: usize = 1 << 16;
 /// Instants per sample at which reversals are looked at: a millisecond at 125 Hz, a tenth of what a joint takes to
@@ -171,7 +173,8 @@ impl<'a> Identifier<'a> {
     /// Whether the noise that periods show may weigh a log that repeats: nothing else was asked for.
     pub fn may_weigh_by_periods(&self) -> bool {
         let Options { estimator, covariance, .. } = self.options;
-        estimator.is_none_or(|e| e == Estimator::Spectral)
+        !self.options.is_single_run()
+            && estimator.is_none_or(|e| e == Estimator::Spectral)
             && covariance.is_none_or(|c| c == CovarianceKind::Spectral)
     }
 
@@ -234,8 +237,7 @@ impl<'a> Identifier<'a> {
             let (log, torque_nm) = (m.source.to_owned(), m.torque_nm.joint(joint)[0]);
             return Err(IdentifyError::DeadTorque { log, joint: joint + 1, torque_nm });
         }
-        let is_single_run = self.options.period_s == Some(0.0);
-        let filled = if is_single_run {
+        let filled = if self.options.is_single_run() {
             None
         } else {
             fill_gaps(m.time_s, m.q_rad, m.qd_rad_s, m.torque_nm)?
@@ -348,7 +350,8 @@ impl<'a> Identifier<'a> {
         prepared: Prepared,
         instruments: Option<&Problem>,
     ) -> Result<Identification, IdentifyError> {
-        let repeats = prepared.processing.periods >= MANY_PERIODS;
+        let are_alike = prepared.replicates.as_ref().is_some_and(Replicates::are_alike);
+        let repeats = prepared.processing.periods >= MANY_PERIODS && !are_alike;
         let estimator = match self.options.estimator {
             Some(estimator) => estimator,
             None if repeats => Estimator::Spectral,
@@ -360,6 +363,9 @@ impl<'a> Identifier<'a> {
             false => CovarianceKind::Blocks,
         };
         let kind = self.options.covariance.unwrap_or(default_kind);
+        if are_alike && matches!(kind, CovarianceKind::Spectral | CovarianceKind::Periods) {
+            return Err(CovarianceError::AlikePeriods.into());
+        }
         let Processing { logs, periods, .. } = prepared.processing;
         let covariance_reason = match (self.options.covariance, default_kind) {
             (Some(_), _) => "asked for",
@@ -367,6 +373,7 @@ impl<'a> Identifier<'a> {
                 "the motion repeats: the scatter between periods holds for noise of any colour whose memory is short \
                  against a period"
             }
+            (None, _) if are_alike => ALIKE_TO_THE_LAST_DIGIT,
             (None, _) if logs > 1 => {
                 "several logs: the scatter between blocks of time holds for noise with a memory short against a block"
             }

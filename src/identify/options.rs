@@ -35,6 +35,11 @@ impl Options {
     /// the series of a motion that repeats ends too.
     pub const VELOCITY_END: f64 = 0.32;
 
+    /// Whether the log counts as a single run even where its motion repeats.
+    pub fn is_single_run(&self) -> bool {
+        self.period_s == Some(0.0)
+    }
+
     /// Cutoff (Hz) of the low-pass on the velocity of a single run before it is differentiated: wide
     /// enough above [`Self::cutoff_hz`] to leave the acceleration to the low-pass on the equations.
     pub fn derivative_cutoff_hz(&self, rate_hz: f64) -> f64 {

@@ -80,7 +80,8 @@ pub fn each_alone(
     let mut parts = Vec::with_capacity(regressions.len());
     for (log, regression) in regressions.iter().enumerate() {
         match identifier.identify_regression(regression) {
-            Ok(part) if part.covariance.degrees_of_freedom.is_finite() => parts.push(part),
+            Ok(part) if part.estimator == Estimator::Spectral => parts.push(part),
+            // It had nothing to weigh its harmonics by.
             Ok(_) => {
                 let reason = "its periods are alike to the last digit".to_owned();
                 return Ok(Several::Together { log, reason });

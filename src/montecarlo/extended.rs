@@ -101,6 +101,7 @@ impl Scenario {
             processing: processing.clone(),
             seed: SEED,
             trials: TRIALS,
+            reduced: None,
             arm,
         };
         let (robot, motion) = (scenario.arm.to_toml(), scenario.excitation.series().to_json());

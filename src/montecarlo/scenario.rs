@@ -30,6 +30,8 @@ pub struct Scenario {
     pub files: Vec<PathBuf>,
     /// The arm, its truth included.
     pub arm: Arm,
+    /// Name of the reduced parameter set, if not the full one is identified.
+    pub reduced: Option<String>,
     /// Base parameters that are identified.
     pub set: BaseSet,
     /// Name or file of the motion's trajectory.
@@ -185,6 +187,20 @@ impl Scenario {
         Self::from_toml(&source.text, &source.name, &source.folder)
     }
 
+    /// The same experiment with another arm, its own base parameters among it.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] where the base parameters of that arm cannot be told.
+    pub fn with_arm(self, arm: Arm) -> Result<Self, ScenarioError> {
+        let parameterisation = parameterisation(self.reduced.as_deref(), &arm)?;
+        Ok(Self { set: BaseSet::find(&arm, parameterisation)?, arm, ..self })
+    }
+
+    /// All files behind it: its own, `path`, and those that it names.
+    pub fn sources(&self, path: &Path) -> Vec<PathBuf> {
+        [&[path.to_owned()], &self.files[..]].concat()
+    }
+
     /// From TOML text; `source` names it in messages, files in it are relative to `folder`.
     pub fn from_toml(text: &str, source: &str, folder: &Path) -> Result<Self, ScenarioError> {
         let source = Source::new(text, source, folder);
@@ -203,10 +219,7 @@ impl Scenario {
     fn asked_for(file: ScenarioFile, source: &Source) -> Result<Self, ScenarioError> {
         source.check(file.trials > 0, "trials", 0.0, "must be at least 1")?;
         let LoadedArm { arm, mut files, .. } = LoadedArm::load(&source.beside(&file.robot))?;
-        let parameterisation = match &file.reduced {
-            Some(name) => Parameterisation::reduced(name, &arm)?,
-            None => Parameterisation::full(arm.dof(), arm.torque_offsets),
-        };
+        let parameterisation = parameterisation(file.reduced.as_deref(), &arm)?;
         let excitation = file.motion.excitation(&arm, source)?;
         files.extend(file.motion.file(source));
         FaultyPlant::new(&arm, &file.effects, &file.plant)?;
@@ -218,6 +231,7 @@ impl Scenario {
             sha256: fingerprint([&source.text, &arm.to_toml(), &excitation.series().to_json()]),
             files,
             arm,
+            reduced: file.reduced,
             excitation,
             trajectory: file.motion.trajectory,
             plant: file.plant,
@@ -228,6 +242,17 @@ impl Scenario {
             seed: file.seed,
             trials: file.trials,
         })
+    }
+}
+
+/// All parameters of `arm`, or a reduced set of them.
+fn parameterisation(
+    reduced: Option<&str>,
+    arm: &Arm,
+) -> Result<Parameterisation, ParameterisationError> {
+    match reduced {
+        Some(name) => Parameterisation::reduced(name, arm),
+        None => Ok(Parameterisation::full(arm.dof(), arm.torque_offsets)),
     }
 }
 

@@ -43,8 +43,9 @@ pub fn page(
         ),
         facts: vec![
             format!(
-                "Predicted from {} s of data: half of the parameters to {} or better, nine tenths to {}.",
-                spec.experiment.data_s,
+                "Predicted from {} periods, {:.1} s of data: half of the parameters to {} or better, nine tenths to {}.",
+                found.excitation.periods(),
+                found.experiment.data_s,
                 number::percent(p.relative_quantile(0.5), 2),
                 number::percent(p.relative_quantile(0.9), 2)
             ),

@@ -147,9 +147,9 @@ impl Physical {
                 list(&self.unconstrained_rms_nm)
             ),
             format!(
-                "The robot file's values are the prior ({}, weight {}{}): combinations that no \
-                 torque depends on are where it puts them, and {} standard parameters with them, which \
-                 come without σ (half of a file's error would stay, or one of {:.0} % be more than it).",
+                "The robot file's values are the prior ({}, weight {}{}): they fix the combinations that no torque depends on, and \
+                 with them {} standard parameters, which come without σ (more than half of an error of the file would stay in them, or an \
+                 error of {:.0} % would shift them by more than σ).",
                 self.prior_metric,
                 self.prior_weight,
                 if self.cross_validation.is_some() { " chosen by cross-validation" } else { "" },

@@ -300,8 +300,11 @@ impl JointEntry {
             return Err(fault(format!("torque_nm = {torque_nm} must be positive, inf if unknown")));
         }
         let [low, high] = self.position_rad;
-        if low.is_nan() || high.is_nan() || low >= high {
-            return Err(fault(format!("position_rad = [{low}, {high}] must be [low, high]")));
+        if !(low < high && low.is_finite() && high.is_finite()) {
+            return Err(fault(format!(
+                "position_rad = [{low}, {high}] must be [low, high]; of a joint without stops write a full turn either way, \
+                 [-6.2832, 6.2832]"
+            )));
         }
         let ranges = self.mass_bounds_kg.iter().map(|range| ("mass_bounds_kg", range));
         let boxes = self.com_bounds_m.iter().flatten().map(|range| ("com_bounds_m", range));

@@ -6,19 +6,21 @@ use thiserror::Error;
 
 use super::arm::{Arm, Placement};
 
-/// Frames that are apart by less are the same, m and rad: files print as many digits.
+/// Frames that are apart by less are the same, m and rad (of ε the share of it): files print as many digits.
 const SAME: f64 = 1e-6;
 
-/// Joint frames and gravity of an arm, as results carry them.
+/// Joint frames, gravity and friction's ε of an arm, as results carry them.
 ///
 /// The name of a robot does not say them: two files describe one robot by other joint frames, and parameters about the frames
-/// of one are wrong about those of the other.
+/// of one are wrong about those of the other; Coulomb and viscous friction are coefficients of tanh(q̇/ε) and q̇.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Kinematics {
     /// Gravity in the base frame, m/s².
     gravity_m_s2: [f64; 3],
     /// From base to flange.
     joint_frames: Vec<JointFrame>,
+    /// ε of the sign of friction, rad/s; not in results of older programs.
+    friction_epsilon_rad_s: Option<f64>,
 }
 
 /// Pose of a joint frame at q = 0 in its parent's: translation, and roll, pitch and yaw about fixed axes.
@@ -57,6 +59,14 @@ pub enum KinematicsDifference {
         /// Of the arm.
         expected: [f64; 3],
     },
+    /// In the law of friction.
+    #[error("its friction_epsilon_rad_s is {found}, not {expected}")]
+    FrictionEpsilon {
+        /// Of the result.
+        found: f64,
+        /// Of the arm.
+        expected: f64,
+    },
 }
 
 impl Kinematics {
@@ -69,6 +79,7 @@ impl Kinematics {
         Self {
             gravity_m_s2: arm.gravity_m_s2.into(),
             joint_frames: arm.joints.iter().map(|joint| frame(&joint.placement)).collect(),
+            friction_epsilon_rad_s: Some(arm.friction_epsilon_rad_s),
         }
     }
 
@@ -90,8 +101,14 @@ impl Kinematics {
         }
         let found = self.gravity_m_s2;
         let is_same = (Vector3::from(found) - arm.gravity_m_s2).norm() < SAME;
-        let expected = arm.gravity_m_s2.into();
-        (!is_same).then_some(KinematicsDifference::Gravity { found, expected })
+        if !is_same {
+            let expected = arm.gravity_m_s2.into();
+            return Some(KinematicsDifference::Gravity { found, expected });
+        }
+        let found = self.friction_epsilon_rad_s?;
+        let expected = arm.friction_epsilon_rad_s;
+        let is_same = (found - expected).abs() < SAME * expected;
+        (!is_same).then_some(KinematicsDifference::FrictionEpsilon { found, expected })
     }
 }
 
@@ -128,5 +145,12 @@ mod tests {
         assert!(turned.contains("joint 5") && turned.contains("5.00e-1 rad"), "{turned}");
         assert!(says(&|arm| arm.gravity_m_s2.z = -9.7).contains("-9.81"));
         assert!(says(&|arm| arm.joints.truncate(5)).contains("6 joints, not 5"));
+        let smoother = says(&|arm| arm.friction_epsilon_rad_s = 0.2);
+        assert!(smoother.contains("friction_epsilon_rad_s is 0.02, not 0.2"), "{smoother}");
+        // A result of an older program does not say it.
+        let mut older = serde_json::to_value(&own).unwrap();
+        older.as_object_mut().unwrap().remove("friction_epsilon_rad_s");
+        let older: Kinematics = serde_json::from_value(older).unwrap();
+        assert!(older.difference(&arm).is_none());
     }
 }

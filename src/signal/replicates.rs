@@ -16,6 +16,21 @@ pub struct Replicates {
     pub deviations: JointSignals,
 }
 
+impl Replicates {
+    /// Scatter below this share of a signal's rms is the rounding of a file that repeats one period.
+    const ROUNDING: f64 = 1e-9;
+
+    /// Whether the periods are alike to the last digit, so that their scatter says nothing of noise.
+    pub fn are_alike(&self) -> bool {
+        let scatters = |(j, sigma): (usize, &f64)| {
+            let mean = self.mean.joint(j);
+            let square = mean.iter().map(|v| v * v).sum::<f64>() / mean.len() as f64;
+            *sigma > Self::ROUNDING * square.sqrt()
+        };
+        !self.sigma.iter().enumerate().any(scatters)
+    }
+}
+
 /// Whole number of periods ≥ 2 in `samples`.
 pub(super) fn whole_periods(samples: usize, per_period: usize) -> Result<usize, SignalError> {
     if per_period == 0 || !samples.is_multiple_of(per_period) || samples < 2 * per_period {
@@ -59,6 +74,16 @@ pub fn replicate_noise(
 mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+
+    #[test]
+    fn a_period_that_is_copied_is_told_from_noise() {
+        let copied = |noise: f64| {
+            let value = |k: usize| ((k % 100) as f64 * 0.07).sin() + noise * (k as f64).sin();
+            replicate_noise(&JointSignals::from_fn(1, 400, |_, k| value(k)), 100).unwrap()
+        };
+        assert!(copied(0.0).are_alike());
+        assert!(!copied(1e-6).are_alike());
+    }
 
     #[test]
     fn mean_and_deviations_add_up_and_the_scatter_is_the_noise() {

@@ -7,6 +7,7 @@
 use crate::diagnose::Kind;
 use crate::diagnose::candidates::elasticity::ON_MOTOR;
 use crate::diagnose::candidates::load_friction::MOTOR_SIDE;
+use crate::plant::PlantConfig;
 use crate::plant::faults::{self, Effect};
 
 /// What becomes of a cause when the simulation is extended by it.
@@ -168,9 +169,10 @@ impl Found<'_> {
                 joint: self.joint?,
                 limit_nm: value("limit_nm")?,
             })),
+            // No drive feeds less forward than nothing.
             Kind::FeedForward => in_the_model(Effect::FeedForward(faults::FeedForward {
                 joint: self.joint?,
-                share_less: value("share_less")?,
+                share_less: value("share_less")?.min(PlantConfig::default().friction_feedforward),
             })),
             Kind::TimeSkew => in_the_model(Effect::TimeSkew(faults::TimeSkew {
                 joint: self.joint,

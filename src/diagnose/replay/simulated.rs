@@ -13,8 +13,8 @@ use crate::identify::Identification;
 use crate::identify::physical::{
     Information, PhysicalOptions, PriorWeight, Pulling, Solver, Structure,
 };
-use crate::plant::PlantConfig;
-use crate::plant::faults::{CurrentOffset, Effect};
+use crate::plant::faults::{CurrentOffset, Effect, FaultyPlant};
+use crate::plant::{PlantConfig, PlantError};
 use crate::robot::Arm;
 
 /// An arm that the plant can be.
@@ -37,7 +37,7 @@ pub struct NotReplayed {
     /// Joint, from 1; null for the arm as a whole.
     pub joint: Option<usize>,
     /// Why.
-    pub reason: &'static str,
+    pub reason: String,
 }
 
 /// The simulation without and with what was found.
@@ -58,6 +58,8 @@ pub struct ExtendedSimulation {
     pub plant: PlantConfig,
 }
 
+/// Why a change of the arm is not replayed.
+const HELD: &str = "the arm's parameters, which were identified with it, hold it";
 /// Why a fault of the record is not replayed.
 const REPAIRED: &str = "a fault of the record, repaired before the model was fitted";
 
@@ -81,6 +83,8 @@ impl ExtendedSimulation {
         };
         let mut theta = finding.extension.theta.clone();
         let mut fitted = Vec::new();
+        // Kind, joint and what goes back into the parameters with it, of each of `effects`.
+        let mut sources = Vec::new();
         for effect in &finding.extension.effects {
             let family = &families[effect.family];
             let quantities =
@@ -89,11 +93,21 @@ impl ExtendedSimulation {
             let (kind, joint) = (family.kind(), effect.site.map(|j| j + 1));
             fitted.push((kind, joint));
             let variant = effect.shape.variant;
-            if !out.take(Found { kind, joint, variant, quantities: &quantities }) {
+            if out.take(Found { kind, joint, variant, quantities: &quantities }, nominal) {
+                sources.push((kind, joint, &effect.absorbed));
+            } else {
                 theta.iter_mut().zip(&effect.absorbed).for_each(|(theta, more)| *theta += more);
             }
         }
         if !fitted.is_empty() {
+            out.extended = realise.arm(&theta)?;
+        }
+        while let Some((index, refusal)) = out.refused(nominal) {
+            out.effects.remove(index);
+            let (kind, joint, absorbed) = sources.remove(index);
+            let reason = in_words(&refusal);
+            out.not_replayed.push(NotReplayed { kind, joint, reason });
+            theta.iter_mut().zip(absorbed).for_each(|(theta, more)| *theta += more);
             out.extended = realise.arm(&theta)?;
         }
         // What is named beside the fitted effects: faults of the record, events, moved parameters.
@@ -104,33 +118,58 @@ impl ExtendedSimulation {
             }
             let found = Found { kind, joint, variant: 0, quantities: &[] };
             if !matches!(found.kind, Kind::Contact) && !kind.is_of_the_record() {
-                let reason = "the arm's parameters, which were identified with it, hold it";
+                let reason = HELD.to_owned();
                 out.not_replayed.push(NotReplayed { kind, joint, reason });
                 continue;
             }
             let quantities: Vec<_> =
                 cause.parameters.iter().map(|(name, e)| (*name, e.value)).collect();
-            out.take(Found { quantities: &quantities, ..found });
+            out.take(Found { quantities: &quantities, ..found }, nominal);
         }
         Ok(out)
     }
 
     /// Takes a cause in; whether it has a counterpart.
-    fn take(&mut self, found: Found) -> bool {
-        match found.counterpart() {
-            Counterpart::InTheModel(effect) => self.effects.push(effect),
+    fn take(&mut self, found: Found, nominal: &Arm) -> bool {
+        let Found { kind, joint, .. } = found;
+        let reason = match found.counterpart() {
+            Counterpart::InTheModel(effect) => {
+                self.effects.push(effect);
+                return true;
+            }
             Counterpart::OfTheRecord(effect) => {
-                self.of_the_record.push(effect);
-                let Found { kind, joint, .. } = found;
-                self.not_replayed.push(NotReplayed { kind, joint, reason: REPAIRED });
+                match FaultyPlant::new(nominal, std::slice::from_ref(&effect), &self.plant) {
+                    Ok(_) => {
+                        self.of_the_record.push(effect);
+                        REPAIRED.to_owned()
+                    }
+                    Err(refusal) => format!("{REPAIRED}; {}", in_words(&refusal)),
+                }
             }
-            Counterpart::None(reason) => {
-                let Found { kind, joint, .. } = found;
-                self.not_replayed.push(NotReplayed { kind, joint, reason });
-                return false;
-            }
+            Counterpart::None(reason) => reason.to_owned(),
+        };
+        self.not_replayed.push(NotReplayed { kind, joint, reason });
+        false
+    }
+
+    /// The first effect that the simulated arm cannot have beside those before it, and why.
+    fn refused(&self, nominal: &Arm) -> Option<(usize, PlantError)> {
+        (0..self.effects.len()).find_map(|last| {
+            let effects = &self.effects[..=last];
+            let arm = &self.extended.arm;
+            let plant = FaultyPlant::with_controller(arm, nominal, effects, &self.plant);
+            plant.err().map(|refusal| (last, refusal))
+        })
+    }
+}
+
+/// Why the plant does not take an effect in; as it stands alone, its number is of no use.
+fn in_words(refusal: &PlantError) -> String {
+    match refusal {
+        PlantError::Effect { key, value, requirement, .. } => {
+            format!("the simulated arm cannot have {key} = {value:.4}, which {requirement}")
         }
-        true
+        other => format!("the simulated arm cannot have it: {other}"),
     }
 }
 

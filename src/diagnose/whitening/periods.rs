@@ -11,7 +11,7 @@ use super::steps::steps;
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::friction_drift::FrictionDrift;
 use crate::diagnose::image::{Column, Image};
-use crate::diagnose::noise_power::{NoiseKnowledge, Uncertainty};
+use crate::diagnose::noise_power::{NoiseKnowledge, Uncertainty, rows_of};
 use crate::diagnose::scene::Scene;
 use crate::identify::{Panel, Regression};
 use crate::robot::JointSignals;
@@ -169,7 +169,9 @@ impl PeriodWhitening {
     /// joint by joint: as far as its own rows have them, which those of the joints behind it resemble by their common noise alone.
     pub fn with_noise_of_joints(&mut self, torques: &[(usize, Vec<Column>)]) {
         let of_joint = |(joint, torques): &(usize, Vec<Column>)| {
-            let rows = self.rows_of(*joint);
+            let harmonics = 0..self.factors.len();
+            let rows: Vec<usize> =
+                harmonics.flat_map(|k| rows_of(self.joints, k, *joint)).collect();
             let image = |torque: &Column| {
                 let whole = self.image_in_noise(torque).mean;
                 Image { mean: rows.iter().map(|row| whole[*row]).collect(), contrast: Vec::new() }
@@ -252,19 +254,6 @@ impl PeriodWhitening {
         (s, freedom)
     }
 
-    /// Rows of joint `j` in the mean period ([`Self::rows`]).
-    fn rows_of(&self, j: usize) -> Vec<usize> {
-        let harmonics = 0..self.factors.len();
-        let mut first = 0;
-        let rows = harmonics.flat_map(|k| {
-            let parts = if k == 0 || 2 * k == self.samples { 1 } else { 2 };
-            let own = first + j * parts;
-            first += self.joints * parts;
-            own..own + parts
-        });
-        rows.collect()
-    }
-
     /// Whitens rows of the mean period for noise of single joints; its own adjoint.
     fn whiten_joints(&self, rows: &mut [f64]) {
         for (own_rows, noise) in &self.of_joints {
@@ -314,11 +303,11 @@ impl PeriodWhitening {
 
     /// Whitened rows of one period's spectra (joint, coefficients), times `scale`.
     fn rows(&self, spectra: &[(usize, Vec<Complex<f64>>)], scale: f64) -> Vec<f64> {
-        let rows = self.samples.min(2 * self.factors.len() - 1);
+        let rows = 2 * self.factors.len() - 1;
         let mut out = vec![0.0; self.joints * rows];
         let mut row = 0;
         for (k, factor) in self.factors.iter().enumerate() {
-            let real = k == 0 || 2 * k == self.samples;
+            let real = k == 0;
             for i in 0..self.joints {
                 let mut sum = Complex::new(0.0, 0.0);
                 for (j, spectrum) in spectra.iter().filter(|(j, _)| *j <= i) {
@@ -347,7 +336,7 @@ impl PeriodWhitening {
         let mut spectra = vec![inverse.make_input_vec(); self.joints];
         let mut row = 0;
         for (k, factor) in self.factors.iter().enumerate() {
-            let real = k == 0 || 2 * k == n;
+            let real = k == 0;
             for i in 0..self.joints {
                 let value = if real {
                     Complex::new(rows[row], 0.0)
@@ -437,7 +426,7 @@ impl PeriodWhitening {
             joints,
             of_mean: periods as f64,
             forward: fourier::forward(samples),
-            factors: vec![identity.iter().copied().collect(); samples / 2 + 1],
+            factors: vec![identity.iter().copied().collect(); samples.div_ceil(2)],
             unknown: Vec::new(),
             drifting: Vec::new(),
             steps: Vec::new(),

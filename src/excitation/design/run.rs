@@ -3,13 +3,11 @@
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use faer::Mat;
-
 use super::barrier::LimitBarrier;
 use super::error::DesignError;
 use super::information::Information;
 use super::interior_point::Stage;
-use super::prediction::Prediction;
+use super::prediction::{Experiment, Prediction};
 use super::problem::Problem;
 use super::search::{Candidate, Effort, Progress, Round, search};
 use super::space::DesignSpace;
@@ -28,7 +26,9 @@ pub struct Design {
     pub excitation: Excitation,
     /// Value of the criterion (a logarithm, see [`super::Criterion`]) on the optimiser's grid.
     pub value: f64,
-    /// What the experiment will tell.
+    /// The experiment asked for, as long as the motion's periods are together.
+    pub experiment: Experiment,
+    /// What it will tell.
     pub prediction: Prediction,
     /// What the motion leaves free.
     pub margins: Margins,
@@ -130,7 +130,6 @@ pub fn design(
     } else {
         vec![1.0; arm.dof()]
     };
-    let prior = spec.prior_sigma.as_ref().map(|sigma| prior_information(base, sigma));
     let information = Information::new(&model, base, weights);
     let barrier = LimitBarrier::new(arm, &spec.requirements, ClearanceModel::new(arm));
     let torque_nm =
@@ -140,7 +139,7 @@ pub fn design(
         information,
         criterion: spec.criterion,
         scales,
-        prior: prior.clone(),
+        prior: spec.prior.clone(),
         barrier,
         torque_nm,
     };
@@ -173,8 +172,10 @@ pub fn design(
             Err(e) => return Err(e),
             Ok((excitation, margins)) => {
                 let series = excitation.series();
-                let prediction =
-                    Prediction::of(&model, base, &spec.experiment, series, prior.as_ref());
+                let data_s = excitation.periods() as f64 * series.period_s;
+                let experiment = Experiment { data_s, ..spec.experiment.clone() };
+                let prior = spec.prior.as_ref();
+                let prediction = Prediction::of(&model, base, &experiment, series, prior);
                 let Some(prediction) = prediction else {
                     last = "it leaves a parameter undetermined".into();
                     continue;
@@ -183,6 +184,7 @@ pub fn design(
                 return Ok(Design {
                     excitation,
                     value: candidate.value,
+                    experiment,
                     prediction,
                     margins,
                     finalists: finalists
@@ -199,13 +201,9 @@ pub fn design(
     Err(DesignError::CheckFailed { candidates: found.candidates.len(), last })
 }
 
-/// diag(1/σ²). A result file states no correlations, so the prior has none.
-fn prior_information(base: &BaseSet, sigma: &[f64]) -> Mat<f64> {
-    Mat::from_fn(
-        base.rank(),
-        base.rank(),
-        |i, k| if i == k { 1.0 / (sigma[i] * sigma[i]) } else { 0.0 },
-    )
+/// Whole periods that cover `data_s`, all but a hundredth of one.
+fn periods_to_cover(data_s: f64, period_s: f64) -> usize {
+    (data_s / period_s - 0.01).ceil().max(1.0) as usize
 }
 
 /// The candidate made ready to run: shrunk by a trifle if the fine grid finds it outside, started at
@@ -226,7 +224,7 @@ fn finish(
         x = space.scaled(&x, SHRINK);
     }
     let series = space.series(&x);
-    let periods = (spec.experiment.data_s / series.period_s).round().max(1.0) as usize;
+    let periods = periods_to_cover(spec.experiment.data_s, series.period_s);
     let mut failure = None;
     for shift_s in calm_moments(arm, spec, &series) {
         let begun = series.shifted(shift_s);

@@ -107,38 +107,46 @@ pub fn search(
         if index > 0 && entrants.is_empty() {
             break;
         }
-        let done = AtomicUsize::new(0);
-        let best = std::sync::Mutex::new(f64::INFINITY);
+        let reached = std::sync::Mutex::new((0, f64::INFINITY));
         let of = entrants.len();
+        let advance = |ws: &mut ProblemWorkspace, start: usize, x: Option<DVector<f64>>| {
+            // Even when time is over, the first entrants get their look at the grid, so that
+            // there is something feasible to return.
+            if effort.over() && index == 0 && start > 0 {
+                return None;
+            }
+            if index == 0 {
+                tried_starts.fetch_add(1, Ordering::Relaxed);
+            }
+            let from = match x {
+                Some(x) => x,
+                None => random_start(arm, &problem, start as u64, effort.seed, ws)?,
+            };
+            let first = round.stages.first()?;
+            let from = inside(&problem, ws, from, first)?;
+            let descent = descend(&problem, ws, from, &round.stages, &|| effort.over())?;
+            let Descent { x, evaluations, ending, .. } = descent;
+            let value = problem.exact(ws, &x)?;
+            let interrupted = ending == Ending::Interrupted;
+            Some((Candidate { start, x, value }, evaluations, interrupted))
+        };
+        // By all entrants, those too that become no motion.
+        let report = |result: &Option<(Candidate, usize, bool)>| {
+            let value = result.as_ref().map_or(f64::INFINITY, |(candidate, ..)| candidate.value);
+            if let Ok(mut reached) = reached.lock() {
+                let (done, best) = &mut *reached;
+                (*done, *best) = (*done + 1, best.min(value));
+                progress(Progress { round: index + 1, done: *done, of, best: *best });
+            }
+        };
         let results: Vec<Option<(Candidate, usize, bool)>> = entrants
             .into_par_iter()
             .map_init(
                 || problem.workspace(),
                 |ws, (start, x)| {
-                    // Even when time is over, the first entrants get their look at the grid, so that
-                    // there is something feasible to return.
-                    if effort.over() && index == 0 && start > 0 {
-                        return None;
-                    }
-                    if index == 0 {
-                        tried_starts.fetch_add(1, Ordering::Relaxed);
-                    }
-                    let from = match x {
-                        Some(x) => x,
-                        None => random_start(arm, &problem, start as u64, effort.seed, ws)?,
-                    };
-                    let first = round.stages.first()?;
-                    let from = inside(&problem, ws, from, first)?;
-                    let descent = descend(&problem, ws, from, &round.stages, &|| effort.over())?;
-                    let Descent { x, evaluations, ending, .. } = descent;
-                    let value = problem.exact(ws, &x)?;
-                    let finished = done.fetch_add(1, Ordering::Relaxed) + 1;
-                    if let Ok(mut best) = best.lock() {
-                        *best = best.min(value);
-                        progress(Progress { round: index + 1, done: finished, of, best: *best });
-                    }
-                    let interrupted = ending == Ending::Interrupted;
-                    Some((Candidate { start, x, value }, evaluations, interrupted))
+                    let result = advance(ws, start, x);
+                    report(&result);
+                    result
                 },
             )
             .collect();

@@ -1,5 +1,7 @@
 //! What a design is asked for, checked before anything runs.
 
+use faer::Mat;
+
 use super::criterion::Criterion;
 use super::error::DesignError;
 use super::prediction::Experiment;
@@ -18,9 +20,9 @@ pub struct Specification {
     pub requirements: Requirements,
     /// For which experiment.
     pub experiment: Experiment,
-    /// Standard deviations with which the base parameters are known already, in the order of the base
-    /// set; ∞ for what is not known.
-    pub prior_sigma: Option<Vec<f64>>,
+    /// What is known already of the base parameters: the inverse of their covariance, in the order of the base set, with
+    /// rows and columns of zeros for those that are not known.
+    pub prior: Option<Mat<f64>>,
     /// Number of random starts.
     pub starts: usize,
     /// How many of them are taken to the end.
@@ -31,6 +33,8 @@ pub struct Specification {
 
 /// More of a period are no use: 1000 s at 1 kHz.
 const MOST_SAMPLES: f64 = 1e6;
+/// The whole motion is checked against the limits: a day of it takes minutes.
+const LONGEST_S: f64 = 86_400.0;
 
 impl Specification {
     /// Whether this can be asked of `arm`.
@@ -48,6 +52,12 @@ impl Specification {
             );
             return Err(DesignError::Value { what, value: samples, must });
         }
+        let data_s = self.experiment.data_s;
+        if data_s > LONGEST_S {
+            let (what, must) =
+                ("the length of the data".to_owned(), format!("at most {LONGEST_S:.0} s"));
+            return Err(DesignError::Value { what, value: data_s, must });
+        }
         at_least("the order", v.order, if v.rest_start { 2 } else { 1 })?;
         at_least("the number of starts", self.starts, 1)?;
         at_least("the number of finalists", self.finalists, 1)?;
@@ -61,7 +71,7 @@ impl Specification {
                 });
             }
         }
-        if self.prior_sigma.is_some() && !self.criterion.whitened() {
+        if self.prior.is_some() && !self.criterion.whitened() {
             return Err(DesignError::PriorUnused);
         }
         let clearance_m = self.requirements.clearance_m;

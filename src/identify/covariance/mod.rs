@@ -138,6 +138,9 @@ pub enum CovarianceError {
         /// Whole periods found.
         periods: usize,
     },
+    /// Needs noise.
+    #[error("the periods are alike to the last digit: their scatter says nothing of noise")]
+    AlikePeriods,
     /// Needs samples in the order of time.
     #[error(
         "a covariance from {what} needs an estimator that works in the time domain (ols, wls), not \

@@ -46,13 +46,13 @@ impl Evidence {
         let Self { realisable, distance, .. } = self;
         if self.is_realisable() {
             return format!(
-                "the unconstrained estimate is an arm that can exist: its bodies keep at least \
-                 {realisable:.2e} of the robot file's pseudo-inertias"
+                "links exist that have the fitted base parameters, with pseudo-inertias of at least {realisable:.2e} times the \
+                 robot file's"
             );
         }
         let found = format!(
-            "no arm that can exist has the base parameters of the fit (its bodies would lack {:.2} times the robot file's \
-             pseudo-inertias); making it one cost {distance:.1} units of noise",
+            "the fitted base parameters are physically impossible (no links have them; they are short by {:.2} times the robot file's \
+             pseudo-inertias); the nearest possible ones raise the sum of squares by {distance:.1} in units of the noise",
             -realisable
         );
         // No draw at all: the chance is below what so many can show.

@@ -49,6 +49,8 @@ pub struct Training<'a> {
     pub identification: &'a Identification,
     /// Base parameters by the robot's description.
     pub nominal: &'a [f64],
+    /// Name of the reduced parameter set, if not the full one was identified.
+    pub reduced: Option<&'a str>,
 }
 
 /// A prediction of a log that was not used for the fit.
@@ -89,6 +91,8 @@ impl Validation {
 pub struct Result {
     robot: String,
     kinematics: Kinematics,
+    /// Null: the full one.
+    reduced: Option<String>,
     log: String,
     samples: usize,
     rate_hz: f64,
@@ -191,12 +195,16 @@ impl Result {
         let fit = identification.residual();
         warnings.extend(validations.iter().filter_map(|validation| foreign(validation, &fit)));
         // Logs whose torques could not be read came no further than that.
-        let torques = training.logs.iter().filter_map(|log| log.torque_nm(arm).ok());
-        warnings.extend(torques.filter_map(|torque_nm| drive_limit_remark(arm, &torque_nm)));
+        let several = training.logs.len() > 1;
+        warnings.extend(training.logs.iter().filter_map(|log| {
+            let remark = drive_limit_remark(arm, &log.torque_nm(arm).ok()?)?;
+            Some(if several { format!("{}: {remark}", log.source) } else { remark })
+        }));
         warnings.extend(validations.iter().flat_map(|validation| validation.warnings.clone()));
         Ok(Self {
             robot: arm.name.clone(),
             kinematics: Kinematics::of(arm),
+            reduced: training.reduced.map(str::to_owned),
             log: names(training.logs),
             samples: identification.samples,
             rate_hz: regression.problem.rate_hz,

@@ -80,7 +80,7 @@ pub fn facts(result: &Result) -> Vec<String> {
             processing.logs, processing.periods
         ),
         _ if processing.logs > 1 => format!(
-            "{} logs one below the other: what repeats in one of them tells nothing of the noise here",
+            "{} logs one below the other, as one single run: that the motion of one repeats is not used",
             processing.logs
         ),
         Some(period) => format!(

@@ -1,0 +1,200 @@
+//! An earlier result of `armid identify`, read back: base parameters and how well they are known.
+
+use std::path::Path;
+
+use nalgebra::{DMatrix, DVector};
+use serde::Deserialize;
+
+use super::robot::{OtherRobot, SavedRobot};
+use crate::base::BaseSet;
+use crate::report::identify::{CONTRADICTED, IDENTIFY_SCHEMA};
+use crate::report::saved::{SavedError, load};
+use crate::robot::Arm;
+
+/// What is needed of an identification's JSON.
+#[derive(Deserialize)]
+pub(super) struct EarlierResult {
+    #[serde(flatten)]
+    about: SavedRobot,
+    #[serde(default)]
+    log: String,
+    #[serde(default)]
+    verdict: String,
+    /// Name of the reduced parameter set, if it was not the full one.
+    #[serde(default)]
+    reduced: Option<String>,
+    base_parameters: Vec<EarlierParameter>,
+    base_covariance: Option<Vec<Vec<Option<f64>>>>,
+    #[serde(default)]
+    intervals: Intervals,
+    #[serde(default)]
+    program: SavedProgram,
+}
+
+#[derive(Default, Deserialize)]
+struct SavedProgram {
+    inputs: Vec<SavedInput>,
+}
+
+#[derive(Deserialize)]
+struct SavedInput {
+    path: String,
+    sha256: String,
+}
+
+#[derive(Default, Deserialize)]
+struct Intervals {
+    trusted: Option<bool>,
+}
+
+/// One base parameter of it.
+#[derive(Deserialize)]
+pub(super) struct EarlierParameter {
+    pub(super) name: String,
+    /// Not in results of older programs.
+    formula: Option<String>,
+    pub(super) value: f64,
+    pub(super) sigma: Option<f64>,
+}
+
+/// Why nothing can be done with the numbers of a result as they are.
+pub(super) enum Doubt {
+    /// No arm can have them.
+    Impossible,
+    /// The model was wrong along its log.
+    WrongModel,
+}
+
+impl EarlierResult {
+    /// The result in `path`.
+    pub(super) fn load(path: &Path) -> Result<Self, SavedError> {
+        load(path, IDENTIFY_SCHEMA)
+    }
+
+    /// Refuses an `arm` about which the result says nothing.
+    pub(super) fn check(&self, arm: &Arm) -> Result<(), OtherRobot> {
+        if let Some(set) = &self.reduced {
+            return Err(OtherRobot::Reduced { set: set.clone() });
+        }
+        self.about.check(arm)
+    }
+
+    /// Whether it was identified from the log whose file has the hash `sha256`.
+    pub(super) fn is_of(&self, sha256: &str) -> bool {
+        let is_its_log = |input: &SavedInput| input.sha256 == sha256 && input.path == self.log;
+        self.program.inputs.iter().any(is_its_log)
+    }
+
+    /// What it says against itself.
+    pub(super) fn doubt(&self) -> Option<Doubt> {
+        if self.verdict == CONTRADICTED {
+            Some(Doubt::Impossible)
+        } else if self.intervals.trusted == Some(false) {
+            Some(Doubt::WrongModel)
+        } else {
+            None
+        }
+    }
+
+    /// Whether σ is all that it says of how well the parameters are known, as results of older programs.
+    pub(super) fn lacks_covariance(&self) -> bool {
+        self.base_covariance.is_none()
+    }
+
+    /// Its base parameters.
+    pub(super) fn parameters(&self) -> &[EarlierParameter] {
+        &self.base_parameters
+    }
+
+    /// Where it has base parameter `k` of `set`. The same column kept beside others that are not is another parameter: the
+    /// whole combination has to be the same.
+    pub(super) fn place(&self, set: &BaseSet, k: usize) -> Option<usize> {
+        let (name, formula) = (set.name(k), set.formula(k));
+        let is_it = |known: &EarlierParameter| match &known.formula {
+            Some(known) => *known == formula,
+            None => known.name == name || known.name == formula,
+        };
+        self.base_parameters.iter().position(is_it)
+    }
+
+    /// The covariance of the base parameters at `places`, by σ alone where it was not saved; or what is wrong with it.
+    pub(super) fn covariance(&self, places: &[usize]) -> Result<DMatrix<f64>, String> {
+        let count = self.base_parameters.len();
+        let Some(rows) = &self.base_covariance else {
+            let variance = |&place: &usize| {
+                let EarlierParameter { name, sigma, .. } = &self.base_parameters[place];
+                sigma.map(|sigma| sigma * sigma).ok_or_else(|| format!("no sigma of {name}"))
+            };
+            let variances: Vec<f64> = places.iter().map(variance).collect::<Result<_, _>>()?;
+            return Ok(DMatrix::from_diagonal(&DVector::from_vec(variances)));
+        };
+        let is_variance = |(i, row): (usize, &Vec<Option<f64>>)| {
+            row.len() == count
+                && row.iter().all(Option::is_some)
+                && row[i].is_some_and(|variance| variance >= 0.0)
+        };
+        if rows.len() != count || !rows.iter().enumerate().all(is_variance) {
+            let message = "base_covariance is no covariance of its base parameters";
+            return Err(format!("{message} ({count} × {count} numbers)"));
+        }
+        let entry = |i: usize, k: usize| rows[places[i]][places[k]].unwrap_or_default();
+        Ok(DMatrix::from_fn(places.len(), places.len(), entry))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::Parameterisation;
+
+    /// Of a result with the two parameters `a` and `b` and this `base_covariance`, taken in the order b, a.
+    fn covariance(rows: &str) -> Result<DMatrix<f64>, String> {
+        let result = serde_json::json!({
+            "robot": "ur5",
+            "base_parameters": [
+                {"name": "a", "value": 1.0, "sigma": 2.0},
+                {"name": "b", "value": 1.0, "sigma": 3.0},
+            ],
+            "base_covariance": serde_json::from_str::<serde_json::Value>(rows).unwrap(),
+        });
+        serde_json::from_value::<EarlierResult>(result).unwrap().covariance(&[1, 0])
+    }
+
+    #[test]
+    fn a_covariance_is_put_in_the_order_of_the_parameters() {
+        let found = covariance("[[4.0, 1.5], [1.5, 9.0]]").unwrap();
+        assert_eq!(found, DMatrix::from_row_slice(2, 2, &[9.0, 1.5, 1.5, 4.0]));
+        // Results of older programs have σ alone.
+        let found = covariance("null").unwrap();
+        assert_eq!(found, DMatrix::from_row_slice(2, 2, &[9.0, 0.0, 0.0, 4.0]));
+    }
+
+    #[test]
+    fn what_is_no_covariance_is_refused() {
+        let not_square = ["[[4.0, 1.5]]", "[[4.0], [1.5, 9.0]]", "[]"];
+        let no_numbers = ["[[4.0, null], [1.5, 9.0]]", "[[-4.0, 1.5], [1.5, 9.0]]"];
+        for rows in not_square.iter().chain(&no_numbers) {
+            let error = covariance(rows).unwrap_err();
+            assert!(error.contains("no covariance of its base parameters (2 × 2"), "{error}");
+        }
+    }
+
+    /// A parameter is known by its whole combination: the first column alone is in other combinations as well.
+    #[test]
+    fn a_combination_is_not_told_by_its_first_column() {
+        let arm = Arm::built_in("ur5").unwrap();
+        let set = BaseSet::find(&arm, Parameterisation::full(6, false)).unwrap();
+        let k = (0..set.rank()).find(|&k| set.formula(k) != set.name(k)).unwrap();
+        let place = |parameter: serde_json::Value| {
+            let result = serde_json::json!({"robot": "ur5", "base_parameters": [parameter]});
+            serde_json::from_value::<EarlierResult>(result).unwrap().place(&set, k)
+        };
+        let (name, formula) = (set.name(k), set.formula(k));
+        let same = serde_json::json!({"name": name, "formula": formula, "value": 1.0});
+        assert_eq!(place(same), Some(0));
+        let other = serde_json::json!({"name": name, "formula": name, "value": 1.0});
+        assert_eq!(place(other), None);
+        // Results of older programs have names alone.
+        assert_eq!(place(serde_json::json!({"name": name, "value": 1.0})), Some(0));
+    }
+}
