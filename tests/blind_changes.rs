@@ -1,7 +1,7 @@
 //! Hide and find what any fit would absorb: against the simulation without it, or against a second log;
 //! and contacts, which no fit absorbs. Everything hidden is made by the plant.
 
-use armid::diagnose::{Cause, Diagnosis, Kind, Nominal, Validation};
+use armid::diagnose::{Cause, Diagnosis, Estimate, Kind, Nominal, Validation};
 use armid::identify::{Identifier, Measurement};
 
 use crate::simulated::{NOISE, Run, scenario};
@@ -209,6 +209,18 @@ fn a_body_between_two_logs_is_weighed_and_scales_the_gains() {
     assert!((scale.value - 1.0).abs() < 0.03, "{scale:?}");
     let none = against(&other);
     assert!(!none.is_named && none.cause().is_none(), "{none:?}");
+    // A push along the log with the body weighs nothing: each of the two estimates is within its own 95 %.
+    let push =
+        "[[effect]]\nkind = \"contact\"\njoint = 2\nstart_s = 24.0\nend_s = 24.5\npeak_nm = 25.0\n";
+    let pushed = run(16, 4, &format!("{body}{push}"));
+    let touched = against(&pushed.log.measurement("changes"));
+    println!("{touched:#?}");
+    assert!(touched.was_touched && !weighed.was_touched && !none.was_touched);
+    let half_kg = |e: &Estimate| 0.5 * (e.ci95[1] - e.ci95[0]);
+    let (with, without) = (&touched.mass_kg, &weighed.mass_kg);
+    let apart_kg = (with.value - without.value).abs();
+    assert!(apart_kg < half_kg(without), "{with:?} {without:?}");
+    assert!(half_kg(with) < 1.2 * half_kg(without), "{with:?} {without:?}");
 
     // The other way round there is less than nothing on the flange, and the model fits the first log alone.
     let bare_run = [Validation { measurement: bare, manufacturer_nm: None }];

@@ -11,6 +11,7 @@ use super::verdict::Estimate;
 use crate::identify::covariance::quantile_95;
 
 /// Equations of one joint along one log.
+#[derive(Clone)]
 pub(super) struct Equations {
     /// Joint (0-based).
     pub(super) joint: usize,

@@ -2,9 +2,9 @@
 
 use super::against::{self, Found, Nominal};
 use super::candidates::{self, Candidate};
+use super::cleaned::Cleaned;
 use super::common_motion::{move_to_common_motion, noise_of_mean};
-use super::contact::{self, Compared};
-use super::data_faults::{self, Faults};
+use super::contact::Compared;
 use super::detection_limits::detection_limits;
 use super::error::DiagnoseError;
 use super::extension::{Effect, Extension};
@@ -21,10 +21,10 @@ use super::record::{Record, is_torn};
 use super::replay::measured_nm;
 use super::rms::rms_where;
 use super::scene::Scene;
-use super::selection::{Kept, select};
+use super::selection::{Contender, Kept, select};
 use super::settled::{beside_model, residual, settled, without_contacts};
 use super::study::{Entry, Study};
-use super::verdict::{Cause, Diagnosis, Rival, Rms, Verdict};
+use super::verdict::{Cause, Diagnosis, HeldOut, Rival, Rms, Unexplained, Verdict};
 use crate::base::BaseSet;
 use crate::dynamics::Model;
 use crate::identify::{
@@ -87,102 +87,52 @@ impl<'a> Diagnoser<'a> {
         held_out: &[Validation],
         simulation: Option<Nominal>,
     ) -> Result<Finding, DiagnoseError> {
-        let Faults { causes: mut faults, record, warning, unreadable } =
-            data_faults::find(m, self.options.is_single_run())?;
-        let m = &record.measurement(m.source);
-        let mut coarse = data_faults::coarse_joints(&faults);
-        coarse.extend(unreadable);
-        // Across a short mended stall torques are straight lines, which differ from period to period.
-        let is_mended = faults.iter().any(|fault| fault.kind == Kind::ClockFault);
-        let compared =
-            if is_mended { Compared::TooFew } else { contact::between_periods(m, &coarse)? };
-        let touched = match &compared {
-            Compared::Touched(touched) => Some(touched),
-            Compared::TooFew | Compared::Alike => None,
-        };
-        let torque_nm = touched.map_or(m.torque_nm, |t| &t.torque_nm);
-        let m = &Measurement { torque_nm, ..*m };
-        let mut regression = self.identifier.regression(m)?;
-        regression.prepared.count_filled(&record.filled);
+        let log = Cleaned::of(m, &self.options)?;
+        let m = &log.measurement(m.source);
+        let mut regression = log.regression(&mut self.identifier, m.source)?;
         let identification = self.identifier.identify_regression(&regression)?;
         let measured_nm = measured_nm(&regression);
-        let fit = &identification.fit;
-        move_to_common_motion(&mut regression, (self.arm, self.set), &fit.theta);
+        move_to_common_motion(&mut regression, (self.arm, self.set), &identification.fit.theta);
         let noise_nm = noise_of_mean(&regression);
         let sources = (self.arm, self.set, &self.options);
-        let estimate = (&fit.theta[..], &fit.joint_sigma_nm[..]);
-        let mut first = Study::new(&self.families, sources, &regression, estimate, m.source)?;
-        first.leave_out(coarse);
-        let null = Extension::fit(&first, &[], &first.torque);
-        let first = without_contacts(first, self.set, &null, m.source)?;
-        let found = select(&first);
-        let (mut study, found) = if found.causes.is_empty() && first.scene.periodic {
-            (first, found.causes)
-        } else {
-            settled(first, found, (self.arm, self.set), m.source)?
-        };
-        let null = Extension::fit(&study, &[], &study.torque);
-        if !study.scene.periodic {
-            // A single run is judged by its own residual, which is known only now.
-            let (_, rest) = Kept::taken_over(&study, found.clone()).without(None);
-            study.judge_by(&rest);
-        }
+        let (study, found) =
+            causes_of(&self.families, sources, &regression, &identification, &log, m.source)?;
         let kept = match study.scene.periodic {
             true => Kept::settled(&study, found),
             false => Kept::of_a_single_run(&study, found),
         };
+        let null = Extension::fit(&study, &[], &study.torque);
         let selected = kept.selected();
         let before_nm = residual(&study, &null);
         let mut model = self.extended(&study, &kept, &selected);
-        faults.extend(match touched {
+        let touches = match log.touched() {
             Some(touched) => touched.causes.clone(),
             None => beside_model(&study, &model.after_nm)?.causes,
-        });
+        };
         if let Some(simulation) = simulation {
             self.compare(&study, &selected, simulation, &mut model);
         }
+        let faults = [log.faults.clone(), touches].concat();
         model.causes = in_order(faults, model.causes, study.scene.periodic);
         let Extended { mut causes, extension, after_nm, accepted, rest } = model;
         let base = intervals::base(&study, self.set, &extension);
         let moved_parameters = simulation.map_or(Vec::new(), |s| against::moved(s, &base));
         let moved_together = simulation.and_then(|s| against::moved_together(&study, s, &base));
-        let is_a_tear = |cause: &mut Cause| {
-            let at = |name| cause.parameters.get(name).map_or(f64::NAN, |e| e.value);
-            cause.kind == Kind::Contact && is_torn(m, [at("start_s"), at("end_s")])
-        };
-        let tears = causes.extract_if(.., is_a_tear).count();
+        let tears = take_out_tears(&mut causes, m);
         make_modest(&mut causes);
         let lack = misfit::lack_of_fit(&study, &accepted, &rest);
-        // What is left of a law of drift is another form of it.
-        let drifts = |j: usize| {
-            causes.iter().any(|c| c.kind == Kind::ThermalDrift && c.joint == Some(j + 1))
-        };
-        let can_differ = |j: usize| !is_mended && !drifts(j);
-        let has_law = |j: usize| {
-            let is_there = |cause: &Cause| cause.joint.is_none_or(|own| own == j + 1);
-            causes.iter().any(|cause| cause.kind.is_a_law() && is_there(cause))
-        };
-        let unexplained = misfit::unexplained(&study, &accepted, &rest, lack, has_law, can_differ);
+        let unexplained = unexplained(&study, (&accepted, &rest), lack, &causes, &log);
         if let Some(unknown) = &unexplained {
             causes.iter_mut().for_each(|cause| cause.make_modest_beside_unknown(unknown.joint));
         }
-        let held_out = held_out
-            .iter()
-            .map(|log| {
-                // The recorder lags on other days as it does here.
-                let mut record = Record::without_rows(&log.measurement, &[]);
-                record.undo_lags(&causes);
-                let measurement = record.measurement(log.measurement.source);
-                let log = &Validation { measurement, manufacturer_nm: log.manufacturer_nm };
-                let models = Models { null: &null, extension: &extension };
-                held_out_gain(&mut self.identifier, sources, &self.families, log, &models)
-            })
-            .collect::<Result<Vec<_>, _>>()?;
-        // What touched the arm, and friction that the null model lacks, bend the null model's gravity.
-        let (theta, covariance) = (&extension.theta, &identification.covariance);
+        let models = Models { null: &null, extension: &extension };
+        let gain = |log| {
+            gain_along((&mut self.identifier, &self.families), sources, log, &models, &causes)
+        };
+        let held_out = held_out.iter().map(gain).collect::<Result<Vec<_>, _>>()?;
         let mut warnings: Vec<String> =
-            warning.into_iter().chain(identification.warnings.clone()).collect();
-        warnings.extend(contact_remark(&study, &compared, is_mended));
+            log.warning.iter().chain(&identification.warnings).cloned().collect();
+        warnings.extend(contact_remark(&study, &log));
         warnings.extend(drift_remark(&study, &causes));
         warnings.extend(drive_limit_remark(self.arm, m.torque_nm));
         for held_out in &held_out {
@@ -228,16 +178,7 @@ impl<'a> Diagnoser<'a> {
             // Whatever is said next rests on it.
             diagnosis.sentences.insert(0, doubt.to_owned());
         }
-        let nominal = self.set.values(&Model::new(self.arm).standard_parameters());
-        let sigma = sigma_of_friction_alone(&diagnosis, self.set);
-        let doubt = Doubt::of(self.arm, self.set, &nominal, theta, &sigma, covariance);
-        if let Some(doubt) = doubt {
-            // Of another robot's log nothing else matters.
-            diagnosis.sentences.insert(0, doubt.sentence);
-            if doubt.is_contradiction {
-                diagnosis.verdict = Verdict::Contradicted;
-            }
-        }
+        self.question_the_arm(&mut diagnosis, &extension, &identification);
         let samples = (0..regression.problem.samples).map(|row| regression.sample(row)).collect();
         let scene = study.scene;
         Ok(Finding {
@@ -250,6 +191,26 @@ impl<'a> Diagnoser<'a> {
             measured_nm,
             samples,
         })
+    }
+
+    /// Says first that the log may be that of another robot, or that no arm has these parameters.
+    fn question_the_arm(
+        &self,
+        diagnosis: &mut Diagnosis,
+        extension: &Extension,
+        identification: &Identification,
+    ) {
+        let nominal = self.set.values(&Model::new(self.arm).standard_parameters());
+        let sigma = sigma_of_friction_alone(diagnosis, self.set);
+        // What touched the arm, and friction that the null model lacks, bend the null model's gravity.
+        let (theta, covariance) = (&extension.theta, &identification.covariance);
+        let doubt = Doubt::of(self.arm, self.set, &nominal, theta, &sigma, covariance);
+        if let Some(doubt) = doubt {
+            diagnosis.sentences.insert(0, doubt.sentence);
+            if doubt.is_contradiction {
+                diagnosis.verdict = Verdict::Contradicted;
+            }
+        }
     }
 
     /// The model of `study` with the causes `selected` of those `kept`.
@@ -313,13 +274,11 @@ impl<'a> Diagnoser<'a> {
         loaded: &Measurement,
         known_mass_kg: Option<f64>,
     ) -> Result<PayloadFinding, DiagnoseError> {
-        let mut mended = |m: &Measurement| -> Result<Regression, DiagnoseError> {
-            let record = data_faults::find(m, self.options.is_single_run())?.record;
-            let mut regression = self.identifier.regression(&record.measurement(m.source))?;
-            regression.prepared.count_filled(&record.filled);
-            Ok(regression)
+        let mut cleaned = |m: &Measurement| -> Result<(Regression, bool), DiagnoseError> {
+            let log = Cleaned::of(m, &self.options)?;
+            Ok((log.regression(&mut self.identifier, m.source)?, log.touched().is_some()))
         };
-        let [reference_rows, loaded_rows] = [mended(reference)?, mended(loaded)?];
+        let [(reference_rows, _), (loaded_rows, touched)] = [cleaned(reference)?, cleaned(loaded)?];
         let shared = payload::Shared {
             arm: self.arm,
             set: self.set,
@@ -328,7 +287,8 @@ impl<'a> Diagnoser<'a> {
             extension: &finding.extension,
         };
         let names = [reference.source, loaded.source];
-        payload::between(&shared, &reference_rows, &loaded_rows, names, known_mass_kg)
+        let found = payload::between(&shared, &reference_rows, &loaded_rows, names, known_mass_kg)?;
+        Ok(PayloadFinding { was_touched: touched, ..found })
     }
 
     fn cause(
@@ -416,14 +376,86 @@ fn in_order(mut faults: Vec<Cause>, mut physics: Vec<Cause>, periodic: bool) -> 
     faults.into_iter().chain(physics).collect()
 }
 
+/// The study of a log laid out in `regression`, and the causes that were found.
+fn causes_of<'a>(
+    families: &'a [Box<dyn Candidate>],
+    sources: (&Arm, &BaseSet, &Options),
+    regression: &'a Regression,
+    identification: &Identification,
+    log: &Cleaned,
+    source: &str,
+) -> Result<(Study<'a>, Vec<Contender>), DiagnoseError> {
+    let (arm, set, _) = sources;
+    let estimate = (&identification.fit.theta[..], &identification.fit.joint_sigma_nm[..]);
+    let mut first = Study::new(families, sources, regression, estimate, source)?;
+    first.leave_out(log.unreadable.clone());
+    let null = Extension::fit(&first, &[], &first.torque);
+    let first = without_contacts(first, set, &null, source)?;
+    let found = select(&first);
+    let (mut study, found) = if found.causes.is_empty() && first.scene.periodic {
+        (first, found.causes)
+    } else {
+        settled(first, found, (arm, set), source)?
+    };
+    if !study.scene.periodic {
+        // A single run is judged by its own residual, which is known only now.
+        let (_, rest) = Kept::taken_over(&study, found.clone()).without(None);
+        study.judge_by(&rest);
+    }
+    Ok((study, found))
+}
+
+/// What one of `models` gains over the other along another `log`.
+fn gain_along(
+    (identifier, families): (&mut Identifier, &[Box<dyn Candidate>]),
+    sources: (&Arm, &BaseSet, &Options),
+    log: &Validation,
+    models: &Models,
+    causes: &[Cause],
+) -> Result<HeldOut, DiagnoseError> {
+    // The recorder lags on other days as it does here.
+    let mut record = Record::without_rows(&log.measurement, &[]);
+    record.undo_lags(causes);
+    let measurement = record.measurement(log.measurement.source);
+    let log = &Validation { measurement, manufacturer_nm: log.manufacturer_nm };
+    held_out_gain(identifier, sources, families, log, models)
+}
+
+/// Takes out contacts at which the angles jump as no arm can; how many.
+fn take_out_tears(causes: &mut Vec<Cause>, m: &Measurement) -> usize {
+    let is_a_tear = |cause: &mut Cause| {
+        let at = |name| cause.parameters.get(name).map_or(f64::NAN, |e| e.value);
+        cause.kind == Kind::Contact && is_torn(m, [at("start_s"), at("end_s")])
+    };
+    causes.extract_if(.., is_a_tear).count()
+}
+
+/// What no cause explains of what the `accepted` ones leave, `rest`.
+fn unexplained(
+    study: &Study,
+    (accepted, rest): (&Span, &Image),
+    lack: Option<misfit::LackOfFit>,
+    causes: &[Cause],
+    log: &Cleaned,
+) -> Option<Unexplained> {
+    // What is left of a law of drift is another form of it.
+    let drifts =
+        |j: usize| causes.iter().any(|c| c.kind == Kind::ThermalDrift && c.joint == Some(j + 1));
+    let can_differ = |j: usize| !log.is_mended && !drifts(j);
+    let has_law = |j: usize| {
+        let is_there = |cause: &Cause| cause.joint.is_none_or(|own| own == j + 1);
+        causes.iter().any(|cause| cause.kind.is_a_law() && is_there(cause))
+    };
+    misfit::unexplained(study, accepted, rest, lack, has_law, can_differ)
+}
+
 /// Why contacts were not looked for.
-fn contact_remark(study: &Study, compared: &Compared, is_mended: bool) -> Option<String> {
-    if is_mended {
-        let remark =
-            "the clock was mended: contacts are not looked for, and what sits beside is less sure";
+fn contact_remark(study: &Study, log: &Cleaned) -> Option<String> {
+    if log.is_mended {
+        let remark = "the clock was mended: contacts are not looked for, and causes named beside it are less sure";
         return Some(remark.to_owned());
     }
-    (study.scene.periodic && matches!(compared, Compared::TooFew)).then(|| {
+    (study.scene.periodic && matches!(log.compared, Compared::TooFew)).then(|| {
         "contacts are not looked for: too few periods follow each other without a gap to be compared; repeat the motion three \
          times or more"
             .to_owned()

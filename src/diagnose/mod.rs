@@ -21,6 +21,7 @@ pub mod candidates;
 
 mod against;
 pub mod chance;
+mod cleaned;
 mod clustered;
 mod common_motion;
 mod contact;

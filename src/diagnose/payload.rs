@@ -50,6 +50,9 @@ pub struct PayloadFinding {
     pub joint_gain_scales: Option<Vec<Estimate>>,
     /// Change of Coulomb friction per joint from the first log to the second, Nm.
     pub coulomb_change_nm: Vec<Estimate>,
+    /// Whether something touched the arm along the second log, which was taken out of it.
+    #[serde(skip)]
+    pub was_touched: bool,
 }
 
 /// What stays the same for both logs.
@@ -92,7 +95,7 @@ pub(super) fn between(
     let offset = blocks(&unloaded);
     let mut fit: Option<(Vec<Equations>, Solution)> = None;
     for _ in 0..ROUNDS {
-        let mut all = clone_of(&unloaded);
+        let mut all = unloaded.clone();
         let mut loaded = equations(shared, &layout, second, &loaded_theta, offset)?;
         for e in &mut loaded {
             layout.add_friction_change(e);
@@ -160,6 +163,7 @@ pub(super) fn between(
         gain_scale,
         joint_gain_scales,
         coulomb_change_nm,
+        was_touched: false,
     })
 }
 
@@ -194,6 +198,12 @@ impl PayloadFinding {
         let mut out = Vec::new();
         if !self.is_named {
             out.push(self.no_body());
+        }
+        if self.was_touched {
+            out.push(
+                "Something touched the arm along the log with the body; that was taken out before."
+                    .to_owned(),
+            );
         }
         if let Some(scale) = &self.gain_scale {
             out.push(format!(
@@ -370,16 +380,6 @@ fn blocks(equations: &[Equations]) -> usize {
     equations.iter().flat_map(|e| &e.block_of).max().map_or(0, |b| b + 1)
 }
 
-fn clone_of(equations: &[Equations]) -> Vec<Equations> {
-    let copy = |e: &Equations| Equations {
-        joint: e.joint,
-        columns: e.columns.clone(),
-        torque_nm: e.torque_nm.clone(),
-        block_of: e.block_of.clone(),
-    };
-    equations.iter().map(copy).collect()
-}
-
 /// Base parameters and effects along one log, in samples in which the joint moves.
 fn equations(
     shared: &Shared,
@@ -449,7 +449,7 @@ fn joint_gains(
     let mut rest: Vec<f64> = body[1..].iter().map(|p| p * known_kg / body[0]).collect();
     let mut scales = Vec::new();
     for _ in 0..STEPS {
-        let mut linear = clone_of(all);
+        let mut linear = all.to_vec();
         for (e, original) in linear.iter_mut().zip(all) {
             let columns = |c: usize| original.columns.column(layout.body + c);
             let mut torque = columns(0) * known_kg;
@@ -527,6 +527,7 @@ mod tests {
             gain_scale: None,
             joint_gain_scales: None,
             coulomb_change_nm: Vec::new(),
+            was_touched: false,
         };
         finding.sentences().join(" ")
     }

@@ -23,7 +23,7 @@ use super::kind::Kind;
 use super::verdict::{Cause, Estimate};
 
 pub use beside_model::{BesideModel, beside_model};
-pub use between_periods::{Compared, between_periods};
+pub use between_periods::{Compared, WithoutContacts, between_periods};
 
 /// Torque around a contact that is set aside with it, s.
 const MARGIN_S: f64 = 0.2;
