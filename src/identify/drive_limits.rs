@@ -22,9 +22,8 @@ pub fn drive_limit_remark(arm: &Arm, torque_nm: &JointSignals) -> Option<String>
         arm.joints.iter().enumerate().take(torque_nm.joints()).filter_map(of_joint).collect();
     (!joints.is_empty()).then(|| {
         format!(
-            "drives are at their torque limits in some samples: {}; what torque does where it leaves the limit is faster \
-             than the log and may look like a gear that gives way or a torque that is recorded late; with less speed or \
-             load the motion is followed",
+            "drives are at their torque limits in some samples: {}; where the torque leaves its limit it changes faster than the log can \
+             follow, which may look like a soft gear or a late torque; move more slowly or with less load",
             joints.join(", ")
         )
     })

@@ -9,11 +9,13 @@ mod mean_noise;
 mod periods;
 mod repeating;
 mod run;
+mod scatter;
 mod steps;
 
-pub use periods::{FLOOR, PeriodWhitening};
+pub use periods::PeriodWhitening;
 pub use repeating::RepeatingNoise;
 pub use run::RunWhitening;
+pub use scatter::FLOOR;
 
 use super::image::{Column, Image};
 use crate::robot::JointSignals;

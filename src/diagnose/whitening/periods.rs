@@ -1,12 +1,11 @@
 //! Noise known from the scatter between periods.
 
 use fourier::Forward;
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::Complex;
 use rayon::prelude::*;
 
-use super::coherence::coherence;
-use super::mean_noise::{drifts, with_own_scatter};
 use super::repeating::RepeatingNoise;
+use super::scatter::{FLOOR, Noise, Periods, Scatter};
 use super::steps::steps;
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::friction_drift::FrictionDrift;
@@ -15,7 +14,7 @@ use crate::diagnose::noise_power::{NoiseKnowledge, Uncertainty, rows_of};
 use crate::diagnose::scene::Scene;
 use crate::identify::{Panel, Regression};
 use crate::robot::JointSignals;
-use crate::signal::{NoisePower, noise_trends, pooled_level};
+use crate::signal::pooled_level;
 
 /// Per harmonic, with S the N × N noise covariance of one period's Fourier coefficients:
 /// rows √P L⁻¹ Ȳ_k of the mean period and L⁻¹ C_k of P − 1 orthonormal contrasts, S = L Lᴴ. Where rows of a log are the mean of
@@ -57,11 +56,6 @@ pub struct PeriodWhitening {
 /// what residuals have beyond that noise is left by 0.01 to 0.4 of it, on joint 2 behind drives that feed half by 0.9: 0.2 in
 /// rms.
 const NOT_FOLLOWED: f64 = 0.2;
-/// Of two periods drifting friction may take most of what a slow harmonic says of noise; of eight it takes 5 to 15 %. What is
-/// left is divided by what would be left of white noise: of noise that rises as that of two colours does it is 0.96 to 1.08.
-const LEAST_KEPT: f64 = 0.25;
-/// Torque below this share of a joint's rms torque is not told from the rounding of a model.
-pub const FLOOR: f64 = 1e-4;
 /// How far, over the rate, what is used ends below the highest frequency of the periods' own motion. Not far, because half
 /// of what narrow play shows in 125 samples a second lies between 44 and 58 Hz.
 const BELOW_HIGHEST: f64 = 0.02;
@@ -98,59 +92,35 @@ impl PeriodWhitening {
         };
         let parts = problem.panels.iter().enumerate().map(without_drift).collect();
         let torque = Column { parts };
-        let mut scatter = whitening.scatter(&torque, &drift);
-        let [_, kept] = regression.prepared.kept();
-        scatter.iter_mut().for_each(|scatter| *scatter /= Complex::from(kept));
         let power: Vec<f64> = problem
             .panels
             .iter()
             .map(|panel| panel.y.iter().map(|y| y * y).sum::<f64>() / panel.y.len() as f64)
             .collect();
-        let likeness = coherence(&scatter[..=last], periods - 1, pooled_level);
-        let trends = trends(&scatter, &power, &likeness, (periods, last));
-        scatter.truncate(last + 1);
-        // Per harmonic, the standard deviation that the trend gives every joint.
-        let sd: Vec<Vec<f64>> = (0..scatter.len())
-            .map(|k| trends.iter().map(|trend| trend[k].value.sqrt()).collect())
-            .collect();
-        for (scatter, sd) in scatter.iter_mut().zip(&sd) {
-            for (i, j) in pairs(joints) {
-                scatter[(i, j)] /= sd[i] * sd[j];
-            }
-        }
+        let [_, kept] = regression.prepared.kept();
+        let all = Periods {
+            torque: &torque,
+            drift: &drift,
+            samples: n,
+            periods,
+            kept,
+            power: &power,
+            last,
+        };
+        let scatter = Scatter::of(&all, |period| whitening.spectrum(period));
         let corners: Vec<Vec<Complex<f64>>> =
             (0..joints).map(|j| whitening.spectrum(scene.sign.joint(j))).collect();
-        for (k, sd) in sd[..=used].iter().enumerate() {
-            let (mut s, freedom) = whitening.averaged(&scatter, k);
-            let mut sd = sd.clone();
-            let mut unknown = Uncertainty {
-                shared: trends[0][k].shared_variance,
-                // The level is that of S, whatever that of the trend.
-                level: 1.0 / freedom,
-                likeness: likeness[k].unwrap_or(1.0),
-                colour: trends.iter().map(|trend| trend[k].colour_variance).collect(),
-            };
-            if k == 0 {
-                // S is larger than the scatter by M/(M − N).
-                let scale = freedom / (freedom - joints as f64).max(1.0);
-                let ratio = |j: usize| scale * scatter[0][(j, j)].re / s[(j, j)].re;
-                let ratio: Vec<f64> = (0..joints).map(ratio).collect();
-                // A real number per period.
-                let is_drift = |j: &usize| drifts(ratio[*j], periods - 1, unknown.of(*j));
-                let of_mean = |j: usize| (j, (scatter[0][(j, j)].re / n as f64).sqrt() * sd[j]);
-                whitening.drifting = (0..joints).filter(is_drift).map(of_mean).collect();
-                let factor = with_own_scatter(&ratio, periods - 1, &mut unknown);
-                sd.iter_mut().zip(factor).for_each(|(sd, factor)| *sd *= factor.sqrt());
-            }
-            whitening.unknown.push(unknown);
-            for (i, j) in pairs(joints) {
-                s[(i, j)] *= sd[i] * sd[j];
-            }
-            // f/(f_s − f), squared, of the corners that friction makes in the velocity.
+        // f/(f_s − f), squared, of the corners that friction makes in the velocity.
+        let corner = |j: usize, k: usize| {
             let alias = (k as f64 / (n - k) as f64).powi(2);
+            NOT_FOLLOWED * alias * scene.coulomb_nm[j] * corners[j][k].norm()
+        };
+        for k in 0..=used {
+            let Noise { covariance: mut s, unknown, drifting } = scatter.noise(k);
+            whitening.unknown.push(unknown);
+            whitening.drifting.extend(drifting);
             for (j, power) in power.iter().enumerate() {
-                let corner = NOT_FOLLOWED * alias * scene.coulomb_nm[j] * corners[j][k].norm();
-                s[(j, j)] += FLOOR * FLOOR * power + periods as f64 * corner * corner;
+                s[(j, j)] += FLOOR * FLOOR * power + periods as f64 * corner(j, k).powi(2);
             }
             let inverse = s.cholesky().and_then(|c| c.l().try_inverse());
             let Some(inverse) = inverse else {
@@ -193,65 +163,6 @@ impl PeriodWhitening {
         let mut images: Vec<Image> = images.chain(steps).collect();
         images.iter_mut().for_each(|image| self.whiten_joints(&mut image.mean));
         self.repeating = Some(RepeatingNoise::new(&images));
-    }
-
-    /// Σ_p D Dᴴ/(P − 1) of every harmonic, D the deviation from the mean period, N × N, of the `torque` of all periods that `drift`
-    /// has been taken out of.
-    fn scatter(&self, torque: &Column, drift: &FrictionDrift) -> Vec<DMatrix<Complex<f64>>> {
-        let Self { samples: n, periods, joints, .. } = *self;
-        let freedom = (periods - 1) as f64;
-        let mut spectra: Vec<Vec<Complex<f64>>> = Vec::new();
-        // By joint and harmonic, what drifting friction has left of noise's standard deviation.
-        let mut kept: Vec<Vec<f64>> = Vec::new();
-        for (j, y) in &torque.parts {
-            spectra.extend(y.chunks_exact(n).map(|period| self.spectrum(period)));
-            let mut lost = vec![0.0; n / 2 + 1];
-            for direction in drift.directions(*j) {
-                for period in direction.chunks_exact(n) {
-                    let spectrum = self.spectrum(period);
-                    lost.iter_mut().zip(&spectrum).for_each(|(lost, c)| *lost += c.norm_sqr());
-                }
-            }
-            let share = |lost: &f64| (1.0 - lost / freedom).max(LEAST_KEPT).sqrt();
-            kept.push(lost.iter().map(share).collect());
-        }
-        let of_harmonic = |k: usize| {
-            let mut scatter = DMatrix::zeros(joints, joints);
-            for p in 0..periods {
-                let deviation = DVector::from_fn(joints, |j, _| {
-                    let of = |p: usize| spectra[j * periods + p][k];
-                    of(p) - (0..periods).map(of).sum::<Complex<f64>>() / periods as f64
-                });
-                scatter += &deviation * deviation.adjoint() / Complex::from(freedom);
-            }
-            for (i, j) in pairs(joints) {
-                scatter[(i, j)] /= kept[i][k] * kept[j][k];
-            }
-            scatter
-        };
-        (0..n / 2 + 1).map(of_harmonic).collect()
-    }
-
-    /// `scatter` averaged about harmonic `k`, scaled for its inverse, and its complex degrees of freedom M.
-    fn averaged(
-        &self,
-        scatter: &[DMatrix<Complex<f64>>],
-        k: usize,
-    ) -> (DMatrix<Complex<f64>>, f64) {
-        let reach = pooled_level(k);
-        // The mean torque drifts more than its neighbours: it is left out of their average.
-        let range = k.saturating_sub(reach).max(1)..(k + reach + 1).min(scatter.len());
-        let count = range.len();
-        let mut s = DMatrix::<Complex<f64>>::zeros(self.joints, self.joints);
-        for scatter in &scatter[range] {
-            s += scatter;
-        }
-        let freedom = (count * (self.periods - 1)) as f64;
-        s *= Complex::from(1.0 / count as f64 * freedom / (freedom - self.joints as f64).max(1.0));
-        if k == 0 || 2 * k == self.samples {
-            s.iter_mut().for_each(|v| v.im = 0.0);
-        }
-        (s, freedom)
     }
 
     /// Whitens rows of the mean period for noise of single joints; its own adjoint.
@@ -419,7 +330,7 @@ impl PeriodWhitening {
 impl PeriodWhitening {
     /// Of noise with variance one that no harmonics and no joints share.
     pub(super) fn of_white_noise(samples: usize, periods: usize, joints: usize) -> Self {
-        let identity = DMatrix::<Complex<f64>>::identity(joints, joints);
+        let identity = nalgebra::DMatrix::<Complex<f64>>::identity(joints, joints);
         Self {
             samples,
             periods,
@@ -435,27 +346,6 @@ impl PeriodWhitening {
             repeating: None,
         }
     }
-}
-
-/// How the power of every joint's noise runs over the harmonics of `scatter` up to `last`. Where nothing scatters it is a
-/// trace of `power`, the mean square of the joint's torque: powers are averaged as logarithms.
-fn trends(
-    scatter: &[DMatrix<Complex<f64>>],
-    power: &[f64],
-    likeness: &[Option<f64>],
-    (periods, last): (usize, usize),
-) -> Vec<Vec<NoisePower>> {
-    let of_joint = |(j, power): (usize, &f64)| -> Vec<f64> {
-        let floor = (FLOOR * FLOOR * power).max(f64::MIN_POSITIVE);
-        scatter.iter().map(|s| s[(j, j)].re.max(1e-6 * floor)).collect()
-    };
-    let own: Vec<Vec<f64>> = power.iter().enumerate().map(of_joint).collect();
-    noise_trends(&own, periods - 1, likeness, last)
-}
-
-/// All (i, j) of a square matrix.
-fn pairs(n: usize) -> impl Iterator<Item = (usize, usize)> {
-    (0..n).flat_map(move |i| (0..n).map(move |j| (i, j)))
 }
 
 #[cfg(test)]

@@ -167,13 +167,7 @@ impl Solver {
         let constrained = self.solve(&data, &(&information.root * &information.theta), GAP)?;
         let noise = information.whitened(covariance);
         let realisable = realisability(&self.structure, &information.theta)?;
-        let draws = bootstrap(
-            self,
-            &data,
-            &constrained,
-            &noise_root(&noise, covariance.degrees_of_freedom),
-            options,
-        )?;
+        let draws = bootstrap(self, &data, &constrained, &noise_root(&noise), options)?;
         let by_delta = |curvature: &Cholesky<f64, Dyn>| {
             Sigma::by_delta_method(&self.structure, curvature, &data.map, &noise)
         };

@@ -68,19 +68,10 @@ impl Evidence {
     }
 }
 
-/// A factor L, L Lᵀ = w Ω + (1 − w) diag Ω with w = f/(f + b): f degrees of freedom know the b
-/// variances well, but not the b² covariances.
-pub(super) fn noise_root(omega: &DMatrix<f64>, degrees_of_freedom: f64) -> DMatrix<f64> {
-    let b = omega.nrows() as f64;
-    let share = if degrees_of_freedom.is_finite() {
-        degrees_of_freedom / (degrees_of_freedom + b)
-    } else {
-        1.0
-    };
-    let diagonal = DMatrix::from_diagonal(&omega.diagonal());
-    let mixed = omega * share + &diagonal * (1.0 - share);
-    // A covariance that is singular for other reasons keeps its variances.
-    Cholesky::new(mixed).map_or_else(|| diagonal.map(f64::sqrt), Cholesky::unpack)
+/// A factor L, L Lᵀ = Ω; of a singular Ω one that has its variances.
+pub(super) fn noise_root(omega: &DMatrix<f64>) -> DMatrix<f64> {
+    let of_variances = || DMatrix::from_diagonal(&omega.diagonal().map(f64::sqrt));
+    Cholesky::new(omega.clone()).map_or_else(of_variances, Cholesky::unpack)
 }
 
 /// What the bootstrap says.

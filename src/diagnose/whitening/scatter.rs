@@ -1,0 +1,197 @@
+//! The noise covariance of one period's Fourier coefficients, from the scatter between periods.
+
+use nalgebra::{Complex, DMatrix, DVector};
+
+use super::coherence::coherence;
+use super::mean_noise::{drifts, with_own_scatter};
+use crate::diagnose::friction_drift::FrictionDrift;
+use crate::diagnose::image::Column;
+use crate::diagnose::noise_power::Uncertainty;
+use crate::signal::{NoisePower, noise_trends, pooled_level};
+
+/// Of two periods drifting friction may take most of what a slow harmonic says of noise; of eight it takes 5 to 15 %. What is
+/// left is divided by what would be left of white noise: of noise that rises as that of two colours does it is 0.96 to 1.08.
+const LEAST_KEPT: f64 = 0.25;
+/// Torque below this share of a joint's rms torque is not told from the rounding of a model.
+pub const FLOOR: f64 = 1e-4;
+
+/// The torque of all periods, as noise is looked for in it.
+pub(super) struct Periods<'a> {
+    /// Of every joint, without what friction that drifts does, `drift`.
+    pub(super) torque: &'a Column,
+    pub(super) drift: &'a FrictionDrift,
+    /// Samples of a period.
+    pub(super) samples: usize,
+    pub(super) periods: usize,
+    /// The part of the periods' degrees of freedom that makes their scatter ([`Prepared::kept`](crate::identify::Prepared::kept)).
+    pub(super) kept: f64,
+    /// Mean square of the torque, per joint.
+    pub(super) power: &'a [f64],
+    /// Highest harmonic that is looked at.
+    pub(super) last: usize,
+}
+
+/// Scatter of the coefficients between periods, harmonic by harmonic.
+pub(super) struct Scatter {
+    joints: usize,
+    samples: usize,
+    periods: usize,
+    /// S of single harmonics, over the standard deviations of `trends`.
+    normalised: Vec<DMatrix<Complex<f64>>>,
+    /// By joint and harmonic, the trend of the power over the harmonics.
+    trends: Vec<Vec<NoisePower>>,
+    /// Mean squared coherence of the joints' noise, where it can be told.
+    likeness: Vec<Option<f64>>,
+}
+
+/// What is known of the noise of one harmonic.
+pub(super) struct Noise {
+    /// N × N, scaled for its inverse by M/(M − N).
+    pub(super) covariance: DMatrix<Complex<f64>>,
+    /// How well.
+    pub(super) unknown: Uncertainty,
+    /// Joints (0-based) whose mean torque drifts, and by how much, Nm rms; none of any harmonic but the mean.
+    pub(super) drifting: Vec<(usize, f64)>,
+}
+
+impl Scatter {
+    /// Of `periods`, whose coefficients `spectrum` makes.
+    pub(super) fn of(periods: &Periods, spectrum: impl Fn(&[f64]) -> Vec<Complex<f64>>) -> Self {
+        let &Periods { samples, kept, power, last, .. } = periods;
+        let count = periods.periods;
+        let joints = periods.torque.parts.len();
+        let mut scatter = between(periods, spectrum);
+        scatter.iter_mut().for_each(|scatter| *scatter /= Complex::from(kept));
+        let likeness = coherence(&scatter[..=last], count - 1, pooled_level);
+        // Where nothing scatters it is a trace of the torque: powers are averaged as logarithms.
+        let of_joint = |(j, power): (usize, &f64)| -> Vec<f64> {
+            let floor = (FLOOR * FLOOR * power).max(f64::MIN_POSITIVE);
+            scatter.iter().map(|s| s[(j, j)].re.max(1e-6 * floor)).collect()
+        };
+        let own: Vec<Vec<f64>> = power.iter().enumerate().map(of_joint).collect();
+        let trends = noise_trends(&own, count - 1, &likeness, last);
+        scatter.truncate(last + 1);
+        let mut all =
+            Self { joints, samples, periods: count, normalised: Vec::new(), trends, likeness };
+        for (k, scatter) in scatter.iter_mut().enumerate() {
+            let sd = all.sd(k);
+            for (i, j) in pairs(joints) {
+                scatter[(i, j)] /= sd[i] * sd[j];
+            }
+        }
+        all.normalised = scatter;
+        all
+    }
+
+    /// The standard deviation that the trend gives every joint at harmonic `k`.
+    fn sd(&self, k: usize) -> Vec<f64> {
+        self.trends.iter().map(|trend| trend[k].value.sqrt()).collect()
+    }
+
+    /// The noise of harmonic `k`.
+    pub(super) fn noise(&self, k: usize) -> Noise {
+        let (mut covariance, freedom) = self.averaged(k);
+        let mut sd = self.sd(k);
+        let mut unknown = Uncertainty {
+            shared: self.trends[0][k].shared_variance,
+            // The level is that of S, whatever that of the trend.
+            level: 1.0 / freedom,
+            likeness: self.likeness[k].unwrap_or(1.0),
+            colour: self.trends.iter().map(|trend| trend[k].colour_variance).collect(),
+        };
+        let mut drifting = Vec::new();
+        if k == 0 {
+            let factor;
+            (factor, drifting) = self.of_mean(&covariance, freedom, &mut unknown);
+            sd.iter_mut().zip(factor).for_each(|(sd, factor)| *sd *= factor.sqrt());
+        }
+        for (i, j) in pairs(self.joints) {
+            covariance[(i, j)] *= sd[i] * sd[j];
+        }
+        Noise { covariance, unknown, drifting }
+    }
+
+    /// By what the power of the mean's noise has to be multiplied beside `averaged`, per joint, and which joints' mean torques drift.
+    fn of_mean(
+        &self,
+        averaged: &DMatrix<Complex<f64>>,
+        freedom: f64,
+        unknown: &mut Uncertainty,
+    ) -> (Vec<f64>, Vec<(usize, f64)>) {
+        let joints = self.joints;
+        let sd = self.sd(0);
+        // S is larger than the scatter by M/(M − N).
+        let scale = freedom / (freedom - joints as f64).max(1.0);
+        let own = |j: usize| self.normalised[0][(j, j)].re;
+        let ratio: Vec<f64> = (0..joints).map(|j| scale * own(j) / averaged[(j, j)].re).collect();
+        // A real number per period.
+        let freedom = self.periods - 1;
+        let is_drift = |j: &usize| drifts(ratio[*j], freedom, unknown.of(*j));
+        let of_mean = |j: usize| (j, (own(j) / self.samples as f64).sqrt() * sd[j]);
+        let drifting = (0..joints).filter(is_drift).map(of_mean).collect();
+        (with_own_scatter(&ratio, freedom, unknown), drifting)
+    }
+
+    /// S averaged about harmonic `k`, scaled for its inverse, and its complex degrees of freedom M.
+    fn averaged(&self, k: usize) -> (DMatrix<Complex<f64>>, f64) {
+        let reach = pooled_level(k);
+        // The mean torque drifts more than its neighbours: it is left out of their average.
+        let range = k.saturating_sub(reach).max(1)..(k + reach + 1).min(self.normalised.len());
+        let count = range.len();
+        let mut s = DMatrix::<Complex<f64>>::zeros(self.joints, self.joints);
+        for scatter in &self.normalised[range] {
+            s += scatter;
+        }
+        let freedom = (count * (self.periods - 1)) as f64;
+        s *= Complex::from(1.0 / count as f64 * freedom / (freedom - self.joints as f64).max(1.0));
+        if k == 0 {
+            s.iter_mut().for_each(|v| v.im = 0.0);
+        }
+        (s, freedom)
+    }
+}
+
+/// Σ_p D Dᴴ/(P − 1) of every harmonic, D the deviation from the mean period, N × N.
+fn between(
+    all: &Periods,
+    spectrum: impl Fn(&[f64]) -> Vec<Complex<f64>>,
+) -> Vec<DMatrix<Complex<f64>>> {
+    let &Periods { torque, drift, samples: n, periods, .. } = all;
+    let joints = torque.parts.len();
+    let freedom = (periods - 1) as f64;
+    let mut spectra: Vec<Vec<Complex<f64>>> = Vec::new();
+    // By joint and harmonic, what drifting friction has left of noise's standard deviation.
+    let mut kept: Vec<Vec<f64>> = Vec::new();
+    for (j, y) in &torque.parts {
+        spectra.extend(y.chunks_exact(n).map(&spectrum));
+        let mut lost = vec![0.0; n / 2 + 1];
+        for direction in drift.directions(*j) {
+            for period in direction.chunks_exact(n) {
+                let spectrum = spectrum(period);
+                lost.iter_mut().zip(&spectrum).for_each(|(lost, c)| *lost += c.norm_sqr());
+            }
+        }
+        let share = |lost: &f64| (1.0 - lost / freedom).max(LEAST_KEPT).sqrt();
+        kept.push(lost.iter().map(share).collect());
+    }
+    let of_harmonic = |k: usize| {
+        let mut scatter = DMatrix::zeros(joints, joints);
+        for p in 0..periods {
+            let deviation = DVector::from_fn(joints, |j, _| {
+                let of = |p: usize| spectra[j * periods + p][k];
+                of(p) - (0..periods).map(of).sum::<Complex<f64>>() / periods as f64
+            });
+            scatter += &deviation * deviation.adjoint() / Complex::from(freedom);
+        }
+        for (i, j) in pairs(joints) {
+            scatter[(i, j)] /= kept[i][k] * kept[j][k];
+        }
+        scatter
+    };
+    (0..n / 2 + 1).map(of_harmonic).collect()
+}
+
+/// All (i, j) of a square matrix.
+fn pairs(n: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..n).flat_map(move |i| (0..n).map(move |j| (i, j)))
+}
