@@ -93,6 +93,7 @@ fn what_an_identified_simulation_does_not_know_is_no_change() {
         let simulation = Nominal {
             theta: &identified.fit.theta,
             covariance: Some(&identified.covariance.matrix),
+            freedom: identified.covariance.degrees_of_freedom,
             doubt: None,
         };
         let against = |run: &Run, simulation: Nominal| {

@@ -298,7 +298,7 @@ fn what_no_simulation_has_does_not_take_the_rest_along() {
     };
     assert!((0.8..=0.9).contains(&fed.share_less), "{fed:?}");
 
-    let (finding, simulation) = found(&hidden);
+    let (mut finding, simulation) = found(&hidden);
     let lag = finding.diagnosis.causes.iter().find(|c| c.kind == Kind::VelocityLag).unwrap();
     assert!((lag.parameters["delay_s"].value + 0.004).abs() < 2e-4, "{lag:?}");
     let kinds: Vec<&str> = simulation.effects.iter().map(|effect| effect.kind()).collect();
@@ -307,4 +307,25 @@ fn what_no_simulation_has_does_not_take_the_rest_along() {
     let [not] = &simulation.not_replayed[..] else { panic!("{:?}", simulation.not_replayed) };
     assert_eq!(not.kind, Kind::VelocityLag);
     assert!(not.reason.contains("cannot have delay_s = -0.0040"), "{}", not.reason);
+
+    // A law that no friction can have, beside the gain: it is left out, and what the parameters take over of it goes back to them.
+    let mut lawless = finding.extension.effects[0].clone();
+    lawless.family = armid::diagnose::candidates::all()
+        .iter()
+        .position(|family| family.kind() == Kind::NonlinearViscous)
+        .unwrap();
+    (lawless.site, lawless.shape.value, lawless.coefficients) = (Some(3), 0.5, vec![-100.0]);
+    lawless.absorbed.fill(0.0);
+    let viscous = (0..set.rank()).find(|&k| set.name(k) == "rv4").unwrap();
+    lawless.absorbed[viscous] = 1.0;
+    finding.extension.effects.insert(0, lawless);
+    let diagnoser = Diagnoser::new(&arm, &model, &set, Options::default());
+    let again = diagnoser.extended_simulation(&finding).unwrap();
+    assert_eq!(again.effects, simulation.effects);
+    let not = &again.not_replayed[0];
+    assert_eq!((not.kind, not.joint), (Kind::NonlinearViscous, Some(4)));
+    assert!(not.reason.contains("cannot have it: joint 4"), "{}", not.reason);
+    let viscous = |arm: &armid::robot::Arm| arm.joints[3].drive.viscous_nm_s_rad;
+    let more = viscous(&again.extended.arm) - viscous(&simulation.extended.arm);
+    assert!((more - 1.0).abs() < 0.05, "{more}");
 }

@@ -25,6 +25,8 @@ pub(super) struct EarlierResult {
     reduced: Option<String>,
     base_parameters: Vec<EarlierParameter>,
     base_covariance: Option<Vec<Vec<Option<f64>>>>,
+    /// Nor in results of older programs.
+    degrees_of_freedom: Option<f64>,
     #[serde(default)]
     intervals: Intervals,
     #[serde(default)]
@@ -101,6 +103,11 @@ impl EarlierResult {
         self.base_covariance.is_none()
     }
 
+    /// How well its covariance is known; many where it does not say.
+    pub(super) fn degrees_of_freedom(&self) -> f64 {
+        self.degrees_of_freedom.unwrap_or(f64::INFINITY)
+    }
+
     /// Its base parameters.
     pub(super) fn parameters(&self) -> &[EarlierParameter] {
         &self.base_parameters
@@ -128,12 +135,14 @@ impl EarlierResult {
             let variances: Vec<f64> = places.iter().map(variance).collect::<Result<_, _>>()?;
             return Ok(DMatrix::from_diagonal(&DVector::from_vec(variances)));
         };
-        let is_variance = |(i, row): (usize, &Vec<Option<f64>>)| {
-            row.len() == count
-                && row.iter().all(Option::is_some)
-                && row[i].is_some_and(|variance| variance >= 0.0)
+        // What is not asked for may be unknown.
+        let is_variance = |&place: &usize| {
+            let row: &Vec<Option<f64>> = &rows[place];
+            places.iter().all(|&other| row[other].is_some())
+                && row[place].is_some_and(|variance| variance >= 0.0)
         };
-        if rows.len() != count || !rows.iter().enumerate().all(is_variance) {
+        let is_square = rows.len() == count && rows.iter().all(|row| row.len() == count);
+        if !is_square || !places.iter().all(is_variance) {
             let message = "base_covariance is no covariance of its base parameters";
             return Err(format!("{message} ({count} × {count} numbers)"));
         }

@@ -16,8 +16,10 @@ use crate::robot::{Arm, Kinematics};
 pub(super) struct Simulated {
     /// Base parameters.
     theta: Vec<f64>,
-    /// Their covariance, where they were identified.
+    /// Their covariance, where they were identified, …
     covariance: Option<DMatrix<f64>>,
+    /// … and how well it is known.
+    freedom: f64,
     /// Why they are doubtful, if they are.
     doubt: Option<String>,
     /// What else should be known of it.
@@ -47,6 +49,7 @@ impl Simulated {
             return Ok(Self {
                 doubt: None,
                 covariance: None,
+                freedom: f64::INFINITY,
                 files: scenario.sources(file),
                 theta: set.values(&Model::new(&scenario.arm).standard_parameters()),
                 warning: has_effects.then(|| {
@@ -89,6 +92,7 @@ impl Simulated {
         Ok(Self {
             theta,
             covariance: Some(covariance),
+            freedom: result.degrees_of_freedom(),
             doubt,
             warning,
             files: vec![file.to_owned()],
@@ -100,6 +104,7 @@ impl Simulated {
         Nominal {
             theta: &self.theta,
             covariance: self.covariance.as_ref(),
+            freedom: self.freedom,
             doubt: self.doubt.as_deref(),
         }
     }

@@ -276,7 +276,10 @@ impl<'a> Diagnoser<'a> {
     ) -> Result<PayloadFinding, DiagnoseError> {
         let mut cleaned = |m: &Measurement| -> Result<(Regression, bool), DiagnoseError> {
             let log = Cleaned::of(m, &self.options)?;
-            Ok((log.regression(&mut self.identifier, m.source)?, log.touched().is_some()))
+            let cleaned = log.measurement(m.source);
+            let is_touch = |cause: &Cause| !is_a_tear(cause, &cleaned);
+            let touched = log.touched().is_some_and(|t| t.causes.iter().any(is_touch));
+            Ok((log.regression(&mut self.identifier, m.source)?, touched))
         };
         let [(reference_rows, _), (loaded_rows, touched)] = [cleaned(reference)?, cleaned(loaded)?];
         let shared = payload::Shared {
@@ -423,11 +426,12 @@ fn gain_along(
 
 /// Takes out contacts at which the angles jump as no arm can; how many.
 fn take_out_tears(causes: &mut Vec<Cause>, m: &Measurement) -> usize {
-    let is_a_tear = |cause: &mut Cause| {
-        let at = |name| cause.parameters.get(name).map_or(f64::NAN, |e| e.value);
-        cause.kind == Kind::Contact && is_torn(m, [at("start_s"), at("end_s")])
-    };
-    causes.extract_if(.., is_a_tear).count()
+    causes.extract_if(.., |cause| is_a_tear(cause, m)).count()
+}
+
+fn is_a_tear(cause: &Cause, m: &Measurement) -> bool {
+    let at = |name| cause.parameters.get(name).map_or(f64::NAN, |e| e.value);
+    cause.kind == Kind::Contact && is_torn(m, [at("start_s"), at("end_s")])
 }
 
 /// What no cause explains of what the `accepted` ones leave, `rest`.

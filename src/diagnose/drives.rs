@@ -47,8 +47,8 @@ const MOST_REVERSALS: usize = 64;
 
 /// What a drive's feeding nothing of its friction forward adds to the torque; `None` for a single run.
 pub fn share(scene: &Scene, joint: usize) -> Option<Column> {
-    let answer = scene.answers(joint).into_iter().nth(SHARE)?;
-    Some(Column::on(joint, answer).scaled(scene.coulomb_nm[joint]))
+    let answer = scene.answers(joint).get(SHARE)?;
+    Some(Column::on(joint, answer.clone()).scaled(scene.coulomb_nm[joint]))
 }
 
 /// By joint, by what drives of an arm differ from each other in the share that they feed forward, as a torque of standard
@@ -61,9 +61,9 @@ pub fn differences(scene: &Scene) -> Vec<(usize, Column)> {
 /// By joint, the lead of its drive as a torque of standard deviation one. Where the null model has it as a column that takes it, too.
 pub fn leads(scene: &Scene) -> impl Iterator<Item = Column> {
     let of_joint = |j: usize| {
-        let answer = scene.answers(j).into_iter().nth(LEAD)?;
+        let answer = scene.answers(j).get(LEAD)?;
         let per_tick = USUAL_LEAD_S / scene.instant_s();
-        Some(Column::on(j, answer).scaled(per_tick * scene.coulomb_nm[j]))
+        Some(Column::on(j, answer.clone()).scaled(per_tick * scene.coulomb_nm[j]))
     };
     (0..scene.joints()).filter_map(of_joint)
 }
@@ -144,8 +144,8 @@ pub fn answers(
     let mut columns: Vec<(Answer, Image)> = Vec::new();
     let mut places = Vec::new();
     for joint in 0..scene.joints() {
-        for (which, answer) in scene.answers(joint).into_iter().enumerate() {
-            let column = Column::on(joint, answer);
+        for (which, answer) in scene.answers(joint).iter().enumerate() {
+            let column = Column::on(joint, answer.clone());
             let image = whitening.image(&column);
             // A joint that stands still answers nothing.
             if !all.push(&image) {

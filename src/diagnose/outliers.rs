@@ -21,7 +21,7 @@ const STAMPS_OFF: f64 = 1.5;
 const REACH: usize = 4;
 /// What is wild is entered and left by jumps of this share of how far it is off, at least, …
 const ABRUPT: f64 = 0.5;
-/// … and of so many times what is usual between the rows before and behind it. Of eight changes of noise the median is 0.95 σ √2 within
+/// … and of so many times what is usual between the rows before and behind it. Of eight changes of noise the median is 0.95 σ within
 /// a third; a wild value is off by eight σ √2 and more.
 const ABOVE_USUAL: f64 = 3.0;
 
@@ -45,8 +45,10 @@ fn mend_torque(record: &mut Record) -> Vec<Strays> {
     let of_joint = |j: usize| {
         let y = record.torque_nm.joint(j);
         let far = far_off(y);
-        let alone = |run: &&[Stray]| stands_alone(y, run);
-        let runs = far.chunk_by(|a, b| a.row + 1 == b.row).filter(alone);
+        let alone = |run: &&[Stray]| stands_alone(y, run, &far);
+        let of_one_run =
+            |a: &Stray, b: &Stray| a.row + 1 == b.row && a.off.signum() == b.off.signum();
+        let runs = far.chunk_by(of_one_run).filter(alone);
         runs.flatten().copied().collect()
     };
     let found = (0..record.torque_nm.joints()).map(|j| (j, of_joint(j))).collect();
@@ -164,16 +166,19 @@ fn far_off(y: &[f64]) -> Vec<Stray> {
         .collect()
 }
 
-/// Whether the neighbouring values `run` of `y` are entered and left by jumps that are none of its own changes: the flank of a
-/// peak is as steep before it and behind it.
-fn stands_alone(y: &[f64], run: &[Stray]) -> bool {
+/// Whether the neighbouring values `run` of `y` are entered and left by jumps that are none of its own changes, between values that
+/// are not `far` off: the flank of a peak is as steep before it and behind it.
+fn stands_alone(y: &[f64], run: &[Stray], far: &[Stray]) -> bool {
     let [Some(first), Some(last)] = [run.first(), run.last()] else { return false };
     // What is far off has rows to both sides.
     let entered = y[first.row] - y[first.row - 1];
     let left = y[last.row] - y[last.row + 1];
-    let before = steps(&y[first.row.saturating_sub(REACH + 1)..first.row]);
-    let behind = steps(&y[last.row + 1..(last.row + REACH + 2).min(y.len())]);
-    let mut beside: Vec<f64> = before.iter().chain(&behind).map(|step| step.abs()).collect();
+    let before = first.row.saturating_sub(REACH)..first.row;
+    let behind = last.row + 2..(last.row + REACH + 2).min(y.len());
+    let is_far = |row: usize| far.binary_search_by_key(&row, |stray| stray.row).is_ok();
+    let is_usual = |row: &usize| !is_far(*row) && !is_far(*row - 1);
+    let rows = before.filter(|row| *row > 0).chain(behind).filter(is_usual);
+    let mut beside: Vec<f64> = rows.map(|row| (y[row] - y[row - 1]).abs()).collect();
     let usual = median(&mut beside).unwrap_or(0.0);
     let off = run.iter().map(|stray| stray.off.abs()).fold(f64::INFINITY, f64::min);
     let least = (ABRUPT * off).max(ABOVE_USUAL * usual);
@@ -245,9 +250,9 @@ mod tests {
             mend_torque(&mut record).into_iter().flat_map(|stray| stray.rows).collect::<Vec<_>>()
         };
         assert_eq!(mended(noise.clone()), [0; 0]);
-        // Four wild values in a row at rest, and one on a flank.
-        let wild = [150, 151, 152, 153, 700, 905];
-        wild.iter().for_each(|&k| noise[k] += 60.0);
+        // Four wild values in a row at rest, one on a flank, and two of different sign beside each other.
+        let wild = [150, 151, 152, 153, 700, 905, 940, 941];
+        wild.iter().for_each(|&k| noise[k] += if k == 941 { -60.0 } else { 60.0 });
         assert_eq!(mended(noise), wild);
     }
 

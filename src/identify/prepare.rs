@@ -174,8 +174,8 @@ impl Preparer {
         }
         let mut warnings = Vec::new();
         let mut even = Even::of(m, options, None, &mut self.filter, &mut warnings)?;
-        let single_run = options.period_s == Some(0.0);
-        let mut period = if single_run { None } else { self.search.find(&even.q_rad)? };
+        let mut period =
+            if options.is_single_run() { None } else { self.search.find(&even.q_rad)? };
         let is_misfit = |p: &&Period| !p.is_whole && p.periods >= FEWEST_PERIODS;
         if let (Some(found), None) = (period.as_ref().filter(is_misfit), options.rate_hz)
             && let Some((fitting, whole, remarks)) =
@@ -183,7 +183,7 @@ impl Preparer {
         {
             (even, period, warnings) = (fitting, Some(whole), remarks);
         }
-        if let (Some(wanted), false) = (options.period_s, single_run) {
+        if let (Some(wanted), false) = (options.period_s, options.is_single_run()) {
             let found = period.as_ref().map(|p| p.samples as f64 / even.rate_hz);
             if found.is_none_or(|found| (found - wanted).abs() > 1.5 / even.rate_hz) {
                 let log = m.source.to_owned();

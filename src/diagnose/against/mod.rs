@@ -44,6 +44,8 @@ pub struct Nominal<'a> {
     pub theta: &'a [f64],
     /// Their covariance, where they were identified.
     pub covariance: Option<&'a DMatrix<f64>>,
+    /// Degrees of freedom with which that is known; infinite: many.
+    pub freedom: f64,
     /// What is said first where these were identified along a log which the model does not explain: what differs from them may
     /// have been wrong there, and no change is sure.
     pub doubt: Option<&'a str>,
@@ -52,17 +54,24 @@ pub struct Nominal<'a> {
 impl<'a> Nominal<'a> {
     /// A simulation that is as it says.
     pub fn certain(theta: &'a [f64]) -> Self {
-        Self { theta, covariance: None, doubt: None }
+        Self { theta, covariance: None, freedom: f64::INFINITY, doubt: None }
+    }
+
+    /// The variance of parameter `k` in data in which it is `of_data`, less that of the simulation, and its degrees of freedom
+    /// (Satterthwaite 1946).
+    fn with_noise(&self, (of_data, freedom): (f64, f64), k: usize) -> (f64, f64) {
+        let own = self.covariance.map_or(0.0, |covariance| covariance[(k, k)]);
+        let both = of_data + own;
+        (both, both.powi(2) / (of_data.powi(2) / freedom + own.powi(2) / self.freedom))
     }
 }
 
 /// Every base parameter in the simulation and in the data, beside the causes that were found in these.
 pub fn moved(simulation: Nominal, base: &Base) -> Vec<Moved> {
     let of_parameter = |((k, data), freedom): ((usize, &BaseParameter), &f64)| {
-        let variance = simulation.covariance.map_or(0.0, |covariance| covariance[(k, k)]);
-        let sigma = data.sigma.hypot(variance.sqrt());
-        let simulation = simulation.theta[k];
-        let z = as_gaussian((data.value - simulation) / sigma, *freedom);
+        let (variance, freedom) = simulation.with_noise((data.sigma.powi(2), *freedom), k);
+        let (sigma, simulation) = (variance.sqrt(), simulation.theta[k]);
+        let z = as_gaussian((data.value - simulation) / sigma, freedom);
         Moved { name: data.name.clone(), simulation, data: data.value, sigma, z }
     };
     base.parameters.iter().enumerate().zip(&base.freedom).map(of_parameter).collect()
@@ -91,7 +100,11 @@ pub fn moved_together(study: &Study, simulation: Nominal, base: &Base) -> Option
         parameters.iter().zip(simulation.theta).map(|(data, theta)| data.value - theta);
     let squared_distance = squared_distance(&covariance, &difference.collect::<Vec<_>>())?;
     let count = parameters.len();
-    let freedom = count as f64 / freedom.iter().map(|freedom| 1.0 / freedom).sum::<f64>();
+    let inverse = |((k, data), freedom): ((usize, &BaseParameter), &f64)| {
+        1.0 / simulation.with_noise((data.sigma.powi(2), *freedom), k).1
+    };
+    let freedom =
+        count as f64 / parameters.iter().enumerate().zip(freedom).map(inverse).sum::<f64>();
     let p_value = upper_fisher(squared_distance / count as f64, count, freedom);
     Some(MovedTogether { squared_distance, degrees_of_freedom: [count as f64, freedom], p_value })
 }
@@ -405,6 +418,27 @@ fn without(taken: &[usize], index: usize) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Beside a simulation that is as it says the log's own count; of two that are known alike all of both; and where a short log is behind
+    /// the larger variance its own.
+    #[test]
+    fn degrees_of_freedom_are_those_of_both_logs() {
+        let covariance = DMatrix::identity(1, 1) * 4.0;
+        let of = |variance: f64, freedom: f64, nominal: Nominal| {
+            nominal.with_noise((variance, freedom), 0)
+        };
+        assert_eq!(of(4.0, 20.0, Nominal::certain(&[0.0])), (4.0, 20.0));
+        let identified = |freedom: f64| Nominal {
+            covariance: Some(&covariance),
+            freedom,
+            ..Nominal::certain(&[0.0])
+        };
+        assert_eq!(of(4.0, 20.0, identified(20.0)), (8.0, 40.0));
+        let (variance, freedom) = of(0.01, 400.0, identified(10.0));
+        assert!((variance - 4.01).abs() < 1e-12 && (10.0..10.1).contains(&freedom), "{freedom}");
+        let (_, freedom) = of(4.0, 20.0, identified(f64::INFINITY));
+        assert_eq!(freedom, 80.0);
+    }
 
     /// Quantiles of Student's t that are as improbable as 1, 2, 3 and 4 σ (SciPy 1.17, `stats.t.isf(stats.norm.sf(z), nu)`).
     #[test]

@@ -214,9 +214,11 @@ impl Scene {
     }
 
     /// How the drive of joint `j` may answer dry friction, as columns ([`drive_answers`]); none for a single run.
-    pub fn answers(&self, j: usize) -> Vec<Vec<f64>> {
-        let Some(clock) = &self.clock else { return Vec::new() };
-        drive_answers(clock, &self.instants(j).sign, self.highest, self.rate_hz).into()
+    pub fn answers(&self, j: usize) -> &[Vec<f64>] {
+        let Some(clock) = &self.clock else { return &[] };
+        self.answers[j].get_or_init(|| {
+            drive_answers(clock, &self.instants(j).sign, self.highest, self.rate_hz).into()
+        })
     }
 
     /// The coefficient of answer number `which` ([`Self::answers`]) that is `b` along a log whose instants are `instant_s` apart:

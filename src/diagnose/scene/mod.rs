@@ -86,6 +86,8 @@ pub struct Scene {
     bends: OnceLock<Bends>,
     /// See [`Self::turning`].
     turnings: Vec<OnceLock<Turning>>,
+    /// See [`Self::answers`].
+    answers: Vec<OnceLock<Vec<Vec<f64>>>>,
     /// Between the samples of a motion that repeats.
     clock: Option<FineClock>,
     /// Up to which harmonic, below n/2, the accelerations of periods are known.
@@ -164,6 +166,7 @@ impl Scene {
             signs_if_fed: (0..joints).map(|_| Default::default()).collect(),
             bends: OnceLock::new(),
             turnings: (0..joints).map(|_| OnceLock::new()).collect(),
+            answers: vec![OnceLock::new(); joints],
             clock,
             highest,
         }

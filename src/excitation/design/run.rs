@@ -24,7 +24,8 @@ use crate::robot::Arm;
 pub struct Design {
     /// The motion: run-in, periods to cover the experiment's data, run-out.
     pub excitation: Excitation,
-    /// Value of the criterion (a logarithm, see [`super::Criterion`]) on the optimiser's grid.
+    /// Value of the criterion (a logarithm, see [`super::Criterion`]) on the optimiser's grid, for data as long as was asked for, or
+    /// as its periods where their length was given.
     pub value: f64,
     /// The experiment asked for, as long as the motion's periods are together.
     pub experiment: Experiment,
@@ -121,6 +122,7 @@ pub fn design(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Design, DesignError> {
     spec.check(arm)?;
+    let spec = &of_whole_periods(spec);
     let model = Model::new(arm);
     let scales = parameter_scales(base, &model);
     // Λ is averaged over the samples of one period; the experiment has so many of them.
@@ -199,6 +201,17 @@ pub fn design(
         }
     }
     Err(DesignError::CheckFailed { candidates: found.candidates.len(), last })
+}
+
+/// The same with data as long as the periods that will be played, where these are known before.
+fn of_whole_periods(spec: &Specification) -> Specification {
+    let mut spec = spec.clone();
+    if spec.variables.period_range_s.is_none() {
+        let period_s = spec.variables.period_s;
+        let periods = periods_to_cover(spec.experiment.data_s, period_s);
+        spec.experiment.data_s = periods as f64 * period_s;
+    }
+    spec
 }
 
 /// Whole periods that cover `data_s`, all but a hundredth of one.

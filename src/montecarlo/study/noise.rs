@@ -165,7 +165,7 @@ pub fn study(
         slow_every,
         seconds: begun.elapsed().as_secs_f64(),
         model_is_wrong: !scenario.effects.is_empty(),
-        single_run: scenario.processing.period_s == Some(0.0),
+        single_run: scenario.processing.is_single_run(),
         chosen: [chosen.0.to_string(), chosen.1.to_string()],
         checks: checks.iter().map(|check| CheckSummary::of(check, name)).collect(),
         methods,

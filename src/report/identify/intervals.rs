@@ -6,6 +6,7 @@ use super::Training;
 use crate::identify::{
     Agreement, Floor, Identification, LackOfFit, MANY_PERIODS, Processing, chance_in_words,
 };
+use crate::signal::Replicates;
 
 /// Whether the 95 % intervals may claim to hold the truth.
 #[derive(Debug, Clone, Serialize)]
@@ -127,6 +128,9 @@ impl Intervals {
             let reason = if logs > 1 {
                 "Whether the intervals hold cannot be tested: several logs as one do not tell noise from what the model \
                  lacks. Identify from logs that each repeat their motion four times or more."
+                    .to_owned()
+            } else if identification.replicates.as_ref().is_some_and(Replicates::are_alike) {
+                "Whether the intervals hold cannot be tested: the periods are alike to the last digit, and show no noise."
                     .to_owned()
             } else if periods >= MANY_PERIODS {
                 format!(

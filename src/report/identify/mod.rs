@@ -100,6 +100,8 @@ pub struct Result {
     estimator: Estimator,
     covariance: CovarianceKind,
     covariance_reason: &'static str,
+    /// Of the noise behind it; null: many.
+    degrees_of_freedom: f64,
     base_parameters: Vec<BaseParameter>,
     /// Their covariance, row by row.
     base_covariance: Vec<Vec<f64>>,
@@ -212,6 +214,7 @@ impl Result {
             estimator: identification.estimator,
             covariance: identification.covariance.kind,
             covariance_reason: identification.covariance_reason,
+            degrees_of_freedom: identification.covariance.degrees_of_freedom,
             base_parameters,
             base_covariance: covariance
                 .row_iter()
