@@ -62,6 +62,14 @@ impl Parameterisation {
         }
     }
 
+    /// All standard parameters of `arm`, or the set that `--reduced` names.
+    pub fn of(arm: &Arm, reduced: Option<&str>) -> Result<Self, ParameterisationError> {
+        match reduced {
+            Some(name) => Self::reduced(name, arm),
+            None => Ok(Self::full(arm.dof(), arm.torque_offsets)),
+        }
+    }
+
     /// The set `--reduced` names.
     pub fn reduced(name: &str, arm: &Arm) -> Result<Self, ParameterisationError> {
         match name {

@@ -51,10 +51,7 @@ struct Term<'a> {
 pub fn run(args: &BaseArgs) -> CommandResult {
     let LoadedArm { arm, files, .. } = load_robot(&args.robot)?;
     check_outputs(&args.json, &files)?;
-    let parameterisation = match &args.reduced {
-        Some(name) => Parameterisation::reduced(name, &arm)?,
-        None => Parameterisation::full(arm.dof(), arm.torque_offsets),
-    };
+    let parameterisation = Parameterisation::of(&arm, args.reduced.as_deref())?;
     let set = BaseSet::find(&arm, parameterisation)?;
     let mut table =
         Table::new([Column::number("", ""), Column::text("combination"), Column::text("unit")]);

@@ -204,10 +204,7 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         [&args.json, &args.report].into_iter().flatten(),
         inputs.iter().map(|input| &input.path).chain(&args.logs).chain(&args.validate),
     )?;
-    let parameterisation = match &args.reduced {
-        Some(name) => Parameterisation::reduced(name, &arm)?,
-        None => Parameterisation::full(arm.dof(), arm.torque_offsets),
-    };
+    let parameterisation = Parameterisation::of(&arm, args.reduced.as_deref())?;
     let set = BaseSet::find(&arm, parameterisation)?;
     let model = Model::new(&arm);
     let logs = args.source.read(&arm, &args.logs)?;

@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use faer::Mat;
-use nalgebra::{Cholesky, DVector};
 
 use super::earlier::{Doubt, EarlierResult};
 use crate::base::BaseSet;
 use crate::excitation::design::DesignError;
+use crate::identify::covariance::precision;
 use crate::robot::Arm;
 
 /// What a design takes for known.
@@ -43,16 +43,12 @@ impl Prior {
             let name = &result.parameters()[places[k]].name;
             return Err(fault(format!("the variance of \"{name}\" is {}", variances[k])));
         }
-        // Units differ by orders of magnitude: correlations are inverted.
-        let scale: DVector<f64> = variances.map(|v| 1.0 / v.sqrt());
-        let correlation = covariance.map_with_location(|i, k, v| v * scale[i] * scale[k]);
-        let inverse = Cholesky::new(correlation)
-            .ok_or_else(|| fault("its base_covariance is not positive definite".into()))?
-            .inverse();
+        let inverse = precision(&covariance)
+            .ok_or_else(|| fault("its base_covariance is not positive definite".into()))?;
         let mut information = Mat::zeros(base.rank(), base.rank());
         for (i, &(row, _)) in known.iter().enumerate() {
             for (k, &(column, _)) in known.iter().enumerate() {
-                information[(row, column)] = scale[i] * scale[k] * inverse[(i, k)];
+                information[(row, column)] = inverse[(i, k)];
             }
         }
         let mut notes = Vec::new();

@@ -192,7 +192,7 @@ impl Scenario {
     /// # Errors
     /// [`ScenarioError`] where the base parameters of that arm cannot be told.
     pub fn with_arm(self, arm: Arm) -> Result<Self, ScenarioError> {
-        let parameterisation = parameterisation(self.reduced.as_deref(), &arm)?;
+        let parameterisation = Parameterisation::of(&arm, self.reduced.as_deref())?;
         Ok(Self { set: BaseSet::find(&arm, parameterisation)?, arm, ..self })
     }
 
@@ -219,7 +219,7 @@ impl Scenario {
     fn asked_for(file: ScenarioFile, source: &Source) -> Result<Self, ScenarioError> {
         source.check(file.trials > 0, "trials", 0.0, "must be at least 1")?;
         let LoadedArm { arm, mut files, .. } = LoadedArm::load(&source.beside(&file.robot))?;
-        let parameterisation = parameterisation(file.reduced.as_deref(), &arm)?;
+        let parameterisation = Parameterisation::of(&arm, file.reduced.as_deref())?;
         let excitation = file.motion.excitation(&arm, source)?;
         files.extend(file.motion.file(source));
         FaultyPlant::new(&arm, &file.effects, &file.plant)?;
@@ -242,17 +242,6 @@ impl Scenario {
             seed: file.seed,
             trials: file.trials,
         })
-    }
-}
-
-/// All parameters of `arm`, or a reduced set of them.
-fn parameterisation(
-    reduced: Option<&str>,
-    arm: &Arm,
-) -> Result<Parameterisation, ParameterisationError> {
-    match reduced {
-        Some(name) => Parameterisation::reduced(name, arm),
-        None => Ok(Parameterisation::full(arm.dof(), arm.torque_offsets)),
     }
 }
 

@@ -57,6 +57,13 @@ impl<'a> Nominal<'a> {
         Self { theta, covariance: None, freedom: f64::INFINITY, doubt: None }
     }
 
+    /// Of every parameter of the data, less that of the simulation, the variance and its degrees of freedom.
+    fn noise_beside(&self, base: &Base) -> Vec<(f64, f64)> {
+        let data = base.parameters.iter().zip(&base.freedom).enumerate();
+        data.map(|(k, (data, freedom))| self.with_noise((data.sigma.powi(2), *freedom), k))
+            .collect()
+    }
+
     /// The variance of parameter `k` in data in which it is `of_data`, less that of the simulation, and its degrees of freedom
     /// (Satterthwaite 1946).
     fn with_noise(&self, (of_data, freedom): (f64, f64), k: usize) -> (f64, f64) {
@@ -68,13 +75,13 @@ impl<'a> Nominal<'a> {
 
 /// Every base parameter in the simulation and in the data, beside the causes that were found in these.
 pub fn moved(simulation: Nominal, base: &Base) -> Vec<Moved> {
-    let of_parameter = |((k, data), freedom): ((usize, &BaseParameter), &f64)| {
-        let (variance, freedom) = simulation.with_noise((data.sigma.powi(2), *freedom), k);
-        let (sigma, simulation) = (variance.sqrt(), simulation.theta[k]);
+    let of_parameter = |((data, theta), (variance, freedom)): ((&BaseParameter, &f64), _)| {
+        let (sigma, simulation) = (f64::sqrt(variance), *theta);
         let z = as_gaussian((data.value - simulation) / sigma, freedom);
         Moved { name: data.name.clone(), simulation, data: data.value, sigma, z }
     };
-    base.parameters.iter().enumerate().zip(&base.freedom).map(of_parameter).collect()
+    let pairs = base.parameters.iter().zip(simulation.theta);
+    pairs.zip(simulation.noise_beside(base)).map(of_parameter).collect()
 }
 
 /// The Gaussian deviate that is as improbable as Student's `t` with so many degrees of freedom, to 1 % from five on and
@@ -91,7 +98,7 @@ pub fn moved_together(study: &Study, simulation: Nominal, base: &Base) -> Option
     if !study.scene.periodic {
         return None;
     }
-    let Base { parameters, covariance, freedom } = base;
+    let Base { parameters, covariance, .. } = base;
     let covariance = match simulation.covariance {
         Some(unknown) => covariance + unknown,
         None => covariance.clone(),
@@ -100,11 +107,8 @@ pub fn moved_together(study: &Study, simulation: Nominal, base: &Base) -> Option
         parameters.iter().zip(simulation.theta).map(|(data, theta)| data.value - theta);
     let squared_distance = squared_distance(&covariance, &difference.collect::<Vec<_>>())?;
     let count = parameters.len();
-    let inverse = |((k, data), freedom): ((usize, &BaseParameter), &f64)| {
-        1.0 / simulation.with_noise((data.sigma.powi(2), *freedom), k).1
-    };
-    let freedom =
-        count as f64 / parameters.iter().enumerate().zip(freedom).map(inverse).sum::<f64>();
+    let inverse = simulation.noise_beside(base).into_iter().map(|(_, freedom)| 1.0 / freedom);
+    let freedom = count as f64 / inverse.sum::<f64>();
     let p_value = upper_fisher(squared_distance / count as f64, count, freedom);
     Some(MovedTogether { squared_distance, degrees_of_freedom: [count as f64, freedom], p_value })
 }

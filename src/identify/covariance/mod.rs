@@ -77,6 +77,13 @@ pub fn squared_distance(matrix: &DMatrix<f64>, error: &[f64]) -> Option<f64> {
     root.solve_lower_triangular(&error).map(|e| e.norm_squared())
 }
 
+/// V⁻¹ of a covariance V, `matrix`; `None` where it is not positive definite.
+pub fn precision(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let inverse = correlations(matrix).cholesky()?.inverse();
+    let scale = matrix.diagonal().map(|variance| 1.0 / variance.sqrt());
+    Some(inverse.map_with_location(|i, k, value| scale[i] * scale[k] * value))
+}
+
 /// 97.5 % quantile of Student's t; 1.96 for infinitely many degrees of freedom.
 pub fn quantile_95(degrees_of_freedom: f64) -> f64 {
     student_quantile(0.975, degrees_of_freedom)
