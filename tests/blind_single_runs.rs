@@ -2,7 +2,7 @@
 
 use armid::diagnose::{Diagnosis, Kind, Verdict};
 
-use crate::simulated::{Run, scenario};
+use crate::simulated::{Run, SIGMA_NM, assert_holds, scenario};
 
 /// A third of a UR5's noise.
 const NOISE: &str =
@@ -24,6 +24,30 @@ fn a_clean_run_has_no_cause_and_nothing_unexplained() {
     }
 }
 
+/// Noise of the velocities, by way of the inertias, is in what the model leaves and in what would bend a gear as well: it made stiff
+/// gears of joints 2 and 3, with 6 and 9 % of the error's mean square.
+#[test]
+fn noise_of_velocities_is_no_gear() {
+    let third = SIGMA_NM.map(|sd| 0.3 * sd);
+    let loud = format!("torque_sd_nm = {third:?}\nq_sd_rad = 2e-5\nqd_sd_rad_s = 3e-3\n");
+    let run =
+        scenario(("loud", 3), ("ur5_identification", 5), &loud, "[processing]\nperiod_s = 0.0");
+    let run = Run::new(run);
+    let d = run.diagnoser().diagnose(&run.log.measurement("loud"), &[], None).unwrap().diagnosis;
+    assert_eq!(d.verdict, Verdict::NothingFound, "{:?}", d.sentences);
+}
+
+/// Half of the error's mean square, where as much of it is that noise.
+#[test]
+fn a_gear_is_seen_beside_noise_of_velocities() {
+    let gear = "kind = \"elasticity\"\njoint = 2\nstiffness_nm_rad = 20000.0\n";
+    let d = diagnose(5, &format!("[[effect]]\n{gear}"));
+    let named: Vec<_> = d.causes.iter().map(|c| (c.kind, c.joint)).collect();
+    assert_eq!(named, [(Kind::Elasticity, Some(2))]);
+    assert_holds(&d.causes[0], "stiffness_nm_rad", 20000.0);
+    assert_eq!(d.causes[0].form, Some("encoder on the motor"));
+}
+
 /// No family of single runs has it; bristles stand in for it, and were named with a confidence of one.
 #[test]
 fn one_joints_late_torque_is_unexplained_and_nothing_else_for_sure() {
@@ -39,8 +63,7 @@ fn friction_that_warms_up_early_is_told_its_time() {
     let d = diagnose(4, &format!("[[effect]]\n{warming}"));
     let named: Vec<_> = d.causes.iter().map(|c| (c.kind, c.joint)).collect();
     assert_eq!(named, [(Kind::ThermalDrift, Some(3))]);
+    assert_holds(&d.causes[0], "time_constant_s", 16.0);
     let time = &d.causes[0].parameters["time_constant_s"];
-    // Twice the half width: 3.9 σ, which one log in 10⁴ misses by chance.
-    assert!((time.value - 16.0).abs() < time.ci95[1] - time.ci95[0], "{time:?}");
     assert!(time.ci95[1] < 24.0, "{time:?}");
 }

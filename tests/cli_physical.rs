@@ -1,39 +1,15 @@
 //! From a log to an arm that simulators accept and back into the plant, as a user does it:
 //! `identify --physical`, `export`, `simulate --arm`.
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 use std::sync::OnceLock;
 
 use armid::robot::{Arm, read_urdf};
 use serde_json::Value;
-use tempfile::TempDir;
+
+use crate::cli::{Folder, default_scenario};
 
 /// Standard deviation of the default scenario's torque noise, Nm.
 const NOISE_NM: [f64; 6] = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15];
-
-fn armid(folder: &Path, words: &str) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_armid"))
-        .current_dir(folder)
-        .args(words.split_whitespace())
-        .output()
-        .unwrap()
-}
-
-/// Asserts the exit code and that the terminal shows all of `words`; returns what it shows.
-fn says(output: &Output, code: i32, words: &[&str]) -> String {
-    let text =
-        [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes)).concat();
-    assert_eq!(output.status.code(), Some(code), "{text}");
-    for word in words {
-        assert!(text.contains(word), "\"{word}\" is not in: {text}");
-    }
-    text
-}
-
-fn json(file: PathBuf) -> Value {
-    serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap()
-}
 
 fn parameter(result: &Value, list: &str, name: &str) -> f64 {
     let found = result[list].as_array().unwrap().iter().find(|p| p["name"] == name);
@@ -41,29 +17,28 @@ fn parameter(result: &Value, list: &str, name: &str) -> f64 {
 }
 
 /// The default scenario with 4 periods, its log and what is identified from it.
-fn identified() -> &'static Path {
-    static FOLDER: OnceLock<TempDir> = OnceLock::new();
-    let folder = FOLDER.get_or_init(|| {
-        let folder = tempfile::tempdir().unwrap();
-        let scenario = include_str!("../sims/default.toml").replace("periods = 8", "periods = 4");
-        let file = |name: &str| folder.path().join(name);
-        std::fs::write(file("noisy.toml"), &scenario).unwrap();
+fn identified() -> &'static Folder {
+    static FOLDER: OnceLock<Folder> = OnceLock::new();
+    FOLDER.get_or_init(|| {
+        let folder = Folder::empty();
+        let scenario = default_scenario(4);
+        folder.write("noisy.toml", &scenario);
         let (quiet, _) = scenario.split_once("[sensors]").unwrap();
-        std::fs::write(file("quiet.toml"), quiet).unwrap();
-        let run = |words: &str| armid(folder.path(), words);
-        says(&run("simulate --scenario noisy.toml --out log.csv --truth truth.json"), 0, &[]);
+        folder.write("quiet.toml", quiet);
+        let words = "simulate --scenario noisy.toml --out log.csv --truth truth.json";
+        folder.armid(words).says(0, &[]);
         let words = "identify log.csv --robot ur5 --physical --json result.json --report r.html";
-        let text = says(&run(words), 0, &["Physical consistency: ", "duality gap", "KKT residual"]);
+        let said = ["Physical consistency: ", "duality gap", "KKT residual"];
+        let text = folder.armid(words).says(0, &said);
         assert!(!text.contains("the model is wrong"), "{text}");
         folder
-    });
-    folder.path()
+    })
 }
 
 #[test]
 fn a_clean_log_gives_an_arm_with_a_certificate() {
     let folder = identified();
-    let result = json(folder.join("result.json"));
+    let result = folder.result("result.json");
     assert_eq!(result["standard_parameters"].as_array().unwrap().len(), 84);
     for body in 1..=6 {
         assert!(parameter(&result, "standard_parameters", &format!("m{body}")) > 0.0);
@@ -78,7 +53,7 @@ fn a_clean_log_gives_an_arm_with_a_certificate() {
     // The solver's own claim: 1e-8 of 1 + objective.
     assert!(number("duality_gap") <= 1e-8 * (1.0 + number("objective")), "{physical}");
     assert!(number("p_value") > 0.01, "{physical}");
-    let page = std::fs::read_to_string(folder.join("r.html")).unwrap();
+    let page = folder.read("r.html");
     assert!(page.contains("Standard parameters that an arm can have"));
 }
 
@@ -93,12 +68,12 @@ fn sigma_is_stated_for_what_the_data_decide() {
     for (joint, factor) in wrong.joints.iter_mut().zip([1.2, 0.8, 1.1, 0.85, 1.15, 0.9]) {
         joint.link.parameters.iter_mut().for_each(|p| *p *= factor);
     }
-    std::fs::write(folder.join("wrong.toml"), wrong.to_toml()).unwrap();
+    folder.write("wrong.toml", wrong.to_toml());
     let words = "identify log.csv --robot wrong.toml --physical --json wrong.json --report w.html";
-    let text = says(&armid(folder, words), 0, &["come without σ"]);
+    let text = folder.armid(words).says(0, &["come without σ"]);
     assert!(!text.contains("the model is wrong"), "{text}");
-    let truth = json(folder.join("truth.json"));
-    let result = json(folder.join("wrong.json"));
+    let truth = folder.result("truth.json");
+    let result = folder.result("wrong.json");
     let (mut by_data, mut by_prior) = (Vec::new(), Vec::new());
     for p in result["standard_parameters"].as_array().unwrap() {
         let name = p["name"].as_str().unwrap();
@@ -121,11 +96,11 @@ fn sigma_is_stated_for_what_the_data_decide() {
     for name in ["m1", "A1", "Ia1", "m2", "m3", "m4", "m6", "mz3"] {
         assert!(by_prior.contains(&name), "{name}: {by_data:?}");
     }
-    let page = std::fs::read_to_string(folder.join("w.html")).unwrap();
+    let page = folder.read("w.html");
     assert_eq!(page.matches(" (prior)</td>").count(), by_prior.len());
     let words = "export wrong.json --robot wrong.toml --mjcf w.xml";
     let decided = format!("of {} standard parameters (m1,", by_prior.len());
-    says(&armid(folder, words), 0, &[&decided]);
+    folder.armid(words).says(0, &[&decided]);
 }
 
 #[test]
@@ -136,8 +111,8 @@ fn the_weight_of_the_prior_is_cross_validated_and_shown() {
             "identify log.csv --robot ur5 --physical --prior {prior} --prior-weight auto --json \
              {prior}.json"
         );
-        says(&armid(folder, &words), 0, &["chosen by cross-validation"]);
-        let physical = &json(folder.join(format!("{prior}.json")))["physical"];
+        folder.armid(&words).says(0, &["chosen by cross-validation"]);
+        let physical = &folder.result(&format!("{prior}.json"))["physical"];
         assert_eq!(physical["prior_metric"], prior);
         let tried = physical["cross_validation"].as_array().unwrap();
         let error = |t: &Value| t["prediction_error"].as_f64().unwrap();
@@ -145,48 +120,44 @@ fn the_weight_of_the_prior_is_cross_validated_and_shown() {
         assert_eq!(best["weight"], physical["prior_weight"], "{physical}");
     }
     let words = "identify log.csv --robot ur5 --period 0 --physical --prior-weight auto";
-    says(&armid(folder, words), 1, &["repeats at least 3 times", "give the weight as a number"]);
+    folder.armid(words).says(1, &["repeats at least 3 times", "give the weight as a number"]);
     let words = "identify log.csv log.csv --robot ur5 --physical --prior-weight auto";
-    says(&armid(folder, words), 1, &["--prior-weight auto", "of several logs give it as a number"]);
+    folder.armid(words).says(1, &["--prior-weight auto", "of several logs give it as a number"]);
     let words = "identify log.csv --robot ur5 --physical --prior-weight 0";
-    says(&armid(folder, words), 2, &["positive number or auto"]);
-    says(&armid(folder, "identify log.csv --robot ur5 --prior entropic"), 2, &["--physical"]);
+    folder.armid(words).says(2, &["positive number or auto"]);
+    folder.armid("identify log.csv --robot ur5 --prior entropic").says(2, &["--physical"]);
 }
 
 /// Torque that is logged late makes rotor inertias negative, as the paper's are, and a friction that pushes, which no arm has.
 #[test]
 fn a_wrong_model_is_called_wrong_and_sent_to_diagnose() {
-    let folder = tempfile::tempdir().unwrap();
-    let scenario = include_str!("../sims/default.toml").replace("periods = 8", "periods = 4");
-    let late = format!("{scenario}\n[[effect]]\nkind = \"time_skew\"\ndelay_s = 0.16\n");
-    std::fs::write(folder.path().join("late.toml"), late).unwrap();
-    says(&armid(folder.path(), "simulate --scenario late.toml --out late.csv"), 0, &[]);
+    let folder = Folder::empty();
+    let late = default_scenario(4) + "\n[[effect]]\nkind = \"time_skew\"\ndelay_s = 0.16\n";
+    folder.write("late.toml", late);
+    folder.armid("simulate --scenario late.toml --out late.csv").says(0, &[]);
     let words = "identify late.csv --robot ur5 --physical --json late.json --report late.html";
     let wrong = "the model is wrong, not only noisy";
     let told =
         [wrong, "Run armid diagnose", "Ia6 ≥ 0", "What was identified is physically impossible"];
-    says(&armid(folder.path(), words), 3, &told);
-    let result = json(folder.path().join("late.json"));
+    folder.armid(words).says(3, &told);
+    let result = folder.result("late.json");
     assert!(parameter(&result, "base_parameters", "Ia6") < 0.0);
     assert!(parameter(&result, "standard_parameters", "Ia6") >= 0.0);
     assert_eq!(result["physical"]["model_is_wrong"], true);
-    let page = std::fs::read_to_string(folder.path().join("late.html")).unwrap();
+    let page = folder.read("late.html");
     assert!(page.contains(wrong));
 }
 
 #[test]
 fn both_formats_are_exported_and_the_urdf_comes_back_with_its_drives() {
     let folder = identified();
-    says(
-        &armid(folder, "export result.json --urdf a.urdf --mjcf a.xml"),
-        0,
-        &["a.urdf", "a.drives.toml", "a.xml"],
-    );
-    let result = json(folder.join("result.json"));
-    let mjcf = std::fs::read_to_string(folder.join("a.xml")).unwrap();
+    let words = "export result.json --urdf a.urdf --mjcf a.xml";
+    folder.armid(words).says(0, &["a.urdf", "a.drives.toml", "a.xml"]);
+    let result = folder.result("result.json");
+    let mjcf = folder.read("a.xml");
     let armature = parameter(&result, "standard_parameters", "Ia3");
     assert!(mjcf.contains(&format!("armature=\"{armature}\"")), "{mjcf}");
-    let back = Arm::load(folder.join("a.urdf").to_str().unwrap()).unwrap();
+    let back = Arm::load(folder.path("a.urdf").to_str().unwrap()).unwrap();
     for (j, joint) in back.joints.iter().enumerate() {
         let value =
             |kind: &str| parameter(&result, "standard_parameters", &format!("{kind}{}", j + 1));
@@ -196,7 +167,7 @@ fn both_formats_are_exported_and_the_urdf_comes_back_with_its_drives() {
         assert!((joint.link.mass_kg() / value("m") - 1.0).abs() < 1e-14);
         assert!((joint.link.parameters[4] - value("A")).abs() < 1e-13);
     }
-    let text = says(&armid(folder, "base --robot a.urdf"), 0, &["58 base parameters"]);
+    let text = folder.armid("base --robot a.urdf").says(0, &["52 base parameters"]);
     assert!(text.contains("a.drives.toml"), "{text}");
 }
 
@@ -205,19 +176,18 @@ fn both_formats_are_exported_and_the_urdf_comes_back_with_its_drives() {
 #[test]
 fn a_robot_that_came_as_urdf_leaves_as_urdf() {
     let folder = identified();
-    says(&armid(folder, "export result.json --urdf in.urdf"), 0, &[]);
-    let with_tool = std::fs::read_to_string(folder.join("in.urdf")).unwrap().replace(
+    folder.armid("export result.json --urdf in.urdf").says(0, &[]);
+    let with_tool = folder.read("in.urdf").replace(
         "</robot>",
         "<link name=\"world\"/><joint name=\"stand\" type=\"fixed\"><parent link=\"world\"/><child link=\"base_link\"/>\
          </joint><link name=\"tool0\"/><joint name=\"tool\" type=\"fixed\"><origin xyz=\"0 0 0.1\" rpy=\"0 0.5 0\"/>\
          <parent link=\"wrist_3_link\"/><child link=\"tool0\"/></joint></robot>",
     );
-    std::fs::write(folder.join("in.urdf"), with_tool).unwrap();
+    folder.write("in.urdf", with_tool);
     let words = "identify log.csv --robot in.urdf --physical --json in.json";
-    says(&armid(folder, words), 0, &["note: in.urdf"]);
-    says(&armid(folder, "export in.json --robot in.urdf --urdf out.urdf"), 0, &["out.urdf"]);
-    let read =
-        |name: &str| read_urdf(&std::fs::read_to_string(folder.join(name)).unwrap(), name).unwrap();
+    folder.armid(words).says(0, &["note: in.urdf"]);
+    folder.armid("export in.json --robot in.urdf --urdf out.urdf").says(0, &["out.urdf"]);
+    let read = |name: &str| read_urdf(&folder.read(name), name).unwrap();
     let (before, after) = (read("in.urdf"), read("out.urdf"));
     assert_eq!(before.arm.name, after.arm.name);
     assert_eq!((&*before.frames.root, before.frames.fixed.len()), ("world", 2));
@@ -232,37 +202,37 @@ fn a_robot_that_came_as_urdf_leaves_as_urdf() {
         assert!((a.placement.rotation - b.placement.rotation).norm() < 1e-14);
         assert_eq!(a.placement.translation_m, b.placement.translation_m);
     }
-    let other = armid(folder, "export in.json --urdf x.urdf --robot ur10e");
-    says(&other, 1, &["in.json", "\"ur5\"", "\"ur10e\""]);
+    let other = folder.armid("export in.json --urdf x.urdf --robot ur10e");
+    other.says(1, &["in.json", "\"ur5\"", "\"ur10e\""]);
     // Of the same name, and its wrist a centimetre longer.
     let arm = Arm::built_in("ur5").unwrap();
     let longer = arm.to_toml().replacen("xyz_m = [-0.39225,", "xyz_m = [-0.40225,", 1);
     assert_ne!(longer, arm.to_toml());
-    std::fs::write(folder.join("longer.toml"), longer).unwrap();
+    folder.write("longer.toml", longer);
     let words = "export result.json --robot longer.toml --urdf x.urdf";
-    says(&armid(folder, words), 1, &["another \"ur5\"", "joint 4", "1.00e-2 m"]);
+    folder.armid(words).says(1, &["another \"ur5\"", "joint 4", "1.00e-2 m"]);
     let words = "diagnose log.csv --robot longer.toml --sim result.json";
-    says(&armid(folder, words), 1, &["result.json", "another \"ur5\""]);
+    folder.armid(words).says(1, &["result.json", "another \"ur5\""]);
     let words = "diagnose log.csv --robot ur10e --sim quiet.toml";
-    says(&armid(folder, words), 1, &["quiet.toml", "another arm than \"ur10e\""]);
-    assert!(!folder.join("x.urdf").exists());
+    folder.armid(words).says(1, &["quiet.toml", "another arm than \"ur10e\""]);
+    assert!(!folder.path("x.urdf").exists());
 }
 
 #[test]
 fn results_that_hold_no_arm_are_refused_with_what_to_do() {
     let folder = identified();
     let refused = |words: &str, expected: &[&str]| {
-        says(&armid(folder, &format!("export {words} --urdf bad.urdf")), 1, expected);
-        assert!(!folder.join("bad.urdf").exists(), "{words}");
+        folder.armid(&format!("export {words} --urdf bad.urdf")).says(1, expected);
+        assert!(!folder.path("bad.urdf").exists(), "{words}");
     };
-    let good = std::fs::read_to_string(folder.join("result.json")).unwrap();
+    let good = folder.read("result.json");
     let edited = |name: &str, edit: &dyn Fn(&mut Value)| {
         let mut value: Value = serde_json::from_str(&good).unwrap();
         edit(&mut value);
-        std::fs::write(folder.join(name), value.to_string()).unwrap();
+        folder.write(name, value.to_string());
     };
     refused("nothing.json", &["nothing.json"]);
-    std::fs::write(folder.join("cut.json"), &good[..good.len() / 2]).unwrap();
+    folder.write("cut.json", &good[..good.len() / 2]);
     refused("cut.json", &["cut.json", "wanted: a result of armid identify --physical --json"]);
     refused("truth.json", &["truth.json", "armid.truth/1"]);
     edited("base.json", &|v| v["standard_parameters"] = Value::Null);
@@ -284,14 +254,13 @@ fn results_that_hold_no_arm_are_refused_with_what_to_do() {
     edited("robot.json", &|v| v["robot"] = "ur9".into());
     refused("robot.json", &["ur9", "built in are"]);
     refused("result.json --robot ur10e", &["\"ur5\"", "\"ur10e\""]);
-    says(&armid(folder, "export result.json"), 2, &["--urdf"]);
-    says(&armid(folder, "export result.json --mjcf no/folder/x.xml"), 1, &["no/folder"]);
+    folder.armid("export result.json").says(2, &["--urdf"]);
+    folder.armid("export result.json --mjcf no/folder/x.xml").says(1, &["no/folder"]);
 }
 
 /// Column `actual_torque_j` of a log, one list per joint.
-fn torque_nm(file: PathBuf) -> Vec<Vec<f64>> {
-    let text = std::fs::read_to_string(file).unwrap();
-    let mut lines = text.lines();
+fn torque_nm(log: &str) -> Vec<Vec<f64>> {
+    let mut lines = log.lines();
     let header: Vec<&str> = lines.next().unwrap().split(',').collect();
     let column = |j: usize| header.iter().position(|h| *h == format!("actual_torque_{j}")).unwrap();
     let columns: Vec<usize> = (0..6).map(column).collect();
@@ -310,10 +279,10 @@ fn torque_nm(file: PathBuf) -> Vec<Vec<f64>> {
 #[test]
 fn the_identified_arm_moves_in_closed_loop_as_the_log_says() {
     let folder = identified();
-    says(&armid(folder, "simulate --scenario quiet.toml --out true.csv"), 0, &[]);
+    folder.armid("simulate --scenario quiet.toml --out true.csv").says(0, &[]);
     let words = "simulate --scenario quiet.toml --arm result.json --out again.csv";
-    says(&armid(folder, words), 0, &["again.csv"]);
-    let read = |name: &str| torque_nm(folder.join(name));
+    folder.armid(words).says(0, &["again.csv"]);
+    let read = |name: &str| torque_nm(&folder.read(name));
     let (truth, again, log) = (read("true.csv"), read("again.csv"), read("log.csv"));
     let mut squares = 0.0;
     for j in 0..6 {

@@ -2,47 +2,34 @@
 //! can be.
 
 use std::path::Path;
-use std::process::Command;
 
 use serde_json::Value;
 
+use crate::cli::Folder;
+
 /// Runs a study and returns its JSON and Markdown; the page must be there too.
-fn study(topic: &str, scenario: &Path, extra: &[&str]) -> (Value, String) {
-    let folder = tempfile::tempdir().unwrap();
-    let file = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    let (json, markdown, page) = (file("a.json"), file("a.md"), file("a.html"));
-    let output = Command::new(env!("CARGO_BIN_EXE_armid"))
-        .args(["study", topic, scenario.to_str().unwrap(), "--trials", "2"])
-        .args(["--json", &json, "--markdown", &markdown, "--report", &page])
-        .args(extra)
-        .output()
-        .unwrap();
-    let stderr = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(0), "{stderr}");
-    let html = std::fs::read_to_string(page).unwrap();
+fn study(folder: &Folder, words: &str) -> (Value, String) {
+    let outputs = "--trials 2 --json a.json --markdown a.md --report a.html";
+    folder.armid(&format!("study {words} {outputs}")).says(0, &[]);
+    let html = folder.read("a.html");
     assert!(html.contains("<svg") && !html.contains("NaN"), "a page without figures");
-    let value = serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap();
-    (value, std::fs::read_to_string(markdown).unwrap())
+    (folder.json("a.json"), folder.read("a.md"))
 }
 
-/// `file` of `sims/` with `old` replaced by `new`, in a folder where its relative paths hold.
-fn changed(file: &str, old: &str, new: &str) -> tempfile::NamedTempFile {
-    let sims = Path::new(env!("CARGO_MANIFEST_DIR")).join("sims");
-    let text = std::fs::read_to_string(sims.join(file)).unwrap();
+/// `file` of `sims/` with `old` replaced by `new`; its relative paths hold in any folder.
+fn changed(file: &str, old: &str, new: &str) -> String {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(root.join("sims").join(file)).unwrap();
     assert!(text.contains(old), "{file} without {old}");
-    let copy = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
-    let absolute = format!("{}/", sims.parent().unwrap().display());
-    let text = text.replace(old, new).replace("\"../", &format!("\"{absolute}"));
-    std::fs::write(copy.path(), text).unwrap();
-    copy
+    text.replace(old, new).replace("\"../", &format!("\"{}/", root.display()))
 }
 
 #[test]
 fn the_paper_is_repeated_and_its_negative_rotor_inertias_with_it() {
-    let scenario = changed("paper.toml", "periods = 3", "periods = 2");
-    let root = env!("CARGO_MANIFEST_DIR");
-    let validation = format!("{root}/trajectories/ur5_paper_validation.json");
-    let (result, markdown) = study("paper", scenario.path(), &["--validation", &validation]);
+    let folder = Folder::empty();
+    folder.write("paper.toml", changed("paper.toml", "periods = 3", "periods = 2"));
+    folder.write("validation.json", include_str!("../trajectories/ur5_paper_validation.json"));
+    let (result, markdown) = study(&folder, "paper paper.toml --validation validation.json");
     assert_eq!(result["schema"], "armid.study-paper/1");
     assert_eq!(result["parameters"].as_array().unwrap().len(), 33);
     assert!(markdown.contains("iG") || markdown.contains("Ia1"), "{markdown}");
@@ -80,8 +67,9 @@ fn the_paper_is_repeated_and_its_negative_rotor_inertias_with_it() {
 
 #[test]
 fn the_cutoff_has_a_best_value_and_e_n_falls_with_the_record() {
-    let sims = Path::new(env!("CARGO_MANIFEST_DIR")).join("sims/cutoff.toml");
-    let (result, _) = study("cutoff", &sims, &[]);
+    let folder = Folder::empty();
+    folder.write("cutoff.toml", include_str!("../sims/cutoff.toml"));
+    let (result, _) = study(&folder, "cutoff cutoff.toml");
     assert_eq!(result["schema"], "armid.study-cutoff/1");
     let curves = result["curves"].as_array().unwrap();
     assert_eq!(curves.len(), 8);
@@ -109,32 +97,24 @@ fn the_cutoff_has_a_best_value_and_e_n_falls_with_the_record() {
 /// Scenarios run one by one and put together are the study of all of them.
 #[test]
 fn scenarios_of_noise_are_put_together_from_files() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    let armid = |arguments: &[&str]| {
-        Command::new(env!("CARGO_BIN_EXE_armid")).args(["study", "noise"]).args(arguments).output()
-    };
-    let read = |name: &str| std::fs::read_to_string(file(name)).unwrap();
-    let json = |name: &str| serde_json::from_str::<Value>(&read(name)).unwrap();
-    for (name, scenario) in [("a.json", "default.toml"), ("b.json", "noise_white.toml")] {
-        let scenario = changed(scenario, "periods = 8", "periods = 4");
-        let path = scenario.path().to_str().unwrap();
-        let few = ["--trials", "2", "--slow-every", "2", "--json", &file(name)];
-        assert!(armid(&[&[path], &few[..]].concat()).unwrap().status.success());
+    let folder = Folder::empty();
+    let noise = |words: &str| folder.armid(&format!("study noise {words}"));
+    for (name, scenario) in [("a", "default.toml"), ("b", "noise_white.toml")] {
+        folder.write(&format!("{name}.toml"), changed(scenario, "periods = 8", "periods = 4"));
+        let words = format!("{name}.toml --trials 2 --slow-every 2 --json {name}.json");
+        noise(&words).says(0, &[]);
     }
-    let together = ["--from", &file("a.json"), &file("b.json"), "--json", &file("all.json")];
-    let outputs = ["--markdown", &file("all.md"), "--report", &file("all.html")];
-    assert!(armid(&[&together[..], &outputs].concat()).unwrap().status.success());
-    let all = json("all.json");
+    let words = "--from a.json b.json --json all.json --markdown all.md --report all.html";
+    noise(words).says(0, &[]);
+    let all = folder.json("all.json");
     for (k, part) in ["a.json", "b.json"].iter().enumerate() {
-        assert_eq!(all["scenarios"][k], json(part)["scenarios"][0]);
+        assert_eq!(all["scenarios"][k], folder.json(part)["scenarios"][0]);
     }
-    assert!(read("all.md").contains("| default ") && read("all.md").contains("| white "));
+    let markdown = folder.read("all.md");
+    assert!(markdown.contains("| default ") && markdown.contains("| white "));
     let command = all["program"]["command"].as_str().unwrap();
     assert_eq!(command.matches("armid study noise").count(), 3, "{command}");
 
-    let twice = armid(&["--from", &file("a.json"), &file("all.json")]).unwrap();
-    assert!(!twice.status.success());
-    assert!(String::from_utf8_lossy(&twice.stderr).contains("default is already there"));
-    assert!(!armid(&["--from", &file("all.md")]).unwrap().status.success());
+    noise("--from a.json all.json").complains(1, &["default is already there"]);
+    noise("--from all.md").says(1, &[]);
 }

@@ -4,12 +4,12 @@ use armid::diagnose::{DetectionLimit, Diagnoser};
 use armid::dynamics::Model;
 use armid::montecarlo::{Scenario, Simulation};
 
-use crate::simulated::{TORQUE_NOISE, scenario};
+use crate::simulated::{TORQUE_NOISE, scenario, simulation};
 
 /// Four periods of an arm with `effects`.
 fn run(effects: &str) -> Simulation {
     let along = ("ur5_identification", 4);
-    Simulation::run(scenario(("limits", 5), along, TORQUE_NOISE, effects)).unwrap()
+    simulation(scenario(("limits", 5), along, TORQUE_NOISE, effects))
 }
 
 /// Of the log of `clean`.

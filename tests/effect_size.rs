@@ -1,17 +1,18 @@
 //! The size of a hidden effect in units of the noise.
 
-use armid::montecarlo::{EffectSize, Simulation};
+use armid::montecarlo::{EffectSize, Scenario, Simulation};
 use armid::plant::Recording;
 use armid::plant::faults::FaultyPlant;
 use armid::robot::JointSignals;
 
-use crate::simulated::{TORQUE_NOISE, scenario};
+use crate::simulated::{SIGMA_NM, TORQUE_NOISE, scenario, simulation};
 
 /// One period of the default scenario's motion, with its own noise.
 fn size_of(effects: &str, noise: &str) -> EffectSize {
     let sensors = TORQUE_NOISE.to_owned() + noise;
     let scenario = scenario(("size", 1), ("ur5_identification", 1), &sensors, effects);
-    Simulation::run(scenario).unwrap().effect_size().unwrap()
+    let clean = Scenario { effects: Vec::new(), ..scenario.clone() };
+    simulation(scenario).size_beside(&simulation(clean).recording).unwrap()
 }
 
 const COLOURED: &str = "[sensors.torque_noise]\ncross_joint_correlation = 0.3\n\
@@ -77,7 +78,7 @@ fn a_log_that_repeats_need_not_be_integrated() {
         let pairs = of(&whole.recording).joint(j).iter().zip(of(&copied.recording).joint(j));
         pairs.take(settled).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     };
-    for (j, torque_sd_nm) in [1.0, 1.0, 0.7, 0.15, 0.15, 0.15].into_iter().enumerate() {
+    for (j, torque_sd_nm) in SIGMA_NM.into_iter().enumerate() {
         let torque = worst(|run| &run.torque_nm, j) / torque_sd_nm;
         let angle = worst(|run| &run.q_rad, j) / 2e-5;
         let velocity = worst(|run| &run.qd_rad_s, j) / 1e-3;

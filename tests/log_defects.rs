@@ -1,6 +1,6 @@
 //! One valid log, then one test per single defect: every message names file, row and value.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -570,7 +570,7 @@ fn suspected(result: Result<Log, LogError>) -> (&'static str, &'static str) {
             assert_eq!(file, "run.csv");
             let message = suspicion.to_string();
             let remedy = match suspicion {
-                UnitSuspicion::Unrelated { .. } => "columns",
+                UnitSuspicion::Unrelated { .. } | UnitSuspicion::NoVelocity { .. } => "columns",
                 _ => "[units]",
             };
             assert!(message.contains("row") && message.contains(remedy), "{message}");
@@ -579,6 +579,7 @@ fn suspected(result: Result<Log, LogError>) -> (&'static str, &'static str) {
                 UnitSuspicion::Clock { unit, .. } => ("clock", unit),
                 UnitSuspicion::Degrees { .. } => ("both", "deg"),
                 UnitSuspicion::Unrelated { .. } => ("none", ""),
+                UnitSuspicion::NoVelocity { .. } => ("no velocity", ""),
             }
         }
         other => panic!("{other:?}"),
@@ -649,6 +650,59 @@ fn velocities_that_belong_to_other_joints() {
     let one = edited(|rows| scale(rows, 9..10, -1.0)).unwrap();
     let warning = one.rows.warnings[0].to_string();
     assert!(warning.contains("joint 3") && warning.contains("-1.000"), "{warning}");
+}
+
+/// A layout as that of the valid log, without velocities.
+fn without_velocities() -> Layout {
+    let layout = include_str!("../layouts/armid.toml");
+    let lines = layout.lines().filter(|line| !line.starts_with("qd = \"actual"));
+    let text = lines.collect::<Vec<_>>().join("\n");
+    assert!(text.len() < layout.len() - 10, "{text}");
+    Layout::from_toml(&text, "no_qd.toml").unwrap()
+}
+
+/// Columns of zeros are no velocities, and the remedy that is named works: slopes of angles, wrapped ones as well, are told to
+/// (ω h)⁴/30 of up to 1.8 rad/s, and at the ends, one-sided, to six times that.
+#[test]
+fn velocities_that_were_not_recorded_are_slopes_of_the_angles() {
+    let mut rows = valid();
+    scale(&mut rows, 7..13, 0.0);
+    assert_eq!(suspected(read(text(&rows, ",", "\n"))), ("no velocity", ""));
+    for row in &mut rows[1..] {
+        let angle: f64 = row[4].parse().unwrap();
+        row[4] = ((angle + 1.0).rem_euclid(TAU) - PI).to_string();
+    }
+    let (text, layout) = (text(&rows, ",", "\n"), without_velocities());
+    let log = read_log_from(text.as_bytes(), "run.csv", &layout, JOINTS).unwrap();
+    assert_eq!(log.rows.used, SAMPLES);
+    assert_eq!(log.rows.warnings, [LogWarning::SlopesOfAngles]);
+    let bound = 6.0 * 1.8 * (2.0 * STEP_S).powi(4) / 30.0;
+    for j in 0..JOINTS {
+        for (slope, t) in log.qd_rad_s.joint(j).iter().zip(&log.time_s) {
+            let off = slope - velocity_rad_s(j, *t);
+            assert!(off.abs() < bound, "joint {}: off by {off} at {t} s", j + 1);
+        }
+    }
+}
+
+/// Readings at 42 Hz in a file of 125 Hz: two in three rows are held.
+#[test]
+fn rows_that_hold_old_readings_are_told() {
+    let log = edited(|rows| {
+        for k in 0..SAMPLES {
+            let read = rows[row(k - k % 3) - 1].clone();
+            rows[row(k) - 1][1..].clone_from_slice(&read[1..]);
+        }
+    })
+    .unwrap();
+    let held = log.rows.warnings.iter().find_map(|warning| match warning {
+        LogWarning::Held { share, rate_hz } => Some((*share, *rate_hz)),
+        _ => None,
+    });
+    let (share, rate_hz) = held.expect("it is told");
+    // 400 rows are 133 such readings and one more.
+    assert!((share - 2.0 / 3.0).abs() < 0.003, "{share}");
+    assert!((rate_hz * STEP_S - 1.0 / 3.0).abs() < 0.003, "{rate_hz}");
 }
 
 #[test]

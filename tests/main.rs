@@ -1,6 +1,8 @@
 //! All integration tests in one program, which is compiled and linked once and keeps every core busy to its end: `cargo test val_`
 //! runs those against something independent, `regress_` those against ourselves, `blind_` hide and find.
 
+mod cli;
+mod damage;
 mod golden;
 mod hidden;
 mod simulated;
@@ -14,8 +16,10 @@ mod cli_diagnose;
 mod cli_excite;
 mod cli_formats;
 mod cli_identify;
+mod cli_montecarlo;
 mod cli_physical;
 mod cli_study;
+mod damaged_logs;
 mod detection_limits;
 mod diagnose_periodic;
 mod dynamics_identities;
@@ -23,6 +27,7 @@ mod effect_size;
 mod excite_design;
 mod log_defects;
 mod log_write;
+mod other_arms;
 mod plant_faults;
 mod plant_runs;
 mod plant_sensors;

@@ -1,5 +1,7 @@
 //! The sensor chain: what it adds, that a trial can be replayed alone, and what the controller reads.
 
+use std::sync::OnceLock;
+
 use armid::excitation::FourierSeries;
 use armid::plant::{
     Effort, Measured, NoiseModel, PerJoint, PlantConfig, PlantError, Recording, SensorConfig,
@@ -8,20 +10,26 @@ use armid::plant::{
 use armid::random::TrialStreams;
 use armid::robot::{Arm, JointSignals};
 
+use crate::simulated::SIGMA_NM;
+
 const RATE_HZ: f64 = 125.0;
 
 fn arm_and_recording() -> (Arm, Recording) {
-    let arm = Arm::built_in("ur5").unwrap();
-    let motion = FourierSeries::built_in("ur5_identification").unwrap();
-    let recording = simulate(&arm, &motion, &PlantConfig::default(), None).unwrap();
-    (arm, recording)
+    static RUN: OnceLock<(Arm, Recording)> = OnceLock::new();
+    let run = RUN.get_or_init(|| {
+        let arm = Arm::built_in("ur5").unwrap();
+        let motion = FourierSeries::built_in("ur5_identification").unwrap();
+        let recording = simulate(&arm, &motion, &PlantConfig::default(), None).unwrap();
+        (arm, recording)
+    });
+    run.clone()
 }
 
 fn noisy() -> SensorConfig {
     SensorConfig {
         q_sd_rad: PerJoint::All(2e-5),
         qd_sd_rad_s: PerJoint::All(1e-3),
-        torque_sd_nm: PerJoint::Each(vec![1.0, 1.0, 0.7, 0.15, 0.15, 0.15]),
+        torque_sd_nm: PerJoint::Each(SIGMA_NM.to_vec()),
         torque_noise: NoiseModel::real_arm(),
         ..SensorConfig::default()
     }
@@ -58,7 +66,7 @@ fn errors_have_the_size_asked_for() {
     let measured = measure(&noisy(), &arm, &recording, 0);
     let n = recording.time_s.len() as f64;
     let (white, coloured) = (5.0 / (2.0 * n).sqrt(), 5.0 / (2.0 * n / 5.0).sqrt());
-    for (j, torque_sd) in [1.0, 1.0, 0.7, 0.15, 0.15, 0.15].into_iter().enumerate() {
+    for (j, torque_sd) in SIGMA_NM.into_iter().enumerate() {
         for (seen, asked, bound) in [
             (rms_difference(&measured.q_rad, &recording.q_rad, j), 2e-5, white),
             (rms_difference(&measured.qd_rad_s, &recording.qd_rad_s, j), 1e-3, white),

@@ -7,7 +7,7 @@
 //! estimates, compared to 1e-9, must not change with it).
 
 use armid::identify::Options;
-use armid::montecarlo::calibration::Calibration;
+use armid::montecarlo::calibration::{Calibration, claims};
 use armid::montecarlo::shard::Shard;
 use armid::montecarlo::{Experiment, Scenario};
 use sha2::{Digest, Sha256};
@@ -97,5 +97,5 @@ fn threads_and_shards_give_the_same_bits_and_few_trials_no_verdict() {
     parts.merge(&run(0..5, 1));
     parts.merge(&run(5..16, 2));
     assert_eq!(whole, parts);
-    assert_eq!(Calibration::of(&whole).verdict.to_string(), VERDICT);
+    assert_eq!(Calibration::of(&whole, claims::MEAN_COVERAGE).verdict.to_string(), VERDICT);
 }

@@ -25,11 +25,12 @@ use armid::plant::{Measured, PerJoint, PlantConfig, Recording, SensorConfig, Sen
 use armid::random::TrialStreams;
 use armid::robot::JointSignals;
 
+use crate::simulated::SIGMA_NM;
+
 const RATE_HZ: f64 = 125.0;
 const PERIOD: usize = 1250;
 const LEAD: usize = 125;
 const PERIODS: usize = 6;
-const SIGMA_NM: [f64; 6] = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15];
 const MOTION_NOISE: f64 = 0.0025;
 
 /// A log of the UR5 with hidden effects, and what its torque is without noise.

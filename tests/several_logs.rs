@@ -6,11 +6,11 @@ use armid::identify::{Identification, Identifier, Regression, Several, each_alon
 use armid::montecarlo::Simulation;
 use armid::plant::Measured;
 
-use crate::simulated::scenario;
+use crate::simulated::{SIGMA_NM, scenario};
 
 /// Four periods of `trajectory`, with noise that remembers and that joints share, `times` as loud as on the UR5.
 fn simulation(trajectory: &str, times: f64, effects: &str) -> Simulation {
-    let sd_nm = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15].map(|sd| times * sd);
+    let sd_nm = SIGMA_NM.map(|sd| times * sd);
     let sensors = format!("torque_sd_nm = {sd_nm:?}\nq_sd_rad = 2e-5\nqd_sd_rad_s = 1e-3");
     let rest = format!(
         "[sensors.torque_noise]\ncomponents = [{{ share = 0.5, colour = \"white\" }}, \

@@ -14,6 +14,8 @@ use armid::identify::{Measurement, Options};
 use armid::log::{Layout, Log, read_log, read_log_from};
 use armid::robot::{Arm, JointSignals};
 
+use crate::damage::{Sound, few_families};
+
 fn data_folder() -> Option<PathBuf> {
     let folder = std::env::var_os("ARMID_DATA").map(PathBuf::from);
     match folder {
@@ -173,7 +175,8 @@ fn the_hits_are_found_and_the_free_run_has_none() {
     assert!(contacts("collision_free.csv").is_empty());
 }
 
-/// Every file of the folder, and damaged pieces of them, end in a result or in a message.
+/// Every file of the folder, and damaged pieces of one, end in a result or in a message (what becomes of a simulated log is told
+/// damage by damage in `damaged_logs.rs`).
 #[test]
 fn no_file_and_no_damage_panics() {
     let Some(folder) = data_folder() else { return };
@@ -189,12 +192,6 @@ fn no_file_and_no_damage_panics() {
     let bench = Bench::new();
     let small = Arm::built_in("ur5").unwrap();
     let layouts = ["ur10e_innopolis", "armid"].map(|name| Layout::load(name).unwrap());
-    // Damage goes through the log and the processing; four families are enough behind them.
-    let few = || -> Families {
-        let wanted = ["presliding", "load_friction", "ripple", "time_skew"];
-        let all = candidates::all().into_iter();
-        all.filter(|family| wanted.contains(&family.kind().name())).collect()
-    };
     let run = |bytes: &[u8], name: &str, layout: &Layout, arm: &Arm, families: Families| {
         let outcome = catch_unwind(AssertUnwindSafe(|| -> Result<(), String> {
             let log = read_log_from(bytes, name, layout, 6).map_err(|e| e.to_string())?;
@@ -231,41 +228,11 @@ fn no_file_and_no_damage_panics() {
     let text =
         std::fs::read_to_string(files.iter().find(|f| f.ends_with(TRAINING)).unwrap()).unwrap();
     let rows: Vec<&str> = text.lines().skip(1000).take(700).collect();
-    let with_field = |row: usize, field: usize, value: &str| {
-        let mut lines: Vec<String> = rows.iter().map(|r| (*r).to_owned()).collect();
-        let mut fields: Vec<&str> = rows[row].split(',').collect();
-        fields[field] = value;
-        lines[row] = fields.join(",");
-        lines.join("\n") + "\n"
-    };
-    let swapped = |a: usize, b: usize| {
-        let swap = |row: &&str| {
-            let mut fields: Vec<&str> = row.split(',').collect();
-            fields.swap(a, b);
-            fields.join(",")
-        };
-        rows.iter().map(swap).collect::<Vec<_>>().join("\n") + "\n"
-    };
-    let plain = rows.join("\n") + "\n";
-    let mut damaged = vec![
-        swapped(1, 7),
-        swapped(2, 14),
-        swapped(0, 3),
-        rows.iter().flat_map(|r| [*r, *r]).collect::<Vec<_>>().join("\n") + "\n",
-        rows.iter().rev().copied().collect::<Vec<_>>().join("\n") + "\n",
-        plain.replace(',', ";"),
-    ];
-    for (row, field, value) in
-        [(0, 0, "NaN"), (10, 1, "1e293"), (699, 20, "-1e293"), (350, 14, "inf"), (350, 8, "")]
-    {
-        damaged.push(with_field(row, field, value));
+    let sound = Sound { header: "", rows, joints: 6 };
+    for (name, text) in sound.damaged() {
+        run(text.as_bytes(), name, &layouts[0], &bench.arm, few_families());
     }
-    for cut in [0, 1, 97, 5000, plain.len() / 2 + 3, plain.len() - 1] {
-        damaged.push(plain[..cut].to_owned());
-    }
-    for (k, text) in damaged.iter().enumerate() {
-        run(text.as_bytes(), &format!("damaged {k}"), &layouts[0], &bench.arm, few());
-    }
-    run(plain.as_bytes(), "wrong layout", &layouts[1], &bench.arm, few());
-    run(plain.as_bytes(), "wrong robot", &layouts[0], &small, few());
+    let plain = sound.text();
+    run(plain.as_bytes(), "wrong layout", &layouts[1], &bench.arm, few_families());
+    run(plain.as_bytes(), "wrong robot", &layouts[0], &small, few_families());
 }

@@ -8,6 +8,8 @@
 //! friction reverses between samples), which is unlike d: what it adds to c is its size over that of d, divided by
 //! the root of the 20 or so independent stretches of a motion of ±5 reversals, 2 % where it is as large as d.
 
+use std::sync::OnceLock;
+
 use armid::base::{BaseSet, Parameterisation};
 use armid::diagnose::candidates::{self, Shape};
 use armid::diagnose::replay::{Counterpart, Found};
@@ -68,10 +70,14 @@ struct Bench {
 }
 
 impl Bench {
-    fn new() -> Self {
-        let arm = Arm::built_in("ur5").unwrap();
-        let set = BaseSet::find(&arm, Parameterisation::full(arm.dof(), false)).unwrap();
-        Self { model: Model::new(&arm), clean: log(&arm, &[]), set, arm }
+    /// The one of all tests here.
+    fn get() -> &'static Self {
+        static BENCH: OnceLock<Bench> = OnceLock::new();
+        BENCH.get_or_init(|| {
+            let arm = Arm::built_in("ur5").unwrap();
+            let set = BaseSet::find(&arm, Parameterisation::full(arm.dof(), false)).unwrap();
+            Self { model: Model::new(&arm), clean: log(&arm, &[]), set, arm }
+        })
     }
 
     /// What every family sees of `run`, for the true parameters.
@@ -219,42 +225,50 @@ fn gears() -> Vec<Case> {
 
 #[test]
 fn friction_means_the_same() {
-    let bench = Bench::new();
+    let bench = Bench::get();
     bench.check(&friction(&bench.arm));
 }
 
 #[test]
 fn drives_mean_the_same() {
-    Bench::new().check(&drives());
+    Bench::get().check(&drives());
 }
 
 #[test]
 fn arm_and_surroundings_mean_the_same() {
-    Bench::new().check(&arm_and_surroundings());
+    Bench::get().check(&arm_and_surroundings());
 }
 
 #[test]
 fn gears_mean_the_same() {
-    Bench::new().check(&gears());
+    Bench::get().check(&gears());
 }
 
-fn play() -> Vec<Case> {
-    // The plant's flanks are stiffer than the softest of the family's.
-    vec![case(Kind::Backlash, 2, (1, 0.004), &[0.004], 0.3)]
-}
-
+/// Over the whole band the ring of the plant's flanks hides the flight across the gap (c = 0.01, with other flanks up to 0.46), so that
+/// of play the number alone is compared: from flank to flank in both. `val_faults` has half of it to either side in the plant,
+/// `blind_benchmark` the interval of what is found.
 #[test]
-#[ignore = "over the whole band the ring of the plant's flanks hides the flight across the gap: c = 0.01, with other flanks up to 0.46"]
 fn play_means_the_same() {
-    Bench::new().check(&play());
+    let gap_rad = 0.004;
+    let family = candidates::all().into_iter().find(|f| f.kind() == Kind::Backlash).unwrap();
+    let bench = Bench::get();
+    let (scene, _) = bench.scene(&bench.clean);
+    let shape = Shape { variant: 1, value: gap_rad };
+    let quantities = family.quantities(&scene, Some(1), shape, &[gap_rad]);
+    let quantities: Vec<_> = quantities.iter().map(|q| (q.name, q.value)).collect();
+    let found = Found { kind: Kind::Backlash, joint: Some(2), variant: 1, quantities: &quantities };
+    let hidden = faults::Effect::Backlash(faults::Backlash::new(2, gap_rad));
+    assert_eq!(found.counterpart(), Counterpart::InTheModel(hidden));
 }
 
 #[test]
 fn no_family_is_left_out() {
     let arm = Arm::built_in("ur5").unwrap();
-    let cases = [friction(&arm), drives(), arm_and_surroundings(), gears(), play()];
+    let cases = [friction(&arm), drives(), arm_and_surroundings(), gears()];
     for family in candidates::all() {
         let kind = family.kind();
-        assert!(cases.iter().flatten().any(|case| case.kind == kind), "{kind} has no case");
+        // Of play only the number is compared, see above.
+        let is_compared = cases.iter().flatten().any(|case| case.kind == kind);
+        assert!(is_compared || kind == Kind::Backlash, "{kind} has no case");
     }
 }

@@ -17,8 +17,12 @@ def main():
     different = [key for key in first.keys() | second.keys() if first.get(key) != second.get(key)]
     if different:
         sys.exit(f"{sys.argv[1]} and {sys.argv[2]} differ in: {', '.join(sorted(different))}")
-    count = sum(len(p) for p in first["parameters"])
-    print(f"same bits: {first['trials']} trials, {len(first['parameters'])} parameters, {count} values")
+    if "parameters" in first:
+        count = sum(len(p) for p in first["parameters"])
+        what = f"{len(first['parameters'])} parameters, {count} values"
+    else:
+        what = f"{len(first['targets'])} targets of a blind benchmark"
+    print(f"same bits: {first['trials']} trials, {what}")
 
 
 if __name__ == "__main__":

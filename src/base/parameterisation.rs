@@ -46,6 +46,29 @@ pub enum ParameterisationError {
         /// Distance from the joint axis, m.
         distance_m: f64,
     },
+    /// The same, of its number of joints.
+    #[error(
+        "the paper's reduced set is stated for the UR5 with its {PAPER_DOF} joints: \"{robot}\" has {joints}"
+    )]
+    Joints {
+        /// The arm.
+        robot: String,
+        /// Its joints.
+        joints: usize,
+    },
+    /// The same, of the directions of its axes.
+    #[error(
+        "the paper's reduced set is stated for the UR5: frame {body} of \"{robot}\" should be turned by right angles \
+         against the paper's, and an entry of its rotation is {difference:.1e} off"
+    )]
+    Turned {
+        /// The arm.
+        robot: String,
+        /// Body whose frame is turned otherwise (1-based).
+        body: usize,
+        /// Largest distance of an entry of the rotation from a whole number.
+        difference: f64,
+    },
 }
 
 impl Parameterisation {
@@ -174,14 +197,14 @@ const PAPER_ZERO_RAD: [f64; PAPER_DOF] = {
     [0.0, -quarter, 0.0, -quarter, 0.0, 0.0]
 };
 
+/// Frames of the UR5 are the paper's up to this, m and entries of rotations.
+const ROUND_OFF: f64 = 1e-9;
+
 /// Pose of each joint frame in the paper's frame of the same body.
 fn paper_frames(arm: &Arm) -> Result<Vec<Placement>, ParameterisationError> {
     if arm.dof() != PAPER_DOF {
-        return Err(ParameterisationError::NotAUr5 {
-            robot: arm.name.clone(),
-            body: arm.dof().min(PAPER_DOF),
-            distance_m: f64::INFINITY,
-        });
+        let (robot, joints) = (arm.name.clone(), arm.dof());
+        return Err(ParameterisationError::Joints { robot, joints });
     }
     let joint_frames = arm.frames(&PAPER_ZERO_RAD);
     let rotation = Matrix3::from_diagonal(&Vector3::new(-1.0, -1.0, 1.0));
@@ -194,13 +217,44 @@ fn paper_frames(arm: &Arm) -> Result<Vec<Placement>, ParameterisationError> {
         // The frame's origin must lie on the joint axis, or its parameters would be other ones.
         let axis = joint.rotation.column(2).into_owned();
         let distance_m = (origin - joint.translation_m).cross(&axis).norm();
-        if distance_m > 1e-9 {
+        if distance_m > ROUND_OFF {
             let robot = arm.name.clone();
             return Err(ParameterisationError::NotAUr5 { robot, body: body + 1, distance_m });
         }
         // All rotations are quarter turns here; cos(π/2) = 6e-17 must not smear the coefficients.
-        relative.rotation.apply(|x| *x = x.round());
+        let whole = relative.rotation.map(f64::round);
+        let difference = (relative.rotation - whole).amax();
+        if difference > ROUND_OFF {
+            let robot = arm.name.clone();
+            return Err(ParameterisationError::Turned { robot, body: body + 1, difference });
+        }
+        relative.rotation = whole;
         out.push(relative);
     }
     Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_papers_set_is_of_the_ur5_alone() {
+        let refused = |change: fn(&mut Arm)| {
+            let mut arm = Arm::built_in("ur5").unwrap();
+            change(&mut arm);
+            Parameterisation::paper(&arm).unwrap_err()
+        };
+        let seven = refused(|arm| arm.joints.push(arm.joints[5].clone()));
+        assert!(matches!(seven, ParameterisationError::Joints { joints: 7, .. }), "{seven}");
+        assert!(seven.to_string().contains("6 joints: \"ur5\" has 7"), "{seven}");
+        let longer = refused(|arm| arm.joints[2].placement.translation_m.x -= 0.1);
+        assert!(matches!(longer, ParameterisationError::NotAUr5 { body: 3, .. }), "{longer}");
+        // A zero of joint 6 elsewhere: its frame stays on its axis.
+        let turned = refused(|arm| {
+            let turn = Placement::from_xyz_rpy([0.0; 3], [0.0, 0.0, 0.3]);
+            arm.joints[5].placement = arm.joints[5].placement.compose(&turn);
+        });
+        assert!(matches!(turned, ParameterisationError::Turned { body: 6, .. }), "{turned}");
+    }
 }

@@ -7,6 +7,7 @@ use thiserror::Error;
 
 use super::parameterisation::{Parameterisation, Terms, evaluate};
 use crate::dynamics::{Model, Workspace, regressor};
+use crate::number::significant;
 use crate::robot::Arm;
 
 /// Columns of a parameterisation that are independent for almost every motion, and the
@@ -138,7 +139,8 @@ impl BaseSet {
             };
             text.push_str(sign);
             if (coefficient.abs() - 1.0).abs() > NEGLIGIBLE {
-                text.push_str(&format!("{} ", significant(coefficient.abs(), 4)));
+                text.push_str(&in_words(coefficient.abs()));
+                text.push(' ');
             }
             text.push_str(&self.parameterisation.names[index]);
         }
@@ -157,14 +159,12 @@ impl BaseSet {
     }
 }
 
-/// `value` with `digits` significant digits, without exponent or trailing zeros.
-fn significant(value: f64, digits: i32) -> String {
-    let decimals = (digits - 1 - value.abs().log10().floor() as i32).max(0) as usize;
-    let text = format!("{value:.decimals$}");
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        text
+/// A coefficient with four significant digits, without the zeros at its end.
+fn in_words(coefficient: f64) -> String {
+    let text = significant(coefficient, 4);
+    match text.contains('.') && !text.contains('e') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
     }
 }
 
@@ -203,4 +203,15 @@ fn back_substitute(columns: &[Vec<f64>], mut c: Vec<f64>) -> Vec<f64> {
         }
     }
     c
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn coefficients_have_no_zeros_at_their_end() {
+        let words = [0.425, 2.0, 0.999_96, 1234.56, 150.0, 0.000_012_345_6].map(in_words);
+        assert_eq!(words, ["0.425", "2", "1", "1235", "150", "1.235e-5"]);
+    }
 }

@@ -203,6 +203,10 @@ fn decline(
 ) -> CommandResult {
     let sentence = error.declined(&log.source);
     say!("{sentence}");
+    let warnings: Vec<String> = log_warnings(log).collect();
+    for warning in &warnings {
+        say!("note: {warning}");
+    }
     let rows = Rows::of(&[log]);
     if let Some(path) = &args.json {
         let body = Declined {
@@ -210,7 +214,7 @@ fn decline(
             verdict: "declined",
             causes: [],
             sentences: [&sentence],
-            warnings: log_warnings(log).collect(),
+            warnings: &warnings,
             rows: &rows,
         };
         Document { schema: DIAGNOSE_SCHEMA, program: &program, body: &body }.write(path)?;
@@ -218,7 +222,8 @@ fn decline(
     if let Some(path) = &args.report {
         let facts = vec![rows.in_words()];
         let verdict = Verdict { status: Status::Bad, sentence, facts };
-        Page::new("Diagnosis", log.source.clone(), verdict, program).write(path)?;
+        let page = Page::new("Diagnosis", log.source.clone(), verdict, program);
+        page.with_warnings(&warnings).write(path)?;
         say!("report: {}", path.display());
     }
     Ok(Outcome::Negative)
@@ -231,7 +236,7 @@ struct Declined<'a> {
     verdict: &'static str,
     causes: [(); 0],
     sentences: [&'a str; 1],
-    warnings: Vec<String>,
+    warnings: &'a [String],
     rows: &'a Rows,
 }
 
@@ -241,4 +246,30 @@ struct WithRows<'a> {
     #[serde(flatten)]
     diagnosis: &'a Diagnosis,
     rows: Rows,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+    use clap::error::ErrorKind;
+
+    #[derive(Debug, Parser)]
+    struct Command {
+        #[command(flatten)]
+        args: DiagnoseArgs,
+    }
+
+    /// A diagnosis weighs by the noise that the log shows: there is nothing to choose.
+    #[test]
+    fn no_covariance_can_be_chosen() {
+        let of = |more: &[&str]| {
+            let mut words = vec!["armid", "log.csv", "--robot", "ur5"];
+            words.extend(more);
+            Command::try_parse_from(words)
+        };
+        let error = of(&["--covariance", "ols"]).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::UnknownArgument);
+        assert!(of(&["--estimator", "ols"]).unwrap().args.sim.is_none());
+    }
 }

@@ -16,6 +16,7 @@ use crate::robot::Arm;
 pub(super) struct EarlierResult {
     #[serde(flatten)]
     about: SavedRobot,
+    /// Of several logs all paths, as `identify` joins them with commas.
     #[serde(default)]
     log: String,
     #[serde(default)]
@@ -81,9 +82,13 @@ impl EarlierResult {
         self.about.check(arm)
     }
 
-    /// Whether it was identified from the log whose file has the hash `sha256`.
+    /// Whether it was identified from the log whose file has the hash `sha256`, alone or with others. Logs that it was only
+    /// validated on are inputs as well.
     pub(super) fn is_of(&self, sha256: &str) -> bool {
-        let is_its_log = |input: &SavedInput| input.sha256 == sha256 && input.path == self.log;
+        let logs = format!(", {}, ", self.log);
+        let is_its_log = |input: &SavedInput| {
+            input.sha256 == sha256 && logs.contains(&format!(", {}, ", input.path))
+        };
         self.program.inputs.iter().any(is_its_log)
     }
 
@@ -186,6 +191,30 @@ mod tests {
             let error = covariance(rows).unwrap_err();
             assert!(error.contains("no covariance of its base parameters (2 × 2"), "{error}");
         }
+    }
+
+    /// The logs of a pooled result are named in one string; what it was validated on is another matter.
+    #[test]
+    fn every_log_of_several_is_its_log() {
+        let input = |path: &str, sha256: &str| serde_json::json!({"path": path, "sha256": sha256});
+        let result = |log: &str| {
+            let inputs = [
+                input("arm.toml", "0"),
+                input("a.csv", "1"),
+                input("b.csv", "2"),
+                input("v.csv", "3"),
+            ];
+            let program = serde_json::json!({"inputs": inputs});
+            let result = serde_json::json!({
+                "robot": "ur5", "log": log, "base_parameters": [], "program": program,
+            });
+            serde_json::from_value::<EarlierResult>(result).unwrap()
+        };
+        let of = |log: &str| ["0", "1", "2", "3"].map(|sha256| result(log).is_of(sha256));
+        assert_eq!(of("a.csv"), [false, true, false, false]);
+        assert_eq!(of("a.csv, b.csv"), [false, true, true, false]);
+        // A part of a name is no name.
+        assert_eq!(of("runs/a.csv, b.csv"), [false, false, true, false]);
     }
 
     /// A parameter is known by its whole combination: the first column alone is in other combinations as well.

@@ -1,18 +1,22 @@
 //! `armid excite`: design an excitation and write it for people, programs and the robot.
 
+mod record;
+
 use std::error::Error;
 use std::path::PathBuf;
 use std::sync::Mutex;
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use clap::Args;
 use nalgebra::Vector3;
-use serde::Serialize;
 use thiserror::Error as ThisError;
+
+use record::Record;
 
 use super::prior::Prior;
 use super::robot::{inputs, load_robot};
-use super::{CommandResult, Outcome, Progress, interrupt_flag};
+use super::{CommandResult, Outcome, Progress, interrupt_flag, threads_or_all};
 use crate::base::{BaseSet, Parameterisation};
 use crate::excitation::design::{
     self, Budget, Criterion, Design, DesignError, Experiment, Specification, Variables,
@@ -61,13 +65,14 @@ pub struct ExciteArgs {
     /// Share of the torque limits the nominal model may need.
     #[arg(long, value_name = "0…1", default_value_t = 0.9)]
     torque_share: f64,
-    /// Torque noise per joint, Nm; without it 0.6 % of the torque limits.
+    /// Torque noise, Nm, of all joints or one number for each; without it 0.6 % of the torque limits.
     #[arg(long, value_name = "LIST", value_delimiter = ',', num_args = 1)]
     noise_nm: Option<Vec<f64>>,
     /// Length of the data that will be recorded, s: the motion is as many whole periods as cover it.
     #[arg(long = "data", value_name = "S", default_value_t = 80.0)]
     data_s: f64,
-    /// Rate of the data, of the CSV and of the set points in the URScript, Hz: a CB-series controller takes 125, an e-Series up to 500.
+    /// Rate of the data, of the CSV and of the set points in the URScript, Hz: a CB-series controller takes 125, an e-Series 500 as well,
+    /// and both of them these over a whole number.
     #[arg(long = "rate", value_name = "HZ", default_value_t = 125.0)]
     rate_hz: f64,
     /// Result of an earlier identification: design for what is still poorly known.
@@ -85,9 +90,9 @@ pub struct ExciteArgs {
     /// Stop after this time and keep the best design so far, s.
     #[arg(long = "seconds", value_name = "S", default_value_t = 120.0)]
     seconds: f64,
-    /// Threads; 0: all cores. The result does not depend on it.
-    #[arg(long, default_value_t = 0)]
-    threads: u16,
+    /// Threads; all cores where left out. The result does not depend on it.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
     /// Trajectory file; a scenario for `simulate` and `montecarlo` names it as `[motion] trajectory`.
     #[arg(long, value_name = "FILE.json")]
     out: PathBuf,
@@ -98,7 +103,7 @@ pub struct ExciteArgs {
     #[arg(long, value_name = "FILE.script")]
     urscript: Option<PathBuf>,
     /// Playback speed of the URScript program as a fraction of the designed one.
-    #[arg(long, value_name = "0…1", default_value_t = 1.0)]
+    #[arg(long, value_name = "0…1", default_value_t = 1.0, requires = "urscript")]
     speed: f64,
     /// Report page.
     #[arg(long, value_name = "FILE.html")]
@@ -142,53 +147,6 @@ impl BadOption {
     }
 }
 
-/// The design block of a trajectory file.
-#[derive(Serialize)]
-struct Record<'a> {
-    period_s: f64,
-    q0_rad: &'a [f64],
-    a_rad_s: &'a [Vec<f64>],
-    b_rad_s: &'a [Vec<f64>],
-    design: DesignRecord,
-}
-
-#[derive(Serialize)]
-struct DesignRecord {
-    robot: String,
-    criterion: Criterion,
-    value: f64,
-    condition: f64,
-    scaled_condition: f64,
-    geometric_mean_sigma: f64,
-    relative_sigma_median: f64,
-    relative_sigma_90: f64,
-    run_in_s: f64,
-    periods: usize,
-    start_rad: Vec<f64>,
-    margins: Vec<MarginRecord>,
-    starts: usize,
-    feasible_starts: usize,
-    finalists: Vec<FinalistRecord>,
-    evaluations: usize,
-    cut_short: bool,
-}
-
-#[derive(Serialize)]
-struct MarginRecord {
-    limit: String,
-    free: f64,
-    unit: &'static str,
-    /// Of half the range of a position, of the largest velocity, acceleration or torque, of 0.1 m for a distance.
-    share: f64,
-    time_s: f64,
-}
-
-#[derive(Serialize)]
-struct FinalistRecord {
-    start: usize,
-    value: f64,
-}
-
 /// Designs, prints what was found, and writes it.
 pub fn run(args: &ExciteArgs) -> CommandResult {
     let LoadedArm { mut arm, files, .. } = load_robot(&args.robot)?;
@@ -210,6 +168,11 @@ pub fn run(args: &ExciteArgs) -> CommandResult {
         }
         eprintln!("note: {}: {NO_CLEARANCE}", args.robot);
     }
+    for name in arm.clearance.unpaired() {
+        let why = "it is in no collision_pairs";
+        eprintln!("note: {}: the arm is not kept clear of capsule \"{name}\": {why}", args.robot);
+    }
+    let playback = playback(args, &arm)?;
     let base = BaseSet::find(&arm, Parameterisation::full(arm.dof(), arm.torque_offsets))?;
     let spec = specification(args, &arm, &base)?;
     let outputs =
@@ -227,9 +190,18 @@ pub fn run(args: &ExciteArgs) -> CommandResult {
         stop: interrupt_flag(),
     };
     let rounds = Rounds { criterion: spec.criterion, current: Mutex::new(None) };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.into()).build()?;
+    let threads = threads_or_all(args.threads);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
     let found = pool.install(|| design::design(&arm, &base, &spec, &budget, &|p| rounds.report(p)));
+    let interrupted = budget.stop.load(Ordering::Relaxed);
     let found = match found {
+        Err(DesignError::OutOfTime { tried, starts }) if interrupted => {
+            eprintln!(
+                "interrupted after {tried} of {starts} starts, none of which is a motion inside the \
+                 limits: nothing was written"
+            );
+            return Ok(Outcome::Interrupted);
+        }
         Err(
             e @ (DesignError::Infeasible { .. }
             | DesignError::NeverClear { .. }
@@ -243,8 +215,28 @@ pub fn run(args: &ExciteArgs) -> CommandResult {
     };
     let seconds = begun.elapsed().as_secs_f64();
     print_summary(&base, &spec, &found, seconds);
-    write_outputs(args, (&arm, &base, &spec), &found, &program)?;
+    write_outputs(args, (&arm, &base, &spec), &found, (&program, playback.as_ref()))?;
+    if interrupted && found.cut_short {
+        eprintln!("interrupted: what was written is the best motion found until then");
+        return Ok(Outcome::Interrupted);
+    }
     Ok(Outcome::Done)
+}
+
+/// How the URScript that is asked for plays the motion.
+fn playback(args: &ExciteArgs, arm: &Arm) -> Result<Option<Playback>, BadOption> {
+    let Some(path) = &args.urscript else { return Ok(None) };
+    if !(args.speed > 0.0 && args.speed <= 1.0) {
+        return Err(BadOption::new("speed", args.speed, "must be in (0, 1]"));
+    }
+    let asked = format!("{} --rate {}", path.display(), args.rate_hz);
+    let playback = Playback::new(arm.dof(), args.rate_hz, args.speed)
+        .map_err(|fault| BadOption::new("urscript", &asked, fault.to_string()))?;
+    if !playback.suits_cb_series() {
+        let why = "set points are no multiple of 8 ms apart";
+        eprintln!("note: --urscript {asked}: plays on the e-Series, not on the CB-Series ({why})");
+    }
+    Ok(Some(playback))
 }
 
 fn specification(
@@ -254,9 +246,6 @@ fn specification(
 ) -> Result<Specification, Box<dyn Error>> {
     if !(args.seconds > 0.0 && args.seconds.is_finite()) {
         return Err(BadOption::new("seconds", args.seconds, "must be positive").into());
-    }
-    if !(args.speed > 0.0 && args.speed <= 1.0) {
-        return Err(BadOption::new("speed", args.speed, "must be in (0, 1]").into());
     }
     let period_range_s = match args.period_range.as_deref() {
         None => None,
@@ -269,8 +258,10 @@ fn specification(
     let noise_of_limit = |j: &Joint| 0.006 * j.limits.torque_nm;
     let unlimited = arm.joints.iter().find(|joint| joint.limits.torque_nm.is_infinite());
     if let (None, Some(joint)) = (&args.noise_nm, unlimited) {
-        let message =
-            format!("joint \"{}\" has no torque limit to guess the noise from", joint.name);
+        let message = format!(
+            "joint \"{}\" has no torque limit to guess the noise from: give it, one number for all joints or one for each",
+            joint.name
+        );
         return Err(BadOption::new("noise-nm", "(not given)", message).into());
     }
     let spec = Specification {
@@ -291,6 +282,7 @@ fn specification(
             data_s: args.data_s,
             rate_hz: args.rate_hz,
             torque_noise_nm: match &args.noise_nm {
+                Some(list) if list.len() == 1 => vec![list[0]; arm.dof()],
                 Some(list) => list.clone(),
                 None => arm.joints.iter().map(noise_of_limit).collect(),
             },
@@ -403,59 +395,16 @@ fn write_outputs(
     args: &ExciteArgs,
     (arm, base, spec): (&Arm, &BaseSet, &Specification),
     found: &Design,
-    program: &Program,
+    (program, playback): (&Program, Option<&Playback>),
 ) -> Result<(), Box<dyn Error>> {
-    let p = &found.prediction;
-    let series = found.excitation.series();
-    let record = Record {
-        period_s: series.period_s,
-        q0_rad: &series.q0_rad,
-        a_rad_s: &series.a_rad_s,
-        b_rad_s: &series.b_rad_s,
-        design: DesignRecord {
-            robot: arm.name.clone(),
-            criterion: spec.criterion,
-            value: found.value,
-            condition: p.condition,
-            scaled_condition: p.scaled_condition,
-            geometric_mean_sigma: p.geometric_mean_sigma(),
-            relative_sigma_median: p.relative_quantile(0.5),
-            relative_sigma_90: p.relative_quantile(0.9),
-            run_in_s: found.excitation.run_in_s(),
-            periods: found.excitation.periods(),
-            start_rad: found.excitation.start_rad(),
-            margins: found
-                .margins
-                .all()
-                .iter()
-                .map(|m| MarginRecord {
-                    limit: m.limit.to_string(),
-                    free: m.free,
-                    unit: m.limit.unit(),
-                    share: m.share,
-                    time_s: m.time_s,
-                })
-                .collect(),
-            starts: found.starts,
-            feasible_starts: found.feasible_starts,
-            finalists: found
-                .finalists
-                .iter()
-                .map(|f| FinalistRecord { start: f.start, value: f.value })
-                .collect(),
-            evaluations: found.evaluations,
-            cut_short: found.cut_short,
-        },
-    };
+    let record = Record::of(arm, spec, found);
     let text = Document { schema: TRAJECTORY_SCHEMA, program, body: &record }.to_json()?;
     write_atomically(&args.out, |out| out.write_all(text.as_bytes()))?;
     if let Some(path) = &args.csv {
         write_atomically(path, |out| write_csv(out, &found.excitation, args.rate_hz))?;
     }
-    if let Some(path) = &args.urscript {
-        let playback =
-            Playback { cycle_s: 1.0 / args.rate_hz, speed: args.speed, approach_rad_s: 0.3 };
-        let script = urscript(&found.excitation, &playback);
+    if let Some((path, playback)) = args.urscript.as_ref().zip(playback) {
+        let script = urscript(&found.excitation, playback);
         write_atomically(path, |out| out.write_all(script.as_bytes()))?;
     }
     if let Some(path) = &args.report {

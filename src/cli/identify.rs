@@ -37,6 +37,9 @@ pub struct IdentifyArgs {
     reduced: Option<String>,
     #[command(flatten)]
     processing: ProcessingArgs,
+    /// Method of the covariance; chosen by what the log offers where left out.
+    #[arg(long, value_enum)]
+    covariance: Option<CovarianceKind>,
     /// Logs to validate on: nothing is fitted to them.
     #[arg(long, num_args = 1..)]
     validate: Vec<PathBuf>,
@@ -84,9 +87,6 @@ pub struct ProcessingArgs {
     /// Estimator; left out: spectral where at least four periods repeat, wls elsewhere.
     #[arg(long, value_enum)]
     estimator: Option<Estimator>,
-    /// Method of the covariance; chosen by what the log offers where left out.
-    #[arg(long, value_enum)]
-    covariance: Option<CovarianceKind>,
 }
 
 impl ProcessingArgs {
@@ -104,7 +104,6 @@ impl ProcessingArgs {
         positive("period", self.period_s, true)?;
         Ok(Options {
             estimator: self.estimator,
-            covariance: self.covariance,
             cutoff_hz: self.cutoff_hz.unwrap_or(default.cutoff_hz),
             rate_hz: self.rate_hz,
             period_s: self.period_s,
@@ -194,7 +193,7 @@ impl SourceArgs {
 
 /// Runs the command.
 pub fn run(args: &IdentifyArgs) -> CommandResult {
-    let options = args.processing.options()?;
+    let options = Options { covariance: args.covariance, ..args.processing.options()? };
     if args.logs.len() > 1 && args.prior_weight == PriorWeight::CrossValidated {
         let message = "the weight is found by leaving out periods of one log in turn; of several logs give it as a number";
         return Err(format!("--prior-weight auto: {message}").into());
@@ -327,6 +326,9 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
 
 /// Writes what can be said of a log whose motion leaves parameters without any trace in the torque.
 fn decline(args: &IdentifyArgs, declined: &Declined, program: Program) -> CommandResult {
+    for warning in &declined.warnings {
+        say!("note: {warning}");
+    }
     say!("\n{}", declined.sentence());
     if let Some(path) = &args.json {
         Document { schema: IDENTIFY_SCHEMA, program: &program, body: declined }.write(path)?;

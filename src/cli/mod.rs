@@ -134,6 +134,7 @@ pub fn interrupt_flag() -> &'static std::sync::atomic::AtomicBool {
             if FLAG.swap(true, std::sync::atomic::Ordering::Relaxed) {
                 std::process::exit(130);
             }
+            eprintln!("ends when what is under way is done; once more ends it at once");
         });
     });
     &FLAG

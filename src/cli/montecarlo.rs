@@ -11,14 +11,13 @@ use super::robot::inputs;
 use super::{CommandResult, Outcome, Progress, interrupt_flag, simulating, threads_or_all};
 use crate::montecarlo::blind::{Benchmark, BlindContent, SCORES_SCHEMA, Scores};
 use crate::montecarlo::calibration::Verdict;
-use crate::montecarlo::shard::{
-    Merged, Shard, load_all, merge, same_run, schema_of, shard_files, shard_path, shard_range,
-};
+use crate::montecarlo::folder::{check_cut, load_all, schema_of, shard_files, shard_path};
+use crate::montecarlo::shard::{Merged, Shard, merge, same_run, shard_range};
 use crate::montecarlo::trials::{Content, Trials};
 use crate::montecarlo::{Estimation, Experiment, Job, SUMMARY_SCHEMA, Summary};
 use crate::output::{check_outputs, check_writable, write_atomically};
 use crate::report::blind;
-use crate::report::json::{Document, Input, Program};
+use crate::report::json::{Document, Input, Program, sha256_of_file};
 use crate::report::montecarlo::{
     check_table, efficiency_sentence, markdown, page, parameter_table,
 };
@@ -55,7 +54,9 @@ struct RunArgs {
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
     trials: Option<u64>,
     /// Run this one trial alone (from 0) and print its estimates.
-    #[arg(long, conflicts_with_all = ["shard", "out", "resume", "json", "report", "markdown"])]
+    #[arg(long, conflicts_with_all = [
+        "trials", "threads", "shard", "out", "resume", "json", "report", "markdown",
+    ])]
     trial: Option<u64>,
     /// Seed instead of the scenario's.
     #[arg(long)]
@@ -69,7 +70,7 @@ struct RunArgs {
     /// Folder for the shard file, written every few seconds.
     #[arg(long)]
     out: Option<PathBuf>,
-    /// Go on with the shard file in --out.
+    /// Go on with the shard file in --out, if this build of the program began it.
     #[arg(long, requires = "out")]
     resume: bool,
     #[command(flatten)]
@@ -127,12 +128,25 @@ fn run_merge(folders: &[PathBuf], output: &OutputArgs) -> CommandResult {
     let schema = files.first().map(|file| schema_of(file)).transpose()?;
     if schema.as_deref() == Some(BlindContent::SCHEMA) {
         let merged = merge(load_all::<BlindContent>(&files)?)?;
+        note_builds(&merged);
         let outcome = conclude_blind(&merged, inputs, output)?;
         return Ok(unless_interrupted(outcome, &merged));
     }
     let merged = merge(load_all::<Estimation>(&files)?)?;
+    note_builds(&merged);
     let outcome = conclude(&merged, merged.seconds, inputs, output)?;
     Ok(unless_interrupted(outcome, &merged))
+}
+
+/// Says so where shards were run by different programs of one version: for other processors, or with another algorithm.
+fn note_builds<C: Content>(merged: &Merged<C>) {
+    if merged.programs.len() > 1 {
+        eprintln!(
+            "note: {} builds of this program ran these shards (header.program in the files): right if they are of one source, for \
+             other processors",
+            merged.programs.len()
+        );
+    }
 }
 
 fn run_trials(args: &RunArgs) -> CommandResult {
@@ -144,6 +158,16 @@ fn run_trials(args: &RunArgs) -> CommandResult {
             format!("{}: this is a file; name a folder for the shard", file.display()).into()
         );
     }
+    let trials = args.trials.unwrap_or(scenario.trials);
+    let ShardOf { index, count } = args.shard.unwrap_or(ShardOf { index: 0, count: 1 });
+    if let Some(folder) = &args.out {
+        check_cut(folder, trials, count)?;
+    }
+    let range = shard_range(trials, index, count);
+    if range.is_empty() {
+        eprintln!("shard {index} of {count} has none of the {trials} trials: nothing is written");
+        return Ok(Outcome::Done);
+    }
     let inputs = inputs(args.scenario.iter().chain(&scenario.files))?;
     scenario.seed = args.seed.unwrap_or(scenario.seed);
     eprintln!("{}: {}", scenario.name, scenario.description);
@@ -154,7 +178,7 @@ fn run_trials(args: &RunArgs) -> CommandResult {
             if let Some(trial) = args.trial {
                 return replay(&experiment, trial);
             }
-            let (merged, wall_s) = run_all(&experiment, args)?;
+            let (merged, wall_s) = run_all(&experiment, args, trials, range)?;
             let outcome = conclude(&merged, wall_s, inputs, &args.output)?;
             Ok(unless_interrupted(outcome, &merged))
         }
@@ -163,7 +187,7 @@ fn run_trials(args: &RunArgs) -> CommandResult {
             if let Some(trial) = args.trial {
                 return replay_blind(&benchmark, trial);
             }
-            let (merged, _) = run_all(&benchmark, args)?;
+            let (merged, _) = run_all(&benchmark, args, trials, range)?;
             let outcome = conclude_blind(&merged, inputs, &args.output)?;
             Ok(unless_interrupted(outcome, &merged))
         }
@@ -178,10 +202,13 @@ fn unless_interrupted<C: Content>(outcome: Outcome, merged: &Merged<C>) -> Outco
 /// Something with the wall time that it took, s.
 type Timed<T> = Result<(T, f64), Box<dyn std::error::Error>>;
 
-/// Runs what the arguments ask for: all trials, or those of one shard.
-fn run_all<T: Trials>(experiment: &T, args: &RunArgs) -> Timed<Merged<T::Content>> {
-    let trials = args.trials.unwrap_or(experiment.scenario().trials);
-    let range = args.shard.map_or(0..trials, |s| shard_range(trials, s.index, s.count));
+/// Runs the trials `range` of `trials` in all.
+fn run_all<T: Trials>(
+    experiment: &T,
+    args: &RunArgs,
+    trials: u64,
+    range: Range<u64>,
+) -> Timed<Merged<T::Content>> {
     if let Some(folder) = &args.out {
         std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
         check_writable(&shard_path(folder, &range))?;
@@ -203,23 +230,34 @@ fn run_shard<T: Trials>(
     trials: u64,
     range: Range<u64>,
 ) -> Timed<Shard<T::Content>> {
-    let threads = threads_or_all(args.threads);
+    let (threads, stop) = (threads_or_all(args.threads), interrupt_flag());
     let file = args.out.as_ref().map(|folder| shard_path(folder, &range));
     let mut shard = Shard::new(experiment, trials, range);
-    if let Some(file) = file.as_deref().filter(|file| file.exists()) {
-        if !args.resume {
-            let file = file.display();
-            return Err(format!("{file} exists: give --resume to go on, or another --out").into());
+    if let Some(file) = &file {
+        shard.header.program = sha256_of_file(&std::env::current_exe()?)?;
+        match (file.exists(), args.resume) {
+            (true, true) => {
+                let saved = Shard::load(file)?;
+                same_run(file, &saved.header, &shard.header)?;
+                saved.check_program(file, &shard.header.program)?;
+                shard = saved;
+                eprintln!("going on after {} trials", shard.next - shard.range[0]);
+            }
+            (true, false) => {
+                let file = file.display();
+                let message = format!("{file} exists: give --resume to go on, or another --out");
+                return Err(message.into());
+            }
+            (false, true) => {
+                eprintln!("{}: nothing to resume, begins with its first trial", file.display());
+            }
+            (false, false) => {}
         }
-        let saved = Shard::load(file)?;
-        same_run(file, &saved.header, &shard.header)?;
-        shard = saved;
-        eprintln!("going on after {} trials", shard.next - shard.range[0]);
     }
     let progress = Progress::new("trials", shard.range[1] - shard.range[0]);
     let begun = Instant::now();
     let before = shard.seconds;
-    shard.run(experiment, threads, file.as_deref(), interrupt_flag(), &|n| progress.reached(n))?;
+    shard.run(experiment, threads, file.as_deref(), stop, &|n| progress.reached(n))?;
     progress.finish();
     Ok((shard, before + begun.elapsed().as_secs_f64()))
 }
@@ -321,5 +359,42 @@ fn write_text(path: &Path, text: &str) -> Result<(), crate::output::OutputError>
 impl OutputArgs {
     fn check(&self, inputs: &[PathBuf]) -> Result<(), crate::output::OutputError> {
         check_outputs([&self.json, &self.report, &self.markdown].into_iter().flatten(), inputs)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::error::ErrorKind;
+
+    #[test]
+    fn one_trial_alone_takes_nothing_that_is_about_many() {
+        for other in ["--trials", "--threads"] {
+            let error =
+                Command::try_parse_from(["montecarlo", "--trial", "9", other, "3"]).unwrap_err();
+            assert_eq!(error.kind(), ErrorKind::ArgumentConflict, "{other}");
+        }
+    }
+
+    /// Of what cannot be a part of the run in a folder nothing is prepared, and nothing written there.
+    #[test]
+    fn a_shard_that_does_not_belong_in_its_folder_is_not_begun() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().to_str().unwrap();
+        let shard = |part: &str, trials: &str| {
+            let words = ["montecarlo", "--shard", part, "--trials", trials, "--out", out];
+            run(Command::try_parse_from(words).unwrap())
+        };
+        let names = || std::fs::read_dir(out).unwrap().count();
+        // Two trials in five parts leave three without any.
+        assert_eq!(shard("0/5", "2").unwrap(), Outcome::Done);
+        assert_eq!(names(), 0);
+        let other = r#"{"header": {"schema": "armid.shard/5", "trials": 1000}}"#;
+        std::fs::write(shard_path(folder.path(), &(0..500)), other).unwrap();
+        let cut = shard("1/4", "1000").unwrap_err().to_string();
+        assert!(cut.contains("none of the 4 shards of 1000 trials"), "{cut}");
+        let length = shard("1/3", "1500").unwrap_err().to_string();
+        assert!(length.contains("a shard of 1000 trials, not of 1500"), "{length}");
+        assert_eq!(names(), 1);
     }
 }

@@ -37,7 +37,7 @@ impl Simulated {
         sha256: &str,
     ) -> Result<Self, Box<dyn std::error::Error>> {
         let name = file.display();
-        if file.extension().is_some_and(|e| e == "toml") {
+        if file.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
             let scenario = Scenario::load(Some(file))?;
             if let Some(difference) = Kinematics::of(&scenario.arm).difference(arm) {
                 let arm = &arm.name;

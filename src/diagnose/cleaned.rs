@@ -29,6 +29,7 @@ impl Cleaned {
     /// # Errors
     /// [`DiagnoseError`] where its signals make no record.
     pub fn of(m: &Measurement, options: &Options) -> Result<Self, DiagnoseError> {
+        m.require_rows()?;
         let Faults { causes: faults, record, warning, unreadable: mut hanging } =
             data_faults::find(m, options.is_single_run())?;
         let mut unreadable = coarse_joints(&faults);

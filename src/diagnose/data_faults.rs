@@ -125,6 +125,7 @@ pub(super) fn cause(
         separating_experiment: None,
         strength,
         in_words: in_words.to_owned(),
+        form: None,
         may_be_none: false,
         rivals: Vec::new(),
     }

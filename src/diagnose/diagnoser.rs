@@ -338,6 +338,7 @@ impl<'a> Diagnoser<'a> {
             class,
             strength: selected.contender.score.lambda.sqrt(),
             in_words: family.in_words().to_owned(),
+            form: family.form(&study.scene, *shape),
             may_be_none,
             rivals: rivals.collect(),
         }

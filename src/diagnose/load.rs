@@ -69,19 +69,32 @@ pub struct Periods<'a> {
 }
 
 impl Loads {
-    /// Of a motion as it was recorded, along which the links take `link_nm`; `mass_kg_m2` as from [`mass_along`],
-    /// `rotor_kg_m2` as from [`rotors_kg_m2`].
+    /// Of a motion as it was recorded at `rate_hz`, along which the links take `link_nm`; `mass_kg_m2` as from [`mass_along`],
+    /// `rotor_kg_m2` as from [`rotors_kg_m2`]. The velocities' noise has a power density of `velocity_noise`, (rad/s)²/Hz.
+    ///
+    /// Nothing repeats by which harmonics could be compared. What bends gears is taken as far as its power is ten times that
+    /// which the velocity's noise, differentiated, has by way of the links' inertia. (A hundred times leaves out what gears of 20 000 Nm/rad
+    /// need, and what was left of them had no name.)
     pub fn as_recorded(
         arm: &Arm,
         motion: &Motion,
-        link_nm: &JointSignals,
-        (mass_kg_m2, rotor_kg_m2): (&[JointSignals], &[f64]),
+        (link_nm, mass_kg_m2, rotor_kg_m2): (&JointSignals, &[JointSignals], &[f64]),
+        (velocity_noise, rate_hz): (&[f64], f64),
     ) -> Self {
         let still = || link_nm.map_joints(|_, y| vec![0.0; y.len()]);
         let ([], mobility_per_kg_m2) = apart(mass_kg_m2, rotor_kg_m2, []);
         let load_nm = sum(link_nm, &rotors_along(arm, motion));
-        let told = || LinkTorque { told_nm: link_nm.clone(), jolt_nm: still() };
-        Self { link: told(), bending: told(), delivered: None, load_nm, mobility_per_kg_m2 }
+        let link = LinkTorque { told_nm: link_nm.clone(), jolt_nm: still() };
+        let known = link_nm.map_joints(|j, y| {
+            let through = |(mass, noise): (&JointSignals, &f64)| {
+                let square: f64 = mass.joint(j).iter().map(|m| m * m).sum();
+                square / y.len() as f64 * noise
+            };
+            let noise = mass_kg_m2.iter().zip(velocity_noise).map(through).sum();
+            beside_differentiated_noise(y, noise, rate_hz)
+        });
+        let bending = LinkTorque { told_nm: known, jolt_nm: still() };
+        Self { link, bending, delivered: None, load_nm, mobility_per_kg_m2 }
     }
 
     /// Of the mean of `periods`, as far as they agree. `link` is along the motion of the regressor, whose accelerations end
@@ -202,6 +215,33 @@ const WELL_KNOWN: f64 = 100.0;
 const KNOWN: f64 = 10.0;
 /// Harmonics that are judged together.
 const BAND: usize = 8;
+
+/// What of `y` is known ten times better than white noise of the power density `noise` (per Hz) that was differentiated, band by
+/// band.
+///
+/// `y` is gone through there and back again, which leaves no jump between its ends.
+fn beside_differentiated_noise(y: &[f64], noise: f64, rate_hz: f64) -> Vec<f64> {
+    let there_and_back: Vec<f64> = y.iter().chain(y.iter().rev()).copied().collect();
+    let n = there_and_back.len();
+    let clock = FineClock::new(n, 1);
+    let spectrum = clock.spectrum(&there_and_back);
+    let omega = std::f64::consts::TAU * rate_hz / n as f64;
+    // Of noise that goes there and back as well, mean squares of the coefficients are σ²/n each, σ² = density · f_s/2.
+    let of_noise = |h: usize| (h as f64 * omega).powi(2) * noise * 0.5 * rate_hz / n as f64;
+    let holds: Vec<bool> = spectrum
+        .chunks(BAND)
+        .zip((0..).step_by(BAND))
+        .map(|(band, first)| {
+            let power: f64 = band.iter().map(Complex64::norm_sqr).sum();
+            let noise: f64 = (first..first + band.len()).map(of_noise).sum();
+            power > (1.0 + KNOWN) * noise
+        })
+        .collect();
+    let gain = |h: usize| if holds[h / BAND] { Complex64::ONE } else { Complex64::ZERO };
+    let mut known = clock.filtered(&there_and_back, gain);
+    known.truncate(y.len());
+    known
+}
 
 /// How well the harmonics of a torque are known.
 struct Harmonics {
@@ -362,6 +402,8 @@ fn sum(a: &JointSignals, b: &JointSignals) -> JointSignals {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::{SeedableRng, rngs::ChaCha8Rng};
+    use rand_distr::{Distribution, StandardNormal};
 
     const N: usize = 500;
     const TICKS: usize = 16;
@@ -408,6 +450,32 @@ mod tests {
             // Light links: the last joint's share beside its own rotor is 5e-4, which costs as many digits.
             assert!((mobility.joint(j)[0] / apart - 1.0).abs() < 1e-9, "{j}");
         }
+    }
+
+    /// A slow swing beside differentiated white noise: what is left is the swing. The noise in its band, 0.1 Hz wide and a little
+    /// more by the jump of its slope at the ends, is a ten thousandth of it.
+    #[test]
+    fn what_is_known_beside_differentiated_noise() {
+        const NOISE: f64 = 1e-3;
+        let swing = |k: usize| 20.0 * (0.8 * std::f64::consts::TAU * k as f64 / RATE_HZ).cos();
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let velocity: Vec<f64> = (0..4000).map(|_| StandardNormal.sample(&mut rng)).collect();
+        let noise = |k: usize| NOISE * 0.5 * RATE_HZ * (velocity[k + 1] - velocity[k - 1]);
+        let y: Vec<f64> = (1..3999).map(|k| swing(k) + noise(k)).collect();
+        let density = 2.0 * NOISE.powi(2) / RATE_HZ;
+        let known = beside_differentiated_noise(&y, density, RATE_HZ);
+        let rms =
+            |y: &mut dyn Iterator<Item = f64>| (y.map(|y| y * y).sum::<f64>() / 3998.0).sqrt();
+        let before = rms(&mut y.iter().zip(1..).map(|(y, k)| y - swing(k)));
+        let after = rms(&mut known.iter().zip(1..).map(|(y, k)| y - swing(k)));
+        assert!(after < 0.01 * 20.0 && after < 0.5 * before, "{before} {after}");
+        // Of noise alone next to nothing: the slowest harmonics, of which differentiating leaves less than the jump at the ends makes. And
+        // all where there is none.
+        let alone: Vec<f64> = (1..3999).map(noise).collect();
+        let left = beside_differentiated_noise(&alone, density, RATE_HZ);
+        assert!(rms(&mut left.into_iter()) < 0.01 * rms(&mut alone.into_iter()));
+        let all = beside_differentiated_noise(&y, 0.0, RATE_HZ);
+        assert!(rms(&mut all.iter().zip(&y).map(|(a, b)| a - b)) < 1e-12);
     }
 
     /// A drive that feeds 90 % of the friction forward, 3 ms late, jolts its joint as it should be known to within the

@@ -188,6 +188,7 @@ impl PayloadFinding {
             separating_experiment: None,
             strength: self.mass_kg.value / sigma,
             in_words: "a body on the flange".to_owned(),
+            form: None,
             may_be_none: false,
             rivals: Vec::new(),
         })

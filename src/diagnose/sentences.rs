@@ -197,7 +197,7 @@ impl Cause {
         }
     }
 
-    /// The parameters in brackets, with a blank before; nothing where none is told.
+    /// The parameters in brackets, with a blank before, and which form of the law fits best; nothing where none is told.
     fn numbers(&self) -> String {
         let number = |(name, e): (&&str, &Estimate)| {
             let name = name.trim_end_matches(&unit_suffix(e.unit)).replace('_', " ");
@@ -205,7 +205,10 @@ impl Cause {
         };
         match self.parameters.iter().map(number).collect::<Vec<_>>().join(", ") {
             numbers if numbers.is_empty() => numbers,
-            numbers => format!(" ({numbers})"),
+            numbers => match self.form {
+                None => format!(" ({numbers})"),
+                Some(form) => format!(" ({numbers}; {form})"),
+            },
         }
     }
 
@@ -271,9 +274,14 @@ mod tests {
             ..known.clone()
         };
         let unsure = Cause { confidence: 0.4, ..open.clone() };
+        let of_the_motor = Cause { form: Some("load of the motor"), ..known.clone() };
         assert_eq!(
             known.sentence(true),
             "Joint 2's model misses friction by load (mu 0.020 ± 0.010)."
+        );
+        assert_eq!(
+            of_the_motor.sentence(true),
+            "Joint 2's model misses friction by load (mu 0.020 ± 0.010; load of the motor)."
         );
         let said = "Joint 2's model may miss friction by load (mu 0.020 ± 0.030); as far as its size is known, there may be none.";
         assert_eq!(open.sentence(true), said);

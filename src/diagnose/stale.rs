@@ -9,7 +9,7 @@ use super::record::Record;
 use super::verdict::Cause;
 use crate::median::median;
 use crate::robot::JointSignals;
-use crate::signal::quantum;
+use crate::signal::resolution;
 
 /// So many times as often as chance repeats a reading, and at least this share of all: a few missed samples are no cause of anything.
 const BEYOND_CHANCE: f64 = 3.0;
@@ -155,7 +155,7 @@ fn of_joint(record: &Record, joint: usize) -> OfJoint {
 /// Readings of `y` that repeat the one before where, by the steps that `y` has, they should not: those that stand alone or nearly
 /// so, and those of a noisy sensor that hangs.
 fn stale(y: &[f64], should_change: impl Fn(usize, f64) -> bool) -> (Vec<usize>, Vec<usize>) {
-    let step = quantum(y);
+    let step = resolution(y);
     let ends =
         y.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(*v), b.max(*v)]);
     let changing: Vec<usize> = (1..y.len()).filter(|k| should_change(*k, step)).collect();

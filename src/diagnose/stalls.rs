@@ -67,7 +67,7 @@ fn passed_s(m: &Measurement, k: usize) -> Option<f64> {
     });
     let joints: Vec<(f64, f64, f64)> = joints.collect();
     let square: f64 = joints.iter().map(|(mean, ..)| mean * mean).sum();
-    // Slower than this, the quantum of the angle is all that is seen.
+    // Slower than this, the resolution of the angle is all that is seen.
     if square <= 1e-2 {
         return None;
     }

@@ -68,6 +68,8 @@ pub struct Cause {
     pub strength: f64,
     /// The effect in words.
     pub in_words: String,
+    /// Which form of the family's law fits best; null for the usual one, and where parameters say it.
+    pub form: Option<&'static str>,
     /// Whether it is a law of one coefficient whose size may be none by its interval: said with a "may".
     pub may_be_none: bool,
     /// The families that came next, and by how much evidence (2 ln) they lost.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Matrix3, Rotation3, Vector3};
+use nalgebra::Vector3;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use rapier3d::math::{Pose, Vector as ParryVector};
@@ -11,7 +11,7 @@ use rapier3d::parry::query::details::closest_points_segment_segment;
 use rapier3d::parry::shape::Segment;
 
 use super::limits::LimitKind;
-use crate::robot::{Arm, CellBox};
+use crate::robot::{Arm, CellBox, Placement};
 
 /// Signed distances between the capsules of an arm, and of its moving capsules from the floor.
 ///
@@ -24,7 +24,7 @@ use crate::robot::{Arm, CellBox};
 /// Immutable; what changes is in [`ClearanceWorkspace`].
 #[derive(Debug, Clone)]
 pub struct ClearanceModel {
-    placements: Vec<(Matrix3<f64>, Vector3<f64>)>,
+    placements: Vec<Placement>,
     capsules: Vec<Shape>,
     pairs: Vec<[usize; 2]>,
     floor: Vec<usize>,
@@ -76,8 +76,8 @@ enum Between {
 /// Scratch of one evaluation: frames and capsule ends in the base frame.
 #[derive(Debug, Clone)]
 pub struct ClearanceWorkspace {
-    rotations: Vec<Matrix3<f64>>,
-    origins_m: Vec<Vector3<f64>>,
+    /// Of the base, then of the joints.
+    frames: Vec<Placement>,
     ends_m: Vec<[Vector3<f64>; 2]>,
 }
 
@@ -114,11 +114,7 @@ impl ClearanceModel {
             None => Vec::new(),
         };
         Self {
-            placements: arm
-                .joints
-                .iter()
-                .map(|j| (j.placement.rotation, j.placement.translation_m))
-                .collect(),
+            placements: arm.joints.iter().map(|j| j.placement).collect(),
             capsules,
             pairs: arm.clearance.pairs.clone(),
             floor,
@@ -131,8 +127,7 @@ impl ClearanceModel {
     /// Scratch for this model.
     pub fn workspace(&self) -> ClearanceWorkspace {
         ClearanceWorkspace {
-            rotations: vec![Matrix3::identity(); self.placements.len() + 1],
-            origins_m: vec![Vector3::zeros(); self.placements.len() + 1],
+            frames: vec![Placement::identity(); self.placements.len() + 1],
             ends_m: vec![[Vector3::zeros(); 2]; self.capsules.len()],
         }
     }
@@ -184,7 +179,6 @@ impl ClearanceModel {
         for _ in 0..POSES_TRIED {
             for (q, joint) in q_rad.iter_mut().zip(&arm.joints) {
                 let [low, high] = joint.limits.position_rad;
-                let low = if low.is_finite() { low } else { 0.0 };
                 *q = low + rng.random::<f64>() * (high - low).min(TAU);
             }
             self.distances(&mut ws, &q_rad, &mut distances_m);
@@ -237,7 +231,8 @@ impl ClearanceModel {
                 Between::Box { capsule, .. } => (away(), body(capsule), 0),
             };
             for j in 0..dof {
-                let (axis, origin) = (ws.rotations[j + 1].column(2), ws.origins_m[j + 1]);
+                let (axis, origin) =
+                    (ws.frames[j + 1].rotation.column(2), ws.frames[j + 1].translation_m);
                 let mut slope = 0.0;
                 if j < body1 {
                     slope += n.dot(&axis.cross(&(p1 - origin)));
@@ -252,14 +247,12 @@ impl ClearanceModel {
 
     /// Forward kinematics of the frames and capsule ends. Index 0 is the base.
     fn place(&self, ws: &mut ClearanceWorkspace, q_rad: &[f64]) {
-        for (i, ((rotation, translation_m), &q)) in self.placements.iter().zip(q_rad).enumerate() {
-            let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), q).into_inner();
-            ws.origins_m[i + 1] = ws.origins_m[i] + ws.rotations[i] * translation_m;
-            ws.rotations[i + 1] = ws.rotations[i] * rotation * turn;
+        for (i, (placement, &q)) in self.placements.iter().zip(q_rad).enumerate() {
+            ws.frames[i + 1] = ws.frames[i].compose(placement).turned(q);
         }
         for (ends, capsule) in ws.ends_m.iter_mut().zip(&self.capsules) {
-            let (r, o) = (&ws.rotations[capsule.body], &ws.origins_m[capsule.body]);
-            *ends = [o + r * capsule.ends_m[0], o + r * capsule.ends_m[1]];
+            let Placement { rotation, translation_m } = &ws.frames[capsule.body];
+            *ends = capsule.ends_m.map(|end| translation_m + rotation * end);
         }
     }
 
@@ -341,6 +334,8 @@ fn nearest_points(
 #[cfg(test)]
 mod tests {
     use std::f64::consts::PI;
+
+    use nalgebra::Rotation3;
 
     use super::*;
 

@@ -68,6 +68,23 @@ pub enum ExcitationError {
         /// Joints of the arm.
         dof: usize,
     },
+    /// The periodic motion itself asks for more than is allowed.
+    #[error(
+        "the motion itself passes a limit: {limit} by {short} at t = {time_s:.3} s of its period (allowed are \
+         {torque_percent:.0} % of the torque limits and a clearance of at least {clearance_m} m)"
+    )]
+    PeriodPasses {
+        /// The limit that is passed, in words.
+        limit: String,
+        /// By how much, in words.
+        short: String,
+        /// Where.
+        time_s: f64,
+        /// Clearance asked for, m.
+        clearance_m: f64,
+        /// Share of the torque limits that was allowed, %.
+        torque_percent: f64,
+    },
     /// No run-in among those tried stays inside the limits.
     #[error(
         "no run-in of {shortest_s} … {longest_s} s joins this motion inside the limits: the best keeps \

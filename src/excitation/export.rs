@@ -3,6 +3,8 @@
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
+use thiserror::Error;
+
 use super::reference::Reference;
 use super::run_in::Excitation;
 
@@ -15,6 +17,56 @@ pub struct Playback {
     pub speed: f64,
     /// Largest joint speed on the way to the start pose, rad/s.
     pub approach_rad_s: f64,
+}
+
+/// What no controller can play.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum PlaybackError {
+    /// `servoj` lasts whole cycles of the controller: anything else plays another motion.
+    #[error(
+        "{rate_hz} set points per second are no whole number of a controller's cycles apart, which last 2 ms (e-Series) \
+         or 8 ms (CB-Series): choose 500 over a whole number, such as 125, 250 or 500"
+    )]
+    Rate {
+        /// Set points per second, Hz.
+        rate_hz: f64,
+    },
+    /// Arms of Universal Robots have six joints.
+    #[error("a controller of Universal Robots moves {JOINTS} joints, the motion has {joints}")]
+    Joints {
+        /// Of the motion.
+        joints: usize,
+    },
+}
+
+/// Joints that `servoj` takes.
+const JOINTS: usize = 6;
+/// Cycles per second of a controller of the e-Series, Hz.
+const E_SERIES_HZ: f64 = 500.0;
+/// The same of the CB-Series.
+const CB_SERIES_HZ: f64 = 125.0;
+
+impl Playback {
+    /// Of a motion of so many joints with `rate_hz` set points per second, at `speed` in (0, 1].
+    pub fn new(joints: usize, rate_hz: f64, speed: f64) -> Result<Self, PlaybackError> {
+        if joints != JOINTS {
+            return Err(PlaybackError::Joints { joints });
+        }
+        if !is_whole(E_SERIES_HZ / rate_hz) {
+            return Err(PlaybackError::Rate { rate_hz });
+        }
+        Ok(Self { cycle_s: 1.0 / rate_hz, speed, approach_rad_s: 0.3 })
+    }
+
+    /// Whether a controller of the CB-Series can play it, and not only one of the e-Series.
+    pub fn suits_cb_series(&self) -> bool {
+        is_whole(self.cycle_s * CB_SERIES_HZ)
+    }
+}
+
+/// Whether `cycles` is a whole number from 1 on, up to round-off.
+fn is_whole(cycles: f64) -> bool {
+    cycles.round() >= 1.0 && (cycles - cycles.round()).abs() < 1e-9 * cycles
 }
 
 /// Writes `motion` sampled at `rate_hz` with the header `timestamp, target_q_0…, target_qd_0…,
@@ -158,9 +210,26 @@ mod tests {
         assert_eq!(row[1..], [q, qd, qdd].concat());
     }
 
+    /// Rates that divide the 500 Hz of an e-Series; the CB-Series needs those that divide 125 Hz.
+    #[test]
+    fn only_what_a_controller_can_play_is_a_playback() {
+        for (rate_hz, cb_series) in
+            [(500.0, false), (250.0, false), (125.0, true), (500.0 / 3.0, false), (62.5, true)]
+        {
+            let playback = Playback::new(6, rate_hz, 1.0).unwrap();
+            assert_eq!(playback.suits_cb_series(), cb_series, "{rate_hz} Hz");
+        }
+        for rate_hz in [1000.0, 300.0, 333.0, 0.0, -125.0, f64::NAN] {
+            let refused = Playback::new(6, rate_hz, 1.0).unwrap_err();
+            assert!(matches!(refused, PlaybackError::Rate { .. }), "{rate_hz} Hz: {refused}");
+        }
+        let refused = Playback::new(7, 125.0, 1.0).unwrap_err();
+        assert_eq!(refused, PlaybackError::Joints { joints: 7 });
+    }
+
     #[test]
     fn the_script_is_balanced_and_starts_gently() {
-        let playback = Playback { cycle_s: 0.008, speed: 0.25, approach_rad_s: 0.3 };
+        let playback = Playback::new(6, 125.0, 0.25).unwrap();
         let script = urscript(&motion(), &playback);
         let opened = script
             .lines()

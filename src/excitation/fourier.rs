@@ -108,7 +108,8 @@ impl FourierSeries {
     ) -> Result<Self, ExcitationError> {
         let n = q_rad.samples();
         let period_s = n as f64 / rate_hz;
-        let order = ((highest_hz * period_s) as usize).min(n.saturating_sub(1) / 2);
+        // Where the highest is a whole one, rounding must not lose it.
+        let order = ((highest_hz * period_s + 1e-9) as usize).min(n.saturating_sub(1) / 2);
         let coefficient = |j: usize, l: usize| {
             let (mut sine, mut cosine) = (0.0, 0.0);
             for (k, q) in q_rad.joint(j).iter().enumerate() {
@@ -147,7 +148,8 @@ impl FourierSeries {
 
     /// A built-in name, or a `.json` file.
     pub fn load(name_or_path: &str) -> Result<Self, ExcitationError> {
-        if Path::new(name_or_path).extension().is_none_or(|e| e != "json") {
+        let extension = Path::new(name_or_path).extension();
+        if extension.is_none_or(|e| !e.eq_ignore_ascii_case("json")) {
             return Self::built_in(name_or_path);
         }
         let text = std::fs::read_to_string(name_or_path)
@@ -314,6 +316,25 @@ mod tests {
                 assert!((x - y).abs() < 1e-13, "{x} {y}");
             }
         }
+    }
+
+    /// 0.29 Hz times 100 s is 28.999999999999996.
+    #[test]
+    fn the_highest_harmonic_is_not_lost_to_rounding() {
+        let (rate_hz, n) = (1.0, 100);
+        let highest = |k: usize| (TAU * 29.0 * k as f64 / n as f64).sin();
+        let q = JointSignals::from_fn(1, n, |_, k| highest(k));
+        assert!(0.29 * (n as f64 / rate_hz) < 29.0);
+        let found = FourierSeries::of_period(&q, rate_hz, 0.29).unwrap();
+        assert_eq!(found.order(), 29);
+    }
+
+    #[test]
+    fn a_file_in_capitals_is_one() {
+        let file = tempfile::Builder::new().suffix(".JSON").tempfile().unwrap();
+        std::fs::write(file.path(), two_joints().to_json()).unwrap();
+        let read = FourierSeries::load(file.path().to_str().unwrap()).unwrap();
+        assert_eq!(read, two_joints());
     }
 
     #[test]

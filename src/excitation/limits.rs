@@ -118,6 +118,11 @@ impl Margin {
     pub fn in_words(&self) -> String {
         format!("{:.4} {}", self.free, self.limit.unit())
     }
+
+    /// By how much a limit is passed, with its unit.
+    pub fn shortfall_in_words(&self) -> String {
+        format!("{:.4} {}", -self.free, self.limit.unit())
+    }
 }
 
 /// Length that counts as a full share of clearance, m.

@@ -2,7 +2,7 @@
 
 use super::error::ExcitationError;
 use super::fourier::FourierSeries;
-use super::limits::{Requirements, check};
+use super::limits::{Margin, Requirements, check};
 use super::reference::Reference;
 use crate::robot::Arm;
 
@@ -62,7 +62,8 @@ impl Excitation {
     /// largest share of the arm's limits free, among durations of 0.5 … 4 s.
     ///
     /// # Errors
-    /// [`ExcitationError::NoRunIn`] if every one of them passes a limit of the arm.
+    /// [`ExcitationError::PeriodPasses`] if the periods themselves pass a limit of the arm,
+    /// [`ExcitationError::NoRunIn`] if they do not and every run-in does.
     pub fn fitted(
         arm: &Arm,
         requirements: &Requirements,
@@ -70,36 +71,75 @@ impl Excitation {
         periods: usize,
         run_out: bool,
     ) -> Result<Self, ExcitationError> {
-        let mut best: Option<(f64, Self)> = None;
-        for run_in_s in RUN_INS_S {
-            let mut candidate = Self::new(series.clone(), run_in_s, 1)?;
+        positive("periods", periods as f64)?;
+        let (chosen, worst) = Self::calmest(arm, requirements, &series, 1, run_out)?;
+        if worst.share >= 0.0 {
+            return Ok(Self { periods, ..chosen });
+        }
+        let margins = check(arm, requirements, &series)?;
+        if !margins.feasible() {
+            let worst = margins.worst();
+            return Err(ExcitationError::PeriodPasses {
+                limit: worst.limit.to_string(),
+                short: worst.shortfall_in_words(),
+                time_s: worst.time_s,
+                clearance_m: requirements.clearance_m,
+                torque_percent: 100.0 * requirements.torque_share,
+            });
+        }
+        let [shortest_s, .., longest_s] = RUN_INS_S;
+        Err(ExcitationError::NoRunIn {
+            shortest_s,
+            longest_s,
+            limit: worst.limit.to_string(),
+            margin: worst.in_words(),
+            time_s: worst.time_s,
+        })
+    }
+
+    /// As [`Self::fitted`], of an arm that is only simulated and has no limits: where periods or
+    /// run-ins pass one, with the run-in that by itself keeps most of them or passes them least.
+    pub fn fitted_without_limits(
+        arm: &Arm,
+        requirements: &Requirements,
+        series: FourierSeries,
+        periods: usize,
+    ) -> Result<Self, ExcitationError> {
+        match Self::fitted(arm, requirements, series.clone(), periods, false) {
+            Err(ExcitationError::PeriodPasses { .. } | ExcitationError::NoRunIn { .. }) => {
+                let (chosen, _) = Self::calmest(arm, requirements, &series, 0, false)?;
+                Ok(Self { periods, ..chosen })
+            }
+            fitted => fitted,
+        }
+    }
+
+    /// The run-in (with a run-out as long, where `run_out`) that together with `periods` periods, or
+    /// none, keeps the largest share of the limits free, and the limit that is left least.
+    fn calmest(
+        arm: &Arm,
+        requirements: &Requirements,
+        series: &FourierSeries,
+        periods: usize,
+        run_out: bool,
+    ) -> Result<(Self, Margin), ExcitationError> {
+        let candidate = |run_in_s: f64| -> Result<(Self, Margin), ExcitationError> {
+            let mut candidate = Self { periods, ..Self::new(series.clone(), run_in_s, 1)? };
             if run_out {
                 candidate = candidate.with_run_out(run_in_s)?;
             }
-            let worst = check(arm, requirements, &candidate)?.worst().share;
-            if best.as_ref().is_none_or(|(share, _)| worst > *share) {
-                best = Some((worst, candidate));
+            let worst = check(arm, requirements, &candidate)?.worst().clone();
+            Ok((candidate, worst))
+        };
+        let [first_s, longer_s @ ..] = RUN_INS_S;
+        let mut best = candidate(first_s)?;
+        for run_in_s in longer_s {
+            let next = candidate(run_in_s)?;
+            if next.1.share > best.1.share {
+                best = next;
             }
         }
-        // The list of durations is not empty, so there is a best one.
-        let [shortest_s, .., longest_s] = RUN_INS_S;
-        let Some((share, mut chosen)) = best else {
-            return Self::new(series, longest_s, periods);
-        };
-        if share < 0.0 {
-            let margins = check(arm, requirements, &chosen)?;
-            let worst = margins.worst();
-            return Err(ExcitationError::NoRunIn {
-                shortest_s,
-                longest_s,
-                limit: worst.limit.to_string(),
-                margin: worst.in_words(),
-                time_s: worst.time_s,
-            });
-        }
-        positive("periods", periods as f64)?;
-        chosen.periods = periods;
-        Ok(chosen)
+        Ok(best)
     }
 
     /// The same, brought to rest within `run_out_s` > 0 seconds after the last period.
@@ -251,6 +291,44 @@ mod tests {
         for (x, y) in first.iter().flatten().zip(second.iter().flatten()) {
             assert!((x - y).abs() < 1e-12);
         }
+    }
+
+    /// What only a part of the torque is allowed for is refused as that, and simulated all the same.
+    #[test]
+    fn a_period_that_passes_a_limit_itself_is_named() {
+        let arm = Arm::built_in("ur5").unwrap();
+        let series = || FourierSeries::built_in("ur5_identification").unwrap();
+        let strict = Requirements { torque_share: 0.1, ..Requirements::default() };
+        let refused = Excitation::fitted(&arm, &strict, series(), 2, false).unwrap_err();
+        assert!(matches!(refused, ExcitationError::PeriodPasses { .. }), "{refused}");
+        let message = refused.to_string();
+        assert!(message.contains("torque of joint") && message.contains("10 %"), "{message}");
+        let simulated = Excitation::fitted_without_limits(&arm, &strict, series(), 2).unwrap();
+        assert_eq!((simulated.series(), simulated.periods()), (&series(), 2));
+        // Where the limits are kept both are the same.
+        let usual = Requirements::default();
+        assert_eq!(
+            Excitation::fitted_without_limits(&arm, &usual, series(), 2).unwrap(),
+            Excitation::fitted(&arm, &usual, series(), 2, false).unwrap()
+        );
+    }
+
+    /// Joint 1 swings by ±0.1 rad within ±0.105 rad, fastest where the period begins: the shortest
+    /// run-in starts v T/2 = 0.157 rad away.
+    #[test]
+    fn a_period_within_its_limits_that_none_leads_into_is_told_apart() {
+        let mut arm = Arm::built_in("ur5").unwrap();
+        arm.joints[0].limits.position_rad = [-0.105, 0.105];
+        let tau = std::f64::consts::TAU;
+        let mut a = vec![vec![0.0]; 6];
+        a[0] = vec![0.1 * tau];
+        let q0 = vec![0.0, -1.2, 0.0, -1.5, 0.3, 0.0];
+        let series = FourierSeries::new(1.0, q0, a, vec![vec![0.0]; 6]).unwrap();
+        let requirements = Requirements::default();
+        let refused = Excitation::fitted(&arm, &requirements, series.clone(), 1, false);
+        assert!(matches!(refused, Err(ExcitationError::NoRunIn { .. })), "{refused:?}");
+        let simulated = Excitation::fitted_without_limits(&arm, &requirements, series, 1).unwrap();
+        assert_eq!(simulated.run_in_s(), 0.5);
     }
 
     #[test]

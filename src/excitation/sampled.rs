@@ -39,7 +39,7 @@ impl SampledMotion {
     }
 
     /// The samples before and after position `x` on the grid, and how far it is between them. Beyond the
-    /// ends of a motion that does not repeat its last stretch goes on.
+    /// ends of a motion that does not repeat its state there is held.
     fn stretch(&self, x: f64) -> (usize, usize, f64) {
         let n = self.motion.samples();
         if self.repeats {
@@ -47,7 +47,8 @@ impl SampledMotion {
             let left = (x.floor() as usize).min(n - 1);
             return (left, (left + 1) % n, x - left as f64);
         }
-        let left = (x.max(0.0).floor() as usize).min(n.saturating_sub(2));
+        let x = x.clamp(0.0, (n - 1) as f64);
+        let left = (x.floor() as usize).min(n.saturating_sub(2));
         (left, (left + 1).min(n - 1), x - left as f64)
     }
 }
@@ -62,6 +63,11 @@ impl Reference for SampledMotion {
     }
 
     fn sample(&self, t_s: f64, q_rad: &mut [f64], qd_rad_s: &mut [f64], qdd_rad_s2: &mut [f64]) {
+        // Of no samples there is no motion.
+        if self.motion.samples() == 0 {
+            [q_rad, qd_rad_s, qdd_rad_s2].into_iter().for_each(|out| out.fill(0.0));
+            return;
+        }
         let (left, right, u) = self.stretch(self.first + t_s * self.rate_hz);
         let h = 1.0 / self.rate_hz;
         for j in 0..q_rad.len() {
@@ -128,6 +134,26 @@ mod tests {
         let (end, truth) = (at(&once, once.duration_s()), at(&series, once.duration_s()));
         for (x, y) in end.iter().flatten().zip(truth.iter().flatten()) {
             assert!((x - y).abs() < 1e-9, "{x} {y}");
+        }
+        // And stays there, as it stays where it begins.
+        assert_eq!(at(&once, once.duration_s() + 1.0), end);
+        assert_eq!(at(&once, -1.0), at(&once, 0.0));
+    }
+
+    #[test]
+    fn a_motion_of_one_sample_or_none_stands_still() {
+        let series = FourierSeries::built_in("ur5_identification").unwrap();
+        let all = sampled(&series, 125.0);
+        let first = |n: usize| Motion {
+            q_rad: all.q_rad.slice(0..n),
+            qd_rad_s: all.qd_rad_s.slice(0..n),
+            qdd_rad_s2: all.qdd_rad_s2.slice(0..n),
+        };
+        let one = SampledMotion::once(first(1), 125.0);
+        assert_eq!(at(&one, 0.5), at(&one, 0.0));
+        let repeated = SampledMotion::repeating(first(0), 125.0, 0.0, 1.0);
+        for none in [SampledMotion::once(first(0), 125.0), repeated] {
+            assert_eq!(at(&none, 0.5), [[0.0; 6]; 3].map(|zeros| zeros.to_vec()));
         }
     }
 }

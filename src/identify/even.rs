@@ -113,7 +113,7 @@ impl<'a> Even<'a> {
         for gap in grid.gaps() {
             warnings.push(format!(
                 "no samples for {:.2} s from {:.2} s on: only the longest stretch without such a gap \
-                 is used",
+                 is used (cut into files, the others count as logs beside it)",
                 gap.end_s - gap.start_s,
                 gap.start_s
             ));

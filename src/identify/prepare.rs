@@ -9,10 +9,11 @@ use super::even::{BetweenRows, Even};
 use super::options::Options;
 use super::prediction::MOVING_RAD_S;
 use crate::dynamics::Motion;
+use crate::median::median_step;
 use crate::robot::JointSignals;
 use crate::signal::{
     Activity, FitScratch, Gap, HarmonicPower, Period, PeriodSearch, PeriodicFit, Replicates,
-    Scratch, ZeroPhase, central_4, quantum, reading_limit, replicate_noise,
+    Scratch, ZeroPhase, central_4, reading_limit, reading_noise, replicate_noise, resolution,
 };
 
 /// The channels identification needs of a log, borrowed.
@@ -31,6 +32,19 @@ pub struct Measurement<'a> {
 }
 
 impl Measurement<'_> {
+    /// Refuses what is too short to be an experiment.
+    ///
+    /// # Errors
+    /// [`IdentifyError::TooShort`].
+    pub(crate) fn require_rows(&self) -> Result<(), IdentifyError> {
+        let samples = self.time_s.len();
+        if samples < FEWEST_SAMPLES {
+            let log = self.source.to_owned();
+            return Err(IdentifyError::TooShort { log, samples, needed: FEWEST_SAMPLES });
+        }
+        Ok(())
+    }
+
     /// Whether joint `j` moves and its torque never changes.
     pub(super) fn is_dead(&self, j: usize) -> bool {
         let torque = self.torque_nm.joint(j);
@@ -88,7 +102,10 @@ pub struct Prepared {
     /// harmonics of `each_period` end there. Of no use for a single run.
     pub highest: f64,
     /// Smallest distance between two recorded angles, per joint, rad.
-    pub angle_quantum_rad: Vec<f64>,
+    pub angle_resolution_rad: Vec<f64>,
+    /// Power density of the velocities' noise, 2 σ²/f_s of white noise, per joint, (rad/s)²/Hz; `None` where periods tell it
+    /// frequency by frequency.
+    pub velocity_noise: Option<Vec<f64>>,
     /// ± the largest torque that is read, per joint, where readings are cut off there, Nm.
     pub torque_limit_nm: Vec<Option<f64>>,
     /// How well the averaged acceleration is known, per joint; `None` for a single run.
@@ -167,11 +184,7 @@ impl Preparer {
         m: &Measurement,
         options: &Options,
     ) -> Result<Prepared, IdentifyError> {
-        let samples = m.time_s.len();
-        if samples < FEWEST_SAMPLES {
-            let log = m.source.to_owned();
-            return Err(IdentifyError::TooShort { log, samples, needed: FEWEST_SAMPLES });
-        }
+        m.require_rows()?;
         let mut warnings = Vec::new();
         let mut even = Even::of(m, options, None, &mut self.filter, &mut warnings)?;
         let mut period =
@@ -301,7 +314,8 @@ impl Preparer {
                 places: rows.places[window.clone()].to_vec(),
             }),
             highest: even.highest,
-            angle_quantum_rad: angle_quantum_rad(m),
+            angle_resolution_rad: angle_resolution_rad(m),
+            velocity_noise: None,
             torque_limit_nm: torque_limit_nm(m),
             replicates: Some(replicate_noise(&torque_nm, samples_per_period)?),
             acceleration: Some(averaged.acceleration),
@@ -361,7 +375,8 @@ impl Preparer {
             recorded: None,
             between: None,
             highest: even.highest,
-            angle_quantum_rad: angle_quantum_rad(m),
+            angle_resolution_rad: angle_resolution_rad(m),
+            velocity_noise: Some(velocity_noise(m)),
             torque_limit_nm: torque_limit_nm(m),
             replicates: None,
             acceleration: None,
@@ -383,8 +398,14 @@ impl Preparer {
     }
 }
 
-fn angle_quantum_rad(m: &Measurement) -> Vec<f64> {
-    (0..m.q_rad.joints()).map(|j| quantum(m.q_rad.joint(j))).collect()
+fn angle_resolution_rad(m: &Measurement) -> Vec<f64> {
+    (0..m.q_rad.joints()).map(|j| resolution(m.q_rad.joint(j))).collect()
+}
+
+fn velocity_noise(m: &Measurement) -> Vec<f64> {
+    let step_s = median_step(m.time_s).unwrap_or(0.0);
+    let density = |j| 2.0 * step_s * reading_noise(m.qd_rad_s.joint(j)).powi(2);
+    (0..m.qd_rad_s.joints()).map(density).collect()
 }
 
 fn torque_limit_nm(m: &Measurement) -> Vec<Option<f64>> {

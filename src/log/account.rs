@@ -60,7 +60,8 @@ impl Reason {
             }
             Self::Implausible => "check the layout: the columns or the units are not these",
             Self::TimeRepeated | Self::TimeBackwards | Self::TimeAhead => {
-                "check which column is the time, and that the file holds one recording"
+                "check which column is the time, and that the file holds one recording: several in one file are several logs, split it where \
+                 the time begins again"
             }
             Self::Inconsistent => "check which columns are positions and which are velocities",
         }
@@ -103,7 +104,7 @@ pub enum LogWarning {
     /// Time stamps that are coarser than half of what rows are apart: evenly recorded rows are put on the line through them.
     RoundedStamps {
         /// What they are rounded to, s.
-        quantum_s: f64,
+        resolution_s: f64,
         /// Rows a second.
         rate_hz: f64,
     },
@@ -141,6 +142,15 @@ pub enum LogWarning {
         /// The joint that jumps there, counted from 1.
         joint: usize,
     },
+    /// The file is written faster than its readings are new.
+    Held {
+        /// Share of the rows of a moving arm whose angles are those of the row before.
+        share: f64,
+        /// New readings a second.
+        rate_hz: f64,
+    },
+    /// The file has no velocities.
+    SlopesOfAngles,
     /// A block that a log need not have, with fields that are empty, no numbers or beyond what the quantity can be: it is
     /// not used.
     LeftOut {
@@ -163,9 +173,9 @@ impl fmt::Display for LogWarning {
                 "{missed} samples are missing in {gaps} gaps; the longest step is {longest_s:.4} s, \
                  after row {after_row}"
             ),
-            Self::RoundedStamps { quantum_s, rate_hz } => write!(
+            Self::RoundedStamps { resolution_s, rate_hz } => write!(
                 f,
-                "time stamps are rounded to {quantum_s:.4} s: rows are taken to be evenly apart, {rate_hz:.3} a second, as the motion \
+                "time stamps are rounded to {resolution_s:.4} s: rows are taken to be evenly apart, {rate_hz:.3} a second, as the motion \
                  says that they are"
             ),
             Self::ManySetAside { set_aside, read } => write!(
@@ -185,6 +195,15 @@ impl fmt::Display for LogWarning {
             Self::Unwrapped { count, after_row, joint } => write!(
                 f,
                 "angles are wrapped, first joint {joint}'s after row {after_row}: unwrapped {count} times"
+            ),
+            Self::Held { share, rate_hz } => write!(
+                f,
+                "{:.0} % of the rows repeat the angles of the one before while the arm moves: some {rate_hz:.0} readings a second are \
+                 new, and the others are late and bend what is identified; keep the rows with new readings only",
+                100.0 * share
+            ),
+            Self::SlopesOfAngles => f.write_str(
+                "the log has no velocities: they are the slopes of polynomials through five angles, and noisier than recorded ones"
             ),
             Self::LeftOut { block, fields, first_row, ref column } => write!(
                 f,

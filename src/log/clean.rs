@@ -247,6 +247,34 @@ pub(super) fn unwrapped(motion: &Motion) -> (Vec<Unwrapped>, Option<LogWarning>)
     (joints, warning)
 }
 
+/// Share of the rows that may repeat the angles of the one before while the arm moves.
+const MOST_HELD: f64 = 0.3;
+/// An arm moves where an angle changes, by its velocity, by so many times the least that it is ever seen to change by.
+const MOVES: f64 = 5.0;
+
+/// Whether most rows hold what an earlier one read: the file is written faster than the arm is asked.
+pub(super) fn held(motion: &Motion) -> Option<LogWarning> {
+    let change = |joint: usize, k: usize| (motion.q[joint][k] - motion.q[joint][k - 1]).abs();
+    let least = |joint: usize| {
+        let changes = (1..motion.rows()).map(|k| change(joint, k));
+        changes.filter(|change| *change > 0.0).fold(f64::INFINITY, f64::min)
+    };
+    let least: Vec<f64> = (0..motion.q.len()).map(least).collect();
+    let moves = |k: &usize| {
+        let step_s = motion.time_s[*k] - motion.time_s[*k - 1];
+        let mut joints = motion.qd.iter().zip(&least);
+        joints.any(|(qd, least)| qd[*k].abs() * step_s > MOVES * least)
+    };
+    let moving: Vec<usize> = (1..motion.rows()).filter(moves).collect();
+    let holds = |k: &&usize| (0..motion.q.len()).all(|joint| change(joint, **k) == 0.0);
+    let held = moving.iter().filter(holds).count();
+    let share = held as f64 / moving.len() as f64;
+    (share > MOST_HELD).then(|| {
+        let rate_hz = median_step(motion.time_s).map_or(0.0, |step_s| (1.0 - share) / step_s);
+        LogWarning::Held { share, rate_hz }
+    })
+}
+
 /// Whether the angles jump between the rows that are left.
 pub(super) fn jumps(motion: &Motion) -> Option<LogWarning> {
     let mut first = None;

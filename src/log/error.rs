@@ -65,8 +65,8 @@ pub enum LogError {
     /// The layout expects names in the first row.
     #[error(
         "{file}: row {row} begins with the number {value} where the layout \"{layout}\" expects column names; \
-         for a file without header give --layout ({} or a .toml file)",
-        built_in()
+         for a file without header give --layout ({} or a .toml file with header = false)",
+        without_header()
     )]
     NoHeader {
         /// The file.
@@ -264,7 +264,8 @@ pub enum LayoutFault {
     Toml(String),
     /// A block that every log needs.
     #[error(
-        "the block \"{block}\" is missing in {place}; a log needs time, q, qd, and current or torque"
+        "the block \"{block}\" is missing in {place}; a log needs time, q, and current or torque (without qd, velocities are the \
+         slopes of the angles)"
     )]
     MissingBlock {
         /// The block.
@@ -388,6 +389,19 @@ pub enum UnitSuspicion {
         /// How many joints show it.
         joints: usize,
     },
+    /// Angles change and velocities do not follow.
+    #[error(
+        "rows {first_row} to {last_row}, joint {joint}: the position moves and the velocities are zero, as if they were not recorded; \
+         leave qd out of [columns] in a layout file (--layout), and they are taken from the angles"
+    )]
+    NoVelocity {
+        /// The joint it is seen on, from 1.
+        joint: usize,
+        /// First row of the stretch it is seen in.
+        first_row: usize,
+        /// Last row of it.
+        last_row: usize,
+    },
     /// No unit explains how positions and velocities are related.
     #[error(
         "rows {first_row} to {last_row}, joint {joint}: the position moves {ratio:.4e} times as far as the integral of \
@@ -411,6 +425,10 @@ fn utf16_hint(utf16: bool) -> &'static str {
 
 fn built_in() -> String {
     super::layout::built_in_layout_names().collect::<Vec<_>>().join(", ")
+}
+
+fn without_header() -> String {
+    super::layout::built_in_without_header().collect::<Vec<_>>().join(", ")
 }
 
 fn list(numbers: &[usize]) -> String {

@@ -26,7 +26,7 @@ pub(super) struct EvenStamps {
     /// When, s.
     pub(super) time_s: Vec<f64>,
     /// What their own stamps were rounded to, s.
-    pub(super) quantum_s: f64,
+    pub(super) resolution_s: f64,
     /// Rows a second.
     pub(super) rate_hz: f64,
 }
@@ -39,13 +39,13 @@ pub(super) fn even_stamps(motion: &Motion) -> Option<EvenStamps> {
         return None;
     }
     let steps = time_s.windows(2).map(|pair| pair[1] - pair[0]);
-    let quantum_s = steps.filter(|step| *step > 0.0).fold(f64::INFINITY, f64::min);
+    let resolution_s = steps.filter(|step| *step > 0.0).fold(f64::INFINITY, f64::min);
     let is_on_grid = |t: &f64| {
-        let steps = (t - first_s) / quantum_s;
+        let steps = (t - first_s) / resolution_s;
         (steps - steps.round()).abs() < ROUNDING
     };
     let apart_s = (time_s[time_s.len() - 1] - first_s) / (time_s.len() - 1) as f64;
-    let is_coarse = quantum_s >= COARSE * apart_s;
+    let is_coarse = resolution_s >= COARSE * apart_s;
     if !is_coarse || !time_s.iter().all(is_on_grid) {
         return None;
     }
@@ -62,13 +62,14 @@ pub(super) fn even_stamps(motion: &Motion) -> Option<EvenStamps> {
     let ends = |[low, high]: [f64; 2], off: &f64| [low.min(*off), high.max(*off)];
     let [low, high] = off_s.iter().fold([f64::INFINITY, f64::NEG_INFINITY], ends);
     let rms_s = (off_s.iter().map(|off| off * off).sum::<f64>() / count).sqrt();
-    let is_rounded = high - low <= WITHIN_STEPS * quantum_s && rms_s >= LEAST_RMS_STEPS * quantum_s;
+    let is_rounded =
+        high - low <= WITHIN_STEPS * resolution_s && rms_s >= LEAST_RMS_STEPS * resolution_s;
     if step_s.is_nan() || step_s <= 0.0 || !is_rounded {
         return None;
     }
     let on_the_line = Motion { time_s: &even, ..*motion };
     let is_better = defect(&on_the_line) < BETTER * defect(motion);
-    is_better.then(|| EvenStamps { quantum_s, rate_hz: 1.0 / step_s, time_s: even })
+    is_better.then(|| EvenStamps { resolution_s, rate_hz: 1.0 / step_s, time_s: even })
 }
 
 /// How far angles are from where velocities bring them, from row to row, rad: of [`TELLING`] of the rows the sum over the joints is less.

@@ -14,6 +14,7 @@ mod lines;
 mod plan;
 mod read;
 mod record;
+mod slopes;
 mod units;
 mod write;
 

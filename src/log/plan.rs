@@ -92,6 +92,9 @@ impl Plan {
         header.refuse_numbers()?;
         let mut fields = Vec::new();
         for block in [Block::Time, Block::Q, Block::Qd] {
+            if block == Block::Qd && layout.columns(block).is_none() {
+                continue;
+            }
             let found = header.block(block)?;
             fields.extend(found.map_err(|missing| header.missing(missing))?);
         }

@@ -1,5 +1,6 @@
 //! From a file to a log.
 
+use std::f64::consts::TAU;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -10,8 +11,9 @@ use super::error::{LogError, UnitSuspicion};
 use super::even_stamps::{EvenStamps, even_stamps};
 use super::layout::{Block, Layout};
 use super::lines::{Line, Lines};
-use super::plan::{Delimiter, Plan};
+use super::plan::{Delimiter, Field, Plan};
 use super::record::{Effort, Log};
+use super::slopes::slopes;
 use super::units;
 use crate::robot::JointSignals;
 
@@ -19,6 +21,8 @@ use crate::robot::JointSignals;
 const WIDTH_ROWS: usize = 50;
 
 /// Reads a log of an arm with `joints` joints.
+///
+/// A layout without velocities takes them from the angles, once the times are in order: slopes of polynomials through five rows.
 ///
 /// Only the columns of the layout are read, row by row; memory is that of the numbers kept, 8 bytes each.
 /// Numbers are converted to SI units. Then, in this order:
@@ -143,6 +147,7 @@ fn has_fields(delimiter: Delimiter, line: &Line, fields: usize) -> bool {
 
 /// The numbers read so far, column by column, and where each row stood in the file.
 struct Table {
+    /// Behind those of the plan the velocities of a file that has none.
     columns: Vec<Vec<f64>>,
     rows: Vec<usize>,
     current: Vec<f64>,
@@ -157,7 +162,7 @@ struct Defect {
 impl Table {
     fn new(plan: &Plan) -> Self {
         Self {
-            columns: vec![Vec::new(); plan.fields.len()],
+            columns: vec![Vec::new(); motion_ranges(plan).2.end.max(plan.fields.len())],
             rows: Vec::new(),
             current: vec![0.0; plan.fields.len()],
         }
@@ -214,14 +219,19 @@ impl Table {
     ) -> Result<Vec<LogWarning>, LogError> {
         let fault = |suspicion| LogError::Units { file: file.to_owned(), suspicion };
         let (time, q, qd) = motion_ranges(plan);
-        let even = even_stamps(&self.motion(plan));
-        let rounded = even.map(|EvenStamps { time_s, quantum_s, rate_hz }| {
+        let has_velocities = plan.range(Block::Qd).is_some();
+        // Whether rounded stamps are even the velocities tell.
+        let even = if has_velocities { even_stamps(&self.motion(plan)) } else { None };
+        let rounded = even.map(|EvenStamps { time_s, resolution_s, rate_hz }| {
             self.columns[time] = time_s;
-            LogWarning::RoundedStamps { quantum_s, rate_hz }
+            LogWarning::RoundedStamps { resolution_s, rate_hz }
         });
         let order = clean::order_of_time(&self.columns[time]);
         self.retain(&order, account, |table, k, _| format!("time {} s", table.columns[time][k]));
         self.require_two(account, file)?;
+        if !has_velocities {
+            self.take_slopes(plan);
+        }
         let motion = self.motion(plan);
         // Many garbage rows can hide how angles and velocities are related: then they go first.
         let mut related = units::check(&motion, &layout.units);
@@ -239,7 +249,8 @@ impl Table {
                 .or_else(|| beyond(qd.clone(), clean::VELOCITY_BOUND_RAD_S))
                 .filter(|_| reason == Reason::Implausible);
             let c = worst.unwrap_or(q.start);
-            format!("{} = {}", plan.fields[c].place(), table.columns[c][k])
+            let place = plan.fields.get(c).map_or("the slope of an angle".to_owned(), Field::place);
+            format!("{place} = {}", table.columns[c][k])
         });
         self.require_two(account, file)?;
         if related.is_err() {
@@ -247,8 +258,15 @@ impl Table {
         }
         let mut warnings = related.map_err(fault)?;
         warnings.splice(0..0, rounded);
-        warnings.extend(self.unwrap_angles(plan));
+        if has_velocities {
+            warnings.extend(self.unwrap_angles(plan));
+        } else {
+            // Without the rows that were set aside.
+            self.take_slopes(plan);
+            warnings.push(LogWarning::SlopesOfAngles);
+        }
         let motion = self.motion(plan);
+        warnings.extend(clean::held(&motion));
         warnings.extend(clean::jumps(&motion));
         if let Some((missed, warning)) = clean::missed_samples(&motion) {
             account.missed_samples = missed;
@@ -269,6 +287,21 @@ impl Table {
             q: &self.columns[q],
             qd: &self.columns[qd],
             row: &self.rows,
+        }
+    }
+
+    /// Velocities of a file that has none, its angles unwrapped: no arm turns by half a turn from one row to the next.
+    fn take_slopes(&mut self, plan: &Plan) {
+        let (time, q, qd) = motion_ranges(plan);
+        for (q, qd) in q.zip(qd) {
+            let mut turns = 0.0;
+            let mut before = self.columns[q].first().copied().unwrap_or(0.0);
+            for angle in &mut self.columns[q] {
+                turns -= ((*angle - before) / TAU).round();
+                before = *angle;
+                *angle += turns * TAU;
+            }
+            self.columns[qd] = slopes(&self.columns[time], &self.columns[q]);
         }
     }
 
@@ -385,10 +418,12 @@ impl Table {
     }
 }
 
-/// Places of time, angles and velocities among a plan's fields: every plan begins with these three.
+/// Places of time, angles and velocities among the columns of a [`Table`]: every plan begins with the first two.
 fn motion_ranges(plan: &Plan) -> (usize, std::ops::Range<usize>, std::ops::Range<usize>) {
     let range = |block| plan.range(block).unwrap_or_default();
-    (range(Block::Time).start, range(Block::Q), range(Block::Qd))
+    let q = range(Block::Q);
+    let behind = plan.fields.len()..plan.fields.len() + q.len();
+    (range(Block::Time).start, q, plan.range(Block::Qd).unwrap_or(behind))
 }
 
 /// One row's numbers in SI units into `values`; NaN in an optional block where it has none that can be.

@@ -15,6 +15,8 @@ use crate::median::{median, median_step};
 const MOVES_RAD: f64 = 0.02;
 /// Ratios this near to 1 (or, relatively, to a factor between units) are taken for it.
 const RATIO_TOLERANCE: f64 = 0.2;
+/// So many times as far as the velocity says: there is none. Milliseconds for seconds are a thousandth, and nanoseconds less.
+const NO_VELOCITY: f64 = 1e6;
 /// Steps of time a recorder of motion has, s.
 const CLOCK_STEP_S: std::ops::Range<f64> = 1e-5..0.9;
 
@@ -99,6 +101,10 @@ fn contradiction(motion: &Motion, units: &Units, ratios: &[Ratio], ratio: f64) -
             q_from: motion.q[joint][first],
             q_to: motion.q[joint][last],
         },
+        // No motion at all, but for what noise adds up to.
+        None if ratio.abs() > NO_VELOCITY => {
+            UnitSuspicion::NoVelocity { joint: joint + 1, first_row, last_row }
+        }
         None => UnitSuspicion::Unrelated { joint: joint + 1, ratio, first_row, last_row },
     }
 }

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
 use super::share::Share;
+pub use super::statistic::Statistic;
 use super::tally::Tally;
 
 /// Chance that all checks together fail an identifier that is exactly at its claim.
@@ -15,6 +16,12 @@ pub mod claims {
     pub const MEAN_COVERAGE: [f64; 2] = [0.935, 0.965];
     /// The same for a log that does not repeat, where only the residuals show the noise.
     pub const MEAN_COVERAGE_OF_A_SINGLE_RUN: [f64; 2] = [0.92, 0.965];
+
+    /// What is claimed of the mean coverage of logs that are single runs, or that repeat.
+    pub fn mean_coverage(single_run: bool) -> [f64; 2] {
+        if single_run { MEAN_COVERAGE_OF_A_SINGLE_RUN } else { MEAN_COVERAGE }
+    }
+
     /// Coverage of each single parameter.
     pub const EACH_COVERAGE: [f64; 2] = [0.90, 0.985];
     /// |mean error| of each parameter in units of its σ.
@@ -51,11 +58,15 @@ impl std::fmt::Display for Verdict {
     }
 }
 
+/// Why [`Statistic::JointRatio`] cannot be checked where no trial tells it.
+const NO_DISTANCE: &str = "the covariance is known with four degrees of freedom or fewer, with which the squared error has no \
+                           mean that trials could find";
+
 /// One check: a statistic, what chance leaves open about it, and the claim.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Check {
-    /// In words.
-    pub what: &'static str,
+    /// What is checked.
+    pub statistic: Statistic,
     /// Parameter that decided (the worst), `None` for statistics over all.
     pub parameter: Option<usize>,
     /// Measured value.
@@ -66,6 +77,8 @@ pub struct Check {
     pub claim: [f64; 2],
     /// The answer.
     pub verdict: Verdict,
+    /// Why nothing was measured, where more trials would not help.
+    pub reason: Option<&'static str>,
 }
 
 /// All checks of one experiment.
@@ -81,16 +94,16 @@ pub struct Calibration {
 const CHECKS: f64 = 6.0;
 
 impl Calibration {
-    /// Checks every claim against `tally`.
+    /// Checks every claim against `tally`; that about the mean coverage depends on whether logs repeat their motion.
     ///
     /// Each statistic gets an interval at confidence 1 − α/(number of claims × number of
     /// statistics in the claim) (Bonferroni), from the binomial, Student's or χ² distribution at the
     /// tally's number of trials: those of a handful are as wide as they have to be. A claim **fails** when an interval lies wholly outside it, is
     /// **not evaluated** when an interval is wider than the claim, and passes otherwise. A trial
     /// that failed counts as an interval that misses the truth.
-    pub fn of(tally: &Tally) -> Self {
+    pub fn of(tally: &Tally, mean_coverage: [f64; 2]) -> Self {
         let b = tally.parameters();
-        let n = tally.succeeded as f64;
+        let (n, all) = (tally.succeeded as f64, tally.trials() as f64);
         if tally.succeeded < 2 || b == 0 {
             // A failed trial is an interval that misses: of so many that have nothing else, five of a hundred were allowed.
             let failed = 0.05_f64.powf(tally.failures.len() as f64) < FALSE_FAILURE_RATE;
@@ -101,15 +114,11 @@ impl Calibration {
         let single = FALSE_FAILURE_RATE / CHECKS;
         let each = single / b as f64;
         let [t_single, t_each] = [single, each].map(|alpha| student_quantile(alpha, n - 1.0));
-        let lost = tally.failures.len() as f64;
-        let held = n / (n + lost);
-
         let (mean, error) = tally.mean_coverage();
         // A handful of trials may show no scatter at all; the binomial error of one parameter, over
         // √b for independent ones, is the least there can be.
-        let least = (0.95 * 0.05 / (n * b as f64)).sqrt();
-        let half = t_single * error.max(least);
-        let mean = mean * held;
+        let least = (0.95 * 0.05 / (all * b as f64)).sqrt();
+        let half = student_quantile(single, all - 1.0) * error.max(least);
         let ratios: Vec<f64> =
             statistics.iter().map(|s| s.sigma_empirical / s.sigma_predicted).collect();
         let (pooled, pooled_error) = tally.pooled_ratio();
@@ -131,21 +140,21 @@ impl Calibration {
         };
         let mut checks = vec![
             Check::new(
-                "coverage of 95 % intervals, mean over parameters",
-                claims::MEAN_COVERAGE,
+                Statistic::MeanCoverage,
+                mean_coverage,
                 [(None, mean, [mean - half, mean + half])],
             ),
             Check::new(
-                "coverage of 95 % intervals, worst parameter",
+                Statistic::EachCoverage,
                 claims::EACH_COVERAGE,
                 statistics.iter().enumerate().map(|(k, s)| {
-                    let count = (s.coverage * n).round() as u64;
-                    let share = Share { count, of: (n + lost) as u64 };
+                    let count = (s.coverage * all).round() as u64;
+                    let share = Share { count, of: tally.trials() };
                     (Some(k), share.value(), share.bounds(0.5 * each))
                 }),
             ),
             Check::new(
-                "bias over σ, worst parameter",
+                Statistic::Bias,
                 claims::BIAS,
                 statistics.iter().enumerate().map(|(k, s)| {
                     let bias = s.bias / s.sigma_empirical;
@@ -153,22 +162,19 @@ impl Calibration {
                     (Some(k), bias, [bias - half, bias + half])
                 }),
             ),
+            Check::new(Statistic::PooledRatio, claims::POOLED_RATIO, around(pooled, pooled_error)),
             Check::new(
-                "empirical over predicted σ, pooled over parameters",
-                claims::POOLED_RATIO,
-                around(pooled, pooled_error),
-            ),
-            Check::new(
-                "empirical over predicted σ, worst parameter",
+                Statistic::EachRatio,
                 claims::EACH_RATIO,
                 ratios.iter().enumerate().map(|(k, &r)| (Some(k), r, ratio_interval(r, each))),
             ),
         ];
-        let joint = |(ratio, error)| {
-            let what = "error over predicted covariance, all parameters together";
-            Check::new(what, claims::JOINT_RATIO, around(ratio, error))
-        };
-        checks.extend(tally.joint_ratio().map(joint));
+        checks.push(match tally.joint_ratio() {
+            Some((ratio, error)) => {
+                Check::new(Statistic::JointRatio, claims::JOINT_RATIO, around(ratio, error))
+            }
+            None => Check::not_measured(Statistic::JointRatio, claims::JOINT_RATIO, NO_DISTANCE),
+        });
         let any = |wanted| checks.iter().any(|check: &Check| check.verdict == wanted);
         let verdict = if any(Verdict::Fail) {
             Verdict::Fail
@@ -184,7 +190,7 @@ impl Calibration {
 impl Check {
     /// The statistic furthest out decides.
     fn new(
-        what: &'static str,
+        statistic: Statistic,
         claim: [f64; 2],
         statistics: impl IntoIterator<Item = (Option<usize>, f64, [f64; 2])>,
     ) -> Self {
@@ -208,19 +214,25 @@ impl Check {
                 };
                 (rank, ((check.value - middle).abs() / half * 1e9) as u64)
             };
-            let check = Self { what, parameter, value, interval, claim, verdict };
+            let check =
+                Self { statistic, parameter, value, interval, claim, verdict, reason: None };
             if worst.as_ref().is_none_or(|known| severity(&check) > severity(known)) {
                 worst = Some(check);
             }
         }
-        worst.unwrap_or(Self {
-            what,
+        worst.unwrap_or_else(|| Self::not_measured(statistic, claim, "there is no parameter"))
+    }
+
+    fn not_measured(statistic: Statistic, claim: [f64; 2], reason: &'static str) -> Self {
+        Self {
+            statistic,
             parameter: None,
             value: f64::NAN,
             interval: [f64::NEG_INFINITY, f64::INFINITY],
             claim,
             verdict: Verdict::NotEvaluated,
-        })
+            reason: Some(reason),
+        }
     }
 }
 
@@ -265,7 +277,7 @@ mod tests {
             let distance = outcomes.iter().map(|o| o.z * o.z).sum::<f64>() / 20.0;
             tally.add(&Outcomes { parameters: outcomes, distance: Some(distance) });
         }
-        Calibration::of(&tally).verdict
+        Calibration::of(&tally, claims::MEAN_COVERAGE).verdict
     }
 
     #[test]
@@ -283,7 +295,7 @@ mod tests {
             for trial in 0..count {
                 tally.failures.push(Failure { trial, reason: String::new() });
             }
-            Calibration::of(&tally).verdict
+            Calibration::of(&tally, claims::MEAN_COVERAGE).verdict
         };
         assert_eq!(failed(100), Verdict::Fail);
         assert_eq!(failed(1), Verdict::NotEvaluated);
@@ -315,8 +327,65 @@ mod tests {
             tally.add(&Outcomes { parameters, distance: Some(z * z) });
         }
         for trial in 2000..4000 {
-            tally.add_failure(crate::montecarlo::trials::Failure { trial, reason: "x".into() });
+            tally.add_failure(Failure { trial, reason: "x".into() });
         }
-        assert_eq!(Calibration::of(&tally).verdict, Verdict::Fail);
+        assert_eq!(Calibration::of(&tally, claims::MEAN_COVERAGE).verdict, Verdict::Fail);
+    }
+
+    /// Trials of which all hold all of 20 truths but for `failed` of 1000 that gave nothing.
+    fn all_held(failed: u64, distance: Option<f64>) -> Tally {
+        let mut tally = Tally::new(20);
+        for trial in 0..1000 {
+            if trial < failed {
+                tally.add_failure(Failure { trial, reason: "x".into() });
+                continue;
+            }
+            let z = if trial % 2 == 0 { 1.0 } else { -1.0 };
+            let parameters = vec![Outcome { z, sigma: 1.0, quantile_95: 1.96 }; 20];
+            tally.add(&Outcomes { parameters, distance });
+        }
+        tally
+    }
+
+    fn check_of(tally: &Tally, statistic: Statistic, mean_coverage: [f64; 2]) -> Check {
+        let checks = Calibration::of(tally, mean_coverage).checks;
+        checks.into_iter().find(|check| check.statistic == statistic).unwrap()
+    }
+
+    /// 50 of 1000 trials gave nothing: coverage is 95 % with the standard error √(0.95·0.05/999) of so many coins, whatever the
+    /// number of parameters that a failed trial takes with it.
+    #[test]
+    fn failed_trials_scatter_the_coverage() {
+        let check = check_of(&all_held(50, None), Statistic::MeanCoverage, claims::MEAN_COVERAGE);
+        let half =
+            student_quantile(FALSE_FAILURE_RATE / CHECKS, 999.0) * (0.95_f64 * 0.05 / 999.0).sqrt();
+        assert!((check.value - 0.95).abs() < 1e-12, "{}", check.value);
+        let off = [0.95 - half - check.interval[0], 0.95 + half - check.interval[1]];
+        assert!(off.iter().all(|off| off.abs() < 1e-12), "{:?} {half}", check.interval);
+    }
+
+    /// 7 % of the intervals miss: too many where periods repeat, and what is claimed of single runs.
+    #[test]
+    fn less_is_claimed_of_single_runs() {
+        let mut tally = Tally::new(20);
+        for trial in 0..20_000_u64 {
+            let z = |k: u64| if (trial * 7 + k * 3) % 100 < 7 { 2.2 } else { 0.9 };
+            let outcome = |k: u64| Outcome { z: z(k), sigma: 1.0, quantile_95: 1.96 };
+            tally.add(&Outcomes { parameters: (0..20).map(outcome).collect(), distance: None });
+        }
+        let of = |claim| check_of(&tally, Statistic::MeanCoverage, claim).verdict;
+        assert_eq!(of(claims::MEAN_COVERAGE), Verdict::Fail);
+        assert_eq!(of(claims::MEAN_COVERAGE_OF_A_SINGLE_RUN), Verdict::Pass);
+    }
+
+    /// A claim that no trial tells anything of is not one that holds.
+    #[test]
+    fn what_is_not_measured_is_not_evaluated() {
+        let of = |distance| {
+            check_of(&all_held(0, distance), Statistic::JointRatio, claims::MEAN_COVERAGE)
+        };
+        let check = of(None);
+        assert_eq!((check.verdict, check.reason), (Verdict::NotEvaluated, Some(NO_DISTANCE)));
+        assert_eq!(of(Some(1.0)).verdict, Verdict::Pass);
     }
 }

@@ -70,10 +70,9 @@ impl Simulation {
         }
         let q_rad = &self.recording.q_rad;
         let motion_noise = MotionNoise::new(&scenario.sensors, &model, q_rad, &whitening)?;
-        let whitening_at = |frequency_hz| {
-            let torque_power = scenario.sensors.torque_noise.power(frequency_hz, rate_hz);
-            motion_noise.whitening(frequency_hz, torque_power)
-        };
+        let torque_power = scenario.sensors.torque_noise.spectrum(rate_hz);
+        let whitening_at =
+            |frequency_hz| motion_noise.whitening(frequency_hz, torque_power(frequency_hz));
         Ok(size(problem, &whitening, &whitening_at))
     }
 

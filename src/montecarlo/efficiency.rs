@@ -62,8 +62,8 @@ impl Experiment {
         let harmonics = regression.problem.samples;
         // Fewer samples hold, frequency by frequency, as much less of the noise's power.
         let logged_hz = scenario.plant.log_rate_hz;
-        let power =
-            |frequency_hz| torque.model.power(frequency_hz, logged_hz) * rate_hz / logged_hz;
+        let spectrum = torque.model.spectrum(logged_hz);
+        let power = |frequency_hz| spectrum(frequency_hz) * rate_hz / logged_hz;
         let powers = (1..=harmonics / 2).map(|k| power(k as f64 * rate_hz / harmonics as f64));
         let (least, most) =
             powers.fold((f64::INFINITY, 0.0f64), |(least, most), p| (least.min(p), most.max(p)));

@@ -20,7 +20,7 @@ pub struct Experiment {
     pub model: Model,
     /// True base parameters.
     pub truth: Vec<f64>,
-    /// σ of the pilot trial per parameter: the unit of the tally.
+    /// About σ of the pilot trial per parameter: the unit of the tally.
     pub scale: Vec<f64>,
     /// The Cramér–Rao bound of every parameter; `None` where it is not known.
     pub least_sigma: Option<Vec<f64>>,
@@ -28,6 +28,8 @@ pub struct Experiment {
     pub estimator: Estimator,
     /// The covariance that the pilot's log calls for, and all trials' with it.
     pub covariance: CovarianceKind,
+    /// Whether logs are runs that do not repeat, of which less is claimed.
+    pub single_run: bool,
 }
 
 /// Number of the pilot trial: its noise is its own and it is never counted.
@@ -78,9 +80,11 @@ impl Experiment {
             least_sigma: None,
             estimator: Estimator::Wls,
             covariance: CovarianceKind::Wls,
+            single_run: false,
         };
         let pilot = experiment.worker_with(pilot_options).identify(PILOT)?;
-        experiment.scale = pilot.sigma();
+        experiment.scale = pilot.sigma().into_iter().map(rounded).collect();
+        experiment.single_run = pilot.processing.periods == 1;
         experiment.estimator = pilot.estimator;
         experiment.covariance = pilot.covariance.kind;
         experiment.least_sigma = experiment.cramer_rao_bound()?;
@@ -129,6 +133,12 @@ impl Experiment {
     }
 }
 
+/// `sigma` to four significant bits. Its last digits differ between kinds of processors, and the unit of exact sums must not.
+fn rounded(sigma: f64) -> f64 {
+    let unit = 2f64.powi(sigma.log2().floor() as i32 - 3);
+    (sigma / unit).round() * unit
+}
+
 /// One thread's memory for trials of an [`Experiment`].
 pub struct Worker<'a> {
     experiment: &'a Experiment,
@@ -159,6 +169,8 @@ pub struct Estimation {
     pub estimator: String,
     /// See `estimator`.
     pub covariance: String,
+    /// See [`Experiment::single_run`].
+    pub single_run: bool,
     /// The parameters with their truth and scale.
     pub parameters: Vec<ParameterHeader>,
 }
@@ -183,7 +195,7 @@ pub struct ParameterHeader {
 
 impl Content for Estimation {
     type Gathered = Tally;
-    const SCHEMA: &'static str = "armid.shard/4";
+    const SCHEMA: &'static str = "armid.shard/5";
 
     fn nothing(&self) -> Tally {
         Tally::new(self.parameters.len())
@@ -191,15 +203,42 @@ impl Content for Estimation {
 
     fn difference(&self, expected: &Self) -> Option<Difference> {
         let methods = |e: &Self| format!("{} with {}", e.estimator, e.covariance);
-        if methods(self) != methods(expected) {
-            let (found, expected) = (methods(self), methods(expected));
-            return Some(Difference { what: "estimator", found, expected });
-        }
-        (self.parameters != expected.parameters).then(|| Difference {
-            what: "parameters",
-            found: format!("{} of them or their truth", self.parameters.len()),
-            expected: format!("{} others", expected.parameters.len()),
-        })
+        let runs = |e: &Self| if e.single_run { "a single run" } else { "repeated" };
+        let counts = [self, expected].map(|e| e.parameters.len());
+        let mut pairs = self.parameters.iter().zip(&expected.parameters);
+        Difference::between("estimator", methods(self), methods(expected))
+            .or_else(|| Difference::between("motion", runs(self), runs(expected)))
+            .or_else(|| Difference::between("number of parameters", counts[0], counts[1]))
+            .or_else(|| pairs.find_map(|(own, other)| own.difference(other)))
+    }
+}
+
+/// Truths that differ by less than this share of a σ are one, and σ that differ by less than this share of themselves: kinds of
+/// processors differ by some 1e-14, and 10⁹ trials tell a mean to 3e-5 of a σ and a σ to 2e-5 of itself.
+const ROUND_OFF: f64 = 1e-6;
+
+impl ParameterHeader {
+    /// In what it differs from `expected`, but for round-off. The unit of exact sums is the same or it is not.
+    fn difference(&self, expected: &Self) -> Option<Difference> {
+        let of = |what: &str| format!("{what} of {}", self.name);
+        let in_words = |p: &Self| format!("{} in {}", p.formula, p.unit);
+        let is_near = |own: f64, other: f64, unit: f64| (own - other).abs() <= ROUND_OFF * unit;
+        let truth = || {
+            let is_same = is_near(self.truth, expected.truth, self.scale);
+            let different = Difference::between(of("truth"), self.truth, expected.truth);
+            different.filter(|_| !is_same)
+        };
+        let least = || {
+            let [own, other] = [self, expected].map(|p| p.sigma_least);
+            let is_same = own.zip(other).is_some_and(|(own, other)| is_near(own, other, own));
+            let [own, other] =
+                [own, other].map(|s| s.map_or("unknown".to_owned(), |s| s.to_string()));
+            Difference::between(of("least σ"), own, other).filter(|_| !is_same)
+        };
+        Difference::between("parameter", in_words(self), in_words(expected))
+            .or_else(truth)
+            .or_else(least)
+            .or_else(|| Difference::between(of("unit"), self.scale, expected.scale))
     }
 }
 
@@ -207,7 +246,6 @@ impl Trials for Experiment {
     type Content = Estimation;
     type Worker<'a> = Worker<'a>;
     type Error = TrialError;
-    const BATCH_PER_THREAD: u64 = 16;
 
     fn scenario(&self) -> &Scenario {
         &self.simulation.scenario
@@ -228,6 +266,7 @@ impl Trials for Experiment {
         Estimation {
             estimator: self.estimator.to_string(),
             covariance: self.covariance.to_string(),
+            single_run: self.single_run,
             parameters,
         }
     }
@@ -238,5 +277,61 @@ impl Trials for Experiment {
 
     fn trial(worker: &mut Worker<'_>, trial: u64) -> Result<Outcomes, TrialError> {
         worker.trial(trial)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn estimation(truth: f64, scale: f64, sigma_least: Option<f64>) -> Estimation {
+        let parameter = ParameterHeader {
+            name: "mx2".into(),
+            formula: "mx2 - 0.425 m3".into(),
+            unit: "kg m".into(),
+            truth,
+            scale,
+            sigma_least,
+        };
+        Estimation {
+            estimator: "spectral".into(),
+            covariance: "spectral".into(),
+            single_run: false,
+            parameters: vec![parameter],
+        }
+    }
+
+    /// Processors with and without fused multiply-add differ by some 1e-14 of a σ: less than what is taken for a difference by
+    /// as much as any trials can tell.
+    #[test]
+    fn round_off_is_no_other_run() {
+        let expected = estimation(-3.9, 0.0025, Some(0.002));
+        let near = estimation(-3.9 + 1e-12 * 0.0025, 0.0025, Some(0.002 * (1.0 + 1e-12)));
+        assert_eq!(near.difference(&expected), None);
+        let unknown = estimation(-3.9, 0.0025, None);
+        assert_eq!(unknown.difference(&unknown), None);
+        let cases = [
+            (estimation(-3.8, 0.0025, Some(0.002)), "truth of mx2", "-3.8", "-3.9"),
+            (estimation(-3.9, 0.0025, Some(0.003)), "least σ of mx2", "0.003", "0.002"),
+            (unknown, "least σ of mx2", "unknown", "0.002"),
+            (estimation(-3.9, 0.003, Some(0.002)), "unit of mx2", "0.003", "0.0025"),
+        ];
+        for (other, what, found, wanted) in cases {
+            let difference = other.difference(&expected).unwrap();
+            let Difference { what: part, found: own, expected: others } = &difference;
+            assert_eq!([part, own, others], [what, found, wanted]);
+        }
+    }
+
+    /// Between two values of four significant bits one in 10¹¹ of σ lies so close to the middle that round-off decides.
+    #[test]
+    fn the_unit_of_the_sums_is_free_of_round_off() {
+        for sigma in [2.531e-3, 1.0, 0.999_999, 7.3e4, 1e-9] {
+            let unit = rounded(sigma);
+            assert!((unit / sigma - 1.0).abs() <= 1.0 / 16.0, "{unit} of {sigma}");
+            for off in [-1e-13, 1e-13] {
+                assert_eq!(rounded(sigma * (1.0 + off)), unit);
+            }
+        }
     }
 }

@@ -72,7 +72,7 @@ impl Scenario {
         // The log does not tell how its motion was begun.
         let requirements = Requirements::default();
         let run_in_s = match Excitation::fitted(&arm, &requirements, series.clone(), 1, false) {
-            Err(ExcitationError::NoRunIn { .. }) => RUN_IN_S,
+            Err(ExcitationError::NoRunIn { .. } | ExcitationError::PeriodPasses { .. }) => RUN_IN_S,
             fitted => fitted?.run_in_s(),
         };
         // Its periods begin with a row, as those of the log do.

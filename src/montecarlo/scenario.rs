@@ -86,7 +86,7 @@ pub(super) struct MotionEntry {
     /// Built-in name or JSON file.
     pub(super) trajectory: String,
     periods: usize,
-    /// Length of the run-in from rest, s; chosen inside the limits where left out.
+    /// Length of the run-in from rest, s; where left out chosen inside the limits, if there is one.
     run_in_s: Option<f64>,
 }
 
@@ -271,7 +271,7 @@ impl MotionEntry {
             Some(run_in_s) => Excitation::new(series, run_in_s, self.periods)?,
             None => {
                 let requirements = Requirements::default();
-                Excitation::fitted(arm, &requirements, series, self.periods, false)?
+                Excitation::fitted_without_limits(arm, &requirements, series, self.periods)?
             }
         })
     }

@@ -1,15 +1,18 @@
 //! A stretch of trials: run in parallel, saved, resumed, merged.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::trials::{Content, Difference, Gathered, Trials, run_one};
+use super::folder::AnyHeader;
+pub use super::merged::{Merged, merge, same_run};
+use super::trials::{Content, Gathered, Trials, run_one};
 use crate::output::{OutputError, write_atomically};
 
 /// What must be equal for two shards to belong together.
@@ -20,6 +23,8 @@ pub struct Header<C: Content> {
     pub schema: String,
     /// Version of the program.
     pub version: String,
+    /// SHA-256 of the program; empty where it is not known. The one part in which shards of one run may differ.
+    pub program: String,
     /// Name of the scenario.
     pub scenario: String,
     /// SHA-256 of the scenario's text, its robot and its motions.
@@ -76,11 +81,55 @@ pub enum ShardError {
         /// The file.
         file: PathBuf,
         /// Which part of the header differs.
-        what: &'static str,
+        what: String,
         /// Its value.
         found: String,
         /// The value of the first file.
         expected: String,
+    },
+    /// A shard that another build of the program has begun.
+    #[error(
+        "{file}: its first {trials} trials were run by another build of this program (SHA-256 {found}, now {expected}): go on \
+         with that one, or begin again in another --out"
+    )]
+    OtherProgram {
+        /// The file.
+        file: PathBuf,
+        /// Trials that have been run.
+        trials: u64,
+        /// The build that ran them.
+        found: String,
+        /// This one.
+        expected: String,
+    },
+    /// Shards of a run that is cut otherwise.
+    #[error(
+        "{file}: trials {start} up to {end} are none of the {shards} shards of {trials} trials: this folder is another run's, or \
+         --trials or --shard were others; give those, or another --out"
+    )]
+    OtherCut {
+        /// The file.
+        file: PathBuf,
+        /// First trial of the shard.
+        start: u64,
+        /// The one behind its last.
+        end: u64,
+        /// Trials of the run that was asked for.
+        trials: u64,
+        /// Its shards.
+        shards: u64,
+    },
+    /// Shards of a run of another length.
+    #[error(
+        "{file}: it is a shard of {found} trials, not of {expected}: give --trials {found} to go on, or another --out"
+    )]
+    OtherLength {
+        /// The file.
+        file: PathBuf,
+        /// Trials of its run.
+        found: u64,
+        /// Trials that were asked for.
+        expected: u64,
     },
     /// Trials counted twice.
     #[error("{file}: trials {start}…{end} are in another shard too")]
@@ -114,12 +163,7 @@ pub fn shard_range(trials: u64, index: u64, count: u64) -> Range<u64> {
     bound(index)..bound(index + 1)
 }
 
-/// File of the shard that holds `range`.
-pub fn shard_path(folder: &Path, range: &Range<u64>) -> PathBuf {
-    folder.join(format!("shard-{:012}-{:012}.json", range.start, range.end))
-}
-
-/// Longest time whose work a kill can lose.
+/// Longest time whose work a kill can lose, the trials under way aside.
 const SAVE_EVERY: Duration = Duration::from_secs(5);
 
 impl<C: Content> Shard<C> {
@@ -132,6 +176,7 @@ impl<C: Content> Shard<C> {
             header: Header {
                 schema: C::SCHEMA.to_owned(),
                 version: env!("CARGO_PKG_VERSION").to_owned(),
+                program: String::new(),
                 scenario: scenario.name.clone(),
                 scenario_sha256: scenario.sha256.clone(),
                 seed: scenario.seed,
@@ -149,11 +194,12 @@ impl<C: Content> Shard<C> {
         let text = std::fs::read_to_string(file)
             .map_err(|source| ShardError::Read { file: file.to_owned(), source })?;
         let format = |message: String| ShardError::Format { file: file.to_owned(), message };
-        let shard: Self = serde_json::from_str(&text).map_err(|e| format(e.to_string()))?;
-        if shard.header.schema != C::SCHEMA {
-            let (found, expected) = (&shard.header.schema, C::SCHEMA);
-            return Err(format(format!("schema {found}, expected {expected}")));
+        let AnyHeader { schema: found, .. } =
+            AnyHeader::within(&text).map_err(|e| format(e.to_string()))?;
+        if found != C::SCHEMA {
+            return Err(format(format!("schema {found}, expected {}", C::SCHEMA)));
         }
+        let shard: Self = serde_json::from_str(&text).map_err(|e| format(e.to_string()))?;
         let [start, end] = shard.range;
         let run = shard.next.checked_sub(start);
         if shard.next > end || run != Some(shard.tally.trials()) {
@@ -171,6 +217,20 @@ impl<C: Content> Shard<C> {
     /// Writes the shard file as a whole.
     pub fn save(&self, file: &Path) -> Result<(), ShardError> {
         Ok(write_atomically(file, |out| serde_json::to_writer(out, self).map_err(Into::into))?)
+    }
+
+    /// Refuses to go on with the shard of `file` where another program than the one with the SHA-256 `program` has begun it.
+    pub fn check_program(&self, file: &Path, program: &str) -> Result<(), ShardError> {
+        let found = &self.header.program;
+        if found == program {
+            return Ok(());
+        }
+        Err(ShardError::OtherProgram {
+            file: file.to_owned(),
+            trials: self.next - self.range[0],
+            found: found.clone(),
+            expected: program.to_owned(),
+        })
     }
 
     /// Whether all its trials have been run.
@@ -194,158 +254,155 @@ impl<C: Content> Shard<C> {
             .num_threads(threads)
             .build()
             .map_err(|e| ShardError::Threads { threads, message: e.to_string() })?;
-        let mut workers: Vec<_> = (0..threads).map(|_| experiment.worker()).collect();
-        let mut saved = Instant::now();
-        while !self.is_complete() && !stop.load(Ordering::Relaxed) {
-            let begun = Instant::now();
-            let end = (self.next + T::BATCH_PER_THREAD * threads as u64).min(self.range[1]);
-            let trials = self.next..end;
-            // Thread t runs every threads-th trial of the batch; sums do not depend on the order.
-            let parts: Vec<C::Gathered> = pool.install(|| {
-                workers
-                    .par_iter_mut()
-                    .enumerate()
-                    .map(|(t, worker)| {
-                        let mut tally = experiment.content().nothing();
-                        for trial in trials.clone().skip(t).step_by(threads) {
-                            run_one::<T>(worker, trial, &mut tally);
+        let workers: Vec<_> = (0..threads).map(|_| experiment.worker()).collect();
+        let end = self.range[1];
+        // Threads take trials in their order, and finish what they took: what was run leaves no gap.
+        let next = &AtomicU64::new(self.next);
+        let (sender, outcomes) = channel();
+        pool.in_place_scope(|scope| {
+            for mut worker in workers {
+                let sender = sender.clone();
+                scope.spawn(move |_| {
+                    while !stop.load(Ordering::Relaxed) {
+                        let trial = next.fetch_add(1, Ordering::Relaxed);
+                        if trial >= end {
+                            break;
                         }
-                        tally
-                    })
-                    .collect()
-            });
-            parts.iter().for_each(|part| self.tally.merge(part));
-            self.next = end;
-            self.seconds += begun.elapsed().as_secs_f64();
+                        let mut outcome = experiment.content().nothing();
+                        run_one::<T>(&mut worker, trial, &mut outcome);
+                        if sender.send((trial, outcome)).is_err() {
+                            break;
+                        }
+                    }
+                });
+            }
+            drop(sender);
+            self.collect(outcomes, file, progress)
+        })?;
+        file.map_or(Ok(()), |file| self.save(file))
+    }
+
+    /// Adds the outcomes of trials in the order of their numbers, until no more can come, and saves now and then.
+    fn collect(
+        &mut self,
+        outcomes: Receiver<(u64, C::Gathered)>,
+        file: Option<&Path>,
+        progress: &(dyn Fn(u64) + Sync),
+    ) -> Result<(), ShardError> {
+        let (begun, before) = (Instant::now(), self.seconds);
+        let mut saved = begun;
+        // What came before the trials in front of it.
+        let mut early = BTreeMap::new();
+        for (trial, outcome) in outcomes {
+            early.insert(trial, outcome);
+            while let Some(outcome) = early.remove(&self.next) {
+                self.tally.merge(&outcome);
+                self.next += 1;
+            }
+            self.seconds = before + begun.elapsed().as_secs_f64();
             progress(self.next - self.range[0]);
             if let Some(file) = file.filter(|_| saved.elapsed() > SAVE_EVERY) {
                 self.save(file)?;
                 saved = Instant::now();
             }
         }
-        file.map_or(Ok(()), |file| self.save(file))
+        Ok(())
     }
 }
 
-/// Shards put together.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Merged<C: Content> {
-    /// Common header.
-    pub header: Header<C>,
-    /// All trials.
-    pub tally: C::Gathered,
-    /// Sum of the time spent on trials, s.
-    pub seconds: f64,
-    /// Trials that no shard has run.
-    pub missing: Vec<Range<u64>>,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::montecarlo::blind::{BlindContent, Record};
+    use crate::montecarlo::trials::Failure;
+    use crate::montecarlo::{Job, Scenario};
+    use std::sync::Mutex;
 
-/// Merges shards (with the files they come from); any order gives the same bits.
-pub fn merge<C: Content>(mut shards: Vec<(PathBuf, Shard<C>)>) -> Result<Merged<C>, ShardError> {
-    shards.sort_by_key(|(_, shard)| shard.range);
-    let Some((_, first)) = shards.first() else {
-        return Err(ShardError::Empty { folder: PathBuf::new() });
-    };
-    let header = first.header.clone();
-    let mut merged = Merged {
-        tally: header.content.nothing(),
-        header: header.clone(),
-        seconds: 0.0,
-        missing: Vec::new(),
-    };
-    let mut reached = 0;
-    for (file, shard) in &shards {
-        same_run(file, &shard.header, &header)?;
-        let [start, end] = shard.range;
-        if start < reached {
-            return Err(ShardError::Overlap { file: file.clone(), start, end: end.max(1) - 1 });
+    /// Trials that say their number and give nothing; each tells `seen` before it ends.
+    struct Counting<F> {
+        scenario: Scenario,
+        seen: F,
+    }
+
+    impl<F: Fn(u64) + Sync> Trials for Counting<F> {
+        type Content = BlindContent;
+        type Worker<'a>
+            = &'a F
+        where
+            Self: 'a;
+        type Error = String;
+
+        fn scenario(&self) -> &Scenario {
+            &self.scenario
         }
-        let mut lack = |from: u64, to: u64| {
-            if from < to {
-                merged.missing.push(from..to);
+
+        fn content(&self) -> BlindContent {
+            BlindContent { known: Vec::new() }
+        }
+
+        fn worker(&self) -> &F {
+            &self.seen
+        }
+
+        fn trial(seen: &mut &F, trial: u64) -> Result<Record, String> {
+            (*seen)(trial);
+            Err(trial.to_string())
+        }
+    }
+
+    fn counting<F: Fn(u64) + Sync>(seen: F) -> Counting<F> {
+        let Ok(Job::Estimates(scenario)) = Job::load(None) else { panic!("the default scenario") };
+        Counting { scenario: *scenario, seen }
+    }
+
+    fn trials_of(shard: &Shard<BlindContent>) -> Vec<u64> {
+        shard.tally.failures.iter().map(|Failure { trial, .. }| *trial).collect()
+    }
+
+    /// The flag is looked at before every trial: what was begun is finished, nothing else, and no trial in front is left out.
+    #[test]
+    fn an_interrupted_shard_has_no_gap_and_goes_on() {
+        let stop = AtomicBool::new(false);
+        let experiment = counting(|trial| {
+            if trial >= 105 {
+                stop.store(true, Ordering::Relaxed);
             }
-        };
-        lack(reached, start);
-        lack(shard.next, end);
-        reached = end;
-        merged.tally.merge(&shard.tally);
-        merged.seconds += shard.seconds;
-    }
-    if reached < header.trials {
-        merged.missing.push(reached..header.trials);
-    }
-    Ok(merged)
-}
-
-/// The names of all shard files in the given folders.
-pub fn shard_files(folders: &[PathBuf]) -> Result<Vec<PathBuf>, ShardError> {
-    let mut all = Vec::new();
-    for folder in folders {
-        let read = |source| ShardError::Read { file: folder.clone(), source };
-        let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
-            .map_err(read)?
-            .map(|entry| entry.map(|e| e.path()))
-            .collect::<Result<_, _>>()
-            .map_err(read)?;
-        files.retain(|f| {
-            let name = f.file_name().and_then(|n| n.to_str()).unwrap_or_default();
-            name.starts_with("shard-") && name.ends_with(".json")
         });
-        if files.is_empty() {
-            return Err(ShardError::Empty { folder: folder.clone() });
-        }
-        all.append(&mut files);
+        let mut shard = Shard::new(&experiment, 1000, 100..200);
+        let reached = Mutex::new(0);
+        let progress = |n: u64| *reached.lock().unwrap() = n;
+        shard.run(&experiment, 3, None, &stop, &progress).unwrap();
+        // Each of three threads takes at most one trial from the 105th on.
+        assert!((106..=108).contains(&shard.next), "{}", shard.next);
+        assert_eq!(trials_of(&shard), (100..shard.next).collect::<Vec<_>>());
+        assert_eq!(*reached.lock().unwrap(), shard.next - 100);
+        stop.store(false, Ordering::Relaxed);
+        let experiment = counting(|_| ());
+        shard.run(&experiment, 2, None, &stop, &progress).unwrap();
+        assert!(shard.is_complete());
+        assert_eq!(trials_of(&shard), (100..200).collect::<Vec<_>>());
     }
-    Ok(all)
-}
 
-/// The shards in `files`, each with its file.
-pub fn load_all<C: Content>(files: &[PathBuf]) -> Result<Vec<(PathBuf, Shard<C>)>, ShardError> {
-    files.iter().map(|file| Ok((file.clone(), Shard::load(file)?))).collect()
-}
-
-/// Format of the shard in `file`: which kind of experiment it is part of.
-pub fn schema_of(file: &Path) -> Result<String, ShardError> {
-    #[derive(Deserialize)]
-    struct AnyShard {
-        header: AnyHeader,
+    /// Files of older programs are said to be of another format, not to lack this or that.
+    #[test]
+    fn the_format_is_looked_at_first() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let old = r#"{"header": {"schema": "armid.blind-shard/2", "trials": 3}}"#;
+        std::fs::write(file.path(), old).unwrap();
+        let error = Shard::<BlindContent>::load(file.path()).unwrap_err().to_string();
+        assert!(error.contains("schema armid.blind-shard/2, expected"), "{error}");
     }
-    #[derive(Deserialize)]
-    struct AnyHeader {
-        schema: String,
-    }
-    let text = std::fs::read_to_string(file)
-        .map_err(|source| ShardError::Read { file: file.to_owned(), source })?;
-    let shard: AnyShard = serde_json::from_str(&text)
-        .map_err(|e| ShardError::Format { file: file.to_owned(), message: e.to_string() })?;
-    Ok(shard.header.schema)
-}
 
-/// Refuses a header that differs, naming the first part that does.
-pub fn same_run<C: Content>(
-    file: &Path,
-    found: &Header<C>,
-    expected: &Header<C>,
-) -> Result<(), ShardError> {
-    let parts: [(&'static str, String, String); 5] = [
-        ("program version", found.version.clone(), expected.version.clone()),
-        ("scenario", found.scenario.clone(), expected.scenario.clone()),
-        (
-            "scenario text, robot or motion",
-            found.scenario_sha256.clone(),
-            expected.scenario_sha256.clone(),
-        ),
-        ("seed", found.seed.to_string(), expected.seed.to_string()),
-        ("number of trials", found.trials.to_string(), expected.trials.to_string()),
-    ];
-    let outer = parts
-        .into_iter()
-        .find(|(_, found, expected)| found != expected)
-        .map(|(what, found, expected)| Difference { what, found, expected });
-    match outer.or_else(|| found.content.difference(&expected.content)) {
-        Some(Difference { what, found, expected }) => {
-            Err(ShardError::Mismatch { file: file.to_owned(), what, found, expected })
-        }
-        None => Ok(()),
+    /// What one build began another must not go on with: the file could not say who ran what.
+    #[test]
+    fn a_shard_stays_with_its_program() {
+        let of = |program: &str| {
+            let mut shard = Shard::new(&counting(|_| ()), 1000, 0..10);
+            shard.header.program = program.to_owned();
+            shard
+        };
+        of("a").check_program(Path::new("s.json"), "a").unwrap();
+        let error = of("a").check_program(Path::new("s.json"), "b").unwrap_err();
+        assert!(matches!(error, ShardError::OtherProgram { .. }), "{error}");
     }
 }

@@ -1,8 +1,8 @@
 //! What a run says, as the JSON that others read.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
-use super::calibration::{Calibration, Check, Verdict};
+use super::calibration::{Calibration, Check, Verdict, claims};
 use super::efficiency::Efficiency;
 use super::experiment::Estimation;
 use super::shard::Merged;
@@ -30,7 +30,7 @@ pub struct Summary {
     pub covariance: String,
     /// One entry per base parameter.
     pub parameters: Vec<ParameterSummary>,
-    /// Coverage of nominal 95 % intervals, mean over parameters.
+    /// Coverage of nominal 95 % intervals, mean over parameters; failed trials cover none.
     pub coverage_mean: f64,
     /// The parameter covered worst (furthest from 95 %).
     pub coverage_worst: NamedValue,
@@ -42,7 +42,7 @@ pub struct Summary {
     pub efficiency: Option<Efficiency>,
     /// The checks behind the verdict.
     pub checks: Vec<CheckSummary>,
-    /// Trials per second of wall time.
+    /// Trials per second of wall time; of merged shards, of the sum of their times.
     pub trials_per_second: f64,
     /// Whether the claimed σ is true.
     pub verdict: Verdict,
@@ -67,7 +67,7 @@ pub struct ParameterSummary {
     pub sigma_predicted: f64,
     /// The Cramér–Rao bound; null where the noise has no known law.
     pub sigma_least: Option<f64>,
-    /// Share of 95 % intervals that hold the truth.
+    /// Share of 95 % intervals that hold the truth, those of failed trials included, which hold none.
     pub coverage: f64,
 }
 
@@ -87,36 +87,52 @@ pub struct CheckSummary {
     pub what: String,
     /// The parameter that decided; null for statistics over all.
     pub parameter: Option<String>,
-    /// Measured value.
+    /// Measured value; null where nothing was measured.
+    #[serde(deserialize_with = "number")]
     pub value: f64,
     /// Where the true value lies, given the number of trials.
+    #[serde(deserialize_with = "ends")]
     pub interval: [f64; 2],
     /// Where the claim says that it lies.
     pub claim: [f64; 2],
     /// The answer.
     pub verdict: Verdict,
+    /// Why nothing was measured, where more trials would not help; null elsewhere.
+    pub reason: Option<String>,
+}
+
+/// What JSON has as null is no number.
+fn number<'de, D: Deserializer<'de>>(source: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(source)?.unwrap_or(f64::NAN))
+}
+
+/// Of two numbers, see [`number`].
+fn ends<'de, D: Deserializer<'de>>(source: D) -> Result<[f64; 2], D::Error> {
+    let ends: [Option<f64>; 2] = Deserialize::deserialize(source)?;
+    Ok(ends.map(|end| end.unwrap_or(f64::NAN)))
 }
 
 impl CheckSummary {
     /// Of `check`, whose parameter k is called `name(k)`.
     pub fn of(check: &Check, name: impl Fn(usize) -> String) -> Self {
         Self {
-            what: check.what.to_owned(),
+            what: check.statistic.in_words().to_owned(),
             parameter: check.parameter.map(name),
             value: check.value,
             interval: check.interval,
             claim: check.claim,
             verdict: check.verdict,
+            reason: check.reason.map(str::to_owned),
         }
     }
 }
 
 impl Summary {
-    /// Of merged shards; `wall_s` is the wall time that the trials took.
+    /// Of merged shards; `wall_s` is the time that the trials took.
     pub fn of(merged: &Merged<Estimation>, wall_s: f64) -> Self {
         let Merged { header, tally, missing, .. } = merged;
         let content = &header.content;
-        let calibration = Calibration::of(tally);
+        let calibration = Calibration::of(tally, claims::mean_coverage(content.single_run));
         let parameters: Vec<ParameterSummary> = content
             .parameters
             .iter()
@@ -191,10 +207,74 @@ impl Summary {
                 });
                 format!("The claim does not hold{reason}.")
             }
-            Verdict::NotEvaluated => format!(
-                "{} trials with an estimate are too few to tell whether the predicted σ is true.",
-                self.trials - self.failed
-            ),
+            Verdict::NotEvaluated => {
+                let mut open = self.checks.iter().filter(|c| c.verdict == Verdict::NotEvaluated);
+                match (open.next().and_then(|c| Some((&c.what, c.reason.as_ref()?))), open.next()) {
+                    (Some((what, reason)), None) => format!(
+                        "What could be checked of the predicted σ holds. Not checked is the {what}: {reason}."
+                    ),
+                    _ => format!(
+                        "{} trials with an estimate are too few to tell whether the predicted σ is true.",
+                        self.trials - self.failed
+                    ),
+                }
+            }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::montecarlo::tally::{Outcome, Outcomes, Tally};
+
+    /// 4000 trials that are as claimed, without a distance: no more of them would tell what is not known.
+    #[test]
+    fn what_cannot_be_checked_is_said_with_its_reason() {
+        let mut tally = Tally::new(1);
+        for trial in 0..4000 {
+            let size = if trial % 20 < 2 { 2.0 } else { 0.82 };
+            let z = if trial % 2 == 0 { size } else { -size };
+            // One in twenty is not held.
+            let quantile_95 = if trial % 20 == 0 { 1.96 } else { 2.01 };
+            let parameters = vec![Outcome { z, sigma: 1.0, quantile_95 }];
+            tally.add(&Outcomes { parameters, distance: None });
+        }
+        let calibration = Calibration::of(&tally, claims::MEAN_COVERAGE);
+        let checks: Vec<CheckSummary> = calibration
+            .checks
+            .iter()
+            .map(|check| CheckSummary::of(check, |_| "mx2".to_owned()))
+            .collect();
+        let summary = Summary {
+            scenario: String::new(),
+            trials: 4000,
+            failed: 0,
+            failures: Vec::new(),
+            missing: Vec::new(),
+            estimator: String::new(),
+            covariance: String::new(),
+            parameters: Vec::new(),
+            coverage_mean: 0.95,
+            coverage_worst: NamedValue { name: String::new(), value: 0.95 },
+            sigma_ratio_pooled: 1.0,
+            joint_ratio: None,
+            efficiency: None,
+            checks,
+            trials_per_second: 1.0,
+            verdict: calibration.verdict,
+        };
+        assert_eq!(summary.verdict, Verdict::NotEvaluated);
+        let sentence = summary.sentence();
+        assert!(
+            sentence.contains("all parameters together: the covariance is known"),
+            "{sentence}"
+        );
+        // What was not measured is null, and is read back.
+        let text = serde_json::to_string(&summary.checks).unwrap();
+        let read: Vec<CheckSummary> = serde_json::from_str(&text).unwrap();
+        let last = &read[read.len() - 1];
+        assert!(last.value.is_nan() && last.interval.iter().all(|end| end.is_nan()), "{last:?}");
+        assert_eq!(last.reason, summary.checks[read.len() - 1].reason);
     }
 }

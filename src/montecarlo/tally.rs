@@ -153,7 +153,7 @@ pub struct ParameterStatistics {
     pub sigma_empirical: f64,
     /// Root mean square of σ̂/scale.
     pub sigma_predicted: f64,
-    /// Share of trials whose 95 % interval holds the truth.
+    /// Share of trials whose 95 % interval holds the truth; those that failed hold none.
     pub coverage: f64,
 }
 
@@ -246,30 +246,31 @@ impl Tally {
             bias,
             sigma_empirical: if self.succeeded < 2 { f64::NAN } else { variance.max(0.0).sqrt() },
             sigma_predicted: (from_units(sums.sigma_squared) / n).sqrt(),
-            coverage: sums.covered as f64 / n,
+            coverage: sums.covered as f64 / self.trials() as f64,
         }
     }
 
     /// Coverage averaged over the parameters, and the standard error of that average. The error
     /// comes from the scatter between trials, so that correlated parameters are not counted as
-    /// independent evidence.
+    /// independent evidence. A trial that failed covers none.
     pub fn mean_coverage(&self) -> (f64, f64) {
-        let n = self.succeeded as f64;
+        let n = self.trials() as f64;
         let b = self.parameters.len() as f64;
         let mean = self.covered as f64 / n;
         let variance = (self.covered_squared as f64 - n * mean * mean) / (n - 1.0);
         (mean / b, (variance.max(0.0) / n).sqrt() / b)
     }
 
-    /// Empirical over predicted σ pooled over the parameters, √(Σ z² / Σ σ̂²), and its standard
-    /// error, again from the scatter between trials.
+    /// Empirical over predicted σ pooled over the parameters, √(Σ s² / Σ σ̂²), and its standard
+    /// error, again from the scatter between trials: of squares about the truth, which scatter no less than those about the mean.
     pub fn pooled_ratio(&self) -> (f64, f64) {
-        let n = self.succeeded as f64;
-        let (spread, error) = mean(self.succeeded, self.spread, self.spread_squared);
-        let predicted: i128 = self.parameters.iter().map(|sums| sums.sigma_squared).sum();
-        let predicted = from_units(predicted) / n / self.parameters.len() as f64;
-        let ratio = (spread / predicted).sqrt();
-        (ratio, 0.5 * ratio * error / spread)
+        let (_, error) = mean(self.succeeded, self.spread, self.spread_squared);
+        let of_all = |square: fn(ParameterStatistics) -> f64| -> f64 {
+            (0..self.parameters()).map(|k| square(self.statistics(k))).sum()
+        };
+        let empirical = of_all(|s| s.sigma_empirical.powi(2));
+        let ratio = (empirical / of_all(|s| s.sigma_predicted.powi(2))).sqrt();
+        (ratio, 0.5 * ratio * error * self.parameters() as f64 / empirical)
     }
 
     /// Error over predicted covariance of all parameters together, the root of the mean of [`Outcomes::distance`], and its
@@ -352,7 +353,7 @@ mod tests {
         assert!((statistics.bias - mean).abs() < 1e-11);
         assert!((statistics.sigma_empirical - sd).abs() < 1e-11);
         let covered = (0..100).filter(|k| k % 10 != 9).filter(|&k| outcome(k, 1).covered()).count();
-        assert_eq!(statistics.coverage, covered as f64 / n);
+        assert_eq!(statistics.coverage, covered as f64 / 100.0);
         let distances: Vec<f64> = (0..100).filter(|k| k % 10 != 9).map(distance).collect();
         let mean = distances.iter().sum::<f64>() / n;
         let sd = (distances.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
@@ -362,6 +363,20 @@ mod tests {
         assert!(
             (whole.histogram().iter().map(|(_, share)| share).sum::<f64>() - 1.0).abs() < 1e-12
         );
+    }
+
+    /// 50 trials of ±2 and 50 of ±1 about a bias of 3: s² is 2.5 · 100/99, whatever the bias.
+    #[test]
+    fn the_pooled_ratio_is_about_the_mean() {
+        let mut tally = Tally::new(1);
+        for k in 0..100 {
+            let size = if k < 50 { 2.0 } else { 1.0 };
+            let z = 3.0 + if k % 2 == 0 { size } else { -size };
+            let parameters = vec![Outcome { z, sigma: 1.0, quantile_95: 1.96 }];
+            tally.add(&Outcomes { parameters, distance: None });
+        }
+        let (ratio, _) = tally.pooled_ratio();
+        assert!((ratio - (2.5_f64 * 100.0 / 99.0).sqrt()).abs() < 1e-11, "{ratio}");
     }
 
     #[test]

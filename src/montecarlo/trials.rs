@@ -22,8 +22,6 @@ pub trait Trials: Sync {
         Self: 'a;
     /// Why a trial gives nothing.
     type Error: Display;
-    /// Trials between two looks at the clock, per thread.
-    const BATCH_PER_THREAD: u64;
 
     /// Name, text and seed.
     fn scenario(&self) -> &Scenario;
@@ -61,11 +59,26 @@ pub trait Content: Debug + Clone + PartialEq + Serialize + DeserializeOwned {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Difference {
     /// Which part.
-    pub what: &'static str,
+    pub what: String,
     /// Its value.
     pub found: String,
     /// The value of the run it should belong to.
     pub expected: String,
+}
+
+impl Difference {
+    /// Of the values of the part `what`, where they differ.
+    pub fn between<V: PartialEq + ToString>(
+        what: impl Into<String>,
+        found: V,
+        expected: V,
+    ) -> Option<Self> {
+        (found != expected).then(|| Self {
+            what: what.into(),
+            found: found.to_string(),
+            expected: expected.to_string(),
+        })
+    }
 }
 
 /// Sums over trials, or their list: the same in any order.
@@ -99,7 +112,7 @@ pub struct Failure {
     pub reason: String,
 }
 
-/// Runs trial `trial` and gathers what comes of it. A panic inside is a failed trial.
+/// Runs trial `trial` and adds what comes of it to `gathered`. A panic inside is a failed trial.
 pub(super) fn run_one<T: Trials>(
     worker: &mut T::Worker<'_>,
     trial: u64,

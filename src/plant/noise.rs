@@ -91,8 +91,11 @@ impl NoiseModel {
                     check(ok, "torque_noise time_constant_s", t, "must be positive")?;
                 }
                 Colour::LowPass { cutoff_hz: f } => {
-                    let ok = f > 0.0 && f < 0.5 * rate_hz;
-                    check(ok, "torque_noise cutoff_hz", f, "must be below half of the log's rate")?;
+                    let key = "torque_noise cutoff_hz";
+                    let requirement =
+                        "must be at least 0.00125: slower noise takes more than an hour to change";
+                    check(f >= FORGOTTEN / LONGEST_S, key, f, requirement)?;
+                    check(f < 0.5 * rate_hz, key, f, "must be below half of the log's rate")?;
                 }
             }
         }
@@ -120,9 +123,8 @@ impl NoiseModel {
             }
             if let Colour::LowPass { cutoff_hz } = *colour {
                 let filter = Butterworth2::new(cutoff_hz / rate_hz);
-                for (sum, r) in
-                    sum.iter_mut().zip(filter.autocorrelation(settled(cutoff_hz, rate_hz)))
-                {
+                let correlation = filter.autocorrelation(settled(cutoff_hz, rate_hz), lags);
+                for (sum, r) in sum.iter_mut().zip(correlation) {
                     *sum += share * r;
                 }
             }
@@ -130,25 +132,15 @@ impl NoiseModel {
         sum
     }
 
-    /// Power at `frequency_hz` of noise sampled at `rate_hz`, relative to white noise of the same
+    /// Power by frequency (Hz) of noise sampled at `rate_hz`, relative to white noise of the same
     /// variance: |H(e^{iω})|² of the filter that makes the colour, its mean over all frequencies 1.
-    pub fn power(&self, frequency_hz: f64, rate_hz: f64) -> f64 {
-        let omega = std::f64::consts::TAU * frequency_hz / rate_hz;
-        let power = |colour: Colour| match colour {
-            Colour::White => 1.0,
-            Colour::Ar1 { time_constant_s } => {
-                let phi = (-1.0 / (rate_hz * time_constant_s)).exp();
-                (1.0 - phi * phi) / (1.0 - 2.0 * phi * omega.cos() + phi * phi)
-            }
-            Colour::LowPass { cutoff_hz } => {
-                let ratio =
-                    (0.5 * omega).tan() / (std::f64::consts::PI * cutoff_hz / rate_hz).tan();
-                let settled = settled(cutoff_hz, rate_hz);
-                let energy = Butterworth2::new(cutoff_hz / rate_hz).energy(settled);
-                1.0 / (1.0 + ratio.powi(4)) / energy
-            }
-        };
-        self.components.iter().map(|c| c.share * power(c.colour)).sum()
+    pub fn spectrum(&self, rate_hz: f64) -> impl Fn(f64) -> f64 + use<> {
+        let part = |c: &Component| (c.share, Spectrum::new(c.colour, rate_hz));
+        let parts: Vec<(f64, Spectrum)> = self.components.iter().map(part).collect();
+        move |frequency_hz: f64| {
+            let omega = std::f64::consts::TAU * frequency_hz / rate_hz;
+            parts.iter().map(|(share, part)| share * part.power(omega)).sum::<f64>()
+        }
     }
 
     /// Adds the noise of one trial to `signals`, sampled at `rate_hz`, with standard deviation `sd[j]`
@@ -181,6 +173,47 @@ impl NoiseModel {
                 for (value, shared) in series.iter_mut().zip(&*shared) {
                     *value += common * shared;
                 }
+            }
+        }
+    }
+}
+
+/// Power by frequency of one colour, with what is the same at all of them worked out once.
+#[derive(Debug, Clone, Copy)]
+enum Spectrum {
+    White,
+    Ar1 {
+        phi: f64,
+    },
+    LowPass {
+        /// tan(π f_c / f_s).
+        corner: f64,
+        energy: f64,
+    },
+}
+
+impl Spectrum {
+    fn new(colour: Colour, rate_hz: f64) -> Self {
+        match colour {
+            Colour::White => Self::White,
+            Colour::Ar1 { time_constant_s } => {
+                Self::Ar1 { phi: (-1.0 / (rate_hz * time_constant_s)).exp() }
+            }
+            Colour::LowPass { cutoff_hz } => Self::LowPass {
+                corner: (std::f64::consts::PI * cutoff_hz / rate_hz).tan(),
+                energy: Butterworth2::new(cutoff_hz / rate_hz).energy(settled(cutoff_hz, rate_hz)),
+            },
+        }
+    }
+
+    /// At ω, rad per sample.
+    fn power(&self, omega: f64) -> f64 {
+        match *self {
+            Self::White => 1.0,
+            Self::Ar1 { phi } => (1.0 - phi * phi) / (1.0 - 2.0 * phi * omega.cos() + phi * phi),
+            Self::LowPass { corner, energy } => {
+                let ratio = (0.5 * omega).tan() / corner;
+                1.0 / (1.0 + ratio.powi(4)) / energy
             }
         }
     }
@@ -229,10 +262,14 @@ impl Process {
     }
 }
 
-/// Samples after which a low-pass has forgotten: its poles decay as exp(−√2 π f_c t), to e⁻²⁰ within
-/// 4.5 / f_c.
+/// The poles of a low-pass decay as exp(−√2 π f_c t), to e⁻²⁰ within this over f_c.
+const FORGOTTEN: f64 = 4.5;
+/// A low-pass must forget within this, s: every process begins with as many samples.
+const LONGEST_S: f64 = 3600.0;
+
+/// Samples after which a low-pass has forgotten.
 fn settled(cutoff_hz: f64, rate_hz: f64) -> usize {
-    (4.5 * rate_hz / cutoff_hz).ceil() as usize
+    (FORGOTTEN * rate_hz / cutoff_hz).ceil() as usize
 }
 
 /// A standard normal number.
@@ -271,12 +308,13 @@ impl Butterworth2 {
         self.gain * (m0 + 2.0 * m1 + m2)
     }
 
-    /// Autocorrelation of its output for white input at all lags at which it is not forgotten, from
-    /// the first `samples` of its impulse response h: r_k = Σ h_i h_{i+k} / Σ h_i².
-    fn autocorrelation(mut self, samples: usize) -> Vec<f64> {
+    /// Autocorrelation of its output for white input at up to `lags` lags at which it is not
+    /// forgotten, from the first `samples` of its impulse response h: r_k = Σ h_i h_{i+k} / Σ h_i².
+    fn autocorrelation(mut self, samples: usize, lags: usize) -> Vec<f64> {
         let h: Vec<f64> = (0..samples).map(|k| self.next(if k == 0 { 1.0 } else { 0.0 })).collect();
         let product = |k: usize| h[k..].iter().zip(&h).map(|(a, b)| a * b).sum::<f64>();
-        (0..samples).map(|k| product(k) / product(0)).collect()
+        let energy = product(0);
+        (0..samples.min(lags)).map(|k| product(k) / energy).collect()
     }
 
     /// Sum of squares of the first `samples` of the impulse response: variance for white input.
@@ -360,11 +398,30 @@ mod tests {
             let model = single(colour);
             let bins = 20_000;
             let frequency = |k: usize| (k as f64 + 0.5) / bins as f64 * 0.5 * RATE_HZ;
-            let mean =
-                (0..bins).map(|k| model.power(frequency(k), RATE_HZ)).sum::<f64>() / bins as f64;
+            let power = model.spectrum(RATE_HZ);
+            let mean = (0..bins).map(|k| power(frequency(k))).sum::<f64>() / bins as f64;
             // The mid-point rule on a smooth spectrum.
             assert!((mean - 1.0).abs() < 1e-5, "{colour:?}: {mean}");
         }
+    }
+
+    /// The inverse transform of the spectrum, by the mid-point rule on a smooth periodic function.
+    #[test]
+    fn autocorrelation_and_spectrum_of_a_low_pass_belong_together() {
+        let model = single(Colour::LowPass { cutoff_hz: 10.0 });
+        let (power, bins) = (model.spectrum(RATE_HZ), 2000);
+        let few = model.autocorrelation(RATE_HZ, 8);
+        for (lag, r) in few.iter().enumerate() {
+            let phase = |k: usize| (k as f64 + 0.5) / bins as f64 * std::f64::consts::PI;
+            let term = |k: usize| {
+                power(phase(k) * RATE_HZ / std::f64::consts::TAU) * (lag as f64 * phase(k)).cos()
+            };
+            let transformed = (0..bins).map(term).sum::<f64>() / bins as f64;
+            assert!((r - transformed).abs() < 1e-8, "lag {lag}: {r} {transformed}");
+        }
+        assert_eq!(few[..], model.autocorrelation(RATE_HZ, 1025)[..8]);
+        // Beyond its memory of 57 samples nothing is left.
+        assert!(model.autocorrelation(RATE_HZ, 60)[57..].iter().all(|r| *r == 0.0));
     }
 
     #[test]
@@ -409,9 +466,14 @@ mod tests {
             of(1.0, Colour::White, -0.1),
             of(1.0, Colour::Ar1 { time_constant_s: 0.0 }, 0.0),
             of(1.0, Colour::LowPass { cutoff_hz: 62.5 }, 0.0),
+            of(1.0, Colour::LowPass { cutoff_hz: f64::NAN }, 0.0),
+            of(1.0, Colour::LowPass { cutoff_hz: 0.0 }, 0.0),
+            of(1.0, Colour::LowPass { cutoff_hz: 1.2e-3 }, 0.0),
         ] {
             assert!(model.validate(RATE_HZ).is_err(), "{model:?}");
         }
         assert_eq!(NoiseModel::real_arm().validate(RATE_HZ), Ok(()));
+        let slow = of(1.0, Colour::LowPass { cutoff_hz: 1.25e-3 }, 0.0);
+        assert_eq!(slow.validate(RATE_HZ), Ok(()));
     }
 }

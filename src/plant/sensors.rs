@@ -11,7 +11,7 @@ use crate::robot::{Arm, JointSignals};
 
 /// One number for all joints, or one for each.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "a number for all joints, or a list with one for each")]
 pub enum PerJoint {
     /// The same at every joint.
     All(f64),
@@ -281,4 +281,17 @@ impl Encoders {
 /// The nearest multiple of `step`.
 pub(super) fn quantised(value: f64, step: f64) -> f64 {
     (value / step).round() * step
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_number_per_joint_is_told_what_it_must_be() {
+        let error = toml::from_str::<SensorConfig>("q_sd_rad = \"2e-5\"").unwrap_err().to_string();
+        assert!(error.contains("a number for all joints, or a list"), "{error}");
+        let list = toml::from_str::<SensorConfig>("q_sd_rad = [1e-5, 2e-5]").unwrap();
+        assert_eq!(list.q_sd_rad, PerJoint::Each(vec![1e-5, 2e-5]));
+    }
 }

@@ -37,8 +37,7 @@ fn best(curve: &Curve, error: impl Fn(&Point) -> f64) -> Option<Point> {
 }
 
 fn sentence(study: &CutoffStudy) -> String {
-    let ratios: Vec<f64> =
-        study.curves.iter().flat_map(|c| &c.points).map(|p| p.measured / p.predicted).collect();
+    let ratios = ratios(study);
     let within = ratios.iter().filter(|r| (0.9..=1.1).contains(*r)).count();
     let worst = ratios.iter().map(|r| r.max(1.0 / r)).fold(1.0, f64::max);
     let cutoffs = |method| {
@@ -98,6 +97,34 @@ fn summary_table(study: &CutoffStudy) -> Table {
     table
 }
 
+/// How well the formulas predict a point whose error is `ratio` times as large.
+fn status(ratio: f64) -> Status {
+    match (ratio - 1.0).abs() {
+        off if off < 0.1 => Status::Good,
+        off if off < 0.3 => Status::Warn,
+        _ => Status::Bad,
+    }
+}
+
+/// Share of the points that the formulas have to predict well.
+const MOST: f64 = 0.9;
+
+/// Of all points with these `ratios`.
+fn overall(ratios: &[f64]) -> Status {
+    let count =
+        |wanted: Status| ratios.iter().filter(|ratio| status(**ratio) == wanted).count() as f64;
+    match count(Status::Good) >= MOST * ratios.len() as f64 {
+        _ if count(Status::Bad) > 0.0 => Status::Bad,
+        true => Status::Good,
+        false => Status::Warn,
+    }
+}
+
+/// Error measured over error predicted, of every point.
+fn ratios(study: &CutoffStudy) -> Vec<f64> {
+    study.curves.iter().flat_map(|c| &c.points).map(|p| p.measured / p.predicted).collect()
+}
+
 fn point_table(curve: &Curve) -> Table {
     let mut table = Table::new([
         Column::number("cutoff", "Hz"),
@@ -112,13 +139,8 @@ fn point_table(curve: &Curve) -> Table {
     ]);
     for p in &curve.points {
         let ratio = p.measured / p.predicted;
-        let status = match (ratio - 1.0).abs() {
-            off if off < 0.1 => Status::Good,
-            off if off < 0.3 => Status::Warn,
-            _ => Status::Bad,
-        };
         table.push_judged(
-            Some(status),
+            Some(status(ratio)),
             [
                 significant(p.cutoff_hz, 3),
                 significant(p.filter_bias, 3),
@@ -189,7 +211,8 @@ fn sigma_table(study: &CutoffStudy) -> Table {
 
 /// The page.
 pub fn page(study: &CutoffStudy, program: Program) -> Result<Page, ReportError> {
-    let verdict = Verdict { status: Status::Good, sentence: sentence(study), facts: Vec::new() };
+    let status = overall(&ratios(study));
+    let verdict = Verdict { status, sentence: sentence(study), facts: Vec::new() };
     let subtitle = format!(
         "{}; {} s of record, {} trials per point",
         study.description, study.record_s, study.trials
@@ -306,4 +329,17 @@ pub fn markdown(study: &CutoffStudy, command: &str) -> String {
         );
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_banner_is_green_where_the_formulas_hold() {
+        let with = |others: &[f64]| overall(&[&[1.0; 9][..], others].concat());
+        assert_eq!(with(&[1.2]), Status::Good);
+        assert_eq!(with(&[1.2, 0.8]), Status::Warn);
+        assert_eq!(with(&[1.4]), Status::Bad);
+    }
 }

@@ -4,7 +4,7 @@ use super::json::Program;
 use super::plot::{Axis, Colour, Grid, Mark};
 use super::{Column, Page, ReportError, Section, Status, Table, Verdict, replay};
 use crate::diagnose::{self, Cause, DetectionLimit, Diagnosis, Finding, Kind, class_holds};
-use crate::number::{percent, resolved, significant};
+use crate::number::{NONE, percent, resolved, significant};
 use crate::robot::Arm;
 
 /// The causes with their numbers.
@@ -62,8 +62,7 @@ pub fn held_out_table(diagnosis: &Diagnosis) -> Table {
     let list =
         |values: &[f64]| -> Vec<String> { values.iter().map(|v| significant(*v, 3)).collect() };
     let change = |before: &[f64], after: &[f64]| -> Vec<String> {
-        let pairs = before.iter().zip(after);
-        pairs.map(|(b, a)| format!("{:+.0} %", 100.0 * (a / b - 1.0))).collect()
+        before.iter().zip(after).map(|(before, after)| change(*before, *after)).collect()
     };
     for log in &diagnosis.held_out {
         let free = (&log.before_standstill_free_rms_nm, &log.after_standstill_free_rms_nm);
@@ -96,6 +95,12 @@ pub fn held_out_table(diagnosis: &Diagnosis) -> Table {
         }
     }
     table
+}
+
+/// By how much an rms changes; of a joint that never moves there is none.
+fn change(before: f64, after: f64) -> String {
+    let change = after / before - 1.0;
+    if change.is_finite() { format!("{:+.0} %", 100.0 * change) } else { NONE.to_owned() }
 }
 
 /// What would not have been seen: a row for each family, a column for each joint.
@@ -182,6 +187,7 @@ pub fn page(finding: &Finding, arm: &Arm, program: Program) -> Result<Page, Repo
     for cause in &diagnosis.causes {
         page.push(cause_section(finding, cause)?);
     }
+    page = page.with_warnings(&diagnosis.warnings);
     if let Some(replay) = &diagnosis.replay {
         page.push(replay::section(replay)?);
     }
@@ -230,7 +236,8 @@ fn cause_section(finding: &Finding, cause: &Cause) -> Result<Section, ReportErro
         Some(j) => format!("Joint {j}: {}", cause.in_words),
         None => format!("All joints: {}", cause.in_words),
     };
-    let j = cause.joint.map_or(0, |j| j - 1);
+    let Diagnosis { before, after, .. } = &finding.diagnosis;
+    let j = cause.joint.map_or_else(|| most_improved(&before.rms_nm, &after.rms_nm), |j| j - 1);
     let (label, unit, axis) = axis(finding, cause.kind, j);
     let residual = residual_axis(finding, j, "residual");
     let mut grid = Grid::new("", Axis::linear(label, unit), residual);
@@ -262,6 +269,13 @@ fn cause_section(finding: &Finding, cause: &Cause) -> Result<Section, ReportErro
         .table(table, "What else was tried in its place, best first"))
 }
 
+/// The joint (0-based) whose rms drops most: what concerns the arm as a whole is seen best there.
+fn most_improved(before_nm: &[f64], after_nm: &[f64]) -> usize {
+    let drops = before_nm.iter().zip(after_nm).map(|(before, after)| before - after);
+    let known = drops.enumerate().filter(|(_, drop)| !drop.is_nan());
+    known.max_by(|(_, a), (_, b)| a.total_cmp(b)).map_or(0, |(j, _)| j)
+}
+
 /// One scale for the residual of joint `j` before and after, so that the gain is seen.
 pub(super) fn residual_axis(finding: &Finding, j: usize, name: &str) -> Axis {
     let both = [&finding.before_nm, &finding.after_nm].map(|residual| residual.joint(j));
@@ -290,7 +304,31 @@ fn axis(finding: &Finding, kind: Kind, j: usize) -> (&'static str, &'static str,
             )
         }
         Kind::TimeSkew => ("rate of the torque", "Nm/s", pick(&scene.torque_rate_nm_s(j))),
+        Kind::VelocityLag => ("acceleration", "rad/s²", pick(scene.motion.qdd_rad_s2.joint(j))),
+        Kind::Contact | Kind::ThermalDrift | Kind::ClockFault => {
+            let time_s = |&k: &usize| scene.lead_in_s + k as f64 / scene.rate_hz;
+            let name = if scene.periodic { "time, periods averaged" } else { "time" };
+            (name, "s", finding.samples.iter().map(time_s).collect())
+        }
         Kind::TorqueGain | Kind::Saturation => ("torque", "Nm", pick(scene.torque_nm.joint(j))),
         _ => ("angle", "rad", pick(scene.motion.q_rad.joint(j))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Joint 3 does not count, whatever its numbers.
+    #[test]
+    fn what_concerns_all_joints_is_shown_where_it_is_seen() {
+        assert_eq!(most_improved(&[1.0, 2.0, f64::NAN], &[0.9, 0.5, f64::NAN]), 1);
+        assert_eq!(most_improved(&[], &[]), 0);
+    }
+
+    #[test]
+    fn a_joint_that_never_moves_changes_by_nothing_that_could_be_said() {
+        assert_eq!(change(2.0, 1.0), "-50 %");
+        assert_eq!([change(f64::NAN, f64::NAN), change(0.0, 0.0)], [NONE; 2]);
     }
 }

@@ -20,7 +20,10 @@ pub fn parameter_table(summary: &Summary) -> Table {
         Column::number("σ predicted", ""),
         Column::number("ratio", ""),
         Column::number("σ/least", ""),
-        Column::number("coverage", ""),
+        Column::number(
+            if summary.failed > 0 { "coverage, failed trials as missed" } else { "coverage" },
+            "",
+        ),
     ]);
     for p in &summary.parameters {
         let ratio = p.sigma_empirical / p.sigma_predicted;
@@ -53,9 +56,8 @@ const IMPOSSIBLE: f64 = 4.3;
 
 /// What is to be said of the coverage of one parameter: nothing where chance can explain it.
 fn covered(coverage: f64, summary: &Summary) -> Option<Status> {
-    let trials = (summary.trials - summary.failed) as f64;
     let is_outside = |z: f64| {
-        let [low, high] = wilson(coverage, trials, z);
+        let [low, high] = wilson(coverage, summary.trials as f64, z);
         high < claims::EACH_COVERAGE[0] || low > claims::EACH_COVERAGE[1]
     };
     let statuses = [(IMPOSSIBLE, Status::Bad), (UNUSUAL, Status::Warn)];
@@ -83,15 +85,17 @@ pub fn check_table(summary: &Summary) -> Table {
     ]);
     for check in &summary.checks {
         let range = |[low, high]: [f64; 2]| format!("{low:.3} … {high:.3}");
+        let measured = |text: String| if check.reason.is_none() { text } else { "–".to_owned() };
+        let reason = check.reason.as_ref().map_or(String::new(), |reason| format!(": {reason}"));
         table.push_judged(
             Some(check.verdict.into()),
             [
                 check.what.clone(),
                 check.parameter.clone().unwrap_or_else(|| "all".into()),
-                format!("{:.3}", check.value),
-                range(check.interval),
+                measured(format!("{:.3}", check.value)),
+                measured(range(check.interval)),
                 range(check.claim),
-                check.verdict.to_string(),
+                format!("{}{reason}", check.verdict),
             ],
         );
     }
@@ -106,10 +110,11 @@ fn facts(summary: &Summary) -> Vec<String> {
             summary.trials, summary.failed, summary.estimator, summary.covariance
         ),
         format!(
-            "coverage of 95 % intervals: mean {}, worst {} ({})",
+            "coverage of 95 % intervals: mean {}, worst {} ({}){}",
             percent(summary.coverage_mean, 3),
             percent(summary.coverage_worst.value, 3),
-            summary.coverage_worst.name
+            summary.coverage_worst.name,
+            if summary.failed > 0 { "; those of failed trials count as missed" } else { "" }
         ),
         format!("empirical over predicted σ, pooled: {:.3}", summary.sigma_ratio_pooled),
     ];
@@ -149,11 +154,7 @@ pub fn page(
     merged: &Merged<Estimation>,
     program: Program,
 ) -> Result<Page, ReportError> {
-    // Shards that were not run may say something else.
-    let status = match summary.verdict.into() {
-        Status::Good if !summary.missing.is_empty() => Status::Warn,
-        status => status,
-    };
+    let status = Status::from(summary.verdict).of_a_part(&summary.missing);
     let verdict = Verdict { status, sentence: summary.sentence(), facts: facts(summary) };
     let subtitle = format!("Scenario {}", summary.scenario);
     let mut page = Page::new("Is the σ true?", subtitle, verdict, program);
@@ -197,7 +198,7 @@ pub fn page(
 }
 
 fn coverage_plot(summary: &Summary) -> Result<String, ReportError> {
-    let n = (summary.trials - summary.failed) as f64;
+    let n = summary.trials as f64;
     let mut plot =
         IntervalPlot::new("Coverage of nominal 95 % intervals", Axis::linear("coverage", "%"));
     plot.columns = 2;

@@ -4,7 +4,7 @@ use super::json::Program;
 use super::plot::{Axis, IntervalPlot, IntervalRow, Span};
 use super::{Column, Page, ReportError, Section, Status, Table, Verdict};
 use crate::montecarlo::CheckSummary;
-use crate::montecarlo::calibration::{claims, wilson};
+use crate::montecarlo::calibration::{Statistic, claims, wilson};
 use crate::montecarlo::study::{MethodResult, NoiseStudy, ScenarioResult};
 use crate::number::percent;
 
@@ -24,11 +24,11 @@ impl ScenarioResult {
 
     /// What is asked of the mean coverage of the method that the log calls for.
     fn coverage_claim(&self) -> [f64; 2] {
-        if self.single_run { claims::MEAN_COVERAGE_OF_A_SINGLE_RUN } else { claims::MEAN_COVERAGE }
+        claims::mean_coverage(self.single_run)
     }
 
-    fn check(&self, claim: [f64; 2]) -> Option<&CheckSummary> {
-        self.checks.iter().find(|check| check.claim == claim)
+    fn check(&self, statistic: Statistic) -> Option<&CheckSummary> {
+        self.checks.iter().find(|check| check.what == statistic.in_words())
     }
 }
 
@@ -93,15 +93,12 @@ fn target_table(study: &NoiseStudy) -> Table {
     for s in study.scenarios.iter().filter(|s| !s.model_is_wrong) {
         let Some(m) = s.chosen_method() else { continue };
         // Of a log that does not repeat only the mean coverage is asked.
-        let judged = |claim| match s.check(claim) {
+        let judged = |statistic| match s.check(statistic) {
             None => "–".into(),
             Some(check) if s.single_run => measured(check),
             Some(check) => target(check),
         };
-        let coverage = s.check(claims::MEAN_COVERAGE).map_or_else(
-            || "–".into(),
-            |check| target(&CheckSummary { claim: s.coverage_claim(), ..check.clone() }),
-        );
+        let coverage = s.check(Statistic::MeanCoverage).map_or_else(|| "–".into(), target);
         let efficiency = m.efficiency.as_ref().map_or_else(
             || "–".into(),
             |e| {
@@ -113,8 +110,8 @@ fn target_table(study: &NoiseStudy) -> Table {
             s.short_name().to_owned(),
             m.trials.to_string(),
             coverage,
-            judged(claims::EACH_COVERAGE),
-            judged(claims::BIAS),
+            judged(Statistic::EachCoverage),
+            judged(Statistic::Bias),
             efficiency,
         ]);
     }
@@ -146,8 +143,9 @@ fn targets() -> String {
     format!(
         "Asked are a mean coverage of {} to {} ({} or more where the log does not repeat), a coverage of {} to {} and a bias of at \
          most {} σ for every parameter, and at most {} times the least possible σ (rms over the parameters; – where the noise has \
-         no known law or every trial its own motion). In brackets where the true value lies: binomial, normal and bounds from the \
-         scatter between trials, so wide that all of them together are wrong once in a thousand studies of one scenario.",
+         no known law or every trial its own motion). In brackets where the true value lies, by Clopper and Pearson's binomial \
+         bounds, Student's t (of the bias, and of the mean coverage by the scatter between trials) and χ², so wide that all of \
+         them together are wrong once in a thousand studies of one scenario.",
         percent(low, 3),
         percent(high, 3),
         percent(claims::MEAN_COVERAGE_OF_A_SINGLE_RUN[0], 2),

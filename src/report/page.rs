@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::error::ReportError;
 use super::json::Program;
+use super::plot::labelled;
 use super::status::Status;
 use super::table::Table;
 use crate::output::write_atomically;
@@ -74,6 +75,11 @@ impl Section {
         self.with(Block::Note { status, text: text.into() })
     }
 
+    /// With one remark after the other about what the reader should know.
+    pub fn warnings(self, warnings: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        warnings.into_iter().fold(self, |section, warning| section.note(Status::Warn, warning))
+    }
+
     /// With a bulleted list.
     pub fn list(self, items: impl IntoIterator<Item = impl Into<String>>) -> Self {
         self.with(Block::List { items: items.into_iter().map(Into::into).collect() })
@@ -89,11 +95,12 @@ impl Section {
         self.with(Block::Table { table, caption: caption.into() })
     }
 
-    /// With a figure and a caption below it; the caption may be empty.
+    /// With a figure and a caption below it; the caption may be empty. It also names a figure without a title.
     ///
     /// `svg` is set into the page as it is: it must come from [`super::plot`], where all text is escaped.
     pub fn figure(self, svg: impl Into<String>, caption: impl Into<String>) -> Self {
-        self.with(Block::Figure { svg: svg.into(), caption: caption.into() })
+        let caption = caption.into();
+        self.with(Block::Figure { svg: labelled(svg.into(), &caption), caption })
     }
 
     /// With everything in `contents` folded away behind its title. On paper it is shown.
@@ -122,6 +129,14 @@ impl Page {
             sections: Vec::new(),
             program,
         }
+    }
+
+    /// With a section for what should be known of the logs, where there is anything.
+    pub fn with_warnings(mut self, warnings: &[String]) -> Self {
+        if !warnings.is_empty() {
+            self.push(Section::new("What should be known").warnings(warnings));
+        }
+        self
     }
 
     /// Adds a section.
@@ -202,6 +217,38 @@ mod tests {
         for loads in ["src=", "<link", "@import", "url(", "href=\"http"] {
             assert!(!html.contains(loads), "{loads}");
         }
+    }
+
+    #[test]
+    fn a_figure_without_a_title_is_read_out_by_its_caption() {
+        let html = |title: &str| {
+            let svg = XyPlot::new(title, Axis::linear("x", ""), Axis::linear("y", "")).with(
+                "",
+                &[0.0, 1.0],
+                &[0.0, 1.0],
+                Colour::MODEL,
+                Mark::Line,
+            );
+            let mut page = page();
+            page.sections = vec![Section::new("").figure(svg.to_svg().unwrap(), HOSTILE)];
+            page.to_html().unwrap()
+        };
+        let named = html("");
+        assert!(!named.contains("aria-label=\"\""), "{named}");
+        assert!(named.contains("aria-label=\"&lt;script&gt;alert('1')"), "{named}");
+        assert!(html("torque").contains("aria-label=\"torque\""));
+    }
+
+    #[test]
+    fn warnings_are_on_the_page_where_there_are_any() {
+        let page = || {
+            let verdict =
+                Verdict { status: Status::Bad, sentence: String::new(), facts: Vec::new() };
+            Page::new("Diagnosis", "", verdict, Program::new(["armid"], None, Vec::new()))
+        };
+        let html = page().with_warnings(&["rows are missing".to_owned()]).to_html().unwrap();
+        assert!(html.contains("<p class=\"note warn\">rows are missing</p>"), "{html}");
+        assert!(page().with_warnings(&[]).sections.is_empty());
     }
 
     #[test]

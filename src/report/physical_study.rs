@@ -57,15 +57,33 @@ fn sentence(study: &PhysicalStudy) -> String {
     )
 }
 
+/// How often the model was called wrong, of how many trials, where it is wrong or where it is not.
+fn called_wrong(study: &PhysicalStudy, where_wrong: bool) -> [u64; 2] {
+    let cases = study.cases.iter().filter(|case| is_wrong(case) == where_wrong);
+    cases.fold([0, 0], |[called, tested], case| [called + case.called_wrong, tested + case.tested])
+}
+
+/// Largest share of constrained estimates that no arm can have.
+fn impossible(study: &PhysicalStudy) -> f64 {
+    study.cases.iter().map(|case| case.indefinite[1]).fold(0.0, f64::max)
+}
+
+/// Most false alarms, as a share of the trials in which the model is right.
+const FALSE_ALARMS: f64 = 0.05;
+
+/// Constraints have to make every arm possible, and to tell a wrong model from noise more often than not.
+fn status(impossible: f64, [false_alarms, sound]: [u64; 2], [found, unsound]: [u64; 2]) -> Status {
+    let is_told = 2 * found >= unsound && false_alarms as f64 <= FALSE_ALARMS * sound as f64;
+    match is_told {
+        _ if impossible > 0.0 => Status::Bad,
+        true => Status::Good,
+        false => Status::Warn,
+    }
+}
+
 fn facts(study: &PhysicalStudy) -> Vec<String> {
-    let wrong = |wanted: bool| {
-        let cases = study.cases.iter().filter(|case| is_wrong(case) == wanted);
-        cases.fold([0, 0], |[called, tested], case| {
-            [called + case.called_wrong, tested + case.tested]
-        })
-    };
-    let ([false_alarms, sound], [found, unsound]) = (wrong(false), wrong(true));
-    let constrained: f64 = study.cases.iter().map(|case| case.indefinite[1]).fold(0.0, f64::max);
+    let [[false_alarms, sound], [found, unsound]] =
+        [false, true].map(|where_wrong| called_wrong(study, where_wrong));
     vec![
         format!(
             "\"The model is wrong, not only noisy\" was said in {found} of {unsound} trials where \
@@ -73,7 +91,7 @@ fn facts(study: &PhysicalStudy) -> Vec<String> {
         ),
         format!(
             "Constrained estimates whose mass matrix is not positive definite: {}.",
-            percent(constrained, 3)
+            percent(impossible(study), 3)
         ),
     ]
 }
@@ -154,7 +172,9 @@ fn short(case: &CaseResult) -> &str {
 
 /// The page.
 pub fn page(study: &PhysicalStudy, program: Program) -> Result<Page, ReportError> {
-    let verdict = Verdict { status: Status::Good, sentence: sentence(study), facts: facts(study) };
+    let [sound, unsound] = [false, true].map(|where_wrong| called_wrong(study, where_wrong));
+    let status = status(impossible(study), sound, unsound);
+    let verdict = Verdict { status, sentence: sentence(study), facts: facts(study) };
     let title = "What does physical consistency repair, and what not?";
     let mut page = Page::new(title, "", verdict, program);
     let cases = study.cases.iter().map(|case| format!("{}: {}.", short(case), case.description));
@@ -250,4 +270,17 @@ pub fn markdown(study: &PhysicalStudy, command: &str) -> String {
         coverage_table(study).to_markdown()
     );
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_banner_is_green_where_the_claims_hold() {
+        assert_eq!(status(0.0, [1, 200], [150, 150]), Status::Good);
+        assert_eq!(status(0.0, [20, 200], [150, 150]), Status::Warn);
+        assert_eq!(status(0.0, [1, 200], [50, 150]), Status::Warn);
+        assert_eq!(status(0.01, [1, 200], [150, 150]), Status::Bad);
+    }
 }

@@ -35,4 +35,33 @@ impl Status {
             Status::Bad => '✗',
         }
     }
+
+    /// A word beside it, for those who only hear the page.
+    pub fn label(self) -> &'static str {
+        match self {
+            Status::Good => "good",
+            Status::Warn => "check",
+            Status::Bad => "fails",
+        }
+    }
+
+    /// The judgement of a run of which the trials `missing` have not been run: they may say something else.
+    pub fn of_a_part(self, missing: &[[u64; 2]]) -> Self {
+        match self {
+            Self::Good if !missing.is_empty() => Self::Warn,
+            status => status,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_part_is_not_good() {
+        let part = |status: Status| status.of_a_part(&[[3, 5]]);
+        assert_eq!([Status::Good, Status::Bad].map(part), [Status::Warn, Status::Bad]);
+        assert_eq!(Status::Good.of_a_part(&[]), Status::Good);
+    }
 }

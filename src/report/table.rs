@@ -1,6 +1,7 @@
 //! A table, shown on the terminal, in Markdown and on the page.
 
-use serde::Serialize;
+use serde::ser::SerializeStruct;
+use serde::{Serialize, Serializer};
 
 use super::error::ReportError;
 use super::page;
@@ -48,12 +49,24 @@ impl Column {
 }
 
 /// A row: one cell per column, and a judgement that colours it.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Row {
     /// The cells, already formatted (see [`crate::number`]).
     pub cells: Vec<String>,
     /// `None` for a row without judgement.
     pub status: Option<Status>,
+}
+
+impl Serialize for Row {
+    /// With what says the judgement where its colour is not seen.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut row = serializer.serialize_struct("Row", 4)?;
+        row.serialize_field("cells", &self.cells)?;
+        row.serialize_field("status", &self.status)?;
+        row.serialize_field("symbol", &self.status.map(Status::symbol))?;
+        row.serialize_field("label", &self.status.map(Status::label))?;
+        row.end()
+    }
 }
 
 /// Columns and rows of text.
@@ -110,15 +123,18 @@ impl Table {
         page::render_table(self)
     }
 
-    /// The table in GitHub's Markdown, columns aligned in the source too.
+    /// The table in GitHub's Markdown, columns aligned in the source too, judgements in the first cell.
     pub fn to_markdown(&self) -> String {
         let escape = |text: &str| text.replace('|', "\\|").replace('\n', " ");
         let headings: Vec<String> = self.columns.iter().map(|c| escape(&c.heading())).collect();
-        let rows: Vec<Vec<String>> = self
-            .rows
-            .iter()
-            .map(|row| row.cells.iter().map(|cell| escape(cell)).collect())
-            .collect();
+        let cells = |row: &Row| {
+            let mut cells: Vec<String> = row.cells.iter().map(|cell| escape(cell)).collect();
+            if let (Some(status), Some(first)) = (row.status, cells.first_mut()) {
+                *first = format!("{} {}: {first}", status.symbol(), status.label());
+            }
+            cells
+        };
+        let rows: Vec<Vec<String>> = self.rows.iter().map(cells).collect();
         let widths = self.widths(&headings, &rows, 3);
         let line = |cells: &[String]| format!("| {} |\n", self.padded(cells, &widths).join(" | "));
         let rule = self.columns.iter().zip(&widths).map(|(column, &width)| match column.align {
@@ -190,8 +206,8 @@ mod tests {
     }
 
     #[test]
-    fn markdown_escapes_the_bar() {
-        let expected = "| name     | value [µrad] |\n|----------|-------------:|\n| rc\\|1    |          1.5 |\n| σ of <q> |   12345.6789 |\n";
+    fn markdown_escapes_the_bar_and_says_judgements() {
+        let expected = "| name              | value [µrad] |\n|-------------------|-------------:|\n| rc\\|1             |          1.5 |\n| ✗ fails: σ of <q> |   12345.6789 |\n";
         assert_eq!(table().to_markdown(), expected);
     }
 
@@ -204,6 +220,9 @@ mod tests {
                 && html.contains("<td class=\"right\">12345.6789</td>"),
             "{html}"
         );
+        // Once, in the first cell of the judged row: colours are not seen by all.
+        assert_eq!(html.matches("aria-label=\"fails\"").count(), 1, "{html}");
+        assert!(html.contains(">✗</span> σ of"), "{html}");
     }
 
     #[test]

@@ -89,6 +89,12 @@ impl Placement {
         }
     }
 
+    /// The same, turned by `q_rad` about its own z axis: where a joint takes its frame.
+    pub fn turned(&self, q_rad: f64) -> Self {
+        let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), q_rad).into_inner();
+        Self { rotation: self.rotation * turn, ..*self }
+    }
+
     /// The transform that undoes this one.
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.transpose();
@@ -174,6 +180,15 @@ pub struct Capsule {
     pub radius_m: f64,
 }
 
+impl Clearance {
+    /// Names of the capsules that are in no pair: the arm is not kept clear of them.
+    pub fn unpaired(&self) -> impl Iterator<Item = &str> {
+        (0..self.capsules.len())
+            .filter(move |k| !self.pairs.iter().any(|pair| pair.contains(k)))
+            .map(move |k| self.capsules[k].name.as_str())
+    }
+}
+
 impl Arm {
     /// Number of joints N.
     pub fn dof(&self) -> usize {
@@ -192,11 +207,7 @@ impl Arm {
             .iter()
             .zip(q_rad)
             .map(|(joint, &q)| {
-                let turn = Placement {
-                    rotation: Rotation3::from_axis_angle(&Vector3::z_axis(), q).into_inner(),
-                    translation_m: Vector3::zeros(),
-                };
-                pose = pose.compose(&joint.placement).compose(&turn);
+                pose = pose.compose(&joint.placement).turned(q);
                 pose
             })
             .collect()

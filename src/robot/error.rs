@@ -14,6 +14,12 @@ pub enum RobotError {
         /// What was asked for.
         name: String,
     },
+    /// A MuJoCo model: armid writes these and does not read them.
+    #[error("{file}: MJCF is not read, only .urdf and .toml; convert it to a URDF")]
+    Mjcf {
+        /// The file.
+        file: String,
+    },
     /// The file could not be read.
     #[error("{file}: {source}")]
     Read {

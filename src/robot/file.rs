@@ -1,5 +1,6 @@
 //! Robot files: one TOML per arm, and the arms built into the program.
 
+mod clearance;
 mod write;
 
 use std::path::{Path, PathBuf};
@@ -7,10 +8,13 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::arm::{Arm, Capsule, CellBox, Clearance, Drive, Joint, Limits, LinkBounds, Placement};
+use clearance::{BoxEntry, CapsuleEntry};
+
+use super::arm::{Arm, Drive, Joint, Limits, Placement};
 use super::error::RobotError;
 use super::export::apply_drive_file;
 use super::inertia::LinkInertia;
+use super::place::Place;
 use super::urdf::{Frames, UrdfArm, UrdfNotice, read_urdf};
 
 /// Arms built in, by the name given to `--robot`.
@@ -78,7 +82,8 @@ impl LoadedArm {
                 .map_err(|source| RobotError::Read { file: path.display().to_string(), source })
         };
         let read = || read_from(path);
-        match path.extension().and_then(|e| e.to_str()) {
+        let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+        match extension.as_deref() {
             Some("urdf") => {
                 let UrdfArm { arm, frames, notices } = read_urdf(&read()?, name_or_path)?;
                 let mut loaded = Self { notices, frames, ..own(arm) };
@@ -93,6 +98,7 @@ impl LoadedArm {
                 Ok(loaded)
             }
             Some("toml") => Ok(own(Arm::from_toml(&read()?, name_or_path)?)),
+            Some("xml" | "mjcf") => Err(RobotError::Mjcf { file: name_or_path.to_owned() }),
             _ => Ok(Self { files: Vec::new(), ..own(Arm::built_in(name_or_path)?) }),
         }
     }
@@ -166,87 +172,20 @@ struct Tensor {
     zz: f64,
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct CapsuleEntry {
-    name: String,
-    body: usize,
-    from_m: [f64; 3],
-    to_m: [f64; 3],
-    radius_m: f64,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct BoxEntry {
-    low_m: [f64; 3],
-    high_m: [f64; 3],
-}
-
 impl RobotFile {
     fn into_arm(self, source: &str) -> Result<Arm, RobotError> {
-        let fault = |what: String| RobotError::Invalid { file: source.to_owned(), what };
+        let place = Place::of_arm(source);
         if self.joints.is_empty() {
-            return Err(fault("it has no [[joint]]".into()));
+            return Err(place.fault("it has no [[joint]]"));
         }
-        if !(self.friction_epsilon_rad_s > 0.0 && self.friction_epsilon_rad_s.is_finite()) {
-            return Err(fault(format!(
-                "friction_epsilon_rad_s = {} must be positive",
-                self.friction_epsilon_rad_s
-            )));
-        }
-        let dof = self.joints.len();
-        let find = |name: &str| {
-            self.capsules.iter().position(|c| c.name == name).ok_or_else(|| {
-                fault(format!("collision_pairs names the capsule \"{name}\", which is not there"))
-            })
-        };
-        let pairs = self
-            .collision_pairs
-            .iter()
-            .map(|[a, b]| Ok([find(a)?, find(b)?]))
-            .collect::<Result<Vec<_>, RobotError>>()?;
-        for c in &self.capsules {
-            if c.body > dof || c.radius_m <= 0.0 {
-                return Err(fault(format!(
-                    "capsule \"{}\": body {} of 0…{dof}, radius {} m",
-                    c.name, c.body, c.radius_m
-                )));
-            }
-        }
-        let boxes = self
-            .boxes
-            .iter()
-            .map(|b| {
-                if (0..3).all(|k| b.low_m[k] < b.high_m[k]) {
-                    return Ok(CellBox { low_m: b.low_m.into(), high_m: b.high_m.into() });
-                }
-                Err(fault(format!(
-                    "box: low_m = {:?} must be below high_m = {:?} in every coordinate",
-                    b.low_m, b.high_m
-                )))
-            })
-            .collect::<Result<Vec<_>, RobotError>>()?;
-        let clearance = Clearance {
-            capsules: self
-                .capsules
-                .iter()
-                .map(|c| Capsule {
-                    name: c.name.clone(),
-                    body: c.body,
-                    from_m: Vector3::from(c.from_m),
-                    to_m: Vector3::from(c.to_m),
-                    radius_m: c.radius_m,
-                })
-                .collect(),
-            pairs,
-            floor_z_m: self.floor_z_m,
-            boxes,
-        };
+        place.finite("gravity_m_s2", &self.gravity_m_s2)?;
+        place.positive("friction_epsilon_rad_s", self.friction_epsilon_rad_s)?;
+        place.unique("joint", self.joints.iter().map(|joint| joint.name.as_str()))?;
+        let clearance = self.clearance(&place)?;
         let joints = self
             .joints
             .into_iter()
-            .map(|entry| entry.into_joint(source))
+            .map(|entry| entry.into_joint(&place))
             .collect::<Result<Vec<_>, _>>()?;
         Ok(Arm {
             name: self.name,
@@ -260,58 +199,43 @@ impl RobotFile {
 }
 
 impl JointEntry {
-    fn into_joint(self, source: &str) -> Result<Joint, RobotError> {
+    fn into_joint(self, of_arm: &Place) -> Result<Joint, RobotError> {
+        let place = of_arm.table("joint", &self.name);
         let t = &self.inertia_com_kg_m2;
+        place.finite("xyz_m", &self.xyz_m)?;
+        place.finite("rpy_rad", &self.rpy_rad)?;
+        place.finite("mass_kg", &[self.mass_kg])?;
+        place.finite("com_m", &self.com_m)?;
+        place.finite("inertia_com_kg_m2", &[t.xx, t.xy, t.xz, t.yy, t.yz, t.zz])?;
         let inertia = Matrix3::new(t.xx, t.xy, t.xz, t.xy, t.yy, t.yz, t.xz, t.yz, t.zz);
         let link = LinkInertia::from_com(self.mass_kg, Vector3::from(self.com_m), inertia);
-        let fault = |what: String| RobotError::Invalid {
-            file: source.to_owned(),
-            what: format!("joint \"{}\": {what}", self.name),
-        };
         let margin = link.consistency_margin();
         if margin.is_nan() || margin <= 0.0 {
-            return Err(fault(format!(
+            return Err(place.fault(format!(
                 "no body has this mass, centre of mass and inertia tensor (smallest eigenvalue of \
                  the pseudo-inertia {margin:.3e}, must be positive)"
             )));
         }
-        for (name, value) in [
-            ("rotor_inertia_kg_m2", self.rotor_inertia_kg_m2),
-            ("viscous_nm_s_rad", self.viscous_nm_s_rad),
-            ("coulomb_nm", self.coulomb_nm),
-        ] {
-            if !(value >= 0.0 && value.is_finite()) {
-                return Err(fault(format!("{name} = {value} must not be negative")));
-            }
-        }
-        for (name, value) in [
-            ("gear_ratio", self.gear_ratio),
-            ("torque_constant_nm_a", self.torque_constant_nm_a),
-            ("velocity_rad_s", self.velocity_rad_s),
-            ("acceleration_rad_s2", self.acceleration_rad_s2),
-        ] {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(fault(format!("{name} = {value} must be positive")));
-            }
-        }
+        place.not_negative("rotor_inertia_kg_m2", self.rotor_inertia_kg_m2)?;
+        place.not_negative("viscous_nm_s_rad", self.viscous_nm_s_rad)?;
+        place.not_negative("coulomb_nm", self.coulomb_nm)?;
+        place.positive("gear_ratio", self.gear_ratio)?;
+        place.positive("torque_constant_nm_a", self.torque_constant_nm_a)?;
+        place.positive("velocity_rad_s", self.velocity_rad_s)?;
+        place.positive("acceleration_rad_s2", self.acceleration_rad_s2)?;
         // A URDF need not say it.
         let torque_nm = self.torque_nm;
         if torque_nm.is_nan() || torque_nm <= 0.0 {
-            return Err(fault(format!("torque_nm = {torque_nm} must be positive, inf if unknown")));
+            return Err(
+                place.fault(format!("torque_nm = {torque_nm} must be positive, inf if unknown"))
+            );
         }
         let [low, high] = self.position_rad;
         if !(low < high && low.is_finite() && high.is_finite()) {
-            return Err(fault(format!(
+            return Err(place.fault(format!(
                 "position_rad = [{low}, {high}] must be [low, high]; of a joint without stops write a full turn either way, \
                  [-6.2832, 6.2832]"
             )));
-        }
-        let ranges = self.mass_bounds_kg.iter().map(|range| ("mass_bounds_kg", range));
-        let boxes = self.com_bounds_m.iter().flatten().map(|range| ("com_bounds_m", range));
-        for (name, [low, high]) in ranges.chain(boxes) {
-            if !(low < high && low.is_finite() && high.is_finite()) {
-                return Err(fault(format!("{name}: [{low}, {high}] must be [low, high]")));
-            }
         }
         Ok(Joint {
             placement: Placement::from_xyz_rpy(self.xyz_m, self.rpy_rad),
@@ -329,7 +253,7 @@ impl JointEntry {
                 acceleration_rad_s2: self.acceleration_rad_s2,
                 torque_nm: self.torque_nm,
             },
-            bounds: LinkBounds { mass_kg: self.mass_bounds_kg, com_m: self.com_bounds_m },
+            bounds: place.bounds(self.mass_bounds_kg, self.com_bounds_m)?,
             name: self.name,
         })
     }
@@ -359,6 +283,59 @@ mod tests {
         let text = include_str!("../../robots/ur5.toml").replace("gear_ratio", "gear_ration");
         let message = Arm::from_toml(&text, "x.toml").unwrap_err().to_string();
         assert!(message.contains("gear_ration"), "{message}");
+    }
+
+    /// As files are called on systems that do not tell capitals apart.
+    #[test]
+    fn an_extension_in_capitals_is_one() {
+        let file = tempfile::Builder::new().suffix(".TOML").tempfile().unwrap();
+        std::fs::write(file.path(), include_str!("../../robots/ur5.toml")).unwrap();
+        let arm = Arm::load(file.path().to_str().unwrap()).unwrap();
+        assert_eq!(arm, Arm::built_in("ur5").unwrap());
+    }
+
+    #[test]
+    fn what_is_no_number_is_refused_with_its_key() {
+        let text = include_str!("../../robots/ur5.toml");
+        let message = |key: &str, value: &str| {
+            let line = format!("\n{key} = ");
+            assert!(text.contains(&line), "{key}");
+            let changed = text.replacen(&line, &format!("{line}{value} # "), 1);
+            Arm::from_toml(&changed, "x.toml").unwrap_err().to_string()
+        };
+        let vectors = ["gravity_m_s2", "xyz_m", "rpy_rad", "com_m"];
+        for (key, bad) in vectors.iter().flat_map(|key| [(key, "nan"), (key, "inf")]) {
+            let refused = message(key, &format!("[0.0, {bad}, 0.0]"));
+            assert!(refused.contains(key) && refused.contains("finite number"), "{refused}");
+        }
+        let mass = message("mass_kg", "inf");
+        assert!(mass.contains("joint \"shoulder_pan\": mass_kg: inf"), "{mass}");
+        let tensor = message(
+            "inertia_com_kg_m2",
+            "{ xx = 1.0, xy = nan, xz = 0.0, yy = 1.0, yz = 0.0, zz = 1.0 }",
+        );
+        assert!(tensor.contains("inertia_com_kg_m2: NaN"), "{tensor}");
+    }
+
+    #[test]
+    fn bounds_of_a_mass_that_none_has_are_refused() {
+        let message = |bounds: &str| {
+            let text = include_str!("../../robots/ur5.toml");
+            let added = format!("mass_bounds_kg = {bounds}\nmass_kg = ");
+            let text = text.replacen("mass_kg = ", &added, 1);
+            Arm::from_toml(&text, "x.toml").map_err(|e| e.to_string())
+        };
+        assert_eq!(message("[3.0, 4.0]").unwrap().joints[0].bounds.mass_kg, Some([3.0, 4.0]));
+        let negative = message("[-2.0, -1.0]").unwrap_err();
+        assert!(negative.contains("mass_bounds_kg = -2 must not be negative"), "{negative}");
+        assert!(message("[4.0, 3.0]").unwrap_err().contains("must be [low, high]"));
+    }
+
+    #[test]
+    fn two_joints_of_one_name_are_refused() {
+        let text = include_str!("../../robots/ur5.toml").replace("wrist_2", "wrist_1");
+        let message = Arm::from_toml(&text, "x.toml").unwrap_err().to_string();
+        assert!(message.contains("the joint \"wrist_1\" is there twice"), "{message}");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Where the joints of an arm stand and how it hangs: what its parameters are about.
 
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -92,8 +92,7 @@ impl Kinematics {
         for (j, (own, joint)) in self.joint_frames.iter().zip(&arm.joints).enumerate() {
             let own = Placement::from_xyz_rpy(own.xyz_m, own.rpy_rad);
             let distance_m = (own.translation_m - joint.placement.translation_m).norm();
-            let turn = own.rotation.transpose() * joint.placement.rotation;
-            let angle_rad = Rotation3::from_matrix_unchecked(turn).angle();
+            let angle_rad = angle_between(&own.rotation, &joint.placement.rotation);
             // Also what is no number is a difference.
             if !(distance_m < SAME && angle_rad < SAME) {
                 return Some(KinematicsDifference::Frame { joint: j + 1, distance_m, angle_rad });
@@ -112,6 +111,12 @@ impl Kinematics {
     }
 }
 
+/// Angle between two rotations, rad: |A − B| = 2 √2 sin(angle/2) (Frobenius). The cosine, from the
+/// trace of AᵀB, has no digits of a small angle, and rounding may carry it beyond 1.
+fn angle_between(a: &Matrix3<f64>, b: &Matrix3<f64>) -> f64 {
+    2.0 * ((a - b).norm() / 8f64.sqrt()).min(1.0).asin()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -126,6 +131,17 @@ mod tests {
             for other in arms() {
                 assert_eq!(own.difference(&other).is_none(), one.name == other.name);
             }
+        }
+    }
+
+    /// Rounding puts the trace of R Rᵀ on either side of 3.
+    #[test]
+    fn a_frame_that_is_tilted_a_little_is_itself() {
+        for k in 1..200 {
+            let rpy_rad = [std::f64::consts::FRAC_PI_2, 5e-5 * f64::from(k), 0.0];
+            let mut arm = Arm::built_in("ur5").unwrap();
+            arm.joints[1].placement = Placement::from_xyz_rpy([0.0; 3], rpy_rad);
+            assert_eq!(Kinematics::of(&arm).difference(&arm), None, "{rpy_rad:?}");
         }
     }
 

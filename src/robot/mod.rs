@@ -10,6 +10,7 @@ mod error;
 mod file;
 mod inertia;
 mod kinematics;
+mod place;
 mod signals;
 mod urdf;
 

@@ -4,11 +4,23 @@
 ///
 /// Storage is joint-major: `joint(j)` is one contiguous time series, which is what filters,
 /// spectra and the batched regressor read.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub struct JointSignals {
     joints: usize,
     samples: usize,
     data: Vec<f64>,
+}
+
+impl Clone for JointSignals {
+    fn clone(&self) -> Self {
+        Self { joints: self.joints, samples: self.samples, data: self.data.clone() }
+    }
+
+    /// Into the memory that is there: every trial begins with a copy of the same run.
+    fn clone_from(&mut self, source: &Self) {
+        (self.joints, self.samples) = (source.joints, source.samples);
+        self.data.clone_from(&source.data);
+    }
 }
 
 impl JointSignals {
@@ -78,5 +90,20 @@ impl JointSignals {
             data.extend(series);
         }
         Self { joints: self.joints, samples, data }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_copy_into_signals_of_the_same_size_takes_no_memory() {
+        let source = JointSignals::from_fn(2, 3, |j, k| (10 * j + k) as f64);
+        let mut copy = JointSignals::zeros(3, 2);
+        let memory = copy.data.as_ptr();
+        copy.clone_from(&source);
+        assert_eq!(copy, source);
+        assert_eq!(copy.data.as_ptr(), memory);
     }
 }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::error::{SignalError, checked_rate_hz, enough};
 use super::noise::{block_noise, quantile};
-use super::readings::quantum;
+use super::readings::resolution;
 use crate::robot::JointSignals;
 
 /// Length of the blocks in which the noise is judged, s.
@@ -25,7 +25,7 @@ pub struct Activity {
     /// Velocity noise per joint in the quietest tenth of the log, rad/s.
     pub noise_rad_s: Vec<f64>,
     /// Velocity beyond which a joint counts as moving, rad/s: σ√(2 ln N), which the largest of N
-    /// noise values hardly exceeds, plus one quantum of the recorded numbers; but at least half a
+    /// noise values hardly exceeds, plus the resolution of the recorded numbers; but at least half a
     /// percent of the fastest joint's rms speed.
     pub threshold_rad_s: Vec<f64>,
     /// Stretches of samples in which no joint moves for half a second or longer.
@@ -38,7 +38,7 @@ impl Activity {
     /// Judges the velocities `qd_rad_s` (joints × samples) recorded at `rate_hz`.
     ///
     /// The caller sets nothing: the noise comes from sixth differences, in which motion drops
-    /// out, the quantum is the smallest distance between recorded values that occurs in the log.
+    /// out, the resolution is the smallest distance between recorded values that occurs in the log.
     pub fn of(qd_rad_s: &JointSignals, rate_hz: f64) -> Result<Self, SignalError> {
         checked_rate_hz(rate_hz)?;
         let samples = qd_rad_s.samples();
@@ -58,7 +58,7 @@ impl Activity {
                 return Err(SignalError::NotFinite { what: "velocity", joint: j, sample, value });
             }
             let noise = quantile(&block_noise(series, block.max(16)), QUIET_SHARE);
-            let threshold = (peak * noise + quantum(series)).max(creep_rad_s);
+            let threshold = (peak * noise + resolution(series)).max(creep_rad_s);
             for (moves, v) in moves.iter_mut().zip(series) {
                 *moves |= v.abs() > threshold;
             }
@@ -109,21 +109,23 @@ mod tests {
     use std::f64::consts::PI;
 
     /// Rest, motion from 3 s to 9 s with a rest from 5 s to 6 s, rest; quantised if asked for.
-    fn log(sigma: f64, quantum: f64) -> JointSignals {
+    fn log(sigma: f64, resolution: f64) -> JointSignals {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         JointSignals::from_fn(2, 1500, |j, k| {
             let t = k as f64 / 125.0;
             let moves = (3.0..9.0).contains(&t) && !(5.0..6.0).contains(&t);
             let noise: f64 = StandardNormal.sample(&mut rng);
             let v = if moves && j == 1 { 0.5 * (PI * t).sin() } else { 0.0 } + sigma * noise;
-            if quantum > 0.0 { (v / quantum).round() * quantum } else { v }
+            if resolution > 0.0 { (v / resolution).round() * resolution } else { v }
         })
     }
 
     #[test]
     fn rest_and_motion_are_told_apart_by_the_noise_of_the_log() {
-        for (sigma, quantum) in [(1e-3, 0.0), (1e-5, 1e-4), (0.0, 1e-4), (0.0, 0.0), (5e-3, 1e-3)] {
-            let activity = Activity::of(&log(sigma, quantum), 125.0).unwrap();
+        for (sigma, resolution) in
+            [(1e-3, 0.0), (1e-5, 1e-4), (0.0, 1e-4), (0.0, 0.0), (5e-3, 1e-3)]
+        {
+            let activity = Activity::of(&log(sigma, resolution), 125.0).unwrap();
             let window = activity.moving_window(0).unwrap();
             // The speed rises by 0.0126 rad/s per sample: within ⌈threshold/0.0126⌉ + 1 samples.
             let slack = (activity.threshold_rad_s[1] / 0.0126).ceil() as usize + 1;

@@ -76,11 +76,11 @@ impl FineClock {
     /// over within a sample or two (a bristle behind a reversal) is missed by it or counted for too much.
     ///
     /// A drive answers q̇ a little later with ω M q̇, with which q̇ fades, so that its torque is ȧ = ω (τ − a), ω here
-    /// `feedback_per_tick` ([`answered`]). Of that torque the log has the samples, of the rest of τ what they tell: a + (τ − a)˜.
+    /// `feedback_per_tick` ([`first_order_lag`]). Of that torque the log has the samples, of the rest of τ what they tell: a + (τ − a)˜.
     /// For what is slower than `highest` the two are alike; ripple faster than half the rate comes back with another height and
     /// phase.
     pub fn as_logged(&self, fine_nm: &[f64], highest: usize, feedback_per_tick: f64) -> Vec<f64> {
-        self.as_logged_but(fine_nm, &answered(fine_nm, feedback_per_tick), highest)
+        self.as_logged_but(fine_nm, &first_order_lag(fine_nm, feedback_per_tick), highest)
     }
 
     /// [`Self::as_logged`] where `given_nm` is all that a drive gives for it.
@@ -108,7 +108,7 @@ impl FineClock {
 
     /// The adjoint of [`Self::as_logged`] where no drive answers: w for which Σ y_k τ̃_k is Σ w_k ∫ τ dt/T, the integral from
     /// sample k to the next.
-    pub fn before_logged(&self, y: &[f64], highest: usize) -> Vec<f64> {
+    pub fn as_logged_adjoint(&self, y: &[f64], highest: usize) -> Vec<f64> {
         self.filtered(y, |h| self.of_mean(h, highest).conj())
     }
 
@@ -154,7 +154,7 @@ impl FineClock {
 
 /// a of ȧ = ω (τ − a) along one period of a torque that repeats, τ from one tick to the next the mean of both and ω
 /// `per_tick`; nothing where ω is zero.
-pub fn answered(torque_nm: &[f64], per_tick: f64) -> Vec<f64> {
+pub fn first_order_lag(torque_nm: &[f64], per_tick: f64) -> Vec<f64> {
     let n = torque_nm.len();
     let keep = (-per_tick).exp();
     let step = |a: f64, k: usize| {
@@ -267,7 +267,7 @@ mod tests {
         let means = (0..N)
             .map(|k| (fine[k * TICKS..][..TICKS].iter().sum::<f64>() + ends(k)) / TICKS as f64);
         let weighed: f64 =
-            clock.before_logged(&y, 20).iter().zip(means).map(|(w, mean)| w * mean).sum();
+            clock.as_logged_adjoint(&y, 20).iter().zip(means).map(|(w, mean)| w * mean).sum();
         assert!((direct - weighed).abs() < 1e-12 && direct.abs() > 1e-3, "{direct} {weighed}");
     }
 
@@ -308,13 +308,13 @@ mod tests {
     #[test]
     fn short_periods_are_answered_as_many() {
         for per_tick in [1e-3, 0.1, 50.0] {
-            let short = answered(&wave(30, 2.0), per_tick);
+            let short = first_order_lag(&wave(30, 2.0), per_tick);
             let periods = (FORGOTTEN / per_tick / 30.0).ceil() as usize + 1;
-            let long = answered(&wave(30, 2.0).repeat(periods), per_tick);
+            let long = first_order_lag(&wave(30, 2.0).repeat(periods), per_tick);
             assert!(largest_difference(&short, &long[..30]) < 1e-13, "{per_tick}");
-            assert!(largest_difference(&answered(&[2.0; 30], per_tick), &[2.0; 30]) < 1e-13);
+            assert!(largest_difference(&first_order_lag(&[2.0; 30], per_tick), &[2.0; 30]) < 1e-13);
         }
-        assert_eq!(answered(&wave(30, 2.0), 0.0), [0.0; 30]);
+        assert_eq!(first_order_lag(&wave(30, 2.0), 0.0), [0.0; 30]);
     }
 
     #[test]

@@ -18,7 +18,7 @@
 //! | how noisy is a signal, without any model of it? | [`replicate_noise`] |
 //! | how does the power of noise run over frequency? | [`noise_trend`], of several channels [`noise_trends`] |
 //! | is there a bump in coloured noise? | [`MatchedFilter`] |
-//! | how fine is a sensor, and where does it end? | [`quantum`], [`reading_limit`] |
+//! | how fine and how noisy is a sensor, and where does it end? | [`resolution`], [`reading_noise`], [`reading_limit`] |
 
 mod activity;
 mod averaged_motion;
@@ -49,7 +49,7 @@ pub use butterworth::{Scratch, ZeroPhase};
 pub use decimate::Decimator;
 pub use differentiate::central_4;
 pub use error::SignalError;
-pub use fine_clock::{FineClock, answered};
+pub use fine_clock::{FineClock, first_order_lag};
 pub use gap_filling::{Filled, fill_gaps};
 pub use instants::{Bracket, Instants, cubic_at, linear_at};
 pub use matched::{Heights, MatchedFilter};
@@ -59,6 +59,6 @@ pub use paper_filter::{PaperDifferentiator, PaperReading};
 pub use period::{Period, PeriodSearch, find_period, variance_of};
 pub use periodic_fit::{FitScratch, PeriodicFit};
 pub use periods::{mean_period, subtract_mean_period};
-pub use readings::{quantum, reading_limit};
+pub use readings::{reading_limit, reading_noise, resolution};
 pub use replicates::{Replicates, replicate_noise};
 pub use resample::{Gap, MOST_PER_ROW, Resampler, bridged_gap_s, gaps, natural_rate_hz};

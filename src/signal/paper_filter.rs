@@ -35,7 +35,6 @@ pub struct PaperDifferentiator {
     passes: TwoPass,
     reading: PaperReading,
     rate_hz: f64,
-    cutoff_hz: f64,
 }
 
 impl PaperDifferentiator {
@@ -53,7 +52,7 @@ impl PaperDifferentiator {
         let section = Biquad { b, a: [(k - 1.0) / (k + 1.0), 0.0] };
         // 3 × (order + 1) samples, as `filtfilt` extends a first-order filter.
         let passes = TwoPass { sections: vec![section], pad: 6 };
-        Ok(Self { passes, reading, rate_hz, cutoff_hz })
+        Ok(Self { passes, reading, rate_hz })
     }
 
     /// y of the series `u`: with the intended reading du/dt, smoothed; with the literal one
@@ -69,15 +68,6 @@ impl PaperDifferentiator {
                 Ok(derivative)
             }
         }
-    }
-
-    /// Noise of an acceleration made from a velocity with white noise σ_v, continuous-time limit
-    /// (f_c ≪ f_s) of the intended reading: σ_a² = σ_v² ω_c³ / (4 f_s).
-    ///
-    /// ∫₀^∞ ω²/(1 + (ω/ω_c)²)² dω = πω_c³/4, times the one-sided density 2σ_v²/f_s over 2π.
-    pub fn acceleration_sigma(&self, sigma_v_rad_s: f64) -> f64 {
-        let cutoff_rad_s = 2.0 * PI * self.cutoff_hz;
-        sigma_v_rad_s * (cutoff_rad_s.powi(3) / (4.0 * self.rate_hz)).sqrt()
     }
 }
 
@@ -123,14 +113,18 @@ mod tests {
         assert!(correlation.abs() < 1e-9, "{correlation}");
     }
 
+    /// Noise of an acceleration made from a velocity with white noise σ_v, where f_c ≪ f_s:
+    /// σ_a² = σ_v² ω_c³ / (4 f_s), of ∫₀^∞ ω²/(1 + (ω/ω_c)²)² dω = πω_c³/4 times the one-sided density 2σ_v²/f_s over 2π.
     #[test]
     fn the_noise_formula_is_the_energy_of_the_impulse_response() {
-        let filter = PaperDifferentiator::new(PaperReading::Intended, 2.0, 500.0).unwrap();
+        let (cutoff_hz, rate_hz) = (2.0, 500.0);
+        let filter = PaperDifferentiator::new(PaperReading::Intended, cutoff_hz, rate_hz).unwrap();
         let mut impulse = vec![0.0; 8001];
         impulse[4000] = 1.0;
         let y = filter.apply(&impulse, &mut Scratch::default()).unwrap();
         let sigma = y.iter().map(|v| v * v).sum::<f64>().sqrt();
         // The tail ∝ 1/ω² of the integral beyond the Nyquist rate is cut: 4f_c/(π f_s/2)/… ≈ 1 %.
-        assert!((sigma / filter.acceleration_sigma(1.0) - 1.0).abs() < 0.02);
+        let expected = ((2.0 * PI * cutoff_hz).powi(3) / (4.0 * rate_hz)).sqrt();
+        assert!((sigma / expected - 1.0).abs() < 0.02, "{sigma} {expected}");
     }
 }

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use fourier::Complex64;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::readings::quantum;
+use super::readings::resolution;
 
 /// Harmonics pooled for one noise estimate and one test.
 pub(super) const BAND_HARMONICS: usize = 8;
@@ -55,7 +55,7 @@ pub(super) fn repeated_rounding(y: &[f64], n: usize, noise: f64) -> f64 {
     if (again as f64) < READ_AGAIN * y.len().saturating_sub(n) as f64 {
         return 0.0;
     }
-    let step = quantum(y).powi(2);
+    let step = resolution(y).powi(2);
     let term = |k: usize| {
         let w = std::f64::consts::TAU * k as f64;
         // A constant has no step.

@@ -95,6 +95,11 @@ impl Hidden {
 
     /// Simulates a log with noise of `seed` and diagnoses it.
     pub fn diagnose(&self, seed: u64) -> Finding {
+        self.diagnose_run(&self.run(), seed)
+    }
+
+    /// What the arm does and its recorder keeps, without noise.
+    pub fn run(&self) -> Recording {
         let arm = Arm::built_in("ur5").unwrap();
         let series = FourierSeries::built_in("ur5_identification").unwrap();
         let excitation = Excitation::new(series, 2.0, self.periods).unwrap();
@@ -132,18 +137,23 @@ impl Hidden {
             let every = (1000.0 / self.log_rate_hz) as usize;
             recording = only_rows(recording, |k| k % every == 0);
         }
-        recording = only_rows(recording, |k| !self.lost_rows.iter().any(|lost| lost.contains(&k)));
+        only_rows(recording, |k| !self.lost_rows.iter().any(|lost| lost.contains(&k)))
+    }
+
+    /// Diagnoses a `recording` of such an arm, read with noise of `seed`.
+    pub fn diagnose_run(&self, recording: &Recording, seed: u64) -> Finding {
+        let arm = Arm::built_in("ur5").unwrap();
         let sensors = SensorConfig {
             torque_sd_nm: PerJoint::Each(
-                [1.0, 1.0, 0.7, 0.15, 0.15, 0.15].map(|sd| self.noise * sd).to_vec(),
+                crate::simulated::SIGMA_NM.map(|sd| self.noise * sd).to_vec(),
             ),
             q_sd_rad: PerJoint::All(self.noise * 2e-5),
             qd_sd_rad_s: PerJoint::All(self.noise * 1e-3),
             ..SensorConfig::default()
         };
         let sensors = Sensors::new(&sensors, &arm, self.log_rate_hz).unwrap();
-        let mut measured = Measured::like(&recording);
-        sensors.measure(&recording, &TrialStreams::new(seed, b"hidden", 0), &mut measured);
+        let mut measured = Measured::like(recording);
+        sensors.measure(recording, &TrialStreams::new(seed, b"hidden", 0), &mut measured);
         for j in 0..arm.dof() {
             let velocities = measured.qd_rad_s.joint_mut(j).iter_mut();
             velocities.for_each(|qd| *qd += self.velocity_offset_rad_s);

@@ -400,6 +400,7 @@ impl Search<'_> {
             gain_fraction: None,
             strength: study.statistic.lambda(&span, &left, gain).max(0.0).sqrt(),
             in_words: change.in_words.to_owned(),
+            form: None,
             rivals: behind.collect(),
         }
     }

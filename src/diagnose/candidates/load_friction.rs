@@ -95,4 +95,12 @@ impl Candidate for LoadFriction {
     fn in_words(&self) -> &'static str {
         "friction that grows with the load on the gear"
     }
+
+    fn form(&self, _: &Scene, shape: Shape) -> Option<&'static str> {
+        match shape.variant {
+            MOTOR_SIDE => Some("load of the motor, the rotor's with it"),
+            BENDING => Some("bending moment on the bearing"),
+            _ => None,
+        }
+    }
 }

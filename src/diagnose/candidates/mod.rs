@@ -222,6 +222,11 @@ pub trait Candidate: Sync {
 
     /// The effect in words, its parameters behind: "friction that grows with load".
     fn in_words(&self) -> &'static str;
+
+    /// Which form of the law this shape is, where there are several and parameters do not say it; `None`: the usual one.
+    fn form(&self, _scene: &Scene, _shape: Shape) -> Option<&'static str> {
+        None
+    }
 }
 
 /// Every family.

@@ -84,7 +84,7 @@ impl Way {
         let first = if scene.periodic { n - 1 } else { 0 };
         let before = std::iter::once(first).chain(0..n - 1);
         let way = |(k, now): (usize, usize)| {
-            // An angle that is known to a quantum only says itself where it went.
+            // An angle that is known to its resolution only says itself where it went.
             if doubt_rad > 0.0 {
                 (q[now] - q[k], 0.0)
             } else {

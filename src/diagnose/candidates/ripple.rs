@@ -122,6 +122,15 @@ impl Candidate for Ripple {
     fn in_words(&self) -> &'static str {
         "torque ripple that repeats many times per turn"
     }
+
+    fn form(&self, scene: &Scene, shape: Shape) -> Option<&'static str> {
+        let form = if shape.variant == OF_THE_DRIVE {
+            "in the recorded torque at once"
+        } else {
+            "in the motion first, as no drive answers it at once"
+        };
+        scene.periodic.then_some(form)
+    }
 }
 
 /// Resolution in orders per turn: one cycle more over the joint's range.
@@ -150,7 +159,7 @@ pub(in crate::diagnose) fn strongest_orders(
     residual_nm: &[f64],
 ) -> Vec<Shape> {
     let q = scene.motion.q_rad.joint(j);
-    let of_links = scene.before_logged(residual_nm).map(|w| of_phasors(&w, q));
+    let of_links = scene.as_logged_adjoint(residual_nm).map(|w| of_phasors(&w, q));
     // A mean of phasors is a difference of them over the order.
     let of_links = of_links.map(|weights| power_of_orders(scene, j, &weights, -2));
     let of_drive = power_of_orders(scene, j, residual_nm, 0);

@@ -83,4 +83,9 @@ impl Candidate for Saturation {
     fn in_words(&self) -> &'static str {
         "a drive at its limit"
     }
+
+    fn form(&self, _: &Scene, shape: Shape) -> Option<&'static str> {
+        let behind = shape.variant == BEFORE_NOISE;
+        Some(if behind { "noise is added behind the limit" } else { "noise is cut off with it" })
+    }
 }

@@ -110,4 +110,8 @@ impl Candidate for Stribeck {
     fn in_words(&self) -> &'static str {
         "friction that is larger near rest and falls with speed (Stribeck)"
     }
+
+    fn form(&self, _: &Scene, shape: Shape) -> Option<&'static str> {
+        Some(if shape.variant == 0 { "extra exp(-(v/vs)^2)" } else { "extra exp(-v/vs)" })
+    }
 }

@@ -22,8 +22,11 @@ pub(super) const FELT_SHARE: f64 = 0.1;
 const CLIPPED: f64 = 3.0;
 /// 95 % quantile of χ² with one degree of freedom.
 const CHI2_95: f64 = 3.841_458_820_694_1;
-/// Its 99.5 % quantile: a shape that far behind the best one is excluded.
+/// Its 99.5 % quantile: a shape that far behind the best one is excluded, …
 const EXCLUDED: f64 = 7.88;
+/// … and behind it by this share of what the best one explains: none of them is the push's own as the log has it, behind a drive that
+/// answers and links that yield. The begin of a strong push was told to 3 ms where it was off by 120.
+const UNLIKE: f64 = 0.1;
 
 /// The bump of length `length_s` at the distance `t_s` from its middle; 1 there.
 pub(super) fn bump(shape: f64, length_s: f64, t_s: f64) -> f64 {
@@ -248,10 +251,10 @@ pub(super) fn weigh(
     let on = |a: usize| joints[felt.felt()[a]];
     let main = (0..felt.count()).max_by(|a, b| over_sigma(*a).total_cmp(&over_sigma(*b)))?;
     let least = FELT.max(FELT_SHARE * over_sigma(main)).min(over_sigma(main));
+    let unlike = EXCLUDED.max(UNLIKE * best.gain);
     let reach = |of: &dyn Fn(&Fit) -> [f64; 2], unit: &'static str| {
         let mut ci95 = [f64::INFINITY, f64::NEG_INFINITY];
-        let possible =
-            of_shapes.iter().zip(&tops).filter(|(_, top)| top.gain > best.gain - EXCLUDED);
+        let possible = of_shapes.iter().zip(&tops).filter(|(_, top)| best.gain - top.gain < unlike);
         for (fit, top) in possible.flat_map(|(fits, top)| fits.iter().map(move |fit| (fit, top))) {
             let left = CHI2_95 - (top.gain - fit.gain);
             if left > 0.0 {

@@ -103,6 +103,7 @@ impl Touch {
             separating_experiment: may_be_of_the_arm.then_some(HARDER),
             strength: self.strength,
             in_words: format!("something touched the arm: {}", joints.join(", ")),
+            form: None,
             may_be_none: false,
             rivals: Vec::new(),
         }

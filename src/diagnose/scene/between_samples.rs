@@ -7,7 +7,7 @@ use super::Scene;
 use crate::diagnose::load::LinkTorque;
 use crate::diagnose::reversals::{Bends, Turning};
 use crate::identify::{drive_answers, feedback_per_tick};
-use crate::signal::answered;
+use crate::signal::first_order_lag;
 
 /// Instants per sample of [`Scene::fine_link_nm`] and [`Scene::instants`].
 pub const FINE: usize = 16;
@@ -194,14 +194,14 @@ impl Scene {
 
     /// What feedback gives for a torque at the instants of a motion that repeats.
     pub fn answered(&self, torque_nm: &[f64]) -> Vec<f64> {
-        answered(torque_nm, feedback_per_tick(self.instant_s()))
+        first_order_lag(torque_nm, feedback_per_tick(self.instant_s()))
     }
 
     /// Weights of the means of a torque from one sample to the next in Σ y_k τ̃_k, τ̃ as logged where no
     /// drive answers
-    /// ([`FineClock::before_logged`](crate::signal::FineClock::before_logged)); `None` for a single run.
-    pub fn before_logged(&self, y: &[f64]) -> Option<Vec<f64>> {
-        Some(self.clock.as_ref()?.before_logged(y, self.highest))
+    /// ([`FineClock::as_logged_adjoint`](crate::signal::FineClock::as_logged_adjoint)); `None` for a single run.
+    pub fn as_logged_adjoint(&self, y: &[f64]) -> Option<Vec<f64>> {
+        Some(self.clock.as_ref()?.as_logged_adjoint(y, self.highest))
     }
 
     /// What the samples of a log show of a friction `torque_nm`, given at the instants, for which the drive gives `given_nm`

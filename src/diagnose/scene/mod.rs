@@ -119,7 +119,11 @@ impl Scene {
                 let along = (&recorded_nm, &mass_kg_m2[..], &rotor_kg_m2[..]);
                 Loads::agreed((&model, &arm), &motion, along, &periods)
             }
-            _ => Loads::as_recorded(&arm, &motion, &recorded_nm, (&mass_kg_m2, &rotor_kg_m2)),
+            _ => {
+                let noise = prepared.velocity_noise.as_deref().unwrap_or_default();
+                let along = (&recorded_nm, &mass_kg_m2[..], &rotor_kg_m2[..]);
+                Loads::as_recorded(&arm, &motion, along, (noise, rate_hz))
+            }
         };
         let Loads { link, bending, delivered, load_nm, mobility_per_kg_m2 } = loads;
         let LinkTorque { told_nm: link_nm, jolt_nm } = link;
@@ -132,9 +136,9 @@ impl Scene {
                 + drive(j).coulomb_nm * sign.joint(j)[k]
                 + offset_nm[j]
         });
-        // Rounded to a quantum Δ, the true angle lies within ±Δ/2.
-        let doubt = |quantum: &f64| if periodic { 0.0 } else { 0.5 * quantum };
-        let angle_doubt_rad = prepared.angle_quantum_rad.iter().map(doubt).collect();
+        // Rounded to a resolution Δ, the true angle lies within ±Δ/2.
+        let doubt = |resolution: &f64| if periodic { 0.0 } else { 0.5 * resolution };
+        let angle_doubt_rad = prepared.angle_resolution_rad.iter().map(doubt).collect();
         let noise_nm = prepared.replicates.as_ref().map_or(vec![0.0; joints], |r| r.sigma.clone());
         Self {
             noise_nm,

@@ -81,18 +81,12 @@ impl LimitBarrier {
     ) -> Option<BarrierTerms> {
         let (n, samples) = (self.limits.len(), motion.samples());
         let share = 1.0 / samples as f64;
-        let step_s = space.longest_period_s() / samples as f64;
-        let shrink = 1.0 - space.finest_phase_rad().powi(2) / 8.0;
         let zeros = JointSignals::zeros(n, samples);
         let mut bar = Motion::at_rest(n, samples);
         let mut curvature = [zeros.clone(), zeros.clone(), zeros];
         let mut value = 0.0;
         for (j, limits) in self.limits.iter().enumerate() {
-            let guard_rad = limits.acceleration_rad_s2 * step_s * step_s / 8.0;
-            let [low, high] = limits.position_rad;
-            let v = shrink * limits.velocity_rad_s;
-            let a = shrink * limits.acceleration_rad_s2;
-            let ranges = [[low + guard_rad, high - guard_rad], [-v, v], [-a, a]];
+            let ranges = tightened(limits, space);
             let sources = [&motion.q_rad, &motion.qd_rad_s, &motion.qdd_rad_s2];
             let bars = [&mut bar.q_rad, &mut bar.qd_rad_s, &mut bar.qdd_rad_s2];
             for (((source, bar), curvature), [low, high]) in
@@ -125,6 +119,7 @@ impl LimitBarrier {
             period_curvature = 1.0 / (below * below) + 1.0 / (above * above);
         }
         let mut distances = vec![0.0; samples * n * n];
+        let step_s = step_s(space);
         let required_m = self.clearance_m + (0.25 * step_s * step_s).min(0.005);
         for k in 0..samples {
             motion.q_rad.sample_into(k, &mut ws.q);
@@ -191,8 +186,8 @@ impl LimitBarrier {
         total
     }
 
-    /// The largest step t ≤ `limit` along the motion `change` (linear in t) that stays inside the
-    /// joint limits with the share `keep` of the way to the nearest one.
+    /// The largest step t ≤ 1 along the motion `change` (linear in t) that uses up no more than the
+    /// share `keep` of the way to the nearest joint limit.
     pub fn longest_step(
         &self,
         space: &DesignSpace,
@@ -200,18 +195,13 @@ impl LimitBarrier {
         change: &Motion,
         keep: f64,
     ) -> f64 {
-        let step_s = space.longest_period_s() / motion.samples() as f64;
-        let shrink = 1.0 - space.finest_phase_rad().powi(2) / 8.0;
         let mut longest: f64 = 1.0;
         for (j, limits) in self.limits.iter().enumerate() {
-            let guard_rad = limits.acceleration_rad_s2 * step_s * step_s / 8.0;
-            let [low, high] = limits.position_rad;
-            let v = shrink * limits.velocity_rad_s;
-            let a = shrink * limits.acceleration_rad_s2;
+            let [q_rad, qd_rad_s, qdd_rad_s2] = tightened(limits, space);
             for (from, by, [low, high]) in [
-                (&motion.q_rad, &change.q_rad, [low + guard_rad, high - guard_rad]),
-                (&motion.qd_rad_s, &change.qd_rad_s, [-v, v]),
-                (&motion.qdd_rad_s2, &change.qdd_rad_s2, [-a, a]),
+                (&motion.q_rad, &change.q_rad, q_rad),
+                (&motion.qd_rad_s, &change.qd_rad_s, qd_rad_s),
+                (&motion.qdd_rad_s2, &change.qdd_rad_s2, qdd_rad_s2),
             ] {
                 for (y, d) in from.joint(j).iter().zip(by.joint(j)) {
                     let room = if *d > 0.0 { (high - y) / d } else { (low - y) / d };
@@ -223,6 +213,22 @@ impl LimitBarrier {
         }
         longest.max(0.0)
     }
+}
+
+/// Longest time between two samples, s.
+fn step_s(space: &DesignSpace) -> f64 {
+    space.longest_period_s() / space.samples() as f64
+}
+
+/// Lowest and highest q, q̇ and q̈ at the samples that keep a joint inside `limits` between them too.
+fn tightened(limits: &Limits, space: &DesignSpace) -> [[f64; 2]; 3] {
+    let step_s = step_s(space);
+    let shrink = 1.0 - space.finest_phase_rad().powi(2) / 8.0;
+    let guard_rad = limits.acceleration_rad_s2 * step_s * step_s / 8.0;
+    let [low, high] = limits.position_rad;
+    let v = shrink * limits.velocity_rad_s;
+    let a = shrink * limits.acceleration_rad_s2;
+    [[low + guard_rad, high - guard_rad], [-v, v], [-a, a]]
 }
 
 /// Aᵀ diag(w) B.

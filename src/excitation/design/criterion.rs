@@ -228,12 +228,21 @@ mod tests {
         close(Criterion::Scaled, 0.0);
     }
 
+    /// One direction tells nothing: its pivot and its eigenvalue are zero without rounding. So is the pivot of two columns that
+    /// are alike, whose eigenvalue is zero to rounding only.
     #[test]
     fn a_singular_matrix_has_no_value() {
-        let m = Mat::from_fn(2, 2, |_, _| 1.0);
-        for criterion in [Criterion::D, Criterion::A] {
-            assert!(criterion.value(&m, &[1.0; 2]).is_none_or(|v| v > 10.0), "{criterion:?}");
+        let unit = [1.0; 2];
+        let one_sided = Mat::from_fn(2, 2, |i, k| if i + k == 0 { 1.0 } else { 0.0 });
+        for criterion in ALL {
+            for singular in [&one_sided, &Mat::zeros(2, 2)] {
+                assert_eq!(criterion.value(singular, &unit), None, "{criterion:?}");
+                assert!(criterion.smooth(singular, &unit, 6.0).is_none(), "{criterion:?}");
+            }
         }
-        assert!(Criterion::Cond.value(&Mat::zeros(2, 2), &[1.0; 2]).is_none());
+        let alike = Mat::from_fn(2, 2, |_, _| 1.0);
+        for criterion in [Criterion::D, Criterion::A] {
+            assert_eq!(criterion.value(&alike, &unit), None, "{criterion:?}");
+        }
     }
 }

@@ -81,8 +81,9 @@ pub fn descend(
                 ending = Ending::Converged;
                 break;
             }
-            let Some((next, tried)) = search(problem, ws, &point, &d, decrease, stage, &mut change)
-            else {
+            let (next, tried) = search(problem, ws, &point, &d, decrease, stage, &mut change);
+            evaluations += tried;
+            let Some(next) = next else {
                 // No decrease along a descent direction: rounding, or a B that misleads.
                 if b.take().is_none() {
                     ending = Ending::Converged;
@@ -90,7 +91,6 @@ pub fn descend(
                 }
                 continue;
             };
-            evaluations += tried;
             let s = &next.x - &point.x;
             let y = &next.gradient - &point.gradient;
             update(&mut b, &s, &y);
@@ -128,7 +128,7 @@ fn direction(
 }
 
 /// Backtracking: the first of t, t/2, t/4 … that is feasible and decreases the merit by a share of
-/// what the slope predicts (Armijo). With the number of points tried.
+/// what the slope predicts (Armijo), if any. With the number of points tried.
 fn search(
     problem: &Problem,
     ws: &mut ProblemWorkspace,
@@ -137,7 +137,7 @@ fn search(
     decrease: f64,
     stage: &Stage,
     change: &mut Motion,
-) -> Option<(Point, usize)> {
+) -> (Option<Point>, usize) {
     const ARMIJO: f64 = 1e-4;
     const TRIALS: usize = 30;
     let space = &problem.space;
@@ -154,11 +154,11 @@ fn search(
         if let Some(next) = problem.point(ws, x, stage.mu, stage.sharpness)
             && next.merit(stage.mu) <= merit - ARMIJO * t * decrease
         {
-            return Some((next, trial));
+            return (Some(next), trial);
         }
         t *= 0.5;
     }
-    None
+    (None, TRIALS)
 }
 
 fn subtract(from: &mut Motion, what: &Motion) {
@@ -227,6 +227,21 @@ mod tests {
         let end = descend(&problem, &mut ws, start.clone(), &stages, &|| true).unwrap();
         assert_eq!(end.ending, Ending::Interrupted);
         assert_eq!(end.x, start);
+    }
+
+    /// No step decreases the merit by more than everything.
+    #[test]
+    fn a_search_that_finds_nothing_has_tried_as_well() {
+        let problem = small_problem(Criterion::D);
+        let mut ws = problem.workspace();
+        let stage = Stage { mu: 0.1, sharpness: 8.0, steps: 1 };
+        let start = feasible_point(&problem);
+        let point = problem.point(&mut ws, start, stage.mu, stage.sharpness).unwrap();
+        let d = -&point.gradient;
+        let mut change = point.motion.clone();
+        let (next, tried) =
+            search(&problem, &mut ws, &point, &d, f64::INFINITY, &stage, &mut change);
+        assert!(next.is_none() && tried > 1, "{tried}");
     }
 
     #[test]

@@ -246,7 +246,9 @@ fn finish(
                 let margins = check(arm, &spec.requirements, &excitation)?;
                 return Ok((excitation, margins));
             }
-            Err(e @ ExcitationError::NoRunIn { .. }) => failure = Some(e),
+            Err(e @ (ExcitationError::NoRunIn { .. } | ExcitationError::PeriodPasses { .. })) => {
+                failure = Some(e);
+            }
             Err(e) => return Err(e.into()),
         }
     }

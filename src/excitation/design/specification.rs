@@ -33,6 +33,10 @@ pub struct Specification {
 
 /// More of a period are no use: 1000 s at 1 kHz.
 const MOST_SAMPLES: f64 = 1e6;
+/// More harmonics are no use: of six joints these are 1200 variables.
+const HIGHEST_ORDER: usize = 100;
+/// More starts are no use: these take hours.
+const MOST_STARTS: usize = 100_000;
 /// The whole motion is checked against the limits: a day of it takes minutes.
 const LONGEST_S: f64 = 86_400.0;
 
@@ -60,6 +64,7 @@ impl Specification {
         }
         at_least("the order", v.order, if v.rest_start { 2 } else { 1 })?;
         at_least("the number of starts", self.starts, 1)?;
+        at_most("the number of starts", self.starts, MOST_STARTS, "")?;
         at_least("the number of finalists", self.finalists, 1)?;
         if let Some([low, high]) = v.period_range_s {
             positive("the shortest period", low)?;
@@ -71,6 +76,12 @@ impl Specification {
                 });
             }
         }
+        let shortest_s = v.period_range_s.map_or(v.period_s, |[low, _]| low);
+        let rate_hz = self.experiment.rate_hz;
+        let seen = (0.5 * rate_hz * shortest_s + 1e-9) as usize;
+        let why = format!(": {rate_hz} Hz show no higher harmonics of {shortest_s} s");
+        at_most("the order", v.order, seen, &why)?;
+        at_most("the order", v.order, HIGHEST_ORDER, "")?;
         if self.prior.is_some() && !self.criterion.whitened() {
             return Err(DesignError::PriorUnused);
         }
@@ -120,7 +131,7 @@ impl Specification {
             return Ok(());
         }
         let worst = margins.worst();
-        let short = format!("{:.4} {}", -worst.free, worst.limit.unit());
+        let short = worst.shortfall_in_words();
         Err(DesignError::FixedPose { limit: worst.limit.to_string(), short })
     }
 }
@@ -140,9 +151,70 @@ fn at_least(what: &str, value: usize, least: usize) -> Result<(), DesignError> {
     Err(DesignError::Value { what: what.to_owned(), value: value as f64, must })
 }
 
+fn at_most(what: &str, value: usize, most: usize, why: &str) -> Result<(), DesignError> {
+    if value <= most {
+        return Ok(());
+    }
+    let must = format!("at most {most}{why}");
+    Err(DesignError::Value { what: what.to_owned(), value: value as f64, must })
+}
+
 fn per_joint(arm: &Arm, what: &'static str, found: usize) -> Result<(), DesignError> {
     if found == arm.dof() {
         return Ok(());
     }
     Err(DesignError::Length { what, found, arm: arm.name.clone(), dof: arm.dof() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(change: impl Fn(&mut Specification)) -> Option<String> {
+        let arm = Arm::built_in("ur5").unwrap();
+        let mut spec = Specification {
+            criterion: Criterion::D,
+            variables: Variables {
+                order: 5,
+                period_s: 10.0,
+                period_range_s: None,
+                fixed_offsets_rad: vec![None; 6],
+                rest_start: false,
+            },
+            requirements: Requirements::default(),
+            experiment: Experiment { data_s: 80.0, rate_hz: 125.0, torque_noise_nm: vec![1.0; 6] },
+            prior: None,
+            starts: 48,
+            finalists: 4,
+            seed: 1,
+        };
+        change(&mut spec);
+        spec.check(&arm).err().map(|error| error.to_string())
+    }
+
+    /// Half of 125 Hz is the 25th harmonic of 0.4 s, and the shortest period counts.
+    #[test]
+    fn harmonics_that_no_sample_shows_are_refused() {
+        let of = |order: usize, period_s: f64, period_range_s: Option<[f64; 2]>| {
+            refused(|spec| {
+                spec.variables.order = order;
+                spec.variables.period_s = period_s;
+                spec.variables.period_range_s = period_range_s;
+            })
+        };
+        assert_eq!(of(25, 0.4, None), None);
+        let above = of(26, 0.4, None).unwrap();
+        assert!(above.contains("the order = 26 must be at most 25: 125 Hz"), "{above}");
+        assert_eq!(of(25, 10.0, Some([0.4, 20.0])), None);
+        assert!(of(26, 10.0, Some([0.4, 20.0])).unwrap().contains("at most 25"));
+    }
+
+    #[test]
+    fn what_would_fill_the_memory_is_refused() {
+        assert_eq!(refused(|spec| spec.variables.order = HIGHEST_ORDER), None);
+        let order = refused(|spec| spec.variables.order = HIGHEST_ORDER + 1).unwrap();
+        assert!(order.contains("the order = 101 must be at most 100"), "{order}");
+        let starts = refused(|spec| spec.starts = usize::MAX).unwrap();
+        assert!(starts.contains("the number of starts"), "{starts}");
+    }
 }

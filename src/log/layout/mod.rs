@@ -27,6 +27,13 @@ pub fn built_in_layout_names() -> impl Iterator<Item = &'static str> {
     BUILT_IN.iter().map(|(name, _)| *name)
 }
 
+/// Those of them that are for files without a header.
+pub(super) fn built_in_without_header() -> impl Iterator<Item = &'static str> {
+    let has_none =
+        |text: &str, name: &str| Layout::from_toml(text, name).is_ok_and(|layout| !layout.header);
+    BUILT_IN.iter().filter(move |(name, text)| has_none(text, name)).map(|(name, _)| *name)
+}
+
 /// How the files of one recorder are to be read: a small TOML file.
 ///
 /// ```toml
@@ -111,7 +118,7 @@ impl Layout {
             return Self::from_toml(text, name);
         }
         let path = std::path::Path::new(name_or_path);
-        if path.extension().is_none_or(|extension| extension != "toml") {
+        if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("toml")) {
             return Err(LogError::UnknownLayout { name: name_or_path.to_owned() });
         }
         let text = std::fs::read_to_string(path).map_err(|e| LogError::Layout {
@@ -195,9 +202,9 @@ impl Layout {
     }
 }
 
-/// Every log needs time, angles, velocities and an effort.
+/// Every log needs time, angles and an effort.
 fn check_blocks(has: impl Fn(Block) -> bool, place: &str) -> Result<(), LayoutFault> {
-    let missing = [Block::Time, Block::Q, Block::Qd]
+    let missing = [Block::Time, Block::Q]
         .into_iter()
         .find(|&block| !has(block))
         .or_else(|| (!has(Block::Current) && !has(Block::Torque)).then_some(Block::Current));
@@ -225,6 +232,28 @@ mod tests {
         fields = 7
         blocks = ["time", "q", "qd", "torque"]
     "#;
+
+    #[test]
+    fn a_file_without_header_is_not_sent_to_a_layout_with_one() {
+        let message = LogError::NoHeader {
+            file: "x.csv".to_owned(),
+            row: 1,
+            value: "0.5".to_owned(),
+            layout: "armid".to_owned(),
+        };
+        let message = message.to_string();
+        assert!(
+            message.contains("--layout (ur10e_innopolis, ur10e_innopolis_author or"),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn an_extension_in_capitals_is_one() {
+        let file = tempfile::Builder::new().suffix(".TOML").tempfile().unwrap();
+        std::fs::write(file.path(), VALID).unwrap();
+        assert_eq!(Layout::load(file.path().to_str().unwrap()).unwrap().name, "mine");
+    }
 
     /// The commented example says all that a layout can.
     #[test]

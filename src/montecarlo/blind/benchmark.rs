@@ -70,10 +70,9 @@ impl Benchmark {
         Ok(Self { plan, model, simulation, known, clean })
     }
 
-    /// Whether the dictionary has the family, and its effects can be seen in the residual in every
-    /// period.
+    /// See [`Family::can_be_withheld`].
     pub(super) fn can_be_withheld(&self, family: &Family) -> bool {
-        family.judged == Judged::Residual && self.known.contains(&family.kind)
+        family.can_be_withheld(&self.known)
     }
 
     /// The families that are hidden and that `wanted` accepts.
@@ -219,18 +218,15 @@ pub struct BlindContent {
 
 impl Content for BlindContent {
     type Gathered = Records;
-    const SCHEMA: &'static str = "armid.blind-shard/2";
+    const SCHEMA: &'static str = "armid.blind-shard/3";
 
     fn nothing(&self) -> Records {
         Records::default()
     }
 
     fn difference(&self, expected: &Self) -> Option<Difference> {
-        (self != expected).then(|| Difference {
-            what: "dictionary",
-            found: format!("{:?}", self.known),
-            expected: format!("{:?}", expected.known),
-        })
+        let known = |content: &Self| format!("{:?}", content.known);
+        Difference::between("dictionary", known(self), known(expected))
     }
 }
 
@@ -238,7 +234,6 @@ impl Trials for Benchmark {
     type Content = BlindContent;
     type Worker<'a> = BlindWorker<'a>;
     type Error = BlindError;
-    const BATCH_PER_THREAD: u64 = 8;
 
     fn scenario(&self) -> &Scenario {
         &self.plan.base

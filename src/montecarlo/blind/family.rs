@@ -170,6 +170,12 @@ fn sign(rng: &mut ChaCha8Rng) -> f64 {
 }
 
 impl Family {
+    /// Whether a diagnosis that knows the families `known` has it, and its effects can be seen in the residual in every
+    /// period.
+    pub(super) fn can_be_withheld(&self, known: &[Kind]) -> bool {
+        self.judged == Judged::Residual && known.contains(&self.kind)
+    }
+
     /// Draws a shape for the site `site`.
     pub(super) fn recipe(
         &self,
@@ -272,13 +278,7 @@ impl Family {
             // Each crossing of the gap leaves the rotor alone for a moment: seen before the angle is. Play
             // below the encoder's noise is none.
             Kind::Backlash => Recipe::growing(2e-5, [2e-5, 0.02], 0.6, move |gap_rad| {
-                Effect::Backlash(Backlash {
-                    joint,
-                    gap_rad,
-                    stiffness_nm_rad: None,
-                    damping_ratio: 0.05,
-                    encoder: EncoderSide::Motor,
-                })
+                Effect::Backlash(Backlash::new(joint, gap_rad))
             }),
             Kind::TorqueGain => {
                 let sign = sign(rng);

@@ -27,4 +27,4 @@ pub use score::{
     ConfidenceBin, Confusion, FamilyScore, GainBin, SAID_NOTHING, SAID_UNEXPLAINED, SCORES_SCHEMA,
     Scores, StrengthBin, power,
 };
-pub use target::Target;
+pub use target::{NAMED_RIGHTLY, Target};

@@ -2,8 +2,8 @@
 
 use serde::Deserialize;
 
-use super::family::{FAMILIES, Family, JOINTS, ON_REQUEST};
-use crate::diagnose::Kind;
+use super::family::{FAMILIES, Family, JOINTS, Judged, ON_REQUEST};
+use crate::diagnose::{Kind, candidates};
 use crate::excitation::Excitation;
 use crate::montecarlo::scenario::{MotionEntry, Scenario, ScenarioError, Source, fingerprint};
 use crate::plant::{SensorConfig, Sensors};
@@ -72,6 +72,55 @@ pub(in crate::montecarlo) struct BlindEntry {
     sensors: Vec<SensorConfig>,
 }
 
+/// By which a sum of shares may pass 1: 0.33, 0.56 and 0.11 add up to 1.0000000000000002.
+const ROUND_OFF: f64 = 1e-9;
+
+impl Shares {
+    fn sum(self) -> f64 {
+        self.one + self.two + self.withheld + self.beside
+    }
+
+    /// Refuses shares of what cannot be drawn from `families`.
+    fn check(self, families: &[Family], source: &Source) -> Result<(), ScenarioError> {
+        let known: Vec<Kind> = candidates::all().iter().map(|family| family.kind()).collect();
+        let places = |wanted: &dyn Fn(&Family) -> bool| -> usize {
+            families.iter().filter(|family| wanted(family)).map(|family| family.sites.len()).sum()
+        };
+        let laws = places(&|family| family.can_be_withheld(&known));
+        let changes = places(&|family| family.judged == Judged::Simulation);
+        let shares = [
+            (
+                "blind.shares.one",
+                self.one,
+                places(&|_| true) > 0,
+                "needs a family in blind.families that can be hidden",
+            ),
+            (
+                "blind.shares.two",
+                self.two,
+                laws > 1,
+                "needs two places for effects of blind.families that the model does not absorb",
+            ),
+            (
+                "blind.shares.withheld",
+                self.withheld,
+                laws > 0,
+                "needs a family in blind.families that the model does not absorb",
+            ),
+            (
+                "blind.shares.beside",
+                self.beside,
+                laws > 0 && changes > 0,
+                "needs a family in blind.families that the model absorbs, and one that it does not",
+            ),
+        ];
+        for (key, share, can_be_drawn, requirement) in shares {
+            source.check(share == 0.0 || can_be_drawn, key, share, requirement)?;
+        }
+        Ok(())
+    }
+}
+
 impl BlindPlan {
     /// Checks `entry`; its motions and sensors are those of `base` and more.
     pub(in crate::montecarlo) fn new(
@@ -85,13 +134,15 @@ impl BlindPlan {
             ("blind.shares.two", two),
             ("blind.shares.withheld", withheld),
             ("blind.shares.beside", beside),
-            ("blind.shares, their sum", one + two + withheld + beside),
             ("blind.against_simulation", entry.against_simulation),
             ("blind.held_out", entry.held_out),
         ];
         for (key, value) in shares {
             source.check((0.0..=1.0).contains(&value), key, value, "must be between 0 and 1")?;
         }
+        let sum = entry.shares.sum();
+        let key = "blind.shares, their sum";
+        source.check(sum <= 1.0 + ROUND_OFF, key, sum, "must not be above 1")?;
         let ranges = [
             ("blind.sqrt_lambda", entry.sqrt_lambda),
             ("blind.sqrt_lambda_of_two", entry.sqrt_lambda_of_two),
@@ -110,6 +161,7 @@ impl BlindPlan {
                 all.filter(|family| kinds.contains(&family.kind)).copied().collect()
             }
         };
+        entry.shares.check(&families, source)?;
         let dof = base.arm.dof() as f64;
         let requirement = "is the number of joints of the robot; effects are hidden in arms of 6";
         source.check(base.arm.dof() == JOINTS, "robot", dof, requirement)?;
@@ -121,6 +173,12 @@ impl BlindPlan {
             base.files.extend(motion.file(source));
             motions.push(Motion { name: motion.trajectory.clone(), excitation });
         }
+        source.check(
+            entry.held_out == 0.0 || motions.len() > 1,
+            "blind.held_out",
+            entry.held_out,
+            "needs a [[blind.motion]]: gains are measured along another motion than the log's",
+        )?;
         let mut sensors = vec![base.sensors.clone()];
         for config in entry.sensors {
             Sensors::new(&config, &base.arm, base.plant.log_rate_hz)?;
@@ -143,5 +201,78 @@ impl BlindPlan {
             against_simulation: entry.against_simulation,
             held_out: entry.held_out,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::montecarlo::Job;
+
+    /// What is wrong with a plan with this `[blind]` table.
+    fn complaint(shares: &str, more: &str) -> Option<String> {
+        let text = format!(
+            r#"
+            name = "plan"
+            robot = "ur5"
+            seed = 7
+            trials = 1
+            [motion]
+            trajectory = "ur5_identification"
+            periods = 4
+            [sensors]
+            torque_sd_nm = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15]
+            q_sd_rad = 2e-5
+            qd_sd_rad_s = 1e-3
+            [blind]
+            shares = {{ {shares} }}
+            sqrt_lambda = [10.0, 15.0]
+            sqrt_lambda_of_two = [15.0, 25.0]
+            against_simulation = 0.5
+            {more}
+            "#
+        );
+        Job::from_toml(&text, "plan").err().map(|error| error.to_string())
+    }
+
+    const OTHER: &str = "[[blind.motion]]\ntrajectory = \"ur5_validation\"\nperiods = 4";
+
+    #[test]
+    fn shares_add_up_to_one_but_for_round_off() {
+        let of = |two: &str| {
+            let shares = format!("one = 0.33, two = {two}, withheld = 0.11");
+            complaint(&shares, "held_out = 0.0")
+        };
+        assert_eq!(of("0.56"), None);
+        assert!(of("0.5601").unwrap().contains("their sum"));
+    }
+
+    #[test]
+    fn what_cannot_be_drawn_is_told_when_the_plan_is_read() {
+        let of = |shares: &str, families: &str| {
+            complaint(shares, &format!("held_out = 0.0\nfamilies = [{families}]"))
+        };
+        let (one, two) = ("one = 1.0, two = 0.0", "one = 0.5, two = 0.5");
+        let with = |shares: &str, more: &str| format!("{shares}, {more}");
+        let none = "withheld = 0.0";
+        assert_eq!(of(&with(one, none), "\"payload\""), None);
+        assert_eq!(of(&with(two, none), "\"stribeck\""), None);
+        // A tilted base has one place; a payload is absorbed by the model.
+        for family in ["\"base_tilt\"", "\"payload\""] {
+            assert!(of(&with(two, none), family).unwrap().contains("blind.shares.two"));
+        }
+        let withheld = of("one = 0.5, two = 0.0, withheld = 0.5", "\"payload\"").unwrap();
+        assert!(withheld.contains("blind.shares.withheld"), "{withheld}");
+        let beside = with("one = 0.5, two = 0.0", "withheld = 0.0, beside = 0.5");
+        assert!(of(&beside, "\"payload\"").unwrap().contains("blind.shares.beside"));
+        assert_eq!(of(&beside, "\"payload\", \"stribeck\""), None);
+        assert!(of(&with(one, none), "").unwrap().contains("blind.shares.one"));
+    }
+
+    #[test]
+    fn gains_need_another_motion() {
+        let shares = "one = 1.0, two = 0.0, withheld = 0.0";
+        let error = complaint(shares, "held_out = 0.5").unwrap();
+        assert!(error.contains("needs a [[blind.motion]]"), "{error}");
+        assert_eq!(complaint(shares, &format!("held_out = 0.5\n{OTHER}")), None);
     }
 }

@@ -361,8 +361,13 @@ fn gains(all: &[Record]) -> Vec<GainBin> {
 mod tests {
     use super::*;
 
+    /// The threshold is z₁₋ₐ/₂ₘ of m = 6 families, and an effect of no size is found with the chance a/2m of one side. Of that
+    /// chance 1 − a/2m keeps eleven digits.
     #[test]
     fn half_the_effects_at_the_threshold_are_found() {
-        assert!(power(3.0) < 0.2 && power(6.0) > 0.8, "{} {}", power(3.0), power(6.0));
+        let one_side = 0.5 * chance::LAW / (6 * candidates::all().len()) as f64;
+        let threshold = Normal::standard().inverse_cdf(1.0 - one_side);
+        assert!((power(threshold) - 0.5).abs() < 1e-12, "{}", power(threshold));
+        assert!((power(0.0) / one_side - 1.0).abs() < 1e-9, "{} {one_side}", power(0.0));
     }
 }

@@ -12,8 +12,11 @@ use crate::montecarlo::calibration::Verdict;
 use crate::montecarlo::shard::Merged;
 use crate::montecarlo::share::Share;
 
-/// Fewer trials than this say nothing about a share.
+/// Fewer cases than this say nothing about a share.
 const FEWEST: u64 = 20;
+
+/// What is counted by the target that sums up the others.
+pub const NAMED_RIGHTLY: &str = "one effect, √λ ≥ 8: kind (class) and joint right";
 
 /// One target.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -28,39 +31,45 @@ pub struct Target {
     pub interval: [f64; 2],
     /// Least and greatest value that meets the target.
     pub target: [f64; 2],
-    /// Whether the measured value does.
+    /// Whether the measured value does; not evaluated of too few cases. The interval says what chance had to do with it.
     pub verdict: Verdict,
 }
 
 impl Target {
     fn new(what: &'static str, share: Share, target: [f64; 2]) -> Self {
-        let measured = share.value();
-        Self::about(what, share, measured, target)
+        Self::about(what, share, share.of, share.bounds(0.025), target)
     }
 
     /// About the sum of what is counted in each of `cases`, in which it goes together: the interval is from the scatter between
-    /// them, the variance of Σ c/Σ n being Σ (c − n Σ c/Σ n)²/(Σ n)².
-    fn of_cases(what: &'static str, cases: Vec<Share>, target: [f64; 2]) -> Self {
+    /// them, the variance of Σ c/Σ n being Σ (c − n Σ c/Σ n)²/(Σ n)²; where they are alike it is as wide as if nothing went together.
+    fn of_cases(what: &'static str, cases: impl Iterator<Item = Share>, target: [f64; 2]) -> Self {
+        let cases: Vec<Share> = cases.filter(|case| case.of > 0).collect();
         let sum = |f: &dyn Fn(&Share) -> u64| cases.iter().map(f).sum();
         let all = Share { count: sum(&|case| case.count), of: sum(&|case| case.of) };
         let off = |case: &Share| case.count as f64 - case.of as f64 * all.value();
         let square: f64 = cases.iter().map(|case| off(case).powi(2)).sum();
         let count = cases.len() as f64;
         let half = 1.96 * (square * count / (count - 1.0)).sqrt() / all.of as f64;
-        let mut target = Self::new(what, all, target);
-        if cases.len() > 1 {
-            target.interval = [all.value() - half, all.value() + half];
-        }
-        target
+        let [low, high] = all.bounds(0.025);
+        // Of a single case `half` is no number, and neither `min` nor `max`.
+        let interval = [low.min(all.value() - half), high.max(all.value() + half)];
+        Self::about(what, all, cases.len() as u64, interval, target)
     }
 
-    fn about(what: &'static str, share: Share, measured: f64, target: [f64; 2]) -> Self {
+    /// About what was counted in so many `cases`, of which chance leaves the `interval`.
+    fn about(
+        what: &'static str,
+        share: Share,
+        cases: u64,
+        interval: [f64; 2],
+        target: [f64; 2],
+    ) -> Self {
+        let measured = share.value();
         let verdict = match measured {
-            _ if share.of < FEWEST => Verdict::NotEvaluated,
+            _ if cases < FEWEST => Verdict::NotEvaluated,
             m if m >= target[0] && m <= target[1] => Verdict::Pass,
             _ => Verdict::Fail,
         };
-        let interval = share.bounds(0.025);
         Self { what, share, measured, interval, target, verdict }
     }
 }
@@ -69,16 +78,19 @@ impl Target {
 fn upper_bound_of(alarms: Share) -> Target {
     let most = 0.01;
     let bound = |count: u64| Share { count, ..alarms }.bounds(0.05)[1];
-    let mut target = Target::about(
-        "clean: one-sided 95 % upper bound of the false alarms",
-        alarms,
-        bound(alarms.count),
-        [0.0, most],
-    );
-    if bound(0) > most {
-        target.verdict = Verdict::NotEvaluated;
+    let measured = bound(alarms.count);
+    Target {
+        what: "clean: one-sided 95 % upper bound of the false alarms",
+        share: alarms,
+        measured,
+        interval: alarms.bounds(0.025),
+        target: [0.0, most],
+        verdict: match measured {
+            _ if bound(0) > most => Verdict::NotEvaluated,
+            bound if bound <= most => Verdict::Pass,
+            _ => Verdict::Fail,
+        },
     }
-    target
 }
 
 /// Every target, and what the trials say about it.
@@ -108,7 +120,10 @@ pub fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
         Share::of(of_them, |r| r.outcome() == Outcome::Wrong)
     };
     let residual = Judged::Residual;
-    let sure = causes(all).filter(|(named, _)| named.confidence >= 0.99);
+    let sure = |record: &Record| {
+        let causes = causes(std::slice::from_ref(record));
+        Share::of(causes.filter(|(named, _)| named.confidence >= 0.99), |(_, right)| *right)
+    };
     let covered = all.iter().filter(|r| r.case.secret == Secret::One).map(Record::covered);
     let is_one = |r: &&Record| r.case.is_one(residual) && r.outcome() == Outcome::Right;
     let base = all.iter().filter(is_one).map(|r| r.answer.base);
@@ -119,11 +134,7 @@ pub fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
     vec![
         Target::new("clean: a false alarm", alarms, [0.0, 0.003]),
         upper_bound_of(alarms),
-        Target::new(
-            "one effect, √λ ≥ 8: kind (class) and joint right",
-            Share::of(one(residual, above(8.0)), is_right),
-            [0.97, 1.0],
-        ),
+        Target::new(NAMED_RIGHTLY, Share::of(one(residual, above(8.0)), is_right), [0.97, 1.0]),
         Target::new(
             "one effect, √λ 6 … 8: kind (class) and joint right",
             Share::of(one(residual, [6.0, 8.0]), is_right),
@@ -139,9 +150,9 @@ pub fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
             Share::of(one(Judged::Simulation, above(8.0)), is_right),
             [0.97, 1.0],
         ),
-        Target::new(
+        Target::of_cases(
             "causes named with confidence ≥ 0.99: right",
-            Share::of(sure, |(_, right)| *right),
+            all.iter().map(sure),
             [0.99, 1.0],
         ),
         Target::new(
@@ -166,12 +177,12 @@ pub fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
         ),
         Target::of_cases(
             "95 % intervals of a named effect's parameters that hold the truth",
-            covered.collect(),
+            covered,
             [0.93, 0.97],
         ),
         Target::of_cases(
             "one effect, named rightly: 95 % intervals of the base parameters that hold the truth",
-            base.collect(),
+            base,
             [0.935, 0.965],
         ),
         Target::new(
@@ -195,10 +206,25 @@ mod tests {
     /// Cases of which half have all and half have none: 100 of them say as much as 100 intervals, and no more.
     #[test]
     fn what_goes_together_counts_once() {
-        let cases = (0..100).map(|i| Share { count: 50 * (i % 2), of: 50 }).collect();
+        let cases = (0..100).map(|i| Share { count: 50 * (i % 2), of: 50 });
         let [low, high] = Target::of_cases("", cases, [0.0, 1.0]).interval;
         let half = 1.96 * (0.25_f64 / 99.0).sqrt();
         assert!((low - 0.5 + half).abs() < 1e-12 && (high - 0.5 - half).abs() < 1e-12);
+    }
+
+    /// 52 parameters of one case are not 52 cases.
+    #[test]
+    fn few_cases_are_not_judged() {
+        let verdict = |cases: u64, held: u64| {
+            let cases = (0..cases).map(|i| Share { count: held + i % 2, of: 52 });
+            Target::of_cases("", cases, [0.935, 0.965]).verdict
+        };
+        assert_eq!(verdict(1, 49), Verdict::NotEvaluated);
+        assert_eq!(verdict(1000, 49), Verdict::Pass);
+        assert_eq!(verdict(1000, 40), Verdict::Fail);
+        let of = |count, of| Target::new("", Share { count, of }, [0.97, 1.0]).verdict;
+        assert_eq!([of(19, 19), of(30, 30)], [Verdict::NotEvaluated, Verdict::Pass]);
+        assert_eq!(of(28, 30), Verdict::Fail);
     }
 
     /// Not even none of 100 is below one of a hundred with 95 %: 0.05^(1/100) is 0.970. None of 299 is.

@@ -357,7 +357,7 @@ mod tests {
     use crate::excitation::{FourierSeries, Reference};
     use crate::montecarlo::study::cutoff::central_difference;
     use crate::robot::Arm;
-    use crate::signal::{PaperDifferentiator, PaperReading, ZeroPhase};
+    use crate::signal::ZeroPhase;
 
     const RATE_HZ: f64 = 125.0;
 
@@ -441,12 +441,11 @@ mod tests {
             let periodic = Periodic::new(12_500, RATE_HZ);
             periodic.noise_gain(|f| central_difference(f, RATE_HZ) * filter.response(f))
         };
-        let differentiator =
-            PaperDifferentiator::new(PaperReading::Intended, 0.25, RATE_HZ).unwrap();
-        // Beyond 10 Hz, where a difference of samples falls behind the derivative, lie 4 f_c/(π · 10 Hz) =
-        // 3 % of σ_a² at f_c = 0.25 Hz, 1.6 % of σ_a.
+        // σ_a² = σ_v² ω_c³ / (4 f_s) for f_c ≪ f_s. Beyond 10 Hz, where a difference of samples falls behind
+        // the derivative, lie 4 f_c/(π · 10 Hz) = 3 % of σ_a² at f_c = 0.25 Hz, 1.6 % of σ_a.
         let sigma = gain(0.25).sqrt();
-        assert!((sigma / differentiator.acceleration_sigma(1.0) - 1.0).abs() < 0.016, "{sigma}");
+        let expected = ((std::f64::consts::TAU * 0.25).powi(3) / (4.0 * RATE_HZ)).sqrt();
+        assert!((sigma / expected - 1.0).abs() < 0.016, "{sigma}");
         with_formulas(|formulas| {
             // At 2e-5 rad/s the attenuation is linear in σ_a²; the friction columns' share, which does
             // not depend on the cutoff, is taken off by a third cutoff.

@@ -98,7 +98,7 @@ pub(super) fn paper_sigma(
             &LogNoise {
                 velocity_sd_rad_s,
                 torque_sd_nm: &torque_sd_nm,
-                torque_power: &|f| case.model.power(f, rate_hz),
+                torque_power: &case.model.spectrum(rate_hz),
                 torque_correlation: case.model.cross_joint_correlation,
             },
             periods,

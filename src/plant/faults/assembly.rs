@@ -2,7 +2,7 @@
 
 use super::effect::{Complaint, require};
 use super::friction::Friction;
-use super::gear::{EncoderSide, Ripple, Transmission};
+use super::gear::{Backlash, Elasticity, EncoderSide, Ripple, Transmission};
 use super::readings::ReadingFault;
 use super::surroundings::{Contact, Spring};
 use super::timing::Timing;
@@ -32,6 +32,10 @@ pub(super) struct JointMechanics {
     pub(super) rotor_inertia_kg_m2: f64,
     /// Friction, on the motor's side of the gear.
     pub(super) friction: Friction,
+    /// How its gear gives way, as asked for.
+    pub(super) elasticity: Option<Elasticity>,
+    /// The play of its gear, as asked for.
+    pub(super) backlash: Option<Backlash>,
     /// What gives way between rotor and link; `None`: nothing.
     pub(super) transmission: Option<Transmission>,
     /// Which side of the transmission the encoder sits on.
@@ -60,6 +64,8 @@ impl Assembly {
         let mechanics = |joint: &crate::robot::Joint| JointMechanics {
             rotor_inertia_kg_m2: joint.drive.rotor_inertia_kg_m2,
             friction: Friction::nominal(&joint.drive, arm.friction_epsilon_rad_s),
+            elasticity: None,
+            backlash: None,
             transmission: None,
             encoder: EncoderSide::Motor,
             ripples: Vec::new(),

@@ -1,6 +1,6 @@
 //! The joint mechanics of an arm with hidden effects.
 
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::Vector3;
 
 use super::assembly::{Assembly, JointMechanics};
 use super::gear::EncoderSide;
@@ -364,9 +364,7 @@ impl Flange {
         }
         let mut pose = Placement::identity();
         for ((placement, &q), axis) in self.placements.iter().zip(q_rad).zip(&mut self.axes) {
-            let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), q).into_inner();
-            pose = pose.compose(placement);
-            pose.rotation *= turn;
+            pose = pose.compose(placement).turned(q);
             *axis = (pose.translation_m, pose.rotation.column(2).into());
         }
         let flange = pose.translation_m;

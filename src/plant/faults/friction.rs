@@ -129,7 +129,11 @@ impl Friction {
             + self.powers.iter().map(power).sum::<f64>();
         let mut bristles = 0.0;
         match &self.presliding {
-            Some(presliding) => bristles = level * presliding.stiffness_per_rad,
+            // c z + a z² with |z| ≤ 1; c falls with the speed whatever z is.
+            Some(presliding) => {
+                bristles = (level + 2.0 * self.asymmetric_nm.abs()) * presliding.stiffness_per_rad;
+                smooth += self.stribeck.iter().map(Stribeck::steepest_nm_s_rad).sum::<f64>();
+            }
             None => smooth += (level + self.asymmetric_nm.abs()) / self.epsilon_rad_s,
         }
         let warm = 1.0 + self.thermal.as_ref().map_or(0.0, |t| t.fraction.max(0.0) * 2.0);
@@ -155,6 +159,14 @@ pub struct Stribeck {
 
 fn gaussian() -> i32 {
     2
+}
+
+impl Stribeck {
+    /// Where d exp(−|q̇/v_s|ⁿ) is steepest: √(2/e) d/v_s at v_s/√2 for n = 2, d/v_s at rest for n = 1.
+    fn steepest_nm_s_rad(&self) -> f64 {
+        let shape = if self.exponent == 1 { 1.0 } else { (2.0 / std::f64::consts::E).sqrt() };
+        shape * self.extra_nm.abs() / self.vs_rad_s
+    }
 }
 
 impl Fault for Stribeck {
@@ -452,5 +464,35 @@ mod tests {
         assert!(1e4 * a * 0.02 > fastest, "the decay was bounded");
         // 2 e^(−18), and as much for the rule's own error (2e-8).
         assert!(worst < 4e-8, "{worst}");
+    }
+
+    /// Central differences of the law over all speeds and states of the bristle come up to the bounds,
+    /// which are sharp where the steepest parts meet, and do not pass them (h = 1e-6: to 1e-6 of them).
+    #[test]
+    fn slopes_beside_presliding_are_bounds() {
+        let drive = crate::robot::Arm::built_in("ur5").unwrap().joints[0].drive;
+        for exponent in [1, 2] {
+            let friction = Friction {
+                stribeck: vec![Stribeck { joint: 1, extra_nm: 2.0, vs_rad_s: 0.01, exponent }],
+                asymmetric_nm: 1.5,
+                presliding: Some(Presliding { joint: 1, stiffness_per_rad: 1e3 }),
+                ..Friction::nominal(&drive, 0.02)
+            };
+            let torque = |speed: f64, z: f64| friction.torque_nm(0.0, speed, Some(z), 0.0, 0.0);
+            let h = 1e-6;
+            let (mut by_speed, mut by_angle) = (0.0_f64, 0.0_f64);
+            for (k, z) in (0..1000).flat_map(|k| [-1.0, 0.0, 1.0].map(|z| (k, z))) {
+                let speed = 1e-4 * f64::from(k);
+                let slope = (torque(speed + h, z) - torque(speed - h, z)) / (2.0 * h);
+                by_speed = by_speed.max(slope.abs());
+                let slope = (torque(speed, z + h) - torque(speed, z - h)) / (2.0 * h);
+                by_angle = by_angle.max(1e3 * slope.abs());
+            }
+            let (smooth, bristles) = friction.slopes(1.0, 0.0);
+            for (found, bound) in [(by_speed, smooth), (by_angle, bristles)] {
+                let share = found / bound;
+                assert!(share > 0.95 && share < 1.0 + 1e-6, "n = {exponent}: {found} {bound}");
+            }
+        }
     }
 }

@@ -74,15 +74,15 @@ pub(super) struct Transmission {
     pub(super) damping_nm_s_rad: f64,
     /// Half of the play, rad.
     pub(super) half_gap_rad: f64,
-    /// Whether k was asked for, by an elasticity.
-    is_elastic: bool,
 }
 
 impl Transmission {
-    fn new(stiffness_nm_rad: f64, damping_ratio: f64, joint: &JointMechanics) -> Self {
-        let critical = 2.0 * (stiffness_nm_rad * joint.rotor_inertia_kg_m2).sqrt();
-        let damping_nm_s_rad = damping_ratio * critical;
-        Self { stiffness_nm_rad, damping_nm_s_rad, half_gap_rad: 0.0, is_elastic: true }
+    /// A spring against a rotor, across a gap (rad).
+    fn new(spring: &Elasticity, rotor_inertia_kg_m2: f64, gap_rad: f64) -> Self {
+        let stiffness_nm_rad = spring.stiffness_nm_rad;
+        let critical = 2.0 * (stiffness_nm_rad * rotor_inertia_kg_m2).sqrt();
+        let damping_nm_s_rad = spring.damping_ratio * critical;
+        Self { stiffness_nm_rad, damping_nm_s_rad, half_gap_rad: 0.5 * gap_rad }
     }
 
     /// T, Nm, at deflection δ (rad) and its rate (rad/s).
@@ -104,6 +104,18 @@ impl Transmission {
 fn require_rotor(joint: &JointMechanics) -> Result<(), Complaint> {
     let rotor = joint.rotor_inertia_kg_m2;
     require(rotor > 0.0, "rotor_inertia_kg_m2", rotor, "of the arm's joint must be positive")
+}
+
+/// The gear that elasticity and backlash of one joint make together, whichever comes first.
+fn fit_gear(joint: &mut JointMechanics) -> Result<(), Complaint> {
+    let rotor = joint.rotor_inertia_kg_m2;
+    let flanks = joint.backlash.map(|play| play.flanks(rotor));
+    let Some(spring) = joint.elasticity.or(flanks) else { return Ok(()) };
+    joint.backlash.map_or(Ok(()), |play| play.require_no_other(&spring))?;
+    let gap_rad = joint.backlash.map_or(0.0, |play| play.gap_rad);
+    joint.transmission = Some(Transmission::new(&spring, rotor, gap_rad));
+    joint.encoder = spring.encoder;
+    Ok(())
 }
 
 /// A gear that gives way: rotor and link are two inertias with a spring between them (Spong 1987).
@@ -142,18 +154,14 @@ impl Fault for Elasticity {
     fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
         let joint = assembly.joint(self.joint);
         require_rotor(joint)?;
-        let half_gap_rad = joint.transmission.map_or(0.0, |t| t.half_gap_rad);
-        let twice = joint.transmission.is_some_and(|t| t.is_elastic);
+        let twice = joint.elasticity.replace(*self).is_some();
         require(!twice, "joint", self.joint as f64, "has an elasticity already")?;
-        let spring = Transmission::new(self.stiffness_nm_rad, self.damping_ratio, joint);
-        joint.transmission = Some(Transmission { half_gap_rad, ..spring });
-        joint.encoder = self.encoder;
-        Ok(())
+        fit_gear(joint)
     }
 }
 
-/// A gear with play: rotor and link are two inertias that touch at either end of a gap. The flanks
-/// are as stiff as an elasticity on the same joint says, or as given here.
+/// A gear with play: rotor and link are two inertias that touch at either end of a gap. Beside an
+/// elasticity of the same joint the flanks are its spring, and what is given here must be the same.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Backlash {
@@ -164,26 +172,45 @@ pub struct Backlash {
     /// Stiffness of the flanks, Nm/rad. Default: what makes the rotor alone swing at 300 rad/s.
     pub stiffness_nm_rad: Option<f64>,
     /// ζ of the flanks against the rotor. Default 0.05.
-    #[serde(default = "default_damping_ratio")]
-    pub damping_ratio: f64,
+    pub damping_ratio: Option<f64>,
     /// Where the encoder sits. Default: on the motor.
-    #[serde(default)]
-    pub encoder: EncoderSide,
+    pub encoder: Option<EncoderSide>,
 }
 
 impl Backlash {
     /// Frequency of the rotor against the flanks where no stiffness is given, rad/s.
     const FLANK_RAD_S: f64 = 300.0;
 
-    /// With the usual flanks, the encoder on the motor.
+    /// With the flanks that the joint's elasticity says, or the usual ones.
     pub fn new(joint: usize, gap_rad: f64) -> Self {
-        Self {
-            joint,
-            gap_rad,
-            stiffness_nm_rad: None,
-            damping_ratio: DAMPING_RATIO,
-            encoder: EncoderSide::Motor,
+        Self { joint, gap_rad, stiffness_nm_rad: None, damping_ratio: None, encoder: None }
+    }
+
+    /// Its flanks where the joint has no elasticity.
+    fn flanks(&self, rotor_inertia_kg_m2: f64) -> Elasticity {
+        let usual = rotor_inertia_kg_m2 * Self::FLANK_RAD_S.powi(2);
+        Elasticity {
+            joint: self.joint,
+            stiffness_nm_rad: self.stiffness_nm_rad.unwrap_or(usual),
+            damping_ratio: self.damping_ratio.unwrap_or(DAMPING_RATIO),
+            encoder: self.encoder.unwrap_or_default(),
         }
+    }
+
+    /// Complains of what is given here and is not that of `spring`, which is what the flanks are.
+    fn require_no_other(&self, spring: &Elasticity) -> Result<(), Complaint> {
+        let requirement =
+            "of the backlash is not that of the joint's elasticity: leave it out of the backlash";
+        for (key, given, used) in [
+            ("stiffness_nm_rad", self.stiffness_nm_rad, spring.stiffness_nm_rad),
+            ("damping_ratio", self.damping_ratio, spring.damping_ratio),
+        ] {
+            let given = given.unwrap_or(used);
+            require(given == used, key, given, requirement)?;
+        }
+        let same_side = self.encoder.is_none_or(|side| side == spring.encoder);
+        let requirement = "has another encoder by its elasticity: leave it out of the backlash";
+        require(same_side, "joint", self.joint as f64, requirement)
     }
 }
 
@@ -195,23 +222,73 @@ impl Fault for Backlash {
     fn check(&self) -> Result<(), Complaint> {
         positive("gap_rad", self.gap_rad)?;
         self.stiffness_nm_rad.map_or(Ok(()), |k| positive("stiffness_nm_rad", k))?;
-        not_negative("damping_ratio", self.damping_ratio)
+        self.damping_ratio.map_or(Ok(()), |ratio| not_negative("damping_ratio", ratio))
     }
 
     fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
         let joint = assembly.joint(self.joint);
         require_rotor(joint)?;
-        let twice = joint.transmission.is_some_and(|t| t.half_gap_rad > 0.0);
+        let twice = joint.backlash.replace(*self).is_some();
         require(!twice, "joint", self.joint as f64, "has a backlash already")?;
-        let default = joint.rotor_inertia_kg_m2 * Self::FLANK_RAD_S.powi(2);
-        let stiffness = self.stiffness_nm_rad.unwrap_or(default);
-        let elastic = joint.transmission;
-        if elastic.is_none() {
-            joint.encoder = self.encoder;
+        fit_gear(joint)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::Arm;
+
+    /// Elasticity and backlash of joint 2 in both orders.
+    fn in_both_orders(
+        spring: Elasticity,
+        play: Backlash,
+    ) -> [Result<(Option<Transmission>, EncoderSide), Complaint>; 2] {
+        let orders: [[&dyn Fault; 2]; 2] = [[&spring, &play], [&play, &spring]];
+        orders.map(|faults| {
+            let mut assembly = Assembly::new(&Arm::built_in("ur5").unwrap(), 1.0);
+            faults.iter().try_for_each(|fault| fault.install(&mut assembly))?;
+            let joint = assembly.joint(2);
+            Ok((joint.transmission, joint.encoder))
+        })
+    }
+
+    #[test]
+    fn the_flanks_of_a_soft_gear_are_its_spring() {
+        let spring =
+            Elasticity { damping_ratio: 0.1, ..Elasticity::new(2, 3e3, EncoderSide::Link) };
+        let play = Backlash::new(2, 0.02);
+        let repeated = Backlash {
+            stiffness_nm_rad: Some(3e3),
+            damping_ratio: Some(0.1),
+            encoder: Some(EncoderSide::Link),
+            ..play
+        };
+        for play in [play, repeated] {
+            let [first, second] = in_both_orders(spring, play);
+            let (gear, encoder) = first.unwrap();
+            assert_eq!((gear, encoder), second.unwrap());
+            let gear = gear.unwrap();
+            assert_eq!((gear.stiffness_nm_rad, gear.half_gap_rad), (3e3, 0.01));
+            let rotor = Arm::built_in("ur5").unwrap().joints[1].drive.rotor_inertia_kg_m2;
+            assert_eq!(gear.damping_nm_s_rad, 0.1 * (2.0 * (3e3 * rotor).sqrt()));
+            assert_eq!(encoder, EncoderSide::Link);
         }
-        let flanks = Transmission::new(stiffness, self.damping_ratio, joint);
-        let spring = elastic.unwrap_or(Transmission { is_elastic: false, ..flanks });
-        joint.transmission = Some(Transmission { half_gap_rad: 0.5 * self.gap_rad, ..spring });
-        Ok(())
+    }
+
+    #[test]
+    fn flanks_that_contradict_the_spring_are_refused_in_both_orders() {
+        let spring = Elasticity::new(2, 3e3, EncoderSide::Motor);
+        let play = Backlash::new(2, 0.02);
+        let contradictions = [
+            ("stiffness_nm_rad", Backlash { stiffness_nm_rad: Some(4e3), ..play }),
+            ("damping_ratio", Backlash { damping_ratio: Some(0.1), ..play }),
+            ("joint", Backlash { encoder: Some(EncoderSide::Link), ..play }),
+        ];
+        for (key, play) in contradictions {
+            for refused in in_both_orders(spring, play) {
+                assert_eq!(refused.unwrap_err().key, key);
+            }
+        }
     }
 }

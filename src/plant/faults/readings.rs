@@ -158,11 +158,11 @@ impl DroppedSamples {
         let mut rng = streams.stream(Channel::Dropped { effect }, stream);
         let lost: Vec<bool> =
             log.time_s.iter().map(|_| rng.random::<f64>() < self.fraction).collect();
-        let whole_rows = joints(self.joint, log.q_rad.joints());
+        let joints = joints(self.joint, log.q_rad.joints());
         let signals = [&mut log.q_rad, &mut log.qd_rad_s, &mut log.torque_nm];
         if self.repeat {
             for signals in signals {
-                for j in whole_rows.clone() {
+                for j in joints.clone() {
                     let series = signals.joint_mut(j);
                     for k in 1..series.len() {
                         if lost[k] {

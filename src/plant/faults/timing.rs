@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::assembly::Assembly;
-use super::effect::{Complaint, Fault, finite, not_negative, require};
+use super::effect::{Complaint, Fault, not_negative, require};
 use crate::plant::Recording;
 use crate::robot::JointSignals;
 
@@ -90,7 +90,6 @@ impl Fault for ClockFault {
     }
 
     fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
-        finite("lost_s", self.lost_s)?;
         assembly.timing.stalls.push(*self);
         Ok(())
     }

@@ -7,8 +7,8 @@ mod plots;
 mod tables;
 
 use super::json::Program;
-use super::{Page, ReportError, Section, Table, Verdict};
-use crate::montecarlo::blind::{Record, Scores, place};
+use super::{Page, ReportError, Section, Status, Table, Verdict};
+use crate::montecarlo::blind::{NAMED_RIGHTLY, Record, Scores, place};
 use crate::number::percent;
 
 use plots::{confidence_plot, confusion_plot, detection_plot};
@@ -21,7 +21,7 @@ pub use tables::target_table;
 
 fn sentence(scores: &Scores) -> String {
     let [met, judged] = scores.met();
-    let right = scores.targets.iter().find(|t| t.target == [0.97, 1.0]);
+    let right = scores.targets.iter().find(|target| target.what == NAMED_RIGHTLY);
     let named = right.map_or_else(String::new, |t| {
         format!(
             " Of single effects with √λ ≥ 8 the diagnosis names {} with kind and joint.",
@@ -167,8 +167,8 @@ pub fn markdown(scores: &Scores, command: &str) -> String {
 
 /// The page.
 pub fn page(scores: &Scores, program: Program) -> Result<Page, ReportError> {
-    let verdict =
-        Verdict { status: scores.verdict.into(), sentence: sentence(scores), facts: facts(scores) };
+    let status = Status::from(scores.verdict).of_a_part(&scores.missing);
+    let verdict = Verdict { status, sentence: sentence(scores), facts: facts(scores) };
     let subtitle = format!("Scenario {}", scores.scenario);
     let mut page = Page::new("Does the diagnosis find what is hidden?", subtitle, verdict, program);
     for (heading, words, table) in parts(scores) {

@@ -6,7 +6,7 @@ use super::{BaseParameter, NOT_IDENTIFIED};
 use crate::identify::{Processing, Regression};
 use crate::log::Log;
 use crate::report::json::Program;
-use crate::report::rows::{Rows, names};
+use crate::report::rows::{Rows, log_warnings, names};
 use crate::report::{Page, Status, Verdict};
 use crate::robot::Arm;
 
@@ -20,7 +20,8 @@ pub struct Declined {
     base_parameters: Vec<BaseParameter>,
     standard_parameters: Option<Vec<()>>,
     not_identified: Vec<String>,
-    warnings: Vec<String>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
     rows: Rows,
     verdict: &'static str,
 }
@@ -28,6 +29,7 @@ pub struct Declined {
 impl Declined {
     /// `parameters`: names of the base parameters whose columns vanish or coincide.
     pub fn new(arm: &Arm, logs: &[&Log], regression: &Regression, parameters: Vec<String>) -> Self {
+        let of_the_logs = logs.iter().flat_map(|log| log_warnings(log));
         Self {
             robot: arm.name.clone(),
             log: names(logs),
@@ -35,7 +37,7 @@ impl Declined {
             base_parameters: Vec::new(),
             standard_parameters: None,
             not_identified: parameters,
-            warnings: regression.prepared.warnings.clone(),
+            warnings: of_the_logs.chain(regression.prepared.warnings.iter().cloned()).collect(),
             rows: Rows::of(logs),
             verdict: NOT_IDENTIFIED,
         }
@@ -51,11 +53,57 @@ impl Declined {
         )
     }
 
-    /// A page with the verdict alone.
+    /// A page with the verdict and the warnings.
     pub fn page(&self, program: Program) -> Page {
         let facts = vec![self.rows.in_words()];
         let verdict = Verdict { status: Status::Bad, sentence: self.sentence(), facts };
         let subtitle = format!("{} from {}", self.robot, self.log);
-        Page::new("Identified parameters", subtitle, verdict, program)
+        Page::new("Identified parameters", subtitle, verdict, program).with_warnings(&self.warnings)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::{BaseSet, Parameterisation};
+    use crate::dynamics::Model;
+    use crate::identify::{Identifier, Measurement, Options};
+    use crate::log::{Effort, LogWarning};
+    use crate::robot::JointSignals;
+
+    /// What may be wrong with the file matters most where nothing could be identified from it.
+    #[test]
+    fn warnings_about_log_and_processing_are_kept() {
+        let arm = Arm::built_in("ur5").unwrap();
+        let set = BaseSet::find(&arm, Parameterisation::full(6, false)).unwrap();
+        let model = Model::new(&arm);
+        let time_s: Vec<f64> = (0..1250).map(|k| 0.008 * f64::from(k)).collect();
+        let signal = |f: fn(f64, f64) -> f64| {
+            let omega = |j: usize| 1.0 + j as f64;
+            JointSignals::from_fn(6, time_s.len(), |j, k| f(omega(j), omega(j) * time_s[k]))
+        };
+        let (q_rad, qd_rad_s) =
+            (signal(|_, phase| phase.sin()), signal(|omega, phase| omega * phase.cos()));
+        let torque_nm = signal(|_, phase| 5.0 * phase.sin());
+        let effort = Effort::Torque(torque_nm.clone());
+        let mut log = Log::new("a.csv", time_s.clone(), q_rad, qd_rad_s, effort).unwrap();
+        log.rows.warnings.push(LogWarning::ManySetAside { set_aside: 7, read: 9 });
+        let options = Options { period_s: Some(0.0), ..Options::default() };
+        let measurement = Measurement {
+            source: &log.source,
+            time_s: &log.time_s,
+            q_rad: &log.q_rad,
+            qd_rad_s: &log.qd_rad_s,
+            torque_nm: &torque_nm,
+        };
+        let mut regression =
+            Identifier::new(&model, &set, options).regression(&measurement).unwrap();
+        regression.prepared.warnings = vec!["resampled".to_owned()];
+        let declined = Declined::new(&arm, &[&log], &regression, vec!["mx2".to_owned()]);
+        let [of_the_file, processing] = &declined.warnings[..] else { panic!("two warnings") };
+        assert!(of_the_file.starts_with("a.csv: 7 of 9 rows"), "{of_the_file}");
+        assert_eq!(processing, "resampled");
+        let html = declined.page(Program::new(["armid"], None, Vec::new())).to_html().unwrap();
+        assert!(html.contains("7 of 9 rows") && html.contains("resampled"), "{html}");
     }
 }

@@ -30,6 +30,9 @@ use crate::robot::{Arm, Kinematics};
 /// Format of the JSON output.
 pub const IDENTIFY_SCHEMA: &str = "armid.identify/1";
 
+/// With so many an interval is 14 % longer than 1.96 σ.
+const FEW_DEGREES_OF_FREEDOM: f64 = 10.0;
+
 const IDENTIFIED: &str = "identified";
 const NOT_IDENTIFIED: &str = "not_identified";
 /// Verdict where no arm has what was identified.
@@ -189,6 +192,12 @@ impl Result {
             training.logs.iter().flat_map(|log| log_warnings(log)).collect();
         warnings.extend(identification.warnings.clone());
         warnings.extend(identification.lack_of_fit.and_then(|lack| lack.warning()));
+        let freedom = identification.covariance.degrees_of_freedom;
+        if freedom < FEW_DEGREES_OF_FREEDOM {
+            warnings.push(format!(
+                "σ is known with {freedom:.1} degrees of freedom: rely on the intervals, which are longer for that, not on ±"
+            ));
+        }
         let is_identified = identifies_the_arm(arm, set, &open);
         let theta = &identification.fit.theta;
         let doubt =

@@ -122,7 +122,7 @@ pub fn page(
     let subtitle = format!("{} from {}", result.robot, result.log);
     let mut page = Page::new("Identified parameters", subtitle, verdict, program);
     let fit = Prediction::of(training.regression, &training.identification.fit.theta);
-    let mut section = Section::new("Torque: measured and predicted")
+    let section = Section::new("Torque: measured and predicted")
         .figure(torque_figure("Torque along the training log", &fit)?, "")
         .figure(
             error_figure("What the model leaves", &fit)?,
@@ -130,10 +130,8 @@ pub fn page(
              every period is not noise: the model lacks something.",
         )
         .table(residual_table(result), "Root mean square over all samples used")
-        .paragraph(&result.intervals.reason);
-    for warning in result.notes() {
-        section = section.note(Status::Warn, warning);
-    }
+        .paragraph(&result.intervals.reason)
+        .warnings(result.notes());
     page.push(section);
     for v in validations {
         let name = v.log.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());

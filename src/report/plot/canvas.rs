@@ -181,7 +181,6 @@ fn finish(svg: &str, size: Size, title: &str) -> String {
                 .replace(" opacity=\"1\"", "")
                 .replace(" font-family=\"sans-serif\"", "")
                 .replace(" stroke=\"none\"", "")
-                .replace(" stroke=\"none\" stroke-width=\"1\"", "")
                 .replace(" \"", "\"");
             out.push_str(&line);
         } else {
@@ -190,6 +189,18 @@ fn finish(svg: &str, size: Size, title: &str) -> String {
         out.push('\n');
     }
     out
+}
+
+/// The figure `svg`, which is read out as `label` where it has no title of its own.
+pub(in crate::report) fn labelled(svg: String, label: &str) -> String {
+    const NAMELESS: &str = " aria-label=\"\"";
+    match svg.split_once('\n') {
+        Some((head, body)) if head.contains(NAMELESS) => {
+            let label = format!(" aria-label=\"{}\"", escape_attribute(label));
+            format!("{}\n{body}", head.replace(NAMELESS, &label))
+        }
+        _ => svg,
+    }
 }
 
 fn escape_attribute(text: &str) -> String {

@@ -30,6 +30,7 @@ mod xy;
 
 pub use axis::{Axis, Scale};
 pub use canvas::Size;
+pub(super) use canvas::labelled;
 pub use error::PlotError;
 pub use grid::Grid;
 pub use heat::HeatMap;

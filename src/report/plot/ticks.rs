@@ -207,17 +207,39 @@ mod tests {
         assert_eq!(labels(&ticks), ["1.2", "1.4", "1.6", "1.8", "2.0"]);
     }
 
+    /// A label reaches half its width to either side. In the ranges behind the third the labels are too long for the closest
+    /// step that the length has room for, but in the last one, where they fit by a tenth of a pixel.
     #[test]
     fn horizontal_labels_never_touch() {
-        for (low, high, px) in
-            [(1000.123, 1000.124, 150.0), (-99_999.0, 99_999.0, 120.0), (0.0, 1e-9, 90.0)]
-        {
-            let ticks = linear(low, high, px, Along::Horizontal).ticks;
+        let assert_apart = |ticks: &[Tick], px: f64| {
             for pair in ticks.windows(2) {
-                let distance = (pair[1].at - pair[0].at) / (high - low) * px;
-                let width = text_width_px(&pair[1].label, FONT_PX);
-                assert!(width < distance || ticks.len() <= 3, "{pair:?}: {width} in {distance} px");
+                let half_px = |tick: &Tick| text_width_px(&tick.label, FONT_PX) / 2.0;
+                let (needed_px, distance_px) =
+                    (half_px(&pair[0]) + half_px(&pair[1]), (pair[1].at - pair[0].at) * px);
+                assert!(needed_px < distance_px, "{pair:?}: {needed_px} in {distance_px} px");
             }
+        };
+        for (low, high, length_px, least) in [
+            (1000.123, 1000.124, 150.0, 2),
+            (-99_999.0, 99_999.0, 120.0, 1),
+            (0.0, 1e-9, 90.0, 2),
+            (1000.123, 1000.124, 600.0, 5),
+            (12_345.6, 12_345.7, 500.0, 5),
+            (-99_999.0, -99_990.0, 450.0, 5),
+            (-4321.25, -4321.05, 420.0, 5),
+            (-490.0, -488.4, 445.0, 8),
+        ] {
+            let ticks = linear(low, high, length_px, Along::Horizontal).ticks;
+            assert!(ticks.len() >= least, "{ticks:?}");
+            assert_apart(&ticks, length_px / (high - low));
+        }
+        // A decade is as long as three labels, and just long enough for those of 1, 2 and 5.
+        for (low, high) in [(-13.0, -7.0), (-5.5, 0.9)] {
+            let length_px = 130.0 * (high - low);
+            let mut ticks = logarithmic(low, high, length_px, Along::Horizontal).ticks;
+            ticks.retain(|tick| !tick.label.is_empty());
+            assert!(ticks.len() >= 18, "{ticks:?}");
+            assert_apart(&ticks, 130.0);
         }
     }
 

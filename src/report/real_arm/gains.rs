@@ -5,16 +5,16 @@ use crate::diagnose::HeldOut;
 use crate::number::percent;
 use crate::report::{Column, Table};
 
-/// Mean over the held-out logs of 1 − after/before per joint.
+/// Mean of 1 − after/before per joint over the held-out logs in which it has a size: along some a joint may never move.
 fn mean_gains(held_out: &[HeldOut], of: impl Fn(&HeldOut) -> (&[f64], &[f64])) -> Vec<f64> {
     let joints = held_out.first().map_or(0, |log| of(log).0.len());
     (0..joints)
         .map(|j| {
-            let gains = held_out.iter().map(|log| {
+            let gain = |log: &HeldOut| {
                 let (before, after) = of(log);
                 1.0 - after[j] / before[j]
-            });
-            gains.sum::<f64>() / held_out.len() as f64
+            };
+            mean(&held_out.iter().map(gain).collect::<Vec<f64>>())
         })
         .collect()
 }
@@ -134,5 +134,39 @@ impl RealArmStudy {
              angles, less can be reached; the wrist joints, half of whose error is noise, come nowhere near the gains \
              of joints 2 and 3.",
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn held_out(before_nm: [f64; 2], after_nm: [f64; 2]) -> HeldOut {
+        let [before, after] = [before_nm, after_nm].map(Vec::from);
+        HeldOut {
+            log: String::new(),
+            warnings: Vec::new(),
+            noise_rms_nm: None,
+            noise_moving_rms_nm: None,
+            before_rms_nm: before.clone(),
+            after_rms_nm: after.clone(),
+            before_moving_rms_nm: before.clone(),
+            after_moving_rms_nm: after.clone(),
+            before_standstill_free_rms_nm: before.clone(),
+            after_standstill_free_rms_nm: after.clone(),
+            manufacturer_rms_nm: None,
+            manufacturer_moving_rms_nm: None,
+            before_own_friction_rms_nm: before,
+            after_own_friction_rms_nm: after,
+            standstill_fraction: vec![0.0; 2],
+        }
+    }
+
+    /// Joint 2 moves in the first log alone.
+    #[test]
+    fn a_joint_that_never_moves_is_left_out_of_the_mean() {
+        let logs = [held_out([2.0, 4.0], [1.0, 1.0]), held_out([2.0, f64::NAN], [2.0, f64::NAN])];
+        let gains = mean_gains(&logs, |log| (&log.before_moving_rms_nm, &log.after_moving_rms_nm));
+        assert_eq!(gains, [0.25, 0.75]);
     }
 }

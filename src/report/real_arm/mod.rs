@@ -12,7 +12,7 @@ use super::json::Program;
 use super::plot::{Axis, Colour, Grid, Mark};
 use super::{Column, Page, ReportError, Section, Table, Verdict};
 use crate::diagnose::{Cause, Estimate, Finding, Kind, PayloadFinding, Repeated, chance};
-use crate::number::{significant, with_sigma};
+use crate::number::{NONE, significant, with_sigma};
 use crate::robot::Arm;
 
 /// A log that was used.
@@ -89,8 +89,10 @@ impl Part {
     }
 }
 
+/// Mean of those that are known.
 fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
+    let known = || values.iter().filter(|value| value.is_finite());
+    known().sum::<f64>() / known().count() as f64
 }
 
 fn list(values: &[f64], digits: usize) -> String {
@@ -98,7 +100,11 @@ fn list(values: &[f64], digits: usize) -> String {
 }
 
 fn percents(values: &[f64]) -> String {
-    values.iter().map(|v| format!("{:.0} %", 100.0 * v)).collect::<Vec<_>>().join("  ")
+    let one = |value: &f64| match value.is_finite() {
+        true => format!("{:.0} %", 100.0 * value),
+        false => NONE.to_owned(),
+    };
+    values.iter().map(one).collect::<Vec<_>>().join("  ")
 }
 
 /// Value ± half of the 95 % interval.

@@ -2,7 +2,7 @@
 
 use super::super::{Status, Verdict};
 use super::{RealArmStudy, file_name, mean, percents};
-use crate::diagnose::{Cause, HeldOut};
+use crate::diagnose::{Cause, HeldOut, Kind};
 use crate::number::significant;
 
 /// Share of the rms error that is to be removed on held-out runs, in the mean of the joints.
@@ -29,6 +29,16 @@ fn on_joints(joints: &[usize]) -> String {
         Some((only, [])) => format!("joint {only}"),
         Some((last, others)) => format!("joints {} and {last}", others.join(", ")),
     }
+}
+
+/// Joints whose velocity lags, and the longest lag, s. A late torque is another cause with a delay.
+fn velocity_lags(causes: &[Cause]) -> (Vec<usize>, f64) {
+    let late = || causes.iter().filter(|cause| cause.kind == Kind::VelocityLag);
+    let delay_s = |cause: &Cause| Some(cause.parameters.get("delay_s")?.value.abs());
+    (
+        late().filter_map(|cause| cause.joint).collect(),
+        late().filter_map(delay_s).fold(0.0, f64::max),
+    )
 }
 
 impl RealArmStudy {
@@ -88,10 +98,7 @@ impl RealArmStudy {
 
     /// What is wrong with the recording, not with the arm.
     fn record(&self) -> Option<String> {
-        let causes = self.finding.diagnosis.causes.iter();
-        let late: Vec<&Cause> = causes.filter(|c| c.parameters.contains_key("delay_s")).collect();
-        let joints: Vec<usize> = late.iter().filter_map(|c| c.joint).collect();
-        let longest = late.iter().map(|c| c.parameters["delay_s"].value.abs()).fold(0.0, f64::max);
+        let (joints, longest) = velocity_lags(&self.finding.diagnosis.causes);
         (longest > 0.0).then(|| {
             format!(
                 "The recording's velocity lags behind its angle by up to {} ms on {}; both models read it back.",
@@ -133,8 +140,9 @@ impl RealArmStudy {
                 (&log.after_moving_rms_nm, &log.manufacturer_moving_rms_nm),
             ];
             pairs.iter().all(|(after, own)| {
-                own.as_ref()
-                    .is_some_and(|own| after.iter().zip(own).all(|(after, own)| after < own))
+                // Joints that never move have neither.
+                let is_below = |(after, own): (&f64, &f64)| after < own || after.is_nan();
+                own.as_ref().is_some_and(|own| after.iter().zip(own).all(is_below))
             })
         };
         let held_out = &self.finding.diagnosis.held_out;
@@ -169,5 +177,39 @@ impl RealArmStudy {
             masses.join(", "),
             bare.len()
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::Estimate;
+
+    fn delay(kind: Kind, joint: Option<usize>, delay_s: f64) -> Cause {
+        let estimate = Estimate { value: delay_s, unit: "s", ci95: [delay_s; 2] };
+        Cause {
+            kind,
+            joint,
+            class: Vec::new(),
+            confidence: 1.0,
+            parameters: [("delay_s", estimate)].into(),
+            gain_fraction: None,
+            separating_experiment: None,
+            strength: 1.0,
+            in_words: String::new(),
+            form: None,
+            may_be_none: false,
+            rivals: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_late_torque_is_no_late_velocity() {
+        let causes = [
+            delay(Kind::VelocityLag, Some(2), 0.004),
+            delay(Kind::TimeSkew, None, 0.02),
+            delay(Kind::VelocityLag, Some(3), -0.006),
+        ];
+        assert_eq!(velocity_lags(&causes), (vec![2, 3], 0.006));
     }
 }

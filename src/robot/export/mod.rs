@@ -199,14 +199,34 @@ mod tests {
     /// URDF and drive file together are the whole arm but for its clearance.
     #[test]
     fn the_drive_file_gives_a_urdf_its_drives_back() {
-        let arm = Arm::built_in("ur5").unwrap();
+        let mut arm = Arm::built_in("ur5").unwrap();
+        arm.joints[1].bounds.mass_kg = Some([7.0, 9.0]);
+        arm.joints[2].bounds.com_m = Some([[-0.4, 0.0], [-0.1, 0.1], [-0.1, 0.2]]);
         let mut read = read_urdf(&urdf(&arm, &Frames::default()).unwrap(), "x.urdf").unwrap().arm;
         apply_drive_file(&mut read, &drive_file(&arm, &[0.0; 6]), "x.drives.toml").unwrap();
         assert_eq!(read.gravity_m_s2, arm.gravity_m_s2);
         assert_eq!(read.friction_epsilon_rad_s, arm.friction_epsilon_rad_s);
+        assert_eq!(read.torque_offsets, arm.torque_offsets);
         for (a, b) in arm.joints.iter().zip(&read.joints) {
-            assert_eq!((a.drive, a.limits), (b.drive, b.limits));
+            assert_eq!((a.drive, a.limits, a.bounds), (b.drive, b.limits, b.bounds));
         }
+    }
+
+    /// Written by a program that did not know of offsets and bounds yet.
+    #[test]
+    fn an_older_drive_file_leaves_what_it_does_not_say() {
+        let mut arm = Arm::built_in("ur5").unwrap();
+        let text = drive_file(&arm, &[0.0; 6]);
+        let older: String =
+            text.lines().filter(|line| !line.contains("torque_offsets")).map(with_end).collect();
+        assert_ne!(older, text);
+        arm.torque_offsets = true;
+        apply_drive_file(&mut arm, &older, "x.drives.toml").unwrap();
+        assert!(arm.torque_offsets);
+    }
+
+    fn with_end(line: &str) -> String {
+        format!("{line}\n")
     }
 
     #[test]
@@ -224,5 +244,7 @@ mod tests {
         assert!(negative.contains("rotor_inertia_kg_m2 = -"), "{negative}");
         let unknown = message(&text.replace("coulomb_nm", "coulombs"));
         assert!(unknown.contains("coulombs"), "{unknown}");
+        let heavy = message(&text.replacen("-9.81", "-inf", 1));
+        assert!(heavy.contains("gravity_m_s2: -inf is not a finite number"), "{heavy}");
     }
 }

@@ -1,7 +1,7 @@
 //! Robot files written.
 
 use super::{BoxEntry, CapsuleEntry, JointEntry, RobotFile, Tensor};
-use crate::robot::{Arm, Capsule, Joint};
+use crate::robot::{Arm, Joint};
 
 impl Arm {
     /// The text of a robot file that reads back as this arm, up to round-off.
@@ -16,9 +16,7 @@ impl Arm {
             collision_pairs: self.clearance.pairs.iter().map(|pair| pair.map(capsule)).collect(),
             joints: self.joints.iter().map(JointEntry::of).collect(),
             capsules: self.clearance.capsules.iter().map(CapsuleEntry::of).collect(),
-            boxes: (self.clearance.boxes.iter())
-                .map(|b| BoxEntry { low_m: b.low_m.into(), high_m: b.high_m.into() })
-                .collect(),
+            boxes: self.clearance.boxes.iter().map(BoxEntry::of).collect(),
         };
         // Strings and numbers in tables always serialise.
         toml::to_string(&file).unwrap_or_default()
@@ -54,18 +52,6 @@ impl JointEntry {
             torque_nm: limits.torque_nm,
             mass_bounds_kg: bounds.mass_kg,
             com_bounds_m: bounds.com_m,
-        }
-    }
-}
-
-impl CapsuleEntry {
-    fn of(capsule: &Capsule) -> Self {
-        Self {
-            name: capsule.name.clone(),
-            body: capsule.body,
-            from_m: capsule.from_m.into(),
-            to_m: capsule.to_m.into(),
-            radius_m: capsule.radius_m,
         }
     }
 }

@@ -24,7 +24,7 @@ pub enum UrdfNotice {
         /// As written.
         files: Vec<String>,
     },
-    /// The drive file beside the URDF was read: rotor inertias, friction, gears, gravity.
+    /// The drive file beside the URDF was read: rotor inertias, friction, gears, gravity, bounds.
     DriveFile {
         /// The file.
         file: String,
@@ -132,7 +132,7 @@ impl fmt::Display for UrdfNotice {
             ),
             Self::DriveFile { file } => write!(
                 f,
-                "rotor inertia, friction, gears, acceleration limits and gravity are those of {file}; torque offsets in it are left out"
+                "rotor inertia, friction, gears, acceleration limits, bounds of the links and gravity are those of {file}; the values of torque offsets in it are left out"
             ),
             Self::Continuous { joint } => {
                 write!(f, "joint \"{joint}\" has no end stops: taken as -2 pi to 2 pi")

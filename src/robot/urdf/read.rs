@@ -21,6 +21,8 @@ const ASSUMED_VELOCITY_RAD_S: f64 = PI;
 const ASSUMED_ACCELERATION_RAD_S2: f64 = 10.0;
 /// Half of the last of four decimals: files print 1.5708 and 3.1416.
 const RIGHT_ANGLE_RAD: f64 = 5e-5;
+/// Below this a right angle is only written with many digits: at the end of an arm of 2 m it is off by 2 nm.
+const WORTH_SAYING_RAD: f64 = 1e-9;
 /// Axes such as (0.577, 0.577, 0.577) have unit length to three digits.
 const AXIS_LENGTH: f64 = 1e-3;
 
@@ -318,12 +320,14 @@ impl Reader {
             finite(place, "rpy", *angle)?;
             let used_rad = (*angle / FRAC_PI_2).round() * FRAC_PI_2;
             let off = (*angle - used_rad).abs();
-            if off < RIGHT_ANGLE_RAD && off > 4.0 * f64::EPSILON * angle.abs() {
-                self.notices.push(UrdfNotice::RightAngle {
-                    place: place.to_owned(),
-                    written_rad: *angle,
-                    used_rad,
-                });
+            if off < RIGHT_ANGLE_RAD {
+                if off > WORTH_SAYING_RAD {
+                    self.notices.push(UrdfNotice::RightAngle {
+                        place: place.to_owned(),
+                        written_rad: *angle,
+                        used_rad,
+                    });
+                }
                 *angle = used_rad;
             }
         }

@@ -1,0 +1,133 @@
+//! Shards of one run, put together.
+
+use std::collections::BTreeSet;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use super::shard::{Header, Shard, ShardError};
+use super::trials::{Content, Difference, Gathered};
+
+/// Shards put together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Merged<C: Content> {
+    /// Common header.
+    pub header: Header<C>,
+    /// All trials.
+    pub tally: C::Gathered,
+    /// Sum of the time spent on trials, s.
+    pub seconds: f64,
+    /// Trials that no shard has run.
+    pub missing: Vec<Range<u64>>,
+    /// SHA-256 of every build of the program that has run some.
+    pub programs: BTreeSet<String>,
+}
+
+/// Merges shards (with the files they come from); any order gives the same bits.
+pub fn merge<C: Content>(mut shards: Vec<(PathBuf, Shard<C>)>) -> Result<Merged<C>, ShardError> {
+    shards.sort_by_key(|(_, shard)| shard.range);
+    let Some((_, first)) = shards.first() else {
+        return Err(ShardError::Empty { folder: PathBuf::new() });
+    };
+    let header = first.header.clone();
+    let mut merged = Merged {
+        tally: header.content.nothing(),
+        header: header.clone(),
+        seconds: 0.0,
+        missing: Vec::new(),
+        programs: shards.iter().map(|(_, shard)| shard.header.program.clone()).collect(),
+    };
+    let mut reached = 0;
+    for (file, shard) in &shards {
+        same_run(file, &shard.header, &header)?;
+        let [start, end] = shard.range;
+        if start < reached {
+            let last = reached.min(end).max(1) - 1;
+            return Err(ShardError::Overlap { file: file.clone(), start, end: last });
+        }
+        if reached < start {
+            merged.missing.push(reached..start);
+        }
+        // What a shard was to run and did not, another one may have.
+        reached = shard.next;
+        merged.tally.merge(&shard.tally);
+        merged.seconds += shard.seconds;
+    }
+    if reached < header.trials {
+        merged.missing.push(reached..header.trials);
+    }
+    Ok(merged)
+}
+
+/// Refuses a header that differs, naming the first part that does.
+pub fn same_run<C: Content>(
+    file: &Path,
+    found: &Header<C>,
+    expected: &Header<C>,
+) -> Result<(), ShardError> {
+    let text = [
+        ("program version", &found.version, &expected.version),
+        ("scenario", &found.scenario, &expected.scenario),
+        ("scenario text, robot or motion", &found.scenario_sha256, &expected.scenario_sha256),
+    ];
+    let numbers =
+        [("seed", found.seed, expected.seed), ("number of trials", found.trials, expected.trials)];
+    let text =
+        text.into_iter().find_map(|(what, own, others)| Difference::between(what, own, others));
+    let difference = text
+        .or_else(|| {
+            let mut numbers = numbers.into_iter();
+            numbers.find_map(|(what, own, others)| Difference::between(what, own, others))
+        })
+        .or_else(|| found.content.difference(&expected.content));
+    match difference {
+        Some(Difference { what, found, expected }) => {
+            Err(ShardError::Mismatch { file: file.to_owned(), what, found, expected })
+        }
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::montecarlo::blind::{BlindContent, Records};
+    use crate::montecarlo::trials::Failure;
+
+    fn shard(range: [u64; 2], seed: u64, program: &str) -> (PathBuf, Shard<BlindContent>) {
+        let content = BlindContent { known: Vec::new() };
+        let header = Header {
+            schema: BlindContent::SCHEMA.to_owned(),
+            version: "1".to_owned(),
+            program: program.to_owned(),
+            scenario: "test".to_owned(),
+            scenario_sha256: String::new(),
+            seed,
+            trials: 10,
+            content,
+        };
+        let failures =
+            (range[0]..range[1]).map(|trial| Failure { trial, reason: String::new() }).collect();
+        let tally = Records { records: Vec::new(), failures };
+        let shard = Shard { header, range, next: range[1], seconds: 1.0, tally };
+        (PathBuf::from(format!("{}.json", range[0])), shard)
+    }
+
+    #[test]
+    fn builds_of_the_program_are_counted_and_other_runs_refused() {
+        let merged = merge(vec![shard([4, 10], 1, "b"), shard([0, 4], 1, "a")]).unwrap();
+        assert_eq!(merged.tally.trials(), 10);
+        assert!(merged.missing.is_empty());
+        assert_eq!(merged.programs.into_iter().collect::<Vec<_>>(), ["a", "b"]);
+        let error = merge(vec![shard([0, 4], 1, "a"), shard([4, 10], 2, "a")]).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "4.json: its seed is 2, but the others have 1: not the same run"
+        );
+        let twice = merge(vec![shard([0, 5], 1, "a"), shard([4, 10], 1, "a")]).unwrap_err();
+        assert!(matches!(twice, ShardError::Overlap { start: 4, end: 4, .. }), "{twice}");
+        // What the first was to run and did not, the second has.
+        let (file, mut half) = shard([0, 4], 1, "a");
+        half.range = [0, 10];
+        assert!(merge(vec![(file, half), shard([4, 10], 1, "a")]).unwrap().missing.is_empty());
+    }
+}

@@ -1,0 +1,32 @@
+//! What a claim is about.
+
+/// A statistic about which something is claimed: [`super::calibration::claims`] says what.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Statistic {
+    /// Coverage of nominal 95 % intervals, mean over the parameters.
+    MeanCoverage,
+    /// The same of each parameter.
+    EachCoverage,
+    /// Mean error of each parameter in units of its σ.
+    Bias,
+    /// Empirical over predicted σ, pooled over the parameters.
+    PooledRatio,
+    /// The same of each parameter.
+    EachRatio,
+    /// Error of all parameters together in units of their predicted covariance.
+    JointRatio,
+}
+
+impl Statistic {
+    /// In words, by which results name it.
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Self::MeanCoverage => "coverage of 95 % intervals, mean over parameters",
+            Self::EachCoverage => "coverage of 95 % intervals, worst parameter",
+            Self::Bias => "bias over σ, worst parameter",
+            Self::PooledRatio => "empirical over predicted σ, pooled over parameters",
+            Self::EachRatio => "empirical over predicted σ, worst parameter",
+            Self::JointRatio => "error over predicted covariance, all parameters together",
+        }
+    }
+}

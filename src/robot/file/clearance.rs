@@ -1,0 +1,156 @@
+//! What an arm keeps clear of, as it stands in a robot file.
+
+use serde::{Deserialize, Serialize};
+
+use super::RobotFile;
+use crate::robot::place::Place;
+use crate::robot::{Capsule, CellBox, Clearance, RobotError};
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CapsuleEntry {
+    name: String,
+    body: usize,
+    from_m: [f64; 3],
+    to_m: [f64; 3],
+    radius_m: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct BoxEntry {
+    low_m: [f64; 3],
+    high_m: [f64; 3],
+}
+
+impl RobotFile {
+    /// Shapes, pairs, floor and boxes, checked.
+    pub(super) fn clearance(&self, place: &Place) -> Result<Clearance, RobotError> {
+        place.finite("floor_z_m", self.floor_z_m.as_slice())?;
+        place.unique("capsule", self.capsules.iter().map(|capsule| capsule.name.as_str()))?;
+        let bodies = self.joints.len();
+        let capsules = self.capsules.iter().map(|entry| entry.capsule(place, bodies));
+        let pairs = self.collision_pairs.iter().map(|pair| self.pair(place, pair));
+        let boxes = self.boxes.iter().map(|entry| entry.cell_box(place));
+        Ok(Clearance {
+            capsules: capsules.collect::<Result<_, _>>()?,
+            pairs: pairs.collect::<Result<_, _>>()?,
+            floor_z_m: self.floor_z_m,
+            boxes: boxes.collect::<Result<_, _>>()?,
+        })
+    }
+
+    /// Two capsules by their places in the list.
+    fn pair(&self, place: &Place, [one, other]: &[String; 2]) -> Result<[usize; 2], RobotError> {
+        let find = |name: &str| {
+            self.capsules.iter().position(|capsule| capsule.name == name).ok_or_else(|| {
+                let what = "which is not there";
+                place.fault(format!("collision_pairs names the capsule \"{name}\", {what}"))
+            })
+        };
+        if one == other {
+            let what = format!("collision_pairs: \"{one}\" cannot be kept clear of itself");
+            return Err(place.fault(what));
+        }
+        Ok([find(one)?, find(other)?])
+    }
+}
+
+impl CapsuleEntry {
+    pub(super) fn of(capsule: &Capsule) -> Self {
+        Self {
+            name: capsule.name.clone(),
+            body: capsule.body,
+            from_m: capsule.from_m.into(),
+            to_m: capsule.to_m.into(),
+            radius_m: capsule.radius_m,
+        }
+    }
+
+    fn capsule(&self, place: &Place, bodies: usize) -> Result<Capsule, RobotError> {
+        let place = place.table("capsule", &self.name);
+        if self.body > bodies {
+            let body = self.body;
+            let what = format!("body = {body} must be 0 (the base) or one of 1 … {bodies}");
+            return Err(place.fault(what));
+        }
+        place.finite("from_m", &self.from_m)?;
+        place.finite("to_m", &self.to_m)?;
+        place.positive("radius_m", self.radius_m)?;
+        Ok(Capsule {
+            name: self.name.clone(),
+            body: self.body,
+            from_m: self.from_m.into(),
+            to_m: self.to_m.into(),
+            radius_m: self.radius_m,
+        })
+    }
+}
+
+impl BoxEntry {
+    pub(super) fn of(cell_box: &CellBox) -> Self {
+        Self { low_m: cell_box.low_m.into(), high_m: cell_box.high_m.into() }
+    }
+
+    fn cell_box(&self, place: &Place) -> Result<CellBox, RobotError> {
+        let Self { low_m, high_m } = self;
+        place.finite("box: low_m", low_m)?;
+        place.finite("box: high_m", high_m)?;
+        if low_m.iter().zip(high_m).all(|(low, high)| low < high) {
+            return Ok(CellBox { low_m: (*low_m).into(), high_m: (*high_m).into() });
+        }
+        Err(place.fault(format!(
+            "box: low_m = {low_m:?} must be below high_m = {high_m:?} in every coordinate"
+        )))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::robot::Arm;
+
+    const UR5: &str = include_str!("../../../robots/ur5.toml");
+
+    fn message(from: &str, to: &str) -> String {
+        assert!(UR5.contains(from), "{from}");
+        Arm::from_toml(&UR5.replacen(from, to, 1), "x.toml").unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_capsule_that_is_none_is_refused() {
+        let body = message("name = \"wrist 3\"\nbody = 6", "name = \"wrist 3\"\nbody = 7");
+        let stated = "x.toml: capsule \"wrist 3\": body = 7 must be 0 (the base) or one of 1 … 6";
+        assert_eq!(body, stated);
+        for value in ["nan", "inf", "0.0"] {
+            let radius = message("radius_m = ", &format!("radius_m = {value} # "));
+            assert!(radius.contains("radius_m = ") && radius.contains("positive"), "{radius}");
+        }
+        for key in ["from_m", "to_m"] {
+            let end = message(&format!("{key} = ["), &format!("{key} = [0.0, inf, 0.0] # ["));
+            assert!(end.contains("capsule \"base\"") && end.contains(key), "{end}");
+        }
+    }
+
+    #[test]
+    fn names_of_capsules_tell_them_apart() {
+        let twice = message("name = \"wrist 3\"\nbody", "name = \"wrist 2\"\nbody");
+        assert!(twice.contains("the capsule \"wrist 2\" is there twice"), "{twice}");
+        let itself = message("[\"base\", \"forearm\"]", "[\"base\", \"base\"]");
+        assert!(itself.contains("\"base\" cannot be kept clear of itself"), "{itself}");
+        let unknown = message("[\"base\", \"forearm\"]", "[\"base\", \"tool\"]");
+        assert!(unknown.contains("\"tool\", which is not there"), "{unknown}");
+    }
+
+    #[test]
+    fn floor_and_boxes_are_somewhere() {
+        let floor = message("floor_z_m = ", "floor_z_m = nan # ");
+        assert!(floor.contains("floor_z_m: NaN is not a finite number"), "{floor}");
+        let with = |low: &str| {
+            let cell_box = format!("{UR5}\n[[box]]\nlow_m = {low}\nhigh_m = [1.0, 1.0, 1.0]\n");
+            Arm::from_toml(&cell_box, "x.toml").map_err(|e| e.to_string())
+        };
+        assert_eq!(with("[0.0, 0.0, 0.0]").unwrap().clearance.boxes.len(), 1);
+        assert!(with("[0.0, -inf, 0.0]").unwrap_err().contains("box: low_m: -inf"));
+        assert!(with("[0.0, 2.0, 0.0]").unwrap_err().contains("in every coordinate"));
+    }
+}

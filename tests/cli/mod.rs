@@ -1,0 +1,112 @@
+//! The programs as a user runs them: by their words, in a folder that every test has for itself.
+
+mod described;
+
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+pub use described::{keys, words};
+
+/// The default scenario with so many periods.
+pub fn default_scenario(periods: usize) -> String {
+    let text = include_str!("../../sims/default.toml");
+    text.replace("periods = 8", &format!("periods = {periods}"))
+}
+
+/// A folder in which programs run, so that files go by their names alone.
+pub struct Folder(TempDir);
+
+impl Folder {
+    pub fn empty() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    pub fn is_empty(&self) -> bool {
+        std::fs::read_dir(self.0.path()).unwrap().next().is_none()
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// Writes a file, and the folder that it is to be in.
+    pub fn write(&self, name: &str, text: impl AsRef<[u8]>) {
+        let path = self.path(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, text).unwrap();
+    }
+
+    pub fn read(&self, name: &str) -> String {
+        std::fs::read_to_string(self.path(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+    }
+
+    pub fn json(&self, name: &str) -> Value {
+        serde_json::from_str(&self.read(name)).unwrap()
+    }
+
+    /// A result for users: `docs/formats.md` has to know every key of it.
+    pub fn result(&self, name: &str) -> Value {
+        let result = self.json(name);
+        described::assert_described(name, &result);
+        result
+    }
+
+    pub fn armid(&self, words: &str) -> Said {
+        Said::by(self.command(env!("CARGO_BIN_EXE_armid"), words))
+    }
+
+    pub fn montecarlo(&self, words: &str) -> Said {
+        Said::by(self.montecarlo_command(words))
+    }
+
+    /// Not started yet, for what a test has to do while it runs.
+    pub fn montecarlo_command(&self, words: &str) -> Command {
+        self.command(env!("CARGO_BIN_EXE_montecarlo"), words)
+    }
+
+    fn command(&self, program: &str, words: &str) -> Command {
+        let mut command = Command::new(program);
+        command.current_dir(self.0.path()).args(words.split_whitespace());
+        command
+    }
+}
+
+/// How a program ended, and what it said.
+pub struct Said {
+    command: String,
+    code: Option<i32>,
+    stdout: String,
+    pub stderr: String,
+}
+
+impl Said {
+    fn by(mut command: Command) -> Self {
+        let Output { status, stdout, stderr } = command.output().unwrap();
+        let [stdout, stderr] =
+            [stdout, stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+        Self { command: format!("{command:?}"), code: status.code(), stdout, stderr }
+    }
+
+    /// Asserts the exit code and that the terminal shows all of `words`; returns what it shows.
+    pub fn says(&self, code: i32, words: &[&str]) -> String {
+        let text = format!("{}{}", self.stdout, self.stderr);
+        assert_eq!(self.code, Some(code), "{}: {text}", self.command);
+        self.contains(&text, words);
+        text
+    }
+
+    /// The same of stderr alone, where errors and notes belong.
+    pub fn complains(&self, code: i32, words: &[&str]) {
+        self.says(code, &[]);
+        self.contains(&self.stderr, words);
+    }
+
+    fn contains(&self, text: &str, words: &[&str]) {
+        for word in words {
+            assert!(text.contains(word), "{}: \"{word}\" is not in: {text}", self.command);
+        }
+    }
+}

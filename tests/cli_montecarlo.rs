@@ -1,0 +1,182 @@
+//! `montecarlo` in parts, as many machines run it: shards, what goes on after a stop, what is put
+//! together, and what is refused.
+
+use std::sync::OnceLock;
+
+use serde_json::{Value, json};
+
+use crate::cli::{Folder, default_scenario};
+
+/// Of one run the options that all its parts share.
+const RUN: &str = "--scenario s.toml --trials 6";
+
+/// File of the shard with the trials from `first` to before `end`.
+fn file_of(folder: &str, first: u64, end: u64) -> String {
+    format!("{folder}/shard-{first:012}-{end:012}.json")
+}
+
+/// Six trials of 20 s as one run, with its result in `whole.json`, and as two shards, in `a` and in
+/// `b`.
+fn runs() -> &'static Folder {
+    static FOLDER: OnceLock<Folder> = OnceLock::new();
+    FOLDER.get_or_init(|| {
+        let folder = Folder::empty();
+        folder.write("s.toml", default_scenario(2));
+        for words in [
+            "--json whole.json",
+            "--shard 0/2 --out a --json a.json",
+            "--shard 1/2 --out b --threads 1",
+        ] {
+            folder.montecarlo(&format!("{RUN} {words}")).says(0, &[]);
+        }
+        folder
+    })
+}
+
+/// What a result says of the trials: all but how it was called and how long it took.
+fn of_trials(folder: &Folder, name: &str) -> Value {
+    let mut result = folder.result(name);
+    for key in ["program", "trials_per_second"] {
+        assert!(result.as_object_mut().unwrap().remove(key).is_some(), "{name} without {key}");
+    }
+    result
+}
+
+/// Copies shard 0 of 2 to `to` as `change` makes it.
+fn changed(folder: &Folder, to: &str, change: impl Fn(&mut Value)) {
+    let mut first = folder.json(&file_of("a", 0, 3));
+    change(&mut first);
+    folder.write(to, first.to_string());
+}
+
+/// Shard 0 of 2, as the whole run of `trials` would have left it when it was stopped after three.
+fn stopped(folder: &Folder, to: &str, trials: u64) {
+    changed(folder, &file_of(to, 0, trials), |shard| {
+        shard["header"]["trials"] = trials.into();
+        shard["range"] = json!([0, trials]);
+    });
+}
+
+#[test]
+fn shards_together_are_the_run_in_one_bit_for_bit() {
+    let folder = runs();
+    // One of many does not miss what the others run.
+    let alone = folder.result("a.json");
+    assert_eq!((&alone["trials"], &alone["missing"]), (&json!(3), &json!([])));
+    let whole = of_trials(folder, "whole.json");
+    assert_eq!(whole["trials"], 6);
+    for (order, result) in [("a b", "ab.json"), ("b a", "ba.json")] {
+        folder.montecarlo(&format!("merge {order} --json {result}")).says(0, &["6 trials"]);
+        assert_eq!(of_trials(folder, result), whole, "{order}");
+    }
+}
+
+/// What was done is written; only the exit code says that it is not all.
+#[test]
+fn a_part_ends_with_130_and_names_the_missing_trials() {
+    let folder = runs();
+    let words = "merge a --json part.json";
+    folder.montecarlo(words).says(130, &["trials 3…5 have not been run"]);
+    let part = folder.result("part.json");
+    assert_eq!((&part["trials"], &part["missing"]), (&json!(3), &json!([[3, 6]])));
+    folder.montecarlo("merge b").says(130, &["trials 0…2 have not been run"]);
+}
+
+#[test]
+fn a_stopped_run_goes_on_where_it_was() {
+    let folder = runs();
+    stopped(folder, "half", 6);
+    folder.montecarlo("merge half").says(130, &["trials 3…5 have not been run"]);
+    let file = file_of("half", 0, 6);
+    let half = folder.read(&file);
+    let refused = |words: &str, expected: &[&str]| {
+        folder.montecarlo(&format!("{RUN} --out half {words}")).complains(1, expected);
+        assert_eq!(folder.read(&file), half, "{words}");
+    };
+    refused("", &[&file, "exists: give --resume"]);
+    refused("--resume --seed 7", &[&file, "seed is 20200601", "7: not the same run"]);
+    // The second time nothing is left to do.
+    for done in [3, 6] {
+        let said = format!("going on after {done} trials");
+        let words = format!("{RUN} --out half --resume --json resumed.json");
+        folder.montecarlo(&words).says(0, &[&said]);
+        assert_eq!(of_trials(folder, "resumed.json"), of_trials(folder, "whole.json"), "{said}");
+    }
+    folder.montecarlo("merge half").says(0, &["6 trials"]);
+}
+
+#[test]
+fn shards_that_do_not_belong_together_are_refused() {
+    let folder = runs();
+    let refused = |words: &str, expected: &[&str]| {
+        folder.montecarlo(&format!("merge {words} --json no.json")).complains(1, expected);
+        assert!(!folder.path("no.json").exists(), "{words}");
+    };
+    stopped(folder, "over", 6);
+    let another = "are in another shard too";
+    refused("a over", &[&file_of("over", 0, 6), another]);
+    // What it was to run and did not, another one may have.
+    folder.montecarlo("merge b over --json both.json").says(0, &["6 trials"]);
+    assert_eq!(of_trials(folder, "both.json"), of_trials(folder, "whole.json"));
+    refused("a a", &[&file_of("a", 0, 3), "trials 0…2", another]);
+
+    // Behind the first one, which the others are compared with.
+    let later = |folder: &str| file_of(folder, 3, 6);
+    folder.montecarlo(&format!("{RUN} --shard 1/2 --out seed --seed 7")).says(0, &[]);
+    refused("a seed", &[&later("seed"), "seed is 7", "20200601: not the same run"]);
+    for (name, key, value, what) in [
+        ("longer", "trials", json!(8), "number of trials is 8"),
+        ("motion", "scenario_sha256", json!("0"), "scenario text, robot or motion is 0"),
+        ("older", "version", json!("0.0.1"), "program version is 0.0.1"),
+    ] {
+        changed(folder, &later(name), |shard| {
+            shard["header"][key] = value.clone();
+            shard["range"] = json!([3, 6]);
+            shard["next"] = json!(6);
+        });
+        refused(&format!("a {name}"), &[&later(name), what, "not the same run"]);
+    }
+
+    let whole = folder.read(&later("b"));
+    folder.write(&later("cut"), &whole[..whole.len() / 2]);
+    refused("a cut", &[&later("cut"), "not a shard file this program can read"]);
+    // A number of trials that are not in its sums.
+    changed(folder, &file_of("more", 0, 3), |shard| shard["next"] = json!(2));
+    refused("more b", &[&file_of("more", 0, 3), "3 trials do not fit 0…2"]);
+    folder.write("empty/note.txt", "nothing yet");
+    refused("a empty", &["empty: no shard files"]);
+    // Nor is any of it gone on with.
+    let cut = folder.montecarlo(&format!("{RUN} --shard 1/2 --out cut --resume"));
+    cut.complains(1, &[&later("cut"), "not a shard file this program can read"]);
+}
+
+/// Ctrl-C ends a run behind the trials that are under way.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_keeps_what_it_has() {
+    use std::io::{BufRead, BufReader};
+    use std::process::{Command, Stdio};
+
+    let folder = runs();
+    stopped(folder, "long", 200);
+    let words = "--scenario s.toml --trials 200 --threads 1 --out long --resume --json long.json";
+    let mut run = folder
+        .montecarlo_command(words)
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(run.stderr.take().unwrap()).lines().map(Result::unwrap);
+    assert!(lines.any(|line| line.starts_with("going on after 3 trials")));
+    // It listens already, and has some ten seconds of trials before it.
+    let signal = format!("kill -INT {}", run.id());
+    assert!(Command::new("sh").args(["-c", &signal]).status().unwrap().success());
+    let said: Vec<String> = lines.collect();
+    assert_eq!(run.wait().unwrap().code(), Some(130), "{said:?}");
+    let reached = folder.json(&file_of("long", 0, 200))["next"].as_u64().unwrap();
+    assert!((3..200).contains(&reached), "{reached}");
+    assert!(said.contains(&format!("interrupted after {reached} trials")), "{said:?}");
+    assert_eq!(folder.result("long.json")["missing"], json!([[reached, 200]]));
+    let missing = format!("trials {reached}…199 have not been run");
+    folder.montecarlo("merge long").says(130, &[&missing]);
+}
