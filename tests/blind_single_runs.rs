@@ -32,9 +32,24 @@ fn noise_of_velocities_is_no_gear() {
     let loud = format!("torque_sd_nm = {third:?}\nq_sd_rad = 2e-5\nqd_sd_rad_s = 3e-3\n");
     let run =
         scenario(("loud", 3), ("ur5_identification", 5), &loud, "[processing]\nperiod_s = 0.0");
-    let run = Run::new(run);
-    let d = run.diagnoser().diagnose(&run.log.measurement("loud"), &[], None).unwrap().diagnosis;
+    let mut run = Run::new(run);
+    let diagnose = |run: &Run| {
+        run.diagnoser().diagnose(&run.log.measurement("loud"), &[], None).unwrap().diagnosis
+    };
+    let d = diagnose(&run);
     assert_eq!(d.verdict, Verdict::NothingFound, "{:?}", d.sentences);
+    // Nor behind a rest that is longer than the motion and read as such, which says nothing of that noise.
+    let rest = 7000;
+    let step_s = run.log.time_s[1] - run.log.time_s[0];
+    let log = &mut run.log;
+    let before = (1..=rest).rev().map(|k| log.time_s[0] - k as f64 * step_s);
+    log.time_s = before.chain(log.time_s.iter().copied()).collect();
+    log.qd_rad_s = log.qd_rad_s.map_joints(|_, qd| [vec![0.0; rest], qd.to_vec()].concat());
+    for signals in [&mut log.q_rad, &mut log.torque_nm] {
+        *signals = signals.map_joints(|_, y| [vec![y[0]; rest], y.to_vec()].concat());
+    }
+    let d = diagnose(&run);
+    assert!(d.causes.iter().all(|cause| cause.kind != Kind::Elasticity), "{:?}", d.sentences);
 }
 
 /// Half of the error's mean square, where as much of it is that noise.

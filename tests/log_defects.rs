@@ -675,7 +675,11 @@ fn velocities_that_were_not_recorded_are_slopes_of_the_angles() {
     let (text, layout) = (text(&rows, ",", "\n"), without_velocities());
     let log = read_log_from(text.as_bytes(), "run.csv", &layout, JOINTS).unwrap();
     assert_eq!(log.rows.used, SAMPLES);
-    assert_eq!(log.rows.warnings, [LogWarning::SlopesOfAngles]);
+    let [LogWarning::Unwrapped { joint: 4, .. }, LogWarning::SlopesOfAngles] =
+        log.rows.warnings[..]
+    else {
+        panic!("{:?}", log.rows.warnings)
+    };
     let bound = 6.0 * 1.8 * (2.0 * STEP_S).powi(4) / 30.0;
     for j in 0..JOINTS {
         for (slope, t) in log.qd_rad_s.joint(j).iter().zip(&log.time_s) {
@@ -685,7 +689,38 @@ fn velocities_that_were_not_recorded_are_slopes_of_the_angles() {
     }
 }
 
-/// Readings at 42 Hz in a file of 125 Hz: two in three rows are held.
+/// A wild angle costs its own row and none beside it, whose slopes it would be in, and stays out of those.
+#[test]
+fn wild_angles_are_in_no_slopes() {
+    let mut rows = valid();
+    let wild: Vec<usize> = (20..SAMPLES).step_by(40).collect();
+    for k in &wild {
+        rows[row(*k) - 1][3] = "2.5".into();
+    }
+    let text = text(&rows, ",", "\n");
+    let log = read_log_from(text.as_bytes(), "run.csv", &without_velocities(), JOINTS).unwrap();
+    assert_eq!(log.rows.used, SAMPLES - wild.len());
+    assert_eq!(log.rows.set_aside[0].reason, Reason::Inconsistent);
+    assert!(log.rows.set_aside[0].example.contains("2.5"), "{}", log.rows);
+    for (slope, t) in log.qd_rad_s.joint(2).iter().zip(&log.time_s) {
+        // Beside a row that is missing steps are twice as long, and one-sided at the ends.
+        let bound = 16.0 * 6.0 * 1.8 * (2.0 * STEP_S).powi(4) / 30.0;
+        assert!((slope - velocity_rad_s(2, *t)).abs() < bound, "{slope} at {t} s");
+    }
+}
+
+/// A layout that knows no torques asks for none.
+#[test]
+fn the_effort_that_a_layout_names_is_the_one_that_is_missing() {
+    let layout = include_str!("../layouts/armid.toml").lines();
+    let layout: Vec<&str> = layout.filter(|line| !line.starts_with("torque =")).collect();
+    let layout = Layout::from_toml(&layout.join("\n"), "ampere.toml").unwrap();
+    let text = text(&valid(), ",", "\n").replace("actual_current", "ampere");
+    let result = read_log_from(text.as_bytes(), "run.csv", &layout, JOINTS);
+    assert_says(result, &["no column \"actual_current_0\"", "\"armid\""]);
+}
+
+/// Readings at 42 Hz in a file of 125 Hz: two in three rows are held. An arm at rest, whose velocities are noisy, holds none.
 #[test]
 fn rows_that_hold_old_readings_are_told() {
     let log = edited(|rows| {
@@ -700,6 +735,17 @@ fn rows_that_hold_old_readings_are_told() {
         _ => None,
     });
     let (share, rate_hz) = held.expect("it is told");
+    let at_rest = edited(|rows| {
+        for k in 0..SAMPLES / 2 {
+            for j in 0..JOINTS {
+                rows[row(k) - 1][1 + j] = rows[row(SAMPLES / 2) - 1][1 + j].clone();
+                rows[row(k) - 1][1 + JOINTS + j] =
+                    (0.004 * (k as f64 + j as f64).sin()).to_string();
+            }
+        }
+    });
+    let warnings = at_rest.unwrap().rows.warnings;
+    assert!(!warnings.iter().any(|w| matches!(w, LogWarning::Held { .. })), "{warnings:?}");
     // 400 rows are 133 such readings and one more.
     assert!((share - 2.0 / 3.0).abs() < 0.003, "{share}");
     assert!((rate_hz * STEP_S - 1.0 / 3.0).abs() < 0.003, "{rate_hz}");

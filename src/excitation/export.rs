@@ -55,7 +55,9 @@ impl Playback {
         if !is_whole(E_SERIES_HZ / rate_hz) {
             return Err(PlaybackError::Rate { rate_hz });
         }
-        Ok(Self { cycle_s: 1.0 / rate_hz, speed, approach_rad_s: 0.3 })
+        // 166.667 means 500/3.
+        let cycle_s = (E_SERIES_HZ / rate_hz).round() / E_SERIES_HZ;
+        Ok(Self { cycle_s, speed, approach_rad_s: 0.3 })
     }
 
     /// Whether a controller of the CB-Series can play it, and not only one of the e-Series.
@@ -64,9 +66,9 @@ impl Playback {
     }
 }
 
-/// Whether `cycles` is a whole number from 1 on, up to round-off.
+/// Whether `cycles` is a whole number from 1 on, as far as a rate is written with six digits.
 fn is_whole(cycles: f64) -> bool {
-    cycles.round() >= 1.0 && (cycles - cycles.round()).abs() < 1e-9 * cycles
+    cycles.round() >= 1.0 && (cycles - cycles.round()).abs() < 1e-5 * cycles
 }
 
 /// Writes `motion` sampled at `rate_hz` with the header `timestamp, target_q_0…, target_qd_0…,

@@ -1,8 +1,8 @@
 //! Which rows of a log belong together.
 
-use crate::median::{median_step, missing_steps};
+use crate::median::{median, median_step, missing_steps};
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use super::account::{LogWarning, Reason};
 
@@ -35,7 +35,7 @@ pub(super) struct Motion<'a> {
     pub(super) time_s: &'a [f64],
     /// Angle of each joint.
     pub(super) q: &'a [Vec<f64>],
-    /// Velocity of each joint.
+    /// Velocity of each joint; none of a file that has none, as long as they are not taken from the angles.
     pub(super) qd: &'a [Vec<f64>],
     /// Number of the row in the file.
     pub(super) row: &'a [usize],
@@ -70,6 +70,11 @@ impl Motion<'_> {
     /// The turn (+1 or −1) that the angle lost on the way to row `k` from the one before: no motion jumps so far, and a
     /// wrapped angle does.
     fn lost_turn(&self, joint: usize, k: usize) -> Option<f64> {
+        if self.qd.is_empty() {
+            // No arm turns by half a turn from one row to the next.
+            let jump_rad = self.q[joint][k] - self.q[joint][k - 1];
+            return (jump_rad.abs() > PI).then(|| -jump_rad.signum());
+        }
         let tolerance_rad = angle_tolerance_rad(self.time_s[k] - self.time_s[k - 1]);
         let jump_rad = self.defect(joint, k - 1, k);
         let is_turn = (jump_rad.abs() - TAU).abs() <= tolerance_rad;
@@ -247,9 +252,31 @@ pub(super) fn unwrapped(motion: &Motion) -> (Vec<Unwrapped>, Option<LogWarning>)
     (joints, warning)
 }
 
+/// Rows of which an angle is compared with the median.
+const BESIDE: usize = 5;
+
+/// For every row of a log without velocities why its angles cannot stay: what is off the median of five is wild, and would be in the slopes
+/// of four rows beside it. Where a joint turns one way the median is the angle itself.
+pub(super) fn wild_angles(motion: &Motion) -> Vec<Option<Reason>> {
+    let rows = motion.rows();
+    let is_wild = |q: &Vec<f64>, k: usize| {
+        let from = k.saturating_sub(BESIDE / 2).min(rows.saturating_sub(BESIDE));
+        let beside = median(&mut q[from..rows.min(from + BESIDE)].to_vec());
+        beside.is_some_and(|beside| (q[k] - beside).abs() > STEP_TOLERANCE_RAD)
+    };
+    let verdict = |k: usize| match k {
+        k if !motion.is_plausible(k) => Some(Reason::Implausible),
+        k if motion.q.iter().any(|q| is_wild(q, k)) => Some(Reason::Inconsistent),
+        _ => None,
+    };
+    (0..rows).map(verdict).collect()
+}
+
 /// Share of the rows that may repeat the angles of the one before while the arm moves.
 const MOST_HELD: f64 = 0.3;
-/// An arm moves where an angle changes, by its velocity, by so many times the least that it is ever seen to change by.
+/// An arm moves where a joint is faster than this, rad/s, far above the noise of velocities, and its angle changes in a row by so many
+/// times the least that it is ever seen to change by.
+const MOVES_RAD_S: f64 = 0.05;
 const MOVES: f64 = 5.0;
 
 /// Whether most rows hold what an earlier one read: the file is written faster than the arm is asked.
@@ -263,7 +290,7 @@ pub(super) fn held(motion: &Motion) -> Option<LogWarning> {
     let moves = |k: &usize| {
         let step_s = motion.time_s[*k] - motion.time_s[*k - 1];
         let mut joints = motion.qd.iter().zip(&least);
-        joints.any(|(qd, least)| qd[*k].abs() * step_s > MOVES * least)
+        joints.any(|(qd, least)| qd[*k].abs() > (MOVES * least / step_s).max(MOVES_RAD_S))
     };
     let moving: Vec<usize> = (1..motion.rows()).filter(moves).collect();
     let holds = |k: &&usize| (0..motion.q.len()).all(|joint| change(joint, **k) == 0.0);

@@ -269,11 +269,15 @@ impl Header<'_> {
             Ok(fields) => return Ok(fields),
             Err(name) => name,
         };
-        self.block(Block::Current)?.map_err(|current| LogError::NoEffort {
-            file: self.file.to_owned(),
-            row: self.row,
-            current,
-            torque,
+        let current = match self.block(Block::Current)? {
+            Ok(fields) => return Ok(fields),
+            Err(name) => name,
+        };
+        let names = |block| self.layout.columns(block).is_some();
+        Err(match (names(Block::Current), names(Block::Torque)) {
+            (true, false) => self.missing(current),
+            (false, true) => self.missing(torque),
+            _ => LogError::NoEffort { file: self.file.to_owned(), row: self.row, current, torque },
         })
     }
 

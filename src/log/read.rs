@@ -1,6 +1,5 @@
 //! From a file to a log.
 
-use std::f64::consts::TAU;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -11,7 +10,7 @@ use super::error::{LogError, UnitSuspicion};
 use super::even_stamps::{EvenStamps, even_stamps};
 use super::layout::{Block, Layout};
 use super::lines::{Line, Lines};
-use super::plan::{Delimiter, Field, Plan};
+use super::plan::{Delimiter, Plan};
 use super::record::{Effort, Log};
 use super::slopes::slopes;
 use super::units;
@@ -22,7 +21,8 @@ const WIDTH_ROWS: usize = 50;
 
 /// Reads a log of an arm with `joints` joints.
 ///
-/// A layout without velocities takes them from the angles, once the times are in order: slopes of polynomials through five rows.
+/// A layout without velocities takes them from the angles, once the times are in order: slopes of polynomials through five
+/// rows; angles off the median of five are set aside before, in place of step 4, and stamps that are rounded stay as they are (step 2).
 ///
 /// Only the columns of the layout are read, row by row; memory is that of the numbers kept, 8 bytes each.
 /// Numbers are converted to SI units. Then, in this order:
@@ -229,9 +229,10 @@ impl Table {
         let order = clean::order_of_time(&self.columns[time]);
         self.retain(&order, account, |table, k, _| format!("time {} s", table.columns[time][k]));
         self.require_two(account, file)?;
-        if !has_velocities {
-            self.take_slopes(plan);
-        }
+        let slopes = match has_velocities {
+            true => Vec::new(),
+            false => self.take_slopes(plan, account, file)?,
+        };
         let motion = self.motion(plan);
         // Many garbage rows can hide how angles and velocities are related: then they go first.
         let mut related = units::check(&motion, &layout.units);
@@ -240,7 +241,8 @@ impl Table {
         {
             return Err(fault(suspicion.clone()));
         }
-        let verdicts = clean::consistency(&motion);
+        // Slopes follow from the angles, whatever these are.
+        let verdicts = if has_velocities { clean::consistency(&motion) } else { Vec::new() };
         self.retain(&verdicts, account, |table, k, reason| {
             let beyond = |columns: std::ops::Range<usize>, bound: f64| {
                 columns.into_iter().find(|&c| table.columns[c][k].abs() > bound)
@@ -249,8 +251,7 @@ impl Table {
                 .or_else(|| beyond(qd.clone(), clean::VELOCITY_BOUND_RAD_S))
                 .filter(|_| reason == Reason::Implausible);
             let c = worst.unwrap_or(q.start);
-            let place = plan.fields.get(c).map_or("the slope of an angle".to_owned(), Field::place);
-            format!("{place} = {}", table.columns[c][k])
+            format!("{} = {}", plan.fields[c].place(), table.columns[c][k])
         });
         self.require_two(account, file)?;
         if related.is_err() {
@@ -258,12 +259,9 @@ impl Table {
         }
         let mut warnings = related.map_err(fault)?;
         warnings.splice(0..0, rounded);
+        warnings.extend(slopes);
         if has_velocities {
             warnings.extend(self.unwrap_angles(plan));
-        } else {
-            // Without the rows that were set aside.
-            self.take_slopes(plan);
-            warnings.push(LogWarning::SlopesOfAngles);
         }
         let motion = self.motion(plan);
         warnings.extend(clean::held(&motion));
@@ -282,27 +280,38 @@ impl Table {
 
     fn motion(&self, plan: &Plan) -> clean::Motion<'_> {
         let (time, q, qd) = motion_ranges(plan);
+        let qd = &self.columns[qd];
+        let are_taken = qd.iter().all(|qd| qd.len() == self.rows.len());
         clean::Motion {
             time_s: &self.columns[time],
             q: &self.columns[q],
-            qd: &self.columns[qd],
+            qd: if are_taken { qd } else { &[] },
             row: &self.rows,
         }
     }
 
-    /// Velocities of a file that has none, its angles unwrapped: no arm turns by half a turn from one row to the next.
-    fn take_slopes(&mut self, plan: &Plan) {
+    /// Velocities of a file that has none: of angles that are unwrapped, without wild ones.
+    fn take_slopes(
+        &mut self,
+        plan: &Plan,
+        account: &mut RowAccount,
+        file: &str,
+    ) -> Result<Vec<LogWarning>, LogError> {
         let (time, q, qd) = motion_ranges(plan);
+        let mut warnings: Vec<LogWarning> = self.unwrap_angles(plan).into_iter().collect();
+        let wild = clean::wild_angles(&self.motion(plan));
+        self.retain(&wild, account, |table, k, _| {
+            let farthest = |c: &usize| table.columns[*c][k].abs();
+            let c = q.clone().max_by(|a, b| farthest(a).total_cmp(&farthest(b)));
+            let c = c.unwrap_or(q.start);
+            format!("{} = {}", plan.fields[c].place(), table.columns[c][k])
+        });
+        self.require_two(account, file)?;
         for (q, qd) in q.zip(qd) {
-            let mut turns = 0.0;
-            let mut before = self.columns[q].first().copied().unwrap_or(0.0);
-            for angle in &mut self.columns[q] {
-                turns -= ((*angle - before) / TAU).round();
-                before = *angle;
-                *angle += turns * TAU;
-            }
             self.columns[qd] = slopes(&self.columns[time], &self.columns[q]);
         }
+        warnings.push(LogWarning::SlopesOfAngles);
+        Ok(warnings)
     }
 
     /// Step 5 of [`read_log`].

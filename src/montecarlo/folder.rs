@@ -89,7 +89,9 @@ pub fn check_cut(folder: &Path, trials: u64, count: u64) -> Result<(), ShardErro
     if !folder.exists() {
         return Ok(());
     }
-    let files = files_of(folder)?;
+    let mut files = files_of(folder)?;
+    files.retain(|file| range_of(file).is_some());
+    files.sort();
     for file in &files {
         let Some(found) = range_of(file) else { continue };
         if !is_of_the_cut(&found, trials, count) {

@@ -16,10 +16,12 @@ pub fn resolution(series: &[f64]) -> f64 {
 }
 
 /// Standard deviation of the noise of single readings: of fourth differences, Σ (−1)^i C(4, i) y_{k+i}, of which white noise has √70
-/// times its own, and a motion at a twentieth of the rate 1 % of its amplitude. Half of them may be anything: the median counts.
+/// times its own, and a motion at a twentieth of the rate 1 % of its amplitude. Half of them may be anything: the median counts, of
+/// those that are not zero. A joint at rest may be read as at rest.
 pub fn reading_noise(series: &[f64]) -> f64 {
     let fourth = |y: &[f64]| y[0] - 4.0 * y[1] + 6.0 * y[2] - 4.0 * y[3] + y[4];
-    let mut sizes: Vec<f64> = series.windows(5).map(|y| fourth(y).abs()).collect();
+    let sizes = series.windows(5).map(|y| fourth(y).abs());
+    let mut sizes: Vec<f64> = sizes.filter(|size| *size > 0.0).collect();
     robust_sigma(&mut sizes) / 70f64.sqrt()
 }
 
@@ -59,7 +61,10 @@ mod tests {
         };
         let series: Vec<f64> = (0..5000).map(reading).collect();
         assert!((reading_noise(&series) / 1e-3 - 1.0).abs() < 0.1);
-        assert_eq!(reading_noise(&[1.0; 4]), 0.0);
+        assert_eq!(reading_noise(&[1.0; 40]), 0.0);
+        // Twice as long at rest as moving.
+        let rested = [vec![0.0; 10_000], series].concat();
+        assert!((reading_noise(&rested) / 1e-3 - 1.0).abs() < 0.1);
     }
 
     fn wave(limit: f64, step: f64) -> Vec<f64> {

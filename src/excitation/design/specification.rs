@@ -78,7 +78,8 @@ impl Specification {
         }
         let shortest_s = v.period_range_s.map_or(v.period_s, |[low, _]| low);
         let rate_hz = self.experiment.rate_hz;
-        let seen = (0.5 * rate_hz * shortest_s + 1e-9) as usize;
+        // Of the harmonic at half the rate samples show no sine.
+        let seen = ((0.5 * rate_hz * shortest_s - 1e-9).ceil() as usize).saturating_sub(1);
         let why = format!(": {rate_hz} Hz show no higher harmonics of {shortest_s} s");
         at_most("the order", v.order, seen, &why)?;
         at_most("the order", v.order, HIGHEST_ORDER, "")?;
@@ -202,11 +203,12 @@ mod tests {
                 spec.variables.period_range_s = period_range_s;
             })
         };
-        assert_eq!(of(25, 0.4, None), None);
-        let above = of(26, 0.4, None).unwrap();
-        assert!(above.contains("the order = 26 must be at most 25: 125 Hz"), "{above}");
-        assert_eq!(of(25, 10.0, Some([0.4, 20.0])), None);
-        assert!(of(26, 10.0, Some([0.4, 20.0])).unwrap().contains("at most 25"));
+        assert_eq!(of(24, 0.4, None), None);
+        let above = of(25, 0.4, None).unwrap();
+        assert!(above.contains("the order = 25 must be at most 24: 125 Hz"), "{above}");
+        assert_eq!(of(25, 0.408, None), None);
+        assert_eq!(of(24, 10.0, Some([0.4, 20.0])), None);
+        assert!(of(25, 10.0, Some([0.4, 20.0])).unwrap().contains("at most 24"));
     }
 
     #[test]

@@ -62,7 +62,10 @@ impl Evidence {
                 "{found}, more than noise explains (p {is} {p:.3}): the model is wrong, not only \
                  noisy. Run armid diagnose"
             ),
-            Some(p) => format!("{found}, which noise explains (p = {p:.2})"),
+            Some(p) => format!(
+                "within noise an arm can have the fitted base parameters (p = {p:.2}): none has exactly these, and the nearest \
+                 possible ones raise the sum of squares by {distance:.1} in units of the noise"
+            ),
             None => found,
         }
     }
