@@ -689,6 +689,25 @@ fn velocities_that_were_not_recorded_are_slopes_of_the_angles() {
     }
 }
 
+/// Stamps of 0.01 s at 125 rows a second, without velocities that could tell that rows are even.
+#[test]
+fn rounded_stamps_are_mended_without_velocities() {
+    let mut rows = valid();
+    for line in &mut rows[1..] {
+        let time: f64 = line[0].parse().unwrap();
+        line[0] = format!("{:.2}", time);
+    }
+    let text = text(&rows, ",", "\n");
+    let log = read_log_from(text.as_bytes(), "run.csv", &without_velocities(), JOINTS).unwrap();
+    assert_eq!(log.rows.used, SAMPLES);
+    assert!(matches!(log.rows.warnings[0], LogWarning::RoundedStamps { .. }), "{}", log.rows);
+    for (k, slope) in log.qd_rad_s.joint(1).iter().enumerate() {
+        // The line through 400 stamps is known to 0.01 s/√(12 · 400) at its middle and to a ten thousandth of its slope.
+        let truth = velocity_rad_s(1, 100.0 + STEP_S * k as f64);
+        assert!((slope - truth).abs() < 2e-3, "{slope} {truth}");
+    }
+}
+
 /// A wild angle costs its own row and none beside it, whose slopes it would be in, and stays out of those.
 #[test]
 fn wild_angles_are_in_no_slopes() {

@@ -72,12 +72,26 @@ pub(super) fn even_stamps(motion: &Motion) -> Option<EvenStamps> {
     is_better.then(|| EvenStamps { resolution_s, rate_hz: 1.0 / step_s, time_s: even })
 }
 
-/// How far angles are from where velocities bring them, from row to row, rad: of [`TELLING`] of the rows the sum over the joints is less.
+/// How far angles are from where velocities bring them, from row to row, or, of a log without these, from the straight line between
+/// the rows beside them, rad: of [`TELLING`] of the rows the sum over the joints is less.
 fn defect(motion: &Motion) -> f64 {
-    let of_row =
-        |k: usize| -> f64 { (0..motion.q.len()).map(|j| motion.defect(j, k - 1, k).abs()).sum() };
-    let mut defects: Vec<f64> = (1..motion.rows()).map(of_row).collect();
+    let of_joint = |j: usize, k: usize| match motion.qd.is_empty() {
+        false => motion.defect(j, k - 1, k),
+        true => between(motion, j, k),
+    };
+    let of_row = |k: usize| -> f64 { (0..motion.q.len()).map(|j| of_joint(j, k).abs()).sum() };
+    let last = if motion.qd.is_empty() { motion.rows() - 1 } else { motion.rows() };
+    let mut defects: Vec<f64> = (1..last).map(of_row).collect();
     let place = (TELLING * defects.len() as f64) as usize;
     let (_, defect, _) = defects.select_nth_unstable_by(place, f64::total_cmp);
     *defect
+}
+
+/// How far the angle of a joint in row `k` is from the straight line between the rows beside it, rad: a h²/2 where the stamps are right, and
+/// q̇ times what they are off where they are not.
+fn between(motion: &Motion, joint: usize, k: usize) -> f64 {
+    let (t, q) = (motion.time_s, &motion.q[joint]);
+    let span_s = t[k + 1] - t[k - 1];
+    let share = if span_s > 0.0 { (t[k] - t[k - 1]) / span_s } else { 0.5 };
+    q[k] - q[k - 1] - share * (q[k + 1] - q[k - 1])
 }

@@ -22,7 +22,7 @@ const WIDTH_ROWS: usize = 50;
 /// Reads a log of an arm with `joints` joints.
 ///
 /// A layout without velocities takes them from the angles, once the times are in order: slopes of polynomials through five
-/// rows; angles off the median of five are set aside before, in place of step 4, and stamps that are rounded stay as they are (step 2).
+/// rows; angles off the median of five are set aside before, in place of step 4.
 ///
 /// Only the columns of the layout are read, row by row; memory is that of the numbers kept, 8 bytes each.
 /// Numbers are converted to SI units. Then, in this order:
@@ -220,8 +220,7 @@ impl Table {
         let fault = |suspicion| LogError::Units { file: file.to_owned(), suspicion };
         let (time, q, qd) = motion_ranges(plan);
         let has_velocities = plan.range(Block::Qd).is_some();
-        // Whether rounded stamps are even the velocities tell.
-        let even = if has_velocities { even_stamps(&self.motion(plan)) } else { None };
+        let even = even_stamps(&self.motion(plan));
         let rounded = even.map(|EvenStamps { time_s, resolution_s, rate_hz }| {
             self.columns[time] = time_s;
             LogWarning::RoundedStamps { resolution_s, rate_hz }
