@@ -31,6 +31,12 @@ pub fn robust_sigma(sizes: &mut [f64]) -> f64 {
     1.4826 * median(sizes).unwrap_or(0.0)
 }
 
+/// [`robust_sigma`] of those values that are not zero: readings that did not change say nothing of noise.
+pub fn sigma_of_changes(values: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = values.iter().map(|v| v.abs()).filter(|v| *v > 0.0).collect();
+    robust_sigma(&mut sizes)
+}
+
 /// Median step of time among the steps forward, s; `None` without any.
 pub fn median_step(time_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> =

@@ -16,7 +16,7 @@ use super::stale;
 use super::stalls::stalls;
 use super::verdict::{Cause, Estimate};
 use crate::identify::Measurement;
-use crate::median::{median_step, missing_steps, robust_sigma};
+use crate::median::{median_step, missing_steps};
 use crate::robot::JointSignals;
 use crate::signal::SignalError;
 
@@ -276,12 +276,6 @@ fn quantisation(torque_nm: &JointSignals) -> Vec<Cause> {
 /// The record's usual step, s.
 pub(super) fn step_s(m: &Measurement) -> f64 {
     median_step(m.time_s).unwrap_or(f64::NAN)
-}
-
-/// [`robust_sigma`] of those values that are not zero: readings that did not change say nothing of noise.
-pub(super) fn sigma_of_changes(values: &[f64]) -> f64 {
-    let mut sizes: Vec<f64> = values.iter().map(|v| v.abs()).filter(|v| *v > 0.0).collect();
-    robust_sigma(&mut sizes)
 }
 
 #[cfg(test)]

@@ -4,11 +4,11 @@
 //! the top off every peak that lasts a few rows, and torque has peaks where an arm hurries or a gear's flanks meet. A wild value
 //! is one that is left as abruptly as it is reached. Angles and velocities move from row to row more than noise: of an angle q − ∫q̇ dt is looked at, of a velocity q̇ − Δq/Δt.
 
-use super::data_faults::{FAR, cause, exact, sigma_of_changes, step_s};
+use super::data_faults::{FAR, cause, exact, step_s};
 use super::kind::Kind;
 use super::record::Record;
 use super::verdict::Cause;
-use crate::median::median;
+use crate::median::{median, sigma_of_changes};
 use crate::robot::JointSignals;
 
 /// Wild readings of one channel of a joint, at least: a single one is an accident.

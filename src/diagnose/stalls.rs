@@ -1,11 +1,11 @@
 //! A clock that stood still while the arm moved on: angles and velocities tell how long.
 
-use super::data_faults::{FAR, cause, exact, sigma_of_changes, step_s};
+use super::data_faults::{FAR, cause, exact, step_s};
 use super::kind::Kind;
 use super::verdict::{Cause, Estimate};
 use crate::identify::Measurement;
 use crate::identify::covariance::quantile_95;
-use crate::median::{lasting, median};
+use crate::median::{lasting, median, sigma_of_changes};
 
 /// A clock that stalled.
 pub struct Stalls {

@@ -89,18 +89,17 @@ pub fn check_cut(folder: &Path, trials: u64, count: u64) -> Result<(), ShardErro
     if !folder.exists() {
         return Ok(());
     }
-    let mut files = files_of(folder)?;
-    files.retain(|file| range_of(file).is_some());
-    files.sort();
-    for file in &files {
-        let Some(found) = range_of(file) else { continue };
-        if !is_of_the_cut(&found, trials, count) {
-            let Range { start, end } = found;
-            let file = file.clone();
+    let files = files_of(folder)?.into_iter();
+    let mut shards: Vec<(PathBuf, Range<u64>)> =
+        files.filter_map(|file| range_of(&file).map(|range| (file, range))).collect();
+    shards.sort_by(|(a, _), (b, _)| a.cmp(b));
+    for (file, found) in &shards {
+        if !is_of_the_cut(found, trials, count) {
+            let (file, Range { start, end }) = (file.clone(), found.clone());
             return Err(ShardError::OtherCut { file, start, end, trials, shards: count });
         }
     }
-    let Some(file) = files.first() else { return Ok(()) };
+    let Some((file, _)) = shards.first() else { return Ok(()) };
     match AnyHeader::load(file)?.trials {
         found if found == trials => Ok(()),
         found => Err(ShardError::OtherLength { file: file.clone(), found, expected: trials }),

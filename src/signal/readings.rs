@@ -1,6 +1,6 @@
 //! What the values of a recorded series say of the sensor behind it.
 
-use crate::median::robust_sigma;
+use crate::median::sigma_of_changes;
 
 /// Smallest distance between two different values of the series: its resolution as recorded.
 /// Zero for a constant.
@@ -20,9 +20,8 @@ pub fn resolution(series: &[f64]) -> f64 {
 /// those that are not zero. A joint at rest may be read as at rest.
 pub fn reading_noise(series: &[f64]) -> f64 {
     let fourth = |y: &[f64]| y[0] - 4.0 * y[1] + 6.0 * y[2] - 4.0 * y[3] + y[4];
-    let sizes = series.windows(5).map(|y| fourth(y).abs());
-    let mut sizes: Vec<f64> = sizes.filter(|size| *size > 0.0).collect();
-    robust_sigma(&mut sizes) / 70f64.sqrt()
+    let changes: Vec<f64> = series.windows(5).map(fourth).collect();
+    sigma_of_changes(&changes) / 70f64.sqrt()
 }
 
 /// Readings at the limit that are no accident, at least, and so many times those at the next value: in coarse
