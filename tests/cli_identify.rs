@@ -87,15 +87,21 @@ fn what_no_arm_has_is_a_negative_result() {
     };
     let text = folder.read("log.csv");
     folder.write("log.csv", text.lines().map(turned).collect::<Vec<_>>().join("\n"));
-    for command in ["identify", "diagnose"] {
+    for (command, verdict) in [("identify", "contradicted"), ("diagnose", "declined")] {
         let words = format!("{command} log.csv --robot ur5 --json result.json");
-        let told = [
-            "What was identified is physically impossible",
-            "friction is negative",
-            "the other sign",
-        ];
+        let told =
+            ["with the torques of all joints reversed", "friction pushes joint 1, 2, 3, 4, 5, 6"];
         folder.armid(&words).says(3, &told);
-        assert_eq!(folder.result("result.json")["verdict"], "contradicted");
+        assert_eq!(folder.result("result.json")["verdict"], verdict);
+    }
+    // It stands, and its description hangs.
+    folder.armid("simulate --out log.csv").says(0, &[]);
+    let robot = include_str!("../robots/ur5.toml").replace("-9.81]", "9.81]");
+    folder.write("hanging.toml", robot);
+    for (command, verdict) in [("identify", "contradicted"), ("diagnose", "declined")] {
+        let words = format!("{command} log.csv --robot hanging.toml --json result.json");
+        folder.armid(&words).says(3, &["gravity_m_s2 = [0.00, 0.00, -9.81]"]);
+        assert_eq!(folder.result("result.json")["verdict"], verdict);
     }
 }
 

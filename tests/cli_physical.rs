@@ -7,6 +7,7 @@ use armid::robot::{Arm, read_urdf};
 use serde_json::Value;
 
 use crate::cli::{Folder, default_scenario};
+use crate::other_arms::Designed;
 
 /// Standard deviation of the default scenario's torque noise, Nm.
 const NOISE_NM: [f64; 6] = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15];
@@ -216,6 +217,70 @@ fn a_robot_that_came_as_urdf_leaves_as_urdf() {
     let words = "diagnose log.csv --robot ur10e --sim quiet.toml";
     folder.armid(words).says(1, &["quiet.toml", "another arm than \"ur10e\""]);
     assert!(!folder.path("x.urdf").exists());
+}
+
+/// A URDF without what is identified, word by word.
+fn not_identified(urdf: &str) -> Vec<String> {
+    let cut = |text: &str, from: &str, to: &str| {
+        let mut parts = text.split(from);
+        let first = parts.next().unwrap().to_owned();
+        parts.fold(first, |kept, part| kept + part.split_once(to).unwrap().1)
+    };
+    let rest = cut(&cut(urdf, "<inertial>", "</inertial>"), "<dynamics ", "/>");
+    rest.split_whitespace().map(str::to_owned).collect()
+}
+
+/// The user's own file has the identified numbers, and what else is in it is there as before. Its joints are tilted, and a
+/// tool is bolted to the last link.
+#[test]
+fn a_urdf_is_given_back_with_its_identified_numbers() {
+    let folder = Folder::empty();
+    let hand = "<link name=\"hand\">";
+    let shape = "<visual><geometry><mesh filename=\"meshes/hand.stl\"/></geometry></visual> <!-- scanned -->";
+    let own = include_str!("other_arms/three_joints.urdf")
+        .replace(hand, &format!("{hand}\n    {shape}"))
+        .replace(
+            "</robot>",
+            "  <gazebo reference=\"hand\"><selfCollide>true</selfCollide></gazebo>\n</robot>",
+        );
+    folder.write("own.urdf", &own);
+    let designed = Designed::new("three_joints", 5.0, &[0.5, 0.4, 0.1]);
+    folder.write("designed.json", designed.trajectory());
+    let scenario = "name = \"three\"\nrobot = \"own.urdf\"\nseed = 1\ntrials = 1\n[motion]\ntrajectory = \"designed.json\"\n\
+                    periods = 8\n[sensors]\ntorque_sd_nm = [0.5, 0.4, 0.1]\nq_sd_rad = 2e-5\nqd_sd_rad_s = 1e-3\n";
+    folder.write("three.toml", scenario);
+    folder.armid("simulate --scenario three.toml --out log.csv").says(0, &[]);
+    let words = "identify log.csv --robot own.urdf --physical --json result.json";
+    folder.armid(words).says(0, &["note: own.urdf"]);
+    let refused = folder.armid("export result.json --robot own.urdf --urdf own.urdf");
+    refused.says(1, &["own.urdf", "the command reads this file"]);
+    assert_eq!(folder.read("own.urdf"), own);
+    let told = "out.urdf: own.urdf with the inertia of 3 links and the friction of 3 joints; everything else as it was";
+    let words = "export result.json --robot own.urdf --urdf out.urdf";
+    let text = folder.armid(words).says(0, &[told, "out.drives.toml"]);
+    assert!(!text.contains("meshes such as"), "{text}");
+    let written = folder.read("out.urdf");
+    assert_ne!(written, own);
+    assert_eq!(not_identified(&written), not_identified(&own));
+    let result = folder.result("result.json");
+    let back = Arm::load(folder.path("out.urdf").to_str().unwrap()).unwrap();
+    assert_eq!(back.dof(), 3);
+    for (j, joint) in back.joints.iter().enumerate() {
+        let value =
+            |kind: &str| parameter(&result, "standard_parameters", &format!("{kind}{}", j + 1));
+        let body = ["m", "mx", "my", "mz", "A", "B", "C", "D", "E", "F"].map(value);
+        // Through frames, centres of mass and back: some roundings of the largest.
+        let size = body.iter().fold(0.0_f64, |size, p| size.max(p.abs()));
+        for (found, expected) in joint.link.parameters.iter().zip(body) {
+            assert!((found - expected).abs() < 1e-12 * size, "{}: {found} {expected}", joint.name);
+        }
+        assert_eq!(joint.drive.rotor_inertia_kg_m2, value("Ia"));
+        assert_eq!(joint.drive.viscous_nm_s_rad, value("rv"));
+        assert_eq!(joint.drive.coulomb_nm, value("rc"));
+    }
+    folder.write("elsewhere/nothing", "");
+    let words = "export result.json --robot own.urdf --urdf elsewhere/out.urdf";
+    folder.armid(words).says(0, &["meshes such as meshes/hand.stl", "beside own.urdf"]);
 }
 
 #[test]

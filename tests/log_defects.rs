@@ -729,6 +729,32 @@ fn wild_angles_are_in_no_slopes() {
 }
 
 /// A layout that knows no torques asks for none.
+/// Seconds and nanoseconds since 1970, of which a number of 53 bits tells a quarter of a microsecond.
+#[test]
+fn stamps_in_two_columns_are_added() {
+    let mut rows = valid();
+    rows[0].insert(1, "nanoseconds".to_owned());
+    for (k, row) in rows[1..].iter_mut().enumerate() {
+        let nanoseconds = 1_700_000_000_900_000_000 + 8_000_000 * k as u64;
+        row[0] = (nanoseconds / 1_000_000_000).to_string();
+        row.insert(1, (nanoseconds % 1_000_000_000).to_string());
+    }
+    let layout = include_str!("../layouts/armid.toml");
+    let layout = layout.replace("[columns]", "[columns]\ntime_nanoseconds = \"nanoseconds\"");
+    let layout = Layout::from_toml(&layout, "ros.toml").unwrap();
+    let read = |rows: &[Vec<String>]| {
+        read_log_from(text(rows, ",", "\n").as_bytes(), "run.csv", &layout, JOINTS)
+    };
+    let log = read(&rows).unwrap();
+    assert_eq!((log.samples(), log.rows.warnings.len()), (SAMPLES, 0), "{}", log.rows);
+    for (k, time_s) in log.time_s.iter().enumerate() {
+        let since_s = time_s - 1_700_000_000.0 - 0.9;
+        assert!((since_s - STEP_S * k as f64).abs() < 5e-7, "{k}: {since_s}");
+    }
+    rows[8][1] = "5000000000".to_owned();
+    assert_one_row_aside(read(&rows), Reason::Implausible, row(7), "5000000000");
+}
+
 #[test]
 fn the_effort_that_a_layout_names_is_the_one_that_is_missing() {
     let layout = include_str!("../layouts/armid.toml").lines();

@@ -23,7 +23,7 @@ struct State {
 #[test]
 fn a_merged_and_reoriented_chain_has_pinocchios_torque_and_tool_frame() {
     let text = include_str!("golden/interpreted.urdf");
-    let UrdfArm { arm, frames, notices } = read_urdf(text, "interpreted.urdf").unwrap();
+    let UrdfArm { arm, frames, notices, .. } = read_urdf(text, "interpreted.urdf").unwrap();
     let states: Vec<State> = serde_json::from_str(include_str!("golden/interpreted.json")).unwrap();
     assert_eq!((arm.dof(), states.len()), (5, 20));
     let merged = notices.iter().filter(|n| matches!(n, UrdfNotice::Merged { .. })).count();

@@ -10,7 +10,7 @@ use crate::dynamics::{Model, Parameter, ParameterLayout};
 use crate::report::identify::{CONTRADICTED, IDENTIFY_SCHEMA};
 use crate::report::physical::DecidedBy;
 use crate::report::saved::{SavedError, load};
-use crate::robot::{Arm, Frames, LoadedArm, RobotError};
+use crate::robot::{Arm, Frames, LoadedArm, RobotError, UrdfLink};
 
 /// An identified arm.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +27,8 @@ pub struct ArmResult {
     pub frames: Frames,
     /// Files that describe the robot.
     pub files: Vec<PathBuf>,
+    /// Links of the URDF that is the first of them; none of another robot.
+    pub urdf_links: Vec<UrdfLink>,
 }
 
 /// A result file that holds no arm.
@@ -97,7 +99,7 @@ impl ArmResult {
         let result: ResultFile = load(path, IDENTIFY_SCHEMA)?;
         let values = result.standard_parameters.filter(|values| !values.is_empty());
         let values = values.ok_or_else(|| ResultError::BaseOnly { file: file.clone() })?;
-        let LoadedArm { arm, frames, files, .. } =
+        let LoadedArm { arm, frames, files, urdf_links, .. } =
             load_robot(robot.unwrap_or(&result.about.robot))?;
         let other = |fault| ResultError::OtherRobot { file: file.clone(), fault };
         result.about.check(&arm).map_err(other)?;
@@ -125,6 +127,7 @@ impl ArmResult {
             },
             frames,
             files,
+            urdf_links,
         })
     }
 }

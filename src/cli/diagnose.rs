@@ -11,6 +11,7 @@ use super::{CommandResult, Outcome};
 use crate::base::{BaseSet, Parameterisation};
 use crate::diagnose::{DIAGNOSE_SCHEMA, DiagnoseError, Diagnoser, Diagnosis, Validation};
 use crate::dynamics::Model;
+use crate::identify::Misreading;
 use crate::log::Log;
 use crate::montecarlo::Scenario;
 use crate::output::{OutputError, check_outputs};
@@ -117,7 +118,7 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
     let program = Program::started(None, inputs);
     let nominal = simulation.as_ref().map(Simulated::nominal);
     let mut finding = match diagnoser.diagnose(&log.measurement(), &validations, nominal) {
-        Err(error) if error.is_about_the_motion() => {
+        Err(error) if error.is_declined() => {
             return decline(args, &log.log, &error, program);
         }
         finding => finding?,
@@ -194,7 +195,8 @@ fn mass(text: &str) -> Result<f64, String> {
     if is_mass { Ok(mass) } else { Err("must be a positive number".into()) }
 }
 
-/// Writes what can be said of a log whose motion does not identify the model that is to be diagnosed.
+/// Writes what can be said of a log whose motion does not identify the model that is to be diagnosed, or that is not read as it was
+/// recorded.
 fn decline(
     args: &DiagnoseArgs,
     log: &Log,
@@ -213,6 +215,7 @@ fn decline(
             log: &log.source,
             verdict: "declined",
             causes: [],
+            misreading: error.misreading(),
             sentences: [&sentence],
             warnings: &warnings,
             rows: &rows,
@@ -235,6 +238,7 @@ struct Declined<'a> {
     log: &'a str,
     verdict: &'static str,
     causes: [(); 0],
+    misreading: Option<&'a Misreading>,
     sentences: [&'a str; 1],
     warnings: &'a [String],
     rows: &'a Rows,

@@ -6,8 +6,9 @@ use clap::{ArgGroup, Args};
 
 use super::arm_result::ArmResult;
 use super::{CommandResult, Outcome};
-use crate::output::{check_outputs, write_atomically};
-use crate::robot::export::{drive_file, mjcf, urdf};
+use crate::output::{OutputError, check_outputs, write_atomically};
+use crate::robot::RobotError;
+use crate::robot::export::{OwnUrdf, drive_file, mjcf, own_urdf, urdf};
 
 /// Write an identified arm as URDF or MJCF.
 #[derive(Debug, Args)]
@@ -18,7 +19,8 @@ pub struct ExportArgs {
     /// Robot that the result is about, where it is not a built-in one: a .urdf or .toml file.
     #[arg(long)]
     robot: Option<String>,
-    /// Write a URDF, and beside it `NAME.drives.toml` with what a URDF has no place for.
+    /// Write a URDF, and beside it `NAME.drives.toml` with what a URDF has no place for. Of a robot that is a
+    /// .urdf file it is that file, in which only inertias and friction are other ones.
     #[arg(long, value_name = "FILE")]
     urdf: Option<PathBuf>,
     /// Write an MJCF.
@@ -29,26 +31,22 @@ pub struct ExportArgs {
 /// Runs the command.
 pub fn run(args: &ExportArgs) -> CommandResult {
     let drives = args.urdf.as_ref().map(|path| path.with_extension("drives.toml"));
-    let robot = args.robot.as_ref().map(PathBuf::from);
+    let result = ArmResult::load(&args.result, args.robot.as_deref())?;
     check_outputs(
         [&args.urdf, &drives, &args.mjcf].into_iter().flatten(),
-        robot.iter().chain([&args.result]),
+        result.files.iter().chain([&args.result]),
     )?;
-    let ArmResult { arm, offsets_nm, by_prior, doubt, frames, .. } =
-        ArmResult::load(&args.result, args.robot.as_deref())?;
-    let write = |path: &Path, text: &str| -> Result<(), crate::output::OutputError> {
-        write_atomically(path, |file| file.write_all(text.as_bytes()))?;
-        say!("{}", path.display());
-        Ok(())
-    };
     if let Some(path) = &args.urdf {
-        write(path, &urdf(&arm, &frames)?)?;
+        write_urdf(path, &result)?;
     }
+    let ArmResult { arm, offsets_nm, by_prior, doubt, frames, .. } = result;
     if let Some(path) = &drives {
         write(path, &drive_file(&arm, &offsets_nm))?;
+        say!("{}", path.display());
     }
     if let Some(path) = &args.mjcf {
         write(path, &mjcf(&arm, &frames)?)?;
+        say!("{}", path.display());
         if offsets_nm.iter().any(|offset| *offset != 0.0) {
             say!("note: torque offsets {offsets_nm:?} Nm have no place in an MJCF");
         }
@@ -65,4 +63,43 @@ pub fn run(args: &ExportArgs) -> CommandResult {
         );
     }
     Ok(Outcome::Done)
+}
+
+/// A robot that came as a URDF leaves as that file, any other one as a URDF of bodies alone.
+fn write_urdf(path: &Path, result: &ArmResult) -> Result<(), Box<dyn std::error::Error>> {
+    let ArmResult { arm, frames, files, urdf_links, .. } = result;
+    let Some(own) = files.first().filter(|_| !urdf_links.is_empty()) else {
+        write(path, &urdf(arm, frames)?)?;
+        say!("{}", path.display());
+        return Ok(());
+    };
+    let name = own.display().to_string();
+    let text = std::fs::read_to_string(own)
+        .map_err(|source| RobotError::Read { file: name.clone(), source })?;
+    let OwnUrdf { text, takeovers, relative_mesh } = own_urdf(&text, &name, arm, urdf_links)?;
+    write(path, &text)?;
+    let end = if arm.dof() == 1 { "" } else { "s" };
+    say!(
+        "{}: {name} with the inertia of {dof} link{end} and the friction of {dof} joint{end}; everything else as it was",
+        path.display(),
+        dof = arm.dof()
+    );
+    for takeover in takeovers {
+        say!("note: {takeover}");
+    }
+    if let Some(mesh) = relative_mesh.filter(|_| folder(path) != folder(own)) {
+        say!(
+            "note: meshes such as {mesh} are looked for from the folder of the file: write it beside {name}, or copy them along"
+        );
+    }
+    Ok(())
+}
+
+fn write(path: &Path, text: &str) -> Result<(), OutputError> {
+    write_atomically(path, |file| file.write_all(text.as_bytes()))
+}
+
+/// Where a file is, by whatever links.
+fn folder(file: &Path) -> Option<PathBuf> {
+    Some(std::fs::canonicalize(file).ok()?.parent()?.to_owned())
 }

@@ -12,8 +12,8 @@ use crate::dynamics::Model;
 use crate::identify::covariance::CovarianceKind;
 use crate::identify::physical::{self, PhysicalOptions, PriorMetric, PriorWeight};
 use crate::identify::{
-    Estimator, FitError, Identification, Identifier, IdentifyError, Measurement, Options,
-    Processing, Regression, Several, each_alone, pooled,
+    Estimator, FitError, Identification, Identifier, IdentifyError, Measurement, Misreading,
+    Options, Processing, Regression, Several, each_alone, pooled,
 };
 use crate::log::{Layout, Log, read_log};
 use crate::output::check_outputs;
@@ -64,7 +64,7 @@ pub struct IdentifyArgs {
 /// Which arm and which kind of log.
 #[derive(Debug, Args)]
 pub struct SourceArgs {
-    /// Robot: ur5, ur10e, ur3e, ur5e, or a .urdf or .toml file.
+    /// Robot: ur5, ur10e, ur3e, ur5e, or a .toml or .urdf file (FILE.urdf#LINK: the arm up to that link).
     #[arg(long)]
     pub robot: String,
     /// Layout of the logs: armid (RTDE names), ur10e_innopolis, ur10e_innopolis_author, or a .toml file.
@@ -228,7 +228,7 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
             .into());
         }
     }
-    let mut identifier = Identifier::new(&model, &set, options);
+    let mut identifier = Identifier::new(&model, &set, options.clone());
     let mut regressions = logs
         .iter()
         .map(|log| identifier.regression(&log.measurement()))
@@ -253,6 +253,7 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
     inputs.extend(logs.iter().chain(&validation_logs).map(|l| l.input.clone()));
     let program = Program::started(None, inputs);
     let logs: Vec<&Log> = logs.iter().map(|l| &l.log).collect();
+    let misreading = Misreading::of(&arm, &regression, &options);
     let identified = match several {
         Several::Apart(parts) => Ok(pooled(&parts, &regression)),
         Several::AsOne | Several::Together { .. } => identifier.identify_regression(&regression),
@@ -275,6 +276,7 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         regression: &regression,
         identification: &identification,
         reduced: args.reduced.as_deref(),
+        misreading: misreading.as_ref(),
     };
     let mut validations = Vec::new();
     for log in &validation_logs {

@@ -61,7 +61,7 @@ pub fn exit_code(result: CommandResult) -> ExitCode {
         Ok(Outcome::Interrupted) => ExitCode::from(130),
         Err(error) => {
             eprintln!("error: {error}");
-            let declined = error.downcast_ref().is_some_and(DiagnoseError::is_about_the_motion);
+            let declined = error.downcast_ref().is_some_and(DiagnoseError::is_declined);
             if declined { ExitCode::from(3) } else { ExitCode::FAILURE }
         }
     }

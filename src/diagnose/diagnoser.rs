@@ -28,7 +28,8 @@ use super::verdict::{Cause, Diagnosis, HeldOut, Rival, Rms, Unexplained, Verdict
 use crate::base::BaseSet;
 use crate::dynamics::Model;
 use crate::identify::{
-    Doubt, Identification, Identifier, Measurement, Options, Regression, drive_limit_remark,
+    Doubt, Identification, Identifier, Measurement, Misreading, Options, Regression,
+    drive_limit_remark,
 };
 use crate::robot::{Arm, JointSignals};
 
@@ -91,6 +92,10 @@ impl<'a> Diagnoser<'a> {
         let m = &log.measurement(m.source);
         let mut regression = log.regression(&mut self.identifier, m.source)?;
         let identification = self.identifier.identify_regression(&regression)?;
+        if let Some(misreading) = Misreading::of(self.arm, &regression, &self.options) {
+            let (log, misreading) = (m.source.to_owned(), Box::new(misreading));
+            return Err(DiagnoseError::Misread { log, misreading });
+        }
         let measured_nm = measured_nm(&regression);
         move_to_common_motion(&mut regression, (self.arm, self.set), &identification.fit.theta);
         let noise_nm = noise_of_mean(&regression);

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::identify::{FitError, IdentifyError};
+use crate::identify::{FitError, IdentifyError, Misreading};
 use crate::signal::SignalError;
 
 /// A log without a diagnosis, with the numbers that say why.
@@ -24,6 +24,14 @@ pub enum DiagnoseError {
         log: String,
         /// Frequency, Hz.
         frequency_hz: f64,
+    },
+    /// The log fits its arm when it is read otherwise.
+    #[error("{log}: declined. {}", misreading.sentence())]
+    Misread {
+        /// The log.
+        log: String,
+        /// How it has to be read.
+        misreading: Box<Misreading>,
     },
     /// Several logs together do not determine the unknowns.
     #[error("{log}: the motions do not determine the {unknowns} unknowns that are asked for")]
@@ -59,13 +67,22 @@ impl DiagnoseError {
         }
     }
 
-    /// Whether the log is sound, but its motion does not identify what was asked for.
-    pub fn is_about_the_motion(&self) -> bool {
+    /// How the log has to be read, where that is what is wrong.
+    pub fn misreading(&self) -> Option<&Misreading> {
+        match self {
+            Self::Misread { misreading, .. } => Some(misreading),
+            _ => None,
+        }
+    }
+
+    /// Whether there is nothing to diagnose: the motion does not identify what was asked for, or the log is not read as it was
+    /// recorded.
+    pub fn is_declined(&self) -> bool {
         let of_the_fit = |error: &IdentifyError| {
             matches!(error, IdentifyError::Fit(FitError::NotExcited { .. } | FitError::StandsStill))
         };
         match self {
-            Self::Singular { .. } | Self::NotExcited { .. } => true,
+            Self::Singular { .. } | Self::NotExcited { .. } | Self::Misread { .. } => true,
             Self::Identify(error) => of_the_fit(error),
             Self::Signal(_) | Self::NoNoise { .. } => false,
         }

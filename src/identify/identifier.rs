@@ -14,7 +14,7 @@ use super::pooled::Agreement;
 use super::prepare::{Measurement, Prepared, Preparer, Processing};
 use super::problem::{Assembler, Problem};
 use super::residual::Residual;
-use super::whiten::smoothed;
+use super::whiten::{SMOOTHER, smoothed};
 use crate::base::BaseSet;
 use crate::dynamics::Model;
 use crate::signal::{FineClock, Replicates, Scratch, ZeroPhase, fill_gaps};
@@ -284,6 +284,7 @@ impl<'a> Identifier<'a> {
         }
         let Options { cutoff_hz, order, .. } = self.options;
         let (repeats, rate_hz) = (prepared.replicates.is_some(), prepared.processing.rate_hz);
+        let cutoff_hz = SMOOTHER * cutoff_hz;
         let motion =
             smoothed(&prepared.motion, repeats, rate_hz, cutoff_hz, order, &mut self.filter)?;
         let along = Prepared { motion, ..prepared.clone() };

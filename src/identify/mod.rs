@@ -2,7 +2,7 @@
 //!
 //! Enters: time stamps, angles, velocities and torques of one log or of several ([`Measurement`]), the [`Model`](crate::dynamics::Model) of
 //! the arm and its [`BaseSet`](crate::base::BaseSet). Leaves: the log on an even clock, laid out as equations ([`Regression`]); base
-//! parameters with their covariance and a test of what the model lacks ([`Identification`]); torque predicted along other
+//! parameters with their covariance and a test of what the model lacks ([`Identification`]), or how the log should have been read ([`Misreading`]); torque predicted along other
 //! logs ([`Prediction`]); standard parameters that an arm can have ([`physical`]).
 
 pub mod covariance;
@@ -21,6 +21,7 @@ mod fit;
 mod gravity;
 mod identifier;
 mod lack_of_fit;
+mod misreading;
 mod motion_noise;
 mod negative_friction;
 mod options;
@@ -45,6 +46,7 @@ pub use even::BetweenRows;
 pub use fit::{Estimator, Fit, FitError, Fitter, Weighting};
 pub use identifier::{Identification, Identifier, KEPT_RATE, MANY_PERIODS, Regression};
 pub use lack_of_fit::{Floor, LackOfFit, chance_in_words};
+pub use misreading::{Change, Match, Misreading};
 pub use options::Options;
 pub use pooled::{Agreement, Several, each_alone, pooled};
 pub use prediction::{MOVING_RAD_S, Prediction};

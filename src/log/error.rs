@@ -327,6 +327,46 @@ pub enum LayoutFault {
         /// The value.
         value: f64,
     },
+    /// Joints count from 1 in layouts.
+    #[error("{key} under [joints] names joint 0: joints count from 1")]
+    JointFromOne {
+        /// The key.
+        key: &'static str,
+    },
+    /// A joint named twice counts as before.
+    #[error("{key} under [joints] names joint {joint} twice")]
+    JointTwice {
+        /// The key.
+        key: &'static str,
+        /// The joint, from 1.
+        joint: usize,
+    },
+    /// A joint that the arm does not have.
+    #[error("{key} under [joints] names joint {joint}, and the arm has {joints} joints")]
+    NoSuchJoint {
+        /// The key.
+        key: &'static str,
+        /// The joint, from 1.
+        joint: usize,
+        /// Of the arm.
+        joints: usize,
+    },
+    /// A zero that is no angle.
+    #[error("zero under [joints] is {value} for joint {joint}: it must be an angle")]
+    Zero {
+        /// The joint, from 1.
+        joint: usize,
+        /// The value.
+        value: f64,
+    },
+    /// Zeros of another number of joints.
+    #[error("zero under [joints] has {found} number(s), and the arm has {joints} joints")]
+    Zeros {
+        /// How many there are.
+        found: usize,
+        /// Joints of the arm.
+        joints: usize,
+    },
     /// Commas cannot separate both fields and decimals.
     #[error("decimal_comma = true needs another delimiter than \"comma\"")]
     CommaTwice,

@@ -91,8 +91,9 @@ impl Plan {
         let header = Header { layout, joints, file, row: header.row, names };
         header.refuse_numbers()?;
         let mut fields = Vec::new();
-        for block in [Block::Time, Block::Q, Block::Qd] {
-            if block == Block::Qd && layout.columns(block).is_none() {
+        for block in [Block::Time, Block::TimeNanoseconds, Block::Q, Block::Qd] {
+            let may_miss = matches!(block, Block::TimeNanoseconds | Block::Qd);
+            if may_miss && layout.columns(block).is_none() {
                 continue;
             }
             let found = header.block(block)?;
@@ -160,7 +161,7 @@ impl Plan {
     /// Where the block's fields are among `fields`.
     pub(super) fn range(&self, block: Block) -> Option<std::ops::Range<usize>> {
         let first = self.fields.iter().position(|f| f.block == block)?;
-        Some(first..first + if block == Block::Time { 1 } else { self.joints })
+        Some(first..first + if block.is_of_time() { 1 } else { self.joints })
     }
 }
 
@@ -176,7 +177,7 @@ impl Field {
 }
 
 fn check_joints(block: Block, found: usize, joints: usize, file: &str) -> Result<(), LogError> {
-    if block == Block::Time || found == joints {
+    if block.is_of_time() || found == joints {
         return Ok(());
     }
     Err(LogError::JointCount { file: file.to_owned(), what: "the layout", found, expected: joints })
@@ -209,7 +210,7 @@ impl Header<'_> {
         let Some(columns) = self.layout.columns(block) else {
             return Ok(Err(block.key().to_owned()));
         };
-        let count = if block == Block::Time { 1 } else { self.joints };
+        let count = if block.is_of_time() { 1 } else { self.joints };
         if let Some(stated) = columns.len() {
             check_joints(block, stated, self.joints, self.file)?;
         }
@@ -242,7 +243,7 @@ impl Header<'_> {
         match first_missing {
             None => {
                 let one_more = columns.len().is_none().then(|| columns.name(count)).flatten();
-                let one_more = one_more.filter(|_| block != Block::Time);
+                let one_more = one_more.filter(|_| !block.is_of_time());
                 match one_more.map(|name| self.find(&name)).transpose()?.flatten() {
                     Some(_) => {
                         let names = (0..).map_while(|joint| columns.name(joint));

@@ -41,6 +41,7 @@ const WIDTH_ROWS: usize = 50;
 /// 5. Angles that jump by one turn are unwrapped, and the angles asked for with them.
 /// 6. Targets and temperatures with fields as in 1 in the rows that are left are no part of the log. Nothing is identified
 ///    from them, and they cost no rows.
+/// 7. Joints that the layout says are counted otherwise are counted as the robot's description does.
 ///
 /// # Errors
 /// Any [`LogError`] about files, layouts, units and joints; [`LogError::NoUsableRows`] if fewer than two
@@ -66,6 +67,10 @@ pub fn read_log_from(
     layout: &Layout,
     joints: usize,
 ) -> Result<Log, LogError> {
+    layout
+        .joints
+        .check_for(joints)
+        .map_err(|fault| LogError::Layout { file: layout.name.clone(), fault })?;
     let mut lines = Lines::new(source, name)?;
     let mut first = Line::default();
     if !lines.next_into(&mut first)? {
@@ -402,7 +407,7 @@ impl Table {
             .map(current)
             .or_else(|| signals(Block::TargetMoment).map(Effort::Torque));
         let (time, q, qd) = motion_ranges(plan);
-        Log {
+        let mut log = Log {
             source: source.to_owned(),
             target_q_rad: signals(Block::TargetQ),
             target_qd_rad_s: signals(Block::TargetQd),
@@ -415,7 +420,9 @@ impl Table {
             time_s: std::mem::take(&mut self.columns[time]),
             rows,
             sha256,
-        }
+        };
+        layout.joints.apply(&mut log, layout.units.q);
+        log
     }
 
     /// The columns as signals; they are given up one block at a time, so that no second copy of the whole
@@ -469,10 +476,14 @@ fn parse(plan: &Plan, line: &Line, values: &mut [f64]) -> Result<(), Defect> {
             std::cmp::Ordering::Equal => None,
         }
     };
-    match reason.map(|reason| Defect { reason, at: fields }).or(defect) {
-        Some(defect) => Err(defect),
-        None => Ok(()),
+    if let Some(defect) = reason.map(|reason| Defect { reason, at: fields }).or(defect) {
+        return Err(defect);
     }
+    if let (Some(time), Some(rest)) = (plan.range(Block::Time), plan.range(Block::TimeNanoseconds))
+    {
+        values[time.start] += values[rest.start];
+    }
+    Ok(())
 }
 
 fn number(text: &[u8], decimal_comma: bool) -> Result<f64, Reason> {

@@ -311,11 +311,14 @@ impl Source {
             .map_err(|e| ScenarioError::Toml { file: self.name.clone(), message: e.to_string() })
     }
 
-    /// A file beside it, or the name of something built in.
+    /// A file beside it, perhaps with the last link of an arm behind `#`, or the name of something built in.
     fn beside(&self, name: &str) -> String {
-        match Path::new(name).extension() {
-            Some(_) => self.folder.join(name).display().to_string(),
-            None => name.to_owned(),
+        let is_file = |name: &str| Path::new(name).extension().is_some();
+        // Names of links may have slashes in them.
+        if is_file(name) || name.rsplit_once('#').is_some_and(|(file, _)| is_file(file)) {
+            self.folder.join(name).display().to_string()
+        } else {
+            name.to_owned()
         }
     }
 

@@ -1,6 +1,7 @@
 //! Robot files: one TOML per arm, and the arms built into the program.
 
 mod clearance;
+mod name;
 mod write;
 
 use std::path::{Path, PathBuf};
@@ -12,10 +13,10 @@ use clearance::{BoxEntry, CapsuleEntry};
 
 use super::arm::{Arm, Drive, Joint, Limits, Placement};
 use super::error::RobotError;
-use super::export::apply_drive_file;
+use super::export::DriveFile;
 use super::inertia::LinkInertia;
 use super::place::Place;
-use super::urdf::{Frames, UrdfArm, UrdfNotice, read_urdf};
+use super::urdf::{Frames, UrdfArm, UrdfLink, UrdfNotice, read_urdf, read_urdf_up_to};
 
 /// Arms built in, by the name given to `--robot`.
 const BUILT_IN: [(&str, &str); 4] = [
@@ -41,7 +42,8 @@ impl Arm {
     }
 
     /// What `--robot` accepts: a built-in name, a `.urdf` file (with its drive file, where
-    /// `NAME.drives.toml` lies beside it) or a `.toml` robot file.
+    /// `NAME.drives.toml` lies beside it) or a `.toml` robot file. `NAME.urdf#LINK` is the arm that ends
+    /// with that link ([`read_urdf_up_to`](super::read_urdf_up_to)).
     pub fn load(name_or_path: &str) -> Result<Self, RobotError> {
         LoadedArm::load(name_or_path).map(|loaded| loaded.arm)
     }
@@ -63,45 +65,66 @@ pub struct LoadedArm {
     pub notices: Vec<UrdfNotice>,
     /// Named frames on its bodies; only a URDF has any.
     pub frames: Frames,
+    /// Links that its bodies consist of; only a URDF has any.
+    pub urdf_links: Vec<UrdfLink>,
     /// Files it was read from: none for a built-in arm, two for a URDF with a drive file.
     pub files: Vec<PathBuf>,
 }
 
 impl LoadedArm {
     /// As [`Arm::load`].
-    pub fn load(name_or_path: &str) -> Result<Self, RobotError> {
-        let path = Path::new(name_or_path);
+    pub fn load(name: &str) -> Result<Self, RobotError> {
+        let (file, last_link) = name::split(name);
+        let path = Path::new(file);
         let own = |arm| Self {
             arm,
             notices: Vec::new(),
             frames: Frames::default(),
+            urdf_links: Vec::new(),
             files: vec![path.to_owned()],
         };
-        let read_from = |path: &Path| {
-            std::fs::read_to_string(path)
-                .map_err(|source| RobotError::Read { file: path.display().to_string(), source })
-        };
-        let read = || read_from(path);
         let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
-        match extension.as_deref() {
-            Some("urdf") => {
-                let UrdfArm { arm, frames, notices } = read_urdf(&read()?, name_or_path)?;
-                let mut loaded = Self { notices, frames, ..own(arm) };
+        match (extension.as_deref(), last_link) {
+            (Some("urdf"), _) => {
+                let text = text_of(path)?;
+                let UrdfArm { arm, frames, links, notices } = match last_link {
+                    Some(last) => read_urdf_up_to(&text, file, last)?,
+                    None => read_urdf(&text, file)?,
+                };
+                let mut loaded = Self { notices, frames, urdf_links: links, ..own(arm) };
                 let drives = path.with_extension("drives.toml");
                 if drives.exists() {
-                    let file = drives.display().to_string();
-                    apply_drive_file(&mut loaded.arm, &read_from(&drives)?, &file)?;
-                    loaded.notices.retain(|notice| !notice.is_settled_by_drive_file());
-                    loaded.notices.push(UrdfNotice::DriveFile { file });
-                    loaded.files.push(drives);
+                    loaded.take_drives(drives)?;
                 }
                 Ok(loaded)
             }
-            Some("toml") => Ok(own(Arm::from_toml(&read()?, name_or_path)?)),
-            Some("xml" | "mjcf") => Err(RobotError::Mjcf { file: name_or_path.to_owned() }),
-            _ => Ok(Self { files: Vec::new(), ..own(Arm::built_in(name_or_path)?) }),
+            (Some("toml"), None) => Ok(own(Arm::from_toml(&text_of(path)?, file)?)),
+            (Some("toml"), Some(link)) => Err(RobotError::Invalid {
+                file: file.to_owned(),
+                what: format!("\"#{link}\" is for a .urdf, a robot file is one arm: leave it out"),
+            }),
+            (Some("xml" | "mjcf"), _) => Err(RobotError::Mjcf { file: file.to_owned() }),
+            _ => Ok(Self { files: Vec::new(), ..own(Arm::built_in(name)?) }),
         }
     }
+
+    /// Takes over what the drive file beside the URDF says.
+    fn take_drives(&mut self, path: PathBuf) -> Result<(), RobotError> {
+        let source = path.display().to_string();
+        let drives = DriveFile::read(&text_of(&path)?, &source)?;
+        let locked: Vec<&str> = self.notices.iter().flat_map(UrdfNotice::locked).collect();
+        drives.apply(&mut self.arm, &locked, &source)?;
+        let notices = std::mem::take(&mut self.notices);
+        self.notices = notices.into_iter().filter_map(|notice| drives.leaves(notice)).collect();
+        self.notices.push(UrdfNotice::DriveFile { file: source });
+        self.files.push(path);
+        Ok(())
+    }
+}
+
+fn text_of(path: &Path) -> Result<String, RobotError> {
+    std::fs::read_to_string(path)
+        .map_err(|source| RobotError::Read { file: path.display().to_string(), source })
 }
 
 #[derive(Serialize, Deserialize)]

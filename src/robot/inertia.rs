@@ -106,6 +106,11 @@ impl LinkInertia {
         Self { parameters: std::array::from_fn(|k| self.parameters[k] + other.parameters[k]) }
     }
 
+    /// What is left of the body without a part of it, same frame.
+    pub fn minus(&self, part: &Self) -> Self {
+        Self { parameters: std::array::from_fn(|k| self.parameters[k] - part.parameters[k]) }
+    }
+
     /// The same body with its parameters about another frame: `placement` is the pose of the
     /// present frame in the new one.
     pub fn transformed(&self, placement: &super::Placement) -> Self {

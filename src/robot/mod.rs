@@ -20,4 +20,7 @@ pub use file::{LoadedArm, built_in_names};
 pub use inertia::LinkInertia;
 pub use kinematics::{Kinematics, KinematicsDifference};
 pub use signals::JointSignals;
-pub use urdf::{FixedFrame, Frames, UrdfArm, UrdfFault, UrdfNotice, read_urdf};
+pub use urdf::{
+    FixedFrame, Frames, LockedJoint, Obstacle, Stand, UrdfArm, UrdfFault, UrdfLink, UrdfNotice,
+    read_urdf, read_urdf_up_to,
+};

@@ -15,6 +15,7 @@ use armid::montecarlo::{Scenario, Simulation};
 use armid::robot::{LoadedArm, UrdfNotice};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
+use crate::misread_logs::assert_exchange_is_named;
 use crate::simulated::{Run, assert_holds};
 
 /// Noise of the encoders, beside that of the torque.
@@ -69,12 +70,17 @@ impl Designed {
         Self { robot, noise_nm, design }
     }
 
+    /// That motion as a file.
+    pub fn trajectory(&self) -> String {
+        self.design.excitation.series().to_json()
+    }
+
     /// So many periods of that motion, in a scenario that ends with `rest`.
     pub fn run(&self, periods: usize, rest: &str) -> Run {
-        let Self { robot, noise_nm, design } = self;
+        let Self { robot, noise_nm, .. } = self;
         let temporary = tempfile::tempdir().unwrap();
         let trajectory = temporary.path().join("designed.json");
-        std::fs::write(&trajectory, design.excitation.series().to_json()).unwrap();
+        std::fs::write(&trajectory, self.trajectory()).unwrap();
         let text = format!(
             "name = \"{robot}\"\nrobot = \"{robot}.urdf\"\nseed = 1\ntrials = 1\n[motion]\ntrajectory = '{}'\n\
              periods = {periods}\n[sensors]\ntorque_sd_nm = {noise_nm:?}\n{ENCODERS}{rest}",
@@ -162,6 +168,7 @@ fn an_arm_of_three_joints_is_identified_and_diagnosed() {
     let designed = Designed::new("three_joints", 5.0, &[0.5, 0.4, 0.1]);
     let clean = designed.run(8, "");
     assert_truth(&designed, &clean, 28);
+    assert_exchange_is_named(&clean, [1, 2]);
     let effect = "kind = \"load_friction\"\njoint = 2\nmu = 0.06\n";
     assert_diagnosed(&designed, &clean, effect, (Kind::LoadFriction, Some(2)), ("mu", 0.06));
 }

@@ -11,10 +11,10 @@ use crate::signal::{Scratch, SignalError, ZeroPhase, central_4};
 
 /// Cutoff of the instruments' motion over that of the regression: the noise in an acceleration grows
 /// as f², its power up to f as f³, so that a quarter leaves 1/64 of the noise that X and Z share.
-const SMOOTHER: f64 = 0.25;
+pub const SMOOTHER: f64 = 0.25;
 
-/// The motion behind a zero-phase low-pass at a quarter of `cutoff_hz`, with the derivative of its own
-/// velocity: what the instruments Z are evaluated along.
+/// The motion behind a zero-phase low-pass at `cutoff_hz`, with the derivative of its own velocity: what the instruments Z are
+/// evaluated along, at [`SMOOTHER`] times the cutoff of the regression.
 ///
 /// Janot, Vandanjon and Gautier (IEEE Trans. Control Systems Technology 22 (2014) 132–145) take the
 /// motion of the identified arm simulated under its controller. Where the controller is not known, a
@@ -29,7 +29,7 @@ pub fn smoothed(
     order: usize,
     scratch: &mut Scratch,
 ) -> Result<Motion, SignalError> {
-    let filter = ZeroPhase::new(SMOOTHER * cutoff_hz, order, rate_hz)?;
+    let filter = ZeroPhase::new(cutoff_hz, order, rate_hz)?;
     let n = motion.samples();
     // One edge is where the guess about what lies beyond fades to 1 %: three leave 1e-6.
     let around = if repeats { (3 * filter.edge_samples()).min(n) } else { 0 };
@@ -172,7 +172,7 @@ mod tests {
             qd_rad_s: JointSignals::from_fn(1, n, |_, k| w * at(k).cos()),
             qdd_rad_s2: JointSignals::zeros(1, n),
         };
-        let smooth = smoothed(&motion, true, rate_hz, 10.0, 4, &mut Scratch::default()).unwrap();
+        let smooth = smoothed(&motion, true, rate_hz, 2.5, 4, &mut Scratch::default()).unwrap();
         for k in 0..n {
             // Fourth-order Butterworth, two passes, −3 dB at 2.5 Hz: 1 − (0.2)⁸/2 at 0.5 Hz.
             assert!((smooth.q_rad.joint(0)[k] - at(k).sin()).abs() < 1e-4);

@@ -14,6 +14,6 @@ mod spectrum;
 pub(super) use autoregression::{autoregression, prewhiten};
 pub(super) use cross_joint::{decorrelate, decorrelation, mix};
 pub(super) use decimate::decimate;
-pub(super) use instruments::{instrument, smoothed};
+pub(super) use instruments::{SMOOTHER, instrument, smoothed};
 pub(super) use replicates::ReplicateWhitening;
 pub use spectrum::Spectrum;

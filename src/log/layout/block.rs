@@ -7,6 +7,7 @@ use serde::Deserialize;
 #[serde(rename_all = "snake_case")]
 pub(in crate::log) enum Block {
     Time,
+    TimeNanoseconds,
     Q,
     Qd,
     Current,
@@ -20,8 +21,9 @@ pub(in crate::log) enum Block {
 }
 
 impl Block {
-    pub(in crate::log) const ALL: [Self; 11] = [
+    pub(in crate::log) const ALL: [Self; 12] = [
         Self::Time,
+        Self::TimeNanoseconds,
         Self::Q,
         Self::Qd,
         Self::Current,
@@ -41,13 +43,20 @@ impl Block {
 
     /// Whether a log need not have it.
     pub(in crate::log) fn is_optional(self) -> bool {
-        !matches!(self, Self::Time | Self::Q | Self::Qd | Self::Current | Self::Torque)
+        let is_of_motion = matches!(self, Self::Q | Self::Qd | Self::Current | Self::Torque);
+        !self.is_of_time() && !is_of_motion
+    }
+
+    /// Whether it is one column for all joints.
+    pub(in crate::log) fn is_of_time(self) -> bool {
+        matches!(self, Self::Time | Self::TimeNanoseconds)
     }
 
     /// Its key in a layout file.
     pub(in crate::log) fn key(self) -> &'static str {
         match self {
             Self::Time => "time",
+            Self::TimeNanoseconds => "time_nanoseconds",
             Self::Q => "q",
             Self::Qd => "qd",
             Self::Current => "current",
@@ -67,6 +76,8 @@ impl Block {
         match self {
             // Nanoseconds since 1970 stay below this until the year 2286.
             Self::Time => 1e19,
+            // Of one second.
+            Self::TimeNanoseconds => 1.0,
             // A thousand turns read in degrees without the layout saying so.
             Self::Q | Self::Qd | Self::TargetQ | Self::TargetQd => 3.6e5,
             // 30 000 rad/s² is 3000 times what arms do; in degrees 60 times.

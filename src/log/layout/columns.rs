@@ -12,6 +12,7 @@ use crate::log::error::LayoutFault;
 #[serde(deny_unknown_fields)]
 pub(super) struct Blocks {
     time: Option<Columns>,
+    time_nanoseconds: Option<Columns>,
     q: Option<Columns>,
     qd: Option<Columns>,
     current: Option<Columns>,
@@ -29,6 +30,7 @@ impl Blocks {
     pub(super) fn of(&self, block: Block) -> Option<&Columns> {
         match block {
             Block::Time => &self.time,
+            Block::TimeNanoseconds => &self.time_nanoseconds,
             Block::Q => &self.q,
             Block::Qd => &self.qd,
             Block::Current => &self.current,
@@ -118,13 +120,13 @@ impl Columns {
             Self::Name(_) | Self::Names(_) if !header => {
                 fault("files without header have no names; give column numbers")
             }
-            Self::Name(name) if block == Block::Time && is_pattern(name) => {
+            Self::Name(name) if block.is_of_time() && is_pattern(name) => {
                 fault("the time is one column, without {0} or {1}")
             }
-            Self::Name(name) if block != Block::Time && !is_pattern(name) => {
+            Self::Name(name) if !block.is_of_time() && !is_pattern(name) => {
                 fault("a name for all joints needs {0} or {1} where the joint's number stands")
             }
-            Self::Names(_) | Self::Range(_) if block == Block::Time => {
+            Self::Names(_) | Self::Range(_) if block.is_of_time() => {
                 fault("the time is one column")
             }
             Self::Names(names) if names.is_empty() => fault("name at least one column"),

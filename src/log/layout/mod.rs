@@ -5,6 +5,7 @@
 
 mod block;
 mod columns;
+mod joints;
 mod units;
 
 use serde::Deserialize;
@@ -13,6 +14,7 @@ use super::error::{LayoutFault, LogError};
 pub(super) use block::Block;
 use columns::Blocks;
 pub(super) use columns::Columns;
+use joints::Joints;
 pub(super) use units::{Angle, AngularVelocity, TimeUnit, Units};
 
 /// Layouts built in, by the name given to `--layout`.
@@ -53,10 +55,15 @@ pub(super) fn built_in_without_header() -> impl Iterator<Item = &'static str> {
 /// q = "angle {1}"
 /// qd = ["w1", "w2", "w3", "w4", "w5", "w6"]
 /// current = { first = 14, last = 19 }   # column numbers count from 1
+///
+/// [joints]                     # where the robot's description counts otherwise; joints from 1
+/// motion_reversed = [3]        # angle and velocity
+/// torque_reversed = [3]
+/// zero = [0, -90, 0, 0, 0, 0]  # added to the angles, in the unit of q
 /// ```
 ///
 /// Blocks: `time q qd`, `current` or `torque` (Nm; taken where both are there), and optionally
-/// `target_q target_qd target_qdd target_current target_moment temperature`. The unit of `q` holds for
+/// `time_nanoseconds` (added to the time: ROS stamps), `target_q target_qd target_qdd target_current target_moment temperature`. The unit of `q` holds for
 /// `target_q` and so on. Files without header need the list of their possible widths:
 ///
 /// ```toml
@@ -77,6 +84,8 @@ pub struct Layout {
     pub(super) drive_gain_nm_a: Option<Vec<f64>>,
     #[serde(default)]
     pub(super) units: Units,
+    #[serde(default)]
+    pub(super) joints: Joints,
     columns: Blocks,
     #[serde(default, rename = "width")]
     pub(super) widths: Vec<Width>,
@@ -153,6 +162,7 @@ impl Layout {
         if self.decimal_comma && self.delimiter == DelimiterChoice::Comma {
             return Err(LayoutFault::CommaTwice);
         }
+        self.joints.check()?;
         let has = |block| self.columns(block).is_some();
         check_blocks(has, "[columns]")?;
         for block in Block::ALL {
@@ -262,6 +272,7 @@ mod tests {
         let layout = Layout::from_toml(text, "example.toml").unwrap();
         assert!(Block::ALL.iter().all(|block| layout.columns(*block).is_some()));
         assert_eq!(layout.units.factor(Block::Time), Some(1e-3));
+        assert_ne!(layout.joints, Joints::default());
     }
 
     fn fault_of(from: &str, to: &str) -> String {

@@ -24,6 +24,7 @@ impl Units {
         let degrees = |yes: bool| yes.then_some(PI / 180.0);
         match block {
             Block::Time => Some(self.time.seconds()).filter(|&s| s != 1.0),
+            Block::TimeNanoseconds => Some(TimeUnit::Ns.seconds()),
             Block::Q | Block::TargetQ => degrees(self.q == Angle::Deg),
             Block::Qd | Block::TargetQd => degrees(self.qd == AngularVelocity::DegS),
             Block::TargetQdd => degrees(self.qdd == AngularAcceleration::DegS2),

@@ -21,8 +21,8 @@ use crate::base::BaseSet;
 use crate::identify::covariance::CovarianceKind;
 use crate::identify::physical::PhysicalEstimate;
 use crate::identify::{
-    Condition, Doubt, Estimator, FitError, Identification, Prediction, Processing, Regression,
-    Residual, drive_limit_remark, identifies_the_arm, not_identified,
+    Condition, Doubt, Estimator, FitError, Identification, Misreading, Prediction, Processing,
+    Regression, Residual, drive_limit_remark, identifies_the_arm, not_identified,
 };
 use crate::log::Log;
 use crate::robot::{Arm, Kinematics};
@@ -54,6 +54,8 @@ pub struct Training<'a> {
     pub nominal: &'a [f64],
     /// Name of the reduced parameter set, if not the full one was identified.
     pub reduced: Option<&'a str>,
+    /// How the (first) log would have to be read to fit the arm, where it does not as it is read.
+    pub misreading: Option<&'a Misreading>,
 }
 
 /// A prediction of a log that was not used for the fit.
@@ -119,6 +121,8 @@ pub struct Result {
     intervals: Intervals,
     condition: Condition,
     not_identified: Vec<String>,
+    /// Null: the log is read as it was recorded, as far as the arm tells.
+    misreading: Option<Misreading>,
     validation: Vec<ValidationJson>,
     /// What the user should know.
     pub warnings: Vec<String>,
@@ -200,10 +204,18 @@ impl Result {
         }
         let is_identified = identifies_the_arm(arm, set, &open);
         let theta = &identification.fit.theta;
-        let doubt =
-            Doubt::of(arm, set, training.nominal, theta, &sigma, &identification.covariance);
+        let doubt = match training.misreading {
+            // It explains whatever else could be doubted.
+            Some(misreading) => {
+                Some(Doubt { is_contradiction: true, sentence: misreading.sentence() })
+            }
+            None => {
+                Doubt::of(arm, set, training.nominal, theta, &sigma, &identification.covariance)
+            }
+        };
         warnings.extend(doubt.iter().map(|doubt| doubt.sentence.clone()));
         let fit = identification.residual();
+        warnings.extend(unrelated(&fit));
         warnings.extend(validations.iter().filter_map(|validation| foreign(validation, &fit)));
         // Logs whose torques could not be read came no further than that.
         let several = training.logs.len() > 1;
@@ -242,6 +254,7 @@ impl Result {
                 _ => IDENTIFIED,
             },
             not_identified: open.iter().map(|&k| set.name(k).to_owned()).collect(),
+            misreading: training.misreading.cloned(),
             validation: validations.iter().map(ValidationJson::of).collect(),
             warnings,
             doubt,
@@ -276,7 +289,8 @@ impl Result {
 
     /// Why the intervals are trusted, or why nothing is known of that; distrust stands in [`Self::sentence`].
     pub fn trust(&self) -> Option<&str> {
-        (self.intervals.trusted != Some(false)).then_some(&*self.intervals.reason)
+        let is_asked = self.intervals.trusted != Some(false) && self.misreading.is_none();
+        is_asked.then_some(&*self.intervals.reason)
     }
 
     /// The warnings that the verdict does not begin with.
@@ -299,6 +313,9 @@ impl Result {
                 names.join(", ")
             );
         }
+        if let Some(misreading) = &self.misreading {
+            return misreading.sentence();
+        }
         let percent = self.residual.relative_percent.iter();
         let (low, high) = percent.fold((f64::INFINITY, 0f64), |(l, h), &p| (l.min(p), h.max(p)));
         let open = match self.not_identified.len() {
@@ -320,6 +337,22 @@ impl Result {
             self.robot, self.samples
         )
     }
+}
+
+/// Percent of a joint's torque from which on what the model leaves is nearly all that was recorded.
+const NEARLY_ALL: f64 = 70.0;
+
+/// A remark where the torque of a joint has next to nothing to do with the motion.
+fn unrelated(fit: &Residual) -> Option<String> {
+    let joints = fit.relative_percent.iter().zip(1..).filter(|(percent, _)| **percent > NEARLY_ALL);
+    let joints: Vec<String> =
+        joints.map(|(percent, joint)| format!("joint {joint} ({percent:.0} %)")).collect();
+    (!joints.is_empty()).then(|| {
+        format!(
+            "the model leaves nearly all of the torque of {}: what is recorded there is noise, or not the torque of that joint",
+            joints.join(", ")
+        )
+    })
 }
 
 /// Times the error of the fit from which on a log that was not used for it is not that of the same arm: of another motion a
@@ -361,5 +394,22 @@ impl ValidationJson {
             manufacturer_rms_nm: rms(Prediction::residual),
             manufacturer_moving_rms_nm: rms(Prediction::moving_residual),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_joint_whose_torque_has_nothing_to_do_with_the_motion_is_told() {
+        let fit = |relative_percent: Vec<f64>| Residual {
+            rms_nm: vec![1.0; relative_percent.len()],
+            relative_percent,
+            e_n: 0.1,
+        };
+        assert_eq!(unrelated(&fit(vec![5.0, 45.0])), None);
+        let told = unrelated(&fit(vec![5.0, 96.4])).unwrap();
+        assert!(told.contains("joint 2 (96 %)") && !told.contains("joint 1"), "{told}");
     }
 }

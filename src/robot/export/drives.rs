@@ -4,30 +4,31 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::robot::place::Place;
-use crate::robot::{Arm, Drive, RobotError};
+use crate::robot::{Arm, Joint, RobotError, UrdfNotice};
 
-#[derive(Serialize, Deserialize)]
+/// What lies beside a URDF. Whatever it leaves out stays as the URDF has it, or as it is assumed without a drive file.
+#[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct DriveFile {
-    robot: String,
-    gravity_m_s2: [f64; 3],
-    friction_epsilon_rad_s: f64,
-    /// Files of older programs do not say it.
+pub(in crate::robot) struct DriveFile {
+    robot: Option<String>,
+    gravity_m_s2: Option<[f64; 3]>,
+    friction_epsilon_rad_s: Option<f64>,
     torque_offsets: Option<bool>,
+    #[serde(default)]
     joint: Vec<DriveEntry>,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct DriveEntry {
     name: String,
-    rotor_inertia_kg_m2: f64,
-    viscous_nm_s_rad: f64,
-    coulomb_nm: f64,
-    torque_offset_nm: f64,
-    acceleration_rad_s2: f64,
-    gear_ratio: f64,
-    torque_constant_nm_a: f64,
+    rotor_inertia_kg_m2: Option<f64>,
+    viscous_nm_s_rad: Option<f64>,
+    coulomb_nm: Option<f64>,
+    torque_offset_nm: Option<f64>,
+    acceleration_rad_s2: Option<f64>,
+    gear_ratio: Option<f64>,
+    torque_constant_nm_a: Option<f64>,
     mass_bounds_kg: Option<[f64; 2]>,
     com_bounds_m: Option<[[f64; 2]; 3]>,
 }
@@ -38,20 +39,20 @@ struct DriveEntry {
 pub fn drive_file(arm: &Arm, offsets_nm: &[f64]) -> String {
     let joints = arm.joints.iter().zip(offsets_nm);
     let file = DriveFile {
-        robot: arm.name.clone(),
-        gravity_m_s2: arm.gravity_m_s2.into(),
-        friction_epsilon_rad_s: arm.friction_epsilon_rad_s,
+        robot: Some(arm.name.clone()),
+        gravity_m_s2: Some(arm.gravity_m_s2.into()),
+        friction_epsilon_rad_s: Some(arm.friction_epsilon_rad_s),
         torque_offsets: Some(arm.torque_offsets),
         joint: joints
             .map(|(joint, &torque_offset_nm)| DriveEntry {
                 name: joint.name.clone(),
-                rotor_inertia_kg_m2: joint.drive.rotor_inertia_kg_m2,
-                viscous_nm_s_rad: joint.drive.viscous_nm_s_rad,
-                coulomb_nm: joint.drive.coulomb_nm,
-                torque_offset_nm,
-                acceleration_rad_s2: joint.limits.acceleration_rad_s2,
-                gear_ratio: joint.drive.gear_ratio,
-                torque_constant_nm_a: joint.drive.torque_constant_nm_a,
+                rotor_inertia_kg_m2: Some(joint.drive.rotor_inertia_kg_m2),
+                viscous_nm_s_rad: Some(joint.drive.viscous_nm_s_rad),
+                coulomb_nm: Some(joint.drive.coulomb_nm),
+                torque_offset_nm: Some(torque_offset_nm),
+                acceleration_rad_s2: Some(joint.limits.acceleration_rad_s2),
+                gear_ratio: Some(joint.drive.gear_ratio),
+                torque_constant_nm_a: Some(joint.drive.torque_constant_nm_a),
                 mass_bounds_kg: joint.bounds.mass_kg,
                 com_bounds_m: joint.bounds.com_m,
             })
@@ -64,48 +65,240 @@ pub fn drive_file(arm: &Arm, offsets_nm: &[f64]) -> String {
 /// Gives `arm`, which was read from a URDF, what is in the text of its drive file; `source` names it
 /// in messages. An [`Arm`] has no place for the torque offsets themselves.
 pub fn apply_drive_file(arm: &mut Arm, text: &str, source: &str) -> Result<(), RobotError> {
-    let file: DriveFile = toml::from_str(text)
-        .map_err(|e| RobotError::Toml { file: source.to_owned(), message: e.to_string() })?;
-    let place = Place::of_arm(source);
-    if file.robot != arm.name {
-        return Err(place.fault(format!(
-            "it is about \"{}\", not \"{}\": move it away or give the URDF that it belongs to",
-            file.robot, arm.name
-        )));
+    DriveFile::read(text, source)?.apply(arm, &[], source)
+}
+
+impl DriveFile {
+    /// From its text; `source` names it in messages.
+    pub(in crate::robot) fn read(text: &str, source: &str) -> Result<Self, RobotError> {
+        toml::from_str(text)
+            .map_err(|e| RobotError::Toml { file: source.to_owned(), message: e.to_string() })
     }
-    let names = |list: &[String]| list.join(", ");
-    let given: Vec<String> = file.joint.iter().map(|entry| entry.name.clone()).collect();
-    let wanted: Vec<String> = arm.joints.iter().map(|joint| joint.name.clone()).collect();
-    if given != wanted {
-        return Err(place.fault(format!(
-            "its joints are {}, the URDF\'s are {}: export both again",
-            names(&given),
-            names(&wanted)
-        )));
+
+    /// Gives `arm` what it says. Joints of the same URDF that are `locked` may be in it: of a robot with two arms, one file has the
+    /// drives of both.
+    pub(in crate::robot) fn apply(
+        &self,
+        arm: &mut Arm,
+        locked: &[&str],
+        source: &str,
+    ) -> Result<(), RobotError> {
+        let place = Place::of_arm(source);
+        self.check_names(arm, locked, &place)?;
+        take(&mut arm.friction_epsilon_rad_s, self.friction_epsilon_rad_s, |value| {
+            place.positive("friction_epsilon_rad_s", value)
+        })?;
+        if let Some(gravity_m_s2) = self.gravity_m_s2 {
+            place.finite("gravity_m_s2", &gravity_m_s2)?;
+            arm.gravity_m_s2 = Vector3::from(gravity_m_s2);
+        }
+        arm.torque_offsets = self.torque_offsets.unwrap_or(arm.torque_offsets);
+        for joint in &mut arm.joints {
+            if let Some(entry) = self.joint.iter().find(|entry| entry.name == joint.name) {
+                entry.apply(joint, &place.table("joint", &entry.name))?;
+            }
+        }
+        Ok(())
     }
-    place.positive("friction_epsilon_rad_s", file.friction_epsilon_rad_s)?;
-    place.finite("gravity_m_s2", &file.gravity_m_s2)?;
-    arm.friction_epsilon_rad_s = file.friction_epsilon_rad_s;
-    arm.gravity_m_s2 = Vector3::from(file.gravity_m_s2);
-    arm.torque_offsets = file.torque_offsets.unwrap_or(arm.torque_offsets);
-    for (joint, entry) in arm.joints.iter_mut().zip(file.joint) {
-        let place = place.table("joint", &entry.name);
-        place.not_negative("rotor_inertia_kg_m2", entry.rotor_inertia_kg_m2)?;
-        place.not_negative("viscous_nm_s_rad", entry.viscous_nm_s_rad)?;
-        place.not_negative("coulomb_nm", entry.coulomb_nm)?;
-        place.finite("torque_offset_nm", &[entry.torque_offset_nm])?;
-        place.positive("gear_ratio", entry.gear_ratio)?;
-        place.positive("torque_constant_nm_a", entry.torque_constant_nm_a)?;
-        place.positive("acceleration_rad_s2", entry.acceleration_rad_s2)?;
-        joint.drive = Drive {
-            rotor_inertia_kg_m2: entry.rotor_inertia_kg_m2,
-            viscous_nm_s_rad: entry.viscous_nm_s_rad,
-            coulomb_nm: entry.coulomb_nm,
-            gear_ratio: entry.gear_ratio,
-            torque_constant_nm_a: entry.torque_constant_nm_a,
-        };
-        joint.limits.acceleration_rad_s2 = entry.acceleration_rad_s2;
-        joint.bounds = place.bounds(entry.mass_bounds_kg, entry.com_bounds_m)?;
+
+    /// Refuses a file about another robot, and joints that the URDF does not have.
+    fn check_names(&self, arm: &Arm, locked: &[&str], place: &Place) -> Result<(), RobotError> {
+        if let Some(robot) = self.robot.as_ref().filter(|robot| **robot != arm.name) {
+            return Err(place.fault(format!(
+                "it is about \"{robot}\", not \"{}\": move it away or give the URDF that it belongs to",
+                arm.name
+            )));
+        }
+        let known: Vec<&str> = arm.joints.iter().map(|joint| joint.name.as_str()).collect();
+        let given: Vec<&str> = self.joint.iter().map(|entry| entry.name.as_str()).collect();
+        let unknown: Vec<&str> = given
+            .iter()
+            .copied()
+            .filter(|name| !known.contains(name) && !locked.contains(name))
+            .collect();
+        if !unknown.is_empty() {
+            return Err(place.fault(format!(
+                "its joints \"{}\" are none of the URDF's, which are {}: correct the names, or export both again",
+                unknown.join("\", \""),
+                known.join(", ")
+            )));
+        }
+        let repeated = (0..given.len()).find(|&k| given[..k].contains(&given[k]));
+        match repeated {
+            Some(k) => Err(place.fault(format!(
+                "its joint \"{}\" is there twice; the URDF's joints are {}, each has one [[joint]] or none",
+                given[k],
+                known.join(", ")
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    /// What remains of a `notice` about the URDF alone.
+    pub(in crate::robot) fn leaves(&self, notice: UrdfNotice) -> Option<UrdfNotice> {
+        match notice {
+            UrdfNotice::Gravity { root } => {
+                self.gravity_m_s2.is_none().then_some(UrdfNotice::Gravity { root })
+            }
+            UrdfNotice::Drives { rotor_inertia, gear_ratio, torque_constant } => {
+                let rotor_inertia = self.without(rotor_inertia, |e| e.rotor_inertia_kg_m2);
+                let gear_ratio = self.without(gear_ratio, |e| e.gear_ratio);
+                let torque_constant = self.without(torque_constant, |e| e.torque_constant_nm_a);
+                let lists = [&rotor_inertia, &gear_ratio, &torque_constant];
+                let is_open = lists.iter().any(|joints| !joints.is_empty());
+                is_open.then_some(UrdfNotice::Drives { rotor_inertia, gear_ratio, torque_constant })
+            }
+            UrdfNotice::NoFriction { joints } => {
+                let joints = self.without(joints, |e| e.viscous_nm_s_rad.or(e.coulomb_nm));
+                (!joints.is_empty()).then_some(UrdfNotice::NoFriction { joints })
+            }
+            UrdfNotice::AssumedAcceleration { joints, acceleration_rad_s2 } => {
+                let joints = self.without(joints, |e| e.acceleration_rad_s2);
+                (!joints.is_empty())
+                    .then_some(UrdfNotice::AssumedAcceleration { joints, acceleration_rad_s2 })
+            }
+            other => Some(other),
+        }
+    }
+
+    /// Those of `joints` of which the file does not say a quantity.
+    fn without(
+        &self,
+        joints: Vec<String>,
+        quantity: impl Fn(&DriveEntry) -> Option<f64>,
+    ) -> Vec<String> {
+        let says = |entry: &DriveEntry, name: &str| entry.name == name && quantity(entry).is_some();
+        let is_open = |name: &String| !self.joint.iter().any(|entry| says(entry, name));
+        joints.into_iter().filter(is_open).collect()
+    }
+}
+
+impl DriveEntry {
+    fn apply(&self, joint: &mut Joint, place: &Place) -> Result<(), RobotError> {
+        let Joint { drive, limits, bounds, .. } = joint;
+        take(&mut drive.rotor_inertia_kg_m2, self.rotor_inertia_kg_m2, |value| {
+            place.not_negative("rotor_inertia_kg_m2", value)
+        })?;
+        take(&mut drive.viscous_nm_s_rad, self.viscous_nm_s_rad, |value| {
+            place.not_negative("viscous_nm_s_rad", value)
+        })?;
+        take(&mut drive.coulomb_nm, self.coulomb_nm, |value| {
+            place.not_negative("coulomb_nm", value)
+        })?;
+        place.finite("torque_offset_nm", self.torque_offset_nm.as_slice())?;
+        take(&mut drive.gear_ratio, self.gear_ratio, |value| place.positive("gear_ratio", value))?;
+        take(&mut drive.torque_constant_nm_a, self.torque_constant_nm_a, |value| {
+            place.positive("torque_constant_nm_a", value)
+        })?;
+        take(&mut limits.acceleration_rad_s2, self.acceleration_rad_s2, |value| {
+            place.positive("acceleration_rad_s2", value)
+        })?;
+        let given = place.bounds(self.mass_bounds_kg, self.com_bounds_m)?;
+        bounds.mass_kg = given.mass_kg.or(bounds.mass_kg);
+        bounds.com_m = given.com_m.or(bounds.com_m);
+        Ok(())
+    }
+}
+
+/// Puts a value that is given, and passes the check, into its place.
+fn take(
+    place: &mut f64,
+    given: Option<f64>,
+    check: impl Fn(f64) -> Result<(), RobotError>,
+) -> Result<(), RobotError> {
+    if let Some(value) = given {
+        check(value)?;
+        *place = value;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ur5() -> Arm {
+        Arm::built_in("ur5").unwrap()
+    }
+
+    fn names(arm: &Arm) -> Vec<String> {
+        arm.joints.iter().map(|joint| joint.name.clone()).collect()
+    }
+
+    /// Some lines by hand, about joints in another order.
+    #[test]
+    fn what_a_drive_file_leaves_out_stays_as_it_was() {
+        let mut wanted = ur5();
+        wanted.joints[4].drive.coulomb_nm = 2.5;
+        wanted.joints[1].drive.rotor_inertia_kg_m2 = 0.7;
+        wanted.joints[1].bounds.mass_kg = Some([7.0, 9.0]);
+        let (first, second) = (&wanted.joints[4].name, &wanted.joints[1].name);
+        let text = format!(
+            "[[joint]]\nname = \"{first}\"\ncoulomb_nm = 2.5\n\
+             [[joint]]\nname = \"{second}\"\nrotor_inertia_kg_m2 = 0.7\nmass_bounds_kg = [7.0, 9.0]\n"
+        );
+        let mut arm = ur5();
+        apply_drive_file(&mut arm, &text, "x.drives.toml").unwrap();
+        assert_eq!(arm, wanted);
+        apply_drive_file(&mut arm, "", "x.drives.toml").unwrap();
+        assert_eq!(arm, wanted);
+        apply_drive_file(&mut arm, "gravity_m_s2 = [0.0, 9.81, 0.0]", "x.drives.toml").unwrap();
+        wanted.gravity_m_s2 = Vector3::new(0.0, 9.81, 0.0);
+        assert_eq!(arm, wanted);
+    }
+
+    #[test]
+    fn a_joint_that_is_not_there_or_twice_is_refused_with_those_that_are() {
+        let names = names(&ur5());
+        let first = names[0].as_str();
+        for (joints, said) in [
+            (["elbow_9", "wrist_9"], "\"elbow_9\", \"wrist_9\" are none of the URDF's"),
+            ([first, first], "is there twice"),
+        ] {
+            let entries = joints.map(|name| format!("[[joint]]\nname = \"{name}\"\n"));
+            let file = DriveFile::read(&entries.concat(), "x.drives.toml").unwrap();
+            let message = file.apply(&mut ur5(), &[], "x.drives.toml").unwrap_err().to_string();
+            assert!(message.contains(said), "{message}");
+            assert!(message.contains(&names.join(", ")), "{message}");
+        }
+        let finger = DriveFile::read("[[joint]]\nname = \"finger\"\n", "x.drives.toml").unwrap();
+        let mut arm = ur5();
+        finger.apply(&mut arm, &["finger"], "x.drives.toml").unwrap();
+        assert_eq!(arm, ur5());
+    }
+
+    #[test]
+    fn only_what_a_drive_file_says_is_not_assumed_any_more() {
+        let all = || ["a", "b"].map(str::to_owned).to_vec();
+        let b = || vec!["b".to_owned()];
+        let gravity = || UrdfNotice::Gravity { root: "base".into() };
+        let drives = |rotor_inertia, gear_ratio, torque_constant| UrdfNotice::Drives {
+            rotor_inertia,
+            gear_ratio,
+            torque_constant,
+        };
+        let no_friction = |joints| UrdfNotice::NoFriction { joints };
+        let accelerations =
+            |joints| UrdfNotice::AssumedAcceleration { joints, acceleration_rad_s2: 10.0 };
+        let notices =
+            || [gravity(), drives(all(), all(), all()), no_friction(all()), accelerations(all())];
+        let left = |text: &str| -> Vec<UrdfNotice> {
+            let file = DriveFile::read(text, "x.drives.toml").unwrap();
+            notices().into_iter().filter_map(|notice| file.leaves(notice)).collect()
+        };
+        assert_eq!(left("friction_epsilon_rad_s = 0.01"), notices());
+        let one = "[[joint]]\nname = \"a\"\n";
+        let said = left(&format!("{one}viscous_nm_s_rad = 0.0\ntorque_constant_nm_a = 0.1\n"));
+        let expected =
+            [gravity(), drives(all(), all(), b()), no_friction(b()), accelerations(all())];
+        assert_eq!(said, expected);
+        let open = said[1].to_string();
+        assert!(open.contains("no gear ratio given, taken as 1: a, b"), "{open}");
+        assert!(open.contains("no torque constant given, taken as 1 Nm/A: b"), "{open}");
+        let mut arm = ur5();
+        let names = names(&arm);
+        arm.joints.truncate(2);
+        let text = drive_file(&arm, &[0.0; 2]).replace(&names[0], "a").replace(&names[1], "b");
+        assert!(left(&text).is_empty(), "{text}");
+    }
 }

@@ -1,11 +1,12 @@
 //! Arms for other programs.
 //!
-//! Enters: an [`Arm`] whose bodies can exist, and named frames on them. Leaves: a URDF,
-//! the drive file with what a URDF has no place for, or an MJCF. All numbers are written so that
-//! they read back as the same bits.
+//! Enters: an [`Arm`] whose bodies can exist, and named frames on them. Leaves: a URDF, or the one
+//! that it came from with other numbers, the drive file with what a URDF has no place for, or an
+//! MJCF. All numbers are written so that they read back as the same bits.
 
 mod drives;
 mod mjcf;
+mod own_urdf;
 mod urdf;
 mod xml;
 
@@ -14,8 +15,10 @@ use thiserror::Error;
 use super::arm::Arm;
 use super::urdf::Frames;
 
+pub(super) use drives::DriveFile;
 pub use drives::{apply_drive_file, drive_file};
 pub use mjcf::mjcf;
+pub use own_urdf::{OwnUrdf, OwnUrdfError, Takeover, Unfit, own_urdf};
 pub use urdf::urdf;
 
 /// The arm is not one that a simulator accepts.
@@ -65,6 +68,19 @@ const UNKNOWN_TORQUE_NM: f64 = 1e9;
 
 /// Refuses an arm that could not run, and names that would collide.
 fn check(arm: &Arm, frames: &Frames) -> Result<(), ExportError> {
+    check_numbers(arm)?;
+    let mut seen = std::collections::HashSet::from([frames.root.clone()]);
+    let links = arm.joints.iter().map(|joint| link_name(&joint.name));
+    for name in links.chain(frames.fixed.iter().map(|frame| frame.name.clone())) {
+        if !seen.insert(name.clone()) {
+            return Err(ExportError::DuplicateName { name });
+        }
+    }
+    Ok(())
+}
+
+/// Refuses an arm that could not run.
+fn check_numbers(arm: &Arm) -> Result<(), ExportError> {
     for joint in &arm.joints {
         let drive = [
             ("rotor inertia", joint.drive.rotor_inertia_kg_m2),
@@ -87,13 +103,6 @@ fn check(arm: &Arm, frames: &Frames) -> Result<(), ExportError> {
         let smallest = joint.link.consistency_margin();
         if smallest <= 0.0 {
             return Err(ExportError::Impossible { joint: name(), smallest });
-        }
-    }
-    let mut seen = std::collections::HashSet::from([frames.root.clone()]);
-    let links = arm.joints.iter().map(|joint| link_name(&joint.name));
-    for name in links.chain(frames.fixed.iter().map(|frame| frame.name.clone())) {
-        if !seen.insert(name.clone()) {
-            return Err(ExportError::DuplicateName { name });
         }
     }
     Ok(())
@@ -132,7 +141,7 @@ mod tests {
         for name in crate::robot::built_in_names() {
             let arm = Arm::built_in(name).unwrap();
             let text = urdf(&arm, &frames()).unwrap();
-            let UrdfArm { arm: read, frames: read_frames, notices } =
+            let UrdfArm { arm: read, frames: read_frames, notices, .. } =
                 read_urdf(&text, "x.urdf").unwrap();
             assert_eq!((read.name.as_str(), read.dof()), (name, 6));
             for (a, b) in arm.joints.iter().zip(&read.joints) {

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::xml::{about_com, escaped, frames_of, numbers};
+use super::xml::{about_com, escaped, frames_of, numbers, tensor};
 use super::{ExportError, UNKNOWN_TORQUE_NM, check, link_name};
 use crate::robot::{Arm, FixedFrame, Frames, Joint, Placement};
 
@@ -35,18 +35,12 @@ pub fn urdf(arm: &Arm, frames: &Frames) -> Result<String, ExportError> {
 }
 
 fn write_link(out: &mut String, joint: &Joint, name: &str) {
-    let (mass_kg, com, i) = about_com(&joint.link);
+    let (mass_kg, com, central) = about_com(&joint.link);
     let _ = write!(
         out,
         "  <link name=\"{name}\">\n    <inertial>\n      <origin xyz=\"{com}\" rpy=\"0 0 0\"/>\n      \
-         <mass value=\"{mass_kg}\"/>\n      <inertia ixx=\"{}\" ixy=\"{}\" ixz=\"{}\" iyy=\"{}\" \
-         iyz=\"{}\" izz=\"{}\"/>\n    </inertial>\n  </link>\n",
-        numbers([&i[(0, 0)]]),
-        numbers([&i[(0, 1)]]),
-        numbers([&i[(0, 2)]]),
-        numbers([&i[(1, 1)]]),
-        numbers([&i[(1, 2)]]),
-        numbers([&i[(2, 2)]]),
+         <mass value=\"{mass_kg}\"/>\n      <inertia {}/>\n    </inertial>\n  </link>\n",
+        tensor(&central),
         name = escaped(name),
         com = numbers(com.iter()),
     );

@@ -32,6 +32,19 @@ pub fn about_com(link: &LinkInertia) -> (f64, Vector3<f64>, Matrix3<f64>) {
     (link.mass_kg(), com, link.inertia_com_kg_m2().unwrap_or_default())
 }
 
+/// Attributes of a URDF's `<inertia>`.
+pub fn tensor(i: &Matrix3<f64>) -> String {
+    format!(
+        "ixx=\"{}\" ixy=\"{}\" ixz=\"{}\" iyy=\"{}\" iyz=\"{}\" izz=\"{}\"",
+        numbers([&i[(0, 0)]]),
+        numbers([&i[(0, 1)]]),
+        numbers([&i[(0, 2)]]),
+        numbers([&i[(1, 1)]]),
+        numbers([&i[(1, 2)]]),
+        numbers([&i[(2, 2)]]),
+    )
+}
+
 /// Frames fixed in body `body`.
 pub fn frames_of(frames: &[FixedFrame], body: usize) -> impl Iterator<Item = &FixedFrame> {
     frames.iter().filter(move |frame| frame.body == body)

@@ -1,169 +1,137 @@
-//! The tree of a URDF as one chain of bodies.
+//! One chain of bodies in the tree of a URDF.
 
-use std::collections::{HashMap, HashSet};
-
-use urdf_rs::{Joint, JointType, Link, Robot};
+use urdf_rs::{Joint, JointType, Link};
 
 use super::fault::UrdfFault;
+use super::obstacle::Obstacle;
+use super::tree::Tree;
 
-/// Links that move as one, in the order in which fixed joints reach them.
-#[derive(Debug, Default)]
+/// Links that move as one, in the order in which joints that stand still reach them.
+#[derive(Debug)]
 pub(super) struct Body<'a> {
     /// The moving joint in front; `None` for the base.
     pub joint: Option<&'a Joint>,
-    /// Its links, the one behind the joint first, each with the fixed joint that holds it and the
+    /// Its links, the one behind the joint first, each with the fixed or locked joint that holds it and the
     /// position of its parent in this list (`None` for the first).
     pub links: Vec<(&'a Link, Option<(&'a Joint, usize)>)>,
     /// Position in `links` of the link that the next moving joint hangs on.
     pub next_parent: usize,
 }
 
-/// Base first, then one body per moving joint.
-pub(super) fn bodies(robot: &Robot) -> Result<Vec<Body<'_>>, UrdfFault> {
-    let links = links_by_name(robot)?;
-    let children = children_by_link(robot, &links)?;
-    let mut link = root(robot, &links)?;
-    let mut joint = None;
-    let mut chain = Vec::new();
-    loop {
-        let (body, next) = collect(link, joint, &links, &children)?;
-        chain.push(body);
-        let Some(moving) = next else { break };
-        link = links[moving.child.link.as_str()];
-        joint = Some(moving);
-    }
-    if chain.len() == 1 {
-        return Err(UrdfFault::NothingMoves);
-    }
-    Ok(chain)
+/// Base first, then one body per joint of `moving`, which lead from the root on; all others stand still.
+pub(super) fn bodies<'a>(tree: &Tree<'a>, moving: &[&'a Joint]) -> Vec<Body<'a>> {
+    let in_front = std::iter::once(None).chain(moving.iter().copied().map(Some));
+    let behind = moving.iter().copied().map(Some).chain(std::iter::once(None));
+    in_front.zip(behind).map(|(joint, next)| body(tree, joint, next)).collect()
 }
 
-fn links_by_name(robot: &Robot) -> Result<HashMap<&str, &Link>, UrdfFault> {
-    if robot.links.is_empty() {
-        return Err(UrdfFault::NoLinks);
-    }
-    let mut links = HashMap::new();
-    for link in &robot.links {
-        if links.insert(link.name.as_str(), link).is_some() {
-            return Err(UrdfFault::Duplicate { kind: "link", name: link.name.clone() });
-        }
-    }
-    Ok(links)
-}
-
-/// Joints by the link they hang on, in the file's order.
-fn children_by_link<'a>(
-    robot: &'a Robot,
-    links: &HashMap<&str, &Link>,
-) -> Result<HashMap<&'a str, Vec<&'a Joint>>, UrdfFault> {
-    let mut names = HashSet::new();
-    let mut children: HashMap<&str, Vec<&Joint>> = HashMap::new();
-    for joint in &robot.joints {
-        if !names.insert(joint.name.as_str()) {
-            return Err(UrdfFault::Duplicate { kind: "joint", name: joint.name.clone() });
-        }
-        for (role, end) in [("parent", &joint.parent), ("child", &joint.child)] {
-            if !links.contains_key(end.link.as_str()) {
-                return Err(UrdfFault::UnknownLink {
-                    joint: joint.name.clone(),
-                    role,
-                    link: end.link.clone(),
-                });
-            }
-        }
-        children.entry(joint.parent.link.as_str()).or_default().push(joint);
-    }
-    Ok(children)
-}
-
-/// The one link without a parent, after making sure that every other link leads back to it.
-fn root<'a>(robot: &'a Robot, links: &HashMap<&str, &'a Link>) -> Result<&'a Link, UrdfFault> {
-    let mut holder: HashMap<&str, &Joint> = HashMap::new();
-    for joint in &robot.joints {
-        if let Some(first) = holder.insert(joint.child.link.as_str(), joint) {
-            return Err(UrdfFault::ClosedChain {
-                link: joint.child.link.clone(),
-                first: first.name.clone(),
-                second: joint.name.clone(),
-            });
-        }
-    }
-    let mut root: Option<&Link> = None;
-    for link in &robot.links {
-        let mut top = link;
-        let mut steps = 0;
-        while let Some(joint) = holder.get(top.name.as_str()) {
-            steps += 1;
-            if steps > robot.links.len() {
-                let parent = joint.parent.link.as_str();
-                return Err(UrdfFault::ClosedChain {
-                    link: parent.to_owned(),
-                    first: holder[parent].name.clone(),
-                    second: joint.name.clone(),
-                });
-            }
-            top = links[joint.parent.link.as_str()];
-        }
-        match root {
-            Some(known) if known.name != top.name => {
-                return Err(UrdfFault::Disconnected {
-                    first: known.name.clone(),
-                    second: top.name.clone(),
-                });
-            }
-            _ => root = Some(top),
-        }
-    }
-    root.ok_or(UrdfFault::NoLinks)
-}
-
-/// The body that begins at `first`, and the moving joint on it.
-fn collect<'a>(
-    first: &'a Link,
-    joint: Option<&'a Joint>,
-    links: &HashMap<&str, &'a Link>,
-    children: &HashMap<&str, Vec<&'a Joint>>,
-) -> Result<(Body<'a>, Option<&'a Joint>), UrdfFault> {
+/// The body behind `joint`, up to the joint `next`.
+fn body<'a>(tree: &Tree<'a>, joint: Option<&'a Joint>, next: Option<&Joint>) -> Body<'a> {
+    let first = joint.map_or(tree.root(), |joint| tree.behind(joint));
     let mut body = Body { joint, links: vec![(first, None)], next_parent: 0 };
-    let mut next: Option<&Joint> = None;
     let mut at = 0;
     while at < body.links.len() {
-        let link = body.links[at].0;
-        for child in children.get(link.name.as_str()).into_iter().flatten() {
-            if !moves(child)? {
-                body.links.push((links[child.child.link.as_str()], Some((child, at))));
-            } else if let Some(other) = next {
-                return Err(UrdfFault::Branched {
-                    body: first.name.clone(),
-                    first: other.name.clone(),
-                    second: child.name.clone(),
-                });
-            } else {
-                next = Some(child);
+        for &child in tree.joints_on(body.links[at].0) {
+            if next.is_some_and(|next| next.name == child.name) {
                 body.next_parent = at;
+            } else {
+                body.links.push((tree.behind(child), Some((child, at))));
             }
         }
         at += 1;
     }
-    Ok((body, next))
+    body
 }
 
-fn moves(joint: &Joint) -> Result<bool, UrdfFault> {
-    let kind = match joint.joint_type {
-        JointType::Fixed => return Ok(false),
-        JointType::Revolute | JointType::Continuous => match &joint.mimic {
-            None => return Ok(true),
-            Some(mimic) => {
-                return Err(UrdfFault::Mimic {
-                    joint: joint.name.clone(),
-                    of: mimic.joint.clone(),
-                });
-            }
-        },
-        JointType::Prismatic => "prismatic",
-        JointType::Floating => "floating",
-        JointType::Planar => "planar",
-        JointType::Spherical => "spherical",
+/// The joints that move the link `last`, from the root on.
+pub(super) fn joints_up_to<'a>(tree: &Tree<'a>, last: &str) -> Result<Vec<&'a Joint>, UrdfFault> {
+    let Some(link) = tree.link(last) else {
+        return Err(UrdfFault::NoSuchLink { link: last.to_owned(), choice: tree.choice() });
     };
-    Err(UrdfFault::JointType { joint: joint.name.clone(), kind })
+    let mut joints = tree.way_to(link);
+    joints.retain(|joint| joint.joint_type != JointType::Fixed);
+    let obstacles: Vec<Obstacle> = joints.iter().filter_map(|joint| Obstacle::of(joint)).collect();
+    if !obstacles.is_empty() {
+        return Err(UrdfFault::OnTheWay { last: last.to_owned(), obstacles });
+    }
+    if joints.is_empty() {
+        let (link, root) = (last.to_owned(), tree.root().name.clone());
+        return Err(UrdfFault::NothingMovesUpTo { link, root, ends: tree.ends() });
+    }
+    Ok(joints)
+}
+
+/// All moving joints, where they are one chain of revolute ones; `file` is what a remedy begins with.
+pub(super) fn all_joints<'a>(tree: &Tree<'a>, file: &str) -> Result<Vec<&'a Joint>, UrdfFault> {
+    let mut moving = Vec::new();
+    let mut obstacles = Vec::new();
+    let mut branches = Vec::new();
+    let mut firsts = vec![tree.root()];
+    let mut at = 0;
+    while at < firsts.len() {
+        let first = firsts[at];
+        let (_, joints) = rigid(tree, first);
+        let turning: Vec<&Joint> =
+            joints.iter().copied().filter(|joint| Obstacle::of(joint).is_none()).collect();
+        if turning.len() > 1 {
+            let joints = turning.iter().map(|joint| joint.name.clone()).collect();
+            branches.push(Obstacle::Branch { body: first.name.clone(), joints });
+        }
+        for joint in joints {
+            obstacles.extend(Obstacle::of(joint));
+            firsts.push(tree.behind(joint));
+            moving.push(joint);
+        }
+        at += 1;
+    }
+    obstacles.append(&mut branches);
+    if !obstacles.is_empty() {
+        let proposal = last_link(tree).map(|link| format!("{file}#{}", link.name));
+        return Err(UrdfFault::NotOneChain { obstacles, proposal });
+    }
+    if moving.is_empty() {
+        return Err(UrdfFault::NothingMoves);
+    }
+    Ok(moving)
+}
+
+/// Links that fixed joints hold on `first`, each with the number of these joints, and the moving joints that hang on them.
+fn rigid<'a>(tree: &Tree<'a>, first: &'a Link) -> (Vec<(&'a Link, usize)>, Vec<&'a Joint>) {
+    let mut links = vec![(first, 0)];
+    let mut moving = Vec::new();
+    let mut at = 0;
+    while at < links.len() {
+        let (link, fixed) = links[at];
+        for &joint in tree.joints_on(link) {
+            if joint.joint_type == JointType::Fixed {
+                links.push((tree.behind(joint), fixed + 1));
+            } else {
+                moving.push(joint);
+            }
+        }
+        at += 1;
+    }
+    (links, moving)
+}
+
+/// The last link of what is likely the arm: of the longest chain of revolute joints that begins at the root, and of its last body the
+/// link behind most fixed joints. Of equals the first.
+fn last_link<'a>(tree: &Tree<'a>) -> Option<&'a Link> {
+    let mut bodies: Vec<(&Link, Option<&Joint>, usize)> = vec![(tree.root(), None, 0)];
+    let mut best: Option<(&Link, usize)> = None;
+    let mut at = 0;
+    while at < bodies.len() {
+        let (first, joint, count) = bodies[at];
+        let (links, joints) = rigid(tree, first);
+        // At the end of a chain, a joint that others follow drives a gripper.
+        let may_be_last = joint.is_some_and(|joint| !tree.is_mimicked(joint));
+        if may_be_last && best.is_none_or(|(_, most)| count > most) {
+            let last = links.iter().rev().max_by_key(|(_, fixed)| *fixed);
+            best = last.map(|(link, _)| (*link, count));
+        }
+        let turning = joints.into_iter().filter(|joint| Obstacle::of(joint).is_none());
+        bodies.extend(turning.map(|joint| (tree.behind(joint), Some(joint), count + 1)));
+        at += 1;
+    }
+    best.map(|(link, _)| link)
 }

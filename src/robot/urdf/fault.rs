@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use super::obstacle::Obstacle;
+
 /// A URDF that is well-formed, but no serial arm of rigid bodies.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum UrdfFault {
@@ -48,33 +50,43 @@ pub enum UrdfFault {
         /// A link of another.
         second: String,
     },
-    /// Two moving joints on one body.
-    #[error(
-        "the chain branches behind \"{body}\": joints \"{first}\" and \"{second}\" both move; make the one that is not part of the arm fixed"
-    )]
-    Branched {
-        /// Link or joint whose body carries both.
-        body: String,
-        /// One moving joint.
-        first: String,
-        /// The other.
-        second: String,
+    /// The joints that move are not one chain of revolute joints.
+    #[error("{}", not_one_chain(obstacles, proposal.as_deref()))]
+    NotOneChain {
+        /// All that keeps them from it.
+        obstacles: Vec<Obstacle>,
+        /// File and last link of what is likely the arm, `FILE.urdf#LINK`.
+        proposal: Option<String>,
     },
-    /// A moving joint that is not a single rotation.
+    /// The last link of the arm is not in the file.
     #[error(
-        "joint \"{joint}\" is {kind}; only revolute, continuous and fixed joints are understood: make it fixed or take it out"
+        "there is no link \"{link}\"; name one of {}, or of those on the way to them",
+        choice.join(", ")
     )]
-    JointType {
-        /// The joint.
-        joint: String,
-        /// Its type.
-        kind: &'static str,
+    NoSuchLink {
+        /// What was asked for.
+        link: String,
+        /// Links to choose from.
+        choice: Vec<String>,
     },
-    /// A joint that copies another.
+    /// Joints between the root and the last link of the arm that are not an arm's.
     #[error(
-        "joint \"{joint}\" mimics \"{of}\"; coupled joints are not understood: make it fixed or take it out"
+        "on the way to link \"{last}\", {}; there only revolute and continuous joints that follow no other are \
+         understood: name a link that is not behind these, or make them fixed in a copy of the file",
+        list(obstacles)
     )]
-    Mimic {
+    OnTheWay {
+        /// The last link of the arm.
+        last: String,
+        /// All of these joints.
+        obstacles: Vec<Obstacle>,
+    },
+    /// A locked joint follows one that is not there, or itself.
+    #[error(
+        "joint \"{joint}\" mimics \"{of}\", which is not in the file or follows it in turn: where does it stand? Make it \
+         fixed in a copy of the file"
+    )]
+    MimicsNothing {
         /// The joint.
         joint: String,
         /// The joint it follows.
@@ -83,6 +95,20 @@ pub enum UrdfFault {
     /// Only fixed joints.
     #[error("no joint moves; an arm needs at least one revolute joint")]
     NothingMoves,
+    /// The last link of the arm is one of the base.
+    #[error(
+        "link \"{link}\" stands still: no joint moves on the way to it from the root link \"{root}\"; name the last link of the \
+         arm, one of {}, or of those on the way to them",
+        ends.join(", ")
+    )]
+    NothingMovesUpTo {
+        /// What was taken for the last link.
+        link: String,
+        /// The root link.
+        root: String,
+        /// Links on which nothing hangs.
+        ends: Vec<String>,
+    },
     /// An axis without a direction, or whose length shows that something else was meant.
     #[error("joint \"{joint}\": the axis ({}, {}, {}) has length {length}; it must be a unit vector", axis[0], axis[1], axis[2])]
     Axis {
@@ -165,4 +191,35 @@ pub enum UrdfFault {
         /// Principal moments about the centre of mass, ascending.
         principal_kg_m2: [f64; 3],
     },
+}
+
+/// Refuses what is no number to calculate with.
+pub(super) fn finite(place: &str, quantity: &'static str, value: f64) -> Result<(), UrdfFault> {
+    if value.is_finite() {
+        return Ok(());
+    }
+    Err(UrdfFault::NotFinite { place: place.to_owned(), quantity, value })
+}
+
+/// Such as `joint "elbow"`, in messages.
+pub(super) fn quoted(kind: &str, name: &str) -> String {
+    format!("{kind} \"{name}\"")
+}
+
+fn list(obstacles: &[Obstacle]) -> String {
+    let words: Vec<String> = obstacles.iter().map(ToString::to_string).collect();
+    words.join(", ")
+}
+
+fn not_one_chain(obstacles: &[Obstacle], proposal: Option<&str>) -> String {
+    let obstacles = list(obstacles);
+    let remedy = match proposal {
+        Some(proposal) => format!(
+            "name the last link of the arm behind the file, for example {proposal}: joints that are not on the way to it are \
+             taken as locked"
+        ),
+        None => "no arm of revolute joints begins at the root link: make what is in its way fixed in a copy of the file"
+            .to_owned(),
+    };
+    format!("the joints that move are not one chain of revolute joints: {obstacles}; {remedy}")
 }

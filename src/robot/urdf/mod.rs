@@ -1,18 +1,27 @@
 //! Arms from URDF files.
 //!
-//! Enters: the text of a URDF (parsed by the `urdf-rs` library). Leaves: a [`UrdfArm`]: the
-//! [`Arm`](super::Arm), the named frames on its bodies (flange, tool), and a list of everything that was
-//! assumed or left out on the way; or a [`UrdfFault`] that says what is wrong, where, and what to
-//! do.
+//! Enters: the text of a URDF (parsed by the `urdf-rs` library), and where the arm is a part of a robot the name of its last
+//! link. Leaves: a [`UrdfArm`]: the [`Arm`](super::Arm), the named frames on its bodies (flange, tool), the links of which these
+//! are made, and a list of everything that was assumed or left out on the way; or a [`UrdfFault`] that says what is wrong,
+//! where, and what to do.
 
+mod arm;
 mod chain;
 mod fault;
+mod joint;
+mod link;
+mod locked;
 mod notice;
+mod obstacle;
 mod read;
 #[cfg(test)]
 mod tests;
+mod tree;
 mod unreadable;
 
+pub use arm::{FixedFrame, Frames, UrdfArm, UrdfLink};
 pub use fault::UrdfFault;
+pub use locked::{LockedJoint, Stand};
 pub use notice::UrdfNotice;
-pub use read::{FixedFrame, Frames, UrdfArm, read_urdf};
+pub use obstacle::Obstacle;
+pub use read::{read_urdf, read_urdf_up_to};

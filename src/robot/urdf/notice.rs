@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use super::locked::LockedJoint;
+
 /// Something a URDF does not say, or says in a way that had to be interpreted.
 #[derive(Debug, Clone, PartialEq)]
 pub enum UrdfNotice {
@@ -11,7 +13,21 @@ pub enum UrdfNotice {
         root: String,
     },
     /// URDF has no drives: rotor inertia 0, gear ratio 1, torque constant 1 Nm/A.
-    Drives,
+    Drives {
+        /// The joints without rotor inertia.
+        rotor_inertia: Vec<String>,
+        /// The joints without gear ratio.
+        gear_ratio: Vec<String>,
+        /// The joints without torque constant.
+        torque_constant: Vec<String>,
+    },
+    /// Joints that are not on the way to the arm's last link do not move.
+    Locked {
+        /// These, and where they stand.
+        joints: Vec<LockedJoint>,
+        /// The last link.
+        last: String,
+    },
     /// Neither damping nor friction is given.
     NoFriction {
         /// The joints without.
@@ -24,7 +40,7 @@ pub enum UrdfNotice {
         /// As written.
         files: Vec<String>,
     },
-    /// The drive file beside the URDF was read: rotor inertias, friction, gears, gravity, bounds.
+    /// The drive file beside the URDF was read: what it gives of rotor inertias, friction, gears, gravity, bounds.
     DriveFile {
         /// The file.
         file: String,
@@ -95,15 +111,13 @@ pub enum UrdfNotice {
 }
 
 impl UrdfNotice {
-    /// Whether a drive file says what the URDF left open.
-    pub fn is_settled_by_drive_file(&self) -> bool {
-        matches!(
-            self,
-            Self::Gravity { .. }
-                | Self::Drives
-                | Self::NoFriction { .. }
-                | Self::AssumedAcceleration { .. }
-        )
+    /// Names of the joints that it calls locked.
+    pub(in crate::robot) fn locked(&self) -> impl Iterator<Item = &str> {
+        let joints = match self {
+            Self::Locked { joints, .. } => joints.as_slice(),
+            _ => &[],
+        };
+        joints.iter().map(|joint| joint.name.as_str())
     }
 }
 
@@ -113,10 +127,40 @@ impl fmt::Display for UrdfNotice {
             Self::Gravity { root } => {
                 write!(f, "gravity is taken as 9.81 m/s2 along -z of the root link \"{root}\"")
             }
-            Self::Drives => write!(
-                f,
-                "URDF has no drives: rotor inertia 0, gear ratio 1, torque constant 1 Nm/A (a current column reads as joint torque)"
-            ),
+            Self::Drives { rotor_inertia, gear_ratio, torque_constant }
+                if rotor_inertia == gear_ratio && gear_ratio == torque_constant =>
+            {
+                write!(
+                    f,
+                    "URDF has no drives: rotor inertia 0, gear ratio 1, torque constant 1 Nm/A (a current column reads as joint torque): {}",
+                    gear_ratio.join(", ")
+                )
+            }
+            Self::Drives { rotor_inertia, gear_ratio, torque_constant } => {
+                let open = [
+                    ("rotor inertia", "0", rotor_inertia),
+                    ("gear ratio", "1", gear_ratio),
+                    ("torque constant", "1 Nm/A", torque_constant),
+                ];
+                let words: Vec<String> = open
+                    .iter()
+                    .filter(|(_, _, joints)| !joints.is_empty())
+                    .map(|(what, value, joints)| {
+                        format!("no {what} given, taken as {value}: {}", joints.join(", "))
+                    })
+                    .collect();
+                write!(f, "{}", words.join("; "))
+            }
+            Self::Locked { joints, last } => {
+                let (noun, verb) =
+                    if joints.len() == 1 { ("joint", "is") } else { ("joints", "are") };
+                let joints: Vec<String> = joints.iter().map(ToString::to_string).collect();
+                let joints = joints.join(", ");
+                write!(
+                    f,
+                    "{noun} {joints} {verb} not on the way to link \"{last}\": taken as locked there, links behind count in the body that carries them"
+                )
+            }
             Self::NoFriction { joints } => {
                 write!(f, "no damping and no friction given, taken as 0: {}", joints.join(", "))
             }
@@ -126,13 +170,13 @@ impl fmt::Display for UrdfNotice {
             ),
             Self::MissingMeshes { files } => write!(
                 f,
-                "{} mesh files are not there, such as {}: nothing is lost, shapes are not read and not exported",
+                "{} mesh files are not there, such as {}: nothing is lost, shapes are not read",
                 files.len(),
                 files.first().map_or("", String::as_str)
             ),
             Self::DriveFile { file } => write!(
                 f,
-                "rotor inertia, friction, gears, acceleration limits, bounds of the links and gravity are those of {file}; the values of torque offsets in it are left out"
+                "rotor inertia, friction, gears, acceleration limits, bounds of the links and gravity are those of {file}, as far as it gives them; values of torque offsets in it are left out"
             ),
             Self::Continuous { joint } => {
                 write!(f, "joint \"{joint}\" has no end stops: taken as -2 pi to 2 pi")

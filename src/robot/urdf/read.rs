@@ -1,68 +1,28 @@
 //! From the chain of a URDF to an [`Arm`].
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
-use nalgebra::{Matrix3, Vector3};
-use urdf_rs::{Geometry, Inertial, JointType, Link, Pose};
+use nalgebra::Vector3;
+use urdf_rs::{Geometry, Pose, Robot};
 
-use super::chain::{Body, bodies};
-use super::fault::UrdfFault;
+use super::arm::{FixedFrame, Frames, UrdfArm, UrdfLink};
+use super::chain::{Body, all_joints, bodies, joints_up_to};
+use super::fault::{UrdfFault, finite, quoted};
+use super::joint::{ASSUMED_ACCELERATION_RAD_S2, drive};
+use super::locked::{LockedJoint, locked_joints};
 use super::notice::UrdfNotice;
+use super::tree::Tree;
 use super::unreadable;
-use crate::robot::arm::{Arm, Clearance, Drive, Joint, Limits, LinkBounds, Placement};
+use crate::robot::arm::{Arm, Clearance, Joint, LinkBounds, Placement};
 use crate::robot::error::RobotError;
 use crate::robot::file::default_epsilon;
 use crate::robot::inertia::LinkInertia;
 
-/// Speed limit where the file gives none: 180 °/s, usual for arms of this size.
-const ASSUMED_VELOCITY_RAD_S: f64 = PI;
-/// Acceleration limit where the file gives none; the built-in arms' as well.
-const ASSUMED_ACCELERATION_RAD_S2: f64 = 10.0;
 /// Half of the last of four decimals: files print 1.5708 and 3.1416.
 const RIGHT_ANGLE_RAD: f64 = 5e-5;
 /// Below this a right angle is only written with many digits: at the end of an arm of 2 m it is off by 2 nm.
 const WORTH_SAYING_RAD: f64 = 1e-9;
-/// Axes such as (0.577, 0.577, 0.577) have unit length to three digits.
-const AXIS_LENGTH: f64 = 1e-3;
-
-/// An arm read from a URDF.
-#[derive(Debug, Clone, PartialEq)]
-pub struct UrdfArm {
-    /// The arm.
-    pub arm: Arm,
-    /// Named links without mass on the bodies: flange, tool0.
-    pub frames: Frames,
-    /// What was assumed, merged or left out, in words by `Display`.
-    pub notices: Vec<UrdfNotice>,
-}
-
-/// Named frames of an arm.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Frames {
-    /// Name of the base frame: the root link.
-    pub root: String,
-    /// All others.
-    pub fixed: Vec<FixedFrame>,
-}
-
-/// No frame but the base, "base_link".
-impl Default for Frames {
-    fn default() -> Self {
-        Self { root: "base_link".into(), fixed: Vec::new() }
-    }
-}
-
-/// A named frame fixed in a body.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FixedFrame {
-    /// The link's name.
-    pub name: String,
-    /// 0 = base, i = body of joint i (1-based).
-    pub body: usize,
-    /// Its pose in the body's joint frame (base frame for body 0).
-    pub placement: Placement,
-}
 
 /// Reads the text of a URDF; `source` names it in messages.
 ///
@@ -71,8 +31,8 @@ pub struct FixedFrame {
 /// - **Base frame**: the root link. Links ahead of the first moving joint are folded into that
 ///   joint's placement; their inertia never moves and is left out.
 /// - **Joints**: revolute and continuous, one chain. A continuous joint is given ±2π rad, the range
-///   of an arm with cables in it. Prismatic, floating, planar, spherical and mimic joints, branches
-///   with moving joints and closed chains are refused.
+///   of an arm with cables in it. Prismatic, floating, planar, spherical and mimic joints and branches
+///   with moving joints are refused here, and locked by [`read_urdf_up_to`]; closed chains are refused.
 /// - **Fixed joints** merge the child link into the body in front of it: the inertia is added.
 ///   Links without mass on a body (flange, tool0) become named frames.
 /// - **Joint frames**: origin at the URDF joint, z along its axis a. With a in the link frame, our
@@ -91,6 +51,22 @@ pub struct FixedFrame {
 /// [`RobotError::Urdf`] where it is no URDF, [`RobotError::UrdfArm`] where it is one, but not of a
 /// serial arm of physically possible bodies.
 pub fn read_urdf(text: &str, source: &str) -> Result<UrdfArm, RobotError> {
+    read(text, source, None)
+}
+
+/// As [`read_urdf`], of an arm that ends with the link `last_link`, whatever else is on the robot.
+///
+/// The moving joints on the way from the root link to that one are the arm's. All others are locked, and their links belong to
+/// the body that carries them: a joint stands at zero, or at the limit nearest to zero where it does not reach it; one that
+/// mimics another where that has it; a floating, planar or spherical joint at its origin.
+///
+/// # Errors
+/// As [`read_urdf`], and where there is no such link, or what moves it are not revolute and continuous joints of their own.
+pub fn read_urdf_up_to(text: &str, source: &str, last_link: &str) -> Result<UrdfArm, RobotError> {
+    read(text, source, Some(last_link))
+}
+
+fn read(text: &str, source: &str, last_link: Option<&str>) -> Result<UrdfArm, RobotError> {
     let robot = urdf_rs::read_from_string(text.trim_start_matches('\u{feff}')).map_err(|e| {
         RobotError::Urdf {
             file: source.to_owned(),
@@ -98,8 +74,8 @@ pub fn read_urdf(text: &str, source: &str) -> Result<UrdfArm, RobotError> {
         }
     })?;
     let mut reader = Reader::default();
-    let (root, joints) = bodies(&robot)
-        .and_then(|chain| Ok((chain[0].links[0].0.name.clone(), reader.joints(&chain)?)))
+    let (root, joints) = reader
+        .arm(&robot, source, last_link)
         .map_err(|fault| RobotError::UrdfArm { file: source.to_owned(), fault })?;
     let files = missing_meshes(&robot, source);
     if !files.is_empty() {
@@ -115,12 +91,13 @@ pub fn read_urdf(text: &str, source: &str) -> Result<UrdfArm, RobotError> {
             clearance: Clearance::default(),
         },
         frames: Frames { root, fixed: reader.frames },
+        links: reader.links,
         notices: reader.notices,
     })
 }
 
 /// Mesh files that cannot be found from the folder of `source`, each once.
-fn missing_meshes(robot: &urdf_rs::Robot, source: &str) -> Vec<String> {
+fn missing_meshes(robot: &Robot, source: &str) -> Vec<String> {
     let folder = Path::new(source).parent().unwrap_or(Path::new(""));
     let shapes = robot.links.iter().flat_map(|link| {
         let visual = link.visual.iter().map(|visual| &visual.geometry);
@@ -140,17 +117,49 @@ fn missing_meshes(robot: &urdf_rs::Robot, source: &str) -> Vec<String> {
 
 /// What accumulates beside the joints.
 #[derive(Default)]
-struct Reader {
+pub(super) struct Reader {
+    /// Joints that are not the arm's.
+    pub(super) locked: Vec<LockedJoint>,
     frames: Vec<FixedFrame>,
-    notices: Vec<UrdfNotice>,
+    links: Vec<UrdfLink>,
+    pub(super) notices: Vec<UrdfNotice>,
 }
 
 impl Reader {
+    /// Name of the root link, and the joints of the arm that ends with `last_link`, or that has all moving joints.
+    fn arm(
+        &mut self,
+        robot: &Robot,
+        source: &str,
+        last_link: Option<&str>,
+    ) -> Result<(String, Vec<Joint>), UrdfFault> {
+        let tree = Tree::of(robot)?;
+        let moving = match last_link {
+            Some(last) => joints_up_to(&tree, last)?,
+            None => all_joints(&tree, source)?,
+        };
+        self.locked = locked_joints(&tree, &moving)?;
+        if let Some(last) = last_link
+            && !self.locked.is_empty()
+        {
+            let (joints, last) = (self.locked.clone(), last.to_owned());
+            self.notices.push(UrdfNotice::Locked { joints, last });
+        }
+        let joints = self.joints(&bodies(&tree, &moving))?;
+        Ok((tree.root().name.clone(), joints))
+    }
+
     fn joints(&mut self, chain: &[Body<'_>]) -> Result<Vec<Joint>, UrdfFault> {
         let root = chain[0].links[0].0.name.clone();
+        let moving = chain.iter().filter_map(|body| body.joint);
+        let names: Vec<String> = moving.map(|joint| joint.name.clone()).collect();
         self.notices.extend([
             UrdfNotice::Gravity { root },
-            UrdfNotice::Drives,
+            UrdfNotice::Drives {
+                rotor_inertia: names.clone(),
+                gear_ratio: names.clone(),
+                torque_constant: names,
+            },
             UrdfNotice::NoClearance,
         ]);
         let mut joints: Vec<Joint> = Vec::with_capacity(chain.len() - 1);
@@ -199,7 +208,11 @@ impl Reader {
                 Some((joint, parent)) => {
                     let place = quoted("joint", &joint.name);
                     let origin = self.placement(&joint.origin, &place)?;
-                    poses[*parent].compose(&origin)
+                    let pose = poses[*parent].compose(&origin);
+                    match self.displacement(joint)? {
+                        Some(displacement) => pose.compose(&displacement),
+                        None => pose,
+                    }
                 }
             };
             poses.push(pose);
@@ -217,7 +230,8 @@ impl Reader {
     ) -> Result<LinkInertia, UrdfFault> {
         let mut sum = LinkInertia::zero();
         for ((link, held), pose) in body.links.iter().zip(poses) {
-            match self.link_inertia(link)? {
+            let own = self.link_inertia(link)?;
+            match own {
                 Some(part) => {
                     sum = sum.plus(&part.transformed(pose));
                     if held.is_some() {
@@ -235,6 +249,13 @@ impl Reader {
                 }),
                 None => {}
             }
+            self.links.push(UrdfLink {
+                name: link.name.clone(),
+                body: number,
+                placement: *pose,
+                inertia: own,
+                is_first: held.is_none(),
+            });
         }
         if sum.mass_kg() > 0.0 {
             return Ok(sum);
@@ -246,6 +267,10 @@ impl Reader {
     /// Links that never move: only their frames and a remark on their mass remain.
     fn standing(&mut self, body: &Body<'_>, poses: &[Placement]) {
         for ((link, held), pose) in body.links.iter().zip(poses) {
+            // What is wrong or odd about the moments of such a link does not matter.
+            let remarks = self.notices.len();
+            let inertia = self.link_inertia(link).ok().flatten();
+            self.notices.truncate(remarks);
             let mass_kg = link.inertial.mass.value;
             if mass_kg != 0.0 {
                 self.notices.push(UrdfNotice::StandingMass { link: link.name.clone(), mass_kg });
@@ -253,65 +278,18 @@ impl Reader {
             if held.is_some() {
                 self.frames.push(FixedFrame { name: link.name.clone(), body: 0, placement: *pose });
             }
+            self.links.push(UrdfLink {
+                name: link.name.clone(),
+                body: 0,
+                placement: *pose,
+                inertia,
+                is_first: held.is_none(),
+            });
         }
-    }
-
-    /// A link's inertia about its own frame; `None` for one without mass.
-    fn link_inertia(&mut self, link: &Link) -> Result<Option<LinkInertia>, UrdfFault> {
-        let Inertial { origin, mass, inertia: i } = &link.inertial;
-        let place = quoted("link", &link.name);
-        let tensor = [
-            ("ixx", i.ixx),
-            ("ixy", i.ixy),
-            ("ixz", i.ixz),
-            ("iyy", i.iyy),
-            ("iyz", i.iyz),
-            ("izz", i.izz),
-        ];
-        finite(&place, "mass", mass.value)?;
-        for (quantity, value) in tensor {
-            finite(&place, quantity, value)?;
-        }
-        if mass.value < 0.0 {
-            return Err(UrdfFault::Negative { place, quantity: "mass", value: mass.value });
-        }
-        if mass.value == 0.0 {
-            let empty = tensor.iter().all(|(_, value)| *value == 0.0);
-            let fault = UrdfFault::InertiaWithoutMass { link: link.name.clone() };
-            return if empty { Ok(None) } else { Err(fault) };
-        }
-        let central = Matrix3::new(i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz);
-        possible(&link.name, &central)?;
-        let frame = self.placement(origin, &place)?;
-        let turned = frame.rotation * central * frame.rotation.transpose();
-        Ok(Some(LinkInertia::from_com(mass.value, frame.translation_m, turned)))
-    }
-
-    /// S of [`read_urdf`]: takes ẑ to the joint's axis.
-    fn axis_to_z(&mut self, joint: &urdf_rs::Joint) -> Result<Placement, UrdfFault> {
-        let written = *joint.axis.xyz;
-        for value in written {
-            finite(&quoted("joint", &joint.name), "axis", value)?;
-        }
-        let length = Vector3::from(written).norm();
-        if (length - 1.0).abs() > AXIS_LENGTH {
-            let joint = joint.name.clone();
-            return Err(UrdfFault::Axis { joint, axis: written, length });
-        }
-        if (length - 1.0).abs() > 4.0 * f64::EPSILON {
-            self.notices.push(UrdfNotice::AxisNormalised { joint: joint.name.clone(), length });
-        }
-        let axis = Vector3::from(written) / length;
-        let rotation = rotation_from_z(axis);
-        if rotation != Matrix3::identity() {
-            let joint = joint.name.clone();
-            self.notices.push(UrdfNotice::Reoriented { joint, axis: written });
-        }
-        Ok(Placement { rotation, translation_m: Vector3::zeros() })
     }
 
     /// A pose of the file, its angles freed from the rounding of right angles.
-    fn placement(&mut self, pose: &Pose, place: &str) -> Result<Placement, UrdfFault> {
+    pub(super) fn placement(&mut self, pose: &Pose, place: &str) -> Result<Placement, UrdfFault> {
         for value in *pose.xyz {
             finite(place, "xyz", value)?;
         }
@@ -332,49 +310,6 @@ impl Reader {
             }
         }
         Ok(Placement::from_xyz_rpy(*pose.xyz, rpy_rad))
-    }
-
-    fn limits(&mut self, joint: &urdf_rs::Joint) -> Result<Limits, UrdfFault> {
-        let name = || joint.name.clone();
-        let limit = &joint.limit;
-        for (quantity, value) in [
-            ("lower", limit.lower),
-            ("upper", limit.upper),
-            ("effort", limit.effort),
-            ("velocity", limit.velocity),
-            ("acceleration", limit.acceleration),
-        ] {
-            let place = quoted("joint", &joint.name);
-            if value.is_nan() {
-                return Err(UrdfFault::NotFinite { place, quantity, value });
-            }
-            if value < 0.0 && quantity != "lower" && quantity != "upper" {
-                return Err(UrdfFault::Negative { place, quantity, value });
-            }
-        }
-        let unlimited = limit.lower == f64::NEG_INFINITY && limit.upper == f64::INFINITY;
-        let position_rad = if joint.joint_type == JointType::Continuous || unlimited {
-            self.notices.push(UrdfNotice::Continuous { joint: name() });
-            [-TAU, TAU]
-        } else if limit.lower < limit.upper && (limit.upper - limit.lower).is_finite() {
-            [limit.lower, limit.upper]
-        } else {
-            let (lower_rad, upper_rad) = (limit.lower, limit.upper);
-            return Err(UrdfFault::Range { joint: name(), lower_rad, upper_rad });
-        };
-        // Zero is how files without the number come out, and how many write "unknown".
-        let given = |value: f64| (value > 0.0 && value.is_finite()).then_some(value);
-        let velocity_rad_s = given(limit.velocity).unwrap_or_else(|| {
-            let velocity_rad_s = ASSUMED_VELOCITY_RAD_S;
-            self.notices.push(UrdfNotice::AssumedVelocity { joint: name(), velocity_rad_s });
-            velocity_rad_s
-        });
-        let torque_nm = given(limit.effort).unwrap_or_else(|| {
-            self.notices.push(UrdfNotice::NoTorqueLimit { joint: name() });
-            f64::INFINITY
-        });
-        let acceleration_rad_s2 = given(limit.acceleration).unwrap_or(ASSUMED_ACCELERATION_RAD_S2);
-        Ok(Limits { position_rad, velocity_rad_s, acceleration_rad_s2, torque_nm })
     }
 
     /// The remarks that concern several joints at once.
@@ -400,65 +335,4 @@ impl Reader {
             });
         }
     }
-}
-
-fn drive(joint: &urdf_rs::Joint) -> Result<Drive, UrdfFault> {
-    let (damping, friction) =
-        joint.dynamics.as_ref().map_or((0.0, 0.0), |d| (d.damping, d.friction));
-    for (quantity, value) in [("damping", damping), ("friction", friction)] {
-        let place = quoted("joint", &joint.name);
-        finite(&place, quantity, value)?;
-        if value < 0.0 {
-            return Err(UrdfFault::Negative { place, quantity, value });
-        }
-    }
-    Ok(Drive {
-        rotor_inertia_kg_m2: 0.0,
-        viscous_nm_s_rad: damping,
-        coulomb_nm: friction,
-        gear_ratio: 1.0,
-        torque_constant_nm_a: 1.0,
-    })
-}
-
-/// Positive principal moments that obey the triangle inequality, or what is wrong with them.
-fn possible(link: &str, central: &Matrix3<f64>) -> Result<(), UrdfFault> {
-    let mut principal_kg_m2: [f64; 3] = central.symmetric_eigenvalues().into();
-    principal_kg_m2.sort_by(f64::total_cmp);
-    let [small, middle, large] = principal_kg_m2;
-    let link = link.to_owned();
-    if small <= 0.0 {
-        Err(UrdfFault::NotPositiveDefinite { link, principal_kg_m2 })
-    } else if small + middle <= large {
-        Err(UrdfFault::Triangle { link, principal_kg_m2 })
-    } else {
-        Ok(())
-    }
-}
-
-/// The rotation that takes ẑ to the unit vector `axis`, exact for the coordinate axes.
-///
-/// For a_z ≥ 0 the smallest one, 1 + [v] + [v]²/(1 + a_z) with v = ẑ × a (Rodrigues); below the
-/// xy plane π about x comes first, so that the denominator never vanishes.
-fn rotation_from_z(axis: Vector3<f64>) -> Matrix3<f64> {
-    let smallest = |a: Vector3<f64>| {
-        let v = Vector3::z().cross(&a).cross_matrix();
-        Matrix3::identity() + v + v * v / (1.0 + a.z)
-    };
-    if axis.z >= 0.0 {
-        smallest(axis)
-    } else {
-        smallest(-axis) * Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0))
-    }
-}
-
-fn finite(place: &str, quantity: &'static str, value: f64) -> Result<(), UrdfFault> {
-    if value.is_finite() {
-        return Ok(());
-    }
-    Err(UrdfFault::NotFinite { place: place.to_owned(), quantity, value })
-}
-
-fn quoted(kind: &str, name: &str) -> String {
-    format!("{kind} \"{name}\"")
 }

@@ -1,5 +1,7 @@
 //! Each fault and each interpretation on a URDF of a few lines.
 
+mod locked;
+
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use approx::assert_abs_diff_eq;
@@ -69,7 +71,7 @@ fn says(text: &str, parts: &[&str]) {
 
 #[test]
 fn a_plain_chain_is_read_as_written() {
-    let UrdfArm { arm, frames, notices } = read(&robot(&two_joints()));
+    let UrdfArm { arm, frames, notices, .. } = read(&robot(&two_joints()));
     assert_eq!(arm.name, "toy");
     assert_eq!(arm.dof(), 2);
     assert!(frames.root == "base" && frames.fixed.is_empty());
@@ -86,7 +88,10 @@ fn a_plain_chain_is_read_as_written() {
         assert_abs_diff_eq!(*actual, expected, epsilon = 1e-15);
     }
     assert!(notices.contains(&UrdfNotice::Gravity { root: "base".into() }));
-    assert!(notices.contains(&UrdfNotice::Drives));
+    let all = || vec!["j1".to_owned(), "j2".to_owned()];
+    let drives =
+        UrdfNotice::Drives { rotor_inertia: all(), gear_ratio: all(), torque_constant: all() };
+    assert!(notices.contains(&drives));
 }
 
 #[test]
@@ -102,7 +107,7 @@ fn damping_and_friction_are_viscous_and_coulomb() {
 
 #[test]
 fn links_ahead_of_the_first_joint_are_folded_into_its_placement() {
-    let UrdfArm { arm, frames, notices } = read(&with(&[
+    let UrdfArm { arm, frames, notices, .. } = read(&with(&[
         link("world", ""),
         joint(
             "fix",
@@ -122,7 +127,7 @@ fn links_ahead_of_the_first_joint_are_folded_into_its_placement() {
 
 #[test]
 fn a_fixed_link_with_mass_is_merged_and_one_without_becomes_a_frame() {
-    let UrdfArm { arm, frames, notices } = read(&with(&[
+    let UrdfArm { arm, frames, notices, .. } = read(&with(&[
         link("gripper", BODY),
         joint("mount", "fixed", "b", "gripper", r#"<origin xyz="0 0 1" rpy="0 0 3.14159265359"/>"#),
         link("tool0", ""),
@@ -292,7 +297,7 @@ fn an_axis_printed_to_three_digits_is_normalised_and_said() {
 fn joints_that_do_not_rotate_are_refused() {
     for kind in ["prismatic", "floating", "planar"] {
         let text = with(&[link("c", BODY), joint("j3", kind, "b", "c", LIMIT)]);
-        says(&text, &["\"j3\"", kind, "fixed"]);
+        says(&text, &["toy.urdf#b", &format!("joint \"j3\" is {kind}")]);
     }
 }
 
@@ -300,13 +305,13 @@ fn joints_that_do_not_rotate_are_refused() {
 fn a_mimic_joint_is_refused() {
     let inside = format!(r#"{LIMIT}<mimic joint="j1"/>"#);
     let text = with(&[link("c", BODY), joint("j3", "revolute", "b", "c", &inside)]);
-    says(&text, &["\"j3\"", "mimics \"j1\""]);
+    says(&text, &["\"j3\"", "mimics \"j1\"", "toy.urdf#b"]);
 }
 
 #[test]
 fn a_branch_that_moves_is_refused() {
     let text = with(&[link("c", BODY), joint("j3", "revolute", "a", "c", LIMIT)]);
-    says(&text, &["branches", "\"j2\"", "\"j3\""]);
+    says(&text, &["branches behind \"a\"", "\"j2\", \"j3\"", "toy.urdf#b"]);
 }
 
 #[test]

@@ -1,0 +1,182 @@
+//! Ways in which a log can have been recorded otherwise than it is read.
+
+use std::f64::consts::FRAC_PI_2;
+use std::fmt;
+
+use nalgebra::Vector3;
+use serde::Serialize;
+
+use crate::robot::Arm;
+
+/// One difference between how a log is read and how it was recorded; joints are 0-based.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Change {
+    /// Angle, velocity and torque of one joint stand in the columns of the other: ROS sorts joints by name.
+    JointsExchanged {
+        /// Both.
+        #[serde(serialize_with = "from_one")]
+        joints: [usize; 2],
+    },
+    /// The torques alone do.
+    TorquesExchanged {
+        /// Both.
+        #[serde(serialize_with = "from_one")]
+        joints: [usize; 2],
+    },
+    /// Angles and velocities alone do.
+    MotionsExchanged {
+        /// Both.
+        #[serde(serialize_with = "from_one")]
+        joints: [usize; 2],
+    },
+    /// The torque drives against positive velocity.
+    TorqueReversed {
+        /// Whose.
+        #[serde(serialize_with = "from_one")]
+        joints: [usize; 1],
+    },
+    /// All torques do: they are what the load does to the drives.
+    AllTorquesReversed,
+    /// Angle, velocity and torque count the other way than the description's axis.
+    JointReversed {
+        /// Whose.
+        #[serde(serialize_with = "from_one")]
+        joints: [usize; 1],
+    },
+    /// Angle and velocity do, the torque does not.
+    MotionReversed {
+        /// Whose.
+        #[serde(serialize_with = "from_one")]
+        joints: [usize; 1],
+    },
+    /// The angle is counted from a zero that is quarter turns away from the description's.
+    ZeroTurned {
+        /// Whose.
+        #[serde(serialize_with = "from_one")]
+        joints: [usize; 1],
+        /// What has to be added to the angles, rad.
+        add_rad: f64,
+    },
+    /// The arm hangs, or stands on a wall.
+    Mounted {
+        /// Gravity in the base frame, m/s².
+        gravity_m_s2: [f64; 3],
+    },
+}
+
+fn from_one<S: serde::Serializer, const N: usize>(
+    joints: &[usize; N],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(joints.iter().map(|j| j + 1))
+}
+
+/// Gravity that is within this of the description's direction is the description's.
+const SAME_DIRECTION: f64 = 0.99;
+
+impl Change {
+    /// All that are looked for.
+    pub(super) fn all(arm: &Arm) -> Vec<Self> {
+        let joints = 0..arm.dof();
+        let pairs = joints.clone().flat_map(|a| (a + 1..arm.dof()).map(move |b| [a, b]));
+        let of_pairs = pairs.flat_map(|joints| {
+            [
+                Self::JointsExchanged { joints },
+                Self::TorquesExchanged { joints },
+                Self::MotionsExchanged { joints },
+            ]
+        });
+        let of_joints = joints.flat_map(|j| {
+            let joints = [j];
+            let turned = |add_rad| Self::ZeroTurned { joints, add_rad };
+            [
+                Self::TorqueReversed { joints },
+                Self::JointReversed { joints },
+                Self::MotionReversed { joints },
+                turned(FRAC_PI_2),
+                turned(-FRAC_PI_2),
+                turned(2.0 * FRAC_PI_2),
+            ]
+        });
+        let mounted =
+            other_gravity(arm).into_iter().map(|gravity_m_s2| Self::Mounted { gravity_m_s2 });
+        of_pairs.chain(of_joints).chain(mounted).chain([Self::AllTorquesReversed]).collect()
+    }
+
+    /// Whether a channel of joint `j` is read otherwise.
+    pub(super) fn is_about(&self, j: usize) -> bool {
+        match self {
+            Self::JointsExchanged { joints }
+            | Self::TorquesExchanged { joints }
+            | Self::MotionsExchanged { joints } => joints.contains(&j),
+            Self::TorqueReversed { joints }
+            | Self::JointReversed { joints }
+            | Self::MotionReversed { joints }
+            | Self::ZeroTurned { joints, .. } => joints.contains(&j),
+            Self::AllTorquesReversed | Self::Mounted { .. } => true,
+        }
+    }
+
+    /// What to do, in a sentence.
+    pub(super) fn remedy(&self) -> &'static str {
+        match self {
+            Self::JointsExchanged { .. }
+            | Self::TorquesExchanged { .. }
+            | Self::MotionsExchanged { .. } => {
+                "List the columns in the order of the arm's joints in a layout ([columns], --layout)."
+            }
+            Self::TorqueReversed { .. }
+            | Self::AllTorquesReversed
+            | Self::JointReversed { .. }
+            | Self::MotionReversed { .. }
+            | Self::ZeroTurned { .. } => {
+                "Say so in a layout ([joints], --layout), or turn the joint in the description of the robot."
+            }
+            Self::Mounted { .. } => "Say how the arm is mounted in its robot file (gravity_m_s2).",
+        }
+    }
+}
+
+/// Gravity along the axes of the base frame, as strong as described and elsewhere.
+pub(super) fn other_gravity(arm: &Arm) -> Vec<[f64; 3]> {
+    let described = arm.gravity_m_s2;
+    let g = described.norm();
+    let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+    let directions = axes.iter().flat_map(|axis| [*axis, -axis]);
+    let others = directions.filter(|d| g > 0.0 && d.dot(&described) < SAME_DIRECTION * g);
+    // −0 + 0 = 0: no minus sign in front of nothing.
+    others.map(|direction| (direction * g).add_scalar(0.0).into()).collect()
+}
+
+impl fmt::Display for Change {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::JointsExchanged { joints: [a, b] } => {
+                write!(f, "the columns of joints {} and {} exchanged", a + 1, b + 1)
+            }
+            Self::TorquesExchanged { joints: [a, b] } => {
+                write!(f, "the torques of joints {} and {} exchanged", a + 1, b + 1)
+            }
+            Self::MotionsExchanged { joints: [a, b] } => {
+                write!(f, "angles and velocities of joints {} and {} exchanged", a + 1, b + 1)
+            }
+            Self::TorqueReversed { joints: [j] } => {
+                write!(f, "the torque of joint {} reversed", j + 1)
+            }
+            Self::AllTorquesReversed => write!(f, "the torques of all joints reversed"),
+            Self::JointReversed { joints: [j] } => {
+                write!(f, "angle, velocity and torque of joint {} reversed", j + 1)
+            }
+            Self::MotionReversed { joints: [j] } => {
+                write!(f, "angle and velocity of joint {} reversed", j + 1)
+            }
+            Self::ZeroTurned { joints: [j], add_rad } => {
+                write!(f, "{:+.0}° added to the angle of joint {}", add_rad.to_degrees(), j + 1)
+            }
+            Self::Mounted { gravity_m_s2: [x, y, z] } => {
+                write!(f, "gravity_m_s2 = [{x:.2}, {y:.2}, {z:.2}]")
+            }
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! Whether a log fits its arm when it is read otherwise: columns in another order, signs, zeros, mounting.
+//!
+//! A mistake in the description of a log leaves no rigid body, no friction and no drive as it is, and what a diagnosis would find of
+//! it is nonsense of great certainty. Of the few ways in which logs and descriptions of arms differ in practice ([`Change`])
+//! those are looked for that make the model fit, one after the other, each time the one that gains most:
+//!
+//! minimise Σ_j ln (‖e_j‖² / ‖τ_j‖²),   the likelihood of torques whose noise is not known, joint by joint,
+//!
+//! e_j the residual of the full set of base parameters, and ten times as large where Coulomb friction comes out as something that
+//! pushes. Parameters cannot stand in for the changes, so that the right ones are told by a residual that falls by far more than any law
+//! of friction takes from it.
+//!
+//! Enters: the arm and a log laid out for regression. Leaves: a [`Misreading`], or nothing.
+
+mod change;
+mod reading;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+pub use change::Change;
+pub use reading::Match;
+
+use super::identifier::Regression;
+use super::options::Options;
+use crate::robot::Arm;
+use reading::{Bench, Reading};
+
+/// A log that fits its arm when it is read otherwise.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Misreading {
+    /// How it has to be read, in the order of what each gains.
+    pub changes: Vec<Change>,
+    /// How well the arm fits the log as it is read.
+    pub as_read: Match,
+    /// How well with the changes.
+    pub otherwise: Match,
+}
+
+/// Share of the torque (rms) up to which the model explains a joint, whatever is read otherwise.
+const EXPLAINED: f64 = 0.03;
+/// Least gain of a change, in Σ ln (‖e_j‖² / ‖τ_j‖²): one joint's residual halves.
+const LEAST_GAIN: f64 = 1.4;
+/// Factor by which the rms residual of a joint has to fall for every joint that is read otherwise, and that of one joint at
+/// least: laws of friction and soft gears bring 1.5 on real arms, and wrong changes take more elsewhere than they bring.
+const FALLS: f64 = 3.0;
+/// Factor by which that of another joint may grow, which is noise.
+const GROWS: f64 = 1.2;
+
+impl Misreading {
+    /// Of the log in `regression` (the first of several); `None` where the model explains it, or no change makes it.
+    pub fn of(arm: &Arm, regression: &Regression, options: &Options) -> Option<Self> {
+        let mut reading = Reading::of(regression, options)?;
+        let mut bench = Bench::new(arm)?;
+        let as_read = bench.fit(&reading)?;
+        let is_explained = as_read.left.iter().all(|share| *share < EXPLAINED);
+        if is_explained && !as_read.friction_pushes.contains(&true) {
+            return None;
+        }
+        bench.add_mountings(arm);
+        let possible = Change::all(arm);
+        let mut otherwise = as_read.clone();
+        let mut changes: Vec<Change> = Vec::new();
+        while changes.len() < arm.dof() {
+            let tried = possible.par_iter().filter_map(|change| {
+                let changed = reading.with(*change);
+                let fit = bench.fit(&changed)?;
+                Some((*change, changed, fit))
+            });
+            let best = tried.min_by(|a, b| a.2.misfit().total_cmp(&b.2.misfit()));
+            let Some((change, changed, fit)) = best else { break };
+            if otherwise.misfit() - fit.misfit() < LEAST_GAIN {
+                break;
+            }
+            changes.push(change);
+            (reading, otherwise) = (changed, fit);
+        }
+        let found = Self { changes, as_read, otherwise };
+        found.is_convincing().then_some(found)
+    }
+
+    fn is_convincing(&self) -> bool {
+        let gain = |j: usize| 0.5 * (self.as_read.misfit_of(j) - self.otherwise.misfit_of(j));
+        let gains: Vec<f64> = (0..self.as_read.left.len()).map(gain).collect();
+        let largest = gains.iter().fold(0.0, |a: f64, gain| a.max(*gain));
+        let all: f64 = gains.iter().sum();
+        largest > FALLS.ln()
+            && all > FALLS.ln() * self.joints().len() as f64
+            && gains.iter().all(|gain| *gain > -GROWS.ln())
+    }
+
+    /// Joints (0-based) whose channels are read otherwise; all where the arm is mounted otherwise.
+    fn joints(&self) -> Vec<usize> {
+        let all = 0..self.as_read.left.len();
+        all.filter(|j| self.changes.iter().any(|change| change.is_about(*j))).collect()
+    }
+
+    /// What is wrong and how to put it right, in words.
+    pub fn sentence(&self) -> String {
+        let joints = self.joints();
+        let range = |fit: &Match| {
+            let shares = joints.iter().map(|j| 100.0 * fit.left[*j]);
+            let (low, high) = shares.fold((f64::INFINITY, 0f64), |(l, h), p| (l.min(p), h.max(p)));
+            match high - low < 0.05 {
+                true => format!("{high:.1} %"),
+                false => format!("{low:.1} to {high:.1} %"),
+            }
+        };
+        let pushed = (0..self.as_read.left.len()).filter(|j| self.as_read.friction_pushes[*j]);
+        let pushed: Vec<String> = pushed.map(|j| (j + 1).to_string()).collect();
+        let pushing = match pushed.len() {
+            0 => String::new(),
+            _ => format!(" (as it is read, friction pushes joint {})", pushed.join(", ")),
+        };
+        let mut remedies: Vec<&str> = Vec::new();
+        for remedy in self.changes.iter().map(Change::remedy) {
+            if !remedies.contains(&remedy) {
+                remedies.push(remedy);
+            }
+        }
+        let there = if joints.len() == self.as_read.left.len() { "" } else { " there" };
+        let pairs = self.as_read.left.iter().zip(&self.otherwise.left);
+        let gain = match pairs.into_iter().any(|(read, otherwise)| *read > GROWS * otherwise) {
+            true => format!(
+                "the model leaves {} of the torque{there} in place of {}{pushing}",
+                range(&self.otherwise),
+                range(&self.as_read)
+            ),
+            // Of an arm whose torques all have the other sign, parameters do as well.
+            false => format!("friction brakes{pushing}"),
+        };
+        format!(
+            "The log is not read as it was recorded: with {} {gain}. {}",
+            listed(&self.changes),
+            remedies.join(" ")
+        )
+    }
+}
+
+/// One, one and another, or a list with an "and" before its last.
+fn listed(changes: &[Change]) -> String {
+    let words: Vec<String> = changes.iter().map(Change::to_string).collect();
+    match &words[..] {
+        [all @ .., last] if !all.is_empty() => format!("{} and {last}", all.join(", ")),
+        words => words.concat(),
+    }
+}

@@ -1,0 +1,158 @@
+//! Identified numbers in the URDF that the arm came from.
+
+mod markup;
+mod share;
+#[cfg(test)]
+mod tests;
+
+use std::path::Path;
+
+use roxmltree::{Document, Node, ParsingOptions};
+use thiserror::Error;
+
+use self::markup::{Edits, Margins, child};
+use self::share::Share;
+use super::xml::{about_com, numbers, tensor};
+use super::{ExportError, check_numbers};
+use crate::robot::{Arm, Drive, LinkInertia, UrdfLink};
+
+pub use self::share::{Takeover, Unfit};
+
+/// A URDF with the numbers of another arm of its build.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OwnUrdf {
+    /// The file.
+    pub text: String,
+    /// Bodies of which one link has all, in words by `Display`.
+    pub takeovers: Vec<Takeover>,
+    /// A mesh that is looked for from the file's folder, where there is one.
+    pub relative_mesh: Option<String>,
+}
+
+/// A URDF that does not take the numbers of an arm.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum OwnUrdfError {
+    /// The arm cannot be written into any.
+    #[error(transparent)]
+    Arm(#[from] ExportError),
+    /// It is not XML to the letter.
+    #[error("{file}: cannot be rewritten, it is no proper XML: {message}; mend it there")]
+    Xml {
+        /// The file.
+        file: String,
+        /// The parser's message, with line and column.
+        message: String,
+    },
+    /// A link or joint of the arm is not in it.
+    #[error(
+        "{file}: the {kind} \"{name}\" is not there; give the file from which the arm was read"
+    )]
+    Missing {
+        /// The file.
+        file: String,
+        /// `link` or `joint`.
+        kind: &'static str,
+        /// Its name.
+        name: String,
+    },
+    /// No link is behind a joint.
+    #[error(
+        "{file}: no link of it is moved by joint \"{joint}\"; give the file from which the arm was read"
+    )]
+    NothingMoved {
+        /// The file.
+        file: String,
+        /// The joint.
+        joint: String,
+    },
+}
+
+/// The URDF `text` with the bodies and the friction of `arm`, which was read from it with these
+/// `links`; `source` names it in messages.
+///
+/// - `<inertial>`: one link of each body takes what the body has beyond the links fixed to it, which
+///   keep theirs: the link right behind the joint, or the first that has mass where that has none.
+///   Where no body can be what is left, it takes all, and the others lose their `<inertial>` (a
+///   [`Takeover`]).
+/// - `<dynamics>` of the arm's joints: `damping` is rv, `friction` is rc.
+/// - Everything else is the same, byte for byte. What a URDF has no place for is in the
+///   [`drive_file`](super::drive_file).
+///
+/// # Errors
+/// [`OwnUrdfError`] for an arm that could not run, and a text that is not the arm's URDF.
+pub fn own_urdf(
+    text: &str,
+    source: &str,
+    arm: &Arm,
+    links: &[UrdfLink],
+) -> Result<OwnUrdf, OwnUrdfError> {
+    check_numbers(arm)?;
+    let file = || source.to_owned();
+    // As in reading, a document type is passed over.
+    let options = ParsingOptions { allow_dtd: true, ..ParsingOptions::default() };
+    let document = Document::parse_with_options(text, options)
+        .map_err(|e| OwnUrdfError::Xml { file: file(), message: e.to_string() })?;
+    let robot = document.root_element();
+    let find = |kind: &'static str, name: &str| {
+        robot
+            .children()
+            .find(|node| node.has_tag_name(kind) && node.attribute("name") == Some(name))
+            .ok_or_else(|| OwnUrdfError::Missing { file: file(), kind, name: name.to_owned() })
+    };
+    let mut edits = Edits::new(text);
+    let mut takeovers = Vec::new();
+    for (number, joint) in arm.joints.iter().enumerate() {
+        let body: Vec<&UrdfLink> = links.iter().filter(|link| link.body == number + 1).collect();
+        let Some(share) = Share::of(joint, &body) else {
+            return Err(OwnUrdfError::NothingMoved { file: file(), joint: joint.name.clone() });
+        };
+        write_inertial(&mut edits, find("link", &share.bearer.name)?, &share.inertia);
+        for (name, _) in share.takeover.iter().flat_map(|takeover| &takeover.emptied) {
+            if let Some(inertial) = child(find("link", name)?, "inertial") {
+                edits.remove(inertial);
+            }
+        }
+        takeovers.extend(share.takeover);
+        write_dynamics(&mut edits, find("joint", &joint.name)?, &joint.drive);
+    }
+    let relative_mesh = robot
+        .descendants()
+        .filter(|node| node.has_tag_name("mesh"))
+        .filter_map(|mesh| mesh.attribute("filename"))
+        .find(|name| !name.contains("://") && !Path::new(name).is_absolute())
+        .map(str::to_owned);
+    Ok(OwnUrdf { text: edits.applied(), takeovers, relative_mesh })
+}
+
+fn write_inertial(edits: &mut Edits<'_>, link: Node<'_, '_>, inertia: &LinkInertia) {
+    let prefix = edits.prefix(link);
+    let write = |margins: &Margins| inertial(inertia, prefix, margins);
+    match child(link, "inertial") {
+        Some(old) => edits.replace(old, write),
+        None => edits.put_first(link, write),
+    }
+}
+
+/// The element, about the centre of mass in the link's axes.
+fn inertial(link: &LinkInertia, prefix: &str, Margins { own, inner }: &Margins) -> String {
+    let (mass_kg, com, central) = about_com(link);
+    format!(
+        "<{prefix}inertial>{inner}<{prefix}origin xyz=\"{}\" rpy=\"0 0 0\"/>{inner}<{prefix}mass value=\"{mass_kg}\"/>{inner}\
+         <{prefix}inertia {}/>{own}</{prefix}inertial>",
+        numbers(com.iter()),
+        tensor(&central)
+    )
+}
+
+fn write_dynamics(edits: &mut Edits<'_>, joint: Node<'_, '_>, drive: &Drive) {
+    let damping = numbers([&drive.viscous_nm_s_rad]);
+    let friction = numbers([&drive.coulomb_nm]);
+    match child(joint, "dynamics") {
+        Some(old) => edits.set_attributes(old, &[("damping", damping), ("friction", friction)]),
+        None => {
+            let prefix = edits.prefix(joint);
+            let new = format!("<{prefix}dynamics damping=\"{damping}\" friction=\"{friction}\"/>");
+            edits.put_last(joint, new);
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! What a URDF says of a moving joint: its axis, limits and friction.
+
+use std::f64::consts::{PI, TAU};
+
+use nalgebra::{Matrix3, Vector3};
+use urdf_rs::{Joint, JointType};
+
+use super::fault::{UrdfFault, finite, quoted};
+use super::notice::UrdfNotice;
+use super::read::Reader;
+use crate::robot::arm::{Drive, Limits, Placement};
+
+/// Speed limit where the file gives none: 180 °/s, usual for arms of this size.
+const ASSUMED_VELOCITY_RAD_S: f64 = PI;
+/// Acceleration limit where the file gives none; the built-in arms' as well.
+pub(super) const ASSUMED_ACCELERATION_RAD_S2: f64 = 10.0;
+/// Axes such as (0.577, 0.577, 0.577) have unit length to three digits.
+const AXIS_LENGTH: f64 = 1e-3;
+
+impl Reader {
+    /// S of [`read_urdf`](super::read_urdf): takes ẑ to the joint's axis.
+    pub(super) fn axis_to_z(&mut self, joint: &Joint) -> Result<Placement, UrdfFault> {
+        let rotation = rotation_from_z(self.unit_axis(joint)?);
+        if rotation != Matrix3::identity() {
+            let (joint, axis) = (joint.name.clone(), *joint.axis.xyz);
+            self.notices.push(UrdfNotice::Reoriented { joint, axis });
+        }
+        Ok(Placement { rotation, translation_m: Vector3::zeros() })
+    }
+
+    /// The axis in the link's frame, of length 1.
+    pub(super) fn unit_axis(&mut self, joint: &Joint) -> Result<Vector3<f64>, UrdfFault> {
+        let written = *joint.axis.xyz;
+        for value in written {
+            finite(&quoted("joint", &joint.name), "axis", value)?;
+        }
+        let length = Vector3::from(written).norm();
+        if (length - 1.0).abs() > AXIS_LENGTH {
+            let joint = joint.name.clone();
+            return Err(UrdfFault::Axis { joint, axis: written, length });
+        }
+        if (length - 1.0).abs() > 4.0 * f64::EPSILON {
+            self.notices.push(UrdfNotice::AxisNormalised { joint: joint.name.clone(), length });
+        }
+        Ok(Vector3::from(written) / length)
+    }
+
+    pub(super) fn limits(&mut self, joint: &Joint) -> Result<Limits, UrdfFault> {
+        let name = || joint.name.clone();
+        let limit = &joint.limit;
+        for (quantity, value) in [
+            ("lower", limit.lower),
+            ("upper", limit.upper),
+            ("effort", limit.effort),
+            ("velocity", limit.velocity),
+            ("acceleration", limit.acceleration),
+        ] {
+            let place = quoted("joint", &joint.name);
+            if value.is_nan() {
+                return Err(UrdfFault::NotFinite { place, quantity, value });
+            }
+            if value < 0.0 && quantity != "lower" && quantity != "upper" {
+                return Err(UrdfFault::Negative { place, quantity, value });
+            }
+        }
+        let unlimited = limit.lower == f64::NEG_INFINITY && limit.upper == f64::INFINITY;
+        let position_rad = if joint.joint_type == JointType::Continuous || unlimited {
+            self.notices.push(UrdfNotice::Continuous { joint: name() });
+            [-TAU, TAU]
+        } else if limit.lower < limit.upper && (limit.upper - limit.lower).is_finite() {
+            [limit.lower, limit.upper]
+        } else {
+            let (lower_rad, upper_rad) = (limit.lower, limit.upper);
+            return Err(UrdfFault::Range { joint: name(), lower_rad, upper_rad });
+        };
+        // Zero is how files without the number come out, and how many write "unknown".
+        let given = |value: f64| (value > 0.0 && value.is_finite()).then_some(value);
+        let velocity_rad_s = given(limit.velocity).unwrap_or_else(|| {
+            let velocity_rad_s = ASSUMED_VELOCITY_RAD_S;
+            self.notices.push(UrdfNotice::AssumedVelocity { joint: name(), velocity_rad_s });
+            velocity_rad_s
+        });
+        let torque_nm = given(limit.effort).unwrap_or_else(|| {
+            self.notices.push(UrdfNotice::NoTorqueLimit { joint: name() });
+            f64::INFINITY
+        });
+        let acceleration_rad_s2 = given(limit.acceleration).unwrap_or(ASSUMED_ACCELERATION_RAD_S2);
+        Ok(Limits { position_rad, velocity_rad_s, acceleration_rad_s2, torque_nm })
+    }
+}
+
+/// Friction, and what stands for the drive that a URDF does not have.
+pub(super) fn drive(joint: &Joint) -> Result<Drive, UrdfFault> {
+    let (damping, friction) =
+        joint.dynamics.as_ref().map_or((0.0, 0.0), |d| (d.damping, d.friction));
+    for (quantity, value) in [("damping", damping), ("friction", friction)] {
+        let place = quoted("joint", &joint.name);
+        finite(&place, quantity, value)?;
+        if value < 0.0 {
+            return Err(UrdfFault::Negative { place, quantity, value });
+        }
+    }
+    Ok(Drive {
+        rotor_inertia_kg_m2: 0.0,
+        viscous_nm_s_rad: damping,
+        coulomb_nm: friction,
+        gear_ratio: 1.0,
+        torque_constant_nm_a: 1.0,
+    })
+}
+
+/// The rotation that takes ẑ to the unit vector `axis`, exact for the coordinate axes.
+///
+/// For a_z ≥ 0 the smallest one, 1 + [v] + [v]²/(1 + a_z) with v = ẑ × a (Rodrigues); below the
+/// xy plane π about x comes first, so that the denominator never vanishes.
+fn rotation_from_z(axis: Vector3<f64>) -> Matrix3<f64> {
+    let smallest = |a: Vector3<f64>| {
+        let v = Vector3::z().cross(&a).cross_matrix();
+        Matrix3::identity() + v + v * v / (1.0 + a.z)
+    };
+    if axis.z >= 0.0 {
+        smallest(axis)
+    } else {
+        smallest(-axis) * Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0))
+    }
+}

@@ -1,0 +1,56 @@
+//! What a URDF says of a link: its inertia.
+
+use nalgebra::Matrix3;
+use urdf_rs::{Inertial, Link};
+
+use super::fault::{UrdfFault, finite, quoted};
+use super::read::Reader;
+use crate::robot::inertia::LinkInertia;
+
+impl Reader {
+    /// A link's inertia about its own frame; `None` for one without mass.
+    pub(super) fn link_inertia(&mut self, link: &Link) -> Result<Option<LinkInertia>, UrdfFault> {
+        let Inertial { origin, mass, inertia: i } = &link.inertial;
+        let place = quoted("link", &link.name);
+        let tensor = [
+            ("ixx", i.ixx),
+            ("ixy", i.ixy),
+            ("ixz", i.ixz),
+            ("iyy", i.iyy),
+            ("iyz", i.iyz),
+            ("izz", i.izz),
+        ];
+        finite(&place, "mass", mass.value)?;
+        for (quantity, value) in tensor {
+            finite(&place, quantity, value)?;
+        }
+        if mass.value < 0.0 {
+            return Err(UrdfFault::Negative { place, quantity: "mass", value: mass.value });
+        }
+        if mass.value == 0.0 {
+            let empty = tensor.iter().all(|(_, value)| *value == 0.0);
+            let fault = UrdfFault::InertiaWithoutMass { link: link.name.clone() };
+            return if empty { Ok(None) } else { Err(fault) };
+        }
+        let central = Matrix3::new(i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz);
+        possible(&link.name, &central)?;
+        let frame = self.placement(origin, &place)?;
+        let turned = frame.rotation * central * frame.rotation.transpose();
+        Ok(Some(LinkInertia::from_com(mass.value, frame.translation_m, turned)))
+    }
+}
+
+/// Positive principal moments that obey the triangle inequality, or what is wrong with them.
+fn possible(link: &str, central: &Matrix3<f64>) -> Result<(), UrdfFault> {
+    let mut principal_kg_m2: [f64; 3] = central.symmetric_eigenvalues().into();
+    principal_kg_m2.sort_by(f64::total_cmp);
+    let [small, middle, large] = principal_kg_m2;
+    let link = link.to_owned();
+    if small <= 0.0 {
+        Err(UrdfFault::NotPositiveDefinite { link, principal_kg_m2 })
+    } else if small + middle <= large {
+        Err(UrdfFault::Triangle { link, principal_kg_m2 })
+    } else {
+        Ok(())
+    }
+}

@@ -1,0 +1,64 @@
+//! What keeps joints of a URDF from being those of one arm.
+
+use std::fmt;
+
+use urdf_rs::{Joint, JointType};
+
+/// Something that an arm of revolute joints in a row does not have.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Obstacle {
+    /// A moving joint that is not a single rotation.
+    JointType {
+        /// The joint.
+        joint: String,
+        /// Its type.
+        kind: &'static str,
+    },
+    /// A joint that copies another.
+    Mimic {
+        /// The joint.
+        joint: String,
+        /// The joint it follows.
+        of: String,
+    },
+    /// Several joints that turn on one body.
+    Branch {
+        /// The link with which the body that carries them begins.
+        body: String,
+        /// The joints.
+        joints: Vec<String>,
+    },
+}
+
+impl Obstacle {
+    /// What keeps one joint from being an arm's; `None` of a fixed one, and of one that turns by itself.
+    pub(super) fn of(joint: &Joint) -> Option<Self> {
+        let name = || joint.name.clone();
+        let kind = match joint.joint_type {
+            JointType::Fixed => return None,
+            JointType::Revolute | JointType::Continuous => {
+                let mimic = joint.mimic.as_ref();
+                return mimic.map(|mimic| Self::Mimic { joint: name(), of: mimic.joint.clone() });
+            }
+            JointType::Prismatic => "prismatic",
+            JointType::Floating => "floating",
+            JointType::Planar => "planar",
+            JointType::Spherical => "spherical",
+        };
+        Some(Self::JointType { joint: name(), kind })
+    }
+}
+
+impl fmt::Display for Obstacle {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::JointType { joint, kind } => write!(f, "joint \"{joint}\" is {kind}"),
+            Self::Mimic { joint, of } => write!(f, "joint \"{joint}\" mimics \"{of}\""),
+            Self::Branch { body, joints } => write!(
+                f,
+                "the chain branches behind \"{body}\" (joints \"{}\")",
+                joints.join("\", \"")
+            ),
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! Robots that come as URDF: an arm that is a part of one, and what a drive file beside it says.
+
+use armid::robot::export::{drive_file, urdf};
+use armid::robot::{Arm, Frames};
+
+use crate::cli::{Folder, default_scenario};
+
+fn ur5() -> (Arm, String) {
+    let arm = Arm::built_in("ur5").unwrap();
+    let text = urdf(&arm, &Frames::default()).unwrap();
+    (arm, text)
+}
+
+/// A hand of 0.5 kg on the last link, and two fingers of 0.1 kg, the second of which slides as the first does.
+fn with_hand(text: &str) -> String {
+    let link = |name: &str, mass_kg: f64| {
+        format!(
+            "<link name=\"{name}\"><inertial><origin xyz=\"0 0 0.05\"/><mass value=\"{mass_kg}\"/>\
+             <inertia ixx=\"1e-3\" ixy=\"0\" ixz=\"0\" iyy=\"1e-3\" iyz=\"0\" izz=\"1e-3\"/></inertial></link>"
+        )
+    };
+    let joint = |name: &str, kind: &str, parent: &str, child: &str, more: &str| {
+        format!(
+            "<joint name=\"{name}\" type=\"{kind}\"><parent link=\"{parent}\"/><child link=\"{child}\"/>\
+             <axis xyz=\"0 1 0\"/><limit lower=\"0\" upper=\"0.04\" velocity=\"0.2\"/>{more}</joint>"
+        )
+    };
+    let hand = [
+        link("hand", 0.5),
+        joint("mount", "fixed", "wrist_3_link", "hand", ""),
+        link("thumb", 0.1),
+        joint("slide", "prismatic", "hand", "thumb", ""),
+        link("finger", 0.1),
+        joint("follower", "prismatic", "hand", "finger", "<mimic joint=\"slide\"/>"),
+        "</robot>".to_owned(),
+    ];
+    text.replace("</robot>", &hand.concat())
+}
+
+/// A folder `cell` with that robot, and the drives of its arm.
+fn cell() -> (Folder, Arm) {
+    let folder = Folder::empty();
+    let (arm, text) = ur5();
+    folder.write("cell/robot.urdf", with_hand(&text));
+    folder.write("cell/robot.drives.toml", drive_file(&arm, &[0.0; 6]));
+    (folder, arm)
+}
+
+#[test]
+fn an_arm_with_a_gripper_is_named_by_its_last_link() {
+    let (folder, _) = cell();
+    let whole = folder.armid("base --robot cell/robot.urdf");
+    let told = ["\"slide\" is prismatic", "\"follower\" is prismatic", "cell/robot.urdf#hand"];
+    whole.complains(1, &told);
+    let arm = folder.armid("base --robot cell/robot.urdf#hand --json base.json");
+    arm.says(0, &["52 base parameters"]);
+    arm.complains(0, &["joints slide (0 m), follower (0 m) are not on the way to link \"hand\""]);
+    let inputs = &folder.result("base.json")["program"]["inputs"];
+    assert_eq!(inputs[0]["path"], "cell/robot.urdf");
+    assert_eq!(inputs[1]["path"], "cell/robot.drives.toml");
+    folder.armid("base --robot cell/robot.urdf#flange").complains(1, &["no link \"flange\""]);
+    folder.armid("base --robot cell/robot.urdf#finger").complains(1, &["on the way to link"]);
+    folder.write("arm.toml", Arm::built_in("ur5").unwrap().to_toml());
+    folder.armid("base --robot arm.toml#hand").complains(1, &["arm.toml", "#hand", "leave it out"]);
+    folder.armid("base --robot ur5#hand").complains(1, &["ur5#hand"]);
+}
+
+/// The last body of the simulated arm is that of a UR5 with all that hangs on it.
+#[test]
+fn a_scenario_names_an_arm_by_its_last_link() {
+    let (folder, arm) = cell();
+    let scenario = default_scenario(1);
+    let robot = "robot = \"robot.urdf#hand\"";
+    folder.write("cell/scenario.toml", scenario.replace("robot = \"ur5\"", robot));
+    let words = "simulate --scenario cell/scenario.toml --out log.csv --truth truth.json";
+    folder.armid(words).says(0, &["log.csv"]);
+    let truth = folder.result("truth.json");
+    let parameters = truth["standard_parameters"].as_array().unwrap();
+    let mass = parameters.iter().find(|parameter| parameter["name"] == "m6").unwrap();
+    let expected_kg = arm.joints[5].link.mass_kg() + 0.5 + 2.0 * 0.1;
+    assert!((mass["value"].as_f64().unwrap() - expected_kg).abs() < 1e-12, "{mass}");
+}
+
+/// A line or two by hand settle what they say, and nothing else.
+#[test]
+fn a_drive_file_says_as_much_as_its_author_knows() {
+    let folder = Folder::empty();
+    folder.write("arm.urdf", ur5().1);
+    let notes = |drives: &str| {
+        folder.write("arm.drives.toml", drives);
+        folder.armid("base --robot arm.urdf").says(0, &["arm.drives.toml"])
+    };
+    let elbow = "[[joint]]\nname = \"elbow\"\n";
+    let text = notes(&format!("{elbow}gear_ratio = 101.0\ntorque_constant_nm_a = 0.12\n"));
+    assert!(text.contains("gravity is taken as 9.81"), "{text}");
+    let open = "no torque constant given, taken as 1 Nm/A: shoulder_pan, shoulder_lift, wrist_1,";
+    assert!(text.contains(open), "{text}");
+    let text = notes(&format!("gravity_m_s2 = [9.81, 0.0, 0.0]\n{elbow}acceleration_rad_s2 = 5.0"));
+    assert!(!text.contains("gravity is taken"), "{text}");
+    assert!(text.contains("URDF has no drives"), "{text}");
+    folder.write("arm.drives.toml", elbow.replace("elbow", "knee"));
+    folder.armid("base --robot arm.urdf").complains(1, &["\"knee\"", "shoulder_pan, "]);
+}

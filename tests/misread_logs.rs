@@ -1,0 +1,201 @@
+//! Logs that are not read as they were recorded: columns in another order, signs, zeros, an arm that hangs. Each is named, alone and with
+//! others, and a log that is read as it was recorded is not, whatever its arm hides.
+
+use std::f64::consts::FRAC_PI_2;
+
+use armid::identify::{Change, Identifier, Misreading, Options};
+use armid::plant::Measured;
+use armid::robot::{Arm, JointSignals};
+use nalgebra::Vector3;
+
+use crate::cli::{Folder, default_scenario};
+use crate::simulated::{Along, NOISE, Run, scenario};
+
+/// A UR5 along some periods of a motion, with what is hidden in it.
+fn run(along: Along, effects: &str) -> Run {
+    Run::new(scenario(("misread", 5), along, NOISE, effects))
+}
+
+/// As `arm` would have it read.
+fn misreading(run: &Run, arm: &Arm, log: &Measured, options: &Options) -> Option<Misreading> {
+    let mut identifier = Identifier::new(&run.model, &run.set, options.clone());
+    let regression = identifier.regression(&log.measurement("misread")).unwrap();
+    Misreading::of(arm, &regression, options)
+}
+
+fn exchanged(signals: &mut JointSignals, [a, b]: [usize; 2]) {
+    let first = signals.joint(a).to_vec();
+    let second = signals.joint(b).to_vec();
+    signals.joint_mut(a).copy_from_slice(&second);
+    signals.joint_mut(b).copy_from_slice(&first);
+}
+
+fn reversed(signals: &mut JointSignals, j: usize) {
+    signals.joint_mut(j).iter_mut().for_each(|v| *v = -*v);
+}
+
+/// `log` as it is recorded by something that differs from the description of the arm by `change`: whoever reads it has to change it so.
+fn recorded(log: &Measured, change: Change) -> Measured {
+    let mut log = log.clone();
+    let Measured { q_rad, qd_rad_s, torque_nm, .. } = &mut log;
+    match change {
+        Change::JointsExchanged { joints } => {
+            [q_rad, qd_rad_s, torque_nm].into_iter().for_each(|signals| exchanged(signals, joints));
+        }
+        Change::TorquesExchanged { joints } => exchanged(torque_nm, joints),
+        Change::MotionsExchanged { joints } => {
+            [q_rad, qd_rad_s].into_iter().for_each(|signals| exchanged(signals, joints));
+        }
+        Change::TorqueReversed { joints: [j] } => reversed(torque_nm, j),
+        Change::AllTorquesReversed => (0..6).for_each(|j| reversed(torque_nm, j)),
+        Change::JointReversed { joints: [j] } => {
+            [q_rad, qd_rad_s, torque_nm].into_iter().for_each(|signals| reversed(signals, j));
+        }
+        Change::MotionReversed { joints: [j] } => {
+            [q_rad, qd_rad_s].into_iter().for_each(|signals| reversed(signals, j));
+        }
+        Change::ZeroTurned { joints: [j], add_rad } => {
+            q_rad.joint_mut(j).iter_mut().for_each(|q| *q -= add_rad);
+        }
+        Change::Mounted { .. } => unreachable!("no channel says how the arm is mounted"),
+    }
+    log
+}
+
+fn is_named(found: Option<Misreading>, hidden: &[Change]) {
+    let found = found.unwrap_or_else(|| panic!("{hidden:?} is not found"));
+    assert_eq!(found.changes.len(), hidden.len(), "{hidden:?}: {found:?}");
+    assert!(hidden.iter().all(|change| found.changes.contains(change)), "{hidden:?}: {found:?}");
+    let sentence = found.sentence();
+    assert!(hidden.iter().all(|change| sentence.contains(&change.to_string())), "{sentence}");
+}
+
+/// Asserts that it is told where the log of `run` has two joints in each other's columns.
+pub fn assert_exchange_is_named(run: &Run, joints: [usize; 2]) {
+    let hidden = Change::JointsExchanged { joints };
+    let log = recorded(&run.log, hidden);
+    is_named(misreading(run, &run.arm, &log, &run.options), &[hidden]);
+}
+
+/// Joint 1 of an arm that stands upright may be counted from any zero: nothing tells, and nothing is said of it.
+#[test]
+fn each_way_to_misread_a_log_is_named() {
+    let run = run(("ur5_identification", 4), "");
+    let single = Options { period_s: Some(0.0), ..run.options.clone() };
+    for hidden in [
+        Change::JointsExchanged { joints: [0, 2] },
+        Change::JointsExchanged { joints: [3, 4] },
+        Change::TorquesExchanged { joints: [1, 2] },
+        Change::TorquesExchanged { joints: [4, 5] },
+        Change::MotionsExchanged { joints: [0, 2] },
+        Change::TorqueReversed { joints: [1] },
+        Change::TorqueReversed { joints: [5] },
+        Change::AllTorquesReversed,
+        Change::JointReversed { joints: [2] },
+        Change::MotionReversed { joints: [3] },
+        Change::ZeroTurned { joints: [1], add_rad: -FRAC_PI_2 },
+        Change::ZeroTurned { joints: [2], add_rad: 2.0 * FRAC_PI_2 },
+    ] {
+        let log = recorded(&run.log, hidden);
+        is_named(misreading(&run, &run.arm, &log, &run.options), &[hidden]);
+        is_named(misreading(&run, &run.arm, &log, &single), &[hidden]);
+    }
+}
+
+/// ROS sorts joints by name, and drives are wired as they are: several at once.
+#[test]
+fn several_ways_at_once_are_named() {
+    let run = run(("ur5_validation", 4), "");
+    let zero = |j: usize| Change::ZeroTurned { joints: [j], add_rad: -FRAC_PI_2 };
+    for hidden in [
+        vec![Change::JointsExchanged { joints: [0, 2] }, Change::TorqueReversed { joints: [1] }],
+        vec![zero(1), zero(3)],
+        vec![Change::TorqueReversed { joints: [0] }, Change::TorqueReversed { joints: [3] }],
+    ] {
+        let log = hidden.iter().fold(run.log.clone(), |log, change| recorded(&log, *change));
+        is_named(misreading(&run, &run.arm, &log, &run.options), &hidden);
+    }
+}
+
+#[test]
+fn an_arm_that_is_not_mounted_as_described_is_named() {
+    let run = run(("ur5_identification", 4), "");
+    let wall = Arm { gravity_m_s2: Vector3::new(0.0, 9.81, 0.0), ..run.arm.clone() };
+    let found = misreading(&run, &wall, &run.log, &run.options);
+    is_named(found, &[Change::Mounted { gravity_m_s2: [0.0, 0.0, -9.81] }]);
+}
+
+/// Physics of any size is no mistake in the description of a log: the largest effects that the scenarios hide, and worse.
+#[test]
+fn a_log_that_is_read_as_it_was_recorded_is_not_called_misread() {
+    for effect in [
+        "kind = \"payload\"\nmass_kg = 5.0\ncom_x_m = 0.1\ncom_y_m = 0.0\ncom_z_m = 0.1",
+        "kind = \"torque_gain\"\njoint = 2\nerror_fraction = -0.5",
+        "kind = \"stribeck\"\njoint = 4\nextra_nm = 6.0\nvs_rad_s = 0.1",
+        "kind = \"spring\"\njoint = 3\nstiffness_nm_rad = 30.0\nrest_rad = 1.0",
+        "kind = \"base_tilt\"\ntilt_x_rad = 0.5\ntilt_y_rad = 0.3",
+        "kind = \"encoder_offset\"\njoint = 2\noffset_rad = 0.3",
+        "kind = \"elasticity\"\njoint = 2\nstiffness_nm_rad = 3000.0",
+    ] {
+        let run = run(("ur5_identification", 4), &format!("[[effect]]\n{effect}"));
+        let found = misreading(&run, &run.arm, &run.log, &run.options);
+        assert_eq!(found, None, "{effect}");
+    }
+}
+
+/// A torque that has nothing to do with the motion fits no arm, however it is read.
+#[test]
+fn torque_that_is_none_is_not_called_misread() {
+    let run = run(("ur5_identification", 4), "");
+    let mut log = run.log.clone();
+    for j in 0..6 {
+        let rows = log.torque_nm.joint_mut(j).iter_mut().enumerate();
+        rows.for_each(|(k, torque)| *torque = ((k * (2 * j + 3)) as f64).sin());
+    }
+    assert_eq!(misreading(&run, &run.arm, &log, &run.options), None);
+}
+
+/// As a user meets it: both programs say what is wrong, and the layout that says so puts it right.
+#[test]
+fn a_layout_puts_a_misread_log_right() {
+    let folder = Folder::empty();
+    folder.write("mine.toml", default_scenario(4));
+    folder.armid("simulate --scenario mine.toml --out log.csv").says(0, &[]);
+    let of = |columns: &str, joints: &str| {
+        format!(
+            "name = \"mine\"\nheader = true\n{joints}\n[columns]\ntime = \"timestamp\"\n{columns}"
+        )
+    };
+    let order = |what: &str, order: [usize; 6]| {
+        format!("[{}]", order.map(|j| format!("\"actual_{what}_{j}\"")).join(", "))
+    };
+    let columns = |o: [usize; 6]| {
+        let [q, qd, torque] = ["q", "qd", "torque"].map(|what| order(what, o));
+        format!("q = {q}\nqd = {qd}\ntorque = {torque}\n")
+    };
+    let as_it_is = columns([0, 1, 2, 3, 4, 5]);
+    folder.write("right.toml", of(&as_it_is, ""));
+    folder.write("sorted.toml", of(&columns([2, 1, 0, 3, 4, 5]), ""));
+    let turned = "joints = { motion_reversed = [3], torque_reversed = [3], zero = [0, 1.5707963267948966, 0, 0, 0, 0] }";
+    folder.write("turned.toml", of(&as_it_is, turned));
+    folder.armid("identify log.csv --robot ur5 --layout right.toml").says(0, &["Identified 52"]);
+    let identify = "identify log.csv --robot ur5 --json result.json --report page.html --layout";
+    let exchanged = ["columns of joints 1 and 3 exchanged", "--layout"];
+    folder.armid(&format!("{identify} sorted.toml")).says(3, &exchanged);
+    let result = folder.result("result.json");
+    assert_eq!(result["verdict"], "contradicted");
+    assert_eq!(result["misreading"]["changes"][0]["kind"], "joints_exchanged");
+    assert_eq!(result["misreading"]["changes"][0]["joints"], serde_json::json!([1, 3]));
+    assert!(folder.read("page.html").contains(exchanged[0]));
+    let diagnose = "diagnose log.csv --robot ur5 --json why.json --layout";
+    folder.armid(&format!("{diagnose} sorted.toml")).says(3, &["declined", exchanged[0]]);
+    let why = folder.result("why.json");
+    assert_eq!((&why["verdict"], &why["causes"]), (&"declined".into(), &serde_json::json!([])));
+    assert_eq!(why["misreading"]["changes"], result["misreading"]["changes"]);
+    let said = [
+        "angle, velocity and torque of joint 3 reversed",
+        "-90° added to the angle of joint 2",
+        "[joints]",
+    ];
+    folder.armid(&format!("{identify} turned.toml")).says(3, &said);
+}
