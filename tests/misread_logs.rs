@@ -199,3 +199,19 @@ fn a_layout_puts_a_misread_log_right() {
     ];
     folder.armid(&format!("{identify} turned.toml")).says(3, &said);
 }
+
+/// One layout reads both logs, and the second one was not recorded as the first: which it is, is said.
+#[test]
+fn of_two_logs_the_one_that_is_misread_is_named() {
+    let folder = Folder::empty();
+    folder.write("mine.toml", default_scenario(4));
+    folder.armid("simulate --scenario mine.toml --out first.csv").says(0, &[]);
+    folder.armid("simulate --scenario mine.toml --trial 1 --out other.csv").says(0, &[]);
+    let mut other = folder.read("other.csv").replacen("actual_torque_1,", "second,", 1);
+    other = other.replacen("actual_torque_2,", "actual_torque_1,", 1);
+    folder.write("other.csv", other.replacen("second,", "actual_torque_2,", 1));
+    let said = "other.csv: The log is not read as it was recorded: with the torques of joints 2 and 3 exchanged";
+    let words = "identify first.csv other.csv --robot ur5 --json both.json";
+    folder.armid(words).says(3, &[said]);
+    assert_eq!(folder.result("both.json")["misreading"]["log"], "other.csv");
+}

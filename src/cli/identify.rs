@@ -18,8 +18,8 @@ use crate::identify::{
 use crate::log::{Layout, Log, read_log};
 use crate::output::check_outputs;
 use crate::report::identify::{
-    Declined, IDENTIFY_SCHEMA, Result as IdentifyResult, Training, Validation, facts, page,
-    parameter_table, residual_table,
+    Declined, IDENTIFY_SCHEMA, MisreadLog, Result as IdentifyResult, Training, Validation, facts,
+    page, parameter_table, residual_table,
 };
 use crate::report::json::{Document, Input, Program};
 use crate::robot::{Arm, JointSignals, LoadedArm};
@@ -240,6 +240,10 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
             *warnings = warnings.iter().map(of_log).collect();
         }
     }
+    let misread = regressions.iter().zip(&logs).find_map(|(regression, log)| {
+        let misreading = Misreading::of(&arm, regression, &options)?;
+        Some(MisreadLog { log: log.log.source.clone(), misreading })
+    });
     let several = each_alone(&mut identifier, &regressions)?;
     let mut regression = Regression::joined(regressions)?;
     let unused = args.processing.unused(&regression.prepared.processing);
@@ -253,7 +257,6 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
     inputs.extend(logs.iter().chain(&validation_logs).map(|l| l.input.clone()));
     let program = Program::started(None, inputs);
     let logs: Vec<&Log> = logs.iter().map(|l| &l.log).collect();
-    let misreading = Misreading::of(&arm, &regression, &options);
     let identified = match several {
         Several::Apart(parts) => Ok(pooled(&parts, &regression)),
         Several::AsOne | Several::Together { .. } => identifier.identify_regression(&regression),
@@ -276,7 +279,7 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         regression: &regression,
         identification: &identification,
         reduced: args.reduced.as_deref(),
-        misreading: misreading.as_ref(),
+        misread: misread.as_ref(),
     };
     let mut validations = Vec::new();
     for log in &validation_logs {

@@ -48,7 +48,7 @@ const FALLS: f64 = 3.0;
 const GROWS: f64 = 1.2;
 
 impl Misreading {
-    /// Of the log in `regression` (the first of several); `None` where the model explains it, or no change makes it.
+    /// Of the log in `regression`; `None` where the model explains it, or no change makes it.
     pub fn of(arm: &Arm, regression: &Regression, options: &Options) -> Option<Self> {
         let mut reading = Reading::of(regression, options)?;
         let mut bench = Bench::new(arm)?;

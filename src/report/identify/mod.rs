@@ -54,8 +54,18 @@ pub struct Training<'a> {
     pub nominal: &'a [f64],
     /// Name of the reduced parameter set, if not the full one was identified.
     pub reduced: Option<&'a str>,
-    /// How the (first) log would have to be read to fit the arm, where it does not as it is read.
-    pub misreading: Option<&'a Misreading>,
+    /// The first of the logs that fits the arm when it is read otherwise.
+    pub misread: Option<&'a MisreadLog>,
+}
+
+/// A log that fits its arm when it is read otherwise.
+#[derive(Debug, Clone, Serialize)]
+pub struct MisreadLog {
+    /// Its name.
+    pub log: String,
+    /// How it has to be read.
+    #[serde(flatten)]
+    pub misreading: Misreading,
 }
 
 /// A prediction of a log that was not used for the fit.
@@ -121,8 +131,8 @@ pub struct Result {
     intervals: Intervals,
     condition: Condition,
     not_identified: Vec<String>,
-    /// Null: the log is read as it was recorded, as far as the arm tells.
-    misreading: Option<Misreading>,
+    /// Null: the logs are read as they were recorded, as far as the arm tells.
+    misreading: Option<MisreadLog>,
     validation: Vec<ValidationJson>,
     /// What the user should know.
     pub warnings: Vec<String>,
@@ -204,10 +214,13 @@ impl Result {
         }
         let is_identified = identifies_the_arm(arm, set, &open);
         let theta = &identification.fit.theta;
-        let doubt = match training.misreading {
+        let several = training.logs.len() > 1;
+        let doubt = match training.misread {
             // It explains whatever else could be doubted.
-            Some(misreading) => {
-                Some(Doubt { is_contradiction: true, sentence: misreading.sentence() })
+            Some(MisreadLog { log, misreading }) => {
+                let name = if several { format!("{log}: ") } else { String::new() };
+                let sentence = format!("{name}{}", misreading.sentence());
+                Some(Doubt { is_contradiction: true, sentence })
             }
             None => {
                 Doubt::of(arm, set, training.nominal, theta, &sigma, &identification.covariance)
@@ -218,7 +231,6 @@ impl Result {
         warnings.extend(unrelated(&fit));
         warnings.extend(validations.iter().filter_map(|validation| foreign(validation, &fit)));
         // Logs whose torques could not be read came no further than that.
-        let several = training.logs.len() > 1;
         warnings.extend(training.logs.iter().filter_map(|log| {
             let remark = drive_limit_remark(arm, &log.torque_nm(arm).ok()?)?;
             Some(if several { format!("{}: {remark}", log.source) } else { remark })
@@ -254,7 +266,7 @@ impl Result {
                 _ => IDENTIFIED,
             },
             not_identified: open.iter().map(|&k| set.name(k).to_owned()).collect(),
-            misreading: training.misreading.cloned(),
+            misreading: training.misread.cloned(),
             validation: validations.iter().map(ValidationJson::of).collect(),
             warnings,
             doubt,
@@ -313,8 +325,8 @@ impl Result {
                 names.join(", ")
             );
         }
-        if let Some(misreading) = &self.misreading {
-            return misreading.sentence();
+        if let (Some(doubt), Some(_)) = (&self.doubt, &self.misreading) {
+            return doubt.sentence.clone();
         }
         let percent = self.residual.relative_percent.iter();
         let (low, high) = percent.fold((f64::INFINITY, 0f64), |(l, h), &p| (l.min(p), h.max(p)));
