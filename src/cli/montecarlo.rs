@@ -168,6 +168,12 @@ fn run_trials(args: &RunArgs) -> CommandResult {
         eprintln!("shard {index} of {count} has none of the {trials} trials: nothing is written");
         return Ok(Outcome::Done);
     }
+    // Before the arm is simulated, which may take minutes.
+    let file = args.out.as_ref().map(|folder| shard_path(folder, &range));
+    if let Some(file) = file.filter(|file| file.exists() && !args.resume) {
+        let file = file.display();
+        return Err(format!("{file} exists: give --resume to go on, or another --out").into());
+    }
     let inputs = inputs(args.scenario.iter().chain(&scenario.files))?;
     scenario.seed = args.seed.unwrap_or(scenario.seed);
     eprintln!("{}: {}", scenario.name, scenario.description);
@@ -235,23 +241,14 @@ fn run_shard<T: Trials>(
     let mut shard = Shard::new(experiment, trials, range);
     if let Some(file) = &file {
         shard.header.program = sha256_of_file(&std::env::current_exe()?)?;
-        match (file.exists(), args.resume) {
-            (true, true) => {
-                let saved = Shard::load(file)?;
-                same_run(file, &saved.header, &shard.header)?;
-                saved.check_program(file, &shard.header.program)?;
-                shard = saved;
-                eprintln!("going on after {} trials", shard.next - shard.range[0]);
-            }
-            (true, false) => {
-                let file = file.display();
-                let message = format!("{file} exists: give --resume to go on, or another --out");
-                return Err(message.into());
-            }
-            (false, true) => {
-                eprintln!("{}: nothing to resume, begins with its first trial", file.display());
-            }
-            (false, false) => {}
+        if file.exists() {
+            let saved = Shard::load(file)?;
+            same_run(file, &saved.header, &shard.header)?;
+            saved.check_program(file, &shard.header.program)?;
+            shard = saved;
+            eprintln!("going on after {} trials", shard.next - shard.range[0]);
+        } else if args.resume {
+            eprintln!("{}: nothing to resume, begins with its first trial", file.display());
         }
     }
     let progress = Progress::new("trials", shard.range[1] - shard.range[0]);
