@@ -143,6 +143,19 @@ fn a_log_that_is_read_as_it_was_recorded_is_not_called_misread() {
     }
 }
 
+/// The first joint's sign of friction is mended by turning its torque round, and no more than that: what is wrong is all of its column.
+#[test]
+fn a_reading_that_fits_no_better_is_not_named() {
+    let run = run(("ur5_identification", 4), "");
+    let mut log = run.log.clone();
+    let noise = |k: usize| 25.0 * ((k * k % 997) as f64).sin();
+    let qd_rad_s = log.qd_rad_s.joint(0).to_vec();
+    let rows = log.torque_nm.joint_mut(0).iter_mut().zip(&qd_rad_s).enumerate();
+    rows.for_each(|(k, (torque, qd))| *torque = noise(k % 1250) - 8.0 * (qd / 0.02).tanh());
+    let found = misreading(&run, &run.arm, &log, &run.options);
+    assert_eq!(found, None);
+}
+
 /// A torque that has nothing to do with the motion fits no arm, however it is read.
 #[test]
 fn torque_that_is_none_is_not_called_misread() {

@@ -133,7 +133,9 @@ impl Change {
             | Self::ZeroTurned { .. } => {
                 "Say so in a layout ([joints], --layout), or turn the joint in the description of the robot."
             }
-            Self::Mounted { .. } => "Say how the arm is mounted in its robot file (gravity_m_s2).",
+            Self::Mounted { .. } => {
+                "Say how the arm is mounted: gravity_m_s2 in its robot file, or in the drives.toml beside its URDF."
+            }
         }
     }
 }

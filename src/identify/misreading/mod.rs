@@ -46,6 +46,9 @@ const LEAST_GAIN: f64 = 1.4;
 const FALLS: f64 = 3.0;
 /// Factor by which that of another joint may grow, which is noise.
 const GROWS: f64 = 1.2;
+/// Share of the torque (rms) of which a reading leaves less on every joint that it is about: one that turns the sign of friction and
+/// fits no better is another mistake.
+const FITS: f64 = 0.5;
 
 impl Misreading {
     /// Of the log in `regression`; `None` where the model explains it, or no change makes it.
@@ -84,8 +87,10 @@ impl Misreading {
         let gains: Vec<f64> = (0..self.as_read.left.len()).map(gain).collect();
         let largest = gains.iter().fold(0.0, |a: f64, gain| a.max(*gain));
         let all: f64 = gains.iter().sum();
+        let joints = self.joints();
         largest > FALLS.ln()
-            && all > FALLS.ln() * self.joints().len() as f64
+            && all > FALLS.ln() * joints.len() as f64
+            && joints.iter().all(|j| self.otherwise.left[*j] < FITS)
             && gains.iter().all(|gain| *gain > -GROWS.ln())
     }
 

@@ -117,6 +117,8 @@ fn exchange(signals: &mut JointSignals, [a, b]: [usize; 2]) {
 
 /// Share of the torque (rms) that friction has where it counts: what is less may be another law.
 const FRICTION: f64 = 0.1;
+/// Share of the torque (rms) that may be left where friction is to be believed: noise that hides a joint's torque has no sign.
+const KNOWN: f64 = 0.3;
 /// What friction that pushes is worth in a misfit: a residual ten times as large.
 const PUSHES: f64 = 2.0 * std::f64::consts::LN_10;
 
@@ -183,9 +185,9 @@ impl Bench {
             let Some(k) = (0..set.rank()).find(is_friction) else { return false };
             let sign = motion.qd_rad_s.joint(j).iter().map(|qd| model.friction_sign(*qd).powi(2));
             let friction_nm = fit.theta[k] * sign.sum::<f64>().sqrt();
-            friction_nm < -FRICTION * fit.torque_squares[j].sqrt()
+            left[j] < KNOWN && friction_nm < -FRICTION * fit.torque_squares[j].sqrt()
         };
-        let friction_pushes = (0..model.dof()).map(pushes).collect();
+        let friction_pushes: Vec<bool> = (0..model.dof()).map(pushes).collect();
         left.iter().all(|share| share.is_finite()).then_some(Match { left, friction_pushes })
     }
 }

@@ -228,7 +228,8 @@ impl Result {
         };
         warnings.extend(doubt.iter().map(|doubt| doubt.sentence.clone()));
         let fit = identification.residual();
-        warnings.extend(unrelated(&fit));
+        // Of a log that is misread nothing else is to be said.
+        warnings.extend(unrelated(&fit).filter(|_| training.misread.is_none()));
         warnings.extend(validations.iter().filter_map(|validation| foreign(validation, &fit)));
         // Logs whose torques could not be read came no further than that.
         warnings.extend(training.logs.iter().filter_map(|log| {
