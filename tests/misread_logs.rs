@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use armid::identify::{Change, Identifier, Misreading, Options};
 use armid::plant::Measured;
-use armid::robot::{Arm, JointSignals};
+use armid::robot::Arm;
 use nalgebra::Vector3;
 
 use crate::cli::{Folder, default_scenario};
@@ -23,36 +23,25 @@ fn misreading(run: &Run, arm: &Arm, log: &Measured, options: &Options) -> Option
     Misreading::of(arm, &regression, options)
 }
 
-fn exchanged(signals: &mut JointSignals, [a, b]: [usize; 2]) {
-    let first = signals.joint(a).to_vec();
-    let second = signals.joint(b).to_vec();
-    signals.joint_mut(a).copy_from_slice(&second);
-    signals.joint_mut(b).copy_from_slice(&first);
-}
-
-fn reversed(signals: &mut JointSignals, j: usize) {
-    signals.joint_mut(j).iter_mut().for_each(|v| *v = -*v);
-}
-
 /// `log` as it is recorded by something that differs from the description of the arm by `change`: whoever reads it has to change it so.
 fn recorded(log: &Measured, change: Change) -> Measured {
     let mut log = log.clone();
     let Measured { q_rad, qd_rad_s, torque_nm, .. } = &mut log;
     match change {
         Change::JointsExchanged { joints } => {
-            [q_rad, qd_rad_s, torque_nm].into_iter().for_each(|signals| exchanged(signals, joints));
+            [q_rad, qd_rad_s, torque_nm].into_iter().for_each(|signals| signals.exchange(joints));
         }
-        Change::TorquesExchanged { joints } => exchanged(torque_nm, joints),
+        Change::TorquesExchanged { joints } => torque_nm.exchange(joints),
         Change::MotionsExchanged { joints } => {
-            [q_rad, qd_rad_s].into_iter().for_each(|signals| exchanged(signals, joints));
+            [q_rad, qd_rad_s].into_iter().for_each(|signals| signals.exchange(joints));
         }
-        Change::TorqueReversed { joints: [j] } => reversed(torque_nm, j),
-        Change::AllTorquesReversed => (0..6).for_each(|j| reversed(torque_nm, j)),
+        Change::TorqueReversed { joints: [j] } => torque_nm.reverse(j),
+        Change::AllTorquesReversed => (0..6).for_each(|j| torque_nm.reverse(j)),
         Change::JointReversed { joints: [j] } => {
-            [q_rad, qd_rad_s, torque_nm].into_iter().for_each(|signals| reversed(signals, j));
+            [q_rad, qd_rad_s, torque_nm].into_iter().for_each(|signals| signals.reverse(j));
         }
         Change::MotionReversed { joints: [j] } => {
-            [q_rad, qd_rad_s].into_iter().for_each(|signals| reversed(signals, j));
+            [q_rad, qd_rad_s].into_iter().for_each(|signals| signals.reverse(j));
         }
         Change::ZeroTurned { joints: [j], add_rad } => {
             q_rad.joint_mut(j).iter_mut().for_each(|q| *q -= add_rad);

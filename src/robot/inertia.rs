@@ -124,3 +124,9 @@ impl LinkInertia {
         Self::from_moments(m, h + m * p, j + cross + steiner)
     }
 }
+/// Principal moments of a tensor, ascending.
+pub(super) fn principal_moments(tensor: &Matrix3<f64>) -> [f64; 3] {
+    let mut moments: [f64; 3] = tensor.symmetric_eigenvalues().into();
+    moments.sort_by(f64::total_cmp);
+    moments
+}

@@ -60,6 +60,18 @@ impl JointSignals {
         &mut self.data[j * self.samples..(j + 1) * self.samples]
     }
 
+    /// Lets joint `j` (0-based) count the other way.
+    pub fn reverse(&mut self, j: usize) {
+        self.joint_mut(j).iter_mut().for_each(|value| *value = -*value);
+    }
+
+    /// Gives each of two joints (0-based) the series of the other.
+    pub fn exchange(&mut self, [a, b]: [usize; 2]) {
+        for k in 0..self.samples {
+            self.data.swap(a * self.samples + k, b * self.samples + k);
+        }
+    }
+
     /// All joints at sample `k`, copied into `out` (length = joints).
     pub fn sample_into(&self, k: usize, out: &mut [f64]) {
         for (j, value) in out.iter_mut().enumerate() {
@@ -96,6 +108,14 @@ impl JointSignals {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn joints_change_places_and_signs() {
+        let mut signals = JointSignals::from_fn(3, 2, |j, k| (10 * j + k) as f64);
+        signals.exchange([0, 2]);
+        signals.reverse(1);
+        assert_eq!([0, 1, 2].map(|j| signals.joint(j)), [[20.0, 21.0], [-10.0, -11.0], [0.0, 1.0]]);
+    }
 
     #[test]
     fn a_copy_into_signals_of_the_same_size_takes_no_memory() {

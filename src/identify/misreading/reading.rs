@@ -70,33 +70,30 @@ impl Reading {
         let mut other = self.clone();
         let Motion { q_rad, qd_rad_s, qdd_rad_s2 } = &mut other.motion;
         let torque_nm = &mut other.torque_nm;
-        let reversed = |signals: &mut JointSignals, j: usize| {
-            signals.joint_mut(j).iter_mut().for_each(|v| *v = -*v);
-        };
         match change {
             Change::JointsExchanged { joints } => {
                 for signals in [q_rad, qd_rad_s, qdd_rad_s2, torque_nm] {
-                    exchange(signals, joints);
+                    signals.exchange(joints);
                 }
             }
-            Change::TorquesExchanged { joints } => exchange(torque_nm, joints),
+            Change::TorquesExchanged { joints } => torque_nm.exchange(joints),
             Change::MotionsExchanged { joints } => {
                 for signals in [q_rad, qd_rad_s, qdd_rad_s2] {
-                    exchange(signals, joints);
+                    signals.exchange(joints);
                 }
             }
-            Change::TorqueReversed { joints: [j] } => reversed(torque_nm, j),
+            Change::TorqueReversed { joints: [j] } => torque_nm.reverse(j),
             Change::AllTorquesReversed => {
-                (0..torque_nm.joints()).for_each(|j| reversed(torque_nm, j));
+                (0..torque_nm.joints()).for_each(|j| torque_nm.reverse(j));
             }
             Change::JointReversed { joints: [j] } => {
                 for signals in [q_rad, qd_rad_s, qdd_rad_s2, torque_nm] {
-                    reversed(signals, j);
+                    signals.reverse(j);
                 }
             }
             Change::MotionReversed { joints: [j] } => {
                 for signals in [q_rad, qd_rad_s, qdd_rad_s2] {
-                    reversed(signals, j);
+                    signals.reverse(j);
                 }
             }
             Change::ZeroTurned { joints: [j], add_rad } => {
@@ -106,13 +103,6 @@ impl Reading {
         }
         other
     }
-}
-
-fn exchange(signals: &mut JointSignals, [a, b]: [usize; 2]) {
-    let first = signals.joint(a).to_vec();
-    let second = signals.joint(b).to_vec();
-    signals.joint_mut(a).copy_from_slice(&second);
-    signals.joint_mut(b).copy_from_slice(&first);
 }
 
 /// Share of the torque (rms) that friction has where it counts: what is less may be another law.

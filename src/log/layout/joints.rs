@@ -81,9 +81,7 @@ impl Joints {
 }
 
 fn reverse(signals: &mut JointSignals, joints: &[usize]) {
-    for joint in joints {
-        signals.joint_mut(joint - 1).iter_mut().for_each(|value| *value = -*value);
-    }
+    joints.iter().for_each(|joint| signals.reverse(joint - 1));
 }
 
 #[cfg(test)]

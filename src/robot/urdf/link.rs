@@ -5,7 +5,7 @@ use urdf_rs::{Inertial, Link};
 
 use super::fault::{UrdfFault, finite, quoted};
 use super::read::Reader;
-use crate::robot::inertia::LinkInertia;
+use crate::robot::inertia::{LinkInertia, principal_moments};
 
 impl Reader {
     /// A link's inertia about its own frame; `None` for one without mass.
@@ -42,8 +42,7 @@ impl Reader {
 
 /// Positive principal moments that obey the triangle inequality, or what is wrong with them.
 fn possible(link: &str, central: &Matrix3<f64>) -> Result<(), UrdfFault> {
-    let mut principal_kg_m2: [f64; 3] = central.symmetric_eigenvalues().into();
-    principal_kg_m2.sort_by(f64::total_cmp);
+    let principal_kg_m2 = principal_moments(central);
     let [small, middle, large] = principal_kg_m2;
     let link = link.to_owned();
     if small <= 0.0 {

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use crate::robot::export::xml::about_com;
+use crate::robot::inertia::principal_moments;
 use crate::robot::{Joint, LinkInertia, UrdfLink};
 
 /// What is left of a body is round-off below this share of it.
@@ -94,8 +95,7 @@ fn unfit(rest: &LinkInertia, body_kg: f64) -> Option<Unfit> {
     }
     // As it is judged when the file is read again.
     let (_, _, central) = about_com(rest);
-    let mut principal_kg_m2: [f64; 3] = central.symmetric_eigenvalues().into();
-    principal_kg_m2.sort_by(f64::total_cmp);
+    let principal_kg_m2 = principal_moments(&central);
     let [small, middle, large] = principal_kg_m2;
     let is_possible = small > 0.0 && small + middle > large;
     (!is_possible).then_some(Unfit::Moments { mass_kg, principal_kg_m2 })
