@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use armid::identify::{Change, Identifier, Misreading, Options};
 use armid::plant::Measured;
-use armid::robot::Arm;
+use armid::robot::{Arm, JointSignals};
 use nalgebra::Vector3;
 
 use crate::cli::{Folder, default_scenario};
@@ -24,10 +24,10 @@ fn misreading(run: &Run, arm: &Arm, log: &Measured, options: &Options) -> Option
 }
 
 /// `log` as it is recorded by something that differs from the description of the arm by `change`: whoever reads it has to change it so.
-fn recorded(log: &Measured, change: Change) -> Measured {
+fn recorded(log: &Measured, change: &Change) -> Measured {
     let mut log = log.clone();
     let Measured { q_rad, qd_rad_s, torque_nm, .. } = &mut log;
-    match change {
+    match *change {
         Change::JointsExchanged { joints } => {
             [q_rad, qd_rad_s, torque_nm].into_iter().for_each(|signals| signals.exchange(joints));
         }
@@ -46,9 +46,24 @@ fn recorded(log: &Measured, change: Change) -> Measured {
         Change::ZeroTurned { joints: [j], add_rad } => {
             q_rad.joint_mut(j).iter_mut().for_each(|q| *q -= add_rad);
         }
+        Change::JointsOrdered { ref order } => {
+            [q_rad, qd_rad_s, torque_nm].into_iter().for_each(|signals| stand_in(signals, order));
+        }
+        Change::TorquesOrdered { ref order } => stand_in(torque_nm, order),
+        Change::MotionsOrdered { ref order } => {
+            [q_rad, qd_rad_s].into_iter().for_each(|signals| stand_in(signals, order));
+        }
         Change::Mounted { .. } => unreachable!("no channel says how the arm is mounted"),
     }
     log
+}
+
+/// Puts each joint of an arm where `order` has it.
+fn stand_in(signals: &mut JointSignals, order: &[usize]) {
+    let of_the_arm = signals.clone();
+    for (j, place) in order.iter().enumerate() {
+        signals.joint_mut(*place).copy_from_slice(of_the_arm.joint(j));
+    }
 }
 
 fn is_named(found: Option<Misreading>, hidden: &[Change]) {
@@ -62,7 +77,7 @@ fn is_named(found: Option<Misreading>, hidden: &[Change]) {
 /// Asserts that it is told where the log of `run` has two joints in each other's columns.
 pub fn assert_exchange_is_named(run: &Run, joints: [usize; 2]) {
     let hidden = Change::JointsExchanged { joints };
-    let log = recorded(&run.log, hidden);
+    let log = recorded(&run.log, &hidden);
     is_named(misreading(run, &run.arm, &log, &run.options), &[hidden]);
 }
 
@@ -84,10 +99,13 @@ fn each_way_to_misread_a_log_is_named() {
         Change::MotionReversed { joints: [3] },
         Change::ZeroTurned { joints: [1], add_rad: -FRAC_PI_2 },
         Change::ZeroTurned { joints: [2], add_rad: 2.0 * FRAC_PI_2 },
+        Change::JointsOrdered { order: vec![1, 2, 3, 4, 5, 0] },
+        Change::TorquesOrdered { order: vec![5, 0, 1, 2, 3, 4] },
     ] {
-        let log = recorded(&run.log, hidden);
-        is_named(misreading(&run, &run.arm, &log, &run.options), &[hidden]);
-        is_named(misreading(&run, &run.arm, &log, &single), &[hidden]);
+        let log = recorded(&run.log, &hidden);
+        let hidden = [hidden];
+        is_named(misreading(&run, &run.arm, &log, &run.options), &hidden);
+        is_named(misreading(&run, &run.arm, &log, &single), &hidden);
     }
 }
 
@@ -100,8 +118,26 @@ fn several_ways_at_once_are_named() {
         vec![Change::JointsExchanged { joints: [0, 2] }, Change::TorqueReversed { joints: [1] }],
         vec![zero(1), zero(3)],
         vec![Change::TorqueReversed { joints: [0] }, Change::TorqueReversed { joints: [3] }],
+        vec![Change::JointsExchanged { joints: [0, 2] }, zero(1), zero(3)],
     ] {
-        let log = hidden.iter().fold(run.log.clone(), |log, change| recorded(&log, *change));
+        let log = hidden.iter().fold(run.log.clone(), |log, change| recorded(&log, change));
+        is_named(misreading(&run, &run.arm, &log, &run.options), &hidden);
+    }
+}
+
+/// With one torque reversed the model fits as well as with all others: without friction it is gravity that tells which.
+#[test]
+fn where_there_is_no_friction_gravity_tells_the_sign_of_torques() {
+    let run = run(("ur5_identification", 4), "");
+    let mut log = run.log.clone();
+    for j in 0..6 {
+        let qd_rad_s = log.qd_rad_s.joint(j).to_vec();
+        let torque_nm = log.torque_nm.joint_mut(j).iter_mut();
+        torque_nm.zip(qd_rad_s).for_each(|(nm, qd)| *nm -= run.model.friction(j, qd));
+    }
+    let reversed = Change::TorqueReversed { joints: [3] };
+    for hidden in [vec![reversed.clone()], vec![Change::AllTorquesReversed, reversed]] {
+        let log = hidden.iter().fold(log.clone(), |log, change| recorded(&log, change));
         is_named(misreading(&run, &run.arm, &log, &run.options), &hidden);
     }
 }
@@ -112,6 +148,16 @@ fn an_arm_that_is_not_mounted_as_described_is_named() {
     let wall = Arm { gravity_m_s2: Vector3::new(0.0, 9.81, 0.0), ..run.arm.clone() };
     let found = misreading(&run, &wall, &run.log, &run.options);
     is_named(found, &[Change::Mounted { gravity_m_s2: [0.0, 0.0, -9.81] }]);
+}
+
+/// On a pedestal of 45°, as arms of a torso stand.
+#[test]
+fn an_arm_that_leans_is_named() {
+    let tilt =
+        "[[effect]]\nkind = \"base_tilt\"\ntilt_x_rad = 0.7853981633974483\ntilt_y_rad = 0.0";
+    let run = run(("ur5_identification", 4), tilt);
+    let sentence = misreading(&run, &run.arm, &run.log, &run.options).unwrap().sentence();
+    assert!(sentence.contains("with gravity_m_s2 = [0.00, -6.94, -6.94] the model"), "{sentence}");
 }
 
 /// Physics of any size is no mistake in the description of a log: the largest effects that the scenarios hide, and worse.
@@ -189,6 +235,16 @@ fn a_layout_puts_a_misread_log_right() {
     assert_eq!(result["misreading"]["changes"][0]["kind"], "joints_exchanged");
     assert_eq!(result["misreading"]["changes"][0]["joints"], serde_json::json!([1, 3]));
     assert!(folder.read("page.html").contains(exchanged[0]));
+    let reads_it = |result: &serde_json::Value| {
+        let lines = result["misreading"]["layout"].as_str().unwrap();
+        folder.write("mended.toml", lines);
+        folder
+            .armid("identify log.csv --robot ur5 --layout mended.toml")
+            .says(0, &["Identified 52"]);
+        lines.to_owned()
+    };
+    let lines = reads_it(&result);
+    assert!(lines.contains("order = [3, 2, 1, 4, 5, 6]"), "{lines}");
     let diagnose = "diagnose log.csv --robot ur5 --json why.json --layout";
     folder.armid(&format!("{diagnose} sorted.toml")).says(3, &["declined", exchanged[0]]);
     let why = folder.result("why.json");
@@ -200,6 +256,7 @@ fn a_layout_puts_a_misread_log_right() {
         "[joints]",
     ];
     folder.armid(&format!("{identify} turned.toml")).says(3, &said);
+    reads_it(&folder.result("result.json"));
 }
 
 /// One layout reads both logs, and the second one was not recorded as the first: which it is, is said.

@@ -11,12 +11,12 @@ use super::{CommandResult, Outcome};
 use crate::base::{BaseSet, Parameterisation};
 use crate::diagnose::{DIAGNOSE_SCHEMA, DiagnoseError, Diagnoser, Diagnosis, Validation};
 use crate::dynamics::Model;
-use crate::identify::Misreading;
 use crate::log::Log;
 use crate::montecarlo::Scenario;
 use crate::output::{OutputError, check_outputs};
 use crate::report::diagnose::{cause_table, held_out_table, limit_table, page};
 use crate::report::json::{Document, Program};
+use crate::report::misread::MisreadLog;
 use crate::report::replay::table as replay_table;
 use crate::report::rows::{Rows, log_warnings};
 use crate::report::{Page, Status, Verdict};
@@ -204,7 +204,13 @@ fn decline(
     program: Program,
 ) -> CommandResult {
     let sentence = error.declined(&log.source);
+    let misread = error.misreading().cloned();
+    let misread = misread.map(|misreading| args.source.misread(log.source.clone(), misreading));
+    let misread = misread.transpose()?;
     say!("{sentence}");
+    if let Some(advice) = misread.as_ref().and_then(MisreadLog::advice) {
+        say!("\n{advice}\n");
+    }
     let warnings: Vec<String> = log_warnings(log).collect();
     for warning in &warnings {
         say!("note: {warning}");
@@ -215,7 +221,7 @@ fn decline(
             log: &log.source,
             verdict: "declined",
             causes: [],
-            misreading: error.misreading(),
+            misreading: misread.as_ref(),
             sentences: [&sentence],
             warnings: &warnings,
             rows: &rows,
@@ -225,7 +231,12 @@ fn decline(
     if let Some(path) = &args.report {
         let facts = vec![rows.in_words()];
         let verdict = Verdict { status: Status::Bad, sentence, facts };
-        let page = Page::new("Diagnosis", log.source.clone(), verdict, program);
+        let mut page = Page::new("Diagnosis", log.source.clone(), verdict, program);
+        misread
+            .as_ref()
+            .and_then(MisreadLog::section)
+            .into_iter()
+            .for_each(|section| page.push(section));
         page.with_warnings(&warnings).write(path)?;
         say!("report: {}", path.display());
     }
@@ -238,7 +249,7 @@ struct Declined<'a> {
     log: &'a str,
     verdict: &'static str,
     causes: [(); 0],
-    misreading: Option<&'a Misreading>,
+    misreading: Option<&'a MisreadLog>,
     sentences: [&'a str; 1],
     warnings: &'a [String],
     rows: &'a Rows,

@@ -1,7 +1,7 @@
 //! `armid identify`: parameters with their uncertainty from the logs of a real or simulated arm.
 
 use std::collections::HashSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 
@@ -15,13 +15,14 @@ use crate::identify::{
     Estimator, FitError, Identification, Identifier, IdentifyError, Measurement, Misreading,
     Options, Processing, Regression, Several, each_alone, pooled,
 };
-use crate::log::{Layout, Log, read_log};
+use crate::log::{Layout, Log, LogError, read_log};
 use crate::output::check_outputs;
 use crate::report::identify::{
-    Declined, IDENTIFY_SCHEMA, MisreadLog, Result as IdentifyResult, Training, Validation, facts,
-    page, parameter_table, residual_table,
+    Declined, IDENTIFY_SCHEMA, Result as IdentifyResult, Training, Validation, facts, page,
+    parameter_table, residual_table,
 };
 use crate::report::json::{Document, Input, Program};
+use crate::report::misread::MisreadLog;
 use crate::robot::{Arm, JointSignals, LoadedArm};
 
 /// Identify the base parameters of an arm from logs of its motion.
@@ -168,9 +169,14 @@ impl SourceArgs {
     /// terminal.
     pub fn arm(&self) -> Result<(Arm, Vec<Input>), Box<dyn std::error::Error>> {
         let LoadedArm { arm, mut files, .. } = load_robot(&self.robot)?;
-        let layout = Path::new(&self.layout);
-        files.extend(layout.extension().map(|_| layout.to_owned()));
+        files.extend(Layout::load(&self.layout)?.files().iter().cloned());
         Ok((arm, inputs(&files)?))
+    }
+
+    /// What is said of a log that fits when it is read otherwise.
+    pub fn misread(&self, log: String, misreading: Misreading) -> Result<MisreadLog, LogError> {
+        let layout = misreading.layout(&Layout::load(&self.layout)?, &self.layout);
+        Ok(MisreadLog { log, misreading, layout })
     }
 
     /// Reads logs and prints what became of their rows.
@@ -242,8 +248,9 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
     }
     let misread = regressions.iter().zip(&logs).find_map(|(regression, log)| {
         let misreading = Misreading::of(&arm, regression, &options)?;
-        Some(MisreadLog { log: log.log.source.clone(), misreading })
+        Some(args.source.misread(log.log.source.clone(), misreading))
     });
+    let misread = misread.transpose()?;
     let several = each_alone(&mut identifier, &regressions)?;
     let mut regression = Regression::joined(regressions)?;
     let unused = args.processing.unused(&regression.prepared.processing);
@@ -309,6 +316,9 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         say!("{fact}");
     }
     say!("\n{}", result.sentence());
+    if let Some(advice) = result.misread().and_then(MisreadLog::advice) {
+        say!("\n{advice}\n");
+    }
     if let Some(trust) = result.trust() {
         say!("{trust}");
     }

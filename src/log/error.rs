@@ -359,13 +359,49 @@ pub enum LayoutFault {
         /// The value.
         value: f64,
     },
-    /// Zeros of another number of joints.
-    #[error("zero under [joints] has {found} number(s), and the arm has {joints} joints")]
-    Zeros {
+    /// A zero beyond a whole turn.
+    #[error(
+        "zero under [joints] is {value} for joint {joint}, more than a whole turn in radians: it looks like degrees. Zeros are in the \
+         unit of q: write {:.4}, or put q = \"deg\" under [units] where the angles are in degrees as well",
+        value.to_radians()
+    )]
+    ZeroInDegrees {
+        /// The joint, from 1.
+        joint: usize,
+        /// The value.
+        value: f64,
+    },
+    /// An order or zeros of another number of joints.
+    #[error("{key} under [joints] has {found} number(s), and the arm has {joints} joints")]
+    NotAllJoints {
+        /// The key.
+        key: &'static str,
         /// How many there are.
         found: usize,
         /// Joints of the arm.
         joints: usize,
+    },
+    /// Stamps in two columns have nanoseconds in the second alone.
+    #[error(
+        "time_nanoseconds is added to the time, which is in nanoseconds as well (time = \"ns\" under [units]): the time of stamps in \
+         two columns is in seconds; leave one of the two out"
+    )]
+    NanosecondsTwice,
+    /// The layout that this one is like cannot be used.
+    #[error("like = \"{like}\": {fault}")]
+    Like {
+        /// The name or the file.
+        like: String,
+        /// What is wrong with it.
+        fault: Box<LogError>,
+    },
+    /// Layouts that are like each other.
+    #[error("like = \"{like}\" leads back to where it began, or on for more than {limit} layouts")]
+    LikeItself {
+        /// The name or the file.
+        like: String,
+        /// Layouts that may be like another.
+        limit: usize,
     },
     /// Commas cannot separate both fields and decimals.
     #[error("decimal_comma = true needs another delimiter than \"comma\"")]

@@ -7,6 +7,7 @@
 
 mod account;
 mod clean;
+mod counting;
 mod error;
 mod even_stamps;
 mod layout;
@@ -19,8 +20,9 @@ mod units;
 mod write;
 
 pub use account::{LogWarning, Reason, RowAccount, SetAside};
+pub use counting::{Counting, Place};
 pub use error::{LayoutFault, LogError, UnitSuspicion};
-pub use layout::{Layout, built_in_layout_names};
+pub use layout::{Joints, Layout, built_in_layout_names};
 pub use read::{read_log, read_log_from};
 pub use record::{Effort, Log};
 pub use write::write_log;

@@ -421,7 +421,7 @@ impl Table {
             rows,
             sha256,
         };
-        layout.joints.apply(&mut log, layout.units.q);
+        layout.counting(log.q_rad.joints()).apply(&mut log);
         log
     }
 

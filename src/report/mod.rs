@@ -10,6 +10,7 @@ mod error;
 pub mod excitation;
 pub mod identify;
 pub mod json;
+pub mod misread;
 pub mod montecarlo;
 pub mod noise_study;
 mod page;

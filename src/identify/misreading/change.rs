@@ -9,7 +9,7 @@ use serde::Serialize;
 use crate::robot::Arm;
 
 /// One difference between how a log is read and how it was recorded; joints are 0-based.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Change {
     /// Angle, velocity and torque of one joint stand in the columns of the other: ROS sorts joints by name.
@@ -29,6 +29,24 @@ pub enum Change {
         /// Both.
         #[serde(serialize_with = "from_one")]
         joints: [usize; 2],
+    },
+    /// Angle, velocity and torque stand in another order.
+    JointsOrdered {
+        /// Of each joint, where it stands.
+        #[serde(serialize_with = "from_one")]
+        order: Vec<usize>,
+    },
+    /// The torques alone do.
+    TorquesOrdered {
+        /// Of each joint, where it stands.
+        #[serde(serialize_with = "from_one")]
+        order: Vec<usize>,
+    },
+    /// Angles and velocities alone do.
+    MotionsOrdered {
+        /// Of each joint, where it stands.
+        #[serde(serialize_with = "from_one")]
+        order: Vec<usize>,
     },
     /// The torque drives against positive velocity.
     TorqueReversed {
@@ -58,18 +76,18 @@ pub enum Change {
         /// What has to be added to the angles, rad.
         add_rad: f64,
     },
-    /// The arm hangs, or stands on a wall.
+    /// The arm hangs, stands on a wall, or leans by half a right angle.
     Mounted {
         /// Gravity in the base frame, m/s².
         gravity_m_s2: [f64; 3],
     },
 }
 
-fn from_one<S: serde::Serializer, const N: usize>(
-    joints: &[usize; N],
+fn from_one<S: serde::Serializer>(
+    joints: &impl AsRef<[usize]>,
     serializer: S,
 ) -> Result<S::Ok, S::Error> {
-    serializer.collect_seq(joints.iter().map(|j| j + 1))
+    serializer.collect_seq(joints.as_ref().iter().map(|j| j + 1))
 }
 
 /// Gravity that is within this of the description's direction is the description's.
@@ -101,7 +119,46 @@ impl Change {
         });
         let mounted =
             other_gravity(arm).into_iter().map(|gravity_m_s2| Self::Mounted { gravity_m_s2 });
-        of_pairs.chain(of_joints).chain(mounted).chain([Self::AllTorquesReversed]).collect()
+        let of_all = of_pairs.chain(of_joints).chain(mounted).chain([Self::AllTorquesReversed]);
+        of_all.chain(Self::orders(arm)).collect()
+    }
+
+    /// The joints from the last to the first, in the order of their names, and one or more columns away.
+    fn orders(arm: &Arm) -> Vec<Self> {
+        let n = arm.dof();
+        let name = |j: usize| &arm.joints[j].name;
+        let rank = |j: usize| (0..n).filter(|k| (name(*k), *k) < (name(j), j)).count();
+        let of_joints = [(0..n).rev().collect(), (0..n).map(rank).collect()];
+        let shifted = (1..n).map(|by| (0..n).map(|j| (j + by) % n).collect::<Vec<usize>>());
+        let shifted = shifted.flat_map(|order| {
+            [
+                Self::JointsOrdered { order: order.clone() },
+                Self::TorquesOrdered { order: order.clone() },
+                Self::MotionsOrdered { order },
+            ]
+        });
+        of_joints.map(|order| Self::JointsOrdered { order }).into_iter().chain(shifted).collect()
+    }
+
+    /// In how many steps two joints exchange their places, or one thing changes.
+    pub(super) fn steps(&self) -> usize {
+        match self {
+            Self::JointsOrdered { order }
+            | Self::TorquesOrdered { order }
+            | Self::MotionsOrdered { order } => {
+                let mut order = order.clone();
+                let mut steps = 0;
+                for k in 0..order.len() {
+                    while order[k] != k {
+                        let place = order[k];
+                        order.swap(k, place);
+                        steps += 1;
+                    }
+                }
+                steps
+            }
+            _ => 1,
+        }
     }
 
     /// Whether a channel of joint `j` is read otherwise.
@@ -110,6 +167,9 @@ impl Change {
             Self::JointsExchanged { joints }
             | Self::TorquesExchanged { joints }
             | Self::MotionsExchanged { joints } => joints.contains(&j),
+            Self::JointsOrdered { order }
+            | Self::TorquesOrdered { order }
+            | Self::MotionsOrdered { order } => order[j] != j,
             Self::TorqueReversed { joints }
             | Self::JointReversed { joints }
             | Self::MotionReversed { joints }
@@ -121,39 +181,47 @@ impl Change {
     /// What to do, in a sentence.
     pub(super) fn remedy(&self) -> &'static str {
         match self {
-            Self::JointsExchanged { .. }
-            | Self::TorquesExchanged { .. }
-            | Self::MotionsExchanged { .. } => {
-                "List the columns in the order of the arm's joints in a layout ([columns], --layout)."
-            }
-            Self::TorqueReversed { .. }
-            | Self::AllTorquesReversed
-            | Self::JointReversed { .. }
-            | Self::MotionReversed { .. }
-            | Self::ZeroTurned { .. } => {
-                "Say so in a layout ([joints], --layout), or turn the joint in the description of the robot."
-            }
             Self::Mounted { .. } => {
                 "Say how the arm is mounted: gravity_m_s2 in its robot file, or in the drives.toml beside its URDF."
+            }
+            _ => {
+                "Say so in a layout ([joints], --layout), or correct the description of the robot."
             }
         }
     }
 }
 
-/// Gravity along the axes of the base frame, as strong as described and elsewhere.
+/// Gravity along the axes of the base frame and half way between two of them, as strong as described and elsewhere.
 pub(super) fn other_gravity(arm: &Arm) -> Vec<[f64; 3]> {
     let described = arm.gravity_m_s2;
     let g = described.norm();
     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
-    let directions = axes.iter().flat_map(|axis| [*axis, -axis]);
-    let others = directions.filter(|d| g > 0.0 && d.dot(&described) < SAME_DIRECTION * g);
+    let along = axes.iter().flat_map(|axis| [*axis, -axis]);
+    let between = [(0, 1), (0, 2), (1, 2)].into_iter().flat_map(|(a, b)| {
+        let signs: [(f64, f64); 4] = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
+        signs.map(|(s, t)| (axes[a] * s + axes[b] * t).normalize())
+    });
+    let others = along.chain(between).filter(|d| g > 0.0 && d.dot(&described) < SAME_DIRECTION * g);
     // −0 + 0 = 0: no minus sign in front of nothing.
     others.map(|direction| (direction * g).add_scalar(0.0).into()).collect()
 }
 
 impl fmt::Display for Change {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
+        let listed = |order: &[usize]| {
+            let joints: Vec<String> = order.iter().map(|joint| (joint + 1).to_string()).collect();
+            joints.join(", ")
+        };
+        match self {
+            Self::JointsOrdered { order } => {
+                write!(f, "the columns of the joints in the order {}", listed(order))
+            }
+            Self::TorquesOrdered { order } => {
+                write!(f, "the torques in the order {}", listed(order))
+            }
+            Self::MotionsOrdered { order } => {
+                write!(f, "angles and velocities in the order {}", listed(order))
+            }
             Self::JointsExchanged { joints: [a, b] } => {
                 write!(f, "the columns of joints {} and {} exchanged", a + 1, b + 1)
             }

@@ -2,45 +2,49 @@
 //!
 //! A mistake in the description of a log leaves no rigid body, no friction and no drive as it is, and what a diagnosis would find of
 //! it is nonsense of great certainty. Of the few ways in which logs and descriptions of arms differ in practice ([`Change`])
-//! those are looked for that make the model fit, one after the other, each time the one that gains most:
+//! those are looked for that make the model fit, the fewest that do:
 //!
-//! minimise Σ_j ln (‖e_j‖² / ‖τ_j‖²),   the likelihood of torques whose noise is not known, joint by joint,
+//! minimise Σ_j ln (‖e_j‖² / ‖τ_j‖²) + λ × changes,   the likelihood of torques whose noise is not known, joint by joint,
 //!
-//! e_j the residual of the full set of base parameters, and ten times as large where Coulomb friction comes out as something that
-//! pushes. Parameters cannot stand in for the changes, so that the right ones are told by a residual that falls by far more than any law
+//! e_j the residual of the full set of base parameters, and ten times as large where friction comes out as something that pushes. All
+//! torques together with the other sign are other parameters and no other residual: that sign is told by friction, which brakes, and where
+//! there is next to none by gravity, which pulls as described. Parameters cannot stand in for the changes, so that the right ones are told by a residual that falls by far more than any law
 //! of friction takes from it.
 //!
 //! Enters: the arm and a log laid out for regression. Leaves: a [`Misreading`], or nothing.
 
+mod bench;
 mod change;
 mod reading;
+mod search;
 
-use rayon::prelude::*;
 use serde::Serialize;
 
+pub use bench::Match;
 pub use change::Change;
-pub use reading::Match;
 
 use super::identifier::Regression;
 use super::options::Options;
+use crate::log::Layout;
 use crate::robot::Arm;
-use reading::{Bench, Reading};
+use bench::Bench;
+use reading::Reading;
 
 /// A log that fits its arm when it is read otherwise.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Misreading {
-    /// How it has to be read, in the order of what each gains.
+    /// How it has to be read: places, signs, zeros, and how the arm is mounted.
     pub changes: Vec<Change>,
     /// How well the arm fits the log as it is read.
     pub as_read: Match,
     /// How well with the changes.
     pub otherwise: Match,
+    #[serde(skip)]
+    reading: Reading,
 }
 
 /// Share of the torque (rms) up to which the model explains a joint, whatever is read otherwise.
 const EXPLAINED: f64 = 0.03;
-/// Least gain of a change, in Σ ln (‖e_j‖² / ‖τ_j‖²): one joint's residual halves.
-const LEAST_GAIN: f64 = 1.4;
 /// Factor by which the rms residual of a joint has to fall for every joint that is read otherwise, and that of one joint at
 /// least: laws of friction and soft gears bring 1.5 on real arms, and wrong changes take more elsewhere than they bring.
 const FALLS: f64 = 3.0;
@@ -53,33 +57,23 @@ const FITS: f64 = 0.5;
 impl Misreading {
     /// Of the log in `regression`; `None` where the model explains it, or no change makes it.
     pub fn of(arm: &Arm, regression: &Regression, options: &Options) -> Option<Self> {
-        let mut reading = Reading::of(regression, options)?;
-        let mut bench = Bench::new(arm)?;
-        let as_read = bench.fit(&reading)?;
-        let is_explained = as_read.left.iter().all(|share| *share < EXPLAINED);
-        if is_explained && !as_read.friction_pushes.contains(&true) {
+        let mut bench = Bench::new(arm, regression, options)?;
+        let as_read = bench.fit(&Reading::as_read(arm.dof()))?;
+        if !as_read.leaves_more_than(EXPLAINED) {
             return None;
         }
         bench.add_mountings(arm);
-        let possible = Change::all(arm);
-        let mut otherwise = as_read.clone();
-        let mut changes: Vec<Change> = Vec::new();
-        while changes.len() < arm.dof() {
-            let tried = possible.par_iter().filter_map(|change| {
-                let changed = reading.with(*change);
-                let fit = bench.fit(&changed)?;
-                Some((*change, changed, fit))
-            });
-            let best = tried.min_by(|a, b| a.2.misfit().total_cmp(&b.2.misfit()));
-            let Some((change, changed, fit)) = best else { break };
-            if otherwise.misfit() - fit.misfit() < LEAST_GAIN {
-                break;
-            }
-            changes.push(change);
-            (reading, otherwise) = (changed, fit);
-        }
-        let found = Self { changes, as_read, otherwise };
+        let (reading, otherwise) = search::best(arm, &bench, &as_read);
+        let changes = reading.changes();
+        let found = Self { changes, as_read, otherwise, reading };
         found.is_convincing().then_some(found)
+    }
+
+    /// The lines of a layout with which the log is read as it was recorded, `layout` being the one it is read with, under the name or
+    /// in the file `like`; `None` where it is the arm that is mounted otherwise, and no more.
+    pub fn layout(&self, layout: &Layout, like: &str) -> Option<String> {
+        let counting = self.reading.counting();
+        (!counting.is_as_described()).then(|| layout.recounted(like, counting))
     }
 
     fn is_convincing(&self) -> bool {

@@ -1,195 +1,209 @@
-//! A log as it may be read, and how well the arm fits it.
+//! A way to read a log, and in which changes it differs from how the log is read.
 
-use nalgebra::Vector3;
-use serde::Serialize;
+use super::change::Change;
+use crate::log::{Counting, Place};
 
-use super::change::{Change, other_gravity};
-use crate::base::{BaseSet, Parameterisation};
-use crate::dynamics::{Model, Motion, Parameter, ParameterLayout};
-use crate::identify::columns::ColumnPlan;
-use crate::identify::fit::{Fitter, Weighting};
-use crate::identify::identifier::Regression;
-use crate::identify::options::Options;
-use crate::identify::problem::{Assembler, Problem};
-use crate::identify::whiten::smoothed;
-use crate::robot::{Arm, JointSignals};
-use crate::signal::{Scratch, ZeroPhase, mean_period};
-
-/// Motion and torque at some instants, and how the arm is mounted.
-#[derive(Debug, Clone)]
+/// How joints are counted in the log, and how the arm is mounted.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Reading {
-    motion: Motion,
-    torque_nm: JointSignals,
+    counting: Counting,
     /// `None`: as described.
     gravity_m_s2: Option<[f64; 3]>,
 }
 
-/// Instants that are looked at: ten equations for each parameter.
-const INSTANTS: usize = 400;
+/// Zeros that differ by less are one, rad: sums of quarter turns have round-off.
+const SAME_ZERO_RAD: f64 = 1e-6;
 
 impl Reading {
-    /// Of the log in `regression`: the mean period, or the run behind the low-pass of `options`; `None` where that cannot be made.
-    pub fn of(regression: &Regression, options: &Options) -> Option<Self> {
-        let Regression { prepared, .. } = regression;
-        let (motion, torque_nm) = (&prepared.motion, &prepared.torque_nm);
-        let n = motion.samples();
-        let every = n.div_ceil(INSTANTS);
-        let thinned =
-            |y: &JointSignals| y.map_joints(|_, y| y.iter().copied().step_by(every).collect());
-        let of_motion = |motion: &Motion| Motion {
-            q_rad: thinned(&motion.q_rad),
-            qd_rad_s: thinned(&motion.qd_rad_s),
-            qdd_rad_s2: thinned(&motion.qdd_rad_s2),
-        };
-        if torque_nm.samples() > n {
-            let mean = torque_nm.map_joints(|_, y| mean_period(y, n));
-            return Some(Self {
-                motion: of_motion(motion),
-                torque_nm: thinned(&mean),
-                gravity_m_s2: None,
-            });
-        }
-        let Options { cutoff_hz, order, .. } = *options;
-        let rate_hz = prepared.processing.rate_hz;
-        let mut scratch = Scratch::default();
-        let smooth = smoothed(motion, false, rate_hz, cutoff_hz, order, &mut scratch).ok()?;
-        let filter = ZeroPhase::new(cutoff_hz, order, rate_hz).ok()?;
-        let mut torque_nm = torque_nm.clone();
-        for j in 0..torque_nm.joints() {
-            filter.filter_in_place(torque_nm.joint_mut(j), &mut scratch).ok()?;
-        }
-        Some(Self {
-            motion: of_motion(&smooth),
-            torque_nm: thinned(&torque_nm),
-            gravity_m_s2: None,
-        })
+    /// The log of an arm with so many joints as it is read.
+    pub fn as_read(joints: usize) -> Self {
+        Self { counting: Counting::as_described(joints), gravity_m_s2: None }
+    }
+
+    /// Of what is read, how joints are counted.
+    pub fn counting(&self) -> &Counting {
+        &self.counting
+    }
+
+    /// Gravity in the base frame where the arm is mounted otherwise than described, m/s².
+    pub fn gravity_m_s2(&self) -> Option<[f64; 3]> {
+        self.gravity_m_s2
     }
 
     /// Read with `change` as well.
-    pub fn with(&self, change: Change) -> Self {
+    pub fn with(&self, change: &Change) -> Self {
         let mut other = self.clone();
-        let Motion { q_rad, qd_rad_s, qdd_rad_s2 } = &mut other.motion;
-        let torque_nm = &mut other.torque_nm;
+        let counting = &mut other.counting;
+        let joints = counting.motion().len();
+        let exchanged = |[a, b]: [usize; 2]| {
+            let mut order: Vec<usize> = (0..joints).collect();
+            order.swap(a, b);
+            order
+        };
         match change {
             Change::JointsExchanged { joints } => {
-                for signals in [q_rad, qd_rad_s, qdd_rad_s2, torque_nm] {
-                    signals.exchange(joints);
-                }
+                counting.order_motions(&exchanged(*joints));
+                counting.order_torques(&exchanged(*joints));
             }
-            Change::TorquesExchanged { joints } => torque_nm.exchange(joints),
-            Change::MotionsExchanged { joints } => {
-                for signals in [q_rad, qd_rad_s, qdd_rad_s2] {
-                    signals.exchange(joints);
-                }
+            Change::TorquesExchanged { joints } => counting.order_torques(&exchanged(*joints)),
+            Change::MotionsExchanged { joints } => counting.order_motions(&exchanged(*joints)),
+            Change::JointsOrdered { order } => {
+                counting.order_motions(order);
+                counting.order_torques(order);
             }
-            Change::TorqueReversed { joints: [j] } => torque_nm.reverse(j),
-            Change::AllTorquesReversed => {
-                (0..torque_nm.joints()).for_each(|j| torque_nm.reverse(j));
-            }
+            Change::TorquesOrdered { order } => counting.order_torques(order),
+            Change::MotionsOrdered { order } => counting.order_motions(order),
+            Change::TorqueReversed { joints: [j] } => counting.reverse_torque(*j),
+            Change::AllTorquesReversed => (0..joints).for_each(|j| counting.reverse_torque(j)),
             Change::JointReversed { joints: [j] } => {
-                for signals in [q_rad, qd_rad_s, qdd_rad_s2, torque_nm] {
-                    signals.reverse(j);
-                }
+                counting.reverse_motion(*j);
+                counting.reverse_torque(*j);
             }
-            Change::MotionReversed { joints: [j] } => {
-                for signals in [q_rad, qd_rad_s, qdd_rad_s2] {
-                    signals.reverse(j);
-                }
-            }
-            Change::ZeroTurned { joints: [j], add_rad } => {
-                q_rad.joint_mut(j).iter_mut().for_each(|q| *q += add_rad);
-            }
-            Change::Mounted { gravity_m_s2 } => other.gravity_m_s2 = Some(gravity_m_s2),
+            Change::MotionReversed { joints: [j] } => counting.reverse_motion(*j),
+            Change::ZeroTurned { joints: [j], add_rad } => counting.turn(*j, *add_rad),
+            Change::Mounted { gravity_m_s2 } => other.gravity_m_s2 = Some(*gravity_m_s2),
         }
+        other.counting.leave_out_whole_turns();
         other
     }
-}
 
-/// Share of the torque (rms) that friction has where it counts: what is less may be another law.
-const FRICTION: f64 = 0.1;
-/// Share of the torque (rms) that may be left where friction is to be believed: noise that hides a joint's torque has no sign.
-const KNOWN: f64 = 0.3;
-/// What friction that pushes is worth in a misfit: a residual ten times as large.
-const PUSHES: f64 = 2.0 * std::f64::consts::LN_10;
-
-/// How well an arm fits a log, joint by joint.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Match {
-    /// Share of the torque (rms) that the model leaves.
-    pub left: Vec<f64>,
-    /// Whether Coulomb friction is negative, and a tenth of the torque or more.
-    pub friction_pushes: Vec<bool>,
-}
-
-impl Match {
-    /// ln (‖e_j‖² / ‖τ_j‖²) of joint `j`, and more where friction pushes.
-    pub(super) fn misfit_of(&self, j: usize) -> f64 {
-        let pushes = if self.friction_pushes[j] { PUSHES } else { 0.0 };
-        2.0 * self.left[j].max(f64::MIN_POSITIVE).ln() + pushes
+    /// Whether `other` is the same but for round-off.
+    pub fn is(&self, other: &Self) -> bool {
+        let (a, b) = (&self.counting, &other.counting);
+        let mut zeros = a.zero_rad().iter().zip(b.zero_rad());
+        self.gravity_m_s2 == other.gravity_m_s2
+            && a.motion() == b.motion()
+            && a.torque() == b.torque()
+            && zeros.all(|(a, b)| (a - b).abs() < SAME_ZERO_RAD)
     }
 
-    /// Of all joints.
-    pub(super) fn misfit(&self) -> f64 {
-        (0..self.left.len()).map(|j| self.misfit_of(j)).sum()
-    }
-}
-
-/// What it takes to fit an arm to readings, for every way in which it may be mounted.
-pub struct Bench {
-    mountings: Vec<Mounting>,
-}
-
-struct Mounting {
-    gravity_m_s2: Option<[f64; 3]>,
-    model: Model,
-    set: BaseSet,
-}
-
-impl Bench {
-    /// For the arm as described; `None` for one without a base set.
-    pub fn new(arm: &Arm) -> Option<Self> {
-        Some(Self { mountings: vec![Mounting::of(arm, None)?] })
-    }
-
-    /// For all other mountings as well.
-    pub fn add_mountings(&mut self, arm: &Arm) {
-        let others = other_gravity(arm).into_iter();
-        self.mountings.extend(others.filter_map(|gravity| Mounting::of(arm, Some(gravity))));
+    /// The fewest changes that lead to it: places, then signs, then zeros, then the mounting.
+    pub fn changes(&self) -> Vec<Change> {
+        let counting = &self.counting;
+        let joints = |places: &[Place]| places.iter().map(|p| p.joint).collect::<Vec<_>>();
+        let (motion, torque) = (joints(counting.motion()), joints(counting.torque()));
+        let mut changes = Vec::new();
+        if motion == torque {
+            changes.extend(ordered(&motion, Whose::Joints));
+        } else if is_in_order(&motion) || is_in_order(&torque) {
+            changes.extend(ordered(&motion, Whose::Motions));
+            changes.extend(ordered(&torque, Whose::Torques));
+        } else {
+            let place_of = |joint: &usize| motion.iter().position(|other| other == joint);
+            let behind: Vec<usize> = torque.iter().filter_map(place_of).collect();
+            changes.extend(ordered(&motion, Whose::Joints));
+            changes.extend(ordered(&behind, Whose::Torques));
+        }
+        changes.extend(self.reversals());
+        for (j, &add_rad) in counting.zero_rad().iter().enumerate() {
+            if add_rad.abs() > SAME_ZERO_RAD {
+                changes.push(Change::ZeroTurned { joints: [j], add_rad });
+            }
+        }
+        changes.extend(self.gravity_m_s2.map(|gravity_m_s2| Change::Mounted { gravity_m_s2 }));
+        changes
     }
 
-    /// How well the full model fits `reading`; `None` where the motion that is read does not tell all its parameters.
-    pub fn fit(&self, reading: &Reading) -> Option<Match> {
-        let mut mountings = self.mountings.iter();
-        let Mounting { model, set, .. } =
-            mountings.find(|m| m.gravity_m_s2 == reading.gravity_m_s2)?;
-        let mut problem = Problem::new(ColumnPlan::new(model, set), 0.0);
-        let Reading { motion, torque_nm, .. } = reading;
-        Assembler::new(model).assemble(&mut problem, model, motion, torque_nm);
-        let fit = Fitter::new(&problem).fit(&problem, set, Weighting::PerJoint).ok()?;
-        let squares = fit.residual_squares.iter().zip(&fit.torque_squares);
-        let left: Vec<f64> = squares.map(|(residual, torque)| (residual / torque).sqrt()).collect();
-        let layout = ParameterLayout::new(model.dof());
-        let pushes = |j: usize| {
-            let is_friction =
-                |k: &usize| set.column(*k)[0].0 == layout.index(Parameter::Coulomb(j));
-            let Some(k) = (0..set.rank()).find(is_friction) else { return false };
-            let sign = motion.qd_rad_s.joint(j).iter().map(|qd| model.friction_sign(*qd).powi(2));
-            let friction_nm = fit.theta[k] * sign.sum::<f64>().sqrt();
-            left[j] < KNOWN && friction_nm < -FRICTION * fit.torque_squares[j].sqrt()
+    /// All torques first where that leaves fewer.
+    fn reversals(&self) -> Vec<Change> {
+        let counting = &self.counting;
+        let of_joints = |are_all_reversed: bool| {
+            let places = counting.motion().iter().zip(counting.torque());
+            let change = |(j, (motion, torque)): (usize, (&Place, &Place))| {
+                let joints = [j];
+                match (motion.is_reversed, torque.is_reversed != are_all_reversed) {
+                    (false, false) => None,
+                    (false, true) => Some(Change::TorqueReversed { joints }),
+                    (true, false) => Some(Change::MotionReversed { joints }),
+                    (true, true) => Some(Change::JointReversed { joints }),
+                }
+            };
+            places.enumerate().filter_map(change).collect::<Vec<_>>()
         };
-        let friction_pushes: Vec<bool> = (0..model.dof()).map(pushes).collect();
-        left.iter().all(|share| share.is_finite()).then_some(Match { left, friction_pushes })
+        let (single, behind_all) = (of_joints(false), of_joints(true));
+        match behind_all.len() + 1 < single.len() {
+            true => [vec![Change::AllTorquesReversed], behind_all].concat(),
+            false => single,
+        }
     }
 }
 
-impl Mounting {
-    fn of(arm: &Arm, gravity_m_s2: Option<[f64; 3]>) -> Option<Self> {
-        let arm = Arm {
-            gravity_m_s2: gravity_m_s2.map_or(arm.gravity_m_s2, Vector3::from),
-            ..arm.clone()
+/// Whose places are told.
+#[derive(Clone, Copy)]
+enum Whose {
+    Joints,
+    Motions,
+    Torques,
+}
+
+fn is_in_order(order: &[usize]) -> bool {
+    order.iter().enumerate().all(|(k, place)| k == *place)
+}
+
+/// Pairs that stand in each other's places, or an order that is more than that.
+fn ordered(order: &[usize], whose: Whose) -> Vec<Change> {
+    let moved = || order.iter().enumerate().filter(|(k, place)| k != *place);
+    if moved().all(|(k, &place)| order[place] == k) {
+        let pairs = moved().filter(|(k, place)| k < *place).map(|(k, &place)| [k, place]);
+        let exchanged = |joints| match whose {
+            Whose::Joints => Change::JointsExchanged { joints },
+            Whose::Motions => Change::MotionsExchanged { joints },
+            Whose::Torques => Change::TorquesExchanged { joints },
         };
-        let set =
-            BaseSet::find(&arm, Parameterisation::full(arm.dof(), arm.torque_offsets)).ok()?;
-        Some(Self { gravity_m_s2, model: Model::new(&arm), set })
+        return pairs.map(exchanged).collect();
+    }
+    let order = order.to_vec();
+    vec![match whose {
+        Whose::Joints => Change::JointsOrdered { order },
+        Whose::Motions => Change::MotionsOrdered { order },
+        Whose::Torques => Change::TorquesOrdered { order },
+    }]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_2;
+
+    fn read_with(changes: &[Change]) -> Reading {
+        changes.iter().fold(Reading::as_read(4), |reading, change| reading.with(change))
+    }
+
+    #[test]
+    fn what_is_done_twice_is_not_done() {
+        let exchange = Change::JointsExchanged { joints: [0, 2] };
+        let turn = Change::ZeroTurned { joints: [1], add_rad: 2.0 * FRAC_PI_2 };
+        let reverse = Change::MotionReversed { joints: [3] };
+        for change in [exchange, turn, reverse, Change::AllTorquesReversed] {
+            let twice = read_with(&[change.clone(), change.clone()]);
+            assert_eq!(twice.changes(), [], "{change:?}");
+            assert!(twice.is(&Reading::as_read(4)), "{change:?}");
+        }
+    }
+
+    #[test]
+    fn many_steps_are_told_as_few_changes() {
+        let torque = |j: usize| Change::TorqueReversed { joints: [j] };
+        let motion = |j: usize| Change::MotionReversed { joints: [j] };
+        let exchanged = |a, b| Change::JointsExchanged { joints: [a, b] };
+        let torques = |a, b| Change::TorquesExchanged { joints: [a, b] };
+        for (steps, changes) in [
+            (vec![torque(0), torque(1), torque(2)], vec![Change::AllTorquesReversed, torque(3)]),
+            (vec![torque(2), motion(2)], vec![Change::JointReversed { joints: [2] }]),
+            (vec![torque(0), exchanged(0, 3)], vec![exchanged(0, 3), torque(3)]),
+            (
+                vec![exchanged(0, 1), exchanged(1, 2)],
+                vec![Change::JointsOrdered { order: vec![1, 2, 0, 3] }],
+            ),
+            (
+                vec![exchanged(0, 1), torques(0, 1)],
+                vec![Change::MotionsExchanged { joints: [0, 1] }],
+            ),
+            (vec![exchanged(0, 1), torques(2, 3)], vec![exchanged(0, 1), torques(2, 3)]),
+        ] {
+            let reading = read_with(&steps);
+            assert_eq!(reading.changes(), changes, "{steps:?}");
+            assert!(read_with(&changes).is(&reading), "{changes:?}");
+        }
     }
 }

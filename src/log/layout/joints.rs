@@ -1,102 +1,177 @@
-//! How a recorder counts joints where the description of the robot counts otherwise.
+//! The `[joints]` table of a layout: places, signs and zeros.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
+use std::fmt::Write as _;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::units::Angle;
+use crate::log::counting::{Counting, Place};
 use crate::log::error::LayoutFault;
-use crate::log::record::{Effort, Log};
-use crate::robot::JointSignals;
 
-/// The `[joints]` table of a layout; joints count from 1.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+/// How a recorder counts joints where the description of the robot counts otherwise; joints count from 1.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub(in crate::log) struct Joints {
-    /// Joints whose angle and velocity count the other way.
+pub struct Joints {
+    /// For each joint of the arm the one that it is by the recorder's count.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    order: Option<Vec<usize>>,
+    /// The same for currents and torques, where these are counted in another order.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    torque_order: Option<Vec<usize>>,
+    /// Joints of the arm whose angle and velocity count the other way.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     motion_reversed: Vec<usize>,
-    /// Joints whose current or torque counts the other way.
+    /// Joints of the arm whose current or torque counts the other way.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     torque_reversed: Vec<usize>,
-    /// What is added to the angles, behind their reversal, in the file's unit of angle.
+    /// What is added to the angles of the arm's joints, behind their reversal, in the file's unit of angle.
+    #[serde(skip_serializing_if = "Option::is_none")]
     zero: Option<Vec<f64>>,
 }
 
 impl Joints {
     /// Whether it can be said of an arm at all.
-    pub(super) fn check(&self) -> Result<(), LayoutFault> {
-        for (key, reversed) in self.reversed() {
-            for (k, &joint) in reversed.iter().enumerate() {
+    pub(super) fn check(&self, unit: Angle) -> Result<(), LayoutFault> {
+        for (key, joints) in self.lists() {
+            for (k, &joint) in joints.iter().enumerate() {
                 if joint == 0 {
                     return Err(LayoutFault::JointFromOne { key });
                 }
-                if reversed[..k].contains(&joint) {
+                if joints[..k].contains(&joint) {
                     return Err(LayoutFault::JointTwice { key, joint });
                 }
             }
         }
-        let zero = self.zero.iter().flatten().enumerate();
-        match zero.into_iter().find(|(_, value)| !value.is_finite()) {
-            Some((j, &value)) => Err(LayoutFault::Zero { joint: j + 1, value }),
-            None => Ok(()),
+        for (j, &value) in self.zero.iter().flatten().enumerate() {
+            if !value.is_finite() {
+                return Err(LayoutFault::Zero { joint: j + 1, value });
+            }
+            if unit == Angle::Rad && value.abs() > TAU {
+                return Err(LayoutFault::ZeroInDegrees { joint: j + 1, value });
+            }
         }
+        Ok(())
     }
 
     /// Whether it can be said of an arm with so many joints.
     pub(in crate::log) fn check_for(&self, joints: usize) -> Result<(), LayoutFault> {
-        for (key, reversed) in self.reversed() {
-            if let Some(&joint) = reversed.iter().find(|joint| **joint > joints) {
+        for (key, list) in self.lists() {
+            if let Some(&joint) = list.iter().find(|joint| **joint > joints) {
                 return Err(LayoutFault::NoSuchJoint { key, joint, joints });
             }
         }
-        match &self.zero {
-            Some(zero) if zero.len() != joints => {
-                Err(LayoutFault::Zeros { found: zero.len(), joints })
-            }
+        let of_all = [("order", &self.order), ("torque_order", &self.torque_order)];
+        let lengths = of_all.map(|(key, order)| (key, order.as_ref().map(Vec::len)));
+        let zero = ("zero", self.zero.as_ref().map(Vec::len));
+        match lengths.into_iter().chain([zero]).find(|(_, n)| n.is_some_and(|n| n != joints)) {
+            Some((key, Some(found))) => Err(LayoutFault::NotAllJoints { key, found, joints }),
             _ => Ok(()),
         }
     }
 
-    fn reversed(&self) -> [(&'static str, &[usize]); 2] {
-        [("motion_reversed", &self.motion_reversed), ("torque_reversed", &self.torque_reversed)]
+    fn lists(&self) -> [(&'static str, &[usize]); 4] {
+        [
+            ("order", self.order.as_deref().unwrap_or_default()),
+            ("torque_order", self.torque_order.as_deref().unwrap_or_default()),
+            ("motion_reversed", &self.motion_reversed),
+            ("torque_reversed", &self.torque_reversed),
+        ]
     }
 
-    /// Lets `log` count as the robot's description does.
-    pub(in crate::log) fn apply(&self, log: &mut Log, unit: Angle) {
-        let Log { q_rad, qd_rad_s, target_q_rad, target_qd_rad_s, target_qdd_rad_s2, .. } = log;
-        let optional = [&mut *target_q_rad, target_qd_rad_s, target_qdd_rad_s2];
-        let motion = [&mut *q_rad, qd_rad_s].into_iter().chain(optional.into_iter().flatten());
-        motion.for_each(|signals| reverse(signals, &self.motion_reversed));
-        let efforts = [&mut log.effort].into_iter().chain(&mut log.target_effort);
-        for effort in efforts {
-            let (Effort::Current { ampere: signals, .. } | Effort::Torque(signals)) = effort;
-            reverse(signals, &self.torque_reversed);
+    /// What it says of an arm with so many joints that it can be said of.
+    pub(in crate::log) fn counting(&self, joints: usize, unit: Angle) -> Counting {
+        let mut counting = Counting::as_described(joints);
+        let from_zero = |order: &Vec<usize>| order.iter().map(|joint| joint - 1).collect();
+        let order: Option<Vec<usize>> = self.order.as_ref().map(from_zero);
+        let torque_order = self.torque_order.as_ref().map(from_zero);
+        if let Some(order) = torque_order.as_ref().or(order.as_ref()) {
+            counting.order_torques(order);
         }
-        let rad = if unit == Angle::Deg { PI / 180.0 } else { 1.0 };
-        for (j, add) in self.zero.iter().flatten().enumerate().filter(|(_, add)| **add != 0.0) {
-            for signals in [&mut *q_rad].into_iter().chain(&mut *target_q_rad) {
-                signals.joint_mut(j).iter_mut().for_each(|q| *q += rad * add);
-            }
+        if let Some(order) = order {
+            counting.order_motions(&order);
         }
+        self.motion_reversed.iter().for_each(|joint| counting.reverse_motion(joint - 1));
+        self.torque_reversed.iter().for_each(|joint| counting.reverse_torque(joint - 1));
+        for (j, add) in self.zero.iter().flatten().enumerate() {
+            counting.turn(j, add * unit.rad());
+        }
+        counting
+    }
+
+    /// What has to be said of an arm for joints to be counted so, in a file with angles in `unit`.
+    pub(in crate::log) fn of(counting: &Counting, unit: Angle) -> Self {
+        let joints = counting.motion().len();
+        let order = |places: &[Place]| places.iter().map(|p| p.joint + 1).collect::<Vec<_>>();
+        let unless = |order: Vec<usize>, plain: &[usize]| (order != plain).then_some(order);
+        let reversed = |places: &[Place]| {
+            (1..).zip(places).filter(|(_, p)| p.is_reversed).map(|(joint, _)| joint).collect()
+        };
+        let plain: Vec<usize> = (1..=joints).collect();
+        let motion = order(counting.motion());
+        let zero: Vec<f64> =
+            counting.zero_rad().iter().map(|rad| rounded(rad / unit.rad())).collect();
+        Self {
+            torque_order: unless(order(counting.torque()), &motion),
+            order: unless(motion, &plain),
+            motion_reversed: reversed(counting.motion()),
+            torque_reversed: reversed(counting.torque()),
+            zero: zero.iter().any(|zero| *zero != 0.0).then_some(zero),
+        }
+    }
+
+    /// As a layout says it, from `[joints]` on.
+    pub(super) fn lines(&self) -> String {
+        let mut lines = "[joints]".to_owned();
+        for (key, joints) in self.lists().iter().filter(|(_, joints)| !joints.is_empty()) {
+            let _ = write!(lines, "\n{key} = {joints:?}");
+        }
+        if let Some(zero) = &self.zero {
+            let _ = write!(lines, "\nzero = {zero:?}");
+        }
+        lines
     }
 }
 
-fn reverse(signals: &mut JointSignals, joints: &[usize]) {
-    joints.iter().for_each(|joint| signals.reverse(joint - 1));
+/// 90 for 90.00000000000001: what was a unit of angle before has no more digits than that.
+fn rounded(zero: f64) -> f64 {
+    const DIGITS: f64 = 1e12;
+    // −0 + 0 = 0.
+    (zero * DIGITS).round() / DIGITS + 0.0
+}
+
+impl Angle {
+    /// In rad.
+    fn rad(self) -> f64 {
+        match self {
+            Self::Rad => 1.0,
+            Self::Deg => PI / 180.0,
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::log::{Layout, Log, LogError, read_log_from};
 
     const FILE: &str = "t;q1;q2;w1;w2;m1;m2;g1;g2\n0.0;10;20;1;2;3;4;11;21\n0.1;10.1;20.2;1;2;3;4;11;21\n\
         0.2;10.2;20.4;1;2;3;4;11;21\n";
 
-    fn read(joints: &str) -> Result<Log, LogError> {
-        let text = format!(
+    fn text(joints: &str) -> String {
+        format!(
             "name = \"mine\"\nheader = true\ndelimiter = \"semicolon\"\n{joints}\n[units]\nq = \"deg\"\nqd = \"deg/s\"\n[columns]\n\
              time = \"t\"\nq = \"q{{1}}\"\nqd = \"w{{1}}\"\ntorque = \"m{{1}}\"\ntarget_q = \"g{{1}}\"\n"
-        );
-        read_log_from(FILE.as_bytes(), "x.csv", &Layout::from_toml(&text, "mine.toml")?, 2)
+        )
+    }
+
+    fn read(joints: &str) -> Result<Log, LogError> {
+        let layout = Layout::from_toml(&text(joints), "mine.toml")?;
+        read_log_from(FILE.as_bytes(), "x.csv", &layout, 2)
+    }
+
+    fn close(a: f64, b_deg: f64) {
+        assert!((a.to_degrees() - b_deg).abs() < 1e-12, "{a} {b_deg}");
     }
 
     #[test]
@@ -104,8 +179,6 @@ mod tests {
         let as_written = read("").unwrap();
         let log = read("joints = { motion_reversed = [2], torque_reversed = [1], zero = [0, 90] }")
             .unwrap();
-        let close =
-            |a: f64, b_deg: f64| assert!((a.to_degrees() - b_deg).abs() < 1e-12, "{a} {b_deg}");
         close(log.q_rad.joint(1)[0], 70.0);
         close(log.qd_rad_s.joint(1)[0], -2.0);
         close(log.target_q_rad.as_ref().unwrap().joint(1)[0], 69.0);
@@ -113,6 +186,40 @@ mod tests {
         assert_eq!(log.effort.signals().joint(1), as_written.effort.signals().joint(1));
         assert_eq!(log.q_rad.joint(0), as_written.q_rad.joint(0));
         assert_eq!(log.qd_rad_s.joint(0), as_written.qd_rad_s.joint(0));
+    }
+
+    #[test]
+    fn joints_stand_where_the_layout_says() {
+        let log = read("joints = { order = [2, 1], motion_reversed = [1] }").unwrap();
+        close(log.q_rad.joint(0)[0], -20.0);
+        close(log.q_rad.joint(1)[0], 10.0);
+        close(log.qd_rad_s.joint(0)[0], -2.0);
+        close(log.target_q_rad.as_ref().unwrap().joint(1)[0], 11.0);
+        assert_eq!(log.effort.signals().joint(0)[0], 4.0);
+        let log = read("joints = { order = [2, 1], torque_order = [1, 2] }").unwrap();
+        close(log.q_rad.joint(0)[0], 20.0);
+        assert_eq!(log.effort.signals().joint(0)[0], 3.0);
+        let log = read("joints = { torque_order = [2, 1] }").unwrap();
+        close(log.q_rad.joint(0)[0], 10.0);
+        assert_eq!(log.effort.signals().joint(0)[0], 4.0);
+    }
+
+    /// What is printed for a counting is read as that counting.
+    #[test]
+    fn the_lines_say_what_they_were_made_of() {
+        let said = "joints = { order = [2, 1], torque_order = [1, 2], motion_reversed = [2], torque_reversed = [1], zero = [0, -90] }";
+        let layout = Layout::from_toml(&text(said), "mine.toml").unwrap();
+        let counting = layout.counting(2);
+        for unit in [Angle::Deg, Angle::Rad] {
+            let lines = Joints::of(&counting, unit).lines();
+            let again: toml::Table = toml::from_str(&lines).unwrap();
+            let again: Joints = again["joints"].clone().try_into().unwrap();
+            let again = again.counting(2, unit);
+            assert_eq!(again.motion(), counting.motion(), "{lines}");
+            assert_eq!(again.torque(), counting.torque(), "{lines}");
+            assert!((again.zero_rad()[1] - counting.zero_rad()[1]).abs() < 1e-12, "{lines}");
+        }
+        assert!(Joints::of(&counting, Angle::Deg).lines().contains("zero = [0.0, -90.0]"));
     }
 
     #[test]
@@ -124,11 +231,23 @@ mod tests {
             ("joints = { zero = [0.0] }", ["zero", "1 number"]),
             ("joints = { zero = [0.0, nan] }", ["zero", "NaN"]),
             ("joints = { zeros = [0.0, 1.0] }", ["zeros", "unknown field"]),
+            ("joints = { order = [1] }", ["order", "1 number"]),
+            ("joints = { order = [1, 1] }", ["order", "joint 1 twice"]),
+            ("joints = { torque_order = [1, 3] }", ["torque_order", "joint 3"]),
         ] {
             let message = read(joints).unwrap_err().to_string();
             for part in parts {
                 assert!(message.contains(part), "{joints}: {message}");
             }
+        }
+    }
+
+    #[test]
+    fn degrees_among_radians_are_refused() {
+        let text = text("joints = { zero = [0, 90] }").replace("q = \"deg\"", "q = \"rad\"");
+        let message = Layout::from_toml(&text, "mine.toml").unwrap_err().to_string();
+        for part in ["joint 2", "90", "degrees", "1.5708"] {
+            assert!(message.contains(part), "{message}");
         }
     }
 }

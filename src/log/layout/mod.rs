@@ -6,15 +6,19 @@
 mod block;
 mod columns;
 mod joints;
+mod like;
 mod units;
+
+use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
+use super::counting::Counting;
 use super::error::{LayoutFault, LogError};
 pub(super) use block::Block;
 use columns::Blocks;
 pub(super) use columns::Columns;
-use joints::Joints;
+pub use joints::Joints;
 pub(super) use units::{Angle, AngularVelocity, TimeUnit, Units};
 
 /// Layouts built in, by the name given to `--layout`.
@@ -23,6 +27,16 @@ const BUILT_IN: [(&str, &str); 3] = [
     ("ur10e_innopolis", include_str!("../../../layouts/ur10e_innopolis.toml")),
     ("ur10e_innopolis_author", include_str!("../../../layouts/ur10e_innopolis_author.toml")),
 ];
+
+/// The text of the layout built in by this name.
+fn built_in(name: &str) -> Option<&'static str> {
+    BUILT_IN.iter().find(|(built_in, _)| *built_in == name).map(|(_, text)| *text)
+}
+
+/// Whether a name is that of a layout file.
+fn is_file(name: &str) -> bool {
+    Path::new(name).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+}
 
 /// Names of the layouts built in; the first is the default.
 pub fn built_in_layout_names() -> impl Iterator<Item = &'static str> {
@@ -57,7 +71,8 @@ pub(super) fn built_in_without_header() -> impl Iterator<Item = &'static str> {
 /// current = { first = 14, last = 19 }   # column numbers count from 1
 ///
 /// [joints]                     # where the robot's description counts otherwise; joints from 1
-/// motion_reversed = [3]        # angle and velocity
+/// order = [3, 2, 1, 4, 5, 6]   # each joint of the arm by the recorder's count; torque_order, where torques have their own
+/// motion_reversed = [3]        # angle and velocity, by the arm's count
 /// torque_reversed = [3]
 /// zero = [0, -90, 0, 0, 0, 0]  # added to the angles, in the unit of q
 /// ```
@@ -71,6 +86,9 @@ pub(super) fn built_in_without_header() -> impl Iterator<Item = &'static str> {
 /// fields = 19
 /// blocks = ["time", "q", "qd", "current"]
 /// ```
+///
+/// With `like = "armid"` (a name, or a file beside this one) whatever is not said is as in that layout: `[units]` and `[columns]`
+/// key by key, all else as a whole.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Layout {
@@ -89,6 +107,9 @@ pub struct Layout {
     columns: Blocks,
     #[serde(default, rename = "width")]
     pub(super) widths: Vec<Width>,
+    /// Files that say it.
+    #[serde(skip)]
+    files: Vec<PathBuf>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
@@ -123,18 +144,19 @@ impl Layout {
     /// # Errors
     /// [`LogError::UnknownLayout`], or [`LogError::Layout`] with what is wrong in the file.
     pub fn load(name_or_path: &str) -> Result<Self, LogError> {
-        if let Some((name, text)) = BUILT_IN.iter().find(|(name, _)| *name == name_or_path) {
-            return Self::from_toml(text, name);
+        if let Some(text) = built_in(name_or_path) {
+            return Self::from_toml(text, name_or_path);
         }
-        let path = std::path::Path::new(name_or_path);
-        if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("toml")) {
+        if !is_file(name_or_path) {
             return Err(LogError::UnknownLayout { name: name_or_path.to_owned() });
         }
-        let text = std::fs::read_to_string(path).map_err(|e| LogError::Layout {
+        let text = std::fs::read_to_string(name_or_path).map_err(|e| LogError::Layout {
             file: name_or_path.to_owned(),
             fault: LayoutFault::Read(e),
         })?;
-        Self::from_toml(&text, name_or_path)
+        let mut layout = Self::from_toml(&text, name_or_path)?;
+        layout.files.insert(0, name_or_path.into());
+        Ok(layout)
     }
 
     /// From the text of a layout file; `source` names it in messages.
@@ -143,10 +165,33 @@ impl Layout {
     /// [`LogError::Layout`] with what is wrong.
     pub fn from_toml(text: &str, source: &str) -> Result<Self, LogError> {
         let fault = |fault| LogError::Layout { file: source.to_owned(), fault };
-        let layout: Self =
-            toml::from_str(text).map_err(|e| fault(LayoutFault::Toml(e.to_string())))?;
+        let toml = |e: toml::de::Error| fault(LayoutFault::Toml(e.to_string()));
+        let layout = match like::overlaid(text, source).map_err(fault)? {
+            Some((table, files)) => Self { files, ..table.try_into().map_err(toml)? },
+            // Only text has lines that an error can name.
+            None => toml::from_str(text).map_err(toml)?,
+        };
         layout.check().map_err(fault)?;
         Ok(layout)
+    }
+
+    /// The files that say it, its own first; none of a layout built in.
+    pub fn files(&self) -> &[PathBuf] {
+        &self.files
+    }
+
+    /// How it has the joints of an arm with so many counted.
+    pub(super) fn counting(&self, joints: usize) -> Counting {
+        self.joints.counting(joints, self.units.q)
+    }
+
+    /// The lines of a layout that reads as this one, named `like`, and counts joints as `counting` does what this one reads.
+    pub fn recounted(&self, like: &str, counting: &Counting) -> String {
+        let earlier = self.counting(counting.motion().len());
+        let mut both = counting.of_what_is_read_with(&earlier);
+        both.leave_out_whole_turns();
+        let joints = Joints::of(&both, self.units.q).lines();
+        format!("name = \"{} recounted\"\nlike = {like:?}\n\n{joints}", self.name)
     }
 
     pub(super) fn columns(&self, block: Block) -> Option<&Columns> {
@@ -162,8 +207,11 @@ impl Layout {
         if self.decimal_comma && self.delimiter == DelimiterChoice::Comma {
             return Err(LayoutFault::CommaTwice);
         }
-        self.joints.check()?;
+        self.joints.check(self.units.q)?;
         let has = |block| self.columns(block).is_some();
+        if has(Block::TimeNanoseconds) && self.units.time == TimeUnit::Ns {
+            return Err(LayoutFault::NanosecondsTwice);
+        }
         check_blocks(has, "[columns]")?;
         for block in Block::ALL {
             if let Some(columns) = self.columns(block) {

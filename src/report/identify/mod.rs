@@ -15,14 +15,15 @@ pub use declined::Declined;
 pub use intervals::{AgreementResult, Intervals, TestResult};
 pub use page::{facts, page, parameter_table, residual_table};
 
+use super::misread::MisreadLog;
 use super::physical::{Physical, StandardParameter, standard_parameters};
 use super::rows::{Rows, log_warnings, names};
 use crate::base::BaseSet;
 use crate::identify::covariance::CovarianceKind;
 use crate::identify::physical::PhysicalEstimate;
 use crate::identify::{
-    Condition, Doubt, Estimator, FitError, Identification, Misreading, Prediction, Processing,
-    Regression, Residual, drive_limit_remark, identifies_the_arm, not_identified,
+    Condition, Doubt, Estimator, FitError, Identification, Prediction, Processing, Regression,
+    Residual, drive_limit_remark, identifies_the_arm, not_identified,
 };
 use crate::log::Log;
 use crate::robot::{Arm, Kinematics};
@@ -56,16 +57,6 @@ pub struct Training<'a> {
     pub reduced: Option<&'a str>,
     /// The first of the logs that fits the arm when it is read otherwise.
     pub misread: Option<&'a MisreadLog>,
-}
-
-/// A log that fits its arm when it is read otherwise.
-#[derive(Debug, Clone, Serialize)]
-pub struct MisreadLog {
-    /// Its name.
-    pub log: String,
-    /// How it has to be read.
-    #[serde(flatten)]
-    pub misreading: Misreading,
 }
 
 /// A prediction of a log that was not used for the fit.
@@ -217,7 +208,7 @@ impl Result {
         let several = training.logs.len() > 1;
         let doubt = match training.misread {
             // It explains whatever else could be doubted.
-            Some(MisreadLog { log, misreading }) => {
+            Some(MisreadLog { log, misreading, .. }) => {
                 let name = if several { format!("{log}: ") } else { String::new() };
                 let sentence = format!("{name}{}", misreading.sentence());
                 Some(Doubt { is_contradiction: true, sentence })
@@ -304,6 +295,11 @@ impl Result {
     pub fn trust(&self) -> Option<&str> {
         let is_asked = self.intervals.trusted != Some(false) && self.misreading.is_none();
         is_asked.then_some(&*self.intervals.reason)
+    }
+
+    /// How the log has to be read, where it is misread.
+    pub fn misread(&self) -> Option<&MisreadLog> {
+        self.misreading.as_ref()
     }
 
     /// The warnings that the verdict does not begin with.

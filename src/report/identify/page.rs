@@ -6,6 +6,7 @@ use super::{Result, Training, Validation};
 use crate::identify::Prediction;
 use crate::number::{significant, with_sigma};
 use crate::report::json::Program;
+use crate::report::misread::MisreadLog;
 use crate::report::plot::{Axis, Colour, Grid, IntervalPlot, IntervalRow, Mark};
 use crate::report::{Column, Page, ReportError, Section, Status, Table, Verdict};
 use crate::robot::JointSignals;
@@ -121,6 +122,11 @@ pub fn page(
     let verdict = Verdict { status, sentence: result.sentence(), facts: facts(result) };
     let subtitle = format!("{} from {}", result.robot, result.log);
     let mut page = Page::new("Identified parameters", subtitle, verdict, program);
+    result
+        .misread()
+        .and_then(MisreadLog::section)
+        .into_iter()
+        .for_each(|section| page.push(section));
     let fit = Prediction::of(training.regression, &training.identification.fit.theta);
     let section = Section::new("Torque: measured and predicted")
         .figure(torque_figure("Torque along the training log", &fit)?, "")

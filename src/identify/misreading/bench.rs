@@ -1,0 +1,198 @@
+//! How well an arm fits a log as it may be read.
+
+use nalgebra::Vector3;
+use serde::Serialize;
+
+use super::change::other_gravity;
+use super::reading::Reading;
+use crate::base::{BaseSet, Parameterisation};
+use crate::dynamics::{Model, Motion, Parameter, ParameterLayout};
+use crate::identify::columns::ColumnPlan;
+use crate::identify::fit::{Fitter, Weighting};
+use crate::identify::identifier::Regression;
+use crate::identify::options::Options;
+use crate::identify::problem::{Assembler, Problem};
+use crate::identify::whiten::smoothed;
+use crate::robot::{Arm, JointSignals};
+use crate::signal::{Scratch, ZeroPhase, mean_period};
+
+/// Share of the torque (rms) that friction has where it counts: what is less may be another law.
+const FRICTION: f64 = 0.1;
+/// Share of the torque (rms) that may be left where friction is to be believed: noise that hides a joint's torque has no sign.
+const KNOWN: f64 = 0.3;
+/// What friction that pushes is worth in a misfit: a residual ten times as large.
+const PUSHES: f64 = 2.0 * std::f64::consts::LN_10;
+/// Mean share of the torque (rms) that friction has on all joints where its sign tells more than gravity's does: it brakes any arm,
+/// gravity pulls as described where the description of the mounting holds.
+const TELLS: f64 = 0.02;
+
+/// How well an arm fits a log, joint by joint.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Match {
+    /// Share of the torque (rms) that the model leaves.
+    pub left: Vec<f64>,
+    /// Whether Coulomb and viscous friction do work on the joint, and are a tenth of the torque or more.
+    pub friction_pushes: Vec<bool>,
+    /// Mean share of the torque (rms) that friction has, negative where it pushes.
+    #[serde(skip)]
+    friction: f64,
+    /// Cosine of the angle between the first moments that were found and those described.
+    #[serde(skip)]
+    gravity: f64,
+}
+
+impl Match {
+    /// ln (‖e_j‖² / ‖τ_j‖²) of joint `j`, and more where friction pushes.
+    pub(super) fn misfit_of(&self, j: usize) -> f64 {
+        let pushes = if self.friction_pushes[j] { PUSHES } else { 0.0 };
+        2.0 * self.left[j].max(f64::MIN_POSITIVE).ln() + pushes
+    }
+
+    /// Of all joints.
+    pub(super) fn misfit(&self) -> f64 {
+        (0..self.left.len()).map(|j| self.misfit_of(j)).sum()
+    }
+
+    /// Whether the model leaves more than `share` of the torque of a joint, or friction pushes one.
+    pub(super) fn leaves_more_than(&self, share: f64) -> bool {
+        self.left.iter().any(|left| *left > share) || self.friction_pushes.contains(&true)
+    }
+
+    /// Whether it is the other sign of all torques that friction, or where there is next to none, gravity as described speaks for:
+    /// the model fits both alike.
+    pub(super) fn is_turned(&self) -> bool {
+        let sign = if self.friction.abs() > TELLS { self.friction } else { self.gravity };
+        sign < 0.0
+    }
+}
+
+/// What it takes to fit an arm to readings of a log, for every way in which it may be mounted.
+pub struct Bench {
+    motion: Motion,
+    torque_nm: JointSignals,
+    mountings: Vec<Mounting>,
+}
+
+struct Mounting {
+    gravity_m_s2: Option<[f64; 3]>,
+    model: Model,
+    set: BaseSet,
+    /// First moments among the base parameters: place and value by the description.
+    first_moments: Vec<(usize, f64)>,
+}
+
+/// Instants that are looked at: ten equations for each parameter.
+const INSTANTS: usize = 400;
+
+impl Bench {
+    /// Of the arm as described and the log in `regression`: the mean period, or the run behind the low-pass of `options`; `None` for
+    /// one without a base set, and where that cannot be made.
+    pub fn new(arm: &Arm, regression: &Regression, options: &Options) -> Option<Self> {
+        let mountings = vec![Mounting::of(arm, None)?];
+        let Regression { prepared, .. } = regression;
+        let (motion, torque_nm) = (&prepared.motion, &prepared.torque_nm);
+        let n = motion.samples();
+        let every = n.div_ceil(INSTANTS);
+        let thinned =
+            |y: &JointSignals| y.map_joints(|_, y| y.iter().copied().step_by(every).collect());
+        let of_motion = |motion: &Motion| Motion {
+            q_rad: thinned(&motion.q_rad),
+            qd_rad_s: thinned(&motion.qd_rad_s),
+            qdd_rad_s2: thinned(&motion.qdd_rad_s2),
+        };
+        if torque_nm.samples() > n {
+            let mean = torque_nm.map_joints(|_, y| mean_period(y, n));
+            let (motion, torque_nm) = (of_motion(motion), thinned(&mean));
+            return Some(Self { motion, torque_nm, mountings });
+        }
+        let Options { cutoff_hz, order, .. } = *options;
+        let rate_hz = prepared.processing.rate_hz;
+        let mut scratch = Scratch::default();
+        let smooth = smoothed(motion, false, rate_hz, cutoff_hz, order, &mut scratch).ok()?;
+        let filter = ZeroPhase::new(cutoff_hz, order, rate_hz).ok()?;
+        let mut torque_nm = torque_nm.clone();
+        for j in 0..torque_nm.joints() {
+            filter.filter_in_place(torque_nm.joint_mut(j), &mut scratch).ok()?;
+        }
+        Some(Self { motion: of_motion(&smooth), torque_nm: thinned(&torque_nm), mountings })
+    }
+
+    /// For all other mountings as well.
+    pub fn add_mountings(&mut self, arm: &Arm) {
+        let others = other_gravity(arm).into_iter();
+        self.mountings.extend(others.filter_map(|gravity| Mounting::of(arm, Some(gravity))));
+    }
+
+    /// How well the full model fits the log as it is read by `reading`; `None` where the motion that is read does not tell all its
+    /// parameters.
+    pub fn fit(&self, reading: &Reading) -> Option<Match> {
+        let mut mountings = self.mountings.iter();
+        let Mounting { model, set, first_moments, .. } =
+            mountings.find(|m| m.gravity_m_s2 == reading.gravity_m_s2())?;
+        let counting = reading.counting();
+        let motion = Motion {
+            q_rad: counting.angles(&self.motion.q_rad),
+            qd_rad_s: counting.rates(&self.motion.qd_rad_s),
+            qdd_rad_s2: counting.rates(&self.motion.qdd_rad_s2),
+        };
+        let torque_nm = counting.torques(&self.torque_nm);
+        let mut problem = Problem::new(ColumnPlan::new(model, set), 0.0);
+        Assembler::new(model).assemble(&mut problem, model, &motion, &torque_nm);
+        let fit = Fitter::new(&problem).fit(&problem, set, Weighting::PerJoint).ok()?;
+        let theta = &fit.theta;
+        let squares = fit.residual_squares.iter().zip(&fit.torque_squares);
+        let left: Vec<f64> = squares.map(|(residual, torque)| (residual / torque).sqrt()).collect();
+        if !left.iter().all(|share| share.is_finite()) {
+            return None;
+        }
+        let layout = ParameterLayout::new(model.dof());
+        let value = |parameter| {
+            let index = layout.index(parameter);
+            (0..set.rank()).find(|k| set.column(*k)[0].0 == index).map_or(0.0, |k| theta[k])
+        };
+        let friction_of = |j: usize| {
+            let (coulomb_nm, viscous) =
+                (value(Parameter::Coulomb(j)), value(Parameter::Viscous(j)));
+            let (mut square, mut power_w) = (0.0, 0.0);
+            for qd_rad_s in motion.qd_rad_s.joint(j) {
+                let nm = coulomb_nm * model.friction_sign(*qd_rad_s) + viscous * qd_rad_s;
+                square += nm * nm;
+                power_w += nm * qd_rad_s;
+            }
+            (square / fit.torque_squares[j]).sqrt().copysign(power_w)
+        };
+        let friction: Vec<f64> = (0..model.dof()).map(friction_of).collect();
+        let pushes = |(left, friction): (&f64, &f64)| *left < KNOWN && *friction < -FRICTION;
+        let friction_pushes = left.iter().zip(&friction).map(pushes).collect();
+        let friction = friction.iter().sum::<f64>() / friction.len() as f64;
+        Some(Match { left, friction_pushes, friction, gravity: cosine(first_moments, theta) })
+    }
+}
+
+/// Of the angle between described values and those at their places; 0 where either has no length.
+fn cosine(described: &[(usize, f64)], found: &[f64]) -> f64 {
+    let sum = |f: &dyn Fn(f64, f64) -> f64| {
+        described.iter().map(|(k, value)| f(*value, found[*k])).sum::<f64>()
+    };
+    let lengths = (sum(&|a, _| a * a) * sum(&|_, b| b * b)).sqrt();
+    if lengths > 0.0 { sum(&|a, b| a * b) / lengths } else { 0.0 }
+}
+
+impl Mounting {
+    fn of(arm: &Arm, gravity_m_s2: Option<[f64; 3]>) -> Option<Self> {
+        let arm = Arm {
+            gravity_m_s2: gravity_m_s2.map_or(arm.gravity_m_s2, Vector3::from),
+            ..arm.clone()
+        };
+        let set =
+            BaseSet::find(&arm, Parameterisation::full(arm.dof(), arm.torque_offsets)).ok()?;
+        let model = Model::new(&arm);
+        let nominal = set.values(&model.standard_parameters());
+        let layout = ParameterLayout::new(arm.dof());
+        let is_first_moment =
+            |k: &usize| matches!(layout.parameter(set.column(*k)[0].0), Parameter::Body(_, 1..=3));
+        let first_moments = (0..set.rank()).filter(is_first_moment).map(|k| (k, nominal[k]));
+        let first_moments = first_moments.collect();
+        Some(Self { gravity_m_s2, model, set, first_moments })
+    }
+}
