@@ -278,6 +278,23 @@ fn a_urdf_is_given_back_with_its_identified_numbers() {
         assert_eq!(joint.drive.viscous_nm_s_rad, value("rv"));
         assert_eq!(joint.drive.coulomb_nm, value("rc"));
     }
+    // It is found by the name in the result, from here or beside that, or by the scenario.
+    let words = "export result.json --urdf again.urdf";
+    folder.armid(words).says(0, &["again.urdf: own.urdf with the inertia of 3 links"]);
+    assert_eq!(folder.read("again.urdf"), written);
+    let words = "simulate --scenario three.toml --arm result.json --out again.csv";
+    folder.armid(words).says(0, &["again.csv"]);
+    let named = "\"robot_source\": \"own.urdf\"";
+    let moved = folder.read("result.json").replace(named, &named.replace("own", "moved"));
+    folder.write("moved.json", &moved);
+    let words = "export moved.json --urdf lost.urdf";
+    folder.armid(words).says(1, &["moved.json", "moved.urdf", "say where it is with --robot"]);
+    let words = "simulate --scenario three.toml --arm moved.json --out again.csv";
+    folder.armid(words).says(0, &["again.csv"]);
+    folder.write("cell/result.json", &moved);
+    folder.write("cell/moved.urdf", &own);
+    let words = "export cell/result.json --urdf again.urdf";
+    folder.armid(words).says(0, &["again.urdf: cell/moved.urdf with the inertia of 3 links"]);
     folder.write("elsewhere/nothing", "");
     let words = "export result.json --robot own.urdf --urdf elsewhere/out.urdf";
     folder.armid(words).says(0, &["meshes such as meshes/hand.stl", "beside own.urdf"]);
@@ -316,7 +333,10 @@ fn results_that_hold_no_arm_are_refused_with_what_to_do() {
     refused("rotor.json", &["wrist_3", "rotor inertia = -0.1", "--physical"]);
     edited("body.json", &|v| v["standard_parameters"][4]["value"] = 50.0.into());
     refused("body.json", &["shoulder_pan", "cannot exist", "--physical"]);
-    edited("robot.json", &|v| v["robot"] = "ur9".into());
+    edited("robot.json", &|v| {
+        v["robot"] = "ur9".into();
+        v["robot_source"] = Value::Null;
+    });
     refused("robot.json", &["ur9", "built in are"]);
     refused("result.json --robot ur10e", &["\"ur5\"", "\"ur10e\""]);
     folder.armid("export result.json").says(2, &["--urdf"]);

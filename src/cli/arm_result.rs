@@ -7,6 +7,7 @@ use thiserror::Error;
 
 use super::robot::{OtherRobot, SavedRobot, load_robot};
 use crate::dynamics::{Model, Parameter, ParameterLayout};
+use crate::montecarlo::Scenario;
 use crate::report::identify::{CONTRADICTED, IDENTIFY_SCHEMA};
 use crate::report::physical::DecidedBy;
 use crate::report::saved::{SavedError, load};
@@ -53,6 +54,17 @@ pub enum ResultError {
         /// How it is another.
         fault: OtherRobot,
     },
+    /// The robot is not where the result says.
+    #[error(
+        "{file}: the robot that it is about is found neither from here nor from the folder of that file: {fault}; say where it is with \
+         --robot"
+    )]
+    NoRobot {
+        /// The file.
+        file: String,
+        /// Why not.
+        fault: RobotError,
+    },
     /// A parameter is unknown, missing, twice there or not a number.
     #[error("{file}: standard parameter \"{name}\" {fault}")]
     Parameter {
@@ -93,14 +105,21 @@ struct Value {
 }
 
 impl ArmResult {
-    /// Reads the result in `path`; it is about `robot`, or the built-in arm it names.
-    pub fn load(path: &Path, robot: Option<&str>) -> Result<Self, ResultError> {
+    /// Reads the result in `path`. It is about `robot`; where that is left out about the one that it names, and where that is
+    /// not found about the robot of that name in `scenario`.
+    pub fn load(
+        path: &Path,
+        robot: Option<&str>,
+        scenario: Option<&Scenario>,
+    ) -> Result<Self, ResultError> {
         let file = path.display().to_string();
         let result: ResultFile = load(path, IDENTIFY_SCHEMA)?;
         let values = result.standard_parameters.filter(|values| !values.is_empty());
         let values = values.ok_or_else(|| ResultError::BaseOnly { file: file.clone() })?;
-        let LoadedArm { arm, frames, files, urdf_links, .. } =
-            load_robot(robot.unwrap_or(&result.about.robot))?;
+        let LoadedArm { arm, frames, files, urdf_links, .. } = match robot {
+            Some(robot) => load_robot(robot)?,
+            None => named(&result.about, path, scenario)?,
+        };
         let other = |fault| ResultError::OtherRobot { file: file.clone(), fault };
         result.about.check(&arm).map_err(other)?;
         let standard = standard(&arm, &values).map_err(|(name, fault)| ResultError::Parameter {
@@ -129,6 +148,24 @@ impl ArmResult {
             files,
             urdf_links,
         })
+    }
+}
+
+/// The robot that the result in `path` is `about`, where nobody says which it is.
+fn named(
+    about: &SavedRobot,
+    path: &Path,
+    scenario: Option<&Scenario>,
+) -> Result<LoadedArm, ResultError> {
+    let same = scenario.filter(|scenario| scenario.arm.name == about.robot);
+    match (about.load(path), same) {
+        (Err(RobotError::Read { .. } | RobotError::UnknownName { .. }), Some(scenario)) => {
+            Ok(load_robot(&scenario.robot)?)
+        }
+        (Err(fault @ (RobotError::Read { .. } | RobotError::UnknownName { .. })), None) => {
+            Err(ResultError::NoRobot { file: path.display().to_string(), fault })
+        }
+        (found, _) => Ok(found?),
     }
 }
 

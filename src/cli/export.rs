@@ -16,7 +16,7 @@ use crate::robot::export::{OwnUrdf, drive_file, mjcf, own_urdf, urdf};
 pub struct ExportArgs {
     /// Result of `armid identify --physical --json`.
     result: PathBuf,
-    /// Robot that the result is about, where it is not a built-in one: a .urdf or .toml file.
+    /// Robot that the result is about, where its file is not where the result names it: a .urdf or .toml file.
     #[arg(long)]
     robot: Option<String>,
     /// Write a URDF, and beside it `NAME.drives.toml` with what a URDF has no place for. Of a robot that is a
@@ -31,7 +31,7 @@ pub struct ExportArgs {
 /// Runs the command.
 pub fn run(args: &ExportArgs) -> CommandResult {
     let drives = args.urdf.as_ref().map(|path| path.with_extension("drives.toml"));
-    let result = ArmResult::load(&args.result, args.robot.as_deref())?;
+    let result = ArmResult::load(&args.result, args.robot.as_deref(), None)?;
     check_outputs(
         [&args.urdf, &drives, &args.mjcf].into_iter().flatten(),
         result.files.iter().chain([&args.result]),

@@ -280,6 +280,7 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
     };
     let training = Training {
         arm: &arm,
+        robot_source: &args.source.robot,
         set: &set,
         logs: &logs,
         nominal: &set.values(&model.standard_parameters()),

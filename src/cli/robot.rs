@@ -30,7 +30,9 @@ pub fn inputs<'a>(
 pub struct SavedRobot {
     /// Its name.
     pub robot: String,
-    /// Not in results of older programs.
+    /// What `identify` loaded it by. Not in results of older programs.
+    robot_source: Option<String>,
+    /// Nor this.
     kinematics: Option<Kinematics>,
 }
 
@@ -67,6 +69,22 @@ pub enum OtherRobot {
 }
 
 impl SavedRobot {
+    /// The robot by which the result in `path` was identified: from the working folder, as `identify` was given it, or from the
+    /// folder of the result.
+    pub fn load(&self, path: &Path) -> Result<LoadedArm, RobotError> {
+        let name = self.robot_source.as_ref().unwrap_or(&self.robot);
+        match load_robot(name) {
+            Err(missing @ RobotError::Read { .. }) => {
+                let beside = path.with_file_name(name).display().to_string();
+                match load_robot(&beside) {
+                    Err(RobotError::Read { .. }) => Err(missing),
+                    found => found,
+                }
+            }
+            found => found,
+        }
+    }
+
     /// Refuses an `arm` about which the result says nothing.
     pub fn check(&self, arm: &Arm) -> Result<(), OtherRobot> {
         if self.robot != arm.name {

@@ -27,7 +27,7 @@ pub struct SimulateArgs {
     /// Simulate the arm of this result of `armid identify --physical` instead of the scenario's.
     #[arg(long, value_name = "RESULT.json")]
     arm: Option<PathBuf>,
-    /// Robot that the result is about, where it is not a built-in one.
+    /// Robot that the result is about, where it is not the one that the result or the scenario names.
     #[arg(long, requires = "arm")]
     robot: Option<String>,
     /// The log.
@@ -108,7 +108,7 @@ pub fn run(args: &SimulateArgs) -> CommandResult {
     let mut robot_files = Vec::new();
     if let Some(path) = &args.arm {
         let ArmResult { arm, offsets_nm, doubt, files, .. } =
-            ArmResult::load(path, args.robot.as_deref())?;
+            ArmResult::load(path, args.robot.as_deref(), Some(&scenario))?;
         if arm.dof() != scenario.arm.dof() {
             let (found, expected) = (arm.dof(), scenario.arm.dof());
             let file = path.display();

@@ -86,6 +86,7 @@ impl Scenario {
             description: format!("{} with what was found in {}", arm.name, log.source),
             sha256: String::new(),
             files: Vec::new(),
+            robot: String::new(),
             set: set.clone(),
             trajectory: String::new(),
             excitation,

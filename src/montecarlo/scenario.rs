@@ -28,6 +28,8 @@ pub struct Scenario {
     pub sha256: String,
     /// The files that it names: robot and motions that are not built in.
     pub files: Vec<PathBuf>,
+    /// Its robot as [`LoadedArm::load`] takes it from the working folder; empty where no file names it.
+    pub robot: String,
     /// The arm, its truth included.
     pub arm: Arm,
     /// Name of the reduced parameter set, if not the full one is identified.
@@ -218,7 +220,8 @@ impl Scenario {
 
     fn asked_for(file: ScenarioFile, source: &Source) -> Result<Self, ScenarioError> {
         source.check(file.trials > 0, "trials", 0.0, "must be at least 1")?;
-        let LoadedArm { arm, mut files, .. } = LoadedArm::load(&source.beside(&file.robot))?;
+        let robot = source.beside(&file.robot);
+        let LoadedArm { arm, mut files, .. } = LoadedArm::load(&robot)?;
         let parameterisation = Parameterisation::of(&arm, file.reduced.as_deref())?;
         let excitation = file.motion.excitation(&arm, source)?;
         files.extend(file.motion.file(source));
@@ -230,6 +233,7 @@ impl Scenario {
             description: file.description,
             sha256: fingerprint([&source.text, &arm.to_toml(), &excitation.series().to_json()]),
             files,
+            robot,
             arm,
             reduced: file.reduced,
             excitation,

@@ -43,6 +43,8 @@ pub const CONTRADICTED: &str = "contradicted";
 pub struct Training<'a> {
     /// The arm.
     pub arm: &'a Arm,
+    /// What it was loaded by: a built-in name, or a file and perhaps the last link of the arm.
+    pub robot_source: &'a str,
     /// Base parameters.
     pub set: &'a BaseSet,
     /// The logs.
@@ -96,6 +98,7 @@ impl Validation {
 #[derive(Debug, Clone, Serialize)]
 pub struct Result {
     robot: String,
+    robot_source: String,
     kinematics: Kinematics,
     /// Null: the full one.
     reduced: Option<String>,
@@ -230,6 +233,7 @@ impl Result {
         warnings.extend(validations.iter().flat_map(|validation| validation.warnings.clone()));
         Ok(Self {
             robot: arm.name.clone(),
+            robot_source: training.robot_source.to_owned(),
             kinematics: Kinematics::of(arm),
             reduced: training.reduced.map(str::to_owned),
             log: names(training.logs),
