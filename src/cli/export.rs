@@ -8,7 +8,7 @@ use super::arm_result::ArmResult;
 use super::{CommandResult, Outcome};
 use crate::output::{OutputError, check_outputs, write_atomically};
 use crate::robot::RobotError;
-use crate::robot::export::{OwnUrdf, drive_file, mjcf, own_urdf, urdf};
+use crate::robot::export::{OwnUrdf, drive_file, drive_file_of_part, mjcf, own_urdf, urdf};
 
 /// Write an identified arm as URDF or MJCF.
 #[derive(Debug, Args)]
@@ -39,11 +39,11 @@ pub fn run(args: &ExportArgs) -> CommandResult {
     if let Some(path) = &args.urdf {
         write_urdf(path, &result)?;
     }
-    let ArmResult { arm, offsets_nm, by_prior, doubt, frames, .. } = result;
     if let Some(path) = &drives {
-        write(path, &drive_file(&arm, &offsets_nm))?;
+        write(path, &drives_of(&result)?)?;
         say!("{}", path.display());
     }
+    let ArmResult { arm, offsets_nm, by_prior, doubt, frames, .. } = result;
     if let Some(path) = &args.mjcf {
         write(path, &mjcf(&arm, &frames)?)?;
         say!("{}", path.display());
@@ -74,8 +74,7 @@ fn write_urdf(path: &Path, result: &ArmResult) -> Result<(), Box<dyn std::error:
         return Ok(());
     };
     let name = own.display().to_string();
-    let text = std::fs::read_to_string(own)
-        .map_err(|source| RobotError::Read { file: name.clone(), source })?;
+    let text = text_of(own)?;
     let OwnUrdf { text, takeovers, relative_mesh } = own_urdf(&text, &name, arm, urdf_links)?;
     write(path, &text)?;
     let end = if arm.dof() == 1 { "" } else { "s" };
@@ -93,6 +92,24 @@ fn write_urdf(path: &Path, result: &ArmResult) -> Result<(), Box<dyn std::error:
         );
     }
     Ok(())
+}
+
+/// The drive file, with those joints of the robot's own one that are not the arm's.
+fn drives_of(result: &ArmResult) -> Result<String, RobotError> {
+    let ArmResult { arm, offsets_nm, files, .. } = result;
+    // A second file is the drive file beside a URDF.
+    match files.get(1) {
+        Some(own) => {
+            let source = own.display().to_string();
+            drive_file_of_part(arm, offsets_nm, &text_of(own)?, &source)
+        }
+        None => Ok(drive_file(arm, offsets_nm)),
+    }
+}
+
+fn text_of(path: &Path) -> Result<String, RobotError> {
+    std::fs::read_to_string(path)
+        .map_err(|source| RobotError::Read { file: path.display().to_string(), source })
 }
 
 fn write(path: &Path, text: &str) -> Result<(), OutputError> {

@@ -37,29 +37,22 @@ struct DriveEntry {
 /// rotor inertia · q̈ + viscous · q̇ + coulomb · tanh(q̇/ε) + offset. `offsets_nm` has one entry per
 /// joint.
 pub fn drive_file(arm: &Arm, offsets_nm: &[f64]) -> String {
-    let joints = arm.joints.iter().zip(offsets_nm);
-    let file = DriveFile {
-        robot: Some(arm.name.clone()),
-        gravity_m_s2: Some(arm.gravity_m_s2.into()),
-        friction_epsilon_rad_s: Some(arm.friction_epsilon_rad_s),
-        torque_offsets: Some(arm.torque_offsets),
-        joint: joints
-            .map(|(joint, &torque_offset_nm)| DriveEntry {
-                name: joint.name.clone(),
-                rotor_inertia_kg_m2: Some(joint.drive.rotor_inertia_kg_m2),
-                viscous_nm_s_rad: Some(joint.drive.viscous_nm_s_rad),
-                coulomb_nm: Some(joint.drive.coulomb_nm),
-                torque_offset_nm: Some(torque_offset_nm),
-                acceleration_rad_s2: Some(joint.limits.acceleration_rad_s2),
-                gear_ratio: Some(joint.drive.gear_ratio),
-                torque_constant_nm_a: Some(joint.drive.torque_constant_nm_a),
-                mass_bounds_kg: joint.bounds.mass_kg,
-                com_bounds_m: joint.bounds.com_m,
-            })
-            .collect(),
-    };
-    // Strings and finite numbers in a table always serialise.
-    toml::to_string(&file).unwrap_or_default()
+    DriveFile::of(arm, offsets_nm).text()
+}
+
+/// As [`drive_file`], of an `arm` that is a part of a robot: behind its joints stand those others that the robot's own drive file
+/// `text` has, such as the second arm's; `source` names it in messages.
+pub fn drive_file_of_part(
+    arm: &Arm,
+    offsets_nm: &[f64],
+    text: &str,
+    source: &str,
+) -> Result<String, RobotError> {
+    let mut file = DriveFile::of(arm, offsets_nm);
+    let of_arm = |entry: &DriveEntry| arm.joints.iter().any(|joint| joint.name == entry.name);
+    let all = DriveFile::read(text, source)?.joint;
+    file.joint.extend(all.into_iter().filter(|entry| !of_arm(entry)));
+    Ok(file.text())
 }
 
 /// Gives `arm`, which was read from a URDF, what is in the text of its drive file; `source` names it
@@ -69,6 +62,22 @@ pub fn apply_drive_file(arm: &mut Arm, text: &str, source: &str) -> Result<(), R
 }
 
 impl DriveFile {
+    fn of(arm: &Arm, offsets_nm: &[f64]) -> Self {
+        let joints = arm.joints.iter().zip(offsets_nm);
+        Self {
+            robot: Some(arm.name.clone()),
+            gravity_m_s2: Some(arm.gravity_m_s2.into()),
+            friction_epsilon_rad_s: Some(arm.friction_epsilon_rad_s),
+            torque_offsets: Some(arm.torque_offsets),
+            joint: joints.map(|(joint, &offset_nm)| DriveEntry::of(joint, offset_nm)).collect(),
+        }
+    }
+
+    fn text(&self) -> String {
+        // Strings and finite numbers in a table always serialise.
+        toml::to_string(self).unwrap_or_default()
+    }
+
     /// From its text; `source` names it in messages.
     pub(in crate::robot) fn read(text: &str, source: &str) -> Result<Self, RobotError> {
         toml::from_str(text)
@@ -174,6 +183,22 @@ impl DriveFile {
 }
 
 impl DriveEntry {
+    fn of(joint: &Joint, torque_offset_nm: f64) -> Self {
+        let Joint { name, drive, limits, bounds, .. } = joint;
+        Self {
+            name: name.clone(),
+            rotor_inertia_kg_m2: Some(drive.rotor_inertia_kg_m2),
+            viscous_nm_s_rad: Some(drive.viscous_nm_s_rad),
+            coulomb_nm: Some(drive.coulomb_nm),
+            torque_offset_nm: Some(torque_offset_nm),
+            acceleration_rad_s2: Some(limits.acceleration_rad_s2),
+            gear_ratio: Some(drive.gear_ratio),
+            torque_constant_nm_a: Some(drive.torque_constant_nm_a),
+            mass_bounds_kg: bounds.mass_kg,
+            com_bounds_m: bounds.com_m,
+        }
+    }
+
     fn apply(&self, joint: &mut Joint, place: &Place) -> Result<(), RobotError> {
         let Joint { drive, limits, bounds, .. } = joint;
         take(&mut drive.rotor_inertia_kg_m2, self.rotor_inertia_kg_m2, |value| {
@@ -265,6 +290,21 @@ mod tests {
         let mut arm = ur5();
         finger.apply(&mut arm, &["finger"], "x.drives.toml").unwrap();
         assert_eq!(arm, ur5());
+    }
+
+    /// One file has the drives of both arms: those of the other one stay as its author wrote them.
+    #[test]
+    fn joints_of_another_arm_stay_in_the_drive_file() {
+        let arm = ur5();
+        let own = arm.joints[0].name.as_str();
+        let text = format!(
+            "[[joint]]\nname = \"other\"\ngear_ratio = 50.0\n[[joint]]\nname = \"{own}\"\ngear_ratio = 7.0\n"
+        );
+        let written = drive_file_of_part(&arm, &[0.5; 6], &text, "x.drives.toml").unwrap();
+        let alone = drive_file(&arm, &[0.5; 6]);
+        let behind = "\n[[joint]]\nname = \"other\"\ngear_ratio = 50.0\n";
+        assert_eq!(written, format!("{alone}{behind}"));
+        assert!(drive_file_of_part(&arm, &[0.5; 6], "joint = 1", "x.drives.toml").is_err());
     }
 
     #[test]

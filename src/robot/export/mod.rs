@@ -16,7 +16,7 @@ use super::arm::Arm;
 use super::urdf::Frames;
 
 pub(super) use drives::DriveFile;
-pub use drives::{apply_drive_file, drive_file};
+pub use drives::{apply_drive_file, drive_file, drive_file_of_part};
 pub use mjcf::mjcf;
 pub use own_urdf::{OwnUrdf, OwnUrdfError, Takeover, Unfit, own_urdf};
 pub use urdf::urdf;
