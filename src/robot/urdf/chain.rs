@@ -43,22 +43,56 @@ fn body<'a>(tree: &Tree<'a>, joint: Option<&'a Joint>, next: Option<&Joint>) -> 
     body
 }
 
-/// The joints that move the link `last`, from the root on.
-pub(super) fn joints_up_to<'a>(tree: &Tree<'a>, last: &str) -> Result<Vec<&'a Joint>, UrdfFault> {
+/// Up to so many links an error names all of them.
+const FEW_LINKS: usize = 8;
+
+/// The joints that move the link `last`, from the root on. `is_arm` tells of other links whether the arm that ends with them can be
+/// read: only such ones are proposed.
+pub(super) fn joints_up_to<'a>(
+    tree: &Tree<'a>,
+    last: &str,
+    is_arm: impl Fn(&str) -> bool,
+) -> Result<Vec<&'a Joint>, UrdfFault> {
     let Some(link) = tree.link(last) else {
-        return Err(UrdfFault::NoSuchLink { link: last.to_owned(), choice: tree.choice() });
+        let choice = choice(tree, is_arm);
+        return Err(UrdfFault::NoSuchLink { link: last.to_owned(), choice });
     };
-    let mut joints = tree.way_to(link);
-    joints.retain(|joint| joint.joint_type != JointType::Fixed);
+    let joints = moving_on_way(tree, link);
     let obstacles: Vec<Obstacle> = joints.iter().filter_map(|joint| Obstacle::of(joint)).collect();
     if !obstacles.is_empty() {
         return Err(UrdfFault::OnTheWay { last: last.to_owned(), obstacles });
     }
     if joints.is_empty() {
         let (link, root) = (last.to_owned(), tree.root().name.clone());
-        return Err(UrdfFault::NothingMovesUpTo { link, root, ends: tree.ends() });
+        return Err(UrdfFault::NothingMovesUpTo { link, root, choice: choice(tree, is_arm) });
     }
     Ok(joints)
+}
+
+/// The joints between the root and `link` that are not fixed.
+fn moving_on_way<'a>(tree: &Tree<'a>, link: &Link) -> Vec<&'a Joint> {
+    let mut joints = tree.way_to(link);
+    joints.retain(|joint| joint.joint_type != JointType::Fixed);
+    joints
+}
+
+/// Links with which an arm can end; where these are many, those of them on which no other one hangs.
+fn choice(tree: &Tree<'_>, is_arm: impl Fn(&str) -> bool) -> Vec<String> {
+    let can_be_last = |link: &&Link| {
+        let joints = moving_on_way(tree, link);
+        // Asked only of links that move: of others `is_arm` would ask for a choice in turn.
+        !joints.is_empty()
+            && joints.iter().all(|joint| Obstacle::of(joint).is_none())
+            && is_arm(&link.name)
+    };
+    let links: Vec<&Link> = tree.all_links().iter().filter(can_be_last).collect();
+    let carries_another = |link: &&Link| {
+        let mut behind = tree.joints_on(link).iter().map(|joint| tree.behind(joint));
+        behind.any(|next| links.iter().any(|other| other.name == next.name))
+    };
+    let are_many = links.len() > FEW_LINKS;
+    let named = links.iter().copied().filter(|link| !are_many || !carries_another(link));
+    named.map(|link| link.name.clone()).collect()
 }
 
 /// All moving joints, where they are one chain of revolute ones; `file` is what a remedy begins with.

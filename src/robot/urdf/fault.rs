@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use super::obstacle::Obstacle;
+use super::words::listed;
 
 /// A URDF that is well-formed, but no serial arm of rigid bodies.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -59,14 +60,11 @@ pub enum UrdfFault {
         proposal: Option<String>,
     },
     /// The last link of the arm is not in the file.
-    #[error(
-        "there is no link \"{link}\"; name one of {}, or of those on the way to them",
-        choice.join(", ")
-    )]
+    #[error("there is no link \"{link}\"; {}", to_choose_from(choice))]
     NoSuchLink {
         /// What was asked for.
         link: String,
-        /// Links to choose from.
+        /// Links with which an arm can end.
         choice: Vec<String>,
     },
     /// Joints between the root and the last link of the arm that are not an arm's.
@@ -97,17 +95,16 @@ pub enum UrdfFault {
     NothingMoves,
     /// The last link of the arm is one of the base.
     #[error(
-        "link \"{link}\" stands still: no joint moves on the way to it from the root link \"{root}\"; name the last link of the \
-         arm, one of {}, or of those on the way to them",
-        ends.join(", ")
+        "link \"{link}\" stands still: no joint moves on the way to it from the root link \"{root}\"; {}",
+        to_choose_from(choice)
     )]
     NothingMovesUpTo {
         /// What was taken for the last link.
         link: String,
         /// The root link.
         root: String,
-        /// Links on which nothing hangs.
-        ends: Vec<String>,
+        /// Links with which an arm can end.
+        choice: Vec<String>,
     },
     /// An axis without a direction, or whose length shows that something else was meant.
     #[error("joint \"{joint}\": the axis ({}, {}, {}) has length {length}; it must be a unit vector", axis[0], axis[1], axis[2])]
@@ -209,6 +206,14 @@ pub(super) fn quoted(kind: &str, name: &str) -> String {
 fn list(obstacles: &[Obstacle]) -> String {
     let words: Vec<String> = obstacles.iter().map(ToString::to_string).collect();
     words.join(", ")
+}
+
+fn to_choose_from(links: &[String]) -> String {
+    if links.is_empty() {
+        return "no link of the file ends an arm of revolute joints that begins at the root link"
+            .to_owned();
+    }
+    format!("name the last link of the arm: {}, or one that moves on the way to them", listed(links))
 }
 
 fn not_one_chain(obstacles: &[Obstacle], proposal: Option<&str>) -> String {

@@ -18,6 +18,7 @@ mod read;
 mod tests;
 mod tree;
 mod unreadable;
+mod words;
 
 pub use arm::{FixedFrame, Frames, UrdfArm, UrdfLink};
 pub use fault::UrdfFault;

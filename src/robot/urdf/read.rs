@@ -135,7 +135,9 @@ impl Reader {
     ) -> Result<(String, Vec<Joint>), UrdfFault> {
         let tree = Tree::of(robot)?;
         let moving = match last_link {
-            Some(last) => joints_up_to(&tree, last)?,
+            Some(last) => joints_up_to(&tree, last, |link| {
+                Self::default().arm(robot, source, Some(link)).is_ok()
+            })?,
             None => all_joints(&tree, source)?,
         };
         self.locked = locked_joints(&tree, &moving)?;

@@ -6,9 +6,6 @@ use urdf_rs::{Joint, Link, Robot};
 
 use super::fault::UrdfFault;
 
-/// Up to so many links an error names all of them.
-const FEW_LINKS: usize = 8;
-
 /// Links that all hang on one root, each by one joint.
 pub(super) struct Tree<'a> {
     robot: &'a Robot,
@@ -33,6 +30,11 @@ impl<'a> Tree<'a> {
     /// The link that hangs on none.
     pub(super) fn root(&self) -> &'a Link {
         self.root
+    }
+
+    /// All links, in the file's order.
+    pub(super) fn all_links(&self) -> &'a [Link] {
+        &self.robot.links
     }
 
     /// All joints, in the file's order.
@@ -77,21 +79,6 @@ impl<'a> Tree<'a> {
         self.joints()
             .iter()
             .any(|other| other.mimic.as_ref().is_some_and(|mimic| mimic.joint == joint.name))
-    }
-
-    /// Links on which nothing hangs.
-    pub(super) fn ends(&self) -> Vec<String> {
-        let ends = self.robot.links.iter().filter(|link| self.joints_on(link).is_empty());
-        ends.map(|link| link.name.clone()).collect()
-    }
-
-    /// Links to choose from: all where they are few.
-    pub(super) fn choice(&self) -> Vec<String> {
-        let links = &self.robot.links;
-        if links.len() > FEW_LINKS {
-            return self.ends();
-        }
-        links.iter().map(|link| link.name.clone()).collect()
     }
 }
 

@@ -211,7 +211,8 @@ fn a_last_link_that_ends_no_arm_is_refused() {
         let words = refused(&text, "base").to_string();
         assert!(words.contains("\"base\" stands still"), "{words}");
         let words = refused(&text, "flange").to_string();
-        assert!(words.contains("no link \"flange\"; name one of base, a, b, "), "{words}");
+        let proposed = "no link \"flange\"; name the last link of the arm: a, b";
+        assert!(words.contains(proposed), "{words}");
     }
     let many: Vec<String> = (0..10)
         .flat_map(|k| {
@@ -220,7 +221,29 @@ fn a_last_link_that_ends_no_arm_is_refused() {
         })
         .collect();
     let words = refused(&with(&many), "flange").to_string();
-    assert!(words.contains("name one of frame0, frame1, ") && !words.contains(" b, "), "{words}");
+    assert!(words.contains(": frame0, frame1, ") && !words.contains(" b, "), "{words}");
+    assert!(words.contains("frame7 and 2 more, or one that moves on the way"), "{words}");
+}
+
+/// Fingers that slide, wheels without mass and what stands still are no ends of an arm.
+#[test]
+fn every_link_that_is_proposed_ends_an_arm() {
+    let wheel = [link("rim", ""), joint("wheel", "continuous", "base", "rim", "")];
+    let text = with_hand(&[fingers(("prismatic", SLIDE), ("revolute", LIMIT)), wheel.into()].concat());
+    for asked in ["flange", "base"] {
+        let (UrdfFault::NoSuchLink { choice, .. } | UrdfFault::NothingMovesUpTo { choice, .. }) =
+            refused(&text, asked)
+        else {
+            panic!("{asked}")
+        };
+        assert_eq!(choice, ["a", "b", "hand", "right"]);
+        for last in choice {
+            up_to(&text, &last);
+        }
+    }
+    let rail = [link("rail", ""), joint("slide", "prismatic", "rail", "base", SLIDE)];
+    let words = refused(&with(&rail), "flange").to_string();
+    assert!(words.contains("no link of the file ends an arm"), "{words}");
 }
 
 /// The bodies are their links, and the links are where the file has them.

@@ -1,0 +1,27 @@
+//! Lists in sentences.
+
+use std::fmt::Display;
+
+/// Of more than so many the first ones are named.
+const FEW: usize = 8;
+
+/// All of a few; of many the first ones, and how many more there are.
+pub(super) fn listed<T: Display>(items: impl IntoIterator<Item = T>) -> String {
+    let mut words: Vec<String> = items.into_iter().map(|item| item.to_string()).collect();
+    let more = words.len().saturating_sub(FEW);
+    words.truncate(FEW);
+    let words = words.join(", ");
+    if more == 0 { words } else { format!("{words} and {more} more") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::listed;
+
+    #[test]
+    fn of_many_the_first_ones_are_named() {
+        assert_eq!(listed(["a", "b"]), "a, b");
+        assert_eq!(listed(1..=8), "1, 2, 3, 4, 5, 6, 7, 8");
+        assert_eq!(listed(1..=20), "1, 2, 3, 4, 5, 6, 7, 8 and 12 more");
+    }
+}
