@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::locked::LockedJoint;
+use super::words::listed;
 
 /// Something a URDF does not say, or says in a way that had to be interpreted.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,21 +70,17 @@ pub enum UrdfNotice {
         /// The joint.
         joint: String,
     },
-    /// A link fixed to a moving body was added to it.
+    /// Links fixed to a moving body were added to it.
     Merged {
-        /// The link.
-        link: String,
         /// The joint that moves it.
         joint: String,
-        /// What it added.
-        mass_kg: f64,
+        /// The links, and what each added, kg.
+        links: Vec<(String, f64)>,
     },
-    /// A link ahead of the first moving joint never moves: its inertia is left out.
+    /// Links that no joint of the arm moves: their inertia is left out.
     StandingMass {
-        /// The link.
-        link: String,
-        /// Its mass.
-        mass_kg: f64,
+        /// The links, and the mass of each, kg.
+        links: Vec<(String, f64)>,
     },
     /// The joint's frame is not the link's: z was turned onto the axis.
     Reoriented {
@@ -154,11 +151,10 @@ impl fmt::Display for UrdfNotice {
             Self::Locked { joints, last } => {
                 let (noun, verb) =
                     if joints.len() == 1 { ("joint", "is") } else { ("joints", "are") };
-                let joints: Vec<String> = joints.iter().map(ToString::to_string).collect();
-                let joints = joints.join(", ");
                 write!(
                     f,
-                    "{noun} {joints} {verb} not on the way to link \"{last}\": taken as locked there, links behind count in the body that carries them"
+                    "{noun} {} {verb} not on the way to link \"{last}\": taken as locked there, links behind count in the body that carries them",
+                    listed(joints)
                 )
             }
             Self::NoFriction { joints } => {
@@ -192,12 +188,12 @@ impl fmt::Display for UrdfNotice {
             Self::NoTorqueLimit { joint } => {
                 write!(f, "joint \"{joint}\": no effort limit, torque taken as unlimited")
             }
-            Self::Merged { link, joint, mass_kg } => write!(
-                f,
-                "link \"{link}\" ({mass_kg} kg) is fixed to the body of joint \"{joint}\" and counted in it"
-            ),
-            Self::StandingMass { link, mass_kg } => {
-                write!(f, "link \"{link}\" ({mass_kg} kg) stands still: its inertia is left out")
+            Self::Merged { joint, links } => {
+                let subject = with_masses(links, "is", "are");
+                write!(f, "{subject} fixed to the body of joint \"{joint}\" and counted in it")
+            }
+            Self::StandingMass { links } => {
+                write!(f, "{} still: inertia left out", with_masses(links, "stands", "stand"))
             }
             Self::Reoriented { joint, axis: [x, y, z] } => write!(
                 f,
@@ -211,4 +207,11 @@ impl fmt::Display for UrdfNotice {
             }
         }
     }
+}
+
+/// Links with their masses, kg, and what they do in the singular and in the plural.
+fn with_masses(links: &[(String, f64)], one_does: &str, all_do: &str) -> String {
+    let (noun, verb) = if links.len() == 1 { ("link", one_does) } else { ("links", all_do) };
+    let links = links.iter().map(|(name, mass_kg)| format!("{name} ({mass_kg} kg)"));
+    format!("{noun} {} {verb}", listed(links))
 }

@@ -231,17 +231,14 @@ impl Reader {
         poses: &[Placement],
     ) -> Result<LinkInertia, UrdfFault> {
         let mut sum = LinkInertia::zero();
+        let mut merged = Vec::new();
         for ((link, held), pose) in body.links.iter().zip(poses) {
             let own = self.link_inertia(link)?;
             match own {
                 Some(part) => {
                     sum = sum.plus(&part.transformed(pose));
                     if held.is_some() {
-                        self.notices.push(UrdfNotice::Merged {
-                            link: link.name.clone(),
-                            joint: joint.name.clone(),
-                            mass_kg: part.mass_kg(),
-                        });
+                        merged.push((link.name.clone(), part.mass_kg()));
                     }
                 }
                 None if held.is_some() => self.frames.push(FixedFrame {
@@ -259,6 +256,9 @@ impl Reader {
                 is_first: held.is_none(),
             });
         }
+        if !merged.is_empty() {
+            self.notices.push(UrdfNotice::Merged { joint: joint.name.clone(), links: merged });
+        }
         if sum.mass_kg() > 0.0 {
             return Ok(sum);
         }
@@ -268,6 +268,7 @@ impl Reader {
 
     /// Links that never move: only their frames and a remark on their mass remain.
     fn standing(&mut self, body: &Body<'_>, poses: &[Placement]) {
+        let mut heavy = Vec::new();
         for ((link, held), pose) in body.links.iter().zip(poses) {
             // What is wrong or odd about the moments of such a link does not matter.
             let remarks = self.notices.len();
@@ -275,7 +276,7 @@ impl Reader {
             self.notices.truncate(remarks);
             let mass_kg = link.inertial.mass.value;
             if mass_kg != 0.0 {
-                self.notices.push(UrdfNotice::StandingMass { link: link.name.clone(), mass_kg });
+                heavy.push((link.name.clone(), mass_kg));
             }
             if held.is_some() {
                 self.frames.push(FixedFrame { name: link.name.clone(), body: 0, placement: *pose });
@@ -287,6 +288,9 @@ impl Reader {
                 inertia,
                 is_first: held.is_none(),
             });
+        }
+        if !heavy.is_empty() {
+            self.notices.push(UrdfNotice::StandingMass { links: heavy });
         }
     }
 

@@ -141,8 +141,10 @@ fn a_fixed_link_with_mass_is_merged_and_one_without_becomes_a_frame() {
     assert_abs_diff_eq!(body.parameters[5], 2.08, epsilon = 1e-14);
     assert_eq!((frames.fixed[0].name.as_str(), frames.fixed[0].body), ("tool0", 2));
     assert_eq!(frames.fixed[0].placement.translation_m, Vector3::new(0.0, 0.0, 1.5));
-    let merged = UrdfNotice::Merged { link: "gripper".into(), joint: "j2".into(), mass_kg: 2.0 };
+    let merged = UrdfNotice::Merged { joint: "j2".into(), links: vec![("gripper".into(), 2.0)] };
     assert!(notices.contains(&merged));
+    let words = "link gripper (2 kg) is fixed to the body of joint \"j2\" and counted in it";
+    assert_eq!(merged.to_string(), words);
 }
 
 #[test]

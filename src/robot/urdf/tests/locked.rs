@@ -33,6 +33,10 @@ fn fingers(left: (&str, &str), right: (&str, &str)) -> Vec<String> {
     ]
 }
 
+fn fixed_fingers() -> Vec<String> {
+    fingers(("fixed", ""), ("fixed", ""))
+}
+
 /// The second finger follows the first.
 fn gripper() -> String {
     let follows = format!(r#"{SLIDE}<mimic joint="f1"/>"#);
@@ -72,7 +76,7 @@ fn assert_same(one: &Arm, other: &Arm) {
 
 #[test]
 fn joints_at_zero_are_as_if_they_were_fixed() {
-    let fixed = read(&with_hand(&fingers(("fixed", ""), ("fixed", ""))));
+    let fixed = read(&with_hand(&fixed_fingers()));
     let at_zero = [("f1", Stand::DistanceM(0.0)), ("f2", Stand::DistanceM(0.0))];
     for last in ["hand", "b"] {
         let found = up_to(&gripper(), last);
@@ -91,7 +95,7 @@ fn joints_at_zero_are_as_if_they_were_fixed() {
         assert_eq!(up_to(&text, "hand").arm, fixed.arm, "{kinds:?}");
     }
     // Where nothing is locked, the last link changes nothing.
-    let plain = with_hand(&fingers(("fixed", ""), ("fixed", "")));
+    let plain = with_hand(&fixed_fingers());
     assert_eq!(up_to(&plain, "tip"), fixed);
 }
 
@@ -107,7 +111,7 @@ fn joints_that_do_not_reach_zero_stand_at_the_nearest_limit() {
     let turned = r#"<origin xyz="0 0 0.5" rpy="0 0 -0.3"/>"#;
     let fixed = read(&with_hand(&fingers(("fixed", moved), ("fixed", turned))));
     assert_same(&found.arm, &fixed.arm);
-    assert_ne!(found.arm, read(&with_hand(&fingers(("fixed", ""), ("fixed", "")))).arm);
+    assert_ne!(found.arm, read(&with_hand(&fixed_fingers())).arm);
     let tip = &found.frames.fixed[0];
     assert_eq!((tip.name.as_str(), tip.body), ("tip", 2));
     assert_abs_diff_eq!(
@@ -276,6 +280,34 @@ fn links_add_up_to_the_bodies_that_hold_them() {
         assert_abs_diff_eq!(pose.translation_m, Vector3::new(0.0, 0.0, height), epsilon = 1e-15);
         assert_abs_diff_eq!(pose.rotation * Vector3::x(), Vector3::x(), epsilon = 1e-15);
     }
+}
+
+/// A gripper of twelve fingers on an arm that stands on ten boxes: a line for each of what is to be said.
+#[test]
+fn what_is_told_of_many_joints_and_links_is_short() {
+    let fingers = (0..12).flat_map(|k| {
+        let (finger, knuckle) = (format!("finger{k}"), format!("knuckle{k}"));
+        [link(&finger, FINGER), joint(&knuckle, "prismatic", "hand", &finger, SLIDE)]
+    });
+    let boxes = (0..10).flat_map(|k| {
+        let name = format!("box{k}");
+        [link(&name, BODY), joint(&format!("bolt{k}"), "fixed", "base", &name, "")]
+    });
+    let parts: Vec<String> = fingers.chain(boxes).collect();
+    let UrdfArm { notices, .. } = up_to(&with_hand(&[fixed_fingers(), parts].concat()), "hand");
+    let said: Vec<String> = notices.iter().map(ToString::to_string).collect();
+    for words in [
+        "joints knuckle0 (0 m), knuckle1 (0 m), ",
+        "knuckle7 (0 m) and 4 more are not on the way to link \"hand\"",
+        "links box0 (2 kg), box1 (2 kg), ",
+        "box7 (2 kg) and 2 more stand still",
+        "links hand (2 kg), left (0.1 kg), right (0.1 kg), finger0 (0.1 kg), ",
+    ] {
+        let lines = said.iter().filter(|line| line.contains(words)).count();
+        assert_eq!(lines, 1, "{words}: {said:#?}");
+    }
+    // Gravity, drives, clearance, friction, acceleration beside these.
+    assert_eq!(said.len(), 8, "{said:#?}");
 }
 
 /// Of many files the base has moments that no body has: it never moves.
