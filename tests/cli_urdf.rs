@@ -93,11 +93,30 @@ fn a_drive_file_says_as_much_as_its_author_knows() {
     let elbow = "[[joint]]\nname = \"elbow\"\n";
     let text = notes(&format!("{elbow}gear_ratio = 101.0\ntorque_constant_nm_a = 0.12\n"));
     assert!(text.contains("gravity is taken as 9.81"), "{text}");
-    let open = "no torque constant given, taken as 1 Nm/A: shoulder_pan, shoulder_lift, wrist_1,";
+    let open = "no gear ratio and no torque constant given, taken as 1 and 1 Nm/A: shoulder_pan, shoulder_lift, wrist_1,";
     assert!(text.contains(open), "{text}");
     let text = notes(&format!("gravity_m_s2 = [9.81, 0.0, 0.0]\n{elbow}acceleration_rad_s2 = 5.0"));
     assert!(!text.contains("gravity is taken"), "{text}");
     assert!(text.contains("URDF has no drives"), "{text}");
+    // One line has all that is open, and of a file that leaves nothing open only its name.
+    let told_of = |drives: &str| {
+        let text = notes(drives);
+        let told = text.lines().filter(|line| line.contains("drives.toml")).map(str::to_owned);
+        let told: Vec<String> = told.collect();
+        assert_eq!(told.len(), 1, "{text}");
+        (told[0].clone(), text)
+    };
+    let (told, _) = told_of("");
+    for words in [
+        "arm.drives.toml leaves open: gravity is taken as 9.81 m/s2",
+        "; URDF has no drives: rotor inertia 0, gear ratio 1, torque constant 1 Nm/A",
+        "; no acceleration limit, taken as 10 rad/s2",
+    ] {
+        assert!(told.contains(words), "{told}");
+    }
+    let (told, text) = told_of(&drive_file(&ur5().0, &[0.0; 6]));
+    assert!(told.ends_with("drives and gravity are those of arm.drives.toml"), "{told}");
+    assert!(!text.contains("taken as"), "{text}");
     folder.write("arm.drives.toml", elbow.replace("elbow", "knee"));
     folder.armid("base --robot arm.urdf").complains(1, &["\"knee\"", "shoulder_pan, "]);
 }

@@ -115,8 +115,11 @@ impl LoadedArm {
         let locked: Vec<&str> = self.notices.iter().flat_map(UrdfNotice::locked).collect();
         drives.apply(&mut self.arm, &locked, &source)?;
         let notices = std::mem::take(&mut self.notices);
-        self.notices = notices.into_iter().filter_map(|notice| drives.leaves(notice)).collect();
-        self.notices.push(UrdfNotice::DriveFile { file: source });
+        let (about_drives, others): (Vec<_>, Vec<_>) =
+            notices.into_iter().partition(UrdfNotice::is_about_drives);
+        self.notices = others;
+        let open = about_drives.into_iter().filter_map(|notice| drives.leaves(notice)).collect();
+        self.notices.push(UrdfNotice::DriveFile { file: source, open });
         self.files.push(path);
         Ok(())
     }

@@ -333,7 +333,8 @@ mod tests {
             [gravity(), drives(all(), all(), b()), no_friction(b()), accelerations(all())];
         assert_eq!(said, expected);
         let open = said[1].to_string();
-        assert!(open.contains("no gear ratio given, taken as 1: a, b"), "{open}");
+        let of_both = "no rotor inertia and no gear ratio given, taken as 0 and 1: a, b; ";
+        assert!(open.contains(of_both), "{open}");
         assert!(open.contains("no torque constant given, taken as 1 Nm/A: b"), "{open}");
         let mut arm = ur5();
         let names = names(&arm);

@@ -213,7 +213,10 @@ fn to_choose_from(links: &[String]) -> String {
         return "no link of the file ends an arm of revolute joints that begins at the root link"
             .to_owned();
     }
-    format!("name the last link of the arm: {}, or one that moves on the way to them", listed(links))
+    format!(
+        "name the last link of the arm: {}, or one that moves on the way to them",
+        listed(links)
+    )
 }
 
 fn not_one_chain(obstacles: &[Obstacle], proposal: Option<&str>) -> String {

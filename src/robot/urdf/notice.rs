@@ -41,10 +41,12 @@ pub enum UrdfNotice {
         /// As written.
         files: Vec<String>,
     },
-    /// The drive file beside the URDF was read: what it gives of rotor inertias, friction, gears, gravity, bounds.
+    /// The drive file beside the URDF was read.
     DriveFile {
         /// The file.
         file: String,
+        /// What is still assumed, because neither of the files says it.
+        open: Vec<UrdfNotice>,
     },
     /// A continuous (or unlimited) joint was given ±2π rad.
     Continuous {
@@ -116,6 +118,17 @@ impl UrdfNotice {
         };
         joints.iter().map(|joint| joint.name.as_str())
     }
+
+    /// Whether it is about something that a drive file can say.
+    pub(in crate::robot) fn is_about_drives(&self) -> bool {
+        matches!(
+            self,
+            Self::Gravity { .. }
+                | Self::Drives { .. }
+                | Self::NoFriction { .. }
+                | Self::AssumedAcceleration { .. }
+        )
+    }
 }
 
 impl fmt::Display for UrdfNotice {
@@ -139,13 +152,22 @@ impl fmt::Display for UrdfNotice {
                     ("gear ratio", "1", gear_ratio),
                     ("torque constant", "1 Nm/A", torque_constant),
                 ];
-                let words: Vec<String> = open
-                    .iter()
-                    .filter(|(_, _, joints)| !joints.is_empty())
-                    .map(|(what, value, joints)| {
-                        format!("no {what} given, taken as {value}: {}", joints.join(", "))
-                    })
-                    .collect();
+                let mut words: Vec<String> = Vec::new();
+                for (k, (_, _, joints)) in open.iter().enumerate() {
+                    let is_said = open[..k].iter().any(|(_, _, earlier)| earlier == joints);
+                    if joints.is_empty() || is_said {
+                        continue;
+                    }
+                    let of_same = || open.iter().filter(|(_, _, others)| others == joints);
+                    let whats: Vec<&str> = of_same().map(|(what, _, _)| *what).collect();
+                    let values: Vec<&str> = of_same().map(|(_, value, _)| *value).collect();
+                    words.push(format!(
+                        "no {} given, taken as {}: {}",
+                        whats.join(" and no "),
+                        values.join(" and "),
+                        joints.join(", ")
+                    ));
+                }
                 write!(f, "{}", words.join("; "))
             }
             Self::Locked { joints, last } => {
@@ -170,10 +192,13 @@ impl fmt::Display for UrdfNotice {
                 files.len(),
                 files.first().map_or("", String::as_str)
             ),
-            Self::DriveFile { file } => write!(
-                f,
-                "rotor inertia, friction, gears, acceleration limits, bounds of the links and gravity are those of {file}, as far as it gives them; values of torque offsets in it are left out"
-            ),
+            Self::DriveFile { file, open } if open.is_empty() => {
+                write!(f, "drives and gravity are those of {file}")
+            }
+            Self::DriveFile { file, open } => {
+                let open: Vec<String> = open.iter().map(ToString::to_string).collect();
+                write!(f, "{file} leaves open: {}", open.join("; "))
+            }
             Self::Continuous { joint } => {
                 write!(f, "joint \"{joint}\" has no end stops: taken as -2 pi to 2 pi")
             }

@@ -233,7 +233,8 @@ fn a_last_link_that_ends_no_arm_is_refused() {
 #[test]
 fn every_link_that_is_proposed_ends_an_arm() {
     let wheel = [link("rim", ""), joint("wheel", "continuous", "base", "rim", "")];
-    let text = with_hand(&[fingers(("prismatic", SLIDE), ("revolute", LIMIT)), wheel.into()].concat());
+    let text =
+        with_hand(&[fingers(("prismatic", SLIDE), ("revolute", LIMIT)), wheel.into()].concat());
     for asked in ["flange", "base"] {
         let (UrdfFault::NoSuchLink { choice, .. } | UrdfFault::NothingMovesUpTo { choice, .. }) =
             refused(&text, asked)
