@@ -178,7 +178,7 @@ fn one_period(robot: &str) -> String {
     scenario.replace("robot = \"ur5\"", &format!("robot = \"{robot}\""))
 }
 
-/// The simulated arm has no limits; a motion for another one is said to be none for it.
+/// Nothing stops the simulated arm at a position, speed or acceleration; a motion for another one is said to be none for it.
 #[test]
 fn a_motion_that_is_too_fast_for_its_arm_is_told() {
     let folder = Folder::empty();
@@ -189,6 +189,7 @@ fn a_motion_that_is_too_fast_for_its_arm_is_told() {
         let note = output.stderr;
         assert_eq!(note.contains("passes the limit of"), said, "{note}");
         assert_eq!(note.contains("passes the limit of ur10e"), said, "{note}");
+        assert_eq!(note.contains("nothing stops the simulated arm there"), said, "{note}");
     }
 }
 

@@ -80,7 +80,7 @@ fn size(simulation: &Simulation) -> Result<Option<EffectSize>, crate::plant::Pla
     if sd.contains(&0.0) { Ok(None) } else { simulation.effect_size().map(Some) }
 }
 
-/// The limit of a joint that a scenario's motion passes furthest: the plant has none.
+/// The limit of a joint that a scenario's motion passes furthest: of these the plant keeps its drives' torques alone.
 fn passed_limit(scenario: &Scenario) -> Result<Option<String>, ExcitationError> {
     let requirements =
         Requirements { clearance_m: 0.0, torque_share: 1.0, ..Requirements::default() };
@@ -94,8 +94,14 @@ fn passed_limit(scenario: &Scenario) -> Result<Option<String>, ExcitationError> 
     };
     let worst = margins.least_first().into_iter().find(of_a_joint);
     Ok(worst.filter(|margin| margin.free < 0.0).map(|Margin { limit, free, time_s, .. }| {
+        let consequence = match limit {
+            LimitKind::Torque { .. } => {
+                "the simulated drive gives no more, and the joint falls behind the motion"
+            }
+            _ => "nothing stops the simulated arm there",
+        };
         format!(
-            "{limit}: the motion {} passes the limit of {} by {:.3} {} at {time_s:.2} s; the simulated arm has no limits",
+            "{limit}: the motion {} passes the limit of {} by {:.3} {} at {time_s:.2} s; {consequence}",
             scenario.trajectory, scenario.arm.name, -free, limit.unit()
         )
     }))

@@ -97,8 +97,9 @@ impl Excitation {
         })
     }
 
-    /// As [`Self::fitted`], of an arm that is only simulated and has no limits: where periods or
-    /// run-ins pass one, with the run-in that by itself keeps most of them or passes them least.
+    /// As [`Self::fitted`], of an arm that is only simulated, which nothing stops at a position, speed
+    /// or acceleration (its drives give no more than their torque): where periods or run-ins pass a
+    /// limit, with the run-in that by itself keeps most of them or passes them least.
     pub fn fitted_without_limits(
         arm: &Arm,
         requirements: &Requirements,
