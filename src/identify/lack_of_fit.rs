@@ -90,17 +90,23 @@ impl LackOfFit {
 
     /// What to say where it does not.
     pub fn warning(&self) -> Option<String> {
-        let (statistic, p) = (self.statistic, chance_in_words(self.p_value));
+        let (statistic, by_noise) = (self.statistic, by_noise_in_words(self.p_value));
         (!self.fits()).then(|| {
             format!(
-                "the model does not explain all that repeats in the torque (lack of fit {statistic:.2}, chance {p}): \
+                "the model does not explain all that repeats in the torque (lack of fit {statistic:.2}; {by_noise}): \
                  σ covers the noise, not the error of the model"
             )
         })
     }
 }
+
+/// What the p-value of a test that asks whether noise explains a difference says.
+pub fn by_noise_in_words(p_value: f64) -> String {
+    format!("probability that noise alone gives as much: {}", chance_in_words(p_value))
+}
+
 /// A probability as it is told.
-pub fn chance_in_words(p_value: f64) -> String {
+fn chance_in_words(p_value: f64) -> String {
     match p_value {
         p if p < f64::MIN_POSITIVE => "below 1e-300".to_owned(),
         p if p < 0.01 => format!("{p:.1e}"),

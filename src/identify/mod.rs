@@ -45,7 +45,7 @@ pub use estimation::{Estimate, Estimation, MotionAids};
 pub use even::BetweenRows;
 pub use fit::{Estimator, Fit, FitError, Fitter, Weighting};
 pub use identifier::{Identification, Identifier, KEPT_RATE, MANY_PERIODS, Regression};
-pub use lack_of_fit::{Floor, LackOfFit, chance_in_words};
+pub use lack_of_fit::{Floor, LackOfFit, by_noise_in_words};
 pub use misreading::{Change, Match, Misreading};
 pub use options::Options;
 pub use pooled::{Agreement, Several, each_alone, pooled};

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::Training;
 use crate::identify::{
-    Agreement, Floor, Identification, LackOfFit, MANY_PERIODS, Processing, chance_in_words,
+    Agreement, Floor, Identification, LackOfFit, MANY_PERIODS, Processing, by_noise_in_words,
 };
 use crate::signal::Replicates;
 
@@ -58,9 +58,9 @@ impl AgreementResult {
     /// Squares are what is tested; what is told is how far the estimates lie apart.
     fn times(&self) -> String {
         format!(
-            "{:.2} times as far as their noise leads to expect (chance {})",
+            "{:.2} times as far as their noise leads to expect ({})",
             self.statistic.sqrt(),
-            chance_in_words(self.p_value)
+            by_noise_in_words(self.p_value)
         )
     }
 
@@ -154,24 +154,23 @@ impl Intervals {
             Floor::Torque => "the scatter of the torque between periods",
             Floor::TorqueAndMotion => "the scatter of torque and motion between periods",
         };
-        let chance = chance_in_words(p_value);
+        let (by_noise, level) = (by_noise_in_words(p_value), LackOfFit::REJECT_BELOW);
         let along = match identification.agreement {
             Some(_) => " along the log that fits worst",
             None => "",
         };
         let reason = if test.fits() {
             format!(
-                "The model explains what repeats in the torque: what it leaves{along} is {statistic:.2} times what \
-                 {scatter} leads to expect (chance {chance})."
+                "The model explains what repeats in the torque: the square of what it leaves{along} is {statistic:.2} times what \
+                 {scatter} leads to expect (F test; {by_noise}, the model is rejected below {level})."
             )
         } else {
             format!(
-                "The 95 % intervals are not to be trusted: what repeats in the torque and is not explained{along} is \
-                 {statistic:.2} times what {scatter} would leave (chance {chance}). They cover the noise, not the \
+                "The 95 % intervals are not to be trusted: the square of what repeats in the torque and is not explained{along} is \
+                 {statistic:.2} times what {scatter} would leave (F test; {by_noise}). They cover the noise, not the \
                  error of the model; armid diagnose looks for its cause."
             )
         };
-        let level = LackOfFit::REJECT_BELOW;
         Self {
             trusted: Some(test.fits()),
             reason,
