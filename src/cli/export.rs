@@ -8,7 +8,7 @@ use super::arm_result::ArmResult;
 use super::{CommandResult, Outcome};
 use crate::output::{OutputError, check_outputs, write_atomically};
 use crate::robot::RobotError;
-use crate::robot::export::{OwnUrdf, drive_file, drive_file_of_part, mjcf, own_urdf, urdf};
+use crate::robot::export::{OwnUrdf, drive_file, drive_file_of_part, mjcf_of_urdf, own_urdf, urdf};
 
 /// Write an identified arm as URDF or MJCF.
 #[derive(Debug, Args)]
@@ -43,9 +43,9 @@ pub fn run(args: &ExportArgs) -> CommandResult {
         write(path, &drives_of(&result)?)?;
         say!("{}", path.display());
     }
-    let ArmResult { arm, offsets_nm, by_prior, doubt, frames, .. } = result;
+    let ArmResult { arm, offsets_nm, by_prior, doubt, frames, urdf_links, .. } = result;
     if let Some(path) = &args.mjcf {
-        write(path, &mjcf(&arm, &frames)?)?;
+        write(path, &mjcf_of_urdf(&arm, &frames, &urdf_links)?)?;
         say!("{}", path.display());
         if offsets_nm.iter().any(|offset| *offset != 0.0) {
             say!("note: torque offsets {offsets_nm:?} Nm have no place in an MJCF");

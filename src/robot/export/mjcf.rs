@@ -5,17 +5,32 @@ use std::fmt::Write;
 use nalgebra::{Rotation3, UnitQuaternion};
 
 use super::xml::{about_com, escaped, frames_of, numbers};
-use super::{ExportError, UNKNOWN_TORQUE_NM, check, link_name};
-use crate::robot::{Arm, FixedFrame, Frames, Joint, Placement};
+use super::{ExportError, UNKNOWN_TORQUE_NM, check, link_names};
+use crate::robot::{Arm, FixedFrame, Frames, Joint, Placement, UrdfLink};
 
 /// The arm as MJCF, with `frames` as sites and one motor per joint.
 ///
 /// `armature` is the rotor inertia, `damping` rv, `frictionloss` rc: MuJoCo's dry friction is
 /// a constraint that holds at standstill, not our tanh(q̇/ε), so the two differ below a few ε. Position
 /// limits and the motors' torque limits are written; speed and acceleration limits, ε, offsets and
-/// clearance capsules have no place.
+/// clearance capsules have no place. Bodies are named `<joint>_link`.
 pub fn mjcf(arm: &Arm, frames: &Frames) -> Result<String, ExportError> {
-    check(arm, frames)?;
+    mjcf_of_urdf(arm, frames, &[])
+}
+
+/// As [`mjcf`], of an arm that was read from a URDF with these `links`: each body has the name of the link right behind its joint.
+pub fn mjcf_of_urdf(
+    arm: &Arm,
+    frames: &Frames,
+    links: &[UrdfLink],
+) -> Result<String, ExportError> {
+    let mut bodies = link_names(arm);
+    for (number, name) in (1..).zip(&mut bodies) {
+        if let Some(link) = links.iter().find(|link| link.is_first && link.body == number) {
+            name.clone_from(&link.name);
+        }
+    }
+    check(arm, frames, &bodies)?;
     let frames = &frames.fixed;
     let mut out = String::new();
     // Writing to a String cannot fail, so the results carry no information.
@@ -27,9 +42,9 @@ pub fn mjcf(arm: &Arm, frames: &Frames) -> Result<String, ExportError> {
         numbers(arm.gravity_m_s2.iter()),
     );
     write_sites(&mut out, frames, 0);
-    for (body, joint) in arm.joints.iter().enumerate() {
-        write_body(&mut out, joint, body + 1);
-        write_sites(&mut out, frames, body + 1);
+    for (depth, (joint, name)) in (1..).zip(arm.joints.iter().zip(&bodies)) {
+        write_body(&mut out, joint, name, depth);
+        write_sites(&mut out, frames, depth);
     }
     for depth in (1..=arm.dof()).rev() {
         let _ = writeln!(out, "{}</body>", indent(depth));
@@ -48,8 +63,8 @@ pub fn mjcf(arm: &Arm, frames: &Frames) -> Result<String, ExportError> {
     Ok(out)
 }
 
-/// Opens the body of a joint, `depth` bodies deep.
-fn write_body(out: &mut String, joint: &Joint, depth: usize) {
+/// Opens the body `name` of a joint, `depth` bodies deep.
+fn write_body(out: &mut String, joint: &Joint, name: &str, depth: usize) {
     let (mass_kg, com, i) = about_com(&joint.link);
     let margin = indent(depth);
     let inertia = [i[(0, 0)], i[(1, 1)], i[(2, 2)], i[(0, 1)], i[(0, 2)], i[(1, 2)]];
@@ -58,7 +73,7 @@ fn write_body(out: &mut String, joint: &Joint, depth: usize) {
         "{margin}<body name=\"{}\" {}>\n{margin}  <inertial pos=\"{}\" mass=\"{mass_kg}\" \
          fullinertia=\"{}\"/>\n{margin}  <joint name=\"{}\" axis=\"0 0 1\" range=\"{}\" \
          armature=\"{}\" damping=\"{}\" frictionloss=\"{}\"/>\n",
-        escaped(&link_name(&joint.name)),
+        escaped(name),
         pose(&joint.placement),
         numbers(com.iter()),
         numbers(&inertia),

@@ -10,6 +10,8 @@ mod own_urdf;
 mod urdf;
 mod xml;
 
+use std::collections::HashSet;
+
 use thiserror::Error;
 
 use super::arm::Arm;
@@ -17,7 +19,7 @@ use super::urdf::Frames;
 
 pub(super) use drives::DriveFile;
 pub use drives::{apply_drive_file, drive_file, drive_file_of_part};
-pub use mjcf::mjcf;
+pub use mjcf::{mjcf, mjcf_of_urdf};
 pub use own_urdf::{OwnUrdf, OwnUrdfError, Takeover, Unfit, own_urdf};
 pub use urdf::urdf;
 
@@ -66,14 +68,14 @@ pub enum ExportError {
 /// Written for a torque limit that is not known: simulators want a number, and take 0 literally.
 const UNKNOWN_TORQUE_NM: f64 = 1e9;
 
-/// Refuses an arm that could not run, and names that would collide.
-fn check(arm: &Arm, frames: &Frames) -> Result<(), ExportError> {
+/// Refuses an arm that could not run, and names that would collide; `bodies` are those of the moving bodies.
+fn check(arm: &Arm, frames: &Frames, bodies: &[String]) -> Result<(), ExportError> {
     check_numbers(arm)?;
-    let mut seen = std::collections::HashSet::from([frames.root.clone()]);
-    let links = arm.joints.iter().map(|joint| link_name(&joint.name));
-    for name in links.chain(frames.fixed.iter().map(|frame| frame.name.clone())) {
-        if !seen.insert(name.clone()) {
-            return Err(ExportError::DuplicateName { name });
+    let mut seen = HashSet::from([frames.root.as_str()]);
+    let fixed = frames.fixed.iter().map(|frame| &frame.name);
+    for name in bodies.iter().chain(fixed) {
+        if !seen.insert(name) {
+            return Err(ExportError::DuplicateName { name: name.clone() });
         }
     }
     Ok(())
@@ -108,9 +110,9 @@ fn check_numbers(arm: &Arm) -> Result<(), ExportError> {
     Ok(())
 }
 
-/// Name of the link that a joint moves.
-fn link_name(joint: &str) -> String {
-    format!("{joint}_link")
+/// Names of the links that the joints move, where nothing has named them.
+fn link_names(arm: &Arm) -> Vec<String> {
+    arm.joints.iter().map(|joint| format!("{}_link", joint.name)).collect()
 }
 
 #[cfg(test)]
@@ -193,6 +195,26 @@ mod tests {
         arm.joints[0].limits.torque_nm = f64::INFINITY;
         assert!(urdf(&arm, &Frames::default()).unwrap().contains("effort=\"1000000000\""));
         assert!(mjcf(&arm, &Frames::default()).unwrap().contains("-1000000000 1000000000"));
+    }
+
+    /// The simulators know a robot by the names of its URDF, which need not be like those of its joints.
+    #[test]
+    fn bodies_of_an_mjcf_have_the_names_of_the_links() {
+        let arm = Arm::built_in("ur5").unwrap();
+        let text = urdf(&arm, &frames()).unwrap();
+        let text = text.replace("\"elbow_link\"", "\"fore &amp; arm\"");
+        let UrdfArm { arm, frames, links, .. } = read_urdf(&text, "x.urdf").unwrap();
+        let named = mjcf_of_urdf(&arm, &frames, &links).unwrap();
+        for words in [
+            "<body name=\"shoulder_pan_link\"",
+            "<body name=\"fore &amp; arm\"",
+            "<joint name=\"elbow\"",
+            "<site name=\"base_link\"",
+        ] {
+            assert!(named.contains(words), "{words}: {named}");
+        }
+        let unnamed = mjcf(&arm, &frames).unwrap();
+        assert_eq!(unnamed, named.replace("fore &amp; arm", "elbow_link"));
     }
 
     #[test]

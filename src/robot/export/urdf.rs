@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::xml::{about_com, escaped, frames_of, numbers, tensor};
-use super::{ExportError, UNKNOWN_TORQUE_NM, check, link_name};
+use super::{ExportError, UNKNOWN_TORQUE_NM, check, link_names};
 use crate::robot::{Arm, FixedFrame, Frames, Joint, Placement};
 
 /// The arm as URDF, with `frames` as links without mass.
@@ -15,19 +15,19 @@ use crate::robot::{Arm, FixedFrame, Frames, Joint, Placement};
 /// - Rotor inertia, acceleration limit, gear ratio, torque constant, ε, torque offsets and gravity have no place: they
 ///   are in the [`drive_file`](super::drive_file). Clearance capsules are left out.
 pub fn urdf(arm: &Arm, frames: &Frames) -> Result<String, ExportError> {
-    check(arm, frames)?;
+    let links = link_names(arm);
+    check(arm, frames, &links)?;
     let Frames { root, fixed: frames } = frames;
     let mut out = String::from("<?xml version=\"1.0\"?>\n");
     // Writing to a String cannot fail, so the results carry no information.
     let _ = writeln!(out, "<robot name=\"{}\">", escaped(&arm.name));
     let _ = writeln!(out, "  <link name=\"{}\"/>", escaped(root));
     write_frames(&mut out, frames, 0, root);
-    let mut parent = root.clone();
-    for (body, joint) in arm.joints.iter().enumerate() {
-        let child = link_name(&joint.name);
-        write_link(&mut out, joint, &child);
-        write_joint(&mut out, joint, &parent, &child);
-        write_frames(&mut out, frames, body + 1, &child);
+    let mut parent = root;
+    for (body, (joint, child)) in (1..).zip(arm.joints.iter().zip(&links)) {
+        write_link(&mut out, joint, child);
+        write_joint(&mut out, joint, parent, child);
+        write_frames(&mut out, frames, body, child);
         parent = child;
     }
     out.push_str("</robot>\n");
