@@ -19,11 +19,7 @@ pub fn mjcf(arm: &Arm, frames: &Frames) -> Result<String, ExportError> {
 }
 
 /// As [`mjcf`], of an arm that was read from a URDF with these `links`: each body has the name of the link right behind its joint.
-pub fn mjcf_of_urdf(
-    arm: &Arm,
-    frames: &Frames,
-    links: &[UrdfLink],
-) -> Result<String, ExportError> {
+pub fn mjcf_of_urdf(arm: &Arm, frames: &Frames, links: &[UrdfLink]) -> Result<String, ExportError> {
     let mut bodies = link_names(arm);
     for (number, name) in (1..).zip(&mut bodies) {
         if let Some(link) = links.iter().find(|link| link.is_first && link.body == number) {

@@ -46,13 +46,14 @@ impl<'t> Edits<'t> {
         text
     }
 
-    /// Puts what is written in place of `element`.
+    /// Puts what is written in place of `element`, on one line where that is.
     pub(super) fn replace(
         &mut self,
         element: Node<'_, '_>,
         write: impl FnOnce(&Margins) -> String,
     ) {
-        let own = margin(self.text, element).map(str::to_owned);
+        let is_one_line = !self.text[element.range()].contains('\n');
+        let own = margin(self.text, element).filter(|_| !is_one_line).map(str::to_owned);
         let margins = Margins::of(own, step(self.text, element));
         self.changes.push((element.range(), write(&margins)));
     }
@@ -207,6 +208,17 @@ mod tests {
         let named = "<u:r xmlns:u=\"x\"><u:link name=\"a/>b\" /></u:r>";
         let expected = "<u:r xmlns:u=\"x\"><u:link name=\"a/>b\"><n><m/></n></u:link></u:r>";
         assert_eq!(put_first(named), expected);
+    }
+
+    #[test]
+    fn what_takes_the_place_of_one_line_is_one_line() {
+        let replaced = |text: &str| {
+            edited(text, |edits, root| edits.replace(child(root, "n").unwrap(), nested))
+        };
+        assert_eq!(replaced("<r>\n  <n><o/></n>\n</r>"), "<r>\n  <n><m/></n>\n</r>");
+        assert_eq!(replaced("<r>\n  <n/>\n</r>"), "<r>\n  <n><m/></n>\n</r>");
+        let lines = "<r>\r\n  <n>\r\n    <m/>\r\n  </n>\r\n</r>";
+        assert_eq!(replaced(&lines.replace("<m/>", "<o/> <o/>")), lines);
     }
 
     #[test]
