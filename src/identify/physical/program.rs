@@ -110,6 +110,10 @@ impl ConeProgram {
     /// objective(y) − Σ g_i − ½ rᵀH⁻¹r, whence gap = Σ g_i + ½ rᵀH⁻¹r with g_i = s_iᵀz_i for a plain
     /// constraint and g_i = s_iᵀz_i − γ_i (d_i + ln det(s_i z_i / γ_i)) for a barrier of degree d_i: both
     /// are ≥ 0, and 0 only where complementarity holds.
+    ///
+    /// # Zeros
+    /// The iteration ends a little inside the cones. Entries of y that are held at zero are put there at last, where the
+    /// certificate allows it.
     pub fn solve(
         &self,
         start: DVector<f64>,
@@ -123,9 +127,9 @@ impl ConeProgram {
         let mut last_factor: Option<Cholesky<f64, Dyn>> = None;
         let mut iterations = 0;
         loop {
-            let objective = self.objective(&point.y) + point.barriers(self);
+            let objective = self.total(&point);
             let residual = self.dual_residual(&point);
-            let gap = point.gap(self) + 0.5 * residual.dot(&hessian.solve(&residual));
+            let gap = self.gap(&point, &residual, &hessian);
             let size = 1.0 + (objective + constant).abs();
             let wanted = tolerance * size;
             let done = gap <= wanted && last_factor.is_some();
@@ -133,16 +137,20 @@ impl ConeProgram {
             let next = if done || exhausted { None } else { step.prepare(self, &point) };
             let Some((scalings, factor)) = next else {
                 return match last_factor {
-                    Some(stiffness) if gap <= ACCEPTABLE * size => Ok(ConeSolution {
-                        objective,
-                        gap,
-                        dual_residual: residual.amax() / scale,
-                        iterations,
-                        margins: point.margins(self),
-                        multipliers: point.z,
-                        y: point.y,
-                        stiffness,
-                    }),
+                    Some(stiffness) if gap <= ACCEPTABLE * size => {
+                        self.settle(&mut point, &hessian, &stiffness, gap);
+                        let residual = self.dual_residual(&point);
+                        Ok(ConeSolution {
+                            objective: self.total(&point),
+                            gap: self.gap(&point, &residual, &hessian),
+                            dual_residual: residual.amax() / scale,
+                            iterations,
+                            margins: point.margins(self),
+                            multipliers: point.z,
+                            y: point.y,
+                            stiffness,
+                        })
+                    }
                     _ => Err(ProgramError::NotConverged { iterations, gap, wanted }),
                 };
             };
@@ -167,6 +175,50 @@ impl ConeProgram {
         0.5 * y.dot(&(&self.hessian * y)) - self.linear.dot(y)
     }
 
+    /// The objective with its barriers.
+    fn total(&self, point: &Point) -> f64 {
+        self.objective(&point.y) + point.barriers(self)
+    }
+
+    /// How far the objective is from its least at most, with r = `residual`.
+    fn gap(&self, point: &Point, residual: &DVector<f64>, hessian: &Cholesky<f64, Dyn>) -> f64 {
+        point.gap(self) + 0.5 * residual.dot(&hessian.solve(residual))
+    }
+
+    /// Puts entries of y that are pressed on zero there, one by one, where that does not widen the `gap`: what the iteration leaves
+    /// of them is round-off, and would be told as a number. The other entries give way as `stiffness` has it.
+    fn settle(
+        &self,
+        point: &mut Point,
+        hessian: &Cholesky<f64, Dyn>,
+        stiffness: &Cholesky<f64, Dyn>,
+        mut gap: f64,
+    ) {
+        let mut settled = Vec::new();
+        for (k, constraint) in self.constraints.iter().enumerate() {
+            let Some(column) = constraint.non_negative() else { continue };
+            if point.z[k][0] <= point.s[k][0] {
+                continue;
+            }
+            let before = point.y.clone();
+            let mut way = DVector::zeros(before.len());
+            way[column] = 1.0;
+            stiffness.solve_mut(&mut way);
+            point.y.axpy(-before[column] / way[column], &way, 1.0);
+            settled.push(column);
+            settled.iter().for_each(|&zero| point.y[zero] = 0.0);
+            point.update_s(self);
+            let found = self.gap(point, &self.dual_residual(point), hessian);
+            if found <= gap && point.margins(self).iter().all(|margin| *margin >= 0.0) {
+                gap = found;
+            } else {
+                settled.pop();
+                point.y = before;
+                point.update_s(self);
+            }
+        }
+    }
+
     /// Σ of the cones' degrees.
     fn degree(&self) -> usize {
         self.constraints.iter().map(|c| c.cone.degree()).sum()
@@ -183,6 +235,16 @@ impl ConeProgram {
 }
 
 impl Constraint {
+    /// The entry of y that it keeps from being negative, where it says no more than that.
+    fn non_negative(&self) -> Option<usize> {
+        match (self.cone, &self.columns[..]) {
+            (Cone::NonNegative, &[column]) if self.barrier == 0.0 && self.offset[0] == 0.0 => {
+                Some(column)
+            }
+            _ => None,
+        }
+    }
+
     /// A_i y, written into `out`.
     fn apply(&self, y: &DVector<f64>, out: &mut [f64]) {
         out.fill(0.0);
