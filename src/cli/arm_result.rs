@@ -63,7 +63,7 @@ pub enum ResultError {
         /// The file.
         file: String,
         /// Why not.
-        fault: RobotError,
+        fault: Box<RobotError>,
     },
     /// A parameter is unknown, missing, twice there or not a number.
     #[error("{file}: standard parameter \"{name}\" {fault}")]
@@ -163,7 +163,7 @@ fn named(
             Ok(load_robot(&scenario.robot)?)
         }
         (Err(fault @ (RobotError::Read { .. } | RobotError::UnknownName { .. })), None) => {
-            Err(ResultError::NoRobot { file: path.display().to_string(), fault })
+            Err(ResultError::NoRobot { file: path.display().to_string(), fault: Box::new(fault) })
         }
         (found, _) => Ok(found?),
     }
