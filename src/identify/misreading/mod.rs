@@ -64,9 +64,13 @@ impl Misreading {
         }
         bench.add_mountings(arm);
         let (reading, otherwise) = search::best(arm, &bench, &as_read);
-        let changes = reading.changes();
-        let found = Self { changes, as_read, otherwise, reading };
-        found.is_convincing().then_some(found)
+        let found = Self { changes: reading.changes(), as_read, otherwise, reading };
+        if !found.is_convincing() {
+            return None;
+        }
+        let Self { as_read, otherwise, reading, .. } = found;
+        let (reading, otherwise) = search::told_by_sign(reading, otherwise, &bench);
+        Some(Self { changes: reading.changes(), as_read, otherwise, reading })
     }
 
     /// The lines of a layout with which the log is read as it was recorded, `layout` being the one it is read with, under the name or

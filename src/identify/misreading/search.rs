@@ -70,7 +70,7 @@ pub fn best(arm: &Arm, bench: &Bench, as_read: &Match) -> (Reading, Match) {
             break;
         }
     }
-    let best = told_by_sign(told_shortly(best, bench), bench);
+    let best = told_shortly(best, bench);
     (best.reading, best.fit)
 }
 
@@ -82,11 +82,14 @@ fn told_shortly(best: Tried, bench: &Bench) -> Tried {
     mirrored.into_iter().fold(best, |best, other| if other.cost < best.cost { other } else { best })
 }
 
-/// With all torques reversed the model fits as well: the one of which friction brakes, or gravity pulls as described.
-fn told_by_sign(best: Tried, bench: &Bench) -> Tried {
-    if !best.fit.is_turned() {
-        return best;
+/// With all torques reversed the model fits as well: the reading of the two in which friction brakes, or gravity pulls as described.
+pub fn told_by_sign(reading: Reading, fit: Match, bench: &Bench) -> (Reading, Match) {
+    if !fit.is_turned() {
+        return (reading, fit);
     }
-    let turned = Tried::of(best.reading.with(&Change::AllTorquesReversed), bench);
-    turned.filter(|other| other.fit.misfit() <= best.fit.misfit()).unwrap_or(best)
+    let turned = reading.with(&Change::AllTorquesReversed);
+    match bench.fit(&turned) {
+        Some(other) if other.misfit() <= fit.misfit() => (turned, other),
+        _ => (reading, fit),
+    }
 }
