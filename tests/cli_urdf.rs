@@ -1,6 +1,6 @@
-//! Robots that come as URDF: an arm that is a part of one, and what a drive file beside it says.
+//! Robots that come as URDF or MJCF: an arm that is a part of one, and what a drive file beside it says.
 
-use armid::robot::export::{drive_file, urdf};
+use armid::robot::export::{drive_file, mjcf, urdf};
 use armid::robot::{Arm, Frames};
 
 use crate::cli::{Folder, default_scenario};
@@ -65,6 +65,23 @@ fn an_arm_with_a_gripper_is_named_by_its_last_link() {
     folder.armid("base --robot ur5#hand").complains(1, &["ur5#hand"]);
 }
 
+/// What an exported model has is read; what it has no place for is told, or said beside it.
+#[test]
+fn a_mujoco_model_is_a_robot() {
+    let folder = Folder::empty();
+    let (arm, _) = ur5();
+    folder.write("arm.xml", mjcf(&arm, &Frames::default()).unwrap());
+    let alone = folder.armid("base --robot arm.xml");
+    alone.says(0, &["58 base parameters"]);
+    alone.complains(0, &["MJCF has no speed limits", "no gear ratio given, taken as 1"]);
+    folder.write("arm.drives.toml", drive_file(&arm, &[0.0; 6]));
+    folder.armid("base --robot arm.xml#wrist_3_link --json base.json").says(0, &["52 base"]);
+    let inputs = &folder.result("base.json")["program"]["inputs"];
+    assert_eq!(inputs[0]["path"], "arm.xml");
+    assert_eq!(inputs[1]["path"], "arm.drives.toml");
+    folder.armid("base --robot arm.xml#hand").complains(1, &["no body or site \"hand\""]);
+}
+
 /// The last body of the simulated arm is that of a UR5 with all that hangs on it.
 #[test]
 fn a_scenario_names_an_arm_by_its_last_link() {
@@ -97,7 +114,7 @@ fn a_drive_file_says_as_much_as_its_author_knows() {
     assert!(text.contains(open), "{text}");
     let text = notes(&format!("gravity_m_s2 = [9.81, 0.0, 0.0]\n{elbow}acceleration_rad_s2 = 5.0"));
     assert!(!text.contains("gravity is taken"), "{text}");
-    assert!(text.contains("URDF has no drives"), "{text}");
+    assert!(text.contains("the file has no drives"), "{text}");
     // One line has all that is open, and of a file that leaves nothing open only its name.
     let told_of = |drives: &str| {
         let text = notes(drives);
@@ -109,7 +126,7 @@ fn a_drive_file_says_as_much_as_its_author_knows() {
     let (told, _) = told_of("");
     for words in [
         "arm.drives.toml leaves open: gravity is taken as 9.81 m/s2",
-        "; URDF has no drives: rotor inertia 0, gear ratio 1, torque constant 1 Nm/A",
+        "; the file has no drives: rotor inertia 0, gear ratio 1, torque constant 1 Nm/A",
         "; no acceleration limit, taken as 10 rad/s2",
     ] {
         assert!(told.contains(words), "{told}");

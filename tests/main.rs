@@ -44,6 +44,7 @@ mod val_export;
 mod val_faults;
 mod val_log_fuzz;
 mod val_log_real;
+mod val_mjcf;
 mod val_paper_base;
 mod val_physical;
 mod val_plant;

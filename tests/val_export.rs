@@ -25,7 +25,7 @@ const RELATIVE: f64 = 1e-9;
 
 /// A random tilted arm, and a UR5 identified from noisy data whose bodies are at the boundary of
 /// what can exist.
-fn arms() -> [Arm; 2] {
+pub fn arms() -> [Arm; 2] {
     #[derive(Deserialize)]
     struct Case {
         name: String,

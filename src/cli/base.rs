@@ -16,7 +16,8 @@ use crate::robot::LoadedArm;
 /// Print the base parameters of an arm: the combinations that torque can reveal.
 #[derive(Debug, Args)]
 pub struct BaseArgs {
-    /// Robot: ur5, ur10e, ur3e, ur5e, or a .toml or .urdf file (FILE.urdf#LINK: the arm up to that link).
+    /// Robot: ur5, ur10e, ur3e, ur5e, or a .toml, .urdf or .xml (MJCF) file (FILE.urdf#LINK: the arm
+    /// up to that link).
     #[arg(long)]
     robot: String,
     /// Reduced parameter set instead of the full one: paper.

@@ -31,7 +31,8 @@ use crate::robot::{Arm, CellBox, Joint, LoadedArm};
 /// Design the motion that tells most about the parameters, inside all limits.
 #[derive(Debug, Args)]
 pub struct ExciteArgs {
-    /// Robot: ur5, ur10e, ur3e, ur5e, or a .toml or .urdf file (FILE.urdf#LINK: the arm up to that link).
+    /// Robot: ur5, ur10e, ur3e, ur5e, or a .toml, .urdf or .xml (MJCF) file (FILE.urdf#LINK: the arm
+    /// up to that link).
     #[arg(long)]
     robot: String,
     /// d: volume of the confidence ellipsoid; a: mean relative variance; e: worst combination;

@@ -16,7 +16,7 @@ use crate::robot::export::{OwnUrdf, drive_file, drive_file_of_part, mjcf_of_urdf
 pub struct ExportArgs {
     /// Result of `armid identify --physical --json`.
     result: PathBuf,
-    /// Robot that the result is about, where its file is not where the result names it: a .urdf or .toml file.
+    /// Robot that the result is about, where its file is not where the result names it: a .urdf, .xml (MJCF) or .toml file.
     #[arg(long)]
     robot: Option<String>,
     /// Write a URDF, and beside it `NAME.drives.toml` with what a URDF has no place for. Of a robot that is a

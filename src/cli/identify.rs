@@ -65,7 +65,8 @@ pub struct IdentifyArgs {
 /// Which arm and which kind of log.
 #[derive(Debug, Args)]
 pub struct SourceArgs {
-    /// Robot: ur5, ur10e, ur3e, ur5e, or a .toml or .urdf file (FILE.urdf#LINK: the arm up to that link).
+    /// Robot: ur5, ur10e, ur3e, ur5e, or a .toml, .urdf or .xml (MJCF) file (FILE.urdf#LINK: the arm
+    /// up to that link).
     #[arg(long)]
     pub robot: String,
     /// Layout of the logs: armid (RTDE names), ur10e_innopolis, ur10e_innopolis_author, or a .toml file.

@@ -104,7 +104,7 @@ impl Placement {
 
 /// Rotations by multiples of π/2 carry round-off of 6e-17 where a 0 or ±1 is meant. A structural
 /// zero that is not exactly zero would blur the rank of the regressor, so such entries are snapped.
-fn snap(x: f64) -> f64 {
+pub(super) fn snap(x: f64) -> f64 {
     if (x - x.round()).abs() < 4.0 * f64::EPSILON { x.round() } else { x }
 }
 

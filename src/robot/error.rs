@@ -7,18 +7,12 @@ use thiserror::Error;
 pub enum RobotError {
     /// `--robot` is neither built in nor a file.
     #[error(
-        "unknown robot \"{name}\": built in are {}; or give a .urdf or .toml file",
+        "unknown robot \"{name}\": built in are {}; or give a .urdf, .xml (MJCF) or .toml file",
         super::file::built_in_names().collect::<Vec<_>>().join(", ")
     )]
     UnknownName {
         /// What was asked for.
         name: String,
-    },
-    /// A MuJoCo model: armid writes these and does not read them.
-    #[error("{file}: MJCF is not read, only .urdf and .toml; convert it to a URDF")]
-    Mjcf {
-        /// The file.
-        file: String,
     },
     /// The file could not be read.
     #[error("{file}: {source}")]
@@ -51,6 +45,14 @@ pub enum RobotError {
         file: String,
         /// What is wrong, where, and what to do.
         fault: super::urdf::UrdfFault,
+    },
+    /// Not a valid MJCF, or not one of an arm this program can work with.
+    #[error("{file}: {fault}")]
+    Mjcf {
+        /// The file.
+        file: String,
+        /// What is wrong, where, and what to do.
+        fault: super::mjcf::MjcfFault,
     },
     /// Read, but not an arm this program can work with.
     #[error("{file}: {what}")]

@@ -15,6 +15,7 @@ use super::arm::{Arm, Drive, Joint, Limits, Placement};
 use super::error::RobotError;
 use super::export::DriveFile;
 use super::inertia::LinkInertia;
+use super::mjcf::{MjcfArm, is_urdf, read_mjcf, read_mjcf_up_to};
 use super::place::Place;
 use super::urdf::{Frames, UrdfArm, UrdfLink, UrdfNotice, read_urdf, read_urdf_up_to};
 
@@ -41,9 +42,10 @@ impl Arm {
         Self::from_toml(text, name)
     }
 
-    /// What `--robot` accepts: a built-in name, a `.urdf` file (with its drive file, where
-    /// `NAME.drives.toml` lies beside it) or a `.toml` robot file. `NAME.urdf#LINK` is the arm that ends
-    /// with that link ([`read_urdf_up_to`](super::read_urdf_up_to)).
+    /// What `--robot` accepts: a built-in name, a `.urdf` file or an MJCF (`.xml`, `.mjcf`), with its drive
+    /// file, where `NAME.drives.toml` lies beside it, or a `.toml` robot file. `NAME.urdf#LINK` is the arm that
+    /// ends with that link ([`read_urdf_up_to`](super::read_urdf_up_to)), `NAME.xml#BODY` the one that ends with
+    /// that body.
     pub fn load(name_or_path: &str) -> Result<Self, RobotError> {
         LoadedArm::load(name_or_path).map(|loaded| loaded.arm)
     }
@@ -61,13 +63,13 @@ impl Arm {
 pub struct LoadedArm {
     /// The arm.
     pub arm: Arm,
-    /// What had to be assumed; only a URDF leaves anything open.
+    /// What had to be assumed; only a URDF and an MJCF leave anything open.
     pub notices: Vec<UrdfNotice>,
-    /// Named frames on its bodies; only a URDF has any.
+    /// Named frames on its bodies; only a URDF and an MJCF have any.
     pub frames: Frames,
     /// Links that its bodies consist of; only a URDF has any.
     pub urdf_links: Vec<UrdfLink>,
-    /// Files it was read from: none for a built-in arm, two for a URDF with a drive file.
+    /// Files it was read from, the one that was named first: none for a built-in arm, two for a URDF with a drive file.
     pub files: Vec<PathBuf>,
 }
 
@@ -85,13 +87,23 @@ impl LoadedArm {
         };
         let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
         match (extension.as_deref(), last_link) {
-            (Some("urdf"), _) => {
+            (Some(end @ ("urdf" | "xml" | "mjcf")), _) => {
                 let text = text_of(path)?;
-                let UrdfArm { arm, frames, links, notices } = match last_link {
-                    Some(last) => read_urdf_up_to(&text, file, last)?,
-                    None => read_urdf(&text, file)?,
+                let mut loaded = if end == "urdf" || is_urdf(&text) {
+                    let UrdfArm { arm, frames, links, notices } = match last_link {
+                        Some(last) => read_urdf_up_to(&text, file, last)?,
+                        None => read_urdf(&text, file)?,
+                    };
+                    Self { notices, frames, urdf_links: links, ..own(arm) }
+                } else {
+                    let MjcfArm { arm, frames, notices, included } = match last_link {
+                        Some(last) => read_mjcf_up_to(&text, file, last)?,
+                        None => read_mjcf(&text, file)?,
+                    };
+                    let mut loaded = Self { notices, frames, ..own(arm) };
+                    loaded.files.extend(included);
+                    loaded
                 };
-                let mut loaded = Self { notices, frames, urdf_links: links, ..own(arm) };
                 let drives = path.with_extension("drives.toml");
                 if drives.exists() {
                     loaded.take_drives(drives)?;
@@ -101,14 +113,15 @@ impl LoadedArm {
             (Some("toml"), None) => Ok(own(Arm::from_toml(&text_of(path)?, file)?)),
             (Some("toml"), Some(link)) => Err(RobotError::Invalid {
                 file: file.to_owned(),
-                what: format!("\"#{link}\" is for a .urdf, a robot file is one arm: leave it out"),
+                what: format!(
+                    "\"#{link}\" is for a .urdf or an MJCF, a robot file is one arm: leave it out"
+                ),
             }),
-            (Some("xml" | "mjcf"), _) => Err(RobotError::Mjcf { file: file.to_owned() }),
             _ => Ok(Self { files: Vec::new(), ..own(Arm::built_in(name)?) }),
         }
     }
 
-    /// Takes over what the drive file beside the URDF says.
+    /// Takes over what the drive file beside the URDF or MJCF says.
     fn take_drives(&mut self, path: PathBuf) -> Result<(), RobotError> {
         let source = path.display().to_string();
         let drives = DriveFile::read(&text_of(&path)?, &source)?;

@@ -1,6 +1,6 @@
 //! What an arm is: joints, frames, links, drives, limits and clearance.
 //!
-//! Enters: a built-in name, a robot file (TOML) or a URDF. Leaves: an immutable [`Arm`], and
+//! Enters: a built-in name, a robot file (TOML), a URDF or an MJCF. Leaves: an immutable [`Arm`], and
 //! [`JointSignals`], the shape in which every later chapter holds one number per joint and sample.
 
 pub mod export;
@@ -10,6 +10,7 @@ mod error;
 mod file;
 mod inertia;
 mod kinematics;
+mod mjcf;
 mod place;
 mod signals;
 mod urdf;
@@ -19,6 +20,7 @@ pub use error::RobotError;
 pub use file::{LoadedArm, built_in_names};
 pub use inertia::LinkInertia;
 pub use kinematics::{Kinematics, KinematicsDifference};
+pub use mjcf::{LeftOut, MjcfArm, MjcfFault, MjcfNotice, read_mjcf, read_mjcf_up_to};
 pub use signals::JointSignals;
 pub use urdf::{
     FixedFrame, Frames, LockedJoint, Obstacle, Stand, UrdfArm, UrdfFault, UrdfLink, UrdfNotice,

@@ -4,9 +4,9 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::robot::place::Place;
-use crate::robot::{Arm, Joint, RobotError, UrdfNotice};
+use crate::robot::{Arm, Joint, MjcfNotice, RobotError, UrdfNotice};
 
-/// What lies beside a URDF. Whatever it leaves out stays as the URDF has it, or as it is assumed without a drive file.
+/// What lies beside a URDF or an MJCF. Whatever it leaves out stays as that has it, or as it is assumed without a drive file.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(in crate::robot) struct DriveFile {
@@ -114,7 +114,7 @@ impl DriveFile {
     fn check_names(&self, arm: &Arm, locked: &[&str], place: &Place) -> Result<(), RobotError> {
         if let Some(robot) = self.robot.as_ref().filter(|robot| **robot != arm.name) {
             return Err(place.fault(format!(
-                "it is about \"{robot}\", not \"{}\": move it away or give the URDF that it belongs to",
+                "it is about \"{robot}\", not \"{}\": move it away or give the robot that it belongs to",
                 arm.name
             )));
         }
@@ -127,7 +127,7 @@ impl DriveFile {
             .collect();
         if !unknown.is_empty() {
             return Err(place.fault(format!(
-                "its joints \"{}\" are none of the URDF's, which are {}: correct the names, or export both again",
+                "its joints \"{}\" are none of the robot's, which are {}: correct the names, or export both again",
                 unknown.join("\", \""),
                 known.join(", ")
             )));
@@ -135,7 +135,7 @@ impl DriveFile {
         let repeated = (0..given.len()).find(|&k| given[..k].contains(&given[k]));
         match repeated {
             Some(k) => Err(place.fault(format!(
-                "its joint \"{}\" is there twice; the URDF's joints are {}, each has one [[joint]] or none",
+                "its joint \"{}\" is there twice; the robot's joints are {}, each has one [[joint]] or none",
                 given[k],
                 known.join(", ")
             ))),
@@ -165,6 +165,9 @@ impl DriveFile {
                 let joints = self.without(joints, |e| e.acceleration_rad_s2);
                 (!joints.is_empty())
                     .then_some(UrdfNotice::AssumedAcceleration { joints, acceleration_rad_s2 })
+            }
+            UrdfNotice::Mjcf(MjcfNotice::Weightless) => {
+                self.gravity_m_s2.is_none().then_some(notice)
             }
             other => Some(other),
         }
@@ -277,7 +280,7 @@ mod tests {
         let names = names(&ur5());
         let first = names[0].as_str();
         for (joints, said) in [
-            (["elbow_9", "wrist_9"], "\"elbow_9\", \"wrist_9\" are none of the URDF's"),
+            (["elbow_9", "wrist_9"], "\"elbow_9\", \"wrist_9\" are none of the robot's"),
             ([first, first], "is there twice"),
         ] {
             let entries = joints.map(|name| format!("[[joint]]\nname = \"{name}\"\n"));

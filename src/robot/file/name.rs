@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-/// `FILE.urdf#LINK` as file and link; whatever else, and a file that has this name, as it is.
+/// `FILE.urdf#LINK` (or `FILE.xml#BODY`) as file and link; whatever else, and a file that has this name, as it is.
 pub(super) fn split(name: &str) -> (&str, Option<&str>) {
     let is_file = |name: &str| Path::new(name).extension().is_some();
     match name.rsplit_once('#') {

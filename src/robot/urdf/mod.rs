@@ -25,4 +25,6 @@ pub use fault::UrdfFault;
 pub use locked::{LockedJoint, Stand};
 pub use notice::UrdfNotice;
 pub use obstacle::Obstacle;
+pub(super) use read::{arm_of, moving_links};
 pub use read::{read_urdf, read_urdf_up_to};
+pub(super) use words::listed;

@@ -4,6 +4,7 @@ use std::fmt;
 
 use super::locked::LockedJoint;
 use super::words::listed;
+use crate::robot::mjcf::MjcfNotice;
 
 /// Something a URDF does not say, or says in a way that had to be interpreted.
 #[derive(Debug, Clone, PartialEq)]
@@ -107,6 +108,8 @@ pub enum UrdfNotice {
         /// As used.
         used_rad: f64,
     },
+    /// Something of an MJCF that a URDF does not have.
+    Mjcf(MjcfNotice),
 }
 
 impl UrdfNotice {
@@ -142,7 +145,7 @@ impl fmt::Display for UrdfNotice {
             {
                 write!(
                     f,
-                    "URDF has no drives: rotor inertia 0, gear ratio 1, torque constant 1 Nm/A (a current column reads as joint torque): {}",
+                    "the file has no drives: rotor inertia 0, gear ratio 1, torque constant 1 Nm/A (a current column reads as joint torque): {}",
                     gear_ratio.join(", ")
                 )
             }
@@ -230,6 +233,7 @@ impl fmt::Display for UrdfNotice {
             Self::RightAngle { place, written_rad, used_rad } => {
                 write!(f, "{place}: angle {written_rad} is taken as {used_rad} rad")
             }
+            Self::Mjcf(notice) => write!(f, "{notice}"),
         }
     }
 }

@@ -73,17 +73,26 @@ fn read(text: &str, source: &str, last_link: Option<&str>) -> Result<UrdfArm, Ro
             message: unreadable::reason(text, &e.to_string()),
         }
     })?;
-    let mut reader = Reader::default();
-    let (root, joints) = reader
-        .arm(&robot, source, last_link)
+    let mut read = arm_of(&robot, source, last_link)
         .map_err(|fault| RobotError::UrdfArm { file: source.to_owned(), fault })?;
     let files = missing_meshes(&robot, source);
     if !files.is_empty() {
-        reader.notices.push(UrdfNotice::MissingMeshes { files });
+        read.notices.push(UrdfNotice::MissingMeshes { files });
     }
+    Ok(read)
+}
+
+/// The arm of a robot, whatever file it comes from; `source` names it, and is what a remedy begins with.
+pub(in crate::robot) fn arm_of(
+    robot: &Robot,
+    source: &str,
+    last_link: Option<&str>,
+) -> Result<UrdfArm, UrdfFault> {
+    let mut reader = Reader::default();
+    let (root, joints) = reader.arm(robot, source, last_link)?;
     Ok(UrdfArm {
         arm: Arm {
-            name: if robot.name.is_empty() { source.to_owned() } else { robot.name },
+            name: if robot.name.is_empty() { source.to_owned() } else { robot.name.clone() },
             gravity_m_s2: Vector3::new(0.0, 0.0, -9.81),
             friction_epsilon_rad_s: default_epsilon(),
             torque_offsets: true,
@@ -94,6 +103,33 @@ fn read(text: &str, source: &str, last_link: Option<&str>) -> Result<UrdfArm, Ro
         links: reader.links,
         notices: reader.notices,
     })
+}
+
+/// Names of the links that move with the arm.
+pub(in crate::robot) fn moving_links(
+    robot: &Robot,
+    source: &str,
+    last_link: Option<&str>,
+) -> Result<Vec<String>, UrdfFault> {
+    let tree = Tree::of(robot)?;
+    let chain = bodies(&tree, &moving_joints(robot, &tree, source, last_link)?);
+    let links = chain.iter().skip(1).flat_map(|body| &body.links);
+    Ok(links.map(|(link, _)| link.name.clone()).collect())
+}
+
+/// The joints of the arm that ends with `last_link`, or that has all moving joints.
+fn moving_joints<'a>(
+    robot: &Robot,
+    tree: &Tree<'a>,
+    source: &str,
+    last_link: Option<&str>,
+) -> Result<Vec<&'a urdf_rs::Joint>, UrdfFault> {
+    match last_link {
+        Some(last) => joints_up_to(tree, last, |link| {
+            Reader::default().arm(robot, source, Some(link)).is_ok()
+        }),
+        None => all_joints(tree, source),
+    }
 }
 
 /// Mesh files that cannot be found from the folder of `source`, each once.
@@ -126,7 +162,7 @@ pub(super) struct Reader {
 }
 
 impl Reader {
-    /// Name of the root link, and the joints of the arm that ends with `last_link`, or that has all moving joints.
+    /// Name of the root link, and the joints of the arm.
     fn arm(
         &mut self,
         robot: &Robot,
@@ -134,12 +170,7 @@ impl Reader {
         last_link: Option<&str>,
     ) -> Result<(String, Vec<Joint>), UrdfFault> {
         let tree = Tree::of(robot)?;
-        let moving = match last_link {
-            Some(last) => joints_up_to(&tree, last, |link| {
-                Self::default().arm(robot, source, Some(link)).is_ok()
-            })?,
-            None => all_joints(&tree, source)?,
-        };
+        let moving = moving_joints(robot, &tree, source, last_link)?;
         self.locked = locked_joints(&tree, &moving)?;
         if let Some(last) = last_link
             && !self.locked.is_empty()

@@ -6,7 +6,7 @@ use std::fmt::Display;
 const FEW: usize = 8;
 
 /// All of a few; of many the first ones, and how many more there are.
-pub(super) fn listed<T: Display>(items: impl IntoIterator<Item = T>) -> String {
+pub(in crate::robot) fn listed<T: Display>(items: impl IntoIterator<Item = T>) -> String {
     let mut words: Vec<String> = items.into_iter().map(|item| item.to_string()).collect();
     let more = words.len().saturating_sub(FEW);
     words.truncate(FEW);

@@ -1,0 +1,91 @@
+//! Default classes: what elements say by the name of a class.
+
+use std::collections::HashMap;
+
+use super::element::{Attributes, Element, fill};
+use super::fault::MjcfFault;
+
+/// The class of elements that name none.
+const MAIN: &str = "main";
+
+/// Kinds of actuators; MuJoCo keeps one set of defaults for all of them.
+pub(super) const ACTUATORS: [&str; 10] = [
+    "general",
+    "motor",
+    "position",
+    "velocity",
+    "intvelocity",
+    "damper",
+    "cylinder",
+    "muscle",
+    "adhesion",
+    "dcmotor",
+];
+
+/// Attributes by what they are for.
+type Class = HashMap<&'static str, Attributes>;
+
+/// The classes of a file, each with what it has from those around it.
+#[derive(Debug)]
+pub(super) struct Defaults {
+    classes: HashMap<String, Class>,
+}
+
+impl Defaults {
+    /// What all `<default>` of a file say together.
+    pub(super) fn of(root: &Element) -> Result<Self, MjcfFault> {
+        let mut defaults = Self { classes: HashMap::from([(MAIN.to_owned(), Class::new())]) };
+        for section in root.each("default") {
+            defaults.read(section, MAIN)?;
+        }
+        Ok(defaults)
+    }
+
+    fn read(&mut self, section: &Element, name: &str) -> Result<(), MjcfFault> {
+        let mut class = self.classes.get(name).cloned().unwrap_or_default();
+        for element in &section.children {
+            if let Some(kind) = kind(&element.tag) {
+                let mut given = element.attributes.clone();
+                let before = class.entry(kind).or_default();
+                fill(&mut given, before);
+                *before = given;
+            }
+        }
+        self.classes.insert(name.to_owned(), class.clone());
+        for inner in section.each("default") {
+            let name = inner.required("class")?;
+            self.classes.entry(name.to_owned()).or_insert_with(|| class.clone());
+            self.read(inner, name)?;
+        }
+        Ok(())
+    }
+
+    /// The element with what its class says beyond what it says itself; `childclass` is that of what is around it.
+    pub(super) fn complete(
+        &self,
+        element: &Element,
+        childclass: Option<&str>,
+    ) -> Result<Element, MjcfFault> {
+        let name = element.text("class").or(childclass).unwrap_or(MAIN);
+        let Some(class) = self.classes.get(name) else {
+            let class = name.to_owned();
+            return Err(MjcfFault::UnknownClass { place: element.place(), class });
+        };
+        let mut complete = element.clone();
+        if let Some(defaults) = kind(&element.tag).and_then(|kind| class.get(kind)) {
+            fill(&mut complete.attributes, defaults);
+        }
+        Ok(complete)
+    }
+}
+
+/// What an element is for, where defaults of it matter.
+fn kind(tag: &str) -> Option<&'static str> {
+    match tag {
+        "joint" => Some("joint"),
+        "geom" => Some("geom"),
+        "site" => Some("site"),
+        _ if ACTUATORS.contains(&tag) => Some("actuator"),
+        _ => None,
+    }
+}

@@ -1,0 +1,144 @@
+//! An MJCF and the files that it includes as one tree of elements.
+
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+use roxmltree::{Document, Node, ParsingOptions};
+
+use super::element::Element;
+use super::fault::MjcfFault;
+
+/// Elements inside each other: no arm has so many, and the stack holds them.
+const DEEPEST: usize = 200;
+
+/// Whether the text of an .xml is a URDF.
+pub(in crate::robot) fn is_urdf(text: &str) -> bool {
+    parsed(text).is_ok_and(|document| document.root_element().tag_name().name() == "robot")
+}
+
+/// The root of an MJCF, with what it includes in place, and the files which that is from; `source` is the file of `text`.
+pub(super) fn document(text: &str, source: &str) -> Result<(Element, Vec<PathBuf>), MjcfFault> {
+    let source = Path::new(source);
+    let folder = folder(source);
+    let known = vec![known(source)];
+    let mut includes = Includes { folder: folder.clone(), known, files: Vec::new() };
+    let root = includes.root(&File::new(text, None, folder), 0)?;
+    Ok((root, includes.files))
+}
+
+fn parsed(text: &str) -> Result<Document<'_>, roxmltree::Error> {
+    // As MuJoCo does, a document type is passed over.
+    let options = ParsingOptions { allow_dtd: true, ..ParsingOptions::default() };
+    Document::parse_with_options(text.trim_start_matches('\u{feff}'), options)
+}
+
+fn folder(file: &Path) -> PathBuf {
+    file.parent().unwrap_or(Path::new("")).to_owned()
+}
+
+/// A file by the one name that it has however it was written.
+fn known(file: &Path) -> PathBuf {
+    file.canonicalize().unwrap_or_else(|_| file.to_owned())
+}
+
+/// A text, and how to tell where something stands in it.
+struct File<'t> {
+    text: &'t str,
+    /// Where its lines end.
+    ends: Vec<usize>,
+    /// As written in `<include>`; `None` for the main file.
+    name: Option<Rc<str>>,
+    folder: PathBuf,
+}
+
+impl<'t> File<'t> {
+    fn new(text: &'t str, name: Option<Rc<str>>, folder: PathBuf) -> Self {
+        let text = text.trim_start_matches('\u{feff}');
+        let ends = text.match_indices('\n').map(|(at, _)| at).collect();
+        Self { text, ends, name, folder }
+    }
+
+    fn line(&self, node: Node<'_, '_>) -> usize {
+        let start = node.range().start;
+        self.ends.partition_point(|end| *end < start) + 1
+    }
+}
+
+/// What was included so far.
+struct Includes {
+    /// Of the main file: there MuJoCo looks for what included files include.
+    folder: PathBuf,
+    known: Vec<PathBuf>,
+    files: Vec<PathBuf>,
+}
+
+impl Includes {
+    fn root(&mut self, file: &File<'_>, depth: usize) -> Result<Element, MjcfFault> {
+        let document = parsed(file.text).map_err(|e| MjcfFault::Xml {
+            file: file.name.as_ref().map(|name| format!("{name}: ")).unwrap_or_default(),
+            message: e.to_string(),
+        })?;
+        let root = self.element(document.root_element(), file, depth)?;
+        let is_included = file.name.is_some();
+        match root.tag.as_str() {
+            "mujoco" => Ok(root),
+            "mujocoinclude" if is_included => Ok(root),
+            _ => Err(MjcfFault::NotMjcf { place: root.place() }),
+        }
+    }
+
+    fn element(
+        &mut self,
+        node: Node<'_, '_>,
+        file: &File<'_>,
+        depth: usize,
+    ) -> Result<Element, MjcfFault> {
+        let attributes =
+            node.attributes().map(|one| (one.name().to_owned(), one.value().to_owned()));
+        let mut element = Element {
+            tag: node.tag_name().name().to_owned(),
+            attributes: attributes.collect(),
+            children: Vec::new(),
+            file: file.name.clone(),
+            line: file.line(node),
+        };
+        if depth > DEEPEST {
+            return Err(MjcfFault::TooDeep { place: element.place() });
+        }
+        for node in node.children().filter(|node| node.is_element()) {
+            let child = self.element(node, file, depth + 1)?;
+            if child.tag == "include" {
+                element.children.extend(self.included(&child, file, depth + 1)?);
+            } else {
+                element.children.push(child);
+            }
+        }
+        Ok(element)
+    }
+
+    /// What stands in the place of `include`.
+    fn included(
+        &mut self,
+        include: &Element,
+        from: &File<'_>,
+        depth: usize,
+    ) -> Result<Vec<Element>, MjcfFault> {
+        let name = include.required("file")?;
+        let near = from.folder.join(name);
+        let path = if near.exists() { near } else { self.folder.join(name) };
+        let file = || path.display().to_string();
+        if self.known.contains(&known(&path)) {
+            return Err(MjcfFault::IncludedTwice { place: include.place(), file: file() });
+        }
+        self.known.push(known(&path));
+        let text = std::fs::read_to_string(&path).map_err(|e| MjcfFault::Include {
+            place: include.place(),
+            file: file(),
+            reason: e.to_string(),
+        })?;
+        let file = File::new(&text, Some(name.into()), folder(&path));
+        let root = self.root(&file, depth)?;
+        self.files.push(path);
+        Ok(root.children)
+    }
+}

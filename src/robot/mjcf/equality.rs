@@ -1,0 +1,50 @@
+//! Joints that follow others: `<equality>`.
+
+use std::collections::HashMap;
+
+use urdf_rs::{Mimic, Robot};
+
+use super::element::Element;
+use super::fault::MjcfFault;
+use super::notice::LeftOut;
+
+/// Numbers of `polycoef`.
+const COEFFICIENTS: usize = 5;
+
+/// Gives the joints of `robot` that follow others their `mimic`, and tells what of this is left out. `references` are the
+/// positions that joints have in the pose of the file.
+pub(super) fn couple(
+    root: &Element,
+    robot: &mut Robot,
+    references: &HashMap<String, f64>,
+) -> Result<Vec<(LeftOut, String)>, MjcfFault> {
+    let mut left_out = Vec::new();
+    let reference = |joint: &str| references.get(joint).copied().unwrap_or(0.0);
+    for joint in root.each("equality").flat_map(|section| section.each("joint")) {
+        if joint.switch("active")? == Some(false) {
+            continue;
+        }
+        let name = joint.required("joint1")?;
+        let coefficients = joint.up_to("polycoef", COEFFICIENTS)?;
+        let coefficients = coefficients.unwrap_or_else(|| vec![0.0, 1.0]);
+        let Some(followed) = joint.text("joint2") else {
+            left_out.push((LeftOut::Held, name.to_owned()));
+            continue;
+        };
+        if coefficients.iter().skip(2).any(|higher| *higher != 0.0) {
+            left_out.push((LeftOut::Curve, name.to_owned()));
+        }
+        let offset = coefficients[0];
+        let multiplier = coefficients.get(1).copied().unwrap_or(1.0);
+        let mimic = Mimic {
+            joint: followed.to_owned(),
+            multiplier: Some(multiplier),
+            // The polynomial is of what joints are away from the pose of the file.
+            offset: Some(reference(name) + offset - multiplier * reference(followed)),
+        };
+        if let Some(follower) = robot.joints.iter_mut().find(|joint| joint.name == name) {
+            follower.mimic = Some(mimic);
+        }
+    }
+    Ok(left_out)
+}

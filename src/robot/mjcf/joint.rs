@@ -1,0 +1,114 @@
+//! What an MJCF says of a joint.
+
+use nalgebra::{Matrix3, Vector3};
+use urdf_rs::{Dynamics, JointLimit, JointType};
+
+use super::compiler::Compiler;
+use super::element::Element;
+use super::fault::MjcfFault;
+use super::notice::LeftOut;
+use super::pose::{about, direction, shift};
+use crate::robot::arm::{Placement, snap};
+
+/// Numbers of `damping` and `stiffness`: that in proportion, and those of higher powers.
+const POWERS: usize = 8;
+
+/// A joint in the frame of the body that it moves.
+#[derive(Debug)]
+pub(super) struct Joint {
+    pub kind: JointType,
+    /// A point of the axis, m; where the body turns about.
+    pub anchor_m: Vector3<f64>,
+    /// Of length 1.
+    pub axis: Vector3<f64>,
+    /// Position that the joint has in the pose of the file, rad or m.
+    pub reference: f64,
+    pub limit: JointLimit,
+    pub dynamics: Dynamics,
+    /// Rotor inertia at the joint, kg m².
+    pub armature_kg_m2: f64,
+    /// What else it has.
+    pub left_out: Vec<LeftOut>,
+}
+
+impl Joint {
+    /// From an element with the defaults of its class, in a `frame` of the body.
+    pub(super) fn of(
+        joint: &Element,
+        frame: &Placement,
+        compiler: &Compiler,
+    ) -> Result<Self, MjcfFault> {
+        let (kind, unit) = match joint.text("type") {
+            _ if joint.tag == "freejoint" => (JointType::Floating, 1.0),
+            None | Some("hinge") => (JointType::Revolute, compiler.angle_rad),
+            Some("slide") => (JointType::Prismatic, 1.0),
+            Some("ball") => (JointType::Spherical, 1.0),
+            Some("free") => (JointType::Floating, 1.0),
+            Some(other) => return Err(joint.keyword("type", other, "hinge, slide, ball, free")),
+        };
+        let is_single = matches!(kind, JointType::Revolute | JointType::Prismatic);
+        let pos = joint.numbers::<3>("pos")?.unwrap_or_default();
+        let anchor_m = match kind {
+            // It has no place of its own.
+            JointType::Floating => Vector3::zeros(),
+            _ => frame.rotation * Vector3::from(pos) + frame.translation_m,
+        };
+        let axis = joint.numbers::<3>("axis")?.unwrap_or([0.0, 0.0, 1.0]);
+        let axis = if is_single {
+            frame.rotation * direction(joint, "axis", axis.into())?
+        } else {
+            Vector3::z()
+        };
+        let range = if is_single { compiler.limit(joint, "limited", "range")? } else { None };
+        let effort = compiler.limit(joint, "actuatorfrclimited", "actuatorfrcrange")?;
+        let [lower, upper] = range.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        let damping = joint.up_to("damping", POWERS)?.unwrap_or_else(|| vec![0.0]);
+        let stiffness = joint.up_to("stiffness", POWERS)?.unwrap_or_default();
+        joint.refuse_negative("damping", damping[0])?;
+        let mut left_out = Vec::new();
+        if damping.iter().skip(1).any(|higher| *higher != 0.0) {
+            left_out.push(LeftOut::HigherDamping);
+        }
+        if stiffness.iter().any(|part| *part != 0.0) {
+            left_out.push(LeftOut::Stiffness);
+        }
+        Ok(Self {
+            anchor_m,
+            axis,
+            reference: joint.number("ref")?.unwrap_or(0.0) * unit,
+            limit: JointLimit {
+                lower: lower * unit,
+                upper: upper * unit,
+                effort: effort.map_or(0.0, smaller),
+                ..JointLimit::default()
+            },
+            dynamics: Dynamics {
+                damping: damping[0],
+                friction: joint.not_negative("frictionloss")?,
+            },
+            armature_kg_m2: joint.not_negative("armature")?,
+            left_out,
+            kind,
+        })
+    }
+
+    /// What the joint does to the body, about its anchor, between the pose of the file and zero.
+    pub(super) fn at_zero(&self) -> Placement {
+        match self.kind {
+            JointType::Revolute if self.reference != 0.0 => {
+                let rotation = about(self.axis, -self.reference).map(snap);
+                Placement { rotation, translation_m: Vector3::zeros() }
+            }
+            JointType::Prismatic => shift(-self.reference * self.axis),
+            _ => Placement { rotation: Matrix3::identity(), translation_m: Vector3::zeros() },
+        }
+    }
+}
+
+/// What a range of forces allows in both directions: the smaller of its ends, or the only one.
+pub(super) fn smaller([lower, upper]: [f64; 2]) -> f64 {
+    match (lower.abs(), upper.abs()) {
+        (0.0, one) | (one, 0.0) => one,
+        (one, other) => one.min(other),
+    }
+}

@@ -1,0 +1,72 @@
+//! What was assumed or left out in reading an MJCF, beside what is told of URDFs too.
+
+use std::fmt;
+
+/// Something that MJCF says and an arm does not have, or the other way round.
+#[derive(Debug, Clone, PartialEq)]
+pub enum MjcfNotice {
+    /// The file switches gravity off.
+    Weightless,
+    /// MJCF has no speed limits.
+    NoSpeedLimits {
+        /// What all joints were given.
+        velocity_rad_s: f64,
+    },
+    /// Something about joints that is no part of an [`Arm`](crate::robot::Arm).
+    LeftOut {
+        /// What.
+        what: LeftOut,
+        /// The joints that have it.
+        joints: Vec<String>,
+    },
+    /// Bodies whose weight MuJoCo takes away.
+    GravityCompensation {
+        /// These.
+        bodies: Vec<String>,
+    },
+}
+
+/// What joints have in MJCF, and not in an [`Arm`](crate::robot::Arm).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LeftOut {
+    /// A spring.
+    Stiffness,
+    /// Damping that grows faster than the speed.
+    HigherDamping,
+    /// A joint that an `<equality>` holds in its place.
+    Held,
+    /// A joint that follows another on a curve.
+    Curve,
+}
+
+impl fmt::Display for LeftOut {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Stiffness => "springs (stiffness) are no part of the arm",
+            Self::HigherDamping => "of damping only the first number is read, which is in proportion to the speed",
+            Self::Held => "an <equality> that holds a joint in its place is not read",
+            Self::Curve => "of polycoef only the first two numbers are read: a joint follows another in proportion",
+        })
+    }
+}
+
+impl fmt::Display for MjcfNotice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Weightless => write!(
+                f,
+                "the file switches gravity off; say gravity_m_s2 in NAME.drives.toml beside it if the arm has weight"
+            ),
+            Self::NoSpeedLimits { velocity_rad_s } => write!(
+                f,
+                "MJCF has no speed limits, taken as {velocity_rad_s:.4} rad/s for all joints"
+            ),
+            Self::LeftOut { what, joints } => write!(f, "{what}: {}", joints.join(", ")),
+            Self::GravityCompensation { bodies } => write!(
+                f,
+                "the file takes weight away (gravcomp), the arm has all of it, and its drives carry it: {}",
+                bodies.join(", ")
+            ),
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! From the text of an MJCF to an [`Arm`].
+
+use std::path::PathBuf;
+
+use nalgebra::Vector3;
+
+use super::actuator::efforts;
+use super::body::Bodies;
+use super::compiler::Compiler;
+use super::defaults::Defaults;
+use super::document::document;
+use super::element::Element;
+use super::equality::couple;
+use super::fault::MjcfFault;
+use super::notice::{LeftOut, MjcfNotice};
+use crate::robot::arm::Arm;
+use crate::robot::error::RobotError;
+use crate::robot::urdf::{Frames, UrdfArm, UrdfLink, UrdfNotice, arm_of, moving_links};
+
+/// Gravity where a file gives none, in the world, m/s²: MuJoCo's own.
+const USUAL_GRAVITY_M_S2: [f64; 3] = [0.0, 0.0, -9.81];
+
+/// An arm read from an MJCF.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MjcfArm {
+    /// The arm.
+    pub arm: Arm,
+    /// Bodies without mass, and named sites.
+    pub frames: Frames,
+    /// What was assumed, merged or left out, in words by `Display`.
+    pub notices: Vec<UrdfNotice>,
+    /// Files that were included.
+    pub included: Vec<PathBuf>,
+}
+
+/// Reads the text of an MJCF; `source` names it in messages, and is where included files are looked for.
+///
+/// What becomes of the file is what becomes of a URDF ([`read_urdf`](crate::robot::read_urdf)), but for this:
+///
+/// - **Base frame**: the world. Gravity is that of `<option>`.
+/// - **Joints**: hinges. `ref` is the position in the pose of the file; an axis that does not go through the body's origin is one
+///   of the joint's frame, whose origin is `pos`. Joints without a name are called after their body (`BODY_joint`). A joint that an
+///   `<equality>` makes follow another is what a mimic joint is there.
+/// - **Bodies** are links; their inertia is that of `<inertial>`, or of geoms that are primitive solids, as `<compiler>` says.
+///   Named sites are frames, as bodies without mass are.
+/// - **Drives**: `armature` is the rotor inertia, `damping` rv, `frictionloss` rc. The torque limit is the joint's
+///   `actuatorfrcrange`, or else an actuator's `forcerange` (of a motor without one its `ctrlrange`) times its gear.
+/// - **Default classes**, `childclass`, `<include>`, `<frame>`, and the ways to write orientations are as in MuJoCo. Copies
+///   (`<replicate>`), attached models, deformable bodies and the mass of meshes on moving bodies are refused.
+/// - Contacts, tendons, sensors, keyframes, and what is only seen are not read.
+///
+/// # Errors
+/// [`RobotError::Mjcf`] where it is no MJCF, or not one of a serial arm of physically possible bodies.
+pub fn read_mjcf(text: &str, source: &str) -> Result<MjcfArm, RobotError> {
+    read(text, source, None).map_err(|fault| RobotError::Mjcf { file: source.to_owned(), fault })
+}
+
+/// As [`read_mjcf`], of an arm that ends with the body (or site) `last_body`, whatever else is in the file, as
+/// [`read_urdf_up_to`](crate::robot::read_urdf_up_to) does.
+///
+/// # Errors
+/// As [`read_mjcf`], and where there is no such body, or what moves it are not hinges of their own.
+pub fn read_mjcf_up_to(text: &str, source: &str, last_body: &str) -> Result<MjcfArm, RobotError> {
+    read(text, source, Some(last_body))
+        .map_err(|fault| RobotError::Mjcf { file: source.to_owned(), fault })
+}
+
+fn read(text: &str, source: &str, last_body: Option<&str>) -> Result<MjcfArm, MjcfFault> {
+    let (root, included) = document(text, source)?;
+    let compiler = Compiler::of(&root)?;
+    let defaults = Defaults::of(&root)?;
+    let efforts = efforts(&root, &compiler, &defaults)?;
+    let mut bodies = Bodies::of(&root, &compiler, &defaults, &efforts)?;
+    let coupled = couple(&root, &mut bodies.robot, &bodies.references)?;
+    bodies.left_out.extend(coupled);
+    give_inertias(&mut bodies, source, last_body)?;
+    let UrdfArm { mut arm, frames, links, notices } =
+        arm_of(&bodies.robot, source, last_body).map_err(MjcfFault::Arm)?;
+    arm.gravity_m_s2 = gravity(&root)?;
+    for joint in &mut arm.joints {
+        joint.drive.rotor_inertia_kg_m2 =
+            bodies.armature_kg_m2.get(&joint.name).copied().unwrap_or(0.0);
+    }
+    let notices = told(notices, &arm, &links, &bodies);
+    Ok(MjcfArm { arm, frames, notices, included })
+}
+
+/// Gives the links their inertia. What never moves needs none, so that what is wrong with it does not matter.
+fn give_inertias(
+    bodies: &mut Bodies<'_>,
+    source: &str,
+    last_body: Option<&str>,
+) -> Result<(), MjcfFault> {
+    let moving = moving_links(&bodies.robot, source, last_body).map_err(MjcfFault::Arm)?;
+    let inertias = std::mem::take(&mut bodies.inertias);
+    for (link, inertia) in bodies.robot.links.iter_mut().zip(inertias) {
+        match inertia {
+            Ok(inertial) => link.inertial = inertial,
+            Err(fault) if moving.contains(&link.name) => return Err(fault),
+            Err(_) => {}
+        }
+    }
+    Ok(())
+}
+
+/// Gravity in the world, m/s².
+fn gravity(root: &Element) -> Result<Vector3<f64>, MjcfFault> {
+    let mut flags = root.each("option").flat_map(|option| option.each("flag"));
+    if flags.any(|flag| flag.text("gravity") == Some("disable")) {
+        return Ok(Vector3::zeros());
+    }
+    let given = match root.settings("option") {
+        Some(option) => option.numbers::<3>("gravity")?,
+        None => None,
+    };
+    Ok(given.unwrap_or(USUAL_GRAVITY_M_S2).into())
+}
+
+/// What is to be told of an MJCF: of what was `noticed` as of a URDF that which holds, and its own.
+fn told(
+    noticed: Vec<UrdfNotice>,
+    arm: &Arm,
+    links: &[UrdfLink],
+    bodies: &Bodies<'_>,
+) -> Vec<UrdfNotice> {
+    let mut notices = Vec::new();
+    let mut own = Vec::new();
+    if arm.gravity_m_s2 == Vector3::zeros() {
+        own.push(MjcfNotice::Weightless);
+    }
+    let mut no_speed_limits = None;
+    for notice in noticed {
+        match notice {
+            UrdfNotice::Gravity { .. } => {}
+            UrdfNotice::AssumedVelocity { velocity_rad_s, .. } => {
+                no_speed_limits = Some(MjcfNotice::NoSpeedLimits { velocity_rad_s });
+            }
+            UrdfNotice::Drives { mut rotor_inertia, gear_ratio, torque_constant } => {
+                let has_none = |joint: &String| bodies.armature_kg_m2.get(joint) == Some(&0.0);
+                rotor_inertia.retain(has_none);
+                notices.push(UrdfNotice::Drives { rotor_inertia, gear_ratio, torque_constant });
+            }
+            other => notices.push(other),
+        }
+    }
+    own.extend(no_speed_limits);
+    for what in [LeftOut::Stiffness, LeftOut::HigherDamping, LeftOut::Held, LeftOut::Curve] {
+        let having = bodies.left_out.iter().filter(|(one, _)| *one == what);
+        let joints: Vec<String> = having
+            .map(|(_, joint)| joint.clone())
+            .filter(|name| what == LeftOut::Curve || arm.joints.iter().any(|j| j.name == *name))
+            .collect();
+        if !joints.is_empty() {
+            own.push(MjcfNotice::LeftOut { what, joints });
+        }
+    }
+    let moving = links.iter().filter(|link| link.body > 0).map(|link| &link.name);
+    let compensated: Vec<String> =
+        moving.filter(|name| bodies.weightless.contains(*name)).cloned().collect();
+    if !compensated.is_empty() {
+        own.push(MjcfNotice::GravityCompensation { bodies: compensated });
+    }
+    notices.extend(own.into_iter().map(UrdfNotice::Mjcf));
+    notices
+}

@@ -1,0 +1,84 @@
+//! Arms that are a part of what is in a file, and joints that are not an arm's.
+
+use approx::assert_abs_diff_eq;
+use nalgebra::Vector3;
+
+use super::{BODY, one, read, says};
+use crate::robot::UrdfNotice;
+use crate::robot::mjcf::{LeftOut, MjcfArm, MjcfNotice, read_mjcf_up_to};
+
+/// A gripper with two fingers, the second of which follows the first.
+fn gripper() -> String {
+    let finger = |name: &str| {
+        format!(
+            r#"<body name="{name}" pos="0 0 0.1"><joint name="{name}_slide" type="slide" axis="0 1 0" range="0.01 0.04"/>
+               <inertial pos="0 0 0" mass="0.1" diaginertia="1e-4 1e-4 1e-4"/></body>"#
+        )
+    };
+    let coupling = r#"<equality><joint joint1="right_slide" joint2="left_slide" polycoef="0.02 -1 0 0 0"/></equality>"#;
+    let hand = format!(r#"<body name="hand">{}{}</body>"#, finger("left"), finger("right"));
+    one(coupling, "", &format!(r#"<joint name="j"/>{BODY}{hand}"#))
+}
+
+#[test]
+fn an_arm_is_named_by_its_last_body() {
+    says(
+        &gripper(),
+        &["one chain of hinges", "\"left_slide\" is a slide", "toy.xml#hand", "taken as locked"],
+    );
+    let MjcfArm { arm, notices, .. } = read_mjcf_up_to(&gripper(), "toy.xml", "hand").unwrap();
+    assert_abs_diff_eq!(arm.joints[0].link.mass_kg(), 2.2, epsilon = 1e-15);
+    let locked = notices.iter().find(|notice| matches!(notice, UrdfNotice::Locked { .. })).unwrap();
+    let text = locked.to_string();
+    assert!(text.contains("left_slide (0.01 m), right_slide (0.01 m)"), "{text}");
+    let refused =
+        |last: &str| read_mjcf_up_to(&gripper(), "toy.xml", last).unwrap_err().to_string();
+    assert!(refused("tool").contains("no body or site \"tool\""), "{}", refused("tool"));
+    let finger = refused("left");
+    assert!(finger.contains("on the way to \"left\"") && finger.contains("a slide"), "{finger}");
+    let world = refused("world");
+    assert!(world.contains("\"world\" stands still"), "{world}");
+}
+
+#[test]
+fn a_free_base_is_told() {
+    let text = one("", "", &format!(r#"<freejoint name="root"/>{BODY}"#));
+    says(&text, &["joint \"root\" is free", "one chain of hinges"]);
+}
+
+#[test]
+fn two_joints_of_one_body_have_nothing_between_them() {
+    let text = one("", "", &format!(r#"<joint name="j"/><joint name="k" axis="0 1 0"/>{BODY}"#));
+    says(&text, &["a behind j", "joint \"j\"", "give each joint a body"]);
+    // Locked, they are two turns about their axes, the second of which is as far from the first as the file says.
+    let wrist = r#"<joint name="k" axis="0 1 0" pos="0 0 0.1" ref="90"/><joint name="l" axis="1 0 0" pos="0 0.2 0"/>"#;
+    let hand = format!(r#"<body name="b" pos="1 0 0">{wrist}{BODY}<site name="tip"/></body>"#);
+    let text = one("", "", &format!(r#"<joint name="j"/>{BODY}{hand}"#));
+    let MjcfArm { frames, .. } = read_mjcf_up_to(&text, "toy.xml", "a").unwrap();
+    let tip = frames.fixed.iter().find(|frame| frame.name == "tip").unwrap();
+    // −90° about y through (1, 0, 0.1): the origin of the body goes from (1, 0, 0) to (1.1, 0, 0.1).
+    assert_abs_diff_eq!(tip.placement.translation_m, Vector3::new(1.1, 0.0, 0.1), epsilon = 1e-15);
+}
+
+#[test]
+fn what_an_arm_does_not_have_is_told() {
+    let joint = r#"<joint name="j" stiffness="2" damping="1 0.5"/>"#;
+    let text = one(
+        r#"<equality><joint joint1="j"/></equality>"#,
+        r#"gravcomp="1""#,
+        &format!("{joint}{BODY}"),
+    );
+    let MjcfArm { notices, .. } = read(&text);
+    for what in [LeftOut::Stiffness, LeftOut::HigherDamping, LeftOut::Held] {
+        let notice = MjcfNotice::LeftOut { what, joints: vec!["j".into()] };
+        assert!(notices.contains(&UrdfNotice::Mjcf(notice)), "{what}");
+    }
+    let compensated = MjcfNotice::GravityCompensation { bodies: vec!["a".into()] };
+    assert!(notices.contains(&UrdfNotice::Mjcf(compensated)));
+    let arm = one(
+        r#"<equality><joint joint1="j" joint2="k"/></equality>"#,
+        "",
+        &format!(r#"<joint name="j"/>{BODY}<body><joint name="k"/>{BODY}</body>"#),
+    );
+    says(&arm, &["joint \"j\" follows \"k\" by an <equality>"]);
+}
