@@ -73,7 +73,13 @@ fn a_mujoco_model_is_a_robot() {
     folder.write("arm.xml", mjcf(&arm, &Frames::default()).unwrap());
     let alone = folder.armid("base --robot arm.xml");
     alone.says(0, &["58 base parameters"]);
-    alone.complains(0, &["MJCF has no speed limits", "no gear ratio and no torque constant given, taken as 1 and 1 Nm/A"]);
+    alone.complains(
+        0,
+        &[
+            "MJCF has no speed limits",
+            "no gear ratio and no torque constant given, taken as 1 and 1 Nm/A",
+        ],
+    );
     folder.write("arm.drives.toml", drive_file(&arm, &[0.0; 6]));
     folder.armid("base --robot arm.xml#wrist_3_link --json base.json").says(0, &["52 base"]);
     let inputs = &folder.result("base.json")["program"]["inputs"];

@@ -273,4 +273,31 @@ fn of_two_logs_the_one_that_is_misread_is_named() {
     let words = "identify first.csv other.csv --robot ur5 --json both.json";
     folder.armid(words).says(3, &[said]);
     assert_eq!(folder.result("both.json")["misreading"]["log"], "other.csv");
+    // Logs that nothing is fitted to are looked at as well.
+    folder.armid("identify first.csv --validate other.csv --robot ur5").says(0, &[said]);
+    folder.armid("diagnose first.csv --held-out other.csv --robot ur5").says(0, &[said]);
+    let declined = "other.csv: declined. The log is not read as it was recorded";
+    folder.armid("diagnose first.csv other.csv --robot ur5").complains(1, &[declined]);
+}
+
+/// Torques of another time: no way to read them fits, and the parameters are not left to speak for themselves.
+#[test]
+fn a_log_that_is_of_no_arm_is_questioned() {
+    let folder = Folder::empty();
+    folder.write("mine.toml", default_scenario(4));
+    folder.armid("simulate --scenario mine.toml --out log.csv").says(0, &[]);
+    let text = folder.read("log.csv");
+    let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+    let (header, rows) = rows.split_first().unwrap();
+    let torque = header.iter().position(|name| *name == "actual_torque_0").unwrap();
+    let later = |k: usize| &rows[(k + 300) % rows.len()][torque..torque + 6];
+    let shifted = rows
+        .iter()
+        .enumerate()
+        .map(|(k, row)| [&row[..torque], later(k), &row[torque + 6..]].concat().join(","));
+    let lines: Vec<String> = [header.join(",")].into_iter().chain(shifted).collect();
+    folder.write("log.csv", lines.join("\n"));
+    let question = "Is this log of ur5, and read as it was recorded?";
+    folder.armid("identify log.csv --robot ur5").says(0, &[question]);
+    folder.armid("diagnose log.csv --robot ur5").says(0, &[question]);
 }

@@ -365,7 +365,8 @@ fn validate(
     theta: &[f64],
 ) -> Result<Validation, Box<dyn std::error::Error>> {
     let regression = identifier.regression(&log.measurement())?;
-    let mut warnings = Vec::new();
+    let misreading = Misreading::of(arm, &regression, identifier.options());
+    let mut warnings: Vec<String> = misreading.iter().map(Misreading::sentence).collect();
     let manufacturer = match log.log.target_torque_nm(arm)? {
         Some(torque_nm) => {
             let given = Measurement { torque_nm: &torque_nm, ..log.measurement() };

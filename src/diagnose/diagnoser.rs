@@ -29,7 +29,7 @@ use crate::base::BaseSet;
 use crate::dynamics::Model;
 use crate::identify::{
     Doubt, Identification, Identifier, Measurement, Misreading, Options, Regression,
-    drive_limit_remark,
+    drive_limit_remark, unlike_remark,
 };
 use crate::robot::{Arm, JointSignals};
 
@@ -209,7 +209,9 @@ impl<'a> Diagnoser<'a> {
         let sigma = sigma_of_friction_alone(diagnosis, self.set);
         // What touched the arm, and friction that the null model lacks, bend the null model's gravity.
         let (theta, covariance) = (&extension.theta, &identification.covariance);
-        let doubt = Doubt::of(self.arm, self.set, &nominal, theta, &sigma, covariance);
+        let left = share_left(diagnosis, identification);
+        let doubt = Doubt::of(self.arm, self.set, &nominal, theta, &sigma, covariance)
+            .or_else(|| Some(Doubt::question(unlike_remark(self.arm, &left)?)));
         if let Some(doubt) = doubt {
             diagnosis.sentences.insert(0, doubt.sentence);
             if doubt.is_contradiction {
@@ -287,6 +289,10 @@ impl<'a> Diagnoser<'a> {
             Ok((log.regression(&mut self.identifier, m.source)?, touched))
         };
         let [(reference_rows, _), (loaded_rows, touched)] = [cleaned(reference)?, cleaned(loaded)?];
+        if let Some(misreading) = Misreading::of(self.arm, &loaded_rows, &self.options) {
+            let (log, misreading) = (loaded.source.to_owned(), Box::new(misreading));
+            return Err(DiagnoseError::Misread { log, misreading });
+        }
         let shared = payload::Shared {
             arm: self.arm,
             set: self.set,
@@ -359,6 +365,17 @@ struct Extended {
     /// What the causes span outside the null model, and what they leave of its residual.
     accepted: Span,
     rest: Image,
+}
+
+/// Share of each joint's torque (rms) that is left beside the causes, without noise as far as the log tells it.
+fn share_left(diagnosis: &Diagnosis, identification: &Identification) -> Vec<f64> {
+    let null = identification.residual();
+    let share = |j: usize| {
+        let torque_nm = 100.0 * null.rms_nm[j] / null.relative_percent[j];
+        let noise_nm = diagnosis.noise_of_mean_nm.as_ref().map_or(0.0, |nm| nm[j]);
+        (diagnosis.after.rms_nm[j].powi(2) - noise_nm.powi(2)).max(0.0).sqrt() / torque_nm
+    };
+    (0..null.rms_nm.len()).map(share).collect()
 }
 
 /// σ of the base parameters beside the causes; ∞ of the Coulomb friction of joints that have another law of friction beside it, so that

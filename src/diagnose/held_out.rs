@@ -16,7 +16,9 @@ use super::scene::Scene;
 use super::verdict::HeldOut;
 use super::whitening::{RunWhitening, Whitening};
 use crate::base::BaseSet;
-use crate::identify::{Identifier, MOVING_RAD_S, Measurement, Options, Problem, Regression};
+use crate::identify::{
+    Identifier, MOVING_RAD_S, Measurement, Misreading, Options, Problem, Regression,
+};
 use crate::robot::{Arm, JointSignals};
 use crate::signal::mean_period;
 
@@ -46,6 +48,7 @@ pub(super) fn held_out_gain(
 ) -> Result<HeldOut, DiagnoseError> {
     let extension = &models.extension.elsewhere(families);
     let mut regression = identifier.regression(&log.measurement)?;
+    let misreading = Misreading::of(arm, &regression, options);
     move_to_common_motion(&mut regression, (arm, set), &models.null.theta);
     let prepared = &regression.prepared;
     let whitening = if prepared.replicates.is_some() {
@@ -88,6 +91,7 @@ pub(super) fn held_out_gain(
         (0..joints).map(of).collect()
     };
     let mut warnings = regression.prepared.warnings.clone();
+    warnings.extend(misreading.map(|misreading| misreading.sentence()));
     let manufacturer = match log.manufacturer_nm {
         Some(torque_nm) => {
             let given = Measurement { torque_nm, ..log.measurement };

@@ -47,6 +47,11 @@ impl Doubt {
         let parts: Vec<String> = head.into_iter().chain(pushing).chain(question).collect();
         (!parts.is_empty()).then(|| Self { is_contradiction, sentence: parts.join(" ") })
     }
+
+    /// A question that contradicts nothing.
+    pub fn question(sentence: String) -> Self {
+        Self { is_contradiction: false, sentence }
+    }
 }
 
 #[cfg(test)]

@@ -165,6 +165,11 @@ impl<'a> Identifier<'a> {
         }
     }
 
+    /// With what it identifies.
+    pub fn options(&self) -> &Options {
+        &self.options
+    }
+
     /// The base set that is identified.
     pub fn base_set(&self) -> &'a BaseSet {
         self.set
@@ -500,6 +505,18 @@ impl Identification {
     /// Residual of the fit over all samples used.
     pub fn residual(&self) -> Residual {
         Residual::from_squares(&self.fit.residual_squares, &self.fit.torque_squares, self.samples)
+    }
+
+    /// Share of each joint's torque (rms) that the model leaves, without noise as far as the log tells it.
+    pub fn left(&self) -> Vec<f64> {
+        let Residual { rms_nm, relative_percent, .. } = self.residual();
+        let beyond_noise = |j: usize| match (&self.explainable_nm, &self.replicates) {
+            (Some(explainable_nm), _) => explainable_nm[j],
+            (None, Some(noise)) => (rms_nm[j].powi(2) - noise.sigma[j].powi(2)).max(0.0).sqrt(),
+            (None, None) => rms_nm[j],
+        };
+        let share = |j: usize| 0.01 * relative_percent[j] * beyond_noise(j) / rms_nm[j];
+        (0..rms_nm.len()).map(share).collect()
     }
 
     /// σ of every base parameter.

@@ -32,6 +32,7 @@ mod problem;
 mod quality;
 mod residual;
 mod triangle;
+mod unlike;
 mod whiten;
 
 pub use bound::{KnownNoise, cramer_rao};
@@ -55,4 +56,5 @@ pub use problem::{Assembler, Domain, Panel, Problem};
 pub use quality::{Condition, identifies_the_arm, not_identified, plausible_size};
 pub use residual::Residual;
 pub use triangle::Triangle;
+pub use unlike::unlike_remark;
 pub use whiten::Spectrum;

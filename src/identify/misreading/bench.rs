@@ -14,7 +14,7 @@ use crate::identify::options::Options;
 use crate::identify::problem::{Assembler, Problem};
 use crate::identify::whiten::smoothed;
 use crate::robot::{Arm, JointSignals};
-use crate::signal::{Scratch, ZeroPhase, mean_period};
+use crate::signal::{Replicates, Scratch, ZeroPhase, mean_period};
 
 /// Share of the torque (rms) that friction has where it counts: what is less may be another law.
 const FRICTION: f64 = 0.1;
@@ -33,6 +33,9 @@ pub struct Match {
     pub left: Vec<f64>,
     /// Whether Coulomb and viscous friction do work on the joint, and are a tenth of the torque or more.
     pub friction_pushes: Vec<bool>,
+    /// `left` without the noise that the log shows by itself.
+    #[serde(skip)]
+    beyond_noise: Vec<f64>,
     /// Mean share of the torque (rms) that friction has, negative where it pushes.
     #[serde(skip)]
     friction: f64,
@@ -53,9 +56,9 @@ impl Match {
         (0..self.left.len()).map(|j| self.misfit_of(j)).sum()
     }
 
-    /// Whether the model leaves more than `share` of the torque of a joint, or friction pushes one.
+    /// Whether the model leaves more than `share` of the torque of a joint, noise apart, or friction pushes one.
     pub(super) fn leaves_more_than(&self, share: f64) -> bool {
-        self.left.iter().any(|left| *left > share) || self.friction_pushes.contains(&true)
+        self.beyond_noise.iter().any(|left| *left > share) || self.friction_pushes.contains(&true)
     }
 
     /// Whether it is the other sign of all torques that friction, or where there is next to none, gravity as described speaks for:
@@ -70,6 +73,8 @@ impl Match {
 pub struct Bench {
     motion: Motion,
     torque_nm: JointSignals,
+    /// Noise (rms) of the torque, as far as it is known.
+    noise_nm: Vec<f64>,
     mountings: Vec<Mounting>,
 }
 
@@ -102,8 +107,15 @@ impl Bench {
         };
         if torque_nm.samples() > n {
             let mean = torque_nm.map_joints(|_, y| mean_period(y, n));
-            let (motion, torque_nm) = (of_motion(motion), thinned(&mean));
-            return Some(Self { motion, torque_nm, mountings });
+            let of_mean = |r: &Replicates| {
+                r.sigma.iter().map(|sigma| sigma / (r.periods as f64).sqrt()).collect()
+            };
+            return Some(Self {
+                motion: of_motion(motion),
+                torque_nm: thinned(&mean),
+                noise_nm: prepared.replicates.as_ref().map_or(vec![0.0; arm.dof()], of_mean),
+                mountings,
+            });
         }
         let Options { cutoff_hz, order, .. } = *options;
         let rate_hz = prepared.processing.rate_hz;
@@ -114,7 +126,12 @@ impl Bench {
         for j in 0..torque_nm.joints() {
             filter.filter_in_place(torque_nm.joint_mut(j), &mut scratch).ok()?;
         }
-        Some(Self { motion: of_motion(&smooth), torque_nm: thinned(&torque_nm), mountings })
+        Some(Self {
+            motion: of_motion(&smooth),
+            torque_nm: thinned(&torque_nm),
+            noise_nm: vec![0.0; arm.dof()],
+            mountings,
+        })
     }
 
     /// For all other mountings as well.
@@ -145,6 +162,14 @@ impl Bench {
         if !left.iter().all(|share| share.is_finite()) {
             return None;
         }
+        let samples = motion.samples() as f64;
+        let beyond_noise = (0..model.dof()).map(|j| {
+            // The torque's that is read there now.
+            let noise_nm = self.noise_nm[counting.torque()[j].joint];
+            let noise = noise_nm * noise_nm * samples / fit.torque_squares[j];
+            (left[j].powi(2) - noise).max(0.0).sqrt()
+        });
+        let beyond_noise = beyond_noise.collect();
         let layout = ParameterLayout::new(model.dof());
         let value = |parameter| {
             let index = layout.index(parameter);
@@ -165,7 +190,8 @@ impl Bench {
         let pushes = |(left, friction): (&f64, &f64)| *left < KNOWN && *friction < -FRICTION;
         let friction_pushes = left.iter().zip(&friction).map(pushes).collect();
         let friction = friction.iter().sum::<f64>() / friction.len() as f64;
-        Some(Match { left, friction_pushes, friction, gravity: cosine(first_moments, theta) })
+        let gravity = cosine(first_moments, theta);
+        Some(Match { left, friction_pushes, beyond_noise, friction, gravity })
     }
 }
 

@@ -43,7 +43,7 @@ pub struct Misreading {
     reading: Reading,
 }
 
-/// Share of the torque (rms) up to which the model explains a joint, whatever is read otherwise.
+/// Share of the torque (rms, noise apart) up to which the model explains a joint, whatever is read otherwise.
 const EXPLAINED: f64 = 0.03;
 /// Factor by which the rms residual of a joint has to fall for every joint that is read otherwise, and that of one joint at
 /// least: laws of friction and soft gears bring 1.5 on real arms, and wrong changes take more elsewhere than they bring.

@@ -23,7 +23,7 @@ use crate::identify::covariance::CovarianceKind;
 use crate::identify::physical::PhysicalEstimate;
 use crate::identify::{
     Condition, Doubt, Estimator, FitError, Identification, Prediction, Processing, Regression,
-    Residual, drive_limit_remark, identifies_the_arm, not_identified,
+    Residual, drive_limit_remark, identifies_the_arm, not_identified, unlike_remark,
 };
 use crate::log::Log;
 use crate::robot::{Arm, Kinematics};
@@ -218,6 +218,7 @@ impl Result {
             }
             None => {
                 Doubt::of(arm, set, training.nominal, theta, &sigma, &identification.covariance)
+                    .or_else(|| Some(Doubt::question(unlike_remark(arm, &identification.left())?)))
             }
         };
         warnings.extend(doubt.iter().map(|doubt| doubt.sentence.clone()));

@@ -1,0 +1,110 @@
+//! Logs without velocities, and readings that are held.
+
+use super::*;
+
+/// A layout as that of the valid log, without velocities.
+fn without_velocities() -> Layout {
+    let layout = include_str!("../../layouts/armid.toml");
+    let lines = layout.lines().filter(|line| !line.starts_with("qd = \"actual"));
+    let text = lines.collect::<Vec<_>>().join("\n");
+    assert!(text.len() < layout.len() - 10, "{text}");
+    Layout::from_toml(&text, "no_qd.toml").unwrap()
+}
+
+/// Columns of zeros are no velocities, and the remedy that is named works: slopes of angles, wrapped ones as well, are told to
+/// (ω h)⁴/30 of up to 1.8 rad/s, and at the ends, one-sided, to six times that.
+#[test]
+fn velocities_that_were_not_recorded_are_slopes_of_the_angles() {
+    let mut rows = valid();
+    scale(&mut rows, 7..13, 0.0);
+    assert_eq!(suspected(read(text(&rows, ",", "\n"))), ("no velocity", ""));
+    for row in &mut rows[1..] {
+        let angle: f64 = row[4].parse().unwrap();
+        row[4] = ((angle + 1.0).rem_euclid(TAU) - PI).to_string();
+    }
+    let (text, layout) = (text(&rows, ",", "\n"), without_velocities());
+    let log = read_log_from(text.as_bytes(), "run.csv", &layout, JOINTS).unwrap();
+    assert_eq!(log.rows.used, SAMPLES);
+    let [LogWarning::Unwrapped { joint: 4, .. }, LogWarning::SlopesOfAngles] =
+        log.rows.warnings[..]
+    else {
+        panic!("{:?}", log.rows.warnings)
+    };
+    let bound = 6.0 * 1.8 * (2.0 * STEP_S).powi(4) / 30.0;
+    for j in 0..JOINTS {
+        for (slope, t) in log.qd_rad_s.joint(j).iter().zip(&log.time_s) {
+            let off = slope - velocity_rad_s(j, *t);
+            assert!(off.abs() < bound, "joint {}: off by {off} at {t} s", j + 1);
+        }
+    }
+}
+
+/// Stamps of 0.01 s at 125 rows a second, without velocities that could tell that rows are even.
+#[test]
+fn rounded_stamps_are_mended_without_velocities() {
+    let mut rows = valid();
+    for line in &mut rows[1..] {
+        let time: f64 = line[0].parse().unwrap();
+        line[0] = format!("{:.2}", time);
+    }
+    let text = text(&rows, ",", "\n");
+    let log = read_log_from(text.as_bytes(), "run.csv", &without_velocities(), JOINTS).unwrap();
+    assert_eq!(log.rows.used, SAMPLES);
+    assert!(matches!(log.rows.warnings[0], LogWarning::RoundedStamps { .. }), "{}", log.rows);
+    for (k, slope) in log.qd_rad_s.joint(1).iter().enumerate() {
+        // The line through 400 stamps is known to 0.01 s/√(12 · 400) at its middle and to a ten thousandth of its slope.
+        let truth = velocity_rad_s(1, 100.0 + STEP_S * k as f64);
+        assert!((slope - truth).abs() < 2e-3, "{slope} {truth}");
+    }
+}
+
+/// A wild angle costs its own row and none beside it, whose slopes it would be in, and stays out of those.
+#[test]
+fn wild_angles_are_in_no_slopes() {
+    let mut rows = valid();
+    let wild: Vec<usize> = (20..SAMPLES).step_by(40).collect();
+    for k in &wild {
+        rows[row(*k) - 1][3] = "2.5".into();
+    }
+    let text = text(&rows, ",", "\n");
+    let log = read_log_from(text.as_bytes(), "run.csv", &without_velocities(), JOINTS).unwrap();
+    assert_eq!(log.rows.used, SAMPLES - wild.len());
+    assert_eq!(log.rows.set_aside[0].reason, Reason::Inconsistent);
+    assert!(log.rows.set_aside[0].example.contains("2.5"), "{}", log.rows);
+    for (slope, t) in log.qd_rad_s.joint(2).iter().zip(&log.time_s) {
+        // Beside a row that is missing steps are twice as long, and one-sided at the ends.
+        let bound = 16.0 * 6.0 * 1.8 * (2.0 * STEP_S).powi(4) / 30.0;
+        assert!((slope - velocity_rad_s(2, *t)).abs() < bound, "{slope} at {t} s");
+    }
+}
+
+/// Readings at 42 Hz in a file of 125 Hz: two in three rows are held. An arm at rest, whose velocities are noisy, holds none.
+#[test]
+fn rows_that_hold_old_readings_are_told() {
+    let log = edited(|rows| {
+        for k in 0..SAMPLES {
+            let read = rows[row(k - k % 3) - 1].clone();
+            rows[row(k) - 1][1..].clone_from_slice(&read[1..]);
+        }
+    })
+    .unwrap();
+    let held = log.rows.warnings.iter().find_map(|warning| match warning {
+        LogWarning::Held { share, rate_hz } => Some((*share, *rate_hz)),
+        _ => None,
+    });
+    let (share, rate_hz) = held.expect("it is told");
+    let at_rest = edited(|rows| {
+        for k in 0..SAMPLES / 2 {
+            for j in 0..JOINTS {
+                rows[row(k) - 1][1 + j] = rows[row(SAMPLES / 2) - 1][1 + j].clone();
+                rows[row(k) - 1][1 + JOINTS + j] =
+                    (0.004 * (k as f64 + j as f64).sin()).to_string();
+            }
+        }
+    });
+    let warnings = at_rest.unwrap().rows.warnings;
+    assert!(!warnings.iter().any(|w| matches!(w, LogWarning::Held { .. })), "{warnings:?}");
+    // 400 rows are 133 such readings and one more.
+    assert!((share - 2.0 / 3.0).abs() < 0.003, "{share}");
+    assert!((rate_hz * STEP_S - 1.0 / 3.0).abs() < 0.003, "{rate_hz}");
+}

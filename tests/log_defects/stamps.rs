@@ -1,0 +1,145 @@
+//! Clocks: coarse stamps, backward and wild times, pauses, stamps in two columns.
+
+use super::*;
+
+/// The line through 400 stamps that are off by 10 ms/√12 is known to 0.15 ms in the middle, and to twice that at its ends: five times
+/// as much.
+#[test]
+fn stamps_that_are_coarser_than_the_rows() {
+    let rounded = |rows: &mut Vec<Vec<String>>| {
+        for row in &mut rows[1..] {
+            let t: f64 = row[0].parse().unwrap();
+            row[0] = format!("{:.2}", t);
+        }
+    };
+    for lost in [None, Some(200)] {
+        let log = edited(|rows| {
+            rounded(rows);
+            // A row that is set aside keeps its place.
+            lost.into_iter().for_each(|k: usize| rows[k][3] = "x".into());
+        })
+        .unwrap();
+        assert_eq!(log.samples(), SAMPLES - lost.iter().count());
+        for (t, row) in log.time_s.iter().zip((0..SAMPLES).filter(|k| lost != Some(k + 1))) {
+            assert!((t - 100.0 - STEP_S * row as f64).abs() < 1.5e-3, "{t} {row}");
+        }
+        assert!(log.rows.warnings.iter().any(|w| matches!(w, LogWarning::RoundedStamps { .. })));
+    }
+}
+
+/// Patterns of stamps that rounding makes as well: every twentieth row missing, every row written twice. The motion says that the stamps
+/// are right.
+#[test]
+fn stamps_that_only_look_rounded() {
+    let is_rounded =
+        |log: &Log| log.rows.warnings.iter().any(|w| matches!(w, LogWarning::RoundedStamps { .. }));
+    let missing = edited(|rows| {
+        let mut k = 0;
+        rows.retain(|_| {
+            k += 1;
+            k % 20 != 0
+        });
+    })
+    .unwrap();
+    assert!(!is_rounded(&missing));
+    assert_eq!(missing.samples(), SAMPLES - SAMPLES / 20);
+    let twice = edited(|rows| {
+        *rows = rows.iter().flat_map(|row| [row.clone(), row.clone()]).skip(1).collect();
+    })
+    .unwrap();
+    assert!(!is_rounded(&twice));
+    assert_eq!(twice.rows.count(Reason::TimeRepeated), SAMPLES);
+}
+
+#[test]
+fn repeated_and_backward_times() {
+    let result = edited(|rows| rows[51][0] = rows[50][0].clone());
+    assert_one_row_aside(result, Reason::TimeRepeated, 52, "100.392");
+    let result = edited(|rows| rows[51][0] = "3.25".into());
+    assert_one_row_aside(result, Reason::TimeBackwards, 52, "3.25");
+    let result = edited(|rows| {
+        let copy = rows[51].clone();
+        rows.insert(51, copy);
+    });
+    assert_one_row_aside(result, Reason::TimeRepeated, 53, "100.4");
+    let result = edited(|rows| rows.swap(51, 52));
+    assert_one_row_aside(result, Reason::TimeBackwards, 53, "100.4");
+}
+
+#[test]
+fn one_time_far_ahead_costs_one_row_and_not_all_that_follow() {
+    for k in [1, 51, SAMPLES - 2] {
+        let result = edited(|rows| rows[k][0] = "5000".into());
+        assert_one_row_aside(result, Reason::TimeAhead, k + 1, "5000");
+    }
+}
+
+#[test]
+fn a_few_times_far_ahead_cost_their_rows_and_not_all_that_follow() {
+    let ahead = |k: usize, times: &[f64]| {
+        let log = edited(|rows| {
+            for (row, time) in rows[k..].iter_mut().zip(times) {
+                row[0] = time.to_string();
+            }
+        });
+        log.unwrap().rows
+    };
+    for k in [1, 51] {
+        for count in [2_usize, 8] {
+            let times: Vec<f64> = (0..count).map(|i| 5000.0 + STEP_S * i as f64).collect();
+            let rows = ahead(k, &times);
+            assert_eq!(
+                (rows.count(Reason::TimeAhead), rows.used),
+                (count, SAMPLES - count),
+                "{rows}"
+            );
+            assert_eq!(rows.set_aside[0].first_row, k + 1);
+            assert_eq!(rows.missed_samples, 0, "{rows}");
+        }
+    }
+    // A clock that stands or jumps about up there.
+    for times in [[5000.0, 5000.0, 5000.0], [5000.0, 4000.0, 6000.0]] {
+        assert_eq!(ahead(51, &times).used, SAMPLES - 3);
+    }
+}
+
+#[test]
+fn a_log_that_goes_on_behind_a_pause_is_kept() {
+    // Three rows behind a minute's pause two times of before it, which are too few to be believed.
+    let log = edited(|rows| {
+        for row in &mut rows[51..] {
+            row[0] = (row[0].parse::<f64>().unwrap() + 60.0).to_string();
+        }
+        for (row, time) in [(54, "101"), (55, "102")] {
+            rows[row][0] = time.into();
+        }
+    });
+    let rows = log.unwrap().rows;
+    assert_eq!((rows.count(Reason::TimeBackwards), rows.used), (2, SAMPLES - 2), "{rows}");
+}
+
+/// Seconds and nanoseconds since 1970, of which a number of 53 bits tells a quarter of a microsecond.
+#[test]
+fn stamps_in_two_columns_are_added() {
+    let mut rows = valid();
+    rows[0].insert(1, "nanoseconds".to_owned());
+    for (k, row) in rows[1..].iter_mut().enumerate() {
+        let nanoseconds = 1_700_000_000_900_000_000 + 8_000_000 * k as u64;
+        row[0] = (nanoseconds / 1_000_000_000).to_string();
+        row.insert(1, (nanoseconds % 1_000_000_000).to_string());
+    }
+    let layout = include_str!("../../layouts/armid.toml");
+    let layout = layout.replace("[columns]", "[columns]\ntime_nanoseconds = \"nanoseconds\"");
+    let layout = Layout::from_toml(&layout, "ros.toml").unwrap();
+    let read = |rows: &[Vec<String>]| {
+        read_log_from(text(rows, ",", "\n").as_bytes(), "run.csv", &layout, JOINTS)
+    };
+    let log = read(&rows).unwrap();
+    assert_eq!((log.samples(), log.rows.warnings.len()), (SAMPLES, 0), "{}", log.rows);
+    for (k, time_s) in log.time_s.iter().enumerate() {
+        let since_s = time_s - 1_700_000_000.0 - 0.9;
+        assert!((since_s - STEP_S * k as f64).abs() < 5e-7, "{k}: {since_s}");
+    }
+    rows[8][1] = "5000000000".to_owned();
+    assert_one_row_aside(read(&rows), Reason::Implausible, row(7), "5000000000");
+}
