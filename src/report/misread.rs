@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::Section;
-use crate::identify::Misreading;
+use crate::identify::{Change, Misreading};
 
 /// A log that fits its arm when it is read otherwise.
 #[derive(Debug, Clone, Serialize)]
@@ -17,26 +17,28 @@ pub struct MisreadLog {
     pub layout: Option<String>,
 }
 
-/// What is to be done with the lines.
-const WHAT_TO_DO: &str = "Read with these lines in a file (--layout FILE.toml) it fits:";
-
 impl MisreadLog {
     /// The layout with which the log fits, for the terminal.
     pub fn advice(&self) -> Option<String> {
         let lines = self.layout.as_ref()?.lines();
         let indented = lines.map(|line| format!("    {line}").trim_end().to_owned());
-        Some(
-            [WHAT_TO_DO.to_owned(), String::new()]
-                .into_iter()
-                .chain(indented)
-                .collect::<Vec<_>>()
-                .join("\n"),
-        )
+        let lines: Vec<String> = indented.collect();
+        Some(format!("{}\n\n{}", self.what_to_do(), lines.join("\n")))
     }
 
     /// The same for a page.
     pub fn section(&self) -> Option<Section> {
         let lines = self.layout.as_ref()?;
-        Some(Section::new("How to read the log").paragraph(WHAT_TO_DO).code(lines))
+        Some(Section::new("How to read the log").paragraph(self.what_to_do()).code(lines))
+    }
+
+    /// What is to be done with the lines.
+    fn what_to_do(&self) -> String {
+        let is_mounted =
+            self.misreading.changes.iter().any(|change| matches!(change, Change::Mounted { .. }));
+        let also = if is_mounted { ", of an arm that is mounted as said" } else { "" };
+        format!(
+            "With these lines in a file of this folder (--layout FILE.toml) it is read as it was recorded{also}:"
+        )
     }
 }

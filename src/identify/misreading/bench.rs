@@ -22,9 +22,14 @@ const FRICTION: f64 = 0.1;
 const KNOWN: f64 = 0.3;
 /// What friction that pushes is worth in a misfit: a residual ten times as large.
 const PUSHES: f64 = 2.0 * std::f64::consts::LN_10;
+/// What gravity is worth in a misfit that has nothing to do with the description's, against one that is the description's: a residual ten
+/// times as large. The description of an arm may be wrong about its masses, hardly about where they are.
+const GRAVITY: f64 = 2.0 * std::f64::consts::LN_10;
 /// Mean share of the torque (rms) that friction has on all joints where its sign tells more than gravity's does: it brakes any arm,
 /// gravity pulls as described where the description of the mounting holds.
 const TELLS: f64 = 0.02;
+/// Cosine from which on gravity is the described one.
+const CLEAR: f64 = 0.9;
 
 /// How well an arm fits a log, joint by joint.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -51,9 +56,24 @@ impl Match {
         2.0 * self.left[j].max(f64::MIN_POSITIVE).ln() + pushes
     }
 
-    /// Of all joints.
+    /// More the less gravity is the description's.
+    pub(super) fn misfit_of_gravity(&self) -> f64 {
+        GRAVITY * (1.0 - self.gravity)
+    }
+
+    /// Of all joints and gravity.
     pub(super) fn misfit(&self) -> f64 {
-        (0..self.left.len()).map(|j| self.misfit_of(j)).sum()
+        (0..self.left.len()).map(|j| self.misfit_of(j)).sum::<f64>() + self.misfit_of_gravity()
+    }
+
+    /// Cosine of the angle between the first moments that were found and those described; 0 where none are described.
+    pub(super) fn gravity(&self) -> f64 {
+        self.gravity
+    }
+
+    /// On how many joints the model leaves more than `share` of the torque, noise apart.
+    pub(super) fn joints_left_by(&self, share: f64) -> usize {
+        self.beyond_noise.iter().filter(|left| **left > share).count()
     }
 
     /// Whether the model leaves more than `share` of the torque of a joint, noise apart, or friction pushes one.
@@ -64,8 +84,16 @@ impl Match {
     /// Whether it is the other sign of all torques that friction, or where there is next to none, gravity as described speaks for:
     /// the model fits both alike.
     pub(super) fn is_turned(&self) -> bool {
-        let sign = if self.friction.abs() > TELLS { self.friction } else { self.gravity };
-        sign < 0.0
+        self.sign() < 0.0
+    }
+
+    /// Whether that is beyond doubt: friction is no noise there, and gravity is the described one with the other sign.
+    pub(super) fn is_clearly_turned(&self) -> bool {
+        self.is_turned() && (self.friction < -TELLS || self.gravity < -CLEAR)
+    }
+
+    fn sign(&self) -> f64 {
+        if self.friction.abs() > TELLS { self.friction } else { self.gravity }
     }
 }
 
@@ -86,8 +114,8 @@ struct Mounting {
     first_moments: Vec<(usize, f64)>,
 }
 
-/// Instants that are looked at: ten equations for each parameter.
-const INSTANTS: usize = 400;
+/// Instants that are looked at: fifteen equations for each parameter of an arm of six joints, and a thousand readings a second.
+const INSTANTS: usize = 150;
 
 impl Bench {
     /// Of the arm as described and the log in `regression`: the mean period, or the run behind the low-pass of `options`; `None` for

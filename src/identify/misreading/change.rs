@@ -123,21 +123,22 @@ impl Change {
         of_all.chain(Self::orders(arm)).collect()
     }
 
-    /// The joints from the last to the first, in the order of their names, and one or more columns away.
+    /// Whole columns in other orders.
     fn orders(arm: &Arm) -> Vec<Self> {
+        let apart = shifted(arm.dof()).flat_map(|order| {
+            [Self::TorquesOrdered { order: order.clone() }, Self::MotionsOrdered { order }]
+        });
+        Self::orders_of_joints(arm).into_iter().chain(apart).collect()
+    }
+
+    /// The joints in the order of their names, from the last to the first, and one or more columns away.
+    pub(super) fn orders_of_joints(arm: &Arm) -> Vec<Self> {
         let n = arm.dof();
         let name = |j: usize| &arm.joints[j].name;
         let rank = |j: usize| (0..n).filter(|k| (name(*k), *k) < (name(j), j)).count();
-        let of_joints = [(0..n).rev().collect(), (0..n).map(rank).collect()];
-        let shifted = (1..n).map(|by| (0..n).map(|j| (j + by) % n).collect::<Vec<usize>>());
-        let shifted = shifted.flat_map(|order| {
-            [
-                Self::JointsOrdered { order: order.clone() },
-                Self::TorquesOrdered { order: order.clone() },
-                Self::MotionsOrdered { order },
-            ]
-        });
-        of_joints.map(|order| Self::JointsOrdered { order }).into_iter().chain(shifted).collect()
+        let orders = [(0..n).map(rank).collect(), (0..n).rev().collect()];
+        let orders = orders.into_iter().chain(shifted(n));
+        orders.map(|order| Self::JointsOrdered { order }).collect()
     }
 
     /// In how many steps two joints exchange their places, or one thing changes.
@@ -189,6 +190,11 @@ impl Change {
             }
         }
     }
+}
+
+/// Orders of columns that stand one or more places away.
+fn shifted(joints: usize) -> impl Iterator<Item = Vec<usize>> {
+    (1..joints).map(move |by| (0..joints).map(|j| (j + by) % joints).collect())
 }
 
 /// Gravity along the axes of the base frame and half way between two of them, as strong as described and elsewhere.

@@ -48,6 +48,12 @@ const EXPLAINED: f64 = 0.03;
 /// Factor by which the rms residual of a joint has to fall for every joint that is read otherwise, and that of one joint at
 /// least: laws of friction and soft gears bring 1.5 on real arms, and wrong changes take more elsewhere than they bring.
 const FALLS: f64 = 3.0;
+/// The same where gravity becomes the description's: what friction and noise leave covers part of the fall.
+const RESTORED: f64 = 1.4;
+/// Cosine between first moments found and described below which they have nothing to do with each other.
+const STRANGE: f64 = 0.5;
+/// Cosine from which on they are the same masses, at the same places.
+const DESCRIBED: f64 = 0.9;
 /// Factor by which that of another joint may grow, which is noise.
 const GROWS: f64 = 1.2;
 /// Share of the torque (rms) of which a reading leaves less on every joint that it is about: one that turns the sign of friction and
@@ -59,13 +65,13 @@ impl Misreading {
     pub fn of(arm: &Arm, regression: &Regression, options: &Options) -> Option<Self> {
         let mut bench = Bench::new(arm, regression, options)?;
         let as_read = bench.fit(&Reading::as_read(arm.dof()))?;
-        if !as_read.leaves_more_than(EXPLAINED) {
+        if !as_read.leaves_more_than(EXPLAINED) && !as_read.is_clearly_turned() {
             return None;
         }
         bench.add_mountings(arm);
         let (reading, otherwise) = search::best(arm, &bench, &as_read);
         let found = Self { changes: reading.changes(), as_read, otherwise, reading };
-        if !found.is_convincing() {
+        if !found.is_convincing() && !found.is_read_turned() {
             return None;
         }
         let Self { as_read, otherwise, reading, .. } = found;
@@ -80,16 +86,29 @@ impl Misreading {
         (!counting.is_as_described()).then(|| layout.recounted(like, counting))
     }
 
+    /// Whether it is as it is read, or nearly so, but for the sign of all torques.
+    fn is_read_turned(&self) -> bool {
+        let turned = [Change::AllTorquesReversed];
+        (self.changes.is_empty() || self.changes == turned) && self.as_read.is_clearly_turned()
+    }
+
     fn is_convincing(&self) -> bool {
         let gain = |j: usize| 0.5 * (self.as_read.misfit_of(j) - self.otherwise.misfit_of(j));
         let gains: Vec<f64> = (0..self.as_read.left.len()).map(gain).collect();
         let largest = gains.iter().fold(0.0, |a: f64, gain| a.max(*gain));
-        let all: f64 = gains.iter().sum();
+        let of_gravity = self.as_read.misfit_of_gravity() - self.otherwise.misfit_of_gravity();
+        let all = gains.iter().sum::<f64>() + 0.5 * of_gravity;
         let joints = self.joints();
-        largest > FALLS.ln()
+        let least = if self.restores_gravity() { RESTORED } else { FALLS };
+        largest > least.ln()
             && all > FALLS.ln() * joints.len() as f64
             && joints.iter().all(|j| self.otherwise.left[*j] < FITS)
             && gains.iter().all(|gain| *gain > -GROWS.ln())
+    }
+
+    /// Whether gravity has nothing to do with the description's as the log is read, and is the description's otherwise.
+    fn restores_gravity(&self) -> bool {
+        self.as_read.gravity() < STRANGE && self.otherwise.gravity() > DESCRIBED
     }
 
     /// Joints (0-based) whose channels are read otherwise; all where the arm is mounted otherwise.
@@ -130,7 +149,8 @@ impl Misreading {
                 range(&self.as_read)
             ),
             // Of an arm whose torques all have the other sign, parameters do as well.
-            false => format!("friction brakes{pushing}"),
+            false if !pushing.is_empty() => format!("friction brakes{pushing}"),
+            false => "gravity pulls, and friction brakes, as they do".to_owned(),
         };
         format!(
             "The log is not read as it was recorded: with {} {gain}. {}",

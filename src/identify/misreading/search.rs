@@ -10,13 +10,15 @@ use crate::robot::Arm;
 
 /// Least gain of a change, in Σ ln (‖e_j‖² / ‖τ_j‖²): one joint's residual halves.
 const LEAST_GAIN: f64 = 1.4;
-/// Share of a joint's torque (rms) that no law of friction and no soft gear leaves: from there on several changes may be needed before
-/// any of them is worth it.
+/// Share of a joint's torque (rms) that no law of friction and no soft gear leaves: where two joints or more have it left, several changes
+/// may be needed before any of them is worth it.
 const FAR: f64 = 0.2;
 /// Readings that are followed at once where the log is that far from the arm.
-const BREADTH: usize = 6;
+const BREADTH: usize = 4;
 /// Changes one after the other that may gain nothing by themselves there.
 const PATIENCE: usize = 1;
+/// Joints up to which all ways to mirror an arm are tried.
+const MIRRORED: usize = 8;
 
 /// A reading, how well it fits, and what that is worth.
 #[derive(Clone)]
@@ -29,57 +31,106 @@ struct Tried {
 impl Tried {
     fn of(reading: Reading, bench: &Bench) -> Option<Self> {
         let fit = bench.fit(&reading)?;
-        let steps: usize = reading.changes().iter().map(Change::steps).sum();
-        let cost = fit.misfit() + LEAST_GAIN * steps as f64;
+        let cost = fit.misfit() + LEAST_GAIN * steps(&reading) as f64;
         Some(Self { reading, fit, cost })
+    }
+
+    fn steps(&self) -> usize {
+        steps(&self.reading)
+    }
+
+    fn cheaper(self, other: Self) -> Self {
+        if other.cost < self.cost { other } else { self }
     }
 }
 
+fn steps(reading: &Reading) -> usize {
+    reading.changes().iter().map(Change::steps).sum()
+}
+
 /// The best reading that was found, which is the log as it is read where none is worth its changes, and its fit.
+///
+/// Joints in another order are a step that no few exchanges lead to, and whatever is wrong beside it looks wrong until it is taken: where the
+/// log is far from the arm, the search also begins with each order that recorders have.
 pub fn best(arm: &Arm, bench: &Bench, as_read: &Match) -> (Reading, Match) {
     let possible = Change::all(arm);
-    let (breadth, patience) =
-        if as_read.leaves_more_than(FAR) { (BREADTH, PATIENCE) } else { (1, 0) };
     let reading = Reading::as_read(arm.dof());
-    let mut seen = vec![reading.clone()];
-    let mut best = Tried { reading, fit: as_read.clone(), cost: as_read.misfit() };
-    let mut followed = vec![best.clone()];
-    let mut in_vain = 0;
-    for _ in 0..arm.dof() {
-        let first = seen.len();
-        for tried in &followed {
-            for reading in possible.iter().map(|change| tried.reading.with(change)) {
-                if !seen.iter().any(|other| other.is(&reading)) {
-                    seen.push(reading);
-                }
+    let root = Tried { reading, fit: as_read.clone(), cost: as_read.misfit() };
+    let mut search = Search { possible: &possible, bench, seen: vec![root.reading.clone()] };
+    let is_far = as_read.joints_left_by(FAR) > 1;
+    let (breadth, patience) = if is_far { (BREADTH, PATIENCE) } else { (1, 0) };
+    let mut best = search.from(root.clone(), breadth, patience);
+    if is_far {
+        for order in Change::orders_of_joints(arm) {
+            if !best.fit.leaves_more_than(EXPLAINED) {
+                break;
             }
-        }
-        let tried = seen[first..].par_iter().cloned();
-        followed = tried.filter_map(|reading| Tried::of(reading, bench)).collect();
-        followed.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-        followed.truncate(breadth);
-        match followed.first() {
-            Some(first) if first.cost < best.cost => {
-                best = first.clone();
-                in_vain = 0;
-            }
-            Some(_) if in_vain < patience => in_vain += 1,
-            _ => break,
-        }
-        if !best.fit.leaves_more_than(EXPLAINED) {
-            break;
+            let ordered = Tried::of(root.reading.with(&order), bench);
+            let found = ordered.map(|ordered| search.from(ordered, 1, PATIENCE));
+            best = found.into_iter().fold(best, Tried::cheaper);
         }
     }
     let best = told_shortly(best, bench);
     (best.reading, best.fit)
 }
 
-/// An arm mirrored in a plane turns all its joints the other way: as well as before, perhaps with fewer changes.
+struct Search<'a> {
+    possible: &'a [Change],
+    bench: &'a Bench,
+    seen: Vec<Reading>,
+}
+
+impl Search<'_> {
+    /// The best that is found from `root` on, with one change after the other.
+    fn from(&mut self, root: Tried, breadth: usize, patience: usize) -> Tried {
+        let mut followed = vec![root.clone()];
+        let mut best = root;
+        let mut in_vain = 0;
+        for _ in 0..best.fit.left.len() {
+            let first = self.seen.len();
+            for tried in &followed {
+                for reading in self.possible.iter().map(|change| tried.reading.with(change)) {
+                    if !self.seen.iter().any(|other| other.is(&reading)) {
+                        self.seen.push(reading);
+                    }
+                }
+            }
+            let bench = self.bench;
+            let tried = self.seen[first..].par_iter().cloned();
+            followed = tried.filter_map(|reading| Tried::of(reading, bench)).collect();
+            followed.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+            followed.truncate(breadth);
+            match followed.first() {
+                Some(first) if first.cost < best.cost => {
+                    best = first.clone();
+                    in_vain = 0;
+                }
+                Some(_) if in_vain < patience => in_vain += 1,
+                _ => break,
+            }
+            if !best.fit.leaves_more_than(EXPLAINED) {
+                break;
+            }
+        }
+        best
+    }
+}
+
+/// An arm that is mirrored in a plane turns some of its joints the other way: as well as before, perhaps with fewer changes.
 fn told_shortly(best: Tried, bench: &Bench) -> Tried {
-    let joints = 0..best.fit.left.len();
-    let reverse = |reading: Reading, j| reading.with(&Change::JointReversed { joints: [j] });
-    let mirrored = Tried::of(joints.fold(best.reading.clone(), reverse), bench);
-    mirrored.into_iter().fold(best, |best, other| if other.cost < best.cost { other } else { best })
+    let joints = best.fit.left.len();
+    if best.steps() < 2 || joints > MIRRORED {
+        return best;
+    }
+    let mirrored = (1..1_usize << joints).into_par_iter().filter_map(|reversed| {
+        let joints = (0..joints).filter(|j| reversed >> j & 1 == 1);
+        let reverse = |reading: Reading, j| reading.with(&Change::JointReversed { joints: [j] });
+        let reading = joints.fold(best.reading.clone(), reverse);
+        // A fit that is no better is worth its price only with fewer changes.
+        (steps(&reading) < best.steps()).then(|| Tried::of(reading, bench)).flatten()
+    });
+    let cheapest = mirrored.min_by(|a, b| a.cost.total_cmp(&b.cost));
+    cheapest.into_iter().fold(best, Tried::cheaper)
 }
 
 /// With all torques reversed the model fits as well: the reading of the two in which friction brakes, or gravity pulls as described.
