@@ -1,7 +1,8 @@
 //! `armid excite` from the outside: exit codes, messages, and outputs that are whole or not there.
 
-use armid::excitation::Reference;
-use armid::robot::Arm;
+use armid::excitation::{ClearanceModel, FourierSeries, Reference};
+use armid::robot::export::urdf;
+use armid::robot::{Arm, Capsule, Frames};
 
 use crate::cli::{Folder, Said};
 
@@ -15,7 +16,7 @@ fn a_small_design_writes_every_output() {
     let words = "--robot ur5 --order 3 --starts 2 --finalists 1 --out t.json --csv t.csv \
                  --urscript t.script --report t.html --box 0.4,-0.5,0,0.9,0.5,0.3 --velocity-share 0.5";
     excite(&folder, words).says(0, &[]);
-    let series = armid::excitation::FourierSeries::load(folder.path("t.json").to_str().unwrap());
+    let series = FourierSeries::load(folder.path("t.json").to_str().unwrap());
     let series = series.unwrap();
     assert_eq!(series.order(), 3);
     let limits: Vec<f64> =
@@ -78,8 +79,8 @@ fn what_no_motion_keeps_clear_of_is_a_negative_result() {
 #[test]
 fn a_robot_without_shapes_has_no_clearance() {
     let folder = Folder::empty();
-    let arm = armid::robot::Arm::built_in("ur5").unwrap();
-    let urdf = armid::robot::export::urdf(&arm, &armid::robot::Frames::default()).unwrap();
+    let arm = Arm::built_in("ur5").unwrap();
+    let urdf = urdf(&arm, &Frames::default()).unwrap();
     folder.write("arm.urdf", &urdf);
     let run = |words: &str, code: i32, expected: &str| {
         excite(&folder, words).complains(code, &[expected]);
@@ -93,4 +94,84 @@ fn a_robot_without_shapes_has_no_clearance() {
     assert_ne!(unlimited, urdf);
     folder.write("arm.urdf", unlimited);
     run(words, 1, "--noise-nm");
+}
+
+/// A mesh of six points around each end of a capsule.
+fn mesh(capsule: &Capsule) -> String {
+    let mut mesh = String::new();
+    for end in [capsule.from_m, capsule.to_m] {
+        for (axis, side) in [(0, -1.0), (0, 1.0), (1, -1.0), (1, 1.0), (2, -1.0), (2, 1.0)] {
+            let mut point = end;
+            point[axis] += side * capsule.radius_m;
+            mesh += &format!("v {} {} {}\n", point.x, point.y, point.z);
+        }
+    }
+    mesh
+}
+
+/// The UR5 as a URDF whose collision shapes are meshes beside it.
+fn write_ur5_with_shapes(folder: &Folder) -> Arm {
+    let arm = Arm::built_in("ur5").unwrap();
+    let text = urdf(&arm, &Frames::default()).unwrap();
+    let mut text =
+        text.replacen("<link name=\"base_link\"/>", "<link name=\"base_link\"></link>", 1);
+    for (number, capsule) in arm.clearance.capsules.iter().enumerate() {
+        folder.write(&format!("meshes/{number}.obj"), mesh(capsule));
+        let link = match capsule.body {
+            0 => "<link name=\"base_link\">".to_owned(),
+            body => format!("<link name=\"{}_link\">", arm.joints[body - 1].name),
+        };
+        assert!(text.contains(&link), "{link}: {text}");
+        let file = format!("meshes/{number}.obj");
+        let shape =
+            format!("<collision><geometry><mesh filename=\"{file}\"/></geometry></collision>");
+        text = text.replacen(&link, &format!("{link}{shape}"), 1);
+    }
+    folder.write("arm.urdf", text);
+    arm
+}
+
+/// The smallest distance along a period, m.
+fn least_distance_m(arm: &Arm, series: &FourierSeries) -> f64 {
+    let model = ClearanceModel::new(arm);
+    assert!(!model.is_empty());
+    let (mut workspace, mut distances_m) = (model.workspace(), vec![0.0; model.len()]);
+    let mut least_m = f64::INFINITY;
+    for k in 0..2000 {
+        let (mut q, mut qd, mut qdd) = ([0.0; 6], [0.0; 6], [0.0; 6]);
+        series.sample(5e-4 * f64::from(k) * series.period_s, &mut q, &mut qd, &mut qdd);
+        model.distances(&mut workspace, &q, &mut distances_m);
+        least_m = distances_m.iter().copied().fold(least_m, f64::min);
+    }
+    least_m
+}
+
+/// Clear of itself and the floor, as its shapes say, and as the capsules do that these are made of.
+#[test]
+fn an_arm_with_collision_shapes_is_kept_clear() {
+    let folder = Folder::empty();
+    let built_in = write_ur5_with_shapes(&folder);
+    folder.write("arm.drives.toml", "floor_z_m = 0.0\n");
+    let words = "--robot arm.urdf --order 2 --starts 2 --finalists 1 --out t.json";
+    let said = excite(&folder, words);
+    said.complains(
+        0,
+        &[
+            "8 capsules from the collision shapes of base_link, shoulder_pan_link, ",
+            "wherever the arm is: base_link and shoulder_lift_link, elbow_link and wrist_2_link",
+        ],
+    );
+    let own = Arm::load(folder.path("arm.urdf").to_str().unwrap()).unwrap();
+    let series = FourierSeries::load(folder.path("t.json").to_str().unwrap()).unwrap();
+    let least_m = least_distance_m(&own, &series);
+    assert!(least_m > 0.0199, "{least_m} m");
+    let least_m = least_distance_m(&built_in, &series);
+    assert!(least_m > 0.0, "{least_m} m");
+    let inputs = folder.result("t.json")["program"]["inputs"].as_array().unwrap().len();
+    assert_eq!(inputs, 2 + 8, "URDF, drive file, meshes");
+    // Folded onto itself: which links, and what may be done.
+    let folded = excite(&folder, &format!("{words} --offsets 0,-1.57,3.1,0,0,0"));
+    folded.complains(1, &["no pose the arm may take: clearance of ", "_link", "unwatched_pairs"]);
+    folder.write("arm.drives.toml", "clearance = \"none\"\n");
+    excite(&folder, words).complains(0, &["the robot has no capsules"]);
 }

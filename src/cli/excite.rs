@@ -1,5 +1,6 @@
 //! `armid excite`: design an excitation and write it for people, programs and the robot.
 
+mod clearance;
 mod record;
 
 use std::error::Error;
@@ -9,9 +10,9 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use nalgebra::Vector3;
 use thiserror::Error as ThisError;
 
+use clearance::{cell_box, say_what_helps, say_what_is_watched};
 use record::Record;
 
 use super::prior::Prior;
@@ -22,11 +23,11 @@ use crate::excitation::design::{
     self, Budget, Criterion, Design, DesignError, Experiment, Specification, Variables,
 };
 use crate::excitation::export::{Playback, urscript, write_csv};
-use crate::excitation::{ClearanceModel, Requirements, TRAJECTORY_SCHEMA};
+use crate::excitation::{Requirements, TRAJECTORY_SCHEMA};
 use crate::output::{check_outputs, write_atomically};
-use crate::report::excitation::{NO_CLEARANCE, page};
+use crate::report::excitation::page;
 use crate::report::json::{Document, Program};
-use crate::robot::{Arm, CellBox, Joint, LoadedArm};
+use crate::robot::{Arm, Joint, LoadedArm};
 
 /// Design the motion that tells most about the parameters, inside all limits.
 #[derive(Debug, Args)]
@@ -150,7 +151,7 @@ impl BadOption {
 
 /// Designs, prints what was found, and writes it.
 pub fn run(args: &ExciteArgs) -> CommandResult {
-    let LoadedArm { mut arm, files, .. } = load_robot(&args.robot)?;
+    let LoadedArm { mut arm, files, notices, .. } = load_robot(&args.robot)?;
     for corners in &args.boxes {
         arm.clearance.boxes.push(cell_box(corners)?);
     }
@@ -162,17 +163,7 @@ pub fn run(args: &ExciteArgs) -> CommandResult {
         joint.limits.velocity_rad_s *= args.velocity_share;
     }
     let arm = arm;
-    if ClearanceModel::new(&arm).is_empty() {
-        if !args.boxes.is_empty() {
-            let message = "the robot has no capsules whose distance could be watched: describe them in a .toml";
-            return Err(BadOption::new("box", args.boxes.join(" "), message).into());
-        }
-        eprintln!("note: {}: {NO_CLEARANCE}", args.robot);
-    }
-    for name in arm.clearance.unpaired() {
-        let why = "it is in no collision_pairs";
-        eprintln!("note: {}: the arm is not kept clear of capsule \"{name}\": {why}", args.robot);
-    }
+    say_what_is_watched(&args.robot, &arm, &args.boxes)?;
     let playback = playback(args, &arm)?;
     let base = BaseSet::find(&arm, Parameterisation::full(arm.dof(), arm.torque_offsets))?;
     let spec = specification(args, &arm, &base)?;
@@ -194,6 +185,9 @@ pub fn run(args: &ExciteArgs) -> CommandResult {
     let threads = threads_or_all(args.threads);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
     let found = pool.install(|| design::design(&arm, &base, &spec, &budget, &|p| rounds.report(p)));
+    if let Err(fault) = &found {
+        say_what_helps(&args.robot, &notices, fault);
+    }
     let interrupted = budget.stop.load(Ordering::Relaxed);
     let found = match found {
         Err(DesignError::OutOfTime { tried, starts }) if interrupted => {
@@ -301,21 +295,6 @@ fn specification(
         seed: args.seed,
     };
     Ok(spec)
-}
-
-/// A box from its two corners, in any order.
-fn cell_box(corners: &str) -> Result<CellBox, BadOption> {
-    let numbers: Option<Vec<f64>> = corners
-        .split(',')
-        .map(|word| word.trim().parse().ok().filter(|x: &f64| x.is_finite()))
-        .collect();
-    match numbers.as_deref() {
-        Some(&[x0, y0, z0, x1, y1, z1]) => {
-            let (a, b) = (Vector3::new(x0, y0, z0), Vector3::new(x1, y1, z1));
-            Ok(CellBox { low_m: a.inf(&b), high_m: a.sup(&b) })
-        }
-        _ => Err(BadOption::new("box", corners, "six numbers X0,Y0,Z0,X1,Y1,Z1 are expected")),
-    }
 }
 
 /// `free` or a number per joint; nothing given: all free.

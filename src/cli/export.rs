@@ -7,8 +7,8 @@ use clap::{ArgGroup, Args};
 use super::arm_result::ArmResult;
 use super::{CommandResult, Outcome};
 use crate::output::{OutputError, check_outputs, write_atomically};
-use crate::robot::RobotError;
-use crate::robot::export::{OwnUrdf, drive_file, drive_file_of_part, mjcf_of_urdf, own_urdf, urdf};
+use crate::robot::export::{OwnUrdf, drive_file, drive_file_of_urdf, mjcf_of_urdf, own_urdf, urdf};
+use crate::robot::{LoadedArm, RobotError};
 
 /// Write an identified arm as URDF or MJCF.
 #[derive(Debug, Args)]
@@ -94,16 +94,18 @@ fn write_urdf(path: &Path, result: &ArmResult) -> Result<(), Box<dyn std::error:
     Ok(())
 }
 
-/// The drive file, with those joints of the robot's own one that are not the arm's.
+/// The drive file. That of a robot's own URDF leaves shapes to it, and has the joints of the robot's own one that are not the arm's.
 fn drives_of(result: &ArmResult) -> Result<String, RobotError> {
-    let ArmResult { arm, offsets_nm, files, .. } = result;
-    // A second file is the drive file beside a URDF.
-    match files.get(1) {
+    let ArmResult { arm, offsets_nm, files, urdf_links, .. } = result;
+    if urdf_links.is_empty() {
+        return Ok(drive_file(arm, offsets_nm));
+    }
+    match LoadedArm::drive_file(files) {
         Some(own) => {
             let source = own.display().to_string();
-            drive_file_of_part(arm, offsets_nm, &text_of(own)?, &source)
+            drive_file_of_urdf(arm, offsets_nm, &text_of(own)?, &source)
         }
-        None => Ok(drive_file(arm, offsets_nm)),
+        None => drive_file_of_urdf(arm, offsets_nm, "", ""),
     }
 }
 

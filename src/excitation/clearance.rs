@@ -5,13 +5,10 @@ use std::f64::consts::TAU;
 use nalgebra::Vector3;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rapier3d::math::{Pose, Vector as ParryVector};
-use rapier3d::parry::query::ClosestPoints;
-use rapier3d::parry::query::details::closest_points_segment_segment;
-use rapier3d::parry::shape::Segment;
 
 use super::limits::LimitKind;
-use crate::robot::{Arm, CellBox, Placement};
+use crate::robot::nearest::{nearest_points, nearest_to_box};
+use crate::robot::{Arm, CellBox, ON_AXIS, Placement};
 
 /// Signed distances between the capsules of an arm, and of its moving capsules from the floor.
 ///
@@ -45,24 +42,11 @@ struct Shape {
 /// Poses in which a distance is looked at before it is said never to be kept.
 pub const POSES_TRIED: usize = 5000;
 
-/// What lies off an axis by less than this, m, or is tilted by less, turns on the spot.
-const ON_AXIS: f64 = 1e-9;
-
 impl Shape {
     /// Whether any motion of the arm moves it.
     fn moves(&self) -> bool {
         let is_off_axis = |end: &Vector3<f64>| end.x.hypot(end.y) > ON_AXIS;
         self.body >= 2 || self.body == 1 && self.ends_m.iter().any(is_off_axis)
-    }
-
-    /// Whether all that it sweeps, turning about the vertical through `axis_m`, lies above or below `cell_box`: a table under the arm.
-    fn stays_over(&self, cell_box: &CellBox, axis_m: &Vector3<f64>) -> bool {
-        let far = self.ends_m.iter().map(|end| end.x.hypot(end.y)).fold(0.0, f64::max);
-        let reach_m = far + self.radius_m;
-        let holds = |i: usize| {
-            cell_box.low_m[i] <= axis_m[i] - reach_m && axis_m[i] + reach_m <= cell_box.high_m[i]
-        };
-        holds(0) && holds(1)
     }
 }
 
@@ -97,13 +81,8 @@ impl ClearanceModel {
             .collect::<Vec<_>>();
         let moving: Vec<usize> = (0..capsules.len()).filter(|&c| capsules[c].moves()).collect();
         let boxes = arm.clearance.boxes.clone();
-        let is_upright = arm.joints.first().is_some_and(|first| {
-            let axis = first.placement.rotation.column(2);
-            axis.x.hypot(axis.y) < ON_AXIS
-        });
-        let rises = |c: &usize| capsules[*c].body >= 2 || !is_upright;
-        let axis_m = arm.joints.first().map_or(Vector3::zeros(), |j| j.placement.translation_m);
-        let nears = |c: usize, b: &CellBox| rises(&c) || !capsules[c].stays_over(b, &axis_m);
+        let rises = |c: &usize| capsules[*c].body >= 2 || !arm.is_upright();
+        let nears = |c: usize, b: &CellBox| !arm.turns_over(&arm.clearance.capsules[c], b);
         let pairs = |(number, b): (usize, &CellBox)| {
             let near = moving.iter().copied().filter(|c| nears(*c, b));
             near.map(|c| [c, number]).collect::<Vec<_>>()
@@ -283,51 +262,6 @@ impl ClearanceModel {
             Between::Floor { .. } => apart.z - radii_m,
             Between::Capsules { .. } | Between::Box { .. } => apart.norm() - radii_m,
         }
-    }
-}
-
-/// Nearest points of a segment and a box; both are the same point where the segment enters the box.
-///
-/// The squared distance of p(s) = a + s d from the box is convex in s, with the slope
-/// 2 d·(p − clamp(p)): its zero is bisected to the last bit.
-fn nearest_to_box(ends: &[Vector3<f64>; 2], of: &CellBox) -> (Vector3<f64>, Vector3<f64>) {
-    let d = ends[1] - ends[0];
-    let at = |s: f64| {
-        let p = ends[0] + d * s;
-        (p, p.sup(&of.low_m).inf(&of.high_m))
-    };
-    let slope = |s: f64| {
-        let (p, nearest) = at(s);
-        d.dot(&(p - nearest))
-    };
-    if slope(0.0) >= 0.0 {
-        return at(0.0);
-    }
-    if slope(1.0) <= 0.0 {
-        return at(1.0);
-    }
-    let (mut low, mut high) = (0.0, 1.0);
-    for _ in 0..f64::MANTISSA_DIGITS {
-        let middle = 0.5 * (low + high);
-        if slope(middle) < 0.0 { low = middle } else { high = middle }
-    }
-    at(high)
-}
-
-/// Nearest points of two segments given by their ends.
-fn nearest_points(
-    one: &[Vector3<f64>; 2],
-    other: &[Vector3<f64>; 2],
-) -> (Vector3<f64>, Vector3<f64>) {
-    let parry = |v: &Vector3<f64>| ParryVector::new(v.x, v.y, v.z);
-    let back = |v: ParryVector| Vector3::new(v.x, v.y, v.z);
-    let segment = |ends: &[Vector3<f64>; 2]| Segment::new(parry(&ends[0]), parry(&ends[1]));
-    let found =
-        closest_points_segment_segment(&Pose::identity(), &segment(one), &segment(other), f64::MAX);
-    match found {
-        ClosestPoints::WithinMargin(p1, p2) => (back(p1), back(p2)),
-        // Only for coordinates so large that the squared distance overflows.
-        ClosestPoints::Intersecting | ClosestPoints::Disjoint => (one[0], other[0]),
     }
 }
 

@@ -71,6 +71,11 @@ pub enum LimitKind {
 }
 
 impl LimitKind {
+    /// Whether it is about what the arm keeps clear of.
+    pub fn is_distance(&self) -> bool {
+        matches!(self, Self::Clearance { .. } | Self::Floor { .. } | Self::Box { .. })
+    }
+
     /// Unit of the margin.
     pub fn unit(&self) -> &'static str {
         match self {

@@ -180,6 +180,9 @@ pub struct Capsule {
     pub radius_m: f64,
 }
 
+/// What lies off an axis by less than this, m, or is tilted by less, turns on the spot.
+pub(crate) const ON_AXIS: f64 = 1e-9;
+
 impl Clearance {
     /// Names of the capsules that are in no pair: the arm is not kept clear of them.
     pub fn unpaired(&self) -> impl Iterator<Item = &str> {
@@ -198,6 +201,31 @@ impl Arm {
     /// The regularised sign tanh(q̇/ε) of dry friction at a velocity, rad/s: the paper's (3).
     pub fn friction_sign(&self, qd_rad_s: f64) -> f64 {
         (qd_rad_s / self.friction_epsilon_rad_s).tanh()
+    }
+
+    /// Whether the first joint turns about the vertical, so that no motion of it brings anything nearer to a floor.
+    pub fn is_upright(&self) -> bool {
+        self.joints.first().is_some_and(|first| {
+            let axis = first.placement.rotation.column(2);
+            axis.x.hypot(axis.y) < ON_AXIS
+        })
+    }
+
+    /// Whether all that a capsule of the first body sweeps, turning about the vertical, lies above or below a box: a table under
+    /// the arm.
+    pub fn turns_over(&self, capsule: &Capsule, cell_box: &CellBox) -> bool {
+        let Some(first) = self.joints.first().filter(|_| capsule.body <= 1 && self.is_upright())
+        else {
+            return false;
+        };
+        let axis_m = first.placement.translation_m;
+        let ends = [capsule.from_m, capsule.to_m];
+        let far = ends.iter().map(|end| end.x.hypot(end.y)).fold(0.0, f64::max);
+        let reach_m = far + capsule.radius_m;
+        let holds = |i: usize| {
+            cell_box.low_m[i] <= axis_m[i] - reach_m && axis_m[i] + reach_m <= cell_box.high_m[i]
+        };
+        holds(0) && holds(1)
     }
 
     /// Pose of every joint frame in the base frame at configuration `q_rad` (length N).

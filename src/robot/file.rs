@@ -1,23 +1,20 @@
 //! Robot files: one TOML per arm, and the arms built into the program.
 
 mod clearance;
+mod loaded;
 mod name;
 mod write;
-
-use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use clearance::{BoxEntry, CapsuleEntry};
-
-use super::arm::{Arm, Drive, Joint, Limits, Placement};
+use super::arm::{Arm, Clearance, Drive, Joint, Limits, Placement};
 use super::error::RobotError;
-use super::export::DriveFile;
 use super::inertia::LinkInertia;
-use super::mjcf::{MjcfArm, is_urdf, read_mjcf, read_mjcf_up_to};
 use super::place::Place;
-use super::urdf::{Frames, UrdfArm, UrdfLink, UrdfNotice, read_urdf, read_urdf_up_to};
+
+pub(super) use clearance::{BoxEntry, CapsuleEntry, ClearanceKeys, pair};
+pub use loaded::LoadedArm;
 
 /// Arms built in, by the name given to `--robot`.
 const BUILT_IN: [(&str, &str); 4] = [
@@ -56,91 +53,6 @@ impl Arm {
             .map_err(|e| RobotError::Toml { file: source.to_owned(), message: e.to_string() })?;
         file.into_arm(source)
     }
-}
-
-/// An arm, and where it comes from.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LoadedArm {
-    /// The arm.
-    pub arm: Arm,
-    /// What had to be assumed; only a URDF and an MJCF leave anything open.
-    pub notices: Vec<UrdfNotice>,
-    /// Named frames on its bodies; only a URDF and an MJCF have any.
-    pub frames: Frames,
-    /// Links that its bodies consist of; only a URDF has any.
-    pub urdf_links: Vec<UrdfLink>,
-    /// Files it was read from, the one that was named first: none for a built-in arm, two for a URDF with a drive file.
-    pub files: Vec<PathBuf>,
-}
-
-impl LoadedArm {
-    /// As [`Arm::load`].
-    pub fn load(name: &str) -> Result<Self, RobotError> {
-        let (file, last_link) = name::split(name);
-        let path = Path::new(file);
-        let own = |arm| Self {
-            arm,
-            notices: Vec::new(),
-            frames: Frames::default(),
-            urdf_links: Vec::new(),
-            files: vec![path.to_owned()],
-        };
-        let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
-        match (extension.as_deref(), last_link) {
-            (Some(end @ ("urdf" | "xml" | "mjcf")), _) => {
-                let text = text_of(path)?;
-                let mut loaded = if end == "urdf" || is_urdf(&text) {
-                    let UrdfArm { arm, frames, links, notices } = match last_link {
-                        Some(last) => read_urdf_up_to(&text, file, last)?,
-                        None => read_urdf(&text, file)?,
-                    };
-                    Self { notices, frames, urdf_links: links, ..own(arm) }
-                } else {
-                    let MjcfArm { arm, frames, notices, included } = match last_link {
-                        Some(last) => read_mjcf_up_to(&text, file, last)?,
-                        None => read_mjcf(&text, file)?,
-                    };
-                    let mut loaded = Self { notices, frames, ..own(arm) };
-                    loaded.files.extend(included);
-                    loaded
-                };
-                let drives = path.with_extension("drives.toml");
-                if drives.exists() {
-                    loaded.take_drives(drives)?;
-                }
-                Ok(loaded)
-            }
-            (Some("toml"), None) => Ok(own(Arm::from_toml(&text_of(path)?, file)?)),
-            (Some("toml"), Some(link)) => Err(RobotError::Invalid {
-                file: file.to_owned(),
-                what: format!(
-                    "\"#{link}\" is for a .urdf or an MJCF, a robot file is one arm: leave it out"
-                ),
-            }),
-            _ => Ok(Self { files: Vec::new(), ..own(Arm::built_in(name)?) }),
-        }
-    }
-
-    /// Takes over what the drive file beside the URDF or MJCF says.
-    fn take_drives(&mut self, path: PathBuf) -> Result<(), RobotError> {
-        let source = path.display().to_string();
-        let drives = DriveFile::read(&text_of(&path)?, &source)?;
-        let locked: Vec<&str> = self.notices.iter().flat_map(UrdfNotice::locked).collect();
-        drives.apply(&mut self.arm, &locked, &source)?;
-        let notices = std::mem::take(&mut self.notices);
-        let (about_drives, others): (Vec<_>, Vec<_>) =
-            notices.into_iter().partition(UrdfNotice::is_about_drives);
-        self.notices = others;
-        let open = about_drives.into_iter().filter_map(|notice| drives.leaves(notice)).collect();
-        self.notices.push(UrdfNotice::DriveFile { file: source, open });
-        self.files.push(path);
-        Ok(())
-    }
-}
-
-fn text_of(path: &Path) -> Result<String, RobotError> {
-    std::fs::read_to_string(path)
-        .map_err(|source| RobotError::Read { file: path.display().to_string(), source })
 }
 
 #[derive(Serialize, Deserialize)]
@@ -220,7 +132,13 @@ impl RobotFile {
         place.finite("gravity_m_s2", &self.gravity_m_s2)?;
         place.positive("friction_epsilon_rad_s", self.friction_epsilon_rad_s)?;
         place.unique("joint", self.joints.iter().map(|joint| joint.name.as_str()))?;
-        let clearance = self.clearance(&place)?;
+        let keys = ClearanceKeys {
+            floor_z_m: self.floor_z_m,
+            capsules: &self.capsules,
+            pairs: &self.collision_pairs,
+            boxes: &self.boxes,
+        };
+        let clearance = keys.added_to(Clearance::default(), self.joints.len(), &place)?;
         let joints = self
             .joints
             .into_iter()

@@ -11,16 +11,20 @@ mod file;
 mod inertia;
 mod kinematics;
 mod mjcf;
+pub(crate) mod nearest;
 mod place;
+mod shapes;
 mod signals;
 mod urdf;
 
+pub(crate) use arm::ON_AXIS;
 pub use arm::{Arm, Capsule, CellBox, Clearance, Drive, Joint, Limits, LinkBounds, Placement};
 pub use error::RobotError;
 pub use file::{LoadedArm, built_in_names};
 pub use inertia::LinkInertia;
 pub use kinematics::{Kinematics, KinematicsDifference};
 pub use mjcf::{LeftOut, MjcfArm, MjcfFault, MjcfNotice, read_mjcf, read_mjcf_up_to};
+pub use shapes::ShapeNotice;
 pub use signals::JointSignals;
 pub use urdf::{
     FixedFrame, Frames, LockedJoint, Obstacle, Stand, UrdfArm, UrdfFault, UrdfLink, UrdfNotice,

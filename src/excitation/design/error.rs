@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use crate::base::{AmbiguousRank, ParameterisationError};
-use crate::excitation::{ExcitationError, POSES_TRIED};
+use crate::excitation::{ExcitationError, LimitKind, POSES_TRIED};
 
 /// A specification that cannot be met or makes no sense.
 #[derive(Debug, Error)]
@@ -46,7 +46,7 @@ pub enum DesignError {
     #[error("the fixed offsets are no pose the arm may take: {limit} is short by {short}")]
     FixedPose {
         /// The limit that is passed.
-        limit: String,
+        limit: LimitKind,
         /// By how much, with its unit.
         short: String,
     },
@@ -104,4 +104,15 @@ pub enum DesignError {
     /// From the parameterisation.
     #[error(transparent)]
     Parameterisation(#[from] ParameterisationError),
+}
+
+impl DesignError {
+    /// Whether it may be what the arm is to keep clear of that leaves no motion.
+    pub fn is_about_clearance(&self) -> bool {
+        match self {
+            Self::NeverClear { .. } | Self::Infeasible { .. } => true,
+            Self::FixedPose { limit, .. } => limit.is_distance(),
+            _ => false,
+        }
+    }
 }

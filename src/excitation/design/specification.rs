@@ -133,7 +133,7 @@ impl Specification {
         }
         let worst = margins.worst();
         let short = worst.shortfall_in_words();
-        Err(DesignError::FixedPose { limit: worst.limit.to_string(), short })
+        Err(DesignError::FixedPose { limit: worst.limit.clone(), short })
     }
 }
 

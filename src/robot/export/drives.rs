@@ -1,8 +1,12 @@
 //! What a URDF has no place for.
 
+mod clearance;
+
+use clearance::Source;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use crate::robot::file::{BoxEntry, CapsuleEntry};
 use crate::robot::place::Place;
 use crate::robot::{Arm, Joint, MjcfNotice, RobotError, UrdfNotice};
 
@@ -14,8 +18,18 @@ pub(in crate::robot) struct DriveFile {
     gravity_m_s2: Option<[f64; 3]>,
     friction_epsilon_rad_s: Option<f64>,
     torque_offsets: Option<bool>,
+    clearance: Option<Source>,
+    floor_z_m: Option<f64>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    collision_pairs: Vec<[String; 2]>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    unwatched_pairs: Vec<[String; 2]>,
     #[serde(default)]
     joint: Vec<DriveEntry>,
+    #[serde(default, rename = "capsule", skip_serializing_if = "Vec::is_empty")]
+    capsules: Vec<CapsuleEntry>,
+    #[serde(default, rename = "box", skip_serializing_if = "Vec::is_empty")]
+    boxes: Vec<BoxEntry>,
 }
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -33,25 +47,40 @@ struct DriveEntry {
     com_bounds_m: Option<[[f64; 2]; 3]>,
 }
 
-/// The drives as TOML, to lie beside a URDF: joint torque is that of the bodies plus
+/// The drives as TOML, to lie beside a URDF of bodies alone, with what the arm keeps clear of: joint torque is that of the bodies plus
 /// rotor inertia · q̈ + viscous · q̇ + coulomb · tanh(q̇/ε) + offset. `offsets_nm` has one entry per
 /// joint.
 pub fn drive_file(arm: &Arm, offsets_nm: &[f64]) -> String {
     DriveFile::of(arm, offsets_nm).text()
 }
 
-/// As [`drive_file`], of an `arm` that is a part of a robot: behind its joints stand those others that the robot's own drive file
-/// `text` has, such as the second arm's; `source` names it in messages.
-pub fn drive_file_of_part(
+/// As [`drive_file`], of an `arm` that came from a URDF with shapes, whose own drive file is `text`: about clearance it says what
+/// that says, and behind the arm's joints stand those others that are in it, such as a second arm's; `source` names it in messages.
+pub fn drive_file_of_urdf(
     arm: &Arm,
     offsets_nm: &[f64],
     text: &str,
     source: &str,
 ) -> Result<String, RobotError> {
-    let mut file = DriveFile::of(arm, offsets_nm);
+    let own = DriveFile::read(text, source)?;
+    let DriveFile { robot, gravity_m_s2, friction_epsilon_rad_s, torque_offsets, joint, .. } =
+        DriveFile::of(arm, offsets_nm);
     let of_arm = |entry: &DriveEntry| arm.joints.iter().any(|joint| joint.name == entry.name);
-    let all = DriveFile::read(text, source)?.joint;
-    file.joint.extend(all.into_iter().filter(|entry| !of_arm(entry)));
+    let others = own.joint.into_iter().filter(|entry| !of_arm(entry));
+    let joint = joint.into_iter().chain(others).collect();
+    let file = DriveFile {
+        robot,
+        gravity_m_s2,
+        friction_epsilon_rad_s,
+        torque_offsets,
+        joint,
+        clearance: own.clearance,
+        floor_z_m: own.floor_z_m,
+        collision_pairs: own.collision_pairs,
+        unwatched_pairs: own.unwatched_pairs,
+        capsules: own.capsules,
+        boxes: own.boxes,
+    };
     Ok(file.text())
 }
 
@@ -64,12 +93,20 @@ pub fn apply_drive_file(arm: &mut Arm, text: &str, source: &str) -> Result<(), R
 impl DriveFile {
     fn of(arm: &Arm, offsets_nm: &[f64]) -> Self {
         let joints = arm.joints.iter().zip(offsets_nm);
+        let capsules = &arm.clearance.capsules;
+        let named = |pair: &[usize; 2]| pair.map(|k| capsules[k].name.clone());
         Self {
             robot: Some(arm.name.clone()),
             gravity_m_s2: Some(arm.gravity_m_s2.into()),
             friction_epsilon_rad_s: Some(arm.friction_epsilon_rad_s),
             torque_offsets: Some(arm.torque_offsets),
+            clearance: None,
+            floor_z_m: arm.clearance.floor_z_m,
+            collision_pairs: arm.clearance.pairs.iter().map(named).collect(),
+            unwatched_pairs: Vec::new(),
             joint: joints.map(|(joint, &offset_nm)| DriveEntry::of(joint, offset_nm)).collect(),
+            capsules: capsules.iter().map(CapsuleEntry::of).collect(),
+            boxes: arm.clearance.boxes.iter().map(BoxEntry::of).collect(),
         }
     }
 
@@ -102,6 +139,7 @@ impl DriveFile {
             arm.gravity_m_s2 = Vector3::from(gravity_m_s2);
         }
         arm.torque_offsets = self.torque_offsets.unwrap_or(arm.torque_offsets);
+        self.clear(arm, &place)?;
         for joint in &mut arm.joints {
             if let Some(entry) = self.joint.iter().find(|entry| entry.name == joint.name) {
                 entry.apply(joint, &place.table("joint", &entry.name))?;
@@ -244,6 +282,7 @@ fn take(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::robot::Clearance;
 
     fn ur5() -> Arm {
         Arm::built_in("ur5").unwrap()
@@ -303,11 +342,13 @@ mod tests {
         let text = format!(
             "[[joint]]\nname = \"other\"\ngear_ratio = 50.0\n[[joint]]\nname = \"{own}\"\ngear_ratio = 7.0\n"
         );
-        let written = drive_file_of_part(&arm, &[0.5; 6], &text, "x.drives.toml").unwrap();
-        let alone = drive_file(&arm, &[0.5; 6]);
+        let written = drive_file_of_urdf(&arm, &[0.5; 6], &text, "x.drives.toml").unwrap();
+        // What the arm keeps clear of is in the URDF.
+        let without = Arm { clearance: Clearance::default(), ..arm.clone() };
+        let alone = drive_file(&without, &[0.5; 6]);
         let behind = "\n[[joint]]\nname = \"other\"\ngear_ratio = 50.0\n";
         assert_eq!(written, format!("{alone}{behind}"));
-        assert!(drive_file_of_part(&arm, &[0.5; 6], "joint = 1", "x.drives.toml").is_err());
+        assert!(drive_file_of_urdf(&arm, &[0.5; 6], "joint = 1", "x.drives.toml").is_err());
     }
 
     #[test]

@@ -18,7 +18,7 @@ use super::arm::Arm;
 use super::urdf::Frames;
 
 pub(super) use drives::DriveFile;
-pub use drives::{apply_drive_file, drive_file, drive_file_of_part};
+pub use drives::{apply_drive_file, drive_file, drive_file_of_urdf};
 pub use mjcf::{mjcf, mjcf_of_urdf};
 pub use own_urdf::{OwnUrdf, OwnUrdfError, Takeover, Unfit, own_urdf};
 pub use urdf::urdf;
@@ -227,7 +227,7 @@ mod tests {
         assert_eq!(file["friction_epsilon_rad_s"].as_float(), Some(0.02));
     }
 
-    /// URDF and drive file together are the whole arm but for its clearance.
+    /// URDF and drive file together are the whole arm.
     #[test]
     fn the_drive_file_gives_a_urdf_its_drives_back() {
         let mut arm = Arm::built_in("ur5").unwrap();
@@ -238,6 +238,7 @@ mod tests {
         assert_eq!(read.gravity_m_s2, arm.gravity_m_s2);
         assert_eq!(read.friction_epsilon_rad_s, arm.friction_epsilon_rad_s);
         assert_eq!(read.torque_offsets, arm.torque_offsets);
+        assert_eq!(read.clearance, arm.clearance);
         for (a, b) in arm.joints.iter().zip(&read.joints) {
             assert_eq!((a.drive, a.limits, a.bounds), (b.drive, b.limits, b.bounds));
         }

@@ -13,7 +13,7 @@ use crate::robot::{Arm, FixedFrame, Frames, Joint, Placement};
 /// - `damping` is rv in Nm s/rad, `friction` rc in Nm (tanh(q̇/ε) in our model, a sign or
 ///   a constraint in others).
 /// - Rotor inertia, acceleration limit, gear ratio, torque constant, ε, torque offsets and gravity have no place: they
-///   are in the [`drive_file`](super::drive_file). Clearance capsules are left out.
+///   are in the [`drive_file`](super::drive_file), and so is what the arm keeps clear of.
 pub fn urdf(arm: &Arm, frames: &Frames) -> Result<String, ExportError> {
     let links = link_names(arm);
     check(arm, frames, &links)?;

@@ -1,14 +1,13 @@
-//! What an arm keeps clear of, as it stands in a robot file.
+//! What an arm keeps clear of, as it stands in a robot file or in a drive file.
 
 use serde::{Deserialize, Serialize};
 
-use super::RobotFile;
 use crate::robot::place::Place;
 use crate::robot::{Capsule, CellBox, Clearance, RobotError};
 
-#[derive(Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct CapsuleEntry {
+pub(in crate::robot) struct CapsuleEntry {
     name: String,
     body: usize,
     from_m: [f64; 3],
@@ -16,48 +15,81 @@ pub(super) struct CapsuleEntry {
     radius_m: f64,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct BoxEntry {
+pub(in crate::robot) struct BoxEntry {
     low_m: [f64; 3],
     high_m: [f64; 3],
 }
 
-impl RobotFile {
-    /// Shapes, pairs, floor and boxes, checked.
-    pub(super) fn clearance(&self, place: &Place) -> Result<Clearance, RobotError> {
+/// Keys about clearance.
+pub(in crate::robot) struct ClearanceKeys<'a> {
+    /// `floor_z_m`.
+    pub floor_z_m: Option<f64>,
+    /// `[[capsule]]`.
+    pub capsules: &'a [CapsuleEntry],
+    /// `collision_pairs`.
+    pub pairs: &'a [[String; 2]],
+    /// `[[box]]`.
+    pub boxes: &'a [BoxEntry],
+}
+
+impl ClearanceKeys<'_> {
+    /// A clearance of an arm with so many moving bodies, and what the keys say, checked: a capsule of a name that there is takes the
+    /// place of that one.
+    pub(in crate::robot) fn added_to(
+        &self,
+        mut clearance: Clearance,
+        bodies: usize,
+        place: &Place,
+    ) -> Result<Clearance, RobotError> {
         place.finite("floor_z_m", self.floor_z_m.as_slice())?;
         place.unique("capsule", self.capsules.iter().map(|capsule| capsule.name.as_str()))?;
-        let bodies = self.joints.len();
-        let capsules = self.capsules.iter().map(|entry| entry.capsule(place, bodies));
-        let pairs = self.collision_pairs.iter().map(|pair| self.pair(place, pair));
-        let boxes = self.boxes.iter().map(|entry| entry.cell_box(place));
-        Ok(Clearance {
-            capsules: capsules.collect::<Result<_, _>>()?,
-            pairs: pairs.collect::<Result<_, _>>()?,
-            floor_z_m: self.floor_z_m,
-            boxes: boxes.collect::<Result<_, _>>()?,
-        })
-    }
-
-    /// Two capsules by their places in the list.
-    fn pair(&self, place: &Place, [one, other]: &[String; 2]) -> Result<[usize; 2], RobotError> {
-        let find = |name: &str| {
-            self.capsules.iter().position(|capsule| capsule.name == name).ok_or_else(|| {
-                let what = "which is not there";
-                place.fault(format!("collision_pairs names the capsule \"{name}\", {what}"))
-            })
-        };
-        if one == other {
-            let what = format!("collision_pairs: \"{one}\" cannot be kept clear of itself");
-            return Err(place.fault(what));
+        clearance.floor_z_m = self.floor_z_m.or(clearance.floor_z_m);
+        for entry in self.capsules {
+            let capsule = entry.capsule(place, bodies)?;
+            match clearance.capsules.iter().position(|known| known.name == capsule.name) {
+                Some(at) => clearance.capsules[at] = capsule,
+                None => clearance.capsules.push(capsule),
+            }
         }
-        Ok([find(one)?, find(other)?])
+        for names in self.pairs {
+            let pair @ [one, other] = pair(&clearance, "collision_pairs", names, place)?;
+            if !clearance.pairs.contains(&pair) && !clearance.pairs.contains(&[other, one]) {
+                clearance.pairs.push(pair);
+            }
+        }
+        for entry in self.boxes {
+            let cell_box = entry.cell_box(place)?;
+            if !clearance.boxes.contains(&cell_box) {
+                clearance.boxes.push(cell_box);
+            }
+        }
+        Ok(clearance)
     }
 }
 
+/// Two capsules, named by `key`, by their places in the list.
+pub(in crate::robot) fn pair(
+    clearance: &Clearance,
+    key: &str,
+    [one, other]: &[String; 2],
+    place: &Place,
+) -> Result<[usize; 2], RobotError> {
+    let find = |name: &str| {
+        clearance.capsules.iter().position(|capsule| capsule.name == name).ok_or_else(|| {
+            place.fault(format!("{key} names the capsule \"{name}\", which is not there"))
+        })
+    };
+    if one == other {
+        let what = format!("{key}: \"{one}\" cannot be kept clear of itself");
+        return Err(place.fault(what));
+    }
+    Ok([find(one)?, find(other)?])
+}
+
 impl CapsuleEntry {
-    pub(super) fn of(capsule: &Capsule) -> Self {
+    pub(in crate::robot) fn of(capsule: &Capsule) -> Self {
         Self {
             name: capsule.name.clone(),
             body: capsule.body,
@@ -88,7 +120,7 @@ impl CapsuleEntry {
 }
 
 impl BoxEntry {
-    pub(super) fn of(cell_box: &CellBox) -> Self {
+    pub(in crate::robot) fn of(cell_box: &CellBox) -> Self {
         Self { low_m: cell_box.low_m.into(), high_m: cell_box.high_m.into() }
     }
 

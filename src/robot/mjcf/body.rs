@@ -5,6 +5,7 @@ use std::collections::{HashMap, HashSet};
 use nalgebra::Vector3;
 use urdf_rs::{Axis, Inertial, JointLimit, JointType, Link, LinkName, Pose, Robot, Vec3};
 
+use super::collision::{MeshAssets, shape};
 use super::compiler::Compiler;
 use super::defaults::Defaults;
 use super::element::Element;
@@ -14,6 +15,7 @@ use super::joint::Joint;
 use super::notice::LeftOut;
 use super::pose::{pose, rpy_rad, shift};
 use crate::robot::arm::Placement;
+use crate::robot::shapes::LinkShape;
 
 /// The body around all others.
 const WORLD: &str = "world";
@@ -39,6 +41,8 @@ pub(super) struct Bodies<'a> {
     defaults: &'a Defaults,
     /// Torque limits by joint.
     efforts: &'a HashMap<String, f64>,
+    /// Meshes by name.
+    meshes: &'a MeshAssets,
     /// Links without inertia, and joints.
     pub robot: Robot,
     /// The inertia of each link, or why it is not known: that matters only where the link moves.
@@ -53,6 +57,8 @@ pub(super) struct Bodies<'a> {
     pub left_out: Vec<(LeftOut, String)>,
     /// Bodies whose weight is taken away.
     pub weightless: HashSet<String>,
+    /// What links collide with.
+    pub shapes: Vec<LinkShape>,
 }
 
 impl<'a> Bodies<'a> {
@@ -62,11 +68,13 @@ impl<'a> Bodies<'a> {
         compiler: &'a Compiler,
         defaults: &'a Defaults,
         efforts: &'a HashMap<String, f64>,
+        meshes: &'a MeshAssets,
     ) -> Result<Self, MjcfFault> {
         let mut bodies = Self {
             compiler,
             defaults,
             efforts,
+            meshes,
             robot: Robot {
                 name: root.text("model").unwrap_or_default().to_owned(),
                 version: None,
@@ -80,6 +88,7 @@ impl<'a> Bodies<'a> {
             references: HashMap::new(),
             left_out: Vec::new(),
             weightless: HashSet::new(),
+            shapes: Vec::new(),
         };
         bodies.link(WORLD.to_owned(), Ok(Inertial::default()));
         let world = Hold { link: WORLD.to_owned(), anchor_m: Vector3::zeros() };
@@ -116,12 +125,13 @@ impl<'a> Bodies<'a> {
         Ok(parts)
     }
 
-    /// The sites and bodies among the parts of the body `hold`.
+    /// The sites, shapes and bodies among the parts of the body `hold`.
     fn inner(&mut self, parts: &[Part<'_>], hold: &Hold) -> Result<(), MjcfFault> {
         for part in parts {
             match part.element.tag.as_str() {
                 "site" => self.site(part, hold)?,
                 "body" => self.body(part, hold)?,
+                "geom" => self.geom(part, hold),
                 _ => {}
             }
         }
@@ -204,6 +214,19 @@ impl<'a> Bodies<'a> {
             dynamics: Some(joint.dynamics),
             ..joint_between(name, origin, parent, child)
         });
+    }
+
+    /// What is wrong with a shape is told where the links with shapes are: the arm is the same without it.
+    fn geom(&mut self, part: &Part<'_>, hold: &Hold) {
+        let geom = self.defaults.complete(part.element, part.childclass);
+        let found = geom.and_then(|geom| shape(&geom, self.compiler, self.meshes));
+        let (own, shape) = match found {
+            Ok(None) => return,
+            Ok(Some((own, shape))) => (own, Ok(shape)),
+            Err(fault) => (Placement::identity(), Err(fault.to_string())),
+        };
+        let placement = shift(-hold.anchor_m).compose(&part.frame.compose(&own));
+        self.shapes.push(LinkShape { link: hold.link.clone(), placement, shape });
     }
 
     /// A place with a name is a link without mass.

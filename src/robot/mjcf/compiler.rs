@@ -33,6 +33,8 @@ pub(super) struct Compiler {
     pub least_mass_kg: f64,
     /// Least principal moment of a body, kg m².
     pub least_moment_kg_m2: f64,
+    /// Where meshes lie, from the folder of the main file.
+    pub mesh_folder: String,
 }
 
 impl Default for Compiler {
@@ -46,6 +48,7 @@ impl Default for Compiler {
             balances: false,
             least_mass_kg: 0.0,
             least_moment_kg_m2: 0.0,
+            mesh_folder: String::new(),
         }
     }
 }
@@ -84,6 +87,11 @@ impl Compiler {
             balances: said.switch("balanceinertia")?.unwrap_or(usual.balances),
             least_mass_kg: said.not_negative("boundmass")?,
             least_moment_kg_m2: said.not_negative("boundinertia")?,
+            mesh_folder: said
+                .text("meshdir")
+                .or(said.text("assetdir"))
+                .unwrap_or_default()
+                .to_owned(),
         })
     }
 

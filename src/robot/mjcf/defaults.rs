@@ -85,6 +85,7 @@ fn kind(tag: &str) -> Option<&'static str> {
         "joint" => Some("joint"),
         "geom" => Some("geom"),
         "site" => Some("site"),
+        "mesh" => Some("mesh"),
         _ if ACTUATORS.contains(&tag) => Some("actuator"),
         _ => None,
     }

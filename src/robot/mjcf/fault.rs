@@ -162,6 +162,14 @@ pub enum MjcfFault {
         /// The class.
         class: String,
     },
+    /// A mesh that is not in the file.
+    #[error("{place}: there is no <mesh> \"{mesh}\" in <asset>")]
+    UnknownMesh {
+        /// The geom.
+        place: String,
+        /// The mesh.
+        mesh: String,
+    },
     /// Something that only MuJoCo itself works out.
     #[error("{place}: {what} not read; {}", COMPILE)]
     Unread {

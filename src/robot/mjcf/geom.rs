@@ -15,7 +15,7 @@ use crate::robot::inertia::LinkInertia;
 const USUAL_DENSITY_KG_M3: f64 = 1000.0;
 
 /// A solid about its centre, its axis of symmetry along z. Sizes are halves and radii, m.
-enum Solid {
+pub(super) enum Solid {
     Ellipsoid([f64; 3]),
     Box([f64; 3]),
     Cylinder { radius_m: f64, half_m: f64 },
@@ -49,12 +49,21 @@ pub(super) fn geom_inertia(
     if geom.switch("shellinertia")? == Some(true) {
         return Err(geom.unread("the inertia of shells is"));
     }
-    let (placement, half_m) = stretch(geom, kind, compiler)?;
-    let solid = Solid::of(geom, kind, half_m)?;
+    let (placement, solid) = solid(geom, kind, compiler)?;
     let mass_kg = mass_kg.unwrap_or_else(|| density_kg_m3 * solid.volume_m3());
     let moments = Matrix3::from_diagonal(&(mass_kg * solid.moments_m2()));
     let about_centre = LinkInertia::from_com(mass_kg, Vector3::zeros(), moments);
     Ok(Some(about_centre.transformed(&placement)))
+}
+
+/// The solid that a geom of a primitive `kind` is, and where it stands.
+pub(super) fn solid(
+    geom: &Element,
+    kind: &str,
+    compiler: &Compiler,
+) -> Result<(Placement, Solid), MjcfFault> {
+    let (placement, half_m) = stretch(geom, kind, compiler)?;
+    Ok((placement, Solid::of(geom, kind, half_m)?))
 }
 
 /// Where the geom stands, and where two points say how long it is half of that, m.

@@ -9,6 +9,7 @@
 
 mod actuator;
 mod body;
+mod collision;
 mod compiler;
 mod defaults;
 mod document;

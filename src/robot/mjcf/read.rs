@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 
 use super::actuator::efforts;
 use super::body::Bodies;
+use super::collision::meshes;
 use super::compiler::Compiler;
 use super::defaults::Defaults;
 use super::document::document;
@@ -31,6 +32,8 @@ pub struct MjcfArm {
     pub notices: Vec<UrdfNotice>,
     /// Files that were included.
     pub included: Vec<PathBuf>,
+    /// Mesh files of collision shapes that were read.
+    pub meshes: Vec<PathBuf>,
 }
 
 /// Reads the text of an MJCF; `source` names it in messages, and is where included files are looked for.
@@ -47,6 +50,7 @@ pub struct MjcfArm {
 ///   `actuatorfrcrange`, or else an actuator's `forcerange` (of a motor without one its `ctrlrange`) times its gear.
 /// - **Default classes**, `childclass`, `<include>`, `<frame>`, and the ways to write orientations are as in MuJoCo. Copies
 ///   (`<replicate>`), attached models, deformable bodies and the mass of meshes on moving bodies are refused.
+/// - **Collision shapes** are the geoms with a `contype` or `conaffinity`, those of the world too, but for planes and height fields.
 /// - Contacts, tendons, sensors, keyframes, and what is only seen are not read.
 ///
 /// # Errors
@@ -70,19 +74,21 @@ fn read(text: &str, source: &str, last_body: Option<&str>) -> Result<MjcfArm, Mj
     let compiler = Compiler::of(&root)?;
     let defaults = Defaults::of(&root)?;
     let efforts = efforts(&root, &compiler, &defaults)?;
-    let mut bodies = Bodies::of(&root, &compiler, &defaults, &efforts)?;
+    let meshes = meshes(&root, &compiler, &defaults);
+    let mut bodies = Bodies::of(&root, &compiler, &defaults, &efforts, &meshes)?;
     let coupled = couple(&root, &mut bodies.robot, &bodies.references)?;
     bodies.left_out.extend(coupled);
     give_inertias(&mut bodies, source, last_body)?;
-    let UrdfArm { mut arm, frames, links, notices } =
-        arm_of(&bodies.robot, source, last_body).map_err(MjcfFault::Arm)?;
+    let mut read = arm_of(&bodies.robot, source, last_body).map_err(MjcfFault::Arm)?;
+    read.watch(&bodies.shapes, source);
+    let UrdfArm { mut arm, frames, links, notices, meshes } = read;
     arm.gravity_m_s2 = gravity(&root)?;
     for joint in &mut arm.joints {
         joint.drive.rotor_inertia_kg_m2 =
             bodies.armature_kg_m2.get(&joint.name).copied().unwrap_or(0.0);
     }
     let notices = told(notices, &arm, &links, &bodies);
-    Ok(MjcfArm { arm, frames, notices, included })
+    Ok(MjcfArm { arm, frames, notices, included, meshes })
 }
 
 /// Gives the links their inertia. What never moves needs none, so that what is wrong with it does not matter.

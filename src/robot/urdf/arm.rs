@@ -1,8 +1,11 @@
 //! What a URDF is read as.
 
+use std::path::{Path, PathBuf};
+
 use super::notice::UrdfNotice;
 use crate::robot::arm::{Arm, Placement};
 use crate::robot::inertia::LinkInertia;
+use crate::robot::shapes::{LinkShape, Watched, watched};
 
 /// An arm read from a URDF.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,6 +18,20 @@ pub struct UrdfArm {
     pub links: Vec<UrdfLink>,
     /// What was assumed, merged or left out, in words by `Display`.
     pub notices: Vec<UrdfNotice>,
+    /// Mesh files of collision shapes that were read.
+    pub meshes: Vec<PathBuf>,
+}
+
+impl UrdfArm {
+    /// Gives the arm the clearance that the `shapes` of its links have; meshes are looked for from the folder of `source`.
+    pub(in crate::robot) fn watch(&mut self, shapes: &[LinkShape], source: &str) {
+        let folder = Path::new(source).parent().unwrap_or(Path::new(""));
+        let Watched { clearance, notices, meshes } =
+            watched(&self.arm, &self.links, shapes, folder);
+        self.arm.clearance = clearance;
+        self.notices.extend(notices.into_iter().map(UrdfNotice::Shapes));
+        self.meshes = meshes;
+    }
 }
 
 /// Named frames of an arm.

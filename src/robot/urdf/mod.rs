@@ -7,6 +7,7 @@
 
 mod arm;
 mod chain;
+mod collision;
 mod fault;
 mod joint;
 mod link;

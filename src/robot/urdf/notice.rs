@@ -5,6 +5,7 @@ use std::fmt;
 use super::locked::LockedJoint;
 use super::words::listed;
 use crate::robot::mjcf::MjcfNotice;
+use crate::robot::shapes::ShapeNotice;
 
 /// Something a URDF does not say, or says in a way that had to be interpreted.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,13 +36,8 @@ pub enum UrdfNotice {
         /// The joints without.
         joints: Vec<String>,
     },
-    /// Collision shapes are not read.
-    NoClearance,
-    /// Mesh files that could not be found (also those of a package, whose folder is not known).
-    MissingMeshes {
-        /// As written.
-        files: Vec<String>,
-    },
+    /// What became of collision shapes.
+    Shapes(ShapeNotice),
     /// The drive file beside the URDF was read.
     DriveFile {
         /// The file.
@@ -185,16 +181,7 @@ impl fmt::Display for UrdfNotice {
             Self::NoFriction { joints } => {
                 write!(f, "no damping and no friction given, taken as 0: {}", joints.join(", "))
             }
-            Self::NoClearance => write!(
-                f,
-                "collision shapes are not read: self-collision and the floor are not watched"
-            ),
-            Self::MissingMeshes { files } => write!(
-                f,
-                "{} mesh files are not there, such as {}: nothing is lost, shapes are not read",
-                files.len(),
-                files.first().map_or("", String::as_str)
-            ),
+            Self::Shapes(notice) => write!(f, "{notice}"),
             Self::DriveFile { file, open } if open.is_empty() => {
                 write!(f, "drives and gravity are those of {file}")
             }

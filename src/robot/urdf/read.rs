@@ -1,13 +1,13 @@
 //! From the chain of a URDF to an [`Arm`].
 
 use std::f64::consts::FRAC_PI_2;
-use std::path::Path;
 
 use nalgebra::Vector3;
-use urdf_rs::{Geometry, Pose, Robot};
+use urdf_rs::{Pose, Robot};
 
 use super::arm::{FixedFrame, Frames, UrdfArm, UrdfLink};
 use super::chain::{Body, all_joints, bodies, joints_up_to};
+use super::collision::shapes;
 use super::fault::{UrdfFault, finite, quoted};
 use super::joint::{ASSUMED_ACCELERATION_RAD_S2, drive};
 use super::locked::{LockedJoint, locked_joints};
@@ -40,7 +40,8 @@ const WORTH_SAYING_RAD: f64 = 1e-9;
 ///   otherwise π about x followed by the smallest rotation from −ẑ to a. Axis z gives S = 1.
 /// - **Friction**: `damping` is rv, `friction` is rc. **Limits**: `effort` is the torque limit,
 ///   `velocity` the speed limit.
-/// - **Shapes** are not read; mesh files that are not there are named in the notices.
+/// - **Collision shapes** become capsules on the bodies, and pairs of them that are kept apart; meshes (STL, OBJ) are looked for from
+///   the folder of `source`. What is not watched is named in the notices. What is only seen is not read.
 /// - **What URDF does not have**: rotor inertia is 0, gear ratio 1 and torque constant 1 (a current
 ///   column then reads as joint torque), gravity 9.81 m/s² along −z of the root link, acceleration
 ///   limit 10 rad/s² unless the file has one. Transmissions are not read.
@@ -75,14 +76,11 @@ fn read(text: &str, source: &str, last_link: Option<&str>) -> Result<UrdfArm, Ro
     })?;
     let mut read = arm_of(&robot, source, last_link)
         .map_err(|fault| RobotError::UrdfArm { file: source.to_owned(), fault })?;
-    let files = missing_meshes(&robot, source);
-    if !files.is_empty() {
-        read.notices.push(UrdfNotice::MissingMeshes { files });
-    }
+    read.watch(&shapes(&robot), source);
     Ok(read)
 }
 
-/// The arm of a robot, whatever file it comes from; `source` names it, and is what a remedy begins with.
+/// The arm of a robot without its clearance, whatever file it comes from; `source` names it, and is what a remedy begins with.
 pub(in crate::robot) fn arm_of(
     robot: &Robot,
     source: &str,
@@ -102,6 +100,7 @@ pub(in crate::robot) fn arm_of(
         frames: Frames { root, fixed: reader.frames },
         links: reader.links,
         notices: reader.notices,
+        meshes: Vec::new(),
     })
 }
 
@@ -130,25 +129,6 @@ fn moving_joints<'a>(
         }),
         None => all_joints(tree, source),
     }
-}
-
-/// Mesh files that cannot be found from the folder of `source`, each once.
-fn missing_meshes(robot: &Robot, source: &str) -> Vec<String> {
-    let folder = Path::new(source).parent().unwrap_or(Path::new(""));
-    let shapes = robot.links.iter().flat_map(|link| {
-        let visual = link.visual.iter().map(|visual| &visual.geometry);
-        visual.chain(link.collision.iter().map(|collision| &collision.geometry))
-    });
-    let mut missing: Vec<String> = shapes
-        .filter_map(|shape| match shape {
-            Geometry::Mesh { filename, .. } => Some(filename.clone()),
-            _ => None,
-        })
-        .filter(|file| !folder.join(file.trim_start_matches("file://")).exists())
-        .collect();
-    missing.sort();
-    missing.dedup();
-    missing
 }
 
 /// What accumulates beside the joints.
@@ -193,7 +173,6 @@ impl Reader {
                 gear_ratio: names.clone(),
                 torque_constant: names,
             },
-            UrdfNotice::NoClearance,
         ]);
         let mut joints: Vec<Joint> = Vec::with_capacity(chain.len() - 1);
         // Pose, in the frame of the body at hand, of the link that the next joint hangs on.

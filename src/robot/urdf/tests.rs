@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 use proptest::prelude::*;
 
 use super::{UrdfArm, UrdfFault, UrdfNotice, read_urdf};
-use crate::robot::RobotError;
+use crate::robot::{RobotError, ShapeNotice};
 
 const BODY: &str = r#"<inertial><origin xyz="0.1 0 0" rpy="0 0 0"/><mass value="2"/>
     <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.025"/></inertial>"#;
@@ -230,19 +230,27 @@ fn a_right_angle_printed_short_is_a_right_angle_and_is_said() {
     assert!(read(&robot(&parts)).arm.joints[1].placement.rotation[(1, 1)].abs() > 1e-5);
 }
 
+/// What is only seen does not matter.
 #[test]
-fn meshes_that_are_not_there_are_named_and_do_not_matter() {
+fn meshes_of_collision_shapes_that_are_not_there_are_named() {
     let mesh =
         r#"<visual><geometry><mesh filename="package://nowhere/a.stl"/></geometry></visual>"#;
     let mut parts = two_joints();
+    parts[1] = link("a", &format!("{BODY}{mesh}"));
+    let seen = read(&robot(&parts));
+    assert_eq!((seen.arm, seen.notices), {
+        let UrdfArm { arm, notices, .. } = read(&robot(&two_joints()));
+        (arm, notices)
+    });
     parts[1] = link("a", &format!("{BODY}{mesh}{}", mesh.replace("visual", "collision")));
     let UrdfArm { arm, notices, .. } = read(&robot(&parts));
     assert_eq!(arm, read(&robot(&two_joints())).arm);
     let files = vec!["package://nowhere/a.stl".to_owned()];
-    let notice = UrdfNotice::MissingMeshes { files };
-    assert!(notices.contains(&notice), "{notices:?}");
+    let notice = ShapeNotice::MissingMeshes { files, links: vec!["a".to_owned()] };
     let message = notice.to_string();
-    assert!(message.contains("nowhere/a.stl") && message.contains("nothing is lost"), "{message}");
+    assert!(notices.contains(&UrdfNotice::Shapes(notice)), "{notices:?}");
+    let words = "collision shapes whose mesh files are not there (package://nowhere/a.stl) are not watched: a";
+    assert_eq!(message, words);
 }
 
 #[test]

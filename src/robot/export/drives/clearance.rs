@@ -1,0 +1,116 @@
+//! What a drive file says of clearance, beyond the shapes of the links.
+
+use serde::{Deserialize, Serialize};
+
+use super::DriveFile;
+use crate::robot::file::{ClearanceKeys, pair};
+use crate::robot::place::Place;
+use crate::robot::{Arm, Clearance, RobotError, ShapeNotice, UrdfNotice};
+
+/// Where the clearance of the arm comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) enum Source {
+    /// Collision shapes of the links, and what the drive file says.
+    #[serde(rename = "shapes")]
+    Shapes,
+    /// The drive file alone.
+    #[serde(rename = "none")]
+    Nothing,
+}
+
+impl DriveFile {
+    /// Gives `arm`, which has the clearance that the shapes of its links have, what the file says beyond it.
+    pub(super) fn clear(&self, arm: &mut Arm, place: &Place) -> Result<(), RobotError> {
+        let of_shapes = std::mem::take(&mut arm.clearance);
+        let begin = if self.sets_shapes_aside() { Clearance::default() } else { of_shapes };
+        let keys = ClearanceKeys {
+            floor_z_m: self.floor_z_m,
+            capsules: &self.capsules,
+            pairs: &self.collision_pairs,
+            boxes: &self.boxes,
+        };
+        let mut clearance = keys.added_to(begin, arm.dof(), place)?;
+        for names in &self.unwatched_pairs {
+            let [one, other] = pair(&clearance, "unwatched_pairs", names, place)?;
+            clearance.pairs.retain(|known| *known != [one, other] && *known != [other, one]);
+        }
+        arm.clearance = clearance;
+        Ok(())
+    }
+
+    fn sets_shapes_aside(&self) -> bool {
+        self.clearance == Some(Source::Nothing)
+    }
+
+    /// Whether a `notice` about shapes is not of interest any more.
+    pub(in crate::robot) fn settles(&self, notice: &UrdfNotice) -> bool {
+        match notice {
+            UrdfNotice::Shapes(ShapeNotice::Nothing) => {
+                self.sets_shapes_aside() || !self.capsules.is_empty()
+            }
+            UrdfNotice::Shapes(_) => self.sets_shapes_aside(),
+            _ => false,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::export::drive_file_of_urdf;
+
+    fn cleared(text: &str) -> Result<Clearance, String> {
+        let mut arm = Arm::built_in("ur5").unwrap();
+        let file = DriveFile::read(text, "x.drives.toml").map_err(|e| e.to_string())?;
+        file.apply(&mut arm, &[], "x.drives.toml").map_err(|e| e.to_string())?;
+        Ok(arm.clearance)
+    }
+
+    const TOOL: &str = "[[capsule]]\nname = \"tool\"\nbody = 6\nfrom_m = [0.0, 0.0, 0.0]\n\
+        to_m = [0.0, 0.0, 0.1]\nradius_m = 0.03\n";
+
+    #[test]
+    fn it_adds_to_the_shapes_or_sets_them_aside() {
+        let of_shapes = Arm::built_in("ur5").unwrap().clearance;
+        assert_eq!(cleared("").unwrap(), of_shapes);
+        let lower = cleared("clearance = \"shapes\"\nfloor_z_m = -0.3").unwrap();
+        assert_eq!(lower, Clearance { floor_z_m: Some(-0.3), ..of_shapes.clone() });
+        assert_eq!(cleared("clearance = \"none\"").unwrap(), Clearance::default());
+        let alone = cleared(&format!("clearance = \"none\"\nfloor_z_m = 0.1\n{TOOL}")).unwrap();
+        assert_eq!((alone.capsules.len(), alone.pairs.len()), (1, 0));
+        assert_eq!(alone.floor_z_m, Some(0.1));
+        let with_tool = cleared(&format!(
+            "collision_pairs = [[\"tool\", \"base\"]]\nunwatched_pairs = [[\"forearm\", \"base\"]]\n{TOOL}"
+        ))
+        .unwrap();
+        assert_eq!(with_tool.capsules.len(), of_shapes.capsules.len() + 1);
+        // One came, another went.
+        assert_eq!(with_tool.pairs.len(), of_shapes.pairs.len());
+        assert!(with_tool.pairs.contains(&[of_shapes.capsules.len(), 0]));
+        let wider = cleared(&TOOL.replace("tool", "wrist 3")).unwrap();
+        assert_eq!(wider.capsules.len(), of_shapes.capsules.len());
+        assert!(wider.capsules.iter().any(|one| one.name == "wrist 3" && one.radius_m == 0.03));
+    }
+
+    /// What was said beside the URDF stays; its shapes are not said again.
+    #[test]
+    fn it_is_kept_where_a_urdf_is_exported() {
+        let arm = Arm::built_in("ur5").unwrap();
+        let text = format!("clearance = \"none\"\nfloor_z_m = -0.3\n{TOOL}");
+        let written = drive_file_of_urdf(&arm, &[0.0; 6], &text, "x.drives.toml").unwrap();
+        assert_eq!(cleared(&written), cleared(&text));
+        assert!(!drive_file_of_urdf(&arm, &[0.0; 6], "", "").unwrap().contains("capsule"));
+    }
+
+    #[test]
+    fn what_it_cannot_mean_is_refused() {
+        let none = cleared("clearance = \"off\"").unwrap_err();
+        assert!(none.contains("off") && none.contains("shapes"), "{none}");
+        let unknown = cleared("unwatched_pairs = [[\"base\", \"tail\"]]").unwrap_err();
+        assert!(unknown.contains("unwatched_pairs names the capsule \"tail\""), "{unknown}");
+        let floor = cleared("floor_z_m = nan").unwrap_err();
+        assert!(floor.contains("floor_z_m: NaN is not a finite number"), "{floor}");
+        let body = cleared(&TOOL.replace("body = 6", "body = 7")).unwrap_err();
+        assert!(body.contains("body = 7 must be 0 (the base) or one of 1 … 6"), "{body}");
+    }
+}

@@ -1,0 +1,106 @@
+//! Arms of whatever kind of file.
+
+use std::path::{Path, PathBuf};
+
+use super::name;
+use crate::robot::arm::Arm;
+use crate::robot::error::RobotError;
+use crate::robot::export::DriveFile;
+use crate::robot::mjcf::{MjcfArm, is_urdf, read_mjcf, read_mjcf_up_to};
+use crate::robot::urdf::{Frames, UrdfArm, UrdfLink, UrdfNotice, read_urdf, read_urdf_up_to};
+
+/// What the drive file of `NAME.urdf` is called behind NAME.
+const DRIVES: &str = "drives.toml";
+
+/// An arm, and where it comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoadedArm {
+    /// The arm.
+    pub arm: Arm,
+    /// What had to be assumed; only a URDF and an MJCF leave anything open.
+    pub notices: Vec<UrdfNotice>,
+    /// Named frames on its bodies; only a URDF and an MJCF have any.
+    pub frames: Frames,
+    /// Links that its bodies consist of; only a URDF has any.
+    pub urdf_links: Vec<UrdfLink>,
+    /// Files it was read from, the one that was named first: none for a built-in arm; of a URDF also its drive file and meshes.
+    pub files: Vec<PathBuf>,
+}
+
+impl LoadedArm {
+    /// As [`Arm::load`].
+    pub fn load(name: &str) -> Result<Self, RobotError> {
+        let (file, last_link) = name::split(name);
+        let path = Path::new(file);
+        let own = |arm| Self {
+            arm,
+            notices: Vec::new(),
+            frames: Frames::default(),
+            urdf_links: Vec::new(),
+            files: vec![path.to_owned()],
+        };
+        let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+        match (extension.as_deref(), last_link) {
+            (Some(end @ ("urdf" | "xml" | "mjcf")), _) => {
+                let text = text_of(path)?;
+                let (mut loaded, meshes) = if end == "urdf" || is_urdf(&text) {
+                    let UrdfArm { arm, frames, links, notices, meshes } = match last_link {
+                        Some(last) => read_urdf_up_to(&text, file, last)?,
+                        None => read_urdf(&text, file)?,
+                    };
+                    (Self { notices, frames, urdf_links: links, ..own(arm) }, meshes)
+                } else {
+                    let MjcfArm { arm, frames, notices, included, meshes } = match last_link {
+                        Some(last) => read_mjcf_up_to(&text, file, last)?,
+                        None => read_mjcf(&text, file)?,
+                    };
+                    let mut loaded = Self { notices, frames, ..own(arm) };
+                    loaded.files.extend(included);
+                    (loaded, meshes)
+                };
+                let drives = path.with_extension(DRIVES);
+                if drives.exists() {
+                    loaded.take_drives(drives)?;
+                }
+                loaded.files.extend(meshes);
+                Ok(loaded)
+            }
+            (Some("toml"), None) => Ok(own(Arm::from_toml(&text_of(path)?, file)?)),
+            (Some("toml"), Some(link)) => Err(RobotError::Invalid {
+                file: file.to_owned(),
+                what: format!(
+                    "\"#{link}\" is for a .urdf or an MJCF, a robot file is one arm: leave it out"
+                ),
+            }),
+            _ => Ok(Self { files: Vec::new(), ..own(Arm::built_in(name)?) }),
+        }
+    }
+
+    /// The drive file among its files.
+    pub fn drive_file(files: &[PathBuf]) -> Option<&PathBuf> {
+        let ends_so = |file: &&PathBuf| file.to_string_lossy().ends_with(&format!(".{DRIVES}"));
+        files.iter().skip(1).find(ends_so)
+    }
+
+    /// Takes over what the drive file beside the URDF or MJCF says.
+    fn take_drives(&mut self, path: PathBuf) -> Result<(), RobotError> {
+        let source = path.display().to_string();
+        let drives = DriveFile::read(&text_of(&path)?, &source)?;
+        let locked: Vec<&str> = self.notices.iter().flat_map(UrdfNotice::locked).collect();
+        drives.apply(&mut self.arm, &locked, &source)?;
+        let mut notices = std::mem::take(&mut self.notices);
+        notices.retain(|notice| !drives.settles(notice));
+        let (about_drives, others): (Vec<_>, Vec<_>) =
+            notices.into_iter().partition(UrdfNotice::is_about_drives);
+        self.notices = others;
+        let open = about_drives.into_iter().filter_map(|notice| drives.leaves(notice)).collect();
+        self.notices.push(UrdfNotice::DriveFile { file: source, open });
+        self.files.push(path);
+        Ok(())
+    }
+}
+
+fn text_of(path: &Path) -> Result<String, RobotError> {
+    std::fs::read_to_string(path)
+        .map_err(|source| RobotError::Read { file: path.display().to_string(), source })
+}

@@ -1,0 +1,133 @@
+//! Shapes of one body that share a capsule.
+
+use nalgebra::Vector3;
+
+use super::enclosure::{Ball, Enclosure};
+
+/// Shapes that one capsule holds.
+#[derive(Debug, Clone)]
+pub(super) struct Group {
+    /// The link of the first of them.
+    pub link: String,
+    balls: Vec<Ball>,
+    /// Along which the capsule may lie.
+    axes: Vec<Vector3<f64>>,
+    pub enclosure: Enclosure,
+}
+
+/// A common capsule may be so many times as large as two that it is for; overlapping ones have a smaller one.
+const WORTH: f64 = 1.25;
+/// Of more axes the first are tried.
+const AXES: usize = 12;
+/// Of more shapes in a body those of a link have one capsule.
+const MANY: usize = 40;
+
+impl Group {
+    /// Of one shape on the link, with its `balls` and axes; `None` without any ball.
+    pub(super) fn of(link: String, balls: Vec<Ball>, axes: Vec<Vector3<f64>>) -> Option<Self> {
+        let enclosure = Enclosure::of(&balls, &axes)?;
+        Some(Self { link, balls, axes, enclosure })
+    }
+
+    /// Around both capsules.
+    fn around(&self, other: &Self) -> Option<Enclosure> {
+        let ends = [self.enclosure.balls(), other.enclosure.balls()].concat();
+        let directions = [self, other].map(|one| {
+            let [from, to] = one.enclosure.ends_m;
+            (to - from).try_normalize(1e-9)
+        });
+        let directions: Vec<Vector3<f64>> = directions.into_iter().flatten().collect();
+        Enclosure::of(&ends, &directions)
+    }
+
+    /// How many times as large as both capsules the one around them is.
+    fn growth(&self, other: &Self) -> f64 {
+        let apart_m3 = self.enclosure.volume_m3() + other.enclosure.volume_m3();
+        self.around(other).map_or(f64::INFINITY, |both| both.volume_m3() / apart_m3)
+    }
+
+    fn take_in(&mut self, other: Self) {
+        let around = self.around(&other);
+        self.balls.extend(other.balls);
+        self.axes.extend(other.axes);
+        self.axes.truncate(AXES);
+        let found = around.into_iter().chain(Enclosure::of(&self.balls, &self.axes));
+        let smallest = found.min_by(|a, b| a.volume_m3().total_cmp(&b.volume_m3()));
+        self.enclosure = smallest.unwrap_or(self.enclosure);
+    }
+}
+
+/// The shapes of a body in groups, at most so many: together are those whose capsule is hardly larger than theirs were.
+pub(super) fn merged(mut groups: Vec<Group>, most: usize) -> Vec<Group> {
+    if groups.len() > MANY {
+        groups = by_link(groups);
+    }
+    loop {
+        let numbers = 0..groups.len();
+        let pairs = numbers.flat_map(|j| (0..j).map(move |i| (i, j)));
+        let growths = pairs.map(|(i, j)| (groups[i].growth(&groups[j]), i, j));
+        let Some((growth, i, j)) = growths.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+            return groups;
+        };
+        if growth > WORTH && groups.len() <= most {
+            return groups;
+        }
+        // The later of the two, so that the place of the other stays.
+        let other = groups.remove(j);
+        groups[i].take_in(other);
+    }
+}
+
+/// One group of all that stand behind each other and are of the same link.
+fn by_link(groups: Vec<Group>) -> Vec<Group> {
+    let mut links: Vec<Group> = Vec::new();
+    for group in groups {
+        match links.last_mut().filter(|last| last.link == group.link) {
+            Some(last) => last.take_in(group),
+            None => links.push(group),
+        }
+    }
+    links
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ball(link: &str, at_m: [f64; 3], radius_m: f64) -> Group {
+        let balls = vec![Ball { centre_m: Vector3::from(at_m), radius_m }];
+        Group::of(link.to_owned(), balls, Vec::new()).unwrap()
+    }
+
+    /// Balls in a row are a rod; of an angle each side is one.
+    #[test]
+    fn shapes_in_a_row_share_a_capsule() {
+        let row = |x: f64, y: f64| {
+            (0..8).map(move |k| ball("arm", [x * f64::from(k), y * f64::from(k), 0.0], 0.05))
+        };
+        let rod = merged(row(0.05, 0.0).collect(), 3);
+        assert_eq!(rod.len(), 1);
+        assert!((rod[0].enclosure.radius_m - 0.05).abs() < 1e-3, "{:?}", rod[0].enclosure);
+        let angle = merged(row(0.05, 0.0).chain(row(0.0, 0.05)).collect(), 3);
+        assert_eq!(angle.len(), 2);
+        assert!(angle.iter().all(|side| side.enclosure.radius_m < 0.08));
+        assert_eq!(merged(row(0.05, 0.0).chain(row(0.0, 0.05)).collect(), 1).len(), 1);
+        assert!(merged(Vec::new(), 3).is_empty());
+    }
+
+    /// What is far from each other shares one only where it must.
+    #[test]
+    fn no_more_capsules_than_are_wanted() {
+        let far = || (0..5).map(|k| ball("arm", [f64::from(k * k), 0.0, 0.0], 0.1));
+        assert_eq!(merged(far().collect(), 5).len(), 5);
+        let few = merged(far().collect(), 3);
+        assert_eq!(few.len(), 3);
+        let dots = (0..150).map(|k| {
+            let (link, y) = if k < 70 { ("left", 0.0) } else { ("right", 50.0) };
+            ball(link, [f64::from(k), y, f64::from(k % 2)], 0.1)
+        });
+        let of_links = merged(dots.collect(), 5);
+        let links: Vec<&str> = of_links.iter().map(|group| group.link.as_str()).collect();
+        assert_eq!(links, ["left", "right"]);
+    }
+}
