@@ -71,6 +71,11 @@ impl Match {
         self.gravity
     }
 
+    /// Share of the torque (rms) that the model leaves of joint `j`, noise apart.
+    pub(super) fn beyond_noise(&self, j: usize) -> f64 {
+        self.beyond_noise[j]
+    }
+
     /// On how many joints the model leaves more than `share` of the torque, noise apart.
     pub(super) fn joints_left_by(&self, share: f64) -> usize {
         self.beyond_noise.iter().filter(|left| **left > share).count()

@@ -56,7 +56,7 @@ const STRANGE: f64 = 0.5;
 const DESCRIBED: f64 = 0.9;
 /// Factor by which that of another joint may grow, which is noise.
 const GROWS: f64 = 1.2;
-/// Share of the torque (rms) of which a reading leaves less on every joint that it is about: one that turns the sign of friction and
+/// Share of the torque (rms, noise apart) of which a reading leaves less on every joint that it is about: one that turns the sign of friction and
 /// fits no better is another mistake.
 const FITS: f64 = 0.5;
 
@@ -102,8 +102,9 @@ impl Misreading {
         let least = if self.restores_gravity() { RESTORED } else { FALLS };
         largest > least.ln()
             && all > FALLS.ln() * joints.len() as f64
-            && joints.iter().all(|j| self.otherwise.left[*j] < FITS)
-            && gains.iter().all(|gain| *gain > -GROWS.ln())
+            && joints.iter().all(|j| self.otherwise.beyond_noise(*j) < FITS)
+            // What stands in the columns of a joint that is read otherwise is another torque: its share may be larger.
+            && (0..gains.len()).all(|j| joints.contains(&j) || gains[j] > -GROWS.ln())
     }
 
     /// Whether gravity has nothing to do with the description's as the log is read, and is the description's otherwise.

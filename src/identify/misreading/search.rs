@@ -10,9 +10,9 @@ use crate::robot::Arm;
 
 /// Least gain of a change, in Σ ln (‖e_j‖² / ‖τ_j‖²): one joint's residual halves.
 const LEAST_GAIN: f64 = 1.4;
-/// Share of a joint's torque (rms) that no law of friction and no soft gear leaves: where two joints or more have it left, several changes
-/// may be needed before any of them is worth it.
-const FAR: f64 = 0.2;
+/// Share of a joint's torque (rms) that laws of friction and soft gears leave of hardly more than one: where two joints or more have it left,
+/// several changes may be needed before any of them is worth it.
+const FAR: f64 = 0.1;
 /// Readings that are followed at once where the log is that far from the arm.
 const BREADTH: usize = 4;
 /// Changes one after the other that may gain nothing by themselves there.
@@ -57,7 +57,7 @@ pub fn best(arm: &Arm, bench: &Bench, as_read: &Match) -> (Reading, Match) {
     let reading = Reading::as_read(arm.dof());
     let root = Tried { reading, fit: as_read.clone(), cost: as_read.misfit() };
     let mut search = Search { possible: &possible, bench, seen: vec![root.reading.clone()] };
-    let is_far = as_read.joints_left_by(FAR) > 1;
+    let is_far = as_read.joints_left_by(FAR) > 1 || as_read.friction_pushes.contains(&true);
     let (breadth, patience) = if is_far { (BREADTH, PATIENCE) } else { (1, 0) };
     let mut best = search.from(root.clone(), breadth, patience);
     if is_far {
