@@ -158,7 +158,7 @@ fn an_arm_with_collision_shapes_is_kept_clear() {
         0,
         &[
             "8 capsules from the collision shapes of base_link, shoulder_pan_link, ",
-            "wherever the arm is: base_link and shoulder_lift_link, elbow_link and wrist_2_link",
+            "wherever the arm is: base_link and shoulder_lift_link 2, elbow_link and wrist_2_link",
         ],
     );
     let own = Arm::load(folder.path("arm.urdf").to_str().unwrap()).unwrap();
