@@ -2,11 +2,12 @@
 //!
 //! A mistake in the description of a log leaves no rigid body, no friction and no drive as it is, and what a diagnosis would find of
 //! it is nonsense of great certainty. Of the few ways in which logs and descriptions of arms differ in practice ([`Change`])
-//! those are looked for that make the model fit, the fewest that do:
+//! those are looked for that make the model fit, as few as are found to:
 //!
-//! minimise Σ_j ln (‖e_j‖² / ‖τ_j‖²) + λ × changes,   the likelihood of torques whose noise is not known, joint by joint,
+//! minimise Σ_j ln (‖e_j‖² / ‖τ_j‖²) + γ (1 − cos φ) + λ × changes,   the likelihood of torques whose noise is not known, joint by joint,
 //!
-//! e_j the residual of the full set of base parameters, and ten times as large where friction comes out as something that pushes. All
+//! e_j the residual of the full set of base parameters, and ten times as large where friction comes out as something that pushes; φ the
+//! angle between the first moments of the base set that are found and those described. All
 //! torques together with the other sign are other parameters and no other residual: that sign is told by friction, which brakes, and where
 //! there is next to none by gravity, which pulls as described. Parameters cannot stand in for the changes, so that the right ones are told by a residual that falls by far more than any law
 //! of friction takes from it.
