@@ -7,10 +7,10 @@
 //! minimise Σ_j ln (‖e_j‖² / ‖τ_j‖²) + γ (1 − cos φ) + λ × changes,   the likelihood of torques whose noise is not known, joint by joint,
 //!
 //! e_j the residual of the full set of base parameters, and ten times as large where friction comes out as something that pushes; φ the
-//! angle between the first moments of the base set that are found and those described. All
-//! torques together with the other sign are other parameters and no other residual: that sign is told by friction, which brakes, and where
-//! there is next to none by gravity, which pulls as described. Parameters cannot stand in for the changes, so that the right ones are told by a residual that falls by far more than any law
-//! of friction takes from it.
+//! angle between the first moments of the base set that are found and those described. All torques together with the other sign are other
+//! parameters and no other residual: that sign is told by friction, which brakes, and where there is next to none by gravity, which pulls
+//! as described. Parameters cannot stand in for the changes, so that the right ones are told by a residual that falls by far more than
+//! any law of friction takes from it.
 //!
 //! Enters: the arm and a log laid out for regression. Leaves: a [`Misreading`], or nothing.
 
