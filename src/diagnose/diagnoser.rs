@@ -210,7 +210,8 @@ impl<'a> Diagnoser<'a> {
         // What touched the arm, and friction that the null model lacks, bend the null model's gravity.
         let (theta, covariance) = (&extension.theta, &identification.covariance);
         let left = share_left(diagnosis, identification);
-        let doubt = Doubt::of(self.arm, self.set, &nominal, theta, &sigma, covariance)
+        let torque_nm = identification.residual().torque_nm();
+        let doubt = Doubt::of(self.arm, self.set, &nominal, theta, &sigma, covariance, &torque_nm)
             .or_else(|| Some(Doubt::question(unlike_remark(self.arm, &left)?)));
         if let Some(doubt) = doubt {
             diagnosis.sentences.insert(0, doubt.sentence);
@@ -369,13 +370,12 @@ struct Extended {
 
 /// Share of each joint's torque (rms) that is left beside the causes, without noise as far as the log tells it.
 fn share_left(diagnosis: &Diagnosis, identification: &Identification) -> Vec<f64> {
-    let null = identification.residual();
+    let torque_nm = identification.residual().torque_nm();
     let share = |j: usize| {
-        let torque_nm = 100.0 * null.rms_nm[j] / null.relative_percent[j];
         let noise_nm = diagnosis.noise_of_mean_nm.as_ref().map_or(0.0, |nm| nm[j]);
-        (diagnosis.after.rms_nm[j].powi(2) - noise_nm.powi(2)).max(0.0).sqrt() / torque_nm
+        (diagnosis.after.rms_nm[j].powi(2) - noise_nm.powi(2)).max(0.0).sqrt() / torque_nm[j]
     };
-    (0..null.rms_nm.len()).map(share).collect()
+    (0..torque_nm.len()).map(share).collect()
 }
 
 /// σ of the base parameters beside the causes; ∞ of the Coulomb friction of joints that have another law of friction beside it, so that

@@ -21,7 +21,8 @@ pub struct Doubt {
 
 impl Doubt {
     /// Of base parameters `theta` of `arm`, which are `nominal` by its description, known to `sigma` and with the `covariance` that
-    /// they have among each other. (Of a parameter that says nothing by itself, σ is infinite.)
+    /// they have among each other, from a log in which joints need `torque_nm` (rms). (Of a parameter that says nothing by itself, σ is
+    /// infinite.)
     pub fn of(
         arm: &Arm,
         set: &BaseSet,
@@ -29,9 +30,10 @@ impl Doubt {
         theta: &[f64],
         sigma: &[f64],
         covariance: &Covariance,
+        torque_nm: &[f64],
     ) -> Option<Self> {
         let gravity = gravity_remark(arm, set, nominal, theta, covariance);
-        let pushing = negative_friction_remark(arm, set, theta, sigma);
+        let pushing = negative_friction_remark(arm, set, theta, sigma, torque_nm);
         let is_reversed = gravity.as_ref().is_some_and(|g| g.is_reversed);
         let head = match (&pushing, is_reversed) {
             (Some(_), _) => Some("What was identified is physically impossible."),
@@ -73,7 +75,8 @@ mod tests {
             degrees_of_freedom: f64::INFINITY,
         };
         let doubt = |theta: &[f64]| {
-            Doubt::of(&arm, &set, &nominal, theta, &covariance.sigma(), &covariance)
+            let sigma = covariance.sigma();
+            Doubt::of(&arm, &set, &nominal, theta, &sigma, &covariance, &[1.0; 6])
         };
         assert_eq!(doubt(&nominal), None);
         let scaled = |prefix: &str, factor: f64| -> Vec<f64> {

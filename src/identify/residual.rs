@@ -26,6 +26,12 @@ impl Residual {
         }
     }
 
+    /// Rms of the torque per joint, Nm.
+    pub fn torque_nm(&self) -> Vec<f64> {
+        let pairs = self.rms_nm.iter().zip(&self.relative_percent);
+        pairs.map(|(rms_nm, percent)| 100.0 * rms_nm / percent).collect()
+    }
+
     /// Of the samples of `error` and `torque_nm` (same shape) for which `counts(joint, sample)`.
     pub fn of(
         error_nm: &JointSignals,

@@ -217,8 +217,17 @@ impl Result {
                 Some(Doubt { is_contradiction: true, sentence })
             }
             None => {
-                Doubt::of(arm, set, training.nominal, theta, &sigma, &identification.covariance)
-                    .or_else(|| Some(Doubt::question(unlike_remark(arm, &identification.left())?)))
+                let torque_nm = identification.residual().torque_nm();
+                Doubt::of(
+                    arm,
+                    set,
+                    training.nominal,
+                    theta,
+                    &sigma,
+                    &identification.covariance,
+                    &torque_nm,
+                )
+                .or_else(|| Some(Doubt::question(unlike_remark(arm, &identification.left())?)))
             }
         };
         warnings.extend(doubt.iter().map(|doubt| doubt.sentence.clone()));

@@ -1,4 +1,4 @@
-//! What actuators say of the torque that joints can have.
+//! What actuators give their joints.
 
 use std::collections::HashMap;
 
@@ -6,35 +6,69 @@ use super::compiler::Compiler;
 use super::defaults::{ACTUATORS, Defaults};
 use super::element::Element;
 use super::fault::MjcfFault;
-use super::joint::smaller;
+use super::joint::{POWERS, smaller};
 
 /// Numbers of `gear`: a joint has one, a site six.
 const GEARS: usize = 6;
+/// Numbers of `gainprm`.
+const GAINS: usize = 10;
 
-/// The largest torque (Nm, or N) of each joint that an actuator limits, by name. `forcerange` is that of the actuator, a motor
-/// without one gives what `ctrlrange` lets it be asked for; the joint has it times `gear`.
-pub(super) fn efforts(
+/// What all actuators of a joint give it together.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Actuated {
+    /// The largest torque, Nm (or force, N); infinite where one of them has no limit.
+    pub effort: f64,
+    /// Rotor inertia at the joint, kg m².
+    pub armature_kg_m2: f64,
+    /// Damping at the joint, Nm s/rad.
+    pub damping: f64,
+}
+
+/// By the joint's name. MuJoCo limits what an actuator is asked for (`ctrlrange`) and what it gives (`forcerange`), the joint has it times
+/// `gear`, and of several actuators the sum. Rotors and dampers of actuators turn with the motor: the joint has them times `gear`².
+pub(super) fn actuated(
     root: &Element,
     compiler: &Compiler,
     defaults: &Defaults,
-) -> Result<HashMap<String, f64>, MjcfFault> {
-    let mut efforts = HashMap::new();
+) -> Result<HashMap<String, Actuated>, MjcfFault> {
+    let mut actuated: HashMap<String, Actuated> = HashMap::new();
     let actuators = root.each("actuator").flat_map(|section| &section.children);
     for actuator in actuators.filter(|one| ACTUATORS.contains(&one.tag.as_str())) {
         let actuator = defaults.complete(actuator, None)?;
         let Some(joint) = actuator.text("joint").or(actuator.text("jointinparent")) else {
             continue;
         };
-        let mut range = compiler.limit(&actuator, "forcelimited", "forcerange")?;
-        if range.is_none() && actuator.tag == "motor" {
-            range = compiler.limit(&actuator, "ctrllimited", "ctrlrange")?;
+        let largest = |range: Option<[f64; 2]>| range.map_or(f64::INFINITY, smaller);
+        let mut force = largest(compiler.limit(&actuator, "forcelimited", "forcerange")?);
+        if let Some(gain) = gain_of_a_motor(&actuator)? {
+            let asked = largest(compiler.limit(&actuator, "ctrllimited", "ctrlrange")?);
+            force = force.min(gain * asked);
         }
-        let gear = actuator.up_to("gear", GEARS)?.map_or(1.0, |gear| gear[0]);
-        if let Some(range) = range {
-            // Of several actuators of one drive (position, velocity) the strongest counts.
-            let effort: &mut f64 = efforts.entry(joint.to_owned()).or_default();
-            *effort = effort.max(smaller(range) * gear.abs());
-        }
+        let gear = actuator.up_to("gear", GEARS)?.map_or(1.0, |gear| gear[0]).abs();
+        let damping = actuator.up_to("damping", POWERS)?.map_or(0.0, |damping| damping[0]);
+        actuator.refuse_negative("damping", damping)?;
+        let joint = actuated.entry(joint.to_owned()).or_default();
+        joint.effort += gear * force;
+        joint.armature_kg_m2 += gear * gear * actuator.not_negative("armature")?;
+        joint.damping += gear * gear * damping;
     }
-    Ok(efforts)
+    Ok(actuated)
+}
+
+/// Force per unit of what is asked for, of an actuator that gives nothing else; `None` for all others. As `<general>` MuJoCo itself writes
+/// motors.
+fn gain_of_a_motor(actuator: &Element) -> Result<Option<f64>, MjcfFault> {
+    let is_plain =
+        |attribute: &str, plain: &str| actuator.text(attribute).is_none_or(|kind| kind == plain);
+    match actuator.tag.as_str() {
+        "motor" => Ok(Some(1.0)),
+        "general"
+            if is_plain("biastype", "none")
+                && is_plain("dyntype", "none")
+                && is_plain("gaintype", "fixed") =>
+        {
+            Ok(Some(actuator.up_to("gainprm", GAINS)?.map_or(1.0, |gain| gain[0].abs())))
+        }
+        _ => Ok(None),
+    }
 }

@@ -3,8 +3,9 @@
 use std::collections::{HashMap, HashSet};
 
 use nalgebra::Vector3;
-use urdf_rs::{Axis, Inertial, JointLimit, JointType, Link, LinkName, Pose, Robot, Vec3};
+use urdf_rs::{Axis, Dynamics, Inertial, JointLimit, JointType, Link, LinkName, Pose, Robot, Vec3};
 
+use super::actuator::Actuated;
 use super::collision::{MeshAssets, shape};
 use super::compiler::Compiler;
 use super::defaults::Defaults;
@@ -39,8 +40,8 @@ struct Hold {
 pub(super) struct Bodies<'a> {
     compiler: &'a Compiler,
     defaults: &'a Defaults,
-    /// Torque limits by joint.
-    efforts: &'a HashMap<String, f64>,
+    /// What actuators give, by joint.
+    actuated: &'a HashMap<String, Actuated>,
     /// Meshes by name.
     meshes: &'a MeshAssets,
     /// Links without inertia, and joints.
@@ -57,6 +58,8 @@ pub(super) struct Bodies<'a> {
     pub left_out: Vec<(LeftOut, String)>,
     /// Bodies whose weight is taken away.
     pub weightless: HashSet<String>,
+    /// Equalities that hold bodies together beside the joints.
+    pub loops: usize,
     /// What links collide with.
     pub shapes: Vec<LinkShape>,
 }
@@ -67,13 +70,13 @@ impl<'a> Bodies<'a> {
         root: &Element,
         compiler: &'a Compiler,
         defaults: &'a Defaults,
-        efforts: &'a HashMap<String, f64>,
+        actuated: &'a HashMap<String, Actuated>,
         meshes: &'a MeshAssets,
     ) -> Result<Self, MjcfFault> {
         let mut bodies = Self {
             compiler,
             defaults,
-            efforts,
+            actuated,
             meshes,
             robot: Robot {
                 name: root.text("model").unwrap_or_default().to_owned(),
@@ -88,6 +91,7 @@ impl<'a> Bodies<'a> {
             references: HashMap::new(),
             left_out: Vec::new(),
             weightless: HashSet::new(),
+            loops: 0,
             shapes: Vec::new(),
         };
         bodies.link(WORLD.to_owned(), Ok(Inertial::default()));
@@ -142,7 +146,8 @@ impl<'a> Bodies<'a> {
         let Part { element, frame, childclass } = body;
         let name = match element.text("name") {
             Some(name) => name.to_owned(),
-            None => format!("unnamed body ({})", element.line()),
+            // Several may stand in one line.
+            None => format!("unnamed body {} ({})", self.robot.links.len(), element.line()),
         };
         let parts = self.parts(element, element.text("childclass").or(*childclass))?;
         let pose = frame.compose(&pose(element, self.compiler)?);
@@ -199,19 +204,21 @@ impl<'a> Bodies<'a> {
     }
 
     fn joint(&mut self, name: String, joint: Joint, origin: &Placement, parent: &str, child: &str) {
-        let mut limit = joint.limit;
-        // What the joint itself says comes first.
-        if limit.effort == 0.0 {
-            limit.effort = self.efforts.get(&name).copied().unwrap_or(0.0);
-        }
-        self.armature_kg_m2.insert(name.clone(), joint.armature_kg_m2);
+        let unlimited = Actuated { effort: f64::INFINITY, ..Actuated::default() };
+        let actuated = self.actuated.get(&name).copied().unwrap_or(unlimited);
+        let effort = joint.effort.min(actuated.effort);
+        // URDF says 0 where there is no limit.
+        let effort = if effort.is_finite() { effort } else { 0.0 };
+        let damping = joint.dynamics.damping + actuated.damping;
+        let armature_kg_m2 = joint.armature_kg_m2 + actuated.armature_kg_m2;
+        self.armature_kg_m2.insert(name.clone(), armature_kg_m2);
         self.references.insert(name.clone(), joint.reference);
         self.left_out.extend(joint.left_out.iter().map(|what| (*what, name.clone())));
         self.robot.joints.push(urdf_rs::Joint {
             joint_type: joint.kind,
             axis: Axis { xyz: Vec3(joint.axis.into()) },
-            limit,
-            dynamics: Some(joint.dynamics),
+            limit: JointLimit { effort, ..joint.limit },
+            dynamics: Some(Dynamics { damping, ..joint.dynamics }),
             ..joint_between(name, origin, parent, child)
         });
     }

@@ -9,7 +9,7 @@ use super::fault::MjcfFault;
 const MAIN: &str = "main";
 
 /// Kinds of actuators; MuJoCo keeps one set of defaults for all of them.
-pub(super) const ACTUATORS: [&str; 10] = [
+pub(super) const ACTUATORS: [&str; 11] = [
     "general",
     "motor",
     "position",
@@ -20,6 +20,7 @@ pub(super) const ACTUATORS: [&str; 10] = [
     "muscle",
     "adhesion",
     "dcmotor",
+    "pid",
 ];
 
 /// Attributes by what they are for.

@@ -80,9 +80,10 @@ impl Includes {
         })?;
         let root = self.element(document.root_element(), file, depth)?;
         let is_included = file.name.is_some();
+        // An included file may begin with anything.
         match root.tag.as_str() {
             "mujoco" => Ok(root),
-            "mujocoinclude" if is_included => Ok(root),
+            _ if is_included => Ok(root),
             _ => Err(MjcfFault::NotMjcf { place: root.place() }),
         }
     }
@@ -124,8 +125,8 @@ impl Includes {
         depth: usize,
     ) -> Result<Vec<Element>, MjcfFault> {
         let name = include.required("file")?;
-        let near = from.folder.join(name);
-        let path = if near.exists() { near } else { self.folder.join(name) };
+        let beside_main = self.folder.join(name);
+        let path = if beside_main.exists() { beside_main } else { from.folder.join(name) };
         let file = || path.display().to_string();
         if self.known.contains(&known(&path)) {
             return Err(MjcfFault::IncludedTwice { place: include.place(), file: file() });

@@ -48,3 +48,14 @@ pub(super) fn couple(
     }
     Ok(left_out)
 }
+
+/// How many equalities hold bodies together beside the joints.
+pub(super) fn loops(root: &Element) -> Result<usize, MjcfFault> {
+    let mut count = 0;
+    for section in root.each("equality") {
+        for holding in section.each("connect").chain(section.each("weld")) {
+            count += usize::from(holding.switch("active")? != Some(false));
+        }
+    }
+    Ok(count)
+}

@@ -6,8 +6,7 @@ use super::words::arm_fault;
 use crate::robot::urdf::UrdfFault;
 
 /// What to do with a model that only MuJoCo itself can work out.
-const COMPILE: &str =
-    "load the model in MuJoCo and save it (mj_saveLastXML): what it writes is read here";
+const COMPILE: &str = "put saveinertial=\"true\" into <compiler>, load the model in MuJoCo and save it (mj_saveLastXML): what it writes then is read here";
 
 /// A text that is no MJCF, or one that is not of a serial arm of rigid bodies. A `place` is such as `line 12: joint "elbow"`.
 #[derive(Debug, Clone, PartialEq, Error)]

@@ -101,6 +101,10 @@ impl BodyInertia {
 
     /// At least what the compiler asks of every body.
     fn bounded(mut self, compiler: &Compiler) -> Self {
+        // A frame stays one, though MuJoCo gives it the least mass as well.
+        if self.mass_kg == 0.0 {
+            return self;
+        }
         self.mass_kg = self.mass_kg.max(compiler.least_mass_kg);
         if !compiler.balances && compiler.least_moment_kg_m2 == 0.0 {
             return self;

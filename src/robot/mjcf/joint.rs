@@ -11,7 +11,7 @@ use super::pose::{about, direction, shift};
 use crate::robot::arm::{Placement, snap};
 
 /// Numbers of `damping` and `stiffness`: that in proportion, and those of higher powers.
-const POWERS: usize = 8;
+pub(super) const POWERS: usize = 8;
 
 /// A joint in the frame of the body that it moves.
 #[derive(Debug)]
@@ -23,7 +23,10 @@ pub(super) struct Joint {
     pub axis: Vector3<f64>,
     /// Position that the joint has in the pose of the file, rad or m.
     pub reference: f64,
+    /// Without its torque.
     pub limit: JointLimit,
+    /// The largest torque (Nm, or N) that actuators together may have; infinite without a limit.
+    pub effort: f64,
     pub dynamics: Dynamics,
     /// Rotor inertia at the joint, kg m².
     pub armature_kg_m2: f64,
@@ -72,16 +75,16 @@ impl Joint {
         if stiffness.iter().any(|part| *part != 0.0) {
             left_out.push(LeftOut::Stiffness);
         }
+        let tuned = joint.up_to("springdamper", 2)?.unwrap_or_default();
+        if tuned.iter().any(|part| *part > 0.0) {
+            left_out.push(LeftOut::SpringDamper);
+        }
         Ok(Self {
             anchor_m,
             axis,
             reference: joint.number("ref")?.unwrap_or(0.0) * unit,
-            limit: JointLimit {
-                lower: lower * unit,
-                upper: upper * unit,
-                effort: effort.map_or(0.0, smaller),
-                ..JointLimit::default()
-            },
+            limit: JointLimit { lower: lower * unit, upper: upper * unit, ..JointLimit::default() },
+            effort: effort.map_or(f64::INFINITY, smaller),
             dynamics: Dynamics {
                 damping: damping[0],
                 friction: joint.not_negative("frictionloss")?,

@@ -12,6 +12,11 @@ pub enum MjcfNotice {
         /// What all joints were given.
         velocity_rad_s: f64,
     },
+    /// Bodies that are held together beside the joints: the arm is read as if they were not.
+    Loops {
+        /// How many.
+        count: usize,
+    },
     /// Something about joints that is no part of an [`Arm`](crate::robot::Arm).
     LeftOut {
         /// What.
@@ -31,6 +36,8 @@ pub enum MjcfNotice {
 pub enum LeftOut {
     /// A spring.
     Stiffness,
+    /// A spring and a damper, by the time constant that they have together.
+    SpringDamper,
     /// Damping that grows faster than the speed.
     HigherDamping,
     /// A joint that an `<equality>` holds in its place.
@@ -43,6 +50,9 @@ impl fmt::Display for LeftOut {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Stiffness => "springs (stiffness) are no part of the arm",
+            Self::SpringDamper => {
+                "springs and dampers by their time constant (springdamper) are not read, so that damping there is not MuJoCo's"
+            }
             Self::HigherDamping => "of damping only the first number is read, which is in proportion to the speed",
             Self::Held => "an <equality> that holds a joint in its place is not read",
             Self::Curve => "of polycoef only the first two numbers are read: a joint follows another in proportion",
@@ -60,6 +70,11 @@ impl fmt::Display for MjcfNotice {
             Self::NoSpeedLimits { velocity_rad_s } => write!(
                 f,
                 "MJCF has no speed limits, taken as {velocity_rad_s:.4} rad/s for all joints"
+            ),
+            Self::Loops { count } => write!(
+                f,
+                "{count} <connect> or <weld> of <equality> are not read: where they close a loop of the arm's bodies, it is no serial arm and \
+                 what is identified of it is not its own"
             ),
             Self::LeftOut { what, joints } => write!(f, "{what}: {}", joints.join(", ")),
             Self::GravityCompensation { bodies } => write!(

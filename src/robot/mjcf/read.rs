@@ -1,17 +1,18 @@
 //! From the text of an MJCF to an [`Arm`].
 
-use std::path::PathBuf;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 
-use super::actuator::efforts;
+use super::actuator::actuated;
 use super::body::Bodies;
 use super::collision::meshes;
 use super::compiler::Compiler;
 use super::defaults::Defaults;
 use super::document::document;
 use super::element::Element;
-use super::equality::couple;
+use super::equality::{couple, loops};
 use super::fault::MjcfFault;
 use super::notice::{LeftOut, MjcfNotice};
 use crate::robot::arm::Arm;
@@ -47,7 +48,8 @@ pub struct MjcfArm {
 /// - **Bodies** are links; their inertia is that of `<inertial>`, or of geoms that are primitive solids, as `<compiler>` says.
 ///   Named sites are frames, as bodies without mass are.
 /// - **Drives**: `armature` is the rotor inertia, `damping` rv, `frictionloss` rc. The torque limit is the joint's
-///   `actuatorfrcrange`, or else an actuator's `forcerange` (of a motor without one its `ctrlrange`) times its gear.
+///   `actuatorfrcrange`, or what its actuators give where that is less: `gear` times the `forcerange`, or of a motor the `ctrlrange` where
+///   that is less. `armature` and `damping` of actuators count as well, times `gear`².
 /// - **Default classes**, `childclass`, `<include>`, `<frame>`, and the ways to write orientations are as in MuJoCo. Copies
 ///   (`<replicate>`), attached models, deformable bodies and the mass of meshes on moving bodies are refused.
 /// - **Collision shapes** are the geoms with a `contype` or `conaffinity`, those of the world too, but for planes and height fields.
@@ -73,11 +75,16 @@ fn read(text: &str, source: &str, last_body: Option<&str>) -> Result<MjcfArm, Mj
     let (root, included) = document(text, source)?;
     let compiler = Compiler::of(&root)?;
     let defaults = Defaults::of(&root)?;
-    let efforts = efforts(&root, &compiler, &defaults)?;
+    let actuated = actuated(&root, &compiler, &defaults)?;
     let meshes = meshes(&root, &compiler, &defaults);
-    let mut bodies = Bodies::of(&root, &compiler, &defaults, &efforts, &meshes)?;
+    let mut bodies = Bodies::of(&root, &compiler, &defaults, &actuated, &meshes)?;
+    if bodies.robot.name.is_empty() {
+        let stem = Path::new(source).file_stem().unwrap_or_default();
+        bodies.robot.name = stem.to_string_lossy().into_owned();
+    }
     let coupled = couple(&root, &mut bodies.robot, &bodies.references)?;
     bodies.left_out.extend(coupled);
+    bodies.loops = loops(&root)?;
     give_inertias(&mut bodies, source, last_body)?;
     let mut read = arm_of(&bodies.robot, source, last_body).map_err(MjcfFault::Arm)?;
     read.watch(&bodies.shapes, source);
@@ -97,16 +104,19 @@ fn give_inertias(
     source: &str,
     last_body: Option<&str>,
 ) -> Result<(), MjcfFault> {
-    let moving = moving_links(&bodies.robot, source, last_body).map_err(MjcfFault::Arm)?;
+    let mut faults = HashMap::new();
     let inertias = std::mem::take(&mut bodies.inertias);
     for (link, inertia) in bodies.robot.links.iter_mut().zip(inertias) {
         match inertia {
             Ok(inertial) => link.inertial = inertial,
-            Err(fault) if moving.contains(&link.name) => return Err(fault),
-            Err(_) => {}
+            Err(fault) => {
+                faults.insert(link.name.clone(), fault);
+            }
         }
     }
-    Ok(())
+    // Links that are proposed as the last one of an arm are tried, for which they need their inertia.
+    let moving = moving_links(&bodies.robot, source, last_body).map_err(MjcfFault::Arm)?;
+    moving.iter().find_map(|link| faults.remove(link)).map_or(Ok(()), Err)
 }
 
 /// Gravity in the world, m/s².
@@ -134,6 +144,9 @@ fn told(
     if arm.gravity_m_s2 == Vector3::zeros() {
         own.push(MjcfNotice::Weightless);
     }
+    if bodies.loops > 0 {
+        own.push(MjcfNotice::Loops { count: bodies.loops });
+    }
     let mut no_speed_limits = None;
     for notice in noticed {
         match notice {
@@ -150,7 +163,13 @@ fn told(
         }
     }
     own.extend(no_speed_limits);
-    for what in [LeftOut::Stiffness, LeftOut::HigherDamping, LeftOut::Held, LeftOut::Curve] {
+    for what in [
+        LeftOut::Stiffness,
+        LeftOut::SpringDamper,
+        LeftOut::HigherDamping,
+        LeftOut::Held,
+        LeftOut::Curve,
+    ] {
         let having = bodies.left_out.iter().filter(|(one, _)| *one == what);
         let joints: Vec<String> = having
             .map(|(_, joint)| joint.clone())

@@ -256,7 +256,7 @@ fn limits_are_those_that_mujoco_keeps() {
 }
 
 #[test]
-fn the_torque_limit_is_the_joints_or_else_its_actuators() {
+fn the_torque_limit_is_the_least_of_the_joints_and_its_actuators() {
     let of = |joint: &str, actuators: &str| {
         let sections = format!("<actuator>{actuators}</actuator>");
         let joint = format!("{BODY}<joint name=\"j\" {joint}/>");
@@ -264,12 +264,40 @@ fn the_torque_limit_is_the_joints_or_else_its_actuators() {
     };
     let motor = r#"<motor joint="j" gear="-10" forcerange="-3 5" ctrlrange="-1 1"/>"#;
     assert_eq!(of(r#"actuatorfrcrange="-8 9""#, motor), 8.0);
-    assert_eq!(of("", motor), 30.0);
+    assert_eq!(of("", motor), 10.0);
+    assert_eq!(of(r#"actuatorfrcrange="-80 80""#, motor), 10.0);
+    let general = r#"<general joint="j" ctrlrange="-1 1" gainprm="3" gear="20"/>"#;
+    assert_eq!(of("", general), 60.0);
     assert_eq!(of("", r#"<motor joint="j" ctrlrange="-1 1" gear="20"/>"#), 20.0);
     assert_eq!(of("", r#"<position joint="j" ctrlrange="-1 1"/>"#), f64::INFINITY);
     assert_eq!(of("", r#"<position joint="other" forcerange="-1 1"/>"#), f64::INFINITY);
     let two = r#"<position joint="j" forcerange="-4 4"/><velocity joint="j" forcerange="0 6"/>"#;
-    assert_eq!(of("", two), 6.0);
+    assert_eq!(of("", two), 10.0);
+}
+
+/// What turns with the motor is felt at the joint times the square of the gear: MuJoCo 4.0 moves this one as if it had 1.02 kg m² and
+/// 10.5 Nm s/rad.
+#[test]
+fn rotors_and_dampers_of_actuators_count() {
+    let sections =
+        r#"<actuator><motor joint="j" gear="100" armature="1e-4" damping="0.001"/></actuator>"#;
+    let joint = r#"<joint name="j" armature="0.02" damping="0.5"/>"#;
+    let drive = read(&one(sections, "", &format!("{BODY}{joint}"))).arm.joints[0].drive;
+    assert_abs_diff_eq!(drive.rotor_inertia_kg_m2, 1.02, epsilon = 1e-12);
+    assert_abs_diff_eq!(drive.viscous_nm_s_rad, 10.5, epsilon = 1e-12);
+}
+
+#[test]
+fn what_is_no_part_of_a_serial_arm_is_told() {
+    let told = |sections: &str, joint: &str| {
+        let text = one(sections, "", &format!("{BODY}<joint name=\"j\" {joint}/>"));
+        let notices = read(&text).notices.into_iter().map(|notice| notice.to_string());
+        notices.collect::<Vec<_>>().join("\n")
+    };
+    assert!(told("", r#"springdamper="0.1 1""#).contains("time constant (springdamper)"));
+    let weld =
+        r#"<equality><weld body1="a" body2="b"/><connect body1="a" active="false"/></equality>"#;
+    assert!(told(weld, "").contains("1 <connect> or <weld>"), "{}", told(weld, ""));
 }
 
 #[test]

@@ -126,6 +126,7 @@ impl UrdfNotice {
                 | Self::Drives { .. }
                 | Self::NoFriction { .. }
                 | Self::AssumedAcceleration { .. }
+                | Self::Mjcf(MjcfNotice::Weightless)
         )
     }
 }

@@ -34,6 +34,7 @@ fn an_arm_is_named_by_its_last_body() {
     let refused =
         |last: &str| read_mjcf_up_to(&gripper(), "toy.xml", last).unwrap_err().to_string();
     assert!(refused("tool").contains("no body or site \"tool\""), "{}", refused("tool"));
+    assert!(refused("tool").contains("name the last body of the arm: a"), "{}", refused("tool"));
     let finger = refused("left");
     assert!(finger.contains("on the way to \"left\"") && finger.contains("a slide"), "{finger}");
     let world = refused("world");
