@@ -76,7 +76,7 @@ fn a_mujoco_model_is_a_robot() {
     alone.complains(
         0,
         &[
-            "MJCF has no speed limits",
+            "no speed limit, taken as 3.1416 rad/s",
             "no gear ratio and no torque constant given, taken as 1 and 1 Nm/A",
         ],
     );

@@ -8,7 +8,7 @@ use super::arm_result::ArmResult;
 use super::{CommandResult, Outcome};
 use crate::output::{OutputError, check_outputs, write_atomically};
 use crate::robot::export::{OwnUrdf, drive_file, drive_file_of_urdf, mjcf_of_urdf, own_urdf, urdf};
-use crate::robot::{LoadedArm, RobotError};
+use crate::robot::{LoadedArm, RobotError, text_of};
 
 /// Write an identified arm as URDF or MJCF.
 #[derive(Debug, Args)]
@@ -107,11 +107,6 @@ fn drives_of(result: &ArmResult) -> Result<String, RobotError> {
         }
         None => drive_file_of_urdf(arm, offsets_nm, "", ""),
     }
-}
-
-fn text_of(path: &Path) -> Result<String, RobotError> {
-    std::fs::read_to_string(path)
-        .map_err(|source| RobotError::Read { file: path.display().to_string(), source })
 }
 
 fn write(path: &Path, text: &str) -> Result<(), OutputError> {

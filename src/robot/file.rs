@@ -15,6 +15,7 @@ use super::place::Place;
 
 pub(super) use clearance::{BoxEntry, CapsuleEntry, ClearanceKeys, pair};
 pub use loaded::LoadedArm;
+pub(crate) use loaded::text_of;
 
 /// Arms built in, by the name given to `--robot`.
 const BUILT_IN: [(&str, &str); 4] = [

@@ -20,6 +20,7 @@ mod urdf;
 pub(crate) use arm::ON_AXIS;
 pub use arm::{Arm, Capsule, CellBox, Clearance, Drive, Joint, Limits, LinkBounds, Placement};
 pub use error::RobotError;
+pub(crate) use file::text_of;
 pub use file::{LoadedArm, built_in_names};
 pub use inertia::LinkInertia;
 pub use kinematics::{Kinematics, KinematicsDifference};

@@ -40,7 +40,9 @@ struct DriveEntry {
     viscous_nm_s_rad: Option<f64>,
     coulomb_nm: Option<f64>,
     torque_offset_nm: Option<f64>,
+    velocity_rad_s: Option<f64>,
     acceleration_rad_s2: Option<f64>,
+    torque_nm: Option<f64>,
     gear_ratio: Option<f64>,
     torque_constant_nm_a: Option<f64>,
     mass_bounds_kg: Option<[f64; 2]>,
@@ -66,8 +68,17 @@ pub fn drive_file_of_urdf(
     let DriveFile { robot, gravity_m_s2, friction_epsilon_rad_s, torque_offsets, joint, .. } =
         DriveFile::of(arm, offsets_nm);
     let of_arm = |entry: &DriveEntry| arm.joints.iter().any(|joint| joint.name == entry.name);
-    let others = own.joint.into_iter().filter(|entry| !of_arm(entry));
-    let joint = joint.into_iter().chain(others).collect();
+    // Limits that its author set stay where they were set: the URDF keeps its own.
+    let limited = joint.into_iter().map(|entry| {
+        let before = own.joint.iter().find(|before| before.name == entry.name);
+        DriveEntry {
+            velocity_rad_s: before.and_then(|before| before.velocity_rad_s),
+            torque_nm: before.and_then(|before| before.torque_nm),
+            ..entry
+        }
+    });
+    let mut joint: Vec<DriveEntry> = limited.collect();
+    joint.extend(own.joint.into_iter().filter(|entry| !of_arm(entry)));
     let file = DriveFile {
         robot,
         gravity_m_s2,
@@ -199,6 +210,15 @@ impl DriveFile {
                 let joints = self.without(joints, |e| e.viscous_nm_s_rad.or(e.coulomb_nm));
                 (!joints.is_empty()).then_some(UrdfNotice::NoFriction { joints })
             }
+            UrdfNotice::AssumedVelocity { joints, velocity_rad_s } => {
+                let joints = self.without(joints, |e| e.velocity_rad_s);
+                (!joints.is_empty())
+                    .then_some(UrdfNotice::AssumedVelocity { joints, velocity_rad_s })
+            }
+            UrdfNotice::NoTorqueLimit { joints } => {
+                let joints = self.without(joints, |e| e.torque_nm);
+                (!joints.is_empty()).then_some(UrdfNotice::NoTorqueLimit { joints })
+            }
             UrdfNotice::AssumedAcceleration { joints, acceleration_rad_s2 } => {
                 let joints = self.without(joints, |e| e.acceleration_rad_s2);
                 (!joints.is_empty())
@@ -232,6 +252,9 @@ impl DriveEntry {
             viscous_nm_s_rad: Some(drive.viscous_nm_s_rad),
             coulomb_nm: Some(drive.coulomb_nm),
             torque_offset_nm: Some(torque_offset_nm),
+            // The file beside it has these.
+            velocity_rad_s: None,
+            torque_nm: None,
             acceleration_rad_s2: Some(limits.acceleration_rad_s2),
             gear_ratio: Some(drive.gear_ratio),
             torque_constant_nm_a: Some(drive.torque_constant_nm_a),
@@ -256,6 +279,10 @@ impl DriveEntry {
         take(&mut drive.torque_constant_nm_a, self.torque_constant_nm_a, |value| {
             place.positive("torque_constant_nm_a", value)
         })?;
+        take(&mut limits.velocity_rad_s, self.velocity_rad_s, |value| {
+            place.positive("velocity_rad_s", value)
+        })?;
+        take(&mut limits.torque_nm, self.torque_nm, |value| place.positive("torque_nm", value))?;
         take(&mut limits.acceleration_rad_s2, self.acceleration_rad_s2, |value| {
             place.positive("acceleration_rad_s2", value)
         })?;
@@ -312,6 +339,28 @@ mod tests {
         apply_drive_file(&mut arm, "gravity_m_s2 = [0.0, 9.81, 0.0]", "x.drives.toml").unwrap();
         wanted.gravity_m_s2 = Vector3::new(0.0, 9.81, 0.0);
         assert_eq!(arm, wanted);
+    }
+
+    /// What MJCF has no place for, and URDFs often leave out.
+    #[test]
+    fn limits_by_hand_come_first() {
+        let mut wanted = ur5();
+        wanted.joints[1].limits.velocity_rad_s = 1.25;
+        wanted.joints[1].limits.torque_nm = 87.0;
+        let text =
+            |limits: &str| format!("[[joint]]\nname = \"{}\"\n{limits}\n", ur5().joints[1].name);
+        let limits = text("velocity_rad_s = 1.25\ntorque_nm = 87.0");
+        let mut arm = ur5();
+        apply_drive_file(&mut arm, &limits, "x.drives.toml").unwrap();
+        assert_eq!(arm, wanted);
+        let file = DriveFile::read(&limits, "x.drives.toml").unwrap();
+        let notice = UrdfNotice::NoTorqueLimit { joints: names(&arm) };
+        let Some(UrdfNotice::NoTorqueLimit { joints }) = file.leaves(notice) else { panic!() };
+        assert_eq!(joints, [&names(&arm)[..1], &names(&arm)[2..]].concat());
+        for limit in ["torque_nm = 0.0", "velocity_rad_s = -1.0", "velocity_rad_s = inf"] {
+            let refused = apply_drive_file(&mut ur5(), &text(limit), "x.drives.toml");
+            assert!(refused.is_err(), "{limit}");
+        }
     }
 
     #[test]

@@ -100,7 +100,8 @@ impl LoadedArm {
     }
 }
 
-fn text_of(path: &Path) -> Result<String, RobotError> {
+/// The text of a file that says what a robot is.
+pub(crate) fn text_of(path: &Path) -> Result<String, RobotError> {
     std::fs::read_to_string(path)
         .map_err(|source| RobotError::Read { file: path.display().to_string(), source })
 }

@@ -7,11 +7,6 @@ use std::fmt;
 pub enum MjcfNotice {
     /// The file switches gravity off.
     Weightless,
-    /// MJCF has no speed limits.
-    NoSpeedLimits {
-        /// What all joints were given.
-        velocity_rad_s: f64,
-    },
     /// Bodies that are held together beside the joints: the arm is read as if they were not.
     Loops {
         /// How many.
@@ -66,10 +61,6 @@ impl fmt::Display for MjcfNotice {
             Self::Weightless => write!(
                 f,
                 "the file switches gravity off; say gravity_m_s2 in NAME.drives.toml beside it if the arm has weight"
-            ),
-            Self::NoSpeedLimits { velocity_rad_s } => write!(
-                f,
-                "MJCF has no speed limits, taken as {velocity_rad_s:.4} rad/s for all joints"
             ),
             Self::Loops { count } => write!(
                 f,

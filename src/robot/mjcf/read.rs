@@ -147,13 +147,9 @@ fn told(
     if bodies.loops > 0 {
         own.push(MjcfNotice::Loops { count: bodies.loops });
     }
-    let mut no_speed_limits = None;
     for notice in noticed {
         match notice {
             UrdfNotice::Gravity { .. } => {}
-            UrdfNotice::AssumedVelocity { velocity_rad_s, .. } => {
-                no_speed_limits = Some(MjcfNotice::NoSpeedLimits { velocity_rad_s });
-            }
             UrdfNotice::Drives { mut rotor_inertia, gear_ratio, torque_constant } => {
                 let has_none = |joint: &String| bodies.armature_kg_m2.get(joint) == Some(&0.0);
                 rotor_inertia.retain(has_none);
@@ -162,7 +158,6 @@ fn told(
             other => notices.push(other),
         }
     }
-    own.extend(no_speed_limits);
     for what in [
         LeftOut::Stiffness,
         LeftOut::SpringDamper,

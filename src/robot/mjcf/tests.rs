@@ -10,7 +10,7 @@ use approx::assert_abs_diff_eq;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use proptest::prelude::*;
 
-use super::pose::{from_z, rpy_rad};
+use super::pose::from_z;
 use super::{MjcfArm, MjcfFault, MjcfNotice, read_mjcf};
 use crate::robot::export::mjcf;
 use crate::robot::{Arm, FixedFrame, Frames, Placement, RobotError, UrdfNotice, read_urdf};
@@ -102,8 +102,9 @@ fn a_plain_chain_is_the_arm_of_the_same_urdf() {
     let expected = read_urdf(same, "toy.urdf").unwrap();
     assert_eq!(arm, expected.arm);
     assert_eq!(frames, expected.frames);
-    let no_speed = MjcfNotice::NoSpeedLimits { velocity_rad_s: PI };
-    assert!(notices.contains(&UrdfNotice::Mjcf(no_speed)));
+    let joints = arm.joints.iter().map(|joint| joint.name.clone()).collect();
+    let no_speed = UrdfNotice::AssumedVelocity { joints, velocity_rad_s: PI };
+    assert!(notices.contains(&no_speed));
     let standing = notices.iter().filter(|n| matches!(n, UrdfNotice::StandingMass { .. }));
     assert_eq!(standing.count(), 1);
 }
@@ -189,7 +190,8 @@ proptest! {
         yaw in -PI..PI,
     ) {
         let rotation = Rotation3::from_euler_angles(roll, pitch, yaw).into_inner();
-        let [roll, pitch, yaw] = rpy_rad(&rotation);
+        let placement = Placement { rotation, translation_m: Vector3::zeros() };
+        let [roll, pitch, yaw] = placement.rpy_rad();
         let back = Rotation3::from_euler_angles(roll, pitch, yaw).into_inner();
         prop_assert!((rotation - back).amax() < 1e-14, "{rotation} {back}");
     }

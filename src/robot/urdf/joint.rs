@@ -11,7 +11,7 @@ use super::read::Reader;
 use crate::robot::arm::{Drive, Limits, Placement};
 
 /// Speed limit where the file gives none: 180 °/s, usual for arms of this size.
-const ASSUMED_VELOCITY_RAD_S: f64 = PI;
+pub(super) const ASSUMED_VELOCITY_RAD_S: f64 = PI;
 /// Acceleration limit where the file gives none; the built-in arms' as well.
 pub(super) const ASSUMED_ACCELERATION_RAD_S2: f64 = 10.0;
 /// Axes such as (0.577, 0.577, 0.577) have unit length to three digits.
@@ -73,20 +73,16 @@ impl Reader {
             let (lower_rad, upper_rad) = (limit.lower, limit.upper);
             return Err(UrdfFault::Range { joint: name(), lower_rad, upper_rad });
         };
-        // Zero is how files without the number come out, and how many write "unknown".
-        let given = |value: f64| (value > 0.0 && value.is_finite()).then_some(value);
-        let velocity_rad_s = given(limit.velocity).unwrap_or_else(|| {
-            let velocity_rad_s = ASSUMED_VELOCITY_RAD_S;
-            self.notices.push(UrdfNotice::AssumedVelocity { joint: name(), velocity_rad_s });
-            velocity_rad_s
-        });
-        let torque_nm = given(limit.effort).unwrap_or_else(|| {
-            self.notices.push(UrdfNotice::NoTorqueLimit { joint: name() });
-            f64::INFINITY
-        });
+        let velocity_rad_s = given(limit.velocity).unwrap_or(ASSUMED_VELOCITY_RAD_S);
+        let torque_nm = given(limit.effort).unwrap_or(f64::INFINITY);
         let acceleration_rad_s2 = given(limit.acceleration).unwrap_or(ASSUMED_ACCELERATION_RAD_S2);
         Ok(Limits { position_rad, velocity_rad_s, acceleration_rad_s2, torque_nm })
     }
+}
+
+/// A limit that is one: zero is how files without the number come out, and how many write "unknown".
+pub(super) fn given(limit: f64) -> Option<f64> {
+    (limit > 0.0 && limit.is_finite()).then_some(limit)
 }
 
 /// Friction, and what stands for the drive that a URDF does not have.

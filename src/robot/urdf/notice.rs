@@ -52,9 +52,9 @@ pub enum UrdfNotice {
     },
     /// No speed limit in the file.
     AssumedVelocity {
-        /// The joint.
-        joint: String,
-        /// What it was given.
+        /// The joints without.
+        joints: Vec<String>,
+        /// What they were given.
         velocity_rad_s: f64,
     },
     /// No acceleration limit in the file.
@@ -66,8 +66,8 @@ pub enum UrdfNotice {
     },
     /// No torque limit in the file: unlimited.
     NoTorqueLimit {
-        /// The joint.
-        joint: String,
+        /// The joints without.
+        joints: Vec<String>,
     },
     /// Links fixed to a moving body were added to it.
     Merged {
@@ -125,6 +125,8 @@ impl UrdfNotice {
             Self::Gravity { .. }
                 | Self::Drives { .. }
                 | Self::NoFriction { .. }
+                | Self::AssumedVelocity { .. }
+                | Self::NoTorqueLimit { .. }
                 | Self::AssumedAcceleration { .. }
                 | Self::Mjcf(MjcfNotice::Weightless)
         )
@@ -193,17 +195,21 @@ impl fmt::Display for UrdfNotice {
             Self::Continuous { joint } => {
                 write!(f, "joint \"{joint}\" has no end stops: taken as -2 pi to 2 pi")
             }
-            Self::AssumedVelocity { joint, velocity_rad_s } => {
-                write!(f, "joint \"{joint}\": no speed limit, taken as {velocity_rad_s:.4} rad/s")
-            }
+            Self::AssumedVelocity { joints, velocity_rad_s } => write!(
+                f,
+                "no speed limit, taken as {velocity_rad_s:.4} rad/s (velocity_rad_s in NAME.drives.toml): {}",
+                joints.join(", ")
+            ),
             Self::AssumedAcceleration { joints, acceleration_rad_s2 } => write!(
                 f,
                 "no acceleration limit, taken as {acceleration_rad_s2} rad/s2: {}",
                 joints.join(", ")
             ),
-            Self::NoTorqueLimit { joint } => {
-                write!(f, "joint \"{joint}\": no effort limit, torque taken as unlimited")
-            }
+            Self::NoTorqueLimit { joints } => write!(
+                f,
+                "no torque limit, taken as unlimited (torque_nm in NAME.drives.toml): {}",
+                joints.join(", ")
+            ),
             Self::Merged { joint, links } => {
                 let subject = with_masses(links, "is", "are");
                 write!(f, "{subject} fixed to the body of joint \"{joint}\" and counted in it")

@@ -9,7 +9,7 @@ use super::arm::{FixedFrame, Frames, UrdfArm, UrdfLink};
 use super::chain::{Body, all_joints, bodies, joints_up_to};
 use super::collision::shapes;
 use super::fault::{UrdfFault, finite, quoted};
-use super::joint::{ASSUMED_ACCELERATION_RAD_S2, drive};
+use super::joint::{ASSUMED_ACCELERATION_RAD_S2, ASSUMED_VELOCITY_RAD_S, drive, given};
 use super::locked::{LockedJoint, locked_joints};
 use super::notice::UrdfNotice;
 use super::tree::Tree;
@@ -338,17 +338,24 @@ impl Reader {
         if !no_friction.is_empty() {
             self.notices.push(UrdfNotice::NoFriction { joints: no_friction });
         }
-        let no_acceleration: Vec<String> = chain
-            .iter()
-            .filter_map(|body| body.joint)
-            .filter(|j| !(j.limit.acceleration > 0.0 && j.limit.acceleration.is_finite()))
-            .map(|j| j.name.clone())
-            .collect();
-        if !no_acceleration.is_empty() {
-            self.notices.push(UrdfNotice::AssumedAcceleration {
-                joints: no_acceleration,
-                acceleration_rad_s2: ASSUMED_ACCELERATION_RAD_S2,
-            });
+        let without = |limit: fn(&urdf_rs::JointLimit) -> f64| -> Vec<String> {
+            let moving = chain.iter().filter_map(|body| body.joint);
+            let open = moving.filter(|joint| given(limit(&joint.limit)).is_none());
+            open.map(|joint| joint.name.clone()).collect()
+        };
+        let joints = without(|limit| limit.velocity);
+        if !joints.is_empty() {
+            let velocity_rad_s = ASSUMED_VELOCITY_RAD_S;
+            self.notices.push(UrdfNotice::AssumedVelocity { joints, velocity_rad_s });
+        }
+        let joints = without(|limit| limit.effort);
+        if !joints.is_empty() {
+            self.notices.push(UrdfNotice::NoTorqueLimit { joints });
+        }
+        let joints = without(|limit| limit.acceleration);
+        if !joints.is_empty() {
+            let acceleration_rad_s2 = ASSUMED_ACCELERATION_RAD_S2;
+            self.notices.push(UrdfNotice::AssumedAcceleration { joints, acceleration_rad_s2 });
         }
     }
 }

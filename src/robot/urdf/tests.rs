@@ -194,8 +194,8 @@ fn a_continuous_joint_has_two_turns_and_missing_limits_are_named() {
     let joint = || "j1".to_owned();
     for notice in [
         UrdfNotice::Continuous { joint: joint() },
-        UrdfNotice::AssumedVelocity { joint: joint(), velocity_rad_s: PI },
-        UrdfNotice::NoTorqueLimit { joint: joint() },
+        UrdfNotice::AssumedVelocity { joints: vec![joint()], velocity_rad_s: PI },
+        UrdfNotice::NoTorqueLimit { joints: vec![joint()] },
     ] {
         assert!(notices.contains(&notice), "{notice}");
     }
