@@ -211,9 +211,8 @@ impl<'a> Diagnoser<'a> {
         let (theta, covariance) = (&extension.theta, &identification.covariance);
         let left = share_left(diagnosis, identification);
         let torque_nm = identification.residual().torque_nm();
-        let doubt = Doubt::of(self.arm, self.set, &nominal, theta, &sigma, covariance, &torque_nm)
-            .or_else(|| Some(Doubt::question(unlike_remark(self.arm, &left)?)));
-        if let Some(doubt) = doubt {
+        let doubt = Doubt::of(self.arm, self.set, &nominal, theta, &sigma, covariance, &torque_nm);
+        if let Some(doubt) = Doubt::or_unlike(doubt, unlike_remark(self.arm, &left)) {
             diagnosis.sentences.insert(0, doubt.sentence);
             if doubt.is_contradiction {
                 diagnosis.verdict = Verdict::Contradicted;

@@ -50,9 +50,14 @@ impl Doubt {
         (!parts.is_empty()).then(|| Self { is_contradiction, sentence: parts.join(" ") })
     }
 
-    /// A question that contradicts nothing.
-    pub fn question(sentence: String) -> Self {
-        Self { is_contradiction: false, sentence }
+    /// Of a log of which the model leaves so much that there is a `remark` about it, what else is asked about parameters means nothing; what
+    /// no arm has stays said.
+    pub fn or_unlike(doubt: Option<Self>, remark: Option<String>) -> Option<Self> {
+        match (doubt, remark) {
+            (Some(doubt), _) if doubt.is_contradiction => Some(doubt),
+            (_, Some(sentence)) => Some(Self { is_contradiction: false, sentence }),
+            (doubt, None) => doubt,
+        }
     }
 }
 

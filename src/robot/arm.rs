@@ -71,17 +71,9 @@ impl Placement {
         }
     }
 
-    /// Roll, pitch and yaw of [`Self::from_xyz_rpy`], rad, that give the rotation back to the last digits.
-    ///
-    /// At a pitch of a right angle only the sum or difference of the other two is known: roll is what is left when yaw, whatever it is,
-    /// was taken away.
+    /// Roll, pitch and yaw of [`Self::from_xyz_rpy`], rad.
     pub fn rpy_rad(&self) -> [f64; 3] {
-        let r = &self.rotation;
-        let pitch = (-r[(2, 0)]).atan2(r[(0, 0)].hypot(r[(1, 0)]));
-        let yaw = r[(1, 0)].atan2(r[(0, 0)]);
-        let (sin, cos) = yaw.sin_cos();
-        let roll = (sin * r[(0, 2)] - cos * r[(1, 2)]).atan2(cos * r[(1, 1)] - sin * r[(0, 1)]);
-        [roll, pitch, yaw]
+        Rotation3::from_matrix_unchecked(self.rotation).euler_angles().into()
     }
 
     /// No rotation, no translation.

@@ -90,6 +90,8 @@ fn from_one<S: serde::Serializer>(
     serializer.collect_seq(joints.as_ref().iter().map(|j| j + 1))
 }
 
+/// What it costs more to have encoders read otherwise than torques, in steps.
+const ENCODERS: f64 = 0.1;
 /// Gravity that is within this of the description's direction is the description's.
 const SAME_DIRECTION: f64 = 0.99;
 
@@ -141,8 +143,18 @@ impl Change {
         orders.map(|order| Self::JointsOrdered { order }).collect()
     }
 
-    /// In how many steps two joints exchange their places, or one thing changes.
-    pub(super) fn steps(&self) -> usize {
+    /// In how many steps two joints exchange their places, or one thing changes; a little more where encoders alone are read otherwise: of a
+    /// light wrist the torque tells hardly more than that something counts the other way, and that is the current's sign far more often.
+    pub(super) fn steps(&self) -> f64 {
+        match self {
+            Self::MotionReversed { .. }
+            | Self::MotionsExchanged { .. }
+            | Self::MotionsOrdered { .. } => ENCODERS + self.exchanges() as f64,
+            _ => self.exchanges() as f64,
+        }
+    }
+
+    fn exchanges(&self) -> usize {
         match self {
             Self::JointsOrdered { order }
             | Self::TorquesOrdered { order }
@@ -176,6 +188,17 @@ impl Change {
             | Self::MotionReversed { joints }
             | Self::ZeroTurned { joints, .. } => joints.contains(&j),
             Self::AllTorquesReversed | Self::Mounted { .. } => true,
+        }
+    }
+
+    /// Whether the torque of joint `j` stands in another joint's column.
+    pub(super) fn moves_torque_of(&self, j: usize) -> bool {
+        match self {
+            Self::JointsExchanged { joints } | Self::TorquesExchanged { joints } => {
+                joints.contains(&j)
+            }
+            Self::JointsOrdered { order } | Self::TorquesOrdered { order } => order[j] != j,
+            _ => false,
         }
     }
 

@@ -97,20 +97,22 @@ impl Misreading {
         let gain = |j: usize| 0.5 * (self.as_read.misfit_of(j) - self.otherwise.misfit_of(j));
         let gains: Vec<f64> = (0..self.as_read.left.len()).map(gain).collect();
         let largest = gains.iter().fold(0.0, |a: f64, gain| a.max(*gain));
-        let of_gravity = self.as_read.misfit_of_gravity() - self.otherwise.misfit_of_gravity();
-        let all = gains.iter().sum::<f64>() + 0.5 * of_gravity;
+        let all: f64 = gains.iter().sum();
         let joints = self.joints();
         let least = if self.restores_gravity() { RESTORED } else { FALLS };
+        let has_moved = |j: usize| self.changes.iter().any(|change| change.moves_torque_of(j));
         largest > least.ln()
-            && all > FALLS.ln() * joints.len() as f64
+            && all > least.ln() * joints.len() as f64
             && joints.iter().all(|j| self.otherwise.beyond_noise(*j) < FITS)
-            // What stands in the columns of a joint that is read otherwise is another torque: its share may be larger.
-            && (0..gains.len()).all(|j| joints.contains(&j) || gains[j] > -GROWS.ln())
+            // What stands in another joint's column is another torque: its share may be larger.
+            && (0..gains.len()).all(|j| has_moved(j) || gains[j] > -GROWS.ln())
     }
 
-    /// Whether gravity has nothing to do with the description's as the log is read, and is the description's otherwise.
+    /// Whether gravity has nothing to do with the description's as the log is read, and is the description's otherwise, though the arm
+    /// is mounted as described.
     fn restores_gravity(&self) -> bool {
-        self.as_read.gravity() < STRANGE && self.otherwise.gravity() > DESCRIBED
+        let is_mounted = self.changes.iter().any(|change| matches!(change, Change::Mounted { .. }));
+        !is_mounted && self.as_read.gravity() < STRANGE && self.otherwise.gravity() > DESCRIBED
     }
 
     /// Joints (0-based) whose channels are read otherwise; all where the arm is mounted otherwise.

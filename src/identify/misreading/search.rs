@@ -31,11 +31,11 @@ struct Tried {
 impl Tried {
     fn of(reading: Reading, bench: &Bench) -> Option<Self> {
         let fit = bench.fit(&reading)?;
-        let cost = fit.misfit() + LEAST_GAIN * steps(&reading) as f64;
+        let cost = fit.misfit() + LEAST_GAIN * steps(&reading);
         Some(Self { reading, fit, cost })
     }
 
-    fn steps(&self) -> usize {
+    fn steps(&self) -> f64 {
         steps(&self.reading)
     }
 
@@ -44,7 +44,7 @@ impl Tried {
     }
 }
 
-fn steps(reading: &Reading) -> usize {
+fn steps(reading: &Reading) -> f64 {
     reading.changes().iter().map(Change::steps).sum()
 }
 
@@ -119,7 +119,7 @@ impl Search<'_> {
 /// An arm that is mirrored in a plane turns some of its joints the other way: as well as before, perhaps with fewer changes.
 fn told_shortly(best: Tried, bench: &Bench) -> Tried {
     let joints = best.fit.left.len();
-    if best.steps() < 2 || joints > MIRRORED {
+    if best.steps() < 2.0 || joints > MIRRORED {
         return best;
     }
     let mirrored = (1..1_usize << joints).into_par_iter().filter_map(|reversed| {

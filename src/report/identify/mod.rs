@@ -218,7 +218,7 @@ impl Result {
             }
             None => {
                 let torque_nm = identification.residual().torque_nm();
-                Doubt::of(
+                let doubt = Doubt::of(
                     arm,
                     set,
                     training.nominal,
@@ -226,8 +226,8 @@ impl Result {
                     &sigma,
                     &identification.covariance,
                     &torque_nm,
-                )
-                .or_else(|| Some(Doubt::question(unlike_remark(arm, &identification.left())?)))
+                );
+                Doubt::or_unlike(doubt, unlike_remark(arm, &identification.left()))
             }
         };
         warnings.extend(doubt.iter().map(|doubt| doubt.sentence.clone()));

@@ -38,13 +38,17 @@ pub(super) fn actuated(
         let Some(joint) = actuator.text("joint").or(actuator.text("jointinparent")) else {
             continue;
         };
+        let gear = actuator.up_to("gear", GEARS)?.map_or(1.0, |gear| gear[0]).abs();
+        // What is not connected limits nothing.
+        if gear == 0.0 {
+            continue;
+        }
         let largest = |range: Option<[f64; 2]>| range.map_or(f64::INFINITY, smaller);
         let mut force = largest(compiler.limit(&actuator, "forcelimited", "forcerange")?);
         if let Some(gain) = gain_of_a_motor(&actuator)? {
             let asked = largest(compiler.limit(&actuator, "ctrllimited", "ctrlrange")?);
-            force = force.min(gain * asked);
+            force = if gain > 0.0 { force.min(gain * asked) } else { 0.0 };
         }
-        let gear = actuator.up_to("gear", GEARS)?.map_or(1.0, |gear| gear[0]).abs();
         let damping = actuator.up_to("damping", POWERS)?.map_or(0.0, |damping| damping[0]);
         actuator.refuse_negative("damping", damping)?;
         let joint = actuated.entry(joint.to_owned()).or_default();

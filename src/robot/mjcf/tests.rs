@@ -10,7 +10,7 @@ use approx::assert_abs_diff_eq;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use proptest::prelude::*;
 
-use super::pose::from_z;
+use super::pose::{from_z, rpy_rad};
 use super::{MjcfArm, MjcfFault, MjcfNotice, read_mjcf};
 use crate::robot::export::mjcf;
 use crate::robot::{Arm, FixedFrame, Frames, Placement, RobotError, UrdfNotice, read_urdf};
@@ -190,8 +190,7 @@ proptest! {
         yaw in -PI..PI,
     ) {
         let rotation = Rotation3::from_euler_angles(roll, pitch, yaw).into_inner();
-        let placement = Placement { rotation, translation_m: Vector3::zeros() };
-        let [roll, pitch, yaw] = placement.rpy_rad();
+        let [roll, pitch, yaw] = rpy_rad(&rotation);
         let back = Rotation3::from_euler_angles(roll, pitch, yaw).into_inner();
         prop_assert!((rotation - back).amax() < 1e-14, "{rotation} {back}");
     }
