@@ -99,6 +99,7 @@ fn an_exported_arm_comes_back() {
         let written = written(&read.arm.name);
         assert_eq!(read.arm.gravity_m_s2, written.gravity_m_s2);
         assert_eq!(read.frames.fixed.len(), 1);
+        assert_eq!(read.arm.dof(), written.dof());
         for (a, b) in written.joints.iter().zip(&read.arm.joints) {
             assert_eq!(a.name, b.name);
             assert_eq!(a.limits.position_rad, b.limits.position_rad);

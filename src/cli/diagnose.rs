@@ -232,11 +232,7 @@ fn decline(
         let facts = vec![rows.in_words()];
         let verdict = Verdict { status: Status::Bad, sentence, facts };
         let mut page = Page::new("Diagnosis", log.source.clone(), verdict, program);
-        misread
-            .as_ref()
-            .and_then(MisreadLog::section)
-            .into_iter()
-            .for_each(|section| page.push(section));
+        page.extend(misread.as_ref().and_then(MisreadLog::section));
         page.with_warnings(&warnings).write(path)?;
         say!("report: {}", path.display());
     }

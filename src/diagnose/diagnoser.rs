@@ -92,10 +92,7 @@ impl<'a> Diagnoser<'a> {
         let m = &log.measurement(m.source);
         let mut regression = log.regression(&mut self.identifier, m.source)?;
         let identification = self.identifier.identify_regression(&regression)?;
-        if let Some(misreading) = Misreading::of(self.arm, &regression, &self.options) {
-            let (log, misreading) = (m.source.to_owned(), Box::new(misreading));
-            return Err(DiagnoseError::Misread { log, misreading });
-        }
+        self.refuse_misread(&regression, m.source)?;
         let measured_nm = measured_nm(&regression);
         move_to_common_motion(&mut regression, (self.arm, self.set), &identification.fit.theta);
         let noise_nm = noise_of_mean(&regression);
@@ -198,6 +195,17 @@ impl<'a> Diagnoser<'a> {
         })
     }
 
+    /// Refuses the log `source` where it fits the arm when it is read otherwise.
+    fn refuse_misread(&self, regression: &Regression, source: &str) -> Result<(), DiagnoseError> {
+        match Misreading::of(self.arm, regression, &self.options) {
+            Some(misreading) => Err(DiagnoseError::Misread {
+                log: source.to_owned(),
+                misreading: Box::new(misreading),
+            }),
+            None => Ok(()),
+        }
+    }
+
     /// Says first that the log may be that of another robot, or that no arm has these parameters.
     fn question_the_arm(
         &self,
@@ -289,10 +297,7 @@ impl<'a> Diagnoser<'a> {
             Ok((log.regression(&mut self.identifier, m.source)?, touched))
         };
         let [(reference_rows, _), (loaded_rows, touched)] = [cleaned(reference)?, cleaned(loaded)?];
-        if let Some(misreading) = Misreading::of(self.arm, &loaded_rows, &self.options) {
-            let (log, misreading) = (loaded.source.to_owned(), Box::new(misreading));
-            return Err(DiagnoseError::Misread { log, misreading });
-        }
+        self.refuse_misread(&loaded_rows, loaded.source)?;
         let shared = payload::Shared {
             arm: self.arm,
             set: self.set,

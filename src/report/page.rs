@@ -144,6 +144,11 @@ impl Page {
         self.sections.push(section);
     }
 
+    /// Adds those sections that there are.
+    pub fn extend(&mut self, sections: impl IntoIterator<Item = Section>) {
+        sections.into_iter().for_each(|section| self.push(section));
+    }
+
     /// The page as an HTML document, the same bytes for the same contents.
     pub fn to_html(&self) -> Result<String, ReportError> {
         Ok(environment()?.get_template("page.html")?.render(context! { page => Serde(self) })?)

@@ -56,14 +56,10 @@ impl Match {
         2.0 * self.left[j].max(f64::MIN_POSITIVE).ln() + pushes
     }
 
-    /// More the less gravity is the description's.
-    pub(super) fn misfit_of_gravity(&self) -> f64 {
-        GRAVITY * (1.0 - self.gravity)
-    }
-
-    /// Of all joints and gravity.
+    /// Of all joints, and more the less gravity is the description's.
     pub(super) fn misfit(&self) -> f64 {
-        (0..self.left.len()).map(|j| self.misfit_of(j)).sum::<f64>() + self.misfit_of_gravity()
+        let of_joints: f64 = (0..self.left.len()).map(|j| self.misfit_of(j)).sum();
+        of_joints + GRAVITY * (1.0 - self.gravity)
     }
 
     /// Cosine of the angle between the first moments that were found and those described; 0 where none are described.

@@ -122,11 +122,7 @@ pub fn page(
     let verdict = Verdict { status, sentence: result.sentence(), facts: facts(result) };
     let subtitle = format!("{} from {}", result.robot, result.log);
     let mut page = Page::new("Identified parameters", subtitle, verdict, program);
-    result
-        .misread()
-        .and_then(MisreadLog::section)
-        .into_iter()
-        .for_each(|section| page.push(section));
+    page.extend(result.misread().and_then(MisreadLog::section));
     let fit = Prediction::of(training.regression, &training.identification.fit.theta);
     let section = Section::new("Torque: measured and predicted")
         .figure(torque_figure("Torque along the training log", &fit)?, "")

@@ -129,6 +129,7 @@ fn an_arm_written_as_mjcf_reads_back_as_the_same_arm() {
         let back = read(&mjcf(&arm, &frames).unwrap());
         assert_eq!(back.arm.name, name);
         assert_eq!(back.arm.gravity_m_s2, arm.gravity_m_s2);
+        assert_eq!(back.arm.dof(), arm.dof());
         for (a, b) in arm.joints.iter().zip(&back.arm.joints) {
             assert_eq!(a.name, b.name);
             assert_eq!(a.limits.position_rad, b.limits.position_rad);
@@ -143,6 +144,7 @@ fn an_arm_written_as_mjcf_reads_back_as_the_same_arm() {
             }
         }
         assert_eq!(back.frames.root, frames.root);
+        assert_eq!(back.frames.fixed.len(), frames.fixed.len());
         for (a, b) in frames.fixed.iter().zip(&back.frames.fixed) {
             assert_eq!((&a.name, a.body), (&b.name, b.body));
             assert!((a.placement.rotation - b.placement.rotation).amax() < 1e-14);
