@@ -58,6 +58,58 @@ fn a_clean_log_gives_an_arm_with_a_certificate() {
     assert!(page.contains("Standard parameters that an arm can have"));
 }
 
+/// A simulation without noise, of a light arm whose friction is nothing but damping: what round-off leaves of the torque is no
+/// evidence against an arm whose Coulomb friction and rotor inertia are zero, on the boundary of what can exist.
+#[test]
+fn a_log_without_noise_gives_an_arm() {
+    let folder = Folder::empty();
+    folder.write(
+        "light.xml",
+        r#"<mujoco model="light">
+  <default><joint type="hinge" axis="0 1 0" range="-120 120" damping="0.01"/></default>
+  <worldbody>
+    <body name="upper" pos="0 0 0.5">
+      <joint name="shoulder"/>
+      <inertial pos="0 0 0.06" mass="0.03" diaginertia="4e-5 4e-5 1e-6"/>
+      <body name="lower" pos="0 0 0.12">
+        <joint name="elbow"/>
+        <inertial pos="0 0 0.05" mass="0.02" diaginertia="2e-5 2e-5 1e-6"/>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>"#,
+    );
+    let motion = serde_json::json!({
+        "schema": "armid.trajectory/1",
+        "program": { "version": "0.1.0", "command": "by hand", "seed": 1, "inputs": [] },
+        "period_s": 4.0,
+        "q0_rad": [0.2, -0.3],
+        "a_rad_s": [[0.5, -0.9, 1.2], [-0.7, 1.0, 0.8]],
+        "b_rad_s": [[0.9, 0.3, -0.6], [0.4, -1.1, 0.7]],
+    });
+    folder.write("motion.json", motion.to_string());
+    folder.write(
+        "quiet.toml",
+        "name = \"light\"\nrobot = \"light.xml\"\nseed = 1\ntrials = 1\n[motion]\ntrajectory = \"motion.json\"\nperiods = 2\n",
+    );
+    folder.armid("simulate --scenario quiet.toml --out log.csv --truth truth.json").says(0, &[]);
+    let words = "identify log.csv --robot light.xml --physical --json result.json";
+    let text = folder.armid(words).says(0, &["within noise an arm can have"]);
+    assert!(!text.contains("the model is wrong"), "{text}");
+    let (result, truth) = (folder.result("result.json"), folder.result("truth.json"));
+    assert!(result["physical"]["p_value"].as_f64().unwrap() > 0.01, "{}", result["physical"]);
+    // The noise counts as 1e-4 of the torque: σ stands for that, and what is left of the torque is some hundred times less.
+    for p in result["standard_parameters"].as_array().unwrap() {
+        let Some(sigma) = p["sigma"].as_f64() else { continue };
+        let name = p["name"].as_str().unwrap();
+        let error = p["value"].as_f64().unwrap() - parameter(&truth, "standard_parameters", name);
+        assert!(error.abs() <= 3.0 * sigma, "{name}: {error} ± {sigma}");
+    }
+    for name in ["rc1", "rc2"] {
+        assert_eq!(parameter(&result, "standard_parameters", name), 0.0, "{name}");
+    }
+}
+
 /// The robot file that stands behind the estimate is wrong by 10 to 20 % of every link. σ is stated for what the data
 /// decide and holds there: a file wrong by all of it would move it by less than σ, this one by a fifth of that, and noise
 /// exceeds 5.8 σ of Student's t with 20 degrees of freedom once in 1e5, some 45 times. The mass of the first

@@ -164,8 +164,8 @@ impl Solver {
         };
         let prior = Pulling { metric, weight };
         let data = self.data(&information, prior);
-        let constrained = self.solve(&data, &(&information.root * &information.theta), GAP)?;
-        let noise = information.whitened(covariance);
+        let constrained = self.solve(&data, &DVector::zeros(data.map.nrows()), GAP)?;
+        let noise = information.noise(covariance);
         let realisable = realisability(&self.structure, &information.theta)?;
         let draws = bootstrap(self, &data, &constrained, &noise_root(&noise), options)?;
         let by_delta = |curvature: &Cholesky<f64, Dyn>| {
@@ -203,7 +203,7 @@ impl Solver {
         prior: Pulling,
     ) -> Result<Constrained, PhysicalError> {
         let data = self.data(information, prior);
-        self.solve(&data, &(&information.root * &information.theta), GAP)
+        self.solve(&data, &DVector::zeros(data.map.nrows()), GAP)
     }
 
     /// The program of data with this information and pull to the prior.
@@ -212,32 +212,37 @@ impl Solver {
         let Pulling { metric, weight } = prior;
         let n = structure.unknowns();
         let map = &information.root * &structure.base_map;
-        let mut hessian = map.tr_mul(&map);
+        let mut pulls = DMatrix::zeros(n, n);
         let mut pull = DVector::zeros(n);
         let mut constraints = structure.constraints.clone();
-        let pull_constant = match metric {
-            PriorMetric::PullBack => structure.add_pulls(weight, &mut hessian, &mut pull),
+        let constant = match metric {
+            PriorMetric::PullBack => structure.add_pulls(weight, &mut pulls, &mut pull),
             PriorMetric::Entropic => {
-                structure.add_divergences(weight, &mut hessian, &mut pull, &mut constraints)
+                structure.add_divergences(weight, &mut pulls, &mut pull, &mut constraints)
             }
         };
-        let program = ConeProgram { hessian, linear: DVector::zeros(n), constraints };
-        Data { map, pull, pull_constant, program }
+        // About unknowns that have θ̂, where the data's part of the objective is zero.
+        let centre = structure.with_base(&information.theta);
+        let pulled = &pulls * &centre;
+        let constant = constant + centre.dot(&(0.5 * &pulled - &pull));
+        let hessian = pulls + map.tr_mul(&map);
+        let program = ConeProgram { hessian, linear: pull - pulled, centre, constraints };
+        Data { map, constant, program }
     }
 
-    /// Solves for a whitened right-hand side ρ = R θ̂ to a relative duality gap.
+    /// Solves for base parameters whose whitened difference from those of `data` is δ = R (θ − θ̂), to a relative duality gap.
     pub(super) fn solve(
         &self,
         data: &Data,
-        rho: &DVector<f64>,
+        deviation: &DVector<f64>,
         gap: f64,
     ) -> Result<Constrained, PhysicalError> {
         let mut program = data.program.clone();
-        program.linear = data.map.tr_mul(rho) + &data.pull;
-        let constant = 0.5 * rho.norm_squared() + data.pull_constant;
+        program.linear += data.map.tr_mul(deviation);
+        let constant = 0.5 * deviation.norm_squared() + data.constant;
         let solution = program.solve(self.structure.start.clone(), constant, gap)?;
         Ok(Constrained {
-            distance: (&data.map * &solution.y - rho).norm_squared(),
+            distance: (data.whitened(&solution.y) - deviation).norm_squared(),
             certificate: Certificate {
                 objective: solution.objective + constant,
                 duality_gap: solution.gap,
@@ -250,14 +255,21 @@ impl Solver {
     }
 }
 
-/// Data ready for solving with any right-hand side.
+/// Data ready for solving with any base parameters near theirs.
 #[derive(Debug, Clone)]
 pub(super) struct Data {
     /// R K, b × n.
     pub map: DMatrix<f64>,
-    pull: DVector<f64>,
-    pull_constant: f64,
+    /// Objective at the program's centre.
+    constant: f64,
     program: ConeProgram,
+}
+
+impl Data {
+    /// R (K y − θ̂).
+    pub fn whitened(&self, y: &DVector<f64>) -> DVector<f64> {
+        &self.map * (y - &self.program.centre)
+    }
 }
 
 impl Constrained {

@@ -100,7 +100,7 @@ pub(super) fn bootstrap(
     }
     let mut deviations = Deviations::new(solver.structure());
     let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
-    let expected = &data.map * &constrained.y;
+    let expected = data.whitened(&constrained.y);
     let mut larger = 0;
     for _ in 0..options.bootstrap {
         let noise = DVector::from_fn(expected.len(), |_, _| StandardNormal.sample(&mut rng));

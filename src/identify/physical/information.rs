@@ -16,9 +16,9 @@ pub struct Information {
     pub theta: DVector<f64>,
 }
 
-/// The noise counts as at least this share of the torque: data without noise must not make the
-/// whole problem infinite.
-const LEAST_NOISE: f64 = 1e-6;
+/// The noise counts as at least this share of the torque: less than any sensor has. What a simulation without noise leaves (the
+/// digits of its log, its integrator's error) is no evidence against an arm, and must not make the problem infinite.
+const LEAST_NOISE: f64 = 1e-4;
 
 impl Information {
     /// Of a fit and the covariance V of its estimate. The unit is chosen so that θ̂ scatters with
@@ -41,8 +41,18 @@ impl Information {
         (&self.root * (theta - &self.theta)).norm_squared()
     }
 
-    /// R V Rᵀ: the covariance of the noise; its mean diagonal entry is 1.
-    pub fn whitened(&self, covariance: &Covariance) -> DMatrix<f64> {
+    /// The covariance of the noise of R θ̂, with a mean diagonal entry of 1: R V Rᵀ, and the rest white where the noise counts as
+    /// more than it is.
+    pub fn noise(&self, covariance: &Covariance) -> DMatrix<f64> {
+        let mut noise = self.whitened(covariance);
+        let missing = 1.0 - noise.trace() / noise.nrows() as f64;
+        let step = noise.nrows() + 1;
+        noise.iter_mut().step_by(step).for_each(|variance| *variance += missing.max(0.0));
+        noise
+    }
+
+    /// R V Rᵀ.
+    fn whitened(&self, covariance: &Covariance) -> DMatrix<f64> {
         &self.root * &covariance.matrix * self.root.transpose()
     }
 }

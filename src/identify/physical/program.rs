@@ -8,8 +8,8 @@ use thiserror::Error;
 use super::cone::{Cone, Scaling};
 use crate::dot::dot;
 
-/// minimise ½ yᵀH y − cᵀy − Σ γ_i ln det s_i subject to s_i = A_i y + b_i ∈ K_i for every
-/// constraint i.
+/// minimise ½ (y − y₀)ᵀH (y − y₀) − cᵀ(y − y₀) − Σ γ_i ln det s_i subject to s_i = A_i y + b_i ∈ K_i
+/// for every constraint i.
 ///
 /// H is positive definite. Each constraint reads a few entries of y only, so that its share of
 /// a Newton step is small dense blocks.
@@ -19,6 +19,9 @@ pub struct ConeProgram {
     pub hessian: DMatrix<f64>,
     /// c.
     pub linear: DVector<f64>,
+    /// y₀: where the quadratic form is expanded. Near its minimum the objective is a small number, and would be lost to
+    /// round-off as the difference of two large ones.
+    pub centre: DVector<f64>,
     /// The constraints.
     pub constraints: Vec<Constraint>,
 }
@@ -43,12 +46,12 @@ pub struct Constraint {
 pub struct ConeSolution {
     /// y.
     pub y: DVector<f64>,
-    /// ½ yᵀH y − cᵀy − Σ γ_i ln det s_i.
+    /// ½ (y − y₀)ᵀH (y − y₀) − cᵀ(y − y₀) − Σ γ_i ln det s_i.
     pub objective: f64,
     /// The objective is at most this much above the least possible one. It is the difference to
     /// the value of a dual point, so that it holds whatever happened on the way.
     pub gap: f64,
-    /// ‖H y − c − Aᵀz‖∞ over ‖c‖∞.
+    /// ‖H (y − y₀) − c − Aᵀz‖∞ over ‖c‖∞.
     pub dual_residual: f64,
     /// Newton steps taken.
     pub iterations: usize,
@@ -108,7 +111,7 @@ impl ConeProgram {
     /// for a plain constraint is the end of the central path and for a barrier a point on it.
     ///
     /// # Certificate
-    /// For z in the cones and r = H y − c − Aᵀz the dual value is
+    /// For z in the cones and r = H (y − y₀) − c − Aᵀz the dual value is
     /// objective(y) − Σ g_i − ½ rᵀH⁻¹r, whence gap = Σ g_i + ½ rᵀH⁻¹r with g_i = s_iᵀz_i for a plain
     /// constraint and g_i = s_iᵀz_i − γ_i (d_i + ln det(s_i z_i / γ_i)) for a barrier of degree d_i: both
     /// are ≥ 0, and 0 only where complementarity holds.
@@ -172,9 +175,15 @@ impl ConeProgram {
         }
     }
 
-    /// ½ yᵀH y − cᵀy: the objective without its barriers.
+    /// ½ (y − y₀)ᵀH (y − y₀) − cᵀ(y − y₀): the objective without its barriers.
     pub fn objective(&self, y: &DVector<f64>) -> f64 {
-        0.5 * y.dot(&(&self.hessian * y)) - self.linear.dot(y)
+        let away = y - &self.centre;
+        0.5 * away.dot(&(&self.hessian * &away)) - self.linear.dot(&away)
+    }
+
+    /// H (y − y₀) − c: its gradient.
+    fn gradient(&self, y: &DVector<f64>) -> DVector<f64> {
+        &self.hessian * (y - &self.centre) - &self.linear
     }
 
     /// The objective with its barriers.
@@ -192,9 +201,9 @@ impl ConeProgram {
         self.constraints.iter().map(|c| c.cone.degree()).sum()
     }
 
-    /// r = H y − c − Aᵀz.
+    /// r = H (y − y₀) − c − Aᵀz.
     fn dual_residual(&self, point: &Point) -> DVector<f64> {
-        let mut residual = &self.hessian * &point.y - &self.linear;
+        let mut residual = self.gradient(&point.y);
         for (constraint, z) in self.constraints.iter().zip(&point.z) {
             constraint.add_transposed(-1.0, z, &mut residual);
         }
@@ -245,7 +254,7 @@ impl Point {
             program.constraints.iter().map(|c| vec![0.0; c.cone.dimension()]).collect();
         let mut point = Self { y, s: zeros.clone(), z: zeros };
         point.update_s(program);
-        let gradient = &program.hessian * &point.y - &program.linear;
+        let gradient = program.gradient(&point.y);
         let most = program.constraints.iter().map(|c| c.barrier).fold(1.0, f64::max);
         let mu = (gradient.dot(&point.y).abs() / program.degree() as f64).max(most);
         for (k, constraint) in program.constraints.iter().enumerate() {

@@ -1,10 +1,10 @@
 //! Could the unconstrained estimate be an arm?
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::cone::{Cone, svec};
 use super::error::PhysicalError;
-use super::program::{ConeProgram, Constraint};
+use super::program::{ConeProgram, Constraint, ProgramError};
 use super::structure::{Structure, Subject};
 
 /// Curvature that makes the linear program a strictly convex one, relative to the prior.
@@ -20,13 +20,19 @@ pub(super) fn realisability(
     structure: &Structure,
     theta: &DVector<f64>,
 ) -> Result<f64, PhysicalError> {
-    let (particular, null_space) = solutions(structure, theta);
+    let null_space = null_space(structure);
     let dimension = null_space.ncols();
-    let mut pull = DMatrix::zeros(structure.unknowns(), structure.unknowns());
-    structure.add_pulls(CURVATURE, &mut pull, &mut DVector::zeros(structure.unknowns()));
+    let n = structure.unknowns();
+    let (mut pulls, mut pull) = (DMatrix::zeros(n, n), DVector::zeros(n));
+    structure.add_pulls(1.0, &mut pulls, &mut pull);
+    let curved = null_space.tr_mul(&(&pulls * &null_space));
+    // Where the pulls would bring them: t is then of the size of one, even where θ moves a light link's mass by thousands of its own.
+    let mut particular = structure.with_base(theta);
+    let to_prior = null_space.tr_mul(&(pull - &pulls * &particular));
+    let factor = Cholesky::new(curved.clone()).ok_or(ProgramError::NotConvex)?;
+    particular += &null_space * factor.solve(&to_prior);
     let mut hessian = DMatrix::zeros(dimension + 1, dimension + 1);
-    let curved = null_space.tr_mul(&(pull * &null_space));
-    hessian.view_mut((0, 0), (dimension, dimension)).copy_from(&curved);
+    hessian.view_mut((0, 0), (dimension, dimension)).copy_from(&(CURVATURE * curved));
     hessian[(dimension, dimension)] = CURVATURE;
     let mut linear = DVector::zeros(dimension + 1);
     linear[dimension] = 1.0;
@@ -45,19 +51,16 @@ pub(super) fn realisability(
     let mut start = DVector::zeros(dimension + 1);
     let worst = constraints.iter().map(|c| c.margin(&start)).fold(f64::INFINITY, f64::min);
     start[dimension] = worst - 1.0;
-    let solution = ConeProgram { hessian, linear, constraints }.solve(start, 0.0, ACCURACY)?;
+    let centre = DVector::zeros(dimension + 1);
+    let program = ConeProgram { hessian, linear, centre, constraints };
+    let solution = program.solve(start, 0.0, ACCURACY)?;
     Ok(solution.y[dimension])
 }
 
-/// One solution of K y = θ, as near to the prior as changing the kept parameters alone makes it, and
-/// a basis of the null space of K.
-fn solutions(structure: &Structure, theta: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
+/// A basis N of the null space of K.
+fn null_space(structure: &Structure) -> DMatrix<f64> {
     let map = &structure.base_map;
-    let kept: Vec<usize> =
-        map.row_iter().map(|row| row.iter().position(|&a| a != 0.0).unwrap_or_default()).collect();
-    let mut particular = structure.start.clone();
-    let missing = theta - map * &particular;
-    kept.iter().zip(missing.iter()).for_each(|(&k, m)| particular[k] += m);
+    let kept = structure.kept();
     let free: Vec<usize> = (0..structure.unknowns()).filter(|k| !kept.contains(k)).collect();
     let mut null_space = DMatrix::zeros(structure.unknowns(), free.len());
     for (column, &d) in free.iter().enumerate() {
@@ -66,7 +69,7 @@ fn solutions(structure: &Structure, theta: &DVector<f64>) -> (DVector<f64>, DMat
             null_space[(k, column)] = -map[(row, d)];
         }
     }
-    (particular, null_space)
+    null_space
 }
 
 /// The constraint in terms of (w, t): A (y₀ + N w) + b − t·unit ∈ K. The margin ε of a link is left

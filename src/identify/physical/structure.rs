@@ -1,6 +1,6 @@
 //! What is asked of the standard parameters of an arm, whatever the data say.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Matrix4};
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix4, RowDVector};
 
 use super::cone::{Cone, svec};
 use super::error::PhysicalError;
@@ -145,6 +145,20 @@ impl Structure {
     /// Number of unknowns n.
     pub fn unknowns(&self) -> usize {
         self.to_standard.len()
+    }
+
+    /// The unknown that each base parameter is named after: no other base parameter has it, and it has the coefficient 1.
+    pub fn kept(&self) -> Vec<usize> {
+        let first = |row: RowDVector<f64>| row.iter().position(|&a| a != 0.0).unwrap_or_default();
+        self.base_map.row_iter().map(|row| first(row.into_owned())).collect()
+    }
+
+    /// Unknowns with K y = θ, as near to the prior as changing the kept ones alone makes them.
+    pub fn with_base(&self, theta: &DVector<f64>) -> DVector<f64> {
+        let mut y = self.start.clone();
+        let missing = theta - &self.base_map * &y;
+        self.kept().iter().zip(missing.iter()).for_each(|(&k, m)| y[k] += m);
+        y
     }
 
     /// All standard parameters x = E y in the order of [`ParameterLayout`]; those that the

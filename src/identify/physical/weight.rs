@@ -134,8 +134,9 @@ pub(super) fn cross_validate(
         let mut error = 0.0;
         for left_out in periods {
             let left_out = DVector::from_column_slice(left_out);
-            let kept = (&information.theta * p - &left_out) / (p - 1.0);
-            let constrained = solver.solve(&data, &(&kept_information.root * kept), ROUGH_GAP)?;
+            // What the others have on average, less the average of all.
+            let away = (&information.theta - &left_out) / (p - 1.0);
+            let constrained = solver.solve(&data, &(&kept_information.root * away), ROUGH_GAP)?;
             let predicted = &solver.structure().base_map * &constrained.y;
             error += (&single_root * (predicted - left_out)).norm_squared();
         }

@@ -33,15 +33,20 @@ const STEPS: usize = 60;
 const GROWTHS: [f64; 10] = [1.0, 1.02, 1.05, 1.1, 1.15, 1.2, 1.25, 1.3, 1.36, 1.42];
 
 impl Enclosure {
-    /// The smallest one by volume along the principal axes of the centres, those of the frame, and `axes`; `None` of no ball.
+    /// Around all balls, as [`Self::by`] has it; `None` of no ball.
     pub(super) fn of(balls: &[Ball], axes: &[Vector3<f64>]) -> Option<Self> {
-        let few = outermost(balls);
-        let own = principal_axes(&few)?;
+        Self::by(&outermost(balls), balls, axes)
+    }
+
+    /// The smallest one by volume along the principal axes of the centres, those of the frame, and `axes`, chosen for `few` of
+    /// the `balls`, the [`outermost`], and around all of them; `None` of no ball.
+    pub(super) fn by(few: &[Ball], balls: &[Ball], axes: &[Vector3<f64>]) -> Option<Self> {
+        let own = principal_axes(few)?;
         let frame = [Vector3::x(), Vector3::y(), Vector3::z()];
         let axes = own.iter().chain(&frame).chain(axes);
         let tried = axes.flat_map(|axis| {
-            let line_m = middle(&few, axis);
-            let along = |growth: f64| Self::about(&few, axis, &line_m, growth).volume_m3();
+            let line_m = middle(few, axis);
+            let along = |growth: f64| Self::about(few, axis, &line_m, growth).volume_m3();
             GROWTHS.map(|growth| (along(growth), axis, line_m, growth))
         });
         let (_, axis, line_m, growth) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -87,7 +92,7 @@ impl Enclosure {
 }
 
 /// The balls that are outermost in one of [`FEW`] directions, which lie on a spiral around the sphere; all of few.
-fn outermost(balls: &[Ball]) -> Vec<Ball> {
+pub(super) fn outermost(balls: &[Ball]) -> Vec<Ball> {
     if balls.len() <= FEW {
         return balls.to_vec();
     }
@@ -100,7 +105,8 @@ fn outermost(balls: &[Ball]) -> Vec<Ball> {
     });
     let farthest = directions.filter_map(|direction| {
         let height = |ball: &Ball| ball.centre_m.dot(&direction) + ball.radius_m;
-        balls.iter().copied().max_by(|a, b| height(a).total_cmp(&height(b)))
+        let heights = balls.iter().map(|ball| (height(ball), ball));
+        heights.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, ball)| *ball)
     });
     farthest.collect()
 }

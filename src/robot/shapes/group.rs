@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::enclosure::{Ball, Enclosure};
+use super::enclosure::{Ball, Enclosure, outermost};
 
 /// Shapes that one capsule holds.
 #[derive(Debug, Clone)]
@@ -10,6 +10,8 @@ pub(super) struct Group {
     /// The link of the first of them.
     pub link: String,
     balls: Vec<Ball>,
+    /// The outermost of the balls: of several groups they are among those of each.
+    few: Vec<Ball>,
     /// Along which the capsule may lie.
     axes: Vec<Vector3<f64>>,
     pub enclosure: Enclosure,
@@ -25,8 +27,9 @@ const MANY: usize = 40;
 impl Group {
     /// Of one shape on the link, with its `balls` and axes; `None` without any ball.
     pub(super) fn of(link: String, balls: Vec<Ball>, axes: Vec<Vector3<f64>>) -> Option<Self> {
-        let enclosure = Enclosure::of(&balls, &axes)?;
-        Some(Self { link, balls, axes, enclosure })
+        let few = outermost(&balls);
+        let enclosure = Enclosure::by(&few, &balls, &axes)?;
+        Some(Self { link, balls, few, axes, enclosure })
     }
 
     /// Around both capsules.
@@ -49,9 +52,11 @@ impl Group {
     fn take_in(&mut self, other: Self) {
         let around = self.around(&other);
         self.balls.extend(other.balls);
+        self.few = outermost(&[&self.few[..], &other.few[..]].concat());
         self.axes.extend(other.axes);
         self.axes.truncate(AXES);
-        let found = around.into_iter().chain(Enclosure::of(&self.balls, &self.axes));
+        let found = Enclosure::by(&self.few, &self.balls, &self.axes);
+        let found = around.into_iter().chain(found);
         let smallest = found.min_by(|a, b| a.volume_m3().total_cmp(&b.volume_m3()));
         self.enclosure = smallest.unwrap_or(self.enclosure);
     }
