@@ -170,7 +170,7 @@ impl SourceArgs {
     /// terminal.
     pub fn arm(&self) -> Result<(Arm, Vec<Input>), Box<dyn std::error::Error>> {
         let LoadedArm { arm, mut files, .. } = load_robot(&self.robot)?;
-        files.extend(Layout::load(&self.layout)?.files().iter().cloned());
+        files.extend(Layout::load(&self.layout)?.files());
         Ok((arm, inputs(&files)?))
     }
 

@@ -395,13 +395,28 @@ pub enum LayoutFault {
         /// What is wrong with it.
         fault: Box<LogError>,
     },
-    /// Layouts that are like each other.
-    #[error("like = \"{like}\" leads back to where it began, or on for more than {limit} layouts")]
+    /// The file of the layout that this one is like is not there.
+    #[error(
+        "like = \"{like}\": there is no {}; files are looked for beside the layout that is like them",
+        looked_for.display()
+    )]
+    NoLike {
+        /// The file as the layout says it.
+        like: String,
+        /// Where it would be.
+        looked_for: PathBuf,
+    },
+    /// A layout that is like itself, over others or not.
+    #[error("like = \"{like}\" leads back to where it came from: no layout can be like itself")]
     LikeItself {
         /// The name or the file.
         like: String,
-        /// Layouts that may be like another.
-        limit: usize,
+    },
+    /// A key that neither the layout has nor one that it is like.
+    #[error("{key} is missing: every layout says it, or is like one that does")]
+    MissingKey {
+        /// The key.
+        key: &'static str,
     },
     /// Commas cannot separate both fields and decimals.
     #[error("decimal_comma = true needs another delimiter than \"comma\"")]

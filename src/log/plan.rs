@@ -152,7 +152,7 @@ impl Plan {
                     first: fields[other].block.key(),
                     second: field.block.key(),
                 };
-                return Err(LogError::Layout { file: layout.name.clone(), fault });
+                return Err(LogError::Layout { file: layout.source.clone(), fault });
             }
         }
         Ok(Self { delimiter, decimal_comma: layout.decimal_comma, width, fields, place, joints })

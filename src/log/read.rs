@@ -67,10 +67,7 @@ pub fn read_log_from(
     layout: &Layout,
     joints: usize,
 ) -> Result<Log, LogError> {
-    layout
-        .joints
-        .check_for(joints)
-        .map_err(|fault| LogError::Layout { file: layout.name.clone(), fault })?;
+    layout.check_for(joints)?;
     let mut lines = Lines::new(source, name)?;
     let mut first = Line::default();
     if !lines.next_into(&mut first)? {

@@ -55,7 +55,7 @@ impl Joints {
     }
 
     /// Whether it can be said of an arm with so many joints.
-    pub(in crate::log) fn check_for(&self, joints: usize) -> Result<(), LayoutFault> {
+    pub(super) fn check_for(&self, joints: usize) -> Result<(), LayoutFault> {
         for (key, list) in self.lists() {
             if let Some(&joint) = list.iter().find(|joint| **joint > joints) {
                 return Err(LayoutFault::NoSuchJoint { key, joint, joints });
@@ -80,7 +80,7 @@ impl Joints {
     }
 
     /// What it says of an arm with so many joints that it can be said of.
-    pub(in crate::log) fn counting(&self, joints: usize, unit: Angle) -> Counting {
+    pub(super) fn counting(&self, joints: usize, unit: Angle) -> Counting {
         let mut counting = Counting::as_described(joints);
         let from_zero = |order: &Vec<usize>| order.iter().map(|joint| joint - 1).collect();
         let order: Option<Vec<usize>> = self.order.as_ref().map(from_zero);
@@ -100,7 +100,7 @@ impl Joints {
     }
 
     /// What has to be said of an arm for joints to be counted so, in a file with angles in `unit`.
-    pub(in crate::log) fn of(counting: &Counting, unit: Angle) -> Self {
+    pub(super) fn of(counting: &Counting, unit: Angle) -> Self {
         let joints = counting.motion().len();
         let order = |places: &[Place]| places.iter().map(|p| p.joint + 1).collect::<Vec<_>>();
         let unless = |order: Vec<usize>, plain: &[usize]| (order != plain).then_some(order);

@@ -1,85 +1,129 @@
 //! A layout that is another one but for what it says itself.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use toml::{Table, Value};
 
-use super::{built_in, is_file};
+use super::{Layout, built_in, is_file};
 use crate::log::error::{LayoutFault, LogError};
 
-/// Layouts that may be like one another before it is a circle.
-const LIMIT: usize = 8;
+/// Keys that a layout has to have, its own or of one that it is like.
+const NEEDED: [&str; 2] = ["name", "header"];
 /// Tables of which single keys are replaced; any other key is replaced as a whole.
 const BY_KEY: [&str; 2] = ["units", "columns"];
 
-/// What `text` says over what the layout says that it is `like`, and the files of the latter; `None` where it is like none, or is no
-/// TOML. `source` is what the text was read from.
-pub(super) fn overlaid(
-    text: &str,
-    source: &str,
-) -> Result<Option<(Table, Vec<PathBuf>)>, LayoutFault> {
-    let mut files = Vec::new();
-    let table = overlaid_within(text, source, LIMIT, &mut files)?;
-    Ok(table.map(|table| (table, files)))
+/// The text of the layout built in by this name, or of the file of this name in `folder`, and what it is called in messages.
+pub(super) fn text_of(name: &str, folder: &Path) -> Result<(String, String), LogError> {
+    if let Some(text) = built_in(name) {
+        return Ok((text.to_owned(), name.to_owned()));
+    }
+    if !is_file(name) {
+        return Err(LogError::UnknownLayout { name: name.to_owned() });
+    }
+    let file = folder.join(name).display().to_string();
+    match std::fs::read_to_string(&file) {
+        Ok(text) => Ok((text, file)),
+        Err(e) => Err(LogError::Layout { file, fault: LayoutFault::Read(e) }),
+    }
 }
 
+/// What `text`, read from `source`, says over what the layouts say that it is like.
+pub(super) fn overlaid(text: &str, source: &str) -> Result<Layout, LogError> {
+    let (table, layout) = overlaid_within(text, source, &mut Vec::new())?;
+    match NEEDED.into_iter().find(|key| !table.contains_key(*key)) {
+        Some(key) => {
+            let fault = LayoutFault::MissingKey { key };
+            Err(LogError::Layout { file: source.to_owned(), fault })
+        }
+        None => Ok(layout),
+    }
+}
+
+/// `above`: the files that are like this one.
 fn overlaid_within(
     text: &str,
     source: &str,
-    limit: usize,
-    files: &mut Vec<PathBuf>,
-) -> Result<Option<Table>, LayoutFault> {
-    let Ok(mut own) = text.parse::<Table>() else { return Ok(None) };
-    let Some(like) = own.remove(KEY) else { return Ok(None) };
-    let Value::String(like) = like else { return Err(LayoutFault::Toml(LIKE.to_owned())) };
-    let limit = limit
-        .checked_sub(1)
-        .ok_or_else(|| LayoutFault::LikeItself { like: like.clone(), limit: LIMIT })?;
-    let fault = |fault| LayoutFault::Like { like: like.clone(), fault: Box::new(fault) };
-    let (below, name) = match built_in(&like) {
-        Some(text) => (text.to_owned(), like.clone()),
-        None if !is_file(&like) => {
-            return Err(fault(LogError::UnknownLayout { name: like.clone() }));
-        }
-        None => {
-            let path = Path::new(source).parent().unwrap_or(Path::new("")).join(&like);
-            let name = path.display().to_string();
-            let text = std::fs::read_to_string(&path).map_err(|e| {
-                fault(LogError::Layout { file: name.clone(), fault: LayoutFault::Read(e) })
-            })?;
-            files.push(path);
-            (text, name)
-        }
+    above: &mut Vec<PathBuf>,
+) -> Result<(Table, Layout), LogError> {
+    let fault = |fault| LogError::Layout { file: source.to_owned(), fault };
+    let toml = |e: toml::de::Error| fault(LayoutFault::Toml(e.to_string()));
+    // Only text has lines that an error can name: what a file says is looked at before it is laid over another.
+    let own: Layout = toml::from_str(text).map_err(toml)?;
+    let table = text.parse::<Table>().map_err(toml)?;
+    let Some(like) = own.like.clone() else {
+        return Ok((table, Layout { source: source.to_owned(), ..own }));
     };
-    let in_file = |error| fault(LogError::Layout { file: name.clone(), fault: error });
-    let mut table = match overlaid_within(&below, &name, limit, files) {
-        Ok(Some(table)) => table,
-        Ok(None) => {
-            below.parse().map_err(|e: toml::de::Error| in_file(LayoutFault::Toml(e.to_string())))?
+    let in_like = |error| fault(LayoutFault::Like { like: like.clone(), fault: Box::new(error) });
+    let folder = Path::new(source).parent().unwrap_or(Path::new(""));
+    let (below, name) = match text_of(&like, folder) {
+        Err(LogError::Layout { file, fault: LayoutFault::Read(e) })
+            if e.kind() == ErrorKind::NotFound =>
+        {
+            let looked_for = std::path::absolute(&file).unwrap_or_else(|_| file.into());
+            return Err(fault(LayoutFault::NoLike { like: like.clone(), looked_for }));
         }
-        Err(circle @ LayoutFault::LikeItself { .. }) => return Err(circle),
-        Err(error) => return Err(in_file(error)),
+        found => found.map_err(in_like)?,
     };
-    for (key, value) in own {
-        match (table.get_mut(&key), value) {
+    above.push(real_path(source));
+    if above.contains(&real_path(&name)) {
+        return Err(fault(LayoutFault::LikeItself { like: like.clone() }));
+    }
+    let (mut merged, below) = overlaid_within(&below, &name, above).map_err(in_like)?;
+    for (key, value) in table {
+        match (merged.get_mut(&key), value) {
             (Some(Value::Table(there)), Value::Table(own)) if BY_KEY.contains(&&*key) => {
                 there.extend(own);
             }
             (_, value) => {
-                table.insert(key, value);
+                merged.insert(key, value);
             }
         }
     }
-    Ok(Some(table))
+    let layout: Layout = merged.clone().try_into().map_err(toml)?;
+    let below = Some(Box::new(below));
+    Ok((merged, Layout { source: source.to_owned(), below, ..layout }))
 }
 
-/// The key that names the other layout.
-const KEY: &str = "like";
-const LIKE: &str = "like is the name of a layout or of a .toml file, in quotes";
+/// By which a file is known under any of its names.
+fn real_path(name: &str) -> PathBuf {
+    Path::new(name).canonicalize().unwrap_or_else(|_| name.into())
+}
+
+/// What a layout must not say.
+type Check<'a> = &'a dyn Fn(&Layout) -> Result<(), LayoutFault>;
+
+impl Layout {
+    /// The files that say it, its own first; none of a layout built in.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let own = is_file(&self.source).then(|| PathBuf::from(&self.source));
+        let below = self.below.iter().flat_map(|below| below.files());
+        own.into_iter().chain(below).collect()
+    }
+
+    /// What `check` finds is told in the file from which on it is so.
+    pub(super) fn checked_by(&self, check: Check) -> Result<(), LogError> {
+        check(self).map_err(|fault| self.told(fault, check))
+    }
+
+    fn told(&self, fault: LayoutFault, check: Check) -> LogError {
+        let message = fault.to_string();
+        let is_same = |other: LayoutFault| other.to_string() == message;
+        let fault = match (&self.below, &self.like) {
+            (Some(below), Some(like)) if check(below).is_err_and(is_same) => {
+                LayoutFault::Like { like: like.clone(), fault: Box::new(below.told(fault, check)) }
+            }
+            _ => fault,
+        };
+        LogError::Layout { file: self.source.clone(), fault }
+    }
+}
 
 #[cfg(test)]
 mod tests {
-    use crate::log::Layout;
+    use std::path::MAIN_SEPARATOR;
+
+    use super::*;
     use crate::log::layout::block::Block;
 
     #[test]
@@ -93,34 +137,110 @@ mod tests {
         assert!(layout.counting(6).torque()[1].is_reversed);
     }
 
+    /// A folder of layouts.
+    struct Folder(tempfile::TempDir);
+
+    impl Folder {
+        fn with(files: &[(&str, &str)]) -> Self {
+            let folder = Self(tempfile::tempdir().unwrap());
+            for (name, text) in files {
+                std::fs::write(folder.0.path().join(name), text).unwrap();
+            }
+            folder
+        }
+
+        fn load(&self, name: &str) -> Result<Layout, LogError> {
+            Layout::load(self.0.path().join(name).to_str().unwrap())
+        }
+
+        /// Without the path of the folder.
+        fn told(&self, error: &LogError) -> String {
+            let path = format!("{}{MAIN_SEPARATOR}", self.0.path().display());
+            error.to_string().replace(&path, "")
+        }
+    }
+
     #[test]
     fn files_are_looked_for_beside_the_layout() {
-        let folder = tempfile::tempdir().unwrap();
-        let write = |name: &str, text: &str| {
-            let path = folder.path().join(name);
-            std::fs::write(&path, text).unwrap();
-            path.to_str().unwrap().to_owned()
-        };
-        write("a.toml", "name = \"a\"\nlike = \"armid\"\n[joints]\nmotion_reversed = [1, 2]\n");
-        let b =
-            write("b.toml", "name = \"b\"\nlike = \"a.toml\"\n[joints]\nmotion_reversed = [3]\n");
-        let layout = Layout::load(&b).unwrap();
+        let a = "name = \"a\"\nlike = \"armid\"\n[joints]\nmotion_reversed = [1, 2]\n";
+        let b = "like = \"a.toml\"\n[joints]\nmotion_reversed = [3]\n";
+        let folder = Folder::with(&[("a.toml", a), ("b.toml", b)]);
+        let layout = folder.load("b.toml").unwrap();
         let reversed: Vec<bool> =
             layout.counting(3).motion().iter().map(|place| place.is_reversed).collect();
         assert_eq!(reversed, [false, false, true]);
-        assert_eq!(layout.files().len(), 2, "{:?}", layout.files());
-        let circle = write("c.toml", "name = \"c\"\nlike = \"c.toml\"\n");
-        let message = Layout::load(&circle).unwrap_err().to_string();
-        assert!(message.contains("c.toml") && message.contains("leads back"), "{message}");
-        for (like, part) in
-            [("\"ur10\"", "ur10e_innopolis"), ("\"no.toml\"", "no.toml"), ("1", "in quotes")]
-        {
-            let path = write("d.toml", &format!("name = \"d\"\nlike = {like}\n"));
-            let message = Layout::load(&path).unwrap_err().to_string();
-            assert!(message.contains(part), "{like}: {message}");
+        assert_eq!((&*layout.name, layout.files().len()), ("a", 2), "{:?}", layout.files());
+    }
+
+    #[test]
+    fn a_layout_that_it_cannot_be_like_is_named() {
+        for (like, parts) in [
+            ("\"ur10\"", vec!["like = \"ur10\": unknown layout", "ur10e_innopolis"]),
+            ("\"no.toml\"", vec!["like = \"no.toml\": there is no no.toml", "beside"]),
+            ("1", vec!["line 2", "expected a string"]),
+            ("\"d.toml\"", vec!["like = \"d.toml\" leads back"]),
+        ] {
+            let text = format!("name = \"d\"\nlike = {like}\n");
+            let folder = Folder::with(&[("d.toml", &*text)]);
+            let message = folder.told(&folder.load("d.toml").unwrap_err());
+            assert!(message.starts_with("layout d.toml: "), "{like}: {message}");
+            assert!(parts.iter().all(|part| message.contains(*part)), "{like}: {message}");
         }
-        let bad = write("e.toml", "name = \"e\"\nlike = \"armid\"\n[joints]\nreversed = [1]\n");
-        let message = Layout::load(&bad).unwrap_err().to_string();
-        assert!(message.contains("reversed"), "{message}");
+    }
+
+    /// Layouts in a row end where one is like none; those in a circle do not.
+    #[test]
+    fn a_circle_is_no_long_row() {
+        let like = |k: usize| format!("name = \"{k}\"\nlike = \"{}.toml\"\n", k + 1);
+        let files: Vec<(String, String)> =
+            (0..20).map(|k| (format!("{k}.toml"), like(k))).collect();
+        let mut files: Vec<(&str, &str)> =
+            files.iter().map(|(name, text)| (&**name, &**text)).collect();
+        files.push(("20.toml", "like = \"armid\"\n"));
+        assert_eq!(Folder::with(&files).load("0.toml").unwrap().name, "0");
+        files.truncate(2);
+        files.push(("2.toml", "like = \"1.toml\"\n"));
+        let folder = Folder::with(&files);
+        let message = folder.told(&folder.load("0.toml").unwrap_err());
+        let chain = "layout 0.toml: like = \"1.toml\": layout 1.toml: like = \"2.toml\": layout 2.toml: like = \"1.toml\" leads back";
+        assert!(message.starts_with(chain), "{message}");
+    }
+
+    #[test]
+    fn a_mistake_is_told_in_the_file_that_makes_it() {
+        let chain = "layout b.toml: like = \"a.toml\": layout a.toml: ";
+        for (mistake, parts) in [
+            ("headr = true", ["line 3", "`headr`", "`like`"]),
+            ("units = { q = \"grad\" }", ["line 3", "`grad`", "`deg`"]),
+            ("drive_gain_nm_a = [1, -2]", ["drive_gain_nm_a", "joint 2", "-2"]),
+            ("joints = { motion_reversed = [2, 2] }", ["motion_reversed", "joint 2", "twice"]),
+            ("joints = { order = [1, 2] }", ["order", "2 number", "6 joints"]),
+            ("joints = { zero = [0] }", ["zero", "1 number", "6 joints"]),
+            ("joints = { motion_reversed = [7] }", ["motion_reversed", "joint 7", "6 joints"]),
+        ] {
+            let a = format!("name = \"a\"\nlike = \"armid\"\n{mistake}\n");
+            let b = "name = \"b\"\nlike = \"a.toml\"\n";
+            let folder = Folder::with(&[("a.toml", &*a), ("b.toml", b)]);
+            for (file, begin) in [("a.toml", "layout a.toml: "), ("b.toml", chain)] {
+                let used = folder.load(file).and_then(|layout| layout.check_for(6));
+                let message = folder.told(&used.unwrap_err());
+                assert!(message.starts_with(begin), "{mistake}: {message}");
+                assert!(parts.iter().all(|part| message.contains(*part)), "{mistake}: {message}");
+            }
+        }
+        let a = "name = \"a\"\nlike = \"armid\"\njoints = { zero = [0, 90] }\nunits = { q = \"deg\" }\n";
+        let b = "name = \"b\"\nlike = \"a.toml\"\nunits = { q = \"rad\" }\n";
+        let folder = Folder::with(&[("a.toml", a), ("b.toml", b)]);
+        folder.load("a.toml").unwrap();
+        let message = folder.told(&folder.load("b.toml").unwrap_err());
+        assert!(message.starts_with("layout b.toml: zero under [joints] is 90"), "{message}");
+    }
+
+    #[test]
+    fn keys_that_a_layout_needs_are_missed_by_name() {
+        for (text, key) in [("header = true", "name"), ("name = \"a\"", "header")] {
+            let message = Layout::from_toml(text, "a.toml").unwrap_err().to_string();
+            assert!(message.starts_with(&format!("layout a.toml: {key} is missing")), "{message}");
+        }
     }
 }

@@ -9,7 +9,7 @@ mod joints;
 mod like;
 mod units;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::Deserialize;
 
@@ -93,9 +93,13 @@ pub(super) fn built_in_without_header() -> impl Iterator<Item = &'static str> {
 #[serde(deny_unknown_fields)]
 pub struct Layout {
     /// Name, for messages.
+    // What stands in one file need not stand in another that is like it: `like` knows what is missing in all.
+    #[serde(default)]
     pub name: String,
+    like: Option<String>,
     #[serde(default)]
     pub(super) delimiter: DelimiterChoice,
+    #[serde(default)]
     pub(super) header: bool,
     #[serde(default)]
     pub(super) decimal_comma: bool,
@@ -103,13 +107,17 @@ pub struct Layout {
     #[serde(default)]
     pub(super) units: Units,
     #[serde(default)]
-    pub(super) joints: Joints,
+    joints: Joints,
+    #[serde(default)]
     columns: Blocks,
     #[serde(default, rename = "width")]
     pub(super) widths: Vec<Width>,
-    /// Files that say it.
+    /// Its file, or the name that it is built in by.
     #[serde(skip)]
-    files: Vec<PathBuf>,
+    pub(super) source: String,
+    /// The layout that it is like.
+    #[serde(skip)]
+    below: Option<Box<Layout>>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
@@ -144,40 +152,23 @@ impl Layout {
     /// # Errors
     /// [`LogError::UnknownLayout`], or [`LogError::Layout`] with what is wrong in the file.
     pub fn load(name_or_path: &str) -> Result<Self, LogError> {
-        if let Some(text) = built_in(name_or_path) {
-            return Self::from_toml(text, name_or_path);
-        }
-        if !is_file(name_or_path) {
-            return Err(LogError::UnknownLayout { name: name_or_path.to_owned() });
-        }
-        let text = std::fs::read_to_string(name_or_path).map_err(|e| LogError::Layout {
-            file: name_or_path.to_owned(),
-            fault: LayoutFault::Read(e),
-        })?;
-        let mut layout = Self::from_toml(&text, name_or_path)?;
-        layout.files.insert(0, name_or_path.into());
-        Ok(layout)
+        let (text, source) = like::text_of(name_or_path, Path::new(""))?;
+        Self::from_toml(&text, &source)
     }
 
-    /// From the text of a layout file; `source` names it in messages.
+    /// From the text of a layout; `source` is its file, or names it in messages.
     ///
     /// # Errors
     /// [`LogError::Layout`] with what is wrong.
     pub fn from_toml(text: &str, source: &str) -> Result<Self, LogError> {
-        let fault = |fault| LogError::Layout { file: source.to_owned(), fault };
-        let toml = |e: toml::de::Error| fault(LayoutFault::Toml(e.to_string()));
-        let layout = match like::overlaid(text, source).map_err(fault)? {
-            Some((table, files)) => Self { files, ..table.try_into().map_err(toml)? },
-            // Only text has lines that an error can name.
-            None => toml::from_str(text).map_err(toml)?,
-        };
-        layout.check().map_err(fault)?;
+        let layout = like::overlaid(text, source)?;
+        layout.checked_by(&Self::check)?;
         Ok(layout)
     }
 
-    /// The files that say it, its own first; none of a layout built in.
-    pub fn files(&self) -> &[PathBuf] {
-        &self.files
+    /// Whether it can be said of an arm with so many joints.
+    pub(super) fn check_for(&self, joints: usize) -> Result<(), LogError> {
+        self.checked_by(&|layout: &Self| layout.joints.check_for(joints))
     }
 
     /// How it has the joints of an arm with so many counted.
