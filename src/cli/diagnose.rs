@@ -5,13 +5,13 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
-use super::identify::{LoadedLog, ProcessingArgs, SourceArgs};
+use super::identify::{LoadedLog, ProcessingArgs, SourceArgs, read_logs};
 use super::simulated::Simulated;
 use super::{CommandResult, Outcome};
 use crate::base::{BaseSet, Parameterisation};
 use crate::diagnose::{DIAGNOSE_SCHEMA, DiagnoseError, Diagnoser, Diagnosis, Validation};
 use crate::dynamics::Model;
-use crate::log::Log;
+use crate::log::{Layout, Log};
 use crate::montecarlo::Scenario;
 use crate::output::{OutputError, check_outputs};
 use crate::report::diagnose::{cause_table, held_out_table, limit_table, page};
@@ -84,13 +84,13 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
         .into());
     }
     let options = args.processing.options()?;
-    let (arm, mut inputs) = args.source.arm()?;
+    let (arm, layout, mut inputs) = args.source.load()?;
     let logs = args.logs.iter().chain(&args.held_out).chain(&args.sim);
     args.check_outputs(inputs.iter().map(|input| &input.path).chain(logs))?;
     let set = BaseSet::find(&arm, Parameterisation::full(arm.dof(), arm.torque_offsets))?;
     let model = Model::new(&arm);
-    let logs = args.source.read(&arm, &args.logs)?;
-    let held_out = args.source.read(&arm, &args.held_out)?;
+    let logs = read_logs(&args.logs, &arm, &layout)?;
+    let held_out = read_logs(&args.held_out, &arm, &layout)?;
     if let Some(same) = held_out.iter().find(|h| logs.iter().any(|log| h.is_of(log))) {
         let file = same.input.path.display();
         return Err(format!("{file} is held out, but it is also the log that is diagnosed").into());
@@ -119,7 +119,7 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
     let nominal = simulation.as_ref().map(Simulated::nominal);
     let mut finding = match diagnoser.diagnose(&log.measurement(), &validations, nominal) {
         Err(error) if error.is_declined() => {
-            return decline(args, &log.log, &error, program);
+            return decline(args, &layout, &log.log, &error, program);
         }
         finding => finding?,
     };
@@ -199,14 +199,15 @@ fn mass(text: &str) -> Result<f64, String> {
 /// recorded.
 fn decline(
     args: &DiagnoseArgs,
+    layout: &Layout,
     log: &Log,
     error: &DiagnoseError,
     program: Program,
 ) -> CommandResult {
     let sentence = error.declined(&log.source);
-    let misread = error.misreading().cloned();
-    let misread = misread.map(|misreading| args.source.misread(log.source.clone(), misreading));
-    let misread = misread.transpose()?;
+    let misreading = error.misreading().cloned();
+    let misread =
+        misreading.map(|misreading| MisreadLog::new(log.source.clone(), misreading, layout));
     say!("{sentence}");
     if let Some(advice) = misread.as_ref().and_then(MisreadLog::advice) {
         say!("\n{advice}\n");

@@ -15,7 +15,7 @@ use crate::identify::{
     Estimator, FitError, Identification, Identifier, IdentifyError, Measurement, Misreading,
     Options, Processing, Regression, Several, each_alone, pooled,
 };
-use crate::log::{Layout, Log, LogError, read_log};
+use crate::log::{Layout, Log, read_log};
 use crate::output::check_outputs;
 use crate::report::identify::{
     Declined, IDENTIFY_SCHEMA, Result as IdentifyResult, Training, Validation, facts, page,
@@ -166,36 +166,29 @@ impl LoadedLog {
 }
 
 impl SourceArgs {
-    /// The arm, and the files that say what it is and how its logs are read; what was assumed about it goes to the
-    /// terminal.
-    pub fn arm(&self) -> Result<(Arm, Vec<Input>), Box<dyn std::error::Error>> {
+    /// The arm, the layout of its logs, and the files that say both; what was assumed about the arm goes to the terminal.
+    pub fn load(&self) -> Result<(Arm, Layout, Vec<Input>), Box<dyn std::error::Error>> {
         let LoadedArm { arm, mut files, .. } = load_robot(&self.robot)?;
-        files.extend(Layout::load(&self.layout)?.files());
-        Ok((arm, inputs(&files)?))
-    }
-
-    /// What is said of a log that fits when it is read otherwise.
-    pub fn misread(&self, log: String, misreading: Misreading) -> Result<MisreadLog, LogError> {
-        let layout = misreading.layout(&Layout::load(&self.layout)?, &self.layout);
-        Ok(MisreadLog { log, misreading, layout })
-    }
-
-    /// Reads logs and prints what became of their rows.
-    pub fn read(
-        &self,
-        arm: &Arm,
-        files: &[PathBuf],
-    ) -> Result<Vec<LoadedLog>, Box<dyn std::error::Error>> {
         let layout = Layout::load(&self.layout)?;
-        let read = |file: &PathBuf| {
-            let log = read_log(file, &layout, arm.dof())?;
-            eprintln!("{}:\n{}", file.display(), log.rows);
-            let torque_nm = log.torque_nm(arm)?;
-            let input = Input { path: file.clone(), sha256: log.sha256.clone() };
-            Ok(LoadedLog { log, torque_nm, input })
-        };
-        files.iter().map(read).collect()
+        files.extend(layout.files());
+        Ok((arm, layout, inputs(&files)?))
     }
+}
+
+/// Reads logs and prints what became of their rows.
+pub fn read_logs(
+    files: &[PathBuf],
+    arm: &Arm,
+    layout: &Layout,
+) -> Result<Vec<LoadedLog>, Box<dyn std::error::Error>> {
+    let read = |file: &PathBuf| {
+        let log = read_log(file, layout, arm.dof())?;
+        eprintln!("{}:\n{}", file.display(), log.rows);
+        let torque_nm = log.torque_nm(arm)?;
+        let input = Input { path: file.clone(), sha256: log.sha256.clone() };
+        Ok(LoadedLog { log, torque_nm, input })
+    };
+    files.iter().map(read).collect()
 }
 
 /// Runs the command.
@@ -205,7 +198,7 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         let message = "the weight is found by leaving out periods of one log in turn; of several logs give it as a number";
         return Err(format!("--prior-weight auto: {message}").into());
     }
-    let (arm, mut inputs) = args.source.arm()?;
+    let (arm, layout, mut inputs) = args.source.load()?;
     check_outputs(
         [&args.json, &args.report].into_iter().flatten(),
         inputs.iter().map(|input| &input.path).chain(&args.logs).chain(&args.validate),
@@ -213,8 +206,8 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
     let parameterisation = Parameterisation::of(&arm, args.reduced.as_deref())?;
     let set = BaseSet::find(&arm, parameterisation)?;
     let model = Model::new(&arm);
-    let logs = args.source.read(&arm, &args.logs)?;
-    let validation_logs = args.source.read(&arm, &args.validate)?;
+    let logs = read_logs(&args.logs, &arm, &layout)?;
+    let validation_logs = read_logs(&args.validate, &arm, &layout)?;
     for (k, log) in logs.iter().enumerate() {
         if let Some(same) = logs[..k].iter().find(|other| log.is_of(other)) {
             let [one, other] = [same, log].map(|l| l.input.path.display());
@@ -249,9 +242,8 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
     }
     let misread = regressions.iter().zip(&logs).find_map(|(regression, log)| {
         let misreading = Misreading::of(&arm, regression, &options)?;
-        Some(args.source.misread(log.log.source.clone(), misreading))
+        Some(MisreadLog::new(log.log.source.clone(), misreading, &layout))
     });
-    let misread = misread.transpose()?;
     let several = each_alone(&mut identifier, &regressions)?;
     let mut regression = Regression::joined(regressions)?;
     let unused = args.processing.unused(&regression.prepared.processing);

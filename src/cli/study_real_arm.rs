@@ -4,17 +4,18 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::identify::{LoadedLog, SourceArgs};
+use super::identify::{LoadedLog, read_logs};
+use super::robot::load_robot;
 use super::{CommandResult, Outcome};
 use crate::base::{BaseSet, Parameterisation};
 use crate::diagnose::{Cause, Diagnoser, Finding, Kind, Validation, repeated};
 use crate::dynamics::Model;
 use crate::identify::Options;
-use crate::log::Effort;
+use crate::log::{Effort, Layout};
 use crate::output::{check_outputs, write_atomically};
 use crate::report::json::{Input, Program};
 use crate::report::real_arm::{Pair, RealArmStudy, Recorded};
-use crate::robot::Arm;
+use crate::robot::{Arm, LoadedArm};
 
 #[derive(Debug, Args)]
 pub(super) struct RealArmArgs {
@@ -66,18 +67,18 @@ pub(super) fn run(args: &RealArmArgs) -> CommandResult {
         [&args.markdown, &args.report].into_iter().flatten(),
         logs.map(|log| folder.join(log)),
     )?;
-    let sources = LAYOUTS.map(|layout| SourceArgs { robot: "ur10e".into(), layout: layout.into() });
-    let (arm, _) = sources[0].arm()?;
+    let LoadedArm { arm, .. } = load_robot("ur10e")?;
+    let [controllers, authors] = [Layout::load(LAYOUTS[0])?, Layout::load(LAYOUTS[1])?];
     let set = BaseSet::find(&arm, Parameterisation::full(arm.dof(), arm.torque_offsets))?;
     let model = Model::new(&arm);
-    let read = |source: &SourceArgs, file: &str| -> Result<LoadedLog, Box<dyn std::error::Error>> {
-        let mut logs = source.read(&arm, &[folder.join(file)])?;
+    let read = |layout: &Layout, file: &str| -> Result<LoadedLog, Box<dyn std::error::Error>> {
+        let mut logs = read_logs(&[folder.join(file)], &arm, layout)?;
         logs.pop().ok_or_else(|| format!("{file}: not read").into())
     };
     let mut diagnoser = Diagnoser::new(&arm, &model, &set, Options::default());
 
-    let training = read(&sources[0], TRAINING)?;
-    let held_out = HELD_OUT.iter().map(|f| read(&sources[0], f)).collect::<Result<Vec<_>, _>>()?;
+    let training = read(&controllers, TRAINING)?;
+    let held_out = HELD_OUT.iter().map(|f| read(&controllers, f)).collect::<Result<Vec<_>, _>>()?;
     let manufacturer =
         held_out.iter().map(|l| l.log.target_torque_nm(&arm)).collect::<Result<Vec<_>, _>>()?;
     let validations: Vec<Validation> = held_out
@@ -90,10 +91,10 @@ pub(super) fn run(args: &RealArmArgs) -> CommandResult {
         .collect();
     let finding = diagnoser.diagnose(&training.measurement(), &validations, None)?;
 
-    let loaded = read(&sources[0], LOADED)?;
+    let loaded = read(&controllers, LOADED)?;
     let again = diagnoser.diagnose(&loaded.measurement(), &[], None)?;
     let repeated = repeated(&finding, &again);
-    let [unload, load] = [read(&sources[0], SECOND_PAIR[0])?, read(&sources[0], SECOND_PAIR[1])?];
+    let [unload, load] = [read(&controllers, SECOND_PAIR[0])?, read(&controllers, SECOND_PAIR[1])?];
     let second = diagnoser.diagnose(&unload.measurement(), &[], None)?;
     let mut pairs = Vec::new();
     let mut compare = |diagnoser: &mut Diagnoser,
@@ -114,11 +115,11 @@ pub(super) fn run(args: &RealArmArgs) -> CommandResult {
     for log in held_out.iter().take(2).chain([&unload]) {
         compare(&mut diagnoser, &finding, [&training, log], bare, "controller's")?;
     }
-    let others = [read(&sources[1], TRAINING)?, read(&sources[1], LOADED)?];
+    let others = [read(&authors, TRAINING)?, read(&authors, LOADED)?];
     let other = diagnoser.diagnose(&others[0].measurement(), &[], None)?;
     compare(&mut diagnoser, &other, [&others[0], &others[1]], body, "authors'")?;
 
-    let touched = CONTACTS.iter().map(|f| read(&sources[0], f)).collect::<Result<Vec<_>, _>>()?;
+    let touched = CONTACTS.iter().map(|f| read(&controllers, f)).collect::<Result<Vec<_>, _>>()?;
     let mut contacts = Vec::new();
     for log in &touched {
         let finding = diagnoser.diagnose(&log.measurement(), &[], None)?;

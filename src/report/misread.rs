@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::Section;
 use crate::identify::{Change, Misreading};
+use crate::log::Layout;
 
 /// A log that fits its arm when it is read otherwise.
 #[derive(Debug, Clone, Serialize)]
@@ -18,6 +19,12 @@ pub struct MisreadLog {
 }
 
 impl MisreadLog {
+    /// Of `log`, which was read with `layout`.
+    pub fn new(log: String, misreading: Misreading, layout: &Layout) -> Self {
+        let layout = misreading.layout(layout);
+        Self { log, misreading, layout }
+    }
+
     /// The layout with which the log fits, for the terminal.
     pub fn advice(&self) -> Option<String> {
         let lines = self.layout.as_ref()?.lines();

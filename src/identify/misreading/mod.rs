@@ -80,11 +80,11 @@ impl Misreading {
         Some(Self { changes: reading.changes(), as_read, otherwise, reading })
     }
 
-    /// The lines of a layout with which the log is read as it was recorded, `layout` being the one it is read with, under the name or
-    /// in the file `like`; `None` where it is the arm that is mounted otherwise, and no more.
-    pub fn layout(&self, layout: &Layout, like: &str) -> Option<String> {
+    /// The lines of a layout with which the log is read as it was recorded, `layout` being the one it is read with; `None` where it is
+    /// the arm that is mounted otherwise, and no more.
+    pub fn layout(&self, layout: &Layout) -> Option<String> {
         let counting = self.reading.counting();
-        (!counting.is_as_described()).then(|| layout.recounted(like, counting))
+        (!counting.is_as_described()).then(|| layout.recounted(counting))
     }
 
     /// Whether it is as it is read, or nearly so, but for the sign of all torques.

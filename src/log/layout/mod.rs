@@ -176,15 +176,15 @@ impl Layout {
         self.joints.counting(joints, self.units.q)
     }
 
-    /// The lines of a layout that reads as this one, named `like`, and counts joints as `counting` does what this one reads (of as many
-    /// joints as a log that it has read).
-    pub(crate) fn recounted(&self, like: &str, counting: &Counting) -> String {
+    /// The lines of a layout that reads as this one, and counts joints as `counting` does what this one reads (of as many joints as a
+    /// log that it has read).
+    pub(crate) fn recounted(&self, counting: &Counting) -> String {
         let earlier = self.counting(counting.motion().len());
         let mut both = counting.of_what_is_read_with(&earlier);
         both.leave_out_whole_turns();
         let joints = Joints::of(&both, self.units.q).lines();
         let name = format!("{} recounted", self.name);
-        format!("name = {name:?}\nlike = {like:?}\n\n{joints}")
+        format!("name = {name:?}\nlike = {:?}\n\n{joints}", self.source)
     }
 
     pub(super) fn columns(&self, block: Block) -> Option<&Columns> {
