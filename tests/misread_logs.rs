@@ -3,7 +3,8 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use armid::identify::{Change, Identifier, Misreading, Options};
+use armid::identify::Channels::{All, Motion, Torque};
+use armid::identify::{Change, Channels, Identifier, Misreading, Options};
 use armid::plant::Measured;
 use armid::robot::{Arm, JointSignals};
 use nalgebra::Vector3;
@@ -26,36 +27,38 @@ fn misreading(run: &Run, arm: &Arm, log: &Measured, options: &Options) -> Option
 /// `log` as it is recorded by something that differs from the description of the arm by `change`: whoever reads it has to change it so.
 fn recorded(log: &Measured, change: &Change) -> Measured {
     let mut log = log.clone();
-    let Measured { q_rad, qd_rad_s, torque_nm, .. } = &mut log;
-    match *change {
-        Change::JointsExchanged { joints } => {
-            [q_rad, qd_rad_s, torque_nm].into_iter().for_each(|signals| signals.exchange(joints));
+    match change {
+        Change::Ordered { what, order } => {
+            channels(&mut log, *what).into_iter().for_each(|signals| stand_in(signals, order));
         }
-        Change::TorquesExchanged { joints } => torque_nm.exchange(joints),
-        Change::MotionsExchanged { joints } => {
-            [q_rad, qd_rad_s].into_iter().for_each(|signals| signals.exchange(joints));
+        Change::Reversed { what, joint } => {
+            channels(&mut log, *what).into_iter().for_each(|signals| signals.reverse(*joint));
         }
-        Change::TorqueReversed { joints: [j] } => torque_nm.reverse(j),
-        Change::AllTorquesReversed => (0..6).for_each(|j| torque_nm.reverse(j)),
-        Change::JointReversed { joints: [j] } => {
-            [q_rad, qd_rad_s, torque_nm].into_iter().for_each(|signals| signals.reverse(j));
-        }
-        Change::MotionReversed { joints: [j] } => {
-            [q_rad, qd_rad_s].into_iter().for_each(|signals| signals.reverse(j));
-        }
-        Change::ZeroTurned { joints: [j], add_rad } => {
-            q_rad.joint_mut(j).iter_mut().for_each(|q| *q -= add_rad);
-        }
-        Change::JointsOrdered { ref order } => {
-            [q_rad, qd_rad_s, torque_nm].into_iter().for_each(|signals| stand_in(signals, order));
-        }
-        Change::TorquesOrdered { ref order } => stand_in(torque_nm, order),
-        Change::MotionsOrdered { ref order } => {
-            [q_rad, qd_rad_s].into_iter().for_each(|signals| stand_in(signals, order));
+        Change::AllTorquesReversed => (0..6).for_each(|j| log.torque_nm.reverse(j)),
+        Change::ZeroTurned { joint, add_rad } => {
+            log.q_rad.joint_mut(*joint).iter_mut().for_each(|q| *q -= add_rad);
         }
         Change::Mounted { .. } => unreachable!("no channel says how the arm is mounted"),
     }
     log
+}
+
+fn channels(log: &mut Measured, what: Channels) -> Vec<&mut JointSignals> {
+    let Measured { q_rad, qd_rad_s, torque_nm, .. } = log;
+    match what {
+        All => vec![q_rad, qd_rad_s, torque_nm],
+        Motion => vec![q_rad, qd_rad_s],
+        Torque => vec![torque_nm],
+    }
+}
+
+/// Two joints of a UR5 in each other's columns.
+fn exchanged(what: Channels, joints: [usize; 2]) -> Change {
+    Change::exchanged(what, joints, 6)
+}
+
+fn reversed(what: Channels, joint: usize) -> Change {
+    Change::Reversed { what, joint }
 }
 
 /// Puts each joint of an arm where `order` has it.
@@ -76,7 +79,7 @@ fn is_named(found: Option<Misreading>, hidden: &[Change]) {
 
 /// Asserts that it is told where the log of `run` has two joints in each other's columns.
 pub fn assert_exchange_is_named(run: &Run, joints: [usize; 2]) {
-    let hidden = Change::JointsExchanged { joints };
+    let hidden = Change::exchanged(All, joints, run.arm.dof());
     let log = recorded(&run.log, &hidden);
     is_named(misreading(run, &run.arm, &log, &run.options), &[hidden]);
 }
@@ -87,20 +90,20 @@ fn each_way_to_misread_a_log_is_named() {
     let run = run(("ur5_identification", 4), "");
     let single = Options { period_s: Some(0.0), ..run.options.clone() };
     for hidden in [
-        Change::JointsExchanged { joints: [0, 2] },
-        Change::JointsExchanged { joints: [3, 4] },
-        Change::TorquesExchanged { joints: [1, 2] },
-        Change::TorquesExchanged { joints: [4, 5] },
-        Change::MotionsExchanged { joints: [0, 2] },
-        Change::TorqueReversed { joints: [1] },
-        Change::TorqueReversed { joints: [5] },
+        exchanged(All, [0, 2]),
+        exchanged(All, [3, 4]),
+        exchanged(Torque, [1, 2]),
+        exchanged(Torque, [4, 5]),
+        exchanged(Motion, [0, 2]),
+        reversed(Torque, 1),
+        reversed(Torque, 5),
         Change::AllTorquesReversed,
-        Change::JointReversed { joints: [2] },
-        Change::MotionReversed { joints: [3] },
-        Change::ZeroTurned { joints: [1], add_rad: -FRAC_PI_2 },
-        Change::ZeroTurned { joints: [2], add_rad: 2.0 * FRAC_PI_2 },
-        Change::JointsOrdered { order: vec![1, 2, 3, 4, 5, 0] },
-        Change::TorquesOrdered { order: vec![5, 0, 1, 2, 3, 4] },
+        reversed(All, 2),
+        reversed(Motion, 3),
+        Change::ZeroTurned { joint: 1, add_rad: -FRAC_PI_2 },
+        Change::ZeroTurned { joint: 2, add_rad: 2.0 * FRAC_PI_2 },
+        Change::Ordered { what: All, order: vec![1, 2, 3, 4, 5, 0] },
+        Change::Ordered { what: Torque, order: vec![5, 0, 1, 2, 3, 4] },
     ] {
         let log = recorded(&run.log, &hidden);
         let hidden = [hidden];
@@ -113,12 +116,12 @@ fn each_way_to_misread_a_log_is_named() {
 #[test]
 fn several_ways_at_once_are_named() {
     let run = run(("ur5_validation", 4), "");
-    let zero = |j: usize| Change::ZeroTurned { joints: [j], add_rad: -FRAC_PI_2 };
+    let zero = |joint| Change::ZeroTurned { joint, add_rad: -FRAC_PI_2 };
     for hidden in [
-        vec![Change::JointsExchanged { joints: [0, 2] }, Change::TorqueReversed { joints: [1] }],
+        vec![exchanged(All, [0, 2]), reversed(Torque, 1)],
         vec![zero(1), zero(3)],
-        vec![Change::TorqueReversed { joints: [0] }, Change::TorqueReversed { joints: [3] }],
-        vec![Change::JointsExchanged { joints: [0, 2] }, zero(1), zero(3)],
+        vec![reversed(Torque, 0), reversed(Torque, 3)],
+        vec![exchanged(All, [0, 2]), zero(1), zero(3)],
     ] {
         let log = hidden.iter().fold(run.log.clone(), |log, change| recorded(&log, change));
         is_named(misreading(&run, &run.arm, &log, &run.options), &hidden);
@@ -135,8 +138,8 @@ fn where_there_is_no_friction_gravity_tells_the_sign_of_torques() {
         let torque_nm = log.torque_nm.joint_mut(j).iter_mut();
         torque_nm.zip(qd_rad_s).for_each(|(nm, qd)| *nm -= run.model.friction(j, qd));
     }
-    let reversed = Change::TorqueReversed { joints: [3] };
-    for hidden in [vec![reversed.clone()], vec![Change::AllTorquesReversed, reversed]] {
+    let single = reversed(Torque, 3);
+    for hidden in [vec![single.clone()], vec![Change::AllTorquesReversed, single]] {
         let log = hidden.iter().fold(log.clone(), |log, change| recorded(&log, change));
         is_named(misreading(&run, &run.arm, &log, &run.options), &hidden);
     }

@@ -47,7 +47,7 @@ pub use even::BetweenRows;
 pub use fit::{Estimator, Fit, FitError, Fitter, Weighting};
 pub use identifier::{Identification, Identifier, KEPT_RATE, MANY_PERIODS, Regression};
 pub use lack_of_fit::{Floor, LackOfFit, by_noise_in_words};
-pub use misreading::{Change, Match, Misreading};
+pub use misreading::{Change, Channels, Match, Misreading};
 pub use options::Options;
 pub use pooled::{Agreement, Several, each_alone, pooled};
 pub use prediction::{MOVING_RAD_S, Prediction};

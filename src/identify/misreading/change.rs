@@ -4,75 +4,65 @@ use std::f64::consts::FRAC_PI_2;
 use std::fmt;
 
 use nalgebra::Vector3;
-use serde::Serialize;
+use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use crate::robot::Arm;
 
+/// Which channels of a joint are read otherwise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Channels {
+    /// Angle, velocity and torque.
+    All,
+    /// Angle and velocity.
+    Motion,
+    /// The torque, or the current.
+    Torque,
+}
+
+impl Channels {
+    /// Whether angle and velocity are among them.
+    pub(super) fn have_motion(self) -> bool {
+        self != Self::Torque
+    }
+
+    /// Whether the torque is.
+    pub(super) fn have_torque(self) -> bool {
+        self != Self::Motion
+    }
+
+    /// In the kinds of results; of one joint; of several.
+    fn words(self) -> [&'static str; 3] {
+        match self {
+            Self::All => ["joint", "angle, velocity and torque", "the columns"],
+            Self::Motion => ["motion", "angle and velocity", "angles and velocities"],
+            Self::Torque => ["torque", "the torque", "the torques"],
+        }
+    }
+}
+
 /// One difference between how a log is read and how it was recorded; joints are 0-based.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[serde(tag = "kind", rename_all = "snake_case")]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Change {
-    /// Angle, velocity and torque of one joint stand in the columns of the other: ROS sorts joints by name.
-    JointsExchanged {
-        /// Both.
-        #[serde(serialize_with = "from_one")]
-        joints: [usize; 2],
-    },
-    /// The torques alone do.
-    TorquesExchanged {
-        /// Both.
-        #[serde(serialize_with = "from_one")]
-        joints: [usize; 2],
-    },
-    /// Angles and velocities alone do.
-    MotionsExchanged {
-        /// Both.
-        #[serde(serialize_with = "from_one")]
-        joints: [usize; 2],
-    },
-    /// Angle, velocity and torque stand in another order.
-    JointsOrdered {
-        /// Of each joint, where it stands.
-        #[serde(serialize_with = "from_one")]
+    /// Channels of joints stand in the columns of others: ROS sorts joints by name.
+    Ordered {
+        /// Which channels.
+        what: Channels,
+        /// Of each joint, where they stand.
         order: Vec<usize>,
     },
-    /// The torques alone do.
-    TorquesOrdered {
-        /// Of each joint, where it stands.
-        #[serde(serialize_with = "from_one")]
-        order: Vec<usize>,
-    },
-    /// Angles and velocities alone do.
-    MotionsOrdered {
-        /// Of each joint, where it stands.
-        #[serde(serialize_with = "from_one")]
-        order: Vec<usize>,
-    },
-    /// The torque drives against positive velocity.
-    TorqueReversed {
+    /// Channels of a joint count the other way than the description's axis.
+    Reversed {
+        /// Which channels.
+        what: Channels,
         /// Whose.
-        #[serde(serialize_with = "from_one")]
-        joints: [usize; 1],
+        joint: usize,
     },
-    /// All torques do: they are what the load does to the drives.
+    /// All torques count the other way: they are what the load does to the drives.
     AllTorquesReversed,
-    /// Angle, velocity and torque count the other way than the description's axis.
-    JointReversed {
-        /// Whose.
-        #[serde(serialize_with = "from_one")]
-        joints: [usize; 1],
-    },
-    /// Angle and velocity do, the torque does not.
-    MotionReversed {
-        /// Whose.
-        #[serde(serialize_with = "from_one")]
-        joints: [usize; 1],
-    },
     /// The angle is counted from a zero that is quarter turns away from the description's.
     ZeroTurned {
         /// Whose.
-        #[serde(serialize_with = "from_one")]
-        joints: [usize; 1],
+        joint: usize,
         /// What has to be added to the angles, rad.
         add_rad: f64,
     },
@@ -83,11 +73,46 @@ pub enum Change {
     },
 }
 
-fn from_one<S: serde::Serializer>(
-    joints: &impl AsRef<[usize]>,
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
-    serializer.collect_seq(joints.as_ref().iter().map(|j| j + 1))
+/// With a `kind` of its own for two joints that are exchanged, and joints that count from 1.
+impl Serialize for Change {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let key = |what: &Channels| what.words()[0];
+        let from_one = |joints: &[usize]| joints.iter().map(|j| j + 1).collect::<Vec<_>>();
+        let mut map = serializer.serialize_map(None)?;
+        match self {
+            Self::Ordered { what, order } => match pair(order) {
+                Some(joints) => {
+                    map.serialize_entry("kind", &format!("{}s_exchanged", key(what)))?;
+                    map.serialize_entry("joints", &from_one(&joints))?;
+                }
+                None => {
+                    map.serialize_entry("kind", &format!("{}s_ordered", key(what)))?;
+                    map.serialize_entry("order", &from_one(order))?;
+                }
+            },
+            Self::Reversed { what, joint } => {
+                map.serialize_entry("kind", &format!("{}_reversed", key(what)))?;
+                map.serialize_entry("joints", &[joint + 1])?;
+            }
+            Self::AllTorquesReversed => map.serialize_entry("kind", "all_torques_reversed")?,
+            Self::ZeroTurned { joint, add_rad } => {
+                map.serialize_entry("kind", "zero_turned")?;
+                map.serialize_entry("joints", &[joint + 1])?;
+                map.serialize_entry("add_rad", add_rad)?;
+            }
+            Self::Mounted { gravity_m_s2 } => {
+                map.serialize_entry("kind", "mounted")?;
+                map.serialize_entry("gravity_m_s2", gravity_m_s2)?;
+            }
+        }
+        map.end()
+    }
+}
+
+/// The joints that stand in each other's places, where all others stand in their own.
+fn pair(order: &[usize]) -> Option<[usize; 2]> {
+    let moved: Vec<usize> = (0..order.len()).filter(|k| order[*k] != *k).collect();
+    moved.try_into().ok()
 }
 
 /// What it costs more to have encoders read otherwise than torques, in steps.
@@ -96,24 +121,28 @@ const ENCODERS: f64 = 0.1;
 const SAME_DIRECTION: f64 = 0.99;
 
 impl Change {
+    /// Two joints of an arm with so many stand in each other's places.
+    pub fn exchanged(what: Channels, [a, b]: [usize; 2], joints: usize) -> Self {
+        let mut order: Vec<usize> = (0..joints).collect();
+        order.swap(a, b);
+        Self::Ordered { what, order }
+    }
+
     /// All that are looked for.
     pub(super) fn all(arm: &Arm) -> Vec<Self> {
-        let joints = 0..arm.dof();
-        let pairs = joints.clone().flat_map(|a| (a + 1..arm.dof()).map(move |b| [a, b]));
-        let of_pairs = pairs.flat_map(|joints| {
-            [
-                Self::JointsExchanged { joints },
-                Self::TorquesExchanged { joints },
-                Self::MotionsExchanged { joints },
-            ]
+        let n = arm.dof();
+        let pairs = (0..n).flat_map(|a| (a + 1..n).map(move |b| [a, b]));
+        let of_pairs = pairs.flat_map(|pair| {
+            let places = [Channels::All, Channels::Torque, Channels::Motion];
+            places.map(|what| Self::exchanged(what, pair, n))
         });
-        let of_joints = joints.flat_map(|j| {
-            let joints = [j];
-            let turned = |add_rad| Self::ZeroTurned { joints, add_rad };
+        let of_joints = (0..n).flat_map(|joint| {
+            let reversed = |what| Self::Reversed { what, joint };
+            let turned = |add_rad| Self::ZeroTurned { joint, add_rad };
             [
-                Self::TorqueReversed { joints },
-                Self::JointReversed { joints },
-                Self::MotionReversed { joints },
+                reversed(Channels::Torque),
+                reversed(Channels::All),
+                reversed(Channels::Motion),
                 turned(FRAC_PI_2),
                 turned(-FRAC_PI_2),
                 turned(2.0 * FRAC_PI_2),
@@ -128,7 +157,8 @@ impl Change {
     /// Whole columns in other orders.
     fn orders(arm: &Arm) -> Vec<Self> {
         let apart = shifted(arm.dof()).flat_map(|order| {
-            [Self::TorquesOrdered { order: order.clone() }, Self::MotionsOrdered { order }]
+            let ordered = |what| Self::Ordered { what, order: order.clone() };
+            [Channels::Torque, Channels::Motion].map(ordered)
         });
         Self::orders_of_joints(arm).into_iter().chain(apart).collect()
     }
@@ -140,66 +170,34 @@ impl Change {
         let rank = |j: usize| (0..n).filter(|k| (name(*k), *k) < (name(j), j)).count();
         let orders = [(0..n).map(rank).collect(), (0..n).rev().collect()];
         let orders = orders.into_iter().chain(shifted(n));
-        orders.map(|order| Self::JointsOrdered { order }).collect()
+        orders.map(|order| Self::Ordered { what: Channels::All, order }).collect()
     }
 
     /// In how many steps two joints exchange their places, or one thing changes; a little more where encoders alone are read otherwise: of a
     /// light wrist the torque tells hardly more than that something counts the other way, and that is the current's sign far more often.
     pub(super) fn steps(&self) -> f64 {
-        match self {
-            Self::MotionReversed { .. }
-            | Self::MotionsExchanged { .. }
-            | Self::MotionsOrdered { .. } => ENCODERS + self.exchanges() as f64,
-            _ => self.exchanges() as f64,
-        }
-    }
-
-    fn exchanges(&self) -> usize {
-        match self {
-            Self::JointsOrdered { order }
-            | Self::TorquesOrdered { order }
-            | Self::MotionsOrdered { order } => {
-                let mut order = order.clone();
-                let mut steps = 0;
-                for k in 0..order.len() {
-                    while order[k] != k {
-                        let place = order[k];
-                        order.swap(k, place);
-                        steps += 1;
-                    }
-                }
-                steps
+        let (what, steps) = match self {
+            Self::Ordered { what, order } => (*what, exchanges(order)),
+            Self::Reversed { what, .. } => (*what, 1),
+            Self::AllTorquesReversed | Self::ZeroTurned { .. } | Self::Mounted { .. } => {
+                return 1.0;
             }
-            _ => 1,
-        }
+        };
+        steps as f64 + if what == Channels::Motion { ENCODERS } else { 0.0 }
     }
 
     /// Whether a channel of joint `j` is read otherwise.
     pub(super) fn is_about(&self, j: usize) -> bool {
         match self {
-            Self::JointsExchanged { joints }
-            | Self::TorquesExchanged { joints }
-            | Self::MotionsExchanged { joints } => joints.contains(&j),
-            Self::JointsOrdered { order }
-            | Self::TorquesOrdered { order }
-            | Self::MotionsOrdered { order } => order[j] != j,
-            Self::TorqueReversed { joints }
-            | Self::JointReversed { joints }
-            | Self::MotionReversed { joints }
-            | Self::ZeroTurned { joints, .. } => joints.contains(&j),
+            Self::Ordered { order, .. } => order[j] != j,
+            Self::Reversed { joint, .. } | Self::ZeroTurned { joint, .. } => *joint == j,
             Self::AllTorquesReversed | Self::Mounted { .. } => true,
         }
     }
 
     /// Whether the torque of joint `j` stands in another joint's column.
     pub(super) fn moves_torque_of(&self, j: usize) -> bool {
-        match self {
-            Self::JointsExchanged { joints } | Self::TorquesExchanged { joints } => {
-                joints.contains(&j)
-            }
-            Self::JointsOrdered { order } | Self::TorquesOrdered { order } => order[j] != j,
-            _ => false,
-        }
+        matches!(self, Self::Ordered { what, order } if what.have_torque() && order[j] != j)
     }
 
     /// What to do, in a sentence.
@@ -213,6 +211,20 @@ impl Change {
             }
         }
     }
+}
+
+/// Exchanges of two places that it takes.
+fn exchanges(order: &[usize]) -> usize {
+    let mut order = order.to_vec();
+    let mut steps = 0;
+    for k in 0..order.len() {
+        while order[k] != k {
+            let place = order[k];
+            order.swap(k, place);
+            steps += 1;
+        }
+    }
+    steps
 }
 
 /// Orders of columns that stand one or more places away.
@@ -237,45 +249,61 @@ pub(super) fn other_gravity(arm: &Arm) -> Vec<[f64; 3]> {
 
 impl fmt::Display for Change {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let listed = |order: &[usize]| {
-            let joints: Vec<String> = order.iter().map(|joint| (joint + 1).to_string()).collect();
-            joints.join(", ")
-        };
         match self {
-            Self::JointsOrdered { order } => {
-                write!(f, "the columns of the joints in the order {}", listed(order))
+            Self::Ordered { what, order } => {
+                let [.., channels] = what.words();
+                match pair(order) {
+                    Some([a, b]) => {
+                        write!(f, "{channels} of joints {} and {} exchanged", a + 1, b + 1)
+                    }
+                    None => {
+                        let joints: Vec<String> =
+                            order.iter().map(|joint| (joint + 1).to_string()).collect();
+                        write!(f, "{channels} of the joints in the order {}", joints.join(", "))
+                    }
+                }
             }
-            Self::TorquesOrdered { order } => {
-                write!(f, "the torques in the order {}", listed(order))
-            }
-            Self::MotionsOrdered { order } => {
-                write!(f, "angles and velocities in the order {}", listed(order))
-            }
-            Self::JointsExchanged { joints: [a, b] } => {
-                write!(f, "the columns of joints {} and {} exchanged", a + 1, b + 1)
-            }
-            Self::TorquesExchanged { joints: [a, b] } => {
-                write!(f, "the torques of joints {} and {} exchanged", a + 1, b + 1)
-            }
-            Self::MotionsExchanged { joints: [a, b] } => {
-                write!(f, "angles and velocities of joints {} and {} exchanged", a + 1, b + 1)
-            }
-            Self::TorqueReversed { joints: [j] } => {
-                write!(f, "the torque of joint {} reversed", j + 1)
+            Self::Reversed { what, joint } => {
+                let [_, channels, _] = what.words();
+                write!(f, "{channels} of joint {} reversed", joint + 1)
             }
             Self::AllTorquesReversed => write!(f, "the torques of all joints reversed"),
-            Self::JointReversed { joints: [j] } => {
-                write!(f, "angle, velocity and torque of joint {} reversed", j + 1)
-            }
-            Self::MotionReversed { joints: [j] } => {
-                write!(f, "angle and velocity of joint {} reversed", j + 1)
-            }
-            Self::ZeroTurned { joints: [j], add_rad } => {
-                write!(f, "{:+.0}° added to the angle of joint {}", add_rad.to_degrees(), j + 1)
+            Self::ZeroTurned { joint, add_rad } => {
+                write!(f, "{:+.0}° added to the angle of joint {}", add_rad.to_degrees(), joint + 1)
             }
             Self::Mounted { gravity_m_s2: [x, y, z] } => {
                 write!(f, "gravity_m_s2 = [{x:.2}, {y:.2}, {z:.2}]")
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    /// As scripts read it.
+    #[test]
+    fn each_change_has_its_kind() {
+        let of = |change: Change| serde_json::to_value(change).unwrap();
+        for (what, key) in
+            [(Channels::All, "joint"), (Channels::Motion, "motion"), (Channels::Torque, "torque")]
+        {
+            let exchanged = of(Change::exchanged(what, [0, 2], 3));
+            let expected = json!({ "kind": format!("{key}s_exchanged"), "joints": [1, 3] });
+            assert_eq!(exchanged, expected);
+            let ordered = of(Change::Ordered { what, order: vec![1, 2, 0] });
+            let expected = json!({ "kind": format!("{key}s_ordered"), "order": [2, 3, 1] });
+            assert_eq!(ordered, expected);
+            let reversed = of(Change::Reversed { what, joint: 1 });
+            assert_eq!(reversed, json!({ "kind": format!("{key}_reversed"), "joints": [2] }));
+        }
+        assert_eq!(of(Change::AllTorquesReversed), json!({ "kind": "all_torques_reversed" }));
+        let turned = of(Change::ZeroTurned { joint: 4, add_rad: 0.5 });
+        assert_eq!(turned, json!({ "kind": "zero_turned", "joints": [5], "add_rad": 0.5 }));
+        let mounted = of(Change::Mounted { gravity_m_s2: [0.0, 0.0, 9.5] });
+        assert_eq!(mounted, json!({ "kind": "mounted", "gravity_m_s2": [0.0, 0.0, 9.5] }));
     }
 }

@@ -22,7 +22,7 @@ mod search;
 use serde::Serialize;
 
 pub use bench::Match;
-pub use change::Change;
+pub use change::{Change, Channels};
 
 use super::identifier::Regression;
 use super::options::Options;

@@ -1,6 +1,6 @@
 //! A way to read a log, and in which changes it differs from how the log is read.
 
-use super::change::Change;
+use super::change::{Change, Channels};
 use crate::log::{Counting, Place};
 
 /// How joints are counted in the log, and how the arm is mounted.
@@ -35,32 +35,25 @@ impl Reading {
         let mut other = self.clone();
         let counting = &mut other.counting;
         let joints = counting.motion().len();
-        let exchanged = |[a, b]: [usize; 2]| {
-            let mut order: Vec<usize> = (0..joints).collect();
-            order.swap(a, b);
-            order
-        };
         match change {
-            Change::JointsExchanged { joints } => {
-                counting.order_motions(&exchanged(*joints));
-                counting.order_torques(&exchanged(*joints));
+            Change::Ordered { what, order } => {
+                if what.have_motion() {
+                    counting.order_motions(order);
+                }
+                if what.have_torque() {
+                    counting.order_torques(order);
+                }
             }
-            Change::TorquesExchanged { joints } => counting.order_torques(&exchanged(*joints)),
-            Change::MotionsExchanged { joints } => counting.order_motions(&exchanged(*joints)),
-            Change::JointsOrdered { order } => {
-                counting.order_motions(order);
-                counting.order_torques(order);
+            Change::Reversed { what, joint } => {
+                if what.have_motion() {
+                    counting.reverse_motion(*joint);
+                }
+                if what.have_torque() {
+                    counting.reverse_torque(*joint);
+                }
             }
-            Change::TorquesOrdered { order } => counting.order_torques(order),
-            Change::MotionsOrdered { order } => counting.order_motions(order),
-            Change::TorqueReversed { joints: [j] } => counting.reverse_torque(*j),
             Change::AllTorquesReversed => (0..joints).for_each(|j| counting.reverse_torque(j)),
-            Change::JointReversed { joints: [j] } => {
-                counting.reverse_motion(*j);
-                counting.reverse_torque(*j);
-            }
-            Change::MotionReversed { joints: [j] } => counting.reverse_motion(*j),
-            Change::ZeroTurned { joints: [j], add_rad } => counting.turn(*j, *add_rad),
+            Change::ZeroTurned { joint, add_rad } => counting.turn(*joint, *add_rad),
             Change::Mounted { gravity_m_s2 } => other.gravity_m_s2 = Some(*gravity_m_s2),
         }
         other.counting.leave_out_whole_turns();
@@ -84,20 +77,20 @@ impl Reading {
         let (motion, torque) = (joints(counting.motion()), joints(counting.torque()));
         let mut changes = Vec::new();
         if motion == torque {
-            changes.extend(ordered(&motion, Whose::Joints));
+            changes.extend(ordered(&motion, Channels::All));
         } else if is_in_order(&motion) || is_in_order(&torque) {
-            changes.extend(ordered(&motion, Whose::Motions));
-            changes.extend(ordered(&torque, Whose::Torques));
+            changes.extend(ordered(&motion, Channels::Motion));
+            changes.extend(ordered(&torque, Channels::Torque));
         } else {
             let place_of = |joint: &usize| motion.iter().position(|other| other == joint);
             let behind: Vec<usize> = torque.iter().filter_map(place_of).collect();
-            changes.extend(ordered(&motion, Whose::Joints));
-            changes.extend(ordered(&behind, Whose::Torques));
+            changes.extend(ordered(&motion, Channels::All));
+            changes.extend(ordered(&behind, Channels::Torque));
         }
         changes.extend(self.reversals());
-        for (j, &add_rad) in counting.zero_rad().iter().enumerate() {
+        for (joint, &add_rad) in counting.zero_rad().iter().enumerate() {
             if add_rad.abs() > SAME_ZERO_RAD {
-                changes.push(Change::ZeroTurned { joints: [j], add_rad });
+                changes.push(Change::ZeroTurned { joint, add_rad });
             }
         }
         changes.extend(self.gravity_m_s2.map(|gravity_m_s2| Change::Mounted { gravity_m_s2 }));
@@ -109,14 +102,14 @@ impl Reading {
         let counting = &self.counting;
         let of_joints = |are_all_reversed: bool| {
             let places = counting.motion().iter().zip(counting.torque());
-            let change = |(j, (motion, torque)): (usize, (&Place, &Place))| {
-                let joints = [j];
-                match (motion.is_reversed, torque.is_reversed != are_all_reversed) {
-                    (false, false) => None,
-                    (false, true) => Some(Change::TorqueReversed { joints }),
-                    (true, false) => Some(Change::MotionReversed { joints }),
-                    (true, true) => Some(Change::JointReversed { joints }),
-                }
+            let change = |(joint, (motion, torque)): (usize, (&Place, &Place))| {
+                let what = match (motion.is_reversed, torque.is_reversed != are_all_reversed) {
+                    (false, false) => return None,
+                    (false, true) => Channels::Torque,
+                    (true, false) => Channels::Motion,
+                    (true, true) => Channels::All,
+                };
+                Some(Change::Reversed { what, joint })
             };
             places.enumerate().filter_map(change).collect::<Vec<_>>()
         };
@@ -128,36 +121,18 @@ impl Reading {
     }
 }
 
-/// Whose places are told.
-#[derive(Clone, Copy)]
-enum Whose {
-    Joints,
-    Motions,
-    Torques,
-}
-
 fn is_in_order(order: &[usize]) -> bool {
     order.iter().enumerate().all(|(k, place)| k == *place)
 }
 
 /// Pairs that stand in each other's places, or an order that is more than that.
-fn ordered(order: &[usize], whose: Whose) -> Vec<Change> {
+fn ordered(order: &[usize], what: Channels) -> Vec<Change> {
     let moved = || order.iter().enumerate().filter(|(k, place)| k != *place);
-    if moved().all(|(k, &place)| order[place] == k) {
-        let pairs = moved().filter(|(k, place)| k < *place).map(|(k, &place)| [k, place]);
-        let exchanged = |joints| match whose {
-            Whose::Joints => Change::JointsExchanged { joints },
-            Whose::Motions => Change::MotionsExchanged { joints },
-            Whose::Torques => Change::TorquesExchanged { joints },
-        };
-        return pairs.map(exchanged).collect();
+    if !moved().all(|(k, &place)| order[place] == k) {
+        return vec![Change::Ordered { what, order: order.to_vec() }];
     }
-    let order = order.to_vec();
-    vec![match whose {
-        Whose::Joints => Change::JointsOrdered { order },
-        Whose::Motions => Change::MotionsOrdered { order },
-        Whose::Torques => Change::TorquesOrdered { order },
-    }]
+    let pairs = moved().filter(|(k, place)| k < *place).map(|(k, &place)| [k, place]);
+    pairs.map(|pair| Change::exchanged(what, pair, order.len())).collect()
 }
 
 #[cfg(test)]
@@ -169,11 +144,15 @@ mod tests {
         changes.iter().fold(Reading::as_read(4), |reading, change| reading.with(change))
     }
 
+    fn exchanged(what: Channels, a: usize, b: usize) -> Change {
+        Change::exchanged(what, [a, b], 4)
+    }
+
     #[test]
     fn what_is_done_twice_is_not_done() {
-        let exchange = Change::JointsExchanged { joints: [0, 2] };
-        let turn = Change::ZeroTurned { joints: [1], add_rad: 2.0 * FRAC_PI_2 };
-        let reverse = Change::MotionReversed { joints: [3] };
+        let exchange = exchanged(Channels::All, 0, 2);
+        let turn = Change::ZeroTurned { joint: 1, add_rad: 2.0 * FRAC_PI_2 };
+        let reverse = Change::Reversed { what: Channels::Motion, joint: 3 };
         for change in [exchange, turn, reverse, Change::AllTorquesReversed] {
             let twice = read_with(&[change.clone(), change.clone()]);
             assert_eq!(twice.changes(), [], "{change:?}");
@@ -183,23 +162,20 @@ mod tests {
 
     #[test]
     fn many_steps_are_told_as_few_changes() {
-        let torque = |j: usize| Change::TorqueReversed { joints: [j] };
-        let motion = |j: usize| Change::MotionReversed { joints: [j] };
-        let exchanged = |a, b| Change::JointsExchanged { joints: [a, b] };
-        let torques = |a, b| Change::TorquesExchanged { joints: [a, b] };
+        let torque = |joint| Change::Reversed { what: Channels::Torque, joint };
+        let motion = |joint| Change::Reversed { what: Channels::Motion, joint };
+        let joints = |a, b| exchanged(Channels::All, a, b);
+        let torques = |a, b| exchanged(Channels::Torque, a, b);
         for (steps, changes) in [
             (vec![torque(0), torque(1), torque(2)], vec![Change::AllTorquesReversed, torque(3)]),
-            (vec![torque(2), motion(2)], vec![Change::JointReversed { joints: [2] }]),
-            (vec![torque(0), exchanged(0, 3)], vec![exchanged(0, 3), torque(3)]),
+            (vec![torque(2), motion(2)], vec![Change::Reversed { what: Channels::All, joint: 2 }]),
+            (vec![torque(0), joints(0, 3)], vec![joints(0, 3), torque(3)]),
             (
-                vec![exchanged(0, 1), exchanged(1, 2)],
-                vec![Change::JointsOrdered { order: vec![1, 2, 0, 3] }],
+                vec![joints(0, 1), joints(1, 2)],
+                vec![Change::Ordered { what: Channels::All, order: vec![1, 2, 0, 3] }],
             ),
-            (
-                vec![exchanged(0, 1), torques(0, 1)],
-                vec![Change::MotionsExchanged { joints: [0, 1] }],
-            ),
-            (vec![exchanged(0, 1), torques(2, 3)], vec![exchanged(0, 1), torques(2, 3)]),
+            (vec![joints(0, 1), torques(0, 1)], vec![exchanged(Channels::Motion, 0, 1)]),
+            (vec![joints(0, 1), torques(2, 3)], vec![joints(0, 1), torques(2, 3)]),
         ] {
             let reading = read_with(&steps);
             assert_eq!(reading.changes(), changes, "{steps:?}");

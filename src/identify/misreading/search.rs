@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::EXPLAINED;
 use super::bench::{Bench, Match};
-use super::change::Change;
+use super::change::{Change, Channels};
 use super::reading::Reading;
 use crate::robot::Arm;
 
@@ -124,7 +124,9 @@ fn told_shortly(best: Tried, bench: &Bench) -> Tried {
     }
     let mirrored = (1..1_usize << joints).into_par_iter().filter_map(|reversed| {
         let joints = (0..joints).filter(|j| reversed >> j & 1 == 1);
-        let reverse = |reading: Reading, j| reading.with(&Change::JointReversed { joints: [j] });
+        let reverse = |reading: Reading, joint| {
+            reading.with(&Change::Reversed { what: Channels::All, joint })
+        };
         let reading = joints.fold(best.reading.clone(), reverse);
         // A fit that is no better is worth its price only with fewer changes.
         (steps(&reading) < best.steps()).then(|| Tried::of(reading, bench)).flatten()
