@@ -153,6 +153,17 @@ fn an_arm_that_is_not_mounted_as_described_is_named() {
     is_named(found, &[Change::Mounted { gravity_m_s2: [0.0, 0.0, -9.81] }]);
 }
 
+/// Three encoders that count the other way do what three torques do on an arm that hangs.
+#[test]
+fn an_arm_is_not_told_to_hang_where_encoders_do_as_well() {
+    let run = run(("ur5_identification", 4), "");
+    for joints in [[1, 2, 3], [1, 2, 4]] {
+        let hidden = joints.map(|joint| reversed(Motion, joint));
+        let log = hidden.iter().fold(run.log.clone(), |log, change| recorded(&log, change));
+        is_named(misreading(&run, &run.arm, &log, &run.options), &hidden);
+    }
+}
+
 /// On a pedestal of 45°, as arms of a torso stand.
 #[test]
 fn an_arm_that_leans_is_named() {

@@ -117,6 +117,9 @@ fn pair(order: &[usize]) -> Option<[usize; 2]> {
 
 /// What it costs more to have encoders read otherwise than torques, in steps.
 const ENCODERS: f64 = 0.1;
+/// What it costs more to have the arm mounted otherwise, in steps: of equally many changes those cost less that leave it as it is described,
+/// be they encoders', and one change more costs more still. Signs and zeros of joints turn an arm upside down as well.
+const MOUNTED: f64 = 0.7;
 /// Gravity that is within this of the description's direction is the description's.
 const SAME_DIRECTION: f64 = 0.99;
 
@@ -179,9 +182,8 @@ impl Change {
         let (what, steps) = match self {
             Self::Ordered { what, order } => (*what, exchanges(order)),
             Self::Reversed { what, .. } => (*what, 1),
-            Self::AllTorquesReversed | Self::ZeroTurned { .. } | Self::Mounted { .. } => {
-                return 1.0;
-            }
+            Self::AllTorquesReversed | Self::ZeroTurned { .. } => return 1.0,
+            Self::Mounted { .. } => return 1.0 + MOUNTED,
         };
         steps as f64 + if what == Channels::Motion { ENCODERS } else { 0.0 }
     }

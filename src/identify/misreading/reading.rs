@@ -30,6 +30,11 @@ impl Reading {
         self.gravity_m_s2
     }
 
+    /// The same of an arm that is mounted as described, where it is not.
+    pub fn mounted_as_described(&self) -> Option<Self> {
+        self.gravity_m_s2.map(|_| Self { counting: self.counting.clone(), gravity_m_s2: None })
+    }
+
     /// Read with `change` as well.
     pub fn with(&self, change: &Change) -> Self {
         let mut other = self.clone();

@@ -70,7 +70,10 @@ pub fn best(arm: &Arm, bench: &Bench, as_read: &Match) -> (Reading, Match) {
             best = found.into_iter().fold(best, Tried::cheaper);
         }
     }
-    let best = told_shortly(best, bench);
+    let mut best = told_shortly(best, bench);
+    if best.fit.leaves_more_than(EXPLAINED) {
+        best = search.from(best, 1, 0);
+    }
     (best.reading, best.fit)
 }
 
@@ -116,18 +119,22 @@ impl Search<'_> {
     }
 }
 
-/// An arm that is mirrored in a plane turns some of its joints the other way: as well as before, perhaps with fewer changes.
+/// An arm that is mirrored in a plane turns some of its joints the other way, and hangs where it stood if the plane is the ground: as well as
+/// before, perhaps with fewer changes.
 fn told_shortly(best: Tried, bench: &Bench) -> Tried {
     let joints = best.fit.left.len();
     if best.steps() < 2.0 || joints > MIRRORED {
         return best;
     }
-    let mirrored = (1..1_usize << joints).into_par_iter().filter_map(|reversed| {
+    let as_described = best.reading.mounted_as_described();
+    let mounted: Vec<Reading> = [best.reading.clone()].into_iter().chain(as_described).collect();
+    let mirrored = (0..mounted.len() << joints).into_par_iter().filter_map(|k| {
+        let (mounted, reversed) = (&mounted[k % mounted.len()], k / mounted.len());
         let joints = (0..joints).filter(|j| reversed >> j & 1 == 1);
         let reverse = |reading: Reading, joint| {
             reading.with(&Change::Reversed { what: Channels::All, joint })
         };
-        let reading = joints.fold(best.reading.clone(), reverse);
+        let reading = joints.fold(mounted.clone(), reverse);
         // A fit that is no better is worth its price only with fewer changes.
         (steps(&reading) < best.steps()).then(|| Tried::of(reading, bench)).flatten()
     });
