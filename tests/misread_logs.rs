@@ -19,9 +19,19 @@ fn run(along: Along, effects: &str) -> Run {
 
 /// As `arm` would have it read.
 fn misreading(run: &Run, arm: &Arm, log: &Measured, options: &Options) -> Option<Misreading> {
+    misreading_of_currents(run, arm, log, options, None)
+}
+
+fn misreading_of_currents(
+    run: &Run,
+    arm: &Arm,
+    log: &Measured,
+    options: &Options,
+    gain: Option<&[f64]>,
+) -> Option<Misreading> {
     let mut identifier = Identifier::new(&run.model, &run.set, options.clone());
     let regression = identifier.regression(&log.measurement("misread")).unwrap();
-    Misreading::of(arm, &regression, options)
+    Misreading::of(arm, &regression, options, gain)
 }
 
 /// `log` as it is recorded by something that differs from the description of the arm by `change`: whoever reads it has to change it so.
@@ -109,6 +119,28 @@ fn each_way_to_misread_a_log_is_named() {
         let hidden = [hidden];
         is_named(misreading(&run, &run.arm, &log, &run.options), &hidden);
         is_named(misreading(&run, &run.arm, &log, &single), &hidden);
+    }
+}
+
+/// With the gain of the joint in whose column it stands, a current is another torque than with that of its own.
+#[test]
+fn currents_have_the_gain_of_the_joint_that_they_are_read_for() {
+    let run = run(("ur5_identification", 4), "");
+    let gain = [12.0, 9.0, 6.0, 4.0, 3.0, 2.0];
+    let scale = |log: &mut Measured, by: &dyn Fn(usize) -> f64| {
+        for j in 0..6 {
+            log.torque_nm.joint_mut(j).iter_mut().for_each(|value| *value *= by(j));
+        }
+    };
+    let mut in_ampere = run.log.clone();
+    scale(&mut in_ampere, &|j| 1.0 / gain[j]);
+    for hidden in [exchanged(All, [0, 2]), exchanged(Torque, [1, 3])] {
+        let mut log = recorded(&in_ampere, &hidden);
+        scale(&mut log, &|j| gain[j]);
+        let found = misreading_of_currents(&run, &run.arm, &log, &run.options, Some(&gain));
+        let left = found.as_ref().map(|found| found.otherwise.left.clone()).unwrap_or_default();
+        assert!(left.iter().all(|share| *share < 0.03), "{left:?}");
+        is_named(found, &[hidden]);
     }
 }
 

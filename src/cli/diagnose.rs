@@ -108,8 +108,9 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
     let sha256 = logs.first().map_or("", |log| &log.input.sha256);
     let simulation =
         args.sim.as_deref().map(|file| Simulated::load(file, (&arm, &set), sha256)).transpose()?;
-    let mut diagnoser = Diagnoser::new(&arm, &model, &set, options.clone());
     let Some(log) = logs.first() else { return Ok(Outcome::Done) };
+    let mut diagnoser = Diagnoser::new(&arm, &model, &set, options.clone())
+        .of_currents(log.log.drive_gain_nm_a(&arm));
     if let Some(Simulated { files, .. }) = &simulation {
         args.check_outputs(files)?;
         inputs.extend(super::robot::inputs(files)?);

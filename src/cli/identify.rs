@@ -241,7 +241,8 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         }
     }
     let misread = regressions.iter().zip(&logs).find_map(|(regression, log)| {
-        let misreading = Misreading::of(&arm, regression, &options)?;
+        let gain = log.log.drive_gain_nm_a(&arm);
+        let misreading = Misreading::of(&arm, regression, &options, gain.as_deref())?;
         Some(MisreadLog::new(log.log.source.clone(), misreading, &layout))
     });
     let several = each_alone(&mut identifier, &regressions)?;
@@ -357,7 +358,8 @@ fn validate(
     theta: &[f64],
 ) -> Result<Validation, Box<dyn std::error::Error>> {
     let regression = identifier.regression(&log.measurement())?;
-    let misreading = Misreading::of(arm, &regression, identifier.options());
+    let gain = log.log.drive_gain_nm_a(arm);
+    let misreading = Misreading::of(arm, &regression, identifier.options(), gain.as_deref());
     let mut warnings: Vec<String> = misreading.iter().map(Misreading::sentence).collect();
     let manufacturer = match log.log.target_torque_nm(arm)? {
         Some(torque_nm) => {

@@ -38,6 +38,8 @@ pub struct Diagnoser<'a> {
     pub(super) arm: &'a Arm,
     pub(super) set: &'a BaseSet,
     pub(super) options: Options,
+    /// Gains of drives whose currents were logged, Nm/A.
+    drive_gain_nm_a: Option<Vec<f64>>,
     pub(super) identifier: Identifier<'a>,
     pub(super) families: Vec<Box<dyn Candidate>>,
 }
@@ -77,7 +79,12 @@ impl<'a> Diagnoser<'a> {
         families: Vec<Box<dyn Candidate>>,
     ) -> Self {
         let identifier = Identifier::new(model, set, options.clone());
-        Self { arm, set, options, identifier, families }
+        Self { arm, set, options, drive_gain_nm_a: None, identifier, families }
+    }
+
+    /// For logs whose torques are currents times these gains of the joints, Nm/A; `None`: torques were logged.
+    pub fn of_currents(self, drive_gain_nm_a: Option<Vec<f64>>) -> Self {
+        Self { drive_gain_nm_a, ..self }
     }
 
     /// Says what the model gets wrong along `m`; `held_out` logs measure the gain;
@@ -129,7 +136,9 @@ impl<'a> Diagnoser<'a> {
         }
         let models = Models { null: &null, extension: &extension };
         let gain = |log| {
-            gain_along((&mut self.identifier, &self.families), sources, log, &models, &causes)
+            let parts = (&mut self.identifier, &*self.families);
+            let currents = self.drive_gain_nm_a.as_deref();
+            gain_along(parts, sources, currents, log, &models, &causes)
         };
         let held_out = held_out.iter().map(gain).collect::<Result<Vec<_>, _>>()?;
         let mut warnings: Vec<String> =
@@ -197,7 +206,8 @@ impl<'a> Diagnoser<'a> {
 
     /// Refuses the log `source` where it fits the arm when it is read otherwise.
     fn refuse_misread(&self, regression: &Regression, source: &str) -> Result<(), DiagnoseError> {
-        match Misreading::of(self.arm, regression, &self.options) {
+        let gain = self.drive_gain_nm_a.as_deref();
+        match Misreading::of(self.arm, regression, &self.options, gain) {
             Some(misreading) => Err(DiagnoseError::Misread {
                 log: source.to_owned(),
                 misreading: Box::new(misreading),
@@ -439,6 +449,7 @@ fn causes_of<'a>(
 fn gain_along(
     (identifier, families): (&mut Identifier, &[Box<dyn Candidate>]),
     sources: (&Arm, &BaseSet, &Options),
+    drive_gain_nm_a: Option<&[f64]>,
     log: &Validation,
     models: &Models,
     causes: &[Cause],
@@ -448,7 +459,7 @@ fn gain_along(
     record.undo_lags(causes);
     let measurement = record.measurement(log.measurement.source);
     let log = &Validation { measurement, manufacturer_nm: log.manufacturer_nm };
-    held_out_gain(identifier, sources, families, log, models)
+    held_out_gain(identifier, sources, drive_gain_nm_a, families, log, models)
 }
 
 /// Takes out contacts at which the angles jump as no arm can; how many.

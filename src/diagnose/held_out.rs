@@ -42,13 +42,14 @@ pub(super) struct Models<'a> {
 pub(super) fn held_out_gain(
     identifier: &mut Identifier,
     (arm, set, options): (&Arm, &BaseSet, &Options),
+    drive_gain_nm_a: Option<&[f64]>,
     families: &[Box<dyn Candidate>],
     log: &Validation,
     models: &Models,
 ) -> Result<HeldOut, DiagnoseError> {
     let extension = &models.extension.elsewhere(families);
     let mut regression = identifier.regression(&log.measurement)?;
-    let misreading = Misreading::of(arm, &regression, options);
+    let misreading = Misreading::of(arm, &regression, options, drive_gain_nm_a);
     move_to_common_motion(&mut regression, (arm, set), &models.null.theta);
     let prepared = &regression.prepared;
     let whitening = if prepared.replicates.is_some() {

@@ -58,8 +58,16 @@ impl Effort {
         }
     }
 
-    /// Motor torque at the joint, Nm: τ = gain · I with the layout's gain where it states one, otherwise
-    /// with the arm's i_G·k; torques as they are.
+    /// Joint torque per ampere, Nm/A: the layout's where it states one, otherwise the arm's i_G·k; `None` of torques.
+    fn gain_nm_a(&self, arm: &Arm) -> Option<Vec<f64>> {
+        let own = || arm.joints.iter().map(|joint| joint.drive.gain_nm_a()).collect();
+        match self {
+            Self::Torque(_) => None,
+            Self::Current { gain_nm_a, .. } => Some(gain_nm_a.clone().unwrap_or_else(own)),
+        }
+    }
+
+    /// Motor torque at the joint, Nm: τ = gain · I, and torques as they are.
     ///
     /// # Errors
     /// [`LogError::JointCount`] where signals, gains and arm differ in joints; `file` names the log in it.
@@ -70,20 +78,13 @@ impl Effort {
             }
             Err(LogError::JointCount { file: file.to_owned(), what, found, expected: arm.dof() })
         };
-        count("the log", self.signals().joints())?;
-        match self {
-            Self::Torque(nm) => Ok(nm.clone()),
-            Self::Current { ampere, gain_nm_a } => {
-                let gain = match gain_nm_a {
-                    Some(gain) => gain.clone(),
-                    None => arm.joints.iter().map(|joint| joint.drive.gain_nm_a()).collect(),
-                };
-                count("the layout's drive_gain_nm_a", gain.len())?;
-                Ok(JointSignals::from_fn(ampere.joints(), ampere.samples(), |j, k| {
-                    gain[j] * ampere.joint(j)[k]
-                }))
-            }
-        }
+        let signals = self.signals();
+        count("the log", signals.joints())?;
+        let Some(gain) = self.gain_nm_a(arm) else { return Ok(signals.clone()) };
+        count("the layout's drive_gain_nm_a", gain.len())?;
+        Ok(JointSignals::from_fn(signals.joints(), signals.samples(), |j, k| {
+            gain[j] * signals.joint(j)[k]
+        }))
     }
 }
 
@@ -134,6 +135,11 @@ impl Log {
     /// [`LogError::JointCount`] if the log or the layout's gains are not of this arm's number of joints.
     pub fn torque_nm(&self, arm: &Arm) -> Result<JointSignals, LogError> {
         self.effort.torque_nm(arm, &self.source)
+    }
+
+    /// Joint torque per ampere by which [`Log::torque_nm`] makes torques of currents, Nm/A; `None` where torques were logged.
+    pub fn drive_gain_nm_a(&self, arm: &Arm) -> Option<Vec<f64>> {
+        self.effort.gain_nm_a(arm)
     }
 
     /// The manufacturer's feed-forward as torque at the joints, Nm; `None` where it was not logged.

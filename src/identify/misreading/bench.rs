@@ -101,9 +101,12 @@ impl Match {
 /// What it takes to fit an arm to readings of a log, for every way in which it may be mounted.
 pub struct Bench {
     motion: Motion,
-    torque_nm: JointSignals,
-    /// Noise (rms) of the torque, as far as it is known.
-    noise_nm: Vec<f64>,
+    /// Torques as they were logged: in another joint's column a current has that joint's gain.
+    effort: JointSignals,
+    /// Noise (rms) of them, as far as it is known.
+    noise: Vec<f64>,
+    /// What they are multiplied by, joint by joint, Nm/A; 1 where they are in Nm.
+    gain: Vec<f64>,
     mountings: Vec<Mounting>,
 }
 
@@ -119,9 +122,18 @@ struct Mounting {
 const INSTANTS: usize = 150;
 
 impl Bench {
-    /// Of the arm as described and the log in `regression`: the mean period, or the run behind the low-pass of `options`; `None` for
-    /// one without a base set, and where that cannot be made.
-    pub fn new(arm: &Arm, regression: &Regression, options: &Options) -> Option<Self> {
+    /// Of the arm as described and the log in `regression`, of currents if there are gains: the mean period, or the run behind the
+    /// low-pass of `options`; `None` for one without a base set, and where that cannot be made.
+    pub fn new(
+        arm: &Arm,
+        regression: &Regression,
+        options: &Options,
+        drive_gain_nm_a: Option<&[f64]>,
+    ) -> Option<Self> {
+        let gain = drive_gain_nm_a.map_or_else(|| vec![1.0; arm.dof()], <[f64]>::to_vec);
+        let as_logged = |torque_nm: &JointSignals| {
+            torque_nm.map_joints(|j, y| y.iter().map(|nm| nm / gain[j]).collect())
+        };
         let mountings = vec![Mounting::of(arm, None)?];
         let Regression { prepared, .. } = regression;
         let (motion, torque_nm) = (&prepared.motion, &prepared.torque_nm);
@@ -137,12 +149,14 @@ impl Bench {
         if torque_nm.samples() > n {
             let mean = torque_nm.map_joints(|_, y| mean_period(y, n));
             let of_mean = |r: &Replicates| {
-                r.sigma.iter().map(|sigma| sigma / (r.periods as f64).sqrt()).collect()
+                let sigma = r.sigma.iter().zip(&gain).map(|(nm, gain)| nm / gain);
+                sigma.map(|sigma| sigma / (r.periods as f64).sqrt()).collect()
             };
             return Some(Self {
                 motion: of_motion(motion),
-                torque_nm: thinned(&mean),
-                noise_nm: prepared.replicates.as_ref().map_or(vec![0.0; arm.dof()], of_mean),
+                effort: as_logged(&thinned(&mean)),
+                noise: prepared.replicates.as_ref().map_or(vec![0.0; arm.dof()], of_mean),
+                gain,
                 mountings,
             });
         }
@@ -157,8 +171,9 @@ impl Bench {
         }
         Some(Self {
             motion: of_motion(&smooth),
-            torque_nm: thinned(&torque_nm),
-            noise_nm: vec![0.0; arm.dof()],
+            effort: as_logged(&thinned(&torque_nm)),
+            noise: vec![0.0; arm.dof()],
+            gain,
             mountings,
         })
     }
@@ -181,7 +196,9 @@ impl Bench {
             qd_rad_s: counting.rates(&self.motion.qd_rad_s),
             qdd_rad_s2: counting.rates(&self.motion.qdd_rad_s2),
         };
-        let torque_nm = counting.torques(&self.torque_nm);
+        let effort = counting.torques(&self.effort);
+        let torque_nm =
+            effort.map_joints(|j, y| y.iter().map(|effort| self.gain[j] * effort).collect());
         let mut problem = Problem::new(ColumnPlan::new(model, set), 0.0);
         Assembler::new(model).assemble(&mut problem, model, &motion, &torque_nm);
         let fit = Fitter::new(&problem).fit(&problem, set, Weighting::PerJoint).ok()?;
@@ -194,7 +211,7 @@ impl Bench {
         let samples = motion.samples() as f64;
         let beyond_noise = (0..model.dof()).map(|j| {
             // The torque's that is read there now.
-            let noise_nm = self.noise_nm[counting.torque()[j].joint];
+            let noise_nm = self.gain[j] * self.noise[counting.torque()[j].joint];
             let noise = noise_nm * noise_nm * samples / fit.torque_squares[j];
             (left[j].powi(2) - noise).max(0.0).sqrt()
         });

@@ -12,6 +12,8 @@
 //! as described. Parameters cannot stand in for the changes, so that the right ones are told by a residual that falls by far more than
 //! any law of friction takes from it.
 //!
+//! Currents belong to the drive in whose column they are put: what is read in another column is multiplied by another gain.
+//!
 //! Enters: the arm and a log laid out for regression. Leaves: a [`Misreading`], or nothing.
 
 mod bench;
@@ -62,9 +64,15 @@ const GROWS: f64 = 1.2;
 const FITS: f64 = 0.5;
 
 impl Misreading {
-    /// Of the log in `regression`; `None` where the model explains it, or no change makes it.
-    pub fn of(arm: &Arm, regression: &Regression, options: &Options) -> Option<Self> {
-        let mut bench = Bench::new(arm, regression, options)?;
+    /// Of the log in `regression`, whose torques are currents times `drive_gain_nm_a` where there are such gains, one for each joint;
+    /// `None` where the model explains it, or no change makes it.
+    pub fn of(
+        arm: &Arm,
+        regression: &Regression,
+        options: &Options,
+        drive_gain_nm_a: Option<&[f64]>,
+    ) -> Option<Self> {
+        let mut bench = Bench::new(arm, regression, options, drive_gain_nm_a)?;
         let as_read = bench.fit(&Reading::as_read(arm.dof()))?;
         if !as_read.leaves_more_than(EXPLAINED) && !as_read.is_clearly_turned() {
             return None;
