@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::robot::urdf::listed;
+
 /// Something that MJCF says and an arm does not have, or the other way round.
 #[derive(Debug, Clone, PartialEq)]
 pub enum MjcfNotice {
@@ -67,11 +69,11 @@ impl fmt::Display for MjcfNotice {
                 "{count} <connect> or <weld> of <equality> are not read: where they close a loop of the arm's bodies, it is no serial arm and \
                  what is identified of it is not its own"
             ),
-            Self::LeftOut { what, joints } => write!(f, "{what}: {}", joints.join(", ")),
+            Self::LeftOut { what, joints } => write!(f, "{what}: {}", listed(joints)),
             Self::GravityCompensation { bodies } => write!(
                 f,
                 "the file takes weight away (gravcomp), the arm has all of it, and its drives carry it: {}",
-                bodies.join(", ")
+                listed(bodies)
             ),
         }
     }

@@ -244,7 +244,7 @@ fn limits_are_those_that_mujoco_keeps() {
     let of = |sections: &str, joint: &str| {
         let MjcfArm { arm, notices, .. } =
             read(&one(sections, "", &format!("{BODY}<joint name=\"j\" {joint}/>")));
-        let unlimited = UrdfNotice::Continuous { joint: "j".into() };
+        let unlimited = UrdfNotice::Continuous { joints: vec!["j".into()] };
         (arm.joints[0].limits.position_rad, notices.contains(&unlimited))
     };
     let all = [-2.0 * PI, 2.0 * PI];

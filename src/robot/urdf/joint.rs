@@ -6,7 +6,6 @@ use nalgebra::{Matrix3, Vector3};
 use urdf_rs::{Joint, JointType};
 
 use super::fault::{UrdfFault, finite, quoted};
-use super::notice::UrdfNotice;
 use super::read::Reader;
 use crate::robot::arm::{Drive, Limits, Placement};
 
@@ -22,8 +21,7 @@ impl Reader {
     pub(super) fn axis_to_z(&mut self, joint: &Joint) -> Result<Placement, UrdfFault> {
         let rotation = rotation_from_z(self.unit_axis(joint)?);
         if rotation != Matrix3::identity() {
-            let (joint, axis) = (joint.name.clone(), *joint.axis.xyz);
-            self.notices.push(UrdfNotice::Reoriented { joint, axis });
+            self.remarks.turned.push((joint.name.clone(), *joint.axis.xyz));
         }
         Ok(Placement { rotation, translation_m: Vector3::zeros() })
     }
@@ -40,7 +38,7 @@ impl Reader {
             return Err(UrdfFault::Axis { joint, axis: written, length });
         }
         if (length - 1.0).abs() > 4.0 * f64::EPSILON {
-            self.notices.push(UrdfNotice::AxisNormalised { joint: joint.name.clone(), length });
+            self.remarks.normalised.push((joint.name.clone(), length));
         }
         Ok(Vector3::from(written) / length)
     }
@@ -65,7 +63,7 @@ impl Reader {
         }
         let unlimited = limit.lower == f64::NEG_INFINITY && limit.upper == f64::INFINITY;
         let position_rad = if joint.joint_type == JointType::Continuous || unlimited {
-            self.notices.push(UrdfNotice::Continuous { joint: name() });
+            self.remarks.endless.push(name());
             [-TAU, TAU]
         } else if limit.lower < limit.upper && (limit.upper - limit.lower).is_finite() {
             [limit.lower, limit.upper]

@@ -15,6 +15,7 @@ mod locked;
 mod notice;
 mod obstacle;
 mod read;
+mod remarks;
 #[cfg(test)]
 mod tests;
 mod tree;

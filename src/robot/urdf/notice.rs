@@ -45,10 +45,10 @@ pub enum UrdfNotice {
         /// What is still assumed, because neither of the files says it.
         open: Vec<UrdfNotice>,
     },
-    /// A continuous (or unlimited) joint was given ±2π rad.
+    /// Continuous (or unlimited) joints were given ±2π rad.
     Continuous {
-        /// The joint.
-        joint: String,
+        /// The joints.
+        joints: Vec<String>,
     },
     /// No speed limit in the file.
     AssumedVelocity {
@@ -81,28 +81,22 @@ pub enum UrdfNotice {
         /// The links, and the mass of each, kg.
         links: Vec<(String, f64)>,
     },
-    /// The joint's frame is not the link's: z was turned onto the axis.
+    /// Frames of joints are not the links': z was turned onto the axis.
     Reoriented {
-        /// The joint.
-        joint: String,
-        /// The axis in the link's frame: z of the joint frame.
-        axis: [f64; 3],
+        /// The joints, and of each the axis in the link's frame: z of the joint frame.
+        joints: Vec<(String, [f64; 3])>,
     },
-    /// An axis was a unit vector only to the digits printed.
+    /// Axes were unit vectors only to the digits printed.
     AxisNormalised {
-        /// The joint.
-        joint: String,
-        /// Its length as written.
-        length: f64,
+        /// The joints, and the length of each axis as written.
+        joints: Vec<(String, f64)>,
     },
-    /// An angle printed to a few digits was taken as the multiple of π/2 it stands for.
-    RightAngle {
-        /// The joint or link.
-        place: String,
-        /// As written.
-        written_rad: f64,
-        /// As used.
-        used_rad: f64,
+    /// Angles printed to a few digits were taken as the multiples of π/2 that they stand for.
+    RightAngles {
+        /// The joints and links.
+        places: Vec<String>,
+        /// The largest distance from such a multiple, rad.
+        off_rad: f64,
     },
     /// Something of an MJCF that a URDF does not have.
     Mjcf(MjcfNotice),
@@ -192,8 +186,8 @@ impl fmt::Display for UrdfNotice {
                 let open: Vec<String> = open.iter().map(ToString::to_string).collect();
                 write!(f, "{file} leaves open: {}", open.join("; "))
             }
-            Self::Continuous { joint } => {
-                write!(f, "joint \"{joint}\" has no end stops: taken as -2 pi to 2 pi")
+            Self::Continuous { joints } => {
+                write!(f, "no end stops, taken as -2 pi to 2 pi: {}", listed(joints))
             }
             Self::AssumedVelocity { joints, velocity_rad_s } => write!(
                 f,
@@ -217,19 +211,34 @@ impl fmt::Display for UrdfNotice {
             Self::StandingMass { links } => {
                 write!(f, "{} still: inertia left out", with_masses(links, "stands", "stand"))
             }
-            Self::Reoriented { joint, axis: [x, y, z] } => write!(
+            Self::Reoriented { joints } => {
+                let axes = joints.iter().map(|(joint, axis)| {
+                    let [x, y, z] = axis.map(to_four_places);
+                    format!("{joint} ({x}, {y}, {z})")
+                });
+                write!(
+                    f,
+                    "frames of joints are turned from those of their links to have z along the axis, parameters are about them: {}",
+                    listed(axes)
+                )
+            }
+            Self::AxisNormalised { joints } => {
+                let lengths = joints.iter().map(|(joint, length)| format!("{joint} ({length})"));
+                write!(f, "axes that are not of length 1 were made so: {}", listed(lengths))
+            }
+            Self::RightAngles { places, off_rad } => write!(
                 f,
-                "joint \"{joint}\": its frame has z along the axis ({x}, {y}, {z}) of the link, parameters are about that frame"
+                "angles that are off multiples of pi/2 by {off_rad:.1e} rad or less are taken as these: {}",
+                listed(places)
             ),
-            Self::AxisNormalised { joint, length } => {
-                write!(f, "joint \"{joint}\": an axis of length {length} was made a unit vector")
-            }
-            Self::RightAngle { place, written_rad, used_rad } => {
-                write!(f, "{place}: angle {written_rad} is taken as {used_rad} rad")
-            }
             Self::Mjcf(notice) => write!(f, "{notice}"),
         }
     }
+}
+
+/// A coordinate as it is read at a glance, zero without a sign.
+fn to_four_places(value: f64) -> f64 {
+    (value * 1e4).round() / 1e4 + 0.0
 }
 
 /// Links with their masses, kg, and what they do in the singular and in the plural.

@@ -12,6 +12,7 @@ use super::fault::{UrdfFault, finite, quoted};
 use super::joint::{ASSUMED_ACCELERATION_RAD_S2, ASSUMED_VELOCITY_RAD_S, drive, given};
 use super::locked::{LockedJoint, locked_joints};
 use super::notice::UrdfNotice;
+use super::remarks::Remarks;
 use super::tree::Tree;
 use super::unreadable;
 use crate::robot::arm::{Arm, Clearance, Joint, LinkBounds, Placement};
@@ -138,7 +139,8 @@ pub(super) struct Reader {
     pub(super) locked: Vec<LockedJoint>,
     frames: Vec<FixedFrame>,
     links: Vec<UrdfLink>,
-    pub(super) notices: Vec<UrdfNotice>,
+    notices: Vec<UrdfNotice>,
+    pub(super) remarks: Remarks,
 }
 
 impl Reader {
@@ -281,9 +283,9 @@ impl Reader {
         let mut heavy = Vec::new();
         for ((link, held), pose) in body.links.iter().zip(poses) {
             // What is wrong or odd about the moments of such a link does not matter.
-            let remarks = self.notices.len();
+            let remarks = self.remarks.right_angles.len();
             let inertia = self.link_inertia(link).ok().flatten();
-            self.notices.truncate(remarks);
+            self.remarks.right_angles.truncate(remarks);
             let mass_kg = link.inertial.mass.value;
             if mass_kg != 0.0 {
                 heavy.push((link.name.clone(), mass_kg));
@@ -316,11 +318,7 @@ impl Reader {
             let off = (*angle - used_rad).abs();
             if off < RIGHT_ANGLE_RAD {
                 if off > WORTH_SAYING_RAD {
-                    self.notices.push(UrdfNotice::RightAngle {
-                        place: place.to_owned(),
-                        written_rad: *angle,
-                        used_rad,
-                    });
+                    self.remarks.right_angles.push((place.to_owned(), off));
                 }
                 *angle = used_rad;
             }
@@ -330,6 +328,7 @@ impl Reader {
 
     /// The remarks that concern several joints at once.
     fn summarise(&mut self, joints: &[Joint], chain: &[Body<'_>]) {
+        self.notices.extend(std::mem::take(&mut self.remarks).notices());
         let no_friction: Vec<String> = joints
             .iter()
             .filter(|j| j.drive.viscous_nm_s_rad == 0.0 && j.drive.coulomb_nm == 0.0)
