@@ -210,6 +210,10 @@ impl DriveFile {
                 let joints = self.without(joints, |e| e.viscous_nm_s_rad.or(e.coulomb_nm));
                 (!joints.is_empty()).then_some(UrdfNotice::NoFriction { joints })
             }
+            UrdfNotice::ServoDamping { mut joints } => {
+                joints.retain(|(joint, ..)| !self.says(joint, |e| e.viscous_nm_s_rad));
+                (!joints.is_empty()).then_some(UrdfNotice::ServoDamping { joints })
+            }
             UrdfNotice::AssumedVelocity { joints, velocity_rad_s } => {
                 let joints = self.without(joints, |e| e.velocity_rad_s);
                 (!joints.is_empty())
@@ -237,9 +241,12 @@ impl DriveFile {
         joints: Vec<String>,
         quantity: impl Fn(&DriveEntry) -> Option<f64>,
     ) -> Vec<String> {
-        let says = |entry: &DriveEntry, name: &str| entry.name == name && quantity(entry).is_some();
-        let is_open = |name: &String| !self.joint.iter().any(|entry| says(entry, name));
-        joints.into_iter().filter(is_open).collect()
+        joints.into_iter().filter(|joint| !self.says(joint, &quantity)).collect()
+    }
+
+    /// Whether the file says a quantity of a joint.
+    fn says(&self, joint: &str, quantity: impl Fn(&DriveEntry) -> Option<f64>) -> bool {
+        self.joint.iter().any(|entry| entry.name == joint && quantity(entry).is_some())
     }
 }
 
@@ -411,10 +418,15 @@ mod tests {
             torque_constant,
         };
         let no_friction = |joints| UrdfNotice::NoFriction { joints };
+        let servo = |joint: &str| (joint.to_owned(), 200.0, 150.0);
+        let dampings = |joints| UrdfNotice::ServoDamping { joints };
         let accelerations =
             |joints| UrdfNotice::AssumedAcceleration { joints, acceleration_rad_s2: 10.0 };
-        let notices =
-            || [gravity(), drives(all(), all(), all()), no_friction(all()), accelerations(all())];
+        let notices = || {
+            let both = dampings(vec![servo("a"), servo("b")]);
+            let accelerations = accelerations(all());
+            [gravity(), drives(all(), all(), all()), no_friction(all()), both, accelerations]
+        };
         let left = |text: &str| -> Vec<UrdfNotice> {
             let file = DriveFile::read(text, "x.drives.toml").unwrap();
             notices().into_iter().filter_map(|notice| file.leaves(notice)).collect()
@@ -422,8 +434,9 @@ mod tests {
         assert_eq!(left("friction_epsilon_rad_s = 0.01"), notices());
         let one = "[[joint]]\nname = \"a\"\n";
         let said = left(&format!("{one}viscous_nm_s_rad = 0.0\ntorque_constant_nm_a = 0.1\n"));
+        let of_b = dampings(vec![servo("b")]);
         let expected =
-            [gravity(), drives(all(), all(), b()), no_friction(b()), accelerations(all())];
+            [gravity(), drives(all(), all(), b()), no_friction(b()), of_b, accelerations(all())];
         assert_eq!(said, expected);
         let open = said[1].to_string();
         let of_both = "no rotor inertia and no gear ratio given, taken as 0 and 1: a, b; ";

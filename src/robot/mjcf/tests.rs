@@ -3,6 +3,7 @@
 mod files;
 mod inertia;
 mod parts;
+mod told;
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 

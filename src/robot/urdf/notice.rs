@@ -36,6 +36,12 @@ pub enum UrdfNotice {
         /// The joints without.
         joints: Vec<String>,
     },
+    /// Damping with which the joint's torque limit does not reach its speed limit: a drive would lose all of its torque in itself.
+    /// Simulations have it to keep a stiff servo calm.
+    ServoDamping {
+        /// The joints, and of each the damping, Nm s/rad, and the torque limit, Nm.
+        joints: Vec<(String, f64, f64)>,
+    },
     /// What became of collision shapes.
     Shapes(ShapeNotice),
     /// The drive file beside the URDF was read.
@@ -119,6 +125,7 @@ impl UrdfNotice {
             Self::Gravity { .. }
                 | Self::Drives { .. }
                 | Self::NoFriction { .. }
+                | Self::ServoDamping { .. }
                 | Self::AssumedVelocity { .. }
                 | Self::NoTorqueLimit { .. }
                 | Self::AssumedAcceleration { .. }
@@ -177,6 +184,20 @@ impl fmt::Display for UrdfNotice {
             }
             Self::NoFriction { joints } => {
                 write!(f, "no damping and no friction given, taken as 0: {}", joints.join(", "))
+            }
+            Self::ServoDamping { joints } => {
+                let joints = joints.iter().map(|(joint, damping, torque_nm)| {
+                    let speed_rad_s = torque_nm / damping;
+                    format!(
+                        "{joint} ({damping} Nm s/rad: {torque_nm} Nm at {speed_rad_s:.2} rad/s)"
+                    )
+                });
+                write!(
+                    f,
+                    "damping that takes the whole torque limit below the speed limit is a simulated servo's and not the arm's, but is read as its \
+                     friction (viscous_nm_s_rad in NAME.drives.toml says otherwise): {}",
+                    listed(joints)
+                )
             }
             Self::Shapes(notice) => write!(f, "{notice}"),
             Self::DriveFile { file, open } if open.is_empty() => {

@@ -337,6 +337,17 @@ impl Reader {
         if !no_friction.is_empty() {
             self.notices.push(UrdfNotice::NoFriction { joints: no_friction });
         }
+        let servo_damping: Vec<(String, f64, f64)> = joints
+            .iter()
+            .map(|joint| (joint, joint.drive.viscous_nm_s_rad, joint.limits.torque_nm))
+            .filter(|(joint, damping, torque_nm)| {
+                damping * joint.limits.velocity_rad_s > *torque_nm
+            })
+            .map(|(joint, damping, torque_nm)| (joint.name.clone(), damping, torque_nm))
+            .collect();
+        if !servo_damping.is_empty() {
+            self.notices.push(UrdfNotice::ServoDamping { joints: servo_damping });
+        }
         let without = |limit: fn(&urdf_rs::JointLimit) -> f64| -> Vec<String> {
             let moving = chain.iter().filter_map(|body| body.joint);
             let open = moving.filter(|joint| given(limit(&joint.limit)).is_none());
