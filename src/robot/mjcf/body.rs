@@ -48,6 +48,8 @@ pub(super) struct Bodies<'a> {
     pub robot: Robot,
     /// The inertia of each link, or why it is not known: that matters only where the link moves.
     pub inertias: Vec<Result<Inertial, MjcfFault>>,
+    /// Names that joints have.
+    joint_names: HashSet<String>,
     /// Named places on links.
     sites: Vec<urdf_rs::Joint>,
     /// Rotor inertia by joint, kg m².
@@ -86,6 +88,7 @@ impl<'a> Bodies<'a> {
                 materials: Vec::new(),
             },
             inertias: Vec::new(),
+            joint_names: HashSet::new(),
             sites: Vec::new(),
             armature_kg_m2: HashMap::new(),
             references: HashMap::new(),
@@ -96,6 +99,9 @@ impl<'a> Bodies<'a> {
         };
         bodies.link(WORLD.to_owned(), Ok(Inertial::default()));
         let world = Hold { link: WORLD.to_owned(), anchor_m: Vector3::zeros() };
+        for section in root.each("worldbody") {
+            collect_joint_names(section, &mut bodies.joint_names);
+        }
         for section in root.each("worldbody") {
             let parts = bodies.parts(section, section.text("childclass"))?;
             bodies.inner(&parts, &world)?;
@@ -168,20 +174,16 @@ impl<'a> Bodies<'a> {
         parent: &Hold,
         parts: &[Part<'_>],
     ) -> Result<Hold, MjcfFault> {
-        let joints: Vec<&Part<'_>> = parts
-            .iter()
-            .filter(|part| matches!(part.element.tag.as_str(), "joint" | "freejoint"))
-            .collect();
+        let joints: Vec<&Part<'_>> = parts.iter().filter(|part| is_joint(part.element)).collect();
         let mut at = Hold { link: parent.link.clone(), anchor_m: Vector3::zeros() };
         // Pose of the body, as far as joints have moved it, in the frame of the link at hand.
         let mut body = shift(-parent.anchor_m).compose(pose);
         for (before, part) in joints.iter().enumerate() {
             let element = self.defaults.complete(part.element, part.childclass)?;
             let joint = Joint::of(&element, &part.frame, self.compiler)?;
-            let joint_name = match (element.text("name"), before) {
-                (Some(name), _) => name.to_owned(),
-                (None, 0) => format!("{name}_joint"),
-                (None, _) => format!("{name}_joint{}", before + 1),
+            let joint_name = match element.text("name") {
+                Some(name) => name.to_owned(),
+                None => self.name_of_unnamed(name, before),
             };
             let origin = body.compose(&shift(joint.anchor_m)).compose(&joint.at_zero());
             let link = if before + 1 == joints.len() {
@@ -201,6 +203,18 @@ impl<'a> Bodies<'a> {
             at.link = name.to_owned();
         }
         Ok(at)
+    }
+
+    /// What a joint without a name is called, `before` others of its body `body`: as no other one is.
+    fn name_of_unnamed(&mut self, body: &str, before: usize) -> String {
+        let mut names = (before + 1..).map(|number| match number {
+            1 => format!("{body}_joint"),
+            _ => format!("{body}_joint{number}"),
+        });
+        // Numbers do not run out.
+        let name = names.find(|name| !self.joint_names.contains(name)).unwrap_or_default();
+        self.joint_names.insert(name.clone());
+        name
     }
 
     fn joint(&mut self, name: String, joint: Joint, origin: &Placement, parent: &str, child: &str) {
@@ -262,6 +276,20 @@ impl<'a> Bodies<'a> {
         self.robot.links.push(Link { name, inertial, visual: Vec::new(), collision: Vec::new() });
         self.inertias.push(inertia);
     }
+}
+
+/// Names of all joints in an element.
+fn collect_joint_names(element: &Element, names: &mut HashSet<String>) {
+    for child in &element.children {
+        if is_joint(child) {
+            names.extend(child.text("name").map(str::to_owned));
+        }
+        collect_joint_names(child, names);
+    }
+}
+
+fn is_joint(element: &Element) -> bool {
+    matches!(element.tag.as_str(), "joint" | "freejoint")
 }
 
 /// What holds the link `child` where it is.

@@ -83,3 +83,12 @@ fn what_an_arm_does_not_have_is_told() {
     );
     says(&arm, &["joint \"j\" follows \"k\" by an <equality>"]);
 }
+
+/// MuJoCo has no name for such a joint, so that none of its names is taken.
+#[test]
+fn a_joint_without_a_name_is_called_as_no_other() {
+    let hand = format!(r#"<body name="b"><joint name="a_joint"/>{BODY}</body>"#);
+    let arm = read(&one("", "", &format!("<joint/>{BODY}{hand}"))).arm;
+    let names: Vec<&str> = arm.joints.iter().map(|joint| joint.name.as_str()).collect();
+    assert_eq!(names, ["a_joint2", "a_joint"]);
+}
