@@ -103,7 +103,12 @@ impl Compiler {
         range: &'static str,
     ) -> Result<Option<[f64; 2]>, MjcfFault> {
         let [lower, upper] = element.numbers::<2>(range)?.unwrap_or_default();
-        let is_limited = element.switch(limited)?.unwrap_or(self.autolimits && lower != upper);
+        let said = element.switch(limited)?;
+        // Without its limit an arm would be moved into its stops, if this is what was meant.
+        if said.is_none() && !self.autolimits && lower != upper {
+            return Err(MjcfFault::LimitLeftOpen { place: element.place(), range, limited });
+        }
+        let is_limited = said.unwrap_or(lower != upper);
         if is_limited && lower >= upper {
             return Err(MjcfFault::Range {
                 place: element.place(),

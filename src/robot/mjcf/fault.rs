@@ -143,6 +143,19 @@ pub enum MjcfFault {
         /// As written; 0 where missing.
         upper: f64,
     },
+    /// A range of which it is not said whether it limits.
+    #[error(
+        "{place} has {range} but not {limited}, and <compiler> says autolimits=\"false\", which MuJoCo refuses too; write {limited}=\"true\" where \
+         the range is a limit, {limited}=\"false\" where it is none"
+    )]
+    LimitLeftOpen {
+        /// The element.
+        place: String,
+        /// The attribute with the range.
+        range: &'static str,
+        /// The attribute that is missing.
+        limited: &'static str,
+    },
     /// A solid without extent.
     #[error("{place}: number {number} of size is {size_m}; it must be positive")]
     Size {

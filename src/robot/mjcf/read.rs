@@ -44,8 +44,7 @@ pub struct MjcfArm {
 /// - **Base frame**: the world. Gravity is that of `<option>`.
 /// - **Joints**: hinges. `ref` is the position in the pose of the file; an axis that does not go through the body's origin is one
 ///   of the joint's frame, whose origin is `pos`. Joints without a name are called after their body (`BODY_joint`,
-///   with a number where another joint is called so). A joint that an
-///   `<equality>` makes follow another is what a mimic joint is there.
+///   with a number where another joint is called so). A joint that an `<equality>` makes follow another is what a mimic joint is there.
 /// - **Bodies** are links; their inertia is that of `<inertial>`, or of geoms that are primitive solids, as `<compiler>` says.
 ///   Named sites are frames, as bodies without mass are.
 /// - **Drives**: `armature` is the rotor inertia, `damping` rv, `frictionloss` rc. The torque limit is the joint's

@@ -253,8 +253,10 @@ fn limits_are_those_that_mujoco_keeps() {
     assert_eq!(of(RADIAN, r#"range="-1 2" limited="false""#), (all, true));
     assert_eq!(of(RADIAN, ""), (all, true));
     let by_hand = r#"<compiler angle="radian" autolimits="false"/>"#;
-    assert_eq!(of(by_hand, r#"range="-1 2""#), (all, true));
+    assert_eq!(of(by_hand, r#"range="-1 2" limited="false""#), (all, true));
     assert_eq!(of(by_hand, r#"range="-1 2" limited="true""#), ([-1.0, 2.0], false));
+    let open = one(by_hand, "", &format!(r#"{BODY}<joint name="j" range="-1 2"/>"#));
+    says(&open, &["joint \"j\" has range but not limited", "autolimits"]);
     let backwards = one("", "", &format!(r#"{BODY}<joint name="j" range="2 -1"/>"#));
     says(&backwards, &["joint \"j\"", "range=\"2 -1\"", "the smaller one"]);
 }
