@@ -68,16 +68,17 @@ impl Joint {
         let damping = joint.up_to("damping", POWERS)?.unwrap_or_else(|| vec![0.0]);
         let stiffness = joint.up_to("stiffness", POWERS)?.unwrap_or_default();
         joint.refuse_negative("damping", damping[0])?;
+        let tuned = joint.up_to("springdamper", 2)?.unwrap_or_default();
+        let is_tuned = tuned.iter().any(|part| *part != 0.0);
         let mut left_out = Vec::new();
+        if is_tuned {
+            left_out.push(LeftOut::SpringDamper);
+        }
         if damping.iter().skip(1).any(|higher| *higher != 0.0) {
             left_out.push(LeftOut::HigherDamping);
         }
         if stiffness.iter().any(|part| *part != 0.0) {
             left_out.push(LeftOut::Stiffness);
-        }
-        let tuned = joint.up_to("springdamper", 2)?.unwrap_or_default();
-        if tuned.iter().any(|part| *part > 0.0) {
-            left_out.push(LeftOut::SpringDamper);
         }
         Ok(Self {
             anchor_m,
@@ -86,7 +87,8 @@ impl Joint {
             limit: JointLimit { lower: lower * unit, upper: upper * unit, ..JointLimit::default() },
             effort: effort.map_or(f64::INFINITY, smaller),
             dynamics: Dynamics {
-                damping: damping[0],
+                // What MuJoCo works out by the time constant counts instead of what is written.
+                damping: if is_tuned { 0.0 } else { damping[0] },
                 friction: joint.not_negative("frictionloss")?,
             },
             armature_kg_m2: joint.not_negative("armature")?,

@@ -48,7 +48,8 @@ impl fmt::Display for LeftOut {
         f.write_str(match self {
             Self::Stiffness => "springs (stiffness) are no part of the arm",
             Self::SpringDamper => {
-                "springs and dampers by their time constant (springdamper) are not read, so that damping there is not MuJoCo's"
+                "springs and dampers by their time constant (springdamper) are not read, damping there is taken as 0: MuJoCo works them out of the \
+                 inertia, and writes them into the file when it saves the model (mj_saveLastXML)"
             }
             Self::HigherDamping => "of damping only the first number is read, which is in proportion to the speed",
             Self::Held => "an <equality> that holds a joint in its place is not read",

@@ -24,3 +24,14 @@ fn damping_that_a_drive_could_not_carry_is_told() {
     // Without a torque limit there is nothing to compare with.
     assert!(!is_told("", r#"damping="200""#));
 }
+
+/// MuJoCo 4.0 gives this joint 1.38 Nm s/rad and 1.38 Nm/rad instead of what is written.
+#[test]
+fn damping_that_mujoco_works_out_itself_is_told() {
+    let joint = r#"armature="0.3" damping="7" stiffness="3" springdamper="0.5 1""#;
+    let text = one("", "", &format!("{BODY}<joint name=\"j\" {joint}/>"));
+    assert_eq!(read(&text).arm.joints[0].drive.viscous_nm_s_rad, 0.0);
+    let lines = told("", joint);
+    let is_told = |line: &String| line.contains("(springdamper)") && line.ends_with(": j");
+    assert!(lines.iter().any(is_told), "{lines:?}");
+}
