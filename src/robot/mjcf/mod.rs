@@ -20,6 +20,7 @@ mod geom;
 mod inertia;
 mod joint;
 mod notice;
+mod option;
 mod pose;
 mod read;
 #[cfg(test)]

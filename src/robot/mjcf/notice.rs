@@ -9,6 +9,8 @@ use crate::robot::urdf::listed;
 pub enum MjcfNotice {
     /// The file switches gravity off.
     Weightless,
+    /// Bodies move in something that drags at them.
+    Medium,
     /// Bodies that are held together beside the joints: the arm is read as if they were not.
     Loops {
         /// How many.
@@ -37,6 +39,8 @@ pub enum LeftOut {
     SpringDamper,
     /// Damping that grows faster than the speed.
     HigherDamping,
+    /// Friction that a flag disables.
+    SwitchedOff,
     /// A joint that an `<equality>` holds in its place.
     Held,
     /// A joint that follows another on a curve.
@@ -52,6 +56,7 @@ impl fmt::Display for LeftOut {
                  inertia, and writes them into the file when it saves the model (mj_saveLastXML)"
             }
             Self::HigherDamping => "of damping only the first number is read, which is in proportion to the speed",
+            Self::SwitchedOff => "friction that the file switches off (<flag>) is taken as 0",
             Self::Held => "an <equality> that holds a joint in its place is not read",
             Self::Curve => "of polycoef only the first two numbers are read: a joint follows another in proportion",
         })
@@ -64,6 +69,10 @@ impl fmt::Display for MjcfNotice {
             Self::Weightless => write!(
                 f,
                 "the file switches gravity off; say gravity_m_s2 in NAME.drives.toml beside it if the arm has weight"
+            ),
+            Self::Medium => write!(
+                f,
+                "drag of the medium (density and viscosity of <option>) is not read, the arm moves without it"
             ),
             Self::Loops { count } => write!(
                 f,

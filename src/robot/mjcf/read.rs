@@ -11,16 +11,13 @@ use super::collision::meshes;
 use super::compiler::Compiler;
 use super::defaults::Defaults;
 use super::document::document;
-use super::element::Element;
 use super::equality::{couple, loops};
 use super::fault::MjcfFault;
 use super::notice::{LeftOut, MjcfNotice};
+use super::option::Options;
 use crate::robot::arm::Arm;
 use crate::robot::error::RobotError;
 use crate::robot::urdf::{Frames, UrdfArm, UrdfLink, UrdfNotice, arm_of, moving_links};
-
-/// Gravity where a file gives none, in the world, m/s²: MuJoCo's own.
-const USUAL_GRAVITY_M_S2: [f64; 3] = [0.0, 0.0, -9.81];
 
 /// An arm read from an MJCF.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,7 +38,7 @@ pub struct MjcfArm {
 ///
 /// What becomes of the file is what becomes of a URDF ([`read_urdf`](crate::robot::read_urdf)), but for this:
 ///
-/// - **Base frame**: the world. Gravity is that of `<option>`.
+/// - **Base frame**: the world. Gravity is that of `<option>`. What its `<flag>` disables is 0: gravity, damping, dry friction.
 /// - **Joints**: hinges. `ref` is the position in the pose of the file; an axis that does not go through the body's origin is one
 ///   of the joint's frame, whose origin is `pos`. Joints without a name are called after their body (`BODY_joint`,
 ///   with a number where another joint is called so). A joint that an `<equality>` makes follow another is what a mimic joint is there.
@@ -53,7 +50,7 @@ pub struct MjcfArm {
 /// - **Default classes**, `childclass`, `<include>`, `<frame>`, and the ways to write orientations are as in MuJoCo. Copies
 ///   (`<replicate>`), attached models, deformable bodies and the mass of meshes on moving bodies are refused.
 /// - **Collision shapes** are the geoms with a `contype` or `conaffinity`, those of the world too, but for planes and height fields.
-/// - Contacts, tendons, sensors, keyframes, and what is only seen are not read.
+/// - Contacts, drag of the medium, tendons, sensors, keyframes, and what is only seen are not read.
 ///
 /// # Errors
 /// [`RobotError::Mjcf`] where it is no MJCF, or not one of a serial arm of physically possible bodies.
@@ -74,6 +71,7 @@ pub fn read_mjcf_up_to(text: &str, source: &str, last_body: &str) -> Result<Mjcf
 fn read(text: &str, source: &str, last_body: Option<&str>) -> Result<MjcfArm, MjcfFault> {
     let (root, included) = document(text, source)?;
     let compiler = Compiler::of(&root)?;
+    let options = Options::of(&root)?;
     let defaults = Defaults::of(&root)?;
     let actuated = actuated(&root, &compiler, &defaults)?;
     let meshes = meshes(&root, &compiler, &defaults);
@@ -84,17 +82,18 @@ fn read(text: &str, source: &str, last_body: Option<&str>) -> Result<MjcfArm, Mj
     }
     let coupled = couple(&root, &mut bodies.robot, &bodies.references)?;
     bodies.left_out.extend(coupled);
+    bodies.left_out.extend(options.switch_off(&mut bodies.robot));
     bodies.loops = loops(&root)?;
     give_inertias(&mut bodies, source, last_body)?;
     let mut read = arm_of(&bodies.robot, source, last_body).map_err(MjcfFault::Arm)?;
     read.watch(&bodies.shapes, source);
     let UrdfArm { mut arm, frames, links, notices, meshes } = read;
-    arm.gravity_m_s2 = gravity(&root)?;
+    arm.gravity_m_s2 = options.gravity_m_s2;
     for joint in &mut arm.joints {
         joint.drive.rotor_inertia_kg_m2 =
             bodies.armature_kg_m2.get(&joint.name).copied().unwrap_or(0.0);
     }
-    let notices = told(notices, &arm, &links, &bodies);
+    let notices = told(notices, &arm, &links, &bodies, &options);
     Ok(MjcfArm { arm, frames, notices, included, meshes })
 }
 
@@ -119,30 +118,21 @@ fn give_inertias(
     moving.iter().find_map(|link| faults.remove(link)).map_or(Ok(()), Err)
 }
 
-/// Gravity in the world, m/s².
-fn gravity(root: &Element) -> Result<Vector3<f64>, MjcfFault> {
-    let mut flags = root.each("option").flat_map(|option| option.each("flag"));
-    if flags.any(|flag| flag.text("gravity") == Some("disable")) {
-        return Ok(Vector3::zeros());
-    }
-    let given = match root.settings("option") {
-        Some(option) => option.numbers::<3>("gravity")?,
-        None => None,
-    };
-    Ok(given.unwrap_or(USUAL_GRAVITY_M_S2).into())
-}
-
 /// What is to be told of an MJCF: of what was `noticed` as of a URDF that which holds, and its own.
 fn told(
     noticed: Vec<UrdfNotice>,
     arm: &Arm,
     links: &[UrdfLink],
     bodies: &Bodies<'_>,
+    options: &Options,
 ) -> Vec<UrdfNotice> {
     let mut notices = Vec::new();
     let mut own = Vec::new();
     if arm.gravity_m_s2 == Vector3::zeros() {
         own.push(MjcfNotice::Weightless);
+    }
+    if options.has_medium {
+        own.push(MjcfNotice::Medium);
     }
     if bodies.loops > 0 {
         own.push(MjcfNotice::Loops { count: bodies.loops });
@@ -162,6 +152,7 @@ fn told(
         LeftOut::Stiffness,
         LeftOut::SpringDamper,
         LeftOut::HigherDamping,
+        LeftOut::SwitchedOff,
         LeftOut::Held,
         LeftOut::Curve,
     ] {

@@ -1,6 +1,6 @@
 //! What is told of an MJCF beside its arm.
 
-use super::{BODY, one, read};
+use super::{BODY, MjcfArm, one, read};
 
 /// The lines that are told, with `sections` ahead of the world and the attributes of the joint "j".
 fn told(sections: &str, joint: &str) -> Vec<String> {
@@ -34,4 +34,33 @@ fn damping_that_mujoco_works_out_itself_is_told() {
     let lines = told("", joint);
     let is_told = |line: &String| line.contains("(springdamper)") && line.ends_with(": j");
     assert!(lines.iter().any(is_told), "{lines:?}");
+}
+
+/// What MuJoCo 4.0 makes of these flags; of dry friction `constraint` takes away as much as its own.
+#[test]
+fn what_flags_disable_is_zero_and_told() {
+    let of = |flags: &str, joint: &str| {
+        let option = format!("<option><flag {flags}/></option>");
+        let text = one(&option, "", &format!("{BODY}<joint name=\"j\" {joint}/>"));
+        let MjcfArm { arm, notices, .. } = read(&text);
+        let line = "friction that the file switches off (<flag>) is taken as 0: j";
+        let is_told = notices.iter().any(|notice| notice.to_string() == line);
+        let drive = arm.joints[0].drive;
+        (drive.viscous_nm_s_rad, drive.coulomb_nm, is_told)
+    };
+    let both = r#"damping="2" frictionloss="1""#;
+    assert_eq!(of(r#"contact="disable" damper="enable""#, both), (2.0, 1.0, false));
+    assert_eq!(of(r#"damper="disable""#, both), (0.0, 1.0, true));
+    assert_eq!(of(r#"frictionloss="disable""#, both), (2.0, 0.0, true));
+    assert_eq!(of(r#"constraint="disable""#, both), (2.0, 0.0, true));
+    assert_eq!(of(r#"constraint="disable""#, r#"damping="2""#), (2.0, 0.0, false));
+}
+
+#[test]
+fn a_medium_is_told() {
+    let is_told = |option: &str| {
+        told(&format!("<option {option}/>"), "").iter().any(|line| line.contains("drag"))
+    };
+    assert!(is_told(r#"density="1.2""#) && is_told(r#"viscosity="2e-5""#));
+    assert!(!is_told(r#"density="0" wind="1 0 0""#));
 }
