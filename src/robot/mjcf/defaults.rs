@@ -8,6 +8,9 @@ use super::fault::MjcfFault;
 /// The class of elements that name none.
 const MAIN: &str = "main";
 
+/// All kinds of equalities have the same defaults.
+const EQUALITY: &str = "equality";
+
 /// Kinds of actuators; MuJoCo keeps one set of defaults for all of them.
 pub(super) const ACTUATORS: [&str; 11] = [
     "general",
@@ -67,13 +70,27 @@ impl Defaults {
         element: &Element,
         childclass: Option<&str>,
     ) -> Result<Element, MjcfFault> {
+        self.complete_as(kind(&element.tag), element, childclass)
+    }
+
+    /// The same of an equality, which may be called as another element is.
+    pub(super) fn complete_equality(&self, equality: &Element) -> Result<Element, MjcfFault> {
+        self.complete_as(Some(EQUALITY), equality, None)
+    }
+
+    fn complete_as(
+        &self,
+        kind: Option<&str>,
+        element: &Element,
+        childclass: Option<&str>,
+    ) -> Result<Element, MjcfFault> {
         let name = element.text("class").or(childclass).unwrap_or(MAIN);
         let Some(class) = self.classes.get(name) else {
             let class = name.to_owned();
             return Err(MjcfFault::UnknownClass { place: element.place(), class });
         };
         let mut complete = element.clone();
-        if let Some(defaults) = kind(&element.tag).and_then(|kind| class.get(kind)) {
+        if let Some(defaults) = kind.and_then(|kind| class.get(kind)) {
             fill(&mut complete.attributes, defaults);
         }
         Ok(complete)
@@ -87,6 +104,7 @@ fn kind(tag: &str) -> Option<&'static str> {
         "geom" => Some("geom"),
         "site" => Some("site"),
         "mesh" => Some("mesh"),
+        EQUALITY => Some(EQUALITY),
         _ if ACTUATORS.contains(&tag) => Some("actuator"),
         _ => None,
     }

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use urdf_rs::{Mimic, Robot};
 
+use super::defaults::Defaults;
 use super::element::Element;
 use super::fault::MjcfFault;
 use super::notice::LeftOut;
@@ -15,15 +16,13 @@ const COEFFICIENTS: usize = 5;
 /// positions that joints have in the pose of the file.
 pub(super) fn couple(
     root: &Element,
+    defaults: &Defaults,
     robot: &mut Robot,
     references: &HashMap<String, f64>,
 ) -> Result<Vec<(LeftOut, String)>, MjcfFault> {
     let mut left_out = Vec::new();
     let reference = |joint: &str| references.get(joint).copied().unwrap_or(0.0);
-    for joint in root.each("equality").flat_map(|section| section.each("joint")) {
-        if joint.switch("active")? == Some(false) {
-            continue;
-        }
+    for joint in active(root, defaults, "joint")? {
         let name = joint.required("joint1")?;
         let coefficients = joint.up_to("polycoef", COEFFICIENTS)?;
         let coefficients = coefficients.unwrap_or_else(|| vec![0.0, 1.0]);
@@ -50,12 +49,18 @@ pub(super) fn couple(
 }
 
 /// How many equalities hold bodies together beside the joints.
-pub(super) fn loops(root: &Element) -> Result<usize, MjcfFault> {
-    let mut count = 0;
-    for section in root.each("equality") {
-        for holding in section.each("connect").chain(section.each("weld")) {
-            count += usize::from(holding.switch("active")? != Some(false));
+pub(super) fn loops(root: &Element, defaults: &Defaults) -> Result<usize, MjcfFault> {
+    Ok(active(root, defaults, "connect")?.len() + active(root, defaults, "weld")?.len())
+}
+
+/// Equalities of a kind that are not switched off, with the defaults of their classes.
+fn active(root: &Element, defaults: &Defaults, kind: &str) -> Result<Vec<Element>, MjcfFault> {
+    let mut active = Vec::new();
+    for equality in root.each("equality").flat_map(|section| section.each(kind)) {
+        let equality = defaults.complete_equality(equality)?;
+        if equality.switch("active")? != Some(false) {
+            active.push(equality);
         }
     }
-    Ok(count)
+    Ok(active)
 }

@@ -80,10 +80,10 @@ fn read(text: &str, source: &str, last_body: Option<&str>) -> Result<MjcfArm, Mj
         let stem = Path::new(source).file_stem().unwrap_or_default();
         bodies.robot.name = stem.to_string_lossy().into_owned();
     }
-    let coupled = couple(&root, &mut bodies.robot, &bodies.references)?;
+    let coupled = couple(&root, &defaults, &mut bodies.robot, &bodies.references)?;
     bodies.left_out.extend(coupled);
     bodies.left_out.extend(options.switch_off(&mut bodies.robot));
-    bodies.loops = loops(&root)?;
+    bodies.loops = loops(&root, &defaults)?;
     give_inertias(&mut bodies, source, last_body)?;
     let mut read = arm_of(&bodies.robot, source, last_body).map_err(MjcfFault::Arm)?;
     read.watch(&bodies.shapes, source);

@@ -92,3 +92,20 @@ fn a_joint_without_a_name_is_called_as_no_other() {
     let names: Vec<&str> = arm.joints.iter().map(|joint| joint.name.as_str()).collect();
     assert_eq!(names, ["a_joint2", "a_joint"]);
 }
+
+/// As in MuJoCo 4.0.
+#[test]
+fn equalities_have_the_defaults_of_their_class() {
+    let counted = |default: &str, equality: &str| {
+        let sections = format!(
+            r#"<default><equality {default}/><default class="off"><equality active="false"/></default></default>
+               <equality><weld body1="a" {equality}/></equality>"#
+        );
+        let notices = read(&one(&sections, "", &format!("<joint/>{BODY}"))).notices;
+        notices.contains(&UrdfNotice::Mjcf(MjcfNotice::Loops { count: 1 }))
+    };
+    assert!(counted(r#"solref="0.1 1""#, ""));
+    assert!(!counted(r#"active="false""#, ""));
+    assert!(counted(r#"active="false""#, r#"active="true""#));
+    assert!(!counted("", r#"class="off""#));
+}
