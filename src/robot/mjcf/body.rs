@@ -52,6 +52,8 @@ pub(super) struct Bodies<'a> {
     joint_names: HashSet<String>,
     /// Named places on links.
     sites: Vec<urdf_rs::Joint>,
+    /// The link that each of them is on.
+    pub links_of_sites: HashMap<String, String>,
     /// Rotor inertia by joint, kg m².
     pub armature_kg_m2: HashMap<String, f64>,
     /// Positions of joints in the pose of the file, rad or m.
@@ -90,6 +92,7 @@ impl<'a> Bodies<'a> {
             inertias: Vec::new(),
             joint_names: HashSet::new(),
             sites: Vec::new(),
+            links_of_sites: HashMap::new(),
             armature_kg_m2: HashMap::new(),
             references: HashMap::new(),
             left_out: Vec::new(),
@@ -255,6 +258,7 @@ impl<'a> Bodies<'a> {
         let site = self.defaults.complete(part.element, part.childclass)?;
         let Some(name) = site.text("name") else { return Ok(()) };
         let own = part.frame.compose(&pose(&site, self.compiler)?);
+        self.links_of_sites.insert(name.to_owned(), hold.link.clone());
         self.sites.push(fixed(name, &shift(-hold.anchor_m).compose(&own), &hold.link));
         Ok(())
     }

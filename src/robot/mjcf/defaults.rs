@@ -104,6 +104,8 @@ fn kind(tag: &str) -> Option<&'static str> {
         "geom" => Some("geom"),
         "site" => Some("site"),
         "mesh" => Some("mesh"),
+        // In <default> all of them are one.
+        "fixed" | "spatial" | "tendon" => Some("tendon"),
         EQUALITY => Some(EQUALITY),
         _ if ACTUATORS.contains(&tag) => Some("actuator"),
         _ => None,

@@ -54,7 +54,11 @@ pub(super) fn loops(root: &Element, defaults: &Defaults) -> Result<usize, MjcfFa
 }
 
 /// Equalities of a kind that are not switched off, with the defaults of their classes.
-fn active(root: &Element, defaults: &Defaults, kind: &str) -> Result<Vec<Element>, MjcfFault> {
+pub(super) fn active(
+    root: &Element,
+    defaults: &Defaults,
+    kind: &str,
+) -> Result<Vec<Element>, MjcfFault> {
     let mut active = Vec::new();
     for equality in root.each("equality").flat_map(|section| section.each(kind)) {
         let equality = defaults.complete_equality(equality)?;

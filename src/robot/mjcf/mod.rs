@@ -22,6 +22,7 @@ mod joint;
 mod notice;
 mod option;
 mod pose;
+mod pull;
 mod read;
 #[cfg(test)]
 mod tests;

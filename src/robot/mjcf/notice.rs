@@ -23,6 +23,16 @@ pub enum MjcfNotice {
         /// The joints that have it.
         joints: Vec<String>,
     },
+    /// Tendons that act on joints of the arm.
+    Tendons {
+        /// These.
+        tendons: Vec<String>,
+    },
+    /// Actuators that do not drive one joint, but push at a site that moves with the arm.
+    SiteActuators {
+        /// These.
+        actuators: Vec<String>,
+    },
     /// Bodies whose weight MuJoCo takes away.
     GravityCompensation {
         /// These.
@@ -80,6 +90,16 @@ impl fmt::Display for MjcfNotice {
                  what is identified of it is not its own"
             ),
             Self::LeftOut { what, joints } => write!(f, "{what}: {}", listed(joints)),
+            Self::Tendons { tendons } => write!(
+                f,
+                "tendons are not read, nor what they do to joints of the arm (drive, hold, couple, limit, slow down): {}",
+                listed(tendons)
+            ),
+            Self::SiteActuators { actuators } => write!(
+                f,
+                "actuators at sites are not read, joints that they move have no torque limit of them: {}",
+                listed(actuators)
+            ),
             Self::GravityCompensation { bodies } => write!(
                 f,
                 "the file takes weight away (gravcomp), the arm has all of it, and its drives carry it: {}",

@@ -15,6 +15,7 @@ use super::equality::{couple, loops};
 use super::fault::MjcfFault;
 use super::notice::{LeftOut, MjcfNotice};
 use super::option::Options;
+use super::pull::Pulls;
 use crate::robot::arm::Arm;
 use crate::robot::error::RobotError;
 use crate::robot::urdf::{Frames, UrdfArm, UrdfLink, UrdfNotice, arm_of, moving_links};
@@ -74,6 +75,7 @@ fn read(text: &str, source: &str, last_body: Option<&str>) -> Result<MjcfArm, Mj
     let options = Options::of(&root)?;
     let defaults = Defaults::of(&root)?;
     let actuated = actuated(&root, &compiler, &defaults)?;
+    let pulls = Pulls::of(&root, &compiler, &defaults)?;
     let meshes = meshes(&root, &compiler, &defaults);
     let mut bodies = Bodies::of(&root, &compiler, &defaults, &actuated, &meshes)?;
     if bodies.robot.name.is_empty() {
@@ -93,7 +95,13 @@ fn read(text: &str, source: &str, last_body: Option<&str>) -> Result<MjcfArm, Mj
         joint.drive.rotor_inertia_kg_m2 =
             bodies.armature_kg_m2.get(&joint.name).copied().unwrap_or(0.0);
     }
-    let notices = told(notices, &arm, &links, &bodies, &options);
+    let mut notices = told(notices, &arm, &links, &bodies, &options);
+    let is_joint = |name: &str| arm.joints.iter().any(|joint| joint.name == name);
+    let moves = |site: &str| {
+        let link = bodies.links_of_sites.get(site);
+        link.is_some_and(|link| links.iter().any(|one| one.body > 0 && one.name == *link))
+    };
+    notices.extend(pulls.notices(is_joint, moves).into_iter().map(UrdfNotice::Mjcf));
     Ok(MjcfArm { arm, frames, notices, included, meshes })
 }
 

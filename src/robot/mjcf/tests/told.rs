@@ -1,6 +1,7 @@
 //! What is told of an MJCF beside its arm.
 
 use super::{BODY, MjcfArm, one, read};
+use crate::robot::mjcf::read_mjcf_up_to;
 
 /// The lines that are told, with `sections` ahead of the world and the attributes of the joint "j".
 fn told(sections: &str, joint: &str) -> Vec<String> {
@@ -63,4 +64,44 @@ fn a_medium_is_told() {
     };
     assert!(is_told(r#"density="1.2""#) && is_told(r#"viscosity="2e-5""#));
     assert!(!is_told(r#"density="0" wind="1 0 0""#));
+}
+
+/// A tendon over the joint "j", and one over the fingers of a gripper, which is locked.
+#[test]
+fn tendons_and_actuators_at_sites_are_told_where_they_move_the_arm() {
+    let told = |sections: &str| -> Vec<String> {
+        let finger = format!(r#"<body name="f"><joint name="f" type="slide"/>{BODY}</body>"#);
+        let inside = format!(r#"<joint name="j"/><site name="s"/>{BODY}{finger}"#);
+        let read = read_mjcf_up_to(&one(sections, "", &inside), "toy.xml", "a").unwrap();
+        let lines = read.notices.iter().map(ToString::to_string);
+        lines.filter(|line| line.contains("are not read, ")).collect()
+    };
+    let tendon = |attributes: &str, joint: &str| {
+        format!(
+            r#"<tendon><fixed name="t" {attributes}><joint joint="{joint}" coef="1"/></fixed></tendon>"#
+        )
+    };
+    let tells = |sections: &str, what: &str, name: &str| {
+        let lines = told(sections);
+        let is_told =
+            |line: &String| line.starts_with(what) && line.ends_with(&format!(": {name}"));
+        assert!(lines.len() == 1 && lines.iter().all(is_told), "{lines:?}");
+    };
+    for acting in [r#"frictionloss="1""#, r#"damping="0 2""#, r#"stiffness="3""#, r#"range="-1 1""#]
+    {
+        tells(&tendon(acting, "j"), "tendons", "t");
+        assert!(told(&tendon(acting, "f")).is_empty());
+    }
+    let idle = tendon("", "j");
+    assert!(told(&idle).is_empty());
+    let motor = r#"<actuator><motor tendon="t"/></actuator>"#;
+    tells(&format!("{idle}{motor}"), "tendons", "t");
+    let held = r#"<equality><tendon tendon1="t"/></equality>"#;
+    tells(&format!("{idle}{held}"), "tendons", "t");
+    tells(&format!(r#"<default><tendon damping="1"/></default>{idle}"#), "tendons", "t");
+    let cable =
+        r#"<tendon><spatial stiffness="9"><site site="w"/><site site="s"/></spatial></tendon>"#;
+    tells(cable, "tendons", "line 1: <spatial>");
+    let jet = r#"<actuator><general name="jet" site="s"/><motor name="k" site="w"/></actuator>"#;
+    tells(jet, "actuators at sites", "jet");
 }
