@@ -54,6 +54,8 @@ pub(super) struct Bodies<'a> {
     sites: Vec<urdf_rs::Joint>,
     /// The link that each of them is on.
     pub links_of_sites: HashMap<String, String>,
+    /// Sites that are called as a body is.
+    pub namesakes: Vec<String>,
     /// Rotor inertia by joint, kg m².
     pub armature_kg_m2: HashMap<String, f64>,
     /// Positions of joints in the pose of the file, rad or m.
@@ -93,6 +95,7 @@ impl<'a> Bodies<'a> {
             joint_names: HashSet::new(),
             sites: Vec::new(),
             links_of_sites: HashMap::new(),
+            namesakes: Vec::new(),
             armature_kg_m2: HashMap::new(),
             references: HashMap::new(),
             left_out: Vec::new(),
@@ -265,11 +268,15 @@ impl<'a> Bodies<'a> {
 
     /// Bodies and sites may share a name; then it is the body's.
     fn add_sites(&mut self) {
-        let mut names: HashSet<String> =
+        let bodies: HashSet<String> =
             self.robot.links.iter().map(|link| link.name.clone()).collect();
+        let mut names = HashSet::new();
         for site in std::mem::take(&mut self.sites) {
-            if names.insert(site.child.link.clone()) {
-                self.link(site.child.link.clone(), Ok(Inertial::default()));
+            let name = site.child.link.clone();
+            if bodies.contains(&name) {
+                self.namesakes.push(name);
+            } else if names.insert(name.clone()) {
+                self.link(name, Ok(Inertial::default()));
                 self.robot.joints.push(site);
             }
         }

@@ -23,6 +23,11 @@ pub enum MjcfNotice {
         /// The joints that have it.
         joints: Vec<String>,
     },
+    /// Sites that are called as a body is: the name is the body's.
+    Namesakes {
+        /// These.
+        sites: Vec<String>,
+    },
     /// Tendons that act on joints of the arm.
     Tendons {
         /// These.
@@ -90,6 +95,11 @@ impl fmt::Display for MjcfNotice {
                  what is identified of it is not its own"
             ),
             Self::LeftOut { what, joints } => write!(f, "{what}: {}", listed(joints)),
+            Self::Namesakes { sites } => write!(
+                f,
+                "sites with the name of a body are no frames, the name means the body: {}",
+                listed(sites)
+            ),
             Self::Tendons { tendons } => write!(
                 f,
                 "tendons are not read, nor what they do to joints of the arm (drive, hold, couple, limit, slow down): {}",

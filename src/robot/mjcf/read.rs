@@ -145,6 +145,9 @@ fn told(
     if bodies.loops > 0 {
         own.push(MjcfNotice::Loops { count: bodies.loops });
     }
+    if !bodies.namesakes.is_empty() {
+        own.push(MjcfNotice::Namesakes { sites: bodies.namesakes.clone() });
+    }
     for notice in noticed {
         match notice {
             UrdfNotice::Gravity { .. } => {}

@@ -109,3 +109,17 @@ fn equalities_have_the_defaults_of_their_class() {
     assert!(counted(r#"active="false""#, r#"active="true""#));
     assert!(!counted("", r#"class="off""#));
 }
+
+#[test]
+fn a_name_that_a_site_has_too_is_the_bodys() {
+    let hand = format!(r#"<body name="b" pos="0 0 1"><joint name="k"/>{BODY}</body>"#);
+    let inside = format!(r#"<joint name="j"/>{BODY}<site name="b"/><site name="s"/>{hand}"#);
+    let text = one("", "", &inside);
+    let MjcfArm { arm, frames, notices, .. } = read_mjcf_up_to(&text, "toy.xml", "b").unwrap();
+    assert_eq!(arm.dof(), 2);
+    let names: Vec<&str> = frames.fixed.iter().map(|frame| frame.name.as_str()).collect();
+    assert_eq!(names, ["s"]);
+    let notice = MjcfNotice::Namesakes { sites: vec!["b".into()] };
+    assert!(notice.to_string().ends_with("the name means the body: b"), "{notice}");
+    assert!(notices.contains(&UrdfNotice::Mjcf(notice)));
+}
