@@ -11,6 +11,7 @@ use super::compiler::Compiler;
 use super::defaults::Defaults;
 use super::element::Element;
 use super::fault::MjcfFault;
+use super::geom::stretch;
 use super::inertia::BodyInertia;
 use super::joint::Joint;
 use super::notice::LeftOut;
@@ -260,7 +261,9 @@ impl<'a> Bodies<'a> {
     fn site(&mut self, part: &Part<'_>, hold: &Hold) -> Result<(), MjcfFault> {
         let site = self.defaults.complete(part.element, part.childclass)?;
         let Some(name) = site.text("name") else { return Ok(()) };
-        let own = part.frame.compose(&pose(&site, self.compiler)?);
+        let kind = site.text("type").unwrap_or("sphere");
+        let (own, _) = stretch(&site, kind, self.compiler)?;
+        let own = part.frame.compose(&own);
         self.links_of_sites.insert(name.to_owned(), hold.link.clone());
         self.sites.push(fixed(name, &shift(-hold.anchor_m).compose(&own), &hold.link));
         Ok(())

@@ -66,8 +66,8 @@ pub(super) fn solid(
     Ok((placement, Solid::of(geom, kind, half_m)?))
 }
 
-/// Where the geom stands, and where two points say how long it is half of that, m.
-fn stretch(
+/// Where a geom (or site) stands, and where two points say how long it is half of that, m.
+pub(super) fn stretch(
     geom: &Element,
     kind: &str,
     compiler: &Compiler,

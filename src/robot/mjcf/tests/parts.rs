@@ -1,7 +1,7 @@
 //! Arms that are a part of what is in a file, and joints that are not an arm's.
 
 use approx::assert_abs_diff_eq;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::{BODY, one, read, says};
 use crate::robot::UrdfNotice;
@@ -122,4 +122,27 @@ fn a_name_that_a_site_has_too_is_the_bodys() {
     let notice = MjcfNotice::Namesakes { sites: vec!["b".into()] };
     assert!(notice.to_string().ends_with("the name means the body: b"), "{notice}");
     assert!(notices.contains(&UrdfNotice::Mjcf(notice)));
+}
+
+/// Its frame as MuJoCo 4.0 prints it: in the middle, z from the second point to the first.
+#[test]
+fn a_site_between_two_points_has_its_frame_in_the_middle() {
+    let site = r#"<site name="s" type="capsule" size="0.01" fromto="0 0 0 0.1 0.3 0.2"/>"#;
+    let text = one("", "", &format!(r#"<joint name="j"/>{BODY}{site}"#));
+    let placement = read(&text).frames.fixed[0].placement;
+    assert_abs_diff_eq!(placement.translation_m, Vector3::new(0.05, 0.15, 0.1), epsilon = 1e-15);
+    let expected = Matrix3::new(
+        0.84654775,
+        -0.46035675,
+        -0.26726124,
+        -0.46035675,
+        -0.38107024,
+        -0.80178373,
+        0.26726124,
+        0.80178373,
+        -0.53452248,
+    );
+    assert_abs_diff_eq!(placement.rotation, expected, epsilon = 1e-8);
+    let ball = one("", "", &format!("<joint/>{BODY}<site name=\"s\" fromto=\"0 0 0 0 0 1\"/>"));
+    says(&ball, &["line 1: site \"s\"", "those that fromto can stretch"]);
 }
