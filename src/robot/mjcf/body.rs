@@ -57,6 +57,8 @@ pub(super) struct Bodies<'a> {
     pub links_of_sites: HashMap<String, String>,
     /// Sites that are called as a body is.
     pub namesakes: Vec<String>,
+    /// Free joints, which are locked.
+    pub free: Vec<String>,
     /// Rotor inertia by joint, kg m².
     pub armature_kg_m2: HashMap<String, f64>,
     /// Positions of joints in the pose of the file, rad or m.
@@ -97,6 +99,7 @@ impl<'a> Bodies<'a> {
             sites: Vec::new(),
             links_of_sites: HashMap::new(),
             namesakes: Vec::new(),
+            free: Vec::new(),
             armature_kg_m2: HashMap::new(),
             references: HashMap::new(),
             left_out: Vec::new(),
@@ -235,8 +238,16 @@ impl<'a> Bodies<'a> {
         self.armature_kg_m2.insert(name.clone(), armature_kg_m2);
         self.references.insert(name.clone(), joint.reference);
         self.left_out.extend(joint.left_out.iter().map(|what| (*what, name.clone())));
+        let joint_type = match joint.kind {
+            // It is the world's: what an arm floats on, or something that lies beside it.
+            JointType::Floating => {
+                self.free.push(name.clone());
+                JointType::Fixed
+            }
+            kind => kind,
+        };
         self.robot.joints.push(urdf_rs::Joint {
-            joint_type: joint.kind,
+            joint_type,
             axis: Axis { xyz: Vec3(joint.axis.into()) },
             limit: JointLimit { effort, ..joint.limit },
             dynamics: Some(Dynamics { damping, ..joint.dynamics }),

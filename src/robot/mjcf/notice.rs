@@ -23,6 +23,11 @@ pub enum MjcfNotice {
         /// The joints that have it.
         joints: Vec<String>,
     },
+    /// Free joints are taken as locked.
+    FreeJoints {
+        /// These.
+        joints: Vec<String>,
+    },
     /// Sites that are called as a body is: the name is the body's.
     Namesakes {
         /// These.
@@ -95,6 +100,11 @@ impl fmt::Display for MjcfNotice {
                  what is identified of it is not its own"
             ),
             Self::LeftOut { what, joints } => write!(f, "{what}: {}", listed(joints)),
+            Self::FreeJoints { joints } => write!(
+                f,
+                "free joints are taken as locked where the file has them, so that what floats on them stands, also where it carries the arm: {}",
+                listed(joints)
+            ),
             Self::Namesakes { sites } => write!(
                 f,
                 "sites with the name of a body are no frames, the name means the body: {}",

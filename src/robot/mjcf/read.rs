@@ -40,9 +40,10 @@ pub struct MjcfArm {
 /// What becomes of the file is what becomes of a URDF ([`read_urdf`](crate::robot::read_urdf)), but for this:
 ///
 /// - **Base frame**: the world. Gravity is that of `<option>`. What its `<flag>` disables is 0: gravity, damping, dry friction.
-/// - **Joints**: hinges. `ref` is the position in the pose of the file; an axis that does not go through the body's origin is one
-///   of the joint's frame, whose origin is `pos`. Joints without a name are called after their body (`BODY_joint`,
-///   with a number where another joint is called so). A joint that an `<equality>` makes follow another is what a mimic joint is there.
+/// - **Joints**: hinges; free joints are locked where the file has them. `ref` is the position in the pose of the file; an axis that does
+///   not go through the body's origin is one of the joint's frame, whose origin is `pos`. Joints without a name are called after their body
+///   (`BODY_joint`, with a number where another joint is called so). A joint that an `<equality>` makes follow another is what a mimic
+///   joint is there.
 /// - **Bodies** are links; their inertia is that of `<inertial>`, or of geoms that are primitive solids, as `<compiler>` says.
 ///   Named sites are frames, as bodies without mass are.
 /// - **Drives**: `armature` is the rotor inertia, `damping` rv, `frictionloss` rc. The torque limit is the joint's
@@ -144,6 +145,9 @@ fn told(
     }
     if bodies.loops > 0 {
         own.push(MjcfNotice::Loops { count: bodies.loops });
+    }
+    if !bodies.free.is_empty() {
+        own.push(MjcfNotice::FreeJoints { joints: bodies.free.clone() });
     }
     if !bodies.namesakes.is_empty() {
         own.push(MjcfNotice::Namesakes { sites: bodies.namesakes.clone() });

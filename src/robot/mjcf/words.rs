@@ -32,7 +32,7 @@ pub(super) fn arm_fault(fault: &UrdfFault) -> String {
             "joint \"{joint}\" follows \"{of}\" by an <equality>, which is not in the file or follows it in turn: where does it \
              stand? Take the joint out of a copy of the file"
         ),
-        UrdfFault::NothingMoves => "no joint is in it; an arm needs at least one hinge".to_owned(),
+        UrdfFault::NothingMoves => "no hinge is in it; an arm needs at least one".to_owned(),
         UrdfFault::NothingMovesUpTo { link, choice, .. } => format!(
             "\"{link}\" stands still: no joint moves on the way to it from the world; {}",
             to_choose_from(choice)
@@ -83,7 +83,6 @@ fn obstacle(obstacle: &Obstacle) -> String {
         Obstacle::JointType { joint, kind } => {
             let kind = match *kind {
                 "prismatic" => "a slide",
-                "floating" => "free",
                 "spherical" => "a ball",
                 other => other,
             };

@@ -61,7 +61,7 @@ fn bad_input_is_told_with_its_place() {
     says(&one(r#"<compiler coordinate="global"/>"#, "", BODY), &["coordinates", "mj_saveLastXML"]);
     says(&one(r#"<compiler eulerseq="xyw"/>"#, "", BODY), &["eulerseq=\"xyw\""]);
     says(&one("", "", "<replicate count=\"2\"/>"), &["<replicate>: copies are not read"]);
-    says(&one("", "", BODY), &["no joint is in it"]);
+    says(&one("", "", BODY), &["no hinge is in it"]);
     let twice = one("", "", &format!("<joint/>{BODY}<body name=\"a\"/>"));
     says(&twice, &["body \"a\" is there twice"]);
     says("<mujoco><worldbody>", &["not readable as XML"]);

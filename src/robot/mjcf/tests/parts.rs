@@ -3,7 +3,7 @@
 use approx::assert_abs_diff_eq;
 use nalgebra::{Matrix3, Vector3};
 
-use super::{BODY, one, read, says};
+use super::{BODY, model, one, read, says};
 use crate::robot::UrdfNotice;
 use crate::robot::mjcf::{LeftOut, MjcfArm, MjcfNotice, read_mjcf_up_to};
 
@@ -41,10 +41,30 @@ fn an_arm_is_named_by_its_last_body() {
     assert!(world.contains("\"world\" stands still"), "{world}");
 }
 
+/// A robot that floats at (1, 0, 0) with an arm on it, and a ball beside it.
 #[test]
-fn a_free_base_is_told() {
-    let text = one("", "", &format!(r#"<freejoint name="root"/>{BODY}"#));
-    says(&text, &["joint \"root\" is free", "one chain of hinges"]);
+fn what_is_free_is_locked_where_it_is() {
+    let arm = format!(r#"<body name="arm" pos="0 0 0.5"><joint name="j"/>{BODY}</body>"#);
+    let robot = format!(
+        r#"<body name="robot" pos="1 0 0" quat="1 0 0 1"><freejoint name="root"/>{BODY}{arm}</body>"#
+    );
+    let ball = r#"<body name="ball" pos="2 0 0"><joint type="free"/><geom size="0.1"/></body>"#;
+    let text = model("", &format!("{robot}{ball}"));
+    for last in ["arm", ""] {
+        let MjcfArm { arm, notices, .. } = match last {
+            "" => read(&text),
+            last => read_mjcf_up_to(&text, "toy.xml", last).unwrap(),
+        };
+        assert_eq!(arm.dof(), 1);
+        let placement = arm.joints[0].placement;
+        assert_eq!(placement.translation_m, Vector3::new(1.0, 0.0, 0.5));
+        assert_eq!(placement.rotation * Vector3::x(), Vector3::y());
+        let notice = MjcfNotice::FreeJoints { joints: vec!["root".into(), "ball_joint".into()] };
+        assert!(notices.contains(&UrdfNotice::Mjcf(notice)));
+        assert!(!notices.iter().any(|notice| matches!(notice, UrdfNotice::Locked { .. })));
+    }
+    let alone = one("", "", &format!(r#"<freejoint name="root"/>{BODY}"#));
+    says(&alone, &["no hinge is in it"]);
 }
 
 #[test]
