@@ -26,6 +26,7 @@ mod diagnose_periodic;
 mod dynamics_identities;
 mod effect_size;
 mod excite_design;
+mod late_bursts;
 mod log_defects;
 mod log_write;
 mod misread_logs;

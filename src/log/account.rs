@@ -108,6 +108,17 @@ pub enum LogWarning {
         /// Rows a second.
         rate_hz: f64,
     },
+    /// Rows that were kept back and written all at once, with the time at which they were: they are put where even rows have them.
+    LateBursts {
+        /// Rows with such stamps.
+        rows: usize,
+        /// How often rows were kept back.
+        bursts: usize,
+        /// The row before the first of them.
+        after_row: usize,
+        /// By how much the latest was late, s.
+        latest_s: f64,
+    },
     /// More than one row in ten was set aside.
     ManySetAside {
         /// Rows set aside.
@@ -177,6 +188,12 @@ impl fmt::Display for LogWarning {
                 f,
                 "time stamps are rounded to {resolution_s:.4} s: rows are taken to be evenly apart, {rate_hz:.3} a second, as the motion \
                  says that they are"
+            ),
+            Self::LateBursts { rows, bursts, after_row, latest_s } => write!(
+                f,
+                "the recorder wrote rows late in bursts: {rows} rows in {bursts} bursts, up to {:.1} ms late; they are read as \
+                 evenly sampled (the first after row {after_row})",
+                1e3 * latest_s
             ),
             Self::ManySetAside { set_aside, read } => write!(
                 f,

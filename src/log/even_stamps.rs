@@ -4,10 +4,12 @@
 //! line through all of them. Whether they were, the motion tells: rows that are missing regularly, or written twice, have the same
 //! pattern of stamps, but their angles follow from their velocities with the stamps as they are.
 
+use std::ops::Range;
+
 use super::clean::Motion;
 
 /// Fewer rows do not tell a pattern.
-const FEWEST_ROWS: usize = 64;
+pub(super) const FEWEST_ROWS: usize = 64;
 /// Stamps that are rounded to this share of what rows are apart, or more coarsely, are looked at.
 const COARSE: f64 = 0.5;
 /// Rounded stamps lie within one step of the line. A recorder that is late now and then by a quarter of it is believed.
@@ -72,19 +74,27 @@ pub(super) fn even_stamps(motion: &Motion) -> Option<EvenStamps> {
     is_better.then(|| EvenStamps { resolution_s, rate_hz: 1.0 / step_s, time_s: even })
 }
 
-/// How far angles are from where velocities bring them, from row to row, or, of a log without these, from the straight line between
-/// the rows beside them, rad: of [`TELLING`] of the rows the sum over the joints is less.
-fn defect(motion: &Motion) -> f64 {
-    let of_joint = |j: usize, k: usize| match motion.qd.is_empty() {
-        false => motion.defect(j, k - 1, k),
-        true => between(motion, j, k),
-    };
-    let of_row = |k: usize| -> f64 { (0..motion.q.len()).map(|j| of_joint(j, k).abs()).sum() };
-    let last = if motion.qd.is_empty() { motion.rows() - 1 } else { motion.rows() };
-    let mut defects: Vec<f64> = (1..last).map(of_row).collect();
+/// [`row_defect`] of [`TELLING`] of the rows is less, rad.
+pub(super) fn defect(motion: &Motion) -> f64 {
+    let mut defects: Vec<f64> = told_rows(motion).map(|k| row_defect(motion, k)).collect();
     let place = (TELLING * defects.len() as f64) as usize;
     let (_, defect, _) = defects.select_nth_unstable_by(place, f64::total_cmp);
     *defect
+}
+
+/// The rows that have a [`row_defect`].
+pub(super) fn told_rows(motion: &Motion) -> Range<usize> {
+    1..if motion.qd.is_empty() { motion.rows() - 1 } else { motion.rows() }
+}
+
+/// How far angles are from where velocities bring them from row `k` − 1 to row `k`, or, of a log without these, from the straight line
+/// between the rows beside it, rad: the sum over the joints.
+pub(super) fn row_defect(motion: &Motion, k: usize) -> f64 {
+    let of_joint = |j: usize| match motion.qd.is_empty() {
+        false => motion.defect(j, k - 1, k),
+        true => between(motion, j, k),
+    };
+    (0..motion.q.len()).map(|j| of_joint(j).abs()).sum()
 }
 
 /// How far the angle of a joint in row `k` is from the straight line between the rows beside it, rad: a h²/2 where the stamps are right, and

@@ -10,6 +10,7 @@ mod clean;
 mod counting;
 mod error;
 mod even_stamps;
+mod late_bursts;
 mod layout;
 mod lines;
 mod plan;

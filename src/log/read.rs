@@ -8,6 +8,7 @@ use super::account::{LogWarning, Reason, RowAccount};
 use super::clean;
 use super::error::{LogError, UnitSuspicion};
 use super::even_stamps::{EvenStamps, even_stamps};
+use super::late_bursts::late_bursts;
 use super::layout::{Block, Layout};
 use super::lines::{Line, Lines};
 use super::plan::{Delimiter, Plan};
@@ -31,8 +32,9 @@ const WIDTH_ROWS: usize = 50;
 ///    empty field, text, NaN, an infinity, or a magnitude beyond: angle and velocity 3.6·10⁵, acceleration 3·10⁴ rad/s²,
 ///    current 500 A, torque 5·10⁴ Nm, temperature 1000 °C, time 10¹⁹ s.
 /// 2. Times that are rounded more coarsely than half of what rows are apart are put on the straight line through them, if the motion says
-///    that rows are even. Then times must increase: repeated and backward times are set aside, and up to 8 in a row that
-///    are far ahead.
+///    that rows are even. Rows that were kept back and written in a burst are put evenly between the row before and the one behind them,
+///    unless the motion says that they were read so late. Then times must increase: repeated and backward times are set aside, and up to 8
+///    in a row that are far ahead.
 /// 3. Units: Δq is compared with ∫q̇ dt, and the clock with what recorders do. Numbers that say degrees,
 ///    milli-, micro- or nanoseconds are an error that names the layout's remedy.
 /// 4. Angles beyond 1000 rad and velocities beyond 100 rad/s are set aside, and so are rows whose angles
@@ -222,11 +224,7 @@ impl Table {
         let fault = |suspicion| LogError::Units { file: file.to_owned(), suspicion };
         let (time, q, qd) = motion_ranges(plan);
         let has_velocities = plan.range(Block::Qd).is_some();
-        let even = even_stamps(&self.motion(plan));
-        let rounded = even.map(|EvenStamps { time_s, resolution_s, rate_hz }| {
-            self.columns[time] = time_s;
-            LogWarning::RoundedStamps { resolution_s, rate_hz }
-        });
+        let restamped = self.restamp(plan);
         let order = clean::order_of_time(&self.columns[time]);
         self.retain(&order, account, |table, k, _| format!("time {} s", table.columns[time][k]));
         self.require_two(account, file)?;
@@ -259,7 +257,7 @@ impl Table {
             related = units::check(&self.motion(plan), &layout.units);
         }
         let mut warnings = related.map_err(fault)?;
-        warnings.splice(0..0, rounded);
+        warnings.splice(0..0, restamped);
         warnings.extend(slopes);
         if has_velocities {
             warnings.extend(self.unwrap_angles(plan));
@@ -289,6 +287,20 @@ impl Table {
             qd: if are_taken { qd } else { &[] },
             row: &self.rows,
         }
+    }
+
+    /// Stamps as rows were recorded, where the motion says that they were not written so: what is said of it.
+    fn restamp(&mut self, plan: &Plan) -> Option<LogWarning> {
+        let motion = self.motion(plan);
+        let (time_s, warning) = match even_stamps(&motion) {
+            Some(EvenStamps { time_s, resolution_s, rate_hz }) => {
+                (time_s, LogWarning::RoundedStamps { resolution_s, rate_hz })
+            }
+            None => late_bursts(&motion)?,
+        };
+        let (time, ..) = motion_ranges(plan);
+        self.columns[time] = time_s;
+        Some(warning)
     }
 
     /// Velocities of a file that has none: of angles that are unwrapped, without wild ones.

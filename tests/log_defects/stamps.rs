@@ -51,6 +51,33 @@ fn stamps_that_only_look_rounded() {
     assert_eq!(twice.rows.count(Reason::TimeRepeated), SAMPLES);
 }
 
+/// Rows that are kept back, one of which is set aside, and written just before the next one.
+#[test]
+fn stamps_of_rows_that_are_written_in_bursts() {
+    let log = edited(|rows| {
+        for (first, count) in [(50, 4), (120, 10), (300, 1)] {
+            let written_s: f64 = rows[first + count][0].parse().unwrap();
+            for row in &mut rows[first..first + count] {
+                let t: f64 = row[0].parse().unwrap();
+                row[0] = (t + 0.98 * (written_s - t)).to_string();
+            }
+        }
+        rows[125][3] = "x".into();
+    })
+    .unwrap();
+    assert_eq!((log.samples(), log.rows.missed_samples), (SAMPLES - 1, 0), "{}", log.rows);
+    for (t, k) in log.time_s.iter().zip((0..SAMPLES).filter(|k| *k != 124)) {
+        assert!((t - 100.0 - STEP_S * k as f64).abs() < 1e-9, "{t} {k}");
+    }
+    let [LogWarning::LateBursts { rows: 14, bursts: 3, after_row: 50, latest_s }] =
+        log.rows.warnings[..]
+    else {
+        panic!("{}", log.rows)
+    };
+    assert!((latest_s - 9.8 * STEP_S).abs() < 1e-9, "{latest_s}");
+    assert!(log.rows.to_string().contains("14 rows in 3 bursts, up to 78.4 ms late"));
+}
+
 #[test]
 fn repeated_and_backward_times() {
     let result = edited(|rows| rows[51][0] = rows[50][0].clone());
