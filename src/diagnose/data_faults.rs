@@ -370,6 +370,20 @@ mod tests {
         assert_eq!(find_in(&time_s, &signals).causes, []);
     }
 
+    /// Ten rows that are stamped when the one behind them is written: the long step before them has what theirs lack.
+    #[test]
+    fn time_that_is_regained_is_no_stall() {
+        let (mut time_s, signals) = record(0.0, None);
+        for first in [1000, 2000, 3000] {
+            let written_s = time_s[first + 10];
+            for t in &mut time_s[first..first + 10] {
+                *t += 0.98 * (written_s - *t);
+            }
+        }
+        let faults = find_in(&time_s, &signals).causes;
+        assert!(faults.iter().all(|fault| fault.kind != Kind::ClockFault), "{faults:?}");
+    }
+
     /// Of five rows two are missing.
     #[test]
     fn missing_rows_are_a_share_of_all_that_should_be_there() {
