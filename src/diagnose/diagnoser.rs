@@ -116,6 +116,9 @@ impl<'a> Diagnoser<'a> {
         let mut model = self.extended(&study, &kept, &selected);
         let touches = match log.touched() {
             Some(touched) => touched.causes.clone(),
+            // Each stall is given back the mean of all. What that is off by sets torque and motion apart for a moment, as far out of the noise
+            // as a touch does: no confidence would be right for what can be either.
+            None if log.is_mended => Vec::new(),
             None => beside_model(&study, &model.after_nm)?.causes,
         };
         if let Some(simulation) = simulation {
@@ -494,7 +497,8 @@ fn unexplained(
 /// Why contacts were not looked for.
 fn contact_remark(study: &Study, log: &Cleaned) -> Option<String> {
     if log.is_mended {
-        let remark = "the clock was mended: contacts are not looked for, and causes named beside it are less sure";
+        let remark = "the clock was mended: contacts are not looked for, because what is left of its error looks like one, and causes named \
+                      beside it are less sure";
         return Some(remark.to_owned());
     }
     (study.scene.periodic && matches!(log.compared, Compared::TooFew)).then(|| {

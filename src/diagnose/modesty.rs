@@ -21,7 +21,7 @@ const SEVERAL: usize = 3;
 /// than [`PROVISIONAL`] where those may be wrong as well: for all of three or more that share a joint, for one
 /// beside another twice as strong, for two of the arm as a whole (a payload moves what a tilted base or a
 /// longer link moves), and wherever a clock was mended or a torque is rounded. A contact is not sure on a joint with
-/// wild readings, or where rows are missing.
+/// wild readings, or where rows are missing; beside a clock that was mended none is named.
 pub(super) fn make_modest(causes: &mut [Cause]) {
     let is_spoilt = |kind: Kind| matches!(kind, Kind::ClockFault | Kind::Quantisation);
     let beside_a_spoilt_record = causes.iter().any(|c| is_spoilt(c.kind));
