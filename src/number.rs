@@ -38,8 +38,19 @@ pub fn significant(value: f64, digits: usize) -> String {
 /// assert_eq!(resolved(0.0208, 104.0), "0.02080");
 /// ```
 pub fn resolved(value: f64, width: f64) -> String {
+    resolved_from(4, value, width)
+}
+
+/// [`resolved`] with `least` significant digits or more, nine at most.
+///
+/// ```
+/// use armid::number::resolved_from;
+/// assert_eq!(resolved_from(2, 203.0812, 0.34), "203.08");
+/// assert_eq!(resolved_from(2, 203.0812, 104.0), "200");
+/// ```
+pub fn resolved_from(least: usize, value: f64, width: f64) -> String {
     let digits = 2 + rounded_magnitude(value, 4) - rounded_magnitude(width, 2);
-    significant(value, digits.clamp(4, 9) as usize)
+    significant(value, digits.clamp(least.min(9) as i32, 9) as usize)
 }
 
 /// `value ± sigma`, sigma with two significant digits and the value to the same place: `1.234 ± 0.012`,

@@ -3,7 +3,7 @@
 use super::against::MOVED;
 use super::kind::Kind;
 use super::verdict::{Cause, Diagnosis, Estimate, HeldOut, Moved};
-use crate::number::{percent, significant, with_sigma};
+use crate::number::{percent, resolved_from, significant, with_sigma};
 
 /// An interval that reaches so much farther to one side than to the other is told by its ends.
 const UNEVEN: f64 = 1.2;
@@ -131,7 +131,8 @@ impl Estimate {
                 .to_owned();
         }
         if above > UNEVEN * below || below > UNEVEN * above {
-            let [value, low, high] = [self.value, low, high].map(|v| significant(v, 2));
+            let [value, low, high] =
+                [self.value, low, high].map(|v| resolved_from(2, v, high - low));
             return format!("{value} (between {low} and {high}) {}", self.unit)
                 .trim_end()
                 .to_owned();
@@ -257,6 +258,18 @@ fn pair(value: f64, half: f64, unit: &str) -> String {
 mod tests {
     use super::super::data_faults::cause;
     use super::*;
+
+    fn told(value: f64, ci95: [f64; 2], unit: &'static str) -> String {
+        Estimate { value, unit, ci95 }.in_words()
+    }
+
+    /// An order of ripple was "21 (between 21 and 21)".
+    #[test]
+    fn the_ends_of_an_interval_differ() {
+        let order = told(20.959, [20.937, 20.989], "1/turn");
+        assert_eq!(order, "20.959 (between 20.937 and 20.989) 1/turn");
+        assert_eq!(told(0.4788, [0.3246, 1.472], "Nm"), "0.48 (between 0.32 and 1.5) Nm");
+    }
 
     #[test]
     fn what_may_be_none_is_said_with_a_may() {
