@@ -13,8 +13,8 @@ const EVEN_ODDS: f64 = 0.5;
 const OF_ANOTHER_ARM: f64 = 3.0;
 /// Chances below this are all alike.
 const RARE: f64 = 1e-4;
-/// Ends of an interval between which nothing is known.
-const VAST: f64 = 1000.0;
+/// Ends of an uneven interval that are this factor apart leave the size open: what lies between is no estimate of it.
+const VAST: f64 = 10.0;
 
 impl Diagnosis {
     /// The first screen; `laws` are the sites of the extended model's effects: joint (1-based), or the arm as a whole.
@@ -123,14 +123,13 @@ impl Estimate {
     /// `value ± half unit`, or with both ends where they are far from even.
     fn in_words(&self) -> String {
         let [low, high] = self.ci95;
-        let (below, above) = (self.value - low, high - self.value);
         if self.says_nothing() {
             let [low, high] = [low, high].map(|v| significant(v, 2));
             return format!("hardly known (between {low} and {high}) {}", self.unit)
                 .trim_end()
                 .to_owned();
         }
-        if above > UNEVEN * below || below > UNEVEN * above {
+        if self.is_uneven() {
             let [value, low, high] =
                 [self.value, low, high].map(|v| resolved_from(2, v, high - low));
             return format!("{value} (between {low} and {high}) {}", self.unit)
@@ -140,10 +139,18 @@ impl Estimate {
         pair(self.value, 0.5 * (high - low), self.unit)
     }
 
-    /// Whether the interval spans a whole turn, or a factor of a thousand.
+    fn is_uneven(&self) -> bool {
+        let [below, above] = self.ci95.map(|end| (end - self.value).abs());
+        above > UNEVEN * below || below > UNEVEN * above
+    }
+
+    /// Whether the interval spans a whole turn; or, uneven and of one sign, a factor of ten or all from zero on, which is where the sizes
+    /// that make sense begin.
     fn says_nothing(&self) -> bool {
         let [low, high] = self.ci95;
-        self.unit == "rad" && high - low > std::f64::consts::TAU || low > 0.0 && high > VAST * low
+        let (near, far) = (low.abs().min(high.abs()), low.abs().max(high.abs()));
+        let is_vast = self.is_uneven() && low * high >= 0.0 && far > VAST * near;
+        is_vast || self.unit == "rad" && high - low > std::f64::consts::TAU
     }
 }
 
@@ -269,6 +276,17 @@ mod tests {
         let order = told(20.959, [20.937, 20.989], "1/turn");
         assert_eq!(order, "20.959 (between 20.937 and 20.989) 1/turn");
         assert_eq!(told(0.4788, [0.3246, 1.472], "Nm"), "0.48 (between 0.32 and 1.5) Nm");
+    }
+
+    /// Friction that warms up by 6 % or 360 %, and one that cools down likewise.
+    #[test]
+    fn what_may_be_ten_times_as_much_is_hardly_known() {
+        assert_eq!(told(0.058, [0.031, 3.6], ""), "hardly known (between 0.031 and 3.6)");
+        assert_eq!(told(-0.058, [-3.6, -0.031], ""), "hardly known (between -3.6 and -0.031)");
+        assert_eq!(told(0.3, [0.0, 0.4], "rad"), "hardly known (between 0 and 0.40) rad");
+        // What is known to half of it has a value, and so has what may be none.
+        assert_eq!(told(0.02, [0.001, 0.039], ""), "0.020 ± 0.019");
+        assert_eq!(told(0.02, [-0.001, 0.06], ""), "0.020 (between -0.0010 and 0.060)");
     }
 
     #[test]
