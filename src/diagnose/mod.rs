@@ -62,6 +62,7 @@ mod stale;
 mod stalls;
 mod statistic;
 mod study;
+mod told;
 mod verdict;
 mod whitening;
 

@@ -2,6 +2,7 @@
 
 use super::against::MOVED;
 use super::kind::Kind;
+use super::told;
 use super::verdict::{Cause, Diagnosis, Estimate, HeldOut, Moved};
 use crate::number::{percent, resolved_from, significant, with_sigma};
 
@@ -19,8 +20,7 @@ const VAST: f64 = 10.0;
 impl Diagnosis {
     /// The first screen; `laws` are the sites of the extended model's effects: joint (1-based), or the arm as a whole.
     pub(super) fn in_sentences(&self, laws: &[Option<usize>]) -> Vec<String> {
-        let mut out: Vec<String> =
-            self.causes.iter().map(|c| c.sentence(self.noise_floor_nm.is_some())).collect();
+        let mut out = told::in_sentences(&self.causes, self.noise_floor_nm.is_some());
         if let Some(unexplained) = &self.unexplained {
             out.push(format!(
                 "Joint {} shows {} Nm (rms) that no known effect explains; it depends most clearly on the {}.",
@@ -29,6 +29,7 @@ impl Diagnosis {
                 unexplained.axis
             ));
         }
+        out.extend(told::in_the_table_alone(&self.causes));
         if out.is_empty() {
             out.push(self.nothing_found().into());
         }
@@ -121,7 +122,7 @@ fn gain_along(held_out: &HeldOut, laws: &[Option<usize>]) -> Option<String> {
 
 impl Estimate {
     /// `value ± half unit`, or with both ends where they are far from even.
-    fn in_words(&self) -> String {
+    pub(super) fn in_words(&self) -> String {
         let [low, high] = self.ci95;
         if self.says_nothing() {
             let [low, high] = [low, high].map(|v| significant(v, 2));
@@ -166,7 +167,7 @@ impl Cause {
         let mut text = match (self.kind.is_of_the_record(), self.joint) {
             (true, None) => format!("The record has {what}."),
             (true, Some(j)) => format!("Joint {j}'s record has {what}."),
-            (false, _) if self.confidence < EVEN_ODDS => {
+            (false, _) if self.is_doubtful() => {
                 format!("{place} may miss {what}; other causes fit as well.")
             }
             (false, _) if self.may_be_none => {
@@ -174,14 +175,7 @@ impl Cause {
             }
             (false, _) => format!("{place} misses {what}."),
         };
-        if let Some(gain) = self.gain_fraction {
-            let of = if noise_is_known {
-                "of what the noise floor leaves to explain, on periods that were not used to fit it"
-            } else {
-                "of the error's mean square, in stretches of time left out of its fit"
-            };
-            text += &format!(" Adding it removes {:.0} % {of}.", 100.0 * gain.clamp(0.0, 1.0));
-        }
+        text += &self.gain_in_words(noise_is_known).unwrap_or_default();
         if !self.class.is_empty() {
             let class = self.class.join(", ");
             text += &format!(" These data cannot tell it from {class}");
@@ -191,6 +185,23 @@ impl Cause {
             text.push('.');
         }
         text
+    }
+
+    /// Whether something else is as likely.
+    pub(super) fn is_doubtful(&self) -> bool {
+        self.confidence < EVEN_ODDS
+    }
+
+    /// The sentence about what it removes, with a blank before.
+    pub(super) fn gain_in_words(&self, noise_is_known: bool) -> Option<String> {
+        let of = if noise_is_known {
+            "of what the noise floor leaves to explain, on periods that were not used to fit it"
+        } else {
+            "of the error's mean square, in stretches of time left out of its fit"
+        };
+        let removed =
+            |gain: f64| format!(" Adding it removes {:.0} % {of}.", 100.0 * gain.clamp(0.0, 1.0));
+        self.gain_fraction.map(removed)
     }
 
     fn contact_sentence(&self) -> String {

@@ -76,6 +76,16 @@ pub struct Cause {
     pub rivals: Vec<Rival>,
 }
 
+/// Names less likely than this are no answer.
+const UNLIKELY: f64 = 1e-3;
+
+impl Cause {
+    /// Whether it is less likely than one in a thousand: something else explains the log better, and is no cause that could be named.
+    pub fn is_unlikely(&self) -> bool {
+        self.confidence < UNLIKELY
+    }
+}
+
 /// A family that lost.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Rival {

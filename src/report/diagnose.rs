@@ -45,7 +45,7 @@ pub fn cause_table(diagnosis: &Diagnosis) -> Table {
 /// none.
 fn confidence(cause: &Cause) -> String {
     let mut text = match cause.confidence {
-        c if c < 1e-3 => "< 0.1 %".to_owned(),
+        _ if cause.is_unlikely() => "< 0.1 %".to_owned(),
         c if c > 0.999 => "> 99.9 %".to_owned(),
         c => percent(c, 3),
     };

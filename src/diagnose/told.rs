@@ -1,0 +1,169 @@
+//! Which causes are told, and which in one sentence: what says one thing together, and the weaker ones of many touches.
+//!
+//! The table of causes has them all.
+
+use super::kind::Kind;
+use super::verdict::{Cause, Estimate};
+
+/// So many touches are told one by one.
+const TOUCHES: usize = 5;
+
+/// The sentences about `causes`, in their order. Unlikely ones have none ([`in_the_table_alone`]).
+pub(super) fn in_sentences(causes: &[Cause], noise_is_known: bool) -> Vec<String> {
+    let weaker = weaker_touches(causes);
+    let last_touch = causes.iter().rposition(|cause| cause.kind == Kind::Contact);
+    let mut out = Vec::new();
+    for (c, cause) in causes.iter().enumerate() {
+        let is_told_elsewhere =
+            weaker.contains(&c) || causes.iter().any(|lag| is_late_angle(lag, cause));
+        if !cause.is_unlikely() && !is_told_elsewhere {
+            let skew = causes.iter().find(|skew| is_late_angle(cause, skew));
+            out.push(match skew {
+                Some(skew) => late_angle(cause, skew, noise_is_known),
+                None => cause.sentence(noise_is_known),
+            });
+        }
+        if Some(c) == last_touch {
+            out.extend(number_of(&weaker, causes));
+        }
+    }
+    out
+}
+
+/// The names that are too unlikely for a sentence of their own.
+pub(super) fn in_the_table_alone(causes: &[Cause]) -> Option<String> {
+    let name = |cause: &Cause| match cause.joint {
+        Some(j) => format!("{} (joint {j})", cause.kind),
+        None => cause.kind.to_string(),
+    };
+    let names: Vec<String> = causes.iter().filter(|c| c.is_unlikely()).map(name).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "In the table alone, because something else is likelier by far (confidence below 0.1 %): {}.",
+            names.join(", ")
+        )
+    })
+}
+
+/// The touches beyond the [`TOUCHES`] strongest.
+fn weaker_touches(causes: &[Cause]) -> Vec<usize> {
+    let is_touch = |c: &usize| causes[*c].kind == Kind::Contact && !causes[*c].is_unlikely();
+    let mut touches: Vec<usize> = (0..causes.len()).filter(is_touch).collect();
+    touches.sort_by(|a, b| causes[*b].strength.total_cmp(&causes[*a].strength));
+    touches.into_iter().skip(TOUCHES).collect()
+}
+
+/// How many `weaker` touches there are, and when; nothing where there are none.
+fn number_of(weaker: &[usize], causes: &[Cause]) -> Option<String> {
+    let at = |name: &'static str| {
+        weaker.iter().filter_map(move |c| Some(causes[*c].parameters.get(name)?.value))
+    };
+    let first_s = at("start_s").fold(f64::INFINITY, f64::min);
+    let last_s = at("end_s").fold(f64::NEG_INFINITY, f64::max);
+    (!weaker.is_empty()).then(|| {
+        format!(
+            "And {} more, less clear, between {first_s:.2} s and {last_s:.2} s, which are in the table.",
+            weaker.len()
+        )
+    })
+}
+
+/// Whether `lag` and `skew` say that one angle is late: velocity and torque are early against it, by times whose intervals meet.
+fn is_late_angle(lag: &Cause, skew: &Cause) -> bool {
+    if (lag.kind, skew.kind) != (Kind::VelocityLag, Kind::TimeSkew)
+        || lag.joint != skew.joint
+        || lag.is_doubtful()
+        || skew.is_doubtful()
+    {
+        return false;
+    }
+    let delay = |cause: &Cause| cause.parameters.get("delay_s").cloned();
+    let (Some(lag), Some(skew)) = (delay(lag), delay(skew)) else { return false };
+    let are_early = lag.ci95[1] < 0.0 && skew.ci95[1] < 0.0;
+    are_early && lag.ci95[0] <= skew.ci95[1] && skew.ci95[0] <= lag.ci95[1]
+}
+
+/// The sentence about an angle that is late ([`is_late_angle`]). Its velocity tells by how much, and far better than the torque.
+fn late_angle(lag: &Cause, skew: &Cause, noise_is_known: bool) -> String {
+    let early = |cause: &Cause| {
+        let delay = &cause.parameters["delay_s"];
+        let [low, high] = delay.ci95;
+        Estimate { value: -delay.value, unit: delay.unit, ci95: [-high, -low] }.in_words()
+    };
+    let (velocity, torque) = (early(lag), early(skew));
+    let whose = match lag.joint {
+        Some(j) => format!("The angle of joint {j} is"),
+        None => "The angles of all joints are".to_owned(),
+    };
+    let gain = skew.gain_in_words(noise_is_known).unwrap_or_default();
+    format!(
+        "{whose} recorded {velocity} late (that is: against the angle the velocity is as early, and the torque is early by {torque}).{gain}"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::data_faults::{cause, exact};
+    use super::*;
+
+    fn delay(kind: Kind, joint: usize, value: f64, half: f64) -> Cause {
+        let estimate = Estimate { value, unit: "s", ci95: [value - half, value + half] };
+        cause(kind, Some(joint), "a delay", 20.0, &[("delay_s", estimate)])
+    }
+
+    /// What was said of an angle that is 2 ms late: two causes of one joint.
+    #[test]
+    fn an_angle_that_is_late_is_one_sentence() {
+        let lag = delay(Kind::VelocityLag, 1, -0.00196, 0.00003);
+        let skew =
+            Cause { gain_fraction: Some(0.961), ..delay(Kind::TimeSkew, 1, -0.00202, 0.00019) };
+        let said = in_sentences(&[lag.clone(), skew.clone()], true);
+        let late = "The angle of joint 2 is recorded 0.001960 ± 0.000030 s late (that is: against the angle the velocity is as early, \
+                    and the torque is early by 0.00202 ± 0.00019 s).";
+        assert_eq!(said.len(), 1, "{said:?}");
+        assert!(said[0].starts_with(late) && said[0].contains("removes 96 %"), "{said:?}");
+        // The torque of another joint, one that is late, one that is early by another time, and one that may be something else.
+        for other in [
+            delay(Kind::TimeSkew, 2, -0.00202, 0.00019),
+            delay(Kind::TimeSkew, 1, 0.00202, 0.00019),
+            delay(Kind::TimeSkew, 1, -0.004, 0.00019),
+            Cause { confidence: 0.4, ..skew },
+        ] {
+            assert_eq!(in_sentences(&[lag.clone(), other], true).len(), 2);
+        }
+    }
+
+    fn touch(start_s: f64, strength: f64) -> Cause {
+        let [start, end] = [start_s, start_s + 0.5].map(|t| exact(t, "s"));
+        let words = "something touched the arm: joint 6 by +1.0 Nm";
+        cause(Kind::Contact, Some(5), words, strength, &[("start_s", start), ("end_s", end)])
+    }
+
+    #[test]
+    fn of_many_touches_the_strongest_are_told() {
+        let drift = delay(Kind::VelocityLag, 0, 0.001, 0.0001);
+        let touches = (1..=7).map(|k| touch(k as f64, if k == 2 { 9.0 } else { 10.0 - k as f64 }));
+        let causes: Vec<Cause> = touches.chain([drift]).collect();
+        let said = in_sentences(&causes, false);
+        assert_eq!(said.len(), 7, "{said:#?}");
+        for (k, said) in said[..5].iter().enumerate() {
+            assert!(said.starts_with(&format!("From {}.00 s", k + 1)), "{said}");
+        }
+        let more = "And 2 more, less clear, between 6.00 s and 7.50 s, which are in the table.";
+        assert_eq!(said[5], more);
+        assert!(said[6].starts_with("Joint 1's record"));
+        assert_eq!(in_sentences(&causes[..5], false).len(), 5);
+    }
+
+    #[test]
+    fn what_is_unlikely_leads_nowhere() {
+        let likely = touch(1.0, 10.0);
+        let unlikely =
+            Cause { confidence: 5e-4, ..cause(Kind::Elasticity, Some(0), "a soft gear", 5.9, &[]) };
+        let causes = [unlikely, likely];
+        assert_eq!(in_sentences(&causes, true), [causes[1].sentence(true)]);
+        let said = in_the_table_alone(&causes).unwrap();
+        assert!(said.ends_with("(confidence below 0.1 %): elasticity (joint 1)."), "{said}");
+        assert_eq!(in_the_table_alone(&causes[1..]), None);
+    }
+}
