@@ -121,6 +121,7 @@ pub(super) fn cause(
         class: Vec::new(),
         confidence: 1.0,
         parameters: parameters.iter().cloned().collect::<BTreeMap<_, _>>(),
+        peak_joint: None,
         gain_fraction: None,
         separating_experiment: None,
         strength,

@@ -362,6 +362,7 @@ impl<'a> Diagnoser<'a> {
             joint: entry.site.map(|j| j + 1),
             confidence: selected.confidence,
             parameters,
+            peak_joint: None,
             gain_fraction,
             separating_experiment: (!class.is_empty()).then(|| family.separating_experiment()),
             class,

@@ -184,6 +184,7 @@ impl PayloadFinding {
             class: Vec::new(),
             confidence: 1.0 - self.probability,
             parameters: parameters.collect(),
+            peak_joint: None,
             gain_fraction: None,
             separating_experiment: None,
             strength: self.mass_kg.value / sigma,

@@ -58,6 +58,8 @@ pub struct Cause {
     pub confidence: f64,
     /// Physical parameters.
     pub parameters: std::collections::BTreeMap<&'static str, Estimate>,
+    /// Joint (1-based) of which `peak_nm` of a contact is: the one that feels it most clearly; null for all else.
+    pub peak_joint: Option<usize>,
     /// Share of the explainable mean square that it removes, in other periods than its size is fitted to; along a single
     /// run of the joint's whole mean square beside the other causes, in stretches of time left out of its
     /// fit. Null where no data were left for that.

@@ -25,9 +25,14 @@ pub fn cause_table(diagnosis: &Diagnosis) -> Table {
             let once = |text: String| if k == 0 { text } else { String::new() };
             let width = estimate.ci95[1] - estimate.ci95[0];
             let [low, high] = estimate.ci95.map(|v| resolved(v, width));
+            let place = match (k, cause.peak_joint) {
+                (0, _) => joint(cause.joint),
+                (_, Some(j)) if cause.joint.is_none() && *name == "peak_nm" => j.to_string(),
+                _ => String::new(),
+            };
             table.push([
                 once(cause.kind.to_string()),
-                once(joint(cause.joint)),
+                place,
                 (*name).to_owned(),
                 resolved(estimate.value, width),
                 format!("{low} … {high}"),

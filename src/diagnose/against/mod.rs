@@ -397,6 +397,7 @@ impl Search<'_> {
             may_be_none: change.kind == Kind::Payload
                 && parameters.get("mass_kg").is_some_and(|mass| mass.holds(0.0)),
             parameters,
+            peak_joint: None,
             gain_fraction: None,
             strength: study.statistic.lambda(&span, &left, gain).max(0.0).sqrt(),
             in_words: change.in_words.to_owned(),

@@ -150,6 +150,7 @@ fn touch(
         start_s: estimate(first, blur_s + foot_s, blur_s, "s"),
         end_s: estimate(last, blur_s, blur_s + foot_s, "s"),
         peak_nm: peak,
+        peak_joint: most.0 + 1,
         felt: felt.iter().map(|touch| (touch.0 + 1, height_nm(touch) / likely)).collect(),
         strength: peak_nm.abs() / sigma_nm.max(f64::MIN_POSITIVE),
         moved_others: false,

@@ -163,8 +163,9 @@ pub(super) struct Push {
     /// Seconds from the first sample.
     pub(super) start_s: Estimate,
     pub(super) end_s: Estimate,
-    /// Of the joint that feels it most, Nm.
+    /// Of the joint that feels it most, Nm, and that joint (0-based).
     pub(super) peak_nm: Estimate,
+    pub(super) peak_joint: usize,
     /// Joints (0-based) on which it was weighed, and how much they feel it and its σ, Nm.
     heights_nm: Vec<(usize, [f64; 2])>,
     /// Those that feel it.
@@ -269,6 +270,7 @@ pub(super) fn weigh(
         start_s: reach(&|fit| fit.start_s, "s"),
         end_s: reach(&|fit| fit.end_s, "s"),
         peak_nm: reach(&|fit| fit.heights_nm[main], "Nm"),
+        peak_joint: on(main),
         felt: (0..felt.count()).filter(|a| over_sigma(*a) >= least).map(on).collect(),
         heights_nm: (0..felt.count()).map(on).zip(best.heights_nm.clone()).collect(),
         gain: best.gain,

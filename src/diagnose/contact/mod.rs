@@ -38,8 +38,9 @@ struct Touch {
     samples: Range<usize>,
     start_s: Estimate,
     end_s: Estimate,
-    /// Of the joint that feels it most, Nm.
+    /// Of the joint that feels it most, Nm, and that joint (1-based).
     peak_nm: Estimate,
+    peak_joint: usize,
     /// Joints (1-based) that felt it, and by how much, Nm.
     felt: Vec<(usize, f64)>,
     /// In standard deviations of the noise.
@@ -71,7 +72,7 @@ impl Touch {
         }
         self.felt.sort_by_key(|(joint, _)| *joint);
         if next.peak_nm.value.abs() > self.peak_nm.value.abs() {
-            self.peak_nm = next.peak_nm;
+            (self.peak_nm, self.peak_joint) = (next.peak_nm, next.peak_joint);
         }
         self.strength = self.strength.max(next.strength);
         self.moved_others |= next.moved_others;
@@ -99,6 +100,7 @@ impl Touch {
             class,
             confidence: self.confidence,
             parameters: parameters.map(|(name, estimate)| (name, estimate.clone())).into(),
+            peak_joint: Some(self.peak_joint),
             gain_fraction: None,
             separating_experiment: may_be_of_the_arm.then_some(HARDER),
             strength: self.strength,
@@ -107,5 +109,37 @@ impl Touch {
             may_be_none: false,
             rivals: Vec::new(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::data_faults::exact;
+    use super::*;
+
+    /// A touch of the joints `felt`, the first of which feels it most.
+    fn touch(start: usize, felt: &[(usize, f64)]) -> Touch {
+        Touch {
+            samples: start..start + 50,
+            start_s: exact(start as f64 / 100.0, "s"),
+            end_s: exact((start + 50) as f64 / 100.0, "s"),
+            peak_nm: exact(felt[0].1, "Nm"),
+            peak_joint: felt[0].0,
+            felt: felt.to_vec(),
+            strength: 10.0,
+            moved_others: false,
+            confidence: 1.0,
+        }
+    }
+
+    #[test]
+    fn the_peak_of_a_touch_has_its_joint() {
+        let mut both = touch(100, &[(6, 5.5), (1, 28.7)]);
+        both.join(touch(150, &[(2, -8.0)]));
+        let cause = both.cause();
+        assert_eq!(cause.joint, None);
+        assert_eq!((cause.peak_joint, cause.parameters["peak_nm"].value), (Some(2), -8.0));
+        both.join(touch(200, &[(6, 5.0)]));
+        assert_eq!(both.cause().peak_joint, Some(2));
     }
 }

@@ -344,6 +344,7 @@ impl Repeats {
             start_s: shifted(&push.start_s),
             end_s: shifted(&push.end_s),
             peak_nm: push.peak_nm.clone(),
+            peak_joint: push.peak_joint + 1,
             felt: push.felt_nm().map(|(j, height)| (j + 1, height)).collect(),
             strength: push.gain.sqrt(),
             moved_others: moved.any(|j| !push.is_felt_on(*j)),

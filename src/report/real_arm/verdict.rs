@@ -193,6 +193,7 @@ mod tests {
             class: Vec::new(),
             confidence: 1.0,
             parameters: [("delay_s", estimate)].into(),
+            peak_joint: None,
             gain_fraction: None,
             separating_experiment: None,
             strength: 1.0,
