@@ -8,7 +8,6 @@ use super::contact::Compared;
 use super::detection_limits::detection_limits;
 use super::error::DiagnoseError;
 use super::extension::{Effect, Extension};
-use super::gain;
 use super::held_out::{Models, Validation, held_out_gain};
 use super::image::{Image, Span};
 use super::intervals;
@@ -106,14 +105,15 @@ impl<'a> Diagnoser<'a> {
         let sources = (self.arm, self.set, &self.options);
         let (study, found) =
             causes_of(&self.families, sources, &regression, &identification, &log, m.source)?;
-        let kept = match study.scene.periodic {
+        let mut kept = match study.scene.periodic {
             true => Kept::settled(&study, found),
             false => Kept::of_a_single_run(&study, found),
         };
         let null = Extension::fit(&study, &[], &study.torque);
+        let gains = kept.drop_idle();
         let selected = kept.selected();
         let before_nm = residual(&study, &null);
-        let mut model = self.extended(&study, &kept, &selected);
+        let mut model = self.extended(&study, &kept, &selected, &gains);
         let touches = match log.touched() {
             Some(touched) => touched.causes.clone(),
             // Each stall is given back the mean of all. What that is off by sets torque and motion apart for a moment, as far out of the noise
@@ -241,11 +241,16 @@ impl<'a> Diagnoser<'a> {
         }
     }
 
-    /// The model of `study` with the causes `selected` of those `kept`.
-    fn extended(&self, study: &Study, kept: &Kept, selected: &[Selected]) -> Extended {
+    /// The model of `study` with the causes `selected` of those `kept`, whose `gains` on other periods are these.
+    fn extended(
+        &self,
+        study: &Study,
+        kept: &Kept,
+        selected: &[Selected],
+        gains: &[Option<f64>],
+    ) -> Extended {
         let entries: Vec<&Entry> = selected.iter().map(|s| &s.contender.entry).collect();
         let extension = Extension::fit(study, &entries, &study.torque);
-        let gains = gain::on_other_periods(study, &entries);
         let cause = |(c, selected): (usize, &Selected)| {
             let gain = gains[c].or(selected.left_out_gain);
             self.cause(study, kept, selected, c, gain, &extension)

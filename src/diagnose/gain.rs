@@ -9,8 +9,13 @@
 //!
 //! both over the m rows in which the cause has 95 % of its square, by the half it was fitted to: noise
 //! elsewhere says nothing of it. m v₂ is the noise of y₂ there, v₁ tr the noise of the fit to y₁.
+//!
+//! What removes less than nothing has been fitted to what something else leaves. A law that is there does not by chance:
+//! of a strength √λ it removes λ ± 2√λ of both halves together, and what has the evidence to be named is three σ and more from
+//! nothing (√λ ≥ 6).
 
 use super::image::{Column, Image, Span};
+use super::selection::Kept;
 use super::study::{Entry, Study};
 
 /// Share of a cause's square in the rows it is judged by.
@@ -18,9 +23,30 @@ const WHERE_IT_ACTS: f64 = 0.95;
 /// Fewer periods have no halves worth fitting.
 const LEAST_PERIODS: usize = 4;
 
+impl Kept<'_, '_> {
+    /// Drops causes by which other periods are known worse than without them, the worst first; those beside it are refined. The gains
+    /// of the others ([`on_other_periods`]).
+    pub fn drop_idle(&mut self) -> Vec<Option<f64>> {
+        loop {
+            let entries: Vec<&Entry> = self.causes.iter().map(|cause| &cause.entry).collect();
+            let gains = on_other_periods(self.study, &entries);
+            let Some(worst) = most_harmful(&gains) else { return gains };
+            let site = self.causes.remove(worst).entry.site;
+            self.refine_at(site);
+        }
+    }
+}
+
+/// The one of `gains` that is farthest below zero.
+fn most_harmful(gains: &[Option<f64>]) -> Option<usize> {
+    let known = gains.iter().enumerate().filter_map(|(c, gain)| Some((c, (*gain)?)));
+    let harmful = known.filter(|(_, gain)| *gain < 0.0);
+    harmful.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(c, _)| c)
+}
+
 /// removed/explainable of every entry, at most 1; `None` for a single run, for what does not repeat, and where
 /// noise leaves nothing to be explained.
-pub fn on_other_periods(study: &Study, entries: &[&Entry]) -> Vec<Option<f64>> {
+fn on_other_periods(study: &Study, entries: &[&Entry]) -> Vec<Option<f64>> {
     if !study.scene.periodic || study.scene.periods < LEAST_PERIODS {
         return vec![None; entries.len()];
     }
@@ -123,4 +149,15 @@ fn half_mean(study: &Study, half: usize) -> Half {
     });
     let mean = study.whitening.image(&Column { parts: parts.collect() });
     Half { mean, variance: periods as f64 / count }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_most_harmful_goes_first() {
+        assert_eq!(most_harmful(&[Some(0.9), Some(-2e-4), None, Some(-0.1), Some(0.0)]), Some(3));
+        assert_eq!(most_harmful(&[None, Some(0.0), Some(1.0)]), None);
+    }
 }

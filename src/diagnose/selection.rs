@@ -263,6 +263,15 @@ impl<'s, 'a> Kept<'s, 'a> {
         }
     }
 
+    /// The best variants and shapes of all causes at `site`.
+    pub(super) fn refine_at(&mut self, site: Option<usize>) {
+        for c in 0..self.causes.len() {
+            if self.causes[c].entry.site == site {
+                self.refine(c);
+            }
+        }
+    }
+
     /// The best of `entry`'s shape and the starting shapes of its variant; several causes of one family on one
     /// joint keep their own.
     fn best_start<'e>(&'e self, entry: &'e Entry, others: &Span, residual: &Image) -> &'e Entry {
@@ -472,11 +481,7 @@ impl<'s, 'a> Kept<'s, 'a> {
         }
         let mut without = Self { causes: self.causes.clone(), ..*self };
         without.causes.remove(c);
-        for other in 0..without.causes.len() {
-            if without.causes[other].entry.site == site {
-                without.refine(other);
-            }
-        }
+        without.refine_at(site);
         self.total_evidence() - without.total_evidence() > LEAST_EVIDENCE
     }
 
