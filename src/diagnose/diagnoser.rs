@@ -14,7 +14,7 @@ use super::intervals;
 use super::judgement::Selected;
 use super::kind::Kind;
 use super::misfit;
-use super::modesty::make_modest;
+use super::modesty::{make_modest, make_modest_beside_unknown};
 use super::payload::{self, PayloadFinding};
 use super::record::{Record, is_torn};
 use super::replay::measured_nm;
@@ -135,7 +135,7 @@ impl<'a> Diagnoser<'a> {
         let lack = misfit::lack_of_fit(&study, &accepted, &rest);
         let unexplained = unexplained(&study, (&accepted, &rest), lack, &causes, &log);
         if let Some(unknown) = &unexplained {
-            causes.iter_mut().for_each(|cause| cause.make_modest_beside_unknown(unknown.joint));
+            make_modest_beside_unknown(&mut causes, unknown.joint, study.scene.periodic);
         }
         let models = Models { null: &null, extension: &extension };
         let gain = |log| {

@@ -2,6 +2,7 @@
 
 use super::against::MOVED;
 use super::kind::Kind;
+use super::modesty::scattered_joints;
 use super::told;
 use super::verdict::{Cause, Diagnosis, Estimate, HeldOut, Moved};
 use crate::number::{percent, resolved_from, significant, with_sigma};
@@ -20,7 +21,10 @@ const VAST: f64 = 10.0;
 impl Diagnosis {
     /// The first screen; `laws` are the sites of the extended model's effects: joint (1-based), or the arm as a whole.
     pub(super) fn in_sentences(&self, laws: &[Option<usize>]) -> Vec<String> {
-        let mut out = told::in_sentences(&self.causes, self.noise_floor_nm.is_some());
+        let is_left = self.unexplained.is_some() && self.noise_floor_nm.is_some();
+        let mut out: Vec<String> = Vec::new();
+        out.extend(is_left.then(|| missing_effect(&self.causes)).flatten());
+        out.extend(told::in_sentences(&self.causes, self.noise_floor_nm.is_some()));
         if let Some(unexplained) = &self.unexplained {
             out.push(format!(
                 "Joint {} shows {} Nm (rms) that no known effect explains; it depends most clearly on the {}.",
@@ -94,6 +98,18 @@ impl Diagnosis {
             j + 1
         ))
     }
+}
+
+/// The sentence about `causes` on many joints, beside something that none of them explains.
+fn missing_effect(causes: &[Cause]) -> Option<String> {
+    let joints: Vec<String> = scattered_joints(causes).iter().map(usize::to_string).collect();
+    (!joints.is_empty()).then(|| {
+        format!(
+            "Something that acts on the arm as a whole is likely missing from the dictionary: joints {} have causes of their own, and \
+             yet something is left unexplained. What is named may be parts of it.",
+            joints.join(", ")
+        )
+    })
 }
 
 /// The sentence about what `laws` at these sites change along another log while joints move, on the joint with one of which
@@ -328,5 +344,15 @@ mod tests {
         let said = "Joint 2's model may miss friction by load (mu 0.020 ± 0.030); as far as its size is known, there may be none.";
         assert_eq!(open.sentence(true), said);
         assert!(unsure.sentence(true).ends_with("; other causes fit as well."));
+    }
+
+    #[test]
+    fn causes_on_many_joints_are_told_to_lack_one_effect() {
+        let kinds = [Kind::Stribeck, Kind::TorqueGain, Kind::Ripple, Kind::Spring];
+        let of_joint = |(j, kind)| cause(kind, Some(j), "an effect", 9.0, &[]);
+        let causes: Vec<Cause> = kinds.into_iter().enumerate().map(of_joint).collect();
+        let said = missing_effect(&causes).unwrap();
+        assert!(said.contains("joints 1, 2, 3, 4 have causes of their own"), "{said}");
+        assert_eq!(missing_effect(&causes[1..]), None);
     }
 }
