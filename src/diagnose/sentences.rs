@@ -49,8 +49,8 @@ impl Diagnosis {
         match self.noise_floor_nm {
             Some(_) => {
                 "Nothing found: what the model leaves is noise, as the scatter between periods shows; the detection \
-                 limits say what would have been seen. What only moves the parameters (a body on the flange, gravity, \
-                 a longer link) shows beside a simulation (--sim) or a second log."
+                 limits say what would have been seen, of each law in the one shape that stands beside them. What only \
+                 moves the parameters (a body on the flange, gravity, a longer link) shows beside a simulation (--sim) or a second log."
             }
             None => {
                 "Nothing found above what a single run can show; the motion does not repeat, so that the noise is \

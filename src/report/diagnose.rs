@@ -108,6 +108,10 @@ fn change(before: f64, after: f64) -> String {
     if change.is_finite() { format!("{:+.0} %", 100.0 * change) } else { NONE.to_owned() }
 }
 
+/// What is to be known of detection limits.
+const OF_ONE_SHAPE: &str = "Each is the limit of the shape in its last column alone: a law in another shape, such as a \
+                            Stribeck curve that falls faster, has another limit.";
+
 /// What would not have been seen: a row for each family, a column for each joint.
 pub fn limit_table(diagnosis: &Diagnosis) -> Table {
     let head = [
@@ -228,8 +232,9 @@ pub fn page(finding: &Finding, arm: &Arm, program: Program) -> Result<Page, Repo
     }
     if !diagnosis.detection_limits.is_empty() {
         page.push(
-            Section::new("What would not have been seen")
-                .details(Section::new("Detection limits").table(limit_table(diagnosis), "")),
+            Section::new("What would not have been seen").details(
+                Section::new("Detection limits").table(limit_table(diagnosis), OF_ONE_SHAPE),
+            ),
         );
     }
     Ok(page)
