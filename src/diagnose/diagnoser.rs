@@ -147,7 +147,7 @@ impl<'a> Diagnoser<'a> {
         let mut warnings: Vec<String> =
             log.warning.iter().chain(&identification.warnings).cloned().collect();
         warnings.extend(contact_remark(&study, &log));
-        warnings.extend(drift_remark(&study, &causes));
+        let drift = drift_remark(&study, &causes);
         warnings.extend(drive_limit_remark(self.arm, m.torque_nm));
         for held_out in &held_out {
             let with_name = |warning: &String| format!("{}: {warning}", held_out.log);
@@ -188,6 +188,9 @@ impl<'a> Diagnoser<'a> {
         let laws: Vec<Option<usize>> =
             extension.effects.iter().map(|effect| effect.site.map(|j| j + 1)).collect();
         diagnosis.sentences = diagnosis.in_sentences(&laws);
+        // Before all else where nothing else is said: it repeats in no period, and counts as noise in what follows.
+        let place = if diagnosis.causes.is_empty() { 0 } else { diagnosis.sentences.len() };
+        drift.into_iter().for_each(|drift| diagnosis.sentences.insert(place, drift));
         if let Some(doubt) = simulation.and_then(|simulation| simulation.doubt) {
             // Whatever is said next rests on it.
             diagnosis.sentences.insert(0, doubt.to_owned());
@@ -526,8 +529,8 @@ fn drift_remark(study: &Study, causes: &[Cause]) -> Option<String> {
         .collect();
     (!own.is_empty()).then(|| {
         format!(
-            "the mean torque changes from period to period more than the noise beside it does ({}): a current sensor whose zero drifts, \
-             or a load that changes; what is constant there, offsets and gravity, is less well known, as its intervals say",
+            "The mean torque drifts: from period to period it changes by more than the noise beside it ({}). A current sensor whose zero \
+             drifts does that, or a load that changes; what is constant there, offsets and gravity, is less well known, as its intervals say.",
             own.join(", ")
         )
     })

@@ -28,6 +28,14 @@ impl Column {
         Self { parts: (0..signals.joints()).map(|j| (j, signals.joint(j).to_vec())).collect() }
     }
 
+    /// What it has more than `other`, a column on the same joints.
+    pub fn minus(mut self, other: &Self) -> Self {
+        for ((_, own), (_, other)) in self.parts.iter_mut().zip(&other.parts) {
+            own.iter_mut().zip(other).for_each(|(own, other)| *own -= other);
+        }
+        self
+    }
+
     /// Every sample times `factor`.
     pub fn scaled(mut self, factor: f64) -> Self {
         self.parts.iter_mut().flat_map(|(_, y)| y).for_each(|v| *v *= factor);

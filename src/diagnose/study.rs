@@ -362,7 +362,25 @@ impl<'a> Study<'a> {
         self.blurred_shares(entries).for_each(|share| {
             span.push(share);
         });
+        for entry in entries {
+            for image in self.loose(entry) {
+                span.push(&image);
+            }
+        }
         span
+    }
+
+    /// Directions along which the law of `entry` may be off, the null model projected out.
+    fn loose(&self, entry: &Entry) -> Vec<Image> {
+        let columns = self.families[entry.family].loose(&self.scene, entry.site, entry.shape);
+        columns
+            .iter()
+            .map(|column| {
+                let mut image = self.whitening.image(column);
+                self.null.residualise(&mut image);
+                image
+            })
+            .collect()
     }
 
     /// The shares that drives feed forward where one of `entries` blurs reversals, the null model projected out.

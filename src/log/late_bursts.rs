@@ -104,7 +104,9 @@ fn bursts(motion: &Motion, apart_s: f64) -> Vec<Range<usize>> {
         let tiny = (before + 2..t.len()).take_while(is_tiny).count();
         // Rows are written between two others as well: then the last step is a part of a usual one.
         let ends = [before + 1 + tiny, before + 2 + tiny];
-        let ends = ends.into_iter().filter(|end| (before + 2..t.len()).contains(end));
+        // A clock that goes back was wrong, not late.
+        let is_end = |end: &usize| (before + 2..t.len()).contains(end) && t[*end] >= t[*end - 1];
+        let ends = ends.into_iter().filter(is_end);
         let off = |end: &usize| (late(before, *end).abs() / ALIKE).round() * ALIKE;
         let end = ends.min_by(|a, b| off(a).total_cmp(&off(b)));
         match end.filter(|end| off(end) <= BALANCED) {

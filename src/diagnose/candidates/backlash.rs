@@ -13,7 +13,7 @@
 //! seen by its jerk at both ends and by the swinging after it: the log has δ̇ at its samples only, and its
 //! acceleration is the derivative of these.
 
-use super::elasticity::{HELD_ERROR, Lag, give_way, held_nm_s_rad};
+use super::elasticity::{HELD_ERROR, Jolts, Lag, give_way, held_nm_s_rad};
 use super::*;
 use crate::diagnose::scene::FINE;
 
@@ -64,13 +64,30 @@ impl Candidate for Backlash {
     }
 
     fn bank(&self, scene: &Scene, site: Option<usize>, shapes: &[Shape]) -> Vec<Vec<Column>> {
-        let j = joint(site);
-        let column = |(shape, [delta, rate]): (&Shape, [Vec<f64>; 2])| {
-            let links = Lag::logged(scene, delta, rate).of(scene, j);
-            vec![give_way(scene, &links, shape.value)]
-        };
-        let abreast = shapes.chunks(ABREAST).flat_map(|some| some.iter().zip(fly(scene, j, some)));
-        abreast.map(column).collect()
+        let flown: Vec<_> = shapes.iter().map(|shape| (*shape, Jolts::USUAL)).collect();
+        flights(scene, joint(site), &flown).map(|column| vec![column]).collect()
+    }
+
+    /// What the jolts of the drive do, how wide the gap is where they decide, and how hard its flanks are.
+    fn loose(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
+        if !scene.periodic {
+            return Vec::new();
+        }
+        let wide = |factor: f64| Shape { value: factor * shape.value, ..shape };
+        let hard = |variant: usize| Shape { variant: variant.min(FLANK_RAD_S.len() - 1), ..shape };
+        let others = [
+            (shape, Jolts { height: 0.7, ..Jolts::USUAL }),
+            (shape, Jolts { damping: 0.4, ..Jolts::USUAL }),
+            (shape, Jolts { damping: 2.5, ..Jolts::USUAL }),
+            (wide(0.85), Jolts::USUAL),
+            (wide(1.2), Jolts::USUAL),
+            (hard(shape.variant.saturating_sub(1)), Jolts::USUAL),
+            (hard(shape.variant + 1), Jolts::USUAL),
+        ];
+        let flown = [&[(shape, Jolts::USUAL)], &others[..]].concat();
+        let mut columns = flights(scene, joint(site), &flown);
+        let Some(usual) = columns.next() else { return Vec::new() };
+        columns.map(|other| other.minus(&usual)).collect()
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
@@ -110,8 +127,18 @@ impl Candidate for Backlash {
     }
 }
 
+/// Torques per unit of the gap of joint `j` for each shape, where jolts make of it what goes with it.
+fn flights(scene: &Scene, j: usize, flown: &[(Shape, Jolts)]) -> impl Iterator<Item = Column> {
+    let column = move |((shape, _), [delta, rate]): (&(Shape, Jolts), [Vec<f64>; 2])| {
+        let links = Lag::logged(scene, delta, rate).of(scene, j);
+        give_way(scene, &links, shape.value)
+    };
+    let abreast = flown.chunks(ABREAST).flat_map(move |some| some.iter().zip(fly(scene, j, some)));
+    abreast.map(column)
+}
+
 /// δ (rad) and δ̇ (rad/s) at the samples of joint `j`, for each of up to [`ABREAST`] shapes.
-fn fly(scene: &Scene, j: usize, shapes: &[Shape]) -> Vec<[Vec<f64>; 2]> {
+fn fly(scene: &Scene, j: usize, flown: &[(Shape, Jolts)]) -> Vec<[Vec<f64>; 2]> {
     let load = scene.link_nm.joint(j);
     let n = load.len();
     let mobility = scene.mobility_per_kg_m2.joint(j);
@@ -121,12 +148,14 @@ fn fly(scene: &Scene, j: usize, shapes: &[Shape]) -> Vec<[Vec<f64>; 2]> {
     let mut entered = scene.entered(RUN_IN_S).peekable();
     let start_nm = entered.peek().map_or(0.0, |k| load[*k]);
     let flanks = Flanks::by_variant(scene, j);
+    let of_lane = |lane: usize| flown[lane.min(flown.len() - 1)];
+    let made: [Jolts; ABREAST] = std::array::from_fn(|lane| of_lane(lane).1);
     let pressed = |lane: usize| {
-        let shape = shapes[lane.min(shapes.len() - 1)];
+        let (shape, _) = of_lane(lane);
         Flight::pressed(0.5 * shape.value, flanks[shape.variant], start_nm)
     };
     let mut flights = Flights::abreast(pressed);
-    let mut out: Vec<[Vec<f64>; 2]> = shapes.iter().map(|_| [vec![0.0; n], vec![0.0; n]]).collect();
+    let mut out: Vec<[Vec<f64>; 2]> = flown.iter().map(|_| [vec![0.0; n], vec![0.0; n]]).collect();
     for k in entered {
         for (lane, [delta, rate]) in out.iter_mut().enumerate() {
             (delta[k], rate[k]) = (flights.angle_rad[lane], flights.rate_rad_s[lane]);
@@ -134,7 +163,7 @@ fn fly(scene: &Scene, j: usize, shapes: &[Shape]) -> Vec<[Vec<f64>; 2]> {
         let held = held_nm_s_rad(mobility[k], rotor);
         let ticks = FINE * k..FINE * (k + 1);
         for (load, jolt) in fine[ticks.clone()].iter().zip(&jolts[ticks]) {
-            flights.step(load + jolt, held, mobility[k], step_s);
+            flights.step([*load, *jolt], held, &made, mobility[k], step_s);
         }
     }
     out
@@ -209,17 +238,26 @@ impl Flights {
         }
     }
 
-    /// `step_s` later, under the load `load_nm`: semi-implicit Euler with all damping implicit, stable as long as √(k ·
+    /// `step_s` later, under a load and jolts of it, Nm, of which is made what `made` says: semi-implicit Euler with all damping implicit, stable as long as √(k ·
     /// mobility) · `step_s` < 2. The flanks push and do not pull.
-    fn step(&mut self, load_nm: f64, held_nm_s_rad: f64, mobility: f64, step_s: f64) {
-        for lane in 0..ABREAST {
+    fn step(
+        &mut self,
+        [load_nm, jolt_nm]: [f64; 2],
+        held_nm_s_rad: f64,
+        made: &[Jolts; ABREAST],
+        mobility: f64,
+        step_s: f64,
+    ) {
+        for (lane, made) in made.iter().enumerate() {
             let (angle, half_gap) = (self.angle_rad[lane], self.half_gap_rad[lane]);
             let pressed = angle - angle.max(-half_gap).min(half_gap);
             let (spring, damping) = (self.stiffness_nm_rad[lane], self.damping_nm_s_rad[lane]);
             let pulls = (spring * pressed + damping * self.rate_rad_s[lane]) * pressed <= 0.0;
             let (spring, damping) = if pulls { (0.0, 0.0) } else { (spring, damping) };
+            let load_nm = load_nm + made.height * jolt_nm;
             let rate = self.rate_rad_s[lane] + (load_nm - spring * pressed) * mobility * step_s;
-            self.rate_rad_s[lane] = rate / (1.0 + (held_nm_s_rad + damping) * mobility * step_s);
+            let damping = made.damping * held_nm_s_rad + damping;
+            self.rate_rad_s[lane] = rate / (1.0 + damping * mobility * step_s);
             self.angle_rad[lane] += self.rate_rad_s[lane] * step_s;
         }
     }
@@ -237,7 +275,8 @@ mod tests {
             Flights::abreast(|_| Flight::pressed(0.5 * gap, Flanks::alone(1.0, 900.0), -1e-9));
         let mut t = 0.0;
         while flights.angle_rad[0] < 0.5 * gap {
-            flights.step(slope * (t + 0.5 * step_s), 0.0, 1.0, step_s);
+            let load_nm = slope * (t + 0.5 * step_s);
+            flights.step([load_nm, 0.0], 0.0, &[Jolts::USUAL; ABREAST], 1.0, step_s);
             t += step_s;
         }
         // Steps of 10 µs.
@@ -252,7 +291,7 @@ mod tests {
             Flight::pressed(1e-5, Flanks::alone(1.0, frequency(lane)), -1.0)
         });
         for _ in 0..100_000 {
-            flights.step(5.0, 0.0, 1.0, 1e-5);
+            flights.step([5.0, 0.0], 0.0, &[Jolts::USUAL; ABREAST], 1.0, 1e-5);
         }
         for (lane, angle) in flights.angle_rad.iter().enumerate() {
             let at_rest = 1e-5 + 5.0 / frequency(lane).powi(2);
@@ -272,7 +311,7 @@ mod tests {
         let at_rest = half_gap + 1.0 / flanks.stiffness_nm_rad;
         for k in 0..100_000 {
             let load = (0.01 * f64::from(k) * std::f64::consts::TAU * step_s).cos();
-            flights.step(load, 0.0, mobility, step_s);
+            flights.step([load, 0.0], 0.0, &[Jolts::USUAL; ABREAST], mobility, step_s);
             // The load crosses zero by 2π · 0.01 Nm/s, the rotor its gap in 36 ms, and the flank stops the 0.016 rad/s of its
             // end within steps of 0.5 ms: 8 µrad in, where the full load is 100 µrad in.
             assert!(flights.angle_rad[0].abs() < 1.001 * at_rest, "{k} {}", flights.angle_rad[0]);

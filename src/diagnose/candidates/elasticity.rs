@@ -39,6 +39,29 @@ pub struct Elasticity;
 const DAMPING_RATIO: f64 = 0.05;
 /// The same, d₂, of what jolts make swing, whose rotor is damped by its own friction as well.
 const JOLTED_DAMPING_RATIO: f64 = 0.15;
+
+/// What jolts of a drive make of a gear, over what is taken for granted: how much of friction it does not feed forward, how it damps,
+/// and how fast the gear swings under it.
+#[derive(Clone, Copy)]
+pub(super) struct Jolts {
+    pub(super) height: f64,
+    pub(super) damping: f64,
+    pub(super) stiffness: f64,
+}
+
+impl Jolts {
+    /// What is taken for granted.
+    pub(super) const USUAL: Self = Self { height: 1.0, damping: 1.0, stiffness: 1.0 };
+    /// Of other drives. Of each only the direction counts, both ways of what is not in proportion.
+    const OTHERS: [Self; 5] = [
+        Self { height: 0.7, ..Self::USUAL },
+        Self { damping: 0.4, ..Self::USUAL },
+        Self { damping: 2.5, ..Self::USUAL },
+        Self { stiffness: 0.85, ..Self::USUAL },
+        Self { stiffness: 1.2, ..Self::USUAL },
+    ];
+}
+
 /// Variants with the encoder on the motor: in the first the links are driven by the part of the motion that is known a
 /// hundred times better than its noise, and by jolts beyond, which is what gears need that swing faster than that; in the
 /// second by what is known ten times better, for gears that swing within it.
@@ -99,7 +122,7 @@ impl Lag {
 /// How links on joint `j` swing behind a motor that moves as recorded, and against one that jolts where joints reverse.
 /// A single run, whose accelerations are those of its low-pass, shows no more than how far the gear bends by what is known of
 /// its load: taken as it is, noise of velocities made gears of 20 σ in clean logs.
-fn swing(scene: &Scene, j: usize, variant: usize, stiffness_nm_rad: f64) -> Lag {
+fn swing(scene: &Scene, j: usize, variant: usize, stiffness_nm_rad: f64, made: Jolts) -> Lag {
     if !scene.periodic {
         let bent = |load: &f64| load / stiffness_nm_rad;
         return Lag::slow(scene, scene.bending_nm(j).iter().map(bent).collect());
@@ -119,7 +142,7 @@ fn swing(scene: &Scene, j: usize, variant: usize, stiffness_nm_rad: f64) -> Lag 
     let mut entered = scene.entered((FORGOTTEN * fades_in_s).min(LONGEST_RUN_IN_S)).peekable();
     let start_nm = entered.peek().map_or(0.0, |k| load[FINE * k]);
     let mut bent = Swing::bent(stiffness_nm_rad, DAMPING_RATIO * critical, start_nm);
-    let mut jolted = Swing::bent(stiffness_nm_rad, 0.0, 0.0);
+    let mut jolted = Swing::bent(made.stiffness * stiffness_nm_rad, 0.0, 0.0);
     let mut lag = Lag {
         angle_rad: vec![0.0; n],
         rate_rad_s: vec![0.0; n],
@@ -130,11 +153,11 @@ fn swing(scene: &Scene, j: usize, variant: usize, stiffness_nm_rad: f64) -> Lag 
         lag.rate_rad_s[k] = bent.rate_rad_s + jolted.rate_rad_s;
         lag.acceleration_rad_s2[k] = bent.acceleration_rad_s2 + jolted.acceleration_rad_s2;
         jolted.damping_nm_s_rad =
-            JOLTED_DAMPING_RATIO * critical + held_nm_s_rad(mobility[k], rotor);
+            made.damping * (JOLTED_DAMPING_RATIO * critical + held_nm_s_rad(mobility[k], rotor));
         for tick in FINE * k + 1..=FINE * (k + 1) {
             let tick = tick % load.len();
             bent.step(load[tick], inertia[k].max(f64::MIN_POSITIVE), step_s);
-            jolted.step(jolts[tick], 1.0 / mobility[k], step_s);
+            jolted.step(made.height * jolts[tick], 1.0 / mobility[k], step_s);
         }
     }
     lag
@@ -236,10 +259,9 @@ impl Candidate for Elasticity {
 
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let j = joint(site);
-        let drive = &scene.arm.joints[j].drive;
         if shape.variant < ON_MOTOR {
             let stiffness = shape.value;
-            let links = swing(scene, j, shape.variant, stiffness).of(scene, j);
+            let links = swing(scene, j, shape.variant, stiffness, Jolts::USUAL).of(scene, j);
             return vec![give_way(scene, &links, 1.0 / stiffness)];
         }
         let form = shape.variant - ON_MOTOR;
@@ -255,6 +277,7 @@ impl Candidate for Elasticity {
         let rate = scene.derivative(&delta);
         let acceleration = scene.accelerations(&rate);
         let (qd, sign) = (scene.motion.qd_rad_s.joint(j), scene.sign.joint(j));
+        let drive = &scene.arm.joints[j].drive;
         let extra = samples(scene, |k| {
             let motor_sign = scene.arm.friction_sign(qd[k] + rate[k]);
             let more = drive.rotor_inertia_kg_m2 * acceleration[k]
@@ -263,6 +286,20 @@ impl Candidate for Elasticity {
             stiffness * more
         });
         vec![Column::on(j, extra)]
+    }
+
+    /// What the jolts of the drive do to a gear of which the log has the motor's angle.
+    fn loose(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
+        if !scene.periodic || shape.variant >= ON_MOTOR {
+            return Vec::new();
+        }
+        let j = joint(site);
+        let jolted = |made: Jolts| {
+            let links = swing(scene, j, shape.variant, shape.value, made).of(scene, j);
+            give_way(scene, &links, 1.0 / shape.value)
+        };
+        let usual = jolted(Jolts::USUAL);
+        Jolts::OTHERS.map(|other| jolted(other).minus(&usual)).into()
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {

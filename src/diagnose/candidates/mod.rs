@@ -130,6 +130,12 @@ pub trait Candidate: Sync {
     /// Torque per unit of each coefficient.
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column>;
 
+    /// Directions of torque along which the law may be off with this shape, by what it takes for granted and the log does not
+    /// tell: what is left there is none of another cause's.
+    fn loose(&self, _scene: &Scene, _site: Option<usize>, _shape: Shape) -> Vec<Column> {
+        Vec::new()
+    }
+
     /// [`Self::columns`] of several shapes, where that is less work at once.
     fn bank(&self, scene: &Scene, site: Option<usize>, shapes: &[Shape]) -> Vec<Vec<Column>> {
         shapes.iter().map(|shape| self.columns(scene, site, *shape)).collect()
