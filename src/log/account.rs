@@ -191,8 +191,8 @@ impl fmt::Display for LogWarning {
             ),
             Self::LateBursts { rows, bursts, after_row, latest_s } => write!(
                 f,
-                "the recorder wrote rows late in bursts: {rows} rows in {bursts} bursts, up to {:.1} ms late; they are read as \
-                 evenly sampled (the first after row {after_row})",
+                "the recorder wrote rows late in bursts, by up to {:.1} ms (rows: {rows}, bursts: {bursts}, the first after row \
+                 {after_row}); they are read as evenly sampled",
                 1e3 * latest_s
             ),
             Self::ManySetAside { set_aside, read } => write!(
