@@ -75,16 +75,11 @@ impl Candidate for Backlash {
         }
         let wide = |factor: f64| Shape { value: factor * shape.value, ..shape };
         let hard = |variant: usize| Shape { variant: variant.min(FLANK_RAD_S.len() - 1), ..shape };
-        let others = [
-            (shape, Jolts { height: 0.7, ..Jolts::USUAL }),
-            (shape, Jolts { damping: 0.4, ..Jolts::USUAL }),
-            (shape, Jolts { damping: 2.5, ..Jolts::USUAL }),
-            (wide(0.85), Jolts::USUAL),
-            (wide(1.2), Jolts::USUAL),
-            (hard(shape.variant.saturating_sub(1)), Jolts::USUAL),
-            (hard(shape.variant + 1), Jolts::USUAL),
-        ];
-        let flown = [&[(shape, Jolts::USUAL)], &others[..]].concat();
+        let jolted = Jolts::OF_OTHER_DRIVES.map(|made| (shape, made));
+        let harder = shape.variant.saturating_sub(1);
+        let flanks = [shape, wide(0.85), wide(1.2), hard(harder), hard(shape.variant + 1)];
+        let [usual, wider @ ..] = flanks.map(|shape| (shape, Jolts::USUAL));
+        let flown = [&[usual], &jolted[..], &wider[..]].concat();
         let mut columns = flights(scene, joint(site), &flown);
         let Some(usual) = columns.next() else { return Vec::new() };
         columns.map(|other| other.minus(&usual)).collect()
@@ -238,8 +233,8 @@ impl Flights {
         }
     }
 
-    /// `step_s` later, under a load and jolts of it, Nm, of which is made what `made` says: semi-implicit Euler with all damping implicit, stable as long as √(k ·
-    /// mobility) · `step_s` < 2. The flanks push and do not pull.
+    /// `step_s` later, under a load and jolts, Nm, of which each gap has what `made` says: semi-implicit Euler with all damping
+    /// implicit, stable as long as √(k · mobility) · `step_s` < 2. The flanks push and do not pull.
     fn step(
         &mut self,
         [load_nm, jolt_nm]: [f64; 2],

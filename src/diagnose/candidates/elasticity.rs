@@ -53,13 +53,14 @@ impl Jolts {
     /// What is taken for granted.
     pub(super) const USUAL: Self = Self { height: 1.0, damping: 1.0, stiffness: 1.0 };
     /// Of other drives. Of each only the direction counts, both ways of what is not in proportion.
-    const OTHERS: [Self; 5] = [
+    pub(super) const OF_OTHER_DRIVES: [Self; 3] = [
         Self { height: 0.7, ..Self::USUAL },
         Self { damping: 0.4, ..Self::USUAL },
         Self { damping: 2.5, ..Self::USUAL },
-        Self { stiffness: 0.85, ..Self::USUAL },
-        Self { stiffness: 1.2, ..Self::USUAL },
     ];
+    /// Where a gear swings faster or slower than it bends.
+    const OF_OTHER_SWINGS: [Self; 2] =
+        [Self { stiffness: 0.85, ..Self::USUAL }, Self { stiffness: 1.2, ..Self::USUAL }];
 }
 
 /// Variants with the encoder on the motor: in the first the links are driven by the part of the motion that is known a
@@ -299,7 +300,8 @@ impl Candidate for Elasticity {
             give_way(scene, &links, 1.0 / shape.value)
         };
         let usual = jolted(Jolts::USUAL);
-        Jolts::OTHERS.map(|other| jolted(other).minus(&usual)).into()
+        let others = Jolts::OF_OTHER_DRIVES.into_iter().chain(Jolts::OF_OTHER_SWINGS);
+        others.map(|other| jolted(other).minus(&usual)).collect()
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
