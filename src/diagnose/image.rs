@@ -106,7 +106,10 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 fn axpy(y: &mut [f64], factor: f64, x: &[f64]) {
-    y.iter_mut().zip(x).for_each(|(y, x)| *y += factor * x);
+    with_widest_registers(
+        #[inline(always)]
+        || y.iter_mut().zip(x).for_each(|(y, x)| *y += factor * x),
+    );
 }
 
 /// An orthonormal basis of the span of columns, with the triangle that made it.
@@ -213,24 +216,34 @@ impl Span {
     /// Removes from `columns` what is spanned, and returns its coordinates, a column for each.
     fn project_out(&self, columns: &mut [Image]) -> Mat<f64> {
         let along = self.along(columns);
-        if self.is_empty() {
-            return along;
-        }
-        let mut spanned = Mat::zeros(self.rows(), columns.len());
-        matmul(&mut spanned, Accum::Replace, self.means(), &along, 1.0, Par::Seq);
-        for (c, column) in columns.iter_mut().enumerate() {
-            axpy(&mut column.mean, -1.0, spanned.col_as_slice(c));
-            for (contrast, along) in self.contrasts.iter().zip(along.col_as_slice(c)) {
-                column.add_contrast(-along, contrast);
-            }
-        }
+        self.add_combinations(columns, -1.0, &along);
         along
     }
 
+    /// columns += factor · directions · coordinates, all of them in one matrix product.
+    pub(super) fn add_combinations(
+        &self,
+        columns: &mut [Image],
+        factor: f64,
+        coordinates: &Mat<f64>,
+    ) {
+        if self.is_empty() {
+            return;
+        }
+        let mut sums = Mat::zeros(self.rows(), columns.len());
+        matmul(&mut sums, Accum::Replace, self.means(), coordinates, factor, Par::Seq);
+        for (c, column) in columns.iter_mut().enumerate() {
+            axpy(&mut column.mean, 1.0, sums.col_as_slice(c));
+            for (contrast, along) in self.contrasts.iter().zip(coordinates.col_as_slice(c)) {
+                column.add_contrast(factor * along, contrast);
+            }
+        }
+    }
+
     /// ⟨direction, column⟩, a row for every direction: one matrix product over the rows of the means in which any of
-    /// `columns` is not zero, products of vectors for one column alone. What acts on one joint of a single run is zero in
-    /// those of the others.
-    fn along(&self, columns: &[Image]) -> Mat<f64> {
+    /// `columns` is not zero, products of vectors for one column alone. A column that acts on one joint of a single run is
+    /// zero in the rows of all other joints.
+    pub(super) fn along(&self, columns: &[Image]) -> Mat<f64> {
         let mut along = Mat::zeros(self.len(), columns.len());
         if self.is_empty() {
             return along;

@@ -25,8 +25,7 @@ pub(super) fn tangents(study: &Study, effect: &Effect) -> Vec<Image> {
     let images = |value: f64| -> Vec<Image> {
         let shape = Shape { value, ..effect.shape };
         let columns = family.columns(&study.scene, effect.site, shape);
-        let used = columns.iter().take(effect.coefficients.len());
-        used.map(|column| study.whitening.image(column)).collect()
+        study.whitening.images(columns.iter().take(effect.coefficients.len()))
     };
     let mut out = images(effect.shape.value);
     let step = STEP * effect.shape.value.abs();

@@ -37,7 +37,7 @@ impl Selected {
 pub struct Form {
     /// With its numbers.
     pub effect: Effect,
-    /// 2 ln of the odds against it, prices aside.
+    /// 2 ln of the odds against it.
     pub behind: f64,
 }
 
@@ -50,14 +50,17 @@ impl Kept<'_, '_> {
     /// Cause `c` in its family's other variants, each at its best shape.
     pub fn other_forms(&self, c: usize) -> Vec<Form> {
         let (others, residual) = self.without(Some(c));
-        let own = self.causes[c].score.gain;
-        let entry = &self.causes[c].entry;
-        let variants = self.other_variants(entry, f64::NEG_INFINITY, &others, &residual);
+        let Contender { entry, score, .. } = &self.causes[c];
+        let own = self.evidence(entry, *score);
+        let richer = self.study.richer_entries(entry);
+        let least = f64::NEG_INFINITY;
+        let variants = self.other_variants(entry, &richer, least, &others, &residual);
         let form = |(entry, score): (Entry, Score)| {
             let coefficients = self.study.span(&entry, &others).solve(&residual);
+            let behind = (own - self.evidence(&entry, score)).max(0.0);
             let Entry { family, site, shape, .. } = entry;
             let effect = Effect { family, site, shape, coefficients, absorbed: Vec::new() };
-            Form { effect, behind: (own - score.gain).max(0.0) }
+            Form { effect, behind }
         };
         variants.into_iter().map(form).collect()
     }

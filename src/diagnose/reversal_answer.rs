@@ -61,9 +61,11 @@ impl ReversalAnswer {
     pub fn given_nm(&self, clock: &FineClock, late_ticks: f64) -> Vec<f64> {
         match self.coefficients(clock, late_ticks) {
             Some(c) => {
-                let signs: Vec<Vec<f64>> = self.delayed(0.0, 1).collect();
-                let sum = |k: usize| signs.iter().zip(&c).map(|(s, c)| c * s[k]).sum::<f64>();
-                (0..self.sign.len()).map(sum).collect()
+                let mut given_nm = vec![0.0; self.sign.len()];
+                for (sign, c) in self.delayed(0.0, 1).zip(c) {
+                    given_nm.iter_mut().zip(sign).for_each(|(sum, sign)| *sum += c * sign);
+                }
+                given_nm
             }
             None => self.sign.iter().map(|s| self.coulomb_nm * s).collect(),
         }
@@ -96,8 +98,9 @@ impl ReversalAnswer {
 pub fn shifted(y: &[f64], ticks: f64, every: usize) -> Vec<f64> {
     let n = y.len();
     let (whole, u) = (ticks.floor() as i64, ticks - ticks.floor());
+    let first = (-whole).rem_euclid(n as i64) as usize;
     let at = |k: usize| {
-        let right = (k as i64 - whole).rem_euclid(n as i64) as usize;
+        let right = if first + k < n { first + k } else { first + k - n };
         let left = if right == 0 { n - 1 } else { right - 1 };
         y[right] + u * (y[left] - y[right])
     };

@@ -206,11 +206,12 @@ impl<'s, 'a> Kept<'s, 'a> {
         rivals
     }
 
-    /// `entry` in the other variants of its family, each at its best shape: those whose best starting shape gains more than
-    /// `least`.
+    /// `entry` in the other variants of its family and in those of `richer`, each at its best shape: those whose best starting shape
+    /// gains more than `least`.
     pub(super) fn other_variants(
         &self,
         entry: &Entry,
+        richer: &[Entry],
         least: f64,
         others: &Span,
         residual: &Image,
@@ -220,7 +221,7 @@ impl<'s, 'a> Kept<'s, 'a> {
         let mut best: Vec<(&Entry, Score)> = Vec::new();
         let is_other =
             |e: &&Entry| (e.family, e.site) == (family, site) && e.shape.variant != shape.variant;
-        for entry in study.entries.iter().filter(is_other) {
+        for entry in study.entries.iter().chain(richer).filter(is_other) {
             let Some(score) = study.score(entry, others, residual) else { continue };
             match best.iter_mut().find(|(b, _)| b.shape.variant == entry.shape.variant) {
                 Some(old) if old.1.gain >= score.gain => {}
@@ -232,23 +233,27 @@ impl<'s, 'a> Kept<'s, 'a> {
         best.into_par_iter().filter_map(|(e, _)| study.refined(e, others, residual)).collect()
     }
 
-    /// The best variant and shape near `entry`. What is the family's own goes before what is not ([`Self::is_its_own`]), unless
-    /// that is far ahead: the narrowest curve of one law looks like a wider one of another.
+    /// The best variant and shape near `entry`, of those of `richer` as well. What is the family's own goes before what is not
+    /// ([`Self::is_its_own`]), unless that is far ahead: the narrowest curve of one law looks like a wider one of another.
     fn at_its_best(
         &self,
         entry: &Entry,
+        richer: &[Entry],
         others: &Span,
         residual: &Image,
-    ) -> Option<(Entry, Score)> {
+    ) -> Option<Contender> {
         let own = self.study.refined(entry, others, residual);
         let start = self.study.score(entry, others, residual).map_or(0.0, |score| score.gain);
-        let forms = self.other_variants(entry, BETWEEN_SHAPES * start, others, residual);
-        let mut forms: Vec<(Entry, Score)> = own.into_iter().chain(forms).collect();
-        forms.sort_by(|a, b| b.1.gain.total_cmp(&a.1.gain));
-        let best = forms.first()?.1.gain;
-        let near = forms.iter().take_while(|form| best - form.1.gain < FAR_AHEAD).count();
-        let is_own =
-            |form: &(Entry, Score)| near == 1 || self.is_its_own(&form.0, others, residual);
+        let forms = self.other_variants(entry, richer, BETWEEN_SHAPES * start, others, residual);
+        let contender = |(entry, score): (Entry, Score)| {
+            let evidence = self.evidence(&entry, score);
+            Contender { entry, score, evidence }
+        };
+        let mut forms: Vec<Contender> = own.into_iter().chain(forms).map(contender).collect();
+        forms.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+        let best = forms.first()?.evidence;
+        let near = forms.iter().take_while(|form| best - form.evidence < FAR_AHEAD).count();
+        let is_own = |form: &Contender| near == 1 || self.is_its_own(&form.entry, others, residual);
         let place = forms[..near].iter().position(is_own).unwrap_or(0);
         Some(forms.swap_remove(place))
     }
@@ -257,9 +262,9 @@ impl<'s, 'a> Kept<'s, 'a> {
     fn refine(&mut self, c: usize) {
         let (others, residual) = self.without(Some(c));
         let current = self.best_start(&self.causes[c].entry, &others, &residual);
-        if let Some((entry, score)) = self.at_its_best(current, &others, &residual) {
-            let evidence = self.evidence(&entry, score);
-            self.causes[c] = Contender { entry, score, evidence };
+        let richer = self.study.richer_entries(current);
+        if let Some(best) = self.at_its_best(current, &richer, &others, &residual) {
+            self.causes[c] = best;
         }
     }
 
@@ -371,12 +376,9 @@ impl<'s, 'a> Kept<'s, 'a> {
         let (head, tail) = best.split_at(finalists);
         let mut all: Vec<Contender> = head
             .par_iter()
-            .map(|contender| match self.at_its_best(&contender.entry, others, residual) {
-                Some((entry, score)) => {
-                    let evidence = self.evidence(&entry, score);
-                    Contender { entry, score, evidence }
-                }
-                None => contender.clone(),
+            .map(|contender| {
+                let best = self.at_its_best(&contender.entry, &[], others, residual);
+                best.unwrap_or_else(|| contender.clone())
             })
             .collect();
         all.extend_from_slice(tail);

@@ -310,11 +310,17 @@ impl<'a> Study<'a> {
         self.memory.entry((family, site, shape), || self.bank(family, site, &[shape]).remove(0))
     }
 
+    /// The richer shapes of the family of `entry` at its site.
+    pub fn richer_entries(&self, entry: &Entry) -> Vec<Entry> {
+        let Entry { family, site, .. } = *entry;
+        let shapes = self.families[family].richer_shapes(&self.scene);
+        shapes.into_par_iter().filter_map(|shape| self.entry(family, site, shape)).collect()
+    }
+
     /// [`Self::entry`] for each of `shapes`.
     fn bank(&self, family: usize, site: Option<usize>, shapes: &[Shape]) -> Vec<Option<Entry>> {
         let columns = self.families[family].bank(&self.scene, site, shapes);
-        let mut images: Vec<Image> =
-            columns.iter().flatten().map(|column| self.whitening.image(column)).collect();
+        let mut images = self.whitening.images(columns.iter().flatten());
         let lengths: Vec<f64> = images.iter().map(Image::square).collect();
         self.null.residualise_all(&mut images);
         let mut outside = images.into_iter().zip(lengths);
@@ -395,8 +401,7 @@ impl<'a> Study<'a> {
     /// The columns of `entry` with what the null model absorbs of them.
     pub fn whole_images(&self, entry: &Entry) -> Vec<Image> {
         let columns = self.families[entry.family].columns(&self.scene, entry.site, entry.shape);
-        let seen = columns.iter().take(entry.images.len());
-        seen.map(|column| self.whitening.image(column)).collect()
+        self.whitening.images(columns.iter().take(entry.images.len()))
     }
 
     /// Square of what `entry` with the coefficients `b` does to joint `j`, the null model projected out.
@@ -522,7 +527,9 @@ impl<'a> Study<'a> {
             return Some([value - half_width, value + half_width]);
         }
         // Also of those which the null model absorbs: what lies between one of them and this one need not be.
-        let shapes = self.families[entry.family].shapes(&self.scene, entry.site);
+        let family = &self.families[entry.family];
+        let mut shapes = family.shapes(&self.scene, entry.site);
+        shapes.extend(family.richer_shapes(&self.scene));
         let same = shapes.iter().filter(|shape| shape.variant == entry.shape.variant);
         let near = 1e-9 * value.abs();
         let (mut low, mut high) = (value, value);

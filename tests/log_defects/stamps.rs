@@ -75,7 +75,9 @@ fn stamps_of_rows_that_are_written_in_bursts() {
         panic!("{}", log.rows)
     };
     assert!((latest_s - 9.8 * STEP_S).abs() < 1e-9, "{latest_s}");
-    assert!(log.rows.to_string().contains("late in bursts, by up to 78.4 ms (rows: 14, bursts: 3, the first after row 50)"));
+    assert!(log.rows.to_string().contains(
+        "late in bursts, by up to 78.4 ms (rows: 14, bursts: 3, the first after row 50)"
+    ));
 }
 
 #[test]

@@ -159,14 +159,14 @@ impl Unknown {
         }))
     }
 
-    /// `image` where this noise is white as well.
-    fn whiten(&self, image: &mut Image) {
-        self.0.iter().for_each(|noise| noise.whiten(&mut image.mean));
+    /// Whitens `images` for this noise as well.
+    fn whiten(&self, images: &mut [Image]) {
+        self.0.iter().for_each(|noise| noise.whiten(images));
     }
 
-    /// [`Self::whiten`] of all.
+    /// [`Self::whiten`] of images that are given away.
     fn whitened(&self, mut images: Vec<Image>) -> Vec<Image> {
-        images.iter_mut().for_each(|image| self.whiten(image));
+        self.whiten(&mut images);
         images
     }
 }
@@ -190,7 +190,7 @@ pub fn explain(study: &Study, set: &BaseSet, simulation: Nominal, accepted: &[Fo
     for (column, theta) in study.null_columns.iter().zip(theta) {
         residual.add(-theta, column);
     }
-    unknown.whiten(&mut residual);
+    unknown.whiten(std::slice::from_mut(&mut residual));
     let changes = changes::all(study, set, theta);
     let images = changes.iter().map(|change| unknown.whitened(change.images.clone())).collect();
     let is_change = |entry: &Entry| {

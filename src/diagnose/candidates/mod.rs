@@ -94,6 +94,12 @@ pub trait Candidate: Sync {
         vec![Shape { variant: 0, value: 0.0 }]
     }
 
+    /// Shapes of further variants, for what the law may have beside and few arms show: they are no starting shapes, and looked at
+    /// only where the law was found.
+    fn richer_shapes(&self, _scene: &Scene) -> Vec<Shape> {
+        Vec::new()
+    }
+
     /// How the shape is refined.
     fn search(&self) -> Search {
         Search::None

@@ -1,5 +1,8 @@
 //! Friction that builds up behind a reversal: τ = F (z − sign q̇), dz/dq = k (1 − z sign q̇) (Dahl 1968).
 //!
+//! Bristles that are damped, as in the LuGre model (Canudas de Wit et al. 1995), add F T dz/dt, T = σ₁/σ₀. Few logs show it, so that
+//! nothing is looked for with it; where presliding was found, it is a form of the law with another coefficient, F T.
+//!
 //! z is propagated exactly along the motion: over a stretch of one direction of length Δ,
 //! z ← s + (z − s) e^{−kΔ}; a step within which the velocity reverses has two such stretches. Over a motion
 //! that repeats it is carried round until it repeats as well.
@@ -51,6 +54,12 @@ const TURNED: f64 = 8.0;
 /// Over its largest, the least acceleration per torque that a joint may have as the arm moves. No arm's inertia changes a
 /// thousandfold; where an estimate of it is not positive, what stands for it is larger by more.
 const LEAST_MOBILITY: f64 = 1e-3;
+
+/// Shapes of variants beyond those of [`DRIVES`] have damped bristles, behind the same drives.
+const DAMPED: usize = DRIVES.len();
+/// T, s, from which the derivative by it is taken: what a drive that feeds friction forward gives is not quite linear in T. Dampings of
+/// LuGre models are some milliseconds.
+const DAMPING_STEP_S: f64 = 1e-3;
 
 /// Share of dry friction that the law has at least. Of bristles with dz/dq = k (1 − z sign q̇)^i (Dahl 1968) it is best
 /// fitted with 1.10 (i = ½), 0.86 (i = 3/2) and 0.72 (i = 2) of their friction.
@@ -123,6 +132,12 @@ impl Way {
         }
         z
     }
+}
+
+/// dz/dt of the bristles, 1/s, whose deflection along `way` is z.
+fn deflection_rate(way: &Way, z: &[f64], stiffness_per_rad: f64) -> Vec<f64> {
+    let rate = |(qd, z): (&f64, &f64)| stiffness_per_rad * (qd - qd.abs() * z);
+    way.qd_rad_s.iter().zip(z).map(rate).collect()
 }
 
 /// What is left of a deflection behind a leg of the way.
@@ -199,6 +214,13 @@ fn column(scene: &Scene, j: usize, way: &Way, z: &[f64], drive: Drive) -> Column
     Column::on(j, column)
 }
 
+/// Starting stiffnesses of a variant. What a drive makes of bristles has one optimum between neighbours of a coarser grid.
+fn grid(variant: usize) -> impl Iterator<Item = Shape> {
+    let [softest, stiffest] = STIFFNESSES_PER_RAD;
+    let count = if variant == 0 { 13 } else { 7 };
+    geometric(softest, stiffest, count).map(move |value| Shape { variant, value })
+}
+
 /// Whether joint `j` has friction, and an inertia, in all of its poses: estimates may come to none in some.
 fn moves_alike(scene: &Scene, j: usize) -> bool {
     let ends = |(least, most): (f64, f64), kick: &f64| (least.min(*kick), most.max(*kick));
@@ -212,14 +234,13 @@ impl Candidate for Presliding {
     }
 
     fn shapes(&self, scene: &Scene, _: Option<usize>) -> Vec<Shape> {
-        let [softest, stiffest] = STIFFNESSES_PER_RAD;
-        // What a drive makes of bristles has one optimum between neighbours of a coarser grid.
-        let of_variant = |variant: usize| {
-            let count = if variant == 0 { 13 } else { 7 };
-            geometric(softest, stiffest, count).map(move |value| Shape { variant, value })
-        };
         let variants = if scene.periodic { DRIVES.len() } else { 1 };
-        (0..variants).flat_map(of_variant).collect()
+        (0..variants).flat_map(grid).collect()
+    }
+
+    fn richer_shapes(&self, scene: &Scene) -> Vec<Shape> {
+        let variants = if scene.periodic { DAMPED..2 * DAMPED } else { 0..0 };
+        variants.flat_map(grid).collect()
     }
 
     fn search(&self) -> Search {
@@ -241,16 +262,27 @@ impl Candidate for Presliding {
             .iter()
             .map(|shape| {
                 let z = way.deflection(scene.periodic, first, shape.value);
-                vec![column(scene, j, &way, &z, DRIVES[shape.variant])]
+                let drive = DRIVES[shape.variant % DAMPED];
+                let dry = column(scene, j, &way, &z, drive);
+                if shape.variant < DAMPED {
+                    return vec![dry];
+                }
+                let rate = deflection_rate(&way, &z, shape.value);
+                let damped: Vec<f64> =
+                    z.iter().zip(rate).map(|(z, rate)| z + DAMPING_STEP_S * rate).collect();
+                let more = column(scene, j, &way, &damped, drive).minus(&dry);
+                vec![dry, more.scaled(1.0 / DAMPING_STEP_S)]
             })
             .collect()
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, shape: Shape, b: &[f64]) -> Vec<Quantity> {
-        vec![
+        let mut out = vec![
             quantity("stiffness_per_rad", shape.value, "1/rad"),
             quantity("coulomb_nm", b[0], "Nm"),
-        ]
+        ];
+        out.extend(b.get(1).map(|damping| quantity("damping_s", damping / b[0], "s")));
+        out
     }
 
     fn size(&self, quantities: &[Quantity]) -> Option<Quantity> {
@@ -266,7 +298,7 @@ impl Candidate for Presliding {
     }
 
     fn is_possible(&self, _: Shape, b: &[f64]) -> bool {
-        b[0] > 0.0
+        b[0] > 0.0 && second(b) >= 0.0
     }
 
     /// All dry friction of a joint builds up behind a reversal. Where some of it does not, something else
@@ -274,6 +306,10 @@ impl Candidate for Presliding {
     fn is_its_own(&self, scene: &Scene, site: Option<usize>, _: Shape, b: &[f64]) -> bool {
         let least = if scene.periodic { LEAST_SHARE } else { LEAST_SHARE_OF_A_RUN };
         b[0] > least * scene.coulomb_nm[joint(site)]
+    }
+
+    fn form(&self, _: &Scene, shape: Shape) -> Option<&'static str> {
+        (shape.variant >= DAMPED).then_some("damped bristles")
     }
 
     fn in_words(&self) -> &'static str {

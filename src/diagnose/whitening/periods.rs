@@ -161,20 +161,26 @@ impl PeriodWhitening {
         steps.iter_mut().for_each(|step| step.scale((2.0 / self.periods as f64).sqrt()));
         let images = torques.map(|torque| self.image_in_noise(torque));
         let mut images: Vec<Image> = images.chain(steps).collect();
-        images.iter_mut().for_each(|image| self.whiten_joints(&mut image.mean));
+        self.whiten_joints(&mut images);
         self.repeating = Some(RepeatingNoise::new(&images));
     }
 
-    /// Whitens rows of the mean period for noise of single joints; its own adjoint.
-    fn whiten_joints(&self, rows: &mut [f64]) {
-        for (own_rows, noise) in &self.of_joints {
-            let mut own: Vec<f64> = own_rows.iter().map(|row| rows[*row]).collect();
-            // What does not act on the joint is zero there, and stays it.
-            if own.iter().all(|row| *row == 0.0) {
-                continue;
-            }
+    /// Whitens the means of `images` for noise of single joints; its own adjoint.
+    fn whiten_joints(&self, images: &mut [Image]) {
+        for (rows, noise) in &self.of_joints {
+            // A torque that does not act on the joint is zero in its rows and stays so.
+            let (mut acting, mut own): (Vec<_>, Vec<_>) = images
+                .iter_mut()
+                .filter(|image| rows.iter().any(|row| image.mean[*row] != 0.0))
+                .map(|image| {
+                    let mean = rows.iter().map(|row| image.mean[*row]).collect();
+                    (image, Image { mean, contrast: Vec::new() })
+                })
+                .unzip();
             noise.whiten(&mut own);
-            own_rows.iter().zip(own).for_each(|(row, value)| rows[*row] = value);
+            for (image, own) in acting.iter_mut().zip(own) {
+                rows.iter().zip(own.mean).for_each(|(row, value)| image.mean[*row] = value);
+            }
         }
     }
 
@@ -240,9 +246,10 @@ impl PeriodWhitening {
     /// The adjoint of [`Self::rows`], per joint over one period.
     pub(super) fn in_time(&self, rows: &[f64]) -> JointSignals {
         let n = self.samples;
-        let mut rows = rows.to_vec();
-        self.repeating.iter().for_each(|noise| noise.whiten(&mut rows));
-        self.whiten_joints(&mut rows);
+        let mut image = [Image { mean: rows.to_vec(), contrast: Vec::new() }];
+        self.repeating.iter().for_each(|noise| noise.whiten(&mut image));
+        self.whiten_joints(&mut image);
+        let [Image { mean: rows, .. }] = image;
         let inverse = fourier::inverse(n);
         let mut spectra = vec![inverse.make_input_vec(); self.joints];
         let mut row = 0;
@@ -276,17 +283,36 @@ impl PeriodWhitening {
 
     /// See [`super::Whitening::image`].
     pub(super) fn image(&self, column: &Column) -> Image {
-        let mut image = self.image_in_noise(column);
-        self.whiten_joints(&mut image.mean);
-        self.repeating.iter().for_each(|noise| noise.whiten(&mut image.mean));
-        if let Some(noise) = &self.stepping {
-            let rows = image.mean.len();
-            image.contrast.chunks_exact_mut(rows).for_each(|contrast| noise.whiten(contrast));
-        }
+        let mut image = [self.image_in_noise(column)];
+        self.whiten_what_repeats(&mut image);
+        let [image] = image;
         image
     }
 
-    /// [`Self::image`] but for noise that repeats.
+    /// See [`super::Whitening::images`].
+    pub(super) fn images<'c>(&self, columns: impl Iterator<Item = &'c Column>) -> Vec<Image> {
+        let mut images: Vec<Image> = columns.map(|column| self.image_in_noise(column)).collect();
+        self.whiten_what_repeats(&mut images);
+        images
+    }
+
+    /// Whitens `images` for the noise that [`Self::image_in_noise`] leaves.
+    fn whiten_what_repeats(&self, images: &mut [Image]) {
+        self.whiten_joints(images);
+        self.repeating.iter().for_each(|noise| noise.whiten(images));
+        let Some(noise) = &self.stepping else { return };
+        for image in images {
+            let rows = image.mean.len();
+            let contrasts = image.contrast.chunks_exact(rows);
+            let mut contrasts: Vec<Image> = contrasts
+                .map(|contrast| Image { mean: contrast.to_vec(), contrast: Vec::new() })
+                .collect();
+            noise.whiten(&mut contrasts);
+            image.contrast = contrasts.into_iter().flat_map(|contrast| contrast.mean).collect();
+        }
+    }
+
+    /// [`Self::image`] but for [`Self::whiten_what_repeats`].
     pub(super) fn image_in_noise(&self, column: &Column) -> Image {
         let n = self.samples;
         let repeats = column.parts.iter().all(|(_, y)| y.len() == n);

@@ -1,8 +1,9 @@
 //! Torques of unknown height as noise.
 
+use faer::Mat;
 use nalgebra::{DMatrix, DVector};
 
-use crate::diagnose::image::{Image, Span, dot};
+use crate::diagnose::image::{Image, Span};
 
 /// Torques of unknown height that repeat in every period, as noise of the mean period: with A the rows of torques whose height
 /// has the standard deviation one, its covariance I + A Aᵀ is whitened by I + Q (√(I + R Rᵀ)⁻¹ − I) Qᵀ, A = Q R.
@@ -10,7 +11,7 @@ pub struct RepeatingNoise {
     /// Q.
     directions: Span,
     /// √(I + R Rᵀ)⁻¹ − I.
-    change: DMatrix<f64>,
+    change: Mat<f64>,
 }
 
 impl RepeatingNoise {
@@ -22,7 +23,7 @@ impl RepeatingNoise {
         });
         let k = directions.len();
         if k == 0 {
-            return Self { directions, change: DMatrix::zeros(0, 0) };
+            return Self { directions, change: Mat::zeros(0, 0) };
         }
         let coordinates =
             columns.iter().map(|column| DVector::from(directions.coordinates(column)));
@@ -32,16 +33,13 @@ impl RepeatingNoise {
         let shrunk =
             DMatrix::from_diagonal(&parts.eigenvalues.map(|square| square.powf(-0.5) - 1.0));
         let change = &parts.eigenvectors * shrunk * parts.eigenvectors.transpose();
-        Self { directions, change }
+        Self { directions, change: Mat::from_fn(k, k, |i, j| change[(i, j)]) }
     }
 
-    /// Whitens `rows` of a mean period; symmetric, it is its own adjoint.
-    pub fn whiten(&self, rows: &mut [f64]) {
-        let along = self.directions.directions().map(|direction| dot(direction.mean, rows));
-        let change = &self.change * DVector::from_iterator(self.directions.len(), along);
-        for (direction, change) in self.directions.directions().zip(change.iter()) {
-            rows.iter_mut().zip(direction.mean).for_each(|(row, d)| *row += change * d);
-        }
+    /// Whitens the means of `images`, all of them at once. Symmetric, it is its own adjoint.
+    pub fn whiten(&self, images: &mut [Image]) {
+        let change = &self.change * self.directions.along(images);
+        self.directions.add_combinations(images, 1.0, &change);
     }
 }
 
@@ -57,10 +55,10 @@ mod tests {
         let noise = RepeatingNoise::new(&columns.each_ref().map(image));
         let a = DMatrix::from_fn(4, 2, |row, k| columns[k][row]);
         let whitener = DMatrix::from_fn(4, 4, |row, k| {
-            let mut unit = [0.0; 4];
-            unit[k] = 1.0;
-            noise.whiten(&mut unit);
-            unit[row]
+            let mut unit = image(&[0.0; 4]);
+            unit.mean[k] = 1.0;
+            noise.whiten(std::slice::from_mut(&mut unit));
+            unit.mean[row]
         });
         let covariance = DMatrix::identity(4, 4) + &a * a.transpose();
         let whitened = &whitener * covariance * whitener.transpose();

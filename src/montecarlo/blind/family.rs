@@ -227,7 +227,7 @@ impl Family {
             Kind::Presliding => {
                 // Bristles of gears give way by 0.1 mrad and more.
                 Recipe::growing(1e-3, [1.0 / 10_000.0, 1.0 / 30.0], 1.0, move |s| {
-                    Effect::Presliding(Presliding { joint, stiffness_per_rad: 1.0 / s })
+                    Effect::Presliding(Presliding::new(joint, 1.0 / s))
                 })
             }
             Kind::ReversalWidth => {

@@ -191,7 +191,7 @@ impl Mechanism {
         let late = |delay_s| Effect::TimeSkew(TimeSkew { joint: None, delay_s });
         let bristles = |stiffness_per_rad| {
             (1..=joints)
-                .map(move |joint| Effect::Presliding(Presliding { joint, stiffness_per_rad }))
+                .map(move |joint| Effect::Presliding(Presliding::new(joint, stiffness_per_rad)))
         };
         match *self {
             Self::Nothing | Self::LiteralFilter { .. } => Vec::new(),

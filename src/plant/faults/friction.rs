@@ -11,7 +11,7 @@ use crate::robot::Drive;
 /// ```text
 /// τ_f = (1 + φ Θ) · [ rv q̇ + c(q, q̇, L) z + Σ A |q̇|ᵖ s + a z² + b |q̇| ]
 /// c   = rc + Σ d exp(−|q̇/v_s|ⁿ) + Σ P cos(q + ψ) + μ |L|
-/// s   = tanh(q̇/ε);   z = s, or the bristle's state with presliding
+/// s   = tanh(q̇/ε);   z = s, or the bristle's state with presliding, whose damping adds c T ż
 /// ```
 #[derive(Debug, Clone)]
 pub(super) struct Friction {
@@ -62,9 +62,13 @@ impl Friction {
     ) -> f64 {
         let sign = (qd_rad_s / self.epsilon_rad_s).tanh();
         let direction = bristle.unwrap_or(sign);
+        let damping = match (&self.presliding, bristle) {
+            (Some(presliding), Some(bristle)) => presliding.damping(qd_rad_s, bristle),
+            _ => 0.0,
+        };
         let level = self.level_nm(q_rad, qd_rad_s, load_nm);
         let speed = qd_rad_s.abs();
-        let mut torque = self.viscous_nm_s_rad * qd_rad_s + level * direction;
+        let mut torque = self.viscous_nm_s_rad * qd_rad_s + level * (direction + damping);
         torque += self.asymmetric_nm * direction * direction + self.asymmetric_nm_s_rad * speed;
         for power in &self.powers {
             torque += power.amplitude_nm * speed.powf(power.exponent) * sign;
@@ -115,9 +119,10 @@ impl Friction {
     pub(super) fn slopes(&self, largest_rad_s: f64, load_nm: f64) -> (f64, f64) {
         // Without the law no load matters, even one that has no limit.
         let loaded = if self.mu == 0.0 { 0.0 } else { self.mu * load_nm };
+        let stribeck_nm = self.stribeck.iter().map(|p| p.extra_nm.abs()).sum::<f64>();
         let level = self.coulomb_nm
             + loaded
-            + self.stribeck.iter().map(|p| p.extra_nm.abs()).sum::<f64>()
+            + stribeck_nm
             + self.positions.iter().map(|p| p.amplitude_nm.abs()).sum::<f64>();
         let power = |p: &NonlinearViscous| {
             // |v|ᵖ tanh(v/ε): at most p vᵖ⁻¹ for p ≥ 1, and about εᵖ⁻¹ near standstill for p < 1.
@@ -129,10 +134,12 @@ impl Friction {
             + self.powers.iter().map(power).sum::<f64>();
         let mut bristles = 0.0;
         match &self.presliding {
-            // c z + a z² with |z| ≤ 1; c falls with the speed whatever z is.
+            // c (z + T ż) + a z² with |z| ≤ 1 and |ż| ≤ 2 k |q̇|; c falls with the speed whatever z is, and |q̇ dc/dq̇| ≤ d.
             Some(presliding) => {
-                bristles = (level + 2.0 * self.asymmetric_nm.abs()) * presliding.stiffness_per_rad;
-                smooth += self.stribeck.iter().map(Stribeck::steepest_nm_s_rad).sum::<f64>();
+                let Presliding { stiffness_per_rad, damping_s, .. } = *presliding;
+                bristles = (level + 2.0 * self.asymmetric_nm.abs()) * stiffness_per_rad;
+                smooth += self.stribeck.iter().map(Stribeck::steepest_nm_s_rad).sum::<f64>()
+                    + 2.0 * damping_s * stiffness_per_rad * (level + stribeck_nm);
             }
             None => smooth += (level + self.asymmetric_nm.abs()) / self.epsilon_rad_s,
         }
@@ -277,8 +284,9 @@ impl Fault for LoadFriction {
     }
 }
 
-/// Dry friction that builds up over an angle instead of at once: Dahl's model (1968),
-/// τ = c z with ż = k (q̇ − |q̇| z), in place of c tanh(q̇/ε). The stiffness of the bristles is c k.
+/// Dry friction that builds up over an angle instead of at once: τ = c (z + T ż) with ż = k (q̇ − |q̇| z), in place of
+/// c tanh(q̇/ε). Without damping (T = 0) this is Dahl's model (1968), with it the bristles of LuGre's (Canudas de Wit et al.
+/// 1995), whose σ₀ is c k, σ₁ is c k T and σ₂ the joint's viscous friction.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Presliding {
@@ -286,12 +294,26 @@ pub struct Presliding {
     pub joint: usize,
     /// k: inverse of the angle over which friction turns round, 1/rad.
     pub stiffness_per_rad: f64,
+    /// T: damping of the bristles over their stiffness, s. Default 0.
+    #[serde(default)]
+    pub damping_s: f64,
 }
 
 /// ln of 1/e^18 = 1.5e-8: what a bristle may lack to have turned round.
 const TURNED_ROUND: f64 = 18.0;
 
 impl Presliding {
+    /// Of bristles without damping.
+    pub fn new(joint: usize, stiffness_per_rad: f64) -> Self {
+        Self { joint, stiffness_per_rad, damping_s: 0.0 }
+    }
+
+    /// T ż, over the level of dry friction.
+    #[inline]
+    fn damping(&self, qd_rad_s: f64, bristle: f64) -> f64 {
+        self.damping_s * self.stiffness_per_rad * (qd_rad_s - qd_rad_s.abs() * bristle)
+    }
+
     /// ż = k (q̇ − |q̇| z), 1/s, which is a decay towards ±1 at k |q̇|; it counts up to `fastest_per_s`.
     #[inline]
     pub(super) fn bristle_rate(&self, qd_rad_s: f64, fastest_per_s: f64, bristle: f64) -> f64 {
@@ -314,7 +336,8 @@ impl Fault for Presliding {
     }
 
     fn check(&self) -> Result<(), Complaint> {
-        positive("stiffness_per_rad", self.stiffness_per_rad)
+        positive("stiffness_per_rad", self.stiffness_per_rad)?;
+        not_negative("damping_s", self.damping_s)
     }
 
     fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
@@ -449,7 +472,7 @@ mod tests {
     /// Behind a reversal, q = a t²/2, the bristle goes from −1 to 1 as 1 − 2 e^(−k q), however fast it may decay.
     #[test]
     fn a_bristle_turns_round_as_if_no_decay_were_too_fast() {
-        let (presliding, a) = (Presliding { joint: 1, stiffness_per_rad: 1e4 }, 20.0);
+        let (presliding, a) = (Presliding::new(1, 1e4), 20.0);
         let fastest = presliding.fastest_turn_per_s(a);
         let step_s = 1e-6;
         let (mut z, mut worst) = (-1.0, 0.0_f64);
@@ -471,11 +494,11 @@ mod tests {
     #[test]
     fn slopes_beside_presliding_are_bounds() {
         let drive = crate::robot::Arm::built_in("ur5").unwrap().joints[0].drive;
-        for exponent in [1, 2] {
+        for (exponent, damping_s) in [(1, 0.0), (2, 0.0), (2, 0.01)] {
             let friction = Friction {
                 stribeck: vec![Stribeck { joint: 1, extra_nm: 2.0, vs_rad_s: 0.01, exponent }],
                 asymmetric_nm: 1.5,
-                presliding: Some(Presliding { joint: 1, stiffness_per_rad: 1e3 }),
+                presliding: Some(Presliding { damping_s, ..Presliding::new(1, 1e3) }),
                 ..Friction::nominal(&drive, 0.02)
             };
             let torque = |speed: f64, z: f64| friction.torque_nm(0.0, speed, Some(z), 0.0, 0.0);
@@ -491,7 +514,9 @@ mod tests {
             let (smooth, bristles) = friction.slopes(1.0, 0.0);
             for (found, bound) in [(by_speed, smooth), (by_angle, bristles)] {
                 let share = found / bound;
-                assert!(share > 0.95 && share < 1.0 + 1e-6, "n = {exponent}: {found} {bound}");
+                // Damping and Stribeck's curve are steepest at different speeds.
+                let sharp = if damping_s == 0.0 { 0.95 } else { 0.5 };
+                assert!(share > sharp && share < 1.0 + 1e-6, "n = {exponent}: {found} {bound}");
             }
         }
     }

@@ -21,7 +21,7 @@
 //! | [`nonlinear_viscous`](NonlinearViscous) | friction | `amplitude_nm`, `exponent` |
 //! | [`asymmetric_friction`](AsymmetricFriction) | friction | `coulomb_nm`, `viscous_nm_s_rad` |
 //! | [`load_friction`](LoadFriction) | friction | `mu` |
-//! | [`presliding`](Presliding) | friction, state | `stiffness_per_rad` |
+//! | [`presliding`](Presliding) | friction, state | `stiffness_per_rad`, (`damping_s`) |
 //! | [`reversal_width`](ReversalWidth) | friction; no `joint`: all | `width_rad_s` |
 //! | [`position_friction`](PositionFriction) | friction | `amplitude_nm`, `phase_rad` |
 //! | [`thermal_drift`](ThermalDrift) | friction, state | `fraction`, `time_constant_s` |
