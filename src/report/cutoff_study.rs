@@ -31,7 +31,7 @@ fn name(method: Method) -> &'static str {
     }
 }
 
-/// The point with the least error.
+/// The point with the smallest `error`.
 fn best(curve: &Curve, error: impl Fn(&Point) -> f64) -> Option<Point> {
     curve.points.iter().copied().min_by(|a, b| error(a).total_cmp(&error(b)))
 }
@@ -97,7 +97,7 @@ fn summary_table(study: &CutoffStudy) -> Table {
     table
 }
 
-/// How well the formulas predict a point whose error is `ratio` times as large.
+/// Judges how well the formulas predict a point whose measured error is `ratio` times the predicted one.
 fn status(ratio: f64) -> Status {
     match (ratio - 1.0).abs() {
         off if off < 0.1 => Status::Good,
@@ -106,10 +106,10 @@ fn status(ratio: f64) -> Status {
     }
 }
 
-/// Share of the points that the formulas have to predict well.
+/// Share of the points that the formulas must predict to within 10 % for a good verdict.
 const MOST: f64 = 0.9;
 
-/// Of all points with these `ratios`.
+/// Judges the whole study by the `ratios` of all points.
 fn overall(ratios: &[f64]) -> Status {
     let count =
         |wanted: Status| ratios.iter().filter(|ratio| status(**ratio) == wanted).count() as f64;
@@ -120,7 +120,7 @@ fn overall(ratios: &[f64]) -> Status {
     }
 }
 
-/// Error measured over error predicted, of every point.
+/// Measured over predicted error, for every point.
 fn ratios(study: &CutoffStudy) -> Vec<f64> {
     study.curves.iter().flat_map(|c| &c.points).map(|p| p.measured / p.predicted).collect()
 }
@@ -209,7 +209,7 @@ fn sigma_table(study: &CutoffStudy) -> Table {
     table
 }
 
-/// The page.
+/// The study as a page.
 pub fn page(study: &CutoffStudy, program: Program) -> Result<Page, ReportError> {
     let status = overall(&ratios(study));
     let verdict = Verdict { status, sentence: sentence(study), facts: Vec::new() };
@@ -260,7 +260,7 @@ fn curves_figure(study: &CutoffStudy, method: Method) -> Result<String, ReportEr
         let cutoff = of(|p| p.cutoff_hz);
         let flat = vec![curve.averaged_error; cutoff.len()];
         let title = format!("velocity noise {} rad/s", significant(curve.velocity_sd_rad_s, 1));
-        // Far below the floor a branch says nothing.
+        // A branch far below the noise floor carries no information.
         let seen = |value: Vec<f64>| -> Vec<f64> {
             value.into_iter().map(|v| if v > 0.02 { v } else { f64::NAN }).collect()
         };
@@ -305,7 +305,7 @@ fn length_figure(study: &CutoffStudy) -> Result<String, ReportError> {
     Ok(plot.to_svg()?)
 }
 
-/// The same in Markdown.
+/// The study as Markdown, with the command that produced it.
 pub fn markdown(study: &CutoffStudy, command: &str) -> String {
     let formula: String = FORMULA.lines().map(|line| format!("    {line}\n")).collect();
     let mut text = format!(

@@ -1,4 +1,4 @@
-//! What `armid diagnose` shows: the verdict in words, the picture that convinces, the alternatives.
+//! The report of `armid diagnose`: verdict in words, residuals before and after each cause, and the alternatives.
 
 use super::json::Program;
 use super::plot::{Axis, Colour, Grid, Mark};
@@ -7,7 +7,7 @@ use crate::diagnose::{self, Cause, DetectionLimit, Diagnosis, Finding, Kind, cla
 use crate::number::{NONE, percent, resolved, significant};
 use crate::robot::Arm;
 
-/// The causes with their numbers.
+/// The named causes with their parameters.
 pub fn cause_table(diagnosis: &Diagnosis) -> Table {
     let mut table = Table::new([
         Column::text("cause"),
@@ -46,8 +46,8 @@ pub fn cause_table(diagnosis: &Diagnosis) -> Table {
     table
 }
 
-/// How sure a cause is: no more digits than a probability between laws that are all approximate has; "if any" where its size may be
-/// none.
+/// The confidence in a cause, rounded to what a probability among approximate laws can support. It ends in "if any"
+/// where the interval of the effect's size includes zero.
 fn confidence(cause: &Cause) -> String {
     let mut text = match cause.confidence {
         _ if cause.is_unlikely() => "< 0.1 %".to_owned(),
@@ -60,7 +60,7 @@ fn confidence(cause: &Cause) -> String {
     text
 }
 
-/// Gains on logs that were not used.
+/// Errors on held-out logs, without and with the causes.
 pub fn held_out_table(diagnosis: &Diagnosis) -> Table {
     let columns = [Column::text("held-out log"), Column::text("rms"), Column::text("model")];
     let mut table = Table::new(columns.into_iter().chain(joint_columns(diagnosis, "Nm")));
@@ -102,17 +102,17 @@ pub fn held_out_table(diagnosis: &Diagnosis) -> Table {
     table
 }
 
-/// By how much an rms changes; of a joint that never moves there is none.
+/// Relative change of an rms; none for a joint that never moves.
 fn change(before: f64, after: f64) -> String {
     let change = after / before - 1.0;
     if change.is_finite() { format!("{:+.0} %", 100.0 * change) } else { NONE.to_owned() }
 }
 
-/// What is to be known of detection limits.
+/// Caption of the table of detection limits.
 const OF_ONE_SHAPE: &str = "Each is the limit of the shape in its last column alone: a law in another shape, such as a \
                             Stribeck curve that falls faster, has another limit.";
 
-/// What would not have been seen: a row for each family, a column for each joint.
+/// Detection limits: one row per family, one column per joint.
 pub fn limit_table(diagnosis: &Diagnosis) -> Table {
     let head = [
         Column::text("found with 90 % probability"),
@@ -138,7 +138,7 @@ pub fn limit_table(diagnosis: &Diagnosis) -> Table {
     table
 }
 
-/// The shapes for which `limits` hold.
+/// The shape parameters for which `limits` hold.
 fn given(limits: &[DetectionLimit]) -> String {
     let ranges = limits[0].given.keys().map(|name| {
         let values =
@@ -155,7 +155,7 @@ fn joint_columns<'a>(diagnosis: &Diagnosis, unit: &'a str) -> impl Iterator<Item
     (1..=diagnosis.before.rms_nm.len()).map(move |j| Column::number(format!("joint {j}"), unit))
 }
 
-/// The last part of a path.
+/// The last component of a path.
 fn file_name(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
@@ -164,7 +164,7 @@ fn joint(joint: Option<usize>) -> String {
     joint.map_or("all".to_owned(), |j| j.to_string())
 }
 
-/// The page.
+/// The diagnosis as a page.
 pub fn page(finding: &Finding, arm: &Arm, program: Program) -> Result<Page, ReportError> {
     let diagnosis = &finding.diagnosis;
     let status = match diagnosis.verdict {
@@ -203,7 +203,7 @@ pub fn page(finding: &Finding, arm: &Arm, program: Program) -> Result<Page, Repo
     if let Some(unexplained) = &diagnosis.unexplained {
         let [x, y]: [Vec<f64>; 2] =
             [0, 1].map(|k| unexplained.curve.iter().map(|point| point[k]).collect());
-        // The ways since a reversal reach from 0.1 mrad to radians.
+        // The distance travelled since a reversal spans 0.1 mrad to radians, which calls for a logarithmic axis.
         let is_wide = x.first().zip(x.last()).is_some_and(|(a, b)| *a > 0.0 && *b > 100.0 * a);
         let scaled = if is_wide { Axis::log } else { Axis::linear };
         let axis = scaled(unexplained.axis, unexplained.unit);
@@ -240,7 +240,8 @@ pub fn page(finding: &Finding, arm: &Arm, program: Program) -> Result<Page, Repo
     Ok(page)
 }
 
-/// One cause: residual against the axis that matters before and after, and who lost.
+/// The section of one cause: residual before and after over the quantity the cause depends on, and the rejected
+/// alternatives.
 fn cause_section(finding: &Finding, cause: &Cause) -> Result<Section, ReportError> {
     let title = match cause.joint {
         Some(j) => format!("Joint {j}: {}", cause.in_words),
@@ -279,14 +280,14 @@ fn cause_section(finding: &Finding, cause: &Cause) -> Result<Section, ReportErro
         .table(table, "What else was tried in its place, best first"))
 }
 
-/// The joint (0-based) whose rms drops most: what concerns the arm as a whole is seen best there.
+/// The joint (0-based) whose rms drops most. A cause that concerns the whole arm is drawn for this joint.
 fn most_improved(before_nm: &[f64], after_nm: &[f64]) -> usize {
     let drops = before_nm.iter().zip(after_nm).map(|(before, after)| before - after);
     let known = drops.enumerate().filter(|(_, drop)| !drop.is_nan());
     known.max_by(|(_, a), (_, b)| a.total_cmp(b)).map_or(0, |(j, _)| j)
 }
 
-/// One scale for the residual of joint `j` before and after, so that the gain is seen.
+/// An ordinate for the residual of joint `j` that is the same before and after, so that the two panels compare.
 pub(super) fn residual_axis(finding: &Finding, j: usize, name: &str) -> Axis {
     let both = [&finding.before_nm, &finding.after_nm].map(|residual| residual.joint(j));
     let largest = both.into_iter().flatten().fold(0.0, |largest: f64, y| largest.max(y.abs()));
@@ -294,7 +295,7 @@ pub(super) fn residual_axis(finding: &Finding, j: usize, name: &str) -> Axis {
     if largest > 0.0 { axis.between(-1.05 * largest, 1.05 * largest) } else { axis }
 }
 
-/// The quantity against which a family's residual is drawn.
+/// The abscissa over which the residual of a family is drawn: label, unit and values.
 fn axis(finding: &Finding, kind: Kind, j: usize) -> (&'static str, &'static str, Vec<f64>) {
     let scene = &finding.scene;
     let pick = |y: &[f64]| finding.samples.iter().map(|&k| y[k]).collect::<Vec<f64>>();
@@ -329,7 +330,7 @@ fn axis(finding: &Finding, kind: Kind, j: usize) -> (&'static str, &'static str,
 mod tests {
     use super::*;
 
-    /// Joint 3 does not count, whatever its numbers.
+    /// The rms of joint 3 is unknown (NaN), so it cannot be the one that improves most.
     #[test]
     fn what_concerns_all_joints_is_shown_where_it_is_seen() {
         assert_eq!(most_improved(&[1.0, 2.0, f64::NAN], &[0.9, 0.5, f64::NAN]), 1);

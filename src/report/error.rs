@@ -6,13 +6,13 @@ use thiserror::Error;
 
 use crate::output::OutputError;
 
-/// A report that could not be made.
+/// A report or document that could not be made.
 #[derive(Debug, Error)]
 pub enum ReportError {
     /// A figure could not be drawn.
     #[error(transparent)]
     Plot(#[from] super::plot::PlotError),
-    /// The page template refused its data.
+    /// The page template could not be rendered.
     #[error("the report page could not be assembled: {0}")]
     Template(#[from] minijinja::Error),
     /// The document could not be written as JSON.
@@ -20,18 +20,18 @@ pub enum ReportError {
     Json {
         /// Schema of the document.
         schema: String,
-        /// Why.
+        /// The error of the serialiser.
         source: serde_json::Error,
     },
     /// The document could not be written.
     #[error(transparent)]
     Output(#[from] OutputError),
-    /// An input could not be read for its checksum.
+    /// An input could not be read to compute its checksum.
     #[error("{}: {source}", path.display())]
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The error of the file system.
         source: std::io::Error,
     },
 }

@@ -1,4 +1,4 @@
-//! The page of `armid excite`: the motion against its limits, what it will tell, the swept arm.
+//! The page of `armid excite`: the motion with its limits, the predicted accuracy, and the volume the arm sweeps.
 
 use crate::base::BaseSet;
 use crate::excitation::design::{Design, Specification};
@@ -12,10 +12,10 @@ use super::plot::{
 };
 use super::{Column, Page, ReportError, Section, Status, Table, Verdict};
 
-/// Samples of one period in the figures.
+/// Samples per period in the figures.
 const SAMPLES: usize = 600;
 
-/// Of a robot whose bodies have no shapes.
+/// Remark for a robot whose bodies have no collision shapes.
 pub const NO_CLEARANCE: &str =
     "the robot has no capsules: its distance from itself, the floor and the cell is not watched";
 
@@ -122,12 +122,12 @@ fn search_fact(found: &Design) -> String {
     )
 }
 
-/// One period at [`SAMPLES`] times.
+/// One period, sampled at [`SAMPLES`] + 1 instants.
 struct Samples {
     time_s: Vec<f64>,
     /// q, q̇, q̈ by joint.
     states: [Vec<Vec<f64>>; 3],
-    /// Distances by index.
+    /// Distances over time, by the index of the clearance model.
     distances_m: Vec<Vec<f64>>,
 }
 
@@ -211,7 +211,7 @@ impl Samples {
         plot.to_svg()
     }
 
-    /// The sample with the smallest distance.
+    /// Index of the sample with the smallest distance.
     fn closest(&self) -> usize {
         let least = |k: usize| self.distances_m.iter().map(|d| d[k]).fold(f64::INFINITY, f64::min);
         (0..self.time_s.len()).min_by(|&a, &b| least(a).total_cmp(&least(b))).unwrap_or(0)
@@ -222,7 +222,7 @@ impl Samples {
     }
 }
 
-/// Points of the arm's axis line at one pose: the ends of its capsules, body by body.
+/// Points of the arm's centre line at one pose: the base origin, then the origin of every body's frame.
 fn skeleton(arm: &Arm, q_rad: &[f64]) -> Vec<[f64; 3]> {
     std::iter::once([0.0; 3])
         .chain(arm.frames(q_rad).iter().map(|f| f.translation_m.into()))

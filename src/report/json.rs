@@ -1,4 +1,4 @@
-//! JSON documents: what was computed, by which program, from which inputs.
+//! JSON documents that name the program, the command and the inputs of a result.
 
 use std::fs::File;
 use std::io::Read;
@@ -10,10 +10,10 @@ use sha2::{Digest, Sha256};
 use super::error::ReportError;
 use crate::output::write_atomically;
 
-/// A file that was read.
+/// An input file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Input {
-    /// Path as the user gave it; in the document what Unicode has of it.
+    /// Path as the user gave it. The document replaces bytes that are not valid Unicode.
     #[serde(serialize_with = "as_text")]
     pub path: PathBuf,
     /// SHA-256 of its contents, 64 lowercase hexadecimal digits.
@@ -25,13 +25,13 @@ fn as_text<S: serde::Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S:
 }
 
 impl Input {
-    /// Reads the file for its checksum.
+    /// Reads the file and computes its checksum.
     pub fn of(path: &Path) -> Result<Self, ReportError> {
         Ok(Self { path: path.to_owned(), sha256: sha256_of_file(path)? })
     }
 }
 
-/// Where a document comes from: enough to make it again.
+/// The origin of a document: enough to produce it again.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Program {
     /// Version of this program.
@@ -45,14 +45,14 @@ pub struct Program {
 }
 
 impl Program {
-    /// This program as it was started.
+    /// This program with the command line it was started with.
     pub fn started(seed: Option<u64>, inputs: Vec<Input>) -> Self {
         let words = std::env::args_os().map(|word| word.to_string_lossy().into_owned());
         Self::new(words, seed, inputs)
     }
 
-    /// This program, run as `command` (the words of the command line; the program's own folder is no part of
-    /// what has to be repeated).
+    /// This program with the words of `command` as its command line. The folder of the program is dropped, because it
+    /// does not matter for a repetition.
     pub fn new(
         command: impl IntoIterator<Item = impl AsRef<str>>,
         seed: Option<u64>,
@@ -69,7 +69,7 @@ impl Program {
     }
 }
 
-/// A word of a command line as a shell takes it.
+/// A word of a command line, quoted for a shell if necessary.
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_./=:,+@%".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
@@ -79,34 +79,34 @@ fn quoted(word: &str) -> String {
     }
 }
 
-/// A document: the schema and the program in front, then the fields of `body`.
+/// A document: schema and program first, then the fields of `body`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Document<'a, T> {
     /// Name and version of the format, such as `armid.identify/1`.
     pub schema: &'a str,
-    /// Where it comes from.
+    /// Its origin.
     pub program: &'a Program,
-    /// What was computed; a struct or map.
+    /// The result; must serialise as a struct or map.
     #[serde(flatten)]
     pub body: &'a T,
 }
 
 impl<T: Serialize> Document<'_, T> {
-    /// The document as indented JSON with a newline at its end. Numbers that are not finite are `null`.
+    /// The document as indented JSON that ends in a newline. Non-finite numbers become `null`.
     pub fn to_json(&self) -> Result<String, ReportError> {
         let text = serde_json::to_string_pretty(self)
             .map_err(|source| ReportError::Json { schema: self.schema.to_owned(), source })?;
         Ok(text + "\n")
     }
 
-    /// Writes the document as a whole or not at all.
+    /// Writes the document atomically.
     pub fn write(&self, path: &Path) -> Result<(), ReportError> {
         let text = self.to_json()?;
         Ok(write_atomically(path, |file| file.write_all(text.as_bytes()))?)
     }
 }
 
-/// SHA-256 of a file's contents in lowercase hexadecimal, read piece by piece.
+/// SHA-256 of a file in lowercase hexadecimal. The file is read in blocks and never held in memory as a whole.
 pub fn sha256_of_file(path: &Path) -> Result<String, ReportError> {
     let read = |source| ReportError::Read { path: path.to_owned(), source };
     let mut file = File::open(path).map_err(read)?;

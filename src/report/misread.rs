@@ -1,4 +1,4 @@
-//! A log that is not read as it was recorded, and the layout with which it is.
+//! A log whose channels have to be read differently, and the layout that does so.
 
 use serde::Serialize;
 
@@ -6,26 +6,26 @@ use super::Section;
 use crate::identify::{Change, Misreading};
 use crate::log::Layout;
 
-/// A log that fits its arm when it is read otherwise.
+/// A log that fits its arm only when its channels are read differently.
 #[derive(Debug, Clone, Serialize)]
 pub struct MisreadLog {
-    /// Its name.
+    /// Name of the log.
     pub log: String,
-    /// How it has to be read.
+    /// How the log has to be read.
     #[serde(flatten)]
     pub misreading: Misreading,
-    /// The lines of a layout that reads it so; `null` where a layout cannot.
+    /// Lines of a layout file that reads the log correctly; `null` where no layout can.
     pub layout: Option<String>,
 }
 
 impl MisreadLog {
-    /// Of `log`, which was read with `layout`.
+    /// Combines the `misreading` of `log` with the corrected version of the `layout` it was read with.
     pub fn new(log: String, misreading: Misreading, layout: &Layout) -> Self {
         let layout = misreading.layout(layout);
         Self { log, misreading, layout }
     }
 
-    /// The layout with which the log fits, for the terminal.
+    /// The corrected layout with instructions, for the terminal.
     pub fn advice(&self) -> Option<String> {
         let lines = self.layout.as_ref()?.lines();
         let indented = lines.map(|line| format!("    {line}").trim_end().to_owned());
@@ -33,13 +33,13 @@ impl MisreadLog {
         Some(format!("{}\n\n{}", self.what_to_do(), lines.join("\n")))
     }
 
-    /// The same for a page.
+    /// The corrected layout with instructions, for a page.
     pub fn section(&self) -> Option<Section> {
         let lines = self.layout.as_ref()?;
         Some(Section::new("How to read the log").paragraph(self.what_to_do()).code(lines))
     }
 
-    /// What is to be done with the lines.
+    /// Tells the user how to use the lines of the layout.
     fn what_to_do(&self) -> String {
         let is_mounted =
             self.misreading.changes.iter().any(|change| matches!(change, Change::Mounted { .. }));

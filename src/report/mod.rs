@@ -1,7 +1,7 @@
-//! What is shown: numbers with their uncertainty, tables, figures, one self-contained page, and JSON.
+//! Output: numbers with their uncertainty, tables, figures, self-contained pages, and JSON.
 //!
-//! Enters: results of the chapters before. Leaves: text for the terminal, Markdown, a [`Page`] as one HTML file
-//! without network or scripts, and [`json`] documents that name program, command, seed and inputs.
+//! Input: results of the other modules. Output: text for the terminal, Markdown, a [`Page`] as one HTML file without
+//! network access or scripts, and [`json`] documents that name program, command, seed and inputs.
 
 pub mod blind;
 pub mod cutoff_study;

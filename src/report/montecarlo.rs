@@ -1,4 +1,4 @@
-//! The Monte Carlo's page and its table for the terminal.
+//! Page and tables of a Monte Carlo run.
 
 use super::json::Program;
 use super::plot::{Axis, Bars, Colour, IntervalPlot, IntervalRow, Mark, Span, XyPlot};
@@ -8,7 +8,7 @@ use crate::montecarlo::tally::BIN_WIDTH;
 use crate::montecarlo::{Efficiency, Estimation, Summary, shard::Merged};
 use crate::number::{percent, significant};
 
-/// Every base parameter: truth, mean, bias, σ found and claimed, coverage.
+/// Every base parameter: truth, mean, bias, empirical and predicted σ, coverage.
 pub fn parameter_table(summary: &Summary) -> Table {
     let mut table = Table::new([
         Column::text("parameter"),
@@ -49,12 +49,12 @@ pub fn parameter_table(summary: &Summary) -> Table {
     table
 }
 
-/// σ of a share beyond which chance alone carries that of one parameter in 5 % of runs.
+/// Standard errors from the claim that the coverage of one given parameter exceeds by chance in 5 % of runs.
 const UNUSUAL: f64 = 1.96;
-/// The same of any of 60 parameters, once in a thousand runs.
+/// Standard errors that any of 60 parameters exceeds by chance in one of a thousand runs.
 const IMPOSSIBLE: f64 = 4.3;
 
-/// What is to be said of the coverage of one parameter: nothing where chance can explain it.
+/// Judges the coverage of one parameter; `None` where chance can explain the deviation from the claim.
 fn covered(coverage: f64, summary: &Summary) -> Option<Status> {
     let is_outside = |z: f64| {
         let [low, high] = wilson(coverage, summary.trials as f64, z);
@@ -64,7 +64,7 @@ fn covered(coverage: f64, summary: &Summary) -> Option<Status> {
     statuses.into_iter().find(|(z, _)| is_outside(*z)).map(|(_, status)| status)
 }
 
-/// Empirical σ against the Cramér–Rao bound.
+/// Empirical σ relative to the Cramér–Rao bound, in words.
 pub fn efficiency_sentence(efficiency: &Efficiency) -> String {
     format!(
         "the estimates scatter {:.2} times as far as the best unbiased estimator's could (Cramér–Rao; rms over \
@@ -73,7 +73,7 @@ pub fn efficiency_sentence(efficiency: &Efficiency) -> String {
     )
 }
 
-/// The checks with what chance leaves open and what is claimed.
+/// The checks: measured value, its confidence interval, claim, verdict.
 pub fn check_table(summary: &Summary) -> Table {
     let mut table = Table::new([
         Column::text("check"),
@@ -102,7 +102,7 @@ pub fn check_table(summary: &Summary) -> Table {
     table
 }
 
-/// What the verdict rests on.
+/// Facts that support the verdict.
 fn facts(summary: &Summary) -> Vec<String> {
     let mut facts = vec![
         format!(
@@ -130,7 +130,7 @@ fn facts(summary: &Summary) -> Vec<String> {
     facts
 }
 
-/// In Markdown: verdict, checks, parameters.
+/// The run as Markdown: verdict, checks, parameters.
 pub fn markdown(summary: &Summary, command: &str) -> String {
     let mut text = format!("# Is the σ true?\n\n{}\n\n    {command}\n", summary.sentence());
     for fact in facts(summary) {
@@ -148,7 +148,7 @@ pub fn markdown(summary: &Summary, command: &str) -> String {
     text
 }
 
-/// The page: verdict, coverage and ratio per parameter, distribution of the errors, tables.
+/// The page: verdict, coverage and σ ratio per parameter, distribution of the errors, tables.
 pub fn page(
     summary: &Summary,
     merged: &Merged<Estimation>,

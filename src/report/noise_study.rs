@@ -1,4 +1,4 @@
-//! The study of noise: page, Markdown and tables.
+//! The study of estimators under noise: page, Markdown and tables.
 
 use super::json::Program;
 use super::plot::{Axis, IntervalPlot, IntervalRow, Span};
@@ -9,7 +9,7 @@ use crate::montecarlo::study::{MethodResult, NoiseStudy, ScenarioResult};
 use crate::number::percent;
 
 impl ScenarioResult {
-    /// The name without what all scenarios of noise have in common.
+    /// The name without the prefix that all noise scenarios share.
     fn short_name(&self) -> &str {
         self.name.trim_start_matches("noise_")
     }
@@ -22,7 +22,7 @@ impl ScenarioResult {
         self.method(&self.chosen[0], &self.chosen[1])
     }
 
-    /// What is asked of the mean coverage of the method that the log calls for.
+    /// Claimed range of the mean coverage for the automatically chosen method.
     fn coverage_claim(&self) -> [f64; 2] {
         claims::mean_coverage(self.single_run)
     }
@@ -32,7 +32,7 @@ impl ScenarioResult {
     }
 }
 
-/// Whether the mean coverage is within `claim`.
+/// Judges whether the mean coverage lies within the claim.
 fn status(method: &MethodResult, [low, high]: [f64; 2]) -> Status {
     match method.coverage_mean {
         c if c >= low && c <= high => Status::Good,
@@ -41,7 +41,7 @@ fn status(method: &MethodResult, [low, high]: [f64; 2]) -> Status {
     }
 }
 
-/// Where the model is wrong, what counts is that the intervals are withheld.
+/// Judges a scenario: by coverage where the model is right; where it is wrong, by whether the intervals are withheld.
 fn scenario_status(scenario: &ScenarioResult, method: &MethodResult) -> Status {
     match (scenario.model_is_wrong, 2 * scenario.rejected_fits > scenario.tested_for_fit) {
         (true, true) => Status::Good,
@@ -50,7 +50,7 @@ fn scenario_status(scenario: &ScenarioResult, method: &MethodResult) -> Status {
     }
 }
 
-/// The verdict in a sentence.
+/// Status and verdict in a sentence.
 fn sentence(study: &NoiseStudy) -> (Status, String) {
     let right = study.scenarios.iter().filter(|s| !s.model_is_wrong);
     let held = right
@@ -80,7 +80,7 @@ fn sentence(study: &NoiseStudy) -> (Status, String) {
     (if held == all && flagged { Status::Good } else { Status::Warn }, sentence)
 }
 
-/// What is asked of the chosen method, scenario by scenario.
+/// The chosen method against its targets, one row per scenario.
 fn target_table(study: &NoiseStudy) -> Table {
     let mut table = Table::new([
         Column::text("scenario"),
@@ -92,7 +92,7 @@ fn target_table(study: &NoiseStudy) -> Table {
     ]);
     for s in study.scenarios.iter().filter(|s| !s.model_is_wrong) {
         let Some(m) = s.chosen_method() else { continue };
-        // Of a log that does not repeat only the mean coverage is asked.
+        // For a log that does not repeat, only the mean coverage is a target.
         let judged = |statistic| match s.check(statistic) {
             None => "–".into(),
             Some(check) if s.single_run => measured(check),
@@ -118,7 +118,7 @@ fn target_table(study: &NoiseStudy) -> Table {
     table
 }
 
-/// A measured value against what is asked of it.
+/// A measured value with pass or miss against its claim.
 fn target(check: &CheckSummary) -> String {
     let CheckSummary { value, interval: [low, high], claim, .. } = check;
     let inside = (claim[0]..=claim[1]).contains(value);
@@ -130,7 +130,7 @@ fn target(check: &CheckSummary) -> String {
     format!("{answer}: {}", measured(check))
 }
 
-/// A measured value, whose it is, and where the true one lies.
+/// A measured value, its parameter, and the confidence interval of the true value.
 fn measured(check: &CheckSummary) -> String {
     let CheckSummary { value, interval: [low, high], .. } = check;
     let of = check.parameter.as_ref().map_or(String::new(), |name| format!(" {name}"));
@@ -156,7 +156,7 @@ fn targets() -> String {
     )
 }
 
-/// How often the lack-of-fit test speaks where it should not, and where it should.
+/// How often the lack-of-fit test rejects a right and a wrong model, in words.
 fn lack_of_fit(study: &NoiseStudy) -> String {
     let count = |wrong: bool| {
         let of = study.scenarios.iter().filter(|s| s.model_is_wrong == wrong);
@@ -183,7 +183,7 @@ fn lack_of_fit(study: &NoiseStudy) -> String {
     )
 }
 
-/// The chosen method in every scenario.
+/// Results of the chosen method in every scenario.
 fn summary_table(study: &NoiseStudy) -> Table {
     let mut table = Table::new([
         Column::text("scenario"),
@@ -235,7 +235,7 @@ fn lost(method: &MethodResult) -> String {
     if method.failed > 0 { format!(" ({} failed)", method.failed) } else { String::new() }
 }
 
-/// How far the paper's σ is off: (20) takes the variance of the noise for 1 Nm².
+/// How far the paper's σ is off: its (20) assumes a noise variance of 1 Nm².
 fn paper_table(study: &NoiseStudy) -> Table {
     let mut table = Table::new([
         Column::text("scenario"),
@@ -259,7 +259,7 @@ fn paper_table(study: &NoiseStudy) -> Table {
     table
 }
 
-/// Instruments beside the methods that they compete with, where the motion repeats.
+/// Instrumental variables beside the competing methods, for motions that repeat.
 fn instruments_table(study: &NoiseStudy) -> Table {
     const METHODS: [(&str, &str); 3] =
         [("wls", "periods"), ("iv", "periods"), ("spectral", "spectral")];
@@ -287,7 +287,7 @@ const INSTRUMENTS: &str = "Instrumental variables (Janot 2014) take the regresso
 so that the noise of the motion does not attenuate. Worst |bias|/σ of any parameter and mean coverage beside plain weighted \
 least squares and the method chosen by itself; chance alone makes the worst of 52 about 2.6/√trials.";
 
-/// Methods against scenarios, with `cell` of each pair that exists.
+/// A table of methods by scenarios, filled by `cell` for every existing pair.
 fn matrix(study: &NoiseStudy, cell: impl Fn(&MethodResult) -> String) -> Table {
     let mut names: Vec<(&str, &str)> = Vec::new();
     for m in study.scenarios.iter().flat_map(|s| &s.methods) {
@@ -296,7 +296,7 @@ fn matrix(study: &NoiseStudy, cell: impl Fn(&MethodResult) -> String) -> Table {
             names.push(name);
         }
     }
-    // Names break between words where columns are narrow.
+    // Spaces instead of underscores let the headings wrap in narrow columns.
     let heading = |s: &ScenarioResult| Column::number(s.short_name().replace('_', " "), "");
     let columns = study.scenarios.iter().map(heading);
     let labels = ["estimator", "σ from"].map(Column::text);
@@ -350,7 +350,7 @@ joints and white. What it claims is off by the true σ over it:";
 
 const TITLE: &str = "The method that a log calls for by itself";
 
-/// The page.
+/// The study as a page.
 pub fn page(study: &NoiseStudy, program: Program) -> Result<Page, ReportError> {
     let (status, sentence) = sentence(study);
     let verdict = Verdict { status, sentence, facts: Vec::new() };
@@ -414,7 +414,7 @@ fn coverage_plot(study: &NoiseStudy) -> Result<String, ReportError> {
     Ok(plot.to_svg()?)
 }
 
-/// The same in Markdown.
+/// The study as Markdown, with the command that produced it.
 pub fn markdown(study: &NoiseStudy, command: &str) -> String {
     let (_, sentence) = sentence(study);
     let mut text = format!(

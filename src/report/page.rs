@@ -1,4 +1,4 @@
-//! One self-contained HTML page: verdict first, then the evidence, then where it comes from.
+//! A self-contained HTML page: first the verdict, then the evidence, then the origin of the result.
 
 use std::path::Path;
 
@@ -14,14 +14,14 @@ use super::status::Status;
 use super::table::Table;
 use crate::output::write_atomically;
 
-/// What the reader takes away if they read nothing else.
+/// The banner of a page: what a reader takes away who reads nothing else.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Verdict {
     /// Colour of the banner.
     pub status: Status,
     /// One plain sentence.
     pub sentence: String,
-    /// A few facts that carry the sentence.
+    /// A few facts that support the sentence.
     pub facts: Vec<String>,
 }
 
@@ -36,11 +36,11 @@ pub struct Page {
     pub verdict: Verdict,
     /// The sections, in reading order.
     pub sections: Vec<Section>,
-    /// The footer.
+    /// Origin of the result, for the footer.
     pub program: Program,
 }
 
-/// A part of the page with a heading.
+/// A section of the page with a heading.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Section {
     title: String,
@@ -60,50 +60,51 @@ enum Block {
 }
 
 impl Section {
-    /// A section without contents.
+    /// An empty section.
     pub fn new(title: impl Into<String>) -> Self {
         Self { title: title.into(), blocks: Vec::new() }
     }
 
-    /// With a paragraph.
+    /// Adds a paragraph.
     pub fn paragraph(self, text: impl Into<String>) -> Self {
         self.with(Block::Paragraph { text: text.into() })
     }
 
-    /// With a remark that stands out.
+    /// Adds a highlighted remark.
     pub fn note(self, status: Status, text: impl Into<String>) -> Self {
         self.with(Block::Note { status, text: text.into() })
     }
 
-    /// With one remark after the other about what the reader should know.
+    /// Adds one highlighted remark for every warning.
     pub fn warnings(self, warnings: impl IntoIterator<Item = impl Into<String>>) -> Self {
         warnings.into_iter().fold(self, |section, warning| section.note(Status::Warn, warning))
     }
 
-    /// With a bulleted list.
+    /// Adds a bulleted list.
     pub fn list(self, items: impl IntoIterator<Item = impl Into<String>>) -> Self {
         self.with(Block::List { items: items.into_iter().map(Into::into).collect() })
     }
 
-    /// With text in a fixed-width font: a command, a file.
+    /// Adds text in a fixed-width font, such as a command or a file.
     pub fn code(self, text: impl Into<String>) -> Self {
         self.with(Block::Code { text: text.into() })
     }
 
-    /// With a table and a caption above it; the caption may be empty.
+    /// Adds a table with a caption above it; the caption may be empty.
     pub fn table(self, table: Table, caption: impl Into<String>) -> Self {
         self.with(Block::Table { table, caption: caption.into() })
     }
 
-    /// With a figure and a caption below it; the caption may be empty. It also names a figure without a title.
+    /// Adds a figure with a caption below it; the caption may be empty. It also labels a figure without a title for
+    /// screen readers.
     ///
-    /// `svg` is set into the page as it is: it must come from [`super::plot`], where all text is escaped.
+    /// `svg` is inserted without escaping: it must come from [`super::plot`], which escapes all text.
     pub fn figure(self, svg: impl Into<String>, caption: impl Into<String>) -> Self {
         let caption = caption.into();
         self.with(Block::Figure { svg: labelled(svg.into(), &caption), caption })
     }
 
-    /// With everything in `contents` folded away behind its title. On paper it is shown.
+    /// Adds `contents` collapsed behind its title. In print it is expanded.
     pub fn details(self, contents: Section) -> Self {
         self.with(Block::Details { summary: contents.title, blocks: contents.blocks })
     }
@@ -131,7 +132,7 @@ impl Page {
         }
     }
 
-    /// With a section for what should be known of the logs, where there is anything.
+    /// Adds a section with the warnings, if there are any.
     pub fn with_warnings(mut self, warnings: &[String]) -> Self {
         if !warnings.is_empty() {
             self.push(Section::new("What should be known").warnings(warnings));
@@ -144,24 +145,24 @@ impl Page {
         self.sections.push(section);
     }
 
-    /// Adds those sections that there are.
+    /// Adds any number of sections.
     pub fn extend(&mut self, sections: impl IntoIterator<Item = Section>) {
         sections.into_iter().for_each(|section| self.push(section));
     }
 
-    /// The page as an HTML document, the same bytes for the same contents.
+    /// The page as an HTML document; equal contents give equal bytes.
     pub fn to_html(&self) -> Result<String, ReportError> {
         Ok(environment()?.get_template("page.html")?.render(context! { page => Serde(self) })?)
     }
 
-    /// Writes the page as a whole or not at all.
+    /// Writes the page atomically.
     pub fn write(&self, path: &Path) -> Result<(), ReportError> {
         let html = self.to_html()?;
         Ok(write_atomically(path, |file| file.write_all(html.as_bytes()))?)
     }
 }
 
-/// One table as an HTML element.
+/// A table as an HTML element.
 pub(super) fn render_table(table: &Table) -> Result<String, ReportError> {
     Ok(environment()?
         .get_template("table.html")?

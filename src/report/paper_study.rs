@@ -1,4 +1,4 @@
-//! The paper's section IV on the simulated arm: page, Markdown and tables.
+//! The study of section IV of the paper on the simulated arm: page, Markdown and tables.
 
 use super::json::Program;
 use super::plot::{Axis, Colour, Grid, Mark, XyPlot};
@@ -7,9 +7,9 @@ use crate::montecarlo::study::{ErrorResult, Mechanism, MechanismResult, PaperStu
 use crate::number::{percent, significant};
 use crate::robot::JointSignals;
 
-/// The paper's (34) and (35).
+/// e_N that the paper reports in (34) and (35).
 const PAPER_E_N: [f64; 2] = [0.0279, 0.0152];
-/// Seconds of a trajectory that the figures show, as in the paper.
+/// Length of the trajectories in the figures, s, as in the paper.
 const SHOWN_S: f64 = 10.0;
 
 const SETTING: &str = "The arm is the simulated UR5 with all its products of inertia and centres of mass; the model is the \
@@ -20,7 +20,7 @@ paper's own arm is not at hand: its e_N stand beside ours for the size, not as a
 const E_N_NOTE: &str = "e_N = √(eᵀe)/m is (21), m the number of time samples, e over all six joints: the definition behind (34) \
 and (35). It is not an rms: it falls as 1/√m. A model that is exact would reach the e_N of the noise alone.";
 
-/// What leaving parameters out costs, from the arm that the full model describes exactly.
+/// The cost of the reduced parameter set on an arm that the full model describes exactly, in words.
 fn reduction(study: &PaperStudy) -> String {
     let of = |parameters: fn(usize) -> bool| {
         let exact = |e: &&ErrorResult| !e.hidden_effects && !e.torque_filtered;
@@ -61,7 +61,7 @@ const MECHANISMS: &str = "The paper reports negative rotor inertias and a mass m
 row hides one mechanism in the same arm, without static friction, and identifies it by the paper's processing, noise left out. \
 These are candidates: that a mechanism makes rotor inertias negative here does not show that it was at work in the paper's data.";
 
-/// The answer in a sentence.
+/// The verdict in a sentence.
 fn sentence(study: &PaperStudy) -> String {
     let [first, second] = study.errors[0].e_n;
     let ratios = || study.parameters.iter().map(|p| p.sigma_empirical / p.sigma_paper);
@@ -218,7 +218,7 @@ fn mechanism_table(study: &PaperStudy) -> Table {
     table
 }
 
-/// The page.
+/// The study as a page.
 pub fn page(study: &PaperStudy, program: Program) -> Result<Page, ReportError> {
     let verdict = Verdict { status: Status::Warn, sentence: sentence(study), facts: Vec::new() };
     let subtitle = study.description.clone();
@@ -385,7 +385,7 @@ fn sigma_figure(study: &PaperStudy) -> Result<String, ReportError> {
     Ok(plot.to_svg()?)
 }
 
-/// Ia3 … Ia6 over their values with nothing hidden, against delay and against presliding's angle.
+/// Ia3 … Ia6 relative to their values without any mechanism, over the delay and over the presliding angle.
 fn mechanism_figure(study: &PaperStudy) -> Result<String, ReportError> {
     let Some(nothing) = study.mechanisms.iter().find(|m| m.mechanism == Mechanism::Nothing) else {
         return Ok(String::new());
@@ -428,7 +428,7 @@ fn mechanism_figure(study: &PaperStudy) -> Result<String, ReportError> {
     Ok(grid.to_svg()?)
 }
 
-/// The same in Markdown.
+/// The study as Markdown, with the command that produced it.
 pub fn markdown(study: &PaperStudy, command: &str) -> String {
     format!(
         "# The paper's section IV on the simulated arm\n\n{}\n\n    {command}\n\n{SETTING}\n\n## How well the \

@@ -1,4 +1,4 @@
-//! Standard parameters that an arm can have: JSON and section of the page.
+//! Physically consistent standard parameters: JSON and section of the page.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,19 +16,20 @@ pub struct StandardParameter {
     value: f64,
     unit: &'static str,
     decided_by: DecidedBy,
-    /// `None` where the data do not decide the value: it scatters with no log, and how wrong the robot file is no log knows.
+    /// `None` where the data do not decide the value. It then does not scatter with the noise, and no log tells the
+    /// error of the robot file.
     sigma: Option<f64>,
 }
 
-/// What puts a standard parameter where it is.
+/// Where the value of a standard parameter comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DecidedBy {
-    /// The data.
+    /// The measured data.
     Data,
-    /// The robot file, as far as the log tells only combinations.
+    /// The robot file, because the log determines only combinations with other parameters.
     Prior,
-    /// The choice of parameters: it is zero (torque offsets, and what a reduced set leaves out).
+    /// The parametrisation: it is fixed at zero (torque offsets, and whatever a reduced set leaves out).
     NotFitted,
 }
 
@@ -42,7 +43,7 @@ impl DecidedBy {
     }
 }
 
-/// All of them; torque offsets are zero where they were not fitted.
+/// All standard parameters; torque offsets are zero where they were not fitted.
 pub fn standard_parameters(estimate: &PhysicalEstimate, arm: &Arm) -> Vec<StandardParameter> {
     let layout = ParameterLayout::new(arm.dof());
     let values = estimate.standard.iter().zip(&estimate.scatter.released.standard).enumerate();
@@ -60,7 +61,7 @@ pub fn standard_parameters(estimate: &PhysicalEstimate, arm: &Arm) -> Vec<Standa
         .collect()
 }
 
-/// How they were found.
+/// How the standard parameters were found, and whether they fit the data.
 #[derive(Debug, Clone, Serialize)]
 pub struct Physical {
     sentence: String,
@@ -70,7 +71,8 @@ pub struct Physical {
     model_is_wrong: bool,
     prior_metric: PriorMetric,
     prior_weight: f64,
-    /// Standard parameters that a robot file wrong by the share `file_error` moves by more than their σ.
+    /// Number of standard parameters that the robot file decides: more than half of an error of the file stays in them,
+    /// or a relative error of `file_error` shifts them by more than σ.
     prior_decides: usize,
     file_error: f64,
     cross_validation: Option<Vec<TriedWeight>>,
@@ -90,7 +92,7 @@ struct TriedWeight {
 }
 
 impl Physical {
-    /// Of an estimate from `problem`.
+    /// Summarises an estimate from `problem`.
     pub fn of(estimate: &PhysicalEstimate, problem: &Problem) -> Self {
         let PhysicalEstimate { evidence, certificate, .. } = estimate;
         let Certificate { objective, duality_gap, kkt_residual, iterations } = *certificate;
@@ -125,7 +127,7 @@ impl Physical {
         }
     }
 
-    /// What is to be said, line by line.
+    /// What the terminal prints, line by line.
     pub fn facts(&self) -> Vec<String> {
         let list = |values: &[f64]| -> String {
             let cells: Vec<String> = values.iter().map(|v| significant(*v, 4)).collect();
@@ -167,7 +169,7 @@ impl Physical {
         facts
     }
 
-    /// The section of the page.
+    /// The section for the page.
     pub fn section(&self, standard: &[StandardParameter]) -> Section {
         let mut section = Section::new("Standard parameters that an arm can have");
         let status = if self.model_is_wrong { Status::Bad } else { Status::Good };

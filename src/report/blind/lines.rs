@@ -1,9 +1,9 @@
-//! What a trial hides and what is said of it, in lines of text.
+//! One trial of the blind benchmark as lines of text: what it hid and what the diagnosis said.
 
 use crate::montecarlo::blind::{Named, Record, place};
 use crate::number::percent;
 
-/// A named cause in a line.
+/// A named cause in one line.
 fn named_line(named: &Named) -> String {
     let numbers: Vec<String> = named
         .parameters
@@ -25,7 +25,7 @@ fn named_line(named: &Named) -> String {
     )
 }
 
-/// A case, its truth and its answer, for the terminal.
+/// The case, its truth and the answer of the diagnosis, as lines for the terminal.
 pub fn replay_lines(record: &Record) -> Vec<String> {
     let case = &record.case;
     let mut lines = vec![

@@ -1,6 +1,6 @@
-//! The blind benchmark: page, Markdown and what a replay prints.
+//! Reports of the blind benchmark: page, Markdown, and the lines that a replay prints.
 //!
-//! Enters: [`Scores`] of a run, or the [`Record`] of one trial. Leaves: a [`Page`], or lines.
+//! Input: the [`Scores`] of a run, or the [`Record`] of one trial. Output: a [`Page`], Markdown, or lines of text.
 
 mod lines;
 mod plots;
@@ -59,7 +59,7 @@ the diagnosis sees the log alone. √λ is the size of the effect in standard de
 encoders) of the best test that could be made; where the null model absorbs the effect, √λ_sim, against a given simulation. A name is right if kind and \
 joint are, or if the class that the diagnosis states holds them. Of one effect the first cause counts.";
 
-/// Misses listed in the report.
+/// Most misses that the report lists.
 const LISTED: usize = 60;
 
 fn misses(scores: &Scores) -> Vec<String> {
@@ -92,7 +92,7 @@ fn misses(scores: &Scores) -> Vec<String> {
     lines
 }
 
-/// The tables that page and Markdown share: heading, words, table.
+/// The tables that page and Markdown share: heading, introductory text, table.
 fn parts(scores: &Scores) -> Vec<(&'static str, &'static str, Table)> {
     let mut parts = vec![
         ("Targets", HOW, target_table(scores)),
@@ -137,7 +137,7 @@ fn parts(scores: &Scores) -> Vec<(&'static str, &'static str, Table)> {
     parts
 }
 
-/// In Markdown.
+/// The scores as Markdown, with the command that produced them.
 pub fn markdown(scores: &Scores, command: &str) -> String {
     let mut text = format!(
         "# Does the diagnosis find what is hidden?\n\n{}\n\n    {command}\n",
@@ -165,7 +165,7 @@ pub fn markdown(scores: &Scores, command: &str) -> String {
     text
 }
 
-/// The page.
+/// The scores as a page.
 pub fn page(scores: &Scores, program: Program) -> Result<Page, ReportError> {
     let status = Status::from(scores.verdict).of_a_part(&scores.missing);
     let verdict = Verdict { status, sentence: sentence(scores), facts: facts(scores) };

@@ -1,4 +1,4 @@
-//! The scores in pictures.
+//! The scores as figures.
 
 use std::collections::{BTreeMap, BTreeSet};
 

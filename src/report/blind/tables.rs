@@ -1,11 +1,11 @@
-//! The scores in tables.
+//! The scores as tables.
 
 use crate::montecarlo::Share;
 use crate::montecarlo::blind::{Judged, Scores, StrengthBin, Target};
 use crate::number::percent;
 use crate::report::{Column, Status, Table};
 
-/// `12 of 40, 30.0 %`.
+/// Formats a share, such as `12 of 40, 30.0 %`.
 fn of(share: Share) -> String {
     if share.of == 0 {
         return "–".into();
@@ -22,7 +22,7 @@ fn target_in_words(target: &Target) -> String {
     }
 }
 
-/// Every target with what was measured.
+/// Every target with the measured value.
 pub fn target_table(scores: &Scores) -> Table {
     let mut table = Table::new([
         Column::text("target"),
@@ -49,12 +49,12 @@ pub fn target_table(scores: &Scores) -> Table {
     table
 }
 
-/// The values of a bin, kept on one line.
+/// The range of a bin; non-breaking spaces keep it on one line.
 pub(super) fn range([low, high]: [f64; 2]) -> String {
     if high.is_finite() { format!("{low}\u{a0}…\u{a0}{high}") } else { format!("≥\u{a0}{low}") }
 }
 
-/// Detection by size.
+/// Detection rates by the size of the effect.
 pub(super) fn strength_table(bins: &[StrengthBin], right: &str) -> Table {
     let mut table = Table::new([
         Column::text("√λ"),
@@ -153,7 +153,7 @@ pub(super) fn condition_table(scores: &Scores) -> Table {
     table
 }
 
-/// What was said for what, most frequent first, in words.
+/// Confusion table: what was named first for each hidden effect, most frequent answer first.
 pub(super) fn confusion_table(scores: &Scores) -> Table {
     let mut table = Table::new([
         Column::text("hidden"),

@@ -1,4 +1,4 @@
-//! A log that gives no estimate at all.
+//! The result for a log from which nothing can be estimated.
 
 use serde::Serialize;
 
@@ -10,8 +10,8 @@ use crate::report::rows::{Rows, log_warnings, names};
 use crate::report::{Page, Status, Verdict};
 use crate::robot::Arm;
 
-/// The JSON of a log that leaves parameters without any trace in the torque: same schema, nothing
-/// estimated.
+/// The JSON of a log whose motion leaves parameters without any effect on the torque. It uses the schema of a normal
+/// result, without estimates.
 #[derive(Debug, Clone, Serialize)]
 pub struct Declined {
     robot: String,
@@ -20,14 +20,15 @@ pub struct Declined {
     base_parameters: Vec<BaseParameter>,
     standard_parameters: Option<Vec<()>>,
     not_identified: Vec<String>,
-    /// What the user should know.
+    /// Remarks for the user about the log and its processing.
     pub warnings: Vec<String>,
     rows: Rows,
     verdict: &'static str,
 }
 
 impl Declined {
-    /// `parameters`: names of the base parameters whose columns vanish or coincide.
+    /// Declines the estimate; `parameters` are the names of base parameters whose columns vanish or depend on the
+    /// others.
     pub fn new(arm: &Arm, logs: &[&Log], regression: &Regression, parameters: Vec<String>) -> Self {
         let of_the_logs = logs.iter().flat_map(|log| log_warnings(log));
         Self {
@@ -71,7 +72,7 @@ mod tests {
     use crate::log::{Effort, LogWarning};
     use crate::robot::JointSignals;
 
-    /// What may be wrong with the file matters most where nothing could be identified from it.
+    /// Remarks about a faulty file matter most where nothing could be identified from it.
     #[test]
     fn warnings_about_log_and_processing_are_kept() {
         let arm = Arm::built_in("ur5").unwrap();

@@ -1,4 +1,4 @@
-//! Whether the intervals can be trusted: noise and misfit apart.
+//! Whether the confidence intervals can be trusted: tests that separate noise from misfit.
 
 use serde::Serialize;
 
@@ -8,35 +8,36 @@ use crate::identify::{
 };
 use crate::signal::Replicates;
 
-/// Whether the 95 % intervals may claim to hold the truth.
+/// Whether the 95 % intervals can be claimed to cover the true parameters.
 #[derive(Debug, Clone, Serialize)]
 pub struct Intervals {
-    /// False where the model leaves more than noise, or logs contradict each other; null where that could not be tested.
+    /// False where the residual exceeds the noise or the logs contradict each other; null where neither could be
+    /// tested.
     pub trusted: Option<bool>,
     /// Why, in a sentence.
     pub reason: String,
-    /// The test behind it.
+    /// The lack-of-fit test behind the answer; null where it could not be run.
     pub lack_of_fit: Option<TestResult>,
-    /// Of several logs that repeat their motions: whether they contradict each other.
+    /// The test of agreement between logs; null unless several logs each repeat their motion.
     pub agreement: Option<AgreementResult>,
 }
 
-/// The test of agreement and its answer.
+/// Result of the test that several logs agree.
 #[derive(Debug, Clone, Serialize)]
 pub struct AgreementResult {
-    /// 1 where the logs differ by their noise.
+    /// The F statistic; about 1 where the logs differ only by their noise.
     pub statistic: f64,
-    /// Of its F distribution.
+    /// Degrees of freedom of its F distribution.
     pub degrees_of_freedom: [f64; 2],
-    /// Chance of a larger statistic where the arm is the same.
+    /// Probability of a larger statistic if all logs come from the same arm.
     pub p_value: f64,
-    /// Chance below which the logs are said to differ.
+    /// Probability below which the logs are said to contradict each other.
     pub level: f64,
-    /// The base parameter that differs most in units of its noise.
+    /// The base parameter whose estimate in one log differs most from the common estimate, in units of its σ.
     pub parameter: String,
-    /// The log that does.
+    /// The log with this estimate.
     pub log: String,
-    /// By how many standard deviations it differs from the common estimate.
+    /// Its deviation from the common estimate in standard deviations, with sign.
     pub sigmas: f64,
 }
 
@@ -55,7 +56,8 @@ impl AgreementResult {
         }
     }
 
-    /// Squares are what is tested; what is told is how far the estimates lie apart.
+    /// How far the estimates of the logs lie apart, in words. The test uses squares; the text states the root, a
+    /// distance.
     fn times(&self) -> String {
         format!(
             "{:.2} times as far as their noise leads to expect ({})",
@@ -76,18 +78,18 @@ impl AgreementResult {
     }
 }
 
-/// The lack-of-fit test and its answer.
+/// Result of the lack-of-fit test.
 #[derive(Debug, Clone, Serialize)]
 pub struct TestResult {
-    /// Statistic, degrees of freedom, chance.
+    /// Statistic, degrees of freedom and p-value.
     #[serde(flatten)]
     pub test: LackOfFit,
-    /// Chance below which the model is rejected.
+    /// Probability below which the model is rejected.
     pub level: f64,
 }
 
 impl Intervals {
-    /// Of what the logs said.
+    /// Judges the intervals by the tests of lack of fit and of agreement.
     pub fn of(training: &Training) -> Self {
         let alone = Self::of_fit(training.identification);
         let Some(agreement) = &training.identification.agreement else { return alone };

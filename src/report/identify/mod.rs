@@ -1,7 +1,7 @@
-//! What `armid identify` says: JSON, tables and page.
+//! The report of `armid identify`: JSON, tables and page.
 //!
-//! Enters: the logs, what was identified from them, and the logs that it is validated on. Leaves: the [`Result`] that becomes JSON, or
-//! why there is none ([`Declined`]), and a [`Page`](crate::report::Page).
+//! Input: the logs, what was identified from them, and the logs for validation. Output: the [`Result`] that becomes
+//! JSON, or the reason why there is none ([`Declined`]), and a [`Page`](crate::report::Page).
 
 mod declined;
 mod intervals;
@@ -28,36 +28,37 @@ use crate::identify::{
 use crate::log::Log;
 use crate::robot::{Arm, Kinematics};
 
-/// Format of the JSON output.
+/// Schema of the JSON output.
 pub const IDENTIFY_SCHEMA: &str = "armid.identify/1";
 
-/// With so many an interval is 14 % longer than 1.96 σ.
+/// Degrees of freedom below which the user is warned. At 10, Student's 95 % interval is 14 % longer than ±1.96 σ.
 const FEW_DEGREES_OF_FREEDOM: f64 = 10.0;
 
 const IDENTIFIED: &str = "identified";
 const NOT_IDENTIFIED: &str = "not_identified";
-/// Verdict where no arm has what was identified.
+/// Verdict if no arm can have the identified parameters, or if the log fits only when its channels are read
+/// differently.
 pub const CONTRADICTED: &str = "contradicted";
 
-/// What was identified, from what.
+/// An identification with everything that it was made from.
 pub struct Training<'a> {
     /// The arm.
     pub arm: &'a Arm,
-    /// What it was loaded by: a built-in name, or a file and perhaps the last link of the arm.
+    /// How the arm was loaded: a built-in name, or a file and possibly the last link of the arm.
     pub robot_source: &'a str,
-    /// Base parameters.
+    /// The base parameters.
     pub set: &'a BaseSet,
     /// The logs.
     pub logs: &'a [&'a Log],
-    /// The logs laid out for regression.
+    /// The logs, laid out for regression.
     pub regression: &'a Regression,
     /// The solution.
     pub identification: &'a Identification,
-    /// Base parameters by the robot's description.
+    /// Base parameters according to the robot's description.
     pub nominal: &'a [f64],
-    /// Name of the reduced parameter set, if not the full one was identified.
+    /// Name of the reduced parameter set; `None` if the full set was identified.
     pub reduced: Option<&'a str>,
-    /// The first of the logs that fits the arm when it is read otherwise.
+    /// The first log that fits the arm only when its channels are read differently; `None` if there is none.
     pub misread: Option<&'a MisreadLog>,
 }
 
@@ -67,14 +68,14 @@ pub struct Validation {
     pub log: PathBuf,
     /// Measured and predicted torque.
     pub prediction: Prediction,
-    /// The manufacturer's feed-forward torque with the same processing, Nm.
+    /// The manufacturer's feed-forward torque after the same processing, Nm.
     pub manufacturer: Option<Prediction>,
-    /// What should be known of the log and of what was made of it.
+    /// Remarks about the log and its processing.
     pub warnings: Vec<String>,
 }
 
 impl Validation {
-    /// Of `theta` along `regression`; `manufacturer` is the same log laid out with the
+    /// Predicts the torque along `regression` with `theta`. `manufacturer` is the same log laid out with the
     /// manufacturer's torque in place of the measured one.
     pub fn new(
         log: &Log,
@@ -94,13 +95,13 @@ impl Validation {
     }
 }
 
-/// The JSON of `armid identify`.
+/// The JSON output of `armid identify`.
 #[derive(Debug, Clone, Serialize)]
 pub struct Result {
     robot: String,
     robot_source: String,
     kinematics: Kinematics,
-    /// Null: the full one.
+    /// Name of the reduced parameter set; null for the full one.
     reduced: Option<String>,
     log: String,
     samples: usize,
@@ -109,28 +110,28 @@ pub struct Result {
     estimator: Estimator,
     covariance: CovarianceKind,
     covariance_reason: &'static str,
-    /// Of the noise behind it; null: many.
+    /// Degrees of freedom of the noise estimate; null if there are infinitely many.
     degrees_of_freedom: f64,
     base_parameters: Vec<BaseParameter>,
-    /// Their covariance, row by row.
+    /// Covariance of the base parameters, row by row.
     base_covariance: Vec<Vec<f64>>,
-    /// Null: only combinations are known.
+    /// Null without `--physical`: only combinations of standard parameters are then known.
     standard_parameters: Option<Vec<StandardParameter>>,
     /// How the standard parameters were found; null without `--physical`.
     physical: Option<Physical>,
     residual: ResidualJson,
     noise_floor_nm: Option<Vec<f64>>,
-    /// Of what repeats in the torque, the part that is neither explained nor noise; null for a single run.
+    /// Rms of the torque that repeats from period to period and that the model does not explain; null for a single run.
     explainable_nm: Option<Vec<f64>>,
     intervals: Intervals,
     condition: Condition,
     not_identified: Vec<String>,
-    /// Null: the logs are read as they were recorded, as far as the arm tells.
+    /// How the log has to be read; null if it fits the arm as it is.
     misreading: Option<MisreadLog>,
     validation: Vec<ValidationJson>,
-    /// What the user should know.
+    /// Remarks for the user.
     pub warnings: Vec<String>,
-    /// Of the warnings the one that doubts that what was identified is this robot, or any.
+    /// The warning which doubts that the identified parameters belong to this robot, or to any.
     #[serde(skip)]
     pub(super) doubt: Option<Doubt>,
     rows: Rows,
@@ -172,7 +173,7 @@ struct ValidationJson {
 }
 
 impl Result {
-    /// Collects everything that is said.
+    /// Collects the result and all remarks about it.
     pub fn of(
         training: &Training,
         validations: &[Validation],
@@ -210,7 +211,7 @@ impl Result {
         let theta = &identification.fit.theta;
         let several = training.logs.len() > 1;
         let doubt = match training.misread {
-            // It explains whatever else could be doubted.
+            // A misread log explains every other doubt.
             Some(MisreadLog { log, misreading, .. }) => {
                 let name = if several { format!("{log}: ") } else { String::new() };
                 let sentence = format!("{name}{}", misreading.sentence());
@@ -232,10 +233,10 @@ impl Result {
         };
         warnings.extend(doubt.iter().map(|doubt| doubt.sentence.clone()));
         let fit = identification.residual();
-        // Of a log that is misread nothing else is to be said.
+        // For a misread log, no further remark about the fit makes sense.
         warnings.extend(unrelated(&fit).filter(|_| training.misread.is_none()));
         warnings.extend(validations.iter().filter_map(|validation| foreign(validation, &fit)));
-        // Logs whose torques could not be read came no further than that.
+        // Logs whose torque cannot be read never get here: such an error is ignored.
         warnings.extend(training.logs.iter().filter_map(|log| {
             let remark = drive_limit_remark(arm, &log.torque_nm(arm).ok()?)?;
             Some(if several { format!("{}: {remark}", log.source) } else { remark })
@@ -280,7 +281,7 @@ impl Result {
         })
     }
 
-    /// Adds standard parameters that an arm can have.
+    /// Adds physically consistent standard parameters.
     pub fn set_physical(&mut self, estimate: &PhysicalEstimate, training: &Training) {
         let problem = &training.regression.problem;
         self.standard_parameters = Some(standard_parameters(estimate, training.arm));
@@ -290,33 +291,33 @@ impl Result {
         }
     }
 
-    /// How the standard parameters were found.
+    /// How the standard parameters were found; `None` without `--physical`.
     pub fn physical(&self) -> Option<&Physical> {
         self.physical.as_ref()
     }
 
-    /// Whether the data do not identify the model.
+    /// Whether the motion fails to identify the model.
     pub fn is_declined(&self) -> bool {
         self.verdict == NOT_IDENTIFIED
     }
 
-    /// Whether no arm has what was identified.
+    /// Whether no arm can have the identified parameters, or the log is misread.
     pub fn is_contradicted(&self) -> bool {
         self.verdict == CONTRADICTED
     }
 
-    /// Why the intervals are trusted, or why nothing is known of that; distrust stands in [`Self::sentence`].
+    /// Why the intervals are trusted, or why that is unknown. Distrust is already part of [`Self::sentence`].
     pub fn trust(&self) -> Option<&str> {
         let is_asked = self.intervals.trusted != Some(false) && self.misreading.is_none();
         is_asked.then_some(&*self.intervals.reason)
     }
 
-    /// How the log has to be read, where it is misread.
+    /// How the log has to be read, if it is misread.
     pub fn misread(&self) -> Option<&MisreadLog> {
         self.misreading.as_ref()
     }
 
-    /// The warnings that the verdict does not begin with.
+    /// The warnings without the one that [`Self::sentence`] begins with.
     pub fn notes(&self) -> impl Iterator<Item = &String> {
         let doubt = self.doubt.as_ref().filter(|_| !self.is_declined());
         let leads = move |warning: &String| doubt.is_some_and(|d| d.sentence == *warning);
@@ -362,10 +363,10 @@ impl Result {
     }
 }
 
-/// Percent of a joint's torque from which on what the model leaves is nearly all that was recorded.
+/// Residual in percent of a joint's torque above which the model explains next to nothing of the torque.
 const NEARLY_ALL: f64 = 70.0;
 
-/// A remark where the torque of a joint has next to nothing to do with the motion.
+/// A remark on joints whose recorded torque has next to nothing to do with the motion.
 fn unrelated(fit: &Residual) -> Option<String> {
     let joints = fit.relative_percent.iter().zip(1..).filter(|(percent, _)| **percent > NEARLY_ALL);
     let joints: Vec<String> =
@@ -378,12 +379,12 @@ fn unrelated(fit: &Residual) -> Option<String> {
     })
 }
 
-/// Times the error of the fit from which on a log that was not used for it is not that of the same arm: of another motion a
-/// model that lacks something is wrong by up to twice as much.
+/// Ratio of validation error to fit error above which a log is said to come from another arm. Along another motion, an
+/// incomplete model of the same arm is wrong by up to twice its fit error.
 const FOREIGN: f64 = 3.0;
 
-/// A remark where what was identified does not describe the log it is validated on. At rest friction may be anything up to Coulomb's,
-/// along any log of any arm: joints count while they move.
+/// A remark on a validation log that the identified parameters do not describe. Only moving samples count: at rest,
+/// friction can take any value up to Coulomb friction, in any log of any arm.
 fn foreign(validation: &Validation, fit: &Residual) -> Option<String> {
     let found = validation.prediction.moving_residual();
     let is_far = |&j: &usize| found.rms_nm[j] > FOREIGN * fit.rms_nm[j];

@@ -11,7 +11,7 @@ use crate::report::plot::{Axis, Colour, Grid, IntervalPlot, IntervalRow, Mark};
 use crate::report::{Column, Page, ReportError, Section, Status, Table, Verdict};
 use crate::robot::JointSignals;
 
-/// Every base parameter with its σ and interval.
+/// Every base parameter with its σ and 95 % interval.
 pub fn parameter_table(result: &Result) -> Table {
     let distrusted = result.intervals.trusted == Some(false);
     let mut table = Table::new([
@@ -40,7 +40,7 @@ pub fn parameter_table(result: &Result) -> Table {
     table
 }
 
-/// Residual per joint: of the fit, and of every validation log with all and with moving samples.
+/// Residual rms per joint: of the fit, and of every validation log over all and over moving samples.
 pub fn residual_table(result: &Result) -> Table {
     let joints = result.residual.rms_nm.len();
     let columns = (1..=joints).map(|j| Column::number(format!("joint {j}"), ""));
@@ -72,7 +72,7 @@ pub fn residual_table(result: &Result) -> Table {
     table
 }
 
-/// How the log was read and the numbers were made.
+/// How the log was processed and how estimate and σ were computed.
 pub fn facts(result: &Result) -> Vec<String> {
     let processing = &result.processing;
     let periods = match processing.period_s {
@@ -106,7 +106,7 @@ pub fn facts(result: &Result) -> Vec<String> {
     ]
 }
 
-/// The page: verdict, torque measured and predicted, residuals, parameters.
+/// The page: verdict, measured and predicted torque, residuals, parameters.
 pub fn page(
     result: &Result,
     training: &Training,
@@ -180,7 +180,7 @@ fn error_figure(title: &str, p: &Prediction) -> std::result::Result<String, Repo
 
 type JointLine<'a> = (&'a str, &'a JointSignals, Colour, Mark);
 
-/// One panel per joint over time.
+/// Curves over time, one panel per joint.
 fn joints_figure(
     title: &str,
     unit: &str,
@@ -200,7 +200,7 @@ fn joints_figure(
     Ok(grid.to_svg()?)
 }
 
-/// σ over the estimate, parameter by parameter.
+/// σ relative to the estimate, for every parameter.
 fn relative_sigma_figure(result: &Result) -> std::result::Result<String, ReportError> {
     let mut plot = IntervalPlot::new("σ of each parameter", Axis::log("σ / |estimate|", "%"));
     plot.columns = 2;
