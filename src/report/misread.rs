@@ -6,7 +6,7 @@ use super::Section;
 use crate::identify::{Change, Misreading};
 use crate::log::Layout;
 
-/// A log that fits its arm only when its channels are read differently.
+/// A log that fits its arm only when its channels are read, or the arm is mounted, differently.
 #[derive(Debug, Clone, Serialize)]
 pub struct MisreadLog {
     /// Name of the log.

@@ -25,7 +25,7 @@ fn of(case: &CaseResult, method: Method) -> Option<&Prediction> {
     case.predictions[method as usize].as_ref()
 }
 
-/// Errors of both estimates and what the constraint did to the scatter.
+/// Scatter and systematic error of the constrained estimate, each relative to the unconstrained one.
 fn gain(case: &CaseResult) -> Option<(f64, f64)> {
     let before = of(case, Method::Unconstrained)?;
     let after = of(case, Method::Constrained)?;
@@ -35,7 +35,7 @@ fn gain(case: &CaseResult) -> Option<(f64, f64)> {
     ))
 }
 
-/// Whether what is systematic outweighs what scatters: the model is wrong, not only noisy.
+/// Whether the systematic error exceeds the scatter, so that the model counts as wrong and not only the data as noisy.
 fn is_wrong(case: &CaseResult) -> bool {
     of(case, Method::Unconstrained).is_some_and(|p| p.systematic_percent > p.scatter_percent)
 }
@@ -57,21 +57,23 @@ fn sentence(study: &PhysicalStudy) -> String {
     )
 }
 
-/// How often the model was called wrong, of how many trials, where it is wrong or where it is not.
+/// In how many of how many tested trials the model was called wrong, over the cases where it is wrong or those where it
+/// is right.
 fn called_wrong(study: &PhysicalStudy, where_wrong: bool) -> [u64; 2] {
     let cases = study.cases.iter().filter(|case| is_wrong(case) == where_wrong);
     cases.fold([0, 0], |[called, tested], case| [called + case.called_wrong, tested + case.tested])
 }
 
-/// Largest share of constrained estimates that no arm can have.
+/// Largest share over the cases of constrained estimates with a mass matrix that is not positive definite.
 fn impossible(study: &PhysicalStudy) -> f64 {
     study.cases.iter().map(|case| case.indefinite[1]).fold(0.0, f64::max)
 }
 
-/// Most false alarms, as a share of the trials in which the model is right.
+/// Largest share of false alarms, over the trials in which the model is right, for a good verdict.
 const FALSE_ALARMS: f64 = 0.05;
 
-/// Constraints have to make every arm possible, and to tell a wrong model from noise more often than not.
+/// Judges the study: constraints must make every arm physical, and the test must detect a wrong model in at least half
+/// of the trials.
 fn status(impossible: f64, [false_alarms, sound]: [u64; 2], [found, unsound]: [u64; 2]) -> Status {
     let is_told = 2 * found >= unsound && false_alarms as f64 <= FALSE_ALARMS * sound as f64;
     match is_told {
@@ -170,7 +172,7 @@ fn short(case: &CaseResult) -> &str {
     case.name.trim_start_matches("physical_")
 }
 
-/// The page.
+/// The study as a page.
 pub fn page(study: &PhysicalStudy, program: Program) -> Result<Page, ReportError> {
     let [sound, unsound] = [false, true].map(|where_wrong| called_wrong(study, where_wrong));
     let status = status(impossible(study), sound, unsound);
@@ -248,7 +250,7 @@ fn coverage_plot(study: &PhysicalStudy) -> Result<String, ReportError> {
     Ok(plot.to_svg()?)
 }
 
-/// The same in Markdown.
+/// The study as Markdown, with the command that produced it.
 pub fn markdown(study: &PhysicalStudy, command: &str) -> String {
     let mut text = format!(
         "# What does physical consistency repair, and what not?\n\n{}\n\n",

@@ -1,11 +1,11 @@
-//! What the simulation says about a diagnosis: torque and motion of the logs, without and with the causes.
+//! Replay of a diagnosis: torque and motion of the logs beside a simulation without and with the causes.
 
 use super::plot::{Axis, Colour, Grid, Mark};
 use super::{Column, ReportError, Section, Table};
 use crate::diagnose::replay::{Replay, ReplayedLog};
 use crate::number::{percent, significant};
 
-/// Torque and angles of every log, joint by joint.
+/// Errors of torque and angle for every log and joint.
 pub fn table(replay: &Replay) -> Table {
     let mut table = Table::new([
         Column::text("replayed log"),
@@ -33,7 +33,7 @@ pub fn table(replay: &Replay) -> Table {
     table
 }
 
-/// The section of the page.
+/// The section for the page.
 pub fn section(replay: &Replay) -> Result<Section, ReportError> {
     let mut section = Section::new("The loop closed").paragraph(
         "The identified arm and, with it, the causes as physics (not as the columns that were fitted) are put \

@@ -1,10 +1,10 @@
-//! The logs by name, and what became of their rows.
+//! Names of logs, and how many of their rows were used.
 
 use serde::Serialize;
 
 use crate::log::Log;
 
-/// What became of the rows of one or several logs.
+/// Numbers of rows read, used and set aside in one or several logs.
 #[derive(Debug, Clone, Serialize)]
 pub struct Rows {
     pub(super) read: usize,
@@ -18,23 +18,23 @@ struct SetAside {
     count: usize,
 }
 
-/// The logs by name, separated by commas.
+/// The names of the logs, separated by commas.
 pub(super) fn names(logs: &[&Log]) -> String {
     logs.iter().map(|log| log.source.as_str()).collect::<Vec<_>>().join(", ")
 }
 
-/// What should be known of a log that could be read, with its name.
+/// Remarks about a log that could be read, each prefixed with the name of the log.
 pub fn log_warnings(log: &Log) -> impl Iterator<Item = String> {
     log.rows.warnings.iter().map(|warning| format!("{}: {warning}", log.source))
 }
 
 impl Rows {
-    /// How many were read and used.
+    /// Rows read and used, in words.
     pub fn in_words(&self) -> String {
         format!("{} rows read, {} used", self.read, self.used)
     }
 
-    /// Of all `logs` together.
+    /// Sums over all `logs`.
     pub fn of(logs: &[&Log]) -> Self {
         let mut rows = Self { read: 0, used: 0, set_aside: Vec::new() };
         for log in logs {

@@ -6,31 +6,31 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use thiserror::Error;
 
-/// A file that is no document of the schema that was asked for.
+/// A file that is not a document of the expected schema.
 #[derive(Debug, Error)]
 #[error("{file}: {fault}")]
 pub struct SavedError {
     /// The file.
     pub file: String,
-    /// What is wrong with it.
+    /// The reason.
     pub fault: SavedFault,
 }
 
-/// See [`SavedError`].
+/// Why a document cannot be read back; see [`SavedError`].
 #[derive(Debug, Error)]
 pub enum SavedFault {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error(transparent)]
     Read(#[from] std::io::Error),
-    /// It is no JSON, or lacks a field.
+    /// The file is not JSON, or lacks a field.
     #[error(transparent)]
     Json(#[from] serde_json::Error),
-    /// It is another document.
+    /// The file has a different schema.
     #[error("its schema is \"{found}\", expected \"{expected}\"")]
     OtherSchema {
-        /// The file's.
+        /// Schema of the file.
         found: String,
-        /// The one that was asked for.
+        /// Expected schema.
         expected: &'static str,
     },
 }
@@ -40,9 +40,9 @@ struct Head {
     schema: String,
 }
 
-/// The fields that `T` has of the document in `path`, which has to be of `schema`.
+/// Reads the fields of `T` from the document in `path`, which must have the given `schema`.
 ///
-/// Errors: the file cannot be read, is no JSON, is of another schema, or lacks a field of `T`.
+/// Errors: the file cannot be read, is not JSON, has a different schema, or lacks a field of `T`.
 pub fn load<T: DeserializeOwned>(path: &Path, schema: &'static str) -> Result<T, SavedError> {
     let read = || -> Result<T, SavedFault> {
         let text = std::fs::read_to_string(path)?;
@@ -71,7 +71,7 @@ mod tests {
         saved.map(|saved| saved.sigma).map_err(|error| error.to_string())
     }
 
-    /// Another document is said to be one, whatever fields it has.
+    /// A different schema is reported as such, whichever fields the document has.
     #[test]
     fn what_is_wrong_is_said() {
         assert_eq!(loaded(r#"{"schema": "armid.sigma/2", "sigma": 0.5, "n": 3}"#), Ok(0.5));

@@ -1,10 +1,10 @@
-//! Good, doubtful, bad.
+//! Judgements: good, doubtful, bad.
 
 use serde::Serialize;
 
 use crate::montecarlo::calibration::Verdict;
 
-/// A judgement, with one colour in tables, figures and on the page.
+/// A judgement, with the same colour in tables, figures and on the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
@@ -27,7 +27,7 @@ impl From<Verdict> for Status {
 }
 
 impl Status {
-    /// One character for where there is no colour.
+    /// One character that replaces the colour where there is none.
     pub fn symbol(self) -> char {
         match self {
             Status::Good => '✓',
@@ -36,7 +36,7 @@ impl Status {
         }
     }
 
-    /// A word beside it, for those who only hear the page.
+    /// A word that states the judgement, for screen readers.
     pub fn label(self) -> &'static str {
         match self {
             Status::Good => "good",
@@ -45,7 +45,8 @@ impl Status {
         }
     }
 
-    /// The judgement of a run of which the trials `missing` have not been run: they may say something else.
+    /// The judgement of a run in which the trials `missing` have not been run. A good judgement becomes doubtful,
+    /// because the missing trials may change it.
     pub fn of_a_part(self, missing: &[[u64; 2]]) -> Self {
         match self {
             Self::Good if !missing.is_empty() => Self::Warn,

@@ -1,4 +1,4 @@
-//! A table, shown on the terminal, in Markdown and on the page.
+//! A table for the terminal, for Markdown and for the page.
 
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
@@ -7,13 +7,13 @@ use super::error::ReportError;
 use super::page;
 use super::status::Status;
 
-/// Side to which the cells of a column are set.
+/// Side to which the cells of a column are aligned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Align {
-    /// Words.
+    /// For words.
     Left,
-    /// Numbers.
+    /// For numbers.
     Right,
 }
 
@@ -48,7 +48,7 @@ impl Column {
     }
 }
 
-/// A row: one cell per column, and a judgement that colours it.
+/// A row: one cell per column, and a judgement that determines its colour.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Row {
     /// The cells, already formatted (see [`crate::number`]).
@@ -58,7 +58,7 @@ pub struct Row {
 }
 
 impl Serialize for Row {
-    /// With what says the judgement where its colour is not seen.
+    /// Adds symbol and label of the judgement, for readers who cannot see its colour.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut row = serializer.serialize_struct("Row", 4)?;
         row.serialize_field("cells", &self.cells)?;
@@ -123,7 +123,8 @@ impl Table {
         page::render_table(self)
     }
 
-    /// The table in GitHub's Markdown, columns aligned in the source too, judgements in the first cell.
+    /// The table in GitHub's Markdown, with columns aligned in the source as well; judgements are written in the first
+    /// cell.
     pub fn to_markdown(&self) -> String {
         let escape = |text: &str| text.replace('|', "\\|").replace('\n', " ");
         let headings: Vec<String> = self.columns.iter().map(|c| escape(&c.heading())).collect();
@@ -145,7 +146,7 @@ impl Table {
         line(&headings) + &rule + &rows.iter().map(|row| line(row)).collect::<String>()
     }
 
-    /// The table for a terminal: columns aligned, judged rows with a symbol in front, no trailing blanks.
+    /// The table for a terminal: columns aligned, judged rows preceded by a symbol, no trailing blanks.
     pub fn to_text(&self) -> String {
         let headings: Vec<String> = self.columns.iter().map(Column::heading).collect();
         let rows: Vec<Vec<String>> = self.rows.iter().map(|row| row.cells.clone()).collect();
@@ -164,7 +165,7 @@ impl Table {
         out
     }
 
-    /// Characters of the longest cell of every column, at least `least`.
+    /// Number of characters of the longest cell of every column, at least `least`.
     fn widths(&self, headings: &[String], rows: &[Vec<String>], least: usize) -> Vec<usize> {
         (0..self.columns.len())
             .map(|k| {
@@ -220,7 +221,7 @@ mod tests {
                 && html.contains("<td class=\"right\">12345.6789</td>"),
             "{html}"
         );
-        // Once, in the first cell of the judged row: colours are not seen by all.
+        // Once, in the first cell of the judged row: not every reader sees the colour.
         assert_eq!(html.matches("aria-label=\"fails\"").count(), 1, "{html}");
         assert!(html.contains(">✗</span> σ of"), "{html}");
     }

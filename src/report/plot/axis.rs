@@ -4,7 +4,7 @@ use super::canvas::Rect;
 use super::error::PlotError;
 use super::ticks::{self, Along, Tick};
 
-/// How values are laid along an axis.
+/// How values are mapped to positions along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scale {
     /// Equal distances for equal differences.
@@ -27,12 +27,12 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// A linear axis that fits the data.
+    /// A linear axis whose range follows the data.
     pub fn linear(label: impl Into<String>, unit: impl Into<String>) -> Self {
         Self { label: label.into(), unit: unit.into(), scale: Scale::Linear, range: None }
     }
 
-    /// A logarithmic axis that fits the data.
+    /// A logarithmic axis whose range follows the data.
     pub fn log(label: impl Into<String>, unit: impl Into<String>) -> Self {
         Self { scale: Scale::Log, ..Self::linear(label, unit) }
     }
@@ -85,7 +85,7 @@ impl Axis {
         Ok(Extent { scale: self.scale, low, high })
     }
 
-    /// `label [unit]`, the unit carrying the power of ten that was taken out of the tick labels.
+    /// `label [unit]`; the unit carries the power of ten that was factored out of the tick labels.
     pub(super) fn caption(&self, exponent: i32) -> String {
         let unit = match (exponent, self.unit.as_str()) {
             (0, unit) => unit.to_owned(),
@@ -130,7 +130,7 @@ impl Extent {
     }
 
     pub fn ticks(self, length_px: f64, along: Along) -> ticks::Ticks {
-        // A figure can be too low for its heading and labels.
+        // A figure can be lower than its heading and labels, which leaves a negative length.
         let length_px = length_px.max(1.0);
         match self.scale {
             Scale::Linear => ticks::linear(self.low, self.high, length_px, along),
@@ -138,7 +138,7 @@ impl Extent {
         }
     }
 
-    /// Power of ten that is taken out of the tick labels.
+    /// Power of ten that is factored out of the tick labels.
     pub fn exponent(self) -> i32 {
         match self.scale {
             Scale::Linear => ticks::shared_exponent(self.low.abs().max(self.high.abs())),
@@ -149,7 +149,7 @@ impl Extent {
         }
     }
 
-    /// Position of a value between the ends (0 to 1 inside), `None` for what cannot be placed.
+    /// Position of a value between the ends (0 to 1 inside), `None` for a value that cannot be placed.
     fn fraction(self, value: f64) -> Option<f64> {
         let at = self.scale.to_axis(value);
         (at.abs() < HUGE).then(|| (at - self.low) / (self.high - self.low))

@@ -1,7 +1,7 @@
-//! A sheet of paper measured in pixels, drawn by plotters' SVG backend.
+//! A sheet measured in pixels, drawn by the SVG backend of plotters.
 //!
-//! The backend's coordinates are integers. The sheet is therefore drawn [`UNITS_PER_PX`] times as large and
-//! shown at its size through the `viewBox`: lines are placed to a tenth of a pixel, and can be thinner than one.
+//! The backend's coordinates are integers. The sheet is therefore drawn [`UNITS_PER_PX`] times as large and scaled back
+//! by the `viewBox`: lines are placed to a tenth of a pixel, and can be thinner than a pixel.
 
 use plotters::backend::SVGBackend;
 use plotters::coord::Shift;
@@ -18,9 +18,9 @@ use super::error::PlotError;
 use super::palette::Colour;
 
 const UNITS_PER_PX: f64 = 10.0;
-/// The backend divides the size it is given by this number.
+/// The backend divides the font size it is given by this number.
 const BACKEND_FONT_DIVISOR: f64 = 1.24;
-/// Sizes between which a figure can be drawn.
+/// Smallest and largest side of a figure that can be drawn.
 pub(super) const LEAST_SIZE_PX: f64 = 40.0;
 pub(super) const MOST_SIZE_PX: f64 = 10_000.0;
 const DASH_PX: i32 = 5;
@@ -85,14 +85,14 @@ impl Rect {
     }
 }
 
-/// Where the given point lies in a text.
+/// Which point of a text its position refers to.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Anchor {
-    /// At its left end, half-way up.
+    /// The left end, at half height.
     Left,
-    /// In its centre.
+    /// The centre.
     Centre,
-    /// At its right end, half-way up.
+    /// The right end, at half height.
     Right,
 }
 
@@ -140,7 +140,7 @@ pub(super) struct Canvas<'a> {
     area: DrawingArea<SVGBackend<'a>, Shift>,
 }
 
-/// An SVG document of the given size, with `draw` having drawn on it.
+/// An SVG document of the given size with what `draw` draws on the canvas.
 pub(super) fn render(
     size: Size,
     title: &str,
@@ -159,7 +159,7 @@ pub(super) fn render(
     Ok(finish(&svg, size, title))
 }
 
-/// Shows the sheet at its size, names it for screen readers, and takes out attributes that say the default.
+/// Scales the sheet to its size, labels it for screen readers, and removes attributes that only state a default.
 fn finish(svg: &str, size: Size, title: &str) -> String {
     let body = svg.split_once('\n').map_or("", |(_root, body)| body);
     let head = format!(
@@ -175,7 +175,7 @@ fn finish(svg: &str, size: Size, title: &str) -> String {
     let mut out = String::with_capacity(head.len() + body.len());
     out.push_str(&head);
     for line in body.lines() {
-        // Texts stand on lines of their own, with `<` escaped: only tags are touched.
+        // The backend writes each text on a line of its own with `<` escaped, so that the replacements touch only tags.
         if line.starts_with('<') {
             let line = line
                 .replace(" opacity=\"1\"", "")
@@ -191,7 +191,7 @@ fn finish(svg: &str, size: Size, title: &str) -> String {
     out
 }
 
-/// The figure `svg`, which is read out as `label` where it has no title of its own.
+/// The figure `svg`, with `label` as its label for screen readers if it has no title of its own.
 pub(in crate::report) fn labelled(svg: String, label: &str) -> String {
     const NAMELESS: &str = " aria-label=\"\"";
     match svg.split_once('\n') {
@@ -287,9 +287,9 @@ fn rgba(colour: Colour, opacity: f64) -> RGBAColor {
     RGBAColor(colour.red, colour.green, colour.blue, opacity)
 }
 
-/// Width of a text in pixels, estimated from the advance widths of the usual sans-serif faces.
+/// Width of a text in pixels, estimated from the advance widths of common sans-serif fonts.
 ///
-/// Whoever opens the page brings the font, so this can only be an estimate; it leans to the wide side.
+/// The reader's system supplies the font, so the width can only be estimated; the estimate errs on the wide side.
 pub(super) fn text_width_px(text: &str, font_px: f64) -> f64 {
     let em: f64 = text
         .chars()

@@ -4,10 +4,9 @@ use thiserror::Error;
 
 use super::canvas::{LEAST_SIZE_PX, MOST_SIZE_PX};
 
-/// A figure that cannot be drawn because what was given does not fit together.
+/// A figure that cannot be drawn because its inputs do not fit together.
 ///
-/// Empty, constant and non-finite data are no errors: they give an empty figure, a widened axis
-/// and a gap.
+/// Empty, constant and non-finite data are not errors: they give an empty figure, a widened axis and a gap.
 #[derive(Debug, Error, PartialEq)]
 pub enum PlotError {
     /// Abscissae and ordinates of one series differ in number.
@@ -22,7 +21,7 @@ pub enum PlotError {
         /// Number of ordinates.
         y: usize,
     },
-    /// A row of a heat map has not one value per column.
+    /// A row of a heat map does not have one value per column, or the map not one row per label.
     #[error("figure \"{figure}\": row {row} has {found} values for {expected} labels")]
     RaggedRow {
         /// Title of the figure.
@@ -48,7 +47,7 @@ pub enum PlotError {
         /// Upper end.
         high: f64,
     },
-    /// A figure without room for its contents.
+    /// The figure is too small or too large, or its size is not finite.
     #[error(
         "a figure of {width_px} x {height_px} pixels is outside {} to {}",
         LEAST_SIZE_PX,
@@ -60,7 +59,7 @@ pub enum PlotError {
         /// Height in pixels.
         height_px: f64,
     },
-    /// The drawing backend refused.
+    /// The drawing backend failed.
     #[error("drawing failed: {reason}")]
     Backend {
         /// The backend's message.

@@ -1,4 +1,4 @@
-//! Small multiples: one panel per joint, comparable at a glance.
+//! Small multiples, such as one panel per joint, for comparison at a glance.
 
 use super::axis::{Axis, Extent};
 use super::canvas::{Anchor, Canvas, Font, Rect, Size, TITLE_PX, render};
@@ -12,22 +12,22 @@ const GUTTER_PX: f64 = 10.0;
 
 /// Panels in rows and columns under one title and one legend.
 ///
-/// The panels share the axes' names, which are taken from `x` and `y` here; each panel's title stands above it.
+/// The panels take the names of their axes from `x` and `y`; each panel has its title above it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
-    /// What is seen.
+    /// Title of the figure.
     pub title: String,
     /// Abscissa of all panels.
     pub x: Axis,
     /// Ordinate of all panels.
     pub y: Axis,
-    /// The panels, row by row; their own axes are used for the scale and for fixed ranges.
+    /// The panels, row by row; their own axes determine scales and fixed ranges.
     pub panels: Vec<XyPlot>,
     /// Panels in a row.
     pub columns: usize,
-    /// One range of the abscissa for all panels, labelled below the last row only.
+    /// Whether all panels have the same range of the abscissa, labelled only below the last row.
     pub share_x: bool,
-    /// One range of the ordinate for all panels, labelled in the first column only.
+    /// Whether all panels have the same range of the ordinate, labelled only in the first column.
     pub share_y: bool,
     /// Height of a row of panels in pixels, without the labels of the abscissa.
     pub row_height_px: f64,
@@ -36,7 +36,7 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Panels in three columns with one abscissa, each with its own ordinate.
+    /// Panels in three columns that share the abscissa, each with its own ordinate.
     pub fn new(title: impl Into<String>, x: Axis, y: Axis) -> Self {
         Self {
             title: title.into(),
@@ -64,7 +64,8 @@ impl Grid {
         let labels_px = X_TICKS_PX + X_NAME_PX;
         let labelled_rows = if self.share_x { 1 } else { rows };
         let entries = heading::legend_entries(&self.panels);
-        // Panels of different ranges carry their own powers of ten, and the common name carries none.
+        // Panels with different ranges carry their own powers of ten; the common name of the ordinate then carries
+        // none.
         let unscaled = Extent { scale: self.y.scale, low: 0.0, high: 1.0 };
         let shared_y =
             extents.first().map(|(_, y)| *y).filter(|_| self.share_y).unwrap_or(unscaled);
@@ -95,7 +96,7 @@ impl Grid {
         let left: Vec<f64> = (0..columns)
             .map(|column| if self.share_y && column > 0 { 8.0 } else { left_px(column) })
             .collect();
-        // Every plot gets the same width, whatever room its labels need.
+        // Every plot gets the same width, regardless of the width of its tick labels.
         let plot_px = (body.width() - left.iter().sum::<f64>() - GUTTER_PX * (columns - 1) as f64)
             / columns as f64;
         for (k, (plot, &(x, y))) in self.panels.iter().zip(extents).enumerate() {

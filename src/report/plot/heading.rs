@@ -1,7 +1,7 @@
-//! What stands above the plots: title, name of the ordinate, legend.
+//! The heading above the plots: title, name of the ordinate, legend.
 //!
-//! The ordinate's name stands horizontally above its axis, where it is read first, and the legend on the same row
-//! at the right end, where it can hide no data.
+//! The name of the ordinate is written horizontally above its axis, where it is easy to read. The legend is on the same
+//! row at the right end, where it cannot hide data.
 
 use super::axis::{Axis, Extent};
 use super::canvas::{Anchor, Canvas, FONT_PX, Font, Point, Rect, Stroke, text_width_px};
@@ -14,7 +14,7 @@ use super::xy::{Mark, XyPlot};
 pub(super) const ROW_PX: f64 = 20.0;
 const SWATCH_PX: f64 = 18.0;
 
-/// What a legend entry shows beside its name.
+/// The symbol of a legend entry.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Swatch {
     Mark(Mark),
@@ -23,7 +23,7 @@ pub(super) enum Swatch {
     Dash,
 }
 
-/// One line of a legend.
+/// An entry of a legend.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Entry {
     name: String,
@@ -45,7 +45,7 @@ impl Entry {
     }
 }
 
-/// Every name once, in the order of first appearance.
+/// Every name once, in order of first appearance.
 pub(super) fn legend_entries<'p>(plots: impl IntoIterator<Item = &'p XyPlot>) -> Vec<Entry> {
     let mut entries: Vec<Entry> = Vec::new();
     for plot in plots {
@@ -66,16 +66,16 @@ pub(super) fn legend_entries<'p>(plots: impl IntoIterator<Item = &'p XyPlot>) ->
     entries
 }
 
-/// What stands above the plots.
+/// The heading above the plots.
 pub(super) struct Heading<'a> {
     pub title: &'a str,
-    /// The ordinate's name and the range that decides on its power of ten.
+    /// The ordinate, and its range, which determines the power of ten in its name.
     pub y: Option<(&'a Axis, Extent)>,
     pub entries: &'a [Entry],
 }
 
 impl Heading<'_> {
-    /// Height on a sheet of the given width.
+    /// Height on a sheet of width `width_px`.
     pub fn height_px(&self, width_px: f64) -> f64 {
         let title = if self.title.is_empty() { 0.0 } else { ROW_PX + 2.0 };
         let legend = if self.shares_row(width_px) {
@@ -92,7 +92,7 @@ impl Heading<'_> {
         title + legend + names
     }
 
-    /// Draws it at the top of the sheet; returns what is left.
+    /// Draws the heading at the top of the sheet; returns the remaining area.
     pub fn draw(&self, canvas: &Canvas, sheet: Rect) -> Result<Rect, PlotError> {
         let mut top = sheet.top;
         if !self.title.is_empty() {
@@ -117,7 +117,7 @@ impl Heading<'_> {
         self.y.map_or_else(String::new, |(axis, extent)| axis.caption(extent.exponent()))
     }
 
-    /// Whether the legend finds room beside the name of the ordinate.
+    /// Whether the legend fits beside the name of the ordinate.
     fn shares_row(&self, width_px: f64) -> bool {
         let legend_px: f64 = self.entries.iter().map(Entry::width_px).sum();
         legend_px + text_width_px(&self.name(), FONT_PX) + RIGHT_PX <= width_px
@@ -134,7 +134,7 @@ fn legend_rows(entries: &[Entry], width_px: f64) -> usize {
     rows
 }
 
-/// How many entries one row of a legend holds, at least one.
+/// Number of entries that fit into one row of a legend, at least one.
 fn fitting(entries: &[Entry], width_px: f64) -> usize {
     let mut used_px = 0.0;
     let fits = |entry: &&Entry| {
@@ -144,7 +144,7 @@ fn fitting(entries: &[Entry], width_px: f64) -> usize {
     entries.iter().take_while(fits).count().max(1)
 }
 
-/// Entries in rows that wrap; returns the ordinate below them.
+/// Draws entries in rows that wrap; returns the ordinate below them.
 pub(super) fn legend(
     canvas: &Canvas,
     room: Rect,

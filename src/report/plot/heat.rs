@@ -1,4 +1,4 @@
-//! A matrix of numbers in shades: confusion of causes, correlation of parameters.
+//! A heat map, such as the confusion of causes or the correlation of parameters.
 
 use super::canvas::{
     Anchor, Canvas, FONT_PX, Font, LEAST_SIZE_PX, Rect, Size, TITLE_PX, render, text_width_px,
@@ -12,10 +12,10 @@ use super::ticks::typographic;
 const DARKEST: Colour = Colour { red: 0x08, green: 0x45, blue: 0x7e };
 const DARKEST_NEGATIVE: Colour = Colour { red: 0x9c, green: 0x3a, blue: 0x10 };
 
-/// A matrix with a label for every row and column and the number in every cell.
+/// A matrix of shaded cells with labelled rows and columns; cells show their numbers where these fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeatMap {
-    /// What is seen.
+    /// Title of the figure.
     pub title: String,
     /// What the rows are, such as `hidden`.
     pub row_axis: String,
@@ -25,7 +25,7 @@ pub struct HeatMap {
     pub row_labels: Vec<String>,
     /// Label of every column.
     pub column_labels: Vec<String>,
-    /// Values, row by row; what is not finite leaves its cell empty.
+    /// Values, row by row; a non-finite value leaves its cell empty.
     pub values: Vec<Vec<f64>>,
     /// Value of the darkest shade; `None` takes the largest magnitude. Negative values have a colour of their own.
     pub full_scale: Option<f64>,
@@ -126,7 +126,7 @@ impl HeatMap {
                 let share = if full > 0.0 { (value.abs() / full).min(1.0) } else { 0.0 };
                 let share = if share.is_finite() { share } else { 0.0 };
                 let dark = if value < 0.0 { DARKEST_NEGATIVE } else { DARKEST };
-                // The square root spreads the small values, which are what one looks for off the diagonal.
+                // The square root emphasises small values: off the diagonal, these are the interesting ones.
                 let shade = Colour::STRIPE.towards(dark, share.sqrt());
                 canvas.rect(cell, shade, 1.0)?;
                 let ink = match share {
@@ -144,7 +144,7 @@ impl HeatMap {
         Ok(())
     }
 
-    /// A dot where nothing is, so that what is there stands out.
+    /// The number; a dot for zero, so that non-zero values stand out.
     fn cell_text(&self, value: f64) -> String {
         if !value.is_finite() {
             String::new()

@@ -1,4 +1,4 @@
-//! A sample against the density it should have.
+//! A histogram of a sample, compared with the density it should follow.
 
 use super::axis::Axis;
 use super::canvas::Size;
@@ -21,17 +21,17 @@ pub struct Density {
 /// A histogram scaled to unit area, with a reference density.
 #[derive(Debug, Clone)]
 pub struct Histogram {
-    /// What is seen.
+    /// Title of the figure.
     pub title: String,
     /// The quantity.
     pub x: Axis,
-    /// The sample; what is not finite is left out.
+    /// The sample; non-finite values are left out.
     pub sample: Vec<f64>,
     /// Legend entry of the sample.
     pub name: String,
     /// Number of bins; `None` takes the rule of Freedman and Diaconis (1981), width 2·IQR/n^(1/3).
     pub bins: Option<usize>,
-    /// What is expected.
+    /// The expected density.
     pub reference: Option<Density>,
     /// Size in pixels.
     pub size: Size,
@@ -56,7 +56,7 @@ impl Histogram {
         }
     }
 
-    /// With the density of the standard normal distribution.
+    /// Adds the density of the standard normal distribution.
     pub fn against_standard_normal(mut self) -> Self {
         let density = |x: f64| (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt();
         self.reference = Some(Density { name: "standard normal".into(), at: density });
@@ -68,7 +68,7 @@ impl Histogram {
         self.to_plot().to_svg()
     }
 
-    /// The histogram as a plot, to be set among others.
+    /// The histogram as a plot, for use in a [`Grid`](super::Grid).
     pub fn to_plot(&self) -> XyPlot {
         let per_unit =
             if self.x.unit.is_empty() { String::new() } else { format!("1/({})", self.x.unit) };
@@ -91,7 +91,7 @@ impl Histogram {
         plot
     }
 
-    /// Edges of bins of equal width that hold the whole sample; none for an empty sample.
+    /// Edges of equally wide bins that cover the whole sample; none for an empty sample.
     fn edges(&self) -> Vec<f64> {
         let mut sorted: Vec<f64> = self.sample.iter().copied().filter(|x| x.is_finite()).collect();
         sorted.sort_unstable_by(f64::total_cmp);

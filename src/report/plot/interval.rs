@@ -1,4 +1,4 @@
-//! Values with their intervals, one row each: parameters with σ, coverage with its bounds.
+//! Values with intervals, one per row, such as parameters with σ or coverage with its bounds.
 
 use super::axis::{Axis, Extent, Frame};
 use super::canvas::{Anchor, Canvas, FONT_PX, Font, Rect, Size, Stroke, render, text_width_px};
@@ -16,7 +16,7 @@ const GUTTER_PX: f64 = 22.0;
 /// One value with its interval.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IntervalRow {
-    /// What the value is of.
+    /// Name of the value.
     pub name: String,
     /// The value.
     pub value: f64,
@@ -24,24 +24,24 @@ pub struct IntervalRow {
     pub low: f64,
     /// Upper end of its interval; not finite for none.
     pub high: f64,
-    /// What it should be, drawn as an upright dash; not finite for none.
+    /// The expected value, drawn as an upright dash; not finite for none.
     pub expected: f64,
     /// Colour of dot and interval; `None` for neutral.
     pub status: Option<Status>,
 }
 
-/// Dots with intervals over a common axis, from top to bottom in one or more columns.
+/// Dots with intervals over a common axis, stacked in one or more columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IntervalPlot {
-    /// What is seen.
+    /// Title of the figure.
     pub title: String,
     /// The common axis.
     pub x: Axis,
     /// The rows.
     pub rows: Vec<IntervalRow>,
-    /// Columns of rows; one column is read fastest, two keep fifty rows on one screen.
+    /// Number of columns; one column is easiest to read, two keep fifty rows on one screen.
     pub columns: usize,
-    /// The interval where values are expected, shaded in every column, with its legend entry.
+    /// The interval in which values are expected, shaded in every column, with its legend entry.
     pub expected: Option<Span>,
     /// Legend entry of dots and intervals, such as `estimate ± 2σ`; empty for none.
     pub value_name: String,
@@ -111,7 +111,7 @@ impl IntervalPlot {
         rows: &[IntervalRow],
         x: Extent,
     ) -> Result<(), PlotError> {
-        // One width for all columns, so that they compare.
+        // All columns use the same width for names, so that positions compare between columns.
         let names_px =
             self.rows.iter().map(|row| text_width_px(&row.name, FONT_PX)).fold(0.0, f64::max);
         let left = (room.left + names_px + 10.0).min(0.5 * (room.left + room.right));

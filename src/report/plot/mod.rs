@@ -1,8 +1,8 @@
 //! Figures as inline SVG.
 //!
-//! Enters: numbers in plain structs. Leaves: an SVG document, the same bytes for the same numbers on every
-//! machine, of at most some 150 kB however long the series are. Values that are not finite are gaps; empty and
-//! constant data give an empty plot and a widened axis.
+//! Input: numbers in plain structs. Output: an SVG document, byte for byte the same for the same numbers on every
+//! machine, of at most about 150 kB however long the series are. Non-finite values are gaps; empty data give an empty
+//! plot, constant data a widened axis.
 //!
 //! | struct | shows |
 //! |---|---|
@@ -55,7 +55,7 @@ mod tests {
         XyPlot::new("figure", x_axis, y_axis).with("series", x, y, Colour::series(0), mark)
     }
 
-    /// Neither a coordinate that is no number, nor one far off the sheet.
+    /// No coordinate is NaN or infinite, and none lies far off the sheet.
     fn assert_drawn_on_the_sheet(svg: &str) {
         assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n"), "{svg}");
         assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");

@@ -1,8 +1,8 @@
-//! Colours: one meaning, one colour, in every figure of a report.
+//! Colours: the same meaning has the same colour in every figure of a report.
 //!
-//! The qualitative colours are those of M. Okabe and K. Ito, "Color Universal Design" (2008),
-//! which stay apart under the common colour-vision deficiencies; the yellow of their set is left out
-//! because thin yellow lines vanish on white paper, and the rest is slightly darkened for the same reason.
+//! The qualitative colours are those of M. Okabe and K. Ito, "Color Universal Design" (2008), which remain
+//! distinguishable under the common colour-vision deficiencies. Their yellow is left out because thin yellow lines
+//! vanish on white paper; the other colours are slightly darkened for the same reason.
 
 use crate::report::Status;
 
@@ -22,11 +22,11 @@ impl Colour {
         Self { red, green, blue }
     }
 
-    /// What the robot did: measured, true, given.
+    /// Measured, true or given values: what the robot did.
     pub const MEASURED: Self = Self::rgb(0x33, 0x3d, 0x47);
-    /// What the model says.
+    /// Values computed by the model.
     pub const MODEL: Self = Self::rgb(0xd5, 0x5e, 0x00);
-    /// Something to compare with, in the background.
+    /// A reference in the background.
     pub const REFERENCE: Self = Self::rgb(0x8a, 0x94, 0x9e);
     /// Before a change.
     pub const BEFORE: Self = Self::rgb(0xd5, 0x5e, 0x00);
@@ -46,7 +46,7 @@ impl Colour {
         SERIES[k % SERIES.len()]
     }
 
-    /// Number of series that can be told apart.
+    /// Number of distinguishable series colours.
     pub const DISTINCT: usize = SERIES.len();
 
     /// Colour of a verdict.

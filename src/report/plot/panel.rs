@@ -1,4 +1,4 @@
-//! One plot laid out on a part of the sheet: grid, axes, data.
+//! One plot laid out in a part of the sheet: grid, axes, data.
 
 use super::axis::{Axis, Extent, Frame, Scale};
 use super::canvas::{Anchor, Canvas, FONT_PX, Font, Point, Rect, Stroke, TITLE_PX, text_width_px};
@@ -8,18 +8,18 @@ use super::ticks::{Along, Ticks};
 use super::trace;
 use super::xy::{Across, Band, Bars, Mark, Series, XyPlot};
 
-/// Points that the curves of one figure may have together: at about ten bytes each, 100 kB.
+/// Points that all curves of one figure may have together: about 100 kB at ten bytes each.
 pub(super) const POINT_BUDGET: usize = 10_000;
 /// A dot costs seven times as many bytes as a point of a line.
 const POINTS_PER_DOT: usize = 7;
-/// Room right of the plot for the half of a tick label that stands out.
+/// Room right of the plot for the protruding half of a tick label.
 pub(super) const RIGHT_PX: f64 = 14.0;
 /// Room for the tick labels below the plot.
 pub(super) const X_TICKS_PX: f64 = 19.0;
 /// Room for the name of the abscissa.
 pub(super) const X_NAME_PX: f64 = 17.0;
 
-/// What a panel shares with its neighbours.
+/// Layout that a panel shares with its neighbours.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Layout {
     /// Room for the tick labels left of the plot.
@@ -31,14 +31,14 @@ pub(super) struct Layout {
     pub point_budget: usize,
 }
 
-/// Room that the labels of an ordinate need.
+/// Room that the tick labels of an ordinate need.
 pub(super) fn left_px(y: Extent, height_px: f64) -> f64 {
     let ticks = y.ticks(height_px - X_TICKS_PX - X_NAME_PX, Along::Vertical).ticks;
     let widest = ticks.iter().map(|tick| text_width_px(&tick.label, FONT_PX)).fold(0.0, f64::max);
     (widest + 10.0).max(24.0)
 }
 
-/// Axes and data of one plot in `room`.
+/// Draws axes and data of one plot in `room`.
 pub(super) fn draw(
     canvas: &Canvas,
     room: Rect,
@@ -65,7 +65,7 @@ pub(super) fn draw(
     for group in &plot.bars {
         bars(canvas, &frame, group)?;
     }
-    // Dense data lie below the bands, which they would hide.
+    // Dense curves are drawn below the bands, because they would hide them.
     let (dense, sparse): (Vec<_>, Vec<_>) =
         plot.series.iter().zip(series_shares).partition(|(curve, _)| curve.mark == Mark::ThinLine);
     for (curve, &share) in dense {
@@ -95,7 +95,7 @@ pub(super) fn draw(
     Ok(())
 }
 
-/// Divides the budget: who needs little gets it, the others share the rest equally.
+/// Divides the budget: small needs are met in full, the others share the remainder equally.
 fn fair_shares(needs: &[usize], budget: usize) -> Vec<usize> {
     let mut order: Vec<usize> = (0..needs.len()).collect();
     order.sort_by_key(|&k| needs[k]);
@@ -109,7 +109,7 @@ fn fair_shares(needs: &[usize], budget: usize) -> Vec<usize> {
 }
 
 impl Series {
-    /// Points of the budget that all samples would take.
+    /// Points of the budget that the series needs if no sample is dropped.
     fn cost(&self) -> usize {
         let per_sample = match self.mark {
             Mark::Line | Mark::ThinLine | Mark::Dashed => 1,
@@ -120,7 +120,7 @@ impl Series {
     }
 }
 
-/// The line on which the plot stands.
+/// The bottom line of a plot.
 pub(super) fn baseline(canvas: &Canvas, area: &Rect) -> Result<(), PlotError> {
     canvas.line(
         &[(area.left, area.bottom), (area.right, area.bottom)],
@@ -128,7 +128,7 @@ pub(super) fn baseline(canvas: &Canvas, area: &Rect) -> Result<(), PlotError> {
     )
 }
 
-/// Vertical lines of the grid.
+/// Vertical grid lines.
 pub(super) fn vertical_grid(
     canvas: &Canvas,
     frame: &Frame,
@@ -142,7 +142,7 @@ pub(super) fn vertical_grid(
     Ok(())
 }
 
-/// Horizontal lines of the grid.
+/// Horizontal grid lines.
 pub(super) fn horizontal_grid(
     canvas: &Canvas,
     frame: &Frame,
@@ -161,7 +161,7 @@ pub(super) fn horizontal_grid(
     Ok(())
 }
 
-/// Tick labels and name below the plot. A label at an end is moved inwards rather than cut.
+/// Tick labels and name below the plot. A label at the right end is moved inwards rather than cut.
 pub(super) fn x_labels(
     canvas: &Canvas,
     frame: &Frame,
@@ -233,7 +233,7 @@ fn band(canvas: &Canvas, frame: &Frame, band: &Band, budget: usize) -> Result<()
     Ok(())
 }
 
-/// Colour of bars: pale, so that a curve over them stands out.
+/// Colour of bars: pale, so that a curve in front of them stands out.
 pub(super) fn bar_colour(colour: Colour) -> Colour {
     colour.towards(Colour::PAPER, 0.45)
 }
@@ -246,7 +246,7 @@ fn bars(canvas: &Canvas, frame: &Frame, bars: &Bars) -> Result<(), PlotError> {
         let (Some(left), Some(right), Some(y)) = ends else { continue };
         let (left, right) = (left.max(area.left), right.min(area.right));
         let y = y.clamp(area.top, area.bottom);
-        // A hair of paper between neighbours, as long as the bars are wide enough to spare it.
+        // A hairline gap between neighbours, if the bars are wide enough for it.
         let gap = if right - left > 4.0 { 0.5 } else { 0.0 };
         if left < right {
             let bar = Rect {
@@ -293,12 +293,12 @@ fn series(canvas: &Canvas, frame: &Frame, series: &Series, budget: usize) -> Res
     Ok(())
 }
 
-/// Width of a decimation bucket: a pixel, or more where the budget asks for it.
+/// Width of a decimation bucket: a pixel, or more if the budget requires it.
 fn bucket_px(area: &Rect, budget: usize) -> f64 {
     (2.0 * area.width() / budget.max(1) as f64).max(1.0)
 }
 
-/// Straight lines across, their labels in rows below one another where they would touch.
+/// Straight lines across the plot; labels that would touch are moved into separate rows.
 fn markers(canvas: &Canvas, frame: &Frame, plot: &XyPlot) -> Result<(), PlotError> {
     let area = &frame.area;
     let mut taken: Vec<(usize, f64, f64)> = Vec::new();
@@ -340,7 +340,7 @@ fn markers(canvas: &Canvas, frame: &Frame, plot: &XyPlot) -> Result<(), PlotErro
     Ok(())
 }
 
-/// A text on translucent paper, readable over data.
+/// A text on a translucent background, readable over data.
 fn note(canvas: &Canvas, text: &str, (left, middle): Point) -> Result<(), PlotError> {
     if text.is_empty() {
         return Ok(());

@@ -20,7 +20,7 @@ pub enum StickStyle {
     Posture,
     /// One of many postures: thin and pale.
     Trail,
-    /// The way of one point: thin.
+    /// The path of one point: thin.
     Path,
 }
 
@@ -37,10 +37,10 @@ pub struct Stick {
     pub style: StickStyle,
 }
 
-/// Two views of polylines, at one scale.
+/// Two views of polylines at the same scale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StickFigure {
-    /// What is seen.
+    /// Title of the figure.
     pub title: String,
     /// The polylines, the last on top.
     pub sticks: Vec<Stick>,
@@ -48,7 +48,7 @@ pub struct StickFigure {
     pub size: Size,
 }
 
-/// One view: the components that point right and up.
+/// One view, defined by the components that point right and up.
 struct View {
     title: &'static str,
     right: usize,
@@ -81,7 +81,7 @@ impl StickFigure {
                     bottom: body.bottom - X_TICKS_PX - X_NAME_PX,
                 }
             };
-            // The largest scale at which both views fit.
+            // The largest scale at which both views fit into their areas.
             let px_per_m = VIEWS.iter().enumerate().fold(f64::INFINITY, |scale, (k, view)| {
                 let (area, right, up) = (area(k), extents[view.right], extents[view.up]);
                 scale
@@ -170,7 +170,7 @@ fn draw_stick(
     }
 }
 
-/// The extent with `span` between its ends and the same middle.
+/// The extent with the same middle, widened to `span`.
 fn widened(extent: Extent, span: f64) -> Extent {
     let middle = 0.5 * (extent.low + extent.high);
     Extent { low: middle - 0.5 * span, high: middle + 0.5 * span, ..extent }

@@ -1,13 +1,13 @@
-//! Round numbers along an axis, and how they are written.
+//! Round numbers along an axis, and their labels.
 
 use super::canvas::{FONT_PX, text_width_px};
 
-/// A line of the grid.
+/// A grid line.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Tick {
     /// Position in axis coordinates (the value, or its decimal logarithm).
     pub at: f64,
-    /// What is written beside it; empty for a minor line.
+    /// Text beside the line; empty for a minor line.
     pub label: String,
 }
 
@@ -15,11 +15,11 @@ pub(super) struct Tick {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Ticks {
     pub ticks: Vec<Tick>,
-    /// The labels are to be multiplied by ten to this power.
+    /// Power of ten by which the labels are to be multiplied.
     pub exponent: i32,
 }
 
-/// Room a label needs along its axis, in pixels.
+/// Direction in which labels follow one another; it determines the room that each label needs.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Along {
     /// Labels side by side: their width counts.
@@ -36,7 +36,7 @@ impl Along {
         }
     }
 
-    /// Smallest distance of two lines at which a grid of this length does not look crowded.
+    /// Smallest distance between grid lines at which a grid of this length does not look crowded.
     fn least_px(self, length_px: f64) -> f64 {
         match self {
             Along::Horizontal => (length_px / 12.0).max(42.0),
@@ -45,7 +45,7 @@ impl Along {
     }
 }
 
-/// Multiples of 1, 2 or 5 × 10ᵏ between `low` and `high`, as many as `length_px` holds without crowding.
+/// Multiples of 1, 2 or 5 × 10ᵏ between `low` and `high`, as many as fit into `length_px` without crowding.
 pub(super) fn linear(low: f64, high: f64, length_px: f64, along: Along) -> Ticks {
     let px = length_px / (high - low);
     let least = (along.least_px(length_px) / px).min(high - low);
@@ -56,7 +56,7 @@ pub(super) fn linear(low: f64, high: f64, length_px: f64, along: Along) -> Ticks
         {
             let ticks = linear_with_step(low, high, step);
             let crowded = ticks.ticks.iter().any(|tick| along.room_px(&tick.label) > step * px);
-            // A step beyond the span leaves one label at most, which cannot touch another.
+            // A step beyond the span leaves at most one label, which cannot touch another.
             if !crowded || step > high - low {
                 return ticks;
             }
@@ -80,7 +80,7 @@ fn linear_with_step(low: f64, high: f64, step: f64) -> Ticks {
     Ticks { ticks, exponent }
 }
 
-/// A power of 1000 to take out of labels that would otherwise be long.
+/// A power of 1000 to factor out of labels that would otherwise be long.
 pub(super) fn shared_exponent(largest: f64) -> i32 {
     if (1e-2..1e5).contains(&largest) || largest == 0.0 {
         0
@@ -89,8 +89,8 @@ pub(super) fn shared_exponent(largest: f64) -> i32 {
     }
 }
 
-/// Decades between the exponents `low` and `high`; 2 and 5 between them where there is room, the other
-/// digits as minor lines. Less than a decade is divided like a linear axis.
+/// Powers of ten between the exponents `low` and `high`; where there is room, 2 and 5 are labelled too, and the other
+/// digits are minor lines. A range of less than one decade is divided like a linear axis.
 pub(super) fn logarithmic(low: f64, high: f64, length_px: f64, along: Along) -> Ticks {
     if high - low < 1.0 {
         let Ticks { mut ticks, exponent } =
@@ -131,7 +131,7 @@ fn decade_label(digit: i32, decade: i32) -> String {
     }
 }
 
-/// `10ⁿ`, with the exponent raised.
+/// `10ⁿ` with a superscript exponent.
 pub(super) fn power_of_ten(exponent: i32) -> String {
     let digits = exponent.to_string();
     let raised = digits.chars().map(|c| match c {
@@ -150,7 +150,7 @@ pub(super) fn power_of_ten(exponent: i32) -> String {
     "10".chars().chain(raised).collect()
 }
 
-/// A true minus sign, and none before a zero.
+/// Replaces the hyphen by a minus sign, and drops it before a zero.
 pub(super) fn typographic(number: &str) -> String {
     match number.strip_prefix('-') {
         Some(digits) if digits.chars().all(|c| matches!(c, '0' | '.')) => digits.to_owned(),
@@ -207,8 +207,8 @@ mod tests {
         assert_eq!(labels(&ticks), ["1.2", "1.4", "1.6", "1.8", "2.0"]);
     }
 
-    /// A label reaches half its width to either side. In the ranges behind the third the labels are too long for the closest
-    /// step that the length has room for, but in the last one, where they fit by a tenth of a pixel.
+    /// Labels are centred and extend half their width to either side. From the fourth range on, the labels are too long
+    /// for the smallest step that the grid length allows; only in the last range do they fit, by a tenth of a pixel.
     #[test]
     fn horizontal_labels_never_touch() {
         let assert_apart = |ticks: &[Tick], px: f64| {
@@ -233,7 +233,7 @@ mod tests {
             assert!(ticks.len() >= least, "{ticks:?}");
             assert_apart(&ticks, length_px / (high - low));
         }
-        // A decade is as long as three labels, and just long enough for those of 1, 2 and 5.
+        // A decade is as long as three labels, just long enough to label 1, 2 and 5.
         for (low, high) in [(-13.0, -7.0), (-5.5, 0.9)] {
             let length_px = 130.0 * (high - low);
             let mut ticks = logarithmic(low, high, length_px, Along::Horizontal).ticks;

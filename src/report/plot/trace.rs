@@ -1,4 +1,4 @@
-//! From samples to what is worth drawing: gaps, decimation and clipping, all in pixels.
+//! Preparation of samples for drawing: gaps, decimation and clipping, all in pixels.
 
 use std::collections::HashSet;
 
@@ -18,11 +18,11 @@ pub(super) fn runs(points: impl Iterator<Item = Option<Point>>) -> Vec<Vec<Point
     runs
 }
 
-/// A line that looks the same with few points.
+/// Decimates a line without changing its appearance.
 ///
-/// A time series (abscissae never decreasing) keeps the lowest and the highest point of every bucket of
-/// `bucket_px`, in their order, so that no peak is lost. Any other curve drops points that are nearer than half a
-/// bucket to the one kept before. The ends are kept in both cases.
+/// A time series (abscissae never decrease) keeps the lowest and the highest point of every bucket of `bucket_px`, in
+/// their order, so that no peak is lost. Any other curve drops points closer than half a bucket to the last point kept.
+/// Both keep their ends.
 pub(super) fn thin_line(run: &[Point], bucket_px: f64) -> Vec<Point> {
     let (Some(&first), Some(&last)) = (run.first(), run.last()) else { return Vec::new() };
     let mut kept = vec![first];
@@ -54,8 +54,8 @@ pub(super) fn thin_line(run: &[Point], bucket_px: f64) -> Vec<Point> {
     kept
 }
 
-/// At most `limit` of the points, so that the cloud keeps its shape and its outliers: the first point of every cell
-/// of a grid, which is made coarser until few enough are left.
+/// Decimates a cloud to at most `limit` points while its shape and outliers remain: keeps the first point in every cell
+/// of a grid, which is coarsened until few enough points are left.
 pub(super) fn thin_dots(points: &[Point], limit: usize) -> Vec<Point> {
     if points.len() <= limit {
         return points.to_vec();
@@ -94,7 +94,7 @@ pub(super) fn inside((x, y): Point, area: &Rect) -> bool {
     (area.left..=area.right).contains(&x) && (area.top..=area.bottom).contains(&y)
 }
 
-/// Liang–Barsky: the part of a segment inside a rectangle, by the range of its parameter t in 0 to 1.
+/// Clips a segment to a rectangle (Liang–Barsky), by the range of its parameter t in 0 to 1.
 fn clip_segment(a: Point, b: Point, area: &Rect) -> Option<(Point, Point)> {
     let (dx, dy) = (b.0 - a.0, b.1 - a.1);
     let (mut enter, mut leave) = (0.0f64, 1.0f64);
@@ -118,7 +118,7 @@ fn clip_segment(a: Point, b: Point, area: &Rect) -> Option<(Point, Point)> {
     if enter > leave {
         return None;
     }
-    // The ends themselves are handed on unchanged, so that consecutive segments join.
+    // Unclipped ends are returned unchanged, so that consecutive segments join.
     let at = |t: f64| (a.0 + t * dx, a.1 + t * dy);
     let from = if enter == 0.0 { a } else { at(enter) };
     let to = if leave == 1.0 { b } else { at(leave) };

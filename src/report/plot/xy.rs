@@ -52,7 +52,7 @@ pub struct Band {
     pub colour: Colour,
 }
 
-/// Bars standing on zero, side by side: bar `k` reaches from `edges[k]` to `edges[k + 1]`.
+/// Adjacent bars that stand on zero: bar `k` reaches from `edges[k]` to `edges[k + 1]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bars {
     /// Name in the legend; empty to be left out of it.
@@ -74,12 +74,12 @@ pub enum Across {
     Y,
 }
 
-/// A dashed straight line through the whole plot with a word beside it.
+/// A dashed straight line through the whole plot with a label.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marker {
     /// Vertical or horizontal.
     pub across: Across,
-    /// Where.
+    /// Position of the line on that axis.
     pub at: f64,
     /// What it marks; may be empty.
     pub label: String,
@@ -99,7 +99,7 @@ pub struct Span {
 /// A plot over two axes: lines, scatter, bands, bars, markers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct XyPlot {
-    /// What is seen; empty for none.
+    /// Title of the figure; empty for none.
     pub title: String,
     /// Abscissa.
     pub x: Axis,
@@ -113,9 +113,9 @@ pub struct XyPlot {
     pub bars: Vec<Bars>,
     /// Lines and dots, the last on top.
     pub series: Vec<Series>,
-    /// Straight lines across.
+    /// Straight lines across the plot.
     pub markers: Vec<Marker>,
-    /// Size when drawn alone.
+    /// Size of the figure when drawn alone.
     pub size: Size,
 }
 
@@ -135,7 +135,7 @@ impl XyPlot {
         }
     }
 
-    /// With one more series.
+    /// Adds a series.
     pub fn with(
         mut self,
         name: impl Into<String>,
@@ -148,7 +148,7 @@ impl XyPlot {
         self
     }
 
-    /// With one more straight line across.
+    /// Adds a straight line across the plot.
     pub fn with_marker(mut self, across: Across, at: f64, label: impl Into<String>) -> Self {
         self.markers.push(Marker { across, at, label: label.into() });
         self
@@ -184,7 +184,7 @@ impl XyPlot {
             .chain(self.bars.iter().flat_map(|b| &b.edges))
             .copied()
             .chain(self.marked(Across::X));
-        // Bars stand on zero; on a log axis zero is a gap and does no harm.
+        // Bars stand on zero, which the range must include; on a log axis zero is a gap and has no effect.
         let y_data = series()
             .flat_map(|s| &s.y)
             .chain(self.bands.iter().flat_map(|b| b.low.iter().chain(&b.high)))

@@ -1,17 +1,17 @@
-//! Published drive gains that disagree: what the data can tell of them, and how the answers move.
+//! Two published sets of drive gains: what the data say about them, and how the results change between them.
 
 use super::{Part, RealArmStudy, list, pair};
 use crate::diagnose::Cause;
 use crate::report::{Column, Table};
 
-/// Whether `other` is the same cause under other drive gains: ripple is known by its order.
+/// Whether `other` is the same cause found with the other drive gains. Ripple is matched by its order per turn.
 fn is_same(cause: &Cause, other: &Cause) -> bool {
     let order = |c: &Cause| c.parameters.get("order_per_turn").map_or(1.0, |e| e.value);
     (cause.kind, cause.joint) == (other.kind, other.joint)
         && (order(cause) / order(other) - 1.0).abs() < SAME_ORDER
 }
 
-/// Orders of ripple that differ by a smaller share are one.
+/// Orders of ripple that differ by a smaller share count as the same.
 const SAME_ORDER: f64 = 0.02;
 
 impl RealArmStudy {

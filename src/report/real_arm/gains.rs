@@ -1,11 +1,12 @@
-//! What the extended model gains on runs that were used for nothing else, and what could be gained at most.
+//! The improvement by the extended model on held-out runs, and the largest improvement that is possible.
 
 use super::{Part, RealArmStudy, file_name, list, mean, percents};
 use crate::diagnose::HeldOut;
 use crate::number::percent;
 use crate::report::{Column, Table};
 
-/// Mean of 1 − after/before per joint over the held-out logs in which it has a size: along some a joint may never move.
+/// Mean of 1 − after/before for every joint over the held-out logs. Logs in which a joint never moves have no such
+/// value and are left out of its mean.
 fn mean_gains(held_out: &[HeldOut], of: impl Fn(&HeldOut) -> (&[f64], &[f64])) -> Vec<f64> {
     let joints = held_out.first().map_or(0, |log| of(log).0.len());
     (0..joints)
@@ -162,7 +163,7 @@ mod tests {
         }
     }
 
-    /// Joint 2 moves in the first log alone.
+    /// Joint 2 moves only in the first log.
     #[test]
     fn a_joint_that_never_moves_is_left_out_of_the_mean() {
         let logs = [held_out([2.0, 4.0], [1.0, 1.0]), held_out([2.0, f64::NAN], [2.0, f64::NAN])];

@@ -1,6 +1,6 @@
-//! The case study of a real UR10e: what its logs say about the rigid model, told to a stranger.
+//! The case study of a real UR10e: what its logs reveal about the rigid model, for readers who do not know the project.
 //!
-//! Enters: the diagnoses of its logs, one by one and in pairs. Leaves: a [`Page`].
+//! Input: the diagnoses of its logs, alone and in pairs. Output: a [`Page`] or Markdown.
 
 mod drives;
 mod gains;
@@ -15,51 +15,51 @@ use crate::diagnose::{Cause, Estimate, Finding, Kind, PayloadFinding, Repeated, 
 use crate::number::{NONE, significant, with_sigma};
 use crate::robot::Arm;
 
-/// A log that was used.
+/// A log used in the study.
 pub struct Recorded {
     /// File name.
     pub file: String,
-    /// What it is for in the study.
+    /// Its role in the study.
     pub role: &'static str,
-    /// Rows used and set aside.
+    /// Number of rows used, and number set aside.
     pub rows: [usize; 2],
     /// Length, s.
     pub seconds: f64,
 }
 
-/// Two logs compared.
+/// The comparison of two logs.
 pub struct Pair {
-    /// The second log.
+    /// File name of the second log.
     pub file: String,
-    /// Mass of the body on the flange as its authors weighed it, kg.
+    /// Mass of the body on the flange as the authors of the logs weighed it, kg; `None` without a body.
     pub known_kg: Option<f64>,
-    /// With which drive gains.
+    /// Whose drive gains were used.
     pub gains: &'static str,
-    /// What was found.
+    /// The body found on the flange.
     pub finding: PayloadFinding,
 }
 
-/// Everything that was found.
+/// All results of the study.
 pub struct RealArmStudy {
     /// The arm.
     pub arm: Arm,
     /// The logs.
     pub recorded: Vec<Recorded>,
-    /// Diagnosis of the training run with its held-out runs, the controller's drive gains.
+    /// Diagnosis of the training run with its held-out runs, using the controller's drive gains.
     pub finding: Finding,
-    /// What repeats of the residual when the training motion was recorded again, with a body on the flange.
+    /// The part of the residual that repeats when the training motion is recorded again with a body on the flange.
     pub repeated: Option<Repeated>,
-    /// The causes with the authors' drive gains.
+    /// The causes found with the authors' drive gains.
     pub other_gains: Vec<Cause>,
     /// Gains in Nm/A: the controller's and the authors'.
     pub gains_nm_a: [Vec<f64>; 2],
     /// Logs with and without a body on the flange.
     pub pairs: Vec<Pair>,
-    /// Per log: contacts found.
+    /// Contacts found, per log.
     pub contacts: Vec<(String, Vec<Cause>)>,
 }
 
-/// A part of the report.
+/// A section of the report, for both page and Markdown.
 struct Part {
     title: String,
     paragraphs: Vec<String>,
@@ -89,7 +89,7 @@ impl Part {
     }
 }
 
-/// Mean of those that are known.
+/// Mean of the finite values.
 fn mean(values: &[f64]) -> f64 {
     let known = || values.iter().filter(|value| value.is_finite());
     known().sum::<f64>() / known().count() as f64
@@ -107,7 +107,7 @@ fn percents(values: &[f64]) -> String {
     values.iter().map(one).collect::<Vec<_>>().join("  ")
 }
 
-/// Value ± half of the 95 % interval.
+/// Value ± half the width of the 95 % interval.
 fn pair(e: &Estimate) -> String {
     with_sigma(e.value, 0.5 * (e.ci95[1] - e.ci95[0]))
 }
@@ -135,7 +135,7 @@ impl RealArmStudy {
         Ok(page)
     }
 
-    /// The report as Markdown, without pictures.
+    /// The report as Markdown, without figures.
     pub fn markdown(&self, command: &str) -> Result<String, ReportError> {
         let Verdict { sentence, facts, .. } = self.verdict();
         let mut out = format!("# What a UR10e's rigid model gets wrong\n\n`{command}`\n");

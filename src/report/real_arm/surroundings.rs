@@ -1,4 +1,4 @@
-//! What the arm carried, and what touched it.
+//! The body on the flange, and contacts of the arm.
 
 use super::{Part, RealArmStudy, pair};
 use crate::number::significant;

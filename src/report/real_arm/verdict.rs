@@ -1,18 +1,18 @@
-//! The first screen of the case study: what was found, in plain words, and what was aimed at and missed.
+//! The summary of the case study: the findings in plain words, and the targets reached or missed.
 
 use super::super::{Status, Verdict};
 use super::{RealArmStudy, file_name, mean, percents};
 use crate::diagnose::{Cause, HeldOut, Kind};
 use crate::number::significant;
 
-/// Share of the rms error that is to be removed on held-out runs, in the mean of the joints.
+/// Targeted reduction of the rms error on held-out runs, mean over the joints.
 const AIM_MEAN: f64 = 0.35;
-/// The same on every single joint.
+/// Targeted reduction on every single joint.
 const AIM_JOINT: f64 = 0.2;
-/// Kinds of cause on the first screen.
+/// Kinds of cause listed in the summary.
 const FIRST_SCREEN: usize = 4;
 
-/// Joints (from 1) whose gain is below the aim.
+/// Joints (from 1) whose reduction is below the target.
 fn short_of_aim(gains: &[f64]) -> Vec<usize> {
     (1..).zip(gains).filter(|(_, gain)| **gain < AIM_JOINT).map(|(j, _)| j).collect()
 }
@@ -31,7 +31,7 @@ fn on_joints(joints: &[usize]) -> String {
     }
 }
 
-/// Joints whose velocity lags, and the longest lag, s. A late torque is another cause with a delay.
+/// Joints whose velocity lags, and the longest lag, s. A late torque also has a delay but is a different cause.
 fn velocity_lags(causes: &[Cause]) -> (Vec<usize>, f64) {
     let late = || causes.iter().filter(|cause| cause.kind == Kind::VelocityLag);
     let delay_s = |cause: &Cause| Some(cause.parameters.get("delay_s")?.value.abs());
@@ -70,7 +70,7 @@ impl RealArmStudy {
         Verdict { status, sentence, facts }
     }
 
-    /// One sentence per kind of cause, what matters most first.
+    /// One sentence per kind of cause, in the order in which the diagnosis lists the causes.
     fn physics(&self) -> Vec<String> {
         let causes = self.finding.diagnosis.causes.iter();
         let physics: Vec<&Cause> = causes.filter(|c| !c.kind.is_of_the_record()).collect();
@@ -96,7 +96,7 @@ impl RealArmStudy {
         kinds.into_iter().take(FIRST_SCREEN).map(sentence).collect()
     }
 
-    /// What is wrong with the recording, not with the arm.
+    /// The defect of the recording itself, a lagging velocity, if there is one.
     fn record(&self) -> Option<String> {
         let (joints, longest) = velocity_lags(&self.finding.diagnosis.causes);
         (longest > 0.0).then(|| {
@@ -140,7 +140,7 @@ impl RealArmStudy {
                 (&log.after_moving_rms_nm, &log.manufacturer_moving_rms_nm),
             ];
             pairs.iter().all(|(after, own)| {
-                // Joints that never move have neither.
+                // A joint that never moves has NaN in both, which counts as below.
                 let is_below = |(after, own): (&f64, &f64)| after < own || after.is_nan();
                 own.as_ref().is_some_and(|own| after.iter().zip(own).all(is_below))
             })
@@ -159,7 +159,7 @@ impl RealArmStudy {
         )
     }
 
-    /// What was found on the flange.
+    /// The body found on the flange, in a sentence.
     fn body(&self) -> String {
         let (loaded, bare): (Vec<_>, Vec<_>) =
             self.pairs.iter().partition(|pair| pair.known_kg.is_some());
