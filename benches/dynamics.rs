@@ -1,8 +1,8 @@
-//! Time per sample of every algorithm of the dynamics, single thread, on the UR5.
+//! Time per sample of every dynamics algorithm, for the UR5 on a single thread.
 //!
-//! `cargo bench --bench dynamics`; `benches/compare.sh` sets the numbers beside Pinocchio's.
-//! Each iteration works through the same random states, so that neither the branch predictor nor
-//! a cache of sines sees one state only; times are divided by the number of states.
+//! `cargo bench --bench dynamics`; `benches/compare.sh` compares the numbers with Pinocchio's. Each iteration works
+//! through the same random states, so that neither the branch predictor nor cached sines benefit from a repeated state;
+//! times are divided by the number of states.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -19,8 +19,7 @@ use nalgebra::DMatrix;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
-/// States per pass. A block of so many samples is 1 MB of regressor: it stays in the second-level
-/// cache.
+/// States per pass. The regressor of a block of this many samples takes 1 MB and stays in the second-level cache.
 const STATES: usize = 512;
 
 type Angles = [f64; 6];
@@ -52,11 +51,11 @@ fn states() -> States {
     States { motion, single }
 }
 
-/// Reports the time of one state of a pass over all of them.
+/// Reports the time per state, measured on whole passes over all states.
 fn per_state(group: &mut BenchmarkGroup<'_, WallTime>, name: &str, mut pass: impl FnMut()) {
     group.bench_function(name, |bencher| {
         bencher.iter_custom(|states| {
-            // Whole passes; criterion is told the share that it asked for.
+            // Only whole passes are timed; criterion gets the share of the time for the number of states it asked for.
             let passes = states.div_ceil(STATES as u64);
             let start = Instant::now();
             for _ in 0..passes {

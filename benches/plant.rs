@@ -1,5 +1,5 @@
-//! Speed of the plant: one forward dynamics, one Runge–Kutta step, a closed-loop second, and the
-//! sensors of one trial.
+//! Speed of the plant: one forward dynamics, one Runge–Kutta step, one second in closed loop, and the sensors of one
+//! trial.
 //!
 //! `cargo bench --bench plant`
 
@@ -24,7 +24,7 @@ fn dynamics(c: &mut Criterion) {
     let mut group = c.benchmark_group("plant");
     group.bench_function("forward_dynamics", |b| {
         b.iter(|| {
-            // A new pose each time, as in an integration.
+            // The pose changes in every call, as in an integration.
             q[0] += 1e-7;
             plant.forward_dynamics(black_box(&q), &qd, &torque, &mut qdd);
             qdd[0]
@@ -46,7 +46,7 @@ fn closed_loop(c: &mut Criterion) {
     let series = FourierSeries::built_in("ur5_identification").unwrap();
     let config = PlantConfig::default();
     let mut group = c.benchmark_group("plant");
-    // Elements are simulated seconds: the throughput is seconds per second.
+    // One element is one simulated second, so that the throughput is simulated seconds per second.
     group.sample_size(10).throughput(Throughput::Elements(series.duration_s() as u64));
     group.bench_function("simulate", |b| {
         b.iter(|| simulate(&arm, black_box(&series), &config, None).unwrap())

@@ -1,4 +1,4 @@
-//! The arm in a result of `armid identify --physical`.
+//! Reads the identified arm from a result of `armid identify --physical`.
 
 use std::path::{Path, PathBuf};
 
@@ -18,27 +18,27 @@ use crate::robot::{Arm, Frames, LoadedArm, RobotError, UrdfLink};
 pub struct ArmResult {
     /// The robot with the identified parameters.
     pub arm: Arm,
-    /// Constant torque per joint, Nm; an [`Arm`] has no place for it.
+    /// Constant torque offset per joint, Nm; kept here because an [`Arm`] has no offsets.
     pub offsets_nm: Vec<f64>,
-    /// Standard parameters that the robot file decided, not the data.
+    /// Names of the standard parameters that the robot file decided rather than the data.
     pub by_prior: Vec<String>,
-    /// What the result says against it, where the model was wrong along the log.
+    /// A warning if the identified model was wrong along its log or physically impossible.
     pub doubt: Option<String>,
-    /// Named frames on its bodies.
+    /// Named frames on the bodies of the arm.
     pub frames: Frames,
     /// Files that describe the robot.
     pub files: Vec<PathBuf>,
-    /// Links of the URDF that is the first of them; none of another robot.
+    /// Links of the first file if it is a URDF; empty for other robots.
     pub urdf_links: Vec<UrdfLink>,
 }
 
-/// A result file that holds no arm.
+/// Why no arm can be read from a result file.
 #[derive(Debug, Error)]
 pub enum ResultError {
-    /// The file cannot be read, or is no result of `armid identify`.
+    /// The file cannot be read, or is not a result of `armid identify`.
     #[error("{0} (wanted: a result of armid identify --physical --json)")]
     Saved(#[from] SavedError),
-    /// Only combinations were identified.
+    /// The result holds only base parameters, that is, combinations of standard parameters.
     #[error(
         "{file}: it has no standard parameters, only combinations of them: run identify --physical"
     )]
@@ -51,10 +51,10 @@ pub enum ResultError {
     OtherRobot {
         /// The file.
         file: String,
-        /// How it is another.
+        /// The difference.
         fault: OtherRobot,
     },
-    /// The robot is not where the result says.
+    /// The robot file is not where the result says.
     #[error(
         "{file}: the robot that it is about is found neither from here nor from the folder of that file: {fault}; say where it is with \
          --robot"
@@ -62,20 +62,20 @@ pub enum ResultError {
     NoRobot {
         /// The file.
         file: String,
-        /// Why not.
+        /// Why it could not be loaded.
         fault: Box<RobotError>,
     },
-    /// A parameter is unknown, missing, twice there or not a number.
+    /// A parameter is unknown, missing, duplicate or not a finite number.
     #[error("{file}: standard parameter \"{name}\" {fault}")]
     Parameter {
         /// The file.
         file: String,
-        /// Its name.
+        /// Name of the parameter.
         name: String,
         /// What is wrong with it.
         fault: &'static str,
     },
-    /// The robot itself.
+    /// The robot description itself is faulty.
     #[error(transparent)]
     Robot(#[from] RobotError),
 }
@@ -105,8 +105,8 @@ struct Value {
 }
 
 impl ArmResult {
-    /// Reads the result in `path`. It is about `robot`; where that is left out about the one that it names, and where that is
-    /// not found about the robot of that name in `scenario`.
+    /// Reads the result in `path`. The arm is `robot`; without `robot`, the one that the result names; if that one is
+    /// not found, the arm of the same name in `scenario`.
     pub fn load(
         path: &Path,
         robot: Option<&str>,
@@ -151,7 +151,8 @@ impl ArmResult {
     }
 }
 
-/// The robot that the result in `path` is `about`, where nobody says which it is.
+/// Loads the robot that the result in `path` names, or the robot of `scenario` if that is missing and has the same
+/// name.
 fn named(
     about: &SavedRobot,
     path: &Path,
@@ -169,8 +170,8 @@ fn named(
     }
 }
 
-/// The values in the order of the layout; offsets may be left out. The error is a name and what is
-/// wrong with it.
+/// The values in the order of the parameter layout; torque offsets may be left out. An error consists of the name of a
+/// parameter and what is wrong with it.
 fn standard(arm: &Arm, values: &[Value]) -> Result<Vec<f64>, (String, &'static str)> {
     let layout = ParameterLayout::new(arm.dof());
     let mut standard: Vec<Option<f64>> = vec![None; layout.count()];

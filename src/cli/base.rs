@@ -1,4 +1,4 @@
-//! `armid base`: which combinations of parameters can be known.
+//! `armid base`: the combinations of parameters that can be identified.
 
 use std::path::PathBuf;
 

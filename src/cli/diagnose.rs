@@ -1,4 +1,4 @@
-//! `armid diagnose`: what the model of an arm gets wrong, from its log.
+//! `armid diagnose`: finds what the model of an arm gets wrong along a log.
 
 use std::path::PathBuf;
 
@@ -57,7 +57,7 @@ pub struct DiagnoseArgs {
 }
 
 impl DiagnoseArgs {
-    /// Refuses outputs that cannot be written, or where one of the `inputs` stands.
+    /// Refuses outputs that cannot be written or that would overwrite one of the `inputs`.
     fn check_outputs<'a>(
         &self,
         inputs: impl IntoIterator<Item = &'a PathBuf>,
@@ -127,7 +127,8 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
     finding.diagnosis.warnings.extend(simulation.and_then(|simulation| simulation.warning));
     let unused = args.processing.unused(&finding.identification.processing);
     finding.diagnosis.warnings.extend(unused);
-    // What fails behind the diagnosis must not take it along: it is told when all else is printed and written.
+    // An error in a later step must not discard the diagnosis: it is reported after everything else is printed and
+    // written.
     let mut failed = None;
     if let Some(loaded) = logs.get(1) {
         let measurements = (&log.measurement(), &loaded.measurement());
@@ -178,7 +179,7 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
         let simulation = diagnoser.extended_simulation(&finding)?;
         let measurement = log.measurement();
         Scenario::of_diagnosis(&simulation, &finding, &measurement, &set, &options)?.save(path)?;
-        // What was written has to be what a scenario may be.
+        // Loading checks that the written file is a valid scenario.
         Scenario::load(Some(path))?;
         say!("scenario: {}", path.display());
     }
@@ -189,15 +190,15 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
     }
 }
 
-/// A mass in kg.
+/// Parses a mass in kg.
 fn mass(text: &str) -> Result<f64, String> {
     let mass: f64 = text.parse().map_err(|e| format!("{e}"))?;
     let is_mass = mass > 0.0 && mass.is_finite();
     if is_mass { Ok(mass) } else { Err("must be a positive number".into()) }
 }
 
-/// Writes what can be said of a log whose motion does not identify the model that is to be diagnosed, or that is not read as it was
-/// recorded.
+/// Reports on a log that cannot be diagnosed: its motion does not identify the model, or its channels have to be read
+/// differently.
 fn decline(
     args: &DiagnoseArgs,
     layout: &Layout,
@@ -241,7 +242,7 @@ fn decline(
     Ok(Outcome::Negative)
 }
 
-/// The JSON of a log that gives no diagnosis.
+/// The JSON for a log without a diagnosis.
 #[derive(Serialize)]
 struct Declined<'a> {
     log: &'a str,
@@ -253,7 +254,7 @@ struct Declined<'a> {
     rows: &'a Rows,
 }
 
-/// The diagnosis with what became of the log's rows.
+/// The diagnosis with the numbers of rows read, used and set aside.
 #[derive(Serialize)]
 struct WithRows<'a> {
     #[serde(flatten)]
@@ -273,7 +274,7 @@ mod tests {
         args: DiagnoseArgs,
     }
 
-    /// A diagnosis weighs by the noise that the log shows: there is nothing to choose.
+    /// A diagnosis weights by the noise it measures in the log, so there is no covariance to choose.
     #[test]
     fn no_covariance_can_be_chosen() {
         let of = |more: &[&str]| {

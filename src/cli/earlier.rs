@@ -1,4 +1,4 @@
-//! An earlier result of `armid identify`, read back: base parameters and how well they are known.
+//! An earlier result of `armid identify`, read back: base parameters and their uncertainty.
 
 use std::path::Path;
 
@@ -11,22 +11,22 @@ use crate::report::identify::{CONTRADICTED, IDENTIFY_SCHEMA};
 use crate::report::saved::{SavedError, load};
 use crate::robot::Arm;
 
-/// What is needed of an identification's JSON.
+/// The fields that are needed from the JSON of an identification.
 #[derive(Deserialize)]
 pub(super) struct EarlierResult {
     #[serde(flatten)]
     about: SavedRobot,
-    /// Of several logs all paths, as `identify` joins them with commas.
+    /// Path of the log; for several logs all paths, separated by commas as `identify` writes them.
     #[serde(default)]
     log: String,
     #[serde(default)]
     verdict: String,
-    /// Name of the reduced parameter set, if it was not the full one.
+    /// Name of the reduced parameter set; `None` for the full one.
     #[serde(default)]
     reduced: Option<String>,
     base_parameters: Vec<EarlierParameter>,
     base_covariance: Option<Vec<Vec<Option<f64>>>>,
-    /// Nor in results of older programs.
+    /// Missing in results of older versions.
     degrees_of_freedom: Option<f64>,
     #[serde(default)]
     intervals: Intervals,
@@ -50,31 +50,31 @@ struct Intervals {
     trusted: Option<bool>,
 }
 
-/// One base parameter of it.
+/// A base parameter of the result.
 #[derive(Deserialize)]
 pub(super) struct EarlierParameter {
     pub(super) name: String,
-    /// Not in results of older programs.
+    /// Missing in results of older versions.
     formula: Option<String>,
     pub(super) value: f64,
     pub(super) sigma: Option<f64>,
 }
 
-/// Why nothing can be done with the numbers of a result as they are.
+/// Why the numbers of a result must not be used as they are.
 pub(super) enum Doubt {
-    /// No arm can have them.
+    /// No arm can have these parameters.
     Impossible,
-    /// The model was wrong along its log.
+    /// The model was wrong along the log of the result.
     WrongModel,
 }
 
 impl EarlierResult {
-    /// The result in `path`.
+    /// Reads the result in `path`.
     pub(super) fn load(path: &Path) -> Result<Self, SavedError> {
         load(path, IDENTIFY_SCHEMA)
     }
 
-    /// Refuses an `arm` about which the result says nothing.
+    /// Refuses an `arm` that the result is not about, and a result for a reduced parameter set.
     pub(super) fn check(&self, arm: &Arm) -> Result<(), OtherRobot> {
         if let Some(set) = &self.reduced {
             return Err(OtherRobot::Reduced { set: set.clone() });
@@ -82,8 +82,8 @@ impl EarlierResult {
         self.about.check(arm)
     }
 
-    /// Whether it was identified from the log whose file has the hash `sha256`, alone or with others. Logs that it was only
-    /// validated on are inputs as well.
+    /// Whether the result was identified from the log with the hash `sha256`, alone or together with others. The path
+    /// must match as well, because the inputs of a result also include its validation logs.
     pub(super) fn is_of(&self, sha256: &str) -> bool {
         let logs = format!(", {}, ", self.log);
         let is_its_log = |input: &SavedInput| {
@@ -92,7 +92,7 @@ impl EarlierResult {
         self.program.inputs.iter().any(is_its_log)
     }
 
-    /// What it says against itself.
+    /// The doubt that the result states about itself.
     pub(super) fn doubt(&self) -> Option<Doubt> {
         if self.verdict == CONTRADICTED {
             Some(Doubt::Impossible)
@@ -103,23 +103,23 @@ impl EarlierResult {
         }
     }
 
-    /// Whether σ is all that it says of how well the parameters are known, as results of older programs.
+    /// Whether the result states only σ and no covariance, as results of older versions do.
     pub(super) fn lacks_covariance(&self) -> bool {
         self.base_covariance.is_none()
     }
 
-    /// How well its covariance is known; many where it does not say.
+    /// Degrees of freedom of the covariance; infinite if the result does not state them.
     pub(super) fn degrees_of_freedom(&self) -> f64 {
         self.degrees_of_freedom.unwrap_or(f64::INFINITY)
     }
 
-    /// Its base parameters.
+    /// The base parameters of the result.
     pub(super) fn parameters(&self) -> &[EarlierParameter] {
         &self.base_parameters
     }
 
-    /// Where it has base parameter `k` of `set`. The same column kept beside others that are not is another parameter: the
-    /// whole combination has to be the same.
+    /// Index in the result of base parameter `k` of `set`. The whole combination must match: the same leading column
+    /// combined with other dependent columns is a different parameter.
     pub(super) fn place(&self, set: &BaseSet, k: usize) -> Option<usize> {
         let (name, formula) = (set.name(k), set.formula(k));
         let is_it = |known: &EarlierParameter| match &known.formula {
@@ -129,7 +129,8 @@ impl EarlierResult {
         self.base_parameters.iter().position(is_it)
     }
 
-    /// The covariance of the base parameters at `places`, by σ alone where it was not saved; or what is wrong with it.
+    /// Covariance of the base parameters at `places`; diagonal from σ if no covariance was saved. The error says what
+    /// is wrong with it.
     pub(super) fn covariance(&self, places: &[usize]) -> Result<DMatrix<f64>, String> {
         let count = self.base_parameters.len();
         let Some(rows) = &self.base_covariance else {
@@ -140,7 +141,7 @@ impl EarlierResult {
             let variances: Vec<f64> = places.iter().map(variance).collect::<Result<_, _>>()?;
             return Ok(DMatrix::from_diagonal(&DVector::from_vec(variances)));
         };
-        // What is not asked for may be unknown.
+        // Entries of parameters that are not asked for may be unknown.
         let is_variance = |&place: &usize| {
             let row: &Vec<Option<f64>> = &rows[place];
             places.iter().all(|&other| row[other].is_some())
@@ -161,7 +162,7 @@ mod tests {
     use super::*;
     use crate::base::Parameterisation;
 
-    /// Of a result with the two parameters `a` and `b` and this `base_covariance`, taken in the order b, a.
+    /// Covariance, in the order b, a, from a result with the parameters `a` and `b` and this `base_covariance`.
     fn covariance(rows: &str) -> Result<DMatrix<f64>, String> {
         let result = serde_json::json!({
             "robot": "ur5",
@@ -178,7 +179,7 @@ mod tests {
     fn a_covariance_is_put_in_the_order_of_the_parameters() {
         let found = covariance("[[4.0, 1.5], [1.5, 9.0]]").unwrap();
         assert_eq!(found, DMatrix::from_row_slice(2, 2, &[9.0, 1.5, 1.5, 4.0]));
-        // Results of older programs have σ alone.
+        // Results of older versions have only σ.
         let found = covariance("null").unwrap();
         assert_eq!(found, DMatrix::from_row_slice(2, 2, &[9.0, 0.0, 0.0, 4.0]));
     }
@@ -193,7 +194,7 @@ mod tests {
         }
     }
 
-    /// The logs of a pooled result are named in one string; what it was validated on is another matter.
+    /// A pooled result names its logs in one string; its validation log does not count.
     #[test]
     fn every_log_of_several_is_its_log() {
         let input = |path: &str, sha256: &str| serde_json::json!({"path": path, "sha256": sha256});
@@ -213,11 +214,11 @@ mod tests {
         let of = |log: &str| ["0", "1", "2", "3"].map(|sha256| result(log).is_of(sha256));
         assert_eq!(of("a.csv"), [false, true, false, false]);
         assert_eq!(of("a.csv, b.csv"), [false, true, true, false]);
-        // A part of a name is no name.
+        // A part of a path does not match.
         assert_eq!(of("runs/a.csv, b.csv"), [false, false, true, false]);
     }
 
-    /// A parameter is known by its whole combination: the first column alone is in other combinations as well.
+    /// The whole combination identifies a parameter: its leading column also leads other combinations.
     #[test]
     fn a_combination_is_not_told_by_its_first_column() {
         let arm = Arm::built_in("ur5").unwrap();
@@ -232,7 +233,7 @@ mod tests {
         assert_eq!(place(same), Some(0));
         let other = serde_json::json!({"name": name, "formula": name, "value": 1.0});
         assert_eq!(place(other), None);
-        // Results of older programs have names alone.
+        // Results of older versions have only names.
         assert_eq!(place(serde_json::json!({"name": name, "value": 1.0})), Some(0));
     }
 }

@@ -1,4 +1,4 @@
-//! `armid excite`: design an excitation and write it for people, programs and the robot.
+//! `armid excite`: designs an excitation and writes it for people, programs and the robot.
 
 mod clearance;
 mod record;
@@ -134,7 +134,7 @@ impl From<CriterionName> for Criterion {
     }
 }
 
-/// An option that makes no sense.
+/// An option with an invalid value.
 #[derive(Debug, ThisError)]
 #[error("--{option} {value}: {message}")]
 struct BadOption {
@@ -149,7 +149,7 @@ impl BadOption {
     }
 }
 
-/// Designs, prints what was found, and writes it.
+/// Designs a motion, prints the result and writes the outputs.
 pub fn run(args: &ExciteArgs) -> CommandResult {
     let LoadedArm { mut arm, files, notices, .. } = load_robot(&args.robot)?;
     for corners in &args.boxes {
@@ -175,7 +175,7 @@ pub fn run(args: &ExciteArgs) -> CommandResult {
 
     let begun = Instant::now();
     let budget = Budget {
-        // A time beyond all clocks is none.
+        // A time that overflows the clock means no deadline.
         deadline: Duration::try_from_secs_f64(args.seconds)
             .ok()
             .and_then(|time| begun.checked_add(time)),
@@ -218,7 +218,7 @@ pub fn run(args: &ExciteArgs) -> CommandResult {
     Ok(Outcome::Done)
 }
 
-/// How the URScript that is asked for plays the motion.
+/// How the requested URScript plays the motion; `None` if none is requested.
 fn playback(args: &ExciteArgs, arm: &Arm) -> Result<Option<Playback>, BadOption> {
     let Some(path) = &args.urscript else { return Ok(None) };
     if !(args.speed > 0.0 && args.speed <= 1.0) {
@@ -297,7 +297,7 @@ fn specification(
     Ok(spec)
 }
 
-/// `free` or a number per joint; nothing given: all free.
+/// Parses `free` or a number for every joint; without a list, all offsets are free.
 fn offsets(list: Option<&str>, dof: usize) -> Result<Vec<Option<f64>>, BadOption> {
     let Some(list) = list else { return Ok(vec![None; dof]) };
     list.split(',')
@@ -311,7 +311,7 @@ fn offsets(list: Option<&str>, dof: usize) -> Result<Vec<Option<f64>>, BadOption
         .collect()
 }
 
-/// One bar per round, and a line with the best design when a round ends.
+/// Shows one progress bar per round, and the best design when a round ends.
 struct Rounds {
     criterion: Criterion,
     current: Mutex<Option<(usize, Progress)>>,

@@ -1,4 +1,4 @@
-//! `armid export`: an identified arm for simulators.
+//! `armid export`: writes an identified arm for simulators.
 
 use std::path::{Path, PathBuf};
 
@@ -65,7 +65,8 @@ pub fn run(args: &ExportArgs) -> CommandResult {
     Ok(Outcome::Done)
 }
 
-/// A robot that came as a URDF leaves as that file, any other one as a URDF of bodies alone.
+/// Writes a URDF: for a robot that came as a URDF a copy of that file with new numbers, for any other robot a URDF with
+/// bodies only.
 fn write_urdf(path: &Path, result: &ArmResult) -> Result<(), Box<dyn std::error::Error>> {
     let ArmResult { arm, frames, files, urdf_links, .. } = result;
     let Some(own) = files.first().filter(|_| !urdf_links.is_empty()) else {
@@ -94,7 +95,8 @@ fn write_urdf(path: &Path, result: &ArmResult) -> Result<(), Box<dyn std::error:
     Ok(())
 }
 
-/// The drive file. That of a robot's own URDF leaves shapes to it, and has the joints of the robot's own one that are not the arm's.
+/// The drive file. For a robot that came as a URDF it contains no shapes, since they are in the URDF, and it keeps the
+/// entries of the robot's own drive file for joints outside the arm.
 fn drives_of(result: &ArmResult) -> Result<String, RobotError> {
     let ArmResult { arm, offsets_nm, files, urdf_links, .. } = result;
     if urdf_links.is_empty() {
@@ -113,7 +115,7 @@ fn write(path: &Path, text: &str) -> Result<(), OutputError> {
     write_atomically(path, |file| file.write_all(text.as_bytes()))
 }
 
-/// Where a file is, by whatever links.
+/// The real folder of a file, with symbolic links resolved.
 fn folder(file: &Path) -> Option<PathBuf> {
     Some(std::fs::canonicalize(file).ok()?.parent()?.to_owned())
 }

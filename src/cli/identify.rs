@@ -1,4 +1,4 @@
-//! `armid identify`: parameters with their uncertainty from the logs of a real or simulated arm.
+//! `armid identify`: estimates parameters and their uncertainty from logs of a real or simulated arm.
 
 use std::collections::HashSet;
 use std::path::PathBuf;
@@ -92,7 +92,7 @@ pub struct ProcessingArgs {
 }
 
 impl ProcessingArgs {
-    /// The library's options, checked.
+    /// Checks the options and converts them to those of the library.
     pub fn options(&self) -> Result<Options, String> {
         let default = Options::default();
         let positive = |name: &str, value: Option<f64>, zero_allowed: bool| match value {
@@ -113,7 +113,7 @@ impl ProcessingArgs {
         })
     }
 
-    /// What to say of an option that `processing` had no use for.
+    /// A warning about a given option that the `processing` did not use.
     pub fn unused(&self, processing: &Processing) -> Option<String> {
         (self.cutoff_hz.is_some() && processing.cutoff_hz.is_none()).then(|| {
             "--cutoff is not used: the motion repeats, and is averaged in place of filtered (--period 0 treats it as a single run)"
@@ -128,12 +128,12 @@ pub struct LoadedLog {
     pub log: Log,
     /// Drive torque at the joint, Nm.
     pub torque_nm: JointSignals,
-    /// Where it was read from.
+    /// The file the log was read from.
     pub input: Input,
 }
 
 impl LoadedLog {
-    /// The channels identification needs.
+    /// The channels that identification needs.
     pub fn measurement(&self) -> Measurement<'_> {
         Measurement {
             source: &self.log.source,
@@ -145,12 +145,12 @@ impl LoadedLog {
     }
 }
 
-/// Share of the rows of a log that are in another one, from which on it is not another one: at rest, and in readings that are
-/// rounded, some rows are alike by chance.
+/// Share of common rows above which two logs count as the same: at rest, and with rounded readings, some rows coincide
+/// by chance.
 const SAME: f64 = 0.5;
 
 impl LoadedLog {
-    /// Whether it holds what `other` does, or what a part of it does.
+    /// Whether this log and `other` are the same recording, or one is a part of the other.
     pub fn is_of(&self, other: &Self) -> bool {
         fn row(log: &LoadedLog, k: usize) -> Vec<u64> {
             let channels = [&log.log.q_rad, &log.log.qd_rad_s, &log.torque_nm];
@@ -166,7 +166,7 @@ impl LoadedLog {
 }
 
 impl SourceArgs {
-    /// The arm, the layout of its logs, and the files that say both; what was assumed about the arm goes to the terminal.
+    /// The arm, the layout of its logs, and the files that describe both. Prints the assumptions about the arm.
     pub fn load(&self) -> Result<(Arm, Layout, Vec<Input>), Box<dyn std::error::Error>> {
         let LoadedArm { arm, mut files, .. } = load_robot(&self.robot)?;
         let layout = Layout::load(&self.layout)?;
@@ -175,7 +175,7 @@ impl SourceArgs {
     }
 }
 
-/// Reads logs and prints what became of their rows.
+/// Reads logs and prints how many rows of each were used or set aside.
 pub fn read_logs(
     files: &[PathBuf],
     arm: &Arm,
@@ -288,7 +288,7 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         validations.push(validate(&arm, &mut identifier, log, &identification.fit.theta)?);
     }
     let mut result = IdentifyResult::of(&training, &validations)?;
-    // What fails behind the identification must not take it along.
+    // An error in the later step must not discard the identification.
     let mut failed = None;
     if args.physical {
         let options = PhysicalOptions {
@@ -334,7 +334,7 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
     }
 }
 
-/// Writes what can be said of a log whose motion leaves parameters without any trace in the torque.
+/// Reports on a log whose motion leaves parameters without any effect on the torque.
 fn decline(args: &IdentifyArgs, declined: &Declined, program: Program) -> CommandResult {
     for warning in &declined.warnings {
         say!("note: {warning}");

@@ -1,8 +1,9 @@
 //! The command line: one file per subcommand, shared by the two binaries.
 //!
-//! Enters: arguments. Leaves: files, text on the terminal and an exit code.
+//! Input: arguments. Output: files, text on the terminal and an exit code.
 
-/// Prints a line. What reads it may have gone (`| head`): files are written all the same.
+/// Prints a line and ignores write errors: if the reader of the output has gone (`| head`), files are written all the
+/// same.
 macro_rules! say {
     ($($text:tt)*) => {{
         use std::io::Write as _;
@@ -42,15 +43,17 @@ use crate::montecarlo::Scenario;
 /// How a command ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
-    /// It did what was asked: exit code 0.
+    /// The command did what was asked: exit code 0.
     Done,
-    /// It ran, outputs are written, and the answer is no: exit code 3, as where the data do not identify what was asked for.
+    /// The command ran and wrote its outputs, but the answer is negative, such as data that do not identify the model:
+    /// exit code 3.
     Negative,
-    /// Ctrl-C ended it before all was done; outputs are of what was: exit code 130, the shell's for that signal.
+    /// Ctrl-C ended the command early; outputs cover the finished part: exit code 130, the shell's code for that
+    /// signal.
     Interrupted,
 }
 
-/// Whatever went wrong, already in words for the user.
+/// The outcome of a command, or an error worded for the user.
 pub type CommandResult = Result<Outcome, Box<dyn std::error::Error>>;
 
 /// Prints an error as one message and turns the result into the exit code.
@@ -67,13 +70,13 @@ pub fn exit_code(result: CommandResult) -> ExitCode {
     }
 }
 
-/// What takes its time in the beginning.
+/// Message before a simulation, which can take a while.
 fn simulating(scenario: &Scenario) -> String {
     let duration_s = scenario.excitation.duration_s();
     format!("simulating a log of {duration_s:.0} s of {} in rapier …", scenario.arm.name)
 }
 
-/// Threads asked for, or one per core.
+/// Number of threads asked for, or one per core.
 fn threads_or_all(asked: Option<u16>) -> usize {
     match asked {
         Some(threads) => usize::from(threads),
@@ -81,7 +84,7 @@ fn threads_or_all(asked: Option<u16>) -> usize {
     }
 }
 
-/// Progress of long work: a bar on a terminal, a plain line now and then elsewhere.
+/// Progress of long work: a bar on a terminal, otherwise an occasional plain line.
 pub struct Progress {
     bar: ProgressBar,
     what: &'static str,
@@ -93,7 +96,7 @@ pub struct Progress {
 const PLAIN_LINE_EVERY: std::time::Duration = std::time::Duration::from_secs(10);
 
 impl Progress {
-    /// For `total` steps of `what`, such as "trials".
+    /// Progress of `total` steps of `what`, such as "trials".
     pub fn new(what: &'static str, total: u64) -> Self {
         let bar = if std::io::stderr().is_terminal() {
             let style = "{bar:40} {pos}/{len} {msg}, {per_sec}, {eta} left";
@@ -105,7 +108,7 @@ impl Progress {
         Self { bar, what, total, printed: std::sync::Mutex::new(std::time::Instant::now()) }
     }
 
-    /// Tells how far the work has come.
+    /// Shows that `done` steps are finished.
     pub fn reached(&self, done: u64) {
         self.bar.set_position(done);
         if !self.bar.is_hidden() {
@@ -124,12 +127,12 @@ impl Progress {
     }
 }
 
-/// A flag that Ctrl-C sets, so that work can stop between two steps and keep what it has.
+/// A flag that Ctrl-C sets, so that work can stop between two steps and keep its results.
 pub fn interrupt_flag() -> &'static std::sync::atomic::AtomicBool {
     static FLAG: std::sync::atomic::AtomicBool = std::sync::atomic::AtomicBool::new(false);
     static ONCE: std::sync::Once = std::sync::Once::new();
     ONCE.call_once(|| {
-        // Without a handler Ctrl-C simply ends the program, which is no harm.
+        // If the handler cannot be installed, Ctrl-C just ends the program, which is acceptable.
         let _ = ctrlc::set_handler(|| {
             if FLAG.swap(true, std::sync::atomic::Ordering::Relaxed) {
                 std::process::exit(130);

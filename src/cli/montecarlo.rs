@@ -1,4 +1,4 @@
-//! `montecarlo`: the main job, and `montecarlo merge`.
+//! The `montecarlo` program: runs trials, and `montecarlo merge` combines shards.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -90,7 +90,7 @@ struct OutputArgs {
     markdown: Option<PathBuf>,
 }
 
-/// `I/N` with I < N.
+/// Part `I/N` of a run, with I < N.
 #[derive(Debug, Clone, Copy)]
 struct ShardOf {
     index: u64,
@@ -138,7 +138,8 @@ fn run_merge(folders: &[PathBuf], output: &OutputArgs) -> CommandResult {
     Ok(unless_interrupted(outcome, &merged))
 }
 
-/// Says so where shards were run by different programs of one version: for other processors, or with another algorithm.
+/// Prints a note if shards were run by different builds of one version: for other processors, or with a changed
+/// algorithm.
 fn note_builds<C: Content>(merged: &Merged<C>) {
     if merged.programs.len() > 1 {
         eprintln!(
@@ -168,7 +169,7 @@ fn run_trials(args: &RunArgs) -> CommandResult {
         eprintln!("shard {index} of {count} has none of the {trials} trials: nothing is written");
         return Ok(Outcome::Done);
     }
-    // Before the arm is simulated, which may take minutes.
+    // Checked before the simulation, which may take minutes.
     let file = args.out.as_ref().map(|folder| shard_path(folder, &range));
     if let Some(file) = file.filter(|file| file.exists() && !args.resume) {
         let file = file.display();
@@ -200,15 +201,16 @@ fn run_trials(args: &RunArgs) -> CommandResult {
     }
 }
 
-/// What is said of a part of the trials is not the answer: whatever started the run has to go on with it.
+/// Exit with an interruption if trials are missing: the result for a part is not the final answer, and whoever started
+/// the run has to continue it.
 fn unless_interrupted<C: Content>(outcome: Outcome, merged: &Merged<C>) -> Outcome {
     if merged.missing.is_empty() { outcome } else { Outcome::Interrupted }
 }
 
-/// Something with the wall time that it took, s.
+/// A value with the wall time that it took, s.
 type Timed<T> = Result<(T, f64), Box<dyn std::error::Error>>;
 
-/// Runs the trials `range` of `trials` in all.
+/// Runs the trials in `range` out of `trials`.
 fn run_all<T: Trials>(
     experiment: &T,
     args: &RunArgs,
@@ -225,7 +227,7 @@ fn run_all<T: Trials>(
     }
     let range = shard.range;
     let mut merged = merge(vec![(PathBuf::new(), shard)])?;
-    // One shard of many is judged by its own trials; what others run is not missing.
+    // A single shard is judged by its own trials; the trials of other shards are not missing.
     merged.missing.retain(|gap| gap.start >= range[0] && gap.end <= range[1]);
     Ok((merged, wall_s))
 }
@@ -259,7 +261,7 @@ fn run_shard<T: Trials>(
     Ok((shard, before + begun.elapsed().as_secs_f64()))
 }
 
-/// One trial alone: its estimates against the truth.
+/// Runs one trial alone and prints its estimates beside the truth.
 fn replay(experiment: &Experiment, trial: u64) -> CommandResult {
     let set = &experiment.simulation.scenario.set;
     let identification = experiment.worker().identify(trial)?;
@@ -274,7 +276,7 @@ fn replay(experiment: &Experiment, trial: u64) -> CommandResult {
     Ok(Outcome::Done)
 }
 
-/// Prints, writes and judges.
+/// Prints and writes the summary, and turns its verdict into the outcome.
 fn conclude(
     merged: &Merged<Estimation>,
     wall_s: f64,
@@ -315,7 +317,7 @@ fn conclude(
     Ok(if summary.verdict == Verdict::Fail { Outcome::Negative } else { Outcome::Done })
 }
 
-/// One hidden case alone: the case, the truth and the answer.
+/// Runs one case of the blind benchmark alone and prints case, truth and answer.
 fn replay_blind(benchmark: &Benchmark, trial: u64) -> CommandResult {
     let begun = Instant::now();
     let record = benchmark.worker().trial(trial)?;
@@ -326,7 +328,7 @@ fn replay_blind(benchmark: &Benchmark, trial: u64) -> CommandResult {
     Ok(Outcome::Done)
 }
 
-/// Prints, writes and judges a blind benchmark.
+/// Prints and writes the scores of a blind benchmark, and turns the verdict into the outcome.
 fn conclude_blind(
     merged: &Merged<BlindContent>,
     inputs: Vec<Input>,
@@ -373,7 +375,7 @@ mod tests {
         }
     }
 
-    /// Of what cannot be a part of the run in a folder nothing is prepared, and nothing written there.
+    /// A shard that cannot belong to the run in its folder is refused before anything is prepared or written.
     #[test]
     fn a_shard_that_does_not_belong_in_its_folder_is_not_begun() {
         let folder = tempfile::tempdir().unwrap();
@@ -383,7 +385,7 @@ mod tests {
             run(Command::try_parse_from(words).unwrap())
         };
         let names = || std::fs::read_dir(out).unwrap().count();
-        // Two trials in five parts leave three without any.
+        // Two trials in five parts leave three parts empty.
         assert_eq!(shard("0/5", "2").unwrap(), Outcome::Done);
         assert_eq!(names(), 0);
         let other = r#"{"header": {"schema": "armid.shard/5", "trials": 1000}}"#;

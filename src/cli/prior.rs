@@ -1,4 +1,4 @@
-//! What an earlier identification knows already of the base parameters.
+//! Prior knowledge of the base parameters from an earlier identification.
 
 use std::path::Path;
 
@@ -10,25 +10,26 @@ use crate::excitation::design::DesignError;
 use crate::identify::covariance::precision;
 use crate::robot::Arm;
 
-/// What a design takes for known.
+/// What a design assumes to be known about the parameters.
 pub(super) struct Prior {
-    /// Inverse of the covariance of the base parameters, b × b; nothing where they are not known.
+    /// Inverse covariance of the base parameters, b × b; zero for unknown parameters.
     pub(super) information: Mat<f64>,
-    /// What should be known of it.
+    /// Remarks for the user.
     pub(super) notes: Vec<String>,
 }
 
 impl Prior {
-    /// From the result in `path`, for the parameters of `base`.
+    /// Reads the result in `path` for the parameters of `base`.
     ///
     /// # Errors
-    /// [`DesignError::Prior`] where it is about another arm, knows none of them, or is not positive definite.
+    /// [`DesignError::Prior`] if the result cannot be read, is about another arm or has none of the parameters, or if
+    /// its covariance is not positive definite.
     pub(super) fn load(path: &Path, arm: &Arm, base: &BaseSet) -> Result<Self, DesignError> {
         let file = path.display().to_string();
         let fault = |message: String| DesignError::Prior { file: file.clone(), message };
         let result = EarlierResult::load(path).map_err(|error| fault(error.fault.to_string()))?;
         result.check(arm).map_err(|other| fault(other.to_string()))?;
-        // A parameter that the result names without a σ is one that it does not know.
+        // A parameter without σ counts as unknown.
         let known: Vec<(usize, usize)> = (0..base.rank())
             .filter_map(|k| Some((k, result.place(base, k)?)))
             .filter(|&(_, place)| result.parameters()[place].sigma.is_some())
@@ -112,7 +113,7 @@ mod tests {
         assert!(notes.contains("1 of the") && notes.contains("no correlations"), "{notes}");
     }
 
-    /// Of two parameters whose errors go together, their difference is known well and their sum badly.
+    /// For two parameters with positively correlated errors, the difference is known well and the sum badly.
     #[test]
     fn correlations_are_part_of_what_is_known() {
         let text = r#"{"schema": "armid.identify/1", "robot": "ur5", "verdict": "ok", "base_parameters":

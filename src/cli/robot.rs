@@ -1,4 +1,4 @@
-//! The robot that a command is about.
+//! Loads the robot that a command is about.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use crate::report::ReportError;
 use crate::report::json::Input;
 use crate::robot::{Arm, Kinematics, KinematicsDifference, LoadedArm, RobotError};
 
-/// The robot that `--robot` names; what was assumed about it goes to the terminal.
+/// Loads the robot given by `--robot` and prints the assumptions made about it.
 pub fn load_robot(name_or_path: &str) -> Result<LoadedArm, RobotError> {
     let loaded = LoadedArm::load(name_or_path)?;
     for notice in &loaded.notices {
@@ -18,59 +18,59 @@ pub fn load_robot(name_or_path: &str) -> Result<LoadedArm, RobotError> {
     Ok(loaded)
 }
 
-/// Files as inputs of a document.
+/// Files as inputs of a document, with checksums.
 pub fn inputs<'a>(
     files: impl IntoIterator<Item = &'a (impl AsRef<Path> + ?Sized + 'a)>,
 ) -> Result<Vec<Input>, ReportError> {
     files.into_iter().map(|file| Input::of(file.as_ref())).collect()
 }
 
-/// The robot that a result of `armid identify` is about.
+/// The robot in a result of `armid identify`.
 #[derive(Debug, Deserialize)]
 pub struct SavedRobot {
-    /// Its name.
+    /// Name of the robot.
     pub robot: String,
-    /// What `identify` loaded it by. Not in results of older programs.
+    /// The argument from which `identify` loaded the robot. Missing in results of older versions.
     robot_source: Option<String>,
-    /// Nor this.
+    /// Kinematics of the robot. Missing in results of older versions.
     kinematics: Option<Kinematics>,
 }
 
-/// A result is about another robot than the one given.
+/// The result cannot be used for the given robot.
 #[derive(Debug, Error)]
 pub enum OtherRobot {
-    /// By its name.
+    /// The names differ.
     #[error("it is about \"{found}\", not \"{expected}\"")]
     Name {
-        /// Of the result.
+        /// Name in the result.
         found: String,
-        /// Of the robot given.
+        /// Name of the given robot.
         expected: String,
     },
-    /// With parameters about other frames.
+    /// The result holds a reduced parameter set, whose parameters differ from those of the full set.
     #[error(
         "it was identified with --reduced {set}, whose parameters are not those of the full set: identify without --reduced"
     )]
     Reduced {
-        /// Name of its parameter set.
+        /// Name of the parameter set.
         set: String,
     },
-    /// Of the same name, and yet another.
+    /// The names agree, but the kinematics differ.
     #[error(
         "it is about another \"{name}\" than the one given: {difference}; give the robot that was identified \
          with --robot"
     )]
     Kinematics {
-        /// Of both.
+        /// Name of both robots.
         name: String,
-        /// In what they differ.
+        /// The difference.
         difference: KinematicsDifference,
     },
 }
 
 impl SavedRobot {
-    /// The robot by which the result in `path` was identified: from the working folder, as `identify` was given it, or from the
-    /// folder of the result.
+    /// Loads the robot from which the result in `path` was identified: first from the working folder, as it was given
+    /// to `identify`, then from the folder of the result.
     pub fn load(&self, path: &Path) -> Result<LoadedArm, RobotError> {
         let name = self.robot_source.as_ref().unwrap_or(&self.robot);
         match load_robot(name) {
@@ -85,7 +85,7 @@ impl SavedRobot {
         }
     }
 
-    /// Refuses an `arm` about which the result says nothing.
+    /// Refuses an `arm` that the result is not about.
     pub fn check(&self, arm: &Arm) -> Result<(), OtherRobot> {
         if self.robot != arm.name {
             let (found, expected) = (self.robot.clone(), arm.name.clone());

@@ -1,4 +1,4 @@
-//! `armid simulate`: one log of the simulated arm, and the truth behind it.
+//! `armid simulate`: writes one log of the simulated arm, and the truth behind it.
 
 use std::path::PathBuf;
 
@@ -47,9 +47,9 @@ struct Truth<'a> {
     standard_parameters: Vec<StandardParameter>,
     effects: Vec<HiddenEffect<'a>>,
     noise: &'a SensorConfig,
-    /// Size of all effects together in units of the noise; null where the torque is read without.
+    /// Size of all effects together in units of the noise; null where a joint's torque is read without noise.
     lambda: Option<f64>,
-    /// What of it moves the parameters.
+    /// Size of the part that moves the parameters of the model.
     lambda_sim: Option<f64>,
 }
 
@@ -73,14 +73,15 @@ impl<'a> HiddenEffect<'a> {
     }
 }
 
-/// λ of the scenario's effects, where there is noise to compare them with.
+/// λ of all effects of the scenario; `None` if a joint's torque has no noise to compare with.
 fn size(simulation: &Simulation) -> Result<Option<EffectSize>, crate::plant::PlantError> {
     let sensors = &simulation.scenario.sensors;
     let sd = sensors.torque_sd_per_joint_nm(simulation.scenario.arm.dof())?;
     if sd.contains(&0.0) { Ok(None) } else { simulation.effect_size().map(Some) }
 }
 
-/// The limit of a joint that a scenario's motion passes furthest: of these the plant keeps its drives' torques alone.
+/// The joint limit that the motion of a scenario exceeds most, in words. Of all limits the plant enforces only the
+/// torque of the drives.
 fn passed_limit(scenario: &Scenario) -> Result<Option<String>, ExcitationError> {
     let requirements =
         Requirements { clearance_m: 0.0, torque_share: 1.0, ..Requirements::default() };

@@ -1,4 +1,4 @@
-//! The simulation that a log is compared with: a scenario, or what was identified from another log.
+//! The simulation that a log is compared with: a scenario, or the result for another log.
 
 use std::path::{Path, PathBuf};
 
@@ -16,21 +16,21 @@ use crate::robot::{Arm, Kinematics};
 pub(super) struct Simulated {
     /// Base parameters.
     theta: Vec<f64>,
-    /// Their covariance, where they were identified, …
+    /// Covariance of these parameters; `None` if they are exact.
     covariance: Option<DMatrix<f64>>,
-    /// … and how well it is known.
+    /// Degrees of freedom of the covariance.
     freedom: f64,
-    /// Why they are doubtful, if they are.
+    /// Why the parameters are doubtful, if they are.
     doubt: Option<String>,
-    /// What else should be known of it.
+    /// Remark for the user.
     pub(super) warning: Option<String>,
-    /// All files behind it.
+    /// All input files of the simulation.
     pub(super) files: Vec<PathBuf>,
 }
 
 impl Simulated {
-    /// The simulation of `arm` that `file` describes, its parameters in the order of `set`; not a result of the log that is
-    /// compared with it, whose file has the hash `sha256`.
+    /// Loads the simulation of `arm` that `file` describes, with parameters in the order of `set`. Refuses a result of
+    /// the very log that is to be compared with it, identified by the hash `sha256` of its file.
     pub(super) fn load(
         file: &Path,
         (arm, set): (&Arm, &BaseSet),
@@ -99,7 +99,7 @@ impl Simulated {
         })
     }
 
-    /// What a diagnosis compares with.
+    /// The parameters that a diagnosis compares with.
     pub(super) fn nominal(&self) -> Nominal<'_> {
         Nominal {
             theta: &self.theta,
@@ -110,7 +110,7 @@ impl Simulated {
     }
 }
 
-/// Why `file` cannot be compared with.
+/// Message that `file` is not a simulation to compare with.
 fn not_a_simulation(file: &Path, why: &dyn std::fmt::Display) -> String {
     let file = file.display();
     format!(
@@ -124,7 +124,8 @@ mod tests {
     use super::*;
     use crate::base::Parameterisation;
 
-    /// The JSON of a diagnosis has base parameters as well, but no simulation is described by what is left beside its causes.
+    /// The JSON of a diagnosis also has base parameters, but they describe the arm without its causes and thus no
+    /// simulation.
     #[test]
     fn a_diagnosis_is_no_simulation() {
         let arm = Arm::built_in("ur5").unwrap();

@@ -1,4 +1,4 @@
-//! `armid study`: what is true in general, found by simulation.
+//! `armid study`: general results, found by simulation or from public logs.
 
 use clap::{Args, Subcommand};
 

@@ -1,4 +1,4 @@
-//! `armid study cutoff`: bias and scatter against the cutoff, e_N against the record, the paper's σ.
+//! `armid study cutoff`: bias and scatter over the cutoff, e_N over the length of the record, and the paper's σ.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! `armid study noise`: every method on the same logs, scenario by scenario, in one run or in several.
+//! `armid study noise`: all methods on the same logs for every scenario, in one run or in several.
 
 use std::path::{Path, PathBuf};
 
@@ -36,18 +36,18 @@ pub(super) struct NoiseArgs {
     output: StudyOutput,
 }
 
-/// Results that cannot be put together.
+/// Results that cannot be combined.
 #[derive(Debug, Error)]
 enum NoiseStudyError {
-    /// The file cannot be read, or is no result of this study.
+    /// The file cannot be read, or is not a result of this study.
     #[error("{0} (wanted: a result of armid study noise --json)")]
     Saved(#[from] SavedError),
-    /// One scenario would stand there twice.
+    /// A scenario occurs twice.
     #[error("{file}: scenario {scenario} is already there")]
     Twice {
-        /// The file that brings it again.
+        /// The file with the second occurrence.
         file: String,
-        /// Its name.
+        /// Name of the scenario.
         scenario: String,
     },
 }
@@ -62,16 +62,16 @@ struct Saved {
     study: NoiseStudy,
 }
 
-/// The study so far, and what made it.
+/// The results so far, and their origin.
 struct Collected {
     study: NoiseStudy,
     inputs: Vec<Input>,
-    /// Commands of the earlier runs, in their order.
+    /// Commands of the earlier runs, in order.
     commands: Vec<String>,
 }
 
 impl Collected {
-    /// The results in `files`.
+    /// Reads the results in `files`.
     fn load(files: &[PathBuf]) -> Result<Self, Box<dyn std::error::Error>> {
         let study = NoiseStudy { scenarios: Vec::new() };
         let mut all = Self { study, inputs: Vec::new(), commands: Vec::new() };
@@ -88,7 +88,7 @@ impl Collected {
         Ok(all)
     }
 
-    /// Refuses the scenario `name` of `file` if it is there.
+    /// Refuses the scenario `name` of `file` if it is already collected.
     fn check_new(&self, file: &Path, name: &str) -> Result<(), NoiseStudyError> {
         if self.study.scenarios.iter().any(|known| known.name == name) {
             let (file, scenario) = (file.display().to_string(), name.to_owned());
@@ -97,7 +97,7 @@ impl Collected {
         Ok(())
     }
 
-    /// This program, its command behind those of the earlier runs.
+    /// This program, with its command after those of the earlier runs.
     fn program(&self) -> Program {
         let own = Program::started(None, self.inputs.clone());
         let commands: Vec<&str> =
@@ -110,7 +110,7 @@ pub(super) fn run(args: &NoiseArgs) -> CommandResult {
     args.output.check(&args.from)?;
     let threads = threads_or_all(args.threads);
     let mut all = Collected::load(&args.from)?;
-    // Whatever cannot be run is told before anything runs.
+    // Errors in any input are reported before the first scenario runs.
     let mut scenarios = Vec::new();
     for path in &args.scenarios {
         let scenario = Scenario::load(Some(path))?;

@@ -1,4 +1,4 @@
-//! What every study writes: tables on the terminal, and where it was asked for Markdown, a page, JSON.
+//! Outputs of a study: tables on the terminal and, on request, Markdown, a page and JSON.
 
 use std::path::PathBuf;
 
@@ -24,12 +24,12 @@ pub(super) struct StudyOutput {
 }
 
 impl StudyOutput {
-    /// Refuses paths that cannot be written, or where one of the `inputs` stands, before any work is done.
+    /// Refuses, before any work is done, paths that cannot be written or that would overwrite one of the `inputs`.
     pub(super) fn check(&self, inputs: &[PathBuf]) -> Result<(), OutputError> {
         check_outputs([&self.markdown, &self.report, &self.json].into_iter().flatten(), inputs)
     }
 
-    /// Prints `markdown` of the results and writes what was asked for.
+    /// Prints the results as `markdown` and writes the requested files.
     pub(super) fn write<T: Serialize>(
         &self,
         schema: &'static str,
@@ -43,8 +43,8 @@ impl StudyOutput {
         Ok(Outcome::Done)
     }
 
-    /// Writes what was asked for: also of a study that is still running, so that one that is ended
-    /// early leaves what it has.
+    /// Writes the requested files. Also called while a study is still running, so that a study that is stopped early
+    /// leaves its results so far.
     pub(super) fn save<T: Serialize>(
         &self,
         schema: &'static str,

@@ -1,4 +1,4 @@
-//! `armid study paper`: the paper's section IV on the simulated arm.
+//! `armid study paper`: repeats section IV of the paper on the simulated arm.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! `armid study physical`: what physical consistency repairs, and what not.
+//! `armid study physical`: what physical consistency repairs, and what it does not.
 
 use std::path::PathBuf;
 
@@ -32,7 +32,7 @@ pub struct PhysicalArgs {
 pub fn run(args: &PhysicalArgs) -> CommandResult {
     let threads = threads_or_all(args.threads);
     let mut study = PhysicalStudy { cases: Vec::new() };
-    // Whatever cannot be run is told before anything runs.
+    // Errors in any input are reported before the first scenario runs.
     let (mut scenarios, mut files) = (Vec::new(), Vec::new());
     for path in &args.scenarios {
         let scenario = Scenario::load(Some(path))?;

@@ -1,4 +1,4 @@
-//! `armid study real-arm`: the case study of a real UR10e from its public logs.
+//! `armid study real-arm`: the case study of a real UR10e from public logs.
 
 use std::path::PathBuf;
 
@@ -32,7 +32,7 @@ pub(super) struct RealArmArgs {
 }
 
 impl RealArmArgs {
-    /// The words of the command that makes the report anywhere: whoever has the logs says where they are.
+    /// The command that reproduces the report, with a placeholder for the folder of the logs.
     fn command(&self) -> Vec<String> {
         let mut words =
             ["armid", "study", "real-arm", "--data", "FOLDER"].map(String::from).to_vec();
@@ -45,7 +45,7 @@ impl RealArmArgs {
     }
 }
 
-/// The body that the authors bolted to the flange, kg.
+/// Mass of the body that the authors bolted to the flange, kg.
 const KNOWN_KG: f64 = 2.805;
 const TRAINING: &str = "ur-20_02_19_14harm50sec.csv";
 const HELD_OUT: [&str; 3] = [
@@ -147,7 +147,8 @@ pub(super) fn run(args: &RealArmArgs) -> CommandResult {
         .into_iter()
         .chain(&held_out)
         .chain(&touched)
-        // The logs are no part of the project: the page names them within the folder it is told.
+        // The logs are not part of the project: the page names them relative to the folder that is given to the
+        // command.
         .map(|l| Input { path: name(l).into(), ..l.input.clone() })
         .collect();
     let gains_nm_a = [gains_of(&training, &arm), gains_of(&others[0], &arm)];
@@ -180,7 +181,7 @@ fn name(log: &LoadedLog) -> String {
         .map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned())
 }
 
-/// The drive gains with which the log's currents became torques, Nm/A.
+/// The drive gains that converted the log's currents to torques, Nm/A.
 fn gains_of(log: &LoadedLog, arm: &Arm) -> Vec<f64> {
     match &log.log.effort {
         Effort::Current { gain_nm_a: Some(gains), .. } => gains.clone(),

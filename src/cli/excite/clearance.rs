@@ -1,4 +1,4 @@
-//! What the motion keeps clear of, and what is told of it.
+//! Clearance options, and messages about what the motion keeps clear of.
 
 use nalgebra::Vector3;
 
@@ -8,7 +8,8 @@ use crate::excitation::design::DesignError;
 use crate::report::excitation::NO_CLEARANCE;
 use crate::robot::{Arm, CellBox, ShapeNotice, UrdfNotice};
 
-/// Says what is not watched of the arm that `robot` names; `boxes` are those that were given, and need something to keep clear.
+/// Tells the user which parts of the arm named by `robot` are not watched. Refuses `boxes` for an arm without capsules,
+/// because there is nothing to keep clear of them.
 pub(super) fn say_what_is_watched(
     robot: &str,
     arm: &Arm,
@@ -32,7 +33,7 @@ pub(super) fn say_what_is_watched(
     Ok(())
 }
 
-/// Says what may be done where the shapes of the arm that `robot` names leave no motion.
+/// Tells the user what to do when the clearance model of the arm named by `robot` leaves no feasible motion.
 pub(super) fn say_what_helps(robot: &str, notices: &[UrdfNotice], fault: &DesignError) {
     let has_own =
         |notice: &UrdfNotice| matches!(notice, UrdfNotice::Shapes(ShapeNotice::Capsules { .. }));
@@ -45,7 +46,7 @@ pub(super) fn say_what_helps(robot: &str, notices: &[UrdfNotice], fault: &Design
     }
 }
 
-/// A box from its two corners, in any order.
+/// Parses a box from two opposite corners, in any order.
 pub(super) fn cell_box(corners: &str) -> Result<CellBox, BadOption> {
     let numbers: Option<Vec<f64>> = corners
         .split(',')

@@ -1,11 +1,11 @@
-//! What a trajectory file says of its design.
+//! The content of a trajectory file.
 
 use serde::Serialize;
 
 use crate::excitation::design::{Criterion, Design, Specification};
 use crate::robot::Arm;
 
-/// A trajectory, and how it was designed.
+/// A trajectory and the record of its design.
 #[derive(Serialize)]
 pub(super) struct Record<'a> {
     period_s: f64,
@@ -41,7 +41,8 @@ struct MarginRecord {
     limit: String,
     free: f64,
     unit: &'static str,
-    /// Of half the range of a position, of the largest velocity, acceleration or torque, of 0.1 m for a distance.
+    /// `free` relative to half the range of a position, to the largest velocity, acceleration or torque, or to 0.1 m
+    /// for a distance.
     share: f64,
     time_s: f64,
 }
@@ -53,7 +54,7 @@ struct FinalistRecord {
 }
 
 impl<'a> Record<'a> {
-    /// Of what was `found` for `arm`.
+    /// Records the design `found` for `arm`.
     pub(super) fn of(arm: &Arm, spec: &Specification, found: &'a Design) -> Self {
         let p = &found.prediction;
         let series = found.excitation.series();
