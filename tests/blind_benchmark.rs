@@ -1,10 +1,10 @@
-//! Hide and find, one family at a time: joint, sign, shape and size are drawn, the plant makes the
-//! effect, and the diagnosis sees the log alone. The cases come from the blind benchmark itself, on logs
-//! of 40 s with white noise and √λ (or √λ_sim) of 10 to 15.
+//! Hide and find, one family at a time: joint, sign, shape and size are drawn at random, the plant produces the effect,
+//! and the diagnosis sees only the log. The cases come from the blind benchmark itself, on logs of 40 s with white
+//! noise and √λ (or √λ_sim) of 10 to 15.
 //!
-//! Seeds are fixed. A correct diagnosis fails a case by chance where the noise happens to favour a rival
-//! (about 1 in 100 at this size) or where an interval misses: intervals are taken twice as wide as the
-//! 95 % they state, which misses 1 in 10 000, and have to be shorter than what they are of is large.
+//! Seeds are fixed. Noise that happens to favour a rival makes a correct diagnosis fail about 1 case in 100 at this
+//! size, and an interval can miss the truth. The tests therefore double the stated 95 % intervals, which then miss 1 in
+//! 10 000; in return, an interval must be short compared with its parameter.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -39,7 +39,7 @@ const PLAN: &str = r#"
     periods = 4
 "#;
 
-/// The benchmark with only `families` to be hidden.
+/// The benchmark, restricted to hiding one of `families`.
 fn benchmark(shares: Shares, families: &[&str]) -> Benchmark {
     static PREPARED: OnceLock<Benchmark> = OnceLock::new();
     let prepared = PREPARED.get_or_init(|| match Job::from_toml(PLAN, "blind-test").unwrap() {
@@ -52,7 +52,7 @@ fn benchmark(shares: Shares, families: &[&str]) -> Benchmark {
     benchmark
 }
 
-/// Rows of its logs.
+/// Rows of each log.
 const ROWS: f64 = 5000.0;
 
 const NOTHING: Shares = Shares { one: 0.0, two: 0.0, withheld: 0.0, beside: 0.0 };
@@ -69,13 +69,13 @@ fn record(benchmark: &Benchmark, trial: u64) -> Record {
     record
 }
 
-/// Two effects cannot be drawn of a family that has one place alone.
+/// Two effects cannot be drawn from a family that has only one possible place.
 #[test]
 fn two_effects_need_two_places() {
     assert!(benchmark(TWO, &["base_tilt"]).worker().trial(0).is_err());
 }
 
-/// What is wrong with the answer to one hidden effect.
+/// What is wrong with the answer to a single hidden effect.
 fn complaint(record: &Record) -> Option<String> {
     let hidden = &record.case.hidden[0];
     let say = |what: &str| Some(format!("{} at {:?}: {what}", hidden.kind, hidden.joint));
@@ -96,7 +96,7 @@ fn complaint(record: &Record) -> Option<String> {
             }
             let reach = match p.high - p.low {
                 width if width > 0.0 => width,
-                // Counted, not estimated.
+                // A counted share has no interval.
                 _ if name == "fraction" => 4.0 * (truth * (1.0 - truth) / ROWS).sqrt(),
                 _ => 1e-6 * truth.abs(),
             };
@@ -109,8 +109,8 @@ fn complaint(record: &Record) -> Option<String> {
             return say("nothing is told of its size");
         }
     }
-    // What a right model under the same noise removes on the other motion. Two coefficients of an effect of 10 σ, each off
-    // by 3.9 of its own, leave 2 (3.9/10)² of it.
+    // Gain on the other motion, relative to that of a right model identified under the same noise. If each of two
+    // coefficients of an effect of 10 σ is off by 3.9 of its own σ, a share of 2 (3.9/10)² remains.
     if let Some(gain) = record.answer.gain
         && gain.share() < (1.0 - 2.0 * 0.39f64.powi(2)) * gain.possible()
     {
@@ -120,8 +120,8 @@ fn complaint(record: &Record) -> Option<String> {
     None
 }
 
-/// One case of each of `families`, all that is wrong at once. The number of the trial, and with it what
-/// is drawn, is the family's place in the list of all.
+/// Runs one case for each of `families` and reports all failures at once. The trial number, and thus the random draw,
+/// follows from the family's place in the list of all families.
 fn hide_and_find(families: &[&str]) {
     let place = |family: &str| FAMILIES.iter().position(|f| f.kind.name() == family).unwrap();
     let complaints: Vec<String> = families
@@ -158,8 +158,8 @@ fn records_that_are_damaged() {
     hide_and_find(&["clock_fault", "dropped_samples"]);
 }
 
-/// Of a clock that stalls every 632 rows gaps are left that the other periods tell only once their own gaps have rows: the log
-/// has more rows when it is moved to a common motion than when its faults were looked for.
+/// A clock that stalls every 632 rows leaves gaps that the other periods reveal only after their own gaps have been
+/// filled. The log then has more rows when it is moved to a common motion than when it was searched for faults.
 #[test]
 fn gaps_that_are_filled_one_after_the_other() {
     let text = std::fs::read_to_string("sims/blind.toml").unwrap();
@@ -242,7 +242,7 @@ fn gravity_lengths_and_angles_against_a_simulation() {
     hide_and_find(&["gravity", "link_length", "encoder_offset"]);
 }
 
-/// A shard of clean logs, run and read back from its file.
+/// A shard of clean logs; checks that it survives a round trip through JSON.
 fn clean(range: std::ops::Range<u64>, threads: usize) -> (PathBuf, Shard<BlindContent>) {
     let benchmark = benchmark(NOTHING, &[]);
     let stop = std::sync::atomic::AtomicBool::new(false);
@@ -254,7 +254,7 @@ fn clean(range: std::ops::Range<u64>, threads: usize) -> (PathBuf, Shard<BlindCo
     (PathBuf::new(), shard)
 }
 
-/// All of them, by two threads.
+/// All ten clean logs, run by two threads.
 fn ten_clean() -> &'static [Record] {
     static TEN: OnceLock<Vec<Record>> = OnceLock::new();
     TEN.get_or_init(|| {
@@ -273,7 +273,7 @@ fn ten_clean_logs_have_no_cause() {
     }
 }
 
-/// Whatever the number of threads and the split into shards.
+/// The records do not depend on the number of threads or the split into shards.
 #[test]
 fn threads_and_shards_give_the_same_records() {
     let parts = merge(vec![clean(1..2, 1), clean(0..1, 1)]).unwrap();
@@ -290,8 +290,8 @@ fn of_two_effects_both_are_named() {
     }
 }
 
-/// What the model absorbs shows against the simulation, and what it does not in the residual; neither makes the other's
-/// parameters look moved.
+/// A change that the model absorbs shows against the simulation; a law that it does not absorb shows in the residual.
+/// Neither makes the parameters of the other appear to have moved.
 #[test]
 fn of_a_change_and_a_law_both_are_named() {
     let benchmark =
@@ -303,9 +303,9 @@ fn of_a_change_and_a_law_both_are_named() {
     }
 }
 
-/// Drives that feed half of friction forward and have slow feedback reverse early or late by what their joint does, which
-/// looks like a sixteenth of what a longer delay does. Of ten logs five were called late. What is still false of these five is
-/// pinned: one has a contact that was not there.
+/// Drives with half of the friction fed forward and slow feedback reverse early or late, depending on the motion of the
+/// joint. This looks like a sixteenth of the effect of a delay. Of ten logs, five were once called late. The one answer
+/// among these five that is still false is pinned: a contact that did not happen.
 #[test]
 fn slow_drives_are_not_late() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("sims/blind_slow_drive.toml");
@@ -320,7 +320,7 @@ fn slow_drives_are_not_late() {
     assert_eq!(named.collect::<Vec<_>>(), [(7, Kind::Contact, Some(3))]);
 }
 
-/// At √λ above 30 a family that the dictionary lacks must not silently be called another.
+/// With √λ above 30, an effect whose family is not in the dictionary must not be named as another family without doubt.
 #[test]
 fn a_family_that_is_not_known_is_not_called_another() {
     let cases =
@@ -334,13 +334,14 @@ fn a_family_that_is_not_known_is_not_called_another() {
             "{family}: {}",
             record.outcome()
         );
-        // All of these repeat.
+        // All these effects repeat with the motion.
         let left = record.answer.left.as_ref();
         assert!(left.is_none_or(|left| left.axis != "time since the start"), "{family}: {left:?}");
     }
 }
 
-/// Friction that drifts shows in what periods have beside their mean; the mean period's residual has next to nothing of it.
+/// Friction that drifts shows in the deviations of the periods from their mean; it leaves almost no trace in the
+/// residual of the mean period.
 #[test]
 fn drift_that_is_not_known_depends_on_the_time() {
     let mut benchmark = benchmark(WITHHELD, &["thermal_drift"]);

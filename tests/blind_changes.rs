@@ -1,17 +1,17 @@
-//! Hide and find what any fit would absorb: against the simulation without it, or against a second log;
-//! and contacts, which no fit absorbs. Everything hidden is made by the plant.
+//! Hide and find effects that any fit would absorb: against a simulation without the effect, or against a second log.
+//! Also contacts, which no fit absorbs. The plant produces everything that is hidden.
 
 use armid::diagnose::{Cause, Diagnosis, Estimate, Kind, Nominal, Validation};
 use armid::identify::{Identifier, Measurement};
 
 use crate::simulated::{NOISE, Run, assert_holds, scenario};
 
-/// `periods` of the identification motion with the effects of `toml`.
+/// `periods` of the identification motion with the effects in `toml`.
 fn run(seed: u64, periods: usize, toml: &str) -> Run {
     Run::new(scenario(("changes", seed), ("ur5_identification", periods), NOISE, toml))
 }
 
-/// The diagnosis against the simulation of the nominal arm.
+/// Diagnoses the log against the simulation of the nominal arm.
 fn against_nominal(run: &Run) -> Diagnosis {
     let nominal = run.set.values(&run.model.standard_parameters());
     let log = run.log.measurement("changes");
@@ -65,14 +65,14 @@ fn a_wrong_gain_is_named_at_its_joint_against_the_simulation() {
 fn nothing_is_named_against_the_simulation_that_made_the_log() {
     let d = against_nominal(&run(14, 4, ""));
     assert!(d.causes.is_empty());
-    // 52 parameters: the largest of as many |t| stays below 5 with a chance of 10⁻³ at most.
+    // Among 52 parameters, the largest |t| exceeds 5 with a probability of at most 10⁻³.
     assert!(d.moved_parameters.iter().all(|m| m.z.abs() < 5.0));
     assert!(!says_that_contacts_are_not_looked_for(&d), "{:?}", d.warnings);
 }
 
-/// A simulation that was identified from another clean log, along another motion with twice the noise, at twice the rate and behind
-/// other drives: what it is wrong by is in its covariance, in all combinations of its parameters. Taken for exact, it had changes
-/// named in these logs.
+/// The simulation is identified from another clean log, along another motion with twice the noise, twice the rate and
+/// other drives. Its errors are described by its covariance, for all combinations of parameters. When it is taken as
+/// exact, changes are named in these logs.
 #[test]
 fn what_an_identified_simulation_does_not_know_is_no_change() {
     let loud =
@@ -96,10 +96,10 @@ fn what_an_identified_simulation_does_not_know_is_no_change() {
         let clean = run(seed, 6, "");
         let d = against(&clean, simulation);
         assert!(d.causes.is_empty(), "{:?}", d.sentences);
-        // 58 parameters in two logs: noise shows one of them 5 σ away in one of 15 000 such tests.
+        // 58 parameters in two logs: noise moves one of them by 5 σ in one of 15 000 such tests.
         assert!(d.moved_parameters.iter().all(|moved| moved.z.abs() < 5.0));
         let together = d.moved_together.unwrap();
-        // One of 10⁴ such logs has less.
+        // One in 10⁴ such logs has a smaller p-value.
         assert!(together.p_value > 1e-4, "{together:?}");
         as_if_exact += against(&clean, Nominal::certain(simulation.theta)).causes.len();
 
@@ -114,8 +114,8 @@ fn what_an_identified_simulation_does_not_know_is_no_change() {
     assert!(as_if_exact > 0, "a test that cannot fail");
 }
 
-/// What the parameters of a model cannot follow of another gravity looks like something else beside it, and is nothing beside
-/// the gravity.
+/// The parameters cannot follow all of a change of gravity. Without gravity as a candidate the remainder looks like
+/// another effect; with it, nothing else is named.
 #[test]
 fn another_gravity_is_nothing_else() {
     let run = run(22, 4, "[[effect]]\nkind = \"gravity\"\ng_m_s2 = 9.2\n");
@@ -126,7 +126,8 @@ fn another_gravity_is_nothing_else() {
     assert_eq!(named, [Kind::Gravity]);
 }
 
-/// What a fit would absorb of an effect is no change of the arm: load friction has the whole of Coulomb's curve in it.
+/// The part of an effect that a fit would absorb is not a change of the arm: load friction contains the whole curve of
+/// Coulomb friction.
 #[test]
 fn effects_beside_a_simulation_are_no_changes() {
     let friction = "[[effect]]\nkind = \"load_friction\"\njoint = 2\nmu = 0.06\n\
@@ -140,7 +141,7 @@ fn effects_beside_a_simulation_are_no_changes() {
     let effects = [(Kind::Stribeck, Some(4)), (Kind::LoadFriction, Some(2))];
     let d = against_nominal(&run(31, 4, friction));
     assert_eq!(named(&d), effects);
-    // As above: nothing of it has moved a parameter.
+    // As above: the effects have not moved any parameter.
     assert!(d.moved_parameters.iter().all(|m| m.z.abs() < 5.0), "{:?}", d.moved_parameters);
     let d = against_nominal(&run(32, 4, &(friction.to_owned() + payload)));
     assert_eq!(named(&d), [effects[0], effects[1], (Kind::Payload, None)]);
@@ -152,11 +153,11 @@ fn says_that_contacts_are_not_looked_for(d: &Diagnosis) -> bool {
     d.warnings.iter().any(|warning| warning.starts_with("contacts are not looked for"))
 }
 
-/// Where two periods differ neither is the one that was touched.
+/// If two periods differ, neither can be identified as the one that was touched.
 #[test]
 fn of_two_periods_contacts_are_not_looked_for() {
     let mut run = run(19, 3, "");
-    // The third is cut off.
+    // The third period is cut off.
     let rows = 0..3200;
     run.log.time_s.truncate(rows.end);
     for signals in [&mut run.log.q_rad, &mut run.log.qd_rad_s, &mut run.log.torque_nm] {
@@ -166,8 +167,8 @@ fn of_two_periods_contacts_are_not_looked_for() {
     assert!(says_that_contacts_are_not_looked_for(&d), "{:?}", d.warnings);
 }
 
-/// A link that is longer by 5 mm is in the parameters that any fit finds: nothing is added to these that could be worth
-/// something along another log.
+/// A link that is 5 mm longer is fully absorbed by the parameters of any fit: no effect is added to the model that
+/// could improve the prediction of another log.
 #[test]
 fn what_only_moves_the_parameters_gains_nothing() {
     let toml = "[[effect]]\nkind = \"link_length\"\njoint = 3\nerror_m = 0.005\n";
@@ -200,12 +201,12 @@ fn a_body_between_two_logs_is_weighed_and_scales_the_gains() {
     assert_holds(&cause, "com_y_m", 0.04);
     assert_holds(&cause, "com_z_m", 0.05);
     let scale = weighed.gain_scale.as_ref().unwrap();
-    // As in `assert_holds`.
+    // The interval is used as in `assert_holds`.
     let [low, high] = scale.ci95;
     assert!((scale.value - 1.0).abs() < high - low && high - low < 0.1, "{scale:?}");
     let none = against(&other);
     assert!(!none.is_named && none.cause().is_none(), "{none:?}");
-    // A push along the log with the body weighs nothing: each of the two estimates is within its own 95 %.
+    // A push during the log with the body adds no weight: each of the two estimates is within its own 95 %.
     let push =
         "[[effect]]\nkind = \"contact\"\njoint = 2\nstart_s = 24.0\nend_s = 24.5\npeak_nm = 25.0\n";
     let pushed = run(16, 4, &format!("{body}{push}"));
@@ -218,7 +219,7 @@ fn a_body_between_two_logs_is_weighed_and_scales_the_gains() {
     assert!(apart_kg < half_kg(without), "{with:?} {without:?}");
     assert!(half_kg(with) < 1.2 * half_kg(without), "{with:?} {without:?}");
 
-    // The other way round there is less than nothing on the flange, and the model fits the first log alone.
+    // With the logs swapped, the body has a negative mass, and the model fits only the first log.
     let bare_run = [Validation { measurement: bare, manufacturer_nm: None }];
     let of_loaded = diagnoser.diagnose(&loaded, &bare_run, None).unwrap();
     let swapped = diagnoser.payload(&of_loaded, &loaded, &bare, None).unwrap();
@@ -230,22 +231,22 @@ fn a_body_between_two_logs_is_weighed_and_scales_the_gains() {
 
 #[test]
 fn a_push_is_found_when_and_where_it_was() {
-    // 20 s to 20.5 s: the third period of a motion of 10 s that begins after its run-in.
+    // 20 s to 20.5 s: in the third period of a 10 s motion that begins after its run-in.
     let toml =
         "[[effect]]\nkind = \"contact\"\njoint = 2\nstart_s = 24.0\nend_s = 24.5\npeak_nm = 25.0\n";
     let d = against_nominal(&run(18, 4, toml));
     let touched: Vec<&Cause> = d.causes.iter().filter(|c| c.kind.name() == "contact").collect();
     assert_eq!(touched.len(), 1);
-    // A push that swells as sin² is at a quarter of its height after a sixth of its length: what is told is where it is felt, to a quarter
-    // of its length and to what its interval leaves open.
+    // A push that grows as sin² reaches a quarter of its height after a sixth of its length. The diagnosis reports when
+    // the push is felt, to a quarter of its length beyond the interval.
     for (name, truth) in [("start_s", 24.0), ("end_s", 24.5)] {
         let e = &touched[0].parameters[name];
         let off_s = (e.ci95[0] - truth).max(truth - e.ci95[1]).max(0.0);
         assert!(off_s < 0.125 && e.ci95[1] - e.ci95[0] < 0.125, "{name}: {e:?}");
     }
     assert!(touched[0].in_words.contains("joint 2"), "{}", touched[0].in_words);
-    // A push against the motion asks the drive for more: the reading is within a third of its peak, which
-    // the low-pass and the controller's answer blur.
+    // A push against the motion asks the drive for more torque. The low-pass and the controller's response blur the
+    // peak, so that the reading is only within a third of it.
     let peak = touched[0].parameters["peak_nm"].value;
     assert!((peak.abs() - 25.0).abs() < 8.5, "{peak}");
 }

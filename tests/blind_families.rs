@@ -1,5 +1,5 @@
-//! Hide and find: what the plant makes and a diagnosis has once taken for something else, named from the log alone. One effect
-//! of each family, with joint and size drawn by chance, is in `blind_benchmark`.
+//! Hide and find: effects of the plant that a diagnosis once confused with others must be named from the log alone.
+//! `blind_benchmark` tests one effect of each family with random joint and size.
 
 use armid::diagnose::candidates::{self, Candidate};
 use armid::diagnose::{Diagnosis, Kind, Verdict};
@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
 use crate::simulated::{NOISE, Run, SIGMA_NM, assert_holds, scenario, simulation};
 
-/// A scenario with white noise and the effects of `toml`.
+/// Diagnoses a log with white noise and the effects in `toml`.
 fn diagnose(seed: u64, toml: &str) -> Diagnosis {
     diagnose_along("ur5_identification", seed, toml)
 }
@@ -17,7 +17,7 @@ fn diagnose_along(trajectory: &str, seed: u64, toml: &str) -> Diagnosis {
     diagnose_rows(trajectory, seed, toml, |samples, _| (0..samples).collect())
 }
 
-/// A log of which `rows` are left, drawn by the number of all and a source of chance.
+/// The same with a selection of `rows`, drawn from the number of all rows by a random generator.
 fn diagnose_rows(
     trajectory: &str,
     seed: u64,
@@ -27,7 +27,7 @@ fn diagnose_rows(
     diagnose_by(candidates::all(), (trajectory, seed, toml), rows)
 }
 
-/// The same by these families alone.
+/// The same with only these families in the dictionary.
 fn diagnose_by(
     families: Vec<Box<dyn Candidate>>,
     (trajectory, seed, toml): (&str, u64, &str),
@@ -44,7 +44,7 @@ fn diagnose_by(
     diagnoser.diagnose(&run.log.measurement("blind"), &[], None).unwrap().diagnosis
 }
 
-/// One effect of `kind` at a joint drawn from `joints`, with `parameters`.
+/// Diagnoses a log with one effect of `kind` with `parameters`, at a joint drawn from `joints`.
 fn hide(seed: u64, kind: &str, joints: &[usize], parameters: &str) -> (usize, Diagnosis) {
     let joint = joints[ChaCha8Rng::seed_from_u64(seed).random_range(0..joints.len())];
     let toml = format!("[[effect]]\nkind = \"{kind}\"\njoint = {joint}\n{parameters}\n");
@@ -60,7 +60,7 @@ fn is_named(d: &Diagnosis, kind: &str, joint: Option<usize>) -> bool {
     })
 }
 
-/// A well damped gear, the encoder on its link: rotor and friction move more than the log says.
+/// A well-damped gear with the encoder on the link: rotor and friction move more than the log shows.
 #[test]
 fn a_gear_that_gives_way_is_seen_from_the_link_as_well() {
     let gear = "stiffness_nm_rad = 8000.0\ndamping_ratio = 0.3\nencoder = \"link\"";
@@ -71,8 +71,8 @@ fn a_gear_that_gives_way_is_seen_from_the_link_as_well() {
     assert!(high - low < 4000.0, "{low} … {high}");
 }
 
-/// Drives that feed no friction forward let the joint answer it: the motion is full of fast harmonics, by which a soft gear
-/// swings and in which a late velocity is rounded. What is hidden is all that is named, at several of its σ.
+/// Drives without friction feed-forward let the joint respond to friction. The motion is then full of fast harmonics
+/// that excite a soft gear and blur a late velocity. The hidden effect is all that is named, several σ strong.
 #[test]
 fn drives_that_feed_no_friction_forward_hide_nothing() {
     let drive = "[plant]\nfriction_feedforward = 0.0\n";
@@ -97,7 +97,7 @@ fn late_torque_belongs_to_the_whole_arm() {
     assert_holds(&d.causes[0], "delay_s", 0.002);
 }
 
-/// So many logs of an arm without effects, `rest` saying how it is driven and read.
+/// Diagnoses of `logs` logs of an arm without effects; `rest` describes its drives and sensors.
 fn clean(trajectory: &str, rest: &str, logs: u64) -> impl Iterator<Item = Diagnosis> {
     let simulation = simulation(scenario(("blind", 0), (trajectory, 6), NOISE, rest));
     (0..logs).map(move |trial| {
@@ -106,15 +106,15 @@ fn clean(trajectory: &str, rest: &str, logs: u64) -> impl Iterator<Item = Diagno
     })
 }
 
-/// Sensors with a share of a UR5's noise.
+/// Sensors with this share of a UR5's noise.
 fn sensors(share: f64) -> String {
     let torque_nm = SIGMA_NM.map(|sd| share * sd);
     let (q, qd) = (share * 2e-5, share * 1e-3);
     format!("torque_sd_nm = {torque_nm:?}\nq_sd_rad = {q:?}\nqd_sd_rad_s = {qd:?}\n")
 }
 
-/// With so little noise what is approximate in how drives answer friction stands ten and more σ out of it, and had the names of a
-/// Stribeck curve, of another width and of a late torque.
+/// With so little noise, the approximations in the model of how drives respond to friction stand out by 10 σ and more.
+/// They were once named as a Stribeck curve, another reversal width and a late torque.
 #[test]
 fn what_is_approximate_at_reversals_has_no_name() {
     let quiet = scenario(("quiet", 11), ("ur5_identification", 8), &sensors(1.0 / 20.0), "");
@@ -127,8 +127,9 @@ fn what_is_approximate_at_reversals_has_no_name() {
     }
 }
 
-/// A gain changes nothing of how friction turns round, and widths of the robot's own were named beside it, with 46 σ; nor does a
-/// joint that jolts have a stiff gear, which had 6 σ from the noise that its acceleration shares with the residual.
+/// A wrong gain does not change how friction reverses; yet reversal widths were once named beside it, with 46 σ.
+/// Likewise, a joint that jolts does not have a stiff gear; one was once named with 6 σ, because the noise of the
+/// acceleration is correlated with the residual.
 #[test]
 fn nothing_stands_beside_a_gain() {
     let half_fed = "[plant]\nbandwidth_rad_s = 50.0\nfriction_feedforward = 0.5\n\
@@ -139,13 +140,14 @@ fn nothing_stands_beside_a_gain() {
     assert_eq!(d.causes.len(), 1, "{:?}", d.sentences);
 }
 
-/// Four logs; the benchmark has ten.
+/// Four logs; `blind_benchmark` has ten more.
 #[test]
 fn clean_logs_have_no_cause() {
     for d in clean("ur5_identification", "", 4) {
         assert_eq!(d.verdict, Verdict::NothingFound, "{:?}", d.sentences);
-        // The residual is noise, less what some ten parameters per joint take of 1250 samples. Both are known to 1/√(2·1250) of them,
-        // the scatter of five periods to less: five σ of the two are one part in six.
+        // The residual is noise, minus the share that about ten parameters per joint take from 1250 samples. Its size
+        // is known to 1/√(2·1250), and the scatter of five periods is known less precisely: five σ of both together are
+        // one part in six.
         let noise_nm = d.noise_of_mean_nm.as_ref().expect("the motion repeats");
         for (left, noise) in d.before.rms_nm.iter().zip(noise_nm) {
             assert!((left / noise - 1.0).abs() < 0.16, "{left} Nm left of noise of {noise} Nm");
@@ -153,7 +155,7 @@ fn clean_logs_have_no_cause() {
     }
 }
 
-/// Controllers that know nothing of friction: where it reverses, the torque follows late and the links jerk.
+/// Controllers that do not compensate friction: where friction reverses, the torque follows late and the links jerk.
 #[test]
 fn how_drives_answer_friction_is_no_cause() {
     for (feedforward, logs) in [(0.0, 2), (0.5, 1)] {
@@ -164,8 +166,8 @@ fn how_drives_answer_friction_is_no_cause() {
     }
 }
 
-/// Friction that is sharper than its samples show, behind drives that expect another one and drives that know none: one
-/// width, which is all that is named.
+/// Friction that is sharper than the samples resolve, with drives that expect other friction and with drives that do
+/// not compensate any. One reversal width is all that is named.
 #[test]
 fn sharp_friction_is_one_cause() {
     for (seed, feedforward) in [(50, 0.9), (51, 0.0)] {
@@ -178,15 +180,15 @@ fn sharp_friction_is_one_cause() {
         );
         let named: Vec<_> = d.causes.iter().map(|c| (c.kind.name(), c.joint)).collect();
         assert_eq!(named, [("reversal_width", None)], "{:?}", d.sentences);
-        // So sharp a turn is only known to be no wider than twice that; otherwise as `assert_holds`.
+        // Of so sharp a reversal, only an upper bound of the width is known; apart from that, as in `assert_holds`.
         let width = &d.causes[0].parameters["width_rad_s"];
         let [low, high] = width.ci95;
         assert!((width.value - 0.003).abs() < high - low && high < 0.01, "{width:?}");
     }
 }
 
-/// What is over within a sample at 125 Hz: bristles that give way within 0.1 mrad, one joint's torque recorded
-/// 1.3 ms late. Each looks like the other in samples of friction, and is told by name and number.
+/// Effects that are over within one sample at 125 Hz: bristles that yield within 0.1 mrad, and the torque of one joint
+/// recorded 1.3 ms late. Each looks like the other in samples of friction; both must be named with the right value.
 #[test]
 fn what_is_over_within_a_sample() {
     let cases = [
@@ -203,8 +205,9 @@ fn what_is_over_within_a_sample() {
     }
 }
 
-/// Joint 1 reverses seldom there, and at much the same acceleration: bristles that give way within 0.1 mrad and a drive
-/// that answers friction in its own way would look alike, were the drive 4.5 ms ahead of its joint.
+/// Along this motion joint 1 reverses rarely and always at about the same acceleration. Bristles that yield within 0.1
+/// mrad would then look like a particular response of the drive to friction, if a drive could be 4.5 ms ahead of its
+/// joint.
 #[test]
 fn what_no_drive_answers_is_friction() {
     let stiff = "[[effect]]\nkind = \"presliding\"\njoint = 1\nstiffness_per_rad = 10000.0";
@@ -212,16 +215,16 @@ fn what_no_drive_answers_is_friction() {
     assert!(is_named(&d, "presliding", Some(1)));
 }
 
-/// Rotor and link of joint 3 ring against each other at 300 rad/s √(1 + Ia/M), Ia = 1.6 and M about 1 kg m²: above the
-/// Nyquist frequency of the log, so that what its samples show depends on the exact frequency.
+/// Rotor and link of joint 3 oscillate against each other at 300 rad/s √(1 + Ia/M), with Ia = 1.6 and M about 1 kg m².
+/// This is above the Nyquist frequency of the log, so that the samples depend on the exact frequency.
 #[test]
 fn play_that_rings_faster_than_the_log() {
     let (_, d) = hide(41, "backlash", &[3], "gap_rad = 6e-5");
     assert!(is_named(&d, "backlash", Some(3)));
 }
 
-/// Two hundred waves per turn at 3 rad/s are 95 Hz, above the Nyquist frequency of the log: most of what its samples
-/// show are aliases. The second order is no gear's, and has to be found among all.
+/// Two hundred waves per turn at 3 rad/s are 95 Hz, above the Nyquist frequency of the log: most of what the samples
+/// show are aliases. The second order belongs to no gear and must be found by a search over all orders.
 #[test]
 fn ripple_that_is_faster_than_the_log() {
     let cases =
@@ -239,7 +242,7 @@ fn ripple_that_is_faster_than_the_log() {
     }
 }
 
-/// Friction that falls by a tenth within a minute changes more from one period to the next than a hand would.
+/// Friction that falls by a tenth within a minute changes more between periods than a touching hand would cause.
 #[test]
 fn warming_is_no_contact() {
     let drift = "fraction = -0.1\ntime_constant_s = 40.0";
@@ -250,8 +253,8 @@ fn warming_is_no_contact() {
     }
 }
 
-/// The first periods of a joint whose friction changes fast are no repetitions of the later ones and are left out; its
-/// friction is that of the beginning all the same.
+/// If the friction of a joint changes fast, its first periods do not repeat the later ones and are left out. The
+/// friction is nevertheless stated for the start of the log.
 #[test]
 fn warming_begins_with_the_log() {
     let toml = "[[effect]]\nkind = \"thermal_drift\"\njoint = 4\nfraction = 0.25\n\
@@ -263,7 +266,8 @@ fn warming_begins_with_the_log() {
     assert!(high - low < 0.2, "{low} … {high}");
 }
 
-/// More friction near rest does to the torque what another share of it that a drive feeds forward does, but not quite.
+/// More friction near standstill changes the torque almost as a drive does that feeds forward another share of
+/// friction.
 #[test]
 fn friction_near_rest_is_no_odd_drive() {
     let toml = "[[effect]]\nkind = \"stribeck\"\njoint = 1\nextra_nm = 3.2\nvs_rad_s = 0.06";
@@ -272,8 +276,8 @@ fn friction_near_rest_is_no_odd_drive() {
     assert_eq!(d.causes.len(), 1, "{:?}", d.sentences);
 }
 
-/// A curve that falls within two widths of the sign lies between two of the shapes that are looked for first, where a narrower
-/// one of the other exponent, which no curve may be, explains more than either.
+/// A Stribeck curve that falls within two widths of the sign function lies between two shapes of the first search. A
+/// narrower curve with the other exponent, which is not an allowed shape, explains more than either of the two.
 #[test]
 fn friction_near_rest_that_falls_at_once() {
     let toml = "[[effect]]\nkind = \"stribeck\"\njoint = 4\nextra_nm = 1.25\nvs_rad_s = 0.0347\nexponent = 2";
@@ -282,7 +286,7 @@ fn friction_near_rest_that_falls_at_once() {
     assert_eq!(d.causes.len(), 1, "{:?}", d.sentences);
 }
 
-/// Such curves on several joints look like one sharper turn of all of them, with more friction in it than there is.
+/// Stribeck curves on several joints look like a sharper reversal of all joints with too much friction.
 #[test]
 fn friction_near_rest_of_several_joints() {
     let joints = [3, 4, 5, 6];
@@ -299,8 +303,8 @@ fn friction_near_rest_of_several_joints() {
     assert_eq!(named, joints.map(|j| (Kind::Stribeck, Some(j))), "{:?}", d.sentences);
 }
 
-/// Beside such a curve a sharper turn with more friction in it than there is explains much: who does not know the curve is
-/// told that something is left, not that the turn is sharp.
+/// If a Stribeck curve is present but not in the dictionary, a sharper reversal with too much friction explains much of
+/// it. The diagnosis must then report something unexplained, not a sharp reversal.
 #[test]
 fn friction_near_rest_is_no_width() {
     let curve = |joint: usize, extra_nm: f64, vs_rad_s: f64| {
@@ -319,8 +323,8 @@ fn friction_near_rest_is_no_width() {
     }
 }
 
-/// Concave friction of which the model takes up all but a twenty-fifth, the least that is looked for: whether it keeps a little
-/// more or less of it beside the next estimate of the arm does not matter, once it is found.
+/// Concave friction of which the model absorbs all but a twenty-fifth, the smallest remainder that is searched for.
+/// Once it is found, it does not matter that slightly more or less of it remains beside the next estimate of the arm.
 #[test]
 fn friction_that_the_model_nearly_absorbs() {
     let toml =
@@ -330,7 +334,7 @@ fn friction_that_the_model_nearly_absorbs() {
     assert_eq!(d.causes.len(), 1, "{:?}", d.sentences);
 }
 
-/// A drive that does not feed its friction forward among five that feed nine tenths of it.
+/// One drive without friction feed-forward among five that feed forward nine tenths.
 #[test]
 fn a_drive_that_feeds_nothing_forward() {
     let toml = "[[effect]]\nkind = \"feed_forward\"\njoint = 1\nshare_less = 0.9";
@@ -340,8 +344,8 @@ fn a_drive_that_feeds_nothing_forward() {
     assert_holds(&d.causes[0], "share_less", 0.9);
 }
 
-/// No controller knows the friction of its joints better than to a tenth: shares that differ by that are no cause, and are
-/// not taken for friction near rest.
+/// No controller knows the friction of its joints to better than a tenth: feed-forward shares that differ by that much
+/// are not a cause, and must not be mistaken for friction near standstill.
 #[test]
 fn drives_that_differ_as_drives_do() {
     let of_joint = |(j, less): (usize, &f64)| {
@@ -355,7 +359,7 @@ fn drives_that_differ_as_drives_do() {
     }
 }
 
-/// Rows 6, 8 and 10 ms apart with true time stamps: what lies between rows is no physics.
+/// Rows 6, 8 and 10 ms apart with correct time stamps: uneven sampling is not physics.
 #[test]
 fn an_uneven_clock_is_no_cause() {
     let d = diagnose_rows(
@@ -374,9 +378,9 @@ fn an_uneven_clock_is_no_cause() {
     assert_eq!(d.verdict, Verdict::NothingFound, "{:?}", d.sentences);
 }
 
-/// Fast logs hold more of the velocity's noise, and coloured torque less noise of its own there: noise of the acceleration
-/// that is in a candidate as well as in the residual shows first. Before, eight of ten such logs had something unexplained.
-/// By the design's rate of false alarms three good logs fail once in 170.
+/// Fast logs contain more velocity noise, and coloured torque noise is weaker at the same frequencies. Noise of the
+/// acceleration, which is in both the candidates and the residual, then shows first; once, eight of ten such logs had
+/// something unexplained. At the designed rate of false alarms, three good logs fail once in 170.
 #[test]
 fn fast_logs_with_coloured_noise_have_no_cause() {
     let noise = r#"
@@ -395,8 +399,8 @@ fn fast_logs_with_coloured_noise_have_no_cause() {
     }
 }
 
-/// Along this motion joint 1 turns by little more than a radian: what friction is in the middle of it is Coulomb friction,
-/// and only how it rises and falls beside that is seen.
+/// Along this motion joint 1 turns by little more than a radian: the mean of the friction over this arc looks like
+/// Coulomb friction, and only its variation is visible.
 #[test]
 fn friction_that_depends_on_an_angle_of_a_small_arc() {
     let toml = "[[effect]]\nkind = \"position_friction\"\njoint = 1\namplitude_nm = 0.8\nphase_rad = -1.0\n";

@@ -1,5 +1,5 @@
-//! Hide and find: what a recorder, a sensor or its noise does to a log is not taken for physics, and physics that all joints have
-//! not for the recorder's.
+//! Hide and find: what a recorder, a sensor or its noise does to a log must not be taken for physics, and physics that
+//! acts on all joints must not be taken for a fault of the recorder.
 
 use armid::diagnose::{Diagnosis, Kind};
 use armid::plant::Measured;
@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
 use crate::simulated::{NOISE, Run, TORQUE_NOISE, scenario};
 
-/// The log of six periods behind `sensors`, with the effects of `rest`, changed by `change`.
+/// Diagnoses a log of six periods with `sensors` and the effects in `rest`, modified by `change`.
 fn diagnose(
     seed: u64,
     (sensors, rest): (&str, &str),
@@ -23,14 +23,14 @@ fn diagnose(
 
 fn as_recorded(_: &mut Measured, _: &mut ChaCha8Rng) {}
 
-/// Kinds and joints of all that is named.
+/// Kinds and joints of all named causes.
 fn named(diagnosis: &Diagnosis) -> Vec<(Kind, Option<usize>)> {
     diagnosis.causes.iter().map(|cause| (cause.kind, cause.joint)).collect()
 }
 
-/// Noise with a memory of half a second and nothing beside it: at 30 Hz it has a hundredth of the amplitude that white noise would
-/// have, and every period ends elsewhere than it began. Each log is designed to be taken for one with a fault in 3 of 1000; of
-/// three none is in 991 of 1000.
+/// Only noise with a correlation time of half a second: at 30 Hz it has a hundredth of the amplitude of white noise,
+/// and no period ends where it began. By design, 3 in 1000 logs of any kind are falsely said to have a fault; none of
+/// three in 991 of 1000.
 #[test]
 fn steep_noise_is_no_fault() {
     let steep = "[sensors.torque_noise]\n\
@@ -42,7 +42,8 @@ fn steep_noise_is_no_fault() {
     }
 }
 
-/// Angles in steps of 10 µrad of an arm that moves alike to far less in every period: no scatter between periods shows the rounding.
+/// Angles in steps of 10 µrad, while the motion repeats to far less than a step: the scatter between periods does not
+/// reveal the rounding.
 #[test]
 fn rounded_angles_of_a_motion_that_repeats_exactly_are_no_fault() {
     let rounded = format!("{TORQUE_NOISE}q_step_rad = 1e-5\nqd_sd_rad_s = 1e-3");
@@ -51,7 +52,7 @@ fn rounded_angles_of_a_motion_that_repeats_exactly_are_no_fault() {
     assert!(diagnosis.unexplained.is_none());
 }
 
-/// Friction that builds up behind the reversals of all joints comes late, as if the whole torque were recorded late.
+/// Friction that builds up after the reversals of all joints comes late, as if the whole torque were recorded late.
 #[test]
 fn presliding_of_all_joints_is_no_clock() {
     let of_joint = |joint: usize| {
@@ -66,7 +67,7 @@ fn presliding_of_all_joints_is_no_clock() {
     assert!(named.iter().all(|(kind, _)| *kind == Kind::Presliding), "{named:?}");
 }
 
-/// One in five readings of the torque of one joint, drawn by chance, is the one before.
+/// One in five torque readings of one joint, drawn at random, repeats the reading before it.
 #[test]
 fn torque_readings_that_repeat_are_no_physics() {
     let diagnosis = diagnose(331, (NOISE, ""), |log, rng| {
@@ -78,12 +79,13 @@ fn torque_readings_that_repeat_are_no_physics() {
         }
     });
     assert_eq!(named(&diagnosis), [(Kind::DroppedSamples, Some(3))]);
-    // Binomial: σ of the share of 7500 rows is 0.5 %; four of them, and of those at rest none is told.
+    // Binomial: the share in 7500 rows has a σ of 0.5 %; the bound is four of them. Repeated readings at standstill are
+    // not detected.
     let share = diagnosis.causes[0].parameters["fraction"].value;
     assert!((share - 0.2).abs() < 0.02, "{share}");
 }
 
-/// The torque sensor of one joint hangs for two seconds.
+/// The torque sensor of one joint freezes for two seconds.
 #[test]
 fn a_torque_that_hangs_is_no_contact() {
     let diagnosis = diagnose(341, (NOISE, ""), |log, _| {
@@ -96,7 +98,7 @@ fn a_torque_that_hangs_is_no_contact() {
     assert_eq!(named(&diagnosis), [(Kind::DroppedSamples, Some(2))]);
 }
 
-/// One in a hundred angles of every joint is off by 40 mrad either way.
+/// One in a hundred angles of every joint is off by 40 mrad in either direction.
 #[test]
 fn wild_angles_are_outliers_and_no_clock() {
     let diagnosis = diagnose(351, (NOISE, ""), |log, rng| {

@@ -1,4 +1,4 @@
-//! Hide and find along single runs, whose noise nothing but their own residual tells.
+//! Hide and find along single runs, where only the residual itself tells the size of the noise.
 
 use armid::diagnose::{Diagnosis, Kind, Verdict};
 
@@ -8,7 +8,7 @@ use crate::simulated::{Run, SIGMA_NM, assert_holds, scenario};
 const NOISE: &str =
     "torque_sd_nm = [0.3, 0.3, 0.2, 0.05, 0.05, 0.05]\nq_sd_rad = 6e-6\nqd_sd_rad_s = 3e-4\n";
 
-/// 80 s, taken for a run that repeats nothing, with the effects of `toml`.
+/// 80 s with the effects in `toml`, treated as a run that does not repeat.
 fn diagnose(seed: u64, toml: &str) -> Diagnosis {
     let rest = format!("[processing]\nperiod_s = 0.0\n{toml}");
     let run = Run::new(scenario(("single", seed), ("ur5_identification", 8), NOISE, &rest));
@@ -24,8 +24,8 @@ fn a_clean_run_has_no_cause_and_nothing_unexplained() {
     }
 }
 
-/// Noise of the velocities, by way of the inertias, is in what the model leaves and in what would bend a gear as well: it made stiff
-/// gears of joints 2 and 3, with 6 and 9 % of the error's mean square.
+/// Velocity noise, multiplied by the inertias, is in the residual as well as in the torque that would bend a gear. It
+/// was once named as stiff gears of joints 2 and 3, with 6 and 9 % of the mean square error.
 #[test]
 fn noise_of_velocities_is_no_gear() {
     let third = SIGMA_NM.map(|sd| 0.3 * sd);
@@ -38,7 +38,8 @@ fn noise_of_velocities_is_no_gear() {
     };
     let d = diagnose(&run);
     assert_eq!(d.verdict, Verdict::NothingFound, "{:?}", d.sentences);
-    // Nor behind a rest that is longer than the motion and read as such, which says nothing of that noise.
+    // The same after a standstill longer than the motion and recorded as zero velocity, which says nothing about that
+    // noise.
     let rest = 7000;
     let step_s = run.log.time_s[1] - run.log.time_s[0];
     let log = &mut run.log;
@@ -52,7 +53,7 @@ fn noise_of_velocities_is_no_gear() {
     assert!(d.causes.iter().all(|cause| cause.kind != Kind::Elasticity), "{:?}", d.sentences);
 }
 
-/// Half of the error's mean square, where as much of it is that noise.
+/// The gear makes up half of the mean square error, and velocity noise as much.
 #[test]
 fn a_gear_is_seen_beside_noise_of_velocities() {
     let gear = "kind = \"elasticity\"\njoint = 2\nstiffness_nm_rad = 20000.0\n";
@@ -63,7 +64,8 @@ fn a_gear_is_seen_beside_noise_of_velocities() {
     assert_eq!(d.causes[0].form, Some("encoder on the motor"));
 }
 
-/// No family of single runs has it; bristles stand in for it, and were named with a confidence of one.
+/// The dictionary for single runs has no late torque of one joint. Bristles explain it instead, and were once named
+/// with a confidence of one.
 #[test]
 fn one_joints_late_torque_is_unexplained_and_nothing_else_for_sure() {
     let d = diagnose(3, "[[effect]]\nkind = \"time_skew\"\njoint = 4\ndelay_s = 0.004\n");
@@ -71,7 +73,7 @@ fn one_joints_late_torque_is_unexplained_and_nothing_else_for_sure() {
     assert_eq!(d.unexplained.map(|unknown| unknown.joint), Some(4));
 }
 
-/// The time constant is a fifth of the record; half of it was the least that was looked for.
+/// The time constant is a fifth of the record; half of the record was once the shortest that was searched for.
 #[test]
 fn friction_that_warms_up_early_is_told_its_time() {
     let warming = "kind = \"thermal_drift\"\njoint = 3\nfraction = -0.2\ntime_constant_s = 16.0\n";

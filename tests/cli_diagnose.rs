@@ -1,10 +1,10 @@
-//! `armid diagnose` as the README shows it, with half the periods: what is hidden in a simulated arm is named.
+//! `armid diagnose` as in the README, with half the periods: effects hidden in a simulated arm are named.
 
 use serde_json::Value;
 
 use crate::cli::Folder;
 
-/// The arm of the README, one log of it, another one of the same motion, and one to be held out.
+/// A folder with the arm of the README, two logs of one motion, and a log of another motion to be held out.
 fn hidden() -> Folder {
     let folder = Folder::empty();
     for (name, text) in [
@@ -24,8 +24,8 @@ fn hidden() -> Folder {
     folder
 }
 
-/// Asserts that `truth` lies within twice the 95 % interval: 3.9 σ, which noise passes once in
-/// 10 000 logs, so that no seed has to be looked for.
+/// Asserts that `truth` lies within twice the 95 % interval: 3.9 σ, which noise exceeds once in 10 000 logs, so that
+/// the seed need not be selected.
 fn holds(cause: &Value, name: &str, truth: f64) {
     let found = &cause["parameters"][name];
     let value = found["value"].as_f64().unwrap();
@@ -34,14 +34,13 @@ fn holds(cause: &Value, name: &str, truth: f64) {
     assert!(low < truth && truth < high, "{name}: {low} … {high} without {truth}");
 }
 
-/// Asserts that the arm with the causes in it gives the torque of the log.
+/// Asserts that the arm with the causes reproduces the torque of the log.
 ///
-/// In units of the noise of the mean period the causes are worth 8 along one motion and 10 along
-/// the other, squares added over the joints. Of these the replay loses at most Δ²τ/4 for every
-/// reversal of joint 2 (see `replay.rs`): of ten in 10 s, Δ = 2 · 0.06 · 90 Nm and τ = 16 ms, that
-/// is 0.47 Nm² over 0.25 Nm² of noise, 1.9 of the 8. What noise leaves is itself known to
-/// √(6 · (2/1250 + 2/3750)) = 0.11, and the parameters add 52/1250 = 0.04. So the share is less
-/// than 1 by 0.24 at most, and moved by chance by 4 % (three standard deviations).
+/// In units of the noise of the mean period, the causes are worth 8 along one motion and 10 along the other, squares
+/// added over the joints. Of these, the replay loses at most Δ²τ/4 for every reversal of joint 2 (see `replay.rs`):
+/// with ten reversals in 10 s, Δ = 2 · 0.06 · 90 Nm and τ = 16 ms, that is 0.47 Nm² over 0.25 Nm² of noise, 1.9 of the
+/// 8. The share of the noise is itself known to √(6 · (2/1250 + 2/3750)) = 0.11, and the parameters add 52/1250 = 0.04.
+/// The share removed is thus below 1 by at most 0.24, and varies by chance by 4 % (three standard deviations).
 fn is_replayed(log: &Value) {
     let removed = log["removed_fraction"].as_f64().unwrap();
     assert!(removed > 0.7 && removed < 1.05, "{log}");
@@ -50,18 +49,18 @@ fn is_replayed(log: &Value) {
 #[test]
 fn what_the_example_hides_is_named() {
     let folder = hidden();
-    // A log that is held out from itself says nothing.
+    // A log cannot be held out from itself.
     let same = folder.armid("diagnose hidden.csv --robot ur5 --held-out hidden.csv");
     same.says(1, &["is held out, but it is also the log"]);
 
-    // Nor does a result of itself say what moved since.
+    // Nor can a result from the same log tell what has changed since.
     let words = "identify hidden.csv --robot ur5 --validate other.csv --json result.json";
     folder.armid(words).says(0, &[]);
     folder.result("result.json");
     let itself = folder.armid("diagnose hidden.csv --robot ur5 --sim result.json");
     itself.says(1, &["identified from the log that is diagnosed"]);
 
-    // Of another log it says little, because it is bent by what the log hides.
+    // The result says little about another log, because the effects hidden in its own log bias it.
     let words = "diagnose other.csv --robot ur5 --sim result.json --json doubtful.json";
     folder.armid(words).says(0, &[]);
     let answer = folder.result("doubtful.json");
@@ -72,7 +71,7 @@ fn what_the_example_hides_is_named() {
         assert!(cause["confidence"].as_f64().unwrap() <= 0.9, "{cause}");
     }
 
-    // All that can be asked for at once; the second log is of a flange as bare as the first.
+    // All options at once; the flange is as bare in the second log as in the first.
     let words = "diagnose hidden.csv again.csv --robot ur5 --known-payload 1 --held-out other.csv \
                  --replay --json why.json --report why.html --extended-scenario found.toml";
     let text = folder.armid(words).says(0, &[]);
@@ -88,7 +87,7 @@ fn what_the_example_hides_is_named() {
     is_replayed(&answer["replay"]["log"]);
     is_replayed(&answer["replay"]["held_out"][0]);
 
-    // The page begins with the verdict, and the scenario has the causes as physics.
+    // The page begins with the verdict, and the scenario contains the causes as physical effects.
     let verdict = "model misses friction that grows with the load on the gear";
     assert!(text.starts_with(&format!("Joint 2's {verdict}")), "{text}");
     assert!(folder.read("why.html").contains(verdict));

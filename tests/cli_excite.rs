@@ -1,4 +1,4 @@
-//! `armid excite` from the outside: exit codes, messages, and outputs that are whole or not there.
+//! `armid excite` from outside: exit codes, messages, and outputs that are complete or absent.
 
 use armid::excitation::{ClearanceModel, FourierSeries, Reference};
 use armid::robot::export::urdf;
@@ -36,7 +36,7 @@ fn a_small_design_writes_every_output() {
     assert!(folder.path("t.csv").exists() && folder.path("t.script").exists());
 }
 
-/// Exit code 3, a reason, and no file: a run without a design must not look like one with.
+/// Exit code 3, a reason, and no file: a failed design must not look like a successful one.
 #[test]
 fn an_infeasible_task_writes_nothing() {
     let folder = Folder::empty();
@@ -66,7 +66,7 @@ fn bad_input_is_named_before_the_work() {
     assert!(folder.is_empty());
 }
 
-/// A box around the shoulder: the answer is no, at once, and says why.
+/// A box around the shoulder: the command gives a negative answer at once, with the reason.
 #[test]
 fn what_no_motion_keeps_clear_of_is_a_negative_result() {
     let folder = Folder::empty();
@@ -75,7 +75,7 @@ fn what_no_motion_keeps_clear_of_is_a_negative_result() {
     assert!(!folder.path("t.json").exists());
 }
 
-/// What a URDF leaves open is said, and what cannot be watched is not promised.
+/// Gaps in a URDF are reported, and a distance that cannot be watched is not promised.
 #[test]
 fn a_robot_without_shapes_has_no_clearance() {
     let folder = Folder::empty();
@@ -96,7 +96,7 @@ fn a_robot_without_shapes_has_no_clearance() {
     run(words, 1, "--noise-nm");
 }
 
-/// A mesh of six points around each end of a capsule.
+/// A mesh with six points around each end of a capsule.
 fn mesh(capsule: &Capsule) -> String {
     let mut mesh = String::new();
     for end in [capsule.from_m, capsule.to_m] {
@@ -109,7 +109,7 @@ fn mesh(capsule: &Capsule) -> String {
     mesh
 }
 
-/// The UR5 as a URDF whose collision shapes are meshes beside it.
+/// Writes the UR5 as a URDF whose collision shapes are separate mesh files.
 fn write_ur5_with_shapes(folder: &Folder) -> Arm {
     let arm = Arm::built_in("ur5").unwrap();
     let text = urdf(&arm, &Frames::default()).unwrap();
@@ -131,7 +131,7 @@ fn write_ur5_with_shapes(folder: &Folder) -> Arm {
     arm
 }
 
-/// The smallest distance along a period, m.
+/// The smallest distance along one period, m.
 fn least_distance_m(arm: &Arm, series: &FourierSeries) -> f64 {
     let model = ClearanceModel::new(arm);
     assert!(!model.is_empty());
@@ -146,7 +146,8 @@ fn least_distance_m(arm: &Arm, series: &FourierSeries) -> f64 {
     least_m
 }
 
-/// Clear of itself and the floor, as its shapes say, and as the capsules do that these are made of.
+/// The motion keeps clear of the arm itself and the floor, by the model from the collision shapes and by the original
+/// capsules from which the shapes were made.
 #[test]
 fn an_arm_with_collision_shapes_is_kept_clear() {
     let folder = Folder::empty();
@@ -169,7 +170,7 @@ fn an_arm_with_collision_shapes_is_kept_clear() {
     assert!(least_m > 0.0, "{least_m} m");
     let inputs = folder.result("t.json")["program"]["inputs"].as_array().unwrap().len();
     assert_eq!(inputs, 2 + 8, "URDF, drive file, meshes");
-    // Folded onto itself: which links, and what may be done.
+    // For an arm folded onto itself, the message names the links and the remedy.
     let folded = excite(&folder, &format!("{words} --offsets 0,-1.57,3.1,0,0,0"));
     folded.complains(1, &["no pose the arm may take: clearance of ", "_link", "unwatched_pairs"]);
     folder.write("arm.drives.toml", "clearance = \"none\"\n");

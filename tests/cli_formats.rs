@@ -1,14 +1,13 @@
-//! `sims/example.toml` knows every key of a scenario. Whether `docs/formats.md` knows every key of
-//! a result, the tests of each command find out where they read one:
-//! [`Folder::result`](crate::cli::Folder::result).
+//! `sims/example.toml` shows every key of a scenario. The tests of the commands check that `docs/formats.md` describes
+//! every key of a result, whenever they read one: [`Folder::result`](crate::cli::Folder::result).
 
 use std::collections::BTreeSet;
 use std::path::Path;
 
 use crate::cli::{keys, words};
 
-/// `sims/example.toml` has every key of the tables that it shows, and a left-out line of `[plant]` and `[processing]` means what
-/// stands there.
+/// `sims/example.toml` has every key of the tables that it shows; its values in `[plant]` and `[processing]` are the
+/// defaults of keys left out.
 #[test]
 fn the_example_of_a_scenario_is_complete() {
     use armid::identify::Options;
@@ -23,7 +22,7 @@ fn the_example_of_a_scenario_is_complete() {
     keys(&serde_json::to_value(PlantConfig::default()).unwrap(), &mut wanted);
     keys(&serde_json::to_value(SensorConfig::default()).unwrap(), &mut wanted);
     keys(&serde_json::to_value(Options::default()).unwrap(), &mut wanted);
-    // A key whose line may be left out stands behind a comment mark.
+    // Optional keys may be shown in a comment.
     let shown: BTreeSet<String> =
         text.lines().flat_map(|line| words(line.trim_start_matches("# "))).collect();
     let missing: Vec<&String> = wanted.difference(&shown).collect();

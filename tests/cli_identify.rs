@@ -1,10 +1,10 @@
-//! `armid` and `montecarlo` as a user runs them: exit codes, messages, and nothing written half.
+//! `armid` and `montecarlo` as a user runs them: exit codes, messages, and no half-written files.
 
 use serde_json::Value;
 
 use crate::cli::{Folder, default_scenario};
 
-/// A log in the default layout: joint `j` moves as `amplitude[j]` rad × a sum of sines.
+/// A log in the default layout: joint `j` moves as `amplitude[j]` rad × a sum of two sines.
 fn log(amplitude: [f64; 6], samples: usize) -> String {
     let names = |what: &str| (0..6).map(|j| format!("{what}_{j}")).collect::<Vec<_>>().join(",");
     let (q, qd, torque) = (names("actual_q"), names("actual_qd"), names("actual_torque"));
@@ -66,13 +66,14 @@ fn a_motion_that_does_not_excite_the_arm_is_a_negative_result_not_an_error() {
     assert_eq!(result["schema"], "armid.identify/1");
     assert_eq!(result["verdict"], "not_identified");
     assert!(result["not_identified"].as_array().unwrap().iter().any(|name| name == "rv4"));
-    // The same of a diagnosis, which needs the model.
+    // A diagnosis needs the model and declines as well.
     let words = "diagnose log.csv --robot ur5 --json result.json";
     folder.armid(words).says(3, &["declined", "armid excite"]);
     assert_eq!(folder.result("result.json")["verdict"], "declined");
 }
 
-/// Torques of which the sign was exchanged fit as well as others: drives push then, and the arm falls upward.
+/// Torques with reversed sign fit as well as correct ones, but friction then drives the joints and the arm falls
+/// upwards.
 #[test]
 fn what_no_arm_has_is_a_negative_result() {
     let folder = Folder::empty();
@@ -94,7 +95,7 @@ fn what_no_arm_has_is_a_negative_result() {
         folder.armid(&words).says(3, &told);
         assert_eq!(folder.result("result.json")["verdict"], verdict);
     }
-    // It stands, and its description hangs.
+    // The arm stands, but its description says that it hangs.
     folder.armid("simulate --out log.csv").says(0, &[]);
     let robot = include_str!("../robots/ur5.toml").replace("-9.81]", "9.81]");
     folder.write("hanging.toml", robot);
@@ -105,7 +106,7 @@ fn what_no_arm_has_is_a_negative_result() {
     }
 }
 
-/// What was not recorded is no motion that excites too little.
+/// A torque that was not recorded must not be reported as insufficient excitation.
 #[test]
 fn a_torque_that_never_changes_is_told_by_its_joint() {
     let folder = Folder::empty();
@@ -120,7 +121,7 @@ fn a_torque_that_never_changes_is_told_by_its_joint() {
         };
         text.lines().enumerate().map(of_row).collect::<Vec<_>>().join("\n")
     };
-    // Behind the time six angles and six velocities.
+    // The torque columns follow the time, six angles and six velocities.
     for (dead, joint) in [(13..19, "joint 1"), (15..16, "joint 3")] {
         folder.write("log.csv", without(dead));
         for task in ["identify", "diagnose"] {
@@ -144,7 +145,7 @@ fn usage_errors_of_the_main_job_exit_with_2() {
     refused("merge no-folder", 1, "no-folder");
 }
 
-/// A run of a few trials that have no place to say more than their number.
+/// A run with too few trials for a verdict; it reports their number.
 #[test]
 fn the_main_job_writes_what_it_is_asked_for() {
     let folder = Folder::empty();
@@ -154,7 +155,7 @@ fn the_main_job_writes_what_it_is_asked_for() {
     let text = folder.read("mc.md");
     assert!(text.contains("## Parameters") && text.contains("| rv1"), "{text}");
     assert_eq!(folder.result("mc.json")["trials"], 3);
-    // One trial alone has no summary to write.
+    // A single trial has no summary to write.
     let alone = folder.montecarlo("--scenario s.toml --trial 1 --json t.json");
     alone.says(2, &["--json"]);
 }
@@ -165,20 +166,20 @@ fn unknown_keys_of_a_scenario_are_errors_that_name_them() {
     let default = default_scenario(8);
     folder.write("x.toml", default.replace("trials =", "trails ="));
     folder.montecarlo("--scenario x.toml").says(1, &["x.toml", "trails"]);
-    // So are things that the plant does not have.
+    // Effects that the plant does not have are errors too.
     let effect = "\n[[effect]]\nkind = \"load_friction\"\njoint = 7\nmu = 0.05\n";
     folder.write("x.toml", default + effect);
     folder.montecarlo("--scenario x.toml").says(1, &["x.toml: effect 1", "joint = 7"]);
 }
 
-/// One period of `robot`, begun within a second: a longer way into it leads joint 3 of a UR5 past
-/// its limit.
+/// One period of `robot` with a run-in of one second: a longer run-in would move joint 3 of a UR5 past its limit.
 fn one_period(robot: &str) -> String {
     let scenario = default_scenario(1).replace("\n[sensors]", "run_in_s = 1.0\n\n[sensors]");
     scenario.replace("robot = \"ur5\"", &format!("robot = \"{robot}\""))
 }
 
-/// Nothing stops the simulated arm at a position, speed or acceleration; a motion for another one is said to be none for it.
+/// Nothing stops the simulated arm at a limit of position, speed or acceleration, so a motion designed for another arm
+/// is reported as exceeding the limits.
 #[test]
 fn a_motion_that_is_too_fast_for_its_arm_is_told() {
     let folder = Folder::empty();
@@ -193,14 +194,13 @@ fn a_motion_that_is_too_fast_for_its_arm_is_told() {
     }
 }
 
-/// How a log is read and processed: each option shows in the result, and a wrong value of each is
-/// named.
+/// How a log is read and processed: each option shows in the result, and each wrong value is named in an error.
 #[test]
 fn what_is_chosen_of_the_processing_is_what_is_done() {
     let folder = Folder::empty();
     folder.write("s.toml", one_period("ur5"));
     folder.armid("simulate --scenario s.toml --out log.csv").says(0, &["samples"]);
-    // The torques as currents of drives that make 2 Nm of an ampere.
+    // The torques are read as currents of drives with 2 Nm/A.
     let layout = "name = \"mine\"\nheader = true\ndrive_gain_nm_a = [2, 2, 2, 2, 2, 2]\n\
                   [columns]\ntime = \"timestamp\"\nq = \"actual_q_{0}\"\n\
                   qd = \"actual_qd_{0}\"\ncurrent = \"actual_torque_{0}\"\n";
@@ -256,7 +256,7 @@ fn a_simulated_log_goes_through_identify_and_the_base_set_is_printed() {
     let words = "identify log.csv --robot ur5 --json r.json --report r.html";
     folder.armid(words).says(0, &["Identified 52 base parameters"]);
     let (result, truth) = (folder.result("r.json"), folder.result("t.json"));
-    // Viscous friction of joint 1 is a base parameter by itself: no combination to compute.
+    // Viscous friction of joint 1 is a base parameter of its own: no combination has to be computed.
     let of = |list: &Value, name: &str| {
         list.as_array().unwrap().iter().find(|p| p["name"] == name).unwrap().clone()
     };
@@ -264,13 +264,13 @@ fn a_simulated_log_goes_through_identify_and_the_base_set_is_printed() {
     let true_value = of(&truth["standard_parameters"], "rv1")["value"].as_f64().unwrap();
     let z =
         (estimate["value"].as_f64().unwrap() - true_value) / estimate["sigma"].as_f64().unwrap();
-    // Fixed seed; a correct σ exceeds 8 of Student's t with few degrees of freedom once in 1e3.
+    // Fixed seed. With a correct σ, |z| exceeds 8 for Student's t with few degrees of freedom once in 1e3.
     assert!(z.abs() < 8.0, "z = {z}");
     assert_eq!(result["processing"]["periods"], 4);
     assert!(folder.read("r.html").contains("Identified parameters"));
 
     folder.armid("identify log.csv log.csv --robot ur5").says(1, &["are the same log"]);
-    // Nor does it become another one by other line ends, or by its second half.
+    // Other line ends, or only its second half, do not make it another log.
     let text = folder.read("log.csv");
     let rows: Vec<&str> = text.lines().collect();
     let half = [&rows[..1], &rows[rows.len() / 2..]].concat().join("\r\n");
@@ -283,7 +283,8 @@ fn a_simulated_log_goes_through_identify_and_the_base_set_is_printed() {
     assert_eq!(folder.result("base.json")["rank"], 33);
 }
 
-/// Another day's log of the same arm: one page, σ from the scatter between the periods of each; and what cannot stand alone.
+/// Two logs of the same arm give one page, with σ from the scatter between the periods of each. Logs that cannot stand
+/// alone are pooled.
 #[test]
 fn several_logs_become_one_estimate_if_each_can_stand_alone() {
     let folder = Folder::empty();
@@ -309,8 +310,8 @@ fn several_logs_become_one_estimate_if_each_can_stand_alone() {
     let both = result("0.csv 1.csv --report both.html", &said);
     assert!(folder.read("both.html").contains("Torque along the training log"));
     assert_eq!(both["samples"].as_u64(), Some(2 * alone["samples"].as_u64().unwrap()));
-    // The same motion twice: σ falls by √2. Each is known to 1/√(2ν) = 16 %, ν of some 20 per log of 4 periods; that of both
-    // shares its scatter, and the median over 52 parameters is off by a fifth at most.
+    // The same motion twice: σ falls by √2. Each σ is known to 1/√(2ν) = 16 %, with ν of about 20 per log of 4 periods.
+    // The σ of both logs shares part of that error, and the median over 52 parameters is off by at most a fifth.
     let sigma = |result: &Value| -> Vec<f64> {
         let list = result["base_parameters"].as_array().unwrap();
         list.iter().map(|p| p["sigma"].as_f64().unwrap()).collect()
@@ -320,28 +321,28 @@ fn several_logs_become_one_estimate_if_each_can_stand_alone() {
     ratios.sort_by(f64::total_cmp);
     assert!((ratios[26] / 2f64.sqrt() - 1.0).abs() < 0.2, "{}", ratios[26]);
 
-    // The arm with half a kilogram on its flange is another.
+    // With half a kilogram on its flange, the arm is another arm.
     let said = ["the logs contradict each other", "identify each log alone"];
     let other = result("0.csv 2.csv", &said);
     assert_eq!(other["intervals"]["trusted"], false);
     assert!(other["intervals"]["agreement"]["p_value"].as_f64().unwrap() < 1e-3);
 
-    // What cannot stand alone takes the others along, and it is said why: a log that does not repeat, and one whose periods are
-    // the same to the last digit.
+    // A log that cannot stand alone makes all logs count as single runs, and the reason is reported: a log that does
+    // not repeat, and one whose periods are identical to the last digit.
     let text = folder.read("1.csv");
     let rows: Vec<&str> = text.lines().collect();
     folder.write("run.csv", rows[..2000].join("\n") + "\n");
     let said =
         ["2 logs one below the other", "run.csv cannot stand alone: its motion does not repeat"];
     result("0.csv run.csv", &said);
-    // Behind the run-in of half a second.
+    // The copied rows begin after the run-in of half a second.
     let tiled = (0..6 * 1250).map(|k| {
         let (_, values) = rows[100 + k % 1250].split_once(',').unwrap();
         format!("\n{:.6},{values}", 0.008 * k as f64)
     });
     folder.write("copies.csv", rows[0].to_owned() + &tiled.collect::<String>() + "\n");
     result("0.csv copies.csv", &["2 logs one below the other", "copies.csv cannot stand alone"]);
-    // By itself it is identified all the same, by what its residual says of noise; nothing of it is without a number.
+    // Alone, this log is still identified, with the noise estimated from its residual; no parameter lacks σ.
     let said = ["alike to the last digit, and show no noise", "Identified 52"];
     let of_copies = result("copies.csv", &said);
     assert!(sigma(&of_copies).iter().all(|sigma| *sigma > 0.0));

@@ -1,4 +1,4 @@
-//! `docs/formats.md` against what the commands write.
+//! Compares `docs/formats.md` with what the commands write.
 
 use std::collections::BTreeSet;
 
@@ -21,12 +21,12 @@ pub fn words(text: &str) -> Vec<String> {
     split.map(str::to_owned).collect()
 }
 
-/// What stands in back ticks in `markdown`.
+/// The words in back ticks in `markdown`.
 fn quoted(markdown: &str) -> BTreeSet<String> {
     markdown.split('`').skip(1).step_by(2).flat_map(words).collect()
 }
 
-/// What stands outside of comments in the scenarios that the description refers to.
+/// The words outside of comments in the scenarios that the description refers to.
 fn of_scenarios() -> BTreeSet<String> {
     let scenarios =
         [include_str!("../../sims/example.toml"), include_str!("../../sims/effects.toml")].concat();
@@ -34,8 +34,7 @@ fn of_scenarios() -> BTreeSet<String> {
     lines.flat_map(words).collect()
 }
 
-/// The part of `markdown` below `heading`, down to the next heading of the same level or a higher
-/// one.
+/// The part of `markdown` below `heading`, up to the next heading of the same or a higher level.
 fn section<'a>(markdown: &'a str, heading: &str) -> &'a str {
     let level = heading.split(' ').next().unwrap().len();
     let start = markdown.find(&format!("{heading}\n")).unwrap_or_else(|| panic!("{heading}"));
@@ -54,7 +53,7 @@ fn section<'a>(markdown: &'a str, heading: &str) -> &'a str {
     &body[..end]
 }
 
-/// Asserts that the description of its format knows every key of `result`, the contents of `file`.
+/// Asserts that the description of the format mentions every key in `result`, the content of `file`.
 pub fn assert_described(file: &str, result: &Value) {
     let schema = result["schema"].as_str().unwrap_or_else(|| panic!("{file} has no schema"));
     let format = schema.split('/').next().unwrap();
@@ -68,7 +67,7 @@ pub fn assert_described(file: &str, result: &Value) {
     let of_all = section(description, "## Results").split("\n### ").next().unwrap();
     let mut known = quoted(&[of_all, section(description, heading)].concat());
     if format == "armid.truth" {
-        // It repeats what was hidden and the noise, as the scenario has them.
+        // This file repeats the hidden effects and the noise in the form of the scenario.
         known.extend(of_scenarios());
     }
     let mut found = BTreeSet::new();

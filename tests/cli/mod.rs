@@ -1,4 +1,4 @@
-//! The programs as a user runs them: by their words, in a folder that every test has for itself.
+//! Runs the programs as a user does: by command line, each test in a folder of its own.
 
 mod described;
 
@@ -10,13 +10,13 @@ use tempfile::TempDir;
 
 pub use described::{keys, words};
 
-/// The default scenario with so many periods.
+/// The default scenario with this number of periods.
 pub fn default_scenario(periods: usize) -> String {
     let text = include_str!("../../sims/default.toml");
     text.replace("periods = 8", &format!("periods = {periods}"))
 }
 
-/// A folder in which programs run, so that files go by their names alone.
+/// A folder in which programs run, so that file names need no path.
 pub struct Folder(TempDir);
 
 impl Folder {
@@ -32,7 +32,7 @@ impl Folder {
         self.0.path().join(name)
     }
 
-    /// Writes a file, and the folder that it is to be in.
+    /// Writes a file, and creates its folder if necessary.
     pub fn write(&self, name: &str, text: impl AsRef<[u8]>) {
         let path = self.path(name);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -47,7 +47,7 @@ impl Folder {
         serde_json::from_str(&self.read(name)).unwrap()
     }
 
-    /// A result for users: `docs/formats.md` has to know every key of it.
+    /// Reads a result for users; `docs/formats.md` must describe every key of it.
     pub fn result(&self, name: &str) -> Value {
         let result = self.json(name);
         described::assert_described(name, &result);
@@ -62,7 +62,7 @@ impl Folder {
         Said::by(self.montecarlo_command(words))
     }
 
-    /// Not started yet, for what a test has to do while it runs.
+    /// A command that is not started yet, for tests that act while it runs.
     pub fn montecarlo_command(&self, words: &str) -> Command {
         self.command(env!("CARGO_BIN_EXE_montecarlo"), words)
     }
@@ -74,7 +74,7 @@ impl Folder {
     }
 }
 
-/// How a program ended, and what it said.
+/// Exit code and output of a program.
 pub struct Said {
     command: String,
     code: Option<i32>,
@@ -90,7 +90,7 @@ impl Said {
         Self { command: format!("{command:?}"), code: status.code(), stdout, stderr }
     }
 
-    /// Asserts the exit code and that the terminal shows all of `words`; returns what it shows.
+    /// Asserts the exit code and that the terminal shows all of `words`; returns the text of the terminal.
     pub fn says(&self, code: i32, words: &[&str]) -> String {
         let text = format!("{}{}", self.stdout, self.stderr);
         assert_eq!(self.code, Some(code), "{}: {text}", self.command);
@@ -98,7 +98,7 @@ impl Said {
         text
     }
 
-    /// The same of stderr alone, where errors and notes belong.
+    /// The same for stderr alone, where errors and notes belong.
     pub fn complains(&self, code: i32, words: &[&str]) {
         self.says(code, &[]);
         self.contains(&self.stderr, words);
