@@ -39,8 +39,8 @@ fn holds(cause: &Value, name: &str, truth: f64) {
 /// In units of the noise of the mean period, the causes are worth 8 along one motion and 10 along the other, squares
 /// added over the joints. Of these, the replay loses at most Δ²τ/4 for every reversal of joint 2 (see `replay.rs`):
 /// with ten reversals in 10 s, Δ = 2 · 0.06 · 90 Nm and τ = 16 ms, that is 0.47 Nm² over 0.25 Nm² of noise, 1.9 of the
-/// 8. The share of the noise is itself known to √(6 · (2/1250 + 2/3750)) = 0.11, and the parameters add 52/1250 = 0.04.
-/// The share removed is thus below 1 by at most 0.24, and varies by chance by 4 % (three standard deviations).
+/// 8. The contribution of the noise is itself known to √(6 · (2/1250 + 2/3750)) = 0.11, and the parameters add 52/1250
+/// = 0.04. The share removed is thus below 1 by at most 0.24, and varies by chance by 4 % (three standard deviations).
 fn is_replayed(log: &Value) {
     let removed = log["removed_fraction"].as_f64().unwrap();
     assert!(removed > 0.7 && removed < 1.05, "{log}");

@@ -1,5 +1,4 @@
-//! `montecarlo` in parts, as many machines run it: shards, what goes on after a stop, what is put
-//! together, and what is refused.
+//! `montecarlo` run in parts, as on many machines: shards, resuming after a stop, merging, and what is refused.
 
 use std::sync::OnceLock;
 
@@ -7,16 +6,15 @@ use serde_json::{Value, json};
 
 use crate::cli::{Folder, default_scenario};
 
-/// Of one run the options that all its parts share.
+/// Options that all parts of one run share.
 const RUN: &str = "--scenario s.toml --trials 6";
 
-/// File of the shard with the trials from `first` to before `end`.
+/// File name of the shard with trials `first..end`.
 fn file_of(folder: &str, first: u64, end: u64) -> String {
     format!("{folder}/shard-{first:012}-{end:012}.json")
 }
 
-/// Six trials of 20 s as one run, with its result in `whole.json`, and as two shards, in `a` and in
-/// `b`.
+/// Six trials of 20 s, run as a whole with its result in `whole.json`, and as two shards in `a` and `b`.
 fn runs() -> &'static Folder {
     static FOLDER: OnceLock<Folder> = OnceLock::new();
     FOLDER.get_or_init(|| {
@@ -33,7 +31,7 @@ fn runs() -> &'static Folder {
     })
 }
 
-/// What a result says of the trials: all but how it was called and how long it took.
+/// A result without its command and speed: only what it says about the trials.
 fn of_trials(folder: &Folder, name: &str) -> Value {
     let mut result = folder.result(name);
     for key in ["program", "trials_per_second"] {
@@ -42,14 +40,14 @@ fn of_trials(folder: &Folder, name: &str) -> Value {
     result
 }
 
-/// Copies shard 0 of 2 to `to` as `change` makes it.
+/// Copies shard 0 of 2 to `to`, modified by `change`.
 fn changed(folder: &Folder, to: &str, change: impl Fn(&mut Value)) {
     let mut first = folder.json(&file_of("a", 0, 3));
     change(&mut first);
     folder.write(to, first.to_string());
 }
 
-/// Shard 0 of 2, as the whole run of `trials` would have left it when it was stopped after three.
+/// Shard 0 of 2, rewritten as the shard of a whole run of `trials` that was stopped after three.
 fn stopped(folder: &Folder, to: &str, trials: u64) {
     changed(folder, &file_of(to, 0, trials), |shard| {
         shard["header"]["trials"] = trials.into();
@@ -60,7 +58,7 @@ fn stopped(folder: &Folder, to: &str, trials: u64) {
 #[test]
 fn shards_together_are_the_run_in_one_bit_for_bit() {
     let folder = runs();
-    // One of many does not miss what the others run.
+    // A single shard does not count the trials of other shards as missing.
     let alone = folder.result("a.json");
     assert_eq!((&alone["trials"], &alone["missing"]), (&json!(3), &json!([])));
     let whole = of_trials(folder, "whole.json");
@@ -71,7 +69,7 @@ fn shards_together_are_the_run_in_one_bit_for_bit() {
     }
 }
 
-/// What was done is written; only the exit code says that it is not all.
+/// Finished trials are written; the exit code alone says that some are missing.
 #[test]
 fn a_part_ends_with_130_and_names_the_missing_trials() {
     let folder = runs();
@@ -95,7 +93,7 @@ fn a_stopped_run_goes_on_where_it_was() {
     };
     refused("", &[&file, "exists: give --resume"]);
     refused("--resume --seed 7", &[&file, "seed is 20200601", "7: not the same run"]);
-    // The second time nothing is left to do.
+    // The second time, nothing is left to do.
     for done in [3, 6] {
         let said = format!("going on after {done} trials");
         let words = format!("{RUN} --out half --resume --json resumed.json");
@@ -115,12 +113,12 @@ fn shards_that_do_not_belong_together_are_refused() {
     stopped(folder, "over", 6);
     let another = "are in another shard too";
     refused("a over", &[&file_of("over", 0, 6), another]);
-    // What it was to run and did not, another one may have.
+    // Trials assigned to one shard but not run may come from another one.
     folder.montecarlo("merge b over --json both.json").says(0, &["6 trials"]);
     assert_eq!(of_trials(folder, "both.json"), of_trials(folder, "whole.json"));
     refused("a a", &[&file_of("a", 0, 3), "trials 0…2", another]);
 
-    // Behind the first one, which the others are compared with.
+    // These shards come after the first one, with which they are compared.
     let later = |folder: &str| file_of(folder, 3, 6);
     folder.montecarlo(&format!("{RUN} --shard 1/2 --out seed --seed 7")).says(0, &[]);
     refused("a seed", &[&later("seed"), "seed is 7", "20200601: not the same run"]);
@@ -140,17 +138,17 @@ fn shards_that_do_not_belong_together_are_refused() {
     let whole = folder.read(&later("b"));
     folder.write(&later("cut"), &whole[..whole.len() / 2]);
     refused("a cut", &[&later("cut"), "not a shard file this program can read"]);
-    // A number of trials that are not in its sums.
+    // The number of trials does not match the sums in the file.
     changed(folder, &file_of("more", 0, 3), |shard| shard["next"] = json!(2));
     refused("more b", &[&file_of("more", 0, 3), "3 trials do not fit 0…2"]);
     folder.write("empty/note.txt", "nothing yet");
     refused("a empty", &["empty: no shard files"]);
-    // Nor is any of it gone on with.
+    // A damaged shard is not resumed either.
     let cut = folder.montecarlo(&format!("{RUN} --shard 1/2 --out cut --resume"));
     cut.complains(1, &[&later("cut"), "not a shard file this program can read"]);
 }
 
-/// Ctrl-C ends a run behind the trials that are under way.
+/// Ctrl-C ends a run after the trials that are in progress.
 #[cfg(unix)]
 #[test]
 fn an_interrupted_run_keeps_what_it_has() {
@@ -168,7 +166,7 @@ fn an_interrupted_run_keeps_what_it_has() {
         .unwrap();
     let mut lines = BufReader::new(run.stderr.take().unwrap()).lines().map(Result::unwrap);
     assert!(lines.any(|line| line.starts_with("going on after 3 trials")));
-    // It listens already, and has some ten seconds of trials before it.
+    // The handler is already installed, and about ten seconds of trials remain.
     let signal = format!("kill -INT {}", run.id());
     assert!(Command::new("sh").args(["-c", &signal]).status().unwrap().success());
     let said: Vec<String> = lines.collect();

@@ -1,5 +1,5 @@
-//! From a log to an arm that simulators accept and back into the plant, as a user does it:
-//! `identify --physical`, `export`, `simulate --arm`.
+//! From a log to an arm that simulators accept, and back into the plant, as a user does it: `identify --physical`,
+//! `export`, `simulate --arm`.
 
 use std::sync::OnceLock;
 
@@ -17,7 +17,7 @@ fn parameter(result: &Value, list: &str, name: &str) -> f64 {
     found.unwrap_or_else(|| panic!("no {name}"))["value"].as_f64().unwrap()
 }
 
-/// The default scenario with 4 periods, its log and what is identified from it.
+/// A folder with the default scenario for 4 periods, its log and the result of its identification.
 fn identified() -> &'static Folder {
     static FOLDER: OnceLock<Folder> = OnceLock::new();
     FOLDER.get_or_init(|| {
@@ -51,15 +51,16 @@ fn a_clean_log_gives_an_arm_with_a_certificate() {
     let physical = &result["physical"];
     assert_eq!(physical["model_is_wrong"], false);
     let number = |key: &str| physical[key].as_f64().unwrap();
-    // The solver's own claim: 1e-8 of 1 + objective.
+    // The accuracy that the solver guarantees: 1e-8 of 1 + objective.
     assert!(number("duality_gap") <= 1e-8 * (1.0 + number("objective")), "{physical}");
     assert!(number("p_value") > 0.01, "{physical}");
     let page = folder.read("r.html");
     assert!(page.contains("Standard parameters that an arm can have"));
 }
 
-/// A simulation without noise, of a light arm whose friction is nothing but damping: what round-off leaves of the torque is no
-/// evidence against an arm whose Coulomb friction and rotor inertia are zero, on the boundary of what can exist.
+/// A simulation without noise, of a light arm with viscous friction only. The rounding errors that remain in the torque
+/// must not count as evidence against zero Coulomb friction and rotor inertia, which lie on the boundary of physical
+/// arms.
 #[test]
 fn a_log_without_noise_gives_an_arm() {
     let folder = Folder::empty();
@@ -98,7 +99,8 @@ fn a_log_without_noise_gives_an_arm() {
     assert!(!text.contains("the model is wrong"), "{text}");
     let (result, truth) = (folder.result("result.json"), folder.result("truth.json"));
     assert!(result["physical"]["p_value"].as_f64().unwrap() > 0.01, "{}", result["physical"]);
-    // The noise counts as 1e-4 of the torque: σ stands for that, and what is left of the torque is some hundred times less.
+    // The noise is taken as 1e-4 of the torque, and σ follows from that; the remaining torque is about a hundred times
+    // smaller.
     for p in result["standard_parameters"].as_array().unwrap() {
         let Some(sigma) = p["sigma"].as_f64() else { continue };
         let name = p["name"].as_str().unwrap();
@@ -110,10 +112,11 @@ fn a_log_without_noise_gives_an_arm() {
     }
 }
 
-/// The robot file that stands behind the estimate is wrong by 10 to 20 % of every link. σ is stated for what the data
-/// decide and holds there: a file wrong by all of it would move it by less than σ, this one by a fifth of that, and noise
-/// exceeds 5.8 σ of Student's t with 20 degrees of freedom once in 1e5, some 45 times. The mass of the first
-/// body, which turns about a vertical axis, shows in no torque, and that of the others only in combinations.
+/// The robot file that serves as prior is wrong by 10 to 20 % for every link. σ is stated only for what the data
+/// decide, and must hold there: a file wrong by 100 % would move these estimates by less than σ, this one by at most a
+/// fifth of that. Noise exceeds 5.8 σ of Student's t with 20 degrees of freedom once in 1e5, in about 45 parameters.
+/// The mass of the first body, which turns about a vertical axis, has no effect on any torque; those of the others
+/// appear only in combinations.
 #[test]
 fn sigma_is_stated_for_what_the_data_decide() {
     let folder = identified();
@@ -181,7 +184,8 @@ fn the_weight_of_the_prior_is_cross_validated_and_shown() {
     folder.armid("identify log.csv --robot ur5 --prior entropic").says(2, &["--physical"]);
 }
 
-/// Torque that is logged late makes rotor inertias negative, as the paper's are, and a friction that pushes, which no arm has.
+/// Torque that is logged late makes rotor inertias negative, as in the paper, and gives friction that drives the
+/// joints, which no arm has.
 #[test]
 fn a_wrong_model_is_called_wrong_and_sent_to_diagnose() {
     let folder = Folder::empty();
@@ -216,7 +220,7 @@ fn both_formats_are_exported_and_the_urdf_comes_back_with_its_drives() {
             |kind: &str| parameter(&result, "standard_parameters", &format!("{kind}{}", j + 1));
         assert_eq!(joint.drive.rotor_inertia_kg_m2, value("Ia"));
         assert_eq!(joint.drive.coulomb_nm, value("rc"));
-        // Through the centre of mass and back: a few roundings.
+        // Converted to the centre of mass and back: a few rounding errors.
         assert!((joint.link.mass_kg() / value("m") - 1.0).abs() < 1e-14);
         assert!((joint.link.parameters[4] - value("A")).abs() < 1e-13);
     }
@@ -224,8 +228,8 @@ fn both_formats_are_exported_and_the_urdf_comes_back_with_its_drives() {
     assert!(text.contains("a.drives.toml"), "{text}");
 }
 
-/// URDF in, URDF out: the same links, joints, limits and frames of another identification. Its arm stands in a world, as
-/// those of ROS do: "base_link" is no root.
+/// URDF in, URDF out: the same links, joints, limits and frames after another identification. As in ROS, the arm stands
+/// in a world, so that "base_link" is not the root.
 #[test]
 fn a_robot_that_came_as_urdf_leaves_as_urdf() {
     let folder = identified();
@@ -257,7 +261,7 @@ fn a_robot_that_came_as_urdf_leaves_as_urdf() {
     }
     let other = folder.armid("export in.json --urdf x.urdf --robot ur10e");
     other.says(1, &["in.json", "\"ur5\"", "\"ur10e\""]);
-    // Of the same name, and its wrist a centimetre longer.
+    // An arm of the same name whose wrist is a centimetre longer.
     let arm = Arm::built_in("ur5").unwrap();
     let longer = arm.to_toml().replacen("xyz_m = [-0.39225,", "xyz_m = [-0.40225,", 1);
     assert_ne!(longer, arm.to_toml());
@@ -271,7 +275,7 @@ fn a_robot_that_came_as_urdf_leaves_as_urdf() {
     assert!(!folder.path("x.urdf").exists());
 }
 
-/// A URDF without what is identified, word by word.
+/// The words of a URDF without the parts that identification changes.
 fn not_identified(urdf: &str) -> Vec<String> {
     let cut = |text: &str, from: &str, to: &str| {
         let mut parts = text.split(from);
@@ -282,8 +286,8 @@ fn not_identified(urdf: &str) -> Vec<String> {
     rest.split_whitespace().map(str::to_owned).collect()
 }
 
-/// The user's own file has the identified numbers, and what else is in it is there as before. Its joints are tilted, and a
-/// tool is bolted to the last link.
+/// The exported URDF is the user's own file with the identified numbers; everything else in it is unchanged. Its joints
+/// are tilted, and a tool is bolted to the last link.
 #[test]
 fn a_urdf_is_given_back_with_its_identified_numbers() {
     let folder = Folder::empty();
@@ -321,7 +325,7 @@ fn a_urdf_is_given_back_with_its_identified_numbers() {
         let value =
             |kind: &str| parameter(&result, "standard_parameters", &format!("{kind}{}", j + 1));
         let body = ["m", "mx", "my", "mz", "A", "B", "C", "D", "E", "F"].map(value);
-        // Through frames, centres of mass and back: some roundings of the largest.
+        // Converted through frames and centres of mass and back: some rounding errors of the largest value.
         let size = body.iter().fold(0.0_f64, |size, p| size.max(p.abs()));
         for (found, expected) in joint.link.parameters.iter().zip(body) {
             assert!((found - expected).abs() < 1e-12 * size, "{}: {found} {expected}", joint.name);
@@ -330,7 +334,8 @@ fn a_urdf_is_given_back_with_its_identified_numbers() {
         assert_eq!(joint.drive.viscous_nm_s_rad, value("rv"));
         assert_eq!(joint.drive.coulomb_nm, value("rc"));
     }
-    // It is found by the name in the result, from here or beside that, or by the scenario.
+    // The robot file is found by its name in the result, from the working folder or beside the result, or through the
+    // scenario.
     let words = "export result.json --urdf again.urdf";
     folder.armid(words).says(0, &["again.urdf: own.urdf with the inertia of 3 links"]);
     assert_eq!(folder.read("again.urdf"), written);
@@ -405,14 +410,14 @@ fn torque_nm(log: &str) -> Vec<Vec<f64>> {
     columns.iter().map(|&c| rows.iter().map(|row| row[c].parse().unwrap()).collect()).collect()
 }
 
-/// The identified arm in closed loop along the motion of the log.
+/// The identified arm, in closed loop, reproduces the torque of the log.
 ///
-/// Against the noise-free truth: the squared difference in units of the noise, summed over joints and
-/// samples, is ‖X (θ̂ − θ)‖², which for least squares is χ² with 52 degrees of freedom and less for an
-/// estimate that is projected onto a convex set which holds the truth. Weights from the scatter of 4
-/// periods cost some of the efficiency and the run-in is not in the data: a factor of 2. 97 is the
-/// 1e-4 quantile. Against the log: the noise's own rms, known to 1/√(2·5250) = 1 % per joint, four
-/// of them for six joints (4e-4), and the difference above, which adds less than 1 %.
+/// Against the noise-free truth: the squared difference in units of the noise, summed over joints and samples, is ‖X
+/// (θ̂ − θ)‖². For least squares this is χ² with 52 degrees of freedom, and it is smaller for an estimate projected
+/// onto a convex set that holds the truth. Weights from the scatter of 4 periods lose some efficiency, and the run-in
+/// is not in the data: a factor of 2. 97 is the quantile for 1e-4. Against the log: the rms of the noise, known to
+/// 1/√(2·5250) = 1 % per joint; four of these for six joints (4e-4), and the difference above, which adds less than 1
+/// %.
 #[test]
 fn the_identified_arm_moves_in_closed_loop_as_the_log_says() {
     let folder = identified();

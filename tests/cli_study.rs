@@ -1,5 +1,5 @@
-//! `armid study paper`, `armid study cutoff` and `armid study noise` as a user runs them, with as few trials as there
-//! can be.
+//! `armid study paper`, `armid study cutoff` and `armid study noise` as a user runs them, with as few trials as
+//! possible.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::cli::Folder;
 
-/// Runs a study and returns its JSON and Markdown; the page must be there too.
+/// Runs a study and returns its JSON and Markdown; checks that the page exists.
 fn study(folder: &Folder, words: &str) -> (Value, String) {
     let outputs = "--trials 2 --json a.json --markdown a.md --report a.html";
     folder.armid(&format!("study {words} {outputs}")).says(0, &[]);
@@ -16,7 +16,7 @@ fn study(folder: &Folder, words: &str) -> (Value, String) {
     (folder.json("a.json"), folder.read("a.md"))
 }
 
-/// `file` of `sims/` with `old` replaced by `new`; its relative paths hold in any folder.
+/// `file` of `sims/` with `old` replaced by `new`, and relative paths made absolute.
 fn changed(file: &str, old: &str, new: &str) -> String {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(root.join("sims").join(file)).unwrap();
@@ -39,8 +39,8 @@ fn the_paper_is_repeated_and_its_negative_rotor_inertias_with_it() {
     for error in errors.iter().filter(|e| e["torque_filtered"] == false) {
         let fit = error["e_n"][0].as_f64().unwrap();
         let rigid = error["hidden_effects"] == false;
-        // Of 10 s with a 1 s memory the noise makes some 10 independent samples per joint in its slow
-        // fifth: its size is known to about 0.2/√10 = 6 %; the fit of 33 … 52 parameters takes a little.
+        // Noise with a memory of 1 s has about 10 independent samples per joint in 10 s for its slow fifth, so that its
+        // size is known to about 0.2/√10 = 6 %; the fit of 33 … 52 parameters absorbs a little.
         assert!(fit > 0.75 * noise, "{error}");
         assert_eq!(rigid, fit < 1.25 * noise, "{error}");
     }
@@ -52,15 +52,15 @@ fn the_paper_is_repeated_and_its_negative_rotor_inertias_with_it() {
             .map(|value| value.as_f64().unwrap())
             .collect()
     };
-    // Truth: 1.6 and 0.25 kg m²; 33 parameters, no noise.
+    // Truth: 1.6 and 0.25 kg m², for 33 parameters without noise.
     let nothing = rotors("nothing");
     assert!((nothing[0] / 1.6 - 1.0).abs() < 0.03, "{nothing:?}");
     assert!(nothing[1..].iter().all(|ia| (ia / 0.25 - 1.0).abs() < 0.05), "{nothing:?}");
-    // A torque 100 ms late, and (33) on the angle, whose sign is turned.
+    // The torque is 100 ms late; or (33) is applied literally to the angle, which reverses the sign.
     assert!(rotors("delay").iter().any(|ia| *ia < 0.0));
     assert!(rotors("literal_filter")[4..].iter().all(|ia| *ia < 0.0));
 
-    // Static friction holds the arm before it starts, and the rigid arm has nothing of the kind.
+    // Static friction holds the arm before it starts; an arm without it has no error there.
     let at_zero = |k: usize| result["starts"][k]["error_at_zero_nm"][1].as_f64().unwrap().abs();
     assert!(at_zero(0) > 4.0 && at_zero(1) < 0.5, "{} {}", at_zero(0), at_zero(1));
 }
@@ -82,19 +82,19 @@ fn the_cutoff_has_a_best_value_and_e_n_falls_with_the_record() {
             assert!(least < 0.7 * error(last), "no right branch: {curve}");
         }
     }
-    // eᵀe of white noise has the relative standard deviation √(2 Σs⁴/m)/Σs²: 1.7 % at 1250 samples, half of
-    // it for e_N. Asked for is 5 %, six of these; the encoder's noise and the filter add less than 1 %.
+    // eᵀe of white noise has a relative standard deviation of √(2 Σs⁴/m)/Σs²: 1.7 % at 1250 samples, half of that for
+    // e_N. The bound of 5 % is six of these; encoder noise and the filter add less than 1 %.
     for length in result["lengths"].as_array().unwrap() {
         let [found, formula] = ["e_n", "predicted_e_n"].map(|key| length[key].as_f64().unwrap());
         assert!((found / formula - 1.0).abs() < 0.05, "{length}");
     }
-    // (20) is right for white noise of 1 Nm, and off by the size of the noise for 0.3 Nm.
+    // (20) is right for white noise of 1 Nm, and off by the factor 0.3 for noise of 0.3 Nm.
     let rms = |k: usize| result["sigmas"][k]["predicted"][1].as_f64().unwrap();
     assert!((rms(0) - 1.0).abs() < 0.03, "{}", rms(0));
     assert!((rms(1) - 0.3).abs() < 0.03, "{}", rms(1));
 }
 
-/// Scenarios run one by one and put together are the study of all of them.
+/// Scenarios run separately and then combined give the same study as all of them together.
 #[test]
 fn scenarios_of_noise_are_put_together_from_files() {
     let folder = Folder::empty();

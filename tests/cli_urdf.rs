@@ -1,4 +1,4 @@
-//! Robots that come as URDF or MJCF: an arm that is a part of one, and what a drive file beside it says.
+//! Robots given as URDF or MJCF: an arm that is a part of the model, and the drive file beside the model.
 
 use armid::robot::export::{drive_file, mjcf, urdf};
 use armid::robot::{Arm, Frames};
@@ -11,7 +11,7 @@ fn ur5() -> (Arm, String) {
     (arm, text)
 }
 
-/// A hand of 0.5 kg on the last link, and two fingers of 0.1 kg, the second of which slides as the first does.
+/// Adds a hand of 0.5 kg to the last link, with two fingers of 0.1 kg; the second finger mimics the first.
 fn with_hand(text: &str) -> String {
     let link = |name: &str, mass_kg: f64| {
         format!(
@@ -37,7 +37,7 @@ fn with_hand(text: &str) -> String {
     text.replace("</robot>", &hand.concat())
 }
 
-/// A folder `cell` with that robot, and the drives of its arm.
+/// A folder `cell` with this robot and the drive file of its arm.
 fn cell() -> (Folder, Arm) {
     let folder = Folder::empty();
     let (arm, text) = ur5();
@@ -65,7 +65,8 @@ fn an_arm_with_a_gripper_is_named_by_its_last_link() {
     folder.armid("base --robot ur5#hand").complains(1, &["ur5#hand"]);
 }
 
-/// What an exported model has is read; what it has no place for is told, or said beside it.
+/// The properties in an exported model are read; the missing ones are reported, and a drive file beside it supplies
+/// them.
 #[test]
 fn a_mujoco_model_is_a_robot() {
     let folder = Folder::empty();
@@ -88,7 +89,7 @@ fn a_mujoco_model_is_a_robot() {
     folder.armid("base --robot arm.xml#hand").complains(1, &["no body or site \"hand\""]);
 }
 
-/// The last body of the simulated arm is that of a UR5 with all that hangs on it.
+/// The last body of the simulated arm is that of a UR5 with everything attached to it.
 #[test]
 fn a_scenario_names_an_arm_by_its_last_link() {
     let (folder, arm) = cell();
@@ -104,7 +105,7 @@ fn a_scenario_names_an_arm_by_its_last_link() {
     assert!((mass["value"].as_f64().unwrap() - expected_kg).abs() < 1e-12, "{mass}");
 }
 
-/// A line or two by hand settle what they say, and nothing else.
+/// A drive file of one or two lines settles what they state and nothing else.
 #[test]
 fn a_drive_file_says_as_much_as_its_author_knows() {
     let folder = Folder::empty();
@@ -121,7 +122,7 @@ fn a_drive_file_says_as_much_as_its_author_knows() {
     let text = notes(&format!("gravity_m_s2 = [9.81, 0.0, 0.0]\n{elbow}acceleration_rad_s2 = 5.0"));
     assert!(!text.contains("gravity is taken"), "{text}");
     assert!(text.contains("the file has no drives"), "{text}");
-    // One line has all that is open, and of a file that leaves nothing open only its name.
+    // A single line reports everything that is open; for a complete file it contains only the name of the file.
     let told_of = |drives: &str| {
         let text = notes(drives);
         let told = text.lines().filter(|line| line.contains("drives.toml")).map(str::to_owned);

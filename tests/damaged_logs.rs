@@ -1,5 +1,5 @@
-//! Whatever happened to a log, identification and diagnosis end in an answer or in a message that fits: never in a panic, in what
-//! is no number, or not at all.
+//! Whatever damage a log has, identification and diagnosis must end in an answer or in a fitting message, never in a
+//! panic, a non-finite number or an endless run.
 
 use std::sync::{Arc, mpsc};
 use std::thread;
@@ -16,7 +16,7 @@ use crate::damage::{Sound, few_families};
 use crate::other_arms::Designed;
 use crate::simulated::Run;
 
-/// What becomes of a log.
+/// How the processing of a log ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum End {
     Answer,
@@ -25,17 +25,18 @@ enum End {
     TooShort,
     NoMotion,
     NoTorque,
-    /// The motion that it shows leaves parameters open.
+    /// The motion leaves parameters unidentified.
     Open,
-    /// It has too few rows a second for the low-pass.
+    /// The rate is too low for the low-pass.
     TooSlow,
 }
 
 use End::{Answer, NoMotion, NoTorque, Open, TooShort, TooSlow, Unread};
 
-/// By what happened to it: where the motion is found to repeat, and where it is taken for a single run. Rows that contradict those
-/// before them are set aside, so that too little is left of columns that were exchanged or have the other sign. Half the log, and
-/// what lies on one side of a pause, has two periods, whose σ wants six seconds.
+/// Expected end for each damage: where the period is searched for, and where the log is treated as a single run. Rows
+/// that contradict the rows before them are set aside, so that too little remains of columns that are exchanged or have
+/// the wrong sign. Half of the log, and the part on one side of a pause, has two periods, too few because their σ needs
+/// six seconds of data.
 const ENDS: &[(&str, [End; 2])] = &[
     ("nothing", [Answer, Answer]),
     ("an angle for its velocity", [TooShort, TooShort]),
@@ -76,10 +77,10 @@ const ENDS: &[(&str, [End; 2])] = &[
     ("a recorder that hung", [TooShort, TooShort]),
 ];
 
-/// Hundreds of times what one of them takes.
+/// Hundreds of times the duration of one case.
 const LIMIT: Duration = Duration::from_secs(300);
 
-/// 14 s of an arm that repeats a motion of 2.5 s, 50 rows a second.
+/// 14 s of an arm that repeats a motion of 2.5 s, at 50 rows per second.
 #[test]
 fn every_damage_ends_in_an_answer_or_in_a_message_that_fits() {
     let designed = Designed::new("three_joints", 2.5, &[0.5, 0.4, 0.1]);
@@ -100,7 +101,7 @@ fn every_damage_ends_in_an_answer_or_in_a_message_that_fits() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// As the file that a log is written to.
+/// The log as the text of its file.
 fn written(log: Measured) -> String {
     let Measured { time_s, q_rad, qd_rad_s, torque_nm, .. } = log;
     let log = Log::new("sound", time_s, q_rad, qd_rad_s, Effort::Torque(torque_nm)).unwrap();
@@ -110,12 +111,12 @@ fn written(log: Measured) -> String {
     std::fs::read_to_string(path).unwrap()
 }
 
-/// Of a log that may repeat and of a single run, each identified and diagnosed.
+/// Ends for a log that may repeat and for a single run, each identified and diagnosed.
 fn ends_in_time(bench: &Arc<Run>, name: &str, text: String) -> [[End; 2]; 2] {
     let (sender, receiver) = mpsc::channel();
     let bench = Arc::clone(bench);
     thread::spawn(move || sender.send([None, Some(0.0)].map(|s| ends(&bench, &text, s))));
-    // A thread that panicked has said so, and sends nothing.
+    // A thread that panics prints its message and sends nothing.
     receiver.recv_timeout(LIMIT).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 

@@ -1,4 +1,4 @@
-//! The limits that a diagnosis prints, in the plant: an effect of that size is as strong as it says.
+//! The detection limits of a diagnosis, checked with the plant: an effect of that size has the stated strength.
 
 use armid::diagnose::{DetectionLimit, Diagnoser};
 use armid::dynamics::Model;
@@ -6,13 +6,13 @@ use armid::montecarlo::{Scenario, Simulation};
 
 use crate::simulated::{TORQUE_NOISE, scenario, simulation};
 
-/// Four periods of an arm with `effects`.
+/// Simulation of four periods of an arm with `effects`.
 fn run(effects: &str) -> Simulation {
     let along = ("ur5_identification", 4);
     simulation(scenario(("limits", 5), along, TORQUE_NOISE, effects))
 }
 
-/// Of the log of `clean`.
+/// Detection limits that the diagnosis of the log of `clean` states.
 fn limits_of(clean: &Simulation) -> Vec<DetectionLimit> {
     let Scenario { arm, set, processing, .. } = &clean.scenario;
     let log = clean.log(0).unwrap();
@@ -21,12 +21,13 @@ fn limits_of(clean: &Simulation) -> Vec<DetectionLimit> {
     diagnoser.diagnose(&log.measurement("limits"), &[], None).unwrap().diagnosis.detection_limits
 }
 
-/// What the plant does with an effect of the size of its limit has the √λ that goes with it, however different the plant's way of
-/// making it is from the column that looks for it.
+/// An effect of the plant with the size of its detection limit has the stated √λ, however much the mechanism in the
+/// plant differs from the regressor column that detects it.
 ///
-/// Four periods know the standard deviation of a slow harmonic's noise to an eighth, so that the limit's √λ may be too small by a
-/// seventh. It is mostly too large: the diagnosis does not count what it leaves to drives and reversals, nor what an inverse
-/// estimate of the noise's covariance has to be scaled by (a tenth), and must not throw away half of what there is.
+/// Four periods determine the standard deviation of a slow harmonic's noise to an eighth, so that the √λ of the limit
+/// may be a seventh too small. Usually it is too large: the diagnosis leaves a part of the effect to drives and
+/// reversals, and scales for the error of the inverse of an estimated noise covariance (a tenth). It must not lose more
+/// than half of √λ that way.
 #[test]
 fn an_effect_of_the_limits_size_is_as_strong_as_it_says() {
     let clean = run("");

@@ -1,4 +1,4 @@
-//! Effects made by physics in a drivetrain of this test, found in periodic logs.
+//! Effects produced by the physics of a drivetrain in these tests, found in periodic logs.
 
 use armid::diagnose::{Cause, Finding, Kind, Verdict};
 
@@ -22,8 +22,8 @@ fn only(finding: &Finding, kind: Kind, joint: Option<usize>) -> &Cause {
     cause
 }
 
-/// Angles in steps of 0.1 mrad: rounding does the same in every period, and would be half a mrad/s of the velocity where joints
-/// reverse. Both logs were given unexplained friction, one of them a ripple as well.
+/// Angles in steps of 0.1 mrad: rounding repeats in every period, and differentiated it would be half a mrad/s of
+/// velocity where joints reverse. Both logs were once said to have unexplained friction, one of them a ripple as well.
 #[test]
 fn coarse_angles_are_no_friction() {
     let sensors =
@@ -38,7 +38,8 @@ fn coarse_angles_are_no_friction() {
     }
 }
 
-/// The zero of one current sensor drifts by three times its noise: no law has it, and it is the first that is said.
+/// The zero of one current sensor drifts by three times its noise. No law describes this, and the diagnosis must say so
+/// first.
 #[test]
 fn a_zero_that_drifts_is_told_first() {
     let run = Run::new(scenario(("drifting zero", 7), ("ur5_identification", 8), NOISE, ""));
@@ -54,25 +55,26 @@ fn a_zero_that_drifts_is_told_first() {
     assert!(d.sentences[0].contains("(joint 3 by 0."), "{}", d.sentences[0]);
 }
 
-/// Where something rubs on the motor's side of a wrist's gear, the rotor loads it more than the links do.
+/// If something rubs on the motor's side of a wrist's gear, the rotor contributes more to the load than the links.
 #[test]
 fn load_friction_on_the_motors_side() {
     let found = Hidden::on(4, Law::MotorLoad { mu: 0.15 }).diagnose(3);
     assert_holds(only(&found, Kind::LoadFriction, Some(5)), "mu", 0.15);
 }
 
-/// A quarter of the largest torque is cut off: what is left bends the fit of the null model, and that is put right.
+/// Torque readings above three quarters of the largest torque are cut off. The clipped readings bias the fit of the
+/// null model, and the diagnosis corrects this.
 #[test]
 fn a_reading_that_ends_before_its_noise() {
     let found = Hidden::on(1, Law::CutBeforeNoise { share: 0.74 }).diagnose(8);
     let cause = only(&found, Kind::Saturation, Some(2));
     let most = found.scene.torque_nm.joint(1).iter().fold(0.0f64, |most, t| most.max(t.abs()));
-    // The motion's largest torque is known a hundred times better than this.
+    // The largest torque of the motion is known a hundred times better than this.
     assert!((cause.parameters["limit_nm"].value / most - 0.74).abs() < 0.01);
 }
 
-/// Waves that no torque moves the links by, up to 96 of them a second: in 125 samples a second their aliases are as high as
-/// they are. The first harmonic of a zigzag is 8/π² of its height.
+/// Waves in the current that move no link, at up to 96 Hz: sampled at 125 Hz, their aliases are as high as the waves
+/// themselves. The first harmonic of a zigzag has 8/π² of its amplitude.
 #[test]
 fn ripple_of_the_current_alone() {
     let zigzag = Law::ZigzagOfTheCurrent { height_nm: 0.12, per_turn: 202.0 };
@@ -88,7 +90,7 @@ fn presliding() {
     assert_holds(only(&found, Kind::Presliding, Some(4)), "stiffness_per_rad", 300.0);
 }
 
-/// Bristles that give way within 0.1 mrad, a sample at 125 Hz: in a fast log they are told as they are.
+/// Bristles that yield within 0.1 mrad, which is one sample at 125 Hz; a fast log resolves them.
 #[test]
 fn stiff_presliding_in_a_fast_log() {
     let hidden = Hidden::on(2, Law::Dahl { stiffness_per_rad: 10_000.0 }).logged_at(500.0);
@@ -96,10 +98,10 @@ fn stiff_presliding_in_a_fast_log() {
     assert_holds(only(&found, Kind::Presliding, Some(3)), "stiffness_per_rad", 10_000.0);
 }
 
-/// The same in samples at 125 Hz, told by what the drive gives while the joint turns round, whatever share of friction it feeds
-/// forward and whatever offset its velocities have. Of the drive the bandwidth of its feedback is guessed, which moves the
-/// stiffness by 2 % at most, and noise a thirtieth of the usual by less than a thousandth. (With less of it what is
-/// approximate in every other law counts as well, which takes longer.)
+/// The same sampled at 125 Hz: the stiffness follows from the torque of the drive while the joint reverses, for any
+/// share of friction fed forward and any offset of the velocities. Only the feedback bandwidth of the drive is assumed,
+/// which changes the stiffness by at most 2 %; noise of a thirtieth of the usual changes it by less than a thousandth.
+/// (With even less noise, the approximations in all other laws matter too, which takes longer.)
 #[test]
 fn stiff_presliding_behind_a_drive_that_feeds_friction() {
     let hidden = || Hidden::on(3, Law::Dahl { stiffness_per_rad: 10_000.0 }).with_noise(0.03);
@@ -119,14 +121,16 @@ fn stiff_presliding_behind_a_drive_that_feeds_friction() {
     }
 }
 
-/// The joint reverses within two samples of this log: what its drive did between them is not what a late reading shows.
+/// The joint reverses within two samples of this log: the response of the drive between them must not be mistaken for a
+/// late reading.
 #[test]
 fn a_late_reading_of_a_sharp_reversal() {
     let found = Hidden::on(0, Law::Late { ms: 2 }).logged_at(250.0).diagnose(10);
     assert_holds(only(&found, Kind::TimeSkew, Some(1)), "delay_s", 0.002);
 }
 
-/// Five gaps of a tenth to four tenths of a second: the other periods tell what is missing, and all of the log counts.
+/// Five gaps of a tenth to four tenths of a second: the other periods reveal what is missing, and the whole log is
+/// used.
 #[test]
 fn gaps_of_a_log_that_repeats() {
     let lost = [1203..1223, 2790..2841, 4125..4144, 6000..6012, 8700..8733];
@@ -138,7 +142,7 @@ fn gaps_of_a_log_that_repeats() {
     assert!(d.warnings.iter().any(|w| w.contains("5 gaps")), "{:?}", d.warnings);
 }
 
-/// Coulomb and viscous friction alone: reversals are as sharp in the log as in the drive.
+/// Only Coulomb and viscous friction: reversals are as sharp in the log as in the drive.
 #[test]
 fn a_fast_log_of_a_good_model_has_no_cause() {
     let found = Hidden::on(1, Law::Load { mu: 0.0 }).logged_at(500.0).diagnose(6);

@@ -1,5 +1,5 @@
-//! Identities that any correct rigid-body dynamics satisfies, whoever wrote it; on the golden
-//! states of the UR5, the UR10e and the tilted arm.
+//! Identities that any correct rigid-body dynamics satisfies, checked on the golden states of the UR5, the UR10e and
+//! the tilted arm.
 //!
 //! Tolerances. Identities between two exact expressions: 1e-10 of the size of the terms (round-off
 //! 1e-16 times a few thousand operations, with three digits in hand). Identities with a derivative:
@@ -66,8 +66,7 @@ fn the_mass_matrix_is_symmetric_and_positive_definite() {
     each_state(|model, ws, s, at| {
         let m = mass(model, ws, &s.q_rad);
         assert_eq!(m, m.transpose(), "{at}");
-        // The rotors alone make every eigenvalue at least the smallest rotor inertia: links only
-        // add to it.
+        // The rotors alone make every eigenvalue at least the smallest rotor inertia; links only add to it.
         let layout = ParameterLayout::new(model.dof());
         let parameters = model.standard_parameters();
         let rotors = (0..layout.count()).filter(|&k| layout.name(k).starts_with("Ia"));
@@ -77,8 +76,8 @@ fn the_mass_matrix_is_symmetric_and_positive_definite() {
     });
 }
 
-/// The columns of the mass matrix are the torques of unit accelerations at rest, gravity and
-/// friction taken away.
+/// The inertial part of the torque, with gravity, velocity torques and friction subtracted, is the mass matrix times
+/// the acceleration.
 #[test]
 fn the_mass_matrix_is_what_inverse_dynamics_multiplies_the_acceleration_by() {
     each_state(|model, ws, s, at| {
@@ -96,9 +95,9 @@ fn the_mass_matrix_is_what_inverse_dynamics_multiplies_the_acceleration_by() {
     });
 }
 
-/// With C_kj = Σ_i Γ_ijk q̇_i from the Christoffel symbols of M (differenced), Ṁ − 2C is skew and C
-/// q̇ is the velocity product of the inverse dynamics. The first holds for any symmetric M(q); the
-/// second ties M and c to one arm.
+/// With C_kj = Σ_i Γ_ijk q̇_i from the Christoffel symbols of M (differenced), Ṁ − 2C is skew, and C q̇ are the
+/// velocity torques of the inverse dynamics. The first property holds for any symmetric M(q); the second ties M and the
+/// velocity torques to the same arm.
 #[test]
 fn velocity_torques_come_from_the_christoffel_symbols_of_the_mass_matrix() {
     each_state(|model, ws, s, at| {
@@ -138,7 +137,7 @@ fn velocity_torques_come_from_the_christoffel_symbols_of_the_mass_matrix() {
     });
 }
 
-/// Gravity is the gradient of the potential energy.
+/// The gravity torque is the gradient of the potential energy.
 #[test]
 fn the_torque_at_rest_is_the_gradient_of_the_potential_energy() {
     each_state(|model, ws, s, at| {
@@ -156,8 +155,8 @@ fn the_torque_at_rest_is_the_gradient_of_the_potential_energy() {
     });
 }
 
-/// The power of the drives less that of friction is the rate of the energy: τᵀq̇ − fᵀq̇ = dE/dt
-/// along (q̇, q̈).
+/// The power of the drives less the power dissipated by friction is the rate of the energy: τᵀq̇ − fᵀq̇ = dE/dt along
+/// (q̇, q̈).
 #[test]
 fn the_power_of_the_drives_is_the_rate_of_energy_and_what_friction_takes() {
     each_state(|model, ws, s, at| {
@@ -176,7 +175,7 @@ fn the_power_of_the_drives_is_the_rate_of_energy_and_what_friction_takes() {
         let size =
             level + dot(&drives, &drives).sqrt() * (1.0 + dot(&s.qd_rad_s, &s.qd_rad_s).sqrt());
         let error = (dot(&drives, &s.qd_rad_s) - friction - rate).abs();
-        // d³E/dt³ brings q̈²/q̇ ≈ 10 times more than the motion's own size.
+        // d³E/dt³ contains q̈²/q̇, about 10 times the size of the motion itself.
         assert!(error < 10.0 * DIFFERENCED * size, "{at}: {error:e} against {size:e} W");
     });
 }
@@ -194,8 +193,8 @@ fn forward_dynamics_undoes_inverse_dynamics() {
     });
 }
 
-/// Eight at a time gives the bits of one at a time, also where the last group is not full and where
-/// a block starts inside a motion.
+/// Eight samples at a time give the same bits as one at a time, also where the last group is incomplete and where a
+/// block starts inside a motion.
 #[test]
 fn a_block_of_samples_has_the_bits_of_single_samples() {
     for (arm, states) in crate::golden::all() {
@@ -222,7 +221,7 @@ fn a_block_of_samples_has_the_bits_of_single_samples() {
                 for j in 0..n {
                     for c in 0..layout.count() {
                         let stored = block.column(j, layout.parameter(c)).map_or(0.0, |v| v[k]);
-                        // −0 and 0 are one number: a structural zero has no sign.
+                        // −0 and 0 count as equal: a structural zero has no sign.
                         let same = stored == single[(j, c)]
                             && (stored == 0.0 || stored.to_bits() == single[(j, c)].to_bits());
                         assert!(same, "{} sample {}, {}", arm.name, start + k, layout.name(c));

@@ -19,8 +19,8 @@ const COLOURED: &str = "[sensors.torque_noise]\ncross_joint_correlation = 0.3\n\
     components = [{ share = 0.6, colour = 'white' }, \
     { share = 0.4, colour = { ar1 = { time_constant_s = 0.1 } } }]";
 
-/// More noise makes nothing easier to see. That of encoders, times the inertia, grows with frequency: it hides more
-/// of a ripple at tens of hertz than of friction that depends on the angle.
+/// More noise makes no effect easier to see. Encoder noise, multiplied by the inertia, grows with frequency: it hides a
+/// ripple at tens of hertz more than friction that depends on the angle.
 #[test]
 fn noise_of_encoders_hides_what_is_fast() {
     let encoders = "q_sd_rad = 2e-5\nqd_sd_rad_s = 1e-3\n";
@@ -34,8 +34,8 @@ fn noise_of_encoders_hides_what_is_fast() {
     assert!(fast < 0.6 && slow > 0.8 && slow < 1.0, "{fast} {slow}");
 }
 
-/// A change of two parameters of the null model: all of it moves parameters, but for what it does to reversals, which
-/// fall between other rows. That is less than a test of 3 σ sees.
+/// An effect that amounts to changed parameters of the null model: all of it moves the parameters, except that
+/// reversals fall between other rows. That remainder is less than a test at 3 σ detects.
 #[test]
 fn what_the_null_model_absorbs_has_only_a_size_against_a_simulation() {
     let payload = "[[effect]]\nkind='payload'\nmass_kg=0.5\ncom_x_m=0\ncom_y_m=0\ncom_z_m=0.05";
@@ -46,8 +46,8 @@ fn what_the_null_model_absorbs_has_only_a_size_against_a_simulation() {
     }
 }
 
-/// λ is a square: twice the effect, four times λ. Stribeck friction is linear in its size up to what it
-/// does to the motion, a few percent here.
+/// λ is quadratic: twice the effect gives four times λ. Stribeck friction is linear in its size apart from its
+/// influence on the motion, a few percent here.
 #[test]
 fn the_size_of_an_effect_is_quadratic() {
     let stribeck = |nm: f64| {
@@ -58,8 +58,8 @@ fn the_size_of_an_effect_is_quadratic() {
     assert!((two.lambda / one.lambda - 4.0).abs() < 0.2, "{one:?} {two:?}");
 }
 
-/// What is copied instead of integrated is what the integration gives: the log of two periods, and its
-/// sizes, for effects with a memory (bristles, a spring and an inertia, a channel that is read late).
+/// Copied periods equal integrated ones: the log of two periods and its λ, for effects with a memory (bristles, a
+/// spring with an inertia, and a delayed channel).
 #[test]
 fn a_log_that_repeats_need_not_be_integrated() {
     let effects = "[[effect]]\nkind='presliding'\njoint=4\nstiffness_per_rad=300\n\
@@ -72,7 +72,7 @@ fn a_log_that_repeats_need_not_be_integrated() {
     let mut whole = Simulation::run(scenario).unwrap();
     whole.recording = recording;
     assert_eq!(whole.recording.time_s, copied.recording.time_s);
-    // The last half second of the whole run lacks what a late channel would still read.
+    // In the last half second, the whole run lacks the later samples that a delayed channel would read.
     let settled = whole.recording.time_s.len() - 63;
     let worst = |of: fn(&Recording) -> &JointSignals, j: usize| {
         let pairs = of(&whole.recording).joint(j).iter().zip(of(&copied.recording).joint(j));
@@ -83,14 +83,15 @@ fn a_log_that_repeats_need_not_be_integrated() {
         let angle = worst(|run| &run.q_rad, j) / 2e-5;
         let velocity = worst(|run| &run.qd_rad_s, j) / 1e-3;
         println!("joint {}: {torque:.2e}, {angle:.2e} and {velocity:.2e} σ", j + 1);
-        // Ten thousand samples off by a hundredth of the noise are a λ of 1.
+        // Ten thousand samples that are off by a hundredth of the noise give λ = 1.
         assert!(torque.max(angle).max(velocity) < 0.01, "joint {}", j + 1);
     }
     let [of_whole, of_copied] = [&whole, &copied].map(|s| s.effect_size().unwrap().lambda);
     assert!((of_copied / of_whole - 1.0).abs() < 0.01, "{of_copied} {of_whole}");
 }
 
-/// A gear that swings on for longer than is waited for, and friction that warms up, are integrated from the first row to the last.
+/// A gear that oscillates for longer than the settling time allowed, and friction that warms up, are integrated from
+/// the first row to the last.
 #[test]
 fn what_does_not_repeat_is_integrated() {
     for effect in [

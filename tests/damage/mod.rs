@@ -1,23 +1,23 @@
-//! What recorders, copies and wrong columns make of a sound log.
+//! Damage that recorders, copying and wrong columns do to a sound log.
 
 use armid::diagnose::candidates::{self, Candidate};
 
-/// Rows of a log of three joints or more, 700 or more, comma separated: time, then the angles, velocities and efforts of all
-/// joints, then what else there may be.
+/// A sound log of at least 700 rows and three joints, comma separated: time, then angles, velocities and efforts of all
+/// joints, then any other columns.
 pub struct Sound<'a> {
-    /// What stands above them, its end of line included.
+    /// Header line, with its line end.
     pub header: &'a str,
     pub rows: Vec<&'a str>,
     pub joints: usize,
 }
 
 impl Sound<'_> {
-    /// The log as it is.
+    /// The undamaged log.
     pub fn text(&self) -> String {
         self.of(&self.rows)
     }
 
-    /// By what happened to it.
+    /// All damaged versions, each with the name of the damage.
     pub fn damaged(&self) -> Vec<(&'static str, String)> {
         let (rows, n) = (&self.rows, self.joints);
         let [q, qd, effort] = [0, n, 2 * n].map(|before| move |joint: usize| before + joint);
@@ -86,7 +86,7 @@ impl Sound<'_> {
         text
     }
 
-    /// With the fields of every row changed.
+    /// The log with the fields of every row modified.
     fn with(&self, change: impl Fn(usize, &mut [String])) -> String {
         self.of(self.rows.iter().enumerate().map(|(k, row)| {
             let mut fields: Vec<String> = row.split(',').map(str::to_owned).collect();
@@ -103,12 +103,12 @@ impl Sound<'_> {
         })
     }
 
-    /// With two columns under each other's name.
+    /// The log with two columns exchanged under their names.
     fn exchanged(&self, a: usize, b: usize) -> String {
         self.with(|_, row| row.swap(a, b))
     }
 
-    /// With the numbers of some columns replaced by what `value` makes of row and number.
+    /// The log with the numbers in some columns replaced by `value` of row and number.
     fn recalculated(
         &self,
         columns: std::ops::Range<usize>,
@@ -122,7 +122,7 @@ impl Sound<'_> {
     }
 }
 
-/// Enough families behind a damaged log: damage goes through the reader and the processing.
+/// A few families suffice for a damaged log, because damage acts on the reader and the processing.
 pub fn few_families() -> Vec<Box<dyn Candidate>> {
     let wanted = ["presliding", "load_friction", "ripple", "time_skew"];
     let all = candidates::all().into_iter();
