@@ -1,4 +1,4 @@
-//! The design of an excitation as a whole: repeatable, safe, and better than what it starts from.
+//! The design of an excitation as a whole: repeatable, feasible, and better than a random motion.
 
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -48,7 +48,7 @@ fn run(spec: &Specification, threads: usize) -> Result<Design, DesignError> {
     pool.install(|| design(&arm, &base, spec, &budget, &|_| {}))
 }
 
-/// Same bits on one and on three threads.
+/// The bits are the same on one and on three threads.
 #[test]
 fn a_design_depends_on_its_seed_and_not_on_the_threads() {
     let spec = specification(Criterion::D);
@@ -60,8 +60,8 @@ fn a_design_depends_on_its_seed_and_not_on_the_threads() {
     assert_ne!(one.excitation, other.excitation);
 }
 
-/// A design keeps every limit on a grid three times finer than the one it was accepted on, is at rest
-/// where it is to rest, and keeps its fixed offsets.
+/// A design keeps every limit on a grid three times finer than the one it was accepted on, starts and ends its period
+/// at rest if required, and keeps its fixed offsets.
 #[test]
 fn a_design_keeps_its_limits_and_its_form() {
     let (arm, base) = ur5();
@@ -69,15 +69,15 @@ fn a_design_keeps_its_limits_and_its_form() {
     spec.variables.rest_start = true;
     spec.variables.fixed_offsets_rad[1] = Some(-1.5);
     let found = run(&spec, 2).unwrap();
-    // Between two samples of the accepting grid, 1 ms apart, a speed can grow by 10 rad/s² · 0.5 ms at most;
-    // a distance by about 1e-6 m: hence a clearance requirement lower by that.
+    // Between two samples of the accepting grid, 1 ms apart, a speed can grow by at most 10 rad/s² · 0.5 ms, and a
+    // distance can shrink by about 1e-6 m; the required clearance is therefore slightly lower here.
     let finer =
         Requirements { check_rate_hz: 3000.0, clearance_m: 0.02 - 1e-5, ..spec.requirements };
     let margins = check(&arm, &finer, &found.excitation).unwrap();
     let worst = margins.worst();
     assert!(worst.free > -1e-4, "{} {}", worst.limit, worst.in_words());
     let series = found.excitation.series();
-    // Even this small search, with less freedom, beats the random motion that is built in in its own criterion.
+    // In its own criterion, even this small and more restricted search beats the built-in random motion.
     let random = FourierSeries::built_in("ur5_identification").unwrap();
     let of_random = Prediction::of(&Model::new(&arm), &base, &spec.experiment, &random, None);
     let random_condition = of_random.unwrap().condition;
@@ -94,7 +94,7 @@ fn a_design_keeps_its_limits_and_its_form() {
     }
 }
 
-/// A free period is moved, and what is known already is not measured again.
+/// A free period is optimised, and parameters that are already known are not measured again.
 #[test]
 fn a_free_period_and_a_prior_are_used() {
     let mut spec = specification(Criterion::A);
@@ -103,8 +103,8 @@ fn a_free_period_and_a_prior_are_used() {
     let period_s = plain.excitation.series().period_s;
     assert!((6.0..=16.0).contains(&period_s) && (period_s - 10.0).abs() > 1e-3);
 
-    // Known already: everything but friction, ten times better than the first design tells. The next
-    // design then cares for friction: its own data tell more about it than the first one's did.
+    // The prior knows everything except friction, ten times better than the first design does. The next design then
+    // concentrates on friction: its own data determine friction better than those of the first design.
     let (_, base) = ur5();
     let friction: Vec<usize> =
         (0..base.rank()).filter(|&k| base.name(k).starts_with('r')).collect();
@@ -153,16 +153,16 @@ fn specifications_that_make_no_sense_are_refused_with_the_number() {
         s.prior = Some(Mat::identity(52, 52));
     };
     assert!(message(unused).contains("prior"));
-    // Lying on the floor is no pose to move about.
+    // An arm that lies on the floor has no room to move.
     let flat = |s: &mut Specification| {
         s.variables.fixed_offsets_rad = [0.0, 0.5, 0.0, 0.0, 0.0, 0.0].map(Some).to_vec();
     };
     assert!(message(flat).contains("floor"));
-    // No pose keeps a metre from itself.
+    // No pose keeps the arm a metre from itself.
     assert!(message(|s| s.requirements.clearance_m = 1.0).contains("poses all over the range"));
 }
 
-/// What is promised is promised of the motion that is written, which is no shorter than the data that are asked for.
+/// The prediction holds for the motion that is written, which is at least as long as the requested data.
 #[test]
 fn the_prediction_is_of_the_periods_that_are_played() {
     let (arm, base) = ur5();
@@ -177,8 +177,8 @@ fn the_prediction_is_of_the_periods_that_are_played() {
     assert_eq!(found.prediction, expected);
 }
 
-/// The prediction is the textbook formula: σ² on the diagonal of the inverse information, which falls
-/// with the length of the data and with the square of the noise.
+/// The prediction follows the textbook formula: σ² on the diagonal of the inverse information, which falls with the
+/// length of the data and grows with the square of the noise.
 #[test]
 fn predicted_sigma_scales_with_noise_and_data() {
     let (arm, base) = ur5();

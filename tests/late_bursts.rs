@@ -1,4 +1,5 @@
-//! A recorder that keeps rows back and writes them in bursts: what is identified and named is what an even clock gives, and it is told.
+//! A recorder that holds rows back and writes them in bursts: the results are those of an even clock, and a warning is
+//! given.
 
 use armid::diagnose::{Diagnosis, Kind};
 use armid::identify::{Identification, Identifier, Measurement};
@@ -6,7 +7,7 @@ use armid::log::{Effort, Layout, Log, LogWarning, read_log, write_log};
 
 use crate::simulated::{NOISE, Run, scenario};
 
-/// The log of `run`, stamped with `time_s`, as it is read from its file.
+/// The log of `run` with the stamps `time_s`, written to a file and read back.
 fn read_back(run: &Run, time_s: &[f64]) -> Log {
     let [q_rad, qd_rad_s, torque_nm] =
         [&run.log.q_rad, &run.log.qd_rad_s, &run.log.torque_nm].map(Clone::clone);
@@ -61,7 +62,7 @@ fn rows_that_are_written_in_bursts_change_nothing() {
 
     let [(identified, diagnosis), (expected, without)] =
         [&late, &even].map(|log| answers(&run, log));
-    // Stamps to 1 ns: a ten thousandth of σ is far more than what that moves.
+    // Stamps are corrected to 1 ns: this changes the estimates by far less than a ten thousandth of σ.
     let close = |a: f64, b: f64, sigma: f64| (a - b).abs() < 1e-4 * sigma;
     let sigma = expected.covariance.sigma();
     for (k, sigma) in sigma.iter().enumerate() {

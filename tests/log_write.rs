@@ -1,4 +1,4 @@
-//! Logs that are written read back to the same bits, and currents become torques.
+//! Written logs read back to the same bits, and currents are converted to torques.
 
 use armid::log::{Effort, Layout, Log, read_log, write_log};
 use armid::robot::{Arm, JointSignals};
@@ -6,13 +6,13 @@ use armid::robot::{Arm, JointSignals};
 const JOINTS: usize = 6;
 const STEP_S: f64 = 0.008;
 
-/// A log with every optional signal and numbers that are hard to print.
+/// A log with every optional signal and numbers that are hard to print exactly.
 fn full_log() -> Log {
     let hard = [0.1, -0.0, 5e-324, 1.0 / 3.0, 123_456.789e-12, f64::EPSILON, -1e-5, 2.5e-7];
     let time_s: Vec<f64> = (0..50).map(|k| 1e9 + STEP_S * k as f64).collect();
     let of =
         |scale: f64| JointSignals::from_fn(JOINTS, 50, |j, k| hard[(j + k) % hard.len()] * scale);
-    // At rest, so that the hard numbers are no jumps.
+    // The arm is at rest, so that the hard numbers do not count as jumps.
     let current = |scale| Effort::Current { ampere: of(scale), gain_nm_a: None };
     let still = JointSignals::from_fn(JOINTS, 50, |j, _| hard[j] / 10.0);
     let mut log = Log::new("made", time_s, still.clone(), of(1e-3), current(1.0)).unwrap();

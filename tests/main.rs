@@ -1,5 +1,6 @@
-//! All integration tests in one program, which is compiled and linked once and keeps every core busy to its end: `cargo test val_`
-//! runs those against something independent, `regress_` those against ourselves, `blind_` hide and find.
+//! All integration tests in one program, which is compiled and linked once and keeps every core busy to its end. `cargo
+//! test val_` runs the tests against independent references, `regress_` those against pinned results, `blind_` hide and
+//! find.
 
 mod cli;
 mod damage;
@@ -55,7 +56,7 @@ mod val_signal;
 mod val_ur10e;
 mod val_urdf;
 
-/// A file that is not named above would never be compiled.
+/// A file that is not listed above would never be compiled.
 #[test]
 fn every_file_is_a_part_of_this_program() {
     let parts = include_str!("main.rs");

@@ -1,5 +1,6 @@
-//! Logs that are not read as they were recorded: columns in another order, signs, zeros, an arm that hangs. Each is named, alone and with
-//! others, and a log that is read as it was recorded is not, whatever its arm hides.
+//! Logs that are read differently from how they were recorded: permuted columns, wrong signs or zeros, or an arm that
+//! hangs. Each mistake is named, alone and in combination; a log that is read correctly is not called misread, whatever
+//! effect its arm hides.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -12,12 +13,12 @@ use nalgebra::Vector3;
 use crate::cli::{Folder, default_scenario};
 use crate::simulated::{Along, NOISE, Run, scenario};
 
-/// A UR5 along some periods of a motion, with what is hidden in it.
+/// A UR5 along some periods of a motion, with hidden `effects`.
 fn run(along: Along, effects: &str) -> Run {
     Run::new(scenario(("misread", 5), along, NOISE, effects))
 }
 
-/// As `arm` would have it read.
+/// The misreading of `log` found for `arm`.
 fn misreading(run: &Run, arm: &Arm, log: &Measured, options: &Options) -> Option<Misreading> {
     misreading_of_currents(run, arm, log, options, None)
 }
@@ -34,7 +35,8 @@ fn misreading_of_currents(
     Misreading::of(arm, &regression, options, gain)
 }
 
-/// `log` as it is recorded by something that differs from the description of the arm by `change`: whoever reads it has to change it so.
+/// `log` as recorded by a system that deviates from the description of the arm such that reading it correctly requires
+/// `change`.
 fn recorded(log: &Measured, change: &Change) -> Measured {
     let mut log = log.clone();
     match change {
@@ -62,7 +64,7 @@ fn channels(log: &mut Measured, what: Channels) -> Vec<&mut JointSignals> {
     }
 }
 
-/// Two joints of a UR5 in each other's columns.
+/// The columns of two joints of a UR5 exchanged.
 fn exchanged(what: Channels, joints: [usize; 2]) -> Change {
     Change::exchanged(what, joints, 6)
 }
@@ -71,7 +73,7 @@ fn reversed(what: Channels, joint: usize) -> Change {
     Change::Reversed { what, joint }
 }
 
-/// Puts each joint of an arm where `order` has it.
+/// Moves the signals of each joint to the place that `order` gives it.
 fn stand_in(signals: &mut JointSignals, order: &[usize]) {
     let of_the_arm = signals.clone();
     for (j, place) in order.iter().enumerate() {
@@ -87,14 +89,15 @@ fn is_named(found: Option<Misreading>, hidden: &[Change]) {
     assert!(hidden.iter().all(|change| sentence.contains(&change.to_string())), "{sentence}");
 }
 
-/// Asserts that it is told where the log of `run` has two joints in each other's columns.
+/// Asserts that exchanged columns of two joints in the log of `run` are named.
 pub fn assert_exchange_is_named(run: &Run, joints: [usize; 2]) {
     let hidden = Change::exchanged(All, joints, run.arm.dof());
     let log = recorded(&run.log, &hidden);
     is_named(misreading(run, &run.arm, &log, &run.options), &[hidden]);
 }
 
-/// Joint 1 of an arm that stands upright may be counted from any zero: nothing tells, and nothing is said of it.
+/// The zero of joint 1 is not among the changes: for an upright arm it is arbitrary, nothing reveals it, and nothing is
+/// said about it.
 #[test]
 fn each_way_to_misread_a_log_is_named() {
     let run = run(("ur5_identification", 4), "");
@@ -122,7 +125,7 @@ fn each_way_to_misread_a_log_is_named() {
     }
 }
 
-/// With the gain of the joint in whose column it stands, a current is another torque than with that of its own.
+/// A current in another joint's column is converted with the gain of that joint and gives a wrong torque.
 #[test]
 fn currents_have_the_gain_of_the_joint_that_they_are_read_for() {
     let run = run(("ur5_identification", 4), "");
@@ -144,7 +147,7 @@ fn currents_have_the_gain_of_the_joint_that_they_are_read_for() {
     }
 }
 
-/// ROS sorts joints by name, and drives are wired as they are: several at once.
+/// ROS sorts joints by name, and drives may be wired differently: several mistakes occur at once.
 #[test]
 fn several_ways_at_once_are_named() {
     let run = run(("ur5_validation", 4), "");
@@ -160,7 +163,8 @@ fn several_ways_at_once_are_named() {
     }
 }
 
-/// With one torque reversed the model fits as well as with all others: without friction it is gravity that tells which.
+/// The model fits equally well with one torque reversed as with all others reversed: without friction, only gravity
+/// tells which is the case.
 #[test]
 fn where_there_is_no_friction_gravity_tells_the_sign_of_torques() {
     let run = run(("ur5_identification", 4), "");
@@ -185,7 +189,7 @@ fn an_arm_that_is_not_mounted_as_described_is_named() {
     is_named(found, &[Change::Mounted { gravity_m_s2: [0.0, 0.0, -9.81] }]);
 }
 
-/// Three encoders that count the other way do what three torques do on an arm that hangs.
+/// Three encoders that count backwards have the same effect as three reversed torques on an arm that hangs.
 #[test]
 fn an_arm_is_not_told_to_hang_where_encoders_do_as_well() {
     let run = run(("ur5_identification", 4), "");
@@ -196,7 +200,7 @@ fn an_arm_is_not_told_to_hang_where_encoders_do_as_well() {
     }
 }
 
-/// On a pedestal of 45°, as arms of a torso stand.
+/// An arm on a pedestal of 45°, as on a humanoid torso.
 #[test]
 fn an_arm_that_leans_is_named() {
     let tilt =
@@ -206,7 +210,8 @@ fn an_arm_that_leans_is_named() {
     assert!(sentence.contains("with gravity_m_s2 = [0.00, -6.94, -6.94] the model"), "{sentence}");
 }
 
-/// Physics of any size is no mistake in the description of a log: the largest effects that the scenarios hide, and worse.
+/// Physical effects of any size are not a mistake in reading the log: the largest effects of the scenarios, and larger
+/// ones.
 #[test]
 fn a_log_that_is_read_as_it_was_recorded_is_not_called_misread() {
     for effect in [
@@ -224,7 +229,7 @@ fn a_log_that_is_read_as_it_was_recorded_is_not_called_misread() {
     }
 }
 
-/// The first joint's sign of friction is mended by turning its torque round, and no more than that: what is wrong is all of its column.
+/// Reversing the torque of joint 1 would correct the sign of its friction and nothing else: its whole column is wrong.
 #[test]
 fn a_reading_that_fits_no_better_is_not_named() {
     let run = run(("ur5_identification", 4), "");
@@ -237,7 +242,7 @@ fn a_reading_that_fits_no_better_is_not_named() {
     assert_eq!(found, None);
 }
 
-/// A torque that has nothing to do with the motion fits no arm, however it is read.
+/// A torque unrelated to the motion fits no arm, however it is read.
 #[test]
 fn torque_that_is_none_is_not_called_misread() {
     let run = run(("ur5_identification", 4), "");
@@ -249,7 +254,7 @@ fn torque_that_is_none_is_not_called_misread() {
     assert_eq!(misreading(&run, &run.arm, &log, &run.options), None);
 }
 
-/// As a user meets it: both programs say what is wrong, and the layout that says so puts it right.
+/// From a user's view: both commands say what is wrong, and the layout they print corrects it.
 #[test]
 fn a_layout_puts_a_misread_log_right() {
     let folder = Folder::empty();
@@ -305,7 +310,7 @@ fn a_layout_puts_a_misread_log_right() {
     reads_it(&folder.result("result.json"));
 }
 
-/// One layout reads both logs, and the second one was not recorded as the first: which it is, is said.
+/// One layout reads both logs, but the second was recorded differently; the message says which log it is.
 #[test]
 fn of_two_logs_the_one_that_is_misread_is_named() {
     let folder = Folder::empty();
@@ -319,14 +324,14 @@ fn of_two_logs_the_one_that_is_misread_is_named() {
     let words = "identify first.csv other.csv --robot ur5 --json both.json";
     folder.armid(words).says(3, &[said]);
     assert_eq!(folder.result("both.json")["misreading"]["log"], "other.csv");
-    // Logs that nothing is fitted to are looked at as well.
+    // Validation and held-out logs are examined as well.
     folder.armid("identify first.csv --validate other.csv --robot ur5").says(0, &[said]);
     folder.armid("diagnose first.csv --held-out other.csv --robot ur5").says(0, &[said]);
     let declined = "other.csv: declined. The log is not read as it was recorded";
     folder.armid("diagnose first.csv other.csv --robot ur5").complains(3, &[declined]);
 }
 
-/// Torques of another time: no way to read them fits, and the parameters are not left to speak for themselves.
+/// Torques from another time: no way of reading them fits, and the parameters are not reported without a question.
 #[test]
 fn a_log_that_is_of_no_arm_is_questioned() {
     let folder = Folder::empty();

@@ -1,4 +1,4 @@
-//! Hidden effects against the physics they must obey.
+//! Hidden effects of the plant, checked against the physics they must obey.
 
 use armid::excitation::{FourierSeries, Reference};
 use armid::plant::faults::{Effect, FaultyPlant};
@@ -34,7 +34,7 @@ fn lively() -> Start<FourierSeries> {
     Start { motion: FourierSeries::built_in("ur5_identification").unwrap(), duration_s: 1.0 }
 }
 
-/// The `[[effect]]` tables of a scenario.
+/// Parses the `[[effect]]` tables of a scenario.
 fn effects(tables: &[&str]) -> Vec<Effect> {
     #[derive(serde::Deserialize)]
     struct File {
@@ -53,7 +53,7 @@ fn run(tables: &[&str], reference: &dyn Reference) -> Recording {
     plant(tables).unwrap().run(reference, None).unwrap()
 }
 
-/// Every kind, of a size that a log shows, and, where there is such a thing, of no size at all.
+/// Every kind of effect with a size that a log shows and, where it exists, with a size that has no effect.
 const KINDS: [(&str, Option<&str>); 28] = [
     (
         "kind='stribeck'\njoint=4\nextra_nm=0.5\nvs_rad_s=0.1",
@@ -133,7 +133,7 @@ const KINDS: [(&str, Option<&str>); 28] = [
     ("kind='dropped_samples'\nfraction=0.05", Some("kind='dropped_samples'\nfraction=0")),
 ];
 
-/// Noise on every channel.
+/// Sensors with noise on every channel.
 fn sensors() -> Sensors {
     let config: SensorConfig =
         toml::from_str("torque_sd_nm = 0.3\nq_sd_rad = 1e-5\nqd_sd_rad_s = 1e-3").unwrap();
@@ -176,7 +176,7 @@ fn every_effect_shows_in_the_log_and_gives_the_same_bits_again() {
     }
 }
 
-/// Torque that is late by one sample is the torque of the row before; the angles are untouched.
+/// Torque delayed by one sample is the torque of the row before; the angles are untouched.
 #[test]
 fn skewed_torque_is_that_of_an_earlier_instant() {
     let clean = run(&[], &lively());
@@ -186,7 +186,7 @@ fn skewed_torque_is_that_of_an_earlier_instant() {
         let rows = clean.torque_nm.samples();
         assert_eq!(late.torque_nm.joint(j)[1..], clean.torque_nm.joint(j)[..rows - 1]);
     }
-    // Half a sample of the log is two decisions of the controller: between the rows, exactly.
+    // Half a sample of the log is four control decisions: the torque between the rows is exact.
     let half = run(&["kind='time_skew'\njoint=2\ndelay_s=0.004"], &lively());
     let config = PlantConfig { log_rate_hz: 250.0, ..PlantConfig::default() };
     let dense = Plant::new(&ur5(), &config).unwrap().run(&lively(), None).unwrap();
@@ -207,11 +207,11 @@ fn a_lagging_velocity_loses_no_distance() {
     let last = y.len() - 1;
     let area: f64 = y.windows(2).map(|w| 0.5 * (w[0] + w[1]) / 500.0).sum();
     let error = delay_s * (y[last] - y[0]) + area - (q[last] - q[0]);
-    // The trapezoid's error of q̇ and of y, h²/12 · change of acceleration (up to 2 · 20 rad/s²) each.
+    // The trapezoidal errors of q̇ and of y, each h²/12 times the change of acceleration (up to 2 · 20 rad/s²).
     assert!(error.abs() < 3e-5, "{error} rad over {} rad", q[last] - q[0]);
 }
 
-/// A stall of three samples after every 50 rows: the rows behind it are those of later instants.
+/// The clock stalls for three samples after every 50 rows: the rows after a stall are those of later instants.
 #[test]
 fn a_stalling_clock_hides_rows_and_keeps_counting() {
     let clean = run(&[], &lively());
@@ -226,7 +226,7 @@ fn a_stalling_clock_hides_rows_and_keeps_counting() {
     assert!(rows < clean.time_s.len());
 }
 
-/// Shares of Bernoulli draws: 6 × 126 readings, 5 standard deviations (once in 2 million seeds).
+/// Shares of Bernoulli draws in 6 × 126 readings, 5 standard deviations (once in 2 million seeds).
 #[test]
 fn readings_go_wrong_as_often_as_asked() {
     let clean = log(&[]);
@@ -268,7 +268,7 @@ fn a_coarse_reading_has_whole_steps() {
     assert_eq!(coarse.q_rad.joint(1), clean.q_rad.joint(1));
 }
 
-/// Any two effects run together, on short runs; the result is a log of finite numbers.
+/// Any two effects run together, tested on short runs; the log has only finite numbers.
 #[test]
 fn any_two_effects_combine() {
     let short = Start { motion: lively().motion, duration_s: 0.04 };
@@ -282,7 +282,7 @@ fn any_two_effects_combine() {
     }
 }
 
-/// With noise in the control loop the log keeps its errors, whatever the timing makes of the rest.
+/// With noise in the control loop the readings keep their errors, whatever else changes with the timing.
 #[test]
 fn effects_live_with_a_controller_that_reads_the_sensors() {
     let streams = TrialStreams::new(1, b"faults", 0);
@@ -338,7 +338,7 @@ fn nonsense_is_refused_with_its_place_and_key() {
     }
 }
 
-/// `sims/effects.toml` shows every kind of effect, with every key that it has.
+/// `sims/effects.toml` shows every kind of effect with every key.
 #[test]
 fn the_list_of_effects_is_complete() {
     let file = std::path::Path::new("sims/effects.toml");

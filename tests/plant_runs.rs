@@ -1,4 +1,4 @@
-//! Runs of the plant: tracking, saturation, and what is refused.
+//! Runs of the plant: tracking, saturation, and inputs that are refused.
 
 use armid::excitation::{FourierSeries, Reference};
 use armid::plant::{
@@ -16,9 +16,9 @@ fn motion() -> FourierSeries {
     FourierSeries::built_in("ur5_identification").unwrap()
 }
 
-/// What the controller does not know is a tenth of the friction. Against the stiffness ω² times an
-/// inertia of at least the rotor's, a joint gives way by 0.1 (rc + rv q̇)/(ω² Ia); twice that leaves
-/// room for what the other joints' errors bring in through the mass matrix.
+/// The controller does not know a tenth of the friction. With a stiffness of ω² times an inertia of at least the
+/// rotor's, a joint deviates by 0.1 (rc + rv q̇)/(ω² Ia); twice that leaves room for errors of other joints that act
+/// through the mass matrix.
 #[test]
 fn the_arm_follows_its_reference() {
     let arm = ur5();
@@ -42,7 +42,7 @@ fn the_arm_follows_its_reference() {
     }
 }
 
-/// 125 Hz is every fourth sample of 500 Hz: the log's rate does not touch the motion.
+/// 125 Hz is every fourth sample of 500 Hz: the rate of the log does not affect the motion.
 #[test]
 fn the_log_rate_does_not_change_the_run() {
     let slow = simulate(&ur5(), &motion(), &PlantConfig::default(), None).unwrap();
@@ -68,7 +68,7 @@ fn a_weak_drive_saturates_and_is_counted() {
 #[test]
 fn a_body_that_cannot_exist_is_refused_with_its_numbers() {
     let mut arm = ur5();
-    // Principal moments of a body obey the triangle inequality: 0.05 > 0.01 + 0.02.
+    // Principal moments of inertia obey the triangle inequality; here 0.05 > 0.01 + 0.02.
     let tensor = Matrix3::from_diagonal(&Vector3::new(0.01, 0.02, 0.05));
     arm.joints[2].link = LinkInertia::from_com(2.0, Vector3::new(0.1, 0.0, 0.0), tensor);
     let error = RapierArm::new(&arm).unwrap_err();
@@ -96,7 +96,7 @@ fn impossible_settings_are_refused() {
     assert!(toml::from_str::<PlantConfig>("step = 0.001").is_err());
 }
 
-/// ε = 1 mrad/s makes the wrists' friction decay at about (1.4/0.001 + 2)/0.3 = 5000 /s.
+/// With ε = 1 mrad/s the friction of the wrists decays at about (1.4/0.001 + 2)/0.3 = 5000 /s.
 #[test]
 fn a_step_too_long_for_the_friction_is_refused() {
     let mut arm = ur5();
@@ -114,7 +114,7 @@ fn a_step_too_long_for_the_friction_is_refused() {
     }
 }
 
-/// A reference for `joints` joints that stands still, and is lost at `until_s`.
+/// A constant reference for `joints` joints that becomes NaN at `until_s`.
 struct Lost {
     joints: usize,
     until_s: f64,
@@ -149,7 +149,7 @@ fn a_run_that_breaks_down_says_when_and_where() {
     assert_eq!(error, PlantError::Joints { what: "the reference", found: 7, expected: 6 });
 }
 
-/// A stiff gear with one more state per joint: the distance travelled, ż = q̇.
+/// A rigid gear with one additional state per joint: the distance travelled, ż = q̇.
 struct Odometer {
     gear: RigidDrivetrain,
 }
@@ -180,7 +180,7 @@ impl Drivetrain for Odometer {
     }
 }
 
-/// A drivetrain's states are integrated with the joints', and change nothing they do not touch.
+/// The states of a drivetrain are integrated together with the joints, and do not disturb them.
 #[test]
 fn a_drivetrain_may_have_states_of_its_own() {
     let arm = ur5();

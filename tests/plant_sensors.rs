@@ -1,4 +1,4 @@
-//! The sensor chain: what it adds, that a trial can be replayed alone, and what the controller reads.
+//! The sensor chain: the errors it adds, the replay of a single trial, and the readings of the controller.
 
 use std::sync::OnceLock;
 
@@ -57,9 +57,9 @@ fn sensors_without_errors_report_the_truth() {
     assert_eq!(measured.torque_nm, recording.torque_nm);
 }
 
-/// White channels: the rms of n numbers has a relative standard deviation of 1/√(2n), here 2 %;
-/// 5 of them fail by chance once in 2 million seeds. The torque's noise is coloured: 5 × 1/√(2·n/n_c)
-/// with about n_c = 5 samples per independent one.
+/// White channels: the rms of n numbers has a relative standard deviation of 1/√(2n), here 2 %; five of these are
+/// exceeded by chance once in 2 million seeds. For the coloured torque noise the bound is 5 × 1/√(2·n/n_c), with about
+/// n_c = 5 samples per independent one.
 #[test]
 fn errors_have_the_size_asked_for() {
     let (arm, recording) = arm_and_recording();
@@ -120,8 +120,8 @@ fn readings_are_whole_steps() {
     }
 }
 
-/// With noise in the loop the log holds what the controller read, the arm itself moves differently,
-/// and the readings are off the true motion by just the encoders' errors.
+/// With noise in the loop, the log holds the readings of the controller, the arm itself moves differently, and the
+/// readings differ from the true motion by exactly the errors of the encoders.
 #[test]
 fn the_controller_reads_what_the_log_says() {
     let (arm, exact) = arm_and_recording();
@@ -147,7 +147,7 @@ fn the_controller_reads_what_the_log_says() {
     }
 
     assert_eq!(run(&PlantConfig::default()).unwrap(), recording);
-    // A log at instants at which the controller does not read could not hold its readings.
+    // A log cannot hold the controller's readings at instants at which the controller does not read.
     let config = PlantConfig { control_rate_hz: 62.5, ..PlantConfig::default() };
     assert!(matches!(run(&config), Err(PlantError::Setting { key: "log_rate_hz", .. })));
 }

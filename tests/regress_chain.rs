@@ -1,10 +1,9 @@
-//! The whole chain pinned: scenario, simulated log, estimate, σ, verdict. A change of the chain's
-//! path is seen here even where the answer is still right.
+//! The whole chain pinned: scenario, simulated log, estimate, σ, verdict. A change in any step shows here even if the
+//! answer is still correct.
 //!
-//! After an intended change run `ARMID_PIN=1 cargo test regress_chain -- --nocapture` and
-//! carry the printed numbers over. The log's hash covers every bit of the plant and the sensors; it
-//! rests on the platform's sine and logarithm, so another C library may call for another hash (the
-//! estimates, compared to 1e-9, must not change with it).
+//! After an intended change run `ARMID_PIN=1 cargo test regress_chain -- --nocapture` and copy the printed numbers. The
+//! hash of the log covers every bit of the plant and the sensors. It depends on the platform's sine and logarithm, so
+//! that another C library may require another hash; the estimates, compared to 1e-9, must not change with it.
 
 use armid::identify::Options;
 use armid::montecarlo::calibration::{Calibration, claims};
@@ -12,7 +11,7 @@ use armid::montecarlo::shard::Shard;
 use armid::montecarlo::{Experiment, Scenario};
 use sha2::{Digest, Sha256};
 
-/// Four periods instead of eight.
+/// The default scenario with four periods instead of eight.
 const SCENARIO: &str = r#"
 name = "regress"
 robot = "ur5"

@@ -1,18 +1,17 @@
-//! The loop closed: what is hidden in the plant and found in a log goes back into the simulation, whose
-//! torque is then the truth's to within what the noise of the log leaves.
+//! Closed loop from plant to simulation: an effect hidden in the plant and found in a log goes back into the
+//! simulation, whose torque must then agree with the truth to within the effect of the log's noise.
 //!
 //! # Tolerance
-//! Of p parameters with covariance V, the torque along a motion with regressor X is known to
-//! E Σ_j e_j²/σ_j² = Σ_j mean_k (x_jk V x_jkᵀ)/σ_j², and varies about that as χ²_p/p does: not above
-//! 1 + 4 √(2/p) times as much but once in 20 000 logs. The k parameters of the effect add k/p. The motion that is
-//! replayed is the mean of noisy readings up to 10 Hz: of a velocity with noise s per sample at f_s = 125 Hz the
-//! mean of P periods has an acceleration noise of √(2 s²/(P f_s) · 4π² f³/3) = 0.006 rad/s² at 10 Hz, which
-//! the links' inertias (4 kg m² at the shoulder, where σ = 1 Nm; less by as much as σ further out) make 0.02 σ per
-//! joint: 6 · 0.02² = 0.0025.
+//! With covariance V of p parameters, the torque along a motion with regressor X is known to E Σ_j e_j²/σ_j² = Σ_j
+//! mean_k (x_jk V x_jkᵀ)/σ_j², and the sum scatters about its expectation like χ²_p/p: it exceeds 1 + 4 √(2/p) times
+//! the expectation once in 20 000 logs. The k parameters of the effect add k/p. The replayed motion is the mean of
+//! noisy readings up to 10 Hz: for a velocity with noise s per sample at f_s = 125 Hz, the mean of P periods has an
+//! acceleration noise of √(2 s²/(P f_s) · 4π² f³/3) = 0.006 rad/s² at 10 Hz. The inertias of the links (4 kg m² at the
+//! shoulder, where σ = 1 Nm; smaller in proportion to σ further out) turn that into 0.02 σ per joint: 6 · 0.02² =
+//! 0.0025.
 //!
-//! Faster than that the simulated arm is on its own. Where a friction that the controller does not know reverses by Δ
-//! (Nm), the log and the simulation settle each in its own way within τ = 1/(2π · 10 Hz), which costs at most
-//! Δ² τ/4 per reversal.
+//! Above 10 Hz the simulated arm does not follow the log. Where a friction unknown to the controller reverses by Δ
+//! (Nm), log and simulation settle differently within τ = 1/(2π · 10 Hz), which costs at most Δ² τ/4 per reversal.
 
 use armid::diagnose::replay::{Replay, ReplayedLog};
 use armid::diagnose::{Diagnoser, Finding, Kind, Validation};
@@ -33,17 +32,17 @@ const LEAD: usize = 125;
 const PERIODS: usize = 6;
 const MOTION_NOISE: f64 = 0.0025;
 
-/// A log of the UR5 with hidden effects, and what its torque is without noise.
+/// A log of the UR5 with hidden effects, and its torque without noise.
 struct Hidden {
     log: Measured,
     truth: Recording,
 }
 
-/// `effects` as in a scenario.
+/// Simulates a log with `effects`, written as in a scenario.
 fn hide(trajectory: &str, effects: &str, seed: u64) -> Hidden {
     let scenario = crate::simulated::scenario(("replay", 1), (trajectory, 1), "", effects);
     let series = FourierSeries::built_in(trajectory).unwrap();
-    // One period, entered a second before it begins, and then again and again.
+    // One period is integrated, entered a second before it begins, and then repeated.
     let periodic = Periodic { series, lead_s: LEAD as f64 / RATE_HZ };
     let config = PlantConfig::default();
     let plant = FaultyPlant::new(&scenario.arm, &scenario.effects, &config).unwrap();
@@ -66,7 +65,7 @@ fn hide(trajectory: &str, effects: &str, seed: u64) -> Hidden {
     Hidden { log, truth }
 }
 
-/// A series that goes on for one period after the lead.
+/// A Fourier series for one period, after a lead of `lead_s`.
 struct Periodic {
     series: FourierSeries,
     lead_s: f64,
@@ -100,7 +99,7 @@ fn off(simulated_nm: &JointSignals, hidden: &Hidden, start_s: f64) -> f64 {
         .sum()
 }
 
-/// Σ_j mean_k (x V xᵀ)/σ_j² along `log`, and where its periods start, s.
+/// Σ_j mean_k (x V xᵀ)/σ_j² along `log`, and the start of its periods, s.
 fn known_to(finding: &Finding, identifier: &mut Identifier, log: &Measured) -> (f64, f64) {
     let regression = identifier.regression(&log.measurement("known")).unwrap();
     let problem = &regression.problem;
@@ -118,8 +117,8 @@ fn known_to(finding: &Finding, identifier: &mut Identifier, log: &Measured) -> (
     (sum, regression.prepared.processing.window_s[0])
 }
 
-/// Mean of Δ² τ/4 over the reversals of joint `j` (from 0) with friction `mu` |torque| that the controller
-/// does not know, in units of the noise.
+/// Mean of Δ² τ/4 over the reversals of joint `j` (from 0), for friction `mu` |torque| that the controller does not
+/// know, in units of the noise.
 fn reversals(hidden: &Hidden, j: usize, mu: f64) -> f64 {
     let settling_s = 1.0 / (std::f64::consts::TAU * 10.0);
     let speed = &hidden.truth.qd_rad_s.joint(j)[LEAD..LEAD + PERIOD];
@@ -138,21 +137,21 @@ fn show(log: &ReplayedLog, before: f64, after: f64, tolerance: f64) {
     );
 }
 
-/// What is hidden, and how.
+/// A hidden effect and its test.
 struct Case {
     kind: Kind,
     joint: usize,
-    /// As in a scenario.
+    /// Its table, as in a scenario.
     effect: &'static str,
-    /// Its parameters.
+    /// Number of its parameters.
     parameters: usize,
     /// Friction per torque that reverses with the motion.
     mu: f64,
-    /// Whether another motion is replayed, too.
+    /// Whether another motion is replayed as well.
     elsewhere: bool,
 }
 
-/// Hides the effect, finds it alone, closes the loop, and compares with the truth.
+/// Hides the effect, diagnoses it as the only cause, replays it, and compares with the truth.
 fn close(case: &Case) -> Replay {
     let hidden = hide("ur5_identification", case.effect, 3);
     let other = case.elsewhere.then(|| hide("ur5_validation", case.effect, 4));
@@ -191,8 +190,8 @@ fn close(case: &Case) -> Replay {
         assert!(after < tolerance, "{}: {after} of at most {tolerance}", log.log);
         assert!(before > 5.0 * after, "{}: {before} before, {after} after", log.log);
     }
-    // In units of the noise of the mean, λ is moved by chance by √(2 · 6 · 1250) through the noise's own
-    // square and by 2 √λ through its product with the effect: at √λ = 30 by 20 % at most (3 σ).
+    // In units of the noise of the mean, λ has a random error of √(2 · 6 · 1250) from the square of the noise and of 2
+    // √λ from its product with the effect: at √λ = 30 at most 20 % (3 σ).
     let removed = replay.log.removed_fraction.unwrap();
     assert!((removed - 1.0).abs() < 0.2, "{removed}");
     replay
@@ -203,7 +202,7 @@ fn friction_that_grows_with_load() {
     let effect = "[[effect]]\nkind = \"load_friction\"\njoint = 2\nmu = 0.02";
     let kind = Kind::LoadFriction;
     let replay = close(&Case { kind, joint: 2, effect, parameters: 1, mu: 0.02, elsewhere: true });
-    // In the run whose torque is compared the arm moves as the log did, far better than the controller alone.
+    // In the run whose torque is compared, the arm follows the log far better than the controller alone makes it.
     let after = &replay.log.after;
     assert!(after.motion_rms_rad[1] < 0.05 * after.tracking_rms_rad[1], "{after:?}");
 }
@@ -223,8 +222,8 @@ fn a_gear_that_gives_way() {
     close(&Case { kind, joint: 2, effect, parameters: 1, mu: 0.0, elsewhere: false });
 }
 
-/// The scenario that is written loads, simulates, and its log has the torque of the one it was made from:
-/// the difference of two noises, and what the parameters are not known to.
+/// The written scenario can be loaded and simulated, and its torque is that of the original log to within the reversals
+/// of friction and the uncertainty of the parameters.
 #[test]
 fn the_extended_simulation_is_a_scenario() {
     let effect = "[[effect]]\nkind = \"torque_gain\"\njoint = 2\nerror_fraction = 0.06";
@@ -250,9 +249,9 @@ fn the_extended_simulation_is_a_scenario() {
     assert_eq!(scenario.effects, simulation.effects);
     assert_eq!(scenario.excitation.periods(), PERIODS);
     let PerJoint::Each(sd) = &scenario.sensors.qd_sd_rad_s else { panic!("one per joint") };
-    // Of 7500 samples a standard deviation is known to 1 %.
+    // From 7500 samples, a standard deviation is known to 1 %.
     assert!(sd.iter().all(|sd| (sd / 1e-3 - 1.0).abs() < 0.05), "{sd:?}");
-    // One period shows whether it is the same arm.
+    // One period suffices to show that it is the same arm.
     scenario.excitation = scenario.excitation.with_periods(1);
     let again = armid::montecarlo::Simulation::run(scenario).unwrap();
     let first = (again.scenario.excitation.run_in_s() * RATE_HZ).round() as usize;
@@ -263,14 +262,15 @@ fn the_extended_simulation_is_a_scenario() {
         let square: f64 = simulated.iter().zip(truth).map(|(s, t)| (s - t).powi(2)).sum();
         let rms = (square / PERIOD as f64).sqrt();
         println!("joint {}: {rms:.3} Nm", j + 1);
-        // The parameters' share is 0.05 σ; the rest is the reversals of friction, where the motion of the two
-        // differs by what the controller leaves.
+        // The parameters contribute 0.05 σ; the remainder comes from the reversals of friction, where the two motions
+        // differ by the tracking error of the controller.
         assert!(rms < 0.5 * sigma_nm, "joint {}: {rms} Nm", j + 1);
     }
 }
 
-/// A drive that feeds nothing forward may be found to feed less than that; and a velocity that is early, as one behind angles
-/// that are late, is none that the simulated sensors have. Neither costs the rest of what was found its place.
+/// A drive without feed-forward may be found to feed forward less than nothing, and the simulated sensors cannot have
+/// an early velocity, which delayed angles make it appear to be. Neither prevents the other causes from being
+/// simulated.
 #[test]
 fn what_no_simulation_has_does_not_take_the_rest_along() {
     let drive = "[[effect]]\nkind = \"feed_forward\"\njoint = 1\nshare_less = 0.9\n";
@@ -309,7 +309,8 @@ fn what_no_simulation_has_does_not_take_the_rest_along() {
     assert_eq!(not.kind, Kind::VelocityLag);
     assert!(not.reason.contains("cannot have delay_s = -0.0040"), "{}", not.reason);
 
-    // A law that no friction can have, beside the gain: it is left out, and what the parameters take over of it goes back to them.
+    // A law that no friction can have, beside the gain: it is left out of the simulation, and the part of it that the
+    // parameters had absorbed is given back to them.
     let mut lawless = finding.extension.effects[0].clone();
     lawless.family = armid::diagnose::candidates::all()
         .iter()

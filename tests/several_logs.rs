@@ -1,4 +1,5 @@
-//! One estimate from several logs: its σ is true and smaller than that of each, and logs of different arms are told.
+//! One estimate from several logs: its σ is true and smaller than that of each log, and logs of different arms are
+//! detected.
 
 use armid::dynamics::Model;
 use armid::identify::covariance::Covariance;
@@ -8,7 +9,8 @@ use armid::plant::Measured;
 
 use crate::simulated::{SIGMA_NM, scenario};
 
-/// Four periods of `trajectory`, with noise that remembers and that joints share, `times` as loud as on the UR5.
+/// Four periods of `trajectory`, with noise that is correlated in time and between joints, `times` as large as on the
+/// UR5.
 fn simulation(trajectory: &str, times: f64, effects: &str) -> Simulation {
     let sd_nm = SIGMA_NM.map(|sd| times * sd);
     let sensors = format!("torque_sd_nm = {sd_nm:?}\nq_sd_rad = 2e-5\nqd_sd_rad_s = 1e-3");
@@ -23,7 +25,7 @@ fn laid_out(identifier: &mut Identifier, log: &Measured) -> Regression {
     identifier.regression(&log.measurement("several")).unwrap()
 }
 
-/// Of each log alone, and of all together.
+/// The identification of each log alone, and of all logs together.
 fn identified(
     identifier: &mut Identifier,
     logs: &[Measured],
@@ -46,10 +48,11 @@ fn coverage(theta: &[f64], covariance: &Covariance, truth: &[f64]) -> f64 {
 
 const PAIRS: u64 = 24;
 
-/// Two motions, the second under noise that is three times as loud: 24 pairs of logs. Coverage is 95 % within five standard
-/// errors of its mean over the pairs (Student's t with 23 degrees of freedom exceeds them once in 2e4). The statistic of
-/// agreement is F with 52 and 312 degrees of freedom, of mean 1.006 and standard deviation 0.21: the mean of 24 lies within five
-/// of its own, 0.043, of that but once in 2e6, and a chance below 1e-3 comes twice once in 3600.
+/// Two motions, the second with three times the noise: 24 pairs of logs. The coverage is 95 % within five standard
+/// errors of its mean over the pairs (Student's t with 23 degrees of freedom exceeds them once in 2e4). The agreement
+/// statistic is F with 52 and 312 degrees of freedom, with mean 1.006 and standard deviation 0.21: the mean of 24
+/// deviates by more than five of its own standard deviations, 0.043, once in 2e6, and two p-values below 1e-3 occur
+/// once in 3600.
 #[test]
 fn the_sigma_of_two_logs_is_true_and_smaller_than_that_of_each() {
     let simulations =
@@ -84,12 +87,13 @@ fn the_sigma_of_two_logs_is_true_and_smaller_than_that_of_each() {
     assert!((mean - 0.95).abs() < 5.0 * error, "{mean} ± {error}");
     assert!((statistics - 1.006).abs() < 5.0 * 0.043, "{statistics}");
     assert!(differing < 2, "{differing} of {PAIRS}");
-    // Both claims of a log's σ share its scatter, so that what the loud one adds is not lost in it.
+    // The stated σ of a log is itself uncertain, but both σ share that scatter, so that the small gain from the loud
+    // log still shows.
     assert!(worse < 0.25, "{worse}");
 }
 
-/// Rotor inertias and frictions stay; a body of 300 g does not go unseen, and where it shows most is the last arm's gravity
-/// or inertia, not a friction.
+/// Rotor inertias and frictions stay the same; a body of 300 g is detected, and it shows most in a gravity or inertia
+/// parameter, not in friction.
 #[test]
 fn logs_of_an_arm_that_was_loaded_between_them_do_not_agree() {
     let payload = "[[effect]]\nkind = \"payload\"\nmass_kg = 0.3\ncom_x_m = 0.0\ncom_y_m = 0.0\ncom_z_m = 0.06\n";

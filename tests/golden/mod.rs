@@ -1,16 +1,16 @@
-//! Reader of the goldens written by `dynamics.py`; the formats are described there.
+//! Reads the golden files written by `dynamics.py`, which describes the formats.
 
 use armid::robot::Arm;
 
-/// Entries that joint j's own body leaves structurally zero: m and mz.
+/// Entries that are structurally zero for joint j's own body: m and mz.
 const OWN_JOINT_ZEROS: [usize; 2] = [0, 3];
 
-/// One random state and what Pinocchio makes of it.
+/// One random state with Pinocchio's results for it.
 pub struct State {
     pub q_rad: Vec<f64>,
     pub qd_rad_s: Vec<f64>,
     pub qdd_rad_s2: Vec<f64>,
-    /// Bodies and rotor inertias, without friction.
+    /// Torque of bodies and rotor inertias, without friction.
     pub torque_nm: Vec<f64>,
     pub friction_nm: Vec<f64>,
     /// N × N, row by row.
@@ -24,13 +24,13 @@ pub struct State {
 }
 
 impl State {
-    /// The torque that the golden acceleration answers to: 5 kg m² · q̈.
+    /// The applied torque for the golden acceleration: 5 kg m² · q̈.
     pub fn applied_nm(&self) -> Vec<f64> {
         self.qdd_rad_s2.iter().map(|a| 5.0 * a).collect()
     }
 }
 
-/// The three arms of the goldens, each with its states.
+/// The three golden arms, each with its states.
 pub fn all() -> Vec<(Arm, Vec<State>)> {
     vec![
         (
@@ -48,7 +48,7 @@ pub fn all() -> Vec<(Arm, Vec<State>)> {
     ]
 }
 
-/// Six random tilted axes, dense links, gravity off every axis.
+/// An arm with six random tilted axes, full inertia tensors, and gravity along none of the axes.
 pub fn tilted() -> Arm {
     Arm::from_toml(include_str!("tilted.toml"), "tilted.toml").unwrap()
 }
@@ -113,7 +113,7 @@ impl Reader<'_> {
         *head
     }
 
-    /// (N, number of states).
+    /// Reads the header: N and the number of states.
     fn header(&mut self, magic: &[u8; 8]) -> (usize, usize) {
         assert_eq!(&self.take::<8>(), magic);
         let [format, dof, count] = [(); 3].map(|()| u32::from_le_bytes(self.take()));

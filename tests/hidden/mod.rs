@@ -1,4 +1,4 @@
-//! A drivetrain with one hidden effect, and the log of the arm behind it.
+//! A drivetrain with one hidden effect, and logs of the arm with it.
 
 use std::ops::Range;
 
@@ -14,7 +14,7 @@ use armid::plant::{
 use armid::random::TrialStreams;
 use armid::robot::{Arm, JointSignals};
 
-/// What is hidden.
+/// The hidden effect.
 #[derive(Debug, Clone, Copy)]
 pub enum Law {
     /// Friction under the torque that the gear transmits.
@@ -28,22 +28,22 @@ pub enum Law {
     Dahl {
         stiffness_per_rad: f64,
     },
-    /// A reading that ends at this share of the largest torque; the noise comes behind it.
+    /// A reading that saturates at this share of the largest torque; noise is added afterwards.
     CutBeforeNoise {
         share: f64,
     },
-    /// Current that zigzags between plus and minus this as the motor turns, and moves nothing.
+    /// A current that zigzags between plus and minus this height as the motor turns, without moving anything.
     ZigzagOfTheCurrent {
         height_nm: f64,
         per_turn: f64,
     },
-    /// Torque that is read so many milliseconds before the rest of its row.
+    /// Torque that is read this many milliseconds before the rest of its row.
     Late {
         ms: usize,
     },
 }
 
-/// A hidden effect and where it sits.
+/// A hidden effect, its joint, and the way the log is recorded.
 pub struct Hidden {
     joint: usize,
     law: Law,
@@ -74,17 +74,17 @@ impl Hidden {
         Self { lost_rows: lost_rows.to_vec(), ..self }
     }
 
-    /// So many times the usual noise.
+    /// Scales the usual noise by this factor.
     pub fn with_noise(self, noise: f64) -> Self {
         Self { noise, ..self }
     }
 
-    /// Behind drives that feed this share of friction forward.
+    /// Uses drives that feed this share of friction forward.
     pub fn fed_forward(self, share: f64) -> Self {
         Self { fed_forward: share, ..self }
     }
 
-    /// With so much more in all velocities.
+    /// Adds this offset to all velocities.
     pub fn with_velocity_offset(self, rad_s: f64) -> Self {
         Self { velocity_offset_rad_s: rad_s, ..self }
     }
@@ -98,17 +98,17 @@ impl Hidden {
         self.diagnose_run(&self.run(), seed)
     }
 
-    /// What the arm does and its recorder keeps, without noise.
+    /// Simulates the arm and its recorder without noise.
     pub fn run(&self) -> Recording {
         let arm = Arm::built_in("ur5").unwrap();
         let series = FourierSeries::built_in("ur5_identification").unwrap();
         let excitation = Excitation::new(series, 2.0, self.periods).unwrap();
-        // Stiff bristles are integrated in short steps.
+        // Stiff bristles need short integration steps.
         let step_s = match self.law {
             Law::Dahl { stiffness_per_rad } if stiffness_per_rad > 1000.0 => 0.00025,
             _ => PlantConfig::default().step_s,
         };
-        // Delays are whole rows of a log of 1 kHz.
+        // A delay is a whole number of rows in a log at 1 kHz.
         let log_rate_hz =
             if matches!(self.law, Law::Late { .. }) { 1000.0 } else { self.log_rate_hz };
         let config = PlantConfig { log_rate_hz, step_s, ..PlantConfig::default() };
@@ -140,7 +140,7 @@ impl Hidden {
         only_rows(recording, |k| !self.lost_rows.iter().any(|lost| lost.contains(&k)))
     }
 
-    /// Diagnoses a `recording` of such an arm, read with noise of `seed`.
+    /// Diagnoses a `recording` of this arm, read with noise of `seed`.
     pub fn diagnose_run(&self, recording: &Recording, seed: u64) -> Finding {
         let arm = Arm::built_in("ur5").unwrap();
         let sensors = SensorConfig {
@@ -173,7 +173,7 @@ impl Hidden {
     }
 }
 
-/// The rows of `recording` that are `kept`.
+/// The rows of `recording` for which `kept` is true.
 fn only_rows(recording: Recording, kept: impl Fn(usize) -> bool) -> Recording {
     let rows: Vec<usize> = (0..recording.time_s.len()).filter(|k| kept(*k)).collect();
     let of = |signals: &JointSignals| {
@@ -246,8 +246,8 @@ impl Drivetrain for HiddenLaw {
         let sign = (v / self.arm.friction_epsilon_rad_s).tanh();
         match self.law {
             Law::Load { mu } => {
-                // The torque behind the gear: what is left of the drive's behind rotor and friction,
-                // where the rotor's share follows from the acceleration. A few rounds converge as μ^k.
+                // The torque transmitted by the gear: the drive torque minus rotor inertia and friction, where the
+                // rotor's share depends on the acceleration. The iteration converges as μ^k.
                 let before = self.link_nm[h];
                 arm.forward_dynamics(stage.q_rad, stage.qd_rad_s, &self.link_nm, qdd);
                 for _ in 0..5 {
@@ -261,7 +261,7 @@ impl Drivetrain for HiddenLaw {
                 return;
             }
             Law::MotorLoad { mu } => {
-                // L of the drive's torque, which bears this friction as well.
+                // The load L that remains of the drive torque, which also overcomes this friction μ|L|.
                 let carried = self.link_nm[h] / (1.0 + mu * sign * self.link_nm[h].signum());
                 self.link_nm[h] = carried;
             }

@@ -1,4 +1,4 @@
-//! Angles that jump, and turns.
+//! Angles that jump or wrap around.
 
 use super::*;
 
@@ -45,11 +45,12 @@ fn a_jump_that_is_no_turn_stays() {
     assert!((jump_rad - 3.0).abs() < 1e-14);
 }
 
-/// Angles from −1 to 2π − 1: each joint passes the seam in the middle of its motion, on its way up and down.
+/// Angles are wrapped to the range −1 to 2π − 1: each joint crosses the seam in the middle of its motion, on its way up
+/// and down.
 #[test]
 fn wrapped_angles_and_their_targets_are_put_together_again() {
     let wrapped = |q: f64| if q < -1.0 { q + 2.0 * PI } else { q };
-    // The target is ahead, and passes the seam in other rows.
+    // The target leads the angle and crosses the seam in other rows.
     let target_rad = |j: usize, t: f64| angle_rad(j, t + 0.05);
     let mut seams = 0;
     let log = edited(|rows| {
@@ -74,7 +75,7 @@ fn wrapped_angles_and_their_targets_are_put_together_again() {
     );
     let target = log.target_q_rad.unwrap();
     for j in 0..JOINTS {
-        // What a joint began with stays.
+        // The first angle of a joint is not changed.
         let begin = log.q_rad.joint(j)[0] - angle_rad(j, log.time_s[0]);
         let of = |f: &dyn Fn(usize, f64) -> f64| -> Vec<f64> {
             log.time_s.iter().map(|&t| begin + f(j, t)).collect()

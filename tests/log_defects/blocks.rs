@@ -1,11 +1,11 @@
-//! Quantities that a log may have or lack.
+//! Optional quantities of a log.
 
 use super::*;
 
-/// Column of the first desired moment in [`with_optional_blocks`]; the temperatures are behind these.
+/// Column of the first desired moment in [`with_optional_blocks`]; the temperatures follow the moments.
 const MOMENT: usize = 19;
 
-/// The log after `edit` was done to the fields of the valid one with desired moments and temperatures.
+/// The log that results when `edit` changes the fields of the valid one with desired moments and temperatures.
 fn with_optional_blocks(edit: impl FnOnce(&mut Vec<Vec<String>>)) -> Log {
     let log = edited(|rows| {
         for name in ["target_moment", "joint_temperatures"] {
@@ -52,7 +52,7 @@ fn a_bad_field_in_a_row_that_is_set_aside_costs_no_block() {
     assert!(log.target_effort.is_some() && log.temperature_c.is_some());
 }
 
-/// A layout that knows no torques asks for none.
+/// A layout without torque columns does not ask for them.
 #[test]
 fn the_effort_that_a_layout_names_is_the_one_that_is_missing() {
     let layout = include_str!("../../layouts/armid.toml").lines();

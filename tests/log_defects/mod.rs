@@ -1,4 +1,4 @@
-//! One valid log, then one test per single defect: every message names file, row and value.
+//! One valid log and one test per defect: every message names file, row and value.
 
 mod angles;
 mod blocks;
@@ -60,14 +60,14 @@ fn read(bytes: impl AsRef<[u8]>) -> Result<Log, LogError> {
     read_log_from(bytes.as_ref(), "run.csv", &Layout::default(), JOINTS)
 }
 
-/// The log after `edit` was done to the fields of the valid one.
+/// The log that results when `edit` changes the fields of the valid one.
 fn edited(edit: impl FnOnce(&mut Vec<Vec<String>>)) -> Result<Log, LogError> {
     let mut rows = valid();
     edit(&mut rows);
     read(text(&rows, ",", "\n"))
 }
 
-/// Multiplies column `c` of every row of data.
+/// Multiplies `columns` of every data row by `factor`.
 fn scale(rows: &mut [Vec<String>], columns: std::ops::Range<usize>, factor: f64) {
     for row in &mut rows[1..] {
         for field in &mut row[columns.clone()] {
@@ -83,7 +83,7 @@ fn assert_says(result: Result<Log, LogError>, parts: &[&str]) {
     }
 }
 
-/// One row is set aside for `reason`, at `row`, and the example shows `value`.
+/// Asserts that exactly one row, `row`, is set aside for `reason`, and that the example shows `value`.
 fn assert_one_row_aside(result: Result<Log, LogError>, reason: Reason, row: usize, value: &str) {
     let log = result.unwrap();
     let entry = &log.rows.set_aside[0];
@@ -96,7 +96,7 @@ fn assert_one_row_aside(result: Result<Log, LogError>, reason: Reason, row: usiz
     assert!(table.contains(&row.to_string()) && table.contains(value), "{table}");
 }
 
-/// The unit that the error names.
+/// The quantity and unit that the error suspects.
 fn suspected(result: Result<Log, LogError>) -> (&'static str, &'static str) {
     match result {
         Err(LogError::Units { file, suspicion }) => {

@@ -1,4 +1,4 @@
-//! Rows, columns and bytes that are damaged.
+//! Damaged rows, columns and bytes.
 
 use super::*;
 
@@ -34,7 +34,7 @@ fn byte_order_mark_line_ends_blank_lines_and_delimiters_change_nothing() {
     ] {
         let mut log = read(&variant).unwrap_or_else(|e| panic!("{e}: {:?}", &variant[..60]));
         log.sha256.clone_from(&expected.sha256);
-        // Only the numbers of the rows differ with blank lines between them.
+        // Apart from the hash, only the row numbers could differ, where blank lines lie between rows.
         assert_eq!(log, expected, "{:?}", &variant[..60]);
     }
 }
@@ -135,14 +135,14 @@ fn implausible_values_of_each_quantity() {
     }
 }
 
-/// Currents in milliamperes: only the rows near a zero of all joints could be currents in amperes.
+/// Currents in milliamperes: only rows near a zero crossing of all joints would be plausible in amperes.
 #[test]
 fn a_unit_in_which_most_rows_are_implausible() {
     let result = edited(|rows| scale(rows, 13..19, 1000.0));
     assert_says(result, &["run.csv", "implausible", "row 2", "actual_current_0", "units"]);
 }
 
-/// A delimiter at the end of every row makes no field, with a header or without.
+/// A delimiter at the end of every row does not make another field, with or without a header.
 #[test]
 fn delimiters_at_the_ends_of_rows_without_a_header() {
     let layout = Layout::load("ur10e_innopolis").unwrap();

@@ -1,8 +1,8 @@
-//! Logs without velocities, and readings that are held.
+//! Logs without velocities, and readings that are held over several rows.
 
 use super::*;
 
-/// A layout as that of the valid log, without velocities.
+/// The layout of the valid log without its velocities.
 fn without_velocities() -> Layout {
     let layout = include_str!("../../layouts/armid.toml");
     let lines = layout.lines().filter(|line| !line.starts_with("qd = \"actual"));
@@ -11,8 +11,8 @@ fn without_velocities() -> Layout {
     Layout::from_toml(&text, "no_qd.toml").unwrap()
 }
 
-/// Columns of zeros are no velocities, and the remedy that is named works: slopes of angles, wrapped ones as well, are told to
-/// (ω h)⁴/30 of up to 1.8 rad/s, and at the ends, one-sided, to six times that.
+/// Columns of zeros are not velocities, and the suggested remedy works: slopes of the angles, also of wrapped ones,
+/// have an error of (ω h)⁴/30 of up to 1.8 rad/s, and six times that at the ends, where they are one-sided.
 #[test]
 fn velocities_that_were_not_recorded_are_slopes_of_the_angles() {
     let mut rows = valid();
@@ -39,7 +39,7 @@ fn velocities_that_were_not_recorded_are_slopes_of_the_angles() {
     }
 }
 
-/// Stamps of 0.01 s at 125 rows a second, without velocities that could tell that rows are even.
+/// Stamps rounded to 0.01 s at 125 rows per second, without velocities that could show that the rows are evenly spaced.
 #[test]
 fn rounded_stamps_are_mended_without_velocities() {
     let mut rows = valid();
@@ -52,13 +52,13 @@ fn rounded_stamps_are_mended_without_velocities() {
     assert_eq!(log.rows.used, SAMPLES);
     assert!(matches!(log.rows.warnings[0], LogWarning::RoundedStamps { .. }), "{}", log.rows);
     for (k, slope) in log.qd_rad_s.joint(1).iter().enumerate() {
-        // The line through 400 stamps is known to 0.01 s/√(12 · 400) at its middle and to a ten thousandth of its slope.
+        // The line through 400 stamps is known to 0.01 s/√(12 · 400) at its middle, and its slope to a ten thousandth.
         let truth = velocity_rad_s(1, 100.0 + STEP_S * k as f64);
         assert!((slope - truth).abs() < 2e-3, "{slope} {truth}");
     }
 }
 
-/// A wild angle costs its own row and none beside it, whose slopes it would be in, and stays out of those.
+/// A wild angle costs only its own row. The rows beside it stay, and the wild angle does not enter their slopes.
 #[test]
 fn wild_angles_are_in_no_slopes() {
     let mut rows = valid();
@@ -72,13 +72,14 @@ fn wild_angles_are_in_no_slopes() {
     assert_eq!(log.rows.set_aside[0].reason, Reason::Inconsistent);
     assert!(log.rows.set_aside[0].example.contains("2.5"), "{}", log.rows);
     for (slope, t) in log.qd_rad_s.joint(2).iter().zip(&log.time_s) {
-        // Beside a row that is missing steps are twice as long, and one-sided at the ends.
+        // Beside a missing row the steps are twice as long; at the ends, slopes are one-sided.
         let bound = 16.0 * 6.0 * 1.8 * (2.0 * STEP_S).powi(4) / 30.0;
         assert!((slope - velocity_rad_s(2, *t)).abs() < bound, "{slope} at {t} s");
     }
 }
 
-/// Readings at 42 Hz in a file of 125 Hz: two in three rows are held. An arm at rest, whose velocities are noisy, holds none.
+/// Readings at 42 Hz in a file at 125 Hz: two in three rows repeat old readings. An arm at rest with noisy velocities
+/// must not be mistaken for this.
 #[test]
 fn rows_that_hold_old_readings_are_told() {
     let log = edited(|rows| {
@@ -104,7 +105,7 @@ fn rows_that_hold_old_readings_are_told() {
     });
     let warnings = at_rest.unwrap().rows.warnings;
     assert!(!warnings.iter().any(|w| matches!(w, LogWarning::Held { .. })), "{warnings:?}");
-    // 400 rows are 133 such readings and one more.
+    // 400 rows are 133 groups of three and one more row.
     assert!((share - 2.0 / 3.0).abs() < 0.003, "{share}");
     assert!((rate_hz * STEP_S - 1.0 / 3.0).abs() < 0.003, "{rate_hz}");
 }

@@ -1,9 +1,9 @@
-//! Clocks: coarse stamps, backward and wild times, pauses, stamps in two columns.
+//! Time stamps: coarse, backward and wild ones, pauses, and stamps in two columns.
 
 use super::*;
 
-/// The line through 400 stamps that are off by 10 ms/√12 is known to 0.15 ms in the middle, and to twice that at its ends: five times
-/// as much.
+/// The line through 400 stamps that are off by 10 ms/√12 is known to 0.15 ms in the middle and to twice that at its
+/// ends; the bound is five times that.
 #[test]
 fn stamps_that_are_coarser_than_the_rows() {
     let rounded = |rows: &mut Vec<Vec<String>>| {
@@ -15,7 +15,7 @@ fn stamps_that_are_coarser_than_the_rows() {
     for lost in [None, Some(200)] {
         let log = edited(|rows| {
             rounded(rows);
-            // A row that is set aside keeps its place.
+            // A row that is set aside keeps its place in time.
             lost.into_iter().for_each(|k: usize| rows[k][3] = "x".into());
         })
         .unwrap();
@@ -27,8 +27,8 @@ fn stamps_that_are_coarser_than_the_rows() {
     }
 }
 
-/// Patterns of stamps that rounding makes as well: every twentieth row missing, every row written twice. The motion says that the stamps
-/// are right.
+/// Patterns of stamps that could also come from rounding: every twentieth row missing, or every row written twice. The
+/// motion shows that the stamps are right.
 #[test]
 fn stamps_that_only_look_rounded() {
     let is_rounded =
@@ -51,7 +51,7 @@ fn stamps_that_only_look_rounded() {
     assert_eq!(twice.rows.count(Reason::TimeRepeated), SAMPLES);
 }
 
-/// Rows that are kept back, one of which is set aside, and written just before the next one.
+/// Rows are held back and written just before the next row; one of them is set aside.
 #[test]
 fn stamps_of_rows_that_are_written_in_bursts() {
     let log = edited(|rows| {
@@ -126,7 +126,7 @@ fn a_few_times_far_ahead_cost_their_rows_and_not_all_that_follow() {
             assert_eq!(rows.missed_samples, 0, "{rows}");
         }
     }
-    // A clock that stands or jumps about up there.
+    // The clock stands still or jumps about far ahead.
     for times in [[5000.0, 5000.0, 5000.0], [5000.0, 4000.0, 6000.0]] {
         assert_eq!(ahead(51, &times).used, SAMPLES - 3);
     }
@@ -134,7 +134,7 @@ fn a_few_times_far_ahead_cost_their_rows_and_not_all_that_follow() {
 
 #[test]
 fn a_log_that_goes_on_behind_a_pause_is_kept() {
-    // Three rows behind a minute's pause two times of before it, which are too few to be believed.
+    // Three rows after a pause of a minute, two stamps go back to before the pause; they are too few to be believed.
     let log = edited(|rows| {
         for row in &mut rows[51..] {
             row[0] = (row[0].parse::<f64>().unwrap() + 60.0).to_string();
@@ -147,7 +147,7 @@ fn a_log_that_goes_on_behind_a_pause_is_kept() {
     assert_eq!((rows.count(Reason::TimeBackwards), rows.used), (2, SAMPLES - 2), "{rows}");
 }
 
-/// Seconds and nanoseconds since 1970, of which a number of 53 bits tells a quarter of a microsecond.
+/// Seconds and nanoseconds since 1970; their sum as a number of 53 bits resolves a quarter of a microsecond.
 #[test]
 fn stamps_in_two_columns_are_added() {
     let mut rows = valid();

@@ -1,4 +1,4 @@
-//! Other units, and decimals.
+//! Other units, and decimal commas.
 
 use super::*;
 
@@ -78,7 +78,7 @@ fn the_remedy_that_is_named_works() {
         .map(|(a, b)| (a - b).abs())
         .fold(0.0, f64::max);
     assert!(worst < 1e-14, "{worst}: two roundings of numbers below 2");
-    // The same layout for numbers that are in SI units is recognised as well.
+    // The same layout applied to numbers in SI units is recognised as wrong as well.
     let result = read_log_from(text(&valid(), ",", "\n").as_bytes(), "run.csv", &layout, JOINTS);
     assert_eq!(suspected(result), ("clock", "s"));
 }

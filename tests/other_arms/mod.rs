@@ -1,4 +1,4 @@
-//! Arms that do not have six joints, from their URDF to a diagnosis. The truth is the URDF.
+//! Arms with other numbers of joints, from their URDF to a diagnosis. The truth is the URDF.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -18,17 +18,17 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use crate::misread_logs::assert_exchange_is_named;
 use crate::simulated::{Run, assert_holds};
 
-/// Noise of the encoders, beside that of the torque.
+/// Encoder noise, in addition to that of the torque.
 const ENCODERS: &str = "q_sd_rad = 2e-5\nqd_sd_rad_s = 1e-3\n";
 
-/// An arm of this folder, and a motion that a small search designs for it.
+/// An arm of this folder, and a motion designed for it by a small search.
 pub struct Designed {
     robot: &'static str,
     noise_nm: &'static [f64],
     design: Design,
 }
 
-/// What lies beside this file.
+/// The folder of this file.
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/other_arms")
 }
@@ -38,7 +38,7 @@ fn load(robot: &str) -> LoadedArm {
 }
 
 impl Designed {
-    /// Three harmonics of a period of `period_s`, eight of them, under torque noise of `noise_nm`.
+    /// Designs a motion of three harmonics with period `period_s`, played eight times under torque noise of `noise_nm`.
     pub fn new(robot: &'static str, period_s: f64, noise_nm: &'static [f64]) -> Self {
         let arm = load(robot).arm;
         let full = Parameterisation::full(arm.dof(), arm.torque_offsets);
@@ -70,12 +70,12 @@ impl Designed {
         Self { robot, noise_nm, design }
     }
 
-    /// That motion as a file.
+    /// The motion as a trajectory file.
     pub fn trajectory(&self) -> String {
         self.design.excitation.series().to_json()
     }
 
-    /// So many periods of that motion, in a scenario that ends with `rest`.
+    /// Simulates this number of periods of the motion, in a scenario that ends with `rest`.
     pub fn run(&self, periods: usize, rest: &str) -> Run {
         let Self { robot, noise_nm, .. } = self;
         let temporary = tempfile::tempdir().unwrap();
@@ -103,9 +103,10 @@ fn diagnose(run: &Run) -> Diagnosis {
     d
 }
 
-/// Asserts that the log `run` tells all `rank` base parameters. The scatter of eight periods knows σ with some forty degrees of
-/// freedom: the largest of 28 errors passes 5 σ once in 3500 logs, and all together pass F's limit once in 10⁴. Of the mean of
-/// all σ it knows a few percent, and encoders have a noise of their own, which the prediction leaves out: a fifth is room for both.
+/// Asserts that the log `run` determines all `rank` base parameters. From the scatter of eight periods, σ has some
+/// forty degrees of freedom: the largest of 28 errors exceeds 5 σ once in 3500 logs, and all errors together exceed the
+/// limit of F once in 10⁴. The mean of all σ is known to a few percent, and the prediction leaves out encoder noise: a
+/// tolerance of a fifth covers both.
 fn assert_truth(designed: &Designed, run: &Run, rank: usize) {
     let found = identify(run);
     assert_eq!(found.estimator, Estimator::Spectral);
@@ -129,7 +130,7 @@ fn assert_truth(designed: &Designed, run: &Run, rank: usize) {
     assert!((0.8..1.2).contains(&ratio), "{ratio} times the predicted sigma");
 }
 
-/// Asserts that nothing is found in the log `clean`, and in that of an arm with `effect` it alone.
+/// Asserts that nothing is found in the log `clean`, and only `effect` in the log of an arm with it.
 fn assert_diagnosed(
     designed: &Designed,
     clean: &Run,
@@ -145,7 +146,7 @@ fn assert_diagnosed(
     assert_holds(&d.causes[0], parameter, truth);
 }
 
-/// The tool is a part of the last body, friction and limits are those of the file.
+/// The tool becomes a part of the last body; friction and limits are those in the file.
 #[test]
 fn a_urdf_of_three_joints_is_read_as_written() {
     let LoadedArm { arm, notices, .. } = load("three_joints");
@@ -163,8 +164,9 @@ fn a_urdf_of_three_joints_is_read_as_written() {
     assert!(limits.eq([(150.0, 2.5), (100.0, 2.5), (40.0, 3.0)]));
 }
 
-/// Torque tells of the first body its inertia about an axis that stands still and two first moments, seven numbers of each body
-/// behind it, the rotors of these, and friction and an offset of every joint: 3 + 2 · 7 + 2 + 3 · 3.
+/// Torque determines, for the first body, the inertia about its fixed axis and two first moments; seven numbers for
+/// each later body; the rotor inertias of the later joints; and friction and an offset of every joint: 3 + 2 · 7 + 2 +
+/// 3 · 3.
 #[test]
 fn an_arm_of_three_joints_is_identified_and_diagnosed() {
     let designed = Designed::new("three_joints", 5.0, &[0.5, 0.4, 0.1]);
@@ -175,7 +177,7 @@ fn an_arm_of_three_joints_is_identified_and_diagnosed() {
     assert_diagnosed(&designed, &clean, effect, (Kind::LoadFriction, Some(2)), ("mu", 0.06));
 }
 
-/// Of its body torque tells the inertia and two first moments.
+/// For its body, torque determines the inertia and two first moments.
 #[test]
 fn a_single_joint_is_an_arm() {
     let designed = Designed::new("one_joint", 5.0, &[0.3]);

@@ -1,4 +1,4 @@
-//! Logs of the simulated UR5, with what a scenario hides in them.
+//! Logs of the simulated UR5 with hidden effects.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -13,18 +13,19 @@ use armid::montecarlo::{Scenario, Simulation};
 use armid::plant::Measured;
 use armid::robot::Arm;
 
-/// Standard deviation of a UR5's torque noise.
+/// Standard deviation of a UR5's torque noise, Nm.
 pub const SIGMA_NM: [f64; 6] = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15];
-/// Torque sensors with such white noise.
+/// Torque sensors with white noise of this size.
 pub const TORQUE_NOISE: &str = "torque_sd_nm = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15]\n";
-/// The same, and encoders with noise.
+/// The same with encoder noise.
 pub const NOISE: &str =
     "torque_sd_nm = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15]\nq_sd_rad = 2e-5\nqd_sd_rad_s = 1e-3\n";
 
-/// So many periods of a built-in trajectory.
+/// Name of a built-in trajectory, and number of periods.
 pub type Along<'a> = (&'a str, usize);
 
-/// Scenario `name`, whose noise hangs on it and on `seed`: behind `sensors`, then the `rest` of its file, effects first of all.
+/// Scenario `name`, with noise that depends on `name` and `seed`. `sensors` is its sensor table; `rest` is the rest of
+/// its file, effects first.
 pub fn scenario(
     (name, seed): (&str, u64),
     (trajectory, periods): Along,
@@ -38,8 +39,8 @@ pub fn scenario(
     Scenario::from_toml(&text, name, Path::new(".")).unwrap()
 }
 
-/// The scenario with its plant run. An arm that does the same in several tests is integrated once: what is read of it, by which
-/// sensors and with which noise, does not touch it.
+/// Runs the plant of the scenario. Tests with the same motion of the arm share one integration, because sensors and
+/// noise do not affect the motion.
 pub fn simulation(scenario: Scenario) -> Simulation {
     static RUNS: Mutex<BTreeMap<String, Arc<OnceLock<Simulation>>>> = Mutex::new(BTreeMap::new());
     assert!(!scenario.controller_reads_sensors, "such an arm moves differently in every trial");
@@ -52,8 +53,8 @@ pub fn simulation(scenario: Scenario) -> Simulation {
     simulation
 }
 
-/// Asserts that the log tells parameter `name` of `cause`: its interval is shorter than the `truth` is large to either side and, made twice
-/// as wide as that of 95 %, holds it. 3.9 σ are missed by chance once in 10⁴ logs.
+/// Asserts that the log determines parameter `name` of `cause`: half its 95 % interval is shorter than the magnitude of
+/// `truth`, and the interval, doubled, holds `truth`. 3.9 σ are exceeded by chance once in 10⁴ logs.
 pub fn assert_holds(cause: &Cause, name: &str, truth: f64) {
     let e = &cause.parameters[name];
     let [low, high] = e.ci95;
@@ -80,19 +81,19 @@ impl Run {
         Self::of(&simulation(scenario), 0)
     }
 
-    /// One of several logs of a plant that has run.
+    /// The log of one trial of a simulated plant.
     pub fn of(simulation: &Simulation, trial: u64) -> Self {
         let Scenario { arm, set, processing, .. } = &simulation.scenario;
         let (arm, set, options) = (arm.clone(), set.clone(), processing.clone());
         Self { model: Model::new(&arm), arm, set, options, log: simulation.log(trial).unwrap() }
     }
 
-    /// One that knows all families.
+    /// A diagnoser with all families.
     pub fn diagnoser(&self) -> Diagnoser<'_> {
         Diagnoser::new(&self.arm, &self.model, &self.set, self.options.clone())
     }
 
-    /// One that knows these.
+    /// A diagnoser with only these families.
     pub fn diagnoser_with(&self, families: Vec<Box<dyn Candidate>>) -> Diagnoser<'_> {
         let Self { arm, model, set, options, .. } = self;
         Diagnoser::with_families(arm, model, set, options.clone(), families)
