@@ -1,5 +1,5 @@
-//! Base parameters against Pinocchio's regressor, SVD ranks and least squares (`golden/base.py`):
-//! every rank, every combination and every coefficient of three arms.
+//! Base parameters against Pinocchio's regressor, SVD ranks and least squares (`golden/base.py`): every rank, every
+//! combination and every coefficient for three arms.
 
 use std::collections::BTreeMap;
 
@@ -36,9 +36,9 @@ fn goldens() -> Vec<(Arm, Golden)> {
     all.into_iter().map(|golden| (arm_of(&golden.robot), golden)).collect()
 }
 
-/// The ranks of the UR arms are also the published ones: 36 inertial, 40 with rotors, 52 with
-/// friction, 58 with offsets. Independent columns are taken left to right, so the rank of the
-/// leading columns is the number of kept ones among them.
+/// The ranks of the UR arms are also the published ones: 36 inertial, 40 with rotors, 52 with friction, 58 with
+/// offsets. Independent columns are selected from left to right, so that the rank of the leading columns is the number
+/// of selected columns among them.
 #[test]
 fn the_ranks_of_all_leading_column_groups_are_those_of_the_singular_values() {
     for (arm, golden) in goldens() {
@@ -54,8 +54,8 @@ fn the_ranks_of_all_leading_column_groups_are_those_of_the_singular_values() {
     }
 }
 
-/// 2e-9: twice the coefficient below which either side leaves a term out, and far above the
-/// rounding of either (1e-13 of columns whose independent part is at least a sixth of them).
+/// The tolerance of 2e-9 is twice the coefficient below which either program drops a term, and far above the rounding
+/// errors of both (1e-13 for columns whose independent part is at least a sixth of them).
 #[test]
 fn every_combination_has_the_golden_terms_and_coefficients() {
     for (arm, golden) in goldens() {

@@ -1,7 +1,7 @@
-//! The claimed σ against the truth in a small Monte Carlo; the full ones are in `reports/noise.md`.
+//! The stated σ against the truth in a small Monte Carlo; the full ones are in `reports/noise.md`.
 //!
-//! A check fails only beyond 5 standard errors of what is claimed (two-sided normal tail 6e-7), so
-//! that a true claim fails less than once in a million seeds; the seeds are fixed.
+//! A check fails only if the result deviates by more than 5 standard errors from the claim (two-sided normal tail
+//! 6e-7), so that a true claim fails less than once in a million seeds; the seeds are fixed.
 
 use armid::identify::Floor;
 use armid::montecarlo::tally::Tally;
@@ -15,12 +15,12 @@ fn experiment(toml: &str) -> Experiment {
     Experiment::prepare(scenario).unwrap()
 }
 
-/// What `trials` trials gave.
+/// Result of a number of trials.
 struct Run {
     tally: Tally,
-    /// Trials whose model failed against the scatter of the torque alone.
+    /// Trials in which the model was rejected against the scatter of the torque alone.
     tested_twice: usize,
-    /// Those of them that failed against the scatter of torque and motion as well.
+    /// Trials among them that were also rejected against the scatter of torque and motion.
     withheld: usize,
 }
 
@@ -41,7 +41,7 @@ fn run(toml: &str, trials: u64) -> Run {
 
 fn assert_calibrated(toml: &str) -> Run {
     let run = run(toml, TRIALS);
-    // At the test's level of 1e-3, five alarms in 48 trials have a chance of 2e-9.
+    // At the test level of 1e-3, five false alarms in 48 trials have a probability of 2e-9.
     let withheld = run.withheld;
     assert!(withheld < 5, "{withheld} of {TRIALS} withheld although the model is right");
     let (coverage, error) = run.tally.mean_coverage();
@@ -63,22 +63,22 @@ fn noise_of_a_real_arms_colour() {
     assert_calibrated(include_str!("../sims/noise_real_arm.toml"));
 }
 
-/// A log four times as fast halves every σ; friction is looked up in a velocity as sharp as the torque is.
+/// A log at four times the rate halves every σ; friction is evaluated at a velocity as sharp as the torque.
 #[test]
 fn a_fast_log() {
     let fast = format!("{}\n[plant]\nlog_rate_hz = 500.0\n", include_str!("../sims/default.toml"));
     assert_calibrated(&fast);
 }
 
-/// Encoders ten times worse: what they leave in the averaged motion is noise, no lack of the model.
+/// Encoders ten times worse: their remaining errors in the averaged motion are noise, not lack of fit.
 #[test]
 fn noise_of_bad_encoders_withholds_no_interval() {
     let run = assert_calibrated(include_str!("../sims/noise_encoder_large.toml"));
-    // Against the scatter of the torque alone half of the trials fail: none of 48 in one of 10¹⁴ seeds.
+    // Against the scatter of the torque alone, half of the trials fail: none of 48 would fail in one of 10¹⁴ seeds.
     assert!(run.tested_twice > 0);
 }
 
-/// Also where encoders are bad, so that the scatter of the motion is in the floor.
+/// The model is also rejected with bad encoders, where the floor includes the scatter of the motion.
 #[test]
 fn intervals_are_withheld_where_the_model_is_wrong() {
     let wrong = include_str!("../sims/noise_model_error.toml");
@@ -90,8 +90,8 @@ fn intervals_are_withheld_where_the_model_is_wrong() {
     assert_eq!(run(&wrong.replace(good, bad), trials).withheld, trials as usize);
 }
 
-/// What is left when the noise is taken away is what the processing does: sampling friction that reverses
-/// within a sample, ending the series of the motion. Nothing of it may show in the σ of the noise.
+/// The error that remains without noise is caused by the processing: friction that reverses within a sample, and
+/// truncation of the Fourier series of the motion. It must not be visible beside the σ of the noise.
 #[test]
 fn the_processing_biases_no_parameter_by_a_fifth_of_its_sigma() {
     for toml in [include_str!("../sims/default.toml"), include_str!("../sims/noise_ar1.toml")] {
@@ -99,9 +99,9 @@ fn the_processing_biases_no_parameter_by_a_fifth_of_its_sigma() {
     }
 }
 
-/// Friction that no drive feeds forward pushes the links at every reversal, for less than a sample. Of a bias of
-/// half a σ a 95 % interval loses 3 % of its coverage; without columns for what the drives do, the rotor inertia of
-/// joint 1 is off by 1.1 σ.
+/// Friction that no drive feeds forward pushes the links at every reversal, for less than a sample. A bias of half a σ
+/// costs a 95 % interval 3 % of its coverage; without regressor columns for the response of the drives, the rotor
+/// inertia of joint 1 is off by 1.1 σ.
 #[test]
 fn drives_that_feed_no_friction_forward_bias_no_parameter_by_half_its_sigma() {
     let toml = include_str!("../sims/default.toml");
@@ -120,7 +120,7 @@ fn assert_bias_below(bound: f64, toml: &str) {
     let set = &quiet.simulation.scenario.set;
     for (k, (theta, truth)) in found.fit.theta.iter().zip(&quiet.truth).enumerate() {
         let bias = (theta - truth) / sigma[k];
-        // The noise that is left moves an estimate by 1/100 σ; 5 of that.
+        // The remaining noise moves an estimate by 1/100 σ; the bound allows five times that.
         assert!(bias.abs() < bound + 5.0 / QUIETER, "{}: {bias:.2} σ", set.name(k));
     }
 }

@@ -1,7 +1,8 @@
 //! Estimates and covariances against statsmodels (`golden/covariance.py`): ordinary and weighted least squares,
-//! Newey–West with the joints of one instant added up, generalised least squares with autoregressive noise (GLSAR),
-//! instrumental variables (IV2SLS), rows thinned behind a low-pass (SciPy's), and blocks of time: corrected in row space,
-//! and without that statsmodels' clusters. Seemingly unrelated equations and resampled blocks against their formulas.
+//! Newey–West with the scores of all joints summed at each instant, generalised least squares with autoregressive noise
+//! (GLSAR), instrumental variables (IV2SLS), rows thinned after a low-pass (SciPy's), and blocks of time: corrected in
+//! row space, and without that correction statsmodels' clusters. Seemingly unrelated equations and resampled blocks are
+//! tested against their formulas.
 
 use armid::base::{BaseSet, Parameterisation};
 use armid::identify::covariance::{
@@ -19,9 +20,9 @@ use serde::Deserialize;
 const SAMPLES: usize = 240;
 const COLUMNS: usize = 3;
 const LAGS: usize = 9;
-/// Blocks of 5 s are then 40 samples.
+/// At this rate, blocks of 5 s have 40 samples.
 const RATE_HZ: f64 = 8.0;
-/// Both sides solve a well-conditioned problem in double precision.
+/// Both programs solve a well-conditioned problem in double precision.
 const TOLERANCE: f64 = 1e-10;
 
 #[derive(Deserialize)]
@@ -40,7 +41,7 @@ struct Golden {
     sur_own: Unrelated,
     decimated_theta: Vec<f64>,
     decimated: Vec<Vec<f64>>,
-    /// Rows of the upper triangle, joint by joint.
+    /// Upper triangle of each joint's covariance, row by row.
     bootstrap: Vec<[f64; 3]>,
 }
 
@@ -55,7 +56,7 @@ fn golden() -> Golden {
     serde_json::from_str(include_str!("golden/covariance.json")).unwrap()
 }
 
-/// The problem of the script, every joint's equation times its weight.
+/// The problem of the script, with the equation of each joint multiplied by its weight.
 fn problem(weights: [f64; 2]) -> Problem {
     let bases: Vec<usize> = (0..COLUMNS).collect();
     let mut problem = single_run(&[bases.clone(), bases], COLUMNS);
@@ -70,7 +71,7 @@ fn problem(weights: [f64; 2]) -> Problem {
     problem
 }
 
-/// Without rows as yet, and with these parameters of `count` in the equation of each joint.
+/// A problem without rows; `bases` lists the parameters in the equation of each joint, out of `count`.
 fn single_run(bases: &[Vec<usize>], count: usize) -> Problem {
     let mut problem = Problem::new(ColumnPlan::explicit(bases, count), RATE_HZ);
     problem.samples = SAMPLES;
@@ -83,7 +84,7 @@ fn column(j: usize, c: usize, t: usize) -> f64 {
     (rate * t as f64 + 0.4 * c as f64).cos()
 }
 
-/// Noise with a memory.
+/// Noise that is correlated in time.
 fn noise(j: usize) -> Vec<f64> {
     let white = |t: usize| (0.7 * (j + 1) as f64 * (t * t) as f64 + j as f64).sin();
     let mut e = 0.0;
@@ -130,7 +131,7 @@ fn scores_in_lags_and_in_blocks_of_time() {
         assert!((found - expected).abs() < TOLERANCE);
     }
     let hac = NeweyWest { lags: Some(LAGS) }.covariance(&problem, &fit).unwrap();
-    // statsmodels without its small-sample factor; ours is T/(T − b).
+    // statsmodels without its small-sample factor; the factor of this library is T/(T − b).
     let lost = SAMPLES as f64 / (SAMPLES - COLUMNS) as f64;
     assert_close(&hac, lost, &golden.hac);
     let blocks = BlockCluster.covariance(&problem, &fit).unwrap();
@@ -139,7 +140,7 @@ fn scores_in_lags_and_in_blocks_of_time() {
     assert!((freedom / golden.blocks_freedom - 1.0).abs() < TOLERANCE, "{freedom}");
 }
 
-/// The first joint alone by `estimator`.
+/// Estimate and covariance for the first joint alone by `estimator`.
 fn first_joint(
     estimator: Estimator,
     kind: CovarianceKind,
@@ -147,13 +148,13 @@ fn first_joint(
 ) -> (Vec<f64>, Covariance) {
     let problem = without_second_joint(problem([1.0, 1.0]));
     let aids = MotionAids { instruments, ..MotionAids::default() };
-    // An eighth of the rate: where rows are thinned, every fourth is kept.
+    // The cut-off is an eighth of the rate: thinning keeps every fourth row.
     let options = Options { cutoff_hz: 1.0, ..Options::default() };
     let (theta, [covariance]) = estimate(&problem, estimator, [kind], aids, &options);
     (theta, covariance)
 }
 
-/// θ̂ by `estimator` and its covariances.
+/// θ̂ by `estimator`, and its covariances.
 fn estimate<const N: usize>(
     problem: &Problem,
     estimator: Estimator,
@@ -202,7 +203,8 @@ fn instrumental_variables() {
     assert_close(&covariance, 1.0, &golden.iv);
 }
 
-/// Of joints that share their parameters, as those of an arm do, and of joints with parameters of their own, as in Zellner's paper.
+/// With joints that share their parameters, as in an arm, and with joints that have their own parameters, as in
+/// Zellner's paper.
 #[test]
 fn seemingly_unrelated_equations() {
     let golden = golden();
@@ -215,7 +217,8 @@ fn seemingly_unrelated_equations() {
         rows.panels = problem([1.0, 1.0]).panels;
         let shared = noise(0);
         rows.panels[1].y.iter_mut().zip(shared).for_each(|(y, e)| *y += 0.8 * e);
-        // The first leaves the variance of what is mixed out, which is one but for what the weights do not know.
+        // The first covariance leaves out the variance of the mixed rows, which is one except for what the weights do
+        // not know.
         let kinds = [CovarianceKind::Paper, CovarianceKind::Ols];
         let (aids, options) = (MotionAids::default(), Options::default());
         let (theta, [bare, scaled]) = estimate(&rows, Estimator::Sur, kinds, aids, &options);
@@ -234,11 +237,11 @@ fn rows_thinned_behind_a_low_pass() {
     assert_close(&covariance, 1.0, &golden.decimated);
 }
 
-/// Rows of a problem that vanishes towards its ends.
+/// Number of rows of a problem that vanishes towards its ends.
 const SLOW: usize = 962;
 
-/// Torque and columns that swing slowly, and whose first and last rows are 1e-14 of their height: no low-pass that lets them swing
-/// changes them by more than rounding.
+/// Torque and columns that vary slowly, with first and last rows of 1e-14 of their height: a low-pass that lets them
+/// pass changes them only by rounding errors.
 fn slow_problem(periods: usize) -> Problem {
     let bases: Vec<usize> = (0..COLUMNS).collect();
     let mut problem = single_run(&[bases.clone(), bases], COLUMNS);
@@ -258,8 +261,9 @@ fn slow_problem(periods: usize) -> Problem {
     problem
 }
 
-/// What is thinned is weighted least squares of the rows that are kept: of a single run all but its ends, of periods all round; of
-/// 962 rows every second, because every fourth, which was asked for, is not the same in the next period.
+/// The thinned estimate is weighted least squares on the rows that are kept: for a single run all but those near its
+/// ends, for periods all rows. Of 962 rows, every second is kept, because every fourth, as asked, would select other
+/// rows in the next period.
 #[test]
 fn thinned_rows_are_weighted_like_others() {
     for (periods, asked, every) in [(1, 1, 1), (1, 4, 4), (3, 1, 1), (3, 4, 2)] {
@@ -289,8 +293,9 @@ fn thinned_rows_are_weighted_like_others() {
     }
 }
 
-/// 24 joints, each with noise and parameters of its own, 200 series of residuals: with L Lᵀ = V of all series that can be made
-/// of them, L⁻¹ V̂ L⁻ᵀ is one on average, with a standard error of √(2/(200 · 24)) = 2.0 %. Four of it.
+/// 24 joints, each with its own noise and parameters, and 200 series of residuals. With L Lᵀ = V over all series that
+/// can be drawn, L⁻¹ V̂ L⁻ᵀ is one on average, with a standard error of √(2/(200 · 24)) = 2.0 %. The bound is four of
+/// these.
 #[test]
 fn resampled_blocks_scatter_as_all_that_can_be_drawn() {
     let expected = golden().bootstrap;
@@ -310,7 +315,7 @@ fn resampled_blocks_scatter_as_all_that_can_be_drawn() {
         }));
     }
     let found = BlockBootstrap.covariance(&problem, &fit(&problem)).unwrap();
-    // Fifteen whole blocks of 2 s.
+    // There are fifteen whole blocks of 2 s.
     assert_eq!(found.degrees_of_freedom, 14.0);
     let mut mean = Matrix2::zeros();
     for (j, [first, both, second]) in expected.into_iter().enumerate() {

@@ -1,12 +1,11 @@
-//! The dynamics against Pinocchio 4.1 on 200 random states of each of three arms: UR5, UR10e and an
-//! arm with random tilted axes. Written by `tests/golden/dynamics.py` from the robot files alone.
+//! The dynamics against Pinocchio 4.1 on 200 random states of each of three arms: UR5, UR10e and an arm with random
+//! tilted axes. `tests/golden/dynamics.py` writes the goldens from the robot files alone.
 //!
-//! Tolerance. Both sides evaluate the same formula in double precision along different paths; each
-//! quantity is a sum of a few hundred products, each of which may exceed the result it cancels to.
-//! Unit round-off 1.1e-16 times a thousand operations times three digits of cancellation is 1e-10 of
-//! the Euclidean norm of the whole vector or matrix. The errors printed are near 1e-15. What the
-//! tests are to find is far larger: the sign of the least of all products of inertia (1.5e-6 kg m²,
-//! UR5 wrist) moves the torque by 5e-6 of its size.
+//! Tolerance. Both programs evaluate the same formula in double precision along different paths. Each quantity is a sum
+//! of a few hundred products, each of which may exceed the sum after cancellation. Unit round-off 1.1e-16 times a
+//! thousand operations times three digits of cancellation is 1e-10 of the Euclidean norm of the whole vector or matrix.
+//! The errors printed are near 1e-15. The mistakes that the tests must find are far larger: a wrong sign of the
+//! smallest product of inertia (1.5e-6 kg m², UR5 wrist) changes the torque by 5e-6 of its size.
 
 use crate::golden::State;
 use armid::dynamics::{
@@ -30,7 +29,7 @@ fn inertial_parameters(arm: &Arm) -> Vec<f64> {
     arm.joints.iter().flat_map(|joint| joint.link.parameters).collect()
 }
 
-/// Runs `actual` on every golden state of every arm and compares with `expected`; prints the worst.
+/// Compares `actual` with `expected` on every golden state of every arm; prints the largest error.
 fn compare(
     mut actual: impl FnMut(&Model, &mut Workspace<f64>, &State) -> Vec<f64>,
     expected: impl Fn(&State) -> Vec<f64>,
@@ -95,10 +94,10 @@ fn the_mass_matrix_with_rotors_is_pinocchios() {
     );
 }
 
-/// Pinocchio's articulated-body algorithm forms no mass matrix, so even the method is another one.
+/// Pinocchio's articulated-body algorithm forms no mass matrix, so that even the method differs.
 ///
-/// M's condition number is below 1e3 for these arms, which still leaves the common tolerance a
-/// factor 1e3.
+/// The condition number of M is below 1e3 for these arms; the observed errors leave room for that within the common
+/// tolerance.
 #[test]
 fn forward_dynamics_is_pinocchios_articulated_body_algorithm() {
     compare(
@@ -126,8 +125,8 @@ fn kinetic_and_potential_energy_are_pinocchios() {
     );
 }
 
-/// Our parameters of the arms and Pinocchio's regressor in our order give Pinocchio's torque:
-/// order, signs and the reference point of `LinkInertia` are the documented ones.
+/// The parameters of this library's arms, multiplied by Pinocchio's regressor in the same order, give Pinocchio's
+/// torque: the order, the signs and the reference point of `LinkInertia` are as documented.
 #[test]
 fn pinocchios_regressor_takes_our_parameters_to_pinocchios_torque() {
     for (arm, states) in crate::golden::all() {

@@ -1,13 +1,13 @@
-//! Exported arms in programs that are not ours: Pinocchio reads the URDF, MuJoCo the MJCF, and both
-//! give our torque on 1000 random states of each of two arms.
+//! Exported arms in other programs: Pinocchio reads the URDF, MuJoCo the MJCF, and both reproduce the torque on 1000
+//! random states of each of two arms.
 //!
-//! The chain: these tests write the arms and compare with the committed `exported_*.urdf` and
-//! `exported_*.xml` (`ARMID_UPDATE=1` writes them anew); `tests/golden/export.py` loads those files
-//! and stores what Pinocchio and MuJoCo say.
+//! The chain: these tests write the arms and compare with the committed `exported_*.urdf` and `exported_*.xml`
+//! (`ARMID_UPDATE=1` rewrites these); `tests/golden/export.py` loads the committed files and stores the torques from
+//! Pinocchio and MuJoCo.
 //!
-//! Tolerance 1e-9 of the torque's norm: both sides sum the same products in double precision
-//! (1e-13); MuJoCo also turns each tensor into principal axes and a quaternion and back. A wrong
-//! frame, sign or axis is in percent.
+//! Tolerance 1e-9 of the torque's norm: all programs sum the same products in double precision (1e-13); MuJoCo also
+//! converts each tensor to principal axes and a quaternion and back. A wrong frame, sign or axis causes an error of
+//! percents.
 
 use std::path::PathBuf;
 
@@ -23,8 +23,7 @@ const DOF: usize = 6;
 const STATES: usize = 1000;
 const RELATIVE: f64 = 1e-9;
 
-/// A random tilted arm, and a UR5 identified from noisy data whose bodies are at the boundary of
-/// what can exist.
+/// A random tilted arm, and a UR5 identified from noisy data whose bodies are at the boundary of physical consistency.
 pub fn arms() -> [Arm; 2] {
     #[derive(Deserialize)]
     struct Case {
@@ -105,8 +104,8 @@ fn the_files_are_the_committed_ones() {
     }
 }
 
-/// Without friction, which is read and compared in `export.py`: it is a number in both formats, but
-/// another law. The rotor inertia is armature in the MJCF and added to Pinocchio's torque by hand.
+/// Compared without friction, which `export.py` reads and compares: both formats store its coefficients but have
+/// another law for it. The rotor inertia is the armature in the MJCF, and is added to Pinocchio's torque by hand.
 #[test]
 fn pinocchio_and_mujoco_give_our_torque() {
     for (number, mut arm) in arms().into_iter().enumerate() {
@@ -116,7 +115,7 @@ fn pinocchio_and_mujoco_give_our_torque() {
             joint.drive.coulomb_nm = 0.0;
         }
         let model = Model::new(&arm);
-        // A URDF has no gravity: Pinocchio ran with the arm's own.
+        // A URDF has no gravity: Pinocchio ran with the gravity of the arm.
         let mut workspace = Workspace::new(&model);
         let mut worst = [0.0_f64; 2];
         for state in golden(number) {
@@ -131,14 +130,14 @@ fn pinocchio_and_mujoco_give_our_torque() {
     }
 }
 
-/// Out and in again: the arm that is read has the torque of the arm that was written.
+/// Written and read back: the arm that is read has the torque of the arm that was written.
 #[test]
 fn a_urdf_that_is_read_again_is_the_same_arm() {
     for mut arm in arms() {
         let read = read_urdf(&urdf(&arm, &frames()).unwrap(), "exported.urdf").unwrap();
         assert_eq!(read.frames.fixed.len(), 1);
         let mut back = read.arm;
-        // What a URDF has no place for.
+        // A URDF does not store these.
         back.gravity_m_s2 = arm.gravity_m_s2;
         back.friction_epsilon_rad_s = arm.friction_epsilon_rad_s;
         for (written, read) in arm.joints.iter_mut().zip(&back.joints) {

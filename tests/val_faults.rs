@@ -1,5 +1,5 @@
-//! Hidden effects against the physics they must obey: statics by virtual work, laws of friction read off
-//! runs at constant speed, energies and impulses. Nothing here is computed with the effects' own code.
+//! Hidden effects against the physics they must obey: statics by virtual work, friction laws measured in runs at
+//! constant speed, energies and impulses. No expected value is computed with the code of the effects.
 
 use armid::excitation::Reference;
 use armid::plant::faults::{Effect, FaultyPlant};
@@ -14,8 +14,8 @@ fn ur5() -> Arm {
 /// A pose in which gravity loads joints 2, 3, 4 and 5.
 const POSE: [f64; 6] = [0.3, -0.9, 0.8, -0.4, 0.6, 0.5];
 
-/// Joint `joint` (from 0) goes along `course` (angle, speed, acceleration at a time) from `POSE`, the
-/// others stand still.
+/// Joint `joint` (from 0) moves along `course` (angle, speed, acceleration over time) relative to `POSE`; the others
+/// stand still.
 struct One<F> {
     joint: usize,
     duration_s: f64,
@@ -42,7 +42,7 @@ impl<F: Fn(f64) -> [f64; 3] + Sync> Reference for One<F> {
     }
 }
 
-/// Constant speed of joint `joint`, passing `POSE` at the end.
+/// Constant speed of joint `joint`, passing `POSE` at the end of the run.
 fn turning(joint: usize, speed_rad_s: f64, duration_s: f64) -> impl Reference {
     let course = move |t: f64| [speed_rad_s * (t - duration_s), speed_rad_s, 0.0];
     One { joint, duration_s, course }
@@ -61,7 +61,7 @@ fn effects(toml_tables: &str) -> Vec<Effect> {
     toml::from_str::<File>(toml_tables).unwrap_or_else(|e| panic!("{toml_tables}: {e}")).effect
 }
 
-/// `keys` of one effect, separated by semicolons.
+/// The table of one effect with `keys`, separated by semicolons.
 fn table(keys: &str) -> String {
     if keys.is_empty() {
         String::new()
@@ -84,21 +84,21 @@ fn last_torque(recording: &Recording) -> [f64; 6] {
     std::array::from_fn(|j| *recording.torque_nm.joint(j).last().unwrap())
 }
 
-/// Angles that the encoders read at the end of a run. The arm gives way to what its controller does
-/// not know, by 1e-4 rad and more: poses are compared where the arm is, not where it should be.
+/// Angles that the encoders read at the end of a run. The arm deviates from its reference by 1e-4 rad and more because
+/// of effects that its controller does not know; torques are therefore compared at the actual pose.
 fn last_pose(recording: &Recording) -> [f64; 6] {
     std::array::from_fn(|j| *recording.q_rad.joint(j).last().unwrap())
 }
 
-/// What an effect adds to the torque of joint `joint` (from 0) at constant speed, Nm.
+/// Torque that an effect adds to joint `joint` (from 0) at constant speed, Nm.
 fn added(keys: &str, joint: usize, speed_rad_s: f64) -> f64 {
-    // The controller's errors decay at 50 /s: to e⁻⁵⁰ in a second.
+    // The controller's errors decay at 50 /s: to e⁻⁵⁰ within a second.
     let at = |keys| last_torque(&run(keys, &turning(joint, speed_rad_s, 1.0)))[joint];
     at(keys) - at("")
 }
 
-/// Holding torques by virtual work: dU/dq of Σ m g z over the centres of mass, in a world in which
-/// gravity is straight down and the base is tilted.
+/// Holding torques by virtual work: dU/dq of Σ m g z over the centres of mass, in a world whose gravity points straight
+/// down and whose base is tilted.
 fn static_torque(arm: &Arm, tilt: Matrix3<f64>, q_rad: &[f64]) -> Vec<f64> {
     let energy = |q: &[f64]| -> f64 {
         let bodies = arm.frames(q).into_iter().zip(&arm.joints);
@@ -111,7 +111,7 @@ fn static_torque(arm: &Arm, tilt: Matrix3<f64>, q_rad: &[f64]) -> Vec<f64> {
             })
             .sum()
     };
-    // Second-order difference of a function of size 100 J: round-off 1e-14·100/1e-5, error 1e-10.
+    // Second-order difference of a function of size 100 J: round-off 1e-14·100/1e-5, truncation error 1e-10.
     const STEP: f64 = 1e-5;
     (0..q_rad.len())
         .map(|j| {
@@ -129,11 +129,11 @@ fn close(seen: f64, wanted: f64, tolerance: f64, what: &str) {
     assert!((seen - wanted).abs() < tolerance, "{what}: {seen}, wanted {wanted} ± {tolerance:.1e}");
 }
 
-/// v_s is the speed at which the extra friction has fallen to 1/e, and far above it none is left;
-/// friction always takes power, whichever way the joint turns.
+/// v_s is the speed at which the extra friction has fallen to 1/e; far above it, none is left. Friction dissipates
+/// power in both directions.
 #[test]
 fn stribeck_friction_fades_at_its_speed() {
-    // Well above ε = 0.02 rad/s, where tanh is 1 to 1e-8.
+    // The speeds are well above ε = 0.02 rad/s, where tanh is 1 to within 1e-8.
     let keys = "kind='stribeck';joint=1;extra_nm=3;vs_rad_s=0.4";
     let extra = |v| added(keys, 0, v);
     close(extra(0.4), 3.0 / std::f64::consts::E, 1e-6, "at v_s");
@@ -169,8 +169,8 @@ fn changed_friction_is_seen_at_constant_speed() {
     close(added(keys, 5, 1.0), 0.4, 1e-6, "rc - 0.3 + rv 0.7 at 1 rad/s");
 }
 
-/// Lifting and lowering slowly, friction is what the drive gives beyond holding the pose. A payload
-/// adds a load that is known by virtual work, and friction by μ times as much.
+/// Lifting and lowering slowly, friction is the drive torque beyond the holding torque. A payload adds a load known by
+/// virtual work, and friction of μ times that load.
 #[test]
 fn friction_grows_with_the_load_that_is_lifted() {
     let mu = 0.06;
@@ -188,7 +188,7 @@ fn friction_grows_with_the_load_that_is_lifted() {
             load_and_loss(&format!("{friction}{payload}"), &with_payload(4.0, com));
         let (added_load, added_loss) = (more_load.abs() - load.abs(), more_loss - loss);
         assert!(added_load > 10.0, "the payload must load the joint: {added_load} Nm");
-        // Accelerations are left over as the pose changes: 0.2 rad/s · 0.1 of the load's 50 Nm/rad.
+        // Accelerations remain because the pose changes: 0.2 rad/s · 0.1 of the load's 50 Nm/rad.
         close(added_loss * speed.signum() / added_load, mu, 3e-3 * mu, "mu");
     }
 }
@@ -201,8 +201,8 @@ fn with_payload(mass_kg: f64, com_m: Vector3<f64>) -> Arm {
     arm
 }
 
-/// From rest the bristles are a spring of stiffness rc k; after a travel of many 1/k all of rc is
-/// there; round a closed loop power is lost.
+/// From rest, the bristles act as a spring of stiffness rc k; after a travel of many 1/k, the full rc is reached. A
+/// closed loop dissipates energy.
 #[test]
 fn presliding_is_a_spring_first_and_coulomb_friction_later() {
     let (k, rc) = (500.0, ur5().joints[0].drive.coulomb_nm);
@@ -232,15 +232,14 @@ fn presliding_is_a_spring_first_and_coulomb_friction_later() {
         }
     }
     let slope = (torque[highest] - torque[lowest]) / (q[highest] - q[lowest]);
-    // The spring softens by k·span = 2.5 % over the loop; inertia adds 3 kg m² · (2π)² = 120 Nm/rad,
-    // against 3500.
+    // The spring softens by k·span = 2.5 % over the loop; inertia adds 3 kg m² · (2π)² = 120 Nm/rad to 3500.
     close(slope, rc * k, 0.08 * rc * k, "stiffness");
     let loss: f64 = (62..187).map(|i| 0.5 * (torque[i] + torque[i + 1]) * (q[i + 1] - q[i])).sum();
     assert!(loss > 0.0, "{loss} J");
     close(added(&keys, 0, 0.5), 0.0, 1e-4, "against Coulomb friction when sliding");
 }
 
-/// At constant speed v friction is rc tanh(v/w), where the arm's file has rc tanh(v/ε).
+/// At constant speed v friction is rc tanh(v/w) instead of the rc tanh(v/ε) of the arm's file.
 #[test]
 fn friction_turns_round_within_its_width() {
     let (width, speed) = (0.06, 0.03);
@@ -253,7 +252,7 @@ fn friction_turns_round_within_its_width() {
     }
 }
 
-/// Over a turn dry friction varies by ±P and is rc on average.
+/// Over a turn, dry friction varies by ±P around its mean rc.
 #[test]
 fn position_dependent_friction_averages_out_over_a_turn() {
     let keys = "kind='position_friction';joint=1;amplitude_nm=1.5;phase_rad=0.7";
@@ -270,26 +269,26 @@ fn position_dependent_friction_averages_out_over_a_turn() {
     let smallest = series.iter().fold(f64::MAX, |m, v| m.min(*v));
     // The turn is not a whole number of samples: one sample of 392 is missing or double.
     close(mean, 0.0, 0.01, "mean");
-    // The arm speeds up and slows down a little under it.
+    // The arm speeds up and slows down slightly under the varying friction.
     close(largest, 1.5, 0.03, "highest");
     close(smallest, -1.5, 0.03, "lowest");
 }
 
-/// Against constant speed friction falls exponentially: by 1 − 1/e of the change after T.
+/// At constant speed, friction approaches its final value exponentially: after T, 1 − 1/e of the change has happened.
 #[test]
 fn a_warming_joint_loses_friction_at_its_time_constant() {
     let keys = "kind='thermal_drift';joint=1;fraction=-0.2;time_constant_s=2";
     let log = run(keys, &turning(0, 1.0, 14.0));
     let torque = log.torque_nm.joint(0);
     let at = |t: f64| torque[(t * 125.0) as usize];
-    // Friction itself is the torque: nothing accelerates, and gravity does not load joint 1.
+    // The torque is friction alone: nothing accelerates, and gravity does not load joint 1.
     let (early, late) = (at(2.0), at(14.0));
     let cold = last_torque(&run("", &turning(0, 1.0, 1.0)))[0];
     close(late / cold, 0.8 + 0.2 * (-7.0_f64).exp(), 1e-3, "warm");
     close((cold - early) / (0.2 * cold), 1.0 - (-1.0_f64).exp(), 5e-3, "after T");
 }
 
-/// At a creep the drive must make up for the ripple: its line stands at n cycles per turn.
+/// At creep speed the drive must compensate the ripple: its spectral line is at n cycles per turn.
 #[test]
 fn ripple_stands_at_its_order() {
     let (n, speed) = (202.0, 0.1);
@@ -311,16 +310,16 @@ fn ripple_stands_at_its_order() {
         }
         (c.hypot(s), (-s).atan2(c))
     };
-    // At 3.2 Hz the position loop (50 rad/s) leaves the joint a part of the ripple, and its inertia
-    // turns the phase: 10 %.
+    // At 3.2 Hz the position loop (50 rad/s) lets a part of the ripple move the joint, and the inertia shifts the
+    // phase: 10 %.
     let (amplitude, phase) = project(n);
     close(amplitude, 0.5, 0.05, "line");
     close(phase, 0.4, 0.15, "phase");
     assert!(project(n * 1.5).0 < 0.05, "no line between");
 }
 
-/// A gear that gives way puts the link at q − τ/k (and half the play further): the drive then holds
-/// the gravity of that pose. The encoder on the motor shows nothing of it.
+/// A soft gear puts the link at q − τ/k (and half the play further); the drive then holds the gravity of that pose. The
+/// encoder on the motor does not show the deflection.
 #[test]
 fn gears_deflect_by_load_over_stiffness_and_half_their_play() {
     for (keys, stiffness, gap) in [
@@ -340,15 +339,15 @@ fn gears_deflect_by_load_over_stiffness_and_half_their_play() {
         let held = static_torque(&ur5(), Matrix3::identity(), &pose);
         let unaware = static_torque(&ur5(), Matrix3::identity(), &read)[1];
         assert!((torque[1] - unaware).abs() > 0.02, "{keys}: nothing to see");
-        // The gear rings at its resonance (ζω ≈ 1.5 /s) after it takes the load: gone after 8 s.
+        // After it takes the load, the gear rings at its resonance (ζω ≈ 1.5 /s); the ringing has decayed after 8 s.
         for j in 0..6 {
             close(torque[j], held[j], 1e-4, keys);
         }
     }
 }
 
-/// The stiffer the gear, the nearer to a rigid one: deflections are L/k, so that torques differ by
-/// (dτ/dq) L/k and the swing it starts.
+/// The stiffer the gear, the closer to a rigid one: deflections are L/k, so that torques differ by (dτ/dq) L/k and by
+/// the oscillation that the deflection starts.
 #[test]
 fn a_stiff_gear_is_a_rigid_one_in_the_limit() {
     let w = 3.0;
@@ -400,8 +399,8 @@ fn a_spring_must_be_held() {
     close(last_torque(&log)[3] - held, 2.0 * (pose[3] - 0.3), 1e-5, "k (q - q0)");
 }
 
-/// The joint is at rest where it was before and after the push, so the drive has given back its whole
-/// momentum. Without friction, which would take a share.
+/// The joint is at rest in the same place before and after the push, so that the drive has returned its whole momentum.
+/// The arm has no friction, which would take a share.
 #[test]
 fn a_contact_costs_the_drive_its_impulse() {
     let mut arm = ur5();
@@ -414,12 +413,12 @@ fn a_contact_costs_the_drive_its_impulse() {
     let torque = log.torque_nm.joint(0);
     let impulse = torque.iter().sum::<f64>() / 125.0;
     close(impulse, 0.5 * 20.0 * 0.4, 0.01, "impulse, Nms");
-    // Before the push: nothing.
+    // There is no torque before the push.
     assert!(torque[..25].iter().all(|t| t.abs() < 1e-9));
 }
 
-/// A slow push on the flange: the drives' torques do the work of the force, for every way in which the
-/// flange could move.
+/// A slow push on the flange: the torques of the drives do the work of the force, for every direction in which the
+/// flange can move.
 #[test]
 fn a_push_on_the_flange_does_the_work_of_a_force() {
     let log = run("kind='contact';start_s=0;end_s=8;peak_nm=15", &standing(4.0));

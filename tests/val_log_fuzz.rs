@@ -1,4 +1,4 @@
-//! Whatever the bytes, the reader answers with a log or an error, and a log keeps its promises.
+//! Whatever its input bytes, the reader returns a log or an error, and a log keeps its guarantees.
 //!
 //! `ARMID_FUZZ_CASES` sets the number of inputs per test (default 400).
 
@@ -16,7 +16,7 @@ fn config() -> ProptestConfig {
 
 const JOINTS: usize = 2;
 
-/// A layout without header and two widths beside the project's own.
+/// The default layout, and a layout without a header that has two widths, with decimal points and with commas.
 fn layouts() -> [Layout; 3] {
     let plain = "name = \"plain\"\nheader = false\n[columns]\ntime = 1\n\
         q = { first = 2, last = 3 }\nqd = { first = 4, last = 5 }\ncurrent = { first = 6, last = 7 }\n\
@@ -31,7 +31,7 @@ fn layouts() -> [Layout; 3] {
     ]
 }
 
-/// A valid log of two joints, with or without header.
+/// A valid log of two joints, with or without a header.
 fn valid(header: bool, rows: usize) -> Vec<u8> {
     let mut text = String::new();
     if header {
@@ -45,7 +45,7 @@ fn valid(header: bool, rows: usize) -> Vec<u8> {
     text.into_bytes()
 }
 
-/// What a log promises, whatever it was read from.
+/// Checks the guarantees of a log, or the message of an error.
 fn check(result: Result<Log, LogError>) {
     match result {
         Ok(log) => {

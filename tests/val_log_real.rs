@@ -1,14 +1,14 @@
 //! Real logs of a UR10e and a UR3e with known defects, read from the folder named by `ARMID_DATA`.
 //!
-//! The numbers below were counted from the files by other means (field counts per line, and steps of
-//! time, with awk and NumPy).
+//! The numbers below were counted from the files by other means: field counts per line and time steps, with awk and
+//! NumPy.
 
 use std::path::PathBuf;
 
 use armid::log::{Effort, Layout, Log, LogWarning, Reason, read_log};
 use armid::robot::Arm;
 
-/// The folder with the data; says why the test is skipped where there is none.
+/// The folder with the data; prints why the tests are skipped if there is none.
 fn data() -> Option<PathBuf> {
     let Some(folder) = std::env::var_os("ARMID_DATA").map(PathBuf::from) else {
         eprintln!("skipped: ARMID_DATA is not set (the folder with the real logs)");
@@ -30,11 +30,11 @@ fn check_sums(log: &Log) {
     assert_eq!(log.sha256.len(), 64);
 }
 
-/// File, rows read, rows used, samples missed, whether it has the manufacturer's feed-forward.
+/// File, rows read, rows used, samples missed, and whether the file has the manufacturer's feed-forward.
 const UR10E: [(&str, usize, usize, usize, bool); 13] = [
     ("collision_2link.csv", 5772, 5772, 0, false),
     ("collision_free.csv", 1731, 1731, 0, false),
-    // Rows 1 to 20 hold uninitialised numbers, shifted fields, zeros or a posture of another time.
+    // Rows 1 to 20 hold uninitialised numbers, shifted fields, zeros or the posture of another time.
     ("ur-19_09_27-11_32_02.csv", 1139, 1119, 0, false),
     ("ur-20_01_17-ptp_10_points.csv", 5347, 5347, 0, true),
     ("ur-20_01_22-joint_1.csv", 5889, 5889, 0, true),
@@ -44,7 +44,7 @@ const UR10E: [(&str, usize, usize, usize, bool); 13] = [
     ("ur-20_01_31-unload.csv", 2623, 2623, 2, true),
     ("ur-20_02_10-30sec_12harm.csv", 3691, 3691, 0, true),
     ("ur-20_02_12-50sec_12harm.csv", 5457, 5457, 1, true),
-    // Its last line has no line end.
+    // The last line has no line end.
     ("ur-20_02_19_14harm50sec.csv", 5375, 5374, 0, true),
     ("ur-20_02_19_14harm50secLoad.csv", 5307, 5307, 0, true),
 ];
@@ -74,7 +74,7 @@ fn uninitialised_rows_are_set_aside_by_reason() {
     let Some(folder) = data() else { return };
     let layout = Layout::load("ur10e_innopolis").unwrap();
     let log = read_log(&folder.join("ur10e/ur-19_09_27-11_32_02.csv"), &layout, 6).unwrap();
-    // Rows 2 (no number is large), 5, 9, 13, 14, 15 and 18 are plausible numbers in the wrong place.
+    // Rows 2 (without large numbers), 5, 9, 13, 14, 15 and 18 are plausible numbers in the wrong columns.
     assert_eq!(log.rows.count(Reason::Implausible) + log.rows.count(Reason::Inconsistent), 20);
     let first_used = log.time_s[0];
     assert!(

@@ -1,5 +1,5 @@
-//! Reading MJCFs: what a file with default classes, frames, geoms and turned joints means against MuJoCo itself, and exported
-//! arms against those that were written.
+//! Reading MJCFs: the meaning of a file with default classes, frames, geoms and rotated joints against MuJoCo itself,
+//! and exported arms against the originals.
 
 use armid::dynamics::{Model, Workspace, inverse_dynamics};
 use armid::robot::{Arm, MjcfArm, read_mjcf, read_mjcf_up_to};
@@ -40,8 +40,8 @@ fn classes() -> (MjcfArm, Golden) {
     (read, serde_json::from_str(include_str!("golden/classes.json")).unwrap())
 }
 
-/// Written by `tests/golden/mjcf.py`. 1e-10 of the torque's size: round-off of a few hundred operations with four digits in
-/// hand; any frame, inertia or default put in the wrong place is in percent.
+/// `tests/golden/mjcf.py` writes the goldens. Tolerance 1e-10 of the torque's size: round-off of a few hundred
+/// operations with four digits to spare; a misplaced frame, inertia or default causes an error of percents.
 #[test]
 fn an_interpreted_mjcf_has_mujocos_torque_and_tool_frame() {
     let (MjcfArm { mut arm, frames, .. }, golden) = classes();
@@ -83,13 +83,15 @@ fn joints_have_the_ranges_rotors_and_friction_that_mujoco_compiles() {
         assert_eq!(drive.viscous_nm_s_rad, expected.viscous_nm_s_rad);
         assert_eq!(drive.coulomb_nm, expected.coulomb_nm);
     }
-    // An actuator's range times its gear, what the joint lets through, a motor's range of control, nothing.
+    // In order: an actuator's force range times its gear; the force range of the joint; a motor's control range times
+    // its gear; an actuator's force range; no limit.
     let limits: Vec<f64> = arm.joints.iter().map(|joint| joint.limits.torque_nm).collect();
     assert_eq!(limits, [125.0, 80.0, 60.0, 7.0, f64::INFINITY]);
 }
 
-/// What MuJoCo reads with our torque (`val_export`) comes back: orientations go through a quaternion and three angles, moments
-/// are as written. The second arm has bodies at the boundary of what can exist.
+/// The files that MuJoCo reads with the correct torque (`val_export`) are read back: orientations pass through a
+/// quaternion and three angles, moments are stored as they are. The second arm has bodies at the boundary of physical
+/// consistency.
 #[test]
 fn an_exported_arm_comes_back() {
     for text in
@@ -115,7 +117,7 @@ fn an_exported_arm_comes_back() {
     }
 }
 
-/// The arms that `val_export` writes.
+/// The arms that `val_export` writes, by name.
 fn written(name: &str) -> Arm {
     let arms = crate::val_export::arms();
     arms.into_iter().find(|arm| arm.name == name).unwrap()

@@ -30,7 +30,7 @@ const EQUATION_30: [&str; 21] = [
     "Ia6",
 ];
 
-/// A printed coefficient: its value and half a unit of its last digit.
+/// A printed coefficient: its value, and half a unit of its last digit.
 struct Printed {
     value: f64,
     half_unit: f64,
@@ -63,7 +63,7 @@ fn equation_30_is_reproduced_entry_by_entry_to_its_printed_digits() {
             combination.len() == wanted.len()
                 && combination.iter().all(|&(index, coefficient)| {
                     wanted.get(&name(index)).is_some_and(|printed| {
-                        // 1e-9: 0.39225 and 0.10915 sit exactly between two printed values.
+                        // 1e-9: 0.39225 and 0.10915 lie exactly between two printed values.
                         (coefficient - printed.value).abs() <= printed.half_unit + 1e-9
                     })
                 })
@@ -87,7 +87,7 @@ fn the_full_ur5_has_36_40_52_and_58_base_parameters() {
         part.to_standard.truncate(columns);
         part.from_standard.truncate(columns);
         let set = BaseSet::find(&arm, part).unwrap();
-        // Rounding and independence are told apart by at least five decades.
+        // Rounding errors and independent columns are at least five decades apart.
         assert!(set.gap.smallest_independent > 1e5 * set.gap.largest_dependent, "{:?}", set.gap);
         set.rank()
     };
@@ -117,7 +117,7 @@ fn base_values_predict_the_torque_of_the_whole_arm() {
                 column * values[k]
             })
             .sum();
-        // 52 products of terms up to 300 Nm, and coefficients below 1e-9 left out.
+        // 52 products of terms up to 300 Nm; coefficients below 1e-9 are dropped.
         assert!((predicted - torque[j]).abs() < 1e-6, "joint {j}: {predicted} {}", torque[j]);
     }
 }

@@ -1,6 +1,5 @@
-//! Physically consistent estimates against Clarabel, a conic solver, through CVXPY
-//! (`tests/golden/physical.py`, with Pinocchio's regressor), and against what follows from
-//! convexity on simulated logs.
+//! Physically consistent estimates against Clarabel, a conic solver, through CVXPY (`tests/golden/physical.py`, with
+//! Pinocchio's regressor), and against consequences of convexity on simulated logs.
 
 use std::f64::consts::PI;
 use std::path::Path;
@@ -58,9 +57,9 @@ fn ur5() -> (Arm, BaseSet) {
     (arm, set)
 }
 
-/// Both solvers stop at relative gaps of 1e-8 and better (Clarabel calls some of its answers
-/// "inaccurate" because 1e-10 was asked for), so objectives agree to 1e-7 of their size; where they
-/// do, strong convexity bounds the distance of the optima: ‖R Δθ‖² ≤ 2 · difference.
+/// Both solvers stop at relative gaps of 1e-8 or less (Clarabel calls some of its answers "inaccurate" because 1e-10
+/// was requested), so that objectives agree to 1e-7 of their size. Strong convexity then bounds the distance of the
+/// optima: ‖R Δθ‖² ≤ 2 · difference.
 #[test]
 fn the_optimum_is_clarabels() {
     let (arm, set) = ur5();
@@ -80,8 +79,8 @@ fn the_optimum_is_clarabels() {
     }
 }
 
-/// Time of a solve, printed beside Clarabel's 8 to 17 ms (200 to 1000 ms with CVXPY's modelling) for
-/// the same cases; the bound is ten times what is claimed, for a slow or loaded machine.
+/// Prints the time of a solve, to be compared with Clarabel's 8 to 17 ms (200 to 1000 ms with CVXPY's modelling) for
+/// the same cases. The bound is ten times the claimed time, for a slow or loaded machine.
 #[test]
 fn a_solve_takes_milliseconds() {
     let (arm, set) = ur5();
@@ -99,13 +98,13 @@ fn a_solve_takes_milliseconds() {
     }
 }
 
-/// The default scenario, its plant run once for all tests.
+/// The default scenario; its plant runs once for all tests.
 fn experiment() -> &'static Experiment {
     static EXPERIMENT: OnceLock<Experiment> = OnceLock::new();
     EXPERIMENT.get_or_init(|| Experiment::prepare(Scenario::load(None).unwrap()).unwrap())
 }
 
-/// The default scenario's log of trial `trial`, its torque late by `delay` samples, identified.
+/// Identifies the default scenario's log of trial `trial`, with the torque delayed by `delay` samples.
 fn identified(experiment: &Experiment, trial: u64, delay: usize) -> Identification {
     let measured = experiment.simulation.log(trial).unwrap();
     let torque_nm = JointSignals::from_fn(6, measured.time_s.len(), |j, k| {
@@ -128,8 +127,8 @@ fn estimate(experiment: &Experiment, found: &Identification) -> PhysicalEstimate
     solve(arm, set, &found.fit, &found.covariance, &PhysicalOptions::default()).unwrap()
 }
 
-/// An arm that exists is at most as far from the data's estimate as the truth is: the constrained
-/// estimate is the nearest, and the truth is one of those it was chosen from.
+/// The constrained estimate is at most as far from the data's estimate as the truth is: it is the nearest physical arm,
+/// and the truth is one of those.
 #[test]
 fn noise_is_repaired_and_called_noise() {
     let experiment = experiment();
@@ -145,8 +144,8 @@ fn noise_is_repaired_and_called_noise() {
     }
 }
 
-/// A torque that is logged 160 ms late makes rotor inertias negative: they lose delay × rv and more.
-/// The repair must not pass for noise, and what comes out must still run.
+/// A torque that is logged 160 ms late makes rotor inertias negative: they lose delay × rv and more. The correction
+/// must not be attributed to noise, and the corrected arm must still be usable.
 #[test]
 fn late_torque_is_repaired_and_called_a_wrong_model() {
     let experiment = experiment();
@@ -168,8 +167,9 @@ fn late_torque_is_repaired_and_called_a_wrong_model() {
     assert_runs(&experiment.simulation.scenario.arm, &physical, 10_000);
 }
 
-/// Every body keeps the margin, no drive parameter is negative, those that are held at zero are there (the interior point ends some
-/// 1e-12 away from it), and the mass matrix has a Cholesky factor wherever the arm goes.
+/// Asserts that every body keeps its margin, that no drive parameter is negative, that parameters held at zero are
+/// exactly zero (the interior point ends about 1e-12 away from it), and that the mass matrix has a Cholesky factor at
+/// `states` random poses.
 fn assert_runs(arm: &Arm, physical: &PhysicalEstimate, states: usize) {
     let identified = ParameterLayout::new(arm.dof()).apply(&physical.standard, arm);
     for joint in &identified.joints {
@@ -190,7 +190,7 @@ fn assert_runs(arm: &Arm, physical: &PhysicalEstimate, states: usize) {
     }
 }
 
-/// The truth's own base parameters are realised by the truth, that is with t = 1 and more.
+/// The true base parameters are realised by the true arm, that is, with t = 1 or more.
 #[test]
 fn the_true_base_parameters_are_realisable() {
     let experiment = experiment();
@@ -231,8 +231,8 @@ fn bounds_of_the_robot_file_hold_and_must_hold_for_the_file_itself() {
     assert!(message.contains("mass of body 3"), "{message}");
 }
 
-/// The reduced set has no products of inertia and one coordinate of each centre of mass: its arm
-/// exists, and has none of what the set leaves out.
+/// The reduced set has no products of inertia and only one coordinate of each centre of mass; its constrained estimate
+/// is a physical arm with the given base parameters.
 #[test]
 fn the_papers_reduced_set_gives_an_arm_as_well() {
     let arm = Arm::built_in("ur5").unwrap();
@@ -260,13 +260,12 @@ fn a_body_that_cannot_exist_is_no_prior() {
     assert!(message.contains("body 5") && message.contains("cannot exist"), "{message}");
 }
 
-/// A small version of `armid study physical`: another arm than the robot file's, five times the usual
-/// noise, 4 periods, so that bounds are active in nearly every trial.
+/// A small version of `armid study physical`: an arm other than that of the robot file, five times the usual noise and
+/// 4 periods, so that bounds are active in nearly every trial.
 ///
-/// The stated σ (as if no bound were there) holds the truth in 95 % of cases; the mean over 52
-/// parameters of 80 trials has a standard error of 0.6 % (parameters of one trial are correlated), and
-/// σ from 4 periods may be low by a few percent: 92 to 99 %. Scatter of predictions: the projection
-/// onto a convex set never adds to it.
+/// The stated σ (as if there were no bound) covers the truth in 95 % of cases. The mean over 52 parameters of 80 trials
+/// has a standard error of 0.6 % (parameters of one trial are correlated), and σ from 4 periods may be a few percent
+/// too small: 92 to 99 %. The projection onto a convex set never increases the scatter of predictions.
 #[test]
 fn intervals_of_the_constrained_estimate_hold_the_truth() {
     let text = include_str!("../sims/physical_noise_5.toml").replace("periods = 8", "periods = 4");

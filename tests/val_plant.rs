@@ -1,5 +1,4 @@
-//! The plant against Pinocchio and against this crate's own dynamics; neither shares code with the
-//! engine.
+//! The plant against Pinocchio and against this crate's own dynamics; neither shares code with the engine.
 
 use armid::dynamics::{
     Model, Workspace, forward_dynamics, inverse_dynamics, kinetic_energy, potential_energy,
@@ -11,7 +10,7 @@ use armid::plant::{
 use armid::robot::{Arm, JointSignals};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
-/// The arm with its friction taken away.
+/// The arm without friction.
 fn frictionless(mut arm: Arm) -> Arm {
     for joint in &mut arm.joints {
         joint.drive.viscous_nm_s_rad = 0.0;
@@ -27,7 +26,7 @@ struct Sines {
 }
 
 impl Sines {
-    /// Six joints, to about 2 rad/s and 5 rad/s².
+    /// Six joints with up to about 2 rad/s and 5 rad/s².
     fn vivid(duration_s: f64) -> Self {
         Self { duration_s, amplitude_rad: 0.35 }
     }
@@ -59,9 +58,8 @@ impl Reference for Sines {
     }
 }
 
-/// Pinocchio's articulated-body algorithm, without friction, on 200 random states of each of three
-/// arms, one of them with tilted axes. Round-off of 1e-16 times the condition number of M (below 1e3)
-/// and a thousand operations is 1e-10.
+/// Pinocchio's articulated-body algorithm without friction, on 200 random states of each of three arms, one of them
+/// with tilted axes. Round-off of 1e-16 times the condition number of M (below 1e3) and a thousand operations is 1e-10.
 #[test]
 fn forward_dynamics_agrees_with_pinocchio() {
     for (arm, states) in crate::golden::all() {
@@ -79,9 +77,9 @@ fn forward_dynamics_agrees_with_pinocchio() {
     }
 }
 
-/// Angles to 3.1 rad, speeds to 3 rad/s, torques to 50 Nm, which are the sum of two parts: the second is given as a change of the
-/// first. Two algorithms that share no code differ
-/// by round-off (2e-15 seen); a wrong term of the equations would be 1e-3 and more.
+/// Angles up to 3.1 rad, speeds up to 3 rad/s, torques up to 50 Nm; each torque is also applied in two parts, the
+/// second as a change of the first. Two algorithms without common code differ by round-off (2e-15 seen); a wrong term
+/// in the equations would cause 1e-3 and more.
 #[test]
 fn forward_dynamics_agrees_with_newton_euler() {
     for name in ["ur5", "ur10e", "ur3e", "ur5e"] {
@@ -118,8 +116,8 @@ fn forward_dynamics_agrees_with_newton_euler() {
     }
 }
 
-/// The arm falls from a stretched pose and swings for 20 s; the energy is this crate's own.
-/// The method's error is O(h⁴): below 1e-9 J at 2 ms here, and about 16 times less at half the step.
+/// The arm falls from a stretched pose and swings for 20 s; this crate's own dynamics give the energy. The error of the
+/// method is O(h⁴): below 1e-9 J at 2 ms here, and about 16 times smaller at half the step.
 #[test]
 fn a_free_swing_keeps_its_energy() {
     let arm = frictionless(Arm::built_in("ur5").unwrap());
@@ -151,7 +149,7 @@ fn a_free_swing_keeps_its_energy() {
     assert!(fine < coarse / 8.0, "{fine:e} J is not fourth order against {coarse:e} J");
 }
 
-/// Root mean square of what the equations of motion leave over along a log, per joint, Nm.
+/// Rms per joint of the residual of the equations of motion along a log, Nm.
 ///
 /// The acceleration comes from the log alone, by the fourth-order Hermite formula
 /// a_k = 2 (q_{k+1} − 2 q_k + q_{k−1})/h² − (q̇_{k+1} − q̇_{k−1})/(2h),
@@ -179,14 +177,14 @@ fn residual_rms(arm: &Arm, log: &Recording, first: usize, every: usize) -> Vec<f
     sums.iter().map(|s| (s / samples.len() as f64).sqrt()).collect()
 }
 
-/// The equations of motion, evaluated by this crate's inverse dynamics along the plant's log: the
-/// plant's own error as a torque.
+/// The equations of motion, evaluated by this crate's inverse dynamics along the plant's log: the error of the plant as
+/// a torque.
 ///
-/// The torque is constant over each hold of the controller, and the acceleration jumps where it
-/// changes. Held over two steps, the samples in the middle see no jump: what is left there is the
-/// error of the integrator and of the formula, both O(h⁴), so that twice the step makes some
-/// sixteen times as much with friction; without it either is less than round-off. (With a decision at every step each formula straddles a jump, and the friction's slope
-/// makes an error O(h²) of the formula, not of the plant.)
+/// The torque is constant while the controller holds it, and the acceleration jumps where the torque changes. With a
+/// hold of two steps, the samples in the middle see no jump: their residual is the error of the integrator and of the
+/// formula, both O(h⁴). Twice the step then gives about sixteen times the residual with friction; without friction both
+/// errors are below round-off. (With a decision at every step, each formula spans a jump, and the slope of the friction
+/// causes an O(h²) error of the formula, not of the plant.)
 #[test]
 fn the_log_obeys_the_equations_of_motion() {
     let ur5 = Arm::built_in("ur5").unwrap();
@@ -207,18 +205,18 @@ fn the_log_obeys_the_equations_of_motion() {
         });
         println!("  largest: {coarse:.1e} and {fine:.1e} Nm");
         if what == "frictionless" {
-            // Angles to π and inertias to 5 kg m², differenced twice.
+            // Angles up to π and inertias up to 5 kg m², differenced twice.
             let round_off_nm = 4.0 * f64::EPSILON * std::f64::consts::PI / step_s.powi(2) * 5.0;
             assert!(coarse.max(fine) < round_off_nm, "{coarse:e} and {fine:e} Nm");
             continue;
         }
-        // What the documentation of `PlantConfig` promises.
+        // The accuracy that the documentation of `PlantConfig` promises.
         assert!(fine < 2e-5, "{what}: {fine:e} Nm");
         assert!(fine < coarse / 8.0, "{what}: {fine:e} is not fourth order against {coarse:e} Nm");
     }
 }
 
-/// The same run in one thread and in two, and in a plant that has run before: the same bits.
+/// Runs in one thread, in two threads, and in a plant that has run before give the same bits.
 #[test]
 fn runs_are_bit_identical() {
     let arm = Arm::built_in("ur5").unwrap();

@@ -1,8 +1,8 @@
-//! A real UR10e diagnosed from its public logs: gains on runs that were never used, a body on the flange
-//! whose mass its authors weighed, contacts.
+//! A real UR10e diagnosed from its public logs: improvement on runs that were never used, a body on the flange whose
+//! mass the authors of the logs weighed, and contacts.
 //!
-//! Reads the folder named by ARMID_DATA (the public set `dataset_ur10e` of
-//! github.com/shamilmamedov/dynamic_calibration below `ur10e/`); says so and passes where it is not set.
+//! Reads the folder named by ARMID_DATA (the public set `dataset_ur10e` of github.com/shamilmamedov/dynamic_calibration
+//! below `ur10e/`); if it is not set, the tests print that and pass.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -114,13 +114,13 @@ fn the_extended_model_predicts_other_days_better_and_the_body_weighs_what_it_wei
     assert!(names(&finding, "nonlinear_viscous", 1));
     assert!((1..=6).all(|j| !names(&finding, "asymmetric_friction", j)), "a known trap");
     assert!(!finding.diagnosis.causes.iter().any(|c| c.kind.name() == "time_skew"), "its stand-in");
-    // A cause that something else explains better would have been exchanged.
+    // A cause that another one explains better would have been exchanged for it.
     for cause in &finding.diagnosis.causes {
         assert!(cause.confidence > 0.5, "{} {:?}: {}", cause.kind, cause.joint, cause.confidence);
     }
     let ripple = finding.diagnosis.causes.iter().filter(|c| c.kind.name() == "ripple");
     for ripple in ripple {
-        // A strain-wave gear of ratio 101 turns its motor 101 times per turn: whole multiples of that.
+        // A strain-wave gear of ratio 101 turns its motor 101 times per turn: orders are multiples of that.
         let multiple = ripple.parameters["order_per_turn"].value / 101.0;
         assert!((multiple - multiple.round()).abs() < 0.02, "{:?}", ripple.parameters);
     }
@@ -147,7 +147,7 @@ fn the_extended_model_predicts_other_days_better_and_the_body_weighs_what_it_wei
     let body = against(&loaded);
     println!("{:?}", body.sentences());
     assert!(body.is_named);
-    // The controller's gains are trusted to 2 %: so is the mass.
+    // The controller's gains are trusted to 2 %, and so is the mass.
     assert!((body.mass_kg.value / 2.805 - 1.0).abs() < 0.02, "{:?}", body.mass_kg);
     let bare = against(&held_out[1]);
     assert!(!bare.is_named, "{bare:?}");
@@ -162,7 +162,7 @@ fn the_hits_are_found_and_the_free_run_has_none() {
         let log = bench.read(&folder, file);
         let finding = bench.diagnoser().diagnose(&log.measurement(), &[], None).unwrap();
         let Diagnosis { causes, sentences, .. } = finding.diagnosis;
-        // Its motion hardly tells gravity: that is no doubt about the robot.
+        // The motion hardly excites gravity; that must not raise a doubt about the robot.
         assert!(!sentences.iter().any(|s| s.starts_with("Is this log of")), "{sentences:?}");
         causes.into_iter().filter(|c| c.kind.name() == "contact").collect::<Vec<_>>()
     };
@@ -175,8 +175,8 @@ fn the_hits_are_found_and_the_free_run_has_none() {
     assert!(contacts("collision_free.csv").is_empty());
 }
 
-/// Every file of the folder, and damaged pieces of one, end in a result or in a message (what becomes of a simulated log is told
-/// damage by damage in `damaged_logs.rs`).
+/// Every file of the folder, and damaged pieces of one, end in a result or in a message. (`damaged_logs.rs` pins the
+/// outcome of each damage to a simulated log.)
 #[test]
 fn no_file_and_no_damage_panics() {
     let Some(folder) = data_folder() else { return };
@@ -218,7 +218,7 @@ fn no_file_and_no_damage_panics() {
     for path in &files {
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
         let bytes = std::fs::read(path).unwrap();
-        // A piece from the middle on, where the arm moves: whole files take seconds each.
+        // A piece from the middle, where the arm moves: whole files take seconds each.
         let start = bytes.len() / 3;
         let piece = &bytes[start..(start + 150_000).min(bytes.len())];
         for layout in &layouts {

@@ -1,12 +1,13 @@
-//! An effect means the same in the diagnosis and in the plant, which share no formula: a family's coefficients
-//! become physical parameters, these an effect, the plant makes a log with it, and the family has to predict that
-//! log's torque with the coefficients it began with.
+//! An effect means the same in the diagnosis and in the plant, which share no formula: a family's coefficients are
+//! converted to physical parameters, these to an effect, the plant produces a log with it, and the family must predict
+//! the torque of that log with the original coefficients.
 //!
-//! Along the log without noise, c = ⟨d, τ − τ₀⟩/⟨d, d⟩, with d the torque that the family predicts and τ₀ that of
-//! the arm without it, is 1 where both mean the same, and −1 or worse where a sign, a phase, a unit or a factor is not
-//! the same. The arm's own rigid torque is not exact along a sampled motion (its acceleration is a short series,
-//! friction reverses between samples), which is unlike d: what it adds to c is its size over that of d, divided by
-//! the root of the 20 or so independent stretches of a motion of ±5 reversals, 2 % where it is as large as d.
+//! Along a log without noise, c = ⟨d, τ − τ₀⟩/⟨d, d⟩, with d the torque that the family predicts and τ₀ the torque of
+//! the arm without the effect, is 1 if both mean the same, and −1 or worse if a sign, a phase, a unit or a factor
+//! differs. The arm's rigid torque is not exact along a sampled motion (its acceleration is a short series, and
+//! friction reverses between samples), but its error does not resemble d: it changes c by its size relative to d,
+//! divided by the root of the 20 or so independent stretches of a motion of ±5 reversals, 2 % where it is as large as
+//! d.
 
 use std::sync::OnceLock;
 
@@ -24,10 +25,10 @@ use armid::robot::Arm;
 const PERIOD: usize = 1250;
 const LEAD: usize = 125;
 const PERIODS: usize = 2;
-/// Largest |c − 1| of a family whose law is the plant's.
+/// Largest |c − 1| of a family with the same law as the plant.
 const SAME: f64 = 0.05;
 
-/// One family at one joint (from 1; 0: all), and how far c may be from 1.
+/// One family at one joint (from 1; 0: all), and the tolerance of c around 1.
 struct Case {
     kind: Kind,
     joint: usize,
@@ -41,7 +42,7 @@ fn case(kind: Kind, joint: usize, shape: (usize, f64), coefficients: &[f64], wit
     Case { kind, joint, shape, coefficients: coefficients.to_vec(), within }
 }
 
-/// A series that goes on for `periods` after a lead.
+/// A Fourier series for `periods` periods after a lead.
 struct Periodic {
     series: FourierSeries,
     lead_s: f64,
@@ -70,7 +71,7 @@ struct Bench {
 }
 
 impl Bench {
-    /// The one of all tests here.
+    /// The common bench of all tests in this file.
     fn get() -> &'static Self {
         static BENCH: OnceLock<Bench> = OnceLock::new();
         BENCH.get_or_init(|| {
@@ -80,7 +81,7 @@ impl Bench {
         })
     }
 
-    /// What every family sees of `run`, for the true parameters.
+    /// The scene that every family gets for `run`, with the true parameters.
     fn scene(&self, run: &Recording) -> (Scene, Regression) {
         let mut identifier = Identifier::new(&self.model, &self.set, Options::default());
         let measurement = Measurement {
@@ -95,7 +96,7 @@ impl Bench {
         (Scene::new(&self.arm, &self.set, &theta, &regression.prepared), regression)
     }
 
-    /// c, and the rms of d over the joints that it is on, Nm.
+    /// c, and the rms of d over the joints that it acts on, Nm.
     fn slope(&self, case: &Case) -> (f64, f64) {
         let families = candidates::all();
         let family = families.iter().position(|f| f.kind() == case.kind).unwrap();
@@ -150,7 +151,7 @@ impl Bench {
             let (slope, rms_nm) = self.slope(case);
             let Case { kind, joint, within, .. } = case;
             println!("{kind:20} joint {joint}: c = {slope:.3}, d {rms_nm:.3} Nm rms");
-            // NaN is wrong too.
+            // NaN also counts as wrong.
             let is_right = (slope - 1.0).abs() <= *within;
             if !is_right {
                 wrong.push((kind, joint, slope));
@@ -160,7 +161,7 @@ impl Bench {
     }
 }
 
-/// Two periods without noise. What repeats is run for one, entered a second before.
+/// Two periods without noise. A run that repeats is integrated for one period, entered a second before.
 fn log(arm: &Arm, effects: &[faults::Effect]) -> Recording {
     let series = FourierSeries::built_in("ur5_identification").unwrap();
     let repeats = effects.iter().all(faults::Effect::repeats);
@@ -175,19 +176,20 @@ const NO_SHAPE: (usize, f64) = (0, 0.0);
 
 fn friction(arm: &Arm) -> Vec<Case> {
     vec![
-        // A peak that is passed in two or three samples: sampled speeds cut a few percent off its top.
+        // A peak that is passed in two or three samples: the sampled speeds cut a few percent off its top.
         case(Kind::Stribeck, 4, (0, 0.15), &[0.8], 0.1),
         case(Kind::Stribeck, 5, (1, 0.2), &[0.8], 0.1),
         case(Kind::NonlinearViscous, 2, (0, 0.5), &[3.0], SAME),
         case(Kind::NonlinearViscous, 3, (1, 2.0), &[3.0], SAME),
         case(Kind::AsymmetricFriction, 3, NO_SHAPE, &[1.5, 1.0], SAME),
         case(Kind::LoadFriction, 2, NO_SHAPE, &[0.08], SAME),
-        // A drive that delivers what the file says jolts the other joints: the diagnosis takes that for its answer.
+        // A drive that delivers the friction of the robot file jolts the other joints; the diagnosis takes that for the
+        // response of the drive.
         case(Kind::ReversalWidth, 5, (0, 0.2), &[0.2], SAME),
         case(Kind::PositionFriction, 1, NO_SHAPE, &[1.5, -2.0], SAME),
-        // The bristles carry the friction that the arm has.
+        // The bristles carry the friction of the arm.
         case(Kind::Presliding, 5, (0, 100.0), &[arm.joints[4].drive.coulomb_nm], SAME),
-        // The plant heats by the power of friction, the family by the clock.
+        // The plant heats by the power of friction, the family by time.
         case(Kind::ThermalDrift, 1, (0, 15.0), &[-0.3], SAME),
     ]
 }
@@ -199,9 +201,10 @@ fn drives() -> Vec<Case> {
         case(Kind::CurrentOffset, 4, NO_SHAPE, &[0.5], SAME),
         case(Kind::Saturation, 2, (0, 40.0), &[1.0], SAME),
         case(Kind::TimeSkew, 2, (0, 0.004), &[0.004], SAME),
-        // At the wrists most of the change is that of friction where it reverses, within less than a sample.
+        // At the wrists most of the change comes from friction where it reverses, within less than a sample.
         case(Kind::TimeSkew, 0, (0, -0.004), &[-0.004], 0.15),
-        // The plant's controller leaves a tenth of friction to the feedback in any case: c is 1 + 0.1/0.9 where both mean the same.
+        // The plant's controller always leaves a tenth of friction to the feedback: c is 1 + 0.1/0.9 if both mean the
+        // same.
         case(Kind::FeedForward, 1, NO_SHAPE, &[0.9], 0.1 / 0.9 + SAME),
     ]
 }
@@ -216,9 +219,9 @@ fn arm_and_surroundings() -> Vec<Case> {
 
 fn gears() -> Vec<Case> {
     vec![
-        // The family's link swings with the mean of its inertia along the motion.
+        // In the family, the link swings with the mean of its inertia along the motion.
         case(Kind::Elasticity, 2, (0, 8000.0), &[1.0 / 8000.0], 0.1),
-        // A soft gear has its encoder on the motor as well.
+        // A soft gear can also have its encoder on the motor.
         case(Kind::Elasticity, 2, (1, 8000.0), &[1.0 / 8000.0], 0.1),
     ]
 }
@@ -244,9 +247,9 @@ fn gears_mean_the_same() {
     Bench::get().check(&gears());
 }
 
-/// Over the whole band the ring of the plant's flanks hides the flight across the gap (c = 0.01, with other flanks up to 0.46), so that
-/// of play the number alone is compared: from flank to flank in both. `val_faults` has half of it to either side in the plant,
-/// `blind_benchmark` the interval of what is found.
+/// Over the whole band, the ringing of the plant's tooth flanks hides the flight across the gap (c = 0.01; with other
+/// flanks up to 0.46). For play, only the parameter is therefore compared: the gap from flank to flank in both.
+/// `val_faults` checks that the plant has half of it to either side, `blind_benchmark` the interval that is found.
 #[test]
 fn play_means_the_same() {
     let gap_rad = 0.004;
@@ -267,7 +270,7 @@ fn no_family_is_left_out() {
     let cases = [friction(&arm), drives(), arm_and_surroundings(), gears()];
     for family in candidates::all() {
         let kind = family.kind();
-        // Of play only the number is compared, see above.
+        // For play, only the parameter is compared; see above.
         let is_compared = cases.iter().flatten().any(|case| case.kind == kind);
         assert!(is_compared || kind == Kind::Backlash, "{kind} has no case");
     }

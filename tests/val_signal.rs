@@ -1,4 +1,4 @@
-//! The signal chapter against SciPy: `tests/golden/signal_scipy.py` makes `signal.json`.
+//! The `signal` module against SciPy: `tests/golden/signal_scipy.py` writes `signal.json`.
 
 use armid::signal::{PaperDifferentiator, PaperReading, Resampler, Scratch, ZeroPhase};
 use serde::Deserialize;
@@ -36,7 +36,7 @@ fn golden() -> Golden {
     serde_json::from_str(include_str!("golden/signal.json")).expect("the golden file is valid")
 }
 
-/// The generator of `signal_scipy.py`, bit by bit.
+/// The generator in `signal_scipy.py`, reproduced bit by bit.
 fn series(n: usize) -> Vec<f64> {
     let mut state: u64 = 12345;
     (0..n)
@@ -54,8 +54,8 @@ fn assert_near(found: &[f64], expected: &[f64], tolerance: f64, what: &str) {
     }
 }
 
-/// Rounding grows with the sharpness of the poles: order 8 at 2 Hz of 125 Hz has denominators
-/// 1 + a₁ + a₂ ≈ (2πf_c/f_s)² = 0.01, four sections and two passes: 1e-16/0.01⁴ᐟ² times a few.
+/// Rounding errors grow with the sharpness of the poles: order 8 at 2 Hz of 125 Hz has denominators 1 + a₁ + a₂ ≈
+/// (2πf_c/f_s)² = 0.01, four sections and two passes: 1e-16/0.01⁴ᐟ² times a few.
 #[test]
 fn zero_phase_butterworth_equals_sosfiltfilt() {
     for case in golden().filters {
@@ -69,7 +69,7 @@ fn zero_phase_butterworth_equals_sosfiltfilt() {
     }
 }
 
-/// Values reach the differentiator's gain, 2πf_c times a few; second derivatives its square.
+/// First derivatives reach the gain of the differentiator, a few times 2πf_c; second derivatives its square.
 #[test]
 fn both_readings_of_the_paper_filter_equal_filtfilt() {
     let golden = golden();

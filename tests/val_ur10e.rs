@@ -1,9 +1,9 @@
-//! The real UR10e: prediction of runs that were not used for the fit, against the rigid-model table
-//! of an independent implementation (Pinocchio regressor, 58 parameters, same processing: 100 Hz,
-//! 10 Hz zero-phase filter on torque and every regressor column, controller's drive gains).
+//! The real UR10e: prediction of runs that were not used for the fit, against the rigid-model table of an independent
+//! implementation (Pinocchio regressor, 58 parameters, same processing: 100 Hz, 10 Hz zero-phase filter on torque and
+//! every regressor column, controller's drive gains).
 //!
-//! Reads the folder named by ARMID_DATA (the public set `dataset_ur10e` of
-//! github.com/shamilmamedov/dynamic_calibration below `ur10e/`); says so and passes where it is not set.
+//! Reads the folder named by ARMID_DATA (the public set `dataset_ur10e` of github.com/shamilmamedov/dynamic_calibration
+//! below `ur10e/`); if it is not set, the tests print that and pass.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ use armid::identify::{Identifier, Measurement, Options, Prediction, Regression};
 use armid::log::{Layout, Log, read_log};
 use armid::robot::Arm;
 
-/// Rms over all samples, Nm, joints 1–6, of the independent implementation.
+/// Rms over all samples of the independent implementation, Nm, joints 1–6.
 const REFERENCE: [(&str, [f64; 6]); 3] = [
     ("ur-20_02_10-30sec_12harm.csv", [1.81, 3.07, 1.49, 0.35, 0.35, 0.25]),
     ("ur-20_02_12-50sec_12harm.csv", [1.74, 3.22, 1.08, 0.24, 0.38, 0.24]),
@@ -59,8 +59,8 @@ fn held_out_runs_are_predicted_as_well_as_by_an_independent_implementation() {
         let held_out = regression(&mut identifier, &arm, &folder.join(file), "ur10e_innopolis");
         let rms = Prediction::of(&held_out, &theta).residual().rms_nm;
         for j in 0..6 {
-            // The window is found here and was set by hand there, and the filters' edges differ:
-            // a tenth is allowed for both.
+            // The window is found automatically here and was set by hand in the reference, and the filters' edges
+            // differ: the tolerance of a tenth covers both.
             assert!(
                 rms[j] <= 1.1 * reference[j],
                 "{file} joint {}: {:.3} Nm, reference {} Nm",
@@ -84,8 +84,8 @@ fn the_author_s_drive_gains_scale_the_torque_and_the_parameters_with_it() {
         let training = regression(&mut identifier, &arm, &folder.join(TRAINING), layout);
         identifier.identify_regression(&training).unwrap().fit.theta[rc6]
     };
-    // Joint 6's friction is seen in joint 6's equation alone, so it scales with that joint's gain;
-    // the inertia it shares with other joints can shift it by a fraction of that change.
+    // Friction of joint 6 appears only in the equation of joint 6, so that it scales with the gain of that joint. The
+    // inertia that this joint shares with others can shift the estimate by a fraction of that change.
     let ratio = coulomb("ur10e_innopolis_author") / coulomb("ur10e_innopolis");
     assert!((ratio / (10.12 / 10.76) - 1.0).abs() < 0.02, "{ratio}");
 }

@@ -18,8 +18,8 @@ struct State {
     tool0_x: [f64; 3],
 }
 
-/// Written by `tests/golden/urdf.py`. 1e-10 of the torque's size: round-off of a few hundred
-/// operations with four digits in hand; any frame or inertia put in the wrong place is in percent.
+/// `tests/golden/urdf.py` writes the goldens. Tolerance 1e-10 of the torque's size: round-off of a few hundred
+/// operations with four digits to spare; a misplaced frame or inertia causes an error of percents.
 #[test]
 fn a_merged_and_reoriented_chain_has_pinocchios_torque_and_tool_frame() {
     let text = include_str!("golden/interpreted.urdf");
@@ -48,10 +48,10 @@ fn a_merged_and_reoriented_chain_has_pinocchios_torque_and_tool_frame() {
     }
 }
 
-/// The published file has other joint frames (axes y and z, base turned by π about z) and lengths
-/// rounded to millimetres, so what is compared is what no choice of frames changes: the line of
-/// every joint axis in space, for random angles. Six lengths lie between the first axis and the
-/// last, each rounded by at most 0.5 mm: 3 mm. Directions depend on right angles only: 1e-12.
+/// The published file has other joint frames (axes y and z, base turned by π about z) and lengths rounded to
+/// millimetres. The comparison therefore uses a quantity that does not depend on the choice of frames: the line of
+/// every joint axis in space, for random angles. Six lengths lie between the first axis and the last, each rounded by
+/// at most 0.5 mm: 3 mm. Directions depend only on right angles: 1e-12.
 #[test]
 fn the_published_ur10e_file_has_the_axes_of_the_built_in_arm() {
     let Some(data) = std::env::var_os("ARMID_DATA") else {
