@@ -1,6 +1,6 @@
-//! All integration tests in one program, which is compiled and linked once and keeps every core busy to its end. `cargo
-//! test val_` runs the tests against independent references, `regress_` those against pinned results, `blind_` hide and
-//! find.
+//! All integration tests in one program, which is compiled and linked once and keeps every core busy to its end.
+//! `cargo test val_` runs the tests against independent references, `regress_` those against pinned results, `blind_`
+//! hide and find.
 
 mod cli;
 mod damage;

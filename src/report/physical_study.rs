@@ -57,8 +57,8 @@ fn sentence(study: &PhysicalStudy) -> String {
     )
 }
 
-/// In how many of how many tested trials the model was called wrong, over the cases where it is wrong or those where it
-/// is right.
+/// Number of trials in which the model was called wrong, and of all tested trials, for the cases where the model is
+/// wrong or for those where it is right.
 fn called_wrong(study: &PhysicalStudy, where_wrong: bool) -> [u64; 2] {
     let cases = study.cases.iter().filter(|case| is_wrong(case) == where_wrong);
     cases.fold([0, 0], |[called, tested], case| [called + case.called_wrong, tested + case.tested])
