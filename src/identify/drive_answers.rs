@@ -1,31 +1,32 @@
-//! How a drive may answer dry friction.
+//! Nuisance columns for a drive's response to dry friction.
 //!
-//! A controller that feeds the share β of a joint's friction F forward does so where the wanted velocity reverses,
-//! a little δ before the true one does. What it does not feed forward accelerates the links for a moment. With s(t)
-//! the sign of q̇ and s̃ the same [as logged](FineClock::as_logged), the record holds
+//! A controller that feeds the share β of a joint's friction F forward does so where the commanded velocity reverses,
+//! a little time δ before the true velocity does. The share that is not fed forward accelerates the links for a
+//! moment. With s(t) the sign of q̇ and s̃ the same signal [as logged](FineClock::as_logged), the record holds
 //!
 //! F (s̃ + β (s − s̃) + β δ (ṡ − s̃˙))
 //!
-//! where the model has F s; s̃ holds the feedback that follows ([`FEEDBACK_RAD_S`]). Neither β nor δ is known: s̃ − s and
-//! its rate are columns beside the model's. They are of high frequency and tell nothing of the arm; left out, an arm
-//! without feed-forward has inertias that are wrong by more than σ.
+//! where the model has F s. s̃ includes the feedback that follows ([`FEEDBACK_RAD_S`]). Neither β nor δ is known: s̃
+//! − s and its rate become additional columns beside the model's. They are of high frequency and carry no information
+//! about the arm; if they are left out, an arm without feed-forward gets inertias that are wrong by more than σ.
 
 use super::problem::Problem;
 use crate::dynamics::{Model, Motion};
 use crate::signal::{FineClock, HarmonicPower};
 
-/// How fast feedback stops a rotor and the links on it, ω in rad/s. Of arms simulated with drives of 2 ζ ω = 100 rad/s, 60 to
-/// 120 explain gears and play about as well; without it gears at the shoulder seemed a third stiffer than they were, play
-/// a quarter narrower, and of ripple faster than half the rate half was left along another motion.
+/// Bandwidth ω of the feedback that stops a rotor and the links on it, rad/s. For arms simulated with drives of 2 ζ ω
+/// = 100 rad/s, values from 60 to 120 explain gears and play about equally well. Without this feedback, gears at the
+/// shoulder seemed a third stiffer than they were, play seemed a quarter narrower, and half of the ripple faster than
+/// half the sampling rate was left along another motion.
 pub const FEEDBACK_RAD_S: f64 = 80.0;
 
-/// The same per tick of `tick_s`.
+/// [`FEEDBACK_RAD_S`] per tick of `tick_s`.
 pub fn feedback_per_tick(tick_s: f64) -> f64 {
     FEEDBACK_RAD_S * tick_s
 }
 
-/// s̃ − s and its rate (per tick) at the samples of one period, of the sign `fine_sign` at every tick, with an
-/// acceleration that is known up to harmonic `highest`; `rate_hz` is that of the samples.
+/// s̃ − s and its rate (per tick) at the samples of one period. `fine_sign` is the sign of the velocity at every
+/// tick, `highest` the highest harmonic up to which the acceleration is known, and `rate_hz` the rate of the samples.
 pub fn drive_answers(
     clock: &FineClock,
     fine_sign: &[f64],
@@ -42,9 +43,10 @@ pub fn drive_answers(
     })
 }
 
-/// Takes the answers of all drives out of `problem`, a motion that repeats and its periods of torque: X and y keep
-/// what is orthogonal to them, joint by joint, as in a fit with them (Frisch and Waugh 1933). Of equal weights it is the same
-/// solution; rows that are weighted afterwards have another one, as free of the answers.
+/// Projects the responses of all drives out of `problem`, which is a repeating motion with its periods of torque. X
+/// and y keep their components orthogonal to the responses, joint by joint, as in a fit that includes these columns
+/// (Frisch and Waugh 1933). With equal weights the solution is that of such a fit; rows that are weighted afterwards
+/// have another solution, which is just as free of the responses.
 pub fn without_drive_answers(
     problem: &mut Problem,
     clock: &FineClock,
@@ -68,7 +70,7 @@ pub fn without_drive_answers(
         }
         for direction in &directions {
             panel.x.chunks_exact_mut(n).for_each(|x| take_out(direction, x));
-            // What repeats is taken out, what differs between the periods is noise.
+            // Only the repeating part is projected out; differences between the periods are noise and stay.
             let periods = panel.y.len() / n;
             let along = |y: &[f64]| direction.iter().zip(y).map(|(d, y)| d * y).sum::<f64>();
             let mean = panel.y.chunks_exact(n).map(along).sum::<f64>() / periods as f64;
@@ -79,7 +81,7 @@ pub fn without_drive_answers(
     }
 }
 
-/// Removes from `y` what it has along the unit vector `direction`.
+/// Removes from `y` its component along the unit vector `direction`.
 fn take_out(direction: &[f64], y: &mut [f64]) {
     let along: f64 = direction.iter().zip(&*y).map(|(d, y)| d * y).sum();
     y.iter_mut().zip(direction).for_each(|(y, d)| *y -= along * d);

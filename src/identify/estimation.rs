@@ -1,4 +1,4 @@
-//! Estimators and covariances applied to one problem.
+//! Applies estimators and covariances to one problem.
 
 use super::columns::ColumnPlan;
 use super::covariance::{Covariance, CovarianceError, CovarianceKind};
@@ -11,44 +11,44 @@ use super::whiten::{ReplicateWhitening, decimate, decorrelate, instrument, prewh
 use crate::base::BaseSet;
 use crate::signal::{HarmonicPower, Scratch};
 
-/// Memory for estimates of problems of one shape.
+/// Memory for estimating problems of one shape.
 pub struct Estimation {
     plan: ColumnPlan,
     fitter: Fitter,
     whitening: ReplicateWhitening,
     filter: Scratch,
-    /// Whitened joint by joint.
+    /// Rows whitened joint by joint.
     own: Option<Whitened>,
-    /// Whitened across joints.
+    /// Rows whitened across joints, with the cumulative column plan.
     mixed: Option<Whitened>,
-    /// Every joint with all columns.
+    /// Rows in which every joint has all columns (instrumental variables).
     full: Option<Whitened>,
 }
 
 /// What is known of the motion besides the regressor along it.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct MotionAids<'a> {
-    /// How well the averaged acceleration of a motion that repeats is known, per joint: up to which
-    /// harmonic [`Estimator::Spectral`] may trust it.
+    /// How well the averaged acceleration of a repeating motion is known, per joint: up to which harmonic
+    /// [`Estimator::Spectral`] may trust it.
     pub acceleration: Option<&'a [HarmonicPower]>,
     /// The regressor along a smoother motion (same rows), for [`Estimator::Iv`].
     pub instruments: Option<&'a Problem>,
 }
 
-/// What one estimator says of a problem.
+/// The result of one estimator for one problem.
 #[derive(Debug, Clone)]
 pub struct Estimate {
     /// The solution.
     pub fit: Fit,
     /// The covariances asked for, in their order.
     pub covariances: Vec<Result<Covariance, CovarianceError>>,
-    /// Whether what repeats in the torque is explained; known for the spectral estimator.
+    /// Test whether the model explains the repeating part of the torque; known for the spectral estimator only.
     pub lack_of_fit: Option<LackOfFit>,
 }
 
 impl Estimate {
-    /// What it is worth where only the parts `kept` of the periods make their mean and their scatter
-    /// ([`Prepared::kept`](super::prepare::Prepared::kept)).
+    /// Corrects covariances and test for periods some of whose rows were filled in: only the parts `kept` of the
+    /// periods determine their mean and their scatter ([`Prepared::kept`](super::prepare::Prepared::kept)).
     pub(super) fn of_fewer_rows(mut self, kept: [f64; 2]) -> Self {
         let kept = kept[0] * kept[1];
         for covariance in self.covariances.iter_mut().flatten() {
@@ -71,7 +71,7 @@ impl Whitened {
     }
 }
 
-/// Periods whose scatter gives weights: below, the noise of the weights outdoes their use.
+/// Fewest periods whose scatter gives weights: with fewer, the noise of the weights costs more than the weights gain.
 const LEAST_PERIODS: usize = 3;
 
 impl Estimation {
@@ -88,8 +88,8 @@ impl Estimation {
         }
     }
 
-    /// θ̂ by `estimator` and its covariances `kinds`; `options` is for the filter of
-    /// [`Estimator::Decimated`].
+    /// Estimates θ̂ by `estimator`, with its covariances `kinds`. `options` is used for the filter of
+    /// [`Estimator::Decimated`] only.
     pub fn estimate(
         &mut self,
         problem: &Problem,
@@ -165,8 +165,8 @@ impl Estimation {
         Ok(Estimate { fit, covariances, lack_of_fit })
     }
 
-    /// Whether a model explains what repeats in the torque of `problem`, whose scatter between periods holds
-    /// the noise of the motion as well; `acceleration` as in [`MotionAids`].
+    /// Tests whether a model explains the repeating part of the torque of `problem`, whose scatter between periods
+    /// includes the noise of the motion; `acceleration` as in [`MotionAids`].
     pub fn lack_of_fit(
         &mut self,
         problem: &Problem,

@@ -1,11 +1,13 @@
-//! Whether the gravity torque of a log is that of the robot it is said to be of.
+//! Checks whether the gravity torque of a log is that of the robot the log is said to come from.
 //!
-//! Robots of one family differ little but in scale: a rigid model fits the log of a larger sister as well, with
-//! larger masses. Those can be compared with the robot's description, and with a body on its flange:
+//! Robots of one family differ in little but scale: a rigid model fits the log of a larger sister as well, with
+//! larger masses. The identified masses can, however, be compared with the robot's description, and with a body on
+//! its flange:
 //!
-//! g ≈ g₀ + P (m, m c),   g the first moments of the base set, g₀ by the description,
+//! g ≈ g₀ + P (m, m c),
 //!
-//! with P the columns of the last body's mass and first moments.
+//! where g are the identified first moments of the base set, g₀ their values by the description, and P the columns of
+//! the last body's mass and first moments.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -16,42 +18,45 @@ use crate::base::BaseSet;
 use crate::dynamics::{Parameter, ParameterLayout};
 use crate::robot::Arm;
 
-/// Gravity found and gravity described.
+/// Comparison of the identified gravity with the described one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GravityMatch {
-    /// Found over described, by least squares over all first moments.
+    /// Ratio of found to described gravity, by least squares over all first moments.
     pub ratio: f64,
     /// σ of the ratio.
     pub ratio_sigma: f64,
-    /// Mass on the flange that comes nearest to what was found, kg; not positive where none helps.
+    /// Mass on the flange that explains the difference best, kg; not positive where no mass helps.
     pub body_kg: f64,
-    /// What the description with that body leaves, as a share of what it says.
+    /// Difference that remains with that body on the flange, as a share of the described first moments.
     pub left: f64,
 }
 
-/// What is to be said of gravity that is not the description's.
+/// A remark about gravity that differs from the description's.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GravityRemark {
-    /// In words.
+    /// The remark in words.
     pub text: String,
-    /// Whether it is that of the description with the other sign, for certain: no arm has it that is mounted so.
+    /// Whether gravity is, beyond doubt, the described one with the opposite sign: no arm mounted as described has
+    /// such gravity.
     pub is_reversed: bool,
 }
 
-/// Factor between gravity found and described beyond which it is remarked on: tolerances of drive gains and
-/// usual bodies on the flange stay below.
+/// Factor between found and described gravity beyond which a remark is made. Tolerances of drive gains and usual
+/// bodies on the flange stay below it.
 const OFF: f64 = 1.5;
-/// Of the logarithm of a factor of 1000: twice as much or half.
-const OFF_THOUSAND: f64 = 0.1;
-/// Share that a body on the flange may leave if it explains what was found: published gains of one arm differ by
+/// Tolerance of the logarithm to base 1000 within which a ratio counts as a factor of 1000: it may be twice or half
 /// as much.
+const OFF_THOUSAND: f64 = 0.1;
+/// Share of the described gravity that may remain if a body on the flange is to count as the explanation. Published
+/// drive gains of one arm differ by as much.
 const LEFT: f64 = 0.2;
-/// Standard parameters of the last body that a body on the flange changes what gravity does by: mass, first
-/// moments.
+/// Number of standard parameters of the last body through which a body on the flange changes gravity: mass and three
+/// first moments.
 const BODY: usize = 4;
 
 impl GravityMatch {
-    /// Of base parameters `theta` with their covariance; `None` for a description without masses.
+    /// Compares the base parameters `theta`, known to `covariance`, with the `nominal` ones; `None` for a description
+    /// without masses.
     pub fn of(
         arm: &Arm,
         set: &BaseSet,
@@ -79,7 +84,7 @@ impl GravityMatch {
             .collect();
         let body = DMatrix::from_columns(&columns);
         let more = &found - &described;
-        // Of what gravity cannot tell apart the smallest is taken.
+        // Where gravity cannot tell the body's parameters apart, the SVD picks the smallest solution.
         let x = body.clone().svd(true, true).solve(&more, f64::EPSILON.sqrt()).ok()?;
         let rest = if x[0] > 0.0 { &more - body * &x } else { more };
         let of_moments = covariance.select_rows(&rows).select_columns(&rows);
@@ -92,7 +97,7 @@ impl GravityMatch {
         })
     }
 
-    /// What is to be said of it, if the ratio is off by more than `quantile` σ of its own.
+    /// A remark, if the ratio is outside of 1/[`OFF`] … [`OFF`] by more than `quantile` of its own σ.
     fn remark(&self, robot: &str, quantile: f64) -> Option<GravityRemark> {
         let doubt = quantile * self.ratio_sigma;
         let is_as_described = self.ratio - doubt < OFF && self.ratio + doubt > 1.0 / OFF;
@@ -102,7 +107,7 @@ impl GravityMatch {
         })
     }
 
-    /// As large as described, with the other sign.
+    /// Whether gravity is about as large as described, with the opposite sign.
     fn is_reversed(&self) -> bool {
         (1.0 / OFF..OFF).contains(&-self.ratio)
     }
@@ -140,8 +145,8 @@ impl GravityMatch {
     }
 }
 
-/// A remark where the gravity torque of the base parameters `theta` that were identified is not that of the arm's
-/// description; masses that are not identified say nothing of gravity.
+/// A remark where the gravity torque of the identified base parameters `theta` is not that of the arm's description;
+/// `None` as well where the log does not identify the masses.
 pub fn gravity_remark(
     arm: &Arm,
     set: &BaseSet,
@@ -213,8 +218,8 @@ mod tests {
             assert!(remark.contains("another unit") && !remark.contains("0.00 times"), "{remark}");
         }
 
-        // Where the moments are hardly known, twice the gravity is no news of the robot: σ of each of the moments
-        // makes that of the ratio, found over described, σ/‖described‖.
+        // Where the first moments are hardly known, twice the gravity proves nothing about the robot. A common σ of
+        // all first moments makes the σ of the ratio σ/‖described‖.
         let vague = DMatrix::identity(set.rank(), set.rank()) * 100.0;
         let doubtful = GravityMatch::of(&arm, &set, &nominal, &larger, &vague).unwrap();
         let expected = 10.0 / length_of_moments(&set, &nominal);

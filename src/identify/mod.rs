@@ -1,9 +1,10 @@
-//! From a log to parameters with an uncertainty: sections III-D and IV-B of the paper.
+//! Identifies parameters with their uncertainty from a log: sections III-D and IV-B of the paper.
 //!
-//! Enters: time stamps, angles, velocities and torques of one log or of several ([`Measurement`]), the [`Model`](crate::dynamics::Model) of
-//! the arm and its [`BaseSet`](crate::base::BaseSet). Leaves: the log on an even clock, laid out as equations ([`Regression`]); base
-//! parameters with their covariance and a test of what the model lacks ([`Identification`]), or how the log should have been read ([`Misreading`]); torque predicted along other
-//! logs ([`Prediction`]); standard parameters that an arm can have ([`physical`]).
+//! Enters: time stamps, angles, velocities and torques of one log or of several ([`Measurement`]), the
+//! [`Model`](crate::dynamics::Model) of the arm and its [`BaseSet`](crate::base::BaseSet). Leaves: the log on an even
+//! clock, laid out as equations ([`Regression`]); base parameters with their covariance and a test of what the model
+//! lacks ([`Identification`]), or how the log should have been read ([`Misreading`]); the torque predicted along
+//! other logs ([`Prediction`]); standard parameters that a real arm can have ([`physical`]).
 
 pub mod covariance;
 pub mod physical;

@@ -1,4 +1,4 @@
-//! Several logs whose motion repeats: one estimate, with the noise that each log shows between its own periods.
+//! Pools several logs whose motion repeats into one estimate, each weighted by the noise between its own periods.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -12,34 +12,36 @@ use super::lack_of_fit::LackOfFit;
 use super::prepare::Processing;
 use super::triangle::Triangle;
 
-/// Whether several logs contradict each other.
+/// Test whether several logs contradict each other.
 ///
-/// With log i's triangle R_i of one of its P_i whitened periods and the pooled θ̂, the logs differ by
-/// Q = Σ P_i ‖R_i (θ̂_i − θ̂)‖². Its expectation where the arm is the same follows from the covariances V_i of the logs, and
-/// Q/E Q is compared with F((L − 1) b, ν). That takes V_i for (P_i R_iᵀR_i)⁻¹ but for a factor, as it is where the periods
-/// show the noise that the weights were taken from; ν = Σ b (P_i − 1) counts each of b directions with one degree of freedom
-/// per period beyond the first, though several harmonics tell of it.
+/// With log i's triangle R_i of one of its P_i whitened periods, its own estimate θ̂_i and the pooled θ̂, the logs
+/// differ by Q = Σ P_i ‖R_i (θ̂_i − θ̂)‖². If the arm is the same in all logs, the expectation of Q follows from the
+/// logs' covariances V_i, and Q/E Q is compared with F((L − 1) b, ν) for L logs and b parameters. This assumes that
+/// V_i is proportional to (P_i R_iᵀR_i)⁻¹, as it is where the periods show the noise that the weights were taken
+/// from. ν = Σ b (P_i − 1) counts one degree of freedom per period beyond the first in each of the b directions,
+/// although several harmonics inform each of them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Agreement {
-    /// Q/E Q: 1 where the logs differ by their noise.
+    /// Q/E Q: about 1 where the logs differ by their noise alone.
     pub statistic: f64,
     /// (L − 1) b and ν.
     pub degrees_of_freedom: [f64; 2],
-    /// Chance of a larger statistic where the arm is the same and the model holds.
+    /// Probability of a larger statistic if the arm is the same and the model holds.
     pub p_value: f64,
-    /// The base parameter that differs most in units of its noise.
+    /// Index of the base parameter that differs most, in units of its noise.
     pub parameter: usize,
-    /// The log, from 0, whose own estimate of it does.
+    /// The log, from 0, whose own estimate of that parameter differs most.
     pub log: usize,
-    /// By how many standard deviations it differs from the pooled estimate.
+    /// By how many standard deviations that estimate differs from the pooled one.
     pub sigmas: f64,
 }
 
 impl Agreement {
-    /// Below this chance the logs tell of different arms, or of one whose model is wrong along one of the motions.
+    /// Below this probability the logs come from different arms, or from one arm whose model is wrong along one of
+    /// the motions.
     pub const REJECT_BELOW: f64 = 1e-3;
 
-    /// Whether noise explains how the logs differ.
+    /// Whether noise explains the differences between the logs.
     pub fn holds(&self) -> bool {
         self.p_value >= Self::REJECT_BELOW
     }
@@ -48,23 +50,21 @@ impl Agreement {
 /// How several logs are used.
 #[derive(Debug)]
 pub enum Several {
-    /// Each by itself, to be [`pooled`].
+    /// Each log is identified by itself; the estimates are to be [`pooled`].
     Apart(Vec<Identification>),
-    /// One below the other: it is one log, or another method was asked for.
+    /// The rows are stacked into one log: there is only one, or another method was asked for.
     AsOne,
-    /// One below the other, because of what a log says alone.
+    /// The rows are stacked, because one of the logs cannot be identified alone.
     Together {
-        /// The log, from 0.
+        /// That log, from 0.
         log: usize,
-        /// Why it cannot stand alone.
+        /// Why it cannot be identified alone.
         reason: String,
     },
 }
 
-/// Identifies from every log by itself, where each can be: its motion repeats often enough and excites all parameters.
-///
-/// # Errors
-/// [`IdentifyError`] where a log cannot be used at all.
+/// Identifies every log by itself if all of them allow it: their motions repeat often enough and excite all
+/// parameters.
 pub fn each_alone(
     identifier: &mut Identifier,
     regressions: &[Regression],
@@ -81,7 +81,7 @@ pub fn each_alone(
     for (log, regression) in regressions.iter().enumerate() {
         match identifier.identify_regression(regression) {
             Ok(part) if part.estimator == Estimator::Spectral => parts.push(part),
-            // It had nothing to weigh its harmonics by.
+            // The periods of this log had no scatter from which to weight the harmonics.
             Ok(_) => {
                 let reason = "its periods are alike to the last digit".to_owned();
                 return Ok(Several::Together { log, reason });
@@ -95,11 +95,11 @@ pub fn each_alone(
     Ok(Several::Apart(parts))
 }
 
-/// What one log adds.
+/// The contribution of one log.
 struct Part {
     /// θ̂_i.
     theta: DVector<f64>,
-    /// √P_i R_i: the information is its square.
+    /// √P_i R_i, a root of the log's information matrix P_i R_iᵀR_i.
     root: DMatrix<f64>,
     /// V_i.
     covariance: DMatrix<f64>,
@@ -125,9 +125,9 @@ impl Part {
     }
 }
 
-/// One estimate of `parts`, which [`each_alone`] identified from the logs behind `joined`: θ̂ minimises
-/// Σ_i P_i ‖R_i θ − z̄_i‖², each log's equations in units of its own noise, so that θ̂ = Σ W_i θ̂_i with W_i = A⁻¹ P_i R_iᵀR_i
-/// and A = Σ P_i R_iᵀR_i, and has the covariance Σ W_i V_i W_iᵀ. Residuals are those of the torque as `joined` has it.
+/// Pools `parts`, which [`each_alone`] identified from the logs behind `joined`, into one estimate. θ̂ minimises Σ_i
+/// P_i ‖R_i θ − z̄_i‖², each log's equations being in units of its own noise. So θ̂ = Σ W_i θ̂_i with W_i = A⁻¹ P_i
+/// R_iᵀR_i and A = Σ P_i R_iᵀR_i, and its covariance is Σ W_i V_i W_iᵀ. Residuals refer to the torque in `joined`.
 pub fn pooled(parts: &[Identification], joined: &Regression) -> Identification {
     let each: Vec<Part> = parts.iter().map(Part::of).collect();
     let triangle = stacked(parts, &each);
@@ -168,7 +168,7 @@ pub fn pooled(parts: &[Identification], joined: &Regression) -> Identification {
     }
 }
 
-/// √P_i R_i and √P_i z̄_i of all logs below each other, as a triangle.
+/// √P_i R_i and √P_i z̄_i of all logs, stacked and reduced to one triangle.
 fn stacked(parts: &[Identification], each: &[Part]) -> Triangle {
     let b = each[0].theta.len();
     let mut all = Triangle::new(b, 1);
@@ -185,8 +185,8 @@ fn stacked(parts: &[Identification], each: &[Part]) -> Triangle {
     all
 }
 
-/// Σ W_i V_i W_iᵀ, and Satterthwaite's degrees of freedom: parameter k has (Σ c_ik)²/Σ (c_ik²/ν_i) with its shares c_ik of the
-/// variance. Stated is their harmonic mean over the parameters, as of each log.
+/// Σ W_i V_i W_iᵀ with Satterthwaite's degrees of freedom: parameter k, of whose variance log i contributes the share
+/// c_ik, has (Σ c_ik)²/Σ (c_ik²/ν_i). As for each single log, their harmonic mean over the parameters is stated.
 fn covariance(each: &[Part], weights: &[DMatrix<f64>]) -> Covariance {
     let shares: Vec<DMatrix<f64>> =
         each.iter().zip(weights).map(|(part, w)| w * &part.covariance * w.transpose()).collect();
@@ -201,7 +201,8 @@ fn covariance(each: &[Part], weights: &[DMatrix<f64>]) -> Covariance {
     Covariance { kind: CovarianceKind::Spectral, matrix, degrees_of_freedom: b as f64 / sum }
 }
 
-/// θ̂_i − θ̂ = (Σ_{j≠i} W_j) θ̂_i − Σ_{j≠i} W_j θ̂_j, because the W_j add up to one; its covariance is the sum of theirs.
+/// Tests the agreement of the logs. Because the W_j add up to one, θ̂_i − θ̂ = (Σ_{j≠i} W_j) θ̂_i − Σ_{j≠i} W_j θ̂_j;
+/// its covariance is the sum of the covariances of these independent terms.
 fn agreement(each: &[Part], weights: &[DMatrix<f64>], pooled: &DVector<f64>) -> Agreement {
     let b = pooled.len();
     let (mut squares, mut expected) = (0.0, 0.0);
@@ -230,8 +231,8 @@ fn agreement(each: &[Part], weights: &[DMatrix<f64>], pooled: &DVector<f64>) -> 
     Agreement { statistic, degrees_of_freedom: [first, second], p_value, parameter, log, sigmas }
 }
 
-/// The test of the log that fits worst; its chance is that of so bad a one among all logs (Bonferroni), each of which is
-/// tested twice where it fails, as ever.
+/// Lack-of-fit test of the log that fits worst. Its p-value is multiplied by the number of logs (Bonferroni), because
+/// the worst of them is taken; each log that fails has been tested twice, as described in [`LackOfFit`].
 fn lack_of_fit(parts: &[Identification]) -> Option<LackOfFit> {
     let tests: Vec<LackOfFit> = parts.iter().map(|part| part.lack_of_fit).collect::<Option<_>>()?;
     let worst = tests.iter().min_by(|a, b| a.p_value.total_cmp(&b.p_value))?;

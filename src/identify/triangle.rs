@@ -1,15 +1,14 @@
-//! Least squares by QR, fed block by block: only the triangle is kept.
+//! Least squares by QR, fed block by block; only the triangle R is kept.
 
 use crate::dot::dot;
 use crate::dynamics::with_widest_registers;
 
-/// R and QᵀY of X = Q R, with the part of Y outside the span of X, for any number of rows.
+/// R and QᵀY of X = Q R, and the length of the part of Y outside the span of X, for any number of rows.
 ///
-/// Rows are appended in blocks that stay in cache; the whole X never goes through memory. The
-/// transformation is Householder's, on `[R; block]`, so that the normal equations are never formed
-/// and accuracy depends on cond(X), not on its square. Written here rather than taken from a
-/// library because it exploits the triangle on top, allocates nothing, uses no fused
-/// multiply-add, and so gives the same bits on every machine.
+/// Rows are appended in blocks that stay in cache; the whole X never goes through memory. The transformation is
+/// Householder's, applied to `[R; block]`: the normal equations are never formed, and accuracy depends on cond(X),
+/// not on its square. It is written here rather than taken from a library because it exploits the triangle on top,
+/// allocates nothing, uses no fused multiply-add, and so gives the same bits on every machine.
 #[derive(Debug, Clone)]
 pub struct Triangle {
     columns: usize,
@@ -22,7 +21,7 @@ pub struct Triangle {
 }
 
 impl Triangle {
-    /// No rows yet.
+    /// A triangle without any rows.
     pub fn new(columns: usize, right_hand_sides: usize) -> Self {
         Self {
             columns,
@@ -143,7 +142,7 @@ impl Triangle {
         dot(column, column).sqrt()
     }
 
-    /// ‖X x − y_p‖² for any x: the triangle stands for all rows.
+    /// ‖X x − y_p‖² for any x, computed from the triangle alone, which stands for all rows.
     pub fn residual_squares(&self, x: &[f64], p: usize) -> f64 {
         let c = self.columns;
         let mut squares = self.outside[p];
@@ -165,7 +164,7 @@ mod tests {
         (i as f64 * (0.31 + 0.27 * k as f64) + k as f64).sin()
     }
 
-    /// Least squares of the same data by faer's QR: an implementation that shares nothing with ours.
+    /// The least-squares solution of the same data by faer's QR, an implementation that shares nothing with this one.
     fn by_faer(rows: usize, columns: usize) -> (Mat<f64>, Mat<f64>, Mat<f64>) {
         let x = Mat::from_fn(rows, columns, wobble);
         let y = Mat::from_fn(rows, 2, |i, p| wobble(i, p + 50) * 3.0);

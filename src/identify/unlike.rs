@@ -1,13 +1,13 @@
-//! Whether a log has anything to do with the arm that it is said to be of.
+//! Checks whether a log has anything to do with the arm that it is said to come from.
 
 use crate::robot::Arm;
 
-/// Share of a joint's torque (rms) that no rigid arm with friction leaves: of seven logs of a UR10e a joint has 5 % left at the median, and
-/// two joints of a wrist that hardly moved a fifth or more.
+/// Residual share of a joint's torque (rms) that no rigid arm with friction shows. In seven logs of a UR10e the
+/// median joint has 5 % left, and two joints of a wrist that hardly moved a fifth or more.
 const MUCH: f64 = 0.2;
 
-/// A question where much of the torque is left on half of the joints or more; `left` are shares of the torque, joint by joint, without
-/// what is known to be noise.
+/// Asks whether the log is of this arm, where much of the torque is left unexplained on half of the joints or more.
+/// `left` holds the unexplained shares of the torque, joint by joint, without what is known to be noise.
 pub fn unlike_remark(arm: &Arm, left: &[f64]) -> Option<String> {
     let joints: Vec<usize> = (0..left.len()).filter(|j| left[*j] > MUCH).collect();
     if 2 * joints.len() < left.len() {
