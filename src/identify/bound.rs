@@ -1,4 +1,4 @@
-//! What no estimator can go below.
+//! The bound below which no unbiased estimator can get.
 
 use nalgebra::DMatrix;
 
@@ -8,18 +8,18 @@ use super::problem::Problem;
 use super::whiten::{Spectrum, decorrelation, mix};
 use crate::base::BaseSet;
 
-/// Torque noise whose law is known.
+/// Torque noise of known statistics.
 pub struct KnownNoise<'a> {
     /// Standard deviation per joint, Nm.
     pub torque_sd_nm: &'a [f64],
     /// Correlation between any two joints at one instant.
     pub correlation: f64,
-    /// Power at a frequency in Hz relative to white noise of the same variance.
+    /// Power at a frequency in Hz, relative to white noise of the same variance.
     pub power: &'a dyn Fn(f64) -> f64,
 }
 
-/// The Cramér–Rao bound of σ: √diag(Σ_k X_kᴴ S_k⁻¹ X_k)⁻¹ for Gaussian noise of known spectrum S_k and
-/// an exactly known motion, from the mean and harmonics 1 … `harmonics` of P periods.
+/// The Cramér–Rao bound of σ, √diag(Σ_k X_kᴴ S_k⁻¹ X_k)⁻¹, for Gaussian noise of known spectrum S_k and an exactly
+/// known motion, from the mean and harmonics 1 … `harmonics` of P periods.
 pub fn cramer_rao(
     problem: &Problem,
     set: &BaseSet,

@@ -1,4 +1,4 @@
-//! How well an arm fits a log as it may be read.
+//! Measures how well an arm fits a log under a given reading.
 
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -16,79 +16,84 @@ use crate::identify::whiten::smoothed;
 use crate::robot::{Arm, JointSignals};
 use crate::signal::{Replicates, Scratch, ZeroPhase, mean_period};
 
-/// Share of the torque (rms) that friction has where it counts: what is less may be another law.
+/// Least share of the torque (rms) that friction must have for its sign to count; a smaller share may be due to
+/// another friction law.
 const FRICTION: f64 = 0.1;
-/// Share of the torque (rms) that may be left where friction is to be believed: noise that hides a joint's torque has no sign.
+/// Largest residual share of the torque (rms) at which the sign of friction is believed: noise that hides a joint's
+/// torque has no sign.
 const KNOWN: f64 = 0.3;
-/// What friction that pushes is worth in a misfit: a residual ten times as large.
+/// Misfit added for friction that pushes: that of a residual ten times as large.
 const PUSHES: f64 = 2.0 * std::f64::consts::LN_10;
-/// What gravity is worth in a misfit that has nothing to do with the description's, against one that is the description's: a residual ten
-/// times as large. The description of an arm may be wrong about its masses, hardly about where they are.
+/// Misfit added for gravity that has nothing to do with the described one: that of a residual ten times as large. The
+/// description of an arm may be wrong about its masses, but hardly about where they are.
 const GRAVITY: f64 = 2.0 * std::f64::consts::LN_10;
-/// Mean share of the torque (rms) that friction has on all joints where its sign tells more than gravity's does: it brakes any arm,
-/// gravity pulls as described where the description of the mounting holds.
+/// Mean share of the torque (rms) of all joints above which the sign of friction counts for more than that of
+/// gravity. Friction brakes any arm; gravity pulls as described only if the mounting is described correctly.
 const TELLS: f64 = 0.02;
-/// Cosine from which on gravity is the described one.
+/// Cosine above which gravity is the described one.
 const CLEAR: f64 = 0.9;
 
 /// How well an arm fits a log, joint by joint.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Match {
-    /// Share of the torque (rms) that the model leaves.
+    /// Share of each joint's torque (rms) that the model leaves.
     pub left: Vec<f64>,
-    /// Whether Coulomb and viscous friction do work on the joint, and are a tenth of the torque or more.
+    /// Whether Coulomb and viscous friction do positive work on the joint and amount to a tenth of the torque or
+    /// more.
     pub friction_pushes: Vec<bool>,
-    /// `left` without the noise that the log shows by itself.
+    /// `left` without the noise that the log itself shows.
     #[serde(skip)]
     beyond_noise: Vec<f64>,
-    /// Mean share of the torque (rms) that friction has, negative where it pushes.
+    /// Mean share of the torque (rms) that is friction; negative where it pushes.
     #[serde(skip)]
     friction: f64,
-    /// Cosine of the angle between the first moments that were found and those described.
+    /// Cosine of the angle between the found and the described first moments.
     #[serde(skip)]
     gravity: f64,
 }
 
 impl Match {
-    /// ln (‖e_j‖² / ‖τ_j‖²) of joint `j`, and more where friction pushes.
+    /// ln (‖e_j‖² / ‖τ_j‖²) of joint `j`, increased where friction pushes.
     pub(super) fn misfit_of(&self, j: usize) -> f64 {
         let pushes = if self.friction_pushes[j] { PUSHES } else { 0.0 };
         2.0 * self.left[j].max(f64::MIN_POSITIVE).ln() + pushes
     }
 
-    /// Of all joints, and more the less gravity is the description's.
+    /// Sum of the misfits of all joints, and an addition that grows as gravity departs from the described one.
     pub(super) fn misfit(&self) -> f64 {
         let of_joints: f64 = (0..self.left.len()).map(|j| self.misfit_of(j)).sum();
         of_joints + GRAVITY * (1.0 - self.gravity)
     }
 
-    /// Cosine of the angle between the first moments that were found and those described; 0 where none are described.
+    /// Cosine of the angle between the found and the described first moments; 0 where none are described.
     pub(super) fn gravity(&self) -> f64 {
         self.gravity
     }
 
-    /// Share of the torque (rms) that the model leaves of joint `j`, noise apart.
+    /// Share of joint `j`'s torque (rms) that the model leaves, without noise.
     pub(super) fn beyond_noise(&self, j: usize) -> f64 {
         self.beyond_noise[j]
     }
 
-    /// On how many joints the model leaves more than `share` of the torque, noise apart.
+    /// Number of joints on which the model leaves more than `share` of the torque, without noise.
     pub(super) fn joints_left_by(&self, share: f64) -> usize {
         self.beyond_noise.iter().filter(|left| **left > share).count()
     }
 
-    /// Whether the model leaves more than `share` of the torque of a joint, noise apart, or friction pushes one.
+    /// Whether the model leaves more than `share` of the torque of any joint, without noise, or friction pushes a
+    /// joint.
     pub(super) fn leaves_more_than(&self, share: f64) -> bool {
         self.beyond_noise.iter().any(|left| *left > share) || self.friction_pushes.contains(&true)
     }
 
-    /// Whether it is the other sign of all torques that friction, or where there is next to none, gravity as described speaks for:
-    /// the model fits both alike.
+    /// Whether all torques should have the other sign, with which the model fits equally well: friction decides, or
+    /// gravity where there is next to no friction.
     pub(super) fn is_turned(&self) -> bool {
         self.sign() < 0.0
     }
 
-    /// Whether that is beyond doubt: friction is no noise there, and gravity is the described one with the other sign.
+    /// Whether [`Self::is_turned`] holds beyond doubt: friction is more than noise, or gravity is the described one
+    /// with the other sign.
     pub(super) fn is_clearly_turned(&self) -> bool {
         self.is_turned() && (self.friction < -TELLS || self.gravity < -CLEAR)
     }
@@ -98,14 +103,14 @@ impl Match {
     }
 }
 
-/// What it takes to fit an arm to readings of a log, for every way in which it may be mounted.
+/// Data and models for fitting an arm to different readings of a log, for every mounting of the arm.
 pub struct Bench {
     motion: Motion,
-    /// Torques as they were logged: in another joint's column a current has that joint's gain.
+    /// Torques or currents as they were logged: a current that is read for another joint gets that joint's gain.
     effort: JointSignals,
-    /// Noise (rms) of them, as far as it is known.
+    /// Noise (rms) of the logged torques or currents, as far as it is known.
     noise: Vec<f64>,
-    /// What they are multiplied by, joint by joint, Nm/A; 1 where they are in Nm.
+    /// Gain from logged values to torques, joint by joint, Nm/A; 1 where they are logged in Nm.
     gain: Vec<f64>,
     mountings: Vec<Mounting>,
 }
@@ -114,16 +119,18 @@ struct Mounting {
     gravity_m_s2: Option<[f64; 3]>,
     model: Model,
     set: BaseSet,
-    /// First moments among the base parameters: place and value by the description.
+    /// The first moments among the base parameters: index and described value.
     first_moments: Vec<(usize, f64)>,
 }
 
-/// Instants that are looked at: fifteen equations for each parameter of an arm of six joints, and a thousand readings a second.
+/// Number of instants used: fifteen equations for each parameter of an arm of six joints, and fast enough to try a
+/// thousand readings a second.
 const INSTANTS: usize = 150;
 
 impl Bench {
-    /// Of the arm as described and the log in `regression`, of currents if there are gains: the mean period, or the run behind the
-    /// low-pass of `options`; `None` for one without a base set, and where that cannot be made.
+    /// Prepares the log in `regression` for the arm as described: its mean period, or a single run behind the
+    /// low-pass of `options`. `drive_gain_nm_a` holds the gains of logged currents. `None` for an arm without a base
+    /// set, and where the low-pass cannot be made.
     pub fn new(
         arm: &Arm,
         regression: &Regression,
@@ -178,13 +185,13 @@ impl Bench {
         })
     }
 
-    /// For all other mountings as well.
+    /// Adds models for all other mountings.
     pub fn add_mountings(&mut self, arm: &Arm) {
         let others = other_gravity(arm).into_iter();
         self.mountings.extend(others.filter_map(|gravity| Mounting::of(arm, Some(gravity))));
     }
 
-    /// How well the full model fits the log as it is read by `reading`; `None` where the motion that is read does not tell all its
+    /// Fits the full model to the log as read by `reading`; `None` where the motion read so does not determine all
     /// parameters.
     pub fn fit(&self, reading: &Reading) -> Option<Match> {
         let mut mountings = self.mountings.iter();
@@ -210,7 +217,7 @@ impl Bench {
         }
         let samples = motion.samples() as f64;
         let beyond_noise = (0..model.dof()).map(|j| {
-            // The torque's that is read there now.
+            // The noise belongs to the logged channel that is read for this joint.
             let noise_nm = self.gain[j] * self.noise[counting.torque()[j].joint];
             let noise = noise_nm * noise_nm * samples / fit.torque_squares[j];
             (left[j].powi(2) - noise).max(0.0).sqrt()
@@ -241,7 +248,8 @@ impl Bench {
     }
 }
 
-/// Of the angle between described values and those at their places; 0 where either has no length.
+/// Cosine of the angle between the described values and the found values at their indices; 0 where either has no
+/// length.
 fn cosine(described: &[(usize, f64)], found: &[f64]) -> f64 {
     let sum = |f: &dyn Fn(f64, f64) -> f64| {
         described.iter().map(|(k, value)| f(*value, found[*k])).sum::<f64>()

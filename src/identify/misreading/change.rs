@@ -1,4 +1,4 @@
-//! Ways in which a log can have been recorded otherwise than it is read.
+//! Ways in which the recording of a log can differ from how the log is read.
 
 use std::f64::consts::FRAC_PI_2;
 use std::fmt;
@@ -8,7 +8,7 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use crate::robot::Arm;
 
-/// Which channels of a joint are read otherwise.
+/// The channels of a joint that a change affects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Channels {
     /// Angle, velocity and torque.
@@ -20,17 +20,17 @@ pub enum Channels {
 }
 
 impl Channels {
-    /// Whether angle and velocity are among them.
+    /// Whether angle and velocity are among the channels.
     pub(super) fn have_motion(self) -> bool {
         self != Self::Torque
     }
 
-    /// Whether the torque is.
+    /// Whether the torque is among the channels.
     pub(super) fn have_torque(self) -> bool {
         self != Self::Motion
     }
 
-    /// In the kinds of results; of one joint; of several.
+    /// Names of the channels: as part of a `kind` in results, for one joint, and for several joints.
     fn words(self) -> [&'static str; 3] {
         match self {
             Self::All => ["joint", "angle, velocity and torque", "the columns"],
@@ -43,37 +43,37 @@ impl Channels {
 /// One difference between how a log is read and how it was recorded; joints are 0-based.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Change {
-    /// Channels of joints stand in the columns of others: ROS sorts joints by name.
+    /// Channels of some joints are in the columns of other joints: ROS sorts joints by name.
     Ordered {
         /// Which channels.
         what: Channels,
-        /// Of each joint, where they stand.
+        /// For each joint, the joint in whose columns its channels are.
         order: Vec<usize>,
     },
     /// Channels of a joint count the other way than the description's axis.
     Reversed {
         /// Which channels.
         what: Channels,
-        /// Whose.
+        /// Joint whose channels count the other way.
         joint: usize,
     },
-    /// All torques count the other way: they are what the load does to the drives.
+    /// All torques count the other way: they are what the load exerts on the drives.
     AllTorquesReversed,
-    /// The angle is counted from a zero that is quarter turns away from the description's.
+    /// The angle is counted from a zero that is quarter turns away from the described one.
     ZeroTurned {
-        /// Whose.
+        /// Joint whose zero is turned.
         joint: usize,
         /// What has to be added to the angles, rad.
         add_rad: f64,
     },
-    /// The arm hangs, stands on a wall, or leans by half a right angle.
+    /// The arm hangs, is mounted on a wall, or is inclined by 45°.
     Mounted {
         /// Gravity in the base frame, m/s².
         gravity_m_s2: [f64; 3],
     },
 }
 
-/// With a `kind` of its own for two joints that are exchanged, and joints that count from 1.
+/// An exchange of two joints has a `kind` of its own; joints count from 1.
 impl Serialize for Change {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let key = |what: &Channels| what.words()[0];
@@ -109,29 +109,30 @@ impl Serialize for Change {
     }
 }
 
-/// The joints that stand in each other's places, where all others stand in their own.
+/// The two joints that have exchanged places, if all others are in their own.
 fn pair(order: &[usize]) -> Option<[usize; 2]> {
     let moved: Vec<usize> = (0..order.len()).filter(|k| order[*k] != *k).collect();
     moved.try_into().ok()
 }
 
-/// What it costs more to have encoders read otherwise than torques, in steps.
+/// Additional cost, in steps, of changing the reading of encoders rather than of torques.
 const ENCODERS: f64 = 0.1;
-/// What it costs more to have the arm mounted otherwise, in steps: of equally many changes those cost less that leave it as it is described,
-/// be they encoders', and one change more costs more still. Signs and zeros of joints turn an arm upside down as well.
+/// Additional cost, in steps, of another mounting. Of equally many changes, those that leave the arm mounted as
+/// described cost less, even if they are changes of encoders; one change more costs more still. Without this cost,
+/// another mounting could replace the right changes: signs and zeros of joints turn an arm upside down as well.
 const MOUNTED: f64 = 0.7;
-/// Gravity that is within this of the description's direction is the description's.
+/// Cosine of the angle to the described gravity above which a direction counts as the described one.
 const SAME_DIRECTION: f64 = 0.99;
 
 impl Change {
-    /// Two joints of an arm with so many stand in each other's places.
+    /// Exchanges two joints of an arm with `joints` joints.
     pub fn exchanged(what: Channels, [a, b]: [usize; 2], joints: usize) -> Self {
         let mut order: Vec<usize> = (0..joints).collect();
         order.swap(a, b);
         Self::Ordered { what, order }
     }
 
-    /// All that are looked for.
+    /// All single changes that the search tries.
     pub(super) fn all(arm: &Arm) -> Vec<Self> {
         let n = arm.dof();
         let pairs = (0..n).flat_map(|a| (a + 1..n).map(move |b| [a, b]));
@@ -157,7 +158,7 @@ impl Change {
         of_all.chain(Self::orders(arm)).collect()
     }
 
-    /// Whole columns in other orders.
+    /// All changes of the order of whole columns.
     fn orders(arm: &Arm) -> Vec<Self> {
         let apart = shifted(arm.dof()).flat_map(|order| {
             let ordered = |what| Self::Ordered { what, order: order.clone() };
@@ -166,7 +167,8 @@ impl Change {
         Self::orders_of_joints(arm).into_iter().chain(apart).collect()
     }
 
-    /// The joints in the order of their names, from the last to the first, and one or more columns away.
+    /// All channels of the joints in the order of their names, from the last to the first, and shifted by one or more
+    /// columns.
     pub(super) fn orders_of_joints(arm: &Arm) -> Vec<Self> {
         let n = arm.dof();
         let name = |j: usize| &arm.joints[j].name;
@@ -176,8 +178,9 @@ impl Change {
         orders.map(|order| Self::Ordered { what: Channels::All, order }).collect()
     }
 
-    /// In how many steps two joints exchange their places, or one thing changes; a little more where encoders alone are read otherwise: of a
-    /// light wrist the torque tells hardly more than that something counts the other way, and that is the current's sign far more often.
+    /// Cost of the change in steps: one step exchanges two joints or changes one thing. It costs a little more to
+    /// change the reading of encoders alone: the torque of a light wrist reveals hardly more than that some channel
+    /// counts the other way, and that is far more often the current.
     pub(super) fn steps(&self) -> f64 {
         let (what, steps) = match self {
             Self::Ordered { what, order } => (*what, exchanges(order)),
@@ -188,7 +191,7 @@ impl Change {
         steps as f64 + if what == Channels::Motion { ENCODERS } else { 0.0 }
     }
 
-    /// Whether a channel of joint `j` is read otherwise.
+    /// Whether the change affects a channel of joint `j`.
     pub(super) fn is_about(&self, j: usize) -> bool {
         match self {
             Self::Ordered { order, .. } => order[j] != j,
@@ -197,12 +200,12 @@ impl Change {
         }
     }
 
-    /// Whether the torque of joint `j` stands in another joint's column.
+    /// Whether the torque of joint `j` is in another joint's column.
     pub(super) fn moves_torque_of(&self, j: usize) -> bool {
         matches!(self, Self::Ordered { what, order } if what.have_torque() && order[j] != j)
     }
 
-    /// What to do, in a sentence.
+    /// States what to do about the change, in a sentence.
     pub(super) fn remedy(&self) -> &'static str {
         match self {
             Self::Mounted { .. } => {
@@ -215,7 +218,7 @@ impl Change {
     }
 }
 
-/// Exchanges of two places that it takes.
+/// Number of exchanges of two places that lead to `order`.
 fn exchanges(order: &[usize]) -> usize {
     let mut order = order.to_vec();
     let mut steps = 0;
@@ -229,12 +232,13 @@ fn exchanges(order: &[usize]) -> usize {
     steps
 }
 
-/// Orders of columns that stand one or more places away.
+/// Orders of columns shifted by one or more places.
 fn shifted(joints: usize) -> impl Iterator<Item = Vec<usize>> {
     (1..joints).map(move |by| (0..joints).map(|j| (j + by) % joints).collect())
 }
 
-/// Gravity along the axes of the base frame and half way between two of them, as strong as described and elsewhere.
+/// Gravity along the axes of the base frame and halfway between any two of them, as strong as described, without the
+/// described direction.
 pub(super) fn other_gravity(arm: &Arm) -> Vec<[f64; 3]> {
     let described = arm.gravity_m_s2;
     let g = described.norm();
@@ -245,7 +249,7 @@ pub(super) fn other_gravity(arm: &Arm) -> Vec<[f64; 3]> {
         signs.map(|(s, t)| (axes[a] * s + axes[b] * t).normalize())
     });
     let others = along.chain(between).filter(|d| g > 0.0 && d.dot(&described) < SAME_DIRECTION * g);
-    // −0 + 0 = 0: no minus sign in front of nothing.
+    // −0 + 0 = 0: a zero component has no minus sign.
     others.map(|direction| (direction * g).add_scalar(0.0).into()).collect()
 }
 
@@ -286,7 +290,7 @@ mod tests {
 
     use super::*;
 
-    /// As scripts read it.
+    /// The kinds as scripts read them.
     #[test]
     fn each_change_has_its_kind() {
         let of = |change: Change| serde_json::to_value(change).unwrap();

@@ -1,18 +1,22 @@
-//! Whether a log fits its arm when it is read otherwise: columns in another order, signs, zeros, mounting.
+//! Finds out whether a log fits its arm when it is read differently: columns in another order, other signs, other
+//! zeros, another mounting.
 //!
-//! A mistake in the description of a log leaves no rigid body, no friction and no drive as it is, and what a diagnosis would find of
-//! it is nonsense of great certainty. Of the few ways in which logs and descriptions of arms differ in practice ([`Change`])
-//! those are looked for that make the model fit, as few as are found to:
+//! With a mistake in the description of a log, nothing found is a property of the arm, and a diagnosis would state
+//! nonsense with great certainty. Logs and descriptions of arms differ in practice in a few ways ([`Change`]). Among
+//! these, the search looks for the fewest changes that make the model fit:
 //!
-//! minimise Σ_j ln (‖e_j‖² / ‖τ_j‖²) + γ (1 − cos φ) + λ × changes,   the likelihood of torques whose noise is not known, joint by joint,
+//! minimise Σ_j ln (‖e_j‖² / ‖τ_j‖²) + γ (1 − cos φ) + λ × changes, the likelihood of torques whose noise is not
+//! known, joint by joint.
 //!
-//! e_j the residual of the full set of base parameters, and ten times as large where friction comes out as something that pushes; φ the
-//! angle between the first moments of the base set that are found and those described. All torques together with the other sign are other
-//! parameters and no other residual: that sign is told by friction, which brakes, and where there is next to none by gravity, which pulls
-//! as described. Parameters cannot stand in for the changes, so that the right ones are told by a residual that falls by far more than
-//! any law of friction takes from it.
+//! e_j is the residual of the full set of base parameters; it counts as ten times as large where the identified
+//! friction pushes instead of braking. φ is the angle between the identified and the described first moments of the
+//! base set. If all torques have the other sign, the parameters change and the residual does not. That sign is
+//! therefore decided by friction, which brakes, and where there is next to none by gravity, which pulls as described.
+//! Parameters cannot stand in for the changes: the right changes reduce the residual by far more than any friction
+//! law does.
 //!
-//! Currents belong to the drive in whose column they are put: what is read in another column is multiplied by another gain.
+//! A current belongs to the drive in whose column it is read: a current read from another column is multiplied by
+//! another gain.
 //!
 //! Enters: the arm and a log laid out for regression. Leaves: a [`Misreading`], or nothing.
 
@@ -33,39 +37,41 @@ use crate::robot::Arm;
 use bench::Bench;
 use reading::Reading;
 
-/// A log that fits its arm when it is read otherwise.
+/// A different reading of a log with which it fits its arm.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Misreading {
-    /// How it has to be read: places, signs, zeros, and how the arm is mounted.
+    /// The changes with which the log has to be read: places, signs, zeros, and how the arm is mounted.
     pub changes: Vec<Change>,
     /// How well the arm fits the log as it is read.
     pub as_read: Match,
-    /// How well with the changes.
+    /// How well the arm fits the log with the changes.
     pub otherwise: Match,
     #[serde(skip)]
     reading: Reading,
 }
 
-/// Share of the torque (rms, noise apart) up to which the model explains a joint, whatever is read otherwise.
+/// Residual share of a joint's torque (rms, without noise) up to which the model explains that joint: no other
+/// reading is looked for.
 const EXPLAINED: f64 = 0.03;
-/// Factor by which the rms residual of a joint has to fall for every joint that is read otherwise, and that of one joint at
-/// least: laws of friction and soft gears bring 1.5 on real arms, and wrong changes take more elsewhere than they bring.
+/// Factor by which the rms residual has to fall, on average, for every joint that is read differently, and on at
+/// least one joint. Friction laws and soft gears yield a factor of 1.5 on real arms, and wrong changes cost more on
+/// other joints than they gain.
 const FALLS: f64 = 3.0;
-/// The same where gravity becomes the description's: what friction and noise leave covers part of the fall.
+/// The same factor where gravity becomes the described one: friction and noise that remain hide part of the fall.
 const RESTORED: f64 = 1.4;
-/// Cosine between first moments found and described below which they have nothing to do with each other.
+/// Cosine between found and described first moments below which they have nothing to do with each other.
 const STRANGE: f64 = 0.5;
-/// Cosine from which on they are the same masses, at the same places.
+/// Cosine above which found and described first moments belong to the same masses at the same places.
 const DESCRIBED: f64 = 0.9;
-/// Factor by which that of another joint may grow, which is noise.
+/// Factor by which the residual of another joint may grow by chance.
 const GROWS: f64 = 1.2;
-/// Share of the torque (rms, noise apart) of which a reading leaves less on every joint that it is about: one that turns the sign of friction and
-/// fits no better is another mistake.
+/// A reading counts only if the model leaves less than this share of the torque (rms, without noise) on every joint
+/// that the reading changes. A reading that turns the sign of friction and fits no better is not the right one.
 const FITS: f64 = 0.5;
 
 impl Misreading {
-    /// Of the log in `regression`, whose torques are currents times `drive_gain_nm_a` where there are such gains, one for each joint;
-    /// `None` where the model explains it, or no change makes it.
+    /// Searches for a misreading of the log in `regression`. `drive_gain_nm_a` holds one gain for each joint where
+    /// the torques are currents times gains. `None` where the model explains the log, or no change makes it do so.
     pub fn of(
         arm: &Arm,
         regression: &Regression,
@@ -88,14 +94,14 @@ impl Misreading {
         Some(Self { changes: reading.changes(), as_read, otherwise, reading })
     }
 
-    /// The lines of a layout with which the log is read as it was recorded, `layout` being the one it is read with; `None` where it is
-    /// the arm that is mounted otherwise, and no more.
+    /// The lines of a layout that reads the log as it was recorded, where `layout` is the one it is read with; `None`
+    /// where only the mounting of the arm differs.
     pub fn layout(&self, layout: &Layout) -> Option<String> {
         let counting = self.reading.counting();
         (!counting.is_as_described()).then(|| layout.recounted(counting))
     }
 
-    /// Whether it is as it is read, or nearly so, but for the sign of all torques.
+    /// Whether the log is read correctly except for the sign of all torques.
     fn is_read_turned(&self) -> bool {
         let turned = [Change::AllTorquesReversed];
         (self.changes.is_empty() || self.changes == turned) && self.as_read.is_clearly_turned()
@@ -112,24 +118,24 @@ impl Misreading {
         largest > least.ln()
             && all > least.ln() * joints.len() as f64
             && joints.iter().all(|j| self.otherwise.beyond_noise(*j) < FITS)
-            // What stands in another joint's column is another torque: its share may be larger.
+            // The torque of another column is another torque: its residual share may be larger.
             && (0..gains.len()).all(|j| has_moved(j) || gains[j] > -GROWS.ln())
     }
 
-    /// Whether gravity has nothing to do with the description's as the log is read, and is the description's otherwise, though the arm
-    /// is mounted as described.
+    /// Whether gravity has nothing to do with the described one as the log is read, and is the described one after
+    /// the changes, with the arm mounted as described.
     fn restores_gravity(&self) -> bool {
         let is_mounted = self.changes.iter().any(|change| matches!(change, Change::Mounted { .. }));
         !is_mounted && self.as_read.gravity() < STRANGE && self.otherwise.gravity() > DESCRIBED
     }
 
-    /// Joints (0-based) whose channels are read otherwise; all where the arm is mounted otherwise.
+    /// Joints (0-based) whose channels are read differently; all joints where the mounting differs.
     fn joints(&self) -> Vec<usize> {
         let all = 0..self.as_read.left.len();
         all.filter(|j| self.changes.iter().any(|change| change.is_about(*j))).collect()
     }
 
-    /// What is wrong and how to put it right, in words.
+    /// States what is wrong and how to correct it, in words.
     pub fn sentence(&self) -> String {
         let joints = self.joints();
         let range = |fit: &Match| {
@@ -160,7 +166,7 @@ impl Misreading {
                 range(&self.otherwise),
                 range(&self.as_read)
             ),
-            // Of an arm whose torques all have the other sign, parameters do as well.
+            // With all torques reversed the model fits as well, by other parameters: the residual shows no gain.
             false if !pushing.is_empty() => format!("friction brakes{pushing}"),
             false => "gravity pulls, and friction brakes, as they do".to_owned(),
         };
@@ -172,7 +178,7 @@ impl Misreading {
     }
 }
 
-/// One, one and another, or a list with an "and" before its last.
+/// Joins the changes in words: "one", "one and another", or a list with "and" before the last.
 fn listed(changes: &[Change]) -> String {
     let words: Vec<String> = changes.iter().map(Change::to_string).collect();
     match &words[..] {

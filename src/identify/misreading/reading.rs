@@ -1,26 +1,26 @@
-//! A way to read a log, and in which changes it differs from how the log is read.
+//! A way to read a log, and the changes by which it differs from how the log is read.
 
 use super::change::{Change, Channels};
 use crate::log::{Counting, Place};
 
-/// How joints are counted in the log, and how the arm is mounted.
+/// How the joints are counted in the log, and how the arm is mounted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reading {
     counting: Counting,
-    /// `None`: as described.
+    /// Gravity in the base frame, m/s²; `None`: as described.
     gravity_m_s2: Option<[f64; 3]>,
 }
 
-/// Zeros that differ by less are one, rad: sums of quarter turns have round-off.
+/// Zeros that differ by less are the same, rad: sums of quarter turns have round-off.
 const SAME_ZERO_RAD: f64 = 1e-6;
 
 impl Reading {
-    /// The log of an arm with so many joints as it is read.
+    /// The log of an arm with `joints` joints as it is read, without changes.
     pub fn as_read(joints: usize) -> Self {
         Self { counting: Counting::as_described(joints), gravity_m_s2: None }
     }
 
-    /// Of what is read, how joints are counted.
+    /// How the joints are counted in what is read.
     pub fn counting(&self) -> &Counting {
         &self.counting
     }
@@ -30,12 +30,12 @@ impl Reading {
         self.gravity_m_s2
     }
 
-    /// The same of an arm that is mounted as described, where it is not.
+    /// The same reading with the arm mounted as described; `None` where it is so already.
     pub fn mounted_as_described(&self) -> Option<Self> {
         self.gravity_m_s2.map(|_| Self { counting: self.counting.clone(), gravity_m_s2: None })
     }
 
-    /// Read with `change` as well.
+    /// This reading with `change` in addition.
     pub fn with(&self, change: &Change) -> Self {
         let mut other = self.clone();
         let counting = &mut other.counting;
@@ -75,7 +75,7 @@ impl Reading {
             && zeros.all(|(a, b)| (a - b).abs() < SAME_ZERO_RAD)
     }
 
-    /// The fewest changes that lead to it: places, then signs, then zeros, then the mounting.
+    /// The fewest changes that lead to this reading: places, then signs, then zeros, then the mounting.
     pub fn changes(&self) -> Vec<Change> {
         let counting = &self.counting;
         let joints = |places: &[Place]| places.iter().map(|p| p.joint).collect::<Vec<_>>();
@@ -102,7 +102,7 @@ impl Reading {
         changes
     }
 
-    /// All torques first where that leaves fewer.
+    /// The changes of signs: "all torques reversed" first, where that makes fewer changes.
     fn reversals(&self) -> Vec<Change> {
         let counting = &self.counting;
         let of_joints = |are_all_reversed: bool| {
@@ -130,7 +130,7 @@ fn is_in_order(order: &[usize]) -> bool {
     order.iter().enumerate().all(|(k, place)| k == *place)
 }
 
-/// Pairs that stand in each other's places, or an order that is more than that.
+/// Exchanges of pairs, or the whole order where it is more than exchanges.
 fn ordered(order: &[usize], what: Channels) -> Vec<Change> {
     let moved = || order.iter().enumerate().filter(|(k, place)| k != *place);
     if !moved().all(|(k, &place)| order[place] == k) {

@@ -1,4 +1,4 @@
-//! The fewest changes with which a log fits its arm.
+//! Searches for the fewest changes with which a log fits its arm.
 
 use rayon::prelude::*;
 
@@ -8,19 +8,19 @@ use super::change::{Change, Channels};
 use super::reading::Reading;
 use crate::robot::Arm;
 
-/// Least gain of a change, in Σ ln (‖e_j‖² / ‖τ_j‖²): one joint's residual halves.
+/// Least gain of a change, in Σ ln (‖e_j‖² / ‖τ_j‖²): the residual of one joint halves.
 const LEAST_GAIN: f64 = 1.4;
-/// Share of a joint's torque (rms) that laws of friction and soft gears leave of hardly more than one: where two joints or more have it left,
-/// several changes may be needed before any of them is worth it.
+/// Residual share of a joint's torque (rms) that friction laws and soft gears hardly ever leave on more than one
+/// joint. Where two joints or more exceed it, several changes may be needed before any one of them pays.
 const FAR: f64 = 0.1;
-/// Readings that are followed at once where the log is that far from the arm.
+/// Number of readings followed in parallel where the log is that far from the arm.
 const BREADTH: usize = 4;
-/// Changes one after the other that may gain nothing by themselves there.
+/// Number of consecutive changes that may gain nothing by themselves there.
 const PATIENCE: usize = 1;
-/// Joints up to which all ways to mirror an arm are tried.
+/// Largest number of joints for which all ways to mirror an arm are tried.
 const MIRRORED: usize = 8;
 
-/// A reading, how well it fits, and what that is worth.
+/// A reading with its fit and its cost.
 #[derive(Clone)]
 struct Tried {
     reading: Reading,
@@ -48,10 +48,11 @@ fn steps(reading: &Reading) -> f64 {
     reading.changes().iter().map(Change::steps).sum()
 }
 
-/// The best reading that was found, which is the log as it is read where none is worth its changes, and its fit.
+/// Returns the best reading found and its fit: the log as it is read, where no reading is worth its changes.
 ///
-/// Joints in another order are a step that no few exchanges lead to, and whatever is wrong beside it looks wrong until it is taken: where the
-/// log is far from the arm, the search also begins with each order that recorders have.
+/// A different order of the joints is a step to which no few exchanges lead, and any other mistake beside it looks
+/// wrong until that step is taken. Where the log is far from the arm, the search therefore also starts from each
+/// order that recorders use.
 pub fn best(arm: &Arm, bench: &Bench, as_read: &Match) -> (Reading, Match) {
     let possible = Change::all(arm);
     let reading = Reading::as_read(arm.dof());
@@ -84,7 +85,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// The best that is found from `root` on, with one change after the other.
+    /// The best reading found from `root` on by one change after the other.
     fn from(&mut self, root: Tried, breadth: usize, patience: usize) -> Tried {
         let mut followed = vec![root.clone()];
         let mut best = root;
@@ -119,8 +120,9 @@ impl Search<'_> {
     }
 }
 
-/// An arm that is mirrored in a plane turns some of its joints the other way, and hangs where it stood if the plane is the ground: as well as
-/// before, perhaps with fewer changes.
+/// Replaces a reading by a mirrored one that is cheaper. Mirroring an arm in a plane reverses some of its joints, and
+/// turns the mounting upside down if the plane is the ground. The mirrored arm fits as well as before, perhaps with
+/// fewer changes.
 fn told_shortly(best: Tried, bench: &Bench) -> Tried {
     let joints = best.fit.left.len();
     if best.steps() < 2.0 || joints > MIRRORED {
@@ -135,14 +137,15 @@ fn told_shortly(best: Tried, bench: &Bench) -> Tried {
             reading.with(&Change::Reversed { what: Channels::All, joint })
         };
         let reading = joints.fold(mounted.clone(), reverse);
-        // A fit that is no better is worth its price only with fewer changes.
+        // A mirrored fit is no better; only fewer changes can make it cheaper.
         (steps(&reading) < best.steps()).then(|| Tried::of(reading, bench)).flatten()
     });
     let cheapest = mirrored.min_by(|a, b| a.cost.total_cmp(&b.cost));
     cheapest.into_iter().fold(best, Tried::cheaper)
 }
 
-/// With all torques reversed the model fits as well: the reading of the two in which friction brakes, or gravity pulls as described.
+/// Decides the sign of all torques, with either of which the model fits equally well: returns the reading in which
+/// friction brakes, or gravity pulls as described.
 pub fn told_by_sign(reading: Reading, fit: Match, bench: &Bench) -> (Reading, Match) {
     if !fit.is_turned() {
         return (reading, fit);
