@@ -1,4 +1,4 @@
-//! The channels of a log on an even clock that is not faster than needed.
+//! Puts the channels of a log on an even clock that is not faster than needed.
 
 use std::borrow::Cow;
 
@@ -12,34 +12,35 @@ use crate::signal::{
 
 /// Time stamps further off the natural step than this share of it make a log uneven.
 const EVEN_WITHIN: f64 = 0.02;
-/// [`Even::highest`] of samples as the log has them: half a cycle less what derivatives near it cost.
+/// [`Even::highest`] of unprocessed samples: half a cycle, reduced by the loss of accuracy of derivatives near it.
 const AS_LOGGED: f64 = 0.48;
-/// The same of samples that went through a decimator's low-pass, or lie on straight lines between rows: at 0.37 a line
-/// between two rows keeps 62 % of an amplitude.
+/// [`Even::highest`] of samples behind a decimator's low-pass, or linearly interpolated between rows: at 0.37 linear
+/// interpolation keeps 62 % of an amplitude.
 const REWORKED: f64 = 0.37;
 
-/// The rows of a log, those in its gaps included, and where samples on an even clock lie among them.
+/// The rows of a log, including those beside its gaps, and the places of evenly spaced samples among them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BetweenRows {
-    /// Of the rows, s.
+    /// Time of the rows, s.
     pub time_s: Vec<f64>,
-    /// In the rows, rad/s.
+    /// Velocities in the rows, rad/s.
     pub qd_rad_s: JointSignals,
-    /// Of every sample.
+    /// Place of every sample among the rows.
     pub places: Vec<Bracket>,
 }
 
-/// See the module.
+/// A log on an even clock.
 pub(super) struct Even<'a> {
     /// Instant of the first sample, s, on the log's clock.
     pub(super) start_s: f64,
     /// Samples per second.
     pub(super) rate_hz: f64,
-    /// Whether samples lie between rows.
+    /// Whether samples were interpolated between rows.
     pub(super) resampled: bool,
-    /// Highest frequency, in cycles per sample, at which the samples show what the log does.
+    /// Highest frequency, in cycles per sample, at which the samples still show the log's content.
     pub(super) highest: f64,
-    /// Where resampled ones lie among the rows; `None` for rows, and for what was decimated since.
+    /// Places of resampled samples among the rows; `None` where the samples are the rows, or were decimated
+    /// afterwards.
     pub(super) between: Option<BetweenRows>,
     /// Joint angles, rad.
     pub(super) q_rad: Cow<'a, JointSignals>,
@@ -50,7 +51,7 @@ pub(super) struct Even<'a> {
 }
 
 impl<'a> Even<'a> {
-    /// Resamples an uneven log, or one that is wanted on a clock so many times `faster`; decimates a fast one.
+    /// Resamples an uneven log, or one that is wanted on a clock `faster` by this factor; decimates a fast one.
     pub(super) fn of(
         m: &Measurement<'a>,
         options: &Options,
@@ -85,7 +86,8 @@ impl<'a> Even<'a> {
             ));
         }
         let is_natural = (0.999 * natural_hz..=1.001 * natural_hz).contains(&wanted_hz);
-        // A decimator keeps whole parts of the grid's rate, which is that multiple of a wanted rate below the log's.
+        // A decimator divides the grid's rate by a whole number; the grid is therefore put on the smallest multiple
+        // of the wanted rate that is not below the log's.
         let parts = if is_natural { 1 } else { whole_parts(natural_hz, wanted_hz) };
         if !is_even || !is_natural || faster.is_some() {
             let plain_hz = if is_natural { even.rate_hz } else { parts as f64 * wanted_hz };
@@ -160,7 +162,7 @@ impl<'a> Even<'a> {
     }
 }
 
-/// Parts into which `rate_hz` is divided so that one is at most `highest_hz`, or a thousandth more.
+/// Smallest whole number that divides `rate_hz` into at most `highest_hz`, or a thousandth more.
 fn whole_parts(rate_hz: f64, highest_hz: f64) -> usize {
     (rate_hz / highest_hz * 0.999).ceil().max(1.0) as usize
 }
@@ -172,8 +174,8 @@ mod tests {
     const START_S: f64 = 7.0;
     const OMEGA_RAD_S: f64 = 3.0;
 
-    /// Ten seconds of a joint that swings, in `log_hz` rows a second, with `rate_hz` asked for: the rate of the samples, and
-    /// how far their angles are off the motion, at least two seconds from both ends, rad.
+    /// Ten seconds of a swinging joint, logged at `log_hz` and put on `rate_hz`: the rate of the samples, and the
+    /// largest error of their angles at least two seconds from both ends, rad.
     fn sampled(log_hz: f64, rate_hz: Option<f64>) -> (f64, f64) {
         let rows = (10.0 * log_hz) as usize;
         let time_s: Vec<f64> = (0..rows).map(|k| START_S + k as f64 / log_hz).collect();
@@ -203,7 +205,7 @@ mod tests {
         for wanted_hz in [20.0, 30.0, 50.0, 62.5, 100.0, 120.0, 124.0, 200.0] {
             let (rate_hz, off_rad) = sampled(125.0, Some(wanted_hz));
             assert!((rate_hz - wanted_hz).abs() < 1e-9, "{rate_hz} instead of {wanted_hz} Hz");
-            // Cubics between rows are off by (ω/125 Hz)⁴/384 = 9e-10, and the ends of the slowest low-pass by e⁻²⁰.
+            // Cubic interpolation is off by (ω/125 Hz)⁴/384 = 9e-10, and the ends of the slowest low-pass by e⁻²⁰.
             assert!(off_rad < 1e-8, "{off_rad:e} rad at {wanted_hz} Hz");
         }
     }

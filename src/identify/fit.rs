@@ -21,16 +21,15 @@ pub enum Estimator {
     /// Seemingly unrelated regressions: the joints' equations weighted by the 6 × 6 covariance of
     /// their residuals (Zellner 1962).
     Sur,
-    /// Each joint's equations behind the filter that makes its residuals white (autoregression),
-    /// then weighted per joint.
+    /// Each joint's equations filtered so that its residuals become white (autoregression), then weighted per joint.
     Gls,
-    /// Torque and regressor behind a low-pass and thinned, then weighted per joint (Gautier 1997).
+    /// Torque and regressor low-passed and thinned, then weighted per joint (Gautier 1997).
     Decimated,
-    /// Instrumental variables, the regressor along a smoother motion, against the noise in the measured
-    /// one; weighted per joint (after Janot, Vandanjon and Gautier 2014).
+    /// Instrumental variables, against noise in the measured motion: the instruments are the regressor along a
+    /// smoother motion; weighted per joint (after Janot, Vandanjon and Gautier 2014).
     Iv,
-    /// Each harmonic of a motion that repeats, and each joint, weighted by the noise that the
-    /// periods show there, correlation between joints included.
+    /// Each harmonic of a repeating motion, and each joint, weighted by the noise that the periods show there,
+    /// including the correlation between joints.
     Spectral,
 }
 
@@ -51,13 +50,13 @@ impl std::fmt::Display for Estimator {
 /// How least squares weighs the equations of a problem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Weighting {
-    /// All alike.
+    /// All equations alike.
     Equal,
-    /// Each joint's divided by the standard deviation of its residual, iterated.
+    /// Each joint's equations divided by the standard deviation of its residual, iterated.
     PerJoint,
 }
 
-/// The data cannot give the parameters at all.
+/// The reason why the data cannot determine the parameters.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum FitError {
     /// Fewer equations than unknowns.
@@ -82,7 +81,7 @@ pub enum FitError {
     /// Nothing moves.
     #[error("the arm stands still, or its periods do not tell how it is accelerated")]
     StandsStill,
-    /// The smoother motion says nothing of some parameters.
+    /// The smoother motion carries no information about some parameters.
     #[error(
         "the motion below the cutoff of the instruments does not excite all parameters: choose a \
          higher cutoff, or another estimator than iv"
@@ -108,7 +107,7 @@ pub struct Fit {
     pub theta_periods: Vec<Vec<f64>>,
     /// s_j: standard deviation of one torque sample's residual per joint, Nm.
     pub joint_sigma_nm: Vec<f64>,
-    /// Weight of each joint's equations: 1/s_j, or 1 where they are not weighted as a whole.
+    /// Weight of each joint's equations: 1/s_j, or 1 where a joint's equations are not weighted as a whole.
     pub weights: Vec<f64>,
     /// QR of the weighted (whitened) W X of one period, and of W y of every period.
     pub triangle: Triangle,
@@ -121,7 +120,7 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// Restates residuals and torques as those of `problem`, whose whitened rows were solved.
+    /// Replaces residuals and torques by those of `problem`, whose whitened rows were solved.
     pub(super) fn state_residuals_of(&mut self, problem: &Problem) {
         self.residual_squares = problem.residual_squares(&self.theta);
         self.torque_squares =
@@ -135,7 +134,7 @@ impl Fit {
 
 /// Iterations of the weights: the first uses the residuals of OLS, the second those of the first.
 const WEIGHT_ITERATIONS: usize = 2;
-/// Smallest column-scaled pivot that is more than rounding of double precision.
+/// Smallest pivot, relative to the length of its column, that is more than rounding of double precision.
 const PIVOT_FLOOR: f64 = 1e-9;
 /// Rows eliminated together.
 const BLOCK: usize = 256;
@@ -222,7 +221,7 @@ impl Fitter {
         }
     }
 
-    /// The weighted joints' triangles, stacked and reduced to one.
+    /// Stacks the joints' weighted triangles and reduces them to one.
     fn combine(
         &mut self,
         problem: &Problem,
@@ -302,7 +301,7 @@ impl Fitter {
     }
 }
 
-/// Mean over the periods of the solutions: the solution for the mean torque.
+/// Solution for the mean torque: the mean of the periods' solutions.
 fn mean_solution(triangle: &Triangle) -> Vec<f64> {
     let periods = triangle.right_hand_sides();
     let mut mean = vec![0.0; triangle.columns()];

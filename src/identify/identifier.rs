@@ -1,4 +1,4 @@
-//! From a raw log to θ̂ and σ: the one function that real logs and simulated trials go through.
+//! From a raw log to θ̂ and σ: the one path that real logs and simulated trials share.
 
 use super::columns::ColumnPlan;
 use super::course::Course;
@@ -19,7 +19,7 @@ use crate::base::BaseSet;
 use crate::dynamics::Model;
 use crate::signal::{FineClock, Replicates, Scratch, ZeroPhase, fill_gaps};
 
-/// Everything that stays the same from log to log, and the memory that is used again.
+/// Everything that stays the same from log to log, and reusable memory.
 pub struct Identifier<'a> {
     model: &'a Model,
     set: &'a BaseSet,
@@ -45,15 +45,15 @@ pub struct Identification {
     pub covariance_reason: &'static str,
     /// What was done to the log.
     pub processing: Processing,
-    /// Samples of torque per joint that were used.
+    /// Torque samples per joint that were used.
     pub samples: usize,
     /// Scatter of the torque between periods; `None` for a single run.
     pub replicates: Option<Replicates>,
-    /// Rms per joint of what repeats and is not explained, Nm; `None` for a single run.
+    /// Rms per joint of the repeating torque that the model does not explain, Nm; `None` for a single run.
     pub explainable_nm: Option<Vec<f64>>,
     /// Test of the model against the scatter between periods; known for the spectral estimator.
     pub lack_of_fit: Option<LackOfFit>,
-    /// Whether several logs tell of one arm; known where each repeats its motion.
+    /// Test whether several logs come from one arm; known where each of them repeats its motion.
     pub agreement: Option<Agreement>,
     /// What the user should know about how the log was used.
     pub warnings: Vec<String>,
@@ -65,18 +65,18 @@ pub struct Regression {
     pub problem: Problem,
     /// The regressor along a smoother motion; only where the estimator asks for it.
     pub instruments: Option<Problem>,
-    /// The motion and torque behind them; for a single run unfiltered and as long as the window.
+    /// The motion and torque from which they were made; for a single run unfiltered and as long as the window.
     pub prepared: Prepared,
-    /// First sample of `prepared` that is in `problem` (edges of the filter are cut off).
+    /// First sample of `prepared` that is in `problem` (the edges of the filter are cut off).
     pub first_sample: usize,
-    /// Samples of `prepared` per sample of `problem` (long logs are thinned behind the filter).
+    /// Samples of `prepared` per sample of `problem` (long logs are thinned after the filter).
     pub every: usize,
-    /// Of several logs, of which `prepared` holds the first.
+    /// Course of several joined logs, of which `prepared` holds the first; `None` for a single log.
     course: Option<Course>,
 }
 
 impl Regression {
-    /// The sample of `prepared` behind row `row` of one period (or of the run).
+    /// The sample of `prepared` that belongs to row `row` of one period (or of the run).
     pub fn sample(&self, row: usize) -> usize {
         self.first_sample + row * self.every
     }
@@ -86,8 +86,8 @@ impl Regression {
         self.course.clone().unwrap_or_else(|| Course::of(self))
     }
 
-    /// Several logs as one: rows stand below each other. A repeated motion then counts as that many
-    /// runs, and the processing reported is that of the first log.
+    /// Joins several logs into one by stacking their rows. Every period then counts as part of a single run, and the
+    /// processing reported is that of the first log.
     pub fn joined(regressions: Vec<Self>) -> Result<Self, IdentifyError> {
         let logs = regressions.len();
         let mut rest = regressions.into_iter();
@@ -130,7 +130,7 @@ impl Regression {
         Ok(first)
     }
 
-    /// Rows that are in no row of the log.
+    /// Number of rows that were filled in and are not in the log.
     fn filled_rows(&self) -> f64 {
         self.prepared.filled_share * (self.problem.samples * self.problem.periods) as f64
     }
@@ -140,16 +140,16 @@ const ALIKE_TO_THE_LAST_DIGIT: &str = "the periods are alike to the last digit, 
      residual between blocks of time holds for noise with a memory short against a block";
 /// Single runs are processed in pieces of this many samples, so that memory stays bounded.
 const PIECE: usize = 1 << 16;
-/// Instants per sample at which reversals are looked at: a millisecond at 125 Hz, a tenth of what a joint takes to
-/// reverse its friction.
+/// Instants per sample at which reversals of velocity are resolved: a millisecond at 125 Hz, a tenth of the time that
+/// a joint takes to reverse its friction.
 const TICKS: usize = 8;
 /// Longest single run that keeps all its samples.
 const LONG_RUN: usize = 100_000;
-/// Rate kept behind a low-pass where a run is long or its rows are counted, in multiples of the cutoff.
+/// Sampling rate kept after a low-pass where a run is long or its rows are counted, in multiples of the cut-off.
 pub const KEPT_RATE: f64 = 4.0;
 
 impl<'a> Identifier<'a> {
-    /// For logs of one arm.
+    /// An identifier for logs of one arm.
     pub fn new(model: &'a Model, set: &'a BaseSet, options: Options) -> Self {
         let problem = Problem::new(ColumnPlan::new(model, set), 0.0);
         Self {
@@ -165,7 +165,7 @@ impl<'a> Identifier<'a> {
         }
     }
 
-    /// With what it identifies.
+    /// The options of identification.
     pub fn options(&self) -> &Options {
         &self.options
     }
@@ -175,7 +175,7 @@ impl<'a> Identifier<'a> {
         self.set
     }
 
-    /// Whether the noise that periods show may weigh a log that repeats: nothing else was asked for.
+    /// Whether a log that repeats may be weighted by the noise between its periods: no other method was asked for.
     pub fn may_weigh_by_periods(&self) -> bool {
         let Options { estimator, covariance, .. } = self.options;
         !self.options.is_single_run()
@@ -190,11 +190,10 @@ impl<'a> Identifier<'a> {
         self.solve(prepared, instruments.as_ref())
     }
 
-    /// `m`, whose torque is the manufacturer's feed-forward, laid out for regression; none where that is the same in every row
-    /// of a joint that moves, which is then told in the `warnings`.
+    /// Lays out `m`, whose torque is the manufacturer's feed-forward, for regression. `None` where that torque is the
+    /// same in every row of a joint that moves; this is then added to `warnings`.
     ///
-    /// # Errors
-    /// As [`Self::regression`].
+    /// # Errors As [`Self::regression`].
     pub fn feed_forward(
         &mut self,
         m: &Measurement,
@@ -211,7 +210,7 @@ impl<'a> Identifier<'a> {
         }
     }
 
-    /// Lays a log out for regression without solving: for validation and diagnosis.
+    /// Lays a log out for regression without solving it: for validation and diagnosis.
     pub fn regression(&mut self, m: &Measurement) -> Result<Regression, IdentifyError> {
         let (prepared, first_sample, every) = self.fill_from(m, true)?;
         let instruments = self.instruments_for(self.options.estimator, &prepared)?;
@@ -267,7 +266,8 @@ impl<'a> Identifier<'a> {
         Ok((prepared, first, every))
     }
 
-    /// The rows of `prepared`; which of its samples they start with, and how many are between them.
+    /// Fills the problem with the rows of `prepared`. Returns the first sample used and the step between the samples
+    /// used.
     fn lay_out(&mut self, prepared: &Prepared) -> Result<(usize, usize), IdentifyError> {
         self.problem.rate_hz = prepared.processing.rate_hz;
         if prepared.replicates.is_some() {
@@ -278,7 +278,7 @@ impl<'a> Identifier<'a> {
         self.fill_filtered(prepared)
     }
 
-    /// The rows of `prepared` along its smoothed motion, where `estimator` asks for them.
+    /// Lays out the rows of `prepared` along its smoothed motion, where `estimator` asks for them.
     fn instruments_for(
         &mut self,
         estimator: Option<Estimator>,
@@ -300,8 +300,8 @@ impl<'a> Identifier<'a> {
         Ok(Some(instruments))
     }
 
-    /// A single run: the same low-pass on torque and every regressor column (Gautier 1997), in
-    /// pieces that overlap by the filter's memory; the filter's edges are cut off.
+    /// Lays out a single run: the same low-pass acts on the torque and on every regressor column (Gautier 1997), in
+    /// pieces that overlap by the filter's memory. The filter's edges are cut off.
     fn fill_filtered(&mut self, prepared: &Prepared) -> Result<(usize, usize), IdentifyError> {
         let rate_hz = prepared.processing.rate_hz;
         let Options { cutoff_hz, order, .. } = self.options;
@@ -363,7 +363,7 @@ impl<'a> Identifier<'a> {
             None if repeats => Estimator::Spectral,
             None => Estimator::Wls,
         };
-        // What works harmonic by harmonic has no blocks of time.
+        // An estimator that works harmonic by harmonic has no blocks of time.
         let default_kind = match repeats || estimator == Estimator::Spectral {
             true => CovarianceKind::Spectral,
             false => CovarianceKind::Blocks,
@@ -422,7 +422,8 @@ impl<'a> Identifier<'a> {
         })
     }
 
-    /// Nothing changes for a single run: its low-pass lies far below what drives do at a reversal.
+    /// Projects the drives' responses to friction out of the problem. A single run stays as it is: its low-pass is
+    /// far slower than the response of a drive at a reversal.
     fn take_out_drive_answers(&mut self, prepared: &Prepared) {
         let Some(acceleration) = &prepared.acceleration else { return };
         let Self { clock, problem, model, .. } = self;
@@ -431,8 +432,8 @@ impl<'a> Identifier<'a> {
         without_drive_answers(problem, clock, model, &prepared.motion, acceleration);
     }
 
-    /// `estimate` of the log `prepared`; where its model fails against the scatter of the torque, tested against
-    /// that of torque and motion.
+    /// Returns `estimate` of the log `prepared`. Where its model fails against the scatter of the torque, it is
+    /// tested again against the scatter of torque and motion together.
     fn with_motion_noise(
         &mut self,
         estimate: Estimate,
@@ -452,7 +453,7 @@ impl<'a> Identifier<'a> {
         Ok(Estimate { lack_of_fit, ..estimate })
     }
 
-    /// Estimates from one log by several methods: estimators, each with its covariances.
+    /// Estimates from one log by several methods: estimators, each with its kinds of covariance.
     pub fn compare(
         &mut self,
         m: &Measurement,
@@ -475,9 +476,10 @@ impl<'a> Identifier<'a> {
     }
 }
 
-/// Rms per joint of what repeats in the torque and is not explained, Nm: of the squares ‖e_j‖² that so many `parameters` leave
-/// over all periods, those of the mean period less the share that its noise, σ²/P, has in them; P and σ² are less in the rows by
-/// the parts that are `kept` ([`Prepared::kept`](super::Prepared::kept)).
+/// Rms per joint of the repeating torque that is not explained, Nm. `residual_squares` are ‖e_j‖² over all periods,
+/// left by a fit of `parameters` parameters. From them the scatter between periods is subtracted, and from the mean
+/// period the share of its noise σ²/P that the fit leaves. Filled-in rows lower P and the scatter to the parts that
+/// are `kept` ([`Prepared::kept`](super::Prepared::kept)).
 fn explainable(
     residual_squares: &[f64],
     parameters: usize,
@@ -498,7 +500,8 @@ fn explainable(
         .collect()
 }
 
-/// With fewer periods their scatter has so few degrees of freedom that blocks tell more.
+/// Periods from which on their scatter is used; with fewer it has so few degrees of freedom that blocks of time are
+/// more informative.
 pub const MANY_PERIODS: usize = 4;
 
 impl Identification {
@@ -507,7 +510,7 @@ impl Identification {
         Residual::from_squares(&self.fit.residual_squares, &self.fit.torque_squares, self.samples)
     }
 
-    /// Share of each joint's torque (rms) that the model leaves, without noise as far as the log tells it.
+    /// Share of each joint's torque (rms) that the model leaves, without noise as far as the log reveals it.
     pub fn left(&self) -> Vec<f64> {
         let Residual { rms_nm, relative_percent, .. } = self.residual();
         let beyond_noise = |j: usize| match (&self.explainable_nm, &self.replicates) {
@@ -533,9 +536,10 @@ mod tests {
     use rand::{SeedableRng, rngs::ChaCha8Rng};
     use rand_distr::{Distribution, StandardNormal};
 
-    /// Eight periods of an error of 0.3 Nm rms that repeats, under noise of 1 Nm; a twelfth of the rows, at other phases in each period, are
-    /// the mean of the other periods. The mean square of the mean period is 0.09 and 1/(8 · 11/12) Nm², known to √(2/8000) of the second
-    /// and twice the root of both products over 8000: 0.0048 Nm². Five of them leave 0.257 to 0.338; without what is kept it were 0.16.
+    /// Eight periods of an error of 0.3 Nm rms that repeats, under noise of 1 Nm. A twelfth of the rows, at other
+    /// phases in each period, is the mean of the other periods. The mean square of the mean period is 0.09 and 1/(8 ·
+    /// 11/12) Nm², known to √(2/8000) of the second term and twice the root of both terms' product over 8000: 0.0048
+    /// Nm². Five of these standard deviations leave 0.257 to 0.338; without `kept` the result would be 0.16.
     #[test]
     fn rows_that_were_filled_in_explain_nothing() {
         const N: usize = 8000;

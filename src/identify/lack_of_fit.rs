@@ -1,51 +1,50 @@
-//! Does the model explain all that repeats?
+//! Tests whether the model explains everything that repeats in the torque.
 
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::problem::Problem;
 
-/// Test of the model against the scatter between periods, which no model can go below.
+/// Test of the model against the scatter between periods, below which no model can get.
 ///
-/// On whitened rows (noise of unit variance) the mean period leaves
-/// LoF = P‖ȳ − Xθ̂‖²/ν₁ with ν₁ = rows − b, and the periods scatter by
-/// PE = Σ_p‖y_p − ȳ‖²/ν₂ with ν₂ = rows (P − 1). Where the model holds, LoF/PE follows F(ν₁, ν₂)
-/// (Draper and Smith, Applied Regression Analysis; per Fourier coefficient because these are
-/// independent for noise of any colour).
+/// On whitened rows (noise of unit variance) the mean period leaves LoF = P‖ȳ − Xθ̂‖²/ν₁ with ν₁ = rows − b, and the
+/// periods scatter by PE = Σ_p‖y_p − ȳ‖²/ν₂ with ν₂ = rows (P − 1). If the model holds, LoF/PE follows F(ν₁, ν₂)
+/// (Draper and Smith, Applied Regression Analysis). The test is made on Fourier coefficients, because these are
+/// independent for noise of any colour.
 ///
-/// The torque's own scatter comes first, and a model that passes against it passes. What is left of the motion's
-/// noise in the regressor is in ȳ − Xθ̂ and not in that scatter: a model that fails is tested again against the
-/// scatter of torque and motion together ([`Floor::TorqueAndMotion`]), with the rows whitened by it, and that answer
-/// counts. Only a model that fails twice is rejected, so that where it is right the chance is at most that of the
-/// second test.
+/// The torque's own scatter comes first, and a model that passes against it passes. The noise of the motion that
+/// remains in the regressor is contained in ȳ − Xθ̂ but not in that scatter. A model that fails is therefore tested
+/// again against the scatter of torque and motion together ([`Floor::TorqueAndMotion`]), with rows whitened by that
+/// scatter, and the second result counts. Only a model that fails twice is rejected, so that a true model is rejected
+/// with at most the probability of the second test.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LackOfFit {
-    /// LoF/PE: 1 where the model explains everything but noise.
+    /// LoF/PE: about 1 where the model explains everything but noise.
     pub statistic: f64,
     /// ν₁ and ν₂.
     pub degrees_of_freedom: [f64; 2],
-    /// Chance of a larger statistic where the model holds.
+    /// Probability of a larger statistic if the model holds.
     pub p_value: f64,
-    /// Whose scatter PE is.
+    /// The scatter that PE measures.
     pub floor: Floor,
 }
 
-/// What scatters between periods.
+/// The quantity whose scatter between periods is the floor of the test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Floor {
     /// The torque as recorded.
     Torque,
-    /// The torque less what the model makes of each period's own motion.
+    /// The torque minus the model's torque for each period's own motion.
     TorqueAndMotion,
 }
 
 impl LackOfFit {
-    /// Below this chance the model does not fit, and a σ that covers noise alone is no claim about
-    /// the truth.
+    /// Below this probability the model does not fit, and a σ that covers noise alone says nothing about the distance
+    /// to the truth.
     pub const REJECT_BELOW: f64 = 1e-3;
 
-    /// Of the whitened rows `problem` in the frequency domain, with two periods or more, whose torque scatters as
+    /// Tests the whitened rows `problem` in the frequency domain, with two periods or more, whose torque scatters as
     /// `floor` says.
     pub(super) fn of(problem: &Problem, theta: &[f64], floor: Floor) -> Self {
         let n = problem.samples;
@@ -60,7 +59,7 @@ impl LackOfFit {
                 lack += periods * (mean - predicted).powi(2);
                 let own = values.map(|y| (y - mean).powi(2)).sum::<f64>();
                 scatter += own;
-                // Rows that are not used are zero.
+                // Unused rows are zero and do not count.
                 rows += f64::from(u8::from(own > 0.0));
             }
         }
@@ -75,7 +74,7 @@ impl LackOfFit {
         Self { statistic, degrees_of_freedom, p_value, floor }
     }
 
-    /// With so many times the statistic.
+    /// The test with `factor` times the statistic.
     pub(super) fn scaled(self, factor: f64) -> Self {
         if factor == 1.0 {
             return self;
@@ -88,7 +87,7 @@ impl LackOfFit {
         self.p_value >= Self::REJECT_BELOW
     }
 
-    /// What to say where it does not.
+    /// A warning where the model does not fit.
     pub fn warning(&self) -> Option<String> {
         let (statistic, by_noise) = (self.statistic, by_noise_in_words(self.p_value));
         (!self.fits()).then(|| {
@@ -100,12 +99,12 @@ impl LackOfFit {
     }
 }
 
-/// What the p-value of a test that asks whether noise explains a difference says.
+/// States in words the p-value of a test whether noise explains a difference.
 pub fn by_noise_in_words(p_value: f64) -> String {
     format!("probability that noise alone gives as much: {}", chance_in_words(p_value))
 }
 
-/// A probability as it is told.
+/// A probability in words.
 fn chance_in_words(p_value: f64) -> String {
     match p_value {
         p if p < f64::MIN_POSITIVE => "below 1e-300".to_owned(),

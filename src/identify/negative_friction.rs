@@ -1,17 +1,17 @@
-//! Whether friction came out as something that pushes.
+//! Remarks on identified Coulomb friction that is negative.
 
 use super::doubt::CERTAIN;
 use crate::base::BaseSet;
 use crate::dynamics::{Parameter, ParameterLayout};
 use crate::robot::Arm;
 
-/// Share of a joint's torque (rms) that is not friction that pushes, however well it is known: steps of an integrator and half a sample
-/// between torque and velocity do as much in simulated logs without noise.
+/// Share of a joint's torque (rms) below which negative friction is ignored, however well it is known: the steps of
+/// an integrator, and half a sample between torque and velocity, cause as much in simulated logs without noise.
 const NOTHING: f64 = 0.01;
 
-/// A remark where the Coulomb friction that was identified, known to `sigma`, is negative, which no drive has, and not next to nothing of
-/// what joints need (`torque_nm`, rms); `None` where none is. Nearly always
-/// the torque of that joint has the other sign, or is that of another one.
+/// A remark where identified Coulomb friction, known to `sigma`, is negative, which no drive has. Values that are
+/// next to nothing compared with the torque that the joints need (`torque_nm`, rms) are ignored; `None` where no
+/// friction is negative. Nearly always the torque of that joint has the other sign, or is that of another joint.
 pub fn negative_friction_remark(
     arm: &Arm,
     set: &BaseSet,
@@ -53,7 +53,7 @@ mod tests {
         let remark = negative_friction_remark(&arm, &set, &theta, &certain, &[1.0; 6]).unwrap();
         assert!(remark.contains("joint 3 (-"), "{remark}");
         assert!(!remark.contains("joint 2"), "{remark}");
-        // It is next to nothing where the joint needs a thousand times as much.
+        // The same value is ignored where the joint needs a thousand times as much torque.
         let torque_nm = [1e3 * theta[third].abs(); 6];
         assert_eq!(negative_friction_remark(&arm, &set, &theta, &certain, &torque_nm), None);
         // Friction that is hardly known may be negative.

@@ -1,4 +1,4 @@
-//! Torque as measured and as a set of parameters predicts it, sample by sample.
+//! Torque as measured and as predicted by a set of parameters, sample by sample.
 
 use super::course::Course;
 use super::identifier::Regression;
@@ -8,7 +8,7 @@ use crate::robot::JointSignals;
 /// Measured and predicted torque along a log or several, with the processing of the regression.
 #[derive(Debug, Clone)]
 pub struct Prediction {
-    /// See [`Course`], s.
+    /// Time, s; see [`Course`].
     pub time_s: Vec<f64>,
     /// Joint velocity, rad/s: to tell motion from standstill.
     pub qd_rad_s: JointSignals,
@@ -22,7 +22,7 @@ pub struct Prediction {
 pub const MOVING_RAD_S: f64 = 0.02;
 
 impl Prediction {
-    /// Of the parameters `theta` along the log behind `regression`.
+    /// Predicts the torque of the parameters `theta` along the log of `regression`.
     pub fn of(regression: &Regression, theta: &[f64]) -> Self {
         let problem = &regression.problem;
         let (n, periods, joints) = (problem.samples, problem.periods, problem.joints());

@@ -1,4 +1,4 @@
-//! From the channels of a log to motion and torque on one clock.
+//! Brings the channels of a log to motion and torque on one clock.
 
 use std::ops::Range;
 
@@ -19,7 +19,7 @@ use crate::signal::{
 /// The channels identification needs of a log, borrowed.
 #[derive(Debug, Clone, Copy)]
 pub struct Measurement<'a> {
-    /// Where it comes from, for messages.
+    /// Where the log comes from, for messages.
     pub source: &'a str,
     /// Increasing time stamps, s.
     pub time_s: &'a [f64],
@@ -32,10 +32,9 @@ pub struct Measurement<'a> {
 }
 
 impl Measurement<'_> {
-    /// Refuses what is too short to be an experiment.
+    /// Refuses a log that is too short to be an experiment.
     ///
-    /// # Errors
-    /// [`IdentifyError::TooShort`].
+    /// # Errors [`IdentifyError::TooShort`].
     pub(crate) fn require_rows(&self) -> Result<(), IdentifyError> {
         let samples = self.time_s.len();
         if samples < FEWEST_SAMPLES {
@@ -68,9 +67,10 @@ pub struct Processing {
     pub torque_filtered: bool,
     /// Period of the motion, s; null for a single run.
     pub period_s: Option<f64>,
-    /// Whole periods used, of several logs together; 1 for a single run, and for several logs that are taken for single runs.
+    /// Whole periods used, summed over several logs; 1 for a single run, and for several logs that are joined into a
+    /// single run.
     pub periods: usize,
-    /// Logs used together; all but the number of periods is said of the first.
+    /// Logs used together; everything here but the number of periods refers to the first of them.
     pub logs: usize,
     /// Whether time stamps were uneven and the log was resampled.
     pub resampled: bool,
@@ -83,43 +83,44 @@ pub struct Processing {
 pub struct Prepared {
     /// One period of the averaged motion, or the whole single run.
     pub motion: Motion,
-    /// Time from the beginning of the log to the first sample used, s: where a motion that repeats does so at first with
-    /// others than its later periods, these are left out.
+    /// Time from the beginning of the log to the first sample used, s. Where the first periods of a repeating motion
+    /// differ from its later ones, they are left out.
     pub lead_in_s: f64,
     /// Torque of all periods one after the other, or of the single run, Nm.
     pub torque_nm: JointSignals,
     /// Scatter of the torque between periods; `None` for a single run.
     pub replicates: Option<Replicates>,
-    /// The motion of every period for itself, with all harmonics up to `highest`; only where
-    /// it was asked for and the motion repeats.
+    /// The motion of every single period, with all harmonics up to `highest`; only where it was asked for and the
+    /// motion repeats.
     pub each_period: Option<Motion>,
     /// Angles and velocities of all periods as they were recorded, rad and rad/s; `None` for a single run.
     pub recorded: Option<[JointSignals; 2]>,
-    /// Where the samples of `torque_nm` lie among the rows, between which the torque is a straight line; only
-    /// where an uneven log of a motion that repeats was put on an even clock.
+    /// Where the samples of `torque_nm` are among the rows of the log, between which the torque was interpolated
+    /// linearly; only where an uneven log of a repeating motion was put on an even clock.
     pub between: Option<BetweenRows>,
-    /// Highest frequency, in cycles per sample, at which the samples of a motion that repeats show what the log does;
-    /// harmonics of `each_period` end there. Of no use for a single run.
+    /// Highest frequency, in cycles per sample, at which the samples of a repeating motion still show the log's
+    /// content; the harmonics of `each_period` end there. Not used for a single run.
     pub highest: f64,
     /// Smallest distance between two recorded angles, per joint, rad.
     pub angle_resolution_rad: Vec<f64>,
-    /// Power density of the velocities' noise, 2 σ²/f_s of white noise, per joint, (rad/s)²/Hz; `None` where periods tell it
-    /// frequency by frequency.
+    /// Power density of the velocities' noise, 2 σ²/f_s for white noise, per joint, (rad/s)²/Hz; `None` where the
+    /// periods reveal the noise frequency by frequency.
     pub velocity_noise: Option<Vec<f64>>,
-    /// ± the largest torque that is read, per joint, where readings are cut off there, Nm.
+    /// Largest magnitude of torque that is read, per joint, where readings are clipped there, Nm.
     pub torque_limit_nm: Vec<Option<f64>>,
     /// How well the averaged acceleration is known, per joint; `None` for a single run.
     pub acceleration: Option<Vec<HarmonicPower>>,
-    /// What was done.
+    /// What was done to the log.
     pub processing: Processing,
-    /// Share of the samples that are in no row of the log, but the mean of other periods at their phase.
+    /// Share of the samples that are missing in the log and were filled in with the mean of the other periods at
+    /// their phase.
     pub filled_share: f64,
     /// What the user should know.
     pub warnings: Vec<String>,
 }
 
 impl Prepared {
-    /// Takes into account that `gaps` of the log were given rows by the other periods
+    /// Accounts for `gaps` in the log that were filled in from the other periods
     /// ([`fill_gaps`](crate::signal::fill_gaps)).
     pub fn count_filled(&mut self, gaps: &[Gap]) {
         let Processing { window_s: [start_s, end_s], rate_hz, .. } = self.processing;
@@ -134,9 +135,10 @@ impl Prepared {
         }
     }
 
-    /// Of P periods with the share f of their samples filled in: the part of them that makes the mean, 1 − f, whose noise has the
-    /// variance σ²/(P (1 − f)), and the part of their P − 1 degrees of freedom that makes their scatter, 1 − f P/(P − 1). Of logs that
-    /// were laid below each other, whose rows count one by one, it is 1 − f both times.
+    /// The parts of P periods that count, where the share f of their samples was filled in. The first, 1 − f,
+    /// determines the mean, whose noise has the variance σ²/(P (1 − f)). The second, 1 − f P/(P − 1), is the part of
+    /// the P − 1 degrees of freedom that determines the scatter. For joined logs, whose rows count one by one, both
+    /// are 1 − f.
     pub fn kept(&self) -> [f64; 2] {
         let (periods, f) = (self.processing.periods as f64, self.filled_share);
         let of_scatter = if periods < 2.0 { f } else { f * periods / (periods - 1.0) };
@@ -146,9 +148,9 @@ impl Prepared {
 
 /// Fewer samples than this are no experiment.
 const FEWEST_SAMPLES: usize = 64;
-/// A log is put on another clock for the sake of this many periods: two tell little of the noise.
+/// Fewest periods for which a log is put on another clock: two reveal little about the noise.
 const FEWEST_PERIODS: usize = 3;
-/// Clocks that are tried until a period is a whole number of samples: each knows its length better.
+/// Number of clocks tried until a period is a whole number of samples: with each the period is known better.
 const CLOCKS: usize = 3;
 
 /// Filters and plans kept from log to log.
@@ -162,7 +164,7 @@ pub struct Preparer {
 }
 
 impl Preparer {
-    /// [`Self::prepare`], and the motion of every period for itself.
+    /// As [`Self::prepare`], with the motion of every single period.
     pub fn prepare_with_periods(
         &mut self,
         m: &Measurement,
@@ -219,8 +221,8 @@ impl Preparer {
         }
     }
 
-    /// The log on a clock that runs so much faster or slower that its period is a whole number of samples, that
-    /// period, and remarks; `None` where no such clock is found.
+    /// Puts the log on a clock that is faster or slower by so much that the period is a whole number of samples.
+    /// Returns the log, that period, and remarks; `None` where no such clock is found.
     fn on_fitting_clock<'a>(
         &mut self,
         m: &Measurement<'a>,
@@ -241,8 +243,8 @@ impl Preparer {
         Ok(None)
     }
 
-    /// How far the motion of every period is off the averaged one, in the harmonics that this keeps; `None` for
-    /// a single run.
+    /// Deviation of every period's motion from the averaged motion, in the harmonics that the average keeps; `None`
+    /// for a single run.
     pub(super) fn deviations(
         &mut self,
         prepared: &Prepared,
@@ -256,7 +258,7 @@ impl Preparer {
         Ok(Some(Motion { q_rad, qd_rad_s, qdd_rad_s2 }))
     }
 
-    /// The plans of the last log, where they are for motions like this one.
+    /// The fit of the last log, where it suits this motion, or a new one.
     fn periodic_fit(
         &mut self,
         samples_per_period: usize,
@@ -412,9 +414,9 @@ fn torque_limit_nm(m: &Measurement) -> Vec<Option<f64>> {
     (0..m.torque_nm.joints()).map(|j| reading_limit(m.torque_nm.joint(j))).collect()
 }
 
-/// The samples of the experiment proper: the motion without standstill at its ends, and without
-/// what a pause separates from it (the arm driving to its start), if one uninterrupted stretch is
-/// most of the motion. Where many moves and pauses alternate, all of them are the experiment.
+/// The samples of the experiment proper: the motion without standstill at its ends, and without a part that a pause
+/// separates from it (the arm driving to its start), provided that one uninterrupted stretch is most of the motion.
+/// Where many moves and pauses alternate, all of them are the experiment.
 fn experiment_window(activity: &Activity) -> Option<Range<usize>> {
     let whole = activity.moving_window(0)?;
     let inside = activity.rests.iter().filter(|r| r.start > whole.start && r.end < whole.end);
@@ -436,7 +438,7 @@ mod tests {
     use rand::{SeedableRng, rngs::ChaCha8Rng};
     use rand_distr::{Distribution, StandardNormal};
 
-    /// Six periods of 10 s, sampled `rate_hz` times a second: time, angles, velocities, torques with a noise of 1 Nm.
+    /// Six periods of 10 s, sampled at `rate_hz`: time, angles, velocities, and torques with a noise of 1 Nm.
     fn log(rate_hz: f64) -> (Vec<f64>, [JointSignals; 3]) {
         let samples = (62.0 * rate_hz) as usize;
         let mut rng = ChaCha8Rng::seed_from_u64(3);
@@ -462,8 +464,8 @@ mod tests {
         prepared_from(&time_s, channels.each_ref())
     }
 
-    /// 80 of 1000 rows: the scatter of 12 000 values of σ = 1 Nm, five degrees of freedom each, is within 5/√(2·10 000) of it,
-    /// where without its correction it would be 5 % below.
+    /// 80 of 1000 rows are filled in. The scatter of 12 000 values of σ = 1 Nm is known to 1/√(2·10 000), of which
+    /// five are allowed; without its correction the scatter would be 5 % too low.
     #[test]
     fn rows_that_were_filled_in_make_no_noise_quieter() {
         let (time_s, channels) = log(100.0);
@@ -487,7 +489,8 @@ mod tests {
         }
     }
 
-    /// Behind a gap at 7 s lies the longest stretch: what is used begins there, and not where the log does, at 100 s by its clock.
+    /// The longest stretch begins after a gap, at 7 s. The samples used begin there, and not where the log does, at
+    /// 100 s by its clock.
     #[test]
     fn time_before_the_longest_stretch_has_passed() {
         let (time_s, channels) = log(100.0);
@@ -509,8 +512,8 @@ mod tests {
         assert!((processing.rate_hz - 100.0).abs() < 1e-9);
     }
 
-    /// 937.3 samples: on a clock 0.03 % slower they are 937. The period is then known as well as that clock, to
-    /// a hundredth of a sample over the log.
+    /// A period of 937.3 samples has 937 on a clock that is 0.03 % slower. The period is then known as well as that
+    /// clock: to a hundredth of a sample over the log.
     #[test]
     fn a_period_between_samples_is_put_on_a_clock_that_fits() {
         let processing = prepared(93.73).processing;

@@ -39,7 +39,7 @@ pub struct Match {
     /// Share of each joint's torque (rms) that the model leaves.
     pub left: Vec<f64>,
     /// Whether Coulomb and viscous friction do positive work on the joint and amount to a tenth of the torque or
-    /// more.
+    /// more, while the model leaves less than 30 % of it.
     pub friction_pushes: Vec<bool>,
     /// `left` without the noise that the log itself shows.
     #[serde(skip)]

@@ -50,8 +50,7 @@ pub struct Misreading {
     reading: Reading,
 }
 
-/// Residual share of a joint's torque (rms, without noise) up to which the model explains that joint: no other
-/// reading is looked for.
+/// Residual share of a joint's torque (rms, without noise) up to which the model counts as explaining that joint.
 const EXPLAINED: f64 = 0.03;
 /// Factor by which the rms residual has to fall, on average, for every joint that is read differently, and on at
 /// least one joint. Friction laws and soft gears yield a factor of 1.5 on real arms, and wrong changes cost more on
