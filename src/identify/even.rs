@@ -18,7 +18,7 @@ const AS_LOGGED: f64 = 0.48;
 /// interpolation keeps 62 % of an amplitude.
 const REWORKED: f64 = 0.37;
 
-/// The rows of a log, including those beside its gaps, and the places of evenly spaced samples among them.
+/// The rows of a log, filled-in rows included, and the places of evenly spaced samples among them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BetweenRows {
     /// Time of the rows, s.

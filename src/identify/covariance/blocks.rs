@@ -9,24 +9,25 @@ use crate::dot::dot;
 use crate::identify::fit::Fit;
 use crate::identify::problem::{Domain, Problem};
 
-/// V = A⁻¹ (Σ_b G̃_b G̃_bᵀ) A⁻¹ with A = XᵀW²X over B blocks of time, whose scores are G_b = Σ_{t in block b} X_tᵀW²e_t.
+/// V = A⁻¹ (Σ_b G̃_b G̃_bᵀ) A⁻¹ with A = XᵀW²X over B blocks of time with the scores G_b = Σ_{t in block b}
+/// X_tᵀW²e_t.
 ///
-/// The fit bends towards every block, most where a parameter is told by few of them, so that residuals are too small by
-/// another factor in each. With S_b = X_bᵀW²X_b, A = L Lᵀ and T_b = L⁻¹ S_b L⁻ᵀ, G̃_b = L (1 − T_b)^(−½) L⁻¹ G_b makes up for
-/// it: of white noise V is then true in the mean (Bell and McCaffrey 2002, their CR2). The degrees of freedom are Satterthwaite's
-/// for white noise, ν_i = (tr Γ)²/tr Γ² with the covariances Γ_bc of what the blocks say of parameter i (Imbens and Kolesár
-/// 2016), and of the parameters together their harmonic mean.
+/// The fit adapts to every block, most where few blocks determine a parameter; residuals are therefore too small, by
+/// another factor in each block. With S_b = X_bᵀW²X_b, A = L Lᵀ and T_b = L⁻¹ S_b L⁻ᵀ, the corrected score G̃_b = L
+/// (1 − T_b)^(−½) L⁻¹ G_b compensates for it: for white noise V is then unbiased (Bell and McCaffrey 2002, their
+/// CR2). The degrees of freedom are Satterthwaite's for white noise, ν_i = (tr Γ)²/tr Γ² with the covariances Γ_bc of
+/// the blocks' contributions to parameter i (Imbens and Kolesár 2016); for all parameters together their harmonic
+/// mean is stated.
 ///
-/// Holds for noise of any colour and any correlation between joints whose memory is short against
-/// a block; made for a single run without repetitions. Unlike the scatter between periods it sees
-/// a model error as noise.
+/// Valid for noise of any colour and any correlation between joints whose memory is short compared with a block;
+/// meant for a single run without repetitions. Unlike the scatter between periods, V counts a model error as noise.
 pub struct BlockCluster;
 
-/// Longer than the memory of motor-current noise (about 1 s), short enough for many blocks.
+/// Length of a block, s: longer than the memory of motor-current noise (about 1 s), short enough for many blocks.
 const BLOCK_S: f64 = 5.0;
-/// In short records blocks may be shorter, down to this, s.
+/// Shortest block, s, to which blocks may shrink in short records.
 const SHORTEST_BLOCK_S: f64 = 1.0;
-/// Fewer blocks would leave the variance to chance.
+/// Fewest blocks: with fewer the variance would be left to chance.
 const LEAST_BLOCKS: usize = 6;
 
 impl CovarianceMethod for BlockCluster {
@@ -41,7 +42,7 @@ impl CovarianceMethod for BlockCluster {
             let needed_s = (least_per_period * problem.periods) as f64 * SHORTEST_BLOCK_S;
             return Err(CovarianceError::TooShort { seconds, needed_s });
         };
-        // The last block of a period takes what is left over.
+        // The last block of a period includes the remainder.
         let per_period = n / length;
         let parts: Vec<Range<usize>> = (0..per_period)
             .map(|k| k * length..if k + 1 == per_period { n } else { (k + 1) * length })
@@ -65,7 +66,7 @@ impl CovarianceMethod for BlockCluster {
     }
 }
 
-/// What a block tells of the whole record.
+/// Share of one block in the information of the whole record.
 struct Leverage {
     /// T_b.
     share: DMatrix<f64>,
@@ -73,7 +74,8 @@ struct Leverage {
     correction: DMatrix<f64>,
 }
 
-/// No residual is made up for more than tenfold: what a single block tells, no scatter shows.
+/// Least eigenvalue of 1 − T_b: no score is enlarged more than tenfold. Where a single block determines a parameter,
+/// no scatter shows its noise.
 const LEAST_LEFT: f64 = 0.01;
 
 impl Leverage {
@@ -103,7 +105,7 @@ impl Leverage {
     }
 }
 
-/// G_b of all blocks, those of one period after those of another.
+/// G_b of all blocks, period after period.
 fn scores_by_block(problem: &Problem, fit: &Fit, parts: &[Range<usize>]) -> Vec<DVector<f64>> {
     let n = problem.samples;
     let residuals = problem.residuals(&fit.theta);
@@ -122,8 +124,8 @@ fn scores_by_block(problem: &Problem, fit: &Fit, parts: &[Range<usize>]) -> Vec<
     scores
 }
 
-/// Harmonic mean of the ν_i. Of parameter i block b says w_bᵀ L⁻¹ G_b with w_b = (1 − T_b)^(−½) L⁻¹ e_i, and of white noise
-/// cov(L⁻¹ G_b, L⁻¹ G_c) = δ_bc T_b − T_b T_c.
+/// Harmonic mean of the ν_i. Block b contributes w_bᵀ L⁻¹ G_b to parameter i, with w_b = (1 − T_b)^(−½) L⁻¹ e_i, and
+/// for white noise cov(L⁻¹ G_b, L⁻¹ G_c) = δ_bc T_b − T_b T_c.
 fn degrees_of_freedom(fit: &Fit, leverages: &[Leverage], periods: usize) -> f64 {
     let b = fit.inverse.nrows();
     let mut inverse_sum = 0.0;
@@ -142,7 +144,7 @@ fn degrees_of_freedom(fit: &Fit, leverages: &[Leverage], periods: usize) -> f64 
         for (at, (own, through)) in told.iter().enumerate() {
             let same = through.norm_squared();
             trace += own - same;
-            // The block itself, its likes in other periods, and the other blocks in all.
+            // The block itself and the same block in other periods; the other blocks follow.
             squares += (own - same).powi(2) + (periods - 1) as f64 * same * same;
             for (_, other) in &told[..at] {
                 squares += 2.0 * periods as f64 * through.dot(other).powi(2);
@@ -153,8 +155,8 @@ fn degrees_of_freedom(fit: &Fit, leverages: &[Leverage], periods: usize) -> f64 
     b as f64 / inverse_sum
 }
 
-/// Samples of a block: of a period of `samples` at least so many `per_period`; short records get shorter blocks rather than none.
-/// `None` where they would be too short.
+/// Samples of a block, so that a period of `samples` has at least `per_period` blocks; short records get shorter
+/// blocks rather than none. `None` where the blocks would be too short.
 fn block_length(samples: usize, per_period: usize, rate_hz: f64) -> Option<usize> {
     let length = ((BLOCK_S * rate_hz) as usize).min(samples / per_period);
     (length > 0 && length >= (SHORTEST_BLOCK_S * rate_hz) as usize).then_some(length)
@@ -164,7 +166,8 @@ fn block_length(samples: usize, per_period: usize, rate_hz: f64) -> Option<usize
 mod tests {
     use super::*;
 
-    /// Of one run six of a second at least; of four periods of 5 s two each; five seconds where the record is long.
+    /// A single run has at least six blocks of a second, four periods of 5 s have two each, and a long record has
+    /// blocks of 5 s.
     #[test]
     fn blocks_lie_in_a_period() {
         assert_eq!(block_length(750, 6, 125.0), Some(125));

@@ -1,4 +1,4 @@
-//! Residuals resampled in blocks.
+//! Bootstrap of residuals in blocks of time.
 
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
@@ -8,16 +8,16 @@ use crate::identify::fit::Fit;
 use crate::identify::problem::{Domain, Problem};
 use crate::random::{Channel, TrialStreams};
 
-/// Covariance of θ* = A⁻¹XᵀW²(Xθ̂ + e*) over 200 series e* made of blocks of the residuals, all joints
-/// together (moving-block bootstrap, Künsch 1989).
+/// Covariance of θ* = A⁻¹XᵀW²(Xθ̂ + e*) over 200 series e* composed of blocks of the residuals, the same blocks for
+/// all joints (moving-block bootstrap, Künsch 1989).
 ///
-/// Holds for noise whose memory is short against a block; sees a model error as noise. The random
-/// numbers are the same for every log.
+/// Valid for noise whose memory is short compared with a block; a model error counts as noise. The random numbers are
+/// the same for every log.
 pub struct BlockBootstrap;
 
 const REPLICATES: usize = 200;
 const BLOCK_S: f64 = 2.0;
-/// Fewer different blocks would resample the same record over and over.
+/// Fewest blocks: fewer different blocks would resample the same record over and over.
 const LEAST_BLOCKS: usize = 6;
 
 impl CovarianceMethod for BlockBootstrap {
@@ -64,7 +64,7 @@ impl CovarianceMethod for BlockBootstrap {
         Ok(Covariance {
             kind: CovarianceKind::Bootstrap,
             matrix: matrix / REPLICATES as f64,
-            // The blocks of the record tell the variance, however often they are drawn.
+            // The blocks of the record determine how well the variance is known, however often they are drawn.
             degrees_of_freedom: (instants / length - 1).min(REPLICATES) as f64,
         })
     }

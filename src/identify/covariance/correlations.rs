@@ -1,18 +1,19 @@
-//! Correlations that a scatter is too short to tell.
+//! Shrinkage of correlations that a scatter has too few degrees of freedom to show.
 
 use nalgebra::DMatrix;
 
 use super::Covariance;
 
 impl Covariance {
-    /// The same σ with correlations (1 − a) r_ik + a t_ik, the found r shrunk towards those of `target`, t; in
-    /// a = Σ_{i≠k} (1 − r_ik²)²/ν / Σ_{i≠k} (r_ik − t_ik)², at most 1, the numerator is what chance alone puts between them
-    /// with ν degrees of freedom (Schäfer and Strimmer 2005, their target C with correlations in place of none).
+    /// Keeps σ and replaces the correlations by (1 − a) r_ik + a t_ik: the found r are shrunk towards those of
+    /// `target`, t. In a = Σ_{i≠k} (1 − r_ik²)²/ν / Σ_{i≠k} (r_ik − t_ik)², at most 1, the numerator is the squared
+    /// difference that chance alone explains with ν degrees of freedom (Schäfer and Strimmer 2005, their target C
+    /// with known correlations in place of none).
     ///
-    /// A scatter with ν degrees of freedom between b parameters says next to nothing of the b(b − 1)/2 correlations where ν is
-    /// not many times b: with fewer than b it is singular, and with 2 (b + 1) squared errors in units of it, eᵀV⁻¹e, add up to 2b
-    /// where they should add up to b. How the parameters hang together is what the motion makes of noise, and that the
-    /// equations know; how large the error of each is the scatter knows.
+    /// A scatter with ν degrees of freedom between b parameters says next to nothing about their b(b − 1)/2
+    /// correlations unless ν is many times b. With fewer than b degrees of freedom it is singular; with 2 (b + 1),
+    /// squared errors in units of it, eᵀV⁻¹e, are 2b on average where they should be b. The equations know how the
+    /// motion correlates the parameters' errors; the scatter knows how large each error is.
     pub(super) fn with_correlations_towards(mut self, target: &DMatrix<f64>) -> Self {
         let [found, known] = [&self.matrix, target].map(correlations);
         let (mut by_chance, mut apart) = (0.0, 0.0);
@@ -21,7 +22,7 @@ impl Covariance {
             by_chance += (1.0 - r * r).powi(2) / self.degrees_of_freedom;
             apart += (r - t).powi(2);
         }
-        // Without any scatter there is nothing to hold on to but the target.
+        // Without any scatter the quotient is NaN, and `min` makes it 1: only the target remains.
         let towards = (by_chance / apart).min(1.0);
         let sigma = self.sigma();
         self.matrix = DMatrix::from_fn(sigma.len(), sigma.len(), |i, k| {
@@ -35,7 +36,7 @@ impl Covariance {
     }
 }
 
-/// m_ik/√(m_ii m_kk); no correlation with what does not scatter.
+/// m_ik/√(m_ii m_kk); 0 for a parameter without scatter.
 pub(super) fn correlations(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     let scale = matrix.diagonal().map(f64::sqrt);
     DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, k| {
@@ -87,7 +88,7 @@ mod tests {
         }
     }
 
-    /// One of many thousand degrees of freedom knows better: a target that is wrong has no weight.
+    /// A scatter with many thousand degrees of freedom is more reliable: a wrong target has no weight.
     #[test]
     fn a_long_scatter_keeps_its_correlations() {
         let found = scatter(&law(0.7), 20_000, 3);
@@ -95,7 +96,7 @@ mod tests {
         let apart = (correlations(&before) - correlations(&law(0.0))).norm_squared();
         let after = found.with_correlations_towards(&law(0.0)).matrix;
         let moved = (correlations(&after) - correlations(&before)).norm_squared();
-        // a is at most the B² pairs of one over ν each.
+        // a is at most the sum of 1/ν over the B² pairs, divided by the squared difference.
         let bound = (B * B) as f64 / 20_000.0 / apart;
         assert!(moved.sqrt() <= bound * apart.sqrt(), "{moved} {bound}");
     }

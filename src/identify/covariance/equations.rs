@@ -1,4 +1,4 @@
-//! What the equations make of noise with a memory.
+//! Covariance that the equations predict for noise with a memory.
 
 use nalgebra::DMatrix;
 
@@ -8,11 +8,13 @@ use crate::identify::fit::Fit;
 use crate::identify::problem::{Domain, Problem};
 use crate::identify::whiten::autoregression;
 
-/// A⁻¹ (Σ_j w_j⁴ X_jᵀΓ_jX_j) A⁻¹ / P with the covariance Γ_j in time of the autoregression that the residuals of joint j are; of
-/// rows that are white already, frequency by frequency, the covariance of [`WeightedLeastSquares`].
+/// A⁻¹ (Σ_j w_j⁴ X_jᵀΓ_jX_j) A⁻¹ / P with the covariance Γ_j in time of the autoregression fitted to the residuals of
+/// joint j. For rows in the frequency domain, which are white already, it is the covariance of
+/// [`WeightedLeastSquares`].
 ///
-/// Γ_j = s_j² H_j H_jᵀ with the innovations' variance s_j² and the lower triangle H_j of the responses to one of them, so that it is
-/// s_j H_jᵀX_j whose products are summed: the columns run backwards through the filter that makes the noise.
+/// Γ_j = s_j² H_j H_jᵀ with the variance s_j² of the innovations and the lower triangle H_j of the responses to one
+/// innovation. The products of s_j H_jᵀX_j are therefore summed: the columns run backwards through the filter that
+/// generates the noise.
 pub(super) fn of_equations(problem: &Problem, fit: &Fit) -> Result<DMatrix<f64>, CovarianceError> {
     if problem.domain == Domain::Frequency {
         return Ok(WeightedLeastSquares.covariance(problem, fit)?.matrix);
@@ -26,7 +28,7 @@ pub(super) fn of_equations(problem: &Problem, fit: &Fit) -> Result<DMatrix<f64>,
     Ok(sandwich(fit, &meat) / problem.periods as f64)
 }
 
-/// x_t + Σ a_i y_{t+i} → y_t, from the last to the first.
+/// Replaces x_t by y_t = x_t + Σ a_i y_{t+i}, from the last to the first.
 fn run_backwards(column: &mut [f64], a: &[f64]) {
     for t in (0..column.len()).rev() {
         let later: f64 = a.iter().zip(&column[t + 1..]).map(|(a, y)| a * y).sum();
@@ -34,7 +36,7 @@ fn run_backwards(column: &mut [f64], a: &[f64]) {
     }
 }
 
-/// Root mean square of e_t − Σ a_i e_{t−i}.
+/// Root mean square of the innovations e_t − Σ a_i e_{t−i}.
 fn innovation_sigma(e: &[f64], a: &[f64]) -> f64 {
     let q = a.len();
     let innovation = |window: &[f64]| {
@@ -49,8 +51,8 @@ fn innovation_sigma(e: &[f64], a: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// H Hᵀ of the responses to one innovation is the covariance of the series: of a first-order autoregression a^|k|/(1 − a²), a
-    /// long way behind the start.
+    /// H Hᵀ of the responses to one innovation is the covariance of the series: for a first-order autoregression
+    /// a^|k|/(1 − a²), far from the start.
     #[test]
     fn columns_run_through_the_covariance_of_the_noise() {
         let a = [0.8];
@@ -71,7 +73,7 @@ mod tests {
     #[test]
     fn innovations_are_what_the_memory_does_not_foretell() {
         let e: Vec<f64> = (0..50).map(|t| 0.5_f64.powi(t)).collect();
-        // All is foretold by half of the last one.
+        // Half of the last value predicts each value exactly.
         assert!(innovation_sigma(&e, &[0.5]) < 1e-12);
         let alternating: Vec<f64> = (0..50).map(|t| if t % 2 == 0 { 3.0 } else { -3.0 }).collect();
         assert_eq!(innovation_sigma(&alternating, &[]), 3.0);

@@ -55,8 +55,9 @@ impl Covariance {
         self.matrix.diagonal().iter().map(|v| v.sqrt()).collect()
     }
 
-    /// What [`squared_distance`] of an error is on average: b ν/(ν − 2), the mean square of Student's t for each
-    /// parameter. `None` with four degrees of freedom and fewer, where it has no variance, and no mean of trials tells it.
+    /// Mean of [`squared_distance`] over errors of the estimate: b ν/(ν − 2), the mean square of Student's t for each
+    /// parameter. `None` with four degrees of freedom or fewer: the squared distance then has no variance, and no
+    /// mean over trials shows its expectation.
     pub fn mean_distance(&self) -> Option<f64> {
         let freedom = self.degrees_of_freedom;
         (freedom > 4.0).then(|| self.matrix.nrows() as f64 * (1.0 + 2.0 / (freedom - 2.0)))
@@ -68,9 +69,9 @@ impl Covariance {
     }
 }
 
-/// eᵀV⁻¹e of an `error` e with the covariance V, `matrix`; `None` where that is singular.
+/// eᵀV⁻¹e of an `error` e with the covariance V, `matrix`; `None` where V is singular.
 pub fn squared_distance(matrix: &DMatrix<f64>, error: &[f64]) -> Option<f64> {
-    // Units differ: only correlations tell whether it is singular.
+    // Units differ: only the matrix of correlations shows whether V is singular.
     let root = correlations(matrix).cholesky()?.unpack();
     let sigma = matrix.diagonal().map(f64::sqrt);
     let error = DVector::from_column_slice(error).component_div(&sigma);
@@ -89,7 +90,7 @@ pub fn quantile_95(degrees_of_freedom: f64) -> f64 {
     student_quantile(0.975, degrees_of_freedom)
 }
 
-/// What a value of Student's t with so many degrees of freedom, one at least, is below with `probability`.
+/// Quantile of Student's t with `degrees_of_freedom`, at least one: a value of t is below it with `probability`.
 pub fn student_quantile(probability: f64, degrees_of_freedom: f64) -> f64 {
     // Beyond 1e6 the quantile differs from the normal one by less than 3e-6.
     match StudentsT::new(0.0, 1.0, degrees_of_freedom.clamp(1.0, 1e6)) {
@@ -136,7 +137,7 @@ impl std::fmt::Display for CovarianceKind {
     }
 }
 
-/// The method asks for something the data do not have.
+/// The reason why a method's covariance does not exist for the data.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum CovarianceError {
     /// Needs replicates.
@@ -176,11 +177,11 @@ pub trait CovarianceMethod {
 }
 
 impl CovarianceKind {
-    /// V of `fit`, which solved `problem`. Where it is a scatter of few parts, its correlations are shrunk towards those that the
-    /// equations make of each joint's noise, as far as chance alone may have put them apart; σ stays as the method has it.
+    /// V of `fit`, which solved `problem`. Where V is a scatter of few parts, its correlations are shrunk towards
+    /// those that the equations predict from each joint's noise, as far as chance alone can explain their difference;
+    /// σ stays as the method computes it.
     ///
-    /// # Errors
-    /// [`CovarianceError`] where the data have not what the method asks for.
+    /// # Errors [`CovarianceError`] where the data lack something that the method needs.
     pub fn covariance(self, problem: &Problem, fit: &Fit) -> Result<Covariance, CovarianceError> {
         let found = self.method().covariance(problem, fit)?;
         if !self.is_scatter() {
@@ -189,7 +190,8 @@ impl CovarianceKind {
         Ok(found.with_correlations_towards(&of_equations(problem, fit)?))
     }
 
-    /// Whether the noise's covariance is counted from what the log shows, of which correlations take more than there is.
+    /// Whether the covariance is estimated from a scatter in the log, which usually has too few degrees of freedom
+    /// for its correlations.
     fn is_scatter(self) -> bool {
         match self {
             Self::Paper | Self::Ols | Self::Wls => false,
@@ -211,7 +213,7 @@ impl CovarianceKind {
     }
 }
 
-/// A⁻¹ Ω A⁻¹ with A = XᵀW²X of one period, A⁻¹ = R⁻¹ R⁻ᵀ.
+/// The sandwich A⁻¹ Ω A⁻¹ with A = XᵀW²X of one period, A⁻¹ = R⁻¹ R⁻ᵀ.
 fn sandwich(fit: &Fit, omega: &DMatrix<f64>) -> DMatrix<f64> {
     let bread = &fit.inverse * fit.inverse.transpose();
     &bread * omega * &bread

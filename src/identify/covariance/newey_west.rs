@@ -1,4 +1,4 @@
-//! Heteroscedasticity and autocorrelation consistent.
+//! Covariance that is consistent under heteroscedasticity and autocorrelation (HAC).
 
 use nalgebra::DMatrix;
 
@@ -7,13 +7,12 @@ use super::{Covariance, CovarianceError, CovarianceKind, CovarianceMethod, sandw
 use crate::identify::fit::Fit;
 use crate::identify::problem::{Domain, Problem};
 
-/// V = A⁻¹ Ω A⁻¹ · T/(T − b), Ω = Σ_{|k| ≤ L} (1 − |k|/(L + 1)) Σ_t g_t g_{t−k}ᵀ over the scores
-/// g_t = X_tᵀW²e_t of T instants, all joints added up (Newey and West 1987; Driscoll and Kraay 1998
-/// for the sum over joints).
+/// V = A⁻¹ Ω A⁻¹ · T/(T − b), Ω = Σ_{|k| ≤ L} (1 − |k|/(L + 1)) Σ_t g_t g_{t−k}ᵀ over the scores g_t = X_tᵀW²e_t of T
+/// instants, summed over the joints (Newey and West 1987; Driscoll and Kraay 1998 for the sum over joints).
 ///
-/// Holds for noise whose memory is short against L samples. Sees a model error as noise.
+/// Valid for noise whose memory is short compared with L samples. A model error counts as noise.
 pub struct NeweyWest {
-    /// Lags L; `None`: Andrews' (1991) bandwidth for the Bartlett kernel, each score a first-order
+    /// Number of lags L; `None`: Andrews' (1991) bandwidth for the Bartlett kernel, each score taken as a first-order
     /// autoregression.
     pub lags: Option<usize>,
 }
@@ -37,14 +36,15 @@ impl CovarianceMethod for NeweyWest {
         Ok(Covariance {
             kind: CovarianceKind::Hac,
             matrix: sandwich(fit, &omega) * correction,
-            // Of a Bartlett estimate: 1.5 T/L (Priestley 1981, its variance 2/3 · L/T · 2).
+            // Degrees of freedom of a Bartlett estimate: 1.5 T/L (Priestley 1981: its relative variance is 2/3 · L/T
+            // · 2).
             degrees_of_freedom: 1.5 * t / (lags + 1) as f64,
         })
     }
 }
 
-/// Σ_{|k| ≤ L} (1 − |k|/(L + 1)) Σ_t g_t g_{t−k}ᵀ, which is 1/(L + 1) Σ_s B_s B_sᵀ over the sums B_s
-/// of all windows of L + 1 instants, those that hang over the ends included.
+/// Σ_{|k| ≤ L} (1 − |k|/(L + 1)) Σ_t g_t g_{t−k}ᵀ, computed as 1/(L + 1) Σ_s B_s B_sᵀ over the sums B_s of all
+/// windows of L + 1 instants, including those that reach beyond the ends.
 fn bartlett(scores: &DMatrix<f64>, lags: usize) -> DMatrix<f64> {
     let (instants, b) = scores.shape();
     let mut windows = DMatrix::zeros(instants + lags, b);
@@ -59,8 +59,8 @@ fn bartlett(scores: &DMatrix<f64>, lags: usize) -> DMatrix<f64> {
     windows.tr_mul(&windows) / (lags + 1) as f64
 }
 
-/// L = 1.1447 (α T)^⅓, α = Σ 4ρ²s⁴/((1 − ρ)⁶(1 + ρ)²) / Σ s⁴/(1 − ρ)⁴, with autocorrelation ρ and
-/// innovation variance s² of each score in units of its own scale (equal weights).
+/// Andrews' bandwidth L = 1.1447 (α T)^⅓, α = Σ 4ρ²s⁴/((1 − ρ)⁶(1 + ρ)²) / Σ s⁴/(1 − ρ)⁴, with the autocorrelation ρ
+/// and the innovation variance s² of each score in units of its own scale (equal weights).
 fn andrews(scores: &DMatrix<f64>) -> usize {
     let instants = scores.nrows();
     let (mut numerator, mut denominator) = (0.0, 0.0);

@@ -4,8 +4,7 @@ use super::{Covariance, CovarianceError, CovarianceKind, CovarianceMethod};
 use crate::identify::fit::Fit;
 use crate::identify::problem::Problem;
 
-/// V = s² (XᵀX)⁻¹, s² = ‖W e‖²/(m − b): white noise of one standard deviation on every (weighted)
-/// equation.
+/// V = s² (XᵀX)⁻¹, s² = ‖W e‖²/(m − b), for white noise of one standard deviation on all (weighted) equations.
 pub struct OrdinaryLeastSquares;
 
 impl CovarianceMethod for OrdinaryLeastSquares {

@@ -6,8 +6,8 @@ use crate::identify::problem::Problem;
 
 /// σ_i = √[(Θ_BᵀΘ_B)⁻¹]_ii, the paper's (20).
 ///
-/// The noise variance is left out: it is a standard deviation only for unweighted least squares
-/// and white torque noise of exactly 1 Nm on every joint.
+/// The noise variance is left out. σ_i is a standard deviation only for unweighted least squares and white torque
+/// noise of exactly 1 Nm on every joint.
 pub struct Paper;
 
 impl CovarianceMethod for Paper {

@@ -6,11 +6,11 @@ use super::{Covariance, CovarianceError, CovarianceKind, CovarianceMethod};
 use crate::identify::fit::Fit;
 use crate::identify::problem::Problem;
 
-/// V = cov(θ̂_p)/P over the estimates of the P periods alone, with Student's t of P − 1 degrees of
+/// V = cov(θ̂_p)/P over the estimates θ̂_p from each of the P periods alone, with Student's t of P − 1 degrees of
 /// freedom.
 ///
-/// Holds for noise of any colour and any correlation between joints, as long as it is independent
-/// from period to period. What repeats, noise or not, drops out: a model error does not widen it.
+/// Valid for noise of any colour and any correlation between joints, as long as it is independent from period to
+/// period. Everything that repeats, noise or not, drops out: a model error does not widen V.
 pub struct PeriodReplicates;
 
 impl CovarianceMethod for PeriodReplicates {

@@ -1,4 +1,4 @@
-//! What every instant contributes to the normal equations.
+//! Contribution of every instant to the normal equations.
 
 use nalgebra::DMatrix;
 

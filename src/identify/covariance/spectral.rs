@@ -10,15 +10,14 @@ use crate::identify::problem::{Domain, Problem};
 use crate::identify::whiten::Spectrum;
 use crate::signal::subtract_mean_period;
 
-/// V = Σ_k Σ_p z_kp z_kpᵀ / (P(P − 1)), z_kp = A⁻¹ X_kᵀW²(Y_pk − Ȳ_k): what the deviation of period
-/// p at harmonic k does to θ̂.
+/// V = Σ_k Σ_p z_kp z_kpᵀ / (P(P − 1)), z_kp = A⁻¹ X_kᵀW²(Y_pk − Ȳ_k): the effect on θ̂ of the deviation of period p
+/// at harmonic k.
 ///
-/// Holds, like the scatter between periods, for noise of any colour and any correlation between
-/// joints. It adds up harmonic by harmonic, which are independent as soon as the noise's memory is
-/// short against the period, and so has many more degrees of freedom: parameter i has
-/// ν_i = (Σ_k c_ik)² / Σ_k c_ik²/(ν_k + 2), with its share c_ik of the variance and the ν_k = 2(P − 1)
-/// degrees of freedom of one harmonic (Satterthwaite's formula for estimated shares). Stated is the
-/// harmonic mean of the ν_i.
+/// Like the scatter between periods, V is valid for noise of any colour and any correlation between joints. It adds
+/// up harmonics, which are independent as soon as the noise's memory is short compared with the period, and so has
+/// many more degrees of freedom. Parameter i has ν_i = (Σ_k c_ik)² / Σ_k c_ik²/(ν_k + 2), with the share c_ik of
+/// harmonic k in its variance and the ν_k = 2(P − 1) degrees of freedom of one harmonic (Satterthwaite's formula for
+/// estimated shares). The harmonic mean of the ν_i is stated.
 pub struct SpectralSandwich;
 
 impl CovarianceMethod for SpectralSandwich {

@@ -5,9 +5,9 @@ use crate::identify::fit::Fit;
 use crate::identify::problem::Problem;
 use nalgebra::{DMatrix, DMatrixView};
 
-/// V = A⁻¹ (Σ_j w_j⁴ s_j² X_jᵀX_j) A⁻¹ / P, A = XᵀW²X: white noise of its own standard deviation
-/// s_j on every joint. With the weights of weighted least squares, w_j = 1/s_j, this is the usual
-/// (XᵀW²X)⁻¹ / P (Gautier 1997); with unit weights it is the honest σ of ordinary least squares.
+/// V = A⁻¹ (Σ_j w_j⁴ s_j² X_jᵀX_j) A⁻¹ / P, A = XᵀW²X, for white noise with its own standard deviation s_j on every
+/// joint. With the weights of weighted least squares, w_j = 1/s_j, this is the usual (XᵀW²X)⁻¹ / P (Gautier 1997);
+/// with unit weights it is the correct covariance of ordinary least squares.
 pub struct WeightedLeastSquares;
 
 impl CovarianceMethod for WeightedLeastSquares {
@@ -29,7 +29,7 @@ impl CovarianceMethod for WeightedLeastSquares {
     }
 }
 
-/// Σ_j w_j⁴ s_j² X̃_jᵀX̃_j of one period, where `colour` makes X̃_j of the columns of joint j.
+/// Σ_j w_j⁴ s_j² X̃_jᵀX̃_j of one period, where `colour` turns the columns of joint j into X̃_j.
 pub(super) fn meat(
     problem: &Problem,
     fit: &Fit,

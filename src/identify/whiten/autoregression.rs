@@ -1,4 +1,4 @@
-//! Noise with a memory of its own at every joint.
+//! Whitens noise that is correlated in time, joint by joint.
 
 use crate::identify::fit::Fit;
 use crate::identify::problem::Problem;
@@ -40,10 +40,10 @@ pub fn autoregression(e: &[f64]) -> Vec<f64> {
     best
 }
 
-/// Every joint's columns and torque behind the filter 1 − Σ a_i z⁻ⁱ of its own residuals in `fit`,
-/// written into `out` (same plan). A motion that repeats goes round: its filtered columns are exact
-/// and only the first samples of the noise are joined to its last; of a single run the first samples
-/// are lost.
+/// Filters every joint's columns and torque by 1 − Σ a_i z⁻ⁱ, estimated from the joint's own residuals in `fit`, and
+/// writes them into `out` (same plan). A repeating motion is filtered as periodic: its columns are exact, and only at
+/// the first samples does the filter combine noise with that of the last ones. Of a single run the first samples are
+/// lost.
 pub fn prewhiten(problem: &Problem, fit: &Fit, out: &mut Problem) {
     let n = problem.samples;
     let residuals = problem.residuals(&fit.theta);
@@ -90,7 +90,7 @@ mod tests {
         }
         let a = autoregression(&e);
         assert_eq!(a.len(), 2);
-        // σ of a coefficient is √((1 − a₂²)/n) = 0.7 %; 5 σ.
+        // σ of a coefficient is √((1 − a₂²)/n) = 0.7 %; the bound is 5 σ.
         assert!((a[0] - 0.6).abs() < 0.035 && (a[1] - 0.25).abs() < 0.035, "{a:?}");
         let mut white = Vec::new();
         filter_round(&e, &a, 0, &mut white);

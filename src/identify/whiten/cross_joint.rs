@@ -1,13 +1,13 @@
-//! Noise that the joints share.
+//! Whitens noise that is correlated between joints.
 
 use nalgebra::DMatrix;
 
 use crate::identify::fit::Fit;
 use crate::identify::problem::Problem;
 
-/// Equations of the joints weighted and mixed so that the residuals of `fit` are uncorrelated
-/// between joints at one instant (Zellner 1962, seemingly unrelated regressions), written into `out`
-/// with the cumulative plan.
+/// Weights and mixes the joints' equations so that the residuals of `fit` are uncorrelated between joints at each
+/// instant (Zellner 1962, seemingly unrelated regressions), and writes them into `out`, which has the cumulative
+/// plan.
 pub fn decorrelate(problem: &Problem, fit: &Fit, out: &mut Problem) {
     let residuals = problem.residuals(&fit.theta);
     let joints = problem.joints();
@@ -18,13 +18,13 @@ pub fn decorrelate(problem: &Problem, fit: &Fit, out: &mut Problem) {
     mix(problem, &weights, &decorrelation(&correlation(&products)), out);
 }
 
-/// Standard deviation of a joint's noise beside what the others tell of it, over its own. Below it rows would be weighed by 10⁴ for what may
-/// be rounding of a channel that was copied.
+/// Least standard deviation of the part of a joint's noise that the other joints do not predict, over that of all its
+/// noise. Below it, rows would be weighted by 10⁴ for what may be the rounding of a copied channel.
 const ALL_BUT_ALIKE: f64 = 1e-4;
 
-/// U, upper triangular, with U C Uᵀ = 1 for a correlation matrix C: row j mixes joint j with those
-/// behind it only, so that wrist equations keep their few columns. The identity where one joint's noise is that of the others to within
-/// [`ALL_BUT_ALIKE`].
+/// U, upper triangular, with U C Uᵀ = 1 for a correlation matrix C: row j mixes joint j only with the joints after
+/// it, so that wrist equations keep their few columns. The identity where the noise of one joint equals a combination
+/// of the others' to within [`ALL_BUT_ALIKE`].
 pub fn decorrelation(correlation: &DMatrix<f64>) -> DMatrix<f64> {
     let n = correlation.nrows();
     let reversed = DMatrix::from_fn(n, n, |i, k| correlation[(n - 1 - i, n - 1 - k)]);
@@ -37,7 +37,7 @@ pub fn decorrelation(correlation: &DMatrix<f64>) -> DMatrix<f64> {
     }
 }
 
-/// Correlation of the joints from sums of products of their deviations; a joint without any is
+/// Correlation of the joints from the sums of products of their deviations; a joint without deviations is
 /// uncorrelated.
 pub fn correlation(products: &DMatrix<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(products.nrows(), products.nrows(), |i, k| {

@@ -1,11 +1,11 @@
-//! As few rows as the motion needs.
+//! Thins a problem to as few rows as the motion needs.
 
 use crate::identify::problem::Problem;
 use crate::signal::{Scratch, SignalError, ZeroPhase};
 
-/// Every column and the torque behind one zero-phase low-pass at `cutoff_hz`, then every nd-th row
-/// with nd = f_s/(2 cutoff) (Gautier 1997), written into `out` (same plan). Of a motion that repeats
-/// nd is the next smaller divisor of the period.
+/// Filters every column and the torque by one zero-phase low-pass at `cutoff_hz`, keeps every nd-th row with nd =
+/// f_s/(2 cutoff) (Gautier 1997), and writes them into `out` (same plan). For a repeating motion nd is reduced to the
+/// next divisor of the period's samples.
 pub fn decimate(
     problem: &Problem,
     cutoff_hz: f64,
@@ -21,7 +21,7 @@ pub fn decimate(
     while periods > 1 && !n.is_multiple_of(every) {
         every -= 1;
     }
-    // A single run loses its ends; a repeated motion is continued round them.
+    // A single run loses its ends; a repeating motion is continued periodically.
     let (before, kept) = if periods > 1 {
         (edge.min(n), 0..n * periods)
     } else {

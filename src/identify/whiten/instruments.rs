@@ -1,4 +1,4 @@
-//! Instruments: equations freed of the noise in the measured motion.
+//! Instrumental variables: equations free of the bias by noise in the measured motion.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -9,18 +9,18 @@ use crate::identify::problem::Problem;
 use crate::robot::JointSignals;
 use crate::signal::{Scratch, SignalError, ZeroPhase, central_4};
 
-/// Cutoff of the instruments' motion over that of the regression: the noise in an acceleration grows
-/// as f², its power up to f as f³, so that a quarter leaves 1/64 of the noise that X and Z share.
+/// Cut-off of the instruments' motion over that of the regression. The noise in an acceleration grows as f², its
+/// power up to f as f⁵, so that a quarter of the cut-off leaves next to nothing of the noise that X and Z share.
 pub const SMOOTHER: f64 = 0.25;
 
-/// The motion behind a zero-phase low-pass at `cutoff_hz`, with the derivative of its own velocity: what the instruments Z are
-/// evaluated along, at [`SMOOTHER`] times the cutoff of the regression.
+/// Filters the motion by a zero-phase low-pass at `cutoff_hz` and differentiates the filtered velocity. The
+/// instruments Z are evaluated along such a motion, at [`SMOOTHER`] times the cut-off of the regression.
 ///
-/// Janot, Vandanjon and Gautier (IEEE Trans. Control Systems Technology 22 (2014) 132–145) take the
-/// motion of the identified arm simulated under its controller. Where the controller is not known, a
-/// computed-torque controller made of the identified model itself is the natural choice; the arm and
-/// its model are then the same, and the simulation returns the motion that it is told to follow,
-/// which is this one. A motion that repeats is continued round its ends.
+/// Janot, Vandanjon and Gautier (IEEE Trans. Control Systems Technology 22 (2014) 132–145) use the motion of the
+/// identified arm simulated under its controller. Where the controller is not known, the natural choice is a
+/// computed-torque controller made of the identified model itself. The arm and its model are then the same, and the
+/// simulation returns the motion that it is commanded to follow, which is this one. A repeating motion is continued
+/// periodically beyond its ends.
 pub fn smoothed(
     motion: &Motion,
     repeats: bool,
@@ -31,7 +31,8 @@ pub fn smoothed(
 ) -> Result<Motion, SignalError> {
     let filter = ZeroPhase::new(cutoff_hz, order, rate_hz)?;
     let n = motion.samples();
-    // One edge is where the guess about what lies beyond fades to 1 %: three leave 1e-6.
+    // After one edge the influence of the guess about the values beyond the ends has faded to 1 %; three edges leave
+    // 1e-6.
     let around = if repeats { (3 * filter.edge_samples()).min(n) } else { 0 };
     let mut longer = Vec::with_capacity(n + 2 * around);
     let mut slope = Vec::new();
@@ -59,14 +60,14 @@ pub fn smoothed(
     Ok(Motion { q_rad, qd_rad_s, qdd_rad_s2 })
 }
 
-/// Writes equations into `out`, every joint with all columns, whose least squares is the estimate by
-/// instrumental variables of `problem`, θ̂ = (ZᵀW²X)⁻¹ ZᵀW²ȳ with Z the regressor in `instruments`
-/// (same rows) and a weight per joint.
+/// Writes equations into `out` (every joint with all columns) whose least-squares solution is the
+/// instrumental-variables estimate of `problem`, θ̂ = (ZᵀW²X)⁻¹ ZᵀW²ȳ. Z is the regressor in `instruments` (same
+/// rows), W one weight per joint.
 ///
-/// These are W X̂ with X̂ = Z Π, Π = (ZᵀW²Z)⁻¹ ZᵀW²X, the part of X that Z explains (two stages of
-/// least squares), and as torque W (y − X θ̂) + W X̂ θ̂. What least squares leaves of them is the residual
-/// of the original equations, so that every covariance of least squares is that of the instruments:
-/// (X̂ᵀW²X̂)⁻¹ = (ZᵀW²X)⁻¹ ZᵀW²Z (XᵀW²Z)⁻¹.
+/// The regressor is W X̂ with X̂ = Z Π, Π = (ZᵀW²Z)⁻¹ ZᵀW²X, the part of X that Z explains (two-stage least squares);
+/// the torque is W (y − X θ̂) + W X̂ θ̂. The residuals of least squares are then those of the original equations, so
+/// that every covariance of least squares becomes that of the instrumental variables: (X̂ᵀW²X̂)⁻¹ = (ZᵀW²X)⁻¹ ZᵀW²Z
+/// (XᵀW²Z)⁻¹.
 pub fn instrument(
     problem: &Problem,
     instruments: &Problem,
@@ -134,7 +135,7 @@ mod tests {
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
 
-    /// y = 2 x + noise with x read through noise a third of its size.
+    /// y = 2 x + noise, with x read under noise a third of its size.
     #[test]
     fn noise_in_the_regressor_does_not_attenuate() {
         let n = 20_000;
@@ -152,11 +153,11 @@ mod tests {
         instrument(&problem, &instruments, &[1.0], &mut out).unwrap();
         let slope =
             |p: &Problem| dot(&p.panels[0].x, &p.panels[0].y) / dot(&p.panels[0].x, &p.panels[0].x);
-        // Least squares is attenuated by 0.5/(0.5 + 0.0625). σ of the slope by instruments is the
-        // residual, √(0.1² + 0.5²), over √(n/2): 0.5 %; 5 σ.
+        // Least squares is attenuated by 0.5/(0.5 + 0.0625). σ of the slope by instruments is the residual, √(0.1² +
+        // 0.5²), over √(n/2): 0.5 %; the bound is 5 σ.
         assert!((slope(&problem) - 1.78).abs() < 0.02, "{}", slope(&problem));
         assert!((slope(&out) - 2.0).abs() < 0.025, "{}", slope(&out));
-        // What is left is the residual of the original equations.
+        // The residual is that of the original equations.
         let theta = slope(&out);
         let original: f64 = problem.residual_squares(&[theta])[0];
         assert!((out.residual_squares(&[theta])[0] / original - 1.0).abs() < 1e-9);

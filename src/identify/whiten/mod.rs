@@ -1,8 +1,8 @@
-//! Problems with the same parameters and whiter noise.
+//! Transforms problems into problems with the same parameters and whiter noise.
 //!
-//! Enters: a [`Problem`](super::problem::Problem). Leaves: another one, whose rows are combinations
-//! of its rows chosen so that noise is alike and independent from row to row: plain least squares on
-//! it is the weighted least squares of the one that entered.
+//! Enters: a [`Problem`](super::problem::Problem). Leaves: another one, whose rows are combinations of the first
+//! one's rows, chosen so that the noise has equal variance and is independent from row to row. Plain least squares on
+//! the second problem is weighted least squares on the first.
 
 mod autoregression;
 mod cross_joint;

@@ -1,4 +1,4 @@
-//! Every frequency and joint weighted by the noise that the periods show there.
+//! Weights every frequency and joint by the noise that the periods show there.
 
 use nalgebra::DMatrix;
 
@@ -9,25 +9,25 @@ use crate::signal::{HarmonicPower, subtract_mean_period};
 
 /// Whitening by the scatter between periods.
 ///
-/// With the Fourier coefficients Y_pk of period p and their mean Ȳ_k, the noise of joint j at
-/// harmonic k has the variance s²_jk = Σ_p |Y_jpk − Ȳ_jk|²/(P − 1), averaged over the neighbouring
-/// harmonics (k ± max(3, k/4), k itself left out), and the joints have the correlation C of the
-/// deviations over s, pooled over all harmonics. Rows become U diag(1/s_k) · row with U C Uᵀ = 1.
+/// With the Fourier coefficients Y_pk of period p and their mean Ȳ_k, the noise of joint j at harmonic k has the
+/// variance s²_jk = Σ_p |Y_jpk − Ȳ_jk|²/(P − 1), averaged over the neighbouring harmonics (k ± max(3, k/4), without k
+/// itself). The joints have the correlation C of the deviations over s, pooled over all harmonics. Rows become U
+/// diag(1/s_k) · row with U C Uᵀ = 1.
 ///
-/// Rows end at 0.08 of the sampling rate. Near a reversal of friction the acceleration is a pulse
-/// shorter than a sample, of which the derivative of the sampled velocity holds a share that falls with
-/// frequency: the torque it lacks is as large at any frequency, and above a few hertz, where the motion
-/// has little else, it is most of what a row says about Coulomb friction. Noise that is quiet there
-/// would weigh it up (bias of 1 σ from rows up to 0.2 f_s under a noise with a memory of 76 ms, 0.1 σ
-/// up to 0.08 f_s, for 4 % of σ). Rows end no later than 0.8 of the harmonics kept in the acceleration,
-/// because what was cut off it comes down by the harmonics of the mass matrix. Those of joint j end
-/// earlier where its acceleration is noisy: noise in a column attenuates what stands beside it. Noise in
-/// q̈ grows with the square of the frequency while the motion fades, so that they end as soon as the
-/// noise left in the averaged acceleration, weighted like the rows, is more than [`HARMLESS_NOISE`] of it.
+/// Rows end at 0.08 of the sampling rate. Near a reversal of friction the acceleration is a pulse shorter than a
+/// sample, and the derivative of the sampled velocity contains a share of it that falls with frequency. The missing
+/// torque is equally large at any frequency; above a few hertz, where the motion has little else, it dominates what a
+/// row says about Coulomb friction. Where the noise is low, such rows would get large weights (rows up to 0.2 f_s
+/// caused a bias of 1 σ under noise with a memory of 76 ms; rows up to 0.08 f_s cause 0.1 σ, for 4 % of σ). Rows end
+/// no later than 0.8 of the harmonics kept in the acceleration, because the harmonics of the mass matrix carry the
+/// missing part of the acceleration down to lower frequencies. The rows of joint j end earlier where its acceleration
+/// is noisy: noise in a column attenuates its parameter. Noise in q̈ grows with the square of the frequency while the
+/// motion fades. The rows therefore end as soon as the noise left in the averaged acceleration, weighted like the
+/// rows, is more than [`HARMLESS_NOISE`] of it.
 ///
-/// For Gaussian noise Ȳ and the scatter are independent, so that least squares on the whitened rows
-/// is unbiased whatever the scatter is; leaving k out of its own weight keeps the scatter of the
-/// whitened rows an honest measure of their noise.
+/// For Gaussian noise Ȳ and the scatter are independent, so that least squares on the whitened rows is unbiased
+/// whatever the scatter is. Because k is left out of its own weight, the scatter of the whitened rows remains an
+/// unbiased measure of their noise.
 #[derive(Default)]
 pub struct ReplicateWhitening {
     spectrum: Spectrum,
@@ -35,26 +35,26 @@ pub struct ReplicateWhitening {
     weights: Vec<Vec<f64>>,
 }
 
-/// Highest frequency of the equations used over the sampling rate.
+/// Highest frequency of the rows used, over the sampling rate.
 const ROWS_END: f64 = 0.08;
-/// Noise in the acceleration that rows may have, as a share of its mean square. Ten times as much (velocity
-/// noise of 0.01 rad/s, eight periods) attenuated the inertia about joint 1 by 5e-5, a tenth of its σ; half as
-/// much costs 1 % of σ under noise with a memory.
+/// Largest noise in the acceleration of the rows used, as a share of its mean square. Ten times as much (velocity
+/// noise of 0.01 rad/s, eight periods) attenuated the inertia about joint 1 by 5e-5, a tenth of its σ; half as much
+/// costs 1 % of σ under noise with a memory.
 const HARMLESS_NOISE: f64 = 5e-6;
-/// Share of the harmonics of the acceleration whose equations are used.
+/// Share of the acceleration's harmonics whose rows are used.
 const USED_HARMONICS: f64 = 0.8;
-/// Always used, so that a motion of few harmonics still gives equations for all parameters.
+/// Harmonics that are always used, so that a motion of few harmonics still gives equations for all parameters.
 const LEAST_HARMONICS: usize = 16;
 /// Neighbours on either side that a weight is averaged over: at least these …
 const LEAST_NEIGHBOURS: usize = 3;
 /// … and this part of the harmonic's own number.
 const NEIGHBOUR_SHARE: usize = 4;
-/// Weights of rows almost without noise are bounded by this much of the noisiest row's noise.
+/// Rows almost without noise are weighted as if they had this share of the noisiest row's noise.
 const LEAST_NOISE: f64 = 1e-9;
 
 impl ReplicateWhitening {
-    /// Writes the whitened mean and harmonics of `problem` into `out`, which has the cumulative plan
-    /// of `problem`. Needs two periods or more and the power of the averaged acceleration per joint.
+    /// Writes the whitened mean and harmonics of `problem` into `out`, which has the cumulative plan of `problem`.
+    /// Needs two periods or more, and the power of the averaged acceleration per joint.
     pub fn whiten(&mut self, problem: &Problem, acceleration: &[HarmonicPower], out: &mut Problem) {
         let moving = acceleration.iter().map(|power| power.noise.len()).filter(|h| *h > 0);
         let highest = moving.min().unwrap_or(0) as f64;
@@ -92,7 +92,7 @@ impl ReplicateWhitening {
     }
 }
 
-/// Weights of the harmonics behind the last one whose acceleration can be trusted set to zero.
+/// Sets the weights of all harmonics above the last one whose acceleration can be trusted to zero.
 fn cut(weights: &mut [f64], acceleration: &HarmonicPower) {
     let used = (weights.len() / 2).min(acceleration.noise.len());
     let (mut estimate, mut noise) = (0.0, 0.0);
@@ -107,7 +107,7 @@ fn cut(weights: &mut [f64], acceleration: &HarmonicPower) {
     }
 }
 
-/// Variances per row replaced by the mean over neighbouring harmonics without their own.
+/// Replaces the variance of each row by the mean over the neighbouring harmonics, without its own.
 fn smooth(variances: &mut [f64]) {
     let last = variances.len() / 2;
     let first_row = |h: usize| if h == 0 { 0 } else { 2 * h - 1 };

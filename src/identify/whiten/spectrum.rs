@@ -1,10 +1,10 @@
-//! A periodic problem, frequency by frequency.
+//! Transforms a periodic problem into the frequency domain.
 
 use fourier::{Complex64, Forward, RealToComplex};
 
 use crate::identify::problem::{Domain, Problem};
 
-/// Brings problems in time into the frequency domain.
+/// Transforms problems from the time domain into the frequency domain.
 #[derive(Default)]
 pub struct Spectrum {
     plan: Option<Forward>,
