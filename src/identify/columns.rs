@@ -54,7 +54,7 @@ impl ColumnPlan {
         Self { joints, base_count }
     }
 
-    /// The plan of equations in which joint j's has those of all joints behind it mixed in.
+    /// The plan of equations in which that of joint j is mixed with those of all later joints.
     pub fn cumulative(&self) -> Self {
         let joints: Vec<Vec<usize>> = (0..self.joints())
             .map(|j| {

@@ -1,19 +1,19 @@
-//! When the rows of a regression were recorded, and how fast the joints moved then.
+//! Times and joint velocities of the rows of a regression.
 
 use super::identifier::Regression;
 use crate::robot::JointSignals;
 
-/// Time and velocity of every row, all periods.
+/// Time and velocity of every row, of all periods.
 #[derive(Debug, Clone)]
 pub struct Course {
-    /// On the log's clock, s; of several logs on that of the first, one log behind the other.
+    /// Time on the log's clock, s; for several logs on the clock of the first, one log after the other.
     pub time_s: Vec<f64>,
-    /// Joints × rows, rad/s.
+    /// Joint velocities, joints × rows, rad/s.
     pub qd_rad_s: JointSignals,
 }
 
 impl Course {
-    /// Of a single log.
+    /// The course of a single log.
     pub(super) fn of(regression: &Regression) -> Self {
         let (n, periods) = (regression.problem.samples, regression.problem.periods);
         let processing = &regression.prepared.processing;
@@ -29,7 +29,7 @@ impl Course {
         }
     }
 
-    /// Puts `other` behind this one, a step of its own later.
+    /// Appends `other` after this course, one of its own steps later.
     pub(super) fn append(&mut self, other: &Self) {
         if let (Some(last), [first, second, ..]) = (self.time_s.last(), &other.time_s[..]) {
             let shift_s = last + (second - first) - first;

@@ -1,4 +1,4 @@
-//! Whether what was identified is the arm that it is said to be, or any.
+//! Checks whether the identified parameters are those of the stated arm, or of any arm at all.
 
 use super::covariance::Covariance;
 use super::gravity::gravity_remark;
@@ -6,23 +6,24 @@ use super::negative_friction::negative_friction_remark;
 use crate::base::BaseSet;
 use crate::robot::Arm;
 
-/// σ from none from which on noise is no excuse for a sign: of all joints of a hundred thousand arms it turns one.
+/// Distance from zero, in σ, beyond which noise does not explain the sign of a parameter: noise alone turns a sign
+/// with a probability of 3e-7.
 pub(super) const CERTAIN: f64 = 5.0;
 
-/// A reason not to take what was identified for what it is said to be.
+/// A reason to doubt that the identified parameters are those of the stated arm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Doubt {
-    /// Whether no arm at all has it, or none that is mounted as described: drives that push, or gravity that pulls the other way. Else
-    /// it may be another arm, or another load.
+    /// Whether no arm, or no arm mounted as described, has such parameters: drives that push, or gravity that pulls
+    /// the other way. Otherwise the log may be of another arm, or of another load.
     pub is_contradiction: bool,
-    /// What is doubted and why, to be said before anything that rests on it.
+    /// The doubt and its reason; to be stated before any result that depends on the parameters.
     pub sentence: String,
 }
 
 impl Doubt {
-    /// Of base parameters `theta` of `arm`, which are `nominal` by its description, known to `sigma` and with the `covariance` that
-    /// they have among each other, from a log in which joints need `torque_nm` (rms). (Of a parameter that says nothing by itself, σ is
-    /// infinite.)
+    /// Examines base parameters `theta` of `arm`, whose values by its description are `nominal`. `sigma` and
+    /// `covariance` tell how well they are known; σ is infinite for a parameter that says nothing by itself.
+    /// `torque_nm` is the torque of the joints along the log (rms).
     pub fn of(
         arm: &Arm,
         set: &BaseSet,
@@ -50,8 +51,8 @@ impl Doubt {
         (!parts.is_empty()).then(|| Self { is_contradiction, sentence: parts.join(" ") })
     }
 
-    /// Of a log of which the model leaves so much that there is a `remark` about it, what else is asked about parameters means nothing; what
-    /// no arm has stays said.
+    /// Combines a doubt with the `remark` that the model leaves much of the log's torque. The remark replaces
+    /// questions about parameters, which then mean nothing; a contradiction stays.
     pub fn or_unlike(doubt: Option<Self>, remark: Option<String>) -> Option<Self> {
         match (doubt, remark) {
             (Some(doubt), _) if doubt.is_contradiction => Some(doubt),

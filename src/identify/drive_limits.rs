@@ -1,14 +1,14 @@
-//! Whether drives gave all that they have along a log.
+//! Checks whether drives reached their torque limits along a log.
 
 use crate::robot::{Arm, JointSignals};
 
-/// Share of its largest torque from which on a drive counts as at its limit: what is read there scatters by noise and by
-/// the gain's tolerance.
+/// Share of its largest torque beyond which a drive counts as being at its limit: readings scatter there by noise and
+/// by the tolerance of the gain.
 const NEAR: f64 = 0.99;
 
 /// A remark where drives are at their limits in samples of `torque_nm` (joints × samples); `None` where none is.
 ///
-/// The equations of motion hold there as elsewhere, but the arm does not move as it was told, and the torque leaves the
+/// The equations of motion hold there as elsewhere, but the arm does not move as commanded, and the torque leaves the
 /// limit within a sample or two, faster than a log can follow.
 pub fn drive_limit_remark(arm: &Arm, torque_nm: &JointSignals) -> Option<String> {
     let samples = torque_nm.samples().max(1) as f64;

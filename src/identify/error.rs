@@ -1,4 +1,4 @@
-//! Why a log cannot be identified from.
+//! Reasons why a log gives no estimate.
 
 use thiserror::Error;
 
@@ -25,7 +25,7 @@ pub enum IdentifyError {
         /// The log.
         log: String,
     },
-    /// The torque of joints that move never changes.
+    /// The torque of a joint never changes although the joint moves.
     #[error(
         "{log}: while joint {joint} moves its torque is {torque_nm} Nm in every row: no torque was recorded there, or its column is another one"
     )]
@@ -34,10 +34,10 @@ pub enum IdentifyError {
         log: String,
         /// The first such joint (from 1).
         joint: usize,
-        /// What is recorded, Nm.
+        /// The recorded torque, Nm.
         torque_nm: f64,
     },
-    /// Another number of joints than the arm's.
+    /// The log has another number of joints than the arm.
     #[error("{log}: {found} joints, but the arm has {expected}")]
     Joints {
         /// The log.
@@ -61,7 +61,7 @@ pub enum IdentifyError {
         /// Rate of the first log, Hz.
         expected_hz: f64,
     },
-    /// `--rate` asks for many samples between two rows.
+    /// `--rate` asks for too many samples between two rows.
     #[error(
         "{log}: it has {natural_hz:.1} rows a second; a rate of {wanted_hz} Hz is more than can be made of them ({most_hz:.0} Hz)"
     )]
@@ -72,7 +72,7 @@ pub enum IdentifyError {
         wanted_hz: f64,
         /// Rate of the log, Hz.
         natural_hz: f64,
-        /// Highest rate that is made of it, Hz.
+        /// Highest rate that can be made of it, Hz.
         most_hz: f64,
     },
     /// `--period` names a period that the motion does not have.

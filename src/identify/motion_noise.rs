@@ -1,21 +1,21 @@
-//! Noise of the motion as noise of the torque.
+//! Converts noise of the motion into noise of the torque.
 //!
-//! The regressor holds the averaged motion, and with it what is left of the encoders' noise there. Period p was
-//! measured d_p off the average (Σ d_p = 0, in the harmonics that the average keeps), so that d_p/√P is one draw
-//! of the error of the average itself. Taken through the model it is torque,
+//! The regressor is evaluated along the averaged motion, and thus contains the remaining noise of the encoders. The
+//! measurement of period p deviates by d_p from the average (Σ d_p = 0, in the harmonics that the average keeps), so
+//! that d_p/√P is one draw of the error of the average itself. Through the model it becomes a torque,
 //!
-//! δ_p = √P [X(m̄ + d_p/√P) θ̂ − mean over p of the same],   y*_p = y_p − δ_p
+//! δ_p = √P [X(m̄ + d_p/√P) θ̂ − mean over p of the same], y*_p = y_p − δ_p
 //!
-//! The mean of y* over the periods is that of y; its scatter is that of the equations, y − X(m)θ, for encoders and
-//! torque together, whatever the correlation between them: no model with this motion leaves less. The step is
-//! d_p/√P because friction turns over within ε of velocity, where the noise of one period would not be small and that
-//! of the average is.
+//! The mean of y* over the periods is that of y. Its scatter is that of the equations, y − X(m)θ, for encoders and
+//! torque together, whatever the correlation between them: no model with this motion leaves less. The step is d_p/√P
+//! because friction reverses within ε of velocity; the noise of one period would not be small there, but that of the
+//! average is.
 
 use super::problem::{Assembler, Problem};
 use crate::dynamics::{Model, Motion};
 use crate::robot::JointSignals;
 
-/// `problem`, one period along `mean` with P periods of torque, its torque as along `mean` exactly: y* by the
+/// Returns `problem` (one period along `mean` with P periods of torque) with its torque moved to `mean`: y* by the
 /// parameters `theta`, with d = `deviations` (joints × P·n).
 pub fn moved_to_mean(
     problem: &Problem,
@@ -67,8 +67,8 @@ mod tests {
     use crate::identify::ColumnPlan;
     use crate::robot::Arm;
 
-    /// Four runs that truly moved a little differently, read without noise: along the mean motion their torques
-    /// are one.
+    /// Four runs whose true motions differ a little, read without noise: moved to the mean motion, their torques are
+    /// the same.
     #[test]
     fn what_the_motion_scatters_is_taken_out_of_the_torque() {
         const PERIODS: usize = 4;
@@ -127,7 +127,8 @@ mod tests {
             }
             // Torques of up to 100 Nm, rounded.
             assert!(largest < 1e-12, "joint {}: the mean moved by {largest:e}", j + 1);
-            // Second order: of friction ½ max|tanh''| d/ε = 0.4 · 1e-4/0.02 = 2e-3 of the first, rms less.
+            // The rest is of second order: for friction ½ max|tanh''| d/ε = 0.4 · 1e-4/0.02 = 2e-3 of the first
+            // order, and less in rms.
             let left = (scatter[1] / scatter[0]).sqrt();
             assert!(left < 4e-3, "joint {}: {left:e} of the scatter is left", j + 1);
         }

@@ -1,17 +1,17 @@
-//! How a log is processed, the `[processing]` table of a scenario.
+//! How a log is processed: the `[processing]` table of a scenario.
 
 use serde::{Deserialize, Serialize};
 
 use super::covariance::CovarianceKind;
 use super::fit::Estimator;
 
-/// Everything about the processing that a user may choose; the default chooses from the data.
+/// All settings of the processing that a user may choose; by default they follow from the data.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Options {
-    /// How equations are weighted; `None`: by what the log offers.
+    /// How equations are weighted; `None`: chosen by the log's content.
     pub estimator: Option<Estimator>,
-    /// How σ is computed; `None`: by what the log offers.
+    /// How σ is computed; `None`: chosen by the log's content.
     pub covariance: Option<CovarianceKind>,
     /// Low-pass applied to torque and regressor columns of a motion that does not repeat, Hz.
     pub cutoff_hz: f64,
@@ -19,20 +19,20 @@ pub struct Options {
     pub order: usize,
     /// Rate that logs are resampled to, Hz; `None`: the log's own, at most [`Self::HIGHEST_RATE_HZ`].
     pub rate_hz: Option<f64>,
-    /// Period of the motion, s; `None`: found in the log. Zero: treat the log as a single run.
+    /// Period of the motion, s; `None`: found in the log. Zero treats the log as a single run.
     pub period_s: Option<f64>,
 }
 
 impl Options {
-    /// Faster logs are decimated to at most this rate. The motion would be content with less, dry friction is not:
-    /// behind the decimator's low-pass the velocity passes through zero more slowly than the drive, and the friction
-    /// looked up in it is not the torque's. Decimated to 125 Hz that is seen as presliding, delays and a bias of
-    /// 1.4 σ; at 250 Hz it is not, and jumps of a drive that feeds friction forward, which fall between two rows at
-    /// any rate, are not seen yet.
+    /// Faster logs are decimated to at most this rate. The motion itself would need less, but dry friction does not
+    /// allow it: behind the decimator's low-pass the velocity passes through zero more slowly than the drive does,
+    /// and the friction computed from it is not that in the torque. In logs decimated to 125 Hz this appears as
+    /// presliding, delays and a bias of 1.4 σ; at 250 Hz it does not. At 250 Hz, the jumps of a drive that feeds
+    /// friction forward, which fall between two rows at any rate, do not show yet.
     pub const HIGHEST_RATE_HZ: f64 = 300.0;
 
-    /// Friction of a single run sees the velocity low-passed at this share of the sampling rate, where
-    /// the series of a motion that repeats ends too.
+    /// Cut-off of the velocity from which the friction of a single run is computed, as a share of the sampling rate.
+    /// The Fourier series of a repeating motion ends there as well.
     pub const VELOCITY_END: f64 = 0.32;
 
     /// Whether the log counts as a single run even where its motion repeats.

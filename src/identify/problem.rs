@@ -4,13 +4,13 @@ use super::columns::ColumnPlan;
 use crate::dynamics::{Lanes, Model, Motion, RegressorBlock, Workspace};
 use crate::robot::JointSignals;
 
-/// What the rows of a [`Problem`] follow each other in.
+/// The domain over which the rows of a [`Problem`] run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Domain {
     /// One row per sample.
     Time,
-    /// Row 0 is the mean of a period, rows 2k − 1 and 2k are √2 times real and imaginary part of its
-    /// k-th Fourier coefficient (unitary: white noise keeps its variance).
+    /// Row 0 is the mean of a period; rows 2k − 1 and 2k are √2 times the real and imaginary part of its k-th Fourier
+    /// coefficient (unitary: white noise keeps its variance).
     Frequency,
 }
 
@@ -28,7 +28,7 @@ pub struct Problem {
     pub periods: usize,
     /// Samples per second.
     pub rate_hz: f64,
-    /// What rows follow each other in.
+    /// Domain over which the rows run.
     pub domain: Domain,
     /// One per joint.
     pub panels: Vec<Panel>,
@@ -111,7 +111,7 @@ impl Problem {
         self.plan.base_count()
     }
 
-    /// Equations of joint `joint`: rows of all periods but those whose weight is nothing.
+    /// Number of equations of joint `joint`: rows of all periods, except those with weight zero.
     pub fn equations(&self, joint: usize) -> usize {
         let Panel { x, y } = &self.panels[joint];
         let n = self.samples;

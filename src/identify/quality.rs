@@ -1,4 +1,4 @@
-//! How well a log determines the parameters: condition numbers, and what it leaves open.
+//! How well a log determines the parameters: condition numbers, and the parameters it leaves undetermined.
 
 use nalgebra::DMatrix;
 use serde::Serialize;
@@ -22,7 +22,7 @@ pub struct Condition {
 }
 
 impl Condition {
-    /// Of the regressor in `problem`.
+    /// Computes the condition numbers of the regressor in `problem`.
     pub fn of(problem: &Problem, set: &BaseSet) -> Result<Self, FitError> {
         let triangle = Fitter::new(problem).fit(problem, set, Weighting::Equal)?.triangle;
         let regressor = condition_number(&triangle, |_| 1.0);
@@ -41,21 +41,20 @@ fn condition_number(triangle: &Triangle, scale: impl Fn(usize) -> f64) -> f64 {
     singular.max() / singular.min()
 }
 
-/// The largest a base parameter could plausibly be on this arm: beyond it, an interval says
-/// nothing.
+/// The largest plausible magnitude of a base parameter on this arm: a wider interval carries no information.
 ///
-/// With M the mass and ℓ the reach of everything from the parameter's body outward: M for masses,
-/// M ℓ for first moments, M ℓ² for moments of inertia; the drive's torque limit over its speed
-/// limit for viscous friction, the torque limit for Coulomb friction and offsets, and that limit
-/// over the acceleration limit for rotor inertias. Where the torque limit is not known it is what holds and accelerates
-/// the whole arm outstretched.
+/// M is the mass and ℓ the reach of everything from the parameter's body outward. The magnitude is M for masses, M ℓ
+/// for first moments, and M ℓ² for moments of inertia. It is the drive's torque limit for Coulomb friction and
+/// offsets, that limit over the speed limit for viscous friction, and over the acceleration limit for rotor inertias.
+/// Where the torque limit is not known, the torque that holds and accelerates the whole outstretched arm takes its
+/// place.
 pub fn plausible_size(arm: &Arm, set: &BaseSet, k: usize) -> f64 {
     let layout = ParameterLayout::new(arm.dof());
     let (standard, _) = set.column(k)[0];
     let outward = |body: usize| {
         let mass: f64 = arm.joints[body..].iter().map(|j| j.link.mass_kg()).sum();
         let later = arm.joints[body + 1..].iter().map(|j| j.placement.translation_m.norm());
-        // The last link has no joint behind it to tell its length; its centre of mass does.
+        // The last link has no next joint to show its length; its centre of mass takes that place.
         let last = arm.joints.last().and_then(|j| j.link.com_m()).map_or(0.0, |c| c.norm());
         (mass, later.sum::<f64>() + last + HAND_M)
     };
@@ -75,12 +74,12 @@ pub fn plausible_size(arm: &Arm, set: &BaseSet, k: usize) -> f64 {
     }
 }
 
-/// Least reach of a body, m: a wrist is not a point.
+/// Length added to every reach, m: even a wrist is not a point.
 const HAND_M: f64 = 0.05;
 
-/// Whether a log that leaves the parameters `open` still identifies the arm: the moments of inertia
-/// of a light wrist may stay open, because no torque depends on them; gravity, friction, rotors and
-/// the bulk of the parameters may not.
+/// Whether a log that leaves the parameters `open` still identifies the arm. Moments of inertia of a light wrist may
+/// stay open, because hardly any torque depends on them; gravity, friction, rotors and three quarters of all
+/// parameters may not.
 pub fn identifies_the_arm(arm: &Arm, set: &BaseSet, open: &[usize]) -> bool {
     let layout = ParameterLayout::new(arm.dof());
     let is_moment_of_inertia =
@@ -100,7 +99,7 @@ mod tests {
     use super::*;
     use crate::base::Parameterisation;
 
-    /// A URDF that gives no torque limits leaves a bound that an interval can be wider than.
+    /// Even with a URDF without torque limits an interval can be wider than the plausible size.
     #[test]
     fn what_has_no_torque_limit_can_still_be_open() {
         let mut arm = Arm::built_in("ur5").unwrap();

@@ -1,8 +1,8 @@
-//! What a prediction leaves of the torque.
+//! The part of the torque that a prediction does not explain.
 
 use crate::robot::JointSignals;
 
-/// How far a prediction is off.
+/// Size of the error of a prediction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Residual {
     /// Root mean square per joint, Nm.
@@ -32,7 +32,7 @@ impl Residual {
         pairs.map(|(rms_nm, percent)| 100.0 * rms_nm / percent).collect()
     }
 
-    /// Of the samples of `error` and `torque_nm` (same shape) for which `counts(joint, sample)`.
+    /// From the samples of `error_nm` and `torque_nm` (same shape) for which `counts(joint, sample)` holds.
     pub fn of(
         error_nm: &JointSignals,
         torque_nm: &JointSignals,

@@ -22,7 +22,7 @@ impl Covariance {
             by_chance += (1.0 - r * r).powi(2) / self.degrees_of_freedom;
             apart += (r - t).powi(2);
         }
-        // Without any scatter the quotient is NaN, and `min` makes it 1: only the target remains.
+        // Without any scatter ν may be NaN; `min` then returns 1, and only the target remains.
         let towards = (by_chance / apart).min(1.0);
         let sigma = self.sigma();
         self.matrix = DMatrix::from_fn(sigma.len(), sigma.len(), |i, k| {

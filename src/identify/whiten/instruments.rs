@@ -9,8 +9,9 @@ use crate::identify::problem::Problem;
 use crate::robot::JointSignals;
 use crate::signal::{Scratch, SignalError, ZeroPhase, central_4};
 
-/// Cut-off of the instruments' motion over that of the regression. The noise in an acceleration grows as f², its
-/// power up to f as f⁵, so that a quarter of the cut-off leaves next to nothing of the noise that X and Z share.
+/// Cut-off of the instruments' motion over that of the regression. The power density of the noise in a differentiated
+/// velocity grows as f², its power up to f as f³, so that a quarter of the cut-off leaves 1/64 of the noise that X
+/// and Z share.
 pub const SMOOTHER: f64 = 0.25;
 
 /// Filters the motion by a zero-phase low-pass at `cutoff_hz` and differentiates the filtered velocity. The
