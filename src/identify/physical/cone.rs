@@ -1,8 +1,8 @@
-//! The two cones of the problem, in one piece of a step each: non-negative numbers and positive
+//! The two cones of the problem, with their parts of an interior-point step: non-negative numbers and positive
 //! semidefinite 4 × 4 matrices, scaled by Nesterov and Todd's point.
 //!
-//! A symmetric matrix is held as the vector svec of its ten entries, off-diagonal ones times √2, so
-//! that ⟨A, B⟩ = tr(AB) is the product of the vectors.
+//! A symmetric matrix is stored as the vector svec of its ten entries, the off-diagonal ones times √2, so that ⟨A, B⟩
+//! = tr(AB) is the scalar product of the vectors.
 
 use nalgebra::{Cholesky, Matrix4, SVector};
 
@@ -42,7 +42,7 @@ pub enum Cone {
 }
 
 impl Cone {
-    /// Numbers that a point of the cone is made of.
+    /// Number of entries of a point.
     pub fn dimension(self) -> usize {
         match self {
             Self::NonNegative => 1,
@@ -50,8 +50,8 @@ impl Cone {
         }
     }
 
-    /// Its part of the duality gap on the central path in units of the barrier parameter: 1 for
-    /// a number, the order for a matrix.
+    /// Contribution to the duality gap on the central path, in units of the barrier parameter: 1 for a number, the
+    /// order for a matrix.
     pub fn degree(self) -> usize {
         match self {
             Self::NonNegative => 1,
@@ -88,7 +88,7 @@ impl Cone {
         }
     }
 
-    /// The scaling at a primal and a dual point inside the cone; `None` where one has left it.
+    /// The scaling at a primal and a dual point inside the cone; `None` where one of them is outside.
     pub fn scaling(self, s: &[f64], z: &[f64]) -> Option<Scaling> {
         match self {
             Self::NonNegative => {
@@ -156,8 +156,8 @@ impl Scaling {
         }
     }
 
-    /// λ \ (target − λ∘λ − a∘b), with γ + σμ on the diagonal of the target: the right-hand side of
-    /// the complementarity equation after division by λ.
+    /// λ \ (target − λ∘λ − a∘b), with target = γ + σμ on the diagonal: the right-hand side of the complementarity
+    /// equation after division by λ.
     pub fn complementarity(&self, target: f64, a: &[f64], b: &[f64], out: &mut [f64]) {
         match self {
             Self::NonNegative { lambda, .. } => {
@@ -176,7 +176,7 @@ impl Scaling {
         }
     }
 
-    /// Longest step α with λ + α·direction still in the cone; infinite where none is the longest.
+    /// Longest step α with λ + α·direction still in the cone; infinite where there is no limit.
     pub fn longest_step(&self, direction: &[f64]) -> f64 {
         let smallest = match self {
             Self::NonNegative { lambda, .. } => direction[0] / lambda,

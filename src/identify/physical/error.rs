@@ -1,4 +1,4 @@
-//! Why there is no physically consistent estimate.
+//! Reasons why there is no physically consistent estimate.
 
 use thiserror::Error;
 
@@ -30,7 +30,7 @@ pub enum PhysicalError {
         /// By how much, relative; negative.
         margin: f64,
     },
-    /// A setting that makes no problem.
+    /// A setting outside of its range.
     #[error("{name} = {value} {requirement}")]
     Setting {
         /// Which.
@@ -49,10 +49,10 @@ pub enum PhysicalError {
         /// Periods there are.
         periods: usize,
     },
-    /// Which parameters no torque depends on could not be told.
+    /// The parameters on which no torque depends could not be determined.
     #[error(transparent)]
     Rank(#[from] AmbiguousRank),
-    /// The solver.
+    /// The solver found no optimum.
     #[error("no optimum: {0}")]
     Program(#[from] ProgramError),
 }

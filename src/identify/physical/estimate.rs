@@ -1,4 +1,4 @@
-//! The constrained estimate and everything that is said about it.
+//! The constrained estimate with its σ, certificate and evidence.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -50,35 +50,35 @@ pub struct PhysicalEstimate {
     pub standard: Vec<f64>,
     /// Base parameters of these standard parameters.
     pub base: Vec<f64>,
-    /// How both scatter.
+    /// σ of both.
     pub scatter: Scatter,
-    /// What an error of the robot file does to each standard parameter.
+    /// Effect of an error of the robot file on each standard parameter.
     pub file_errors: Vec<FileError>,
     /// The unconstrained base parameters θ̂.
     pub unconstrained: Vec<f64>,
     /// Their σ.
     pub unconstrained_sigma: Vec<f64>,
-    /// Bounds that the estimate lies on.
+    /// Constraints that are active at the estimate.
     pub active: Vec<Subject>,
     /// How far the solver's answer is from optimal.
     pub certificate: Certificate,
     /// Whether the unconstrained estimate could have been an arm, and what the repair cost.
     pub evidence: Evidence,
-    /// The pull to the prior that was used.
+    /// The pull to the prior.
     pub prior: Pulling,
-    /// How it was chosen, where the data chose it.
+    /// How its weight was chosen, where the data chose it.
     pub cross_validation: Option<CrossValidation>,
 }
 
 impl PhysicalEstimate {
-    /// By which share the robot file may be wrong: what its weight γ says, 1/√γ, but no more than by all of it.
+    /// Relative error that the robot file may have: 1/√γ by its weight γ, but at most 1.
     pub fn file_error(&self) -> f64 {
         self.prior.weight.sqrt().recip().min(1.0)
     }
 
-    /// Whether the robot file decides standard parameter `k`, rather than the data: more than half of its error stays, or a
-    /// file as wrong as it may be moves the estimate by more than its σ. That σ knows only the noise of the data, and would
-    /// not be the parameter's uncertainty.
+    /// Whether the robot file, rather than the data, determines standard parameter `k`. It does if more than half of
+    /// the file's error remains in the estimate, or if a file that is as wrong as it may be moves the estimate by
+    /// more than its σ. This σ accounts only for the noise of the data and would not be the parameter's uncertainty.
     pub fn is_prior(&self, k: usize) -> bool {
         let FileError { stays, share } = self.file_errors[k];
         share > 0.5 || self.file_error() * stays > self.scatter.released.standard[k]
@@ -88,18 +88,18 @@ impl PhysicalEstimate {
 /// Proof of optimality.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Certificate {
-    /// Objective ½T + ½γ(…), in units of the noise's χ².
+    /// Value of the objective ½T + γD, in units of the noise's χ².
     pub objective: f64,
-    /// It is at most this much above the minimum.
+    /// Upper bound on the objective's distance from the minimum.
     pub duality_gap: f64,
-    /// ‖∇objective − Aᵀz‖∞ over ‖c‖∞: the stationarity that is left.
+    /// ‖∇objective − Aᵀz‖∞ over ‖c‖∞: remaining violation of stationarity.
     pub kkt_residual: f64,
     /// Newton steps.
     pub iterations: usize,
 }
 
-/// Estimates standard parameters from `fit`, which identified `set` on `arm`; the arm's own values
-/// (the robot file's) are the prior.
+/// Estimates standard parameters from `fit`, which identified `set` on `arm`; the arm's own values (from the robot
+/// file) are the prior.
 pub fn solve(
     arm: &Arm,
     set: &BaseSet,
@@ -129,9 +129,9 @@ pub struct Constrained {
     solution: ConeSolution,
 }
 
-/// Relative duality gap at which a solution counts: far below what an estimate's σ could show.
+/// Relative duality gap at which a solution counts as found: far below anything that an estimate's σ could show.
 const GAP: f64 = 1e-8;
-/// The same for solutions of which only sums are used: of draws, and of left-out periods.
+/// The same for solutions that enter sums only: bootstrap draws, and left-out periods.
 pub(super) const ROUGH_GAP: f64 = 1e-6;
 
 impl Solver {
@@ -171,7 +171,8 @@ impl Solver {
         let by_delta = |curvature: &Cholesky<f64, Dyn>| {
             Sigma::by_delta_method(&self.structure, curvature, &data.map, &noise)
         };
-        // The entropic program has its prior's curvature in its barriers.
+        // The entropic program has the prior's curvature in its barriers; the pull's curvature at the prior is used
+        // for both metrics.
         let pulls = self.structure.pull_curvature();
         let curvature = data.map.tr_mul(&data.map) + weight * &pulls;
         let curvature = Cholesky::new(curvature).ok_or(ProgramError::NotConvex)?;
@@ -206,7 +207,7 @@ impl Solver {
         self.solve(&data, &DVector::zeros(data.map.nrows()), GAP)
     }
 
-    /// The program of data with this information and pull to the prior.
+    /// The program of the data in `information` with the pull `prior`.
     pub(super) fn data(&self, information: &Information, prior: Pulling) -> Data {
         let Self { structure } = self;
         let Pulling { metric, weight } = prior;
@@ -221,7 +222,8 @@ impl Solver {
                 structure.add_divergences(weight, &mut pulls, &mut pull, &mut constraints)
             }
         };
-        // About unknowns that have θ̂, where the data's part of the objective is zero.
+        // The quadratic form is expanded about unknowns with K y = θ̂, where the data's part of the objective is
+        // zero.
         let centre = structure.with_base(&information.theta);
         let pulled = &pulls * &centre;
         let constant = constant + centre.dot(&(0.5 * &pulled - &pull));
@@ -230,7 +232,8 @@ impl Solver {
         Data { map, constant, program }
     }
 
-    /// Solves for base parameters whose whitened difference from those of `data` is δ = R (θ − θ̂), to a relative duality gap.
+    /// Solves, to a relative duality gap, for base parameters θ whose whitened difference δ = R (θ − θ̂) from those
+    /// of `data` is `deviation`.
     pub(super) fn solve(
         &self,
         data: &Data,
@@ -255,7 +258,7 @@ impl Solver {
     }
 }
 
-/// Data ready for solving with any base parameters near theirs.
+/// A program that can be solved for any base parameters near those of its data.
 #[derive(Debug, Clone)]
 pub(super) struct Data {
     /// R K, b × n.
@@ -273,8 +276,8 @@ impl Data {
 }
 
 impl Constrained {
-    /// Constraints that the solution lies on: those whose multiplier exceeds their margin (their
-    /// product is the same tiny number for all of them).
+    /// Constraints active at the solution: those whose multiplier exceeds their margin (the product of both is the
+    /// same tiny number for all constraints).
     fn active(&self, structure: &Structure) -> Vec<Subject> {
         let ConeSolution { multipliers, margins, .. } = &self.solution;
         let found = structure.subjects.iter().zip(multipliers.iter().zip(margins));

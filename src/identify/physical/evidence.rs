@@ -1,4 +1,4 @@
-//! Is it only noise that made the estimate impossible?
+//! Tests whether noise alone explains a physically impossible estimate.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rand::SeedableRng;
@@ -9,24 +9,24 @@ use super::error::PhysicalError;
 use super::estimate::{Constrained, Data, PhysicalOptions, ROUGH_GAP, Solver};
 use super::scatter::{Deviations, Sigma};
 
-/// Whether the unconstrained estimate belongs to any set of links, and what making it so cost.
+/// Whether the unconstrained estimate belongs to any set of links, and the cost of making it so.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Evidence {
-    /// The largest t for which links with exactly the unconstrained base parameters exist whose
-    /// pseudo-inertias (and friction, rotor inertias) are all at least t times the prior's.
-    /// Negative: no links have these base parameters; −1 is wrong by the size of the prior.
+    /// The largest t for which links with exactly the unconstrained base parameters exist whose pseudo-inertias (and
+    /// friction and rotor inertias) are all at least t times the prior's. If negative, no links have these base
+    /// parameters; −1 means that they are short by the size of the prior.
     pub realisable: f64,
-    /// T = ‖R (K x − θ̂)‖²: how much the weighted squares grew by the repair, in units of the noise.
+    /// T = ‖R (K x − θ̂)‖²: increase of the weighted sum of squares by the repair, in units of the noise.
     pub distance: f64,
-    /// Draws of the bootstrap whose T was at least as large, and draws in all.
+    /// Number of bootstrap draws with T at least as large, and number of all draws.
     pub exceeded: Option<(usize, usize)>,
 }
 
-/// Below this p-value noise is no explanation.
+/// p-value below which noise is no explanation.
 const SIGNIFICANT: f64 = 0.01;
 
 impl Evidence {
-    /// (1 + draws at least as large)/(1 + draws).
+    /// (1 + draws at least as large)/(1 + all draws).
     pub fn p_value(&self) -> Option<f64> {
         self.exceeded.map(|(larger, draws)| (1 + larger) as f64 / (1 + draws) as f64)
     }
@@ -55,7 +55,7 @@ impl Evidence {
              pseudo-inertias); the nearest possible ones raise the sum of squares by {distance:.1} in units of the noise",
             -realisable
         );
-        // No draw at all: the chance is below what so many can show.
+        // With no draw at least as large, the probability is below the least that this number of draws can show.
         let is = if self.exceeded.is_some_and(|(larger, _)| larger == 0) { "≤" } else { "=" };
         match self.p_value() {
             Some(p) if p < SIGNIFICANT => format!(
@@ -71,23 +71,23 @@ impl Evidence {
     }
 }
 
-/// A factor L, L Lᵀ = Ω; of a singular Ω one that has its variances.
+/// A factor L with L Lᵀ = Ω; for a singular Ω the diagonal factor with its variances.
 pub(super) fn noise_root(omega: &DMatrix<f64>) -> DMatrix<f64> {
     let of_variances = || DMatrix::from_diagonal(&omega.diagonal().map(f64::sqrt));
     Cholesky::new(omega.clone()).map_or_else(of_variances, Cholesky::unpack)
 }
 
-/// What the bootstrap says.
+/// Result of the bootstrap.
 pub(super) struct Draws {
-    /// Draws whose T was at least as large, and draws in all.
+    /// Number of draws with T at least as large, and number of all draws.
     pub exceeded: (usize, usize),
-    /// How far their estimates are off.
+    /// Scatter of the draws' estimates.
     pub sigma: Sigma,
 }
 
-/// How many draws of noise about the constrained estimate cost at least as much fit, and how far
-/// their estimates are from it. The estimate is on the boundary where T was positive: the least
-/// favourable of all arms that can exist.
+/// Draws noise about the constrained estimate, and determines how many draws cost at least as much fit and how far
+/// their estimates are from it. Where T was positive, the estimate is on the boundary: the least favourable of all
+/// arms that can exist.
 pub(super) fn bootstrap(
     solver: &Solver,
     data: &Data,

@@ -1,13 +1,12 @@
-//! What the data say, in units of their noise.
+//! The information in the data, in units of their noise.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::identify::covariance::Covariance;
 use crate::identify::fit::Fit;
 
-/// The weighted least-squares problem of a fit, reduced to its triangle: for any base parameters
-/// the weighted squares exceed their minimum by ‖R (θ − θ̂)‖², all periods together, in units of
-/// the noise.
+/// The weighted least-squares problem of a fit, reduced to its triangle: for any base parameters θ the weighted sum
+/// of squares of all periods exceeds its minimum by ‖R (θ − θ̂)‖², in units of the noise.
 #[derive(Debug, Clone)]
 pub struct Information {
     /// R, b × b.
@@ -16,14 +15,14 @@ pub struct Information {
     pub theta: DVector<f64>,
 }
 
-/// The noise counts as at least this share of the torque: less than any sensor has. What a simulation without noise leaves (the
-/// digits of its log, its integrator's error) is no evidence against an arm, and must not make the problem infinite.
+/// Least noise assumed, as a share of the torque: less than any sensor has. The residual of a simulation without
+/// noise (the digits of its log, its integrator's error) is no evidence against an arm, and must not make R infinite.
 const LEAST_NOISE: f64 = 1e-4;
 
 impl Information {
-    /// Of a fit and the covariance V of its estimate. The unit is chosen so that θ̂ scatters with
-    /// tr(R V Rᵀ) = b about what it estimates: weights that were wrong by a factor, or none, as in
-    /// ordinary least squares, then make no difference to the size of a distance.
+    /// The information of a fit and the covariance V of its estimate. The unit is chosen so that tr(R V Rᵀ) = b. The
+    /// size of a distance is then unaffected by weights that were wrong by a common factor, or absent, as in ordinary
+    /// least squares.
     pub fn of(fit: &Fit, covariance: &Covariance) -> Self {
         let b = fit.theta.len();
         let root = DMatrix::from_fn(b, b, |i, k| fit.triangle.r(i, k));
@@ -41,8 +40,8 @@ impl Information {
         (&self.root * (theta - &self.theta)).norm_squared()
     }
 
-    /// The covariance of the noise of R θ̂, with a mean diagonal entry of 1: R V Rᵀ, and the rest white where the noise counts as
-    /// more than it is.
+    /// The covariance of the noise of R θ̂, with a mean diagonal entry of 1: R V Rᵀ, supplemented by white noise
+    /// where the assumed noise exceeds the actual one.
     pub fn noise(&self, covariance: &Covariance) -> DMatrix<f64> {
         let mut noise = self.whitened(covariance);
         let missing = 1.0 - noise.trace() / noise.nrows() as f64;

@@ -8,19 +8,19 @@ use thiserror::Error;
 use super::cone::{Cone, Scaling};
 use crate::dot::dot;
 
-/// minimise ½ (y − y₀)ᵀH (y − y₀) − cᵀ(y − y₀) − Σ γ_i ln det s_i subject to s_i = A_i y + b_i ∈ K_i
-/// for every constraint i.
+/// The program: minimise ½ (y − y₀)ᵀH (y − y₀) − cᵀ(y − y₀) − Σ γ_i ln det s_i subject to s_i = A_i y + b_i ∈ K_i for
+/// every constraint i.
 ///
-/// H is positive definite. Each constraint reads a few entries of y only, so that its share of
-/// a Newton step is small dense blocks.
+/// H is positive definite. Each constraint involves only a few entries of y, so that it contributes small dense
+/// blocks to a Newton step.
 #[derive(Debug, Clone)]
 pub struct ConeProgram {
     /// H.
     pub hessian: DMatrix<f64>,
     /// c.
     pub linear: DVector<f64>,
-    /// y₀: where the quadratic form is expanded. Near its minimum the objective is a small number, and would be lost to
-    /// round-off as the difference of two large ones.
+    /// y₀, about which the quadratic form is expanded. Near its minimum the objective is a small number; as the
+    /// difference of two large ones it would be lost to round-off.
     pub centre: DVector<f64>,
     /// The constraints.
     pub constraints: Vec<Constraint>,
@@ -31,13 +31,13 @@ pub struct ConeProgram {
 pub struct Constraint {
     /// K_i.
     pub cone: Cone,
-    /// Entries of y that it reads.
+    /// Entries of y that the constraint involves.
     pub columns: Vec<usize>,
     /// A_i: dimension of the cone × number of columns.
     pub map: DMatrix<f64>,
     /// b_i.
     pub offset: DVector<f64>,
-    /// γ_i ≥ 0: zero for a plain constraint.
+    /// γ_i ≥ 0; zero for a plain constraint.
     pub barrier: f64,
 }
 
@@ -48,8 +48,8 @@ pub struct ConeSolution {
     pub y: DVector<f64>,
     /// ½ (y − y₀)ᵀH (y − y₀) − cᵀ(y − y₀) − Σ γ_i ln det s_i.
     pub objective: f64,
-    /// The objective is at most this much above the least possible one. It is the difference to
-    /// the value of a dual point, so that it holds whatever happened on the way.
+    /// Upper bound on the objective's distance from the minimum. It is the difference to the value of a dual point,
+    /// so that it holds independently of the iteration.
     pub gap: f64,
     /// ‖H (y − y₀) − c − Aᵀz‖∞ over ‖c‖∞.
     pub dual_residual: f64,
@@ -59,8 +59,8 @@ pub struct ConeSolution {
     pub multipliers: Vec<Vec<f64>>,
     /// Smallest eigenvalue of s_i of every constraint.
     pub margins: Vec<f64>,
-    /// H + Σ A_iᵀ W_i⁻¹W_i⁻ᵀ A_i one step before the solution, factorised: what a shift of c does to
-    /// y. At the solution itself it is infinite in the directions that an active constraint holds.
+    /// H + Σ A_iᵀ W_i⁻¹W_i⁻ᵀ A_i one step before the solution, factorised: it relates a shift of c to a shift of y.
+    /// At the solution itself it is infinite in the directions that an active constraint fixes.
     pub stiffness: Cholesky<f64, Dyn>,
 }
 
@@ -72,7 +72,7 @@ pub enum ProgramError {
     StartOutside {
         /// Number of the constraint.
         constraint: usize,
-        /// Smallest eigenvalue there.
+        /// Smallest eigenvalue at the starting point.
         margin: f64,
     },
     /// H has a direction without curvature.
@@ -90,35 +90,31 @@ pub enum ProgramError {
     },
 }
 
-/// Steps that are far more than any problem has needed (10 to 25).
+/// Limit of the number of steps, far more than any problem has needed (10 to 25).
 const MOST_STEPS: usize = 100;
-/// Where rounding ends the iteration early, this relative gap will do: at an objective of 100 it is
-/// 0.001, where half a unit is one σ. It is reported as it is.
+/// Relative gap that is accepted where rounding ends the iteration early. At an objective of 100 it is 0.001, where
+/// half a unit is one σ. The gap is reported as it is.
 const ACCEPTABLE: f64 = 1e-5;
-/// Share of the way to the boundary that a step goes.
+/// Share of the distance to the boundary that a step covers.
 const SHORT_OF_BOUNDARY: f64 = 0.99;
-/// A shorter step means that the second-order correction led astray: one back to the centre is taken.
+/// A shorter step means that the second-order correction was misleading; a step back to the central path replaces it.
 const TOO_SHORT: f64 = 0.1;
 
 impl ConeProgram {
-    /// Solves from `start`, which is inside all cones, until the duality gap is below `tolerance`
-    /// times 1 + |objective + `constant`| (a constant added to the objective, so that "relative"
-    /// has a meaning).
+    /// Solves from `start`, which is inside all cones, until the duality gap is below `tolerance` times 1 +
+    /// |objective + `constant`|. (The constant is added to the objective to give "relative" a meaning.)
     ///
-    /// Mehrotra's predictor–corrector with Nesterov and Todd's scaling (L. Vandenberghe, "The
-    /// CVXOPT linear and quadratic cone program solvers", 2010). s = A y + b holds throughout, so
-    /// only the dual equation and complementarity are left to Newton's method: s_i z_i = γ_i, which
-    /// for a plain constraint is the end of the central path and for a barrier a point on it.
+    /// Mehrotra's predictor–corrector method with Nesterov and Todd's scaling (L. Vandenberghe, "The CVXOPT linear
+    /// and quadratic cone program solvers", 2010). s = A y + b holds throughout, so that only the dual equation and
+    /// complementarity are left to Newton's method: s_i z_i = γ_i, which is the end of the central path for a plain
+    /// constraint and a point on it for a barrier.
     ///
-    /// # Certificate
-    /// For z in the cones and r = H (y − y₀) − c − Aᵀz the dual value is
-    /// objective(y) − Σ g_i − ½ rᵀH⁻¹r, whence gap = Σ g_i + ½ rᵀH⁻¹r with g_i = s_iᵀz_i for a plain
-    /// constraint and g_i = s_iᵀz_i − γ_i (d_i + ln det(s_i z_i / γ_i)) for a barrier of degree d_i: both
-    /// are ≥ 0, and 0 only where complementarity holds.
+    /// # Certificate For z in the cones and r = H (y − y₀) − c − Aᵀz the dual value is objective(y) − Σ g_i − ½
+    /// rᵀH⁻¹r, so that gap = Σ g_i + ½ rᵀH⁻¹r. Here g_i = s_iᵀz_i for a plain constraint and g_i = s_iᵀz_i − γ_i (d_i
+    /// + ln det(s_i z_i / γ_i)) for a barrier of degree d_i. Both are ≥ 0, and 0 only where complementarity holds.
     ///
-    /// # Zeros
-    /// The iteration ends a little inside the cones. Entries of y that are held at zero are put there at last, where the
-    /// certificate allows it.
+    /// # Zeros The iteration ends slightly inside the cones. Entries of y that a constraint presses onto zero are
+    /// finally set to zero, where the certificate allows it.
     pub fn solve(
         &self,
         start: DVector<f64>,
@@ -181,7 +177,7 @@ impl ConeProgram {
         0.5 * away.dot(&(&self.hessian * &away)) - self.linear.dot(&away)
     }
 
-    /// H (y − y₀) − c: its gradient.
+    /// H (y − y₀) − c: the gradient of [`Self::objective`].
     fn gradient(&self, y: &DVector<f64>) -> DVector<f64> {
         &self.hessian * (y - &self.centre) - &self.linear
     }
@@ -191,7 +187,7 @@ impl ConeProgram {
         self.objective(&point.y) + point.barriers(self)
     }
 
-    /// How far the objective is from its least at most, with r = `residual`.
+    /// Upper bound on the objective's distance from its minimum, with r = `residual`.
     fn gap(&self, point: &Point, residual: &DVector<f64>, hessian: &Cholesky<f64, Dyn>) -> f64 {
         point.gap(self) + 0.5 * residual.dot(&hessian.solve(residual))
     }
@@ -239,7 +235,7 @@ impl Constraint {
     }
 }
 
-/// Where the iteration stands: y, s = A y + b and z.
+/// Current point of the iteration: y, s = A y + b and z.
 struct Point {
     y: DVector<f64>,
     s: Vec<Vec<f64>>,
@@ -247,7 +243,7 @@ struct Point {
 }
 
 impl Point {
-    /// s from `y`, and z = μ s⁻¹ on the central path's dual side with a μ of the size of the
+    /// The starting point: s from `y`, and z = μ s⁻¹ on the central path's dual side. μ is of the size of the
     /// objective, so that primal and dual start equally far from the solution.
     fn new(program: &ConeProgram, y: DVector<f64>) -> Result<Self, ProgramError> {
         let zeros: Vec<Vec<f64>> =
@@ -284,7 +280,7 @@ impl Point {
         program.constraints.iter().zip(points).map(|(c, (s, z))| (c, &s[..], &z[..]))
     }
 
-    /// Σ g_i, the certificate's part that complementarity leaves.
+    /// Σ g_i: the violation of complementarity in the certificate.
     fn gap(&self, program: &ConeProgram) -> f64 {
         self.pairs(program)
             .map(|(Constraint { cone, barrier, .. }, s, z)| match *barrier {
@@ -298,7 +294,7 @@ impl Point {
             .sum()
     }
 
-    /// How far the s_iᵀz_i are from their ends γ_i d_i.
+    /// Sum of the distances of the s_iᵀz_i from their targets γ_i d_i.
     fn excess(&self, program: &ConeProgram) -> f64 {
         let off = |(c, s, z): (&Constraint, &[f64], &[f64])| {
             (dot(s, z) - c.barrier * c.cone.degree() as f64).abs()
@@ -332,16 +328,16 @@ impl Point {
     }
 }
 
-/// What the right-hand side of a step takes from the one before.
+/// Term of the affine step that the right-hand side of the next step includes.
 #[derive(Clone, Copy, PartialEq)]
 enum Correction {
-    /// Nothing: the affine step.
+    /// None, as for the affine step itself.
     None,
-    /// The product of the affine step's parts, which the linearisation left out.
+    /// The product of the affine step's primal and dual parts, which the linearisation leaves out.
     SecondOrder,
 }
 
-/// A Newton step, primal and dual directions scaled, and the memory to compute it.
+/// A Newton step with scaled primal and dual directions, and the memory to compute it.
 struct Step {
     y: DVector<f64>,
     s: Vec<Vec<f64>>,
@@ -362,8 +358,8 @@ impl Step {
         }
     }
 
-    /// The scalings at `point` and the factor of H + Σ B_iᵀB_i; `None` where rounding has taken the
-    /// point out of a cone.
+    /// The scalings at `point` and the factor of H + Σ B_iᵀB_i; `None` where rounding has moved the point out of a
+    /// cone.
     fn prepare(
         &mut self,
         program: &ConeProgram,
@@ -397,8 +393,8 @@ impl Step {
         }
     }
 
-    /// Solves H Δy − AᵀΔz = −r, λ∘(Δz̃ + Δs̃) = (γ + σμ) e − λ∘λ − (correction), Δs̃ = B Δy:
-    /// with d = λ\(…), (H + BᵀB) Δy = −r + Bᵀd and Δz̃ = d − B Δy.
+    /// Computes the step of H Δy − AᵀΔz = −r, λ∘(Δz̃ + Δs̃) = (γ + σμ) e − λ∘λ − (correction), Δs̃ = B Δy. With d =
+    /// λ\(…) it is (H + BᵀB) Δy = −r + Bᵀd and Δz̃ = d − B Δy.
     fn towards(
         &mut self,
         program: &ConeProgram,

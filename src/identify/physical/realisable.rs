@@ -1,4 +1,4 @@
-//! Could the unconstrained estimate be an arm?
+//! Tests whether the unconstrained estimate could be an arm.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -7,13 +7,13 @@ use super::error::PhysicalError;
 use super::program::{ConeProgram, Constraint, ProgramError};
 use super::structure::{Structure, Subject};
 
-/// Curvature that makes the linear program a strictly convex one, relative to the prior.
+/// Curvature, relative to that of the prior, that makes the linear program strictly convex.
 const CURVATURE: f64 = 1e-9;
-/// The answer is wanted to this accuracy, relative to the prior.
+/// Wanted accuracy of the answer, relative to the prior.
 const ACCURACY: f64 = 1e-6;
 
-/// The largest t such that links with base parameters exactly `theta` exist, every pseudo-inertia
-/// at least t times the prior's and every drive parameter at least t times its prior's size.
+/// The largest t such that links with base parameters exactly `theta` exist of which every pseudo-inertia is at least
+/// t times the prior's and every drive parameter at least t times its prior's size.
 ///
 /// maximise t over y = y₀ + N w, K y₀ = θ, K N = 0.
 pub(super) fn realisability(
@@ -26,7 +26,8 @@ pub(super) fn realisability(
     let (mut pulls, mut pull) = (DMatrix::zeros(n, n), DVector::zeros(n));
     structure.add_pulls(1.0, &mut pulls, &mut pull);
     let curved = null_space.tr_mul(&(&pulls * &null_space));
-    // Where the pulls would bring them: t is then of the size of one, even where θ moves a light link's mass by thousands of its own.
+    // y₀ is the point closest to the prior. t is then of the order of one, even where θ changes a light link's mass
+    // by thousands of its own.
     let mut particular = structure.with_base(theta);
     let to_prior = null_space.tr_mul(&(pull - &pulls * &particular));
     let factor = Cholesky::new(curved.clone()).ok_or(ProgramError::NotConvex)?;
@@ -72,8 +73,8 @@ fn null_space(structure: &Structure) -> DMatrix<f64> {
     null_space
 }
 
-/// The constraint in terms of (w, t): A (y₀ + N w) + b − t·unit ∈ K. The margin ε of a link is left
-/// out: t takes its place.
+/// The constraint in terms of (w, t): A (y₀ + N w) + b − t·unit ∈ K. The margin ε of a link is left out, because t
+/// takes its place.
 fn along(
     constraint: &Constraint,
     particular: &DVector<f64>,

@@ -1,4 +1,4 @@
-//! How a constrained estimate scatters.
+//! Uncertainty of a constrained estimate.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -9,33 +9,33 @@ use super::structure::Structure;
 pub struct Sigma {
     /// Of the base parameters.
     pub base: Vec<f64>,
-    /// Of the standard parameters, as far as the data decide them: what only the prior decides has
+    /// Of the standard parameters, as far as the data determine them: a parameter that only the prior determines has
     /// none of the data's noise.
     pub standard: Vec<f64>,
 }
 
-/// Three answers to how the estimate scatters. They agree where no bound is near.
+/// Three measures of the scatter of the estimate. They agree where no bound is near.
 ///
-/// Delta method: with the right-hand side ρ = R θ̂ and its covariance N, y moves by
-/// dy = S⁻¹ (R K)ᵀ dρ, where S is the curvature of the objective in the parameters that are free. In
-/// log-Cholesky parameters η (P = T Tᵀ, T triangular with diagonal e^η; D. Rucker, P. M. Wensing,
-/// "Smooth parameterization of rigid-body inertia", 2022), which have no bounds, the curvature
-/// brought back to y is H + Σ tr(Z d²P), and on the central path, where Z = μ P⁻¹, the second term
-/// is μ tr(P⁻¹dP P⁻¹dP): the curvature that the interior point's last Newton step has anyway.
+/// Delta method: with the right-hand side ρ = R θ̂ and its covariance N, y moves by dy = S⁻¹ (R K)ᵀ dρ, where S is
+/// the curvature of the objective in free parameters. Log-Cholesky parameters η (P = T Tᵀ, T triangular with diagonal
+/// e^η; D. Rucker, P. M. Wensing, "Smooth parameterization of rigid-body inertia", 2022) have no bounds. The
+/// curvature in them, transformed back to y, is H + Σ tr(Z d²P). On the central path, where Z = μ P⁻¹, the second
+/// term is μ tr(P⁻¹dP P⁻¹dP): the curvature that the last Newton step of the interior-point method contains anyway.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scatter {
-    /// With the full curvature. An active bound holds its direction, and this σ leaves it out.
+    /// By the full curvature. An active bound fixes its direction, which therefore does not contribute to this σ.
     pub held: Sigma,
-    /// With Gauss and Newton's curvature, which knows only the data and the prior (as it is at the prior): as if no bound
-    /// were there. In log-Cholesky parameters this is the textbook formula J (JᵀHJ)⁻¹Jᵀ = H⁻¹.
+    /// By the Gauss–Newton curvature, which contains only the data and the prior (with the prior's curvature at the
+    /// prior): as if there were no bounds. In log-Cholesky parameters this is the textbook formula J (JᵀHJ)⁻¹Jᵀ =
+    /// H⁻¹.
     pub released: Sigma,
-    /// Root mean square distance from the estimate of estimates drawn around it (parametric
-    /// bootstrap): bounds hold where the draw is beyond them, and only there.
+    /// Root mean square distance of estimates drawn around the estimate (parametric bootstrap): a bound takes effect
+    /// in the draws that go beyond it, and only there.
     pub drawn: Option<Sigma>,
 }
 
 impl Sigma {
-    /// dy = S⁻¹ (R K)ᵀ dρ with cov ρ = `noise`; `map` is R K.
+    /// σ by dy = S⁻¹ (R K)ᵀ dρ with cov ρ = `noise`; `map` is R K.
     pub(super) fn by_delta_method(
         structure: &Structure,
         curvature: &Cholesky<f64, Dyn>,
@@ -56,20 +56,21 @@ impl Sigma {
     }
 }
 
-/// What an error of the prior does to a standard parameter, free of noise and bounds.
+/// Effect of an error of the prior on a standard parameter, without noise and bounds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FileError {
-    /// Root mean square error of the estimate where the prior is wrong by 100 % in every direction of its metric, in the
-    /// parameter's unit. In proportion for other errors.
+    /// Root mean square error of the estimate if the prior is wrong by 100 % in every direction of its metric, in the
+    /// parameter's unit. It is proportional to the error of the prior.
     pub stays: f64,
-    /// That over the error of the prior itself: 0 where the data decide, 1 where nothing but the prior does.
+    /// `stays` over the error of the prior itself: 0 where the data determine the parameter, 1 where only the prior
+    /// does.
     pub share: f64,
 }
 
 impl FileError {
-    /// Of every standard parameter. With the prior's curvature A = `pulls`, its weight γ and the `curvature` S = (R K)ᵀ(R K) + γ A the
-    /// estimate is off by S⁻¹ γ A times the prior's error, whose covariance is A⁻¹: by γ √diag(E S⁻¹ A S⁻¹ Eᵀ), out of
-    /// √diag(E A⁻¹ Eᵀ).
+    /// The effect for every standard parameter. With the prior's curvature A = `pulls`, its weight γ and the
+    /// `curvature` S = (R K)ᵀ(R K) + γ A, the estimate is off by S⁻¹ γ A times the prior's error, whose covariance is
+    /// A⁻¹. Its error is therefore γ √diag(E S⁻¹ A S⁻¹ Eᵀ), compared with √diag(E A⁻¹ Eᵀ) of the prior.
     pub(super) fn of(
         structure: &Structure,
         curvature: &Cholesky<f64, Dyn>,
@@ -126,7 +127,7 @@ impl Deviations {
 mod tests {
     use nalgebra::Matrix4;
 
-    /// A lower triangular matrix with eˣ on the diagonal.
+    /// A lower triangular matrix with eˣ on its diagonal.
     fn factor(eta: &Matrix4<f64>) -> Matrix4<f64> {
         Matrix4::from_fn(|i, j| match i.cmp(&j) {
             std::cmp::Ordering::Less => 0.0,
@@ -135,8 +136,8 @@ mod tests {
         })
     }
 
-    /// The sentence in the documentation of `Scatter`, by second differences (step h: truncation
-    /// h², rounding 1e-16/h²; 1e-4 leaves 1e-6).
+    /// Checks the statement in the documentation of `Scatter` by second differences (step h: truncation h², rounding
+    /// 1e-16/h²; 1e-4 leaves 1e-6).
     #[test]
     fn log_cholesky_curvature_is_the_interior_points() {
         let eta = Matrix4::from_fn(|i, j| 0.3 * ((4 * i + j) as f64).sin());

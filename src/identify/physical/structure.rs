@@ -1,4 +1,4 @@
-//! What is asked of the standard parameters of an arm, whatever the data say.
+//! Conditions on the standard parameters of an arm, independent of the data.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix4, RowDVector};
 
@@ -11,9 +11,9 @@ use crate::robot::{Arm, LinkInertia};
 
 /// Unknowns, base map, cones and prior of an arm.
 ///
-/// The unknowns y are the parameters of the base set's parameterisation, and behind them the
-/// standard parameters that no torque depends on (of body 1, whose axis is vertical): x = E y are
-/// all standard parameters, θ = K y the base parameters.
+/// The unknowns y are the parameters of the base set's parameterisation, followed by standard parameters on which no
+/// torque depends (such as those of body 1, whose axis is vertical). x = E y are all standard parameters, θ = K y the
+/// base parameters.
 #[derive(Debug, Clone)]
 pub struct Structure {
     layout: ParameterLayout,
@@ -21,17 +21,17 @@ pub struct Structure {
     to_standard: Vec<Terms>,
     /// K, b × n.
     pub base_map: DMatrix<f64>,
-    /// Every link, then friction and rotor inertias, then bounds.
+    /// The constraints: every link, then friction and rotor inertias, then bounds.
     pub constraints: Vec<Constraint>,
-    /// What each constraint is about.
+    /// Subject of each constraint.
     pub subjects: Vec<Subject>,
-    /// What pulls to the prior.
+    /// The pulls to the prior.
     pub pulls: Vec<Pull>,
     /// The prior, moved inside the cones where it lies on their boundary.
     pub start: DVector<f64>,
 }
 
-/// What a constraint is about.
+/// Subject of a constraint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Subject {
     /// Pseudo-inertia of a body (0-based).
@@ -60,18 +60,18 @@ impl std::fmt::Display for Subject {
     }
 }
 
-/// What pulls a few entries of y to the prior: A y is to be near a.
+/// A pull of a few entries of y to the prior: A y is to be near a.
 #[derive(Debug, Clone)]
 pub struct Pull {
     columns: Vec<usize>,
     map: DMatrix<f64>,
     target: DVector<f64>,
-    /// The cone whose unit a is; `None` where the prior is zero, or as good as that.
+    /// The cone whose unit element a is; `None` where the prior is zero, or so small that it counts as unknown.
     cone: Option<Cone>,
 }
 
 impl Pull {
-    /// weight·½‖A y − a‖² as a part of ½ yᵀH y − cᵀy; returns weight·½‖a‖².
+    /// Adds weight·½‖A y − a‖² to ½ yᵀH y − cᵀy; returns weight·½‖a‖².
     fn add_square(&self, weight: f64, h: &mut DMatrix<f64>, c: &mut DVector<f64>) -> f64 {
         let Self { columns, map, target, .. } = self;
         for (a, &row) in columns.iter().enumerate() {
@@ -84,24 +84,24 @@ impl Pull {
     }
 }
 
-/// Share of the squared pull that is added to the entropic one.
+/// Share of the squared pull that is added to the entropic pull.
 pub const ENTROPIC_CURVATURE: f64 = 1e-4;
-/// Size of a drive parameter whose prior is zero (a URDF has no rotor inertia): what counts as
-/// a deviation of 100 %, as much as the first joints of an arm of 20 kg have, so that it pulls none to nothing. In kg m²,
-/// Nm s/rad and Nm.
+/// Deviation that counts as 100 % for a drive parameter whose prior is zero (a URDF has no rotor inertia), in kg m²,
+/// Nm s/rad and Nm. It is as large as in the first joints of an arm of 20 kg, so that the prior does not pull any
+/// drive parameter to zero.
 const UNKNOWN_ROTOR_INERTIA: f64 = 1.0;
 const UNKNOWN_FRICTION: f64 = 10.0;
-/// A drive parameter whose prior is less than this share of that was not measured (a URDF's damping of 0.1), and is pulled as gently
-/// as none.
+/// A prior of a drive parameter below this share of that size was not measured (a URDF's damping of 0.1), and pulls
+/// as gently as a missing one.
 const PLACEHOLDER: f64 = 0.02;
-/// A torque offset of this size counts as a deviation of 100 %, Nm: as gentle a pull as that of friction that is not known.
+/// Torque offset that counts as a deviation of 100 %, Nm: as gentle a pull as that of unknown friction.
 const USUAL_OFFSET_NM: f64 = 10.0;
-/// Priors below this share of their size are on the boundary.
+/// A drive's prior below this share of its size counts as lying on the boundary.
 const ON_BOUNDARY: f64 = 1e-2;
 
 impl Structure {
-    /// For the base set of `arm`; every pseudo-inertia is to be at least `margin` times the one
-    /// of `prior`, whose bodies must be possible.
+    /// The structure for the base set of `arm`. Every pseudo-inertia is to be at least `margin` times that of
+    /// `prior`, whose bodies must be physically possible.
     pub fn new(arm: &Arm, set: &BaseSet, prior: &Arm, margin: f64) -> Result<Self, PhysicalError> {
         let layout = ParameterLayout::new(arm.dof());
         let extra = unobservable(arm, set)?;
@@ -147,13 +147,14 @@ impl Structure {
         self.to_standard.len()
     }
 
-    /// The unknown that each base parameter is named after: no other base parameter has it, and it has the coefficient 1.
+    /// The unknown after which each base parameter is named: no other base parameter contains it, and its coefficient
+    /// is 1.
     pub fn kept(&self) -> Vec<usize> {
         let first = |row: RowDVector<f64>| row.iter().position(|&a| a != 0.0).unwrap_or_default();
         self.base_map.row_iter().map(|row| first(row.into_owned())).collect()
     }
 
-    /// Unknowns with K y = θ, as near to the prior as changing the kept ones alone makes them.
+    /// Unknowns with K y = θ, obtained from the prior by changing only the kept unknowns.
     pub fn with_base(&self, theta: &DVector<f64>) -> DVector<f64> {
         let mut y = self.start.clone();
         let missing = theta - &self.base_map * &y;
@@ -189,17 +190,17 @@ impl Structure {
         self.pulls.iter().map(|pull| pull.add_square(weight, h, c)).sum()
     }
 
-    /// A = Σ AᵀA of the pulls, n × n: the curvature at the prior of what pulls to it, per unit of its weight.
+    /// Σ AᵀA of the pulls, n × n: the curvature of the pull at the prior, per unit of its weight.
     pub fn pull_curvature(&self) -> DMatrix<f64> {
         let mut pulls = DMatrix::zeros(self.unknowns(), self.unknowns());
         self.add_pulls(1.0, &mut pulls, &mut DVector::zeros(self.unknowns()));
         pulls
     }
 
-    /// Adds weight·D of every pull, D = tr(A y) − ln det(A y) − d: the logarithm as a barrier among
-    /// `constraints`, the trace to −cᵀy; returns −Σ weight·d. Where the prior is zero there is no
-    /// logarithm, and the pull is the square. H is given `ENTROPIC_CURVATURE` of the square as well,
-    /// because data alone leave it singular.
+    /// Adds weight·D of every pull, D = tr(A y) − ln det(A y) − d. The logarithm becomes a barrier among
+    /// `constraints`, the trace a part of −cᵀy; returns −Σ weight·d. Where the prior is zero there is no logarithm,
+    /// and the pull is the square. H also gets `ENTROPIC_CURVATURE` of the square, because the data alone leave it
+    /// singular.
     pub fn add_divergences(
         &self,
         weight: f64,
@@ -229,7 +230,7 @@ impl Structure {
         constant
     }
 
-    /// Unknowns that the standard parameters in `range` depend on, and that block of E.
+    /// The unknowns on which the standard parameters in `range` depend, and the corresponding block of E.
     fn block(&self, range: std::ops::Range<usize>) -> (Vec<usize>, DMatrix<f64>) {
         let touches = |terms: &Terms| terms.iter().any(|(k, _)| range.contains(k));
         let columns: Vec<usize> =
@@ -245,9 +246,9 @@ impl Structure {
         (columns, block)
     }
 
-    /// svec(L₀⁻¹ P L₀⁻ᵀ) − margin·svec(1) ∈ semidefinite, P₀ = L₀L₀ᵀ the prior's pseudo-inertia: in
-    /// these coordinates the prior is the unit matrix and the pull-back
-    /// tr(P₀⁻¹ΔP P₀⁻¹ΔP) is the plain distance.
+    /// Adds the constraint and the pull of a link: svec(L₀⁻¹ P L₀⁻ᵀ) − margin·svec(1) ∈ semidefinite, with the
+    /// prior's pseudo-inertia P₀ = L₀L₀ᵀ. In these coordinates the prior is the unit matrix and the pull-back
+    /// tr(P₀⁻¹ΔP P₀⁻¹ΔP) is the squared Euclidean distance.
     fn add_link(
         &mut self,
         body: usize,
@@ -279,7 +280,7 @@ impl Structure {
         Ok(())
     }
 
-    /// parameter / size ≥ 0, pulled to prior / size.
+    /// Adds a drive parameter: parameter / size ≥ 0, pulled to prior / size.
     fn add_drive(&mut self, parameter: Parameter, standard: &[f64], unknown: f64) {
         let index = self.layout.index(parameter);
         let prior = standard[index].max(0.0);
@@ -309,7 +310,7 @@ impl Structure {
         }
     }
 
-    /// The robot file's bounds: mass, and centre of mass as m·low ≤ m·ρ ≤ m·high.
+    /// Adds the robot file's bounds: on the mass, and on the centre of mass as m·low ≤ m·ρ ≤ m·high.
     fn add_bounds(&mut self, body: usize, joint: &crate::robot::Joint) {
         let (columns, block) = self.block(10 * body..10 * body + 10);
         let mass_kg = joint.link.mass_kg();
@@ -342,7 +343,7 @@ impl Structure {
         self.constraints.push(Constraint { cone, columns, map, offset, barrier: 0.0 });
     }
 
-    /// The prior itself must satisfy every bound.
+    /// Checks that the prior itself satisfies every constraint.
     fn check_start(&self) -> Result<(), PhysicalError> {
         for (constraint, &subject) in self.constraints.iter().zip(&self.subjects) {
             let margin = constraint.margin(&self.start);
@@ -354,9 +355,8 @@ impl Structure {
     }
 }
 
-/// Standard parameters of the bodies that no torque of `arm` depends on and that the base set's
-/// parameterisation leaves out: a reduced set drops them together with what it sets to zero, but
-/// they are free.
+/// Standard parameters of the bodies on which no torque of `arm` depends and which the base set's parameterisation
+/// leaves out. A reduced set drops them together with the parameters that it sets to zero, but these are free.
 fn unobservable(arm: &Arm, set: &BaseSet) -> Result<Vec<usize>, PhysicalError> {
     let layout = ParameterLayout::new(arm.dof());
     if set.parameterisation.count() >= layout.count_without_offsets() {

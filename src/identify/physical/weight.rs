@@ -1,5 +1,4 @@
-//! The pull to the prior: how it measures deviations, and its weight, given or chosen by
-//! cross-validation.
+//! The pull to the prior: its metric, and its weight, given or chosen by cross-validation.
 
 use std::str::FromStr;
 
@@ -10,17 +9,17 @@ use super::error::PhysicalError;
 use super::estimate::{ROUGH_GAP, Solver};
 use super::information::Information;
 
-/// How a deviation from the prior is measured. Both are ½ tr(P₀⁻¹ΔP P₀⁻¹ΔP) for small deviations and
-/// do not depend on the choice of frames and units.
+/// How a deviation from the prior is measured. Both metrics are ½ tr(P₀⁻¹ΔP P₀⁻¹ΔP) for small deviations and
+/// independent of the choice of frames and units.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
 #[value(rename_all = "snake_case")]
 pub enum PriorMetric {
-    /// ½ tr(P₀⁻¹ΔP P₀⁻¹ΔP): the square of the distance in the tangent space at the prior.
+    /// ½ tr(P₀⁻¹ΔP P₀⁻¹ΔP): half the squared distance in the tangent space at the prior.
     #[default]
     PullBack,
-    /// tr(P₀⁻¹P) − ln det(P₀⁻¹P) − 4: the relative entropy of Gaussian densities of mass, infinite
-    /// where a body ceases to exist.
+    /// tr(P₀⁻¹P) − ln det(P₀⁻¹P) − 4: twice the relative entropy of Gaussian mass densities, infinite on the boundary
+    /// of bodies that can exist.
     Entropic,
 }
 
@@ -54,18 +53,19 @@ impl Pulling {
     }
 }
 
-/// γ: a relative deviation of s from the prior costs as much as one σ of noise when γ = 1/s².
+/// The weight γ: with γ = 1/s², a relative deviation of s from the prior costs as much as one σ of noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PriorWeight {
     /// This weight.
     Fixed(f64),
-    /// The one that predicts left-out periods best.
+    /// The weight that predicts left-out periods best.
     CrossValidated,
 }
 
 impl PriorWeight {
-    /// A deviation of 100 % from the prior is one σ: what the data know to less than that they decide. A weaker pull leaves what
-    /// they hardly know to their noise, and links of a thousandth of their mass come out.
+    /// With this weight a deviation of 100 % from the prior costs one σ: the prior decides what the data know less
+    /// well than that. A weaker pull leaves parameters that the data hardly determine to their noise, and links of a
+    /// thousandth of their mass result.
     pub const WEAK: f64 = 1.0;
 }
 
@@ -84,7 +84,7 @@ impl std::fmt::Display for PriorWeight {
     }
 }
 
-/// What asks for cross-validation.
+/// The word that asks for cross-validation.
 const AUTO: &str = "auto";
 
 impl FromStr for PriorWeight {
@@ -99,20 +99,20 @@ impl FromStr for PriorWeight {
     }
 }
 
-/// Weights tried and how they predicted.
+/// The weights tried and their prediction errors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CrossValidation {
     /// The best of them.
     pub weight: f64,
-    /// (γ, mean squared prediction error of a left-out period per base parameter, in units of that
-    /// period's noise; 1 + 1/(P − 1) is what noise alone leaves).
+    /// (γ, mean squared prediction error of a left-out period per base parameter, in units of that period's noise).
+    /// Noise alone leaves 1 + 1/(P − 1).
     pub tried: Vec<(f64, f64)>,
 }
 
-/// From "decides nothing" to "10 % deviation is one σ".
+/// Weights from "the prior decides nothing" to "a deviation of 10 % is one σ".
 const CANDIDATES: [f64; 7] = [1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2];
 
-/// Leaves out one period after the other.
+/// Chooses the weight by leaving out one period after the other.
 pub(super) fn cross_validate(
     solver: &Solver,
     information: &Information,
@@ -124,7 +124,7 @@ pub(super) fn cross_validate(
         return Err(PhysicalError::TooFewPeriods { periods: count });
     }
     let p = count as f64;
-    // R counts all periods; P − 1 of them know less, one of them less still.
+    // R contains the information of all P periods. P − 1 periods contain less, a single one 1/P.
     let kept_root = &information.root * ((p - 1.0) / p).sqrt();
     let single_root = &information.root / p.sqrt();
     let kept_information = Information { root: kept_root, theta: information.theta.clone() };
@@ -134,7 +134,7 @@ pub(super) fn cross_validate(
         let mut error = 0.0;
         for left_out in periods {
             let left_out = DVector::from_column_slice(left_out);
-            // What the others have on average, less the average of all.
+            // Mean of the other periods minus the mean of all.
             let away = (&information.theta - &left_out) / (p - 1.0);
             let constrained = solver.solve(&data, &(&kept_information.root * away), ROUGH_GAP)?;
             let predicted = &solver.structure().base_map * &constrained.y;

@@ -1,4 +1,4 @@
-//! Zeros that are zeros.
+//! Sets entries of the solution that are zero exactly to zero.
 
 use nalgebra::{Cholesky, DVector, Dyn};
 
@@ -6,8 +6,9 @@ use super::{ConeProgram, Constraint, Point};
 use crate::identify::physical::cone::Cone;
 
 impl ConeProgram {
-    /// Puts entries of y that are pressed on zero there, one by one, where that does not widen the `gap`: what the iteration leaves
-    /// of them is round-off, and would be told as a number. The other entries give way as `stiffness` has it.
+    /// Sets entries of y that a constraint presses onto zero to zero, one by one, where that does not widen the
+    /// `gap`: the iteration leaves round-off in them, which would be reported as a number. The other entries follow
+    /// according to `stiffness`.
     pub(super) fn settle(
         &self,
         point: &mut Point,
@@ -42,7 +43,7 @@ impl ConeProgram {
 }
 
 impl Constraint {
-    /// The entry of y that it keeps from being negative, where it says no more than that.
+    /// The entry of y that the constraint keeps from being negative, where this is all the constraint states.
     fn non_negative(&self) -> Option<usize> {
         match (self.cone, &self.columns[..]) {
             (Cone::NonNegative, &[column]) if self.barrier == 0.0 && self.offset[0] == 0.0 => {
