@@ -1,7 +1,7 @@
-//! Which combinations of parameters can be known: section III-D of the paper.
+//! Base parameters, the combinations of parameters that can be identified: section III-D of the paper.
 //!
-//! Enters: an arm and a [`Parameterisation`] of its equations of motion. Leaves: a [`BaseSet`]:
-//! the independent columns, left to right, and the combinations that go with them, by name.
+//! Enters: an arm and a [`Parameterisation`] of its equations of motion. Leaves: a [`BaseSet`]: the independent
+//! columns, from left to right, and the corresponding combinations of parameters, by name.
 
 mod parameterisation;
 mod set;

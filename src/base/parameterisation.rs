@@ -1,4 +1,4 @@
-//! Which parameters a model has: all standard ones, or a chosen few about chosen frames.
+//! The parameters of a model: all standard ones, or a chosen few in chosen frames.
 
 use nalgebra::{Matrix3, Vector3};
 use thiserror::Error;
@@ -24,7 +24,7 @@ pub struct Parameterisation {
     pub from_standard: Vec<Terms>,
 }
 
-/// The parameterisation does not exist for this arm.
+/// The reason why a parameterisation does not exist for an arm.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ParameterisationError {
     /// `--reduced` names nothing known.
@@ -46,7 +46,7 @@ pub enum ParameterisationError {
         /// Distance from the joint axis, m.
         distance_m: f64,
     },
-    /// The same, of its number of joints.
+    /// The paper's set is tied to the UR5's number of joints.
     #[error(
         "the paper's reduced set is stated for the UR5 with its {PAPER_DOF} joints: \"{robot}\" has {joints}"
     )]
@@ -56,7 +56,7 @@ pub enum ParameterisationError {
         /// Its joints.
         joints: usize,
     },
-    /// The same, of the directions of its axes.
+    /// The paper's set is tied to the directions of the UR5's axes.
     #[error(
         "the paper's reduced set is stated for the UR5: frame {body} of \"{robot}\" should be turned by right angles \
          against the paper's, and an entry of its rotation is {difference:.1e} off"
@@ -85,7 +85,7 @@ impl Parameterisation {
         }
     }
 
-    /// All standard parameters of `arm`, or the set that `--reduced` names.
+    /// All standard parameters of `arm`, or the reduced set named by `--reduced`.
     pub fn of(arm: &Arm, reduced: Option<&str>) -> Result<Self, ParameterisationError> {
         match reduced {
             Some(name) => Self::reduced(name, arm),
@@ -93,7 +93,7 @@ impl Parameterisation {
         }
     }
 
-    /// The set `--reduced` names.
+    /// The reduced set named by `--reduced`.
     pub fn reduced(name: &str, arm: &Arm) -> Result<Self, ParameterisationError> {
         match name {
             "paper" => Self::paper(arm),
@@ -101,12 +101,12 @@ impl Parameterisation {
         }
     }
 
-    /// The reduced set of section IV-A: no products of inertia, one coordinate of the centre of
-    /// mass per body (2: z, 3: z, 4: y, 5: z, 6: y), of body 1 only C; 44 parameters in the order
-    /// C₁; m, m·com, A, B, C of bodies 2…6; Ia, rv, rc.
+    /// The reduced set of section IV-A: no products of inertia, one coordinate of the centre of mass per body (2: z,
+    /// 3: z, 4: y, 5: z, 6: y), and only C of body 1. It has 44 parameters in the order C₁; m, m·com, A, B, C of
+    /// bodies 2…6; Ia, rv, rc.
     ///
-    /// They are about the paper's frames, which are parallel to each other with the arm upright
-    /// (q₂ = q₄ = −π/2 in UR angles, others 0) and turned by π about z against the UR base frame.
+    /// They refer to the paper's frames, which are parallel to each other with the arm upright (q₂ = q₄ = −π/2 in UR
+    /// angles, others 0) and turned by π about z against the UR base frame.
     pub fn paper(arm: &Arm) -> Result<Self, ParameterisationError> {
         let frames = paper_frames(arm)?;
         let layout = ParameterLayout::new(PAPER_DOF);
@@ -175,13 +175,13 @@ fn terms(body: usize, coefficients: impl IntoIterator<Item = f64>) -> Terms {
 
 const PAPER_DOF: usize = 6;
 
-/// Coordinate of the centre of mass that is kept per body: index into [`BODY_PARAMETERS`].
+/// Coordinate of the centre of mass that each body keeps: index into [`BODY_PARAMETERS`].
 const PAPER_COM_AXIS: [Option<usize>; PAPER_DOF] =
     [None, Some(3), Some(3), Some(2), Some(3), Some(2)];
 
-/// Origins of the paper's frames 2…6 in their parent frame, m, from the coefficients of (30):
-/// 0.11336² = 0.01285, 0.39225² = 0.1539, 0.10915² = 0.01191, 0.09465² = 0.008959. Frame 2 is moved
-/// along its own axis, as section III-D explains, and frame 3 is back in the plane of axis 1.
+/// Origins of the paper's frames 2…6 in their parent frames, m, from the coefficients of (30): 0.11336² = 0.01285,
+/// 0.39225² = 0.1539, 0.10915² = 0.01191, 0.09465² = 0.008959. Frame 2 is displaced along its own axis, as section
+/// III-D explains, and frame 3 is back in the plane of axis 1.
 const PAPER_ORIGINS_M: [[f64; 3]; PAPER_DOF] = [
     [0.0, 0.0, 0.0],
     [0.0, 0.11336, 0.0],
@@ -197,7 +197,7 @@ const PAPER_ZERO_RAD: [f64; PAPER_DOF] = {
     [0.0, -quarter, 0.0, -quarter, 0.0, 0.0]
 };
 
-/// Frames of the UR5 are the paper's up to this, m and entries of rotations.
+/// Tolerance within which frames of the UR5 count as the paper's, in m and in entries of rotations.
 const ROUND_OFF: f64 = 1e-9;
 
 /// Pose of each joint frame in the paper's frame of the same body.
@@ -214,14 +214,14 @@ fn paper_frames(arm: &Arm) -> Result<Vec<Placement>, ParameterisationError> {
         origin += rotation * Vector3::from(PAPER_ORIGINS_M[body]);
         let frame = Placement { rotation, translation_m: origin };
         let mut relative = frame.inverse().compose(joint);
-        // The frame's origin must lie on the joint axis, or its parameters would be other ones.
+        // The frame's origin must lie on the joint axis; otherwise its parameters would have another meaning.
         let axis = joint.rotation.column(2).into_owned();
         let distance_m = (origin - joint.translation_m).cross(&axis).norm();
         if distance_m > ROUND_OFF {
             let robot = arm.name.clone();
             return Err(ParameterisationError::NotAUr5 { robot, body: body + 1, distance_m });
         }
-        // All rotations are quarter turns here; cos(π/2) = 6e-17 must not smear the coefficients.
+        // All rotations here are quarter turns; rounding keeps cos(π/2) = 6e-17 out of the coefficients.
         let whole = relative.rotation.map(f64::round);
         let difference = (relative.rotation - whole).amax();
         if difference > ROUND_OFF {
@@ -250,7 +250,7 @@ mod tests {
         assert!(seven.to_string().contains("6 joints: \"ur5\" has 7"), "{seven}");
         let longer = refused(|arm| arm.joints[2].placement.translation_m.x -= 0.1);
         assert!(matches!(longer, ParameterisationError::NotAUr5 { body: 3, .. }), "{longer}");
-        // A zero of joint 6 elsewhere: its frame stays on its axis.
+        // Joint 6 has another zero; the origin of its frame stays on its axis.
         let turned = refused(|arm| {
             let turn = Placement::from_xyz_rpy([0.0; 3], [0.0, 0.0, 0.3]);
             arm.joints[5].placement = arm.joints[5].placement.compose(&turn);

@@ -1,4 +1,4 @@
-//! The base parameters: which combinations can be known at all.
+//! Finds the base parameters, the combinations of parameters that can be identified.
 
 use nalgebra::{DMatrix, DVector};
 use rand::rngs::ChaCha8Rng;
@@ -10,23 +10,23 @@ use crate::dynamics::{Model, Workspace, regressor};
 use crate::number::significant;
 use crate::robot::Arm;
 
-/// Columns of a parameterisation that are independent for almost every motion, and the
-/// combinations of parameters that go with them: the paper's (15).
+/// Columns of a parameterisation that are independent for almost every motion, and the corresponding combinations of
+/// parameters: the paper's (15).
 #[derive(Debug, Clone, PartialEq)]
 pub struct BaseSet {
-    /// The model's parameters.
+    /// The parameterisation from which the columns were selected.
     pub parameterisation: Parameterisation,
     /// Independent columns, left to right: indices into the parameterisation.
     pub independent: Vec<usize>,
-    /// One base parameter per independent column; the kept parameter is the first term
-    /// (coefficient 1), the others are indices into the parameterisation.
+    /// One base parameter per independent column, as terms over the parameterisation: first the kept parameter
+    /// (coefficient 1), then the parameters of dependent columns.
     pub combinations: Vec<Terms>,
-    /// How clearly the rank was told.
+    /// How clearly the rank was determined.
     pub gap: RankGap,
 }
 
-/// Distance of a column from the span of those before it, relative to its length: smallest among
-/// the independent columns, largest among the dependent ones.
+/// Smallest distance of an independent column, and largest of a dependent one, from the span of the columns before
+/// it, relative to the column's length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RankGap {
     /// Smallest ratio that counted as independent.
@@ -35,7 +35,7 @@ pub struct RankGap {
     pub largest_dependent: f64,
 }
 
-/// The rank of the regressor cannot be told from rounding errors.
+/// The rank of the regressor cannot be determined, because a column may be dependent except for rounding errors.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error(
     "the rank is not clear: column {column} stands {ratio:.2e} of its length off the columns before \
@@ -49,11 +49,11 @@ pub struct AmbiguousRank {
     pub ratio: f64,
 }
 
-/// Below this a column is dependent: rounding of 1200 rows at double precision stays under 1e-13.
+/// Relative distance below which a column is dependent: rounding of 1200 rows at double precision stays under 1e-13.
 const DEPENDENT_BELOW: f64 = 1e-10;
-/// Above this a column is independent. Between the two the answer would be a guess.
+/// Relative distance above which a column is independent. Between the two thresholds the answer would be a guess.
 const INDEPENDENT_ABOVE: f64 = 1e-7;
-/// Random states stacked: 6 rows each, far more rows than columns.
+/// Number of random states, with one row per joint each: far more rows than columns.
 const STATES: usize = 200;
 /// Coefficients below this are rounding and are left out.
 const NEGLIGIBLE: f64 = 1e-9;
@@ -61,11 +61,10 @@ const NEGLIGIBLE: f64 = 1e-9;
 impl BaseSet {
     /// Finds the independent columns of `parameterisation` from left to right.
     ///
-    /// The regressor is stacked over random states (fixed seed: the answer is the same every
-    /// time). Column by column, the part outside the span of the columns kept so far is computed
-    /// by Gram–Schmidt with reorthogonalisation: a column is kept when that part is not rounding,
-    /// otherwise its coefficients β on the kept columns say where its parameter goes:
-    /// p_B,k = p_k + Σ_d β_kd p_d.
+    /// The regressor is stacked over random states (with a fixed seed, so that the answer is always the same). For
+    /// each column in turn, Gram–Schmidt with reorthogonalisation computes the part outside the span of the columns
+    /// kept so far. A column is kept when that part is more than rounding. Otherwise its coefficients β on the kept
+    /// columns state to which base parameters its parameter contributes: p_B,k = p_k + Σ_d β_kd p_d.
     pub fn find(arm: &Arm, parameterisation: Parameterisation) -> Result<Self, AmbiguousRank> {
         let stacked = random_regressor(arm, &parameterisation);
         let mut directions: Vec<DVector<f64>> = Vec::new();
@@ -76,7 +75,7 @@ impl BaseSet {
         let longest = stacked.column_iter().map(|c| c.norm()).fold(0.0, f64::max);
         for (c, column) in stacked.column_iter().enumerate() {
             let length = column.norm();
-            // A column of rounding errors (a structural zero) is no direction at all.
+            // A column of rounding errors (a structural zero) has no direction.
             if length < DEPENDENT_BELOW * longest {
                 continue;
             }
@@ -118,7 +117,7 @@ impl BaseSet {
         self.independent.len()
     }
 
-    /// Name of base parameter `k`: that of its kept column.
+    /// Name of base parameter `k`, which is that of its kept column.
     pub fn name(&self, k: usize) -> &str {
         &self.parameterisation.names[self.independent[k]]
     }
@@ -128,7 +127,7 @@ impl BaseSet {
         self.parameterisation.units[self.independent[k]]
     }
 
-    /// The whole combination in words, such as `A3 - C3 + 0.1539 m4`.
+    /// The whole combination as text, such as `A3 - C3 + 0.1539 m4`.
     pub fn formula(&self, k: usize) -> String {
         let mut text = String::new();
         for (position, &(index, coefficient)) in self.combinations[k].iter().enumerate() {
@@ -159,7 +158,7 @@ impl BaseSet {
     }
 }
 
-/// A coefficient with four significant digits, without the zeros at its end.
+/// A coefficient with four significant digits, without trailing zeros.
 fn in_words(coefficient: f64) -> String {
     let text = significant(coefficient, 4);
     match text.contains('.') && !text.contains('e') {
@@ -193,7 +192,7 @@ fn random_regressor(arm: &Arm, parameterisation: &Parameterisation) -> DMatrix<f
     stacked
 }
 
-/// β of R β = c, R given by its columns.
+/// Solves R β = c for β, with R given by its columns.
 fn back_substitute(columns: &[Vec<f64>], mut c: Vec<f64>) -> Vec<f64> {
     for k in (0..c.len()).rev() {
         c[k] /= columns[k][k];

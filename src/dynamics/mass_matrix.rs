@@ -57,7 +57,7 @@ pub fn forward_dynamics(
     torque_nm: &[f64],
     qdd_rad_s2: &mut [f64],
 ) -> Result<(), NotPositiveDefinite> {
-    // The workspace's memory is on loan while the functions below use the rest of it.
+    // These parts of the workspace are taken out while the functions below borrow the workspace.
     let mut bias_nm = std::mem::take(&mut ws.bias_nm);
     let rest = std::mem::take(&mut ws.no_acceleration);
     let mut mass = std::mem::take(&mut ws.mass_matrix);
@@ -104,7 +104,7 @@ pub fn kinetic_energy(
     0.5 * twice
 }
 
-/// Potential energy −Σ_i gᵀ(m p_i + R_i h_i) of the links, J; zero with all mass at the base origin.
+/// Potential energy −Σ_i gᵀ(m p_i + R_i h_i) of the links, J; zero if all mass is at the base origin.
 pub fn potential_energy(model: &Model, q_rad: &[f64]) -> f64 {
     // Gravity and the base origin carried into each body's frame.
     let mut gravity: Vec3<f64> = Vec3::constant(model.gravity);

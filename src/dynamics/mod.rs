@@ -1,8 +1,8 @@
-//! What the arm obeys: M(q) q̈ + c(q, q̇) + g(q) + Q_R(q̇) = Q_M (the paper's (1)), its linear form
+//! Equations of motion of the arm: M(q) q̈ + c(q, q̇) + g(q) + Q_R(q̇) = Q_M (the paper's (1)), their linear form
 //! Θ(q, q̇, q̈) p = Q_M (13), mass matrix, forward dynamics and energies.
 //!
-//! Enters: an [`Arm`](crate::robot::Arm). Leaves: an immutable [`Model`] and functions
-//! `f(&Model, &mut Workspace, …)` over one sample, over eight at once, or over a whole [`Motion`].
+//! Enters: an [`Arm`](crate::robot::Arm). Leaves: an immutable [`Model`] and functions `f(&Model, &mut Workspace, …)`
+//! over one sample, over eight at once, or over a whole [`Motion`].
 
 mod mass_matrix;
 mod model;

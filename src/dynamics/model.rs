@@ -1,4 +1,4 @@
-//! The arm as the algorithms see it: constants only.
+//! Constants of an arm for the algorithms of this chapter.
 
 use nalgebra::Matrix3;
 
@@ -23,7 +23,7 @@ pub(super) struct Body {
     rotation: [[f64; 3]; 3],
     /// Child origin in the parent frame, m.
     pub(super) origin: [f64; 3],
-    /// The paper's (7).
+    /// The ten inertial parameters of the paper's (7).
     pub(super) inertial: [f64; 10],
     pub(super) rotor_inertia: f64,
     pub(super) viscous: f64,
@@ -82,7 +82,7 @@ impl Model {
 }
 
 impl Body {
-    /// A parent-frame vector in the body's frame: `Rz(−q) R₀ᵀ v`.
+    /// Transforms a vector from the parent's frame into the body's: `Rz(−q) R₀ᵀ v`.
     #[inline(always)]
     pub(super) fn to_child<T: Real>(&self, (sin, cos): (T, T), v: Vec3<T>) -> Vec3<T> {
         let r = &self.rotation;
@@ -92,7 +92,7 @@ impl Body {
         Vec3::new(cos * x + sin * y, cos * y - sin * x, z)
     }
 
-    /// A body-frame vector in the parent's frame: `R₀ Rz(q) v`.
+    /// Transforms a vector from the body's frame into the parent's: `R₀ Rz(q) v`.
     #[inline(always)]
     pub(super) fn to_parent<T: Real>(&self, (sin, cos): (T, T), v: Vec3<T>) -> Vec3<T> {
         let r = &self.rotation;

@@ -50,7 +50,7 @@ impl Model {
     }
 }
 
-/// Torque of every drive, Nm, before friction takes its part: the paper's (1) with (2)–(4),
+/// Torque of every drive at its joint, Nm, friction included: the paper's (1) with (2)–(4),
 ///
 /// τ = M(q) q̈ + c(q, q̇) + g(q) + Ia q̈ + rv q̇ + rc tanh(q̇/ε).
 ///
@@ -69,7 +69,7 @@ pub fn inverse_dynamics<T: Real>(
     }
 }
 
-/// Torque that moves the links alone: M_links(q) q̈ + c(q, q̇) + g(q), without rotors and friction.
+/// Torque of the links alone, M_links(q) q̈ + c(q, q̇) + g(q), without rotors and friction.
 #[inline(always)]
 pub fn rigid_torque<T: Real>(
     model: &Model,

@@ -5,9 +5,9 @@ use crate::robot::{Arm, LinkInertia};
 /// The ten inertial parameters of a body in the paper's order (7).
 pub const BODY_PARAMETERS: [&str; 10] = ["m", "mx", "my", "mz", "A", "B", "C", "D", "E", "F"];
 
-/// Order of the standard parameters of an arm of N joints: body by body `m mx my mz A B C D E F`,
-/// then `Ia` (i_G² C_M), `rv`, `rc` of all joints, then `off` (constant torque). The paper's (13)
-/// with its 13 N entries, and N offsets behind them.
+/// Order of the standard parameters of an arm of N joints: body by body `m mx my mz A B C D E F`, then `Ia` (i_G²
+/// C_M), `rv`, `rc` of all joints, then `off` (constant torque). These are the 13 N entries of the paper's (13),
+/// followed by N offsets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ParameterLayout {
     dof: usize,
@@ -44,7 +44,7 @@ impl ParameterLayout {
         13 * self.dof
     }
 
-    /// What stands at `index`.
+    /// The parameter at `index`.
     pub fn parameter(&self, index: usize) -> Parameter {
         let n = self.dof;
         match index {
@@ -56,7 +56,7 @@ impl ParameterLayout {
         }
     }
 
-    /// Where `parameter` stands.
+    /// The index of `parameter`.
     pub fn index(&self, parameter: Parameter) -> usize {
         let n = self.dof;
         match parameter {
@@ -68,7 +68,7 @@ impl ParameterLayout {
         }
     }
 
-    /// Name such as `mx3`, `Ia1`, `rv6`: the body's or joint's number (from 1) behind the symbol.
+    /// Name such as `mx3`, `Ia1`, `rv6`: the symbol and the number of the body or joint, from 1.
     pub fn name(&self, index: usize) -> String {
         match self.parameter(index) {
             Parameter::Body(body, k) => format!("{}{}", BODY_PARAMETERS[k], body + 1),
@@ -79,8 +79,8 @@ impl ParameterLayout {
         }
     }
 
-    /// `arm` with other standard parameters (at least 13 N of them). Constant torques have no place in
-    /// an [`Arm`] and are not taken over.
+    /// `arm` with the standard parameters `standard` (at least 13 N). Constant torques have no place in an [`Arm`]
+    /// and are ignored.
     pub fn apply(&self, standard: &[f64], arm: &Arm) -> Arm {
         let value = |parameter| standard[self.index(parameter)];
         let mut arm = arm.clone();
@@ -94,7 +94,7 @@ impl ParameterLayout {
         arm
     }
 
-    /// SI unit.
+    /// SI unit of the parameter at `index`.
     pub fn unit(&self, index: usize) -> &'static str {
         match self.parameter(index) {
             Parameter::Body(_, 0) => "kg",

@@ -1,9 +1,9 @@
-//! The scalar the dynamics is written over: one number, or several samples side by side.
+//! The scalar type of the dynamics: one number, or several samples side by side.
 
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
-/// Arithmetic the algorithms of this chapter need. Implemented for `f64` (one sample), for
-/// [`Lanes`] (eight samples at once) and, where derivatives are wanted, for dual numbers.
+/// Arithmetic that the algorithms of this chapter need. Implemented for `f64` (one sample), for [`Lanes`] (eight
+/// samples at once) and, where derivatives are needed, for dual numbers.
 pub trait Real:
     Copy
     + Add<Output = Self>
@@ -144,10 +144,10 @@ impl Real for Lanes {
     }
 }
 
-/// Does `work` with the widest registers of the machine, chosen at run time.
+/// Runs `work` with the widest registers of the machine, chosen at run time.
 ///
-/// Only what the compiler inlines gets them: `work` and what it calls are to be `#[inline(always)]`. No fused multiply-add is
-/// used, so that all machines give the same bits.
+/// Only code that the compiler inlines uses them: `work` and everything it calls should be `#[inline(always)]`. No
+/// fused multiply-add is used, so that all machines give the same bits.
 #[inline]
 pub fn with_widest_registers<R>(work: impl FnMut() -> R) -> R {
     struct Work<F>(F);
@@ -162,14 +162,14 @@ pub fn with_widest_registers<R>(work: impl FnMut() -> R) -> R {
     pulp::Arch::new().dispatch(Work(work))
 }
 
-/// `f(a, b)` of all pairs, in place of `a`: eight at a time, in registers where `f` is `#[inline(always)]` and so is called
-/// [`with_widest_registers`].
+/// Replaces every `a` by `f(a, b)`, eight at a time. The eight run in registers if `f` is `#[inline(always)]` and so
+/// is the code that calls this function [`with_widest_registers`].
 #[inline(always)]
 pub fn map_pairs(a: &mut [f64], b: &[f64], f: impl Fn(f64, f64) -> f64) {
     let (a_whole, a_rest) = a.as_chunks_mut::<LANES>();
     let (b_whole, b_rest) = b.as_chunks::<LANES>();
     for (a, b) in a_whole.iter_mut().zip(b_whole) {
-        // A place of its own, which nothing that `f` refers to can be.
+        // A local buffer, to which nothing inside `f` can refer.
         let mut out = [0.0; LANES];
         for k in 0..LANES {
             out[k] = f(a[k], b[k]);
@@ -225,8 +225,8 @@ fn sin_cos(x: f64) -> (f64, f64) {
     (f64::from_bits(sin_abs.to_bits() ^ sin_sign), f64::from_bits(cos_abs.to_bits() ^ cos_sign))
 }
 
-/// exp(y) = 2ᵏ p: 2ᵏ and p − 1, |ln p| ≤ ln 2 / 2, which small y leave their relative accuracy. |y| ≤ 708 keeps 2ᵏ a normal
-/// number.
+/// Splits exp(y) = 2ᵏ p, |ln p| ≤ ln 2 / 2, and returns 2ᵏ and p − 1, so that small y keep their relative accuracy.
+/// |y| ≤ 708 keeps 2ᵏ a normal number.
 #[inline(always)]
 #[allow(clippy::excessive_precision)]
 fn exponential(y: f64) -> (f64, f64) {
@@ -256,7 +256,8 @@ fn exponential(y: f64) -> (f64, f64) {
     (power, r + r * r * tail)
 }
 
-/// Exponential function without branches. Error below 2 units in the last place for |x| ≤ 708; what is larger is taken for that.
+/// Exponential function without branches. Error below 2 units in the last place for |x| ≤ 708; arguments beyond ±708
+/// are replaced by ±708.
 #[inline(always)]
 fn exp(x: f64) -> f64 {
     let bounded = if x.abs() > 708.0 { 708f64.copysign(x) } else { x };
@@ -283,8 +284,8 @@ mod tests {
 
     #[test]
     fn sine_and_cosine_agree_with_the_library_to_rounding() {
-        // Near a zero of the function the reduced angle itself is only known to half a unit of the
-        // argument's last reduction step, hence the absolute floor of one unit of 1.
+        // Near a zero of the function the reduced angle is known only to half a unit of the argument's last reduction
+        // step, hence the absolute floor of one unit of 1.
         for k in 0..400_000 {
             let x = (k as f64 - 200_000.0) * 0.000_317 + 1e-9 * k as f64;
             let (s, c) = sin_cos(x);

@@ -1,13 +1,13 @@
-//! The regressor Θ(q, q̇, q̈) of the paper's (13): torque linear in the standard parameters.
+//! The regressor Θ(q, q̇, q̈) of the paper's (13): torque is linear in the standard parameters.
 //!
-//! Per body i and joint j ≤ i, with the body's motion (ω, α, a; a minus gravity) and its Jacobian
-//! column (s, v: angular and linear velocity of frame i per unit speed of joint j) in frame i,
-//! d'Alembert's principle gives the torque of joint j
+//! For body i and joint j ≤ i, with the body's motion (ω, α, a; a minus gravity) and its Jacobian column (s, v:
+//! angular and linear velocity of frame i per unit speed of joint j) in frame i, d'Alembert's principle gives the
+//! torque of joint j
 //!
 //! τ_j = s·(J α + ω × J ω + h × a) + v·(m a + α × h + ω × (ω × h)),
 //!
-//! linear in the body's ten parameters (m, h = mρ, J). Joints j > i do not feel body i: only the
-//! 10·N(N+1)/2 structurally non-zero entries are computed and stored.
+//! which is linear in the body's ten parameters (m, h = mρ, J). The torque of a joint j > i does not depend on body
+//! i: only the 10·N(N+1)/2 structurally non-zero entries are computed and stored.
 
 use nalgebra::DMatrix;
 
@@ -94,8 +94,8 @@ pub fn regressor(
 
 /// The structurally non-zero columns of the regressor over a block of consecutive samples.
 ///
-/// Joint j's row sees the bodies j…N−1 and its own drive. Each such column is one contiguous run
-/// of samples; a block of a few hundred samples stays in cache while it is consumed.
+/// Joint j's row contains the bodies j…N−1 and its own drive. Each of these columns is one contiguous run of samples;
+/// a block of a few hundred samples stays in cache while it is used.
 #[derive(Debug, Clone)]
 pub struct RegressorBlock {
     pub(super) dof: usize,
@@ -126,7 +126,7 @@ impl RegressorBlock {
         self.samples
     }
 
-    /// Most samples it can hold.
+    /// Largest number of samples the block can hold.
     pub fn capacity(&self) -> usize {
         self.capacity
     }
@@ -138,16 +138,15 @@ impl RegressorBlock {
         Some(&self.columns[start..start + self.samples])
     }
 
-    /// The same column, to be written: for blocks that hold weights on a regressor.
+    /// The same column for writing, in blocks that hold weights on a regressor.
     pub fn column_mut(&mut self, joint: usize, parameter: Parameter) -> Option<&mut [f64]> {
         let start = self.start(joint, parameter)?;
         Some(&mut self.columns[start..start + self.samples])
     }
 
-    /// Makes this a block of `samples` zeros, to be written column by column.
+    /// Sets the block to `samples` samples of zeros, to be written column by column.
     ///
-    /// # Panics
-    /// If `samples` exceeds the capacity.
+    /// # Panics If `samples` exceeds the capacity.
     pub fn set_samples(&mut self, samples: usize) {
         assert!(samples <= self.capacity);
         self.samples = samples;
@@ -202,7 +201,7 @@ impl RegressorBlock {
             for (lanes, source) in state.iter_mut().zip(sources) {
                 for (j, lane) in lanes.iter_mut().enumerate() {
                     let series = &source.joint(j)[start + k..start + k + width];
-                    // A short last group repeats its last sample: valid numbers that nobody reads.
+                    // A short last group repeats its last sample: valid numbers that are never read.
                     lane.0 = std::array::from_fn(|l| series[l.min(width - 1)]);
                 }
             }
@@ -269,7 +268,7 @@ mod tests {
             for j in 0..6 {
                 for c in 0..layout.count() {
                     let stored = block.column(j, layout.parameter(c)).map_or(0.0, |v| v[k]);
-                    // Adding zero makes the two zeros one.
+                    // Adding zero turns −0 into +0.
                     let same = (theta[(j, c)] + 0.0).to_bits() == (stored + 0.0).to_bits();
                     assert!(same, "joint {j}, {}: {} {stored}", layout.name(c), theta[(j, c)]);
                 }

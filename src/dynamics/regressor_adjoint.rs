@@ -1,14 +1,13 @@
-//! Derivatives of the regressor by the motion, contracted with weights: what a gradient of any
-//! function of Θ needs, without ever forming the 18·N·13N numbers of ∂Θ/∂(q, q̇, q̈).
+//! Derivatives of the regressor with respect to the motion, contracted with weights: they yield the gradient of any
+//! function of Θ without ever forming the 18·N·13N numbers of ∂Θ/∂(q, q̇, q̈).
 //!
-//! A function f of Θ with B = ∂f/∂Θ changes by Σ B_jc dΘ_jc. Row j of Θ contracted with row j of B is
-//! the torque of joint j of an arm whose parameters are B_j. So per body i and joint j ≤ i, with
-//! b = (m, h, J) the weights of the body's ten columns, the function to differentiate is
+//! A function f of Θ with B = ∂f/∂Θ changes by Σ B_jc dΘ_jc. Row j of Θ contracted with row j of B is the torque of
+//! joint j of an arm whose parameters are B_j. So for body i and joint j ≤ i, with b = (m, h, J) the weights of the
+//! body's ten columns, the function to differentiate is
 //!
 //! φ = s·(J α + h × a + ω × J ω) + v·(m a + α × h + ω × (ω × h)),
 //!
-//! and a reverse sweep over the recursions of ω, α, a, s, v gives all derivatives at the cost of a
-//! few regressors.
+//! and a reverse sweep over the recursions of ω, α, a, s, v gives all derivatives at the cost of a few regressors.
 
 use super::model::Model;
 use super::motion::Motion;
@@ -26,7 +25,7 @@ pub struct AdjointWorkspace<T> {
     columns: Vec<(Vec3<T>, Vec3<T>)>,
     /// Adjoints of ω, α, a of every body.
     motion_bar: Vec<[Vec3<T>; 3]>,
-    /// Adjoints of the Jacobian columns, in the frame of the body the sweep is at.
+    /// Adjoints of the Jacobian columns, in the frame of the body that the sweep has reached.
     column_bar: Vec<(Vec3<T>, Vec3<T>)>,
 }
 
@@ -61,7 +60,8 @@ fn swing_adjoint<T: Real>(w: Vec3<T>, r: Vec3<T>, x: Vec3<T>) -> Vec3<T> {
     x * w.dot(r) + r * w.dot(x) - w * (x.dot(r) * 2.0)
 }
 
-/// Derivatives of Σ_ij Σ_k `weights(j, i)[k]`·Θ[j, body i, k] by (q, q̇, q̈), added to `out`.
+/// Computes the derivatives of Σ_ij Σ_k `weights(j, i)[k]`·Θ[j, body i, k] with respect to (q, q̇, q̈) and adds them
+/// to `q_bar`, `qd_bar`, `qdd_bar`.
 #[inline(always)]
 fn sweep<T: Real>(
     model: &Model,
@@ -135,12 +135,11 @@ fn sweep<T: Real>(
 }
 
 impl RegressorBlock {
-    /// Writes into `gradient` the derivatives of Σ_jc B_jc(t)·Θ_jc(q(t), q̇(t), q̈(t)) by q, q̇, q̈ at
-    /// every sample t of `range`, where this block holds B (set through
-    /// [`column_mut`](Self::column_mut)) instead of a regressor.
+    /// Writes into `gradient` the derivatives of Σ_jc B_jc(t)·Θ_jc(q(t), q̇(t), q̈(t)) with respect to q, q̇, q̈ at
+    /// every sample t of `range`. This block holds B instead of a regressor (set through
+    /// [`column_mut`](Self::column_mut)).
     ///
-    /// # Panics
-    /// If `range` is outside the motion or not as long as the block's samples.
+    /// # Panics If `range` is outside the motion or not as long as the block's samples.
     pub fn pull_back(
         &self,
         model: &Model,
@@ -233,9 +232,9 @@ mod tests {
         sum
     }
 
-    /// Central differences with h = 1e-6: round-off 1e-16·Σ|BΘ|/h ≈ 1e-8 (Σ is about 300), truncation
-    /// below it except across the friction sign, where the third derivative is 2/ε³ and h²/6 of it
-    /// 4e-8; 1e-6 therefore holds for the true derivative only.
+    /// Central differences with h = 1e-6. Round-off is 1e-16·Σ|BΘ|/h ≈ 1e-8 (Σ is about 300). Truncation is smaller
+    /// except across the friction sign, whose third derivative is 2/ε³, and h²/6 of it 4e-8. A tolerance of 1e-6 is
+    /// therefore met by the true derivative only.
     #[test]
     fn derivatives_are_finite_differences() {
         for name in ["ur5", "ur10e"] {
@@ -286,8 +285,8 @@ mod tests {
         }
     }
 
-    /// The derivative of the joint torques by q̈ is the mass matrix: with B_j = p for one joint, the
-    /// pull-back must return its row.
+    /// The derivative of the joint torques with respect to q̈ is the mass matrix: with B_j = p for one joint, the
+    /// pull-back must return the joint's row of it.
     #[test]
     fn pulling_back_one_torque_gives_a_row_of_the_mass_matrix() {
         let model = Model::new(&Arm::built_in("ur5").unwrap());

@@ -1,10 +1,10 @@
-//! Three-vectors over any [`Real`], with just the operations rigid bodies need.
+//! Three-vectors over any [`Real`], with only the operations that rigid bodies need.
 
 use std::ops::{Add, AddAssign, Mul, Sub};
 
 use super::real::Real;
 
-/// A vector in some frame, stated by whoever holds it.
+/// A three-vector; the code that holds it states its frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Vec3<T> {
     /// Component along x.

@@ -1,4 +1,4 @@
-//! Scratch memory of the algorithms, made once and used for every sample.
+//! Scratch memory of the algorithms, allocated once and reused for every sample.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -7,7 +7,7 @@ use super::newton_euler::BodyMotion;
 use super::real::Real;
 use super::vector::Vec3;
 
-/// Scratch for one arm and one scalar type. Contents between calls mean nothing.
+/// Scratch for one arm and one scalar type. Its contents are meaningless between calls.
 #[derive(Debug, Clone)]
 pub struct Workspace<T> {
     pub(super) motion: Vec<BodyMotion<T>>,
@@ -17,7 +17,7 @@ pub struct Workspace<T> {
     pub(super) jacobian: Vec<(Vec3<T>, Vec3<T>)>,
     pub(super) mass_matrix: DMatrix<f64>,
     pub(super) bias_nm: DVector<f64>,
-    /// Zeros.
+    /// Zero accelerations, for the bias torque.
     pub(super) no_acceleration: Vec<T>,
 }
 

@@ -78,8 +78,8 @@ pub fn plausible_size(arm: &Arm, set: &BaseSet, k: usize) -> f64 {
 const HAND_M: f64 = 0.05;
 
 /// Whether a log that leaves the parameters `open` still identifies the arm. Moments of inertia of a light wrist may
-/// stay open, because hardly any torque depends on them; gravity, friction, rotors and three quarters of all
-/// parameters may not.
+/// stay open, because hardly any torque depends on them. Gravity, friction and rotors may not, nor may more than a
+/// quarter of all parameters.
 pub fn identifies_the_arm(arm: &Arm, set: &BaseSet, open: &[usize]) -> bool {
     let layout = ParameterLayout::new(arm.dof());
     let is_moment_of_inertia =

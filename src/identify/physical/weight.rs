@@ -18,8 +18,8 @@ pub enum PriorMetric {
     /// ½ tr(P₀⁻¹ΔP P₀⁻¹ΔP): half the squared distance in the tangent space at the prior.
     #[default]
     PullBack,
-    /// tr(P₀⁻¹P) − ln det(P₀⁻¹P) − 4: twice the relative entropy of Gaussian mass densities, infinite on the boundary
-    /// of bodies that can exist.
+    /// tr(P₀⁻¹P) − ln det(P₀⁻¹P) − 4: up to a factor the relative entropy of Gaussian mass densities; infinite where
+    /// a body ceases to be possible.
     Entropic,
 }
 
