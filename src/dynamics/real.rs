@@ -162,8 +162,8 @@ pub fn with_widest_registers<R>(work: impl FnMut() -> R) -> R {
     pulp::Arch::new().dispatch(Work(work))
 }
 
-/// Replaces every `a` by `f(a, b)`, eight at a time. The eight run in registers if `f` is `#[inline(always)]` and so
-/// is the code that calls this function [`with_widest_registers`].
+/// Replaces every `a` by `f(a, b)`, eight at a time. The eight stay in registers if `f` is `#[inline(always)]` and
+/// the caller runs in [`with_widest_registers`].
 #[inline(always)]
 pub fn map_pairs(a: &mut [f64], b: &[f64], f: impl Fn(f64, f64) -> f64) {
     let (a_whole, a_rest) = a.as_chunks_mut::<LANES>();
