@@ -13,7 +13,7 @@ pub struct ParameterLayout {
     dof: usize,
 }
 
-/// What one standard parameter is.
+/// The meaning of one standard parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Parameter {
     /// Entry `0…9` of [`BODY_PARAMETERS`] of a body (0-based).

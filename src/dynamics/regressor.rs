@@ -106,7 +106,7 @@ pub struct RegressorBlock {
     pub(super) columns: Vec<f64>,
 }
 
-/// Columns of one joint's drive behind its body columns: Ia, rv, rc, off.
+/// Number of columns of a joint's drive, after its body columns: Ia, rv, rc, off.
 const DRIVE_COLUMNS: usize = 4;
 
 impl RegressorBlock {
@@ -146,7 +146,8 @@ impl RegressorBlock {
 
     /// Sets the block to `samples` samples of zeros, to be written column by column.
     ///
-    /// # Panics If `samples` exceeds the capacity.
+    /// # Panics
+    /// If `samples` exceeds the capacity.
     pub fn set_samples(&mut self, samples: usize) {
         assert!(samples <= self.capacity);
         self.samples = samples;

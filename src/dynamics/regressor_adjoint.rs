@@ -139,7 +139,8 @@ impl RegressorBlock {
     /// every sample t of `range`. This block holds B instead of a regressor (set through
     /// [`column_mut`](Self::column_mut)).
     ///
-    /// # Panics If `range` is outside the motion or not as long as the block's samples.
+    /// # Panics
+    /// If `range` is outside the motion or not as long as the block's samples.
     pub fn pull_back(
         &self,
         model: &Model,

@@ -6,18 +6,19 @@
 //!
 //! F (s̃ + β (s − s̃) + β δ (ṡ − s̃˙))
 //!
-//! where the model has F s. s̃ includes the feedback that follows ([`FEEDBACK_RAD_S`]). Neither β nor δ is known: s̃
-//! − s and its rate become additional columns beside the model's. They are of high frequency and carry no information
-//! about the arm; if they are left out, an arm without feed-forward gets inertias that are wrong by more than σ.
+//! where the model has F s. s̃ includes the feedback that follows ([`FEEDBACK_RAD_S`]). Neither β nor δ is known:
+//! s̃ − s and its rate become additional columns beside the model's. They are of high frequency and carry no
+//! information about the arm; if they are left out, an arm without feed-forward gets inertias that are wrong by more
+//! than σ.
 
 use super::problem::Problem;
 use crate::dynamics::{Model, Motion};
 use crate::signal::{FineClock, HarmonicPower};
 
-/// Bandwidth ω of the feedback that stops a rotor and the links on it, rad/s. For arms simulated with drives of 2 ζ ω
-/// = 100 rad/s, values from 60 to 120 explain gears and play about equally well. Without this feedback, gears at the
-/// shoulder seemed a third stiffer than they were, play seemed a quarter narrower, and half of the ripple faster than
-/// half the sampling rate was left along another motion.
+/// Bandwidth ω of the feedback that stops a rotor and the links on it, rad/s. For arms simulated with drives of 2 ζ
+/// ω = 100 rad/s, values from 60 to 120 explain gears and play about equally well. Without this feedback, gears at
+/// the shoulder seemed a third stiffer than they were, play seemed a quarter narrower, and half of the ripple faster
+/// than half the sampling rate was left along another motion.
 pub const FEEDBACK_RAD_S: f64 = 80.0;
 
 /// [`FEEDBACK_RAD_S`] per tick of `tick_s`.

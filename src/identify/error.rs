@@ -32,7 +32,7 @@ pub enum IdentifyError {
     DeadTorque {
         /// The log.
         log: String,
-        /// The first such joint (from 1).
+        /// The first joint with a constant torque, from 1.
         joint: usize,
         /// The recorded torque, Nm.
         torque_nm: f64,

@@ -25,7 +25,7 @@ pub struct Estimation {
     full: Option<Whitened>,
 }
 
-/// What is known of the motion besides the regressor along it.
+/// Additional knowledge of the motion, besides the regressor along it.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct MotionAids<'a> {
     /// How well the averaged acceleration of a repeating motion is known, per joint: up to which harmonic

@@ -10,7 +10,7 @@ use crate::signal::{
     Bracket, Decimator, MOST_PER_ROW, Resampler, Scratch, bridged_gap_s, natural_rate_hz,
 };
 
-/// Time stamps further off the natural step than this share of it make a log uneven.
+/// A log is uneven if one of its time steps differs from the natural step by more than this share.
 const EVEN_WITHIN: f64 = 0.02;
 /// [`Even::highest`] of unprocessed samples: half a cycle, reduced by the loss of accuracy of derivatives near it.
 const AS_LOGGED: f64 = 0.48;

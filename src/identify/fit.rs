@@ -98,7 +98,7 @@ pub enum FitError {
     },
 }
 
-/// A least-squares solution with the triangle that stands for all its equations.
+/// A least-squares solution, with the triangle that represents all its equations.
 #[derive(Debug, Clone)]
 pub struct Fit {
     /// θ̂, base parameters in their SI units.

@@ -32,7 +32,7 @@ pub struct Identifier<'a> {
     clock: Option<FineClock>,
 }
 
-/// What a log says about the arm.
+/// The result of identification from a log.
 #[derive(Debug, Clone)]
 pub struct Identification {
     /// Which estimator made the solution.
@@ -193,7 +193,8 @@ impl<'a> Identifier<'a> {
     /// Lays out `m`, whose torque is the manufacturer's feed-forward, for regression. `None` where that torque is the
     /// same in every row of a joint that moves; this is then added to `warnings`.
     ///
-    /// # Errors As [`Self::regression`].
+    /// # Errors
+    /// As [`Self::regression`].
     pub fn feed_forward(
         &mut self,
         m: &Measurement,
@@ -537,9 +538,9 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     /// Eight periods of an error of 0.3 Nm rms that repeats, under noise of 1 Nm. A twelfth of the rows, at other
-    /// phases in each period, is the mean of the other periods. The mean square of the mean period is 0.09 and 1/(8 ·
-    /// 11/12) Nm², known to √(2/8000) of the second term and twice the root of both terms' product over 8000: 0.0048
-    /// Nm². Five of these standard deviations leave 0.257 to 0.338; without `kept` the result would be 0.16.
+    /// phases in each period, is the mean of the other periods. The mean square of the mean period is 0.09 and
+    /// 1/(8 · 11/12) Nm², known to √(2/8000) of the second term and twice the root of both terms' product over 8000:
+    /// 0.0048 Nm². Five of these standard deviations leave 0.257 to 0.338; without `kept` the result would be 0.16.
     #[test]
     fn rows_that_were_filled_in_explain_nothing() {
         const N: usize = 8000;

@@ -82,7 +82,7 @@ impl LackOfFit {
         Self::new(factor * self.statistic, self.degrees_of_freedom, self.floor)
     }
 
-    /// Whether the model explains what repeats.
+    /// Whether the model explains everything that repeats.
     pub fn fits(&self) -> bool {
         self.p_value >= Self::REJECT_BELOW
     }

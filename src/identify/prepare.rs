@@ -34,7 +34,8 @@ pub struct Measurement<'a> {
 impl Measurement<'_> {
     /// Refuses a log that is too short to be an experiment.
     ///
-    /// # Errors [`IdentifyError::TooShort`].
+    /// # Errors
+    /// [`IdentifyError::TooShort`].
     pub(crate) fn require_rows(&self) -> Result<(), IdentifyError> {
         let samples = self.time_s.len();
         if samples < FEWEST_SAMPLES {

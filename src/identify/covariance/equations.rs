@@ -66,7 +66,7 @@ mod tests {
         let [x, y] = [response(150), response(153)];
         let product: f64 = x.iter().zip(&y).map(|(x, y)| x * y).sum();
         let expected = a[0].powi(3) / (1.0 - a[0] * a[0]);
-        // What is left of the start is 0.8³⁰⁰.
+        // The start's influence is 0.8³⁰⁰.
         assert!((product - expected).abs() < 1e-12, "{product} {expected}");
     }
 

@@ -155,7 +155,7 @@ pub enum CovarianceError {
          one that works frequency by frequency"
     )]
     NotInTime {
-        /// What it is made from.
+        /// What the covariance is made from.
         what: &'static str,
     },
     /// Needs a longer record.
@@ -181,7 +181,8 @@ impl CovarianceKind {
     /// those that the equations predict from each joint's noise, as far as chance alone can explain their difference;
     /// σ stays as the method computes it.
     ///
-    /// # Errors [`CovarianceError`] where the data lack something that the method needs.
+    /// # Errors
+    /// [`CovarianceError`] where the data lack something that the method needs.
     pub fn covariance(self, problem: &Problem, fit: &Fit) -> Result<Covariance, CovarianceError> {
         let found = self.method().covariance(problem, fit)?;
         if !self.is_scatter() {

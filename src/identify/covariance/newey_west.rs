@@ -36,8 +36,8 @@ impl CovarianceMethod for NeweyWest {
         Ok(Covariance {
             kind: CovarianceKind::Hac,
             matrix: sandwich(fit, &omega) * correction,
-            // Degrees of freedom of a Bartlett estimate: 1.5 T/L (Priestley 1981: its relative variance is 2/3 · L/T
-            // · 2).
+            // Degrees of freedom of a Bartlett estimate: 1.5 T/L (Priestley 1981: its relative variance is
+            // 2/3 · L/T · 2).
             degrees_of_freedom: 1.5 * t / (lags + 1) as f64,
         })
     }

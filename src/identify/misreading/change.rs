@@ -63,7 +63,7 @@ pub enum Change {
     ZeroTurned {
         /// Joint whose zero is turned.
         joint: usize,
-        /// What has to be added to the angles, rad.
+        /// Angle to be added to the recorded angles, rad.
         add_rad: f64,
     },
     /// The arm hangs, is mounted on a wall, or is inclined by 45°.

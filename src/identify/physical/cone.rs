@@ -1,8 +1,8 @@
 //! The two cones of the problem, with their parts of an interior-point step: non-negative numbers and positive
 //! semidefinite 4 × 4 matrices, scaled by Nesterov and Todd's point.
 //!
-//! A symmetric matrix is stored as the vector svec of its ten entries, the off-diagonal ones times √2, so that ⟨A, B⟩
-//! = tr(AB) is the scalar product of the vectors.
+//! A symmetric matrix is stored as the vector svec of its ten entries, the off-diagonal ones times √2, so that ⟨A,
+//! B⟩ = tr(AB) is the scalar product of the vectors.
 
 use nalgebra::{Cholesky, Matrix4, SVector};
 

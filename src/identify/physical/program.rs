@@ -101,19 +101,21 @@ const SHORT_OF_BOUNDARY: f64 = 0.99;
 const TOO_SHORT: f64 = 0.1;
 
 impl ConeProgram {
-    /// Solves from `start`, which is inside all cones, until the duality gap is below `tolerance` times 1 +
-    /// |objective + `constant`|. (The constant is added to the objective to give "relative" a meaning.)
+    /// Solves from `start`, which is inside all cones, until the duality gap is below `tolerance` times
+    /// 1 + |objective + `constant`|. (The constant is added to the objective to give "relative" a meaning.)
     ///
     /// Mehrotra's predictor–corrector method with Nesterov and Todd's scaling (L. Vandenberghe, "The CVXOPT linear
     /// and quadratic cone program solvers", 2010). s = A y + b holds throughout, so that only the dual equation and
     /// complementarity are left to Newton's method: s_i z_i = γ_i, which is the end of the central path for a plain
     /// constraint and a point on it for a barrier.
     ///
-    /// # Certificate For z in the cones and r = H (y − y₀) − c − Aᵀz the dual value is objective(y) − Σ g_i − ½
-    /// rᵀH⁻¹r, so that gap = Σ g_i + ½ rᵀH⁻¹r. Here g_i = s_iᵀz_i for a plain constraint and g_i = s_iᵀz_i − γ_i (d_i
-    /// + ln det(s_i z_i / γ_i)) for a barrier of degree d_i. Both are ≥ 0, and 0 only where complementarity holds.
+    /// # Certificate
+    /// For z in the cones and r = H (y − y₀) − c − Aᵀz the dual value is objective(y) − Σ g_i − ½ rᵀH⁻¹r, so that
+    /// gap = Σ g_i + ½ rᵀH⁻¹r. Here g_i = s_iᵀz_i for a plain constraint and g_i = s_iᵀz_i − γ_i (d_i + ln det(s_i
+    /// z_i / γ_i)) for a barrier of degree d_i. Both are ≥ 0, and 0 only where complementarity holds.
     ///
-    /// # Zeros The iteration ends slightly inside the cones. Entries of y that a constraint presses onto zero are
+    /// # Zeros
+    /// The iteration ends slightly inside the cones. Entries of y that a constraint presses onto zero are
     /// finally set to zero, where the certificate allows it.
     pub fn solve(
         &self,
@@ -393,8 +395,8 @@ impl Step {
         }
     }
 
-    /// Computes the step of H Δy − AᵀΔz = −r, λ∘(Δz̃ + Δs̃) = (γ + σμ) e − λ∘λ − (correction), Δs̃ = B Δy. With d =
-    /// λ\(…) it is (H + BᵀB) Δy = −r + Bᵀd and Δz̃ = d − B Δy.
+    /// Computes the step of H Δy − AᵀΔz = −r, λ∘(Δz̃ + Δs̃) = (γ + σμ) e − λ∘λ − (correction), Δs̃ = B Δy. With
+    /// d = λ\(…) it is (H + BᵀB) Δy = −r + Bᵀd and Δz̃ = d − B Δy.
     fn towards(
         &mut self,
         program: &ConeProgram,

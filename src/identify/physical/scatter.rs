@@ -26,8 +26,8 @@ pub struct Scatter {
     /// By the full curvature. An active bound fixes its direction, which therefore does not contribute to this σ.
     pub held: Sigma,
     /// By the Gauss–Newton curvature, which contains only the data and the prior (with the prior's curvature at the
-    /// prior): as if there were no bounds. In log-Cholesky parameters this is the textbook formula J (JᵀHJ)⁻¹Jᵀ =
-    /// H⁻¹.
+    /// prior): as if there were no bounds. In log-Cholesky parameters this is the textbook formula J
+    /// (JᵀHJ)⁻¹Jᵀ = H⁻¹.
     pub released: Sigma,
     /// Root mean square distance of estimates drawn around the estimate (parametric bootstrap): a bound takes effect
     /// in the draws that go beyond it, and only there.

@@ -3,9 +3,9 @@
 use crate::identify::problem::Problem;
 use crate::signal::{Scratch, SignalError, ZeroPhase};
 
-/// Filters every column and the torque by one zero-phase low-pass at `cutoff_hz`, keeps every nd-th row with nd =
-/// f_s/(2 cutoff) (Gautier 1997), and writes them into `out` (same plan). For a repeating motion nd is reduced to the
-/// next smaller divisor of the samples per period.
+/// Filters every column and the torque by one zero-phase low-pass at `cutoff_hz`, keeps every nd-th row with
+/// nd = f_s/(2 cutoff) (Gautier 1997), and writes them into `out` (same plan). For a repeating motion nd is reduced
+/// to the next smaller divisor of the samples per period.
 pub fn decimate(
     problem: &Problem,
     cutoff_hz: f64,

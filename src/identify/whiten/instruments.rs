@@ -154,8 +154,8 @@ mod tests {
         instrument(&problem, &instruments, &[1.0], &mut out).unwrap();
         let slope =
             |p: &Problem| dot(&p.panels[0].x, &p.panels[0].y) / dot(&p.panels[0].x, &p.panels[0].x);
-        // Least squares is attenuated by 0.5/(0.5 + 0.0625). σ of the slope by instruments is the residual, √(0.1² +
-        // 0.5²), over √(n/2): 0.5 %; the bound is 5 σ.
+        // Least squares is attenuated by 0.5/(0.5 + 0.0625). σ of the slope by instruments is the residual,
+        // √(0.1² + 0.5²), over √(n/2): 0.5 %; the bound is 5 σ.
         assert!((slope(&problem) - 1.78).abs() < 0.02, "{}", slope(&problem));
         assert!((slope(&out) - 2.0).abs() < 0.025, "{}", slope(&out));
         // The residual is that of the original equations.
