@@ -265,7 +265,8 @@ fn exp(x: f64) -> f64 {
     power * expm1_r + power
 }
 
-/// Hyperbolic tangent without branches: tanh|x| = −e/(2 + e) with e = exp(−2|x|) − 1. Error below 3 units in the last place.
+/// Hyperbolic tangent without branches: tanh|x| = −e/(2 + e) with e = exp(−2|x|) − 1. Error below 3 units in the last
+/// place.
 #[inline(always)]
 fn tanh(x: f64) -> f64 {
     // Beyond 20 the result rounds to ±1; NaN goes through.

@@ -1,10 +1,10 @@
 //! Covariances of the estimate: one method per file, one trait.
 //!
-//! A σ is a claim about how θ̂ would scatter over repetitions of the experiment. Each method rests
-//! on other assumptions about the noise; the Monte Carlo measures how often each one's intervals
-//! hold the truth.
+//! A σ is a claim about how θ̂ would scatter over repetitions of the experiment. Each method rests on other
+//! assumptions about the noise; the Monte Carlo study measures how often each method's intervals contain the truth.
 //!
-//! Enters: the equations of a log and their solution. Leaves: the b × b covariance of the base parameters with its degrees of freedom.
+//! Enters: the equations of a log and their solution. Leaves: the b × b covariance of the base parameters with its
+//! degrees of freedom.
 
 mod blocks;
 mod bootstrap;

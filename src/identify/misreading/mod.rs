@@ -5,18 +5,17 @@
 //! nonsense with great certainty. Logs and descriptions of arms differ in practice in a few ways ([`Change`]). Among
 //! these, the search looks for the fewest changes that make the model fit:
 //!
-//! minimise Σ_j ln (‖e_j‖² / ‖τ_j‖²) + γ (1 − cos φ) + λ × changes, the likelihood of torques whose noise is not
-//! known, joint by joint.
+//! minimise Σ_j ln (‖e_j‖² / ‖τ_j‖²) + γ (1 − cos φ) + λ × changes.
 //!
-//! e_j is the residual of the full set of base parameters; it counts as ten times as large where the identified
-//! friction pushes instead of braking. φ is the angle between the identified and the described first moments of the
-//! base set. If all torques have the other sign, the parameters change and the residual does not. That sign is
-//! therefore decided by friction, which brakes, and where there is next to none by gravity, which pulls as described.
-//! Parameters cannot stand in for the changes: the right changes reduce the residual by far more than any friction
-//! law does.
+//! The first term is the likelihood of torques whose noise is not known, joint by joint. e_j is the residual of the
+//! full set of base parameters; it counts as ten times as large where the identified friction pushes instead of
+//! braking. φ is the angle between the identified and the described first moments of the base set. If all torques
+//! have the other sign, the parameters change and the residual does not. That sign is therefore decided by friction,
+//! which brakes, and where there is next to none by gravity, which pulls as described. Parameters cannot stand in for
+//! the changes: the right changes reduce the residual by far more than any friction law does.
 //!
-//! A current belongs to the drive in whose column it is read: a current read from another column is multiplied by
-//! another gain.
+//! A current is multiplied by the gain of the joint for which it is read: read for another joint, it gets another
+//! gain.
 //!
 //! Enters: the arm and a log laid out for regression. Leaves: a [`Misreading`], or nothing.
 
