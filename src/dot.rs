@@ -1,6 +1,9 @@
 //! The sum of products, ⟨a, b⟩ = Σ aₖ bₖ.
 
-/// ⟨a, b⟩ of as many values in sixteen interleaved partial sums, which the compiler can keep in registers: a fixed order, hence fixed bits.
+/// Dot product ⟨a, b⟩ of two slices of equal length, in sixteen interleaved partial sums that the compiler can keep in
+/// registers.
+///
+/// The order of summation is fixed, and with it every bit of the result.
 #[inline(always)]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     debug_assert_eq!(a.len(), b.len());

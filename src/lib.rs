@@ -1,5 +1,5 @@
-//! Identification of the dynamic parameters of a serial robot arm, with uncertainty that is
-//! checked against a simulated truth, and a diagnosis of what the model gets wrong.
+//! Identification of the dynamic parameters of a serial robot arm, with uncertainties that are checked against a
+//! simulated truth, and a diagnosis of what the model gets wrong.
 #![warn(missing_docs)]
 
 pub mod base;

@@ -1,6 +1,6 @@
-//! The median (the value in the middle, of an even number of values the mean of the two there), and what is like it.
+//! The median (for an even number of values, the mean of the two in the middle) and other robust statistics.
 
-/// Median of finite values, whose order changes; `None` of none.
+/// Median of finite values, which are reordered; `None` without any value.
 pub fn median(values: &mut [f64]) -> Option<f64> {
     let middle = values.len() / 2;
     if values.is_empty() {
@@ -12,9 +12,9 @@ pub fn median(values: &mut [f64]) -> Option<f64> {
     Some(lower.map_or(upper, |lower| 0.5 * (lower + upper)))
 }
 
-/// Mean of all values but the least and the greatest, whose order changes: one wild value does not move it, and of seven
-/// Gaussian values it has 7 % more variance than the mean of all, where their median has 47 % more. Of one or two values
-/// their mean; `None` of none.
+/// Mean of all values except the smallest and the largest; the values are reordered. One wild value does not move it.
+/// For seven Gaussian values its variance is 7 % above that of the plain mean, where that of the median is 47 % above.
+/// For one or two values it is their mean; `None` without any value.
 pub fn trimmed_mean(values: &mut [f64]) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
     let inner = match values.len() {
@@ -25,32 +25,34 @@ pub fn trimmed_mean(values: &mut [f64]) -> Option<f64> {
     Some(inner.iter().sum::<f64>() / inner.len() as f64)
 }
 
-/// Standard deviation of Gaussian values from the median of their `sizes` |x|, whose order changes: median/0.6745;
-/// zero of none.
+/// Standard deviation of Gaussian values from the median of their `sizes` |x|: median/0.6745. The sizes are reordered;
+/// zero without any size.
 pub fn robust_sigma(sizes: &mut [f64]) -> f64 {
     1.4826 * median(sizes).unwrap_or(0.0)
 }
 
-/// [`robust_sigma`] of those values that are not zero: readings that did not change say nothing of noise.
+/// [`robust_sigma`] of the values that are not zero: a reading that did not change says nothing about noise.
 pub fn sigma_of_changes(values: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = values.iter().map(|v| v.abs()).filter(|v| *v > 0.0).collect();
     robust_sigma(&mut sizes)
 }
 
-/// Median step of time among the steps forward, s; `None` without any.
+/// Median of the positive time steps, s; `None` without any.
 pub fn median_step(time_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> =
         time_s.windows(2).map(|pair| pair[1] - pair[0]).filter(|&step| step > 0.0).collect();
     median(&mut steps)
 }
 
-/// Steps of `typical_s` that are missing between stamps `k` − 1 and `k` of `time_s`, not rounded.
+/// Number of steps of `typical_s` that are missing between the stamps `k` − 1 and `k` of `time_s`, not rounded.
 pub fn missing_steps(time_s: &[f64], k: usize, typical_s: f64) -> f64 {
     lasting(k, |k| Some((time_s.get(k)? - time_s.get(k.checked_sub(1)?)?) / typical_s - 1.0))
 }
 
-/// What the steps beside step `k` do not take back of its `excess`, or 0. What one stamp is late makes the step before it
-/// longer and the one behind it shorter: that is jitter, and nothing lasts.
+/// The part of the `excess` of step `k` that the two neighbouring steps do not compensate, or 0.
+///
+/// A stamp that is late makes the step before it longer and the step after it shorter by the same amount: that is
+/// jitter, and no excess lasts.
 pub fn lasting(k: usize, excess: impl Fn(usize) -> Option<f64>) -> f64 {
     let deficit = |k: Option<usize>| k.and_then(&excess).map_or(0.0, |e| e.min(0.0));
     excess(k).map_or(0.0, |e| e + deficit(k.checked_sub(1)) + deficit(Some(k + 1))).max(0.0)

@@ -1,4 +1,4 @@
-//! Numbers as people read them: as many digits as mean something.
+//! Numbers for people to read: with as many digits as are meaningful.
 
 /// Written where there is no finite number.
 pub const NONE: &str = "—";
@@ -29,8 +29,8 @@ pub fn significant(value: f64, digits: usize) -> String {
     }
 }
 
-/// `value` with four significant digits, or as many as show `width` with two: what lies between 1829.48 and 1829.58
-/// is not `1829 … 1830`.
+/// `value` with four significant digits, or with as many as it takes to show `width` with two: an interval from 1829.48
+/// to 1829.58 must not read `1829 … 1830`.
 ///
 /// ```
 /// use armid::number::resolved;
@@ -41,7 +41,7 @@ pub fn resolved(value: f64, width: f64) -> String {
     resolved_from(4, value, width)
 }
 
-/// [`resolved`] with `least` significant digits or more, nine at most.
+/// [`resolved`] with at least `least` significant digits, nine at most.
 ///
 /// ```
 /// use armid::number::resolved_from;
@@ -53,8 +53,8 @@ pub fn resolved_from(least: usize, value: f64, width: f64) -> String {
     significant(value, digits.clamp(least.min(9) as i32, 9) as usize)
 }
 
-/// `value ± sigma`, sigma with two significant digits and the value to the same place: `1.234 ± 0.012`,
-/// `(1.23 ± 0.12)e-6`. The rule is that of the GUM (JCGM 100:2008, 7.2.6).
+/// `value ± sigma`: sigma with two significant digits, the value rounded to the same decimal place, as in `1.234 ±
+/// 0.012` and `(1.23 ± 0.12)e-6`. The rule is that of the GUM (JCGM 100:2008, 7.2.6).
 ///
 /// ```
 /// use armid::number::with_sigma;
@@ -84,7 +84,7 @@ pub fn with_sigma(value: f64, sigma: f64) -> String {
     }
 }
 
-/// A fraction in percent with `digits` significant digits: `0.0712` is `7.1 %` with two.
+/// A fraction in percent with `digits` significant digits: 0.0712 with two is `7.1 %`.
 pub fn percent(fraction: f64, digits: usize) -> String {
     if fraction.is_finite() {
         format!("{} %", significant(100.0 * fraction, digits))
@@ -93,7 +93,7 @@ pub fn percent(fraction: f64, digits: usize) -> String {
     }
 }
 
-/// A number with a prefixed unit: `2e-5`, `rad` is `20.0 µrad` with three digits.
+/// A number with an SI prefix on its unit: 2e-5 `rad` with three digits is `20.0 µrad`.
 ///
 /// ```
 /// use armid::number::prefixed;
@@ -118,7 +118,7 @@ pub fn prefixed(value: f64, unit: &str, digits: usize) -> String {
     }
 }
 
-/// A count with its thousands set apart by narrow spaces that do not break: `10 000`.
+/// A count with its thousands separated by narrow no-break spaces: `10 000`.
 pub fn count(number: usize) -> String {
     let digits = number.to_string();
     let mut out = String::with_capacity(digits.len() + digits.len() / 3 * '\u{202f}'.len_utf8());
@@ -142,7 +142,7 @@ fn has_exponent(magnitude: i32) -> bool {
     !(-4..6).contains(&magnitude)
 }
 
-/// `value` rounded to `place` digits behind the point; a negative place rounds before the point.
+/// `value` rounded to `place` digits after the decimal point; a negative place rounds before the point.
 fn fixed(value: f64, place: i32) -> String {
     let rounded = if place < 0 {
         let unit = 10f64.powi(-place);

@@ -1,4 +1,4 @@
-//! Files the program writes: checked before the work starts, complete or not there at all.
+//! Output files: checked before the work starts, and afterwards either complete or not there at all.
 
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
@@ -33,13 +33,13 @@ pub enum OutputError {
         /// Why.
         source: io::Error,
     },
-    /// Something that is read would be lost.
+    /// An output would overwrite a file that the command reads.
     #[error("{}: the command reads this file; name another one to write", path.display())]
     IsInput {
         /// The output asked for.
         path: PathBuf,
     },
-    /// One of two outputs would be lost.
+    /// Two outputs would go to the same file.
     #[error("{}: two outputs would go to this file; name two", path.display())]
     Twice {
         /// The output asked for.
@@ -63,8 +63,8 @@ impl OutputError {
     }
 }
 
-/// Whether `path` could be written now: its folder exists and takes a file, it is no folder itself
-/// and not read-only. Call it before long work, so that the work is not lost at its end.
+/// Checks that `path` can be written now: its folder exists and accepts a new file, and the path is neither a folder
+/// nor read-only. Called before long work, so that its result is not lost at the end.
 pub fn check_writable(path: &Path) -> Result<(), OutputError> {
     match Target::find(path)? {
         Target::Device => {
@@ -77,8 +77,8 @@ pub fn check_writable(path: &Path) -> Result<(), OutputError> {
     Ok(())
 }
 
-/// Whether all `outputs` can be written ([`check_writable`]), and none of them takes the place of another one or of one of the
-/// `inputs`.
+/// Checks that all `outputs` can be written ([`check_writable`]) and that none of them would replace another output or
+/// one of the `inputs`.
 pub fn check_outputs(
     outputs: impl IntoIterator<Item = impl AsRef<Path>>,
     inputs: impl IntoIterator<Item = impl AsRef<Path>>,
@@ -101,8 +101,8 @@ pub fn check_outputs(
     Ok(())
 }
 
-/// The file that `path` names, by whatever links, there already or not; `None` of what nothing can take the place of: a device, a
-/// folder, a file that cannot be written.
+/// The file that `path` names, with all links resolved, whether it exists or not; `None` for paths that no file can
+/// replace: a device, a folder, a file that cannot be written.
 fn place(path: &Path) -> Option<PathBuf> {
     match Target::find(path).ok()? {
         Target::Device => None,
@@ -113,9 +113,9 @@ fn place(path: &Path) -> Option<PathBuf> {
     }
 }
 
-/// Writes `path` as a whole: into a temporary file beside it, forced to the disk, then renamed. On any
-/// error, the writer's own included, an earlier file of that name stays as it was and the temporary
-/// one is removed. A device (such as `/dev/stdout`) is written directly.
+/// Writes `path` as a whole: into a temporary file beside it, which is forced to disk and then renamed. On any error,
+/// including one of the writer itself, an earlier file of that name stays as it was and the temporary file is removed.
+/// A device (such as `/dev/stdout`) is written directly.
 pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -146,9 +146,9 @@ fn fill(file: &File, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io
 
 /// What a path leads to.
 enum Target {
-    /// A regular file, there already or not; links are followed, so that a link stays a link.
+    /// A regular file that exists or can be created; links are followed, so that a link stays a link.
     File { path: PathBuf, permissions: Option<fs::Permissions> },
-    /// A terminal, pipe or device: it cannot be replaced by renaming.
+    /// A terminal, pipe or device, which cannot be replaced by renaming.
     Device,
 }
 
@@ -189,7 +189,7 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// A temporary file in the folder of the file it is to become; removed when dropped.
+/// A temporary file in the folder of its target; removed when dropped.
 struct Partial {
     path: PathBuf,
     file: File,
@@ -209,8 +209,8 @@ impl Partial {
 
     fn rename_to(self, target: &Path) -> io::Result<()> {
         fs::rename(&self.path, target)?;
-        // The rename itself reaches the disk with the folder. Not every file system allows this,
-        // and the file is whole either way, so a refusal is no failure.
+        // The rename itself reaches the disk only with the folder. Not every file system can sync a folder, and the
+        // file is complete either way, so a refusal is not an error.
         if let Ok(folder) = File::open(folder_of(target)) {
             let _ = folder.sync_all();
         }

@@ -1,17 +1,16 @@
-//! Where every random number comes from.
+//! Source of all random numbers.
 //!
-//! A number is a pure function of (seed, scenario, trial, channel, joint, position in its stream):
-//! trial k can be replayed alone, and results are the same bits for any number of threads and any
-//! split into shards. The generator is ChaCha8, which is counter-based: its 256-bit key is
-//! SHA-256("armid/random/1" ‖ seed ‖ trial ‖ scenario) and its 64-bit stream number holds the channel
-//! and the joint. No other generator has a say in what a trial is: those that choose starting points or test motions
-//! do so the same way each time.
+//! A number is a pure function of (seed, scenario, trial, channel, joint, position in its stream): any trial can be
+//! replayed alone, and the results are the same bits for any number of threads and any split into shards. The generator
+//! is ChaCha8, which is counter-based: its 256-bit key is SHA-256("armid/random/1" ‖ seed ‖ trial ‖ scenario) and its
+//! 64-bit stream number holds the channel and the joint. No other generator influences what a trial contains: the
+//! generators that choose starting points or test motions draw the same numbers every time.
 
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use sha2::{Digest, Sha256};
 
-/// Separates these keys from any other use of the hash, and one version of this scheme from the next.
+/// Separates these keys from any other use of the hash, and each version of this scheme from the next.
 const DOMAIN: &[u8] = b"armid/random/1";
 
 /// What a stream of random numbers is for.
@@ -21,17 +20,17 @@ pub enum Channel {
     Position,
     /// Error of the velocity reading.
     Velocity,
-    /// One component of the torque error, each joint's own part.
+    /// One component of the torque error, the part that is independent for each joint.
     Torque {
         /// Which component of the noise model.
         component: u8,
     },
-    /// One component of the torque error, the part that all joints share.
+    /// One component of the torque error, the part that is common to all joints.
     TorqueShared {
         /// Which component of the noise model.
         component: u8,
     },
-    /// Readings that a fault replaces by nonsense.
+    /// Readings that a fault replaces by arbitrary values.
     Outlier {
         /// Which of the scenario's effects, from 0.
         effect: u8,
@@ -41,14 +40,14 @@ pub enum Channel {
         /// Which of the scenario's effects, from 0.
         effect: u8,
     },
-    /// Which blocks of a record are drawn again.
+    /// Which blocks of a record are drawn in resampling.
     Resampling,
-    /// What is hidden in a trial of a blind benchmark.
+    /// The hidden truth of a trial of the blind benchmark.
     Case,
 }
 
 impl Channel {
-    /// Kind and component; these numbers are part of every pinned result.
+    /// Kind and component as one number. The codes are part of every pinned result and must not change.
     fn code(self) -> u64 {
         let (kind, component) = match self {
             Self::Position => (1, 0),
@@ -71,7 +70,7 @@ pub struct TrialStreams {
 }
 
 impl TrialStreams {
-    /// The streams of trial `trial` (from 0) of the scenario whose text (or digest) is `scenario`.
+    /// The streams of trial `trial` (from 0) of the scenario whose text or digest is `scenario`.
     pub fn new(seed: u64, scenario: &[u8], trial: u64) -> Self {
         let digest = Sha256::new()
             .chain_update(DOMAIN)
@@ -82,7 +81,7 @@ impl TrialStreams {
         Self { key: digest.into() }
     }
 
-    /// The stream of `channel` at joint `joint` (from 0), at its beginning.
+    /// The stream of `channel` at joint `joint` (from 0), from its beginning.
     pub fn stream(&self, channel: Channel, joint: usize) -> ChaCha8Rng {
         let mut rng = ChaCha8Rng::from_seed(self.key);
         rng.set_stream(channel.code() << 32 | joint as u64);
@@ -124,7 +123,7 @@ mod tests {
         assert_eq!(first_words.len(), 3 * 3 * 3 * 9 * 7);
     }
 
-    /// The scheme is part of every published result: a change must be seen.
+    /// The scheme is part of every published result: a change must not go unnoticed.
     #[test]
     fn the_scheme_is_pinned() {
         let mut rng = TrialStreams::new(7, b"scenario", 3).stream(Channel::Velocity, 2);

@@ -1,4 +1,4 @@
-//! Everything but the Monte Carlo: `armid --help`.
+//! The `armid` program, with every task except the Monte Carlo study: `armid --help`.
 
 use std::process::ExitCode;
 

@@ -1,4 +1,4 @@
-//! The main job: `cargo run --release --bin montecarlo`.
+//! The Monte Carlo program: `cargo run --release --bin montecarlo`.
 
 use std::process::ExitCode;
 
