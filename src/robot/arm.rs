@@ -6,9 +6,9 @@ use super::inertia::LinkInertia;
 
 /// A serial arm. Joint `i` (0-based) connects body `i − 1` (the base for `i = 0`) to body `i`.
 ///
-/// Frame `i` is fixed in body `i`, has its origin on joint axis `i` and its z axis along it, so
-/// that `R_i(q) = placement.rotation · Rot_z(q)` maps coordinates of frame `i` into its parent's.
-/// Immutable once built: algorithms take `&Arm` and a workspace.
+/// Frame `i` is fixed in body `i`, with its origin on joint axis `i` and its z axis along that axis, so that
+/// `R_i(q) = placement.rotation · Rot_z(q)` maps coordinates of frame `i` into those of its parent. Immutable once
+/// built: algorithms take `&Arm` and a workspace.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Arm {
     /// Name as given to `--robot`.
@@ -17,12 +17,12 @@ pub struct Arm {
     pub gravity_m_s2: Vector3<f64>,
     /// ε of the regularised sign tanh(q̇/ε) of the paper's (3), rad/s.
     pub friction_epsilon_rad_s: f64,
-    /// Whether identification fits a constant torque per joint (current sensor offset and unequal
-    /// friction in the two directions): yes for real arms, no for the simulated null model.
+    /// Whether identification fits a constant torque per joint, for the offset of the current sensor and for friction
+    /// that differs between the two directions: yes for real arms, no for the simulated null model.
     pub torque_offsets: bool,
     /// Joints from base to flange.
     pub joints: Vec<Joint>,
-    /// Where the arm must not touch itself or the floor.
+    /// What the arm must not touch: itself, the floor, boxes in the cell.
     pub clearance: Clearance,
 }
 
@@ -37,18 +37,18 @@ pub struct Joint {
     pub link: LinkInertia,
     /// Motor, gear and friction.
     pub drive: Drive,
-    /// What the joint may do.
+    /// Limits of motion and torque.
     pub limits: Limits,
-    /// What is known of the moved body beforehand.
+    /// What is known about the moved body before identification.
     pub bounds: LinkBounds,
 }
 
-/// What a physically consistent estimate of a body must respect, where it is known.
+/// Known bounds that a physically consistent estimate of a body must respect.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LinkBounds {
-    /// Least and greatest mass, kg.
+    /// Smallest and largest mass, kg.
     pub mass_kg: Option<[f64; 2]>,
-    /// Box that holds the centre of mass, in the joint frame: [low, high] of x, y, z, m.
+    /// Box that contains the centre of mass, in the joint frame: [low, high] of x, y, z, m.
     pub com_m: Option<[[f64; 2]; 3]>,
 }
 
@@ -89,7 +89,7 @@ impl Placement {
         }
     }
 
-    /// The same, turned by `q_rad` about its own z axis: where a joint takes its frame.
+    /// This pose turned by `q_rad` about its own z axis: the pose of a joint frame at the joint angle `q_rad`.
     pub fn turned(&self, q_rad: f64) -> Self {
         let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), q_rad).into_inner();
         Self { rotation: self.rotation * turn, ..*self }
@@ -130,7 +130,7 @@ impl Drive {
     }
 }
 
-/// What one joint may do.
+/// Limits of one joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// Lowest and highest angle, rad.
@@ -152,11 +152,11 @@ pub struct Clearance {
     pub pairs: Vec<[usize; 2]>,
     /// Height of the floor in the base frame, m; `None`: no floor.
     pub floor_z_m: Option<f64>,
-    /// What else stands in the cell.
+    /// Boxes that stand in the cell.
     pub boxes: Vec<CellBox>,
 }
 
-/// A box in the cell, its edges along the axes of the base frame.
+/// A box in the cell with its edges along the axes of the base frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CellBox {
     /// Corner with the smallest coordinates, m.
@@ -165,22 +165,23 @@ pub struct CellBox {
     pub high_m: Vector3<f64>,
 }
 
-/// A segment with a radius, fixed in a body.
+/// A capsule fixed in a body: all points within a radius of a segment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Capsule {
     /// Name in messages and reports.
     pub name: String,
-    /// 0 = base, i = body of joint i (1-based), so that 1…N are the moving bodies.
+    /// 0 = base, i = body of joint i (counted from 1, so that 1…N are the moving bodies).
     pub body: usize,
-    /// Segment ends in the body's joint frame (base frame for body 0), m.
+    /// One end of the segment, in the body's joint frame (the base frame for body 0), m.
     pub from_m: Vector3<f64>,
-    /// Other end, m.
+    /// The other end, in the same frame, m.
     pub to_m: Vector3<f64>,
     /// Radius, m.
     pub radius_m: f64,
 }
 
-/// What lies off an axis by less than this, m, or is tilted by less, turns on the spot.
+/// A point nearer to a joint axis than this, m, does not move as the joint turns; an axis tilted by less, rad, is
+/// vertical.
 pub(crate) const ON_AXIS: f64 = 1e-9;
 
 impl Clearance {
@@ -203,7 +204,7 @@ impl Arm {
         (qd_rad_s / self.friction_epsilon_rad_s).tanh()
     }
 
-    /// Whether the first joint turns about the vertical, so that no motion of it brings anything nearer to a floor.
+    /// Whether the first joint turns about the vertical, so that its motion brings nothing nearer to the floor.
     pub fn is_upright(&self) -> bool {
         self.joints.first().is_some_and(|first| {
             let axis = first.placement.rotation.column(2);
@@ -211,8 +212,9 @@ impl Arm {
         })
     }
 
-    /// Whether all that a capsule of the first body sweeps, turning about the vertical, lies above or below a box: a table under
-    /// the arm.
+    /// Whether the circle that a capsule of the base or the first body sweeps about a vertical first axis lies within
+    /// the outline of a box seen from above. The box, such as a table under the arm, is then above or below the capsule
+    /// at every angle.
     pub fn turns_over(&self, capsule: &Capsule, cell_box: &CellBox) -> bool {
         let Some(first) = self.joints.first().filter(|_| capsule.body <= 1 && self.is_upright())
         else {

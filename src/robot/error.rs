@@ -1,8 +1,8 @@
-//! What can be wrong with a description of an arm.
+//! Errors in the description of an arm.
 
 use thiserror::Error;
 
-/// A description of an arm that cannot be used, with the place and the value.
+/// A description of an arm that cannot be used, with the place and the value at fault.
 #[derive(Debug, Error)]
 pub enum RobotError {
     /// `--robot` is neither built in nor a file.
@@ -38,7 +38,7 @@ pub enum RobotError {
         /// The parser's message.
         message: String,
     },
-    /// A URDF, but not of an arm this program can work with.
+    /// A valid URDF, but not of an arm that this program can work with.
     #[error("{file}: {fault}")]
     UrdfArm {
         /// The file.
@@ -46,7 +46,7 @@ pub enum RobotError {
         /// What is wrong, where, and what to do.
         fault: super::urdf::UrdfFault,
     },
-    /// Not a valid MJCF, or not one of an arm this program can work with.
+    /// Not a valid MJCF, or not of an arm that this program can work with.
     #[error("{file}: {fault}")]
     Mjcf {
         /// The file.
@@ -54,7 +54,7 @@ pub enum RobotError {
         /// What is wrong, where, and what to do.
         fault: super::mjcf::MjcfFault,
     },
-    /// Read, but not an arm this program can work with.
+    /// A readable file, but not of an arm that this program can work with.
     #[error("{file}: {what}")]
     Invalid {
         /// The file.

@@ -1,4 +1,4 @@
-//! Robot files: one TOML per arm, and the arms built into the program.
+//! Robot files (one TOML per arm) and the arms built into the program.
 
 mod clearance;
 mod loaded;
@@ -17,7 +17,7 @@ pub(super) use clearance::{BoxEntry, CapsuleEntry, ClearanceKeys, pair};
 pub use loaded::LoadedArm;
 pub(crate) use loaded::text_of;
 
-/// Arms built in, by the name given to `--robot`.
+/// Built-in arms, by the name given to `--robot`.
 const BUILT_IN: [(&str, &str); 4] = [
     ("ur5", include_str!("../../robots/ur5.toml")),
     ("ur10e", include_str!("../../robots/ur10e.toml")),
@@ -25,13 +25,13 @@ const BUILT_IN: [(&str, &str); 4] = [
     ("ur5e", include_str!("../../robots/ur5e.toml")),
 ];
 
-/// Names of the arms built in.
+/// Names of the built-in arms.
 pub fn built_in_names() -> impl Iterator<Item = &'static str> {
     BUILT_IN.iter().map(|(name, _)| *name)
 }
 
 impl Arm {
-    /// One of the arms built in.
+    /// One of the built-in arms.
     pub fn built_in(name: &str) -> Result<Self, RobotError> {
         let (_, text) = BUILT_IN
             .iter()
@@ -40,15 +40,15 @@ impl Arm {
         Self::from_toml(text, name)
     }
 
-    /// What `--robot` accepts: a built-in name, a `.urdf` file or an MJCF (`.xml`, `.mjcf`), with its drive
-    /// file, where `NAME.drives.toml` lies beside it, or a `.toml` robot file. `NAME.urdf#LINK` is the arm that
-    /// ends with that link ([`read_urdf_up_to`](super::read_urdf_up_to)), `NAME.xml#BODY` the one that ends with
-    /// that body.
+    /// Loads what `--robot` names: a built-in arm, a `.toml` robot file, a `.urdf` file or an MJCF (`.xml`, `.mjcf`),
+    /// the latter two together with the drive file `NAME.drives.toml` where one lies beside them. `NAME.urdf#LINK` is
+    /// the arm that ends with that link ([`read_urdf_up_to`](super::read_urdf_up_to)), `NAME.xml#BODY` the arm that
+    /// ends with that body.
     pub fn load(name_or_path: &str) -> Result<Self, RobotError> {
         LoadedArm::load(name_or_path).map(|loaded| loaded.arm)
     }
 
-    /// From the text of a robot file; `source` names it in messages.
+    /// Reads the text of a robot file; `source` names it in messages.
     pub fn from_toml(text: &str, source: &str) -> Result<Self, RobotError> {
         let file: RobotFile = toml::from_str(text)
             .map_err(|e| RobotError::Toml { file: source.to_owned(), message: e.to_string() })?;
@@ -181,7 +181,7 @@ impl JointEntry {
         place.positive("torque_constant_nm_a", self.torque_constant_nm_a)?;
         place.positive("velocity_rad_s", self.velocity_rad_s)?;
         place.positive("acceleration_rad_s2", self.acceleration_rad_s2)?;
-        // A URDF need not say it.
+        // Infinity is allowed: a URDF need not give a torque limit, and a robot file written from it must be readable.
         let torque_nm = self.torque_nm;
         if torque_nm.is_nan() || torque_nm <= 0.0 {
             return Err(
@@ -243,7 +243,7 @@ mod tests {
         assert!(message.contains("gear_ration"), "{message}");
     }
 
-    /// As files are called on systems that do not tell capitals apart.
+    /// File systems that ignore case may show extensions in capitals.
     #[test]
     fn an_extension_in_capitals_is_one() {
         let file = tempfile::Builder::new().suffix(".TOML").tempfile().unwrap();

@@ -1,4 +1,4 @@
-//! Inertial parameters of one body and the test whether any mass distribution has them.
+//! Inertial parameters of one body, and the test whether any mass distribution can have them.
 
 use nalgebra::{Matrix3, Matrix4, Vector3};
 
@@ -96,23 +96,23 @@ impl LinkInertia {
         Self::from_moments(p[(3, 3)], h, sigma.trace() * Matrix3::identity() - sigma)
     }
 
-    /// Smallest eigenvalue of the pseudo-inertia: > 0 for a body that can exist.
+    /// Smallest eigenvalue of the pseudo-inertia: positive for a body that can exist.
     pub fn consistency_margin(&self) -> f64 {
         self.pseudo_inertia().symmetric_eigenvalues().min()
     }
 
-    /// Both bodies rigidly joined, same frame: parameters about one frame add.
+    /// The two bodies rigidly joined; parameters about the same frame add.
     pub fn plus(&self, other: &Self) -> Self {
         Self { parameters: std::array::from_fn(|k| self.parameters[k] + other.parameters[k]) }
     }
 
-    /// What is left of the body without a part of it, same frame.
+    /// The remainder of the body without `part`, both about the same frame.
     pub fn minus(&self, part: &Self) -> Self {
         Self { parameters: std::array::from_fn(|k| self.parameters[k] - part.parameters[k]) }
     }
 
-    /// The same body with its parameters about another frame: `placement` is the pose of the
-    /// present frame in the new one.
+    /// The same body with its parameters about another frame: `placement` is the pose of the present frame in the new
+    /// one.
     pub fn transformed(&self, placement: &super::Placement) -> Self {
         let (r, p) = (placement.rotation, placement.translation_m);
         let m = self.mass_kg();

@@ -1,4 +1,4 @@
-//! Where the joints of an arm stand and how it hangs: what its parameters are about.
+//! Joint frames, gravity and friction law of an arm: what the meaning of its parameters depends on.
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -6,71 +6,73 @@ use thiserror::Error;
 
 use super::arm::{Arm, Placement};
 
-/// Frames that are apart by less are the same, m and rad (of ε the share of it): files print as many digits.
+/// Frames that differ by less count as the same, in m and rad; of ε, the relative difference. Files print as many
+/// digits.
 const SAME: f64 = 1e-6;
 
-/// Joint frames, gravity and friction's ε of an arm, as results carry them.
+/// Joint frames, gravity and the friction ε of an arm, as stored in results.
 ///
-/// The name of a robot does not say them: two files describe one robot by other joint frames, and parameters about the frames
-/// of one are wrong about those of the other; Coulomb and viscous friction are coefficients of tanh(q̇/ε) and q̇.
+/// The name of a robot does not determine them: two files can describe one robot with different joint frames, and
+/// parameters about the frames of one file are wrong about those of the other. ε belongs to the friction parameters,
+/// because Coulomb and viscous friction are the coefficients of tanh(q̇/ε) and q̇.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Kinematics {
     /// Gravity in the base frame, m/s².
     gravity_m_s2: [f64; 3],
-    /// From base to flange.
+    /// Poses of the joint frames, from base to flange.
     joint_frames: Vec<JointFrame>,
-    /// ε of the sign of friction, rad/s; not in results of older programs.
+    /// ε of the regularised sign in the friction law, rad/s; absent from results of older programs.
     friction_epsilon_rad_s: Option<f64>,
 }
 
-/// Pose of a joint frame at q = 0 in its parent's: translation, and roll, pitch and yaw about fixed axes.
+/// Pose of a joint frame at q = 0 in its parent's frame: translation, and roll, pitch and yaw about fixed axes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct JointFrame {
     xyz_m: [f64; 3],
     rpy_rad: [f64; 3],
 }
 
-/// How an arm differs from the one that a result is about.
+/// Difference between an arm and the one that a result is about.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum KinematicsDifference {
-    /// In the number of joints.
+    /// The number of joints differs.
     #[error("it has {found} joints, not {expected}")]
     Joints {
-        /// Of the result.
+        /// In the result.
         found: usize,
-        /// Of the arm.
+        /// In the arm.
         expected: usize,
     },
-    /// In a joint frame.
+    /// A joint frame differs.
     #[error("the frame of joint {joint} is {distance_m:.2e} m and {angle_rad:.2e} rad elsewhere")]
     Frame {
-        /// From 1.
+        /// Number of the joint, from 1.
         joint: usize,
-        /// Between the origins.
+        /// Distance between the origins, m.
         distance_m: f64,
-        /// Between the axes.
+        /// Angle of the rotation between the two frames, rad.
         angle_rad: f64,
     },
-    /// In the gravity.
+    /// The gravity vector differs.
     #[error("its gravity is {found:?} m/s², not {expected:?}")]
     Gravity {
-        /// Of the result.
+        /// In the result, m/s².
         found: [f64; 3],
-        /// Of the arm.
+        /// In the arm, m/s².
         expected: [f64; 3],
     },
-    /// In the law of friction.
+    /// The ε of the friction law differs.
     #[error("its friction_epsilon_rad_s is {found}, not {expected}")]
     FrictionEpsilon {
-        /// Of the result.
+        /// In the result, rad/s.
         found: f64,
-        /// Of the arm.
+        /// In the arm, rad/s.
         expected: f64,
     },
 }
 
 impl Kinematics {
-    /// Of `arm`.
+    /// The kinematics of `arm`.
     pub fn of(arm: &Arm) -> Self {
         let frame = |placement: &Placement| JointFrame {
             xyz_m: placement.translation_m.into(),
@@ -83,7 +85,7 @@ impl Kinematics {
         }
     }
 
-    /// The first difference between this and `arm`; `None` where parameters mean the same.
+    /// The first difference between this and `arm`; `None` where parameters have the same meaning for both.
     pub fn difference(&self, arm: &Arm) -> Option<KinematicsDifference> {
         let (found, expected) = (self.joint_frames.len(), arm.dof());
         if found != expected {
@@ -93,7 +95,7 @@ impl Kinematics {
             let own = Placement::from_xyz_rpy(own.xyz_m, own.rpy_rad);
             let distance_m = (own.translation_m - joint.placement.translation_m).norm();
             let angle_rad = angle_between(&own.rotation, &joint.placement.rotation);
-            // Also what is no number is a difference.
+            // The negated comparison counts NaN as a difference too.
             if !(distance_m < SAME && angle_rad < SAME) {
                 return Some(KinematicsDifference::Frame { joint: j + 1, distance_m, angle_rad });
             }
@@ -111,8 +113,8 @@ impl Kinematics {
     }
 }
 
-/// Angle between two rotations, rad: |A − B| = 2 √2 sin(angle/2) (Frobenius). The cosine, from the
-/// trace of AᵀB, has no digits of a small angle, and rounding may carry it beyond 1.
+/// Angle between two rotations, rad, from |A − B| = 2 √2 sin(angle/2) (Frobenius norm). Its cosine, from the trace of
+/// AᵀB, would lose all digits of a small angle, and rounding may carry it beyond 1.
 fn angle_between(a: &Matrix3<f64>, b: &Matrix3<f64>) -> f64 {
     2.0 * ((a - b).norm() / 8f64.sqrt()).min(1.0).asin()
 }
@@ -134,7 +136,7 @@ mod tests {
         }
     }
 
-    /// Rounding puts the trace of R Rᵀ on either side of 3.
+    /// Rounding makes the trace of R Rᵀ a little smaller or larger than 3.
     #[test]
     fn a_frame_that_is_tilted_a_little_is_itself() {
         for k in 1..200 {
@@ -163,7 +165,7 @@ mod tests {
         assert!(says(&|arm| arm.joints.truncate(5)).contains("6 joints, not 5"));
         let smoother = says(&|arm| arm.friction_epsilon_rad_s = 0.2);
         assert!(smoother.contains("friction_epsilon_rad_s is 0.02, not 0.2"), "{smoother}");
-        // A result of an older program does not say it.
+        // A result of an older program does not contain ε.
         let mut older = serde_json::to_value(&own).unwrap();
         older.as_object_mut().unwrap().remove("friction_epsilon_rad_s");
         let older: Kinematics = serde_json::from_value(older).unwrap();

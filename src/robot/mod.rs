@@ -1,7 +1,7 @@
-//! What an arm is: joints, frames, links, drives, limits and clearance.
+//! Description of an arm: joints, frames, links, drives, limits and clearance.
 //!
-//! Enters: a built-in name, a robot file (TOML), a URDF or an MJCF. Leaves: an immutable [`Arm`], and
-//! [`JointSignals`], the shape in which every later chapter holds one number per joint and sample.
+//! Input: a built-in name, a robot file (TOML), a URDF or an MJCF. Output: an immutable [`Arm`], and [`JointSignals`],
+//! the layout in which all other modules hold one number per joint and sample.
 
 pub mod export;
 

@@ -1,4 +1,4 @@
-//! Nearest points of segments and boxes: what the distances of capsules are made of.
+//! Nearest points of segments and boxes, from which the distances of capsules are computed.
 
 use nalgebra::Vector3;
 use rapier3d::math::{Pose, Vector as ParryVector};
@@ -10,8 +10,8 @@ use super::arm::CellBox;
 
 /// Nearest points of a segment and a box; both are the same point where the segment enters the box.
 ///
-/// The squared distance of p(s) = a + s d from the box is convex in s, with the slope
-/// 2 d·(p − clamp(p)): its zero is bisected to the last bit.
+/// The squared distance of p(s) = a + s d from the box is convex in s, with slope 2 d·(p − clamp(p)): the zero of the
+/// slope is found by bisection, down to the last bit.
 pub(crate) fn nearest_to_box(
     ends: &[Vector3<f64>; 2],
     of: &CellBox,

@@ -1,4 +1,4 @@
-//! Numbers of the files that describe an arm, checked.
+//! Checks of the numbers in files that describe an arm.
 
 use std::collections::HashSet;
 use std::fmt::Display;
@@ -6,31 +6,31 @@ use std::fmt::Display;
 use super::arm::LinkBounds;
 use super::error::RobotError;
 
-/// Where in a file something stands: what is wrong there is told with it.
+/// A place in a file, which error messages name.
 #[derive(Debug)]
 pub(super) struct Place {
     file: String,
-    /// Such as `joint "elbow": `; empty of what is said of the whole arm.
+    /// Prefix such as `joint "elbow": `; empty for statements about the whole arm.
     table: String,
 }
 
 impl Place {
-    /// What `file` says of the whole arm.
+    /// The place of statements about the whole arm in `file`.
     pub(super) fn of_arm(file: &str) -> Self {
         Self { file: file.to_owned(), table: String::new() }
     }
 
-    /// The table of the `kind` called `name` in the same file.
+    /// The table of this `kind` and `name` in the same file.
     pub(super) fn table(&self, kind: &str, name: &str) -> Self {
         Self { file: self.file.clone(), table: format!("{kind} \"{name}\": ") }
     }
 
-    /// Something that is wrong there.
+    /// An error at this place.
     pub(super) fn fault(&self, what: impl Display) -> RobotError {
         RobotError::Invalid { file: self.file.clone(), what: format!("{}{what}", self.table) }
     }
 
-    /// Refuses values that are no numbers to calculate with.
+    /// Refuses NaN and infinite values.
     pub(super) fn finite(&self, key: &str, values: &[f64]) -> Result<(), RobotError> {
         match values.iter().find(|value| !value.is_finite()) {
             Some(value) => Err(self.fault(format!("{key}: {value} is not a finite number"))),
@@ -38,7 +38,7 @@ impl Place {
         }
     }
 
-    /// Refuses what is not a finite number above 0.
+    /// Refuses anything but a finite number above 0.
     pub(super) fn positive(&self, key: &str, value: f64) -> Result<(), RobotError> {
         if value > 0.0 && value.is_finite() {
             return Ok(());
@@ -46,7 +46,7 @@ impl Place {
         Err(self.fault(format!("{key} = {value} must be positive")))
     }
 
-    /// Refuses what is not a finite number from 0 on.
+    /// Refuses anything but a finite number of at least 0.
     pub(super) fn not_negative(&self, key: &str, value: f64) -> Result<(), RobotError> {
         if value >= 0.0 && value.is_finite() {
             return Ok(());
@@ -54,7 +54,7 @@ impl Place {
         Err(self.fault(format!("{key} = {value} must not be negative")))
     }
 
-    /// Refuses what is no range.
+    /// Refuses anything but a finite range with low < high.
     fn range(&self, key: &str, [low, high]: [f64; 2]) -> Result<(), RobotError> {
         if low < high && low.is_finite() && high.is_finite() {
             return Ok(());
@@ -62,7 +62,7 @@ impl Place {
         Err(self.fault(format!("{key}: [{low}, {high}] must be [low, high]")))
     }
 
-    /// What is known of a link's mass (kg) and centre of mass (m).
+    /// Bounds of a link's mass (kg) and centre of mass (m), checked.
     pub(super) fn bounds(
         &self,
         mass_bounds_kg: Option<[f64; 2]>,
@@ -78,7 +78,7 @@ impl Place {
         Ok(LinkBounds { mass_kg: mass_bounds_kg, com_m: com_bounds_m })
     }
 
-    /// Refuses two tables of one `kind` and one name.
+    /// Refuses two tables of the same `kind` with the same name.
     pub(super) fn unique<'a>(
         &self,
         kind: &str,

@@ -1,9 +1,9 @@
 //! One number per joint and sample, stored joint by joint.
 
-/// Samples of all joints of one quantity (angle, velocity, torque …), unit stated by whoever owns it.
+/// Samples of one quantity (angle, velocity, torque …) for all joints; the owner of the signals states the unit.
 ///
-/// Storage is joint-major: `joint(j)` is one contiguous time series, which is what filters,
-/// spectra and the batched regressor read.
+/// Storage is joint-major: `joint(j)` is one contiguous time series, which is what filters, spectra and the batched
+/// regressor read.
 #[derive(Debug, PartialEq)]
 pub struct JointSignals {
     joints: usize,
@@ -16,7 +16,7 @@ impl Clone for JointSignals {
         Self { joints: self.joints, samples: self.samples, data: self.data.clone() }
     }
 
-    /// Into the memory that is there: every trial begins with a copy of the same run.
+    /// Reuses the existing memory: every trial begins with a copy of the same run.
     fn clone_from(&mut self, source: &Self) {
         (self.joints, self.samples) = (source.joints, source.samples);
         self.data.clone_from(&source.data);
@@ -24,12 +24,12 @@ impl Clone for JointSignals {
 }
 
 impl JointSignals {
-    /// All zeros, `joints` × `samples`.
+    /// Zeros for `joints` × `samples`.
     pub fn zeros(joints: usize, samples: usize) -> Self {
         Self { joints, samples, data: vec![0.0; joints * samples] }
     }
 
-    /// Value of `f(joint, sample)` everywhere.
+    /// Signals with the value `f(joint, sample)` at every joint and sample.
     pub fn from_fn(joints: usize, samples: usize, mut f: impl FnMut(usize, usize) -> f64) -> Self {
         let mut out = Self::zeros(joints, samples);
         for j in 0..joints {
@@ -45,7 +45,7 @@ impl JointSignals {
         self.joints
     }
 
-    /// Number of samples of every joint.
+    /// Number of samples per joint.
     pub fn samples(&self) -> usize {
         self.samples
     }
@@ -60,12 +60,12 @@ impl JointSignals {
         &mut self.data[j * self.samples..(j + 1) * self.samples]
     }
 
-    /// Lets joint `j` (0-based) count the other way.
+    /// Reverses the sign convention of joint `j` (0-based): negates its series.
     pub fn reverse(&mut self, j: usize) {
         self.joint_mut(j).iter_mut().for_each(|value| *value = -*value);
     }
 
-    /// All joints at sample `k`, copied into `out` (length = joints).
+    /// Copies sample `k` of all joints into `out` (length = number of joints).
     pub fn sample_into(&self, k: usize, out: &mut [f64]) {
         for (j, value) in out.iter_mut().enumerate() {
             *value = self.data[j * self.samples + k];
@@ -79,12 +79,12 @@ impl JointSignals {
         }
     }
 
-    /// The samples `range`, as a new set of signals.
+    /// The samples in `range`, as new signals.
     pub fn slice(&self, range: std::ops::Range<usize>) -> Self {
         Self::from_fn(self.joints, range.len(), |j, k| self.joint(j)[range.start + k])
     }
 
-    /// Each joint's series replaced by `f(series)`; all results must have one length.
+    /// Signals in which each joint's series is replaced by `f(joint, series)`; all results must have the same length.
     pub fn map_joints(&self, mut f: impl FnMut(usize, &[f64]) -> Vec<f64>) -> Self {
         let mut data = Vec::new();
         let mut samples = 0;

@@ -1,4 +1,4 @@
-//! What an arm keeps clear of, as it stands in a robot file or in a drive file.
+//! Clearance keys that robot files and drive files share.
 
 use serde::{Deserialize, Serialize};
 
@@ -22,7 +22,7 @@ pub(in crate::robot) struct BoxEntry {
     high_m: [f64; 3],
 }
 
-/// Keys about clearance.
+/// The clearance keys of a file.
 pub(in crate::robot) struct ClearanceKeys<'a> {
     /// `floor_z_m`.
     pub floor_z_m: Option<f64>,
@@ -35,8 +35,8 @@ pub(in crate::robot) struct ClearanceKeys<'a> {
 }
 
 impl ClearanceKeys<'_> {
-    /// A clearance of an arm with so many moving bodies, and what the keys say, checked: a capsule of a name that there is takes the
-    /// place of that one.
+    /// Adds these keys, checked, to the `clearance` of an arm with `bodies` moving bodies. A capsule replaces one of
+    /// the same name.
     pub(in crate::robot) fn added_to(
         &self,
         mut clearance: Clearance,
@@ -69,7 +69,7 @@ impl ClearanceKeys<'_> {
     }
 }
 
-/// Two capsules, named by `key`, by their places in the list.
+/// Positions in the list of the two capsules that `key` names.
 pub(in crate::robot) fn pair(
     clearance: &Clearance,
     key: &str,

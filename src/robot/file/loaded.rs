@@ -1,4 +1,4 @@
-//! Arms of whatever kind of file.
+//! Loading of arms from any kind of file.
 
 use std::path::{Path, PathBuf};
 
@@ -9,26 +9,27 @@ use crate::robot::export::DriveFile;
 use crate::robot::mjcf::{MjcfArm, is_urdf, read_mjcf, read_mjcf_up_to};
 use crate::robot::urdf::{Frames, UrdfArm, UrdfLink, UrdfNotice, read_urdf, read_urdf_up_to};
 
-/// What the drive file of `NAME.urdf` is called behind NAME.
+/// Extension that replaces `urdf` in `NAME.urdf` to name its drive file.
 const DRIVES: &str = "drives.toml";
 
-/// An arm, and where it comes from.
+/// An arm and its origin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoadedArm {
     /// The arm.
     pub arm: Arm,
-    /// What had to be assumed; only a URDF and an MJCF leave anything open.
+    /// Assumptions that had to be made; only a URDF or an MJCF leaves anything open.
     pub notices: Vec<UrdfNotice>,
-    /// Named frames on its bodies; only a URDF and an MJCF have any.
+    /// Named frames on its bodies; only a URDF or an MJCF has any.
     pub frames: Frames,
     /// Links that its bodies consist of; only a URDF has any.
     pub urdf_links: Vec<UrdfLink>,
-    /// Files it was read from, the one that was named first: none for a built-in arm; of a URDF also its drive file and meshes.
+    /// Files that the arm was read from, the one that was named first: none for a built-in arm. For a URDF or an MJCF
+    /// also the drive file and the meshes, for an MJCF the files that it includes.
     pub files: Vec<PathBuf>,
 }
 
 impl LoadedArm {
-    /// As [`Arm::load`].
+    /// Loads the arm that `name` names, as [`Arm::load`] does.
     pub fn load(name: &str) -> Result<Self, RobotError> {
         let (file, last_link) = name::split(name);
         let path = Path::new(file);
@@ -76,13 +77,13 @@ impl LoadedArm {
         }
     }
 
-    /// The drive file among its files.
+    /// The drive file among the `files` of a loaded arm.
     pub fn drive_file(files: &[PathBuf]) -> Option<&PathBuf> {
         let ends_so = |file: &&PathBuf| file.to_string_lossy().ends_with(&format!(".{DRIVES}"));
         files.iter().skip(1).find(ends_so)
     }
 
-    /// Takes over what the drive file beside the URDF or MJCF says.
+    /// Applies the drive file beside the URDF or MJCF, and drops the notices that it settles.
     fn take_drives(&mut self, path: PathBuf) -> Result<(), RobotError> {
         let source = path.display().to_string();
         let drives = DriveFile::read(&text_of(&path)?, &source)?;
@@ -100,7 +101,7 @@ impl LoadedArm {
     }
 }
 
-/// The text of a file that says what a robot is.
+/// Reads the text of a file that describes a robot.
 pub(crate) fn text_of(path: &Path) -> Result<String, RobotError> {
     std::fs::read_to_string(path)
         .map_err(|source| RobotError::Read { file: path.display().to_string(), source })

@@ -1,8 +1,9 @@
-//! What names a robot: something built in, a file, or a file with the last link of the arm.
+//! Names of robots: a built-in arm, a file, or a file with the last link of the arm.
 
 use std::path::Path;
 
-/// `FILE.urdf#LINK` (or `FILE.xml#BODY`) as file and link; whatever else, and a file that has this name, as it is.
+/// Splits `FILE.urdf#LINK` (or `FILE.xml#BODY`) into file and link. Any other name, and the name of a file that exists
+/// under it, stays whole.
 pub(super) fn split(name: &str) -> (&str, Option<&str>) {
     let is_file = |name: &str| Path::new(name).extension().is_some();
     match name.rsplit_once('#') {

@@ -1,4 +1,4 @@
-//! Robot files written.
+//! Writing of robot files.
 
 use super::{BoxEntry, CapsuleEntry, JointEntry, RobotFile, Tensor};
 use crate::robot::{Arm, Joint};
@@ -61,12 +61,12 @@ mod tests {
     use super::*;
     use crate::robot::built_in_names;
 
-    /// Angles, products of inertia and their shift to the joint frame cost a few units of round-off each.
+    /// Angles, products of inertia and their shift to the joint frame add a few units of round-off each.
     #[test]
     fn every_built_in_arm_comes_back() {
         for name in built_in_names() {
             let mut arm = Arm::built_in(name).unwrap();
-            // A limit that a URDF does not give.
+            // Torque limits are unknown where a URDF does not give them.
             arm.joints[0].limits.torque_nm = f64::INFINITY;
             let again = Arm::from_toml(&arm.to_toml(), "written").unwrap();
             assert_eq!(again.clearance, arm.clearance);
