@@ -1,4 +1,4 @@
-//! What a URDF has no place for.
+//! The drive file: everything about an arm that a URDF has no place for.
 
 mod clearance;
 
@@ -10,7 +10,8 @@ use crate::robot::file::{BoxEntry, CapsuleEntry};
 use crate::robot::place::Place;
 use crate::robot::{Arm, Joint, MjcfNotice, RobotError, UrdfNotice};
 
-/// What lies beside a URDF or an MJCF. Whatever it leaves out stays as that has it, or as it is assumed without a drive file.
+/// The drive file beside a URDF or an MJCF. A key that is left out keeps the value of that file, or the value that is
+/// assumed without a drive file.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(in crate::robot) struct DriveFile {
@@ -49,15 +50,16 @@ struct DriveEntry {
     com_bounds_m: Option<[[f64; 2]; 3]>,
 }
 
-/// The drives as TOML, to lie beside a URDF of bodies alone, with what the arm keeps clear of: joint torque is that of the bodies plus
-/// rotor inertia · q̈ + viscous · q̇ + coulomb · tanh(q̇/ε) + offset. `offsets_nm` has one entry per
-/// joint.
+/// The drives and the clearance of `arm` as TOML, to lie beside a URDF that describes the bodies alone. The torque of a
+/// joint is that of the bodies plus rotor inertia · q̈ + viscous · q̇ + coulomb · tanh(q̇/ε) + offset; `offsets_nm` has
+/// one entry per joint.
 pub fn drive_file(arm: &Arm, offsets_nm: &[f64]) -> String {
     DriveFile::of(arm, offsets_nm).text()
 }
 
-/// As [`drive_file`], of an `arm` that came from a URDF with shapes, whose own drive file is `text`: about clearance it says what
-/// that says, and behind the arm's joints stand those others that are in it, such as a second arm's; `source` names it in messages.
+/// As [`drive_file`], for an `arm` that came from a URDF with shapes whose own drive file is `text`. The clearance keys
+/// are kept from `text`. The joints of `text` that are not the arm's, such as those of a second arm, follow the joints
+/// of the arm; `source` names the drive file in messages.
 pub fn drive_file_of_urdf(
     arm: &Arm,
     offsets_nm: &[f64],
@@ -68,7 +70,8 @@ pub fn drive_file_of_urdf(
     let DriveFile { robot, gravity_m_s2, friction_epsilon_rad_s, torque_offsets, joint, .. } =
         DriveFile::of(arm, offsets_nm);
     let of_arm = |entry: &DriveEntry| arm.joints.iter().any(|joint| joint.name == entry.name);
-    // Limits that its author set stay where they were set: the URDF keeps its own.
+    // Speed and torque limits are written only where the old drive file has them: others are in the URDF, which keeps
+    // its own.
     let limited = joint.into_iter().map(|entry| {
         let before = own.joint.iter().find(|before| before.name == entry.name);
         DriveEntry {
@@ -95,8 +98,8 @@ pub fn drive_file_of_urdf(
     Ok(file.text())
 }
 
-/// Gives `arm`, which was read from a URDF, what is in the text of its drive file; `source` names it
-/// in messages. An [`Arm`] has no place for the torque offsets themselves.
+/// Applies the text of a drive file to `arm`, which was read from a URDF; `source` names the file in messages. Torque
+/// offsets are checked but not kept: an [`Arm`] has no place for them.
 pub fn apply_drive_file(arm: &mut Arm, text: &str, source: &str) -> Result<(), RobotError> {
     DriveFile::read(text, source)?.apply(arm, &[], source)
 }
@@ -126,14 +129,14 @@ impl DriveFile {
         toml::to_string(self).unwrap_or_default()
     }
 
-    /// From its text; `source` names it in messages.
+    /// Reads the text of a drive file; `source` names it in messages.
     pub(in crate::robot) fn read(text: &str, source: &str) -> Result<Self, RobotError> {
         toml::from_str(text)
             .map_err(|e| RobotError::Toml { file: source.to_owned(), message: e.to_string() })
     }
 
-    /// Gives `arm` what it says. Joints of the same URDF that are `locked` may be in it: of a robot with two arms, one file has the
-    /// drives of both.
+    /// Applies the drive file to `arm`. It may also contain `locked` joints of the same URDF: for a robot with two
+    /// arms, one file has the drives of both.
     pub(in crate::robot) fn apply(
         &self,
         arm: &mut Arm,
@@ -192,7 +195,7 @@ impl DriveFile {
         }
     }
 
-    /// What remains of a `notice` about the URDF alone.
+    /// The part of a `notice` about the URDF that this file leaves open.
     pub(in crate::robot) fn leaves(&self, notice: UrdfNotice) -> Option<UrdfNotice> {
         match notice {
             UrdfNotice::Gravity { root } => {
@@ -235,7 +238,7 @@ impl DriveFile {
         }
     }
 
-    /// Those of `joints` of which the file does not say a quantity.
+    /// Those of `joints` for which the file does not give a quantity.
     fn without(
         &self,
         joints: Vec<String>,
@@ -244,7 +247,7 @@ impl DriveFile {
         joints.into_iter().filter(|joint| !self.says(joint, &quantity)).collect()
     }
 
-    /// Whether the file says a quantity of a joint.
+    /// Whether the file gives a quantity of a joint.
     fn says(&self, joint: &str, quantity: impl Fn(&DriveEntry) -> Option<f64>) -> bool {
         self.joint.iter().any(|entry| entry.name == joint && quantity(entry).is_some())
     }
@@ -259,7 +262,7 @@ impl DriveEntry {
             viscous_nm_s_rad: Some(drive.viscous_nm_s_rad),
             coulomb_nm: Some(drive.coulomb_nm),
             torque_offset_nm: Some(torque_offset_nm),
-            // The file beside it has these.
+            // The URDF beside the drive file has these limits.
             velocity_rad_s: None,
             torque_nm: None,
             acceleration_rad_s2: Some(limits.acceleration_rad_s2),
@@ -300,7 +303,7 @@ impl DriveEntry {
     }
 }
 
-/// Puts a value that is given, and passes the check, into its place.
+/// Writes a given value into `place` after it has passed the check.
 fn take(
     place: &mut f64,
     given: Option<f64>,
@@ -326,7 +329,7 @@ mod tests {
         arm.joints.iter().map(|joint| joint.name.clone()).collect()
     }
 
-    /// Some lines by hand, about joints in another order.
+    /// A few hand-written lines, about joints in another order.
     #[test]
     fn what_a_drive_file_leaves_out_stays_as_it_was() {
         let mut wanted = ur5();
@@ -348,7 +351,7 @@ mod tests {
         assert_eq!(arm, wanted);
     }
 
-    /// What MJCF has no place for, and URDFs often leave out.
+    /// Speed and torque limits have no place in an MJCF, and URDFs often leave them out.
     #[test]
     fn limits_by_hand_come_first() {
         let mut wanted = ur5();
@@ -390,7 +393,7 @@ mod tests {
         assert_eq!(arm, ur5());
     }
 
-    /// One file has the drives of both arms: those of the other one stay as its author wrote them.
+    /// One file has the drives of two arms: the entries of the other arm stay as their author wrote them.
     #[test]
     fn joints_of_another_arm_stay_in_the_drive_file() {
         let arm = ur5();
@@ -399,7 +402,7 @@ mod tests {
             "[[joint]]\nname = \"other\"\ngear_ratio = 50.0\n[[joint]]\nname = \"{own}\"\ngear_ratio = 7.0\n"
         );
         let written = drive_file_of_urdf(&arm, &[0.5; 6], &text, "x.drives.toml").unwrap();
-        // What the arm keeps clear of is in the URDF.
+        // The clearance comes from the URDF.
         let without = Arm { clearance: Clearance::default(), ..arm.clone() };
         let alone = drive_file(&without, &[0.5; 6]);
         let behind = "\n[[joint]]\nname = \"other\"\ngear_ratio = 50.0\n";

@@ -1,4 +1,4 @@
-//! MJCF, MuJoCo's own format.
+//! Export as MJCF, MuJoCo's own format.
 
 use std::fmt::Write;
 
@@ -10,15 +10,16 @@ use crate::robot::{Arm, FixedFrame, Frames, Joint, Placement, UrdfLink};
 
 /// The arm as MJCF, with `frames` as sites and one motor per joint.
 ///
-/// `armature` is the rotor inertia, `damping` rv, `frictionloss` rc: MuJoCo's dry friction is
-/// a constraint that holds at standstill, not our tanh(q̇/ε), so the two differ below a few ε. Position
-/// limits and the motors' torque limits are written; speed and acceleration limits, ε, offsets and
-/// clearance capsules have no place. Bodies are named `<joint>_link`.
+/// `armature` is the rotor inertia, `damping` is rv, `frictionloss` is rc. MuJoCo's dry friction is a constraint that
+/// holds at standstill, not tanh(q̇/ε), so the two differ at speeds below a few ε. Position limits and the motors'
+/// torque limits are written; speed and acceleration limits, ε, offsets and clearance capsules have no place in an
+/// MJCF. Bodies are named `<joint>_link`.
 pub fn mjcf(arm: &Arm, frames: &Frames) -> Result<String, ExportError> {
     mjcf_of_urdf(arm, frames, &[])
 }
 
-/// As [`mjcf`], of an arm that was read from a URDF with these `links`: each body has the name of the link right behind its joint.
+/// As [`mjcf`], for an arm that was read from a URDF with these `links`: each body has the name of the link directly
+/// behind its joint.
 pub fn mjcf_of_urdf(arm: &Arm, frames: &Frames, links: &[UrdfLink]) -> Result<String, ExportError> {
     let mut bodies = link_names(arm);
     for (number, name) in (1..).zip(&mut bodies) {
@@ -59,7 +60,7 @@ pub fn mjcf_of_urdf(arm: &Arm, frames: &Frames, links: &[UrdfLink]) -> Result<St
     Ok(out)
 }
 
-/// Opens the body `name` of a joint, `depth` bodies deep.
+/// Opens the body `name` of a joint, at nesting depth `depth`.
 fn write_body(out: &mut String, joint: &Joint, name: &str, depth: usize) {
     let (mass_kg, com, i) = about_com(&joint.link);
     let margin = indent(depth);

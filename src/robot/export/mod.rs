@@ -1,8 +1,8 @@
-//! Arms for other programs.
+//! Export of arms to other programs.
 //!
-//! Enters: an [`Arm`] whose bodies can exist, and named frames on them. Leaves: a URDF, or the one
-//! that it came from with other numbers, the drive file with what a URDF has no place for, or an
-//! MJCF. All numbers are written so that they read back as the same bits.
+//! Input: an [`Arm`] whose bodies can exist, and named frames on them. Output: a URDF (a new one, or the one that the
+//! arm came from with other numbers), the drive file with everything that a URDF has no place for, or an MJCF. All
+//! numbers are written so that they read back as the same bits.
 
 mod drives;
 mod mjcf;
@@ -26,7 +26,7 @@ pub use urdf::urdf;
 /// The arm is not one that a simulator accepts.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ExportError {
-    /// No mass distribution has these ten parameters.
+    /// No mass distribution has the ten parameters of a body.
     #[error(
         "the body of joint \"{joint}\" cannot exist (smallest eigenvalue of its pseudo-inertia \
          {smallest:.3e}, must be positive): no simulator runs it; identify with --physical"
@@ -37,7 +37,7 @@ pub enum ExportError {
         /// Smallest eigenvalue.
         smallest: f64,
     },
-    /// A drive that gives energy.
+    /// A negative parameter of a drive, which would generate energy.
     #[error("joint \"{joint}\": {quantity} = {value} is negative; identify with --physical")]
     Negative {
         /// Name of the joint.
@@ -47,7 +47,7 @@ pub enum ExportError {
         /// Its value.
         value: f64,
     },
-    /// A number that no file format has.
+    /// A number that no file format can represent.
     #[error("joint \"{joint}\": {quantity} = {value} is not a finite number")]
     NotFinite {
         /// Name of the joint.
@@ -57,7 +57,7 @@ pub enum ExportError {
         /// Its value.
         value: f64,
     },
-    /// Two links or frames of one name.
+    /// Two links or frames with the same name.
     #[error("the name \"{name}\" is used twice; rename the joint or the frame")]
     DuplicateName {
         /// The name.
@@ -65,10 +65,10 @@ pub enum ExportError {
     },
 }
 
-/// Written for a torque limit that is not known: simulators want a number, and take 0 literally.
+/// Written for an unknown torque limit: simulators require a number, and take 0 literally.
 const UNKNOWN_TORQUE_NM: f64 = 1e9;
 
-/// Refuses an arm that could not run, and names that would collide; `bodies` are those of the moving bodies.
+/// Refuses an arm that could not run, and names that would collide; `bodies` are the names of the moving bodies.
 fn check(arm: &Arm, frames: &Frames, bodies: &[String]) -> Result<(), ExportError> {
     check_numbers(arm)?;
     let mut seen = HashSet::from([frames.root.as_str()]);
@@ -110,7 +110,7 @@ fn check_numbers(arm: &Arm) -> Result<(), ExportError> {
     Ok(())
 }
 
-/// Names of the links that the joints move, where nothing has named them.
+/// Default names of the links that the joints move.
 fn link_names(arm: &Arm) -> Vec<String> {
     arm.joints.iter().map(|joint| format!("{}_link", joint.name)).collect()
 }
@@ -136,8 +136,8 @@ mod tests {
         }
     }
 
-    /// Rotations go through three angles and back (a few roundings), moments through the centre of
-    /// mass; everything else comes back as written.
+    /// Rotations are converted to three angles and back (a few roundings), moments to the centre of mass and back;
+    /// everything else reads back as written.
     #[test]
     fn an_arm_written_as_urdf_reads_back_as_the_same_arm() {
         for name in crate::robot::built_in_names() {
@@ -197,7 +197,7 @@ mod tests {
         assert!(mjcf(&arm, &Frames::default()).unwrap().contains("-1000000000 1000000000"));
     }
 
-    /// The simulators know a robot by the names of its URDF, which need not be like those of its joints.
+    /// Simulators address bodies by the link names of the URDF, which need not resemble the names of the joints.
     #[test]
     fn bodies_of_an_mjcf_have_the_names_of_the_links() {
         let arm = Arm::built_in("ur5").unwrap();
@@ -227,7 +227,7 @@ mod tests {
         assert_eq!(file["friction_epsilon_rad_s"].as_float(), Some(0.02));
     }
 
-    /// URDF and drive file together are the whole arm.
+    /// URDF and drive file together contain the whole arm.
     #[test]
     fn the_drive_file_gives_a_urdf_its_drives_back() {
         let mut arm = Arm::built_in("ur5").unwrap();
@@ -244,7 +244,7 @@ mod tests {
         }
     }
 
-    /// Written by a program that did not know of offsets and bounds yet.
+    /// A drive file written before offsets and bounds were part of the format.
     #[test]
     fn an_older_drive_file_leaves_what_it_does_not_say() {
         let mut arm = Arm::built_in("ur5").unwrap();

@@ -1,4 +1,4 @@
-//! Identified numbers in the URDF that the arm came from.
+//! Writes identified numbers into the URDF that the arm came from.
 
 mod markup;
 mod share;
@@ -18,24 +18,24 @@ use crate::robot::{Arm, Drive, LinkInertia, UrdfLink};
 
 pub use self::share::{Takeover, Unfit};
 
-/// A URDF with the numbers of another arm of its build.
+/// A URDF rewritten with the numbers of another arm of the same design.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OwnUrdf {
-    /// The file.
+    /// The text of the file.
     pub text: String,
-    /// Bodies of which one link has all, in words by `Display`.
+    /// Bodies whose whole inertia was given to one link; `Display` puts each into words.
     pub takeovers: Vec<Takeover>,
-    /// A mesh that is looked for from the file's folder, where there is one.
+    /// One mesh file that is given relative to the folder of the URDF, where there is any.
     pub relative_mesh: Option<String>,
 }
 
-/// A URDF that does not take the numbers of an arm.
+/// A URDF that the numbers of an arm cannot be written into.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum OwnUrdfError {
-    /// The arm cannot be written into any.
+    /// The arm cannot be written into any URDF.
     #[error(transparent)]
     Arm(#[from] ExportError),
-    /// It is not XML to the letter.
+    /// The text is not strictly valid XML.
     #[error("{file}: cannot be rewritten, it is no proper XML: {message}; mend it there")]
     Xml {
         /// The file.
@@ -43,7 +43,7 @@ pub enum OwnUrdfError {
         /// The parser's message, with line and column.
         message: String,
     },
-    /// A link or joint of the arm is not in it.
+    /// A link or joint of the arm is not in the file.
     #[error(
         "{file}: the {kind} \"{name}\" is not there; give the file from which the arm was read"
     )]
@@ -55,7 +55,7 @@ pub enum OwnUrdfError {
         /// Its name.
         name: String,
     },
-    /// No link is behind a joint.
+    /// No link of the arm is moved by a joint.
     #[error(
         "{file}: no link of it is moved by joint \"{joint}\"; give the file from which the arm was read"
     )]
@@ -67,19 +67,20 @@ pub enum OwnUrdfError {
     },
 }
 
-/// The URDF `text` with the bodies and the friction of `arm`, which was read from it with these
-/// `links`; `source` names it in messages.
+/// The URDF `text` with the bodies and the friction of `arm`, which was read from it with these `links`; `source` names
+/// it in messages.
 ///
-/// - `<inertial>`: one link of each body takes what the body has beyond the links fixed to it, which
-///   keep theirs: the link right behind the joint, or the first that has mass where that has none.
-///   Where no body can be what is left, it takes all, and the others lose their `<inertial>` (a
-///   [`Takeover`]).
+/// - `<inertial>`: one link of each body, the bearer, gets the inertia of the body less that of the links fixed to it, which
+///   keep their own. The bearer is the link directly behind the joint, or the first link with mass if that one has none.
+///   Where no body can have the remaining inertia, the bearer gets the whole of it, and the other links lose their
+///   `<inertial>` (a [`Takeover`]).
 /// - `<dynamics>` of the arm's joints: `damping` is rv, `friction` is rc.
-/// - Everything else is the same, byte for byte. What a URDF has no place for is in the
+/// - Everything else stays the same, byte for byte. What a URDF has no place for is in the
 ///   [`drive_file`](super::drive_file).
 ///
 /// # Errors
-/// [`OwnUrdfError`] for an arm that could not run, and a text that is not the arm's URDF.
+///
+/// [`OwnUrdfError`] for an arm that could not run, and for a text that is not the arm's URDF.
 pub fn own_urdf(
     text: &str,
     source: &str,
@@ -88,7 +89,7 @@ pub fn own_urdf(
 ) -> Result<OwnUrdf, OwnUrdfError> {
     check_numbers(arm)?;
     let file = || source.to_owned();
-    // As in reading, a document type is passed over.
+    // A document type declaration is skipped, as it is when a URDF is read.
     let options = ParsingOptions { allow_dtd: true, ..ParsingOptions::default() };
     let document = Document::parse_with_options(text, options)
         .map_err(|e| OwnUrdfError::Xml { file: file(), message: e.to_string() })?;
@@ -133,7 +134,7 @@ fn write_inertial(edits: &mut Edits<'_>, link: Node<'_, '_>, inertia: &LinkInert
     }
 }
 
-/// The element, about the centre of mass in the link's axes.
+/// The `<inertial>` element, about the centre of mass in the link's axes.
 fn inertial(link: &LinkInertia, prefix: &str, Margins { own, inner }: &Margins) -> String {
     let (mass_kg, com, central) = about_com(link);
     format!(

@@ -1,4 +1,4 @@
-//! What a drive file says of clearance, beyond the shapes of the links.
+//! Clearance keys of a drive file, which add to the shapes of the links.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,10 +7,10 @@ use crate::robot::file::{ClearanceKeys, pair};
 use crate::robot::place::Place;
 use crate::robot::{Arm, Clearance, RobotError, ShapeNotice, UrdfNotice};
 
-/// Where the clearance of the arm comes from.
+/// Sources of the arm's clearance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Source {
-    /// Collision shapes of the links, and what the drive file says.
+    /// The collision shapes of the links and the drive file.
     #[serde(rename = "shapes")]
     Shapes,
     /// The drive file alone.
@@ -19,7 +19,7 @@ pub(super) enum Source {
 }
 
 impl DriveFile {
-    /// Gives `arm`, which has the clearance that the shapes of its links have, what the file says beyond it.
+    /// Adds what the file says about clearance to that of `arm`, which comes from the shapes of its links.
     pub(super) fn clear(&self, arm: &mut Arm, place: &Place) -> Result<(), RobotError> {
         let of_shapes = std::mem::take(&mut arm.clearance);
         let begin = if self.sets_shapes_aside() { Clearance::default() } else { of_shapes };
@@ -42,7 +42,7 @@ impl DriveFile {
         self.clearance == Some(Source::Nothing)
     }
 
-    /// Whether a `notice` about shapes is not of interest any more.
+    /// Whether the file makes a `notice` about shapes pointless.
     pub(in crate::robot) fn settles(&self, notice: &UrdfNotice) -> bool {
         match notice {
             UrdfNotice::Shapes(ShapeNotice::Nothing) => {
@@ -84,7 +84,7 @@ mod tests {
         ))
         .unwrap();
         assert_eq!(with_tool.capsules.len(), of_shapes.capsules.len() + 1);
-        // One came, another went.
+        // One pair was added and one removed.
         assert_eq!(with_tool.pairs.len(), of_shapes.pairs.len());
         assert!(with_tool.pairs.contains(&[of_shapes.capsules.len(), 0]));
         let wider = cleared(&TOOL.replace("tool", "wrist 3")).unwrap();
@@ -92,7 +92,7 @@ mod tests {
         assert!(wider.capsules.iter().any(|one| one.name == "wrist 3" && one.radius_m == 0.03));
     }
 
-    /// What was said beside the URDF stays; its shapes are not said again.
+    /// Hand-written clearance stays in the drive file; that of the shapes is not repeated in it.
     #[test]
     fn it_is_kept_where_a_urdf_is_exported() {
         let arm = Arm::built_in("ur5").unwrap();

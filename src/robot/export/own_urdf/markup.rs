@@ -1,18 +1,18 @@
-//! Changes to the text of an XML file, of which everything else stays byte for byte.
+//! Edits to the text of an XML file that leave everything else as it is, byte for byte.
 
 use std::ops::Range;
 
 use roxmltree::Node;
 
-/// Where files do not show how far in the next level stands.
+/// Indentation step where the file does not show one.
 const USUAL_STEP: &str = "  ";
 
-/// Line end and blanks in front of an element and of those in it: nothing where all share a line.
+/// Line end and indentation in front of an element and of its children; empty where all share one line.
 #[derive(Default)]
 pub(super) struct Margins {
-    /// Of the element, and of its closing tag.
+    /// Of the element and of its closing tag.
     pub own: String,
-    /// Of what is in it.
+    /// Of its children.
     pub inner: String,
 }
 
@@ -25,7 +25,7 @@ impl Margins {
 /// A text and the changes to it.
 pub(super) struct Edits<'t> {
     text: &'t str,
-    /// What takes the place of which bytes.
+    /// Byte ranges and their replacements.
     changes: Vec<(Range<usize>, String)>,
 }
 
@@ -34,10 +34,10 @@ impl<'t> Edits<'t> {
         Self { text, changes: Vec::new() }
     }
 
-    /// The text with all changes.
+    /// The text with all changes applied.
     pub(super) fn applied(mut self) -> String {
-        // From the back, so that places ahead stay where they are; of two insertions at one place
-        // the earlier one comes to stand in front.
+        // Applied from the back, so that the positions of earlier changes stay valid; of two insertions at one place,
+        // the one that was made first ends up in front.
         self.changes.sort_by_key(|(range, _)| range.start);
         let mut text = self.text.to_owned();
         for (range, new) in self.changes.into_iter().rev() {
@@ -46,7 +46,7 @@ impl<'t> Edits<'t> {
         text
     }
 
-    /// Puts what is written in place of `element`, on one line where that is.
+    /// Replaces `element` by what `write` returns; an element on one line stays on one line.
     pub(super) fn replace(
         &mut self,
         element: Node<'_, '_>,
@@ -58,7 +58,7 @@ impl<'t> Edits<'t> {
         self.changes.push((element.range(), write(&margins)));
     }
 
-    /// Takes `element` out, and with it the line that it has for itself.
+    /// Removes `element`, and its line with it where the element has the line to itself.
     pub(super) fn remove(&mut self, element: Node<'_, '_>) {
         let Range { start, end } = element.range();
         let behind = self.text[end..].trim_start_matches([' ', '\t']);
@@ -67,7 +67,7 @@ impl<'t> Edits<'t> {
         self.changes.push((start - margin.len()..end, String::new()));
     }
 
-    /// Puts what is written into `parent`, ahead of all that is in it.
+    /// Inserts what `write` returns as the first child of `parent`.
     pub(super) fn put_first(
         &mut self,
         parent: Node<'_, '_>,
@@ -102,9 +102,9 @@ impl<'t> Edits<'t> {
         });
     }
 
-    /// Puts the element `new` into `parent`, behind all that is in it.
+    /// Inserts the element `new` as the last child of `parent`.
     pub(super) fn put_last(&mut self, parent: Node<'_, '_>, new: String) {
-        // Behind comments too: those on the line of another element are about that one.
+        // Comments count as children: a comment on the line of another element belongs to that element.
         let Some(last) = parent.children().rfind(|node| !node.is_text()) else {
             return self.put_first(parent, |_| new);
         };
@@ -114,7 +114,8 @@ impl<'t> Edits<'t> {
         self.changes.push((at..at, format!("{margin}{new}")));
     }
 
-    /// Gives `element` these attributes; others that it has stay, and how its own are written.
+    /// Sets `attributes` of `element`. Its other attributes stay, and so does the way in which those that exist are
+    /// written.
     pub(super) fn set_attributes(&mut self, element: Node<'_, '_>, attributes: &[(&str, String)]) {
         let at = match element.attributes().next_back() {
             Some(last) => last.range().end,
@@ -128,26 +129,26 @@ impl<'t> Edits<'t> {
         }
     }
 
-    /// Prefix of the name of `element` with its colon; nothing where it has none.
+    /// Namespace prefix in the name of `element`, with its colon; empty without one.
     pub(super) fn prefix(&self, element: Node<'_, '_>) -> &'t str {
         let name = qualified_name(self.text, element);
         &name[..name.find(':').map_or(0, |colon| colon + 1)]
     }
 }
 
-/// The first element of this name in another.
+/// The first child element of this name.
 pub(super) fn child<'d, 'i>(element: Node<'d, 'i>, name: &str) -> Option<Node<'d, 'i>> {
     element.children().find(|node| node.has_tag_name(name))
 }
 
-/// Name of an element as it is written, with its prefix.
+/// Name of an element as written, with its prefix.
 fn qualified_name<'t>(text: &'t str, element: Node<'_, '_>) -> &'t str {
     let behind = &text[element.range().start + 1..];
     let ends = |c: char| c.is_whitespace() || c == '/' || c == '>';
     &behind[..behind.find(ends).unwrap_or(behind.len())]
 }
 
-/// Line end and blanks in front of an element; `None` where it is not the first on its line.
+/// Line end and indentation in front of an element; `None` where it is not the first on its line.
 fn margin<'t>(text: &'t str, element: Node<'_, '_>) -> Option<&'t str> {
     let before = &text[..element.range().start];
     let line = before.trim_end_matches([' ', '\t']);
@@ -155,7 +156,7 @@ fn margin<'t>(text: &'t str, element: Node<'_, '_>) -> Option<&'t str> {
     Some(&before[line.len() - line_end.len()..])
 }
 
-/// By which blanks an element stands further in than the one around it.
+/// Indentation of an element relative to its parent.
 fn step<'t>(text: &'t str, element: Node<'_, '_>) -> &'t str {
     let own = margin(text, element).unwrap_or_default();
     let outer = element.parent_element().and_then(|parent| margin(text, parent));
@@ -177,7 +178,7 @@ mod tests {
         edits.applied()
     }
 
-    /// An element with another one in it.
+    /// An element with a child.
     fn nested(margins: &Margins) -> String {
         format!("<n>{}<m/>{}</n>", margins.inner, margins.own)
     }

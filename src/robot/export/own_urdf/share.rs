@@ -1,4 +1,4 @@
-//! How the links of a body share what was identified for the body as a whole.
+//! Distribution of the identified inertia of a body among its links.
 
 use std::fmt;
 
@@ -6,41 +6,41 @@ use crate::robot::export::xml::about_com;
 use crate::robot::inertia::principal_moments;
 use crate::robot::{Joint, LinkInertia, UrdfLink};
 
-/// What is left of a body is round-off below this share of it.
+/// A remaining mass below this fraction of the body's mass counts as round-off.
 const ROUND_OFF: f64 = 1e-9;
 
-/// The link of a body that is given what was identified.
+/// The link of a body that bears the identified inertia, and its share.
 pub(super) struct Share<'a> {
-    /// That link.
+    /// The bearer.
     pub bearer: &'a UrdfLink,
-    /// What it is given, about its own frame.
+    /// The inertia it is given, about its own frame.
     pub inertia: LinkInertia,
-    /// Where the other links cannot keep what they have.
+    /// Set where the other links cannot keep their inertia.
     pub takeover: Option<Takeover>,
 }
 
-/// A body from which the links that are fixed to it cannot keep what the file gives them: one link
-/// has all of it.
+/// A body whose identified inertia does not allow the links fixed to it to keep what the file gives them: one link gets
+/// all of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Takeover {
     /// The joint that moves the body.
     pub joint: String,
-    /// The mass that was identified.
+    /// The identified mass, kg.
     pub body_kg: f64,
-    /// The link that has all of it.
+    /// The link that gets all of it.
     pub link: String,
-    /// The links whose `<inertial>` is taken out, with the mass that they had.
+    /// The links whose `<inertial>` is removed, with the mass that each had, kg.
     pub emptied: Vec<(String, f64)>,
-    /// Why.
+    /// Why the other links cannot keep theirs.
     pub why: Unfit,
 }
 
-/// Why no body has the inertia that is left over.
+/// Reason why no body can have the remaining inertia.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Unfit {
     /// Its mass is not positive.
     Mass {
-        /// The mass.
+        /// The mass, kg.
         mass_kg: f64,
     },
     /// A principal moment of inertia is not positive, or not less than the sum of the others.
@@ -53,10 +53,10 @@ pub enum Unfit {
 }
 
 impl<'a> Share<'a> {
-    /// For the body of `joint`, whose `links` these are; `None` without any.
+    /// The share for the body of `joint`, which consists of `links`; `None` without any.
     ///
-    /// The link right behind the joint bears what was identified less what the file gives to the
-    /// others. Where it has no inertia in the file (a frame by name), the next one that has does.
+    /// The bearer is the link directly behind the joint. It gets the identified inertia less what the file gives to the
+    /// other links. If it has no inertia in the file (a mere named frame), the next link that has one is the bearer.
     pub(super) fn of(joint: &Joint, links: &[&'a UrdfLink]) -> Option<Self> {
         let first = links.iter().copied().find(|link| link.is_first)?;
         let bearer = if first.inertia.is_some() {
@@ -87,13 +87,13 @@ impl<'a> Share<'a> {
     }
 }
 
-/// What keeps a body of `body_kg` from leaving this; `None` where nothing does.
+/// Reason why no body can have the inertia `rest` that is left of a body of `body_kg`; `None` where one can.
 fn unfit(rest: &LinkInertia, body_kg: f64) -> Option<Unfit> {
     let mass_kg = rest.mass_kg();
     if mass_kg <= ROUND_OFF * body_kg {
         return Some(Unfit::Mass { mass_kg });
     }
-    // As it is judged when the file is read again.
+    // The same test as when the file is read again.
     let (_, _, central) = about_com(rest);
     let principal_kg_m2 = principal_moments(&central);
     let [small, middle, large] = principal_kg_m2;

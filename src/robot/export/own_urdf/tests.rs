@@ -103,7 +103,7 @@ fn written(text: &str, arm: &Arm, links: &[UrdfLink]) -> OwnUrdf {
     own_urdf(text, "cell.urdf", arm, links).unwrap()
 }
 
-/// Through frames, centres of mass and back: some roundings of the largest number.
+/// Conversions to other frames and to centres of mass and back cost a few roundings of the largest number.
 fn assert_reads_back(text: &str, arm: &Arm) {
     let back = loaded(text).arm;
     assert_eq!(arm.dof(), back.dof());
@@ -116,7 +116,7 @@ fn assert_reads_back(text: &str, arm: &Arm) {
     }
 }
 
-/// What stands in `text` where `parts` stand in `original`, all else being the same.
+/// The parts of `text` at the places where `original` has `parts`; everything else must be the same.
 fn in_place_of<'a>(parts: &[String], mut original: &str, mut text: &'a str) -> Vec<&'a str> {
     let mut found = Vec::new();
     for (k, part) in parts.iter().enumerate() {
@@ -132,7 +132,7 @@ fn in_place_of<'a>(parts: &[String], mut original: &str, mut text: &'a str) -> V
     found
 }
 
-/// As an editor on Windows saves it.
+/// The file as an editor on Windows saves it.
 #[test]
 fn what_is_not_identified_stays_byte_for_byte() {
     let windows = |text: &str| text.replace('\n', "\r\n");
@@ -154,8 +154,8 @@ fn what_is_not_identified_stays_byte_for_byte() {
     assert_reads_back(&own.text, &arm);
 }
 
-/// Tool and finger have 0.9 kg: a body with 0.3 times the 2.4 kg of the file has less, and half of it leaves 0.3 kg for the hand
-/// that would have to be thinner than nothing.
+/// Tool and finger weigh 0.9 kg together. With 0.3 times the 2.4 kg of the file, the body weighs less; with half of it,
+/// 0.3 kg are left for the hand, with moments of inertia that no body can have.
 #[test]
 fn a_body_that_its_links_do_not_fit_into_is_that_of_one_link() {
     let text = cell();
@@ -181,7 +181,7 @@ fn a_body_that_its_links_do_not_fit_into_is_that_of_one_link() {
     }
 }
 
-/// Many files have a frame by name behind the joint, and the body on it.
+/// Many files have a mere named frame directly behind the joint, and the body on it.
 #[test]
 fn a_link_without_mass_stays_so_where_another_one_has_the_body() {
     let text = cell().replace(HAND, "");
