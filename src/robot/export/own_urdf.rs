@@ -55,7 +55,7 @@ pub enum OwnUrdfError {
         /// Its name.
         name: String,
     },
-    /// No link of the arm is moved by a joint.
+    /// No link is directly behind one of the joints.
     #[error(
         "{file}: no link of it is moved by joint \"{joint}\"; give the file from which the arm was read"
     )]

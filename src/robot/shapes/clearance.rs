@@ -1,4 +1,4 @@
-//! The clearance of an arm from the shapes of its links.
+//! Derivation of the clearance of an arm from the shapes of its links.
 
 use std::path::{Path, PathBuf};
 
@@ -13,18 +13,18 @@ use super::shape::{LinkShape, Shape, ShapeFault};
 use crate::robot::arm::{Arm, Capsule, CellBox, Clearance, Placement};
 use crate::robot::urdf::UrdfLink;
 
-/// Capsules of a body that moves, and of the base, which may be a whole robot with another arm: every one more costs the design of a
-/// motion as many distances as there are capsules on other bodies.
+/// Largest number of capsules of a moving body, and of the base, which may be a whole robot with another arm. Each
+/// additional capsule costs the design of a motion one distance for every capsule on other bodies.
 const MOST_OF_BODY: usize = 3;
 const MOST_OF_BASE: usize = 8;
-/// Farther from the origin of the body coordinates lose what capsules are made of, m.
+/// Farther than this from the origin of the body, m, coordinates are too coarse for the sizes of capsules.
 const OUT_OF_SIGHT_M: f64 = 1e6;
-/// A capsule has some thickness, m.
+/// Smallest radius of a capsule, m.
 const THINNEST_M: f64 = 1e-4;
-/// Entries of a rotation that are so near to 0 or ±1 are meant to be: files print 1.5708.
+/// Entries of a rotation matrix that are this near to 0 or ±1 are taken as such: files print 1.5708 for π/2.
 const ALIGNED: f64 = 1e-4;
 
-/// What becomes of shapes.
+/// Result of the conversion of shapes.
 pub(in crate::robot) struct Watched {
     pub clearance: Clearance,
     pub notices: Vec<ShapeNotice>,
@@ -32,21 +32,21 @@ pub(in crate::robot) struct Watched {
     pub meshes: Vec<PathBuf>,
 }
 
-/// A shape of the base that is a box along its axes.
+/// A box-shaped collision shape of the base whose edges lie along the axes of the base.
 struct BaseBox {
     link: String,
     cell_box: CellBox,
-    /// As a shape among others, unless it is too large for one.
+    /// The same box as a shape for a capsule, unless it is too large for one.
     group: Result<Group, ShapeFault>,
 }
 
-/// Capsules around the `shapes` of `links`, which are the arm's, and the pairs of them to keep apart; meshes are looked for from
-/// `folder`.
+/// Encloses the `shapes` of `links`, which belong to `arm`, in capsules, and selects the pairs of capsules to keep
+/// apart; meshes are searched for from `folder`.
 ///
-/// - Shapes of a body share a capsule where it is hardly larger than theirs, and where they are many.
+/// - Shapes of a body share a capsule where it is hardly larger than their separate ones, and where there are too many.
 /// - Boxes of the base that lie along its axes, such as tables, stay boxes, unless the arm could never leave them.
-/// - Watched are capsules of bodies that are not next to each other in the chain, except pairs that are near in nearly all of some
-///   hundred poses all over the range of the joints: what overlaps there are the capsules, not the links.
+/// - A pair of capsules is watched if their bodies are not neighbours in the chain, unless the two are near in nearly all of
+///   some hundred poses over the whole range of the joints: then it is the capsules that overlap, not the links.
 pub(in crate::robot) fn watched(
     arm: &Arm,
     links: &[UrdfLink],
@@ -106,14 +106,14 @@ pub(in crate::robot) fn watched(
     Watched { clearance, notices, meshes: meshes.into_files() }
 }
 
-/// What was read so far.
+/// State of reading the shapes.
 struct Reader {
-    /// By body, the base first.
+    /// Groups of shapes by body, the base first.
     groups: Vec<Vec<Group>>,
     boxes: Vec<BaseBox>,
-    /// Links of these.
+    /// Links whose shapes were read.
     links: Vec<String>,
-    /// What was not read, with its link.
+    /// Shapes that were not read, each with its link and the fault.
     faults: Vec<(String, ShapeFault)>,
     meshes: Meshes,
 }
@@ -160,7 +160,7 @@ impl Reader {
     }
 }
 
-/// The box as one of the cell, where its edges lie along the axes of the base.
+/// The box as a box of the cell, if its edges lie along the axes of the base.
 fn cell_box(placement: &Placement, half_m: [f64; 3]) -> Option<CellBox> {
     let whole = placement.rotation.map(f64::round);
     if (placement.rotation - whole).amax() > ALIGNED {
@@ -177,7 +177,7 @@ fn capsule(body: usize, group: &Group) -> Capsule {
     Capsule { name: group.link.clone(), body, from_m, to_m, radius_m }
 }
 
-/// The second capsule of a link is called `LINK 2`.
+/// Makes names unique: the second capsule of a link is called `LINK 2`.
 fn with_own_names(capsules: Vec<Capsule>) -> Vec<Capsule> {
     let mut named: Vec<Capsule> = Vec::with_capacity(capsules.len());
     for mut capsule in capsules {
@@ -192,7 +192,7 @@ fn with_own_names(capsules: Vec<Capsule>) -> Vec<Capsule> {
     named
 }
 
-/// Pairs of capsules to keep apart, and those that are never.
+/// Pairs of capsules to keep apart, and pairs that are never apart.
 fn pairs(capsules: &[Capsule], poses: &Poses) -> (Vec<[usize; 2]>, Vec<[usize; 2]>) {
     let numbers = 0..capsules.len();
     let all = numbers.flat_map(|j| (0..j).map(move |i| [i, j]));
@@ -200,7 +200,7 @@ fn pairs(capsules: &[Capsule], poses: &Poses) -> (Vec<[usize; 2]>, Vec<[usize; 2
     apart.partition(|[i, j]| !poses.are_never_apart(&capsules[*i], &capsules[*j]))
 }
 
-/// A line of the meshes that are not there, and one of all else that was not read.
+/// One notice about missing mesh files, and one about all other shapes that were not read.
 fn told(faults: Vec<(String, ShapeFault)>) -> Vec<ShapeNotice> {
     let (mut files, mut missed, mut shapes) = (Vec::new(), Vec::new(), Vec::new());
     for (link, fault) in faults {

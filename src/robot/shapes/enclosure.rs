@@ -1,10 +1,10 @@
-//! The capsule around a set of balls.
+//! Smallest capsule around a set of balls.
 
 use std::f64::consts::PI;
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-/// A ball that is to be held; a point has the radius 0.
+/// A ball to be enclosed; a point is a ball of radius 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Ball {
     pub centre_m: Vector3<f64>,
@@ -17,29 +17,31 @@ impl Ball {
     }
 }
 
-/// A segment with a radius that holds something.
+/// A capsule that encloses something.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Enclosure {
     pub ends_m: [Vector3<f64>; 2],
     pub radius_m: f64,
 }
 
-/// Of more balls than so many, axes are sought for those that are outermost in as many directions.
+/// Largest number of balls among which the axis is sought. Of more balls only those that are outermost in one of as
+/// many directions are used.
 const FEW: usize = 300;
-/// Steps towards the farthest ball in search of a line that is near to all.
+/// Number of steps towards the farthest ball in the search for the line that is nearest to all.
 const STEPS: usize = 60;
-/// A radius beyond the least one lets the half spheres at the ends cover more, so that the segment is shorter: these multiples
-/// of the least one are tried.
+/// Radii that are tried, as multiples of the smallest possible one: with a larger radius the hemispheres at the ends
+/// cover more, so that the segment is shorter.
 const GROWTHS: [f64; 10] = [1.0, 1.02, 1.05, 1.1, 1.15, 1.2, 1.25, 1.3, 1.36, 1.42];
 
 impl Enclosure {
-    /// Around all balls, as [`Self::by`] has it; `None` of no ball.
+    /// The capsule around all balls, as by [`Self::by`]; `None` without any ball.
     pub(super) fn of(balls: &[Ball], axes: &[Vector3<f64>]) -> Option<Self> {
         Self::by(&outermost(balls), balls, axes)
     }
 
-    /// The smallest one by volume along the principal axes of the centres, those of the frame, and `axes`, chosen for `few` of
-    /// the `balls`, the [`outermost`], and around all of them; `None` of no ball.
+    /// The capsule of the smallest volume along one of the principal axes of the centres, the axes of the frame, or the
+    /// given `axes`. The axis is chosen for `few` of the `balls`, the [`outermost`] ones, and the capsule then encloses
+    /// all of them; `None` without any ball.
     pub(super) fn by(few: &[Ball], balls: &[Ball], axes: &[Vector3<f64>]) -> Option<Self> {
         let own = principal_axes(few)?;
         let frame = [Vector3::x(), Vector3::y(), Vector3::z()];
@@ -53,7 +55,7 @@ impl Enclosure {
         Some(Self::about(balls, axis, &line_m, growth))
     }
 
-    /// The shortest one along a line whose radius is the least one times `growth`.
+    /// The shortest capsule along a line whose radius is `growth` times the smallest possible one.
     fn about(balls: &[Ball], axis: &Vector3<f64>, line_m: &Vector3<f64>, growth: f64) -> Self {
         let place = |ball: &Ball| {
             let from = ball.centre_m - line_m;
@@ -66,13 +68,13 @@ impl Enclosure {
         for ball in balls {
             let (along, aside) = place(ball);
             let spare = radius_m - ball.radius_m;
-            // So far from the ball an end of the segment still has it.
+            // An end of the segment may be this far from the ball along the axis and still cover it.
             let covered = (spare * spare - aside * aside).max(0.0).sqrt();
             low = low.min(along + covered);
             high = high.max(along - covered);
         }
         if low > high {
-            // A sphere has all of them, wherever between these its centre is.
+            // A sphere covers all balls, with its centre anywhere between the two values.
             let centre = 0.5 * (low + high);
             (low, high) = (centre, centre);
         }
@@ -85,13 +87,14 @@ impl Enclosure {
         PI * r * r * ((to - from).norm() + 4.0 / 3.0 * r)
     }
 
-    /// The balls at its ends: what holds these holds it.
+    /// The balls at its ends: a convex set that contains both contains the capsule.
     pub(super) fn balls(&self) -> [Ball; 2] {
         self.ends_m.map(|centre_m| Ball { centre_m, radius_m: self.radius_m })
     }
 }
 
-/// The balls that are outermost in one of [`FEW`] directions, which lie on a spiral around the sphere; all of few.
+/// The balls that are outermost in one of [`FEW`] directions, which lie on a spiral around the sphere; up to [`FEW`]
+/// balls are all kept.
 pub(super) fn outermost(balls: &[Ball]) -> Vec<Ball> {
     if balls.len() <= FEW {
         return balls.to_vec();
@@ -111,7 +114,7 @@ pub(super) fn outermost(balls: &[Ball]) -> Vec<Ball> {
     farthest.collect()
 }
 
-/// Principal axes of the centres; `None` of no ball.
+/// Principal axes of the centres; `None` without any ball.
 fn principal_axes(balls: &[Ball]) -> Option<[Vector3<f64>; 3]> {
     if balls.is_empty() {
         return None;
@@ -126,9 +129,10 @@ fn principal_axes(balls: &[Ball]) -> Option<[Vector3<f64>; 3]> {
     Some([0, 1, 2].map(|k| vectors.column(k).into_owned()))
 }
 
-/// A point of the line along `axis` of which the farthest ball is nearly as near as it can be.
+/// A point on the line along `axis` whose distance from the farthest ball is almost the smallest possible.
 ///
-/// From the middle of what the balls take up across the axis, shorter and shorter steps towards whichever is farthest.
+/// The search starts at the centre of the bounding rectangle across the axis and takes shorter and shorter steps
+/// towards the ball that is then farthest.
 fn middle(balls: &[Ball], axis: &Vector3<f64>) -> Vector3<f64> {
     let helper = if axis.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
     let u = axis.cross(&helper).normalize();
@@ -165,7 +169,7 @@ mod tests {
 
     use super::*;
 
-    /// How far a ball sticks out, m.
+    /// Distance by which a ball sticks out of the capsule, m.
     fn beyond_m(capsule: &Enclosure, ball: &Ball) -> f64 {
         let [from, to] = capsule.ends_m;
         let along = to - from;
@@ -182,7 +186,7 @@ mod tests {
         corners.iter().map(|corner| Ball::point(Vector3::from(*corner))).collect()
     }
 
-    /// All corners of a box with these halves, turned.
+    /// All corners of a box with these half lengths, turned.
     fn corners(half_m: [f64; 3], turn: &Rotation3<f64>) -> Vec<Ball> {
         let signs = (0..8).map(|k| [0, 1, 2].map(|i| if k >> i & 1 == 0 { -1.0 } else { 1.0 }));
         let corner = |sign: [f64; 3]| Vector3::from_fn(|i, _| sign[i] * half_m[i]);
@@ -208,7 +212,8 @@ mod tests {
         }
     }
 
-    /// More points than the search looks at, on an ellipsoid: outermost in its direction is nearly each of them.
+    /// More points than the search looks at, on an ellipsoid, where nearly every point is outermost in its own
+    /// direction.
     #[test]
     fn all_of_many_points_is_inside() {
         let point = |k: i32| {
@@ -218,7 +223,7 @@ mod tests {
         let balls: Vec<Ball> = (0..20_000).map(|k| Ball::point(point(k))).collect();
         let capsule = Enclosure::of(&balls, &[]).unwrap();
         assert!(balls.iter().all(|ball| beyond_m(&capsule, ball) < 1e-12), "{capsule:?}");
-        // Along its longest axis one of the radius 0.2 m has it: π 0.2² · 0.4 + 4/3 π 0.2³ = 0.084 m³.
+        // Along the longest axis, a capsule of radius 0.2 m encloses it: π 0.2² · 0.4 + 4/3 π 0.2³ = 0.084 m³.
         assert!(capsule.volume_m3() < 0.09, "{capsule:?}");
         assert!(Enclosure::of(&[], &[]).is_none());
     }
@@ -229,13 +234,13 @@ mod tests {
         let sphere = Enclosure::of(&[ball], &[]).unwrap();
         assert!((sphere.radius_m - 0.05).abs() < 1e-12, "{sphere:?}");
         assert!(sphere.ends_m.iter().all(|end| (end - ball.centre_m).norm() < 1e-12));
-        // A capsule is its own.
+        // The capsule around a capsule is the capsule itself.
         let axis = Vector3::new(0.6, 0.0, 0.8);
         let own = Enclosure { ends_m: [Vector3::zeros(), axis * 0.5], radius_m: 0.07 };
         let found = Enclosure::of(&own.balls(), &[]).unwrap();
         assert!((found.radius_m - 0.07).abs() < 1e-9, "{found:?}");
         assert!((found.volume_m3() / own.volume_m3() - 1.0).abs() < 1e-6, "{found:?}");
-        // A long box lies in a capsule along it that is little wider than its diagonal.
+        // A long box lies in a capsule along it that is little wider than the diagonal of its cross-section.
         let turn = Rotation3::from_euler_angles(0.3, -0.8, 1.1);
         let beam = Enclosure::of(&corners([0.03, 0.04, 0.5], &turn), &[]).unwrap();
         let [from, to] = beam.ends_m;
@@ -248,7 +253,8 @@ mod tests {
         assert!(cube.volume_m3() < 1.02 * 4.0 / 3.0 * PI * (0.03_f64).powf(1.5), "{cube:?}");
     }
 
-    /// Three points of a triangle with equal sides: the circle around it, not one about the middle of its height.
+    /// The corners of an equilateral triangle: the line must pass through the centre of the circumscribed circle, not
+    /// through the middle of the triangle's height.
     #[test]
     fn the_line_is_in_the_middle() {
         let height = 3.0_f64.sqrt() / 2.0;

@@ -1,38 +1,39 @@
-//! Shapes of one body that share a capsule.
+//! Grouping of the shapes of one body into common capsules.
 
 use nalgebra::Vector3;
 
 use super::enclosure::{Ball, Enclosure, outermost};
 
-/// Shapes that one capsule holds.
+/// Shapes inside one common capsule.
 #[derive(Debug, Clone)]
 pub(super) struct Group {
-    /// The link of the first of them.
+    /// The link of the first of these shapes.
     pub link: String,
     balls: Vec<Ball>,
-    /// The outermost of the balls: of several groups they are among those of each.
+    /// The outermost balls. Those of a union of groups are among the outermost balls of its groups.
     few: Vec<Ball>,
-    /// Along which the capsule may lie.
+    /// Candidate directions of the capsule.
     axes: Vec<Vector3<f64>>,
     pub enclosure: Enclosure,
 }
 
-/// A common capsule may be so many times as large as two that it is for; overlapping ones have a smaller one.
+/// Two capsules are merged if the common one has at most this many times their total volume; for overlapping capsules
+/// it can be less than their total.
 const WORTH: f64 = 1.25;
-/// Of more axes the first are tried.
+/// At most this many axes are kept, the first ones.
 const AXES: usize = 12;
-/// Of more shapes in a body those of a link have one capsule.
+/// A body with more shapes than this begins with one capsule per link.
 const MANY: usize = 40;
 
 impl Group {
-    /// Of one shape on the link, with its `balls` and axes; `None` without any ball.
+    /// The group of one shape on `link`, with its `balls` and axes; `None` without any ball.
     pub(super) fn of(link: String, balls: Vec<Ball>, axes: Vec<Vector3<f64>>) -> Option<Self> {
         let few = outermost(&balls);
         let enclosure = Enclosure::by(&few, &balls, &axes)?;
         Some(Self { link, balls, few, axes, enclosure })
     }
 
-    /// Around both capsules.
+    /// A capsule around both capsules.
     fn around(&self, other: &Self) -> Option<Enclosure> {
         let ends = [self.enclosure.balls(), other.enclosure.balls()].concat();
         let directions = [self, other].map(|one| {
@@ -43,7 +44,7 @@ impl Group {
         Enclosure::of(&ends, &directions)
     }
 
-    /// How many times as large as both capsules the one around them is.
+    /// Volume of the capsule around both, relative to their total volume.
     fn growth(&self, other: &Self) -> f64 {
         let apart_m3 = self.enclosure.volume_m3() + other.enclosure.volume_m3();
         self.around(other).map_or(f64::INFINITY, |both| both.volume_m3() / apart_m3)
@@ -62,7 +63,8 @@ impl Group {
     }
 }
 
-/// The shapes of a body in groups, at most so many: together are those whose capsule is hardly larger than theirs were.
+/// Merges the groups of a body pair by pair, always the pair whose volume grows least, as long as there are more than
+/// `most` groups or the common capsule is hardly larger than the two.
 pub(super) fn merged(mut groups: Vec<Group>, most: usize) -> Vec<Group> {
     if groups.len() > MANY {
         groups = by_link(groups);
@@ -77,13 +79,13 @@ pub(super) fn merged(mut groups: Vec<Group>, most: usize) -> Vec<Group> {
         if growth > WORTH && groups.len() <= most {
             return groups;
         }
-        // The later of the two, so that the place of the other stays.
+        // The later of the two is removed, so that the earlier one keeps its position.
         let other = groups.remove(j);
         groups[i].take_in(other);
     }
 }
 
-/// One group of all that stand behind each other and are of the same link.
+/// Merges consecutive groups of the same link.
 fn by_link(groups: Vec<Group>) -> Vec<Group> {
     let mut links: Vec<Group> = Vec::new();
     for group in groups {
@@ -104,7 +106,7 @@ mod tests {
         Group::of(link.to_owned(), balls, Vec::new()).unwrap()
     }
 
-    /// Balls in a row are a rod; of an angle each side is one.
+    /// Balls in a row merge into one rod, balls along an L into one rod for each side.
     #[test]
     fn shapes_in_a_row_share_a_capsule() {
         let row = |x: f64, y: f64| {
@@ -120,7 +122,7 @@ mod tests {
         assert!(merged(Vec::new(), 3).is_empty());
     }
 
-    /// What is far from each other shares one only where it must.
+    /// Distant shapes share a capsule only if their number must be reduced.
     #[test]
     fn no_more_capsules_than_are_wanted() {
         let far = || (0..5).map(|k| ball("arm", [f64::from(k * k), 0.0, 0.0], 0.1));

@@ -1,4 +1,4 @@
-//! Meshes: files with the corners of many triangles.
+//! Reading of meshes: files with the corners of many triangles.
 
 mod find;
 mod obj;
@@ -12,36 +12,36 @@ use thiserror::Error;
 
 use find::find;
 
-/// Meshes for collisions have a few hundred kilobytes; no file of an arm has so many bytes.
+/// Files with more bytes are refused: a collision mesh has a few hundred kilobytes.
 const MOST_BYTES: u64 = 500_000_000;
 
 /// A mesh that cannot be used.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub(super) enum MeshFault {
-    /// Not found.
+    /// The file was not found.
     #[error("{file} is not there")]
     Missing { file: String },
-    /// Another format.
+    /// The file has an unsupported format.
     #[error("{file}: of meshes only .stl and .obj are read")]
     Format { file: String },
     /// The file cannot be read.
     #[error("{file}: {reason}")]
     Read { file: String, reason: String },
-    /// What is in it is no mesh.
+    /// The content of the file is not a mesh.
     #[error("{file}: {flaw}")]
     Flawed { file: String, flaw: MeshFlaw },
 }
 
-/// What is wrong in a mesh file.
+/// An error in the content of a mesh file.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub(super) enum MeshFlaw {
-    /// Neither kind of STL.
+    /// Neither text nor binary STL.
     #[error("it is no STL")]
     NoStl,
-    /// Fewer bytes than announced.
+    /// A binary STL with fewer triangles than it announces.
     #[error("it announces {triangles} triangles and has room for {room}; is it cut off?")]
     CutOff { triangles: usize, room: usize },
-    /// A text without its last line.
+    /// A text STL without its last line.
     #[error("it ends without endsolid; is it cut off?")]
     NoEnd,
     /// A word where a number should be.
@@ -58,20 +58,20 @@ pub(super) enum MeshFlaw {
     Empty,
 }
 
-/// The meshes of one file.
+/// Reader of the meshes that one robot file names.
 pub(super) struct Meshes {
     folder: PathBuf,
-    /// Those that were read.
+    /// Mesh files that were read.
     files: Vec<PathBuf>,
 }
 
 impl Meshes {
-    /// What a file in `folder` names.
+    /// A reader of the meshes that a robot file in `folder` names.
     pub(super) fn named_in(folder: &Path) -> Self {
         Self { folder: folder.to_owned(), files: Vec::new() }
     }
 
-    /// The corners of a mesh, each once.
+    /// The corners of the mesh file `name`, each once.
     pub(super) fn points(&mut self, name: &str) -> Result<Vec<Vector3<f64>>, MeshFault> {
         let file = || name.to_owned();
         let end = Path::new(name).extension().and_then(|end| end.to_str()).map(str::to_lowercase);
@@ -97,7 +97,7 @@ impl Meshes {
         Ok(points)
     }
 
-    /// Those files that were read.
+    /// The mesh files that were read.
     pub(super) fn into_files(self) -> Vec<PathBuf> {
         self.files
     }
@@ -111,7 +111,7 @@ fn bytes_of(path: &Path) -> Result<Vec<u8>, String> {
     std::fs::read(path).map_err(|e| e.to_string())
 }
 
-/// Refuses what is no set of points.
+/// Refuses points that are not finite, and the absence of any point.
 fn checked(points: Vec<Vector3<f64>>) -> Result<Vec<Vector3<f64>>, MeshFlaw> {
     let is_finite = |point: &Vector3<f64>| point.iter().all(|number| number.is_finite());
     match points.iter().position(|point| !is_finite(point)) {

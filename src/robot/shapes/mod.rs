@@ -1,8 +1,9 @@
-//! Collision shapes as capsules.
+//! Conversion of collision shapes into capsules.
 //!
-//! Enters: an [`Arm`](super::Arm) that was read from a URDF or an MJCF, its links, and the collision shapes that the file has on
-//! them; meshes are files that lie somewhere near. Leaves: the [`Clearance`](super::Clearance) of the arm, capsules that hold the
-//! shapes and the pairs of them to keep apart, and a list of what is not watched and why ([`ShapeNotice`]).
+//! Input: an [`Arm`](super::Arm) that was read from a URDF or an MJCF, its links, and their collision shapes in the
+//! file; mesh files are searched for near that file. Output: the [`Clearance`](super::Clearance) of the arm, which
+//! consists of capsules that contain the shapes and the pairs of capsules to keep apart, and a list of everything that
+//! is not watched and why ([`ShapeNotice`]).
 
 mod clearance;
 mod enclosure;

@@ -1,40 +1,40 @@
-//! What is told of collision shapes.
+//! Notices about collision shapes.
 
 use std::fmt;
 
 use crate::robot::urdf::listed;
 
-/// What became of the collision shapes of a file.
+/// How the collision shapes of a file were used.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ShapeNotice {
-    /// None was there, or none that is read.
+    /// The file has no collision shape, or none that could be read.
     Nothing,
-    /// The arm is kept clear of itself.
+    /// The arm is kept clear of itself by capsules.
     Capsules {
-        /// How many there are.
+        /// Number of capsules.
         count: usize,
-        /// Boxes of the base that are what they are.
+        /// Number of boxes of the base that stay boxes.
         boxes: usize,
-        /// Links whose shapes these are.
+        /// Links whose shapes they enclose.
         links: Vec<String>,
-        /// Links with mass and without shapes.
+        /// Links with mass but without shapes.
         bare: Vec<String>,
     },
-    /// Shapes that are not read.
+    /// Shapes that could not be read.
     NotRead {
         /// Their links, each with the reason.
         shapes: Vec<(String, String)>,
     },
     /// Mesh files of collision shapes that could not be found.
     MissingMeshes {
-        /// As written.
+        /// Their names as written in the file.
         files: Vec<String>,
         /// Links whose shapes they are.
         links: Vec<String>,
     },
-    /// Capsules that are near to each other wherever the arm is.
+    /// Capsules that are near to each other wherever the arm is, and hence not watched.
     NeverApart {
-        /// Pairs of them.
+        /// Pairs of names of such capsules.
         pairs: Vec<[String; 2]>,
     },
 }

@@ -1,4 +1,4 @@
-//! What is near to each other wherever the arm is.
+//! Detection of capsules that are near to each other wherever the arm is.
 
 use std::f64::consts::TAU;
 
@@ -9,14 +9,15 @@ use rand::{RngExt, SeedableRng};
 use crate::robot::arm::{Arm, Capsule, CellBox, Placement};
 use crate::robot::nearest::{nearest_points, nearest_to_box};
 
-/// Poses that are looked at.
+/// Number of poses that are looked at.
 const POSES: usize = 300;
-/// Capsules that are near in this share of them are larger than their links by more than leaves room between them.
+/// Capsules that are near in this share of the poses are so because they are larger than their links, so that no room
+/// is left between them.
 const NEARLY_ALL: f64 = 0.95;
-/// What counts as near, m: the clearance that `armid excite` keeps where nothing else is asked for.
+/// Distance that counts as near, m: the clearance that `armid excite` keeps by default.
 const NEAR_M: f64 = 0.02;
 
-/// Poses all over the range of the joints: of each the frames of base and bodies.
+/// Random poses over the whole range of the joints: for each the frames of the base and the bodies.
 pub(super) struct Poses(Vec<Vec<Placement>>);
 
 impl Poses {
@@ -36,7 +37,7 @@ impl Poses {
         Self(poses)
     }
 
-    /// Whether no motion would keep two capsules apart.
+    /// Whether no motion could keep two capsules apart.
     pub(super) fn are_never_apart(&self, one: &Capsule, other: &Capsule) -> bool {
         self.nearly_always(|frames| {
             let (p, q) = nearest_points(&ends(frames, one), &ends(frames, other));
@@ -44,7 +45,7 @@ impl Poses {
         })
     }
 
-    /// Whether no motion would keep a capsule out of a box.
+    /// Whether no motion could keep a capsule out of a box.
     pub(super) fn is_always_in(&self, capsule: &Capsule, cell_box: &CellBox) -> bool {
         self.nearly_always(|frames| {
             let (p, q) = nearest_to_box(&ends(frames, capsule), cell_box);
@@ -52,7 +53,7 @@ impl Poses {
         })
     }
 
-    /// Whether a distance, m, is small in [`NEARLY_ALL`] poses.
+    /// Whether a distance, m, is less than [`NEAR_M`] in [`NEARLY_ALL`] of the poses.
     fn nearly_always(&self, distance_m: impl Fn(&[Placement]) -> f64) -> bool {
         let near = self.0.iter().filter(|frames| distance_m(frames) < NEAR_M).count();
         near as f64 >= NEARLY_ALL * self.0.len() as f64

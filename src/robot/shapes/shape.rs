@@ -1,4 +1,4 @@
-//! The solids that links collide with.
+//! The solids used for collisions of links.
 
 use std::f64::consts::PI;
 
@@ -9,7 +9,7 @@ use super::enclosure::Ball;
 use super::mesh::{MeshFault, Meshes};
 use crate::robot::arm::Placement;
 
-/// A solid about its centre, its axis of symmetry along z. Sizes are halves and radii, m.
+/// A solid about its centre, with its axis of symmetry along z. Sizes are half lengths and radii, m.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::robot) enum Shape {
     Ellipsoid([f64; 3]),
@@ -18,12 +18,12 @@ pub(in crate::robot) enum Shape {
         radius_m: f64,
         half_m: f64,
     },
-    /// The half spheres lie beyond `half_m`.
+    /// The hemispheres lie beyond ±`half_m`.
     Capsule {
         radius_m: f64,
         half_m: f64,
     },
-    /// What a file has, times `scale`.
+    /// The mesh of a file, scaled by `scale` along each axis.
     Mesh {
         file: String,
         scale: [f64; 3],
@@ -35,42 +35,42 @@ pub(in crate::robot) enum Shape {
 pub(in crate::robot) struct LinkShape {
     /// The link's name.
     pub link: String,
-    /// Where it is in the link's frame.
+    /// Pose in the link's frame.
     pub placement: Placement,
-    /// The shape, or why it is not understood.
+    /// The shape, or the reason why it could not be interpreted.
     pub shape: Result<Shape, String>,
 }
 
-/// Why a shape is not watched.
+/// Reason why a shape is not watched.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub(super) enum ShapeFault {
-    /// Something without extent.
+    /// A size that is not positive.
     #[error("its size {size_m} m is not positive")]
     Size { size_m: f64 },
-    /// A pose that is none.
+    /// A pose that is not finite.
     #[error("its pose has a number that is not finite")]
     Pose,
-    /// Farther away than any arm reaches.
+    /// A shape farther away than any arm reaches.
     #[error("it reaches {reach_m:.1} m from its link: is it in mm, and the scale missing?")]
     Far { reach_m: f64 },
-    /// The mesh file.
+    /// An unusable mesh file.
     #[error(transparent)]
     Mesh(#[from] MeshFault),
-    /// What the file that it stands in means is not known.
+    /// A shape whose description could not be interpreted.
     #[error("{0}")]
     Unread(String),
 }
 
-/// No link of an arm reaches farther, m.
+/// No link of an arm extends farther from its frame, m.
 const FARTHEST_M: f64 = 20.0;
-/// Corners of the prism around a cylinder: it is 1/cos(π/48) = 1.002 times as wide.
+/// Corners of the prism around a cylinder, which is 1/cos(π/48) = 1.002 times as wide.
 const CORNERS: usize = 48;
-/// Parallels and meridians of the polyhedron around a ball.
+/// Parallels and meridians of the polyhedron around an ellipsoid.
 const PARALLELS: usize = 12;
 const MERIDIANS: usize = 24;
 
 impl LinkShape {
-    /// Balls that are held by whatever convex holds the shape, or hardly less, in the frame of the link.
+    /// Balls, in the frame of the link, whose convex hull contains the shape and is hardly larger.
     pub(super) fn balls(&self, meshes: &mut Meshes) -> Result<Vec<Ball>, ShapeFault> {
         let shape = self.understood()?;
         let Placement { rotation, translation_m } = &self.placement;
@@ -86,7 +86,7 @@ impl LinkShape {
         Ok(balls)
     }
 
-    /// The shape, if it stands somewhere.
+    /// The shape, if it was interpreted and has a finite pose.
     pub(super) fn understood(&self) -> Result<&Shape, ShapeFault> {
         let shape = self.shape.as_ref().map_err(|why| ShapeFault::Unread(why.clone()))?;
         let Placement { rotation, translation_m } = &self.placement;
@@ -134,7 +134,7 @@ impl Shape {
                 let points = meshes.points(file)?.into_iter();
                 let points: Vec<Ball> =
                     points.map(|point| Ball::point(point.component_mul(&scale))).collect();
-                // One point many times, or a scale of zero or infinity.
+                // Refuses a single repeated point, and a scale of zero or infinity.
                 let spread = points.iter().map(|ball| (ball.centre_m - points[0].centre_m).norm());
                 let size_m = spread.fold(0.0, f64::max);
                 positive([size_m])?;
@@ -144,7 +144,7 @@ impl Shape {
     }
 }
 
-/// The sizes, if something of these has an extent.
+/// The sizes, if all of them are positive and finite.
 fn positive<const N: usize>(sizes_m: [f64; N]) -> Result<[f64; N], ShapeFault> {
     match sizes_m.iter().find(|size| !(**size > 0.0 && size.is_finite())) {
         Some(&size_m) => Err(ShapeFault::Size { size_m }),
@@ -152,8 +152,8 @@ fn positive<const N: usize>(sizes_m: [f64; N]) -> Result<[f64; N], ShapeFault> {
     }
 }
 
-/// Corners of a polyhedron around an ellipsoid. That with its corners on the unit sphere has the ball of the radius
-/// cos(π/meridians) cos(π/(2 parallels)) in it: it is 1.7 % too large.
+/// Corners of a polyhedron around an ellipsoid. The polyhedron with its corners on the unit sphere contains the ball of
+/// radius cos(π/meridians) cos(π/(2 parallels)), hence it is scaled up by the inverse, 1.7 %.
 fn around_ellipsoid(half_m: [f64; 3]) -> Vec<Ball> {
     let inner = (PI / MERIDIANS as f64).cos() * (PI / (2 * PARALLELS) as f64).cos();
     let half_m = Vector3::from(half_m) / inner;

@@ -1,4 +1,4 @@
-//! Shapes of whole files: what is watched of them, and what is told of the others.
+//! Collision shapes of whole files: which are watched, and what is reported about the others.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ const BODY: &str = r#"<inertial><mass value="2"/>
     <inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial>"#;
 const NAMES: [&str; 5] = ["base", "one", "two", "three", "four"];
 
-/// An STL of bytes.
+/// A binary STL.
 pub(super) fn binary_stl(header: &str, triangles: &[[Vector3<f64>; 3]]) -> Vec<u8> {
     let mut bytes = header.as_bytes().to_vec();
     bytes.resize(80, 0);
@@ -28,7 +28,7 @@ pub(super) fn binary_stl(header: &str, triangles: &[[Vector3<f64>; 3]]) -> Vec<u
     bytes
 }
 
-/// A bar of 60 × 80 × 200 mm that begins in the origin, in mm.
+/// A bar of 60 × 80 × 200 mm along z, from the origin upwards, in mm.
 fn bar() -> Vec<u8> {
     let corner = |k: usize| {
         Vector3::new([-30.0, 30.0][k & 1], [-40.0, 40.0][(k >> 1) & 1], [0.0, 200.0][k >> 2])
@@ -71,7 +71,7 @@ fn told(notices: &[UrdfNotice]) -> Vec<&ShapeNotice> {
     of_shapes.collect()
 }
 
-/// Ends in the base frame in the pose of the file, the lower one first.
+/// Ends of a capsule in the base frame at q = 0, the lower one first.
 fn ends(arm: &Arm, capsule: &Capsule) -> [Vector3<f64>; 2] {
     let mut ends = [capsule.from_m, capsule.to_m];
     if capsule.body > 0 {
@@ -86,10 +86,10 @@ fn owned(names: &[&str]) -> Vec<String> {
     names.iter().map(|name| (*name).to_owned()).collect()
 }
 
-/// Each link of the tower has its capsule: not narrower than the shape, hardly wider, and not longer than with whole half spheres
-/// at the ends.
+/// Asserts that each link of the tower has its capsule: not narrower than the shape, hardly wider, and not longer than
+/// with whole hemispheres at the ends.
 fn assert_is_tower(arm: &Arm) {
-    // Radius, height of the middle and half of the length of each shape, m.
+    // Radius, height of the middle and half length of each shape, m.
     let expected = [
         ("base", 0.1, 0.0, 0.0),
         ("one", 0.05, 0.6, 0.1),
@@ -142,7 +142,7 @@ fn shapes_of_a_urdf_become_capsules() {
     assert_eq!(capsules.to_string(), words);
 }
 
-/// The same tower for MuJoCo, with what only is seen, a ground, and a mesh whose scale is that of its class.
+/// The same tower as an MJCF, with purely visual geometry, a ground plane, and a mesh whose scale comes from its class.
 #[test]
 fn geoms_of_an_mjcf_become_capsules() {
     let folder = tempfile::tempdir().unwrap();
@@ -185,7 +185,7 @@ fn geoms_of_an_mjcf_become_capsules() {
     assert!(said.contains("four (line ") && said.contains("no <mesh> \"rod\""), "{said}");
 }
 
-/// Each with its reason, in a line for each kind.
+/// Each shape with its reason, in one line per kind of reason.
 #[test]
 fn what_is_not_read_is_told_and_not_watched() {
     let folder = tempfile::tempdir().unwrap();
@@ -223,7 +223,7 @@ fn what_is_not_read_is_told_and_not_watched() {
     assert!(!unread.contains('\n'));
 }
 
-/// In metres what was drawn in millimetres.
+/// A mesh drawn in millimetres and read in metres.
 #[test]
 fn a_mesh_without_its_scale_is_told() {
     let folder = tempfile::tempdir().unwrap();
@@ -240,7 +240,7 @@ fn a_mesh_without_its_scale_is_told() {
     assert!(unread.contains("two (it reaches 206.2 m from its link"), "{unread}");
 }
 
-/// 0.8 m between centres, whatever the joints do, and radii of 0.45 m.
+/// The centres are always 0.8 m apart, and the radii are 0.45 m.
 #[test]
 fn links_that_no_motion_parts_are_not_kept_apart() {
     let wide = collision(0.0, r#"<sphere radius="0.45"/>"#);
@@ -253,7 +253,8 @@ fn links_that_no_motion_parts_are_not_kept_apart() {
     assert!(pairs.contains("wherever the arm is: base and two"), "{pairs}");
 }
 
-/// A table under the arm is a box, and so is what it can leave; the block that it stands in belongs to the base.
+/// A table under the arm stays a box, and so does a box that the arm can leave; the block around the arm joins the
+/// base.
 #[test]
 fn boxes_of_the_base_stay_boxes() {
     let sphere = collision(0.0, r#"<sphere radius="0.2"/>"#);
@@ -274,7 +275,7 @@ fn boxes_of_the_base_stay_boxes() {
     assert_eq!(of_base(&tilted), (0, owned(&["base", "one", "two"])));
 }
 
-/// Two that are far from each other are two; where names repeat they are numbered.
+/// Two shapes that are far apart get two capsules; repeated names are numbered.
 #[test]
 fn a_link_may_have_several_capsules() {
     let ears = [0.0, 1.0].map(|z_m| collision(z_m, r#"<sphere radius="0.1"/>"#)).concat();
@@ -283,7 +284,7 @@ fn a_link_may_have_several_capsules() {
     assert_eq!(names, ["two", "two 2"]);
 }
 
-/// What the drive file says comes behind the shapes, or before them.
+/// The keys of the drive file add to the shapes or replace them.
 #[test]
 fn a_drive_file_says_more_or_less() {
     let folder = tempfile::tempdir().unwrap();

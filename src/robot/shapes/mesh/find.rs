@@ -1,11 +1,11 @@
-//! Where a mesh lies that a file names.
+//! Search for mesh files.
 
 use std::path::{Path, PathBuf};
 
-/// The file that is called `name` in a file in `folder`.
+/// The mesh file that a robot file in `folder` calls `name`.
 ///
-/// Of `package://NAME/REST` the package is a folder above that is called so, or beside one above; or REST lies in one above, as in
-/// copies of a part of a package.
+/// For `package://NAME/REST`, the package is a folder called NAME that is an ancestor of `folder` or a child of an
+/// ancestor. Otherwise REST is searched for in the ancestors themselves, as for a copied part of a package.
 pub(super) fn find(name: &str, folder: &Path) -> Option<PathBuf> {
     if let Some(rest) = name.strip_prefix("package://").or(name.strip_prefix("model://")) {
         return in_package(rest, folder);
@@ -24,7 +24,7 @@ fn in_package(rest: &str, folder: &Path) -> Option<PathBuf> {
         let others = [above.join(package).join(inside), above.join(inside)];
         own.into_iter().chain(others).find(|path| path.is_file())
     })?;
-    // As the folder was written, where it lies below that.
+    // A file below `folder` keeps the path of `folder` as it was written.
     let below = found.strip_prefix(&whole).map(|below| folder.join(below));
     Some(below.unwrap_or(found))
 }

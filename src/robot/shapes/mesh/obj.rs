@@ -1,10 +1,10 @@
-//! OBJ: points and faces as words.
+//! OBJ meshes: points and faces as text.
 
 use nalgebra::Vector3;
 
 use super::{MeshFlaw, point};
 
-/// All points; which of them are the corners of a face does not matter.
+/// All points. Which of them are corners of faces does not matter.
 pub(super) fn points(bytes: &[u8]) -> Result<Vec<Vector3<f64>>, MeshFlaw> {
     let mut points = Vec::new();
     for (line, number) in String::from_utf8_lossy(bytes).lines().zip(1..) {
@@ -22,7 +22,7 @@ mod tests {
 
     use super::*;
 
-    /// Normals and texture are no points; behind the coordinates there may be colours.
+    /// Normals and texture coordinates are not points; colours may follow the coordinates of a point.
     #[test]
     fn points_are_lines_that_begin_with_v() {
         let text =

@@ -1,19 +1,20 @@
-//! STL: triangles as bytes or as words.
+//! STL meshes: triangles, in binary or in text.
 
 use nalgebra::Vector3;
 
 use super::{MeshFlaw, point};
 
-/// Bytes ahead of the number of triangles, which has four.
+/// Number of bytes of the header, and of the number of triangles that follows it.
 const HEADER: usize = 80;
 const COUNT: usize = 4;
-/// Bytes of a triangle: four vectors of three numbers of four bytes, the first of which is its normal, and two more.
+/// Number of bytes of a triangle: four vectors of three 4-byte numbers, the first of which is the normal, and two more
+/// bytes.
 const TRIANGLE: usize = 50;
 const VECTOR: usize = 12;
 
 /// The corners of all triangles.
 pub(super) fn points(bytes: &[u8]) -> Result<Vec<Vector3<f64>>, MeshFlaw> {
-    // Files of bytes may begin like those of words: what counts is whether their length fits.
+    // A binary file may begin like a text file; it is binary if its length matches the number of triangles.
     let is_text = bytes.trim_ascii_start().starts_with(b"solid");
     let count = bytes.get(HEADER..HEADER + COUNT).and_then(|four| <[u8; 4]>::try_from(four).ok());
     let announced = count.map(|four| u32::from_le_bytes(four) as usize);
@@ -75,11 +76,11 @@ mod tests {
     fn words_and_bytes_are_the_same_triangle() {
         assert_eq!(points(TEXT.as_bytes()).unwrap(), triangle());
         let bytes = binary_stl("made by hand", &[triangle()]);
-        // 0.1 to the digits of four bytes.
+        // 0.1 is stored in single precision.
         for (found, expected) in points(&bytes).unwrap().iter().zip(triangle()) {
             assert!((found - expected).amax() < 1e-8, "{found}");
         }
-        // Some programs begin a file of bytes with the word.
+        // Some programs begin a binary file with the word `solid`.
         assert_eq!(points(&binary_stl("solid", &[triangle()])).unwrap(), points(&bytes).unwrap());
     }
 
@@ -97,7 +98,7 @@ mod tests {
         assert_eq!(word, "line 6: \"O.25\" is no number");
         assert!(said(TEXT.replace(" 0.25 0", "").as_bytes()).contains("line 6: a point has three"));
         assert!(said(b"").contains("no STL") && said(b"<?xml").contains("no STL"));
-        // None of these is a point, which is told of any format.
+        // A file without points is reported the same way for every format.
         assert_eq!(points(b"solid\nendsolid\n"), Ok(Vec::new()));
         assert_eq!(points(&binary_stl("", &[])), Ok(Vec::new()));
     }
