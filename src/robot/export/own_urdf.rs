@@ -70,10 +70,10 @@ pub enum OwnUrdfError {
 /// The URDF `text` with the bodies and the friction of `arm`, which was read from it with these `links`; `source` names
 /// it in messages.
 ///
-/// - `<inertial>`: one link of each body, the bearer, gets the inertia of the body less that of the links fixed to it, which
-///   keep their own. The bearer is the link directly behind the joint, or the first link with mass if that one has none.
-///   Where no body can have the remaining inertia, the bearer gets the whole of it, and the other links lose their
-///   `<inertial>` (a [`Takeover`]).
+/// - `<inertial>`: one link of each body, the bearer, gets the inertia of the body less that of the links fixed to it,
+///   which keep their own. The bearer is the link directly behind the joint, or the first link with mass if that one
+///   has none. Where no body can have the remaining inertia, the bearer gets the whole of it, and the other links lose
+///   their `<inertial>` (a [`Takeover`]).
 /// - `<dynamics>` of the arm's joints: `damping` is rv, `friction` is rc.
 /// - Everything else stays the same, byte for byte. What a URDF has no place for is in the
 ///   [`drive_file`](super::drive_file).

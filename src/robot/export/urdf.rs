@@ -8,12 +8,12 @@ use crate::robot::{Arm, FixedFrame, Frames, Joint, Placement};
 
 /// The arm as URDF, with `frames` as links without mass.
 ///
-/// - One link per body, named `<joint>_link`, on the root link. Its frame is the joint frame of the [`Arm`], so that every
-///   axis is `0 0 1`; its inertia is about the centre of mass, in the link's axes.
-/// - `damping` is rv in Nm s/rad, `friction` is rc in Nm (multiplying tanh(q̇/ε) in this library, a sign or a constraint in
-///   other programs).
-/// - Rotor inertia, acceleration limit, gear ratio, torque constant, ε, torque offsets, gravity and clearance have no place in
-///   a URDF; they are in the [`drive_file`](super::drive_file).
+/// - One link per body, named `<joint>_link`, on the root link. Its frame is the joint frame of the [`Arm`], so that
+///   every axis is `0 0 1`; its inertia is about the centre of mass, in the link's axes.
+/// - `damping` is rv in Nm s/rad, `friction` is rc in Nm (multiplying tanh(q̇/ε) in this library, a sign or a
+///   constraint in other programs).
+/// - Rotor inertia, acceleration limit, gear ratio, torque constant, ε, torque offsets, gravity and clearance have no
+///   place in a URDF; they are in the [`drive_file`](super::drive_file).
 pub fn urdf(arm: &Arm, frames: &Frames) -> Result<String, ExportError> {
     let links = link_names(arm);
     check(arm, frames, &links)?;

@@ -45,8 +45,8 @@ struct BaseBox {
 ///
 /// - Shapes of a body share a capsule where it is hardly larger than their separate ones, and where there are too many.
 /// - Boxes of the base that lie along its axes, such as tables, stay boxes, unless the arm could never leave them.
-/// - A pair of capsules is watched if their bodies are not neighbours in the chain, unless the two are near in nearly all of
-///   some hundred poses over the whole range of the joints: then it is the capsules that overlap, not the links.
+/// - A pair of capsules is watched if their bodies are not neighbours in the chain, unless the two are near in nearly
+///   all of some hundred poses over the whole range of the joints: then it is the capsules that overlap, not the links.
 pub(in crate::robot) fn watched(
     arm: &Arm,
     links: &[UrdfLink],
