@@ -1,4 +1,4 @@
-//! What a URDF is read as.
+//! The result of reading a URDF.
 
 use std::path::{Path, PathBuf};
 
@@ -12,18 +12,19 @@ use crate::robot::shapes::{LinkShape, Watched, watched};
 pub struct UrdfArm {
     /// The arm.
     pub arm: Arm,
-    /// Named links without mass on the bodies: flange, tool0.
+    /// Named frames, the links without mass on the bodies: flange, tool0.
     pub frames: Frames,
     /// All links of the file: those of the base, then those of body 1, and so on.
     pub links: Vec<UrdfLink>,
-    /// What was assumed, merged or left out, in words by `Display`.
+    /// Everything that was assumed, merged or left out; `Display` puts each into words.
     pub notices: Vec<UrdfNotice>,
     /// Mesh files of collision shapes that were read.
     pub meshes: Vec<PathBuf>,
 }
 
 impl UrdfArm {
-    /// Gives the arm the clearance that the `shapes` of its links have; meshes are looked for from the folder of `source`.
+    /// Gives the arm the clearance that follows from the `shapes` of its links; meshes are searched for from the folder
+    /// of `source`.
     pub(in crate::robot) fn watch(&mut self, shapes: &[LinkShape], source: &str) {
         let folder = Path::new(source).parent().unwrap_or(Path::new(""));
         let Watched { clearance, notices, meshes } =
@@ -39,11 +40,11 @@ impl UrdfArm {
 pub struct Frames {
     /// Name of the base frame: the root link.
     pub root: String,
-    /// All others.
+    /// The other frames.
     pub fixed: Vec<FixedFrame>,
 }
 
-/// No frame but the base, "base_link".
+/// No frames except the base, "base_link".
 impl Default for Frames {
     fn default() -> Self {
         Self { root: "base_link".into(), fixed: Vec::new() }
@@ -61,18 +62,18 @@ pub struct FixedFrame {
     pub placement: Placement,
 }
 
-/// A link of the file in the body that it moves with.
+/// A link of the file and the body that it is part of.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UrdfLink {
     /// Its name.
     pub name: String,
     /// 0 = base, i = body of joint i (1-based).
     pub body: usize,
-    /// Its frame in the body's joint frame (base frame for body 0).
+    /// Pose of its frame in the body's joint frame (base frame for body 0).
     pub placement: Placement,
-    /// Its own inertial parameters about its own frame; `None` without mass, and of a link of the base whose moments no body
-    /// has (it never moves).
+    /// Its own inertial parameters about its own frame; `None` for a link without mass, and for a link of the base
+    /// whose moments no body can have, which does not matter as it never moves.
     pub inertia: Option<LinkInertia>,
-    /// The link right behind the moving joint (or the root link).
+    /// Whether it is the link directly behind the moving joint (or the root link).
     pub is_first: bool,
 }

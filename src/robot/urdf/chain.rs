@@ -1,4 +1,4 @@
-//! One chain of bodies in the tree of a URDF.
+//! Selection of one chain of bodies in the tree of a URDF.
 
 use urdf_rs::{Joint, JointType, Link};
 
@@ -6,19 +6,20 @@ use super::fault::UrdfFault;
 use super::obstacle::Obstacle;
 use super::tree::Tree;
 
-/// Links that move as one, in the order in which joints that stand still reach them.
+/// Links that move as one rigid body, in the order in which the joints between them are reached from the first.
 #[derive(Debug)]
 pub(super) struct Body<'a> {
-    /// The moving joint in front; `None` for the base.
+    /// The moving joint in front of the body; `None` for the base.
     pub joint: Option<&'a Joint>,
-    /// Its links, the one behind the joint first, each with the fixed or locked joint that holds it and the
-    /// position of its parent in this list (`None` for the first).
+    /// Its links, the one directly behind the joint first. Each comes with the fixed or locked joint that holds it and
+    /// the position of its parent in this list (`None` for the first).
     pub links: Vec<(&'a Link, Option<(&'a Joint, usize)>)>,
-    /// Position in `links` of the link that the next moving joint hangs on.
+    /// Position in `links` of the link that carries the next moving joint.
     pub next_parent: usize,
 }
 
-/// Base first, then one body per joint of `moving`, which lead from the root on; all others stand still.
+/// The base, then one body per joint of `moving`. These joints are ordered from the root on; all other joints stand
+/// still.
 pub(super) fn bodies<'a>(tree: &Tree<'a>, moving: &[&'a Joint]) -> Vec<Body<'a>> {
     let in_front = std::iter::once(None).chain(moving.iter().copied().map(Some));
     let behind = moving.iter().copied().map(Some).chain(std::iter::once(None));
@@ -43,11 +44,11 @@ fn body<'a>(tree: &Tree<'a>, joint: Option<&'a Joint>, next: Option<&Joint>) -> 
     body
 }
 
-/// Up to so many links an error names all of them.
+/// An error lists all links if there are at most this many.
 const FEW_LINKS: usize = 8;
 
-/// The joints that move the link `last`, from the root on. `is_arm` tells of other links whether the arm that ends with them can be
-/// read: only such ones are proposed.
+/// The joints that move the link `last`, from the root on. `is_arm` tells whether an arm that ends with a given link
+/// can be read; only such links are proposed in an error.
 pub(super) fn joints_up_to<'a>(
     tree: &Tree<'a>,
     last: &str,
@@ -76,11 +77,12 @@ fn moving_on_way<'a>(tree: &Tree<'a>, link: &Link) -> Vec<&'a Joint> {
     joints
 }
 
-/// Links with which an arm can end; where these are many, those of them on which no other one hangs.
+/// Links with which an arm can end; if there are many, only those that carry none of the others.
 fn choice(tree: &Tree<'_>, is_arm: impl Fn(&str) -> bool) -> Vec<String> {
     let can_be_last = |link: &&Link| {
         let joints = moving_on_way(tree, link);
-        // Asked only of links that move: of others `is_arm` would ask for a choice in turn.
+        // `is_arm` is asked only about links that move: for a link that does not, reading the arm would call this
+        // function again.
         !joints.is_empty()
             && joints.iter().all(|joint| Obstacle::of(joint).is_none())
             && is_arm(&link.name)
@@ -95,7 +97,7 @@ fn choice(tree: &Tree<'_>, is_arm: impl Fn(&str) -> bool) -> Vec<String> {
     named.map(|link| link.name.clone()).collect()
 }
 
-/// All moving joints, where they are one chain of revolute ones; `file` is what a remedy begins with.
+/// All moving joints, if they form one chain of revolute joints; `file` is the beginning of a proposed `FILE#LINK`.
 pub(super) fn all_joints<'a>(tree: &Tree<'a>, file: &str) -> Result<Vec<&'a Joint>, UrdfFault> {
     let mut moving = Vec::new();
     let mut obstacles = Vec::new();
@@ -129,7 +131,8 @@ pub(super) fn all_joints<'a>(tree: &Tree<'a>, file: &str) -> Result<Vec<&'a Join
     Ok(moving)
 }
 
-/// Links that fixed joints hold on `first`, each with the number of these joints, and the moving joints that hang on them.
+/// The links that fixed joints connect to `first`, each with the number of these joints, and the moving joints that
+/// these links carry.
 fn rigid<'a>(tree: &Tree<'a>, first: &'a Link) -> (Vec<(&'a Link, usize)>, Vec<&'a Joint>) {
     let mut links = vec![(first, 0)];
     let mut moving = Vec::new();
@@ -148,8 +151,8 @@ fn rigid<'a>(tree: &Tree<'a>, first: &'a Link) -> (Vec<(&'a Link, usize)>, Vec<&
     (links, moving)
 }
 
-/// The last link of what is likely the arm: of the longest chain of revolute joints that begins at the root, and of its last body the
-/// link behind most fixed joints. Of equals the first.
+/// The last link of what is likely the arm: of the last body in the longest chain of revolute joints that begins at the
+/// root, the link behind the most fixed joints. Of equals, the first.
 fn last_link<'a>(tree: &Tree<'a>) -> Option<&'a Link> {
     let mut bodies: Vec<(&Link, Option<&Joint>, usize)> = vec![(tree.root(), None, 0)];
     let mut best: Option<(&Link, usize)> = None;
@@ -157,7 +160,7 @@ fn last_link<'a>(tree: &Tree<'a>) -> Option<&'a Link> {
     while at < bodies.len() {
         let (first, joint, count) = bodies[at];
         let (links, joints) = rigid(tree, first);
-        // At the end of a chain, a joint that others follow drives a gripper.
+        // A joint at the end of a chain that other joints mimic drives a gripper.
         let may_be_last = joint.is_some_and(|joint| !tree.is_mimicked(joint));
         if may_be_last && best.is_none_or(|(_, most)| count > most) {
             let last = links.iter().rev().max_by_key(|(_, fixed)| *fixed);

@@ -1,11 +1,11 @@
-//! What a URDF says of the shapes of its links.
+//! Collision shapes of the links of a URDF.
 
 use urdf_rs::{Geometry, Robot};
 
 use crate::robot::arm::Placement;
 use crate::robot::shapes::{LinkShape, Shape};
 
-/// All `<collision>`, link by link.
+/// The shapes of all `<collision>` elements, link by link.
 pub(super) fn shapes(robot: &Robot) -> Vec<LinkShape> {
     let of_link = |link: &urdf_rs::Link| {
         let shapes = link.collision.iter().map(|collision| LinkShape {

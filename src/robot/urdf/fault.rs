@@ -1,14 +1,14 @@
-//! What makes a URDF unusable as an arm.
+//! Faults that make a URDF unusable as an arm.
 
 use thiserror::Error;
 
 use super::obstacle::Obstacle;
 use super::words::listed;
 
-/// A URDF that is well-formed, but no serial arm of rigid bodies.
+/// A well-formed URDF that does not describe a serial arm of rigid bodies.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum UrdfFault {
-    /// No link at all.
+    /// The file has no link.
     #[error("it has no <link>; is it a URDF? (expand .xacro files first)")]
     NoLinks,
     /// A name is used twice.
@@ -29,19 +29,19 @@ pub enum UrdfFault {
         /// The missing link.
         link: String,
     },
-    /// A link hangs on two joints, or a loop has no beginning.
+    /// A link has two parent joints, or a loop has no beginning.
     #[error(
         "the chain is closed at link \"{link}\" (joints \"{first}\" and \"{second}\"); an arm is open: remove one of them"
     )]
     ClosedChain {
-        /// Where it closes.
+        /// The link at which the chain closes.
         link: String,
         /// One joint that leads there.
         first: String,
         /// The other.
         second: String,
     },
-    /// Links that no joint connects to the rest.
+    /// Links that no joint connects to the others.
     #[error(
         "the links \"{first}\" and \"{second}\" are not connected; every link but the root needs a joint to its parent"
     )]
@@ -51,12 +51,12 @@ pub enum UrdfFault {
         /// A link of another.
         second: String,
     },
-    /// The joints that move are not one chain of revolute joints.
+    /// The moving joints are not one chain of revolute joints.
     #[error("{}", not_one_chain(obstacles, proposal.as_deref()))]
     NotOneChain {
-        /// All that keeps them from it.
+        /// Everything that prevents such a chain.
         obstacles: Vec<Obstacle>,
-        /// File and last link of what is likely the arm, `FILE.urdf#LINK`.
+        /// File and last link of what is likely the arm, as `FILE.urdf#LINK`.
         proposal: Option<String>,
     },
     /// The last link of the arm is not in the file.
@@ -67,7 +67,7 @@ pub enum UrdfFault {
         /// Links with which an arm can end.
         choice: Vec<String>,
     },
-    /// Joints between the root and the last link of the arm that are not an arm's.
+    /// Joints between the root and the last link of the arm that an arm does not have.
     #[error(
         "on the way to link \"{last}\", {}; there only revolute and continuous joints that follow no other are \
          understood: name a link that is not behind these, or make them fixed in a copy of the file",
@@ -79,7 +79,7 @@ pub enum UrdfFault {
         /// All of these joints.
         obstacles: Vec<Obstacle>,
     },
-    /// A locked joint follows one that is not there, or itself.
+    /// A locked joint mimics a joint that does not exist, or in the end itself.
     #[error(
         "joint \"{joint}\" mimics \"{of}\", which is not in the file or follows it in turn: where does it stand? Make it \
          fixed in a copy of the file"
@@ -90,23 +90,23 @@ pub enum UrdfFault {
         /// The joint it follows.
         of: String,
     },
-    /// Only fixed joints.
+    /// All joints are fixed.
     #[error("no joint moves; an arm needs at least one revolute joint")]
     NothingMoves,
-    /// The last link of the arm is one of the base.
+    /// The link named as the last of the arm is part of the base.
     #[error(
         "link \"{link}\" stands still: no joint moves on the way to it from the root link \"{root}\"; {}",
         to_choose_from(choice)
     )]
     NothingMovesUpTo {
-        /// What was taken for the last link.
+        /// The link that was named.
         link: String,
         /// The root link.
         root: String,
         /// Links with which an arm can end.
         choice: Vec<String>,
     },
-    /// An axis without a direction, or whose length shows that something else was meant.
+    /// An axis of zero length, or whose length shows that something else was meant.
     #[error("joint \"{joint}\": the axis ({}, {}, {}) has length {length}; it must be a unit vector", axis[0], axis[1], axis[2])]
     Axis {
         /// The joint.
@@ -126,7 +126,7 @@ pub enum UrdfFault {
         /// The value.
         value: f64,
     },
-    /// A value on the wrong side of zero.
+    /// A negative value of a quantity that must not be negative.
     #[error("{place}: {quantity} = {value} must not be negative")]
     Negative {
         /// Link or joint.
@@ -136,7 +136,7 @@ pub enum UrdfFault {
         /// The value.
         value: f64,
     },
-    /// Lower limit not below the upper one.
+    /// The lower limit is not below the upper one.
     #[error(
         "joint \"{joint}\": lower = {lower_rad} and upper = {upper_rad} rad leave no range; give <limit lower= upper= velocity= effort=>, or make the joint continuous"
     )]
@@ -158,7 +158,7 @@ pub enum UrdfFault {
         /// The joint.
         joint: String,
     },
-    /// Moments of inertia without mass.
+    /// A link with moments of inertia but no mass.
     #[error(
         "link \"{link}\" has moments of inertia, but mass 0; give its mass, or take out <inertial>"
     )]
@@ -190,7 +190,7 @@ pub enum UrdfFault {
     },
 }
 
-/// Refuses what is no number to calculate with.
+/// Refuses NaN and infinite values.
 pub(super) fn finite(place: &str, quantity: &'static str, value: f64) -> Result<(), UrdfFault> {
     if value.is_finite() {
         return Ok(());
@@ -198,7 +198,7 @@ pub(super) fn finite(place: &str, quantity: &'static str, value: f64) -> Result<
     Err(UrdfFault::NotFinite { place: place.to_owned(), quantity, value })
 }
 
-/// Such as `joint "elbow"`, in messages.
+/// A name for messages, such as `joint "elbow"`.
 pub(super) fn quoted(kind: &str, name: &str) -> String {
     format!("{kind} \"{name}\"")
 }

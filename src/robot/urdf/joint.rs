@@ -1,4 +1,4 @@
-//! What a URDF says of a moving joint: its axis, limits and friction.
+//! Reading of a moving joint: its axis, limits and friction.
 
 use std::f64::consts::{PI, TAU};
 
@@ -9,15 +9,15 @@ use super::fault::{UrdfFault, finite, quoted};
 use super::read::Reader;
 use crate::robot::arm::{Drive, Limits, Placement};
 
-/// Speed limit where the file gives none: 180 °/s, usual for arms of this size.
+/// Speed limit if the file gives none: 180 °/s, usual for arms of this size.
 pub(super) const ASSUMED_VELOCITY_RAD_S: f64 = PI;
-/// Acceleration limit where the file gives none; the built-in arms' as well.
+/// Acceleration limit if the file gives none; the same as that of the built-in arms.
 pub(super) const ASSUMED_ACCELERATION_RAD_S2: f64 = 10.0;
-/// Axes such as (0.577, 0.577, 0.577) have unit length to three digits.
+/// Tolerance of the length of an axis: axes such as (0.577, 0.577, 0.577) have unit length to three digits.
 const AXIS_LENGTH: f64 = 1e-3;
 
 impl Reader {
-    /// S of [`read_urdf`](super::read_urdf): takes ẑ to the joint's axis.
+    /// The rotation S of [`read_urdf`](super::read_urdf), which takes ẑ to the joint's axis.
     pub(super) fn axis_to_z(&mut self, joint: &Joint) -> Result<Placement, UrdfFault> {
         let rotation = rotation_from_z(self.unit_axis(joint)?);
         if rotation != Matrix3::identity() {
@@ -26,7 +26,7 @@ impl Reader {
         Ok(Placement { rotation, translation_m: Vector3::zeros() })
     }
 
-    /// The axis in the link's frame, of length 1.
+    /// The axis in the link's frame, scaled to length 1.
     pub(super) fn unit_axis(&mut self, joint: &Joint) -> Result<Vector3<f64>, UrdfFault> {
         let written = *joint.axis.xyz;
         for value in written {
@@ -78,12 +78,12 @@ impl Reader {
     }
 }
 
-/// A limit that is one: zero is how files without the number come out, and how many write "unknown".
+/// A limit, if it was given: a missing number is read as zero, and many files write zero for "unknown".
 pub(super) fn given(limit: f64) -> Option<f64> {
     (limit > 0.0 && limit.is_finite()).then_some(limit)
 }
 
-/// Friction, and what stands for the drive that a URDF does not have.
+/// Friction of the joint, with default values for the drive parameters that a URDF does not have.
 pub(super) fn drive(joint: &Joint) -> Result<Drive, UrdfFault> {
     let (damping, friction) =
         joint.dynamics.as_ref().map_or((0.0, 0.0), |d| (d.damping, d.friction));
@@ -105,8 +105,8 @@ pub(super) fn drive(joint: &Joint) -> Result<Drive, UrdfFault> {
 
 /// The rotation that takes ẑ to the unit vector `axis`, exact for the coordinate axes.
 ///
-/// For a_z ≥ 0 the smallest one, 1 + [v] + [v]²/(1 + a_z) with v = ẑ × a (Rodrigues); below the
-/// xy plane π about x comes first, so that the denominator never vanishes.
+/// For a_z ≥ 0 it is the smallest such rotation, 1 + [v] + [v]²/(1 + a_z) with v = ẑ × a (Rodrigues). Below the xy
+/// plane, a half turn about x comes first, so that the denominator never vanishes.
 fn rotation_from_z(axis: Vector3<f64>) -> Matrix3<f64> {
     let smallest = |a: Vector3<f64>| {
         let v = Vector3::z().cross(&a).cross_matrix();

@@ -1,4 +1,4 @@
-//! What a URDF says of a link: its inertia.
+//! Reading of the inertia of a link.
 
 use nalgebra::Matrix3;
 use urdf_rs::{Inertial, Link};
@@ -8,7 +8,7 @@ use super::read::Reader;
 use crate::robot::inertia::{LinkInertia, principal_moments};
 
 impl Reader {
-    /// A link's inertia about its own frame; `None` for one without mass.
+    /// Inertia of a link about its own frame; `None` for a link without mass.
     pub(super) fn link_inertia(&mut self, link: &Link) -> Result<Option<LinkInertia>, UrdfFault> {
         let Inertial { origin, mass, inertia: i } = &link.inertial;
         let place = quoted("link", &link.name);
@@ -40,7 +40,7 @@ impl Reader {
     }
 }
 
-/// Positive principal moments that obey the triangle inequality, or what is wrong with them.
+/// Checks that the principal moments are positive and obey the triangle inequality.
 fn possible(link: &str, central: &Matrix3<f64>) -> Result<(), UrdfFault> {
     let principal_kg_m2 = principal_moments(central);
     let [small, middle, large] = principal_kg_m2;

@@ -1,4 +1,4 @@
-//! Joints of a URDF that are not the arm's: each is locked where it stands.
+//! Joints of a URDF that are not part of the arm and are locked at one position.
 
 use std::fmt;
 
@@ -15,18 +15,18 @@ use crate::robot::arm::Placement;
 pub struct LockedJoint {
     /// Its name.
     pub name: String,
-    /// Where it stands.
+    /// Where it is locked.
     pub stand: Stand,
 }
 
-/// Where a joint stands that does not move.
+/// Position of a joint that does not move.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Stand {
-    /// A revolute joint, turned about its axis, rad.
+    /// A revolute joint, turned about its axis by this angle, rad.
     AngleRad(f64),
-    /// A prismatic joint, displaced along its axis, m.
+    /// A prismatic joint, displaced along its axis by this distance, m.
     DistanceM(f64),
-    /// A joint of several freedoms: at its origin.
+    /// A joint of several degrees of freedom, at its origin.
     Origin,
 }
 
@@ -41,7 +41,7 @@ impl fmt::Display for LockedJoint {
     }
 }
 
-/// All joints but fixed ones and those of `moving`, in the file's order.
+/// All joints except the fixed ones and those of `moving`, in the file's order.
 pub(super) fn locked_joints(
     tree: &Tree<'_>,
     moving: &[&Joint],
@@ -66,9 +66,10 @@ fn is_one_of(joints: &[&Joint], joint: &Joint) -> bool {
     joints.iter().any(|one| one.name == joint.name)
 }
 
-/// Position of a locked joint, rad or m. One that follows others stands where they have it; of those that move the arm, at zero.
+/// Position of a locked joint, rad or m. A mimic joint is where the joint that it mimics puts it; a mimicked joint of
+/// the arm itself counts as being at zero.
 fn value(tree: &Tree<'_>, moving: &[&Joint], joint: &Joint) -> Result<f64, UrdfFault> {
-    // The position sought is factor · (that of the joint `at`) + offset.
+    // The position sought is factor · (position of the joint `at`) + offset.
     let (mut factor, mut offset) = (1.0, 0.0);
     let mut at = joint;
     for _ in 0..=tree.joints().len() {
@@ -87,7 +88,7 @@ fn value(tree: &Tree<'_>, moving: &[&Joint], joint: &Joint) -> Result<f64, UrdfF
     Err(UrdfFault::MimicsNothing { joint: joint.name.clone(), of })
 }
 
-/// Zero, or the limit nearest to it where a joint does not reach it, rad or m.
+/// Zero, or the limit nearest to zero if the range of the joint does not contain zero, rad or m.
 fn nearest_to_zero(joint: &Joint) -> Result<f64, UrdfFault> {
     if !matches!(joint.joint_type, JointType::Revolute | JointType::Prismatic) {
         return Ok(0.0);
@@ -109,7 +110,7 @@ fn nearest_to_zero(joint: &Joint) -> Result<f64, UrdfFault> {
 }
 
 impl Reader {
-    /// What a locked joint is away from its origin; `None` of one that stands there.
+    /// Displacement of a locked joint from its origin; `None` if there is none.
     pub(super) fn displacement(&mut self, joint: &Joint) -> Result<Option<Placement>, UrdfFault> {
         let locked = self.locked.iter().find(|locked| locked.name == joint.name);
         Ok(match locked.map(|locked| locked.stand) {

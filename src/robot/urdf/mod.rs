@@ -1,9 +1,9 @@
 //! Arms from URDF files.
 //!
-//! Enters: the text of a URDF (parsed by the `urdf-rs` library), and where the arm is a part of a robot the name of its last
-//! link. Leaves: a [`UrdfArm`]: the [`Arm`](super::Arm), the named frames on its bodies (flange, tool), the links of which these
-//! are made, and a list of everything that was assumed or left out on the way; or a [`UrdfFault`] that says what is wrong,
-//! where, and what to do.
+//! Input: the text of a URDF (parsed by the `urdf-rs` library) and, where the arm is part of a larger robot, the name
+//! of its last link. Output: a [`UrdfArm`], which holds the [`Arm`](super::Arm), the named frames on its bodies
+//! (flange, tool), the links that the bodies consist of, and a list of everything that was assumed or left out; or a
+//! [`UrdfFault`] that says what is wrong, where, and what to do about it.
 
 mod arm;
 mod chain;

@@ -1,4 +1,4 @@
-//! What was assumed or left out in reading a URDF.
+//! Notices about what was assumed or left out in reading a URDF.
 
 use std::fmt;
 
@@ -7,15 +7,15 @@ use super::words::listed;
 use crate::robot::mjcf::MjcfNotice;
 use crate::robot::shapes::ShapeNotice;
 
-/// Something a URDF does not say, or says in a way that had to be interpreted.
+/// Something that a URDF does not say, or says in a way that had to be interpreted.
 #[derive(Debug, Clone, PartialEq)]
 pub enum UrdfNotice {
-    /// URDF has no gravity: 9.81 m/s² along −z of the root link.
+    /// A URDF has no gravity: 9.81 m/s² along −z of the root link is assumed.
     Gravity {
-        /// The root link: the base frame.
+        /// The root link, which is the base frame.
         root: String,
     },
-    /// URDF has no drives: rotor inertia 0, gear ratio 1, torque constant 1 Nm/A.
+    /// A URDF has no drives: rotor inertia 0, gear ratio 1 and torque constant 1 Nm/A are assumed.
     Drives {
         /// The joints without rotor inertia.
         rotor_inertia: Vec<String>,
@@ -24,9 +24,9 @@ pub enum UrdfNotice {
         /// The joints without torque constant.
         torque_constant: Vec<String>,
     },
-    /// Joints that are not on the way to the arm's last link do not move.
+    /// Joints that are not on the way to the arm's last link are locked.
     Locked {
-        /// These, and where they stand.
+        /// The joints, and where they are locked.
         joints: Vec<LockedJoint>,
         /// The last link.
         last: String,
@@ -36,41 +36,41 @@ pub enum UrdfNotice {
         /// The joints without.
         joints: Vec<String>,
     },
-    /// Damping with which the joint's torque limit does not reach its speed limit: a drive would lose all of its torque in itself.
-    /// Simulations have it to keep a stiff servo calm.
+    /// Damping so high that the joint's torque limit does not suffice for its speed limit: the drive would spend all of
+    /// its torque on its own friction. Simulations use such values to stabilise a stiff servo.
     ServoDamping {
-        /// The joints, and of each the damping, Nm s/rad, and the torque limit, Nm.
+        /// The joints, each with its damping, Nm s/rad, and torque limit, Nm.
         joints: Vec<(String, f64, f64)>,
     },
-    /// What became of collision shapes.
+    /// A notice about collision shapes.
     Shapes(ShapeNotice),
     /// The drive file beside the URDF was read.
     DriveFile {
         /// The file.
         file: String,
-        /// What is still assumed, because neither of the files says it.
+        /// Assumptions that remain, because neither file says otherwise.
         open: Vec<UrdfNotice>,
     },
-    /// Continuous (or unlimited) joints were given ±2π rad.
+    /// Continuous (or unlimited) joints were given the range ±2π rad.
     Continuous {
         /// The joints.
         joints: Vec<String>,
     },
-    /// No speed limit in the file.
+    /// The file has no speed limit.
     AssumedVelocity {
         /// The joints without.
         joints: Vec<String>,
-        /// What they were given.
+        /// The assumed limit, rad/s.
         velocity_rad_s: f64,
     },
-    /// No acceleration limit in the file.
+    /// The file has no acceleration limit.
     AssumedAcceleration {
         /// The joints without.
         joints: Vec<String>,
-        /// What they were given.
+        /// The assumed limit, rad/s².
         acceleration_rad_s2: f64,
     },
-    /// No torque limit in the file: unlimited.
+    /// The file has no torque limit: unlimited torque is assumed.
     NoTorqueLimit {
         /// The joints without.
         joints: Vec<String>,
@@ -79,37 +79,37 @@ pub enum UrdfNotice {
     Merged {
         /// The joint that moves it.
         joint: String,
-        /// The links, and what each added, kg.
+        /// The links, each with the mass that it added, kg.
         links: Vec<(String, f64)>,
     },
-    /// Links that no joint of the arm moves: their inertia is left out.
+    /// Links that no joint of the arm moves; their inertia is left out.
     StandingMass {
         /// The links, and the mass of each, kg.
         links: Vec<(String, f64)>,
     },
-    /// Frames of joints are not the links': z was turned onto the axis.
+    /// Joint frames that differ from the frames of the links, because z was turned onto the axis.
     Reoriented {
-        /// The joints, and of each the axis in the link's frame: z of the joint frame.
+        /// The joints, each with its axis in the link's frame, which is the z axis of the joint frame.
         joints: Vec<(String, [f64; 3])>,
     },
-    /// Axes were unit vectors only to the digits printed.
+    /// Axes that were unit vectors only to the digits printed.
     AxisNormalised {
         /// The joints, and the length of each axis as written.
         joints: Vec<(String, f64)>,
     },
-    /// Angles printed to a few digits were taken as the multiples of π/2 that they stand for.
+    /// Angles printed to a few digits were taken as the multiples of π/2 that they represent.
     RightAngles {
         /// The joints and links.
         places: Vec<String>,
-        /// The largest distance from such a multiple, rad.
+        /// The largest deviation from such a multiple, rad.
         off_rad: f64,
     },
-    /// Something of an MJCF that a URDF does not have.
+    /// A notice about something in an MJCF that has no equivalent in a URDF.
     Mjcf(MjcfNotice),
 }
 
 impl UrdfNotice {
-    /// Names of the joints that it calls locked.
+    /// Names of the joints that this notice reports as locked.
     pub(in crate::robot) fn locked(&self) -> impl Iterator<Item = &str> {
         let joints = match self {
             Self::Locked { joints, .. } => joints.as_slice(),
@@ -118,7 +118,7 @@ impl UrdfNotice {
         joints.iter().map(|joint| joint.name.as_str())
     }
 
-    /// Whether it is about something that a drive file can say.
+    /// Whether a drive file can settle this notice.
     pub(in crate::robot) fn is_about_drives(&self) -> bool {
         matches!(
             self,
@@ -257,12 +257,12 @@ impl fmt::Display for UrdfNotice {
     }
 }
 
-/// A coordinate as it is read at a glance, zero without a sign.
+/// A coordinate with four decimals, zero without a sign.
 fn to_four_places(value: f64) -> f64 {
     (value * 1e4).round() / 1e4 + 0.0
 }
 
-/// Links with their masses, kg, and what they do in the singular and in the plural.
+/// The links with their masses, kg, followed by the verb in the singular or the plural.
 fn with_masses(links: &[(String, f64)], one_does: &str, all_do: &str) -> String {
     let (noun, verb) = if links.len() == 1 { ("link", one_does) } else { ("links", all_do) };
     let links = links.iter().map(|(name, mass_kg)| format!("{name} ({mass_kg} kg)"));

@@ -1,10 +1,10 @@
-//! What keeps joints of a URDF from being those of one arm.
+//! Reasons why the joints of a URDF are not those of one arm.
 
 use std::fmt;
 
 use urdf_rs::{Joint, JointType};
 
-/// Something that an arm of revolute joints in a row does not have.
+/// Something that a serial arm of revolute joints does not have.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Obstacle {
     /// A moving joint that is not a single rotation.
@@ -14,16 +14,16 @@ pub enum Obstacle {
         /// Its type.
         kind: &'static str,
     },
-    /// A joint that copies another.
+    /// A joint that mimics another.
     Mimic {
         /// The joint.
         joint: String,
         /// The joint it follows.
         of: String,
     },
-    /// Several joints that turn on one body.
+    /// Several rotating joints on one body.
     Branch {
-        /// The link with which the body that carries them begins.
+        /// The first link of the body that carries them.
         body: String,
         /// The joints.
         joints: Vec<String>,
@@ -31,7 +31,7 @@ pub enum Obstacle {
 }
 
 impl Obstacle {
-    /// What keeps one joint from being an arm's; `None` of a fixed one, and of one that turns by itself.
+    /// The reason why a joint cannot be part of an arm; `None` for a fixed joint and for one that turns independently.
     pub(super) fn of(joint: &Joint) -> Option<Self> {
         let name = || joint.name.clone();
         let kind = match joint.joint_type {

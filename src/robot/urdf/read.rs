@@ -1,4 +1,4 @@
-//! From the chain of a URDF to an [`Arm`].
+//! Reading of a URDF into an [`Arm`].
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -20,50 +20,56 @@ use crate::robot::error::RobotError;
 use crate::robot::file::default_epsilon;
 use crate::robot::inertia::LinkInertia;
 
-/// Half of the last of four decimals: files print 1.5708 and 3.1416.
+/// Half a unit of the fourth decimal: files print 1.5708 and 3.1416.
 const RIGHT_ANGLE_RAD: f64 = 5e-5;
-/// Below this a right angle is only written with many digits: at the end of an arm of 2 m it is off by 2 nm.
+/// A smaller deviation from a right angle is not reported: it is the rounding of a number with many digits, and at the
+/// end of an arm of 2 m it amounts to 2 nm.
 const WORTH_SAYING_RAD: f64 = 1e-9;
 
 /// Reads the text of a URDF; `source` names it in messages.
 ///
-/// What becomes of the file:
+/// The file is interpreted as follows:
 ///
-/// - **Base frame**: the root link. Links ahead of the first moving joint are folded into that
-///   joint's placement; their inertia never moves and is left out.
-/// - **Joints**: revolute and continuous, one chain. A continuous joint is given ±2π rad, the range
-///   of an arm with cables in it. Prismatic, floating, planar, spherical and mimic joints and branches
-///   with moving joints are refused here, and locked by [`read_urdf_up_to`]; closed chains are refused.
-/// - **Fixed joints** merge the child link into the body in front of it: the inertia is added.
-///   Links without mass on a body (flange, tool0) become named frames.
-/// - **Joint frames**: origin at the URDF joint, z along its axis a. With a in the link frame, our
-///   frame is the link frame turned by S, S ẑ = a: the smallest rotation from ẑ to a if a_z ≥ 0,
-///   otherwise π about x followed by the smallest rotation from −ẑ to a. Axis z gives S = 1.
-/// - **Friction**: `damping` is rv, `friction` is rc. **Limits**: `effort` is the torque limit,
-///   `velocity` the speed limit.
-/// - **Collision shapes** become capsules on the bodies, and pairs of them that are kept apart; meshes (STL, OBJ) are looked for from
-///   the folder of `source`. What is not watched is named in the notices. What is only seen is not read.
-/// - **What URDF does not have**: rotor inertia is 0, gear ratio 1 and torque constant 1 (a current
-///   column then reads as joint torque), gravity 9.81 m/s² along −z of the root link, acceleration
-///   limit 10 rad/s² unless the file has one. Transmissions are not read.
-/// - **Angles** within 5e-5 rad of a multiple of π/2 are that multiple: files print 1.5708 for π/2,
-///   and parallel axes that are nearly parallel blur which parameters can be known.
+/// - **Base frame**: the root link. Links ahead of the first moving joint are folded into the placement of that joint;
+///   their inertia never moves and is left out.
+/// - **Joints**: revolute and continuous, in one chain. A continuous joint is given the range ±2π rad, that of an arm
+///   with internal cables. Prismatic, floating, planar, spherical and mimic joints and branches with moving joints are
+///   refused here and locked by [`read_urdf_up_to`]; closed chains are always refused.
+/// - **Fixed joints** merge the child link into the body in front of it, whose inertia grows by that of the link. Links
+///   without mass on a body (flange, tool0) become named frames.
+/// - **Joint frames**: the origin is that of the URDF joint, z lies along the joint axis a. With a given in the link
+///   frame, the joint frame is the link frame turned by S with S ẑ = a: the smallest rotation from ẑ to a if a_z ≥ 0,
+///   otherwise π about x followed by the smallest rotation from −ẑ to a. For the axis z, S = 1.
+/// - **Friction**: `damping` is rv, `friction` is rc. **Limits**: `effort` is the torque limit, `velocity` the speed
+///   limit.
+/// - **Collision shapes** become capsules on the bodies, and pairs of capsules to keep apart; meshes (STL, OBJ) are
+///   searched for from the folder of `source`. The notices name everything that is not watched. Visual geometry is not
+///   read.
+/// - **Not in a URDF**: the rotor inertia is taken as 0, the gear ratio as 1 and the torque constant as 1 Nm/A (a
+///   current column then reads as joint torque), gravity as 9.81 m/s² along −z of the root link, the acceleration limit
+///   as 10 rad/s² unless the file has one. Transmissions are not read.
+/// - **Angles** within 5e-5 rad of a multiple of π/2 are taken as that multiple: files print 1.5708 for π/2, and axes
+///   that are parallel only to the digits printed blur which parameters are identifiable.
 ///
 /// # Errors
-/// [`RobotError::Urdf`] where it is no URDF, [`RobotError::UrdfArm`] where it is one, but not of a
-/// serial arm of physically possible bodies.
+///
+/// [`RobotError::Urdf`] if the text is not a URDF, [`RobotError::UrdfArm`] if it is a URDF, but not of a serial arm of
+/// physically possible bodies.
 pub fn read_urdf(text: &str, source: &str) -> Result<UrdfArm, RobotError> {
     read(text, source, None)
 }
 
-/// As [`read_urdf`], of an arm that ends with the link `last_link`, whatever else is on the robot.
+/// As [`read_urdf`], for an arm that ends with the link `last_link`, whatever else is on the robot.
 ///
-/// The moving joints on the way from the root link to that one are the arm's. All others are locked, and their links belong to
-/// the body that carries them: a joint stands at zero, or at the limit nearest to zero where it does not reach it; one that
-/// mimics another where that has it; a floating, planar or spherical joint at its origin.
+/// The moving joints between the root link and `last_link` are those of the arm. All other joints are locked, and their
+/// links belong to the body that carries them. A locked joint is at zero, or at the limit nearest to zero if its range
+/// does not contain zero; a mimic joint is where the joint that it mimics puts it; a floating, planar or spherical
+/// joint is at its origin.
 ///
 /// # Errors
-/// As [`read_urdf`], and where there is no such link, or what moves it are not revolute and continuous joints of their own.
+///
+/// As [`read_urdf`]; also if there is no such link, or if a joint that moves it is not revolute or continuous, or
+/// mimics another.
 pub fn read_urdf_up_to(text: &str, source: &str, last_link: &str) -> Result<UrdfArm, RobotError> {
     read(text, source, Some(last_link))
 }
@@ -81,7 +87,8 @@ fn read(text: &str, source: &str, last_link: Option<&str>) -> Result<UrdfArm, Ro
     Ok(read)
 }
 
-/// The arm of a robot without its clearance, whatever file it comes from; `source` names it, and is what a remedy begins with.
+/// The arm of a robot without its clearance, from a file of any format; `source` names the file in messages and begins
+/// a proposed `FILE#LINK`.
 pub(in crate::robot) fn arm_of(
     robot: &Robot,
     source: &str,
@@ -117,7 +124,7 @@ pub(in crate::robot) fn moving_links(
     Ok(links.map(|(link, _)| link.name.clone()).collect())
 }
 
-/// The joints of the arm that ends with `last_link`, or that has all moving joints.
+/// The joints of the arm that ends with `last_link`; without it, all moving joints.
 fn moving_joints<'a>(
     robot: &Robot,
     tree: &Tree<'a>,
@@ -132,10 +139,10 @@ fn moving_joints<'a>(
     }
 }
 
-/// What accumulates beside the joints.
+/// Everything that accumulates beside the joints while an arm is read.
 #[derive(Default)]
 pub(super) struct Reader {
-    /// Joints that are not the arm's.
+    /// Joints that are not part of the arm.
     pub(super) locked: Vec<LockedJoint>,
     frames: Vec<FixedFrame>,
     links: Vec<UrdfLink>,
@@ -177,7 +184,7 @@ impl Reader {
             },
         ]);
         let mut joints: Vec<Joint> = Vec::with_capacity(chain.len() - 1);
-        // Pose, in the frame of the body at hand, of the link that the next joint hangs on.
+        // Pose of the link that carries the next joint, in the frame of the current body.
         let mut parent = Placement::identity();
         for (number, body) in chain.iter().enumerate() {
             let turn = match body.joint {
@@ -234,7 +241,7 @@ impl Reader {
         Ok(poses)
     }
 
-    /// Sum of the links of a moving body about its joint frame.
+    /// Inertia of a moving body about its joint frame: the sum over its links.
     fn inertia(
         &mut self,
         body: &Body<'_>,
@@ -278,11 +285,11 @@ impl Reader {
         Err(UrdfFault::NoMass { link, joint: joint.name.clone() })
     }
 
-    /// Links that never move: only their frames and a remark on their mass remain.
+    /// Records the links that never move: only their frames and a notice of their mass remain.
     fn standing(&mut self, body: &Body<'_>, poses: &[Placement]) {
         let mut heavy = Vec::new();
         for ((link, held), pose) in body.links.iter().zip(poses) {
-            // What is wrong or odd about the moments of such a link does not matter.
+            // Errors and oddities in the moments of a standing link do not matter.
             let remarks = self.remarks.right_angles.len();
             let inertia = self.link_inertia(link).ok().flatten();
             self.remarks.right_angles.truncate(remarks);
@@ -306,7 +313,7 @@ impl Reader {
         }
     }
 
-    /// A pose of the file, its angles freed from the rounding of right angles.
+    /// A pose of the file, with angles close to multiples of π/2 made exact.
     pub(super) fn placement(&mut self, pose: &Pose, place: &str) -> Result<Placement, UrdfFault> {
         for value in *pose.xyz {
             finite(place, "xyz", value)?;
@@ -326,7 +333,7 @@ impl Reader {
         Ok(Placement::from_xyz_rpy(*pose.xyz, rpy_rad))
     }
 
-    /// The remarks that concern several joints at once.
+    /// Adds the notices that concern several joints at once.
     fn summarise(&mut self, joints: &[Joint], chain: &[Body<'_>]) {
         self.notices.extend(std::mem::take(&mut self.remarks).notices());
         let no_friction: Vec<String> = joints

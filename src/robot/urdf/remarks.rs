@@ -1,22 +1,22 @@
-//! What is remarked of one joint or link after the other, and told of all of them in one line.
+//! Remarks that are collected joint by joint and link by link, and reported in one line for each subject.
 
 use super::notice::UrdfNotice;
 
-/// Remarks by matter.
+/// Remarks by subject.
 #[derive(Debug, Default)]
 pub(super) struct Remarks {
     /// Joints without end stops.
     pub endless: Vec<String>,
-    /// Joints whose frame is not the link's, with their axes in that.
+    /// Joints whose frame differs from that of the link, with their axes in the link's frame.
     pub turned: Vec<(String, [f64; 3])>,
-    /// Joints whose axis was no unit vector, with its length.
+    /// Joints whose axis was not a unit vector, with its length.
     pub normalised: Vec<(String, f64)>,
-    /// Joints and links of which an angle was made a multiple of π/2, and how far it was from that, rad.
+    /// Joints and links with an angle that was rounded to a multiple of π/2, and its deviation from that, rad.
     pub right_angles: Vec<(String, f64)>,
 }
 
 impl Remarks {
-    /// A line for each matter.
+    /// One notice for each subject.
     pub(super) fn notices(self) -> Vec<UrdfNotice> {
         let Self { endless, turned, normalised, right_angles } = self;
         let mut notices = Vec::new();

@@ -20,7 +20,7 @@ fn link(name: &str, inside: &str) -> String {
     format!(r#"<link name="{name}">{inside}</link>"#)
 }
 
-/// A joint along z at (0, 0, 0.5), or as `inside` says.
+/// A joint with axis z at (0, 0, 0.5), unless `inside` says otherwise.
 fn joint(name: &str, kind: &str, parent: &str, child: &str, inside: &str) -> String {
     let origin = if inside.contains("<origin") { "" } else { r#"<origin xyz="0 0 0.5"/>"# };
     let axis = if inside.contains("<axis") { "" } else { r#"<axis xyz="0 0 1"/>"# };
@@ -62,7 +62,7 @@ fn fault(text: &str) -> UrdfFault {
     }
 }
 
-/// The text of the fault names all of `parts`.
+/// Asserts that the text of the fault contains all of `parts`.
 fn says(text: &str, parts: &[&str]) {
     let message = fault(text).to_string();
     for part in parts {
@@ -174,10 +174,10 @@ fn an_axis_off_z_turns_the_joint_frame_and_its_parameters() {
         let tolerance = if exact { 0.0 } else { 4.0 * f64::EPSILON };
         assert_abs_diff_eq!(rotation * Vector3::z(), Vector3::from(axis), epsilon = tolerance);
         assert_abs_diff_eq!(rotation.determinant(), 1.0, epsilon = 4.0 * f64::EPSILON);
-        // The centre of mass is where the file has it: x = 0.1 m in the link's frame.
+        // The centre of mass stays where the file has it: x = 0.1 m in the link's frame.
         let com = rotation * arm.joints[0].link.com_m().unwrap();
         assert_abs_diff_eq!(com, Vector3::new(0.1, 0.0, 0.0), epsilon = 1e-16);
-        // At q = 0 the next joint is where the file has it, whatever became of the frame.
+        // At q = 0 the next joint is where the file has it, whatever the orientation of the joint frame.
         let origin = arm.frames(&[0.0, 0.0])[1].translation_m;
         assert_abs_diff_eq!(origin, Vector3::new(0.0, 0.0, 1.0), epsilon = 1e-15);
         assert!(notices.contains(&UrdfNotice::Reoriented { joints: vec![("j1".into(), axis)] }));
@@ -213,7 +213,7 @@ fn a_right_angle_printed_short_is_a_right_angle_and_is_said() {
         let places = vec!["joint \"j2\"".to_owned()];
         let off_rad = written.parse::<f64>().unwrap() - FRAC_PI_2;
         let notice = UrdfNotice::RightAngles { places, off_rad };
-        // The others are off by 2e-10 rad and less, which nobody has to know.
+        // The other two deviate by at most 2e-10 rad, which is not worth reporting.
         assert_eq!(notices.contains(&notice), written == "1.5708", "{notices:?}");
     }
     for (written, turns) in [("3.1416", 2.0), ("-3.1416", -2.0), ("4.7124", 3.0), ("6.2832", 4.0)] {
@@ -232,7 +232,7 @@ fn a_right_angle_printed_short_is_a_right_angle_and_is_said() {
     assert!(read(&robot(&parts)).arm.joints[1].placement.rotation[(1, 1)].abs() > 1e-5);
 }
 
-/// What is only seen does not matter.
+/// Visual geometry does not matter.
 #[test]
 fn meshes_of_collision_shapes_that_are_not_there_are_named() {
     let mesh =
@@ -403,7 +403,7 @@ fn what_is_no_urdf_is_an_error_that_names_the_file() {
             other => panic!("{text}: {other:?}"),
         }
     }
-    // An unexpanded macro stands where a number should.
+    // An unexpanded macro in place of a number.
     let text = robot(&two_joints()).replacen("0.01", "${ixx}", 1);
     assert!(matches!(read_urdf(&text, "toy.urdf"), Err(RobotError::Urdf { .. })));
 }

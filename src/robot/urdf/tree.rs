@@ -6,19 +6,19 @@ use urdf_rs::{Joint, Link, Robot};
 
 use super::fault::UrdfFault;
 
-/// Links that all hang on one root, each by one joint.
+/// Links that are all connected to one root, each by one joint to its parent.
 pub(super) struct Tree<'a> {
     robot: &'a Robot,
     links: HashMap<&'a str, &'a Link>,
-    /// Joints by the link that they hang on, in the file's order.
+    /// Joints by their parent link, in the file's order.
     children: HashMap<&'a str, Vec<&'a Joint>>,
-    /// Joints by the link that they hold.
+    /// Joints by their child link.
     holders: HashMap<&'a str, &'a Joint>,
     root: &'a Link,
 }
 
 impl<'a> Tree<'a> {
-    /// The tree of a file, or why it is none.
+    /// The tree of a file, or the reason why it is none.
     pub(super) fn of(robot: &'a Robot) -> Result<Self, UrdfFault> {
         let links = links_by_name(robot)?;
         let children = children_by_link(robot, &links)?;
@@ -27,7 +27,7 @@ impl<'a> Tree<'a> {
         Ok(Self { robot, links, children, holders, root })
     }
 
-    /// The link that hangs on none.
+    /// The link without a parent.
     pub(super) fn root(&self) -> &'a Link {
         self.root
     }
@@ -52,12 +52,12 @@ impl<'a> Tree<'a> {
         self.links.get(name).copied()
     }
 
-    /// The link that `joint` holds.
+    /// The child link of `joint`.
     pub(super) fn behind(&self, joint: &Joint) -> &'a Link {
         self.links[joint.child.link.as_str()]
     }
 
-    /// The joints that hang on `link`.
+    /// The joints whose parent is `link`.
     pub(super) fn joints_on(&self, link: &Link) -> &[&'a Joint] {
         self.children.get(link.name.as_str()).map(Vec::as_slice).unwrap_or_default()
     }
@@ -74,7 +74,7 @@ impl<'a> Tree<'a> {
         way
     }
 
-    /// Whether another joint follows `joint`.
+    /// Whether another joint mimics `joint`.
     pub(super) fn is_mimicked(&self, joint: &Joint) -> bool {
         self.joints()
             .iter()
@@ -133,7 +133,7 @@ fn holders_by_link(robot: &Robot) -> Result<HashMap<&str, &Joint>, UrdfFault> {
     Ok(holders)
 }
 
-/// The one link without a parent, after making sure that every other link leads back to it.
+/// The one link without a parent, after checking that every other link leads back to it.
 fn root<'a>(
     robot: &'a Robot,
     links: &HashMap<&str, &'a Link>,

@@ -1,12 +1,12 @@
-//! Why a text is not readable as URDF, in words that lead to the place.
+//! Reasons why a text is not readable as URDF, in words that lead to the place.
 
-/// Attributes that hold numbers, blank between them.
+/// Attributes that hold numbers, separated by blanks.
 const NUMBERS: [&str; 18] = [
     "xyz", "rpy", "value", "ixx", "ixy", "ixz", "iyy", "iyz", "izz", "lower", "upper", "effort",
     "velocity", "damping", "friction", "radius", "length", "size",
 ];
 
-/// What is wrong with `text`, which the parser gave up on with `message`.
+/// The reason why the parser rejected `text`; `message` is the parser's own.
 pub(super) fn reason(text: &str, message: &str) -> String {
     if text.trim().is_empty() {
         return "the file is empty".to_owned();
@@ -29,7 +29,7 @@ pub(super) fn reason(text: &str, message: &str) -> String {
     message.to_owned()
 }
 
-/// `name="value"` pairs of a line.
+/// The `name="value"` pairs of a line.
 fn attributes(line: &str) -> impl Iterator<Item = (&str, &str)> {
     line.split_inclusive("=\"").zip(line.split("=\"").skip(1)).filter_map(|(before, behind)| {
         let name = before.trim_end_matches("=\"").rsplit(char::is_whitespace).next()?;

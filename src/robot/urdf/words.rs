@@ -1,11 +1,11 @@
-//! Lists in sentences.
+//! Lists for use in sentences.
 
 use std::fmt::Display;
 
-/// Of more than so many the first ones are named.
+/// A longer list is cut after this many items.
 const FEW: usize = 8;
 
-/// All of a few; of many the first ones, and how many more there are.
+/// The items separated by commas; of a long list only the first ones and the number of the others.
 pub(in crate::robot) fn listed<T: Display>(items: impl IntoIterator<Item = T>) -> String {
     let mut words: Vec<String> = items.into_iter().map(|item| item.to_string()).collect();
     let more = words.len().saturating_sub(FEW);

@@ -1,4 +1,4 @@
-//! Robots of which an arm is a part: what is not on the way to its last link stands still.
+//! Robots of which the arm is a part: joints that are not on the way to its last link are locked.
 
 use approx::assert_abs_diff_eq;
 use nalgebra::Vector3;
@@ -12,7 +12,7 @@ const FINGER: &str = r#"<inertial><origin xyz="0 0.02 0.03" rpy="0.3 0 0"/><mass
     <inertia ixx="1e-4" ixy="0" ixz="0" iyy="1e-4" iyz="0" izz="5e-5"/></inertial>"#;
 const SLIDE: &str = r#"<limit lower="0" upper="0.04" effort="20" velocity="0.2"/>"#;
 
-/// The arm with a hand, and two fingers that `joints` hold.
+/// The arm with a hand and two fingers, which `joints` connect to the hand.
 fn with_hand(joints: &[String]) -> String {
     let hand = [
         link("hand", BODY),
@@ -37,7 +37,7 @@ fn fixed_fingers() -> Vec<String> {
     fingers(("fixed", ""), ("fixed", ""))
 }
 
-/// The second finger follows the first.
+/// A gripper whose second finger mimics the first.
 fn gripper() -> String {
     let follows = format!(r#"{SLIDE}<mimic joint="f1"/>"#);
     with_hand(&fingers(("prismatic", SLIDE), ("prismatic", &follows)))
@@ -54,7 +54,7 @@ fn refused(text: &str, last: &str) -> UrdfFault {
     }
 }
 
-/// Names and places of the joints that are said to be locked.
+/// Names and positions of the joints that are reported as locked.
 fn locked(read: &UrdfArm) -> Vec<(&str, Stand)> {
     let joints = read.notices.iter().flat_map(|notice| match notice {
         UrdfNotice::Locked { joints, .. } => joints.as_slice(),
@@ -63,7 +63,7 @@ fn locked(read: &UrdfArm) -> Vec<(&str, Stand)> {
     joints.map(|LockedJoint { name, stand }| (name.as_str(), *stand)).collect()
 }
 
-/// A few roundings of numbers below 10 are all that the two differ in.
+/// Asserts that two arms differ by no more than a few roundings of numbers below 10.
 fn assert_same(one: &Arm, other: &Arm) {
     assert_eq!(one.dof(), other.dof());
     for (a, b) in one.joints.iter().zip(&other.joints) {
@@ -94,12 +94,12 @@ fn joints_at_zero_are_as_if_they_were_fixed() {
         let text = with_hand(&fingers((kinds[0], all), (kinds[1], all)));
         assert_eq!(up_to(&text, "hand").arm, fixed.arm, "{kinds:?}");
     }
-    // Where nothing is locked, the last link changes nothing.
+    // Where nothing is locked, naming the last link changes nothing.
     let plain = with_hand(&fixed_fingers());
     assert_eq!(up_to(&plain, "tip"), fixed);
 }
 
-/// A URDF that says the same with fixed joints has the same arm.
+/// The same robot with fixed joints in place of the locked ones has the same arm.
 #[test]
 fn joints_that_do_not_reach_zero_stand_at_the_nearest_limit() {
     let along = r#"<axis xyz="0.6 0 0.8"/><limit lower="0.01" upper="0.04" velocity="0.2"/>"#;
@@ -129,7 +129,7 @@ fn a_joint_that_mimics_another_follows_it() {
     let text = with_hand(&fingers(("prismatic", open), ("prismatic", &follows("f1"))));
     let stands = [("f1", Stand::DistanceM(0.01)), ("f2", Stand::DistanceM(0.002 - 0.01))];
     assert_eq!(locked(&up_to(&text, "hand")), stands);
-    // Also through another, wherever that stands in the file; a joint of the arm is at zero.
+    // Also through another mimic joint, wherever that is in the file; a mimicked joint of the arm counts as zero.
     let text = with_hand(&fingers(("prismatic", &follows("f2")), ("prismatic", &follows("j1"))));
     let stands = [("f1", Stand::DistanceM(0.0)), ("f2", Stand::DistanceM(0.002))];
     assert_eq!(locked(&up_to(&text, "hand")), stands);
@@ -140,7 +140,7 @@ fn a_joint_that_mimics_another_follows_it() {
     }
 }
 
-/// What stands beside the arm on its base never moves; what hangs on the arm is a part of the body that carries it.
+/// A second arm on the base never moves; one that the arm carries is part of the body that carries it.
 #[test]
 fn a_second_arm_belongs_to_what_carries_it() {
     let second = |parent: &str, kind: &str| {
@@ -156,7 +156,7 @@ fn a_second_arm_belongs_to_what_carries_it() {
         let found = up_to(&second(carrier, "revolute"), "b");
         assert_eq!(found.arm, read(&second(carrier, "fixed")).arm);
     }
-    // The arm ends where it is said to, ahead of its own last joints as well.
+    // The arm ends at the named link, even if joints of its own follow.
     let shorter = up_to(&robot(&two_joints()), "a");
     assert_eq!((shorter.arm.dof(), shorter.arm.joints[0].link.mass_kg()), (1, 4.0));
     assert_eq!(locked(&shorter), [("j2", Stand::AngleRad(0.0))]);
@@ -186,18 +186,18 @@ fn without_a_last_link_all_that_is_in_the_way_is_told_at_once() {
     for part in ["\"f1\" is prismatic", "\"f2\" mimics \"f1\"", "\"j1\", \"wheel\"", &name()] {
         assert!(message.contains(part), "{message}");
     }
-    // What it proposes is an arm.
+    // The proposed link ends an arm.
     assert_eq!(up_to(&text, "hand").arm.dof(), 2);
 }
 
-/// The joint that turns a gripper's fingers is none of the arm's.
+/// The joint that drives a gripper's fingers is not part of the arm.
 #[test]
 fn a_gripper_is_not_proposed_as_the_end_of_the_arm() {
     let follows = format!(r#"{LIMIT}<mimic joint="f1"/>"#);
     let text = with_hand(&fingers(("revolute", LIMIT), ("revolute", &follows)));
     let UrdfFault::NotOneChain { proposal, .. } = fault(&text) else { panic!() };
     assert_eq!(proposal.as_deref(), Some("toy.urdf#hand"));
-    // A rail in front is in the way of every arm.
+    // A rail ahead of the arm is in the way of every arm.
     let rail = [link("rail", ""), joint("slide", "prismatic", "rail", "base", SLIDE)];
     let found = fault(&with(&rail));
     let UrdfFault::NotOneChain { proposal: None, .. } = &found else { panic!("{found:?}") };
@@ -229,7 +229,7 @@ fn a_last_link_that_ends_no_arm_is_refused() {
     assert!(words.contains("frame7 and 2 more, or one that moves on the way"), "{words}");
 }
 
-/// Fingers that slide, wheels without mass and what stands still are no ends of an arm.
+/// Sliding fingers, massless wheels and links that stand still do not end an arm.
 #[test]
 fn every_link_that_is_proposed_ends_an_arm() {
     let wheel = [link("rim", ""), joint("wheel", "continuous", "base", "rim", "")];
@@ -251,7 +251,7 @@ fn every_link_that_is_proposed_ends_an_arm() {
     assert!(words.contains("no link of the file ends an arm"), "{words}");
 }
 
-/// The bodies are their links, and the links are where the file has them.
+/// The bodies consist of their links, and the links are where the file has them.
 #[test]
 fn links_add_up_to_the_bodies_that_hold_them() {
     let mut parts = two_joints();
@@ -273,7 +273,7 @@ fn links_add_up_to_the_bodies_that_hold_them() {
         });
         assert_eq!(sum, joint.link);
     }
-    // At q = 0 the frames of the links are those of the file: none of its joints has angles.
+    // At q = 0 the frames of the links are those of the file: none of its joints has a rotated origin.
     let frames = arm.frames(&[0.0, 0.0]);
     let heights = [0.5, 1.0, 1.5, 2.0, 2.0, 2.5];
     for (link, height) in links[1..].iter().zip(heights) {
@@ -283,7 +283,7 @@ fn links_add_up_to_the_bodies_that_hold_them() {
     }
 }
 
-/// A gripper of twelve fingers on an arm that stands on ten boxes: a line for each of what is to be said.
+/// A gripper with twelve fingers on an arm that stands on ten boxes: one line for each subject.
 #[test]
 fn what_is_told_of_many_joints_and_links_is_short() {
     let fingers = (0..12).flat_map(|k| {
@@ -307,11 +307,11 @@ fn what_is_told_of_many_joints_and_links_is_short() {
         let lines = said.iter().filter(|line| line.contains(words)).count();
         assert_eq!(lines, 1, "{words}: {said:#?}");
     }
-    // Gravity, drives, clearance, friction, acceleration beside these.
+    // Gravity, drives, clearance, friction and acceleration, in addition to these.
     assert_eq!(said.len(), 8, "{said:#?}");
 }
 
-/// Of many files the base has moments that no body has: it never moves.
+/// In many files the base has moments that no body can have; it never moves.
 #[test]
 fn moments_of_the_base_do_not_matter() {
     let mut parts = two_joints();

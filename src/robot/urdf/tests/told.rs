@@ -1,8 +1,8 @@
-//! What is told of several joints at once.
+//! Notices about several joints at once.
 
 use super::{joint, read, robot, two_joints};
 
-/// The lines that are told of the arm j1, j2 whose joints both are of the `kind` and have the lines `inside`.
+/// The notices about the arm j1, j2 whose joints are both of this `kind` and contain the elements `inside`.
 fn told(kind: &str, inside: &str) -> Vec<String> {
     let mut parts = two_joints();
     parts[3] = joint("j1", kind, "base", "a", inside);
