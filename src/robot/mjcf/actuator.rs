@@ -1,4 +1,4 @@
-//! What actuators give their joints.
+//! Contributions of actuators to their joints.
 
 use std::collections::HashMap;
 
@@ -8,15 +8,15 @@ use super::element::Element;
 use super::fault::MjcfFault;
 use super::joint::{POWERS, smaller};
 
-/// Numbers of `gear`: a joint has one, a site six.
+/// Largest number of values of `gear`: one for a joint, six for a site.
 const GEARS: usize = 6;
-/// Numbers of `gainprm`.
+/// Largest number of values of `gainprm`.
 const GAINS: usize = 10;
 
-/// What all actuators of a joint give it together.
+/// The combined contribution of all actuators of a joint.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Actuated {
-    /// The largest torque, Nm (or force, N); infinite where one of them has no limit.
+    /// Largest torque, Nm, or force, N; infinite if one of them has no limit.
     pub effort: f64,
     /// Rotor inertia at the joint, kg m².
     pub armature_kg_m2: f64,
@@ -24,8 +24,11 @@ pub(super) struct Actuated {
     pub damping: f64,
 }
 
-/// By the joint's name. MuJoCo limits what an actuator is asked for (`ctrlrange`) and what it gives (`forcerange`), the joint has it times
-/// `gear`, and of several actuators the sum. Rotors and dampers of actuators turn with the motor: the joint has them times `gear`².
+/// The contributions by name of the joint.
+///
+/// MuJoCo limits the input of an actuator (`ctrlrange`) and its output (`forcerange`). The joint receives the output
+/// times `gear`, summed over its actuators. Rotors and dampers of actuators turn with the motor: the joint has their
+/// inertia and damping times `gear`².
 pub(super) fn actuated(
     root: &Element,
     compiler: &Compiler,
@@ -39,7 +42,7 @@ pub(super) fn actuated(
             continue;
         };
         let gear = actuator.up_to("gear", GEARS)?.map_or(1.0, |gear| gear[0]).abs();
-        // What is not connected limits nothing.
+        // An actuator that is not connected limits nothing.
         if gear == 0.0 {
             continue;
         }
@@ -59,8 +62,8 @@ pub(super) fn actuated(
     Ok(actuated)
 }
 
-/// Force per unit of what is asked for, of an actuator that gives nothing else; `None` for all others. As `<general>` MuJoCo itself writes
-/// motors.
+/// Output per unit of input of an actuator whose output is proportional to its input; `None` for all others. MuJoCo
+/// itself writes motors as `<general>`.
 fn gain_of_a_motor(actuator: &Element) -> Result<Option<f64>, MjcfFault> {
     let is_plain =
         |attribute: &str, plain: &str| actuator.text(attribute).is_none_or(|kind| kind == plain);

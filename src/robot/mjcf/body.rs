@@ -1,4 +1,4 @@
-//! The bodies of an MJCF as links and joints.
+//! Conversion of the bodies of an MJCF into links and joints.
 
 use std::collections::{HashMap, HashSet};
 
@@ -19,43 +19,43 @@ use super::pose::{pose, rpy_rad, shift};
 use crate::robot::arm::Placement;
 use crate::robot::shapes::LinkShape;
 
-/// The body around all others.
+/// The body that contains all others.
 const WORLD: &str = "world";
 
-/// An element of a body, without the `<frame>` around it.
+/// An element of a body, with the `<frame>` elements around it resolved.
 pub(super) struct Part<'a> {
     pub element: &'a Element,
-    /// Pose of that frame in the body.
+    /// Pose in the body of the innermost `<frame>` around the element.
     pub frame: Placement,
-    /// The class of what names none.
+    /// The default class of elements that name none.
     pub childclass: Option<&'a str>,
 }
 
-/// The link of a body: its axes are the body's, its origin is the anchor of the last joint that moves it.
+/// The link of a body. Its axes are those of the body, its origin is the anchor of the last joint that moves the body.
 struct Hold {
     link: String,
     anchor_m: Vector3<f64>,
 }
 
-/// What an MJCF says of bodies and joints.
+/// The links and joints that an MJCF is converted into.
 pub(super) struct Bodies<'a> {
     compiler: &'a Compiler,
     defaults: &'a Defaults,
-    /// What actuators give, by joint.
+    /// Contributions of the actuators, by joint.
     actuated: &'a HashMap<String, Actuated>,
     /// Meshes by name.
     meshes: &'a MeshAssets,
-    /// Links without inertia, and joints.
+    /// All links, still without inertia, and all joints.
     pub robot: Robot,
-    /// The inertia of each link, or why it is not known: that matters only where the link moves.
+    /// The inertia of each link, or the reason why it is not known, which matters only if the link moves.
     pub inertias: Vec<Result<Inertial, MjcfFault>>,
-    /// Names that joints have.
+    /// Names of joints that are taken.
     joint_names: HashSet<String>,
-    /// Named places on links.
+    /// Fixed joints for the named sites.
     sites: Vec<urdf_rs::Joint>,
-    /// The link that each of them is on.
+    /// The link on which each site is.
     pub links_of_sites: HashMap<String, String>,
-    /// Sites that are called as a body is.
+    /// Sites with the same name as a body.
     pub namesakes: Vec<String>,
     /// Free joints, which are locked.
     pub free: Vec<String>,
@@ -63,18 +63,18 @@ pub(super) struct Bodies<'a> {
     pub armature_kg_m2: HashMap<String, f64>,
     /// Positions of joints in the pose of the file, rad or m.
     pub references: HashMap<String, f64>,
-    /// What joints have and an arm does not.
+    /// Properties of joints that an arm does not have.
     pub left_out: Vec<(LeftOut, String)>,
-    /// Bodies whose weight is taken away.
+    /// Bodies whose weight is compensated.
     pub weightless: HashSet<String>,
-    /// Equalities that hold bodies together beside the joints.
+    /// Number of equalities that connect bodies in addition to the joints.
     pub loops: usize,
-    /// What links collide with.
+    /// Collision shapes of the links.
     pub shapes: Vec<LinkShape>,
 }
 
 impl<'a> Bodies<'a> {
-    /// All that is in the `<worldbody>` of `root`.
+    /// Everything in the `<worldbody>` of `root`.
     pub(super) fn of(
         root: &Element,
         compiler: &'a Compiler,
@@ -120,7 +120,7 @@ impl<'a> Bodies<'a> {
         Ok(bodies)
     }
 
-    /// What is in an element, frames resolved.
+    /// The elements in `element`, with `<frame>` elements resolved.
     fn parts<'e>(
         &self,
         element: &'e Element,
@@ -145,7 +145,7 @@ impl<'a> Bodies<'a> {
         Ok(parts)
     }
 
-    /// The sites, shapes and bodies among the parts of the body `hold`.
+    /// Converts the sites, shapes and bodies among the parts of the body `hold`.
     fn inner(&mut self, parts: &[Part<'_>], hold: &Hold) -> Result<(), MjcfFault> {
         for part in parts {
             match part.element.tag.as_str() {
@@ -162,7 +162,7 @@ impl<'a> Bodies<'a> {
         let Part { element, frame, childclass } = body;
         let name = match element.text("name") {
             Some(name) => name.to_owned(),
-            // Several may stand in one line.
+            // The number distinguishes several on one line.
             None => format!("unnamed body {} ({})", self.robot.links.len(), element.line()),
         };
         let parts = self.parts(element, element.text("childclass").or(*childclass))?;
@@ -176,7 +176,7 @@ impl<'a> Bodies<'a> {
         self.inner(&parts, &hold)
     }
 
-    /// The joints between `parent` and the body `name`, which the file has at `pose` in the body of that.
+    /// Converts the joints between `parent` and the body `name`, whose pose in the parent body is `pose` in the file.
     fn joints(
         &mut self,
         name: &str,
@@ -186,7 +186,7 @@ impl<'a> Bodies<'a> {
     ) -> Result<Hold, MjcfFault> {
         let joints: Vec<&Part<'_>> = parts.iter().filter(|part| is_joint(part.element)).collect();
         let mut at = Hold { link: parent.link.clone(), anchor_m: Vector3::zeros() };
-        // Pose of the body, as far as joints have moved it, in the frame of the link at hand.
+        // Pose of the body, as moved by the joints so far, in the frame of the current link.
         let mut body = shift(-parent.anchor_m).compose(pose);
         for (before, part) in joints.iter().enumerate() {
             let element = self.defaults.complete(part.element, part.childclass)?;
@@ -215,13 +215,13 @@ impl<'a> Bodies<'a> {
         Ok(at)
     }
 
-    /// What a joint without a name is called, `before` others of its body `body`: as no other one is.
+    /// A unique name for a joint without one, with `before` other joints in front of it in the body `body`.
     fn name_of_unnamed(&mut self, body: &str, before: usize) -> String {
         let mut names = (before + 1..).map(|number| match number {
             1 => format!("{body}_joint"),
             _ => format!("{body}_joint{number}"),
         });
-        // Numbers do not run out.
+        // The iterator is endless.
         let name = names.find(|name| !self.joint_names.contains(name)).unwrap_or_default();
         self.joint_names.insert(name.clone());
         name
@@ -231,7 +231,7 @@ impl<'a> Bodies<'a> {
         let unlimited = Actuated { effort: f64::INFINITY, ..Actuated::default() };
         let actuated = self.actuated.get(&name).copied().unwrap_or(unlimited);
         let effort = joint.effort.min(actuated.effort);
-        // URDF says 0 where there is no limit.
+        // In a URDF, 0 means no limit.
         let effort = if effort.is_finite() { effort } else { 0.0 };
         let damping = joint.dynamics.damping + actuated.damping;
         let armature_kg_m2 = joint.armature_kg_m2 + actuated.armature_kg_m2;
@@ -239,7 +239,7 @@ impl<'a> Bodies<'a> {
         self.references.insert(name.clone(), joint.reference);
         self.left_out.extend(joint.left_out.iter().map(|what| (*what, name.clone())));
         let joint_type = match joint.kind {
-            // It is the world's: what an arm floats on, or something that lies beside it.
+            // Free joints connect bodies to the world: a floating base of the arm, or an object beside it.
             JointType::Floating => {
                 self.free.push(name.clone());
                 JointType::Fixed
@@ -255,7 +255,8 @@ impl<'a> Bodies<'a> {
         });
     }
 
-    /// What is wrong with a shape is told where the links with shapes are: the arm is the same without it.
+    /// Records the collision shape of a geom. A fault is only recorded, to be reported with the shapes: the arm is the
+    /// same without it.
     fn geom(&mut self, part: &Part<'_>, hold: &Hold) {
         let geom = self.defaults.complete(part.element, part.childclass);
         let found = geom.and_then(|geom| shape(&geom, self.compiler, self.meshes));
@@ -268,7 +269,7 @@ impl<'a> Bodies<'a> {
         self.shapes.push(LinkShape { link: hold.link.clone(), placement, shape });
     }
 
-    /// A place with a name is a link without mass.
+    /// Records a named site as a link without mass.
     fn site(&mut self, part: &Part<'_>, hold: &Hold) -> Result<(), MjcfFault> {
         let site = self.defaults.complete(part.element, part.childclass)?;
         let Some(name) = site.text("name") else { return Ok(()) };
@@ -280,7 +281,7 @@ impl<'a> Bodies<'a> {
         Ok(())
     }
 
-    /// Bodies and sites may share a name; then it is the body's.
+    /// Adds the sites as links. If a body has the same name as a site, the name means the body.
     fn add_sites(&mut self) {
         let bodies: HashSet<String> =
             self.robot.links.iter().map(|link| link.name.clone()).collect();
@@ -303,7 +304,7 @@ impl<'a> Bodies<'a> {
     }
 }
 
-/// Names of all joints in an element.
+/// Collects the names of all joints in an element.
 fn collect_joint_names(element: &Element, names: &mut HashSet<String>) {
     for child in &element.children {
         if is_joint(child) {
@@ -317,12 +318,12 @@ fn is_joint(element: &Element) -> bool {
     matches!(element.tag.as_str(), "joint" | "freejoint")
 }
 
-/// What holds the link `child` where it is.
+/// The fixed joint that connects the link `child` to `parent`.
 fn fixed(child: &str, origin: &Placement, parent: &str) -> urdf_rs::Joint {
     joint_between(format!("{child} (fixed)"), origin, parent, child)
 }
 
-/// A joint that does not move yet.
+/// A fixed joint, to be given its type by the caller.
 fn joint_between(name: String, origin: &Placement, parent: &str, child: &str) -> urdf_rs::Joint {
     urdf_rs::Joint {
         name,

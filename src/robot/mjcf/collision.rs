@@ -1,4 +1,4 @@
-//! The shapes that collide, and the meshes among them.
+//! Collision shapes of an MJCF, and their meshes.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -12,7 +12,7 @@ use super::pose::pose;
 use crate::robot::arm::Placement;
 use crate::robot::shapes::Shape;
 
-/// Meshes by name, or why one is not read: that matters only where something collides with it.
+/// Meshes by name, or the reason why one is not read, which matters only if a collision shape uses it.
 pub(super) type MeshAssets = HashMap<String, Result<Shape, MjcfFault>>;
 
 /// The meshes of a file.
@@ -37,8 +37,8 @@ fn mesh(asset: &Element, compiler: &Compiler, defaults: &Defaults) -> Result<Sha
     Ok(Shape::Mesh { file: file.display().to_string(), scale })
 }
 
-/// The shape of a geom with the defaults of its class, and where it stands in the frame around it; `None` of one that is only seen,
-/// and of grounds.
+/// The shape of a geom that has the defaults of its class, and its pose in the frame of its parent; `None` for purely
+/// visual geoms and for ground planes and height fields.
 pub(super) fn shape(
     geom: &Element,
     compiler: &Compiler,
@@ -49,7 +49,8 @@ pub(super) fn shape(
     if matches!(kind, "plane" | "hfield") || !(collides("contype")? || collides("conaffinity")?) {
         return Ok(None);
     }
-    // A primitive with a mesh is fitted to it: what holds the mesh holds it, or nearly.
+    // A primitive with a mesh is fitted to the mesh: a capsule around the mesh encloses the primitive too, or nearly
+    // so.
     if let Some(mesh) = geom.text("mesh") {
         let unknown = || MjcfFault::UnknownMesh { place: geom.place(), mesh: mesh.to_owned() };
         let shape = meshes.get(mesh).cloned().unwrap_or_else(|| Err(unknown()))?;

@@ -1,14 +1,14 @@
-//! How MuJoCo is told to understand a file: its `<compiler>`.
+//! Settings for the interpretation of a file: its `<compiler>`.
 
 use super::element::Element;
 use super::fault::MjcfFault;
 
-/// When the inertia of a body is that of its geoms.
+/// Whether the inertia of a body is computed from its geoms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum FromGeoms {
-    /// Whatever `<inertial>` says.
+    /// Always, whatever `<inertial>` says.
     Always,
-    /// Where there is no `<inertial>`.
+    /// If there is no `<inertial>`.
     Auto,
     /// Never.
     Never,
@@ -19,21 +19,21 @@ pub(super) enum FromGeoms {
 pub(super) struct Compiler {
     /// Unit of angles, rad.
     pub angle_rad: f64,
-    /// Axes of `euler`: in lower case those that turned already, in capitals those of the parent.
+    /// Axes of `euler`: lower-case letters turn with the frame, capitals are fixed in the parent.
     pub eulerseq: [char; 3],
-    /// Whether a range alone makes a limit.
+    /// Whether a range alone means that a quantity is limited.
     pub autolimits: bool,
-    /// Where inertia comes from.
+    /// Source of the inertia.
     pub from_geoms: FromGeoms,
-    /// First and last group of geoms that count.
+    /// First and last group of the geoms that contribute to the inertia.
     pub groups: [f64; 2],
-    /// Whether moments that no body has are made equal.
+    /// Whether principal moments that no body can have are replaced by their mean.
     pub balances: bool,
-    /// Least mass of a body, kg.
+    /// Lower bound of the mass of a body, kg.
     pub least_mass_kg: f64,
-    /// Least principal moment of a body, kg m².
+    /// Lower bound of the principal moments of a body, kg m².
     pub least_moment_kg_m2: f64,
-    /// Where meshes lie, from the folder of the main file.
+    /// Folder of the meshes, relative to that of the main file.
     pub mesh_folder: String,
 }
 
@@ -54,7 +54,7 @@ impl Default for Compiler {
 }
 
 impl Compiler {
-    /// What all `<compiler>` of a file say together.
+    /// The combined settings of all `<compiler>` elements of a file.
     pub(super) fn of(root: &Element) -> Result<Self, MjcfFault> {
         let usual = Self::default();
         let Some(said) = root.settings("compiler") else { return Ok(usual) };
@@ -95,7 +95,7 @@ impl Compiler {
         })
     }
 
-    /// The range that limits something, in the file's unit; `None` where nothing does.
+    /// The range that limits a quantity, in the file's unit; `None` if it is not limited.
     pub(super) fn limit(
         &self,
         element: &Element,
@@ -104,7 +104,7 @@ impl Compiler {
     ) -> Result<Option<[f64; 2]>, MjcfFault> {
         let [lower, upper] = element.numbers::<2>(range)?.unwrap_or_default();
         let said = element.switch(limited)?;
-        // Without its limit an arm would be moved into its stops, if this is what was meant.
+        // If the range was meant as a limit, ignoring it would move the arm into its end stops.
         if said.is_none() && !self.autolimits && lower != upper {
             return Err(MjcfFault::LimitLeftOpen { place: element.place(), range, limited });
         }

@@ -1,4 +1,4 @@
-//! Default classes: what elements say by the name of a class.
+//! Default classes: attributes that elements take over by the name of a class.
 
 use std::collections::HashMap;
 
@@ -8,10 +8,10 @@ use super::fault::MjcfFault;
 /// The class of elements that name none.
 const MAIN: &str = "main";
 
-/// All kinds of equalities have the same defaults.
+/// All kinds of equalities share one set of defaults.
 const EQUALITY: &str = "equality";
 
-/// Kinds of actuators; MuJoCo keeps one set of defaults for all of them.
+/// Tags of actuators, for all of which MuJoCo keeps one set of defaults.
 pub(super) const ACTUATORS: [&str; 11] = [
     "general",
     "motor",
@@ -26,17 +26,17 @@ pub(super) const ACTUATORS: [&str; 11] = [
     "pid",
 ];
 
-/// Attributes by what they are for.
+/// Attributes by kind of element.
 type Class = HashMap<&'static str, Attributes>;
 
-/// The classes of a file, each with what it has from those around it.
+/// The classes of a file, each including what it inherits from the classes around it.
 #[derive(Debug)]
 pub(super) struct Defaults {
     classes: HashMap<String, Class>,
 }
 
 impl Defaults {
-    /// What all `<default>` of a file say together.
+    /// The classes in all `<default>` elements of a file.
     pub(super) fn of(root: &Element) -> Result<Self, MjcfFault> {
         let mut defaults = Self { classes: HashMap::from([(MAIN.to_owned(), Class::new())]) };
         for section in root.each("default") {
@@ -64,7 +64,7 @@ impl Defaults {
         Ok(())
     }
 
-    /// The element with what its class says beyond what it says itself; `childclass` is that of what is around it.
+    /// The element completed with the attributes of its class; `childclass` applies to elements that name no class.
     pub(super) fn complete(
         &self,
         element: &Element,
@@ -73,7 +73,7 @@ impl Defaults {
         self.complete_as(kind(&element.tag), element, childclass)
     }
 
-    /// The same of an equality, which may be called as another element is.
+    /// Completes an equality, whose tag may be that of another kind of element.
     pub(super) fn complete_equality(&self, equality: &Element) -> Result<Element, MjcfFault> {
         self.complete_as(Some(EQUALITY), equality, None)
     }
@@ -97,14 +97,14 @@ impl Defaults {
     }
 }
 
-/// What an element is for, where defaults of it matter.
+/// The kind of an element, if defaults for it matter.
 fn kind(tag: &str) -> Option<&'static str> {
     match tag {
         "joint" => Some("joint"),
         "geom" => Some("geom"),
         "site" => Some("site"),
         "mesh" => Some("mesh"),
-        // In <default> all of them are one.
+        // In `<default>` there is only one tag for all of them.
         "fixed" | "spatial" | "tendon" => Some("tendon"),
         EQUALITY => Some(EQUALITY),
         _ if ACTUATORS.contains(&tag) => Some("actuator"),

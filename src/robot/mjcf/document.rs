@@ -1,4 +1,4 @@
-//! An MJCF and the files that it includes as one tree of elements.
+//! An MJCF and the files that it includes, as one tree of elements.
 
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -8,7 +8,7 @@ use roxmltree::{Document, Node, ParsingOptions};
 use super::element::Element;
 use super::fault::MjcfFault;
 
-/// Elements inside each other: no arm has so many, and the stack holds them.
+/// Largest nesting depth of elements: no arm needs more, and the stack can hold it.
 const DEEPEST: usize = 200;
 
 /// Whether the text of an .xml is a URDF.
@@ -16,7 +16,8 @@ pub(in crate::robot) fn is_urdf(text: &str) -> bool {
     parsed(text).is_ok_and(|document| document.root_element().tag_name().name() == "robot")
 }
 
-/// The root of an MJCF, with what it includes in place, and the files which that is from; `source` is the file of `text`.
+/// The root element of an MJCF with all included files in place, and the paths of these files; `source` is the path of
+/// `text`.
 pub(super) fn document(text: &str, source: &str) -> Result<(Element, Vec<PathBuf>), MjcfFault> {
     let source = Path::new(source);
     let folder = folder(source);
@@ -27,7 +28,7 @@ pub(super) fn document(text: &str, source: &str) -> Result<(Element, Vec<PathBuf
 }
 
 fn parsed(text: &str) -> Result<Document<'_>, roxmltree::Error> {
-    // As MuJoCo does, a document type is passed over.
+    // Like MuJoCo, this skips a document type declaration.
     let options = ParsingOptions { allow_dtd: true, ..ParsingOptions::default() };
     Document::parse_with_options(text.trim_start_matches('\u{feff}'), options)
 }
@@ -36,17 +37,17 @@ fn folder(file: &Path) -> PathBuf {
     file.parent().unwrap_or(Path::new("")).to_owned()
 }
 
-/// A file by the one name that it has however it was written.
+/// The canonical path of a file, which is the same however its name was written.
 fn known(file: &Path) -> PathBuf {
     file.canonicalize().unwrap_or_else(|_| file.to_owned())
 }
 
-/// A text, and how to tell where something stands in it.
+/// A text, and what is needed to tell the line of an element in it.
 struct File<'t> {
     text: &'t str,
-    /// Where its lines end.
+    /// Positions of its line ends.
     ends: Vec<usize>,
-    /// As written in `<include>`; `None` for the main file.
+    /// Its name as written in `<include>`; `None` for the main file.
     name: Option<Rc<str>>,
     folder: PathBuf,
 }
@@ -64,9 +65,9 @@ impl<'t> File<'t> {
     }
 }
 
-/// What was included so far.
+/// The files included so far.
 struct Includes {
-    /// Of the main file: there MuJoCo looks for what included files include.
+    /// Folder of the main file: MuJoCo looks there for the files that included files include.
     folder: PathBuf,
     known: Vec<PathBuf>,
     files: Vec<PathBuf>,
@@ -80,7 +81,7 @@ impl Includes {
         })?;
         let root = self.element(document.root_element(), file, depth)?;
         let is_included = file.name.is_some();
-        // An included file may begin with anything.
+        // The root element of an included file may have any name.
         match root.tag.as_str() {
             "mujoco" => Ok(root),
             _ if is_included => Ok(root),
@@ -117,7 +118,7 @@ impl Includes {
         Ok(element)
     }
 
-    /// What stands in the place of `include`.
+    /// The elements that replace `include`.
     fn included(
         &mut self,
         include: &Element,

@@ -1,4 +1,4 @@
-//! The elements of an MJCF: their attributes, and where they stand.
+//! Elements of an MJCF: their attributes and their places in the file.
 
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -8,28 +8,29 @@ use super::fault::MjcfFault;
 /// Attributes by name, as written.
 pub(super) type Attributes = BTreeMap<String, String>;
 
-/// Ways to give an orientation; an element has one of them or none.
+/// Attributes that give an orientation; an element has at most one of them.
 pub(super) const ORIENTATIONS: [&str; 5] = ["quat", "axisangle", "euler", "xyaxes", "zaxis"];
 
-/// No length, mass or torque of an arm is beyond it, and products of a few of such numbers are still finite.
+/// Largest number that is accepted: no length, mass or torque of an arm exceeds it, and products of a few such numbers
+/// are finite.
 const LARGEST: f64 = 1e15;
 
-/// An element with all that is in it.
+/// An element with everything in it.
 #[derive(Debug, Clone)]
 pub(super) struct Element {
     /// Its tag.
     pub tag: String,
     /// Its attributes.
     pub attributes: Attributes,
-    /// The elements in it, those of included files in the place of `<include>`.
+    /// The elements in it, with those of included files in the place of `<include>`.
     pub children: Vec<Element>,
-    /// The included file that it is from; `None` for the main file.
+    /// The included file that contains it; `None` for the main file.
     pub file: Option<Rc<str>>,
-    /// Its line there, from 1 on.
+    /// Its line in the file, from 1.
     pub line: usize,
 }
 
-/// Takes over `defaults` of what is not given: of an orientation only where none is given in any way.
+/// Adds those `defaults` that are not given. A default orientation is added only if no attribute gives an orientation.
 pub(super) fn fill(given: &mut Attributes, defaults: &Attributes) {
     let is_orientation = |name: &str| ORIENTATIONS.contains(&name);
     let is_turned = given.keys().any(|name| is_orientation(name));
@@ -46,12 +47,12 @@ impl Element {
         self.attributes.get(attribute).map(String::as_str)
     }
 
-    /// The elements of one tag directly in it.
+    /// The elements with this tag directly in it.
     pub(super) fn each<'a>(&'a self, tag: &'a str) -> impl Iterator<Item = &'a Element> {
         self.children.iter().filter(move |child| child.tag == tag)
     }
 
-    /// What all elements of one tag directly in it say together: of two that give an attribute the later one counts.
+    /// The combined attributes of all elements with this tag directly in it; a later element overrides an earlier one.
     pub(super) fn settings(&self, tag: &str) -> Option<Element> {
         let sections: Vec<&Element> = self.each(tag).collect();
         let mut settings = (*sections.last()?).clone();
@@ -61,7 +62,7 @@ impl Element {
         Some(settings)
     }
 
-    /// Such as `line 12`, with the file where it is not the main one.
+    /// The line for messages, such as `line 12`, with the file if it is not the main one.
     pub(super) fn line(&self) -> String {
         match &self.file {
             Some(file) => format!("{file} line {}", self.line),
@@ -69,7 +70,7 @@ impl Element {
         }
     }
 
-    /// Such as `line 12: joint "elbow"`, in messages.
+    /// The place for messages, such as `line 12: joint "elbow"`.
     pub(super) fn place(&self) -> String {
         match self.text("name") {
             Some(name) => format!("{}: {} \"{name}\"", self.line(), self.tag),
@@ -77,7 +78,7 @@ impl Element {
         }
     }
 
-    /// An attribute that has to be there, as written.
+    /// A mandatory attribute as written.
     pub(super) fn required(&self, attribute: &'static str) -> Result<&str, MjcfFault> {
         self.text(attribute).ok_or_else(|| MjcfFault::Missing { place: self.place(), attribute })
     }
@@ -91,13 +92,13 @@ impl Element {
         values.map(|values| self.exactly(attribute, values)).transpose()
     }
 
-    /// An attribute of N numbers that has to be there.
+    /// A mandatory attribute of N numbers.
     pub(super) fn required_numbers<const N: usize>(
         &self,
         attribute: &'static str,
     ) -> Result<[f64; N], MjcfFault> {
         self.required(attribute)?;
-        // It is there.
+        // `required` has found it.
         Ok(self.numbers(attribute)?.unwrap_or([0.0; N]))
     }
 
@@ -106,14 +107,14 @@ impl Element {
         Ok(self.numbers::<1>(attribute)?.map(|[value]| value))
     }
 
-    /// An attribute of one number from 0 on; 0 where it is not there.
+    /// An attribute of one number that is at least 0; 0 if it is missing.
     pub(super) fn not_negative(&self, attribute: &'static str) -> Result<f64, MjcfFault> {
         let value = self.number(attribute)?.unwrap_or(0.0);
         self.refuse_negative(attribute, value)?;
         Ok(value)
     }
 
-    /// Refuses what must not be below zero.
+    /// Refuses a value below zero.
     pub(super) fn refuse_negative(
         &self,
         attribute: &'static str,
@@ -161,7 +162,7 @@ impl Element {
         MjcfFault::Count { place: self.place(), attribute, found, needed }
     }
 
-    /// An attribute that is `true` or `false`; `None` where it is `auto` or not there.
+    /// An attribute that is `true` or `false`; `None` if it is `auto` or missing.
     pub(super) fn switch(&self, attribute: &'static str) -> Result<Option<bool>, MjcfFault> {
         match self.text(attribute) {
             None | Some("auto") => Ok(None),
@@ -171,7 +172,7 @@ impl Element {
         }
     }
 
-    /// A word that is none of `choice`.
+    /// The fault for a value that is none of `choice`.
     pub(super) fn keyword(
         &self,
         attribute: &'static str,
@@ -182,7 +183,7 @@ impl Element {
         MjcfFault::Keyword { place: self.place(), attribute, value, choice }
     }
 
-    /// The one of `attributes` that it has; two of them contradict each other.
+    /// The one of `attributes` that the element has; two of them are a contradiction.
     pub(super) fn at_most_one(
         &self,
         attributes: &[&'static str],
@@ -196,7 +197,7 @@ impl Element {
         }
     }
 
-    /// What is missing where a file would have to be compiled first.
+    /// The fault for an element that only MuJoCo can process, so that the file must be compiled there first.
     pub(super) fn unread(&self, what: &'static str) -> MjcfFault {
         MjcfFault::Unread { place: self.place(), what }
     }

@@ -1,4 +1,4 @@
-//! Joints that follow others: `<equality>`.
+//! Constraints between joints or bodies: `<equality>`.
 
 use std::collections::HashMap;
 
@@ -9,11 +9,11 @@ use super::element::Element;
 use super::fault::MjcfFault;
 use super::notice::LeftOut;
 
-/// Numbers of `polycoef`.
+/// Largest number of values of `polycoef`.
 const COEFFICIENTS: usize = 5;
 
-/// Gives the joints of `robot` that follow others their `mimic`, and tells what of this is left out. `references` are the
-/// positions that joints have in the pose of the file.
+/// Gives the joints of `robot` that follow others their `mimic`, and returns what is left out of the constraints.
+/// `references` are the positions of the joints in the pose of the file.
 pub(super) fn couple(
     root: &Element,
     defaults: &Defaults,
@@ -38,7 +38,7 @@ pub(super) fn couple(
         let mimic = Mimic {
             joint: followed.to_owned(),
             multiplier: Some(multiplier),
-            // The polynomial is of what joints are away from the pose of the file.
+            // `polycoef` relates displacements of the joints from the pose of the file.
             offset: Some(reference(name) + offset - multiplier * reference(followed)),
         };
         if let Some(follower) = robot.joints.iter_mut().find(|joint| joint.name == name) {
@@ -48,12 +48,12 @@ pub(super) fn couple(
     Ok(left_out)
 }
 
-/// How many equalities hold bodies together beside the joints.
+/// Number of equalities that connect bodies in addition to the joints.
 pub(super) fn loops(root: &Element, defaults: &Defaults) -> Result<usize, MjcfFault> {
     Ok(active(root, defaults, "connect")?.len() + active(root, defaults, "weld")?.len())
 }
 
-/// Equalities of a kind that are not switched off, with the defaults of their classes.
+/// Equalities of this `kind` that are not switched off, completed with the defaults of their classes.
 pub(super) fn active(
     root: &Element,
     defaults: &Defaults,

@@ -1,17 +1,18 @@
-//! What makes an MJCF unusable as an arm.
+//! Faults that make an MJCF unusable as an arm.
 
 use thiserror::Error;
 
 use super::words::arm_fault;
 use crate::robot::urdf::UrdfFault;
 
-/// What to do with a model that only MuJoCo itself can work out.
+/// Advice for a model that only MuJoCo itself can process.
 const COMPILE: &str = "put saveinertial=\"true\" into <compiler>, load the model in MuJoCo and save it (mj_saveLastXML): what it writes then is read here";
 
-/// A text that is no MJCF, or one that is not of a serial arm of rigid bodies. A `place` is such as `line 12: joint "elbow"`.
+/// A text that is not an MJCF, or not one of a serial arm of rigid bodies. A `place` reads like
+/// `line 12: joint "elbow"`.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum MjcfFault {
-    /// It is not XML.
+    /// The text is not XML.
     #[error("{file}not readable as XML: {message}")]
     Xml {
         /// The included file and a colon; empty for the main one.
@@ -19,7 +20,7 @@ pub enum MjcfFault {
         /// The parser's message, with line and column.
         message: String,
     },
-    /// It is the XML of something else.
+    /// The text is XML, but not an MJCF.
     #[error("{place}: an MJCF begins with <mujoco>; is it one?")]
     NotMjcf {
         /// The first element.
@@ -43,13 +44,13 @@ pub enum MjcfFault {
         /// The file.
         file: String,
     },
-    /// Elements inside elements without end.
+    /// Elements are nested too deeply.
     #[error("{place} is nested too deeply")]
     TooDeep {
         /// The element.
         place: String,
     },
-    /// An attribute that has to be there.
+    /// A mandatory attribute is missing.
     #[error("{place}: {attribute} is missing")]
     Missing {
         /// The element.
@@ -67,7 +68,7 @@ pub enum MjcfFault {
         /// The word.
         word: String,
     },
-    /// A number that is not finite, or larger than any of an arm.
+    /// A number that is not finite, or too large for any quantity of an arm.
     #[error("{place}: {attribute} = {value:?} is not a number to calculate with")]
     NotFinite {
         /// The element.
@@ -77,7 +78,7 @@ pub enum MjcfFault {
         /// The value.
         value: f64,
     },
-    /// Too many numbers, or too few.
+    /// An attribute with too many or too few numbers.
     #[error("{place}: {attribute} has {found} numbers instead of {needed}")]
     Count {
         /// The element.
@@ -86,10 +87,10 @@ pub enum MjcfFault {
         attribute: &'static str,
         /// How many there are.
         found: usize,
-        /// How many there should be, or may be at most.
+        /// How many there should be, exactly or at most.
         needed: usize,
     },
-    /// A value on the wrong side of zero.
+    /// A negative value of a quantity that must not be negative.
     #[error("{place}: {attribute} = {value} must not be negative")]
     Negative {
         /// The element.
@@ -99,7 +100,7 @@ pub enum MjcfFault {
         /// The value.
         value: f64,
     },
-    /// A word that means nothing there.
+    /// A word that is not allowed there.
     #[error("{place}: {attribute}=\"{value}\" is none of {choice}")]
     Keyword {
         /// The element.
@@ -108,10 +109,10 @@ pub enum MjcfFault {
         attribute: &'static str,
         /// As written.
         value: String,
-        /// What may be written.
+        /// The allowed words.
         choice: &'static str,
     },
-    /// Two attributes that say the same in different ways.
+    /// Two attributes that give the same quantity in different ways.
     #[error("{place} has both {first} and {second}; leave one of them out")]
     Both {
         /// The element.
@@ -121,7 +122,7 @@ pub enum MjcfFault {
         /// The second.
         second: &'static str,
     },
-    /// A vector without length.
+    /// A vector of zero length.
     #[error("{place}: {attribute} is zero, it has no direction")]
     NoDirection {
         /// The element.
@@ -129,7 +130,7 @@ pub enum MjcfFault {
         /// The attribute.
         attribute: &'static str,
     },
-    /// Lower limit not below the upper one.
+    /// The lower limit is not below the upper one.
     #[error(
         "{place}: {attribute}=\"{lower} {upper}\" leaves no range; the first number must be the smaller one"
     )]
@@ -143,7 +144,7 @@ pub enum MjcfFault {
         /// As written; 0 where missing.
         upper: f64,
     },
-    /// A range of which it is not said whether it limits.
+    /// A range without the attribute that says whether it is a limit.
     #[error(
         "{place} has {range} but not {limited}, and <compiler> says autolimits=\"false\", which MuJoCo refuses too; write {limited}=\"true\" where \
          the range is a limit, {limited}=\"false\" where it is none"
@@ -156,7 +157,7 @@ pub enum MjcfFault {
         /// The attribute that is missing.
         limited: &'static str,
     },
-    /// A solid without extent.
+    /// A size of a solid that is not positive.
     #[error("{place}: number {number} of size is {size_m}; it must be positive")]
     Size {
         /// The geom.
@@ -166,7 +167,7 @@ pub enum MjcfFault {
         /// As written; 0 where missing.
         size_m: f64,
     },
-    /// A default class that is not in the file.
+    /// An unknown default class.
     #[error("{place}: there is no <default class=\"{class}\">")]
     UnknownClass {
         /// The element.
@@ -174,7 +175,7 @@ pub enum MjcfFault {
         /// The class.
         class: String,
     },
-    /// A mesh that is not in the file.
+    /// An unknown mesh.
     #[error("{place}: there is no <mesh> \"{mesh}\" in <asset>")]
     UnknownMesh {
         /// The geom.
@@ -182,7 +183,7 @@ pub enum MjcfFault {
         /// The mesh.
         mesh: String,
     },
-    /// Something that only MuJoCo itself works out.
+    /// Something that only MuJoCo itself can process.
     #[error("{place}: {what} not read; {}", COMPILE)]
     Unread {
         /// The element.
@@ -199,10 +200,10 @@ pub enum MjcfFault {
     Mesh {
         /// The body.
         body: String,
-        /// Where the geom stands.
+        /// Line of the geom.
         geom: String,
     },
-    /// Bodies and joints that are no serial arm.
+    /// Bodies and joints that do not form a serial arm.
     #[error("{}", arm_fault(.0))]
     Arm(UrdfFault),
 }

@@ -1,4 +1,4 @@
-//! What a geom adds to the inertia of its body.
+//! Contribution of a geom to the inertia of its body.
 
 use std::f64::consts::PI;
 
@@ -11,10 +11,10 @@ use super::pose::{direction, from_z, pose};
 use crate::robot::arm::Placement;
 use crate::robot::inertia::LinkInertia;
 
-/// Density where a file gives none, kg/m³: that of water.
+/// Default density, kg/m³: that of water.
 const USUAL_DENSITY_KG_M3: f64 = 1000.0;
 
-/// A solid about its centre, its axis of symmetry along z. Sizes are halves and radii, m.
+/// A solid about its centre, with its axis of symmetry along z. Sizes are half lengths and radii, m.
 pub(super) enum Solid {
     Ellipsoid([f64; 3]),
     Box([f64; 3]),
@@ -22,8 +22,8 @@ pub(super) enum Solid {
     Capsule { radius_m: f64, half_m: f64 },
 }
 
-/// The inertia of a geom in the frame around it, about that frame's origin; `None` of one without mass. `geom` has the defaults of
-/// its class, `body` names the body for a message.
+/// The inertia of a geom in the frame of its parent, about that frame's origin; `None` for a geom without mass. `geom`
+/// has the defaults of its class, `body` names the body in messages.
 pub(super) fn geom_inertia(
     geom: &Element,
     compiler: &Compiler,
@@ -42,7 +42,7 @@ pub(super) fn geom_inertia(
     if matches!(kind, "plane" | "hfield") {
         return Ok(None);
     }
-    // A primitive with a mesh is fitted to it.
+    // A primitive with a mesh is fitted to the mesh.
     if matches!(kind, "mesh" | "sdf") || geom.text("mesh").is_some() {
         return Err(MjcfFault::Mesh { body: body.to_owned(), geom: geom.line() });
     }
@@ -56,7 +56,7 @@ pub(super) fn geom_inertia(
     Ok(Some(about_centre.transformed(&placement)))
 }
 
-/// The solid that a geom of a primitive `kind` is, and where it stands.
+/// The solid of a geom of a primitive `kind`, and its pose.
 pub(super) fn solid(
     geom: &Element,
     kind: &str,
@@ -66,7 +66,7 @@ pub(super) fn solid(
     Ok((placement, Solid::of(geom, kind, half_m)?))
 }
 
-/// Where a geom (or site) stands, and where two points say how long it is half of that, m.
+/// The pose of a geom (or site), and half its length, m, if it is given by two points.
 pub(super) fn stretch(
     geom: &Element,
     kind: &str,
@@ -95,7 +95,7 @@ impl Solid {
             }
             Err(MjcfFault::Size { place: geom.place(), number: k + 1, size_m })
         };
-        // Between two points a box is as thick as it is wide.
+        // A box between two points is as thick as it is wide.
         let sizes = || -> Result<[f64; 3], MjcfFault> {
             match half_m {
                 Some(half_m) => Ok([size(0)?, size(0)?, half_m]),
@@ -126,7 +126,7 @@ impl Solid {
         }
     }
 
-    /// Principal moments per mass, m².
+    /// Principal moments divided by the mass, m².
     fn moments_m2(&self) -> Vector3<f64> {
         match *self {
             Self::Ellipsoid([a, b, c]) => {
@@ -139,10 +139,10 @@ impl Solid {
             }
             Self::Capsule { radius_m: r, half_m } => {
                 let height = 2.0 * half_m;
-                // Of two half spheres and the cylinder between them the share of the spheres, by volume.
+                // Share of the two hemispheres in the volume; the rest is the cylinder between them.
                 let spheres = 4.0 * r / (4.0 * r + 3.0 * height);
                 let cylinder = 1.0 - spheres;
-                // Steiner, with the centre of mass of a half sphere 3r/8 from its flat side.
+                // Steiner, with the centre of mass of a hemisphere 3r/8 from its flat side.
                 let across = cylinder * (3.0 * r * r + height * height) / 12.0
                     + spheres * (0.4 * r * r + height * (3.0 * r + 2.0 * height) / 8.0);
                 let along = cylinder * r * r / 2.0 + spheres * 0.4 * r * r;

@@ -1,4 +1,4 @@
-//! The inertia of a body: as written, or that of its geoms.
+//! Inertia of a body: as written, or from its geoms.
 
 use nalgebra::{Matrix3, Vector3};
 use urdf_rs::{Inertia, Inertial, Mass, Pose, Vec3};
@@ -13,7 +13,7 @@ use super::pose::pose;
 use crate::robot::arm::Placement;
 use crate::robot::inertia::LinkInertia;
 
-/// Mass, its centre, and the moments about that in the axes of the body.
+/// Mass, centre of mass, and the moments about it in the axes of the body.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct BodyInertia {
     mass_kg: f64,
@@ -22,7 +22,7 @@ pub(super) struct BodyInertia {
 }
 
 impl BodyInertia {
-    /// Of the body called `name` with these `parts`, in its frame.
+    /// The inertia of the body `name` with these `parts`, in the body's frame.
     pub(super) fn of(
         name: &str,
         parts: &[Part<'_>],
@@ -40,7 +40,7 @@ impl BodyInertia {
             FromGeoms::Never => false,
         };
         let inertia = if by_geoms {
-            // Geoms without mass change nothing.
+            // Massless geoms do not replace a written inertia.
             match Self::of_geoms(name, parts, compiler, defaults)? {
                 Some(inertia) => inertia,
                 None => as_written()?,
@@ -77,7 +77,7 @@ impl BodyInertia {
         Ok(Self { mass_kg, com_m: placement.translation_m, central_kg_m2 })
     }
 
-    /// `None` where no geom has mass.
+    /// The summed inertia of the geoms; `None` if none has mass.
     fn of_geoms(
         name: &str,
         parts: &[Part<'_>],
@@ -99,9 +99,9 @@ impl BodyInertia {
         }))
     }
 
-    /// At least what the compiler asks of every body.
+    /// Applies the lower bounds that the compiler sets for every body.
     fn bounded(mut self, compiler: &Compiler) -> Self {
-        // A frame stays one, though MuJoCo gives it the least mass as well.
+        // A massless body stays a mere frame, although MuJoCo gives it the least mass as well.
         if self.mass_kg == 0.0 {
             return self;
         }
@@ -119,7 +119,7 @@ impl BodyInertia {
         self
     }
 
-    /// The same about a frame of the same axes with its origin at `anchor_m`.
+    /// The inertial element for a frame with the same axes and its origin at `anchor_m`.
     pub(super) fn about(&self, anchor_m: &Vector3<f64>) -> Inertial {
         let i = &self.central_kg_m2;
         Inertial {

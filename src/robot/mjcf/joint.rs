@@ -1,4 +1,4 @@
-//! What an MJCF says of a joint.
+//! Reading of a joint of an MJCF.
 
 use nalgebra::{Matrix3, Vector3};
 use urdf_rs::{Dynamics, JointLimit, JointType};
@@ -10,32 +10,32 @@ use super::notice::LeftOut;
 use super::pose::{about, direction, shift};
 use crate::robot::arm::{Placement, snap};
 
-/// Numbers of `damping` and `stiffness`: that in proportion, and those of higher powers.
+/// Largest number of values of `damping` and `stiffness`: the linear coefficient, then those of higher powers.
 pub(super) const POWERS: usize = 8;
 
 /// A joint in the frame of the body that it moves.
 #[derive(Debug)]
 pub(super) struct Joint {
     pub kind: JointType,
-    /// A point of the axis, m; where the body turns about.
+    /// A point on the axis, or the centre of rotation of a ball joint, m.
     pub anchor_m: Vector3<f64>,
-    /// Of length 1.
+    /// The axis, of length 1.
     pub axis: Vector3<f64>,
-    /// Position that the joint has in the pose of the file, rad or m.
+    /// Position of the joint in the pose of the file, rad or m.
     pub reference: f64,
-    /// Without its torque.
+    /// Its limits without the torque.
     pub limit: JointLimit,
-    /// The largest torque (Nm, or N) that actuators together may have; infinite without a limit.
+    /// Largest torque, Nm, or force, N, of all its actuators together; infinite without a limit.
     pub effort: f64,
     pub dynamics: Dynamics,
     /// Rotor inertia at the joint, kg m².
     pub armature_kg_m2: f64,
-    /// What else it has.
+    /// Properties that an arm does not have.
     pub left_out: Vec<LeftOut>,
 }
 
 impl Joint {
-    /// From an element with the defaults of its class, in a `frame` of the body.
+    /// Reads a joint element with the defaults of its class, in a `frame` of the body.
     pub(super) fn of(
         joint: &Element,
         frame: &Placement,
@@ -52,7 +52,7 @@ impl Joint {
         let is_single = matches!(kind, JointType::Revolute | JointType::Prismatic);
         let pos = joint.numbers::<3>("pos")?.unwrap_or_default();
         let anchor_m = match kind {
-            // It has no place of its own.
+            // A free joint has no position of its own.
             JointType::Floating => Vector3::zeros(),
             _ => frame.rotation * Vector3::from(pos) + frame.translation_m,
         };
@@ -87,7 +87,7 @@ impl Joint {
             limit: JointLimit { lower: lower * unit, upper: upper * unit, ..JointLimit::default() },
             effort: effort.map_or(f64::INFINITY, smaller),
             dynamics: Dynamics {
-                // What MuJoCo works out by the time constant counts instead of what is written.
+                // MuJoCo replaces the written damping by what follows from the time constant.
                 damping: if is_tuned { 0.0 } else { damping[0] },
                 friction: joint.not_negative("frictionloss")?,
             },
@@ -97,7 +97,7 @@ impl Joint {
         })
     }
 
-    /// What the joint does to the body, about its anchor, between the pose of the file and zero.
+    /// Motion of the body, about the anchor of the joint, from the pose of the file to the zero position of the joint.
     pub(super) fn at_zero(&self) -> Placement {
         match self.kind {
             JointType::Revolute if self.reference != 0.0 => {
@@ -110,7 +110,8 @@ impl Joint {
     }
 }
 
-/// What a range of forces allows in both directions: the smaller of its ends, or the only one.
+/// The force that a range allows in both directions: the smaller absolute value of its ends, or the only one that is
+/// not zero.
 pub(super) fn smaller([lower, upper]: [f64; 2]) -> f64 {
     match (lower.abs(), upper.abs()) {
         (0.0, one) | (one, 0.0) => one,

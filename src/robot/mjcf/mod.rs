@@ -1,11 +1,12 @@
 //! Arms from MJCF files, MuJoCo's own format.
 //!
-//! Enters: the text of an MJCF, the folder in which the files lie that it includes, and where the arm is a part of a robot the
-//! name of its last body. Leaves: a [`MjcfArm`]: the [`Arm`](super::Arm), the named frames on its bodies, and a list of what
-//! was assumed or left out; or a [`MjcfFault`] that says what is wrong, where, and what to do.
+//! Input: the text of an MJCF, the folder of the files that it includes, and, where the arm is part of a larger robot,
+//! the name of its last body. Output: a [`MjcfArm`], which holds the [`Arm`](super::Arm), the named frames on its
+//! bodies, and a list of what was assumed or left out; or a [`MjcfFault`] that says what is wrong, where, and what to
+//! do about it.
 //!
-//! Bodies become the links, joints the joints of a robot as a URDF describes one: which of them are the arm's, which are locked
-//! and what belongs to one moving body is decided where this is decided for URDFs.
+//! Bodies and joints of the MJCF are converted into links and joints of a URDF robot. The code for URDFs then decides
+//! which joints are the arm's, which are locked, and what belongs to one moving body.
 
 mod actuator;
 mod body;

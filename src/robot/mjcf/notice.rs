@@ -1,69 +1,69 @@
-//! What was assumed or left out in reading an MJCF, beside what is told of URDFs too.
+//! Notices about what was assumed or left out in reading an MJCF, in addition to those that URDFs have too.
 
 use std::fmt;
 
 use crate::robot::urdf::listed;
 
-/// Something that MJCF says and an arm does not have, or the other way round.
+/// Something that an MJCF says and an arm does not have, or the other way round.
 #[derive(Debug, Clone, PartialEq)]
 pub enum MjcfNotice {
     /// The file switches gravity off.
     Weightless,
-    /// Bodies move in something that drags at them.
+    /// Bodies move in a medium that drags at them.
     Medium,
-    /// Bodies that are held together beside the joints: the arm is read as if they were not.
+    /// Bodies that are connected by more than joints; the arm is read without these connections.
     Loops {
-        /// How many.
+        /// Number of such connections.
         count: usize,
     },
     /// Something about joints that is no part of an [`Arm`](crate::robot::Arm).
     LeftOut {
-        /// What.
+        /// What is left out.
         what: LeftOut,
         /// The joints that have it.
         joints: Vec<String>,
     },
     /// Free joints are taken as locked.
     FreeJoints {
-        /// These.
+        /// The joints.
         joints: Vec<String>,
     },
-    /// Sites that are called as a body is: the name is the body's.
+    /// Sites with the same name as a body; the name then means the body.
     Namesakes {
-        /// These.
+        /// The sites.
         sites: Vec<String>,
     },
     /// Tendons that act on joints of the arm.
     Tendons {
-        /// These.
+        /// The tendons.
         tendons: Vec<String>,
     },
-    /// Actuators that do not drive one joint, but push at a site that moves with the arm.
+    /// Actuators that do not drive one joint, but pull or push at a site that moves with the arm.
     SiteActuators {
-        /// These.
+        /// The actuators.
         actuators: Vec<String>,
     },
-    /// Bodies whose weight MuJoCo takes away.
+    /// Bodies whose weight MuJoCo compensates.
     GravityCompensation {
-        /// These.
+        /// The bodies.
         bodies: Vec<String>,
     },
 }
 
-/// What joints have in MJCF, and not in an [`Arm`](crate::robot::Arm).
+/// Properties that joints have in an MJCF, but not in an [`Arm`](crate::robot::Arm).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LeftOut {
     /// A spring.
     Stiffness,
-    /// A spring and a damper, by the time constant that they have together.
+    /// A spring and a damper, given by their common time constant.
     SpringDamper,
     /// Damping that grows faster than the speed.
     HigherDamping,
-    /// Friction that a flag disables.
+    /// Friction that a `<flag>` disables.
     SwitchedOff,
     /// A joint that an `<equality>` holds in its place.
     Held,
-    /// A joint that follows another on a curve.
+    /// A joint that follows another along a curve.
     Curve,
 }
 

@@ -1,4 +1,4 @@
-//! What a file says of the physics that it is simulated with: its `<option>`.
+//! Physics settings of a file: its `<option>`.
 
 use nalgebra::Vector3;
 use urdf_rs::Robot;
@@ -7,15 +7,15 @@ use super::element::Element;
 use super::fault::MjcfFault;
 use super::notice::LeftOut;
 
-/// Gravity where a file gives none, in the world, m/s²: MuJoCo's own.
+/// MuJoCo's default gravity, in the world frame, m/s².
 const USUAL_GRAVITY_M_S2: [f64; 3] = [0.0, 0.0, -9.81];
 
 /// The settings that matter to an arm.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Options {
-    /// In the world, m/s².
+    /// Gravity in the world frame, m/s².
     pub gravity_m_s2: Vector3<f64>,
-    /// Whether bodies move in something that drags at them.
+    /// Whether bodies move in a medium that drags at them.
     pub has_medium: bool,
     /// Whether damping is switched off.
     is_undamped: bool,
@@ -35,7 +35,7 @@ impl Default for Options {
 }
 
 impl Options {
-    /// What all `<option>` of a file say together.
+    /// The combined settings of all `<option>` elements of a file.
     pub(super) fn of(root: &Element) -> Result<Self, MjcfFault> {
         let usual = Self::default();
         let Some(said) = root.settings("option") else { return Ok(usual) };
@@ -52,12 +52,12 @@ impl Options {
             has_medium: said.not_negative("density")? > 0.0
                 || said.not_negative("viscosity")? > 0.0,
             is_undamped: is_off("damper"),
-            // In MuJoCo dry friction is one of the constraints.
+            // In MuJoCo, dry friction is one of the constraints.
             is_without_dry_friction: is_off("frictionloss") || is_off("constraint"),
         })
     }
 
-    /// Takes from the joints what is switched off, and tells which of them had it.
+    /// Sets damping and dry friction that are switched off to zero, and returns the joints that had any.
     pub(super) fn switch_off(&self, robot: &mut Robot) -> Vec<(LeftOut, String)> {
         let mut had = Vec::new();
         for joint in &mut robot.joints {

@@ -1,4 +1,4 @@
-//! Where an element stands, and how it is turned.
+//! Position and orientation of an element.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -7,10 +7,10 @@ use super::element::{Element, ORIENTATIONS};
 use super::fault::MjcfFault;
 use crate::robot::arm::{Placement, snap};
 
-/// Shorter vectors have no direction; MuJoCo's own bound.
+/// Vectors up to this length have no direction; MuJoCo's own bound.
 const SHORTEST: f64 = 1e-15;
 
-/// `pos` and whatever gives the orientation, in the frame around the element.
+/// The pose from `pos` and the orientation attribute, in the frame of the parent element.
 pub(super) fn pose(element: &Element, compiler: &Compiler) -> Result<Placement, MjcfFault> {
     let pos = element.numbers::<3>("pos")?.unwrap_or_default();
     Ok(Placement { rotation: rotation(element, compiler)?, translation_m: pos.into() })
@@ -21,7 +21,7 @@ pub(super) fn shift(translation_m: Vector3<f64>) -> Placement {
     Placement { translation_m, ..Placement::identity() }
 }
 
-/// The vector with length 1.
+/// The vector scaled to length 1.
 pub(super) fn direction(
     element: &Element,
     attribute: &'static str,
@@ -83,7 +83,7 @@ pub(super) fn about(axis: Vector3<f64>, angle_rad: f64) -> Matrix3<f64> {
     Matrix3::identity() * cos + axis.cross_matrix() * sin + axis * axis.transpose() * (1.0 - cos)
 }
 
-/// From w, x, y, z, of any length: those of whole numbers give exact matrices.
+/// The rotation of the quaternion w, x, y, z of any length: quaternions of whole numbers give exact matrices.
 fn from_quaternion([w, x, y, z]: [f64; 4]) -> Matrix3<f64> {
     let length_squared = w * w + x * x + y * y + z * z;
     Matrix3::new(
@@ -99,19 +99,19 @@ fn from_quaternion([w, x, y, z]: [f64; 4]) -> Matrix3<f64> {
     ) / length_squared
 }
 
-/// The smallest rotation that takes ẑ to a unit vector, and half a turn about x where that is −ẑ, as in MuJoCo.
+/// The smallest rotation that takes ẑ to a unit vector, and a half turn about x for −ẑ, as in MuJoCo.
 pub(super) fn from_z(to: Vector3<f64>) -> Matrix3<f64> {
     if to.x.hypot(to.y) <= SHORTEST {
         return Matrix3::from_diagonal(&Vector3::new(1.0, to.z.signum(), to.z.signum()));
     }
-    // The axis is ẑ × to; 1 + cos and sin of the angle are in the ratio of cos and sin of its half.
+    // The axis is ẑ × to; 1 + cos and sin of the angle have the ratio of cos and sin of half the angle.
     from_quaternion([1.0 + to.z, -to.y, to.x, 0.0])
 }
 
-/// Roll, pitch and yaw (fixed axes) that give the rotation back to the last digits.
+/// Roll, pitch and yaw (fixed axes), from which the rotation is recovered to the last digits.
 ///
-/// At a pitch of a right angle only the sum or difference of the other two is known: roll is what is left
-/// when yaw, whatever it is, was taken away.
+/// At a pitch of ±π/2 only the sum or the difference of roll and yaw is determined: roll is computed from what remains
+/// of the rotation after yaw, whatever its value, is removed.
 pub(super) fn rpy_rad(r: &Matrix3<f64>) -> [f64; 3] {
     let pitch = (-r[(2, 0)]).atan2(r[(0, 0)].hypot(r[(1, 0)]));
     let yaw = r[(1, 0)].atan2(r[(0, 0)]);

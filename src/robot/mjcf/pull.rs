@@ -1,4 +1,4 @@
-//! What moves joints and is not read: tendons, and actuators at sites.
+//! Tendons and actuators at sites, which act on joints but are not read.
 
 use super::compiler::Compiler;
 use super::defaults::{ACTUATORS, Defaults};
@@ -8,22 +8,22 @@ use super::fault::MjcfFault;
 use super::joint::POWERS;
 use super::notice::MjcfNotice;
 
-/// Something that pulls, and at what.
+/// Something that pulls, and the joints and sites at which it pulls.
 struct Pull {
-    /// Its name, or where it stands.
+    /// Its name, or its place in the file.
     name: String,
     joints: Vec<String>,
     sites: Vec<String>,
 }
 
-/// All of a file that pulls at joints without being an actuator of one of them.
+/// Everything in a file that pulls at joints without being an actuator of one of them.
 pub(super) struct Pulls {
     tendons: Vec<Pull>,
     actuators: Vec<Pull>,
 }
 
 impl Pulls {
-    /// Those of a file.
+    /// Collects them from a file.
     pub(super) fn of(
         root: &Element,
         compiler: &Compiler,
@@ -58,7 +58,7 @@ impl Pulls {
         Ok(Self { tendons, actuators })
     }
 
-    /// What is to be told of those that pull at one of the arm's joints, or at a site that moves with it.
+    /// Notices about those that pull at one of the arm's joints, or at a site that moves with the arm.
     pub(super) fn notices(
         &self,
         is_joint: impl Fn(&str) -> bool,
@@ -84,17 +84,18 @@ impl Pulls {
     }
 }
 
-/// A name, or the place of what has none.
+/// The name of an element, or its place if it has none.
 fn name(element: &Element) -> String {
     element.text("name").map_or_else(|| element.place(), str::to_owned)
 }
 
-/// Those of the attributes that are there.
+/// The values of those attributes that are given.
 fn attributes(element: &Element, names: &[&str]) -> Vec<String> {
     names.iter().filter_map(|name| element.text(name)).map(str::to_owned).collect()
 }
 
-/// Whether a tendon pulls without anything that drives or holds it; one that does not may be there to measure.
+/// Whether a tendon acts on its joints without anything that drives or constrains it; one that does not may serve as a
+/// sensor.
 fn pulls_itself(tendon: &Element, compiler: &Compiler) -> Result<bool, MjcfFault> {
     for attribute in ["stiffness", "damping"] {
         let powers = tendon.up_to(attribute, POWERS)?.unwrap_or_default();

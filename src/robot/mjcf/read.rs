@@ -1,4 +1,4 @@
-//! From the text of an MJCF to an [`Arm`].
+//! Reading of an MJCF into an [`Arm`].
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -25,46 +25,50 @@ use crate::robot::urdf::{Frames, UrdfArm, UrdfLink, UrdfNotice, arm_of, moving_l
 pub struct MjcfArm {
     /// The arm.
     pub arm: Arm,
-    /// Bodies without mass, and named sites.
+    /// Named frames: bodies without mass, and named sites.
     pub frames: Frames,
-    /// What was assumed, merged or left out, in words by `Display`.
+    /// Everything that was assumed, merged or left out; `Display` puts each into words.
     pub notices: Vec<UrdfNotice>,
-    /// Files that were included.
+    /// Included files.
     pub included: Vec<PathBuf>,
     /// Mesh files of collision shapes that were read.
     pub meshes: Vec<PathBuf>,
 }
 
-/// Reads the text of an MJCF; `source` names it in messages, and is where included files are looked for.
+/// Reads the text of an MJCF; `source` names it in messages, and included files are searched for from its folder.
 ///
-/// What becomes of the file is what becomes of a URDF ([`read_urdf`](crate::robot::read_urdf)), but for this:
+/// The file is interpreted like a URDF ([`read_urdf`](crate::robot::read_urdf)), with these differences:
 ///
-/// - **Base frame**: the world. Gravity is that of `<option>`. What its `<flag>` disables is 0: gravity, damping, dry friction.
-/// - **Joints**: hinges; free joints are locked where the file has them. `ref` is the position in the pose of the file; an axis that does
-///   not go through the body's origin is one of the joint's frame, whose origin is `pos`. Joints without a name are called after their body
-///   (`BODY_joint`, with a number where another joint is called so). A joint that an `<equality>` makes follow another is what a mimic
-///   joint is there.
-/// - **Bodies** are links; their inertia is that of `<inertial>`, or of geoms that are primitive solids, as `<compiler>` says.
-///   Named sites are frames, as bodies without mass are.
-/// - **Drives**: `armature` is the rotor inertia, `damping` rv, `frictionloss` rc. The torque limit is the joint's
-///   `actuatorfrcrange`, or what its actuators give where that is less: `gear` times the `forcerange`, or of a motor the `ctrlrange` where
-///   that is less. `armature` and `damping` of actuators count as well, times `gear`².
-/// - **Default classes**, `childclass`, `<include>`, `<frame>`, and the ways to write orientations are as in MuJoCo. Copies
-///   (`<replicate>`), attached models, deformable bodies and the mass of meshes on moving bodies are refused.
-/// - **Collision shapes** are the geoms with a `contype` or `conaffinity`, those of the world too, but for planes and height fields.
-/// - Contacts, drag of the medium, tendons, sensors, keyframes, and what is only seen are not read.
+/// - **Base frame**: the world. Gravity is that of `<option>`. Gravity, damping and dry friction are 0 if a `<flag>`
+///   disables them.
+/// - **Joints**: hinges; free joints are locked where the file has them. `ref` is the position of a joint in the pose
+///   of the file. The frame of a joint has its origin at `pos`, so that the axis need not go through the origin of the
+///   body. Joints without a name are called after their body (`BODY_joint`, with a number if another joint has that
+///   name). A joint that an `<equality>` makes follow another is treated like a mimic joint of a URDF.
+/// - **Bodies** are links. Their inertia is that of `<inertial>` or of geoms that are primitive solids, as `<compiler>`
+///   says. Named sites become frames, as bodies without mass do.
+/// - **Drives**: `armature` is the rotor inertia, `damping` is rv, `frictionloss` is rc. The torque limit is the
+///   smaller of the joint's `actuatorfrcrange` and the limit of its actuators: `gear` times the `forcerange`, or for a
+///   motor times the `ctrlrange` if that is smaller. `armature` and `damping` of actuators are added, times `gear`².
+/// - **Default classes**, `childclass`, `<include>`, `<frame>` and the ways to give orientations are as in MuJoCo.
+///   Copies (`<replicate>`), attached models, deformable bodies and the mass of meshes on moving bodies are refused.
+/// - **Collision shapes** are the geoms with a `contype` or `conaffinity`, including those of the world, except planes
+///   and height fields.
+/// - Contacts, drag of the medium, tendons, sensors, keyframes and visual geometry are not read.
 ///
 /// # Errors
-/// [`RobotError::Mjcf`] where it is no MJCF, or not one of a serial arm of physically possible bodies.
+///
+/// [`RobotError::Mjcf`] if the text is not an MJCF, or not one of a serial arm of physically possible bodies.
 pub fn read_mjcf(text: &str, source: &str) -> Result<MjcfArm, RobotError> {
     read(text, source, None).map_err(|fault| RobotError::Mjcf { file: source.to_owned(), fault })
 }
 
-/// As [`read_mjcf`], of an arm that ends with the body (or site) `last_body`, whatever else is in the file, as
+/// As [`read_mjcf`], for an arm that ends with the body (or site) `last_body`, whatever else is in the file, as
 /// [`read_urdf_up_to`](crate::robot::read_urdf_up_to) does.
 ///
 /// # Errors
-/// As [`read_mjcf`], and where there is no such body, or what moves it are not hinges of their own.
+///
+/// As [`read_mjcf`]; also if there is no such body, or if a joint that moves it is not a hinge, or follows another.
 pub fn read_mjcf_up_to(text: &str, source: &str, last_body: &str) -> Result<MjcfArm, RobotError> {
     read(text, source, Some(last_body))
         .map_err(|fault| RobotError::Mjcf { file: source.to_owned(), fault })
@@ -106,7 +110,7 @@ fn read(text: &str, source: &str, last_body: Option<&str>) -> Result<MjcfArm, Mj
     Ok(MjcfArm { arm, frames, notices, included, meshes })
 }
 
-/// Gives the links their inertia. What never moves needs none, so that what is wrong with it does not matter.
+/// Gives the links their inertia. Links that never move need none, so that a fault in their inertia does not matter.
 fn give_inertias(
     bodies: &mut Bodies<'_>,
     source: &str,
@@ -122,12 +126,12 @@ fn give_inertias(
             }
         }
     }
-    // Links that are proposed as the last one of an arm are tried, for which they need their inertia.
+    // The links need their inertia before this call, which tries the arms that end with links to be proposed.
     let moving = moving_links(&bodies.robot, source, last_body).map_err(MjcfFault::Arm)?;
     moving.iter().find_map(|link| faults.remove(link)).map_or(Ok(()), Err)
 }
 
-/// What is to be told of an MJCF: of what was `noticed` as of a URDF that which holds, and its own.
+/// The notices about an MJCF: those `noticed` while it was read like a URDF that also hold for an MJCF, and its own.
 fn told(
     noticed: Vec<UrdfNotice>,
     arm: &Arm,

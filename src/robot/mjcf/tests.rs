@@ -19,12 +19,12 @@ use crate::robot::{Arm, FixedFrame, Frames, Placement, RobotError, UrdfNotice, r
 const BODY: &str = r#"<inertial pos="0.1 0 0" mass="2" diaginertia="0.01 0.02 0.025"/>"#;
 const RADIAN: &str = r#"<compiler angle="radian"/>"#;
 
-/// Sections ahead of the world, and what is in it.
+/// A model with `sections` ahead of the world, and `world` in it.
 fn model(sections: &str, world: &str) -> String {
     format!(r#"<mujoco model="toy">{sections}<worldbody>{world}</worldbody></mujoco>"#)
 }
 
-/// The same with one body, its attributes, and what is in it.
+/// A model with one body, its attributes, and the elements `inside` it.
 fn one(sections: &str, body: &str, inside: &str) -> String {
     model(sections, &format!(r#"<body name="a" {body}>{inside}</body>"#))
 }
@@ -43,7 +43,7 @@ fn fault(text: &str) -> MjcfFault {
     }
 }
 
-/// The text of the fault names all of `parts`.
+/// Asserts that the text of the fault contains all of `parts`.
 fn says(text: &str, parts: &[&str]) {
     let message = fault(text).to_string();
     for part in parts {
@@ -51,7 +51,7 @@ fn says(text: &str, parts: &[&str]) {
     }
 }
 
-/// Where the frame of the only joint is.
+/// Pose of the frame of the only joint.
 fn placement(text: &str) -> Placement {
     read(text).arm.joints[0].placement
 }
@@ -110,7 +110,8 @@ fn a_plain_chain_is_the_arm_of_the_same_urdf() {
     assert_eq!(standing.count(), 1);
 }
 
-/// Angles of the quaternion and back, moments through the centre of mass: a few units of round-off each.
+/// Conversions of the quaternion to angles and back, and of moments to the centre of mass and back, cost a few units of
+/// round-off each.
 #[test]
 fn an_arm_written_as_mjcf_reads_back_as_the_same_arm() {
     let frame = |name: &str, body, xyz, rpy| FixedFrame {
@@ -185,7 +186,7 @@ fn orientations_are_what_mujoco_calls_so() {
 }
 
 proptest! {
-    /// Also where pitch is a right angle, and next to it.
+    /// Also for a pitch of π/2 and close to it.
     #[test]
     fn angles_give_their_rotation_back(
         roll in -PI..PI,
@@ -211,7 +212,7 @@ proptest! {
     }
 }
 
-/// The body turns about an axis beside its origin: its own frame goes round.
+/// The body turns about an axis beside its origin, so that its own frame moves on a circle.
 #[test]
 fn a_joint_beside_the_origin_of_its_body_has_its_frame_there() {
     let text = one(
@@ -228,7 +229,7 @@ fn a_joint_beside_the_origin_of_its_body_has_its_frame_there() {
     assert_abs_diff_eq!(turned.translation_m, Vector3::new(1.2, 0.2, 0.0), epsilon = 1e-15);
 }
 
-/// The pose of the file is that at `ref`.
+/// The pose of the file is that with each joint at its `ref`.
 #[test]
 fn a_joint_has_its_reference_position_in_the_pose_of_the_file() {
     let joint = r#"<joint axis="0 0 2" ref="45" range="-90 60"/>"#;
@@ -281,8 +282,8 @@ fn the_torque_limit_is_the_least_of_the_joints_and_its_actuators() {
     assert_eq!(of("", two), 10.0);
 }
 
-/// What turns with the motor is felt at the joint times the square of the gear: MuJoCo 4.0 moves this one as if it had 1.02 kg m² and
-/// 10.5 Nm s/rad.
+/// Inertia and damping on the motor side act at the joint times the square of the gear ratio: MuJoCo 4.0 moves this
+/// joint as if it had 1.02 kg m² and 10.5 Nm s/rad.
 #[test]
 fn rotors_and_dampers_of_actuators_count() {
     let sections =
@@ -328,7 +329,8 @@ fn rotors_friction_and_gravity_are_read() {
     assert!(notices.contains(&weightless));
 }
 
-/// Own attributes before those of the class, that before the class around it; `childclass` where there is no `class`.
+/// An element's own attributes override those of its class, which override those of the class around it; `childclass`
+/// applies where there is no `class`.
 #[test]
 fn classes_inherit_and_are_overridden() {
     let sections = r#"<default>
@@ -359,7 +361,8 @@ fn what_is_in_a_frame_moves_with_it() {
         format!(r#"<frame pos="0 0 1" euler="90 0 0"><joint name="j" pos="0 1 0"/>{BODY}</frame>"#);
     let MjcfArm { arm, .. } = read(&one("", "", &inside));
     let joint = &arm.joints[0];
-    // (0, 1, 0) of the frame is (0, 0, 2) of the body, its z axis −y; the joint's z axis is that.
+    // (0, 1, 0) in the frame is (0, 0, 2) in the body; the frame's z axis, which is that of the joint, is −y in the
+    // body.
     let origin = joint.placement.translation_m;
     assert_abs_diff_eq!(origin, Vector3::new(0.0, 0.0, 2.0), epsilon = 1e-15);
     let axis = joint.placement.rotation * Vector3::z();

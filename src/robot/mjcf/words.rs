@@ -1,8 +1,8 @@
-//! What keeps bodies and joints from being an arm, in the words of MJCF: the checks are those of URDFs.
+//! Faults of the conversion into an arm, in the terms of MJCF: the checks themselves are those for URDFs.
 
 use crate::robot::urdf::{Obstacle, UrdfFault, listed};
 
-/// The message of a fault that was found in the bodies and joints of an MJCF.
+/// The message for a fault that was found in the bodies and joints of an MJCF.
 pub(super) fn arm_fault(fault: &UrdfFault) -> String {
     match fault {
         UrdfFault::Duplicate { kind: "link", name } => {

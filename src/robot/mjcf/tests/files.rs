@@ -1,4 +1,4 @@
-//! Files that belong to each other, and what is wrong with them.
+//! Included files and files beside the MJCF, and their faults.
 
 use super::{BODY, model, one, says};
 use crate::robot::export::urdf;
@@ -71,7 +71,7 @@ fn bad_input_is_told_with_its_place() {
     says(&model("", &deep), &["nested too deeply"]);
 }
 
-/// By what is in it, not by how it is called.
+/// The content decides, not the extension.
 #[test]
 fn an_xml_that_is_a_urdf_is_read_as_one() {
     let folder = tempfile::tempdir().unwrap();
@@ -83,7 +83,7 @@ fn an_xml_that_is_a_urdf_is_read_as_one() {
     assert!(!loaded.urdf_links.is_empty());
 }
 
-/// What lies beside the file knows better.
+/// The drive file beside the MJCF takes precedence.
 #[test]
 fn a_drive_file_comes_before_the_mjcf() {
     let folder = tempfile::tempdir().unwrap();

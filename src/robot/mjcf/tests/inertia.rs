@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::{BODY, model, one, read, says};
 use crate::robot::mjcf::MjcfArm;
 
-/// Mass and the moments about the centre of mass, across and along the axis of symmetry.
+/// Mass, centre of mass, and the inertia tensor about it of a geom.
 fn solid(geom: &str) -> (f64, Vector3<f64>, Matrix3<f64>) {
     let link = read(&one("", "", &format!("<joint/><geom {geom}/>"))).arm.joints[0].link;
     (link.mass_kg(), link.com_m().unwrap(), link.inertia_com_kg_m2().unwrap())
@@ -33,7 +33,8 @@ fn solids_have_the_moments_of_the_textbook() {
     says(&one("", "", r#"<joint/><geom type="cone" size="1"/>"#), &["type=\"cone\"", "capsule"]);
 }
 
-/// Against the sum over slices: a half sphere, a cylinder, a half sphere. The midpoint rule with 20 000 slices is good to 1e-7.
+/// Compares with a sum over slices of hemisphere, cylinder and hemisphere. The midpoint rule with 20 000 slices is
+/// accurate to 1e-7.
 #[test]
 fn a_capsule_between_two_points_has_the_moments_of_its_slices() {
     let (from, to) = (Vector3::new(0.1, 0.0, 0.2), Vector3::new(0.1, 0.3, 0.6));
@@ -89,7 +90,7 @@ fn bounds_of_moments_are_kept() {
     assert!((central - Matrix3::identity() * mean).amax() < 1e-14, "{central}");
 }
 
-/// A mesh without mass of its own is of no concern, nor is one on a body that stands.
+/// A massless mesh does not matter, nor does a mesh on a body that stands still.
 #[test]
 fn only_a_mesh_that_moves_needs_an_inertial() {
     let mesh = r#"<geom type="mesh" mesh="m"/>"#;

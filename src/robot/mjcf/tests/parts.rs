@@ -1,4 +1,4 @@
-//! Arms that are a part of what is in a file, and joints that are not an arm's.
+//! Arms that are part of a larger model, and joints that are not an arm's.
 
 use approx::assert_abs_diff_eq;
 use nalgebra::{Matrix3, Vector3};
@@ -71,7 +71,7 @@ fn what_is_free_is_locked_where_it_is() {
 fn two_joints_of_one_body_have_nothing_between_them() {
     let text = one("", "", &format!(r#"<joint name="j"/><joint name="k" axis="0 1 0"/>{BODY}"#));
     says(&text, &["a behind j", "joint \"j\"", "give each joint a body"]);
-    // Locked, they are two turns about their axes, the second of which is as far from the first as the file says.
+    // Locked, they are two rotations about their axes, at the distance that the file gives these.
     let wrist = r#"<joint name="k" axis="0 1 0" pos="0 0 0.1" ref="90"/><joint name="l" axis="1 0 0" pos="0 0.2 0"/>"#;
     let hand = format!(r#"<body name="b" pos="1 0 0">{wrist}{BODY}<site name="tip"/></body>"#);
     let text = one("", "", &format!(r#"<joint name="j"/>{BODY}{hand}"#));
@@ -104,7 +104,7 @@ fn what_an_arm_does_not_have_is_told() {
     says(&arm, &["joint \"j\" follows \"k\" by an <equality>"]);
 }
 
-/// MuJoCo has no name for such a joint, so that none of its names is taken.
+/// MuJoCo leaves such a joint unnamed, so its generated name must not be that of any other joint.
 #[test]
 fn a_joint_without_a_name_is_called_as_no_other() {
     let hand = format!(r#"<body name="b"><joint name="a_joint"/>{BODY}</body>"#);
@@ -144,7 +144,7 @@ fn a_name_that_a_site_has_too_is_the_bodys() {
     assert!(notices.contains(&UrdfNotice::Mjcf(notice)));
 }
 
-/// Its frame as MuJoCo 4.0 prints it: in the middle, z from the second point to the first.
+/// The frame as MuJoCo 4.0 prints it: the origin in the middle, z from the second point to the first.
 #[test]
 fn a_site_between_two_points_has_its_frame_in_the_middle() {
     let site = r#"<site name="s" type="capsule" size="0.01" fromto="0 0 0 0.1 0.3 0.2"/>"#;

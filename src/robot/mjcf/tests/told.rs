@@ -1,15 +1,15 @@
-//! What is told of an MJCF beside its arm.
+//! Notices about an MJCF.
 
 use super::{BODY, MjcfArm, one, read};
 use crate::robot::mjcf::read_mjcf_up_to;
 
-/// The lines that are told, with `sections` ahead of the world and the attributes of the joint "j".
+/// The notices about a model with `sections` ahead of the world and these attributes of the joint "j".
 fn told(sections: &str, joint: &str) -> Vec<String> {
     let text = one(sections, "", &format!("{BODY}<joint name=\"j\" {joint}/>"));
     read(&text).notices.iter().map(ToString::to_string).collect()
 }
 
-/// A joint of MuJoCo Menagerie's UR5e: with π rad/s, which are assumed, 628 Nm.
+/// A joint of MuJoCo Menagerie's UR5e: at the assumed speed limit of π rad/s, its damping would take 628 Nm.
 #[test]
 fn damping_that_a_drive_could_not_carry_is_told() {
     let servo = r#"<actuator><position joint="j" kp="3500" forcerange="-150 150"/></actuator>"#;
@@ -37,7 +37,7 @@ fn damping_that_mujoco_works_out_itself_is_told() {
     assert!(lines.iter().any(is_told), "{lines:?}");
 }
 
-/// What MuJoCo 4.0 makes of these flags; of dry friction `constraint` takes away as much as its own.
+/// As in MuJoCo 4.0: the flag `constraint` disables dry friction as much as its own flag does.
 #[test]
 fn what_flags_disable_is_zero_and_told() {
     let of = |flags: &str, joint: &str| {
