@@ -1,6 +1,6 @@
 //! Numbers for people to read: with as many digits as are meaningful.
 
-/// Written where there is no finite number.
+/// Text in place of a number that is not finite.
 pub const NONE: &str = "—";
 
 /// `value` with `digits` significant digits: `0.01234`, `1234`, `1.23e-7`.

@@ -144,7 +144,7 @@ fn fill(file: &File, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io
     buffer.flush()
 }
 
-/// What a path leads to.
+/// The kind of object that a path leads to.
 enum Target {
     /// A regular file that exists or can be created; links are followed, so that a link stays a link.
     File { path: PathBuf, permissions: Option<fs::Permissions> },
@@ -220,7 +220,7 @@ impl Partial {
 
 impl Drop for Partial {
     fn drop(&mut self) {
-        // After a rename there is nothing left to remove.
+        // After a rename this finds no file to remove.
         let _ = fs::remove_file(&self.path);
     }
 }

@@ -13,7 +13,7 @@ use sha2::{Digest, Sha256};
 /// Separates these keys from any other use of the hash, and each version of this scheme from the next.
 const DOMAIN: &[u8] = b"armid/random/1";
 
-/// What a stream of random numbers is for.
+/// The purpose of a stream of random numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Channel {
     /// Error of the position reading.

@@ -188,7 +188,7 @@ pub enum MjcfFault {
     Unread {
         /// The element.
         place: String,
-        /// Such as "copies (replicate) are".
+        /// What is not read, with its verb, such as "copies are".
         what: &'static str,
     },
     /// A moving body whose inertia would have to come from a mesh.

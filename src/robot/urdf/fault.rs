@@ -36,7 +36,7 @@ pub enum UrdfFault {
     ClosedChain {
         /// The link at which the chain closes.
         link: String,
-        /// One joint that leads there.
+        /// One joint that leads to it.
         first: String,
         /// The other.
         second: String,
@@ -121,7 +121,7 @@ pub enum UrdfFault {
     NotFinite {
         /// Link or joint.
         place: String,
-        /// What.
+        /// The quantity.
         quantity: &'static str,
         /// The value.
         value: f64,
@@ -131,7 +131,7 @@ pub enum UrdfFault {
     Negative {
         /// Link or joint.
         place: String,
-        /// What.
+        /// The quantity.
         quantity: &'static str,
         /// The value.
         value: f64,

@@ -26,7 +26,7 @@ fn damping_that_a_drive_could_not_carry_is_told() {
     assert!(!is_told("", r#"damping="200""#));
 }
 
-/// MuJoCo 4.0 gives this joint 1.38 Nm s/rad and 1.38 Nm/rad instead of what is written.
+/// MuJoCo 4.0 gives this joint 1.38 Nm s/rad and 1.38 Nm/rad instead of the written values.
 #[test]
 fn damping_that_mujoco_works_out_itself_is_told() {
     let joint = r#"armature="0.3" damping="7" stiffness="3" springdamper="0.5 1""#;
