@@ -1,29 +1,29 @@
-//! What became of every row of a file.
+//! The account of every row of a file: used, or set aside and why.
 
 use std::fmt;
 
 /// Why a row was not used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Reason {
-    /// The last line has no line end, so its last value may be cut short.
+    /// The last line does not end in a newline, so its last value may be cut short.
     CutShort,
     /// Fewer fields than the other rows.
     TooFewFields,
     /// More fields than the other rows.
     TooManyFields,
-    /// A field that is needed is empty.
+    /// A required field is empty.
     EmptyField,
-    /// A field that is needed is no number.
+    /// A required field is not a number.
     NotANumber,
-    /// NaN or infinite.
+    /// A required field is NaN or infinite.
     NotFinite,
-    /// A number beyond what the quantity can be (see [`super::read_log`] for the bounds).
+    /// A number that the quantity cannot have (see [`super::read_log`] for the bounds).
     Implausible,
     /// The same time as the row before.
     TimeRepeated,
-    /// A time before that of the row before.
+    /// A time earlier than that of the row before.
     TimeBackwards,
-    /// A time far ahead of the rows before and behind, alone or with a few others.
+    /// A time far ahead of the rows before and after it, in one row or a few consecutive ones.
     TimeAhead,
     /// Positions that do not follow from the neighbouring rows' positions and velocities.
     Inconsistent,
@@ -47,7 +47,7 @@ impl Reason {
         }
     }
 
-    /// What to look at when every row of a file falls to this reason.
+    /// The advice given when this reason rules out most rows of a file.
     pub(super) fn advice(self) -> &'static str {
         match self {
             Self::CutShort => "copy the file again",
@@ -81,42 +81,44 @@ pub struct SetAside {
     pub reason: Reason,
     /// How many rows.
     pub count: usize,
-    /// The first of them, numbered as in the file (from 1, header and blank lines counted).
+    /// The first of these rows, numbered as in the file (from 1, header and blank lines counted).
     pub first_row: usize,
-    /// The value met in that row.
+    /// The offending value in that row.
     pub example: String,
 }
 
 /// Something a reader of the results should know about a log that could be read.
 #[derive(Debug, Clone, PartialEq)]
 pub enum LogWarning {
-    /// Rows that the recorder should have written and did not.
+    /// The recorder left out rows.
     MissedSamples {
-        /// Rows missing.
+        /// Number of rows missing.
         missed: usize,
-        /// Number of gaps they are missing in.
+        /// Number of gaps in which they are missing.
         gaps: usize,
         /// The longest step of time, s.
         longest_s: f64,
         /// The row before the longest step.
         after_row: usize,
     },
-    /// Time stamps that are coarser than half of what rows are apart: evenly recorded rows are put on the line through them.
+    /// Time stamps are rounded more coarsely than half the sampling interval; evenly sampled rows are put on the
+    /// straight line through their stamps.
     RoundedStamps {
-        /// What they are rounded to, s.
+        /// Resolution of the stamps, s.
         resolution_s: f64,
-        /// Rows a second.
+        /// Rows per second.
         rate_hz: f64,
     },
-    /// Rows that were kept back and written all at once, with the time at which they were: they are put where even rows have them.
+    /// The recorder held rows back and wrote them in bursts, stamped with the time of writing; they are spaced evenly
+    /// instead.
     LateBursts {
-        /// Rows with such stamps.
+        /// Number of rows with late stamps.
         rows: usize,
-        /// How often rows were kept back.
+        /// Number of bursts.
         bursts: usize,
-        /// The row before the first of them.
+        /// The row before the first burst.
         after_row: usize,
-        /// By how much the latest was late, s.
+        /// Largest lateness of a row, s.
         latest_s: f64,
     },
     /// More than one row in ten was set aside.
@@ -126,52 +128,52 @@ pub enum LogWarning {
         /// Rows read.
         read: usize,
     },
-    /// A joint's position does not move as its velocity says.
+    /// The position of a joint does not change as its velocity predicts.
     VelocityDisagrees {
         /// The joint, counted from 1.
         joint: usize,
-        /// Change of position over the integral of velocity, median over the log; 1 when they agree.
+        /// Change of position divided by the integral of velocity, median over the log; 1 if they agree.
         ratio: f64,
     },
-    /// The position jumps between rows that are each part of a longer consistent stretch.
+    /// The position jumps between two rows that each belong to a longer consistent stretch.
     PositionJumps {
-        /// How often.
+        /// Number of jumps.
         count: usize,
         /// The row before the first jump.
         after_row: usize,
-        /// The joint that jumps most there, counted from 1.
+        /// The joint with the largest jump there, counted from 1.
         joint: usize,
-        /// By how much, rad.
+        /// Size of that jump, rad.
         jump_rad: f64,
     },
-    /// Angles that were given within one turn and jumped at its ends, put together again.
+    /// Angles were recorded within one turn and jumped at its ends; they have been unwrapped.
     Unwrapped {
-        /// How many jumps of one turn, in all joints.
+        /// Number of jumps by one turn, over all joints.
         count: usize,
-        /// The row before the first.
+        /// The row before the first jump.
         after_row: usize,
         /// The joint that jumps there, counted from 1.
         joint: usize,
     },
-    /// The file is written faster than its readings are new.
+    /// Rows are written faster than new readings arrive, so many rows repeat the reading of the row before.
     Held {
-        /// Share of the rows of a moving arm whose angles are those of the row before.
+        /// Among the rows in which the arm moves, the share that repeat the angles of the row before.
         share: f64,
-        /// New readings a second.
+        /// New readings per second.
         rate_hz: f64,
     },
-    /// The file has no velocities.
+    /// The file has no velocities; they are computed from the angles.
     SlopesOfAngles,
-    /// A block that a log need not have, with fields that are empty, no numbers or beyond what the quantity can be: it is
-    /// not used.
+    /// An optional block is not used, because some of its fields are empty, not numbers, or beyond what the quantity
+    /// can be.
     LeftOut {
         /// The block's key in a layout.
         block: &'static str,
-        /// How many such fields in the rows used.
+        /// Number of unusable fields among the rows used.
         fields: usize,
-        /// The first row with one.
+        /// The first row with an unusable field.
         first_row: usize,
-        /// The column it is in.
+        /// The column of that field.
         column: String,
     },
 }
@@ -231,25 +233,25 @@ impl fmt::Display for LogWarning {
     }
 }
 
-/// What became of every row: `read` = `used` + the counts of `set_aside`.
+/// The account of every row: `read` = `used` + the sum of the counts in `set_aside`.
 ///
 /// Blank lines and the header are not rows of data and are not counted. Prints as a short table.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RowAccount {
-    /// Rows of data met.
+    /// Rows of data in the file.
     pub read: usize,
-    /// Rows in the log.
+    /// Rows that entered the log.
     pub used: usize,
-    /// Rows left out, by reason, in the order first met.
+    /// Rows set aside, by reason, in the order in which the reasons first occurred.
     pub set_aside: Vec<SetAside>,
-    /// Rows that the recorder did not write, judged by the median step of time.
+    /// Rows that the recorder left out, judged by the median time step.
     pub missed_samples: usize,
-    /// What else should be known.
+    /// Further things that a reader of the results should know.
     pub warnings: Vec<LogWarning>,
 }
 
 impl RowAccount {
-    /// The account of a log that was made, not read: all `rows` used.
+    /// The account of a log that was created rather than read: all `rows` are used.
     pub fn complete(rows: usize) -> Self {
         Self { read: rows, used: rows, ..Self::default() }
     }
@@ -264,7 +266,7 @@ impl RowAccount {
         self.set_aside.iter().map(|s| s.count).sum()
     }
 
-    /// Counts one row; `example` is only asked for at the first of its reason.
+    /// Counts one row as set aside; `example` is called only for the first row of each reason.
     pub(super) fn add(&mut self, reason: Reason, row: usize, example: impl FnOnce() -> String) {
         match self.set_aside.iter_mut().find(|s| s.reason == reason) {
             Some(entry) => entry.count += 1,

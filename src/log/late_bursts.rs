@@ -1,8 +1,10 @@
-//! Rows that a recorder kept back and then wrote all at once, with the time at which it wrote them.
+//! Repairs the time stamps of rows that a recorder held back and then wrote in one burst.
 //!
-//! Such stamps are a long step and behind it as many tiny ones as rows were kept back; then the clock is right again. Read as they
-//! stand they are a gap and a clock that stalls, and count their time twice. Whether rows were recorded evenly, the motion tells: in a
-//! loop that hung and caught up they were read when their stamps say, and there angles follow from velocities with the stamps as they are.
+//! Such rows are stamped with the time of writing. A burst shows as one long time step followed by as many tiny steps
+//! as rows were held back; after it the clock is right again. Taken at face value, it looks like a gap plus a stalled
+//! clock, and its time is counted twice. The motion decides whether the rows were sampled evenly: if the control loop
+//! itself hung and caught up, the rows were sampled at the times stamped on them, and the angles agree with the
+//! integrated velocities on the stamps as they are.
 
 use std::ops::Range;
 
@@ -11,33 +13,37 @@ use super::clean::Motion;
 use super::even_stamps::{FEWEST_ROWS, defect, row_defect, told_rows};
 use crate::median::median_step;
 
-/// A burst begins with a row that is late by this much of what rows are apart. Ordinary stamps are late by less.
+/// A burst begins with a row that is late by at least this fraction of the sampling interval. Ordinary stamps are less
+/// late.
 const LATE: f64 = 0.75;
-/// Steps within a burst are a smaller share of that.
+/// Time steps within a burst are shorter than this fraction of the sampling interval.
 const TINY: f64 = 0.5;
-/// And behind it the clock is right again to this one: where it is not, rows were lost or time was.
+/// After the burst the clock is right again to within this fraction of the interval; otherwise rows or time were lost.
 const BALANCED: f64 = 0.3;
-/// Of two rows at which it is, as far as this share of what rows are apart tells, the first ends the burst.
+/// Two candidate end rows whose clock errors round to the same multiple of this fraction of the interval count as
+/// equal; the first one then ends the burst.
 const ALIKE: f64 = 0.02;
-/// Steps that differ from the usual one by less than this share of it tell what rows are apart.
+/// Only steps that differ from the median step by less than this fraction of it enter the estimate of the sampling
+/// interval.
 const ORDINARY: f64 = 0.5;
-/// Angles follow from velocities this much better on even stamps, where they tell anything.
+/// Evenly spaced stamps are accepted if they reduce the mismatch between angles and velocities to this fraction.
 const BETTER: f64 = 0.5;
-/// They tell something where they are off by more than so many times what they are in most rows.
+/// A burst is decisive only if its mismatch exceeds this many times the mismatch of typical rows.
 const USUAL: f64 = 2.0;
 
-/// What the motion says of a burst.
+/// The verdict of the motion on one burst.
 #[derive(Clone, Copy, PartialEq)]
 enum Answer {
-    /// Its rows were recorded evenly.
+    /// The rows were sampled evenly.
     Even,
-    /// They were recorded when their stamps say.
+    /// The rows were sampled at the times stamped on them.
     AsStamped,
-    /// The arm hardly moves there, or a row is garbage.
+    /// Undecided: the arm hardly moves there, or a row is garbage.
     Open,
 }
 
-/// Stamps of which bursts lie evenly between the rows before and behind them, and what to say of it; `None` where there are none.
+/// Returns the time stamps with each late burst spread evenly between the rows before and after it, and the warning
+/// that reports the repair; `None` if no burst is repaired.
 pub(super) fn late_bursts(motion: &Motion) -> Option<(Vec<f64>, LogWarning)> {
     if motion.rows() < FEWEST_ROWS {
         return None;
@@ -52,7 +58,7 @@ pub(super) fn late_bursts(motion: &Motion) -> Option<(Vec<f64>, LogWarning)> {
     }
     let answers = answers(motion, &even_s, &found);
     let count = |wanted: Answer| answers.iter().filter(|answer| **answer == wanted).count();
-    // What is open is as most of the others are: one recorder wrote them all.
+    // Undecided bursts follow the majority, since one recorder wrote them all.
     let most_are_even = count(Answer::Even) >= count(Answer::AsStamped);
     let is_even = |answer: Answer| match answer {
         Answer::Even => true,
@@ -74,7 +80,8 @@ pub(super) fn late_bursts(motion: &Motion) -> Option<(Vec<f64>, LogWarning)> {
     Some((time_s, LogWarning::LateBursts { rows, bursts, after_row, latest_s }))
 }
 
-/// What rows are apart, s: mean of the usual steps. Where a recorder writes nothing but bursts most steps are tiny, and that of all counts.
+/// Estimates the sampling interval, s: the mean of the steps close to the median. If the recorder writes nothing but
+/// bursts, most steps are tiny, and the mean of all steps is used instead.
 fn apart_s(time_s: &[f64]) -> Option<f64> {
     let typical_s = median_step(time_s)?;
     let mean_s = (time_s.last()? - time_s.first()?) / (time_s.len() - 1) as f64;
@@ -84,14 +91,15 @@ fn apart_s(time_s: &[f64]) -> Option<f64> {
     let steps = time_s.windows(2).map(|pair| pair[1] - pair[0]);
     let usual = steps.filter(|step| (step / typical_s - 1.0).abs() < ORDINARY);
     let (sum_s, count) = usual.fold((0.0, 0.0), |(sum_s, count), step| (sum_s + step, count + 1.0));
-    // Of an even number of steps the median may be none of them.
+    // With an even number of steps the median may lie between two steps, so that no step is close to it.
     Some(if count > 0.0 { sum_s / count } else { typical_s })
 }
 
-/// The late rows of every burst of rows that are `apart_s`: the row before them and the one behind have stamps that are right.
+/// Finds the bursts and returns the range of late rows of each; `apart_s` is the sampling interval. The row before a
+/// burst and the row after it have correct stamps.
 fn bursts(motion: &Motion, apart_s: f64) -> Vec<Range<usize>> {
     let (t, row) = (motion.time_s, motion.row);
-    // How much later row b is than its place in the file behind row a has it, in rows.
+    // Lateness of row b, in rows: its time after row a minus its distance from row a in the file.
     let late = |a: usize, b: usize| (t[b] - t[a]) / apart_s - (row[b] - row[a]) as f64;
     let is_tiny = |k: &usize| (0.0..TINY * apart_s).contains(&(t[*k] - t[*k - 1]));
     let mut out = Vec::new();
@@ -102,9 +110,10 @@ fn bursts(motion: &Motion, apart_s: f64) -> Vec<Range<usize>> {
             continue;
         }
         let tiny = (before + 2..t.len()).take_while(is_tiny).count();
-        // Rows are written between two others as well: then the last step is a part of a usual one.
+        // A burst may also be written between two sampling instants; then the step that ends it is shorter than a usual
+        // one, and may itself count as tiny.
         let ends = [before + 1 + tiny, before + 2 + tiny];
-        // A clock that goes back was wrong, not late.
+        // A clock that runs backwards was wrong, not late.
         let is_end = |end: &usize| (before + 2..t.len()).contains(end) && t[*end] >= t[*end - 1];
         let ends = ends.into_iter().filter(is_end);
         let off = |end: &usize| (late(before, *end).abs() / ALIKE).round() * ALIKE;
@@ -120,7 +129,7 @@ fn bursts(motion: &Motion, apart_s: f64) -> Vec<Range<usize>> {
     out
 }
 
-/// Lays stamps evenly between the first and the last of them, as `rows` have their places in the file.
+/// Spaces the stamps evenly between the first and the last one, in proportion to the row numbers `rows` in the file.
 fn lay_evenly(time_s: &mut [f64], rows: &[usize]) {
     let last = time_s.len() - 1;
     let place = |k: usize| (rows[k] - rows[0]) as f64;
@@ -130,10 +139,11 @@ fn lay_evenly(time_s: &mut [f64], rows: &[usize]) {
     }
 }
 
-/// What the motion says of each of the `found` bursts beside stamps that lie evenly in all of them.
+/// Returns the verdict of the motion on each burst in `found`. `even_s` holds the stamps with all bursts spread evenly.
 fn answers(motion: &Motion, even_s: &[f64], found: &[Range<usize>]) -> Vec<Answer> {
     let evenly = Motion { time_s: even_s, ..*motion };
-    // Many bursts, or many that are none, are what most rows have on one of the two.
+    // With many bursts, or many false ones, typical rows fit only one of the two sets of stamps; the better set defines
+    // the usual mismatch.
     let usual_rad = USUAL * defect(motion).min(defect(&evenly));
     let told = told_rows(motion);
     let answer = |burst: &Range<usize>| {
@@ -159,7 +169,7 @@ mod tests {
     const STEP_S: f64 = 0.004;
     const ROWS: usize = 600;
 
-    /// Two joints as they were read, and the stamps that they were given.
+    /// Two joints sampled at known times, with the stamps written to the log.
     struct Recorded {
         stamps_s: Vec<f64>,
         q: Vec<Vec<f64>>,
@@ -180,7 +190,8 @@ mod tests {
             }
         }
 
-        /// Without the rows `lost`: set aside, or not written at all.
+        /// Drops the rows `lost`. With `is_renumbered` they were never written to the file; otherwise they were set
+        /// aside when reading.
         fn without(mut self, lost: &[usize], is_renumbered: bool) -> Self {
             let keep = |values: &mut Vec<f64>| {
                 let kept = values.iter().enumerate().filter(|(k, _)| !lost.contains(k));
@@ -210,12 +221,13 @@ mod tests {
         (0..ROWS).map(|k| STEP_S * k as f64).collect()
     }
 
-    /// Between −1 and 1, without a pattern.
+    /// Pseudo-random number between −1 and 1.
     fn chance(k: usize) -> f64 {
         ((k * 7919) % 1009) as f64 / 504.0 - 1.0
     }
 
-    /// Stamps of rows that are kept back: (first, how many) of every burst, written 98 % of the way to the next row.
+    /// Stamps with bursts, each given as (first row, number of rows held back). The rows are stamped at 98 % of the way
+    /// to the next regular row.
     fn kept_back(stamps_s: &[f64], bursts: &[(usize, usize)]) -> Vec<f64> {
         let mut out = stamps_s.to_vec();
         for &(first, count) in bursts {
@@ -245,7 +257,7 @@ mod tests {
         }
     }
 
-    /// Stamps that are off by up to an eighth of a step beside them, and a row that was set aside in one of them.
+    /// Jitter of up to an eighth of a step on all stamps, and one row set aside within a burst.
     #[test]
     fn bursts_among_jittered_stamps() {
         let jittered: Vec<f64> =
@@ -259,19 +271,19 @@ mod tests {
         }
     }
 
-    /// All rows are written in blocks, so that most steps are tiny.
+    /// All rows are written in blocks, so most steps are tiny.
     #[test]
     fn a_recorder_that_writes_nothing_but_bursts() {
         let blocks = |k: usize| STEP_S * (k.div_ceil(8) * 8) as f64 + 1e-5 * ((k + 7) % 8) as f64;
         let stamps_s: Vec<f64> = (0..ROWS).map(blocks).collect();
         let (time_s, _) = Recorded::new(&even(), &stamps_s).mended(true).unwrap();
-        // Behind the last block nothing tells that the clock is right again.
+        // After the last block no further row shows that the clock is right again.
         for (t, truth) in time_s.iter().zip(even()).take(ROWS - 7) {
             assert!((t - truth).abs() < 1e-4, "{t} {truth}");
         }
     }
 
-    /// An arm at rest tells nothing against it.
+    /// An arm at rest gives no evidence against even sampling, so the bursts are spread evenly.
     #[test]
     fn bursts_of_an_arm_at_rest() {
         let mut recorded = Recorded::new(&even(), &kept_back(&even(), &BURSTS));
@@ -281,7 +293,7 @@ mod tests {
         assert!(time_s.iter().zip(even()).all(|(t, truth)| (t - truth).abs() < 1e-12));
     }
 
-    /// A loop that hangs and catches up reads its rows when their stamps say.
+    /// A control loop that hangs and catches up samples its rows at the times stamped on them, so the stamps stay.
     #[test]
     fn rows_that_were_read_late_stay() {
         let late = kept_back(&even(), &BURSTS);
@@ -299,14 +311,14 @@ mod tests {
         let jittered: Vec<f64> =
             (0..ROWS).map(|k| STEP_S * (k as f64 + 0.35 * chance(k))).collect();
         assert!(is_left(&even_s, &jittered) && is_left(&jittered, &jittered));
-        // A clock that stalls: the time that it loses is never regained.
+        // A clock that stalls and never regains the lost time.
         let lost: Vec<f64> = (0..ROWS).map(|k| even_s[k] + 0.02 * (k / 100) as f64).collect();
         assert!(is_left(&lost, &even_s));
-        // One that stands for ten rows and goes on from there.
+        // A clock that stands still for ten rows and continues from there.
         let stood = |k: usize| STEP_S * (k.min(200) + k.saturating_sub(210)) as f64;
         let stamps_s: Vec<f64> = (0..ROWS).map(|k| stood(k) + 1e-6 * k as f64).collect();
         assert!(is_left(&even_s, &stamps_s));
-        // Rows that are missing, alone and many beside each other, also behind stamps that are a little late.
+        // Missing rows, single and in long runs, with exact and with jittered stamps.
         let lost: Vec<usize> = [50, 80, 82, 300].into_iter().chain(400..420).collect();
         for stamps_s in [&even_s, &jittered] {
             let recorded = Recorded::new(&even_s, stamps_s).without(&lost, true);

@@ -1,9 +1,9 @@
-//! One run's record: reading, checking and writing.
+//! The log of one run: reading, checking and writing.
 //!
-//! Enters: a CSV file of a real arm or of the simulation, and a [`Layout`] that says what its columns
-//! are. Leaves: a [`Log`] in SI units whose rows are finite, plausible, in the order of time and
-//! consistent from one to the next, with a [`RowAccount`] of every row that did not make it.
-//! Whatever the file holds, the answer is a [`Log`] or a [`LogError`] that names file, row and value.
+//! Input: a CSV file from a real arm or from a simulation, and a [`Layout`] that says which column holds which
+//! quantity. Output: a [`Log`] in SI units whose rows are finite, plausible, in order of time and consistent with their
+//! neighbours, with a [`RowAccount`] of every row that was rejected. Whatever the file holds, the result is a [`Log`]
+//! or a [`LogError`] that names file, row and value.
 
 mod account;
 mod clean;

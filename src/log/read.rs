@@ -1,4 +1,4 @@
-//! From a file to a log.
+//! Reads a file into a log.
 
 use std::fs::File;
 use std::io::Read;
@@ -17,37 +17,41 @@ use super::slopes::slopes;
 use super::units;
 use crate::robot::JointSignals;
 
-/// Rows without header that are looked at to find the width of a file: one cut row does not decide.
+/// Number of rows of a file without header that are inspected to find its width, so that one truncated row does not
+/// decide.
 const WIDTH_ROWS: usize = 50;
 
 /// Reads a log of an arm with `joints` joints.
 ///
-/// A layout without velocities takes them from the angles, once the times are in order: slopes of polynomials through five
-/// rows; angles off the median of five are set aside before, in place of step 4.
+/// If the layout has no velocities, they are computed from the angles once the times are in order, as slopes of
+/// polynomials through five rows. Step 4 is then replaced: before differentiation, rows with an angle far from the
+/// median of five rows are set aside.
 ///
-/// Only the columns of the layout are read, row by row; memory is that of the numbers kept, 8 bytes each.
-/// Numbers are converted to SI units. Then, in this order:
+/// Only the columns named by the layout are kept, row by row; memory use is 8 bytes per number kept. Numbers are
+/// converted to SI units. Then, in this order:
 ///
-/// 1. Rows are set aside that have another number of fields than the file, or in time, angles, velocities or effort an
-///    empty field, text, NaN, an infinity, or a magnitude beyond: angle and velocity 3.6·10⁵, acceleration 3·10⁴ rad/s²,
-///    current 500 A, torque 5·10⁴ Nm, temperature 1000 °C, time 10¹⁹ s.
-/// 2. Times that are rounded more coarsely than half of what rows are apart are put on the straight line through them, if the motion says
-///    that rows are even. Rows that were kept back and written in a burst are put evenly between the row before and the one behind them,
-///    unless the motion says that they were read so late. Then times must increase: repeated and backward times are set aside, and up to 8
-///    in a row that are far ahead.
-/// 3. Units: Δq is compared with ∫q̇ dt, and the clock with what recorders do. Numbers that say degrees,
-///    milli-, micro- or nanoseconds are an error that names the layout's remedy.
-/// 4. Angles beyond 1000 rad and velocities beyond 100 rad/s are set aside, and so are rows whose angles
-///    and velocities do not follow from their neighbours': stretches of fewer than 10 rows, or
-///    interleaved with a longer one, that no acceleration below 20 rad/s² connects to the rest.
-/// 5. Angles that jump by one turn are unwrapped, and the angles asked for with them.
-/// 6. Targets and temperatures with fields as in 1 in the rows that are left are no part of the log. Nothing is identified
-///    from them, and they cost no rows.
-/// 7. Joints that the layout says are counted otherwise are counted as the robot's description does.
+/// 1. Rows are set aside if their number of fields differs from that of the file, or if time, angles, velocities or
+///    effort contain an empty field, text, NaN, an infinity, or a magnitude beyond these bounds: angle and velocity
+///    3.6·10⁵, acceleration 3·10⁴ rad/s², current 500 A, torque 5·10⁴ Nm, temperature 1000 °C, time 10¹⁹ s.
+/// 2. Time stamps rounded more coarsely than half the sampling interval are replaced by the straight line through them,
+///    if the motion shows that the rows were sampled evenly. Rows that were held back and written in one burst are
+///    spread evenly between the row before and the row after, unless the motion shows that they were really sampled
+///    that late. Then times must increase: repeated and backward times are set aside, and so are up to 8 consecutive
+///    rows whose time is far ahead.
+/// 3. Units are checked: Δq is compared with ∫q̇ dt, and the clock with the steps a recorder can have. Numbers that
+///    indicate degrees, milli-, micro- or nanoseconds are an error that names the change to make in the layout.
+/// 4. Rows with angles beyond 1000 rad or velocities beyond 100 rad/s are set aside, and so are rows whose angles and
+///    velocities do not follow from those of their neighbours: stretches of fewer than 10 rows, or interleaved with a
+///    longer one, that no acceleration below 20 rad/s² connects to the other rows.
+/// 5. Angles that jump by one turn are unwrapped, and the target angles with them.
+/// 6. A block of targets or temperatures is left out of the log if it has a field as in step 1 in any of the remaining
+///    rows. Nothing is identified from these blocks, so they cost no rows.
+/// 7. Joints that the recorder counts differently, according to the layout, are renumbered and re-signed to match the
+///    robot's description.
 ///
 /// # Errors
-/// Any [`LogError`] about files, layouts, units and joints; [`LogError::NoUsableRows`] if fewer than two
-/// rows are left, or most hold what the quantities cannot be.
+/// Any [`LogError`] about files, layouts, units and joints; [`LogError::NoUsableRows`] if fewer than two rows remain,
+/// or if most rows hold values that the quantities cannot have.
 pub fn read_log(path: &Path, layout: &Layout, joints: usize) -> Result<Log, LogError> {
     let file = path.display().to_string();
     if path.is_dir() {
@@ -59,7 +63,7 @@ pub fn read_log(path: &Path, layout: &Layout, joints: usize) -> Result<Log, LogE
     }
 }
 
-/// As [`read_log`], from any source of bytes; `name` stands for the file in messages.
+/// As [`read_log`], from any source of bytes; messages refer to the source as `name`.
 ///
 /// # Errors
 /// As [`read_log`].
@@ -98,7 +102,9 @@ pub fn read_log_from(
     Ok(table.into_log(&plan, layout, account, name, lines.sha256()))
 }
 
-/// The plan of a file without header, from the width that most of its first rows have, and those rows.
+/// Builds the plan of a file without header from the most common width among its first rows.
+///
+/// Returns the plan and the rows already consumed.
 fn plan_by_width(
     lines: &mut Lines<impl Read>,
     first: Line,
@@ -143,21 +149,21 @@ fn plan_by_width(
     }
 }
 
-/// Whether a row has so many fields, and no more behind them than a delimiter that ends it.
+/// Whether a row has exactly this many fields, not counting the empty field after a trailing delimiter.
 fn has_fields(delimiter: Delimiter, line: &Line, fields: usize) -> bool {
     let mut behind = delimiter.split(&line.bytes).skip(fields.saturating_sub(1));
     behind.next().is_some() && behind.next().is_none_or(<[u8]>::is_empty) && behind.next().is_none()
 }
 
-/// The numbers read so far, column by column, and where each row stood in the file.
+/// The numbers read so far, column by column, and the row of the file that each one came from.
 struct Table {
-    /// Behind those of the plan the velocities of a file that has none.
+    /// The columns of the plan; if the file has no velocities, their columns follow after these.
     columns: Vec<Vec<f64>>,
     rows: Vec<usize>,
     current: Vec<f64>,
 }
 
-/// What is wrong with a row: in which column (from 0), or with how many fields.
+/// What is wrong with a row: `at` is the column (from 0) or, for a wrong number of fields, that number.
 struct Defect {
     reason: Reason,
     at: usize,
@@ -172,7 +178,7 @@ impl Table {
         }
     }
 
-    /// Takes a row in, or counts why not.
+    /// Adds a row to the table, or counts it as set aside with the reason.
     fn push(
         &mut self,
         plan: &Plan,
@@ -233,14 +239,15 @@ impl Table {
             false => self.take_slopes(plan, account, file)?,
         };
         let motion = self.motion(plan);
-        // Many garbage rows can hide how angles and velocities are related: then they go first.
+        // Many garbage rows can hide the relation between angles and velocities. If no unit explains the relation, the
+        // garbage is removed first and the units are checked again afterwards.
         let mut related = units::check(&motion, &layout.units);
         if let Err(suspicion) = &related
             && !matches!(suspicion, UnitSuspicion::Unrelated { .. })
         {
             return Err(fault(suspicion.clone()));
         }
-        // Slopes follow from the angles, whatever these are.
+        // Velocities computed as slopes always agree with the angles, so there is nothing to check.
         let verdicts = if has_velocities { clean::consistency(&motion) } else { Vec::new() };
         self.retain(&verdicts, account, |table, k, reason| {
             let beyond = |columns: std::ops::Range<usize>, bound: f64| {
@@ -289,7 +296,8 @@ impl Table {
         }
     }
 
-    /// Stamps as rows were recorded, where the motion says that they were not written so: what is said of it.
+    /// Repairs rounded or late time stamps where the motion contradicts them; returns the warning that reports the
+    /// repair.
     fn restamp(&mut self, plan: &Plan) -> Option<LogWarning> {
         let motion = self.motion(plan);
         let (time_s, warning) = match even_stamps(&motion) {
@@ -303,7 +311,7 @@ impl Table {
         Some(warning)
     }
 
-    /// Velocities of a file that has none: of angles that are unwrapped, without wild ones.
+    /// Computes the velocities of a file that has none, after unwrapping the angles and setting wild ones aside.
     fn take_slopes(
         &mut self,
         plan: &Plan,
@@ -340,7 +348,7 @@ impl Table {
         warning
     }
 
-    /// Step 6 of [`read_log`]: what to say of an optional block that is not used.
+    /// Step 6 of [`read_log`]: the warning for an optional block that is left out because of unusable fields.
     fn left_out(&self, plan: &Plan, block: Block) -> Option<LogWarning> {
         let range = plan.range(block)?;
         let columns = &self.columns[range.clone()];
@@ -358,7 +366,7 @@ impl Table {
         })
     }
 
-    /// Keeps the rows without a reason against them and counts the others.
+    /// Keeps the rows without a reason against them and counts the other rows as set aside.
     fn retain(
         &mut self,
         verdicts: &[Option<Reason>],
@@ -383,7 +391,7 @@ impl Table {
 
     fn require_two(&self, account: &mut RowAccount, file: &str) -> Result<(), LogError> {
         account.used = self.rows.len();
-        // What most rows have is no garbage, but another quantity or unit.
+        // If most rows look like garbage, the column holds another quantity or another unit.
         if account.used < 2 || 2 * account.count(Reason::Implausible) > account.read {
             return Err(LogError::NoUsableRows {
                 file: file.to_owned(),
@@ -407,7 +415,7 @@ impl Table {
         };
         let gain = || layout.drive_gain_nm_a.clone();
         let current = |ampere| Effort::Current { ampere, gain_nm_a: gain() };
-        // A plan has torques or currents: without either there is no plan.
+        // Every plan contains torques or currents, so the zero-sized fallback is never used.
         let effort = match signals(Block::Torque) {
             Some(nm) => Effort::Torque(nm),
             None => current(signals(Block::Current).unwrap_or(JointSignals::zeros(0, 0))),
@@ -434,15 +442,16 @@ impl Table {
         log
     }
 
-    /// The columns as signals; they are given up one block at a time, so that no second copy of the whole
-    /// log is ever held.
+    /// Moves columns into signals. Each block is released as it is converted, so that no second copy of the whole log
+    /// is ever held in memory.
     fn signals(&mut self, range: std::ops::Range<usize>) -> JointSignals {
         let columns: Vec<Vec<f64>> = self.columns[range].iter_mut().map(std::mem::take).collect();
         JointSignals::from_fn(columns.len(), self.rows.len(), |j, k| columns[j][k])
     }
 }
 
-/// Places of time, angles and velocities among the columns of a [`Table`]: every plan begins with the first two.
+/// Positions of time, angles and velocities among the columns of a [`Table`]. Without recorded velocities, the velocity
+/// columns follow after those of the plan.
 fn motion_ranges(plan: &Plan) -> (usize, std::ops::Range<usize>, std::ops::Range<usize>) {
     let range = |block| plan.range(block).unwrap_or_default();
     let q = range(Block::Q);
@@ -450,7 +459,7 @@ fn motion_ranges(plan: &Plan) -> (usize, std::ops::Range<usize>, std::ops::Range
     (range(Block::Time).start, q, plan.range(Block::Qd).unwrap_or(behind))
 }
 
-/// One row's numbers in SI units into `values`; NaN in an optional block where it has none that can be.
+/// Writes the numbers of one row, in SI units, into `values`; unusable fields of optional blocks become NaN.
 fn parse(plan: &Plan, line: &Line, values: &mut [f64]) -> Result<(), Defect> {
     let mut defect = None;
     let mut count = 0;
@@ -472,7 +481,7 @@ fn parse(plan: &Plan, line: &Line, values: &mut [f64]) -> Result<(), Defect> {
             Err(reason) => defect = defect.or(Some(Defect { reason, at })),
         }
     }
-    // A delimiter at the end of a row separates nothing.
+    // A trailing delimiter does not start another field.
     let surplus = usize::from(last_is_empty && count == plan.width + 1);
     let fields = count - surplus;
     let last_is_used = plan.place.last().is_some_and(Option::is_some);
@@ -509,12 +518,12 @@ fn number(text: &[u8], decimal_comma: bool) -> Result<f64, Reason> {
     }
 }
 
-/// "0,25", "-1,5e3": a number once its only comma is a point.
+/// Whether the text is a number once its only comma is replaced by a point, such as "0,25" or "-1,5e3".
 fn is_decimal_comma(text: &str) -> bool {
     text.matches(',').count() == 1 && text.replace(',', ".").parse::<f64>().is_ok()
 }
 
-/// A value as shown in messages; uninitialised doubles are printed with 300 digits.
+/// Shortens a value for messages; uninitialised doubles can print as 300 digits.
 fn abridged(text: &str) -> String {
     const SHOWN: usize = 24;
     match text.char_indices().nth(SHOWN) {

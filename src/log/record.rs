@@ -1,15 +1,15 @@
-//! The record of one run.
+//! The log of one run.
 
 use super::account::RowAccount;
 use super::error::LogError;
 use crate::robot::{Arm, JointSignals};
 
-/// One run of an arm: what was measured, at which times, and what became of the file's rows.
+/// One run of an arm: the measured signals, their times, and the account of the file's rows.
 ///
-/// All signals have one length; times increase strictly. Angles follow the joint convention of the arm.
+/// All signals have the same number of samples; times increase strictly. Angles follow the joint convention of the arm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Log {
-    /// File or scenario it comes from.
+    /// File or scenario that the log comes from.
     pub source: String,
     /// Time of every sample, s.
     pub time_s: Vec<f64>,
@@ -29,20 +29,20 @@ pub struct Log {
     pub target_effort: Option<Effort>,
     /// Joint temperatures, °C.
     pub temperature_c: Option<JointSignals>,
-    /// What became of the file's rows.
+    /// Account of the file's rows: how many were used, and why others were not.
     pub rows: RowAccount,
     /// SHA-256 of the file's bytes in hexadecimal; empty for a log that was not read from a file.
     pub sha256: String,
 }
 
-/// What the motors gave, in the quantity that was logged.
+/// Measured effort of the motors, in the quantity that was logged.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Effort {
     /// Motor currents.
     Current {
-        /// Current of every joint's motor, A.
+        /// Motor current of every joint, A.
         ampere: JointSignals,
-        /// Joint torque per ampere stated by the layout, Nm/A; `None`: the arm's own i_G·k.
+        /// Joint torque per ampere as stated by the layout, Nm/A; `None` stands for the arm's own i_G·k.
         gain_nm_a: Option<Vec<f64>>,
     },
     /// Motor torques at the joints, Nm.
@@ -58,7 +58,8 @@ impl Effort {
         }
     }
 
-    /// Joint torque per ampere, Nm/A: the layout's where it states one, otherwise the arm's i_G·k; `None` of torques.
+    /// Joint torque per ampere, Nm/A: the value of the layout if it states one, otherwise the arm's i_G·k; `None` if
+    /// torques were logged.
     fn gain_nm_a(&self, arm: &Arm) -> Option<Vec<f64>> {
         let own = || arm.joints.iter().map(|joint| joint.drive.gain_nm_a()).collect();
         match self {
@@ -67,10 +68,11 @@ impl Effort {
         }
     }
 
-    /// Motor torque at the joint, Nm: τ = gain · I, and torques as they are.
+    /// Motor torque at the joint, Nm: τ = gain · I; logged torques are returned unchanged.
     ///
     /// # Errors
-    /// [`LogError::JointCount`] where signals, gains and arm differ in joints; `file` names the log in it.
+    /// [`LogError::JointCount`] if signals, gains and arm differ in the number of joints; `file` is the name of the log
+    /// in the message.
     fn torque_nm(&self, arm: &Arm, file: &str) -> Result<JointSignals, LogError> {
         let count = |what, found| {
             if found == arm.dof() {
@@ -89,11 +91,11 @@ impl Effort {
 }
 
 impl Log {
-    /// A log that was made rather than read (a simulation's, or a test's); targets and temperatures may be
-    /// set afterwards.
+    /// Creates a log from signals, for example of a simulation or a test. Targets and temperatures may be set
+    /// afterwards.
     ///
     /// # Errors
-    /// [`LogError::Shape`] where the signals differ in joints or samples.
+    /// [`LogError::Shape`] if the signals differ in joints or samples.
     pub fn new(
         source: impl Into<String>,
         time_s: Vec<f64>,
@@ -132,17 +134,18 @@ impl Log {
     /// Measured motor torque at the joints, Nm: gain · current, or the torque that was logged.
     ///
     /// # Errors
-    /// [`LogError::JointCount`] if the log or the layout's gains are not of this arm's number of joints.
+    /// [`LogError::JointCount`] if the number of joints of the log, or of the layout's gains, differs from that of the
+    /// arm.
     pub fn torque_nm(&self, arm: &Arm) -> Result<JointSignals, LogError> {
         self.effort.torque_nm(arm, &self.source)
     }
 
-    /// Joint torque per ampere by which [`Log::torque_nm`] makes torques of currents, Nm/A; `None` where torques were logged.
+    /// Joint torque per ampere that [`Log::torque_nm`] multiplies currents with, Nm/A; `None` if torques were logged.
     pub fn drive_gain_nm_a(&self, arm: &Arm) -> Option<Vec<f64>> {
         self.effort.gain_nm_a(arm)
     }
 
-    /// The manufacturer's feed-forward as torque at the joints, Nm; `None` where it was not logged.
+    /// The manufacturer's feed-forward as torque at the joints, Nm; `None` if it was not logged.
     ///
     /// # Errors
     /// As [`Log::torque_nm`].

@@ -1,4 +1,4 @@
-//! From a log to the project's own CSV.
+//! Writes a log as CSV in the project's own format.
 
 use std::io::Write;
 use std::path::Path;
@@ -11,14 +11,16 @@ use super::record::{Effort, Log};
 use crate::output::write_atomically;
 use crate::robot::JointSignals;
 
-/// Writes a log with RTDE names, comma separated, every number in the shortest form that reads back to
-/// the same bits. The file appears whole or not at all. Returns its SHA-256.
+/// Writes a log as comma-separated values with RTDE column names.
 ///
-/// Drive gains are no part of the file: currents are written as currents.
+/// Every number is written in the shortest form that reads back to the same bits. The file appears whole or not at all.
+/// Returns the SHA-256 of the file.
+///
+/// Drive gains are not part of the file: currents are written as currents.
 ///
 /// # Errors
-/// [`LogError::Shape`] or [`LogError::NotFinite`] for a log that could not be read back, checked before
-/// anything is written; [`LogError::Output`] if the file cannot be written.
+/// [`LogError::Shape`] or [`LogError::NotFinite`] for a log that could not be read back, checked before anything is
+/// written; [`LogError::Output`] if the file cannot be written.
 pub fn write_log(path: &Path, log: &Log) -> Result<String, LogError> {
     log.check_shape()?;
     let columns = columns(log);
@@ -44,7 +46,7 @@ pub fn write_log(path: &Path, log: &Log) -> Result<String, LogError> {
             if k < log.samples() {
                 for (i, (_, values)) in columns.iter().enumerate() {
                     let comma = if i == 0 { "" } else { "," };
-                    // Debug and not Display: it turns to exponents where that is shorter.
+                    // Debug rather than Display, because it switches to exponents where that is shorter.
                     write!(line, "{comma}{:?}", values[k])?;
                 }
             }
@@ -54,7 +56,7 @@ pub fn write_log(path: &Path, log: &Log) -> Result<String, LogError> {
     Ok(hexadecimal(hash))
 }
 
-/// All columns with their names, in the order they are written.
+/// All columns with their names, in the order in which they are written.
 fn columns(log: &Log) -> Vec<(String, &[f64])> {
     fn effort<'a>(
         effort: &'a Effort,
