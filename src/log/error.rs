@@ -1,4 +1,4 @@
-//! What can be wrong with a log or with the layout that describes it.
+//! Errors of logs and of the layouts that describe them.
 
 use std::path::PathBuf;
 
@@ -7,10 +7,10 @@ use thiserror::Error;
 use super::account::{RowAccount, SetAside};
 use crate::output::OutputError;
 
-/// A log that cannot be used: where, which value, and what to do.
+/// A log that cannot be used. Each message names the place, the value and the remedy.
 #[derive(Debug, Error)]
 pub enum LogError {
-    /// The file cannot be opened or read on.
+    /// The file cannot be opened, or reading it fails.
     #[error("{file}: cannot be read: {source}")]
     Read {
         /// The file.
@@ -36,7 +36,7 @@ pub enum LogError {
         /// Whether the file begins like UTF-16 text.
         utf16: bool,
     },
-    /// A line longer than any row can be.
+    /// A line is longer than any row can be.
     #[error("{file}: row {row} is longer than {limit} bytes: not a log of one sample per row")]
     LineTooLong {
         /// The file.
@@ -46,7 +46,7 @@ pub enum LogError {
         /// Largest length accepted, bytes.
         limit: usize,
     },
-    /// No bytes, or blank lines only.
+    /// The file has no bytes, or blank lines only.
     #[error("{file}: the file is empty ({lines} blank lines); record the log again")]
     Empty {
         /// The file.
@@ -54,7 +54,7 @@ pub enum LogError {
         /// Blank lines met.
         lines: usize,
     },
-    /// A header and nothing below it.
+    /// The file has a header and no rows of data.
     #[error("{file}: row {row} is a header and no row of data follows; record the log again")]
     HeaderOnly {
         /// The file.
@@ -62,7 +62,7 @@ pub enum LogError {
         /// The header's row.
         row: usize,
     },
-    /// The layout expects names in the first row.
+    /// The layout expects column names in the first row, which holds numbers.
     #[error(
         "{file}: row {row} begins with the number {value} where the layout \"{layout}\" expects column names; \
          for a file without header give --layout ({} or a .toml file with header = false)",
@@ -78,7 +78,7 @@ pub enum LogError {
         /// The layout.
         layout: String,
     },
-    /// The layout expects numbers in the first row.
+    /// The layout expects numbers in the first row, which holds a header.
     #[error(
         "{file}: row {row} begins with \"{value}\", a header, and the layout \"{layout}\" is for files without; \
          leave --layout away for RTDE names, or set header = true in the layout"
@@ -93,7 +93,7 @@ pub enum LogError {
         /// The layout.
         layout: String,
     },
-    /// A column that is needed is not in the header.
+    /// A required column is not in the header.
     #[error(
         "{file}: row {row} (header) has no column \"{column}\", which the layout \"{layout}\" needs; it has {found}; \
          name the column in a layout file (--layout)"
@@ -110,7 +110,7 @@ pub enum LogError {
         /// The names that are there, abridged.
         found: String,
     },
-    /// A column that is used is there twice.
+    /// A column that is used occurs twice in the header.
     #[error(
         "{file}: row {row} (header) has the column \"{column}\" twice, as columns {first} and {second}; \
          rename or remove one"
@@ -127,7 +127,7 @@ pub enum LogError {
         /// Column number of the second.
         second: usize,
     },
-    /// Neither currents nor torques.
+    /// The header has neither currents nor torques.
     #[error(
         "{file}: row {row} (header) has neither \"{current}\" nor \"{torque}\"; one of them must be logged"
     )]
@@ -155,7 +155,7 @@ pub enum LogError {
         /// Joints of the arm.
         expected: usize,
     },
-    /// A file without header whose rows have no width that the layout knows.
+    /// The width of a file without header is none of those in the layout.
     #[error(
         "{file}: row {row} has {found} fields; the layout \"{layout}\" knows files of {} fields; \
          choose another --layout, or add a [[width]] to it",
@@ -168,12 +168,12 @@ pub enum LogError {
         row: usize,
         /// Its fields.
         found: usize,
-        /// What the layout accepts.
+        /// Widths that the layout accepts.
         expected: Vec<usize>,
         /// The layout.
         layout: String,
     },
-    /// Decimals written with commas.
+    /// Decimals are written with commas.
     #[error(
         "{file}: row {row}, column {column}: \"{value}\" has a decimal comma; \
          set decimal_comma = true in a layout file (--layout), or export with decimal points"
@@ -188,7 +188,7 @@ pub enum LogError {
         /// The field.
         value: String,
     },
-    /// Numbers that only make sense in another unit.
+    /// The numbers only make sense in another unit.
     #[error("{file}: {suspicion}")]
     Units {
         /// The file.
@@ -196,15 +196,15 @@ pub enum LogError {
         /// What was seen, where, and what to put into the layout.
         suspicion: UnitSuspicion,
     },
-    /// Fewer than two rows are left, or most rows hold what the quantities cannot be.
+    /// Fewer than two rows remain, or most rows hold values that the quantities cannot have.
     #[error("{file}: of {} rows read {} can be used{}", account.read, account.used, main_reason(account))]
     NoUsableRows {
         /// The file.
         file: String,
-        /// What became of the rows.
+        /// Account of the rows: how many were set aside, and why.
         account: RowAccount,
     },
-    /// Neither a built-in layout nor a layout file.
+    /// The name is neither a built-in layout nor a layout file.
     #[error("unknown layout \"{name}\": built in are {}; or give a .toml file", built_in())]
     UnknownLayout {
         /// What was asked for.
@@ -236,7 +236,7 @@ pub enum LogError {
         /// The log's samples.
         samples: usize,
     },
-    /// A value that must not be written into a log.
+    /// A log to be written holds a value that is not finite.
     #[error("{}: row {row}, column \"{column}\" would be {value}; nothing was written", path.display())]
     NotFinite {
         /// The output.
@@ -262,7 +262,7 @@ pub enum LayoutFault {
     /// Not valid TOML, or a key or value that layouts do not have (the parser names line and key).
     #[error("{0}")]
     Toml(String),
-    /// A block that every log needs.
+    /// A block that every log needs is missing.
     #[error(
         "the block \"{block}\" is missing in {place}; a log needs time, q, and current or torque (without qd, velocities are the \
          slopes of the angles)"
@@ -273,7 +273,7 @@ pub enum LayoutFault {
         /// `[columns]` or `[[width]]`.
         place: String,
     },
-    /// Names where only numbers can be, or the reverse.
+    /// Columns are given by names where only numbers are possible, or the reverse.
     #[error("{block} = {value}: {expected}")]
     BadColumns {
         /// The block.
@@ -283,7 +283,7 @@ pub enum LayoutFault {
         /// What it may say.
         expected: &'static str,
     },
-    /// One column for two things.
+    /// One column is used for two quantities.
     #[error("column {column} is used for \"{first}\" and for \"{second}\"")]
     Overlap {
         /// Column number, from 1.
@@ -293,7 +293,7 @@ pub enum LayoutFault {
         /// The other.
         second: &'static str,
     },
-    /// A block reaches beyond the width it is in.
+    /// A block reaches beyond the width that lists it.
     #[error("\"{block}\" is column {column}, and this [[width]] has {fields} fields")]
     BeyondWidth {
         /// The block.
@@ -303,7 +303,7 @@ pub enum LayoutFault {
         /// Fields of the row.
         fields: usize,
     },
-    /// A file without header and no widths, or a header and widths.
+    /// A layout without header lists no widths, or one with header does.
     #[error(
         "header = {header} and {widths} [[width]] tables: files without header need at least one, others none"
     )]
@@ -313,7 +313,7 @@ pub enum LayoutFault {
         /// Number of widths.
         widths: usize,
     },
-    /// The same width twice.
+    /// The same width is listed twice.
     #[error("two [[width]] tables have fields = {fields}")]
     SameWidth {
         /// Fields of both.
@@ -327,13 +327,13 @@ pub enum LayoutFault {
         /// The value.
         value: f64,
     },
-    /// Joints count from 1 in layouts.
+    /// A list names joint 0, but joints count from 1 in layouts.
     #[error("{key} under [joints] names joint 0: joints count from 1")]
     JointFromOne {
         /// The key.
         key: &'static str,
     },
-    /// A joint named twice counts as before.
+    /// A list names a joint twice; reversing it twice would cancel out.
     #[error("{key} under [joints] names joint {joint} twice")]
     JointTwice {
         /// The key.
@@ -341,17 +341,17 @@ pub enum LayoutFault {
         /// The joint, from 1.
         joint: usize,
     },
-    /// A joint that the arm does not have.
+    /// A list names a joint that the arm does not have.
     #[error("{key} under [joints] names joint {joint}, and the arm has {joints} joints")]
     NoSuchJoint {
         /// The key.
         key: &'static str,
         /// The joint, from 1.
         joint: usize,
-        /// Of the arm.
+        /// Joints of the arm.
         joints: usize,
     },
-    /// A zero that is no angle.
+    /// A zero is not a finite angle.
     #[error("zero under [joints] is {value} for joint {joint}: it must be an angle")]
     Zero {
         /// The joint, from 1.
@@ -359,7 +359,7 @@ pub enum LayoutFault {
         /// The value.
         value: f64,
     },
-    /// A zero beyond a whole turn.
+    /// A zero in radians is larger than a whole turn.
     #[error(
         "zero under [joints] is {value} for joint {joint}, more than a whole turn in radians: it looks like degrees. Zeros are in the \
          unit of q: write {:.4}, or put q = \"deg\" under [units] where the angles are in degrees as well",
@@ -371,23 +371,24 @@ pub enum LayoutFault {
         /// The value.
         value: f64,
     },
-    /// An order or zeros of another number of joints.
+    /// The number of entries of an order, or of the zeros, differs from the number of joints.
     #[error("{key} under [joints] has {found} number(s), and the arm has {joints} joints")]
     NotAllJoints {
         /// The key.
         key: &'static str,
-        /// How many there are.
+        /// Number of entries.
         found: usize,
         /// Joints of the arm.
         joints: usize,
     },
-    /// Stamps in two columns have nanoseconds in the second alone.
+    /// The layout adds a column of nanoseconds to a time that is in nanoseconds as well. Of a time stamp split into two
+    /// columns, only the second column may be in nanoseconds.
     #[error(
         "time_nanoseconds is added to the time, which is in nanoseconds as well (time = \"ns\" under [units]): the time of stamps in \
          two columns is in seconds; leave one of the two out"
     )]
     NanosecondsTwice,
-    /// The layout that this one is like cannot be used.
+    /// The layout named by `like` cannot be used.
     #[error("like = \"{like}\": {fault}")]
     Like {
         /// The name or the file.
@@ -395,62 +396,62 @@ pub enum LayoutFault {
         /// What is wrong with it.
         fault: Box<LogError>,
     },
-    /// The file of the layout that this one is like is not there.
+    /// The layout file named by `like` does not exist.
     #[error(
         "like = \"{like}\": there is no {}; files are looked for beside the layout that is like them",
         looked_for.display()
     )]
     NoLike {
-        /// The file as the layout says it.
+        /// The file as named in the layout.
         like: String,
-        /// Where it would be.
+        /// The path where it was looked for.
         looked_for: PathBuf,
     },
-    /// A layout that is like itself, over others or not.
+    /// A chain of `like` leads back to a layout that is already in it.
     #[error("like = \"{like}\" leads back to where it came from: no layout can be like itself")]
     LikeItself {
         /// The name or the file.
         like: String,
     },
-    /// A key that neither the layout has nor one that it is like.
+    /// A required key is in neither the layout nor any layout that it is like.
     #[error("{key} is missing: every layout says it, or is like one that does")]
     MissingKey {
         /// The key.
         key: &'static str,
     },
-    /// Commas cannot separate both fields and decimals.
+    /// Commas are to separate both fields and decimals.
     #[error("decimal_comma = true needs another delimiter than \"comma\"")]
     CommaTwice,
 }
 
-/// Units that the numbers contradict.
+/// A stated unit that the numbers contradict.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum UnitSuspicion {
-    /// Positions and velocities are related by the factor of another unit.
+    /// Positions and velocities are related by the factor between two units.
     #[error(
         "rows {first_row} to {last_row}, joint {joint}: the position moves {ratio:.4} times as far as the integral of \
          the velocity (from {q_from:.4} to {q_to:.4} rad as read): {quantity} looks like {unit}; \
          put {quantity} = \"{unit}\" under [units] in a layout file (--layout)"
     )]
     Ratio {
-        /// Quantity that is in another unit: `time`, `q` or `qd`.
+        /// The quantity that is in another unit: `time`, `q` or `qd`.
         quantity: &'static str,
         /// The unit it seems to be in.
         unit: &'static str,
-        /// The joint it is seen on, from 1.
+        /// The joint on which it is seen, from 1.
         joint: usize,
         /// Change of position over integral of velocity.
         ratio: f64,
-        /// First row of the stretch it is seen in.
+        /// First row of the stretch in which it is seen.
         first_row: usize,
-        /// Last row of it.
+        /// Last row of that stretch.
         last_row: usize,
-        /// Position there, as read.
+        /// Position at the start of the stretch, as read.
         q_from: f64,
-        /// Position at its end.
+        /// Position at the end of the stretch, as read.
         q_to: f64,
     },
-    /// The clock's steps are no recorder's.
+    /// The time steps are too long or too short for a recorder of motion.
     #[error(
         "the time steps by {step_s:.3e} s from row to row (first at row {row}, time {time_s}): it looks like {unit}; \
          put time = \"{unit}\" under [units] in a layout file (--layout)"
@@ -465,7 +466,7 @@ pub enum UnitSuspicion {
         /// Its time as read, s.
         time_s: f64,
     },
-    /// Positions and velocities agree with each other and both are too large.
+    /// Positions and velocities agree with each other, and both are too large.
     #[error(
         "row {row}, joint {joint}: q = {q:.4} rad, and {joints} joints stay beyond one turn on average: q and qd look \
          like degrees; put q = \"deg\" and qd = \"deg/s\" under [units] in a layout file (--layout)"
@@ -480,17 +481,17 @@ pub enum UnitSuspicion {
         /// How many joints show it.
         joints: usize,
     },
-    /// Angles change and velocities do not follow.
+    /// The angles change, but the velocities are zero.
     #[error(
         "rows {first_row} to {last_row}, joint {joint}: the position moves and the velocities are zero, as if they were not recorded; \
          leave qd out of [columns] in a layout file (--layout), and they are taken from the angles"
     )]
     NoVelocity {
-        /// The joint it is seen on, from 1.
+        /// The joint on which it is seen, from 1.
         joint: usize,
-        /// First row of the stretch it is seen in.
+        /// First row of the stretch in which it is seen.
         first_row: usize,
-        /// Last row of it.
+        /// Last row of that stretch.
         last_row: usize,
     },
     /// No unit explains how positions and velocities are related.
@@ -499,13 +500,13 @@ pub enum UnitSuspicion {
          the velocity, which no unit explains; check which columns are q, qd and time in the layout"
     )]
     Unrelated {
-        /// The joint it is seen on, from 1.
+        /// The joint on which it is seen, from 1.
         joint: usize,
         /// Change of position over integral of velocity.
         ratio: f64,
-        /// First row of the stretch it is seen in.
+        /// First row of the stretch in which it is seen.
         first_row: usize,
-        /// Last row of it.
+        /// Last row of that stretch.
         last_row: usize,
     },
 }

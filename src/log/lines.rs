@@ -1,4 +1,4 @@
-//! Lines of a text file, numbered as in the file, with bounded memory and the file's SHA-256.
+//! Reads the lines of a text file with bounded memory, numbers them as in the file, and computes the file's SHA-256.
 
 use std::io::{BufRead, BufReader, Read};
 
@@ -6,26 +6,27 @@ use sha2::{Digest, Sha256};
 
 use super::error::LogError;
 
-/// Longest line accepted, bytes: 200 numbers of 300 digits, each a printed uninitialised double, fit.
+/// Longest line accepted, bytes. It has room for 200 numbers of 300 digits, the length at which an uninitialised double
+/// prints.
 const LINE_LIMIT: usize = 1 << 16;
-/// Bytes looked at to tell text from other files.
+/// Number of leading bytes that are inspected to tell text from binary files.
 const HEAD: usize = 1 << 13;
 
-/// One line without its end.
+/// One line without its line end.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Line {
-    /// Number in the file, from 1.
+    /// Number of the line in the file, from 1.
     pub(super) row: usize,
-    /// Content.
+    /// The bytes of the line.
     pub(super) bytes: Vec<u8>,
-    /// Whether a line end followed.
+    /// Whether the line was terminated by a line end.
     pub(super) ended: bool,
 }
 
 /// Reads a source line by line.
 ///
-/// A line ends with `\n`; carriage returns before it belong to the end (Windows writes one, some
-/// recorders two). A source without `\n` in its first 8 kB but with `\r` ends its lines with that.
+/// A line ends with `\n`; carriage returns directly before it belong to the line end (Windows writes one, some
+/// recorders two). If the first 8 kB contain `\r` but no `\n`, lines end with `\r`.
 pub(super) struct Lines<R> {
     source: BufReader<Hashing<R>>,
     file: String,
@@ -34,7 +35,7 @@ pub(super) struct Lines<R> {
 }
 
 impl<R: Read> Lines<R> {
-    /// Looks at the first bytes: skips a byte order mark, refuses what is not text.
+    /// Inspects the first bytes: skips a byte order mark and rejects a source that is not text.
     pub(super) fn new(source: R, file: &str) -> Result<Self, LogError> {
         let source = Hashing { source, hash: Sha256::new() };
         let source = BufReader::with_capacity(1 << 16, source);
@@ -58,7 +59,7 @@ impl<R: Read> Lines<R> {
         Ok(lines)
     }
 
-    /// The next line that is not blank into `line`; `false` at the end of the source.
+    /// Reads the next line that is not blank into `line`; returns `false` at the end of the source.
     pub(super) fn next_into(&mut self, line: &mut Line) -> Result<bool, LogError> {
         loop {
             line.bytes.clear();
@@ -121,7 +122,7 @@ impl<R: Read> Lines<R> {
     }
 }
 
-/// Hashes what passes through.
+/// A reader that hashes all bytes passing through it.
 struct Hashing<R> {
     source: R,
     hash: Sha256,

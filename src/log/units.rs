@@ -1,7 +1,7 @@
-//! Whether the numbers are in the units the layout says.
+//! Checks that the numbers are in the units stated by the layout.
 //!
-//! An angle is the integral of its velocity over time. If Δq / ∫q̇ dt, which is 1 in the right units, is
-//! 180/π, 10⁻³ or another factor between units, one of the three is in another unit than stated.
+//! An angle is the integral of its velocity over time. If Δq / ∫q̇ dt, which is 1 in the right units, equals 180/π,
+//! 10⁻³ or another factor between units, then one of the three quantities is in another unit than stated.
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,27 +11,28 @@ use super::error::UnitSuspicion;
 use super::layout::{Angle, AngularVelocity, TimeUnit, Units};
 use crate::median::{median, median_step};
 
-/// Motion within one span below which its ratio says nothing, rad: 200 steps of a 10⁻⁴ rad encoder.
+/// A span in which a joint moves less than this is not used, rad: 200 steps of a 10⁻⁴ rad encoder.
 const MOVES_RAD: f64 = 0.02;
-/// Ratios this near to 1 (or, relatively, to a factor between units) are taken for it.
+/// Relative deviation up to which a ratio is taken to be 1, or a factor between units.
 const RATIO_TOLERANCE: f64 = 0.2;
-/// So many times as far as the velocity says: there is none. Milliseconds for seconds are a thousandth, and nanoseconds less.
+/// If the position moves this many times as far as the integral of the velocity, no velocity was recorded. Times in
+/// milliseconds read as seconds make the ratio 10⁻³, and times in nanoseconds make it smaller still.
 const NO_VELOCITY: f64 = 1e6;
-/// Steps of time a recorder of motion has, s.
+/// Time steps that a recorder of robot motion can have, s.
 const CLOCK_STEP_S: std::ops::Range<f64> = 1e-5..0.9;
 
 /// Δq / ∫q̇ dt of one joint.
 struct Ratio {
     joint: usize,
     ratio: f64,
-    /// Rows (indices) of the span with the largest motion.
+    /// First and last row (indices) of the span with the largest motion.
     span: (usize, usize),
 }
 
-/// Compares angles, velocities and clock.
+/// Compares angles, velocities and clock; returns a warning for each joint whose velocity disagrees.
 ///
 /// # Errors
-/// What the numbers contradict, with the remedy.
+/// The unit that the numbers contradict, with the remedy.
 pub(super) fn check(motion: &Motion, units: &Units) -> Result<Vec<LogWarning>, UnitSuspicion> {
     let ratios: Vec<Ratio> = (0..motion.q.len()).filter_map(|j| ratio_of(motion, j)).collect();
     let mut values: Vec<f64> = ratios.iter().map(|r| r.ratio).collect();
@@ -53,7 +54,7 @@ fn is_near(ratio: f64, expected: f64) -> bool {
     (ratio / expected - 1.0).abs() <= RATIO_TOLERANCE
 }
 
-/// The median over the spans of a log in which the joint moves; `None` if it hardly moves.
+/// Returns the median ratio over the spans of the log in which the joint moves; `None` if it hardly moves.
 fn ratio_of(motion: &Motion, joint: usize) -> Option<Ratio> {
     let rows = motion.rows();
     let length = (rows / 200).clamp(10, 100);
@@ -75,14 +76,14 @@ fn ratio_of(motion: &Motion, joint: usize) -> Option<Ratio> {
             widest = (moved.abs(), (first, last));
         }
     }
-    // A few spans of garbage in a log at rest are no motion.
+    // In a log at rest, a few spans of garbage must not count as motion.
     if ratios.len() < 3.max(spans / 20) {
         return None;
     }
     Some(Ratio { joint, ratio: median(&mut ratios)?, span: widest.1 })
 }
 
-/// The fewest changes of unit that explain the ratio, the first of them named.
+/// Finds the smallest set of unit changes that explains the ratio and names the first change in it.
 fn contradiction(motion: &Motion, units: &Units, ratios: &[Ratio], ratio: f64) -> UnitSuspicion {
     let seen =
         ratios.iter().min_by(|a, b| (a.ratio - ratio).abs().total_cmp(&(b.ratio - ratio).abs()));
@@ -101,7 +102,7 @@ fn contradiction(motion: &Motion, units: &Units, ratios: &[Ratio], ratio: f64) -
             q_from: motion.q[joint][first],
             q_to: motion.q[joint][last],
         },
-        // No motion at all, but for what noise adds up to.
+        // The integral of the velocity is zero but for accumulated noise.
         None if ratio.abs() > NO_VELOCITY => {
             UnitSuspicion::NoVelocity { joint: joint + 1, first_row, last_row }
         }
@@ -109,7 +110,8 @@ fn contradiction(motion: &Motion, units: &Units, ratios: &[Ratio], ratio: f64) -
     }
 }
 
-/// Other units the file might be in, with the Δq / ∫q̇ dt this would show as read.
+/// A combination of units that the file might be in, and the Δq / ∫q̇ dt that it would show when read with the stated
+/// units.
 struct Alternative {
     ratio: f64,
     changes: Vec<(&'static str, &'static str)>,
@@ -142,7 +144,7 @@ fn alternatives(units: &Units) -> impl Iterator<Item = Alternative> {
     })
 }
 
-/// For logs at rest: no recorder of motion has steps of seconds.
+/// Checks the clock of a log at rest: no recorder of motion has steps of seconds.
 fn check_clock(motion: &Motion, units: &Units) -> Result<(), UnitSuspicion> {
     let Some(step_s) = median_step(motion.time_s).filter(|s| !CLOCK_STEP_S.contains(s)) else {
         return Ok(());
@@ -161,8 +163,8 @@ fn check_clock(motion: &Motion, units: &Units) -> Result<(), UnitSuspicion> {
     }
 }
 
-/// Angles and velocities both in degrees agree with each other. But no arm keeps two joints beyond a
-/// whole turn for half of a log, and in degrees nearly every posture looks like that.
+/// Detects angles and velocities that are both in degrees, which agree with each other. No arm keeps two joints beyond
+/// a whole turn for half of a log, but in degrees read as radians nearly every posture looks like that.
 fn check_degrees(motion: &Motion, units: &Units) -> Result<(), UnitSuspicion> {
     if units.q == Angle::Deg {
         return Ok(());
