@@ -1,4 +1,4 @@
-//! Which rows of a log belong together.
+//! Decides which rows of a log belong to the recorded motion, and unwraps its angles.
 
 use crate::median::{median, median_step, missing_steps};
 use std::collections::BTreeMap;
@@ -6,36 +6,36 @@ use std::f64::consts::{PI, TAU};
 
 use super::account::{LogWarning, Reason};
 
-/// Largest angle of a joint, rad: 159 turns. More is not a position.
+/// Largest angle of a joint, rad: 159 turns. A larger number is not a position.
 pub(super) const ANGLE_BOUND_RAD: f64 = 1e3;
 /// Largest velocity of a joint, rad/s; the fastest arms reach about 15.
 pub(super) const VELOCITY_BOUND_RAD_S: f64 = 100.0;
 
-/// Difference of angle that is always accepted between rows, rad. It is above encoder noise, quantisation
-/// and the lag of a filtered velocity (1 rad/s late by 20 ms is 0.02 rad), and far below the steps of
-/// uninitialised or shifted rows.
+/// Mismatch of angle that is always accepted between rows, rad. It is above encoder noise, quantisation and the lag of
+/// a filtered velocity (1 rad/s late by 20 ms is 0.02 rad), and far below the steps of uninitialised or shifted rows.
 const STEP_TOLERANCE_RAD: f64 = 0.05;
-/// Acceleration up to which a motion is believed over a step, rad/s²; arms stay below about 20.
+/// Acceleration up to which a motion is plausible over a step, rad/s²; arms stay below about 20.
 const ACCELERATION_RAD_S2: f64 = 20.0;
-/// Change of velocity that is always accepted between rows, rad/s: a collision or an emergency stop.
+/// Change of velocity that is always accepted between rows, rad/s; it covers a collision or an emergency stop.
 const VELOCITY_TOLERANCE_RAD_S: f64 = 1.0;
-/// A row continues a stretch over at most this many lines of the file.
+/// A row continues a stretch only if it is at most this many rows of the file after the last row of the stretch.
 const BRIDGED_LINES: usize = 8;
-/// Stretches shorter than this that nothing connects to the rest are garbage.
+/// A stretch with fewer rows than this that nothing connects to the other rows is garbage.
 const SHORT_STRETCH: usize = 10;
-/// Stretches that are open for continuation at one time.
+/// Number of stretches that are kept open for continuation at any time.
 const OPEN_STRETCHES: usize = 16;
-/// A step of time this many times the median is far ahead.
+/// A time step longer than this many median steps counts as far ahead.
 const FAR_AHEAD_STEPS: f64 = 20.0;
-/// Rows in a row whose time is taken for wrong where it is far ahead; more are a pause behind which the clock was set back.
+/// Largest number of consecutive rows far ahead whose time is taken to be wrong. A longer run is a genuine pause, after
+/// which the clock was set back.
 const AHEAD_ROWS: usize = 8;
 
-/// The columns of motion of a log, one entry per row.
+/// The columns that describe the motion of a log, one entry per row.
 pub(super) struct Motion<'a> {
     pub(super) time_s: &'a [f64],
     /// Angle of each joint.
     pub(super) q: &'a [Vec<f64>],
-    /// Velocity of each joint; none of a file that has none, as long as they are not taken from the angles.
+    /// Velocity of each joint; empty for a file without velocities until they are computed from the angles.
     pub(super) qd: &'a [Vec<f64>],
     /// Number of the row in the file.
     pub(super) row: &'a [usize],
@@ -46,14 +46,16 @@ impl Motion<'_> {
         self.time_s.len()
     }
 
-    /// q_j(k) − q_j(i) − ½ (q̇_j(i) + q̇_j(k)) (t_k − t_i): zero for a motion of constant acceleration.
+    /// Mismatch between angle and velocity, q_j(k) − q_j(i) − ½ (q̇_j(i) + q̇_j(k)) (t_k − t_i): zero for constant
+    /// acceleration.
     pub(super) fn defect(&self, joint: usize, i: usize, k: usize) -> f64 {
         let (q, qd) = (&self.q[joint], &self.qd[joint]);
         q[k] - q[i] - 0.5 * (qd[i] + qd[k]) * (self.time_s[k] - self.time_s[i])
     }
 
-    /// Largest defect or change of velocity of any joint over what is tolerated; at most 1 if row `k` can follow row `i`. One whole
-    /// turn does not count: a wrapped angle is a matter of notation.
+    /// Largest mismatch of angle, or change of velocity, of any joint relative to its tolerance. Row `k` can follow row
+    /// `i` if the result is at most 1. One whole turn does not count, because a wrapped angle is only a matter of
+    /// notation.
     fn strain(&self, i: usize, k: usize) -> f64 {
         let step_s = self.time_s[k] - self.time_s[i];
         let tolerance_rad_s = VELOCITY_TOLERANCE_RAD_S + ACCELERATION_RAD_S2 * step_s;
@@ -67,11 +69,11 @@ impl Motion<'_> {
             .fold(0.0, f64::max)
     }
 
-    /// The turn (+1 or −1) that the angle lost on the way to row `k` from the one before: no motion jumps so far, and a
-    /// wrapped angle does.
+    /// The turn (+1 or −1) that the recorded angle lost from row `k` − 1 to row `k`: only a wrapped angle jumps that
+    /// far.
     fn lost_turn(&self, joint: usize, k: usize) -> Option<f64> {
         if self.qd.is_empty() {
-            // No arm turns by half a turn from one row to the next.
+            // No joint moves by half a turn from one row to the next.
             let jump_rad = self.q[joint][k] - self.q[joint][k - 1];
             return (jump_rad.abs() > PI).then(|| -jump_rad.signum());
         }
@@ -87,20 +89,24 @@ impl Motion<'_> {
     }
 }
 
-/// Defect of angle tolerated over a step of time: the trapezoidal rule errs by at most a Δt²/4 if the
+/// Mismatch of angle tolerated over a time step: the error of the trapezoidal rule is at most a Δt²/4 if the
 /// acceleration stays within ±a.
 fn angle_tolerance_rad(step_s: f64) -> f64 {
     STEP_TOLERANCE_RAD + ACCELERATION_RAD_S2 * step_s * step_s / 4.0
 }
 
-/// For every row why its time cannot stay, so that the times that stay increase strictly.
+/// For every row the reason why its time is rejected, if it is; the remaining times increase strictly.
+///
+/// A time that is not after the one before it is set aside. The exception is a run of up to [`AHEAD_ROWS`] preceding
+/// rows that are far ahead of the rows on both sides, provided that at least as many rows continue normally after it;
+/// then the run is set aside instead.
 ///
 /// A time not after the one before it is set aside, unless the one before, or up to [`AHEAD_ROWS`] of them, are far
 /// ahead of the rows on both sides, and as many rows go on behind; then these are.
 pub(super) fn order_of_time(time_s: &[f64]) -> Vec<Option<Reason>> {
     let mut verdicts = vec![None; time_s.len()];
     let far = FAR_AHEAD_STEPS * median_step(time_s).unwrap_or(0.0);
-    // Those that stay so far.
+    // The rows kept so far.
     let mut kept: Vec<usize> = Vec::with_capacity(time_s.len());
     for (k, &t) in time_s.iter().enumerate() {
         let (before, ahead) = kept.split_at(kept.partition_point(|&i| time_s[i] < t));
@@ -129,14 +135,18 @@ pub(super) fn order_of_time(time_s: &[f64]) -> Vec<Option<Reason>> {
     verdicts
 }
 
-/// Rows that follow from one another.
+/// A sequence of rows that follow from one another.
 struct Stretch {
     first: usize,
     last: usize,
     rows: usize,
 }
 
-/// For every row why its motion cannot stay.
+/// For every row the reason why its motion is rejected, if it is.
+///
+/// Rows are linked into stretches: each row is appended to the stretch whose last row it follows best. A log is one
+/// motion, so a stretch that is short compared with the longest, or interleaved with a longer one, is garbage (rows of
+/// uninitialised memory, shifted fields, zeros).
 ///
 /// Rows are strung into stretches, each row onto the one whose last row it follows best. A log is one
 /// motion: what is short beside a longer stretch, or interleaved with one, is garbage (rows of
@@ -145,7 +155,7 @@ pub(super) fn consistency(motion: &Motion) -> Vec<Option<Reason>> {
     let mut verdicts = vec![None; motion.rows()];
     let mut stretch_of = vec![0_usize; motion.rows()];
     let mut stretches: Vec<Stretch> = Vec::new();
-    // Those that may go on, the longest unused first.
+    // Stretches that may be continued, least recently used first.
     let mut open: Vec<usize> = Vec::with_capacity(OPEN_STRETCHES);
     for k in 0..motion.rows() {
         if !motion.is_plausible(k) {
@@ -184,13 +194,13 @@ pub(super) fn consistency(motion: &Motion) -> Vec<Option<Reason>> {
     verdicts
 }
 
-/// The stretches that make up the motion: the longest, and every other that is not short and does not
-/// overlap a longer one.
+/// Selects the stretches that make up the motion: the longest, and every other that is not short and does not overlap a
+/// longer one.
 fn believed(stretches: &[Stretch]) -> Vec<bool> {
     let mut believed = vec![false; stretches.len()];
     let mut order: Vec<usize> = (0..stretches.len()).collect();
     order.sort_by_key(|&s| std::cmp::Reverse(stretches[s].rows));
-    // First row to last row of those taken; they are disjoint.
+    // First row → last row of the selected stretches, which are disjoint.
     let mut taken: BTreeMap<usize, usize> = BTreeMap::new();
     for (rank, s) in order.into_iter().enumerate() {
         let Stretch { first, last, rows } = stretches[s];
@@ -210,12 +220,13 @@ fn believed(stretches: &[Stretch]) -> Vec<bool> {
 pub(super) struct Unwrapped {
     /// Counted from 0.
     pub(super) joint: usize,
-    /// Of every row, rad.
+    /// Angle in every row, rad.
     pub(super) q: Vec<f64>,
 }
 
 impl Unwrapped {
-    /// Brings the angles that were asked for into the turn of these; they may be wrapped at other rows, or not at all.
+    /// Shifts the target angles by whole turns to within half a turn of these angles. Targets may be wrapped at other
+    /// rows, or not at all.
     pub(super) fn bring_along(&self, target_q: &mut [f64]) {
         for (target, q) in target_q.iter_mut().zip(&self.q) {
             *target += TAU * ((q - *target) / TAU).round();
@@ -223,11 +234,12 @@ impl Unwrapped {
     }
 }
 
-/// The joints whose angles jump by one turn between the rows that are left, put together again, and what to say of it.
+/// Unwraps all joints whose angles jump by one turn between the remaining rows; returns them and the warning that
+/// reports it.
 pub(super) fn unwrapped(motion: &Motion) -> (Vec<Unwrapped>, Option<LogWarning>) {
     let mut joints = Vec::new();
     let mut count = 0;
-    // The first row behind a jump, and its joint.
+    // The first row after a jump, and its joint.
     let mut first: Option<(usize, usize)> = None;
     for joint in 0..motion.q.len() {
         let jumps: Vec<(usize, f64)> =
@@ -252,11 +264,12 @@ pub(super) fn unwrapped(motion: &Motion) -> (Vec<Unwrapped>, Option<LogWarning>)
     (joints, warning)
 }
 
-/// Rows of which an angle is compared with the median.
+/// Number of rows whose median an angle is compared with.
 const BESIDE: usize = 5;
 
-/// For every row of a log without velocities why its angles cannot stay: what is off the median of five is wild, and would be in the slopes
-/// of four rows beside it. Where a joint turns one way the median is the angle itself.
+/// For every row of a log without velocities the reason why its angles are rejected, if they are. An angle far from the
+/// median of five rows is wild; it would corrupt the slopes of four neighbouring rows. While a joint turns in one
+/// direction, the median is the angle itself.
 pub(super) fn wild_angles(motion: &Motion) -> Vec<Option<Reason>> {
     let rows = motion.rows();
     let is_wild = |q: &Vec<f64>, k: usize| {
@@ -272,14 +285,14 @@ pub(super) fn wild_angles(motion: &Motion) -> Vec<Option<Reason>> {
     (0..rows).map(verdict).collect()
 }
 
-/// Share of the rows that may repeat the angles of the one before while the arm moves.
+/// Among the rows in which the arm moves, the share that may repeat the angles of the row before.
 const MOST_HELD: f64 = 0.3;
-/// An arm moves where a joint is faster than this, rad/s, far above the noise of velocities, and its angle changes in a row by so many
-/// times the least that it is ever seen to change by.
+/// The arm moves where a joint is faster than this, rad/s, which is far above the noise of velocities, and fast enough
+/// to advance in one step by [`MOVES`] times the smallest change ever seen in its angle.
 const MOVES_RAD_S: f64 = 0.05;
 const MOVES: f64 = 5.0;
 
-/// Whether most rows hold what an earlier one read: the file is written faster than the arm is asked.
+/// Detects a file that is written faster than the arm is sampled, so that many rows repeat an earlier reading.
 pub(super) fn held(motion: &Motion) -> Option<LogWarning> {
     let change = |joint: usize, k: usize| (motion.q[joint][k] - motion.q[joint][k - 1]).abs();
     let least = |joint: usize| {
@@ -302,7 +315,7 @@ pub(super) fn held(motion: &Motion) -> Option<LogWarning> {
     })
 }
 
-/// Whether the angles jump between the rows that are left.
+/// Detects jumps of the angles between the remaining rows.
 pub(super) fn jumps(motion: &Motion) -> Option<LogWarning> {
     let mut first = None;
     let mut count = 0;
@@ -324,15 +337,15 @@ pub(super) fn jumps(motion: &Motion) -> Option<LogWarning> {
     })
 }
 
-/// How many rows the recorder left out: the time between two rows in median steps, less the rows between
-/// them that were set aside.
+/// Counts the rows that the recorder left out: the time between two rows in median steps, less the rows between them
+/// that were set aside.
 pub(super) fn missed_samples(motion: &Motion) -> Option<(usize, LogWarning)> {
     let typical_s = median_step(motion.time_s)?;
     let (mut missed, mut gaps, mut longest_s, mut after_row) = (0_usize, 0, 0.0, 0);
     for k in 1..motion.rows() {
         let step_s = motion.time_s[k] - motion.time_s[k - 1];
         let set_aside = motion.row[k] - motion.row[k - 1] - 1;
-        // A float beyond the range becomes the largest integer, so a clock that leaps cannot overflow.
+        // Converting a float beyond the range of integers saturates, so a clock that leaps cannot overflow.
         let here =
             (missing_steps(motion.time_s, k, typical_s).round() as usize).saturating_sub(set_aside);
         if here > 0 {

@@ -1,20 +1,20 @@
-//! How a recorder counts joints where the description of the robot counts otherwise.
+//! Order, sign and zero of the joints where a recorder's convention differs from the robot's description.
 
 use std::f64::consts::{PI, TAU};
 
 use super::record::{Effort, Log};
 use crate::robot::JointSignals;
 
-/// Where the signal of a joint stands in a recording, and which way it counts there.
+/// The position and the sign of a joint's signal in a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Place {
-    /// The joint (0-based) by the recorder's count.
+    /// The joint (0-based) in the recorder's numbering.
     pub joint: usize,
-    /// Whether it counts the other way.
+    /// Whether the recorder uses the opposite sign.
     pub is_reversed: bool,
 }
 
-/// The places of all joints of an arm in a recording:
+/// The convention of a recording: positions, signs and zeros of all joints of an arm.
 ///
 /// q_j = ± q_recorded(m_j) + zero_j,   q̇_j = ± q̇_recorded(m_j),   τ_j = ± τ_recorded(t_j).
 #[derive(Debug, Clone, PartialEq)]
@@ -25,72 +25,73 @@ pub struct Counting {
 }
 
 impl Counting {
-    /// As the description of an arm with so many joints counts them.
+    /// The convention of the robot's description, for an arm with this many joints.
     pub fn as_described(joints: usize) -> Self {
         let places = |joint| Place { joint, is_reversed: false };
         let motion: Vec<Place> = (0..joints).map(places).collect();
         Self { torque: motion.clone(), motion, zero_rad: vec![0.0; joints] }
     }
 
-    /// Where angle and velocity of each joint stand.
+    /// Position and sign of angle and velocity of each joint.
     pub fn motion(&self) -> &[Place] {
         &self.motion
     }
 
-    /// Where the current or torque of each joint stands.
+    /// Position and sign of the current or torque of each joint.
     pub fn torque(&self) -> &[Place] {
         &self.torque
     }
 
-    /// What is added to each angle behind its reversal, rad.
+    /// Offset added to each angle after its sign is applied, rad.
     pub fn zero_rad(&self) -> &[f64] {
         &self.zero_rad
     }
 
-    /// Whether nothing is counted otherwise.
+    /// Whether the recorder's convention is that of the robot's description.
     pub fn is_as_described(&self) -> bool {
         *self == Self::as_described(self.motion.len())
     }
 
-    /// Takes angle and velocity of joint `k` (0-based) from where those of `order[k]` stood.
+    /// Assigns to joint `k` (0-based) the angle and velocity that joint `order[k]` has had so far.
     pub fn order_motions(&mut self, order: &[usize]) {
         self.motion = order.iter().map(|&k| self.motion[k]).collect();
         self.zero_rad = order.iter().map(|&k| self.zero_rad[k]).collect();
     }
 
-    /// Takes the torque of joint `k` (0-based) from where that of `order[k]` stood.
+    /// Assigns to joint `k` (0-based) the torque that joint `order[k]` has had so far.
     pub fn order_torques(&mut self, order: &[usize]) {
         self.torque = order.iter().map(|&k| self.torque[k]).collect();
     }
 
-    /// Lets angle and velocity of joint `j` (0-based) count the other way.
+    /// Reverses the sign of angle and velocity of joint `j` (0-based), its offset included.
     pub fn reverse_motion(&mut self, j: usize) {
         self.motion[j].is_reversed = !self.motion[j].is_reversed;
-        // 0 − 0 = 0, and −0 is not.
+        // 0 − x instead of −x: this keeps 0 from becoming −0.
         self.zero_rad[j] = 0.0 - self.zero_rad[j];
     }
 
-    /// Lets the torque of joint `j` (0-based) count the other way.
+    /// Reverses the sign of the torque of joint `j` (0-based).
     pub fn reverse_torque(&mut self, j: usize) {
         self.torque[j].is_reversed = !self.torque[j].is_reversed;
     }
 
-    /// Adds to the angle of joint `j` (0-based).
+    /// Adds `add_rad` to the offset of the angle of joint `j` (0-based).
     pub fn turn(&mut self, j: usize, add_rad: f64) {
         self.zero_rad[j] += add_rad;
     }
 
-    /// Leaves whole turns out of the zeros: what is left is more than half a turn back, and half a turn at most.
+    /// Removes whole turns from the offsets, which brings them into the interval (−π, π].
     pub fn leave_out_whole_turns(&mut self) {
         for zero in &mut self.zero_rad {
-            // Half a turn is +π, whichever way round-off has it.
+            // With this tolerance half a turn becomes +π in spite of round-off.
             let turns = ((*zero - PI) / TAU - 1e-9).ceil();
-            // −0 + 0 = 0.
+            // Adding 0 turns −0 into 0.
             *zero = *zero - turns * TAU + 0.0;
         }
     }
 
-    /// The counting that is this one of what is read with `earlier`.
+    /// Composes two conventions: the result reads a recording as if `earlier` were applied first and `self` to its
+    /// result.
     pub fn of_what_is_read_with(&self, earlier: &Self) -> Self {
         let place = |of: &[Place], place: &Place| Place {
             joint: of[place.joint].joint,
@@ -108,7 +109,7 @@ impl Counting {
         both
     }
 
-    /// Angles as the arm counts them, rad.
+    /// Angles in the arm's convention, rad.
     pub fn angles(&self, recorded: &JointSignals) -> JointSignals {
         let mut q_rad = placed(&self.motion, recorded);
         for (j, add) in self.zero_rad.iter().enumerate().filter(|(_, add)| **add != 0.0) {
@@ -117,17 +118,17 @@ impl Counting {
         q_rad
     }
 
-    /// Velocities or accelerations as the arm counts them.
+    /// Velocities or accelerations in the arm's convention.
     pub fn rates(&self, recorded: &JointSignals) -> JointSignals {
         placed(&self.motion, recorded)
     }
 
-    /// Currents or torques as the arm counts them.
+    /// Currents or torques in the arm's convention.
     pub fn torques(&self, recorded: &JointSignals) -> JointSignals {
         placed(&self.torque, recorded)
     }
 
-    /// Lets a log that is read as it was recorded count as the arm does.
+    /// Converts a log from the recorder's convention to the arm's, in place.
     pub(super) fn apply(&self, log: &mut Log) {
         if self.is_as_described() {
             return;
@@ -196,7 +197,7 @@ mod tests {
         assert_close(&both.torques(&q), &other.torques(&one().torques(&q)));
     }
 
-    /// Changed step by step it reads what the steps read.
+    /// Changing a convention step by step reads the same values as applying the steps one after the other.
     #[test]
     fn steps_change_what_was_read_before() {
         let mut stepped = one();

@@ -1,39 +1,46 @@
-//! Time stamps that are rounded more coarsely than rows follow each other: `0.01 s` at 125 rows a second.
+//! Repairs time stamps rounded more coarsely than the sampling interval: to `0.01 s` at 125 rows per second, for
+//! example.
 //!
-//! Such stamps repeat, and where they do not they are off by up to half of their step. Rows that were recorded evenly lie on the straight
-//! line through all of them. Whether they were, the motion tells: rows that are missing regularly, or written twice, have the same
-//! pattern of stamps, but their angles follow from their velocities with the stamps as they are.
+//! Such stamps repeat, and those that do not are off by up to half of the resolution. Rows that were sampled evenly lie
+//! on the straight line through all stamps. The motion decides whether they were: rows that are missing regularly, or
+//! written twice, produce the same pattern of stamps, but then the angles follow from the velocities on the stamps as
+//! they are.
 
 use std::ops::Range;
 
 use super::clean::Motion;
 
-/// Fewer rows do not tell a pattern.
+/// With fewer rows than this no pattern is recognisable.
 pub(super) const FEWEST_ROWS: usize = 64;
-/// Stamps that are rounded to this share of what rows are apart, or more coarsely, are looked at.
+/// Stamps are examined if their resolution is at least this fraction of the sampling interval.
 const COARSE: f64 = 0.5;
-/// Rounded stamps lie within one step of the line. A recorder that is late now and then by a quarter of it is believed.
+/// Rounded stamps deviate from the line by at most one unit of resolution, peak to peak. A recorder that is
+/// occasionally late by a quarter of that is still accepted.
 const WITHIN_STEPS: f64 = 1.25;
-/// Their rms distance from it is that of rounding, 1/√12 of a step, or half as much; of a few wrong stamps it is less.
+/// Lowest rms deviation from the line, in units of the resolution: about half of 1/√12, the value for rounding. A few
+/// wrong stamps give less.
 const LEAST_RMS_STEPS: f64 = 0.14;
-/// How far off whole steps a stamp may be, in steps: decimal fractions of times of 10⁹ s.
+/// How far a stamp may be off the grid of its resolution, in units of the resolution: allows for decimal fractions of
+/// times around 10⁹ s.
 const ROUNDING: f64 = 1e-3;
-/// On the line angles follow from velocities this much better, or the stamps stay.
+/// The line is accepted only if it reduces the mismatch between angles and velocities to less than this fraction.
 const BETTER: f64 = 0.5;
-/// Share of rows that count: at rest nothing tells the time, and where an angle is wrapped it jumps by a turn.
+/// Quantile of the rows whose mismatch is compared. A high quantile is needed because an arm at rest says nothing about
+/// time; the rows above it are ignored because a wrapped angle jumps by a turn.
 const TELLING: f64 = 0.9;
 
-/// Rows that were recorded evenly.
+/// Time stamps of rows that were sampled evenly.
 pub(super) struct EvenStamps {
-    /// When, s.
+    /// The even time stamps, s.
     pub(super) time_s: Vec<f64>,
-    /// What their own stamps were rounded to, s.
+    /// Resolution of the original stamps, s.
     pub(super) resolution_s: f64,
-    /// Rows a second.
+    /// Rows per second.
     pub(super) rate_hz: f64,
 }
 
-/// Even stamps for rows whose own are rounded; `None` where they are not, or not rounded alone.
+/// Returns even stamps for rows whose own stamps are rounded; `None` if they are not rounded, or if rounding alone does
+/// not explain them.
 pub(super) fn even_stamps(motion: &Motion) -> Option<EvenStamps> {
     let (time_s, rows) = (motion.time_s, motion.row);
     let (first_s, first_row) = (*time_s.first()?, *rows.first()?);
@@ -51,7 +58,7 @@ pub(super) fn even_stamps(motion: &Motion) -> Option<EvenStamps> {
     if !is_coarse || !time_s.iter().all(is_on_grid) {
         return None;
     }
-    // Rows that were set aside have their place in the file.
+    // Rows that were set aside still have their place in the file.
     let place: Vec<f64> = rows.iter().map(|row| row.abs_diff(first_row) as f64).collect();
     let count = time_s.len() as f64;
     let middle = place.iter().sum::<f64>() / count;
@@ -74,7 +81,7 @@ pub(super) fn even_stamps(motion: &Motion) -> Option<EvenStamps> {
     is_better.then(|| EvenStamps { resolution_s, rate_hz: 1.0 / step_s, time_s: even })
 }
 
-/// [`row_defect`] of [`TELLING`] of the rows is less, rad.
+/// The mismatch that the fraction [`TELLING`] of the rows does not exceed, rad (see [`row_defect`]).
 pub(super) fn defect(motion: &Motion) -> f64 {
     let mut defects: Vec<f64> = told_rows(motion).map(|k| row_defect(motion, k)).collect();
     let place = (TELLING * defects.len() as f64) as usize;
@@ -82,13 +89,13 @@ pub(super) fn defect(motion: &Motion) -> f64 {
     *defect
 }
 
-/// The rows that have a [`row_defect`].
+/// The rows for which [`row_defect`] is defined.
 pub(super) fn told_rows(motion: &Motion) -> Range<usize> {
     1..if motion.qd.is_empty() { motion.rows() - 1 } else { motion.rows() }
 }
 
-/// How far angles are from where velocities bring them from row `k` − 1 to row `k`, or, of a log without these, from the straight line
-/// between the rows beside it, rad: the sum over the joints.
+/// Mismatch of row `k`, rad, summed over the joints: the distance of the angles from where the velocities lead from row
+/// `k` − 1 to row `k` or, in a log without velocities, from the straight line between the neighbouring rows.
 pub(super) fn row_defect(motion: &Motion, k: usize) -> f64 {
     let of_joint = |j: usize| match motion.qd.is_empty() {
         false => motion.defect(j, k - 1, k),
@@ -97,8 +104,8 @@ pub(super) fn row_defect(motion: &Motion, k: usize) -> f64 {
     (0..motion.q.len()).map(|j| of_joint(j).abs()).sum()
 }
 
-/// How far the angle of a joint in row `k` is from the straight line between the rows beside it, rad: a h²/2 where the stamps are right, and
-/// q̇ times what they are off where they are not.
+/// Distance of a joint's angle in row `k` from the straight line between the neighbouring rows, rad. It is about q̈
+/// h²/2 if the stamps are right, and q̇ times their error if they are not.
 fn between(motion: &Motion, joint: usize, k: usize) -> f64 {
     let (t, q) = (motion.time_s, &motion.q[joint]);
     let span_s = t[k + 1] - t[k - 1];

@@ -14,7 +14,7 @@ pub(super) enum Delimiter {
 }
 
 impl Delimiter {
-    /// As the layout says, or as the first line shows.
+    /// The delimiter stated by the layout, or the one found in the first line.
     pub(super) fn choose(layout: &Layout, first_line: &[u8]) -> Self {
         match layout.delimiter {
             DelimiterChoice::Comma => Self::Byte(b','),
@@ -47,32 +47,32 @@ impl Delimiter {
     }
 }
 
-/// One column that is read.
+/// One column of the file that is read.
 #[derive(Debug, Clone)]
 pub(super) struct Field {
     pub(super) block: Block,
     /// Name in the file, or empty.
     pub(super) name: String,
-    /// Factor to the SI unit.
+    /// Factor that converts to the SI unit; `None` if it is one.
     pub(super) factor: Option<f64>,
     /// Column number in the file, from 0.
     pub(super) column: usize,
 }
 
-/// Which columns of a file are read; fields of a block stand together, in the order of the joints.
+/// The columns of a file that are read. The fields of a block are contiguous, in the order of the joints.
 pub(super) struct Plan {
     pub(super) delimiter: Delimiter,
     pub(super) decimal_comma: bool,
-    /// Fields of every row.
+    /// Number of fields of every row.
     pub(super) width: usize,
     pub(super) fields: Vec<Field>,
-    /// For every column of the file its place in `fields`.
+    /// For every column of the file, its index in `fields`.
     pub(super) place: Vec<Option<usize>>,
     joints: usize,
 }
 
 impl Plan {
-    /// From the header of a file.
+    /// Builds the plan from the header of a file.
     pub(super) fn from_header(
         layout: &Layout,
         joints: usize,
@@ -84,7 +84,7 @@ impl Plan {
             .split(&header.bytes)
             .map(|name| String::from_utf8_lossy(name).into_owned())
             .collect();
-        // A delimiter at the end of the row separates nothing.
+        // A trailing delimiter does not start another field.
         if names.len() > 1 && names.last().is_some_and(String::is_empty) {
             names.pop();
         }
@@ -108,7 +108,8 @@ impl Plan {
         Self::new(layout, joints, delimiter, header.names.len(), fields)
     }
 
-    /// From the number of fields of a file without header.
+    /// Builds the plan from the number of fields of a file without header; `None` if the layout does not list this
+    /// width.
     pub(super) fn from_width(
         layout: &Layout,
         joints: usize,
@@ -121,7 +122,7 @@ impl Plan {
         };
         let mut fields = Vec::new();
         for &block in &known.blocks {
-            // Torques are taken where both are there.
+            // Torques take precedence where both are present.
             if block == Block::Current && known.blocks.contains(&Block::Torque) {
                 continue;
             }
@@ -158,7 +159,7 @@ impl Plan {
         Ok(Self { delimiter, decimal_comma: layout.decimal_comma, width, fields, place, joints })
     }
 
-    /// Where the block's fields are among `fields`.
+    /// Range of the block's fields within `fields`.
     pub(super) fn range(&self, block: Block) -> Option<std::ops::Range<usize>> {
         let first = self.fields.iter().position(|f| f.block == block)?;
         Some(first..first + if block.is_of_time() { 1 } else { self.joints })
@@ -166,7 +167,7 @@ impl Plan {
 }
 
 impl Field {
-    /// "column 14 (actual_current_0)", for messages.
+    /// The position of the column for messages, such as "column 14 (actual_current_0)".
     pub(super) fn place(&self) -> String {
         if self.name.is_empty() {
             format!("column {}", self.column + 1)
@@ -205,7 +206,7 @@ impl Header<'_> {
         }
     }
 
-    /// The fields of a block, or `Err(name)` of its first column if none of them is there.
+    /// The fields of a block, or `Err(name)` with the name of its first column if none of its columns is in the header.
     fn block(&self, block: Block) -> Result<Result<Vec<Field>, String>, LogError> {
         let Some(columns) = self.layout.columns(block) else {
             return Ok(Err(block.key().to_owned()));
@@ -254,7 +255,7 @@ impl Header<'_> {
                 }
             }
             Some(name) if found.is_empty() => Ok(Err(name)),
-            // The first joints are there and all others are not: another arm's log.
+            // The first joints are present and all later ones are missing: the log is of another arm.
             Some(name)
                 if columns.name(found.len()).as_ref() == Some(&name) && block == Block::Q =>
             {
@@ -264,7 +265,7 @@ impl Header<'_> {
         }
     }
 
-    /// Torques where they are logged, otherwise currents.
+    /// The fields of torques where they are logged, otherwise those of currents.
     fn effort(&self) -> Result<Vec<Field>, LogError> {
         let torque = match self.block(Block::Torque)? {
             Ok(fields) => return Ok(fields),

@@ -1,4 +1,4 @@
-//! What a group of columns means.
+//! Blocks: groups of columns with one meaning.
 
 use serde::Deserialize;
 
@@ -36,23 +36,23 @@ impl Block {
         Self::Temperature,
     ];
 
-    /// Those that a log need not have.
+    /// The blocks that a log need not have.
     pub(in crate::log) fn optional() -> impl Iterator<Item = Self> {
         Self::ALL.into_iter().filter(|block| block.is_optional())
     }
 
-    /// Whether a log need not have it.
+    /// Whether the block is optional in a file. `qd` is not counted as optional, although a layout may omit it.
     pub(in crate::log) fn is_optional(self) -> bool {
         let is_of_motion = matches!(self, Self::Q | Self::Qd | Self::Current | Self::Torque);
         !self.is_of_time() && !is_of_motion
     }
 
-    /// Whether it is one column for all joints.
+    /// Whether the block is a single column rather than one column per joint.
     pub(in crate::log) fn is_of_time(self) -> bool {
         matches!(self, Self::Time | Self::TimeNanoseconds)
     }
 
-    /// Its key in a layout file.
+    /// The key of the block in a layout file.
     pub(in crate::log) fn key(self) -> &'static str {
         match self {
             Self::Time => "time",
@@ -70,19 +70,19 @@ impl Block {
         }
     }
 
-    /// Largest magnitude that can be a measurement, in the SI unit (°C for temperatures). What lies beyond
-    /// is an uninitialised number. Angles and velocities are held to a tighter bound once their unit is sure.
+    /// Largest magnitude that a measurement can have, in the SI unit (°C for temperatures). Anything larger is an
+    /// uninitialised number. Angles and velocities are held to a tighter bound once their unit is known.
     pub(in crate::log) fn bound(self) -> f64 {
         match self {
             // Nanoseconds since 1970 stay below this until the year 2286.
             Self::Time => 1e19,
-            // Of one second.
+            // Nanoseconds are a fraction of one second.
             Self::TimeNanoseconds => 1.0,
-            // A thousand turns read in degrees without the layout saying so.
+            // A thousand turns recorded in degrees by a layout that does not say so.
             Self::Q | Self::Qd | Self::TargetQ | Self::TargetQd => 3.6e5,
-            // 30 000 rad/s² is 3000 times what arms do; in degrees 60 times.
+            // 30 000 rad/s² is 3000 times the acceleration of real arms; as a number in degrees, it is still 60 times.
             Self::TargetQdd => 3e4,
-            // The drives of the largest arms take about 100 A and give about 10 kNm.
+            // The drives of the largest arms draw about 100 A and deliver about 10 kNm.
             Self::Current | Self::TargetCurrent => 500.0,
             Self::Torque | Self::TargetMoment => 5e4,
             Self::Temperature => 1e3,

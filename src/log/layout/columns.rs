@@ -1,4 +1,4 @@
-//! Where a block's columns are: by name, by pattern, by number.
+//! Where the columns of a block are: by name, by pattern or by number.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use serde::Deserialize;
 use super::block::Block;
 use crate::log::error::LayoutFault;
 
-/// Where each block is.
+/// The columns of every block.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Blocks {
@@ -26,7 +26,7 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
-    /// The columns of `block`, where the layout has them.
+    /// The columns of `block`, if the layout has them.
     pub(super) fn of(&self, block: Block) -> Option<&Columns> {
         match block {
             Block::Time => &self.time,
@@ -67,7 +67,7 @@ pub(in crate::log) struct ColumnRange {
     last: usize,
 }
 
-/// As a layout file says it.
+/// Prints the columns as they are written in a layout file.
 impl fmt::Display for Columns {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
@@ -82,7 +82,7 @@ impl fmt::Display for Columns {
 }
 
 impl Columns {
-    /// Names by joint; a pattern goes on for as many joints as asked. `None` for column numbers.
+    /// Name of the column of a joint (from 0). A pattern gives a name for any joint. `None` for column numbers.
     pub(in crate::log) fn name(&self, joint: usize) -> Option<String> {
         match self {
             Self::Name(pattern) => Some(
@@ -102,7 +102,7 @@ impl Columns {
         }
     }
 
-    /// How many there are; `None` for a pattern.
+    /// Number of columns; `None` for a pattern.
     pub(in crate::log) fn len(&self) -> Option<usize> {
         match self {
             Self::Name(_) => None,

@@ -1,4 +1,4 @@
-//! The `[joints]` table of a layout: places, signs and zeros.
+//! The `[joints]` table of a layout: order, signs and zeros of the joints.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
@@ -9,29 +9,29 @@ use super::units::Angle;
 use crate::log::counting::{Counting, Place};
 use crate::log::error::LayoutFault;
 
-/// How a recorder counts joints where the description of the robot counts otherwise; joints count from 1.
+/// Where the joints of a recorder differ in order, sign or zero from the description of the robot; joints count from 1.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Joints {
-    /// For each joint of the arm the one that it is by the recorder's count.
+    /// For each joint of the arm, the number of that joint in the recording.
     #[serde(skip_serializing_if = "Option::is_none")]
     order: Option<Vec<usize>>,
-    /// The same for currents and torques, where these are counted in another order.
+    /// The same for currents and torques, if they are recorded in another order.
     #[serde(skip_serializing_if = "Option::is_none")]
     torque_order: Option<Vec<usize>>,
-    /// Joints of the arm whose angle and velocity count the other way.
+    /// Joints of the arm whose angle and velocity are recorded with the opposite sign.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     motion_reversed: Vec<usize>,
-    /// Joints of the arm whose current or torque counts the other way.
+    /// Joints of the arm whose current or torque is recorded with the opposite sign.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     torque_reversed: Vec<usize>,
-    /// What is added to the angles of the arm's joints, behind their reversal, in the file's unit of angle.
+    /// Offsets added to the angles of the arm's joints after their sign is applied, in the file's unit of angle.
     #[serde(skip_serializing_if = "Option::is_none")]
     zero: Option<Vec<f64>>,
 }
 
 impl Joints {
-    /// Whether it can be said of an arm at all.
+    /// Checks everything that does not depend on the number of joints.
     pub(super) fn check(&self, unit: Angle) -> Result<(), LayoutFault> {
         for (key, joints) in self.lists() {
             for (k, &joint) in joints.iter().enumerate() {
@@ -54,7 +54,7 @@ impl Joints {
         Ok(())
     }
 
-    /// Whether it can be said of an arm with so many joints.
+    /// Checks that the table fits an arm with this many joints.
     pub(super) fn check_for(&self, joints: usize) -> Result<(), LayoutFault> {
         for (key, list) in self.lists() {
             if let Some(&joint) = list.iter().find(|joint| **joint > joints) {
@@ -79,7 +79,7 @@ impl Joints {
         ]
     }
 
-    /// What it says of an arm with so many joints that it can be said of.
+    /// The convention that the table states for an arm with this many joints; [`Self::check_for`] must have passed.
     pub(super) fn counting(&self, joints: usize, unit: Angle) -> Counting {
         let mut counting = Counting::as_described(joints);
         let from_zero = |order: &Vec<usize>| order.iter().map(|joint| joint - 1).collect();
@@ -99,7 +99,7 @@ impl Joints {
         counting
     }
 
-    /// What has to be said of an arm for joints to be counted so, in a file with angles in `unit`.
+    /// The table that states the convention `counting`, for a file with angles in `unit`.
     pub(super) fn of(counting: &Counting, unit: Angle) -> Self {
         let joints = counting.motion().len();
         let order = |places: &[Place]| places.iter().map(|p| p.joint + 1).collect::<Vec<_>>();
@@ -120,7 +120,7 @@ impl Joints {
         }
     }
 
-    /// As a layout says it, from `[joints]` on.
+    /// The table as text of a layout file, starting with `[joints]`.
     pub(super) fn lines(&self) -> String {
         let mut lines = "[joints]".to_owned();
         for (key, joints) in self.lists().iter().filter(|(_, joints)| !joints.is_empty()) {
@@ -133,15 +133,16 @@ impl Joints {
     }
 }
 
-/// 90 for 90.00000000000001: what was a unit of angle before has no more digits than that.
+/// Rounds to twelve decimals, so that 90.00000000000001 becomes 90: the conversion of units leaves no more digits than
+/// that.
 fn rounded(zero: f64) -> f64 {
     const DIGITS: f64 = 1e12;
-    // −0 + 0 = 0.
+    // Adding 0 turns −0 into 0.
     (zero * DIGITS).round() / DIGITS + 0.0
 }
 
 impl Angle {
-    /// In rad.
+    /// One unit of the angle, in rad.
     fn rad(self) -> f64 {
         match self {
             Self::Rad => 1.0,
@@ -204,7 +205,7 @@ mod tests {
         assert_eq!(log.effort.signals().joint(0)[0], 4.0);
     }
 
-    /// What is printed for a counting is read as that counting.
+    /// The text printed for a convention reads back as the same convention.
     #[test]
     fn the_lines_say_what_they_were_made_of() {
         let said = "joints = { order = [2, 1], torque_order = [1, 2], motion_reversed = [2], torque_reversed = [1], zero = [0, -90] }";

@@ -1,4 +1,4 @@
-//! A layout that is another one but for what it says itself.
+//! Layouts that inherit from another one through `like` and override parts of it.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -8,12 +8,12 @@ use toml::{Table, Value};
 use super::{Layout, built_in, is_file};
 use crate::log::error::{LayoutFault, LogError};
 
-/// Keys that a layout has to have, its own or of one that it is like.
+/// Keys that a layout must have, either itself or by inheritance.
 const NEEDED: [&str; 2] = ["name", "header"];
-/// Tables of which single keys are replaced; any other key is replaced as a whole.
+/// Tables that are overridden key by key; any other key is overridden as a whole.
 const BY_KEY: [&str; 2] = ["units", "columns"];
 
-/// The text of the layout built in by this name, or of the file of this name in `folder`, and what it is called in messages.
+/// The text of a layout and its name in messages; `name` is a built-in layout, or a file in `folder`.
 pub(super) fn text_of(name: &str, folder: &Path) -> Result<(String, String), LogError> {
     if let Some(text) = built_in(name) {
         return Ok((text.to_owned(), name.to_owned()));
@@ -28,7 +28,7 @@ pub(super) fn text_of(name: &str, folder: &Path) -> Result<(String, String), Log
     }
 }
 
-/// What `text`, read from `source`, says over what the layouts say that it is like.
+/// Parses `text`, read from `source`, and lays it over the layouts that it inherits from.
 pub(super) fn overlaid(text: &str, source: &str) -> Result<Layout, LogError> {
     let (table, layout) = overlaid_within(text, source, &mut Vec::new())?;
     match NEEDED.into_iter().find(|key| !table.contains_key(*key)) {
@@ -40,7 +40,7 @@ pub(super) fn overlaid(text: &str, source: &str) -> Result<Layout, LogError> {
     }
 }
 
-/// `above`: the files that are like this one.
+/// As [`overlaid`], without the check for required keys; `above` holds the files that inherit from this one.
 fn overlaid_within(
     text: &str,
     source: &str,
@@ -48,7 +48,7 @@ fn overlaid_within(
 ) -> Result<(Table, Layout), LogError> {
     let fault = |fault| LogError::Layout { file: source.to_owned(), fault };
     let toml = |e: toml::de::Error| fault(LayoutFault::Toml(e.to_string()));
-    // Only text has lines that an error can name: what a file says is looked at before it is laid over another.
+    // Each file is parsed as text before it is merged, because only then can an error name the line.
     let own: Layout = toml::from_str(text).map_err(toml)?;
     let table = text.parse::<Table>().map_err(toml)?;
     let Some(like) = own.like.clone() else {
@@ -85,23 +85,23 @@ fn overlaid_within(
     Ok((merged, Layout { source: source.to_owned(), below, ..layout }))
 }
 
-/// By which a file is known under any of its names.
+/// The canonical path of a file, by which it is recognised under any of its names.
 fn real_path(name: &str) -> PathBuf {
     Path::new(name).canonicalize().unwrap_or_else(|_| name.into())
 }
 
-/// What a layout must not say.
+/// A check of a layout.
 type Check<'a> = &'a dyn Fn(&Layout) -> Result<(), LayoutFault>;
 
 impl Layout {
-    /// The files that say it, its own first; none of a layout built in.
+    /// The files that make up the layout, its own first; none for a built-in layout.
     pub fn files(&self) -> Vec<PathBuf> {
         let own = is_file(&self.source).then(|| PathBuf::from(&self.source));
         let below = self.below.iter().flat_map(|below| below.files());
         own.into_iter().chain(below).collect()
     }
 
-    /// What `check` finds is told in the file from which on it is so.
+    /// Runs `check`; a fault is attributed to the deepest layout of the chain that already has it.
     pub(super) fn checked_by(&self, check: Check) -> Result<(), LogError> {
         check(self).map_err(|fault| self.told(fault, check))
     }
@@ -153,7 +153,7 @@ mod tests {
             Layout::load(self.0.path().join(name).to_str().unwrap())
         }
 
-        /// Without the path of the folder.
+        /// The message of the error, without the path of the folder.
         fn told(&self, error: &LogError) -> String {
             let path = format!("{}{MAIN_SEPARATOR}", self.0.path().display());
             error.to_string().replace(&path, "")
@@ -188,7 +188,7 @@ mod tests {
         }
     }
 
-    /// Layouts in a row end where one is like none; those in a circle do not.
+    /// A chain of layouts ends at one without `like`; a circular chain does not end.
     #[test]
     fn a_circle_is_no_long_row() {
         let like = |k: usize| format!("name = \"{k}\"\nlike = \"{}.toml\"\n", k + 1);

@@ -1,7 +1,7 @@
-//! Layouts: which column of a file is which quantity, and in which unit.
+//! Layouts: which column of a file holds which quantity, and in which unit.
 //!
-//! Enters: a TOML file, or the name of a built-in layout. Leaves: names or numbers of columns per quantity, the factors that bring them to SI
-//! units, and the widths that files may have.
+//! Input: a TOML file, or the name of a built-in layout. Output: names or numbers of the columns of each quantity, the
+//! factors that convert them to SI units, and the widths that files may have.
 
 mod block;
 mod columns;
@@ -21,36 +21,36 @@ pub(super) use columns::Columns;
 pub use joints::Joints;
 pub(super) use units::{Angle, AngularVelocity, TimeUnit, Units};
 
-/// Layouts built in, by the name given to `--layout`.
+/// Built-in layouts, by the name given to `--layout`.
 const BUILT_IN: [(&str, &str); 3] = [
     ("armid", include_str!("../../../layouts/armid.toml")),
     ("ur10e_innopolis", include_str!("../../../layouts/ur10e_innopolis.toml")),
     ("ur10e_innopolis_author", include_str!("../../../layouts/ur10e_innopolis_author.toml")),
 ];
 
-/// The text of the layout built in by this name.
+/// The text of the built-in layout of this name.
 fn built_in(name: &str) -> Option<&'static str> {
     BUILT_IN.iter().find(|(built_in, _)| *built_in == name).map(|(_, text)| *text)
 }
 
-/// Whether a name is that of a layout file.
+/// Whether a name is that of a layout file, by its extension.
 fn is_file(name: &str) -> bool {
     Path::new(name).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
 }
 
-/// Names of the layouts built in; the first is the default.
+/// Names of the built-in layouts; the first is the default.
 pub fn built_in_layout_names() -> impl Iterator<Item = &'static str> {
     BUILT_IN.iter().map(|(name, _)| *name)
 }
 
-/// Those of them that are for files without a header.
+/// Names of the built-in layouts for files without a header.
 pub(super) fn built_in_without_header() -> impl Iterator<Item = &'static str> {
     let has_none =
         |text: &str, name: &str| Layout::from_toml(text, name).is_ok_and(|layout| !layout.header);
     BUILT_IN.iter().filter(move |(name, text)| has_none(text, name)).map(|(name, _)| *name)
 }
 
-/// How the files of one recorder are to be read: a small TOML file.
+/// Describes how to read the files of one recorder; written as a small TOML file.
 ///
 /// ```toml
 /// name = "my_robot"
@@ -77,9 +77,10 @@ pub(super) fn built_in_without_header() -> impl Iterator<Item = &'static str> {
 /// zero = [0, -90, 0, 0, 0, 0]  # added to the angles, in the unit of q
 /// ```
 ///
-/// Blocks: `time q qd`, `current` or `torque` (Nm; taken where both are there), and optionally
-/// `time_nanoseconds` (added to the time: ROS stamps), `target_q target_qd target_qdd target_current target_moment temperature`. The unit of `q` holds for
-/// `target_q` and so on. Files without header need the list of their possible widths:
+/// Blocks: `time q qd`, `current` or `torque` (Nm; it takes precedence where both are present), and optionally
+/// `time_nanoseconds` (added to the time: ROS stamps), `target_q target_qd target_qdd target_current target_moment
+/// temperature`. The unit of `q` also applies to `target_q`, and likewise for the other targets. Layouts for files
+/// without a header must list their possible widths:
 ///
 /// ```toml
 /// [[width]]
@@ -87,13 +88,14 @@ pub(super) fn built_in_without_header() -> impl Iterator<Item = &'static str> {
 /// blocks = ["time", "q", "qd", "current"]
 /// ```
 ///
-/// With `like = "armid"` (a name, or a file beside this one) whatever is not said is as in that layout: `[units]` and `[columns]`
-/// key by key, all else as a whole.
+/// With `like = "armid"` (a built-in name, or a file beside this one) everything that this layout does not state is
+/// taken from the other layout: `[units]` and `[columns]` key by key, any other entry as a whole.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Layout {
     /// Name, for messages.
-    // What stands in one file need not stand in another that is like it: `like` knows what is missing in all.
+    // Optional for serde, because a layout with `like` may inherit it; the module `like` reports keys that no layout of
+    // the chain has.
     #[serde(default)]
     pub name: String,
     like: Option<String>,
@@ -112,10 +114,10 @@ pub struct Layout {
     columns: Blocks,
     #[serde(default, rename = "width")]
     pub(super) widths: Vec<Width>,
-    /// Its file, or the name that it is built in by.
+    /// The file of the layout, or the name of a built-in one.
     #[serde(skip)]
     pub(super) source: String,
-    /// The layout that it is like.
+    /// The layout named by `like`.
     #[serde(skip)]
     below: Option<Box<Layout>>,
 }
@@ -140,14 +142,14 @@ pub(super) struct Width {
 }
 
 impl Default for Layout {
-    /// The project's own log, which is also what RTDE recorders write.
+    /// The layout of the project's own logs, which is also the one that RTDE recorders write.
     fn default() -> Self {
         Self::from_toml(BUILT_IN[0].1, BUILT_IN[0].0).expect("a built-in layout is valid: tested")
     }
 }
 
 impl Layout {
-    /// What `--layout` accepts: a built-in name or a `.toml` file.
+    /// Loads what `--layout` accepts: a built-in name or a `.toml` file.
     ///
     /// # Errors
     /// [`LogError::UnknownLayout`], or [`LogError::Layout`] with what is wrong in the file.
@@ -156,7 +158,7 @@ impl Layout {
         Self::from_toml(&text, &source)
     }
 
-    /// From the text of a layout; `source` is its file, or names it in messages.
+    /// Parses the text of a layout; `source` is its file, or its name in messages.
     ///
     /// # Errors
     /// [`LogError::Layout`] with what is wrong.
@@ -166,18 +168,18 @@ impl Layout {
         Ok(layout)
     }
 
-    /// Whether it can be said of an arm with so many joints.
+    /// Checks that the layout fits an arm with this many joints.
     pub(super) fn check_for(&self, joints: usize) -> Result<(), LogError> {
         self.checked_by(&|layout: &Self| layout.joints.check_for(joints))
     }
 
-    /// How it has the joints of an arm with so many counted.
+    /// The convention of the layout for the joints of an arm with this many joints.
     pub(super) fn counting(&self, joints: usize) -> Counting {
         self.joints.counting(joints, self.units.q)
     }
 
-    /// The lines of a layout that reads as this one, and counts joints as `counting` does what this one reads (of as many joints as a
-    /// log that it has read).
+    /// Returns the text of a layout that reads files as this one does and then applies `counting` to the joints as this
+    /// layout counts them. `counting` must have as many joints as a log read with this layout.
     pub(crate) fn recounted(&self, counting: &Counting) -> String {
         let earlier = self.counting(counting.motion().len());
         let mut both = counting.of_what_is_read_with(&earlier);
@@ -253,7 +255,7 @@ impl Layout {
     }
 }
 
-/// Every log needs time, angles and an effort.
+/// Checks that `has` contains the blocks that every log needs: time, angles and an effort.
 fn check_blocks(has: impl Fn(Block) -> bool, place: &str) -> Result<(), LayoutFault> {
     let missing = [Block::Time, Block::Q]
         .into_iter()
@@ -306,7 +308,7 @@ mod tests {
         assert_eq!(Layout::load(file.path().to_str().unwrap()).unwrap().name, "mine");
     }
 
-    /// The commented example says all that a layout can.
+    /// The commented example uses everything that a layout can state.
     #[test]
     fn the_example_is_whole_and_valid() {
         let text = include_str!("../../../layouts/example.toml");

@@ -1,4 +1,4 @@
-//! The units of a file.
+//! Units in which the quantities of a file are written.
 
 use std::f64::consts::PI;
 
@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use super::block::Block;
 
-/// Units of a file.
+/// Units of the quantities of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(in crate::log) struct Units {
@@ -18,8 +18,7 @@ pub(in crate::log) struct Units {
 }
 
 impl Units {
-    /// Factor from the file's unit to the SI unit; `None` where nothing changes, so that numbers stay
-    /// the same to the last bit.
+    /// Factor from the file's unit to the SI unit; `None` for a factor of one, so that numbers keep every bit.
     pub(in crate::log) fn factor(&self, block: Block) -> Option<f64> {
         let degrees = |yes: bool| yes.then_some(PI / 180.0);
         match block {
