@@ -1,4 +1,4 @@
-//! When the arm moves and when it stands still, judged by the log's own noise and speed.
+//! Separates motion from rest by the log's own noise and speed.
 
 use std::ops::Range;
 
@@ -7,26 +7,26 @@ use super::noise::{block_noise, quantile};
 use super::readings::resolution;
 use crate::robot::JointSignals;
 
-/// Length of the blocks in which the noise is judged, s.
+/// Length of the blocks in which the noise is estimated, s.
 const NOISE_BLOCK_S: f64 = 0.25;
-/// Share of blocks taken to be the quiet ones: a log with less rest than that has none.
+/// Fraction of the blocks that counts as quiet; a log with less rest than that is treated as having none.
 const QUIET_SHARE: f64 = 0.1;
-/// Share of the fastest joint's rms speed that is no motion worth the name: brakes, settling and
-/// sensor flicker at rest are not noise of any fixed size.
+/// Fraction of the fastest joint's rms speed below which nothing counts as motion: brakes, settling and sensor flicker
+/// at rest are not noise of a fixed size.
 const CREEP_SHARE: f64 = 0.005;
 /// A rest is at least this long, s: shorter ones are reversals.
 const SHORTEST_REST_S: f64 = 0.5;
-/// Samples in a row above the threshold that make a motion; fewer are outliers.
+/// Consecutive samples above the threshold that make a motion; fewer are outliers.
 const SHORTEST_MOTION: usize = 3;
 
-/// Motion and rest of one log.
+/// The stretches of motion and rest in one log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Activity {
     /// Velocity noise per joint in the quietest tenth of the log, rad/s.
     pub noise_rad_s: Vec<f64>,
-    /// Velocity beyond which a joint counts as moving, rad/s: σ√(2 ln N), which the largest of N
-    /// noise values hardly exceeds, plus the resolution of the recorded numbers; but at least half a
-    /// percent of the fastest joint's rms speed.
+    /// Velocity above which a joint counts as moving, rad/s: σ√(2 ln N), which the largest of N noise values hardly
+    /// exceeds, plus the resolution of the recorded numbers; but at least half a percent of the fastest joint's rms
+    /// speed.
     pub threshold_rad_s: Vec<f64>,
     /// Stretches of samples in which no joint moves for half a second or longer.
     pub rests: Vec<Range<usize>>,
@@ -35,10 +35,10 @@ pub struct Activity {
 }
 
 impl Activity {
-    /// Judges the velocities `qd_rad_s` (joints × samples) recorded at `rate_hz`.
+    /// Finds motion and rest from the velocities `qd_rad_s` (joints × samples) recorded at `rate_hz`.
     ///
-    /// The caller sets nothing: the noise comes from sixth differences, in which motion drops
-    /// out, the resolution is the smallest distance between recorded values that occurs in the log.
+    /// There is nothing to set: the noise is estimated from sixth differences, in which motion cancels, and the
+    /// resolution is the smallest distance between recorded values in the log.
     pub fn of(qd_rad_s: &JointSignals, rate_hz: f64) -> Result<Self, SignalError> {
         checked_rate_hz(rate_hz)?;
         let samples = qd_rad_s.samples();
@@ -108,7 +108,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
     use std::f64::consts::PI;
 
-    /// Rest, motion from 3 s to 9 s with a rest from 5 s to 6 s, rest; quantised if asked for.
+    /// Rest, motion from 3 s to 9 s interrupted by a rest from 5 s to 6 s, then rest; optionally quantised.
     fn log(sigma: f64, resolution: f64) -> JointSignals {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         JointSignals::from_fn(2, 1500, |j, k| {

@@ -1,8 +1,8 @@
-//! What is known of a motion whose periods were averaged.
+//! The result of averaging the periods of a motion.
 
 use crate::robot::JointSignals;
 
-/// One period of a motion with its derivatives, and how well they are known.
+/// One period of a motion with its derivatives, and their accuracy.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AveragedMotion {
     /// Joint angles over one period, rad.
@@ -13,15 +13,15 @@ pub struct AveragedMotion {
     pub qdd_rad_s2: JointSignals,
     /// Highest harmonic kept in the acceleration, per joint; 0 for a joint that stands still.
     pub harmonics: Vec<usize>,
-    /// How well the acceleration is known, harmonic by harmonic, per joint.
+    /// Accuracy of the acceleration by harmonic, per joint.
     pub acceleration: Vec<HarmonicPower>,
 }
 
-/// Mean squares of harmonics 1, 2, … of a joint's averaged acceleration, rad²/s⁴.
+/// Mean squares of harmonics 1, 2, … of the averaged acceleration of a joint, rad²/s⁴.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct HarmonicPower {
-    /// Of the estimate.
+    /// Mean square of the estimate.
     pub estimate: Vec<f64>,
-    /// Of the noise in it: 2(hω)⁴ v_h.
+    /// Mean square of the noise in the estimate: 2(hω)⁴ v_h.
     pub noise: Vec<f64>,
 }

@@ -31,8 +31,10 @@ impl Biquad {
     }
 }
 
-/// Working memory of the zero-phase filters. One per thread; it grows to what the filter needs
-/// (a few dozen numbers, independent of the record's length) and then allocates nothing more.
+/// Working memory of the zero-phase filters, one per thread.
+///
+/// It grows to the size that the filter needs (a few dozen numbers, independent of the length of the record) and then
+/// allocates nothing more.
 #[derive(Debug, Clone, Default)]
 pub struct Scratch {
     state: Vec<[f64; 2]>,
@@ -41,9 +43,9 @@ pub struct Scratch {
 
 /// A cascade of sections run forward and then backward over an oddly extended record.
 ///
-/// The record is continued at both ends by `pad` samples of its own image, turned by half a turn
-/// about the end point (2x₀ − x_k), and each pass starts from the steady state of its first
-/// value: what SciPy's `sosfiltfilt` and `filtfilt` do by default.
+/// The record is continued at both ends by `pad` samples of its own image, rotated by half a turn about the end point
+/// (2x₀ − x_k), and each pass starts from the steady state of its first value, as in SciPy's `sosfiltfilt` and
+/// `filtfilt` by default.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct TwoPass {
     pub sections: Vec<Biquad>,
@@ -51,13 +53,13 @@ pub(super) struct TwoPass {
 }
 
 impl TwoPass {
-    /// Samples a record must have at least: the extension mirrors `pad` samples beside the end.
+    /// Smallest number of samples of a record: the extension mirrors `pad` samples next to the end.
     pub fn least_samples(&self) -> usize {
         self.pad + 1
     }
 
-    /// Filters `x` in place. The extensions are made on the fly; only the one behind the end is
-    /// kept, because the backward pass starts in it.
+    /// Filters `x` in place. The extensions are computed on the fly; only the one after the end is stored, because the
+    /// backward pass starts in it.
     pub fn run(&self, x: &mut [f64], scratch: &mut Scratch) -> Result<(), SignalError> {
         enough("zero-phase filtering", x.len(), self.least_samples())?;
         let pad = self.pad;

@@ -1,4 +1,4 @@
-//! Butterworth low-pass of any order, run forward and backward so that it shifts nothing in time.
+//! Butterworth low-pass of any order, run forward and backward so that it causes no delay.
 //!
 //! One pass has |H(f)|² = 1 / (1 + (Ω/Ω_c)^{2n}) with the bilinear frequency Ω = tan(πf/f_s). Two
 //! passes multiply to the real, positive response
@@ -20,7 +20,7 @@ pub use super::biquad::Scratch;
 /// Above this order nothing is gained: the two-pass roll-off is 1 : f⁴⁰ already.
 const HIGHEST_ORDER: usize = 20;
 
-/// A Butterworth low-pass without phase: filtered signals keep their place in time.
+/// A Butterworth low-pass without phase: filtered signals are not delayed.
 ///
 /// ```
 /// use armid::signal::{Scratch, ZeroPhase};
@@ -42,7 +42,7 @@ pub struct ZeroPhase {
 impl ZeroPhase {
     /// Low-pass whose **two-pass** response is 1/√2 (−3 dB) at `cutoff_hz`.
     ///
-    /// Errors: a cutoff outside (0, rate/2), an order outside 1…20, a rate that is not positive.
+    /// Errors: a cut-off outside (0, rate/2), an order outside 1…20, a rate that is not positive.
     pub fn new(cutoff_hz: f64, order: usize, rate_hz: f64) -> Result<Self, SignalError> {
         let warped = (PI * checked_cutoff_hz(cutoff_hz, rate_hz)? / rate_hz).tan();
         checked_order(order)?;
@@ -101,7 +101,7 @@ impl ZeroPhase {
         1.0 / (1.0 + ratio.powi(2 * self.order as i32))
     }
 
-    /// Rate of the series it is for, Hz.
+    /// Sampling rate that the filter is designed for, Hz.
     pub fn rate_hz(&self) -> f64 {
         self.rate_hz
     }
@@ -112,8 +112,8 @@ impl ZeroPhase {
         self.rate_hz / PI * warped.atan()
     }
 
-    /// Samples at each end over which the guess about what lies beyond the record fades to one
-    /// percent (slowest pole); what is closer to an end should not be trusted.
+    /// Number of samples at each end over which the effect of the assumed continuation of the record fades to one
+    /// percent (slowest pole). Values closer to an end should not be trusted.
     pub fn edge_samples(&self) -> usize {
         let slowest = self.passes.sections.iter().map(slowest_pole).fold(0.0, f64::max);
         if slowest <= 0.0 { 1 } else { (0.01_f64.ln() / slowest.ln()).ceil() as usize }
@@ -150,7 +150,7 @@ mod tests {
         }
     }
 
-    /// Measured on a long sine, away from the ends: amplitude G, phase none.
+    /// Measured on a long sine, away from the ends: gain G and no phase.
     #[test]
     fn a_sine_comes_out_with_the_stated_gain_and_no_delay() {
         let filter = ZeroPhase::new(10.0, 4, 125.0).unwrap();

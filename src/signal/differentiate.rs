@@ -2,11 +2,11 @@
 
 use super::error::{SignalError, checked_rate_hz, enough, same};
 
-/// dy/dt into `out`, fourth order in the time step h. Needs 5 samples.
+/// Writes dy/dt into `out`, with an error of fourth order in the time step h. Needs 5 samples.
 ///
-/// (y₋₂ − 8y₋₁ + 8y₁ − y₂)/12h, indices counted from the sample at which the derivative is taken; the two samples at each end
-/// by one-sided formulas of five points. Response of the interior to a sine of angular frequency ω:
-/// jω·(8 sin ωh − sin 2ωh)/(6ωh) = jω(1 − (ωh)⁴/30 + …).
+/// The formula is (y₋₂ − 8y₋₁ + 8y₁ − y₂)/12h, with indices relative to the sample at which the derivative is taken;
+/// the two samples at each end use one-sided formulas of five points. Response of the interior to a sine of angular
+/// frequency ω: jω·(8 sin ωh − sin 2ωh)/(6ωh) = jω(1 − (ωh)⁴/30 + …).
 pub fn central_4(y: &[f64], rate_hz: f64, out: &mut [f64]) -> Result<(), SignalError> {
     let rate = checked_rate_hz(rate_hz)?;
     enough("a central difference of fourth order", y.len(), 5)?;

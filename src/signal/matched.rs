@@ -1,13 +1,14 @@
-//! Bumps in coloured noise: the matched filter.
+//! The matched filter: detects bumps in coloured noise.
 //!
-//! A bump h b(t − t₀) of unknown height and time in noise of the power spectrum S(f) is seen best by
+//! A bump h b(t − t₀) of unknown height and time, in noise with the power spectrum S(f), is detected best by
 //!
 //! c(t) = ∫ X(f) B*(f)/S(f) e^{2πift} df, N = ∫ |B(f)|²/S(f) df:
 //!
-//! h = c/N is the height at t with the variance 1/N, and c²/N is twice what the bump gains in log-likelihood
-//! (D. O. North 1943, reprinted in Proc. IEEE 51 (1963) 1016–1027). S is the median of the periodograms of
-//! overlapping stretches, which a bump in one of them does not move, and its trend over frequency, times a factor that does not depend on
-//! frequency: N carries its inverse, and [`Heights::scale`] tells it from what the filter leaves elsewhere.
+//! h = c/N is the height at t, with the variance 1/N, and c²/N is twice the log-likelihood gained by the bump (D. O.
+//! North 1943, reprinted in Proc. IEEE 51 (1963) 1016–1027). S is estimated from the median of the periodograms of
+//! overlapping stretches, which a bump in one of them does not move, followed by its trend over frequency. This
+//! estimate is off by a factor that does not depend on frequency: N carries the inverse of the factor, and
+//! [`Heights::scale`] determines it from the filter's output over the whole record.
 
 use fourier::{Complex64, Forward, Inverse, RealToComplex};
 
@@ -16,56 +17,58 @@ use super::noise_trend::noise_trend;
 use crate::median::{median, robust_sigma};
 use crate::robot::JointSignals;
 
-/// Stretches of this length tell the noise's spectrum, s: slower noise looks alike to any bump.
+/// Length of the stretches from which the noise spectrum is estimated, s. Slower noise looks the same to any bump.
 const STRETCH_S: f64 = 8.0;
-/// Fewest stretches, without overlap.
+/// Smallest number of stretches, counted without overlap.
 const STRETCHES: usize = 4;
-/// Shortest mirror image, s.
+/// Length of the mirror image at each end, s.
 const MIRROR_S: f64 = 4.0;
-/// Noise below this share of its largest power is not believed: a sensor's own low-pass leaves none.
+/// Noise power is taken to be at least this fraction of its maximum: where a sensor's own low-pass leaves almost no
+/// noise, the estimate cannot be trusted.
 const FLOOR: f64 = 1e-4;
 
-/// Signals that are looked through for bumps.
+/// Signals prepared for the search for bumps.
 ///
-/// Beyond both ends they go on as their mirror images for a few seconds, so that nothing is heard there of the
-/// step from the last sample to the first.
+/// Both ends are extended by a mirror image of a few seconds, so that the step from the last sample to the first leaves
+/// no trace in the record.
 pub struct MatchedFilter {
     samples: usize,
-    /// Samples of the mirror image before the first one.
+    /// Samples of mirror image before the first sample.
     before: usize,
-    /// Samples in all.
+    /// Total number of samples, mirror images included.
     extended: usize,
     rate_hz: f64,
     forward: Forward,
     inverse: Inverse,
-    /// Per signal 1/S at the frequencies of the whole record.
+    /// 1/S of each signal at the frequencies of the extended record.
     weights: Vec<Vec<f64>>,
-    /// Per signal X/S.
+    /// X/S of each signal.
     weighted: Vec<Vec<Complex64>>,
 }
 
-/// What a bump of one shape is worth at every sample.
+/// Estimated height of a bump of one shape, centred at every sample.
 pub struct Heights {
-    /// Height of a bump centred at the sample, signal by signal.
+    /// Height of a bump centred at the sample, for each signal.
     pub height: JointSignals,
-    /// N per signal, up to the factor of S.
+    /// N of each signal, up to the unknown factor of S.
     pub information: Vec<f64>,
-    /// Degrees of freedom with which [`Self::scale`] knows each signal's noise: heights that know nothing of each other.
+    /// Degrees of freedom of [`Self::scale`] for each signal: the effective number of independent heights.
     pub freedom: Vec<f64>,
 }
 
-/// Heights count up to so many σ in what they say of σ.
+/// Heights are clipped at this many σ in the estimate of σ.
 const CLIPPED: f64 = 2.5;
 /// E min(z², [`CLIPPED`]²) of Gaussian z.
 const CLIPPED_SQUARE: f64 = 0.977_558;
-/// Variance of the σ of all heights over that of the clipped ones' (Huber 1964, proposal 2).
+/// Efficiency of the clipped estimate: the variance of σ estimated from all heights over that of the clipped estimate
+/// (Huber 1964, proposal 2).
 const CLIPPED_EFFICIENCY: f64 = 0.963;
-/// Steps from the median's σ to the clipped one: what it is off by shrinks to a tenth with each.
+/// Iterations from the median's σ to the clipped one; each reduces the remaining error to a tenth.
 const CLIPPED_STEPS: usize = 4;
 
 impl Heights {
-    /// Standard deviation of h √N over all samples but for those few that hold a bump: the root of the factor
-    /// that S lacks.
+    /// Standard deviation of h √N over all samples, except for the few that hold a bump: the square root of the unknown
+    /// factor of S.
     pub fn scale(&self, signal: usize) -> f64 {
         let heights = self.height.joint(signal);
         let mut sizes: Vec<f64> = heights.iter().map(|h| h.abs()).collect();
@@ -80,9 +83,9 @@ impl Heights {
 }
 
 impl MatchedFilter {
-    /// For `signals` without a trend, sampled at `rate_hz`.
+    /// Prepares `signals` without a trend, sampled at `rate_hz`.
     ///
-    /// Errors: fewer than 64 samples, a rate that is none.
+    /// Errors: fewer than 64 samples, or a rate that is not positive and finite.
     pub fn new(signals: &JointSignals, rate_hz: f64) -> Result<Self, SignalError> {
         checked_rate_hz(rate_hz)?;
         let samples = signals.samples();
@@ -104,10 +107,10 @@ impl MatchedFilter {
         for signal in (0..signals.joints()).map(|j| signals.joint(j)) {
             let mut power = median_power(signal, &*plan);
             let largest = power.iter().copied().fold(0.0, f64::max);
-            // Of a signal without noise nothing is known: any spectrum does.
+            // For a signal without noise any spectrum will do.
             let least = if largest > 0.0 { FLOOR * largest } else { 1.0 };
             power.iter_mut().for_each(|p| *p = p.max(least));
-            // A factor that all frequencies share does not matter.
+            // A factor common to all frequencies does not matter here.
             let trend = noise_trend(&power, 1, power.len() - 1);
             let logarithms: Vec<f64> = trend.iter().map(|p| p.value.ln()).collect();
             let mut spectrum = filter.spectrum(filter.with_mirrors(signal));
@@ -132,7 +135,7 @@ impl MatchedFilter {
         self.rate_hz
     }
 
-    /// Heights of the bump b(t), even in t (s) and zero far from t = 0, in every signal.
+    /// Heights of the bump b(t) in every signal; b must be even in t (s) and zero far from t = 0.
     pub fn heights(&self, bump: impl Fn(f64) -> f64) -> Heights {
         let n = self.extended;
         let of_sample = |k: usize| bump(k.min(n - k) as f64 / self.rate_hz);
@@ -143,7 +146,7 @@ impl MatchedFilter {
         let mut freedom = Vec::with_capacity(self.weighted.len());
         let inside = CLIPPED_EFFICIENCY * self.samples as f64 / n as f64;
         for (j, (weighted, weights)) in self.weighted.iter().zip(&self.weights).enumerate() {
-            // Of the heights and of their square, all over frequency.
+            // Sums of the information over frequency, and of its square.
             let (mut total, mut squares) = (0.0, 0.0);
             for (k, (b, w)) in shape.iter().zip(weights).enumerate() {
                 let is_single = k == 0 || 2 * k == n;
@@ -153,7 +156,7 @@ impl MatchedFilter {
             }
             let mut product: Vec<Complex64> =
                 weighted.iter().zip(&shape).map(|(x, b)| x * b.conj() / total).collect();
-            // Rounding leaves imaginary parts where a real signal has none.
+            // Rounding leaves imaginary parts at the two ends, where the spectrum of a real signal is real.
             product[0].im = 0.0;
             if n.is_multiple_of(2) {
                 product[n / 2].im = 0.0;
@@ -168,7 +171,7 @@ impl MatchedFilter {
         Heights { height, information, freedom }
     }
 
-    /// `signal` between its mirror images.
+    /// `signal` extended by its mirror images.
     fn with_mirrors(&self, signal: &[f64]) -> Vec<f64> {
         let last = (self.samples - 1) as isize;
         (0..self.extended)
@@ -189,7 +192,7 @@ impl MatchedFilter {
     }
 }
 
-/// The next length from `least` on whose transform is fast: 2ᵃ 3ᵇ 5ᶜ.
+/// The smallest length from `least` on with a fast transform: 2ᵃ 3ᵇ 5ᶜ.
 fn fast_length(least: usize) -> usize {
     let is_fast = |length: &usize| {
         let mut rest = *length;
@@ -203,7 +206,7 @@ fn fast_length(least: usize) -> usize {
     (least..).find(is_fast).unwrap_or(least)
 }
 
-/// Median over half-overlapping Hann-windowed stretches of |spectrum|², by frequency.
+/// Median of |spectrum|² over half-overlapping stretches with a Hann window, at each frequency.
 fn median_power(signal: &[f64], plan: &dyn RealToComplex<f64>) -> Vec<f64> {
     let length = plan.len();
     let mut spectra: Vec<Vec<f64>> = Vec::new();
@@ -284,8 +287,8 @@ mod tests {
         assert!(stated.sqrt() < 0.7, "{stated}");
     }
 
-    /// The scatter of [`Heights::scale`] between logs is that of its degrees of freedom, 1/√(2ν), for short bumps and for long
-    /// ones; and a bump of a hundred σ hardly moves it.
+    /// [`Heights::scale`] scatters between logs as its degrees of freedom say, 1/√(2ν), for short and for long bumps;
+    /// and a bump of a hundred σ hardly moves it.
     #[test]
     fn scale_is_known_as_well_as_it_says() {
         const LOGS: usize = 100;

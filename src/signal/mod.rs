@@ -1,24 +1,24 @@
-//! What happens to a record before anything is identified from it: filters without phase,
-//! derivatives, fewer samples, a uniform time grid, rest and motion told apart, periods found,
-//! averaged and differentiated, spectra.
+//! Prepares a log for identification: zero-phase filters, derivatives, decimation, a uniform time grid, separation of
+//! rest and motion, detection of periods, their averages and derivatives, and spectra.
 //!
-//! Enters: time stamps and [`JointSignals`](crate::robot::JointSignals) of one log. Leaves: the
-//! same quantities, smoother, on a uniform grid or averaged over periods, and how noisy they were.
+//! Input: time stamps and [`JointSignals`](crate::robot::JointSignals) of one log. Output: the same quantities,
+//! smoothed, on a uniform grid or averaged over periods, and their noise levels.
 //!
 //! | question | answer |
 //! |---|---|
-//! | remove what is faster than the motion, keep its place in time | [`ZeroPhase`], [`Decimator`] |
-//! | accelerations as the paper makes them | [`PaperDifferentiator`] |
-//! | derivative of a smooth series | [`central_4`] |
-//! | time stamps jitter, samples are missing | [`Resampler`], [`fill_gaps`] |
+//! | how to remove components faster than the motion without delay? | [`ZeroPhase`], [`Decimator`] |
+//! | how to compute accelerations as the paper does? | [`PaperDifferentiator`] |
+//! | how to differentiate a smooth series? | [`central_4`] |
+//! | how to treat jittered time stamps and missing samples? | [`Resampler`], [`fill_gaps`] |
 //! | when does the arm move? | [`Activity`] |
 //! | does the motion repeat, and from where to where? | [`find_period`] |
-//! | the best estimate of a repeated motion and its derivatives | [`PeriodicFit`] |
+//! | what is the best estimate of a repeated motion and its derivatives? | [`PeriodicFit`] |
 //! | what happens between the samples of a repeated motion? | [`FineClock`] |
 //! | how noisy is a signal, without any model of it? | [`replicate_noise`] |
-//! | how does the power of noise run over frequency? | [`noise_trend`], of several channels [`noise_trends`] |
+//! | how does the power of noise depend on frequency? | [`noise_trend`]; for several channels [`noise_trends`] |
 //! | is there a bump in coloured noise? | [`MatchedFilter`] |
-//! | how fine and how noisy is a sensor, and where does it end? | [`resolution`], [`reading_noise`], [`reading_limit`] |
+//! | what are the resolution, the noise and the limit of a sensor? | [`resolution`], [`reading_noise`],
+//! [`reading_limit`] |
 
 mod activity;
 mod averaged_motion;

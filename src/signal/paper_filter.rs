@@ -25,11 +25,10 @@ pub enum PaperReading {
     Intended,
 }
 
-/// Equation (33) with its cutoff f = ω_c/2π (10 Hz in the paper).
+/// Equation (33) with its cut-off f = ω_c/2π (10 Hz in the paper).
 ///
-/// Discretised by the bilinear transform s = 2f_s (1 − z⁻¹)/(1 + z⁻¹) with ω_c = 2f_s tan(πf/f_s),
-/// so that the cutoff is met exactly. The derivative of the intended reading is the central
-/// difference of fourth order.
+/// Discretised by the bilinear transform s = 2f_s (1 − z⁻¹)/(1 + z⁻¹) with ω_c = 2f_s tan(πf/f_s), so that the cut-off
+/// is met exactly. The derivative of the intended reading is the central difference of fourth order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PaperDifferentiator {
     passes: TwoPass,
@@ -38,7 +37,7 @@ pub struct PaperDifferentiator {
 }
 
 impl PaperDifferentiator {
-    /// The filter for `reading` with the single-pass cutoff as the paper states it.
+    /// The filter for `reading`, with the single-pass cut-off that the paper states.
     pub fn new(reading: PaperReading, cutoff_hz: f64, rate_hz: f64) -> Result<Self, SignalError> {
         let k = (PI * checked_cutoff_hz(cutoff_hz, rate_hz)? / rate_hz).tan();
         let gain = match reading {
@@ -55,8 +54,8 @@ impl PaperDifferentiator {
         Ok(Self { passes, reading, rate_hz })
     }
 
-    /// y of the series `u`: with the intended reading du/dt, smoothed; with the literal one
-    /// −d²u/dt², smoothed. Needs 7 samples.
+    /// Applies the filter to the series `u`: returns du/dt, smoothed, with the intended reading, and −d²u/dt²,
+    /// smoothed, with the literal one. Needs 7 samples.
     pub fn apply(&self, u: &[f64], scratch: &mut Scratch) -> Result<Vec<f64>, SignalError> {
         let mut y = u.to_vec();
         self.passes.run(&mut y, scratch)?;
@@ -104,7 +103,7 @@ mod tests {
         assert!(matches(&apply(PaperReading::Literal, &qd), &qddd, -attenuation));
         assert!(matches(&apply(PaperReading::Literal, &q), &qdd, -attenuation));
         assert!(matches(&apply(PaperReading::Intended, &qd), &qdd, attenuation));
-        // And the literal output has nothing of the acceleration in it.
+        // The literal output contains nothing of the acceleration.
         let literal = apply(PaperReading::Literal, &qd);
         let period = 1000..1000 + 8 * 625;
         let range = period.start..period.end.min(4125);
@@ -113,8 +112,8 @@ mod tests {
         assert!(correlation.abs() < 1e-9, "{correlation}");
     }
 
-    /// Noise of an acceleration made from a velocity with white noise σ_v, where f_c ≪ f_s:
-    /// σ_a² = σ_v² ω_c³ / (4 f_s), of ∫₀^∞ ω²/(1 + (ω/ω_c)²)² dω = πω_c³/4 times the one-sided density 2σ_v²/f_s over 2π.
+    /// Noise of an acceleration computed from a velocity with white noise σ_v, for f_c ≪ f_s: σ_a² = σ_v² ω_c³ / (4
+    /// f_s), from ∫₀^∞ ω²/(1 + (ω/ω_c)²)² dω = πω_c³/4 times the one-sided density 2σ_v²/f_s over 2π.
     #[test]
     fn the_noise_formula_is_the_energy_of_the_impulse_response() {
         let (cutoff_hz, rate_hz) = (2.0, 500.0);

@@ -1,17 +1,16 @@
-//! Finds by itself whether a motion repeats, how long its period is, and which part of the log
-//! consists of whole periods.
+//! Finds whether a motion repeats, how long its period is, and which part of the log consists of whole periods; there
+//! is nothing to set.
 //!
-//! 1. Candidates: lags L at which the mean square difference d(L) = ⟨|q(k + L) − q(k)|²⟩, summed
-//!    over joints and computed by FFT, has a local minimum below a quarter of what unrelated
-//!    positions would give (2 × variance).
-//! 2. At each candidate the difference is judged block by block. A block repeats if its mean
-//!    square is below what noise, half a sample of slip and one percent of the motion's amplitude
-//!    allow. The longest stretch of such blocks is the repeated part: run-in and rest fall away.
-//! 3. The stretch is cut again where a block differs by more than four times the upper quartile
-//!    of the stretch's own blocks: what noise allows is what this log shows.
-//! 4. Of the candidates that cover two or more periods, the one covering most wins, the shortest
-//!    among equals, so that a period is preferred to its multiples.
-//! 5. The lag of the first period against the last, interpolated, refines the period.
+//! 1. Candidates: lags L at which the mean square difference d(L) = ⟨|q(k + L) − q(k)|²⟩, summed over joints and
+//!    computed by FFT, has a local minimum below a quarter of the value for unrelated positions (2 × variance).
+//! 2. At each candidate the difference is judged block by block. A block repeats if its mean square is below what
+//!    noise, half a sample of slip and one percent of the motion's amplitude allow. The longest run of such blocks is
+//!    the repeated part; run-in and rest fall outside it.
+//! 3. The run is cut again where a block exceeds four times the upper quartile of the run's own blocks, so that the
+//!    limit follows from the noise of this log.
+//! 4. Among the candidates that cover two or more periods, the one that covers most wins, and the shortest among
+//!    equals, so that a period is preferred to its multiples.
+//! 5. The period is refined by the interpolated lag between the first period and the last.
 
 use std::ops::Range;
 
@@ -21,21 +20,21 @@ use super::error::{SignalError, enough};
 use super::noise::{block_noise, quantile};
 use crate::robot::JointSignals;
 
-/// Samples to which the search for candidates thins a longer log.
+/// A longer log is thinned to about this many samples for the search for candidates.
 const SEARCH_SAMPLES: usize = 16384;
-/// Shortest period looked for, in samples of the (thinned) log.
+/// Shortest period that is searched for, in samples of the (thinned) log.
 const SHORTEST_PERIOD: usize = 16;
-/// A candidate's mean square difference, relative to unrelated positions.
+/// Largest mean square difference of a candidate, relative to that of unrelated positions.
 const CANDIDATE_SHARE: f64 = 0.25;
-/// Imperfect repetition that is still called one, relative to the motion's rms amplitude.
+/// Deviation between periods that still counts as repetition, relative to the motion's rms amplitude.
 const REPEATS_WITHIN: f64 = 0.01;
-/// Ratio of mean squares that tells a block that repeats from one that does not.
+/// Ratio of mean squares that separates blocks that repeat from blocks that do not.
 const BLOCK_RATIO: f64 = 4.0;
 /// Blocks per period.
 const BLOCKS: usize = 64;
-/// Samples by which the ends of the repeated part are judged.
+/// Number of samples over which the ends of the repeated part are judged.
 const EDGE_SAMPLES: usize = 4;
-/// Slip over the whole log that is always taken for none, in samples.
+/// Slip over the whole log that always counts as none, in samples.
 const NO_SLIP: f64 = 0.01;
 
 /// A repeated motion inside a log.
@@ -45,26 +44,26 @@ pub struct Period {
     pub samples: usize,
     /// Length of the period in samples, interpolated.
     pub refined_samples: f64,
-    /// Whether the period is a whole number of samples: the slip between `samples` and
-    /// `refined_samples`, added up over the log, is hidden in the scatter between periods (or
-    /// below a hundredth of a sample). Only then may periods be folded.
+    /// Whether the period is a whole number of samples: the slip between `samples` and `refined_samples`, added up over
+    /// the log, is hidden in the scatter between periods (or is below a hundredth of a sample). Only then may periods
+    /// be folded onto each other.
     pub is_whole: bool,
     /// Number of whole periods in `window`.
     pub periods: usize,
-    /// Samples of the log that hold the whole periods; `periods` × `samples` long.
+    /// Range of samples that holds the whole periods; `periods` × `samples` long.
     pub window: Range<usize>,
 }
 
-/// Plans and memory of the search, kept from log to log.
+/// Transform plans and working memory of the search, reused from log to log.
 #[derive(Default)]
 pub struct PeriodSearch {
     plans: Option<Plans>,
     time: Vec<f64>,
     spectrum: Vec<Complex64>,
     power: Vec<Complex64>,
-    /// Σ q² up to each sample of the thinned log, over all joints.
+    /// Σ q² before each sample of the thinned log, over all joints.
     energy: Vec<f64>,
-    /// Σ |q(k + L) − q(k)|² up to each k.
+    /// Σ |q(k + L) − q(k)|² before each k.
     sums: Vec<f64>,
 }
 
@@ -80,7 +79,7 @@ pub fn find_period(q_rad: &JointSignals) -> Result<Option<Period>, SignalError> 
     PeriodSearch::default().find(q_rad)
 }
 
-/// A lag and how far it may be off, in samples.
+/// A candidate lag and its uncertainty, in samples.
 #[derive(Debug, Clone, Copy)]
 struct Candidate {
     samples: usize,
@@ -106,7 +105,8 @@ impl PeriodSearch {
         }
         let mut best: Option<Period> = None;
         for candidate in self.candidates(q_rad) {
-            // Longer than the best by more than the new period cannot be had by a multiple of it.
+            // To replace the best, a candidate must cover more by over one of its own periods, which no multiple of the
+            // best period can.
             let needed =
                 |period: usize| best.as_ref().map_or(0, |b: &Period| b.window.len() + period);
             if needed(candidate.samples - candidate.uncertainty) >= q_rad.samples() {
@@ -121,12 +121,12 @@ impl PeriodSearch {
         Ok(best)
     }
 
-    /// Step 1, on a log thinned by averaging neighbours.
+    /// Step 1, on a log thinned by averaging neighbouring samples.
     fn candidates(&mut self, q_rad: &JointSignals) -> Vec<Candidate> {
         let thin = q_rad.samples().div_ceil(SEARCH_SAMPLES);
         let n = q_rad.samples() / thin;
         let longest = n / 2;
-        // Long enough that no lag in use is reached from the other side of the circle.
+        // Long enough that the circular correlation does not wrap around at any lag in use.
         let length = (n + longest + 1).next_power_of_two();
         let plans = match self.plans.take().filter(|plans| plans.length == length) {
             Some(plans) => plans,
@@ -184,7 +184,7 @@ impl Plans {
     }
 }
 
-/// The log and what it says about itself.
+/// The log and the tolerances derived from it.
 struct Record<'a> {
     q_rad: &'a JointSignals,
     /// Variance of q, summed over joints, rad².
@@ -210,8 +210,7 @@ impl<'a> Record<'a> {
         Self { q_rad, variance, step_square, tolerance }
     }
 
-    /// Mean over the samples k = from, from + every, … of `range` of |q(k + lag) − q(k)|², summed over
-    /// joints.
+    /// Mean of |q(k + lag) − q(k)|², summed over joints, over the samples k = from, from + every, … of `range`.
     fn difference(&self, range: &Range<usize>, lag: usize, every: usize) -> f64 {
         let later = range.start + lag..range.end + lag;
         let sum: f64 = (0..self.q_rad.joints())
@@ -224,7 +223,7 @@ impl<'a> Record<'a> {
         sum / range.len().div_ceil(every) as f64
     }
 
-    /// Sums of |q(k + lag) − q(k)|², over joints and all k before the index.
+    /// Cumulative sums of |q(k + lag) − q(k)|² over joints: entry k sums all samples before k.
     fn sum_differences(&self, lag: usize, sums: &mut Vec<f64>) {
         sums.clear();
         sums.resize(self.q_rad.samples() - lag + 1, 0.0);
@@ -239,7 +238,7 @@ impl<'a> Record<'a> {
         }
     }
 
-    /// The lag near `candidate` at which most of the log repeats best: least median of block means.
+    /// The lag near `candidate` at which most of the log repeats best: the one with the smallest median of block means.
     fn sharpen(&self, candidate: Candidate) -> usize {
         let Candidate { samples, uncertainty } = candidate;
         let cost = |lag: usize| {
@@ -251,7 +250,7 @@ impl<'a> Record<'a> {
         };
         let longest = self.q_rad.samples() / 2;
         let mut best = (samples, cost(samples));
-        // Run-in and rest pull the candidate aside: go on while the range's end is the best.
+        // Run-in and rest bias the candidate, so the search continues as long as it improves.
         loop {
             let lowest = best.0.saturating_sub(uncertainty).max(SHORTEST_PERIOD);
             let highest = (best.0 + uncertainty).min(longest);
@@ -303,8 +302,8 @@ impl<'a> Record<'a> {
         Some(Period { samples: lag, refined_samples, is_whole: slip <= hidden, periods, window })
     }
 
-    /// Longest run of neighbouring blocks below `limit` that spans a period of difference (hence
-    /// two periods of log) in which the arm really moves.
+    /// Longest run of neighbouring blocks below `limit` that is at least one lag long (hence covers two periods of the
+    /// log) and in which the arm really moves.
     fn longest_run(
         &self,
         blocks: &[(Range<usize>, f64)],
@@ -319,7 +318,7 @@ impl<'a> Record<'a> {
             .max_by_key(|run| run.len())
     }
 
-    /// Whether a stretch holds a good part of the log's motion; rest repeats at any lag.
+    /// Whether a stretch holds a good part of the log's motion; a stretch at rest would repeat at any lag.
     fn moves(&self, stretch: Range<usize>) -> bool {
         let variance: f64 = (0..self.q_rad.joints())
             .map(|j| variance_of(&self.q_rad.joint(j)[stretch.clone()]))
@@ -327,11 +326,11 @@ impl<'a> Record<'a> {
         variance > CANDIDATE_SHARE * self.variance
     }
 
-    /// The period from the shift that carries the first period of `window` onto its last, and the
-    /// mean square that no shift removes.
+    /// Refines the period from the shift that maps the first period of `window` onto its last; returns it with the mean
+    /// square that no shift removes.
     ///
-    /// It may be half a sample off `lag`. Where that adds up to a good part of a period over all of them, so few are
-    /// compared first that it does not.
+    /// The period may differ from `lag` by half a sample. If that could add up to a large part of a period over all
+    /// periods, a first estimate uses so few of them that it cannot.
     fn refine(&self, window: &Range<usize>, lag: usize, periods: usize) -> (f64, f64) {
         let few = periods.min(lag / 4);
         let reach = few.div_ceil(2) + 1;
@@ -345,8 +344,9 @@ impl<'a> Record<'a> {
         self.refined_over(window, lag, periods, far, periods.div_ceil(few) + 1).unwrap_or(rough)
     }
 
-    /// [`Self::refine`] from the shifts within `reach` of `far`, which carry the first period onto the last of so many; `None`
-    /// where there is no room behind them. Parabola through the three best.
+    /// [`Self::refine`] from the shifts within `reach` of `far`, at which the first of `periods` periods falls onto the
+    /// last. The minimum is that of the parabola through the three best shifts. `None` if too few samples follow the
+    /// window.
     fn refined_over(
         &self,
         window: &Range<usize>,
@@ -372,8 +372,8 @@ impl<'a> Record<'a> {
     }
 }
 
-/// The run continued sample by sample at both ends, as far as the mean over the next
-/// [`EDGE_SAMPLES`] stays below `limit`: blocks end where they happen to, periods do not.
+/// Extends the run sample by sample at both ends, as long as the mean over the next [`EDGE_SAMPLES`] stays below
+/// `limit`: blocks end at arbitrary places, periods do not.
 fn widened(run: Range<usize>, limit: f64, sums: &[f64]) -> Range<usize> {
     let pairs = sums.len() - 1;
     let below = |from: usize| sums[from + EDGE_SAMPLES] - sums[from] <= limit * EDGE_SAMPLES as f64;
@@ -387,7 +387,7 @@ fn widened(run: Range<usize>, limit: f64, sums: &[f64]) -> Range<usize> {
     start..end
 }
 
-/// 0..count in blocks of `length` (at least 8); the last takes the remainder.
+/// Splits 0..count into blocks of `length` (at least 8); the last takes the remainder.
 fn blocks(count: usize, length: usize) -> impl Iterator<Item = Range<usize>> {
     let length = length.max(8).min(count.max(1));
     let full = count / length;
@@ -459,7 +459,7 @@ mod tests {
         }
     }
 
-    /// Two hundred periods of 99.6 samples are 80 samples shorter than as many of 100.
+    /// Two hundred periods of 99.6 samples are 80 samples shorter than two hundred of 100.
     #[test]
     fn many_short_periods_show_what_each_is_off() {
         for (period, whole) in [(99.6, false), (124.7, false), (100.0, true)] {

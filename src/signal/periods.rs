@@ -1,12 +1,12 @@
-//! What the periods of a signal have in common, and what they have not.
+//! Splits a periodic signal into the part common to all periods and the remainder.
 
-/// Mean over the periods of `n` samples.
+/// Mean over all periods of `n` samples.
 pub fn mean_period(y: &[f64], n: usize) -> Vec<f64> {
     let periods = y.len() / n;
     (0..n).map(|k| y.iter().skip(k).step_by(n).sum::<f64>() / periods as f64).collect()
 }
 
-/// Takes the mean over the periods of `n` samples out of each of them.
+/// Subtracts the mean over all periods of `n` samples from each period.
 pub fn subtract_mean_period(y: &mut [f64], n: usize) {
     let common = mean_period(y, n);
     y.iter_mut().zip(common.iter().cycle()).for_each(|(y, common)| *y -= common);
