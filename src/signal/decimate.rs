@@ -1,18 +1,18 @@
-//! Fewer samples without aliasing: zero-phase low-pass, then every n-th sample is kept.
+//! Decimation without aliasing: a zero-phase low-pass, after which every n-th sample is kept.
 
 use super::butterworth::{Scratch, ZeroPhase};
 use super::error::{SignalError, checked_rate_hz};
 
 /// Order of the anti-alias filter, each pass.
 const ANTI_ALIAS_ORDER: usize = 8;
-/// Its −3 dB frequency as a share of the new Nyquist frequency. What would fold onto this
-/// frequency lies at 1.2 of the new Nyquist frequency, where two passes leave at most
-/// 1/(1 + 0.414·1.5¹⁶) = 0.0037 (−49 dB).
+/// Its −3 dB frequency as a fraction of the new Nyquist frequency. A component that would alias onto this frequency
+/// lies at 1.2 times the new Nyquist frequency, where two passes leave at most 1/(1 + 0.414·1.5¹⁶) = 0.0037 (−49 dB).
 const ANTI_ALIAS_SHARE: f64 = 0.8;
 
-/// Keeps every n-th sample after a zero-phase low-pass. Filter measured torque, motion and every
-/// regressor column with the *same* decimator: then the equation of motion still holds between
-/// the filtered columns, whatever the filter does.
+/// Keeps every n-th sample after a zero-phase low-pass.
+///
+/// Measured torque, motion and every regressor column must pass the *same* decimator: then the equation of motion still
+/// holds between the filtered columns, whatever the filter does.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Decimator {
     filter: Option<ZeroPhase>,
@@ -21,8 +21,8 @@ pub struct Decimator {
 }
 
 impl Decimator {
-    /// Every `every`-th sample of a record at `rate_hz`, low-passed at 0.8 of the new Nyquist
-    /// frequency. `every` = 1 leaves the record as it is.
+    /// Keeps every `every`-th sample of a record at `rate_hz`, low-passed at 0.8 of the new Nyquist frequency.
+    /// `every` = 1 leaves the record unchanged.
     pub fn new(every: usize, rate_hz: f64) -> Result<Self, SignalError> {
         checked_rate_hz(rate_hz)?;
         match every {
@@ -36,18 +36,18 @@ impl Decimator {
         }
     }
 
-    /// Rate of the result, Hz.
+    /// Sampling rate of the result, Hz.
     pub fn rate_hz(&self) -> f64 {
         self.rate_hz / self.every as f64
     }
 
-    /// Samples of the result for a record of `samples`: ⌈samples / every⌉.
+    /// Number of samples of the result for a record of `samples`: ⌈samples / every⌉.
     pub fn samples(&self, samples: usize) -> usize {
         samples.div_ceil(self.every)
     }
 
-    /// Filters `x` in place, packs the kept samples (0, n, 2n, …) to the front and returns how
-    /// many there are. Allocates nothing.
+    /// Filters `x` in place, moves the kept samples (0, n, 2n, …) to the front and returns their number. Allocates
+    /// nothing.
     pub fn decimate_in_place(
         &self,
         x: &mut [f64],

@@ -1,19 +1,19 @@
-//! Values of signals between the time stamps of a log.
+//! Interpolates signals between the time stamps of a log.
 
 use super::error::{SignalError, same};
 use super::resample::check_time;
 use crate::robot::JointSignals;
 
-/// Where an instant lies: the row before it, and the share of the way to the next row.
+/// The position of an instant: the row before it, and the fraction of the way to the next row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bracket {
     /// Row at or before the instant.
     pub left: usize,
-    /// 0 at that row, below 1.
+    /// Fraction of the way to the next row: 0 at `left`, always below 1.
     pub u: f64,
 }
 
-/// Instants between the time stamps of a log; applies to any number of signals.
+/// Instants between the time stamps of a log, at which any number of signals can be interpolated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instants {
     source_s: Vec<f64>,
@@ -21,7 +21,7 @@ pub struct Instants {
 }
 
 impl Instants {
-    /// `instants` from the first to the last of the strictly increasing `time_s`.
+    /// Locates `instants` among the strictly increasing `time_s`; instants outside are moved to the nearest end.
     pub fn new(time_s: &[f64], instants: impl Iterator<Item = f64>) -> Result<Self, SignalError> {
         check_time(time_s)?;
         let last = time_s.len() - 1;
@@ -36,23 +36,23 @@ impl Instants {
         Ok(Self { places: instants.map(place).collect(), source_s: time_s.to_vec() })
     }
 
-    /// With places that are known.
+    /// From positions that are already known.
     pub(super) fn of(source_s: Vec<f64>, places: Vec<Bracket>) -> Self {
         Self { source_s, places }
     }
 
-    /// Where they lie among the time stamps.
+    /// Positions of the instants among the time stamps.
     pub fn places(&self) -> &[Bracket] {
         &self.places
     }
 
-    /// Straight lines between the time stamps: for signals that jump, such as currents.
+    /// Linear interpolation: for signals that jump, such as currents.
     pub fn linear(&self, y: &[f64]) -> Result<Vec<f64>, SignalError> {
         self.check(y)?;
         Ok(self.places.iter().map(|p| lerp(y, p)).collect())
     }
 
-    /// Piecewise cubic with the known slope at every time stamp: for angles with their velocity.
+    /// Piecewise cubic interpolation with the known slope at every time stamp: for angles with their velocity.
     ///
     /// Error for a smooth y: at most step⁴/384 · max|y⁗|.
     pub fn hermite(&self, y: &[f64], slope_per_s: &[f64]) -> Result<Vec<f64>, SignalError> {
@@ -61,17 +61,17 @@ impl Instants {
         Ok(self.places.iter().map(|p| self.cubic(y, slope_per_s, p)).collect())
     }
 
-    /// Piecewise cubic that never overshoots its samples: for smooth signals without known slope.
+    /// Piecewise cubic interpolation that never overshoots the samples: for smooth signals without known slope.
     ///
-    /// Slopes are the weighted harmonic mean of the neighbouring differences, zero at extrema
-    /// (F. Fritsch and J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300–304).
+    /// The slopes are weighted harmonic means of the neighbouring difference quotients, and zero at extrema (F. Fritsch
+    /// and J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300–304).
     pub fn monotone(&self, y: &[f64]) -> Result<Vec<f64>, SignalError> {
         self.check(y)?;
         let slopes = monotone_slopes(&self.source_s, y);
         Ok(self.places.iter().map(|p| self.cubic(y, &slopes, p)).collect())
     }
 
-    /// Angles by [`Self::hermite`] with their velocities as slopes.
+    /// Interpolates angles by [`Self::hermite`], with their velocities as slopes.
     pub fn angles(
         &self,
         q_rad: &JointSignals,
@@ -81,12 +81,12 @@ impl Instants {
         self.all_joints(q_rad, |j, q| self.hermite(q, qd_rad_s.joint(j)))
     }
 
-    /// Every joint by [`Self::monotone`].
+    /// Interpolates every joint by [`Self::monotone`].
     pub fn smooth(&self, y: &JointSignals) -> Result<JointSignals, SignalError> {
         self.all_joints(y, |_, series| self.monotone(series))
     }
 
-    /// Every joint by [`Self::linear`].
+    /// Interpolates every joint by [`Self::linear`].
     pub fn straight(&self, y: &JointSignals) -> Result<JointSignals, SignalError> {
         self.all_joints(y, |_, series| self.linear(series))
     }
@@ -119,14 +119,14 @@ impl Instants {
     }
 }
 
-/// The straight line between the samples of y around the fractional sample `at`.
+/// Linear interpolation of y at the fractional sample `at`.
 pub fn linear_at(y: &[f64], at: f64) -> f64 {
     let left = (at.floor() as usize).min(y.len() - 2);
     lerp(y, &Bracket { left, u: at - left as f64 })
 }
 
-/// y at the fractional sample `at`: a cubic through two samples on either side (Catmull and Rom 1974); a straight line where one
-/// of them is missing.
+/// Cubic interpolation of y at the fractional sample `at`, from two samples on either side (Catmull and Rom 1974);
+/// linear if one of them is missing.
 pub fn cubic_at(y: &[f64], at: f64) -> f64 {
     let left = at.floor() as usize;
     if left == 0 || left + 2 >= y.len() {
@@ -156,7 +156,7 @@ fn monotone_slopes(t: &[f64], y: &[f64]) -> Vec<f64> {
         let (w1, w2) = (2.0 * step(i) + step(i - 1), step(i) + 2.0 * step(i - 1));
         (w1 + w2) / (w1 / left + w2 / right)
     };
-    // Three-point formula at the ends, limited so that the curve keeps to the samples' side.
+    // Three-point formula at the ends, limited so that the curve does not leave the range of the samples.
     let end = |h0: f64, h1: f64, d0: f64, d1: f64| {
         let slope = ((2.0 * h0 + h1) * d0 - h0 * d1) / (h0 + h1);
         if slope * d0 <= 0.0 {

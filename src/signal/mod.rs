@@ -6,7 +6,7 @@
 //!
 //! | question | answer |
 //! |---|---|
-//! | how to remove components faster than the motion without delay? | [`ZeroPhase`], [`Decimator`] |
+//! | how to remove what is faster than the motion without delay? | [`ZeroPhase`], [`Decimator`] |
 //! | how to compute accelerations as the paper does? | [`PaperDifferentiator`] |
 //! | how to differentiate a smooth series? | [`central_4`] |
 //! | how to treat jittered time stamps and missing samples? | [`Resampler`], [`fill_gaps`] |
@@ -17,8 +17,7 @@
 //! | how noisy is a signal, without any model of it? | [`replicate_noise`] |
 //! | how does the power of noise depend on frequency? | [`noise_trend`]; for several channels [`noise_trends`] |
 //! | is there a bump in coloured noise? | [`MatchedFilter`] |
-//! | what are the resolution, the noise and the limit of a sensor? | [`resolution`], [`reading_noise`],
-//! [`reading_limit`] |
+//! | what are resolution, noise and limit of a sensor? | [`resolution`], [`reading_noise`], [`reading_limit`] |
 
 mod activity;
 mod averaged_motion;

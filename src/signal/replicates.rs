@@ -1,4 +1,4 @@
-//! Noise without a model: what differs between periods of one repeated motion.
+//! Noise estimated without a model, from the differences between periods of one repeated motion.
 
 use super::error::SignalError;
 use crate::robot::JointSignals;
@@ -17,10 +17,10 @@ pub struct Replicates {
 }
 
 impl Replicates {
-    /// Scatter below this share of a signal's rms is the rounding of a file that repeats one period.
+    /// Scatter below this fraction of a signal's rms is rounding in a file that repeats one period.
     const ROUNDING: f64 = 1e-9;
 
-    /// Whether the periods are alike to the last digit, so that their scatter says nothing of noise.
+    /// Whether the periods agree to the last digit, so that their scatter says nothing about noise.
     pub fn are_alike(&self) -> bool {
         let scatters = |(j, sigma): (usize, &f64)| {
             let mean = self.mean.joint(j);
@@ -31,7 +31,7 @@ impl Replicates {
     }
 }
 
-/// Whole number of periods ≥ 2 in `samples`.
+/// Number of whole periods in `samples`; an error unless there are at least 2 and nothing remains.
 pub(super) fn whole_periods(samples: usize, per_period: usize) -> Result<usize, SignalError> {
     if per_period == 0 || !samples.is_multiple_of(per_period) || samples < 2 * per_period {
         return Err(SignalError::Periods { samples, samples_per_period: per_period });
@@ -41,8 +41,8 @@ pub(super) fn whole_periods(samples: usize, per_period: usize) -> Result<usize, 
 
 /// Splits `y`, which holds two or more whole periods, into its mean period and the scatter.
 ///
-/// Whatever repeats, modelled or not, is in the mean; what is left is noise of any colour with
-/// its correlation between joints.
+/// Everything that repeats, modelled or not, is in the mean; the scatter is noise of any colour, with its correlation
+/// between joints.
 pub fn replicate_noise(
     y: &JointSignals,
     samples_per_period: usize,

@@ -1,9 +1,8 @@
-//! From jittered time stamps with gaps to a uniform grid.
+//! Resamples signals with jittered time stamps and gaps onto a uniform grid.
 //!
-//! The grid is t₀ + k/f_s from the first time stamp on. Between two time stamps that are close
-//! enough a value is interpolated; across a longer gap nothing is invented: its grid points are
-//! left out and the gap is reported. Samples on either side of a gap belong to different
-//! [`Resampler::segments`], and filters must not run across.
+//! The grid is t₀ + k/f_s, starting at the first time stamp. Between two time stamps that are close enough a value is
+//! interpolated. Across a longer gap nothing is invented: its grid points are left out and the gap is reported. Samples
+//! on either side of a gap belong to different [`Resampler::segments`], and filters must not run across.
 
 use std::ops::Range;
 
@@ -11,7 +10,7 @@ use super::error::{SignalError, checked_rate_hz, enough};
 use super::instants::{Bracket, Instants};
 use crate::median::median;
 
-/// A stretch of time without samples, longer than the caller lets be interpolated.
+/// A stretch of time without samples that is longer than the caller allows to be interpolated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gap {
     /// Last time stamp before it, s.
@@ -25,29 +24,29 @@ pub struct Gap {
 pub struct Resampler {
     start_s: f64,
     rate_hz: f64,
-    /// Numbers of the points on the grid, gaps counted.
+    /// Indices of the samples on the full grid, with the points in gaps counted.
     ticks: Vec<usize>,
     instants: Instants,
     segments: Vec<Range<usize>>,
     gaps: Vec<Gap>,
 }
 
-/// Longer steps, in median ones, miss rows.
+/// A step longer than this many median steps contains missing rows.
 const LONGEST_STEP: f64 = 1.8;
-/// Up to this share the median step may be off the mean one: a grid that much faster or slower than its rows takes
-/// nothing from them, and a median is a round number that late rows do not move.
+/// Relative difference from the mean step up to which the median step counts as typical. A grid that much faster or
+/// slower than the rows loses nothing, and a median is a round number that late rows do not move.
 const TYPICAL_WITHIN: f64 = 0.1;
-/// Samples of a grid per row, at most: more would be made up.
+/// Largest number of grid samples per row; more would be invented.
 pub const MOST_PER_ROW: f64 = 10.0;
 
-/// The natural rate of a log, Hz: one over the median distance of its time stamps, or over the mean distance where the
-/// median is not typical (stamps in whole milliseconds of a log at 400 Hz are 2 and 3 ms apart).
+/// The natural sampling rate of a log, Hz: one over the median time step, or over the mean step if the median is not
+/// typical (stamps in whole milliseconds of a log at 400 Hz are 2 and 3 ms apart).
 ///
 /// Errors: fewer than two time stamps, time that does not increase, time stamps in bursts.
 pub fn natural_rate_hz(time_s: &[f64]) -> Result<f64, SignalError> {
     check_time(time_s)?;
     let mut steps: Vec<f64> = time_s.windows(2).map(|t| t[1] - t[0]).collect();
-    // `check_time` has seen two stamps.
+    // `check_time` guarantees two stamps.
     let median_s = median(&mut steps).unwrap_or(f64::NAN);
     let single = steps.iter().filter(|step_s| **step_s <= LONGEST_STEP * median_s);
     let (sum_s, count) =
@@ -68,8 +67,8 @@ pub fn natural_rate_hz(time_s: &[f64]) -> Result<f64, SignalError> {
     Ok(rate_hz)
 }
 
-/// The longest gap that is bridged in a log of `rate_hz`, s: ten samples, and in a fast log what ten samples of 125 Hz
-/// last. How far a motion can be interpolated depends on the motion, not on how often it is read.
+/// The longest gap that is bridged in a log of `rate_hz`, s: ten samples or, in a faster log, the duration of ten
+/// samples at 125 Hz. How far a motion can be interpolated depends on the motion, not on the sampling rate.
 pub fn bridged_gap_s(rate_hz: f64) -> f64 {
     10.0 / rate_hz.min(125.0)
 }
@@ -134,12 +133,12 @@ impl Resampler {
         Ok(Self { start_s, rate_hz, ticks, instants, segments, gaps })
     }
 
-    /// Where the samples of the grid lie among the time stamps, which tells their values.
+    /// The positions of the grid samples among the time stamps, from which signals are interpolated.
     pub fn instants(&self) -> &Instants {
         &self.instants
     }
 
-    /// Number of samples on the grid, those in gaps not counted.
+    /// Number of samples on the grid, without those in gaps.
     pub fn samples(&self) -> usize {
         self.ticks.len()
     }
@@ -149,7 +148,7 @@ impl Resampler {
         self.rate_hz
     }
 
-    /// Times of the samples, s, on the clock of the time stamps.
+    /// Times of the samples, s, on the same clock as the time stamps.
     pub fn time_s(&self) -> Vec<f64> {
         self.ticks.iter().map(|tick| self.start_s + *tick as f64 / self.rate_hz).collect()
     }
@@ -159,7 +158,7 @@ impl Resampler {
         &self.segments
     }
 
-    /// The segment of most samples; the last of several.
+    /// The segment with the most samples; the last one if several are equally long.
     pub fn longest_segment(&self) -> Range<usize> {
         self.segments.iter().max_by_key(|s| s.len()).cloned().unwrap_or(0..0)
     }
@@ -170,11 +169,12 @@ impl Resampler {
     }
 }
 
-/// A grid point this close to a time stamp, in grid steps, is on it: rounding of t · f_s.
+/// Distance from a time stamp, in grid steps, below which a grid point coincides with it; allows for rounding of t ·
+/// f_s.
 const ROUNDING_TICKS: f64 = 1e-6;
 
-/// Adds the grid point that coincides with time stamp `index`, `after` ticks from the first, if there is one and it is
-/// new.
+/// Adds the grid point that coincides with time stamp `index`, which lies `after` ticks after the first one, if there
+/// is such a point and it is new.
 fn push_on_stamp(ticks: &mut Vec<usize>, places: &mut Vec<Bracket>, index: usize, after: f64) {
     let tick = after.round() as usize;
     let is_new = ticks.last().is_none_or(|last| *last < tick);
@@ -215,14 +215,15 @@ mod tests {
         fn rate(stamps: impl Iterator<Item = f64>) -> f64 {
             natural_rate_hz(&stamps.collect::<Vec<f64>>()).unwrap()
         }
-        // 400 Hz in whole milliseconds: 2 and 3 ms, either of which may be the median; with a pause of a second in it.
+        // 400 Hz in whole milliseconds: steps of 2 and 3 ms, either of which may be the median, and a pause of one
+        // second.
         let pause_ms = |k: usize| if k > 600 { 1000.0 } else { 0.0 };
         let rounded = |k: usize| (2.5 * k as f64 + pause_ms(k)).round() / 1e3;
         for rows in [1000, 1001] {
             let found_hz = rate((0..rows).map(rounded));
             assert!((found_hz / 400.0 - 1.0).abs() < 1e-3, "{rows} rows: {found_hz} Hz");
         }
-        // Steps of 10, 10 and 12 ms are 10 ms, and those of a log without every fifth row 8 ms.
+        // With steps of 10, 10 and 12 ms the natural step is 10 ms; in a log without every fifth row it is 8 ms.
         let uneven = |k: usize| 0.01 * k as f64 + 0.002 * (k / 3) as f64;
         assert!((rate((0..1000).map(uneven)) - 100.0).abs() < 1e-6);
         let kept = (0..1000).filter(|k| k % 5 != 0);
@@ -231,7 +232,7 @@ mod tests {
 
     #[test]
     fn stamps_in_bursts_are_refused_and_pauses_are_not() {
-        // Eight rows at a time, stamped as they are read.
+        // Eight rows at a time, stamped on arrival.
         let bursts: Vec<f64> =
             (0..1000).map(|k| 0.064 * (k / 8) as f64 + 5e-6 * (k % 8) as f64).collect();
         match natural_rate_hz(&bursts) {
@@ -283,7 +284,7 @@ mod tests {
             assert!((v - 2.0 * t).abs() < 1e-12);
             assert!(*t < 5.391 || *t > 5.599, "a sample was invented at {t} s");
         }
-        // A limit above the gap bridges it, and says nothing.
+        // With a limit above its length the gap is bridged and not reported.
         let bridged = Resampler::new(&time_s, 100.0, 0.3).unwrap();
         assert_eq!((bridged.samples(), bridged.gaps().len()), (100, 0));
     }

@@ -1,4 +1,4 @@
-//! The Fourier coefficients of a repeated signal: what repeats in them, and what scatters.
+//! The Fourier coefficients of a repeated signal, separated into the part that repeats and the scatter.
 
 use std::ops::RangeInclusive;
 
@@ -7,12 +7,12 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::readings::resolution;
 
-/// Harmonics pooled for one noise estimate and one test.
+/// Number of harmonics pooled for one noise estimate and one test.
 pub(super) const BAND_HARMONICS: usize = 8;
-/// Chance that a joint keeps a band without motion in it.
+/// Probability that a joint keeps a band without motion in it.
 const FALSE_BAND: f64 = 0.01;
 
-/// Neighbouring harmonics and the F-ratio above which there is motion in them.
+/// A band of neighbouring harmonics, and the F-ratio above which it contains motion.
 pub(super) struct Band {
     pub(super) harmonics: RangeInclusive<usize>,
     threshold: f64,
@@ -43,18 +43,21 @@ impl Band {
     }
 }
 
-/// Share of samples that are read again a period later, to the last digit, from which on readings may be coarse: of noise
-/// of half a step 0.49 are, of noise of three steps 0.09, which rounds nothing off that repeats.
+/// Readings may be coarse if at least this fraction of the samples recurs one period later to the last digit. The
+/// fraction is 0.49 for noise of half a step; it is 0.09 for noise of three steps, whose rounding does not repeat.
 const READ_AGAIN: f64 = 0.05;
 
-/// What no scatter between periods shows counts as so many times its variance beside what they show: where angles are coarse and
-/// velocities are not, the motion is told by these from slower harmonics on, whose noise every test knows. Of angles in steps of 0.1 mrad
-/// rounding is 0.4 mrad/s of the velocity otherwise, and where a joint reverses a tenth of a Nm that looks like friction.
+/// Factor on the variance of the rounding that repeats in every period, which no scatter between periods shows. Where
+/// angles are coarse and velocities are not, the factor makes the velocities, whose noise every test sees, determine
+/// the motion from slower harmonics on. Without it, rounding of angles in steps of 0.1 mrad leaves 0.4 mrad/s in the
+/// velocity, and where a joint reverses a tenth of a Nm that looks like friction.
 const UNSEEN: f64 = 16.0;
 
-/// Variance of what rounding does to every period alike, of a signal `y` with periods of `n` samples whose noise has
-/// the variance `noise`: that of readings in steps Δ is Σ_k Δ²/(2π²k²) exp(−(2πkσ/Δ)²), Δ²/12 without noise (Widrow 1956).
-/// No scatter between periods shows it, and no average takes it away.
+/// Variance of the rounding error that is the same in every period.
+///
+/// `y` is a signal with periods of `n` samples whose noise has the variance `noise`. For readings in steps Δ the
+/// variance is Σ_k Δ²/(2π²k²) exp(−(2πkσ/Δ)²), which is Δ²/12 without noise (Widrow 1956). No scatter between periods
+/// shows this error, and no average removes it.
 pub(super) fn repeated_rounding(y: &[f64], n: usize, noise: f64) -> f64 {
     let again = y.windows(n + 1).filter(|w| w[0] == w[n]).count();
     if (again as f64) < READ_AGAIN * y.len().saturating_sub(n) as f64 {
@@ -69,21 +72,21 @@ pub(super) fn repeated_rounding(y: &[f64], n: usize, noise: f64) -> f64 {
     (1..=20).map(term).sum()
 }
 
-/// Coefficients of all periods of one signal, their mean, and the scatter per harmonic.
+/// Fourier coefficients of all periods of one signal, their mean, and their scatter per harmonic.
 #[derive(Default)]
 pub(super) struct Spectra {
-    /// Coefficients 0 … n/2 of one period after the other.
+    /// Coefficients 0 … n/2, period after period.
     pub(super) periods: Vec<Complex64>,
     pub(super) mean: Vec<Complex64>,
     pub(super) scatter: Vec<f64>,
-    /// Scatter that stands for what is not known of a coefficient though no period shows it.
+    /// Lower bound of the noise power of a coefficient, for errors that no scatter between periods shows: rounding.
     floor: f64,
-    /// Whether what rounding does is more than what periods show.
+    /// Whether the rounding that repeats exceeds the scatter between periods.
     pub(super) is_coarse: bool,
 }
 
 impl Spectra {
-    /// Mean and scatter of the coefficients in `periods`, of the signal `y` with periods of `n` samples.
+    /// Computes mean and scatter of the coefficients in `periods`; `y` is the signal, with periods of `n` samples.
     pub(super) fn average(&mut self, y: &[f64], n: usize) {
         let bins = n / 2 + 1;
         let count = self.periods.len() / bins;
@@ -105,13 +108,13 @@ impl Spectra {
         let power: f64 = self.mean.iter().map(|c| c.norm_sqr()).sum();
         let digits = (8.0 * f64::EPSILON).powi(2) * power * (1.0 / n as f64);
         let noise = n as f64 / bins as f64 * self.scatter.iter().sum::<f64>();
-        // The mean has 1/P of the scatter, and all of what repeats.
+        // Averaging divides the scatter by P but leaves the repeated rounding whole, hence the factor P.
         let repeated = count as f64 * repeated_rounding(y, n, noise);
         self.is_coarse = repeated > noise;
         self.floor = digits.max(UNSEEN * repeated / n as f64).max(f64::MIN_POSITIVE.sqrt());
     }
 
-    /// Leaves of every period what it is off the mean.
+    /// Subtracts the mean from the coefficients of every period.
     pub(super) fn subtract_mean(&mut self) {
         for spectrum in self.periods.chunks_exact_mut(self.mean.len()) {
             spectrum.iter_mut().zip(&self.mean).for_each(|(c, mean)| *c -= mean);
@@ -124,7 +127,7 @@ impl Spectra {
         (scatter.iter().sum::<f64>() / scatter.len() as f64).max(self.floor)
     }
 
-    /// Whether the mean's energy in the band exceeds what noise makes of it.
+    /// Whether the energy of the mean in the band exceeds what noise explains.
     pub(super) fn stands_out(&self, band: &Band, periods: f64) -> bool {
         let mean = &self.mean[band.harmonics.clone()];
         let energy = periods * mean.iter().map(|c| c.norm_sqr()).sum::<f64>() / mean.len() as f64;
@@ -138,7 +141,7 @@ mod tests {
     use rand::{SeedableRng, rngs::ChaCha8Rng};
     use rand_distr::{Distribution, StandardNormal};
 
-    /// The mean of many periods is off by what rounding does to all of them, and is said to be.
+    /// The error of the mean of many periods is the repeated rounding, and its variance is the one predicted.
     #[test]
     fn rounding_repeats_as_far_as_noise_leaves_it() {
         const STEP: f64 = 1e-3;
@@ -152,16 +155,16 @@ mod tests {
             let y: Vec<f64> = (0..n * periods).map(read).collect();
             let off = |k: usize| y[k..].iter().step_by(n).sum::<f64>() / periods as f64 - truth(k);
             let square = (0..n).map(|k| off(k).powi(2)).sum::<f64>() / n as f64;
-            // What is not rounded scatters by no more than noise and a step, over the periods.
+            // The part that does not repeat scatters over the periods by no more than noise and one step.
             let scatter = (sigma * sigma + 1.0 / 12.0) * STEP * STEP / periods as f64;
             let said = repeated_rounding(&y, n, (sigma * STEP).powi(2));
             let left = f64::from(u8::from(sigma > 0.0)) * scatter;
-            // 500 samples: their mean square is known to 6 %, twice that is allowed.
+            // The mean square of 500 samples is known to 6 %; twice that is allowed.
             assert!((square - said).abs() < 0.13 * said + left, "{sigma}: {square:e} {said:e}");
         }
     }
 
-    /// Readings as fine as their noise repeat nothing.
+    /// Readings as fine as their noise have no repeated rounding.
     #[test]
     fn fine_readings_have_no_rounding_that_repeats() {
         let y: Vec<f64> = (0..1000).map(|k| (0.1 * k as f64).sin()).collect();
