@@ -1,8 +1,8 @@
-//! What can be wrong with a signal or with what is asked of it.
+//! Errors of signals and of requests for their processing.
 
 use thiserror::Error;
 
-/// A request to the signal chapter that cannot be met, with the numbers that say why.
+/// A request to the module `signal` that cannot be met, with the numbers that show why.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SignalError {
     /// The sampling rate is not a positive number.
@@ -11,7 +11,7 @@ pub enum SignalError {
         /// The rate, Hz.
         rate_hz: f64,
     },
-    /// The cutoff is not between zero and half the sampling rate.
+    /// The cut-off is not between zero and half the sampling rate.
     #[error(
         "a cutoff of {cutoff_hz} Hz cannot be had at {rate_hz} Hz: it must lie above 0 and below {} Hz",
         rate_hz / 2.0
@@ -22,7 +22,7 @@ pub enum SignalError {
         /// The sampling rate, Hz.
         rate_hz: f64,
     },
-    /// The filter order is zero or beyond what double precision carries.
+    /// The filter order is zero or above the highest order offered.
     #[error("filter order {order} is not between 1 and {highest}")]
     Order {
         /// The order asked for.
@@ -30,7 +30,7 @@ pub enum SignalError {
         /// The highest order offered.
         highest: usize,
     },
-    /// Keep every 0th sample.
+    /// Decimation by zero.
     #[error("keeping every 0th sample leaves nothing; the smallest factor is 1")]
     Factor,
     /// The record is too short for the task.
@@ -38,7 +38,7 @@ pub enum SignalError {
     TooFewSamples {
         /// What was to be done.
         task: &'static str,
-        /// Samples at hand.
+        /// Samples available.
         samples: usize,
         /// Samples needed.
         needed: usize,
@@ -48,22 +48,22 @@ pub enum SignalError {
     Mismatch {
         /// Which two things differ.
         what: &'static str,
-        /// What the first one has.
+        /// Count of the first.
         expected: usize,
-        /// What the second one has.
+        /// Count of the second.
         found: usize,
     },
     /// Time does not increase.
     #[error("time does not increase at sample {index}: {before_s} s is followed by {after_s} s")]
     Time {
-        /// Sample (0-based) at which it fails.
+        /// The sample (0-based) that is not later than the one before.
         index: usize,
         /// Time of the sample before, s.
         before_s: f64,
-        /// Its own time, s.
+        /// Time of this sample, s.
         after_s: f64,
     },
-    /// Time stamps that tell when rows arrived, not when they were measured.
+    /// Time stamps show when rows arrived, not when they were measured.
     #[error(
         "time stamps come in bursts: most follow each other at {rate_hz:.0} Hz, and yet there are {rows_hz:.0} rows in a \
          second; log the time at which a row is measured"
@@ -74,18 +74,18 @@ pub enum SignalError {
         /// Rows per second, pauses left out, Hz.
         rows_hz: f64,
     },
-    /// The longest bridged gap is not a positive time.
+    /// The longest gap to bridge is not a positive time.
     #[error("the longest gap to interpolate across is {limit_s} s; it must be positive")]
     GapLimit {
         /// The limit, s.
         limit_s: f64,
     },
-    /// Not at least two whole periods.
+    /// The samples are not two or more whole periods.
     #[error(
         "{samples} samples are not two or more whole periods of {samples_per_period} samples each"
     )]
     Periods {
-        /// Samples at hand.
+        /// Samples available.
         samples: usize,
         /// Samples of one period.
         samples_per_period: usize,
@@ -104,7 +104,7 @@ pub enum SignalError {
     },
 }
 
-/// A sampling rate that can be used, or the error that says it cannot.
+/// Returns the sampling rate if it can be used.
 pub(super) fn checked_rate_hz(rate_hz: f64) -> Result<f64, SignalError> {
     if rate_hz.is_finite() && rate_hz > 0.0 {
         Ok(rate_hz)
@@ -113,7 +113,7 @@ pub(super) fn checked_rate_hz(rate_hz: f64) -> Result<f64, SignalError> {
     }
 }
 
-/// A cutoff strictly between zero and half the rate.
+/// Returns the cut-off if it is strictly between zero and half the sampling rate.
 pub(super) fn checked_cutoff_hz(cutoff_hz: f64, rate_hz: f64) -> Result<f64, SignalError> {
     checked_rate_hz(rate_hz)?;
     if cutoff_hz > 0.0 && cutoff_hz < rate_hz / 2.0 {
@@ -123,7 +123,7 @@ pub(super) fn checked_cutoff_hz(cutoff_hz: f64, rate_hz: f64) -> Result<f64, Sig
     }
 }
 
-/// At least `needed` samples, or the error that names the task.
+/// Checks that there are at least `needed` samples; the error names the task.
 pub(super) fn enough(task: &'static str, samples: usize, needed: usize) -> Result<(), SignalError> {
     if samples < needed {
         return Err(SignalError::TooFewSamples { task, samples, needed });
@@ -131,7 +131,7 @@ pub(super) fn enough(task: &'static str, samples: usize, needed: usize) -> Resul
     Ok(())
 }
 
-/// Two counts that must agree.
+/// Checks that two counts agree.
 pub(super) fn same(what: &'static str, expected: usize, found: usize) -> Result<(), SignalError> {
     if expected != found {
         return Err(SignalError::Mismatch { what, expected, found });

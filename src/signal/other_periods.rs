@@ -1,10 +1,13 @@
-//! The same phase of a motion in its other periods.
+//! Finds the samples at the same phase of a motion in its other periods.
 
-/// Other periods that one is compared with: of more the nearest are as good, and an hour of a short motion has hundreds.
+/// Largest number of other periods that one is compared with. The nearest ones serve as well as all, and an hour of a
+/// short motion has hundreds.
 const MOST_OTHERS: usize = 16;
 
-/// Samples, not whole ones, at the phase of sample `k` in the other periods of `samples` samples that repeat every `period` of
-/// them, as far as they were recorded; of many the nearest.
+/// Returns the fractional sample positions at the phase of sample `k` in the other periods.
+///
+/// The log has `samples` samples and repeats every `period` of them. Only periods in which the phase was recorded
+/// count, and of many only the nearest.
 pub fn other_periods(k: usize, period: f64, samples: usize) -> impl Iterator<Item = f64> + Clone {
     let own = (k as f64 / period).floor() as usize;
     let phase = k as f64 - own as f64 * period;
@@ -20,7 +23,8 @@ pub fn other_periods(k: usize, period: f64, samples: usize) -> impl Iterator<Ite
 mod tests {
     use super::*;
 
-    /// Of 6.5 periods of 10 samples the seventh has the first half; of many the nearest sixteen.
+    /// Of 6.5 periods of 10 samples the seventh contains only the first half; of many periods the nearest sixteen are
+    /// used.
     #[test]
     fn other_periods_are_those_that_were_recorded() {
         let others = |k, samples| other_periods(k, 10.0, samples).collect::<Vec<f64>>();

@@ -1,25 +1,24 @@
-//! The best estimate of a repeated motion: periods averaged, angle and velocity combined harmonic
-//! by harmonic, and the Fourier series differentiated exactly.
+//! The best estimate of a repeated motion: periods are averaged, angle and velocity are combined harmonic by harmonic,
+//! and the Fourier series is differentiated exactly.
 //!
-//! With P periods of n samples, ω = 2πf_s/n, and per period p the Fourier coefficients
-//! Q_ph, V_ph = (1/n) Σ_k y_k e^{−2πihk/n} of angle and velocity:
+//! With P periods of n samples, ω = 2πf_s/n, and for each period p the Fourier coefficients Q_ph, V_ph = (1/n) Σ_k y_k
+//! e^{−2πihk/n} of angle and velocity:
 //!
-//! 1. Means Q̄_h, V̄_h and scatter S_h = Σ_p |Y_ph − Ȳ_h|² / (P − 1), pooled over bands of
-//!    neighbouring harmonics. S/P is the noise power of a mean coefficient.
-//! 2. Both measure the same series, V_h = ihω Q_h. Weighted by their noise:
-//!    Q̂_h = Q̄_h + w (V̄_h/ihω − Q̄_h), w = S_q / (S_q + S_v/(hω)²), of variance
-//!    v_h = w S_v / (P (hω)²). Slow harmonics come from the angle, fast ones from the velocity.
-//! 3. The series ends with the last band in which energy stands above the noise. In a band of B
-//!    harmonics without motion, P Σ|Ȳ_h|²/B over ΣS_h/B follows F(2B, 2B(P − 1)) for Gaussian
-//!    noise of any smooth spectrum; angle and velocity are tested each, at a level that lets one
-//!    joint in a hundred keep a band too many. It goes on as long as all its noise is less than
-//!    a share of it that costs nothing (`FREE_NOISE`, for q̈ and, much later, for q̇): what is too
-//!    weak to be seen band by band (the kink that friction leaves at a reversal fades as 1/h² in
-//!    q̇) is not too weak to bias the friction parameters.
-//!    q̈ ends earlier, at 0.2 f_s or 25 Hz.
-//! 4. q, q̇ = Σ ihω Q̂_h e^{ihωt}, q̈ = −Σ (hω)² Q̂_h e^{ihωt} on the period's grid.
+//! 1. The means Q̄_h, V̄_h and the scatter S_h = Σ_p |Y_ph − Ȳ_h|² / (P − 1) are computed; the scatter is pooled over
+//!    bands of neighbouring harmonics. S/P is the noise power of a mean coefficient.
+//! 2. Both channels measure the same series, V_h = ihω Q_h. Weighted by their noise, Q̂_h = Q̄_h + w (V̄_h/ihω − Q̄_h)
+//!    with w = S_q / (S_q + S_v/(hω)²) has the variance v_h = w S_v / (P (hω)²). Slow harmonics come from the angle,
+//!    fast ones from the velocity.
+//! 3. The series contains at least all bands up to the last one whose energy exceeds the noise. In a band of B
+//!    harmonics without motion, the ratio of P Σ|Ȳ_h|²/B to ΣS_h/B follows F(2B, 2B(P − 1)) for Gaussian noise of any
+//!    smooth spectrum. Angle and velocity are both tested, at a level at which one joint in a hundred keeps a band too
+//!    many. The series continues beyond that band as long as its total noise is a negligible fraction of it
+//!    (`FREE_NOISE`, for q̈ and, much later, for q̇): a component too weak to be detected band by band (the kink that
+//!    friction leaves at a reversal fades as 1/h² in q̇) is not too weak to bias the friction parameters. q̈ ends
+//!    earlier, at 0.2 f_s or 25 Hz.
+//! 4. The motion on the period's grid is q, q̇ = Σ ihω Q̂_h e^{ihωt}, q̈ = −Σ (hω)² Q̂_h e^{ihωt}.
 //!
-//! The mean angle is the angle's own; a mean velocity (an offset of its sensor) is not used.
+//! The mean angle is taken from the angle alone; a mean velocity (an offset of its sensor) is not used.
 
 use std::f64::consts::PI;
 
@@ -30,13 +29,14 @@ use super::error::{SignalError, checked_rate_hz, enough, same};
 use super::spectra::{BAND_HARMONICS, Band, Spectra};
 use crate::robot::JointSignals;
 
-/// Noise in q̈, as a share of its mean square, that costs nothing: it attenuates an inertia by about
-/// as much, a small part of the σ that any practical record reaches.
+/// Noise in q̈, as a fraction of its mean square, that costs nothing: it attenuates an inertia by about the same
+/// fraction, a small part of the σ that any practical record reaches.
 const FREE_NOISE: f64 = 1e-4;
-/// The same for q̇, where friction looks closer: a few mrad/s against the tens over which it turns.
+/// The same for q̇, where friction is more sensitive: a few mrad/s, compared with the tens of mrad/s over which
+/// friction reverses.
 const FREE_NOISE_QD: f64 = 1e-5;
 
-/// Plans and thresholds for motions of one length; made once, used for every record of it.
+/// Transform plans and thresholds for motions of one length; created once and used for every record of that length.
 pub struct PeriodicFit {
     samples_per_period: usize,
     periods: usize,
@@ -46,16 +46,16 @@ pub struct PeriodicFit {
     bands: Vec<Band>,
 }
 
-/// Highest frequency of q̈ over the sampling rate. Where friction reverses, q̇ has a kink, whose
-/// spectrum falls only as 1/f²: sampled at f_s, q̇ at f holds (f/(f_s − f))² of what belongs to
-/// f_s − f, a sixteenth at 0.2 f_s, and its derivative is worth no more.
+/// Highest frequency of q̈ as a fraction of the sampling rate. Where friction reverses, q̇ has a kink, whose spectrum
+/// falls only as 1/f². Sampled at f_s, the component of q̇ at f contains the alias of the one at f_s − f, whose size is
+/// (f/(f_s − f))² of the component itself: a sixteenth at 0.2 f_s. Beyond that, the derivative is not worth keeping.
 const ALIAS_FREE: f64 = 0.2;
-/// The same for q and q̇. Friction looks at q̇ sample by sample: there what is folded belongs to the
-/// sample, and a series that ends at 0.2 f_s rounds the kink off by several mrad/s.
+/// The same for q and q̇. The friction model evaluates q̇ sample by sample: there the aliased part belongs to the value
+/// at the sample, and a series that ends at 0.2 f_s would round the kink off by several mrad/s.
 const SERIES_END: f64 = 0.32;
-/// Highest frequency of q̈ whatever the rate, Hz: an arm is moved at a few hertz. What friction adds to that
-/// stands out of the noise of a fast log much farther up, but there the noise in q̈, which grows with the square
-/// of the frequency, is more than what it is worth.
+/// Highest frequency of q̈ at any sampling rate, Hz: an arm is moved at a few hertz. The effect of friction on q̈
+/// stands out of the noise of a fast log up to much higher frequencies, but there the noise in q̈, which grows with the
+/// square of the frequency, outweighs it.
 const ACCELERATION_HZ: f64 = 25.0;
 
 /// Working memory of [`PeriodicFit::fit`], one per thread.
@@ -69,7 +69,7 @@ pub struct FitScratch {
     derived: Vec<Complex64>,
 }
 
-/// What the average keeps of one joint's series.
+/// Which harmonics of one joint's series are kept.
 #[derive(Default)]
 struct Kept {
     /// Highest harmonic of q and q̇; 0 for a joint that stands still.
@@ -79,7 +79,7 @@ struct Kept {
 }
 
 impl PeriodicFit {
-    /// For records of `periods` ≥ 2 periods of `samples_per_period` ≥ 5 samples at `rate_hz`.
+    /// Prepares the fit for records of `periods` ≥ 2 periods of `samples_per_period` ≥ 5 samples at `rate_hz`.
     pub fn new(
         samples_per_period: usize,
         periods: usize,
@@ -111,7 +111,7 @@ impl PeriodicFit {
         self.rate_hz
     }
 
-    /// Number of periods a record must have.
+    /// Number of periods that a record must have.
     pub fn periods(&self) -> usize {
         self.periods
     }
@@ -148,12 +148,12 @@ impl PeriodicFit {
         Ok(motion)
     }
 
-    /// Every period for itself: angle, velocity and acceleration (joints × P·n samples), angle and
-    /// velocity combined as in step 2, all harmonics up to `share` of the rate and nothing averaged.
+    /// Returns every period separately: angle, velocity and acceleration (joints × P·n samples). Angle and velocity are
+    /// combined as in step 2 with all harmonics up to `share` of the sampling rate, and nothing is averaged.
     ///
-    /// What differs between the periods is noise of the encoders as the acceleration shows it, and
-    /// motion that does not repeat. Where readings are so coarse that their rounding repeats, it has the harmonics
-    /// of [`Self::fit`]: the others are rounding that looks like motion.
+    /// The differences between the periods are encoder noise as it appears in the acceleration, and motion that does
+    /// not repeat. If readings are so coarse that their rounding repeats, only the harmonics of [`Self::fit`] are used:
+    /// the others are rounding that looks like motion.
     ///
     /// Errors: as for [`Self::fit`].
     pub fn each_period(
@@ -175,10 +175,10 @@ impl PeriodicFit {
         })
     }
 
-    /// How far every period is off the mean of all, in the harmonics that [`Self::fit`] keeps: angle, velocity
-    /// and acceleration (joints × P·n samples).
+    /// Returns the deviation of every period from the mean of all, in the harmonics that [`Self::fit`] keeps: angle,
+    /// velocity and acceleration (joints × P·n samples).
     ///
-    /// This over √P is how far the averaged motion is off, one draw of it per period.
+    /// Divided by √P, each period's deviation is one draw of the error of the averaged motion.
     ///
     /// Errors: as for [`Self::fit`].
     pub fn deviations(
@@ -195,8 +195,9 @@ impl PeriodicFit {
         })
     }
 
-    /// Angle, velocity and acceleration (joints × P·n samples), period by period as in step 2. `prepare` may change the
-    /// spectra of a joint before, and says up to which harmonics they are used: for angle and velocity, for the acceleration.
+    /// Computes angle, velocity and acceleration (joints × P·n samples) period by period as in step 2. `prepare` may
+    /// first change the spectra of a joint, and returns the highest harmonics to use: for angle and velocity, and for
+    /// the acceleration.
     fn period_by_period(
         &self,
         q_rad: &JointSignals,
@@ -221,7 +222,7 @@ impl PeriodicFit {
         Ok(out)
     }
 
-    /// Step 2 for period `p` by itself, up to harmonic `highest`, into `series`.
+    /// Step 2 for period `p` alone, up to harmonic `highest`, into `series`.
     fn combine_period(
         &self,
         q: &Spectra,
@@ -246,7 +247,7 @@ impl PeriodicFit {
         }
     }
 
-    /// Step 4 of `scratch.series`: q, q̇ and q̈ of one joint and period, the last up to harmonic `in_qdd`.
+    /// Step 4 for `scratch.series`: q, q̇ and q̈ of one joint and period; q̈ up to harmonic `in_qdd`.
     fn synthesise_motion(
         &self,
         scratch: &mut FitScratch,
@@ -311,7 +312,7 @@ impl PeriodicFit {
         out.average(y, n);
     }
 
-    /// Steps 2 and 3: Q̂ into `scratch.series`; what is kept of it.
+    /// Steps 2 and 3: writes Q̂ into `scratch.series` and returns which harmonics are kept.
     fn combine(&self, scratch: &mut FitScratch) -> Kept {
         let FitScratch { q, qd, series, .. } = scratch;
         let periods = self.periods as f64;
@@ -326,7 +327,7 @@ impl PeriodicFit {
         else {
             return kept;
         };
-        // Mean square and noise so far: of q̇, of q̈.
+        // Mean square and noise accumulated so far, of q̇ and of q̈.
         let (mut square, mut noise) = ([0.0; 2], [0.0; 2]);
         let mut in_qdd = true;
         let share = ALIAS_FREE.min(ACCELERATION_HZ / self.rate_hz);
@@ -335,7 +336,7 @@ impl PeriodicFit {
             let (noise_q, noise_qd) = (q.noise(&band.harmonics), qd.noise(&band.harmonics));
             let weight = |w: f64| weight(noise_q, noise_qd, w);
             let frequencies = band.harmonics.clone().map(|h| (h, self.angular_frequency(h)));
-            // Mean square of the noise of a harmonic in q̇.
+            // Mean square of the noise in q̇ at a harmonic.
             let in_qd = |w: f64| 2.0 * weight(w) * noise_qd / periods;
             let added = frequencies.clone().fold([0.0; 2], |[v, a], (_, w)| {
                 let noise = in_qd(w);
@@ -381,12 +382,12 @@ impl PeriodicFit {
     }
 }
 
-/// Weight of the velocity at ω beside the angle, by the noise powers of both.
+/// Weight of the velocity relative to the angle at the frequency ω, from the noise powers of both.
 fn weight(noise_q: f64, noise_qd: f64, w: f64) -> f64 {
     noise_q / (noise_q + noise_qd / (w * w))
 }
 
-/// Harmonics of a period of n samples up to `share` of the sampling rate.
+/// Number of harmonics, of a period of n samples, up to `share` of the sampling rate.
 fn harmonics_below(share: f64, samples_per_period: usize) -> usize {
     ((share * samples_per_period as f64) as usize).max(1)
 }
@@ -455,8 +456,8 @@ mod tests {
         }
     }
 
-    /// Every period for itself: without noise the motion, with noise scattered about their own mean, which the
-    /// fit of all of them is close to.
+    /// Every period separately: without noise it is the motion; with noise the periods scatter about their own mean,
+    /// which the fit of all periods is close to.
     #[test]
     fn each_period_is_the_motion_with_its_own_noise() {
         let (n, p) = (1250, 4);
@@ -475,9 +476,9 @@ mod tests {
         let [q, qd] = record(n, p, [2e-5, 1e-3], 1);
         let [found, ..] = fit.each_period(&q, &qd, 0.32, &mut scratch).unwrap();
         let mean = fit.fit(&q, &qd, &mut scratch).unwrap().q_rad;
-        // Angle and velocity together have the variance 1/(1/σ_q² + ω²/σ_q̇²) per harmonic. The fit has the mean of
-        // the periods, or nothing, of a harmonic: (P − 1)/P or all of it is scatter. Some 650 degrees of freedom
-        // tell the rms of a joint to 2.8 %: four of these, one seed in 2000.
+        // Angle and velocity together have the variance 1/(1/σ_q² + ω²/σ_q̇²) per harmonic. For each harmonic the fit
+        // contains the mean of the periods, or nothing: (P − 1)/P of the variance, or all of it, is scatter. Some 650
+        // degrees of freedom determine the rms of a joint to 2.8 %; the limit is four times that, one seed in 2000.
         let variance =
             |h: usize| 1.0 / (2e-5f64.powi(-2) + (fit.angular_frequency(h) / 1e-3).powi(2));
         let highest = (0.32 * n as f64) as usize;
@@ -493,7 +494,7 @@ mod tests {
         }
     }
 
-    /// The acceleration's error is the one predicted.
+    /// The error of the acceleration agrees with the predicted one.
     #[test]
     fn with_noise_the_claimed_noise_of_the_acceleration_holds() {
         let (n, p) = (1250, 8);
@@ -520,12 +521,12 @@ mod tests {
         // ones, relative sd of the mean square √(2/110/240) = 0.9 %; 5 sd.
         let mean = ratio / (6 * TRIALS) as f64;
         assert!((mean - 1.0).abs() < 0.045, "squared error / claimed variance = {mean}");
-        // 240 joints with a chance of 1 % each to keep a band of pure noise: more than 9 in 5e-4 of
-        // runs.
+        // 240 joints, each with a probability of 1 % of keeping a band of pure noise: more than 9 of them in 5e-4 of
+        // the runs.
         assert!(too_noisy <= 9, "{too_noisy} of 240 joints kept too much noise");
     }
 
-    /// What the periods are off their mean tells how far the mean is off the truth.
+    /// The deviations of the periods from their mean predict the error of the mean.
     #[test]
     fn deviations_over_the_root_of_the_periods_are_the_errors_of_the_mean() {
         const TRIALS: u64 = 40;
@@ -547,15 +548,16 @@ mod tests {
                 }
             }
         }
-        // 240 joints with 16 numbers and more that weigh alike (slow ones of the angle, fast ones of the
-        // acceleration): relative sd of the errors' mean square √(2/16/240) = 2.3 %, of the claim 0.9 %; 5 sd.
+        // 240 joints with at least 16 numbers of similar weight (slow harmonics for the angle, fast ones for the
+        // acceleration): the errors' mean square has a relative sd of √(2/16/240) = 2.3 %, the claim 0.9 %; the limit
+        // is 5 sd.
         for (errors, claimed) in errors.into_iter().zip(claimed) {
             let ratio = errors / (claimed / (p * (p - 1)) as f64);
             assert!((ratio - 1.0).abs() < 0.12, "squared error over claim: {ratio}");
         }
     }
 
-    /// Above the motion's last visible band only as many harmonics as their noise is free.
+    /// Above the last visible band of the motion, harmonics are added only while their noise is negligible.
     #[test]
     fn much_noise_ends_the_series_with_the_motion() {
         let (n, p) = (1250, 8);
@@ -566,7 +568,7 @@ mod tests {
             let m = fit.fit(&q, &qd, &mut FitScratch::default()).unwrap();
             too_many += m.harmonics.iter().filter(|h| **h != BAND_HARMONICS).count();
         }
-        // 240 joints with a chance of 1 % each: more than 9 in 5e-4 of runs.
+        // 240 joints with a probability of 1 % each: more than 9 of them in 5e-4 of the runs.
         assert!(too_many <= 9, "{too_many} of 240 joints kept a band of pure noise");
     }
 

@@ -1,41 +1,42 @@
-//! What the values of a recorded series say of the sensor behind it.
+//! Properties of a sensor that the values of a recorded series reveal.
 
 use crate::median::sigma_of_changes;
 
-/// Smallest distance between two different values of the series: its resolution as recorded.
-/// Zero for a constant.
+/// The resolution of a series as recorded: the smallest distance between two different values. Zero for a constant.
 pub fn resolution(series: &[f64]) -> f64 {
     let mut values = series.to_vec();
     values.sort_by(f64::total_cmp);
     let scale =
         [values.first(), values.last()].into_iter().flatten().fold(0.0, |s: f64, v| s.max(v.abs()));
-    // What differs by rounding alone is the same value.
+    // Values that differ only by rounding count as equal.
     let distances = values.windows(2).map(|v| v[1] - v[0]).filter(|d| *d > 1e-12 * scale);
     let smallest = distances.fold(f64::INFINITY, f64::min);
     if smallest.is_finite() { smallest } else { 0.0 }
 }
 
-/// Standard deviation of the noise of single readings: of fourth differences, Σ (−1)^i C(4, i) y_{k+i}, of which white noise has √70
-/// times its own, and a motion at a twentieth of the rate 1 % of its amplitude. Half of them may be anything: the median counts, of
-/// those that are not zero. A joint at rest may be read as at rest.
+/// Standard deviation of the noise of single readings.
+///
+/// It is estimated from fourth differences, Σ (−1)^i C(4, i) y_{k+i}: white noise is amplified by √70, and a motion at
+/// a twentieth of the sampling rate is reduced to 1 % of its amplitude. The median of the differences that are not zero
+/// is used, so half of them may be outliers, and a joint at rest may give constant readings.
 pub fn reading_noise(series: &[f64]) -> f64 {
     let fourth = |y: &[f64]| y[0] - 4.0 * y[1] + 6.0 * y[2] - 4.0 * y[3] + y[4];
     let changes: Vec<f64> = series.windows(5).map(fourth).collect();
     sigma_of_changes(&changes) / 70f64.sqrt()
 }
 
-/// Readings at the limit that are no accident, at least, and so many times those at the next value: in coarse
-/// steps the highest is no more frequent than the one before.
+/// Smallest number of readings at the limit that is no coincidence, and its smallest ratio to the number at the next
+/// value: with coarse steps the highest value is no more frequent than the one below it.
 const AT_LIMIT: usize = 4;
 const MORE_THAN_NEXT: usize = 3;
 
-/// ± the reading that the series does not pass, because it is cut off there: its largest size, where that
-/// very number is read again and again. `None` if nothing is cut off.
+/// The magnitude at which the series is clipped: its largest magnitude, if exactly that number occurs again and again.
+/// `None` if nothing is clipped.
 pub fn reading_limit(series: &[f64]) -> Option<f64> {
     let mut sizes: Vec<f64> = series.iter().map(|v| v.abs()).collect();
     sizes.sort_by(|a, b| b.total_cmp(a));
     let largest = *sizes.first().filter(|v| **v > 0.0)?;
-    // What differs by rounding alone is the same value.
+    // Values that differ only by rounding count as equal.
     let is_same = |a: f64, b: f64| (a - b).abs() <= 1e-12 * largest;
     let count = |of: &[f64]| of.iter().take_while(|v| is_same(**v, of[0])).count();
     let at_limit = count(&sizes);
@@ -49,7 +50,8 @@ mod tests {
     use rand::{SeedableRng, rngs::ChaCha8Rng};
     use rand_distr::{Distribution, StandardNormal};
 
-    /// Of 5000 differences, each of which says something that the next four say as well, the median tells σ to some 2.5 %: four of these.
+    /// 5000 differences, each correlated with the next four: their median determines σ to some 2.5 %; the limit is four
+    /// times that.
     #[test]
     fn noise_is_told_beside_a_motion_and_a_jump() {
         let mut rng = ChaCha8Rng::seed_from_u64(8);
@@ -61,7 +63,7 @@ mod tests {
         let series: Vec<f64> = (0..5000).map(reading).collect();
         assert!((reading_noise(&series) / 1e-3 - 1.0).abs() < 0.1);
         assert_eq!(reading_noise(&[1.0; 40]), 0.0);
-        // Twice as long at rest as moving.
+        // Rest for twice as long as the motion.
         let rested = [vec![0.0; 10_000], series].concat();
         assert!((reading_noise(&rested) / 1e-3 - 1.0).abs() < 0.1);
     }
