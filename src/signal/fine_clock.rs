@@ -1,13 +1,13 @@
-//! What happens between the samples of a motion that repeats.
+//! Computes what happens between the samples of a repeated motion.
 
 use std::f64::consts::{PI, TAU};
 
 use fourier::{Complex64, ComplexToReal, Forward, Inverse};
 
-/// An answer that began so many of its own times before has forgotten what it began with but for its rounding.
+/// After this many time constants the initial value of a response has decayed below rounding.
 const FORGOTTEN: f64 = 37.0;
 
-/// A clock that ticks several times per sample of one period, and plans for the way there and back.
+/// A fine time grid with several ticks per sample over one period, with the Fourier transforms between the two grids.
 pub struct FineClock {
     samples: usize,
     ticks: usize,
@@ -17,7 +17,7 @@ pub struct FineClock {
 }
 
 impl FineClock {
-    /// For periods of `samples` samples, and `ticks` in each of them.
+    /// Creates the grid for periods of `samples` samples, with `ticks` ticks per sample.
     pub fn new(samples: usize, ticks: usize) -> Self {
         Self {
             samples,
@@ -28,7 +28,7 @@ impl FineClock {
         }
     }
 
-    /// Samples of a period.
+    /// Samples per period.
     pub fn samples(&self) -> usize {
         self.samples
     }
@@ -38,19 +38,21 @@ impl FineClock {
         self.ticks
     }
 
-    /// One period of `y` at every tick, by its Fourier series.
+    /// Evaluates one period of `y` at every tick from its Fourier series.
     pub fn refined(&self, y: &[f64]) -> Vec<f64> {
         let mut spectrum = self.spectrum(y);
         if self.samples.is_multiple_of(2) && self.ticks > 1 {
-            // The Nyquist harmonic is two of the longer series, which share it.
+            // The Nyquist harmonic becomes two harmonics of the finer series, which share its amplitude.
             spectrum[self.samples / 2] *= 0.5;
         }
         spectrum.resize(self.ticks * self.samples / 2 + 1, Complex64::ZERO);
         synthesised(&*self.fine_inverse, &mut spectrum)
     }
 
-    /// One period of `y` at every tick, of which the samples tell the rate `y_per_sample` as well: the cubic through both
-    /// between each sample and the next. Where y bends between two samples it is nearer than the series of y alone.
+    /// Evaluates one period of `y` at every tick from its values and rates at the samples.
+    ///
+    /// A cubic is laid through both between neighbouring samples. Where y bends between two samples, it is closer to
+    /// the truth than the Fourier series of y alone.
     pub fn between(&self, y: &[f64], y_per_sample: &[f64]) -> Vec<f64> {
         let (n, ticks) = (self.samples, self.ticks);
         let cell = |k: usize| {
@@ -66,24 +68,26 @@ impl FineClock {
         (0..n).flat_map(cell).collect()
     }
 
-    /// What the samples of a log tell of a torque `fine_nm`, given at every tick, that no controller answers at
-    /// once: it accelerates the links, q̇ holds −∫τ dt/M, and the log has that at its samples only.
-    /// Differentiated as the series of those samples up to harmonic `highest`, it comes back as
+    /// Computes the torque that a sampled log shows for the torque `fine_nm`, which is given at every tick.
     ///
-    /// τ̃_h = iω_h/(e^{iω_h T} − 1) · DFT_h[∫ τ dt from one sample to the next], T the time between samples,
+    /// Suppose first that no controller reacts to the torque. It accelerates the links, so that q̇ contains −∫τ dt/M,
+    /// and the log has this integral at its samples only. Differentiating the Fourier series of these samples up to
+    /// harmonic `highest` gives
     ///
-    /// and τ̃ is what a recorded torque minus M q̈ shows. τ at the samples themselves is another signal: what is
-    /// over within a sample or two (a bristle behind a reversal) is missed by it or counted for too much.
+    /// τ̃_h = iω_h/(e^{iω_h T} − 1) · DFT_h[∫ τ dt from one sample to the next], with T the time between samples,
     ///
-    /// A drive answers q̇ a little later with ω M q̇, with which q̇ fades, so that its torque is ȧ = ω (τ − a), ω here
-    /// `feedback_per_tick` ([`first_order_lag`]). Of that torque the log has the samples, of the rest of τ what they tell: a + (τ − a)˜.
-    /// For what is slower than `highest` the two are alike; ripple faster than half the rate comes back with another height and
-    /// phase.
+    /// and τ̃ is what recorded torque minus M q̈ shows. τ at the sample instants is another signal: it misses, or
+    /// counts too much of, anything that is over within a sample or two (such as a bristle after a reversal).
+    ///
+    /// A drive reacts to q̇ a little later with the torque ω M q̇, which makes q̇ decay, so that the drive's torque a
+    /// obeys ȧ = ω (τ − a), with ω given here as `feedback_per_tick` ([`first_order_lag`]). The log contains samples of
+    /// a, and the remainder τ − a as above: together a + (τ − a)˜. For components slower than `highest` the two are
+    /// alike; ripple faster than half the sampling rate is aliased to another amplitude and phase.
     pub fn as_logged(&self, fine_nm: &[f64], highest: usize, feedback_per_tick: f64) -> Vec<f64> {
         self.as_logged_but(fine_nm, &first_order_lag(fine_nm, feedback_per_tick), highest)
     }
 
-    /// [`Self::as_logged`] where `given_nm` is all that a drive gives for it.
+    /// [`Self::as_logged`] for a drive whose entire reaction is the torque `given_nm`.
     pub fn as_logged_but(&self, fine_nm: &[f64], given_nm: &[f64], highest: usize) -> Vec<f64> {
         let rest: Vec<f64> = fine_nm.iter().zip(given_nm).map(|(nm, given)| nm - given).collect();
         let mut logged = self.unanswered_as_logged(&rest, highest);
@@ -95,7 +99,7 @@ impl FineClock {
     /// τ̃ of [`Self::as_logged`].
     fn unanswered_as_logged(&self, fine_nm: &[f64], highest: usize) -> Vec<f64> {
         let next = fine_nm[self.ticks..].iter().step_by(self.ticks).chain(&fine_nm[..1]);
-        // By the trapezoidal rule.
+        // Mean over each cell, by the trapezoidal rule.
         let mean: Vec<f64> = fine_nm
             .chunks_exact(self.ticks)
             .zip(next)
@@ -106,13 +110,13 @@ impl FineClock {
         self.filtered(&mean, |h| self.of_mean(h, highest))
     }
 
-    /// The adjoint of [`Self::as_logged`] where no drive answers: w for which Σ y_k τ̃_k is Σ w_k ∫ τ dt/T, the integral from
-    /// sample k to the next.
+    /// The adjoint of [`Self::as_logged`] without a drive's reaction: returns the w for which Σ y_k τ̃_k = Σ w_k ∫ τ
+    /// dt/T, with the integral from sample k to the next.
     pub fn as_logged_adjoint(&self, y: &[f64], highest: usize) -> Vec<f64> {
         self.filtered(y, |h| self.of_mean(h, highest).conj())
     }
 
-    /// iω_h T/(e^{iω_h T} − 1) up to harmonic `highest`.
+    /// The factor iω_h T/(e^{iω_h T} − 1) up to harmonic `highest`, zero beyond.
     fn of_mean(&self, h: usize, highest: usize) -> Complex64 {
         let half = PI * h as f64 / self.samples as f64;
         match h {
@@ -122,8 +126,7 @@ impl FineClock {
         }
     }
 
-    /// One period of `y` with `factor(h)` times its harmonic h: a derivative with ihω, a delay of T with
-    /// e^(−ihωT).
+    /// Multiplies each harmonic h of one period of `y` by `factor(h)`: ihω gives a derivative, e^(−ihωT) a delay of T.
     pub fn filtered(&self, y: &[f64], factor: impl Fn(usize) -> Complex64) -> Vec<f64> {
         let mut spectrum = self.spectrum(y);
         spectrum.iter_mut().enumerate().for_each(|(h, value)| *value *= factor(h));
@@ -135,7 +138,7 @@ impl FineClock {
         self.derivative_up_to(y, rate_hz, self.samples)
     }
 
-    /// [`Self::derivative`] of the harmonics up to `highest`.
+    /// [`Self::derivative`] from the harmonics up to `highest`.
     pub fn derivative_up_to(&self, y: &[f64], rate_hz: f64, highest: usize) -> Vec<f64> {
         let omega = TAU * rate_hz / self.samples as f64;
         let rate = |h: usize| if h > highest { 0.0 } else { h as f64 * omega };
@@ -152,8 +155,8 @@ impl FineClock {
     }
 }
 
-/// a of ȧ = ω (τ − a) along one period of a torque that repeats, τ from one tick to the next the mean of both and ω
-/// `per_tick`; nothing where ω is zero.
+/// First-order lag of a periodic torque: the a of ȧ = ω (τ − a) over one period, with ω given as `per_tick`. τ between
+/// two ticks is the mean of both. Zero if ω is zero.
 pub fn first_order_lag(torque_nm: &[f64], per_tick: f64) -> Vec<f64> {
     let n = torque_nm.len();
     let keep = (-per_tick).exp();
@@ -164,7 +167,7 @@ pub fn first_order_lag(torque_nm: &[f64], per_tick: f64) -> Vec<f64> {
     let run_in = ((FORGOTTEN / per_tick) as usize).min(n);
     let mut a = (n - run_in..n).fold(0.0, step);
     if run_in == n && keep < 1.0 {
-        // Of a short period all those before it count.
+        // If the period is short compared with the time constant, all earlier periods contribute (a geometric series).
         a /= 1.0 - keep.powi(n as i32);
     }
     (0..n)
@@ -175,8 +178,8 @@ pub fn first_order_lag(torque_nm: &[f64], per_tick: f64) -> Vec<f64> {
         .collect()
 }
 
-/// The series with these coefficients. The mean and the harmonic at half the rate, which an odd number of samples does not have, are
-/// real; what else they are given has no samples.
+/// Inverse transform of the coefficients. The mean, and the harmonic at half the sampling rate that only an even number
+/// of samples has, are real; their imaginary parts do not affect the samples and are removed.
 fn synthesised(inverse: &dyn ComplexToReal<f64>, spectrum: &mut [Complex64]) -> Vec<f64> {
     let mut out = inverse.make_output_vec();
     spectrum[0].im = 0.0;
@@ -210,7 +213,7 @@ mod tests {
         assert!(largest_difference(&fine, &wave(TICKS * N, 7.0)) < 1e-13);
     }
 
-    /// A cubic is told by its values and rates; that of a wave is off by (ω T)⁴/384 of it.
+    /// A cubic is reproduced from its values and rates; for a sine the relative error is (ω T)⁴/384.
     #[test]
     fn values_and_rates_tell_what_is_between() {
         let (clock, harmonic) = (FineClock::new(N, TICKS), 3.0);
@@ -223,8 +226,8 @@ mod tests {
         assert!(off < theory && off > 0.8 * theory, "{off} {theory}");
     }
 
-    /// The highest harmonic of an odd number of samples is one as any other, and without ticks between the samples that of an even
-    /// number is what it is.
+    /// With an odd number of samples the highest harmonic is like any other; with an even number and one tick per
+    /// sample it is kept unchanged.
     #[test]
     fn the_highest_harmonic_stays() {
         for n in [50, 51] {
@@ -244,8 +247,8 @@ mod tests {
         assert!(largest_difference(&clock.derivative(&wave(N, 7.0), rate_hz), &later) < 1e-11);
     }
 
-    /// Integrated over its samples and differentiated, a slow wave is itself, but for the trapezoidal rule:
-    /// (ω Δt)²/12 with Δt a tick.
+    /// A slow sine, integrated between samples and differentiated, is unchanged except for the error of the trapezoidal
+    /// rule, (ω Δt)²/12 with Δt one tick.
     #[test]
     fn what_is_slow_is_logged_as_it_is() {
         let clock = FineClock::new(N, TICKS);
@@ -255,7 +258,7 @@ mod tests {
         assert!(largest_difference(&clock.as_logged(&wave(800, 21.0), 20, 0.0), &[0.0; N]) < 1e-13);
     }
 
-    /// The adjoint weighs what lies between two samples as the log shows it, but for rounding.
+    /// The adjoint weights the means between samples as the log shows them, except for rounding.
     #[test]
     fn weights_of_what_is_logged() {
         let clock = FineClock::new(N, TICKS);
@@ -271,13 +274,14 @@ mod tests {
         assert!((direct - weighed).abs() < 1e-12 && direct.abs() > 1e-3, "{direct} {weighed}");
     }
 
-    /// Links of M = 1 under a wave of friction τ faster than half the rate, held by a drive's a = −ω q̇: of q̈ = a − τ the log
-    /// has the samples of a and of q̇, and shows a less the derivative of the latter.
+    /// Links of M = 1 under a sinusoidal friction torque τ faster than half the sampling rate, held by a drive with a =
+    /// −ω q̇. The equation is q̈ = a − τ; the log has samples of a and of q̇, and shows a minus the derivative of the
+    /// latter.
     #[test]
     fn a_wave_that_a_drive_answers_is_logged_as_its_alias() {
         let (clock, harmonic, per_tick) = (FineClock::new(N, TICKS), 31.0, 0.04);
         let (per_sample, omega) = (per_tick * TICKS as f64, TAU * harmonic / N as f64);
-        // By ȧ = ω (τ − a), per sample.
+        // Response of ȧ = ω (τ − a), per sample.
         let response = per_sample / Complex64::new(per_sample, omega);
         let answer: Vec<f64> = (0..N)
             .map(|k| (Complex64::from_polar(1.0, omega * k as f64 + 0.3) * response).im)
@@ -287,15 +291,17 @@ mod tests {
         let shown: Vec<f64> = answer.iter().zip(&acceleration).map(|(a, qdd)| a - qdd).collect();
         let fine = wave(TICKS * N, harmonic);
         let logged = clock.as_logged(&fine, 20, per_tick);
-        // Straight from tick to tick a wave of height one loses (ω Δ)²/12 in what is answered and in the means of its cells.
+        // Linear interpolation between ticks loses (ω Δ)²/12 of a sine in the lag, and as much in the means of the
+        // cells.
         let lost = (omega / TICKS as f64).powi(2) / 6.0;
         let off = largest_difference(&logged, &shown);
         assert!(off < lost, "{off} {lost}");
-        // Without the answer it were another wave.
+        // Without the reaction of the drive the result is a different sine.
         assert!(largest_difference(&clock.as_logged(&fine, 20, 0.0), &shown) > 10.0 * lost);
     }
 
-    /// What is slow is shown as it is, whatever a drive answers: the mean over a tick and the sums over a cell lose (ω Δ)²/12 each.
+    /// Slow components are shown unchanged whatever the drive does: the mean over a tick and the sums over a cell lose
+    /// (ω Δ)²/12 each.
     #[test]
     fn what_is_slow_is_logged_as_it_is_behind_a_drive() {
         let clock = FineClock::new(N, TICKS);
@@ -304,7 +310,8 @@ mod tests {
         assert!(largest_difference(&logged, &wave(N, 3.0)) < tick * tick / 6.0 + 1e-13);
     }
 
-    /// A period that is over before an answer is forgotten is answered as often as it repeats; a constant in full.
+    /// For a period shorter than the memory of the lag, the result equals that of many repetitions; a constant passes
+    /// in full.
     #[test]
     fn short_periods_are_answered_as_many() {
         for per_tick in [1e-3, 0.1, 50.0] {
@@ -325,7 +332,7 @@ mod tests {
         assert!(largest_difference(&slow, &clock.derivative(&wave(N, 3.0), 125.0)) < 1e-10);
     }
 
-    /// A pulse between two samples, which no sample shows, is logged with all of its area.
+    /// A pulse between two samples, which no sample shows, is logged with its full area.
     #[test]
     fn a_pulse_between_samples_is_logged() {
         let clock = FineClock::new(N, TICKS);

@@ -1,10 +1,10 @@
-//! Rows for the gaps of a log whose motion repeats: what the arm did there it did in the other periods as well.
+//! Fills gaps in the log of a repeated motion with what the arm did at the same phase of other periods.
 //!
-//! A gap too long to be interpolated would end the record, and of a log with five of them a fifth would be used. Where
-//! the motion repeats, every missing row becomes the mean of the rows at its phase in the periods that have them. It is what
-//! averaging over periods takes a period without that row for, so that it moves no estimate; the scatter between periods
-//! becomes too small by about the share of rows that are filled in, a tenth at most, and the mean is that of fewer: see
-//! [`Prepared::count_filled`](crate::identify::Prepared::count_filled).
+//! A gap too long to be interpolated would end the record, and a log with five of them would keep only a fifth of its
+//! rows. If the motion repeats, every missing row is replaced by the mean of the rows at its phase in the periods that
+//! have them. Averaging over periods amounts to the same replacement, so the filled rows do not move any estimate. They
+//! do reduce the scatter between periods by about the fraction of rows that are filled, a tenth at most, and the mean
+//! is taken over fewer periods at these rows; see [`Prepared::count_filled`](crate::identify::Prepared::count_filled).
 
 use std::f64::consts::SQRT_2;
 
@@ -15,23 +15,25 @@ use super::resample::{Gap, Resampler, bridged_gap_s, gaps, natural_rate_hz};
 use crate::median::robust_sigma;
 use crate::robot::JointSignals;
 
-/// Shorter gaps, in usual steps, are for straight lines. Longer ones hold the reversal of a joint, and a straight line
-/// across it stands out beside the other periods as a touch does.
+/// Gaps shorter than this many usual steps are interpolated linearly. Longer ones can contain the reversal of a joint,
+/// and then a straight line stands out against the other periods as a contact would.
 const SHORT_STEPS: f64 = 2.5;
-/// More of a log is not filled in, as a share of its rows.
+/// Largest fraction of the duration of a log that is filled.
 const MOST: f64 = 0.1;
-/// Shorter logs show no period.
+/// Shorter logs show no periods.
 const FEWEST_ROWS: usize = 64;
-/// Other periods whose rows make one: the scatter between two periods of which one is a copy would be none.
+/// Smallest number of other periods that provide a row. With a single one, the row would be a copy and the scatter
+/// between the two periods zero.
 const FEWEST: usize = 2;
-/// How far an arm may be from where the other periods have it at both ends of a gap, over the rms of its angle about
-/// the mean: else it waited in the gap, or was driven elsewhere.
+/// Largest deviation of the arm from the other periods at both ends of a gap, relative to the rms of its angle about
+/// the mean. If the deviation is larger, the arm waited during the gap or was driven elsewhere.
 const REPEATS_WITHIN: f64 = 0.02;
-/// Or over the noise of that angle, whichever is more: a joint that is held moves by nothing else. Beside the mean of three
-/// periods or more one of the twelve readings at the ends of a gap is further off in one of some 10⁴ gaps.
+/// The same relative to the noise of the angle, for a joint that is held and moves by nothing else; the larger of both
+/// limits applies. Compared with the mean of three periods or more, one of the twelve readings at the ends of a gap
+/// exceeds this limit in one of some 10⁴ gaps.
 const REPEATS_BEYOND_NOISE: f64 = 5.0;
 
-/// A log with rows in its gaps.
+/// A log whose gaps are filled.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Filled {
     /// Time, s.
@@ -42,12 +44,12 @@ pub struct Filled {
     pub qd_rad_s: JointSignals,
     /// Torques, Nm.
     pub torque_nm: JointSignals,
-    /// The gaps that have rows now.
+    /// The gaps that have been filled.
     pub gaps: Vec<Gap>,
 }
 
 impl Filled {
-    /// What a user should know.
+    /// The message that tells a user what was filled.
     pub fn warning(&self) -> String {
         let length_s = |gap: &Gap| gap.end_s - gap.start_s;
         let longest = self.gaps.iter().max_by(|a, b| length_s(a).total_cmp(&length_s(b)));
@@ -62,7 +64,9 @@ impl Filled {
     }
 }
 
-/// `None` where nothing is missing for longer than what is interpolated, or where the other periods cannot tell.
+/// Fills the gaps of a log whose motion repeats.
+///
+/// `None` if no gap is too long to interpolate, or if the other periods cannot fill any.
 ///
 /// Errors: time that does not increase, values that are not finite.
 pub fn fill_gaps(
@@ -86,7 +90,8 @@ pub fn fill_gaps(
         let longest = grid.longest_segment();
         Ok::<_, SignalError>((grid.time_s()[longest.start], angles.slice(longest)))
     };
-    // What is interpolated across a long gap may not repeat, and the longest stretch may be too short.
+    // The interpolation across a long gap may prevent the period from being found; the longest stretch without gaps may
+    // be too short instead.
     let (mut start_s, bridged) = angles(f64::INFINITY)?;
     let mut period = find_period(&bridged)?;
     if period.is_none() {
@@ -113,20 +118,20 @@ pub fn fill_gaps(
     Ok((!patches.is_empty()).then(|| log.with(patches)))
 }
 
-/// How far the angles `q_rad` of a joint may be from those of other periods, each of so many `samples`.
+/// How far the angles `q_rad` of a joint may deviate from those of other periods; a period has `samples` samples.
 fn tolerance_rad(q_rad: &[f64], samples: f64) -> f64 {
     let repeating = (q_rad.len() as f64 - samples).max(0.0) as usize;
     let pairs = (0..repeating).map(|k| (q_rad[k] - linear_at(q_rad, k as f64 + samples)).abs());
     let noise = robust_sigma(&mut pairs.collect::<Vec<f64>>()) / SQRT_2;
-    // The mean of equal numbers is one of them to within their last digits.
+    // The mean of equal numbers equals them only to within rounding.
     let largest = q_rad.iter().fold(0.0, |most: f64, q| most.max(q.abs()));
     let rounding = 8.0 * f64::EPSILON * largest;
     let moved = REPEATS_WITHIN * variance_of(q_rad).sqrt();
     moved.max(REPEATS_BEYOND_NOISE * noise).max(rounding)
 }
 
-/// Whether no step is a gap beside the shortest one, and so none beside the usual one: most logs, of which thousands may
-/// be looked at in a row.
+/// Whether no step is a gap even compared with the shortest step, and hence none compared with the usual step. This
+/// quick check settles most logs, of which thousands may be processed in a row.
 fn is_even(time_s: &[f64]) -> bool {
     let ends = |[least, most]: [f64; 2], t: &[f64]| {
         let step_s = t[1] - t[0];
@@ -136,7 +141,7 @@ fn is_even(time_s: &[f64]) -> bool {
     most_s <= SHORT_STEPS * least_s
 }
 
-/// Rows for one gap.
+/// The rows that fill one gap.
 struct Patch {
     gap: Gap,
     time_s: Vec<f64>,
@@ -150,20 +155,21 @@ struct Log<'a> {
     channels: [&'a JointSignals; 3],
     gaps: &'a [Gap],
     period_s: f64,
-    /// From when to when it is known to repeat: before and behind that are run-in, and rest.
+    /// First and last time of the stretch that is known to repeat, s; run-in and rest lie outside.
     repeats_s: [f64; 2],
-    /// How far off an angle may be that repeats, per joint.
+    /// Largest deviation of an angle that counts as repetition, per joint, rad.
     tolerance_rad: Vec<f64>,
 }
 
 impl Log<'_> {
-    /// What the other periods have in `gap`.
+    /// Computes the mean of the other periods in `gap`; `None` if too few have these rows, or if the arm did not repeat
+    /// them.
     fn patch(&self, gap: &Gap, rate_hz: f64) -> Result<Option<Patch>, SignalError> {
         let steps = ((gap.end_s - gap.start_s) * rate_hz).round().max(1.0) as usize;
         let way = (gap.end_s - gap.start_s) / steps as f64;
         let instants: Vec<f64> = (0..=steps).map(|i| gap.start_s + i as f64 * way).collect();
         let [first, last] = self.repeats_s;
-        // Less than nothing where the gap itself is before it, or behind it.
+        // Negative if the gap itself lies before the repeated stretch, or after it.
         let before = ((gap.start_s - first) / self.period_s).floor() as i64;
         let after = ((last - gap.end_s) / self.period_s).floor() as i64;
         let mut sum =
@@ -176,7 +182,7 @@ impl Log<'_> {
             if self.gaps.get(next).is_some_and(|other| other.start_s < end_s) {
                 continue;
             }
-            // The rows around it: a log has many gaps, and each many periods.
+            // Only the rows around the shifted gap are used: a log has many gaps, and each gap many periods.
             let begin = self.time_s.partition_point(|t| *t <= start_s).saturating_sub(1);
             let behind = self.time_s.partition_point(|t| *t < end_s) + 1;
             let rows = begin..behind.min(self.time_s.len());
@@ -218,7 +224,7 @@ impl Log<'_> {
     }
 
     fn with(&self, patches: Vec<Patch>) -> Filled {
-        // Where each row comes from: the log, or a patch; and its number there.
+        // The origin of each row, the log or a patch, and its index there.
         let mut rows: Vec<(Option<&Patch>, usize)> = Vec::with_capacity(self.time_s.len());
         let mut next = patches.iter().peekable();
         for (k, t) in self.time_s.iter().enumerate() {
@@ -259,7 +265,8 @@ mod tests {
     const PERIOD_S: f64 = 2.0;
     const ROWS: usize = 1000;
 
-    /// One joint in a dance of 2 s, for 10 s, without the rows `left_out`; behind `paused` it comes a tenth of a second later.
+    /// One joint in a periodic motion of 2 s for 10 s, without the rows `left_out`; after row `paused` the motion is a
+    /// tenth of a second late.
     fn log(left_out: &[std::ops::Range<usize>], paused: usize) -> (Vec<f64>, [JointSignals; 3]) {
         let kept: Vec<usize> =
             (0..ROWS).filter(|k| !left_out.iter().any(|gap| gap.contains(k))).collect();
@@ -297,7 +304,7 @@ mod tests {
         assert!(off.fold(0.0, f64::max) < 1e-9);
     }
 
-    /// What comes before the dance, one period of it at half the size, is none of the others.
+    /// The first 2 s, with the same motion at half the amplitude, do not count as a period.
     #[test]
     fn the_way_there_is_no_period() {
         let gap = 530..550;
@@ -315,7 +322,7 @@ mod tests {
         }
     }
 
-    /// A joint that is held, with the noise of its encoder and without any, speaks for no pause.
+    /// A joint that is held, with or without encoder noise, is no sign of a pause.
     #[test]
     fn a_joint_at_rest_repeats() {
         for noise_rad in [2e-5, 0.0] {
@@ -337,11 +344,12 @@ mod tests {
 
     #[test]
     fn nothing_is_invented() {
-        // Short enough for a straight line; too much; an arm that waited meanwhile.
+        // A gap short enough for a straight line; too much missing; an arm that waited during the gap.
         assert_eq!(filled(from_ref(&(130..131)), ROWS), None);
         assert_eq!(filled(&[130..150, 300..400], ROWS), None);
         assert_eq!(filled(from_ref(&(500..530)), 515), None);
-        // Four others have the first gap, and one what is missing in four of five periods.
+        // Four other periods have the rows of the first gap; only one has the rows that are missing in four of five
+        // periods.
         let gaps = [105..118, 220..233, 420..433, 620..633, 820..833];
         let filled = filled(&gaps, ROWS).unwrap();
         assert_eq!(filled.gaps.len(), 1);

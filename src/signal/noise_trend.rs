@@ -1,4 +1,4 @@
-//! The power of noise over frequency without the scatter of its estimate.
+//! Estimates the power of noise over frequency, smoothed so that the scatter of single harmonics is removed.
 
 use nalgebra::{Matrix3, RowVector3};
 use statrs::function::gamma::digamma;
@@ -6,45 +6,52 @@ use statrs::function::gamma::digamma;
 /// Power of noise at one harmonic.
 #[derive(Debug, Clone, Copy)]
 pub struct NoisePower {
-    /// Mean square of one period's coefficient, Nm².
+    /// Mean square of one period's Fourier coefficient, Nm².
     pub value: f64,
-    /// Variance of its estimate over its square, of what all channels share.
+    /// Relative variance of the estimate: the part shared by all channels.
     pub shared_variance: f64,
-    /// Of what is the channel's own, but for its level: the mean of ln power over the harmonics near by.
+    /// Relative variance of the part specific to the channel, apart from its level, which is the mean of ln power over
+    /// nearby harmonics.
     pub colour_variance: f64,
 }
 
-/// Harmonics on each side of harmonic k whose power says something about that of k: max(3, k/4).
+/// Number of harmonics on each side of harmonic k whose power enters the estimate at k: max(3, k/4).
 pub fn pooled(k: usize) -> usize {
     (k / 4).max(FEWEST)
 }
 
-/// Harmonics on each side of harmonic k that say how far the noise of one channel lies above that of all: max(12, k/4).
+/// Number of harmonics on each side of harmonic k that determine how far the noise of one channel lies above that of
+/// all channels: max(12, k/4).
 pub fn pooled_level(k: usize) -> usize {
     pooled(k).max(LEVEL)
 }
 
-/// With fewer, the scatter of few periods says little of the slowest harmonics' noise; with more, a line misses how
-/// noise of two colours bends there.
+/// Smallest number of harmonics on each side. With fewer, a few periods determine the noise at the slowest harmonics
+/// poorly; with more, a straight line misses the curvature of noise of two colours there.
 const FEWEST: usize = 3;
-/// What one channel's noise has beside that of the others is mostly how strong it is, and hardly its colour.
+/// The same for the level of one channel. The noise of a channel differs from that of the others mostly in strength and
+/// hardly in colour, so many harmonics may be averaged.
 const LEVEL: usize = 12;
-/// Chance that the noise of a channel is of another colour than that of the others.
+/// Prior probability that the noise of a channel has another colour than that of the others.
 const OTHER_COLOUR: f64 = 0.2;
-/// Variance of such a colour over that of its estimate.
+/// Variance of such a colour relative to that of its estimate.
 const SPREAD: f64 = 10.0;
-/// Standard deviation of ln power at one harmonic by which colours of one kind differ.
+/// Standard deviation of ln power at one harmonic by which colours of the same kind differ.
 const ALIKE: f64 = 0.2;
-/// Square of the harmonic below which power flattens, as far as the mean is told by its neighbours. Of the mean over eight
-/// periods lines then find the power of noise with a time constant of 0.03 periods 1.17 times, of 0.1 periods 0.97 times; of noise
-/// that forgets in 0.3 periods a third. Parabolas would find 0.94, 0.95 and half of it, with 2.7 times the scatter.
+/// Square of the harmonic below which power is taken to flatten, for the extrapolation to the mean (harmonic 0) from
+/// its neighbours. For the mean over eight periods, straight lines then estimate 1.17 times the true power if the noise
+/// has a time constant of 0.03 periods, 0.97 times at 0.1 periods, and a third at 0.3 periods. Parabolas would give
+/// 0.94, 0.95 and a half, with 2.7 times the scatter.
 const FLAT_BELOW: f64 = 2.25;
 
-/// The power of noise by harmonic, 0 … `last`, without its scatter: beyond the mean straight lines of ln power in
-/// ln harmonic over k ± max(3, k/4), seven harmonics or more. `freedom` is that of one harmonic, complex numbers.
+/// Smooths the power of noise at the harmonics 0 … `last`.
 ///
-/// The mean is told by its seven neighbours, in ln √(h² + 2.25): noise that is slower than a few harmonics still rises from
-/// the first of them to the mean. What the mean itself shows is not used: means drift, and have half the degrees of freedom.
+/// For every harmonic k except the mean, a straight line of ln power over ln harmonic is fitted to the harmonics k ±
+/// max(3, k/4), which are at least seven. `freedom` is the number of complex degrees of freedom of one harmonic.
+///
+/// The mean (harmonic 0) is extrapolated from its seven neighbours, in ln √(h² + 2.25): the power of noise slower than
+/// a few harmonics still rises from the first of them to the mean. The power observed at the mean itself is not used,
+/// because means drift and have half the degrees of freedom.
 pub fn noise_trend(power: &[f64], freedom: usize, last: usize) -> Vec<NoisePower> {
     let end = power.len() - 1;
     let noise = LogScatter::of(2 * freedom);
@@ -60,14 +67,16 @@ pub fn noise_trend(power: &[f64], freedom: usize, last: usize) -> Vec<NoisePower
     (0..=last.min(end)).map(at).collect()
 }
 
-/// [`noise_trend`] of J channels, equally long, whose noise is of one kind, as that of an arm's drives is. `likeness` is the
-/// mean squared coherence between them by harmonic; where it is `None`, channels count as independent in what is one's own,
-/// and as one in what they share.
+/// [`noise_trend`] for J channels of equal length whose noise is of one kind, such as that of an arm's drives.
 ///
-/// The mean of their ln powers, up to J times as well known as one channel's, is followed by parabolas over the same harmonics,
-/// but for the mean: at the slowest ones lines miss noise of two colours by a tenth. How far a channel lies above the mean is a level, of
-/// harmonics k ± max(12, k/4), and what it has beside that its colour, alike within a standard deviation of 0.2 or, with the
-/// chance of a fifth, another one.
+/// `likeness` is the mean squared coherence between the channels by harmonic. Where it is `None`, the worst case is
+/// assumed: channels count as independent for their specific parts, and as fully coherent for the shared part.
+///
+/// The mean of the ln powers is up to J times as well known as that of one channel. It is fitted by parabolas over the
+/// same harmonics, because straight lines miss noise of two colours by a tenth at the slowest harmonics; only for
+/// harmonic 0 by straight lines. The difference of a channel from this mean consists of a level, the average over the
+/// harmonics k ± max(12, k/4), and a colour, the remainder. Colours differ by a standard deviation of 0.2 or, with the
+/// probability of a fifth, by more.
 pub fn noise_trends(
     power: &[Vec<f64>],
     freedom: usize,
@@ -89,9 +98,9 @@ pub fn noise_trends(
     for k in 0..=last.min(end) {
         let likeness = likeness[k.min(likeness.len() - 1)];
         let shared = (1.0 + (channels - 1.0) * likeness.unwrap_or(1.0)) / channels;
-        // All deviations from the mean together are none.
+        // The deviations from the mean sum to zero.
         let own = (1.0 - likeness.unwrap_or(0.0)) * (1.0 - 1.0 / channels);
-        // At the mean a parabola would miss less of how noise bends, and scatter by more than that.
+        // At harmonic 0 a parabola would reduce the error from curvature, but increase the scatter by more.
         let fit = LocalFit::new(near(k, end), k, if k == 0 { 1 } else { 2 });
         let fits = ColourFits::new(k, end, own * noise.variance);
         for (trend, own) in trends.iter_mut().zip(&beside) {
@@ -106,18 +115,18 @@ pub fn noise_trends(
     trends
 }
 
-/// What the ln power of a channel's noise at one harmonic has beside the channel's level.
+/// The colour of a channel at one harmonic: the difference of its ln power from the channel's level.
 struct Colour {
     value: f64,
     variance: f64,
 }
 
-/// How colours are fitted at one harmonic: lines and levels over the harmonics near by.
+/// The fits for the colours at one harmonic: lines and levels over nearby harmonics.
 struct ColourFits {
     level: LocalFit,
     near_level: LocalFit,
     line: LocalFit,
-    /// Variance of one harmonic.
+    /// Variance of ln power at a single harmonic.
     variance: f64,
 }
 
@@ -131,13 +140,16 @@ impl ColourFits {
         }
     }
 
-    /// Mean and variance of the colour of a channel whose ln powers are `own` beside the mean of all channels.
+    /// Posterior mean and variance of the colour of a channel; `own` is its ln power relative to the mean of all
+    /// channels.
     ///
-    /// Either the channel's noise is of the others' kind, and its colour has the standard deviation [`ALIKE`]; or, with the
-    /// chance [`OTHER_COLOUR`], it is of another, and the variance is [`SPREAD`] times that of its estimate, in level and
-    /// slope over the near harmonics (a spike and a slab; Mitchell and Beauchamp 1988). With χ² of these two in units of
-    /// their variance the odds of the first are (1 + g)^(m/2) exp(−χ² g/(2 (1 + g))) times those before, m the number of the
-    /// two that differ at all; the mean is that of both posterior means, and the variance holds how far they are apart.
+    /// Under the first hypothesis the channel's noise is of the same kind as that of the others, and its colour has the
+    /// standard deviation [`ALIKE`]. Under the second, with prior probability [`OTHER_COLOUR`], it is of another kind,
+    /// and the variance is [`SPREAD`] times that of its estimate, in level and slope over the near harmonics (a spike
+    /// and a slab; Mitchell and Beauchamp 1988). With χ² of these two in units of their variance, the posterior odds of
+    /// the first hypothesis are (1 + g)^(m/2) exp(−χ² g/(2 (1 + g))) times the prior odds, where g is [`SPREAD`] and m
+    /// the number of the two quantities that can differ at all. The result is the mean over both hypotheses, and the
+    /// variance includes the distance between their posterior means.
     fn colour(&self, own: &[f64]) -> Colour {
         let Self { level, near_level, line, variance } = self;
         let (mut square, mut terms) = (0.0, 0.0);
@@ -161,7 +173,7 @@ impl ColourFits {
     }
 }
 
-/// Harmonics near `k` of 1 … `end` whose power says something about it, seven or more but at the end.
+/// Harmonics of 1 … `end` near `k` that enter the estimate at k: seven or more, except close to `end`.
 fn near(k: usize, end: usize) -> std::ops::RangeInclusive<usize> {
     around(k, pooled(k), end)
 }
@@ -171,22 +183,22 @@ fn around(k: usize, reach: usize, end: usize) -> std::ops::RangeInclusive<usize>
     first..=(k + reach).max(first + 2 * FEWEST).min(end)
 }
 
-/// How the logarithm of an estimated power scatters.
+/// Bias and variance of the logarithm of an estimated power.
 pub struct LogScatter {
-    /// ln (ν/2) − ψ(ν/2), by which it is low.
+    /// Bias to add, ln (ν/2) − ψ(ν/2): the logarithm is too low by this on average.
     bias: f64,
-    /// ψ'(ν/2).
+    /// Variance of the logarithm, ψ'(ν/2).
     pub variance: f64,
 }
 
 impl LogScatter {
-    /// Of a mean square of ν real numbers, `freedom`.
+    /// For a mean square of ν = `freedom` real numbers.
     pub fn of(freedom: usize) -> Self {
         let half = 0.5 * freedom as f64;
         Self { bias: half.ln() - digamma(half), variance: trigamma_of_half(freedom) }
     }
 
-    /// The logarithm of a power, not low.
+    /// The logarithm of a power, corrected for its bias.
     pub fn logarithm(&self, power: f64) -> f64 {
         power.ln() + self.bias
     }
@@ -196,15 +208,16 @@ impl LogScatter {
     }
 }
 
-/// A polynomial in ln harmonic, by least squares over some harmonics, at one of them or at the mean.
+/// A least-squares polynomial in ln harmonic over a range of harmonics, evaluated at one harmonic or at the mean
+/// (harmonic 0).
 struct LocalFit {
     first: usize,
-    /// What every harmonic counts.
+    /// Weight of every harmonic in the value.
     weights: Vec<f64>,
 }
 
 impl LocalFit {
-    /// Of `degree` 0, 1 or 2.
+    /// Fits a polynomial of `degree` 0, 1 or 2 over `harmonics`, evaluated at the harmonic `at`.
     fn new(harmonics: std::ops::RangeInclusive<usize>, at: usize, degree: usize) -> Self {
         let first = *harmonics.start();
         let row = |h: usize| {
@@ -215,7 +228,7 @@ impl LocalFit {
             RowVector3::new(1.0, x, x * x)
         };
         let mut normal = Matrix3::identity();
-        // So few harmonics bear no more.
+        // A small number of harmonics limits the degree.
         let size = (degree + 1).min(harmonics.clone().count());
         normal.view_mut((0, 0), (size, size)).fill(0.0);
         for h in harmonics.clone() {
@@ -232,13 +245,13 @@ impl LocalFit {
         self.weights.iter().zip(&y[self.first..]).map(|(w, y)| w * y).sum()
     }
 
-    /// Σ w²: the variance of the value over that of one harmonic.
+    /// Σ w²: the variance of the value relative to that of one harmonic.
     fn square(&self) -> f64 {
         self.weights.iter().map(|w| w * w).sum()
     }
 }
 
-/// ψ'(ν/2): π²/6 − Σ 1/i², i < ν/2, of an even ν; π²/2 − 4 Σ 1/i², i < ν and odd, of an odd one.
+/// ψ'(ν/2): π²/6 − Σ 1/i² over i < ν/2 for even ν; π²/2 − 4 Σ 1/i² over odd i < ν for odd ν.
 fn trigamma_of_half(nu: usize) -> f64 {
     let square = std::f64::consts::PI.powi(2);
     let below = |i: usize| 1.0 / (i * i) as f64;
@@ -256,7 +269,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
     use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
-    /// Power that falls as 1/h² is found without a bend at its steep beginning.
+    /// Power that falls as 1/h² is estimated without a bend at its steep beginning.
     #[test]
     fn steep_noise_keeps_its_slope() {
         const TRIALS: usize = 200;
@@ -265,7 +278,7 @@ mod tests {
         for _ in 0..TRIALS {
             let power = scattered(&mut rng, FREEDOM, &[Box::new(|h| h.powi(-2))], 199).remove(0);
             let found = noise_trend(&power, FREEDOM, 39);
-            // Of the mean such noise has no end.
+            // At the mean this power is infinite.
             for (k, (mean, found)) in mean.iter_mut().zip(found).enumerate().skip(1) {
                 *mean += (found.value * (k as f64).powi(2)).ln() / TRIALS as f64;
             }
@@ -277,8 +290,9 @@ mod tests {
         }
     }
 
-    /// What eight periods' scatter at harmonics 1 to 7 tells of the mean over all of them, exact, from the autocovariance of noise
-    /// that is half white and forgets the rest in so many periods: see [`FLAT_BELOW`].
+    /// Exact prediction of the mean from the scatter of eight periods at harmonics 1 to 7, computed from the
+    /// autocovariance of noise that is half white; the other half has a time constant of `forgets` periods. See
+    /// [`FLAT_BELOW`].
     #[test]
     fn slow_noise_rises_to_the_mean() {
         const N: usize = 500;
@@ -290,7 +304,7 @@ mod tests {
                 let white = if lag == 0 { 0.5 } else { 0.0 };
                 white + 0.5 * (-(lag as f64) / (forgets * N as f64)).exp()
             };
-            // Covariance of the coefficients of two periods that lie so many periods apart.
+            // Covariance between the coefficients of two periods that are `apart` periods apart.
             let covariance = |h: usize, apart: usize| -> f64 {
                 let term = |lag: i64| {
                     let angle = std::f64::consts::TAU * (h as i64 * lag) as f64 / N as f64;
@@ -306,14 +320,14 @@ mod tests {
             let scatter =
                 |h: usize| (PERIODS as f64 * covariance(h, 0) - of_mean(h)) / (PERIODS - 1) as f64;
             let power: Vec<f64> = (0..=7).map(scatter).collect();
-            // So many degrees of freedom that logarithms are not low.
+            // With this many degrees of freedom the logarithms are unbiased.
             let found = &noise_trends(&[power.clone(), power], 1_000_000, &[Some(0.0)], 0)[0];
             let missed = of_mean(0) / found[0].value;
             assert!((least..most).contains(&missed), "{forgets}: {missed}");
         }
     }
 
-    /// Powers of noise by channel and harmonic 0 … `last` that scatter with 2 `freedom` degrees of freedom.
+    /// Powers of noise by channel and harmonic 0 … `last`, with a scatter of 2 `freedom` degrees of freedom.
     fn scattered(
         rng: &mut ChaCha8Rng,
         freedom: usize,
@@ -332,15 +346,16 @@ mod tests {
 
     const FREEDOM: usize = 7;
     const TRIALS: usize = 400;
-    /// Harmonics whose trend is looked at, and that are there.
+    /// Number of harmonics whose trend is tested, and number that exist.
     const LAST: usize = 24;
     const ALL: usize = 60;
 
-    /// Chance by which noise is told from what is no noise.
+    /// Significance level at which noise is taken for something else.
     const RARE: f64 = 1e-4;
 
-    /// By harmonic from 0, mean and mean square of the errors of ln power of `joint`, its level that of the scatter over the near
-    /// harmonics; the variance that is claimed; and how often noise is taken for something else, over `RARE`.
+    /// For every harmonic from 0 on: mean and mean square of the errors of ln power of `joint`, after its level is
+    /// matched to the scatter over the near harmonics; the variance that is claimed; and the rate of false alarms
+    /// relative to `RARE`.
     fn errors(truth: &[Box<dyn Fn(f64) -> f64>], joint: usize, together: bool) -> Vec<[f64; 4]> {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let mut sums = vec![[0.0; 4]; LAST];
@@ -377,26 +392,28 @@ mod tests {
         Box::new(move |h| level * (0.03 + 1.0 / (1.0 + (h / 1.6).powi(2))))
     }
 
-    /// Noise of six drives of different strength, half of it white, a fifth slower than the motion: no error is larger than it is
-    /// said to be, and those of the slowest harmonic have less than 0.6 of the square of those of one drive alone.
+    /// Noise of six drives of different strength, half of it white, a fifth slower than the motion: no error exceeds
+    /// its claim, and at the slowest harmonic the mean square error is less than 0.6 of that of one drive alone.
     #[test]
     fn drives_of_one_kind_say_more_together() {
         let truth = [1.0, 1.0, 0.7, 0.15, 0.15, 0.15].map(of_two_colours);
         let together = errors(&truth, 3, true);
         for (h, [mean, square, claimed, false_alarms]) in together.iter().enumerate() {
-            // Half a standard deviation is known to 0.2/√400 = 0.01 and belongs to where two colours bend more than a parabola.
+            // Half a standard deviation is known to 0.2/√400 = 0.01; it is a bias that arises where noise of two
+            // colours bends more than a parabola.
             assert!(mean.abs() < 0.5 * claimed.sqrt(), "harmonic {h}: off by {mean}");
-            // A mean square of 400 scatters by 7 %: three and a half of these.
+            // A mean square of 400 values scatters by 7 %; the limit is three and a half times that.
             assert!(square / claimed < 1.25, "harmonic {h}: {square} {claimed}");
-            // A chance of 10⁻⁴ changes by e^{7 error} or so: its mean of 400 scatters by 15 %, two of these.
+            // A probability of 10⁻⁴ changes by about e^{7 error}: its mean over 400 trials scatters by 15 %; the limit
+            // is twice that.
             assert!(*false_alarms < 1.3, "harmonic {h}: {false_alarms}");
         }
         let alone = errors(&truth, 3, false);
         assert!(together[1][1] < 0.6 * alone[1][1], "{} {}", together[1][1], alone[1][1]);
     }
 
-    /// One drive whose slow noise has so many times the power that it has in the others; by its level alone it would be missed by
-    /// up to ln 10 = 2.3. Noise of that drive, and of another, is taken for something else three times as often at most.
+    /// One drive has `factor` times the slow noise power of the others; its level alone would miss that by up to ln
+    /// 10 = 2.3. False alarms, on that drive and on another one, are at most three times as frequent as stated.
     #[test]
     fn a_drive_of_another_colour_is_followed() {
         for factor in [1.5, 2.0, 4.0, 10.0] {
@@ -412,7 +429,8 @@ mod tests {
         }
     }
 
-    /// Fewer harmonics or channels than a parabola and a line over seven need, and no noise at all in a channel, leave numbers.
+    /// With fewer harmonics or channels than a parabola and a line over seven need, or a channel without noise, all
+    /// results remain finite numbers.
     #[test]
     fn short_records_and_still_channels_leave_numbers() {
         for (channels, end) in [(1, 1), (2, 2), (3, 4), (6, 9)] {
