@@ -1,4 +1,5 @@
-//! How far the arm is from itself, from the floor and from its cell: capsules on the links.
+//! Distances of the arm from itself, from the floor and from the boxes of its cell, computed from capsules on the
+//! links.
 
 use std::f64::consts::TAU;
 
@@ -10,15 +11,16 @@ use super::limits::LimitKind;
 use crate::robot::nearest::{nearest_points, nearest_to_box};
 use crate::robot::{Arm, CellBox, ON_AXIS, Placement};
 
-/// Signed distances between the capsules of an arm, and of its moving capsules from the floor.
+/// Signed distances between the capsules of an arm, and of its moving capsules from the floor and from boxes.
 ///
-/// Two capsules with segments S₁, S₂ and radii r₁, r₂ are d = dist(S₁, S₂) − r₁ − r₂ apart; d < 0 is
-/// the depth by which they overlap (as long as the segments do not cross, where d = −r₁ − r₂). The
-/// distance of a capsule from the floor at z_f is min(z of its ends) − r − z_f. What no motion brings
-/// nearer is left out: the base, a capsule of the first body along its axis, and of a first body that turns about the vertical the
-/// floor and what lies under it. A capsule whose segment enters a box is −r from it.
+/// Two capsules with segments S₁, S₂ and radii r₁, r₂ have the distance d = dist(S₁, S₂) − r₁ − r₂; d < 0 is the depth
+/// by which they overlap (unless the segments cross, where d = −r₁ − r₂). The distance of a capsule from the floor at
+/// z_f is min(z of its ends) − r − z_f. A capsule whose segment enters a box has the distance −r from it. Distances
+/// that no motion can reduce are left out: those of the base and of a capsule of the first body along its axis from
+/// floor and boxes, and, if the first body turns about the vertical, those of this body from the floor and from what
+/// lies under it.
 ///
-/// Immutable; what changes is in [`ClearanceWorkspace`].
+/// Immutable; all mutable data are in [`ClearanceWorkspace`].
 #[derive(Debug, Clone)]
 pub struct ClearanceModel {
     placements: Vec<Placement>,
@@ -27,7 +29,7 @@ pub struct ClearanceModel {
     floor: Vec<usize>,
     floor_z_m: f64,
     boxes: Vec<CellBox>,
-    /// Capsule and box.
+    /// Indices of capsule and box.
     box_pairs: Vec<[usize; 2]>,
 }
 
@@ -39,18 +41,18 @@ struct Shape {
     radius_m: f64,
 }
 
-/// Poses in which a distance is looked at before it is said never to be kept.
+/// Number of poses that are tried before a distance is reported as never kept.
 pub const POSES_TRIED: usize = 5000;
 
 impl Shape {
-    /// Whether any motion of the arm moves it.
+    /// Whether the arm can move this capsule.
     fn moves(&self) -> bool {
         let is_off_axis = |end: &Vector3<f64>| end.x.hypot(end.y) > ON_AXIS;
         self.body >= 2 || self.body == 1 && self.ends_m.iter().any(is_off_axis)
     }
 }
 
-/// Two things whose distance is watched, as positions in the model's lists.
+/// The two objects of a watched distance, as indices into the model's lists.
 enum Between {
     Capsules { one: usize, other: usize },
     Floor { capsule: usize },
@@ -60,7 +62,7 @@ enum Between {
 /// Scratch of one evaluation: frames and capsule ends in the base frame.
 #[derive(Debug, Clone)]
 pub struct ClearanceWorkspace {
-    /// Of the base, then of the joints.
+    /// Frame of the base, then of the joints.
     frames: Vec<Placement>,
     ends_m: Vec<[Vector3<f64>; 2]>,
 }
@@ -103,7 +105,7 @@ impl ClearanceModel {
         }
     }
 
-    /// Scratch for this model.
+    /// Creates the scratch for this model.
     pub fn workspace(&self) -> ClearanceWorkspace {
         ClearanceWorkspace {
             frames: vec![Placement::identity(); self.placements.len() + 1],
@@ -111,12 +113,12 @@ impl ClearanceModel {
         }
     }
 
-    /// Number of distances: the watched pairs, the capsules above the floor, capsules and boxes.
+    /// Number of distances: watched pairs, moving capsules and the floor, moving capsules and boxes.
     pub fn len(&self) -> usize {
         self.pairs.len() + self.floor.len() + self.box_pairs.len()
     }
 
-    /// What distance `index` is between, by position in the model's lists.
+    /// The two objects of distance `index`, as indices into the model's lists.
     fn between(&self, index: usize) -> Between {
         let above_floor = index.wrapping_sub(self.pairs.len());
         if index < self.pairs.len() {
@@ -135,7 +137,7 @@ impl ClearanceModel {
         self.len() == 0
     }
 
-    /// What distance `index` is between.
+    /// The limit that distance `index` belongs to, with names for messages.
     pub fn limit(&self, index: usize) -> LimitKind {
         let name = |capsule: usize| self.capsules[capsule].name.clone();
         match self.between(index) {
@@ -147,8 +149,8 @@ impl ClearanceModel {
         }
     }
 
-    /// What is nearer than `clearance_m` in every one of [`POSES_TRIED`] poses all over the range of the joints, and its largest distance
-    /// there, m.
+    /// Finds a distance that is below `clearance_m` in every one of [`POSES_TRIED`] poses over the whole range of the
+    /// joints; returns it with its largest value there, m.
     pub fn never_kept(&self, arm: &Arm, clearance_m: f64) -> Option<(LimitKind, f64)> {
         let mut ws = self.workspace();
         let mut distances_m = vec![0.0; self.len()];
@@ -174,7 +176,7 @@ impl ClearanceModel {
         ws.ends_m.iter().zip(&self.capsules).map(|(&ends, c)| (ends, c.radius_m)).collect()
     }
 
-    /// All distances (m) at `q_rad` into `distances_m` of length [`len`](Self::len).
+    /// Writes all distances (m) at `q_rad` into `distances_m` of length [`len`](Self::len).
     pub fn distances(&self, ws: &mut ClearanceWorkspace, q_rad: &[f64], distances_m: &mut [f64]) {
         self.place(ws, q_rad);
         for (index, d) in distances_m.iter_mut().enumerate() {
@@ -183,12 +185,12 @@ impl ClearanceModel {
         }
     }
 
-    /// All distances (m), and their derivatives by the joint angles (m/rad) into `gradients`,
+    /// Computes all distances (m), and their derivatives by the joint angles (m/rad) into `gradients`, as
     /// `gradients[index · N + j]`.
     ///
-    /// With the nearest points p₁, p₂ and n = (p₁ − p₂)/|p₁ − p₂|: ∂d/∂q_j = n·(ẑ_j × (p₁ − o_j)) for a joint
-    /// below p₁ only, minus the same of p₂ (their own motion along the segments is tangential and
-    /// drops out). Where segments cross there is no direction and the derivative is given as 0.
+    /// With the nearest points p₁, p₂ and n = (p₁ − p₂)/|p₁ − p₂|: ∂d/∂q_j = n·(ẑ_j × (p₁ − o_j)) if joint j moves p₁,
+    /// minus the same term for p₂. The motion of the nearest points along the segments is tangential and drops out.
+    /// Where segments cross there is no direction, and the derivative is set to 0.
     pub fn distances_and_gradients(
         &self,
         ws: &mut ClearanceWorkspace,
@@ -235,8 +237,8 @@ impl ClearanceModel {
         }
     }
 
-    /// Nearest points of distance `index` and what is taken off for the radii. For the floor the
-    /// second point is straight below the first.
+    /// Nearest points of distance `index`, and the sum of radii to subtract. For the floor the second point is straight
+    /// below the first.
     fn nearest(&self, ws: &ClearanceWorkspace, index: usize) -> (Vector3<f64>, Vector3<f64>, f64) {
         match self.between(index) {
             Between::Capsules { one, other } => {
@@ -256,7 +258,7 @@ impl ClearanceModel {
         }
     }
 
-    /// Distance with its sign: below the floor the difference of heights is negative.
+    /// Signed distance; below the floor the difference in height is negative.
     fn signed(&self, index: usize, apart: &Vector3<f64>, radii_m: f64) -> f64 {
         match self.between(index) {
             Between::Floor { .. } => apart.z - radii_m,
@@ -300,7 +302,8 @@ mod tests {
         best
     }
 
-    /// The shoulder of a UR5 turns about the vertical: it may hit a box, and the floor only of an arm that is mounted otherwise.
+    /// The shoulder of a UR5 turns about the vertical: it may hit a box, but the floor only if the arm is mounted
+    /// otherwise.
     #[test]
     fn a_first_body_that_turns_is_watched() {
         let watched = |arm: &Arm| {
@@ -317,7 +320,7 @@ mod tests {
             high_m: Vector3::new(0.5, 1.0, 1.0),
         });
         assert_eq!(watched(&arm), [true, false]);
-        // No turn brings it nearer to a table.
+        // Turning does not bring it closer to a table.
         let table =
             CellBox { low_m: Vector3::new(-1.0, -1.0, -0.5), high_m: Vector3::new(1.0, 1.0, 0.0) };
         let aside = std::mem::replace(&mut arm.clearance.boxes[0], table);
@@ -328,7 +331,8 @@ mod tests {
         assert_eq!(watched(&arm), [true, true]);
     }
 
-    /// Where a box is around the shoulder, the upper arm always reaches into it; from one beside it joint 1 turns it away.
+    /// If a box surrounds the shoulder, the upper arm always reaches into it; joint 1 can turn it away from a box
+    /// beside it.
     #[test]
     fn what_no_motion_keeps_clear_of_is_told() {
         let within = |range_rad: [f64; 2], low_m: [f64; 3], high_m: [f64; 3]| {
@@ -343,7 +347,7 @@ mod tests {
         assert_eq!(around.as_deref(), Some("clearance of upper arm and box 1"));
         assert_eq!(never_kept([0.12, -1.0, 0.0], [0.5, 1.0, 1.0]), None);
         assert_eq!(never_kept([2.0, -1.0, 0.0], [2.5, 1.0, 1.0]), None);
-        // Where joint 1 may turn away from it counts, and nothing else.
+        // Only the range of joint 1 decides whether it can turn away.
         let beside = ([0.12, -1.0, 0.0], [0.5, 1.0, 1.0]);
         let halves = [[0.0, PI], [PI, TAU]].map(|range| within(range, beside.0, beside.1));
         assert!(halves.iter().any(Option::is_none), "{halves:?}");
@@ -460,8 +464,8 @@ mod tests {
         }
     }
 
-    /// Poses whose answer is known without computing: upright is free, an arm folded onto itself
-    /// and an arm reaching below the floor are not.
+    /// Poses whose clearance is known without computing: upright is free, an arm folded onto itself and an arm reaching
+    /// below the floor are not.
     #[test]
     fn known_poses_of_the_ur5() {
         let arm = Arm::built_in("ur5").unwrap();

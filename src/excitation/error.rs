@@ -1,11 +1,11 @@
-//! What can be wrong with a trajectory.
+//! Errors of trajectories.
 
 use thiserror::Error;
 
 /// A trajectory that cannot be used, with the place and the value.
 #[derive(Debug, Error)]
 pub enum ExcitationError {
-    /// Neither built in nor a file.
+    /// The name is neither a built-in trajectory nor a file.
     #[error(
         "unknown trajectory \"{name}\": built in are {}; or give a .json file",
         super::fourier::built_in_names().collect::<Vec<_>>().join(", ")
@@ -30,7 +30,7 @@ pub enum ExcitationError {
         /// The parser's message with line and column.
         message: String,
     },
-    /// JSON of another kind or of another version.
+    /// JSON of another kind or version.
     #[error("{file}: its schema is \"{found}\", expected \"{expected}\"", expected = super::TRAJECTORY_SCHEMA)]
     Schema {
         /// The file.
@@ -38,7 +38,7 @@ pub enum ExcitationError {
         /// The schema it states.
         found: String,
     },
-    /// A value that no series can have.
+    /// A value that a series cannot have.
     #[error("{what} = {value} must be {must}")]
     Value {
         /// Which quantity.
@@ -48,7 +48,7 @@ pub enum ExcitationError {
         /// What is allowed.
         must: &'static str,
     },
-    /// Rows of coefficients that do not belong together.
+    /// Lists of coefficients with inconsistent lengths.
     #[error("{what}: {found} values, expected {expected}")]
     Length {
         /// Which list.
@@ -68,24 +68,24 @@ pub enum ExcitationError {
         /// Joints of the arm.
         dof: usize,
     },
-    /// The periodic motion itself asks for more than is allowed.
+    /// The periodic motion itself exceeds a limit.
     #[error(
         "the motion itself passes a limit: {limit} by {short} at t = {time_s:.3} s of its period (allowed are \
          {torque_percent:.0} % of the torque limits and a clearance of at least {clearance_m} m)"
     )]
     PeriodPasses {
-        /// The limit that is passed, in words.
+        /// The limit that is exceeded, in words.
         limit: String,
         /// By how much, in words.
         short: String,
-        /// Where.
+        /// When, s.
         time_s: f64,
         /// Clearance asked for, m.
         clearance_m: f64,
-        /// Share of the torque limits that was allowed, %.
+        /// Allowed fraction of the torque limits, %.
         torque_percent: f64,
     },
-    /// No run-in among those tried stays inside the limits.
+    /// None of the run-ins that were tried keeps the limits.
     #[error(
         "no run-in of {shortest_s} … {longest_s} s joins this motion inside the limits: the best keeps \
          {margin} of {limit} at t = {time_s:.3} s"
@@ -95,11 +95,11 @@ pub enum ExcitationError {
         shortest_s: f64,
         /// Longest run-in tried, s.
         longest_s: f64,
-        /// The limit that is passed, in words.
+        /// The limit that is exceeded, in words.
         limit: String,
-        /// Margin of the best one, in words (negative).
+        /// Margin of the best run-in, in words (negative).
         margin: String,
-        /// Where.
+        /// When, s.
         time_s: f64,
     },
 }

@@ -1,4 +1,4 @@
-//! A motion for other programs: samples as CSV, and a URScript program that plays it.
+//! Exports a motion to other programs: samples as CSV, and a URScript program that plays it.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -13,16 +13,16 @@ use super::run_in::Excitation;
 pub struct Playback {
     /// Cycle of the controller, s: 0.008 for the CB series, 0.002 for the e-Series.
     pub cycle_s: f64,
-    /// Speed as a fraction of the designed one, in (0, 1]. The motion is the same, only slower.
+    /// Speed as a fraction of the designed one, in (0, 1]. The path is the same, only slower.
     pub speed: f64,
-    /// Largest joint speed on the way to the start pose, rad/s.
+    /// Largest joint speed while approaching the start pose, rad/s.
     pub approach_rad_s: f64,
 }
 
-/// What no controller can play.
+/// Why no controller can play a motion.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum PlaybackError {
-    /// `servoj` lasts whole cycles of the controller: anything else plays another motion.
+    /// `servoj` lasts a whole number of controller cycles; any other rate would play another motion.
     #[error(
         "{rate_hz} set points per second are no whole number of a controller's cycles apart, which last 2 ms (e-Series) \
          or 8 ms (CB-Series): choose 500 over a whole number, such as 125, 250 or 500"
@@ -34,7 +34,7 @@ pub enum PlaybackError {
     /// Arms of Universal Robots have six joints.
     #[error("a controller of Universal Robots moves {JOINTS} joints, the motion has {joints}")]
     Joints {
-        /// Of the motion.
+        /// Joints of the motion.
         joints: usize,
     },
 }
@@ -43,11 +43,11 @@ pub enum PlaybackError {
 const JOINTS: usize = 6;
 /// Cycles per second of a controller of the e-Series, Hz.
 const E_SERIES_HZ: f64 = 500.0;
-/// The same of the CB-Series.
+/// Cycles per second of a controller of the CB-Series, Hz.
 const CB_SERIES_HZ: f64 = 125.0;
 
 impl Playback {
-    /// Of a motion of so many joints with `rate_hz` set points per second, at `speed` in (0, 1].
+    /// For a motion of `joints` joints with `rate_hz` set points per second, played at `speed` in (0, 1].
     pub fn new(joints: usize, rate_hz: f64, speed: f64) -> Result<Self, PlaybackError> {
         if joints != JOINTS {
             return Err(PlaybackError::Joints { joints });
@@ -60,13 +60,13 @@ impl Playback {
         Ok(Self { cycle_s, speed, approach_rad_s: 0.3 })
     }
 
-    /// Whether a controller of the CB-Series can play it, and not only one of the e-Series.
+    /// Whether a controller of the CB-Series can play it as well as one of the e-Series.
     pub fn suits_cb_series(&self) -> bool {
         is_whole(self.cycle_s * CB_SERIES_HZ)
     }
 }
 
-/// Whether `cycles` is a whole number from 1 on, as far as a rate is written with six digits.
+/// Whether `cycles` is a whole number ≥ 1, to within the accuracy of a rate written with six digits.
 fn is_whole(cycles: f64) -> bool {
     cycles.round() >= 1.0 && (cycles - cycles.round()).abs() < 1e-5 * cycles
 }
@@ -99,8 +99,8 @@ pub fn write_csv(out: &mut dyn Write, motion: &impl Reference, rate_hz: f64) -> 
 /// A URScript program that moves slowly to the start pose, waits for the operator, and plays
 /// `motion` with `servoj`, evaluating the series (24) on the controller.
 ///
-/// The joint speeds of the run-in and run-out are integrated in closed form in the script too, so it
-/// needs no table and is as long for one period as for hundred.
+/// The script contains the closed-form integral of the joint speeds in run-in and run-out, so it needs no table and is
+/// as long for one period as for a hundred.
 pub fn urscript(motion: &Excitation, playback: &Playback) -> String {
     let series = motion.series();
     let (n, order) = (motion.joints(), series.order());

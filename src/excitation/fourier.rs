@@ -12,16 +12,16 @@ use crate::robot::JointSignals;
 /// Schema of trajectory files.
 pub const TRAJECTORY_SCHEMA: &str = "armid.trajectory/1";
 
-/// Share of the rms velocity that the last harmonics of a fitted series may hold.
+/// Fraction of the rms velocity that the omitted last harmonics of a fitted series may hold.
 const LEFT_OUT: f64 = 1e-3;
 
-/// Trajectories built in, by the name given instead of a file.
+/// Built-in trajectories, by the name given instead of a file.
 const BUILT_IN: [(&str, &str); 2] = [
     ("ur5_identification", include_str!("../../trajectories/ur5_identification.json")),
     ("ur5_validation", include_str!("../../trajectories/ur5_validation.json")),
 ];
 
-/// Names of the trajectories built in.
+/// Names of the built-in trajectories.
 pub fn built_in_names() -> impl Iterator<Item = &'static str> {
     BUILT_IN.iter().map(|(name, _)| *name)
 }
@@ -48,7 +48,7 @@ pub struct FourierSeries {
     pub b_rad_s: Vec<Vec<f64>>,
 }
 
-/// A trajectory file as it stands on disk.
+/// The contents of a trajectory file.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct TrajectoryFile {
@@ -57,7 +57,7 @@ struct TrajectoryFile {
     q0_rad: Vec<f64>,
     a_rad_s: Vec<Vec<f64>>,
     b_rad_s: Vec<Vec<f64>>,
-    /// Program that wrote the file, and how the series was designed: for the reader of the file.
+    /// The program that wrote the file, and how the series was designed: information for readers of the file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     program: Option<serde_json::Value>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -65,7 +65,7 @@ struct TrajectoryFile {
 }
 
 impl FourierSeries {
-    /// A series with values checked: a positive period, finite coefficients, one order for all
+    /// Creates a series after checking its values: a positive period, finite coefficients, the same order for all
     /// joints.
     pub fn new(
         period_s: f64,
@@ -99,8 +99,8 @@ impl FourierSeries {
         Ok(Self { period_s, q0_rad, a_rad_s, b_rad_s })
     }
 
-    /// The series through one period of angles (n samples at `rate_hz`), up to `highest_hz`; the last
-    /// harmonics, which together hold less than a thousandth of every joint's rms velocity, are left out.
+    /// Fits a series to one period of angles (n samples at `rate_hz`), with harmonics up to `highest_hz`. The last
+    /// harmonics are left out if together they hold less than a thousandth of every joint's rms velocity.
     pub fn of_period(
         q_rad: &JointSignals,
         rate_hz: f64,
@@ -108,7 +108,7 @@ impl FourierSeries {
     ) -> Result<Self, ExcitationError> {
         let n = q_rad.samples();
         let period_s = n as f64 / rate_hz;
-        // Where the highest is a whole one, rounding must not lose it.
+        // If the product is a whole number, rounding must not lose the last harmonic.
         let order = ((highest_hz * period_s + 1e-9) as usize).min(n.saturating_sub(1) / 2);
         let coefficient = |j: usize, l: usize| {
             let (mut sine, mut cosine) = (0.0, 0.0);
@@ -137,7 +137,7 @@ impl FourierSeries {
         Self::new(period_s, q0_rad, pick(|c| c.0), pick(|c| c.1))
     }
 
-    /// One of the trajectories built in.
+    /// Loads a built-in trajectory.
     pub fn built_in(name: &str) -> Result<Self, ExcitationError> {
         let (_, text) = BUILT_IN
             .iter()
@@ -146,7 +146,7 @@ impl FourierSeries {
         Self::from_json(text, name)
     }
 
-    /// A built-in name, or a `.json` file.
+    /// Loads a trajectory from a built-in name or a `.json` file.
     pub fn load(name_or_path: &str) -> Result<Self, ExcitationError> {
         let extension = Path::new(name_or_path).extension();
         if extension.is_none_or(|e| !e.eq_ignore_ascii_case("json")) {
@@ -157,7 +157,7 @@ impl FourierSeries {
         Self::from_json(&text, name_or_path)
     }
 
-    /// From the text of a trajectory file; `source` names it in messages.
+    /// Parses the text of a trajectory file; `source` names it in messages.
     pub fn from_json(text: &str, source: &str) -> Result<Self, ExcitationError> {
         let json = |e: serde_json::Error| ExcitationError::Json {
             file: source.to_owned(),
@@ -185,7 +185,7 @@ impl FourierSeries {
             program: None,
             design: None,
         };
-        // Numbers and strings only: there is nothing in it that JSON could refuse.
+        // The file holds only numbers and strings, so serialisation cannot fail.
         serde_json::to_string_pretty(&file).unwrap_or_default() + "\n"
     }
 
@@ -199,7 +199,7 @@ impl FourierSeries {
         TAU / self.period_s
     }
 
-    /// The same motion started `shift_s` later: `shifted.q(t) = q(t + shift_s)`.
+    /// The same motion with its start moved by `shift_s` into the period: `shifted.q(t) = q(t + shift_s)`.
     ///
     /// With φ = ω l shift: a' = a cos φ + b sin φ, b' = b cos φ − a sin φ.
     pub fn shifted(&self, shift_s: f64) -> Self {

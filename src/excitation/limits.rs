@@ -1,4 +1,4 @@
-//! What a motion leaves free of every limit of the arm.
+//! Margins of a motion from every limit of the arm.
 
 use std::fmt;
 
@@ -8,12 +8,12 @@ use super::reference::Reference;
 use crate::dynamics::{Model, Workspace, inverse_dynamics};
 use crate::robot::Arm;
 
-/// What is asked of a motion beyond the limits of the arm itself.
+/// Requirements on a motion beyond the limits of the arm itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Requirements {
-    /// Smallest distance of the arm from itself and from the floor, m.
+    /// Smallest distance of the arm from itself, from the floor and from boxes, m.
     pub clearance_m: f64,
-    /// Share of the largest torque of a joint that the nominal model may need.
+    /// Fraction of the largest torque of a joint that the nominal model may need.
     pub torque_share: f64,
     /// Rate at which a motion is checked, Hz.
     pub check_rate_hz: f64,
@@ -26,7 +26,7 @@ impl Default for Requirements {
     }
 }
 
-/// Which limit is meant. Joints are 0-based here and 1-based in print.
+/// Identifies a limit. Joints are 0-based here and 1-based in print.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum LimitKind {
     /// Joint angle, rad.
@@ -71,7 +71,7 @@ pub enum LimitKind {
 }
 
 impl LimitKind {
-    /// Whether it is about what the arm keeps clear of.
+    /// Whether the limit is a distance that the arm must keep.
     pub fn is_distance(&self) -> bool {
         matches!(self, Self::Clearance { .. } | Self::Floor { .. } | Self::Box { .. })
     }
@@ -104,17 +104,17 @@ impl fmt::Display for LimitKind {
     }
 }
 
-/// The least that a motion leaves free of one limit.
+/// The smallest margin of a motion from one limit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Margin {
     /// Which limit.
     pub limit: LimitKind,
-    /// What is left in the limit's unit; negative where it is passed.
+    /// Margin in the unit of the limit; negative if the limit is exceeded.
     pub free: f64,
     /// `free` as a fraction of the bound: of half the range of a position, of the largest velocity,
     /// acceleration or torque, of 0.1 m for a distance.
     pub share: f64,
-    /// When it is least, s.
+    /// Time at which the margin is smallest, s.
     pub time_s: f64,
 }
 
@@ -124,13 +124,13 @@ impl Margin {
         format!("{:.4} {}", self.free, self.limit.unit())
     }
 
-    /// By how much a limit is passed, with its unit.
+    /// The amount by which a limit is exceeded, with its unit.
     pub fn shortfall_in_words(&self) -> String {
         format!("{:.4} {}", -self.free, self.limit.unit())
     }
 }
 
-/// Length that counts as a full share of clearance, m.
+/// Clearance that counts as a share of one, m.
 const CLEARANCE_SCALE_M: f64 = 0.1;
 
 /// The margin of every limit over one motion.
@@ -140,32 +140,31 @@ pub struct Margins {
 }
 
 impl Margins {
-    /// Position, velocity, acceleration and torque joint by joint, then the distances.
+    /// All margins: position, velocity, acceleration and torque, each joint by joint, then the distances.
     pub fn all(&self) -> &[Margin] {
         &self.all
     }
 
-    /// All of them, the smallest share first.
+    /// All margins, the smallest share first.
     pub fn least_first(&self) -> Vec<&Margin> {
         let mut sorted: Vec<&Margin> = self.all.iter().collect();
         sorted.sort_by(|a, b| a.share.total_cmp(&b.share));
         sorted
     }
 
-    /// Whether no limit is passed.
+    /// Whether no limit is exceeded.
     pub fn feasible(&self) -> bool {
         self.worst().free >= 0.0
     }
 
-    /// The limit with the smallest share left.
+    /// The margin with the smallest share.
     pub fn worst(&self) -> &Margin {
         // An arm has at least one joint, so there are at least four margins.
         self.all.iter().min_by(|a, b| a.share.total_cmp(&b.share)).unwrap_or(&self.all[0])
     }
 }
 
-/// Follows `motion` from its start to its end at `requirements.check_rate_hz` and returns what it
-/// leaves free.
+/// Follows `motion` from start to end at `requirements.check_rate_hz` and returns its margins.
 ///
 /// Between two samples h apart a quantity x can exceed its sampled extreme by at most max|ẍ| h²/8:
 /// at 1 kHz 1e-6 m for a point moving with 10 m/s².
@@ -263,7 +262,7 @@ mod tests {
         }
     }
 
-    /// One joint swings with amplitude 1 rad/s at ω = 1 rad/s about 0: every margin is known.
+    /// One joint oscillates with 1 rad/s at ω = 1 rad/s about 0: every margin is known.
     #[test]
     fn margins_of_a_known_motion() {
         let arm = Arm::built_in("ur5").unwrap();

@@ -1,9 +1,8 @@
-//! How to move so that the parameters can be known.
+//! Excitation: how to move the arm so that its parameters can be identified.
 //!
-//! Enters: an [`Arm`](crate::robot::Arm) with its limits and clearance model. Leaves: a
-//! [`Reference`], the motion asked of the arm as a function of time; in particular an
-//! [`Excitation`], the paper's periodic series (24) with a smooth run-in from rest, and the
-//! [`Margins`] it keeps from every limit.
+//! Input: an [`Arm`](crate::robot::Arm) with its limits and clearance model. Output: a [`Reference`], the commanded
+//! motion as a function of time; in particular an [`Excitation`], the paper's periodic series (24) with a smooth run-in
+//! from rest, and the [`Margins`] by which it keeps every limit.
 
 mod clearance;
 pub mod design;

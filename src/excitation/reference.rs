@@ -1,10 +1,10 @@
-//! A motion that can be asked for at any time.
+//! A motion that can be evaluated at any time.
 
-/// What a controller follows: a motion of all joints, defined at every time from 0 to its end.
+/// The motion that a controller follows: all joints, defined at every time from 0 to its end.
 ///
-/// Implemented by every kind of excitation; read by the plant, which samples it at the controller's
-/// rate. The acceleration must be the second derivative of the position, or a computed-torque
-/// controller is fed a torque that does not belong to the motion.
+/// Implemented by every kind of excitation; the simulated plant samples it at the controller's rate. The acceleration
+/// must be the second derivative of the position; otherwise a computed-torque controller receives a feed-forward torque
+/// that does not belong to the motion.
 pub trait Reference: Sync {
     /// Number of joints N.
     fn joints(&self) -> usize;

@@ -1,4 +1,4 @@
-//! Periods of a series, joined from rest and left to rest without a jump.
+//! Periods of a series, with smooth transitions from and to rest.
 
 use super::error::ExcitationError;
 use super::fourier::FourierSeries;
@@ -9,20 +9,21 @@ use crate::robot::Arm;
 /// Durations tried for a run-in, s.
 const RUN_INS_S: [f64; 8] = [0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0];
 
-/// Whole periods of a series, after a smooth start from rest: `run_in_s` of blend, then `periods`
-/// periods from the phase 0 of the series, then `run_out_s` of blend to rest (0: the motion goes
-/// on past the last period).
+/// Whole periods of a series with a smooth start from rest.
 ///
-/// The blend of duration T leads from rest to the state (v, a) of the series at its phase 0. Its
-/// velocity is the cubic with q̇ = q̈ = 0 at the start and q̇ = v, q̈ = a at the end, with s = t/T:
+/// The motion consists of a blend of `run_in_s`, then `periods` periods from phase 0 of the series, then a blend to
+/// rest of `run_out_s` (0: the motion continues past the last period).
+///
+/// The blend of duration T leads from rest to the state (v, a) of the series at phase 0. Its velocity is the cubic with
+/// q̇ = q̈ = 0 at the start and q̇ = v, q̈ = a at the end, with s = t/T:
 ///
 /// ```text
 /// q̇(s) = v (3s² − 2s³) + a T (s³ − s²)
 /// q(s)  = q_start + T [ v (s³ − s⁴/2) + a T (s⁴/4 − s³/3) ]
 /// ```
 ///
-/// so the arm starts from q_start = q(0) − v T/2 + a T²/12: the pose from which nothing but the
-/// speed has to be built up. The run-out is the same thing backwards.
+/// so the arm starts from q_start = q(0) − v T/2 + a T²/12, the pose from which only the speed has to be built up. The
+/// run-out is the same blend backwards in time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Excitation {
     series: FourierSeries,
@@ -32,7 +33,7 @@ pub struct Excitation {
     join: State,
 }
 
-/// State of all joints at the phase 0 of the series.
+/// State of all joints at phase 0 of the series.
 #[derive(Debug, Clone, PartialEq)]
 struct State {
     q_rad: Vec<f64>,
@@ -58,12 +59,12 @@ impl Excitation {
         Ok(Self { series, run_in_s, periods, run_out_s: 0.0, join })
     }
 
-    /// With the run-in (and, where `run_out`, a run-out of the same duration) that keeps the
-    /// largest share of the arm's limits free, among durations of 0.5 … 4 s.
+    /// Chooses the run-in (and, with `run_out`, a run-out of the same duration) that keeps the largest fraction of the
+    /// arm's limits free, among durations of 0.5 … 4 s.
     ///
     /// # Errors
-    /// [`ExcitationError::PeriodPasses`] if the periods themselves pass a limit of the arm,
-    /// [`ExcitationError::NoRunIn`] if they do not and every run-in does.
+    /// [`ExcitationError::PeriodPasses`] if the periods themselves exceed a limit of the arm,
+    /// [`ExcitationError::NoRunIn`] if they do not but every run-in does.
     pub fn fitted(
         arm: &Arm,
         requirements: &Requirements,
@@ -97,9 +98,11 @@ impl Excitation {
         })
     }
 
-    /// As [`Self::fitted`], of an arm that is only simulated, which nothing stops at a position, speed
-    /// or acceleration (its drives give no more than their torque): where periods or run-ins pass a
-    /// limit, with the run-in that by itself keeps most of them or passes them least.
+    /// As [`Self::fitted`], for an arm that is only simulated.
+    ///
+    /// Nothing stops a simulated arm at a position, speed or acceleration limit (its drives still give no more than
+    /// their torque). If the periods or all run-ins exceed a limit, the run-in is chosen by itself: the one with the
+    /// largest margin or the smallest violation.
     pub fn fitted_without_limits(
         arm: &Arm,
         requirements: &Requirements,
@@ -115,8 +118,8 @@ impl Excitation {
         }
     }
 
-    /// The run-in (with a run-out as long, where `run_out`) that together with `periods` periods, or
-    /// none, keeps the largest share of the limits free, and the limit that is left least.
+    /// Finds the run-in (with `run_out` together with an equally long run-out) that, combined with `periods` periods or
+    /// none, has the largest smallest margin; returns it with that margin.
     fn calmest(
         arm: &Arm,
         requirements: &Requirements,
@@ -143,13 +146,13 @@ impl Excitation {
         Ok(best)
     }
 
-    /// The same, brought to rest within `run_out_s` > 0 seconds after the last period.
+    /// The same motion, brought to rest within `run_out_s` > 0 seconds after the last period.
     pub fn with_run_out(self, run_out_s: f64) -> Result<Self, ExcitationError> {
         positive("run_out_s", run_out_s)?;
         Ok(Self { run_out_s, ..self })
     }
 
-    /// The same with `periods` periods, at least one.
+    /// The same motion with `periods` periods, at least one.
     pub fn with_periods(self, periods: usize) -> Self {
         Self { periods: periods.max(1), ..self }
     }
@@ -181,8 +184,8 @@ impl Excitation {
         state.q_rad
     }
 
-    /// The blend of `duration_s` at the time `left_s` before its moving end. Backwards in time
-    /// (`direction` = −1) the velocity changes sign and the acceleration does not.
+    /// Evaluates the blend of `duration_s` at the time `left_s` before its moving end. Backwards in time (`direction` =
+    /// −1) the velocity changes sign and the acceleration does not.
     fn blend(&self, duration_s: f64, left_s: f64, direction: f64, out: [&mut [f64]; 3]) {
         let [q, qd, qdd] = out;
         let s = (1.0 - left_s / duration_s).max(0.0);
@@ -294,7 +297,7 @@ mod tests {
         }
     }
 
-    /// What only a part of the torque is allowed for is refused as that, and simulated all the same.
+    /// A period that exceeds the allowed part of the torque is refused for that reason, but can still be simulated.
     #[test]
     fn a_period_that_passes_a_limit_itself_is_named() {
         let arm = Arm::built_in("ur5").unwrap();
@@ -306,7 +309,7 @@ mod tests {
         assert!(message.contains("torque of joint") && message.contains("10 %"), "{message}");
         let simulated = Excitation::fitted_without_limits(&arm, &strict, series(), 2).unwrap();
         assert_eq!((simulated.series(), simulated.periods()), (&series(), 2));
-        // Where the limits are kept both are the same.
+        // If the limits are kept, both functions agree.
         let usual = Requirements::default();
         assert_eq!(
             Excitation::fitted_without_limits(&arm, &usual, series(), 2).unwrap(),
@@ -314,8 +317,8 @@ mod tests {
         );
     }
 
-    /// Joint 1 swings by ±0.1 rad within ±0.105 rad, fastest where the period begins: the shortest
-    /// run-in starts v T/2 = 0.157 rad away.
+    /// Joint 1 oscillates by ±0.1 rad within ±0.105 rad and is fastest where the period begins: the shortest run-in
+    /// starts v T/2 = 0.157 rad away.
     #[test]
     fn a_period_within_its_limits_that_none_leads_into_is_told_apart() {
         let mut arm = Arm::built_in("ur5").unwrap();

@@ -1,25 +1,25 @@
-//! A motion that was recorded, to be followed again.
+//! A recorded motion, used as a reference.
 
 use super::reference::Reference;
 use crate::dynamics::Motion;
 
-/// Samples of a motion joined by polynomials of fifth degree, each with angle, velocity and acceleration
-/// of the two samples at its ends.
+/// Samples of a motion joined by polynomials of fifth degree, each of which matches angle, velocity and acceleration of
+/// the two samples at its ends.
 ///
-/// With u ∈ [0, 1] between two samples that are h apart, and d, e, f what a parabola from the first one
-/// misses at the second one of q, h q̇ and h² q̈:
+/// With u ∈ [0, 1] between two samples that are h apart, let d, e, f be the differences between the second sample and
+/// the parabola from the first one, in q, h q̇ and h² q̈:
 ///
 /// ```text
 /// q(u) = q₀ + h q̇₀ u + ½ h² q̈₀ u² + (10 d − 4 e + f/2) u³ − (15 d − 7 e + f) u⁴ + (6 d − 3 e + f/2) u⁵
 /// ```
 ///
-/// so that the velocity is the derivative of the angle everywhere, and the acceleration that of the
-/// velocity, without a jump.
+/// so that the velocity is the derivative of the angle everywhere, and the acceleration is that of the velocity,
+/// without jumps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SampledMotion {
     motion: Motion,
     rate_hz: f64,
-    /// Duration of a period, where the first sample follows the last.
+    /// Whether the motion repeats, so that the first sample follows the last.
     repeats: bool,
     /// Sample at which the reference starts; negative: before the first one.
     first: f64,
@@ -27,19 +27,19 @@ pub struct SampledMotion {
 }
 
 impl SampledMotion {
-    /// One period of a motion, over and over for `duration_s`, started `lead_s` before its first sample.
+    /// Repeats one period of a motion for `duration_s`, starting `lead_s` before its first sample.
     pub fn repeating(motion: Motion, rate_hz: f64, lead_s: f64, duration_s: f64) -> Self {
         Self { motion, rate_hz, repeats: true, first: -lead_s * rate_hz, duration_s }
     }
 
-    /// A motion from its first sample to its last one.
+    /// Plays a motion once, from its first sample to its last.
     pub fn once(motion: Motion, rate_hz: f64) -> Self {
         let duration_s = motion.samples().saturating_sub(1) as f64 / rate_hz;
         Self { motion, rate_hz, repeats: false, first: 0.0, duration_s }
     }
 
-    /// The samples before and after position `x` on the grid, and how far it is between them. Beyond the
-    /// ends of a motion that does not repeat its state there is held.
+    /// The samples before and after position `x` on the grid, and the fraction of the way between them. Beyond the ends
+    /// of a motion that does not repeat, the state at the end is held.
     fn stretch(&self, x: f64) -> (usize, usize, f64) {
         let n = self.motion.samples();
         if self.repeats {
@@ -63,7 +63,7 @@ impl Reference for SampledMotion {
     }
 
     fn sample(&self, t_s: f64, q_rad: &mut [f64], qd_rad_s: &mut [f64], qdd_rad_s2: &mut [f64]) {
-        // Of no samples there is no motion.
+        // Without samples there is no motion.
         if self.motion.samples() == 0 {
             [q_rad, qd_rad_s, qdd_rad_s2].into_iter().for_each(|out| out.fill(0.0));
             return;
@@ -135,7 +135,7 @@ mod tests {
         for (x, y) in end.iter().flatten().zip(truth.iter().flatten()) {
             assert!((x - y).abs() < 1e-9, "{x} {y}");
         }
-        // And stays there, as it stays where it begins.
+        // The motion stays there, as it stays at its beginning.
         assert_eq!(at(&once, once.duration_s() + 1.0), end);
         assert_eq!(at(&once, -1.0), at(&once, 0.0));
     }
