@@ -7,14 +7,16 @@ use crate::dynamics::Motion;
 use crate::excitation::{ClearanceModel, ClearanceWorkspace, Requirements};
 use crate::robot::{Arm, JointSignals, Limits};
 
-/// φ(x) = −(1/N) Σ_k Σ_c ln s_c(t_k): s_c is what the motion leaves free of limit c (position, velocity,
-/// acceleration, clearance) at sample k; +∞ outside. Linear in x for the joint limits.
+/// The barrier φ(x) = −(1/N) Σ_k Σ_c ln s_c(t_k).
 ///
-/// Limits are tightened so that they hold between the samples too. A trigonometric polynomial p of
-/// order L has |p̈| ≤ (ωL)² max|p| (Bernstein), so sampled every h its maximum is at most
-/// 1/(1 − (ωLh)²/8) times that of the samples: velocity and acceleration limits shrink by (ωLh)²/8.
-/// Positions shrink by max|q̈| h²/8. Distances have no such bound: they are taken to accelerate with
-/// 2 m/s² and shrink by h²/8 of it, at most 5 mm; the fine check afterwards has the last word.
+/// s_c is the margin of the motion from limit c (position, velocity, acceleration, clearance) at sample k, linear in x
+/// for the joint limits; outside the limits φ = +∞.
+///
+/// Limits are tightened so that they hold between the samples too. A trigonometric polynomial p of order L has |p̈| ≤
+/// (ωL)² max|p| (Bernstein), so sampled every h its maximum is at most 1/(1 − (ωLh)²/8) times that of the samples:
+/// velocity and acceleration limits shrink by (ωLh)²/8. Positions shrink by max|q̈| h²/8. Distances have no such bound:
+/// they are assumed to accelerate with 2 m/s² and shrink by h²/8 times that, at most 5 mm; the fine check afterwards
+/// decides.
 #[derive(Debug, Clone)]
 pub struct LimitBarrier {
     limits: Vec<Limits>,
@@ -27,11 +29,11 @@ pub struct LimitBarrier {
 pub struct BarrierTerms {
     /// φ.
     pub value: f64,
-    /// ∂φ by q, q̇, q̈ at every sample.
+    /// Derivatives of φ by q, q̇, q̈ at every sample.
     pub bar: Motion,
-    /// ∂φ by ln T beyond what goes through the motion: the ends of a free period's range.
+    /// Derivative of φ by ln T apart from that through the motion: from the ends of the range of a free period.
     pub period_slope: f64,
-    /// Diagonal of ∂²φ by q, q̇, q̈: the joint limits' part.
+    /// Diagonal of ∂²φ by q, q̇, q̈: the part of the joint limits.
     curvature: [JointSignals; 3],
     period_curvature: f64,
     /// Σ (1/s²) ∇d ∇dᵀ of the distances, N_joints² numbers per sample.
@@ -47,7 +49,7 @@ pub struct BarrierWorkspace {
     gradients: Vec<f64>,
 }
 
-/// Beyond this a distance is left out of the curvature, m: its share 1/s² is negligible.
+/// Margin of a distance above which it is left out of the curvature, m: its contribution 1/s² is negligible.
 const FAR_M: f64 = 0.2;
 
 impl LimitBarrier {
@@ -71,7 +73,7 @@ impl LimitBarrier {
         }
     }
 
-    /// The barrier at the motion of `x`; `None` if it passes a (tightened) limit.
+    /// Evaluates the barrier at the motion of `x`; `None` if the motion exceeds a (tightened) limit.
     pub fn evaluate(
         &self,
         ws: &mut BarrierWorkspace,
@@ -151,8 +153,8 @@ impl LimitBarrier {
         Some(BarrierTerms { value, bar, period_slope, curvature, period_curvature, distances })
     }
 
-    /// ∂²φ by x without the second derivatives of the distances (and of a free period): positive
-    /// semidefinite, exact for the joint limits.
+    /// Computes ∂²φ by x without the second derivatives of the distances (and of a free period): positive semidefinite,
+    /// and exact for the joint limits.
     pub fn curvature(
         &self,
         terms: &BarrierTerms,
@@ -186,8 +188,8 @@ impl LimitBarrier {
         total
     }
 
-    /// The largest step t ≤ 1 along the motion `change` (linear in t) that uses up no more than the
-    /// share `keep` of the way to the nearest joint limit.
+    /// The largest step t ≤ 1 along the motion `change` (linear in t) that uses at most the fraction `keep` of the
+    /// distance to the nearest joint limit.
     pub fn longest_step(
         &self,
         space: &DesignSpace,
@@ -220,7 +222,7 @@ fn step_s(space: &DesignSpace) -> f64 {
     space.longest_period_s() / space.samples() as f64
 }
 
-/// Lowest and highest q, q̇ and q̈ at the samples that keep a joint inside `limits` between them too.
+/// Lowest and highest q, q̇ and q̈ allowed at the samples, such that the joint stays inside `limits` between them too.
 fn tightened(limits: &Limits, space: &DesignSpace) -> [[f64; 2]; 3] {
     let step_s = step_s(space);
     let shrink = 1.0 - space.finest_phase_rad().powi(2) / 8.0;

@@ -1,4 +1,4 @@
-//! What makes one information matrix better than another.
+//! Criteria that compare information matrices.
 
 use faer::linalg::solvers::DenseSolveCore;
 use faer::{Mat, Side};
@@ -22,12 +22,12 @@ pub enum Criterion {
 }
 
 impl Criterion {
-    /// Whether Λ is to be weighted with the torque noise.
+    /// Whether Λ is weighted with the torque noise.
     pub fn whitened(self) -> bool {
         matches!(self, Self::D | Self::A | Self::E)
     }
 
-    /// A value of the criterion as the number people compare.
+    /// A value of the criterion in words, as the number that is usually quoted.
     pub fn in_words(self, value: f64) -> String {
         match self {
             Self::D => format!("det^(1/n) of the covariance {:.4e}", value.exp()),
@@ -55,9 +55,9 @@ impl Criterion {
 
     /// The criterion and its derivative G by Λ (symmetric, df = tr(G dΛ)).
     ///
-    /// Extreme eigenvalues meet at an optimum, where they have no derivative. They are replaced by
-    /// p-norms of the spectrum, ln λ_max ≤ (1/p) ln Σ λᵖ and −ln λ_min ≤ (1/p) ln Σ λ⁻ᵖ, which are
-    /// smooth, from above, and exact to ln(n)/p.
+    /// Extreme eigenvalues coincide at an optimum, where they have no derivative. They are replaced by p-norms of the
+    /// spectrum, ln λ_max ≤ (1/p) ln Σ λᵖ and −ln λ_min ≤ (1/p) ln Σ λ⁻ᵖ, which are smooth upper bounds, exact to
+    /// within ln(n)/p.
     pub fn smooth(
         self,
         information: &Mat<f64>,
@@ -96,7 +96,7 @@ impl Criterion {
                 let s = equilibration(information)?;
                 let c = congruent(information, &s);
                 let (value, g) = soft_spectrum(&c, sharpness, true)?;
-                // C_ij = s_i s_j Λ_ij with s = Λ_ii^(-1/2): the diagonal also moves its row and column.
+                // C_ij = s_i s_j Λ_ij with s = Λ_ii^(-1/2): a diagonal entry also changes its row and column.
                 let mut out = congruent(&g, &s);
                 for i in 0..n {
                     let moved: f64 = (0..n).map(|k| g[(i, k)] * c[(k, i)]).sum();
@@ -137,7 +137,7 @@ fn scale_all(matrix: &mut Mat<f64>, factor: f64) {
     }
 }
 
-/// (1/p) ln Σ λ⁻ᵖ, plus (1/p) ln Σ λᵖ if `both` ends are meant, and the derivative by the matrix.
+/// (1/p) ln Σ λ⁻ᵖ, plus (1/p) ln Σ λᵖ if `both` ends of the spectrum count, and its derivative by the matrix.
 fn soft_spectrum(matrix: &Mat<f64>, p: f64, both: bool) -> Option<(f64, Mat<f64>)> {
     let n = matrix.nrows();
     let eigen = matrix.self_adjoint_eigen(Side::Lower).ok()?;
@@ -177,7 +177,7 @@ mod tests {
         theta.transpose() * &theta
     }
 
-    /// Directional differences with h = 1e-5: truncation h² ≈ 1e-10 of values of order 1 to 100.
+    /// Directional differences with h = 1e-5: the truncation error is h² ≈ 1e-10, for values of order 1 to 100.
     #[test]
     fn derivatives_are_finite_differences() {
         let scales: Vec<f64> = (0..8).map(|i| 0.5 + 0.3 * i as f64).collect();
@@ -228,8 +228,8 @@ mod tests {
         close(Criterion::Scaled, 0.0);
     }
 
-    /// One direction tells nothing: its pivot and its eigenvalue are zero without rounding. So is the pivot of two columns that
-    /// are alike, whose eigenvalue is zero to rounding only.
+    /// A direction without information has a pivot and an eigenvalue of exactly zero. Two equal columns have a pivot of
+    /// exactly zero too, but an eigenvalue of zero only to within rounding.
     #[test]
     fn a_singular_matrix_has_no_value() {
         let unit = [1.0; 2];

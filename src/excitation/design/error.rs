@@ -1,4 +1,4 @@
-//! Why there is no design.
+//! Errors of the design of an excitation.
 
 use thiserror::Error;
 
@@ -30,32 +30,32 @@ pub enum DesignError {
         /// How many there must be.
         dof: usize,
     },
-    /// Something is too near wherever the arm is.
+    /// A distance is too small wherever the arm is.
     #[error(
         "{limit}: at most {most_m:.3} m in {POSES_TRIED} poses all over the range of the joints, and {clearance_m} m are asked for"
     )]
     NeverClear {
-        /// What is too near.
+        /// The distance, in words.
         limit: String,
-        /// The largest distance, m; negative where they overlap.
+        /// The largest value of the distance, m; negative if the two always overlap.
         most_m: f64,
-        /// What is asked for, m.
+        /// The clearance that is required, m.
         clearance_m: f64,
     },
-    /// Fixed offsets at which the arm may not even stand.
+    /// The fixed offsets are a pose that the arm may not take.
     #[error("the fixed offsets are no pose the arm may take: {limit} is short by {short}")]
     FixedPose {
-        /// The limit that is passed.
+        /// The limit that is exceeded.
         limit: LimitKind,
         /// By how much, with its unit.
         short: String,
     },
-    /// A condition number is about one motion alone.
+    /// A prior is combined with a condition number, which depends on one motion alone.
     #[error(
         "the condition number of Θ does not know what was known before: use a prior with d, a or e"
     )]
     PriorUnused,
-    /// What is known already belongs to another model.
+    /// The prior belongs to another model.
     #[error("{file}: {message}")]
     Prior {
         /// The file.
@@ -71,20 +71,20 @@ pub enum DesignError {
     Infeasible {
         /// How many were tried.
         starts: usize,
-        /// Clearance asked for.
+        /// Clearance that was required, m.
         clearance_m: f64,
         /// Name of the arm.
         arm: String,
     },
-    /// Time was over before a start became a motion inside the limits.
+    /// Time ran out before any start became a motion inside the limits.
     #[error(
         "time was over after {tried} of {starts} starts, and none of these is a motion inside the limits: give more \
          --seconds"
     )]
     OutOfTime {
-        /// How many were looked at.
+        /// Number of starts tried.
         tried: usize,
-        /// How many there are.
+        /// Number of starts.
         starts: usize,
     },
     /// Designs were found, but none passed the check on the fine grid together with a run-in.
@@ -95,19 +95,19 @@ pub enum DesignError {
         /// Why the last one failed.
         last: String,
     },
-    /// From the trajectory.
+    /// An error of the trajectory.
     #[error(transparent)]
     Excitation(#[from] ExcitationError),
-    /// From the base parameters.
+    /// An error of the base parameters.
     #[error(transparent)]
     Rank(#[from] AmbiguousRank),
-    /// From the parameterisation.
+    /// An error of the parameterisation.
     #[error(transparent)]
     Parameterisation(#[from] ParameterisationError),
 }
 
 impl DesignError {
-    /// Whether it may be what the arm is to keep clear of that leaves no motion.
+    /// Whether the required clearances may be the reason that no motion is left.
     pub fn is_about_clearance(&self) -> bool {
         match self {
             Self::NeverClear { .. } | Self::Infeasible { .. } => true,

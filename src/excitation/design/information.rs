@@ -8,16 +8,16 @@ use crate::dynamics::{
     AdjointWorkspace, Lanes, Model, Motion, Parameter, ParameterLayout, RegressorBlock, Workspace,
 };
 
-/// Λ = Σ_t Θ_B(t)ᵀ W Θ_B(t) with one weight per joint, W = diag(w): w = 1 for the paper's own
-/// criterion, w_j = 1/σ_j² for the information about the parameters in data with torque noise σ_j.
+/// The information matrix Λ = Σ_t Θ_B(t)ᵀ W Θ_B(t), with one weight per joint, W = diag(w). w = 1 gives the paper's own
+/// criterion; w_j = 1/σ_j² gives the information about the parameters in data with torque noise σ_j.
 #[derive(Debug, Clone)]
 pub struct Information {
     model: Model,
-    /// Per joint: the base columns its row sees.
+    /// For every joint, the base columns on which its torque depends.
     visible: Vec<Vec<VisibleColumn>>,
     rank: usize,
     weights: Vec<f64>,
-    /// Non-zero standard parameters, for the torque.
+    /// Non-zero standard parameters of the nominal model, for its torque.
     nominal: Vec<(Parameter, f64)>,
 }
 
@@ -34,7 +34,7 @@ pub struct InformationWorkspace {
     backward: AdjointWorkspace<Lanes>,
     regressor: RegressorBlock,
     adjoint: RegressorBlock,
-    /// Per joint: its visible base columns, samples × columns.
+    /// For every joint, its visible base columns, samples × columns.
     columns: Vec<Mat<f64>>,
 }
 
@@ -87,8 +87,8 @@ impl Information {
         }
     }
 
-    /// Λ per sample: Σ_t Θᵀ W Θ / N, symmetric, rank × rank; and the torque of the nominal model into
-    /// `torque_nm[joint · N + sample]`.
+    /// Computes Λ per sample, Σ_t Θᵀ W Θ / N, a symmetric rank × rank matrix, and writes the torque of the nominal
+    /// model into `torque_nm[joint · N + sample]`.
     pub fn evaluate(
         &self,
         ws: &mut InformationWorkspace,
@@ -125,8 +125,8 @@ impl Information {
         information
     }
 
-    /// Writes into `bar` the derivatives by q, q̇, q̈ of tr(G Λ) + Σ_jt `torque_weights`·τ_j(t), with
-    /// the Λ and τ of the last [`evaluate`](Self::evaluate) of the same motion and a symmetric G.
+    /// Writes into `bar` the derivatives, by q, q̇ and q̈, of tr(G Λ) + Σ_jt `torque_weights`·τ_j(t) for a symmetric G.
+    /// Λ and τ are those of the last [`evaluate`](Self::evaluate), which must have been of the same motion.
     ///
     /// tr(G dΛ) = Σ_j (2 w_j/N) ⟨Θ_j G, dΘ_j⟩, so the weights on the regressor are B_j = (2 w_j/N) Θ_j G.
     pub fn pull_back(

@@ -1,4 +1,4 @@
-//! From one start to a local optimum, inside the limits all the way.
+//! Descends from one start to a local optimum, inside the limits all the way.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -12,7 +12,7 @@ pub struct Stage {
     pub mu: f64,
     /// p of the smoothed spectrum.
     pub sharpness: f64,
-    /// Most steps taken.
+    /// Largest number of steps.
     pub steps: usize,
 }
 
@@ -23,7 +23,7 @@ pub enum Ending {
     Converged,
     /// The last stage used all its steps.
     StepLimit,
-    /// It was told to stop; the point is feasible all the same.
+    /// The descent was told to stop; its point is feasible all the same.
     Interrupted,
 }
 
@@ -32,7 +32,7 @@ pub enum Ending {
 pub struct Descent {
     /// The variables, strictly inside the (tightened) limits.
     pub x: DVector<f64>,
-    /// Points evaluated.
+    /// Number of points evaluated.
     pub evaluations: usize,
     /// How it ended.
     pub ending: Ending,
@@ -41,17 +41,17 @@ pub struct Descent {
 /// A predicted decrease of the merit below this ends a stage: the criteria are logarithms, so it is
 /// a relative change of a condition number or a variance.
 const TOLERANCE: f64 = 1e-6;
-/// Share of the way to the nearest joint limit that one step may use.
+/// Fraction of the distance to the nearest joint limit that one step may use.
 const KEEP: f64 = 0.98;
 
 /// Minimises `problem` from the feasible `start` through the `stages`. `None` if the start is not
 /// strictly feasible.
 ///
-/// Each step solves (B + μ H) d = −∇(f + μ φ): H is the exact curvature of the barrier of the joint
-/// limits (Gauss–Newton for the distances), B a BFGS approximation of the curvature of the criterion
-/// alone, damped (Powell) to stay positive definite. The barrier is the stiff part and known, so B
-/// has only the smooth criterion to learn, and survives changes of μ. A backtracking search on the
-/// merit f + μ φ keeps every iterate strictly feasible.
+/// Each step solves (B + μ H) d = −∇(f + μ φ). H is the curvature of the barrier, exact for the joint limits and
+/// Gauss–Newton for the distances. B is a BFGS approximation of the curvature of the criterion alone, damped (Powell)
+/// to stay positive definite. The barrier is the stiff part and its curvature is known, so B has to learn only the
+/// smooth criterion, and remains valid when μ changes. A backtracking search on the merit f + μ φ keeps every iterate
+/// strictly feasible.
 pub fn descend(
     problem: &Problem,
     ws: &mut ProblemWorkspace,
@@ -84,7 +84,7 @@ pub fn descend(
             let (next, tried) = search(problem, ws, &point, &d, decrease, stage, &mut change);
             evaluations += tried;
             let Some(next) = next else {
-                // No decrease along a descent direction: rounding, or a B that misleads.
+                // A descent direction without decrease: rounding, or a misleading B.
                 if b.take().is_none() {
                     ending = Ending::Converged;
                     break;
@@ -100,7 +100,8 @@ pub fn descend(
     Some(Descent { x: point.x, evaluations, ending })
 }
 
-/// −(B + μ H)⁻¹ ∇. Before B knows anything it is the gradient's own length, for a first step of order 1.
+/// The step −(B + μ H)⁻¹ ∇. Before the first update, B is the identity times the norm of the gradient, which gives a
+/// first step of order 1.
 fn direction(
     problem: &Problem,
     point: &Point,
@@ -127,8 +128,8 @@ fn direction(
     }
 }
 
-/// Backtracking: the first of t, t/2, t/4 … that is feasible and decreases the merit by a share of
-/// what the slope predicts (Armijo), if any. With the number of points tried.
+/// Backtracking line search: returns the first of t, t/2, t/4 … that is feasible and decreases the merit by a fraction
+/// of what the slope predicts (Armijo), if any, and the number of points tried.
 fn search(
     problem: &Problem,
     ws: &mut ProblemWorkspace,
@@ -143,7 +144,7 @@ fn search(
     let space = &problem.space;
     let mut t = 1.0;
     if space.log_period_at().is_none() {
-        // The motion is affine in x, so the way to the joint limits is known.
+        // The motion is affine in x, so the distance to the joint limits is known.
         space.motion((&point.x + d).as_slice(), change);
         subtract(change, &point.motion);
         t = problem.barrier.longest_step(space, &point.motion, change, KEEP);
@@ -175,11 +176,11 @@ fn subtract(from: &mut Motion, what: &Motion) {
     }
 }
 
-/// Damped BFGS: y is drawn towards B s until sᵀy ≥ 0.2 sᵀB s (Powell 1978).
+/// Damped BFGS update: y is moved towards B s until sᵀy ≥ 0.2 sᵀB s (Powell 1978).
 fn update(b: &mut Option<DMatrix<f64>>, s: &DVector<f64>, y: &DVector<f64>) {
     let n = s.len();
     let b = b.get_or_insert_with(|| {
-        // Size of the curvature seen along the first step.
+        // Magnitude of the curvature along the first step.
         let scale = (y.norm() / s.norm().max(f64::MIN_POSITIVE)).clamp(1e-6, 1e6);
         DMatrix::identity(n, n) * scale
     });
@@ -202,7 +203,7 @@ mod tests {
     use crate::excitation::design::Criterion;
     use crate::excitation::design::problem::tests::{feasible_point, small_problem};
 
-    /// Every iterate is feasible, so the end is; and the merit of the last stage can only have fallen.
+    /// Every iterate is feasible, so the end is; and the merit in the last stage can only decrease.
     #[test]
     fn a_descent_ends_feasible_and_lower() {
         for criterion in [Criterion::D, Criterion::Cond] {
@@ -229,7 +230,7 @@ mod tests {
         assert_eq!(end.x, start);
     }
 
-    /// No step decreases the merit by more than everything.
+    /// No step reaches an infinite decrease, so the search fails, but still counts its trials.
     #[test]
     fn a_search_that_finds_nothing_has_tried_as_well() {
         let problem = small_problem(Criterion::D);

@@ -1,4 +1,4 @@
-//! What an experiment will tell, before it is run.
+//! Predicts the accuracy of an experiment before it is run.
 
 use faer::linalg::solvers::DenseSolveCore;
 use faer::{Mat, Side};
@@ -9,7 +9,7 @@ use crate::base::BaseSet;
 use crate::dynamics::{Model, Motion};
 use crate::excitation::{FourierSeries, Reference};
 
-/// The data an experiment gives: its length, rate and torque noise.
+/// The data that an experiment gives: length, sampling rate and torque noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Experiment {
     /// Length of the periodic motion that is recorded, s.
@@ -26,7 +26,7 @@ impl Experiment {
         self.data_s * self.rate_hz
     }
 
-    /// 1/σ_j².
+    /// Weight of every joint, 1/σ_j².
     pub(super) fn weights(&self) -> Vec<f64> {
         self.torque_noise_nm.iter().map(|sigma| 1.0 / (sigma * sigma)).collect()
     }
@@ -38,18 +38,18 @@ pub struct Prediction {
     /// Standard deviation of every base parameter by weighted least squares, in its unit:
     /// σ_i = sqrt([(Θ_BᵀWΘ_B)⁻¹]_ii), the paper's (20) with the noise in it.
     pub sigma: Vec<f64>,
-    /// σ_i / |θ_i| with the arm's own parameters θ; infinite where θ_i is zero (symmetric bodies have
-    /// moments that vanish).
+    /// σ_i / |θ_i|, where θ are the arm's own parameters; infinite if θ_i is zero (symmetric bodies have moments that
+    /// vanish).
     pub relative_sigma: Vec<f64>,
     /// cond(Θ_BᵀΘ_B), the paper's (22).
     pub condition: f64,
-    /// The same with columns of unit length.
+    /// The same condition number with columns scaled to unit length.
     pub scaled_condition: f64,
 }
 
 impl Prediction {
-    /// Of `series` played over and over, sampled over one period at the experiment's rate; `None` if
-    /// it leaves some base parameter undetermined.
+    /// Predicts the accuracy of repeating `series`, from samples of one period at the experiment's rate; `None` if some
+    /// base parameter remains undetermined.
     pub fn of(
         model: &Model,
         base: &BaseSet,
@@ -69,7 +69,7 @@ impl Prediction {
         let total = Mat::from_fn(base.rank(), base.rank(), |i, k| {
             whitened[(i, k)] * experiment.samples() + prior.map_or(0.0, |p| p[(i, k)])
         });
-        // Columns of very different size are brought to one before the inverse is formed.
+        // Columns of very different size are scaled to unit length before the inverse is formed.
         let scales = equilibration(&total)?;
         let inverse = congruent(&total, &scales).llt(Side::Lower).ok()?.inverse();
         let sigma: Vec<f64> =
@@ -87,7 +87,7 @@ impl Prediction {
         })
     }
 
-    /// Geometric mean of the σ. It mixes units, so it only compares designs for one arm.
+    /// Geometric mean of the σ. It mixes units, so it can only compare designs for the same arm.
     pub fn geometric_mean_sigma(&self) -> f64 {
         (self.sigma.iter().map(|s| s.ln()).sum::<f64>() / self.sigma.len() as f64).exp()
     }

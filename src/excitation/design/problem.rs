@@ -1,4 +1,4 @@
-//! One design problem: what is minimised, over which variables, inside which limits.
+//! One design problem: its objective, variables and limits.
 
 use faer::Mat;
 use nalgebra::{DMatrix, DVector};
@@ -9,30 +9,29 @@ use super::information::{Information, InformationWorkspace};
 use super::space::DesignSpace;
 use crate::dynamics::Motion;
 
-/// Minimise f(x) = criterion(Λ(x) + Λ_prior) subject to the limits.
+/// Minimises f(x) = criterion(Λ(x) + Λ_prior) subject to the limits.
 ///
-/// The torque limits enter through a barrier of their own, ψ = −(1/N) Σ ln(1 − (τ/τ_max)²): the
-/// torque comes for free with the regressor, and the derivative of ψ with the same reverse sweep as
-/// that of f.
+/// The torque limits enter through a barrier of their own, ψ = −(1/N) Σ ln(1 − (τ/τ_max)²). The torque is a by-product
+/// of the regressor, and the derivative of ψ comes from the same reverse sweep as that of f.
 #[derive(Debug, Clone)]
 pub struct Problem {
     /// The variables.
     pub space: DesignSpace,
     /// Λ of the experiment (of one sample for unweighted criteria).
     pub information: Information,
-    /// What is minimised.
+    /// The criterion that is minimised.
     pub criterion: Criterion,
     /// Scale of every base parameter (for the relative criteria).
     pub scales: Vec<f64>,
-    /// What is known already.
+    /// Prior information Λ_prior on the base parameters.
     pub prior: Option<Mat<f64>>,
-    /// Joint limits and distances.
+    /// Barrier of joint limits and distances.
     pub barrier: LimitBarrier,
     /// Largest torque per joint, Nm.
     pub torque_nm: Vec<f64>,
 }
 
-/// Everything about one feasible x.
+/// Everything that a step needs to know about one feasible x.
 #[derive(Debug, Clone)]
 pub struct Point {
     /// The variables.
@@ -81,8 +80,8 @@ impl Problem {
         }
     }
 
-    /// The point x with everything a step needs; `None` if it is not strictly inside the limits or
-    /// tells nothing about some parameter.
+    /// Evaluates the point x; `None` if it is not strictly inside the limits or gives no information about some
+    /// parameter.
     pub fn point(
         &self,
         ws: &mut ProblemWorkspace,
@@ -130,7 +129,7 @@ impl Problem {
         Some(Point { x, motion, smooth, torque_barrier, gradient, terms, barrier_gradient })
     }
 
-    /// Λ + Λ_prior, feasible or not.
+    /// Λ + Λ_prior at x, whether x is feasible or not.
     pub fn total_information(&self, ws: &mut ProblemWorkspace, x: &DVector<f64>) -> Mat<f64> {
         self.space.motion(x.as_slice(), &mut ws.bar);
         let mut information =
@@ -141,7 +140,7 @@ impl Problem {
         information
     }
 
-    /// The criterion itself (not smoothed) at x on this problem's grid.
+    /// The exact criterion (not smoothed) at x on this problem's grid.
     pub fn exact(&self, ws: &mut ProblemWorkspace, x: &DVector<f64>) -> Option<f64> {
         let information = self.total_information(ws, x);
         self.criterion.value(&information, &self.scales)
@@ -216,10 +215,10 @@ pub(super) mod tests {
         assert!(without.gradient.iter().all(|slope| slope.is_finite()));
     }
 
-    /// The whole chain criterion, information, regressor, motion, coefficients against central
-    /// differences, for every criterion and a free period. Round-off of a small eigenvalue is
-    /// 1e-16 of the largest, up to some 1e-11 of itself here, which over h = 1e-5 is 1e-6; truncation is
-    /// h² times third derivatives, of order 1/ε² = 2500 from tanh. Both stay below 1e-5.
+    /// The whole chain of criterion, information, regressor, motion and coefficients is compared with central
+    /// differences, for every criterion and a free period. Round-off of a small eigenvalue is 1e-16 of the largest, up
+    /// to some 1e-11 of itself here, which over h = 1e-5 gives 1e-6; truncation is h² times third derivatives, of order
+    /// 1/ε² = 2500 from tanh. Both stay below 1e-5.
     #[test]
     fn gradients_are_finite_differences() {
         for criterion in
@@ -252,8 +251,8 @@ pub(super) mod tests {
         }
     }
 
-    /// The curvature of the joint limits is exact: far from every distance limit, it is the
-    /// difference of barrier gradients for a fixed period.
+    /// The curvature of the joint limits is exact: far from every distance limit and for a fixed period, it equals the
+    /// difference of barrier gradients.
     #[test]
     fn curvature_is_positive_and_close_to_differences_of_the_gradient() {
         let problem = small_problem(Criterion::D);

@@ -1,4 +1,4 @@
-//! From a specification to a design that passed its check.
+//! Runs a design: from a specification to a motion that passed its check.
 
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -19,33 +19,33 @@ use crate::excitation::{
 };
 use crate::robot::Arm;
 
-/// A design that passed its check on the fine grid, run-in and run-out included.
+/// A design that passed its check on the fine grid, including run-in and run-out.
 #[derive(Debug, Clone)]
 pub struct Design {
-    /// The motion: run-in, periods to cover the experiment's data, run-out.
+    /// The motion: run-in, enough periods to cover the experiment's data, run-out.
     pub excitation: Excitation,
-    /// Value of the criterion (a logarithm, see [`super::Criterion`]) on the optimiser's grid, for data as long as was asked for, or
-    /// as its periods where their length was given.
+    /// Value of the criterion (a logarithm, see [`super::Criterion`]) on the optimiser's grid. It is for data of the
+    /// length asked for or, if the length of the period was given, of the length of its whole periods.
     pub value: f64,
-    /// The experiment asked for, as long as the motion's periods are together.
+    /// The experiment asked for, with the length of the motion's periods together.
     pub experiment: Experiment,
-    /// What it will tell.
+    /// The accuracy that it will give.
     pub prediction: Prediction,
-    /// What the motion leaves free.
+    /// Margins of the motion from the limits.
     pub margins: Margins,
     /// Finalists, best first.
     pub finalists: Vec<Finalist>,
-    /// Starts tried.
+    /// Number of starts.
     pub starts: usize,
-    /// Starts that became a motion inside the limits.
+    /// Number of starts that became a motion inside the limits.
     pub feasible_starts: usize,
-    /// Points evaluated (criterion, limits and their derivatives).
+    /// Number of points evaluated (criterion, limits and their derivatives).
     pub evaluations: usize,
     /// Whether time or the user ended the search; if not, the result depends on the seed alone.
     pub cut_short: bool,
 }
 
-/// One design that was taken to the end.
+/// One design that was refined to the end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Finalist {
     /// The start it came from.
@@ -54,12 +54,12 @@ pub struct Finalist {
     pub value: f64,
 }
 
-/// When a search ends before its work is done.
+/// Conditions that end a search before its work is done.
 #[derive(Debug)]
 pub struct Budget<'a> {
-    /// At this time.
+    /// The search ends at this time.
     pub deadline: Option<Instant>,
-    /// Once this is set.
+    /// The search ends once this is set.
     pub stop: &'a AtomicBool,
 }
 
@@ -89,9 +89,11 @@ fn rounds(spec: &Specification) -> Vec<Round> {
     ]
 }
 
-/// Scale of every base parameter for the relative criteria: its own size, but at least a thousandth
-/// of the largest of the same unit, so that what is nearly zero does not rule the design; offsets, which are nominally zero,
-/// count as the largest.
+/// Scale of every base parameter for the relative criteria.
+///
+/// The scale is the parameter's own size, but at least a thousandth of the largest parameter with the same unit, so
+/// that parameters close to zero do not dominate the design. Offsets, which are nominally zero, get the size of the
+/// largest.
 pub fn parameter_scales(base: &BaseSet, model: &Model) -> Vec<f64> {
     const FLOOR: f64 = 1e-3;
     let theta = base.values(&model.standard_parameters());
@@ -110,10 +112,10 @@ pub fn parameter_scales(base: &BaseSet, model: &Model) -> Vec<f64> {
         .collect()
 }
 
-/// Designs a motion for `arm` that tells most about the parameters of `base`.
+/// Designs the motion for `arm` that is most informative about the parameters of `base`.
 ///
 /// # Errors
-/// A specification that makes no sense, or no feasible motion: then there is no design to return.
+/// An invalid specification, or no feasible motion; there is then no design to return.
 pub fn design(
     arm: &Arm,
     base: &BaseSet,
@@ -125,7 +127,7 @@ pub fn design(
     let spec = &of_whole_periods(spec);
     let model = Model::new(arm);
     let scales = parameter_scales(base, &model);
-    // Λ is averaged over the samples of one period; the experiment has so many of them.
+    // Λ is averaged over the samples of one period, so it is multiplied by the number of samples of the experiment.
     let samples = spec.experiment.samples();
     let weights = if spec.criterion.whitened() {
         spec.experiment.weights().iter().map(|w| w * samples).collect()
@@ -203,7 +205,7 @@ pub fn design(
     Err(DesignError::CheckFailed { candidates: found.candidates.len(), last })
 }
 
-/// The same with data as long as the periods that will be played, where these are known before.
+/// The same specification, with the data extended to the whole periods that will be played if their length is fixed.
 fn of_whole_periods(spec: &Specification) -> Specification {
     let mut spec = spec.clone();
     if spec.variables.period_range_s.is_none() {
@@ -214,13 +216,13 @@ fn of_whole_periods(spec: &Specification) -> Specification {
     spec
 }
 
-/// Whole periods that cover `data_s`, all but a hundredth of one.
+/// Number of whole periods that cover `data_s`; up to a hundredth of a period may be missing.
 fn periods_to_cover(data_s: f64, period_s: f64) -> usize {
     (data_s / period_s - 0.01).ceil().max(1.0) as usize
 }
 
-/// The candidate made ready to run: shrunk by a trifle if the fine grid finds it outside, started at
-/// its calmest moment, with run-in and run-out; and checked as a whole.
+/// Prepares a candidate for execution: scales it down slightly if it exceeds a limit on the fine grid, starts it at its
+/// calmest moment, adds run-in and run-out, and checks the whole motion.
 fn finish(
     arm: &Arm,
     spec: &Specification,
@@ -256,8 +258,8 @@ fn finish(
     Err(failure.map_or(shortfall, DesignError::from))
 }
 
-/// Times of the period at which the motion may start: only 0 for a motion through rest, otherwise
-/// the moments of least speed and acceleration first, some way apart.
+/// Times of the period at which the motion may start: only 0 for a motion through rest; otherwise the moments closest
+/// to rest, judged by speed, acceleration and torque, at some distance from each other.
 fn calm_moments(arm: &Arm, spec: &Specification, series: &FourierSeries) -> Vec<f64> {
     const MOMENTS: usize = 200;
     const TRIED: usize = 8;

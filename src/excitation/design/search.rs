@@ -1,4 +1,4 @@
-//! Many starts, fewer and fewer survivors.
+//! A search with many starts and fewer and fewer survivors.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
@@ -19,9 +19,9 @@ pub struct Effort<'a> {
     pub starts: usize,
     /// Seed of the starts; start k is the same whatever the number of starts or threads.
     pub seed: u64,
-    /// No new work after this.
+    /// No new work starts after this time.
     pub deadline: Option<Instant>,
-    /// No new work once set.
+    /// No new work starts once this is set.
     pub stop: &'a AtomicBool,
 }
 
@@ -31,31 +31,31 @@ impl Effort<'_> {
     }
 }
 
-/// One round of the search: the best `survivors` of the round before are taken further.
+/// One round of the search, in which the best `survivors` of the round before are refined.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Round {
-    /// How many designs take part (of the first round: all starts).
+    /// Number of designs that take part (in the first round, all starts).
     pub survivors: usize,
-    /// Samples per period the limits are kept on and the information is summed over.
+    /// Samples per period on which the limits are enforced and the information is summed.
     pub samples: usize,
-    /// What each of them goes through.
+    /// The stages that each of them goes through.
     pub stages: Vec<Stage>,
 }
 
-/// How far a search is.
+/// Progress of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
     /// Round, from 1.
     pub round: usize,
-    /// Designs of this round finished.
+    /// Number of designs of this round that are finished.
     pub done: usize,
-    /// Designs of this round.
+    /// Number of designs in this round.
     pub of: usize,
     /// Best value of the criterion so far in this round (not smoothed).
     pub best: f64,
 }
 
-/// A design that came out of a search, best first.
+/// A design found by a search.
 #[derive(Debug, Clone)]
 pub struct Candidate {
     /// Number of the start it came from.
@@ -66,26 +66,26 @@ pub struct Candidate {
     pub value: f64,
 }
 
-/// What a search found.
+/// Result of a search.
 #[derive(Debug, Clone)]
 pub struct Found {
     /// Survivors, best first.
     pub candidates: Vec<Candidate>,
-    /// Starts that were looked at before time was over.
+    /// Number of starts tried before time ran out.
     pub tried_starts: usize,
-    /// Starts for which a feasible motion was found.
+    /// Number of starts that led to a feasible motion.
     pub feasible_starts: usize,
-    /// Points evaluated.
+    /// Number of points evaluated.
     pub evaluations: usize,
-    /// Whether it was cut short by the deadline or the stop signal: then the result depends on how
-    /// fast the machine is, otherwise only on the seed.
+    /// Whether the search was cut short by the deadline or the stop signal: then the result depends on the speed of the
+    /// machine, otherwise only on the seed.
     pub cut_short: bool,
 }
 
 /// Runs the rounds. `problem_at(samples)` is the problem on a grid of `samples` times.
 ///
-/// Every start is a function of (seed, start) alone, every descent is sequential, and survivors are
-/// chosen by value with ties by number, so the result does not depend on the number of threads.
+/// Every start is a function of (seed, start) alone, every descent is sequential, and survivors are chosen by value,
+/// with ties broken by the number of the start. The result therefore does not depend on the number of threads.
 pub fn search(
     arm: &Arm,
     problem_at: impl Fn(usize) -> Problem,
@@ -110,8 +110,7 @@ pub fn search(
         let reached = std::sync::Mutex::new((0, f64::INFINITY));
         let of = entrants.len();
         let advance = |ws: &mut ProblemWorkspace, start: usize, x: Option<DVector<f64>>| {
-            // Even when time is over, the first entrants get their look at the grid, so that
-            // there is something feasible to return.
+            // The first start is tried even if time is over, so that there may be something feasible to return.
             if effort.over() && index == 0 && start > 0 {
                 return None;
             }
@@ -130,7 +129,7 @@ pub fn search(
             let interrupted = ending == Ending::Interrupted;
             Some((Candidate { start, x, value }, evaluations, interrupted))
         };
-        // By all entrants, those too that become no motion.
+        // Reported for every entrant, including those without a feasible motion.
         let report = |result: &Option<(Candidate, usize, bool)>| {
             let value = result.as_ref().map_or(f64::INFINITY, |(candidate, ..)| candidate.value);
             if let Ok(mut reached) = reached.lock() {
@@ -172,8 +171,8 @@ pub fn search(
     Found { candidates, tried_starts, feasible_starts, evaluations, cut_short }
 }
 
-/// `x` if it is strictly feasible in `problem`, or the largest of a few smaller motions about the
-/// same offsets that is.
+/// Returns `x` if it is strictly feasible in `problem`, or the largest of a series of smaller motions about the same
+/// offsets that is.
 fn inside(
     problem: &Problem,
     ws: &mut ProblemWorkspace,
@@ -191,11 +190,11 @@ fn inside(
     None
 }
 
-/// Poses tried for the offsets of one start.
+/// Number of poses tried for the offsets of one start.
 const POSES: usize = 200;
 
-/// A random feasible motion: a pose that keeps its distance, and random coefficients shrunk until
-/// the motion stays inside.
+/// Creates a random feasible motion: a pose that keeps its distances, and random coefficients scaled down until the
+/// motion stays inside the limits.
 fn random_start(
     arm: &Arm,
     problem: &Problem,
@@ -213,7 +212,7 @@ fn random_start(
         for (j, joint) in arm.joints.iter().enumerate() {
             let limits = &joint.limits;
             let [low, high] = limits.position_rad;
-            // Half a turn either way covers every pose; more of the range only shifts it.
+            // Half a turn either way covers every pose; a wider range only repeats them.
             let reach = (0.5 * (high - low)).min(std::f64::consts::PI);
             let centre = 0.5 * (high + low);
             series.q0_rad[j] = centre + reach * rng.random_range(-1.0..1.0);
@@ -226,7 +225,7 @@ fn random_start(
         }
         let x = DVector::from_vec(space.project(&series));
         let mut factor = 1.0;
-        // Below a tenth of its size a motion is hardly a start: another pose is better.
+        // A motion below a tenth of its size is a poor start: another pose is better.
         while factor > 0.1 {
             let candidate = DVector::from_vec(space.scaled(x.as_slice(), factor));
             if problem.point(ws, candidate.clone(), stage.mu, stage.sharpness).is_some() {

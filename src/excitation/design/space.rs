@@ -1,4 +1,4 @@
-//! The variables of a design, the paper's (26), and the motion they stand for.
+//! The variables of a design, the paper's (26), and the motion that they describe.
 
 use std::f64::consts::TAU;
 
@@ -13,21 +13,21 @@ use crate::excitation::FourierSeries;
 pub struct Variables {
     /// Order L of the series.
     pub order: usize,
-    /// Period 2π/ω, s: the fixed value, or where the search starts.
+    /// Period 2π/ω, s: the fixed value, or the starting value of the search.
     pub period_s: f64,
-    /// Shortest and longest period, s, if it is free; one frequency is common to all joints, since
-    /// only then the motion is periodic.
+    /// Shortest and longest period, s, if it is free. All joints share one frequency, since the motion is periodic only
+    /// then.
     pub period_range_s: Option<[f64; 2]>,
-    /// Offsets q_j0 (rad) that are fixed, joint by joint; `None`: free.
+    /// Offsets q_j0 (rad) that are fixed, joint by joint; `None` for free ones.
     pub fixed_offsets_rad: Vec<Option<f64>>,
-    /// Whether the motion passes through rest: q̇(0) = q̈(0) = 0, that is Σ a_l = 0 and Σ l b_l = 0.
+    /// Whether the motion passes through rest: q̇(0) = q̈(0) = 0, i.e. Σ a_l = 0 and Σ l b_l = 0.
     pub rest_start: bool,
 }
 
 /// The map from the vector x of free variables to the motion at N equidistant times of one period.
 ///
-/// Per joint x holds the offset (where free) and the coefficients c = Z y: Z is the identity, or an
-/// orthonormal basis of the series that pass through rest. With τ = ω t,
+/// For every joint x holds the offset (if free) and the coefficients y of c = Z y: Z is the identity, or an orthonormal
+/// basis of the series that pass through rest. With τ = ω t,
 ///
 /// ```text
 /// q = q₀ + (1/ω) S_q c,   q̇ = S_v c,   q̈ = ω S_a c
@@ -94,17 +94,17 @@ impl DesignSpace {
         self.count
     }
 
-    /// Number N of times.
+    /// Number N of sampling times.
     pub fn samples(&self) -> usize {
         self.samples
     }
 
-    /// What is free.
+    /// The free variables.
     pub fn variables(&self) -> &Variables {
         &self.variables
     }
 
-    /// Longest period x may have, s: what the distance between samples is judged by.
+    /// Longest period that x may have, s, which determines the distance between samples.
     pub fn longest_period_s(&self) -> f64 {
         self.variables.period_range_s.map_or(self.variables.period_s, |[_, longest]| longest)
     }
@@ -136,7 +136,7 @@ impl DesignSpace {
         &x[at..at + self.null_space.ncols()]
     }
 
-    /// The series x stands for.
+    /// The series described by x.
     pub fn series(&self, x: &[f64]) -> FourierSeries {
         let order = self.variables.order;
         let rows: Vec<DVector<f64>> = (0..self.joints())
@@ -150,8 +150,7 @@ impl DesignSpace {
         }
     }
 
-    /// The x of this space nearest to `series`: exact if the series lies in the space, otherwise
-    /// projected onto it.
+    /// The x of this space closest to `series`: exact if the series lies in the space, otherwise a projection onto it.
     pub fn project(&self, series: &FourierSeries) -> Vec<f64> {
         let order = self.variables.order;
         let mut x = vec![0.0; self.count];
@@ -177,7 +176,7 @@ impl DesignSpace {
         x
     }
 
-    /// x with every coefficient multiplied by `factor`: the same motion, smaller, about its offsets.
+    /// x with every coefficient multiplied by `factor`: the same motion about its offsets, scaled in size.
     pub fn scaled(&self, x: &[f64], factor: f64) -> Vec<f64> {
         let mut out = x.to_vec();
         for &at in &self.coefficients_at {
@@ -203,8 +202,8 @@ impl DesignSpace {
         }
     }
 
-    /// The derivatives of joint `joint`'s q, q̇, q̈ (N × n_j each) by the variables it depends on, and
-    /// the places of those in x. `motion` is that of `x`.
+    /// The derivatives of q, q̇, q̈ of joint `joint` (N × n_j each) by the variables on which it depends, and the
+    /// positions of these variables in x. `motion` is that of `x`.
     pub fn basis(
         &self,
         x: &[f64],
@@ -230,7 +229,7 @@ impl DesignSpace {
             out[0].column_mut(0).fill(1.0);
         }
         if self.log_period_at().is_some() {
-            // At fixed phase q − q₀ grows with T and q̈ falls with it.
+            // At a fixed phase, q − q₀ is proportional to T and q̈ to 1/T.
             let last = places.len() - 1;
             let offset = self.offset_rad(x, joint);
             for k in 0..self.samples {
@@ -241,7 +240,7 @@ impl DesignSpace {
         (out, places)
     }
 
-    /// Adds to `gradient` (by x) what `bar` (derivatives by q, q̇, q̈ at every sample) amounts to.
+    /// Adds to `gradient` (by x) the contribution of `bar` (derivatives by q, q̇, q̈ at every sample).
     pub fn pull_back(&self, x: &[f64], motion: &Motion, bar: &Motion, gradient: &mut [f64]) {
         let omega = TAU / self.period_s(x);
         let m = self.null_space.ncols();

@@ -1,4 +1,4 @@
-//! What a design is asked for, checked before anything runs.
+//! The specification of a design, checked before anything runs.
 
 use faer::Mat;
 
@@ -9,39 +9,39 @@ use super::space::Variables;
 use crate::excitation::{ClearanceModel, FourierSeries, Requirements, check};
 use crate::robot::Arm;
 
-/// What a design is asked for.
+/// Specification of a design.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Specification {
-    /// What is minimised.
+    /// The criterion that is minimised.
     pub criterion: Criterion,
-    /// Over which variables.
+    /// The variables over which it is minimised.
     pub variables: Variables,
-    /// Inside which limits, beyond those of the arm.
+    /// Requirements beyond the limits of the arm.
     pub requirements: Requirements,
-    /// For which experiment.
+    /// The experiment that the design is for.
     pub experiment: Experiment,
-    /// What is known already of the base parameters: the inverse of their covariance, in the order of the base set, with
-    /// rows and columns of zeros for those that are not known.
+    /// Prior information on the base parameters: the inverse of their covariance, in the order of the base set, with
+    /// rows and columns of zeros for unknown parameters.
     pub prior: Option<Mat<f64>>,
     /// Number of random starts.
     pub starts: usize,
-    /// How many of them are taken to the end.
+    /// Number of starts that are refined to the end.
     pub finalists: usize,
     /// Seed of the starts.
     pub seed: u64,
 }
 
-/// More of a period are no use: 1000 s at 1 kHz.
+/// Largest number of samples of a period; more would be of no use: this is 1000 s at 1 kHz.
 const MOST_SAMPLES: f64 = 1e6;
-/// More harmonics are no use: of six joints these are 1200 variables.
+/// Largest order; higher ones would be of no use: with six joints this is 1200 variables.
 const HIGHEST_ORDER: usize = 100;
-/// More starts are no use: these take hours.
+/// Largest number of starts; this many take hours.
 const MOST_STARTS: usize = 100_000;
-/// The whole motion is checked against the limits: a day of it takes minutes.
+/// Longest data, s: the whole motion is checked against the limits, which takes minutes for a day.
 const LONGEST_S: f64 = 86_400.0;
 
 impl Specification {
-    /// Whether this can be asked of `arm`.
+    /// Checks that the specification can be met by `arm`.
     pub fn check(&self, arm: &Arm) -> Result<(), DesignError> {
         let v = &self.variables;
         positive("the period", v.period_s)?;
@@ -78,7 +78,7 @@ impl Specification {
         }
         let shortest_s = v.period_range_s.map_or(v.period_s, |[low, _]| low);
         let rate_hz = self.experiment.rate_hz;
-        // Of the harmonic at half the rate samples show no sine.
+        // At half the sampling rate the samples show no sine component, so the order must stay below that harmonic.
         let seen = ((0.5 * rate_hz * shortest_s - 1e-9).ceil() as usize).saturating_sub(1);
         let why = format!(": {rate_hz} Hz show no higher harmonics of {shortest_s} s");
         at_most("the order", v.order, seen, &why)?;
@@ -120,7 +120,7 @@ impl Specification {
         self.check_fixed_pose(arm)
     }
 
-    /// With every offset fixed, the motion goes through the neighbourhood of that pose: if the arm
+    /// Checks the pose given by the offsets if all of them are fixed: the motion passes near that pose, so if the arm
     /// may not stand there, no amplitude is small enough.
     fn check_fixed_pose(&self, arm: &Arm) -> Result<(), DesignError> {
         let fixed: Option<Vec<f64>> = self.variables.fixed_offsets_rad.iter().copied().collect();
@@ -193,7 +193,7 @@ mod tests {
         spec.check(&arm).err().map(|error| error.to_string())
     }
 
-    /// Half of 125 Hz is the 25th harmonic of 0.4 s, and the shortest period counts.
+    /// Half of 125 Hz is the 25th harmonic of a period of 0.4 s, and the shortest period decides.
     #[test]
     fn harmonics_that_no_sample_shows_are_refused() {
         let of = |order: usize, period_s: f64, period_range_s: Option<[f64; 2]>| {
