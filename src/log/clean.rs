@@ -100,9 +100,6 @@ fn angle_tolerance_rad(step_s: f64) -> f64 {
 /// A time that is not after the one before it is set aside. The exception is a run of up to [`AHEAD_ROWS`] preceding
 /// rows that are far ahead of the rows on both sides, provided that at least as many rows continue normally after it;
 /// then the run is set aside instead.
-///
-/// A time not after the one before it is set aside, unless the one before, or up to [`AHEAD_ROWS`] of them, are far
-/// ahead of the rows on both sides, and as many rows go on behind; then these are.
 pub(super) fn order_of_time(time_s: &[f64]) -> Vec<Option<Reason>> {
     let mut verdicts = vec![None; time_s.len()];
     let far = FAR_AHEAD_STEPS * median_step(time_s).unwrap_or(0.0);
@@ -146,10 +143,6 @@ struct Stretch {
 ///
 /// Rows are linked into stretches: each row is appended to the stretch whose last row it follows best. A log is one
 /// motion, so a stretch that is short compared with the longest, or interleaved with a longer one, is garbage (rows of
-/// uninitialised memory, shifted fields, zeros).
-///
-/// Rows are strung into stretches, each row onto the one whose last row it follows best. A log is one
-/// motion: what is short beside a longer stretch, or interleaved with one, is garbage (rows of
 /// uninitialised memory, shifted fields, zeros).
 pub(super) fn consistency(motion: &Motion) -> Vec<Option<Reason>> {
     let mut verdicts = vec![None; motion.rows()];

@@ -5,9 +5,9 @@
 //!
 //! G(f) = |H(f)|² = 1 / (1 + (Ω/Ω_c)^{2n}),
 //!
-//! which is down by **6** dB, not 3, at the single-pass cutoff. G = 1/√2 at the frequency f₃ needs
+//! which is down by **6** dB, not 3, at the single-pass cut-off. G = 1/√2 at the frequency f₃ needs
 //! Ω_c = tan(πf₃/f_s) · (√2 − 1)^{−1/2n}; without that the −3 dB point of an order-4 filter sits
-//! at 0.90 of the cutoff, of order 2 at 0.80. Design: S. Butterworth, "On the theory of filter
+//! at 0.90 of the cut-off, of order 2 at 0.80. Design: S. Butterworth, "On the theory of filter
 //! amplifiers" (1930), mapped by the bilinear transform.
 
 use std::f64::consts::{PI, SQRT_2};

@@ -17,7 +17,7 @@ pub enum SignalError {
         rate_hz / 2.0
     )]
     Cutoff {
-        /// The cutoff, Hz.
+        /// The cut-off, Hz.
         cutoff_hz: f64,
         /// The sampling rate, Hz.
         rate_hz: f64,

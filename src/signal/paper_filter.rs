@@ -74,7 +74,7 @@ impl PaperDifferentiator {
 mod tests {
     use super::*;
 
-    /// A sine well below the cutoff, away from the ends: the literal reading of the velocity is
+    /// A sine well below the cut-off, away from the ends: the literal reading of the velocity is
     /// minus its second derivative, of the angle minus the acceleration; the intended one is q̈.
     #[test]
     fn taken_literally_the_paper_filter_turns_the_sign_and_differentiates_twice() {
@@ -95,7 +95,7 @@ mod tests {
         };
         let attenuation = 1.0 / (1.0 + (f / cutoff).powi(2));
         // Tolerance: the bilinear frequency departs by (πf/f_s)²/3 = 8e-6 at f and 1.3e-3 at the
-        // cutoff, which is prewarped; what is left in the ratio is (f/f_c)² × 2.6e-3 = 2e-5.
+        // cut-off, which is prewarped; what is left in the ratio is (f/f_c)² × 2.6e-3 = 2e-5.
         let matches = |y: &[f64], truth: &[f64], factor: f64| {
             let size = truth.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
             (1000..4000).all(|k| (y[k] - factor * truth[k]).abs() < 5e-5 * size)
