@@ -21,7 +21,7 @@ use crate::robot::JointSignals;
 const STRETCH_S: f64 = 8.0;
 /// Smallest number of stretches, counted without overlap.
 const STRETCHES: usize = 4;
-/// Length of the mirror image at each end, s.
+/// Smallest length of the mirror image at each end, s (less only for records shorter than this).
 const MIRROR_S: f64 = 4.0;
 /// Noise power is taken to be at least this fraction of its maximum: where a sensor's own low-pass leaves almost no
 /// noise, the estimate cannot be trusted.
