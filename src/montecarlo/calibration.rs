@@ -1,4 +1,4 @@
-//! Is the σ true? The verdict over a tally.
+//! Verdict over a tally: is the claimed σ true?
 
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
@@ -7,17 +7,17 @@ use super::share::Share;
 pub use super::statistic::Statistic;
 use super::tally::Tally;
 
-/// Chance that all checks together fail an identifier that is exactly at its claim.
+/// Probability that any check fails although the identifier is exactly as good as claimed.
 pub const FALSE_FAILURE_RATE: f64 = 1e-3;
 
-/// What is claimed, as intervals that the true value of a statistic must lie in.
+/// The claims: for each statistic the interval in which its true value must lie.
 pub mod claims {
     /// Coverage of nominal 95 % intervals, mean over the parameters.
     pub const MEAN_COVERAGE: [f64; 2] = [0.935, 0.965];
-    /// The same for a log that does not repeat, where only the residuals show the noise.
+    /// The same for a log whose motion does not repeat: there the noise can be estimated from the residuals only.
     pub const MEAN_COVERAGE_OF_A_SINGLE_RUN: [f64; 2] = [0.92, 0.965];
 
-    /// What is claimed of the mean coverage of logs that are single runs, or that repeat.
+    /// Claimed mean coverage, for logs that are single runs or for logs that repeat their motion.
     pub fn mean_coverage(single_run: bool) -> [f64; 2] {
         if single_run { MEAN_COVERAGE_OF_A_SINGLE_RUN } else { MEAN_COVERAGE }
     }
@@ -28,23 +28,24 @@ pub mod claims {
     pub const BIAS: [f64; 2] = [-0.2, 0.2];
     /// Empirical over predicted σ, pooled over the parameters.
     pub const POOLED_RATIO: [f64; 2] = [0.95, 1.05];
-    /// Error of all parameters together in units of their predicted covariance: the same of all their combinations.
+    /// Error of all parameters jointly in units of their predicted covariance: the same claim as [`POOLED_RATIO`],
+    /// for all linear combinations of the parameters.
     pub const JOINT_RATIO: [f64; 2] = [0.95, 1.05];
     /// Empirical over predicted σ of each parameter.
     pub const EACH_RATIO: [f64; 2] = [0.85, 1.15];
-    /// Most that the empirical σ may be of the least possible one, rms over the parameters.
+    /// Largest ratio of the empirical σ to the Cramér–Rao bound, rms over the parameters.
     pub const EFFICIENCY: f64 = 1.15;
 }
 
-/// Answer of one check, or of all.
+/// Result of one check, or of all checks together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// The claim holds as far as these trials can tell.
+    /// The trials do not contradict the claim, and there are enough of them to tell.
     Pass,
     /// The claim is wrong beyond what chance explains.
     Fail,
-    /// Too few trials: chance alone could hide or fake a violation.
+    /// There are too few trials: chance alone could hide or fake a violation.
     NotEvaluated,
 }
 
@@ -58,35 +59,35 @@ impl std::fmt::Display for Verdict {
     }
 }
 
-/// Why [`Statistic::JointRatio`] cannot be checked where no trial tells it.
+/// Why [`Statistic::JointRatio`] cannot be checked if fewer than two trials have a distance.
 const NO_DISTANCE: &str = "the covariance is known with four degrees of freedom or fewer, with which the squared error has no \
                            mean that trials could find";
 
-/// One check: a statistic, what chance leaves open about it, and the claim.
+/// One check: a statistic, its confidence interval, and the claim.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Check {
-    /// What is checked.
+    /// The statistic that is checked.
     pub statistic: Statistic,
-    /// Parameter that decided (the worst), `None` for statistics over all.
+    /// The worst parameter, which decided the check; `None` for statistics over all parameters.
     pub parameter: Option<usize>,
     /// Measured value.
     pub value: f64,
-    /// Where the true value lies at the check's confidence.
+    /// Confidence interval of the true value, at the confidence of the check.
     pub interval: [f64; 2],
-    /// Where the claim says that it lies.
+    /// Interval in which the true value lies according to the claim.
     pub claim: [f64; 2],
-    /// The answer.
+    /// The verdict.
     pub verdict: Verdict,
-    /// Why nothing was measured, where more trials would not help.
+    /// Why the statistic could not be measured; set only if more trials would not help.
     pub reason: Option<&'static str>,
 }
 
 /// All checks of one experiment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
-    /// One per claim.
+    /// One check per claim.
     pub checks: Vec<Check>,
-    /// Fail if any fails; not evaluated if any could not be; else pass.
+    /// `Fail` if any check fails; otherwise `NotEvaluated` if any check could not be evaluated; otherwise `Pass`.
     pub verdict: Verdict,
 }
 
@@ -94,18 +95,20 @@ pub struct Calibration {
 const CHECKS: f64 = 6.0;
 
 impl Calibration {
-    /// Checks every claim against `tally`; that about the mean coverage depends on whether logs repeat their motion.
+    /// Checks every claim against `tally`. `mean_coverage` is the claim about the mean coverage, which depends on
+    /// whether the logs repeat their motion.
     ///
-    /// Each statistic gets an interval at confidence 1 − α/(number of claims × number of
-    /// statistics in the claim) (Bonferroni), from the binomial, Student's or χ² distribution at the
-    /// tally's number of trials: those of a handful are as wide as they have to be. A claim **fails** when an interval lies wholly outside it, is
-    /// **not evaluated** when an interval is wider than the claim, and passes otherwise. A trial
-    /// that failed counts as an interval that misses the truth.
+    /// Each statistic gets an interval at confidence 1 − α/(number of claims × number of statistics in the claim)
+    /// (Bonferroni), from the binomial, Student's or χ² distribution for the tally's number of trials, so that the
+    /// intervals of a handful of trials are as wide as they have to be. A claim **fails** when an interval lies wholly
+    /// outside it, is **not evaluated** when an interval is wider than the claim, and passes otherwise. A failed trial
+    /// counts as an interval that misses the truth.
     pub fn of(tally: &Tally, mean_coverage: [f64; 2]) -> Self {
         let b = tally.parameters();
         let (n, all) = (tally.succeeded as f64, tally.trials() as f64);
         if tally.succeeded < 2 || b == 0 {
-            // A failed trial is an interval that misses: of so many that have nothing else, five of a hundred were allowed.
+            // A failed trial counts as a 95 % interval that misses, which has a probability of 5 %. The claim fails if
+            // so many misses in a row are too improbable.
             let failed = 0.05_f64.powf(tally.failures.len() as f64) < FALSE_FAILURE_RATE;
             let verdict = if failed { Verdict::Fail } else { Verdict::NotEvaluated };
             return Self { checks: Vec::new(), verdict };
@@ -115,14 +118,14 @@ impl Calibration {
         let each = single / b as f64;
         let [t_single, t_each] = [single, each].map(|alpha| student_quantile(alpha, n - 1.0));
         let (mean, error) = tally.mean_coverage();
-        // A handful of trials may show no scatter at all; the binomial error of one parameter, over
-        // √b for independent ones, is the least there can be.
+        // A handful of trials may show no scatter at all. The standard error is therefore at least the smallest
+        // one possible, that of independent parameters: the binomial error of one parameter over √b.
         let least = (0.95 * 0.05 / (all * b as f64)).sqrt();
         let half = student_quantile(single, all - 1.0) * error.max(least);
         let ratios: Vec<f64> =
             statistics.iter().map(|s| s.sigma_empirical / s.sigma_predicted).collect();
         let (pooled, pooled_error) = tally.pooled_ratio();
-        // Again no less than for independent parameters: σ of s/σ is 1/√(2n) each.
+        // Again at least the standard error for independent parameters: s/σ of one parameter has a σ of 1/√(2n).
         let least = (0.5 / (n * b as f64)).sqrt();
         let around = |ratio: f64, error: f64| {
             let half = t_single * error.max(least);
@@ -188,7 +191,8 @@ impl Calibration {
 }
 
 impl Check {
-    /// The statistic furthest out decides.
+    /// The check of the worst of the `statistics`: a failed one before one that is not evaluated, and among equals the
+    /// one whose value is farthest from the middle of the claim.
     fn new(
         statistic: Statistic,
         claim: [f64; 2],
@@ -242,12 +246,12 @@ fn student_quantile(alpha: f64, degrees_of_freedom: f64) -> f64 {
         .map_or(f64::INFINITY, |t| -t.inverse_cdf(0.5 * alpha))
 }
 
-/// Wilson's interval for a binomial share (E. B. Wilson 1927).
+/// Wilson's confidence interval for a binomial proportion (E. B. Wilson 1927).
 pub fn wilson(share: f64, trials: f64, z: f64) -> [f64; 2] {
     let z2 = z * z / trials;
     let centre = (share + 0.5 * z2) / (1.0 + z2);
     let half = z / (1.0 + z2) * (share * (1.0 - share) / trials + 0.25 * z2 / trials).sqrt();
-    // Rounding must not carry the bounds of a share of 0 or 1 beyond it.
+    // Round-off must not push the bounds below 0 or above 1 for a share of 0 or 1.
     [(centre - half).max(0.0), (centre + half).min(1.0)]
 }
 
@@ -259,7 +263,7 @@ mod tests {
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
 
-    /// Trials of 20 independent parameters whose true σ is `true_sigma` where 1 is claimed.
+    /// Trials of 20 independent parameters whose true σ is `true_sigma`, while the claimed σ is 1.
     fn experiment(trials: usize, true_sigma: f64, bias: f64) -> Verdict {
         seeded(11, trials, true_sigma, bias)
     }
@@ -307,8 +311,8 @@ mod tests {
         assert_eq!(experiment(20, 1.0, 0.0), Verdict::NotEvaluated);
     }
 
-    /// Nor may they fail what is true more often than once in a thousand runs: of 500 half a run does, and more than four do
-    /// with a chance of 2e-4.
+    /// A handful of trials may not fail a true claim more often than once in a thousand runs. Of 500 runs 0.5 are
+    /// expected to fail; more than four fail with a probability of 2e-4.
     #[test]
     fn a_handful_of_trials_does_not_fail_what_is_true() {
         for trials in [2, 3, 5] {
@@ -332,7 +336,7 @@ mod tests {
         assert_eq!(Calibration::of(&tally, claims::MEAN_COVERAGE).verdict, Verdict::Fail);
     }
 
-    /// Trials of which all hold all of 20 truths but for `failed` of 1000 that gave nothing.
+    /// 1000 trials, of which `failed` failed; the intervals of all others hold the true values of all 20 parameters.
     fn all_held(failed: u64, distance: Option<f64>) -> Tally {
         let mut tally = Tally::new(20);
         for trial in 0..1000 {
@@ -352,8 +356,8 @@ mod tests {
         checks.into_iter().find(|check| check.statistic == statistic).unwrap()
     }
 
-    /// 50 of 1000 trials gave nothing: coverage is 95 % with the standard error √(0.95·0.05/999) of so many coins, whatever the
-    /// number of parameters that a failed trial takes with it.
+    /// 50 of 1000 trials failed. Coverage is then 95 %, with the standard error √(0.95·0.05/999) of 1000 coin tosses,
+    /// regardless of how many parameters each failed trial takes with it.
     #[test]
     fn failed_trials_scatter_the_coverage() {
         let check = check_of(&all_held(50, None), Statistic::MeanCoverage, claims::MEAN_COVERAGE);
@@ -364,7 +368,7 @@ mod tests {
         assert!(off.iter().all(|off| off.abs() < 1e-12), "{:?} {half}", check.interval);
     }
 
-    /// 7 % of the intervals miss: too many where periods repeat, and what is claimed of single runs.
+    /// 7 % of the intervals miss: too many for logs that repeat, but within the claim for single runs.
     #[test]
     fn less_is_claimed_of_single_runs() {
         let mut tally = Tally::new(20);
@@ -378,7 +382,7 @@ mod tests {
         assert_eq!(of(claims::MEAN_COVERAGE_OF_A_SINGLE_RUN), Verdict::Pass);
     }
 
-    /// A claim that no trial tells anything of is not one that holds.
+    /// A claim does not pass if no trial provides evidence about it.
     #[test]
     fn what_is_not_measured_is_not_evaluated() {
         let of = |distance| {

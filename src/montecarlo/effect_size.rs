@@ -1,4 +1,4 @@
-//! How much of a hidden effect a log can show.
+//! Effect size: how much of a hidden effect a log can show.
 
 use nalgebra::DMatrix;
 use serde::Serialize;
@@ -11,22 +11,23 @@ use crate::identify::{Assembler, ColumnPlan, Problem, Spectrum, Triangle};
 use crate::plant::{PlantError, Recording, Whitening};
 use crate::signal::FineClock;
 
-/// Size of what is hidden in a scenario, in units of the noise of one log.
+/// Size of the effects hidden in a scenario, in units of the noise of one log.
 ///
-/// With d the noise-free torque minus that of the null model's truth along the same log (its angles, its velocities
-/// and their derivative, all samples of the whole periods), less the same of the arm without effects (what sampling
-/// does to friction that reverses), W the whitening of the noise of the equations (that of the torque readings, and
-/// that of the encoders times the inertia: above some 10 Hz it is the larger one), and Q an orthonormal basis of the
-/// whitened regressor W X of the null model:
+/// d is the torque that the effects add along the log. The noise-free torque minus the torque of the null model with
+/// its true parameters (from the log's angles, velocities and the derivative of the velocities, at all samples of the
+/// whole periods) gives a difference; d is this difference minus the same difference for the arm without effects,
+/// which holds the errors that sampling makes where friction reverses. W whitens the noise of the equations: that of
+/// the torque readings, and that of the encoders times the inertia, which is the larger one above some 10 Hz. Q is an
+/// orthonormal basis of the whitened regressor W X of the null model. Then:
 ///
 /// ```text
 /// λ     = ‖(1 − Q Qᵀ) W d‖²    what no parameters of the null model can explain
 /// λ_sim = ‖Q Qᵀ W d‖²          what moves its parameters: Δpᵀ V⁻¹ Δp with V⁻¹ = Xᵀ WᵀW X
 /// ```
 ///
-/// λ is the noncentrality of the best test that could be made of the residuals, λ_sim that of the best
-/// test against a given simulation. Readings that go wrong one by one (outliers, lost rows, coarse steps) are not
-/// counted, and a clock that stalls has no size of this kind.
+/// λ is the noncentrality of the most powerful test on the residuals, λ_sim that of the most powerful test against a
+/// given simulation. Effects on single readings (outliers, lost rows, coarse steps) are not counted, and no size of
+/// this kind is defined for a clock that stalls.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct EffectSize {
     /// λ.
@@ -35,22 +36,22 @@ pub struct EffectSize {
     pub lambda_sim: f64,
 }
 
-/// Rows eliminated together.
+/// Number of harmonic rows that are eliminated in one block.
 const BLOCK: usize = 128;
 
 impl Simulation {
     /// λ and λ_sim of all effects of the scenario together.
     ///
     /// # Errors
-    /// [`PlantError::Setting`] where a joint's torque is read without noise: nothing is then too small
-    /// to be seen.
+    /// [`PlantError::Setting`] where a joint's torque is read without noise: every effect, however small, would then
+    /// be visible.
     pub fn effect_size(&self) -> Result<EffectSize, PlantError> {
         let clean = Scenario { effects: Vec::new(), ..self.scenario.clone() };
         self.size_beside(&Self::run(clean)?.recording)
     }
 
-    /// λ and λ_sim of all effects, `clean` being the run of the arm without them along the same motion, or one that
-    /// goes on longer.
+    /// λ and λ_sim of all effects of the scenario together. `clean` is the run of the arm without effects along the
+    /// same motion; it may be longer.
     ///
     /// # Errors
     /// See [`Self::effect_size`].
@@ -76,7 +77,7 @@ impl Simulation {
         Ok(size(problem, &whitening, &whitening_at))
     }
 
-    /// The whole periods of `recording`.
+    /// The equations of motion of the whole periods of `recording`.
     fn equations(&self, model: &Model, recording: &Recording) -> Problem {
         let Scenario { excitation, plant, set, .. } = &self.scenario;
         let [begin_s, end_s] = excitation.periodic_window_s();
@@ -97,8 +98,8 @@ impl Simulation {
     }
 }
 
-/// λ and λ_sim of d, which stands in place of the torque in `problem`; `beside_torque` whitens at every frequency
-/// what `torque` has made white but for the noise of the motion.
+/// λ and λ_sim of d, which `problem` holds in place of the torque. `torque` whitens the noise of the torque readings;
+/// `beside_torque` then whitens, at each frequency, the sum of that white noise and the noise of the motion.
 fn size(
     mut problem: Problem,
     torque: &Whitening,

@@ -1,4 +1,4 @@
-//! How far the estimates are from the best that there can be.
+//! Efficiency: how close the estimates come to the best possible ones.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,22 +6,22 @@ use super::experiment::{Experiment, TrialError};
 use super::simulation::Simulation;
 use crate::identify::{Identifier, KnownNoise, Measurement, Options, cramer_rao};
 
-/// Noise of less than this share of its largest power has been filtered out: no sensor is that quiet.
+/// Noise whose power falls below this share of its largest power has been filtered out: no sensor is that quiet.
 const FILTERED_OUT: f64 = 1e-9;
 
 /// Empirical σ over the Cramér–Rao bound.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Efficiency {
-    /// Root mean square over the parameters; 1 cannot be beaten without bias.
+    /// Root mean square over the parameters; no unbiased estimator gets below 1.
     pub rms: f64,
-    /// Largest of any parameter.
+    /// Largest ratio of any parameter.
     pub worst: f64,
-    /// Its name.
+    /// Name of that parameter.
     pub worst_of: String,
 }
 
 impl Efficiency {
-    /// Of the empirical `sigma` over the least possible `bound`, for parameters called `name(k)`.
+    /// Compares the empirical `sigma` with the Cramér–Rao `bound`; parameter k is called `name(k)`.
     pub fn of(sigma: &[f64], bound: &[f64], name: impl Fn(usize) -> String) -> Self {
         let ratios: Vec<f64> = sigma.iter().zip(bound).map(|(s, b)| s / b).collect();
         let worst = (0..ratios.len()).max_by(|a, b| ratios[*a].total_cmp(&ratios[*b])).unwrap_or(0);
@@ -35,11 +35,12 @@ impl Efficiency {
 }
 
 impl Experiment {
-    /// The least σ of every parameter that an unbiased estimator can have: the Cramér–Rao bound of the
-    /// whole periods of the noise-free motion, known exactly, under the scenario's torque noise at all
-    /// frequencies that the processing keeps. `None` where that noise has no known law (rounded readings) or
-    /// is filtered out of some frequencies (what is said there would be known without error), where the motion
-    /// does not repeat, or where every trial has a motion of its own (sensors in the loop).
+    /// The smallest σ that an unbiased estimator can have for every parameter: the Cramér–Rao bound.
+    ///
+    /// The bound holds for the whole periods of the noise-free motion, which counts as exactly known, under the
+    /// scenario's torque noise at all frequencies that the processing keeps. `None` where that noise has no known law
+    /// (rounded readings), where it is filtered out of some frequencies (the torque there would count as known without
+    /// error), where the motion does not repeat, or where every trial has a motion of its own (sensors in the loop).
     pub(super) fn cramer_rao_bound(&self) -> Result<Option<Vec<f64>>, TrialError> {
         let Simulation { scenario, recording, .. } = &self.simulation;
         let Some(torque) = self.simulation.known_torque_noise() else { return Ok(None) };
@@ -60,7 +61,7 @@ impl Experiment {
         }
         let rate_hz = regression.problem.rate_hz;
         let harmonics = regression.problem.samples;
-        // Fewer samples hold, frequency by frequency, as much less of the noise's power.
+        // Resampling to a lower rate reduces the noise power per harmonic by the ratio of the rates.
         let logged_hz = scenario.plant.log_rate_hz;
         let spectrum = torque.model.spectrum(logged_hz);
         let power = |frequency_hz| spectrum(frequency_hz) * rate_hz / logged_hz;
@@ -77,8 +78,8 @@ impl Experiment {
         };
         let bound = cramer_rao(&regression.problem, &scenario.set, &noise, harmonics)
             .map_err(|e| TrialError::Identify(e.into()))?;
-        // Without noise not even the last trace of the run-in is a period like the others; the logs of the
-        // trials have them all.
+        // Without noise even the last traces of the run-in make a period differ from the others, so that fewer
+        // periods are kept here than in the logs of the trials, which keep all of them.
         let found = regression.problem.periods as f64;
         let more = (found / scenario.excitation.periods() as f64).sqrt();
         Ok(Some(bound.into_iter().map(|sigma| sigma * more).collect()))

@@ -1,4 +1,4 @@
-//! One scenario made ready, and its trials.
+//! A scenario prepared for its trials, and the trials themselves.
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -12,7 +12,7 @@ use crate::identify::covariance::{Covariance, CovarianceKind, squared_distance};
 use crate::identify::{Estimator, Identification, Identifier, IdentifyError, Options};
 use crate::plant::{Measured, PlantError};
 
-/// A scenario whose plant has run: what all trials share.
+/// A scenario whose plant has run: everything that all trials share.
 pub struct Experiment {
     /// The scenario, its run and its sensors.
     pub simulation: Simulation,
@@ -20,19 +20,19 @@ pub struct Experiment {
     pub model: Model,
     /// True base parameters.
     pub truth: Vec<f64>,
-    /// About σ of the pilot trial per parameter: the unit of the tally.
+    /// Unit of the tally for each parameter: σ of the pilot trial, rounded to a few bits.
     pub scale: Vec<f64>,
     /// The Cramér–Rao bound of every parameter; `None` where it is not known.
     pub least_sigma: Option<Vec<f64>>,
-    /// The estimator that the pilot's log calls for, and all trials' with it.
+    /// The estimator that suits the pilot's log; all trials use it.
     pub estimator: Estimator,
-    /// The covariance that the pilot's log calls for, and all trials' with it.
+    /// The kind of covariance that suits the pilot's log; all trials use it.
     pub covariance: CovarianceKind,
-    /// Whether logs are runs that do not repeat, of which less is claimed.
+    /// Whether the logs are runs that do not repeat, for which less coverage is claimed.
     pub single_run: bool,
 }
 
-/// Number of the pilot trial: its noise is its own and it is never counted.
+/// Number of the pilot trial. Its noise is that of no other trial, and it is never counted.
 const PILOT: u64 = u64::MAX;
 
 /// A trial that gave no estimate.
@@ -41,10 +41,10 @@ pub enum TrialError {
     /// The plant did not run.
     #[error("the plant: {0}")]
     Plant(#[from] PlantError),
-    /// The log was not identified.
+    /// The identification failed.
     #[error("{0}")]
     Identify(#[from] IdentifyError),
-    /// An estimate so far off that it is no estimate.
+    /// The estimate of one parameter is too far off, or its σ is too large or zero, to count as an estimate.
     #[error("{parameter}: estimate {z:.3e} pilot σ off the truth, σ {sigma:.3e} pilot σ")]
     Unsound {
         /// Name of the base parameter.
@@ -54,10 +54,10 @@ pub enum TrialError {
         /// σ̂/scale.
         sigma: f64,
     },
-    /// A combination of parameters that is said to be known without error.
+    /// The covariance is singular: it claims that some combination of parameters is known without error.
     #[error("the covariance of the base parameters is singular")]
     Singular,
-    /// All parameters together so far off that this is no estimate.
+    /// All parameters jointly are too far off to count as an estimate.
     #[error("all parameters together: squared error {squared:.3e} in units of their covariance")]
     TooFar {
         /// (θ̂ − θ)ᵀV⁻¹(θ̂ − θ).
@@ -66,7 +66,7 @@ pub enum TrialError {
 }
 
 impl Experiment {
-    /// Runs the plant once without noise, and a pilot trial that sets the scales.
+    /// Runs the plant once without noise, then a pilot trial that sets the scales, the estimator and the covariance.
     pub fn prepare(scenario: Scenario) -> Result<Self, TrialError> {
         let model = Model::new(&scenario.arm);
         let truth = scenario.set.values(&model.standard_parameters());
@@ -108,7 +108,7 @@ impl Experiment {
         }
     }
 
-    /// Estimates `theta` with their `covariance` against the truth, in units of the tally.
+    /// Compares the estimates `theta` and their `covariance` with the truth, in the units of the tally.
     pub fn outcomes(&self, theta: &[f64], covariance: &Covariance) -> Result<Outcomes, TrialError> {
         let Self { truth, scale, simulation, .. } = self;
         let (sigma, quantile_95) = (covariance.sigma(), covariance.quantile_95());
@@ -133,8 +133,8 @@ impl Experiment {
     }
 }
 
-/// `sigma` to four significant bits. Its last digits differ between kinds of processors, and the unit of exact sums must not. What is no
-/// size stays as it is, for trials to fail by.
+/// Rounds `sigma` to four significant bits. Its last digits differ between kinds of processors, but the unit of exact
+/// sums must not. Zero, NaN and infinity stay as they are, so that the trials fail.
 fn rounded(sigma: f64) -> f64 {
     if !sigma.is_normal() {
         return sigma;
@@ -158,24 +158,24 @@ impl Worker<'_> {
         Ok(self.identifier.identify(&self.measured.measurement("simulated log"))?)
     }
 
-    /// Runs trial `trial` and compares with the truth.
+    /// Runs trial `trial` and compares its estimates with the truth.
     pub fn trial(&mut self, trial: u64) -> Result<Outcomes, TrialError> {
         let identification = self.identify(trial)?;
         self.experiment.outcomes(&identification.fit.theta, &identification.covariance)
     }
 }
 
-/// What the trials of a Monte Carlo over estimates have in common.
+/// What all trials of a Monte Carlo run over estimates have in common.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Estimation {
-    /// Estimator and covariance, as they appear in the results.
+    /// Name of the estimator, as it appears in the results.
     pub estimator: String,
-    /// See `estimator`.
+    /// Name of the kind of covariance, as it appears in the results.
     pub covariance: String,
     /// See [`Experiment::single_run`].
     pub single_run: bool,
-    /// The parameters with their truth and scale.
+    /// The parameters with their true values and scales.
     pub parameters: Vec<ParameterHeader>,
 }
 
@@ -183,9 +183,9 @@ pub struct Estimation {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ParameterHeader {
-    /// Name of the kept column.
+    /// Name of the standard parameter whose column is kept.
     pub name: String,
-    /// The whole combination.
+    /// The full linear combination of standard parameters.
     pub formula: String,
     /// SI unit.
     pub unit: String,
@@ -217,12 +217,14 @@ impl Content for Estimation {
     }
 }
 
-/// Truths that differ by less than this share of a σ are one, and σ that differ by less than this share of themselves: kinds of
-/// processors differ by some 1e-14, and 10⁹ trials tell a mean to 3e-5 of a σ and a σ to 2e-5 of itself.
+/// Two true values that differ by less than this share of a σ count as equal, and so do two σ that differ by less than
+/// this share of themselves. Kinds of processors differ by some 1e-14, while 10⁹ trials determine a mean to 3e-5 of a
+/// σ and a σ to 2e-5 of itself.
 const ROUND_OFF: f64 = 1e-6;
 
 impl ParameterHeader {
-    /// In what it differs from `expected`, but for round-off. The unit of exact sums is the same or it is not.
+    /// The first part in which the header differs from `expected` by more than round-off. The scale, as the unit of
+    /// exact sums, must agree exactly.
     fn difference(&self, expected: &Self) -> Option<Difference> {
         let of = |what: &str| format!("{what} of {}", self.name);
         let in_words = |p: &Self| format!("{} in {}", p.formula, p.unit);
@@ -305,8 +307,8 @@ mod tests {
         }
     }
 
-    /// Processors with and without fused multiply-add differ by some 1e-14 of a σ: less than what is taken for a difference by
-    /// as much as any trials can tell.
+    /// Processors with and without fused multiply-add differ by some 1e-14 of a σ. The threshold lies well above that,
+    /// and well below any difference that trials could resolve.
     #[test]
     fn round_off_is_no_other_run() {
         let expected = estimation(-3.9, 0.0025, Some(0.002));
@@ -327,7 +329,8 @@ mod tests {
         }
     }
 
-    /// Between two values of four significant bits one in 10¹¹ of σ lies so close to the middle that round-off decides.
+    /// Only about one σ in 10¹¹ lies so close to the midpoint between two values of four significant bits that
+    /// round-off decides how it is rounded.
     #[test]
     fn the_unit_of_the_sums_is_free_of_round_off() {
         assert_eq!(rounded(0.0), 0.0);

@@ -1,4 +1,4 @@
-//! What was found in a log as a scenario: the arm with its effects, the log's motion and its noise.
+//! Turns the diagnosis of a log into a scenario: the arm with the effects found, the log's motion and its noise.
 
 use std::path::{Path, PathBuf};
 
@@ -16,14 +16,14 @@ use crate::plant::{PerJoint, PlantConfig, SensorConfig};
 use crate::robot::JointSignals;
 use crate::signal::replicate_noise;
 
-/// Run-in from rest where none keeps the limits of the arm, s.
+/// Run-in from rest, s, if no run-in keeps the arm within its limits.
 const RUN_IN_S: f64 = 2.0;
-/// Trials of a scenario that is made from a log.
+/// Number of trials of a scenario that is made from a log.
 const TRIALS: u64 = 100;
-/// Its seed.
+/// Seed of a scenario that is made from a log.
 const SEED: u64 = 1;
 
-/// A scenario as it stands in a file.
+/// A scenario as it is written to a file.
 #[derive(Serialize)]
 struct ScenarioText<'a> {
     name: &'a str,
@@ -47,9 +47,11 @@ struct MotionText<'a> {
 }
 
 impl Scenario {
-    /// The scenario behind `log`, diagnosed as `finding`: the arm and the effects of `simulation`, faults of
-    /// the record included, the mean motion of the log up to its cutoff as a Fourier series, and white noise
-    /// of the size that the log's periods show. `set` is what was identified.
+    /// The scenario behind `log`, whose diagnosis is `finding`.
+    ///
+    /// It consists of the arm and the effects of `simulation` (faults of the record included), the mean motion of the
+    /// log up to the cut-off as a Fourier series, and white noise of the size that the scatter between the log's
+    /// periods shows. `set` are the base parameters that were identified.
     ///
     /// # Errors
     /// [`ScenarioError::OnePeriod`] where the motion does not repeat.
@@ -69,13 +71,13 @@ impl Scenario {
         let series =
             FourierSeries::of_period(&scene.motion.q_rad, scene.rate_hz, processing.cutoff_hz)?;
         let arm = simulation.extended.arm.clone();
-        // The log does not tell how its motion was begun.
+        // The log does not say how its motion was started from rest.
         let requirements = Requirements::default();
         let run_in_s = match Excitation::fitted(&arm, &requirements, series.clone(), 1, false) {
             Err(ExcitationError::NoRunIn { .. } | ExcitationError::PeriodPasses { .. }) => RUN_IN_S,
             fitted => fitted?.run_in_s(),
         };
-        // Its periods begin with a row, as those of the log do.
+        // Round the run-in up to whole rows, so that each period begins exactly at a row, as in the log.
         let rate_hz = simulation.plant.log_rate_hz;
         let run_in_s = (run_in_s * rate_hz - 1e-6).ceil() / rate_hz;
         let excitation = Excitation::new(series, run_in_s, scene.periods)?;
@@ -116,8 +118,8 @@ impl Scenario {
         [path.to_owned(), beside("robot.toml"), beside("trajectory.json")]
     }
 
-    /// Writes the scenario to `path`, and beside it the robot file `NAME.robot.toml` and the trajectory
-    /// `NAME.trajectory.json` that it names. (A reduced set of parameters is not written.)
+    /// Writes the scenario to `path`, and next to it the two files that it refers to: the robot `NAME.robot.toml` and
+    /// the trajectory `NAME.trajectory.json`. (A reduced set of parameters is not written.)
     pub fn save(&self, path: &Path) -> Result<(), OutputError> {
         let [_, robot, trajectory] = Self::files_of(path);
         let name = |path: &Path| path.file_name().unwrap_or_default().display().to_string();
@@ -148,13 +150,13 @@ impl Scenario {
             processing: &self.processing,
             effect: &self.effects,
         };
-        // Strings, numbers and tables of them always serialise.
+        // Strings, numbers and tables of them always serialise: the default is never used.
         toml::to_string(&text).unwrap_or_default()
     }
 }
 
-/// Noise of one sample from the scatter between the periods of `signals`; zero where the log was put on
-/// another clock before it was used.
+/// Standard deviation of one sample, per joint, from the scatter between the periods of `signals`. Zero if the log was
+/// resampled to another clock before it was used.
 fn scatter(finding: &Finding, log: &Measurement, signals: &JointSignals) -> Vec<f64> {
     let processing = &finding.identification.processing;
     let (n, periods) = (finding.scene.samples(), finding.scene.periods);

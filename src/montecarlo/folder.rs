@@ -8,19 +8,19 @@ use serde::Deserialize;
 use super::shard::{Shard, ShardError, shard_range};
 use super::trials::Content;
 
-/// File of the shard that holds `range`.
+/// Path of the shard file in `folder` that holds the trials `range`.
 pub fn shard_path(folder: &Path, range: &Range<u64>) -> PathBuf {
     folder.join(format!("shard-{:012}-{:012}.json", range.start, range.end))
 }
 
-/// The trials that the shard in `file` holds, by its name.
+/// The range of trials of the shard in `file`, read from the file name.
 fn range_of(file: &Path) -> Option<Range<u64>> {
     let name = file.file_name()?.to_str()?;
     let (start, end) = name.strip_prefix("shard-")?.strip_suffix(".json")?.split_once('-')?;
     Some(start.parse().ok()?..end.parse().ok()?)
 }
 
-/// The names of all shard files in the given folders.
+/// The paths of all shard files in the given folders.
 pub fn shard_files(folders: &[PathBuf]) -> Result<Vec<PathBuf>, ShardError> {
     let mut all = Vec::new();
     for folder in folders {
@@ -33,7 +33,7 @@ pub fn shard_files(folders: &[PathBuf]) -> Result<Vec<PathBuf>, ShardError> {
     Ok(all)
 }
 
-/// The shard files of `folder`, in any order.
+/// The shard files of `folder`, in arbitrary order.
 fn files_of(folder: &Path) -> Result<Vec<PathBuf>, ShardError> {
     let read = |source| ShardError::Read { file: folder.to_owned(), source };
     let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
@@ -48,12 +48,12 @@ fn files_of(folder: &Path) -> Result<Vec<PathBuf>, ShardError> {
     Ok(files)
 }
 
-/// The shards in `files`, each with its file.
+/// Loads the shards in `files` and pairs each with its path.
 pub fn load_all<C: Content>(files: &[PathBuf]) -> Result<Vec<(PathBuf, Shard<C>)>, ShardError> {
     files.iter().map(|file| Ok((file.clone(), Shard::load(file)?))).collect()
 }
 
-/// What all kinds of shards say of themselves.
+/// The part of the header that all kinds of shards share.
 #[derive(Deserialize)]
 pub(super) struct AnyHeader {
     pub schema: String,
@@ -61,7 +61,7 @@ pub(super) struct AnyHeader {
 }
 
 impl AnyHeader {
-    /// Of the shard that is written as `text`.
+    /// Reads the header of the shard whose file contains `text`.
     pub fn within(text: &str) -> serde_json::Result<Self> {
         #[derive(Deserialize)]
         struct AnyShard {
@@ -78,13 +78,14 @@ impl AnyHeader {
     }
 }
 
-/// Format of the shard in `file`: which kind of experiment it is part of.
+/// Schema of the shard in `file`, which tells the kind of experiment it belongs to.
 pub fn schema_of(file: &Path) -> Result<String, ShardError> {
     Ok(AnyHeader::load(file)?.schema)
 }
 
-/// Refuses a `folder` with shards that are not those of `trials` trials in `count` parts: what is written beside them could
-/// never be merged with them. Of their lengths one is looked at, since each was looked at beside another.
+/// Refuses a `folder` that holds shards of another cut than `trials` trials in `count` parts: shards written next to
+/// them could never be merged with them. Only one file is opened to check the length of its run, because every shard
+/// passed the same check when it was added to the folder.
 pub fn check_cut(folder: &Path, trials: u64, count: u64) -> Result<(), ShardError> {
     if !folder.exists() {
         return Ok(());
@@ -111,7 +112,7 @@ fn is_of_the_cut(range: &Range<u64>, trials: u64, count: u64) -> bool {
     if range.start >= trials {
         return false;
     }
-    // The part that holds its first trial is the first one that ends behind it.
+    // The part that holds the first trial of `range` is the first part that ends after this trial.
     let behind = u128::from(range.start) + 1;
     let index = (behind * u128::from(count)).div_ceil(u128::from(trials)) as u64 - 1;
     shard_range(trials, index, count) == *range
@@ -126,7 +127,7 @@ mod tests {
         for (trials, count) in [(10, 3), (7, 7), (1000, 8), (1, 1), (3, 5), (1_000_000_007, 999)] {
             for index in (0..count).step_by((count as usize / 50).max(1)) {
                 let range = shard_range(trials, index, count);
-                // Parts without trials have no file.
+                // An empty part has no file, so it does not count as a part of the cut.
                 assert_eq!(is_of_the_cut(&range, trials, count), !range.is_empty(), "{range:?}");
                 let longer = range.start..range.end + 1;
                 assert!(range.is_empty() || !is_of_the_cut(&longer, trials, count), "{longer:?}");
@@ -135,7 +136,7 @@ mod tests {
         assert!(!is_of_the_cut(&(10..20), 10, 1));
     }
 
-    /// A folder is one run's: another length or another cut is found before anything is written there.
+    /// A folder belongs to one run: another length or another cut is detected before anything is written to the folder.
     #[test]
     fn a_folder_of_another_run_is_refused() {
         let folder = tempfile::tempdir().unwrap();

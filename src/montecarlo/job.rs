@@ -1,26 +1,26 @@
-//! What a scenario file asks for.
+//! Jobs: what a scenario file asks for.
 
 use std::path::Path;
 
 use super::blind::BlindPlan;
 use super::scenario::{Scenario, ScenarioError, Source};
 
-/// What `montecarlo` can run.
+/// A job that `montecarlo` can run.
 #[derive(Debug, Clone)]
 pub enum Job {
     /// One arm, identified from many noisy logs.
     Estimates(Box<Scenario>),
-    /// Many arms with something hidden in them, each diagnosed from one log.
+    /// Many arms with hidden effects, each diagnosed from one log.
     Blind(Box<BlindPlan>),
 }
 
 impl Job {
-    /// What the file `path` asks for; the default scenario where there is none.
+    /// Loads the job in the file `path`, or the default scenario if `path` is `None`.
     pub fn load(path: Option<&Path>) -> Result<Self, ScenarioError> {
         Self::from_source(&Source::load(path)?)
     }
 
-    /// From TOML text; `name` stands for it in messages.
+    /// Reads the job from TOML text; messages refer to the text as `name`.
     pub fn from_toml(text: &str, name: &str) -> Result<Self, ScenarioError> {
         Self::from_source(&Source::new(text, name, Path::new("")))
     }
@@ -37,7 +37,7 @@ impl Job {
         })
     }
 
-    /// The scenario; of a blind benchmark, the one without its draws.
+    /// The scenario; for a blind benchmark the base scenario, to which each trial adds its draws.
     pub fn scenario_mut(&mut self) -> &mut Scenario {
         match self {
             Self::Estimates(scenario) => scenario,

@@ -1,4 +1,4 @@
-//! Shards of one run, put together.
+//! Merging the shards of one run.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -7,22 +7,22 @@ use std::path::{Path, PathBuf};
 use super::shard::{Header, Shard, ShardError};
 use super::trials::{Content, Difference, Gathered};
 
-/// Shards put together.
+/// The merged shards of one run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Merged<C: Content> {
-    /// Common header.
+    /// Header that the shards have in common.
     pub header: Header<C>,
-    /// All trials.
+    /// The results of all trials.
     pub tally: C::Gathered,
     /// Sum of the time spent on trials, s.
     pub seconds: f64,
-    /// Trials that no shard has run.
+    /// Ranges of trials that no shard has run.
     pub missing: Vec<Range<u64>>,
-    /// SHA-256 of every build of the program that has run some.
+    /// SHA-256 of every build of the program that has run some of the trials.
     pub programs: BTreeSet<String>,
 }
 
-/// Merges shards (with the files they come from); any order gives the same bits.
+/// Merges shards, each given with its file. The result is the same to the last bit for any order.
 pub fn merge<C: Content>(mut shards: Vec<(PathBuf, Shard<C>)>) -> Result<Merged<C>, ShardError> {
     shards.sort_by_key(|(_, shard)| shard.range);
     let Some((_, first)) = shards.first() else {
@@ -47,7 +47,7 @@ pub fn merge<C: Content>(mut shards: Vec<(PathBuf, Shard<C>)>) -> Result<Merged<
         if reached < start {
             merged.missing.push(reached..start);
         }
-        // What a shard was to run and did not, another one may have.
+        // Trials that this shard was meant to run but did not may be in another shard.
         reached = shard.next;
         merged.tally.merge(&shard.tally);
         merged.seconds += shard.seconds;
@@ -58,7 +58,7 @@ pub fn merge<C: Content>(mut shards: Vec<(PathBuf, Shard<C>)>) -> Result<Merged<
     Ok(merged)
 }
 
-/// Refuses a header that differs, naming the first part that does.
+/// Refuses a header `found` that differs from `expected`; the error names the first part that differs.
 pub fn same_run<C: Content>(
     file: &Path,
     found: &Header<C>,
@@ -125,7 +125,7 @@ mod tests {
         );
         let twice = merge(vec![shard([0, 5], 1, "a"), shard([4, 10], 1, "a")]).unwrap_err();
         assert!(matches!(twice, ShardError::Overlap { start: 4, end: 4, .. }), "{twice}");
-        // What the first was to run and did not, the second has.
+        // The first shard was meant to run ten trials and ran four; the second one has the other six.
         let (file, mut half) = shard([0, 4], 1, "a");
         half.range = [0, 10];
         assert!(merge(vec![(file, half), shard([4, 10], 1, "a")]).unwrap().missing.is_empty());

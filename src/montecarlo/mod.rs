@@ -1,9 +1,10 @@
-//! The whole chain, thousands of times, against the truth.
+//! Monte Carlo: runs the whole chain thousands of times and compares the results with the truth.
 //!
-//! Enters: a [`Job`]. A [`Scenario`] leaves a [`Tally`](tally::Tally) of its trials and a
-//! [`Calibration`](calibration::Calibration): whether the σ that the identifier claims is true. A
-//! [`BlindPlan`](blind::BlindPlan) leaves [`Scores`](blind::Scores): whether the diagnosis finds what is
-//! hidden. Both are run by [`shard`], with the same bits for any number of threads and any split.
+//! Input: a [`Job`]. For a [`Scenario`] the output is a [`Tally`](tally::Tally) of its trials and a
+//! [`Calibration`](calibration::Calibration), which says whether the σ that the identifier claims is true.
+//! For a [`BlindPlan`](blind::BlindPlan) the output is [`Scores`](blind::Scores), which say whether the
+//! diagnosis finds the hidden effects. [`shard`] runs both kinds; the results are the same to the last bit for
+//! any number of threads and any split into shards.
 
 pub mod blind;
 pub mod calibration;

@@ -1,4 +1,4 @@
-//! What the noise of the encoders leaves in the equations of motion.
+//! Noise that the encoders contribute to the equations of motion.
 
 use nalgebra::DMatrix;
 
@@ -6,18 +6,19 @@ use crate::dynamics::{Model, Workspace, mass_matrix};
 use crate::plant::{PlantError, SensorConfig, Whitening};
 use crate::robot::JointSignals;
 
-/// Configurations between two at which the mass matrix is looked at, samples.
+/// The mass matrix is evaluated at every 25th sample of the motion.
 const EVERY: usize = 25;
 
-/// Noise of the inertial torque M q̈ behind torque readings whose own noise is white with variance one.
+/// Noise of the inertial torque M q̈ in equations whose torque noise has been whitened to variance one.
 ///
-/// Positions with noise of variance σ_q² per sample and velocities with σ_q̇² tell the acceleration at ω up to
+/// Positions with noise of variance σ_q² per sample and velocities with σ_q̇² together determine the acceleration of
+/// a joint at the frequency ω with the variance
 ///
 /// s(ω) = 1/(1/(ω⁴ σ_q²) + 1/(ω² σ_q̇²)),
 ///
-/// each joint for itself. With A the whitening of the torque across the joints and γ(ω) the relative power of its
-/// colour, the noise of the whitened equations has the covariance 1 + Σ_l s_l(ω)/γ(ω) ⟨a_l a_lᵀ⟩, a_l = A M e_l
-/// and ⟨ ⟩ the mean over the motion.
+/// independently for each joint. Let A be the whitening of the torque across the joints and γ(ω) the relative power
+/// of its spectrum. Then the noise of the whitened equations has the covariance 1 + Σ_l s_l(ω)/γ(ω) ⟨a_l a_lᵀ⟩, with
+/// a_l = A M e_l and ⟨ ⟩ the mean over the motion.
 pub(super) struct MotionNoise {
     q_sd_rad: Vec<f64>,
     qd_sd_rad_s: Vec<f64>,
@@ -26,10 +27,10 @@ pub(super) struct MotionNoise {
 }
 
 impl MotionNoise {
-    /// Along the configurations `q_rad`.
+    /// Averages over the configurations `q_rad`.
     ///
     /// # Errors
-    /// [`PlantError`] where the sensors are not those of this arm.
+    /// [`PlantError`] if the sensor settings do not fit the number of joints of the arm.
     pub fn new(
         sensors: &SensorConfig,
         model: &Model,
@@ -55,7 +56,8 @@ impl MotionNoise {
         Ok(Self { q_sd_rad, qd_sd_rad_s, products })
     }
 
-    /// L⁻¹ of the covariance L Lᵀ at `frequency_hz`, where the torque's colour has the relative power γ.
+    /// L⁻¹, where L Lᵀ is the covariance at `frequency_hz`. `torque_power` is γ, the relative power of the torque noise
+    /// there.
     pub fn whitening(&self, frequency_hz: f64, torque_power: f64) -> DMatrix<f64> {
         let n = self.products.len();
         let omega = std::f64::consts::TAU * frequency_hz;
@@ -64,7 +66,7 @@ impl MotionNoise {
             let by_position = (omega * omega * self.q_sd_rad[l]).powi(2);
             let by_velocity = (omega * self.qd_sd_rad_s[l]).powi(2);
             let power = by_position * by_velocity / (by_position + by_velocity);
-            // Readings without noise, and the mean, know the acceleration.
+            // Readings without noise determine the acceleration exactly, and so does its mean (ω = 0) in any case.
             if power > 0.0 {
                 covariance += product * (power / torque_power);
             }
@@ -97,8 +99,8 @@ mod tests {
         (noise, mass.column(1).into_owned())
     }
 
-    /// One encoder alone is noisy, and its torques stand against white torque noise of 1 Nm: by hand
-    /// 1 + s m mᵀ with m the second column of the mass matrix, whose inverse is 1 − s m mᵀ/(1 + s m²).
+    /// One encoder alone is noisy, and the torque noise is white with 1 Nm. By hand, the covariance is 1 + s m mᵀ, with
+    /// m the second column of the mass matrix; its inverse is 1 − s m mᵀ/(1 + s m²).
     #[test]
     fn one_noisy_encoder() {
         let mut each = vec![0.0; 6];
@@ -116,7 +118,7 @@ mod tests {
         assert!((w.transpose() * w - wanted).amax() < 1e-12);
     }
 
-    /// At rest, and where encoders have no noise, the torque's own noise is all there is.
+    /// At frequency zero, and if the encoders have no noise, the noise of the torque readings is the only noise.
     #[test]
     fn what_has_no_noise_adds_none() {
         let (quiet, _) = noise(&SensorConfig::default());
