@@ -1,4 +1,4 @@
-//! Scenarios: an experiment on the simulated arm, as TOML.
+//! Scenarios: experiments on the simulated arm, described in TOML.
 
 use std::path::{Path, PathBuf};
 
@@ -14,25 +14,26 @@ use crate::plant::faults::{Effect, FaultyPlant};
 use crate::plant::{PlantConfig, PlantError, SensorConfig, Sensors};
 use crate::robot::{Arm, LoadedArm, RobotError};
 
-/// The scenario that runs when none is named.
+/// The scenario that runs when no file is given.
 const DEFAULT: &str = include_str!("../../sims/default.toml");
 
-/// A scenario that has been read and checked: it can be run.
+/// A scenario that has been read and checked, ready to run.
 #[derive(Debug, Clone)]
 pub struct Scenario {
-    /// Name; together with the seed it selects the random numbers.
+    /// Name; together with the seed it determines the random numbers.
     pub name: String,
-    /// What it is for, in a sentence.
+    /// Purpose of the scenario, in a sentence.
     pub description: String,
-    /// SHA-256 of its text and of the robot and the motions that it names.
+    /// SHA-256 of the scenario's text and of the robot and the motions that it names.
     pub sha256: String,
-    /// The files that it names: robot and motions that are not built in.
+    /// The files that the scenario names: robot and motions that are not built in.
     pub files: Vec<PathBuf>,
-    /// Its robot as [`LoadedArm::load`] takes it from the working folder; empty where no file names it.
+    /// The robot in the form that [`LoadedArm::load`] accepts from the working folder; empty if the scenario was not
+    /// read from a file.
     pub robot: String,
-    /// The arm, its truth included.
+    /// The arm with its true parameters.
     pub arm: Arm,
-    /// Name of the reduced parameter set, if not the full one is identified.
+    /// Name of the reduced parameter set; `None` if the full set is identified.
     pub reduced: Option<String>,
     /// Base parameters that are identified.
     pub set: BaseSet,
@@ -42,17 +43,17 @@ pub struct Scenario {
     pub excitation: Excitation,
     /// How the plant runs.
     pub plant: PlantConfig,
-    /// What the sensors add.
+    /// Errors that the sensors add.
     pub sensors: SensorConfig,
-    /// What is hidden in the arm: the null model knows nothing of it.
+    /// Effects hidden in the arm, of which the null model knows nothing.
     pub effects: Vec<Effect>,
-    /// Whether the controller reads the noisy sensors (the plant then runs anew for every trial).
+    /// Whether the controller reads the noisy sensors, in which case the plant runs again for every trial.
     pub controller_reads_sensors: bool,
     /// How logs are processed.
     pub processing: Options,
     /// Seed of all random numbers.
     pub seed: u64,
-    /// Trials of a full run.
+    /// Number of trials of a full run.
     pub trials: u64,
 }
 
@@ -78,7 +79,7 @@ pub(super) struct ScenarioFile {
     effects: Vec<Effect>,
     #[serde(default)]
     processing: Options,
-    /// Makes it a blind benchmark.
+    /// Present if the scenario is a blind benchmark.
     pub(super) blind: Option<BlindEntry>,
 }
 
@@ -88,7 +89,8 @@ pub(super) struct MotionEntry {
     /// Built-in name or JSON file.
     pub(super) trajectory: String,
     periods: usize,
-    /// Length of the run-in from rest, s; where left out chosen inside the limits, if there is one.
+    /// Length of the run-in from rest, s. If left out, one that keeps the arm within its limits is chosen, or the one
+    /// that exceeds them least.
     run_in_s: Option<f64>,
 }
 
@@ -100,7 +102,7 @@ pub enum ScenarioError {
     Read {
         /// The file.
         file: PathBuf,
-        /// Why.
+        /// Why reading failed.
         source: std::io::Error,
     },
     /// Not valid TOML, an unknown key, or a value of the wrong type.
@@ -111,7 +113,7 @@ pub enum ScenarioError {
         /// The parser's message with line and key.
         message: String,
     },
-    /// JSON, as the results of other commands are.
+    /// The file is JSON, like the results of other commands.
     #[error(
         "{file}: is JSON, a scenario is TOML; `armid simulate --arm` takes a result of `armid identify --physical`"
     )]
@@ -119,31 +121,31 @@ pub enum ScenarioError {
         /// The file.
         file: String,
     },
-    /// A blind benchmark where one arm is asked for.
+    /// The file is a blind benchmark, but a single arm was asked for.
     #[error("{file}: is a blind benchmark ([blind]), which only `montecarlo` can run")]
     Blind {
         /// The file.
         file: String,
     },
-    /// A number that makes no experiment.
+    /// A number with which no experiment is possible.
     #[error("{file}: {key} = {value} {requirement}")]
     Setting {
         /// The file.
         file: String,
         /// The key.
         key: &'static str,
-        /// Its value.
+        /// The value of the key.
         value: f64,
-        /// What it must be.
+        /// Condition that the value must meet.
         requirement: &'static str,
     },
-    /// A motion that does not repeat is no scenario's.
+    /// The motion of the log does not repeat, so it cannot become the motion of a scenario.
     #[error("{log}: its motion does not repeat, and that of a scenario does")]
     OnePeriod {
         /// The log.
         log: String,
     },
-    /// Something that the file asks for.
+    /// Something that the file asks for is not possible.
     #[error("{file}: {source}")]
     Within {
         /// The file.
@@ -169,7 +171,7 @@ pub enum ScenarioError {
 }
 
 impl ScenarioError {
-    /// The same with the file's name, where it has none.
+    /// Adds the name of the file to an error that does not name it yet.
     pub(super) fn within(self, file: &str) -> Self {
         match self {
             Self::Robot(_)
@@ -183,27 +185,28 @@ impl ScenarioError {
 }
 
 impl Scenario {
-    /// The scenario in `path`, or the default one.
+    /// Loads the scenario in `path`, or the default scenario if `path` is `None`.
     pub fn load(path: Option<&Path>) -> Result<Self, ScenarioError> {
         let source = Source::load(path)?;
         Self::from_toml(&source.text, &source.name, &source.folder)
     }
 
-    /// The same experiment with another arm, its own base parameters among it.
+    /// The same experiment with another arm and that arm's base parameters.
     ///
     /// # Errors
-    /// [`ScenarioError`] where the base parameters of that arm cannot be told.
+    /// [`ScenarioError`] if the base parameters of that arm cannot be determined.
     pub fn with_arm(self, arm: Arm) -> Result<Self, ScenarioError> {
         let parameterisation = Parameterisation::of(&arm, self.reduced.as_deref())?;
         Ok(Self { set: BaseSet::find(&arm, parameterisation)?, arm, ..self })
     }
 
-    /// All files behind it: its own, `path`, and those that it names.
+    /// All files of the scenario: its own file `path` and the files that it names.
     pub fn sources(&self, path: &Path) -> Vec<PathBuf> {
         [&[path.to_owned()], &self.files[..]].concat()
     }
 
-    /// From TOML text; `source` names it in messages, files in it are relative to `folder`.
+    /// Reads a scenario from TOML text. Messages refer to the text as `source`; files that it names are relative to
+    /// `folder`.
     pub fn from_toml(text: &str, source: &str, folder: &Path) -> Result<Self, ScenarioError> {
         let source = Source::new(text, source, folder);
         let file = source.parse()?;
@@ -213,7 +216,7 @@ impl Scenario {
         Self::from_file(file, &source)
     }
 
-    /// From a parsed file.
+    /// Builds the scenario from a parsed file.
     pub(super) fn from_file(file: ScenarioFile, source: &Source) -> Result<Self, ScenarioError> {
         Self::asked_for(file, source).map_err(|error| error.within(&source.name))
     }
@@ -249,7 +252,7 @@ impl Scenario {
     }
 }
 
-/// SHA-256 of all `texts`.
+/// SHA-256 of all `texts` in sequence.
 pub(super) fn fingerprint<'a>(texts: impl IntoIterator<Item = &'a String>) -> String {
     let mut hasher = Sha256::new();
     texts.into_iter().for_each(|text| hasher.update(text));
@@ -257,13 +260,13 @@ pub(super) fn fingerprint<'a>(texts: impl IntoIterator<Item = &'a String>) -> St
 }
 
 impl MotionEntry {
-    /// Its trajectory's file; `None` for one that is built in.
+    /// File of the trajectory; `None` for a built-in one.
     pub(super) fn file(&self, source: &Source) -> Option<PathBuf> {
         let path = PathBuf::from(source.beside(&self.trajectory));
         path.extension().is_some().then_some(path)
     }
 
-    /// The motion of `arm`.
+    /// The motion that the entry describes, for `arm`.
     pub(super) fn excitation(
         &self,
         arm: &Arm,
@@ -281,12 +284,12 @@ impl MotionEntry {
     }
 }
 
-/// Where a scenario's text comes from.
+/// The text of a scenario and where it comes from.
 pub(super) struct Source {
     pub(super) text: String,
-    /// For messages.
+    /// Name of the text in messages.
     pub(super) name: String,
-    /// Files that the text names are relative to it.
+    /// Folder to which the files named in the text are relative.
     folder: PathBuf,
 }
 
@@ -295,7 +298,7 @@ impl Source {
         Self { text: text.to_owned(), name: name.to_owned(), folder: folder.to_owned() }
     }
 
-    /// The file `path`, or the default scenario.
+    /// Reads the file `path`, or takes the default scenario if `path` is `None`.
     pub(super) fn load(path: Option<&Path>) -> Result<Self, ScenarioError> {
         let Some(path) = path else {
             let name = "sims/default.toml".to_owned();
@@ -315,10 +318,11 @@ impl Source {
             .map_err(|e| ScenarioError::Toml { file: self.name.clone(), message: e.to_string() })
     }
 
-    /// A file beside it, perhaps with the last link of an arm behind `#`, or the name of something built in.
+    /// Resolves `name`: a file relative to the scenario's folder, possibly followed by `#` and the last link of an arm,
+    /// or the name of something built in.
     fn beside(&self, name: &str) -> String {
         let is_file = |name: &str| Path::new(name).extension().is_some();
-        // Names of links may have slashes in them.
+        // Look for a file extension before the `#` only: names of links may contain slashes.
         if is_file(name) || name.rsplit_once('#').is_some_and(|(file, _)| is_file(file)) {
             self.folder.join(name).display().to_string()
         } else {

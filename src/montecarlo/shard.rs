@@ -1,4 +1,4 @@
-//! A stretch of trials: run in parallel, saved, resumed, merged.
+//! Shards: contiguous ranges of trials that are run in parallel, saved, resumed and merged.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -15,7 +15,7 @@ pub use super::merged::{Merged, merge, same_run};
 use super::trials::{Content, Gathered, Trials, run_one};
 use crate::output::{OutputError, write_atomically};
 
-/// What must be equal for two shards to belong together.
+/// Header of a shard: everything that must be equal for two shards to belong to the same run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, bound = "")]
 pub struct Header<C: Content> {
@@ -23,7 +23,7 @@ pub struct Header<C: Content> {
     pub schema: String,
     /// Version of the program.
     pub version: String,
-    /// SHA-256 of the program; empty where it is not known. The one part in which shards of one run may differ.
+    /// SHA-256 of the program; empty if unknown. This is the only part in which shards of one run may differ.
     pub program: String,
     /// Name of the scenario.
     pub scenario: String,
@@ -31,43 +31,43 @@ pub struct Header<C: Content> {
     pub scenario_sha256: String,
     /// Seed of all random numbers.
     pub seed: u64,
-    /// Trials of the whole run.
+    /// Number of trials of the whole run.
     pub trials: u64,
-    /// What the kind of experiment adds.
+    /// The part that is specific to the kind of experiment.
     pub content: C,
 }
 
-/// A shard's file: its header, its range of trials, how far it has come, and the sums so far.
+/// Contents of a shard file: the header, the range of trials, the progress, and the sums so far.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, bound = "")]
 pub struct Shard<C: Content> {
-    /// What it is part of.
+    /// The run that the shard is part of.
     pub header: Header<C>,
-    /// First trial and the one behind the last.
+    /// First trial, and one past the last.
     pub range: [u64; 2],
     /// First trial that has not been run.
     pub next: u64,
     /// Time spent on trials, s, summed over resumptions.
     pub seconds: f64,
-    /// What the trials from `range[0]` to `next` add up to.
+    /// Sum over the trials from `range[0]` up to, but not including, `next`.
     pub tally: C::Gathered,
 }
 
-/// Shards that cannot be saved, read, resumed or merged.
+/// Error in running, saving, reading, resuming or merging shards.
 #[derive(Debug, Error)]
 pub enum ShardError {
-    /// Could not be written.
+    /// A file could not be written.
     #[error(transparent)]
     Output(#[from] OutputError),
-    /// Could not be read.
+    /// A file or folder could not be read.
     #[error("{file}: {source}")]
     Read {
         /// The file or folder.
         file: PathBuf,
-        /// Why.
+        /// Why reading failed.
         source: std::io::Error,
     },
-    /// Not a shard file of this version.
+    /// The file is not a shard file of this version.
     #[error("{file}: not a shard file this program can read: {message}")]
     Format {
         /// The file.
@@ -75,19 +75,19 @@ pub enum ShardError {
         /// The parser's message.
         message: String,
     },
-    /// Shards of different runs.
+    /// The shards belong to different runs.
     #[error("{file}: its {what} is {found}, but the others have {expected}: not the same run")]
     Mismatch {
         /// The file.
         file: PathBuf,
         /// Which part of the header differs.
         what: String,
-        /// Its value.
+        /// Its value in this file.
         found: String,
-        /// The value of the first file.
+        /// Its value in the first file.
         expected: String,
     },
-    /// A shard that another build of the program has begun.
+    /// The shard was begun by another build of the program.
     #[error(
         "{file}: its first {trials} trials were run by another build of this program (SHA-256 {found}, now {expected}): go on \
          with that one, or begin again in another --out"
@@ -95,14 +95,14 @@ pub enum ShardError {
     OtherProgram {
         /// The file.
         file: PathBuf,
-        /// Trials that have been run.
+        /// Number of trials that have been run.
         trials: u64,
         /// The build that ran them.
         found: String,
-        /// This one.
+        /// The build that is running.
         expected: String,
     },
-    /// Shards of a run that is cut otherwise.
+    /// The shard belongs to a run that is cut differently.
     #[error(
         "{file}: trials {start} up to {end} are none of the {shards} shards of {trials} trials: this folder is another run's, or \
          --trials or --shard were others; give those, or another --out"
@@ -112,26 +112,26 @@ pub enum ShardError {
         file: PathBuf,
         /// First trial of the shard.
         start: u64,
-        /// The one behind its last.
+        /// One past the last trial of the shard.
         end: u64,
-        /// Trials of the run that was asked for.
+        /// Number of trials of the run that was asked for.
         trials: u64,
-        /// Its shards.
+        /// Number of shards of the run that was asked for.
         shards: u64,
     },
-    /// Shards of a run of another length.
+    /// The shard belongs to a run of another length.
     #[error(
         "{file}: it is a shard of {found} trials, not of {expected}: give --trials {found} to go on, or another --out"
     )]
     OtherLength {
         /// The file.
         file: PathBuf,
-        /// Trials of its run.
+        /// Number of trials of the shard's run.
         found: u64,
-        /// Trials that were asked for.
+        /// Number of trials that was asked for.
         expected: u64,
     },
-    /// Trials counted twice.
+    /// Two shards contain the same trials.
     #[error("{file}: trials {start}…{end} are in another shard too")]
     Overlap {
         /// The file.
@@ -141,33 +141,33 @@ pub enum ShardError {
         /// Last trial of the shard.
         end: u64,
     },
-    /// A folder without shards.
+    /// The folder contains no shards.
     #[error("{folder}: no shard files (shard-*.json)")]
     Empty {
         /// The folder.
         folder: PathBuf,
     },
-    /// Threads could not be started.
+    /// The threads could not be started.
     #[error("could not start {threads} threads: {message}")]
     Threads {
-        /// Threads asked for.
+        /// Number of threads asked for.
         threads: usize,
         /// Why not.
         message: String,
     },
 }
 
-/// Trials of shard `index` of `count` (0-based): contiguous, sizes differing by at most one.
+/// Trials of shard `index` (0-based) of `count`. The ranges are contiguous and differ in size by at most one.
 pub fn shard_range(trials: u64, index: u64, count: u64) -> Range<u64> {
     let bound = |i: u64| (u128::from(trials) * u128::from(i) / u128::from(count)) as u64;
     bound(index)..bound(index + 1)
 }
 
-/// Longest time whose work a kill can lose, the trials under way aside.
+/// Interval between saves: a killed run loses at most the work of this time and the trials in progress.
 const SAVE_EVERY: Duration = Duration::from_secs(5);
 
 impl<C: Content> Shard<C> {
-    /// No trials run yet.
+    /// A shard of which no trial has been run yet.
     pub fn new<T: Trials<Content = C>>(experiment: &T, trials: u64, range: Range<u64>) -> Self {
         let scenario = experiment.scenario();
         let content = experiment.content();
@@ -214,12 +214,12 @@ impl<C: Content> Shard<C> {
         Ok(shard)
     }
 
-    /// Writes the shard file as a whole.
+    /// Writes the shard file atomically.
     pub fn save(&self, file: &Path) -> Result<(), ShardError> {
         Ok(write_atomically(file, |out| serde_json::to_writer(out, self).map_err(Into::into))?)
     }
 
-    /// Refuses to go on with the shard of `file` where another program than the one with the SHA-256 `program` has begun it.
+    /// Refuses to continue the shard in `file` unless it was begun by the program with the SHA-256 `program`.
     pub fn check_program(&self, file: &Path, program: &str) -> Result<(), ShardError> {
         let found = &self.header.program;
         if found == program {
@@ -233,15 +233,15 @@ impl<C: Content> Shard<C> {
         })
     }
 
-    /// Whether all its trials have been run.
+    /// Whether all trials of the shard have been run.
     pub fn is_complete(&self) -> bool {
         self.next == self.range[1]
     }
 
-    /// Runs the trials that are missing on `threads` threads, until done or `stop` is set.
+    /// Runs the missing trials on `threads` threads, until all are done or `stop` is set.
     ///
-    /// `progress` is told the number of trials run in this shard; `file` is written every few
-    /// seconds and at the end, so that a killed run loses little and repeats nothing.
+    /// `progress` is called with the number of trials of this shard that have been run. `file` is written every few
+    /// seconds and at the end, so that a killed run loses little and a resumed run repeats nothing that was saved.
     pub fn run<T: Trials<Content = C>>(
         &mut self,
         experiment: &T,
@@ -256,7 +256,8 @@ impl<C: Content> Shard<C> {
             .map_err(|e| ShardError::Threads { threads, message: e.to_string() })?;
         let workers: Vec<_> = (0..threads).map(|_| experiment.worker()).collect();
         let end = self.range[1];
-        // Threads take trials in their order, and finish what they took: what was run leaves no gap.
+        // Threads take trials in ascending order and finish every trial they have taken, so that the trials that have
+        // been run leave no gap.
         let next = &AtomicU64::new(self.next);
         let (sender, outcomes) = channel();
         pool.in_place_scope(|scope| {
@@ -282,7 +283,7 @@ impl<C: Content> Shard<C> {
         file.map_or(Ok(()), |file| self.save(file))
     }
 
-    /// Adds the outcomes of trials in the order of their numbers, until no more can come, and saves now and then.
+    /// Adds the outcomes in the order of the trial numbers until all senders are gone, and saves every few seconds.
     fn collect(
         &mut self,
         outcomes: Receiver<(u64, C::Gathered)>,
@@ -291,7 +292,7 @@ impl<C: Content> Shard<C> {
     ) -> Result<(), ShardError> {
         let (begun, before) = (Instant::now(), self.seconds);
         let mut saved = begun;
-        // What came before the trials in front of it.
+        // Outcomes that arrived before those of trials with lower numbers.
         let mut early = BTreeMap::new();
         for (trial, outcome) in outcomes {
             early.insert(trial, outcome);
@@ -318,7 +319,7 @@ mod tests {
     use crate::montecarlo::{Job, Scenario};
     use std::sync::Mutex;
 
-    /// Trials that say their number and give nothing; each tells `seen` before it ends.
+    /// Trials that all fail, with their number as the reason; each calls `seen` before it ends.
     struct Counting<F> {
         scenario: Scenario,
         seen: F,
@@ -359,7 +360,8 @@ mod tests {
         shard.tally.failures.iter().map(|Failure { trial, .. }| *trial).collect()
     }
 
-    /// The flag is looked at before every trial: what was begun is finished, nothing else, and no trial in front is left out.
+    /// The flag is checked before every trial: trials already begun are finished, no others are started, and no trial
+    /// with a lower number is left out.
     #[test]
     fn an_interrupted_shard_has_no_gap_and_goes_on() {
         let stop = AtomicBool::new(false);
@@ -383,7 +385,7 @@ mod tests {
         assert_eq!(trials_of(&shard), (100..200).collect::<Vec<_>>());
     }
 
-    /// Files of older programs are said to be of another format, not to lack this or that.
+    /// A file of an older program is reported as having another format, not as lacking some field.
     #[test]
     fn the_format_is_looked_at_first() {
         let file = tempfile::NamedTempFile::new().unwrap();
@@ -393,7 +395,8 @@ mod tests {
         assert!(error.contains("schema armid.blind-shard/2, expected"), "{error}");
     }
 
-    /// What one build began another must not go on with: the file could not say who ran what.
+    /// A shard that one build began must not be continued by another, because the file could not say which build ran
+    /// which trials.
     #[test]
     fn a_shard_stays_with_its_program() {
         let of = |program: &str| {

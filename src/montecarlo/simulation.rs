@@ -1,4 +1,4 @@
-//! A scenario's arm, run and read: everything of a scenario but the identification.
+//! Runs a scenario's arm and reads its sensors: everything in a scenario except the identification.
 
 use std::borrow::Cow;
 
@@ -11,7 +11,7 @@ use crate::plant::{
 };
 use crate::random::TrialStreams;
 
-/// A scenario whose plant has run: what the logs of all its trials share.
+/// A scenario whose plant has run: everything that the logs of all its trials share.
 pub struct Simulation {
     /// The scenario.
     pub scenario: Scenario,
@@ -22,7 +22,8 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// Runs the plant once without noise; where nothing in the arm drifts, of a motion that repeats by [`run_repeating`].
+    /// Runs the plant once without noise; with [`run_repeating`] if every effect in the arm repeats from period to
+    /// period.
     pub fn run(scenario: Scenario) -> Result<Self, PlantError> {
         let plant = FaultyPlant::new(&scenario.arm, &scenario.effects, &scenario.plant)?;
         let excitation = &scenario.excitation;
@@ -34,7 +35,7 @@ impl Simulation {
         Self::with_recording(scenario, plant, recording)
     }
 
-    /// With the run that the plant has made.
+    /// Builds the simulation from a `recording` that `plant` has already made.
     pub(super) fn with_recording(
         scenario: Scenario,
         plant: FaultyPlant,
@@ -44,11 +45,11 @@ impl Simulation {
         Ok(Self { scenario, recording, plant, sensors })
     }
 
-    /// The same run read by other sensors.
+    /// The same run, read by other sensors.
     ///
     /// # Errors
-    /// [`PlantError`] where a setting makes no sense, or where the controller reads the sensors: the
-    /// run would be another one.
+    /// [`PlantError`] if a setting makes no sense, or if the controller reads the sensors, because other sensors would
+    /// then change the run.
     pub fn read_by(&self, sensors: SensorConfig) -> Result<Self, PlantError> {
         if self.scenario.controller_reads_sensors {
             let requirement = "must be false where one run is read by several sensors";
@@ -64,13 +65,12 @@ impl Simulation {
         })
     }
 
-    /// The random numbers of a trial.
+    /// The random number streams of a trial.
     pub fn streams(&self, trial: u64) -> TrialStreams {
         TrialStreams::new(self.scenario.seed, self.scenario.name.as_bytes(), trial)
     }
 
-    /// The noise-free run of a trial: the shared one, or its own where the controller reads the
-    /// sensors.
+    /// The run behind the log of a trial: the shared one, or the trial's own one if the controller reads the sensors.
     pub fn recording(&self, trial: u64) -> Result<Cow<'_, Recording>, PlantError> {
         if !self.scenario.controller_reads_sensors {
             return Ok(Cow::Borrowed(&self.recording));
@@ -79,19 +79,19 @@ impl Simulation {
         Ok(Cow::Owned(self.plant.run(&self.scenario.excitation, Some(encoders))?))
     }
 
-    /// The law of the torque noise, where rounding adds nothing to it.
+    /// The law of the torque noise; `None` if rounding adds to the noise.
     pub fn known_torque_noise(&self) -> Option<TorqueNoise<'_>> {
         self.sensors.torque_noise()
     }
 
-    /// The log of a trial: the noise-free run as its sensors read it, with the readings that go wrong.
+    /// The log of a trial: the run as the sensors read it, including readings spoilt by faults.
     pub fn log(&self, trial: u64) -> Result<Measured, PlantError> {
         let mut log = Measured::like(&self.recording);
         self.log_into(trial, &mut log)?;
         Ok(log)
     }
 
-    /// As [`Self::log`], into memory that is used again and again.
+    /// As [`Self::log`], but writes into existing memory, which is reused from trial to trial.
     pub fn log_into(&self, trial: u64, log: &mut Measured) -> Result<(), PlantError> {
         let recording = self.recording(trial)?;
         let streams = self.streams(trial);
@@ -102,7 +102,7 @@ impl Simulation {
 }
 
 impl Measured {
-    /// As identification and diagnosis read it; `source` names it in messages.
+    /// The log in the form that identification and diagnosis read; messages refer to it as `source`.
     pub fn measurement<'a>(&'a self, source: &'a str) -> Measurement<'a> {
         Measurement {
             source,

@@ -1,6 +1,6 @@
-//! What a claim is about.
+//! Statistics that the calibration claims are about.
 
-/// A statistic about which something is claimed: [`super::calibration::claims`] says what.
+/// A statistic with a claim about its true value; the claims are in [`super::calibration::claims`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Statistic {
     /// Coverage of nominal 95 % intervals, mean over the parameters.
@@ -13,12 +13,12 @@ pub enum Statistic {
     PooledRatio,
     /// The same of each parameter.
     EachRatio,
-    /// Error of all parameters together in units of their predicted covariance.
+    /// Error of all parameters jointly, in units of their predicted covariance.
     JointRatio,
 }
 
 impl Statistic {
-    /// In words, by which results name it.
+    /// Name of the statistic in results, in words.
     pub fn in_words(self) -> &'static str {
         match self {
             Self::MeanCoverage => "coverage of 95 % intervals, mean over parameters",

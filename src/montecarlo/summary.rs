@@ -1,4 +1,4 @@
-//! What a run says, as the JSON that others read.
+//! Summary of a run, in the form of its JSON output.
 
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -11,49 +11,50 @@ use super::trials::Failure;
 /// Format of the JSON output.
 pub const SUMMARY_SCHEMA: &str = "armid.montecarlo/1";
 
-/// Result of a Monte Carlo run. Fractions are 0…1; σ in the parameter's unit.
+/// Result of a Monte Carlo run. Fractions are 0…1; every σ is in the unit of its parameter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     /// Name of the scenario.
     pub scenario: String,
     /// Trials run, failed ones included.
     pub trials: u64,
-    /// Trials that gave no estimate.
+    /// Number of trials that gave no estimate.
     pub failed: u64,
-    /// Which and why.
+    /// Which trials failed, and why.
     pub failures: Vec<Failure>,
-    /// Stretches of trials that have not been run: `[first, one behind the last]`.
+    /// Ranges of trials that have not been run: `[first, one past the last]`.
     pub missing: Vec<[u64; 2]>,
-    /// Estimator.
+    /// Name of the estimator.
     pub estimator: String,
     /// Method of the covariance.
     pub covariance: String,
     /// One entry per base parameter.
     pub parameters: Vec<ParameterSummary>,
-    /// Coverage of nominal 95 % intervals, mean over parameters; failed trials cover none.
+    /// Coverage of nominal 95 % intervals, mean over parameters; the intervals of a failed trial count as misses.
     pub coverage_mean: f64,
-    /// The parameter covered worst (furthest from 95 %).
+    /// The parameter whose coverage is farthest from 95 %.
     pub coverage_worst: NamedValue,
     /// Empirical over predicted σ, pooled over parameters.
     pub sigma_ratio_pooled: f64,
-    /// Error of all parameters together in units of their predicted covariance; null where it cannot be told.
+    /// Error of all parameters jointly, in units of their predicted covariance; null if it cannot be determined.
     pub joint_ratio: Option<f64>,
-    /// Empirical σ over the Cramér–Rao bound; null where the noise has no known law.
+    /// Empirical σ over the Cramér–Rao bound; null if the bound is not known, for example because the noise has no
+    /// known law.
     pub efficiency: Option<Efficiency>,
     /// The checks behind the verdict.
     pub checks: Vec<CheckSummary>,
-    /// Trials per second of wall time; of merged shards, of the sum of their times.
+    /// Trials per second of wall time; for merged shards, per second of the sum of their times.
     pub trials_per_second: f64,
-    /// Whether the claimed σ is true.
+    /// Verdict on whether the claimed σ is true.
     pub verdict: Verdict,
 }
 
 /// Statistics of one base parameter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ParameterSummary {
-    /// Name of the kept column.
+    /// Name of the standard parameter whose column is kept.
     pub name: String,
-    /// The whole combination.
+    /// The full linear combination of standard parameters.
     pub formula: String,
     /// SI unit.
     pub unit: String,
@@ -65,9 +66,9 @@ pub struct ParameterSummary {
     pub sigma_empirical: f64,
     /// Root mean square of the claimed σ.
     pub sigma_predicted: f64,
-    /// The Cramér–Rao bound; null where the noise has no known law.
+    /// The Cramér–Rao bound; null if it is not known, for example because the noise has no known law.
     pub sigma_least: Option<f64>,
-    /// Share of 95 % intervals that hold the truth, those of failed trials included, which hold none.
+    /// Share of all trials whose 95 % interval holds the true value; failed trials count as misses.
     pub coverage: f64,
 }
 
@@ -80,40 +81,40 @@ pub struct NamedValue {
     pub value: f64,
 }
 
-/// One check with its bounds.
+/// One check with its interval and its claim.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CheckSummary {
-    /// In words.
+    /// The statistic, in words.
     pub what: String,
-    /// The parameter that decided; null for statistics over all.
+    /// The parameter that decided the check; null for statistics over all parameters.
     pub parameter: Option<String>,
-    /// Measured value; null where nothing was measured.
+    /// Measured value; null if nothing was measured.
     #[serde(deserialize_with = "number")]
     pub value: f64,
-    /// Where the true value lies, given the number of trials.
+    /// Confidence interval of the true value for this number of trials.
     #[serde(deserialize_with = "ends")]
     pub interval: [f64; 2],
-    /// Where the claim says that it lies.
+    /// Interval in which the true value lies according to the claim.
     pub claim: [f64; 2],
-    /// The answer.
+    /// The verdict.
     pub verdict: Verdict,
-    /// Why nothing was measured, where more trials would not help; null elsewhere.
+    /// Why the statistic could not be measured, if more trials would not help; otherwise null.
     pub reason: Option<String>,
 }
 
-/// What JSON has as null is no number.
+/// Reads a number from JSON, where null stands for NaN.
 fn number<'de, D: Deserializer<'de>>(source: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(source)?.unwrap_or(f64::NAN))
 }
 
-/// Of two numbers, see [`number`].
+/// Reads the two ends of an interval from JSON; see [`number`].
 fn ends<'de, D: Deserializer<'de>>(source: D) -> Result<[f64; 2], D::Error> {
     let ends: [Option<f64>; 2] = Deserialize::deserialize(source)?;
     Ok(ends.map(|end| end.unwrap_or(f64::NAN)))
 }
 
 impl CheckSummary {
-    /// Of `check`, whose parameter k is called `name(k)`.
+    /// Summarises `check`; parameter k is called `name(k)`.
     pub fn of(check: &Check, name: impl Fn(usize) -> String) -> Self {
         Self {
             what: check.statistic.in_words().to_owned(),
@@ -128,7 +129,7 @@ impl CheckSummary {
 }
 
 impl Summary {
-    /// Of merged shards; `wall_s` is the time that the trials took.
+    /// Summarises merged shards; `wall_s` is the time that the trials took, s.
     pub fn of(merged: &Merged<Estimation>, wall_s: f64) -> Self {
         let Merged { header, tally, missing, .. } = merged;
         let content = &header.content;
@@ -228,14 +229,14 @@ mod tests {
     use super::*;
     use crate::montecarlo::tally::{Outcome, Outcomes, Tally};
 
-    /// 4000 trials that are as claimed, without a distance: no more of them would tell what is not known.
+    /// 4000 trials as claimed, but without a distance: more trials would not make the joint ratio measurable.
     #[test]
     fn what_cannot_be_checked_is_said_with_its_reason() {
         let mut tally = Tally::new(1);
         for trial in 0..4000 {
             let size = if trial % 20 < 2 { 2.0 } else { 0.82 };
             let z = if trial % 2 == 0 { size } else { -size };
-            // One in twenty is not held.
+            // One interval in twenty misses the true value.
             let quantile_95 = if trial % 20 == 0 { 1.96 } else { 2.01 };
             let parameters = vec![Outcome { z, sigma: 1.0, quantile_95 }];
             tally.add(&Outcomes { parameters, distance: None });
@@ -270,7 +271,7 @@ mod tests {
             sentence.contains("all parameters together: the covariance is known"),
             "{sentence}"
         );
-        // What was not measured is null, and is read back.
+        // A value that was not measured is written as null and read back as NaN.
         let text = serde_json::to_string(&summary.checks).unwrap();
         let read: Vec<CheckSummary> = serde_json::from_str(&text).unwrap();
         let last = &read[read.len() - 1];

@@ -1,23 +1,23 @@
-//! Sums over trials that come out the same in any order.
+//! Sums over trials that are the same for any order of the trials.
 
 use serde::{Deserialize, Serialize};
 
 use super::trials::{Failure, Gathered};
 
-/// Fixed-point unit of the sums: 2⁻⁴⁰ of a parameter's scale, 1e-12 of a σ.
+/// Fixed-point units per one: a unit is 2⁻⁴⁰ of a parameter's scale, about 1e-12 of a σ.
 ///
-/// Integer addition is exact and associative, so a tally does not depend on the number of threads,
-/// on the split into shards or on the order of merging, and its size not on the number of trials.
-/// 2¹²⁷ units hold 1e10 trials of |z| ≤ 1e4 with the squares of their squares.
+/// Integer addition is exact and associative, so a tally does not depend on the number of threads, on the split into
+/// shards or on the order of merging; nor does its size depend on the number of trials. The range of 2¹²⁷ units is
+/// enough to sum z⁴ over 1e10 trials with |z| ≤ 1e4.
 const UNITS_PER_ONE: f64 = (1u64 << 40) as f64;
 
-/// Largest |z| a tally takes; a trial beyond it has failed.
+/// Largest |z| that a tally accepts; a trial with a larger one counts as failed.
 pub const LARGEST_Z: f64 = 1e4;
 
-/// Histogram of (θ̂ − θ)/σ̂ pooled over the parameters: bins of [`BIN_WIDTH`] from −[`BIN_RANGE`] to
-/// it, one bin beyond each end.
+/// Bin width of the histogram of (θ̂ − θ)/σ̂, pooled over the parameters. The bins reach from −[`BIN_RANGE`] to
+/// +[`BIN_RANGE`]; one more bin at each end collects the values beyond.
 pub const BIN_WIDTH: f64 = 0.25;
-/// See [`BIN_WIDTH`].
+/// Range of the histogram; see [`BIN_WIDTH`].
 pub const BIN_RANGE: f64 = 5.0;
 const BINS: usize = (2.0 * BIN_RANGE / BIN_WIDTH) as usize + 2;
 
@@ -29,14 +29,14 @@ fn from_units(units: i128) -> f64 {
     units as f64 / UNITS_PER_ONE
 }
 
-/// What one trial says of one parameter, in units of the parameter's scale.
+/// Result of one trial for one parameter, in units of the parameter's scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
     /// (θ̂ − θ)/scale.
     pub z: f64,
     /// σ̂/scale.
     pub sigma: f64,
-    /// Half-width of the 95 % interval over σ̂.
+    /// Half-width of the 95 % interval in units of σ̂.
     pub quantile_95: f64,
 }
 
@@ -45,24 +45,24 @@ impl Outcome {
         self.z.abs() <= self.quantile_95 * self.sigma
     }
 
-    /// Whether the tally can hold it.
+    /// Whether the tally accepts this outcome.
     pub fn is_sound(&self) -> bool {
         self.z.abs() <= LARGEST_Z && self.sigma > 0.0 && self.sigma <= LARGEST_Z
     }
 }
 
-/// What one trial says of all parameters.
+/// Result of one trial for all parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcomes {
-    /// Of each.
+    /// One outcome per parameter.
     pub parameters: Vec<Outcome>,
-    /// Squared error of all together in units of the covariance that was predicted, (θ̂ − θ)ᵀV⁻¹(θ̂ − θ), over what it is on
-    /// average where V is right; `None` where that is not known.
+    /// Squared error of all parameters jointly in units of the predicted covariance, (θ̂ − θ)ᵀV⁻¹(θ̂ − θ), divided by
+    /// its expected value for a correct V; `None` if that expected value is not known.
     pub distance: Option<f64>,
 }
 
 impl Outcomes {
-    /// Whether the tally can hold what is said of all together.
+    /// Whether the tally accepts the joint distance.
     pub fn is_sound(&self) -> bool {
         self.distance.is_none_or(|distance| (0.0..=LARGEST_Z * LARGEST_Z).contains(&distance))
     }
@@ -74,18 +74,18 @@ impl Outcomes {
 pub struct Tally {
     /// Trials that gave an estimate.
     pub succeeded: u64,
-    /// Trials that did not, by number.
+    /// Trials that gave no estimate, sorted by number.
     pub failures: Vec<Failure>,
     parameters: Vec<ParameterSums>,
-    /// Σ over trials of the number of covered parameters, and of its square.
+    /// Sum over the trials of the number of covered parameters; below it, the sum of the squares of this number.
     covered: u64,
     covered_squared: u64,
-    /// Σ over trials of the mean over parameters of z², and of its square.
+    /// Sum over the trials of the mean of z² over the parameters; below it, the sum of the squares of this mean.
     #[serde(with = "decimal")]
     spread: i128,
     #[serde(with = "decimal")]
     spread_squared: i128,
-    /// Trials with a [`Outcomes::distance`], Σ of it and of its square.
+    /// Number of trials with an [`Outcomes::distance`]; below it, the sums of the distance and of its square.
     measured: u64,
     #[serde(with = "decimal")]
     distance: i128,
@@ -106,7 +106,7 @@ struct ParameterSums {
     covered: u64,
 }
 
-/// 128-bit integers as decimal strings: JSON numbers would lose their low digits.
+/// Serialises 128-bit integers as decimal strings, because JSON numbers would lose their low digits.
 mod decimal {
     use serde::{Deserialize, Deserializer, Serializer, de::Error};
 
@@ -153,12 +153,12 @@ pub struct ParameterStatistics {
     pub sigma_empirical: f64,
     /// Root mean square of σ̂/scale.
     pub sigma_predicted: f64,
-    /// Share of trials whose 95 % interval holds the truth; those that failed hold none.
+    /// Share of all trials whose 95 % interval holds the true value; failed trials count as misses.
     pub coverage: f64,
 }
 
 impl Tally {
-    /// No trials yet.
+    /// A tally without trials.
     pub fn new(parameters: usize) -> Self {
         Self {
             succeeded: 0,
@@ -180,7 +180,7 @@ impl Tally {
         self.parameters.len()
     }
 
-    /// Trials run.
+    /// Number of trials, including failed ones.
     pub fn trials(&self) -> u64 {
         self.succeeded + self.failures.len() as u64
     }
@@ -250,9 +250,9 @@ impl Tally {
         }
     }
 
-    /// Coverage averaged over the parameters, and the standard error of that average. The error
-    /// comes from the scatter between trials, so that correlated parameters are not counted as
-    /// independent evidence. A trial that failed covers none.
+    /// Coverage averaged over the parameters, and the standard error of that average. The standard error comes from the
+    /// scatter between trials, so that correlated parameters are not counted as independent evidence. A failed trial
+    /// covers no parameter.
     pub fn mean_coverage(&self) -> (f64, f64) {
         let n = self.trials() as f64;
         let b = self.parameters.len() as f64;
@@ -261,8 +261,9 @@ impl Tally {
         (mean / b, (variance.max(0.0) / n).sqrt() / b)
     }
 
-    /// Empirical over predicted σ pooled over the parameters, √(Σ s² / Σ σ̂²), and its standard
-    /// error, again from the scatter between trials: of squares about the truth, which scatter no less than those about the mean.
+    /// Empirical over predicted σ pooled over the parameters, √(Σ s² / Σ σ̂²), and its standard error. The standard
+    /// error again comes from the scatter between trials: that of the squared deviations from the truth, which scatter
+    /// at least as much as those from the mean.
     pub fn pooled_ratio(&self) -> (f64, f64) {
         let (_, error) = mean(self.succeeded, self.spread, self.spread_squared);
         let of_all = |square: fn(ParameterStatistics) -> f64| -> f64 {
@@ -273,16 +274,16 @@ impl Tally {
         (ratio, 0.5 * ratio * error * self.parameters() as f64 / empirical)
     }
 
-    /// Error over predicted covariance of all parameters together, the root of the mean of [`Outcomes::distance`], and its
-    /// standard error. What the pooled ratio is of each σ, this is of every combination of the parameters. `None` where fewer
-    /// than two trials tell it.
+    /// Error of all parameters jointly over the predicted covariance, which is the root of the mean of
+    /// [`Outcomes::distance`], and its standard error. The pooled ratio tests each σ; this ratio tests every linear
+    /// combination of the parameters. `None` if fewer than two trials have a distance.
     pub fn joint_ratio(&self) -> Option<(f64, f64)> {
         let (mean, error) = mean(self.measured, self.distance, self.distance_squared);
         (self.measured > 1).then(|| (mean.sqrt(), 0.5 * error / mean.sqrt()))
     }
 
-    /// `(bin centre, share of all)` of (θ̂ − θ)/σ̂ pooled over parameters and trials; the first and
-    /// last bin collect what lies beyond.
+    /// Histogram of (θ̂ − θ)/σ̂ pooled over parameters and trials, as pairs `(bin centre, share of all)`. The first and
+    /// the last bin collect all values beyond the range.
     pub fn histogram(&self) -> Vec<(f64, f64)> {
         let all: u64 = self.histogram.iter().sum();
         let centre = |bin: usize| (bin as f64 - 0.5) * BIN_WIDTH - BIN_RANGE;
@@ -291,7 +292,7 @@ impl Tally {
     }
 }
 
-/// Mean of so many `trials` whose values and their squares add up to these, and its standard error.
+/// Mean over `trials` trials and its standard error, from the sum of the values and the sum of their squares.
 fn mean(trials: u64, sum: i128, squares: i128) -> (f64, f64) {
     let n = trials as f64;
     let mean = from_units(sum) / n;
@@ -365,7 +366,7 @@ mod tests {
         );
     }
 
-    /// 50 trials of ±2 and 50 of ±1 about a bias of 3: s² is 2.5 · 100/99, whatever the bias.
+    /// 50 trials of ±2 and 50 of ±1 about a bias of 3: s² is 2.5 · 100/99, regardless of the bias.
     #[test]
     fn the_pooled_ratio_is_about_the_mean() {
         let mut tally = Tally::new(1);

@@ -1,8 +1,8 @@
-//! What can be run trial by trial, saved, resumed, split and merged.
+//! Interface of experiments that are run trial by trial, and can be saved, resumed, split and merged.
 //!
-//! An experiment says what one trial is ([`Trials`]), what identifies a run besides its scenario
-//! ([`Content`]), and what its trials add up to ([`Gathered`]). Everything else is the same for all of
-//! them: [`super::shard`].
+//! An experiment defines what one trial is ([`Trials`]), what identifies a run besides its scenario ([`Content`]), and
+//! what its trials add up to ([`Gathered`]). Everything else is the same for all experiments and is in
+//! [`super::shard`].
 
 use std::fmt::{Debug, Display};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -12,38 +12,38 @@ use serde::{Deserialize, Serialize};
 
 use super::Scenario;
 
-/// An experiment that has been made ready.
+/// An experiment that has been prepared for its trials.
 pub trait Trials: Sync {
-    /// What two parts of one run have in common.
+    /// Part of the header that all parts of one run have in common.
     type Content: Content;
-    /// One thread's memory.
+    /// Working memory of one thread.
     type Worker<'a>: Send
     where
         Self: 'a;
-    /// Why a trial gives nothing.
+    /// Why a trial failed.
     type Error: Display;
 
-    /// Name, text and seed.
+    /// The scenario, for its name, fingerprint and seed.
     fn scenario(&self) -> &Scenario;
 
-    /// See [`Content`].
+    /// The content of the header; see [`Content`].
     fn content(&self) -> Self::Content;
 
-    /// What one thread needs.
+    /// Creates the working memory of one thread.
     fn worker(&self) -> Self::Worker<'_>;
 
-    /// Runs trial `trial`: the same outcome on any worker, whatever it ran before.
+    /// Runs trial `trial`. The outcome is the same on any worker, whatever trials it ran before.
     fn trial(worker: &mut Self::Worker<'_>, trial: u64) -> Result<OutcomeOf<Self>, Self::Error>;
 }
 
-/// What one trial of `T` gives.
+/// Outcome of one trial of `T`.
 pub type OutcomeOf<T> = <GatheredOf<T> as Gathered>::Outcome;
-/// What the trials of `T` add up to.
+/// Sum or list of the outcomes of all trials of `T`.
 pub type GatheredOf<T> = <<T as Trials>::Content as Content>::Gathered;
 
-/// What must be equal for two parts of a run to belong together, besides scenario, seed and length.
+/// Everything, besides scenario, seed and length, that must be equal for two parts to belong to the same run.
 pub trait Content: Debug + Clone + PartialEq + Serialize + DeserializeOwned {
-    /// What the trials add up to.
+    /// Sum or list of the outcomes of the trials.
     type Gathered: Gathered;
     /// Format of the files that hold it.
     const SCHEMA: &'static str;
@@ -51,23 +51,23 @@ pub trait Content: Debug + Clone + PartialEq + Serialize + DeserializeOwned {
     /// The sum of no trials.
     fn nothing(&self) -> Self::Gathered;
 
-    /// The first part in which it differs from `expected`.
+    /// The first part in which the content differs from `expected`.
     fn difference(&self, expected: &Self) -> Option<Difference>;
 }
 
-/// A part in which two runs differ, and its two values.
+/// A part of the header in which two runs differ, with its two values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Difference {
-    /// Which part.
+    /// Name of the part.
     pub what: String,
-    /// Its value.
+    /// Its value in the run at hand.
     pub found: String,
-    /// The value of the run it should belong to.
+    /// Its value in the run to which this one should belong.
     pub expected: String,
 }
 
 impl Difference {
-    /// Of the values of the part `what`, where they differ.
+    /// The difference between two values of the part `what`; `None` if they are equal.
     pub fn between<V: PartialEq + ToString>(
         what: impl Into<String>,
         found: V,
@@ -81,44 +81,44 @@ impl Difference {
     }
 }
 
-/// Sums over trials, or their list: the same in any order.
+/// Sum over trials, or a list of them, that is the same for any order of the trials.
 pub trait Gathered: Debug + Clone + PartialEq + Serialize + DeserializeOwned + Send + Sync {
-    /// What one trial gives.
+    /// Outcome of one trial.
     type Outcome;
 
     /// Adds the outcome of trial `trial`.
     fn gather(&mut self, trial: u64, outcome: Self::Outcome);
 
-    /// Adds a trial that gave nothing.
+    /// Adds a failed trial.
     fn gather_failure(&mut self, failure: Failure);
 
     /// Adds other trials of the same run.
     fn merge(&mut self, other: &Self);
 
-    /// Trials so far, those that gave nothing included.
+    /// Number of trials so far, including failed ones.
     fn trials(&self) -> u64;
 
-    /// Whether the two can be merged without loss.
+    /// Whether `self` and `other` can be merged without loss.
     fn fits(&self, other: &Self) -> bool;
 }
 
-/// A trial that gave nothing.
+/// A failed trial.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Failure {
-    /// Which trial (from 0).
+    /// Number of the trial (from 0).
     pub trial: u64,
-    /// Why.
+    /// Why it failed.
     pub reason: String,
 }
 
-/// Runs trial `trial` and adds what comes of it to `gathered`. A panic inside is a failed trial.
+/// Runs trial `trial` and adds its outcome to `gathered`. A panic inside the trial counts as a failure.
 pub(super) fn run_one<T: Trials>(
     worker: &mut T::Worker<'_>,
     trial: u64,
     gathered: &mut GatheredOf<T>,
 ) {
-    // After a panic the scratch memory may be half written; every use overwrites it.
+    // After a panic the worker's memory may be half written; this is safe because every trial overwrites it.
     let reason = match catch_unwind(AssertUnwindSafe(|| T::trial(worker, trial))) {
         Ok(Ok(outcome)) => return gathered.gather(trial, outcome),
         Ok(Err(error)) => error.to_string(),
