@@ -1,4 +1,4 @@
-//! A blind benchmark made ready, and its trials.
+//! A blind benchmark prepared for its trials, and the trials themselves.
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -18,36 +18,36 @@ use crate::montecarlo::{Scenario, Simulation};
 use crate::plant::faults::{Effect, FaultyPlant};
 use crate::plant::{Measured, PlantError, Recording, SensorConfig};
 
-/// What all trials share.
+/// A prepared blind benchmark: everything that all trials share.
 #[derive(Clone)]
 pub struct Benchmark {
-    /// What is drawn from.
+    /// The plan from which the cases are drawn.
     pub plan: BlindPlan,
     /// The arm's equations of motion.
     pub model: Model,
-    /// Base parameters of the nominal arm.
+    /// Base parameters of the nominal arm, for comparison with the nominal simulation.
     pub simulation: Vec<f64>,
     /// Families of the dictionary.
     pub known: Vec<Kind>,
-    /// The run of the arm without effects along each motion.
+    /// Run of the arm without effects along each motion of the plan.
     pub(super) clean: Vec<Recording>,
 }
 
-/// A trial without an answer.
+/// Why a trial has no answer.
 #[derive(Debug, Error)]
 pub enum BlindError {
     /// The plant did not run.
     #[error("the plant: {0}")]
     Plant(#[from] PlantError),
-    /// The log was not diagnosed.
+    /// The diagnosis failed.
     #[error("{source}; the log: {case}")]
     Diagnose {
-        /// What is in the log.
+        /// The truth about the log.
         case: Box<Case>,
-        /// Why it got no answer.
+        /// Why the diagnosis failed.
         source: DiagnoseError,
     },
-    /// No family fits what was drawn.
+    /// The plan has no family for the kind of case that was drawn.
     #[error("no family can be hidden here")]
     NothingToHide,
 }
@@ -75,12 +75,12 @@ impl Benchmark {
         family.can_be_withheld(&self.known)
     }
 
-    /// The families that are hidden and that `wanted` accepts.
+    /// The families of the plan that `wanted` accepts.
     pub(super) fn open(&self, wanted: impl Fn(&Family) -> bool) -> Vec<&Family> {
         self.plan.families.iter().filter(|f| wanted(f)).collect()
     }
 
-    /// The arm of `scenario` without its effects along motion `motion`.
+    /// Simulation of `scenario` without its effects along motion number `motion`, from the run made beforehand.
     pub(super) fn clean_simulation(
         &self,
         scenario: Scenario,
@@ -91,7 +91,7 @@ impl Benchmark {
         Simulation::with_recording(scenario, plant, self.clean[motion].clone())
     }
 
-    /// The dictionary without what is withheld in `case`.
+    /// The dictionary without the families that are withheld in `case`.
     fn dictionary(&self, case: &Case) -> Vec<Box<dyn Candidate>> {
         let mut families = candidates::all();
         if case.secret == Secret::Withheld {
@@ -103,20 +103,20 @@ impl Benchmark {
         families
     }
 
-    /// What one thread needs.
+    /// Creates the working memory of one thread.
     pub fn worker(&self) -> BlindWorker<'_> {
         BlindWorker { benchmark: self, log: Measured::like(&self.clean[0]) }
     }
 }
 
-/// One thread's memory.
+/// Working memory of one thread.
 pub struct BlindWorker<'a> {
     benchmark: &'a Benchmark,
     log: Measured,
 }
 
 impl BlindWorker<'_> {
-    /// Hides, logs, diagnoses.
+    /// Runs one trial: draws a case, makes its log, diagnoses the log, and records the truth with the answer.
     pub fn trial(&mut self, trial: u64) -> Result<Record, BlindError> {
         let benchmark = self.benchmark;
         let drawn = draw(benchmark, trial)?;
@@ -145,7 +145,7 @@ impl BlindWorker<'_> {
         Ok(Record { trial, case: drawn.case, answer: Answer::of(&diagnosis, gain, &truth) })
     }
 
-    /// What the diagnosis with these families makes of the log.
+    /// Diagnoses the worker's log with a dictionary of these `families`.
     fn diagnose(
         &self,
         families: Vec<Box<dyn Candidate>>,
@@ -171,8 +171,8 @@ impl BlindWorker<'_> {
         Ok(diagnoser.diagnose(&self.log.measurement("hidden"), &held_out, simulation)?.diagnosis)
     }
 
-    /// The noise-free run of the same arm along the next motion, where the case is one of those whose
-    /// gain is measured. A fault of the record adds nothing to the model of the arm that could be judged there.
+    /// The noise-free run of the same arm along the next motion, if the gain is measured for this case. Faults of the
+    /// record are excluded, because they add nothing to the model of the arm that another motion could test.
     fn held_out(&self, drawn: &Drawn) -> Result<Option<Recording>, BlindError> {
         let plan = &self.benchmark.plan;
         let scenario = &drawn.simulation.scenario;
@@ -190,14 +190,14 @@ impl BlindWorker<'_> {
         Ok(Some(simulation.recording))
     }
 
-    /// The motion along which the gain is measured.
+    /// Number of the motion along which the gain is measured: the one after the motion of the log.
     fn next_motion(&self, drawn: &Drawn) -> usize {
         (drawn.motion + 1) % self.benchmark.plan.motions.len()
     }
 
-    /// The next motion of the arm without effects, predicted from a log of that arm with the noise of this trial: all that
-    /// is wrong there is the noise of the parameters, which the right cause cannot remove either. `None` where that log, which is
-    /// not the trial's, gets no answer.
+    /// Prediction of the next motion for the arm without effects, identified from a log of that arm with the noise of
+    /// this trial. Its only error is the noise of the parameters, which the right cause could not remove either. `None`
+    /// if the diagnosis of that log, which is not the log of the trial, fails.
     fn clean_held_out(&mut self, drawn: &Drawn, trial: u64) -> Result<Option<HeldOut>, PlantError> {
         let benchmark = self.benchmark;
         let scenario = drawn.simulation.scenario.clone();
@@ -208,7 +208,7 @@ impl BlindWorker<'_> {
     }
 }
 
-/// What the trials of a blind benchmark have in common.
+/// What all trials of a blind benchmark have in common.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BlindContent {

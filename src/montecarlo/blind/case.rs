@@ -1,4 +1,4 @@
-//! What one trial hides, drawn from its own random numbers.
+//! Cases: what a trial hides, drawn from the trial's own random numbers.
 
 use rand::RngExt;
 use rand::rngs::ChaCha8Rng;
@@ -26,7 +26,7 @@ pub enum Secret {
     Two,
     /// One effect whose family the diagnosis does not know.
     Withheld,
-    /// A change of the arm that the null model absorbs, and a law that it does not.
+    /// A change of the arm, which the null model absorbs, and beside it a law, which it does not.
     Beside,
 }
 
@@ -50,11 +50,11 @@ pub struct Hidden {
     pub kind: Kind,
     /// Joint from 1; `None`: the arm as a whole.
     pub joint: Option<usize>,
-    /// By what it can be seen.
+    /// By what a diagnosis can see the effect.
     pub judged: Judged,
-    /// √λ or √λ_sim of this effect alone; `None` for faults of the record.
+    /// √λ or √λ_sim (see `judged`) of this effect alone; `None` for faults of the record.
     pub strength: Option<f64>,
-    /// Its numbers.
+    /// The effect with its parameters.
     pub effect: Effect,
 }
 
@@ -64,19 +64,19 @@ pub struct Hidden {
 pub struct Case {
     /// What is hidden.
     pub secret: Secret,
-    /// Trajectory.
+    /// Name of the trajectory.
     pub motion: String,
-    /// Colour of the noise.
+    /// Colour of the torque noise.
     pub noise: String,
     /// Whether the diagnosis is given the nominal simulation.
     pub against_simulation: bool,
-    /// The effects.
+    /// The hidden effects.
     pub hidden: Vec<Hidden>,
     /// √λ of all effects together along the log.
     pub sqrt_lambda: f64,
-    /// √λ_sim of the same.
+    /// √λ_sim of all effects together along the log.
     pub sqrt_lambda_sim: f64,
-    /// Of two effects: the cosine of the angle between what the null model leaves of them.
+    /// For two effects: cosine of the angle between their whitened residuals under the null model.
     pub cosine: Option<f64>,
 }
 
@@ -108,17 +108,17 @@ impl std::fmt::Display for Case {
     }
 }
 
-/// Sizes tried for an effect whose √λ is not proportional to its size.
+/// Number of sizes tried for an effect whose √λ is not proportional to its size.
 const PILOTS: usize = 3;
-/// A pilot this close to the √λ that is wanted is good enough.
+/// A pilot whose √λ is within this share of the wanted one is good enough.
 const CLOSE: f64 = 0.1;
 
-/// A case with the arm that makes its log.
+/// A case with the simulation that makes its log.
 pub(super) struct Drawn {
     pub case: Case,
     pub simulation: Simulation,
     pub motion: usize,
-    /// Whether its gain is measured along another motion.
+    /// Whether the gain is measured along another motion.
     pub measures_gain: bool,
 }
 
@@ -191,7 +191,7 @@ fn colour(noise: &NoiseModel) -> &'static str {
     if *noise == NoiseModel::white() { "white" } else { "coloured" }
 }
 
-/// √ of what the effect is judged by.
+/// √λ or √λ_sim, depending on what the effect is judged by.
 fn strength(judged: Judged, size: EffectSize) -> Option<f64> {
     match judged {
         Judged::Residual => Some(size.lambda.sqrt()),
@@ -200,7 +200,7 @@ fn strength(judged: Judged, size: EffectSize) -> Option<f64> {
     }
 }
 
-/// Draws effects and finds their sizes.
+/// Draws effects and finds the sizes that give them the wanted strength.
 struct Maker<'a> {
     benchmark: &'a Benchmark,
     scenario: &'a Scenario,
@@ -209,13 +209,13 @@ struct Maker<'a> {
 }
 
 impl Maker<'_> {
-    /// One effect; of a family that can be withheld, if `withheld`.
+    /// One effect; if `withheld`, of a family that can be withheld.
     fn one(&mut self, withheld: bool, range: [f64; 2]) -> Result<Hidden, BlindError> {
         let benchmark = self.benchmark;
         self.hidden(&benchmark.open(|f| !withheld || benchmark.can_be_withheld(f)), range)
     }
 
-    /// Two effects of different families or at different joints, both to be seen in the residual.
+    /// Two effects of different families or at different joints, both visible in the residual.
     fn two(&mut self) -> Result<Vec<Hidden>, BlindError> {
         let benchmark = self.benchmark;
         let range = benchmark.plan.sqrt_lambda_of_two;
@@ -232,7 +232,7 @@ impl Maker<'_> {
         }
     }
 
-    /// A change that a simulation shows, and a law that the residual does.
+    /// A change, visible against a simulation, and a law, visible in the residual.
     fn beside(&mut self) -> Result<Vec<Hidden>, BlindError> {
         let benchmark = self.benchmark;
         let range = benchmark.plan.sqrt_lambda_of_two;
@@ -241,7 +241,7 @@ impl Maker<'_> {
         Ok(vec![change, law])
     }
 
-    /// An effect of one of `families` whose strength lies in `range`, where its physics allows.
+    /// An effect of one of `families` whose strength lies in `range`, as far as its physics allows.
     fn hidden(&mut self, families: &[&Family], range: [f64; 2]) -> Result<Hidden, BlindError> {
         let family = **families.choose(self.rng).ok_or(BlindError::NothingToHide)?;
         let joint = *family.sites.choose(self.rng).ok_or(BlindError::NothingToHide)?;
@@ -257,7 +257,8 @@ impl Maker<'_> {
         Ok(Hidden { kind: family.kind, joint, judged: family.judged, strength, effect })
     }
 
-    /// The recipe at the size whose strength is `wanted`, and about how strong it is.
+    /// The effect of `recipe` at a size whose strength is about `wanted`, and its estimated strength. The strength is
+    /// `None` if no pilot determined it for this size.
     fn sized(
         &self,
         family: &Family,
@@ -281,7 +282,8 @@ impl Maker<'_> {
         Ok((recipe.effect(size), None))
     }
 
-    /// Strength of `effect` along the log, from one period of it where it repeats.
+    /// Strength of `effect` along the log. If the effect repeats, one period is run and the strength is multiplied by
+    /// √P for P periods.
     fn pilot(&self, judged: Judged, effect: Effect) -> Result<Option<f64>, BlindError> {
         if judged == Judged::Record {
             return Ok(None);

@@ -1,4 +1,4 @@
-//! Which effects are hidden, where, and in which range of sizes.
+//! Families of hidden effects: which effects are hidden, where, and in which range of sizes.
 
 use std::f64::consts::PI;
 
@@ -17,30 +17,30 @@ use crate::plant::faults::{
 };
 use crate::robot::{Arm, JointSignals};
 
-/// By what a diagnosis can see the effect.
+/// By what a diagnosis can see an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Judged {
-    /// What the null model leaves; its size is √λ.
+    /// By the residuals of the null model; the size of the effect is √λ.
     Residual,
-    /// A given simulation, because the null model absorbs it; its size is √λ_sim.
+    /// By comparison with a given simulation, because the null model absorbs the effect; its size is √λ_sim.
     Simulation,
-    /// The readings themselves; it has no size in units of the torque's noise.
+    /// By the readings themselves; the effect has no size in units of the torque noise.
     Record,
 }
 
-/// A family and where it is hidden.
+/// A family of effects and the sites where it is hidden.
 #[derive(Debug, Clone, Copy)]
 pub struct Family {
-    /// Name.
+    /// Name of the family.
     pub kind: Kind,
-    /// How it is judged there.
+    /// By what its effects are seen at these sites.
     pub judged: Judged,
     /// Joints from 1; `None`: the arm as a whole.
     pub sites: &'static [Option<usize>],
 }
 
-/// Joints of the arms in which effects are hidden.
+/// Number of joints of the arms in which effects are hidden.
 pub(super) const JOINTS: usize = 6;
 const EACH: &[Option<usize>] = &[Some(1), Some(2), Some(3), Some(4), Some(5), Some(6)];
 const EACH_AND_ALL: &[Option<usize>] =
@@ -80,8 +80,8 @@ pub const FAMILIES: [Family; 29] = [
     residual(Kind::ReversalWidth, EACH_AND_ALL),
 ];
 
-/// Families that are hidden only where a scenario names them. Whether a drive that feeds another share of friction forward is
-/// named depends on how much drives differ anyway, and √λ does not say.
+/// Families that are hidden only if a scenario names them. Whether a drive that feeds forward another share of friction
+/// is named depends on how much the drives of the arm differ anyway, which √λ does not measure.
 pub(super) const ON_REQUEST: [Family; 1] = [residual(Kind::FeedForward, EACH)];
 
 const fn residual(kind: Kind, sites: &'static [Option<usize>]) -> Family {
@@ -96,18 +96,18 @@ const fn of_the_record(kind: Kind, sites: &'static [Option<usize>]) -> Family {
     Family { kind, judged: Judged::Record, sites }
 }
 
-/// Families whose torque is that of `kind` but for what no log shows: a constant is a friction that differs
-/// by direction, and a spring far from its rest. Where one is withheld, so are they.
+/// Families whose torque no log can distinguish from that of `kind`: a constant torque is also a friction that differs
+/// by direction, and a spring far from its rest position. If `kind` is withheld, they are withheld too.
 pub(super) fn kin(kind: Kind) -> &'static [Kind] {
     const CONSTANT: &[Kind] = &[Kind::CurrentOffset, Kind::AsymmetricFriction, Kind::Spring];
     if CONSTANT.contains(&kind) { CONSTANT } else { &[] }
 }
 
-/// What sizes are measured by.
+/// Circumstances of a trial from which shapes and sizes are derived.
 pub(super) struct Surroundings<'a> {
     /// The nominal arm.
     pub arm: &'a Arm,
-    /// What the clean log's torque is, Nm.
+    /// Torque of the arm without effects along the same motion, Nm.
     pub clean_torque_nm: &'a JointSignals,
     /// Begin and end of the whole periods, s.
     pub window_s: [f64; 2],
@@ -115,18 +115,18 @@ pub(super) struct Surroundings<'a> {
     pub sensors: &'a SensorConfig,
 }
 
-/// An effect of a shape that has been drawn, for any size.
+/// An effect whose shape has been drawn, and whose size is still free.
 pub(super) struct Recipe {
     make: Box<dyn Fn(f64) -> Effect>,
-    /// First size that is tried.
+    /// The size tried first.
     pub start: f64,
-    /// Sizes below or beyond these make no sense, or need steps that are too small.
+    /// Smallest size; sizes outside `least` … `most` make no sense or need too small an integration step.
     pub least: f64,
-    /// See `least`.
+    /// Largest size; see `least`.
     pub most: f64,
-    /// p of √λ ∝ sizeᵖ, about.
+    /// Exponent p of the approximate law √λ ∝ sizeᵖ.
     pub power: f64,
-    /// Whether √λ is proportional to size.
+    /// Whether √λ is proportional to the size.
     pub linear: bool,
 }
 
@@ -144,23 +144,23 @@ impl Recipe {
         Self { make: Box::new(make), start, least, most, power, linear: false }
     }
 
-    /// The effect at `size`.
+    /// The effect with this `size`.
     pub fn effect(&self, size: f64) -> Effect {
         (self.make)(size)
     }
 }
 
-/// Evenly on a logarithmic scale.
+/// Draws a number that is uniformly distributed on a logarithmic scale.
 pub(super) fn log_uniform(rng: &mut ChaCha8Rng, [low, high]: [f64; 2]) -> f64 {
     low * (high / low).powf(rng.random::<f64>())
 }
 
-/// Evenly on a straight scale.
+/// Draws a uniformly distributed number.
 fn uniform(rng: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
     low + (high - low) * rng.random::<f64>()
 }
 
-/// One or the other.
+/// Draws `true` with the given probability.
 pub(super) fn chance(rng: &mut ChaCha8Rng, probability: f64) -> bool {
     rng.random::<f64>() < probability
 }
@@ -170,13 +170,12 @@ fn sign(rng: &mut ChaCha8Rng) -> f64 {
 }
 
 impl Family {
-    /// Whether a diagnosis that knows the families `known` has it, and its effects can be seen in the residual in every
-    /// period.
+    /// Whether the family is one of the `known` families of the dictionary and its effects are seen in the residual.
     pub(super) fn can_be_withheld(&self, known: &[Kind]) -> bool {
         self.judged == Judged::Residual && known.contains(&self.kind)
     }
 
-    /// Draws a shape for the site `site`.
+    /// Draws the shape of an effect at `site`.
     pub(super) fn recipe(
         &self,
         site: Option<usize>,
@@ -204,7 +203,7 @@ impl Family {
                 let exponent =
                     if chance(rng, 0.5) { uniform(rng, 0.4, 0.7) } else { uniform(rng, 1.5, 3.0) };
                 let sign = sign(rng);
-                // At 3 rad/s, the fastest there is, no more than half of the viscous friction.
+                // At 3 rad/s, the highest speed that occurs, at most half of the viscous friction.
                 let most = 0.5 * viscous * 3f64.powf(1.0 - exponent);
                 Recipe::linear(0.2 * most, most, move |s| {
                     let amplitude_nm = sign * s;
@@ -225,14 +224,14 @@ impl Family {
                 Effect::LoadFriction(LoadFriction { joint, mu })
             }),
             Kind::Presliding => {
-                // Bristles of gears give way by 0.1 mrad and more.
+                // The bristles of gears deflect by 0.1 mrad or more before they slip.
                 Recipe::growing(1e-3, [1.0 / 10_000.0, 1.0 / 30.0], 1.0, move |s| {
                     Effect::Presliding(Presliding::new(joint, 1.0 / s))
                 })
             }
             Kind::ReversalWidth => {
                 let epsilon = around.arm.friction_epsilon_rad_s;
-                // Twenty times as sharp or ten times as gradual.
+                // The reversal becomes up to twenty times as sharp or up to ten times as gradual.
                 let (sign, most) = if chance(rng, 0.5) { (-1.0, 0.95) } else { (1.0, 9.0) };
                 Recipe::growing(0.5, [0.01, most], 1.0, move |s| {
                     let width_rad_s = epsilon * (1.0 + sign * s);
@@ -254,7 +253,7 @@ impl Family {
                 })
             }
             Kind::Ripple => {
-                // Once and twice per turn of the wave generator, or a motor's cogging at any order.
+                // Once or twice per turn of the wave generator, or the cogging of a motor at any order.
                 let order_per_turn = match rng.random_range(0..3) {
                     0 => 101.0,
                     1 => 202.0,
@@ -275,8 +274,8 @@ impl Family {
                     })
                 })
             }
-            // Each crossing of the gap leaves the rotor alone for a moment: seen before the angle is. Play
-            // below the encoder's noise is none.
+            // Each crossing of the gap leaves the rotor without load for a moment, which is visible at gaps too small
+            // to be seen in the angle. A gap below the encoder noise of 2e-5 rad does not count as play.
             Kind::Backlash => Recipe::growing(2e-5, [2e-5, 0.02], 0.6, move |gap_rad| {
                 Effect::Backlash(Backlash::new(joint, gap_rad))
             }),

@@ -1,4 +1,4 @@
-//! One answer against its truth.
+//! Judges one answer against the truth.
 
 use super::case::{Case, Hidden, Secret};
 use super::family::Judged;
@@ -6,30 +6,30 @@ use super::record::{Named, Record};
 use crate::diagnose::class_holds;
 use crate::montecarlo::share::Share;
 
-/// Whether `named`, or something that it says it cannot be told from, is what was hidden.
+/// Whether the cause `named`, or one of the aliases in its class, is the hidden effect.
 pub fn is_right(named: &Named, hidden: &Hidden) -> bool {
     let (kind, joint) = (hidden.kind, hidden.joint);
     named.kind == kind && named.joint == joint
         || class_holds(&named.class, named.joint, kind, joint)
 }
 
-/// Whether `named` sits where `hidden` does, whatever it is.
+/// Whether `named` is at the joint of `hidden`, regardless of its kind, or is right by an alias.
 pub fn is_at(named: &Named, hidden: &Hidden) -> bool {
     named.joint == hidden.joint || is_right(named, hidden)
 }
 
-/// How an answer turned out.
+/// Outcome of one answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Outcome {
-    /// The first cause named is what was hidden (of two: both are named); of nothing, nothing.
+    /// The first cause named is the hidden effect. With two effects: both are named. With none: nothing is said.
     Right,
-    /// Nothing was said.
+    /// Nothing was said, although something was hidden.
     Silent,
-    /// Something is there, says the answer, without a name.
+    /// The answer says that something is unexplained, but gives it no name.
     Unexplained,
-    /// A wrong name, and the answer says that something is left unexplained.
+    /// A wrong name is given, but the answer says that something is left unexplained.
     WrongFlagged,
-    /// A wrong name and no doubt.
+    /// A wrong name is given without any reservation.
     Wrong,
 }
 
@@ -46,8 +46,8 @@ impl std::fmt::Display for Outcome {
 }
 
 impl Record {
-    /// How it turned out. Of two effects (or a change and a law), both must be named; where the family is withheld no name is
-    /// right.
+    /// Outcome of the trial. With two effects (or a change and a law) both must be named; if the family is withheld, no
+    /// name is right.
     pub fn outcome(&self) -> Outcome {
         let (named, hidden) = (&self.answer.named, &self.case.hidden);
         let is_flagged = self.answer.left.is_some();
@@ -74,7 +74,8 @@ impl Record {
 }
 
 impl Case {
-    /// What the effects are judged by together: √λ, or √λ_sim of one that the model absorbs.
+    /// Strength of all hidden effects together: √λ, or √λ_sim of a single effect that the null model absorbs. `None`
+    /// without effects, and for a fault of the record.
     pub fn strength(&self) -> Option<f64> {
         match &self.hidden[..] {
             [only] => only.strength,
@@ -83,12 +84,12 @@ impl Case {
         }
     }
 
-    /// Whether one effect is hidden that is judged so.
+    /// Whether the case hides one effect, its family not withheld, and this effect is seen by `judged`.
     pub(super) fn is_one(&self, judged: Judged) -> bool {
         self.secret == Secret::One && self.hidden.iter().all(|h| h.judged == judged)
     }
 
-    /// Whether it is at least as strong as `low`.
+    /// Whether the strength is at least `low`.
     pub(super) fn is_from(&self, low: f64) -> bool {
         self.strength().is_some_and(|s| s >= low)
     }
@@ -100,7 +101,7 @@ impl Record {
         self.answer.named.is_empty() && self.answer.left.is_none()
     }
 
-    /// Whether the first name is a good one for the first effect hidden.
+    /// Whether `good` holds for the first cause named and the first effect hidden.
     pub(super) fn first_is(&self, good: impl Fn(&Named, &Hidden) -> bool) -> bool {
         match (self.answer.named.first(), self.case.hidden.first()) {
             (Some(named), Some(hidden)) => good(named, hidden),
@@ -108,7 +109,8 @@ impl Record {
         }
     }
 
-    /// `(covered, all)` of the parameters of what was named by its own name.
+    /// Counts the parameters of the first hidden effect whose 95 % interval holds the true value. Only counted if the
+    /// first cause named is that effect itself, not an alias of it.
     pub(super) fn covered(&self) -> Share {
         let mut share = Share::default();
         let Some(hidden) = self.case.hidden.first() else { return share };
@@ -118,8 +120,8 @@ impl Record {
             let (Some(truth), Some(p)) = (truth.as_f64(), named.parameters.get(&name)) else {
                 continue;
             };
-            // An interval without width is no claim about chance, and a force on the flange has no torque
-            // that a joint's could be compared with.
+            // An interval without width makes no claim about chance. For a force on the flange, the estimated
+            // torque at a joint cannot be compared with the hidden peak.
             let is_force = hidden.joint.is_none() && name == "peak_nm";
             if p.high <= p.low || is_force {
                 continue;
@@ -132,7 +134,7 @@ impl Record {
     }
 }
 
-/// The angle `a` plus the turns that bring it closest to `b`.
+/// The angle `a` plus the whole number of turns that brings it closest to `b`.
 fn same_turn(a: f64, b: f64) -> f64 {
     let turn = std::f64::consts::TAU;
     a + turn * ((b - a) / turn).round()

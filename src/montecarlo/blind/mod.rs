@@ -1,11 +1,11 @@
-//! The blind benchmark: an arm with something hidden in it (or nothing), one log, one diagnosis, judged
-//! against the truth. Thousands of times.
+//! The blind benchmark: thousands of times, an arm with a hidden effect (or none) makes one log, the log is
+//! diagnosed, and the diagnosis is judged against the truth.
 //!
-//! Enters: a [`BlindPlan`]. Each trial draws its own case from its own random numbers: nothing, one
-//! effect, two, or one whose family is taken out of the dictionary; where it sits, its shape and size,
-//! the motion and the noise. The size is chosen for a √λ that is drawn ([`EffectSize`](super::EffectSize)),
-//! the effect is made by the plant's physics, and the diagnosis sees the log alone. Leaves: one
-//! [`Record`] per trial, and [`Scores`].
+//! Input: a [`BlindPlan`]. Each trial draws its own case from its own random numbers: no effect, one, two, one whose
+//! family is taken out of the dictionary, or a change of the arm beside a law; also the site, shape and size of each
+//! effect, the motion and the noise. The size is chosen to reach a √λ that is drawn
+//! ([`EffectSize`](super::EffectSize)). The plant's physics produces the effect, and the diagnosis sees the log alone.
+//! Output: one [`Record`] per trial, and [`Scores`].
 
 mod benchmark;
 mod case;

@@ -1,4 +1,4 @@
-//! What a blind benchmark draws from: the `[blind]` table of a scenario.
+//! Plan of a blind benchmark: the `[blind]` table of a scenario, from which cases are drawn.
 
 use serde::Deserialize;
 
@@ -11,23 +11,23 @@ use crate::plant::{SensorConfig, Sensors};
 /// A blind benchmark that has been read and checked.
 #[derive(Debug, Clone)]
 pub struct BlindPlan {
-    /// Arm, plant, processing, seed and number of trials; the first motion and the first sensors.
+    /// Arm, plant, processing, seed and number of trials, and the first motion and sensors.
     pub base: Scenario,
     /// Motions, drawn with equal chances.
     pub motions: Vec<Motion>,
     /// Sensors, drawn with equal chances.
     pub sensors: Vec<SensorConfig>,
-    /// What is hidden, and how often.
+    /// Shares of the kinds of cases.
     pub shares: Shares,
-    /// Range of √λ of single effects, drawn evenly on a logarithmic scale.
+    /// Range of √λ (or √λ_sim) of single effects, drawn uniformly on a logarithmic scale.
     pub sqrt_lambda: [f64; 2],
-    /// The same for each of two effects, and for √λ_sim of a change beside a law.
+    /// The same for each of two effects, and for a change (√λ_sim) and the law beside it (√λ).
     pub sqrt_lambda_of_two: [f64; 2],
-    /// Families that are hidden.
+    /// Families from which hidden effects are drawn.
     pub families: Vec<Family>,
-    /// Share of clean logs that are compared with a simulation.
+    /// Share of logs without effects that are compared with the nominal simulation.
     pub against_simulation: f64,
-    /// Share of cases with one effect whose gain is measured along another motion.
+    /// Share of cases with one effect for which the gain is measured along another motion.
     pub held_out: f64,
 }
 
@@ -40,7 +40,7 @@ pub struct Motion {
     pub excitation: Excitation,
 }
 
-/// How often what is hidden; the rest of 1 is nothing.
+/// Shares of the kinds of cases; in the remaining cases nothing is hidden.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Shares {
@@ -50,12 +50,12 @@ pub struct Shares {
     pub two: f64,
     /// One effect whose family the diagnosis does not know.
     pub withheld: f64,
-    /// A change that the model absorbs and a law beside it, compared with the nominal simulation.
+    /// A change that the null model absorbs and a law beside it, compared with the nominal simulation.
     #[serde(default)]
     pub beside: f64,
 }
 
-/// The table as it is written.
+/// The table as it is written in the file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(in crate::montecarlo) struct BlindEntry {
@@ -64,7 +64,7 @@ pub(in crate::montecarlo) struct BlindEntry {
     sqrt_lambda_of_two: [f64; 2],
     against_simulation: f64,
     held_out: f64,
-    /// Only these families are hidden; those that are drawn where left out.
+    /// Families to be hidden; if left out, all of [`FAMILIES`].
     families: Option<Vec<Kind>>,
     #[serde(default)]
     motion: Vec<MotionEntry>,
@@ -72,7 +72,7 @@ pub(in crate::montecarlo) struct BlindEntry {
     sensors: Vec<SensorConfig>,
 }
 
-/// By which a sum of shares may pass 1: 0.33, 0.56 and 0.11 add up to 1.0000000000000002.
+/// Round-off by which the sum of the shares may exceed 1: 0.33, 0.56 and 0.11 add up to 1.0000000000000002.
 const ROUND_OFF: f64 = 1e-9;
 
 impl Shares {
@@ -80,7 +80,7 @@ impl Shares {
         self.one + self.two + self.withheld + self.beside
     }
 
-    /// Refuses shares of what cannot be drawn from `families`.
+    /// Refuses a positive share of a kind of case that cannot be drawn from `families`.
     fn check(self, families: &[Family], source: &Source) -> Result<(), ScenarioError> {
         let known: Vec<Kind> = candidates::all().iter().map(|family| family.kind()).collect();
         let places = |wanted: &dyn Fn(&Family) -> bool| -> usize {
@@ -122,7 +122,7 @@ impl Shares {
 }
 
 impl BlindPlan {
-    /// Checks `entry`; its motions and sensors are those of `base` and more.
+    /// Checks `entry` and makes the plan. Its motions and sensors are those of `base` followed by those of `entry`.
     pub(in crate::montecarlo) fn new(
         mut base: Scenario,
         entry: BlindEntry,
@@ -208,7 +208,7 @@ impl BlindPlan {
 mod tests {
     use crate::montecarlo::Job;
 
-    /// What is wrong with a plan with this `[blind]` table.
+    /// The error, if any, for a plan with this `[blind]` table.
     fn complaint(shares: &str, more: &str) -> Option<String> {
         let text = format!(
             r#"
@@ -256,7 +256,7 @@ mod tests {
         let none = "withheld = 0.0";
         assert_eq!(of(&with(one, none), "\"payload\""), None);
         assert_eq!(of(&with(two, none), "\"stribeck\""), None);
-        // A tilted base has one place; a payload is absorbed by the model.
+        // A tilted base can be hidden at one site only; a payload is absorbed by the null model.
         for family in ["\"base_tilt\"", "\"payload\""] {
             assert!(of(&with(two, none), family).unwrap().contains("blind.shares.two"));
         }

@@ -1,4 +1,4 @@
-//! What became of each trial.
+//! Records: the truth and the answer of each trial.
 
 use std::collections::BTreeMap;
 
@@ -29,13 +29,13 @@ pub struct Named {
     pub kind: Kind,
     /// Joint from 1.
     pub joint: Option<usize>,
-    /// What the data cannot tell from it, as the diagnosis says it.
+    /// Aliases: causes that the data cannot distinguish from this one, in the wording of the diagnosis.
     pub class: Vec<String>,
     /// Stated probability of the class.
     pub confidence: f64,
-    /// √λ̂; `None` where it is not a number.
+    /// √λ̂; `None` if it is not finite.
     pub strength: Option<f64>,
-    /// Parameters whose interval is finite.
+    /// Parameters whose estimate and interval are finite.
     pub parameters: BTreeMap<String, Interval>,
 }
 
@@ -60,35 +60,35 @@ impl Named {
     }
 }
 
-/// What is left without an explanation.
+/// Residual that is left without an explanation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Left {
-    /// On what it depends.
+    /// Variable on which the residual depends.
     pub axis: String,
     /// Joint from 1.
     pub joint: usize,
-    /// Size, Nm.
+    /// Root mean square, Nm.
     pub rms_nm: f64,
 }
 
-/// Squared residuals along a motion that was not used, without noise, summed over the joints in units
-/// of each joint's noise.
+/// Mean squared residuals along a noise-free motion that was not used for the diagnosis, in units of each joint's noise
+/// variance and summed over the joints.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HeldOutGain {
-    /// Of the model without causes.
+    /// Residuals of the model without causes.
     pub before: f64,
-    /// Of the extended model.
+    /// Residuals of the model extended by the causes named.
     pub after: f64,
-    /// Of a model that is right, with parameters identified under the same noise: the same arm without effects, its
-    /// log, and its next motion.
+    /// Residuals of a correct model with parameters identified under the same noise: the null model for the same arm
+    /// without effects, identified from that arm's log and tested on that arm's next motion.
     pub least: f64,
 }
 
 impl HeldOutGain {
-    /// Of the residuals of `hidden` and of those of the arm without effects, with the standard deviations `sd_nm` of
-    /// the noise.
+    /// Sums up the residuals of the arm with its effects (`hidden`) and without them (`clean`); `sd_nm` are the
+    /// standard deviations of the torque noise.
     pub fn of(hidden: &HeldOut, clean: &HeldOut, sd_nm: &[f64]) -> Self {
         let sum =
             |rms_nm: &[f64]| rms_nm.iter().zip(sd_nm).map(|(rms, sd)| (rms / sd).powi(2)).sum();
@@ -99,41 +99,41 @@ impl HeldOutGain {
         }
     }
 
-    /// Share that the causes remove.
+    /// Share of the squared residuals that the causes named remove.
     pub fn share(&self) -> f64 {
         1.0 - self.after / self.before
     }
 
-    /// Share that the right cause could remove at most: the rest is the noise of the arm's parameters.
+    /// Share that the right cause could remove at most; the remainder is due to the noise of the arm's parameters.
     pub fn possible(&self) -> f64 {
         1.0 - self.least / self.before
     }
 }
 
-/// What the diagnosis says.
+/// The answer of the diagnosis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Answer {
-    /// Causes in the order of the diagnosis: faults of the record, then the strongest first.
+    /// Causes in the order of the diagnosis: faults of the record first, then the others, the strongest first.
     pub named: Vec<Named>,
-    /// What is left over.
+    /// The unexplained residual, if any.
     pub left: Option<Left>,
-    /// Gain along another motion, where it was measured.
+    /// Gain along another motion, if it was measured.
     pub gain: Option<HeldOutGain>,
-    /// Base parameters of the extended model whose 95 % interval holds the truth.
+    /// Share of the base parameters of the extended model whose 95 % interval holds the true value.
     pub base: Share,
 }
 
-/// 95 % of a normal distribution lie within so many σ.
+/// 95 % of a normal distribution lie within this many σ of its mean.
 const Z_95: f64 = 1.959_963_984_540_054;
 
-/// Base parameters whose 95 % interval holds the truth.
+/// Share of the base parameters whose 95 % interval holds the true value.
 fn covered(estimates: &[BaseParameter], truth: &[f64]) -> Share {
     Share::of(estimates.iter().zip(truth), |(p, truth)| (p.value - **truth).abs() <= Z_95 * p.sigma)
 }
 
 impl Answer {
-    /// Of a diagnosis; `truth` are the base parameters of the arm that was hidden.
+    /// Extracts the answer from a diagnosis; `truth` are the true base parameters of the arm with its effects.
     pub fn of(diagnosis: &Diagnosis, gain: Option<HeldOutGain>, truth: &[f64]) -> Self {
         Self {
             named: diagnosis.causes.iter().map(Named::of).collect(),
@@ -153,7 +153,7 @@ impl Answer {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
-    /// Which trial.
+    /// Number of the trial.
     pub trial: u64,
     /// The truth.
     pub case: Case,
@@ -161,13 +161,13 @@ pub struct Record {
     pub answer: Answer,
 }
 
-/// All trials, by number.
+/// All trials, sorted by number.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Records {
     /// Trials with an answer.
     pub records: Vec<Record>,
-    /// Trials without.
+    /// Trials without an answer.
     pub failures: Vec<Failure>,
 }
 

@@ -1,4 +1,4 @@
-//! All trials together, against the targets.
+//! Scores: all trials together, judged against the targets.
 
 use std::collections::BTreeMap;
 
@@ -26,91 +26,91 @@ const STRENGTHS: [f64; 12] = [0.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 3
 /// Edges of the bins of stated confidence.
 const CONFIDENCES: [f64; 8] = [0.0, 0.5, 0.8, 0.9, 0.95, 0.99, 0.999, 1.0];
 
-/// Cases of a range of √λ.
+/// The cases in one range of √λ.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StrengthBin {
     /// Range of √λ.
     pub range: [f64; 2],
     /// Mean √λ.
     pub mean: f64,
-    /// Anything was said.
+    /// Cases in which anything was said.
     pub detected: Share,
-    /// Named rightly, joint included.
+    /// Cases named rightly, joint included.
     pub right: Share,
-    /// At the right joint.
+    /// Cases in which the first cause named is at the right joint.
     pub right_joint: Share,
-    /// A wrong name without doubt.
+    /// Cases with a wrong name given without reservation.
     pub wrong: Share,
-    /// Power of the best test there is, mean over the cases.
+    /// Power of the likelihood-ratio test of the right coefficient, mean over the cases.
     pub power: f64,
 }
 
-/// One family's cases.
+/// The cases of one family.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FamilyScore {
     /// Family.
     pub kind: Kind,
-    /// By what it is seen.
+    /// By what its effects are seen.
     pub judged: Judged,
     /// Mean √λ (or √λ_sim); null for faults of the record.
     pub mean_strength: Option<f64>,
-    /// Named rightly, joint included, at √λ ≥ 8 (faults of the record: all).
+    /// Cases named rightly, joint included, at √λ ≥ 8 (faults of the record: all cases).
     pub right: Share,
-    /// At the right joint, as above.
+    /// Of the same cases, those in which the first cause named is at the right joint.
     pub right_joint: Share,
-    /// Nothing was said, as above.
+    /// Of the same cases, those in which nothing was said.
     pub silent: Share,
-    /// Mean number of other things that it is not told from, where it is named rightly.
+    /// Mean number of aliases stated, over the cases named rightly.
     pub mean_class: f64,
-    /// Intervals of its parameters that hold the truth.
+    /// Intervals of the effect's parameters that hold the true value.
     pub covered: Share,
 }
 
-/// How often one family was given the name of another.
+/// Row of the confusion table: the names that one family was given.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Confusion {
-    /// Hidden.
+    /// The family that was hidden.
     pub hidden: Kind,
-    /// What was said first; `nothing` and `unexplained` included.
+    /// Number of cases by the first name given; `nothing` and `unexplained` count as names.
     pub said: BTreeMap<String, u64>,
 }
 
-/// Named causes of a range of stated confidence.
+/// The causes named in one range of stated confidence.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ConfidenceBin {
     /// Range of stated confidence.
     pub range: [f64; 2],
     /// Mean stated confidence.
     pub stated: f64,
-    /// How many are right.
+    /// Causes that are right.
     pub right: Share,
 }
 
-/// Gains along a motion that was not used.
+/// Gains, along a motion that was not used, of the cases in one range of √λ.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GainBin {
     /// Range of √λ.
     pub range: [f64; 2],
-    /// Cases.
+    /// Number of cases.
     pub cases: u64,
-    /// Share of the explainable mean square that is removed, median.
+    /// Median share of the explainable mean square that the causes named remove.
     pub removed: f64,
-    /// What the parameters' own noise allows, median.
+    /// Median share that the noise of the arm's parameters allows to be removed.
     pub possible: f64,
 }
 
-/// What a blind benchmark says.
+/// Result of a blind benchmark.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scores {
     /// Name of the scenario.
     pub scenario: String,
-    /// Trials run.
+    /// Number of trials run.
     pub trials: u64,
     /// Trials without an answer.
     pub failures: Vec<Failure>,
-    /// Stretches of trials that have not been run: `[first, one behind the last]`.
+    /// Ranges of trials that have not been run: `[first, one past the last]`.
     pub missing: Vec<[u64; 2]>,
-    /// Trials by what is hidden.
+    /// Number of trials by what is hidden.
     pub secrets: BTreeMap<Secret, u64>,
     /// The targets.
     pub targets: Vec<Target>,
@@ -118,30 +118,29 @@ pub struct Scores {
     pub residual: Vec<StrengthBin>,
     /// Single effects seen against a simulation, by √λ_sim.
     pub simulation: Vec<StrengthBin>,
-    /// Effects whose family is withheld, by √λ; `right` counts answers that leave something
-    /// unexplained.
+    /// Effects whose family is withheld, by √λ; `right` counts the answers that report something unexplained.
     pub withheld: Vec<StrengthBin>,
-    /// Right at √λ ≥ 8 by motion and noise.
+    /// Share of right answers for single effects seen in the residual at √λ ≥ 8, by motion and noise.
     pub conditions: BTreeMap<String, Share>,
-    /// By family.
+    /// Scores of single effects by family.
     pub families: Vec<FamilyScore>,
-    /// Single effects at √λ ≥ 8.
+    /// Confusion table of single effects at √λ ≥ 8 and of faults of the record.
     pub confusion: Vec<Confusion>,
-    /// Stated confidence of all causes named where no family was withheld.
+    /// Calibration of the stated confidence, over all causes named where no family was withheld.
     pub confidence: Vec<ConfidenceBin>,
-    /// Mean distance between stated confidence and share of right causes.
+    /// Mean absolute difference between stated confidence and share of right causes, weighted by the number of causes.
     pub calibration_error: f64,
-    /// By √λ.
+    /// Gains along another motion, by √λ.
     pub gains: Vec<GainBin>,
-    /// Answers that are not right: false alarms, single effects with √λ ≥ 8, pairs, and wrong
-    /// names of withheld families.
+    /// Answers that are not right: false alarms, single effects with √λ ≥ 8, faults of the record, pairs, and wrong
+    /// names for withheld families.
     pub misses: Vec<Record>,
-    /// All targets together.
+    /// Verdict over all targets.
     pub verdict: Verdict,
 }
 
 impl Scores {
-    /// Of merged shards.
+    /// Scores the trials of merged shards.
     pub fn of(merged: &Merged<BlindContent>) -> Self {
         let all = &merged.tally.records;
         let secret = |s: Secret| all.iter().filter(move |r| r.case.secret == s);
@@ -192,22 +191,22 @@ impl Scores {
         }
     }
 
-    /// Targets met, and targets that could be judged.
+    /// Number of targets met, and number of targets that could be judged.
     pub fn met(&self) -> [usize; 2] {
         let count = |v: Verdict| self.targets.iter().filter(|t| t.verdict == v).count();
         [count(Verdict::Pass), count(Verdict::Pass) + count(Verdict::Fail)]
     }
 }
 
-/// All causes named where no family is withheld, and whether each is something that was hidden.
+/// All causes named in trials where no family is withheld, each with whether it is one of the hidden effects.
 pub fn causes(all: &[Record]) -> impl Iterator<Item = (&Named, bool)> {
     all.iter().filter(|r| r.case.secret != Secret::Withheld).flat_map(|r| {
         r.answer.named.iter().map(|n| (n, r.case.hidden.iter().any(|h| is_right(n, h))))
     })
 }
 
-/// Power of the likelihood-ratio test of one coefficient at √λ, with the share that a family of one shape has in the chance
-/// on each of six joints: Φ(√λ − z₁₋ₐ/₂ₘ), m = 6 families.
+/// Power of the likelihood-ratio test of one coefficient at √λ: Φ(√λ − z₁₋ₐ/₂ₘ). The false-alarm rate a of all laws is
+/// divided evenly among m tests, one for each family of the dictionary at each of six joints.
 pub fn power(sqrt_lambda: f64) -> f64 {
     let tests = 6 * candidates::all().len();
     let normal = Normal::standard();
@@ -292,9 +291,9 @@ fn families(all: &[Record]) -> Vec<FamilyScore> {
         .collect()
 }
 
-/// What was said first where nothing was named.
+/// Name in the confusion table for an answer that says nothing.
 pub const SAID_NOTHING: &str = "nothing";
-/// See [`SAID_NOTHING`].
+/// Name in the confusion table for an answer that reports something unexplained without naming a cause.
 pub const SAID_UNEXPLAINED: &str = "unexplained";
 
 fn confusion<'a>(records: impl Iterator<Item = &'a Record>) -> Vec<Confusion> {
@@ -302,7 +301,7 @@ fn confusion<'a>(records: impl Iterator<Item = &'a Record>) -> Vec<Confusion> {
     for r in records.filter(|r| r.case.is_from(8.0) || r.case.is_one(Judged::Record)) {
         let Some(hidden) = r.case.hidden.first() else { continue };
         let said = match r.answer.named.first() {
-            // A class that holds the truth is a right answer.
+            // An answer whose class contains the hidden effect counts as right.
             Some(named) if is_right(named, hidden) => hidden.kind.name(),
             Some(named) => named.kind.name(),
             None if r.answer.left.is_some() => SAID_UNEXPLAINED,
@@ -361,8 +360,8 @@ fn gains(all: &[Record]) -> Vec<GainBin> {
 mod tests {
     use super::*;
 
-    /// The threshold is z₁₋ₐ/₂ₘ of m = 6 families, and an effect of no size is found with the chance a/2m of one side. Of that
-    /// chance 1 − a/2m keeps eleven digits.
+    /// At the threshold z₁₋ₐ/₂ₘ the power is one half, and an effect of size zero is found with the one-sided
+    /// probability a/2m. In 1 − a/2m eleven digits of this probability survive.
     #[test]
     fn half_the_effects_at_the_threshold_are_found() {
         let one_side = 0.5 * chance::LAW / (6 * candidates::all().len()) as f64;

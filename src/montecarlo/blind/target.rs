@@ -1,4 +1,4 @@
-//! What a blind benchmark is held to.
+//! Targets that a blind benchmark must meet.
 
 use serde::Serialize;
 
@@ -12,10 +12,10 @@ use crate::montecarlo::calibration::Verdict;
 use crate::montecarlo::shard::Merged;
 use crate::montecarlo::share::Share;
 
-/// Fewer cases than this say nothing about a share.
+/// A share of fewer cases than this is not judged.
 const FEWEST: u64 = 20;
 
-/// What is counted by the target that sums up the others.
+/// Name of the headline target.
 pub const NAMED_RIGHTLY: &str = "one effect, √λ ≥ 8: kind (class) and joint right";
 
 /// One target.
@@ -25,13 +25,15 @@ pub struct Target {
     pub what: &'static str,
     /// The count.
     pub share: Share,
-    /// Measured value: the share, or its bound where the target is about that.
+    /// Measured value: the share, or its upper bound if the target is about the bound.
     pub measured: f64,
-    /// Interval that holds the chance behind the share with 95 %; of what one case has many of, from the scatter between cases.
+    /// 95 % confidence interval of the probability behind the share. If each case contributes several counts, the
+    /// interval comes from the scatter between cases.
     pub interval: [f64; 2],
-    /// Least and greatest value that meets the target.
+    /// Smallest and largest value that meet the target.
     pub target: [f64; 2],
-    /// Whether the measured value does; not evaluated of too few cases. The interval says what chance had to do with it.
+    /// Whether the measured value meets the target; not evaluated if there are too few cases. The verdict ignores
+    /// `interval`, which shows how far chance may have moved the value.
     pub verdict: Verdict,
 }
 
@@ -40,8 +42,9 @@ impl Target {
         Self::about(what, share, share.of, share.bounds(0.025), target)
     }
 
-    /// About the sum of what is counted in each of `cases`, in which it goes together: the interval is from the scatter between
-    /// them, the variance of Σ c/Σ n being Σ (c − n Σ c/Σ n)²/(Σ n)²; where they are alike it is as wide as if nothing went together.
+    /// Target about the pooled share of `cases`, each of which contributes n counts, c of them wanted, that are
+    /// correlated within the case. The interval comes from the scatter between the cases: the variance of Σ c/Σ n is Σ
+    /// (c − n Σ c/Σ n)²/(Σ n)². It is never narrower than the interval for independent counts.
     fn of_cases(what: &'static str, cases: impl Iterator<Item = Share>, target: [f64; 2]) -> Self {
         let cases: Vec<Share> = cases.filter(|case| case.of > 0).collect();
         let sum = |f: &dyn Fn(&Share) -> u64| cases.iter().map(f).sum();
@@ -51,12 +54,12 @@ impl Target {
         let count = cases.len() as f64;
         let half = 1.96 * (square * count / (count - 1.0)).sqrt() / all.of as f64;
         let [low, high] = all.bounds(0.025);
-        // Of a single case `half` is no number, and neither `min` nor `max`.
+        // For a single case `half` is NaN, which `min` and `max` ignore.
         let interval = [low.min(all.value() - half), high.max(all.value() + half)];
         Self::about(what, all, cases.len() as u64, interval, target)
     }
 
-    /// About what was counted in so many `cases`, of which chance leaves the `interval`.
+    /// Target about `share`, which was counted in `cases` cases and has the confidence interval `interval`.
     fn about(
         what: &'static str,
         share: Share,
@@ -74,7 +77,8 @@ impl Target {
     }
 }
 
-/// Of the false `alarms`; of so few that none at all would not meet it, it says nothing.
+/// Target about the upper bound of the false `alarms`. It is not evaluated if there are so few cases that even no alarm
+/// at all would miss it.
 fn upper_bound_of(alarms: Share) -> Target {
     let most = 0.01;
     let bound = |count: u64| Share { count, ..alarms }.bounds(0.05)[1];
@@ -93,7 +97,7 @@ fn upper_bound_of(alarms: Share) -> Target {
     }
 }
 
-/// Every target, and what the trials say about it.
+/// All targets, evaluated on the trials.
 pub fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
     let all = &merged.tally.records;
     let is_right = |r: &&Record| r.outcome() == Outcome::Right;
@@ -128,7 +132,7 @@ pub fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
     let is_one = |r: &&Record| r.case.is_one(residual) && r.outcome() == Outcome::Right;
     let base = all.iter().filter(is_one).map(|r| r.answer.base);
     let large = || all.iter().filter(|r| r.case.is_from(40.0)).filter_map(|r| r.answer.gain);
-    // The other targets are about cases that have an answer.
+    // All other targets are about cases that have an answer.
     let failures = merged.tally.failures.len() as u64;
     let silent = Share { count: failures, of: all.len() as u64 + failures };
     vec![
@@ -203,7 +207,8 @@ pub fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
 mod tests {
     use super::*;
 
-    /// Cases of which half have all and half have none: 100 of them say as much as 100 intervals, and no more.
+    /// In half of the cases all intervals hold the truth, in the other half none: 100 such cases carry as much
+    /// information as 100 single intervals, and no more.
     #[test]
     fn what_goes_together_counts_once() {
         let cases = (0..100).map(|i| Share { count: 50 * (i % 2), of: 50 });
@@ -212,7 +217,7 @@ mod tests {
         assert!((low - 0.5 + half).abs() < 1e-12 && (high - 0.5 - half).abs() < 1e-12);
     }
 
-    /// 52 parameters of one case are not 52 cases.
+    /// 52 parameters of one case do not count as 52 cases.
     #[test]
     fn few_cases_are_not_judged() {
         let verdict = |cases: u64, held: u64| {
@@ -227,7 +232,8 @@ mod tests {
         assert_eq!(of(28, 30), Verdict::Fail);
     }
 
-    /// Not even none of 100 is below one of a hundred with 95 %: 0.05^(1/100) is 0.970. None of 299 is.
+    /// Even 0 alarms in 100 cases do not show with 95 % confidence that the rate is below 1 %: 0.05^(1/100) is 0.970. 0
+    /// in 299 do.
     #[test]
     fn a_bound_that_nothing_can_meet_is_not_missed() {
         let verdict = |count, of| upper_bound_of(Share { count, of }).verdict;
