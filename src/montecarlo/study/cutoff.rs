@@ -1,4 +1,4 @@
-//! Bias and scatter against the cutoff frequency, predicted and measured.
+//! Cut-off study: bias and scatter against the cut-off frequency, predicted and measured.
 
 use std::ops::Range;
 
@@ -19,86 +19,86 @@ use crate::plant::{Measured, PerJoint, SensorConfig};
 use crate::robot::JointSignals;
 use crate::signal::ZeroPhase;
 
-/// Cutoffs, Hz.
+/// Cut-off frequencies, Hz.
 const CUTOFFS_HZ: [f64; 12] = [0.75, 1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 40.0];
 /// Noise of the velocity reading, rad/s.
 const VELOCITY_SD_RAD_S: [f64; 4] = [3e-4, 1e-3, 3e-3, 1e-2];
-/// Periods of the record; one more on either side takes up the filters' ends.
+/// Periods of the record. One more period on either side absorbs the end effects of the filters.
 pub(super) const RECORD_PERIODS: usize = 2;
 
-/// The study of the cutoff.
+/// Results of the cut-off study.
 #[derive(Debug, Clone, Serialize)]
 pub struct CutoffStudy {
     /// Name of the scenario.
     pub scenario: String,
-    /// In a sentence.
+    /// Description of the scenario, in a sentence.
     pub description: String,
-    /// Trials behind every point.
+    /// Number of trials behind every point.
     pub trials: u64,
     /// Length of the record, s.
     pub record_s: f64,
-    /// One curve per processing and noise of the velocity.
+    /// One curve per processing and velocity noise.
     pub curves: Vec<Curve>,
-    /// e_N and rms against the length of the record.
+    /// e_N and rms error against the length of the record.
     pub lengths: Vec<RecordLength>,
     /// σ of (20) under several kinds of noise.
     pub sigmas: Vec<SigmaCase>,
 }
 
-/// Who processes the log.
+/// How the log is processed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// Section IV-B: accelerations by (33), plain least squares.
+    /// By the paper's section IV-B: accelerations by (33), plain least squares.
     Paper,
-    /// This program on a single run: low-pass of order 4 on the torque and every column of the
+    /// By this program for a single run: the same low-pass of order 4 on the torque and on every column of the
     /// regressor, weighted least squares.
     Parallel,
 }
 
-/// Error against cutoff.
+/// Error against the cut-off.
 #[derive(Debug, Clone, Serialize)]
 pub struct Curve {
     /// The processing.
     pub method: Method,
-    /// σ_v, rad/s.
+    /// Noise σ_v of the velocity reading, rad/s.
     pub velocity_sd_rad_s: f64,
-    /// Points with rising cutoff.
+    /// Points in the order of rising cut-off.
     pub points: Vec<Point>,
-    /// Measured error of this program where it averages the periods and needs no cutoff.
+    /// Measured error of this program if it averages the periods, for which it needs no cut-off.
     pub averaged_error: f64,
 }
 
-/// One cutoff. All errors are root mean squares over the parameters, each in units of the least σ
-/// that the record's torque noise allows.
+/// Errors at one cut-off. All errors are root mean squares over the parameters, each in units of the smallest σ that
+/// the record's torque noise allows.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Point {
-    /// Cutoff, Hz.
+    /// Cut-off, Hz.
     pub cutoff_hz: f64,
-    /// Bias that the filter alone makes, by formula.
+    /// Bias due to the filter alone, by formula.
     pub filter_bias: f64,
-    /// Bias that the encoder's noise alone makes, by formula.
+    /// Bias due to the encoder noise alone, by formula.
     pub noise_bias: f64,
     /// Scatter, by formula.
     pub scatter: f64,
-    /// Bias of both and scatter together, by formula.
+    /// Total error from both biases and the scatter, by formula.
     pub predicted: f64,
-    /// Error of the estimates, measured.
+    /// Total error of the estimates, measured.
     pub measured: f64,
-    /// Bias measured; chance's share subtracted, not below zero.
+    /// Bias, measured; the contribution of chance is subtracted, with zero as the lower limit.
     pub measured_bias: f64,
-    /// Scatter measured.
+    /// Scatter, measured.
     pub measured_scatter: f64,
 }
 
-/// What the trials of one scenario share.
+/// Everything that the trials of one scenario share.
 pub(super) struct Bench {
     pub simulation: Simulation,
     pub model: Model,
     pub theta: Vec<f64>,
-    /// Samples of one period.
+    /// Number of samples of one period.
     pub period: usize,
-    /// Samples of the record.
+    /// Range of samples of the record.
     pub record: Range<usize>,
 }
 
@@ -137,7 +137,7 @@ impl Bench {
         })
     }
 
-    /// The same run read by other sensors.
+    /// The same run, read by other sensors.
     pub(super) fn read_by(&self, sensors: SensorConfig) -> Result<Self, StudyError> {
         Ok(Self {
             simulation: self.simulation.read_by(sensors)?,
@@ -160,7 +160,7 @@ impl Bench {
         Ok(self.scenario().sensors.torque_sd_per_joint_nm(self.model.dof())?)
     }
 
-    /// The formulas along `motion`, see [`Self::exact_motion`].
+    /// The formulas for the error along `motion`, the result of [`Self::exact_motion`].
     pub(super) fn formulas(&self, motion: &Motion) -> NoisyRegressor<'_> {
         let scenario = self.scenario();
         NoisyRegressor::new(
@@ -173,7 +173,7 @@ impl Bench {
         )
     }
 
-    /// θ̂ by section IV-B.
+    /// Estimate θ̂ by the method of the paper's section IV-B.
     pub(super) fn paper_estimate(
         &self,
         equations: &PaperEquations,
@@ -188,13 +188,15 @@ impl Bench {
     }
 }
 
-/// Response of the fourth-order central difference over that of d/dt, times ω: rad/s.
+/// A(f) of the fourth-order central difference, whose frequency response is jA, in rad/s. An ideal derivative has A =
+/// ω.
 pub(super) fn central_difference(frequency_hz: f64, rate_hz: f64) -> f64 {
     let x = std::f64::consts::TAU * frequency_hz / rate_hz;
     rate_hz * (8.0 * x.sin() - (2.0 * x).sin()) / 6.0
 }
 
-/// The part of `log` that gives equations for exactly the samples of the record.
+/// The part of `log` that yields equations for exactly the samples of the record, given that a processing loses `edge`
+/// samples at either end.
 fn around(bench: &Bench, log: &Measured, edge: usize) -> [JointSignals; 3] {
     let range = bench.record.start - edge..bench.record.end + edge;
     [&log.q_rad, &log.qd_rad_s, &log.torque_nm].map(|signals| signals.slice(range.clone()))
@@ -224,12 +226,13 @@ fn identify(
     Ok(Identifier::new(&bench.model, set, options).identify(&measurement)?.fit.theta)
 }
 
-/// Processing of a single run with a cutoff.
+/// Processing options for a single run with a cut-off.
 fn parallel_options(cutoff_hz: f64) -> Options {
     Options { cutoff_hz, period_s: Some(0.0), ..Options::default() }
 }
 
-/// Estimates of one trial: the paper's and ours at every cutoff, and ours by averaged periods.
+/// Estimates of one trial: by the paper's method and by this program at every cut-off, and by this program from
+/// averaged periods.
 struct Estimates {
     paper: Vec<Vec<f64>>,
     parallel: Vec<Vec<f64>>,
@@ -254,7 +257,7 @@ fn estimates(bench: &Bench, trial: u64) -> Result<Estimates, StudyError> {
     })
 }
 
-/// Measures and predicts everything, `trials` trials per point; `progress` is told the trials done.
+/// Runs the study with `trials` trials per point; `progress` is called with the number of trials done.
 pub fn cutoff_study(
     scenario: &Scenario,
     trials: u64,
@@ -311,18 +314,18 @@ pub fn cutoff_study(
     })
 }
 
-/// Trials that the study runs in all, for its progress.
+/// Total number of trials that the study runs, for its progress.
 pub fn cutoff_study_trials(trials: u64) -> u64 {
     trials * (VELOCITY_SD_RAD_S.len() + super::paper_sigma::CASES) as u64
 }
 
-/// Rms over the parameters, in units of `unit`.
+/// Rms of `value(k)` over the parameters k, each in units of `unit[k]`.
 pub(super) fn rms_in(unit: &[f64], value: impl Fn(usize) -> f64) -> f64 {
     let sum: f64 = (0..unit.len()).map(|k| (value(k) / unit[k]).powi(2)).sum();
     (sum / unit.len() as f64).sqrt()
 }
 
-/// Measured errors of one point.
+/// Measured errors at one cut-off.
 struct Errors {
     total: f64,
     bias: f64,
@@ -339,7 +342,7 @@ impl Errors {
         };
         let scatter = rms_in(unit, |k| variance(k).sqrt());
         let apparent = rms_in(unit, |k| mean(k) - truth[k]);
-        // The mean of `count` trials is off by chance: scatter²/count of its square is not bias.
+        // The mean of `count` trials deviates by chance: the part scatter²/count of its squared deviation is not bias.
         let bias = (apparent * apparent - scatter * scatter / count).max(0.0).sqrt();
         Self { total: bias.hypot(scatter), bias, scatter }
     }
@@ -392,7 +395,7 @@ fn point(
     let unfiltered =
         formulas.outcome(&Treatment { differentiator: &ideal, ..treatment }, &noise(0.0), periods);
     let scatter = rms_in(unit, |k| whole.variance[k].sqrt());
-    // What the sampled motion itself leaves, without any filter, is neither branch's.
+    // The bias that the sampled motion leaves even without a filter belongs to neither branch.
     let filter_bias = rms_in(unit, |k| filter.bias[k] - unfiltered.bias[k]);
     Ok(Point {
         cutoff_hz,
@@ -411,13 +414,14 @@ mod tests {
     use super::*;
     use std::path::Path;
 
-    /// Both ends of the U, parameter by parameter: mean error of the paper's processing at 2 Hz (filter)
-    /// and at 30 Hz with 1e-2 rad/s (noise) against the formula.
+    /// Both ends of the U-shaped curve, parameter by parameter: the mean error of the paper's processing at 2 Hz
+    /// (filter branch) and at 30 Hz with 1e-2 rad/s (noise branch) is compared with the formula.
     ///
-    /// With T trials the mean is known to √(V/T), V by formula. Asked for is a root mean square over the
-    /// parameters below 3 of these, which chance passes in less than 0.3 % of seeds even if all parameters
-    /// were one (the seed is fixed), plus 5 % of the bias: the formula is of first order in the covariance
-    /// of the regressor's noise, which fluctuates by 1/√(samples of a correlation time) ≈ 3 %.
+    /// With T trials the mean is known to √(V/T), with V by formula. The deviation from the formula, as a root mean
+    /// square over the parameters in these units, must stay below 3 plus 5 % of the bias. Even if all parameters were
+    /// perfectly correlated, chance alone would exceed 3 for less than 0.3 % of seeds (the seed is fixed). The 5 %
+    /// allow for the formula being of first order in the covariance of the regressor's noise, which fluctuates by
+    /// 1/√(samples of a correlation time) ≈ 3 %.
     #[test]
     fn both_branches_are_those_of_the_formula() {
         const TRIALS: u64 = 10;

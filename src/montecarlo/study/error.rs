@@ -1,4 +1,4 @@
-//! What can stop a study.
+//! Errors of studies.
 
 use thiserror::Error;
 
@@ -7,42 +7,42 @@ use crate::identify::{FitError, IdentifyError};
 use crate::plant::PlantError;
 use crate::signal::SignalError;
 
-/// A study that cannot be made from this scenario.
+/// Why a study cannot be made from a scenario.
 #[derive(Debug, Error)]
 pub enum StudyError {
-    /// The simulation of the arm.
+    /// The simulation of the arm failed.
     #[error(transparent)]
     Plant(#[from] PlantError),
-    /// The motion.
+    /// The motion is not possible.
     #[error(transparent)]
     Excitation(#[from] ExcitationError),
-    /// Filters.
+    /// A filter is not possible.
     #[error(transparent)]
     Signal(#[from] SignalError),
-    /// Least squares.
+    /// The least-squares fit failed.
     #[error(transparent)]
     Fit(#[from] FitError),
-    /// A log.
+    /// A log could not be identified.
     #[error(transparent)]
     Identify(#[from] IdentifyError),
-    /// Rank of a parameter set.
+    /// The rank of a parameter set is ambiguous.
     #[error(transparent)]
     Base(#[from] crate::base::AmbiguousRank),
-    /// Too short a motion.
+    /// The motion has too few periods.
     #[error(
         "scenario {scenario}: this study needs motion.periods ≥ {needed}, found {found}: {why}"
     )]
     Periods {
         /// Name of the scenario.
         scenario: String,
-        /// Periods found.
+        /// Number of periods found.
         found: usize,
-        /// Periods needed.
+        /// Number of periods needed.
         needed: usize,
-        /// What they are for.
+        /// What the periods are needed for.
         why: &'static str,
     },
-    /// A period is no whole number of samples.
+    /// The period is not a whole number of samples.
     #[error(
         "scenario {scenario}: a period of {period_s} s is not a whole number of samples at {rate_hz} Hz"
     )]

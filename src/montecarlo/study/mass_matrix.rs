@@ -1,4 +1,4 @@
-//! The mass matrix that identified base parameters stand for.
+//! The mass matrix implied by identified base parameters.
 
 use nalgebra::{DMatrix, DVector};
 use rand::rngs::ChaCha8Rng;
@@ -7,13 +7,13 @@ use rand::{RngExt, SeedableRng};
 use crate::base::BaseSet;
 use crate::dynamics::{Model, ParameterLayout, Workspace, regressor};
 
-/// Random poses that are looked at; the same ones every time.
+/// Number of random poses that are examined; they are the same every time.
 const POSES: usize = 400;
 
-/// Share of random poses (|q_j| ≤ π) in which M(q) of the base parameters `theta` is not positive
-/// definite, and the smallest eigenvalue of all of them, kg m².
+/// Share of random poses (|q_j| ≤ π) in which the mass matrix M(q) of the base parameters `theta` is not positive
+/// definite, and the smallest eigenvalue over all poses, kg m².
 ///
-/// M(q) is a function of base parameters alone: its column i is Θ_B(q, 0, e_i) θ − Θ_B(q, 0, 0) θ.
+/// M(q) depends on the base parameters alone: its column i is Θ_B(q, 0, e_i) θ − Θ_B(q, 0, 0) θ.
 pub fn indefinite_share(model: &Model, set: &BaseSet, theta: &[f64]) -> (f64, f64) {
     let n = model.dof();
     let mut standard = DVector::zeros(ParameterLayout::new(n).count());
@@ -61,7 +61,7 @@ mod tests {
         let wrist = (0..set.rank()).find(|&k| set.name(k) == "Ia6").unwrap();
         theta[wrist] = -0.1;
         let (share, least) = indefinite_share(&model, &set, &theta);
-        // The last link's own inertia, 1e-4 kg m², cannot make up for it in any pose.
+        // The last link's own inertia, 1e-4 kg m², cannot compensate the negative rotor inertia in any pose.
         assert!(share == 1.0 && least < -0.05, "{share} {least}");
     }
 }

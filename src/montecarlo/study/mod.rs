@@ -1,6 +1,6 @@
-//! Studies: many methods over many scenarios.
+//! Studies: comparisons of many methods over many scenarios.
 //!
-//! Enters: scenarios. Leaves: tables of what each method claims and what is true.
+//! Input: scenarios. Output: tables of what each method claims and what is true.
 
 mod cutoff;
 mod error;

@@ -1,4 +1,4 @@
-//! Which σ is true under which noise? Every method on the same logs.
+//! Noise study: which σ is true under which noise? All methods run on the same logs.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -17,8 +17,8 @@ use crate::montecarlo::tally::Tally;
 use crate::montecarlo::trials::Failure;
 use crate::plant::Measured;
 
-/// The methods that are compared, in the order of the tables: estimator, covariance, and whether it is
-/// fast enough for every trial (how often the others run is the caller's choice).
+/// The methods that are compared, in the order of the tables: estimator, covariance, and whether the method is fast
+/// enough to run on every trial. The caller chooses how often the slow methods run.
 const METHODS: [(E, C, bool); 17] = [
     (E::Ols, C::Paper, true),
     (E::Ols, C::Ols, true),
@@ -39,77 +39,77 @@ const METHODS: [(E, C, bool); 17] = [
     (E::Spectral, C::Periods, true),
 ];
 
-/// All scenarios of a study.
+/// Results of a study over all its scenarios.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NoiseStudy {
     /// One entry per scenario.
     pub scenarios: Vec<ScenarioResult>,
 }
 
-/// What all methods say of one scenario.
+/// Results of all methods for one scenario.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ScenarioResult {
-    /// Name.
+    /// Name of the scenario.
     pub name: String,
-    /// In a sentence.
+    /// Description of the scenario, in a sentence.
     pub description: String,
-    /// Trials run.
+    /// Number of trials run.
     pub trials: u64,
-    /// The slow methods ran on every so many of them.
+    /// The slow methods ran on one trial out of this many.
     pub slow_every: u64,
-    /// Time for them, s.
+    /// Wall time of all trials, s.
     pub seconds: f64,
-    /// Whether an effect is hidden that the model does not know.
+    /// Whether the arm has a hidden effect that the model does not know.
     pub model_is_wrong: bool,
-    /// Whether the log is treated as one run that does not repeat.
+    /// Whether the log is treated as a single run that does not repeat.
     pub single_run: bool,
-    /// Estimator and covariance that the log calls for.
+    /// Estimator and covariance that the program chooses for such a log.
     pub chosen: [String; 2],
-    /// What is claimed of them, against the trials.
+    /// Checks of the claims about the chosen estimator and covariance.
     pub checks: Vec<CheckSummary>,
-    /// The methods that exist for such logs.
+    /// The methods that are applicable to such logs.
     pub methods: Vec<MethodResult>,
-    /// Trials with a lack-of-fit test.
+    /// Number of trials with a lack-of-fit test.
     pub tested_for_fit: u64,
-    /// Those of them that failed against the scatter of the torque alone, and were tested against that of torque and
-    /// motion.
+    /// Of these, trials whose test failed against the scatter of the torque alone and was repeated against the scatter
+    /// of torque and motion.
     pub tested_again: u64,
-    /// Those of them in which it rejected the model (at [`LackOfFit::REJECT_BELOW`]).
+    /// Of the tested trials, those whose final test rejected the model (at the level [`LackOfFit::REJECT_BELOW`]).
     pub rejected_fits: u64,
 }
 
-/// One method over all trials.
+/// Result of one method over all trials.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MethodResult {
     /// Estimator.
     pub estimator: String,
     /// Covariance.
     pub covariance: String,
-    /// Trials.
+    /// Number of trials.
     pub trials: u64,
-    /// Trials without an estimate.
+    /// Number of trials without an estimate.
     pub failed: u64,
-    /// Coverage of 95 % intervals, mean over the parameters; failed trials cover none.
+    /// Coverage of 95 % intervals, mean over the parameters; failed trials count as misses.
     pub coverage_mean: f64,
-    /// Its standard error, from the scatter between trials.
+    /// Standard error of `coverage_mean`, from the scatter between trials.
     pub coverage_error: f64,
-    /// Coverage of the parameter furthest from 95 %.
+    /// Coverage of the parameter whose coverage is farthest from 95 %.
     pub coverage_worst: f64,
-    /// Where its true value lies with 95 % confidence (Wilson's binomial interval).
+    /// 95 % confidence interval of the true value of `coverage_worst` (Wilson's binomial interval).
     pub coverage_worst_within: [f64; 2],
     /// Its name.
     pub coverage_worst_of: String,
-    /// Empirical over predicted σ: least, pooled, greatest over the parameters.
+    /// Empirical over predicted σ: smallest, pooled (rms) and largest over the parameters.
     pub ratio: [f64; 3],
-    /// Largest |mean error| over σ of any parameter.
+    /// Largest |mean error| over empirical σ of any parameter.
     pub bias_worst: f64,
     /// Its name.
     pub bias_worst_of: String,
-    /// Empirical σ over the Cramér–Rao bound, where the law of the noise is known.
+    /// Empirical σ over the Cramér–Rao bound; `None` where the bound is not known.
     pub efficiency: Option<Efficiency>,
 }
 
-/// Tallies of all methods, in their order.
+/// Tallies of all methods, in the order of [`METHODS`], and counts of the lack-of-fit test.
 struct Tallies {
     methods: Vec<Tally>,
     tested: u64,
@@ -117,10 +117,11 @@ struct Tallies {
     rejected: u64,
 }
 
-/// Runs the scenario's trials, at most `most`, with every method (the slow ones on every
-/// `slow_every`-th trial) on `threads` threads; `progress` is told the number of trials done.
+/// Runs the scenario's trials (at most `most`) with every method on `threads` threads; the slow methods run on every
+/// `slow_every`-th trial only. `progress` is called with the number of trials done.
 ///
-/// A trial's log is simulated and laid out once; every estimator solves it once for all its covariances.
+/// Each trial's log is simulated and its equations are assembled once; each estimator solves them once for all its
+/// covariances.
 pub fn study(
     scenario: Scenario,
     most: Option<u64>,
@@ -177,7 +178,7 @@ pub fn study(
     })
 }
 
-/// One thread's memory.
+/// Working memory of one thread.
 struct Bench<'a> {
     experiment: &'a Experiment,
     identifier: Identifier<'a>,
@@ -205,7 +206,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// The methods that trial `trial` runs, as their indices per estimator.
+/// The methods to run on trial `trial`: for each estimator the indices of its methods in [`METHODS`].
 fn due(trial: u64, slow_every: u64) -> Vec<(E, Vec<usize>)> {
     let mut due: Vec<(E, Vec<usize>)> = Vec::new();
     for (index, (estimator, _, always)) in METHODS.iter().enumerate() {
@@ -298,7 +299,7 @@ impl MethodResult {
         let bias = |k: usize| (statistics[k].bias / statistics[k].sigma_empirical).abs();
         let coverage = furthest(&|k| (statistics[k].coverage - 0.95).abs());
         let biased = furthest(&bias);
-        // The pooled ratio of the empirical σ alone; bias is stated by itself.
+        // The pooled ratio uses the scatter about the mean only; bias is reported separately.
         let pooled = ratios().map(|r| r * r).sum::<f64>() / statistics.len() as f64;
         let sigma: Vec<f64> = statistics
             .iter()
@@ -333,7 +334,7 @@ impl MethodResult {
 }
 
 impl NoiseStudy {
-    /// Level of the lack-of-fit test.
+    /// Significance level of the lack-of-fit test.
     pub fn rejection_level() -> f64 {
         LackOfFit::REJECT_BELOW
     }

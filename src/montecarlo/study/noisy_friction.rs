@@ -1,25 +1,25 @@
-//! The friction columns of a joint whose velocity is noisy, by quadrature.
+//! Moments of a joint's friction columns under velocity noise, by quadrature.
 
 use nalgebra::DMatrix;
 
 use crate::base::BaseSet;
 
-/// A joint's friction columns q̇ + v and tanh((q̇ + v)/ε) under velocity noise v.
+/// Moments of a joint's friction columns q̇ + v and tanh((q̇ + v)/ε) under velocity noise v.
 pub(super) struct NoisyFriction {
-    /// Base index of rv.
+    /// Base index of the viscous friction rv.
     viscous: Option<usize>,
-    /// Base index of rc.
+    /// Base index of the Coulomb friction rc.
     pub(super) coulomb: Option<usize>,
-    /// E tanh((q̇ + v)/ε).
+    /// E tanh((q̇ + v)/ε) at every sample.
     pub(super) mean_sign: Vec<f64>,
-    /// rv + rc E[1 − tanh²]/ε.
+    /// Mean slope of the friction torque over the velocity at every sample, rv + rc E[1 − tanh²]/ε.
     pub(super) slope_nm_s_rad: Vec<f64>,
-    /// Sums over the period of var(q̇ + v), their covariance, var(tanh).
+    /// Sums over the period of var(q̇ + v), cov(q̇ + v, tanh((q̇ + v)/ε)) and var(tanh((q̇ + v)/ε)).
     covariance: [f64; 3],
 }
 
 impl NoisyFriction {
-    /// Of joint `joint` with the base parameters `theta` of `set`, along `qd_rad_s`.
+    /// Computes the moments for joint `joint` (from 0) with the base parameters `theta` of `set`, along `qd_rad_s`.
     pub(super) fn new(
         set: &BaseSet,
         theta: &[f64],
@@ -71,10 +71,10 @@ impl NoisyFriction {
     }
 }
 
-/// Quadrature over a normal number: nodes and weights.
+/// Nodes and weights of a quadrature over the standard normal distribution.
 fn normal_nodes() -> impl Iterator<Item = (f64, f64)> {
     const STEP: f64 = 0.25;
     let density = |x: f64| STEP * (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt();
-    // The trapezoidal rule converges faster than any power of the step; beyond 6 there is 1e-9 left.
+    // The trapezoidal rule converges faster than any power of the step. The tails beyond ±6 hold about 1e-9.
     (-24..=24).map(move |k| (STEP * f64::from(k), density(STEP * f64::from(k))))
 }

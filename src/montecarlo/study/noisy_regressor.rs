@@ -1,32 +1,32 @@
-//! What least squares makes of a regressor that is filtered and noisy: by formula, not by trial.
+//! Formulas for the bias and scatter of least squares with a filtered and noisy regressor.
 //!
-//! The true equations are y = Xθ. A processing solves others: the torque behind G_y, the regressor
-//! behind G_x, in it the acceleration that a differentiator jA(ω) makes of the velocity, and in that
-//! the encoder's white noise v of variance σ_v². With X̄ the mean of the regressor that is used, E what
-//! is random in it, and W the weights of the joints (the velocity itself behind L, 1 in the paper),
+//! The true equations are y = Xθ. The equations that a processing solves differ: the torque is filtered by G_y and the
+//! regressor by G_x. The velocity in the regressor is filtered by L (1 in the paper), and the acceleration is computed
+//! from the velocity by a differentiator with the response jA(ω). The velocity contains the encoder's white noise v of
+//! variance σ_v². With X̄ the mean of the regressor that is used, E its random part, and W the weights of the joints,
 //!
 //! ```text
 //! θ̂ → (X̄ᵀW²X̄ + N)⁻¹ X̄ᵀW² G_y y,   N = E[EᵀW²E]                                  (a)
 //! V  = (X̄ᵀW²X̄ + N)⁻¹ Ω (X̄ᵀW²X̄ + N)⁻¹                                             (b)
 //! ```
 //!
-//! **Filter branch** (N = 0): the acceleration lacks (1 − A/ω) q̈, torque that the parameters make up for.
-//! For (33), A/ω = 1/(1 + (f/f_c)²): a rotor inertia comes out too large by about (f/f_c)², f the
-//! frequency of the motion. It falls as 1/f_c².
+//! **Filter branch** (N = 0): the acceleration lacks the part (1 − A/ω) q̈, and the parameters compensate the missing
+//! torque. For (33), A/ω = 1/(1 + (f/f_c)²): a rotor inertia comes out too large by about (f/f_c)², with f the
+//! frequency of the motion. This bias falls as 1/f_c².
 //!
-//! **Noise branch** (errors in variables): a = A v has the variance
+//! **Noise branch** (errors in variables): the acceleration noise a = A v has the variance
 //!
 //! ```text
 //! σ_a² = σ_v² · mean over all frequencies of (A G_x)²  →  σ_v² ω_c³/(4 f_s) for (33)
 //! N    = σ_a² Σ_i Σ_t D_iᵀW²D_i + N_friction,   D_i = ∂X/∂q̈_i
 //! ```
 //!
-//! which attenuates inertias by σ_a²/var(q̈ | other columns): it grows as f_c³. N_friction is the
-//! covariance of q̇ + Lv and tanh((q̇ + Lv)/ε), by quadrature; it hardly depends on the cutoff. Noise
-//! of velocity and acceleration at one instant are uncorrelated (A is odd).
+//! and attenuates inertias by the share σ_a²/var(q̈ | other columns). This bias grows as f_c³. N_friction is the
+//! covariance of q̇ + Lv and tanh((q̇ + Lv)/ε), by quadrature; it hardly depends on the cut-off. The noise of velocity
+//! and the noise of acceleration at the same instant are uncorrelated (A is odd).
 //!
-//! **Scatter**: Ω has a part of the torque noise (variance s_j², spectrum S, correlation C between joints)
-//! and one of the encoder's noise that passes into the equations' error, first order in v:
+//! **Scatter**: Ω is the sum of a part from the torque noise (variance s_j², spectrum S, correlation C between joints)
+//! and a part from the encoder noise, which enters the error of the equations to first order in v:
 //!
 //! ```text
 //! Ω = Σ_jj' C_jj' s_j s_j' w_j² w_j'² Y_jᵀY_j' + σ_v² Σ_i g_iᵀg_i,   Y = √S G_y X̄
@@ -44,36 +44,36 @@ use crate::dynamics::{Model, Motion};
 use crate::identify::{Assembler, ColumnPlan, Problem};
 use crate::robot::JointSignals;
 
-/// A real response over the frequency in Hz.
+/// A real frequency response as a function of the frequency in Hz.
 pub(super) type Response<'a> = &'a dyn Fn(f64) -> f64;
 
-/// How a processing treats one log.
+/// How a processing filters and weights a log.
 pub(super) struct Treatment<'a> {
-    /// A(f), rad/s: the acceleration is made of the velocity by jA.
+    /// A(f), rad/s: jA is the response that computes the acceleration from the velocity.
     pub differentiator: Response<'a>,
-    /// L: the velocity of the regressor is behind this.
+    /// L, the filter of the velocity in the regressor.
     pub velocity: Response<'a>,
-    /// G_x.
+    /// G_x, the filter of the regressor.
     pub regressor: Response<'a>,
-    /// G_y.
+    /// G_y, the filter of the torque.
     pub torque: Response<'a>,
-    /// w_j.
+    /// w_j, the weights of the joints.
     pub weights: &'a [f64],
 }
 
 /// The noise of a log.
 pub(super) struct LogNoise<'a> {
-    /// σ_v, rad/s.
+    /// σ_v, the noise of the velocity reading, rad/s.
     pub velocity_sd_rad_s: f64,
-    /// s_j, Nm.
+    /// s_j, the torque noise of each joint, Nm.
     pub torque_sd_nm: &'a [f64],
-    /// S(f), its mean over all frequencies 1.
+    /// S(f), the spectrum of the torque noise, with mean 1 over all frequencies.
     pub torque_power: Response<'a>,
-    /// Correlation between any two joints.
+    /// Correlation of the torque noise between any two joints.
     pub torque_correlation: f64,
 }
 
-/// Where the estimates end up.
+/// Bias and variance of the estimates.
 #[derive(Debug, Clone)]
 pub(super) struct Outcome {
     /// Limit of θ̂ minus θ.
@@ -82,7 +82,7 @@ pub(super) struct Outcome {
     pub variance: Vec<f64>,
 }
 
-/// One period of an arm's exact motion with all that the formulas need of it.
+/// One period of an arm's exact motion, with the quantities that the formulas derive from it.
 pub(super) struct NoisyRegressor<'a> {
     model: &'a Model,
     set: &'a BaseSet,
@@ -93,11 +93,11 @@ pub(super) struct NoisyRegressor<'a> {
     rate_hz: f64,
     exact: Columns,
     torque_nm: Vec<Vec<f64>>,
-    /// D_i.
+    /// D_i = ∂X/∂q̈_i.
     slopes: Vec<Columns>,
 }
 
-/// The columns of every joint's equation, each with its base index.
+/// For every joint, the columns of its equation, each with its base index.
 type Columns = Vec<Vec<(usize, Vec<f64>)>>;
 
 fn columns(problem: &Problem) -> Columns {
@@ -111,7 +111,7 @@ fn columns(problem: &Problem) -> Columns {
 }
 
 impl<'a> NoisyRegressor<'a> {
-    /// For one period `motion` of an arm with the base parameters `theta`.
+    /// Prepares the formulas for one period `motion` of an arm with the base parameters `theta`.
     pub(super) fn new(
         model: &'a Model,
         set: &'a BaseSet,
@@ -148,7 +148,8 @@ impl<'a> NoisyRegressor<'a> {
         }
     }
 
-    /// √diag (XᵀWX)⁻¹ over `periods` periods, white torque noise of known size and an exact regressor.
+    /// √diag (XᵀW²X)⁻¹ with W = diag(1/s_j): the σ of `periods` periods with white torque noise of known size and an
+    /// exact regressor.
     pub(super) fn least_sigma(&self, torque_sd_nm: &[f64], periods: f64) -> Vec<f64> {
         let weights: Vec<f64> = torque_sd_nm.iter().map(|s| 1.0 / s).collect();
         let inverse = inverse(self.gram(&self.exact, &weights));
@@ -160,7 +161,7 @@ impl<'a> NoisyRegressor<'a> {
         self.least_sigma(&vec![1.0; self.exact.len()], periods)
     }
 
-    /// (a) and (b) for `periods` periods of data.
+    /// Bias by (a) and variance by (b) for `periods` periods of data.
     pub(super) fn outcome(&self, how: &Treatment, noise: &LogNoise, periods: f64) -> Outcome {
         let b = self.set.rank();
         let n = self.motion.samples();
@@ -240,7 +241,7 @@ impl<'a> NoisyRegressor<'a> {
         }
     }
 
-    /// Ω of the torque noise.
+    /// The part of Ω from the torque noise.
     fn torque_part(&self, mean: &Columns, how: &Treatment, noise: &LogNoise) -> DMatrix<f64> {
         let b = self.set.rank();
         let shape = |f: f64| Complex64::new((noise.torque_power)(f).sqrt() * (how.torque)(f), 0.0);
@@ -268,7 +269,7 @@ impl<'a> NoisyRegressor<'a> {
         omega
     }
 
-    /// g_i: how the score of every parameter answers to v_i; `seen` is G_x X̄.
+    /// Adds g_i, the response of the score of every parameter to the encoder noise v_i, to `score`; `seen` is G_x X̄.
     fn encoder_score(
         &self,
         seen: &Columns,
@@ -278,7 +279,7 @@ impl<'a> NoisyRegressor<'a> {
         score: &mut DMatrix<f64>,
     ) {
         let n = self.motion.samples();
-        // The adjoint of jA.
+        // The adjoint filter of jA.
         let adjoint = |f: f64| Complex64::new(0.0, -(how.differentiator)(f));
         for (j, joint) in seen.iter().enumerate() {
             let slope = product(&self.slopes[i][j], &self.theta, n);
@@ -327,7 +328,7 @@ fn assembled(model: &Model, set: &BaseSet, motion: &Motion, rate_hz: f64) -> Col
     columns(&problem)
 }
 
-/// X_j θ.
+/// X_j θ for the columns of one joint.
 fn product(joint: &[(usize, Vec<f64>)], theta: &[f64], samples: usize) -> Vec<f64> {
     let mut sum = vec![0.0; samples];
     for (base, column) in joint {
@@ -336,7 +337,8 @@ fn product(joint: &[(usize, Vec<f64>)], theta: &[f64], samples: usize) -> Vec<f6
     sum
 }
 
-/// Inverse of a symmetric positive definite matrix, scaled to a unit diagonal first; NaN where it is none.
+/// Inverse of a symmetric positive definite matrix, which is scaled to a unit diagonal first. All entries are NaN if
+/// the matrix is not positive definite.
 fn inverse(mut matrix: DMatrix<f64>) -> DMatrix<f64> {
     let b = matrix.nrows();
     let scale = DVector::from_fn(b, |k, _| 1.0 / matrix[(k, k)].sqrt());
@@ -361,7 +363,7 @@ mod tests {
 
     const RATE_HZ: f64 = 125.0;
 
-    /// One period of the identification trajectory, exactly.
+    /// Exact motion of one period of the identification trajectory.
     fn motion() -> Motion {
         let series = FourierSeries::built_in("ur5_identification").unwrap();
         let samples = (series.period_s * RATE_HZ).round() as usize;
@@ -409,8 +411,9 @@ mod tests {
         values.iter().map(|v| v * v).sum::<f64>().sqrt()
     }
 
-    /// The acceleration lacks tan²(πf/f_s)/tan²(πf_c/f_s) of itself, and less by that share again:
-    /// at most (0.5/20)² = 6e-4. The central difference adds (2πf/f_s)⁴/30 < 1e-8.
+    /// To leading order the filter removes the share tan²(πf/f_s)/tan²(πf_c/f_s) of the acceleration. The relative
+    /// error of this approximation is the same share again, at most (0.5/20)² = 6e-4. The central difference adds
+    /// (2πf/f_s)⁴/30 < 1e-8.
     #[test]
     fn the_filter_branch_falls_with_the_square_of_the_cutoff() {
         with_formulas(|formulas| {
@@ -421,8 +424,8 @@ mod tests {
         });
     }
 
-    /// With white noise of 1 Nm everywhere and an exact regressor the scatter is the paper's (20): at
-    /// 40 Hz the filter takes (0.5/40)² = 1.6e-4 of the acceleration.
+    /// With white noise of 1 Nm on every joint and an exact regressor the scatter equals the paper's (20). The
+    /// regressor is nearly exact: at 40 Hz the filter removes (0.5/40)² = 1.6e-4 of the acceleration.
     #[test]
     fn without_encoder_noise_and_for_unit_noise_the_scatter_is_the_papers_sigma() {
         with_formulas(|formulas| {
@@ -433,7 +436,7 @@ mod tests {
         });
     }
 
-    /// σ_a as stated for fast sampling, and a noise branch that grows with its square.
+    /// σ_a agrees with the formula for fast sampling, and the noise branch grows in proportion to σ_a².
     #[test]
     fn the_noise_branch_grows_with_the_variance_of_the_acceleration() {
         let gain = |cutoff_hz: f64| {
@@ -441,14 +444,14 @@ mod tests {
             let periodic = Periodic::new(12_500, RATE_HZ);
             periodic.noise_gain(|f| central_difference(f, RATE_HZ) * filter.response(f))
         };
-        // σ_a² = σ_v² ω_c³ / (4 f_s) for f_c ≪ f_s. Beyond 10 Hz, where a difference of samples falls behind
-        // the derivative, lie 4 f_c/(π · 10 Hz) = 3 % of σ_a² at f_c = 0.25 Hz, 1.6 % of σ_a.
+        // σ_a² = σ_v² ω_c³ / (4 f_s) for f_c ≪ f_s. Above 10 Hz the central difference falls short of the
+        // derivative; these frequencies hold 4 f_c/(π · 10 Hz) = 3 % of σ_a² at f_c = 0.25 Hz, or 1.6 % of σ_a.
         let sigma = gain(0.25).sqrt();
         let expected = ((std::f64::consts::TAU * 0.25).powi(3) / (4.0 * RATE_HZ)).sqrt();
         assert!((sigma / expected - 1.0).abs() < 0.016, "{sigma}");
         with_formulas(|formulas| {
-            // At 2e-5 rad/s the attenuation is linear in σ_a²; the friction columns' share, which does
-            // not depend on the cutoff, is taken off by a third cutoff.
+            // At 2e-5 rad/s the attenuation is linear in σ_a². The contribution of the friction columns does not
+            // depend on the cut-off; differences to a third cut-off remove it.
             let bias = |hz: f64| {
                 let [with, without] = [2e-5, 0.0].map(|sd| outcome(formulas, hz, sd).bias);
                 with.iter().zip(without).map(|(a, b)| a - b).collect::<Vec<f64>>()

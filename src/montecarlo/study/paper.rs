@@ -1,4 +1,4 @@
-//! The paper's section IV repeated on the simulated arm, and where negative rotor inertias come from.
+//! Repeats the paper's section IV on the simulated arm and studies where negative rotor inertias come from.
 
 use std::ops::Range;
 
@@ -18,67 +18,67 @@ use crate::plant::Measured;
 use crate::plant::faults::{Effect, Presliding, TimeSkew};
 use crate::robot::JointSignals;
 
-/// Section IV on the simulated arm.
+/// Results of section IV on the simulated arm.
 #[derive(Debug, Clone, Serialize)]
 pub struct PaperStudy {
     /// Name of the scenario.
     pub scenario: String,
-    /// In a sentence.
+    /// Description of the scenario, in a sentence.
     pub description: String,
-    /// Time samples m of each trajectory.
+    /// Number of time samples m of each trajectory.
     pub samples: usize,
     /// Rate of the log, Hz.
     pub rate_hz: f64,
-    /// e_N that the noise of the torque alone makes: √(Σ_j s_j² / m).
+    /// e_N due to the torque noise alone: √(Σ_j s_j² / m).
     pub noise_e_n: f64,
-    /// e_N of every arm, parameter set and processing.
+    /// Prediction errors for every arm, parameter set and processing.
     pub errors: Vec<ErrorResult>,
-    /// Repetitions with fresh noise behind the parameters' scatter.
+    /// Number of repetitions with fresh noise from which the scatter of the parameters is computed.
     pub trials: u64,
-    /// The paper's parameters, its (30).
+    /// The paper's parameters (30).
     pub parameters: Vec<ParameterResult>,
-    /// What happens when the arm leaves rest: with the scenario's hidden effects and without them.
+    /// Torque errors when the arm leaves rest, with the scenario's hidden effects and without them.
     pub starts: [StartResult; 2],
-    /// Candidates for negative rotor inertias.
+    /// Candidate mechanisms for negative rotor inertias.
     pub mechanisms: Vec<MechanismResult>,
-    /// What figures 2, 3, 5–7 and 8–11 show.
+    /// The series that figures 2, 3, 5–7 and 8–11 show.
     #[serde(skip)]
     pub traces: [Trace; 2],
 }
 
-/// How well one model predicts.
+/// Prediction error of one model.
 #[derive(Debug, Clone, Serialize)]
 pub struct ErrorResult {
     /// Whether the arm has the scenario's hidden effects.
     pub hidden_effects: bool,
-    /// Parameters of the model.
+    /// Number of parameters of the model.
     pub parameters: usize,
-    /// Whether the torque was low-passed too.
+    /// Whether the torque went through the low-pass too.
     pub torque_filtered: bool,
-    /// The paper's (21) on the identification and on the validation trajectory.
+    /// The paper's error measure (21) on the identification and on the validation trajectory.
     pub e_n: [f64; 2],
     /// Rms of the validation error per joint, Nm.
     pub validation_rms_nm: Vec<f64>,
-    /// Rms per joint of the predicted torque against the torque without noise, Nm.
+    /// Rms per joint of the difference between the predicted torque and the torque without noise, Nm.
     pub validation_rms_without_noise_nm: Vec<f64>,
 }
 
 /// One of the paper's 33 parameters.
 #[derive(Debug, Clone, Serialize)]
 pub struct ParameterResult {
-    /// The combination.
+    /// The linear combination of standard parameters.
     pub formula: String,
-    /// Its unit.
+    /// Unit.
     pub unit: String,
-    /// Its value for the simulated arm, parameters that the set leaves out taken as zero.
+    /// True value for the simulated arm; standard parameters that the set leaves out are taken as zero.
     pub truth: f64,
-    /// Estimate of the first trial.
+    /// Estimate from the first trial.
     pub estimate: f64,
-    /// σ of that trial by (20).
+    /// σ of the first trial by (20).
     pub sigma_paper: f64,
-    /// Mean over the trials.
+    /// Mean of the estimates over the trials.
     pub mean: f64,
-    /// Scatter over the trials.
+    /// Standard deviation of the estimates over the trials.
     pub sigma_empirical: f64,
 }
 
@@ -87,7 +87,7 @@ pub struct ParameterResult {
 pub struct StartResult {
     /// Whether the arm has the scenario's hidden effects.
     pub hidden_effects: bool,
-    /// Measured minus predicted torque at t = 0, noise left out, Nm.
+    /// Measured minus predicted torque at t = 0 without noise, Nm.
     pub error_at_zero_nm: Vec<f64>,
     /// Rms of the same over the whole trajectory, Nm.
     pub rms_nm: Vec<f64>,
@@ -95,7 +95,7 @@ pub struct StartResult {
     pub coulomb_nm: Vec<f64>,
 }
 
-/// What one mechanism does to the identified rotor inertias.
+/// Effect of one mechanism on the identified rotor inertias.
 #[derive(Debug, Clone, Serialize)]
 pub struct MechanismResult {
     /// The mechanism.
@@ -110,32 +110,32 @@ pub struct MechanismResult {
     pub smallest_eigenvalue_kg_m2: f64,
 }
 
-/// Something that may lie behind negative rotor inertias.
+/// A mechanism that may cause negative rotor inertias.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Mechanism {
-    /// Nothing: the reduced model on the rigid arm.
+    /// No mechanism: the reduced model on the rigid arm.
     Nothing,
     /// All torques are read late.
     Delay {
-        /// By this much, s.
+        /// Delay, s.
         delay_s: f64,
     },
-    /// Dry friction of all joints builds up over an angle.
+    /// The dry friction of all joints builds up over an angle (presliding).
     Presliding {
         /// Inverse of the angle, 1/rad.
         stiffness_per_rad: f64,
     },
-    /// Both.
+    /// Both a delay and presliding.
     DelayAndPresliding {
         /// See [`Self::Delay`].
         delay_s: f64,
         /// See [`Self::Presliding`].
         stiffness_per_rad: f64,
     },
-    /// (33) as printed.
+    /// (33) is used as printed.
     LiteralFilter {
-        /// What goes into it.
+        /// Input of (33).
         acceleration: Acceleration,
     },
 }
@@ -162,13 +162,13 @@ impl std::fmt::Display for Mechanism {
     }
 }
 
-/// Delays that are tried, s: 0 … 12 samples at 125 Hz.
+/// Delays that are tried, s: 1 … 12.5 samples at 125 Hz.
 const DELAYS_S: [f64; 6] = [0.008, 0.016, 0.024, 0.050, 0.075, 0.100];
-/// Stiffness of presliding that is tried, 1/rad.
+/// Presliding stiffnesses that are tried, 1/rad.
 const STIFFNESS_PER_RAD: [f64; 4] = [1000.0, 300.0, 100.0, 30.0];
 
 impl Mechanism {
-    /// All that are tried.
+    /// All mechanisms that are tried.
     pub fn all() -> Vec<Self> {
         let delays = DELAYS_S.map(|delay_s| Self::Delay { delay_s });
         let presliding =
@@ -213,7 +213,7 @@ impl Mechanism {
     }
 }
 
-/// One trajectory as the figures show it.
+/// Series of one trajectory as the figures show them.
 #[derive(Debug, Clone)]
 pub struct Trace {
     /// Time from the start, s.
@@ -224,14 +224,14 @@ pub struct Trace {
     pub current_a: JointSignals,
     /// Measured torque, Nm.
     pub measured_nm: JointSignals,
-    /// Torque predicted by the parameters of the identification trajectory, Nm.
+    /// Torque predicted with the parameters from the identification trajectory, Nm.
     pub predicted_nm: JointSignals,
 }
 
-/// The first period leads the arm to where the motion starts; the paper's 20 s follow.
+/// The first period brings the arm to the start of the motion; the paper's 20 s follow.
 const LEAD_PERIODS: usize = 1;
 
-/// A run of the arm along one trajectory, cut to what the paper logs.
+/// A run of the arm along one trajectory, cut to the window that the paper logs.
 struct Run {
     simulation: Simulation,
     window: Range<usize>,
@@ -292,8 +292,8 @@ fn residual(problem: &Problem, theta: &[f64]) -> Residual {
     Residual::from_squares(&problem.residual_squares(theta), &torque, problem.samples)
 }
 
-/// Repeats section IV on `scenario`'s arm; `validation` is the second trajectory, `trials` the number
-/// of repetitions with fresh noise, `progress` is told how many of the arm's runs are done.
+/// Repeats section IV on `scenario`'s arm. `validation` is the second trajectory and `trials` the number of repetitions
+/// with fresh noise. `progress` is called with the number of runs of the arm that are done.
 pub fn paper_study(
     scenario: &Scenario,
     validation: FourierSeries,
@@ -367,7 +367,7 @@ pub fn paper_study(
     })
 }
 
-/// Runs of the arm in a study, for its progress.
+/// Number of runs of the arm in a study, for its progress.
 pub fn paper_study_runs() -> u64 {
     4 + Mechanism::all().len() as u64
 }
@@ -442,7 +442,7 @@ fn start(model: &Model, set: &BaseSet, run: &Run) -> Result<StartResult, StudyEr
     })
 }
 
-/// Value of the base parameter whose kept column is `name`; NaN where there is none.
+/// Value of the base parameter whose kept column is `name`; NaN if there is none.
 fn named(set: &BaseSet, theta: &[f64], name: &str) -> f64 {
     (0..set.rank()).find(|&k| set.name(k) == name).map_or(f64::NAN, |k| theta[k])
 }

@@ -1,4 +1,4 @@
-//! The paper's section IV-B: from the channels of a log to the equations (16).
+//! The paper's section IV-B: how the channels of a log become the equations (16).
 
 use std::ops::Range;
 
@@ -11,38 +11,37 @@ use crate::plant::Measured;
 use crate::robot::JointSignals;
 use crate::signal::{PaperDifferentiator, PaperReading, Scratch, SignalError, ZeroPhase};
 
-/// How accelerations are made of a log by (33), y = s/(s/ω + 1) u, run forward and backward.
+/// How (33), y = s/(s/ω + 1) u, run forward and backward, is used to compute accelerations from a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Acceleration {
-    /// What must be meant: the derivative of the velocity behind a low-pass without phase,
-    /// jω/(1 + (ω/ω_c)²).
+    /// The reading that must be meant: the derivative of the velocity through a zero-phase low-pass, jω/(1 + (ω/ω_c)²).
     Intended,
-    /// As printed, u the velocity: −d²q̇/dt² behind the low-pass.
+    /// As printed, with u the velocity: the low-passed −d²q̇/dt².
     LiteralFromVelocity,
-    /// As printed, u the angle: −q̈ behind the low-pass.
+    /// As printed, with u the angle: the low-passed −q̈.
     LiteralFromAngle,
 }
 
-/// The paper's processing of a log: angles and velocities as they were logged, accelerations by (33).
+/// The paper's processing of a log: angles and velocities as logged, accelerations by (33).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PaperEquations {
     /// Corner frequency f of (33), Hz; 10 in the paper.
     pub cutoff_hz: f64,
-    /// How (33) is read.
+    /// Interpretation of (33).
     pub acceleration: Acceleration,
-    /// Whether the torque goes through the same low-pass 1/(1 + (ω/ω_c)²). The paper does not say
-    /// that it does.
+    /// Whether the torque goes through the same low-pass 1/(1 + (ω/ω_c)²). The paper does not mention such a filter.
     pub torque_filtered: bool,
 }
 
 impl PaperEquations {
-    /// As in section IV-B.
+    /// The settings of section IV-B.
     pub const PAPER: Self =
         Self { cutoff_hz: 10.0, acceleration: Acceleration::Intended, torque_filtered: false };
 
-    /// Θ_B and torque of the samples `filtered` of `log`, of which the rows `kept` (counted within
-    /// `filtered`) become equations: what lies between them takes up the filters' ends.
+    /// Assembles Θ_B and the torque. The filters run over the samples `filtered` of `log`, but only the rows `kept`
+    /// (counted within `filtered`) become equations, so that the samples outside `kept` absorb the end effects of the
+    /// filters.
     pub fn assemble(
         &self,
         model: &Model,

@@ -1,4 +1,4 @@
-//! Where the paper's σ, its (20), is off, and by how much.
+//! Under which noise the paper's σ, its (20), is wrong, and by how much.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -11,14 +11,14 @@ use crate::dynamics::Motion;
 use crate::plant::{Colour, Component, NoiseModel, PerJoint, SensorConfig};
 use crate::signal::ZeroPhase;
 
-/// σ of (20) under one kind of noise.
+/// Comparison of the σ of (20) with the true σ under one kind of noise.
 #[derive(Debug, Clone, Serialize)]
 pub struct SigmaCase {
-    /// The noise of the torque.
+    /// The torque noise, in words.
     pub noise: &'static str,
-    /// Whether the torque was low-passed as the acceleration was.
+    /// Whether the torque went through the same low-pass as the acceleration.
     pub torque_filtered: bool,
-    /// True σ over that of (20), by formula: least, rms, greatest over the parameters.
+    /// True σ over the σ of (20), by formula: smallest, rms and largest over the parameters.
     pub predicted: [f64; 3],
     /// The same, measured.
     pub measured: [f64; 3],
@@ -59,7 +59,7 @@ fn cases(own: &PerJoint) -> [Case; CASES] {
     ]
 }
 
-/// Runs `trials` of every case; `motion` is that of one period.
+/// Runs `trials` trials of every case. `motion` is the exact motion of one period.
 pub(super) fn paper_sigma(
     bench: &Bench,
     motion: &Motion,
@@ -134,7 +134,7 @@ pub(super) fn paper_sigma(
     Ok(results)
 }
 
-/// Least, rms and greatest of `count` values.
+/// Smallest, rms and largest of `count` values.
 fn spread(count: usize, value: impl Fn(usize) -> f64) -> [f64; 3] {
     let values: Vec<f64> = (0..count).map(value).collect();
     let rms = (values.iter().map(|v| v * v).sum::<f64>() / count as f64).sqrt();

@@ -1,10 +1,10 @@
-//! Series of one period behind a filter of known response.
+//! Filtering of periodic series by a filter of known frequency response.
 
 use fourier::Complex64;
 
 use crate::signal::FineClock;
 
-/// Series with one number of samples.
+/// Filters for series of one period with a given number of samples.
 pub(super) struct Periodic {
     samples: usize,
     rate_hz: f64,
@@ -20,14 +20,14 @@ impl Periodic {
         bin as f64 * self.rate_hz / self.samples as f64
     }
 
-    /// One period of a series as it is in the steady state behind a filter with `response`, a
-    /// function of the frequency in Hz.
+    /// Steady-state output, over one period, of a filter with the given `response` (a function of the frequency in Hz)
+    /// whose input is the periodic series `x`.
     pub(super) fn filtered(&self, x: &[f64], response: impl Fn(f64) -> Complex64) -> Vec<f64> {
         self.clock.filtered(x, |bin| response(self.frequency_hz(bin)))
     }
 
-    /// Variance of unit white noise behind a filter whose gain is `gain`: the mean of its square over
-    /// all frequencies.
+    /// Variance of unit white noise after a filter with the given `gain`: the mean of the squared gain over all
+    /// frequencies.
     pub(super) fn noise_gain(&self, gain: impl Fn(f64) -> f64) -> f64 {
         let half = self.samples / 2;
         let sum: f64 = (0..=half)

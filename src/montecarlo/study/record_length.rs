@@ -1,4 +1,4 @@
-//! e_N against the length of the record.
+//! The paper's error measure e_N against the length of the record.
 
 use serde::Serialize;
 
@@ -12,22 +12,22 @@ use crate::montecarlo::scenario::Scenario;
 /// Longest record, periods.
 const LONGEST: usize = 8;
 
-/// One length.
+/// Errors of the fit for one length of the record.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct RecordLength {
     /// Length, s.
     pub record_s: f64,
-    /// Time samples m.
+    /// Number of time samples m.
     pub samples: usize,
-    /// The paper's (21), √(eᵀe)/m, of the fit.
+    /// The paper's error measure (21), √(eᵀe)/m, for the fit.
     pub e_n: f64,
-    /// √(eᵀe/Nm) over all N joints, Nm: an rms.
+    /// Root mean square √(eᵀe/(N m)) over all N joints and m samples, Nm.
     pub rms_nm: f64,
-    /// What noise alone makes of e_N: √(Σ_j s_j²/m) √(1 − b/Nm).
+    /// e_N expected from torque noise alone with b parameters: √(Σ_j s_j²/m) √(1 − b/(N m)).
     pub predicted_e_n: f64,
 }
 
-/// Fits records of 1 … 8 periods of the same run by section IV-B.
+/// Fits records of 1 … 8 periods of the same run by the method of the paper's section IV-B.
 pub(super) fn record_length(scenario: &Scenario) -> Result<Vec<RecordLength>, StudyError> {
     let series = scenario.excitation.series().clone();
     let excitation = Excitation::new(series, scenario.excitation.run_in_s(), LONGEST + 2)?;

@@ -1,4 +1,4 @@
-//! The arm that stands in the laboratory: not the one in the file.
+//! The arm as built, which differs from the arm in the robot file.
 
 use nalgebra::{Cholesky, Matrix4};
 use rand::SeedableRng;
@@ -7,13 +7,13 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::robot::{Arm, LinkInertia};
 
-/// Standard deviation of the log-Cholesky parameters of a body: mass by 20 %, moments by as much.
+/// Standard deviation of the log-Cholesky parameters of a body; mass and moments vary by about 20 %.
 const BODY_SPREAD: f64 = 0.1;
 /// Standard deviation of the logarithms of rotor inertia and friction.
 const DRIVE_SPREAD: f64 = 0.2;
 
-/// `arm` with every body and drive off its nominal values at random, and every body still one that
-/// can exist: P = L U Uᵀ Lᵀ with L Lᵀ the nominal pseudo-inertia and U triangular near 1.
+/// A copy of `arm` in which every body and drive deviates at random from its nominal values, while every body remains
+/// physically possible: its pseudo-inertia is P = L U Uᵀ Lᵀ, with L Lᵀ the nominal one and U triangular and close to 1.
 pub fn as_built(arm: &Arm, seed: u64) -> Arm {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
@@ -49,7 +49,7 @@ mod tests {
         for (a, b) in nominal.joints.iter().zip(&built.joints) {
             assert!(b.link.consistency_margin() > 0.0);
             let ratio = b.link.mass_kg() / a.link.mass_kg();
-            // Three standard deviations of e^(2·0.1 n) and of what the off-diagonals add.
+            // The bounds allow for three standard deviations of e^(2·0.1 n) and of the off-diagonal contributions.
             assert!((0.5..2.0).contains(&ratio) && ratio != 1.0, "{ratio}");
         }
     }

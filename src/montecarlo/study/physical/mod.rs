@@ -1,9 +1,9 @@
-//! What does physical consistency repair, and what not?
+//! Study of physical consistency: what do the constraints repair, and what not?
 //!
-//! The arm of a scenario is replaced by one [as built](as_built), the robot file stays the prior.
-//! Every trial is identified with and without constraints, and both predict another motion.
+//! The arm of a scenario is replaced by an arm [as built](as_built), while the robot file remains the prior. Every
+//! trial is identified with and without the constraints, and both estimates predict another motion.
 //!
-//! Enters: scenarios. Leaves: scatter and model error of both kinds of estimates, and how often a wrong model is called one.
+//! Input: scenarios. Output: scatter and model error of both kinds of estimates, and how often a model is called wrong.
 
 mod as_built;
 mod statistics;
@@ -26,39 +26,40 @@ use crate::montecarlo::scenario::Scenario;
 use trial::Bench;
 use validation::Validation;
 
-/// Ways to estimate that are compared, in the order of [`METHODS`].
+/// Methods of estimation that are compared, in the order of [`METHODS`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
     /// Least squares.
     Unconstrained = 0,
-    /// With the constraints and the default prior, which decides what the data know to less than 100 % of the robot file.
+    /// With the constraints and the default prior, which governs only what the data determine less accurately than to
+    /// 100 % of the robot file's value.
     Constrained = 1,
-    /// With the constant pull-back to the robot file, its weight by cross-validation.
+    /// With the constraints and a constant pull-back to the robot file, whose weight is chosen by cross-validation.
     PullBack = 2,
-    /// With the entropic pull, its weight by cross-validation.
+    /// With the constraints and the entropic prior, whose weight is chosen by cross-validation.
     Entropic = 3,
 }
 
-/// In words.
+/// Names of the methods in results, in the order of [`Method`].
 pub const METHODS: [&str; 4] =
     ["unconstrained", "constrained", "constrained, pull-back prior", "constrained, entropic prior"];
 
-/// The motion that is predicted; no scenario identifies from it.
+/// The motion that is predicted; no scenario uses it for identification.
 pub const VALIDATED_ON: &str = "ur5_validation";
-/// Bootstrap and cross-validation take a hundred solves: only in every such trial.
+/// Default interval between trials with bootstrap and cross-validation, which take about a hundred solves each.
 pub const THOROUGH_EVERY: u64 = 10;
-/// Which arm was built.
+/// Seed that determines the arm as built.
 const AS_BUILT_SEED: u64 = 1;
 
-/// All cases.
+/// Results of all cases.
 #[derive(Debug, Clone, Serialize)]
 pub struct PhysicalStudy {
     /// One entry per scenario.
     pub cases: Vec<CaseResult>,
 }
 
-/// Runs `trials` of `scenario` (its own number where `None`) on the arm as built, every
-/// `thorough_every`th of them with bootstrap and cross-validation.
+/// Runs `trials` trials of `scenario` (the scenario's own number if `None`) on the arm as built, every
+/// `thorough_every`-th of them with bootstrap and cross-validation.
 pub fn physical_case(
     mut scenario: Scenario,
     trials: Option<u64>,
@@ -88,7 +89,7 @@ pub fn physical_case(
         own.map(|trial| (trial, run(&mut bench, trial))).collect::<Vec<_>>()
     };
     let mut outcomes: Vec<_> = (0..threads).into_par_iter().flat_map_iter(share).collect();
-    // Summed in the order of the trials: the same result for any number of threads.
+    // Sum in the order of the trials, so that the result is the same for any number of threads.
     outcomes.sort_by_key(|(trial, _)| *trial);
     let seconds = begun.elapsed().as_secs_f64();
     Ok(CaseResult::of(&experiment, &validation, &outcomes, seconds))

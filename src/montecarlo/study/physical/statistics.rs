@@ -1,4 +1,4 @@
-//! Outcomes of all trials of a case, summed up.
+//! Summary of the outcomes of all trials of a case.
 
 use nalgebra::DVector;
 use serde::Serialize;
@@ -9,64 +9,64 @@ use super::validation::Validation;
 use crate::montecarlo::experiment::Experiment;
 use crate::montecarlo::trials::Failure;
 
-/// What all trials of one scenario say.
+/// Results of all trials of one scenario.
 #[derive(Debug, Clone, Serialize)]
 pub struct CaseResult {
     /// Name of the scenario.
     pub name: String,
-    /// In a sentence.
+    /// Description of the scenario, in a sentence.
     pub description: String,
-    /// Trials with an outcome.
+    /// Number of trials with an outcome.
     pub trials: u64,
-    /// Trials without one.
+    /// Trials without an outcome.
     pub failures: Vec<Failure>,
-    /// Time for them, s.
+    /// Wall time of all trials, s.
     pub seconds: f64,
-    /// Base parameters.
+    /// Number of base parameters.
     pub parameters: usize,
-    /// Share of the unconstrained estimates that no links have.
+    /// Share of the unconstrained estimates that are not realisable by any links.
     pub not_realisable: f64,
-    /// Share with a negative rotor inertia or friction.
+    /// Share of the unconstrained estimates with a negative rotor inertia or friction coefficient.
     pub negative_drive: f64,
-    /// Share whose mass matrix is not positive definite somewhere: unconstrained, constrained.
+    /// Share of estimates whose mass matrix is not positive definite in some pose: unconstrained, constrained.
     pub indefinite: [f64; 2],
-    /// Trials tested for whether the repair cost more than noise explains, and those where it did.
+    /// Number of trials tested for whether the constraints raise the misfit by more than noise explains.
     pub tested: u64,
-    /// See [`Self::tested`].
+    /// Number of these trials in which they do, so that the model is called wrong.
     pub called_wrong: u64,
-    /// Error on the other motion per method; `None` where it was not tried.
+    /// Error on the other motion, per method; `None` if fewer than two trials tried the method.
     pub predictions: [Option<Prediction>; METHODS.len()],
-    /// Coverage of 95 % intervals per σ.
+    /// Coverage of 95 % intervals, for each σ of [`SIGMAS`].
     pub coverage: [Option<Coverage>; SIGMAS.len()],
     /// Median of the cross-validated weights: pull-back, entropic.
     pub weights: [Option<f64>; 2],
 }
 
-/// Error of the predicted torque, percent of the torque, root mean square over the joints.
+/// Error of the predicted torque in percent of the torque, as a root mean square over the joints.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Prediction {
     /// Trials.
     pub trials: usize,
-    /// Root mean square over the trials.
+    /// Total error, root mean square over the trials.
     pub error_percent: f64,
-    /// Its 95 % interval.
+    /// 95 % interval of `error_percent`.
     pub interval_percent: [f64; 2],
-    /// The part that changes from trial to trial.
+    /// The part of the error that changes from trial to trial.
     pub scatter_percent: f64,
-    /// The part that is the same in all trials.
+    /// The part of the error that is the same in all trials.
     pub systematic_percent: f64,
 }
 
-/// How often 95 % intervals hold the truth.
+/// How often 95 % intervals hold the true value.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Coverage {
     /// Trials.
     pub trials: usize,
-    /// Mean over the parameters.
+    /// Coverage, mean over the parameters.
     pub mean: f64,
     /// Standard error of that mean, from the scatter between trials.
     pub standard_error: f64,
-    /// Of the parameter that is covered least.
+    /// Coverage of the parameter that is covered least often.
     pub worst: f64,
 }
 
@@ -120,7 +120,7 @@ impl CaseResult {
 }
 
 impl Prediction {
-    /// From R θ − ρ of every trial.
+    /// Splits the error into its parts, from R θ − ρ of every trial and the square that no θ explains.
     fn of(errors: &[&DVector<f64>], unexplained: f64) -> Option<Self> {
         let trials = errors.len();
         if trials < 2 {

@@ -1,4 +1,4 @@
-//! One log, identified with and without the constraints.
+//! One trial: a log identified with and without the constraints.
 
 use nalgebra::DVector;
 
@@ -11,30 +11,30 @@ use crate::identify::physical::{
 use crate::montecarlo::experiment::{Experiment, TrialError, Worker};
 use crate::montecarlo::study::indefinite_share;
 
-/// What a trial says.
+/// Outcome of one trial.
 #[derive(Debug, Clone)]
 pub struct Outcome {
-    /// R θ − ρ of the validation per method; `None` where it was not tried.
+    /// R θ − ρ of the validation, per method; `None` if the method was not tried.
     pub errors: [Option<DVector<f64>>; METHODS.len()],
-    /// Whether links exist that have the unconstrained base parameters.
+    /// Whether the unconstrained base parameters are realisable, that is, some set of physically possible links has
+    /// them.
     pub realisable: bool,
-    /// Whether a rotor inertia or friction among them is negative.
+    /// Whether a rotor inertia or friction coefficient among the unconstrained base parameters is negative.
     pub negative_drive: bool,
-    /// Whether the unconstrained, and the constrained, mass matrix has a direction without inertia
-    /// somewhere.
+    /// Whether the mass matrix is not positive definite in some pose: unconstrained, constrained.
     pub indefinite: [bool; 2],
-    /// Whether the repair cost more than noise explains; not always tested.
+    /// Whether the constraints raise the misfit by more than noise explains; `None` if not tested.
     pub model_is_wrong: Option<bool>,
-    /// Which 95 % intervals hold the truth, per [`SIGMAS`]; not always tested.
+    /// Which parameters' 95 % intervals hold the true value, for each σ of [`SIGMAS`]; `None` if not computed.
     pub covered: [Option<Vec<bool>>; SIGMAS.len()],
-    /// Weight of the prior by cross-validation, per metric.
+    /// Cross-validated weight of the prior: pull-back, entropic.
     pub weights: [Option<f64>; 2],
 }
 
-/// The σ whose intervals are counted: of the unconstrained estimate, and three of the constrained.
+/// The σ whose intervals are counted: that of the unconstrained estimate, and three of the constrained estimate.
 pub const SIGMAS: [&str; 4] = ["unconstrained", "held", "released", "drawn"];
 
-/// One thread's memory.
+/// Working memory of one thread.
 pub struct Bench<'a> {
     experiment: &'a Experiment,
     worker: Worker<'a>,
@@ -47,14 +47,14 @@ impl<'a> Bench<'a> {
         Self { experiment, worker: experiment.worker(), solver, validation }
     }
 
-    /// Runs a trial; `thorough` ones also draw, test and cross-validate.
+    /// Runs a trial; a `thorough` one also runs the bootstrap, the test of the model and the cross-validation.
     pub fn trial(&mut self, trial: u64, thorough: bool) -> Result<Outcome, Lost> {
         let found = self.worker.identify(trial)?;
         let draws = if thorough { PhysicalOptions::default().bootstrap } else { 0 };
         let plain = PhysicalOptions { bootstrap: draws, seed: trial, ..PhysicalOptions::default() };
         let estimate = self.solve(&found, &plain)?;
         let mut outcome = self.outcome(&found, &estimate);
-        // A single run has no periods to leave out.
+        // Cross-validation leaves out periods, which a single run does not have.
         if thorough && found.fit.theta_periods.len() > 2 {
             for (k, metric) in
                 [PriorMetric::PullBack, PriorMetric::Entropic].into_iter().enumerate()
@@ -108,7 +108,8 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Only those that are base parameters by themselves.
+    /// Whether a rotor inertia or friction coefficient in `theta` is negative; examines the base parameters named after
+    /// one.
     fn has_negative_drive(&self, theta: &[f64]) -> bool {
         let set = &self.experiment.simulation.scenario.set;
         let is_drive = |name: &str| ["Ia", "rv", "rc"].iter().any(|kind| name.starts_with(kind));
@@ -121,13 +122,13 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// A trial without outcome.
+/// Why a trial has no outcome.
 #[derive(Debug, thiserror::Error)]
 pub enum Lost {
-    /// No estimate at all.
+    /// There is no estimate at all.
     #[error(transparent)]
     Trial(#[from] TrialError),
-    /// No constrained estimate.
+    /// There is no constrained estimate.
     #[error(transparent)]
     Physical(#[from] PhysicalError),
 }

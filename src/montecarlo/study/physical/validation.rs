@@ -1,4 +1,4 @@
-//! How well base parameters predict a motion that they were not identified from.
+//! Validation: how well base parameters predict a motion from which they were not identified.
 
 use nalgebra::DVector;
 
@@ -9,15 +9,15 @@ use crate::montecarlo::scenario::{Scenario, ScenarioError};
 use crate::montecarlo::simulation::Simulation;
 use crate::plant::SensorConfig;
 
-/// Error of a prediction on another motion of the same arm, noise-free, reduced to a triangle:
-/// mean over the joints of ‖e_j‖²/‖τ_j‖² = ‖R θ − ρ‖² + (what no θ explains)².
+/// Prediction error on another, noise-free motion of the same arm, reduced to a triangular system: the mean over the
+/// joints of ‖e_j‖²/‖τ_j‖² equals ‖R θ − ρ‖² plus the square of the part that no θ explains.
 #[derive(Debug, Clone)]
 pub struct Validation {
     triangle: Triangle,
 }
 
 impl Validation {
-    /// Runs the arm of `scenario`, with all that is hidden in it, along `trajectory`.
+    /// Runs the arm of `scenario`, including its hidden effects, along `trajectory`.
     pub fn run(scenario: &Scenario, trajectory: &str) -> Result<Self, CaseError> {
         let series = FourierSeries::built_in(trajectory).map_err(ScenarioError::from)?;
         let arm = &scenario.arm;
@@ -34,20 +34,21 @@ impl Validation {
         Ok(Self { triangle: reduced(&regression.problem) })
     }
 
-    /// R θ − ρ.
+    /// R θ − ρ for the base parameters `theta`.
     pub fn error(&self, theta: &[f64]) -> DVector<f64> {
         let b = theta.len();
         let row = |i: usize| (i..b).map(|k| self.triangle.r(i, k) * theta[k]).sum::<f64>();
         DVector::from_iterator(b, self.triangle.rhs(0).iter().enumerate().map(|(i, z)| row(i) - z))
     }
 
-    /// (What no θ explains)².
+    /// Square of the part of the error that no θ explains.
     pub fn unexplained(&self) -> f64 {
         self.triangle.outside(0)
     }
 }
 
-/// All joints' equations, each joint's divided by its torque and by √joints.
+/// Triangular factor of all joints' equations, each joint's equations divided by the norm of its torque and by √N for N
+/// joints.
 fn reduced(problem: &Problem) -> Triangle {
     let (b, n) = (problem.parameters(), problem.samples);
     let mut triangle = Triangle::new(b, 1);
@@ -65,16 +66,16 @@ fn reduced(problem: &Problem) -> Triangle {
     triangle
 }
 
-/// A case that could not be run.
+/// Why a case could not be run.
 #[derive(Debug, thiserror::Error)]
 pub enum CaseError {
-    /// The scenario or the motion to validate on.
+    /// The scenario or the validation motion is not possible.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
-    /// The plant, or the log that all trials are modelled on.
+    /// The plant, or the pilot log on which all trials are modelled, failed.
     #[error(transparent)]
     Trial(#[from] TrialError),
-    /// The constraints of the arm.
+    /// The constraints of the arm could not be set up.
     #[error(transparent)]
     Physical(#[from] crate::identify::physical::PhysicalError),
 }
