@@ -1,19 +1,19 @@
-//! How the plant is run.
+//! Configuration of the plant.
 
 use serde::{Deserialize, Serialize};
 
 use super::error::PlantError;
 
-/// Integration step, rates and controller, the `[plant]` table of a scenario.
+/// Integration step, rates and controller: the `[plant]` table of a scenario.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PlantConfig {
-    /// Step of the Runge–Kutta method, s. Default 1 ms: between decisions the equations of motion hold
-    /// along the log to 2e-5 Nm, friction included (`tests/val_plant.rs` prints the table).
+    /// Step of the Runge–Kutta method, s. Default 1 ms, with which the logged motion satisfies the equations of motion
+    /// to 2e-5 Nm between decisions of the controller, friction included (`tests/val_plant.rs` prints the table).
     pub step_s: f64,
-    /// Rate of the controller, Hz; its period must be a whole number of steps. Default 1000:
-    /// with slower decisions the logged torque, the mean of what was held before and after an instant, is
-    /// visibly off where friction reverses, and biases its identified parameters.
+    /// Rate of the controller, Hz; its period must be a whole number of steps. Default 1000. The logged torque is the
+    /// mean of the torques held before and after an instant; at lower rates this mean is visibly wrong where friction
+    /// reverses, which biases the identified friction parameters.
     pub control_rate_hz: f64,
     /// Rate of the log, Hz; its period must be a whole number of steps. Default 125.
     pub log_rate_hz: f64,
@@ -39,7 +39,7 @@ impl Default for PlantConfig {
 }
 
 impl PlantConfig {
-    /// Checks ranges and that both periods are whole numbers of steps.
+    /// Checks that all values are in range and that the periods of controller and log are whole numbers of steps.
     pub fn validate(&self) -> Result<(), PlantError> {
         for (key, value, zero_allowed) in [
             ("step_s", self.step_s, false),
@@ -60,12 +60,12 @@ impl PlantConfig {
         Ok(())
     }
 
-    /// Steps between two decisions of the controller.
+    /// Number of steps between two decisions of the controller.
     pub fn steps_per_control(&self) -> Result<usize, PlantError> {
         self.steps_in("control_rate_hz", self.control_rate_hz)
     }
 
-    /// Steps between two samples of the log.
+    /// Number of steps between two samples of the log.
     pub fn steps_per_log(&self) -> Result<usize, PlantError> {
         self.steps_in("log_rate_hz", self.log_rate_hz)
     }
@@ -73,7 +73,7 @@ impl PlantConfig {
     fn steps_in(&self, key: &'static str, rate_hz: f64) -> Result<usize, PlantError> {
         let steps = 1.0 / (rate_hz * self.step_s);
         let whole = steps.round();
-        // Rates and steps are decimal numbers: a few units of round-off, or a real mismatch.
+        // Rates and steps are decimal numbers: the deviation is a few units of round-off or a real mismatch.
         if whole < 1.0 || (steps - whole).abs() > 1e-9 * whole {
             return Err(PlantError::Setting {
                 key,

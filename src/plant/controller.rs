@@ -5,15 +5,14 @@ use crate::robot::Arm;
 
 use super::config::PlantConfig;
 
-/// Computed torque about the reference (q_r, q̇_r, q̈_r) with feedback of the readings (q, q̇):
+/// Computed-torque controller about the reference (q_r, q̇_r, q̈_r) with feedback of the readings (q, q̇):
 ///
-/// τ = ID(q_r, q̇_r, q̈_r + ω² (q_r − q) + 2 ζ ω (q̇_r − q̇)), limited to each drive's torque,
+/// τ = ID(q_r, q̇_r, q̈_r + ω² (q_r − q) + 2 ζ ω (q̇_r − q̇)), limited to each drive's torque.
 ///
-/// with ID the inverse dynamics of a nominal arm whose friction is a stated share of the arm's own
-/// (a controller never knows friction fully). The feedback passes through the nominal mass matrix, so
-/// that every joint has the same bandwidth ω and damping ζ in every pose (Siciliano et al., Robotics:
-/// Modelling, Planning and Control, section 8.5.2, with the model evaluated at the reference, as
-/// industrial controllers do).
+/// ID is the inverse dynamics of a nominal arm whose friction is a given share of the arm's own, because a controller
+/// never knows friction fully. The feedback passes through the nominal mass matrix, so that every joint has the same
+/// bandwidth ω and damping ζ in every pose (Siciliano et al., Robotics: Modelling, Planning and Control, section
+/// 8.5.2). As in industrial controllers, the model is evaluated at the reference.
 #[derive(Debug, Clone)]
 pub struct Controller {
     model: Model,
@@ -28,8 +27,8 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// A controller that believes in `nominal`, with gains from `config` and the share `fed_forward` of its friction on each
-    /// joint.
+    /// A controller whose model is `nominal`, with gains from `config`. `fed_forward` is the share of the nominal
+    /// friction that it feeds forward at each joint.
     pub fn new(nominal: &Arm, fed_forward: &[f64], config: &PlantConfig) -> Self {
         let mut believed = nominal.clone();
         for (joint, share) in believed.joints.iter_mut().zip(fed_forward) {
@@ -51,12 +50,13 @@ impl Controller {
         }
     }
 
-    /// Where the reference is to be written before [`Self::torque`] is asked: q, q̇, q̈.
+    /// The reference q, q̇, q̈ (rad, rad/s, rad/s²), to be set before each call of [`Self::torque`].
     pub fn target_mut(&mut self) -> (&mut [f64], &mut [f64], &mut [f64]) {
         (&mut self.q_rad, &mut self.qd_rad_s, &mut self.qdd_rad_s2)
     }
 
-    /// Drive torque (Nm) for the readings (`q_rad`, `qd_rad_s`); whether any drive was at its limit.
+    /// Computes the drive torque (Nm) for the readings (`q_rad`, `qd_rad_s`). Returns whether any drive was at its
+    /// limit.
     pub fn torque(&mut self, q_rad: &[f64], qd_rad_s: &[f64], torque_nm: &mut [f64]) -> bool {
         for (j, command) in self.command_rad_s2.iter_mut().enumerate() {
             *command = self.qdd_rad_s2[j]

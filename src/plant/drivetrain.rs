@@ -1,9 +1,9 @@
-//! What stands between the torque a drive makes and the torque that reaches the link.
+//! Drivetrains: the mechanics between the torque of a drive and the torque that reaches the link.
 
 use super::rapier_arm::RapierArm;
 use crate::robot::Arm;
 
-/// One evaluation of the equations of motion: everything held fixed during it.
+/// Arguments of one evaluation of the equations of motion.
 #[derive(Debug, Clone, Copy)]
 pub struct Stage<'a> {
     /// Time, s.
@@ -18,20 +18,20 @@ pub struct Stage<'a> {
     pub drive_torque_nm: &'a [f64],
 }
 
-/// Joint mechanics: turns drive torque into joint acceleration by way of the links' dynamics.
+/// Joint mechanics: computes joint accelerations from drive torques, using the dynamics of the links.
 ///
-/// It owns the call to [`RapierArm::forward_dynamics`], so that a law that needs the load the gear
-/// really carries can find it (the arm may be asked more than once in a stage), and it may add states
-/// of its own, which are integrated with the joints': bristle deflections, motor angles behind an
-/// elastic gear, temperatures.
+/// A drivetrain itself calls [`RapierArm::forward_dynamics`], if necessary more than once per stage, so that a friction
+/// law can find the load that the gear really carries. It may also have states of its own, which are integrated along
+/// with those of the joints: bristle deflections, motor angles behind an elastic gear, temperatures.
 pub trait Drivetrain: Send {
-    /// Number of states of its own.
+    /// Number of the drivetrain's own states.
     fn states(&self) -> usize {
         0
     }
 
-    /// Prepares the arm and the own states for a run whose encoders read (`q_rad`, `qd_rad_s`) at its
-    /// start, and leaves there where the links are (the same where nothing gives way).
+    /// Prepares the arm and the own states for a run at whose start the encoders read (`q_rad`, `qd_rad_s`). Replaces
+    /// both by the angles and speeds of the links, which are the same if the gears are rigid and the encoders have no
+    /// offset.
     fn start(
         &mut self,
         arm: &mut RapierArm,
@@ -40,25 +40,25 @@ pub trait Drivetrain: Send {
         states: &mut [f64],
     );
 
-    /// Replaces the links' angles and speeds by those of what the encoders sit on, their errors of
-    /// mounting included. By default they sit on the joints themselves.
+    /// Replaces the links' angles and speeds by those at the encoders, including mounting errors. By default the
+    /// encoders are on the joints themselves.
     fn encoder_side(&self, _states: &[f64], _q_rad: &mut [f64], _qd_rad_s: &mut [f64]) {}
 
-    /// Replaces the links' accelerations by those of what the encoders sit on, from the own states'
-    /// time derivatives. By default they are the same.
+    /// Replaces the links' accelerations by those at the encoders, from the time derivatives of the own states. By
+    /// default they are the same.
     fn encoder_acceleration(&self, _states_rate: &[f64], _qdd_rad_s2: &mut [f64]) {}
 
-    /// Into how many parts a step may be divided where [`Self::fastest_decay_per_s`] asks for it.
-    /// By default a step that is too long is refused.
+    /// Largest number of parts into which a step may be divided if [`Self::fastest_decay_per_s`] requires it. By
+    /// default a step that is too long is refused.
     fn most_substeps(&self) -> usize {
         1
     }
 
-    /// Fastest rate (1/s) at which it makes a disturbance of a joint's speed decay, given the arm's
-    /// diag(M⁻¹) in kg⁻¹ m⁻²: what limits the step of an explicit integrator.
+    /// Fastest rate (1/s) at which a disturbance of a joint's speed decays, given the arm's diag(M⁻¹) in kg⁻¹ m⁻². This
+    /// rate limits the step of an explicit integrator.
     fn fastest_decay_per_s(&self, inverse_inertia_per_kg_m2: &[f64]) -> f64;
 
-    /// Joint accelerations `qdd_rad_s2` (rad/s²) and the own states' time derivatives.
+    /// Computes the joint accelerations `qdd_rad_s2` (rad/s²) and the time derivatives of the own states.
     fn rates(
         &mut self,
         arm: &mut RapierArm,
@@ -68,7 +68,7 @@ pub trait Drivetrain: Send {
     );
 }
 
-/// A stiff gear with the regularised friction of the paper's (2) and (3):
+/// A rigid gear with the regularised friction of the paper's (2) and (3):
 /// τ_link = τ_drive − rv q̇ − rc tanh(q̇/ε).
 #[derive(Debug, Clone)]
 pub struct RigidDrivetrain {
@@ -79,7 +79,7 @@ pub struct RigidDrivetrain {
 }
 
 impl RigidDrivetrain {
-    /// Friction and rotors of `arm`.
+    /// The drivetrain with the friction and the rotor inertias of `arm`.
     pub fn new(arm: &Arm) -> Self {
         let joints = arm
             .joints

@@ -1,11 +1,11 @@
-//! What can stop a simulation.
+//! Errors of simulations.
 
 use thiserror::Error;
 
-/// A plant that cannot be built, a configuration that cannot be run, or a run that broke down.
+/// Why a plant cannot be built, a configuration cannot be run, or a run broke down.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum PlantError {
-    /// A link that no mass distribution has. The engine would clamp it silently.
+    /// The inertia of a link is not that of any mass distribution. The engine would silently clamp it.
     #[error(
         "joint {joint}: no body has mass {mass_kg} kg and principal moments {principal_kg_m2:?} \
          kg m2 (smallest eigenvalue of the pseudo-inertia {margin:.3e}, must be positive)"
@@ -20,7 +20,7 @@ pub enum PlantError {
         /// Smallest eigenvalue of the pseudo-inertia.
         margin: f64,
     },
-    /// The engine holds another inertia tensor than the one it was given.
+    /// The engine holds a different inertia tensor from the one it was given.
     #[error(
         "joint {joint}: the engine changed the inertia tensor by {difference_kg_m2:.3e} kg m2 \
          (largest entry), more than round-off"
@@ -31,7 +31,7 @@ pub enum PlantError {
         /// Largest difference of an entry, kg m².
         difference_kg_m2: f64,
     },
-    /// A setting outside its range.
+    /// A setting is outside its range.
     #[error("{key} = {value}: {requirement}")]
     Setting {
         /// The key in the scenario.
@@ -41,7 +41,7 @@ pub enum PlantError {
         /// What it must be.
         requirement: &'static str,
     },
-    /// Friction is too steep, or a gear too stiff, for the step: the integration would chatter.
+    /// Friction is too steep, or a gear too stiff, for the integration step: the integration would chatter.
     #[error(
         "step_s = {step_s}: the joint mechanics (friction at standstill, bristles, gears) are as fast \
          as {decay_per_s:.0} /s, which needs a step of at most {longest_s:.2e} s, a larger \
@@ -55,12 +55,12 @@ pub enum PlantError {
         /// The longest step accepted, s.
         longest_s: f64,
     },
-    /// A hidden effect whose numbers make no sense.
+    /// A parameter of a hidden effect makes no sense.
     #[error("effect {number} ({kind}): {key} = {value}: {requirement}")]
     Effect {
-        /// Its place among the scenario's effects, from 1.
+        /// Number of the effect within the scenario, from 1.
         number: usize,
-        /// Its kind.
+        /// Kind of the effect.
         kind: &'static str,
         /// The key.
         key: &'static str,
@@ -69,7 +69,7 @@ pub enum PlantError {
         /// What it must be.
         requirement: &'static str,
     },
-    /// Effects that together turn friction of a joint into a drive.
+    /// The effects together make the friction of a joint drive the joint.
     #[error(
         "joint {joint}: the effects leave {torque_nm:.3} Nm of friction at {qd_rad_s:.3} rad/s, which \
          would drive the joint instead of slowing it"
@@ -77,9 +77,9 @@ pub enum PlantError {
     FrictionDrives {
         /// Joint, from 1.
         joint: usize,
-        /// Speed at which it does, rad/s.
+        /// Speed at which it drives the joint, rad/s.
         qd_rad_s: f64,
-        /// Friction there, Nm.
+        /// Friction at that speed, Nm.
         torque_nm: f64,
     },
     /// A list with one entry per joint has another length.
@@ -92,7 +92,7 @@ pub enum PlantError {
         /// Joints of the arm.
         expected: usize,
     },
-    /// The state left the finite numbers.
+    /// The state is no longer finite.
     #[error(
         "the simulation broke down at t = {time_s} s: joint {joint} at {q_rad} rad, {qd_rad_s} rad/s"
     )]

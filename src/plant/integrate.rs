@@ -1,9 +1,9 @@
-//! The classical Runge–Kutta method of fourth order, with the drive torque held over the step.
+//! The classical fourth-order Runge–Kutta method, with the drive torque held constant over each step.
 
 use super::drivetrain::{Drivetrain, Stage};
 use super::rapier_arm::RapierArm;
 
-/// State of the plant, kept outside the engine: `[q | q̇ | the drivetrain's own]`.
+/// State of the plant, which is kept outside the engine: `[q | q̇ | the drivetrain's own states]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct State {
     dof: usize,
@@ -11,7 +11,7 @@ pub struct State {
 }
 
 impl State {
-    /// `dof` joints at rest at zero and `states` zeros of the drivetrain.
+    /// The state with `dof` joints at rest at angle zero, and `states` states of the drivetrain at zero.
     pub fn zeros(dof: usize, states: usize) -> Self {
         Self { dof, values: vec![0.0; 2 * dof + states] }
     }
@@ -31,23 +31,24 @@ impl State {
         &self.values[2 * self.dof..]
     }
 
-    /// Angles (rad), velocities (rad/s) and the drivetrain's own states, to be set.
+    /// Mutable angles (rad), velocities (rad/s) and own states of the drivetrain.
     pub fn parts_mut(&mut self) -> (&mut [f64], &mut [f64], &mut [f64]) {
         let (q, rest) = self.values.split_at_mut(self.dof);
         let (qd, states) = rest.split_at_mut(self.dof);
         (q, qd, states)
     }
 
-    /// First joint (from 0) whose angle or speed is not a finite number.
+    /// Index (from 0) of the first joint whose angle or speed is not finite.
     pub fn first_not_finite(&self) -> Option<usize> {
         (0..self.dof).find(|&j| !(self.q_rad()[j] + self.qd_rad_s()[j]).is_finite())
     }
 }
 
-/// Runge–Kutta's classical method: y(t+h) = y + h/6 (k₁ + 2k₂ + 2k₃ + k₄), error O(h⁴).
+/// The classical Runge–Kutta method: y(t+h) = y + h/6 (k₁ + 2k₂ + 2k₃ + k₄), with global error O(h⁴).
 ///
-/// Friction is evaluated in every stage. tanh(q̇/ε) is stiff: a speed that decays at rate λ is stable
-/// while h λ < 2.78; steps beyond [`Self::LARGEST_STEP_DECAY`] are refused by [`Plant`](super::Plant).
+/// Friction is evaluated in every stage. The term tanh(q̇/ε) is stiff: for a speed that decays at rate λ the method is
+/// stable while h λ < 2.78. [`Plant`](super::Plant) refuses or divides steps with h λ above
+/// [`Self::LARGEST_STEP_DECAY`].
 #[derive(Debug, Clone)]
 pub struct RungeKutta4 {
     rates: [Vec<f64>; 4],
@@ -55,18 +56,18 @@ pub struct RungeKutta4 {
 }
 
 impl RungeKutta4 {
-    /// Largest product of step and decay rate that is used: below the limit of stability 2.78 by a
-    /// margin for poses in which a joint feels less inertia than where the run begins. At 2.0 the
-    /// method's decay per step is 0.33 in place of e⁻² = 0.14.
+    /// Largest product of step and decay rate that is used. It is below the stability limit of 2.78 to leave a margin
+    /// for poses in which a joint feels less inertia than at the start of the run. At 2.0 a disturbance shrinks to 0.33
+    /// per step instead of e⁻² = 0.14.
     pub const LARGEST_STEP_DECAY: f64 = 2.0;
 
-    /// Scratch for states shaped like `state`.
+    /// An integrator with working memory for states of the same size as `state`.
     pub fn new(state: &State) -> Self {
         let zeros = vec![0.0; state.values.len()];
         Self { rates: std::array::from_fn(|_| zeros.clone()), trial: state.clone() }
     }
 
-    /// Moves `state` from `time_s` to `time_s + step_s` under `drive_torque_nm`.
+    /// Advances `state` from `time_s` to `time_s + step_s` under the constant torque `drive_torque_nm`.
     pub fn step(
         &mut self,
         arm: &mut RapierArm,

@@ -1,13 +1,13 @@
-//! The simulated truth: the arm in a physics engine, its drivetrain, its controller and its sensors.
+//! The plant, which is the simulated truth: the arm in a physics engine, its drivetrain, controller and sensors.
 //!
-//! Enters: an [`Arm`](crate::robot::Arm) whose parameters are the truth, a
+//! Input: an [`Arm`](crate::robot::Arm) whose parameters are the truth, a
 //! [`Reference`](crate::excitation::Reference) to follow, a [`PlantConfig`] and a [`SensorConfig`].
-//! Leaves: a noise-free [`Recording`], and per trial what the [`Sensors`] [`Measured`] of it.
+//! Output: a noise-free [`Recording`] and, for each trial, the log [`Measured`] by the [`Sensors`].
 //!
-//! What acts inside the integration (friction, elasticity, any state of the joint mechanics) is a
-//! [`Drivetrain`]; what acts on the readings is in the sensors. The equations of motion are the
-//! engine's: this chapter shares none with [`dynamics`](crate::dynamics), except in the controller,
-//! whose model is what the arm's maker believes.
+//! Everything that acts inside the integration (friction, elasticity, any state of the joint mechanics) belongs to a
+//! [`Drivetrain`]; everything that acts on the readings belongs to the sensors. The equations of motion are those of
+//! the engine. No code is shared with [`dynamics`](crate::dynamics) except in the controller, whose model represents
+//! what the manufacturer of the arm believes.
 
 mod config;
 mod controller;

@@ -1,4 +1,4 @@
-//! Colours of noise: what a torque reading is off by, in time and across the joints.
+//! Noise of the torque readings: its colour in time and its correlation across the joints.
 
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -8,7 +8,7 @@ use super::error::PlantError;
 use crate::random::{Channel, TrialStreams};
 use crate::robot::JointSignals;
 
-/// How one component of a noise runs on in time. All are stationary with unit variance.
+/// Colour of one noise component, that is, its correlation in time. All processes are stationary with unit variance.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Colour {
@@ -19,30 +19,30 @@ pub enum Colour {
         /// Time constant T, s.
         time_constant_s: f64,
     },
-    /// White noise behind a causal second-order Butterworth low-pass.
+    /// White noise through a causal second-order Butterworth low-pass.
     LowPass {
         /// Cut-off frequency (−3 dB), Hz.
         cutoff_hz: f64,
     },
 }
 
-/// One part of a noise: its share of the variance and its colour.
+/// One component of the noise: its share of the variance and its colour.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Component {
     /// Share of the variance, 0…1.
     pub share: f64,
-    /// How it runs on in time.
+    /// Colour of the component.
     pub colour: Colour,
 }
 
-/// Noise of the torque channels: e_j = s_j Σ_c √share_c (√(1−ρ) own_jc + √ρ shared_c), where own and
-/// shared are independent unit-variance processes of colour c. Its standard deviation is s_j and its
-/// correlation between any two joints at one instant is ρ.
+/// Noise of the torque channels: e_j = s_j Σ_c √share_c (√(1−ρ) own_jc + √ρ shared_c), where own_jc and shared_c are
+/// independent unit-variance processes of colour c. The noise of joint j has the standard deviation s_j, and the
+/// correlation between any two joints at the same instant is ρ.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NoiseModel {
-    /// Parts; the shares sum to 1.
+    /// Components; their shares sum to 1.
     pub components: Vec<Component>,
     /// Correlation ρ between the joints, 0 ≤ ρ < 1.
     #[serde(default)]
@@ -56,15 +56,14 @@ impl Default for NoiseModel {
 }
 
 impl NoiseModel {
-    /// Independent in time and across joints.
+    /// White noise, independent in time and across the joints.
     pub fn white() -> Self {
         let components = vec![Component { share: 1.0, colour: Colour::White }];
         Self { components, cross_joint_correlation: 0.0 }
     }
 
-    /// The colour of the residuals of a real arm of the same family: half of the variance white,
-    /// 30 % with a time constant of 20 ms, 20 % with 1 s, and a correlation of 0.3 between joints
-    /// (seen in the residuals of the public UR10e logs).
+    /// The colour of the residuals of a real arm of the same family, as seen in the public UR10e logs: half of the
+    /// variance is white, 30 % has a time constant of 20 ms and 20 % one of 1 s; the correlation between joints is 0.3.
     pub fn real_arm() -> Self {
         let part = |share, colour| Component { share, colour };
         Self {
@@ -132,8 +131,9 @@ impl NoiseModel {
         sum
     }
 
-    /// Power by frequency (Hz) of noise sampled at `rate_hz`, relative to white noise of the same
-    /// variance: |H(e^{iω})|² of the filter that makes the colour, its mean over all frequencies 1.
+    /// Power spectrum, as a function of the frequency in Hz, of noise sampled at `rate_hz`, relative to white noise of
+    /// the same variance. It is |H(e^{iω})|² of the filter that shapes the noise, and its mean over all frequencies is
+    /// 1.
     pub fn spectrum(&self, rate_hz: f64) -> impl Fn(f64) -> f64 + use<> {
         let part = |c: &Component| (c.share, Spectrum::new(c.colour, rate_hz));
         let parts: Vec<(f64, Spectrum)> = self.components.iter().map(part).collect();
@@ -143,8 +143,8 @@ impl NoiseModel {
         }
     }
 
-    /// Adds the noise of one trial to `signals`, sampled at `rate_hz`, with standard deviation `sd[j]`
-    /// at joint j. `shared` is scratch.
+    /// Adds the noise of one trial to `signals`, which are sampled at `rate_hz`, with standard deviation `sd[j]` at
+    /// joint j. `shared` is working memory.
     pub(super) fn add_to(
         &self,
         streams: &TrialStreams,
@@ -178,7 +178,7 @@ impl NoiseModel {
     }
 }
 
-/// Power by frequency of one colour, with what is the same at all of them worked out once.
+/// Power spectrum of one colour; the terms that do not depend on frequency are computed once.
 #[derive(Debug, Clone, Copy)]
 enum Spectrum {
     White,
@@ -206,7 +206,7 @@ impl Spectrum {
         }
     }
 
-    /// At ω, rad per sample.
+    /// Power at the frequency ω, rad per sample.
     fn power(&self, omega: f64) -> f64 {
         match *self {
             Self::White => 1.0,
@@ -219,7 +219,7 @@ impl Spectrum {
     }
 }
 
-/// A unit-variance stationary process, sample by sample.
+/// Generator of a unit-variance stationary process, sample by sample.
 #[derive(Debug, Clone)]
 enum Process {
     White,
@@ -228,7 +228,7 @@ enum Process {
 }
 
 impl Process {
-    /// The process in its stationary state: its first sample is distributed as all others.
+    /// The process in its stationary state, so that its first sample has the same distribution as all others.
     fn new(colour: Colour, rate_hz: f64, rng: &mut impl Rng) -> Self {
         match colour {
             Colour::White => Self::White,
@@ -262,17 +262,17 @@ impl Process {
     }
 }
 
-/// The poles of a low-pass decay as exp(−√2 π f_c t), to e⁻²⁰ within this over f_c.
+/// Settling time of a low-pass in units of 1/f_c: its poles decay as exp(−√2 π f_c t), which is e⁻²⁰ after this time.
 const FORGOTTEN: f64 = 4.5;
-/// A low-pass must forget within this, s: every process begins with as many samples.
+/// Longest settling time allowed for a low-pass, s, because every process draws that many samples before it starts.
 const LONGEST_S: f64 = 3600.0;
 
-/// Samples after which a low-pass has forgotten.
+/// Number of samples after which a low-pass has settled.
 fn settled(cutoff_hz: f64, rate_hz: f64) -> usize {
     (FORGOTTEN * rate_hz / cutoff_hz).ceil() as usize
 }
 
-/// A standard normal number.
+/// Draws a standard normal number.
 #[inline]
 pub(super) fn normal(rng: &mut impl Rng) -> f64 {
     StandardNormal.sample(rng)
@@ -289,7 +289,7 @@ struct Butterworth2 {
 }
 
 impl Butterworth2 {
-    /// `cutoff` as a fraction of the sampling rate, below 0.5.
+    /// The low-pass with the cut-off frequency `cutoff`, as a fraction of the sampling rate, below 0.5.
     fn new(cutoff: f64) -> Self {
         let k = (std::f64::consts::PI * cutoff).tan();
         let norm = 1.0 / (1.0 + std::f64::consts::SQRT_2 * k + k * k);
@@ -308,8 +308,8 @@ impl Butterworth2 {
         self.gain * (m0 + 2.0 * m1 + m2)
     }
 
-    /// Autocorrelation of its output for white input at up to `lags` lags at which it is not
-    /// forgotten, from the first `samples` of its impulse response h: r_k = Σ h_i h_{i+k} / Σ h_i².
+    /// Autocorrelation of the output for white input, from the first `samples` samples of the impulse response h:
+    /// r_k = Σ h_i h_{i+k} / Σ h_i². Returns at most `lags` lags, and none beyond `samples`.
     fn autocorrelation(mut self, samples: usize, lags: usize) -> Vec<f64> {
         let h: Vec<f64> = (0..samples).map(|k| self.next(if k == 0 { 1.0 } else { 0.0 })).collect();
         let product = |k: usize| h[k..].iter().zip(&h).map(|(a, b)| a * b).sum::<f64>();
@@ -317,7 +317,8 @@ impl Butterworth2 {
         (0..samples.min(lags)).map(|k| product(k) / energy).collect()
     }
 
-    /// Sum of squares of the first `samples` of the impulse response: variance for white input.
+    /// Sum of squares of the first `samples` samples of the impulse response: the variance of the output for white
+    /// input.
     fn energy(mut self, samples: usize) -> f64 {
         (0..samples).map(|k| self.next(if k == 0 { 1.0 } else { 0.0 }).powi(2)).sum()
     }
@@ -329,8 +330,8 @@ mod tests {
 
     const RATE_HZ: f64 = 125.0;
     const SAMPLES: usize = 200_000;
-    /// Bounds are 5 standard deviations of the estimate: each check fails by chance once in 2 million
-    /// seeds, and the seed is fixed.
+    /// Bounds of the tests, in standard deviations of the estimate. At 5 each check fails by chance for one in 2
+    /// million seeds, and the seed is fixed.
     const SIGMAS: f64 = 5.0;
 
     fn draw(model: &NoiseModel, sd: &[f64]) -> JointSignals {
@@ -400,12 +401,13 @@ mod tests {
             let frequency = |k: usize| (k as f64 + 0.5) / bins as f64 * 0.5 * RATE_HZ;
             let power = model.spectrum(RATE_HZ);
             let mean = (0..bins).map(|k| power(frequency(k))).sum::<f64>() / bins as f64;
-            // The mid-point rule on a smooth spectrum.
+            // The mid-point rule is accurate for a smooth spectrum.
             assert!((mean - 1.0).abs() < 1e-5, "{colour:?}: {mean}");
         }
     }
 
-    /// The inverse transform of the spectrum, by the mid-point rule on a smooth periodic function.
+    /// The autocorrelation is the inverse transform of the spectrum, computed here by the mid-point rule on a smooth
+    /// periodic function.
     #[test]
     fn autocorrelation_and_spectrum_of_a_low_pass_belong_together() {
         let model = single(Colour::LowPass { cutoff_hz: 10.0 });
@@ -420,7 +422,7 @@ mod tests {
             assert!((r - transformed).abs() < 1e-8, "lag {lag}: {r} {transformed}");
         }
         assert_eq!(few[..], model.autocorrelation(RATE_HZ, 1025)[..8]);
-        // Beyond its memory of 57 samples nothing is left.
+        // Beyond the settling time of 57 samples the autocorrelation is zero.
         assert!(model.autocorrelation(RATE_HZ, 60)[57..].iter().all(|r| *r == 0.0));
     }
 
@@ -438,8 +440,8 @@ mod tests {
         assert!((re * re + im * im - 0.5).abs() < 1e-12, "{}", re * re + im * im);
     }
 
-    /// The correlation of two series with autocorrelation ρ_k varies by (1−ρ²)²/n · Σ ρ_k², with the
-    /// shares' sum of squares dominated by the slow 20 %: 0.2² · 125.
+    /// The sample correlation of two series with autocorrelation ρ_k has the variance (1−ρ²)²/n · Σ ρ_k². The sum is
+    /// dominated by the slow component with its share of 20 %: 0.2² · 125.
     #[test]
     fn joints_are_correlated_as_asked() {
         let model = NoiseModel::real_arm();

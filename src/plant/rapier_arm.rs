@@ -1,4 +1,4 @@
-//! The arm as a multibody of the physics engine: exact forward dynamics, no integration.
+//! The arm as a multibody of the physics engine, used for exact forward dynamics without the engine's integrator.
 
 use nalgebra::{DMatrix, DVector, Matrix3};
 use rapier3d::dynamics::{
@@ -11,36 +11,35 @@ use super::engine_math;
 use super::error::PlantError;
 use crate::robot::{Arm, LinkInertia};
 
-/// Step handed to the engine, s. Its velocity update v⁺ = v + h a solves
-/// (M + h ∂c/∂q̇) a = τ − c − g, so a is the exact acceleration up to a relative error of h |∂c/∂q̇|/|M|:
-/// with this h below the round-off of a double.
+/// Time step h given to the engine, s. The engine's velocity update v⁺ = v + h a solves (M + h ∂c/∂q̇) a = τ − c − g,
+/// so that a is the exact acceleration up to a relative error of h |∂c/∂q̇|/|M|. With this h the error is below the
+/// round-off of a double.
 const INSTANT_S: f64 = 1e-15;
 
 /// Index of the rotation about z among the engine's six joint coordinates.
 const ABOUT_Z: usize = DIM + 2;
 
-/// Stiffness of the spring through which a torque enters, Nm/rad. The engine has no public vector of
-/// generalised forces; a joint spring k(rest − q) with rest = q + τ/k is one. With this k its
-/// stiffness adds nothing (h² k = 1e-39 kg m² on the diagonal of the mass matrix), and τ is
-/// reproduced to round-off because q is 10⁹ times smaller than τ/k.
+/// Stiffness k of the spring through which a torque enters, Nm/rad. The engine has no public vector of generalised
+/// forces, but a joint spring k (rest − q) with rest = q + τ/k has the same effect. With this k the spring's stiffness
+/// is negligible (h² k = 1e-39 kg m² on the diagonal of the mass matrix), and τ is reproduced to round-off because q is
+/// 10⁹ times smaller than τ/k.
 const TORQUE_SPRING_NM_RAD: f64 = 1e-9;
 
-/// Largest entry by which the engine's copy of an inertia tensor may differ, relative to its trace:
-/// eigenvectors, quaternion and reciprocal each cost a few units of round-off.
+/// Largest difference allowed in any entry between an inertia tensor and the engine's copy of it, relative to the
+/// trace. Eigenvectors, quaternion and reciprocal each cost a few units of round-off.
 const TENSOR_TOLERANCE: f64 = 1e-13;
 
 /// An arm in rapier, in reduced coordinates: joint angles, speeds and torques in, accelerations out.
 ///
-/// Rotor inertias enter as the engine's armature, a constant on the diagonal of the mass matrix.
-/// Friction does not enter: it belongs to the [drivetrain](super::Drivetrain), and the torque given
-/// here is what is left of the drive torque behind it. The engine's integrator, which is of first
-/// order and dissipates energy, is not used.
+/// Rotor inertias enter as the engine's armature, a constant on the diagonal of the mass matrix. Friction does not
+/// enter: it belongs to the [drivetrain](super::Drivetrain), and the torque given here is the part of the drive torque
+/// that remains after friction. The engine's integrator, which is of first order and dissipates energy, is not used.
 ///
-/// The engine computes an acceleration only within a full step, which costs about 10 µs for six joints:
-/// two fifths for the mass matrix and the Coriolis matrix of its implicit integrator (not used here,
-/// and not to be switched off), a fifth for kinematics and Jacobians before and after the step, a
-/// quarter for islands, solver stages and collision detection that find nothing to do. There are no
-/// colliders, contacts or constraints to remove.
+/// The engine computes an acceleration only as part of a full step, which takes about 10 µs for six joints. Two fifths
+/// of the time go to the mass matrix and to the Coriolis matrix of the implicit integrator, which is not used here but
+/// cannot be switched off; a fifth to kinematics and Jacobians before and after the step; and a quarter to islands,
+/// solver stages and collision detection, which find nothing to do. There are no colliders, contacts or constraints to
+/// remove.
 pub struct RapierArm {
     world: PhysicsWorld,
     multibody: MultibodyIndex,
@@ -55,8 +54,8 @@ impl std::fmt::Debug for RapierArm {
 }
 
 impl RapierArm {
-    /// Builds the multibody. A link whose inertia no body can have is refused with its numbers, and
-    /// so is a tensor that the engine does not keep.
+    /// Builds the multibody. Refuses a link whose inertia no body can have, and an inertia tensor that the engine does
+    /// not keep; both errors state the numbers.
     pub fn new(arm: &Arm) -> Result<Self, PlantError> {
         let mut world = PhysicsWorld::new();
         world.gravity = engine_math::vector(&arm.gravity_m_s2);
@@ -87,13 +86,13 @@ impl RapierArm {
 
         let (displacement, response) = (vec![0.0; arm.dof()], DVector::zeros(arm.dof()));
         let mut built = Self { world, multibody, displacement, response };
-        // Only after one pass of forward kinematics has the fixed base lost the six freedoms it is
-        // born with, and do the vectors below have their final places.
+        // Only one pass of forward kinematics removes the six degrees of freedom that the fixed base initially has,
+        // and gives the vectors below their final layout.
         let PhysicsWorld { multibody_joints, bodies, .. } = &mut built.world;
         if let Some(mb) = multibody_joints.get_multibody_mut(multibody) {
             mb.forward_kinematics(bodies, true);
             mb.set_self_contacts_enabled(false);
-            // Born with 0.1 Nm s/rad on every joint.
+            // By default the engine damps every joint with 0.1 Nm s/rad.
             mb.damping_mut().fill(0.0);
             for (i, joint) in arm.joints.iter().enumerate() {
                 mb.armature_mut()[i] = joint.drive.rotor_inertia_kg_m2;
@@ -107,12 +106,12 @@ impl RapierArm {
         self.displacement.len()
     }
 
-    /// q̈ = (M(q) + diag(Ia))⁻¹ (τ − c(q, q̇) − g(q)), rad/s², with τ the torque that reaches the
-    /// link side (drive torque minus friction), Nm. All slices have length N.
+    /// Computes q̈ = (M(q) + diag(Ia))⁻¹ (τ − c(q, q̇) − g(q)), rad/s², with τ the torque that reaches the link side
+    /// (drive torque minus friction), Nm. All slices have length N.
     ///
-    /// The result depends on the arguments alone, bit for bit, whatever was asked before. A state that
-    /// is not finite gives a result that is not finite, and makes the engine set the links aside: the
-    /// arm is of no use afterwards.
+    /// The result depends on the arguments alone, bit for bit, regardless of previous calls. A state that is not finite
+    /// gives a result that is not finite, and makes the engine disable the links, so that the arm cannot be used any
+    /// more.
     pub fn forward_dynamics(
         &mut self,
         q_rad: &[f64],
@@ -134,19 +133,20 @@ impl RapierArm {
         qdd_rad_s2.copy_from_slice(multibody.generalized_acceleration().as_slice());
     }
 
-    /// Adds M⁻¹ Δτ to `qdd_rad_s2`, which [`Self::forward_dynamics`] has found last: what more torque, Δτ = `more_nm`, adds to it
-    /// in the same state. The engine's factors of its mass matrix are those of that call, of whose work this is a small part.
+    /// Updates `qdd_rad_s2`, the result of the last call of [`Self::forward_dynamics`], for an additional torque Δτ =
+    /// `more_nm` in the same state: adds M⁻¹ Δτ. This reuses the engine's factorisation of the mass matrix from that
+    /// call and takes a small fraction of its time.
     pub fn add_response(&mut self, more_nm: &[f64], qdd_rad_s2: &mut [f64]) {
         self.response.copy_from_slice(more_nm);
         let multibody = multibody_mut(&mut self.world, self.multibody);
-        // Factors that are not finite solve nothing; nor is the acceleration finite then.
+        // If the factors are not finite there is no solution, but then the acceleration is not finite either.
         if multibody.inv_augmented_mass().solve_mut(&mut self.response) {
             qdd_rad_s2.iter_mut().zip(&self.response).for_each(|(qdd, more)| *qdd += more);
         }
     }
 
-    /// Accelerations at rest without any torque (rad/s²), and what a unit torque on each joint adds to
-    /// them, column by column: M⁻¹, kg⁻¹ m⁻².
+    /// Accelerations at rest without any torque (rad/s²), and the matrix M⁻¹ (kg⁻¹ m⁻²), whose columns are the changes
+    /// of acceleration due to a unit torque on each joint.
     pub(super) fn response(&mut self, q_rad: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
         let n = self.dof();
         let rest = vec![0.0; n];
@@ -163,29 +163,29 @@ impl RapierArm {
         (idle, inverse)
     }
 
-    /// Torques that hold the links still against gravity, Nm: M⁻¹ τ = −q̈(τ = 0). In a pose that is
-    /// not finite there are none, and what is returned is not finite either.
+    /// Torques that hold the links still against gravity, Nm: M⁻¹ τ = −q̈(τ = 0). If the pose is not finite, the result
+    /// is not finite either.
     pub(super) fn holding_torque(&mut self, q_rad: &[f64]) -> DVector<f64> {
         let (idle, inverse) = self.response(q_rad);
         let none = DVector::repeat(self.dof(), f64::NAN);
         inverse.lu().solve(&-idle).unwrap_or(none)
     }
 
-    /// Replaces the rotor inertia that the multibody carries at joint `j` (from 0), kg m². A
-    /// drivetrain that moves a rotor on its own, behind an elastic gear, sets it to zero.
+    /// Replaces the rotor inertia that the multibody carries at joint `j` (from 0), kg m². A drivetrain that integrates
+    /// the rotor itself, because of an elastic gear, sets it to zero.
     pub fn set_rotor_inertia(&mut self, j: usize, rotor_inertia_kg_m2: f64) {
         multibody_mut(&mut self.world, self.multibody).armature_mut()[j] = rotor_inertia_kg_m2;
     }
 }
 
-/// The multibody, which `RapierArm::new` has put there and nothing removes.
+/// The multibody. `RapierArm::new` inserts it, and nothing removes it.
 fn multibody_mut(world: &mut PhysicsWorld, index: MultibodyIndex) -> &mut Multibody {
     world.multibody_joints.get_multibody_mut(index).expect("inserted when the arm was built")
 }
 
-/// Brings the joints to exactly `q_rad`. The engine only takes displacements, which round; the second
-/// pass removes the rounding of the first (the difference of neighbouring doubles is exact), so that
-/// no trace of the previous state remains.
+/// Moves the joints to exactly `q_rad`. The engine accepts displacements only, which are subject to round-off. The
+/// second pass removes the round-off of the first (the difference of neighbouring doubles is exact), so that no trace
+/// of the previous state remains.
 fn move_to(multibody: &mut Multibody, q_rad: &[f64], displacement: &mut [f64]) {
     const PASSES: usize = 4;
     for _ in 0..PASSES {
@@ -201,9 +201,9 @@ fn move_to(multibody: &mut Multibody, q_rad: &[f64], displacement: &mut [f64]) {
     }
 }
 
-/// The link's mass, centre of mass and inertia tensor in the engine's form: principal moments and
-/// the axes they belong to. (The engine's own decomposition of a tensor is wrong for a tilted tensor
-/// with two equal smallest moments and for small links, so it is not used.)
+/// The link's mass, centre of mass and inertia tensor in the engine's form, that is, with principal moments and axes.
+/// The engine's own decomposition of a tensor is not used, because it is wrong for a tilted tensor whose two smallest
+/// moments are equal, and for small links.
 fn mass_properties(link: &LinkInertia, joint: usize) -> Result<MassProperties, PlantError> {
     let margin = link.consistency_margin();
     let tensor = link.inertia_com_kg_m2().unwrap_or_else(Matrix3::zeros);

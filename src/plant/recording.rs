@@ -1,18 +1,18 @@
-//! What a simulated run leaves: the truth at the instants of the log.
+//! Recording of a simulated run: the truth at the instants of the log.
 
 use crate::robot::JointSignals;
 
-/// The noise-free course of a run, sampled at the log's rate.
+/// The noise-free signals of a run, sampled at the log's rate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
     /// Time from the start of the reference, s.
     pub time_s: Vec<f64>,
-    /// Angles of what the encoders sit on (the joints, unless a gear gives way), rad.
+    /// Angles at the encoders (those of the joints if the gears are rigid), rad.
     pub q_rad: JointSignals,
-    /// Velocities of the same, rad/s.
+    /// Velocities at the encoders, rad/s.
     pub qd_rad_s: JointSignals,
-    /// Drive torque i_G k I at the joint, before friction, Nm: at the instants at which the
-    /// controller decides, the mean of what was held before and what is held after.
+    /// Drive torque i_G k I at the joint, before friction, Nm. At instants at which the controller decides, it is the
+    /// mean of the torques held before and after the decision.
     pub torque_nm: JointSignals,
     /// Reference angles, rad.
     pub target_q_rad: JointSignals,
@@ -20,9 +20,10 @@ pub struct Recording {
     pub target_qd_rad_s: JointSignals,
     /// Reference accelerations, rad/s².
     pub target_qdd_rad_s2: JointSignals,
-    /// What the controller read at these instants, where it did not read the truth.
+    /// Readings of the controller at these instants; `None` if it read the truth.
     pub readings: Option<Readings>,
-    /// Decisions of the controller at which at least one drive was at its limit, in what was integrated.
+    /// Number of decisions of the controller, within the part of the run that was integrated, at which at least one
+    /// drive was at its limit.
     pub saturated_decisions: usize,
 }
 
@@ -36,8 +37,8 @@ pub struct Readings {
 }
 
 impl Recording {
-    /// The same run gone on to `samples` rows: each row beyond the first `known` is the row of one
-    /// period (`period` rows) before.
+    /// The same run continued to `samples` rows: each row after the first `known` ones is a copy of the row one period
+    /// (`period` rows) earlier.
     pub fn repeated(&self, known: usize, period: usize, samples: usize, log_rate_hz: f64) -> Self {
         let signals = |s: &JointSignals| repeated(s, known, period, samples);
         Self {
@@ -58,7 +59,7 @@ impl Recording {
         }
     }
 
-    /// Zeros for `joints` × `samples`, and room for readings if there are any.
+    /// A recording of zeros for `joints` × `samples`, with memory for readings if `with_readings`.
     pub(super) fn zeros(joints: usize, samples: usize, with_readings: bool) -> Self {
         let zeros = || JointSignals::zeros(joints, samples);
         Self {
@@ -75,7 +76,8 @@ impl Recording {
     }
 }
 
-/// `signals` gone on to `samples` samples: each beyond the first `known` is that of `period` before.
+/// `signals` continued to `samples` samples: each one after the first `known` is a copy of the one `period` samples
+/// earlier.
 fn repeated(signals: &JointSignals, known: usize, period: usize, samples: usize) -> JointSignals {
     signals.map_joints(|_, y| {
         let back = |k: usize| k - (k + 1 - known).div_ceil(period) * period;

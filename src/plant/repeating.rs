@@ -1,26 +1,30 @@
-//! Runs of a motion that repeats, of which little more than one period is integrated.
+//! Fast runs of motions that repeat: little more than one period is integrated.
 
 use super::{PlantConfig, PlantError, Recording};
 use crate::excitation::{Excitation, Reference};
 
-/// Time after the run-in in which most arms forget how they started, s. Soft gears that hardly damp do not, which
-/// [`has_forgotten`] sees.
+/// Time after the run-in within which most arms forget how they started, s. Arms with soft, weakly damped gears do not;
+/// [`has_forgotten`] detects them.
 const SETTLING_S: f64 = 2.0;
-/// The last rows of a run may lack what comes after them (a channel that is read late), by at most the
-/// longest delay there is, s.
+/// Time at the end of a run whose rows may be incomplete, s: a delayed channel needs samples from after the end. Equals
+/// the longest delay allowed.
 const UNSETTLED_END_S: f64 = 0.5;
-/// Time before the end of what is settled that is compared with the same a period earlier, s: two swings of a gear at 4 Hz.
+/// Length of the stretch at the end of the settled rows that is compared with the stretch one period earlier, s: two
+/// oscillations of a gear at 4 Hz.
 const COMPARED_S: f64 = 0.5;
-/// What of its largest value a signal may still owe to the start. Of 3 rad, 2 rad/s and 100 Nm it is a seventieth, a five-thousandth and a
-/// hundred-thousandth of the usual noise (2e-5 rad, 1e-3 rad/s, 1 Nm).
+/// Largest effect of the start that may remain in a signal, as a share of the signal's largest value. For 3 rad, 2
+/// rad/s and 100 Nm it is a seventieth, a five-thousandth and a hundred-thousandth of the usual noise (2e-5 rad, 1e-3
+/// rad/s, 1 Nm).
 const FORGOTTEN: f64 = 1e-7;
 
-/// The recording of an arm that follows `excitation`, made by `run`: what its log shows when the arm has forgotten how it started repeats
-/// from then on, and is copied. For arms in which nothing drifts. `run` is asked for all of the motion where that saves nothing, where
-/// its period is not a whole number of rows and of the controller's decisions, and where the arm has not forgotten its start in time.
+/// Recording of an arm that follows `excitation`, where `run` performs the runs. For arms in which nothing drifts.
+///
+/// Once the arm has forgotten how it started, its log repeats with every period, so that further periods are copied.
+/// The whole motion is run instead if copying saves nothing, if the period is not a whole number of log rows and of
+/// controller decisions, or if the arm has not forgotten its start in time.
 ///
 /// # Errors
-/// Those of `run`.
+/// The errors of `run`.
 pub fn run_repeating(
     excitation: &Excitation,
     config: &PlantConfig,
@@ -47,7 +51,7 @@ pub fn run_repeating(
     Ok(begun.repeated(known, rows(period_s), samples, config.log_rate_hz))
 }
 
-/// Whether the last `compared` rows of the first `known` are those of one `period` before.
+/// Whether the last `compared` of the first `known` rows agree with those one `period` earlier, to [`FORGOTTEN`].
 fn has_forgotten(begun: &Recording, known: usize, period: usize, compared: usize) -> bool {
     [&begun.q_rad, &begun.qd_rad_s, &begun.torque_nm].into_iter().all(|signals| {
         (0..signals.joints()).all(|j| {
@@ -59,7 +63,7 @@ fn has_forgotten(begun: &Recording, known: usize, period: usize, compared: usize
     })
 }
 
-/// The beginning of a motion.
+/// The first `duration_s` of a motion.
 struct Begin<'a> {
     of: &'a Excitation,
     duration_s: f64,

@@ -1,4 +1,4 @@
-//! What the arm's sensors make of the truth.
+//! The arm's sensors: how readings differ from the truth.
 
 use rand::rngs::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -9,18 +9,18 @@ use super::recording::Recording;
 use crate::random::{Channel, TrialStreams};
 use crate::robot::{Arm, JointSignals};
 
-/// One number for all joints, or one for each.
+/// One number for all joints, or one for each joint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged, expecting = "a number for all joints, or a list with one for each")]
 pub enum PerJoint {
     /// The same at every joint.
     All(f64),
-    /// Joint by joint.
+    /// One value for each joint.
     Each(Vec<f64>),
 }
 
 impl PerJoint {
-    /// One value for each of `joints`, none of them negative.
+    /// One value for each of `joints` joints. Refuses negative values and lists of another length.
     fn resolve(&self, key: &'static str, joints: usize) -> Result<Vec<f64>, PlantError> {
         let values = match self {
             Self::All(value) => vec![*value; joints],
@@ -43,7 +43,7 @@ impl PerJoint {
     }
 }
 
-/// Which quantity the drives report.
+/// Quantity that the drives report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Effort {
@@ -62,17 +62,17 @@ pub struct SensorConfig {
     pub q_sd_rad: PerJoint,
     /// Standard deviation of the velocity reading, rad/s; white.
     pub qd_sd_rad_s: PerJoint,
-    /// Standard deviation of the torque reading, Nm (of the current times i_G k where current is read).
+    /// Standard deviation of the torque reading, Nm. If current is read, it is that of the current times i_G k.
     pub torque_sd_nm: PerJoint,
     /// Colour of the torque noise.
     pub torque_noise: NoiseModel,
-    /// Smallest step of the position reading, rad; 0: none.
+    /// Resolution of the position reading, rad; 0: no rounding.
     pub q_step_rad: f64,
-    /// Smallest step of the velocity reading, rad/s; 0: none.
+    /// Resolution of the velocity reading, rad/s; 0: no rounding.
     pub qd_step_rad_s: f64,
-    /// Smallest step of the effort reading, in its own unit (Nm or A); 0: none.
+    /// Resolution of the effort reading, in its own unit (Nm or A); 0: no rounding.
     pub effort_step: f64,
-    /// What the drives report.
+    /// Quantity that the drives report.
     pub effort: Effort,
 }
 
@@ -92,17 +92,17 @@ impl Default for SensorConfig {
 }
 
 impl SensorConfig {
-    /// Standard deviation of the torque reading of each of `joints`, Nm.
+    /// Standard deviation of the torque reading for each of `joints` joints, Nm.
     pub fn torque_sd_per_joint_nm(&self, joints: usize) -> Result<Vec<f64>, PlantError> {
         self.torque_sd_nm.resolve("torque_sd_nm", joints)
     }
 
-    /// Standard deviation of the position reading of each of `joints`, rad.
+    /// Standard deviation of the position reading for each of `joints` joints, rad.
     pub fn q_sd_per_joint_rad(&self, joints: usize) -> Result<Vec<f64>, PlantError> {
         self.q_sd_rad.resolve("q_sd_rad", joints)
     }
 
-    /// Standard deviation of the velocity reading of each of `joints`, rad/s.
+    /// Standard deviation of the velocity reading for each of `joints` joints, rad/s.
     pub fn qd_sd_per_joint_rad_s(&self, joints: usize) -> Result<Vec<f64>, PlantError> {
         self.qd_sd_rad_s.resolve("qd_sd_rad_s", joints)
     }
@@ -117,12 +117,12 @@ pub struct Sensors {
     torque_noise: NoiseModel,
     q_step_rad: f64,
     qd_step_rad_s: f64,
-    /// Step of the torque that one step of the effort makes, Nm.
+    /// Resolution of the torque that follows from that of the effort, Nm; 0: no rounding.
     torque_step_nm: Vec<f64>,
     rate_hz: f64,
 }
 
-/// The channels of a log as the sensors report them; same samples as the recording.
+/// The channels of a log as the sensors report them, at the same samples as the recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
     /// Time stamps, s.
@@ -133,12 +133,12 @@ pub struct Measured {
     pub qd_rad_s: JointSignals,
     /// Drive torque at the joint, Nm.
     pub torque_nm: JointSignals,
-    /// Scratch for the part of the noise that all joints share.
+    /// Working memory for the part of the noise that all joints share.
     shared: Vec<f64>,
 }
 
 impl Measured {
-    /// Room for what is measured of `recording`.
+    /// A log with the noise-free signals of `recording`, as memory for its measurements.
     pub fn like(recording: &Recording) -> Self {
         Self {
             time_s: recording.time_s.clone(),
@@ -178,9 +178,9 @@ impl Sensors {
         })
     }
 
-    /// Reads `recording` with the errors of one trial, into `out` (made by [`Measured::like`]).
+    /// Reads `recording` with the errors of one trial into `out`, which [`Measured::like`] has made.
     ///
-    /// Positions and velocities that the controller has read already are logged as it read them.
+    /// If the controller has already read positions and velocities, they are logged as it read them.
     pub fn measure(&self, recording: &Recording, streams: &TrialStreams, out: &mut Measured) {
         out.time_s.clone_from(&recording.time_s);
         match &recording.readings {
@@ -212,14 +212,14 @@ impl Sensors {
         }
     }
 
-    /// The law of the torque noise; `None` where the torque is rounded too.
+    /// The law of the torque noise; `None` if the torque is also rounded.
     pub fn torque_noise(&self) -> Option<TorqueNoise<'_>> {
         let rounded = self.torque_step_nm.iter().any(|step| *step > 0.0);
         let noise = TorqueNoise { sd_nm: &self.torque_sd_nm, model: &self.torque_noise };
         (!rounded).then_some(noise)
     }
 
-    /// The encoders of one trial, to be read in the loop.
+    /// The encoders of one trial, for the controller to read.
     pub fn encoders(&self, streams: &TrialStreams) -> Encoders {
         let channel = |channel, j, sd, step| Reader { rng: streams.stream(channel, j), sd, step };
         let joints = (0..self.q_sd_rad.len())
@@ -232,7 +232,7 @@ impl Sensors {
     }
 }
 
-/// Size and colour of the torque noise.
+/// Standard deviation and colour of the torque noise.
 #[derive(Debug, Clone, Copy)]
 pub struct TorqueNoise<'a> {
     /// Standard deviation per joint, Nm.
@@ -241,7 +241,7 @@ pub struct TorqueNoise<'a> {
     pub model: &'a NoiseModel,
 }
 
-/// The encoders of all joints during one trial; every reading draws the next errors.
+/// The encoders of all joints during one trial; each reading draws new errors.
 #[derive(Debug)]
 pub struct Encoders {
     joints: Vec<Encoder>,
@@ -269,7 +269,7 @@ impl Reader {
 }
 
 impl Encoders {
-    /// Replaces true angles and speeds by readings.
+    /// Replaces the true angles (rad) and speeds (rad/s) by readings.
     pub fn read(&mut self, q_rad: &mut [f64], qd_rad_s: &mut [f64]) {
         for (encoder, (q, qd)) in self.joints.iter_mut().zip(q_rad.iter_mut().zip(qd_rad_s)) {
             *q = encoder.q.read(*q);
@@ -278,7 +278,7 @@ impl Encoders {
     }
 }
 
-/// The nearest multiple of `step`.
+/// The multiple of `step` that is nearest to `value`.
 pub(super) fn quantised(value: f64, step: f64) -> f64 {
     (value / step).round() * step
 }

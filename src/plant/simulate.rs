@@ -1,4 +1,4 @@
-//! One run of the arm under its controller.
+//! Runs of the arm under its controller.
 
 use super::config::PlantConfig;
 use super::controller::Controller;
@@ -11,9 +11,9 @@ use super::sensors::Encoders;
 use crate::excitation::Reference;
 use crate::robot::{Arm, JointSignals};
 
-/// The arm, what moves it, and what it believes: everything of a run but the motion.
+/// The arm with its drivetrain and controller: everything that a run needs except the motion.
 ///
-/// Every run starts from a newly built engine, so that runs do not know of each other.
+/// Every run starts from a newly built engine, so that runs do not influence each other.
 pub struct Plant {
     arm: Arm,
     drivetrain: Box<dyn Drivetrain>,
@@ -22,14 +22,14 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// `arm` as it is, behind a stiff gear, with a controller that knows it.
+    /// A plant with the true arm `arm`, rigid gears, and a controller whose model is the same arm.
     pub fn new(arm: &Arm, config: &PlantConfig) -> Result<Self, PlantError> {
         let fed_forward = vec![config.friction_feedforward; arm.dof()];
         Self::with_drivetrain(arm, arm, &fed_forward, Box::new(RigidDrivetrain::new(arm)), config)
     }
 
-    /// `arm` as it is, behind `drivetrain`, with a controller that takes it for `nominal` and feeds the share `fed_forward`
-    /// of that friction forward on each joint.
+    /// A plant with the true arm `arm`, the given `drivetrain`, and a controller whose model is `nominal`.
+    /// `fed_forward` is the share of the nominal friction that the controller feeds forward at each joint.
     pub fn with_drivetrain(
         arm: &Arm,
         nominal: &Arm,
@@ -47,8 +47,8 @@ impl Plant {
         })
     }
 
-    /// Follows `reference` from its start to its end. The controller reads the true angles and
-    /// speeds, or, where they are given, what `encoders` make of them.
+    /// Follows `reference` from start to end. The controller reads the true angles and speeds or, if `encoders` are
+    /// given, the readings of the encoders.
     pub fn run(
         &mut self,
         reference: &dyn Reference,
@@ -57,9 +57,9 @@ impl Plant {
         self.follow(reference, encoders, None)
     }
 
-    /// As [`Self::run`] with true readings, with the accelerations (rad/s²) of what the encoders sit on:
-    /// at the instants at which the controller decides the mean of those before and after, as the
-    /// recorded torque is.
+    /// As [`Self::run`] with true readings, but also returns the accelerations at the encoders (rad/s²). At instants at
+    /// which the controller decides, these are the means of the accelerations before and after, as for the recorded
+    /// torque.
     pub fn run_with_acceleration(
         &mut self,
         reference: &dyn Reference,
@@ -72,7 +72,7 @@ impl Plant {
         Ok((recording, JointSignals::from_fn(n, samples, at)))
     }
 
-    /// The run; accelerations, where they are asked for, sample by sample.
+    /// Performs the run. If `accelerations` is given, appends the accelerations of all joints to it, sample by sample.
     fn follow(
         &mut self,
         reference: &dyn Reference,
@@ -93,7 +93,7 @@ impl Plant {
                               so that the log holds what it read",
             });
         }
-        // A duration that is a whole number of samples up to round-off keeps its last sample.
+        // If the duration is a whole number of samples up to round-off, its last sample is kept.
         let logged = (reference.duration_s() * self.config.log_rate_hz + 1e-6).floor() as usize;
         let mut recording = Recording::zeros(n, logged + 1, encoders.is_some());
 
@@ -105,7 +105,7 @@ impl Plant {
         let decay_per_s = self.drivetrain.fastest_decay_per_s(inverse.diagonal().as_slice());
         let parts = (h * decay_per_s / RungeKutta4::LARGEST_STEP_DECAY).ceil().max(1.0);
         let most = self.drivetrain.most_substeps();
-        // Also where the decay is no number: the cast below must not hide it.
+        // This also catches a decay that is NaN, which the cast below would hide.
         if parts.is_nan() || parts > most as f64 {
             let longest_s = most as f64 * RungeKutta4::LARGEST_STEP_DECAY / decay_per_s;
             return Err(PlantError::StepTooLong { step_s: h, decay_per_s, longest_s });
@@ -179,7 +179,7 @@ impl Plant {
         Ok(recording)
     }
 
-    /// What ideal encoders would read in `state`.
+    /// Readings of ideal encoders in `state`.
     fn seen(&self, state: &State, q_rad: &mut [f64], qd_rad_s: &mut [f64]) {
         q_rad.copy_from_slice(state.q_rad());
         qd_rad_s.copy_from_slice(state.qd_rad_s());
@@ -187,7 +187,7 @@ impl Plant {
     }
 }
 
-/// One run of `arm` as it is, behind a stiff gear, with a controller that knows it.
+/// Performs one run of `arm` with rigid gears and a controller whose model is the same arm.
 pub fn simulate(
     arm: &Arm,
     reference: &dyn Reference,

@@ -1,35 +1,36 @@
-//! The transformation that makes coloured noise white.
+//! Whitening of coloured torque noise.
 
 use super::error::PlantError;
 use super::noise::NoiseModel;
 
-/// W with W Cov(e) Wᵀ = 1 for the torque noise e of a [`NoiseModel`].
+/// The whitening transformation W, with W Cov(e) Wᵀ = 1 for the torque noise e of a [`NoiseModel`].
 ///
-/// All joints share one colour, so the covariance is a product: D (C ⊗ Γ) D with the standard
-/// deviations D, the correlation C = (1 − ρ) 1 + ρ 11ᵀ between joints and Γ in time. In time each
-/// sample is replaced by the error of its best prediction from the samples before it, over that
-/// error's standard deviation (Durbin and Levinson); across the joints C^(−1/2) is applied.
+/// All joints have the same colour, so the covariance is a Kronecker product: D (C ⊗ Γ) D, with the standard deviations
+/// D, the correlation C = (1 − ρ) 1 + ρ 11ᵀ between joints and the autocorrelation Γ in time. In time, each sample is
+/// replaced by the error of its best linear prediction from the preceding samples, divided by the standard deviation of
+/// that error (Durbin–Levinson recursion). Across the joints, C^(−1/2) D⁻¹ is applied.
 #[derive(Debug, Clone)]
 pub struct Whitening {
-    /// Coefficients of the best predictor from the last 1, 2, … samples.
+    /// Coefficients of the best linear predictor from the last 1, 2, … samples, the most recent sample first.
     predictors: Vec<Vec<f64>>,
     /// Variance of the prediction error from 0, 1, 2, … samples.
     variances: Vec<f64>,
-    /// C^(−1/2) D⁻¹, row by row: joints × joints.
+    /// C^(−1/2) D⁻¹ (joints × joints), row by row.
     across: Vec<Vec<f64>>,
 }
 
-/// Longest memory that is followed, samples.
+/// Largest order of the predictor, samples.
 const LONGEST_MEMORY: usize = 1024;
-/// Orders over which the prediction error is compared, and what counts as no further gain.
+/// The order stops growing when the error variance falls by less than the share [`NO_GAIN`] over this many orders.
 const GAIN_OVER: usize = 16;
 const NO_GAIN: f64 = 1e-9;
 
 impl Whitening {
-    /// For noise of the colour `model` and standard deviations `sd` (all positive), at `rate_hz`.
+    /// The whitening for noise of the colour `model` with standard deviations `sd` (Nm, all positive), sampled at
+    /// `rate_hz`.
     ///
     /// # Errors
-    /// [`PlantError::Setting`] where a joint has no noise at all.
+    /// [`PlantError::Setting`] if a joint has no noise.
     pub fn new(model: &NoiseModel, sd: &[f64], rate_hz: f64) -> Result<Self, PlantError> {
         if let Some(&value) = sd.iter().find(|s| s.is_nan() || **s <= 0.0) {
             let requirement = "must be positive on every joint for the noise to be whitened";
@@ -38,7 +39,7 @@ impl Whitening {
         let correlation = model.autocorrelation(rate_hz, LONGEST_MEMORY + 1);
         let (predictors, variances) = predictors(&correlation);
         let (n, rho) = (sd.len() as f64, model.cross_joint_correlation);
-        // Eigenvalues of C: 1 − ρ + nρ for (1, 1, …), 1 − ρ across it.
+        // C has the eigenvalue 1 − ρ + nρ for (1, 1, …) and 1 − ρ in all orthogonal directions.
         let (common, own) = (1.0 / (1.0 - rho + n * rho).sqrt(), 1.0 / (1.0 - rho).sqrt());
         let across = (0..sd.len())
             .map(|i| {
@@ -52,7 +53,7 @@ impl Whitening {
     /// Whitens one joint's series in time, in place.
     pub fn in_time(&self, series: &mut [f64]) {
         let longest = self.predictors.len();
-        // From the end, so that the samples before are still what they were.
+        // Go backwards, so that the preceding samples are still unchanged when they are needed.
         for t in (0..series.len()).rev() {
             let order = t.min(longest);
             let mut error = series[t];
@@ -65,13 +66,14 @@ impl Whitening {
         }
     }
 
-    /// Weights of all joints' (time-whitened) series in row `joint` of the whitened ones, 1/Nm.
+    /// Weights (1/Nm) with which the time-whitened series of all joints add up to the whitened series number `joint`.
     pub fn across(&self, joint: usize) -> &[f64] {
         &self.across[joint]
     }
 }
 
-/// The recursion of Durbin and Levinson, until more memory does not help.
+/// Predictors and their error variances by the Durbin–Levinson recursion, up to the order beyond which nothing is
+/// gained.
 fn predictors(correlation: &[f64]) -> (Vec<Vec<f64>>, Vec<f64>) {
     let mut all: Vec<Vec<f64>> = Vec::new();
     let mut variances = vec![correlation[0]];
@@ -101,8 +103,9 @@ mod tests {
 
     const RATE_HZ: f64 = 125.0;
 
-    /// Noise made by the sensors' own generator becomes white with unit variance: sample correlations
-    /// of white noise vary by 1/√n, bounds are 5 of these (60 checks: by chance once in 30 000 seeds).
+    /// Noise from the sensors' own generator becomes white with unit variance. Sample correlations of white noise have
+    /// a standard deviation of 1/√n, and the bounds are 5 standard deviations (60 checks: a failure by chance in one of
+    /// 30 000 seeds).
     #[test]
     fn the_sensors_noise_becomes_white() {
         let ar1 = |t| Colour::Ar1 { time_constant_s: t };
@@ -137,7 +140,7 @@ mod tests {
         }
     }
 
-    /// AR(1): the best prediction is φ times the last sample, and more memory is of no use.
+    /// AR(1): the best prediction is φ times the last sample; earlier samples do not improve it.
     #[test]
     fn an_autoregression_needs_one_sample() {
         let colour = Colour::Ar1 { time_constant_s: 0.05 };
