@@ -22,7 +22,7 @@ pub struct Experiment {
     pub truth: Vec<f64>,
     /// Unit of the tally for each parameter: σ of the pilot trial, rounded to a few bits.
     pub scale: Vec<f64>,
-    /// The Cramér–Rao bound of every parameter; `None` where it is not known.
+    /// The Cramér–Rao bound of every parameter; `None` if it is not known.
     pub least_sigma: Option<Vec<f64>>,
     /// The estimator that suits the pilot's log; all trials use it.
     pub estimator: Estimator,
@@ -91,7 +91,7 @@ impl Experiment {
         Ok(experiment)
     }
 
-    /// What one thread needs to run trials.
+    /// Creates the working memory of one thread.
     pub fn worker(&self) -> Worker<'_> {
         self.worker_with(Options {
             estimator: Some(self.estimator),
@@ -143,7 +143,7 @@ fn rounded(sigma: f64) -> f64 {
     (sigma / unit).round() * unit
 }
 
-/// One thread's memory for trials of an [`Experiment`].
+/// Working memory of one thread for trials of an [`Experiment`].
 pub struct Worker<'a> {
     experiment: &'a Experiment,
     identifier: Identifier<'a>,
@@ -191,9 +191,9 @@ pub struct ParameterHeader {
     pub unit: String,
     /// True value.
     pub truth: f64,
-    /// Unit of the tally's sums.
+    /// Unit of the tally's sums for this parameter.
     pub scale: f64,
-    /// The Cramér–Rao bound, where it is known.
+    /// The Cramér–Rao bound; `None` if it is not known.
     pub sigma_least: Option<f64>,
 }
 

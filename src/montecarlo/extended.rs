@@ -54,7 +54,7 @@ impl Scenario {
     /// periods shows. `set` are the base parameters that were identified.
     ///
     /// # Errors
-    /// [`ScenarioError::OnePeriod`] where the motion does not repeat.
+    /// [`ScenarioError::OnePeriod`] if the motion does not repeat.
     pub fn of_diagnosis(
         simulation: &ExtendedSimulation,
         finding: &Finding,

@@ -374,7 +374,7 @@ mod tests {
         let reached = Mutex::new(0);
         let progress = |n: u64| *reached.lock().unwrap() = n;
         shard.run(&experiment, 3, None, &stop, &progress).unwrap();
-        // Each of three threads takes at most one trial from the 105th on.
+        // Each of the three threads runs at most one trial whose number is 105 or higher.
         assert!((106..=108).contains(&shard.next), "{}", shard.next);
         assert_eq!(trials_of(&shard), (100..shard.next).collect::<Vec<_>>());
         assert_eq!(*reached.lock().unwrap(), shard.next - 100);

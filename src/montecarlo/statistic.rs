@@ -5,13 +5,13 @@
 pub enum Statistic {
     /// Coverage of nominal 95 % intervals, mean over the parameters.
     MeanCoverage,
-    /// The same of each parameter.
+    /// Coverage of nominal 95 % intervals, for each parameter.
     EachCoverage,
     /// Mean error of each parameter in units of its σ.
     Bias,
     /// Empirical over predicted σ, pooled over the parameters.
     PooledRatio,
-    /// The same of each parameter.
+    /// Empirical over predicted σ, for each parameter.
     EachRatio,
     /// Error of all parameters jointly, in units of their predicted covariance.
     JointRatio,

@@ -26,7 +26,7 @@ pub struct Summary {
     pub missing: Vec<[u64; 2]>,
     /// Name of the estimator.
     pub estimator: String,
-    /// Method of the covariance.
+    /// Name of the kind of covariance.
     pub covariance: String,
     /// One entry per base parameter.
     pub parameters: Vec<ParameterSummary>,

@@ -45,10 +45,10 @@ pub type GatheredOf<T> = <<T as Trials>::Content as Content>::Gathered;
 pub trait Content: Debug + Clone + PartialEq + Serialize + DeserializeOwned {
     /// Sum or list of the outcomes of the trials.
     type Gathered: Gathered;
-    /// Format of the files that hold it.
+    /// Schema of the shard files that hold it.
     const SCHEMA: &'static str;
 
-    /// The sum of no trials.
+    /// The empty sum or list, without any trials.
     fn nothing(&self) -> Self::Gathered;
 
     /// The first part in which the content differs from `expected`.

@@ -38,7 +38,7 @@ pub enum PlantError {
         key: &'static str,
         /// The value found.
         value: f64,
-        /// What it must be.
+        /// Condition that the value must meet.
         requirement: &'static str,
     },
     /// Friction is too steep, or a gear too stiff, for the integration step: the integration would chatter.
@@ -66,7 +66,7 @@ pub enum PlantError {
         key: &'static str,
         /// The value found.
         value: f64,
-        /// What it must be.
+        /// Condition that the value must meet.
         requirement: &'static str,
     },
     /// The effects together make the friction of a joint drive the joint.
@@ -87,9 +87,9 @@ pub enum PlantError {
     Joints {
         /// What has the wrong length.
         what: &'static str,
-        /// Its length.
+        /// Its number of entries.
         found: usize,
-        /// Joints of the arm.
+        /// Number of joints of the arm.
         expected: usize,
     },
     /// The state is no longer finite.
@@ -101,9 +101,9 @@ pub enum PlantError {
         time_s: f64,
         /// Joint, from 1.
         joint: usize,
-        /// Its angle, rad.
+        /// Angle of the joint, rad.
         q_rad: f64,
-        /// Its speed, rad/s.
+        /// Speed of the joint, rad/s.
         qd_rad_s: f64,
     },
 }

@@ -54,7 +54,7 @@ pub enum Effort {
     Current,
 }
 
-/// Sensor errors, the `[sensors]` table of a scenario. The default has none.
+/// Sensor errors: the `[sensors]` table of a scenario. The default has no errors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SensorConfig {

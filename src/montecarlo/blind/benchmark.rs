@@ -23,11 +23,11 @@ use crate::plant::{Measured, PlantError, Recording, SensorConfig};
 pub struct Benchmark {
     /// The plan from which the cases are drawn.
     pub plan: BlindPlan,
-    /// The arm's equations of motion.
+    /// Model of the arm: its equations of motion.
     pub model: Model,
     /// Base parameters of the nominal arm, for comparison with the nominal simulation.
     pub simulation: Vec<f64>,
-    /// Families of the dictionary.
+    /// Families in the dictionary of the diagnosis.
     pub known: Vec<Kind>,
     /// Run of the arm without effects along each motion of the plan.
     pub(super) clean: Vec<Recording>,
@@ -212,7 +212,7 @@ impl BlindWorker<'_> {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BlindContent {
-    /// Families of the dictionary.
+    /// Families in the dictionary of the diagnosis.
     pub known: Vec<Kind>,
 }
 

@@ -14,7 +14,7 @@ use crate::plant::NoiseModel;
 use crate::plant::faults::Effect;
 use crate::random::{Channel, TrialStreams};
 
-/// What is hidden.
+/// Kinds of cases: how much is hidden.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Secret {
@@ -62,7 +62,7 @@ pub struct Hidden {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Case {
-    /// What is hidden.
+    /// Kind of the case.
     pub secret: Secret,
     /// Name of the trajectory.
     pub motion: String,

@@ -97,13 +97,13 @@ pub struct MethodResult {
     pub coverage_worst: f64,
     /// 95 % confidence interval of the true value of `coverage_worst` (Wilson's binomial interval).
     pub coverage_worst_within: [f64; 2],
-    /// Its name.
+    /// Name of that parameter.
     pub coverage_worst_of: String,
     /// Empirical over predicted σ: smallest, pooled (rms) and largest over the parameters.
     pub ratio: [f64; 3],
     /// Largest |mean error| over empirical σ of any parameter.
     pub bias_worst: f64,
-    /// Its name.
+    /// Name of that parameter.
     pub bias_worst_of: String,
     /// Empirical σ over the Cramér–Rao bound; `None` where the bound is not known.
     pub efficiency: Option<Efficiency>,

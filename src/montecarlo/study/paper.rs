@@ -89,7 +89,7 @@ pub struct StartResult {
     pub hidden_effects: bool,
     /// Measured minus predicted torque at t = 0 without noise, Nm.
     pub error_at_zero_nm: Vec<f64>,
-    /// Rms of the same over the whole trajectory, Nm.
+    /// Rms of measured minus predicted torque over the whole trajectory, Nm.
     pub rms_nm: Vec<f64>,
     /// Identified Coulomb friction, Nm.
     pub coulomb_nm: Vec<f64>,

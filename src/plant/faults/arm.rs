@@ -1,4 +1,4 @@
-//! Arms that are not built or mounted as their model says.
+//! Effects of an arm that is not built or mounted as its model says.
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -7,18 +7,18 @@ use super::assembly::Assembly;
 use super::effect::{Complaint, Fault, finite, not_negative, positive, require};
 use crate::robot::LinkInertia;
 
-/// A body bolted to the flange: a solid steel ball of the given mass about its centre of mass (the
-/// smallest inertia a body of that mass has in practice).
+/// A body bolted to the flange: a solid steel ball with the given mass and centre of mass, which has the smallest
+/// inertia that a body of that mass has in practice.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Payload {
     /// Mass, kg.
     pub mass_kg: f64,
-    /// Centre of mass in the last joint's frame, m.
+    /// x of the centre of mass in the last joint's frame, m.
     pub com_x_m: f64,
-    /// Its y, m.
+    /// y of the centre of mass, m.
     pub com_y_m: f64,
-    /// Its z (along the last joint's axis), m.
+    /// z of the centre of mass (along the last joint's axis), m.
     pub com_z_m: f64,
 }
 
@@ -50,15 +50,14 @@ impl Fault for Payload {
     }
 }
 
-/// A link of another length: the way from the previous joint's frame to this joint's is longer by e
-/// along its own direction. For joint 1 that is the height of the arm on its base, which no torque
-/// depends on.
+/// A link of another length: the vector from the previous joint's frame to this joint's frame is longer by e in its own
+/// direction. For joint 1 this vector is the height of the arm on its base, on which no torque depends.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LinkLength {
     /// Joint at the far end of the link, from 1.
     pub joint: usize,
-    /// e, m.
+    /// e, the error of the length, m.
     pub error_m: f64,
 }
 
@@ -83,7 +82,7 @@ impl Fault for LinkLength {
     }
 }
 
-/// Gravity of another size, along its nominal direction.
+/// Gravity of another magnitude, in its nominal direction.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Gravity {
@@ -110,8 +109,8 @@ impl Fault for Gravity {
     }
 }
 
-/// A base that does not stand level: turned against the vertical by the rotation vector
-/// (tilt_x, tilt_y, 0) in base axes, so that gravity appears turned back in the base frame.
+/// A base that is not level: it is rotated by the rotation vector (tilt_x, tilt_y, 0) in base axes, so that in the base
+/// frame gravity appears rotated by the opposite angle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BaseTilt {
@@ -139,7 +138,7 @@ impl Fault for BaseTilt {
     }
 }
 
-/// An encoder off zero: it reads q + o, and the controller believes it.
+/// An encoder with a zero offset: it reads q + o, and the controller uses this reading.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EncoderOffset {

@@ -1,4 +1,4 @@
-//! The plant under construction: what the effects have put into it so far.
+//! The plant under construction, into which the effects are installed one by one.
 
 use super::effect::{Complaint, require};
 use super::friction::Friction;
@@ -8,37 +8,37 @@ use super::surroundings::{Contact, Spring};
 use super::timing::Timing;
 use crate::robot::Arm;
 
-/// Everything an effect can act on.
+/// Everything that an effect can change.
 #[derive(Debug, Clone)]
 pub(super) struct Assembly {
-    /// The true arm. Friction is in `joints`, not here.
+    /// The true arm, except for its friction, which is in `joints`.
     pub(super) arm: Arm,
     /// Mechanics of each joint.
     pub(super) joints: Vec<JointMechanics>,
-    /// Pushes on the flange.
+    /// Contact forces on the flange.
     pub(super) flange_contacts: Vec<Contact>,
-    /// When the channels are read.
+    /// Instants at which the channels are read.
     pub(super) timing: Timing,
-    /// What becomes of the readings, in this order, each with its effect's number from 0.
+    /// Faults of the readings, in the order of application, each with the number of its effect, from 0.
     pub(super) readings: Vec<(u8, ReadingFault)>,
     /// Number of the effect being installed, from 0.
     pub(super) number: u8,
 }
 
-/// One joint from the current of its motor to its link.
+/// Mechanics of one joint, from the current of its motor to its link.
 #[derive(Debug, Clone)]
 pub(super) struct JointMechanics {
     /// Reflected rotor inertia, kg m².
     pub(super) rotor_inertia_kg_m2: f64,
-    /// Friction, on the motor's side of the gear.
+    /// Friction on the motor side of the gear.
     pub(super) friction: Friction,
-    /// How its gear gives way, as asked for.
+    /// The elasticity of the gear, as specified by the effect.
     pub(super) elasticity: Option<Elasticity>,
-    /// The play of its gear, as asked for.
+    /// The play of the gear, as specified by the effect.
     pub(super) backlash: Option<Backlash>,
-    /// What gives way between rotor and link; `None`: nothing.
+    /// The compliant transmission between rotor and link; `None` if the gear is rigid.
     pub(super) transmission: Option<Transmission>,
-    /// Which side of the transmission the encoder sits on.
+    /// Side of the transmission on which the encoder sits.
     pub(super) encoder: EncoderSide,
     /// Torque ripples.
     pub(super) ripples: Vec<Ripple>,
@@ -46,7 +46,7 @@ pub(super) struct JointMechanics {
     pub(super) gain_error: f64,
     /// Logged minus true torque, Nm.
     pub(super) offset_nm: f64,
-    /// Share of its friction that the controller feeds forward.
+    /// Share of the joint's nominal friction that the controller feeds forward.
     pub(super) fed_forward: f64,
     /// Largest torque the reading can show, Nm.
     pub(super) reading_limit_nm: f64,
@@ -54,12 +54,12 @@ pub(super) struct JointMechanics {
     pub(super) encoder_offset_rad: f64,
     /// Springs between the link and its surroundings.
     pub(super) springs: Vec<Spring>,
-    /// Things touched by this joint alone.
+    /// Contacts that act on this joint alone.
     pub(super) contacts: Vec<Contact>,
 }
 
 impl Assembly {
-    /// The nominal arm, its friction fed forward as the controller's configuration says.
+    /// The arm without effects. `friction_feedforward` is the share of friction that the controller feeds forward.
     pub(super) fn new(arm: &Arm, friction_feedforward: f64) -> Self {
         let mechanics = |joint: &crate::robot::Joint| JointMechanics {
             rotor_inertia_kg_m2: joint.drive.rotor_inertia_kg_m2,
@@ -87,7 +87,8 @@ impl Assembly {
         }
     }
 
-    /// Complains of joint `index` (from 0) whose drive has no torque limit, by which a fault is sized.
+    /// Complains if the drive of joint `index` (from 0) has no finite torque limit, which some effects need for their
+    /// size.
     pub(super) fn require_torque_limit(&self, index: usize) -> Result<(), Complaint> {
         let limit_nm = self.arm.joints[index].limits.torque_nm;
         require(

@@ -1,12 +1,12 @@
-//! Drives whose current is not what it is taken for.
+//! Effects of the drives: errors of the current reading, of the torque constant and of the feed-forward.
 
 use serde::{Deserialize, Serialize};
 
 use super::assembly::Assembly;
 use super::effect::{Complaint, Fault, finite, positive, require};
 
-/// A torque constant off its nominal value: the torque that controller and log compute from the
-/// current with the nominal i_G k is (1 + e) times the true one (the true constant is k/(1 + e)).
+/// A torque constant that deviates from its nominal value: the torque that controller and log compute from the current
+/// with the nominal i_G k is (1 + e) times the true torque. The true constant is k/(1 + e).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TorqueGain {
@@ -33,14 +33,14 @@ impl Fault for TorqueGain {
     }
 }
 
-/// A current sensor off zero. The current loop holds the *reading* at what the controller asks for, so
-/// the log shows the command and the drive gives o less.
+/// A current sensor with a zero offset. The current loop holds the *reading* at the value that the controller commands,
+/// so that the log shows the command, while the drive delivers o less.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CurrentOffset {
     /// Joint, from 1.
     pub joint: usize,
-    /// o: reading minus truth, as torque at the joint, Nm.
+    /// o: reading minus truth, as a torque at the joint, Nm.
     pub offset_nm: f64,
 }
 
@@ -59,14 +59,14 @@ impl Fault for CurrentOffset {
     }
 }
 
-/// A drive that feeds another share of its friction forward than the controller's
-/// [`friction_feedforward`](crate::plant::PlantConfig::friction_feedforward): less by Δ.
+/// A drive that feeds forward another share of its friction than the controller's
+/// [`friction_feedforward`](crate::plant::PlantConfig::friction_feedforward): the share is smaller by Δ.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FeedForward {
     /// Joint, from 1.
     pub joint: usize,
-    /// Δ; negative where it feeds more forward.
+    /// Δ; negative if the drive feeds more forward.
     pub share_less: f64,
 }
 
@@ -89,9 +89,9 @@ impl Fault for FeedForward {
     }
 }
 
-/// A current reading that ends at a limit which the current itself passes: the log shows
-/// clamp(τ, ±limit). (A drive that cannot give more than it is asked for is a limit of the arm,
-/// `torque_nm`; its log is true.)
+/// A current reading that saturates at a limit although the current itself exceeds it: the log shows clamp(τ, ±limit).
+/// (A drive that cannot deliver the commanded torque is modelled by the arm's limit `torque_nm` instead; its log is
+/// correct.)
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Saturation {

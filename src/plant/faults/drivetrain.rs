@@ -11,64 +11,66 @@ use crate::robot::Placement;
 
 /// Joints with any combination of effects between the current of their motors and their links.
 ///
-/// Its own states, joint by joint, are the bristle of presliding (z, 1), the rotor behind a gear that
-/// gives way (angle rad, speed rad/s), and the warmth Θ (1), of each only what the effects need.
-/// Without effects every operation is the one of [`RigidDrivetrain`](crate::plant::RigidDrivetrain),
-/// to the bit.
+/// The drivetrain's own states, joint by joint, are the bristle of presliding (z, dimensionless), the rotor behind an
+/// elastic gear or one with play (angle, rad; speed, rad/s), and the warmth Θ (dimensionless); only the states that the
+/// effects need exist. Without effects, every operation is the same as in
+/// [`RigidDrivetrain`](crate::plant::RigidDrivetrain), to the last bit.
 #[derive(Debug, Clone)]
 pub struct HiddenDrivetrain {
     joints: Vec<JointMechanics>,
     slots: Vec<Slots>,
     states: usize,
     course: Course,
-    /// Largest drive torques: bounds of gear loads, Nm.
+    /// Largest drive torques, which bound the loads of the gears, Nm.
     limit_nm: Vec<f64>,
     flange: Flange,
-    /// Torque at the gears' outputs that load-dependent friction was last found for, Nm.
+    /// Torques at the outputs of the gears for which load-dependent friction was last computed, Nm.
     load_nm: Vec<f64>,
     motor: Vec<Motor>,
     resistance_nm: Vec<f64>,
     link_torque_nm: Vec<f64>,
-    /// What the link torques are more than before: scratch.
+    /// Working memory: increase of the link torques over their previous values, Nm.
     more_nm: Vec<f64>,
 }
 
-/// Where a joint's own states are.
+/// Indices of a joint's own states.
 #[derive(Debug, Clone, Copy, Default)]
 struct Slots {
     bristle: Option<usize>,
-    /// Angle; the speed follows it.
+    /// Index of the rotor's angle; the speed is at the next index.
     rotor: Option<usize>,
     warmth: Option<usize>,
 }
 
-/// The motor's side of one joint during one stage.
+/// The motor side of one joint during one stage.
 #[derive(Debug, Clone, Copy, Default)]
 struct Motor {
     q_rad: f64,
     qd_rad_s: f64,
-    /// What the drive gives, ripple taken off, Nm.
+    /// Torque that the drive delivers, minus the ripple, Nm.
     drive_nm: f64,
 }
 
-/// What is known of a motion before it is run.
+/// Properties of a motion that are known before it is run.
 #[derive(Debug, Clone)]
 struct Course {
-    /// With room for what tracking adds, rad/s.
+    /// Largest speed of each joint, with a margin for tracking errors, rad/s.
     largest_speed_rad_s: Vec<f64>,
-    /// Twice what the motion asks for and a little more, rad/s², and what pushes make of the rotor alone.
+    /// Bound of each joint's acceleration, rad/s²: twice the largest acceleration of the motion, plus 1 rad/s², plus
+    /// the acceleration that contacts would give to the rotor alone.
     largest_acceleration_rad_s2: Vec<f64>,
-    /// Under nominal friction, W.
+    /// Mean power lost in nominal friction, W.
     mean_friction_power_w: Vec<f64>,
 }
 
-/// Where on the course speeds are looked up, per second.
+/// Rate at which the motion is sampled for its [`Course`], Hz.
 const COURSE_RATE_HZ: f64 = 100.0;
-/// Gear loads are found to this accuracy, Nm: the integrator's own error is a thousand times larger.
+/// Accuracy to which the loads of the gears are found, Nm; the integrator's own error is a thousand times larger.
 const LOAD_ACCURACY_NM: f64 = 1e-9;
-/// A bound that convergence by at least the factor μ ≤ 0.5 per iteration stays inside.
+/// Limit of the iterations for gear loads. Since the error falls by at least the factor μ ≤ 0.5 per iteration, the
+/// limit is not reached.
 const LOAD_ITERATIONS: usize = 48;
-/// Parts a step may be divided into.
+/// Largest number of parts into which a step may be divided.
 const MOST_SUBSTEPS: usize = 64;
 
 impl Course {
@@ -137,7 +139,7 @@ impl HiddenDrivetrain {
         }
     }
 
-    /// Torques of the surroundings against positive motion of the links, Nm.
+    /// Computes the torques of the surroundings against positive motion of the links, Nm.
     fn find_resistance(&mut self, time_s: f64, q_rad: &[f64]) {
         for (j, joint) in self.joints.iter().enumerate() {
             let springs = joint.springs.iter().map(|s| s.resistance_nm(q_rad[j]));
@@ -147,7 +149,7 @@ impl HiddenDrivetrain {
         self.flange.add_resistance(time_s, q_rad, &mut self.resistance_nm);
     }
 
-    /// Friction of joint `j`, Nm, with its own states from `states`.
+    /// Friction of joint `j`, Nm; the joint's own states are taken from `states`.
     fn friction_nm(&self, j: usize, states: &[f64]) -> f64 {
         let (slots, motor) = (&self.slots[j], &self.motor[j]);
         let bristle = slots.bristle.map(|s| states[s]);
@@ -156,7 +158,7 @@ impl HiddenDrivetrain {
         friction.torque_nm(motor.q_rad, motor.qd_rad_s, bristle, warmth, self.load_nm[j])
     }
 
-    /// Finds the link torques of all joints with a stiff gear, and by how much they are more than before.
+    /// Computes the link torques of all joints with a rigid gear, and their increase over the previous values.
     fn find_link_torques(&mut self, stage: &Stage<'_>) {
         for j in 0..self.joints.len() {
             self.more_nm[j] = 0.0;
@@ -170,9 +172,9 @@ impl HiddenDrivetrain {
         }
     }
 
-    /// Finds the loads of stiff gears with load-dependent friction and the accelerations that go with
-    /// them: L = τ_drive − τ_f(L) − Ia q̈(τ_f(L)), by iteration from the last stage's load. A change of
-    /// L changes the right-hand side by at most μ times as much.
+    /// Solves for the loads L of rigid gears with load-dependent friction and for the corresponding accelerations: L =
+    /// τ_drive − τ_f(L) − Ia q̈(τ_f(L)). The iteration starts from the load of the last stage. It converges, because a
+    /// change of L changes the right-hand side by at most μ times as much.
     fn settle_loads(&mut self, arm: &mut RapierArm, stage: &Stage<'_>, qdd_rad_s2: &mut [f64]) {
         for _ in 0..LOAD_ITERATIONS {
             let mut change: f64 = 0.0;
@@ -219,7 +221,7 @@ impl Drivetrain for HiddenDrivetrain {
         if self.joints.iter().all(|joint| joint.transmission.is_none()) {
             return;
         }
-        // Gears that give way start deflected as far as it takes to hold the links.
+        // Elastic gears start with the deflection that holds the links against gravity and the surroundings.
         self.find_resistance(0.0, q_rad);
         let holding_nm = arm.holding_torque(q_rad);
         for (j, joint) in self.joints.iter().enumerate() {
@@ -254,9 +256,9 @@ impl Drivetrain for HiddenDrivetrain {
         }
     }
 
-    /// The fastest of: friction against what it acts on, the swing of bristles and gears, bristles
-    /// that turn round, ripple passing by at the largest speed of the motion. A swing of frequency ω counts
-    /// as 2 ω: a step ω h = 1 resolves it.
+    /// The largest of these rates: the decay by friction and gear damping of the inertias on which they act, the
+    /// oscillation of bristles and gears, the reversal of bristles, and the ripple at the largest speed of the motion.
+    /// An oscillation of frequency ω counts as 2 ω, because a step with ω h = 1 resolves it.
     fn fastest_decay_per_s(&self, inverse_inertia_per_kg_m2: &[f64]) -> f64 {
         let mut fastest: f64 = 0.0;
         for (j, joint) in self.joints.iter().enumerate() {
@@ -275,7 +277,7 @@ impl Drivetrain for HiddenDrivetrain {
                 let acceleration = self.course.largest_acceleration_rad_s2[j];
                 let turning = presliding.fastest_turn_per_s(acceleration);
                 let passing = presliding.stiffness_per_rad * speed;
-                // Twice: the decay has a kink where the joint reverses, within a step.
+                // The factor 2 allows for the kink of the decay where the joint reverses within a step.
                 fastest = fastest.max(2.0 * turning.min(passing));
             }
             for ripple in &joint.ripples {
@@ -335,12 +337,12 @@ impl Drivetrain for HiddenDrivetrain {
     }
 }
 
-/// Pushes on the flange and the lever arms they act with.
+/// Contact forces on the flange, with the kinematics for their lever arms.
 #[derive(Debug, Clone)]
 struct Flange {
     contacts: Vec<Contact>,
     placements: Vec<Placement>,
-    /// Origin and axis of each joint in the base frame: scratch.
+    /// Working memory: origin and axis of each joint in the base frame.
     axes: Vec<(Vector3<f64>, Vector3<f64>)>,
     reach_m: f64,
 }
@@ -356,7 +358,7 @@ impl Flange {
         }
     }
 
-    /// Adds −Jᵀ F of the pushes at `time_s`, Nm: τ_i = z_i · ((p_flange − p_i) × F).
+    /// Adds the resistance −Jᵀ F of the contact force F at `time_s`, Nm: (Jᵀ F)_i = z_i · ((p_flange − p_i) × F).
     fn add_resistance(&mut self, time_s: f64, q_rad: &[f64], resistance_nm: &mut [f64]) {
         let push_nm: f64 = self.contacts.iter().map(|c| c.push_nm(time_s)).sum();
         if push_nm == 0.0 {

@@ -1,4 +1,4 @@
-//! An effect as a scenario names it.
+//! Hidden effects as a scenario describes them.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,17 +14,17 @@ use super::readings::{DroppedSamples, Outliers, Quantisation};
 use super::surroundings::{Contact, Spring};
 use super::timing::{ClockFault, TimeSkew, VelocityLag};
 
-/// What every kind of effect can do: say where it sits, check its numbers, and take its place.
+/// Interface of every kind of effect: it states its joint, checks its parameters, and installs itself in the plant.
 pub(super) trait Fault {
-    /// The joint it sits at, from 1; `None` where it belongs to the whole arm.
+    /// The joint of the effect, from 1; `None` if it belongs to the whole arm or to all joints.
     fn joint(&self) -> Option<usize>;
-    /// Ranges of its own numbers.
+    /// Checks the ranges of the effect's parameters.
     fn check(&self) -> Result<(), Complaint>;
-    /// Puts it into the plant under construction. The joint exists.
+    /// Installs the effect in the plant under construction. The caller guarantees that the joint exists.
     fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint>;
 }
 
-/// A number that makes no sense.
+/// Complaint about a parameter whose value makes no sense.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Complaint {
     pub(super) key: &'static str,
@@ -32,7 +32,7 @@ pub(super) struct Complaint {
     pub(super) requirement: &'static str,
 }
 
-/// Passes `ok`, or complains about `key`.
+/// Complains about `key` unless `ok` holds.
 pub(super) fn require(
     ok: bool,
     key: &'static str,
@@ -42,25 +42,25 @@ pub(super) fn require(
     if ok { Ok(()) } else { Err(Complaint { key, value, requirement }) }
 }
 
-/// Any number that is one.
+/// Requires a finite number.
 pub(super) fn finite(key: &'static str, value: f64) -> Result<(), Complaint> {
     require(value.is_finite(), key, value, "must be a finite number")
 }
 
-/// Above zero.
+/// Requires a finite number above zero.
 pub(super) fn positive(key: &'static str, value: f64) -> Result<(), Complaint> {
     require(value > 0.0 && value.is_finite(), key, value, "must be positive")
 }
 
-/// Zero or above.
+/// Requires a finite number that is zero or above.
 pub(super) fn not_negative(key: &'static str, value: f64) -> Result<(), Complaint> {
     require(value >= 0.0 && value.is_finite(), key, value, "must not be negative")
 }
 
-/// Declares the kinds: one line each, which is all that a new kind needs here.
+/// Declares the kinds of effects. A new kind needs one line in the list below and nothing else in this file.
 macro_rules! effects {
     ($($(#[$doc:meta])* $variant:ident = $kind:literal,)*) => {
-        /// One hidden effect: an `[[effect]]` table, told apart by its `kind`.
+        /// One hidden effect: an `[[effect]]` table, distinguished by its `kind`.
         ///
         /// ```toml
         /// [[effect]]
@@ -79,7 +79,7 @@ macro_rules! effects {
             /// All kinds.
             pub const KINDS: &[&str] = &[$($kind),*];
 
-            /// Its `kind`.
+            /// The `kind` of the effect.
             pub fn kind(&self) -> &'static str {
                 match self {
                     $(Self::$variant(_) => $kind,)*
@@ -98,7 +98,7 @@ macro_rules! effects {
 effects! {
     /// More friction near standstill.
     Stribeck = "stribeck",
-    /// Viscous friction that is not proportional to speed.
+    /// Viscous friction that is not proportional to the speed.
     NonlinearViscous = "nonlinear_viscous",
     /// Friction that differs between the two directions.
     AsymmetricFriction = "asymmetric_friction",
@@ -106,76 +106,76 @@ effects! {
     LoadFriction = "load_friction",
     /// Friction that builds up over a small angle.
     Presliding = "presliding",
-    /// Friction that turns round over another range of speeds.
+    /// Friction that reverses over another range of speeds.
     ReversalWidth = "reversal_width",
     /// Friction that varies with the angle.
     PositionFriction = "position_friction",
     /// Friction that changes as the joint warms up.
     ThermalDrift = "thermal_drift",
-    /// Friction of another size than nominal.
+    /// Coulomb and viscous friction that deviate from their nominal values.
     FrictionChange = "friction_change",
-    /// Torque ripple of gear or motor.
+    /// Torque ripple of the gear or motor.
     Ripple = "ripple",
-    /// A gear that gives way.
+    /// An elastic gear.
     Elasticity = "elasticity",
     /// A gear with play.
     Backlash = "backlash",
-    /// A torque constant off its nominal value.
+    /// A torque constant that deviates from its nominal value.
     TorqueGain = "torque_gain",
-    /// A current sensor off zero.
+    /// A current sensor with a zero offset.
     CurrentOffset = "current_offset",
-    /// A current reading that ends at a limit.
+    /// A current reading that saturates.
     Saturation = "saturation",
-    /// A drive that feeds another share of its friction forward.
+    /// A drive that feeds forward another share of its friction.
     FeedForward = "feed_forward",
     /// A cable or dress pack that pulls.
     Spring = "spring",
-    /// Something touched on the way.
+    /// A contact with something during the motion.
     Contact = "contact",
     /// A body on the flange.
     Payload = "payload",
     /// A link of another length.
     LinkLength = "link_length",
-    /// Another gravity.
+    /// Gravity of another magnitude.
     Gravity = "gravity",
-    /// A base that does not stand level.
+    /// A base that is not level.
     BaseTilt = "base_tilt",
-    /// An encoder off zero.
+    /// An encoder with a zero offset.
     EncoderOffset = "encoder_offset",
-    /// Torque that is read late.
+    /// A torque that is read late.
     TimeSkew = "time_skew",
-    /// Velocity behind a low-pass.
+    /// A velocity that is low-pass filtered.
     VelocityLag = "velocity_lag",
-    /// Stalls that the time column hides.
+    /// Stalls of the logger that the time column hides.
     ClockFault = "clock_fault",
     /// A coarse reading.
     Quantisation = "quantisation",
-    /// Readings that are nonsense.
+    /// Readings that have lost their meaning.
     Outliers = "outliers",
     /// Rows lost or repeated.
     DroppedSamples = "dropped_samples",
 }
 
 impl Effect {
-    /// The joint it sits at, from 1; `None` where it belongs to the whole arm or to all joints.
+    /// The joint of the effect, from 1; `None` if it belongs to the whole arm or to all joints.
     pub fn joint(&self) -> Option<usize> {
         self.as_fault().joint()
     }
 
-    /// Whether the noise-free log of a periodic motion repeats with it, once the start is forgotten.
-    /// (Single readings that go wrong do so later, in each trial's log.)
+    /// Whether the noise-free log of a periodic motion still repeats with this effect, once the start is forgotten.
+    /// (Faults of single readings do not matter here: they are applied later, to the log of each trial.)
     pub fn repeats(&self) -> bool {
         !matches!(self, Self::ThermalDrift(_) | Self::Contact(_) | Self::ClockFault(_))
     }
 
-    /// Its numbers and choices, by their keys in a scenario.
+    /// Parameters of the effect, by their keys in a scenario, except for `kind` and `joint`.
     pub fn parameters(&self) -> serde_json::Map<String, serde_json::Value> {
         match serde_json::to_value(self) {
             Ok(serde_json::Value::Object(mut keys)) => {
                 keys.retain(|key, _| key != "kind" && key != "joint");
                 keys
             }
-            // An enum of tables with text keys and finite numbers is an object.
+            // Never reached: an enum of tables with text keys and finite numbers serialises to an object.
             _ => serde_json::Map::new(),
         }
     }

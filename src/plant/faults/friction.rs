@@ -1,4 +1,4 @@
-//! Friction of a joint, and everything that can be wrong with a model of it.
+//! Friction of a joint, and all effects by which it can deviate from its nominal model.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,7 +6,7 @@ use super::assembly::Assembly;
 use super::effect::{Complaint, Fault, finite, not_negative, positive, require};
 use crate::robot::Drive;
 
-/// Friction torque of one joint on the motor's side of its gear:
+/// Friction torque of one joint on the motor side of its gear:
 ///
 /// ```text
 /// τ_f = (1 + φ Θ) · [ rv q̇ + c(q, q̇, L) z + Σ A |q̇|ᵖ s + a z² + b |q̇| ]
@@ -23,16 +23,16 @@ pub(super) struct Friction {
     asymmetric_nm: f64,
     asymmetric_nm_s_rad: f64,
     positions: Vec<PositionFriction>,
-    /// μ of the load-dependent part.
+    /// Coefficient μ of the load-dependent part.
     pub(super) mu: f64,
-    /// Bristles, if any.
+    /// Presliding by bristles, if any.
     pub(super) presliding: Option<Presliding>,
-    /// Warming, if any.
+    /// Thermal drift, if any.
     pub(super) thermal: Option<ThermalDrift>,
 }
 
 impl Friction {
-    /// The paper's (2) and (3), with the drive's own rv and rc.
+    /// Friction by the paper's (2) and (3), with the drive's own rv and rc.
     pub(super) fn nominal(drive: &Drive, epsilon_rad_s: f64) -> Self {
         Self {
             epsilon_rad_s,
@@ -49,8 +49,8 @@ impl Friction {
         }
     }
 
-    /// τ_f, Nm, at angle and speed of the motor, the bristle's state where there is one, the warmth Θ
-    /// and the torque L that the gear's output carries.
+    /// τ_f, Nm, for the motor's angle and speed, the state of the bristle (if there is one), the warmth Θ and the
+    /// torque L at the output of the gear.
     #[inline]
     pub(super) fn torque_nm(
         &self,
@@ -98,8 +98,8 @@ impl Friction {
         (self.viscous_nm_s_rad * qd_rad_s + self.coulomb_nm * sign) * qd_rad_s
     }
 
-    /// First speed up to `largest_rad_s` (and its torque, Nm) at which friction would drive the joint
-    /// instead of slowing it.
+    /// First of a series of speeds up to `largest_rad_s` at which friction would drive the joint instead of slowing it,
+    /// with the friction torque there, Nm.
     pub(super) fn first_driving(&self, largest_rad_s: f64) -> Option<(f64, f64)> {
         const SPEEDS: i32 = 48;
         let wave: f64 = self.positions.iter().map(|p| p.amplitude_nm.abs()).sum();
@@ -114,10 +114,10 @@ impl Friction {
             })
     }
 
-    /// Steepest slope dτ_f/dq̇ at speeds up to `largest_rad_s` with gear loads up to `load_nm`, and
-    /// steepest slope dτ_f/dq of the bristles: Nm s/rad and Nm/rad. Upper bounds.
+    /// Upper bounds of the slopes of friction at speeds up to `largest_rad_s` and gear loads up to `load_nm`: dτ_f/dq̇,
+    /// Nm s/rad, and dτ_f/dq of the bristles, Nm/rad.
     pub(super) fn slopes(&self, largest_rad_s: f64, load_nm: f64) -> (f64, f64) {
-        // Without the law no load matters, even one that has no limit.
+        // Without load-dependent friction the load does not matter, even if it is infinite.
         let loaded = if self.mu == 0.0 { 0.0 } else { self.mu * load_nm };
         let stribeck_nm = self.stribeck.iter().map(|p| p.extra_nm.abs()).sum::<f64>();
         let level = self.coulomb_nm
@@ -125,7 +125,7 @@ impl Friction {
             + stribeck_nm
             + self.positions.iter().map(|p| p.amplitude_nm.abs()).sum::<f64>();
         let power = |p: &NonlinearViscous| {
-            // |v|ᵖ tanh(v/ε): at most p vᵖ⁻¹ for p ≥ 1, and about εᵖ⁻¹ near standstill for p < 1.
+            // The slope of |v|ᵖ tanh(v/ε) is at most p vᵖ⁻¹ for p ≥ 1, and about εᵖ⁻¹ near standstill for p < 1.
             let at = if p.exponent < 1.0 { self.epsilon_rad_s } else { largest_rad_s };
             p.amplitude_nm.abs() * p.exponent.max(1.0) * at.powf(p.exponent - 1.0)
         };
@@ -134,7 +134,8 @@ impl Friction {
             + self.powers.iter().map(power).sum::<f64>();
         let mut bristles = 0.0;
         match &self.presliding {
-            // c (z + T ż) + a z² with |z| ≤ 1 and |ż| ≤ 2 k |q̇|; c falls with the speed whatever z is, and |q̇ dc/dq̇| ≤ d.
+            // The law is c (z + T ż) + a z² with |z| ≤ 1 and |ż| ≤ 2 k |q̇|. The Stribeck part of c depends on the speed for any z,
+            // and |q̇ dc/dq̇| ≤ d.
             Some(presliding) => {
                 let Presliding { stiffness_per_rad, damping_s, .. } = *presliding;
                 bristles = (level + 2.0 * self.asymmetric_nm.abs()) * stiffness_per_rad;
@@ -169,7 +170,7 @@ fn gaussian() -> i32 {
 }
 
 impl Stribeck {
-    /// Where d exp(−|q̇/v_s|ⁿ) is steepest: √(2/e) d/v_s at v_s/√2 for n = 2, d/v_s at rest for n = 1.
+    /// Steepest slope of d exp(−|q̇/v_s|ⁿ): √(2/e) d/v_s at v_s/√2 for n = 2, and d/v_s at rest for n = 1.
     fn steepest_nm_s_rad(&self) -> f64 {
         let shape = if self.exponent == 1 { 1.0 } else { (2.0 / std::f64::consts::E).sqrt() };
         shape * self.extra_nm.abs() / self.vs_rad_s
@@ -194,8 +195,8 @@ impl Fault for Stribeck {
     }
 }
 
-/// Viscous friction off proportionality: + A |q̇/(1 rad/s)|ᵖ sign q̇. Concave for p < 1 (thinning
-/// grease) or A < 0 with p > 1, convex otherwise.
+/// Viscous friction that is not proportional to speed, by the additional term A |q̇/(1 rad/s)|ᵖ sign q̇. The law is
+/// concave for A > 0 with p < 1 (thinning grease) and for A < 0 with p > 1, and convex otherwise.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NonlinearViscous {
@@ -203,7 +204,7 @@ pub struct NonlinearViscous {
     pub joint: usize,
     /// A: deviation from the linear law at 1 rad/s, Nm.
     pub amplitude_nm: f64,
-    /// p, above 0 and up to 4.
+    /// Exponent p, above 0 and up to 4.
     pub exponent: f64,
 }
 
@@ -224,16 +225,16 @@ impl Fault for NonlinearViscous {
     }
 }
 
-/// Friction of unequal size in the two directions: rc ± a and rv ± b for positive (negative) speed.
-/// At standstill, where dry friction has no direction, the unequal part vanishes too.
+/// Friction that differs between the two directions: rc + a and rv + b for positive speed, rc − a and rv − b for
+/// negative speed. At standstill, where dry friction has no direction, the asymmetric part vanishes too.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AsymmetricFriction {
     /// Joint, from 1.
     pub joint: usize,
-    /// a: half the difference of Coulomb friction, Nm.
+    /// a: half of the difference of Coulomb friction between the directions, Nm.
     pub coulomb_nm: f64,
-    /// b: half the difference of viscous friction, Nm s/rad.
+    /// b: half of the difference of viscous friction between the directions, Nm s/rad.
     pub viscous_nm_s_rad: f64,
 }
 
@@ -255,15 +256,15 @@ impl Fault for AsymmetricFriction {
     }
 }
 
-/// Dry friction that grows with the load: c = rc + μ |L|, with L the torque that the gear's output
-/// hands to the link (the rotor's own inertia is upstream of it and not in it). In a stiff gear L
-/// depends on the acceleration and the acceleration on friction: both are solved for in every stage.
+/// Dry friction that grows with the load: c = rc + μ |L|, with L the torque that the gear's output transmits to the
+/// link (the torque that accelerates the rotor is not part of it). In a rigid gear, L depends on the acceleration and
+/// the acceleration depends on friction: both are solved for together in every stage.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LoadFriction {
     /// Joint, from 1.
     pub joint: usize,
-    /// μ: friction per gear torque, 0 up to 0.5.
+    /// μ: friction per gear torque, from 0 to 0.5.
     pub mu: f64,
 }
 
@@ -292,39 +293,40 @@ impl Fault for LoadFriction {
 pub struct Presliding {
     /// Joint, from 1.
     pub joint: usize,
-    /// k: inverse of the angle over which friction turns round, 1/rad.
+    /// k: inverse of the angle over which friction reverses, 1/rad.
     pub stiffness_per_rad: f64,
     /// T: damping of the bristles over their stiffness, s. Default 0.
     #[serde(default)]
     pub damping_s: f64,
 }
 
-/// ln of 1/e^18 = 1.5e-8: what a bristle may lack to have turned round.
+/// Exponent after which a bristle counts as reversed: the remaining deviation is then e⁻¹⁸ = 1.5e-8.
 const TURNED_ROUND: f64 = 18.0;
 
 impl Presliding {
-    /// Of bristles without damping.
+    /// Undamped bristles.
     pub fn new(joint: usize, stiffness_per_rad: f64) -> Self {
         Self { joint, stiffness_per_rad, damping_s: 0.0 }
     }
 
-    /// T ż, over the level of dry friction.
+    /// T ż: the damping torque over the level of dry friction.
     #[inline]
     fn damping(&self, qd_rad_s: f64, bristle: f64) -> f64 {
         self.damping_s * self.stiffness_per_rad * (qd_rad_s - qd_rad_s.abs() * bristle)
     }
 
-    /// ż = k (q̇ − |q̇| z), 1/s, which is a decay towards ±1 at k |q̇|; it counts up to `fastest_per_s`.
+    /// ż = k (q̇ − |q̇| z), 1/s, which is a decay towards ±1 at the rate k |q̇|. The rate is limited to
+    /// `fastest_per_s`.
     #[inline]
     pub(super) fn bristle_rate(&self, qd_rad_s: f64, fastest_per_s: f64, bristle: f64) -> f64 {
         let decay_per_s = (self.stiffness_per_rad * qd_rad_s.abs()).min(fastest_per_s);
         decay_per_s * (qd_rad_s.signum() - bristle)
     }
 
-    /// The fastest decay that matters, 1/s, to a joint that starts at rest and is not accelerated faster than a.
-    /// Behind a reversal the bristle lacks e^(−k d) where the joint has turned by d, at a speed of √(2 a d) at most: it
-    /// has turned round for good before the decay k q̇ gets beyond √(2 a k · 18), and a bristle at rest at ±1 does
-    /// not tell how fast it would go there.
+    /// Fastest decay of the bristle that matters, 1/s, for a joint that starts at rest with an acceleration of at most
+    /// a. When the joint has moved by d after a reversal, its speed is at most √(2 a d), and the deviation of the
+    /// bristle has shrunk to e^(−k d). The bristle has therefore completed its reversal (k d = 18) before the decay
+    /// rate k q̇ exceeds √(2 a k · 18). From then on it stays at ±1, where the rate has no effect.
     pub(super) fn fastest_turn_per_s(&self, acceleration_rad_s2: f64) -> f64 {
         (2.0 * acceleration_rad_s2 * self.stiffness_per_rad * TURNED_ROUND).sqrt()
     }
@@ -346,14 +348,14 @@ impl Fault for Presliding {
     }
 }
 
-/// Dry friction that turns round over another range of speeds than the robot's file says: tanh(q̇/w) in place of
-/// tanh(q̇/ε). The controller feeds forward what the file says.
+/// Dry friction that reverses over another range of speeds than the robot file says: tanh(q̇/w) in place of tanh(q̇/ε).
+/// The controller feeds forward the friction of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ReversalWidth {
-    /// Joint, from 1; left out: all.
+    /// Joint, from 1; if left out, all joints.
     pub joint: Option<usize>,
-    /// w, rad/s.
+    /// Width w, rad/s.
     pub width_rad_s: f64,
 }
 
@@ -374,15 +376,15 @@ impl Fault for ReversalWidth {
     }
 }
 
-/// Dry friction that varies over a turn: c = rc + P cos(q + ψ), from a gear or seal out of round.
+/// Dry friction that varies over a turn, c = rc + P cos(q + ψ), because a gear or seal is not round.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PositionFriction {
     /// Joint, from 1.
     pub joint: usize,
-    /// P, Nm.
+    /// Amplitude P, Nm.
     pub amplitude_nm: f64,
-    /// ψ, rad.
+    /// Phase ψ, rad.
     pub phase_rad: f64,
 }
 
@@ -402,9 +404,9 @@ impl Fault for PositionFriction {
     }
 }
 
-/// All friction of a joint times 1 + φ Θ, where Θ is the joint's warmth: 0 when the run starts, then
-/// heated by friction, T Θ̇ = p/p̄ − Θ, with p the present and p̄ the mean power of nominal friction
-/// along the motion, so that Θ settles around 1. Grease thins: φ < 0 as a rule.
+/// Friction that changes as the joint warms up: all friction is multiplied by 1 + φ Θ. The warmth Θ is 0 at the start
+/// of the run and then obeys T Θ̇ = p/p̄ − Θ, with p the present and p̄ the mean power of nominal friction along the
+/// motion, so that Θ settles around 1. Because grease thins, φ is usually negative.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ThermalDrift {
@@ -412,7 +414,7 @@ pub struct ThermalDrift {
     pub joint: usize,
     /// φ: relative change of friction once warm, above −0.5 and up to 1.
     pub fraction: f64,
-    /// T, s.
+    /// Time constant T, s.
     pub time_constant_s: f64,
 }
 
@@ -433,8 +435,8 @@ impl Fault for ThermalDrift {
     }
 }
 
-/// Friction of the nominal form but of another size than the controller and the simulation it came
-/// from assume: rc + a, rv + b.
+/// Friction of the nominal form but with other coefficients than the controller and the nominal simulation assume:
+/// rc + a and rv + b.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FrictionChange {
@@ -469,7 +471,8 @@ impl Fault for FrictionChange {
 mod tests {
     use super::*;
 
-    /// Behind a reversal, q = a t²/2, the bristle goes from −1 to 1 as 1 − 2 e^(−k q), however fast it may decay.
+    /// After a reversal, q = a t²/2, the bristle moves from −1 to 1 as 1 − 2 e^(−k q), even though its decay rate is
+    /// limited.
     #[test]
     fn a_bristle_turns_round_as_if_no_decay_were_too_fast() {
         let (presliding, a) = (Presliding::new(1, 1e4), 20.0);
@@ -478,19 +481,19 @@ mod tests {
         let (mut z, mut worst) = (-1.0, 0.0_f64);
         for step in 0..20_000 {
             let t = step as f64 * step_s;
-            // The midpoint rule.
+            // A step of the midpoint rule.
             let half = z + 0.5 * step_s * presliding.bristle_rate(a * t, fastest, z);
             z += step_s * presliding.bristle_rate(a * (t + 0.5 * step_s), fastest, half);
             let q = 0.5 * a * (t + step_s).powi(2);
             worst = worst.max((z - 1.0 + 2.0 * (-1e4 * q).exp()).abs());
         }
         assert!(1e4 * a * 0.02 > fastest, "the decay was bounded");
-        // 2 e^(−18), and as much for the rule's own error (2e-8).
+        // The limited rate contributes 2 e^(−18) = 3e-8, the midpoint rule about 2e-8.
         assert!(worst < 4e-8, "{worst}");
     }
 
-    /// Central differences of the law over all speeds and states of the bristle come up to the bounds,
-    /// which are sharp where the steepest parts meet, and do not pass them (h = 1e-6: to 1e-6 of them).
+    /// Central differences of the law over all speeds and states of the bristle reach the bounds, which are sharp where
+    /// the steepest parts coincide, but do not exceed them (with h = 1e-6, to 1e-6 of the bounds).
     #[test]
     fn slopes_beside_presliding_are_bounds() {
         let drive = crate::robot::Arm::built_in("ur5").unwrap().joints[0].drive;

@@ -1,22 +1,22 @@
-//! Gears that ripple, give way, or have play.
+//! Effects of the gears: ripple, elasticity and play.
 
 use serde::{Deserialize, Serialize};
 
 use super::assembly::{Assembly, JointMechanics};
 use super::effect::{Complaint, Fault, finite, not_negative, positive, require};
 
-/// Torque ripple + A cos(n q + φ) on the motor's side: the mesh of a strain-wave gear (n = twice the
-/// gear ratio for its two-lobed wave generator) or the cogging of the motor (n = gear ratio × poles).
+/// Torque ripple A cos(n q + φ) on the motor side, from the mesh of a strain-wave gear (n = twice the gear ratio for
+/// its two-lobed wave generator) or the cogging of the motor (n = gear ratio × poles).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ripple {
     /// Joint, from 1.
     pub joint: usize,
-    /// A, Nm at the joint.
+    /// Amplitude A, Nm at the joint.
     pub amplitude_nm: f64,
-    /// n: periods per turn of the joint.
+    /// n: number of periods per turn of the joint.
     pub order_per_turn: f64,
-    /// φ, rad.
+    /// Phase φ, rad.
     pub phase_rad: f64,
 }
 
@@ -32,7 +32,7 @@ impl Fault for Ripple {
     }
 
     fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
-        // A ripple of no size must not shorten the integrator's steps either.
+        // A ripple of zero amplitude is left out, because it would needlessly shorten the integrator's steps.
         if self.amplitude_nm != 0.0 {
             assembly.joint(self.joint).ripples.push(*self);
         }
@@ -40,44 +40,44 @@ impl Fault for Ripple {
     }
 }
 
-/// Which side of a gear that gives way the encoder sits on.
+/// Side of an elastic gear, or of one with play, on which the encoder sits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EncoderSide {
-    /// On the motor, as in most arms: its angle over the gear ratio.
+    /// On the motor, as in most arms: the encoder reads the motor's angle over the gear ratio.
     #[default]
     Motor,
     /// On the link.
     Link,
 }
 
-/// Damping ratio of a gear against its rotor where none is given: the few percent of strain-wave gears.
+/// Default damping ratio of a gear against its rotor: a few percent, as in strain-wave gears.
 const DAMPING_RATIO: f64 = 0.05;
 
 fn default_damping_ratio() -> f64 {
     DAMPING_RATIO
 }
 
-/// What stands between rotor and link: with the deflection δ = q_motor − q_link,
+/// Compliant transmission between rotor and link. With the deflection δ = q_motor − q_link,
 ///
 /// ```text
 /// Ia q̈_motor = τ_drive − τ_f − T;   the link feels T = k dead(δ) + d δ̇ while in contact
 /// dead(δ) = δ ∓ gap/2 beyond the gap, 0 within;   d = 2 ζ √(k Ia)
 /// ```
 ///
-/// Flanks push and do not pull: across a gap, T keeps the sign of the contact.
+/// Flanks push but do not pull: with a gap, T is zero where its sign would be opposite to that of the contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Transmission {
     /// k, Nm/rad.
     pub(super) stiffness_nm_rad: f64,
     /// d, Nm s/rad.
     pub(super) damping_nm_s_rad: f64,
-    /// Half of the play, rad.
+    /// Half of the gap, rad.
     pub(super) half_gap_rad: f64,
 }
 
 impl Transmission {
-    /// A spring against a rotor, across a gap (rad).
+    /// The transmission with the given `spring`, between a link and a rotor with the given inertia, across a gap (rad).
     fn new(spring: &Elasticity, rotor_inertia_kg_m2: f64, gap_rad: f64) -> Self {
         let stiffness_nm_rad = spring.stiffness_nm_rad;
         let critical = 2.0 * (stiffness_nm_rad * rotor_inertia_kg_m2).sqrt();
@@ -85,7 +85,7 @@ impl Transmission {
         Self { stiffness_nm_rad, damping_nm_s_rad, half_gap_rad: 0.5 * gap_rad }
     }
 
-    /// T, Nm, at deflection δ (rad) and its rate (rad/s).
+    /// T, Nm, for the deflection δ (rad) and its rate (rad/s).
     #[inline]
     pub(super) fn torque_nm(&self, deflection_rad: f64, rate_rad_s: f64) -> f64 {
         let gap = self.half_gap_rad;
@@ -100,13 +100,14 @@ impl Transmission {
     }
 }
 
-/// Two inertias need a rotor.
+/// Complains if the rotor has no inertia: a transmission needs an inertia on either side.
 fn require_rotor(joint: &JointMechanics) -> Result<(), Complaint> {
     let rotor = joint.rotor_inertia_kg_m2;
     require(rotor > 0.0, "rotor_inertia_kg_m2", rotor, "of the arm's joint must be positive")
 }
 
-/// The gear that elasticity and backlash of one joint make together, whichever comes first.
+/// Builds the transmission from the elasticity and the backlash of one joint; the result does not depend on which of
+/// them was installed first.
 fn fit_gear(joint: &mut JointMechanics) -> Result<(), Complaint> {
     let rotor = joint.rotor_inertia_kg_m2;
     let flanks = joint.backlash.map(|play| play.flanks(rotor));
@@ -118,7 +119,7 @@ fn fit_gear(joint: &mut JointMechanics) -> Result<(), Complaint> {
     Ok(())
 }
 
-/// A gear that gives way: rotor and link are two inertias with a spring between them (Spong 1987).
+/// An elastic gear: rotor and link are two inertias with a spring between them (Spong 1987).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Elasticity {
@@ -135,7 +136,7 @@ pub struct Elasticity {
 }
 
 impl Elasticity {
-    /// With the usual damping.
+    /// An elastic gear with the default damping.
     pub fn new(joint: usize, stiffness_nm_rad: f64, encoder: EncoderSide) -> Self {
         Self { joint, stiffness_nm_rad, damping_ratio: DAMPING_RATIO, encoder }
     }
@@ -160,8 +161,8 @@ impl Fault for Elasticity {
     }
 }
 
-/// A gear with play: rotor and link are two inertias that touch at either end of a gap. Beside an
-/// elasticity of the same joint the flanks are its spring, and what is given here must be the same.
+/// A gear with play: rotor and link are two inertias that touch at either end of a gap. If the same joint also has an
+/// elasticity, its spring acts as the flanks, and values given here must agree with those of the elasticity.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Backlash {
@@ -169,7 +170,7 @@ pub struct Backlash {
     pub joint: usize,
     /// Play from flank to flank at the joint, rad.
     pub gap_rad: f64,
-    /// Stiffness of the flanks, Nm/rad. Default: what makes the rotor alone swing at 300 rad/s.
+    /// Stiffness of the flanks, Nm/rad. Default: the stiffness with which the rotor alone oscillates at 300 rad/s.
     pub stiffness_nm_rad: Option<f64>,
     /// ζ of the flanks against the rotor. Default 0.05.
     pub damping_ratio: Option<f64>,
@@ -178,15 +179,15 @@ pub struct Backlash {
 }
 
 impl Backlash {
-    /// Frequency of the rotor against the flanks where no stiffness is given, rad/s.
+    /// Frequency of the rotor against the flanks if no stiffness is given, rad/s.
     const FLANK_RAD_S: f64 = 300.0;
 
-    /// With the flanks that the joint's elasticity says, or the usual ones.
+    /// A backlash with the flanks given by the joint's elasticity, or with the default flanks.
     pub fn new(joint: usize, gap_rad: f64) -> Self {
         Self { joint, gap_rad, stiffness_nm_rad: None, damping_ratio: None, encoder: None }
     }
 
-    /// Its flanks where the joint has no elasticity.
+    /// The flanks of the gap, if the joint has no elasticity.
     fn flanks(&self, rotor_inertia_kg_m2: f64) -> Elasticity {
         let usual = rotor_inertia_kg_m2 * Self::FLANK_RAD_S.powi(2);
         Elasticity {
@@ -197,7 +198,7 @@ impl Backlash {
         }
     }
 
-    /// Complains of what is given here and is not that of `spring`, which is what the flanks are.
+    /// Complains about values given here that differ from those of `spring`, which acts as the flanks.
     fn require_no_other(&self, spring: &Elasticity) -> Result<(), Complaint> {
         let requirement =
             "of the backlash is not that of the joint's elasticity: leave it out of the backlash";
@@ -239,7 +240,7 @@ mod tests {
     use super::*;
     use crate::robot::Arm;
 
-    /// Elasticity and backlash of joint 2 in both orders.
+    /// Installs the elasticity `spring` and the backlash `play` of joint 2 in both orders.
     fn in_both_orders(
         spring: Elasticity,
         play: Backlash,

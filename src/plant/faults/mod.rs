@@ -1,19 +1,19 @@
-//! What can be hidden in the simulated arm, one `[[effect]]` table of a scenario each.
+//! Effects that can be hidden in the simulated arm; each is an `[[effect]]` table of a scenario.
 //!
-//! Enters: the nominal arm and a list of [`Effect`]s, in any combination. Leaves: a [`FaultyPlant`],
-//! which runs like a [`Plant`](super::Plant), and afterwards spoils the trial's readings.
+//! Input: the nominal arm and a list of [`Effect`]s, in any combination. Output: a [`FaultyPlant`], which runs like a
+//! [`Plant`](super::Plant) and afterwards spoils the readings of a trial.
 //!
-//! Every effect is made where it arises. Friction, gears, drives and the surroundings act in the
-//! integration of the equations of motion ([`HiddenDrivetrain`]); bodies, lengths and gravity change
-//! the true arm; timing and reading errors act on the recording. No effect adds a term to the torque
-//! that is logged. The controller, and the null model that is identified, stay nominal.
+//! Every effect is produced where it physically arises. Friction, gears, drives and the surroundings act in the
+//! integration of the equations of motion ([`HiddenDrivetrain`]); bodies, lengths and gravity change the true arm;
+//! timing and reading errors act on the recording. No effect simply adds a term to the logged torque. The controller
+//! and the null model that is identified stay nominal.
 //!
 //! # Signs
-//! A positive size of a torque effect asks the drive for more torque at positive speed, angle or
-//! torque: it raises the logged torque by that much. The logged torque is i_G k I with the nominal k.
+//! With a positive size, a torque effect requires more torque from the drive at positive speed, angle or torque, and
+//! so raises the logged torque by this amount. The logged torque is i_G k I with the nominal k.
 //!
-//! # Where the encoders sit
-//! On the motor's side of an elastic gear or of a backlash, unless the effect says `encoder = "link"`.
+//! # Location of the encoders
+//! On the motor side of an elastic gear or of a backlash, unless the effect says `encoder = "link"`.
 //!
 //! | kind | acts in | keys besides `joint` |
 //! |---|---|---|

@@ -1,4 +1,4 @@
-//! A plant with hidden effects, from its scenario to its readings.
+//! The plant with hidden effects, from the scenario to the readings.
 
 use super::assembly::Assembly;
 use super::drivetrain::HiddenDrivetrain;
@@ -8,7 +8,7 @@ use crate::plant::{Encoders, Measured, Plant, PlantConfig, PlantError, Recording
 use crate::random::TrialStreams;
 use crate::robot::{Arm, JointSignals};
 
-/// An arm with hidden effects under the controller of the nominal arm.
+/// An arm with hidden effects, driven by a controller that knows the nominal arm only.
 #[derive(Debug, Clone)]
 pub struct FaultyPlant {
     nominal: Arm,
@@ -21,8 +21,8 @@ impl FaultyPlant {
     /// Checks `effects` and builds the true arm from the nominal one.
     ///
     /// # Errors
-    /// [`PlantError::Effect`] names the effect, its key and the value that makes no sense;
-    /// [`PlantError::FrictionDrives`] where the sum of what was asked for on a joint is no friction.
+    /// [`PlantError::Effect`] if a parameter makes no sense, with the effect, the key and the value;
+    /// [`PlantError::FrictionDrives`] if the effects on a joint together would make friction drive it.
     pub fn new(
         nominal: &Arm,
         effects: &[Effect],
@@ -31,7 +31,7 @@ impl FaultyPlant {
         Self::with_controller(nominal, nominal, effects, config)
     }
 
-    /// As [`Self::new`] from `arm`, under a controller that takes the result for `nominal`.
+    /// As [`Self::new`], but the true arm is built from `arm`, while the model of the controller is `nominal`.
     pub fn with_controller(
         arm: &Arm,
         nominal: &Arm,
@@ -74,13 +74,13 @@ impl FaultyPlant {
         })
     }
 
-    /// The arm as it is: bodies, lengths and gravity with their errors, nominal drives.
+    /// The true arm: its bodies, lengths and gravity contain the effects; its drives are nominal.
     pub fn true_arm(&self) -> &Arm {
         &self.assembly.arm
     }
 
-    /// One run along `reference`, as the log's channels would read without noise. The controller
-    /// reads what the encoders sit on, or, where they are given, what `encoders` make of it.
+    /// Performs one run along `reference`. The recording holds what the channels of the log would read without noise.
+    /// The controller reads the true values at the encoders or, if `encoders` are given, their readings.
     pub fn run(
         &self,
         reference: &dyn Reference,
@@ -97,8 +97,8 @@ impl FaultyPlant {
         Ok(recording)
     }
 
-    /// As [`Self::run`] without encoders' errors, with the accelerations (rad/s²) of what the encoders
-    /// sit on at the instants at which the log's rows are read.
+    /// As [`Self::run`] without encoder errors, but also returns the accelerations (rad/s²) at the encoders at the
+    /// instants at which the rows of the log are read.
     pub fn run_with_acceleration(
         &self,
         reference: &dyn Reference,
@@ -114,7 +114,7 @@ impl FaultyPlant {
         Ok((recording, at_rows))
     }
 
-    /// Applies to `log`, fresh from the sensors, what goes wrong with single readings in this trial.
+    /// Applies the faults of single readings of one trial to `log`, which comes directly from the sensors.
     pub fn spoil(&self, streams: &TrialStreams, log: &mut Measured) {
         self.end_at_limits(&mut log.torque_nm);
         for (effect, fault) in &self.assembly.readings {
@@ -122,7 +122,7 @@ impl FaultyPlant {
         }
     }
 
-    /// The plant for a run along `reference`, with every channel read in time.
+    /// The plant for a run along `reference`, without the timing errors.
     fn plant(&self, reference: &dyn Reference, config: &PlantConfig) -> Result<Plant, PlantError> {
         if reference.joints() != self.nominal.dof() {
             let (found, expected) = (reference.joints(), self.nominal.dof());
@@ -133,8 +133,8 @@ impl FaultyPlant {
         Plant::with_drivetrain(&self.assembly.arm, &self.nominal, &fed_forward, drivetrain, config)
     }
 
-    /// A configuration that logs at every decision of the controller (or at every step, where the
-    /// log's instants are no instants of decision), and its samples per sample of the log.
+    /// A configuration with a denser log, and the number of its samples per sample of the log. It logs at every
+    /// decision of the controller, or at every step if the instants of the log are not instants of decision.
     fn dense_config(&self) -> Result<(PlantConfig, usize), PlantError> {
         let (log, control) = (self.config.steps_per_log()?, self.config.steps_per_control()?);
         let steps = if log.is_multiple_of(control) { control } else { 1 };

@@ -1,4 +1,4 @@
-//! Readings that go wrong one by one, after the sensors have added their noise.
+//! Faults of single readings, which occur after the sensors have added their noise.
 
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
@@ -10,7 +10,7 @@ use crate::plant::sensors::quantised;
 use crate::random::{Channel, TrialStreams};
 use crate::robot::JointSignals;
 
-/// What becomes of readings.
+/// A fault of single readings.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum ReadingFault {
     Coarse(Quantisation),
@@ -19,8 +19,8 @@ pub(super) enum ReadingFault {
 }
 
 impl ReadingFault {
-    /// Applies fault number `effect` to the readings of one trial. `limit_nm[j]` is what joint j's
-    /// drive can give.
+    /// Applies the fault, which is effect number `effect`, to the readings of one trial. `limit_nm[j]` is the largest
+    /// torque of joint j's drive.
     pub(super) fn apply(
         &self,
         effect: u8,
@@ -49,11 +49,11 @@ pub enum ReadingChannel {
     Velocity,
 }
 
-/// A coarse reading: the nearest multiple of a step, noise included.
+/// A coarse reading: the reading, including its noise, is rounded to the nearest multiple of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Quantisation {
-    /// Joint, from 1; left out: all.
+    /// Joint, from 1; if left out, all joints.
     pub joint: Option<usize>,
     /// Step, in the channel's unit.
     pub step: f64,
@@ -92,14 +92,14 @@ impl Fault for Quantisation {
     }
 }
 
-/// Torque readings that have lost their meaning (a bit error, a corrupted packet): each with the
-/// given probability is replaced by a number uniform over what the drive can give.
+/// Torque readings that have lost their meaning (a bit error, a corrupted packet): with the given probability, a
+/// reading is replaced by a number that is uniformly distributed between the torque limits of the drive.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Outliers {
-    /// Joint, from 1; left out: all, each on its own.
+    /// Joint, from 1; if left out, all joints, each independently.
     pub joint: Option<usize>,
-    /// Share of the readings, 0…1.
+    /// Probability with which a reading is replaced, 0…0.5.
     pub fraction: f64,
 }
 
@@ -108,7 +108,7 @@ impl Outliers {
         for j in joints(self.joint, log.torque_nm.joints()) {
             let mut rng = streams.stream(Channel::Outlier { effect }, j);
             for value in log.torque_nm.joint_mut(j) {
-                // Both are drawn for every sample: a larger fraction hits the same samples and more.
+                // Draw both numbers for every sample, so that a larger fraction hits the same samples and some more.
                 let [chance, size]: [f64; 2] = rng.random();
                 if chance < self.fraction {
                     *value = limit_nm[j] * (2.0 * size - 1.0);
@@ -137,17 +137,17 @@ impl Fault for Outliers {
     }
 }
 
-/// Rows lost on the way, each with the given probability: missing from the log (their time stamps
-/// too), or, with `repeat`, shown with the readings of the row before. With a `joint`, only that
-/// joint's readings repeat. The first row is never lost.
+/// Lost rows: with the given probability, a row is missing from the log (including its time stamp) or, with `repeat`,
+/// shows the readings of the row before. With a `joint`, only that joint's readings repeat. The first row is never
+/// lost.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DroppedSamples {
-    /// Joint, from 1; left out: the whole row.
+    /// Joint, from 1; if left out, the whole row.
     pub joint: Option<usize>,
-    /// Share of the rows, 0…0.9.
+    /// Probability with which a row is lost, 0…0.9.
     pub fraction: f64,
-    /// Whether a lost row repeats the one before instead of missing. Default: no.
+    /// Whether a lost row repeats the row before instead of being missing. Default: no.
     #[serde(default)]
     pub repeat: bool,
 }

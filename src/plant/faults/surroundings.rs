@@ -1,4 +1,4 @@
-//! What pulls and pushes from outside.
+//! Effects of the surroundings: forces that pull or push from outside.
 
 use std::f64::consts::PI;
 
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::assembly::Assembly;
 use super::effect::{Complaint, Fault, finite, not_negative, require};
 
-/// A cable or dress pack across a joint: it pulls the link back to its rest angle with k (q − q₀).
+/// A cable or dress pack across a joint: it pulls the link back to its rest angle with the torque k (q − q₀).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Spring {
@@ -43,26 +43,26 @@ impl Fault for Spring {
     }
 }
 
-/// Something touched on the way: a push that swells and fades as sin²(π (t − t₀)/(t₁ − t₀)).
+/// A contact during the motion: a push that rises and falls as sin²(π (t − t₀)/(t₁ − t₀)).
 ///
-/// With a `joint`, a torque against its positive motion with the peak given. Without, a force on the
-/// flange (the origin of the last joint's frame) along −(1, 1, 1)/√3 of the base, whose peak is
-/// `peak_nm` over the arm's reach (the sum of its link lengths): no joint feels more than `peak_nm`.
+/// With a `joint`, it is a torque with the given peak against the joint's positive motion. Without a `joint`, it is a
+/// force on the flange (the origin of the last joint's frame) along −(1, 1, 1)/√3 of the base. The peak of the force is
+/// `peak_nm` divided by the arm's reach (the sum of its link lengths), so that no joint feels more than `peak_nm`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Contact {
-    /// Joint, from 1; left out: at the flange.
+    /// Joint, from 1; if left out, the contact is at the flange.
     pub joint: Option<usize>,
-    /// t₀ on the log's clock, s.
+    /// Start t₀ on the log's clock, s.
     pub start_s: f64,
-    /// t₁, s.
+    /// End t₁, s.
     pub end_s: f64,
     /// Peak, Nm.
     pub peak_nm: f64,
 }
 
 impl Contact {
-    /// Size of the push at `time_s`, Nm: 0 outside [t₀, t₁].
+    /// Size of the push at `time_s`, Nm; zero before t₀ and after t₁.
     #[inline]
     pub(super) fn push_nm(&self, time_s: f64) -> f64 {
         if time_s <= self.start_s || time_s >= self.end_s {

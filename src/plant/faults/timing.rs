@@ -1,4 +1,4 @@
-//! Channels that are not read when the log says.
+//! Timing errors: channels that are not read at the instants that the log states.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,17 +7,17 @@ use super::effect::{Complaint, Fault, not_negative, require};
 use crate::plant::Recording;
 use crate::robot::JointSignals;
 
-/// Torque that is read late: the log at t shows the torque of t − δ beside the angles of t.
+/// A torque that is read late: the log at time t shows the torque of t − δ next to the angles of t.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TimeSkew {
-    /// Joint, from 1; left out: all.
+    /// Joint, from 1; if left out, all joints.
     pub joint: Option<usize>,
-    /// δ, s; negative where the angles are late.
+    /// δ, s; negative if the angles are late.
     pub delay_s: f64,
 }
 
-/// Longest delay, s: beyond it there is no log to speak of.
+/// Longest delay allowed, s; a log with a longer one would be useless.
 const LONGEST_DELAY_S: f64 = 0.5;
 
 impl Fault for TimeSkew {
@@ -38,12 +38,12 @@ impl Fault for TimeSkew {
     }
 }
 
-/// Velocity behind a first-order low-pass of time constant δ in the path of the log:
-/// δ ẏ = q̇ − y, which at the slow frequencies of a motion is a delay by δ.
+/// A velocity that passes a first-order low-pass with time constant δ before it is logged: δ ẏ = q̇ − y. At the low
+/// frequencies of a motion this is a delay of δ.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VelocityLag {
-    /// Joint, from 1; left out: all.
+    /// Joint, from 1; if left out, all joints.
     pub joint: Option<usize>,
     /// δ, s.
     pub delay_s: f64,
@@ -67,14 +67,14 @@ impl Fault for VelocityLag {
     }
 }
 
-/// A logger that stalls and does not say so: after every n rows it misses `lost_s` of the motion,
-/// while the time column goes on evenly.
+/// A logger that stalls without showing it: after every n rows it misses `lost_s` of the motion, while the time column
+/// continues at even steps.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClockFault {
     /// Time missed at each stall, s.
     pub lost_s: f64,
-    /// n: rows from one stall to the next.
+    /// n: number of rows from one stall to the next.
     pub every_rows: usize,
 }
 
@@ -95,7 +95,7 @@ impl Fault for ClockFault {
     }
 }
 
-/// When each channel is really read.
+/// The instants at which each channel is really read.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Timing {
     pub(super) torque_delay_s: Vec<f64>,
@@ -104,13 +104,13 @@ pub(super) struct Timing {
 }
 
 impl Timing {
-    /// Every channel when the log says.
+    /// The timing in which every channel is read at the instant that the log states.
     pub(super) fn exact(joints: usize) -> Self {
         let zeros = vec![0.0; joints];
         Self { torque_delay_s: zeros.clone(), velocity_lag_s: zeros, stalls: Vec::new() }
     }
 
-    /// Whether it does nothing.
+    /// Whether there are no timing errors.
     pub(super) fn is_exact(&self) -> bool {
         let delays = self.torque_delay_s.iter().chain(&self.velocity_lag_s);
         delays.chain(self.stalls.iter().map(|s| &s.lost_s)).all(|d| *d == 0.0)
@@ -122,9 +122,9 @@ impl Timing {
         k as f64 * step_s + lost
     }
 
-    /// The log at every `every`-th sample of the run `dense`, read when this timing has it read.
-    /// Between samples of `dense` angles are interpolated by Hermite's cubic, speeds by Lagrange's,
-    /// torques (means over the hold) linearly. What the controller read keeps its errors.
+    /// The log with one row for every `every`-th sample of the run `dense`, each read at the instants of this timing.
+    /// Between the samples of `dense`, angles are interpolated by Hermite cubics, speeds by Lagrange cubics, and
+    /// torques (means over the hold) linearly. Readings of the controller keep their errors.
     pub(super) fn sample(&self, dense: &Recording, rate_hz: f64, every: usize) -> Recording {
         let n = dense.q_rad.joints();
         let step_s = every as f64 / rate_hz;
@@ -132,7 +132,7 @@ impl Timing {
         let rows = (0..=last / every)
             .take_while(|&k| self.instant_s(k, step_s) * rate_hz <= last as f64 + 1e-6)
             .count();
-        // Position on the grid of `dense` at which a row is read, `delay_s` earlier.
+        // Position on the grid of `dense` at which row `k` is read with the delay `delay_s`.
         let at = |k: usize, delay_s: f64| {
             Place::new((self.instant_s(k, step_s) - delay_s) * rate_hz, last)
         };
@@ -172,7 +172,8 @@ impl Timing {
         log
     }
 
-    /// One more channel of the run behind [`Self::sample`], at the instants of the rows of `log`.
+    /// One more channel `dense` of the run given to [`Self::sample`], at the instants at which the rows of `log` are
+    /// read.
     pub(super) fn sample_one(
         &self,
         dense: &JointSignals,
@@ -188,8 +189,8 @@ impl Timing {
     }
 }
 
-/// A first-order low-pass of time constant `constant` samples over a signal that is linear between
-/// its samples, exact, starting settled: y' = e y + …, e = exp(−1/c).
+/// Exact output of a first-order low-pass with a time constant of c = `constant` samples, for an input that is linear
+/// between its samples and constant before the first one. A deviation decays by the factor exp(−1/c) per sample.
 fn lag(u: &[f64], constant: f64) -> Vec<f64> {
     if constant == 0.0 {
         return u.to_vec();
@@ -199,7 +200,7 @@ fn lag(u: &[f64], constant: f64) -> Vec<f64> {
     let mut out = Vec::with_capacity(u.len());
     out.push(y);
     for pair in u.windows(2) {
-        // A ramp of slope m ends m c behind its input.
+        // For a ramp of slope m the output settles m c below the input.
         let slope = pair[1] - pair[0];
         let ahead = y - (pair[0] - slope * constant);
         y = pair[1] - slope * constant + ahead * decay;
@@ -208,7 +209,7 @@ fn lag(u: &[f64], constant: f64) -> Vec<f64> {
     out
 }
 
-/// A place between two samples of an even grid.
+/// A position between two samples of an even grid.
 #[derive(Debug, Clone, Copy)]
 struct Place {
     index: usize,
@@ -217,10 +218,10 @@ struct Place {
 }
 
 impl Place {
-    /// Off whole samples by less than this is round-off of the time, in samples.
+    /// Smaller deviations from a whole sample, in samples, count as round-off of the time.
     const ROUND_OFF: f64 = 1e-7;
 
-    /// `position` samples behind the first; outside the grid its ends hold.
+    /// The place `position` samples after the first one; positions outside the grid are moved to its ends.
     fn new(position: f64, last: usize) -> Self {
         let position = position.clamp(0.0, last as f64);
         let nearest = position.round();

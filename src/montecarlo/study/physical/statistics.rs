@@ -64,7 +64,7 @@ pub struct Coverage {
     pub trials: usize,
     /// Coverage, mean over the parameters.
     pub mean: f64,
-    /// Standard error of that mean, from the scatter between trials.
+    /// Standard error of `mean`, from the scatter between trials.
     pub standard_error: f64,
     /// Coverage of the parameter that is covered least often.
     pub worst: f64,
