@@ -1,4 +1,5 @@
-//! A log as physics is looked for in it: without the faults of its record, and without what touched the arm.
+//! A log prepared for the search for physical causes: the faults of its record and the contacts with the arm are taken
+//! out.
 
 use super::contact::{Compared, WithoutContacts, between_periods};
 use super::data_faults::{self, Faults, coarse_joints};
@@ -8,33 +9,33 @@ use super::record::Record;
 use super::verdict::Cause;
 use crate::identify::{Identifier, Measurement, Options, Regression};
 
-/// See the module.
+/// A cleaned log, with what was found while cleaning it.
 pub struct Cleaned {
     record: Record,
     /// The faults of the record, as causes.
     pub faults: Vec<Cause>,
-    /// Joints (0-based) whose torque is not to be believed.
+    /// Joints (0-based) whose torque readings are not reliable.
     pub unreadable: Vec<usize>,
-    /// Whether the clock was mended.
+    /// Whether time lost in stalls of the clock was given back.
     pub is_mended: bool,
-    /// What repetitions beside each other say of contacts.
+    /// What the comparison of repetitions shows of contacts.
     pub compared: Compared,
-    /// What a user should know of it.
+    /// A remark for the user.
     pub warning: Option<String>,
 }
 
 impl Cleaned {
-    /// Of `m`.
+    /// Cleans the log `m`.
     ///
-    /// # Errors
-    /// [`DiagnoseError`] where its signals make no record.
+    /// # Errors [`DiagnoseError`] if the rows are invalid or the signals cannot be processed.
     pub fn of(m: &Measurement, options: &Options) -> Result<Self, DiagnoseError> {
         m.require_rows()?;
         let Faults { causes: faults, record, warning, unreadable: mut hanging } =
             data_faults::find(m, options.is_single_run())?;
         let mut unreadable = coarse_joints(&faults);
         unreadable.append(&mut hanging);
-        // Across a short mended stall torques are straight lines, which differ from period to period.
+        // Across a short stall that was mended, the torque is a straight line that differs from period to period, so
+        // repetitions cannot be compared.
         let is_mended = faults.iter().any(|fault| fault.kind == Kind::ClockFault);
         let compared = match is_mended {
             true => Compared::TooFew,
@@ -43,7 +44,7 @@ impl Cleaned {
         Ok(Self { record, faults, unreadable, is_mended, compared, warning })
     }
 
-    /// What touched the arm, where repetitions show that.
+    /// The contacts found, and the torque without them, if the comparison of repetitions shows any.
     pub fn touched(&self) -> Option<&WithoutContacts> {
         match &self.compared {
             Compared::Touched(touched) => Some(touched),
@@ -51,17 +52,16 @@ impl Cleaned {
         }
     }
 
-    /// As a measurement.
+    /// The log as a measurement, with the torque of contacts taken out.
     pub fn measurement<'a>(&'a self, source: &'a str) -> Measurement<'a> {
         let m = self.record.measurement(source);
         let torque_nm = self.touched().map_or(m.torque_nm, |touched| &touched.torque_nm);
         Measurement { torque_nm, ..m }
     }
 
-    /// Laid out for regression.
+    /// The log laid out for regression. Rows that were filled in from other periods are counted as such.
     ///
-    /// # Errors
-    /// [`DiagnoseError`] where nothing can be identified from it.
+    /// # Errors [`DiagnoseError`] if nothing can be identified from the log.
     pub fn regression(
         &self,
         identifier: &mut Identifier,

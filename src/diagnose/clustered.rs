@@ -1,7 +1,8 @@
-//! Least squares over several logs: joints weighted by their residual, covariance from the scatter of
-//! block sums, which holds for residuals with a memory short against a block.
+//! Least squares over several logs. Joints are weighted by their residual; the covariance comes from the scatter of
+//! block sums, which is valid for residuals whose correlation time is short against a block.
 //!
-//! x̂ = A⁻¹ Σ Xᵀy/s_j², A = Σ XᵀX/s_j², V = B/(B − 1) A⁻¹ (Σ_b g_b g_bᵀ) A⁻¹, g_b the sum of Xᵀe/s_j² over block b.
+//! x̂ = A⁻¹ Σ Xᵀy/s_j², A = Σ XᵀX/s_j², V = B/(B − 1) A⁻¹ (Σ_b g_b g_bᵀ) A⁻¹, where g_b is the sum of Xᵀe/s_j² over
+//! block b.
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -23,18 +24,18 @@ pub(super) struct Equations {
     pub(super) block_of: Vec<usize>,
 }
 
-/// Unknowns with their covariance.
+/// Estimates of the unknowns with their covariance.
 pub(super) struct Solution {
-    /// x̂; zero where a column vanishes.
+    /// x̂; zero for an unknown whose column is zero everywhere.
     pub(super) x: DVector<f64>,
     covariance: DMatrix<f64>,
     blocks: usize,
 }
 
-/// Rounds of weighting.
+/// Rounds of reweighting the joints by their residual.
 const ROUNDS: usize = 3;
 
-/// Solves `equations` of `joints` joints.
+/// Solves `equations` for an arm of `joints` joints; `log` names the logs in an error.
 pub(super) fn solve(
     equations: &[Equations],
     joints: usize,
@@ -82,7 +83,8 @@ pub(super) fn solve(
     Ok(Solution { x, covariance, blocks: used })
 }
 
-/// The inverse of a Gram matrix whose columns differ in size; unknowns without a column stay zero.
+/// Inverse of a Gram matrix, scaled to a unit diagonal first because its columns differ in size. Rows and columns of
+/// unknowns without a column become zero.
 fn scaled_inverse(gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = gram.nrows();
     let scale: Vec<f64> = (0..n)
@@ -97,7 +99,8 @@ fn scaled_inverse(gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 }
 
 impl Solution {
-    /// `value` with its 95 % interval, by the gradient of it with respect to the unknowns from `first` on.
+    /// `value`, a function of the unknowns, with its 95 % interval by the delta method. `gradient` is its gradient with
+    /// respect to the unknowns from number `first` on.
     pub(super) fn estimate(
         &self,
         value: f64,
@@ -112,7 +115,8 @@ impl Solution {
         Estimate { value, unit, ci95: [value - reach, value + reach] }
     }
 
-    /// Probability that these unknowns are this far from zero by chance.
+    /// Probability that chance alone takes these unknowns this far from zero: the Wald statistic W as Hotelling's T²,
+    /// that is W (B − k)/(k (B − 1)) as F(k, B − k). 1 if the covariance is singular or there are too few blocks.
     pub(super) fn probability(&self, unknowns: &[usize]) -> f64 {
         let count = unknowns.len();
         let x = DVector::from_fn(count, |k, _| self.x[unknowns[k]]);

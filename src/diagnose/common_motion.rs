@@ -1,29 +1,32 @@
-//! Torque of every period as it would have been along one common motion.
+//! Torque of every period, corrected to what it would have been along one motion common to all periods.
 //!
-//! A model can only be as good as the motion that is put into it. The averaged acceleration is a short
-//! Fourier series: beyond its last harmonic the torque still holds what the corners of friction do to the
-//! acceleration, and every period's own motion differs a little. Both are accounted for by the rigid model
-//! itself, which is good enough for small differences:
+//! A model can only be as good as the motion that is put into it. The averaged acceleration is a short Fourier series.
+//! Beyond its last harmonic the torque still contains the effect of friction's corners on the acceleration, and the
+//! motion of every period differs a little from the mean. The rigid model corrects for both; it is accurate enough for
+//! small differences:
 //!
 //! y*_p = y_p − [τ̂_rigid(q_p, q̇_p, q̈_p) − τ̂_rigid(q̄, q̇̄, q̈)]
 //!
-//! with period p's own motion, all its harmonics and all its encoder noise, in the first term; in the
-//! second the mean angles and velocities with all their harmonics, at which friction is looked at, and the
-//! short series of the acceleration. What is left is regressed on that motion, whose columns are almost
-//! free of noise, while the scatter of y* between the periods is that of the equations: noise of the torque
-//! and of the motion together. Whitened by it, noisy harmonics count for what they are worth (errors
-//! in variables, to first order). What the noise d_p of period p's velocity does to friction φ is added to it,
+//! The first term takes the motion of period p itself, with all its harmonics and all its encoder noise. The second
+//! term takes the mean angles and velocities with all their harmonics, at which friction is evaluated, and the short
+//! series of the acceleration. y* is then regressed on this common motion, whose columns are almost free of noise,
+//! while the scatter of y* between the periods is that of the equations: noise of torque and motion together. Whitening
+//! by this scatter gives noisy harmonics the weight they deserve (errors in variables, to first order). The effect of
+//! the noise d_p in the velocity of period p on the friction φ,
 //!
 //! δ_p = √P [φ(q̇̄ + d_p/√P) − mean over p of the same],
 //!
-//! by the step that the mean may be off: friction turns round within a few hundredths of a rad/s, where the noise of one period
-//! is not small. The mean of y* over the periods stays what it is.
+//! is subtracted from y*_p as well. It is evaluated with the step d_p/√P, which is the size of the error of the mean,
+//! because friction turns round within a few hundredths of a rad/s, where the noise of a single period is not small.
+//! The mean of y* over the periods does not change by δ_p.
 //!
-//! The acceleration, and the velocity of a joint that rests, have the harmonics alone in which they stand out of their noise. What is
-//! noise in them is in the equations as well, with the other sign, and looks like whatever hangs on it: a few percent of the harmonics of
-//! an inertia's column are noise, but where that of the torque falls steeply with frequency it is they that count most, and friction
-//! of a joint that rests turns with the noise of its velocity. Of a joint that turns round the velocity keeps all its harmonics: they
-//! make the kink there, and friction that turns too softly looks like one that comes late.
+//! The acceleration, and the velocity of a joint at rest, keep only the harmonics in which they stand out of their
+//! noise. Noise left in them is also in the equations, with the opposite sign, and therefore resembles any effect that
+//! depends on them. Only a few percent of the harmonics of an inertia's column are noise, but where the noise of the
+//! torque falls steeply with frequency these harmonics have the largest weight; and the friction of a joint at rest
+//! changes its sign with the noise of its velocity. The velocity of a joint that reverses keeps all its harmonics,
+//! because they make the kink at the reversal: friction that turns round too softly looks like friction that comes
+//! late.
 
 use fourier::Complex64;
 
@@ -36,14 +39,14 @@ use crate::identify::{Assembler, BetweenRows, Regression};
 use crate::robot::{Arm, JointSignals};
 use crate::signal::{Bracket, FineClock, cubic_at, mean_period, subtract_mean_period};
 
-/// Moves the torque of `regression` to the mean of its periods' motion, by the base parameters
-/// `theta`, and its columns with it.
+/// Corrects the torque of `regression` to the common motion of its periods, using the base parameters `theta`, and
+/// recomputes its columns along this motion.
 ///
-/// Where the log was put on an even clock, its torque is a straight line between rows: corners of friction are
-/// cut off there, which looks like friction that builds up behind reversals and like a delay. What the model
-/// says of straight lines and of the true course is put in their place.
+/// Where the log was resampled on an even clock, its torque is a straight line between rows. This cuts off the corners
+/// of friction there, which looks like friction that builds up after reversals and like a delay. The difference between
+/// the predicted torque and the straight line through the predictions at the rows is therefore added.
 ///
-/// Nothing changes for a single run: there is no motion but its own.
+/// A single run is left unchanged: it has no motion but its own.
 pub fn move_to_common_motion(
     regression: &mut Regression,
     (arm, set): (&Arm, &BaseSet),
@@ -88,8 +91,9 @@ pub fn move_to_common_motion(
     regression.prepared.motion = common;
 }
 
-/// σ of the mean over the periods, sample by sample, Nm: what noise of torque and motion leaves of an error there, drift of friction
-/// left out. `None` where nothing repeats. For a `regression` that was moved to its common motion.
+/// Standard deviation of the mean over the periods at every sample, Nm: the error that noise of torque and motion
+/// leaves there, without drift of friction. `None` where nothing repeats. `regression` must have been moved to its
+/// common motion.
 pub fn noise_of_mean(regression: &Regression) -> Option<JointSignals> {
     let (n, periods) = (regression.problem.samples, regression.problem.periods);
     if periods < 2 {
@@ -110,13 +114,14 @@ pub fn noise_of_mean(regression: &Regression) -> Option<JointSignals> {
     Some(JointSignals::from_fn(panels.len(), n, |j, k| (scatter[j][k] * share).sqrt()))
 }
 
-/// Neighbouring harmonics that are judged together.
+/// Number of neighbouring harmonics that are judged together.
 const BAND: usize = 8;
-/// Power of a band in the mean of the periods, over that of the noise in it, from which on it has more motion than noise.
+/// Least ratio of a band's power in the mean of the periods to the power of the noise in that mean: from here on the
+/// band contains more motion than noise.
 const STANDS_OUT: f64 = 2.0;
 
-/// A joint rests while its velocity is no more than so many σ of what noise there is in the bands that are left out, for so long
-/// before and behind, s: one that turns round is faster by then.
+/// A joint is at rest while its velocity stays below this many σ of the noise in the rejected bands, for [`NEAR_S`]
+/// before and after: a joint that reverses is faster by then.
 const AT_REST: f64 = 15.0;
 const NEAR_S: f64 = 0.04;
 
@@ -127,13 +132,14 @@ struct Bands {
 }
 
 impl Bands {
-    /// Those in which the mean of the periods of `n` samples in `y` stands out of what they scatter.
+    /// Finds the bands in which the mean of the periods in `y`, of `n` samples each, stands out of its noise, which is
+    /// known from the scatter between the periods.
     fn that_stand_out(y: &[f64], n: usize) -> Self {
         let clock = FineClock::new(n, 1);
         let periods: Vec<Vec<Complex64>> =
             y.chunks_exact(n).map(|period| clock.spectrum(period)).collect();
         let count = periods.len() as f64;
-        // Power of a harmonic in the mean, and of its noise there.
+        // Power of a harmonic in the mean, and of the noise in that mean.
         let power = |h: usize| {
             let mean = periods.iter().map(|spectrum| spectrum[h]).sum::<Complex64>() / count;
             let off = periods.iter().map(|spectrum| (spectrum[h] - mean).norm_sqr()).sum::<f64>();
@@ -147,13 +153,13 @@ impl Bands {
         Self { kept: powers.chunks(BAND).map(stands_out).collect(), clock }
     }
 
-    /// One period of a motion in the bands that are kept.
+    /// One period of a motion, reduced to the bands that are kept.
     fn of(&self, period: &[f64]) -> Vec<f64> {
         let is_kept = |h: usize| h == 0 || self.kept[(h - 1) / BAND];
         self.clock.filtered(period, |h| if is_kept(h) { Complex64::ONE } else { Complex64::ZERO })
     }
 
-    /// The velocities `own` of all periods, while their joint rests in the bands that are kept.
+    /// The velocities `own` of all periods; where their joint is at rest, reduced to the bands that are kept.
     fn without_noise_at_rest(&self, own: &[f64], rate_hz: f64) -> Vec<f64> {
         let n = self.clock.samples();
         let mean = mean_period(own, n);
@@ -162,7 +168,7 @@ impl Bands {
         let slow = AT_REST * (noise / n as f64).sqrt();
         let is_slow: Vec<bool> = told.iter().map(|qd| qd.abs() < slow).collect();
         let near = ((NEAR_S * rate_hz).ceil() as usize).min(n / 2);
-        // The period closes.
+        // The motion is periodic: the first sample follows the last.
         let rests = |k: usize| (n + k - near..=n + k + near).all(|at| is_slow[at % n]);
         let rests: Vec<bool> = (0..n).map(rests).collect();
         let periods = own.chunks_exact(n).flat_map(|period| {
@@ -174,7 +180,8 @@ impl Bands {
     }
 }
 
-/// δ_p (see the module) of joint `j`, Nm, at every sample of all periods, whose velocities are `own` and in the mean `mean`.
+/// δ_p (see the module) of joint `j`, Nm, at every sample of all periods. `own` are the velocities of all periods,
+/// `mean` is their mean.
 fn friction_noise(arm: &Arm, j: usize, own: &[f64], mean: &[f64]) -> Vec<f64> {
     let (n, drive) = (mean.len(), &arm.joints[j].drive);
     let periods = own.len() / n;
@@ -187,7 +194,7 @@ fn friction_noise(arm: &Arm, j: usize, own: &[f64], mean: &[f64]) -> Vec<f64> {
     noise
 }
 
-/// The rows of a log beside an even clock.
+/// The rows of a log that was resampled on an even clock.
 struct Rows<'a> {
     between: &'a BetweenRows,
     start_s: f64,
@@ -195,8 +202,8 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// Predicted torque of joint `j` minus a straight line through its predictions at the rows, Nm, at every
-    /// sample of all periods. `load_nm` and `motion` are those of the periods.
+    /// Predicted torque of joint `j` minus the straight line through the predictions at the neighbouring rows, Nm, at
+    /// every sample of all periods. `load_nm` and `motion` are those of the periods.
     fn lost_to_straight_lines(
         &self,
         arm: &Arm,
@@ -208,7 +215,7 @@ impl Rows<'_> {
         let dry = |qd: f64| drive.coulomb_nm * arm.friction_sign(qd);
         let qd_rad_s = motion.qd_rad_s.joint(j);
         let pairs = load_nm.joint(j).iter().zip(qd_rad_s);
-        // All that is smooth: rows lie between its samples.
+        // The smooth part of the torque, which may be interpolated: rows lie between the samples.
         let smooth: Vec<f64> = pairs.map(|(load, qd)| load + drive.viscous_nm_s_rad * qd).collect();
         let at_row = |row: usize| {
             let at = (self.between.time_s[row] - self.start_s) * self.rate_hz;
@@ -237,7 +244,7 @@ mod tests {
     const PERIODS: usize = 8;
     const RATE_HZ: f64 = 100.0;
 
-    /// Periods of `mean(k)` with white noise of `noise`.
+    /// Periods of `mean(k)` plus white noise of standard deviation `noise`.
     fn periods(mean: impl Fn(usize) -> f64, noise: f64) -> Vec<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let mut random = || -> f64 { StandardNormal.sample(&mut rng) };
@@ -249,9 +256,10 @@ mod tests {
         (y.map(|y| y * y).sum::<f64>() / samples).sqrt()
     }
 
-    /// Harmonics 3 and 101 of a motion stand out, with 14 others beside them; of the bands of noise alone F with 16 and 112 degrees of
-    /// freedom exceeds 2 by chance in 2 of 100, of 61 bands in nine once in 10⁵ times. With so many bands the motion keeps
-    /// √(11 · 16/1000) of the noise of its mean, at most.
+    /// Harmonics 3 and 101 contain motion; their two bands, with 14 harmonics of noise, stand out. In a band of noise
+    /// alone, F with 16 and 112 degrees of freedom exceeds 2 by chance in 2 of 100 cases; more than eight of the 61
+    /// bands of noise do so once in 10⁵ times. With this many bands the motion keeps at most √(11 · 16/1000) of the
+    /// noise of its mean.
     #[test]
     fn noise_without_motion_goes() {
         let wave = |h: f64, k: usize| (TAU * h * k as f64 / SAMPLES as f64).sin();
@@ -268,7 +276,7 @@ mod tests {
         assert!(off < of_mean * (11.0 * 16.0 / SAMPLES as f64).sqrt(), "{off}");
     }
 
-    /// What repeats exactly has no noise to stand out of, to rounding of a sum over n samples.
+    /// A motion that repeats exactly has no noise to stand out of, up to the rounding of a sum over n samples.
     #[test]
     fn a_motion_without_noise_stays_what_it_is() {
         let kink = |k: usize| (k as f64 - 300.0).abs() / 300.0;
@@ -279,9 +287,9 @@ mod tests {
         assert!(off < SAMPLES as f64 * f64::EPSILON, "{off}");
     }
 
-    /// The velocity of a joint that moves for half a period and rests for the other half. Its harmonics fall as 1/h³, and below the noise
-    /// of their mean at h = 28: with those bands, and a few by chance, less than half of the noise stays at rest. Where it moves
-    /// nothing changes.
+    /// The velocity of a joint that moves for half a period and rests for the other half. Its harmonics fall as 1/h³
+    /// and drop below the noise of their mean at h = 28. With these bands, and a few kept by chance, less than half of
+    /// the noise remains at rest. Where the joint moves nothing changes.
     #[test]
     fn velocity_loses_its_noise_at_rest_alone() {
         let moves = SAMPLES / 2;
@@ -295,7 +303,7 @@ mod tests {
         assert_eq!(told[100..moves - 100], y[100..moves - 100]);
     }
 
-    /// δ_p of a velocity that stands well away from rest is the viscous friction of its noise, and has no mean over the periods.
+    /// δ_p of a velocity far from rest is the viscous friction of its noise, and its mean over the periods is zero.
     #[test]
     fn noise_of_the_velocity_rubs() {
         let arm = Arm::built_in("ur5").unwrap();
@@ -309,7 +317,7 @@ mod tests {
             assert!((noise - expected).abs() < 1e-12, "{noise} {expected}");
         }
         let common = mean_period(&noise, SAMPLES);
-        // The mean of eight numbers of 30 Nm, taken out of each: to their last digits.
+        // The mean of eight numbers of about 30 Nm was subtracted from each: zero to their last digits.
         assert!(common.iter().all(|common| common.abs() < 8.0 * 30.0 * f64::EPSILON));
     }
 }

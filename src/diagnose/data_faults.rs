@@ -1,11 +1,11 @@
-//! Faults of the record itself, looked for before any physics: what they do to a log would otherwise be
-//! explained by a wrong law of friction.
+//! Faults of the record itself. They are looked for before any physics, because a wrong friction law would otherwise
+//! explain what they do to a log.
 //!
-//! All tests are on the raw channels. Angle and velocity say the same twice, which shows a velocity that
+//! All tests use the raw channels. Angle and velocity contain the same information twice; this reveals a velocity that
 //! lags and a clock that stood still while the time stamps went on:
 //!
-//! - lag d of q̇: q̇ − Δq/Δt = −d q̈ in least squares;
-//! - time lost between two rows: see [`stalls`](super::stalls).
+//! - the lag d of q̇ follows from q̇ − Δq/Δt = −d q̈ by least squares;
+//! - for the time lost between two rows see [`stalls`](super::stalls).
 
 use std::collections::BTreeMap;
 
@@ -20,46 +20,47 @@ use crate::median::{median_step, missing_steps};
 use crate::robot::JointSignals;
 use crate::signal::SignalError;
 
-/// Deviations of this many robust standard deviations are no noise: in 10⁶ Gaussian values one in 10⁵
-/// logs has such a value.
+/// A deviation of this many robust standard deviations is not noise: among 10⁶ Gaussian values, one in 10⁹ logs has
+/// such a value.
 pub(super) const FAR: f64 = 8.0;
-/// A lag that a reader of a log need not care about, in samples.
+/// A lag below this many samples is too small to matter to the user of a log.
 const SMALL_LAG_SAMPLES: f64 = 0.01;
-/// A step of this part of the rms change from sample to sample adds a tenth to the variance of the noise:
-/// white noise changes by √2 σ, a step s adds s²/12.
+/// A quantisation step is coarse from this ratio to the rms change from sample to sample on: there it adds a tenth to
+/// the variance of the noise. (White noise of variance σ² changes by √2 σ; a step s adds s²/12.)
 const COARSE: f64 = 0.77;
-/// A step as large as the rms change between samples leaves errors that repeat with the motion, as physics
-/// does.
+/// A step that is larger than the rms change between samples leaves rounding errors that repeat with the motion, as
+/// physical effects do.
 const TOO_COARSE: f64 = 1.0;
-/// Blocks for the scatter of the lag.
+/// Number of blocks whose scatter gives the σ of the lag.
 const BLOCKS: usize = 20;
-/// Student's t₁₉ for a chance of 10⁻⁵ in two tails, six joints.
+/// Student's t₁₉ that noise exceeds with a probability of about 2·10⁻⁵, two-tailed and for six joints together.
 const LAG_T: f64 = 6.5;
-/// Lags of single joints are those of all where none is off their mean by so many of its own σ and this share of the mean: the lag of
-/// a filter that all channels have depends a little on how fast a joint moves.
+/// All joints share one lag if each differs from the mean by less than this many of its own σ plus this share of the
+/// mean: the lag of a filter common to all channels depends a little on how fast a joint moves.
 const ALIKE: [f64; 2] = [5.0, 0.1];
-/// Angle and velocity of a joint that moves go together: the mean of their product is at least this share of the velocity's square. Of a
-/// joint at rest both are noise, and it is nothing but chance.
+/// Angle and velocity of a moving joint agree: the mean product of the logged velocity and the slope of the angle is at
+/// least this share of the mean square velocity. For a joint at rest both are noise, and the product is small.
 const GO_TOGETHER: f64 = 0.5;
-/// Slower than this, rad/s, a joint may repeat its readings.
+/// A joint slower than this, rad/s, may repeat its readings.
 pub(super) const MOVES_RAD_S: f64 = 0.01;
-/// Share of rows that an ordinary recorder misses: no cause of anything.
+/// Share of rows that an ordinary recorder misses; this is not reported.
 const MISSED: f64 = 2e-3;
 
 /// The faults of a record.
 pub struct Faults {
-    /// As causes.
+    /// The faults as causes.
     pub causes: Vec<Cause>,
-    /// The record without those that can be taken back.
+    /// The record after the faults that can be corrected have been corrected.
     pub record: Record,
-    /// What a user should know of it.
+    /// A remark for the user.
     pub warning: Option<String>,
-    /// Joints (0-based) whose torque cannot be believed.
+    /// Joints (0-based) whose torque readings are not reliable.
     pub unreadable: Vec<usize>,
 }
 
-/// All faults of the record of `m`. Rows that repeat, a clock that stalls and gaps hide what the velocity and the torque
-/// have: they are looked for first. Rows that are missing are made of other periods unless the motion counts as a `single_run`.
+/// Finds all faults of the record of `m`. Repeated rows, stalls of the clock and gaps are dealt with first, because
+/// they hide faults of the velocity and the torque. Missing rows are filled in from other periods unless the motion
+/// counts as a `single_run`.
 pub fn find(m: &Measurement, single_run: bool) -> Result<Faults, SignalError> {
     let mut out: Vec<Cause> = Vec::new();
     let repeats = repeats(m);
@@ -83,11 +84,13 @@ pub fn find(m: &Measurement, single_run: bool) -> Result<Faults, SignalError> {
     Ok(Faults { causes: out, record, warning, unreadable })
 }
 
-/// Share of the rows that other periods have to fill if a torque hangs there, at most; of a longer one the rest of the log is used.
+/// If a torque hangs in no more than this share of the rows, they are replaced only where other periods can fill them
+/// in. If it hangs in more, they are removed in any case and the rest of the log is used.
 const SHORT_HANG: f64 = 0.1;
 
-/// Fills the gaps of `record`, and puts other periods in place of the rows in which a torque hangs. Where these are few and nothing
-/// repeats they stay: what is warned of, and the joints (0-based) whose torque is not to be believed.
+/// Fills the gaps of `record` and replaces the rows in which a torque hangs by rows of other periods. If there are few
+/// such rows and nothing repeats, they stay, and their joints are unreliable. Returns a remark for the user and the
+/// unreliable joints (0-based).
 fn without_hanging_torques(
     record: &mut Record,
     stale: &stale::Found,
@@ -136,7 +139,8 @@ pub(super) fn exact(value: f64, unit: &'static str) -> Estimate {
     Estimate { value, unit, ci95: [value, value] }
 }
 
-/// A velocity channel that lags behind the angle, per joint or of all joints alike.
+/// Velocity channels that lag behind the angle: one cause for all joints if they share one lag, otherwise one per
+/// joint.
 fn velocity_lag(m: &Measurement) -> Vec<Cause> {
     let step_s = step_s(m);
     let lags: Vec<Option<(f64, f64)>> = (0..m.q_rad.joints()).map(|j| lag(m, j)).collect();
@@ -150,7 +154,7 @@ fn velocity_lag(m: &Measurement) -> Vec<Cause> {
     };
     let known: Vec<(f64, f64)> = lags.iter().flatten().copied().collect();
     let late: Vec<(f64, f64)> = known.iter().copied().filter(is_late).collect();
-    // A joint that does not move contradicts nothing.
+    // Joints that do not move have no lag and do not speak against a common one.
     if 2 * late.len() > lags.len() && late.len() > 1 {
         let weight: f64 = late.iter().map(|(_, s)| s.powi(-2)).sum();
         let mean = late.iter().map(|(d, s)| d / (s * s)).sum::<f64>() / weight;
@@ -176,12 +180,13 @@ fn velocity_lag(m: &Measurement) -> Vec<Cause> {
         .collect()
 }
 
-/// Lag of joint `j`'s velocity and its σ from the scatter between blocks, s.
+/// Lag of joint `j`'s velocity and its σ from the scatter between blocks, s. `None` for a joint that does not move, and
+/// in short logs.
 fn lag(m: &Measurement, j: usize) -> Option<(f64, f64)> {
     let (t, q, qd) = (m.time_s, m.q_rad.joint(j), m.qd_rad_s.joint(j));
     let n = t.len();
-    // Two samples to each side: the difference is the mean velocity over four steps, and so is what it
-    // is compared with, so that the curvature of the motion drops out.
+    // The slope of the angle over two samples to each side is the mean velocity over these four steps. It is compared
+    // with the mean of the logged velocity over the same steps, so that the curvature of the motion cancels.
     let (mut alike, mut all) = (0.0, 0.0);
     let terms: Vec<(f64, f64)> = (2..n.saturating_sub(2))
         .map(|k| {
@@ -198,7 +203,7 @@ fn lag(m: &Measurement, j: usize) -> Option<(f64, f64)> {
         .collect();
     let sum = |part: &[(f64, f64)]| part.iter().fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
     let (product, square) = sum(&terms);
-    // Of a joint at rest velocity and angle are noise, which is never late.
+    // For a joint at rest, velocity and angle are noise, which has no lag.
     let moves = alike > GO_TOGETHER * all;
     if square.is_nan() || square <= 0.0 || !moves || terms.len() < 10 * BLOCKS {
         return None;
@@ -225,7 +230,7 @@ fn repeats(m: &Measurement) -> Vec<usize> {
     (1..m.time_s.len()).filter(|&k| moves(k) && channels.iter().all(|s| same(s, k))).collect()
 }
 
-/// Rows that repeat the one before, or are missing by the time stamps.
+/// Rows that repeat the one before, or that are missing according to the time stamps.
 fn repeated_or_missing(m: &Measurement, repeats: &[usize]) -> Option<Cause> {
     let step_s = step_s(m);
     let missing: f64 =
@@ -238,13 +243,13 @@ fn repeated_or_missing(m: &Measurement, repeats: &[usize]) -> Option<Cause> {
     })
 }
 
-/// Joints (0-based) whose torque is too coarse to say more than that.
+/// Joints (0-based) whose torque is too coarse for anything but this finding.
 pub fn coarse_joints(faults: &[Cause]) -> Vec<usize> {
     let coarse = |f: &&Cause| f.kind == Kind::Quantisation && f.strength > TOO_COARSE;
     faults.iter().filter(coarse).filter_map(|f| f.joint).map(|j| j - 1).collect()
 }
 
-/// Torques that are whole multiples of a step that is coarse against what changes between samples.
+/// Torques that are whole multiples of a step that is coarse compared with the changes from sample to sample.
 fn quantisation(torque_nm: &JointSignals) -> Vec<Cause> {
     (0..torque_nm.joints())
         .filter_map(|j| {
@@ -255,7 +260,7 @@ fn quantisation(torque_nm: &JointSignals) -> Vec<Cause> {
             let gap = |w: &[f64]| w[1] - w[0];
             let step = values.windows(2).map(gap).filter(|g| *g > 0.0).fold(f64::NAN, f64::min);
             let scale = values.last()?.abs().max(values.first()?.abs());
-            // Rounding of a decimal fraction may stand in the last digits of every value.
+            // The last digits of every value may contain the rounding of a decimal fraction.
             let off_grid = |v: &f64| {
                 let steps = (v - values[0]) / step;
                 (steps - steps.round()).abs() * step > 1e-9 * scale
@@ -343,7 +348,7 @@ mod tests {
         assert!((faults[0].parameters["delay_s"].value - 0.004).abs() < 1e-4);
     }
 
-    /// A third joint at rest, of which nothing is known but noise, says nothing against a delay of all.
+    /// A third joint is at rest and contains only noise. It does not speak against a lag common to all joints.
     #[test]
     fn a_joint_at_rest_contradicts_no_late_velocity() {
         let (time_s, signals) = record(0.004, None);
@@ -361,7 +366,7 @@ mod tests {
         assert_eq!((faults[0].kind, faults[0].joint), (Kind::VelocityLag, None));
     }
 
-    /// A stamp that came late makes one step longer and the next one shorter: no time is lost.
+    /// A time stamp that is late makes one step longer and the next one shorter: no time is lost.
     #[test]
     fn stamps_that_come_late_are_no_stalls() {
         let (mut time_s, signals) = record(0.0, None);
@@ -371,7 +376,8 @@ mod tests {
         assert_eq!(find_in(&time_s, &signals).causes, []);
     }
 
-    /// Ten rows that are stamped when the one behind them is written: the long step before them has what theirs lack.
+    /// Ten rows are stamped when the row after them is written: the long step before them contains the time that their
+    /// own steps lack.
     #[test]
     fn time_that_is_regained_is_no_stall() {
         let (mut time_s, signals) = record(0.0, None);
@@ -385,7 +391,7 @@ mod tests {
         assert!(faults.iter().all(|fault| fault.kind != Kind::ClockFault), "{faults:?}");
     }
 
-    /// Of five rows two are missing.
+    /// Two of every five rows are missing.
     #[test]
     fn missing_rows_are_a_share_of_all_that_should_be_there() {
         let (time_s, signals) = record(0.0, None);
@@ -408,7 +414,7 @@ mod tests {
         assert_eq!(clock.parameters["every_rows"].value, 250.0);
     }
 
-    /// A stalled clock is set right: the time of the last row is what it was.
+    /// Lost time is given back: the last row is at its true time again.
     #[test]
     fn lost_time_is_given_back() {
         let (time_s, signals) = record(0.0, Some(250));
@@ -419,7 +425,7 @@ mod tests {
         assert!((given_back - true_s).abs() < 2e-3, "{shown} {given_back} {true_s}");
     }
 
-    /// Every hundredth row is written twice: the copies go, and nothing else is found.
+    /// Every hundredth row is a copy of the one before: the copies are removed, and no other fault is found.
     #[test]
     fn rows_written_twice_are_taken_out() {
         let (time_s, signals) = record(0.0, None);
@@ -427,7 +433,7 @@ mod tests {
         let twice = signals.map(|s| JointSignals::from_fn(2, 4000, |j, k| s.joint(j)[of(k)]));
         let Faults { causes, record, .. } = find_in(&time_s, &twice);
         assert_eq!(causes.iter().map(|f| f.kind).collect::<Vec<_>>(), [Kind::DroppedSamples]);
-        // Where the arm rests nothing can be said.
+        // Copies cannot be recognised where the arm is at rest.
         assert!((3960..3970).contains(&record.time_s.len()), "{}", record.time_s.len());
     }
 }

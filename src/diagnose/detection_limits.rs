@@ -1,4 +1,4 @@
-//! How small an effect this log would still show.
+//! Detection limits: how small an effect the log would still show.
 
 use std::borrow::Cow;
 
@@ -10,19 +10,21 @@ use super::study::{Entry, Study};
 use super::verdict::DetectionLimit;
 use crate::identify::covariance::student_quantile;
 
-/// How often an effect of the size of the limit is found.
+/// Probability with which an effect of the size of the limit is found.
 const POWER: f64 = 0.9;
-/// A column that keeps less than this share of its square beside the causes that were named is one of them.
+/// A column that keeps less than this share of its square outside the named causes counts as absorbed by them.
 const ABSORBED_BESIDE: f64 = 0.04 * 0.04;
-/// No effect has a coefficient (Nm, Nm/rad, rad, 1 … in SI) as large as this: its column is rounding.
+/// No effect has a coefficient as large as this (Nm, Nm/rad, rad, 1 … in SI units): the column that needs it is
+/// rounding.
 const BEYOND_PHYSICS: f64 = 1e4;
-/// √λ that most families need, beyond which nothing is looked for, and how well the least is told.
+/// √λ that most families need; the largest √λ that is tried; and the accuracy of the limit: absolute for √λ, in the
+/// logarithm for a shape.
 const USUAL: f64 = 8.0;
 const LARGEST: f64 = 1000.0;
 const TOLD_TO: f64 = 0.01;
 
-/// Per family and site the size that would be found with 90 % probability beside the causes `accepted`; none for a single
-/// run, whose noise is not known.
+/// For every family at every site, the size of effect that would be found with 90 % probability beside the causes
+/// `accepted`. Empty for a single run, whose noise is not known.
 pub fn detection_limits(study: &Study, accepted: &Span) -> Vec<DetectionLimit> {
     if !study.scene.periodic {
         return Vec::new();
@@ -31,7 +33,8 @@ pub fn detection_limits(study: &Study, accepted: &Span) -> Vec<DetectionLimit> {
     for (family, candidate) in study.families.iter().enumerate() {
         for site in candidate.sites(study.scene.joints()) {
             let here = study.entries.iter().filter(|e| (e.family, e.site) == (family, site));
-            // The law that bears the family's name: the same parameter of another one is another size.
+            // Only the first variant, which bears the family's name: in another law the same parameter means another
+            // size.
             let Some(law) = here.clone().map(|entry| entry.shape.variant).min() else { continue };
             let visible: Vec<Visible> = here
                 .filter(|entry| entry.shape.variant == law)
@@ -51,7 +54,7 @@ pub fn detection_limits(study: &Study, accepted: &Span) -> Vec<DetectionLimit> {
             };
             let of = quantities(coefficient);
             let Some(quantity) = candidate.size(&of) else { continue };
-            // What the coefficient does not change, the shape has given.
+            // Quantities that do not change with the coefficient are determined by the shape.
             let given = of
                 .iter()
                 .zip(quantities(2.0 * coefficient))
@@ -77,7 +80,7 @@ pub fn detection_limits(study: &Study, accepted: &Span) -> Vec<DetectionLimit> {
     out
 }
 
-/// A law in one shape, and what of it is seen beside the causes that were named.
+/// A law with one shape, and its span outside the null model and the named causes.
 struct Visible<'e> {
     entry: Cow<'e, Entry>,
     span: Span,
@@ -89,21 +92,22 @@ impl<'e> Visible<'e> {
         Self { entry, span }
     }
 
-    /// See [`needed`].
+    /// √λ from which on this law is found, see [`needed`].
     fn needed(&self, study: &Study) -> f64 {
         needed(study, &self.entry, &self.span)
     }
 }
 
-/// The least of a law that is found.
+/// The smallest effect of a law that is found.
 struct Least<'e> {
     visible: Visible<'e>,
-    /// Of the first column, which alone is there.
+    /// Coefficient of the first column; the other coefficients are zero.
     coefficient: f64,
     sqrt_lambda: f64,
 }
 
-/// The least coefficient in the middle one of the shapes in which an effect of about that size may be.
+/// The smallest coefficient that is found, for the middle one of those shapes that an effect of about that size may
+/// have.
 fn least_coefficient<'e>(study: &Study, mut shapes: Vec<Visible<'e>>) -> Option<Least<'e>> {
     let place = shapes.len() / 2;
     let middle = shapes.get(place)?;
@@ -121,8 +125,8 @@ fn least_coefficient<'e>(study: &Study, mut shapes: Vec<Visible<'e>>) -> Option<
     Some(Least { visible, coefficient, sqrt_lambda })
 }
 
-/// The weakest shape that is found where shapes say how large an effect is: between the weakest of `shapes` that is and the next
-/// one.
+/// For families whose shape determines the size of the effect: the weakest shape that is found. It lies between the
+/// weakest one of `shapes` that is found and the next weaker one, and is located by bisection on a logarithmic scale.
 fn least_shape<'e>(study: &Study, accepted: &Span, shapes: Vec<Visible<'e>>) -> Option<Least<'e>> {
     let whole = |Visible { entry, .. }: &Visible| {
         study.families[entry.family].whole(entry.shape).unwrap_or(0.0)
@@ -135,7 +139,7 @@ fn least_shape<'e>(study: &Study, accepted: &Span, shapes: Vec<Visible<'e>>) -> 
     let first = by_excess.partition_point(|(excess, _)| *excess < 0.0);
     let value = |i: usize| by_excess.get(i).map(|(_, visible)| visible.entry.shape.value);
     let found = value(first)?;
-    // Weaker than all shapes there are as the weakest is than the one before it.
+    // If even the weakest shape is found, the search begins weaker by the ratio of the two weakest shapes.
     let mut silent = match first.checked_sub(1).and_then(value) {
         Some(silent) => silent,
         None => found * found / value(1)?,
@@ -155,11 +159,12 @@ fn least_shape<'e>(study: &Study, accepted: &Span, shapes: Vec<Visible<'e>>) -> 
     Some(Least { visible: least, coefficient, sqrt_lambda })
 }
 
-/// √λ of an effect along the first column of `entry`, whose `span` that is, from which on it is found with the probability
-/// [`POWER`]; no less than [`LARGEST`] where none is.
+/// √λ from which on an effect along the first column of `entry`, whose span is `span`, is found with probability
+/// [`POWER`]; at least [`LARGEST`] if there is none.
 ///
-/// An effect is found where what is seen of it is worth its price and rarer by chance than allowed. What is seen is what is there
-/// and noise of Student's law, of which the log knows how strong it is with ν degrees of freedom.
+/// An effect is found if its observed part is worth its price and is rarer by chance than the share of a law in the
+/// false-alarm probability allows. The observed part is the true effect plus noise, which is Student-distributed with
+/// the ν degrees of freedom to which the log knows its power.
 fn needed(study: &Study, entry: &Entry, span: &Span) -> f64 {
     let of_one = span.inside(&entry.images[0]);
     let worth = study.price(entry) + LEAST_EVIDENCE;
@@ -181,7 +186,7 @@ fn needed(study: &Study, entry: &Entry, span: &Span) -> f64 {
     found + student_quantile(POWER, statistic.freedom(span, &of_one))
 }
 
-/// Coefficients of `entry` of which only the first is not zero.
+/// Coefficients of `entry`: `coefficient` for the first column, zero for the others.
 fn first_alone(entry: &Entry, coefficient: f64) -> Vec<f64> {
     let mut b = vec![0.0; entry.images.len()];
     b[0] = coefficient;

@@ -1,4 +1,4 @@
-//! From a log to a diagnosis: the procedure as a whole.
+//! The whole procedure from a log to a diagnosis.
 
 use super::against::{self, Found, Nominal};
 use super::candidates::{self, Candidate};
@@ -32,20 +32,20 @@ use crate::identify::{
 };
 use crate::robot::{Arm, JointSignals};
 
-/// Everything that stays the same from log to log.
+/// Diagnoses logs of one arm; holds everything that does not change from log to log.
 pub struct Diagnoser<'a> {
     pub(super) arm: &'a Arm,
     pub(super) set: &'a BaseSet,
     pub(super) options: Options,
-    /// Gains of drives whose currents were logged, Nm/A.
+    /// Gains of the drives if currents were logged instead of torques, Nm/A.
     drive_gain_nm_a: Option<Vec<f64>>,
     pub(super) identifier: Identifier<'a>,
     pub(super) families: Vec<Box<dyn Candidate>>,
 }
 
-/// A diagnosis with what it was made from, for pictures.
+/// A diagnosis with the data from which it was made, for plots.
 pub struct Finding {
-    /// What is said.
+    /// The diagnosis itself.
     pub diagnosis: Diagnosis,
     /// The null model's identification.
     pub identification: Identification,
@@ -59,17 +59,17 @@ pub struct Finding {
     pub after_nm: JointSignals,
     /// Logged torque: the mean period, or the run behind its low-pass, Nm.
     pub measured_nm: JointSignals,
-    /// Sample of the scene behind each residual.
+    /// The sample of the scene that belongs to each residual.
     pub samples: Vec<usize>,
 }
 
 impl<'a> Diagnoser<'a> {
-    /// For logs of `arm`, with all families.
+    /// A diagnoser for logs of `arm`, with all families.
     pub fn new(arm: &'a Arm, model: &'a Model, set: &'a BaseSet, options: Options) -> Self {
         Self::with_families(arm, model, set, options, candidates::all())
     }
 
-    /// With these families only.
+    /// Like [`Self::new`], with these families only.
     pub fn with_families(
         arm: &'a Arm,
         model: &'a Model,
@@ -81,13 +81,14 @@ impl<'a> Diagnoser<'a> {
         Self { arm, set, options, drive_gain_nm_a: None, identifier, families }
     }
 
-    /// For logs whose torques are currents times these gains of the joints, Nm/A; `None`: torques were logged.
+    /// Declares that the torques of the logs are currents times these gains of the joints, Nm/A; `None`: torques were
+    /// logged.
     pub fn of_currents(self, drive_gain_nm_a: Option<Vec<f64>>) -> Self {
         Self { drive_gain_nm_a, ..self }
     }
 
-    /// Says what the model gets wrong along `m`; `held_out` logs measure the gain;
-    /// a `simulation` of the arm is compared with what the log says.
+    /// Diagnoses the log `m`: says what the model gets wrong along it. The gain is measured on the `held_out` logs. A
+    /// `simulation` of the arm, if given, is compared with the log.
     pub fn diagnose(
         &mut self,
         m: &Measurement,
@@ -116,8 +117,9 @@ impl<'a> Diagnoser<'a> {
         let mut model = self.extended(&study, &kept, &selected, &gains);
         let touches = match log.touched() {
             Some(touched) => touched.causes.clone(),
-            // Each stall is given back the mean of all. What that is off by sets torque and motion apart for a moment, as far out of the noise
-            // as a touch does: no confidence would be right for what can be either.
+            // Every stall is given back the mean lost time of all stalls. The remaining error shifts torque and motion
+            // against each other for a moment and stands out of the noise as far as a touch does, so no confidence in a
+            // touch would be justified.
             None if log.is_mended => Vec::new(),
             None => beside_model(&study, &model.after_nm)?.causes,
         };
@@ -188,11 +190,12 @@ impl<'a> Diagnoser<'a> {
         let laws: Vec<Option<usize>> =
             extension.effects.iter().map(|effect| effect.site.map(|j| j + 1)).collect();
         diagnosis.sentences = diagnosis.in_sentences(&laws);
-        // Before all else where nothing else is said: it repeats in no period, and counts as noise in what follows.
+        // This sentence comes first only if no cause is named: drift does not repeat from period to period and counts
+        // as noise in everything that follows.
         let place = if diagnosis.causes.is_empty() { 0 } else { diagnosis.sentences.len() };
         drift.into_iter().for_each(|drift| diagnosis.sentences.insert(place, drift));
         if let Some(doubt) = simulation.and_then(|simulation| simulation.doubt) {
-            // Whatever is said next rests on it.
+            // Everything that follows rests on the simulation.
             diagnosis.sentences.insert(0, doubt.to_owned());
         }
         self.question_the_arm(&mut diagnosis, &extension, &identification);
@@ -210,7 +213,7 @@ impl<'a> Diagnoser<'a> {
         })
     }
 
-    /// Refuses the log `source` where it fits the arm when it is read otherwise.
+    /// Refuses the log `source` if it fits the arm once it is read differently.
     fn refuse_misread(&self, regression: &Regression, source: &str) -> Result<(), DiagnoseError> {
         let gain = self.drive_gain_nm_a.as_deref();
         match Misreading::of(self.arm, regression, &self.options, gain) {
@@ -222,7 +225,8 @@ impl<'a> Diagnoser<'a> {
         }
     }
 
-    /// Says first that the log may be that of another robot, or that no arm has these parameters.
+    /// Puts a doubt before all other sentences: that the log may be that of another robot, or that no arm has these
+    /// parameters.
     fn question_the_arm(
         &self,
         diagnosis: &mut Diagnosis,
@@ -231,7 +235,8 @@ impl<'a> Diagnoser<'a> {
     ) {
         let nominal = self.set.values(&Model::new(self.arm).standard_parameters());
         let sigma = sigma_of_friction_alone(diagnosis, self.set);
-        // What touched the arm, and friction that the null model lacks, bend the null model's gravity.
+        // Contacts and friction that the null model lacks distort its estimate of gravity, so θ is that of the extended
+        // model.
         let (theta, covariance) = (&extension.theta, &identification.covariance);
         let left = share_left(diagnosis, identification);
         let torque_nm = identification.residual().torque_nm();
@@ -244,7 +249,8 @@ impl<'a> Diagnoser<'a> {
         }
     }
 
-    /// The model of `study` with the causes `selected` of those `kept`, whose `gains` on other periods are these.
+    /// Fits the model of `study` with the causes `selected` from those `kept`; `gains` are their gains on other
+    /// periods.
     fn extended(
         &self,
         study: &Study,
@@ -263,7 +269,9 @@ impl<'a> Diagnoser<'a> {
         Extended { causes, after_nm: residual(study, &extension), extension, accepted, rest }
     }
 
-    /// Judges what differs from a `simulation` in place of what any fit would absorb.
+    /// Compares the log with a `simulation`. A kind of cause that can be a change against the simulation is judged by
+    /// this comparison alone, in which effects that any fit would absorb stand out too. Effects that the changes make
+    /// needless are dropped.
     fn compare(
         &self,
         study: &Study,
@@ -281,14 +289,14 @@ impl<'a> Diagnoser<'a> {
         model.causes.retain(|c| !explained.judged.contains(&(c.kind, c.joint)));
         model.causes.extend(explained.causes);
         if simulation.doubt.is_some() {
-            // The laws as well: they are what is needed beside the changes.
+            // The laws become provisional as well, because they were found beside the changes.
             let judged = model.causes.iter_mut().filter(|cause| cause.kind.is_a_law());
             judged.for_each(Cause::make_provisional);
         }
         model.rest = study.residual.clone();
         explained.span.residualise(&mut model.rest);
         model.accepted = explained.span;
-        // What is not found again beside the simulation is not a part of the model either.
+        // An effect that is not found again beside the simulation leaves the model.
         let is_named = |entry: &&Entry| {
             let place = (self.families[entry.family].kind(), entry.site.map(|j| j + 1));
             model.causes.iter().any(|cause| (cause.kind, cause.joint) == place)
@@ -301,8 +309,8 @@ impl<'a> Diagnoser<'a> {
         }
     }
 
-    /// Says whether `loaded` was recorded with a body on the flange that `reference`, diagnosed as
-    /// `finding`, did not have; a known mass also tells the drives' gains.
+    /// Says whether `loaded` was recorded with a body on the flange that was not there in `reference`, whose diagnosis
+    /// is `finding`. A known mass also determines the gains of the drives.
     pub fn payload(
         &mut self,
         finding: &Finding,
@@ -358,7 +366,7 @@ impl<'a> Diagnoser<'a> {
         let effect = &extension.effects[index];
         let parameters = intervals::physical(study, kept, effect, index);
         let Effect { site, shape, coefficients, .. } = effect;
-        // Of several coefficients one may be none beside the others.
+        // Only for laws with one coefficient: one of several coefficients may be zero although the others are not.
         let size = (coefficients.len() == 1)
             .then(|| family.size(&family.quantities(&study.scene, *site, *shape, coefficients)))
             .flatten()
@@ -383,18 +391,18 @@ impl<'a> Diagnoser<'a> {
     }
 }
 
-/// The model with causes, and what is said of these.
+/// The extended model, and the causes to report.
 struct Extended {
     causes: Vec<Cause>,
     extension: Extension,
-    /// Its residual, Nm.
+    /// Residual of the extended model, Nm.
     after_nm: JointSignals,
-    /// What the causes span outside the null model, and what they leave of its residual.
+    /// Span of the causes outside the null model, and the residual of the null model without its part in this span.
     accepted: Span,
     rest: Image,
 }
 
-/// Share of each joint's torque (rms) that is left beside the causes, without noise as far as the log tells it.
+/// Share of each joint's rms torque that is left unexplained beside the causes, with the known noise subtracted.
 fn share_left(diagnosis: &Diagnosis, identification: &Identification) -> Vec<f64> {
     let torque_nm = identification.residual().torque_nm();
     let share = |j: usize| {
@@ -404,8 +412,8 @@ fn share_left(diagnosis: &Diagnosis, identification: &Identification) -> Vec<f64
     (0..torque_nm.len()).map(share).collect()
 }
 
-/// σ of the base parameters beside the causes; ∞ of the Coulomb friction of joints that have another law of friction beside it, so that
-/// it may be negative where all friction is not.
+/// σ of the base parameters beside the causes. It is ∞ for the Coulomb friction of a joint that also has another
+/// friction law: that parameter may be negative although the friction as a whole is not.
 fn sigma_of_friction_alone(diagnosis: &Diagnosis, set: &BaseSet) -> Vec<f64> {
     let has_law = |name: &str| {
         let laws = diagnosis.causes.iter().filter(|cause| cause.kind.is_friction());
@@ -416,8 +424,8 @@ fn sigma_of_friction_alone(diagnosis: &Diagnosis, set: &BaseSet) -> Vec<f64> {
     known.map(|(k, p)| if has_law(set.name(k)) { f64::INFINITY } else { p.sigma }).collect()
 }
 
-/// Faults of the record before physics, the strongest first, of a motion that repeats. Of a single run what matters most is said first,
-/// what only concerns the recording last.
+/// Orders the causes. For a repeating motion: faults of the record before physics, physics by strength. For a single
+/// run the cause with the largest gain comes first, and faults that concern only the recording come last.
 fn in_order(mut faults: Vec<Cause>, mut physics: Vec<Cause>, periodic: bool) -> Vec<Cause> {
     physics.sort_by(|a, b| b.strength.total_cmp(&a.strength));
     if !periodic {
@@ -428,7 +436,7 @@ fn in_order(mut faults: Vec<Cause>, mut physics: Vec<Cause>, periodic: bool) -> 
     faults.into_iter().chain(physics).collect()
 }
 
-/// The study of a log laid out in `regression`, and the causes that were found.
+/// Prepares the study of the log in `regression` and finds its causes.
 fn causes_of<'a>(
     families: &'a [Box<dyn Candidate>],
     sources: (&Arm, &BaseSet, &Options),
@@ -450,14 +458,14 @@ fn causes_of<'a>(
         settled(first, found, (arm, set), source)?
     };
     if !study.scene.periodic {
-        // A single run is judged by its own residual, which is known only now.
+        // A single run is judged by the residual that the causes leave, which is known only at this point.
         let (_, rest) = Kept::taken_over(&study, found.clone()).without(None);
         study.judge_by(&rest);
     }
     Ok((study, found))
 }
 
-/// What one of `models` gains over the other along another `log`.
+/// Gain of the extended model over the null model along another `log`.
 fn gain_along(
     (identifier, families): (&mut Identifier, &[Box<dyn Candidate>]),
     sources: (&Arm, &BaseSet, &Options),
@@ -466,7 +474,7 @@ fn gain_along(
     models: &Models,
     causes: &[Cause],
 ) -> Result<HeldOut, DiagnoseError> {
-    // The recorder lags on other days as it does here.
+    // The recorder has the same lags on other days.
     let mut record = Record::without_rows(&log.measurement, &[]);
     record.undo_lags(causes);
     let measurement = record.measurement(log.measurement.source);
@@ -474,7 +482,7 @@ fn gain_along(
     held_out_gain(identifier, sources, drive_gain_nm_a, families, log, models)
 }
 
-/// Takes out contacts at which the angles jump as no arm can; how many.
+/// Removes contacts at which the angles jump as no arm can, and returns their number.
 fn take_out_tears(causes: &mut Vec<Cause>, m: &Measurement) -> usize {
     causes.extract_if(.., |cause| is_a_tear(cause, m)).count()
 }
@@ -484,7 +492,7 @@ fn is_a_tear(cause: &Cause, m: &Measurement) -> bool {
     cause.kind == Kind::Contact && is_torn(m, [at("start_s"), at("end_s")])
 }
 
-/// What no cause explains of what the `accepted` ones leave, `rest`.
+/// The unexplained part of `rest`, the residual that the `accepted` causes leave.
 fn unexplained(
     study: &Study,
     (accepted, rest): (&Span, &Image),
@@ -492,7 +500,7 @@ fn unexplained(
     causes: &[Cause],
     log: &Cleaned,
 ) -> Option<Unexplained> {
-    // What is left of a law of drift is another form of it.
+    // A residual that drifts beside a thermal drift is another form of the same law.
     let drifts =
         |j: usize| causes.iter().any(|c| c.kind == Kind::ThermalDrift && c.joint == Some(j + 1));
     let can_differ = |j: usize| !log.is_mended && !drifts(j);
@@ -503,7 +511,7 @@ fn unexplained(
     misfit::unexplained(study, accepted, rest, lack, has_law, can_differ)
 }
 
-/// Why contacts were not looked for.
+/// States why contacts were not looked for, if they were not.
 fn contact_remark(study: &Study, log: &Cleaned) -> Option<String> {
     if log.is_mended {
         let remark = "the clock was mended: contacts are not looked for, because what is left of its error looks like one, and causes named \
@@ -517,7 +525,7 @@ fn contact_remark(study: &Study, log: &Cleaned) -> Option<String> {
     })
 }
 
-/// What a user should know of mean torques that drift, but for those of joints whose friction is said to.
+/// Warns of mean torques that drift, except on joints with a thermal drift among the causes.
 fn drift_remark(study: &Study, causes: &[Cause]) -> Option<String> {
     let is_said = |joint: usize| {
         causes.iter().any(|c| c.kind == Kind::ThermalDrift && c.joint == Some(joint))

@@ -1,29 +1,31 @@
-//! How many of a family's shapes can be told from each other.
+//! How many distinguishable shapes a family has.
 
 use super::study::Entry;
 
-/// The z of noise that has to be exceeded by what is named, about.
+/// About the z that a law has to exceed before it is named.
 const TYPICAL_Z: f64 = 4.5;
-/// The same where noise is known with 20 degrees of freedom: Student's t of the chance of the former.
+/// The same where the noise is known with 20 degrees of freedom: Student's t with the same probability.
 const MOST_Z: f64 = 6.0;
 
-/// How many tests the shapes of one family at one site are together: the chance that noise exceeds z in any of them, over
-/// that in one.
+/// Effective number of tests that the shapes of one family at one site amount to: the probability that noise exceeds z
+/// in any of them, divided by the probability for one.
 ///
-/// Two shapes whose columns are an angle θ apart exceed z one without the other with a chance of no more than (θ/π)
-/// exp(−z²/2), twice the up-crossings on the way from one to the other (Efron 1997, the length heuristic), or that of one
-/// test, 2 Φ(−z) ≈ √(2/π) exp(−z²/2)/z. Each shape joins the nearest of those before it (Worsley 1982): the one before it in
-/// its variant, and all of the variant before. Of families with several coefficients every shape counts.
+/// For two shapes whose columns are an angle θ apart, the probability that noise exceeds z in one but not in the other
+/// is at most (θ/π) exp(−z²/2), twice the expected number of up-crossings on the way from one to the other (Efron 1997,
+/// the length heuristic); it is also at most that of one test, 2 Φ(−z) ≈ √(2/π) exp(−z²/2)/z. Each shape joins its
+/// nearest neighbour among the earlier ones (Worsley 1982): the shape before it in its own variant, and all shapes of
+/// the variant before. In families with several coefficients every shape counts as one test.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DistinctShapes {
-    /// Whatever their coefficients.
+    /// Number for all shapes, with any coefficients.
     pub all: f64,
-    /// Of those to which a coefficient may belong that noise makes as large as what is named has to be.
+    /// Number for the shapes that noise can reach: a coefficient as large as noise would need to be named is possible
+    /// there.
     pub within_reach: f64,
 }
 
 impl DistinctShapes {
-    /// Of `entries`; `is_possible` says whether a coefficient may belong to one.
+    /// Counts the shapes of `entries`; `is_possible` says whether a coefficient is possible for an entry.
     pub fn of(entries: &[Entry], is_possible: impl Fn(&Entry, f64) -> bool) -> Self {
         if entries.iter().any(|e| e.images.len() > 1) {
             let all = entries.len() as f64;
@@ -39,7 +41,7 @@ impl DistinctShapes {
     }
 }
 
-/// Of entries with one column each.
+/// Effective number of tests at the threshold `z`, for entries with one column each.
 fn tests(entries: &[&Entry], z: f64) -> f64 {
     let angle = |a: &Entry, b: &Entry| {
         let (a, b) = (&a.images[0], &b.images[0]);
@@ -72,7 +74,7 @@ mod tests {
         Entry { family: 0, site: None, shape: Shape { variant, value }, images }
     }
 
-    /// A family whose coefficients go with every shape.
+    /// A family in which every coefficient is possible for every shape.
     const ANY: fn(&Entry, f64) -> bool = |_, _| true;
 
     fn quarter_circle(steps: usize) -> Vec<Entry> {
@@ -81,9 +83,9 @@ mod tests {
         columns.enumerate().map(|(k, mean)| entry(0, k as f64, &mean)).collect()
     }
 
-    /// Along a quarter of a circle, however finely, the length heuristic counts 1 + (π/2) z/√(2π) tests; columns at right
-    /// angles are a test each, and the same column in two variants is one, wherever
-    /// it stands in them.
+    /// Along a quarter of a circle, sampled as finely as desired, the length heuristic counts 1 + (π/2) z/√(2π) tests.
+    /// Columns at right angles are one test each. A column that occurs in two variants is counted once, wherever in the
+    /// variants it is.
     #[test]
     fn shapes_that_resemble_each_other_are_counted_once() {
         let expected = 1.0 + std::f64::consts::FRAC_PI_2 * TYPICAL_Z / std::f64::consts::TAU.sqrt();
@@ -98,8 +100,9 @@ mod tests {
         assert_eq!(DistinctShapes::of(&entries, ANY).all, 3.0);
     }
 
-    /// Of shapes that hold their coefficient those count that noise reaches: with σ = 1/‖x‖ = 1 and a coefficient within half
-    /// of its shape's value, 5 and −6 of these four; without one there is still the test that is made.
+    /// Where shape and coefficient are one parameter, only shapes that noise reaches count. With σ = 1/‖x‖ = 1, and
+    /// coefficients possible within half of the shape's value, these are 5 and −6 of the four values. Where noise
+    /// reaches no shape, one test remains.
     #[test]
     fn what_noise_does_not_reach_is_no_test() {
         let apart = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.6, 0.8]];
@@ -109,14 +112,15 @@ mod tests {
         let tests = |entries: &[Entry]| DistinctShapes::of(entries, agrees);
         assert_eq!(tests(&entries).within_reach, 2.0);
         assert_eq!(tests(&entries[1..3]), DistinctShapes { all: 2.0, within_reach: 1.0 });
-        // Of two columns one coefficient does not tell where the other is.
+        // One coefficient of two columns does not tell where the other one is.
         let mut both = entries;
         both.iter_mut().for_each(|e| e.images.push(e.images[0].clone()));
         assert_eq!(tests(&both), DistinctShapes { all: 4.0, within_reach: 4.0 });
     }
 
-    /// The chance that noise exceeds z in any of the columns on a quarter of a circle, over that in one, is the tests that
-    /// are counted, but for what 2 Φ(−z) is less than its leading term, by 1 − 1/z² at most (Gordon 1941).
+    /// The probability that noise exceeds z in any of the columns on a quarter of a circle, over that for one column,
+    /// equals the number of tests counted, except that 2 Φ(−z) falls short of its leading term, by a factor of no less
+    /// than 1 − 1/z² (Gordon 1941).
     #[test]
     fn the_count_is_the_chance() {
         use rand::{SeedableRng, rngs::ChaCha8Rng};
@@ -137,8 +141,8 @@ mod tests {
         }
         let counted = tests(&columns.iter().collect::<Vec<_>>(), z);
         let at_most = 1.0 + (counted - 1.0) / (1.0 - z.powi(-2));
-        // 2500 cases of one and 4400 more of the others: the ratio is known to 1.6 %, of which this is four. Exceeding at
-        // both ends with different signs, which is counted twice, has 0.3 %.
+        // 2500 exceedances of one column and 4400 more of the others: the ratio is known to 1.6 %, and the tolerance is
+        // four times that. Exceedances at both ends with opposite signs, which are counted twice, add 0.3 %.
         let ratio: f64 = any / one;
         assert!(ratio > 0.933 * counted, "{ratio} {counted}");
         assert!(ratio < 1.064 * at_most, "{ratio} {at_most}");

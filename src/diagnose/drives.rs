@@ -1,14 +1,15 @@
 //! How the drives answer dry friction, as columns of the null model ([`Scene::answers`]).
 //!
-//! The share of its friction that a drive feeds forward is not in the log, and friction that rises near rest looks like
-//! another share. But one controller drives all joints: their common share is a column of the null model, and what single
-//! ones differ from it by the common error with which a controller knows friction is a torque of known variance, counted as
-//! noise that repeats ([`PeriodWhitening::with_repeating_noise`](super::whitening::PeriodWhitening::with_repeating_noise)).
-//! A drive that differs by more is a cause like others (`candidates/feed_forward.rs`).
+//! The log does not contain the share of its friction that a drive feeds forward, and friction that rises near rest
+//! looks like another share. But one controller drives all joints. Their common share is therefore a column of the null
+//! model. Single drives differ from it by the typical error with which a controller knows the friction of a joint; this
+//! difference is a torque of known variance, and counts as noise that repeats in every period
+//! ([`PeriodWhitening::with_repeating_noise`](super::whitening::PeriodWhitening::with_repeating_noise)). A drive that
+//! differs by more is a cause like any other (`candidates/feed_forward.rs`).
 //!
-//! A controller acts at its ticks, and its feedback is not quite what the model takes it for: what a drive gives while friction
-//! turns round is a little more or less at every single reversal ([`unknown_pulses`]), and so is how the joint turns ([`turns`]), both
-//! noise as well.
+//! A controller acts at its ticks, and its feedback is not exactly as modelled. While friction turns round, a drive
+//! therefore gives a little more or less torque at every single reversal ([`unknown_pulses`]), and the joint itself
+//! turns round in a slightly different way ([`turns`]). Both count as noise as well.
 
 use rayon::prelude::*;
 
@@ -16,49 +17,54 @@ use super::image::{Column, Image, Span};
 use super::scene::{FINE, LONGEST_LEAD_S, Scene};
 use super::whitening::Whitening;
 
-/// A column of the null model: joint, place in [`Scene::answers`] and factor of each of its parts.
+/// A column of the null model: for each of its parts the joint, the index in [`Scene::answers`] and the factor.
 pub type Answer = Vec<(usize, usize, f64)>;
 
-/// Place of the share in [`Scene::answers`].
+/// Index of the share in [`Scene::answers`].
 const SHARE: usize = 0;
-/// That of the lead.
+/// Index of the lead in [`Scene::answers`].
 const LEAD: usize = 1;
 
-/// Standard deviation of the shares that drives of one arm feed forward: how well a controller knows the friction of a joint.
+/// Standard deviation of the shares that the drives of one arm feed forward: how well a controller knows the friction
+/// of a joint.
 const ALIKE: f64 = 0.1;
-/// Standard deviation of leads, s: half of the longest that any drive has ([`Scene::can_answer`]).
+/// Standard deviation of the leads, s: half of the longest lead that a drive may have ([`Scene::can_answer`]).
 const USUAL_LEAD_S: f64 = 0.5 * LONGEST_LEAD_S;
-/// Standard deviation of what drives do about a reversal beside what it tells, over the difference to feeding nothing or all forward.
-/// Chosen, not derived: behind drives that feed half forward 1 of it stands in logs of little noise. With 0.35 and more steep
-/// noise has something unexplained, with less clean logs of a thirtieth of the noise have a name (`reports/blind_history.md`).
+/// Standard deviation of the unknown part of the turning of joints at reversals, over the difference to a drive that
+/// feeds nothing or all of its friction forward. The value is chosen, not derived: behind drives that feed half
+/// forward, logs of little noise show 1 times this difference. With 0.35 and more, something unexplained appears in
+/// steep noise; with less than 0.25, clean logs with a thirtieth of the noise are given a cause
+/// (`reports/blind_history.md`).
 const TURN: f64 = 0.25;
-/// How long before a reversal and how long behind it a drive may give what it does not know, s, in pulses of half the time between
-/// samples.
+/// Time before and after a reversal during which a drive may give an unknown torque, s. It is divided into pulses of
+/// half a sample each.
 const AROUND_S: [f64; 2] = [0.004, 0.008];
-/// A pulse of this length, s, …
+/// Length of a reference pulse, s ([`PULSE_SHARE`]).
 const PULSE_S: f64 = 0.004;
-/// … has this standard deviation over the step 2 F_c of friction; shorter ones are as independent as longer ones. In logs of
-/// clean arms with a thousandth of the benchmark's noise, whose drives feed 0, 0.5 and 0.9 of friction forward with feedback of 25 to
-/// 100 rad/s along both its motions, likelihood says 0.004 to 0.03 (of joint 1 along the first 0.07), 0.014 in the median;
-/// pulses hold 0.7 to 0.95 of what those leave.
+/// Standard deviation of a pulse of length [`PULSE_S`], over the step 2 F_c of friction. Shorter pulses are as
+/// independent as longer ones, so that it goes as 1/√length. In logs of clean arms with a thousandth of the benchmark's
+/// noise, whose drives feed 0, 0.5 and 0.9 of the friction forward with feedback of 25 to 100 rad/s along both motions
+/// of the benchmark, the likelihood gives 0.004 to 0.03 (0.07 for joint 1 along the first motion), with a median of
+/// 0.014. Pulses contain 0.7 to 0.95 of the residual left there.
 const PULSE_SHARE: f64 = 0.015;
-/// Reversals of a joint in one period that have pulses of their own; more share them in turn.
+/// Number of reversals of a joint in one period that have pulses of their own; any further ones share these in turn.
 const MOST_REVERSALS: usize = 64;
 
-/// What a drive's feeding nothing of its friction forward adds to the torque; `None` for a single run.
+/// Torque that is added if the drive of `joint` feeds nothing of its friction forward; `None` for a single run.
 pub fn share(scene: &Scene, joint: usize) -> Option<Column> {
     let answer = scene.answers(joint).get(SHARE)?;
     Some(Column::on(joint, answer.clone()).scaled(scene.coulomb_nm[joint]))
 }
 
-/// By joint, by what drives of an arm differ from each other in the share that they feed forward, as a torque of standard
-/// deviation one.
+/// For each joint, the torque by which the shares that the drives of one arm feed forward differ, at one standard
+/// deviation.
 pub fn differences(scene: &Scene) -> Vec<(usize, Column)> {
     let of_joint = |j: usize| Some((j, share(scene, j)?.scaled(ALIKE)));
     (0..scene.joints()).filter_map(of_joint).collect()
 }
 
-/// By joint, the lead of its drive as a torque of standard deviation one. Where the null model has it as a column that takes it, too.
+/// For each joint, the torque of its drive's lead, at one standard deviation. Where the lead is also a column of the
+/// null model, that column absorbs this torque.
 pub fn leads(scene: &Scene) -> impl Iterator<Item = Column> {
     let of_joint = |j: usize| {
         let answer = scene.answers(j).get(LEAD)?;
@@ -68,8 +74,9 @@ pub fn leads(scene: &Scene) -> impl Iterator<Item = Column> {
     (0..scene.joints()).filter_map(of_joint)
 }
 
-/// By joint, a share of what the record would show of friction if its drive fed nothing or all of it forward, less what its answer
-/// to reversals tells, each as a torque of standard deviation one: between two samples a joint turns round as the drive lets it.
+/// For each joint, two torques at one standard deviation: a share of the friction that the record would show if the
+/// drive fed nothing, or all, of it forward, minus that for the velocity told by the drive's answer to reversals.
+/// Between two samples, a joint turns round as its drive lets it.
 pub fn turns(scene: &Scene) -> impl Iterator<Item = Column> {
     let joints = if scene.periodic { scene.joints() } else { 0 };
     let if_fed = |(j, fed): (usize, usize)| {
@@ -81,7 +88,8 @@ pub fn turns(scene: &Scene) -> impl Iterator<Item = Column> {
     (0..joints).flat_map(|j| [(j, 0), (j, 1)]).map(if_fed)
 }
 
-/// By joint, what its drive may give more or less around single reversals, each of standard deviation one; none for a single run.
+/// For each joint, the torques that its drive may give in addition around single reversals, each at one standard
+/// deviation; none for a single run.
 pub fn unknown_pulses(scene: &Scene) -> Vec<(usize, Vec<Column>)> {
     if !scene.periodic {
         return Vec::new();
@@ -113,7 +121,8 @@ pub fn unknown_pulses(scene: &Scene) -> Vec<(usize, Vec<Column>)> {
     (0..scene.joints()).into_par_iter().map(of_joint).collect()
 }
 
-/// Where a velocity that repeats turns round, going from beyond one `width` of rest to beyond it on the other side.
+/// Indices at which a periodic velocity reverses: it passes from beyond one `width` of rest to beyond it on the other
+/// side.
 fn reversals(qd_rad_s: &[f64], width: f64) -> Vec<usize> {
     let n = qd_rad_s.len();
     let Some(start) = qd_rad_s.iter().position(|qd| qd.abs() > width) else { return Vec::new() };
@@ -131,8 +140,9 @@ fn reversals(qd_rad_s: &[f64], width: f64) -> Vec<usize> {
     out
 }
 
-/// Columns of the null model beside those of the rigid one, `rigid`: the lead of each drive but of those that no drive has
-/// ([`Scene::can_answer`]; fitted to `torque` with a share of each drive's own), and the share that all feed forward.
+/// Columns of the null model in addition to the rigid ones (`rigid`): the lead of each drive, and the share that all
+/// drives feed forward. Leads longer than a drive can have are left out ([`Scene::can_answer`]); they are fitted to
+/// `torque` together with a share for each drive.
 pub fn answers(
     scene: &Scene,
     whitening: &Whitening,
@@ -147,7 +157,7 @@ pub fn answers(
         for (which, answer) in scene.answers(joint).iter().enumerate() {
             let column = Column::on(joint, answer.clone());
             let image = whitening.image(&column);
-            // A joint that stands still answers nothing.
+            // The columns of a joint that stands still vanish.
             if !all.push(&image) {
                 continue;
             }
@@ -178,12 +188,12 @@ pub fn answers(
 mod tests {
     use super::*;
 
-    /// A velocity that turns round twice a period, dwells near rest once without turning, and trembles as it turns.
+    /// A velocity that reverses twice in a period, once stays near rest without reversing, and trembles as it reverses.
     #[test]
     fn reversals_are_where_friction_turns_round() {
         let qd = [0.5, 0.3, 0.01, 0.4, 0.1, 0.01, -0.01, 0.01, -0.05, -0.4, -0.2, 0.1];
         assert_eq!(reversals(&qd, 0.02), [8, 11]);
-        // Wherever the period begins.
+        // The result does not depend on where the period begins.
         for shift in 0..qd.len() {
             let mut turned = qd;
             turned.rotate_left(shift);

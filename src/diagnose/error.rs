@@ -1,14 +1,14 @@
-//! Why a log cannot be diagnosed.
+//! Errors: why a log cannot be diagnosed.
 
 use thiserror::Error;
 
 use crate::identify::{FitError, IdentifyError, Misreading};
 use crate::signal::SignalError;
 
-/// A log without a diagnosis, with the numbers that say why.
+/// Reason why a log has no diagnosis, with the numbers that explain it.
 #[derive(Debug, Error)]
 pub enum DiagnoseError {
-    /// There is no model to diagnose.
+    /// The identification failed: there is no model to diagnose.
     #[error(transparent)]
     Identify(#[from] IdentifyError),
     /// A filter or spectrum could not be computed.
@@ -25,12 +25,12 @@ pub enum DiagnoseError {
         /// Frequency, Hz.
         frequency_hz: f64,
     },
-    /// The log fits its arm when it is read otherwise.
+    /// The log fits its arm only if it is read differently.
     #[error("{log}: declined. {}", misreading.sentence())]
     Misread {
         /// The log.
         log: String,
-        /// How it has to be read.
+        /// How the log has to be read.
         misreading: Box<Misreading>,
     },
     /// Several logs together do not determine the unknowns.
@@ -38,7 +38,7 @@ pub enum DiagnoseError {
     Singular {
         /// The log.
         log: String,
-        /// Unknowns.
+        /// Number of unknowns.
         unknowns: usize,
     },
     /// A parameter's column vanishes in the whitened equations.
@@ -54,12 +54,12 @@ pub enum DiagnoseError {
     },
 }
 
-/// What helps where a motion tells too little.
+/// Advice for a motion that excites too little.
 const WHAT_TO_DO: &str =
     "`armid identify` names all that is not excited, `armid excite` plans a motion that excites it";
 
 impl DiagnoseError {
-    /// The sentence about the log `log` whose motion tells too little.
+    /// The sentence that says why the log `log` is declined, for an error that [`Self::is_declined`].
     pub fn declined(&self, log: &str) -> String {
         match self {
             Self::Identify(error) => format!("{log}: declined, {error}; {WHAT_TO_DO}"),
@@ -67,7 +67,7 @@ impl DiagnoseError {
         }
     }
 
-    /// How the log has to be read, where that is what is wrong.
+    /// How the log has to be read, if it was read wrongly.
     pub fn misreading(&self) -> Option<&Misreading> {
         match self {
             Self::Misread { misreading, .. } => Some(misreading),
@@ -75,8 +75,7 @@ impl DiagnoseError {
         }
     }
 
-    /// Whether there is nothing to diagnose: the motion does not identify what was asked for, or the log is not read as it was
-    /// recorded.
+    /// Whether the log is declined: its motion does not identify the unknowns, or it is not read as it was recorded.
     pub fn is_declined(&self) -> bool {
         let of_the_fit = |error: &IdentifyError| {
             matches!(error, IdentifyError::Fit(FitError::NotExcited { .. } | FitError::StandsStill))

@@ -1,4 +1,4 @@
-//! The extended model: base parameters and effects together.
+//! The extended model: base parameters and effects, fitted together.
 
 use super::candidates::{Candidate, Shape};
 use super::drives::Answer;
@@ -10,27 +10,27 @@ use crate::identify::Problem;
 use crate::robot::JointSignals;
 use crate::signal::mean_period;
 
-/// An effect with its numbers.
+/// An effect with its fitted shape and coefficients.
 #[derive(Debug, Clone)]
 pub struct Effect {
     /// Index into the families.
     pub family: usize,
-    /// Joint, or the arm as a whole.
+    /// Joint (0-based), or `None` for the arm as a whole.
     pub site: Option<usize>,
     /// Nonlinear parameters.
     pub shape: Shape,
     /// Coefficients of its columns.
     pub coefficients: Vec<f64>,
-    /// What the base parameters would take over of it if it were left out.
+    /// Change of the base parameters that would absorb part of the effect if it were left out.
     pub absorbed: Vec<f64>,
 }
 
-/// Base parameters and effects fitted together.
+/// Base parameters and effects, fitted together.
 #[derive(Debug, Clone)]
 pub struct Extension {
     /// Base parameters.
     pub theta: Vec<f64>,
-    /// How the drives answer friction, rates of which are per [`Self::instant_s`].
+    /// How the drives answer friction; rates are per [`Self::instant_s`].
     pub answers: Answer,
     /// Time between two instants of the log that was fitted, s ([`Scene::instant_s`]).
     pub instant_s: f64,
@@ -39,8 +39,8 @@ pub struct Extension {
 }
 
 impl Extension {
-    /// Least squares of `torque` (the study's own, or that of other periods of the same motion) on
-    /// the null model and `entries`, in the whitened equations.
+    /// Fits the null model and `entries` to `torque` by least squares in the whitened equations. `torque` is the
+    /// study's own, or that of other periods of the same motion.
     pub fn fit(study: &Study, entries: &[&Entry], torque: &Image) -> Self {
         let mut residual = torque.clone();
         study.null.residualise(&mut residual);
@@ -50,7 +50,7 @@ impl Extension {
         };
         let telling: Vec<Vec<bool>> = entries.iter().map(&mut telling).collect();
         let mut solved = span.solve(&residual).into_iter();
-        // A column that those before it add up to has nothing of its own.
+        // The coefficient of a column that is a combination of those before it is zero.
         let mut coefficient = |told| if told { solved.next().unwrap_or(0.0) } else { 0.0 };
         let mut effects: Vec<Effect> = entries
             .iter()
@@ -84,7 +84,7 @@ impl Extension {
         Self { theta, answers, instant_s: study.scene.instant_s(), effects }
     }
 
-    /// The same model for another log ([`Candidate::elsewhere`]).
+    /// The same model for another log, with shapes as [`Candidate::elsewhere`] gives them.
     pub fn elsewhere(&self, families: &[Box<dyn Candidate>]) -> Self {
         let mut out = self.clone();
         for effect in &mut out.effects {
@@ -93,7 +93,7 @@ impl Extension {
         out
     }
 
-    /// Torque of one period (or of the run), Nm, as the regression sees it: joints × samples of `problem`.
+    /// Predicted torque of one period (or of the run) as the regression sees it, Nm: joints × samples of `problem`.
     pub fn torque_nm(
         &self,
         families: &[Box<dyn Candidate>],
@@ -107,7 +107,7 @@ impl Extension {
             problem.predict(j, &self.theta, out);
             let columns = scene.answers(j);
             for &(_, which, b) in self.answers.iter().filter(|(joint, ..)| *joint == j) {
-                // A single run has none.
+                // A single run has no answers.
                 if let Some(column) = columns.get(which) {
                     let b = scene.answer_from(self.instant_s, which, b);
                     out.iter_mut().zip(column).for_each(|(o, y)| *o += b * y);
@@ -117,7 +117,7 @@ impl Extension {
         for effect in &self.effects {
             for (column, b) in effect.columns(families, scene) {
                 for (j, y) in column.parts {
-                    // What does not repeat is averaged over the periods.
+                    // A torque that does not repeat is averaged over the periods.
                     let mean = mean_period(&y, scene.samples());
                     let y = whitening.map_or(mean.clone(), |w| w.as_regressed(&mean));
                     out.joint_mut(j).iter_mut().zip(&y).for_each(|(o, y)| *o += b * y);

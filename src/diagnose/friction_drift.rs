@@ -1,10 +1,11 @@
-//! Friction that changes slowly, as it shows between repetitions: neither noise nor contact, however large it is.
+//! Friction that changes slowly between repetitions: neither noise nor contact, however large it is.
 //!
-//! Where friction φ of a joint is f times as large at the time t, a sample differs by φ (f(t) − f̄) from what the
-//! repetitions have in common at its phase: their mean, or the trimmed mean of the other periods. φ is made of sign q̇
-//! and q̇, f of a straight line and of what has faded after a quarter of the record; the shares of the four are least
-//! squares. They fit a push, which comes once and has one direction, hardly at all, and take four of the thousands
-//! of degrees of freedom of noise; but of eight periods 5 to 15 % of those in the slow harmonics, where the velocity lives.
+//! If the friction φ of a joint is multiplied by f(t) at time t, a sample differs by φ (f(t) − f̄) from what the
+//! repetitions have in common at its phase, which is their mean or the trimmed mean of the other periods. φ is a
+//! combination of sign q̇ and q̇, and f a combination of a straight line and an exponential with a quarter of the
+//! record as its time constant. The coefficients of the four products are found by least squares. They hardly fit a
+//! push, which comes once and has one direction. They take four of the thousands of degrees of freedom of the noise;
+//! but of eight periods they take 5 to 15 % of those in the slow harmonics, where the velocity lives.
 
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
 
@@ -12,23 +13,23 @@ use crate::median::trimmed_mean;
 use crate::robot::JointSignals;
 use crate::signal::other_periods;
 
-/// Slower than this, rad/s, dry friction has not built up.
+/// Velocity over which dry friction builds up, rad/s.
 const STANDSTILL_RAD_S: f64 = 0.02;
-/// What fades does so with this share of the record as time constant.
+/// Time constant of the exponential, as a share of the record.
 const FADES: f64 = 0.25;
-/// Laws of friction times courses in time.
+/// Number of friction laws times the number of courses in time.
 const COLUMNS: usize = 4;
 
-/// What drifting friction may do to the deviations of every joint.
+/// Deviations that drifting friction may cause, for every joint.
 pub struct FrictionDrift {
     qd_rad_s: JointSignals,
-    /// f(t) − f̄ of both courses, per sample.
+    /// f(t) − f̄ at every sample, for the exponential and the straight line.
     courses: [Vec<f64>; 2],
 }
 
 impl FrictionDrift {
-    /// Deviations from the trimmed mean of the other periods, for joints with the velocities `qd_rad_s`, whose motion
-    /// repeats every `period` samples.
+    /// For deviations from the trimmed mean of the other periods; `qd_rad_s` are the velocities of the whole record,
+    /// whose motion repeats every `period` samples.
     pub fn beside_others(qd_rad_s: JointSignals, period: f64) -> Self {
         let samples = qd_rad_s.samples();
         let mut same = Vec::new();
@@ -39,7 +40,7 @@ impl FrictionDrift {
         })
     }
 
-    /// Deviations from the mean over all `periods`, each with the velocities `qd_rad_s`.
+    /// For deviations from the mean over all `periods`, each with the velocities `qd_rad_s`.
     pub fn beside_mean(qd_rad_s: &JointSignals, periods: usize) -> Self {
         let n = qd_rad_s.samples();
         let all = qd_rad_s.map_joints(|_, qd| qd.repeat(periods));
@@ -48,7 +49,7 @@ impl FrictionDrift {
         })
     }
 
-    /// `common` of a course and a sample is what the repetitions have in common there.
+    /// `common(f, k)` is what the repetitions of the course `f` have in common at the phase of sample `k`.
     fn new(
         qd_rad_s: JointSignals,
         mut common: impl FnMut(&dyn Fn(f64) -> f64, usize) -> f64,
@@ -61,7 +62,7 @@ impl FrictionDrift {
         Self { courses: [course(&fade), course(&line)], qd_rad_s }
     }
 
-    /// Takes the best fit to the samples that are `used` out of the deviations `y` of joint `j`.
+    /// Subtracts the drift from the deviations `y` of joint `j`, as fitted to the samples that are `used`.
     pub fn remove(&self, j: usize, y: &mut [f64], used: impl Fn(usize) -> bool) {
         let Some(gram) = self.gram(j, &used) else { return };
         let mut right = SVector::<f64, COLUMNS>::zeros();
@@ -74,7 +75,7 @@ impl FrictionDrift {
         }
     }
 
-    /// Orthonormal deviations of joint `j` that [`Self::remove`] leaves nothing of, by sample.
+    /// Orthonormal basis of the deviations of joint `j` that [`Self::remove`] removes completely, by sample.
     pub fn directions(&self, j: usize) -> Vec<Vec<f64>> {
         let whitened = self.gram(j, |_| true).and_then(|gram| gram.l().try_inverse());
         let Some(inverse) = whitened else { return Vec::new() };
@@ -84,7 +85,7 @@ impl FrictionDrift {
         inverse.row_iter().map(|row| of(row.transpose())).collect()
     }
 
-    /// What the four shares do to sample `k`.
+    /// The four columns at sample `k` of joint `j`.
     fn row(&self, j: usize, k: usize) -> SVector<f64, COLUMNS> {
         let qd = self.qd_rad_s.joint(j)[k];
         let friction = [(qd / STANDSTILL_RAD_S).tanh(), qd];
@@ -92,7 +93,8 @@ impl FrictionDrift {
         [friction[0] * fade, friction[1] * fade, friction[0] * line, friction[1] * line].into()
     }
 
-    /// Of the samples that are `used`; `None` for a joint that stands still, which has no friction that could drift.
+    /// Gram matrix of the samples that are `used`; `None` for a joint that stands still, which has no friction that
+    /// could drift.
     fn gram(
         &self,
         j: usize,
@@ -111,7 +113,7 @@ impl FrictionDrift {
 mod tests {
     use super::*;
 
-    /// A straight course is taken out whole: its trimmed mean over the other periods is what the columns assume.
+    /// A straight course is removed completely: its trimmed mean over the other periods is what the columns assume.
     #[test]
     fn friction_that_grows_evenly_is_taken_out() {
         let (n, period) = (800, 100);
@@ -137,7 +139,7 @@ mod tests {
         assert!((0..n).map(repeats).fold(0.0, f64::max) < 1e-9);
     }
 
-    /// Directions are of length one and at right angles, and of each nothing is left.
+    /// The directions are orthonormal, and nothing of them is left after removal.
     #[test]
     fn directions_are_what_is_removed() {
         let (n, periods) = (200, 4);

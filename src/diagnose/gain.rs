@@ -1,31 +1,32 @@
-//! How much of what can be explained a cause removes, on periods that were not used for the fit.
+//! Gain of a cause: how much of the explainable residual it removes on periods that were not used for the fit.
 //!
-//! All in whitened rows, where the mean of all P periods has noise of variance one, that of P_h periods
-//! v_h = P/P_h. With P_S the projection on the span of null model and causes, and P_R that without cause c,
-//! models are fitted to one half of the periods (y₁) and judged on the other (y₂), both ways round:
+//! Everything is computed in whitened rows, where the noise of the mean over all P periods has variance one, and that
+//! of the mean over P_h periods has v_h = P/P_h. P_S is the projection on the span of the null model and all causes,
+//! P_R that without cause c. Models are fitted to one half of the periods (y₁) and judged on the other half (y₂), and
+//! the other way round:
 //!
 //! explainable = ‖y₂ − P_R y₁‖² − m v₂ − v₁ tr P_R,
-//! removed = explainable − (‖y₂ − P_S y₁‖² − m v₂ − v₁ tr P_S),
+//! removed = explainable − (‖y₂ − P_S y₁‖² − m v₂ − v₁ tr P_S).
 //!
-//! both over the m rows in which the cause has 95 % of its square, by the half it was fitted to: noise
-//! elsewhere says nothing of it. m v₂ is the noise of y₂ there, v₁ tr the noise of the fit to y₁.
+//! Both extend over the m rows that contain 95 % of the square of the cause, as fitted to y₁: noise in other rows says
+//! nothing about it. m v₂ is the noise of y₂ in these rows, and v₁ tr P is the noise of the fit to y₁.
 //!
-//! What removes less than nothing has been fitted to what something else leaves. A law that is there does not by chance:
-//! of a strength √λ it removes λ ± 2√λ of both halves together, and what has the evidence to be named is three σ and more from
-//! nothing (√λ ≥ 6).
+//! A cause that removes less than nothing was fitted to the remainder of something else. A law that is present does not
+//! get there by chance: with strength √λ it removes λ ± 2√λ of both halves together, and a law with enough evidence to
+//! be named (√λ ≥ 6) lies at least three σ above zero.
 
 use super::image::{Column, Image, Span};
 use super::selection::Kept;
 use super::study::{Entry, Study};
 
-/// Share of a cause's square in the rows it is judged by.
+/// Share of a cause's square that is contained in the rows by which it is judged.
 const WHERE_IT_ACTS: f64 = 0.95;
-/// Fewer periods have no halves worth fitting.
+/// Least number of periods whose halves are worth a fit.
 const LEAST_PERIODS: usize = 4;
 
 impl Kept<'_, '_> {
-    /// Drops causes by which other periods are known worse than without them, the worst first; those beside it are refined. The gains
-    /// of the others ([`on_other_periods`]).
+    /// Drops causes that make the prediction of other periods worse, the worst first, and refines the remaining ones at
+    /// the same site. Returns the gains of those that stay ([`on_other_periods`]).
     pub fn drop_idle(&mut self) -> Vec<Option<f64>> {
         loop {
             let entries: Vec<&Entry> = self.causes.iter().map(|cause| &cause.entry).collect();
@@ -37,15 +38,15 @@ impl Kept<'_, '_> {
     }
 }
 
-/// The one of `gains` that is farthest below zero.
+/// Index of the most negative of the `gains`; `None` if none is negative.
 fn most_harmful(gains: &[Option<f64>]) -> Option<usize> {
     let known = gains.iter().enumerate().filter_map(|(c, gain)| Some((c, (*gain)?)));
     let harmful = known.filter(|(_, gain)| *gain < 0.0);
     harmful.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(c, _)| c)
 }
 
-/// removed/explainable of every entry, at most 1; `None` for a single run, for what does not repeat, and where
-/// noise leaves nothing to be explained.
+/// removed/explainable of every entry, at most 1. `None` for a single run, for fewer than [`LEAST_PERIODS`], for a
+/// cause that does not repeat, and if nothing explainable stands out of the noise.
 fn on_other_periods(study: &Study, entries: &[&Entry]) -> Vec<Option<f64>> {
     if !study.scene.periodic || study.scene.periods < LEAST_PERIODS {
         return vec![None; entries.len()];
@@ -84,7 +85,7 @@ fn on_other_periods(study: &Study, entries: &[&Entry]) -> Vec<Option<f64>> {
         .collect()
 }
 
-/// A model's columns: those of the null model, and outside them those of causes.
+/// Span of a model: the null model, and the columns of the causes outside it.
 struct Model<'a> {
     null: &'a Span,
     causes: Span,
@@ -99,7 +100,7 @@ impl<'a> Model<'a> {
         Self { null: &study.null, causes }
     }
 
-    /// P y.
+    /// The projection P y on the model.
     fn prediction(&self, y: &Image) -> Image {
         let mut prediction = self.null.inside(y);
         prediction.add(1.0, &self.causes.inside(y));
@@ -113,7 +114,7 @@ impl<'a> Model<'a> {
     }
 }
 
-/// The rows that hold [`WHERE_IT_ACTS`] of the square of `signal`.
+/// The strongest rows of `signal`, which together contain [`WHERE_IT_ACTS`] of its square.
 fn strongest(signal: &[f64]) -> Vec<usize> {
     let mut rows: Vec<usize> = (0..signal.len()).collect();
     rows.sort_by(|&a, &b| signal[b].abs().total_cmp(&signal[a].abs()));
@@ -127,7 +128,7 @@ fn strongest(signal: &[f64]) -> Vec<usize> {
     rows
 }
 
-/// Mean torque of half of the periods.
+/// Mean torque of one half of the periods.
 struct Half {
     /// Whitened.
     mean: Image,

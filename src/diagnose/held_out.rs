@@ -1,10 +1,10 @@
-//! Gains on a log that was used neither for the fit nor for a choice.
+//! Gains on a log that was used neither for a fit nor for a choice.
 //!
-//! Every model goes through the same processing, nothing is fitted again, and three scores are kept
-//! apart: samples in which the joint moves (|q̇| > 0.02 rad/s), all samples with friction at standstill
-//! as the model says it, and all samples with friction at standstill anywhere in [−F, F]. Dry friction
-//! holds a joint that stands still against any torque up to F, so that no function of its speed can
-//! predict it: the third score leaves out what is unpredictable, for every model alike.
+//! All models see the log after the same processing, and nothing is fitted again. Three scores are kept apart: the
+//! samples in which the joint moves (|q̇| > 0.02 rad/s); all samples, with friction at standstill as the model predicts
+//! it; and all samples, with friction at standstill anywhere in [−F, F]. Dry friction holds a joint that stands still
+//! against any torque up to F, so that no function of its speed can predict it. The third score leaves out this
+//! unpredictable part, for all models alike.
 
 use super::candidates::Candidate;
 use super::common_motion::{move_to_common_motion, noise_of_mean};
@@ -38,7 +38,8 @@ pub(super) struct Models<'a> {
     pub(super) extension: &'a Extension,
 }
 
-/// Residuals of both models on a log that neither has seen.
+/// Rms residuals of both models, and of the manufacturer's feed-forward where it is given, on a log that neither model
+/// has seen.
 pub(super) fn held_out_gain(
     identifier: &mut Identifier,
     (arm, set, options): (&Arm, &BaseSet, &Options),
@@ -125,7 +126,7 @@ pub(super) fn held_out_gain(
     })
 }
 
-/// Which samples of the regression count as what, per joint.
+/// Classes of the regression's samples, per joint.
 struct Rows {
     /// |q̇| > 0.02 rad/s.
     moves: Vec<Vec<bool>>,
@@ -153,8 +154,8 @@ impl Rows {
     }
 }
 
-/// Rms of the error `e` of joint `j` where it moves, without what its own Coulomb and viscous friction
-/// explain of it there, Nm.
+/// Rms of the error `e` of joint `j` while it moves, Nm, without the part of the error that the joint's own Coulomb and
+/// viscous friction explain there.
 fn without_friction_of(
     problem: &Problem,
     set: &BaseSet,
@@ -189,13 +190,13 @@ fn coulomb_nm(set: &BaseSet, theta: &[f64], j: usize) -> f64 {
     coulomb_index(set, j).map_or(0.0, |k| theta[k].abs())
 }
 
-/// The base parameter that stands for joint `j`'s Coulomb friction.
+/// Index of the base parameter that is joint `j`'s Coulomb friction.
 fn coulomb_index(set: &BaseSet, j: usize) -> Option<usize> {
     let name = format!("rc{}", j + 1);
     (0..set.rank()).find(|&k| set.name(k) == name)
 }
 
-/// `model` without what depends on the direction of motion.
+/// `model` without its Coulomb friction and without effects of the friction families.
 fn without_friction(
     model: &Extension,
     set: &BaseSet,

@@ -1,4 +1,4 @@
-//! Signals in the whitened equations, and the space that known columns span there.
+//! Signals in the whitened equations, and the subspace that known columns span there.
 
 use std::ops::Range;
 
@@ -18,17 +18,17 @@ pub struct Column {
 }
 
 impl Column {
-    /// On one joint.
+    /// A column on one joint.
     pub fn on(joint: usize, samples: Vec<f64>) -> Self {
         Self { parts: vec![(joint, samples)] }
     }
 
-    /// On all joints of `signals`.
+    /// A column on all joints of `signals`.
     pub fn everywhere(signals: &crate::robot::JointSignals) -> Self {
         Self { parts: (0..signals.joints()).map(|j| (j, signals.joint(j).to_vec())).collect() }
     }
 
-    /// What it has more than `other`, a column on the same joints.
+    /// This column minus `other`, which is on the same joints.
     pub fn minus(mut self, other: &Self) -> Self {
         for ((_, own), (_, other)) in self.parts.iter_mut().zip(&other.parts) {
             own.iter_mut().zip(other).for_each(|(own, other)| *own -= other);
@@ -43,15 +43,15 @@ impl Column {
     }
 }
 
-/// A column in the whitened equations: noise there has variance one in every row.
+/// A column in the whitened equations, where the noise of every row has variance one.
 ///
-/// `mean` belongs to the mean of the periods, `contrast` to their differences; what repeats has no
-/// contrast (empty).
+/// `mean` belongs to the mean of the periods, `contrast` to the differences between them. For a signal that repeats in
+/// every period `contrast` is empty.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Image {
     /// Rows of the mean period.
     pub mean: Vec<f64>,
-    /// Rows of the differences between periods; empty for what repeats.
+    /// Rows of the differences between periods; empty for a signal that repeats.
     pub contrast: Vec<f64>,
 }
 
@@ -61,7 +61,7 @@ impl Image {
         dot(&self.mean, &other.mean) + dot_of_contrasts(&self.contrast, &other.contrast)
     }
 
-    /// From the first to the last row of the mean that is not zero.
+    /// Range from the first to the last non-zero row of the mean.
     fn support(&self) -> Range<usize> {
         let start = self.mean.iter().position(|v| *v != 0.0).unwrap_or(0);
         let end = self.mean.iter().rposition(|v| *v != 0.0).map_or(start, |last| last + 1);
@@ -92,7 +92,7 @@ impl Image {
     }
 }
 
-/// ⟨a, b⟩ in the differences between periods; what repeats has none.
+/// ⟨a, b⟩ of the differences between periods; zero if one of the signals repeats.
 fn dot_of_contrasts(a: &[f64], b: &[f64]) -> f64 {
     if a.is_empty() || b.is_empty() { 0.0 } else { dot(a, b) }
 }
@@ -112,14 +112,14 @@ fn axpy(y: &mut [f64], factor: f64, x: &[f64]) {
     );
 }
 
-/// An orthonormal basis of the span of columns, with the triangle that made it.
+/// Orthonormal basis of the span of columns, with the triangular matrix R of their QR decomposition.
 #[derive(Debug, Clone, Default)]
 pub struct Span {
-    /// Means of the directions, one behind the other.
+    /// Means of the directions, one after another.
     means: Vec<f64>,
-    /// Their contrasts.
+    /// Contrasts of the directions.
     contrasts: Vec<Vec<f64>>,
-    /// Column k of R: coefficients of column k on directions 0…k.
+    /// Column k of R: coordinates of column k along the directions 0…k.
     triangle: Vec<Vec<f64>>,
 }
 
@@ -128,15 +128,16 @@ pub struct Span {
 pub struct Direction<'a> {
     /// Rows of the mean period.
     pub mean: &'a [f64],
-    /// Rows of the differences between periods; empty for what repeats.
+    /// Rows of the differences between periods; empty for a signal that repeats.
     pub contrast: &'a [f64],
 }
 
-/// A column that keeps less than this share of its length is a combination of those before it.
+/// A column that keeps less than this share of its length after orthogonalisation counts as linearly dependent on the
+/// columns before it.
 const DEPENDENT: f64 = 1e-6;
 
 impl Span {
-    /// Of what `images` have outside `others`.
+    /// Span of the parts of `images` outside `others`.
     pub fn outside(others: &Self, images: &[Image]) -> Self {
         let mut span = Self::default();
         for image in images {
@@ -147,8 +148,8 @@ impl Span {
         span
     }
 
-    /// [`Self::outside`], and for each of its columns which of `images` it is and whether its coefficient is told: others of
-    /// them do not add up to it.
+    /// [`Self::outside`], and for each of its columns the index in `images` and whether the data determine its
+    /// coefficient. They do not if other images add up to the column.
     pub fn telling(others: &Self, images: &[Image]) -> (Self, Vec<(usize, bool)>) {
         let outside = |image: &Image| {
             let mut image = image.clone();
@@ -173,17 +174,18 @@ impl Span {
         self.triangle.len()
     }
 
-    /// Whether nothing is spanned.
+    /// Whether the span has no dimensions.
     pub fn is_empty(&self) -> bool {
         self.triangle.is_empty()
     }
 
-    /// Takes `column` in; `false`, and nothing changes, if it is already spanned.
+    /// Adds `column` to the span. Returns `false`, and changes nothing, if it is spanned already.
     pub fn push(&mut self, column: &Image) -> bool {
         self.take(column.clone())
     }
 
-    /// [`Self::push`] by classical Gram-Schmidt, twice: as orthogonal as rounding allows (Giraud et al. 2005).
+    /// [`Self::push`] by classical Gram-Schmidt, applied twice, which makes the directions as orthogonal as rounding
+    /// allows (Giraud et al. 2005).
     fn take(&mut self, mut rest: Image) -> bool {
         let length = rest.square().sqrt();
         let mut coefficients = vec![0.0; self.len()];
@@ -203,17 +205,18 @@ impl Span {
         true
     }
 
-    /// Removes from `column` what is spanned.
+    /// Removes from `column` its part inside the span.
     pub fn residualise(&self, column: &mut Image) {
         self.residualise_all(std::slice::from_mut(column));
     }
 
-    /// Removes from `columns` what is spanned, from all of them at once.
+    /// Removes from all `columns` their parts inside the span, in one pass.
     pub fn residualise_all(&self, columns: &mut [Image]) {
         self.project_out(columns);
     }
 
-    /// Removes from `columns` what is spanned, and returns its coordinates, a column for each.
+    /// Removes from `columns` their parts inside the span, and returns the coordinates of these parts, one column for
+    /// each.
     fn project_out(&self, columns: &mut [Image]) -> Mat<f64> {
         let along = self.along(columns);
         self.add_combinations(columns, -1.0, &along);
@@ -240,9 +243,9 @@ impl Span {
         }
     }
 
-    /// ⟨direction, column⟩, a row for every direction: one matrix product over the rows of the means in which any of
-    /// `columns` is not zero, products of vectors for one column alone. A column that acts on one joint of a single run is
-    /// zero in the rows of all other joints.
+    /// ⟨direction, column⟩, with one row per direction and one column per column. The means take one matrix product
+    /// over the rows in which any of `columns` is not zero, or products of vectors if there is only one column. A
+    /// column that acts on one joint of a single run is zero in the rows of all other joints.
     pub(super) fn along(&self, columns: &[Image]) -> Mat<f64> {
         let mut along = Mat::zeros(self.len(), columns.len());
         if self.is_empty() {
@@ -272,17 +275,17 @@ impl Span {
         along
     }
 
-    /// Means of the directions, rows × dimensions.
+    /// Means of the directions as a matrix, rows × dimensions.
     fn means(&self) -> MatRef<'_, f64> {
         MatRef::from_column_major_slice(&self.means, self.rows(), self.len())
     }
 
-    /// Rows of a mean.
+    /// Number of rows of a mean.
     fn rows(&self) -> usize {
         self.means.len() / self.len().max(1)
     }
 
-    /// The part of `y` that is spanned.
+    /// The part of `y` inside the span.
     pub fn inside(&self, y: &Image) -> Image {
         let mut part = y.clone();
         self.residualise(&mut part);
@@ -338,11 +341,11 @@ impl Span {
         })
     }
 
-    /// R⁻¹, with columns = directions · R.
+    /// R⁻¹, where columns = directions · R.
     pub fn inverse_triangle(&self) -> DMatrix<f64> {
         let k = self.len();
         let r = DMatrix::from_fn(k, k, |i, c| self.triangle[c].get(i).copied().unwrap_or(0.0));
-        // Every pivot is positive, or its column would not have been taken in.
+        // Every pivot is positive: otherwise its column would not have been added.
         r.solve_upper_triangular(&DMatrix::identity(k, k)).unwrap_or_else(|| DMatrix::zeros(k, k))
     }
 
@@ -376,7 +379,7 @@ mod tests {
         assert!(!span.push(&image(&[1.0, 2.0, 3.0, 4.0])), "a combination of both");
     }
 
-    /// Nothing, a column of its own, and two that are alike.
+    /// A zero column, an independent column, and two that are parallel.
     #[test]
     fn a_coefficient_is_told_where_no_other_column_stands_in_for_its_own() {
         let alike = [[0.0, 1.0, 1.0, 0.0], [0.0, -2.0, -2.0, 0.0]];

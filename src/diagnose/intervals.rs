@@ -1,4 +1,4 @@
-//! How well the numbers of an extended model are known.
+//! Confidence intervals: how well the numbers of an extended model are known.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -15,11 +15,11 @@ use super::study::{Entry, Study};
 use super::verdict::{BaseParameter, Estimate};
 use crate::base::BaseSet;
 
-/// Relative step of the derivative by a nonlinear parameter.
+/// Relative step of the numerical derivative with respect to a nonlinear parameter.
 const STEP: f64 = 1e-3;
 
-/// What `effect` adds to the whitened equations per unit of its coefficients, and of its nonlinear parameter
-/// where it has one.
+/// Derivatives of `effect` in the whitened equations with respect to its coefficients, and with respect to its
+/// nonlinear parameter if it has one.
 pub(super) fn tangents(study: &Study, effect: &Effect) -> Vec<Image> {
     let family = &study.families[effect.family];
     let images = |value: f64| -> Vec<Image> {
@@ -46,16 +46,16 @@ pub(super) fn tangents(study: &Study, effect: &Effect) -> Vec<Image> {
     out
 }
 
-/// Base parameters beside the effects of `extension` with their σ, the effects' own numbers unknown as well:
-/// the block of (XᵀX)⁻¹ that belongs to them, X with the tangents of the effects, which is returned as well (NaN where the effects
-/// leave nothing of one).
+/// Base parameters beside the effects of `extension`, with their σ when the numbers of the effects are unknown as well.
+/// Their covariance is the corresponding block of (XᵀX)⁻¹, where X also contains the tangents of the effects. It is NaN
+/// for a parameter whose column the effects absorb.
 pub fn base(study: &Study, set: &BaseSet, extension: &Extension) -> Base {
     let effects = extension.effects.iter().flat_map(|effect| tangents(study, effect));
     let mut span = Span::default();
     effects.for_each(|image| {
         span.push(&image);
     });
-    // Where each is in the span; the effects may leave nothing of one.
+    // Index of each parameter in the span; `None` if the effects absorb its column.
     let place = |column| {
         let next = span.len();
         span.push(column).then_some(next)
@@ -70,7 +70,7 @@ pub fn base(study: &Study, set: &BaseSet, extension: &Extension) -> Base {
     let parameter = |k: usize| BaseParameter {
         name: set.name(k).to_owned(),
         value: extension.theta[k],
-        // What is NaN stays it.
+        // `clamp` preserves NaN.
         sigma: covariance[(k, k)].clamp(0.0, f64::INFINITY).sqrt(),
     };
     let of_span = study.statistic.freedom_of_coefficients(&span);
@@ -82,24 +82,27 @@ pub fn base(study: &Study, set: &BaseSet, extension: &Extension) -> Base {
     }
 }
 
-/// Base parameters beside what was found.
+/// Base parameters beside the effects that were found.
 pub struct Base {
-    /// With their σ.
+    /// The parameters with their σ.
     pub parameters: Vec<BaseParameter>,
-    /// Of these, b × b.
+    /// Covariance of the parameters, b × b.
     pub covariance: DMatrix<f64>,
-    /// How well each σ is known, in degrees of freedom.
+    /// Degrees of freedom to which each σ is known.
     pub freedom: Vec<f64>,
 }
 
-/// Physical parameters of a cause with 95 % intervals. Where the family has several forms (Stribeck's
-/// exponent, the stiffness of a gear's flanks), an interval reaches over all that the log allows: with
-/// D = 2 ln of the odds against a form, its own interval shrunk by √(1 − D/q²), q the normal one's
-/// quantile, which is where the likelihood falls below that of the best form by q². The nonlinear parameter of a
-/// motion that repeats is treated the same way, value by value: the interval is that of the profile of the likelihood
-/// (Venzon and Moolgavkar 1988), which need not be symmetric. It also reaches to what the shape says of the same
-/// parameter, see [`Candidate::in_shape`], to all that an absorbed column leaves open ([`Candidate::left_open`]), holds what
-/// the law itself may be wrong by ([`Candidate::form_error`]), and nothing that makes no sense ([`Candidate::least`]).
+/// Physical parameters of a cause, with 95 % intervals.
+///
+/// For a motion that repeats, the nonlinear parameter is varied value by value: its interval is that of the profile
+/// likelihood (Venzon and Moolgavkar 1988), which need not be symmetric. Where the family has several forms (Stribeck's
+/// exponent, the stiffness of a gear's flanks), the interval covers all forms that the log allows. With D = 2 ln of the
+/// odds against a form and q the 95 % quantile, the interval of that form is shrunk by √(1 − D/q²); it ends where the
+/// likelihood is below that of the best form by q².
+///
+/// The interval also reaches to the value that the shape gives for the same parameter ([`Candidate::in_shape`]), and
+/// over the range that an absorbed column leaves open ([`Candidate::left_open`]). It is widened by the error of the law
+/// itself ([`Candidate::form_error`]), and holds no impossible values ([`Candidate::least`]).
 pub fn physical(
     study: &Study,
     kept: &Kept,
@@ -123,7 +126,7 @@ pub fn physical(
         }
         let span = tangent_span(study, &others, &form.effect);
         let other = of_one_form(study, &form.effect, (&span, &residual), left.sqrt() * quantile);
-        // A form with the other sign bends the other way where it counts for less: it is another statement.
+        // A form with the opposite sign bends the other way where this matters less; it is a different statement.
         let is_opposite = |(name, own): (&&str, &Estimate)| {
             other.get(name).is_some_and(|other| own.value * other.value < 0.0)
         };
@@ -152,7 +155,8 @@ pub fn physical(
     out
 }
 
-/// The intervals `own` made long enough to hold those of `other`; phases are taken round the circle.
+/// Extends the intervals `own` to cover those of `other`; phases are first shifted by whole turns to be near each
+/// other.
 fn reach_over(own: &mut BTreeMap<&'static str, Estimate>, other: &BTreeMap<&str, Estimate>) {
     for (name, own) in own {
         let Some(other) = other.get(name) else { continue };
@@ -162,7 +166,7 @@ fn reach_over(own: &mut BTreeMap<&'static str, Estimate>, other: &BTreeMap<&str,
     }
 }
 
-/// The likelihood along the nonlinear parameter of a cause, everything else at its best.
+/// The profile likelihood along the nonlinear parameter of a cause: all other parameters are at their best.
 struct Profile<'a> {
     study: &'a Study<'a>,
     effect: &'a Effect,
@@ -171,15 +175,15 @@ struct Profile<'a> {
     quantile: f64,
 }
 
-/// Parts of the way to an end of the interval at which the profile is looked at.
+/// Number of points at which the profile is evaluated on the way to each end of the interval.
 const PARTS: usize = 4;
-/// How often an end is looked for further out, and how often it is halved in.
+/// Number of steps outward in search of an end, and of bisection steps afterwards.
 const STEPS_OUT: usize = 4;
 const HALVINGS: usize = 4;
 
 impl Profile<'_> {
-    /// What the profile says; σ of the nonlinear parameter, the last of `tangents`, is where it begins to look for
-    /// the ends. `None` where the columns at the best value hang on those of the other causes.
+    /// Intervals from the profile. The search for the ends starts from σ of the nonlinear parameter, which is the last
+    /// of `tangents`. `None` if the columns at the best value depend linearly on those of the other causes.
     fn intervals(&self, tangents: &Span) -> Option<BTreeMap<&'static str, Estimate>> {
         let covariance = self.study.statistic.covariance(tangents, self.residual);
         let sigma = covariance.diagonal().as_slice().last().map_or(0.0, |v| v.max(0.0).sqrt());
@@ -199,7 +203,8 @@ impl Profile<'_> {
         Some(out)
     }
 
-    /// How far, from the best value and in units of `step`'s scale, the gain falls by the square of the quantile.
+    /// Distance from the best value, in the direction of `step` and in its unit, at which the gain has fallen by the
+    /// square of the quantile.
     fn end(&self, step: f64, best: f64) -> f64 {
         let is_allowed = |way: f64| {
             let gain = self.entry(self.moved(way)).and_then(|entry| self.gain(&entry));
@@ -223,7 +228,8 @@ impl Profile<'_> {
         inside
     }
 
-    /// The nonlinear parameter `way` from its best value; what is searched on a logarithmic scale goes by factors.
+    /// The nonlinear parameter at the distance `way` from its best value; on a logarithmic scale the value is
+    /// multiplied.
     fn moved(&self, way: f64) -> f64 {
         let value = self.effect.shape.value;
         match self.study.families[self.effect.family].search() {
@@ -254,7 +260,7 @@ impl Profile<'_> {
     }
 }
 
-/// The [`tangents`] of `effect` outside the null model and outside `others`.
+/// Span of the [`tangents`] of `effect` outside the null model and outside `others`.
 fn tangent_span(study: &Study, others: &Span, effect: &Effect) -> Span {
     let outside_null = |mut image: Image| {
         study.null.residualise(&mut image);
@@ -264,8 +270,8 @@ fn tangent_span(study: &Study, others: &Span, effect: &Effect) -> Span {
     Span::outside(others, &tangents)
 }
 
-/// By the delta method: coefficients and shape are linearised together in `span`, the other causes' coefficients
-/// free; intervals of ± `half` σ.
+/// Parameters of one form by the delta method, with intervals of ± `half` σ. `span` holds the tangents of coefficients
+/// and shape; the coefficients of the other causes are free.
 fn of_one_form(
     study: &Study,
     effect: &Effect,
@@ -309,7 +315,8 @@ fn of_one_form(
             let variance = (g.transpose() * &covariance * &g)[(0, 0)].max(0.0);
             let reach = half * variance.sqrt();
             let value = quantity.value;
-            // What is searched on a logarithmic scale is positive, and a single run knows it to a factor.
+            // A parameter that is searched on a logarithmic scale is positive; a single run determines it to within a
+            // factor.
             let by_factor = !study.scene.periodic
                 && family.search() == Search::Logarithmic
                 && value == effect.shape.value;

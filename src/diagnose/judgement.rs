@@ -1,5 +1,5 @@
-//! What a cause that was kept might be instead: its class, its rivals, other forms of its own law, and how sure
-//! its name is.
+//! Alternatives to a cause that was kept: its class, its rivals and other forms of its own law, and how certain its
+//! name is.
 
 use super::extension::Effect;
 use super::selection::{Contender, FINALISTS, Kept, SHARED};
@@ -9,23 +9,23 @@ use super::study::{Entry, Score};
 /// (z₀.₉₉₉ + z₀.₉)² = (3.09 + 1.28)².
 pub const TELLS_APART: f64 = 19.0;
 
-/// A cause that was kept, and what else it might be.
+/// A cause that was kept, with its alternatives.
 #[derive(Debug, Clone)]
 pub struct Selected {
     /// The cause.
     pub contender: Contender,
-    /// Posterior probability of its class.
+    /// Posterior probability of the class, the cause itself included.
     pub confidence: f64,
-    /// Others that the data cannot tell from it: family and site.
+    /// Alternatives that the data cannot tell from the cause: family and site.
     pub class: Vec<(usize, Option<usize>)>,
-    /// The others, best first.
+    /// The best alternatives, best first, whether or not the data can tell them from the cause.
     pub rivals: Vec<Contender>,
-    /// Share of the mean square that it removes in stretches of a single run left out of its fit.
+    /// Share of the mean square that the cause removes in stretches of a single run that were left out of its fit.
     pub left_out_gain: Option<f64>,
 }
 
 impl Selected {
-    /// Those of its rivals that the data cannot tell from it, at their best shapes.
+    /// The rivals that the data cannot tell from the cause, at their best shapes.
     pub fn alike(&self) -> Vec<&Entry> {
         let in_class =
             |rival: &&Contender| self.class.contains(&(rival.entry.family, rival.entry.site));
@@ -35,19 +35,19 @@ impl Selected {
 
 /// A cause in another form of its family.
 pub struct Form {
-    /// With its numbers.
+    /// The effect in this form, with its coefficients.
     pub effect: Effect,
-    /// 2 ln of the odds against it.
+    /// 2 ln of the odds against this form.
     pub behind: f64,
 }
 
 impl Kept<'_, '_> {
-    /// The causes, judged.
+    /// All causes, each with its confidence, class and rivals.
     pub fn selected(&self) -> Vec<Selected> {
         (0..self.causes.len()).map(|c| self.judged(c)).collect()
     }
 
-    /// Cause `c` in its family's other variants, each at its best shape.
+    /// Cause `c` in the other variants of its family, each at its best shape.
     pub fn other_forms(&self, c: usize) -> Vec<Form> {
         let (others, residual) = self.without(Some(c));
         let Contender { entry, score, .. } = &self.causes[c];
@@ -65,13 +65,13 @@ impl Kept<'_, '_> {
         variants.into_iter().map(form).collect()
     }
 
-    /// Confidence, class and rivals of cause `c`, the others given.
+    /// Confidence, class and rivals of cause `c`, given the other causes.
     fn judged(&self, c: usize) -> Selected {
         let study = self.study;
         let (others, residual) = self.without(Some(c));
         let contender = self.causes[c].clone();
         let own = study.span(&contender.entry, &others);
-        // The signal of the cause as the data show it.
+        // The signal of the cause as it appears in the data.
         let signal = own.inside(&residual);
         let size = signal.square();
         let mut rivals = self.rivals(c, &others, &residual);
@@ -81,7 +81,7 @@ impl Kept<'_, '_> {
         let is_alike = |explained: &f64| scale * (size - explained) < TELLS_APART;
         let in_class = rivals.iter().zip(&explained).filter(|(_, explained)| is_alike(explained));
         let class = in_class.map(|(rival, _)| (rival.entry.family, rival.entry.site)).collect();
-        // Something else that a single run shows beside the cause is no reason to doubt it.
+        // Along a single run, another effect that is visible beside the cause is no reason to doubt it.
         let in_its_place = |explained: &f64| {
             study.scene.periodic || is_alike(explained) || *explained > SHARED * size
         };
@@ -98,9 +98,9 @@ impl Kept<'_, '_> {
     }
 }
 
-/// Posterior probability that a cause with `evidence` (2 ln, against no effect) or one of its class is there:
-/// of its rivals with their `evidences` those that are `alike`. The others and no effect at all are what else
-/// it may be.
+/// Posterior probability that a cause, or one of its class, is present. `evidence` is 2 ln of the odds for it against
+/// no effect, `evidences` are those of its rivals, and `alike` marks the rivals in its class. The alternatives are the
+/// other rivals and no effect at all.
 pub fn probability_of_class(evidence: f64, evidences: &[f64], alike: &[bool]) -> f64 {
     let top = evidences.iter().copied().fold(evidence, f64::max).max(0.0);
     let weight = |evidence: f64| (0.5 * (evidence - top)).exp();

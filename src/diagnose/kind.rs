@@ -1,4 +1,4 @@
-//! Names of what can be wrong: shared with the scenarios of the plant and with the JSON.
+//! Names of the families of effects, shared by the scenarios of the plant and the JSON output.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +16,7 @@ pub enum Kind {
     LoadFriction,
     /// Friction that builds up over a small angle behind a reversal.
     Presliding,
-    /// Friction that turns round over another range of speeds than the model has it.
+    /// Friction whose sign turns round over another range of speeds than in the model.
     ReversalWidth,
     /// Friction that depends on the angle.
     PositionFriction,
@@ -58,11 +58,11 @@ pub enum Kind {
     ClockFault,
     /// Samples missing or repeated.
     DroppedSamples,
-    /// A coarse quantity.
+    /// Torque recorded in coarse steps.
     Quantisation,
     /// Single values far off.
     Outliers,
-    /// Friction that is not what the simulation assumes.
+    /// Friction that differs from that of the simulation.
     FrictionChange,
 }
 
@@ -104,7 +104,7 @@ impl Kind {
 }
 
 impl Kind {
-    /// Whether it hangs on the direction of motion, so that it is undetermined at standstill.
+    /// Whether the effect depends on the direction of motion, which leaves it undetermined at standstill.
     pub fn is_friction(self) -> bool {
         matches!(
             self,
@@ -121,7 +121,7 @@ impl Kind {
         )
     }
 
-    /// Whether it is a law of the arm, neither a fault of the recording nor something that happened once.
+    /// Whether it is a law of the arm: neither a fault of the recording nor something that happened once.
     pub fn is_a_law(self) -> bool {
         !self.is_of_the_record() && self != Self::Contact
     }

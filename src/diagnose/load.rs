@@ -1,10 +1,11 @@
-//! What a log tells of the torque on links and rotors, harmonic by harmonic.
+//! Torque on links and rotors along a log, as far as the log determines it, harmonic by harmonic.
 //!
-//! The acceleration's noise is in what the null model leaves and in what a family makes of the load; where the load
-//! is differentiated the two would be correlated for no physical reason. Of a motion that repeats, slow harmonics are
-//! known well and taken as they are ([`Harmonics`]). Fast ones are small and drown one by one, and yet they make gears
-//! swing; but they are no accident: a drive that does not answer dry friction at once jolts its joint, at every
-//! reversal in the same way. That common course is known ([`jolts`]), and better from the torque than from the motion.
+//! The noise of the acceleration is in the residual of the null model as well as in the columns that a family derives
+//! from the load. Where a column differentiates the load, the two would be correlated for no physical reason. If the
+//! motion repeats, the slow harmonics of the load are known well and used as they are ([`Harmonics`]). Each fast
+//! harmonic is small and drowns in noise, yet these harmonics make gears swing. They are not accidental: a drive that
+//! does not answer dry friction at once jolts its joint, in the same way at every reversal. This common course is known
+//! ([`jolts`]), and the torque shows it better than the motion.
 
 use fourier::Complex64;
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -16,65 +17,69 @@ use crate::dynamics::{
 use crate::robot::{Arm, JointSignals};
 use crate::signal::{FineClock, mean_period};
 
-/// Torques of a rigid arm along the motion of a log, as far as it tells them.
+/// Torques of a rigid arm along the motion of a log, as far as the log determines them.
 pub struct Loads {
-    /// What moves the links, of what is known a hundred times better than its noise.
+    /// Torque that moves the links, in the harmonics whose power is more than a hundred times their noise.
     pub link: LinkTorque,
-    /// The same of what is known ten times better: a gear that gives way swings by what its motor does, up to
-    /// frequencies at which little is left of that, and knows no difference between a motor that is moved and one that
-    /// swings back.
+    /// The same, in the harmonics whose power is more than ten times their noise. A gear that gives way is excited by
+    /// its motor up to frequencies at which little of the motor's motion is left, and it makes no difference to the
+    /// gear whether the motor is driven or swings back.
     pub bending: LinkTorque,
-    /// What the drives deliver for it and for dry friction, where periods tell it.
+    /// Torque that the drives deliver for the load and for dry friction, if the motion repeats.
     pub delivered: Option<Delivered>,
-    /// Torque on the gears, what moves links and rotors, Nm; of what is known a hundred times better than its noise.
+    /// Torque on the gears, which moves links and rotors, in the harmonics whose power is more than a hundred times
+    /// their noise, Nm.
     pub load_nm: JointSignals,
-    /// What a torque that presses the links and the rotor of a joint apart accelerates them by, 1/(kg m²), the other
-    /// joints being free to move: I_a⁻¹ + [(M + I_a')⁻¹]_jj, I_a' without the joint's own rotor.
+    /// Relative acceleration of links and rotor of a joint per torque that presses them apart, 1/(kg m²), while the
+    /// other joints are free to move: I_a⁻¹ + [(M + I_a')⁻¹]_jj, where I_a' lacks the rotor of the joint itself.
     pub mobility_per_kg_m2: JointSignals,
 }
 
-/// What the drives deliver, in two ranges of harmonics: for a load that is known, and beyond.
+/// Torque that the drives deliver, in two sets of harmonics: those in which the load is known, and the others.
 pub struct Delivered {
-    /// Load, links and rotors, in the harmonics in which it is known ten times better than its noise, Nm.
+    /// Load (links and rotors) in the harmonics whose power is more than ten times their noise, Nm.
     pub load_nm: JointSignals,
-    /// Which these are, by joint.
+    /// Whether a harmonic is one of these, by joint and harmonic.
     pub known: Vec<Vec<bool>>,
-    /// What the drives deliver in the others, as reversals tell it, at every tick, Nm: load and dry friction together, of
-    /// which a drive may feed any share forward.
+    /// Torque of the drives in the other harmonics, as reversals show it, at every tick, Nm. It is load and dry
+    /// friction together, of which a drive may feed any share forward.
     pub beyond_nm: Vec<Vec<f64>>,
-    /// Where these are from, by joint.
+    /// The fitted answers to reversals from which `beyond_nm` is computed, by joint.
     pub answers: Vec<ReversalAnswer>,
 }
 
 /// Torque that moves the links of every joint, in two parts.
 pub struct LinkTorque {
-    /// What the motion tells, Nm.
+    /// The part that the motion determines, Nm.
     pub told_nm: JointSignals,
-    /// The links' share of what the drives give too fast for that, as the joints' reversals tell it, Nm.
+    /// The links' share of the drives' torque in harmonics too fast for the motion to determine, as shown by the
+    /// reversals of the joints, Nm.
     pub jolt_nm: JointSignals,
 }
 
-/// A motion that repeats, its periods one after the other.
+/// A motion that repeats, with its periods one after another.
 pub struct Periods<'a> {
     /// Angles, velocities and accelerations of every period.
     pub each: &'a Motion,
     /// Recorded torque, Nm.
     pub torque_nm: &'a JointSignals,
-    /// Between the samples of one.
+    /// The clock between the samples of one period.
     pub clock: &'a FineClock,
     /// Samples per second.
     pub rate_hz: f64,
-    /// Up to which harmonic the accelerations are known.
+    /// The highest harmonic up to which the accelerations are known.
     pub highest: usize,
 }
 
 impl Loads {
-    /// Of a motion as it was recorded at `rate_hz`, along which the links take `link_nm`; `mass_kg_m2` as from [`mass_along`],
-    /// `rotor_kg_m2` as from [`rotors_kg_m2`]. The velocities' noise has a power density of `velocity_noise`, (rad/s)²/Hz.
+    /// Loads along a single run as it was recorded at `rate_hz`, where the links need `link_nm`. `mass_kg_m2` comes
+    /// from [`mass_along`], `rotor_kg_m2` from [`rotors_kg_m2`]. The noise of the velocities has the power density
+    /// `velocity_noise`, (rad/s)²/Hz.
     ///
-    /// Nothing repeats by which harmonics could be compared. What bends gears is taken as far as its power is ten times that
-    /// which the velocity's noise, differentiated, has by way of the links' inertia. (A hundred times leaves out what gears of 20 000 Nm/rad
-    /// need, and what was left of them had no name.)
+    /// Without repetitions harmonics cannot be compared between periods: `link` and `load_nm` are used whole. The
+    /// torque that bends gears is used where its power is ten times that of the velocity's noise, differentiated and
+    /// multiplied by the inertia of the links. (A factor of a hundred leaves out what gears of 20 000 Nm/rad need, and
+    /// the remainder of their effect had no name.)
     pub fn as_recorded(
         arm: &Arm,
         motion: &Motion,
@@ -97,9 +102,9 @@ impl Loads {
         Self { link, bending, delivered: None, load_nm, mobility_per_kg_m2 }
     }
 
-    /// Of the mean of `periods`, as far as they agree. `link` is along the motion of the regressor, whose accelerations end
-    /// where noise begins to cost more than they tell; gears swing by those of the periods themselves, with all their
-    /// harmonics.
+    /// Loads along the mean of `periods`, as far as the periods agree. `link_nm` belongs to the motion of the
+    /// regressor, whose accelerations end at the harmonic from which on their noise costs more than they tell. The
+    /// torques that make gears swing use the accelerations of the periods themselves, with all their harmonics.
     pub fn agreed(
         (model, arm): (&Model, &Arm),
         mean: &Motion,
@@ -126,7 +131,7 @@ impl Loads {
             .collect();
         let coulomb_nm = |j: usize| arm.joints[j].drive.coulomb_nm;
         let dry = |j: usize| fine_sign[j].iter().map(move |s| coulomb_nm(j) * s);
-        // In the harmonics in which the load is not known to `level`.
+        // Fitted to the harmonics in which the load is not known to `level`.
         let answers = |level: f64| -> Vec<ReversalAnswer> {
             let of_joint = |j: usize| {
                 let torque = of_torques[j].beyond(&of_loads[j], level, fastest(periods));
@@ -172,10 +177,10 @@ impl Loads {
     }
 }
 
-/// Where links or rotor are lighter than this share of both, they have no say in how the other swings.
+/// The lighter of links and rotor counts as at least this share of both.
 const LEAST_SHARE: f64 = 1e-6;
 
-/// Of torques on the gears what the links take, M (M + I_a)⁻¹ τ, and [`Loads::mobility_per_kg_m2`].
+/// The links' share M (M + I_a)⁻¹ τ of each of the torques τ on the gears, and [`Loads::mobility_per_kg_m2`].
 fn apart<const N: usize>(
     mass_kg_m2: &[JointSignals],
     rotor_kg_m2: &[f64],
@@ -190,7 +195,7 @@ fn apart<const N: usize>(
         let total = DMatrix::from_fn(joints, joints, |i, j| {
             mass_kg_m2[j].joint(i)[k] + if i == j { rotor(j) } else { 0.0 }
         });
-        // An estimate may come to a mass matrix that no arm has.
+        // The estimated mass matrix may be one that no arm has, that is not positive definite.
         let inverse = Cholesky::new(total).map(|total| total.inverse());
         for (links_nm, torque_nm) in links_nm.iter_mut().zip(torques_nm) {
             let Some(inverse) = &inverse else { continue };
@@ -201,7 +206,7 @@ fn apart<const N: usize>(
         }
         for j in 0..joints {
             let own = inverse.as_ref().map_or(0.0, |inverse| inverse[(j, j)]);
-            // Sherman and Morrison 1950; the share of the inertia that is not the rotor's lies within 0 and 1 in an arm.
+            // Sherman and Morrison 1950. The links' share of the inertia lies between 0 and 1 in any real arm.
             let of_links = (1.0 - rotor(j) * own).clamp(LEAST_SHARE, 1.0 - LEAST_SHARE);
             mobility.joint_mut(j)[k] = 1.0 / (rotor(j) * of_links);
         }
@@ -209,24 +214,24 @@ fn apart<const N: usize>(
     (links_nm, mobility)
 }
 
-/// Power over noise of a band of harmonics that is taken as it is.
+/// A band of harmonics whose power is more than this many times its noise is used as it is.
 const WELL_KNOWN: f64 = 100.0;
 /// The same for [`Loads::bending`].
 const KNOWN: f64 = 10.0;
-/// Harmonics that are judged together.
+/// Number of harmonics that are judged together.
 const BAND: usize = 8;
 
-/// What of `y` is known ten times better than white noise of the power density `noise` (per Hz) that was differentiated, band by
-/// band.
+/// The part of `y` whose power is more than ten times that of differentiated white noise, selected band by band.
+/// `noise` is the power density of the white noise, per Hz.
 ///
-/// `y` is gone through there and back again, which leaves no jump between its ends.
+/// `y` is followed by its own mirror image, which avoids a jump between its ends.
 fn beside_differentiated_noise(y: &[f64], noise: f64, rate_hz: f64) -> Vec<f64> {
     let there_and_back: Vec<f64> = y.iter().chain(y.iter().rev()).copied().collect();
     let n = there_and_back.len();
     let clock = FineClock::new(n, 1);
     let spectrum = clock.spectrum(&there_and_back);
     let omega = std::f64::consts::TAU * rate_hz / n as f64;
-    // Of noise that goes there and back as well, mean squares of the coefficients are σ²/n each, σ² = density · f_s/2.
+    // The noise is mirrored as well: each coefficient has the mean square σ²/n, with σ² = density · f_s/2.
     let of_noise = |h: usize| (h as f64 * omega).powi(2) * noise * 0.5 * rate_hz / n as f64;
     let holds: Vec<bool> = spectrum
         .chunks(BAND)
@@ -243,18 +248,18 @@ fn beside_differentiated_noise(y: &[f64], noise: f64, rate_hz: f64) -> Vec<f64> 
     known
 }
 
-/// How well the harmonics of a torque are known.
+/// The harmonics of a torque and how well they are known.
 struct Harmonics {
-    /// Power over noise, by band.
+    /// Ratio of power, without its noise, to noise, by band.
     known: Vec<f64>,
     /// Coefficients of the mean period.
     mean: Vec<Complex64>,
-    /// Mean square of their noise.
+    /// Mean square of the noise in each coefficient.
     noise: Vec<f64>,
 }
 
 impl Harmonics {
-    /// Of `periods`, one after the other.
+    /// The harmonics of `periods`, which follow one after another.
     fn of(clock: &FineClock, periods: &[f64]) -> Self {
         let spectra: Vec<Vec<Complex64>> =
             periods.chunks_exact(clock.samples()).map(|y| clock.spectrum(y)).collect();
@@ -278,12 +283,12 @@ impl Harmonics {
         Self { known, mean, noise }
     }
 
-    /// Whether the power of harmonic `h` is more than `level` times its noise.
+    /// Whether the power of harmonic `h`, judged with its band, is more than `level` times its noise.
     fn holds(&self, h: usize, level: f64) -> bool {
         self.known[h / BAND] > level
     }
 
-    /// Those up to `last` in which `load` is not known to `level`.
+    /// The harmonics up to `last` in which `load` is not known to `level`.
     fn beyond(&self, load: &Self, level: f64, last: usize) -> Vec<TorqueHarmonic> {
         let harmonic =
             |h: usize| TorqueHarmonic { number: h, mean: self.mean[h], noise: self.noise[h] };
@@ -291,27 +296,27 @@ impl Harmonics {
         (1..=last).map(harmonic).filter(is_beyond).collect()
     }
 
-    /// `y` with these harmonics only.
+    /// `y` with only the harmonics that are known to `level`.
     fn part(&self, clock: &FineClock, y: &[f64], level: f64) -> Vec<f64> {
         let gain = |h: usize| if self.holds(h, level) { Complex64::ONE } else { Complex64::ZERO };
         clock.filtered(y, gain)
     }
 
-    /// `y` without them, up to the harmonic `highest`.
+    /// `y` without the harmonics known to `level`, up to the harmonic `highest`.
     fn rest(&self, clock: &FineClock, y: &[f64], level: f64, highest: usize) -> Vec<f64> {
         let is_rest = |h: usize| h <= highest && !self.holds(h, level);
         clock.filtered(y, |h| if is_rest(h) { Complex64::ONE } else { Complex64::ZERO })
     }
 }
 
-/// The last harmonic in which drives are looked at.
+/// The last harmonic in which the drives' answers are fitted.
 fn fastest(periods: &Periods) -> usize {
     let Periods { clock, rate_hz, highest, .. } = *periods;
     highest.min((FASTEST_HZ * clock.samples() as f64 / rate_hz) as usize)
 }
 
-/// Of what a drive gives beside friction, Nm at every tick, the part in which the torque of its links is not known to `level`,
-/// at the samples.
+/// The part of a drive's torque beyond friction in the harmonics in which the torque of its links is not known to
+/// `level`, at the samples, Nm. `beside_friction_nm` is the torque at every tick.
 fn jolts(periods: &Periods, links: &Harmonics, level: f64, beside_friction_nm: &[f64]) -> Vec<f64> {
     let last = fastest(periods);
     let every_tick = FineClock::new(beside_friction_nm.len(), 1);
@@ -326,7 +331,7 @@ pub fn load_along(model: &Model, arm: &Arm, motion: &Motion) -> JointSignals {
     sum(&rigid_torque_along(model, motion), &rotors_along(arm, motion))
 }
 
-/// M_links q̈ + c + g of every sample, eight samples at a time with the widest registers of the machine.
+/// M_links q̈ + c + g at every sample, eight samples at a time with the widest registers of the machine.
 pub fn rigid_torque_along(model: &Model, motion: &Motion) -> JointSignals {
     let mut out = JointSignals::zeros(motion.joints(), motion.samples());
     with_widest_registers(
@@ -359,8 +364,8 @@ fn fill_rigid_torque(model: &Model, motion: &Motion, out: &mut JointSignals) {
     }
 }
 
-/// M of every sample, kg m², column by column: what one rad/s² more of a joint takes on all of them, beside the
-/// torques `recorded_nm`.
+/// M at every sample, kg m², column by column: the additional torque on all joints, over `recorded_nm`, when one joint
+/// accelerates by one rad/s² more.
 pub fn mass_along(model: &Model, motion: &Motion, recorded_nm: &JointSignals) -> Vec<JointSignals> {
     (0..motion.joints())
         .map(|j| {
@@ -373,11 +378,12 @@ pub fn mass_along(model: &Model, motion: &Motion, recorded_nm: &JointSignals) ->
         .collect()
 }
 
-/// The lightest rotor, over the mean of what its links resist with: a gear that gives way has two sides, and models
-/// without rotors count them to the links.
+/// Least inertia of a rotor, as a share of the mean inertia of its links. A gear that gives way has two sides, and
+/// models without rotors count the inertia of the rotors with that of the links.
 const LIGHTEST_ROTOR: f64 = 0.02;
 
-/// I_a of every joint, kg m², but no less than `LIGHTEST_ROTOR` allows; `mass_kg_m2` as from [`mass_along`].
+/// I_a of every joint, kg m², at least the share `LIGHTEST_ROTOR` of the mean inertia of the links; `mass_kg_m2` comes
+/// from [`mass_along`].
 pub fn rotors_kg_m2(arm: &Arm, mass_kg_m2: &[JointSignals]) -> Vec<f64> {
     let rotor = |(j, mass): (usize, &JointSignals)| {
         let own = mass.joint(j);
@@ -387,7 +393,7 @@ pub fn rotors_kg_m2(arm: &Arm, mass_kg_m2: &[JointSignals]) -> Vec<f64> {
     mass_kg_m2.iter().enumerate().map(rotor).collect()
 }
 
-/// I_a q̈ of every sample, Nm.
+/// I_a q̈ at every sample, Nm.
 fn rotors_along(arm: &Arm, motion: &Motion) -> JointSignals {
     motion.qdd_rad_s2.map_joints(|j, qdd| {
         let inertia = arm.joints[j].drive.rotor_inertia_kg_m2;
@@ -415,7 +421,7 @@ mod tests {
         (arm, model)
     }
 
-    /// A pose and one rad/s² of the elbow.
+    /// A pose in which the elbow alone accelerates, by one rad/s².
     fn one_sample() -> Motion {
         let of = |values: [f64; 6]| JointSignals::from_fn(6, 1, |j, _| values[j]);
         Motion {
@@ -425,7 +431,8 @@ mod tests {
         }
     }
 
-    /// Two rows of M q̈ + I_a q̈ = τ written out: what accelerates the arm is the links' share and the rotors'.
+    /// M q̈ + I_a q̈ = τ written out: of the torque that accelerates the arm, the links and the rotors take their
+    /// shares.
     #[test]
     fn links_and_rotors_share_a_torque() {
         let (arm, model) = ur5();
@@ -440,20 +447,20 @@ mod tests {
         let on_links = less_gravity(rigid_torque_along(&model, &motion));
         let ([links], mobility) = apart(&mass, &rotors_kg_m2(&arm, &mass), [&on_gears]);
         for j in 0..6 {
-            // Torques of some 10 Nm, through inertias whose largest and smallest are 1 : 100.
+            // Torques of some 10 Nm, through inertias whose ratio is up to 100 : 1.
             assert!((links.joint(j)[0] - on_links.joint(j)[0]).abs() < 1e-11);
             let rotor = |i: usize| arm.joints[i].drive.rotor_inertia_kg_m2;
             let free = DMatrix::from_fn(6, 6, |i, k| {
                 mass[k].joint(i)[0] + if i == k && i != j { rotor(i) } else { 0.0 }
             });
             let apart = 1.0 / rotor(j) + free.try_inverse().unwrap()[(j, j)];
-            // Light links: the last joint's share beside its own rotor is 5e-4, which costs as many digits.
+            // The links of the last joint are light: their share beside the rotor is 5e-4, which costs as many digits.
             assert!((mobility.joint(j)[0] / apart - 1.0).abs() < 1e-9, "{j}");
         }
     }
 
-    /// A slow swing beside differentiated white noise: what is left is the swing. The noise in its band, 0.1 Hz wide and a little
-    /// more by the jump of its slope at the ends, is a ten thousandth of it.
+    /// A slow swing plus differentiated white noise: the swing is what remains. Its band is 0.1 Hz wide, a little wider
+    /// because of the kink at the ends, and the noise in this band is a ten thousandth of the swing.
     #[test]
     fn what_is_known_beside_differentiated_noise() {
         const NOISE: f64 = 1e-3;
@@ -469,8 +476,8 @@ mod tests {
         let before = rms(&mut y.iter().zip(1..).map(|(y, k)| y - swing(k)));
         let after = rms(&mut known.iter().zip(1..).map(|(y, k)| y - swing(k)));
         assert!(after < 0.01 * 20.0 && after < 0.5 * before, "{before} {after}");
-        // Of noise alone next to nothing: the slowest harmonics, of which differentiating leaves less than the jump at the ends makes. And
-        // all where there is none.
+        // Next to nothing remains of noise alone: the slowest harmonics, where differentiated noise is weaker than the
+        // jump at the ends. Without noise everything remains.
         let alone: Vec<f64> = (1..3999).map(noise).collect();
         let left = beside_differentiated_noise(&alone, density, RATE_HZ);
         assert!(rms(&mut left.into_iter()) < 0.01 * rms(&mut alone.into_iter()));
@@ -478,8 +485,8 @@ mod tests {
         assert!(rms(&mut all.iter().zip(&y).map(|(a, b)| a - b)) < 1e-12);
     }
 
-    /// A drive that feeds 90 % of the friction forward, 3 ms late, jolts its joint as it should be known to within the
-    /// six coefficients' noise and what steps of 8 ms lack of a delay of 3 ms.
+    /// A drive that feeds 90 % of the friction forward, 3 ms late: the jolts of its joint are found as they should be,
+    /// up to the noise of six coefficients and the inability of steps of 8 ms to follow a delay of 3 ms.
     #[test]
     fn reversals_tell_the_jolts_of_a_drive() {
         let (fine, coulomb_nm, late) = (N * TICKS, 8.0, 6);
@@ -528,7 +535,8 @@ mod tests {
         let truth: Vec<f64> = band.into_iter().step_by(TICKS).collect();
         let square = |y: &[f64]| y.iter().map(|y| y * y).sum::<f64>();
         let off: Vec<f64> = truth.iter().zip(&known).map(|(t, k)| t - k).collect();
-        // Six coefficients of unit noise beside what they explain, and what the steps lack: 0.03 without noise.
+        // Six coefficients of unit noise, relative to what they explain, and the error of the steps, which is 0.03
+        // without noise.
         let share = square(&off) / square(&truth);
         assert!(share < 0.1, "{share}");
     }

@@ -1,21 +1,22 @@
-//! What the model gets wrong: candidates, tests, verdict, extended model, gain.
+//! Diagnosis: what the rigid model gets wrong along a log.
 //!
-//! Enters: a log, the arm and its base set. Leaves: a [`Diagnosis`]: causes with names, sizes and
-//! intervals, what cannot be told apart, what is left unexplained, what would not have been seen, and
-//! how much the extended model gains on data it was not fitted to.
+//! Input: a log, the arm and its base set. Output: a [`Diagnosis`], which names causes with their sizes and intervals
+//! and lists the alternatives that the data cannot tell from them, what is left unexplained, how small an effect would
+//! have been seen, and how much the extended model gains on data it was not fitted to.
 //!
-//! 1. The log is processed as for identification, and its equations are whitened ([`Whitening`]): with
-//!    periods by the scatter between them (less what drifting friction does there), without by the residual itself.
-//!    How the drives answer dry friction belongs to the null model (`drives`), what single ones differ by to the
-//!    noise, and friction is looked at between the samples of a log ([`Scene::as_logged`], [`Scene::turning_rad_s`]).
-//! 2. Every family's columns lose what the null model spans; the squared length of the residual along
-//!    them, T = ‖P r‖² ~ χ²_k(λ), is the score test of adding the family.
-//! 3. Nonlinear parameters are refined continuously, the best family is added if chance does not explain
-//!    it, all causes are refined together, exchanged and removed where another set is better, and again.
-//!    Where a law explains a joint best at an end of its range that is not its own (play without a flight,
-//!    Stribeck's curve over the whole range of speeds, or while the sign turns round), it stands in for something
-//!    unknown and is not named.
-//! 4. What is left is tested against noise; if it is none and no family fits, the answer says so.
+//! 1. The log is processed as for identification, and its equations are whitened ([`Whitening`]). Where the motion
+//!    repeats, the noise is known from the scatter between the periods, less the part of it that drifting friction
+//!    causes; along a single run the residual itself serves as the noise. How the drives answer dry friction belongs to
+//!    the null model (`drives`); the differences between single drives count as noise. Friction is evaluated between
+//!    the samples of a log ([`Scene::as_logged`], [`Scene::turning_rad_s`]).
+//! 2. The null model is projected out of the columns of every family. The squared length of the residual's projection
+//!    on them, T = ‖P r‖² ~ χ²_k(λ), is the score statistic for adding the family.
+//! 3. Nonlinear parameters are refined continuously. The best family is added if chance does not explain it. All causes
+//!    are then refined together, and exchanged or removed where another set is better; the search repeats until nothing
+//!    is added. A law may explain a joint best at an end of its range where it is no longer that law: play without a
+//!    flight, or a Stribeck curve that spans the whole range of speeds or only the speeds at which the sign turns
+//!    round. There it stands in for something unknown and is not named.
+//! 4. The remaining residual is tested against noise. If it is not noise and no family fits it, the diagnosis says so.
 
 pub mod candidates;
 
