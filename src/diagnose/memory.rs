@@ -1,6 +1,7 @@
-//! Entries that a study has worked out, by their family, site and shape.
+//! A cache of the entries that a study has computed, keyed by family, site and shape.
 //!
-//! A search for the best shape begins where the one before it began, and the shapes it looks at first are the same.
+//! It pays because a search for the best shape starts where the search before it started, so that both evaluate the
+//! same shapes first.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -8,13 +9,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::candidates::Shape;
 use super::study::Entry;
 
-/// Bytes of columns that are kept at most: what comes later is worked out each time.
+/// Upper limit of the bytes of columns that are kept. An entry beyond it is computed anew each time.
 const MOST_BYTES: usize = 64 << 20;
 
-/// A family, a site and a shape.
+/// Family, site, variant of the shape, and the bits of the shape's value.
 type Key = (usize, Option<usize>, usize, u64);
 
-/// Entries, and `None` for those that the null model absorbs.
+/// The cache itself. It holds `None` for shapes whose columns the null model absorbs.
 #[derive(Default)]
 pub struct Memory {
     known: Mutex<Known>,
@@ -27,14 +28,14 @@ struct Known {
 }
 
 impl Memory {
-    /// The entry of `family` at `site` with `shape`, by `make` if it is not known.
+    /// The entry of `family` at `site` with `shape`, computed by `make` if it is not in the cache.
     pub fn entry(
         &self,
         (family, site, shape): (usize, Option<usize>, Shape),
         make: impl FnOnce() -> Option<Entry>,
     ) -> Option<Entry> {
         let key = (family, site, shape.variant, shape.value.to_bits());
-        // Entries are put in whole: a panic elsewhere leaves none half made.
+        // An entry is inserted whole or not at all, so a lock poisoned by a panic elsewhere still guards valid entries.
         let lock = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
         let known = lock().entries.get(&key).cloned();
         if let Some(entry) = known {

@@ -1,4 +1,4 @@
-//! What is left behind the last cause: is it noise, and if not, on what does it depend?
+//! Tests of the residual that is left after the last cause: is it noise, and if not, on what does it depend?
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -10,43 +10,50 @@ use super::statistic::Statistic;
 use super::study::{LEAST_GAIN, Study};
 use super::verdict::Unexplained;
 
-/// Edges of the bands in which the residual is compared with noise, Hz; the last one ends with the rows.
-/// Errors of friction and load live in the slow ones, of gears and clocks in the fast ones.
+/// Lower edges, in Hz, of the bands in which the residual is compared with noise; the last band reaches to the highest
+/// harmonic that has rows. Errors of friction and load show in the slow bands, those of gears and clocks in the fast
+/// ones.
 const BANDS_HZ: [f64; 5] = [0.0, 2.0, 5.0, 10.0, 20.0];
-/// A part of the curve that keeps less than this share of its length belongs to the model.
+/// A hat that keeps less than this share of its length outside the model, the causes and the hats before it is not
+/// fitted.
 const ABSORBED: f64 = 0.1;
-/// A part of the curve that keeps less than this share has no height of its own that could be drawn.
+/// A component of the curve of which the model and the causes leave less than this share is not drawn: its height is
+/// not determined.
 const VISIBLE: f64 = 0.3;
-/// Knots of the curve along an axis.
+/// Number of knots of the curve along an axis.
 const KNOTS: usize = 10;
-/// Share of the error that is left along a single run which the approximate forms of laws on a joint may leave along one curve: of
-/// a UR10e whose friction has six kinds of laws up to 0.22.
+/// Along a single run, a curve on a joint that has a named law must remove more than this share of the joint's
+/// remaining mean square. Laws are approximate in form and may leave that much along one curve: on a UR10e whose
+/// friction has six kinds of laws, up to 0.22.
 const LEFT_BY_LAWS: f64 = 0.25;
-/// Quantities of a joint along which curves are drawn; the last is time.
+/// Number of quantities of a joint along which a curve is fitted; the last one is time.
 const AXES: usize = 6;
-/// Share of the samples beyond the outermost knots. A drive that feeds friction forward jumps at a reversal, and the
-/// torque changes there so fast that these few samples would have a knot for themselves: what is left of them is
-/// when they were taken.
+/// Share of the samples that lie beyond each of the outermost knots. Where a drive that feeds friction forward jumps at
+/// a reversal, the torque changes so fast that a few samples would have a knot for themselves, and their residual would
+/// only reflect the instants at which they were taken.
 const OUTERMOST: f64 = 0.01;
-/// Of fewer periods, drifting friction takes more than a third of what slow harmonics say of noise.
+/// Least number of periods for the curve of friction over the whole log. With fewer, drifting friction takes more than
+/// a third of the information that the slow harmonics give about the noise.
 const FEWEST_PERIODS: usize = 4;
-/// The first knot of the way behind a reversal, rad: bristles and teeth give way by more.
+/// First knot of the distance travelled since a reversal, rad. Bristles and gear teeth give way over longer distances
+/// than this.
 const SHORTEST_WAY_RAD: f64 = 1e-4;
 
-/// How well noise explains what is left.
+/// How well noise alone explains the residual that is left.
 #[derive(Debug, Clone, Copy)]
 pub struct LackOfFit {
-    /// Probability that noise alone leaves as much in any band of any joint.
+    /// Probability that noise alone leaves a residual as large in any band of any joint.
     pub probability: f64,
-    /// The joint (0-based) of which that is least likely.
+    /// The joint (0-based) that noise explains least well.
     pub joint: usize,
 }
 
-/// Whether noise alone leaves as much on the joints that are looked at; `None` for a single run.
+/// Tests whether noise alone explains the residual on the joints that are looked at; `None` for a single run.
 ///
-/// Per joint and band, Σ r² over its degrees of freedom is F(k, ν): k the rows less their share in what the
-/// null model and `accepted` have fitted (Σ of the leverages), ν what the periods know of the noise there.
-/// The smallest probability is multiplied by their number (Bonferroni).
+/// Per joint and band, Σ r² divided by its degrees of freedom k is distributed as F(k, ν). Here k is the number of rows
+/// less their share in the directions that the null model and `accepted` have fitted (the sum of the leverages), and ν
+/// the degrees of freedom with which the periods tell the noise power in the band. The smallest probability is
+/// multiplied by the number of tests (Bonferroni).
 pub fn lack_of_fit(study: &Study, accepted: &Span, residual: &Image) -> Option<LackOfFit> {
     let Statistic::Periods(knowledge) = &study.statistic else { return None };
     let harmonic = |hz: f64| (hz * study.scene.samples() as f64 / study.scene.rate_hz) as usize;
@@ -77,16 +84,18 @@ pub fn lack_of_fit(study: &Study, accepted: &Span, residual: &Image) -> Option<L
     (tests > 0.0).then(|| LackOfFit { probability: (tests * least).min(1.0), joint: worst })
 }
 
-/// Those of `first` below the harmonic at which the rows end, and that.
+/// The edges in `first` that lie below `end`, the harmonic behind the last one with rows, followed by `end`.
 fn band_edges(first: [usize; BANDS_HZ.len()], end: usize) -> Vec<usize> {
     first.into_iter().take_while(|edge| *edge < end).chain([end]).collect()
 }
 
-/// The axis along which the residual is largest: a curve of 10 knots in each quantity of each joint.
+/// Finds the axis along which the residual is largest, by a curve of 10 knots in each quantity of each joint.
 ///
-/// `Some` if that curve cannot be noise; or if the lack of fit cannot, and then of the joint of which it is. Along a single run the
-/// curve has to show in stretches of time that were left out of its fit as well, and be more than laws leave on a joint that
-/// `has_law`. Whether friction changes as the log goes on is asked of the joints whose periods `can_differ` by nothing else that is known.
+/// Returns the curve with the most evidence among those that noise cannot explain. If there is none but noise cannot
+/// explain the lack of fit either, it returns the best curve of the joint with that lack. Along a single run a curve
+/// must also reduce the error in stretches of time that were left out of its fit, and on a joint that `has_law` by more
+/// than approximate laws leave. A curve of friction over the whole log is tried only on joints whose periods
+/// `can_differ` for no reason that is known already.
 pub fn unexplained(
     study: &Study,
     accepted: &Span,
@@ -109,7 +118,7 @@ pub fn unexplained(
             (("rate of the torque", "Nm/s"), &torque_rate),
             (("time within the period", "s"), &time),
         ];
-        // What happens once in a single run depends on nothing.
+        // A single run has no axis of time: dependence on time cannot be told from events that happen once.
         let count = if scene.periodic { AXES } else { AXES - 1 };
         let curves = axes.into_iter().take(count).map(|(axis, values)| (axis, hats(values)));
         let course = if can_differ(j) { since_the_start(scene, j) } else { None };
@@ -154,12 +163,12 @@ pub fn unexplained(
         }
     }
     found.sort_by(|a, b| a.evidence.total_cmp(&b.evidence));
-    // Curves of fewer knots may be worth more and still be noise.
+    // The curve with the most evidence may still be noise, because curves with fewer knots pay a lower price.
     if let Some(clear) = found.iter().rposition(|c| c.probability * tests < chance::UNEXPLAINED) {
         return Some(found.swap_remove(clear).unexplained);
     }
     let lack = lack_of_fit.filter(|lack| lack.probability < chance::UNEXPLAINED)?;
-    // The lack is one of the mean period.
+    // The lack of fit is one of the mean period, to which only curves that repeat can belong.
     let of_joint = |curve: &Curve| curve.repeats && curve.unexplained.joint == lack.joint + 1;
     found.into_iter().rfind(of_joint).map(|curve| curve.unexplained)
 }
@@ -168,25 +177,27 @@ pub fn unexplained(
 struct Curve {
     /// Twice the gain in log-likelihood less its price.
     evidence: f64,
-    /// Of as much by chance.
+    /// Probability that noise alone explains as much, this curve taken by itself.
     probability: f64,
-    /// Whether every period has it.
+    /// Whether the curve is the same in every period.
     repeats: bool,
     unexplained: Unexplained,
 }
 
-/// Heights of the knots that `residual` shows, without their mean, which belongs to the model: the least-squares curve
-/// without the parts of which the model and the causes leave less than [`VISIBLE`]. With the hats' images X, and `outside`
-/// of the model X⊥, X⊥ᵀX⊥ v = s² XᵀX v: the share that is left of the part v is s.
+/// Least-squares heights of the knots that `residual` shows, without the components of the curve of which the model and
+/// the causes leave less than [`VISIBLE`], and with mean zero because a constant belongs to the model.
+///
+/// With X the images of the hats and X⊥ (`outside`) their parts outside the model, the components v are the solutions
+/// of X⊥ᵀX⊥ v = s² XᵀX v, where s is the share of component v that is left.
 fn visible(raw: &[Image], outside: &[Image], residual: &Image) -> Vec<f64> {
     let n = raw.len();
     let gram = |of: &[Image]| DMatrix::from_fn(n, n, |i, k| of[i].dot(&of[k]));
     let mut heights = DVector::zeros(n);
     let own = gram(raw);
-    // Knots may coincide.
+    // Knots may coincide, which makes XᵀX singular.
     let ridge = 1e-9 * own.trace() / n as f64;
     if let Some(factor) = (own + DMatrix::identity(n, n) * ridge).cholesky() {
-        // L⁻¹ X⊥ᵀX⊥ L⁻ᵀ has the eigenvalues s²; its vectors are Lᵀ v.
+        // With XᵀX = L Lᵀ, the matrix L⁻¹ X⊥ᵀX⊥ L⁻ᵀ has the eigenvalues s² and the eigenvectors Lᵀ v.
         let lower = factor.l();
         let half = lower.solve_lower_triangular(&gram(outside)).unwrap_or_default();
         let both = lower.solve_lower_triangular(&half.transpose()).unwrap_or_default();
@@ -204,13 +215,14 @@ fn visible(raw: &[Image], outside: &[Image], residual: &Image) -> Vec<f64> {
     heights.data.into()
 }
 
-/// What friction does behind a reversal, whatever its law: hats over the logarithm of the way since then, each
-/// times the direction of motion; `None` if the joint never turns.
+/// Axis of what friction does after a reversal, whatever its law: hats over the logarithm of the distance travelled
+/// since then, each times the direction of motion. `None` if the joint never reverses.
 fn behind_reversals(scene: &Scene, j: usize) -> Option<(Axis, Curves)> {
     let (q, qd) = (scene.motion.q_rad.joint(j), scene.motion.qd_rad_s.joint(j));
     let n = q.len();
     let turns = |k: usize| qd[(k + n - 1) % n] * qd[k] < 0.0;
-    // The end of a single run is not followed by its beginning, where a joint counts as a radian from its reversal.
+    // A period is followed by the next one, a single run by nothing: there the first sample has none before it, and up
+    // to the first reversal the distance is left at its initial value, whose logarithm 0 stands for 1 rad.
     let start = if scene.periodic { 0 } else { 1 };
     let first = (start..n).find(|&k| turns(k))?;
     let end = if scene.periodic { first + n } else { n };
@@ -218,7 +230,8 @@ fn behind_reversals(scene: &Scene, j: usize) -> Option<(Axis, Curves)> {
     let mut turn_rad = q[first];
     for k in (first..end).map(|k| k % n) {
         if turns(k) {
-            // Between two samples, where a straight velocity passes through zero.
+            // The angle of the reversal itself, where the velocity, taken as linear between the two samples, passes
+            // through zero.
             let before = (k + n - 1) % n;
             turn_rad = q[k] - 0.5 * qd[k] * qd[k] / ((qd[k] - qd[before]) * scene.rate_hz);
         }
@@ -232,10 +245,13 @@ fn behind_reversals(scene: &Scene, j: usize) -> Option<(Axis, Curves)> {
     Some((("way since the reversal", "rad"), (knots.into_iter().map(f64::exp).collect(), hats)))
 }
 
-/// Friction that changes as the log goes on: hats over time, each times the direction of motion, a knot to a period or as many as
-/// other curves have; `None` if the joint never turns, or few periods leave little of the noise that is not drift. It is told by
-/// what periods have beside their mean, from which the whitening takes drifts that fade or go on evenly before it
-/// asks how strong the noise is: others hide a little of themselves.
+/// Axis of friction that changes over the log: hats over time, each times the direction of motion, with one knot per
+/// period but no more knots than other curves have. `None` if the joint never reverses, or if there are so few periods
+/// that little of the noise in their differences is not drift.
+///
+/// Only differences between the periods show such a change. From these the whitening removes drifts that fade or grow
+/// linearly before it estimates the noise; a drift of any other course hides a little of itself by raising that
+/// estimate.
 fn since_the_start(scene: &Scene, j: usize) -> Option<(Axis, Curves)> {
     let sign = scene.sign.joint(j);
     let (n, knots) = (sign.len(), scene.periods.min(KNOTS));
@@ -245,14 +261,14 @@ fn since_the_start(scene: &Scene, j: usize) -> Option<(Axis, Curves)> {
     }
     let samples = n * scene.periods;
     let time = (0..samples).map(|k| scene.lead_in_s + k as f64 / scene.rate_hz).collect::<Vec<_>>();
-    // In the middle of equal parts.
+    // Each knot lies in the middle of one of equally long parts of the log.
     let part_s = samples as f64 / scene.rate_hz / knots as f64;
     let at = (0..knots).map(|k| scene.lead_in_s + (k as f64 + 0.5) * part_s).collect();
     let (knots, hats) = hats_at(at, &time);
     Some((("time since the start", "s"), (knots, times(hats, sign))))
 }
 
-/// Hats times the `direction` of motion, which is the same in every period.
+/// The hats times the `direction` of motion, which is the same in every period.
 fn times(mut hats: Vec<Vec<f64>>, direction: &[f64]) -> Vec<Vec<f64>> {
     for hat in &mut hats {
         hat.iter_mut().zip(direction.iter().cycle()).for_each(|(h, sign)| *h *= sign);
@@ -262,10 +278,10 @@ fn times(mut hats: Vec<Vec<f64>>, direction: &[f64]) -> Vec<Vec<f64>> {
 
 /// Name and unit of a quantity.
 type Axis = (&'static str, &'static str);
-/// Knots, and what rises to 1 at each.
+/// Knots, and for each the samples of the hat function that is 1 there.
 type Curves = (Vec<f64>, Vec<Vec<f64>>);
 
-/// Knots at equal shares of the samples, and the piecewise linear hat of each.
+/// Knots at equally spaced quantiles of `values`, and the piecewise linear hat of each.
 fn hats(values: &[f64]) -> Curves {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -274,7 +290,7 @@ fn hats(values: &[f64]) -> Curves {
     hats_at((0..KNOTS).map(|k| sorted[(share(k) * last) as usize]).collect(), values)
 }
 
-/// The piecewise linear hat of each of `knots`.
+/// The `knots`, and the piecewise linear hat of each, evaluated at `values`.
 fn hats_at(knots: Vec<f64>, values: &[f64]) -> Curves {
     let mut hats = vec![vec![0.0; values.len()]; knots.len()];
     for (k, &x) in values.iter().enumerate() {
@@ -291,7 +307,7 @@ fn hats_at(knots: Vec<f64>, values: &[f64]) -> Curves {
 mod tests {
     use super::*;
 
-    /// Of periods of 10 s: where rows end beyond 20 Hz, within the bands, and at an edge.
+    /// In periods of 10 s the rows end beyond 20 Hz, within a band, and at an edge.
     #[test]
     fn bands_reach_to_the_last_row() {
         let first = [0, 20, 50, 100, 200];
@@ -300,7 +316,7 @@ mod tests {
         assert_eq!(band_edges(first, 100), [0, 20, 50, 100]);
     }
 
-    /// A model that follows a straight line but for 2 % of it: least squares would give what is left of the line fifty
+    /// The model absorbs a straight line except for 2 % of it. Least squares would give the remainder of the line fifty
     /// times its height.
     #[test]
     fn what_the_model_absorbs_is_not_drawn() {
@@ -314,11 +330,11 @@ mod tests {
         model.push(&image(x.iter().map(|x| x + 0.02 * (60.0 * x).sin()).collect()));
         let mut outside = raw.clone();
         model.residualise_all(&mut outside);
-        // A bump of height one, and 25 times what is left of the line.
+        // A bump of height one, plus 25 times the remainder of the line.
         let bump = |x: f64| (1.0 - (x - 0.4).abs() / 0.1).max(0.0);
         let mut residual = image(x.iter().map(|x| bump(*x) - 0.5 * (60.0 * x).sin()).collect());
         model.residualise(&mut residual);
-        // The last knot's hat is one less the others.
+        // The hats add up to one, which the model holds, so the last of them is linearly dependent.
         let mut span = Span::default();
         let pushed = outside.iter().filter(|image| span.push(image)).count();
         let least_squares = span.solve(&residual);

@@ -1,37 +1,38 @@
-//! How sure a name may be beside the others.
+//! Upper limits on the confidence in a cause, given the other causes and what is left unexplained.
 
 use std::collections::BTreeSet;
 
 use super::kind::Kind;
 use super::verdict::Cause;
 
-/// No physical cause is surer than this in a log that shows something unexplained as well, in a record that had to be mended, or as
-/// one of several that may share one origin.
+/// Limit for a physical cause in a log that shows something unexplained as well, in a record that had to be mended, or
+/// among several causes that may share one origin.
 const PROVISIONAL: f64 = 0.9;
-/// Nor surer than this where what is unexplained sits on its own joint, or where it is one of the arm as a whole: it may be a part of
-/// what the dictionary lacks.
+/// Limit for a cause on the joint with the unexplained effect, for a cause of the arm as a whole, and for one that may
+/// be part of an effect on the whole arm: it may be a part of what the dictionary lacks.
 const BESIDE_UNKNOWN: f64 = 0.5;
-/// A cause that removes less than this share of what can be explained where it acts leaves nine times as much there.
+/// A cause that removes less than this share of the explainable mean square leaves more than nine times as much of it.
 const NEXT_TO_NOTHING: f64 = 0.1;
-/// Nor surer than this where it does, beside something unexplained: of eleven such names in three logs of another simulator none was
-/// right, of which fewer than one in four are by Clopper and Pearson (1934) with 95 %.
+/// Limit for a cause with so small a gain beside something unexplained. Of eleven such names in three logs of another
+/// simulator none was right; by Clopper and Pearson (1934), fewer than one in four are, with 95 % confidence.
 const BESIDE_MORE: f64 = 0.25;
-/// So many joints with something of their own are not many faults but one of the arm as a whole. Where one joint in ten has a fault,
-/// three of six have in 1.6 % of all arms, and four in 0.13 %: less often than good logs are given a fault by chance.
+/// From this many joints with causes of their own on, the causes count not as many faults but as one effect on the arm
+/// as a whole. If one joint in ten has a fault, three or more of six joints have one in 1.6 % of all arms, and four or
+/// more in 0.13 %: more rarely than a good log is given a fault by chance.
 const MANY_JOINTS: usize = 4;
-/// A cause of less than this share of the strength of another one beside it may be what the other's law
-/// leaves.
+/// A cause with less than this share of the strength of another one beside it may be what the approximate law of the
+/// other leaves.
 const OVERSHADOWED: f64 = 0.5;
-/// So many causes on one joint may be the parts of one that is not in the dictionary.
+/// From this many causes on one joint on, they may be parts of a single one that is not in the dictionary.
 const SEVERAL: usize = 3;
 
-/// Takes back what steady causes beside each other cannot be sure of.
+/// Limits the confidence in causes that stand beside each other.
 ///
-/// Each confidence weighs a cause against its rivals with the other causes taken for granted. It is no more
-/// than [`PROVISIONAL`] where those may be wrong as well: for all of three or more that share a joint, for one
-/// beside another twice as strong, for two of the arm as a whole (a payload moves what a tilted base or a
-/// longer link moves), and wherever a clock was mended or a torque is rounded. A contact is not sure on a joint with
-/// wild readings, or where rows are missing; beside a clock that was mended none is named.
+/// Each confidence weighs a cause against its rivals and takes the other causes for granted. Where these may be wrong
+/// as well, it is limited to [`PROVISIONAL`]: for all of three or more causes that share a joint, for a cause beside
+/// another one more than twice as strong, for two causes of the arm as a whole (a payload moves the same parameters as
+/// a tilted base or a longer link), and wherever a clock was mended or a torque is rounded. A contact is limited on a
+/// joint with wild readings, and where rows are missing. (Beside a mended clock no contact is named at all.)
 pub(super) fn make_modest(causes: &mut [Cause]) {
     let is_spoilt = |kind: Kind| matches!(kind, Kind::ClockFault | Kind::Quantisation);
     let beside_a_spoilt_record = causes.iter().any(|c| is_spoilt(c.kind));
@@ -71,8 +72,9 @@ pub(super) fn make_modest(causes: &mut [Cause]) {
     }
 }
 
-/// Takes back what cannot be known while something is left unexplained on `joint` (from 1). How little a cause gains, and on how many
-/// joints causes are, says something where `noise_is_known`; along single runs of real arms friction has laws on all joints.
+/// Limits the confidence in causes while something is left unexplained on `joint` (1-based). A cause's small gain and
+/// the number of joints with causes are evidence only where `noise_is_known`: along single runs of real arms, friction
+/// has laws on all joints.
 pub(super) fn make_modest_beside_unknown(causes: &mut [Cause], joint: usize, noise_is_known: bool) {
     let all: &[Cause] = causes;
     let has_parts = noise_is_known && !scattered_joints(all).is_empty();
@@ -87,15 +89,16 @@ pub(super) fn make_modest_beside_unknown(causes: &mut [Cause], joint: usize, noi
     }
 }
 
-/// The joints (from 1) with laws that are likely parts of one effect on the arm as a whole if something is left unexplained beside
-/// them; none where they are few.
+/// The joints (1-based) whose laws are likely parts of one effect on the arm as a whole if something is left
+/// unexplained beside them; empty if these are fewer than [`MANY_JOINTS`].
 pub(super) fn scattered_joints(causes: &[Cause]) -> BTreeSet<usize> {
     let scattered = causes.iter().filter(|cause| is_of_few_joints(causes, cause));
     let joints: BTreeSet<usize> = scattered.filter_map(|cause| cause.joint).collect();
     if joints.len() < MANY_JOINTS { BTreeSet::new() } else { joints }
 }
 
-/// Whether `cause` is a law of its joint that no more than a few have. What many joints have alike, their drives lack.
+/// Whether `cause` is a law on a joint, of a kind that fewer than [`MANY_JOINTS`] joints have. A kind that many joints
+/// have alike is a property of their drives that the model lacks.
 fn is_of_few_joints(causes: &[Cause], cause: &Cause) -> bool {
     let alike = causes.iter().filter(|other| other.kind == cause.kind);
     let joints: BTreeSet<usize> = alike.filter_map(|other| other.joint).collect();
@@ -103,7 +106,7 @@ fn is_of_few_joints(causes: &[Cause], cause: &Cause) -> bool {
 }
 
 impl Cause {
-    /// Takes back what cannot be known while other things may be wrong as well.
+    /// Limits the confidence to what can be known while other things may be wrong as well.
     pub(super) fn make_provisional(&mut self) {
         self.is_no_surer_than(PROVISIONAL);
     }
@@ -120,7 +123,7 @@ mod tests {
     use super::super::data_faults;
     use super::*;
 
-    /// A cause of `joint` (from 1) with this gain.
+    /// A cause on `joint` (1-based) with this gain.
     fn cause(kind: Kind, joint: usize, gain: f64) -> Cause {
         let sure = data_faults::cause(kind, Some(joint - 1), "an effect", 20.0, &[]);
         Cause { gain_fraction: Some(gain), ..sure }
@@ -131,7 +134,8 @@ mod tests {
         causes.iter().map(|cause| cause.confidence).collect()
     }
 
-    /// A pendulum on the tool had eight names on five joints, most with a confidence of 0.9.
+    /// Four of the causes named for a pendulum on the tool: it got eight names on five joints, most with a confidence
+    /// of 0.9.
     fn of_a_pendulum() -> Vec<Cause> {
         vec![
             cause(Kind::AsymmetricFriction, 6, 0.26),
@@ -146,13 +150,14 @@ mod tests {
         let causes = of_a_pendulum();
         assert_eq!(scattered_joints(&causes), BTreeSet::from([2, 3, 5, 6]));
         assert_eq!(confidences(causes.clone(), 4, true), [0.5, 0.5, 0.5, 0.25]);
-        // A single run tells nothing of that, and three joints may have a fault each.
+        // A single run tells nothing about this, and three joints may each have a fault.
         assert_eq!(confidences(causes.clone(), 4, false), [0.9; 4]);
         assert!(scattered_joints(&causes[..3]).is_empty());
         assert_eq!(confidences(causes[..3].to_vec(), 5, true), [0.9, 0.5, 0.9]);
     }
 
-    /// Bristles of all joints and what the arm as a whole has, beside two faults of one joint each, and faults of the record.
+    /// Bristles on all joints and a time skew of the arm as a whole, beside two faults of one joint each and two faults
+    /// of the record.
     #[test]
     fn what_joints_have_alike_is_no_part_of_an_unknown_effect() {
         let mut causes: Vec<Cause> = (1..=6).map(|j| cause(Kind::Presliding, j, 0.9)).collect();
@@ -166,7 +171,7 @@ mod tests {
         assert_eq!(confidences(causes, 4, true), expected);
     }
 
-    /// Less than a tenth of what can be explained, where it acts.
+    /// The first cause removes less than a tenth of what can be explained.
     #[test]
     fn a_name_that_gains_nothing_beside_an_unexplained_rest_is_unsure() {
         let causes = vec![cause(Kind::Stribeck, 2, 0.0087), cause(Kind::Stribeck, 3, 0.12)];

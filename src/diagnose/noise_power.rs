@@ -1,14 +1,13 @@
 //! The power of the noise between periods by harmonic, and how well it is known.
 //!
-//! P periods tell the noise of one harmonic of one joint with P − 1 complex degrees of freedom. Harmonics
-//! beside each other share what they say, and so do joints whose noise is of one kind
-//! ([`noise_trends`](crate::signal::noise_trends)), but at the slow end, where a motion and the torques of gravity
-//! and springs live, there are few of them: a test that took the noise for known would find springs in
-//! every hundredth log. Two corrections follow:
+//! P periods tell the noise of one harmonic of one joint with P − 1 complex degrees of freedom. Neighbouring harmonics
+//! are pooled, and so are joints whose noise is of one kind ([`noise_trends`](crate::signal::noise_trends)). But at the
+//! slow end, where the motion and the torques of gravity and springs live, there are few harmonics to pool: a test that
+//! took the noise for known would find springs in every hundredth log. Two corrections follow:
 //!
-//! - what a family explains is counted as by Student's distribution in every slow harmonic of every joint,
+//! - in every slow harmonic of every joint, the gain of a family is that of Student's distribution,
 //!   (ν + 2) ln(1 + |r|²/ν) in place of |r|² (the likelihood with the noise's scale integrated out);
-//! - its probability is that of F(k, ν), ν from the share that every harmonic has in what is explained
+//! - the probability of a family is that of F(k, ν), with ν from the share of every harmonic in the explained square
 //!   (Satterthwaite 1946).
 
 use std::ops::Range;
@@ -19,37 +18,39 @@ use crate::signal::{pooled, pooled_level};
 /// How well the noise of whitened rows is known.
 #[derive(Debug, Clone)]
 pub struct NoiseKnowledge {
-    /// Per harmonic from 0.
+    /// By harmonic, from 0.
     harmonics: Vec<Uncertainty>,
 }
 
-/// Relative variance of the noise's power at one harmonic.
+/// Relative variance of the estimated noise power at one harmonic, in three parts.
 #[derive(Debug, Clone)]
 pub struct Uncertainty {
-    /// Of what all joints share, alike within [`pooled`].
+    /// Of the power that all joints share; one error over the harmonics within [`pooled`].
     pub shared: f64,
-    /// Of how strong the noise of a joint is, alike within [`pooled_level`].
+    /// Of the level of each joint's noise; one error over the harmonics within [`pooled_level`].
     pub level: f64,
-    /// Mean squared coherence of the joints' noise: what two of them have in common of that.
+    /// Mean squared coherence of the joints' noise: the share of the error of `level` that any two joints have in
+    /// common.
     pub likeness: f64,
-    /// Of what the noise of every joint has beside both, alike within [`pooled`].
+    /// By joint, of the colour of its noise beside both; one error over the harmonics within [`pooled`].
     pub colour: Vec<f64>,
 }
 
 impl Uncertainty {
-    /// Of one joint, in all.
+    /// The sum of the three parts for one joint.
     pub fn of(&self, joint: usize) -> f64 {
         self.shared + self.level + self.colour[joint]
     }
 }
 
-/// Noise that is known with more degrees of freedom than this counts as known in what a family explains.
+/// From this many degrees of freedom on, the noise of a harmonic counts as known in the gain of a family.
 const WELL_KNOWN: f64 = 200.0;
-/// Degrees of freedom beyond which F(k, ν) is χ²ₖ/k.
+/// Degrees of freedom from which on F(k, ν) is taken as χ²ₖ/k.
 const MANY: f64 = 1e5;
 
-/// Rows of (harmonic, joint) among the whitened rows of a period, harmonic by harmonic and joint by joint: one of the mean, real and
-/// imaginary part of the others. The highest harmonic that is used lies below half the rate.
+/// Rows of (harmonic, joint) among the whitened rows of a period, which are ordered by harmonic and then by joint: one
+/// row for harmonic 0 (the mean), two (real and imaginary part) for each other. The highest harmonic in use lies below
+/// half the sampling rate.
 pub fn rows_of(joints: usize, harmonic: usize, joint: usize) -> Range<usize> {
     if harmonic == 0 {
         return joint..joint + 1;
@@ -59,7 +60,7 @@ pub fn rows_of(joints: usize, harmonic: usize, joint: usize) -> Range<usize> {
 }
 
 impl NoiseKnowledge {
-    /// From what is not known of every harmonic from 0.
+    /// From the uncertainty of every harmonic, from 0.
     pub fn new(harmonics: Vec<Uncertainty>) -> Self {
         Self { harmonics }
     }
@@ -68,12 +69,12 @@ impl NoiseKnowledge {
         self.harmonics.first().map_or(0, |known| known.colour.len())
     }
 
-    /// Its [`rows_of`] (harmonic, joint).
+    /// [`rows_of`] (harmonic, joint) for this number of joints.
     pub fn rows(&self, harmonic: usize, joint: usize) -> Range<usize> {
         rows_of(self.joints(), harmonic, joint)
     }
 
-    /// Twice the gain in log-likelihood when the residual loses what `span` explains.
+    /// Twice the gain in log-likelihood when the part of `residual` that `span` explains is removed from it.
     pub fn gain(&self, span: &Span, residual: &Image) -> f64 {
         if span.is_empty() {
             return 0.0;
@@ -103,9 +104,9 @@ impl NoiseKnowledge {
         gain
     }
 
-    /// Degrees of freedom ν of the noise along what `span` explains of `residual`: 2/ν is the relative
-    /// variance of the noise's power there, Σ w w' C over harmonics and joints with the shares w of the explained square and
-    /// the relative covariances C ([`Uncertainty`]).
+    /// Degrees of freedom ν of the noise along the part of `residual` that `span` explains. 2/ν is the relative
+    /// variance of the noise power there, Σ w w' C over harmonics and joints, with w their shares of the explained
+    /// square and C the relative covariances ([`Uncertainty`]).
     pub fn freedom(&self, span: &Span, residual: &Image) -> f64 {
         if span.is_empty() {
             return MANY;
@@ -113,7 +114,7 @@ impl NoiseKnowledge {
         self.freedom_along(&span.combination(&span.coordinates(residual)))
     }
 
-    /// The same along one `direction`.
+    /// Degrees of freedom ν of the noise along one `direction`, as in [`Self::freedom`].
     pub fn freedom_along(&self, direction: &Image) -> f64 {
         let harmonics = self.harmonics();
         let mut share = vec![vec![0.0; harmonics]; self.joints()];
@@ -140,12 +141,12 @@ impl NoiseKnowledge {
         (2.0 / self.variance(&share)).min(MANY)
     }
 
-    /// Harmonics from 0 whose rows are used.
+    /// Number of harmonics whose rows are used, from 0 on.
     pub fn harmonics(&self) -> usize {
         self.harmonics.len()
     }
 
-    /// Σ w w' C over harmonics and joints, `share` the w of each joint.
+    /// Σ w w' C over harmonics and joints, with `share` holding w by joint and harmonic.
     fn variance(&self, share: &[Vec<f64>]) -> f64 {
         let together: Vec<f64> =
             (0..self.harmonics()).map(|h| share.iter().map(|share| share[h]).sum()).collect();
@@ -159,15 +160,15 @@ impl NoiseKnowledge {
             + of_alike(&together, pooled, |h| at(h).shared)
     }
 
-    /// Whether ν is so large that noise is known.
+    /// Whether ν is so large that the noise counts as known.
     pub fn is_known(freedom: f64) -> bool {
         freedom >= MANY
     }
 }
 
-/// Σ w_h w_h' v_h over all harmonics and those that are within `reach` of them.
+/// Σ w_h w_h' v_h over all harmonics h and all harmonics h' within `reach` of h.
 fn of_alike(share: &[f64], reach: fn(usize) -> usize, variance: impl Fn(usize) -> f64) -> f64 {
-    // Of all harmonics below each.
+    // Cumulative sums of the shares: entry h is the sum over all harmonics below h.
     let mut below = Vec::with_capacity(share.len() + 1);
     below.push(0.0);
     below.extend(share.iter().scan(0.0, |sum, share| {
@@ -194,8 +195,8 @@ mod tests {
         NoiseKnowledge::new(vec![unknown; 3])
     }
 
-    /// Ten million logs would be needed to see a chance of 10⁻⁷; a chance of 1/200 is seen in 20 000.
-    /// A direction in one slow harmonic, its noise's scale estimated with ν degrees of freedom.
+    /// A direction in one slow harmonic, with the scale of its noise estimated from ν degrees of freedom. A chance of
+    /// 10⁻⁷ would need ten million logs to be seen; a chance of 1/200 is seen in 20 000.
     #[test]
     fn chance_along_one_harmonic_is_that_of_student() {
         const TRIALS: usize = 20_000;
@@ -216,11 +217,12 @@ mod tests {
             let scale: f64 = (0..whole).map(|_| normal().powi(2)).sum::<f64>() / whole as f64;
             normal().powi(2) / scale > limit
         });
-        // Binomial, 100 ± 10; 15.4 degrees of freedom stand for 15: within six of these.
+        // Binomial, 100 ± 10, so the limit is six standard deviations: it also covers that 15.4 degrees of freedom are
+        // rounded to 15.
         assert!((beyond.count() as f64 - 100.0).abs() < 60.0);
     }
 
-    /// Where noise is well known, the gain is what is explained; where it is not, it is less.
+    /// Where noise is well known, the gain is the explained square; where it is not, the gain is less.
     #[test]
     fn what_lies_in_poorly_known_noise_counts_less() {
         let residual = Image { mean: vec![0.5, 6.0, 1.0, -0.5, 1.0], contrast: Vec::new() };
@@ -237,8 +239,8 @@ mod tests {
         assert!((poorly.gain(&span, &residual) - expected).abs() < 1e-9);
     }
 
-    /// Two joints, all of the explained square in one harmonic, half on each: what is shared and what is coherent counts whole,
-    /// the rest half.
+    /// Two joints, with all of the explained square in one harmonic, half on each. The shared and the coherent variance
+    /// count in full, the rest by half.
     #[test]
     fn what_joints_share_is_no_better_known_on_two() {
         let unknown =

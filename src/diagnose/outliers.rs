@@ -1,8 +1,10 @@
-//! Single readings far off what stands beside them, and what they are replaced by.
+//! Single readings far off their neighbours, and the values that replace them.
 //!
-//! Torques are compared with the median of nine, which follows a step and which four wild values in a row do not move; but it cuts
-//! the top off every peak that lasts a few rows, and torque has peaks where an arm hurries or a gear's flanks meet. A wild value
-//! is one that is left as abruptly as it is reached. Angles and velocities move from row to row more than noise: of an angle q − ∫q̇ dt is looked at, of a velocity q̇ − Δq/Δt.
+//! Torques are compared with the median of nine readings. It follows a step, and four wild values in a row do not move
+//! it; but it cuts the top off every peak that lasts only a few rows, and torque has such peaks where an arm hurries or
+//! the flanks of a gear meet. A torque therefore counts as wild only if it is left as abruptly as it is reached. Angles
+//! and velocities change from row to row by more than their noise, so the test is on q − ∫q̇ dt for an angle and on
+//! q̇ − Δq/Δt for a velocity.
 
 use super::data_faults::{FAR, cause, exact, step_s};
 use super::kind::Kind;
@@ -11,36 +13,38 @@ use super::verdict::Cause;
 use crate::median::{median, sigma_of_changes};
 use crate::robot::JointSignals;
 
-/// Wild readings of one channel of a joint, at least: a single one is an accident.
+/// Least number of wild readings in one channel of a joint: fewer are an accident, and no fault of the channel.
 const FEWEST: usize = 3;
-/// What is off by less than this share of what an angle changes between two rows is not wild.
+/// An angle that is off by less than this share of its usual change between two rows is not wild.
 const SMALL_STRAY: f64 = 0.5;
-/// So many steps of time a stamp may be off: what its joint goes in that time is not wild.
+/// A time stamp may be off by this many steps: a deviation no larger than what the joint travels in that time is not
+/// wild.
 const STAMPS_OFF: f64 = 1.5;
 /// Rows to either side of the median.
 const REACH: usize = 4;
-/// What is wild is entered and left by jumps of this share of how far it is off, at least, …
+/// Wild torques are entered and left by jumps of at least this share of their deviation, …
 const ABRUPT: f64 = 0.5;
-/// … and of so many times what is usual between the rows before and behind it. Of eight changes of noise the median is 0.95 σ within
-/// a third; a wild value is off by eight σ √2 and more.
+/// … and of at least this many times the median change between the rows before and behind them. Of eight changes of
+/// white noise with standard deviation σ that median is 0.95 σ to within a third; a wild value is off by at least
+/// 8 √2 σ.
 const ABOVE_USUAL: f64 = 3.0;
 
 /// Wild readings of one channel of a joint.
 pub struct Strays {
-    /// 0-based.
+    /// Joint (0-based).
     joint: usize,
     channel: &'static str,
     rows: Vec<usize>,
 }
 
-/// Puts wild readings where what stands beside them says that they should be.
+/// Replaces wild readings by what their neighbours say they should be.
 pub fn mend(record: &mut Record) -> Vec<Strays> {
     let mut strays = mend_motion(record);
     strays.extend(mend_torque(record));
     strays
 }
 
-/// Puts torques far off on the median of nine.
+/// Replaces wild torques by the median of nine.
 fn mend_torque(record: &mut Record) -> Vec<Strays> {
     let of_joint = |j: usize| {
         let y = record.torque_nm.joint(j);
@@ -55,10 +59,10 @@ fn mend_torque(record: &mut Record) -> Vec<Strays> {
     replace(&mut record.torque_nm, "torque", found)
 }
 
-/// Puts angles and velocities far off where the other says that they should be.
+/// Replaces wild angles by what the velocities say, and wild velocities by what the angles say.
 ///
-/// A stamp that came late moves ∫q̇ dt as a wild angle does, and a row that came late moves the angle: what is far off neither by
-/// the stamps nor by even steps is not wild.
+/// A stamp that came late moves ∫q̇ dt just as a wild angle does, and a row that was read late moves the angle. A
+/// reading therefore counts as wild only if it is far off both with the recorded stamps and with even steps of time.
 fn mend_motion(record: &mut Record) -> Vec<Strays> {
     let joints = record.q_rad.joints();
     let even_s = step_s(&record.measurement(""));
@@ -95,7 +99,7 @@ fn mend_motion(record: &mut Record) -> Vec<Strays> {
             });
             far_off(&inner.collect::<Vec<f64>>())
         });
-        // Where the acceleration jumps Δq/Δt is not q̇, but no velocity is far from those beside it.
+        // Where the acceleration jumps, Δq/Δt differs from q̇ although no velocity is far from its neighbours.
         by_all(qd, [far_off(qd), stamped, even])
     };
     let velocities = (0..joints).map(|j| (j, of_velocity(j))).collect();
@@ -103,7 +107,7 @@ fn mend_motion(record: &mut Record) -> Vec<Strays> {
     strays
 }
 
-/// What is far off by all ways to look at `y`, and what `y` should be there by the last.
+/// Values of `y` that are far off by every one of the `ways` to test them, with the replacement from the last way.
 fn by_all<const N: usize>(y: &[f64], ways: [Vec<Stray>; N]) -> Vec<Stray> {
     let is_in = |way: &[Stray], row| way.binary_search_by_key(&row, |stray| stray.row).is_ok();
     let Some((last, others)) = ways.split_last() else { return Vec::new() };
@@ -111,7 +115,7 @@ fn by_all<const N: usize>(y: &[f64], ways: [Vec<Stray>; N]) -> Vec<Stray> {
     all.map(|&Stray { row, off, .. }| Stray { row, off, instead: y[row] - off }).collect()
 }
 
-/// Puts what is found in place of the readings where a joint has several.
+/// Replaces the readings `found`, on every joint that has at least [`FEWEST`] of them.
 fn replace(
     signals: &mut JointSignals,
     channel: &'static str,
@@ -127,7 +131,7 @@ fn replace(
         .collect()
 }
 
-/// One cause for every joint with wild readings, of a record with so many `rows`.
+/// One cause for every joint with wild readings, in a record of `rows` rows.
 pub fn causes(strays: &[Strays], rows: usize) -> Vec<Cause> {
     let mut joints: Vec<usize> = strays.iter().map(|stray| stray.joint).collect();
     joints.sort_unstable();
@@ -145,17 +149,17 @@ pub fn causes(strays: &[Strays], rows: usize) -> Vec<Cause> {
     joints.into_iter().map(of_joint).collect()
 }
 
-/// One value far off.
+/// One value far off its neighbours.
 #[derive(Debug, Clone, Copy)]
 struct Stray {
     row: usize,
-    /// How far.
+    /// Its difference from what its neighbours say.
     off: f64,
-    /// What stands beside it.
+    /// What its neighbours say it should be.
     instead: f64,
 }
 
-/// Values of `y` far off the median of nine, in rising order.
+/// Values of `y` far off the median of nine, in the order of their rows.
 fn far_off(y: &[f64]) -> Vec<Stray> {
     let limit = FAR * sigma_of_changes(&steps(y));
     y.windows(2 * REACH + 1)
@@ -166,11 +170,12 @@ fn far_off(y: &[f64]) -> Vec<Stray> {
         .collect()
 }
 
-/// Whether the neighbouring values `run` of `y` are entered and left by jumps that are none of its own changes, between values that
-/// are not `far` off: the flank of a peak is as steep before it and behind it.
+/// Whether the consecutive values `run` of `y` are entered and left by jumps that exceed the usual changes of `y`
+/// around them. Changes from or to values that are `far` off do not count as usual. A peak fails this test, because its
+/// flanks are as steep before and behind the run.
 fn stands_alone(y: &[f64], run: &[Stray], far: &[Stray]) -> bool {
     let [Some(first), Some(last)] = [run.first(), run.last()] else { return false };
-    // What is far off has rows to both sides.
+    // `far_off` returns only values with [`REACH`] rows on either side.
     let entered = y[first.row] - y[first.row - 1];
     let left = y[last.row] - y[last.row + 1];
     let before = first.row.saturating_sub(REACH)..first.row;
@@ -185,7 +190,7 @@ fn stands_alone(y: &[f64], run: &[Stray], far: &[Stray]) -> bool {
     [entered, left].iter().all(|jump| jump * first.off.signum() > least)
 }
 
-/// From one value to the next.
+/// Differences between consecutive values.
 fn steps(y: &[f64]) -> Vec<f64> {
     y.windows(2).map(|w| w[1] - w[0]).collect()
 }
@@ -195,7 +200,7 @@ mod tests {
     use super::*;
     use crate::diagnose::record::moves_and_rests;
 
-    /// While the joint moves, two next to each other, and at rest.
+    /// One row while the joint moves, two next to each other, and one at rest.
     const WILD: [usize; 4] = [150, 320, 321, 700];
 
     /// One channel of a record's joint.
@@ -204,9 +209,9 @@ mod tests {
     const VELOCITY: Channel = |record| record.qd_rad_s.joint_mut(0);
     const TORQUE: Channel = |record| record.torque_nm.joint_mut(0);
 
-    /// The motion comes back to where it was, by rules whose error is h³/12 |q̇̈| = 1.7e-7 rad a row, and h²/6 |q̇̈| = 4e-5 rad/s; the
-    /// torque to the median of nine, which is off by 0.42 of the noise of 0.3 Nm, as the reading itself was by the whole of it: five
-    /// standard deviations of the two.
+    /// Motion is restored by rules with errors of h³/12 |q̇̈| = 1.7e-7 rad per row and h²/6 |q̇̈| = 4e-5 rad/s. Torque
+    /// is restored to the median of nine, which is off by 0.42 of the noise of 0.3 Nm, while the clean reading itself
+    /// is off by all of it: the tolerance is five standard deviations of the two together.
     #[test]
     fn wild_readings_go_back_to_where_they_were() {
         for (channel, name, off, tolerance) in [
@@ -231,8 +236,8 @@ mod tests {
         }
     }
 
-    /// An arm that rests most of the time and hurries in between, 50 times a second: at each of its peaks of 0.3 s the median of nine
-    /// is off by 60 Nm (2π/15)² = 10 Nm, twice what stands out of the noise at rest.
+    /// An arm that rests most of the time and hurries in between. At each of its peaks of 0.3 s the median of nine is
+    /// off by 60 Nm (2π/15)² = 10 Nm, twice what stands out of the noise at rest.
     #[test]
     fn peaks_of_torque_are_not_wild() {
         let [noisy, clean] = [0.5, 0.0].map(|sd| moves_and_rests(4.0, sd).torque_nm);
@@ -250,14 +255,15 @@ mod tests {
             mend_torque(&mut record).into_iter().flat_map(|stray| stray.rows).collect::<Vec<_>>()
         };
         assert_eq!(mended(noise.clone()), [0; 0]);
-        // Four wild values in a row at rest, one on a flank, and two of different sign beside each other.
+        // Four wild values in a row and one alone at rest, one on a flank, and two of different sign next to each
+        // other.
         let wild = [150, 151, 152, 153, 700, 905, 940, 941];
         wild.iter().for_each(|&k| noise[k] += if k == 941 { -60.0 } else { 60.0 });
         assert_eq!(mended(noise), wild);
     }
 
-    /// Nor stamps that are half a row late, nor rows that were read that late; an acceleration that jumps where a move begins; torque that
-    /// steps; two wild readings.
+    /// None of these is wild: stamps that are half a row late, rows that were read that late, an acceleration that
+    /// jumps where a move begins, a torque that steps, two wild readings.
     #[test]
     fn what_moves_is_not_wild() {
         let late_s = 0.004;

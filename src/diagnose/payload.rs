@@ -1,13 +1,13 @@
 //! What changed between two logs of the same arm: a body on the flange.
 //!
-//! Both logs share the base parameters and the effects that were found in the first; the second may have
-//! a body on the flange (ten inertial parameters, about the last joint's frame) and friction of other
-//! size, as another day makes it. The motions need not be the same.
+//! Both logs share the base parameters and the effects that were found in the first. The second may have a body on the
+//! flange (ten inertial parameters, about the last joint's frame) and friction of another size, because it may be from
+//! another day. The motions need not be the same.
 //!
-//! A known mass M gives the scale of the drive gains: with gains that are off by a common factor every
-//! identified mass is, so that true gain = M/m̂ × assumed gain. Joint by joint the body's torque enters
-//! with a factor a_j of its own (Gautier and Briot 2014, with the mass as the known quantity); 1/a_j is the
-//! scale of that joint's gain.
+//! A known mass M gives the scale of the drive gains: if all gains are off by a common factor, so is every identified
+//! mass m̂, and the true gain is M/m̂ times the assumed one. Joint by joint, the torque of the body enters with a
+//! factor a_j of its own (Gautier and Briot 2014, with the mass as the known quantity); 1/a_j is the scale of that
+//! joint's gain.
 
 use serde::Serialize;
 
@@ -36,21 +36,22 @@ pub struct PayloadFinding {
     pub reference: String,
     /// Mass, kg; NaN (null) where the joints of this arm do not tell it from the body's other parameters.
     pub mass_kg: Estimate,
-    /// First moments m·c about the last joint's frame, kg m; NaN likewise.
+    /// First moments m·c about the last joint's frame, kg m; NaN (null) where the joints do not tell them.
     pub first_moment_kg_m: [Estimate; 3],
     /// Centre of mass in the last joint's frame, m; meaningful where the body is named.
     pub com_m: [Estimate; 3],
-    /// Probability of such a mass and first moment by chance.
+    /// Probability that chance alone gives a mass and first moments as large.
     pub probability: f64,
     /// Whether a body is named.
     pub is_named: bool,
-    /// Scale of all drive gains that the known mass implies; null where none was given.
+    /// Common scale of all drive gains that follows from the known mass; null where no mass was given or no body is
+    /// named.
     pub gain_scale: Option<Estimate>,
-    /// The same joint by joint.
+    /// The scale of each joint's own drive gain, likewise.
     pub joint_gain_scales: Option<Vec<Estimate>>,
     /// Change of Coulomb friction per joint from the first log to the second, Nm.
     pub coulomb_change_nm: Vec<Estimate>,
-    /// Whether something touched the arm along the second log, which was taken out of it.
+    /// Whether something touched the arm along the second log; the rows were taken out.
     #[serde(skip)]
     pub was_touched: bool,
 }
@@ -65,20 +66,20 @@ pub(super) struct Shared<'a> {
     pub(super) extension: &'a Extension,
 }
 
-/// Inertial parameters of a body.
+/// Number of inertial parameters of a body.
 const BODY: usize = 10;
-/// Mass and first moments: what a body cannot be without.
+/// How many of them are mass and first moments, which no body is without.
 const STATIC: usize = 4;
-/// Length of the blocks, s.
+/// Length of the blocks of time for the covariance, s.
 const BLOCK_S: f64 = 2.0;
-/// Rows kept per joint and log.
+/// Most rows kept per joint and log.
 const MOST_ROWS: usize = 8000;
-/// The load on the gears, which some effects depend on, is known better with the body.
+/// Rounds of the fit: some effects depend on the load on the gears, which is known better once the body is.
 const ROUNDS: usize = 2;
-/// Gauss–Newton steps for gains and first moments together.
+/// Gauss–Newton steps for the gains and the body's other parameters together.
 const STEPS: usize = 4;
 
-/// Compares the log behind `second` with the one behind `first`, named `names`.
+/// Compares the log of the regression `second` with that of `first`; `names` are the names of the two logs.
 pub(super) fn between(
     shared: &Shared,
     first: &Regression,
@@ -168,7 +169,7 @@ pub(super) fn between(
 }
 
 impl PayloadFinding {
-    /// As a cause, if a body is named.
+    /// The finding as a cause, if a body is named.
     pub fn cause(&self) -> Option<Cause> {
         if !self.is_named {
             return None;
@@ -195,7 +196,7 @@ impl PayloadFinding {
         })
     }
 
-    /// What is said where no body is named, and what a known mass says about the drives.
+    /// The sentences about the finding: that no body is named, and what a known mass says about the drives.
     pub fn sentences(&self) -> Vec<String> {
         let mut out = Vec::new();
         if !self.is_named {
@@ -233,7 +234,7 @@ impl PayloadFinding {
         out
     }
 
-    /// Joints whose own scale of gains is not that of all.
+    /// Joints whose own scale of gains differs from the common one (their 95 % intervals do not overlap).
     fn apart(&self) -> Option<String> {
         let (all, own) = self.gain_scale.as_ref().zip(self.joint_gain_scales.as_ref())?;
         let is_apart = |scale: &Estimate| {
@@ -244,7 +245,7 @@ impl PayloadFinding {
         (!joints.is_empty()).then(|| joints.join(", "))
     }
 
-    /// What is said where no body is named.
+    /// The sentence if no body is named.
     fn no_body(&self) -> String {
         let Self { reference, probability, mass_kg, .. } = self;
         let axes = ["x", "y", "z"].into_iter().zip(&self.first_moment_kg_m);
@@ -292,22 +293,24 @@ fn with_interval(estimate: &Estimate) -> String {
     format!("{:.3} ± {:.3}", estimate.value, 0.5 * (estimate.ci95[1] - estimate.ci95[0]))
 }
 
-/// A gain is told if its 95 % interval is within this share of it: two sources rarely differ by less.
+/// A scale of gains counts as told if its 95 % interval is within ± this share of it: two sources rarely differ by
+/// less.
 const TOLD_WITHIN: f64 = 0.1;
 
-/// Whether the motions tell a scale of gains.
+/// Whether the motions tell this scale of gains well enough to be stated.
 fn is_told(scale: &Estimate) -> bool {
     0.5 * (scale.ci95[1] - scale.ci95[0]) < TOLD_WITHIN * scale.value
 }
 
-/// Where the unknowns stand.
+/// Positions of the unknowns in the columns of the least-squares problem.
 struct Layout {
     base: usize,
-    /// First of the body's parameters.
+    /// Position of the body's first parameter.
     body: usize,
-    /// First of the changes of Coulomb, viscous friction and offset, three per joint.
+    /// Position of the first change of friction; each joint has three, of Coulomb friction, viscous friction and
+    /// offset.
     friction: usize,
-    /// Their base parameters, per joint.
+    /// Per joint, the base parameters that these three change.
     friction_base: Vec<[Option<usize>; 3]>,
     count: usize,
 }
@@ -335,11 +338,12 @@ impl Layout {
     }
 }
 
-/// The last body's ten parameters.
+/// The ten inertial parameters of a body on the last link, as they show in the base parameters.
 struct Body {
-    /// Each in base parameters; zero where the joints do not feel it, or those before it add up to the same.
+    /// Each parameter in terms of base parameters; zero where the joints do not feel it, or where parameters before it
+    /// have the same effect together.
     terms: Vec<Vec<f64>>,
-    /// Whether the joints tell it from all others.
+    /// Whether the joints tell each parameter from all others.
     told: [bool; BODY],
 }
 
@@ -354,7 +358,7 @@ impl Body {
         Self::felt((0..BODY).map(of).collect())
     }
 
-    /// Of `all` terms those that add something to the ones before.
+    /// Keeps those of `all` terms that are linearly independent of the ones before them, and sets the others to zero.
     fn felt(all: Vec<Vec<f64>>) -> Self {
         let image = |terms: &Vec<f64>| Image { mean: terms.clone(), contrast: Vec::new() };
         let images: Vec<Image> = all.iter().map(image).collect();
@@ -382,7 +386,7 @@ fn blocks(equations: &[Equations]) -> usize {
     equations.iter().flat_map(|e| &e.block_of).max().map_or(0, |b| b + 1)
 }
 
-/// Base parameters and effects along one log, in samples in which the joint moves.
+/// Equations of the base parameters and effects along one log, restricted to samples in which the joint moves.
 fn equations(
     shared: &Shared,
     layout: &Layout,
@@ -416,7 +420,7 @@ fn equations(
         }
         let mut first = layout.base;
         for effect in &extension.effects {
-            // Of what a drive feeds forward a single run has no columns.
+            // A single run has no columns of what a drive feeds forward.
             for (at, (column, _)) in (first..).zip(effect.columns(families, &scene)) {
                 for (_, y) in column.parts.iter().filter(|(joint, _)| *joint == j) {
                     let y = whitening.as_ref().map_or_else(|| y.clone(), |w| w.as_regressed(y));
@@ -437,7 +441,7 @@ fn equations(
     Ok(out)
 }
 
-/// Scale 1/a_j of every joint's drive gain, the body's mass known.
+/// Scale 1/a_j of every joint's drive gain, where the body's mass is `known_kg`.
 fn joint_gains(
     all: &[Equations],
     layout: &Layout,
@@ -447,7 +451,7 @@ fn joint_gains(
     log: &str,
 ) -> Result<Vec<Estimate>, DiagnoseError> {
     let mut factors = vec![body[0] / known_kg; joints];
-    // The body's other parameters as a gain of one would show them.
+    // The body's other nine parameters, rescaled to what they are if the mass is the known one.
     let mut rest: Vec<f64> = body[1..].iter().map(|p| p * known_kg / body[0]).collect();
     let mut scales = Vec::new();
     for _ in 0..STEPS {
@@ -495,8 +499,8 @@ mod tests {
         Body::new(&set, joints).told
     }
 
-    /// A vertical joint feels an inertia alone; one across it, on the same point, the moments in its plane as well, but
-    /// nothing of a mass; six feel all.
+    /// A vertical joint feels an inertia alone. A second joint across it, on the same point, also feels the moments in
+    /// its plane, but no mass. Six joints feel all ten parameters.
     #[test]
     fn an_arm_tells_what_its_joints_feel_of_a_body() {
         assert_eq!(told(1)[..STATIC], [false; STATIC]);
@@ -504,7 +508,7 @@ mod tests {
         assert_eq!(told(6), [true; BODY]);
     }
 
-    /// Of two parameters that are felt alike neither is told, and one is left out.
+    /// Of two parameters that the joints feel alike, neither is told, and the second is left out.
     #[test]
     fn what_adds_up_to_the_same_is_not_told() {
         let mut all = vec![vec![0.0; 3]; BODY];
@@ -514,7 +518,8 @@ mod tests {
         assert_eq!(terms[..3], [all[0].clone(), all[1].clone(), vec![0.0; 3]]);
     }
 
-    /// What is said of a second log with so much more on the flange, and this probability of as much by chance.
+    /// What is said of a second log with this mass and first moment more on the flange, at this probability that chance
+    /// explains them.
     fn said(mass_kg: f64, moment_kg_m: f64, probability: f64) -> String {
         let known_to = |half: f64| {
             move |value: f64| Estimate { value, unit: "", ci95: [value - half, value + half] }
@@ -534,7 +539,8 @@ mod tests {
         finding.sentences().join(" ")
     }
 
-    /// A gripper that was turned, or exchanged for one as heavy, is no accident.
+    /// Chance is named only where it explains the difference: a gripper that was turned, or exchanged for one as heavy,
+    /// is no accident.
     #[test]
     fn chance_is_named_where_it_explains_a_difference() {
         let chance = |mass_kg, moment_kg_m, probability| {

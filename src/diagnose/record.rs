@@ -1,4 +1,4 @@
-//! A log's record with its faults taken back, as far as they can be.
+//! The record of a log, and corrections of its faults as far as they are possible.
 
 use super::kind::Kind;
 use super::verdict::Cause;
@@ -6,15 +6,15 @@ use crate::identify::Measurement;
 use crate::robot::JointSignals;
 use crate::signal::{Filled, Gap, SignalError, fill_gaps};
 
-/// How far a joint may turn between two rows beyond what its speed says, rad.
+/// How far a joint may turn between two rows beyond what its speed explains, rad.
 const TORN_RAD: f64 = 0.05;
-/// Times its speed at either row that a joint may have had between them.
+/// Factor by which a joint may have been faster between two rows than at either of them.
 const FASTER: f64 = 3.0;
-/// How far what a filter makes of a torn record reaches, s.
+/// How far in time a filter spreads the effect of a jump in the record, s.
 const REACH_S: f64 = 0.5;
 
-/// Whether the angles of `m` jump, as no arm can, from `start_s` to `end_s` or nearby: rows are missing or put together
-/// wrongly there, and what the torque shows is the jump.
+/// Whether the angles of `m` jump, as no arm can, between `start_s` and `end_s` or nearby. Rows are then missing or put
+/// together wrongly, and what the torque shows there is the jump.
 pub fn is_torn(m: &Measurement, [start_s, end_s]: [f64; 2]) -> bool {
     let near = |k: &usize| (start_s - REACH_S..end_s + REACH_S).contains(&m.time_s[*k]);
     (1..m.time_s.len()).filter(near).any(|k| {
@@ -27,13 +27,13 @@ pub fn is_torn(m: &Measurement, [start_s, end_s]: [f64; 2]) -> bool {
     })
 }
 
-/// Rows on either side that tell a slope.
+/// Rows on either side of a row from which its slope is computed.
 const REACH_ROWS: usize = 24;
-/// How far a row may be from where even rows have it, over their distance.
+/// Limit of a row's distance in time from an evenly spaced grid, over the step of the grid.
 const UNEVEN: f64 = 0.02;
 
-/// dy/dt at row `k`: the derivative of all that rows tell, sin(πx)/(πx) under a Hann window, right to within 1 % up to 0.45 of
-/// their rate. `None` near the ends and where the rows are not even.
+/// dy/dt at row `k`: the derivative of the interpolation by sin(πx)/(πx), under a Hann window, accurate to 1 % up to
+/// 0.45 of the sampling rate. `None` near the ends and where the rows are not evenly spaced.
 fn slope(time_s: &[f64], y: &[f64], k: usize) -> Option<f64> {
     let (first, last) = (k.checked_sub(REACH_ROWS)?, k + REACH_ROWS);
     let step_s = (time_s.get(last)? - time_s[first]) / (2 * REACH_ROWS) as f64;
@@ -51,7 +51,7 @@ fn slope(time_s: &[f64], y: &[f64], k: usize) -> Option<f64> {
     Some((1..=REACH_ROWS).map(term).sum::<f64>() / step_s)
 }
 
-/// See the module.
+/// The channels of a log, which corrections may change.
 pub struct Record {
     /// Time, s.
     pub time_s: Vec<f64>,
@@ -61,12 +61,12 @@ pub struct Record {
     pub qd_rad_s: JointSignals,
     /// Torques, Nm.
     pub torque_nm: JointSignals,
-    /// Gaps that have rows of other periods now.
+    /// Gaps that were filled with rows of other periods.
     pub filled: Vec<Gap>,
 }
 
 impl Record {
-    /// Of `m` without the rows `left_out`, which are in rising order.
+    /// The record of `m` without the rows `left_out`, which are in ascending order.
     pub fn without_rows(m: &Measurement, left_out: &[usize]) -> Self {
         let rows: Vec<usize> =
             (0..m.time_s.len()).filter(|k| left_out.binary_search(k).is_err()).collect();
@@ -82,7 +82,7 @@ impl Record {
         }
     }
 
-    /// As a measurement.
+    /// A view of the record as a measurement from `source`.
     pub fn measurement<'a>(&'a self, source: &'a str) -> Measurement<'a> {
         Measurement {
             source,
@@ -93,14 +93,14 @@ impl Record {
         }
     }
 
-    /// `lost_s` passed behind each of `rows` without the clock showing it.
+    /// Adds `lost_s` behind each of `rows`, where time passed without the clock showing it.
     pub fn give_back_time(&mut self, rows: &[usize], lost_s: f64) {
         for (k, time) in self.time_s.iter_mut().enumerate() {
             *time += lost_s * rows.partition_point(|row| *row < k) as f64;
         }
     }
 
-    /// Rows for its gaps, where the motion repeats; what a user should know of them.
+    /// Fills gaps with rows of other periods where the motion repeats; returns a warning for the user.
     pub fn fill_gaps(&mut self) -> Result<Option<String>, SignalError> {
         let Self { time_s, q_rad, qd_rad_s, torque_nm, .. } = &*self;
         let Some(filled) = fill_gaps(time_s, q_rad, qd_rad_s, torque_nm)? else {
@@ -112,16 +112,18 @@ impl Record {
         Ok(Some(warning))
     }
 
-    /// Takes back the lags among `causes`.
+    /// Undoes the velocity lags among `causes`.
     pub fn undo_lags(&mut self, causes: &[Cause]) {
         for lag in causes.iter().filter(|cause| cause.kind == Kind::VelocityLag) {
             self.undo_lag(lag.joint.map(|j| j - 1), lag.parameters["delay_s"].value);
         }
     }
 
-    /// The velocity of `joint` (of all: `None`) came `lag_s` late. The angles tell what it was where rows are even: what made it
-    /// late, a filter as a rule, has also rounded its kinks, at which friction is looked at. Elsewhere straight lines between
-    /// its samples tell it.
+    /// Undoes a lag by which the velocity of `joint` (`None`: of all joints) came `lag_s` late.
+    ///
+    /// Where rows are evenly spaced, the velocity is computed from the angles, because what makes a velocity late is
+    /// usually a filter, which also rounds the kinks at which friction is tested. Elsewhere the late velocity is moved,
+    /// linearly between its samples.
     fn undo_lag(&mut self, joint: Option<usize>, lag_s: f64) {
         let t = &self.time_s;
         for j in joint.map_or(0..self.qd_rad_s.joints(), |j| j..j + 1) {
@@ -139,8 +141,8 @@ impl Record {
     }
 }
 
-/// For tests of what records go through: a joint that moves for `moves_s` and rests for as long, three times, 125 times a second, its
-/// torque with noise of `noise_nm`.
+/// For tests: a record of a joint that moves for `moves_s` and then rests for as long, three times, at 125 samples per
+/// second, with torque noise of `noise_nm`.
 #[cfg(test)]
 pub fn moves_and_rests(moves_s: f64, noise_nm: f64) -> Record {
     use rand::{SeedableRng, rngs::ChaCha8Rng};
@@ -165,7 +167,7 @@ pub fn moves_and_rests(moves_s: f64, noise_nm: f64) -> Record {
 mod tests {
     use super::*;
 
-    /// Up to 0.42 of the rate, and not where a row is missing or at the ends.
+    /// The slope is right up to 0.42 of the rate, and `None` where a row is missing or near the ends.
     #[test]
     fn angles_tell_their_slope() {
         let (n, step_s) = (200, 0.008);
@@ -184,8 +186,8 @@ mod tests {
         }
     }
 
-    /// A joint that turns at 2 rad/s, with a second missing, is where it has to be; turned by 0.3 rad within a row it
-    /// is not.
+    /// A joint that turns at 2 rad/s is where it has to be behind a gap of one second; if it turned by another 0.3 rad
+    /// within a row, it is not.
     #[test]
     fn a_gap_is_no_tear_and_a_jump_is_one() {
         let time_s: Vec<f64> = (0..500).map(|k| 0.01 * k as f64 + f64::from(k >= 250)).collect();

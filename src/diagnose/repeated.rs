@@ -1,29 +1,29 @@
-//! Two single runs of one motion: what of their residuals repeats.
+//! Two single runs of one motion: how much of their residuals repeats.
 //!
-//! Noise does not repeat. With e₁ and e₂ the residuals of the same motion recorded twice, each behind its
-//! own fit, ρ = ⟨e₁, e₂⟩/(‖e₁‖ ‖e₂‖) is the share of the mean square that a function of the motion could
-//! explain, and 1 − √(1 − ρ) the share of the rms error that the best model of all could remove along it.
-//! What the fits themselves take up, and what changes between the runs, is not in ρ.
+//! Noise does not repeat. With e₁ and e₂ the residuals of the same motion recorded twice, each outside its own fit, ρ =
+//! ⟨e₁, e₂⟩/(‖e₁‖ ‖e₂‖) is the share of the mean square that a function of the motion could explain, and 1 − √(1 − ρ)
+//! the share of the rms error that the best possible model could remove along that motion. ρ does not count what the
+//! fits themselves absorb, nor what changes between the runs.
 
 use super::diagnoser::Finding;
 use crate::identify::MOVING_RAD_S;
 use crate::robot::JointSignals;
 
-/// What repeats, per joint, in samples in which the joint moves.
+/// The share ρ of the residuals that repeats, per joint, over samples in which the joint moves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Repeated {
-    /// Of the residual without causes.
+    /// Of the residuals of the null model.
     pub before: Vec<f64>,
-    /// Of the residual with each run's causes.
+    /// Of the residuals with each run's causes in the model.
     pub after: Vec<f64>,
 }
 
-/// Longest shift between the runs' windows, s.
+/// Longest shift in time between the runs that is tried, s.
 const LONGEST_SHIFT_S: f64 = 3.0;
-/// The same motion: angles agree to this rms, rad.
+/// Two motions count as the same if their angles agree to this rms, rad.
 const SAME_RAD: f64 = 0.005;
 
-/// What repeats of the residuals of `first` and `second`; `None` if their motions differ.
+/// The share of the residuals of `first` and `second` that repeats; `None` if their motions or sampling differ.
 pub fn repeated(first: &Finding, second: &Finding) -> Option<Repeated> {
     let (a, b) = (angles(first), angles(second));
     let rates = [first, second].map(|f| f.identification.processing.rate_hz);
@@ -77,7 +77,7 @@ fn angles(finding: &Finding) -> JointSignals {
     JointSignals::from_fn(q.joints(), finding.samples.len(), |j, k| q.joint(j)[finding.samples[k]])
 }
 
-/// Samples k of one run and l = k + shift of another that lie in both.
+/// Pairs of samples k of one run and l = k + shift of the other that lie within both.
 fn pairs(n: usize, m: usize, shift: isize) -> impl Iterator<Item = (usize, usize)> {
     (0..n).filter_map(move |k| {
         let l = k.checked_add_signed(shift)?;

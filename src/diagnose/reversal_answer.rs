@@ -1,52 +1,52 @@
-//! What the drive of a joint gives where its friction turns round, as the recorded torque tells it.
+//! What the drive of a joint delivers where its friction reverses, as the recorded torque tells it.
 //!
-//! Harmonics in which the load of a joint drowns in noise are small one by one, but they are no accident: whatever a drive
-//! does at a reversal it does at every other. With s the sign of the velocity it is Σ_i c_i s(t − iΔ), the c fitted to the
-//! torque of these harmonics. Six delays, from two before to three behind the reversal, hold what a drive does within some
-//! twenty milliseconds.
+//! In the harmonics in which the load of a joint is below the noise, the drive's torque is small harmonic by harmonic,
+//! but it is no accident: whatever a drive does at one reversal it does at every other. With s the sign of the
+//! velocity, its torque is Σ_i c_i s(t − iΔ), with the c fitted to the recorded torque of these harmonics. Six delays,
+//! from two before to three behind the reversal, cover what a drive does within some twenty milliseconds.
 //!
-//! A torque that is recorded late shows the same sum later, which between two samples is not another set of c: under a
-//! delay d that is asked for, the c are those of Σ_i c_i s(t − iΔ − d).
+//! A torque that is recorded late shows the same sum later. Between two samples this is not the same sum with other c,
+//! so for a delay d the c are fitted to Σ_i c_i s(t − iΔ − d).
 
 use fourier::Complex64;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::signal::FineClock;
 
-/// Time between two delays, s; not less than that between two samples.
+/// Step Δ between two delays, s; never less than the time between two samples.
 const DELAY_S: f64 = 0.008;
-/// In steps of that.
+/// The delays i, in steps of Δ.
 const DELAYS: std::ops::Range<i64> = -2..4;
-/// Faster than this, Hz, drives are not looked at: delays of 8 ms tell nothing beyond half their rate.
+/// Highest frequency at which drives are looked at, Hz: delays of 8 ms tell nothing beyond half their rate.
 pub const FASTEST_HZ: f64 = 60.0;
-/// What the reversals explain of a torque over what they explain of noise. The noise of the c is in the residual of the
-/// log as well; all six shift a score by less than √(6/(6·10)) = 0.3 of its σ.
+/// Least ratio of what the reversals explain of the torque to what they would explain of noise. The noise of the c also
+/// enters the residual of the log; at this ratio, all six shift a score by less than √(6/(6·10)) = 0.3 of its σ.
 const TOLD: f64 = 10.0;
 
 /// A harmonic of the recorded torque.
 pub struct TorqueHarmonic {
-    /// Its number.
+    /// Its number, 1 for once per period.
     pub number: usize,
-    /// Coefficient of the mean period.
+    /// Its coefficient in the mean period.
     pub mean: Complex64,
     /// Mean square of its noise.
     pub noise: f64,
 }
 
-/// See the module.
+/// What the recorded torque tells of one drive's answer to reversals; see the module.
 pub struct ReversalAnswer {
-    /// s, at every tick.
+    /// s, the sign of the velocity, at every tick.
     sign: Vec<f64>,
-    /// Coulomb friction, Nm: what a drive of which nothing is told gives.
+    /// Coulomb friction, Nm: a drive of which the torque tells nothing is taken to deliver it all.
     coulomb_nm: f64,
-    /// Harmonics in which drives are looked at.
+    /// The harmonics to which the c are fitted.
     torque: Vec<TorqueHarmonic>,
     /// Δ in ticks.
     delay: f64,
 }
 
 impl ReversalAnswer {
-    /// Of a joint whose velocity has the `sign` at every tick of `clock`, of which there are `rate_hz` samples a second.
+    /// For a joint whose velocity has the `sign` at every tick of `clock`, in a log of `rate_hz` samples per second.
     pub fn new(
         (clock, rate_hz): (&FineClock, f64),
         sign: Vec<f64>,
@@ -57,7 +57,7 @@ impl ReversalAnswer {
         Self { sign, coulomb_nm, torque, delay }
     }
 
-    /// What the drive gives, Nm at every tick, if the torque was recorded `late_ticks` late.
+    /// What the drive delivers, Nm at every tick, if the torque was recorded `late_ticks` late.
     pub fn given_nm(&self, clock: &FineClock, late_ticks: f64) -> Vec<f64> {
         match self.coefficients(clock, late_ticks) {
             Some(c) => {
@@ -71,7 +71,7 @@ impl ReversalAnswer {
         }
     }
 
-    /// The c, Nm; `None` where the answer drowns, or where the joint hardly reverses.
+    /// The c, Nm; `None` where noise drowns the answer, or where the joint hardly reverses.
     fn coefficients(&self, clock: &FineClock, late_ticks: f64) -> Option<Vec<f64>> {
         let spectra: Vec<Vec<Complex64>> =
             self.delayed(late_ticks, clock.ticks()).map(|s| clock.spectrum(&s)).collect();
@@ -83,18 +83,18 @@ impl ReversalAnswer {
         let normal = DMatrix::from_fn(count, count, |i, k| weighted(i, &|h| spectra[k][h.number]));
         let score = DVector::from_fn(count, |i, _| weighted(i, &|h| h.mean));
         let c = Cholesky::new(normal)?.solve(&score);
-        // Noise alone would make this one: the mean square of a coefficient has two parts.
+        // Noise alone would make this ratio one: the mean square of a complex coefficient has two parts.
         let told = 2.0 * c.dot(&score) / count as f64;
         (told > TOLD).then(|| c.as_slice().to_vec())
     }
 
-    /// s(t − iΔ − d) at every so many ticks, by delay.
+    /// s(t − iΔ − d) for every delay i, at every `every`-th tick.
     fn delayed(&self, late_ticks: f64, every: usize) -> impl Iterator<Item = Vec<f64>> {
         DELAYS.map(move |i| shifted(&self.sign, i as f64 * self.delay + late_ticks, every))
     }
 }
 
-/// y(t − `ticks`) of a series that repeats, straight between its ticks, at every so many of them.
+/// y(t − `ticks`) of a periodic series, interpolated linearly between ticks, at every `every`-th tick.
 pub fn shifted(y: &[f64], ticks: f64, every: usize) -> Vec<f64> {
     let n = y.len();
     let (whole, u) = (ticks.floor() as i64, ticks - ticks.floor());
@@ -114,8 +114,8 @@ mod tests {
     const N: usize = 500;
     const TICKS: usize = 16;
 
-    /// A joint that reverses within two samples under a friction of 8 Nm, of which its drive gives `shares` a sample or two
-    /// around the reversal, and whose torque is recorded `late_ticks` late.
+    /// A joint that reverses within two samples under a friction of 8 Nm. Its drive delivers `shares` (share, delay in
+    /// ticks) of that around the reversal, and its torque is recorded `late_ticks` late.
     fn answer(shares: &[(f64, f64)], late_ticks: f64) -> (FineClock, ReversalAnswer, Vec<f64>) {
         let clock = FineClock::new(N, TICKS);
         let velocity = |k: usize| {
@@ -141,14 +141,14 @@ mod tests {
         a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     }
 
-    /// Whatever part of a sample the torque is late: the answer is what it is on time.
+    /// By whatever fraction of a sample the torque is late, the answer is that of a torque recorded on time.
     #[test]
     fn a_late_torque_tells_what_the_drive_gave() {
         for late in [0.0, 3.0, 5.5, -7.25, 20.0] {
             let (clock, answer, truth) = answer(&[(0.7, 0.0), (0.2, -16.0)], late);
             assert!(off(&answer.given_nm(&clock, late), &truth) < 1e-9, "{late}");
         }
-        // Taken for one on time it tells another course between the samples.
+        // A late torque that is taken for one on time tells another course between the samples.
         let (clock, answer, truth) = answer(&[(1.0, 0.0)], 8.0);
         assert!(off(&answer.given_nm(&clock, 0.0), &truth) > 1.0);
     }
@@ -158,7 +158,7 @@ mod tests {
         let (clock, answer, _) = answer(&[], 0.0);
         let dry: Vec<f64> = answer.sign.iter().map(|s| 8.0 * s).collect();
         assert_eq!(answer.given_nm(&clock, 0.0), dry);
-        // A joint that does not reverse tells nothing either.
+        // Nor does the torque of a joint that does not reverse tell anything.
         let still = ReversalAnswer { sign: vec![1.0; N * TICKS], ..answer };
         assert_eq!(still.given_nm(&clock, 0.0), vec![8.0; N * TICKS]);
     }

@@ -1,53 +1,54 @@
-//! How a joint moves between the samples of a log while its friction turns round.
+//! How a joint moves between the samples of a log while its friction reverses.
 //!
-//! The samples of a velocity, joined by their Fourier series, say how the joint moves as long as nothing is over within a
-//! sample. Friction that turns round faster is: what the drive does not deliver at once bends the velocity, by
-//! −a F Δ(s(q̇) − β s_ε(q̇)), with a the joint's acceleration per torque, F its dry friction, s the law by which that turns
-//! round, and β s_ε what the drive gives it, forward and by its feedback. Of a bend at t′ a series of samples lacks
+//! The Fourier series through the samples of a velocity says how the joint moves as long as nothing happens within a
+//! sample. Friction that reverses faster violates this: the part that the drive does not deliver at once bends the
+//! velocity by −a F Δ(s(q̇) − β s_ε(q̇)). Here a is the joint's acceleration per torque, F its dry friction, s the law
+//! by which the friction reverses, and β s_ε what the drive delivers of it, by feed-forward and feedback. For a bend at
+//! t′, the series of the samples lacks
 //!
 //! B(t, t′) = (t − t′)₊ − Σₙ (nT − t′)₊ sinc(t/T − n),
 //!
-//! T the time between samples, and the velocity is what solves q̇ = series − Σ B a F Δ(s − β s_ε).
+//! with T the time between samples, and the velocity solves q̇ = series − Σ B a F Δ(s − β s_ε).
 
 use super::scene::FINE;
 use crate::dynamics::{map_pairs, with_widest_registers};
 use crate::signal::FineClock;
 
-/// What the series of a log's samples lacks of a velocity that bends between them.
+/// What the series through the samples of a log lacks of a velocity that bends between them.
 #[derive(Debug)]
 pub struct Bends {
-    /// Of a slope that changes by one per tick, by the tick within a sample at which it does, from `REACH` ticks before to
-    /// `REACH` ticks behind it.
+    /// B for a slope that changes by one per tick, by the tick within a sample at which it changes; each from `REACH`
+    /// ticks before that tick to `REACH` ticks behind it.
     lacking: Vec<Vec<f64>>,
-    /// The largest of them.
+    /// The largest absolute value in `lacking`.
     most: f64,
 }
 
-/// Ticks over which a bend is followed: four samples. Further on a series of 1250 samples lacks up to a ninth of what it
-/// lacks at most, where the bend lies on a sample; 1.4 % where it lies half-way.
+/// Ticks over which a bend is followed on either side: four samples. Farther away, a series of 1250 samples lacks up to
+/// a ninth of the maximum of B if the bend lies on a sample, and 1.4 % if it lies half-way between two.
 const REACH: usize = 4 * FINE;
-/// Widths of a law behind which friction has turned round but for 7e-4 of it.
+/// Widths of a law beyond which friction has reversed except for 7e-4 of it.
 const WIDTHS: f64 = 4.0;
-/// Steps towards the solution, in units of what it takes to get there.
+/// Total length of the iteration: the number of steps times the length of a step.
 const STEPS: f64 = 5.0;
 
-/// One joint whose friction turns round.
+/// One joint whose friction reverses.
 pub struct Turning {
-    /// Velocity by the series of its samples, at every tick of one period, rad/s.
+    /// Velocity by the series through its samples, at every tick of one period, rad/s.
     pub series_rad_s: Vec<f64>,
-    /// What the model expects there of dry friction, s_ε of the series.
+    /// Sign s_ε of the dry friction that the model expects there, from the velocity of the series.
     pub expected: Vec<f64>,
-    /// Change of the velocity within a tick per dry friction that nothing balances, a F dt, rad/s.
+    /// Change of the velocity within one tick if all dry friction is unbalanced, a F dt, rad/s.
     pub kick_rad_s: Vec<f64>,
 }
 
 impl Bends {
-    /// For motions on `clock`.
+    /// For motions on the ticks of `clock`.
     pub fn new(clock: &FineClock) -> Self {
         let (ticks, n) = (clock.ticks(), clock.ticks() * clock.samples());
         let lacking = |phase: usize| -> Vec<f64> {
             let bend = n / 2 / ticks * ticks + phase;
-            // A parabola over the period whose slope goes from −½ to ½ where it closes.
+            // A parabola over the period, whose slope jumps by one, from −½ to ½, where the period closes.
             let whole: Vec<f64> = (0..n)
                 .map(|k| {
                     let x = ((k + n - bend) % n) as f64;
@@ -64,7 +65,7 @@ impl Bends {
         Self { lacking, most }
     }
 
-    /// Velocity at every tick where friction turns round by `law`, from −1 to 1 over a few `width_rad_s`, and the drive
+    /// Velocity at every tick if friction reverses by `law`, from −1 to 1 within a few `width_rad_s`, and the drive
     /// delivers the share `delivered` of it, β s_ε.
     pub fn between_samples(
         &self,
@@ -94,7 +95,7 @@ impl Bends {
         out
     }
 
-    /// One turn, over `run` (ticks modulo the period).
+    /// Solves one reversal, over the ticks `run` (modulo the period), and writes the velocity to `out`.
     #[inline(always)]
     fn solve(
         &self,
@@ -110,10 +111,10 @@ impl Bends {
         let by_samples: Vec<f64> = run.clone().map(|k| series[k % n]).collect();
         let mut qd = by_samples.clone();
         let inner = 1..=qd.len();
-        // As steep as the law may be, the step still leads towards the solution.
+        // The step is short enough to converge however steep the law is.
         let steepness = 2.0 * kick[run.start % n].abs() * self.most / width_rad_s;
         let step = 1.0 / (1.0 + steepness);
-        // What is unbalanced, with the ticks before and behind the run, where the joint follows the series.
+        // The unbalanced friction, with one tick before the run and one behind it, where the joint follows the series.
         let around = || (run.start + n - 1..=run.end + n).map(|k| k % n);
         let given: Vec<f64> = around().map(|k| delivered[k]).collect();
         let mut force: Vec<f64> = around().map(|k| law(series[k]) - delivered[k]).collect();
@@ -160,7 +161,8 @@ mod tests {
         Turning { series_rad_s, expected, kick_rad_s }
     }
 
-    /// A joint pushed to and fro by a drive that knows nothing of friction, at every tick of its fourth period.
+    /// The velocity of a joint that is pushed to and fro by a drive without friction feed-forward, at every tick of the
+    /// fourth period.
     fn motion() -> Vec<f64> {
         const STEPS: usize = 40;
         let ticks = SAMPLES * FINE;
@@ -186,9 +188,9 @@ mod tests {
         a.iter().zip(b).fold(0.0, |most, (a, b)| most.max((a - b).abs()))
     }
 
-    /// Between its samples the joint leaves the series by most of the width of its friction. What is found lies within the
-    /// trapezoids in which it is looked for: behind a turn at 10 rad/s² a tick takes the joint through 5 mrad/s, a width, and
-    /// an eighth of that is the error of one.
+    /// Between its samples the joint departs from the series by more than half of the width of its friction. The
+    /// solution lies within the error of the trapezoids on which it is computed: behind a reversal at 10 rad/s² a tick
+    /// takes the joint through 5 mrad/s, a width, and an eighth of that is the error of one trapezoid.
     #[test]
     fn a_joint_is_found_between_its_samples() {
         let clock = FineClock::new(SAMPLES, FINE);
@@ -209,7 +211,7 @@ mod tests {
         assert!(left < WIDTH_RAD_S / 8.0);
     }
 
-    /// A drive that delivers what friction takes leaves the joint where its samples say.
+    /// A drive that delivers all of the friction leaves the joint where the series says.
     #[test]
     fn what_is_delivered_bends_nothing() {
         let clock = FineClock::new(SAMPLES, FINE);

@@ -1,6 +1,6 @@
 //! The size of an error.
 
-/// Rms of the samples that count, Nm; NaN of none, which is no error of size zero.
+/// Rms of the samples that count, Nm; NaN if none does, because that is not an error of size zero.
 pub fn rms_where(e: &[f64], counts: impl Fn(usize) -> bool) -> f64 {
     let (mut square, mut count) = (0.0, 0usize);
     for (_, e) in e.iter().enumerate().filter(|(k, _)| counts(*k)) {

@@ -8,32 +8,34 @@ use super::kind::Kind;
 use super::significance::{FAR_AHEAD, LEAST_EVIDENCE};
 use super::study::{Entry, Score, Study};
 
-/// Causes at most: a log that needs more has another kind of problem.
+/// Most causes: a log that needs more has another kind of problem.
 const MOST_CAUSES: usize = 24;
-/// Share of a cause's square that another explains as well, at least, if it may stand in for it.
+/// A cause can stand in for another one only if it explains at least this share of the other's square.
 pub(super) const SHARED: f64 = 0.5;
-/// Rounds in which causes of a single run are exchanged: two may replace each other for ever.
+/// Most rounds of exchanging the causes of a single run: two causes may replace each other for ever.
 const EXCHANGES: usize = 3;
-/// 2 ln of the odds by which another has to be ahead of a cause to take its place: two that say much the same would take turns.
+/// 2 ln of the odds by which a contender must be ahead of a cause to replace it. Without a margin, two that explain
+/// much the same would take turns.
 const CLEARLY_BETTER: f64 = 1.0;
-/// Causes of one family on one joint at most, where a family may be there more than once: gears and motors have
-/// a few orders of ripple, and more of them are what another cause leaves.
+/// Most causes of one family on one joint, where a family may occur more than once. Gears and motors have a few orders
+/// of ripple; further ones are what another cause leaves.
 const MOST_ALIKE: usize = 3;
-/// Families whose shapes are refined before one is chosen.
+/// Number of families whose shapes are refined before one is chosen.
 pub(super) const FINALISTS: usize = 10;
 
-/// Share of what a family explains at the best of all its starting shapes which another variant explains at its own, at
-/// least, if it may explain more between them: from one starting shape to the best near it Stribeck's curve gains 3 %.
+/// Another variant is refined only if, at its best starting shape, it explains at least this share of what the family
+/// explains at the starting shape under consideration; otherwise it cannot be ahead between its starting shapes. For
+/// scale: from a starting shape to the best one near it, Stribeck's curve gains 3 %.
 const BETWEEN_SHAPES: f64 = 0.8;
 
-/// A family that was considered, at its best shape.
+/// A family that was considered at one site, at its best shape.
 #[derive(Debug, Clone)]
 pub struct Contender {
     /// Family, site, shape and columns.
     pub entry: Entry,
     /// What it explains.
     pub score: Score,
-    /// Twice the log-evidence against no effect.
+    /// Twice the log-evidence for it against no effect.
     pub evidence: f64,
 }
 
@@ -45,16 +47,17 @@ pub struct Kept<'s, 'a> {
     with_common: bool,
 }
 
-/// Causes, and twice the log-evidence for all of them together against none.
+/// The causes that were found, and twice the log-evidence for all of them together against none.
 pub struct Found {
     pub causes: Vec<Contender>,
     pub evidence: f64,
 }
 
-/// Adds families one by one while the data ask for it; along a single run those of single joints.
+/// Adds families one by one as long as the data demand it; along a single run only on single joints.
 ///
-/// A cause of the arm as a whole, found first because no single joint's explains as much, may stand for another one that all joints
-/// have: causes of single joints alone take its place where the evidence leaves no doubt, unless they are the same one, joint by joint.
+/// A cause of the arm as a whole, which is found first because no cause of a single joint explains as much, may stand
+/// in for a different effect that all joints have. Causes of single joints replace it where the evidence leaves no
+/// doubt, unless they are of its own family, joint by joint.
 pub fn select(study: &Study) -> Found {
     let grown = |with_common: bool| {
         let mut kept = Kept { study, causes: Vec::new(), with_common };
@@ -77,13 +80,13 @@ pub fn select(study: &Study) -> Found {
 }
 
 impl<'s, 'a> Kept<'s, 'a> {
-    /// `causes` as they were found in this `study`.
+    /// The `causes` as they were found in this `study`.
     pub fn settled(study: &'s Study<'a>, causes: Vec<Contender>) -> Self {
         Self { study, causes, with_common: true }
     }
 
-    /// `causes` found in another study of the same log (its load estimated with another model),
-    /// taken over into `study`, refined and judged.
+    /// Takes `causes` found in another study of the same log (with loads from another estimate of the arm) over into
+    /// `study`, and refines and scores them there.
     pub fn taken_over(study: &'s Study<'a>, causes: Vec<Contender>) -> Self {
         let again = causes.into_iter().filter_map(|cause| {
             let Entry { family, site, shape, .. } = cause.entry;
@@ -96,9 +99,11 @@ impl<'s, 'a> Kept<'s, 'a> {
         kept
     }
 
-    /// The causes of a single run: from `found` on single joints, then those of the arm as a whole beside
-    /// them. Where such a cause shows up, all are looked for together as well, and the better evidence
-    /// wins: one cause of all joints may explain more than any on one joint, and yet less than several.
+    /// The causes of a single run: those `found` on single joints, then those of the arm as a whole beside them.
+    ///
+    /// If a cause of the whole arm shows up, all causes are also searched for together from the start, and the result
+    /// with more evidence wins: one cause of all joints may explain more than any cause of one joint, and yet less than
+    /// several of them.
     pub fn of_a_single_run(study: &'s Study<'a>, found: Vec<Contender>) -> Self {
         let mut kept = Self::taken_over(study, found);
         kept.grow();
@@ -113,22 +118,24 @@ impl<'s, 'a> Kept<'s, 'a> {
         kept
     }
 
-    /// Adds families one by one while the data ask for it.
+    /// Adds families one by one as long as the data demand it.
     pub fn grow(&mut self) {
         let mut dropped: Vec<(usize, Option<usize>)> = Vec::new();
-        // Two causes may replace each other for ever: rounds are counted, not causes.
+        // The limit counts rounds, not causes, because two causes may replace each other for ever.
         for _ in 0..MOST_CAUSES {
             let (others, residual) = self.without(None);
-            // Where noise has a memory, the most evidence and the least chance need not go together.
+            // Where noise is correlated in time, the contender with the most evidence need not be the least likely by
+            // chance.
             let contenders = self.contenders(None, &others, &residual);
             let significant = |c: &Contender| {
                 !dropped.contains(&(c.entry.family, c.entry.site))
                     && self.is_significant(c, &others, &residual)
             };
             let finalists = &contenders[..FINALISTS.min(contenders.len())];
-            // What explains a joint best without being its own law is in the place of something unknown, and
-            // what explains less is not that. What all joints have in common is no single one's: several with a law each look
-            // like another one of the arm.
+            // A contender that explains a joint best but is not its family's own law stands in for something unknown. A
+            // contender far behind it is not that unknown, unless it is needed beside it. But a law of a single joint
+            // is not ruled out by one of the whole arm, because several joints with a law each look like one of the
+            // arm.
             let foreign: Vec<&Contender> = finalists
                 .iter()
                 .filter(|c| !self.is_its_own(&c.entry, &others, &residual))
@@ -159,9 +166,9 @@ impl<'s, 'a> Kept<'s, 'a> {
         self.study.statistic.gain(&span, &self.study.residual) - price
     }
 
-    /// Exchanges causes for what explains the log better beside all others, and grows again.
+    /// Replaces causes by contenders that explain the log better beside all other causes, and grows again.
     ///
-    /// What was found first may have stood in for a cause that came later, on any joint.
+    /// A cause that was found early may have stood in for one that was found later, on any joint.
     fn exchange(&mut self) {
         for _ in 0..EXCHANGES {
             let mut exchanged = false;
@@ -186,9 +193,11 @@ impl<'s, 'a> Kept<'s, 'a> {
         }
     }
 
-    /// What might be in the place of cause `c`, best first. What is ahead along a single run is in its place
-    /// only if it explains the same, and if it would be named there: more evidence in few stretches of time
-    /// alone makes no rival.
+    /// Contenders that might take the place of cause `c`, best first.
+    ///
+    /// Along a single run, a contender with more evidence than the cause counts only if it explains the same part of
+    /// the residual and would itself be significant there: more evidence in a few stretches of time does not make a
+    /// rival.
     pub(super) fn rivals(&self, c: usize, others: &Span, residual: &Image) -> Vec<Contender> {
         let Entry { family, site, .. } = self.causes[c].entry;
         let mut rivals = self.contenders(Some(c), others, residual);
@@ -206,8 +215,8 @@ impl<'s, 'a> Kept<'s, 'a> {
         rivals
     }
 
-    /// `entry` in the other variants of its family and in those of `richer`, each at its best shape: those whose best starting shape
-    /// gains more than `least`.
+    /// `entry` in the other variants of its family, those of `richer` included, each at its best shape. Only variants
+    /// whose best starting shape gains more than `least` are considered.
     pub(super) fn other_variants(
         &self,
         entry: &Entry,
@@ -233,8 +242,9 @@ impl<'s, 'a> Kept<'s, 'a> {
         best.into_par_iter().filter_map(|(e, _)| study.refined(e, others, residual)).collect()
     }
 
-    /// The best variant and shape near `entry`, of those of `richer` as well. What is the family's own goes before what is not
-    /// ([`Self::is_its_own`]), unless that is far ahead: the narrowest curve of one law looks like a wider one of another.
+    /// The best variant and shape near `entry`, the variants of `richer` included. A form that is the family's own
+    /// ([`Self::is_its_own`]) is preferred to one that is not, unless the latter is far ahead: the narrowest curve of one
+    /// law looks like a wider one of another.
     fn at_its_best(
         &self,
         entry: &Entry,
@@ -258,7 +268,7 @@ impl<'s, 'a> Kept<'s, 'a> {
         Some(forms.swap_remove(place))
     }
 
-    /// The best variant and shape of cause `c`, the others given.
+    /// Refines cause `c` to its best variant and shape, given the other causes.
     fn refine(&mut self, c: usize) {
         let (others, residual) = self.without(Some(c));
         let current = self.best_start(&self.causes[c].entry, &others, &residual);
@@ -268,7 +278,7 @@ impl<'s, 'a> Kept<'s, 'a> {
         }
     }
 
-    /// The best variants and shapes of all causes at `site`.
+    /// Refines all causes at `site` to their best variants and shapes.
     pub(super) fn refine_at(&mut self, site: Option<usize>) {
         for c in 0..self.causes.len() {
             if self.causes[c].entry.site == site {
@@ -277,8 +287,8 @@ impl<'s, 'a> Kept<'s, 'a> {
         }
     }
 
-    /// The best of `entry`'s shape and the starting shapes of its variant; several causes of one family on one
-    /// joint keep their own.
+    /// The best of `entry`'s own shape and the starting shapes of its variant. Causes of a repeatable family keep their
+    /// own shape, and so do all causes of a motion that repeats.
     fn best_start<'e>(&'e self, entry: &'e Entry, others: &Span, residual: &Image) -> &'e Entry {
         let study = self.study;
         if study.scene.periodic || study.families[entry.family].is_repeatable() {
@@ -294,8 +304,8 @@ impl<'s, 'a> Kept<'s, 'a> {
         best.fold(start, |best, e| if e.1 > best.1 { e } else { best }).0
     }
 
-    /// Span of all causes but `left_out`, with the shares that drives feed forward where these blur reversals, and the
-    /// residual outside it.
+    /// The span of all causes but `left_out`, together with the shares that drives feed forward where a cause blurs
+    /// reversals; and the residual outside that span.
     pub fn without(&self, left_out: Option<usize>) -> (Span, Image) {
         let study = self.study;
         let others = self.causes.iter().enumerate().filter(|(c, _)| Some(*c) != left_out);
@@ -306,13 +316,13 @@ impl<'s, 'a> Kept<'s, 'a> {
         (span, residual)
     }
 
-    /// 2 ln of the evidence for adding `entry`: what it explains, less its price.
+    /// 2 ln of the evidence for adding `entry`: its gain less its price.
     pub(super) fn evidence(&self, entry: &Entry, score: Score) -> f64 {
         score.gain - self.study.price(entry)
     }
 
-    /// The best shape of every family at every site that is free (`open` is the cause to be replaced,
-    /// if any), best first.
+    /// The best shape of every family at every free site, best first. `open` is the cause to be replaced, if any; its
+    /// place counts as free.
     fn contenders(&self, open: Option<usize>, others: &Span, residual: &Image) -> Vec<Contender> {
         let study = self.study;
         let orders = self.ripple_orders(residual);
@@ -320,7 +330,7 @@ impl<'s, 'a> Kept<'s, 'a> {
             open.and_then(|c| self.causes[c].entry.site).filter(|_| !study.scene.periodic);
         let left_out = |entry: &Entry| match entry.site {
             None => !self.with_common,
-            // Along a single run what acts on another joint does not stand in for this one's cause.
+            // Along a single run, a cause on another joint cannot stand in for one of this joint.
             site => open_site.is_some() && site != open_site,
         };
         let taken = |entry: &Entry| {
@@ -331,8 +341,9 @@ impl<'s, 'a> Kept<'s, 'a> {
             let most = if study.families[entry.family].is_repeatable() { MOST_ALIKE } else { 1 };
             self.causes.iter().enumerate().filter(is_taken).count() >= most
         };
-        // What all joints share is told from what single ones have by the majority: beside one of the arm as a whole, most
-        // joints with one of their own would say in many numbers that the others have another.
+        // An effect that all joints share is told from effects of single joints by majority. Beside a cause of the
+        // whole arm, at most one joint may have a cause of the same family: if most joints had one, these would say in
+        // many numbers that the remaining joints differ.
         let outvoted = |entry: &Entry| {
             let (mut single, mut common) = (0, 0);
             for (c, cause) in self.causes.iter().enumerate() {
@@ -369,7 +380,7 @@ impl<'s, 'a> Kept<'s, 'a> {
         best.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
         let mut finalists = FINALISTS.min(best.len());
         if !study.scene.periodic {
-            // A finer shape does not double the evidence.
+            // Refining a shape does not double the evidence.
             let near = |c: &&Contender| c.evidence > 0.5 * best[0].evidence;
             finalists = best.iter().take(finalists).take_while(near).count();
         }
@@ -386,7 +397,7 @@ impl<'s, 'a> Kept<'s, 'a> {
         all
     }
 
-    /// Ripple at the orders in which the residual has most power.
+    /// Entries of ripple at the orders in which the residual has most power.
     fn ripple_orders(&self, residual: &Image) -> Vec<Entry> {
         let study = self.study;
         let Some(family) = study.families.iter().position(|f| f.kind() == Kind::Ripple) else {
@@ -406,11 +417,11 @@ impl<'s, 'a> Kept<'s, 'a> {
             .collect()
     }
 
-    /// Refines all causes jointly, exchanges those that another family now replaces, and drops those
-    /// that are not needed any more. `false` if the newest cause was dropped.
+    /// Refines all causes jointly, replaces those that another family explains better beside the newest one, and drops
+    /// those that are no longer needed. Returns `false` if the newest cause was dropped.
     ///
-    /// Along a single run, whose causes are many, only those that share a joint with the newest: the others are
-    /// looked at once all are found ([`Self::exchange`]).
+    /// Along a single run, which has many causes, only those that share a joint with the newest are looked at; the
+    /// others follow once all are found ([`Self::exchange`]).
     fn settle(&mut self) -> bool {
         let newest = self.causes.len() - 1;
         let new_site = self.causes[newest].entry.site;
@@ -426,7 +437,7 @@ impl<'s, 'a> Kept<'s, 'a> {
             }
             let mut exchanged = false;
             for c in 0..self.causes.len().saturating_sub(1) {
-                // Only what shares a joint with the newest can have stood in for it.
+                // Only a cause that shares a joint with the newest can have stood in for it.
                 if !shares_joint(self.causes[c].entry.site) {
                     continue;
                 }
@@ -451,7 +462,7 @@ impl<'s, 'a> Kept<'s, 'a> {
         !self.drop_unneeded(is_looked_at).contains(&newest)
     }
 
-    /// Drops causes at these sites that are not needed beside the others; which they were.
+    /// Drops causes at the sites `is_looked_at` that are not needed beside the others; returns their former indices.
     pub(super) fn drop_unneeded(
         &mut self,
         is_looked_at: impl Fn(Option<usize>) -> bool,
@@ -473,8 +484,8 @@ impl<'s, 'a> Kept<'s, 'a> {
         dropped
     }
 
-    /// Whether all causes explain more with cause `c`, what it costs counted, than they would without it: others on its joint
-    /// may have the shapes that they have because of it.
+    /// Whether all causes together have more evidence with cause `c`, its price included, than without it. For the
+    /// comparison the other causes on its joint are refined without it, because they may owe their shapes to it.
     fn is_more_with(&self, c: usize) -> bool {
         let site = self.causes[c].entry.site;
         let share_site = self.causes.iter().filter(|cause| cause.entry.site == site).count();
@@ -487,7 +498,7 @@ impl<'s, 'a> Kept<'s, 'a> {
         self.total_evidence() - without.total_evidence() > LEAST_EVIDENCE
     }
 
-    /// Square that `contender` explains of `signal`, which `others` have left.
+    /// Square of the part of `signal`, which lies outside `others`, that `contender` explains.
     pub(super) fn explains(&self, contender: &Contender, others: &Span, signal: &Image) -> f64 {
         self.study.span(&contender.entry, others).explained(signal)
     }

@@ -1,4 +1,4 @@
-//! What a diagnosis says, in words.
+//! A diagnosis in words.
 
 use super::against::MOVED;
 use super::kind::Kind;
@@ -7,19 +7,21 @@ use super::told;
 use super::verdict::{Cause, Diagnosis, Estimate, HeldOut, Moved};
 use crate::number::{percent, resolved_from, significant, with_sigma};
 
-/// An interval that reaches so much farther to one side than to the other is told by its ends.
+/// An interval that reaches this many times farther to one side than to the other is stated by its ends.
 const UNEVEN: f64 = 1.2;
-/// What is less sure than this is said with a "may".
+/// A cause with less confidence than this is stated with a "may".
 const EVEN_ODDS: f64 = 0.5;
-/// Times the error along the log from which on the error along another one is none of the same arm.
+/// From this many times the error along the log on, the error along another log is not one of the same arm.
 const OF_ANOTHER_ARM: f64 = 3.0;
-/// Chances below this are all alike.
+/// Smaller probabilities are not told apart.
 const RARE: f64 = 1e-4;
-/// Ends of an uneven interval that are this factor apart leave the size open: what lies between is no estimate of it.
+/// If the ends of an uneven interval are this factor apart, the size is open: no value between them is an estimate of
+/// it.
 const VAST: f64 = 10.0;
 
 impl Diagnosis {
-    /// The first screen; `laws` are the sites of the extended model's effects: joint (1-based), or the arm as a whole.
+    /// The sentences of the first screen. `laws` are the sites of the extended model's effects: a joint (1-based), or
+    /// `None` for the arm as a whole.
     pub(super) fn in_sentences(&self, laws: &[Option<usize>]) -> Vec<String> {
         let is_left = self.unexplained.is_some() && self.noise_floor_nm.is_some();
         let mut out: Vec<String> = Vec::new();
@@ -44,7 +46,7 @@ impl Diagnosis {
         out
     }
 
-    /// The sentence where nothing is named.
+    /// The sentence if nothing is named.
     pub(super) fn nothing_found(&self) -> &'static str {
         match self.noise_floor_nm {
             Some(_) => {
@@ -59,7 +61,7 @@ impl Diagnosis {
         }
     }
 
-    /// The sentence about the parameters beside those of a simulation.
+    /// The sentence that compares the base parameters with those of a simulation.
     fn moved(&self) -> Option<String> {
         let far = |a: &&Moved, b: &&Moved| a.z.abs().total_cmp(&b.z.abs());
         let farthest = self.moved_parameters.iter().max_by(far)?;
@@ -79,7 +81,8 @@ impl Diagnosis {
         ))
     }
 
-    /// The sentence about a log along which the model errs far more, friction at standstill left open.
+    /// The sentence about a log along which the model errs far more than along this one, even with friction at
+    /// standstill left open.
     fn does_not_carry_over(&self, held_out: &HeldOut) -> Option<String> {
         let noise = |j: usize| self.noise_floor_nm.as_ref().map_or(0.0, |noise| noise[j]);
         let expected = self.after.rms_nm.iter().enumerate().map(|(j, rms)| rms.hypot(noise(j)));
@@ -100,7 +103,7 @@ impl Diagnosis {
     }
 }
 
-/// The sentence about `causes` on many joints, beside something that none of them explains.
+/// The sentence about `causes` that are spread over many joints, for a log that shows something unexplained.
 fn missing_effect(causes: &[Cause]) -> Option<String> {
     let joints: Vec<String> = scattered_joints(causes).iter().map(usize::to_string).collect();
     (!joints.is_empty()).then(|| {
@@ -112,8 +115,9 @@ fn missing_effect(causes: &[Cause]) -> Option<String> {
     })
 }
 
-/// The sentence about what `laws` at these sites change along another log while joints move, on the joint with one of which
-/// they change most. What only moved the parameters is in both models, and what happened once in none.
+/// The sentence about how `laws` at these sites change the error along another log while the joint moves, for the joint
+/// with a law on which the error changes most. Joints without laws are left out: parameters that only moved are in both
+/// models, and events that happened once in neither.
 fn gain_along(held_out: &HeldOut, laws: &[Option<usize>]) -> Option<String> {
     let has_law = |j: usize| laws.iter().any(|joint| joint.is_none_or(|joint| joint == j + 1));
     let HeldOut { before_moving_rms_nm, after_moving_rms_nm, .. } = held_out;
@@ -137,7 +141,7 @@ fn gain_along(held_out: &HeldOut, laws: &[Option<usize>]) -> Option<String> {
 }
 
 impl Estimate {
-    /// `value ± half unit`, or with both ends where they are far from even.
+    /// `value ± half unit`, or the value between both ends if these are far from even.
     pub(super) fn in_words(&self) -> String {
         let [low, high] = self.ci95;
         if self.says_nothing() {
@@ -161,8 +165,9 @@ impl Estimate {
         above > UNEVEN * below || below > UNEVEN * above
     }
 
-    /// Whether the interval spans a whole turn; or, uneven and of one sign, a factor of ten or all from zero on, which is where the sizes
-    /// that make sense begin.
+    /// Whether the interval says nothing about the value. Either it spans a whole turn; or it is uneven, of one sign,
+    /// and its ends are more than a factor of ten apart. An end at zero, where the meaningful sizes begin, is
+    /// infinitely far apart in this sense.
     fn says_nothing(&self) -> bool {
         let [low, high] = self.ci95;
         let (near, far) = (low.abs().min(high.abs()), low.abs().max(high.abs()));
@@ -203,12 +208,12 @@ impl Cause {
         text
     }
 
-    /// Whether something else is as likely.
+    /// Whether something else is more likely than this cause.
     pub(super) fn is_doubtful(&self) -> bool {
         self.confidence < EVEN_ODDS
     }
 
-    /// The sentence about what it removes, with a blank before.
+    /// The sentence about what the cause removes, with a leading blank.
     pub(super) fn gain_in_words(&self, noise_is_known: bool) -> Option<String> {
         let of = if noise_is_known {
             "of what the noise floor leaves to explain, on periods that were not used to fit it"
@@ -232,7 +237,7 @@ impl Cause {
         }
     }
 
-    /// The parameters in brackets, with a blank before, and which form of the law fits best; nothing where none is told.
+    /// The parameters and the best form of the law in brackets, with a leading blank; empty if there are no parameters.
     fn numbers(&self) -> String {
         let number = |(name, e): (&&str, &Estimate)| {
             let name = name.trim_end_matches(&unit_suffix(e.unit)).replace('_', " ");
@@ -270,7 +275,7 @@ impl Cause {
     }
 }
 
-/// The unit as parameter names carry it, such as `_nm`.
+/// The unit as a suffix of parameter names, such as `_nm`.
 fn unit_suffix(unit: &str) -> String {
     format!(
         "_{}",
@@ -297,7 +302,8 @@ mod tests {
         Estimate { value, unit, ci95 }.in_words()
     }
 
-    /// An order of ripple was "21 (between 21 and 21)".
+    /// The ends are rounded finely enough to differ from the value: an order of ripple must not be "21 (between 21 and
+    /// 21)".
     #[test]
     fn the_ends_of_an_interval_differ() {
         let order = told(20.959, [20.937, 20.989], "1/turn");
@@ -305,13 +311,13 @@ mod tests {
         assert_eq!(told(0.4788, [0.3246, 1.472], "Nm"), "0.48 (between 0.32 and 1.5) Nm");
     }
 
-    /// Friction that warms up by 6 % or 360 %, and one that cools down likewise.
+    /// Friction that rises by 6 % or 360 % as it warms up, and friction that falls likewise.
     #[test]
     fn what_may_be_ten_times_as_much_is_hardly_known() {
         assert_eq!(told(0.058, [0.031, 3.6], ""), "hardly known (between 0.031 and 3.6)");
         assert_eq!(told(-0.058, [-3.6, -0.031], ""), "hardly known (between -3.6 and -0.031)");
         assert_eq!(told(0.3, [0.0, 0.4], "rad"), "hardly known (between 0 and 0.40) rad");
-        // What is known to half of it has a value, and so has what may be none.
+        // A size that may be half or none is still stated with its value.
         assert_eq!(told(0.02, [0.001, 0.039], ""), "0.020 ± 0.019");
         assert_eq!(told(0.02, [-0.001, 0.06], ""), "0.020 (between -0.0010 and 0.060)");
     }

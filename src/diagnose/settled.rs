@@ -1,7 +1,8 @@
 //! Causes and the estimate of the arm, fitted in turn.
 //!
-//! Causes are looked for along loads, friction and torques that an estimate predicts, and what is wrong bends the estimate.
-//! The load on a gear is better known once friction is, and so is what touched the arm, and what a reading cuts off.
+//! Causes are searched for along loads, friction and torques that an estimate of the arm predicts, and unmodelled
+//! causes bias that estimate. Once friction is known better, so are the load on a gear, contacts with the arm, and
+//! where readings are cut off.
 
 use super::contact::{self, BesideModel};
 use super::error::DiagnoseError;
@@ -12,16 +13,16 @@ use crate::base::BaseSet;
 use crate::robot::{Arm, JointSignals};
 use crate::signal::{SignalError, ZeroPhase, mean_period};
 
-/// Rounds of causes and estimate at most.
+/// Most rounds of causes and estimate.
 const ROUNDS: usize = 4;
-/// 2 ln of the evidence below which another round changes nothing that counts.
+/// A round that gains less than this, in 2 ln of the evidence, changes nothing that counts.
 const SETTLED: f64 = 4.0;
 
-/// What was `found` in `study`, and the estimate of the arm beside it, until one no longer changes the other.
+/// Fits what was `found` in `study` and the estimate of the arm in turn, until neither changes the other.
 ///
-/// Of a motion that repeats, what was found only because the estimate was bent is dropped on the way, and the arm estimated
-/// without it; a single run has one
-/// round, because what it shows is judged by what the causes leave ([`Kept::of_a_single_run`]).
+/// For a motion that repeats, a cause that was found only because the estimate was biased is dropped on the way, and
+/// the arm is estimated without it. A single run gets one round, because its causes are judged by what they leave
+/// ([`Kept::of_a_single_run`]).
 pub fn settled<'s>(
     mut study: Study<'s>,
     found: Found,
@@ -54,7 +55,7 @@ pub fn settled<'s>(
     Ok((study, causes))
 }
 
-/// `study` of a single run without the rows in which something touched the arm beside `model`.
+/// The `study` of a single run without the rows in which something touched the arm according to `model`.
 pub fn without_contacts<'s>(
     study: Study<'s>,
     set: &BaseSet,
@@ -65,8 +66,8 @@ pub fn without_contacts<'s>(
     study.without_rows(set, &touched.samples, log)
 }
 
-/// Contacts in the residual of a model along a single run; none where a motion repeats, which shows them
-/// better ([`contact::between_periods`]).
+/// Contacts in the residual of a model along a single run. None for a motion that repeats, which shows them better by
+/// itself ([`contact::between_periods`]).
 pub fn beside_model(study: &Study, after_nm: &JointSignals) -> Result<BesideModel, SignalError> {
     let regression = study.regression;
     let prepared = &regression.prepared;
@@ -86,7 +87,7 @@ pub fn beside_model(study: &Study, after_nm: &JointSignals) -> Result<BesideMode
     contact::beside_model(after_nm, &qd, &time_s, &low_pass)
 }
 
-/// Residual of `model` in time, Nm: of the mean period, or of the run.
+/// Residual of `model` over time, Nm: of the mean period, or of the single run.
 pub fn residual(study: &Study, model: &Extension) -> JointSignals {
     let problem = &study.regression.problem;
     let predicted = model.torque_nm(study.families, &study.scene, problem, Some(&study.whitening));

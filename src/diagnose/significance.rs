@@ -1,5 +1,5 @@
-//! When a family's law counts as a cause: chance does not explain it, the evidence is for it, it is its family's own,
-//! and it is more than what the other causes leave by the approximate form of their laws.
+//! When a family's law counts as a cause: chance does not explain it, the evidence is for it, it is the family's own
+//! law, and it is more than what the other causes leave because their laws are approximate.
 
 use super::candidates::Shape;
 use super::chance;
@@ -7,21 +7,22 @@ use super::image::{Image, Span};
 use super::selection::{Contender, Kept};
 use super::study::{Entry, LEAST_GAIN};
 
-/// A law is another's only if its coefficient is so by more than so many σ.
+/// A coefficient rules a law out as the family's own only if it still does so this many σ to either side.
 const DOUBT: f64 = 2.0;
-/// A family's law is right to this share of its own size: what is smaller on the same joint is no second
-/// cause.
+/// A family's law is accurate to this share of its own size: anything smaller on the same joint is no second cause.
 const FORM_ERROR: f64 = 0.05;
-/// 2 ln of the odds for a cause, at least: e to one.
+/// Least 2 ln of the odds for a cause: e to one.
 pub const LEAST_EVIDENCE: f64 = 2.0;
-/// 2 ln of the odds between two laws that leave no doubt: twenty to one.
+/// 2 ln of the odds at which no doubt is left between two laws: twenty to one.
 pub(super) const FAR_AHEAD: f64 = 6.0;
 
 impl Kept<'_, '_> {
-    /// Whether chance explains `contender` in fewer logs without faults than [`chance::LAW`], all
-    /// families, sites and shapes counted, the evidence is for it, and it is more than what the
-    /// approximate form of the causes found beside it may leave. Along a single run it also has to show in
-    /// stretches of time left out of its fit.
+    /// Whether `contender` counts as a cause beside `others`.
+    ///
+    /// Chance must explain it in fewer than [`chance::LAW`] of logs without faults, all families, sites and shapes
+    /// counted; the evidence must be for it; it must be its family's own law; and it must be more than what the causes
+    /// found beside it may leave by the approximate form of their laws. Along a single run it also has to show in
+    /// stretches of time that were left out of its fit.
     pub(super) fn is_significant(
         &self,
         contender: &Contender,
@@ -53,7 +54,7 @@ impl Kept<'_, '_> {
             && study.generalises(site, &span, residual, LEAST_GAIN)
     }
 
-    /// Whether `contender` is needed beside `other`, which is on another joint, and all causes.
+    /// Whether `contender` is needed beside all causes and `other`, which sits on another joint.
     pub(super) fn is_significant_beside(&self, contender: &Contender, other: &Contender) -> bool {
         let (site, other_site) = (contender.entry.site, other.entry.site);
         if site == other_site || site.is_none() || other_site.is_none() {
@@ -73,11 +74,14 @@ impl Kept<'_, '_> {
         self.is_significant(&beside, &others, &residual)
     }
 
-    /// See [`super::candidates::Candidate::is_its_own`]; a coefficient counts as what is nearest to the law's own of
-    /// all that noise leaves possible, and so does one with which the shape does not go
-    /// ([`super::candidates::Candidate::agreeing`]) unless that which does explains as much. A law that holds a parameter
-    /// twice, so that it could be of any size by its coefficients alone, is the family's own only where the data tell its
-    /// shape from the smallest: play that is none but for flanks that give way is a soft gear.
+    /// Whether `entry`, with its shape and fitted coefficients, is its family's own law
+    /// ([`super::candidates::Candidate::is_its_own`]).
+    ///
+    /// Its first coefficient may take any value that noise leaves possible. The shape must also agree with the
+    /// coefficient ([`super::candidates::Candidate::agreeing`]) for one such value, unless the shape that does agree
+    /// explains as much. A law that holds a parameter twice could have any size by its coefficients alone; it is the
+    /// family's own only if the data tell its shape from the smallest one: play of no width between flanks that give
+    /// way is a soft gear.
     pub(super) fn is_its_own(&self, entry: &Entry, others: &Span, residual: &Image) -> bool {
         let study = self.study;
         let Entry { family, site, shape, .. } = *entry;
@@ -103,7 +107,7 @@ impl Kept<'_, '_> {
                 || self.is_as_good(entry, law.agreeing(shape, &b), others, residual))
     }
 
-    /// Whether `entry` explains hardly more than it would with another `shape`.
+    /// Whether `entry` explains hardly more than it would with the other `shape`.
     fn is_as_good(&self, entry: &Entry, shape: Shape, others: &Span, residual: &Image) -> bool {
         let study = self.study;
         let gain = |e: &Entry| study.score(e, others, residual).map(|score| score.gain);
@@ -114,7 +118,7 @@ impl Kept<'_, '_> {
         }
     }
 
-    /// 2 ln of the odds for the shape of `entry` against the smallest of its variant.
+    /// 2 ln of the odds for the shape of `entry` against the smallest shape of its variant.
     fn ahead_of_smallest(&self, entry: &Entry, others: &Span, residual: &Image) -> f64 {
         let place = |e: &Entry| (e.family, e.site, e.shape.variant);
         let same = self.study.entries.iter().filter(|e| place(e) == place(entry));
@@ -124,14 +128,14 @@ impl Kept<'_, '_> {
         gain(entry).unwrap_or(0.0) - of_smallest
     }
 
-    /// The share of its own size to which the law of `entry` is right.
+    /// The share of its own size to which the law of `entry` is accurate.
     fn form_error(&self, entry: &Entry) -> f64 {
         let study = self.study;
         study.families[entry.family].form_error(&study.scene, entry.shape).max(FORM_ERROR)
     }
 
-    /// Square of what cause `c`, which sits on another joint, does to joint `j`: what swings or turns round sharply jolts
-    /// all joints, and an error in how it does looks like a cause of theirs.
+    /// Square of what cause `c`, which sits on another joint, does to joint `j`. A cause that oscillates or reverses
+    /// sharply jolts all joints, and an error in its law looks like a cause on them.
     fn square_on(&self, j: usize, c: usize) -> f64 {
         let (others, residual) = self.without(Some(c));
         let entry = &self.causes[c].entry;

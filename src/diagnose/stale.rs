@@ -1,7 +1,9 @@
-//! Readings of single channels that repeat the one before: the recorder asked again before the sensor had anything new.
+//! Readings of single channels that repeat the one before, because the recorder asked again before the sensor had a new
+//! one.
 //!
-//! A signal with steps Δ that changes by c from reading to reading repeats one by chance about as often as Δ/c. Readings that repeat
-//! far more often than that while their joint moves are stale, unless they stand at the end of what can be read.
+//! A signal that is quantised in steps Δ and changes by c from reading to reading repeats by chance in about Δ/c of all
+//! readings. Readings that repeat far more often while their joint moves are stale, unless they lie at the end of the
+//! channel's range.
 
 use super::data_faults::{MOVES_RAD_S, cause, exact};
 use super::kind::Kind;
@@ -11,45 +13,46 @@ use crate::median::median;
 use crate::robot::JointSignals;
 use crate::signal::resolution;
 
-/// So many times as often as chance repeats a reading, and at least this share of all: a few missed samples are no cause of anything.
+/// Stale readings must be this many times as frequent as chance makes them, and at least this share of all: a few
+/// missed samples are no cause of anything.
 const BEYOND_CHANCE: f64 = 3.0;
 const LEAST_SHARE: f64 = 2e-3;
-/// A channel that repeats half of its readings, or more of them, is read at a lower rate.
+/// From this share of repeated readings on, a channel is not stale but read at a lower rate.
 const MOST_SHARE: f64 = 0.4;
-/// Slower than [`MOVES_RAD_S`] for most of so long before and behind, s, a joint may as well stand still.
+/// A joint counts as possibly at rest if it is slower than [`MOVES_RAD_S`] for most of this time before and behind, s.
 const NEAR_S: f64 = 0.2;
-/// Share of the rows that may be taken out because of stale readings.
+/// Largest share of the rows that may be removed because of stale readings.
 const MOST_ROWS: f64 = 0.4;
-/// So many readings alike are a sensor that hangs: what stands between its neighbours in time is not known any more.
+/// This many repeated readings in a row are a sensor that hangs: the values in between can no longer be interpolated.
 const HANGS: usize = 6;
-/// Share of the runs of equal readings that may have the same number by chance.
+/// Largest share of the runs of equal readings that may have the same value by chance.
 const ONE_NUMBER: f64 = 0.05;
-/// A signal is noisy where it changes its slope by this share of what it changes, from reading to reading: white noise does by 1.7,
-/// smooth motion by less than 0.2.
+/// A signal is noisy if its second differences are at least this share of its first differences (in the median): for
+/// white noise the ratio is 1.7, for smooth motion less than 0.2.
 const NOISY: f64 = 0.5;
-/// Share of the stale readings of one joint that are those of all, at least, where the whole recorder hangs.
+/// If more than this share of the stale rows of every joint is common to all joints, the whole recorder hangs.
 const ALIKE: f64 = 0.9;
 
-/// Channels of one joint.
+/// Names of the channels of one joint.
 const CHANNELS: [&str; 3] = ["angle", "velocity", "torque"];
 
 /// Stale readings of one joint.
 struct OfJoint {
     joint: usize,
-    /// By channel, in the order of [`CHANNELS`].
+    /// Rows with stale readings by channel, in the order of [`CHANNELS`].
     readings: [Vec<usize>; 3],
     /// Rows in which the torque hangs.
     hangs: Vec<usize>,
 }
 
 impl OfJoint {
-    /// Rows with a stale reading, in rising order.
+    /// Rows with a stale or hanging reading, in ascending order.
     fn rows(&self) -> Vec<usize> {
         in_order(self.readings.iter().chain([&self.hangs]).flatten().copied())
     }
 }
 
-/// Each of `rows` once, in rising order.
+/// Each of `rows` once, in ascending order.
 fn in_order(rows: impl Iterator<Item = usize>) -> Vec<usize> {
     let mut rows: Vec<usize> = rows.collect();
     rows.sort_unstable();
@@ -57,22 +60,22 @@ fn in_order(rows: impl Iterator<Item = usize>) -> Vec<usize> {
     rows
 }
 
-/// What is said of stale readings, and where torques hang.
+/// The causes that stale readings make, and the rows in which torques hang.
 pub struct Found {
     pub causes: Vec<Cause>,
-    /// By joint (0-based) the rows of the record in which its torque hangs.
+    /// By joint (0-based), the rows of the mended record in which its torque hangs.
     pub hangs: Vec<(usize, Vec<usize>)>,
 }
 
 impl Found {
-    /// All rows in which a torque hangs, in rising order.
+    /// All rows in which a torque hangs, in ascending order.
     pub fn hanging_rows(&self) -> Vec<usize> {
         in_order(self.hangs.iter().flat_map(|(_, rows)| rows.iter().copied()))
     }
 }
 
-/// Takes the rows with stale readings out of `record`; of too many rows none: the readings are put between their neighbours. A torque that
-/// hangs stays where it is.
+/// Removes the rows with stale readings from `record`. If these are too many, no row is removed and each stale reading
+/// is interpolated instead. A torque that hangs is left as it is.
 pub fn mend(record: &mut Record) -> Found {
     let joints = record.torque_nm.joints();
     let samples = record.time_s.len();
@@ -101,7 +104,7 @@ pub fn mend(record: &mut Record) -> Found {
     Found { causes, hangs: hangs.collect() }
 }
 
-/// One cause for all joints where they repeat the same rows, else one for every joint that repeats any.
+/// One cause for all joints if they repeat the same rows, else one cause for every joint that repeats any.
 fn causes(found: &[OfJoint], samples: usize) -> Vec<Cause> {
     let rows: Vec<Vec<usize>> = found.iter().map(OfJoint::rows).collect();
     let said = |joint: Option<usize>, rows: &[usize], channels: String| {
@@ -131,15 +134,16 @@ fn of_joint(record: &Record, joint: usize) -> OfJoint {
     let Record { time_s, q_rad, qd_rad_s, torque_nm, .. } = record;
     let speed = qd_rad_s.joint(joint);
     let span_s = time_s.last().unwrap_or(&0.0) - time_s.first().unwrap_or(&0.0);
-    // A record without rows has no rate.
+    // The rate of a record without rows is NaN; the limits make `reach` zero then.
     let reach = (NEAR_S * time_s.len() as f64 / span_s).max(1.0).min(time_s.len() as f64) as usize;
-    // A reversal is no rest.
+    // A quarter of the samples near by suffices, so that a reversal does not count as rest.
     let moves = |k: usize| {
         let near = k.saturating_sub(reach)..(k + reach).min(speed.len());
         let fast = speed[near.clone()].iter().filter(|speed| speed.abs() > MOVES_RAD_S).count();
         4 * fast > near.len()
     };
-    // An angle says itself how little it has to change, and a velocity of nothing is said of what is too slow to be seen.
+    // An angle must change if the joint travels several steps of its resolution. A velocity that reads zero may be too
+    // slow to be seen.
     let turns = |k: usize, step: f64| {
         let speed = speed[k].abs();
         speed > MOVES_RAD_S && (time_s[k] - time_s[k - 1]) * speed > BEYOND_CHANCE * step
@@ -152,8 +156,8 @@ fn of_joint(record: &Record, joint: usize) -> OfJoint {
     OfJoint { joint, readings: [angles, velocities, torques], hangs }
 }
 
-/// Readings of `y` that repeat the one before where, by the steps that `y` has, they should not: those that stand alone or nearly
-/// so, and those of a noisy sensor that hangs.
+/// Readings of `y` that repeat the one before although, by the resolution of `y`, they should change: first those of
+/// short runs, then those of a noisy sensor that hangs.
 fn stale(y: &[f64], should_change: impl Fn(usize, f64) -> bool) -> (Vec<usize>, Vec<usize>) {
     let step = resolution(y);
     let ends =
@@ -163,7 +167,7 @@ fn stale(y: &[f64], should_change: impl Fn(usize, f64) -> bool) -> (Vec<usize>, 
     let (mut single, mut hanging) = (Vec::new(), Vec::new());
     let all: Vec<usize> = changing.iter().copied().filter(is_stale).collect();
     let runs: Vec<&[usize]> = all.chunk_by(|a, b| b - a == 1).collect();
-    // A number that is read again and again is one that is not passed: a drive's limit.
+    // A value that is read again and again is one that the signal does not pass: the limit of a drive.
     let mut values: Vec<f64> = runs.iter().map(|run| y[run[0]]).filter(|v| *v != 0.0).collect();
     values.sort_by(f64::total_cmp);
     let often = (ONE_NUMBER * runs.len() as f64).max(2.0);
@@ -171,7 +175,7 @@ fn stale(y: &[f64], should_change: impl Fn(usize, f64) -> bool) -> (Vec<usize>, 
     let limits: Vec<f64> = values.chunk_by(|a, b| a == b).filter(is_often).map(|v| v[0]).collect();
     for run in runs {
         let (first, last) = (run[0], run[run.len() - 1]);
-        // Where what stands around it is as good as the same, it need not have changed.
+        // If the readings around a run are almost equal, the readings in it need not have changed.
         let around = y.get(last + 1).zip(first.checked_sub(2).map(|k| y[k]));
         let changes =
             around.is_some_and(|(next, before)| (next - before).abs() > BEYOND_CHANCE * step);
@@ -189,7 +193,7 @@ fn stale(y: &[f64], should_change: impl Fn(usize, f64) -> bool) -> (Vec<usize>, 
     let change = sizes(y.windows(2).map(|w| w[1] - w[0]).collect());
     let bend = sizes(y.windows(3).map(|w| w[2] - 2.0 * w[1] + w[0]).collect());
     if bend < NOISY * change {
-        // What runs smoothly may as well stand.
+        // A smooth signal may as well be constant.
         hanging.clear();
     }
     let chance = if change > 0.0 { BEYOND_CHANCE * step / change } else { 1.0 };
@@ -203,8 +207,8 @@ fn stale(y: &[f64], should_change: impl Fn(usize, f64) -> bool) -> (Vec<usize>, 
     (single, hanging)
 }
 
-/// Puts joint `j` of `signals` at the `stale` samples between its neighbours: on the cubic through two good readings on either side,
-/// on the straight line through one where there are no two.
+/// Interpolates joint `j` of `signals` at the `stale` samples: by the cubic through two good readings on either side,
+/// or by the straight line through one on either side if there are no two.
 fn interpolate(time_s: &[f64], signals: &mut JointSignals, j: usize, stale: &[usize]) {
     let y = signals.joint_mut(j);
     let is_good = |k: &usize| stale.binary_search(k).is_err();
@@ -216,7 +220,7 @@ fn interpolate(time_s: &[f64], signals: &mut JointSignals, j: usize, stale: &[us
         } else {
             before.into_iter().take(1).chain(behind.into_iter().take(1)).collect()
         };
-        // Lagrange's polynomial.
+        // Weights of Lagrange's polynomial.
         let weight = |at: usize| -> f64 {
             let others = nodes.iter().filter(|other| **other != at);
             others
@@ -234,7 +238,8 @@ mod tests {
     use crate::diagnose::record::moves_and_rests as record;
     use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
-    /// Without noise all channels of a joint that rests stand still, and a drive at its limit reads one number.
+    /// Without noise, all channels of a joint at rest are constant; and a drive at its limit reads the same value again
+    /// and again.
     #[test]
     fn rest_and_a_limit_are_not_stale() {
         for noise_nm in [0.0, 0.3] {
@@ -243,14 +248,15 @@ mod tests {
             let mut limited = record(4.0, noise_nm);
             limited.torque_nm.joint_mut(0).iter_mut().for_each(|t| *t = t.clamp(-6.0, 6.0));
             assert_eq!(mend(&mut limited).causes, []);
-            // Beside wild readings the limit is not the largest one.
+            // With wild readings in the channel, the limit is not its largest value.
             limited.torque_nm.joint_mut(0)[100] = 40.0;
             limited.torque_nm.joint_mut(0)[400] = -40.0;
             assert_eq!(mend(&mut limited).causes, []);
         }
     }
 
-    /// Torque in steps as coarse as its noise repeats itself by chance, and one that is read at a fourth of the rate has no other record.
+    /// Torque in steps as coarse as its noise repeats by chance; and for torque that is read at a half or a fourth of
+    /// the rate there are no other readings.
     #[test]
     fn coarse_and_slow_readings_are_not_stale() {
         let mut coarse = record(4.0, 0.3);
@@ -266,7 +272,7 @@ mod tests {
         assert_eq!(mend(&mut half).causes, []);
     }
 
-    /// One in ten angles is the one before: its rows go, and the words say which channel it was.
+    /// One in ten angles repeats the one before: these rows are removed, and the words name the channel.
     #[test]
     fn an_angle_that_repeats_is_told_from_its_torque() {
         let mut record = record(4.0, 0.3);
@@ -282,12 +288,14 @@ mod tests {
         assert_eq!(causes.len(), 1);
         assert_eq!((causes[0].kind, causes[0].joint), (Kind::DroppedSamples, Some(1)));
         assert_eq!(causes[0].in_words, "readings of the angle that repeat the one before");
-        // Half of the rows move, a tenth of these is stale, and at the slow ends of a motion none is told.
+        // The joint moves in half of the rows, a tenth of these is stale, and at the slow ends of a motion stale
+        // readings go unseen.
         let left_out = (before - record.time_s.len()) as f64 / before as f64;
         assert!((0.03..0.06).contains(&left_out), "{left_out}");
     }
 
-    /// Of too many rows none goes: a cubic through its neighbours puts a smooth angle back to where it was.
+    /// A cubic through its good neighbours puts a smooth angle back to where it was, as is done where too many rows are
+    /// stale to be removed.
     #[test]
     fn readings_between_good_ones_are_put_back() {
         let mut record = record(4.0, 0.0);
@@ -298,8 +306,8 @@ mod tests {
         interpolate(&record.time_s, &mut record.q_rad, 0, &stale);
         let off = |(a, b): (&f64, &f64)| (a - b).abs();
         let most = record.q_rad.joint(0).iter().zip(&truth).map(off).fold(0.0, f64::max);
-        // The angle's fourth derivative is (2π/4)⁴ = 6 rad/s⁴ and jumps where it comes to rest, by a second derivative of 2.5 rad/s²
-        // over steps of 8 ms.
+        // The angle's fourth derivative is (2π/4)⁴ = 6 rad/s⁴. Where the joint comes to rest, its second derivative
+        // jumps by 2.5 rad/s², over steps of 8 ms.
         assert!(most < 0.5 * 2.5 * 0.008 * 0.008, "{most}");
     }
 }

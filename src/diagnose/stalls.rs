@@ -1,4 +1,4 @@
-//! A clock that stood still while the arm moved on: angles and velocities tell how long.
+//! A clock that stood still while the arm moved on: angles and velocities tell for how long.
 
 use super::data_faults::{FAR, cause, exact, step_s};
 use super::kind::Kind;
@@ -13,33 +13,34 @@ pub struct Stalls {
     pub rows: Vec<usize>,
     /// Mean time lost, s.
     pub lost_s: f64,
-    /// Half of its 95 % interval, by the scatter between the stalls, s.
+    /// Half-width of the 95 % interval of `lost_s`, from the scatter between the stalls, s.
     reach_s: f64,
     /// σ of the time between two rows where nothing is lost, s.
     sigma_s: f64,
 }
 
-/// Across a longer gap, in usual steps, velocities at its ends do not tell how far joints went.
+/// In gaps longer than this many usual steps, the velocities at the ends do not tell how far the joints went.
 const GAP_STEPS: f64 = 4.5;
 
-/// So many rows before or behind a stall a clock that was only read late, or early, is right again.
+/// A clock that was only read late or early is right again within this many rows before or behind the apparent stall.
 const REGAINED_ROWS: usize = 50;
-/// More than this share of what was lost is then gained back.
+/// In that case at least this share of the lost time is regained there.
 const REGAINED: f64 = 0.5;
-/// Distances between stalls that are whole multiples of their median, to within this share of it, make a rhythm (a stall is not seen where
-/// the arm is slow) ...
+/// The stalls have a rhythm if the distances between them are whole multiples of the median distance, to within this
+/// share of it (multiples, because a stall is not seen where the arm is slow) ...
 const OFF_BEAT: f64 = 0.1;
-/// ... where this share of them are.
+/// ... for at least this share of the distances.
 const IN_RHYTHM: f64 = 0.8;
-/// Stalls that are mostly nearer to each other, in rows, come in bursts.
+/// Stalls whose median distance is below this, in rows, come in bursts.
 const BURST_ROWS: f64 = 5.0;
 
-/// Rows between which more time passed than the time stamps say, and is not in the steps beside them.
+/// Finds the rows behind which more time passed than the time stamps say, and is not made up for by the steps beside
+/// them. `None` for fewer than three.
 pub fn stalls(m: &Measurement) -> Option<Stalls> {
     let step = |k: usize| m.time_s[k + 1] - m.time_s[k];
     let gap_s = GAP_STEPS * step_s(m);
     let last = m.time_s.len().saturating_sub(1);
-    // Accelerations beside a step are from its neighbours.
+    // The accelerations that enter step k come from the steps beside it.
     let beside_gap = |k: usize| (k.saturating_sub(1)..(k + 2).min(last)).any(|k| step(k) > gap_s);
     let ahead = |k: usize| passed_s(m, k).map_or(0.0, |passed| passed - step(k));
     let ahead: Vec<f64> = (0..last).map(ahead).collect();
@@ -48,7 +49,8 @@ pub fn stalls(m: &Measurement) -> Option<Stalls> {
     let sigma_s = sigma_of_changes(&lost);
     let limit = (FAR * sigma_s).max(0.5 * step_s(m));
     let lasts = |&k: &usize| lasting(k, |k| lost.get(k).copied()) > limit;
-    // Steps that are too long count, be they as long as a gap: velocities at their ends are near enough where rows are.
+    // Stamps that regain the time make steps that are too long. They count even if they are as long as a gap: for this
+    // sum the velocities at the ends are accurate enough.
     let stays_lost = |&k: &usize| {
         let beside = k.saturating_sub(REGAINED_ROWS)..(k + REGAINED_ROWS + 1).min(last);
         let far = ahead[beside].iter().filter(|ahead| ahead.abs() > limit);
@@ -65,17 +67,17 @@ pub fn stalls(m: &Measurement) -> Option<Stalls> {
     Some(Stalls { rows, lost_s, reach_s, sigma_s })
 }
 
-/// Time between rows k and k + 1 by how far the joints went; `None` where they stand.
+/// Time between rows k and k + 1 from the distances that the joints travelled; `None` if they are at rest.
 ///
-/// Least squares of q₁ − q₀ = h (q̇₀ + q̇₁)/2 − h³ q⃛/12 (the trapezoid with its correction) over the joints, q⃛
-/// from the accelerations of the steps on either side, whose middles lie a step more than h apart.
+/// Least squares over the joints of q₁ − q₀ = h (q̇₀ + q̇₁)/2 − h³ q⃛/12 (the trapezoidal rule with its correction),
+/// with q⃛ from the accelerations of the steps on either side, whose middles are h plus one step apart.
 fn passed_s(m: &Measurement, k: usize) -> Option<f64> {
     let t = m.time_s;
     let acceleration = |qd: &[f64], k: usize| match (qd.get(k + 1), t.get(k + 1)) {
         (Some(next), Some(later)) => (next - qd[k]) / (later - t[k]),
         _ => 0.0,
     };
-    // Mean velocity, way and change of the acceleration of every joint.
+    // Mean velocity, distance and change of the acceleration of every joint.
     let joints = (0..m.q_rad.joints()).map(|j| {
         let (q, qd) = (m.q_rad.joint(j), m.qd_rad_s.joint(j));
         let before = if k > 0 { acceleration(qd, k - 1) } else { 0.0 };
@@ -84,13 +86,13 @@ fn passed_s(m: &Measurement, k: usize) -> Option<f64> {
     });
     let joints: Vec<(f64, f64, f64)> = joints.collect();
     let square: f64 = joints.iter().map(|(mean, ..)| mean * mean).sum();
-    // Slower than this, the resolution of the angle is all that is seen.
+    // Below this speed, only the resolution of the angle is seen.
     if square <= 1e-2 {
         return None;
     }
     let mut passed = t[k + 1] - t[k];
     let step = passed;
-    // The correction is small: three rounds settle it.
+    // The correction is small, so three rounds of iteration settle it.
     for _ in 0..3 {
         let correction = passed.powi(3) / (12.0 * (passed + step));
         let along = |(mean, way, change): &(f64, f64, f64)| mean * (way + correction * change);
@@ -100,7 +102,7 @@ fn passed_s(m: &Measurement, k: usize) -> Option<f64> {
 }
 
 impl Stalls {
-    /// What is said of it.
+    /// The stalls as a cause.
     pub fn cause(&self) -> Cause {
         let Self { rows, lost_s, reach_s: reach, sigma_s } = self;
         let lost = Estimate { value: *lost_s, unit: "s", ci95: [lost_s - reach, lost_s + reach] };
@@ -118,7 +120,7 @@ impl Stalls {
     }
 }
 
-/// Every how many rows the clock stalls behind `rows`; else in words.
+/// The number of rows from stall to stall if the `rows` have a rhythm; otherwise a description in words.
 fn rhythm(rows: &[usize]) -> Result<f64, &'static str> {
     let mut between: Vec<f64> = rows.windows(2).map(|w| (w[1] - w[0]) as f64).collect();
     let every = median(&mut between).unwrap_or(f64::NAN);
@@ -139,7 +141,7 @@ mod tests {
 
     #[test]
     fn a_rhythm_is_told_where_there_is_one() {
-        // At a slow turn of the arm one is not seen, and rows that were lost move others.
+        // One stall is missing because it falls on a slow turn of the arm, and lost rows shift others.
         assert_eq!(rhythm(&[100, 350, 601, 1098, 1350, 1600]), Ok(251.0));
         assert_eq!(rhythm(&[100, 101, 102, 103, 900, 901, 902]), Err("in bursts"));
         assert_eq!(rhythm(&[100, 180, 700, 1030, 1720, 1790]), Err("at irregular times"));

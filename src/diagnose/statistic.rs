@@ -10,31 +10,31 @@ use crate::identify::covariance::quantile_95;
 
 /// How evidence is counted.
 pub enum Statistic {
-    /// Rows are independent with variance one, as far as the periods tell that.
+    /// A motion that repeats: rows are independent with variance one, as far as the periods tell the noise.
     Periods(NoiseKnowledge),
-    /// A single run: residuals have a memory and hold what the model gets wrong.
+    /// A single run: the residual is correlated in time and holds what the model gets wrong.
     Blocks {
         /// Block of time of every row.
         block_of: Vec<usize>,
         /// Number of blocks.
         blocks: usize,
-        /// Number of those, B, with rows that count.
+        /// Number B of blocks with rows that count.
         used: usize,
         /// Rows per joint.
         rows: usize,
-        /// Per joint, number n of those that count.
+        /// Per joint, number n of rows that count.
         counting: Vec<usize>,
-        /// Autocorrelation of the residual per joint, lags 1, 2, … up to its first zero, a block at most.
+        /// Autocorrelation of the residual per joint at lags 1, 2, … up to its first zero, at most over one block.
         memory: Vec<Vec<f64>>,
     },
 }
 
-/// λ of an effect of the usual strength, √λ about 30. Schwarz's ln n takes n for it, an effect as large in every
-/// sample as the noise.
+/// λ of an effect of usual strength, √λ about 30. Schwarz's ln n takes n for λ: an effect as large as the noise in
+/// every sample.
 const USUAL_LAMBDA: f64 = 1000.0;
-/// Stretches of time of the cross-validation.
+/// Stretches of time in the cross-validation.
 const FOLDS: usize = 10;
-/// Share of an effect's square on a joint below which the joint says nothing of it.
+/// If less than this share of an effect's square lies on a joint, the joint does not count for it.
 const TRACE: f64 = 1e-3;
 
 impl Statistic {
@@ -46,7 +46,7 @@ impl Statistic {
         }
     }
 
-    /// For rows in blocks of time, of which those that do not count are zero.
+    /// For rows in blocks of time; rows that do not count are zero.
     fn of_blocks(block_of: Vec<usize>, counts: &[bool], residual: &Image, joints: usize) -> Self {
         let rows = block_of.len() / joints;
         let block_rows = block_of.iter().take_while(|block| **block == 0).count();
@@ -61,13 +61,14 @@ impl Statistic {
         Self::Blocks { block_of, blocks, used, rows, counting, memory }
     }
 
-    /// Twice the gain in log-likelihood when the residual loses what `span` explains.
+    /// Twice the gain in log-likelihood when the part of `residual` that `span` explains is removed.
     ///
-    /// Periods: ‖P r‖², less where noise is not well known ([`NoiseKnowledge::gain`]). Blocks:
-    /// T = −Σ_j n_j ln(1 − (2⟨u, r⟩ − ‖u‖²)/‖r‖²) over the joints, u = P r, with n_j the rows that are
-    /// independent as far as u can tell: ⟨u, r⟩ has the variance ‖r‖²/n ‖u‖² (1 + 2 Σ ρ_r ρ_u) of the n rows that count
-    /// (Bartlett 1946), so that n_j = n/(1 + 2 Σ ρ_r ρ_u). Ripple, whose own correlation changes its sign, is told from slow
-    /// errors that way.
+    /// Periods: ‖P r‖², or less where noise is not well known ([`NoiseKnowledge::gain`]).
+    ///
+    /// Blocks: T = −Σ_j n_j ln(1 − (2⟨u, r⟩ − ‖u‖²)/‖r‖²) over the joints, with u = P r and n_j the number of rows that
+    /// are independent along u. The variance of ⟨u, r⟩ is ‖r‖²/n ‖u‖² (1 + 2 Σ ρ_r ρ_u) for the n rows that count
+    /// (Bartlett 1946), so that n_j = n/(1 + 2 Σ ρ_r ρ_u). This tells ripple, whose own correlation ρ_u changes its
+    /// sign, from slow errors.
     pub fn gain(&self, span: &Span, residual: &Image) -> f64 {
         let (rows, counting, memory) = match self {
             Self::Periods(knowledge) => return knowledge.gain(span, residual),
@@ -80,7 +81,7 @@ impl Statistic {
             .zip(counting.iter().zip(memory))
             .map(|((u, r), (counting, memory))| {
                 let square = dot(r, r);
-                // The null model makes a trace of everything everywhere.
+                // Projecting out the null model leaves a trace of every effect on every joint.
                 if square == 0.0 || dot(u, u) < TRACE * whole {
                     return 0.0;
                 }
@@ -90,8 +91,8 @@ impl Statistic {
             .sum()
     }
 
-    /// λ̂ of what `span` explains: its length² in units of the noise; for a single run the gain, because
-    /// its noise is not known.
+    /// λ̂ of what `span` explains: its squared length in units of the noise. For a single run, whose noise is not
+    /// known, the gain.
     pub fn lambda(&self, span: &Span, residual: &Image, gain: f64) -> f64 {
         match self {
             Self::Periods(_) => span.explained(residual),
@@ -99,10 +100,11 @@ impl Statistic {
         }
     }
 
-    /// What `count` free coefficients of one effect cost in 2 ln of the evidence.
+    /// Price of `count` free coefficients of one effect, in 2 ln of the evidence.
     ///
-    /// Periods: k ln(1 + λ₀/k) of a Gaussian prior in which the effect's λ is [`USUAL_LAMBDA`] in the mean, however many
-    /// coefficients it has (Zellner 1986). Blocks: k ln n (Schwarz 1978), n the rows that see the site.
+    /// Periods: k ln(1 + λ₀/k), from a Gaussian prior under which the mean λ of the effect is [`USUAL_LAMBDA`], however
+    /// many coefficients it has (Zellner 1986). Blocks: k ln n (Schwarz 1978), with n the number of rows that see the
+    /// site.
     pub fn coefficients_price(&self, count: usize, site: Option<usize>) -> f64 {
         let k = count as f64;
         let rows: usize = match (self, site) {
@@ -113,9 +115,9 @@ impl Statistic {
         k * (rows.max(1) as f64).ln()
     }
 
-    /// Probability of at least this much by chance alone, one test.
+    /// Probability that chance alone explains at least as much, in a single test.
     ///
-    /// Periods: F(k, ν) with the degrees of freedom of [`NoiseKnowledge::freedom`]. Blocks: the Wald statistic bᵀV⁻¹b
+    /// Periods: F(k, ν) with the degrees of freedom of [`NoiseKnowledge::freedom`]. Blocks: the Wald statistic bᵀV⁻¹b,
     /// with V from the scatter of block sums, as F(k, B − k).
     pub fn probability(&self, span: &Span, residual: &Image) -> f64 {
         let k = span.len();
@@ -144,11 +146,11 @@ impl Statistic {
         }
     }
 
-    /// Square that `span` takes from `residual` in stretches left out of the fit: blocked cross-validation in
+    /// Square that `span` removes from `residual` in stretches left out of the fit, by blocked cross-validation over
     /// [`FOLDS`] stretches of time. `None` where noise is known.
     ///
-    /// With s_f = Uᵀr and G_f = UᵀU over stretch f, b₋f = (I − G_f)⁻¹ (Uᵀr − s_f), and the gain is
-    /// Σ_f 2 b₋fᵀ s_f − b₋fᵀ G_f b₋f.
+    /// With s_f = Uᵀr and G_f = UᵀU over stretch f, the coefficients fitted without it are b₋f = (I − G_f)⁻¹ (Uᵀr −
+    /// s_f), and the gain is Σ_f 2 b₋fᵀ s_f − b₋fᵀ G_f b₋f.
     pub fn left_out_gain(&self, span: &Span, residual: &Image) -> Option<f64> {
         let Self::Blocks { block_of, blocks, .. } = self else { return None };
         let k = span.len();
@@ -168,14 +170,15 @@ impl Statistic {
         let mut gain = 0.0;
         for (s, g) in along.iter().zip(&gram) {
             let rest = DMatrix::identity(k, k) - g;
-            // Nothing is known of a direction that lives in one stretch alone: its gain there is none.
+            // A direction that lies in one stretch alone cannot be fitted without it, so the stretch gains nothing.
             let Some(b) = rest.lu().solve(&(&whole - s)) else { continue };
             gain += 2.0 * b.dot(s) - b.dot(&(g * &b));
         }
         Some(gain)
     }
 
-    /// Covariance of the coordinates on `span` from the scatter of block sums of what is left.
+    /// Covariance of the coordinates on `span`, from the scatter of the block sums of what `span` leaves of `residual`;
+    /// and the number B of blocks. `None` where noise is known.
     fn scatter(
         &self,
         span: &Span,
@@ -211,14 +214,14 @@ impl Statistic {
         }
     }
 
-    /// Half width, in σ, of a 95 % interval of what `span` says of `residual`: Student's t with the degrees of
-    /// freedom of [`Self::freedom`].
+    /// Half-width, in σ, of a 95 % interval along `span`: the quantile of Student's t with the degrees of freedom of
+    /// [`Self::freedom`].
     pub fn quantile_95(&self, span: &Span, residual: &Image) -> f64 {
         quantile_95(self.freedom(span, residual))
     }
 
-    /// Degrees of freedom of the noise along what `span` explains of `residual`: those of [`NoiseKnowledge::freedom`], or of
-    /// the scatter of B block sums B − 1.
+    /// Degrees of freedom of the noise along the part of `residual` that `span` explains: those of
+    /// [`NoiseKnowledge::freedom`], or B − 1 for the scatter of B block sums.
     pub fn freedom(&self, span: &Span, residual: &Image) -> f64 {
         match self {
             Self::Periods(knowledge) => knowledge.freedom(span, residual),
@@ -226,7 +229,8 @@ impl Statistic {
         }
     }
 
-    /// The same along each coefficient of `span`, which is R⁻¹ of its directions.
+    /// Degrees of freedom of the noise along each coefficient of `span`; the coefficients are R⁻¹ times the coordinates
+    /// on its directions.
     pub fn freedom_of_coefficients(&self, span: &Span) -> Vec<f64> {
         match self {
             Self::Periods(knowledge) => {
@@ -242,7 +246,7 @@ impl Statistic {
     }
 }
 
-/// P(F_{k,ν} > x), which is that of χ²_k/k where ν is many.
+/// P(F_{k,ν} > x), or P(χ²_k/k > x) where ν is large enough for the noise to count as known.
 pub fn upper_fisher(x: f64, k: usize, freedom: f64) -> f64 {
     if NoiseKnowledge::is_known(freedom) {
         return upper_chi_squared(x * k as f64, k);
@@ -255,14 +259,14 @@ pub fn upper_chi_squared(x: f64, k: usize) -> f64 {
     ChiSquared::new(k as f64).map_or(1.0, |d| d.sf(x.max(0.0)))
 }
 
-/// Autocorrelation of a series at lags 1, 2, … `longest` up to the first that is not positive.
+/// Autocorrelation of a series at lags 1, 2, … `longest`, up to the first that is not positive.
 fn autocorrelation(r: &[f64], longest: usize) -> Vec<f64> {
     let square = dot(r, r).max(f64::MIN_POSITIVE);
     let at = |lag: usize| dot(&r[lag..], &r[..r.len() - lag]) / square;
     (1..=longest.min(r.len() - 1)).map(at).take_while(|rho| *rho > 0.0).collect()
 }
 
-/// Rows, of those `counting` of a residual with autocorrelation `memory`, that are independent along `signal`.
+/// How many of the `counting` rows of a residual with autocorrelation `memory` are independent along `signal`.
 fn independent(signal: &[f64], counting: usize, memory: &[f64]) -> f64 {
     let rows = signal.len();
     let square = dot(signal, signal).max(f64::MIN_POSITIVE);
@@ -280,7 +284,8 @@ mod tests {
     const ROWS_PER_BLOCK: usize = 8;
     const BLOCKS: usize = 40;
 
-    /// What a run of one joint says of a wave in a residual with a memory, after which the joint rests for so many blocks.
+    /// Statistics of a wave in a correlated residual along a run of one joint, which then rests for `rest_blocks`
+    /// blocks.
     fn told(rest_blocks: usize) -> [f64; 5] {
         let (moving, all) = (ROWS_PER_BLOCK * BLOCKS, ROWS_PER_BLOCK * (BLOCKS + rest_blocks));
         let while_moving = |y: &dyn Fn(usize) -> f64| Image {
@@ -304,7 +309,7 @@ mod tests {
         ]
     }
 
-    /// While a joint rests a run says nothing of it.
+    /// The rows in which a joint rests change no statistic.
     #[test]
     fn rows_that_do_not_count_tell_nothing() {
         let (moving, resting) = (told(0), told(25));

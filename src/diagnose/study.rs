@@ -1,4 +1,4 @@
-//! One log made ready for tests: whitened, the null model projected out, and every family's columns.
+//! One log prepared for tests: whitened, with the null model projected out, and with the columns of every family.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -23,16 +23,16 @@ use crate::robot::Arm;
 pub struct Entry {
     /// Index into the families.
     pub family: usize,
-    /// Joint, or the arm as a whole.
+    /// Joint (0-based), or `None` for the arm as a whole.
     pub site: Option<usize>,
     /// Nonlinear parameters.
     pub shape: Shape,
-    /// Whitened columns, the null model projected out.
+    /// Whitened columns, with the null model projected out.
     pub images: Vec<Image>,
 }
 
 impl Entry {
-    /// Bytes of its columns.
+    /// Number of bytes of its columns.
     pub fn bytes(&self) -> usize {
         let rows = self.images.iter().map(|image| image.mean.len() + image.contrast.len());
         rows.sum::<usize>() * size_of::<f64>()
@@ -48,46 +48,47 @@ pub struct Score {
     pub lambda: f64,
 }
 
-/// A log, its null model, and what may be added to it.
+/// A log, its null model, and the entries that may be added to it.
 pub struct Study<'a> {
     /// The families.
     pub families: &'a [Box<dyn Candidate>],
-    /// What the candidates see.
+    /// The motion and the predictions that the candidates see.
     pub scene: Scene,
     /// The regression of the null model.
     pub regression: &'a Regression,
-    /// Where tests are made.
+    /// The whitening, from torques in time to the equations in which tests are made.
     pub whitening: Whitening,
-    /// The null model's columns there: base parameters, and behind them how the drives answer friction.
+    /// The null model's whitened columns: those of the base parameters, then those of how the drives answer friction.
     pub null_columns: Vec<Image>,
-    /// What is in each of the latter.
+    /// The parts of each of the latter.
     pub answers: Vec<Answer>,
-    /// Their span.
+    /// The span of `null_columns`.
     pub null: Span,
-    /// By joint (0-based) what the drive's own share of friction fed forward adds to the null model.
+    /// By joint (0-based), the whitened torque of its drive feeding another share of friction forward than the others,
+    /// with the null model projected out.
     pub shares: Vec<(usize, Image)>,
-    /// Torque minus null model there.
+    /// Whitened torque minus the null model.
     pub residual: Image,
-    /// How scores become statistics.
+    /// How explained squares become statistics.
     pub statistic: Statistic,
-    /// Every family at every site with every starting shape; see [`Self::with_estimate`].
+    /// Every family at every site with every starting shape; but see [`Self::with_estimate`].
     pub entries: Vec<Entry>,
     /// How many starting shapes of a family at a site can be told from each other.
     pub(super) shapes: HashMap<Place, DistinctShapes>,
-    /// Measured torque there.
+    /// Whitened measured torque.
     pub torque: Image,
     /// Joints (0-based) whose readings are too bad to look for physics in them.
     pub left_out: Vec<usize>,
-    /// Causes that an earlier estimate of the arm has shown.
+    /// Causes that were visible with an earlier estimate of the arm.
     shown: Vec<Shown>,
-    /// Entries with other shapes that were worked out.
+    /// Cache of entries with any shape.
     memory: Memory,
 }
 
 /// A family and a site.
 type Place = (usize, Option<usize>);
 
-/// A law of which an estimate of the arm left so many columns to be seen.
+/// A law that was visible with an earlier estimate of the arm, and the number of its columns that were.
 struct Shown {
     family: usize,
     site: Option<usize>,
@@ -95,21 +96,21 @@ struct Shown {
     columns: usize,
 }
 
-/// A column that keeps less than this share of its length outside the null model is not seen: what is left
-/// of it is the noise of the null model's accelerations, which the residual has as well. A spring on a joint
-/// without gravity keeps 2.7 %, and was found in one of 50 logs without one.
+/// A column that keeps less than this share of its length outside the null model counts as absorbed: the remainder
+/// reflects the noise of the null model's accelerations, which the residual contains as well. A spring on a joint
+/// without gravity keeps 2.7 %, and was found in one of 50 logs without a spring.
 const ABSORBED: f64 = 0.04;
-/// Of a cause that was found beside one estimate of the arm, beside the next: the shares differ a little, and a cause that
-/// comes and goes with them settles nothing.
+/// The same limit for a cause that was found with an earlier estimate of the arm. The shares differ a little between
+/// estimates, and if a cause came and went with them, the fit would not settle.
 const ABSORBED_AGAIN: f64 = 0.5 * ABSORBED;
-/// Shapes that are prepared at once.
+/// Number of shapes that are prepared at once.
 const BANK: usize = 8;
-/// Share of the explained square that has to be explained in stretches left out of the fit as well.
+/// Least share of the explained square that must also be explained in stretches left out of the fit.
 const KEPT_SHARE: f64 = 0.5;
-/// Share of its joint's mean square that a cause has to remove there: 2.5 % of the rms error are within what
-/// approximate laws leave beside each other.
+/// Least share of its joint's mean square that a cause must remove in stretches left out of the fit. It is 2.5 % of the
+/// rms error, which approximate laws may leave beside each other.
 pub(super) const LEAST_GAIN: f64 = 0.05;
-/// Steps of a golden-section search: the bracket shrinks to 1 %.
+/// Steps of the golden-section search: they shrink the bracket to 1 %.
 const GOLDEN_STEPS: usize = 10;
 
 impl<'a> Study<'a> {
@@ -207,8 +208,8 @@ impl<'a> Study<'a> {
         })
     }
 
-    /// The same study of a single run with `rows` of the regression left out: what touched the arm there
-    /// happened once, and no law of friction is to be bent by it.
+    /// The same study of a single run without `rows` of the regression. What touched the arm there happened once, and
+    /// no law of friction is to be bent by it.
     pub fn without_rows(
         mut self,
         set: &BaseSet,
@@ -228,8 +229,9 @@ impl<'a> Study<'a> {
         Ok(study)
     }
 
-    /// The same study with torques predicted by other base parameters, `entries` found with the old ones. Of a motion that repeats it
-    /// knows no other laws, and these nowhere else, until it is to [look everywhere](Self::look_everywhere) again.
+    /// The same study with torques predicted by the base parameters `theta`, after `entries` were found with others.
+    /// For a motion that repeats it prepares only the families of `entries`, each at its site, until it [looks
+    /// everywhere](Self::look_everywhere) again.
     pub fn with_estimate(
         mut self,
         arm: &Arm,
@@ -257,18 +259,19 @@ impl<'a> Study<'a> {
         self.fill_entries(|_| true);
     }
 
-    /// Lets `residual` (of a better model than the null model) say how many rows are independent.
+    /// Recomputes the statistic from `residual`, that of a better model than the null model, so that it tells how many
+    /// rows are independent.
     pub fn judge_by(&mut self, residual: &Image) {
         self.statistic = Statistic::new(&self.whitening, residual, self.scene.joints());
     }
 
-    /// Looks for nothing on these joints any more.
+    /// Excludes these joints from the search.
     pub fn leave_out(&mut self, joints: Vec<usize>) {
         self.entries.retain(|e| e.site.is_none_or(|j| !joints.contains(&j)));
         self.left_out = joints;
     }
 
-    /// Whether something is looked for at `site`: on a joint that is not left out, or in the arm as a whole.
+    /// Whether the search includes `site`: a joint that is not left out, or the arm as a whole.
     pub fn looks_at(&self, site: Option<usize>) -> bool {
         site.is_none_or(|j| !self.left_out.contains(&j))
     }
@@ -297,7 +300,7 @@ impl<'a> Study<'a> {
         self.entries = entries.flatten_iter().collect();
         let place = |e: &Entry| (e.family, e.site);
         let groups = self.entries.chunk_by(|a, b| place(a) == place(b));
-        // The noise of a single run is not known, and what it makes of a coefficient neither.
+        // The noise of a single run is not known, and so neither is how large a coefficient it can make.
         let is_possible = |e: &Entry, b: f64| {
             !self.scene.periodic || self.families[e.family].is_possible(e.shape, &[b])
         };
@@ -305,7 +308,7 @@ impl<'a> Study<'a> {
         self.shapes = groups.map(distinct).collect();
     }
 
-    /// A family's columns, the null model projected out; `None` if it absorbs them.
+    /// The entry of a family at a site with this shape; `None` if the null model absorbs it.
     pub fn entry(&self, family: usize, site: Option<usize>, shape: Shape) -> Option<Entry> {
         self.memory.entry((family, site, shape), || self.bank(family, site, &[shape]).remove(0))
     }
@@ -328,7 +331,7 @@ impl<'a> Study<'a> {
             let own: Vec<(Image, f64)> = outside.by_ref().take(columns.len()).collect();
             let shown = self.shown_columns(family, site, shape.variant);
             let least = |column: usize| if column < shown { ABSORBED_AGAIN } else { ABSORBED };
-            // Columns behind an absorbed one are parameters that go with it.
+            // Columns behind an absorbed one are dropped with it: they are parameters that belong to it.
             let images: Vec<Image> = own
                 .into_iter()
                 .enumerate()
@@ -341,13 +344,13 @@ impl<'a> Study<'a> {
         shapes.iter().zip(columns).map(entry).collect()
     }
 
-    /// How many columns of a law an earlier estimate of the arm has shown.
+    /// How many columns of a law were visible with an earlier estimate of the arm.
     fn shown_columns(&self, family: usize, site: Option<usize>, variant: usize) -> usize {
         let is_it = |s: &&Shown| (s.family, s.site, s.variant) == (family, site, variant);
         self.shown.iter().filter(is_it).map(|s| s.columns).max().unwrap_or(0)
     }
 
-    /// What `image` has outside the null model; `None` if that absorbs it.
+    /// The part of `image` outside the null model; `None` if the null model absorbs it.
     pub fn outside_null(&self, mut image: Image) -> Option<Image> {
         let length = image.square();
         self.null.residualise(&mut image);
@@ -359,7 +362,8 @@ impl<'a> Study<'a> {
         Span::outside(others, &entry.images)
     }
 
-    /// Span of all `entries` outside the null model, with the shares that drives feed forward where these blur reversals.
+    /// Span of all `entries` outside the null model, together with the shares that drives feed forward where an entry
+    /// blurs reversals, and with the directions along which the laws of the entries may be off.
     pub fn span_of_all(&self, entries: &[&Entry]) -> Span {
         let mut span = Span::default();
         for image in entries.iter().flat_map(|entry| &entry.images) {
@@ -376,7 +380,7 @@ impl<'a> Study<'a> {
         span
     }
 
-    /// Directions along which the law of `entry` may be off, the null model projected out.
+    /// Directions along which the law of `entry` may be off, with the null model projected out.
     fn loose(&self, entry: &Entry) -> Vec<Image> {
         let columns = self.families[entry.family].loose(&self.scene, entry.site, entry.shape);
         columns
@@ -389,7 +393,8 @@ impl<'a> Study<'a> {
             .collect()
     }
 
-    /// The shares that drives feed forward where one of `entries` blurs reversals, the null model projected out.
+    /// The shares that drives feed forward on joints where one of `entries` blurs reversals, with the null model
+    /// projected out.
     pub fn blurred_shares(&self, entries: &[&Entry]) -> impl Iterator<Item = &Image> {
         let is_blurred = |j: usize| {
             let mut blurs = entries.iter().filter(|e| self.families[e.family].blurs_reversals());
@@ -398,13 +403,13 @@ impl<'a> Study<'a> {
         self.shares.iter().filter(move |(j, _)| is_blurred(*j)).map(|(_, share)| share)
     }
 
-    /// The columns of `entry` with what the null model absorbs of them.
+    /// The whitened columns of `entry`, including what the null model absorbs of them.
     pub fn whole_images(&self, entry: &Entry) -> Vec<Image> {
         let columns = self.families[entry.family].columns(&self.scene, entry.site, entry.shape);
         self.whitening.images(columns.iter().take(entry.images.len()))
     }
 
-    /// Square of what `entry` with the coefficients `b` does to joint `j`, the null model projected out.
+    /// Square of what `entry` with the coefficients `b` does to joint `j`, with the null model projected out.
     pub fn square_on(&self, j: usize, entry: &Entry, b: &[f64]) -> f64 {
         let columns = self.families[entry.family].columns(&self.scene, entry.site, entry.shape);
         let on_joint = columns.into_iter().zip(b).filter_map(|(mut column, b)| {
@@ -421,8 +426,8 @@ impl<'a> Study<'a> {
         })
     }
 
-    /// What adding `entry` to `others` explains, given the residual of both null model and `others`;
-    /// `None` if its coefficients are physically impossible.
+    /// What adding `entry` to `others` explains of `residual`, from which the null model and `others` have been
+    /// projected out. `None` if its columns are dependent there, or its coefficients physically impossible.
     pub fn score(&self, entry: &Entry, others: &Span, residual: &Image) -> Option<Score> {
         let span = self.span(entry, others);
         if span.len() != entry.images.len() {
@@ -435,7 +440,7 @@ impl<'a> Study<'a> {
         })
     }
 
-    /// Share of the mean square of the joint `site` (or all) that `span` takes from `residual` in
+    /// Share of the mean square of the joint `site` (`None`: of all joints) that `span` removes from `residual` in
     /// stretches of a single run that were left out of its fit.
     pub fn left_out_gain(&self, site: Option<usize>, span: &Span, residual: &Image) -> Option<f64> {
         let gain = self.statistic.left_out_gain(span, residual)?;
@@ -443,9 +448,8 @@ impl<'a> Study<'a> {
         (square > 0.0).then(|| gain / square)
     }
 
-    /// Whether what `span` at `site` explains of `residual` is also explained in stretches of a single run
-    /// that were left out of its fit, and there takes more than the share `least` of the mean square away. Always
-    /// true where noise is known.
+    /// Whether `span` at `site` also explains `residual` in stretches of a single run that were left out of its fit,
+    /// and removes more than the share `least` of the mean square there. Always true where noise is known.
     pub fn generalises(
         &self,
         site: Option<usize>,
@@ -459,14 +463,14 @@ impl<'a> Study<'a> {
         })
     }
 
-    /// Square of `residual` on the joint `site` (or all) along a single run.
+    /// Square of `residual` on the joint `site` (`None`: on all joints) along a single run.
     fn square(&self, site: Option<usize>, residual: &Image) -> f64 {
         let rows = residual.mean.len() / self.scene.joints();
         let own = site.map_or(0..residual.mean.len(), |j| j * rows..(j + 1) * rows);
         dot(&residual.mean[own.clone()], &residual.mean[own])
     }
 
-    /// The best shape near `entry`, and what it explains.
+    /// The best shape near `entry` and its score, by golden-section search.
     pub fn refined(
         &self,
         entry: &Entry,
@@ -519,14 +523,15 @@ impl<'a> Study<'a> {
         Some(best)
     }
 
-    /// Where the nonlinear parameter of `entry` is searched: from the starting shape before it to the
-    /// one behind it, never beyond the smallest and largest.
+    /// The range in which the nonlinear parameter of `entry` is searched: from the next smaller starting shape to the
+    /// next larger one, but never beyond the smallest and largest; or the half-width that the family prescribes.
     fn bracket(&self, entry: &Entry) -> Option<[f64; 2]> {
         let value = entry.shape.value;
         if let Some(half_width) = self.families[entry.family].half_width(&self.scene, entry.site) {
             return Some([value - half_width, value + half_width]);
         }
-        // Also of those which the null model absorbs: what lies between one of them and this one need not be.
+        // Starting shapes that the null model absorbs count as neighbours as well: a shape between one of them and this
+        // one need not be absorbed.
         let family = &self.families[entry.family];
         let mut shapes = family.shapes(&self.scene, entry.site);
         shapes.extend(family.richer_shapes(&self.scene));
@@ -551,7 +556,7 @@ impl<'a> Study<'a> {
         (low < high).then_some([low, high])
     }
 
-    /// Torque of the null model with base parameters `theta` on joint `j` alone.
+    /// Whitened torque of the null model with base parameters `theta` on joint `j` alone.
     pub fn torque_on(&self, j: usize, theta: &[f64]) -> Image {
         let problem = &self.regression.problem;
         let mut torque = vec![0.0; problem.samples];
@@ -559,14 +564,14 @@ impl<'a> Study<'a> {
         self.whitening.regression_image(&Column::on(j, torque))
     }
 
-    /// Base parameters of the null model.
+    /// Number of base parameters in the null model.
     pub fn base_count(&self) -> usize {
         self.null_columns.len() - self.answers.len()
     }
 }
 
-/// Whether `image`, of the square `length` before the null model was projected out, keeps more than the share `least` of its
-/// length.
+/// Whether `image`, whose squared length was `length` before the null model was projected out, keeps more than the
+/// share `least` of its length.
 fn is_seen(image: &Image, length: f64, least: f64) -> bool {
     image.square() > least * least * length
 }

@@ -1,14 +1,15 @@
-//! Which causes are told, and which in one sentence: what says one thing together, and the weaker ones of many touches.
+//! Which causes get a sentence, and which share one: a late angle that shows as two causes, and the weaker ones of many
+//! touches.
 //!
-//! The table of causes has them all.
+//! The table of causes holds all of them.
 
 use super::kind::Kind;
 use super::verdict::{Cause, Estimate};
 
-/// So many touches are told one by one.
+/// Up to this many touches get a sentence each.
 const TOUCHES: usize = 5;
 
-/// The sentences about `causes`, in their order. Unlikely ones have none ([`in_the_table_alone`]).
+/// The sentences about `causes`, in the order of the causes. Unlikely causes get none ([`in_the_table_alone`]).
 pub(super) fn in_sentences(causes: &[Cause], noise_is_known: bool) -> Vec<String> {
     let weaker = weaker_touches(causes);
     let last_touch = causes.iter().rposition(|cause| cause.kind == Kind::Contact);
@@ -30,7 +31,8 @@ pub(super) fn in_sentences(causes: &[Cause], noise_is_known: bool) -> Vec<String
     out
 }
 
-/// The names that are too unlikely for a sentence of their own.
+/// One sentence with the names of the causes that are too unlikely for a sentence of their own; `None` if there are
+/// none.
 pub(super) fn in_the_table_alone(causes: &[Cause]) -> Option<String> {
     let name = |cause: &Cause| match cause.joint {
         Some(j) => format!("{} (joint {j})", cause.kind),
@@ -45,7 +47,7 @@ pub(super) fn in_the_table_alone(causes: &[Cause]) -> Option<String> {
     })
 }
 
-/// The touches beyond the [`TOUCHES`] strongest.
+/// Indices of the touches beyond the [`TOUCHES`] strongest.
 fn weaker_touches(causes: &[Cause]) -> Vec<usize> {
     let is_touch = |c: &usize| causes[*c].kind == Kind::Contact && !causes[*c].is_unlikely();
     let mut touches: Vec<usize> = (0..causes.len()).filter(is_touch).collect();
@@ -53,7 +55,7 @@ fn weaker_touches(causes: &[Cause]) -> Vec<usize> {
     touches.into_iter().skip(TOUCHES).collect()
 }
 
-/// How many `weaker` touches there are, and when; nothing where there are none.
+/// The sentence that says how many `weaker` touches there are, and when; `None` if there are none.
 fn number_of(weaker: &[usize], causes: &[Cause]) -> Option<String> {
     let at = |name: &'static str| {
         weaker.iter().filter_map(move |c| Some(causes[*c].parameters.get(name)?.value))
@@ -68,7 +70,8 @@ fn number_of(weaker: &[usize], causes: &[Cause]) -> Option<String> {
     })
 }
 
-/// Whether `lag` and `skew` say that one angle is late: velocity and torque are early against it, by times whose intervals meet.
+/// Whether `lag` and `skew` together say that an angle is late: velocity and torque are both early against it, by times
+/// whose 95 % intervals overlap.
 fn is_late_angle(lag: &Cause, skew: &Cause) -> bool {
     if (lag.kind, skew.kind) != (Kind::VelocityLag, Kind::TimeSkew)
         || lag.joint != skew.joint
@@ -83,7 +86,8 @@ fn is_late_angle(lag: &Cause, skew: &Cause) -> bool {
     are_early && lag.ci95[0] <= skew.ci95[1] && skew.ci95[0] <= lag.ci95[1]
 }
 
-/// The sentence about an angle that is late ([`is_late_angle`]). Its velocity tells by how much, and far better than the torque.
+/// The sentence about an angle that is late ([`is_late_angle`]). It states the delay by the velocity, which tells it
+/// far better than the torque.
 fn late_angle(lag: &Cause, skew: &Cause, noise_is_known: bool) -> String {
     let early = |cause: &Cause| {
         let delay = &cause.parameters["delay_s"];
@@ -111,7 +115,7 @@ mod tests {
         cause(kind, Some(joint), "a delay", 20.0, &[("delay_s", estimate)])
     }
 
-    /// What was said of an angle that is 2 ms late: two causes of one joint.
+    /// An angle that is 2 ms late shows as two causes of one joint, which share one sentence.
     #[test]
     fn an_angle_that_is_late_is_one_sentence() {
         let lag = delay(Kind::VelocityLag, 1, -0.00196, 0.00003);
@@ -122,7 +126,8 @@ mod tests {
                     and the torque is early by 0.00202 ± 0.00019 s).";
         assert_eq!(said.len(), 1, "{said:?}");
         assert!(said[0].starts_with(late) && said[0].contains("removes 96 %"), "{said:?}");
-        // The torque of another joint, one that is late, one that is early by another time, and one that may be something else.
+        // These do not: the torque of another joint, a torque that is late, one that is early by another time, and one
+        // that may be something else.
         for other in [
             delay(Kind::TimeSkew, 2, -0.00202, 0.00019),
             delay(Kind::TimeSkew, 1, 0.00202, 0.00019),

@@ -1,4 +1,4 @@
-//! What a diagnosis says, in numbers.
+//! A diagnosis in numbers: the body of its JSON.
 
 use serde::Serialize;
 
@@ -32,13 +32,14 @@ impl Estimate {
         self.ci95 = [low.min(value), high.max(value)];
     }
 
-    /// Both halves of the interval made longer by an error of their own kind, of which `half` is 95 %.
+    /// Widens both halves of the interval by an independent error whose own 95 % half-width is `half`; the halves add
+    /// in quadrature.
     pub(super) fn widen(&mut self, half: f64) {
         let [low, high] = self.ci95.map(|end| (end - self.value).hypot(half));
         self.ci95 = [self.value - low, self.value + high];
     }
 
-    /// What lies below `least` is taken for `least`.
+    /// Raises the value and the ends of the interval to `least` where they lie below it.
     pub(super) fn keep_above(&mut self, least: f64) {
         self.value = self.value.max(least);
         self.ci95 = self.ci95.map(|end| end.max(least));
@@ -52,37 +53,41 @@ pub struct Cause {
     pub kind: Kind,
     /// Joint (1-based); null for the arm as a whole.
     pub joint: Option<usize>,
-    /// What these data cannot tell from it, itself left out: kind, with `@joint` where the joint differs.
+    /// Names of the other kinds that these data cannot tell from this cause, with `@joint` behind where the joint
+    /// differs.
     pub class: Vec<String>,
-    /// Posterior probability of the class.
+    /// Posterior probability that this cause or one of its class is there.
     pub confidence: f64,
     /// Physical parameters.
     pub parameters: std::collections::BTreeMap<&'static str, Estimate>,
-    /// Joint (1-based) of which `peak_nm` of a contact is: the one that feels it most clearly; null for all else.
+    /// For a contact, the joint (1-based) that feels it most clearly, to which `peak_nm` refers; null for all other
+    /// causes.
     pub peak_joint: Option<usize>,
-    /// Share of the explainable mean square that it removes, in other periods than its size is fitted to; along a single
-    /// run of the joint's whole mean square beside the other causes, in stretches of time left out of its
-    /// fit. Null where no data were left for that.
+    /// Share of the explainable mean square that the cause removes in periods to which its size was not fitted. Along a
+    /// single run, the share of the joint's whole mean square beside the other causes that it removes in stretches of
+    /// time left out of its fit. Null where no data were left for this.
     pub gain_fraction: Option<f64>,
-    /// What would separate it from its class; null where nothing has to be separated.
+    /// The experiment that would tell it from its class; null if the class is empty.
     pub separating_experiment: Option<&'static str>,
-    /// √λ̂: size in standard deviations of the noise.
+    /// √λ̂, the size of the effect in standard deviations of the noise.
     pub strength: f64,
     /// The effect in words.
     pub in_words: String,
-    /// Which form of the family's law fits best; null for the usual one, and where parameters say it.
+    /// Which form of the family's law fits best; null for the usual form, and where the parameters say it.
     pub form: Option<&'static str>,
-    /// Whether it is a law of one coefficient whose size may be none by its interval: said with a "may".
+    /// Whether the cause is a law of one coefficient whose interval includes no effect at all; it is stated with a
+    /// "may".
     pub may_be_none: bool,
     /// The families that came next, and by how much evidence (2 ln) they lost.
     pub rivals: Vec<Rival>,
 }
 
-/// Names less likely than this are no answer.
+/// A cause less likely than this is no answer.
 const UNLIKELY: f64 = 1e-3;
 
 impl Cause {
-    /// Whether it is less likely than one in a thousand: something else explains the log better, and is no cause that could be named.
+    /// Whether the cause is less likely than one in a thousand: something else, which is no cause that could be named,
+    /// explains the log better.
     pub fn is_unlikely(&self) -> bool {
         self.confidence < UNLIKELY
     }
@@ -99,18 +104,18 @@ pub struct Rival {
     pub evidence_behind: f64,
 }
 
-/// Something is there and no family explains it.
+/// An effect that the log shows and that no family explains.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Unexplained {
-    /// Quantity on which it depends most clearly.
+    /// Quantity on which the effect depends most clearly.
     pub axis: &'static str,
     /// Its unit.
     pub unit: &'static str,
     /// Joint (1-based).
     pub joint: usize,
-    /// Size of that dependence, Nm.
+    /// Rms of that dependence, Nm.
     pub rms_nm: f64,
-    /// Axis value and torque, Nm, of the curve.
+    /// Points of the curve: value of the quantity and torque, Nm.
     pub curve: Vec<[f64; 2]>,
 }
 
@@ -123,14 +128,14 @@ pub struct DetectionLimit {
     pub joint: Option<usize>,
     /// Name of the parameter.
     pub parameter: &'static str,
-    /// Value that is found with probability `power`; null where the null model, or a cause that was named, absorbs
-    /// the effect, or where no effect is that large.
+    /// Value that is found with probability `power`. Null where the null model or a named cause absorbs the effect, and
+    /// where no effect can be that large.
     pub value: Option<f64>,
     /// SI unit.
     pub unit: &'static str,
-    /// The effect's other parameters, SI, for which this holds.
+    /// The effect's other parameters, SI, for which this value holds.
     pub given: std::collections::BTreeMap<&'static str, f64>,
-    /// √λ of the effect at that value: what it does to the torque, in units of the noise and outside the model.
+    /// √λ of the effect at that value: its size in the torque outside the model, in standard deviations of the noise.
     pub sqrt_lambda: Option<f64>,
     /// Probability of detection at that value.
     pub power: f64,
@@ -143,14 +148,15 @@ pub struct Rms {
     pub rms_nm: Vec<f64>,
 }
 
-/// How much is gained on a log that was not used.
+/// The gain along a log that was not used for the fit; rms errors per joint, Nm.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HeldOut {
     /// The log.
     pub log: String,
-    /// What was made of it that the user should know.
+    /// What the user should know of how the log was processed.
     pub warnings: Vec<String>,
-    /// What noise of torque and motion leaves of any model's error, all samples; null where nothing repeats.
+    /// What the noise of torque and motion contributes to the error of any model, all samples; null for a log that does
+    /// not repeat.
     pub noise_rms_nm: Option<Vec<f64>>,
     /// The same, samples in which the joint moves.
     pub noise_moving_rms_nm: Option<Vec<f64>>,
@@ -170,8 +176,8 @@ pub struct HeldOut {
     pub manufacturer_rms_nm: Option<Vec<f64>>,
     /// The manufacturer's feed-forward, samples in which the joint moves.
     pub manufacturer_moving_rms_nm: Option<Vec<f64>>,
-    /// Without the causes, samples in which the joint moves, had its Coulomb and viscous friction been
-    /// fitted to this log: shows what friction of another day costs, and is no gain.
+    /// Without the causes, samples in which the joint moves, with Coulomb and viscous friction refitted to this log. It
+    /// shows what the friction of another day costs, and is no gain.
     pub before_own_friction_rms_nm: Vec<f64>,
     /// With the causes, likewise.
     pub after_own_friction_rms_nm: Vec<f64>,
@@ -179,40 +185,42 @@ pub struct HeldOut {
     pub standstill_fraction: Vec<f64>,
 }
 
-/// A parameter of the simulation against the data.
+/// A base parameter of the simulation compared with the data.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Moved {
     /// Base parameter.
     pub name: String,
-    /// In the simulation.
+    /// Value in the simulation.
     pub simulation: f64,
-    /// In the data.
+    /// Value in the data.
     pub data: f64,
-    /// Of the difference.
+    /// Standard deviation of the difference.
     pub sigma: f64,
-    /// Difference over σ, as the Gaussian deviate that is as improbable: σ is known with the degrees of freedom that the log gives it.
+    /// Difference over σ, converted from Student's t to the Gaussian deviate of equal probability, because the log
+    /// gives σ only finite degrees of freedom.
     pub z: f64,
 }
 
-/// All parameters of the simulation together against the data.
+/// All base parameters of the simulation together compared with the data.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MovedTogether {
-    /// dᵀV⁻¹d of the differences d with their covariance V: as many as there are parameters on average where nothing moved.
+    /// dᵀV⁻¹d of the differences d with covariance V. Where nothing moved, its mean is the number of parameters.
     pub squared_distance: f64,
-    /// b and ν: over b, the number of parameters, it is compared with F(b, ν), ν what the noise is known with.
+    /// b and ν: `squared_distance`/b, with b the number of parameters, is compared with F(b, ν), where ν are the
+    /// degrees of freedom with which the noise is known.
     pub degrees_of_freedom: [f64; 2],
-    /// Probability that noise alone carries them so far.
+    /// Probability that noise alone makes the distance as large.
     pub p_value: f64,
 }
 
-/// A base parameter beside the causes that were found.
+/// A base parameter as estimated together with the causes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BaseParameter {
     /// Name, as in identification.
     pub name: String,
     /// Estimate.
     pub value: f64,
-    /// σ; NaN (null) where the causes leave nothing to tell it by.
+    /// Standard deviation; NaN (null) where the causes leave nothing from which to tell it.
     pub sigma: f64,
 }
 
@@ -221,16 +229,16 @@ pub struct BaseParameter {
 pub struct Diagnosis {
     /// The log.
     pub log: String,
-    /// Rms noise of one sample per joint from the scatter between periods, Nm; null for a single run.
+    /// Rms noise of one sample per joint, from the scatter between periods, Nm; null for a single run.
     pub noise_floor_nm: Option<Vec<f64>>,
-    /// What noise of torque and motion leaves of any model's residual, which is that of the mean of the periods, Nm; null for a
-    /// single run.
+    /// What the noise of torque and motion contributes to the residual of any model, which is that of the mean period,
+    /// per joint, Nm; null for a single run.
     pub noise_of_mean_nm: Option<Vec<f64>>,
     /// Residual of the model without causes.
     pub before: Rms,
     /// What was found.
     pub causes: Vec<Cause>,
-    /// What is there but not explained.
+    /// The effect that is there but not explained, if any.
     pub unexplained: Option<Unexplained>,
     /// Residual of the extended model.
     pub after: Rms,
@@ -238,32 +246,32 @@ pub struct Diagnosis {
     pub base_parameters: Vec<BaseParameter>,
     /// Gains on other logs.
     pub held_out: Vec<HeldOut>,
-    /// Parameters against the simulation.
+    /// Base parameters compared with those of the simulation.
     pub moved_parameters: Vec<Moved>,
     /// All of them together; null for a single run, and without a simulation.
     pub moved_together: Option<MovedTogether>,
-    /// A second log against this one.
+    /// A second log compared with this one.
     pub payload: Option<PayloadFinding>,
-    /// The simulation against the logs, without and with the causes; null where it was not asked for or
-    /// does not run.
+    /// The replay: the simulation compared with the logs, without and with the causes; null where it was not asked for
+    /// or does not run.
     pub replay: Option<Replay>,
-    /// What would not be seen.
+    /// Limits below which effects would not be seen.
     pub detection_limits: Vec<DetectionLimit>,
-    /// Probability that noise alone leaves this much behind the last cause; null for a single run.
+    /// Probability that noise alone leaves a residual this large behind the last cause; null for a single run.
     pub lack_of_fit_probability: Option<f64>,
-    /// In one word.
+    /// The result in one word.
     pub verdict: Verdict,
-    /// In sentences.
+    /// The result in sentences.
     pub sentences: Vec<String>,
     /// What the user should know.
     pub warnings: Vec<String>,
 }
 
-/// In one word.
+/// The result of a diagnosis in one word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// Nothing that the log could show.
+    /// Nothing was found that this log could show.
     NothingFound,
     /// Causes named, nothing left over.
     CauseNamed,
@@ -274,12 +282,12 @@ pub enum Verdict {
 }
 
 impl Diagnosis {
-    /// Whether no arm has what was identified.
+    /// Whether no arm has the base parameters that were identified.
     pub fn is_contradicted(&self) -> bool {
         self.verdict == Verdict::Contradicted
     }
 
-    /// Takes in what the simulation says, or why it says nothing.
+    /// Adds the result of the replay, or a warning that says why there is none.
     pub fn add_replay<E: std::fmt::Display>(&mut self, replay: Result<Replay, E>) {
         match replay {
             Ok(replay) => {
@@ -290,7 +298,7 @@ impl Diagnosis {
         }
     }
 
-    /// Takes in what a second log says about a body on the flange.
+    /// Adds what a second log says about a body on the flange.
     pub fn add_payload(&mut self, payload: PayloadFinding) {
         let cause = payload.cause();
         if let (Verdict::NothingFound, Some(_)) = (self.verdict, &cause) {
@@ -306,8 +314,8 @@ impl Diagnosis {
     }
 }
 
-/// Whether a `class` (of a cause at `site`) holds `kind` at `joint`: kinds at another joint than the cause's have it behind
-/// an @.
+/// Whether the `class` of a cause at `site` holds `kind` at `joint`. Kinds on another joint than the cause's are
+/// written with `@joint` behind.
 pub fn class_holds(
     class: &[String],
     site: Option<usize>,
