@@ -1,8 +1,8 @@
-//! What may differ between an arm and a simulation of it, and the torque that each difference adds.
+//! Possible differences between an arm and a simulation of it, and the torque that each of them adds.
 //!
-//! A body on the flange adds X K δ, δ its ten inertial parameters and K the map to base parameters; other friction
-//! adds multiples of its columns; a wrong torque constant a share of the joint's torque; gravity, tilt and
-//! length add what the inverse dynamics of the changed arm add.
+//! A body on the flange adds X K δ, with δ its ten inertial parameters and K the map to base parameters. Another
+//! friction adds multiples of the friction columns, and a wrong torque constant a share of the joint's torque. A change
+//! of gravity, tilt or length adds the difference that it makes to the inverse dynamics of the arm.
 
 use std::collections::BTreeMap;
 
@@ -17,18 +17,18 @@ use crate::diagnose::verdict::Estimate;
 use crate::dynamics::{Parameter, ParameterLayout};
 use crate::robot::{Arm, JointSignals};
 
-/// Steps of the numerical derivatives: small against what matters, large against rounding.
+/// Steps of the numerical derivatives: small compared with relevant changes, large compared with rounding.
 const LENGTH_STEP_M: f64 = 1e-4;
 const GRAVITY_STEP: f64 = 1e-4;
 
-/// Physical parameters of coefficients, as far as the data tell these.
+/// Function from coefficients to physical parameters; `None` for coefficients that the data do not determine.
 type Quantities<'a> = Box<dyn Fn(&[Option<f64>]) -> Vec<Quantity> + 'a>;
 
-/// A change that may have moved the parameters.
+/// A physical change that may have moved the parameters.
 pub(super) struct Change<'a> {
     pub(super) kind: Kind,
     pub(super) site: Option<usize>,
-    /// By coefficient; zero where it moves nothing.
+    /// Whitened column of each coefficient; zero where it has no effect.
     pub(super) images: Vec<Image>,
     quantities: Quantities<'a>,
     pub(super) in_words: &'static str,
@@ -46,8 +46,8 @@ impl Change<'_> {
         }
     }
 
-    /// Quantities of the coefficients `b` with 95 % intervals by the delta method; of each its place in the change, and whether
-    /// it is told.
+    /// Physical quantities of the coefficients `b`, with 95 % intervals by the delta method. `places` gives the
+    /// position of each coefficient in the change, and whether the data determine it.
     pub(super) fn estimates(
         &self,
         (b, places): (&[f64], &[(usize, bool)]),
@@ -86,7 +86,7 @@ impl Change<'_> {
     }
 }
 
-/// Everything that is looked for.
+/// All changes that are looked for.
 pub(super) fn all<'a>(study: &'a Study<'a>, set: &BaseSet, simulation: &[f64]) -> Vec<Change<'a>> {
     let scene = &study.scene;
     let joints = scene.joints();
@@ -158,7 +158,7 @@ pub(super) fn all<'a>(study: &'a Study<'a>, set: &BaseSet, simulation: &[f64]) -
     out
 }
 
-/// A family of the catalogue, whose columns the null model may absorb here.
+/// A family of the catalogue as a change; unlike elsewhere, the null model may absorb its columns here.
 fn of_family<'a>(
     study: &'a Study<'a>,
     family: &'a dyn Candidate,
@@ -177,7 +177,7 @@ fn of_family<'a>(
     }
 }
 
-/// Torque per metre by which the way to joint `j`'s frame is longer, Nm/m.
+/// Torque per metre of lengthening of the vector to joint `j`'s frame, Nm/m.
 fn longer(study: &Study, j: usize) -> Column {
     with_arm(study, LENGTH_STEP_M, |arm| {
         let way_m = &mut arm.joints[j].placement.translation_m;
@@ -185,7 +185,7 @@ fn longer(study: &Study, j: usize) -> Column {
     })
 }
 
-/// Torque per unit of a small `change` of the arm of size `step`.
+/// Torque per unit of a small `change` of the arm, of size `step`.
 fn with_arm(study: &Study, step: f64, change: impl Fn(&mut Arm)) -> Column {
     let mut arm = study.scene.arm.clone();
     change(&mut arm);
@@ -203,12 +203,12 @@ pub(super) fn combined(columns: &[Image], b: &[f64]) -> Image {
     sum
 }
 
-/// The quantity of a coefficient; none where the data do not tell that.
+/// The quantity of a coefficient; empty where the data do not determine it.
 fn told(name: &'static str, value: Option<f64>, unit: &'static str) -> Vec<Quantity> {
     value.map(|value| Quantity { name, value, unit }).into_iter().collect()
 }
 
-/// A body by its mass and where that sits, or by its first moments where no mass is told.
+/// A body described by its mass and centre of mass, or by its first moments where the mass is not determined.
 fn payload(b: &[Option<f64>]) -> Vec<Quantity> {
     let (mass_kg, first_moment_kg_m) = (b[0], &b[1..4]);
     let names = match mass_kg {
@@ -230,9 +230,10 @@ fn friction(b: &[Option<f64>]) -> Vec<Quantity> {
     both.into_iter().flatten().collect()
 }
 
-/// The `quantities` of a family as far as its coefficients `b` are told.
+/// The `quantities` of a family, as far as its coefficients `b` are determined.
 fn of_told(b: &[Option<f64>], quantities: impl Fn(&[f64]) -> Vec<Quantity>) -> Vec<Quantity> {
-    // What stands last goes with what stands before it where it is not told.
+    // Undetermined coefficients at the end are cut off, as families expect of absorbed columns; those in between become
+    // NaN.
     let Some(last) = b.iter().rposition(Option::is_some) else { return Vec::new() };
     let b: Vec<f64> = b[..=last].iter().map(|b| b.unwrap_or(f64::NAN)).collect();
     quantities(&b).into_iter().filter(|quantity| !quantity.value.is_nan()).collect()
@@ -246,7 +247,7 @@ mod tests {
         quantities.into_iter().map(|quantity| (quantity.name, quantity.value)).collect()
     }
 
-    /// One joint feels moments across its axis alone, two parallel ones the mass as well.
+    /// A single joint feels only moments across its axis; two parallel joints also feel the mass.
     #[test]
     fn a_body_is_told_as_far_as_the_joints_feel_it() {
         let moments = payload(&[None, Some(0.2), Some(0.1), None]);
@@ -255,7 +256,7 @@ mod tests {
         assert_eq!(numbers(in_a_plane), [("mass_kg", 2.0), ("com_x_m", 0.1), ("com_y_m", 0.25)]);
     }
 
-    /// A tilt about an axis that the arm does not feel is not taken for the one that it feels.
+    /// A tilt about an axis that the arm does not feel is not confused with the one that it feels.
     #[test]
     fn a_coefficient_keeps_its_place() {
         let tilt = |b: &[f64]| -> Vec<Quantity> {

@@ -1,11 +1,11 @@
-//! A log against a given simulation: which of its parameters moved, and which physical changes moved them.
+//! Comparison of a log with a given simulation: which of its parameters moved, and which physical changes moved them.
 //!
-//! Nothing is fitted first: the residual is y − X θ_sim, and a change explains its own torque of it ([`changes`]). Effects that any
-//! fit would absorb stand out here. Where the simulation was identified from a log, θ_sim has the covariance C of that: X C Xᵀ is
-//! noise of the residual like that of the log itself.
+//! Nothing is fitted first: the residual is y − X θ_sim, and a change explains its own torque in it ([`changes`]).
+//! Effects that any fit would absorb stand out here. Where the simulation was identified from a log, θ_sim has the
+//! covariance C of that identification; X C Xᵀ is then noise of the residual, like the noise of the log itself.
 //!
-//! Enters: the study of a log, the base parameters of the simulation, and the effects that were found without it. Leaves: the changes that
-//! explain the difference, as causes, and which parameters moved by how much.
+//! Enters: the study of a log, the base parameters of the simulation, and the effects that were found without it.
+//! Leaves: the changes that explain the difference, as causes, and which parameters moved by how much.
 
 mod changes;
 
@@ -28,44 +28,45 @@ use super::whitening::RepeatingNoise;
 use crate::base::BaseSet;
 use crate::identify::covariance::squared_distance;
 
-/// Changes at most.
+/// Maximum number of changes.
 const MOST_CHANGES: usize = 8;
-/// Rounds in which one is added and others are removed: two may replace each other for ever.
+/// Rounds in which one change is added and others are removed; bounded because two may replace each other for ever.
 const ROUNDS: usize = 2 * MOST_CHANGES;
-/// Alternatives that are reported.
+/// Number of alternatives that are reported.
 const RIVALS: usize = 5;
-/// σ of known noise beyond which a parameter differs from a simulation: noise shows one in 300 comparisons of fifty parameters.
+/// Difference between a parameter and a simulation, in σ of known noise, beyond which the parameter has moved: noise
+/// exceeds it in one of 300 comparisons of fifty parameters.
 pub const MOVED: f64 = 4.0;
 
 /// The simulation that a log is compared with.
 #[derive(Debug, Clone, Copy)]
 pub struct Nominal<'a> {
-    /// Its base parameters.
+    /// Base parameters of the simulation.
     pub theta: &'a [f64],
     /// Their covariance, where they were identified.
     pub covariance: Option<&'a DMatrix<f64>>,
-    /// Degrees of freedom with which that is known; infinite: many.
+    /// Degrees of freedom with which the covariance is known; infinite: many.
     pub freedom: f64,
-    /// What is said first where these were identified along a log which the model does not explain: what differs from them may
-    /// have been wrong there, and no change is sure.
+    /// Caveat to be stated first, where the parameters were identified from a log that the model does not explain: a
+    /// difference may then be an error of theirs, and no change is certain.
     pub doubt: Option<&'a str>,
 }
 
 impl<'a> Nominal<'a> {
-    /// A simulation that is as it says.
+    /// A simulation whose parameters are exact.
     pub fn certain(theta: &'a [f64]) -> Self {
         Self { theta, covariance: None, freedom: f64::INFINITY, doubt: None }
     }
 
-    /// Of every parameter of the data, less that of the simulation, the variance and its degrees of freedom.
+    /// Variance of the difference between data and simulation for every base parameter, and its degrees of freedom.
     fn noise_beside(&self, base: &Base) -> Vec<(f64, f64)> {
         let data = base.parameters.iter().zip(&base.freedom).enumerate();
         data.map(|(k, (data, freedom))| self.with_noise((data.sigma.powi(2), *freedom), k))
             .collect()
     }
 
-    /// The variance of parameter `k` in data in which it is `of_data`, less that of the simulation, and its degrees of freedom
-    /// (Satterthwaite 1946).
+    /// Variance of the difference between data and simulation in parameter `k`, and its degrees of freedom
+    /// (Satterthwaite 1946). `of_data` is the variance in the data, known with `freedom` degrees of freedom.
     fn with_noise(&self, (of_data, freedom): (f64, f64), k: usize) -> (f64, f64) {
         let own = self.covariance.map_or(0.0, |covariance| covariance[(k, k)]);
         let both = of_data + own;
@@ -73,7 +74,7 @@ impl<'a> Nominal<'a> {
     }
 }
 
-/// Every base parameter in the simulation and in the data, beside the causes that were found in these.
+/// Every base parameter in the simulation and in the data, where it is estimated beside the causes that were found.
 pub fn moved(simulation: Nominal, base: &Base) -> Vec<Moved> {
     let of_parameter = |((data, theta), (variance, freedom)): ((&BaseParameter, &f64), _)| {
         let (sigma, simulation) = (f64::sqrt(variance), *theta);
@@ -84,16 +85,18 @@ pub fn moved(simulation: Nominal, base: &Base) -> Vec<Moved> {
     pairs.zip(simulation.noise_beside(base)).map(of_parameter).collect()
 }
 
-/// The Gaussian deviate that is as improbable as Student's `t` with so many degrees of freedom, to 1 % from five on and
-/// 6 % with two, up to 4 σ (Wallace 1959).
+/// The Gaussian deviate that is as improbable as Student's `t` with the given degrees of freedom. Up to 4 σ, it is
+/// accurate to 1 % from five degrees of freedom on and to 6 % with two (Wallace 1959).
 fn as_gaussian(t: f64, freedom: f64) -> f64 {
     let shrunk = (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0);
     t.signum() * shrunk * (freedom * (t * t / freedom).ln_1p()).sqrt()
 }
 
-/// How far the data lie from a simulation in all `base` parameters together: of a log that repeats, whose noise the `study`
-/// knows. Combinations of parameters are told far better than any of them. d²/b of b parameters is taken for F(b, ν) with the
-/// harmonic mean ν of what each σ is known with.
+/// Distance of the data from a simulation in all `base` parameters together, for a periodic log, whose noise the
+/// `study` knows; `None` for a single run.
+///
+/// Combinations of parameters are known far better than any single one. d²/b of b parameters is treated as F(b, ν),
+/// with ν the harmonic mean of the degrees of freedom with which each σ is known.
 pub fn moved_together(study: &Study, simulation: Nominal, base: &Base) -> Option<MovedTogether> {
     if !study.scene.periodic {
         return None;
@@ -115,17 +118,18 @@ pub fn moved_together(study: &Study, simulation: Nominal, base: &Base) -> Option
 
 /// An effect that was found beside the null model.
 pub struct Found<'a> {
-    /// At its best shape.
+    /// The law, at its best shape.
     pub entry: &'a Entry,
-    /// With its numbers.
+    /// Its numbers.
     pub effect: &'a Effect,
-    /// What the data cannot tell from it.
+    /// Laws that the data cannot distinguish from it.
     pub alike: Vec<&'a Entry>,
 }
 
-/// An effect and the room that the residual of a simulation leaves it: its columns with what a fit of the null model would absorb of
-/// them, most of what they are; how these change with its shape; and those of what the data cannot tell from it. A law whose
-/// exponent is off by a tenth, or that is another of its class, is none the less not a change of the arm.
+/// An effect and the room that it is given in the residual of a simulation: its columns, including the part that a fit
+/// of the null model would absorb, which is most of them; the derivatives of these columns by its shape; and the
+/// columns of laws that the data cannot distinguish from it. A law whose exponent is off by a tenth, or that is another
+/// one of its class, is still not a change of the arm.
 struct Beside<'a> {
     entry: &'a Entry,
     room: Vec<Image>,
@@ -139,16 +143,16 @@ impl<'a> Beside<'a> {
     }
 }
 
-/// What is not known of the simulation, as noise of its residual.
+/// Uncertainty of the simulation, as noise of its residual.
 struct Unknown(Option<RepeatingNoise>);
 
 impl Unknown {
-    /// Of a simulation whose base parameters have the `covariance`, whose roots times the null model's columns are torques of
-    /// standard deviation one.
+    /// Uncertainty of a simulation whose base parameters have this `covariance`. The null model's columns times the
+    /// root of the covariance are torques of standard deviation one.
     fn new(study: &Study, covariance: Option<&DMatrix<f64>>) -> Self {
         Self(covariance.map(|covariance| {
             let parts = covariance.clone().symmetric_eigen();
-            // What rounding makes of zero.
+            // Rounding may make zero eigenvalues slightly negative.
             let roots = parts.eigenvalues.map(|variance| variance.max(0.0).sqrt());
             let torque = |(direction, root): (nalgebra::DVectorView<f64>, &f64)| {
                 let coefficients: Vec<f64> = direction.iter().map(|d| root * d).collect();
@@ -164,7 +168,7 @@ impl Unknown {
         self.0.iter().for_each(|noise| noise.whiten(images));
     }
 
-    /// [`Self::whiten`] of images that are given away.
+    /// [`Self::whiten`], by value.
     fn whitened(&self, mut images: Vec<Image>) -> Vec<Image> {
         self.whiten(&mut images);
         images
@@ -173,16 +177,17 @@ impl Unknown {
 
 /// How the data differ from a simulation.
 pub struct Explained {
-    /// The changes, the one that explains most first.
+    /// The changes, in descending order of what they explain.
     pub causes: Vec<Cause>,
-    /// Every change that was looked for, and every effect that is needless beside those found: kind and joint from 1. What is
-    /// one of them is judged here alone.
+    /// Every change that was looked for, and every effect that proved unnecessary beside those found: kind and joint
+    /// (1-based). Causes among them are judged here alone.
     pub judged: Vec<(Kind, Option<usize>)>,
-    /// What the changes and the effects that are needed span outside the null model.
+    /// Span, outside the null model, of the changes and of the effects that are needed.
     pub span: Span,
 }
 
-/// The changes that explain how the data differ from the simulation; `accepted` are effects that were found beside the null model.
+/// Finds the changes that explain how the data differ from the simulation; `accepted` are the effects that were found
+/// beside the null model.
 pub fn explain(study: &Study, set: &BaseSet, simulation: Nominal, accepted: &[Found]) -> Explained {
     let Nominal { theta, covariance, .. } = simulation;
     let unknown = Unknown::new(study, covariance);
@@ -209,7 +214,7 @@ pub fn explain(study: &Study, set: &BaseSet, simulation: Nominal, accepted: &[Fo
     let nuisance = nuisance(study, &unknown, beside.iter());
     let mut search = Search { study, changes, images, places, unknown, nuisance, residual };
     let mut taken = search.select();
-    // What the null model could not absorb of a change may have been taken for an effect.
+    // An accepted effect may have been the part of a change that the null model could not absorb.
     while let Some(needless) = (0..beside.len()).find(|&e| !search.needs(e, &beside, &taken)) {
         let entry = beside.remove(needless).entry;
         judged.push((study.families[entry.family].kind(), entry.site.map(|j| j + 1)));
@@ -225,8 +230,8 @@ pub fn explain(study: &Study, set: &BaseSet, simulation: Nominal, accepted: &[Fo
     Explained { causes, judged, span }
 }
 
-/// What the residual of a simulation holds beside changes: the effects `beside` with their room, and how drives answer friction,
-/// which no simulation says.
+/// Nuisance columns of the residual of a simulation: the effects `beside` with their room, and how drives answer
+/// friction, which no simulation says.
 fn nuisance<'a>(
     study: &Study,
     unknown: &Unknown,
@@ -251,7 +256,7 @@ fn nuisance<'a>(
 struct Search<'a> {
     study: &'a Study<'a>,
     changes: Vec<Change<'a>>,
-    /// Of each change, where what is not known of the simulation is white.
+    /// Columns of each change, whitened for the uncertainty of the simulation as well.
     images: Vec<Vec<Image>>,
     /// See [`places`].
     places: Vec<f64>,
@@ -260,7 +265,7 @@ struct Search<'a> {
     residual: Image,
 }
 
-/// A change with 2 ln of the evidence for it and the probability of as much by chance.
+/// A change with 2 ln of the evidence for it, and the probability that chance explains as much.
 struct Scored {
     change: usize,
     evidence: f64,
@@ -268,7 +273,7 @@ struct Scored {
 }
 
 impl Search<'_> {
-    /// Forward selection, with removal of what a later change makes needless.
+    /// Forward selection of changes; changes that a later one makes unnecessary are removed.
     fn select(&self) -> Vec<usize> {
         let significant =
             |s: &Scored| s.evidence > 0.0 && s.probability * self.places[s.change] < chance::CHANGE;
@@ -294,8 +299,9 @@ impl Search<'_> {
         taken
     }
 
-    /// Whether effect number `e` of those `beside` is worth its price beside the others and the changes `taken`; true where none
-    /// is, which is how it was found, and of one of several of a family at its site, which are judged together.
+    /// Whether effect number `e` of those `beside` is worth its price beside the other effects and the changes `taken`.
+    /// True where no change is taken, since the effect was found that way, and for each of several effects of a family
+    /// at the same site, which are judged together.
     fn needs(&self, e: usize, beside: &[Beside], taken: &[usize]) -> bool {
         let study = self.study;
         let entry = beside[e].entry;
@@ -334,12 +340,12 @@ impl Search<'_> {
         out
     }
 
-    /// Span of the changes `taken` and of what no simulation has, and the residual outside it.
+    /// Span of the changes `taken` and of the nuisance columns, and the residual outside it.
     fn outside(&self, taken: &[usize]) -> (Span, Image) {
         self.outside_of(self.nuisance.clone(), taken)
     }
 
-    /// The same of the changes `taken` and `span`.
+    /// The same for the changes `taken` and a given `span`.
     fn outside_of(&self, mut span: Span, taken: &[usize]) -> (Span, Image) {
         for image in taken.iter().flat_map(|&c| &self.images[c]) {
             span.push(image);
@@ -349,7 +355,7 @@ impl Search<'_> {
         (span, rest)
     }
 
-    /// Change `taken[index]` with its numbers, the others given.
+    /// Change `taken[index]` as a cause with its numbers, the other changes given.
     fn cause(&self, taken: &[usize], index: usize) -> Cause {
         let study = self.study;
         let change = &self.changes[taken[index]];
@@ -407,8 +413,8 @@ impl Search<'_> {
     }
 }
 
-/// Kinds of changes times sites of the kind of each, between which chance and odds are shared evenly: first between the kinds,
-/// then between the sites of each, as laws share theirs ([`price`](super::price)).
+/// Number of kinds of changes times the number of sites of each change's kind. Chance and odds are shared evenly: first
+/// between the kinds, then between the sites of each, as for laws ([`price`](super::price)).
 fn places(changes: &[Change]) -> Vec<f64> {
     let mut sites: BTreeMap<Kind, usize> = BTreeMap::new();
     for change in changes {
@@ -425,8 +431,8 @@ fn without(taken: &[usize], index: usize) -> Vec<usize> {
 mod tests {
     use super::*;
 
-    /// Beside a simulation that is as it says the log's own count; of two that are known alike all of both; and where a short log is behind
-    /// the larger variance its own.
+    /// Against an exact simulation, the degrees of freedom are those of the log. For two variances that are known
+    /// equally well, they add up. Where a short log determines the larger variance, they are those of that log.
     #[test]
     fn degrees_of_freedom_are_those_of_both_logs() {
         let covariance = DMatrix::identity(1, 1) * 4.0;
@@ -446,7 +452,8 @@ mod tests {
         assert_eq!(freedom, 80.0);
     }
 
-    /// Quantiles of Student's t that are as improbable as 1, 2, 3 and 4 σ (SciPy 1.17, `stats.t.isf(stats.norm.sf(z), nu)`).
+    /// Quantiles of Student's t that are as improbable as 1, 2, 3 and 4 σ (SciPy 1.17, `stats.t.isf(stats.norm.sf(z),
+    /// nu)`).
     #[test]
     fn few_degrees_of_freedom_make_large_deviations_usual() {
         for (freedom, within, quantiles) in [

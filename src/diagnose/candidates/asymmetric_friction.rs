@@ -1,5 +1,5 @@
-//! Friction of different size in the two directions: half the differences of Coulomb and viscous
-//! friction, τ = c + v |q̇|.
+//! Friction of different size in the two directions: τ = c + v |q̇|, with c and v half the differences of Coulomb and
+//! viscous friction.
 
 use super::*;
 
@@ -19,12 +19,12 @@ impl Candidate for AsymmetricFriction {
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
-        // Where the null model fits offsets, the constant is one of them, and nothing is known of it as friction.
+        // Where the null model fits offsets, the constant is one of them, and does not reveal friction.
         let constant = b.get(1).map(|constant| quantity("coulomb_nm", *constant, "Nm"));
         constant.into_iter().chain([quantity("viscous_nm_s_rad", b[0], "Nm s/rad")]).collect()
     }
 
-    /// What the null model's offset leaves: the Coulomb part alone is one, but at reversals.
+    /// The viscous part. The Coulomb part alone is an offset except at reversals, and the null model absorbs offsets.
     fn size(&self, quantities: &[Quantity]) -> Option<Quantity> {
         quantities.last().copied()
     }

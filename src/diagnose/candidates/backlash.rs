@@ -1,17 +1,18 @@
-//! Play in the gear. While the load presses rotor and link together they move as one, but for what the flanks
-//! give way; where the load changes sign they part, and the rotor flies through the gap g to the other flank:
+//! Play in the gear. While the load presses rotor and link together, they move as one, apart from the compliance of the
+//! flanks. Where the load changes sign they part, and the rotor flies through the gap g to the other flank:
 //!
 //! ```text
 //! δ̈ = (τ_L − T − d_M δ̇) (1/I_a + [(M + I_a')⁻¹]_jj),   T = k (δ ∓ g/2) + d δ̇ beyond ±g/2 as long as it pushes, 0 between
 //! ```
 //!
-//! with δ = q_M − q_L, the load τ_L of the rigid arm, which passes through zero, the other joints free to move (with
-//! theirs held, flights at the elbow seemed half as wide as they were), and flanks against which the
-//! rotor alone swings at √(k/I_a) with the damping d = 2 ζ √(k I_a); the drive damps by d_M, as it does where gears give
-//! way. The log has the motor's angle, so that
-//! the links have moved by δ less than it says. A flight lasts (6 g/δ⃛)^(1/3), a few milliseconds, and is
-//! seen by its jerk at both ends and by the swinging after it: the log has δ̇ at its samples only, and its
-//! acceleration is the derivative of these.
+//! Here δ = q_M − q_L, and τ_L is the load of the rigid arm, which passes through zero. The other joints are free to
+//! move; with them held, gaps at the elbow seemed half as wide as they were. The flanks are such that the rotor alone
+//! swings against them at √(k/I_a), with the damping d = 2 ζ √(k I_a). The drive damps by d_M, as it does in compliant
+//! gears.
+//!
+//! The log has the motor's angle, so that the links have moved by δ less than it says. A flight lasts (6 g/δ⃛)^(1/3), a
+//! few milliseconds. It shows by its jerk at both ends and by the swing after it. The log has δ̇ only at its samples,
+//! and the acceleration is the derivative of these samples.
 
 use super::elasticity::{HELD_ERROR, Jolts, Lag, give_way, held_nm_s_rad};
 use super::*;
@@ -20,21 +21,23 @@ use crate::diagnose::scene::FINE;
 /// See the module.
 pub struct Backlash;
 
-/// Frequencies of the rotor against its flanks, rad/s, by variant: from those that the log's rate can hardly tell from stiff ones to
-/// those of a gear that gives way. What the samples show of a swing depends on where it
-/// is within their step: halfway between two of these its phase is off by one radian where it has faded to 1/e.
+/// Frequencies at which the rotor swings against its flanks, rad/s, by variant: from flanks that the log's rate can
+/// hardly tell from rigid ones to those of a compliant gear. What the samples show of a swing depends on its phase
+/// within their step. Halfway between two neighbouring frequencies, the phase is off by one radian when the swing has
+/// decayed to 1/e.
 const FLANK_RAD_S: [f64; 14] = [
     900.0, 775.0, 668.0, 576.0, 496.0, 428.0, 369.0, 318.0, 274.0, 236.0, 203.0, 175.0, 151.0,
     130.0,
 ];
-/// ζ of the flanks.
+/// Damping ratio ζ of the flanks.
 const DAMPING_RATIO: f64 = 0.12;
-/// The fastest swing that steps of h follow, times h: flanks are no stiffer. At sixteen instants per sample that is five
-/// times faster than what the samples can show; behind stiffer ones light links move with their rotor all the same.
+/// Fastest swing that steps of length h can follow, times h: flanks are made no stiffer than this. At sixteen instants
+/// per sample, this swing is five times faster than what the samples can show. Behind stiffer flanks, light links move
+/// with their rotor anyway.
 const FOLLOWED: f64 = 1.0;
-/// Time in which most of how a flight began is forgotten, s.
+/// Time in which the initial state of the simulated flight is mostly forgotten, s.
 const RUN_IN_S: f64 = 3.0;
-/// Gaps that are flown through at once.
+/// Number of gaps that are simulated in parallel.
 const ABREAST: usize = 8;
 
 impl Candidate for Backlash {
@@ -42,7 +45,8 @@ impl Candidate for Backlash {
         Kind::Backlash
     }
 
-    /// Flanks too stiff to be followed are all alike.
+    /// Variants whose flanks are too stiff for the integration steps are clipped to the same stiffness; only one of
+    /// them is kept.
     fn shapes(&self, scene: &Scene, site: Option<usize>) -> Vec<Shape> {
         let stiffness = Flanks::by_variant(scene, joint(site)).map(|f| f.stiffness_nm_rad);
         (0..FLANK_RAD_S.len())
@@ -68,7 +72,8 @@ impl Candidate for Backlash {
         flights(scene, joint(site), &flown).map(|column| vec![column]).collect()
     }
 
-    /// What the jolts of the drive do, how wide the gap is where they decide, and how hard its flanks are.
+    /// Directions in which the law may be wrong: the drive's response to jolts, the width of the gap where jolts are
+    /// decisive, and the stiffness of its flanks.
     fn loose(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         if !scene.periodic {
             return Vec::new();
@@ -109,10 +114,10 @@ impl Candidate for Backlash {
         b[0] > 0.0
     }
 
-    /// Both tell the gap: how far the links lag, and how long a flight lasts. Flanks and drives that are harder or softer
-    /// than those assumed make a flight seem longer or shorter; a gap that is crossed in less time than a third of it
-    /// takes was none, but a gear that gives way, and one four times too wide for the lag of the links, which a flight
-    /// 1.6 times too long means, was not flown through.
+    /// The gap is determined twice: by how far the links lag (coefficient) and by how long a flight lasts (shape).
+    /// Flanks and drives that are harder or softer than assumed make a flight seem longer or shorter. If the flight
+    /// fits a gap of less than a third of the lag, there was no gap but a compliant gear. If it fits a gap more than
+    /// four times the lag, the flight seems 1.6 times too long, and no gap was flown through.
     fn is_its_own(&self, _: &Scene, _: Option<usize>, shape: Shape, b: &[f64]) -> bool {
         b.first().is_none_or(|gap_rad| (0.25..=3.0).contains(&(gap_rad / shape.value)))
     }
@@ -122,7 +127,7 @@ impl Candidate for Backlash {
     }
 }
 
-/// Torques per unit of the gap of joint `j` for each shape, where jolts make of it what goes with it.
+/// Torque per unit of the gap of joint `j`, for each shape and the response to jolts that goes with it.
 fn flights(scene: &Scene, j: usize, flown: &[(Shape, Jolts)]) -> impl Iterator<Item = Column> {
     let column = move |((shape, _), [delta, rate]): (&(Shape, Jolts), [Vec<f64>; 2])| {
         let links = Lag::logged(scene, delta, rate).of(scene, j);
@@ -164,7 +169,7 @@ fn fly(scene: &Scene, j: usize, flown: &[(Shape, Jolts)]) -> Vec<[Vec<f64>; 2]> 
     out
 }
 
-/// What a rotor meets at the ends of its gap.
+/// Stiffness and damping of the flanks that a rotor meets at the ends of its gap.
 #[derive(Clone, Copy)]
 struct Flanks {
     stiffness_nm_rad: f64,
@@ -172,7 +177,8 @@ struct Flanks {
 }
 
 impl Flanks {
-    /// Those of joint `j`, on which its rotor swings at [`FLANK_RAD_S`] were it alone, as far as instants can follow.
+    /// Flanks of joint `j` on which its rotor, were it alone, would swing at [`FLANK_RAD_S`], limited to what the
+    /// instants can follow.
     fn by_variant(scene: &Scene, j: usize) -> [Self; FLANK_RAD_S.len()] {
         let mobility = scene.mobility_per_kg_m2.joint(j).iter().copied().fold(0.0, f64::max);
         let rotor = scene.rotor_kg_m2[j];
@@ -186,8 +192,8 @@ impl Flanks {
         }
     }
 
-    /// No stiffer than steps of `step_s` follow where rotor and links are as easily pressed apart as `mobility`, and not
-    /// damped more than what then comes to rest without a swing.
+    /// Limits the stiffness to what steps of `step_s` can follow, where a relative torque accelerates rotor and links
+    /// apart by `mobility` per unit, and limits the damping to its critical value for that stiffness.
     fn followed(self, mobility: f64, step_s: f64) -> Self {
         let stiffness_nm_rad = self.stiffness_nm_rad.min((FOLLOWED / step_s).powi(2) / mobility);
         let critical = 2.0 * (stiffness_nm_rad / mobility).sqrt();
@@ -204,14 +210,14 @@ struct Flight {
 }
 
 impl Flight {
-    /// At rest on the flank to which `load_nm` presses it.
+    /// A rotor at rest on the flank to which `load_nm` presses it.
     fn pressed(half_gap_rad: f64, flanks: Flanks, load_nm: f64) -> Self {
         let angle_rad = half_gap_rad.copysign(load_nm) + load_nm / flanks.stiffness_nm_rad;
         Self { angle_rad, half_gap_rad, flanks }
     }
 }
 
-/// Rotors under one load, number by number, so that a processor moves several at once.
+/// Several rotors under one load, stored as a structure of arrays so that the processor moves several at once.
 struct Flights {
     angle_rad: [f64; ABREAST],
     rate_rad_s: [f64; ABREAST],
@@ -233,8 +239,9 @@ impl Flights {
         }
     }
 
-    /// `step_s` later, under a load and jolts, Nm, of which each gap has what `made` says: semi-implicit Euler with all damping
-    /// implicit, stable as long as √(k · mobility) · `step_s` < 2. The flanks push and do not pull.
+    /// Advances by `step_s` under a load and a jolt, Nm; `made` says how much of the jolt and of the drive's damping
+    /// each gap gets. Semi-implicit Euler with all damping implicit, stable as long as √(k · mobility) · `step_s` < 2.
+    /// The flanks push and never pull.
     fn step(
         &mut self,
         [load_nm, jolt_nm]: [f64; 2],
@@ -262,7 +269,7 @@ impl Flights {
 mod tests {
     use super::*;
 
-    /// A load that grows as s t takes the rotor across the gap g in (6 g/s)^(1/3).
+    /// A load that grows as s t takes the rotor across the gap g in the time (6 g/s)^(1/3).
     #[test]
     fn a_gap_is_crossed_in_the_time_of_a_cubic() {
         let (gap, slope, step_s) = (2e-5_f64, 300.0_f64, 1e-5);
@@ -278,7 +285,7 @@ mod tests {
         assert!((t - (6.0 * gap / slope).cbrt()).abs() < 2.0 * step_s, "{t}");
     }
 
-    /// Under a constant load the rotor ends T = load deep in the flank.
+    /// Under a constant load the rotor comes to rest where the flank's deflection carries the load.
     #[test]
     fn a_rotor_comes_to_rest_in_the_flank() {
         let frequency = |lane: usize| 300.0 + 50.0 * lane as f64;
@@ -290,13 +297,13 @@ mod tests {
         }
         for (lane, angle) in flights.angle_rad.iter().enumerate() {
             let at_rest = 1e-5 + 5.0 / frequency(lane).powi(2);
-            // What is left of the swing after 1 s: e^(−0.12 · 300).
+            // The swing left after 1 s: e^(−0.12 · 300).
             assert!((angle - at_rest).abs() < 1e-9 * at_rest, "{angle}");
         }
     }
 
-    /// Links of a hundredth of the rotor's inertia on flanks that steps cannot follow stay within what the full load presses
-    /// them in by.
+    /// Links with a hundredth of the rotor's inertia, on flanks that the steps cannot follow, penetrate the flank no
+    /// deeper than under the full load at rest.
     #[test]
     fn light_links_stay_with_their_rotor() {
         let (rotor, share, step_s, half_gap) = (0.25, 0.01, 5e-4, 1e-4);
@@ -307,11 +314,12 @@ mod tests {
         for k in 0..100_000 {
             let load = (0.01 * f64::from(k) * std::f64::consts::TAU * step_s).cos();
             flights.step([load, 0.0], 0.0, &[Jolts::USUAL; ABREAST], mobility, step_s);
-            // The load crosses zero by 2π · 0.01 Nm/s, the rotor its gap in 36 ms, and the flank stops the 0.016 rad/s of its
-            // end within steps of 0.5 ms: 8 µrad in, where the full load is 100 µrad in.
+            // The load crosses zero at 2π · 0.01 Nm/s, the rotor crosses its gap in 36 ms, and the flank stops the
+            // final speed of 0.016 rad/s within a few steps of 0.5 ms: 8 µrad deep, compared with 100 µrad under the
+            // full load.
             assert!(flights.angle_rad[0].abs() < 1.001 * at_rest, "{k} {}", flights.angle_rad[0]);
         }
-        // 50 s: half a period of the load, whose end presses to the other side.
+        // After 50 s, half a period of the load, the load presses to the other side.
         assert!(
             (flights.angle_rad[0] + at_rest).abs() < 1e-3 * at_rest,
             "{}",

@@ -1,4 +1,4 @@
-//! A base that does not stand level: gravity turned by small angles about the base's x and y axes.
+//! A base that does not stand level: gravity rotated by small angles about the base's x and y axes.
 
 use nalgebra::{Rotation3, Vector3};
 
@@ -7,7 +7,7 @@ use super::*;
 /// See the module.
 pub struct BaseTilt;
 
-/// Tilt at which the torque change is taken, rad: small, so that it is linear.
+/// Tilt at which the torque change is evaluated, rad: small enough for it to be linear.
 const SMALL_RAD: f64 = 1e-5;
 
 impl Candidate for BaseTilt {
@@ -23,7 +23,7 @@ impl Candidate for BaseTilt {
         [Vector3::x_axis(), Vector3::y_axis()]
             .iter()
             .map(|axis| {
-                // The base turns by +angle, so that gravity turns by −angle in its frame.
+                // The base turns by +angle, so that gravity turns by −angle in the base frame.
                 let turn = Rotation3::from_axis_angle(axis, -SMALL_RAD);
                 let mut arm = scene.arm.clone();
                 arm.gravity_m_s2 = turn * arm.gravity_m_s2;

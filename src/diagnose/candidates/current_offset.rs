@@ -1,4 +1,4 @@
-//! A constant torque: the current sensor's zero, or Coulomb friction of different size in the two directions.
+//! A constant torque: the zero of the current sensor, or Coulomb friction of different size in the two directions.
 
 use super::*;
 

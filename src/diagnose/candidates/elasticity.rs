@@ -1,27 +1,30 @@
-//! A gear that gives way: link angle q_L, motor angle q_M, k (q_M − q_L) = τ_L.
+//! A compliant gear: link angle q_L, motor angle q_M, k (q_M − q_L) = τ_L.
 //!
-//! Where the log has the motor's angle, the links move by δ less than it says: the torques change by
-//! τ(q − δ, q̇ − δ̇, q̈ − δ̈) − τ(q, q̇, q̈) on every joint. The link swings on its spring,
+//! Where the log has the motor's angle, the links move by δ less than it says. The torques on all joints change by τ(q
+//! − δ, q̇ − δ̇, q̈ − δ̈) − τ(q, q̇, q̈). The link swings on its spring,
 //!
 //! ```text
 //! M_jj(q) δ̈ + d₁ δ̇ + k δ = τ_L
 //! ```
 //!
-//! with τ_L the load of the motor's motion, as far as the log tells it. Its slow part bends the gear by τ_L/k. Jolts of the
-//! drive where joints reverse are too fast for the log to show the motor's answer; of them the links' share τ_J is known
-//! ([`Scene::fine_jolt_nm`]), and makes rotor and links swing against each other:
+//! with τ_L the load along the motor's motion, as far as the log determines it. The slow part of τ_L bends the gear by
+//! τ_L/k. Where joints reverse, the drive jolts the gear too fast for the log to show how the motor responds. The
+//! links' share τ_J of these jolts is known ([`Scene::fine_jolt_nm`]), and makes rotor and links swing against each
+//! other:
 //!
 //! ```text
 //! δ̈ = (τ_J − k δ − (d₂ + d_M) δ̇) (I_a⁻¹ + [(M + I_a')⁻¹]_jj)
 //! ```
 //!
-//! by which a stiff gear is seen that hardly bends; the drive, which holds the rotor, damps by d_M ([`held_nm_s_rad`]).
-//! Where the log has the link's angle, the rotor and its friction move more:
-//! I_a δ̈ + F_v δ̇ + F_c [tanh((q̇ + δ̇)/ε) − tanh(q̇/ε)] on the joint itself, δ = τ_L/(k + i d ω) (further variants; the
-//! friction reverses where the motor does). There τ_L is differentiated twice, and its noise is in the residual as well: of a load that
-//! is known ten times better than that, the two together make stiff gears of clean logs. So far it is taken for soft gears alone
-//! ([`stiffest_nm_rad`]), and as far as it is known a hundred times better for all. The stiffness is in the coefficient 1/k; the
-//! shape only says how fast the gear swings.
+//! This swing reveals stiff gears that hardly bend. The drive, which holds the rotor, damps it by d_M
+//! ([`held_nm_s_rad`]).
+//!
+//! Where the log has the link's angle, the rotor and its friction move more: I_a δ̈ + F_v δ̇ + F_c [tanh((q̇ + δ̇)/ε) −
+//! tanh(q̇/ε)] on the joint itself, with δ = τ_L/(k + i d ω) (further variants; the friction reverses where the motor
+//! does). Here τ_L is differentiated twice, and its noise is in the residual as well. With a load known only ten times
+//! better than its noise, the two correlate and produce stiff gears in clean logs. Such a load is therefore used for
+//! soft gears only ([`stiffest_nm_rad`]), and a load known a hundred times better for all gears. The stiffness is in
+//! the coefficient 1/k; the shape only says how fast the gear swings.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -35,13 +38,14 @@ use fourier::Complex64;
 /// See the module.
 pub struct Elasticity;
 
-/// Damping d₁ over that of the rotor on the spring, 2 √(k Ia): a few percent in strain-wave gears.
+/// Damping d₁ relative to the critical damping of the rotor on the spring, 2 √(k Ia): a few percent in strain-wave
+/// gears.
 const DAMPING_RATIO: f64 = 0.05;
-/// The same, d₂, of what jolts make swing, whose rotor is damped by its own friction as well.
+/// The same for d₂, the damping of the swing after jolts: there, the rotor is also damped by its own friction.
 const JOLTED_DAMPING_RATIO: f64 = 0.15;
 
-/// What jolts of a drive make of a gear, over what is taken for granted: how much of friction it does not feed forward, how it damps,
-/// and how fast the gear swings under it.
+/// How a gear responds to the jolts of its drive, relative to the assumptions of the law: how much of the friction the
+/// drive does not feed forward, how strongly it damps, and on how stiff a spring the gear swings.
 #[derive(Clone, Copy)]
 pub(super) struct Jolts {
     pub(super) height: f64,
@@ -50,43 +54,45 @@ pub(super) struct Jolts {
 }
 
 impl Jolts {
-    /// What is taken for granted.
+    /// The assumptions of the law.
     pub(super) const USUAL: Self = Self { height: 1.0, damping: 1.0, stiffness: 1.0 };
-    /// Of other drives. Of each only the direction counts, both ways of what is not in proportion.
+    /// Responses with other drives. Only the direction of each difference matters, and deviations both ways are listed
+    /// where they are not proportional.
     pub(super) const OF_OTHER_DRIVES: [Self; 3] = [
         Self { height: 0.7, ..Self::USUAL },
         Self { damping: 0.4, ..Self::USUAL },
         Self { damping: 2.5, ..Self::USUAL },
     ];
-    /// Where a gear swings faster or slower than it bends.
+    /// Responses where a gear swings faster or slower than its static stiffness implies.
     const OF_OTHER_SWINGS: [Self; 2] =
         [Self { stiffness: 0.85, ..Self::USUAL }, Self { stiffness: 1.2, ..Self::USUAL }];
 }
 
-/// Variants with the encoder on the motor: in the first the links are driven by the part of the motion that is known a
-/// hundred times better than its noise, and by jolts beyond, which is what gears need that swing faster than that; in the
-/// second by what is known ten times better, for gears that swing within it.
+/// Number of variants with the encoder on the motor. In the first, the links are driven by the part of the motion that
+/// is known a hundred times better than its noise, and by jolts beyond it; gears that swing faster than that part need
+/// these. In the second, they are driven by what is known ten times better, for gears that swing within it.
 pub const ON_MOTOR: usize = 2;
-/// Damping where the encoder sits on the link, by further variants: a loop closed over the gear needs it.
+/// Damping ratios of the further variants, with the encoder on the link: a loop closed over the gear needs damping.
 const LINK_DAMPING_RATIO: [f64; 2] = [0.05, 0.3];
-/// The first variants of these know the load ten times better than its noise, the others, from here on, a hundred times.
+/// First variant with the encoder on the link whose load is known a hundred times better than its noise. The variants
+/// before it use a load known ten times better.
 const WELL_KNOWN_ON_LINK: usize = ON_MOTOR + LINK_DAMPING_RATIO.len();
 /// The range of stiffnesses, Nm/rad.
 const SOFTEST_NM_RAD: f64 = 2e3;
 /// See [`SOFTEST_NM_RAD`].
 const STIFFEST_NM_RAD: f64 = 2e5;
-/// Stiffnesses: neighbours are told by where the links swing.
+/// Number of starting stiffnesses where the links' resonance tells neighbours apart.
 const STIFFNESSES: usize = 14;
-/// The same where they are told by nothing but how far the gear bends.
+/// The same where only the static deflection of the gear tells them apart.
 const BENT_STIFFNESSES: usize = 3;
-/// No gear gives way by more than this, rad: its teeth would not meet.
+/// Largest plausible twist of a gear, rad: beyond it, the teeth would no longer mesh.
 const MOST_TWIST_RAD: f64 = 0.1;
-/// A swing is entered so many times before as long as it takes to fade to 1/e: of what it began with 1 % is left.
+/// Run-in of a simulated swing, in multiples of the time in which it decays to 1/e: 1 % of its initial state is left.
 const FORGOTTEN: f64 = 4.6;
-/// No longer than this, s.
+/// Longest run-in, s.
 const LONGEST_RUN_IN_S: f64 = 30.0;
 
-/// How far the links of a joint are behind its encoder.
+/// How far the links of a joint lag behind its encoder.
 pub(super) struct Lag {
     /// δ at the samples, rad.
     pub(super) angle_rad: Vec<f64>,
@@ -97,18 +103,19 @@ pub(super) struct Lag {
 }
 
 impl Lag {
-    /// With the rates of `angle_rad` as its samples tell them.
+    /// The lag `angle_rad`, with rates derived from its samples.
     pub(super) fn slow(scene: &Scene, angle_rad: Vec<f64>) -> Self {
         let rate_rad_s = scene.derivative(&angle_rad);
         Self::logged(scene, angle_rad, rate_rad_s)
     }
 
-    /// With a δ̇ that may hold more than the differences of δ, and of which the log has the samples only.
+    /// The lag with a given δ̇, which may hold more than the derivative of δ, and which the log has at its samples
+    /// only.
     pub(super) fn logged(scene: &Scene, angle_rad: Vec<f64>, rate_rad_s: Vec<f64>) -> Self {
         Self { acceleration_rad_s2: scene.accelerations(&rate_rad_s), angle_rad, rate_rad_s }
     }
 
-    /// The motion of the links when joint `j` lags by it.
+    /// Motion of the links when joint `j` has this lag.
     pub(super) fn of(&self, scene: &Scene, j: usize) -> Motion {
         let mut motion: Motion = scene.motion.clone();
         for k in 0..scene.samples() {
@@ -120,9 +127,11 @@ impl Lag {
     }
 }
 
-/// How links on joint `j` swing behind a motor that moves as recorded, and against one that jolts where joints reverse.
-/// A single run, whose accelerations are those of its low-pass, shows no more than how far the gear bends by what is known of
-/// its load: taken as it is, noise of velocities made gears of 20 σ in clean logs.
+/// Lag of the links on joint `j`, which swing behind a motor that moves as recorded, and against a motor that jolts
+/// where joints reverse.
+///
+/// In a single run, whose accelerations come from its low-pass, only the bending by the known part of the load is used.
+/// Without this restriction, noise of the velocities produced gears of 20 σ in clean logs.
 fn swing(scene: &Scene, j: usize, variant: usize, stiffness_nm_rad: f64, made: Jolts) -> Lag {
     if !scene.periodic {
         let bent = |load: &f64| load / stiffness_nm_rad;
@@ -164,15 +173,19 @@ fn swing(scene: &Scene, j: usize, variant: usize, stiffness_nm_rad: f64, made: J
     lag
 }
 
-/// Standard error of stiffnesses and gaps that are told by a swing, over their value: how a drive damps is not in the
-/// log. Of 97 causes named in simulated arms with drives of 2 ζ ω = 100 rad/s they are off by 0 to 20 % in the median of a
-/// joint, and half or twice [`FEEDBACK_RAD_S`] moves single ones by up to a fifth. Of drives of 50, 100 and 400 rad/s the
-/// intervals that this makes held 86 of 91, 92 of 97 and 89 of 90 truths.
+/// Relative standard error of stiffnesses and gaps that are inferred from a swing: how the drive damps is not in the
+/// log.
+///
+/// Of 97 causes named in simulated arms with drives of 2 ζ ω = 100 rad/s, these values are off by 0 to 20 % in the
+/// median of a joint. Half or twice [`FEEDBACK_RAD_S`] moves single ones by up to a fifth. With drives of 50, 100 and
+/// 400 rad/s, the resulting intervals held 86 of 91, 92 of 97 and 89 of 90 true values.
 pub(super) const HELD_ERROR: f64 = 0.15;
 
-/// Damping d_M of δ̇ by the drive, Nm s/rad, ω = [`FEEDBACK_RAD_S`]. It answers the rotor's speed with ω (M + I_a) q̇_M; of δ̇
-/// the rotor has the share s = M/(M + I_a), so that the power is that of d_M = ω (M + I_a) s² = ω I_a s²/(1 − s).
-/// `mobility_per_kg_m2` is I_a⁻¹ + M⁻¹ = 1/(I_a s), M what the links resist with where the other joints are free to move.
+/// Damping d_M of δ̇ by the drive, Nm s/rad, with ω = [`FEEDBACK_RAD_S`].
+///
+/// The drive answers the rotor's speed with ω (M + I_a) q̇_M. The rotor has the share s = M/(M + I_a) of δ̇, so that
+/// the dissipated power is that of d_M = ω (M + I_a) s² = ω I_a s²/(1 − s). `mobility_per_kg_m2` is I_a⁻¹ + M⁻¹ =
+/// 1/(I_a s), with M the inertia of the links where the other joints are free to move.
 pub(super) fn held_nm_s_rad(mobility_per_kg_m2: f64, rotor_kg_m2: f64) -> f64 {
     let share = 1.0 / (mobility_per_kg_m2 * rotor_kg_m2);
     FEEDBACK_RAD_S * rotor_kg_m2 * share.powi(2) / (1.0 - share)
@@ -195,7 +208,7 @@ impl Swing {
         Self { stiffness_nm_rad, damping_nm_s_rad, angle_rad, rate_rad_s, acceleration_rad_s2 }
     }
 
-    /// `step_s` later, when the load is `load_nm` (Newmark 1959, average acceleration: stable for springs of any
+    /// Advances by `step_s`, to a load of `load_nm` (Newmark 1959, average acceleration: stable for springs of any
     /// stiffness, and neither adds energy to a swing nor takes any).
     fn step(&mut self, load_nm: f64, inertia_kg_m2: f64, step_s: f64) {
         let (k, d) = (self.stiffness_nm_rad, self.damping_nm_s_rad);
@@ -210,13 +223,14 @@ impl Swing {
     }
 }
 
-/// The stiffest gear that a load known ten times better than its noise tells where the encoder sits on the link: one on which the rotor
-/// swings within half the harmonics that a log can have. In clean logs noise made gears of four to sixteen times that.
+/// The stiffest gear for which a load known ten times better than its noise may be used, where the encoder sits on the
+/// link: the rotor swings on it within half the harmonics that a log can have. In clean logs, noise produced gears four
+/// to sixteen times as stiff.
 fn stiffest_nm_rad(scene: &Scene, j: usize) -> f64 {
     scene.rotor_kg_m2[j] * (0.25 * TAU * scene.rate_hz).powi(2)
 }
 
-/// Torques on all joints when the links move as `motion`, per unit of `scale`.
+/// Change of the torques on all joints when the links move as `motion`, per unit of `scale`.
 pub(super) fn give_way(scene: &Scene, motion: &Motion, scale: f64) -> Column {
     Column::everywhere(&scene.torque_change(&scene.arm, motion)).scaled(1.0 / scale)
 }
@@ -237,7 +251,7 @@ impl Candidate for Elasticity {
             })
         };
         if !scene.periodic {
-            // Of a single run the log's own motion is all there is.
+            // In a single run, the log's own motion is all there is.
             let parts = [0..1, well_known_on_link].map(|v| (v, STIFFEST_NM_RAD, BENT_STIFFNESSES));
             return parts.into_iter().flat_map(of).collect();
         }
@@ -289,7 +303,7 @@ impl Candidate for Elasticity {
         vec![Column::on(j, extra)]
     }
 
-    /// What the jolts of the drive do to a gear of which the log has the motor's angle.
+    /// Directions in which the response to the drive's jolts may be wrong, for gears with the encoder on the motor.
     fn loose(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         if !scene.periodic || shape.variant >= ON_MOTOR {
             return Vec::new();
@@ -312,8 +326,9 @@ impl Candidate for Elasticity {
         if scene.periodic && shape.variant < ON_MOTOR { HELD_ERROR } else { 0.0 }
     }
 
-    /// How a gear bends tells k; how jolts make it swing also depends on the drive that holds its rotor, and shapes are
-    /// up to several times stiffer. Elsewhere it swings by its own k.
+    /// The coefficient, from the bending of the gear, gives k. The shape, from its swing after jolts, also depends on
+    /// the drive that holds the rotor and can be several times stiffer. In another log, the gear is predicted to swing
+    /// by its own k.
     fn elsewhere(&self, shape: Shape, b: &[f64]) -> Shape {
         match b {
             [compliance] if shape.variant < ON_MOTOR && *compliance > 0.0 => {
@@ -351,7 +366,8 @@ impl Candidate for Elasticity {
 mod tests {
     use super::*;
 
-    /// k δ = load at rest; without damping a swing keeps its height, and its period is 2π √(M/k) but for (ω Δt)²/12.
+    /// At rest, k δ equals the load. Without damping, a swing keeps its height, and its period is 2π √(M/k) up to the
+    /// relative error (ω Δt)²/12 of the integrator.
     #[test]
     fn a_link_swings_on_its_gear() {
         let (stiffness, inertia, step_s) = (2e4, 2.0, 5e-4);
@@ -383,8 +399,8 @@ mod tests {
         assert!((1.0 - height).abs() < (omega * step_s).powi(2) / 8.0, "{height}");
     }
 
-    /// Two inertias on a spring, the rotor's speed answered by ω (M + I_a) q̇_M with a small ω: their swing fades by
-    /// exp(−d_M t/(2 μ)), 1/μ the mobility.
+    /// Two inertias on a spring, with the rotor's speed answered by ω (M + I_a) q̇_M with a small ω: their swing fades
+    /// as exp(−d_M t/(2 μ)), where 1/μ is the mobility.
     #[test]
     fn a_drive_damps_by_its_share_of_the_swing() {
         let (rotor, links, stiffness, omega, step_s) = (1.6, 3.0, 2e4, 1.0, 1e-6);
@@ -407,7 +423,7 @@ mod tests {
         let held = held_nm_s_rad(mobility, rotor) / FEEDBACK_RAD_S * omega;
         let faded = (energy(&motor, &link) / before).ln();
         let expected = -held * mobility * f64::from(count) * step_s;
-        // The energy falls in waves: within one of them by up to d_M/(μ ω_0).
+        // The energy falls in waves, each of relative height up to d_M/(μ ω_0).
         let wave = held * mobility / (stiffness * mobility).sqrt();
         assert!((faded - expected).abs() < 2.0 * wave, "{faded} {expected}");
     }

@@ -1,4 +1,4 @@
-//! An angle with a constant error: the torques are those of q − δ.
+//! A joint angle with a constant error δ: the torques are those of q − δ.
 
 use super::elasticity::{Lag, give_way};
 use super::*;
@@ -6,7 +6,7 @@ use super::*;
 /// See the module.
 pub struct EncoderOffset;
 
-/// Offset at which the torque change is taken, rad: small, so that it is linear.
+/// Offset at which the torque change is evaluated, rad: small enough for it to be linear.
 const SMALL_RAD: f64 = 1e-5;
 
 impl Candidate for EncoderOffset {

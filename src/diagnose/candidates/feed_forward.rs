@@ -1,5 +1,6 @@
-//! A drive that feeds another share of its friction forward than the others: with F its dry friction, s the sign of q̇ and
-//! s̃ the same as logged, τ = F Δ (s̃ − s), Δ the share that it feeds forward less than the others ([`Scene::answers`]).
+//! A drive that feeds forward another share of its friction than the others: τ = F Δ (s̃ − s). F is the drive's dry
+//! friction, s the sign of q̇, s̃ the sign as logged, and Δ the share by which this drive feeds forward less than the
+//! others ([`Scene::answers`]).
 
 use super::*;
 use crate::diagnose::drives;
@@ -7,9 +8,10 @@ use crate::diagnose::drives;
 /// See the module.
 pub struct FeedForward;
 
-/// A drive feeds no more than twice its friction forward, and no less than nothing.
+/// Bound on Δ: a drive feeds forward no more than twice its friction, and no less than nothing.
 const MOST_LESS: f64 = 2.0;
-/// Of a drive beside others that feed all of theirs nothing more can be missing.
+/// Largest Δ that a real drive can have: beside drives that feed all of their friction forward, no more than all can be
+/// missing.
 const ALL: f64 = 1.0;
 
 impl Candidate for FeedForward {
@@ -42,7 +44,7 @@ impl Candidate for FeedForward {
         share_less.abs() < ALL
     }
 
-    /// Beyond that it stands in for something else about reversals.
+    /// Beyond [`ALL`], the law stands in for something else about reversals.
     fn is_its_own(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> bool {
         b[0].abs() <= ALL
     }

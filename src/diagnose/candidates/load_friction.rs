@@ -1,9 +1,10 @@
-//! Friction of a loaded gear: τ = μ |τ_L| sign q̇, τ_L the torque the gear transmits.
+//! Friction of a loaded gear: τ = μ |τ_L| sign q̇, with τ_L the torque that the gear transmits. μ is the friction per
+//! load at the run's rms load.
 //!
-//! A single run is also asked for the exponent, τ = c |τ_L|^p sign q̇, and for friction under the bending
-//! moment on the joint's bearing. Of that moment the torque on the next joint is known, where its axis is
-//! perpendicular to this one's (variant 1). μ is the friction per load at the run's rms load. A motion that repeats is
-//! asked whether the rotor's torque counts as well (variant 2): where something on the motor's side of the gear rubs.
+//! In a single run, two more things are estimated: the exponent p of τ = c |τ_L|^p sign q̇, and friction under the
+//! bending moment on the joint's bearing. The torque on the next joint tells this moment where the axes of the two
+//! joints are perpendicular (variant 1). In a periodic motion, a variant whose load includes the rotor's torque is
+//! tried instead (variant 2): something rubs on the motor's side of the gear.
 
 use std::borrow::Cow;
 
@@ -12,16 +13,16 @@ use super::*;
 /// See the module.
 pub struct LoadFriction;
 
-/// The variant whose load is the torque that the gear transmits: the rotor sits on the motor's side.
+/// Variant whose load is the torque that the gear transmits, without the rotor's: the rotor sits on the motor's side.
 const GEAR: usize = 0;
-/// The variant whose load is the bending moment.
+/// Variant whose load is the bending moment.
 const BENDING: usize = 1;
-/// The variant whose load is the torque on the motor's side of the gear, the rotor's with it.
+/// Variant whose load is the torque on the motor's side of the gear, including the rotor's.
 pub const MOTOR_SIDE: usize = 2;
-/// Exponents to begin with along a single run.
+/// Starting exponents for a single run.
 const EXPONENTS: [f64; 4] = [1.0, 1.5, 2.0, 2.5];
 
-/// Torque by which joint `j` is loaded, at its instants, Nm.
+/// Torque that loads joint `j`, at its instants, Nm.
 fn load(scene: &Scene, j: usize, variant: usize) -> Cow<'_, [f64]> {
     match variant {
         MOTOR_SIDE => scene.at_instants(scene.load_nm.joint(j)),
@@ -30,13 +31,14 @@ fn load(scene: &Scene, j: usize, variant: usize) -> Cow<'_, [f64]> {
     }
 }
 
-/// Whether the axis behind joint `j` is perpendicular to its own, so that its torque bends joint `j`.
+/// Whether the axis after joint `j` is perpendicular to that of joint `j`, so that its torque bends the bearing of
+/// joint `j`.
 fn is_bent(scene: &Scene, j: usize) -> bool {
-    // The cosine between both axes: the child's z in the parent's frame.
+    // Cosine between the two axes: the child's z axis in the parent's frame.
     scene.arm.joints.get(j + 1).is_some_and(|next| next.placement.rotation[(2, 2)].abs() < 0.1)
 }
 
-/// p; a motion that repeats is not asked for it.
+/// Exponent p; 1 in a periodic motion, for which it is not estimated.
 fn exponent(shape: Shape) -> f64 {
     if shape.value > 0.0 { shape.value } else { 1.0 }
 }
@@ -83,7 +85,7 @@ impl Candidate for LoadFriction {
         out
     }
 
-    /// A gear whose friction is its load does not turn.
+    /// A gear whose friction equals its load does not turn.
     fn can_be(&self, _: &Scene, _: Option<usize>, mu: f64) -> bool {
         mu.abs() < 1.0
     }

@@ -1,11 +1,12 @@
-//! What can be wrong, one family per file.
+//! Catalogue of model errors that the diagnosis looks for, one family per file.
 //!
-//! A family turns the processed motion of a log into the torque it would add to it, per unit of its
-//! coefficients. Adding a family is one file and one line in [`all`]. Nothing here is shared with the
-//! plant, which makes the same effects by physics.
+//! A family turns the processed motion of a log into the torque that the effect would add to it, per unit of its
+//! coefficients. Adding a family takes one file and one line in [`all`]. The families share no code with the plant,
+//! which produces the same effects by integrating the physics.
 //!
-//! Enters: the [`Scene`] of a log, a joint, and a [`Shape`]: the numbers that a law is not linear in. Leaves: columns of torque, physical
-//! parameters with units from their coefficients, and what the family is confounded with.
+//! Enters: the [`Scene`] of a log, a joint, and a [`Shape`], the parameters in which the law is not linear. Leaves:
+//! columns of torque, the physical parameters with units that follow from their coefficients, and the experiment that
+//! separates the family from effects it is confounded with.
 
 mod asymmetric_friction;
 mod backlash;
@@ -32,19 +33,19 @@ use super::kind::Kind;
 use super::scene::{Instants, Scene};
 use crate::dynamics::{map_pairs, with_widest_registers};
 
-/// A point in the nonlinear parameters of a family.
+/// A point in the space of a family's nonlinear parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shape {
-    /// Form of the law, where there are several.
+    /// Form of the law, for families that have several.
     pub variant: usize,
-    /// The nonlinear parameter in SI units; 0 where there is none.
+    /// The nonlinear parameter in SI units; 0 for laws without one.
     pub value: f64,
 }
 
-/// How the nonlinear parameter is searched.
+/// How the nonlinear parameter is refined.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Search {
-    /// There is none.
+    /// The law has no nonlinear parameter.
     None,
     /// Between neighbours on a logarithmic scale.
     Logarithmic,
@@ -68,28 +69,28 @@ fn quantity(name: &'static str, value: f64, unit: &'static str) -> Quantity {
     Quantity { name, value, unit }
 }
 
-/// The coefficient of a family's second column; zero where the null model absorbs that column, which a joint that
-/// hardly moves makes like the first.
+/// Coefficient of a family's second column. Zero where the null model absorbs that column: on a joint that hardly
+/// moves, it looks like the first.
 fn second(b: &[f64]) -> f64 {
     b.get(1).copied().unwrap_or(0.0)
 }
 
 /// One family of effects.
 pub trait Candidate: Sync {
-    /// Its name.
+    /// Kind of the effect, by which it is named.
     fn kind(&self) -> Kind;
 
-    /// Where it may sit: a joint (0-based), or `None` for the arm as a whole.
+    /// Sites at which the effect may occur: a joint (0-based), or `None` for the arm as a whole.
     fn sites(&self, joints: usize) -> Vec<Option<usize>> {
         (0..joints).map(Some).collect()
     }
 
-    /// How common it is there beside its other sites, before the log was seen.
+    /// Prior odds of the effect at this site relative to the family's other sites. Only their ratios matter.
     fn prior_odds(&self, _site: Option<usize>) -> f64 {
         1.0
     }
 
-    /// Shapes to begin with: fine enough that between two neighbours there is only one optimum.
+    /// Starting shapes for the search: so closely spaced that there is only one optimum between two neighbours.
     fn shapes(&self, _scene: &Scene, _site: Option<usize>) -> Vec<Shape> {
         vec![Shape { variant: 0, value: 0.0 }]
     }
@@ -105,49 +106,50 @@ pub trait Candidate: Sync {
         Search::None
     }
 
-    /// Half the width of the bracket around a shape in which the optimum lies, where starting shapes
-    /// are no grid; `None`: neighbours on the grid are the bracket.
+    /// Half the width of the bracket around a starting shape in which the optimum lies, for families whose starting
+    /// shapes form no grid. `None`: the neighbours on the grid are the bracket.
     fn half_width(&self, _scene: &Scene, _site: Option<usize>) -> Option<f64> {
         None
     }
 
-    /// Whether shape and coefficient are one parameter, so that beside the latter there is hardly a shape to choose.
+    /// Whether shape and coefficient are the same parameter, so that once the coefficient is known there is hardly a
+    /// shape left to choose.
     fn shape_is_coefficient(&self) -> bool {
         false
     }
 
-    /// How many shapes were to choose from when this one was taken, where there were more than the
-    /// starting ones.
+    /// Number of shapes that were available when this one was chosen, where it is larger than the number of starting
+    /// shapes; `None`: the starting shapes were all.
     fn alternatives(&self, _scene: &Scene, _site: Option<usize>, _shape: Shape) -> Option<f64> {
         None
     }
 
-    /// Whether one joint may have several of it, with different shapes.
+    /// Whether one joint may have several effects of this family, with different shapes.
     fn is_repeatable(&self) -> bool {
         false
     }
 
-    /// Whether it changes what is seen where its joint reverses, so that beside it the log does not tell which share of its
-    /// friction a drive feeds forward.
+    /// Whether the effect changes how reversals of its joint look in the log. Beside such an effect, the log no longer
+    /// tells which share of its friction the drive feeds forward.
     fn blurs_reversals(&self) -> bool {
         false
     }
 
-    /// Torque per unit of each coefficient.
+    /// Torque per unit of each coefficient: one column per coefficient.
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column>;
 
-    /// Directions of torque along which the law may be off with this shape, by what it takes for granted and the log does not
-    /// tell: what is left there is none of another cause's.
+    /// Directions of torque along which the law may be wrong at this shape, because it takes something for granted that
+    /// the log does not tell. A residual along them is not evidence for another cause.
     fn loose(&self, _scene: &Scene, _site: Option<usize>, _shape: Shape) -> Vec<Column> {
         Vec::new()
     }
 
-    /// [`Self::columns`] of several shapes, where that is less work at once.
+    /// [`Self::columns`] of several shapes at once, where computing them together is cheaper.
     fn bank(&self, scene: &Scene, site: Option<usize>, shapes: &[Shape]) -> Vec<Vec<Column>> {
         shapes.iter().map(|shape| self.columns(scene, site, *shape)).collect()
     }
 
-    /// Physical parameters of the coefficients.
+    /// Physical parameters that belong to the coefficients `b`.
     fn quantities(
         &self,
         scene: &Scene,
@@ -156,31 +158,31 @@ pub trait Candidate: Sync {
         b: &[f64],
     ) -> Vec<Quantity>;
 
-    /// The physical parameter that the shape holds as well as the coefficients, for laws that fix it twice (play
-    /// by how far the links lag and by how long a flight lasts). Where the two disagree the law is not quite that
-    /// of the arm, and the parameter is no better known than they differ.
+    /// The physical parameter that the shape determines in addition to the coefficients, for laws that fix one
+    /// parameter twice (play by how far the links lag, and by how long a flight lasts). Where the two values disagree,
+    /// the law is not quite that of the arm, and the parameter is known no better than they differ.
     fn in_shape(&self, _shape: Shape) -> Option<Quantity> {
         None
     }
 
-    /// What its physical parameters are where nothing is wrong.
+    /// Value of the physical parameters when nothing is wrong.
     fn without_effect(&self, _scene: &Scene) -> f64 {
         0.0
     }
 
-    /// Standard error of its physical parameters beside that of the noise, over what they are more or less than
-    /// [`Self::without_effect`]: what the law takes for granted and the log does not tell.
+    /// Standard error of the physical parameters beyond that from noise, relative to their distance from
+    /// [`Self::without_effect`]. It covers what the law takes for granted and the log does not tell.
     fn form_error(&self, _scene: &Scene, _shape: Shape) -> f64 {
         0.0
     }
 
-    /// What its physical parameters cannot be less than, though noise may say so.
+    /// Lower bound of the physical parameters: estimates below it are due to noise.
     fn least(&self) -> f64 {
         f64::NEG_INFINITY
     }
 
-    /// Between which values its physical parameters may lie where the null model absorbs a column, so that the log tells
-    /// only the coefficients `b` of those before it.
+    /// Ranges in which the physical parameters may lie where the null model absorbs a column, so that the log
+    /// determines only the coefficients `b` of the columns before it.
     fn left_open(
         &self,
         _scene: &Scene,
@@ -191,57 +193,58 @@ pub trait Candidate: Sync {
         Vec::new()
     }
 
-    /// The shape with which the law, fitted with `shape` and the coefficients `b` to one log, predicts another.
+    /// Shape with which the law predicts another log, after it has been fitted to one log with `shape` and the
+    /// coefficients `b`.
     fn elsewhere(&self, shape: Shape, _b: &[f64]) -> Shape {
         shape
     }
 
-    /// The shape nearest to `shape` that goes with the coefficients `b`, for laws whose shape is known from them too. What
-    /// only another shape explains is not quite the law's own.
+    /// The shape nearest to `shape` that is consistent with the coefficients `b`, for laws whose coefficients also
+    /// determine the shape. An effect that is explained only with an inconsistent shape is not quite the law's own.
     fn agreeing(&self, shape: Shape, _b: &[f64]) -> Shape {
         shape
     }
 
-    /// The quantity that says how large the effect is, for detection limits.
+    /// The quantity that measures the size of the effect, for detection limits.
     fn size(&self, quantities: &[Quantity]) -> Option<Quantity> {
         quantities.first().copied()
     }
 
-    /// Whether an effect whose [`Self::size`] has this value can be there.
+    /// Whether an effect of this [`Self::size`] is physically possible.
     fn can_be(&self, _scene: &Scene, _site: Option<usize>, _size: f64) -> bool {
         true
     }
 
-    /// The first coefficient of an effect of this `shape`, where the shape says how large it is.
+    /// First coefficient of an effect of this `shape`, for laws whose shape determines the size of the effect.
     fn whole(&self, _shape: Shape) -> Option<f64> {
         None
     }
 
-    /// The experiment that tells it from what it resembles.
+    /// The experiment that separates the effect from those it resembles.
     fn separating_experiment(&self) -> &'static str;
 
-    /// Whether coefficients `b` can belong to it at all, in this shape.
+    /// Whether the coefficients `b` are physically possible for this family and shape.
     fn is_possible(&self, _shape: Shape, _b: &[f64]) -> bool {
         true
     }
 
-    /// Whether the law, with this shape and these coefficients at their best, is the family's own. Where it is
-    /// not, the law only stands in for one that resembles it at that end of its range: the data show
-    /// something, and it is not this.
+    /// Whether the law, at its best shape and coefficients, really is this family's effect. Where it is not, the law
+    /// only stands in for an effect that resembles it at that end of its range: the data show something, but not this.
     fn is_its_own(&self, _scene: &Scene, _site: Option<usize>, _shape: Shape, _b: &[f64]) -> bool {
         true
     }
 
-    /// The effect in words, its parameters behind: "friction that grows with load".
+    /// The effect in words, to which its parameters are appended: "friction that grows with load".
     fn in_words(&self) -> &'static str;
 
-    /// Which form of the law this shape is, where there are several and parameters do not say it; `None`: the usual one.
+    /// Name of the form of the law that this shape selects, for families with several forms that the parameters do not
+    /// distinguish; `None`: the usual form.
     fn form(&self, _scene: &Scene, _shape: Shape) -> Option<&'static str> {
         None
     }
 }
 
-/// Every family.
+/// All families of the catalogue.
 pub fn all() -> Vec<Box<dyn Candidate>> {
     vec![
         Box::new(stribeck::Stribeck),
@@ -266,25 +269,25 @@ pub fn all() -> Vec<Box<dyn Candidate>> {
     ]
 }
 
-/// The lowest and the highest angle of joint `j`, rad.
+/// Lowest and highest angle of joint `j`, rad.
 fn range_rad(scene: &Scene, j: usize) -> [f64; 2] {
     let ends = |[low, high]: [f64; 2], q: &f64| [low.min(*q), high.max(*q)];
     scene.motion.q_rad.joint(j).iter().fold([f64::INFINITY, f64::NEG_INFINITY], ends)
 }
 
-/// Samples of joint `j` made from angle, speed and load by `f(k)`.
+/// `f(k)` at every sample k of the scene.
 fn samples(scene: &Scene, f: impl Fn(usize) -> f64) -> Vec<f64> {
     (0..scene.samples()).map(f).collect()
 }
 
-/// Friction of joint `j` that turns with the direction of motion, `level(instants, k)` times the sign of q̇.
+/// Dry friction of joint `j` as logged: `level(instants, k)` times the sign of q̇.
 fn dry_friction(scene: &Scene, j: usize, level: impl Fn(&Instants, usize) -> f64) -> Column {
     let at = scene.instants(j);
     let friction = (0..at.sign.len()).map(|k| at.sign[k] * level(at, k)).collect();
     Column::on(j, scene.as_logged(friction))
 }
 
-/// `f(a, b)` of all pairs, with the widest registers of the machine where `f` is inlined.
+/// `f(a, b)` of all pairs, with the machine's widest vector registers where `f` is inlined.
 fn of_pairs(mut a: Vec<f64>, b: &[f64], f: impl Fn(f64, f64) -> f64) -> Vec<f64> {
     with_widest_registers(
         #[inline(always)]
@@ -293,23 +296,23 @@ fn of_pairs(mut a: Vec<f64>, b: &[f64], f: impl Fn(f64, f64) -> f64) -> Vec<f64>
     a
 }
 
-/// The joint of a family that always sits on one.
+/// The joint at `site`, for families that always sit on a joint.
 fn joint(site: Option<usize>) -> usize {
     site.unwrap_or_default()
 }
 
-/// Sites of a family that belongs to the arm as a whole or to one joint; an arm of one joint is that joint.
+/// Sites of a family that may affect the arm as a whole or a single joint. For an arm with one joint, only that joint.
 fn arm_and_joints(joints: usize) -> Vec<Option<usize>> {
     let arm = (joints > 1).then_some(None);
     arm.into_iter().chain((0..joints).map(Some)).collect()
 }
 
-/// The joints of such a site.
+/// The joints that a site of [`arm_and_joints`] affects.
 fn joints_at(scene: &Scene, site: Option<usize>) -> std::ops::Range<usize> {
     site.map_or(0..scene.joints(), |j| j..j + 1)
 }
 
-/// `count` values from `low` to `high` in equal ratios.
+/// `count` values from `low` to `high` in geometric progression.
 fn geometric(low: f64, high: f64, count: usize) -> impl Iterator<Item = f64> {
     let ratio = (high / low).powf(1.0 / (count - 1) as f64);
     (0..count).map(move |k| low * ratio.powi(k as i32))

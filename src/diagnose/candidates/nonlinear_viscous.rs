@@ -1,14 +1,14 @@
-//! Friction curved in speed beside the linear law: τ = a |q̇|^p sign q̇, p < 1 concave, p > 1 convex.
+//! Friction that is curved in speed, in addition to the linear law: τ = a |q̇|^p sign q̇, p < 1 concave, p > 1 convex.
 //!
-//! Along a single run also friction that rises from one level to another around a speed v,
-//! τ = a (1 − e^{−(q̇/v)²}) sign q̇, a > 0 (variant 2; with a < 0 it is Stribeck's).
+//! In a single run, also friction that rises from one level to another around a speed v, τ = a (1 − e^{−(q̇/v)²}) sign
+//! q̇, a > 0 (variant 2; with a < 0 it would be Stribeck's law).
 
 use super::*;
 
 /// See the module.
 pub struct NonlinearViscous;
 
-/// The variant that rises around a speed.
+/// Variant that rises around a speed.
 const STEP: usize = 2;
 
 /// The law at speed `v` (rad/s, ≥ 0), per unit of a.
@@ -22,7 +22,8 @@ impl Candidate for NonlinearViscous {
     }
 
     fn shapes(&self, scene: &Scene, _: Option<usize>) -> Vec<Shape> {
-        // At p = 0 and p = 1 the law is Coulomb's or linear: concave and convex are searched apart.
+        // At p = 0 the law is Coulomb's, at p = 1 linear, both in the null model: concave and convex laws are searched
+        // separately.
         let concave = [0.3, 0.5, 0.7].map(|value| Shape { variant: 0, value });
         let convex = [1.4, 1.8, 2.2, 3.0].map(|value| Shape { variant: 1, value });
         let steps = if scene.periodic { &[][..] } else { &[0.15, 0.25, 0.4, 0.65, 1.0][..] };

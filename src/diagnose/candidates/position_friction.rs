@@ -1,11 +1,11 @@
 //! Coulomb friction that depends on the angle: τ = (a sin(q − q₀) + b cos(q − q₀)) sign q̇ = A cos(q + φ) sign q̇.
 //!
-//! q₀ lies in the middle of the angles: over a small arc b is Coulomb friction, which the null model has, and a is what
-//! can be seen.
+//! q₀ is the middle of the range of angles. Over a small arc, b is Coulomb friction, which the null model contains, and
+//! only a can be seen.
 
 use super::*;
 
-/// Over a turn friction varies by a part of its level, at most this.
+/// Largest variation of friction over a turn, as a share of its level.
 const MOST: f64 = 0.75;
 
 /// See the module.
@@ -36,7 +36,7 @@ impl Candidate for PositionFriction {
         ]
     }
 
-    /// Of a law of which only the slope a is seen, −A sin(q₀ + φ) = a, A is at least |a|.
+    /// Where only the slope a of the law is seen, −A sin(q₀ + φ) = a, A is at least |a|.
     fn left_open(
         &self,
         scene: &Scene,
@@ -59,7 +59,7 @@ impl Candidate for PositionFriction {
         "the same motion with another payload or on a tilted base: this friction stays where it was"
     }
 
-    /// What would have to vary by more than [`MOST`] is a bent law of something else, seen over a small arc.
+    /// A variation of more than [`MOST`] means that the law of something else is curved, seen over a small arc.
     fn is_its_own(&self, scene: &Scene, site: Option<usize>, _: Shape, b: &[f64]) -> bool {
         !scene.periodic || b[0].hypot(second(b)) < MOST * scene.coulomb_nm[joint(site)]
     }

@@ -1,20 +1,21 @@
-//! Friction that builds up behind a reversal: τ = F (z − sign q̇), dz/dq = k (1 − z sign q̇) (Dahl 1968).
+//! Friction that builds up after a reversal (presliding): τ = F (z − sign q̇), dz/dq = k (1 − z sign q̇) (Dahl 1968).
 //!
-//! Bristles that are damped, as in the LuGre model (Canudas de Wit et al. 1995), add F T dz/dt, T = σ₁/σ₀. Few logs show it, so that
-//! nothing is looked for with it; where presliding was found, it is a form of the law with another coefficient, F T.
+//! Damped bristles, as in the LuGre model (Canudas de Wit et al. 1995), add F T dz/dt with T = σ₁/σ₀. Few logs show the
+//! damping, so it does not take part in the search. Where presliding was found, it is a further form of the law, with
+//! F T as a second coefficient.
 //!
-//! z is propagated exactly along the motion: over a stretch of one direction of length Δ,
-//! z ← s + (z − s) e^{−kΔ}; a step within which the velocity reverses has two such stretches. Over a motion
-//! that repeats it is carried round until it repeats as well.
+//! z is propagated exactly along the motion. Over a stretch of length Δ in one direction s, z ← s + (z − s) e^{−kΔ}; a
+//! step within which the velocity reverses consists of two such stretches. Over a periodic motion, z is carried round
+//! until it repeats as well.
 //!
-//! Stiff bristles turn round within a few samples, and what the samples show of that depends on the torque that the drive
-//! gives meanwhile. One that feeds friction forward does so where the velocity that is wanted reverses. Under friction that
-//! waits for the joint to reverse before it gives way, that is some milliseconds later, and later the more gently the joint
-//! turns: no constant lead, as the null model has it, follows that. What a drive gives is worked out with the bristles
-//! ([`given`]); which kind of drive it is, is a variant of the law.
+//! Stiff bristles turn round within a few samples, and how the samples show it depends on the torque that the drive
+//! gives meanwhile. A drive that feeds friction forward does so where the commanded velocity reverses. Real presliding
+//! friction gives way only after the joint has reversed, some milliseconds later, and the later the more gently the
+//! joint turns. A constant lead, as in the null model, cannot follow that. The torque of the drive is therefore
+//! simulated along with the bristles ([`given`]); the kind of drive is a variant of the law.
 //!
-//! The angle of a single run is followed with play: it moves only as far as the doubt about the recorded
-//! angles (their rounding) demands. Without, rounding at standstill would shake the friction loose.
+//! In a single run, the angle is followed with play: it moves only as far as the uncertainty of the recorded angles
+//! (their rounding) demands. Without this play, rounding at standstill would shake the friction loose.
 
 use super::*;
 use crate::dynamics::Real;
@@ -22,60 +23,62 @@ use crate::dynamics::Real;
 /// See the module.
 pub struct Presliding;
 
-/// Standard error of 1/k, rad, of a motion that repeats: the noise of the angles between which a joint turns round is in no
-/// residual. Over eight periods with angles known to 2e-5 rad (32 arms, `reports/blind_history.md`) estimates scatter by 0.9
-/// of what they claim with it. It does not follow the noise of other logs.
+/// Standard error of 1/k, rad, for a periodic motion: the noise of the angles between which a joint turns round is in
+/// no residual. Over eight periods with angles known to 2e-5 rad (32 arms, `reports/blind_history.md`), estimates then
+/// scatter by 0.9 of the error that they claim. The constant does not adapt to the angle noise of other logs.
 const TURN_RAD: f64 = 4.5e-6;
-/// The same over 1/k, at most.
+/// Upper limit of this standard error relative to 1/k.
 const MOST_ERROR: f64 = 0.15;
-/// Stiffnesses that are tried, 1/rad.
+/// Range of stiffnesses that is searched, 1/rad.
 const STIFFNESSES_PER_RAD: [f64; 2] = [20.0, 100_000.0];
 
-/// What the drive of the joint gives where friction turns round, by variant.
+/// How the drive of the joint reacts to friction that turns round, by variant.
 #[derive(Clone, Copy)]
 enum Drive {
-    /// A share of friction by the sign of the joint's velocity, or nothing.
+    /// It feeds forward a share of friction by the sign of the joint's velocity, or nothing.
     BySign,
-    /// A share of friction by the sign of the velocity that is wanted, and feedback of this bandwidth, rad/s.
+    /// It feeds forward a share of friction by the sign of the commanded velocity, and has feedback of this bandwidth,
+    /// rad/s.
     ByWantedVelocity(f64),
-    /// What the bristles take: the joint moves as it is told.
+    /// It gives exactly what the bristles take: the joint moves as commanded.
     Bristles,
 }
 
-/// A bandwidth that is wrong by 1.7 moves 1/k by 2 % at most.
+/// The drives that are tried. A bandwidth that is wrong by a factor of 1.7 moves 1/k by 2 % at most.
 const DRIVES: [Drive; 4] =
     [Drive::BySign, Drive::ByWantedVelocity(30.0), Drive::ByWantedVelocity(80.0), Drive::Bristles];
 
-/// Share β of friction that drives feed forward by the velocity that is wanted, if they do. By how much theirs is another is
-/// told by the answers of the null model.
+/// Share β of friction that drives feed forward by the commanded velocity, if they do. How much the actual share
+/// differs is left to the drive-answer columns of the null model.
 const FED: f64 = 0.9;
-/// Widths of the model's sign behind which it has turned round but for 3e-7.
+/// Widths of the model's regularised sign beyond which it is complete up to 3e-7.
 const TURNED: f64 = 8.0;
-/// Over its largest, the least acceleration per torque that a joint may have as the arm moves. No arm's inertia changes a
-/// thousandfold; where an estimate of it is not positive, what stands for it is larger by more.
+/// Smallest acceleration per torque that a joint may have as the arm moves, relative to its largest. No arm's inertia
+/// changes a thousandfold. Where an estimated inertia is not positive, the value that replaces it is off by more than
+/// that.
 const LEAST_MOBILITY: f64 = 1e-3;
 
-/// Shapes of variants beyond those of [`DRIVES`] have damped bristles, behind the same drives.
+/// Variants from this one on have damped bristles, behind the same drives as [`DRIVES`].
 const DAMPED: usize = DRIVES.len();
-/// T, s, from which the derivative by it is taken: what a drive that feeds friction forward gives is not quite linear in T. Dampings of
-/// LuGre models are some milliseconds.
+/// T, s, over which the derivative by T is taken: the torque of a drive that feeds friction forward is not quite linear in
+/// T. LuGre models have dampings of some milliseconds.
 const DAMPING_STEP_S: f64 = 1e-3;
 
-/// Share of dry friction that the law has at least. Of bristles with dz/dq = k (1 − z sign q̇)^i (Dahl 1968) it is best
-/// fitted with 1.10 (i = ½), 0.86 (i = 3/2) and 0.72 (i = 2) of their friction.
+/// Smallest share of the joint's dry friction that the law must account for. Bristles with dz/dq = k (1 − z sign q̇)^i
+/// (Dahl 1968) are best fitted with 1.10 (i = ½), 0.86 (i = 3/2) and 0.72 (i = 2) of their friction.
 const LEAST_SHARE: f64 = 0.7;
-/// The same of a single run, whose low-pass is slower than most of a reversal. Torques that are recorded late by 4 ms have 0.13 to
-/// 0.16, a soft gear 0.07.
+/// The same for a single run, whose low-pass is slower than most of a reversal. Torques that are recorded 4 ms late
+/// give shares of 0.13 to 0.16, a soft gear 0.07.
 const LEAST_SHARE_OF_A_RUN: f64 = 0.25;
 
-/// The way of a joint to each of its instants from the one before, rad.
+/// Path of a joint from each of its instants to the next, rad.
 struct Way {
-    /// To the instant, or to where the joint turns round before it.
+    /// Path to the instant, or to the point before it where the joint turns round.
     there: Vec<f64>,
-    /// From there to the instant.
+    /// Path from that turning point to the instant; 0 without one.
     back: Vec<f64>,
-    /// Velocities at the instants, rad/s. Of a motion that repeats they are those of the angles between its samples: how the
-    /// model's friction bends them is not how bristles do.
+    /// Velocities at the instants, rad/s. For a periodic motion, they are differences of the angles between the
+    /// samples: the velocities of [`Instants`] are bent by the model's friction, not by bristles.
     qd_rad_s: Vec<f64>,
 }
 
@@ -93,7 +96,7 @@ impl Way {
         let first = if scene.periodic { n - 1 } else { 0 };
         let before = std::iter::once(first).chain(0..n - 1);
         let way = |(k, now): (usize, usize)| {
-            // An angle that is known to its resolution only says itself where it went.
+            // An angle known only to its resolution allows no turning point between two instants.
             if doubt_rad > 0.0 {
                 (q[now] - q[k], 0.0)
             } else {
@@ -104,7 +107,7 @@ impl Way {
         Self { there, back, qd_rad_s }
     }
 
-    /// z at the instants, which begins as `state` where the motion does not repeat.
+    /// z at the instants. It begins as `state` where the motion does not repeat.
     fn deflection(&self, is_periodic: bool, mut state: f64, stiffness_per_rad: f64) -> Vec<f64> {
         let lefts = of_pairs(
             self.there.clone(),
@@ -117,7 +120,7 @@ impl Way {
             direction + (state - direction) * left
         };
         let mut z = vec![0.0; self.there.len()];
-        // One lap forgets where the state began if the joint travels a few times 1/k; two are plenty.
+        // One lap forgets the initial state if the joint travels a few times 1/k; two are plenty.
         let laps = if is_periodic { 2 } else { 1 };
         for _ in 0..laps {
             for (((z, there), left), back) in
@@ -134,20 +137,20 @@ impl Way {
     }
 }
 
-/// dz/dt of the bristles, 1/s, whose deflection along `way` is z.
+/// dz/dt, 1/s, of bristles whose deflection along `way` is z.
 fn deflection_rate(way: &Way, z: &[f64], stiffness_per_rad: f64) -> Vec<f64> {
     let rate = |(qd, z): (&f64, &f64)| stiffness_per_rad * (qd - qd.abs() * z);
     way.qd_rad_s.iter().zip(z).map(rate).collect()
 }
 
-/// What is left of a deflection behind a leg of the way.
+/// Factor by which a leg of the path reduces the distance of a deflection from its limit.
 #[inline(always)]
 fn left_behind(leg: f64, stiffness_per_rad: f64) -> f64 {
     Real::exp(-stiffness_per_rad * leg.abs())
 }
 
-/// Signed lengths of the way from one (angle, velocity) to the next: there and back where the velocity,
-/// straight between them, passes through zero.
+/// Signed lengths of the path from one (angle, velocity) to the next: there and back, where the linearly interpolated
+/// velocity passes through zero.
 fn legs((q0, v0): (f64, f64), (q1, v1): (f64, f64), step_s: f64) -> (f64, f64) {
     if v0 * v1 >= 0.0 {
         return (q1 - q0, 0.0);
@@ -167,21 +170,21 @@ fn with_play(q: &[f64], half_width: f64) -> Vec<f64> {
         .collect()
 }
 
-/// What the drive of joint `j` gives at its instants over F, if it feeds friction forward by the velocity that is wanted and
-/// its feedback has the bandwidth ω, critically damped, while friction is F z.
+/// Torque, relative to F, that the drive of joint `j` gives at its instants while friction is F z. The drive feeds
+/// friction forward by the commanded velocity and has critically damped feedback of bandwidth ω.
 ///
-/// With a the joint's acceleration per torque, it lags behind that velocity by v:
+/// With a the joint's acceleration per torque, the joint lags behind the commanded velocity by v:
 ///
 /// v̇ = a F z − a τ, τ = β F s_ε(q̇ + v) + (2 ω v + ω² ∫ v dt)/a.
 fn given(scene: &Scene, j: usize, way: &Way, z: &[f64], omega: f64) -> Vec<f64> {
     let step_s = scene.instant_s();
     let width = scene.arm.friction_epsilon_rad_s;
     let kicks = scene.kick_rad_s(j);
-    // As if it had moved on in one direction.
+    // Initial state: as if the joint had always moved in one direction.
     let at_rest = (1.0 - FED) * kicks[0] * z[0] / (omega * omega * step_s);
     let (mut lag, mut behind) = (0.0, at_rest);
     let mut out = vec![0.0; z.len()];
-    // Where the first lap ends, the second begins.
+    // The second lap begins where the first one ends.
     for _ in 0..2 {
         for (((out, z), kick), qd) in out.iter_mut().zip(z).zip(kicks).zip(&way.qd_rad_s) {
             let widths = (qd + lag) / width;
@@ -195,14 +198,14 @@ fn given(scene: &Scene, j: usize, way: &Way, z: &[f64], omega: f64) -> Vec<f64> 
     out
 }
 
-/// The column of joint `j` with this `drive`, of a deflection z.
+/// Column of joint `j` for this `drive` and the deflection z.
 fn column(scene: &Scene, j: usize, way: &Way, z: &[f64], drive: Drive) -> Column {
     let sign = &scene.instants(j).sign;
     let less: Vec<f64> = z.iter().zip(sign).map(|(z, sign)| z - sign).collect();
     let column = match drive {
         Drive::ByWantedVelocity(omega) if moves_alike(scene, j) => {
             let given = given(scene, j, way, z, omega);
-            // Beside what it gives for friction that turns round with the sign.
+            // Difference from what the drive gives for friction that follows the sign, as the null model has it.
             let by_feedback = scene.answered(sign);
             let by_sign = sign.iter().zip(by_feedback).map(|(s, a)| FED * s + (1.0 - FED) * a);
             let more: Vec<f64> = given.iter().zip(by_sign).map(|(g, own)| g - own).collect();
@@ -214,14 +217,16 @@ fn column(scene: &Scene, j: usize, way: &Way, z: &[f64], drive: Drive) -> Column
     Column::on(j, column)
 }
 
-/// Starting stiffnesses of a variant. What a drive makes of bristles has one optimum between neighbours of a coarser grid.
+/// Starting stiffnesses of a variant. With the reaction of a drive, there is one optimum between neighbours of a coarser
+/// grid as well.
 fn grid(variant: usize) -> impl Iterator<Item = Shape> {
     let [softest, stiffest] = STIFFNESSES_PER_RAD;
     let count = if variant == 0 { 13 } else { 7 };
     geometric(softest, stiffest, count).map(move |value| Shape { variant, value })
 }
 
-/// Whether joint `j` has friction, and an inertia, in all of its poses: estimates may come to none in some.
+/// Whether joint `j` has friction, and a positive inertia in all of its poses: estimated inertias may be non-positive
+/// in some.
 fn moves_alike(scene: &Scene, j: usize) -> bool {
     let ends = |(least, most): (f64, f64), kick: &f64| (least.min(*kick), most.max(*kick));
     let (least, most) = scene.kick_rad_s(j).iter().fold((f64::INFINITY, 0.0), ends);
@@ -301,8 +306,8 @@ impl Candidate for Presliding {
         b[0] > 0.0 && second(b) >= 0.0
     }
 
-    /// All dry friction of a joint builds up behind a reversal. Where some of it does not, something else
-    /// happens there: a torque recorded late, or another law of speed.
+    /// All dry friction of a joint builds up after a reversal. Where some of it does not, something else happens there:
+    /// a torque recorded late, or another dependence on speed.
     fn is_its_own(&self, scene: &Scene, site: Option<usize>, _: Shape, b: &[f64]) -> bool {
         let least = if scene.periodic { LEAST_SHARE } else { LEAST_SHARE_OF_A_RUN };
         b[0] > least * scene.coulomb_nm[joint(site)]
@@ -321,8 +326,8 @@ impl Candidate for Presliding {
 mod tests {
     use super::*;
 
-    /// Share of the friction of bristles with exponent i that the law is fitted with, by least squares over a way of 100/k
-    /// behind a reversal, the level of friction being free. With w = 1 − z, w' = −wⁱ from w = 2.
+    /// Share of their friction with which bristles of exponent i are fitted by the law, by least squares over a path of
+    /// 100/k after a reversal, with the level of friction free. With w = 1 − z, w' = −wⁱ from w = 2.
     fn fitted_share(w: impl Fn(f64) -> f64) -> f64 {
         const POINTS: usize = 10_000;
         let ways: Vec<f64> = (0..=POINTS).map(|k| 100.0 * k as f64 / POINTS as f64).collect();
@@ -347,9 +352,9 @@ mod tests {
         let root = |x: f64| (2f64.sqrt() - 0.5 * x).max(0.0).powi(2);
         let three_halves = |x: f64| (0.5f64.sqrt() + 0.5 * x).powi(-2);
         let square = |x: f64| 1.0 / (0.5 + x);
-        // Its own law between two of the stiffnesses, which are 1.2 % apart.
+        // The law itself, between two of the tried stiffnesses, which are 1.2 % apart.
         assert!((fitted_share(|x| 2.0 * (-x).exp()) - 1.0).abs() < 0.01);
-        // Half of the last digit that the constant's comment gives.
+        // Tolerance: half of the last digit given at the constant.
         assert!((fitted_share(root) - 1.10).abs() < 0.005);
         assert!((fitted_share(three_halves) - 0.86).abs() < 0.005);
         assert!((fitted_share(square) - 0.72).abs() < 0.005);

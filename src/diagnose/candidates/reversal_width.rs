@@ -1,13 +1,14 @@
-//! Friction that turns round over another range of speeds than the model has it, of one joint or of all:
-//! τ = F (tanh(q̇/w) − tanh(q̇/ε)), F the joint's dry friction and ε the width of the robot's file.
+//! Friction that turns round over another range of speeds than the model assumes, on one joint or on all: τ = F
+//! (tanh(q̇/w) − tanh(q̇/ε)), with F the joint's dry friction and ε the width in the robot file.
 //!
-//! Friction that is all there at once has w = 0. What samples show of a reversal is the area under the law, which is
-//! proportional to w − ε: this is the coefficient, and the shape as well.
+//! Friction that changes sign at once has w = 0. What the samples show of a reversal is the area under the law, which
+//! is proportional to w − ε. This difference is both the coefficient and the shape.
 //!
-//! Where friction turns round within a sample the joint does not move as the samples say: what the drive does not
-//! deliver at once bends its velocity ([`Scene::turning_rad_s`]). What its answer to reversals would tell is told by the
-//! width of the file; drives feed dry friction forward by that width, or not at all, and give of the rest what their feedback
-//! does: these are the variants.
+//! Where friction turns round within a sample, the joint does not move as the samples say: the friction torque that the
+//! drive does not deliver at once bends its velocity ([`Scene::turning_rad_s`]). The answer of the drive to reversals
+//! cannot be taken from the log here, because it is inferred with the width of the file. Instead, the drive either
+//! feeds dry friction forward with that width or not at all, and its feedback answers the rest; these are the two
+//! variants.
 
 use super::*;
 use crate::dynamics::Real;
@@ -15,21 +16,22 @@ use crate::dynamics::Real;
 /// See the module.
 pub struct ReversalWidth;
 
-/// Two widths this close, as a share of ε, are one: their difference over their distance is the law's slope there.
+/// Two widths this close, as a share of ε, count as one: the difference quotient is then the derivative of the law.
 const APART: f64 = 1e-3;
-/// The sharpest law whose turn is followed, as a share of ε.
+/// Width of the sharpest law whose reversal is simulated, as a share of ε.
 const SHARPEST: f64 = 0.05;
-/// Changes that are tried, as shares of ε.
+/// Starting values of w − ε, as shares of ε.
 const CHANGES: [f64; 11] = [-0.9, -0.8, -0.6, -0.35, -0.15, 0.15, 0.4, 0.8, 1.6, 3.2, 6.4];
-/// The coefficient over the shape: all dry friction of a joint turns round, and an estimate is off by less than this.
+/// Possible ratios of coefficient to shape. All dry friction of a joint turns round, and the ratio of an estimate is
+/// off by less than this.
 const WHOLE: std::ops::RangeInclusive<f64> = 0.4..=2.5;
-/// The same at most where friction turns round and does nothing else. Of 85 widths it was 0.4 to 1.5, and with five it was
-/// more, of which a shape that agrees explains as much; friction that falls while it turns round, under the same law, goes to
-/// the end of what is possible.
+/// Upper limit of this ratio where friction turns round and does nothing else. For 85 widths the ratio was 0.4 to 1.5.
+/// With five it was larger, but a consistent shape explained as much. Friction that falls while it turns round, fitted
+/// with the same law, goes to the end of the possible range.
 const MOST_WHOLE: f64 = 1.5;
-/// Standard error of widths less than the model's, over what they are less: what a drive answers while friction turns round
-/// within a sample is not known. In logs of another simulator, whose drives feed nothing forward, a width of 0.002 rad/s left
-/// 0.14 of its strength to late torques of the wrist.
+/// Standard error of widths below the model's, relative to the difference: how the drive answers while friction turns
+/// round within a sample is not known. In logs of another simulator, whose drives feed nothing forward, a width of
+/// 0.002 rad/s left 0.14 of its strength to late torques of the wrist.
 const SHARP_ERROR: f64 = 0.15;
 
 impl Candidate for ReversalWidth {
@@ -119,8 +121,8 @@ impl Candidate for ReversalWidth {
         WHOLE.contains(&(b[0] / shape.value))
     }
 
-    /// No friction turns round faster than at once: a coefficient beyond that by two standard errors of the law is of
-    /// friction that there is more of.
+    /// No friction turns round faster than at once. A coefficient beyond that by two standard errors of the law means
+    /// that there is more friction, not a narrower reversal.
     fn is_its_own(&self, scene: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> bool {
         let at_once = -scene.arm.friction_epsilon_rad_s;
         b[0] >= (1.0 + 2.0 * SHARP_ERROR) * at_once

@@ -1,8 +1,9 @@
-//! Torque that repeats many times per turn: τ = A cos(N q + φ), of the gear's teeth (even multiples of the
-//! ratio) or the motor's poles. Fast ripple goes into the acceleration of the links, hardly into the torque, and above half
-//! the rate the samples hold its alias: a log shows it as it shows whatever no controller answers at once
-//! ([`Scene::as_logged`]). Ripple that the drive answers, or that only its current has, is in the torque as it is at
-//! every sample (variant 1).
+//! Torque ripple that repeats many times per turn: τ = A cos(N q + φ), caused by the gear's teeth (even multiples of
+//! the ratio) or by the motor's poles.
+//!
+//! Fast ripple accelerates the links and hardly shows in the torque, and above half the sampling rate the samples hold
+//! its alias. A log shows it as it shows any torque that no controller answers at once ([`Scene::as_logged`]). Ripple
+//! that the drive answers, or that is in its current only, is in the recorded torque at every sample (variant 1).
 
 use super::*;
 use crate::dynamics::Real;
@@ -10,40 +11,41 @@ use crate::dynamics::Real;
 /// See the module.
 pub struct Ripple;
 
-/// The variant that no drive answers at once.
+/// Variant for ripple that no drive answers at once.
 const OF_THE_LINKS: usize = 0;
-/// The variant that is in the torque at once. Along a single run, behind its low-pass, both are the same.
+/// Variant for ripple that is in the torque at once. In a single run, behind its low-pass, the two are the same.
 const OF_THE_DRIVE: usize = 1;
 
-/// Forms that a log can tell.
+/// Variants that a log can distinguish.
 fn variants(scene: &Scene) -> std::ops::RangeInclusive<usize> {
     OF_THE_LINKS..=if scene.periodic { OF_THE_DRIVE } else { OF_THE_LINKS }
 }
 
-/// Orders that a strain-wave gear of ratio 100 makes, per turn of the joint, and their neighbours.
+/// Range of orders per turn of the joint: those of a strain-wave gear of ratio 100, and their neighbours.
 const HIGHEST_ORDER: f64 = 450.0;
 const LOWEST_ORDER: f64 = 20.0;
 /// Orders of a strain-wave gear in multiples of its ratio.
 const GEAR_MULTIPLES: [f64; 3] = [1.0, 2.0, 4.0];
-/// Orders of the motor's poles and slots in multiples of the ratio; looked for along single runs, whose
-/// slow parts show them.
+/// Orders of the motor's poles and slots in multiples of the ratio. They are looked for in single runs, whose slow
+/// parts show them.
 const MOTOR_MULTIPLES: [f64; 2] = [8.0, 12.0];
 
-/// Orders that are looked at first, of a gear of this `ratio` and its motor; none of an arm without drives, which says 1.
+/// Orders that are tried first, for a gear of this `ratio` and its motor. None for an arm without drives, whose ratio
+/// is 1.
 fn expected_orders(ratio: f64, is_periodic: bool) -> impl Iterator<Item = f64> {
     let motor = if is_periodic { &[][..] } else { &MOTOR_MULTIPLES[..] };
     let multiples = GEAR_MULTIPLES.into_iter().chain(motor.iter().copied());
     multiples.map(move |m| m * ratio).filter(|order| *order >= LOWEST_ORDER)
 }
 
-/// The same of joint `j`.
+/// [`expected_orders`] of joint `j`.
 fn expected_on(scene: &Scene, j: usize) -> impl Iterator<Item = f64> {
     expected_orders(scene.arm.joints[j].drive.gear_ratio, scene.periodic)
 }
 
-/// A joint that turns by less from one sample to the next shows no order.
+/// A joint that turns by less than this between two samples reveals no order.
 const STANDSTILL_RAD: f64 = 1e-8;
-/// Peaks of the order spectrum that are looked at closely.
+/// Number of peaks of the order spectrum that are examined.
 const PEAKS: usize = 3;
 
 impl Candidate for Ripple {
@@ -53,7 +55,7 @@ impl Candidate for Ripple {
 
     fn shapes(&self, scene: &Scene, site: Option<usize>) -> Vec<Shape> {
         let spacing = order_spacing(scene, joint(site));
-        // Half the resolution on both sides brackets a peak of the order spectrum.
+        // Half the resolution to either side brackets a peak of the order spectrum.
         let about = |order: f64| [-0.5, 0.0, 0.5].map(|u| order + u * spacing);
         let orders: Vec<f64> = expected_on(scene, joint(site)).flat_map(about).collect();
         let shapes = |variant| orders.iter().map(move |&value| Shape { variant, value });
@@ -87,7 +89,7 @@ impl Candidate for Ripple {
             return [wave(f64::cos), wave(f64::sin)].map(|ripple| Column::on(j, ripple)).into();
         }
         let at = scene.instants(j);
-        // What was resampled from uneven times has no aliases that could be predicted.
+        // A run resampled from uneven times has no aliases that could be predicted.
         let fastest_rad_s = if scene.periodic {
             f64::INFINITY
         } else {
@@ -133,14 +135,14 @@ impl Candidate for Ripple {
     }
 }
 
-/// Resolution in orders per turn: one cycle more over the joint's range.
+/// Resolution in orders per turn: one more cycle over the joint's range.
 fn order_spacing(scene: &Scene, j: usize) -> f64 {
     let [low, high] = range_rad(scene, j);
     std::f64::consts::TAU / (high - low).max(1e-2)
 }
 
-/// v for which Σ v_k e^{iNq_k} is iN Σ w_k c_k, c_k the mean of e^{iNq} from sample k of a period to the next, where
-/// q goes straight: c_k = (e^{iNq_{k+1}} − e^{iNq_k})/(iN (q_{k+1} − q_k)).
+/// Weights v for which Σ v_k e^{iNq_k} = iN Σ w_k c_k, where c_k is the mean of e^{iNq} from sample k of a period to
+/// the next, with q linear in between: c_k = (e^{iNq_{k+1}} − e^{iNq_k})/(iN (q_{k+1} − q_k)).
 fn of_phasors(w: &[f64], q: &[f64]) -> Vec<f64> {
     let next = q[1..].iter().chain(&q[..1]);
     let per_turn: Vec<f64> = w
@@ -152,7 +154,7 @@ fn of_phasors(w: &[f64], q: &[f64]) -> Vec<f64> {
     before.zip(&per_turn).map(|(before, own)| before - own).collect()
 }
 
-/// Orders at which `residual_nm` of joint `j` has most power, feedback of its drive aside: shapes to begin with.
+/// Starting shapes: the orders at which `residual_nm` of joint `j` has most power, ignoring the feedback of its drive.
 pub(in crate::diagnose) fn strongest_orders(
     scene: &Scene,
     j: usize,
@@ -160,10 +162,10 @@ pub(in crate::diagnose) fn strongest_orders(
 ) -> Vec<Shape> {
     let q = scene.motion.q_rad.joint(j);
     let of_links = scene.as_logged_adjoint(residual_nm).map(|w| of_phasors(&w, q));
-    // A mean of phasors is a difference of them over the order.
+    // A mean of phasors is their difference divided by the order, hence the tilt of −2 in power.
     let of_links = of_links.map(|weights| power_of_orders(scene, j, &weights, -2));
     let of_drive = power_of_orders(scene, j, residual_nm, 0);
-    // Along a single run what is read is what there is.
+    // A single run has the second spectrum only, which then counts as variant 0.
     let powers = of_links.into_iter().chain([of_drive]).enumerate();
     let shape = |variant| move |value| Shape { variant, value };
     powers.flat_map(|(variant, power)| power.peaks().map(shape(variant))).collect()
@@ -197,7 +199,7 @@ fn power_of_orders(scene: &Scene, j: usize, weights: &[f64], tilt: i32) -> Order
 }
 
 impl OrderSpectrum {
-    /// The orders of its highest peaks, and those beside them.
+    /// Orders of the highest peaks, each with its two neighbours.
     fn peaks(self) -> impl Iterator<Item = f64> {
         let Self { step, power } = self;
         let mut peaks: Vec<usize> = (1..power.len().saturating_sub(1))
@@ -216,7 +218,7 @@ mod tests {
 
     use super::*;
 
-    /// A robot file without drives says nothing of gears, and its ratio of one is none.
+    /// A robot file without drives says nothing of gears: its ratio of one is not a gear ratio.
     #[test]
     fn no_order_is_expected_of_a_gear_that_is_not_known() {
         let expected = |ratio, is_periodic| expected_orders(ratio, is_periodic).collect::<Vec<_>>();
@@ -226,7 +228,8 @@ mod tests {
         assert!(expected(1.0, true).is_empty() && expected(1.0, false).is_empty());
     }
 
-    /// Of a joint that turns at constant speed between samples, the weights of its phasors give back what the means do.
+    /// For a joint that turns at constant speed between samples, the weights of the phasors give the same sum as the
+    /// means.
     #[test]
     fn means_are_differences_of_phasors() {
         const N: usize = 12;
@@ -235,18 +238,18 @@ mod tests {
         let order = 90.0;
         let phasor = |q: f64| Complex::from_polar(1.0, order * q);
         let turned = |k: usize| (q[(k + 1) % N] - q[k]) * order;
-        // sinc(x) e^{iN(q_k + q_{k+1})/2}, x half of what the cell turns.
+        // sinc(x) e^{iN(q_k + q_{k+1})/2}, with x half the phase that the cell turns through.
         let mean = |k: usize| {
             let x = 0.5 * turned(k);
             phasor(q[k] + x / order) * if x == 0.0 { 1.0 } else { x.sin() / x }
         };
-        // A cell that stands still is left out.
+        // A cell without motion is left out.
         let cells = (0..N).filter(|&k| turned(k) != 0.0);
         let by_means: Complex<f64> = cells.map(|k| mean(k) * w[k]).sum();
         let by_phasors: Complex<f64> =
             of_phasors(&w, &q).iter().zip(&q).map(|(v, q)| phasor(*q) * *v).sum();
         let difference = by_means * Complex::new(0.0, order) - by_phasors;
-        // Rounding: terms of up to w/Δq = 60 with phases of up to 11 rad, some 10⁻¹³ in all.
+        // Rounding: terms of up to w/Δq = 60 with phases of up to 11 rad, in total some 10⁻¹³.
         assert!(difference.norm() < 1e-10 * by_phasors.norm(), "{by_means} {by_phasors}");
     }
 }

@@ -1,6 +1,6 @@
-//! A drive at its limit: torque beyond ±c is cut off, and its noise with it. With σ the noise of one sample,
-//! the mean of what is cut above is E max(0, τ + n − c) = x Φ(x/σ) + σ φ(x/σ), x = τ − c. Noise that comes to the
-//! reading behind the limit is not cut: max(0, x) (variant 1).
+//! A drive at its limit: torque beyond ±c is cut off, and its noise with it. With σ the noise of one sample, the mean
+//! of the torque that is cut off above is E max(0, τ + n − c) = x Φ(x/σ) + σ φ(x/σ), x = τ − c. Noise that is added to
+//! the reading after the limit is not cut off: max(0, x) (variant 1).
 
 use super::*;
 use statrs::function::erf::erfc;
@@ -8,12 +8,13 @@ use statrs::function::erf::erfc;
 /// See the module.
 pub struct Saturation;
 
-/// The variant whose noise comes behind the limit.
+/// Variant whose noise is added after the limit.
 const BEFORE_NOISE: usize = 1;
-/// Limits to begin with, over the largest torque that the model expects.
+/// Starting limits, as shares of the largest torque that the model expects.
 const SHARES: [f64; 5] = [0.6, 0.7, 0.8, 0.9, 0.97];
 
-/// Share of what is beyond the limit that has to be cut off. Of two sensors whose reading bends the best limits cut off 0.02 and 0.06.
+/// Smallest share of the torque beyond the limit that has to be cut off. For two sensors with a curved characteristic,
+/// the best-fitting limits cut off 0.02 and 0.06.
 const LEAST_CUT: f64 = 0.5;
 
 /// E max(0, x + n), n normal with standard deviation `sigma`.
@@ -33,11 +34,11 @@ impl Candidate for Saturation {
     }
 
     fn shapes(&self, scene: &Scene, site: Option<usize>) -> Vec<Shape> {
-        // Readings that stop at one number tell it.
+        // Readings that stop at one number reveal the limit.
         if let Some(limit) = scene.torque_limit_nm[joint(site)] {
             return vec![Shape { variant: 0, value: limit }];
         }
-        // Where nothing repeats, a law of friction that is not quite right looks like the top cut off.
+        // In a single run, an inaccurate friction law looks like a cut-off peak.
         if !scene.periodic {
             return Vec::new();
         }
@@ -74,8 +75,8 @@ impl Candidate for Saturation {
         b[0] > 0.0
     }
 
-    /// All is cut off beyond a limit, and more than that of what a model says that is bent by it. A sensor whose reading bends cuts off
-    /// a share, and no reading stops at its limit.
+    /// Beyond a real limit everything is cut off, and even more relative to a model that the limit has biased. A sensor
+    /// with a curved characteristic cuts off only a share, and its readings do not stop at a limit.
     fn is_its_own(&self, scene: &Scene, site: Option<usize>, _: Shape, b: &[f64]) -> bool {
         b[0] > LEAST_CUT || scene.torque_limit_nm[joint(site)].is_some()
     }

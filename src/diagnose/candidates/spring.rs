@@ -1,4 +1,4 @@
-//! A cable or hose that pulls like a spring: the drive has to give τ = k (q − q₀).
+//! A cable or hose that pulls like a spring: the drive has to supply τ = k (q − q₀).
 
 use super::*;
 
@@ -11,7 +11,7 @@ impl Candidate for Spring {
     }
 
     fn shapes(&self, _: &Scene, _: Option<usize>) -> Vec<Shape> {
-        // Where the null model absorbs the angle, the pull at zero is all that is left of a spring.
+        // Where the null model absorbs the column of the angle, only the spring's pull at zero is left (variant 1).
         [0, 1].map(|variant| Shape { variant, value: 0.0 }).to_vec()
     }
 
@@ -29,7 +29,7 @@ impl Candidate for Spring {
             return vec![quantity("pull_at_zero_nm", b[0], "Nm")];
         }
         let mut out = vec![quantity("stiffness_nm_rad", b[0], "Nm/rad")];
-        // The constant is the estimate's own where it fits offsets.
+        // Where the estimate fits offsets, the constant is absorbed and the rest angle unknown.
         out.extend(b.get(1).map(|constant| quantity("rest_rad", -constant / b[0], "rad")));
         out
     }
@@ -38,7 +38,7 @@ impl Candidate for Spring {
         "slow motion over the joint's whole range with the cable on and off"
     }
 
-    /// What drives away from its rest is no cable.
+    /// A torque that drives the joint away from its rest angle is not a cable.
     fn is_possible(&self, shape: Shape, b: &[f64]) -> bool {
         shape.variant == 1 || b[0] > 0.0
     }

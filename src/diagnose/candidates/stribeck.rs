@@ -1,9 +1,9 @@
-//! Friction that falls with speed near rest: τ = F e^{−(|q̇|/v_s)ⁿ} sign q̇, n = 2 or 1 (Stribeck 1902; Armstrong-Hélouvry,
-//! Dupont and Canudas de Wit 1994).
+//! Friction that falls with speed near rest: τ = F e^{−(|q̇|/v_s)ⁿ} sign q̇, n = 2 or 1 (Stribeck 1902;
+//! Armstrong-Hélouvry, Dupont and Canudas de Wit 1994).
 //!
-//! Where it turns round, a joint does not move as its samples say ([`Scene::turning_rad_s`]): what bends its velocity there is
-//! this friction beside the joint's own. How much of it there is is not known before the fit; the columns are those of a usual
-//! share, divided by it.
+//! Where friction turns round, a joint does not move as its samples say ([`Scene::turning_rad_s`]): this friction,
+//! added to the joint's own, bends its velocity. Its size is not known before the fit. The columns are therefore
+//! computed for a typical share and divided by it.
 
 use super::*;
 use crate::dynamics::Real;
@@ -11,26 +11,30 @@ use crate::dynamics::Real;
 /// See the module.
 pub struct Stribeck;
 
-/// Friction near rest beside the joint's own, F/F_c, with which its turn is followed. A few tenths to once that are
-/// usual; between 0.2 and 0.8 the turn moves estimates of F by 4 %, between none and 0.2 by more than their σ.
+/// Assumed ratio F/F_c of the extra friction near rest to the joint's own, for simulating its reversals. A few tenths
+/// to one are typical. Between 0.2 and 0.8, the reversal moves estimates of F by 4 %; between zero and 0.2, by more
+/// than their σ.
 const USUAL_SHARE: f64 = 0.5;
 
-/// How the drive answers while friction turns round: by its feedback alone. What its answer to reversals tells is no better a
-/// guess on joints 3 to 6, and on joints 1 and 2, which turn round within few samples, made F 1.8 to 2.6 times as large in six of 84
-/// logs (`reports/blind_history.md`).
+/// How the drive answers while friction turns round: by its feedback alone. The answer inferred from reversals is no
+/// better a guess on joints 3 to 6. On joints 1 and 2, which turn round within few samples, it made F 1.8 to 2.6 times
+/// as large in six of 84 logs (`reports/blind_history.md`).
 const FED: Option<f64> = Some(0.0);
 
-/// Standard error of F and v_s over their value, for both: with it the intervals hold 77 and 79 truths of those 84 logs.
+/// Relative standard error of both F and v_s. With it, the intervals hold 77 and 79 of the true values in those 84
+/// logs.
 const TURN_ERROR: f64 = 0.04;
 
-/// A curve that falls over more than so many times the width of the regularised sign is no matter of slow motion.
+/// A curve wider than this many widths of the regularised sign is not confined to slow motion.
 const WIDEST: f64 = 25.0;
-/// The narrowest that is looked for; slower than the sign turns round it would be a part of that.
+/// Narrowest curve that is looked for. A narrower one would merely be part of the sign's own reversal.
 const NARROWEST: f64 = 1.2;
-/// What is best explained by a curve no wider than this is narrower than any: another way in which friction turns round.
+/// If the best curve is no wider than this, the true one is narrower than any that is tried: friction turns round in
+/// another way.
 const AT_THE_END: f64 = 1.25;
 
-/// Friction over Coulomb's with [`USUAL_SHARE`] more of it near rest, which falls with the speed `v`, rad/s.
+/// Friction at the speed `v`, rad/s, relative to Coulomb friction, with [`USUAL_SHARE`] of extra friction near rest
+/// that falls with speed.
 #[inline(always)]
 fn usual(shape: Shape, epsilon_rad_s: f64, v: f64) -> f64 {
     let x = v.abs() / shape.value;
@@ -44,7 +48,7 @@ impl Candidate for Stribeck {
     }
 
     fn shapes(&self, scene: &Scene, _: Option<usize>) -> Vec<Shape> {
-        // Up to twice the widest, to see where it would end.
+        // Up to twice the widest, to see where the search would end.
         let epsilon = scene.arm.friction_epsilon_rad_s;
         (0..2)
             .flat_map(|variant| {
@@ -101,7 +105,8 @@ impl Candidate for Stribeck {
         b[0] > 0.0
     }
 
-    /// Friction that falls over the whole range of speeds has another law, and so has what falls while the sign turns round.
+    /// Friction that falls over the whole range of speeds follows another law, and so does friction that falls while
+    /// the sign turns round.
     fn is_its_own(&self, scene: &Scene, _: Option<usize>, shape: Shape, _: &[f64]) -> bool {
         let widths = shape.value / scene.arm.friction_epsilon_rad_s;
         widths > AT_THE_END && widths <= WIDEST

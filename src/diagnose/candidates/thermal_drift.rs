@@ -1,13 +1,13 @@
-//! Friction that changes while the arm warms up: τ = f (F_c sign q̇ + F_v q̇)(1 − e^{−t/T}), t from the
-//! start of the record, not of what is used of it: a motion that changes with its friction repeats later. It does not
-//! repeat itself, so that the differences between periods show it.
+//! Friction that changes while the arm warms up: τ = f (F_c sign q̇ + F_v q̇)(1 − e^{−t/T}). t counts from the start of
+//! the record, not of the part that is used: a motion that changes with its friction becomes periodic only later. The
+//! effect itself does not repeat, so that the differences between periods show it.
 
 use super::*;
 
 /// See the module.
 pub struct ThermalDrift;
 
-/// Time constants this close to the fastest are not told from it.
+/// Time constants within this factor of the fastest are not distinguished from it.
 const TOLD: f64 = 1.02;
 
 /// The fastest time constant, s.
@@ -21,7 +21,7 @@ impl Candidate for ThermalDrift {
     }
 
     fn shapes(&self, scene: &Scene, _: Option<usize>) -> Vec<Shape> {
-        // Slower than ten records the drift is a straight line in time.
+        // A drift much slower than the record is a straight line in time.
         let slowest = 5.0 * scene.duration_s();
         geometric(fastest_s(scene), slowest, 5).map(|value| Shape { variant: 0, value }).collect()
     }
@@ -34,7 +34,7 @@ impl Candidate for ThermalDrift {
         let j = joint(site);
         let drive = &scene.arm.joints[j].drive;
         let qd = scene.motion.qd_rad_s.joint(j);
-        // What a drive feeds forward does not warm up with the friction.
+        // The friction that a drive feeds forward does not warm up with the actual friction.
         let sign = scene.as_logged(scene.instants(j).sign.clone());
         let n = scene.samples();
         let friction = (0..n * scene.periods).map(|k| {
@@ -49,12 +49,12 @@ impl Candidate for ThermalDrift {
         vec![quantity("fraction", b[0], ""), quantity("time_constant_s", shape.value, "s")]
     }
 
-    /// Friction does not drive, and does not grow fourfold.
+    /// Friction does not drive a joint, and does not grow fourfold.
     fn is_possible(&self, _: Shape, b: &[f64]) -> bool {
         (-1.0..3.0).contains(&b[0])
     }
 
-    /// What ends early in a single run may be anything that happened once.
+    /// In a single run, an effect that ends early may be anything that happened once.
     fn is_its_own(&self, scene: &Scene, _: Option<usize>, shape: Shape, _: &[f64]) -> bool {
         scene.periodic || shape.value > TOLD * fastest_s(scene)
     }

@@ -1,16 +1,16 @@
 //! Torque recorded later than the motion by a delay d: τ(t − d) − τ(t), of one joint or of all.
 //!
-//! d is the shape, and the coefficient as well: what a delay changes is divided by it. Where the two disagree the law is
-//! another one that looks like a delay of the shape: drives with slow feedback lead or lag by a little more at one reversal than
-//! at the other, which is a sixteenth of what half a sample would change.
+//! d is both the shape and the coefficient, because the change that a delay causes is divided by the delay. Where the
+//! two disagree, another effect looks like a delay of that shape: drives with slow feedback lead or lag slightly more
+//! at one reversal than at another, which is a sixteenth of the change by a delay of half a sample.
 
 use super::*;
 
 /// See the module.
 pub struct TimeSkew;
 
-/// Delays to begin with, s. Where the leads that drives may have take what a delay changes to first order, the rest is in
-/// proportion to its square, and a shape d reaches delays from d/√3 to √3 d.
+/// Starting delays, s. Where the drive leads of the null model absorb the first-order change by a delay, the remainder
+/// is proportional to its square, and a shape d reaches delays from d/√3 to √3 d.
 const DELAYS_S: [f64; 12] = [
     -0.04,
     -0.015,
@@ -25,10 +25,10 @@ const DELAYS_S: [f64; 12] = [
     0.015,
     0.04,
 ];
-/// Below this delay, s, what it changes is in proportion to it: to (ω d)²/6 = 0.15 % at the 60 Hz up to which drives are looked
-/// at.
+/// Below this delay, s, the change is proportional to the delay, up to (ω d)²/6 = 0.15 % at 60 Hz, the highest
+/// frequency at which drives are examined.
 const SHORTEST_S: f64 = 2.5e-4;
-/// The coefficient over the shape, at most, and its inverse at least.
+/// Largest ratio of coefficient to shape; its inverse is the smallest.
 const AGREES: f64 = 3.0;
 
 impl Candidate for TimeSkew {
@@ -41,13 +41,13 @@ impl Candidate for TimeSkew {
     }
 
     fn prior_odds(&self, site: Option<usize>) -> f64 {
-        // Joints are recorded together: one of six alone is late a third as often as the arm.
+        // Joints are recorded together: that a single one of six is late is a third as likely as that the whole arm is.
         if site.is_some() { 0.06 } else { 1.0 }
     }
 
     fn shapes(&self, scene: &Scene, site: Option<usize>) -> Vec<Shape> {
-        // A row is recorded at one time. Where joints repeat nothing, one joint's torque that seems late
-        // is friction that builds up behind its reversals.
+        // A row is recorded at one time. In a single run, the torque of one joint that seems late is friction that
+        // builds up after its reversals.
         if site.is_some() && !scene.periodic {
             return Vec::new();
         }
@@ -97,8 +97,8 @@ impl Candidate for TimeSkew {
 mod tests {
     use super::*;
 
-    /// Whether the law stays the same between the shape and the delay or goes with its square: some shape to begin with takes
-    /// every delay up to 60 ms, and none takes one that is a sixteenth of it or runs the other way.
+    /// Whether the change is proportional to the delay or to its square, some starting shape accepts every delay up to
+    /// 60 ms. No shape accepts a delay that is a sixteenth of it or has the other sign.
     #[test]
     fn every_delay_begins_somewhere() {
         let is_taken =

@@ -1,11 +1,11 @@
-//! A wrong torque constant: the log says (1 + e) times the torque.
+//! A wrong torque constant: the log shows (1 + e) times the torque.
 
 use super::*;
 
 /// See the module.
 pub struct TorqueGain;
 
-/// Errors that a torque constant can have.
+/// Plausible range of the error e.
 const LARGEST: std::ops::Range<f64> = -0.5..1.0;
 
 impl Candidate for TorqueGain {
@@ -22,7 +22,7 @@ impl Candidate for TorqueGain {
         vec![quantity("error_fraction", b[0], "")]
     }
 
-    /// A log of twice the torque, or of half, is of another arm.
+    /// A log with twice the torque, or with half of it, is of another arm.
     fn is_possible(&self, _: Shape, b: &[f64]) -> bool {
         LARGEST.contains(&b[0])
     }

@@ -1,8 +1,8 @@
-//! Contacts along a single run: torque far off the extended model's.
+//! Contacts in a single run: torque that deviates far from the extended model.
 //!
-//! Samples near a joint's own reversals do not count, where errors of the model's friction are largest. A
-//! contact is where the deviation passes [`FAR_OF_MODEL`] robust standard deviations; it lasts while the
-//! deviation stays above [`NEAR`] of that.
+//! Samples near a joint's own reversals do not count, because errors of the model's friction are largest there. A
+//! contact is where the deviation exceeds [`FAR_OF_MODEL`] robust standard deviations; it lasts while the deviation
+//! stays above the share [`NEAR`] of that.
 
 use std::ops::Range;
 
@@ -13,27 +13,29 @@ use crate::median::robust_sigma;
 use crate::robot::JointSignals;
 use crate::signal::{Scratch, SignalError, ZeroPhase};
 
-/// Deviations of this many robust σ belong to a contact: most of them are errors of the model.
+/// Deviations of this many robust σ belong to a contact. The threshold is high because most deviations are errors of
+/// the model.
 const FAR_OF_MODEL: f64 = 12.0;
 /// A contact lasts while the deviation is above this share of the threshold.
 const NEAR: f64 = 0.5;
 /// Parts closer than this are one contact, s.
 const TOGETHER_S: f64 = 0.3;
-/// A joint slower than this, rad/s, or so shortly before or behind, s, may be held by friction.
+/// A joint slower than `SLOW_RAD_S`, rad/s, or one that was so within `REVERSAL_S` before or after, s, may be held by
+/// friction.
 const SLOW_RAD_S: f64 = 0.05;
 const REVERSAL_S: f64 = 0.25;
 
-/// Contacts beside a model along a single run.
+/// Contacts found beside a model in a single run.
 #[derive(Default)]
 pub struct BesideModel {
     /// One cause per contact.
     pub causes: Vec<Cause>,
-    /// The samples that they disturb.
+    /// Samples that they disturb.
     pub samples: Vec<Range<usize>>,
 }
 
-/// Contacts in the residual `error_nm` of a model along a single run with joint velocities `qd_rad_s`,
-/// sample by sample on the evenly spaced clock `time_s`, behind `low_pass`.
+/// Finds contacts in the residual `error_nm` of a model along a single run with joint velocities `qd_rad_s`, both
+/// sampled on the evenly spaced clock `time_s` and filtered by `low_pass`.
 pub fn beside_model(
     error_nm: &JointSignals,
     qd_rad_s: &JointSignals,
@@ -74,7 +76,7 @@ pub fn beside_model(
     let touches: Vec<Touch> = stretches(n, gap, |k| highest(k) >= NEAR)
         .into_iter()
         .filter_map(|samples| {
-            // Per joint that felt it: joint, sample where most, score there.
+            // For each joint that felt it: joint, sample of the largest score, that score.
             let felt: Vec<(usize, usize, f64)> = joints
                 .clone()
                 .filter_map(|j| {
@@ -91,8 +93,8 @@ pub fn beside_model(
     })
 }
 
-/// Stretches of `0..n` that begin and end with a sample that `is_far` and have no more than `gap` others in a
-/// row.
+/// Stretches of `0..n` that begin and end with a sample that `is_far`, with at most `gap` other samples in a row in
+/// between.
 fn stretches(n: usize, gap: usize, is_far: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     let mut out: Vec<Range<usize>> = Vec::new();
     for k in (0..n).filter(|&k| is_far(k)) {
@@ -104,7 +106,7 @@ fn stretches(n: usize, gap: usize, is_far: impl Fn(usize) -> bool) -> Vec<Range<
     out
 }
 
-/// The contact that the joints `felt` (joint, sample where most, score there) in `samples`.
+/// The contact that the joints `felt` (joint, sample of the largest score, that score) in `samples`.
 fn touch(
     samples: Range<usize>,
     felt: &[(usize, usize, f64)],
@@ -123,7 +125,8 @@ fn touch(
     // A low-pass moves an edge by up to a quarter of its shortest period.
     let blur_s = 0.25 / low_pass.cutoff_hz();
     let (first, last) = (time_s[samples.start], time_s[samples.end - 1]);
-    // What rises and falls as sin² is above the share NEAR/score of its peak for 1 − f of its time only.
+    // A push that rises and falls as sin² is above the share NEAR/score of its peak for only 1 − f of its duration,
+    // with f = `unseen`.
     let unseen = (NEAR / score).sqrt().asin() / std::f64::consts::FRAC_PI_2;
     let foot_s = 0.5 * (last - first) * unseen / (1.0 - unseen);
     let estimate = |value: f64, below: f64, above: f64, unit: &'static str| Estimate {
@@ -131,7 +134,7 @@ fn touch(
         unit,
         ci95: [value - below, value + above],
     };
-    // The low-pass takes from the peak, the more the shorter the push is.
+    // The low-pass lowers the peak, the more the shorter the push is.
     let [likely, at_least] = [last - first + 2.0 * foot_s, last - first - 2.0 * blur_s]
         .map(|length_s| kept_of_peak(low_pass, length_s.max(SHORTEST_S)));
     let likely = likely?;
@@ -158,7 +161,7 @@ fn touch(
     }))
 }
 
-/// What `low_pass` leaves of the peak of a push that rises and falls as sin² within `length_s`.
+/// Share of its peak that a push keeps behind `low_pass`, if it rises and falls as sin² within `length_s`.
 fn kept_of_peak(low_pass: &ZeroPhase, length_s: f64) -> Result<f64, SignalError> {
     let (rate_hz, edge) = (low_pass.rate_hz(), low_pass.edge_samples());
     let samples = (length_s * rate_hz).ceil() as usize;
@@ -177,8 +180,8 @@ fn kept_of_peak(low_pass: &ZeroPhase, length_s: f64) -> Result<f64, SignalError>
 mod tests {
     use super::*;
 
-    /// ∫ P(f)/(1 + (√2 − 1)(f/f_c)⁸) df by hand, P the spectrum of sin². At 125 Hz a tenth of a second has its peak a quarter of a
-    /// sample from the next one, which is (π/50)² = 0.004 lower.
+    /// ∫ P(f)/(1 + (√2 − 1)(f/f_c)⁸) df by hand, with P the spectrum of sin². At 125 Hz, a push of a tenth of a second
+    /// has its peak a quarter of a sample from the nearest sample, whose value is (π/50)² = 0.004 lower.
     #[test]
     fn short_pushes_lose_some_of_their_peak() {
         for (cutoff_hz, length_s, kept) in

@@ -1,9 +1,9 @@
-//! Contacts in a motion that repeats: torque that one period has and the others have not.
+//! Contacts in a periodic motion: torque that one period has and the others do not.
 //!
-//! What the trimmed mean of the other periods leaves of the torque is noise, coloured and alike between joints,
-//! and what came once. Bumps of every length are looked for by the matched filter, in one joint with the noise that the
-//! others show of it taken out, and in all joints together; the highest is taken out with its samples, until none is left
-//! that noise would not make.
+//! The deviation of the torque from the trimmed mean of the other periods is noise, coloured and correlated between
+//! joints, plus events that happened once. Matched filters search it for bumps of every length: in one joint, with the
+//! noise removed that is predicted from the other joints, and in all joints together. The highest bump is set aside
+//! with its samples, until none is left that noise would not make.
 
 use std::ops::Range;
 
@@ -19,27 +19,27 @@ use crate::signal::{
     Resampler, SignalError, bridged_gap_s, find_period, linear_at, natural_rate_hz,
 };
 
-/// Bumps closer than this are one contact, s: an arm that was hit swings on for a while.
+/// Bumps closer than this are one contact, s: an arm that was hit keeps swinging for a while.
 const TOGETHER_S: f64 = 0.5;
-/// Bumps that are weighed in one log.
+/// Maximum number of bumps that are examined in one log.
 const MOST: usize = 40;
-/// At an end where the repetitions were prolonged so much is left out, s: the last of a run-in moves the arm so
-/// little beside the repetitions that angles do not show it, and takes torque.
+/// Time left out at an end where the repetitions were extended, s. The last part of a run-in differs so little from the
+/// repetitions that the angles do not show it, but it takes torque.
 const EDGE_S: f64 = 0.5;
-/// A last period that lacks no more than this share is a whole one.
+/// A last period that lacks no more than this share counts as complete.
 const WHOLE_WITHIN: f64 = 0.01;
 
 /// Contacts in a log whose motion repeats, and the torque as it would be without them.
 pub struct WithoutContacts {
     /// One cause per contact.
     pub causes: Vec<Cause>,
-    /// Torque with the trimmed mean of the other periods in place of the contacts, Nm.
+    /// Torque in which the contacts are replaced by the trimmed mean of the other periods, Nm.
     pub torque_nm: JointSignals,
 }
 
-/// What repetitions beside each other say of contacts.
+/// Result of comparing the repetitions.
 pub enum Compared {
-    /// Nothing: the motion does not repeat often enough without a gap.
+    /// No statement: the motion does not repeat often enough without a gap.
     TooFew,
     /// Nothing touched the arm.
     Alike,
@@ -47,7 +47,7 @@ pub enum Compared {
     Touched(WithoutContacts),
 }
 
-/// Looks for contacts by comparing repetitions, not on the joints `left_out` (0-based).
+/// Looks for contacts by comparing repetitions, on all joints but those `left_out` (0-based).
 pub fn between_periods(m: &Measurement, left_out: &[usize]) -> Result<Compared, SignalError> {
     let rate_hz = natural_rate_hz(m.time_s)?;
     let grid = Resampler::new(m.time_s, rate_hz, bridged_gap_s(rate_hz))?;
@@ -87,7 +87,7 @@ pub fn between_periods(m: &Measurement, left_out: &[usize]) -> Result<Compared, 
     while looked_at.len() < MOST
         && let Some(candidate) = repeats.search(&aside, &known, &looked_at, 1.0)?
     {
-        // Its own torque moves the mean of the others.
+        // The torque of the contact moves the mean of the other periods.
         let mut aside_with_it = aside.clone();
         aside_with_it[candidate.samples(&repeats)].fill(true);
         let Some(push) = repeats.weigh(&candidate, &aside_with_it, &known)? else {
@@ -141,7 +141,7 @@ mod tests {
     use rand::{SeedableRng, rngs::ChaCha8Rng};
     use rand_distr::{Distribution, StandardNormal};
 
-    /// A push that swells and fades as a cosine, with its heights on both joints.
+    /// A push that rises and falls as sin², with its heights on both joints.
     struct Hidden {
         start_s: f64,
         end_s: f64,
@@ -190,7 +190,7 @@ mod tests {
         contacts(&time_s, &signals)
     }
 
-    /// `signals` and a third joint, at rest, whose torque is zero.
+    /// `signals` with a third joint, at rest, whose torque is zero.
     fn with_a_silent_joint(signals: &[JointSignals; 3]) -> [JointSignals; 3] {
         signals.each_ref().map(|two| {
             let value = |j, k| if j < 2 { two.joint(j)[k] } else { 0.0 };
@@ -204,7 +204,7 @@ mod tests {
         assert!((0..20).all(|seed| found(seed, &nothing).is_none()));
     }
 
-    /// Of two periods either may be the one that was touched.
+    /// With two periods, either one may be the one that was touched.
     #[test]
     fn of_two_periods_nothing_is_said() {
         let push = Hidden { start_s: 14.0, end_s: 14.4, nm: [6.0, 0.0] };
@@ -219,17 +219,17 @@ mod tests {
         let without = found(1, &push).unwrap();
         assert_eq!(without.causes.len(), 1);
         assert_eq!(without.causes[0].joint, Some(1));
-        // What is left in its place is the torque of the other periods: their mean is within its noise, six
-        // times 0.5 Nm.
+        // The torque of the other periods is left in place of the contact: their mean is within its noise; the
+        // tolerance is six times 0.5 Nm.
         let left =
             without.torque_nm.joint(0)[2420] - 20.0 * (0.1 * 24.2 * std::f64::consts::TAU).cos();
         assert!(left.abs() < 3.0, "{left}");
     }
 
-    /// Pushes of six times the noise of a sample are found in slow noise, where and when they are said to be. The
-    /// longest have a strength of 8 to 9; 8 is seen in 99 of 100 logs (2.5 σ above the threshold).
-    /// Of three intervals in each of 60 logs nominally 9 miss, those of one log together: σ ≤ √(9 · 3) = 5.2,
-    /// three σ above are 24.
+    /// Pushes of six times the noise of a sample are found in slow noise, and the stated joint, times and heights are
+    /// right. The longest have a strength of 8 to 9; a strength of 8 is seen in 99 of 100 logs (2.5 σ above the
+    /// threshold). Of three intervals in each of 60 logs, 9 are expected to miss, those of one log together: σ ≤ √(9
+    /// · 3) = 5.2, and three σ above is 24.
     #[test]
     fn weak_pushes_are_found_and_their_intervals_hold_the_truth() {
         let (mut seen, mut misses) = (0, 0);
@@ -252,7 +252,7 @@ mod tests {
         assert!(misses < 24, "{misses} of {}", 3 * seen);
     }
 
-    /// Thirty times the noise in one sample, and what is left of that by a clock between two.
+    /// A reading of thirty times the noise in one sample, and one that resampling spreads over two, are no contact.
     #[test]
     fn wild_readings_are_no_contact() {
         let nothing = Hidden { start_s: 24.0, end_s: 25.0, nm: [0.0, 0.0] };
@@ -264,7 +264,8 @@ mod tests {
         assert!(contacts(&time_s, &signals).is_none());
     }
 
-    /// Simulated without noise, periods differ in the last digits of the file alone: bumps of them are no contact, a push is.
+    /// In a simulation without noise, periods differ only in the last digits of the file. Bumps of these digits are no
+    /// contact, but a push is.
     #[test]
     fn last_digits_are_no_contact() {
         let nothing = Hidden { start_s: 24.0, end_s: 25.0, nm: [0.0, 0.0] };
@@ -279,7 +280,7 @@ mod tests {
         assert_eq!(contacts(&time_s, &signals).unwrap().causes[0].joint, Some(2));
     }
 
-    /// Torque of [`log`] without its noise: of 0.5 Nm are left 5e-10, as of the last digits of a file.
+    /// Torque of [`log`] nearly without its noise: 5e-10 of the 0.5 Nm are left, like the last digits of a file.
     fn leave_last_digits(time_s: &[f64], torque_nm: &mut [f64]) {
         let omega = std::f64::consts::TAU / 10.0;
         for (y, t) in torque_nm.iter_mut().zip(time_s) {
@@ -288,7 +289,7 @@ mod tests {
         }
     }
 
-    /// What stands out of the last digits of one joint, by however much, is no reason not to look at another.
+    /// A bump above the last digits of one joint, however high, does not prevent the search on another joint.
     #[test]
     fn a_joint_of_last_digits_hides_no_push_on_another() {
         let push = Hidden { start_s: 31.0, end_s: 31.8, nm: [20.0, 2.5] };
@@ -298,7 +299,7 @@ mod tests {
         assert_eq!(without.causes.iter().map(|c| c.joint).collect::<Vec<_>>(), [Some(2)]);
     }
 
-    /// What no joint could tell alone is told by both together, and called a push on the arm.
+    /// A push that no joint shows significantly alone is found in both together, and is called a push on the arm.
     #[test]
     fn a_push_on_both_joints_is_one_on_the_arm() {
         let push = Hidden { start_s: 31.0, end_s: 31.8, nm: [1.2, -1.2] };
@@ -306,8 +307,8 @@ mod tests {
         assert_eq!(cause.joint, None);
     }
 
-    /// Where both joints tell it together, one that feels 4 σ of it is not taken for noise: it exceeds three of these in 84 of
-    /// 100 logs, which of 46 is 39 ± 2.5; three of these below are 31.
+    /// Where only both joints together show the push, a joint that feels 4 σ of it is not taken for noise. It exceeds 3
+    /// σ in 84 of 100 logs, which is 39 ± 2.5 of 46; three standard deviations below is 31.
     #[test]
     fn a_joint_that_feels_little_is_not_quiet() {
         let (mut seen, mut on_arm) = (0, 0);
@@ -321,7 +322,7 @@ mod tests {
         assert!(on_arm >= 31, "{on_arm} of {seen}");
     }
 
-    /// Angles known to 20 µrad, of drives that yield by so much where they are pushed.
+    /// Adds encoder noise of 20 µrad, and the deflection `yields_rad` of each drive under the push.
     fn yielding(signals: &mut [JointSignals; 3], seed: u64, hidden: &Hidden, yields_rad: [f64; 2]) {
         let mut rng = ChaCha8Rng::seed_from_u64(1000 + seed);
         for (j, yields_rad) in yields_rad.into_iter().enumerate() {
@@ -334,7 +335,8 @@ mod tests {
         }
     }
 
-    /// Pushes too weak to stand out of all the log, where the angles show that something moved the arm.
+    /// Pushes that are too weak to stand out in the whole log are found where the angles show that something moved the
+    /// arm.
     #[test]
     fn a_weak_push_is_found_where_the_arm_yields() {
         let push = Hidden { start_s: 31.0, end_s: 31.8, nm: [1.5, 0.0] };
@@ -346,12 +348,12 @@ mod tests {
             let found = contacts(&time_s, &signals);
             soft += i32::from(found.is_some_and(|f| f.causes[0].joint == Some(1)));
         }
-        // By hand a push of 0.8 s has to pass 5.6 σ all along the log, and 3.8 where the arm yields, which of 40 pushes of 5.9 ± 1 σ
-        // 15 do that do not pass the first: binomial, σ is 3.1, and three of these below is six.
+        // By hand: a push of 0.8 s has to exceed 5.6 σ anywhere in the log, but 3.8 σ where the arm yields. Of 40
+        // pushes of 5.9 ± 1 σ, 15 exceed only the second; the binomial σ is 3.1, and three of these below is six.
         assert!(soft >= rigid + 6, "{rigid} {soft}");
     }
 
-    /// A push of both joints, to which one of them yields, is one of both.
+    /// A push on both joints, of which only one yields, is a push on both.
     #[test]
     fn a_joint_that_does_not_yield_feels_its_push() {
         let push = Hidden { start_s: 31.0, end_s: 31.8, nm: [3.0, 2.5] };
@@ -363,7 +365,7 @@ mod tests {
         }
     }
 
-    /// The arm may have been pushed where another joint than the one whose torque shows it moved as well.
+    /// If another joint than the one with the torque moved as well, the push may have been on the arm.
     #[test]
     fn a_push_that_moved_another_joint_may_be_one_on_the_arm() {
         let push = Hidden { start_s: 31.0, end_s: 31.8, nm: [3.0, 0.0] };
@@ -377,8 +379,9 @@ mod tests {
         }
     }
 
-    /// A third joint trembles by 2 mrad: its encoder's noise is more of that than a contact moves an arm, and says nothing of where the
-    /// motion repeats. The push moves the arm, and its period is not among those that repeat throughout.
+    /// A third joint trembles by 2 mrad. The noise of its encoder is a larger share of that than the displacement of an
+    /// arm by a contact, and does not tell where the motion repeats. The push moves the arm, so that its period is not
+    /// among those that repeat throughout.
     #[test]
     fn a_joint_that_hardly_moves_hides_no_push() {
         let push = Hidden { start_s: 31.0, end_s: 31.8, nm: [6.0, 0.0] };
@@ -406,7 +409,7 @@ mod tests {
         assert_eq!(found.causes.iter().map(|c| c.joint).collect::<Vec<_>>(), [Some(1)]);
     }
 
-    /// Angles that differ say nothing of torques.
+    /// Differing angles alone do not show that a torque acted.
     #[test]
     fn an_arm_that_moved_otherwise_was_not_touched_for_that() {
         let nothing = Hidden { start_s: 31.0, end_s: 31.8, nm: [0.0, 0.0] };
@@ -417,8 +420,8 @@ mod tests {
         }
     }
 
-    /// A joint whose torque is not recorded (zero all along) has no noise in which to be found, and does not say how high the
-    /// push of the others is.
+    /// A joint whose torque is not recorded (always zero) has no noise in which a contact could be found, and does not
+    /// influence the height of a push on the others.
     #[test]
     fn a_joint_without_noise_feels_nothing() {
         let push = Hidden { start_s: 31.0, end_s: 31.8, nm: [1.8, -1.8] };

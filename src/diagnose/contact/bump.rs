@@ -1,4 +1,4 @@
-//! Where a push begins, how high it is and where it ends, whatever its shape.
+//! Begin, height and end of a push of unknown shape.
 
 use std::ops::Range;
 
@@ -7,47 +7,49 @@ use nalgebra::DMatrix;
 use crate::diagnose::verdict::Estimate;
 use crate::signal::{Heights, MatchedFilter};
 
-/// Exponents p of (1 − u²)^p, |u| < 1: from a push that sets in at once to one that swells softly.
+/// Exponents p of (1 − u²)^p, |u| < 1: from a push with an abrupt onset to one that swells softly.
 const SHAPES: [f64; 4] = [0.5, 1.0, 2.0, 3.0];
-/// The shape by which bumps are looked for.
+/// The shape with which bumps are searched for.
 pub(super) const ORDINARY: f64 = 1.0;
-/// Lengths around the first guess for which a bump is weighed: steps of ln, and how many to either side.
+/// Lengths at which a bump is evaluated around the first guess: steps in ln, and number of steps to either side.
 const STEP: f64 = 0.07;
 const STEPS: i32 = 9;
-/// A joint feels a push that was weighed on it if it shows so many σ of it, which noise does once in 370 joints, and
-/// this share of as many as the joint that feels it most: the arm that gives way moves the other joints a little.
+/// A joint on which a push was evaluated feels it if it shows this many σ of it, which noise does in one of 370 joints,
+/// and the share `FELT_SHARE` of the σ of the joint that feels it most: an arm that yields moves the other joints a
+/// little.
 const FELT: f64 = 3.0;
 pub(super) const FELT_SHARE: f64 = 0.1;
-/// Heights count for the correlation between joints up to so many σ.
+/// Heights are clipped at this many σ for the correlation between joints.
 const CLIPPED: f64 = 3.0;
 /// 95 % quantile of χ² with one degree of freedom.
 const CHI2_95: f64 = 3.841_458_820_694_1;
-/// Its 99.5 % quantile: a shape that far behind the best one is excluded, …
+/// Its 99.5 % quantile: a shape is excluded if it is that far behind the best one, …
 const EXCLUDED: f64 = 7.88;
-/// … and behind it by this share of what the best one explains: none of them is the push's own as the log has it, behind a drive that
-/// answers and links that yield. The begin of a strong push was told to 3 ms where it was off by 120.
+/// … and if it is behind by this share of what the best one explains. The second condition is needed because no shape
+/// is exactly that of the push in the log, after the drive has answered and the links have yielded: without it, the
+/// begin of a strong push was stated to 3 ms where it was off by 120 ms.
 const UNLIKE: f64 = 0.1;
 
-/// The bump of length `length_s` at the distance `t_s` from its middle; 1 there.
+/// Value of a bump of length `length_s` at the distance `t_s` from its centre, where it is 1.
 pub(super) fn bump(shape: f64, length_s: f64, t_s: f64) -> f64 {
     let u = 2.0 * t_s / length_s;
     (1.0 - u * u).max(0.0).powf(shape)
 }
 
-/// What noise does to the heights of bumps in several joints.
+/// Noise of the heights of bumps in several joints.
 pub(super) struct Noise {
-    /// Of each joint, what [`MatchedFilter`]'s σ = 1/√N has to be multiplied by.
+    /// Factor of each joint by which the σ = 1/√N of [`MatchedFilter`] has to be multiplied.
     scale: Vec<f64>,
-    /// How well it is known: degrees of freedom.
+    /// Degrees of freedom with which this factor is known.
     freedom: Vec<f64>,
-    /// Between the joints.
+    /// Correlation between the joints.
     correlation: DMatrix<f64>,
     /// Its inverse.
     precision: DMatrix<f64>,
 }
 
 impl Noise {
-    /// From the heights of bumps of one length, of which few hold any.
+    /// Estimates the noise from the heights of bumps of one length at all samples, few of which contain a bump.
     pub(super) fn of(heights: &Heights) -> Self {
         let joints = heights.height.joints();
         let scale: Vec<f64> = (0..joints).map(|j| heights.scale(j)).collect();
@@ -69,7 +71,7 @@ impl Noise {
         Self { scale, freedom, precision: inverse(correlation.clone()), correlation }
     }
 
-    /// Heights at one sample over their σ.
+    /// Heights at one sample in units of their σ.
     pub(super) fn scores(&self, heights: &Heights, sample: usize) -> Vec<f64> {
         let score = |(j, scale): (usize, &f64)| {
             let height = heights.height.joint(j)[sample];
@@ -78,13 +80,14 @@ impl Noise {
         self.scale.iter().enumerate().map(score).collect()
     }
 
-    /// zᵀ C⁻¹ z: twice what a bump in all signals gains in log-likelihood, and no less than one in some of them.
+    /// zᵀ C⁻¹ z: twice the gain in log-likelihood of a bump in all signals, and an upper bound for bumps in some of
+    /// them.
     pub(super) fn gain(&self, z: &[f64]) -> f64 {
         let n = z.len();
         (0..n).map(|i| (0..n).map(|j| z[i] * self.precision[(i, j)] * z[j]).sum::<f64>()).sum()
     }
 
-    /// Bumps that the signals `felt` feel and the signals `quiet` do not.
+    /// Noise model for bumps that the signals `felt` feel and the signals `quiet` do not.
     pub(super) fn felt_by(&self, felt: &[usize], quiet: &[usize]) -> Felt<'_> {
         let signals = [felt, quiet].concat();
         let correlation = self.correlation.select_rows(&signals).select_columns(&signals);
@@ -94,18 +97,18 @@ impl Noise {
     }
 }
 
-/// The inverse of a correlation, or of a part of one; of one that has none the identity.
+/// Inverse of a correlation matrix or of a part of it; the identity where it is singular.
 fn inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
     let n = matrix.nrows();
     matrix.try_inverse().unwrap_or_else(|| DMatrix::identity(n, n))
 }
 
-/// Noise beside a bump that some signals feel, F, and others do not. With their scores z, their correlation C and P = C⁻¹ the
-/// heights on F are b = P_FF⁻¹ (P z)_F in their σ, the noise taken out that the others show, their covariance is P_FF⁻¹, and
-/// twice the gain in log-likelihood is (P z)_Fᵀ b.
+/// Noise model for a bump that some signals feel, F, and others do not. With their scores z, their correlation C and
+/// P = C⁻¹, the heights on F, in units of their σ, are b = P_FF⁻¹ (P z)_F: the noise that is predicted from the other
+/// signals is removed. Their covariance is P_FF⁻¹, and twice the gain in log-likelihood is (P z)_Fᵀ b.
 pub(super) struct Felt<'a> {
     noise: &'a Noise,
-    /// F, and behind it the others.
+    /// F, followed by the other signals.
     signals: Vec<usize>,
     /// Rows F of P.
     precision: DMatrix<f64>,
@@ -114,35 +117,35 @@ pub(super) struct Felt<'a> {
 }
 
 impl Felt<'_> {
-    /// F.
+    /// The signals F that feel the bump.
     pub(super) fn felt(&self) -> &[usize] {
         &self.signals[..self.count()]
     }
 
-    /// How many signals feel the bump.
+    /// Number of signals that feel the bump.
     pub(super) fn count(&self) -> usize {
         self.covariance.nrows()
     }
 
-    /// (P z) of the a-th signal that feels the bump.
+    /// Element of P z for the a-th signal that feels the bump.
     fn weighed(&self, a: usize, z: &[f64]) -> f64 {
         self.signals.iter().enumerate().map(|(b, j)| self.precision[(a, b)] * z[*j]).sum()
     }
 
-    /// Twice what the bump gains in log-likelihood.
+    /// Twice the gain in log-likelihood by the bump.
     pub(super) fn gain(&self, z: &[f64]) -> f64 {
         (0..self.count()).map(|a| self.weighed(a, z) * self.score(a, z)).sum()
     }
 
-    /// The gain that would be as rare if noise were known: with k signals and ν degrees of freedom of the noise of the least
-    /// known one (ν + k/2 − 1) ln(1 + gain/ν) is χ²ₖ (Bartlett 1938).
+    /// The equally improbable gain if the noise were known. With k signals, and ν degrees of freedom for the noise of
+    /// the least known one, (ν + k/2 − 1) ln(1 + gain/ν) is χ²ₖ (Bartlett 1938).
     pub(super) fn of_known_noise(&self, gain: f64) -> f64 {
         let k = self.count() as f64;
         let freedom = self.felt().iter().map(|j| self.noise.freedom[*j]).fold(f64::MAX, f64::min);
         (freedom + 0.5 * k - 1.0) * (gain / freedom).ln_1p()
     }
 
-    /// Height on the a-th signal that feels the bump, over what σ would be there without the others.
+    /// Height on the a-th signal that feels the bump, in units of the σ that it would have without the other signals.
     fn score(&self, a: usize, z: &[f64]) -> f64 {
         (0..self.count()).map(|b| self.covariance[(a, b)] * self.weighed(b, z)).sum()
     }
@@ -158,27 +161,27 @@ impl Felt<'_> {
     }
 }
 
-/// A push as the log knows it.
+/// A push as far as the log determines it.
 pub(super) struct Push {
     /// Seconds from the first sample.
     pub(super) start_s: Estimate,
     pub(super) end_s: Estimate,
-    /// Of the joint that feels it most, Nm, and that joint (0-based).
+    /// Peak torque of the joint that feels it most, Nm, and that joint (0-based).
     pub(super) peak_nm: Estimate,
     pub(super) peak_joint: usize,
-    /// Joints (0-based) on which it was weighed, and how much they feel it and its σ, Nm.
+    /// Joints (0-based) on which it was evaluated, with its height and the σ of that, Nm.
     heights_nm: Vec<(usize, [f64; 2])>,
-    /// Those that feel it.
+    /// Joints (0-based) that feel it.
     pub(super) felt: Vec<usize>,
-    /// Twice what it gains in log-likelihood.
+    /// Twice its gain in log-likelihood.
     pub(super) gain: f64,
-    /// How sure it is that something pushed.
+    /// Confidence that something pushed.
     pub(super) confidence: f64,
     shape: f64,
 }
 
 impl Push {
-    /// Makes the intervals of begin and end hold those of `other`.
+    /// Extends the intervals of begin and end to contain those of `other`.
     pub(super) fn reach_over(&mut self, other: &Self) {
         for bound in other.start_s.ci95 {
             self.start_s.reach(bound);
@@ -188,24 +191,24 @@ impl Push {
         }
     }
 
-    /// Whether joint `joint` (0-based) feels it.
+    /// Whether joint `joint` (0-based) feels the push.
     pub(super) fn is_felt_on(&self, joint: usize) -> bool {
         self.felt.contains(&joint)
     }
 
-    /// The joints (0-based) that feel it, in their order, and how much, Nm.
+    /// Joints (0-based) that feel the push, in order, with its height, Nm.
     pub(super) fn felt_nm(&self) -> impl Iterator<Item = (usize, f64)> {
         let felt = self.heights_nm.iter().filter(|(j, _)| self.is_felt_on(*j));
         felt.map(|(j, [height, _])| (*j, *height))
     }
 
-    /// The joint that shows most of it of those that do not feel it.
+    /// Among the joints that do not feel the push, the one that shows most of it.
     pub(super) fn next_to_feel(&self) -> Option<usize> {
         let others = self.heights_nm.iter().filter(|(j, _)| !self.is_felt_on(*j));
         others.max_by(|a, b| sigmas(a.1).total_cmp(&sigmas(b.1))).map(|(j, _)| *j)
     }
 
-    /// On joint `joint` (0-based), Nm.
+    /// Torque of the push on joint `joint` (0-based), Nm.
     pub(super) fn torque_nm(&self, joint: usize, t_s: f64) -> f64 {
         let on_joint = self.heights_nm.iter().find(|(j, _)| *j == joint);
         let height = on_joint.map_or(0.0, |(_, [height, _])| *height);
@@ -214,27 +217,27 @@ impl Push {
     }
 }
 
-/// Size of a height over its σ; none of a joint without noise, whose heights are none either.
+/// Magnitude of a height in units of its σ; zero for a joint without noise, whose heights are zero as well.
 fn sigmas([height, sigma]: [f64; 2]) -> f64 {
     if sigma > 0.0 { (height / sigma).abs() } else { 0.0 }
 }
 
-/// A bump that explains what is seen.
+/// A bump fitted to the deviations.
 struct Fit {
     shape: f64,
     gain: f64,
     /// Value and σ, seconds from the first sample.
     start_s: [f64; 2],
     end_s: [f64; 2],
-    /// Height on each joint and its σ.
+    /// Height on each joint and its σ, Nm.
     heights_nm: Vec<[f64; 2]>,
 }
 
-/// Weighs bumps of all shapes that are `felt` around one of the ordinary shape and `length_s` whose centre is among
-/// `centres`; `joints` are those of the signals of `filter`.
+/// Fits bumps of all shapes that are `felt`, near one of the ordinary shape and `length_s` whose centre is among
+/// `centres`; `joints` are the joints of the signals of `filter`.
 ///
-/// What the log knows of begin, end and height of a push of one shape is where they stay within χ²₁ of the best
-/// such bump. The shape itself is unknown: intervals reach over all that are not excluded.
+/// For a given shape, the intervals of begin, end and height are those within χ²₁ of its best bump. The shape itself is
+/// unknown: the intervals cover all shapes that are not excluded.
 pub(super) fn weigh(
     filter: &MatchedFilter,
     felt: &Felt,
@@ -283,7 +286,7 @@ fn top<'a>(fits: impl Iterator<Item = &'a Fit>) -> Option<&'a Fit> {
     fits.max_by(|a, b| a.gain.total_cmp(&b.gain))
 }
 
-/// The best bumps of one shape: of each length, and of all lengths together.
+/// The best bumps of one shape: for each length, and over all lengths.
 fn fits(
     filter: &MatchedFilter,
     felt: &Felt,
@@ -301,7 +304,7 @@ fn fits(
     let top = top.clamp(1, fits.len() - 2);
     let around = [top - 1, top, top + 1].map(|i| &fits[i]);
     let Summit { at, value, sigma } = summit(around.map(|fit| fit.gain));
-    // σ of a length known is widened by what the length's own σ moves.
+    // σ at a known length, widened by the effect of the length's own σ.
     let between = |of: &dyn Fn(&Fit) -> [f64; 2]| {
         let [before, middle, behind] = around.map(of);
         let slope = 0.5 * (behind[0] - before[0]);
@@ -344,8 +347,8 @@ fn of_length(
     })
 }
 
-/// The top of a parabola through three values a step apart: where, from the middle one, in steps; how high;
-/// and the σ that twice a log-likelihood of this curvature stands for.
+/// Summit of a parabola through three values a step apart: its position relative to the middle one, in steps; its
+/// height; and the σ for which its curvature is that of twice a log-likelihood.
 struct Summit {
     at: f64,
     value: f64,
@@ -356,7 +359,7 @@ fn summit([before, middle, behind]: [f64; 3]) -> Summit {
     let slope = 0.5 * (behind - before);
     let curvature = before - 2.0 * middle + behind;
     if curvature >= 0.0 {
-        // No top here: all that is known is the step.
+        // No maximum here: the position is known only to the step.
         return Summit { at: 0.0, value: middle, sigma: 1.0 };
     }
     let at = (-slope / curvature).clamp(-1.0, 1.0);
@@ -377,8 +380,8 @@ mod tests {
         assert!((found.sigma - 0.5f64.sqrt()).abs() < 1e-12);
     }
 
-    /// Of known noise a gain is what it is; of noise known with ν degrees of freedom it is as rare as one of F(k, ν), to a few
-    /// percent of a σ down to once in 10⁸.
+    /// With known noise, a gain keeps its value. With noise known with ν degrees of freedom, it is as rare as one of
+    /// F(k, ν), up to a few percent of a σ, down to once in 10⁸.
     #[test]
     fn gains_of_poorly_known_noise_are_less_rare() {
         let noise = |freedom: f64| Noise {
@@ -401,8 +404,8 @@ mod tests {
         }
     }
 
-    /// Noise that two signals share, seen in the one that nothing touched, is taken out of the other: with the correlation c
-    /// what is left of it has σ √(1 − c²).
+    /// Noise shared by two signals is removed from one of them if it shows in the other, which nothing touched. With
+    /// the correlation c, the σ of the remaining noise is √(1 − c²).
     #[test]
     fn a_quiet_signal_tells_the_noise_of_another() {
         let correlation = DMatrix::from_row_slice(2, 2, &[1.0, 0.6, 0.6, 1.0]);
@@ -410,7 +413,7 @@ mod tests {
         let noise = Noise { scale: vec![1.0; 2], freedom: vec![1e9; 2], correlation, precision };
         let z = [5.0, -1.0];
         let beside = noise.felt_by(&[0], &[1]);
-        // 5 + 0.6, over 0.8.
+        // (5 + 0.6)/0.8.
         assert!((beside.gain(&z).sqrt() - 7.0).abs() < 1e-12);
         assert!((beside.score(0, &z) - 5.6).abs() < 1e-12);
         assert!((noise.felt_by(&[0], &[]).gain(&z).sqrt() - 5.0).abs() < 1e-12);

@@ -1,38 +1,38 @@
-//! Noise that is louder at some times than at others: there a bump has to be higher.
+//! Noise that is louder at some times than at others; there, a bump has to be higher.
 //!
-//! How loud a signal is tells the median size of its second differences nearby, to which a bump adds little: of one as
-//! long as the shortest, 0.1 s, and eight times as high as the noise they are as large as those of the noise.
+//! The loudness of a signal is the median size of its second differences nearby, to which a bump adds little: those of
+//! the shortest bump, 0.1 s, at eight times the height of the noise are as large as those of the noise.
 
 use std::ops::Range;
 
 use crate::median::median;
 use crate::robot::JointSignals;
 
-/// Second differences within this time to either side tell how loud it is, s.
+/// Second differences within this time to either side determine the loudness, s.
 const NEARBY_S: f64 = 0.35;
-/// How often that is asked, s.
+/// Interval at which the loudness is evaluated, s.
 const STEP_S: f64 = 0.1;
-/// Of 80 second differences, which hang together, the median is known to 15 %: what seems louder by less than five times that may be as
-/// loud as ever.
+/// Ratio to the usual loudness from which on a stretch counts as louder. The median of 80 correlated second differences
+/// is known to 15 %; a difference of less than five times that may be chance.
 const CLEARLY: f64 = 1.8;
-/// Nothing counts as louder than this: an arm that was hit shakes, and of periods that are alike to the last digits a push is all that
-/// changes, however softly.
+/// Upper limit of the loudness. An arm that was hit shakes; and where periods are alike to the last digits, a push is
+/// the only change, however soft.
 const LOUDEST: f64 = 3.0;
 
-/// How much louder than usual signals are.
+/// Loudness of signals relative to their usual one, ℓ.
 pub(super) struct Loudness {
-    /// Per signal Σ ℓ² over the samples before each.
+    /// Σ ℓ² over the samples before each one, per signal.
     sums: Vec<Vec<f64>>,
 }
 
 impl Loudness {
-    /// Of `signals`, sampled at `rate_hz`.
+    /// Loudness of `signals`, sampled at `rate_hz`.
     pub(super) fn of(signals: &JointSignals, rate_hz: f64) -> Self {
         let sums = (0..signals.joints()).map(|j| sums(signals.joint(j), rate_hz)).collect();
         Self { sums }
     }
 
-    /// √ of the mean of ℓ² of a signal over `samples`: what noise makes of a bump there is louder by so much.
+    /// Root mean square of ℓ of a signal over `samples`: the factor by which noise makes higher bumps there.
     pub(super) fn over(&self, signal: usize, samples: Range<usize>) -> f64 {
         let sums = &self.sums[signal];
         let [start, end] = [samples.start, samples.end].map(|k| k.min(sums.len() - 1));
@@ -49,11 +49,11 @@ fn sums(y: &[f64], rate_hz: f64) -> Vec<f64> {
         let middle = block * step + step / 2;
         let near = middle.saturating_sub(reach).min(sizes.len())..(middle + reach).min(sizes.len());
         let ratio = median(&mut sizes[near].to_vec()).unwrap_or(0.0) / usual;
-        // Where nothing changes but here and there nothing is loud or quiet.
+        // Where the signal changes only here and there, nothing is loud or quiet.
         if ratio.is_finite() && ratio > CLEARLY { ratio.min(LOUDEST).powi(2) } else { 1.0 }
     };
     let blocks: Vec<f64> = (0..y.len().div_ceil(step)).map(of_block).collect();
-    // A window that only reaches into what is loud hears little of it.
+    // A window that only touches a loud stretch measures little of it; its neighbours count as well.
     let beside = reach.div_ceil(step);
     let loudest = |block: usize| {
         let near = block.saturating_sub(beside)..(block + beside + 1).min(blocks.len());
@@ -77,7 +77,8 @@ mod tests {
 
     const RATE_HZ: f64 = 125.0;
 
-    /// A minute of noise that is three times as loud from 20 s to 22 s, with a bump of `height` σ from 40.0 s to 40.4 s.
+    /// Loudness of a minute of noise that is three times as loud from 20 s to 22 s, with a bump of `height` σ from 40.0
+    /// s to 40.4 s.
     fn loudness(height: f64) -> Loudness {
         let mut rng = ChaCha8Rng::seed_from_u64(4);
         let y = JointSignals::from_fn(1, (60.0 * RATE_HZ) as usize, |_, k| {
@@ -95,7 +96,7 @@ mod tests {
         loudness.over(0, at(seconds.start)..at(seconds.end))
     }
 
-    /// Each block is known to 15 %, and of those beside each other the loudest counts, up to three.
+    /// Each block is known to 15 %; among neighbouring blocks the loudest counts, up to three.
     #[test]
     fn loud_stretches_are_told_and_no_others() {
         let all = loudness(0.0);

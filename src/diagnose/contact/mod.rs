@@ -1,12 +1,13 @@
-//! Something touched the arm: torque that comes once and goes.
+//! Contacts: something touched the arm, a torque that comes once and goes.
 //!
-//! A motion that repeats needs no model: at every phase the torque is compared with the trimmed mean of the other
-//! periods, which one contact cannot move, and what is left is searched for bumps ([`between_periods`]), lower ones where the
-//! angles show that the arm moved otherwise: a drive yields to a push by far more than an encoder's noise. A
-//! single run is compared with the extended model, in samples far from the joint's own reversals, where
-//! friction is known best ([`beside_model`]).
+//! A periodic motion needs no model: at every phase, the torque is compared with the trimmed mean of the other periods,
+//! which one contact cannot move, and the deviations are searched for bumps ([`between_periods`]). Lower bumps are
+//! accepted where the angles show that the arm moved differently: under a push, a drive yields by far more than an
+//! encoder's noise. A single run is compared with the extended model, in samples far from the joint's own reversals,
+//! where friction is known best ([`beside_model`]).
 //!
-//! Enters: the channels of a log, or the residual of a model along it. Leaves: contacts as causes, and the torque without them.
+//! Enters: the channels of a log, or the residual of a model along it. Leaves: contacts as causes, and the torque
+//! without them.
 
 mod beside_model;
 mod between_periods;
@@ -25,29 +26,30 @@ use super::verdict::{Cause, Estimate};
 pub use beside_model::{BesideModel, beside_model};
 pub use between_periods::{Compared, WithoutContacts, between_periods};
 
-/// Torque around a contact that is set aside with it, s.
+/// Margin around a contact that is set aside with it, s.
 const MARGIN_S: f64 = 0.2;
 
-/// What tells a push on one joint from one on the arm.
+/// The experiment that separates a push on one joint from one on the arm.
 const HARDER: &str = "the same touch, harder or longer";
 
 /// One contact.
 #[derive(Debug, Clone, PartialEq)]
 struct Touch {
-    /// Samples in which it is felt.
+    /// Samples in which the contact is felt.
     samples: Range<usize>,
     start_s: Estimate,
     end_s: Estimate,
-    /// Of the joint that feels it most, Nm, and that joint (1-based).
+    /// Peak torque of the joint that feels it most, Nm, and that joint (1-based).
     peak_nm: Estimate,
     peak_joint: usize,
-    /// Joints (1-based) that felt it, and by how much, Nm.
+    /// Joints (1-based) that felt it, and their peak torques, Nm.
     felt: Vec<(usize, f64)>,
-    /// In standard deviations of the noise.
+    /// Strength in standard deviations of the noise.
     strength: f64,
-    /// Whether joints moved otherwise whose torque does not tell a push on them from an arm that gives way.
+    /// Whether further joints moved differently, whose torque does not tell whether they were pushed or the arm merely
+    /// yielded.
     moved_others: bool,
-    /// How sure it is.
+    /// Confidence that it is a contact.
     confidence: f64,
 }
 
@@ -57,7 +59,7 @@ fn are_near(a: &Range<usize>, b: &Range<usize>, margin: usize) -> bool {
 }
 
 impl Touch {
-    /// Takes in what follows as a part of itself.
+    /// Merges with a following contact.
     fn join(&mut self, next: Self) {
         self.samples.end = self.samples.end.max(next.samples.end);
         if next.end_s.value > self.end_s.value {
@@ -79,7 +81,7 @@ impl Touch {
         self.confidence = self.confidence.max(next.confidence);
     }
 
-    /// Its samples and those beside it, of `n` in all.
+    /// Its samples and the margin around them, out of `n` samples in all.
     fn disturbed(&self, rate_hz: f64, n: usize) -> Range<usize> {
         let margin = (MARGIN_S * rate_hz) as usize;
         self.samples.start.saturating_sub(margin)..(self.samples.end + margin).min(n)
@@ -117,7 +119,7 @@ mod tests {
     use super::super::data_faults::exact;
     use super::*;
 
-    /// A touch of the joints `felt`, the first of which feels it most.
+    /// A contact felt by the joints `felt`, the first of which feels it most.
     fn touch(start: usize, felt: &[(usize, f64)]) -> Touch {
         Touch {
             samples: start..start + 50,

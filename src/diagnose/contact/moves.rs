@@ -1,7 +1,7 @@
-//! Where the arm did not move as in the other periods.
+//! Places where the arm did not move as in the other periods.
 //!
-//! A drive yields to what pushes the arm, by tens of microradians where its torque tells nothing yet, and is back within a few
-//! tenths of a second. The angles do not tell what it was; they tell where to look.
+//! A drive yields to a push on the arm by tens of microradians, even where its torque does not reveal the push yet, and
+//! is back within a few tenths of a second. The angles do not tell what moved the arm; they tell where to look.
 
 use std::ops::Range;
 
@@ -12,26 +12,27 @@ use crate::median::robust_sigma;
 use crate::robot::JointSignals;
 use crate::signal::{SignalError, cubic_at};
 
-/// What is a move is so many times as high as noise is not: friction and its feedback bring noise into torques and angles alike, and pushes
-/// of 7 σ in the torque are two to eight times as high.
+/// A move has to be this many times higher than the threshold for noise: friction and feedback bring noise into torques
+/// and angles alike, and pushes of 7 σ in the torque are two to eight times as high.
 const CLEARLY: f64 = 1.5;
-/// Moves at most. Where there are more the periods are not alike, and none is a place of its own.
+/// Maximum number of moves. If there are more, the periods are not alike, and none of the places is special.
 const MOST: usize = 10;
-/// The middle of a push lies within half the length of what it does to the angles, and this much more, s.
+/// The middle of a push lies within half the length of its effect on the angles, plus this, s.
 const YIELDS_S: f64 = 0.5;
-/// Angles that scatter by less than this, rad, differ by their last digits: encoders resolve a microradian at best.
+/// Angles that scatter by less than this, rad, differ only in their last digits: encoders resolve a microradian at
+/// best.
 const LEAST_RAD: f64 = 1e-6;
 
-/// A place where the arm moved otherwise than in the other periods.
+/// A place where the arm moved differently than in the other periods.
 pub(super) struct Move {
-    /// Samples of the window among which the middle is of what moved it.
+    /// Samples of the window that may be the middle of what moved it.
     pub(super) centres: Range<usize>,
     /// Joints (0-based) that moved.
     pub(super) joints: Vec<usize>,
 }
 
 impl Move {
-    /// Takes in another part of itself.
+    /// Merges with another part of the same move.
     fn join(&mut self, centres: Range<usize>, joints: Vec<usize>) {
         self.centres.start = self.centres.start.min(centres.start);
         self.centres.end = self.centres.end.max(centres.end);
@@ -42,8 +43,8 @@ impl Move {
 }
 
 impl Repeats {
-    /// Where the angles `q_rad` differ from those of the other periods as noise does not, nor the `drift` of friction to which
-    /// drives yield; and that, if it had to be made.
+    /// Finds where the angles `q_rad` differ from those of the other periods by more than noise, or the `drift` of
+    /// friction, to which drives yield, would make them. Also returns the drift if it had to be computed.
     pub(super) fn find_moves(
         &self,
         q_rad: JointSignals,
@@ -51,7 +52,8 @@ impl Repeats {
     ) -> Result<(Vec<Move>, Option<FrictionDrift>), SignalError> {
         let mut angles = Self {
             signals: q_rad,
-            // What turns at 3 rad/s² bends by 24 µrad between samples at 125 Hz: as much as encoders scatter.
+            // A joint that accelerates at 3 rad/s² deviates by 24 µrad from a straight line between samples at 125 Hz:
+            // as much as encoders scatter.
             between_samples: cubic_at,
             joints: self.joints.clone(),
             window: self.window.clone(),
@@ -78,7 +80,7 @@ impl Repeats {
             let centres =
                 found.centre.saturating_sub(reach)..(found.centre + reach).min(self.window.len());
             let in_log = |k: usize| self.window.start + k;
-            // It moves the mean of the others.
+            // The move shifts the mean of the other periods.
             aside[in_log(centres.start)..in_log(centres.end)].fill(true);
             seen.push(in_log(centres.start)..in_log(centres.end));
             let joints = found.felt.iter().map(|row| angles.joints[*row]).collect();
@@ -100,13 +102,13 @@ mod tests {
 
     const RATE_HZ: f64 = 100.0;
 
-    /// Six periods of 1000.3 samples behind 1.5 s that are none of them, angles known to 20 µrad; each move is its middle, s, its length,
-    /// s, its joint and height, rad.
+    /// Moves in six periods of 1000.3 samples, preceded by 1.5 s that do not belong to them, with angles known to 20
+    /// µrad. Each entry of `moved` is the middle, s, the length, s, the joint and the height, rad.
     fn moves(seed: u64, moved: &[(f64, f64, usize, f64)]) -> Vec<Move> {
         moves_beside(seed, moved, |_, _| 0.0)
     }
 
-    /// The same of drives that yield besides by `yields_rad(q̇, t)` to friction.
+    /// The same, with drives that also yield to friction by `yields_rad(q̇, t)`.
     fn moves_beside(
         seed: u64,
         moved: &[(f64, f64, usize, f64)],
@@ -148,13 +150,14 @@ mod tests {
         torques.find_moves(q_rad, drift).unwrap().0
     }
 
-    /// Also of a period that is no whole number of samples: straight lines between them would be off by up to two σ of the noise.
+    /// No move is found, even if the period is not a whole number of samples: linear interpolation would be off by up
+    /// to two σ of the noise.
     #[test]
     fn an_arm_that_repeats_has_none() {
         assert!((0..10).all(|seed| moves(seed, &[]).is_empty()));
     }
 
-    /// A long move is found once, where it is, and leaves no mirror image in the mean of the other periods.
+    /// A long move is found once, in the right place, and leaves no mirror image in the mean of the other periods.
     #[test]
     fn a_move_is_found_on_its_joint() {
         for seed in 0..10 {
@@ -166,7 +169,8 @@ mod tests {
         }
     }
 
-    /// Drives yield to friction that warms up as they do to a push, all along a period: that is no place of its own.
+    /// Drives yield to friction that warms up as they do to a push, but all along a period: this is no place of its
+    /// own.
     #[test]
     fn friction_that_drifts_moves_nothing() {
         let fades = |qd: f64, t_s: f64| 3e-4 * (qd / 0.02).tanh() * (-t_s / 15.0).exp();

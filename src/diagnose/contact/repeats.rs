@@ -1,4 +1,4 @@
-//! The repetitions of a motion compared with each other, and the bumps that one has and the others have not.
+//! Compares the repetitions of a motion with each other, and finds the bumps that one has and the others do not.
 
 use std::ops::Range;
 
@@ -15,74 +15,74 @@ use crate::median::{robust_sigma, trimmed_mean};
 use crate::robot::JointSignals;
 use crate::signal::{MatchedFilter, SignalError, other_periods};
 
-/// A joint felt a contact that another one shows by itself if it deviates by so many σ (once in 10⁴ by chance), and by
-/// [`FELT_SHARE`] of the joint that felt it most.
+/// A joint felt a contact that is found on another joint alone if it deviates by this many σ (once in 10⁴ by chance),
+/// and by [`FELT_SHARE`] of the σ of the joint that felt it most.
 const FELT_BESIDE: f64 = 4.0;
-/// Shortest bump, s; a collision lasts a tenth of a second.
+/// Length of the shortest bump, s; a collision lasts a tenth of a second.
 pub(super) const SHORTEST_S: f64 = 0.1;
-/// The longest, s: a hand that leans on the arm.
+/// Length of the longest bump, s: a hand that leans on the arm.
 const LONGEST_S: f64 = 6.0;
-/// Step between lengths: a bump √√2 too long or short is seen with 97 % of its height.
+/// Ratio of successive lengths: a bump that is too long or short by a factor √√2 still shows 97 % of its height.
 const LENGTHEN: f64 = std::f64::consts::SQRT_2;
-/// What lasts longer than this share of a period is no contact: friction that drifts, or another motion.
+/// An event longer than this share of a period is no contact, but drifting friction or another motion.
 const LONGEST_OF_PERIOD: f64 = 0.5;
-/// Bumps are looked for this far from those already found, s: closer ones are what their shape lacks.
+/// Distance of further bumps from those already found, s: closer ones are due to the difference in shape.
 const APART_S: f64 = 0.3;
-/// A reading of so many σ that stands alone is wild: noise makes one of 10⁸.
+/// A single isolated reading of this many σ is wild: noise makes one in 10⁸.
 const WILD: f64 = 5.8;
-/// The trimmed mean of fewer periods is moved by one contact.
+/// Fewest periods: with fewer, one contact moves the trimmed mean.
 pub(super) const FEWEST_PERIODS: usize = 3;
 
-/// A log on an even clock whose motion repeats.
+/// A log with a periodic motion, on an evenly spaced clock.
 pub(super) struct Repeats {
-    /// What is compared: torques, Nm, or angles, rad.
+    /// The compared signals: torques, Nm, or angles, rad.
     pub(super) signals: JointSignals,
-    /// Their values at a fractional sample.
+    /// Interpolation of these signals at a fractional sample.
     pub(super) between_samples: fn(&[f64], f64) -> f64,
-    /// Joints (0-based) that can be compared.
+    /// Joints (0-based) that are compared.
     pub(super) joints: Vec<usize>,
     /// Samples of the repetitions.
     pub(super) window: Range<usize>,
     /// Samples per period.
     pub(super) period: f64,
     pub(super) rate_hz: f64,
-    /// What drifting friction does; not asked for where nothing deviates anyway.
+    /// Effect of drifting friction; not computed where nothing deviates anyway.
     pub(super) drift: Option<FrictionDrift>,
-    /// Where the arm did not move as it did in the other periods.
+    /// Where the arm did not move as in the other periods.
     pub(super) moves: Vec<Move>,
 }
 
-/// Where a bump may be.
+/// A possible bump.
 pub(super) struct Candidate {
-    /// Sample of the window.
+    /// Its middle, a sample of the window.
     pub(super) centre: usize,
     pub(super) length_s: f64,
-    /// Which of the joints that are compared felt it.
+    /// Indices, among the compared joints, of those that felt it.
     pub(super) felt: Vec<usize>,
-    /// Which of them show noise alone.
+    /// Indices of those that show noise alone.
     quiet: Vec<usize>,
-    /// σ from which on a bump there in one joint is none of noise.
+    /// Height in σ from which on a bump there, in one joint, is not noise.
     far: f64,
-    /// The same of a bump of its length anywhere in the log.
+    /// The same for a bump of its length anywhere in the log.
     far_anywhere: f64,
-    /// Whether it is looked for because the arm moved otherwise there: which move it is.
+    /// Index of the move because of which it is searched for; `None`: it is searched for everywhere.
     pub(super) of_move: Option<usize>,
 }
 
-/// Where bumps are looked for.
+/// A place where bumps are searched for.
 struct Place {
-    /// Samples of the window that may be their middle.
+    /// Samples of the window that may be the middle of a bump.
     centres: Range<usize>,
-    /// Which of the joints that are compared may feel them alone.
+    /// Indices, among the compared joints, of those that may feel a bump alone.
     rows: Vec<usize>,
-    /// σ from which on one in one joint is none of noise.
+    /// Height in σ from which on a bump in one joint is not noise.
     far: f64,
     /// See [`Candidate::of_move`].
     of_move: Option<usize>,
 }
 
 impl Candidate {
-    /// Its samples in the whole log, and as many beside it: its foot may lie there.
+    /// Its samples in the whole log, with as many on either side, where its foot may lie.
     pub(super) fn samples(&self, repeats: &Repeats) -> Range<usize> {
         let reach = (self.length_s * repeats.rate_hz) as usize + 1;
         let centre = repeats.window.start + self.centre;
@@ -92,9 +92,9 @@ impl Candidate {
 }
 
 impl Repeats {
-    /// y(k) minus the trimmed mean of y at the same phase in the other periods, without those that are set `aside`
-    /// there if any are left. Of two others their mean is wrong by half of either: y(k) itself counts with them where it
-    /// is not set aside.
+    /// y(k) minus the trimmed mean of y at the same phase in the other periods. Samples that are set `aside` are
+    /// excluded from the mean, if any others are left. With only two other periods, an error of either one enters the
+    /// mean by half; y(k) itself is then included where it is not set aside.
     pub(super) fn deviation(&self, y: &[f64], k: usize, aside: &[bool]) -> f64 {
         let Range { start, end } = self.window.clone();
         let others = other_periods(k - start, self.period, end - start).map(|at| start as f64 + at);
@@ -109,8 +109,8 @@ impl Repeats {
         y[k] - trimmed_mean(&mut same).unwrap_or(y[k])
     }
 
-    /// Deviations of all joints that are compared, without the pushes that are `known` and without drifting friction,
-    /// samples of the window.
+    /// Deviations of all compared joints at the samples of the window, without the `known` pushes and without drifting
+    /// friction.
     pub(super) fn deviations(&self, aside: &[bool], known: &[Push]) -> JointSignals {
         let joints = &self.joints;
         let mut out = JointSignals::from_fn(joints.len(), self.window.len(), |row, k| {
@@ -124,14 +124,15 @@ impl Repeats {
                 drift.remove(*j, out.joint_mut(row), |k| !aside[self.window.start + k]);
             }
         }
-        // Even the softest bump of nine samples is half as high two samples off its top: it does not stand out alone.
+        // Even the softest bump of nine samples is still half as high two samples from its top, so that it is not an
+        // isolated value.
         let reach = if SHORTEST_S * self.rate_hz >= 9.0 { 2 } else { 1 };
         (0..joints.len()).for_each(|row| level_wild_values(out.joint_mut(row), reach));
         out
     }
 
-    /// The bump that is highest beside what noise would not make, apart from the samples that were `looked_at`; `None` of one below
-    /// `least` times that.
+    /// Finds the bump that is highest relative to the threshold for noise, apart from the samples `looked_at`; `None`
+    /// if all are below `least` times the threshold.
     pub(super) fn search(
         &self,
         aside: &[bool],
@@ -168,7 +169,7 @@ impl Repeats {
                         continue;
                     }
                     let scores = noise.scores(&heights, centre);
-                    // What is not so far in all joints is not in any.
+                    // A bump that is below the bound in all joints together is below it in each.
                     if noise.gain(&scores) <= (highest * far).powi(2) {
                         continue;
                     }
@@ -179,7 +180,8 @@ impl Repeats {
                         1 => 0.0,
                         _ => as_known(&together) / far_together,
                     };
-                    // Where it is louder noise makes higher bumps; which of those that it does not make is highest it does not tell.
+                    // Louder noise makes higher bumps. The loudness decides whether a bump is noise, but not which of
+                    // the significant bumps is highest.
                     let louder =
                         |row: &usize| loudness.over(*row, centre - reach..centre + reach).powi(2);
                     let beside = |felt: &Felt, louder: f64| {
@@ -196,7 +198,7 @@ impl Repeats {
                         highest = of_one.max(of_all);
                         let [mut felt, mut quiet] = felt_and_quiet(&scores, &alone, &telling);
                         if of_all > of_one {
-                            // A joint that shows little of what all show is not quiet.
+                            // A joint that shows little of a push that all joints show together is not quiet.
                             felt.extend(&telling);
                             felt.sort_unstable();
                             felt.dedup();
@@ -218,9 +220,11 @@ impl Repeats {
         Ok(best)
     }
 
-    /// Where bumps of `length_s` are looked for on which joints: first all along the log on all of them, and where the arm moved
-    /// otherwise on those that did. Noise of the torques does not choose where the angles differ, as long as no feedback brings it
-    /// into them: it is asked there only whether a torque goes with a move that noise did not make.
+    /// Places and joints where bumps of `length_s` are searched for: first the whole log on all joints, then where the
+    /// arm moved differently, on the joints that did.
+    ///
+    /// Noise of the torques does not influence where the angles differ, as long as no feedback couples the two. At such
+    /// a place, the only question is therefore whether a torque goes with a move that noise did not make.
     fn looked_through(&self, length_s: f64) -> Vec<Place> {
         let all = 0..self.joints.len();
         let everywhere = Place {
@@ -242,7 +246,7 @@ impl Repeats {
         let chances = [chance::CONTACT, chance::CONTACT_WHERE_MOVED];
         for (group, chance) in [&mut everywhere, &mut where_moved].into_iter().zip(chances) {
             let bumps = group.iter().map(|place| {
-                // Each joint by itself, and all together.
+                // Each joint alone, and all together.
                 let ways = if place.rows.len() > 1 { place.rows.len() + 1 } else { 1 };
                 let duration_s = place.centres.len() as f64 / self.rate_hz;
                 rarity::bumps(length_s, duration_s, lengths * ways)
@@ -254,7 +258,7 @@ impl Repeats {
         everywhere
     }
 
-    /// Lengths of the bumps that are looked for, s.
+    /// Lengths of the bumps that are searched for, s.
     fn lengths_s(&self) -> Vec<f64> {
         let longest_s = LONGEST_S.min(LONGEST_OF_PERIOD * self.period / self.rate_hz);
         let shortest_s = SHORTEST_S.max(4.0 / self.rate_hz);
@@ -263,8 +267,9 @@ impl Repeats {
             .collect()
     }
 
-    /// What the log knows of the push at `candidate`: where several joints feel it, whose levers change while
-    /// the arm moves on, its begin and end are where any of them may see them.
+    /// Determines the push at `candidate` as far as the log allows; `None` if it turns out to be noise. Where several
+    /// joints feel it, their lever arms change while the arm moves on: the intervals of begin and end then cover those
+    /// of every single joint.
     pub(super) fn weigh(
         &self,
         candidate: &Candidate,
@@ -282,7 +287,7 @@ impl Repeats {
         let weigh_on =
             |felt: &Felt| bump::weigh(&filter, felt, &self.joints, centres.clone(), length_s);
         let felt = felt_by(&candidate.felt);
-        // What its neighbourhood tells of the noise may make it less than it seemed.
+        // The noise in its neighbourhood may make it less significant than it seemed.
         let is_far = |felt: &Felt, push: &Push, far: f64| {
             let [start, end] =
                 [&push.start_s, &push.end_s].map(|at| (at.value * self.rate_hz) as usize);
@@ -304,7 +309,8 @@ impl Repeats {
             for row in rows(&all) {
                 weigh_on(&felt_by(&[row])).iter().for_each(|own| all.reach_over(own));
             }
-            // Where they do not show it by themselves the log does not tell that the others did not feel it.
+            // If the joints that feel the push do not show it significantly by themselves, the log does not exclude
+            // that the others felt it.
             while let Some(next) = all.next_to_feel() {
                 let felt = felt_by(&rows(&all));
                 if weigh_on(&felt).is_some_and(|push| is_far(&felt, &push, far)) {
@@ -316,8 +322,8 @@ impl Repeats {
         Ok(Some(all))
     }
 
-    /// Whether `push` is nowhere where it is felt more than what rounding leaves of the torque: periods that are alike to the
-    /// last digit of a file differ by that alone, and have no noise beside which it would be small: such joints tell nothing.
+    /// Whether `push` is nowhere larger than the rounding of the torque. Periods that are alike to the last digit of a
+    /// file differ only by rounding, and have no noise to compare the push with: such joints tell nothing.
     pub(super) fn is_rounding(&self, push: &Push) -> bool {
         push.felt_nm().all(|(j, height)| {
             let torque_nm = &self.signals.joint(j)[self.window.clone()];
@@ -326,7 +332,7 @@ impl Repeats {
         })
     }
 
-    /// `push` at `candidate` as a contact of the log, whose window begins at `begin_s`.
+    /// Converts `push` at `candidate` to a contact of the log, whose window begins at `begin_s`.
     pub(super) fn touch(&self, candidate: &Candidate, push: &Push, begin_s: f64) -> Touch {
         let here = self.moves.iter().filter(|own| own.centres.contains(&candidate.centre));
         let mut moved = here.flat_map(|own| &own.joints);
@@ -353,15 +359,15 @@ impl Repeats {
     }
 }
 
-/// Puts what stands `reach` samples before and behind in place of values that stand out alone: a reading that went
-/// wild, and what resampling makes of it, is over before anything that touches the arm has begun.
+/// Replaces isolated values by the mean of the values `reach` samples before and after: a reading that went wild,
+/// including its trace after resampling, is over before any real touch of the arm has begun.
 fn level_wild_values(y: &mut [f64], reach: usize) {
     let measured = y.to_vec();
     let beside = |k: usize| [measured[k - reach], measured[k + reach]];
     let level = |k: usize| 0.5 * beside(k).iter().sum::<f64>();
     let all = reach..measured.len().saturating_sub(reach);
     let mut changes: Vec<f64> = all.clone().map(|k| (measured[k] - level(k)).abs()).collect();
-    // Of three values that know nothing of each other.
+    // A value less the mean of two independent others has 1.5 times the variance of one.
     let sigma = robust_sigma(&mut changes) / 1.5f64.sqrt();
     for k in all {
         let size = measured[k].abs();
@@ -371,8 +377,8 @@ fn level_wild_values(y: &mut [f64], reach: usize) {
     }
 }
 
-/// Which joints felt a bump with these scores, each by itself and `alone` among all, and which show noise alone; the one of those
-/// `telling` that shows most of it felt it.
+/// Which joints felt a bump with these scores, and which show noise alone. `alone` holds the significance of each joint
+/// with the others taken as quiet; among those `telling`, the joint with the largest felt it in any case.
 fn felt_and_quiet(scores: &[f64], alone: &[f64], telling: &[usize]) -> [Vec<usize>; 2] {
     let limit = FELT_BESIDE.max(FELT_SHARE * farthest(scores));
     let most = telling.iter().max_by(|a, b| alone[**a].total_cmp(&alone[**b]));

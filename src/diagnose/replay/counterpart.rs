@@ -1,8 +1,7 @@
-//! What a named cause is in the plant.
+//! The counterpart of a named cause in the plant.
 //!
-//! The two speak of the same physical quantities in the same units, and nothing else is shared: a size
-//! that was fitted to a log goes into the equations of motion. Where a family and its effect do not mean
-//! the same, it says so here.
+//! Diagnosis and plant use the same physical quantities in the same units, and share nothing else: a size that was
+//! fitted to a log enters the equations of motion. Where a family and its effect differ in meaning, this file says so.
 
 use crate::diagnose::Kind;
 use crate::diagnose::candidates::elasticity::ON_MOTOR;
@@ -10,19 +9,19 @@ use crate::diagnose::candidates::load_friction::MOTOR_SIDE;
 use crate::plant::PlantConfig;
 use crate::plant::faults::{self, Effect};
 
-/// What becomes of a cause when the simulation is extended by it.
+/// What happens to a cause when the simulation is extended by it.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Counterpart {
-    /// It is part of the model that was fitted, and acts in the simulated arm.
+    /// It is part of the fitted model, and acts in the simulated arm.
     InTheModel(Effect),
-    /// It acts on the readings: the log was freed of it before the model was fitted, so that a replay
-    /// goes without, while a scenario that is to make such logs has it.
+    /// It acts on the readings. The log was freed of it before the model was fitted, so that a replay does without it,
+    /// while a scenario that is to produce such logs includes it.
     OfTheRecord(Effect),
-    /// It does not go back, for this reason.
+    /// It is not simulated, for this reason.
     None(&'static str),
 }
 
-/// Why a cause does not go back.
+/// Reasons why a cause is not simulated.
 const IN_THE_PARAMETERS: &str = "the identified parameters hold it already";
 const ONE_EVENT: &str =
     "it happened once: no property of the arm, taken out of the log before the fit";
@@ -30,22 +29,22 @@ const NO_SUCH_SIZE: &str = "the size that was found is none that the simulated e
 const NO_SUCH_LAW: &str = "the simulated arm has no friction of this law";
 const INCOMPLETE: &str = "the log does not tell all of its numbers";
 
-/// Stiffest bristles that are simulated, 1/rad: friction then turns round within 0.1 mrad, less than a joint
-/// moves in one sample where its direction is in doubt, so that no log tells it from a stiffer one.
+/// Stiffest bristles that are simulated, 1/rad. Friction then turns round within 0.1 mrad, less than a joint moves in
+/// one sample where its direction is in doubt, so that no log distinguishes stiffer bristles.
 const STIFFEST_PER_RAD: f64 = 1e4;
 
-/// Sharpest reversal of friction that is simulated, rad/s: a joint that turns at 1 rad/s² is through it within a
-/// millisecond.
+/// Sharpest reversal of friction that is simulated, rad/s: a joint that accelerates at 1 rad/s² passes through it
+/// within a millisecond.
 const SHARPEST_RAD_S: f64 = 1e-3;
 
-/// A cause as the diagnosis has it.
+/// A cause as diagnosed.
 #[derive(Debug, Clone, Copy)]
 pub struct Found<'a> {
     /// Its family.
     pub kind: Kind,
-    /// From 1; `None`: the arm as a whole.
+    /// Joint, from 1; `None`: the arm as a whole.
     pub joint: Option<usize>,
-    /// Which form of the family's law.
+    /// Variant of the family's law.
     pub variant: usize,
     /// Names of its physical parameters, with SI values.
     pub quantities: &'a [(&'static str, f64)],
@@ -74,7 +73,7 @@ impl Found<'_> {
                 vs_rad_s: value("vs_rad_s")?,
                 exponent: if self.variant == 0 { 2 } else { 1 },
             })),
-            // Laws that the plant does not have, most of which only single runs are asked for.
+            // Laws that the plant does not have. Most of them are fitted to single runs only.
             Kind::NonlinearViscous if value("speed_rad_s").is_some() => {
                 Some(Counterpart::None(NO_SUCH_LAW))
             }
@@ -94,7 +93,7 @@ impl Found<'_> {
             Kind::AsymmetricFriction => {
                 in_the_model(Effect::AsymmetricFriction(faults::AsymmetricFriction {
                     joint: self.joint?,
-                    // Not told where it is an offset, which the arm has already.
+                    // Unknown where the null model fits an offset, which the arm already has.
                     coulomb_nm: value("coulomb_nm").unwrap_or(0.0),
                     viscous_nm_s_rad: value("viscous_nm_s_rad")?,
                 }))
@@ -106,8 +105,8 @@ impl Found<'_> {
                 }
                 _ => Some(Counterpart::None(NO_SUCH_SIZE)),
             },
-            // The friction that slides is the arm's own; what the family fits to the reversals alone is
-            // the same quantity, known less well.
+            // Sliding friction is the arm's own. The value that the family fits to the reversals alone is the same
+            // quantity, known less well.
             Kind::Presliding => in_the_model(Effect::Presliding(faults::Presliding {
                 joint: self.joint?,
                 stiffness_per_rad: value("stiffness_per_rad")?.min(STIFFEST_PER_RAD),
@@ -170,7 +169,7 @@ impl Found<'_> {
                 joint: self.joint?,
                 limit_nm: value("limit_nm")?,
             })),
-            // No drive feeds less forward than nothing.
+            // No drive feeds forward less than nothing.
             Kind::FeedForward => in_the_model(Effect::FeedForward(faults::FeedForward {
                 joint: self.joint?,
                 share_less: value("share_less")?.min(PlantConfig::default().friction_feedforward),
@@ -217,8 +216,8 @@ impl Found<'_> {
         }
     }
 
-    /// A spring whose angle dependence the null model absorbs leaves its pull at zero; one whose pull at
-    /// zero the offset of the null model absorbs pulls from there.
+    /// Counterpart of a spring. Where the null model absorbs its angle dependence, only its pull at zero remains, a
+    /// constant torque. Where the offset of the null model absorbs its pull at zero, its rest angle is taken as zero.
     fn spring(&self) -> Option<Counterpart> {
         let joint = self.joint?;
         if let Some(offset_nm) = self.value("pull_at_zero_nm") {

@@ -1,4 +1,4 @@
-//! One log replayed by one arm.
+//! Replay of one log by one simulated arm.
 
 use super::error::ReplayError;
 use super::simulated::SimulatedArm;
@@ -12,21 +12,21 @@ use crate::plant::{PlantConfig, PlantError, Recording};
 use crate::robot::{Arm, JointSignals};
 use crate::signal::{Scratch, SignalError, ZeroPhase, central_4, mean_period};
 
-/// A log as it is to be replayed.
+/// A log prepared for its replay.
 pub(super) struct Course<'a> {
-    /// Its motion.
+    /// Motion of the log.
     pub(super) scene: &'a Scene,
-    /// Its torque: the mean period, or the run behind its low-pass, Nm.
+    /// Torque of the log: the mean period, or the low-passed run, Nm.
     pub(super) measured_nm: &'a JointSignals,
-    /// Sample of the motion behind each sample of the torque.
+    /// Sample of the motion to which each sample of the torque belongs.
     pub(super) samples: &'a [usize],
-    /// How a single run is processed.
+    /// Processing options of a single run.
     pub(super) options: &'a Options,
 }
 
 /// What a simulated arm did along the motion of a log.
 pub(super) struct Replayed {
-    /// Drive torque, as processed as the log's, Nm.
+    /// Drive torque, processed as that of the log, Nm.
     pub(super) torque_nm: JointSignals,
     /// Logged minus simulated angle under the controller alone, rms per joint, rad.
     pub(super) tracking_rms_rad: Vec<f64>,
@@ -34,13 +34,13 @@ pub(super) struct Replayed {
     pub(super) motion_rms_rad: Vec<f64>,
 }
 
-/// A motion that repeats is entered this long before the period that counts, s: fifty times as long as
-/// the controller takes to forget how it started.
+/// Run-in before the period of a periodic motion that counts, s: fifty times as long as the controller takes to forget
+/// how it started.
 const LEAD_S: f64 = 1.0;
 /// Longest step of the integrator, s.
 const LONGEST_STEP_S: f64 = 0.001;
 
-/// Torque of a log as it is compared: of one period the mean, of a single run what its low-pass leaves, Nm.
+/// Torque of a log in the form in which it is compared, Nm: the mean period, or the low-passed run.
 pub(in crate::diagnose) fn measured_nm(regression: &Regression) -> JointSignals {
     let Regression { prepared, problem, .. } = regression;
     if prepared.replicates.is_some() {
@@ -51,11 +51,11 @@ pub(in crate::diagnose) fn measured_nm(regression: &Regression) -> JointSignals 
 }
 
 impl Course<'_> {
-    /// The log's motion run by `simulated` with `effects` in it, under the controller of `nominal`.
+    /// Replays the log's motion with `simulated` and `effects` in it, under the controller of `nominal`.
     ///
-    /// The controller is given the motion that was logged, and the arm leaves it by what the controller
-    /// does not know: the tracking error. What it lacks is then added to the reference, so that the arm
-    /// moves as the logged one did, and the torque of that run is what the two can be compared by.
+    /// In a first run, the controller gets the logged motion as reference. The arm deviates from it because of effects
+    /// that the controller does not know: the tracking error. This deviation, smoothed, is added to the reference, so
+    /// that the arm moves as the logged one did. The torque of the second run is compared with that of the log.
     pub(super) fn replay(
         &self,
         simulated: &SimulatedArm,
@@ -93,7 +93,7 @@ impl Course<'_> {
         })
     }
 
-    /// Angles and torque of one run on the samples of the scene: of the mean period, where it repeats.
+    /// Angles and torque of one run at the samples of the scene; averaged over the period where the motion repeats.
     fn follow(
         &self,
         plant: &FaultyPlant,
@@ -107,7 +107,7 @@ impl Course<'_> {
                 plant.run(&SampledMotion::once(reference, rate_hz), None)?;
             return Ok((q_rad, torque_nm));
         }
-        // What does not repeat begins with the record.
+        // Effects that do not repeat begin with the record, so that all of it is simulated.
         let (lead, count) =
             if repeats { ((LEAD_S * rate_hz).ceil() as usize, n) } else { (0, n * periods) };
         let (lead_s, duration_s) = (lead as f64 / rate_hz, (lead + count) as f64 / rate_hz);
@@ -119,9 +119,8 @@ impl Course<'_> {
         Ok((mean(&run.q_rad), mean(&run.torque_nm)))
     }
 
-    /// The part of angles below the cutoff of the processing, with its derivatives. Above it, and above
-    /// what the controller can follow, the accelerations of a log are noise rather than motion, and would
-    /// be fed forward as torque.
+    /// The angles below the cut-off of the processing, with their derivatives. Above it, and above what the controller
+    /// can follow, the accelerations of a log are noise rather than motion, and would be fed forward as torque.
     fn smooth(&self, q_rad: &JointSignals) -> Result<Motion, SignalError> {
         let rate_hz = self.scene.rate_hz;
         let Options { cutoff_hz, order, .. } = *self.options;
@@ -151,7 +150,7 @@ impl Course<'_> {
         Ok(motion)
     }
 
-    /// Simulated torque, processed and picked as the log's.
+    /// Simulated torque, processed and sampled as that of the log.
     fn as_compared(&self, mut torque_nm: JointSignals) -> Result<JointSignals, SignalError> {
         if self.scene.periodic {
             return Ok(torque_nm);
@@ -177,12 +176,12 @@ fn rms_per_joint(signals: &JointSignals) -> Vec<f64> {
     (0..signals.joints()).map(|j| rms_where(signals.joint(j), |_| true)).collect()
 }
 
-/// Inverse of the last digit of a rate that means anything, s.
+/// Inverse of the last significant digit of a rate, s.
 const RATE_DIGITS: f64 = 1e6;
 
-/// The plant's own controller, with decisions at every step and a log at the rate of the one replayed.
+/// The plant's own controller, with decisions at every step and a log at the rate of the replayed one.
 pub(super) fn plant_config(rate_hz: f64) -> PlantConfig {
-    // A rate from time stamps carries their round-off.
+    // A rate derived from time stamps carries their round-off.
     let rate_hz = (rate_hz * RATE_DIGITS).round() / RATE_DIGITS;
     let steps = (1.0 / (rate_hz * LONGEST_STEP_S) * (1.0 - 1e-6)).ceil().max(1.0);
     PlantConfig {

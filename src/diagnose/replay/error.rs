@@ -1,4 +1,4 @@
-//! Why nothing could be replayed.
+//! Errors of the replay.
 
 use thiserror::Error;
 
@@ -8,22 +8,22 @@ use crate::identify::physical::PhysicalError;
 use crate::plant::PlantError;
 use crate::signal::SignalError;
 
-/// No replay, with the numbers that say why.
+/// Why nothing was replayed, with the numbers that say why.
 #[derive(Debug, Error)]
 pub enum ReplayError {
-    /// No arm that can exist is near what was identified.
+    /// No physically possible arm is near the identified one.
     #[error("the identified arm cannot be simulated: {0}")]
     Physical(#[from] PhysicalError),
-    /// The plant refuses the effects, or does not get through the motion.
+    /// The plant rejects the effects, or does not complete the motion.
     #[error("the simulation with what was found does not run: {0}")]
     Plant(#[from] PlantError),
-    /// A held-out log.
+    /// A held-out log cannot be processed.
     #[error(transparent)]
     Identify(#[from] IdentifyError),
-    /// The same.
+    /// The diagnosis of a log fails.
     #[error(transparent)]
     Diagnose(#[from] DiagnoseError),
-    /// A filter.
+    /// A filter cannot be applied.
     #[error(transparent)]
     Signal(#[from] SignalError),
 }

@@ -1,13 +1,13 @@
-//! The loop closed: what was found goes back into the simulation, which replays the motion of the log.
+//! Closing the loop: the causes that were found go back into the simulation, which replays the motion of the log.
 //!
-//! Enters: a [`Finding`]. Leaves: the simulation without and with the causes ([`ExtendedSimulation`]), and
-//! a [`Replay`]: how far its torque and its motion are from the log's, on the log and on logs that nothing
-//! was fitted to.
+//! Enters: a [`Finding`]. Leaves: the simulation without and with the causes ([`ExtendedSimulation`]), and a
+//! [`Replay`], which says how far their torque and motion are from those of the log and of logs that nothing was fitted
+//! to.
 //!
-//! The model that is fitted to a log is a sum of torques along the recorded motion. Here the causes act
-//! as physics in the integration of the equations of motion ([`plant::faults`](crate::plant::faults)),
-//! under a controller that does not know of them, and the two share no formula: that the torque of the
-//! log comes out is a test of the diagnosis, not a repetition of the fit.
+//! The model that is fitted to a log is a sum of torques along the recorded motion. In the replay, the causes act as
+//! physics in the integration of the equations of motion ([`plant::faults`](crate::plant::faults)), under a controller
+//! that does not know of them. The two share no formula: reproducing the torque of the log tests the diagnosis rather
+//! than repeating the fit.
 
 mod counterpart;
 mod course;
@@ -30,16 +30,16 @@ pub use simulated::{ExtendedSimulation, NotReplayed, SimulatedArm};
 
 use course::Course;
 
-/// A simulation against logs, without and with the causes that were found.
+/// Comparison of a simulation with logs, without and with the causes that were found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Replay {
-    /// The causes as they act in the simulated arm, with their parameters as scenarios have them.
+    /// The simulated causes, with their parameters as in scenarios.
     pub effects: Vec<Effect>,
-    /// The others.
+    /// The causes that are not simulated.
     pub not_replayed: Vec<NotReplayed>,
-    /// How far the simulated arms are from the identified ones (rms over the base parameters, in standard
-    /// deviations of what the log says): without the causes, and with them. 0 where the identified
-    /// parameters are those of an arm that can exist; up to 1 it is nearer than the noise.
+    /// Distance of the simulated arms from the identified ones (rms over the base parameters, in standard deviations of
+    /// what the log says), without and with the causes. 0 where the identified parameters are those of a physically
+    /// possible arm; up to 1, the distance is within the noise.
     pub arm_distance: [f64; 2],
     /// The log that was diagnosed.
     pub log: ReplayedLog,
@@ -47,36 +47,35 @@ pub struct Replay {
     pub held_out: Vec<ReplayedLog>,
 }
 
-/// One log replayed.
+/// Replay of one log.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReplayedLog {
-    /// The log.
+    /// Name of the log.
     pub log: String,
-    /// Noise of the torque that is compared (the mean over the periods), rms per joint, Nm; null for a
-    /// single run.
+    /// Noise of the compared torque (the mean over the periods), rms per joint, Nm; null for a single run.
     pub noise_nm: Option<Vec<f64>>,
     /// Without the causes.
     pub before: Distance,
     /// With them.
     pub after: Distance,
-    /// Share of the explainable mean square of the torque (beyond the noise; every joint in units of its
-    /// noise) that the causes remove; null for a single run.
+    /// Share of the explainable mean square of the torque (beyond the noise, with every joint in units of its noise)
+    /// that the causes remove; null for a single run.
     pub removed_fraction: Option<f64>,
-    /// For pictures.
+    /// Courses of the torque, for plots.
     #[serde(skip)]
     pub course: Torques,
 }
 
-/// How far a simulation is from a log.
+/// Distance of a simulation from a log.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Distance {
     /// Logged minus simulated torque along the same motion, rms per joint, Nm.
     pub torque_rms_nm: Vec<f64>,
-    /// Logged minus simulated angle, rms per joint, rad, where the simulation's own controller follows
-    /// the logged motion. It depends on that controller; the difference between before and after shows
-    /// what the causes do to the motion.
+    /// Logged minus simulated angle, rms per joint, rad, where the simulation's own controller follows the logged
+    /// motion. It depends on that controller; the difference between before and after shows how the causes affect the
+    /// motion.
     pub tracking_rms_rad: Vec<f64>,
-    /// What is left of it in the run whose torque is compared, rad.
+    /// The remaining difference in the run whose torque is compared, rad.
     pub motion_rms_rad: Vec<f64>,
 }
 
@@ -94,7 +93,7 @@ pub struct Torques {
 }
 
 impl Diagnoser<'_> {
-    /// The simulation without and with what was found.
+    /// The simulation without and with the causes that were found.
     pub fn extended_simulation(
         &self,
         finding: &Finding,
@@ -102,8 +101,7 @@ impl Diagnoser<'_> {
         ExtendedSimulation::new(self.arm, self.set, &self.families, finding)
     }
 
-    /// Lets the simulation replay the log behind `finding` and the logs `held_out`, without and with
-    /// what was found.
+    /// Replays the log behind `finding` and the logs `held_out` with the simulation, without and with the causes.
     pub fn replay(
         &mut self,
         finding: &Finding,
@@ -196,7 +194,8 @@ impl ExtendedSimulation {
     }
 }
 
-/// Σ (b² − a²)/σ² over Σ (b² − σ²)/σ²; `None` where there was nothing to explain.
+/// Share of the explainable mean square that is removed: Σ (b² − a²)/σ² over Σ (b² − σ²)/σ², with b before, a after;
+/// `None` where there was nothing to explain.
 fn removed_fraction(before_nm: &[f64], after_nm: &[f64], noise_nm: &[f64]) -> Option<f64> {
     let (mut removed, mut explainable) = (0.0, 0.0);
     for ((before, after), noise) in before_nm.iter().zip(after_nm).zip(noise_nm) {
@@ -206,12 +205,12 @@ fn removed_fraction(before_nm: &[f64], after_nm: &[f64], noise_nm: &[f64]) -> Op
     (explainable > 0.0).then(|| removed / explainable)
 }
 
-/// An arm that is nearer than this to the identified one, in σ per parameter, is that arm: it adds a
-/// quarter to the mean square that the noise of the parameters makes.
+/// Distance from the identified arm, in σ per parameter, below which the simulated arm counts as the identified one: it
+/// adds a quarter to the mean square that the noise of the parameters makes.
 const WORTH_SAYING: f64 = 0.5;
 
 impl Replay {
-    /// In words.
+    /// The replay in words.
     pub fn sentences(&self) -> Vec<String> {
         let mut out = Vec::new();
         for (log, place) in std::iter::once((&self.log, ""))
@@ -252,7 +251,7 @@ impl Replay {
 }
 
 impl ReplayedLog {
-    /// The joint (0-based) whose torque gains most, in units of its noise where that is known.
+    /// The joint (0-based) whose torque improves most, in units of its noise where that is known.
     pub fn worst_joint(&self) -> usize {
         let gain = |j: usize| {
             let square = |distance: &Distance| distance.torque_rms_nm[j].powi(2);

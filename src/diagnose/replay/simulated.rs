@@ -1,4 +1,4 @@
-//! The arms that go back into the simulation.
+//! The arms used in the simulation.
 
 use serde::Serialize;
 
@@ -17,30 +17,30 @@ use crate::plant::faults::{CurrentOffset, Effect, FaultyPlant};
 use crate::plant::{PlantConfig, PlantError};
 use crate::robot::Arm;
 
-/// An arm that the plant can be.
+/// An arm that the plant can simulate.
 #[derive(Debug, Clone)]
 pub struct SimulatedArm {
     /// Bodies and drives.
     pub arm: Arm,
     /// Constant torques, Nm, for which an [`Arm`] has no place: one effect per joint that has one.
     pub offsets: Vec<Effect>,
-    /// √(‖R (θ − θ̂)‖²/b): how far its b base parameters are from those that were identified, in standard
-    /// deviations of what the log says about them. Not 0 where no arm that can exist has those.
+    /// √(‖R (θ − θ̂)‖²/b): distance of its b base parameters from the identified ones, in standard deviations of what
+    /// the log says about them. It is above 0 where no physically possible arm has the identified parameters.
     pub distance: f64,
 }
 
-/// A cause that is not in the simulation.
+/// A cause that is not simulated.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NotReplayed {
-    /// Family.
+    /// Kind of the cause.
     pub kind: Kind,
     /// Joint, from 1; null for the arm as a whole.
     pub joint: Option<usize>,
-    /// Why.
+    /// Reason.
     pub reason: String,
 }
 
-/// The simulation without and with what was found.
+/// The simulation without and with the causes that were found.
 #[derive(Debug, Clone)]
 pub struct ExtendedSimulation {
     /// The arm that the null model identifies.
@@ -51,10 +51,10 @@ pub struct ExtendedSimulation {
     pub effects: Vec<Effect>,
     /// Faults of the record, which were repaired before the fit.
     pub of_the_record: Vec<Effect>,
-    /// Causes that have no counterpart; the extended arm does as well without them as it can.
+    /// Causes without a counterpart; the extended arm is fitted without them as well as it can be.
     pub not_replayed: Vec<NotReplayed>,
-    /// Steps and rates: decisions of the plant's own controller at every step, a log at the rate of the
-    /// one that was diagnosed.
+    /// Steps and rates: the plant's own controller decides at every step, and the log has the rate of the diagnosed
+    /// one.
     pub plant: PlantConfig,
 }
 
@@ -64,7 +64,7 @@ const HELD: &str = "the arm's parameters, which were identified with it, hold it
 const REPAIRED: &str = "a fault of the record, repaired before the model was fitted";
 
 impl ExtendedSimulation {
-    /// From what was found about logs of `nominal`.
+    /// Builds the simulation from what was found in logs of `nominal`.
     pub(super) fn new(
         nominal: &Arm,
         set: &BaseSet,
@@ -83,7 +83,7 @@ impl ExtendedSimulation {
         };
         let mut theta = finding.extension.theta.clone();
         let mut fitted = Vec::new();
-        // Kind, joint and what goes back into the parameters with it, of each of `effects`.
+        // Kind and joint of each of `effects`, and what returns to the parameters if the effect is dropped.
         let mut sources = Vec::new();
         for effect in &finding.extension.effects {
             let family = &families[effect.family];
@@ -110,7 +110,7 @@ impl ExtendedSimulation {
             theta.iter_mut().zip(absorbed).for_each(|(theta, more)| *theta += more);
             out.extended = realise.arm(&theta)?;
         }
-        // What is named beside the fitted effects: faults of the record, events, moved parameters.
+        // Causes that are named in addition to the fitted effects: faults of the record, events, moved parameters.
         for cause in &finding.diagnosis.causes {
             let (kind, joint) = (cause.kind, cause.joint);
             if fitted.contains(&(kind, joint)) {
@@ -129,7 +129,7 @@ impl ExtendedSimulation {
         Ok(out)
     }
 
-    /// Takes a cause in; whether it has a counterpart.
+    /// Adds a cause; returns whether it acts in the simulated arm.
     fn take(&mut self, found: Found, nominal: &Arm) -> bool {
         let Found { kind, joint, .. } = found;
         let reason = match found.counterpart() {
@@ -152,7 +152,7 @@ impl ExtendedSimulation {
         false
     }
 
-    /// The first effect that the simulated arm cannot have beside those before it, and why.
+    /// The first effect that the simulated arm cannot have together with those before it, and why.
     fn refused(&self, nominal: &Arm) -> Option<(usize, PlantError)> {
         (0..self.effects.len()).find_map(|last| {
             let effects = &self.effects[..=last];
@@ -163,7 +163,7 @@ impl ExtendedSimulation {
     }
 }
 
-/// Why the plant does not take an effect in; as it stands alone, its number is of no use.
+/// Why the plant rejects an effect. As the effect stands alone here, its number is omitted.
 fn in_words(refusal: &PlantError) -> String {
     match refusal {
         PlantError::Effect { key, value, requirement, .. } => {
@@ -173,10 +173,10 @@ fn in_words(refusal: &PlantError) -> String {
     }
 }
 
-/// Finds arms that can exist for base parameters of one log.
+/// Finds physically possible arms for base parameters of one log.
 ///
-/// Base parameters are combinations. Among the arms that can exist it takes the one that minimises
-/// ‖R (θ − θ̂)‖² + γ ‖deviation from the robot file‖² with a γ that decides only what the log leaves open
+/// Base parameters are combinations, shared by many arms. Among the physically possible arms, the one is chosen that
+/// minimises ‖R (θ − θ̂)‖² + γ ‖deviation from the robot file‖², with a γ that decides only what the log leaves open
 /// ([`PriorWeight::WEAK`]).
 struct Realise<'a> {
     nominal: &'a Arm,

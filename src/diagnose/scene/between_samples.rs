@@ -1,5 +1,5 @@
-//! What happens between the samples of a log, [`FINE`] times in each: angles, velocities and torques there, and what the samples
-//! show of a friction that acts there.
+//! The motion between the samples of a log, at [`FINE`] instants per sample: angles, velocities and torques there, and
+//! how the samples show a friction that acts between them.
 
 use std::borrow::Cow;
 
@@ -9,21 +9,22 @@ use crate::diagnose::reversals::{Bends, Turning};
 use crate::identify::{drive_answers, feedback_per_tick};
 use crate::signal::first_order_lag;
 
-/// Instants per sample of [`Scene::fine_link_nm`] and [`Scene::instants`].
+/// Number of instants per sample of [`Scene::fine_link_nm`] and [`Scene::instants`].
 pub const FINE: usize = 16;
 
-/// βδ of [`drive_answers`] at most, s. In logs of clean arms whose drives feed any share of the friction forward, with
-/// feedback of 25 to 100 rad/s, up to 0.9 ms were measured on joints 1 to 3 and 5, 1.3 ms on joint 4 and 1.6 ms on joint
-/// 6, where it is noise; behind 4 ms friction builds up over an angle, or a channel is recorded late.
+/// Largest βδ of [`drive_answers`], s. In logs of clean arms, whose drives feed any share of the friction forward and
+/// have feedback of 25 to 100 rad/s, up to 0.9 ms were measured on joints 1 to 3 and 5, and 1.3 ms on joint 4 and 1.6
+/// ms on joint 6, where it is noise. At 4 ms, friction builds up over an angle, or a channel is recorded late.
 pub const LONGEST_LEAD_S: f64 = 0.002;
 
-/// The motion of one joint where friction is looked at.
+/// The motion of one joint at the instants at which friction is evaluated.
 pub struct Instants {
-    /// Time between two of them, s.
+    /// Time between two instants, s.
     pub step_s: f64,
-    /// Angles, rad; of a motion that repeats as its samples have them, with their velocities.
+    /// Angles, rad; in a periodic motion, interpolated from the angles and velocities of the samples.
     pub q_rad: Vec<f64>,
-    /// Velocities, rad/s; of a motion that repeats as the model's friction bends them, which is not quite the rate of the angles.
+    /// Velocities, rad/s; in a periodic motion, as the model's friction bends them, which is not exactly the rate of
+    /// the angles.
     pub qd_rad_s: Vec<f64>,
     /// tanh(q̇/ε).
     pub sign: Vec<f64>,
@@ -35,26 +36,26 @@ impl Scene {
         1.0 / (self.rate_hz * FINE as f64)
     }
 
-    /// The link torque of joint `j` at `FINE` instants per sample, for what happens between samples.
+    /// Link torque of joint `j`, Nm, at `FINE` instants per sample, for effects between samples.
     pub fn fine_link_nm(&self, j: usize) -> &[f64] {
         self.fine_link_nm[j].get_or_init(|| self.fine(self.link_nm.joint(j)))
     }
 
-    /// What the links of joint `j` take where joints reverse, at `FINE` instants per sample, Nm.
+    /// Torque that the links of joint `j` take where joints reverse, at `FINE` instants per sample, Nm.
     pub fn fine_jolt_nm(&self, j: usize) -> &[f64] {
         self.fine_jolt_nm[j].get_or_init(|| self.fine(self.jolt_nm.joint(j)))
     }
 
-    /// What makes a gear at joint `j` that gives way swing, at `FINE` instants per sample, Nm: torque of its links that
-    /// the motion tells, and what they take beside it where joints reverse.
+    /// Torques that make a compliant gear at joint `j` swing, at `FINE` instants per sample, Nm: the torque of its
+    /// links that the motion determines, and what the links take in addition where joints reverse.
     pub fn fine_bending_nm(&self, j: usize) -> [&[f64]; 2] {
         let LinkTorque { told_nm, jolt_nm } = &self.bending;
         let fine = || [told_nm, jolt_nm].map(|y| self.fine(y.joint(j)));
         self.fine_bending_nm[j].get_or_init(fine).each_ref().map(Vec::as_slice)
     }
 
-    /// Where friction of joint `j` is looked at: `FINE` times per sample of a motion that repeats, at the
-    /// samples of a single run, whose low-pass lies far below their rate.
+    /// Instants at which the friction of joint `j` is evaluated: `FINE` per sample of a periodic motion; the samples
+    /// themselves in a single run, whose low-pass lies far below the sampling rate.
     pub fn instants(&self, j: usize) -> &Instants {
         self.instants[j].get_or_init(|| {
             let (q, qd) = (self.motion.q_rad.joint(j), self.motion.qd_rad_s.joint(j));
@@ -78,10 +79,12 @@ impl Scene {
         })
     }
 
-    /// Velocity of joint `j` at its instants, rad/s, while dry friction turns round by `law` within a few `width_rad_s` and
-    /// the drive delivers what it gives of that (see `reversals`). It feeds the share `fed` of what the model expects forward, and
-    /// gives by its feedback what is lacking along the samples; `None`: what its answer to reversals tells.
-    /// Of a single run it is what was recorded.
+    /// Velocity of joint `j` at its instants, rad/s, while dry friction turns round by `law` within a few `width_rad_s`
+    /// and the drive delivers a part of it (see `reversals`).
+    ///
+    /// The drive feeds forward the share `fed` of the friction that the model expects, and its feedback supplies what
+    /// is lacking along the samples. With `None`, the drive's torque is the one inferred from its answer to reversals.
+    /// In a single run, the result is the recorded velocity.
     pub fn turning_rad_s(
         &self,
         j: usize,
@@ -93,7 +96,7 @@ impl Scene {
             return self.motion.qd_rad_s.joint(j).to_vec();
         }
         let joint = self.turning(j);
-        // An estimate may come to no friction.
+        // The estimated friction may be zero or negative.
         let (Some(clock), Some(told), true) =
             (&self.clock, &self.delivered, self.coulomb_nm[j] > 0.0)
         else {
@@ -113,7 +116,7 @@ impl Scene {
         bends.between_samples(joint, &delivered, width_rad_s, law)
     }
 
-    /// tanh(q̇/ε) of joint `j` at its instants, as it turns round where the drive feeds `fed` times its dry friction forward, 0 or 1.
+    /// tanh(q̇/ε) of joint `j` at its instants, for a drive that feeds `fed` times its dry friction forward, 0 or 1.
     pub fn sign_if_fed(&self, j: usize, fed: usize) -> &[f64] {
         self.signs_if_fed[j][fed].get_or_init(|| {
             let epsilon = self.arm.friction_epsilon_rad_s;
@@ -123,12 +126,12 @@ impl Scene {
         })
     }
 
-    /// Change of the velocity of joint `j` within an instant per dry friction that nothing balances, rad/s.
+    /// Change of the velocity of joint `j` within one instant by its unbalanced dry friction, rad/s.
     pub fn kick_rad_s(&self, j: usize) -> &[f64] {
         &self.turning(j).kick_rad_s
     }
 
-    /// What bends the velocity of joint `j` where its friction turns round.
+    /// Quantities that determine how the velocity of joint `j` bends where its friction turns round.
     fn turning(&self, j: usize) -> &Turning {
         self.turnings[j].get_or_init(|| {
             let series_rad_s = self.fine(self.motion.qd_rad_s.joint(j));
@@ -144,7 +147,7 @@ impl Scene {
         })
     }
 
-    /// `y`, given at the samples, at the instants of a joint.
+    /// `y`, given at the samples, interpolated to the instants of a joint.
     pub fn at_instants<'y>(&self, y: &'y [f64]) -> Cow<'y, [f64]> {
         if self.periodic { self.fine(y).into() } else { y.into() }
     }
@@ -154,9 +157,11 @@ impl Scene {
         if self.periodic { self.fine_link_nm(j) } else { self.link_nm.joint(j) }
     }
 
-    /// Angles of joint `j` at `FINE` instants per sample, from those and the velocities that the samples of a motion that
-    /// repeats have in the mean: where it bends between two of them is in their difference, and in no series of harmonics
-    /// that ends before half the rate. The mean velocity of such a motion is the offset of its sensor.
+    /// Angles of joint `j` at `FINE` instants per sample, interpolated from the mean angles and velocities of the
+    /// samples in a periodic motion.
+    ///
+    /// A bend between two samples shows in the difference of their velocities, but in no Fourier series that ends below
+    /// half the rate. The mean velocity of a periodic motion is the offset of its sensor, and is subtracted.
     fn fine_angles_rad(&self, j: usize) -> Vec<f64> {
         let (Some(clock), Some([q_rad, qd_rad_s])) = (&self.clock, &self.recorded) else {
             return self.fine(self.motion.q_rad.joint(j));
@@ -180,8 +185,8 @@ impl Scene {
         (0..y.len()).flat_map(between).collect()
     }
 
-    /// What the samples of a log show of a friction `torque_nm`, given at the instants, that the drive does not
-    /// answer at once but by its feedback ([`FineClock::as_logged`](crate::signal::FineClock::as_logged)).
+    /// How the samples of a log show a friction `torque_nm`, given at the instants, that the drive answers only by its
+    /// feedback, not at once ([`FineClock::as_logged`](crate::signal::FineClock::as_logged)).
     pub fn as_logged(&self, torque_nm: Vec<f64>) -> Vec<f64> {
         match &self.clock {
             Some(_) => {
@@ -192,20 +197,20 @@ impl Scene {
         }
     }
 
-    /// What feedback gives for a torque at the instants of a motion that repeats.
+    /// Torque that the drive's feedback gives in answer to a torque at the instants of a periodic motion.
     pub fn answered(&self, torque_nm: &[f64]) -> Vec<f64> {
         first_order_lag(torque_nm, feedback_per_tick(self.instant_s()))
     }
 
-    /// Weights of the means of a torque from one sample to the next in Σ y_k τ̃_k, τ̃ as logged where no
-    /// drive answers
+    /// Weights w for which Σ y_k τ̃_k = Σ w_k τ̄_k, where τ̄_k is the mean of a torque from sample k to the next, and
+    /// τ̃ is the torque as logged where no drive answers
     /// ([`FineClock::as_logged_adjoint`](crate::signal::FineClock::as_logged_adjoint)); `None` for a single run.
     pub fn as_logged_adjoint(&self, y: &[f64]) -> Option<Vec<f64>> {
         Some(self.clock.as_ref()?.as_logged_adjoint(y, self.highest))
     }
 
-    /// What the samples of a log show of a friction `torque_nm`, given at the instants, for which the drive gives `given_nm`
-    /// in all.
+    /// How the samples of a log show a friction `torque_nm`, given at the instants, in answer to which the drive gives
+    /// `given_nm` in total.
     pub fn as_logged_but(&self, torque_nm: Vec<f64>, given_nm: &[f64]) -> Vec<f64> {
         match &self.clock {
             Some(clock) => clock.as_logged_but(&torque_nm, given_nm, self.highest),
@@ -213,7 +218,8 @@ impl Scene {
         }
     }
 
-    /// How the drive of joint `j` may answer dry friction, as columns ([`drive_answers`]); none for a single run.
+    /// Columns for the ways in which the drive of joint `j` may answer dry friction ([`drive_answers`]); none for a
+    /// single run.
     pub fn answers(&self, j: usize) -> &[Vec<f64>] {
         let Some(clock) = &self.clock else { return &[] };
         self.answers[j].get_or_init(|| {
@@ -221,14 +227,14 @@ impl Scene {
         })
     }
 
-    /// The coefficient of answer number `which` ([`Self::answers`]) that is `b` along a log whose instants are `instant_s` apart:
-    /// rates are per instant.
+    /// Converts the coefficient `b` of answer number `which` ([`Self::answers`]) to this log, from a log whose instants
+    /// are `instant_s` apart: the lead's column is a rate per instant.
     pub fn answer_from(&self, instant_s: f64, which: usize, b: f64) -> f64 {
         if which == 0 { b } else { b * (instant_s / self.instant_s()) }
     }
 
-    /// Whether the drive of joint `j` may be what gives its answer number `which` ([`Self::answers`]) the coefficient
-    /// `b`: it does not lead or lag its joint by more than `LONGEST_LEAD_S`.
+    /// Whether a real drive of joint `j` can give its answer number `which` ([`Self::answers`]) the coefficient `b`: no
+    /// drive leads or lags its joint by more than `LONGEST_LEAD_S`.
     pub fn can_answer(&self, j: usize, which: usize, b: f64) -> bool {
         let lead_s = b * self.instants(j).step_s;
         which == 0 || lead_s.abs() < LONGEST_LEAD_S * self.coulomb_nm[j].abs()

@@ -1,7 +1,7 @@
-//! What every candidate sees of a log: the motion, and what the current estimate makes of it.
+//! Input of every candidate: the motion of a log, and the torques that the current estimate predicts along it.
 //!
-//! Enters: the prepared log and base parameters. Leaves: motion, loads, friction's sign and inertias at every sample and, where the motion
-//! repeats, between the samples.
+//! Enters: the prepared log and base parameters. Leaves: motion, loads, sign of friction and inertias at every sample
+//! and, where the motion repeats, between the samples.
 
 mod between_samples;
 
@@ -24,8 +24,8 @@ use crate::signal::{FineClock, central_4, linear_at, mean_period};
 
 /// The processed motion of one log and the torques that the estimate predicts along it.
 ///
-/// A motion that repeats is one period of n samples, `periods` of which follow each other in the
-/// log; a single run is n samples, once.
+/// A periodic motion is stored as one period of n samples, `periods` of which follow each other in the log. A single
+/// run is stored as its n samples.
 pub struct Scene {
     /// The arm with parameters that are equivalent to the estimate.
     pub arm: Arm,
@@ -39,38 +39,39 @@ pub struct Scene {
     pub lead_in_s: f64,
     /// Whether the motion closes on itself.
     pub periodic: bool,
-    /// Mean angles and velocities of the periods as they were recorded, rad and rad/s.
+    /// Mean over the periods of the recorded angles and velocities, rad and rad/s.
     recorded: Option<[JointSignals; 2]>,
-    /// Torque that moves the links along the motion as it was recorded, Nm.
+    /// Torque that moves the links along the recorded motion, Nm.
     recorded_nm: JointSignals,
-    /// Torque that moves the links, Nm.
+    /// Torque that moves the links, Nm; in a periodic motion, only in the harmonics in which it is well known.
     pub link_nm: JointSignals,
     /// Torque on the gear: links and rotors, Nm.
     pub load_nm: JointSignals,
-    /// What the links take beside `link_nm` where joints reverse, Nm.
+    /// Torque that the links take in addition to `link_nm` where joints reverse, Nm.
     jolt_nm: JointSignals,
-    /// What moves the links of gears that give way.
+    /// Torque that moves the links of compliant gears.
     bending: LinkTorque,
-    /// What the drives deliver, where periods tell it.
+    /// Torque that the drives deliver, where several periods reveal it.
     delivered: Option<Delivered>,
-    /// I_a of every joint, kg m², no less than a small share of what its links resist with: what gears swing against.
+    /// Rotor inertia I_a of every joint, kg m², no less than a small share of the inertia of its links: compliant gears
+    /// need something to swing against.
     pub rotor_kg_m2: Vec<f64>,
-    /// How easily links and rotor are pressed apart, 1/(kg m²).
+    /// Relative acceleration of links and rotor per torque that presses them apart, 1/(kg m²).
     pub mobility_per_kg_m2: JointSignals,
     /// Predicted drive torque: load, friction and offset, Nm.
     pub torque_nm: JointSignals,
     /// tanh(q̇/ε).
     pub sign: JointSignals,
-    /// Noise of one sample of torque, Nm; zero where no period repeats to show it.
+    /// Noise of one sample of torque, Nm; zero for a single run, which has no repetitions to show it.
     pub noise_nm: Vec<f64>,
     /// Estimated Coulomb friction, Nm.
     pub coulomb_nm: Vec<f64>,
     /// Diagonal of the links' mass matrix along the motion, kg m².
     pub own_inertia_kg_m2: JointSignals,
-    /// Half-width of the interval around each recorded angle in which the true one lies, rad; zero for
-    /// a motion that repeats, whose angles are averaged.
+    /// Half-width of the interval around each recorded angle in which the true one lies, rad; zero for a periodic
+    /// motion, whose angles are averaged.
     pub angle_doubt_rad: Vec<f64>,
-    /// ± the largest torque that is read, where readings are cut off there, Nm.
+    /// Magnitude at which torque readings are cut off, Nm; `None` where they are not.
     pub torque_limit_nm: Vec<Option<f64>>,
     /// See [`Self::fine_link_nm`].
     fine_link_nm: Vec<OnceLock<Vec<f64>>>,
@@ -82,20 +83,20 @@ pub struct Scene {
     instants: Vec<OnceLock<Instants>>,
     /// See [`Self::sign_if_fed`].
     signs_if_fed: Vec<[OnceLock<Vec<f64>>; 2]>,
-    /// What the series of samples lacks of bends between them.
+    /// Correction of the Fourier series of the samples for bends between them.
     bends: OnceLock<Bends>,
     /// See [`Self::turning`].
     turnings: Vec<OnceLock<Turning>>,
     /// See [`Self::answers`].
     answers: Vec<OnceLock<Vec<Vec<f64>>>>,
-    /// Between the samples of a motion that repeats.
+    /// Fine clock between the samples of a periodic motion.
     clock: Option<FineClock>,
-    /// Up to which harmonic, below n/2, the accelerations of periods are known.
+    /// Highest harmonic, below n/2, up to which the accelerations of the periods are known.
     pub highest: usize,
 }
 
 impl Scene {
-    /// Along `prepared`, for the arm whose base parameters are `theta`.
+    /// The scene along `prepared`, for the arm with the base parameters `theta`.
     pub fn new(nominal: &Arm, set: &BaseSet, theta: &[f64], prepared: &Prepared) -> Self {
         let periodic = prepared.replicates.is_some();
         let mean_of =
@@ -181,7 +182,7 @@ impl Scene {
         self.motion.joints()
     }
 
-    /// Samples n of the motion.
+    /// Number of samples n of the motion.
     pub fn samples(&self) -> usize {
         self.motion.samples()
     }
@@ -191,8 +192,8 @@ impl Scene {
         (self.samples() * self.periods) as f64 / self.rate_hz
     }
 
-    /// The samples in the order in which they follow each other; of a motion that repeats from `before_s` before its
-    /// beginning on.
+    /// Indices of the samples in order of time. For a periodic motion, they start `before_s` before the beginning of
+    /// the period.
     pub fn entered(&self, before_s: f64) -> impl Iterator<Item = usize> + use<> {
         let n = self.samples();
         let before = if self.periodic { (before_s * self.rate_hz).ceil() as usize } else { 0 };
@@ -210,8 +211,8 @@ impl Scene {
         out
     }
 
-    /// Accelerations (rad/s²) of velocities `qd_rad_s` at the samples, as far as those of the log are known: of a motion that
-    /// repeats up to the highest harmonic that is.
+    /// Accelerations (rad/s²) of the velocities `qd_rad_s` at the samples, limited to what is known of the log's own:
+    /// in a periodic motion, to harmonics up to [`Self::highest`].
     pub fn accelerations(&self, qd_rad_s: &[f64]) -> Vec<f64> {
         match &self.clock {
             Some(clock) => clock.derivative_up_to(qd_rad_s, self.rate_hz, self.highest),
@@ -219,15 +220,17 @@ impl Scene {
         }
     }
 
-    /// Torque on the links of a gear at joint `j` that gives way, Nm, as far as the motion tells it.
+    /// Torque on the links of a compliant gear at joint `j`, Nm, as far as the motion determines it.
     pub fn bending_nm(&self, j: usize) -> &[f64] {
         self.bending.told_nm.joint(j)
     }
 
-    /// The predicted drive torque of joint `j` a time `delay_s` before every sample less that at the sample, Nm. Of dry
-    /// friction, which reverses between two samples, the instant counts; and a drive that is slow to answer it lets the
-    /// joint do so, so that load and friction change together and the torque hardly does. Where the load drowns, reversals
-    /// tell what the drive delivers.
+    /// Change of the predicted drive torque of joint `j` by a delay: its value `delay_s` before every sample less that
+    /// at the sample, Nm.
+    ///
+    /// Dry friction reverses between two samples, so that the exact instant counts. A drive that is slow to answer it
+    /// lets the joint accelerate instead; load and friction then change together, and their sum hardly does. In
+    /// harmonics where the load drowns in noise, the reversals tell what the drive delivers.
     pub fn change_by_delay_nm(&self, j: usize, delay_s: f64) -> Vec<f64> {
         let less = |late: Vec<f64>, now: &[f64]| -> Vec<f64> {
             late.iter().zip(now).map(|(late, now)| late - now).collect()
@@ -250,7 +253,8 @@ impl Scene {
         };
         let (coulomb, viscous) = (self.coulomb_nm[j], self.arm.joints[j].drive.viscous_nm_s_rad);
         let load = delivered.load_nm.joint(j);
-        // Elsewhere the velocity's noise, differentiated, is that of the acceleration, which the residual holds as well.
+        // In the other harmonics, the differentiated noise of the velocity is that of the acceleration, which the
+        // residual holds as well.
         let qd = part(self.motion.qd_rad_s.joint(j), true);
         let smooth: Vec<f64> = load.iter().zip(&qd).map(|(load, qd)| load + viscous * qd).collect();
         let smooth = less(self.delayed(&smooth, delay_s), &smooth);
@@ -260,14 +264,14 @@ impl Scene {
         smooth.iter().zip(&dry).zip(&beyond).map(sum).collect()
     }
 
-    /// Rate of the predicted drive torque of joint `j`, Nm/s: what a delay by one sample changes.
+    /// Rate of the predicted drive torque of joint `j`, Nm/s: minus its change by a delay of one sample, per unit of
+    /// time.
     pub fn torque_rate_nm_s(&self, j: usize) -> Vec<f64> {
         let change_nm = self.change_by_delay_nm(j, 1.0 / self.rate_hz);
         change_nm.into_iter().map(|nm| -nm * self.rate_hz).collect()
     }
 
-    /// The harmonics of a signal of n samples up to `highest_hz`, where the motion repeats; of a single run
-    /// the signal itself.
+    /// The part of a signal of n samples below `highest_hz` in a periodic motion; the signal itself in a single run.
     pub fn slow_part(&self, y: &[f64], highest_hz: f64) -> Vec<f64> {
         let Some(clock) = &self.clock else { return y.to_vec() };
         let last = (highest_hz * y.len() as f64 / self.rate_hz) as usize;
@@ -285,8 +289,7 @@ impl Scene {
         (0..y.len()).map(value).collect()
     }
 
-    /// y behind a filter with the response `response(ω)`, ω in rad/s; y itself times the response at rest
-    /// where the motion does not repeat.
+    /// y filtered with the response `response(ω)`, ω in rad/s. In a single run, y times the response at ω = 0.
     pub fn filtered(&self, y: &[f64], response: impl Fn(f64) -> Complex64) -> Vec<f64> {
         let Some(clock) = &self.clock else {
             let at_rest = response(0.0).re;
@@ -296,7 +299,7 @@ impl Scene {
         clock.filtered(y, |h| response(h as f64 * omega))
     }
 
-    /// Change of the link torques, Nm, when `arm` moves as `motion` instead of what was recorded.
+    /// Change of the link torques, Nm, when `arm` moves as `motion` instead of as recorded.
     pub fn torque_change(&self, arm: &Arm, motion: &Motion) -> JointSignals {
         let mut changed = rigid_torque_along(&Model::new(arm), motion);
         for j in 0..self.joints() {
@@ -310,11 +313,11 @@ impl Scene {
     }
 }
 
-/// An arm with the base parameters `theta`, and the constant torques that go with it, Nm.
+/// An arm with the base parameters `theta`, and the constant torques that belong to it, Nm.
 ///
-/// Base parameters are combinations; of the many arms with the same combinations this is the one
-/// that differs from `nominal` in the kept parameters only. Every torque along every motion is that
-/// of the estimate, though a single body may come out unphysical.
+/// Base parameters are combinations of standard parameters, shared by many arms. This arm is the one that differs from
+/// `nominal` only in the kept parameters. Its torques along every motion are those of the estimate, although a single
+/// body may come out unphysical.
 pub fn equivalent_arm(nominal: &Arm, set: &BaseSet, theta: &[f64]) -> (Arm, Vec<f64>) {
     let layout = ParameterLayout::new(nominal.dof());
     let full = set.parameterisation.count() >= layout.count_without_offsets();

@@ -1,10 +1,11 @@
-//! How much the noise of joints has in common.
+//! Coherence between the noise of different joints.
 
 use nalgebra::{Complex, DMatrix};
 
-/// Mean squared coherence between two joints at every harmonic, from the `scatter` of the harmonics within `reach` of it,
-/// each of which chance alone gives 1/M with M complex degrees of freedom, `freedom` (Carter, Knapp and Nuttall 1973). `None`
-/// where that tells nothing: of two periods every pair is coherent.
+/// Mean squared coherence between two joints at every harmonic, from the `scatter` of the harmonics within `reach` of
+/// it. Chance alone gives each of them 1/M with M = `freedom` complex degrees of freedom (Carter, Knapp and Nuttall
+/// 1973), for which the mean is corrected. `None` where nothing can be concluded: with two periods, every pair is
+/// coherent.
 pub fn coherence(
     scatter: &[DMatrix<Complex<f64>>],
     freedom: usize,
@@ -40,7 +41,7 @@ mod tests {
     use rand::{SeedableRng, rngs::ChaCha8Rng};
     use rand_distr::{Distribution, StandardNormal};
 
-    /// Scatter of `joints` whose noise shares a part of the amplitude `common`, of so many periods.
+    /// Scatter of `joints` whose noise shares a part of amplitude `common`, with `freedom` complex degrees of freedom.
     fn scatter(joints: usize, freedom: usize, common: f64) -> Vec<DMatrix<Complex<f64>>> {
         let mut rng = ChaCha8Rng::seed_from_u64(9);
         let mut normal = || -> Complex<f64> {
@@ -59,16 +60,17 @@ mod tests {
         (0..400).map(of_harmonic).collect()
     }
 
-    /// Independent noise has none; noise of which 0.3 of the power is common has 0.3², the squared correlation, but for
-    /// what the correction for chance is low by: γ² + (1 − γ²)² (1 + 2 γ²/M)/M is to be expected uncorrected, 0.080 corrected,
-    /// a tenth less.
+    /// Independent noise has no coherence. Noise of which 0.3 of the power is common has 0.3², the squared correlation,
+    /// apart from the bias of the correction for chance: uncorrected, γ² + (1 − γ²)² (1 + 2 γ²/M)/M is expected, which
+    /// is 0.080 when corrected, a tenth too little.
     #[test]
     fn coherence_is_that_of_the_noise() {
         const FREEDOM: usize = 7;
         for (common, expected) in [(0.0f64, 0.0), (0.3f64.sqrt(), 0.09)] {
             let found = coherence(&scatter(6, FREEDOM, common), FREEDOM, |_| 1000);
             let found = found[200].unwrap();
-            // 400 harmonics of fifteen pairs, each of which scatters by 1/7: 0.002, of which this is five.
+            // Each of 400 harmonics of fifteen pairs scatters by 1/7: 0.002 in the mean; the tolerance is five of
+            // these.
             assert!((found - expected).abs() < 0.01 + 0.1 * expected, "{found} {expected}");
         }
     }

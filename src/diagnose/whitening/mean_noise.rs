@@ -1,37 +1,40 @@
-//! The noise of the mean torque: what the harmonics beside it tell, and what the means of the periods tell themselves.
+//! Noise of the mean torque: what the neighbouring harmonics predict, corrected by the scatter of the means of the
+//! periods.
 
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::diagnose::noise_power::Uncertainty;
 use crate::signal::LogScatter;
 
-/// A mean torque that scatters so much more than its neighbours that noise shows it less often than this, drifts; one that
-/// scatters so much less tells nothing, as where a still joint's torque is rounded.
+/// A mean torque drifts if noise alone makes it scatter so much more than its neighbours with less than this
+/// probability. If it scatters so much less, with less than this probability, it tells nothing, as where the torque of
+/// a still joint is rounded.
 const RARE: f64 = 1.0 / 300.0;
 
-/// A joint's mean torque that scatters so much that noise does it less often than this is worth a remark.
+/// Probability, under noise, below which the scatter of a joint's mean torque is worth a remark.
 const REMARKABLE: f64 = 1e-5;
 
-/// Probability that noise makes a mean torque scatter less than `ratio` times what the harmonics beside it let expect, of which not
-/// more is known than its logarithm's variance `unknown`; `None` where nothing scatters at all.
+/// Probability that noise makes a mean torque scatter less than `ratio` times the prediction of the neighbouring
+/// harmonics, whose logarithm has the variance `unknown`; `None` where nothing scatters at all.
 fn below(ratio: f64, freedom: usize, unknown: f64) -> Option<f64> {
     let of_noise = FisherSnedecor::new(freedom as f64, 2.0 / unknown).ok();
     of_noise.filter(|_| ratio.is_finite()).map(|of_noise| of_noise.cdf(ratio))
 }
 
-/// Whether a mean torque that scatters by `ratio` changes more than noise can, see [`with_own_scatter`].
+/// Whether a mean torque whose scatter is `ratio` times the prediction varies more than noise can, see
+/// [`with_own_scatter`].
 pub fn drifts(ratio: f64, freedom: usize, unknown: f64) -> bool {
     below(ratio, freedom, unknown).is_some_and(|below| below > 1.0 - REMARKABLE)
 }
 
-/// Corrects the power of the mean's noise by what its own scatter over the periods tells; what it has to be multiplied by, per
-/// joint, and in `unknown` what is not known of it then. `ratio` is the scatter of every joint's mean over what the
-/// harmonics beside it let expect, with ν degrees of `freedom`.
+/// Corrects the noise power of the mean by its own scatter over the periods. Returns the factor for each joint, and
+/// updates `unknown` to the uncertainty that remains. `ratio` is the scatter of every joint's mean relative to the
+/// prediction of the neighbouring harmonics, with ν degrees of `freedom`.
 ///
-/// A joint whose mean drifts has the power of its scatter. Of the others x = ln ratio, which scatters about s + c with the
-/// variance ψ'(ν/2): s the error of what all joints share, c that of the joint's own, of which `unknown` gives the variances
-/// before. The power is multiplied by the exponential of the posterior mean of s + c. Of the variance of s all counts afterwards, also
-/// what a joint's own ratio takes of it.
+/// A joint whose mean drifts gets the power of its scatter. For the others, x = ln ratio scatters about s + c with the
+/// variance ψ'(ν/2), where s is the error that all joints share and c that of the joint alone; `unknown` gives their
+/// prior variances. The power is multiplied by the exponential of the posterior mean of s + c. The full posterior
+/// variance of s is kept, although a joint's own ratio reduces its part of it.
 pub fn with_own_scatter(ratio: &[f64], freedom: usize, unknown: &mut Uncertainty) -> Vec<f64> {
     let (mut steady, mut drifting) = (Vec::new(), Vec::new());
     for (j, &ratio) in ratio.iter().enumerate() {
@@ -45,7 +48,7 @@ pub fn with_own_scatter(ratio: &[f64], freedom: usize, unknown: &mut Uncertainty
     let beyond = |j: usize| scatter.logarithm(ratio[j]);
     let own = |unknown: &Uncertainty, j: usize| unknown.level + unknown.colour[j];
 
-    // Joints whose noise is alike tell the same of what they share.
+    // Joints with coherent noise carry the same information on the shared error.
     let alike = 1.0 + (steady.len() as f64 - 1.0) * unknown.likeness;
     let weight = |j: &usize| 1.0 / (alike * (own(unknown, *j) + scatter.variance));
     let weights: f64 = steady.iter().map(weight).sum();
@@ -81,7 +84,7 @@ mod tests {
         Uncertainty { shared: 0.03, level: 0.01, likeness: 0.0, colour: vec![0.04; JOINTS] }
     }
 
-    /// What is said to be not known of the noise afterwards is what is not, and is less than before.
+    /// The claimed remaining uncertainty of the noise is the actual one, and is less than before.
     #[test]
     fn errors_are_as_large_as_they_are_said_to_be() {
         const TRIALS: usize = 4000;
@@ -103,17 +106,17 @@ mod tests {
         }
         let count = (TRIALS * JOINTS) as f64;
         let [square, claimed] = [squares / count, claimed / count];
-        // By hand: 1/(1/0.03 + 6/(0.05 + 0.330)) shared, 0.05 · 0.330/(0.05 + 0.330) of each joint; and of one joint in 300, which
-        // is said to drift, 2/7 in place of its own.
+        // By hand: 1/(1/0.03 + 6/(0.05 + 0.330)) for the shared error and 0.05 · 0.330/(0.05 + 0.330) for each joint's
+        // own; one joint in 300 counts as drifting and has 2/7 instead of its own.
         let own = 0.043_42 + (2.0 / 7.0 - 0.043_42) / 300.0;
         assert!((claimed - (0.020_35 + own)).abs() < 3e-4, "{claimed}");
-        // The square scatters by 1 %. Of what is shared (1 − 0.05/0.380)² is left unknown, and all of it counts, so that 0.92 of what is
-        // claimed is to be expected; as ln χ²₇ is skewed the linear estimate loses some of it again, and the noise that is taken for
-        // drift (of one joint in 300) has an error of ln 3 and more.
+        // The square scatters by 1 %. The share (1 − 0.05/0.380)² of the shared variance actually remains, while all of
+        // it is claimed, so that 0.92 of the claim is expected. As ln χ²₇ is skewed, the linear estimate loses a part
+        // of this again, and noise that is taken for drift (one joint in 300) has an error of ln 3 and more.
         assert!((square / claimed - 0.97).abs() < 0.05, "{square} {claimed}");
     }
 
-    /// Neither a mean that drifts nor one that shows no noise at all says anything of the other joints.
+    /// Neither a drifting mean nor one without any noise says anything about the other joints.
     #[test]
     fn means_unlike_noise_are_left_to_themselves() {
         let mut unknown = before();
@@ -121,14 +124,15 @@ mod tests {
         assert_eq!(factor[2], 30.0);
         assert!((factor[3].ln() - 0.036).abs() < 1e-3, "{factor:?}");
         assert_eq!(unknown.colour[2..4], [2.0 / 7.0, 0.04]);
-        // ln χ²₇/7 is low by 0.149: of a ratio of one the four joints take 0.149 · 4 · 0.030/0.380/(1 + 4 · 0.030/0.380) = 0.036 to be
-        // shared, and of the rest each 0.05/0.380.
+        // E ln(χ²₇/7) is −0.149. From a ratio of one, the four joints attribute 0.149 · 4 · 0.030/0.380/(1 + 4 ·
+        // 0.030/0.380) = 0.036 to the shared error, and 0.05/0.380 of the remainder each to their own.
         for j in [0, 1, 4, 5] {
             assert!((factor[j].ln() - 0.051).abs() < 1e-3, "{factor:?}");
         }
     }
 
-    /// Of two periods a mean has one number; without any joint that tells, or anything shared, nothing changes but by the joint's own.
+    /// With two periods, the scatter of a mean is a single number. Without any joint that tells something, or without a
+    /// shared error, nothing changes but by the joint's own scatter.
     #[test]
     fn few_periods_and_silent_joints_leave_numbers() {
         let mut unknown = before();

@@ -1,8 +1,8 @@
-//! The equations of a log in which noise is white: where every test is made.
+//! The whitened equations of a log, on which every test is made.
 //!
-//! Enters: a regression and the motion of its log. Leaves: for any torque in time its rows, in which noise has variance
-//! one, of the mean of periods that repeat and of their differences, or of the samples of a single run in which joints
-//! move.
+//! Enters: a regression and the motion of its log. Leaves: the rows of any torque signal in these equations, where
+//! noise has variance one. For a periodic motion, these are rows of the mean period and of the differences between
+//! periods; for a single run, rows of the samples in which joints move.
 
 mod coherence;
 mod mean_noise;
@@ -20,16 +20,16 @@ pub use scatter::FLOOR;
 use super::image::{Column, Image};
 use crate::robot::JointSignals;
 
-/// From torques in time to whitened rows.
+/// Map from torques in time to whitened rows.
 pub enum Whitening {
-    /// A motion that repeats: noise known from the scatter between periods.
+    /// A periodic motion: the noise is known from the scatter between periods.
     Periods(Box<PeriodWhitening>),
-    /// A single run: rows of moving samples, divided by the scatter of the fit's residual.
+    /// A single run: rows of the samples in which joints move, divided by the scatter of the fit's residual.
     Run(RunWhitening),
 }
 
 impl Whitening {
-    /// Rows of a torque signal given in time.
+    /// Whitened rows of a torque signal in time.
     pub fn image(&self, column: &Column) -> Image {
         match self {
             Self::Periods(periods) => periods.image(column),
@@ -37,7 +37,7 @@ impl Whitening {
         }
     }
 
-    /// [`Self::image`] of all of `columns`, which costs less than one by one.
+    /// [`Self::image`] of all `columns` at once, which costs less than one by one.
     pub fn images<'c>(&self, columns: impl Iterator<Item = &'c Column>) -> Vec<Image> {
         match self {
             Self::Periods(periods) => periods.images(columns),
@@ -45,7 +45,7 @@ impl Whitening {
         }
     }
 
-    /// Rows of a column of the regression, which has been through its filter.
+    /// Whitened rows of a column of the regression, which has already been through its filter.
     pub fn regression_image(&self, column: &Column) -> Image {
         match self {
             Self::Periods(periods) => periods.image(column),
@@ -53,7 +53,7 @@ impl Whitening {
         }
     }
 
-    /// Wᵀr in time: its correlation with a torque signal is that signal's score. `None` for a single run.
+    /// Wᵀr in time: its scalar product with a torque signal is the score of that signal. `None` for a single run.
     pub fn in_time(&self, rows: &Image) -> Option<JointSignals> {
         match self {
             Self::Periods(periods) => Some(periods.in_time(&rows.mean)),
@@ -61,7 +61,7 @@ impl Whitening {
         }
     }
 
-    /// Joints (0-based) whose mean torque changes from period to period more than noise does, and by how much, Nm rms.
+    /// Joints (0-based) whose mean torque changes from period to period by more than noise, and by how much, Nm rms.
     pub fn drifting(&self) -> &[(usize, f64)] {
         match self {
             Self::Periods(periods) => periods.drifting(),
@@ -69,7 +69,7 @@ impl Whitening {
         }
     }
 
-    /// Torque in time (n samples) as the regression sees it: filtered and cut for a single run.
+    /// Torque in time (n samples) as the regression sees it: filtered and decimated for a single run.
     pub fn as_regressed(&self, y: &[f64]) -> Vec<f64> {
         match self {
             Self::Periods(_) => y.to_vec(),

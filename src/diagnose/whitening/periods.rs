@@ -1,4 +1,4 @@
-//! Noise known from the scatter between periods.
+//! Whitening of a periodic motion, whose noise is known from the scatter between periods.
 
 use fourier::Forward;
 use nalgebra::Complex;
@@ -16,52 +16,60 @@ use crate::identify::{Panel, Regression};
 use crate::robot::JointSignals;
 use crate::signal::pooled_level;
 
-/// Per harmonic, with S the N × N noise covariance of one period's Fourier coefficients:
-/// rows √P L⁻¹ Ȳ_k of the mean period and L⁻¹ C_k of P − 1 orthonormal contrasts, S = L Lᴴ. Where rows of a log are the mean of
-/// other periods, P and S are those of the rest ([`Prepared::kept`](crate::identify::Prepared::kept)).
+/// Whitened rows per harmonic: √P L⁻¹ Ȳ_k of the mean period and L⁻¹ C_k of P − 1 orthonormal contrasts, where S = L Lᴴ
+/// is the N × N noise covariance of one period's Fourier coefficients. Where samples of some periods are missing and
+/// filled in from the others, P and the degrees of freedom of S are reduced accordingly
+/// ([`Prepared::kept`](crate::identify::Prepared::kept)).
 ///
-/// S is the scatter between periods, divided by the trend of every joint's power over frequency ([`noise_trends`]) so that
-/// steep noise does not bend it, averaged over neighbouring harmonics, and scaled by M/(M − N) (M complex
-/// degrees of freedom, N joints) so that ⟨Yᴴ S⁻¹ Y⟩ is that of the true covariance. Friction that drifts
-/// ([`FrictionDrift`]) is no noise, left out of it, and what it takes of noise is made up for. Torques have been
-/// moved to a common motion before, so that S is the noise of torque and acceleration together. To it comes
-/// what sampling does to the acceleration where friction reverses: the velocity has a kink there, whose
-/// spectrum falls as 1/f², and holds at f the share (f/(f_s − f))² of it that belongs to f_s − f. What is not followed
-/// of it between the samples ([`NOT_FOLLOWED`]) is an error of the equations that no period tells from another. What torques of
-/// unknown height do around reversals, on single joints ([`PeriodWhitening::with_noise_of_joints`]) or anywhere
-/// ([`PeriodWhitening::with_repeating_noise`]), is whitened behind L⁻¹.
+/// S is estimated from the scatter between periods. The scatter is divided by the trend of every joint's power over
+/// frequency ([`noise_trends`]), so that steep noise does not bias it, averaged over neighbouring harmonics, and scaled
+/// by M/(M − N) (M complex degrees of freedom, N joints), so that ⟨Yᴴ S⁻¹ Y⟩ is that of the true covariance. Friction
+/// that drifts ([`FrictionDrift`]) is not noise: it is removed before, and the scatter that this removal costs is made
+/// up for. Torques have been moved to a common motion before, so that S is the noise of torque and acceleration
+/// together.
+///
+/// Sampling adds an error to the acceleration where friction reverses. The velocity has a kink there, whose spectrum
+/// falls as 1/f²; at f, the kink's component at f_s − f appears as an alias with the share (f/(f_s − f))². The part of
+/// it that is not followed between the samples ([`NOT_FOLLOWED`]) is an error of the equations that is the same in
+/// every period, and is added to S.
+///
+/// Torques of unknown height around reversals, on single joints ([`PeriodWhitening::with_noise_of_joints`]) or anywhere
+/// ([`PeriodWhitening::with_repeating_noise`]), are whitened after L⁻¹.
 pub struct PeriodWhitening {
     samples: usize,
     periods: usize,
     joints: usize,
-    /// Periods that make the mean, where some rows are the mean of others.
+    /// Effective number of periods in the mean, less than `periods` where samples are filled in.
     of_mean: f64,
     forward: Forward,
-    /// L⁻¹ per harmonic that is used, row-major N × N.
+    /// L⁻¹ per harmonic in use, row-major N × N.
     factors: Vec<Vec<Complex<f64>>>,
-    /// How well the noise's power is known, per harmonic.
+    /// Uncertainty of the noise's power, per harmonic.
     unknown: Vec<Uncertainty>,
-    /// Joints (0-based) whose mean torque changes from period to period more than noise does, and its standard deviation, Nm.
+    /// Joints (0-based) whose mean torque changes from period to period by more than noise, and its standard deviation,
+    /// Nm.
     drifting: Vec<(usize, f64)>,
-    /// Steps that slow noise makes in one period, per joint, as high as their standard deviation.
+    /// Steps that slow noise makes in one period, per joint, each as high as its standard deviation.
     steps: Vec<Image>,
     stepping: Option<RepeatingNoise>,
-    /// Of every joint, its rows and noise that repeats in them.
+    /// For every joint, its rows and the repeating noise in them.
     of_joints: Vec<(Vec<usize>, RepeatingNoise)>,
     repeating: Option<RepeatingNoise>,
 }
 
-/// Share of Coulomb's torque whose kink is not followed between samples. In the fastest eighth of the harmonics of clean logs
-/// with a twentieth of the benchmark's noise, whose drives feed 0, 0.5 and 0.9 of friction forward along both its motions,
-/// what residuals have beyond that noise is left by 0.01 to 0.4 of it, on joint 2 behind drives that feed half by 0.9: 0.2 in
-/// rms.
+/// Share of the Coulomb friction whose kink is not followed between samples.
+///
+/// In the fastest eighth of the harmonics of clean logs with a twentieth of the benchmark's noise, residuals exceed
+/// that noise as if a share of 0.01 to 0.4 were left, and 0.9 on joint 2 behind drives that feed half forward; the rms
+/// is 0.2. The drives feed 0, 0.5 and 0.9 of friction forward, along both motions of the benchmark.
 const NOT_FOLLOWED: f64 = 0.2;
-/// How far, over the rate, what is used ends below the highest frequency of the periods' own motion. Not far, because half
-/// of what narrow play shows in 125 samples a second lies between 44 and 58 Hz.
+/// Distance, relative to the sampling rate, of the highest harmonic in use from the highest frequency of the periods'
+/// own motion. It is small because, at 125 samples a second, half of the signal of narrow play lies between 44 and 58
+/// Hz.
 const BELOW_HIGHEST: f64 = 0.02;
 
 impl PeriodWhitening {
-    /// From the periods of a log.
+    /// Whitening from the periods of a log.
     pub fn new(regression: &Regression, scene: &Scene, log: &str) -> Result<Self, DiagnoseError> {
         let problem = &regression.problem;
         let (n, periods, joints) = (problem.samples, problem.periods, problem.joints());
@@ -82,7 +90,7 @@ impl PeriodWhitening {
         };
         let used = ((regression.prepared.highest - BELOW_HIGHEST) * n as f64).round() as usize;
         let used = used.min(scene.highest);
-        // Beyond it the torque was not moved to the common motion.
+        // Beyond `highest`, the torque was not moved to the common motion.
         let last = (used + pooled_level(used)).min(scene.highest);
         let drift = FrictionDrift::beside_mean(&scene.motion.qd_rad_s, periods);
         let without_drift = |(j, panel): (usize, &Panel)| {
@@ -110,7 +118,8 @@ impl PeriodWhitening {
         let scatter = Scatter::of(&all, |period| whitening.spectrum(period));
         let corners: Vec<Vec<Complex<f64>>> =
             (0..joints).map(|j| whitening.spectrum(scene.sign.joint(j))).collect();
-        // f/(f_s − f), squared, of the corners that friction makes in the velocity.
+        // Amplitude of the kinks that friction makes in the velocity, as aliased: the share (f/(f_s − f))² of each
+        // coefficient.
         let corner = |j: usize, k: usize| {
             let alias = (k as f64 / (n - k) as f64).powi(2);
             NOT_FOLLOWED * alias * scene.coulomb_nm[j] * corners[j][k].norm()
@@ -135,8 +144,9 @@ impl PeriodWhitening {
         Ok(whitening)
     }
 
-    /// Takes torques on single joints that repeat in every period and whose heights have the standard deviation one for noise,
-    /// joint by joint: as far as its own rows have them, which those of the joints behind it resemble by their common noise alone.
+    /// Treats torques on single joints as additional noise, joint by joint. Each torque repeats in every period; its
+    /// height is unknown, with standard deviation one. Only the rows of the joint itself are whitened: the rows of
+    /// later joints show the torque merely because their noise is correlated with that of the joint.
     pub fn with_noise_of_joints(&mut self, torques: &[(usize, Vec<Column>)]) {
         let of_joint = |(joint, torques): &(usize, Vec<Column>)| {
             let harmonics = 0..self.factors.len();
@@ -153,9 +163,9 @@ impl PeriodWhitening {
         self.of_joints = of_joints;
     }
 
-    /// Takes torques that repeat in every period and whose heights have the standard deviation one for noise.
+    /// Treats torques as additional noise that repeats in every period, with heights of standard deviation one.
     pub fn with_repeating_noise<'c>(&mut self, torques: impl Iterator<Item = &'c Column>) {
-        // Steps of periods that follow each other take each other back, so that their mean has the first and the last end alone: 1/P of one
+        // Steps of consecutive periods cancel, so that only the first and the last end are left in the mean: 1/P of one
         // step's variance where noise forgets within a period, 2/P where its memory is as long as one.
         let mut steps = self.steps.clone();
         steps.iter_mut().for_each(|step| step.scale((2.0 / self.periods as f64).sqrt()));
@@ -165,10 +175,10 @@ impl PeriodWhitening {
         self.repeating = Some(RepeatingNoise::new(&images));
     }
 
-    /// Whitens the means of `images` for noise of single joints; its own adjoint.
+    /// Whitens the means of `images` for the noise of single joints. The map is its own adjoint.
     fn whiten_joints(&self, images: &mut [Image]) {
         for (rows, noise) in &self.of_joints {
-            // A torque that does not act on the joint is zero in its rows and stays so.
+            // A column that does not act on the joint is zero in its rows, and stays zero.
             let (mut acting, mut own): (Vec<_>, Vec<_>) = images
                 .iter_mut()
                 .filter(|image| rows.iter().any(|row| image.mean[*row] != 0.0))
@@ -202,7 +212,7 @@ impl PeriodWhitening {
         &self.drifting
     }
 
-    /// How well the noise of every row is known.
+    /// Uncertainty of the noise in every row.
     pub fn knowledge(&self) -> NoiseKnowledge {
         NoiseKnowledge::new(self.unknown.clone())
     }
@@ -211,7 +221,7 @@ impl PeriodWhitening {
     fn spectrum(&self, period: &[f64]) -> Vec<Complex<f64>> {
         let mut time = period.to_vec();
         let mut out = self.forward.make_output_vec();
-        // The lengths are the plan's own, so that the transform succeeds.
+        // The lengths are those of the plan, so that the transform succeeds.
         let _ = self.forward.process(&mut time, &mut out);
         let scale = 1.0 / (self.samples as f64).sqrt();
         out.iter_mut().for_each(|c| *c *= scale);
@@ -243,7 +253,7 @@ impl PeriodWhitening {
         out
     }
 
-    /// The adjoint of [`Self::rows`], per joint over one period.
+    /// Adjoint of [`Self::rows`] and of the whitening of repeating noise, per joint over one period.
     pub(super) fn in_time(&self, rows: &[f64]) -> JointSignals {
         let n = self.samples;
         let mut image = [Image { mean: rows.to_vec(), contrast: Vec::new() }];
@@ -274,7 +284,7 @@ impl PeriodWhitening {
             if n.is_multiple_of(2) {
                 spectrum[n / 2].im = 0.0;
             }
-            // The lengths are the plan's own, so that the transform succeeds.
+            // The lengths are those of the plan, so that the transform succeeds.
             let _ = inverse.process(spectrum, out.joint_mut(j));
             out.joint_mut(j).iter_mut().for_each(|v| *v *= scale);
         }
@@ -312,7 +322,7 @@ impl PeriodWhitening {
         }
     }
 
-    /// [`Self::image`] but for [`Self::whiten_what_repeats`].
+    /// [`Self::image`] without whitening for noise that repeats.
     pub(super) fn image_in_noise(&self, column: &Column) -> Image {
         let n = self.samples;
         let repeats = column.parts.iter().all(|(_, y)| y.len() == n);
@@ -330,7 +340,7 @@ impl PeriodWhitening {
                 column.parts.iter().map(|(j, y)| (*j, part(y))).collect()
             })
             .collect();
-        // Helmert's contrasts: period c against the mean of the periods before it.
+        // Helmert contrasts: period c against the mean of the periods before it.
         let combine = |weights: &[f64]| -> Vec<(usize, Vec<Complex<f64>>)> {
             let mut sum = periods[0].clone();
             for (part, (_, spectrum)) in sum.iter_mut().enumerate() {
@@ -354,7 +364,7 @@ impl PeriodWhitening {
 
 #[cfg(test)]
 impl PeriodWhitening {
-    /// Of noise with variance one that no harmonics and no joints share.
+    /// Whitening for noise of variance one, independent between harmonics and joints.
     pub(super) fn of_white_noise(samples: usize, periods: usize, joints: usize) -> Self {
         let identity = nalgebra::DMatrix::<Complex<f64>>::identity(joints, joints);
         Self {
@@ -378,7 +388,8 @@ impl PeriodWhitening {
 mod tests {
     use super::*;
 
-    /// Along a torque a of a joint the noise has the variance 1 + |a|²; and ⟨W c, r⟩ = ⟨c, Wᵀ r⟩ with noise of all as well.
+    /// Along a torque a of a joint, the noise has the variance 1 + |a|². With noise on all joints as well, ⟨W c, r⟩ =
+    /// ⟨c, Wᵀ r⟩.
     #[test]
     fn noise_of_joints_is_whitened_and_in_time_is_the_adjoint() {
         const SAMPLES: usize = 40;
@@ -402,7 +413,7 @@ mod tests {
         let rows = whitening.image(&wave(1, 0.4, 3.0));
         let in_time = whitening.in_time(&rows.mean);
         let of_time: f64 = torque.parts[0].1.iter().zip(in_time.joint(1)).map(|(a, b)| a * b).sum();
-        // In time a row is not yet weighted by the periods that make the mean.
+        // `in_time` does not apply the weight √P of the mean over P periods.
         let of_rows = whitening.image(&torque).dot(&rows) / 3f64.sqrt();
         assert!((of_time - of_rows).abs() < 1e-12 * of_rows.abs().max(1.0), "{of_time} {of_rows}");
     }

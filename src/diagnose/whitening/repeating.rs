@@ -1,12 +1,13 @@
-//! Torques of unknown height as noise.
+//! Torques of unknown height, treated as noise.
 
 use faer::Mat;
 use nalgebra::{DMatrix, DVector};
 
 use crate::diagnose::image::{Image, Span};
 
-/// Torques of unknown height that repeat in every period, as noise of the mean period: with A the rows of torques whose height
-/// has the standard deviation one, its covariance I + A Aᵀ is whitened by I + Q (√(I + R Rᵀ)⁻¹ − I) Qᵀ, A = Q R.
+/// Torques of unknown height that repeat in every period, treated as noise of the mean period. With A the rows of
+/// torques whose height has the standard deviation one, the covariance is I + A Aᵀ. It is whitened by I + Q (√(I + R
+/// Rᵀ)⁻¹ − I) Qᵀ, where A = Q R.
 pub struct RepeatingNoise {
     /// Q.
     directions: Span,
@@ -15,7 +16,7 @@ pub struct RepeatingNoise {
 }
 
 impl RepeatingNoise {
-    /// Of torques whose whitened rows, at the height of one standard deviation, are `columns`.
+    /// Noise of torques whose whitened rows, at a height of one standard deviation, are `columns`.
     pub fn new(columns: &[Image]) -> Self {
         let mut directions = Span::default();
         columns.iter().for_each(|column| {
@@ -36,7 +37,7 @@ impl RepeatingNoise {
         Self { directions, change: Mat::from_fn(k, k, |i, j| change[(i, j)]) }
     }
 
-    /// Whitens the means of `images`, all of them at once. Symmetric, it is its own adjoint.
+    /// Whitens the means of `images`, all of them at once. The map is symmetric, hence its own adjoint.
     pub fn whiten(&self, images: &mut [Image]) {
         let change = &self.change * self.directions.along(images);
         self.directions.add_combinations(images, 1.0, &change);
@@ -47,7 +48,7 @@ impl RepeatingNoise {
 mod tests {
     use super::*;
 
-    /// W (I + A Aᵀ) W = I, for torques that resemble each other.
+    /// W (I + A Aᵀ) W = I, for similar torques.
     #[test]
     fn noise_that_repeats_is_whitened() {
         let columns = [[3.0, 1.0, 0.0, 0.5], [2.5, 1.5, 0.0, 0.0]];

@@ -1,4 +1,4 @@
-//! Noise of a single run, of which only the fit's residual tells.
+//! Whitening of a single run, whose noise is known only from the fit's residual.
 
 use std::ops::Range;
 
@@ -7,29 +7,29 @@ use crate::diagnose::image::{Column, Image};
 use crate::identify::{KEPT_RATE, MOVING_RAD_S, Options, Regression};
 use crate::signal::{Scratch, ZeroPhase};
 
-/// Rows of a single run: the regression's low-pass, then a weight per joint, and only samples in
-/// which the joint moves: at rest dry friction may be anything between ±Fc.
+/// Rows of a single run: the regression's low-pass, then one weight per joint. Only samples in which the joint moves
+/// count: at rest, dry friction may take any value between ±Fc.
 pub struct RunWhitening {
     filter: ZeroPhase,
     first_sample: usize,
     every: usize,
     rows: usize,
-    /// Every so many rows are tested: behind a low-pass neighbours say the same.
+    /// Only every `thin`-th row is tested: after a low-pass, neighbouring rows carry the same information.
     thin: usize,
     weights: Vec<f64>,
-    /// Per joint and row.
+    /// Whether a row counts, per joint and row.
     counts: Vec<Vec<bool>>,
-    /// Rows per block of time, for tests that allow noise with a memory.
+    /// Rows per block of time, for tests that allow for autocorrelated noise.
     block_rows: usize,
 }
 
-/// Blocks of a single run.
+/// Length of the blocks of a single run, s.
 const BLOCK_S: f64 = 1.0;
-/// A joint that does not move ([`MOVING_RAD_S`]) for so long, s, stands still.
+/// A joint slower than [`MOVING_RAD_S`] for this long, s, stands still.
 const REST_S: f64 = 0.25;
 
 impl RunWhitening {
-    /// From a single run and the standard deviation of its residual per joint, Nm.
+    /// Whitening of a single run, from the standard deviation of its residual per joint, Nm.
     pub fn new(
         regression: &Regression,
         options: &Options,
@@ -58,7 +58,7 @@ impl RunWhitening {
         one_joint.repeat(self.weights.len())
     }
 
-    /// Whether a row of an image counts.
+    /// Whether each row of an image counts.
     pub fn counting(&self) -> Vec<bool> {
         self.counts.iter().flat_map(|counts| counts.iter().step_by(self.thin).copied()).collect()
     }
@@ -77,7 +77,7 @@ impl RunWhitening {
             .collect()
     }
 
-    /// These rows of the regression count on no joint any more.
+    /// Excludes these rows of the regression on all joints.
     pub fn leave_out(&mut self, rows: &[Range<usize>]) {
         for counts in &mut self.counts {
             rows.iter().for_each(|rows| counts[rows.clone()].fill(false));
@@ -89,10 +89,10 @@ impl RunWhitening {
         self.counts[joint][row]
     }
 
-    /// `y` in time as the regression sees it.
+    /// `y` in time as the regression sees it: filtered and decimated.
     pub(super) fn filtered(&self, y: &[f64]) -> Vec<f64> {
         let mut filtered = y.to_vec();
-        // The run is longer than the filter's memory, or there would be no regression of it.
+        // The run is longer than the filter's memory; otherwise there would be no regression.
         let _ = self.filter.filter_in_place(&mut filtered, &mut Scratch::default());
         filtered
             .iter()
@@ -103,7 +103,7 @@ impl RunWhitening {
             .collect()
     }
 
-    /// See [`super::Whitening::image`]; `is_filtered` is what has been through the regression's filter.
+    /// See [`super::Whitening::image`]; `is_filtered` marks columns that have been through the regression's filter.
     pub(super) fn image(&self, column: &Column, is_filtered: bool) -> Image {
         let rows = self.rows.div_ceil(self.thin);
         let mut mean = vec![0.0; rows * self.weights.len()];
@@ -122,8 +122,8 @@ impl RunWhitening {
     }
 }
 
-/// Samples in which a joint moves: not within a rest of `rest` samples or longer, nor `margin`
-/// samples beside one.
+/// Samples in which a joint moves: neither within a rest of `rest` samples or longer, nor within `margin` samples of
+/// one.
 fn moving(qd_rad_s: &[f64], rest: usize, margin: usize) -> Vec<bool> {
     let n = qd_rad_s.len();
     let mut moves = vec![true; n];

@@ -9,25 +9,28 @@ use crate::diagnose::image::Column;
 use crate::diagnose::noise_power::Uncertainty;
 use crate::signal::{NoisePower, noise_trends, pooled_level};
 
-/// Of two periods drifting friction may take most of what a slow harmonic says of noise; of eight it takes 5 to 15 %. What is
-/// left is divided by what would be left of white noise: of noise that rises as that of two colours does it is 0.96 to 1.08.
+/// Least share of the scatter that counts as kept when drifting friction is removed. With two periods, the removal may
+/// take most of what a slow harmonic says of noise; with eight, 5 to 15 %. The remaining scatter is divided by the
+/// share that would remain of white noise. For noise that rises as the sum of two colours, the result is 0.96 to 1.08
+/// of the true power.
 const LEAST_KEPT: f64 = 0.25;
-/// Torque below this share of a joint's rms torque is not told from the rounding of a model.
+/// Torque below this share of a joint's rms torque cannot be distinguished from rounding in a model.
 pub const FLOOR: f64 = 1e-4;
 
-/// The torque of all periods, as noise is looked for in it.
+/// The torque of all periods, prepared for the estimate of its noise.
 pub(super) struct Periods<'a> {
-    /// Of every joint, without what friction that drifts does, `drift`.
+    /// Torque of every joint, without the drifting friction that `drift` describes.
     pub(super) torque: &'a Column,
     pub(super) drift: &'a FrictionDrift,
     /// Samples of a period.
     pub(super) samples: usize,
     pub(super) periods: usize,
-    /// The part of the periods' degrees of freedom that makes their scatter ([`Prepared::kept`](crate::identify::Prepared::kept)).
+    /// Share of the periods' degrees of freedom that makes their scatter
+    /// ([`Prepared::kept`](crate::identify::Prepared::kept)).
     pub(super) kept: f64,
     /// Mean square of the torque, per joint.
     pub(super) power: &'a [f64],
-    /// Highest harmonic that is looked at.
+    /// Highest harmonic in use.
     pub(super) last: usize,
 }
 
@@ -36,26 +39,26 @@ pub(super) struct Scatter {
     joints: usize,
     samples: usize,
     periods: usize,
-    /// S of single harmonics, over the standard deviations of `trends`.
+    /// S of single harmonics, divided by the standard deviations of `trends`.
     normalised: Vec<DMatrix<Complex<f64>>>,
-    /// By joint and harmonic, the trend of the power over the harmonics.
+    /// Trend of the power over the harmonics, by joint and harmonic.
     trends: Vec<Vec<NoisePower>>,
-    /// Mean squared coherence of the joints' noise, where it can be told.
+    /// Mean squared coherence of the joints' noise, where it can be determined.
     likeness: Vec<Option<f64>>,
 }
 
 /// What is known of the noise of one harmonic.
 pub(super) struct Noise {
-    /// N × N, scaled for its inverse by M/(M − N).
+    /// Noise covariance S, N × N, scaled by M/(M − N) for its inverse.
     pub(super) covariance: DMatrix<Complex<f64>>,
-    /// How well.
+    /// Uncertainty of its power.
     pub(super) unknown: Uncertainty,
-    /// Joints (0-based) whose mean torque drifts, and by how much, Nm rms; none of any harmonic but the mean.
+    /// Joints (0-based) whose mean torque drifts, and by how much, Nm rms; empty for all harmonics but the mean.
     pub(super) drifting: Vec<(usize, f64)>,
 }
 
 impl Scatter {
-    /// Of `periods`, whose coefficients `spectrum` makes.
+    /// The scatter of `periods`, with `spectrum` the Fourier coefficients of one period.
     pub(super) fn of(periods: &Periods, spectrum: impl Fn(&[f64]) -> Vec<Complex<f64>>) -> Self {
         let &Periods { samples, kept, power, last, .. } = periods;
         let count = periods.periods;
@@ -63,7 +66,7 @@ impl Scatter {
         let mut scatter = between(periods, spectrum);
         scatter.iter_mut().for_each(|scatter| *scatter /= Complex::from(kept));
         let likeness = coherence(&scatter[..=last], count - 1, pooled_level);
-        // Where nothing scatters it is a trace of the torque: powers are averaged as logarithms.
+        // Powers are averaged as logarithms: where nothing scatters, a trace of the torque's power takes their place.
         let of_joint = |(j, power): (usize, &f64)| -> Vec<f64> {
             let floor = (FLOOR * FLOOR * power).max(f64::MIN_POSITIVE);
             scatter.iter().map(|s| s[(j, j)].re.max(1e-6 * floor)).collect()
@@ -83,7 +86,7 @@ impl Scatter {
         all
     }
 
-    /// The standard deviation that the trend gives every joint at harmonic `k`.
+    /// Standard deviation of every joint at harmonic `k`, by the trend.
     fn sd(&self, k: usize) -> Vec<f64> {
         self.trends.iter().map(|trend| trend[k].value.sqrt()).collect()
     }
@@ -94,7 +97,7 @@ impl Scatter {
         let mut sd = self.sd(k);
         let mut unknown = Uncertainty {
             shared: self.trends[0][k].shared_variance,
-            // The level is that of S, whatever that of the trend.
+            // The level is that of S, whatever the level of the trend.
             level: 1.0 / freedom,
             likeness: self.likeness[k].unwrap_or(1.0),
             colour: self.trends.iter().map(|trend| trend[k].colour_variance).collect(),
@@ -111,7 +114,8 @@ impl Scatter {
         Noise { covariance, unknown, drifting }
     }
 
-    /// By what the power of the mean's noise has to be multiplied beside `averaged`, per joint, and which joints' mean torques drift.
+    /// Factors by which the noise power of the mean differs from `averaged`, per joint, and the joints whose mean
+    /// torques drift.
     fn of_mean(
         &self,
         averaged: &DMatrix<Complex<f64>>,
@@ -120,11 +124,11 @@ impl Scatter {
     ) -> (Vec<f64>, Vec<(usize, f64)>) {
         let joints = self.joints;
         let sd = self.sd(0);
-        // S is larger than the scatter by M/(M − N).
+        // S is scaled up from the scatter by M/(M − N).
         let scale = freedom / (freedom - joints as f64).max(1.0);
         let own = |j: usize| self.normalised[0][(j, j)].re;
         let ratio: Vec<f64> = (0..joints).map(|j| scale * own(j) / averaged[(j, j)].re).collect();
-        // A real number per period.
+        // The mean is one real number per period.
         let freedom = self.periods - 1;
         let is_drift = |j: &usize| drifts(ratio[*j], freedom, unknown.of(*j));
         let of_mean = |j: usize| (j, (own(j) / self.samples as f64).sqrt() * sd[j]);
@@ -132,10 +136,10 @@ impl Scatter {
         (with_own_scatter(&ratio, freedom, unknown), drifting)
     }
 
-    /// S averaged about harmonic `k`, scaled for its inverse, and its complex degrees of freedom M.
+    /// S averaged over the neighbourhood of harmonic `k`, scaled for its inverse, and its complex degrees of freedom M.
     fn averaged(&self, k: usize) -> (DMatrix<Complex<f64>>, f64) {
         let reach = pooled_level(k);
-        // The mean torque drifts more than its neighbours: it is left out of their average.
+        // The mean torque drifts more than its neighbours, and is left out of their average.
         let range = k.saturating_sub(reach).max(1)..(k + reach + 1).min(self.normalised.len());
         let count = range.len();
         let mut s = DMatrix::<Complex<f64>>::zeros(self.joints, self.joints);
@@ -151,7 +155,7 @@ impl Scatter {
     }
 }
 
-/// Σ_p D Dᴴ/(P − 1) of every harmonic, D the deviation from the mean period, N × N.
+/// Σ_p D Dᴴ/(P − 1) of every harmonic, N × N, with D the deviation from the mean period.
 fn between(
     all: &Periods,
     spectrum: impl Fn(&[f64]) -> Vec<Complex<f64>>,
@@ -160,7 +164,7 @@ fn between(
     let joints = torque.parts.len();
     let freedom = (periods - 1) as f64;
     let mut spectra: Vec<Vec<Complex<f64>>> = Vec::new();
-    // By joint and harmonic, what drifting friction has left of noise's standard deviation.
+    // Share of the noise's standard deviation that is left after removing drifting friction, by joint and harmonic.
     let mut kept: Vec<Vec<f64>> = Vec::new();
     for (j, y) in &torque.parts {
         spectra.extend(y.chunks_exact(n).map(&spectrum));
@@ -191,7 +195,7 @@ fn between(
     (0..n / 2 + 1).map(of_harmonic).collect()
 }
 
-/// All (i, j) of a square matrix.
+/// All index pairs (i, j) of a square matrix.
 fn pairs(n: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..n).flat_map(move |i| (0..n).map(move |j| (i, j)))
 }

@@ -1,29 +1,30 @@
-//! Steps that noise slower than a period makes.
+//! Steps between periods that are caused by noise slower than a period.
 
 use super::periods::PeriodWhitening;
 use crate::diagnose::image::{Column, Image, dot};
 use crate::diagnose::statistic::upper_chi_squared;
 use crate::median::median;
 
-/// Chance that steps as large as those of most joints (or of one) are no more than what S lets expect, at most, if they are noise of
-/// their own.
+/// Largest probability, under S, of steps as large as those of most joints (or of one joint) at which the steps count
+/// as noise of their own.
 const BY_CHANCE: f64 = 0.01;
-/// Steps of a joint's own that those of all joints count for.
+/// Number of a joint's own steps to which the evidence of all joints is equivalent.
 const OF_ALL: f64 = 7.0;
 
-/// Per joint the step that noise makes in one period, as high as its standard deviation beyond what `whitening` lets expect of
-/// `torque`, Nm, along all periods; nothing where it is not larger than that.
+/// Step that noise makes in one period, per joint. Its height is the standard deviation beyond that which `whitening`
+/// predicts for `torque`, Nm, along all periods; zero where the observed one is not larger. Empty where no joint steps.
 ///
-/// Noise slower than a period ends it elsewhere than it began it: to Fourier coefficients a step, which all harmonics share,
-/// though S takes them for independent. Of a Brownian motion its square is as large as all the rest, and without it the
-/// coefficients are independent (Watson 1961). Where steps are larger than S lets expect, they are noise of their own.
+/// Noise slower than a period ends it at another level than it began. To Fourier coefficients, that is a step, shared
+/// by all harmonics, although S takes them to be independent. For Brownian motion, the square of the step is as large
+/// as everything else, and without it the coefficients are independent (Watson 1961). Where steps are larger than S
+/// predicts, they are treated as separate noise.
 pub fn steps(whitening: &PeriodWhitening, torque: &Column) -> Vec<Image> {
     let (n, freedom, joints) = (whitening.samples(), whitening.periods() - 1, whitening.joints());
     let ramp: Vec<f64> = (0..n).map(|k| (k as f64 + 0.5) / n as f64 - 0.5).collect();
     let contrasts = whitening.image_in_noise(torque).contrast;
     let on_joint = |j| whitening.image_in_noise(&Column::on(j, ramp.clone()));
     let mut steps: Vec<Image> = (0..joints).map(on_joint).collect();
-    // Of every joint the mean of z², z the height of its steps over the σ that S gives it.
+    // Mean of z² for every joint, with z the height of its steps relative to the σ given by S.
     let own = freedom as f64;
     let square = |step: &mut Image| {
         step.scale(1.0 / step.square().sqrt());
@@ -33,7 +34,7 @@ pub fn steps(whitening: &PeriodWhitening, torque: &Column) -> Vec<Image> {
     let squares: Vec<f64> = steps.iter_mut().map(square).collect();
     let by_chance =
         |square: f64, freedom: usize| upper_chi_squared(square * freedom as f64, freedom);
-    // One sensor that drifts says nothing of the others' noise.
+    // One drifting sensor says nothing of the noise of the others; hence the median.
     let usual = median(&mut squares.clone()).unwrap_or(0.0);
     let all_step = by_chance(usual, joints * freedom) < BY_CHANCE;
     let steps_alone = |square: f64| by_chance(square, freedom) < BY_CHANCE / joints as f64;
@@ -61,7 +62,8 @@ mod tests {
     const PERIODS: usize = 8;
     const JOINTS: usize = 6;
 
-    /// Joints (0-based) that step, where the torque of joint j walks by `walk(j)` from sample to sample beside white noise of one.
+    /// Joints (0-based) that step, where the torque of joint j performs a random walk with steps of `walk(j)` per
+    /// sample, added to white noise of one.
     fn stepping(seed: u64, walk: impl Fn(usize) -> f64) -> Vec<usize> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut of_joint = |j: usize| {
@@ -80,20 +82,20 @@ mod tests {
         steps.iter().enumerate().filter_map(is_high).collect()
     }
 
-    /// White noise ends a period where it began: of ten records two have a step by chance once in 200 times (2 % each: all joints, or
-    /// one of them).
+    /// White noise ends a period where it began. Two of ten records show a step by chance once in 200 times (2 % each:
+    /// all joints, or one of them).
     #[test]
     fn white_noise_does_not_step() {
         let records = (0..10).filter(|seed| !stepping(*seed, |_| 0.0).is_empty()).count();
         assert!(records < 2, "{records}");
     }
 
-    /// A walk of a tenth of the noise per sample is 1.4 of it after a period, and the height of a step is known to
-    /// √(12/200) = 0.24.
+    /// A random walk with a tenth of the noise per sample reaches 1.4 of the noise after a period. The height of a step
+    /// is known to √(12/200) = 0.24.
     #[test]
     fn what_walks_steps() {
         assert_eq!(stepping(21, |_| 0.1), [0, 1, 2, 3, 4, 5]);
-        // One sensor alone, for which the others do not stand in.
+        // One sensor alone, which the evidence of the others does not support.
         assert_eq!(stepping(22, |j| if j == 2 { 0.1 } else { 0.0 }), [2]);
     }
 }
