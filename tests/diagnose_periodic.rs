@@ -90,6 +90,17 @@ fn presliding() {
     assert_holds(only(&found, Kind::Presliding, Some(4)), "stiffness_per_rad", 300.0);
 }
 
+/// A LuGre model: damping makes bristles look stiffer than they are, and fewer.
+#[test]
+fn presliding_of_damped_bristles() {
+    let law = Law::LuGre { stiffness_per_rad: 600.0, damping_s: 0.006 };
+    let found = Hidden::on(3, law).diagnose(14);
+    let cause = only(&found, Kind::Presliding, Some(4));
+    let truth = [("stiffness_per_rad", 600.0), ("damping_s", 0.006), ("coulomb_nm", 1.6)];
+    truth.into_iter().for_each(|(name, truth)| assert_holds(cause, name, truth));
+    assert_eq!(cause.form, Some("damped bristles"));
+}
+
 /// Bristles that yield within 0.1 mrad, which is one sample at 125 Hz; a fast log resolves them.
 #[test]
 fn stiff_presliding_in_a_fast_log() {

@@ -6,6 +6,7 @@ mod cli;
 mod damage;
 mod golden;
 mod hidden;
+mod real_logs;
 mod simulated;
 
 mod blind_benchmark;

@@ -6,6 +6,8 @@ use armid::plant::{Measured, Plant, PlantConfig, PlantError, Recording, SensorCo
 use armid::random::TrialStreams;
 use armid::robot::Arm;
 
+use crate::simulated;
+
 fn ur5() -> Arm {
     Arm::built_in("ur5").unwrap()
 }
@@ -34,15 +36,10 @@ fn lively() -> Start<FourierSeries> {
     Start { motion: FourierSeries::built_in("ur5_identification").unwrap(), duration_s: 1.0 }
 }
 
-/// Parses the `[[effect]]` tables of a scenario.
+/// Effects whose keys are `tables`.
 fn effects(tables: &[&str]) -> Vec<Effect> {
-    #[derive(serde::Deserialize)]
-    struct File {
-        #[serde(default)]
-        effect: Vec<Effect>,
-    }
     let text: String = tables.iter().map(|t| format!("[[effect]]\n{t}\n")).collect();
-    toml::from_str::<File>(&text).unwrap_or_else(|e| panic!("{text}: {e}")).effect
+    simulated::effects(&text)
 }
 
 fn plant(tables: &[&str]) -> Result<FaultyPlant, PlantError> {

@@ -2,10 +2,12 @@
 //! constant speed, energies and impulses. No expected value is computed with the code of the effects.
 
 use armid::excitation::Reference;
-use armid::plant::faults::{Effect, FaultyPlant};
+use armid::plant::faults::FaultyPlant;
 use armid::plant::{PlantConfig, Recording};
 use armid::robot::Arm;
 use nalgebra::{Matrix3, Rotation3, Vector3};
+
+use crate::simulated;
 
 fn ur5() -> Arm {
     Arm::built_in("ur5").unwrap()
@@ -52,15 +54,6 @@ fn standing(duration_s: f64) -> impl Reference {
     One { joint: 0, duration_s, course: |_| [0.0; 3] }
 }
 
-fn effects(toml_tables: &str) -> Vec<Effect> {
-    #[derive(serde::Deserialize)]
-    struct File {
-        #[serde(default)]
-        effect: Vec<Effect>,
-    }
-    toml::from_str::<File>(toml_tables).unwrap_or_else(|e| panic!("{toml_tables}: {e}")).effect
-}
-
 /// The table of one effect with `keys`, separated by semicolons.
 fn table(keys: &str) -> String {
     if keys.is_empty() {
@@ -71,7 +64,7 @@ fn table(keys: &str) -> String {
 }
 
 fn run_arm(arm: &Arm, keys: &str, reference: &dyn Reference) -> Recording {
-    let plant = FaultyPlant::new(arm, &effects(&table(keys)), &PlantConfig::default());
+    let plant = FaultyPlant::new(arm, &simulated::effects(&table(keys)), &PlantConfig::default());
     plant.unwrap_or_else(|e| panic!("{keys}: {e}")).run(reference, None).unwrap()
 }
 

@@ -3,23 +3,10 @@
 //! The numbers below were counted from the files by other means: field counts per line and time steps, with awk and
 //! NumPy.
 
-use std::path::PathBuf;
-
 use armid::log::{Effort, Layout, Log, LogWarning, Reason, read_log};
 use armid::robot::Arm;
 
-/// The folder with the data; prints why the tests are skipped if there is none.
-fn data() -> Option<PathBuf> {
-    let Some(folder) = std::env::var_os("ARMID_DATA").map(PathBuf::from) else {
-        eprintln!("skipped: ARMID_DATA is not set (the folder with the real logs)");
-        return None;
-    };
-    if !folder.is_dir() {
-        eprintln!("skipped: ARMID_DATA = {} is not a folder", folder.display());
-        return None;
-    }
-    Some(folder)
-}
+use crate::real_logs;
 
 fn check_sums(log: &Log) {
     let rows = &log.rows;
@@ -51,7 +38,7 @@ const UR10E: [(&str, usize, usize, usize, bool); 13] = [
 
 #[test]
 fn one_layout_takes_every_ur10e_file_and_accounts_for_every_row() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = real_logs::folder() else { return };
     let layout = Layout::load("ur10e_innopolis").unwrap();
     for (name, read, used, missed, feed_forward) in UR10E {
         let log = read_log(&folder.join("ur10e").join(name), &layout, 6).unwrap();
@@ -71,7 +58,7 @@ fn one_layout_takes_every_ur10e_file_and_accounts_for_every_row() {
 
 #[test]
 fn uninitialised_rows_are_set_aside_by_reason() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = real_logs::folder() else { return };
     let layout = Layout::load("ur10e_innopolis").unwrap();
     let log = read_log(&folder.join("ur10e/ur-19_09_27-11_32_02.csv"), &layout, 6).unwrap();
     // Rows 2 (without large numbers), 5, 9, 13, 14, 15 and 18 are plausible numbers in the wrong columns.
@@ -89,7 +76,7 @@ fn uninitialised_rows_are_set_aside_by_reason() {
 
 #[test]
 fn the_ur10e_layouts_bring_their_own_drive_gains() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = real_logs::folder() else { return };
     let arm = Arm::built_in("ur10e").unwrap();
     let file = folder.join("ur10e/ur-20_02_19_14harm50sec.csv");
     for (name, gain) in [("ur10e_innopolis", 11.98), ("ur10e_innopolis_author", 10.0)] {
@@ -103,7 +90,7 @@ fn the_ur10e_layouts_bring_their_own_drive_gains() {
 
 #[test]
 fn the_ur3e_log_is_read_with_the_default_layout() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = real_logs::folder() else { return };
     let log = read_log(&folder.join("ur3e/rtde_full_log.csv"), &Layout::default(), 6).unwrap();
     check_sums(&log);
     assert_eq!((log.rows.read, log.rows.used), (1968, 1968));
@@ -118,7 +105,7 @@ fn the_ur3e_log_is_read_with_the_default_layout() {
 
 #[test]
 fn the_wrong_layout_is_named() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = real_logs::folder() else { return };
     let ur10e = folder.join("ur10e/ur-20_02_19_14harm50sec.csv");
     let message = read_log(&ur10e, &Layout::default(), 6).unwrap_err().to_string();
     assert!(message.contains("838.4650") && message.contains("--layout"), "{message}");

@@ -15,17 +15,7 @@ use armid::log::{Layout, Log, read_log, read_log_from};
 use armid::robot::{Arm, JointSignals};
 
 use crate::damage::{Sound, few_families};
-
-fn data_folder() -> Option<PathBuf> {
-    let folder = std::env::var_os("ARMID_DATA").map(PathBuf::from);
-    match folder {
-        Some(folder) if folder.join("ur10e").is_dir() => Some(folder),
-        _ => {
-            println!("skipped: ARMID_DATA does not name a folder with ur10e/ in it");
-            None
-        }
-    }
-}
+use crate::real_logs;
 
 type Families = Vec<Box<dyn candidates::Candidate>>;
 
@@ -88,7 +78,7 @@ fn names(finding: &Finding, kind: &str, joint: usize) -> bool {
 
 #[test]
 fn the_extended_model_predicts_other_days_better_and_the_body_weighs_what_it_weighs() {
-    let Some(folder) = data_folder() else { return };
+    let Some(folder) = real_logs::folder() else { return };
     let bench = Bench::new();
     let training = bench.read(&folder, TRAINING);
     let held_out = [
@@ -156,7 +146,7 @@ fn the_extended_model_predicts_other_days_better_and_the_body_weighs_what_it_wei
 
 #[test]
 fn the_hits_are_found_and_the_free_run_has_none() {
-    let Some(folder) = data_folder() else { return };
+    let Some(folder) = real_logs::folder() else { return };
     let bench = Bench::new();
     let contacts = |file: &str| {
         let log = bench.read(&folder, file);
@@ -179,7 +169,7 @@ fn the_hits_are_found_and_the_free_run_has_none() {
 /// outcome of each damage to a simulated log.)
 #[test]
 fn no_file_and_no_damage_panics() {
-    let Some(folder) = data_folder() else { return };
+    let Some(folder) = real_logs::folder() else { return };
     let mut files: Vec<PathBuf> = Vec::new();
     let mut folders = vec![folder];
     while let Some(folder) = folders.pop() {

@@ -5,13 +5,15 @@
 //! Reads the folder named by ARMID_DATA (the public set `dataset_ur10e` of github.com/shamilmamedov/dynamic_calibration
 //! below `ur10e/`); if it is not set, the tests print that and pass.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use armid::base::{BaseSet, Parameterisation};
 use armid::dynamics::Model;
 use armid::identify::{Identifier, Measurement, Options, Prediction, Regression};
 use armid::log::{Layout, Log, read_log};
 use armid::robot::Arm;
+
+use crate::real_logs;
 
 /// Rms over all samples of the independent implementation, Nm, joints 1–6.
 const REFERENCE: [(&str, [f64; 6]); 3] = [
@@ -20,17 +22,6 @@ const REFERENCE: [(&str, [f64; 6]); 3] = [
     ("ur-20_01_17-ptp_10_points.csv", [2.32, 3.34, 1.28, 0.27, 1.11, 1.33]),
 ];
 const TRAINING: &str = "ur-20_02_19_14harm50sec.csv";
-
-fn data_folder() -> Option<PathBuf> {
-    let folder = std::env::var_os("ARMID_DATA").map(|data| Path::new(&data).join("ur10e"));
-    match folder {
-        Some(folder) if folder.is_dir() => Some(folder),
-        _ => {
-            println!("skipped: ARMID_DATA does not name a folder with ur10e/ in it");
-            None
-        }
-    }
-}
 
 fn regression(identifier: &mut Identifier, arm: &Arm, file: &Path, layout: &str) -> Regression {
     let log: Log = read_log(file, &Layout::load(layout).unwrap(), arm.dof()).unwrap();
@@ -47,7 +38,8 @@ fn regression(identifier: &mut Identifier, arm: &Arm, file: &Path, layout: &str)
 
 #[test]
 fn held_out_runs_are_predicted_as_well_as_by_an_independent_implementation() {
-    let Some(folder) = data_folder() else { return };
+    let Some(folder) = real_logs::folder() else { return };
+    let folder = folder.join("ur10e");
     let arm = Arm::built_in("ur10e").unwrap();
     let model = Model::new(&arm);
     let set = BaseSet::find(&arm, Parameterisation::full(6, true)).unwrap();
@@ -74,7 +66,8 @@ fn held_out_runs_are_predicted_as_well_as_by_an_independent_implementation() {
 
 #[test]
 fn the_author_s_drive_gains_scale_the_torque_and_the_parameters_with_it() {
-    let Some(folder) = data_folder() else { return };
+    let Some(folder) = real_logs::folder() else { return };
+    let folder = folder.join("ur10e");
     let arm = Arm::built_in("ur10e").unwrap();
     let model = Model::new(&arm);
     let set = BaseSet::find(&arm, Parameterisation::full(6, true)).unwrap();

@@ -6,7 +6,7 @@ use rand::{RngExt, SeedableRng};
 use thiserror::Error;
 
 use super::parameterisation::{Parameterisation, Terms, evaluate};
-use crate::dynamics::{Model, Workspace, regressor};
+use crate::dynamics::{Model, Parameter, ParameterLayout, Workspace, regressor};
 use crate::number::significant;
 use crate::robot::Arm;
 
@@ -115,6 +115,13 @@ impl BaseSet {
     /// Number of base parameters.
     pub fn rank(&self) -> usize {
         self.independent.len()
+    }
+
+    /// Base parameters whose kept column is a first moment of a body of an arm with the `layout`.
+    pub fn first_moments(&self, layout: &ParameterLayout) -> impl Iterator<Item = usize> {
+        let is_first_moment =
+            |&k: &usize| matches!(layout.parameter(self.column(k)[0].0), Parameter::Body(_, 1..=3));
+        (0..self.rank()).filter(is_first_moment)
     }
 
     /// Name of base parameter `k`, which is that of its kept column.

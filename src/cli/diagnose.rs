@@ -24,28 +24,28 @@ use crate::report::{Page, Status, Verdict};
 /// Say what the rigid model with linear friction gets wrong along a log, and what explains it.
 #[derive(Debug, Args)]
 pub struct DiagnoseArgs {
-    /// The log. With a second one: the body that its flange carries and that of the first log does not.
+    /// The log. If two are given, the body that the flange carries in the second one only is weighed.
     #[arg(required = true, num_args = 1..=2)]
     logs: Vec<PathBuf>,
     #[command(flatten)]
     source: SourceArgs,
     #[command(flatten)]
     processing: ProcessingArgs,
-    /// Logs on which the gain is measured: nothing is fitted to them or chosen by them.
+    /// Logs on which the gain is measured. Nothing is fitted to them or chosen by them.
     #[arg(long, num_args = 1..)]
     held_out: Vec<PathBuf>,
     /// A simulation to compare with: a scenario (.toml) or a result of `armid identify` (.json).
     #[arg(long, value_name = "SCENARIO|RESULT")]
     sim: Option<PathBuf>,
-    /// Mass of the body that the second log was recorded with, kg: tells the scale of the drive gains.
+    /// Known mass, kg, of the body in the second log; it determines the scale of the drive gains.
     #[arg(long = "known-payload", value_name = "KG", value_parser = mass)]
     known_payload_kg: Option<f64>,
-    /// Put what was found back into the simulation, and let it replay the log and the held-out ones: seconds
-    /// per log, minutes where stiff effects need short steps.
+    /// Put the causes back into the simulation and let it replay the log and the held-out ones. Takes seconds per
+    /// log, or minutes where stiff effects need short steps.
     #[arg(long)]
     replay: bool,
-    /// Write the simulation with what was found as a scenario for `simulate` and `montecarlo`, with
-    /// its robot file and trajectory beside it.
+    /// Write the simulation with the causes as a scenario for `simulate` and `montecarlo`, with its robot file and
+    /// trajectory beside it.
     #[arg(long, value_name = "FILE.toml")]
     extended_scenario: Option<PathBuf>,
     /// Write the result as JSON.

@@ -58,26 +58,27 @@ pub struct ExciteArgs {
     /// Smallest distance of the arm from itself and the floor, m.
     #[arg(long = "clearance", value_name = "M", default_value_t = 0.02)]
     clearance_m: f64,
-    /// A box in the cell to stay clear of, two corners in the base frame, m; may be given again.
+    /// A box in the cell to stay clear of: two corners in the base frame, m. May be given several times.
     #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1", allow_hyphen_values = true)]
     boxes: Vec<String>,
-    /// Share of the speed limits the motion may use: drives overshoot, and a controller stops at its limit.
+    /// Share of the speed limits that the motion may use. Below 1 it leaves room for drives that overshoot, because
+    /// controllers stop the arm at its speed limit.
     #[arg(long, value_name = "0…1", default_value_t = 1.0)]
     velocity_share: f64,
     /// Share of the torque limits the nominal model may need.
     #[arg(long, value_name = "0…1", default_value_t = 0.9)]
     torque_share: f64,
-    /// Torque noise, Nm, of all joints or one number for each; without it 0.6 % of the torque limits.
+    /// Torque noise, Nm: one number for all joints or one for each. Default: 0.6 % of the torque limits.
     #[arg(long, value_name = "LIST", value_delimiter = ',', num_args = 1)]
     noise_nm: Option<Vec<f64>>,
-    /// Length of the data that will be recorded, s: the motion is as many whole periods as cover it.
+    /// Length of the data that will be recorded, s. The motion has as many whole periods as cover it.
     #[arg(long = "data", value_name = "S", default_value_t = 80.0)]
     data_s: f64,
-    /// Rate of the data, of the CSV and of the set points in the URScript, Hz: a CB-series controller takes 125, an e-Series 500 as well,
-    /// and both of them these over a whole number.
+    /// Rate of the data, of the CSV and of the set points in the URScript, Hz. CB-series controllers take 125 divided by
+    /// a whole number, e-Series controllers 500 divided by one.
     #[arg(long = "rate", value_name = "HZ", default_value_t = 125.0)]
     rate_hz: f64,
-    /// Result of an earlier identification: design for what is still poorly known.
+    /// Result of an earlier identification. The motion is designed for the parameters that are still poorly known.
     #[arg(long, value_name = "RESULT.json")]
     prior: Option<PathBuf>,
     /// Random starts.
@@ -92,7 +93,7 @@ pub struct ExciteArgs {
     /// Stop after this time and keep the best design so far, s.
     #[arg(long = "seconds", value_name = "S", default_value_t = 120.0)]
     seconds: f64,
-    /// Threads; all cores where left out. The result does not depend on it.
+    /// Threads; default: all cores. The result does not depend on it.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
     /// Trajectory file; a scenario for `simulate` and `montecarlo` names it as `[motion] trajectory`.

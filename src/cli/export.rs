@@ -16,11 +16,11 @@ use crate::robot::{LoadedArm, RobotError, text_of};
 pub struct ExportArgs {
     /// Result of `armid identify --physical --json`.
     result: PathBuf,
-    /// Robot that the result is about, where its file is not where the result names it: a .urdf, .xml (MJCF) or .toml file.
+    /// Robot of the result (a .urdf, .xml (MJCF) or .toml file), if its file has moved since.
     #[arg(long)]
     robot: Option<String>,
-    /// Write a URDF, and beside it `NAME.drives.toml` with what a URDF has no place for. Of a robot that is a
-    /// .urdf file it is that file, in which only inertias and friction are other ones.
+    /// Write a URDF, and beside it `NAME.drives.toml` with what a URDF has no place for. If the robot came as a .urdf
+    /// file, the result is that file with its inertias and friction replaced.
     #[arg(long, value_name = "FILE")]
     urdf: Option<PathBuf>,
     /// Write an MJCF.

@@ -38,20 +38,20 @@ pub struct IdentifyArgs {
     reduced: Option<String>,
     #[command(flatten)]
     processing: ProcessingArgs,
-    /// Method of the covariance; chosen by what the log offers where left out.
+    /// Method of the covariance. Default: the best one that the log allows.
     #[arg(long, value_enum)]
     covariance: Option<CovarianceKind>,
-    /// Logs to validate on: nothing is fitted to them.
+    /// Logs to validate on. Nothing is fitted to them.
     #[arg(long, num_args = 1..)]
     validate: Vec<PathBuf>,
-    /// Also estimate standard parameters that an arm can have, for simulators.
+    /// Also estimate physically consistent standard parameters, for simulators.
     #[arg(long)]
     physical: bool,
-    /// How deviations from the robot file's values are measured, of those that the data do not decide.
+    /// How deviations from the robot file's values are measured for parameters that the data do not decide.
     #[arg(long, requires = "physical", value_enum, default_value = "pull_back")]
     prior: PriorMetric,
-    /// Weight of the robot file's values: 1/s² treats them as known to a relative σ of s (1: to 100 %); auto: the weight that
-    /// predicts left-out periods best.
+    /// Weight of the robot file's values: 1/s² treats them as known to a relative σ of s (1: to 100 %), auto takes the
+    /// weight that predicts left-out periods best.
     #[arg(long, requires = "physical", default_value_t)]
     prior_weight: PriorWeight,
     /// Write the result as JSON.
@@ -77,16 +77,17 @@ pub struct SourceArgs {
 /// How logs are processed.
 #[derive(Debug, Args)]
 pub struct ProcessingArgs {
-    /// Low-pass on torque and regressor of a single run, Hz [default: 10]; a motion that repeats needs none.
+    /// Cut-off of the low-pass on torque and regressor of a single run, Hz [default: 10]. A motion that repeats needs no
+    /// low-pass.
     #[arg(long = "cutoff", value_name = "HZ")]
     cutoff_hz: Option<f64>,
-    /// Rate the log is resampled to, Hz. Left out: its own; logs above 300 Hz are decimated to 150 to 300 Hz.
+    /// Rate to which the log is resampled, Hz. Default: its own, but logs above 300 Hz are decimated to 150 to 300 Hz.
     #[arg(long = "rate", value_name = "HZ")]
     rate_hz: Option<f64>,
-    /// Period of the motion, s; found where left out, 0 to treat it as a single run.
+    /// Period of the motion, s. Default: found in the log; 0 treats the log as a single run.
     #[arg(long = "period", value_name = "S")]
     period_s: Option<f64>,
-    /// Estimator; left out: spectral where at least four periods repeat, wls elsewhere.
+    /// Estimator. Default: spectral if at least four periods repeat, otherwise wls.
     #[arg(long, value_enum)]
     estimator: Option<Estimator>,
 }

@@ -21,19 +21,19 @@ use crate::report::json::{Document, Program};
 /// Simulate one trial of a scenario and write its log.
 #[derive(Debug, Args)]
 pub struct SimulateArgs {
-    /// Scenario file; sims/default.toml (built in) where left out.
+    /// Scenario file. Default: sims/default.toml, which is built in.
     #[arg(long)]
     scenario: Option<PathBuf>,
     /// Simulate the arm of this result of `armid identify --physical` instead of the scenario's.
     #[arg(long, value_name = "RESULT.json")]
     arm: Option<PathBuf>,
-    /// Robot that the result is about, where it is not the one that the result or the scenario names.
+    /// Robot of the result, if it is not the one that the result or the scenario names.
     #[arg(long, requires = "arm")]
     robot: Option<String>,
     /// The log.
     #[arg(long)]
     out: PathBuf,
-    /// Which trial's noise (from 0).
+    /// Trial whose noise is used, counted from 0.
     #[arg(long, default_value_t = 0)]
     trial: u64,
     /// Write the truth as JSON.

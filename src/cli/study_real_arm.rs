@@ -104,8 +104,7 @@ pub(super) fn run(args: &RealArmArgs) -> CommandResult {
                        gains: &'static str|
      -> CommandResult {
         let measurements = (first.measurement(), other.measurement());
-        let finding =
-            diagnoser.payload(finding, &measurements.0, &measurements.1, Some(KNOWN_KG))?;
+        let finding = diagnoser.payload(finding, &measurements.0, &measurements.1, known_kg)?;
         pairs.push(Pair { file: name(other), known_kg, gains, finding });
         Ok(Outcome::Done)
     };

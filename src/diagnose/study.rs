@@ -313,7 +313,7 @@ impl<'a> Study<'a> {
         self.memory.entry((family, site, shape), || self.bank(family, site, &[shape]).remove(0))
     }
 
-    /// The richer shapes of the family of `entry` at its site.
+    /// The family of `entry` at its site in each of its richer shapes.
     pub fn richer_entries(&self, entry: &Entry) -> Vec<Entry> {
         let Entry { family, site, .. } = *entry;
         let shapes = self.families[family].richer_shapes(&self.scene);

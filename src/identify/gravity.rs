@@ -65,9 +65,7 @@ impl GravityMatch {
         covariance: &DMatrix<f64>,
     ) -> Option<Self> {
         let layout = ParameterLayout::new(arm.dof());
-        let is_first_moment =
-            |&k: &usize| matches!(layout.parameter(set.column(k)[0].0), Parameter::Body(_, 1..=3));
-        let rows: Vec<usize> = (0..set.rank()).filter(is_first_moment).collect();
+        let rows: Vec<usize> = set.first_moments(&layout).collect();
         let described = DVector::from_iterator(rows.len(), rows.iter().map(|&k| nominal[k]));
         let found = DVector::from_iterator(rows.len(), rows.iter().map(|&k| theta[k]));
         let square = described.norm_squared();

@@ -103,7 +103,9 @@ impl Regression {
         first.instruments.iter_mut().for_each(Problem::unfold);
         first.prepared.replicates = None;
         first.prepared.acceleration = None;
+        first.prepared.each_period = None;
         first.prepared.recorded = None;
+        first.prepared.between = None;
         let processing = &mut first.prepared.processing;
         *processing = Processing { logs, periods: 1, harmonics: None, ..processing.clone() };
         for other in rest {

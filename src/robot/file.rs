@@ -182,12 +182,7 @@ impl JointEntry {
         place.positive("velocity_rad_s", self.velocity_rad_s)?;
         place.positive("acceleration_rad_s2", self.acceleration_rad_s2)?;
         // Infinity is allowed: a URDF need not give a torque limit, and a robot file written from it must be readable.
-        let torque_nm = self.torque_nm;
-        if torque_nm.is_nan() || torque_nm <= 0.0 {
-            return Err(
-                place.fault(format!("torque_nm = {torque_nm} must be positive, inf if unknown"))
-            );
-        }
+        place.limit("torque_nm", self.torque_nm)?;
         let [low, high] = self.position_rad;
         if !(low < high && low.is_finite() && high.is_finite()) {
             return Err(place.fault(format!(

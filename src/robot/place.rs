@@ -43,7 +43,15 @@ impl Place {
         if value > 0.0 && value.is_finite() {
             return Ok(());
         }
-        Err(self.fault(format!("{key} = {value} must be positive")))
+        Err(self.fault(format!("{key} = {value} must be positive and finite")))
+    }
+
+    /// Refuses anything but a positive number or infinity, which stands for a limit that is not known.
+    pub(super) fn limit(&self, key: &str, value: f64) -> Result<(), RobotError> {
+        if value > 0.0 {
+            return Ok(());
+        }
+        Err(self.fault(format!("{key} = {value} must be positive, inf if unknown")))
     }
 
     /// Refuses anything but a finite number of at least 0.
@@ -51,7 +59,8 @@ impl Place {
         if value >= 0.0 && value.is_finite() {
             return Ok(());
         }
-        Err(self.fault(format!("{key} = {value} must not be negative")))
+        let requirement = if value < 0.0 { "must not be negative" } else { "must be finite" };
+        Err(self.fault(format!("{key} = {value} {requirement}")))
     }
 
     /// Refuses anything but a finite range with low < high.

@@ -28,6 +28,11 @@ pub enum Law {
     Dahl {
         stiffness_per_rad: f64,
     },
+    /// Bristles that are damped as well: σ₁/σ₀ is `damping_s`.
+    LuGre {
+        stiffness_per_rad: f64,
+        damping_s: f64,
+    },
     /// A reading that saturates at this share of the largest torque; noise is added afterwards.
     CutBeforeNoise {
         share: f64,
@@ -204,7 +209,7 @@ impl HiddenLaw {
 impl Drivetrain for HiddenLaw {
     fn states(&self) -> usize {
         match self.law {
-            Law::Dahl { .. } => 1,
+            Law::Dahl { .. } | Law::LuGre { .. } => 1,
             _ => 0,
         }
     }
@@ -266,10 +271,13 @@ impl Drivetrain for HiddenLaw {
                 self.link_nm[h] = carried;
             }
             Law::CutBeforeNoise { .. } | Law::ZigzagOfTheCurrent { .. } | Law::Late { .. } => {}
-            Law::Dahl { stiffness_per_rad } => {
+            Law::Dahl { stiffness_per_rad } | Law::LuGre { stiffness_per_rad, .. } => {
                 let z = stage.states[0];
-                states_rate[0] = stiffness_per_rad * (v - v.abs() * z);
-                self.link_nm[h] += drive.coulomb_nm * (sign - z);
+                let rate = stiffness_per_rad * (v - v.abs() * z);
+                let damping_s =
+                    if let Law::LuGre { damping_s, .. } = self.law { damping_s } else { 0.0 };
+                states_rate[0] = rate;
+                self.link_nm[h] += drive.coulomb_nm * (sign - z - damping_s * rate);
             }
         }
         arm.forward_dynamics(stage.q_rad, stage.qd_rad_s, &self.link_nm, qdd);

@@ -11,6 +11,7 @@ use armid::dynamics::Model;
 use armid::identify::Options;
 use armid::montecarlo::{Scenario, Simulation};
 use armid::plant::Measured;
+use armid::plant::faults::Effect;
 use armid::robot::Arm;
 
 /// Standard deviation of a UR5's torque noise, Nm.
@@ -23,6 +24,16 @@ pub const NOISE: &str =
 
 /// Name of a built-in trajectory, and number of periods.
 pub type Along<'a> = (&'a str, usize);
+
+/// Parses the `[[effect]]` tables of a scenario.
+pub fn effects(tables: &str) -> Vec<Effect> {
+    #[derive(serde::Deserialize)]
+    struct File {
+        #[serde(default)]
+        effect: Vec<Effect>,
+    }
+    toml::from_str::<File>(tables).unwrap_or_else(|e| panic!("{tables}: {e}")).effect
+}
 
 /// Scenario `name`, with noise that depends on `name` and `seed`. `sensors` is its sensor table; `rest` is the rest of
 /// its file, effects first.

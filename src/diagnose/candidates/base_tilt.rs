@@ -34,7 +34,9 @@ impl Candidate for BaseTilt {
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
-        vec![quantity("tilt_x_rad", b[0], "rad"), quantity("tilt_y_rad", second(b), "rad")]
+        // A direction of tilt that the null model absorbs is not determined, rather than zero.
+        let axes = ["tilt_x_rad", "tilt_y_rad"].into_iter().zip(b);
+        axes.map(|(name, angle)| quantity(name, *angle, "rad")).collect()
     }
 
     fn separating_experiment(&self) -> &'static str {

@@ -95,7 +95,7 @@ pub trait Candidate: Sync {
         vec![Shape { variant: 0, value: 0.0 }]
     }
 
-    /// Shapes of further variants, for what the law may have beside and few arms show: they are no starting shapes, and looked at
+    /// Shapes of further variants, for parts of the law that few logs show. They take no part in the search and are tried
     /// only where the law was found.
     fn richer_shapes(&self, _scene: &Scene) -> Vec<Shape> {
         Vec::new()

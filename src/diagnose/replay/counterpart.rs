@@ -183,8 +183,9 @@ impl Found<'_> {
                 offset_rad: value("offset_rad")?,
             })),
             Kind::BaseTilt => in_the_model(Effect::BaseTilt(faults::BaseTilt {
-                tilt_x_rad: value("tilt_x_rad")?,
-                tilt_y_rad: value("tilt_y_rad")?,
+                // A direction that the log does not determine is left as it is in the model.
+                tilt_x_rad: value("tilt_x_rad").unwrap_or(0.0),
+                tilt_y_rad: value("tilt_y_rad").unwrap_or(0.0),
             })),
             Kind::Spring => self.spring(),
             Kind::VelocityLag => of_the_record(Effect::VelocityLag(faults::VelocityLag {

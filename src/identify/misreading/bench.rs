@@ -269,10 +269,7 @@ impl Mounting {
         let model = Model::new(&arm);
         let nominal = set.values(&model.standard_parameters());
         let layout = ParameterLayout::new(arm.dof());
-        let is_first_moment =
-            |k: &usize| matches!(layout.parameter(set.column(*k)[0].0), Parameter::Body(_, 1..=3));
-        let first_moments = (0..set.rank()).filter(is_first_moment).map(|k| (k, nominal[k]));
-        let first_moments = first_moments.collect();
+        let first_moments = set.first_moments(&layout).map(|k| (k, nominal[k])).collect();
         Some(Self { gravity_m_s2, model, set, first_moments })
     }
 }

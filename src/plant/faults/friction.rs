@@ -134,8 +134,8 @@ impl Friction {
             + self.powers.iter().map(power).sum::<f64>();
         let mut bristles = 0.0;
         match &self.presliding {
-            // The law is c (z + T ż) + a z² with |z| ≤ 1 and |ż| ≤ 2 k |q̇|. The Stribeck part of c depends on the speed for any z,
-            // and |q̇ dc/dq̇| ≤ d.
+            // The law is c (z + T ż) + a z² with |z| ≤ 1 and |ż| ≤ 2 k |q̇|. The Stribeck part of c depends on the speed
+            // for any z, with |q̇ dc/dq̇| ≤ d.
             Some(presliding) => {
                 let Presliding { stiffness_per_rad, damping_s, .. } = *presliding;
                 bristles = (level + 2.0 * self.asymmetric_nm.abs()) * stiffness_per_rad;

@@ -292,7 +292,7 @@ impl DriveEntry {
         take(&mut limits.velocity_rad_s, self.velocity_rad_s, |value| {
             place.positive("velocity_rad_s", value)
         })?;
-        take(&mut limits.torque_nm, self.torque_nm, |value| place.positive("torque_nm", value))?;
+        take(&mut limits.torque_nm, self.torque_nm, |value| place.limit("torque_nm", value))?;
         take(&mut limits.acceleration_rad_s2, self.acceleration_rad_s2, |value| {
             place.positive("acceleration_rad_s2", value)
         })?;
@@ -367,6 +367,9 @@ mod tests {
         let notice = UrdfNotice::NoTorqueLimit { joints: names(&arm) };
         let Some(UrdfNotice::NoTorqueLimit { joints }) = file.leaves(notice) else { panic!() };
         assert_eq!(joints, [&names(&arm)[..1], &names(&arm)[2..]].concat());
+        let unknown = text("torque_nm = inf");
+        apply_drive_file(&mut arm, &unknown, "x.drives.toml").unwrap();
+        assert_eq!(arm.joints[1].limits.torque_nm, f64::INFINITY);
         for limit in ["torque_nm = 0.0", "velocity_rad_s = -1.0", "velocity_rad_s = inf"] {
             let refused = apply_drive_file(&mut ur5(), &text(limit), "x.drives.toml");
             assert!(refused.is_err(), "{limit}");

@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::METHODS;
 use super::trial::{Lost, Outcome, SIGMAS};
 use super::validation::Validation;
+use crate::median::median;
 use crate::montecarlo::experiment::Experiment;
 use crate::montecarlo::trials::Failure;
 
@@ -97,8 +98,7 @@ impl CaseResult {
         });
         let weights = [0, 1].map(|metric| {
             let mut weights: Vec<f64> = sound.iter().filter_map(|o| o.weights[metric]).collect();
-            weights.sort_by(f64::total_cmp);
-            weights.get(weights.len() / 2).copied()
+            median(&mut weights)
         });
         Self {
             name: scenario.name.clone(),
