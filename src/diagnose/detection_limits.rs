@@ -2,7 +2,9 @@
 
 use std::borrow::Cow;
 
-use super::candidates::Shape;
+use rayon::prelude::*;
+
+use super::candidates::{Candidate, Shape};
 use super::chance;
 use super::image::Span;
 use super::significance::LEAST_EVIDENCE;
@@ -29,55 +31,61 @@ pub fn detection_limits(study: &Study, accepted: &Span) -> Vec<DetectionLimit> {
     if !study.scene.periodic {
         return Vec::new();
     }
-    let mut out = Vec::new();
-    for (family, candidate) in study.families.iter().enumerate() {
-        for site in candidate.sites(study.scene.joints()) {
-            let here = study.entries.iter().filter(|e| (e.family, e.site) == (family, site));
-            // Only the first variant, which bears the family's name: in another law the same parameter means another
-            // size.
-            let Some(law) = here.clone().map(|entry| entry.shape.variant).min() else { continue };
-            let visible: Vec<Visible> = here
-                .filter(|entry| entry.shape.variant == law)
-                .map(|entry| Visible::beside(study, accepted, Cow::Borrowed(entry)))
-                .filter(|visible| visible.span.first_length() > 0.0)
-                .collect();
-            let is_the_shape = visible.iter().any(|v| candidate.whole(v.entry.shape).is_some());
-            let least = match is_the_shape {
-                true => least_shape(study, accepted, visible),
-                false => least_coefficient(study, visible),
-            };
-            let Some(Least { visible, coefficient, sqrt_lambda }) = least else { continue };
-            let Visible { entry, span } = visible;
-            let quantities = |coefficient: f64| {
-                let b = first_alone(&entry, coefficient);
-                candidate.quantities(&study.scene, site, entry.shape, &b)
-            };
-            let of = quantities(coefficient);
-            let Some(quantity) = candidate.size(&of) else { continue };
-            // Quantities that do not change with the coefficient are determined by the shape.
-            let given = of
-                .iter()
-                .zip(quantities(2.0 * coefficient))
-                .filter(|(one, two)| one.value == two.value && one.value != 0.0)
-                .map(|(one, _)| (one.name, one.value));
-            let length = span.first_length();
-            let is_told = sqrt_lambda < LARGEST
-                && length * length > ABSORBED_BESIDE * entry.images[0].square()
-                && coefficient < BEYOND_PHYSICS
-                && candidate.can_be(&study.scene, site, quantity.value);
-            out.push(DetectionLimit {
-                kind: candidate.kind(),
-                joint: site.map(|j| j + 1),
-                parameter: quantity.name,
-                value: is_told.then_some(quantity.value),
-                unit: quantity.unit,
-                given: given.filter(|(name, _)| *name != quantity.name).collect(),
-                sqrt_lambda: is_told.then_some(sqrt_lambda),
-                power: POWER,
-            });
-        }
-    }
-    out
+    let sites = |(family, candidate): (usize, &Box<dyn Candidate>)| {
+        candidate.sites(study.scene.joints()).into_iter().map(move |site| (family, site))
+    };
+    let places: Vec<_> = study.families.iter().enumerate().flat_map(sites).collect();
+    places.into_par_iter().filter_map(|place| limit_at(study, accepted, place)).collect()
+}
+
+/// Detection limit of one family at one site; `None` if the family was not looked for there.
+fn limit_at(
+    study: &Study,
+    accepted: &Span,
+    (family, site): (usize, Option<usize>),
+) -> Option<DetectionLimit> {
+    let candidate = &study.families[family];
+    let here = study.entries.iter().filter(|e| (e.family, e.site) == (family, site));
+    // Only the first variant, which bears the family's name: in another law the same parameter means another size.
+    let law = here.clone().map(|entry| entry.shape.variant).min()?;
+    let visible: Vec<Visible> = here
+        .filter(|entry| entry.shape.variant == law)
+        .map(|entry| Visible::beside(study, accepted, Cow::Borrowed(entry)))
+        .filter(|visible| visible.span.first_length() > 0.0)
+        .collect();
+    let is_the_shape = visible.iter().any(|v| candidate.whole(v.entry.shape).is_some());
+    let least = match is_the_shape {
+        true => least_shape(study, accepted, visible),
+        false => least_coefficient(study, visible),
+    };
+    let Least { visible: Visible { entry, span }, coefficient, sqrt_lambda } = least?;
+    let quantities = |coefficient: f64| {
+        let b = first_alone(&entry, coefficient);
+        candidate.quantities(&study.scene, site, entry.shape, &b)
+    };
+    let of = quantities(coefficient);
+    let quantity = candidate.size(&of)?;
+    // Quantities that do not change with the coefficient are determined by the shape.
+    let given = of
+        .iter()
+        .zip(quantities(2.0 * coefficient))
+        .filter(|(one, two)| one.value == two.value && one.value != 0.0)
+        .map(|(one, _)| (one.name, one.value));
+    let length = span.first_length();
+    let is_told = sqrt_lambda < LARGEST
+        && length * length > ABSORBED_BESIDE * entry.images[0].square()
+        && coefficient < BEYOND_PHYSICS
+        && candidate.can_be(&study.scene, site, quantity.value);
+    Some(DetectionLimit {
+        kind: candidate.kind(),
+        joint: site.map(|j| j + 1),
+        parameter: quantity.name,
+        value: is_told.then_some(quantity.value),
+        unit: quantity.unit,
+        given: given.filter(|(name, _)| *name != quantity.name).collect(),
+        sqrt_lambda: is_told.then_some(sqrt_lambda),
+        power: POWER,
+    })
 }
 
 /// A law with one shape, and its span outside the null model and the named causes.

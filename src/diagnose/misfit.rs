@@ -1,6 +1,7 @@
 //! Tests of the residual that is left after the last cause: is it noise, and if not, on what does it depend?
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::chance;
@@ -101,67 +102,18 @@ pub fn unexplained(
     accepted: &Span,
     residual: &Image,
     lack_of_fit: Option<LackOfFit>,
-    has_law: impl Fn(usize) -> bool,
-    can_differ: impl Fn(usize) -> bool,
+    has_law: impl Fn(usize) -> bool + Sync,
+    can_differ: impl Fn(usize) -> bool + Sync,
 ) -> Option<Unexplained> {
-    let scene = &study.scene;
-    let mut found: Vec<Curve> = Vec::new();
-    let mut tests = 0.0;
-    for j in (0..scene.joints()).filter(|j| study.looks_at(Some(*j))) {
-        let torque_rate = scene.torque_rate_nm_s(j);
-        let time: Vec<f64> = (0..scene.samples()).map(|k| k as f64 / scene.rate_hz).collect();
-        let axes: [(Axis, &[f64]); AXES] = [
-            (("angle", "rad"), scene.motion.q_rad.joint(j)),
-            (("speed", "rad/s"), scene.motion.qd_rad_s.joint(j)),
-            (("acceleration", "rad/s²"), scene.motion.qdd_rad_s2.joint(j)),
-            (("torque", "Nm"), scene.torque_nm.joint(j)),
-            (("rate of the torque", "Nm/s"), &torque_rate),
-            (("time within the period", "s"), &time),
-        ];
-        // A single run has no axis of time: dependence on time cannot be told from events that happen once.
-        let count = if scene.periodic { AXES } else { AXES - 1 };
-        let curves = axes.into_iter().take(count).map(|(axis, values)| (axis, hats(values)));
-        let course = if can_differ(j) { since_the_start(scene, j) } else { None };
-        let of_friction = behind_reversals(scene, j).into_iter().chain(course);
-        for ((axis, unit), (knots, hats)) in curves.chain(of_friction) {
-            tests += 1.0;
-            let mut span = Span::default();
-            let image = |hat: &Vec<f64>| study.whitening.image(&Column::on(j, hat.clone()));
-            let raw: Vec<Image> = hats.iter().map(image).collect();
-            let mut outside = raw.clone();
-            study.null.residualise_all(&mut outside);
-            accepted.residualise_all(&mut outside);
-            for (raw, image) in raw.iter().zip(&outside) {
-                let mut own = image.clone();
-                span.residualise(&mut own);
-                if own.square() > ABSORBED * ABSORBED * raw.square() {
-                    span.push(image);
-                }
-            }
-            let explained = span.explained(residual);
-            let least = if has_law(j) { LEFT_BY_LAWS } else { LEAST_GAIN };
-            let probability = if study.generalises(Some(j), &span, residual, least) {
-                study.statistic.probability(&span, residual)
-            } else {
-                1.0
-            };
-            let evidence = explained - span.len() as f64 * (residual.mean.len() as f64).ln();
-            let heights = visible(&raw, &outside, residual);
-            let curve_at =
-                |k: usize| -> f64 { hats.iter().zip(&heights).map(|(h, b)| h[k] * b).sum() };
-            let n = hats[0].len();
-            let square: f64 = (0..n).map(|k| curve_at(k).powi(2)).sum();
-            let unexplained = Unexplained {
-                axis,
-                unit,
-                joint: j + 1,
-                rms_nm: (square / n as f64).sqrt(),
-                curve: knots.iter().zip(&heights).map(|(x, y)| [*x, *y]).collect(),
-            };
-            let repeats = n == scene.samples();
-            found.push(Curve { evidence, probability, repeats, unexplained });
-        }
-    }
+    let looked_at: Vec<usize> =
+        (0..study.scene.joints()).filter(|j| study.looks_at(Some(*j))).collect();
+    let around = |&j: &usize| Around { joint: j, has_law: has_law(j), can_differ: can_differ(j) };
+    let curves = looked_at
+        .par_iter()
+        .map(around)
+        .flat_map_iter(|joint| curves(study, accepted, residual, &joint));
+    let mut found: Vec<Curve> = curves.collect();
+    let tests = found.len() as f64;
     found.sort_by(|a, b| a.evidence.total_cmp(&b.evidence));
     // The curve with the most evidence may still be noise, because curves with fewer knots pay a lower price.
     if let Some(clear) = found.iter().rposition(|c| c.probability * tests < chance::UNEXPLAINED) {
@@ -171,6 +123,71 @@ pub fn unexplained(
     // The lack of fit is one of the mean period, to which only curves that repeat can belong.
     let of_joint = |curve: &Curve| curve.repeats && curve.unexplained.joint == lack.joint + 1;
     found.into_iter().rfind(of_joint).map(|curve| curve.unexplained)
+}
+
+/// A joint, and what is known of it when its curves are tried.
+struct Around {
+    joint: usize,
+    /// Whether a law is named on it.
+    has_law: bool,
+    /// Whether its periods may differ for no reason that is known already.
+    can_differ: bool,
+}
+
+/// A curve of 10 knots in each quantity of one joint.
+fn curves(study: &Study, accepted: &Span, residual: &Image, around: &Around) -> Vec<Curve> {
+    let (scene, j) = (&study.scene, around.joint);
+    let torque_rate = scene.torque_rate_nm_s(j);
+    let time: Vec<f64> = (0..scene.samples()).map(|k| k as f64 / scene.rate_hz).collect();
+    let axes: [(Axis, &[f64]); AXES] = [
+        (("angle", "rad"), scene.motion.q_rad.joint(j)),
+        (("speed", "rad/s"), scene.motion.qd_rad_s.joint(j)),
+        (("acceleration", "rad/s²"), scene.motion.qdd_rad_s2.joint(j)),
+        (("torque", "Nm"), scene.torque_nm.joint(j)),
+        (("rate of the torque", "Nm/s"), &torque_rate),
+        (("time within the period", "s"), &time),
+    ];
+    // A single run has no axis of time: dependence on time cannot be told from events that happen once.
+    let count = if scene.periodic { AXES } else { AXES - 1 };
+    let curves = axes.into_iter().take(count).map(|(axis, values)| (axis, hats(values)));
+    let course = if around.can_differ { since_the_start(scene, j) } else { None };
+    let of_friction = behind_reversals(scene, j).into_iter().chain(course);
+    let curve = |((axis, unit), (knots, hats)): (Axis, (Vec<f64>, Vec<Vec<f64>>))| {
+        let mut span = Span::default();
+        let columns: Vec<Column> = hats.iter().map(|hat| Column::on(j, hat.clone())).collect();
+        let raw = study.whitening.images(columns.iter());
+        let mut outside = raw.clone();
+        study.null.residualise_all(&mut outside);
+        accepted.residualise_all(&mut outside);
+        for (raw, image) in raw.iter().zip(&outside) {
+            let mut own = image.clone();
+            span.residualise(&mut own);
+            if own.square() > ABSORBED * ABSORBED * raw.square() {
+                span.push(image);
+            }
+        }
+        let explained = span.explained(residual);
+        let least = if around.has_law { LEFT_BY_LAWS } else { LEAST_GAIN };
+        let probability = if study.generalises(Some(j), &span, residual, least) {
+            study.statistic.probability(&span, residual)
+        } else {
+            1.0
+        };
+        let evidence = explained - span.len() as f64 * (residual.mean.len() as f64).ln();
+        let heights = visible(&raw, &outside, residual);
+        let curve_at = |k: usize| -> f64 { hats.iter().zip(&heights).map(|(h, b)| h[k] * b).sum() };
+        let n = hats[0].len();
+        let square: f64 = (0..n).map(|k| curve_at(k).powi(2)).sum();
+        let unexplained = Unexplained {
+            axis,
+            unit,
+            joint: j + 1,
+            rms_nm: (square / n as f64).sqrt(),
+            curve: knots.iter().zip(&heights).map(|(x, y)| [*x, *y]).collect(),
+        };
+        Curve { evidence, probability, repeats: n == scene.samples(), unexplained }
+    };
+    curves.chain(of_friction).map(curve).collect()
 }
 
 /// A curve along one axis, and how clearly the residual shows it.

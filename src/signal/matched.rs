@@ -11,6 +11,7 @@
 //! [`Heights::scale`] determines it from the filter's output over the whole record.
 
 use fourier::{Complex64, Forward, Inverse, RealToComplex};
+use rayon::prelude::*;
 
 use super::error::{SignalError, checked_rate_hz, enough};
 use super::noise_trend::noise_trend;
@@ -104,7 +105,8 @@ impl MatchedFilter {
         };
         let stretch = ((STRETCH_S * rate_hz) as usize).clamp(8, samples / STRETCHES);
         let plan = fourier::forward(stretch);
-        for signal in (0..signals.joints()).map(|j| signals.joint(j)) {
+        let of_joint = |j: usize| {
+            let signal = signals.joint(j);
             let mut power = median_power(signal, &*plan);
             let largest = power.iter().copied().fold(0.0, f64::max);
             // For a signal without noise any spectrum will do.
@@ -124,9 +126,10 @@ impl MatchedFilter {
                 })
                 .collect();
             spectrum.iter_mut().zip(&weights).for_each(|(x, w)| *x *= w);
-            filter.weights.push(weights);
-            filter.weighted.push(spectrum);
-        }
+            (weights, spectrum)
+        };
+        let of_joints: Vec<_> = (0..signals.joints()).into_par_iter().map(of_joint).collect();
+        (filter.weights, filter.weighted) = of_joints.into_iter().unzip();
         Ok(filter)
     }
 

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use super::bump::{self, FELT_SHARE, Felt, Noise, ORDINARY, Push};
 use super::loudness::Loudness;
 use super::moves::Move;
@@ -112,23 +114,24 @@ impl Repeats {
     /// Deviations of all compared joints at the samples of the window, without the `known` pushes and without drifting
     /// friction.
     pub(super) fn deviations(&self, aside: &[bool], known: &[Push]) -> JointSignals {
-        let joints = &self.joints;
-        let mut out = JointSignals::from_fn(joints.len(), self.window.len(), |row, k| {
-            let j = joints[row];
-            let deviation = self.deviation(self.signals.joint(j), self.window.start + k, aside);
-            let t_s = k as f64 / self.rate_hz;
-            deviation - known.iter().map(|push| push.torque_nm(j, t_s)).sum::<f64>()
-        });
-        if let Some(drift) = &self.drift {
-            for (row, j) in joints.iter().enumerate() {
-                drift.remove(*j, out.joint_mut(row), |k| !aside[self.window.start + k]);
-            }
-        }
         // Even the softest bump of nine samples is still half as high two samples from its top, so that it is not an
         // isolated value.
         let reach = if SHORTEST_S * self.rate_hz >= 9.0 { 2 } else { 1 };
-        (0..joints.len()).for_each(|row| level_wild_values(out.joint_mut(row), reach));
-        out
+        let of_joint = |&j: &usize| {
+            let deviation = |k: usize| {
+                let deviation = self.deviation(self.signals.joint(j), self.window.start + k, aside);
+                let t_s = k as f64 / self.rate_hz;
+                deviation - known.iter().map(|push| push.torque_nm(j, t_s)).sum::<f64>()
+            };
+            let mut out: Vec<f64> = (0..self.window.len()).map(deviation).collect();
+            if let Some(drift) = &self.drift {
+                drift.remove(j, &mut out, |k| !aside[self.window.start + k]);
+            }
+            level_wild_values(&mut out, reach);
+            out
+        };
+        let rows: Vec<Vec<f64>> = self.joints.par_iter().map(of_joint).collect();
+        JointSignals::from_fn(rows.len(), self.window.len(), |row, k| rows[row][k])
     }
 
     /// Finds the bump that is highest relative to the threshold for noise, apart from the samples `looked_at`; `None`
