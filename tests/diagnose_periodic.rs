@@ -87,7 +87,9 @@ fn ripple_of_the_current_alone() {
 #[test]
 fn presliding() {
     let found = Hidden::on(3, Law::Dahl { stiffness_per_rad: 300.0 }).diagnose(4);
-    assert_holds(only(&found, Kind::Presliding, Some(4)), "stiffness_per_rad", 300.0);
+    let cause = only(&found, Kind::Presliding, Some(4));
+    assert_holds(cause, "stiffness_per_rad", 300.0);
+    assert_eq!(cause.form, None, "no damping");
 }
 
 /// A LuGre model: damping makes bristles look stiffer than they are, and fewer.
@@ -99,6 +101,22 @@ fn presliding_of_damped_bristles() {
     let truth = [("stiffness_per_rad", 600.0), ("damping_s", 0.006), ("coulomb_nm", 1.6)];
     truth.into_iter().for_each(|(name, truth)| assert_holds(cause, name, truth));
     assert_eq!(cause.form, Some("damped bristles"));
+}
+
+/// Damping that the log does not show (1.5 of its standard error) moves the stiffness by more than the noise alone would allow.
+#[test]
+fn presliding_of_hardly_damped_bristles() {
+    let law = Law::LuGre { stiffness_per_rad: 600.0, damping_s: 0.0007 };
+    let hidden = Hidden::on(3, law);
+    let run = hidden.run();
+    for seed in [21, 22, 23] {
+        let found = hidden.diagnose_run(&run, seed);
+        let cause = only(&found, Kind::Presliding, Some(4));
+        for (name, truth) in [("stiffness_per_rad", 600.0), ("coulomb_nm", 1.6)] {
+            let [low, high] = cause.parameters[name].ci95;
+            assert!(low < truth && truth < high, "{seed}: {name} {low} … {high}");
+        }
+    }
 }
 
 /// Bristles that yield within 0.1 mrad, which is one sample at 125 Hz; a fast log resolves them.

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use rayon::prelude::*;
 
-use super::candidates::{Candidate, Shape};
+use super::candidates::Shape;
 use super::chance;
 use super::image::Span;
 use super::significance::LEAST_EVIDENCE;
@@ -31,10 +31,11 @@ pub fn detection_limits(study: &Study, accepted: &Span) -> Vec<DetectionLimit> {
     if !study.scene.periodic {
         return Vec::new();
     }
-    let sites = |(family, candidate): (usize, &Box<dyn Candidate>)| {
-        candidate.sites(study.scene.joints()).into_iter().map(move |site| (family, site))
+    let sites = |family: usize| {
+        let sites = study.families[family].sites(study.scene.joints());
+        sites.into_iter().map(move |site| (family, site))
     };
-    let places: Vec<_> = study.families.iter().enumerate().flat_map(sites).collect();
+    let places: Vec<_> = (0..study.families.len()).flat_map(sites).collect();
     places.into_par_iter().filter_map(|place| limit_at(study, accepted, place)).collect()
 }
 

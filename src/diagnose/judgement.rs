@@ -37,7 +37,8 @@ impl Selected {
 pub struct Form {
     /// The effect in this form, with its coefficients.
     pub effect: Effect,
-    /// 2 ln of the odds against this form.
+    /// Twice the log-likelihood that this form lacks. Prices do not count, so that an interval also holds the values of a form with
+    /// another coefficient that the log neither shows nor excludes.
     pub behind: f64,
 }
 
@@ -51,13 +52,13 @@ impl Kept<'_, '_> {
     pub fn other_forms(&self, c: usize) -> Vec<Form> {
         let (others, residual) = self.without(Some(c));
         let Contender { entry, score, .. } = &self.causes[c];
-        let own = self.evidence(entry, *score);
+        let own = score.gain;
         let richer = self.study.richer_entries(entry);
         let least = f64::NEG_INFINITY;
         let variants = self.other_variants(entry, &richer, least, &others, &residual);
         let form = |(entry, score): (Entry, Score)| {
             let coefficients = self.study.span(&entry, &others).solve(&residual);
-            let behind = (own - self.evidence(&entry, score)).max(0.0);
+            let behind = (own - score.gain).max(0.0);
             let Entry { family, site, shape, .. } = entry;
             let effect = Effect { family, site, shape, coefficients, absorbed: Vec::new() };
             Form { effect, behind }

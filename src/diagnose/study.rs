@@ -317,7 +317,9 @@ impl<'a> Study<'a> {
     pub fn richer_entries(&self, entry: &Entry) -> Vec<Entry> {
         let Entry { family, site, .. } = *entry;
         let shapes = self.families[family].richer_shapes(&self.scene);
-        shapes.into_par_iter().filter_map(|shape| self.entry(family, site, shape)).collect()
+        let richer = shapes.into_par_iter().filter_map(|shape| self.entry(family, site, shape));
+        // If the null model absorbs the further coefficient, the law is the one without it.
+        richer.filter(|entry| entry.images.len() > 1).collect()
     }
 
     /// [`Self::entry`] for each of `shapes`.

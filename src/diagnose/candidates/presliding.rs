@@ -221,7 +221,7 @@ fn column(scene: &Scene, j: usize, way: &Way, z: &[f64], drive: Drive) -> Column
 /// grid as well.
 fn grid(variant: usize) -> impl Iterator<Item = Shape> {
     let [softest, stiffest] = STIFFNESSES_PER_RAD;
-    let count = if variant == 0 { 13 } else { 7 };
+    let count = if variant.is_multiple_of(DAMPED) { 13 } else { 7 };
     geometric(softest, stiffest, count).map(move |value| Shape { variant, value })
 }
 
@@ -300,6 +300,10 @@ impl Candidate for Presliding {
 
     fn separating_experiment(&self) -> &'static str {
         "triangular motion of ±2 mrad: the torque follows the angle on a hysteresis loop"
+    }
+
+    fn least(&self) -> f64 {
+        0.0
     }
 
     fn is_possible(&self, _: Shape, b: &[f64]) -> bool {

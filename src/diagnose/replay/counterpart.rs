@@ -110,7 +110,7 @@ impl Found<'_> {
             Kind::Presliding => in_the_model(Effect::Presliding(faults::Presliding {
                 joint: self.joint?,
                 stiffness_per_rad: value("stiffness_per_rad")?.min(STIFFEST_PER_RAD),
-                damping_s: value("damping_s").unwrap_or(0.0),
+                damping_s: value("damping_s").unwrap_or(0.0).max(0.0),
             })),
             Kind::ReversalWidth => in_the_model(Effect::ReversalWidth(faults::ReversalWidth {
                 joint: self.joint,

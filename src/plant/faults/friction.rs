@@ -11,7 +11,7 @@ use crate::robot::Drive;
 /// ```text
 /// τ_f = (1 + φ Θ) · [ rv q̇ + c(q, q̇, L) z + Σ A |q̇|ᵖ s + a z² + b |q̇| ]
 /// c   = rc + Σ d exp(−|q̇/v_s|ⁿ) + Σ P cos(q + ψ) + μ |L|
-/// s   = tanh(q̇/ε);   z = s, or the bristle's state with presliding, whose damping adds c T ż
+/// s   = tanh(q̇/ε);   z = s, or the bristle's state with presliding, whose damping adds (c − μ |L|) T ż
 /// ```
 #[derive(Debug, Clone)]
 pub(super) struct Friction {
@@ -68,7 +68,9 @@ impl Friction {
         };
         let level = self.level_nm(q_rad, qd_rad_s, load_nm);
         let speed = qd_rad_s.abs();
-        let mut torque = self.viscous_nm_s_rad * qd_rad_s + level * (direction + damping);
+        // Damping that grew with the load would make the load iteration diverge.
+        let unloaded = level - self.mu * load_nm.abs();
+        let mut torque = self.viscous_nm_s_rad * qd_rad_s + level * direction + unloaded * damping;
         torque += self.asymmetric_nm * direction * direction + self.asymmetric_nm_s_rad * speed;
         for power in &self.powers {
             torque += power.amplitude_nm * speed.powf(power.exponent) * sign;
@@ -135,7 +137,8 @@ impl Friction {
         let mut bristles = 0.0;
         match &self.presliding {
             // The law is c (z + T ż) + a z² with |z| ≤ 1 and |ż| ≤ 2 k |q̇|. The Stribeck part of c depends on the speed
-            // for any z, with |q̇ dc/dq̇| ≤ d.
+            // for any z, with |q̇ dc/dq̇| ≤ d. `bristles` is the stiffness of the oscillator of joint and bristle, from which
+            // the terms in T cancel.
             Some(presliding) => {
                 let Presliding { stiffness_per_rad, damping_s, .. } = *presliding;
                 bristles = (level + 2.0 * self.asymmetric_nm.abs()) * stiffness_per_rad;
@@ -285,7 +288,7 @@ impl Fault for LoadFriction {
     }
 }
 
-/// Dry friction that builds up over an angle instead of at once: τ = c (z + T ż) with ż = k (q̇ − |q̇| z), in place of
+/// Dry friction that builds up over an angle instead of at once: τ = c (z + T ż), c without load in the damping, with ż = k (q̇ − |q̇| z), in place of
 /// c tanh(q̇/ε). Without damping (T = 0) this is Dahl's model (1968), with it the bristles of LuGre's (Canudas de Wit et al.
 /// 1995), whose σ₀ is c k, σ₁ is c k T and σ₂ the joint's viscous friction.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
