@@ -102,16 +102,14 @@ pub fn unexplained(
     accepted: &Span,
     residual: &Image,
     lack_of_fit: Option<LackOfFit>,
-    has_law: impl Fn(usize) -> bool + Sync,
-    can_differ: impl Fn(usize) -> bool + Sync,
+    has_law: impl Fn(usize) -> bool,
+    can_differ: impl Fn(usize) -> bool,
 ) -> Option<Unexplained> {
-    let looked_at: Vec<usize> =
-        (0..study.scene.joints()).filter(|j| study.looks_at(Some(*j))).collect();
-    let around = |&j: &usize| Around { joint: j, has_law: has_law(j), can_differ: can_differ(j) };
-    let curves = looked_at
-        .par_iter()
-        .map(around)
-        .flat_map_iter(|joint| curves(study, accepted, residual, &joint));
+    let joints: Vec<Around> = (0..study.scene.joints())
+        .filter(|j| study.looks_at(Some(*j)))
+        .map(|joint| Around { joint, has_law: has_law(joint), can_differ: can_differ(joint) })
+        .collect();
+    let curves = joints.par_iter().flat_map_iter(|joint| curves(study, accepted, residual, joint));
     let mut found: Vec<Curve> = curves.collect();
     let tests = found.len() as f64;
     found.sort_by(|a, b| a.evidence.total_cmp(&b.evidence));
