@@ -8,6 +8,7 @@ use super::candidates::Shape;
 use super::chance;
 use super::image::Span;
 use super::significance::LEAST_EVIDENCE;
+use super::statistic::upper_fisher;
 use super::study::{Entry, Study};
 use super::verdict::DetectionLimit;
 use crate::identify::covariance::student_quantile;
@@ -179,10 +180,12 @@ fn needed(study: &Study, entry: &Entry, span: &Span) -> f64 {
     let worth = study.price(entry) + LEAST_EVIDENCE;
     let rare = chance::LAW / study.tests(entry);
     let statistic = &study.statistic;
+    let freedom = statistic.freedom(span, &of_one);
     let is_found = |sqrt_lambda: f64| {
         let mut seen = of_one.clone();
         seen.scale(sqrt_lambda / span.first_length());
-        statistic.gain(span, &seen) > worth && statistic.probability(span, &seen) < rare
+        let f = span.explained(&seen) / span.len() as f64;
+        statistic.gain(span, &seen) > worth && upper_fisher(f, span.len(), freedom) < rare
     };
     let [mut silent, mut found] = [0.0, USUAL];
     while found < LARGEST && !is_found(found) {
@@ -192,7 +195,7 @@ fn needed(study: &Study, entry: &Entry, span: &Span) -> f64 {
         let between = 0.5 * (silent + found);
         if is_found(between) { found = between } else { silent = between }
     }
-    found + student_quantile(POWER, statistic.freedom(span, &of_one))
+    found + student_quantile(POWER, freedom)
 }
 
 /// Coefficients of `entry`: `coefficient` for the first column, zero for the others.

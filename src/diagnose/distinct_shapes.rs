@@ -43,17 +43,18 @@ impl DistinctShapes {
 
 /// Effective number of tests at the threshold `z`, for entries with one column each.
 fn tests(entries: &[&Entry], z: f64) -> f64 {
-    let angle = |a: &Entry, b: &Entry| {
-        let (a, b) = (&a.images[0], &b.images[0]);
-        (a.dot(b).abs() / (a.square() * b.square()).sqrt()).min(1.0).acos()
+    let angle = |(a, a_square): &(&Entry, f64), (b, b_square): &(&Entry, f64)| {
+        let along = a.images[0].dot(&b.images[0]).abs();
+        (along / (a_square * b_square).sqrt()).min(1.0).acos()
     };
-    let variants: Vec<&[&Entry]> =
-        entries.chunk_by(|a, b| a.shape.variant == b.shape.variant).collect();
+    let entries: Vec<(&Entry, f64)> = entries.iter().map(|e| (*e, e.images[0].square())).collect();
+    let variants: Vec<&[(&Entry, f64)]> =
+        entries.chunk_by(|(a, _), (b, _)| a.shape.variant == b.shape.variant).collect();
     let mut count = 1.0;
     for (v, variant) in variants.iter().enumerate() {
         for (k, entry) in variant.iter().enumerate() {
-            let before = k.checked_sub(1).map(|k| variant[k]);
-            let beside = v.checked_sub(1).into_iter().flat_map(|v| variants[v].iter().copied());
+            let before = k.checked_sub(1).map(|k| &variant[k]);
+            let beside = v.checked_sub(1).into_iter().flat_map(|v| variants[v]);
             let nearest = before.into_iter().chain(beside).map(|other| angle(entry, other));
             if let Some(angle) = nearest.min_by(f64::total_cmp) {
                 count += (angle * z / std::f64::consts::TAU.sqrt()).min(1.0);

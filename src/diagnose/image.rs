@@ -193,7 +193,7 @@ impl Span {
             let along = self.project_out(std::slice::from_mut(&mut rest));
             coefficients.iter_mut().zip(along.col_as_slice(0)).for_each(|(c, a)| *c += a);
         }
-        let outside = rest.square().sqrt();
+        let outside = if self.is_empty() { length } else { rest.square().sqrt() };
         if outside.is_nan() || outside <= DEPENDENT * length {
             return false;
         }
@@ -316,7 +316,12 @@ impl Span {
 
     /// Least-squares coefficients of `y` on the columns that were pushed.
     pub fn solve(&self, y: &Image) -> Vec<f64> {
-        let mut x = self.coordinates(y);
+        self.coefficients(self.coordinates(y))
+    }
+
+    /// [`Self::solve`] for a signal with these [coordinates](Self::coordinates).
+    pub fn coefficients(&self, coordinates: Vec<f64>) -> Vec<f64> {
+        let mut x = coordinates;
         for k in (0..x.len()).rev() {
             x[k] /= self.triangle[k][k];
             let value = x[k];

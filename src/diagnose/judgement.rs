@@ -3,7 +3,8 @@
 
 use super::extension::Effect;
 use super::selection::{Contender, FINALISTS, Kept, SHARED};
-use super::study::{Entry, Score};
+use super::statistic::Score;
+use super::study::Entry;
 
 /// Two effects are told apart with 99.9 % confidence and 90 % power where λ(1 − cos²) exceeds
 /// (z₀.₉₉₉ + z₀.₉)² = (3.09 + 1.28)².

@@ -6,6 +6,8 @@
 //! and velocities change from row to row by more than their noise, so the test is on q − ∫q̇ dt for an angle and on
 //! q̇ − Δq/Δt for a velocity.
 
+use rayon::prelude::*;
+
 use super::data_faults::{FAR, cause, exact, step_s};
 use super::kind::Kind;
 use super::record::Record;
@@ -55,7 +57,8 @@ fn mend_torque(record: &mut Record) -> Vec<Strays> {
         let runs = far.chunk_by(of_one_run).filter(alone);
         runs.flatten().copied().collect()
     };
-    let found = (0..record.torque_nm.joints()).map(|j| (j, of_joint(j))).collect();
+    let joints = (0..record.torque_nm.joints()).into_par_iter();
+    let found = joints.map(|j| (j, of_joint(j))).collect();
     replace(&mut record.torque_nm, "torque", found)
 }
 
@@ -88,7 +91,7 @@ fn mend_motion(record: &mut Record) -> Vec<Strays> {
         });
         far
     };
-    let angles = (0..joints).map(|j| (j, of_angle(j))).collect();
+    let angles = (0..joints).into_par_iter().map(|j| (j, of_angle(j))).collect();
     let mut strays = replace(&mut record.q_rad, "angle", angles);
     let of_velocity = |j: usize| {
         let (q, qd) = (record.q_rad.joint(j), record.qd_rad_s.joint(j));
@@ -102,7 +105,7 @@ fn mend_motion(record: &mut Record) -> Vec<Strays> {
         // Where the acceleration jumps, Δq/Δt differs from q̇ although no velocity is far from its neighbours.
         by_all(qd, [far_off(qd), stamped, even])
     };
-    let velocities = (0..joints).map(|j| (j, of_velocity(j))).collect();
+    let velocities = (0..joints).into_par_iter().map(|j| (j, of_velocity(j))).collect();
     strays.extend(replace(&mut record.qd_rad_s, "velocity", velocities));
     strays
 }

@@ -59,16 +59,30 @@ impl ReversalAnswer {
 
     /// What the drive delivers, Nm at every tick, if the torque was recorded `late_ticks` late.
     pub fn given_nm(&self, clock: &FineClock, late_ticks: f64) -> Vec<f64> {
-        match self.coefficients(clock, late_ticks) {
-            Some(c) => {
-                let mut given_nm = vec![0.0; self.sign.len()];
-                for (sign, c) in self.delayed(0.0, 1).zip(c) {
-                    given_nm.iter_mut().zip(sign).for_each(|(sum, sign)| *sum += c * sign);
-                }
-                given_nm
-            }
-            None => self.sign.iter().map(|s| self.coulomb_nm * s).collect(),
+        self.sum_nm(self.coefficients(clock, late_ticks).as_deref(), 0.0, 1)
+    }
+
+    /// Change of what the drive delivers by a delay, Nm at every sample of `clock`, if the torque was recorded that many
+    /// ticks late.
+    pub fn change_by_delay_nm(&self, clock: &FineClock, late_ticks: f64) -> Vec<f64> {
+        let c = self.coefficients(clock, late_ticks);
+        let [mut late, now] =
+            [late_ticks, 0.0].map(|ticks| self.sum_nm(c.as_deref(), ticks, clock.ticks()));
+        late.iter_mut().zip(now).for_each(|(late, now)| *late -= now);
+        late
+    }
+
+    /// Σ_i c_i s(t − iΔ − d) with d = `late_ticks`, Nm, at every `every`-th tick; without `c`, all friction of t − d.
+    fn sum_nm(&self, c: Option<&[f64]>, late_ticks: f64, every: usize) -> Vec<f64> {
+        let Some(c) = c else {
+            let sign = shifted(&self.sign, late_ticks, every);
+            return sign.iter().map(|s| self.coulomb_nm * s).collect();
+        };
+        let mut sum_nm = vec![0.0; self.sign.len().div_ceil(every)];
+        for (sign, c) in self.delayed(late_ticks, every).zip(c) {
+            sum_nm.iter_mut().zip(sign).for_each(|(sum, sign)| *sum += c * sign);
         }
+        sum_nm
     }
 
     /// The c, Nm; `None` where noise drowns the answer, or where the joint hardly reverses.
@@ -147,6 +161,9 @@ mod tests {
         for late in [0.0, 3.0, 5.5, -7.25, 20.0] {
             let (clock, answer, truth) = answer(&[(0.7, 0.0), (0.2, -16.0)], late);
             assert!(off(&answer.given_nm(&clock, late), &truth) < 1e-9, "{late}");
+            let [delayed, now] = [late, 0.0].map(|ticks| shifted(&truth, ticks, TICKS));
+            let change: Vec<f64> = delayed.iter().zip(now).map(|(a, b)| a - b).collect();
+            assert!(off(&answer.change_by_delay_nm(&clock, late), &change) < 1e-9, "{late}");
         }
         // A late torque that is taken for one on time tells another course between the samples.
         let (clock, answer, truth) = answer(&[(1.0, 0.0)], 8.0);
@@ -159,6 +176,12 @@ mod tests {
         let dry: Vec<f64> = answer.sign.iter().map(|s| 8.0 * s).collect();
         assert_eq!(answer.given_nm(&clock, 0.0), dry);
         // Nor does the torque of a joint that does not reverse tell anything.
+        let change: Vec<f64> = shifted(&dry, 8.0, TICKS)
+            .iter()
+            .zip(dry.iter().step_by(TICKS))
+            .map(|(late, now)| late - now)
+            .collect();
+        assert!(off(&answer.change_by_delay_nm(&clock, 8.0), &change) < 1e-12);
         let still = ReversalAnswer { sign: vec![1.0; N * TICKS], ..answer };
         assert_eq!(still.given_nm(&clock, 0.0), vec![8.0; N * TICKS]);
     }

@@ -6,7 +6,8 @@ use super::candidates::ripple::strongest_orders;
 use super::image::{Image, Span};
 use super::kind::Kind;
 use super::significance::{FAR_AHEAD, LEAST_EVIDENCE};
-use super::study::{Entry, Score, Study};
+use super::statistic::Score;
+use super::study::{Entry, Study};
 
 /// Most causes: a log that needs more has another kind of problem.
 const MOST_CAUSES: usize = 24;

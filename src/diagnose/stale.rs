@@ -5,6 +5,8 @@
 //! readings. Readings that repeat far more often while their joint moves are stale, unless they lie at the end of the
 //! channel's range.
 
+use rayon::prelude::*;
+
 use super::data_faults::{MOVES_RAD_S, cause, exact};
 use super::kind::Kind;
 use super::record::Record;
@@ -79,7 +81,7 @@ impl Found {
 pub fn mend(record: &mut Record) -> Found {
     let joints = record.torque_nm.joints();
     let samples = record.time_s.len();
-    let found: Vec<OfJoint> = (0..joints).map(|j| of_joint(record, j)).collect();
+    let found: Vec<OfJoint> = (0..joints).into_par_iter().map(|j| of_joint(record, j)).collect();
     let single = found.iter().flat_map(|stale| stale.readings.iter().flatten().copied());
     let mut left_out = in_order(single);
     if left_out.len() as f64 > MOST_ROWS * samples as f64 {

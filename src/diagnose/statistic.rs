@@ -29,6 +29,15 @@ pub enum Statistic {
     },
 }
 
+/// What an entry explains.
+#[derive(Debug, Clone, Copy)]
+pub struct Score {
+    /// Twice the gain in log-likelihood.
+    pub gain: f64,
+    /// λ̂, see [`Statistic::score`].
+    pub lambda: f64,
+}
+
 /// λ of an effect of usual strength, √λ about 30. Schwarz's ln n takes n for λ: an effect as large as the noise in
 /// every sample.
 const USUAL_LAMBDA: f64 = 1000.0;
@@ -70,11 +79,16 @@ impl Statistic {
     /// (Bartlett 1946), so that n_j = n/(1 + 2 Σ ρ_r ρ_u). This tells ripple, whose own correlation ρ_u changes its
     /// sign, from slow errors.
     pub fn gain(&self, span: &Span, residual: &Image) -> f64 {
+        self.gain_along(span, residual, &span.coordinates(residual))
+    }
+
+    /// [`Self::gain`] for a residual with these coordinates along the span.
+    fn gain_along(&self, span: &Span, residual: &Image, coordinates: &[f64]) -> f64 {
         let (rows, counting, memory) = match self {
-            Self::Periods(knowledge) => return knowledge.gain(span, residual),
+            Self::Periods(knowledge) => return knowledge.gain(span, residual, coordinates),
             Self::Blocks { rows, counting, memory, .. } => (*rows, counting, memory),
         };
-        let signal = span.inside(residual);
+        let signal = span.combination(coordinates);
         let whole = signal.square();
         let panels = signal.mean.chunks_exact(rows).zip(residual.mean.chunks_exact(rows));
         panels
@@ -91,13 +105,15 @@ impl Statistic {
             .sum()
     }
 
-    /// λ̂ of what `span` explains: its squared length in units of the noise. For a single run, whose noise is not
-    /// known, the gain.
-    pub fn lambda(&self, span: &Span, residual: &Image, gain: f64) -> f64 {
-        match self {
-            Self::Periods(_) => span.explained(residual),
+    /// [`Self::gain`], and λ̂ of what `span` explains: its squared length in units of the noise; for a single run, whose
+    /// noise is not known, the gain.
+    pub fn score(&self, span: &Span, residual: &Image, coordinates: &[f64]) -> Score {
+        let gain = self.gain_along(span, residual, coordinates);
+        let lambda = match self {
+            Self::Periods(_) => coordinates.iter().map(|along| along * along).sum(),
             Self::Blocks { .. } => gain,
-        }
+        };
+        Score { gain, lambda }
     }
 
     /// Price of `count` free coefficients of one effect, in 2 ln of the evidence.

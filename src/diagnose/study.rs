@@ -11,8 +11,9 @@ use super::drives::{self, Answer};
 use super::error::DiagnoseError;
 use super::image::{Column, Image, Span, dot};
 use super::memory::Memory;
+use super::peak::search_peak;
 use super::scene::Scene;
-use super::statistic::Statistic;
+use super::statistic::{Score, Statistic};
 use super::whitening::{PeriodWhitening, RunWhitening, Whitening};
 use crate::base::BaseSet;
 use crate::identify::{Options, Regression};
@@ -32,20 +33,16 @@ pub struct Entry {
 }
 
 impl Entry {
+    /// Its family and site.
+    pub(super) fn place(&self) -> Place {
+        (self.family, self.site)
+    }
+
     /// Number of bytes of its columns.
     pub fn bytes(&self) -> usize {
         let rows = self.images.iter().map(|image| image.mean.len() + image.contrast.len());
         rows.sum::<usize>() * size_of::<f64>()
     }
-}
-
-/// What an entry explains.
-#[derive(Debug, Clone, Copy)]
-pub struct Score {
-    /// Twice the gain in log-likelihood.
-    pub gain: f64,
-    /// λ̂, see [`Statistic::lambda`].
-    pub lambda: f64,
 }
 
 /// A log, its null model, and the entries that may be added to it.
@@ -80,38 +77,27 @@ pub struct Study<'a> {
     /// Joints (0-based) whose readings are too bad to look for physics in them.
     pub left_out: Vec<usize>,
     /// Causes that were visible with an earlier estimate of the arm.
-    shown: Vec<Shown>,
+    pub(super) shown: Vec<Shown>,
     /// Cache of entries with any shape.
-    memory: Memory,
+    pub(super) memory: Memory,
 }
 
 /// A family and a site.
-type Place = (usize, Option<usize>);
+pub(super) type Place = (usize, Option<usize>);
 
 /// A law that was visible with an earlier estimate of the arm, and the number of its columns that were.
-struct Shown {
-    family: usize,
-    site: Option<usize>,
-    variant: usize,
-    columns: usize,
+pub(super) struct Shown {
+    pub(super) family: usize,
+    pub(super) site: Option<usize>,
+    pub(super) variant: usize,
+    pub(super) columns: usize,
 }
 
-/// A column that keeps less than this share of its length outside the null model counts as absorbed: the remainder
-/// reflects the noise of the null model's accelerations, which the residual contains as well. A spring on a joint
-/// without gravity keeps 2.7 %, and was found in one of 50 logs without a spring.
-const ABSORBED: f64 = 0.04;
-/// The same limit for a cause that was found with an earlier estimate of the arm. The shares differ a little between
-/// estimates, and if a cause came and went with them, the fit would not settle.
-const ABSORBED_AGAIN: f64 = 0.5 * ABSORBED;
-/// Number of shapes that are prepared at once.
-const BANK: usize = 8;
 /// Least share of the explained square that must also be explained in stretches left out of the fit.
 const KEPT_SHARE: f64 = 0.5;
 /// Least share of its joint's mean square that a cause must remove in stretches left out of the fit. It is 2.5 % of the
 /// rms error, which approximate laws may leave beside each other.
 pub(super) const LEAST_GAIN: f64 = 0.05;
-/// Steps of the golden-section search: they shrink the bracket to 1 %.
-const GOLDEN_STEPS: usize = 10;
 
 impl<'a> Study<'a> {
     /// Prepares the log laid out in `regression`; `theta` and `sigma_nm` are the null model's fit.
@@ -250,13 +236,8 @@ impl<'a> Study<'a> {
         self.shown = entries.iter().map(shown).collect();
         let places: Vec<Place> = entries.iter().map(|entry| (entry.family, entry.site)).collect();
         let is_periodic = self.scene.periodic;
-        self.fill_entries(|place| !is_periodic || places.contains(place));
+        self.prepare(|place| !is_periodic || places.contains(place));
         self
-    }
-
-    /// Prepares every family at every site with every starting shape.
-    pub fn look_everywhere(&mut self) {
-        self.fill_entries(|_| true);
     }
 
     /// Recomputes the statistic from `residual`, that of a better model than the null model, so that it tells how many
@@ -274,89 +255,6 @@ impl<'a> Study<'a> {
     /// Whether the search includes `site`: a joint that is not left out, or the arm as a whole.
     pub fn looks_at(&self, site: Option<usize>) -> bool {
         site.is_none_or(|j| !self.left_out.contains(&j))
-    }
-
-    fn fill_entries(&mut self, is_wanted: impl Fn(&Place) -> bool) {
-        let study = &*self;
-        let wanted: Vec<(usize, Option<usize>, Vec<Shape>)> = study
-            .families
-            .iter()
-            .enumerate()
-            .flat_map(|(family, candidate)| {
-                let scene = &study.scene;
-                let sites = candidate.sites(scene.joints()).into_iter();
-                let looked_at = |site: &Option<usize>| study.looks_at(*site);
-                let is_wanted = &is_wanted;
-                let sites = sites.filter(looked_at).filter(move |s| is_wanted(&(family, *s)));
-                sites.flat_map(move |site| {
-                    let shapes = candidate.shapes(scene, site);
-                    let banks: Vec<_> =
-                        shapes.chunks(BANK).map(|s| (family, site, s.to_vec())).collect();
-                    banks
-                })
-            })
-            .collect();
-        let entries = wanted.par_iter().flat_map_iter(|(f, site, s)| study.bank(*f, *site, s));
-        self.entries = entries.flatten_iter().collect();
-        let place = |e: &Entry| (e.family, e.site);
-        let groups = self.entries.chunk_by(|a, b| place(a) == place(b));
-        // The noise of a single run is not known, and so neither is how large a coefficient it can make.
-        let is_possible = |e: &Entry, b: f64| {
-            !self.scene.periodic || self.families[e.family].is_possible(e.shape, &[b])
-        };
-        let distinct = |same: &[Entry]| (place(&same[0]), DistinctShapes::of(same, is_possible));
-        self.shapes = groups.map(distinct).collect();
-    }
-
-    /// The entry of a family at a site with this shape; `None` if the null model absorbs it.
-    pub fn entry(&self, family: usize, site: Option<usize>, shape: Shape) -> Option<Entry> {
-        self.memory.entry((family, site, shape), || self.bank(family, site, &[shape]).remove(0))
-    }
-
-    /// The family of `entry` at its site in each of its richer shapes.
-    pub fn richer_entries(&self, entry: &Entry) -> Vec<Entry> {
-        let Entry { family, site, .. } = *entry;
-        let shapes = self.families[family].richer_shapes(&self.scene);
-        let richer = shapes.into_par_iter().filter_map(|shape| self.entry(family, site, shape));
-        // If the null model absorbs the further coefficient, the law is the one without it.
-        richer.filter(|entry| entry.images.len() > 1).collect()
-    }
-
-    /// [`Self::entry`] for each of `shapes`.
-    fn bank(&self, family: usize, site: Option<usize>, shapes: &[Shape]) -> Vec<Option<Entry>> {
-        let columns = self.families[family].bank(&self.scene, site, shapes);
-        let mut images = self.whitening.images(columns.iter().flatten());
-        let lengths: Vec<f64> = images.iter().map(Image::square).collect();
-        self.null.residualise_all(&mut images);
-        let mut outside = images.into_iter().zip(lengths);
-        let entry = |(shape, columns): (&Shape, Vec<Column>)| {
-            let own: Vec<(Image, f64)> = outside.by_ref().take(columns.len()).collect();
-            let shown = self.shown_columns(family, site, shape.variant);
-            let least = |column: usize| if column < shown { ABSORBED_AGAIN } else { ABSORBED };
-            // Columns behind an absorbed one are dropped with it: they are parameters that belong to it.
-            let images: Vec<Image> = own
-                .into_iter()
-                .enumerate()
-                .map_while(|(k, (image, length))| {
-                    is_seen(&image, length, least(k)).then_some(image)
-                })
-                .collect();
-            (!images.is_empty()).then_some(Entry { family, site, shape: *shape, images })
-        };
-        shapes.iter().zip(columns).map(entry).collect()
-    }
-
-    /// How many columns of a law were visible with an earlier estimate of the arm.
-    fn shown_columns(&self, family: usize, site: Option<usize>, variant: usize) -> usize {
-        let is_it = |s: &&Shown| (s.family, s.site, s.variant) == (family, site, variant);
-        self.shown.iter().filter(is_it).map(|s| s.columns).max().unwrap_or(0)
-    }
-
-    /// The part of `image` outside the null model; `None` if the null model absorbs it.
-    pub fn outside_null(&self, mut image: Image) -> Option<Image> {
-        let length = image.square();
-        self.null.residualise(&mut image);
-        is_seen(&image, length, ABSORBED).then_some(image)
     }
 
     /// Span of an entry outside the null model and outside `others`.
@@ -435,11 +333,10 @@ impl<'a> Study<'a> {
         if span.len() != entry.images.len() {
             return None;
         }
-        let possible = self.families[entry.family].is_possible(entry.shape, &span.solve(residual));
-        possible.then(|| {
-            let gain = self.statistic.gain(&span, residual);
-            Score { gain, lambda: self.statistic.lambda(&span, residual, gain) }
-        })
+        let coordinates = span.coordinates(residual);
+        let b = span.coefficients(coordinates.clone());
+        let is_possible = self.families[entry.family].is_possible(entry.shape, &b);
+        is_possible.then(|| self.statistic.score(&span, residual, &coordinates))
     }
 
     /// Share of the mean square of the joint `site` (`None`: of all joints) that `span` removes from `residual` in
@@ -472,7 +369,7 @@ impl<'a> Study<'a> {
         dot(&residual.mean[own.clone()], &residual.mean[own])
     }
 
-    /// The best shape near `entry` and its score, by golden-section search.
+    /// The best shape near `entry` and its score, by [`search_peak`].
     pub fn refined(
         &self,
         entry: &Entry,
@@ -491,37 +388,22 @@ impl<'a> Study<'a> {
             Some(bracket) => bracket,
             None => return Some(start),
         };
-        let (mut low, mut high) = (to(low), to(high));
-        const RATIO: f64 = 0.618_033_988_749_895;
-        let evaluate = |at: f64| -> Option<(Entry, Score)> {
-            let shape = Shape { value: from(at), ..entry.shape };
-            let entry = self.entry(entry.family, entry.site, shape)?;
-            let score = self.score(&entry, others, residual)?;
-            Some((entry, score))
-        };
-        let value =
-            |found: &Option<(Entry, Score)>| found.as_ref().map_or(f64::NEG_INFINITY, |f| f.1.gain);
-        let mut inner = [high - RATIO * (high - low), low + RATIO * (high - low)];
-        let mut found = inner.map(evaluate);
         let mut best = start;
-        for _ in 0..GOLDEN_STEPS {
-            for f in &found {
-                if let Some(f) = f.as_ref().filter(|f| f.1.gain > best.1.gain) {
-                    best = f.clone();
-                }
+        let known = [to(entry.shape.value), best.1.gain];
+        search_peak([to(low), to(high)], known, |at| {
+            let shape = Shape { value: from(at), ..entry.shape };
+            let entry = self.entry(entry.family, entry.site, shape);
+            let found = entry.and_then(|entry| {
+                let score = self.score(&entry, others, residual)?;
+                Some((entry, score))
+            });
+            let Some(found) = found else { return f64::NEG_INFINITY };
+            let gain = found.1.gain;
+            if gain > best.1.gain {
+                best = found;
             }
-            if value(&found[0]) >= value(&found[1]) {
-                high = inner[1];
-                inner = [high - RATIO * (high - low), inner[0]];
-                found[1] = found[0].take();
-                found[0] = evaluate(inner[0]);
-            } else {
-                low = inner[0];
-                inner = [inner[1], low + RATIO * (high - low)];
-                found[0] = found[1].take();
-                found[1] = evaluate(inner[1]);
-            }
-        }
+            gain
+        });
         Some(best)
     }
 
@@ -570,10 +452,4 @@ impl<'a> Study<'a> {
     pub fn base_count(&self) -> usize {
         self.null_columns.len() - self.answers.len()
     }
-}
-
-/// Whether `image`, whose squared length was `length` before the null model was projected out, keeps more than the
-/// share `least` of its length.
-fn is_seen(image: &Image, length: f64, least: f64) -> bool {
-    image.square() > least * least * length
 }

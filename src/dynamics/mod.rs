@@ -22,7 +22,7 @@ pub use model::Model;
 pub use motion::Motion;
 pub use newton_euler::{inverse_dynamics, rigid_torque};
 pub use parameters::{BODY_PARAMETERS, Parameter, ParameterLayout};
-pub use real::{LANES, Lanes, Real, map_pairs, with_widest_registers};
+pub use real::{LANES, Lanes, Real, map_pairs, of_pairs, with_widest_registers};
 pub use regressor::{RegressorBlock, regressor};
 pub use regressor_adjoint::AdjointWorkspace;
 pub use vector::Vec3;

@@ -52,6 +52,16 @@ pub const LANES: usize = 8;
 pub struct Lanes(pub [f64; LANES]);
 
 impl Lanes {
+    /// `y`, eight at a time, filled up with zeros.
+    pub fn of(y: &[f64]) -> Vec<Self> {
+        let filled = |some: &[f64]| {
+            let mut lanes = [0.0; LANES];
+            lanes[..some.len()].copy_from_slice(some);
+            Self(lanes)
+        };
+        y.chunks(LANES).map(filled).collect()
+    }
+
     #[inline(always)]
     fn map2(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
         let mut out = self;
@@ -177,6 +187,16 @@ pub fn map_pairs(a: &mut [f64], b: &[f64], f: impl Fn(f64, f64) -> f64) {
         *a = out;
     }
     a_rest.iter_mut().zip(b_rest).for_each(|(a, b)| *a = f(*a, *b));
+}
+
+/// `f(a, b)` of all pairs, with the widest registers of the machine if `f` is `#[inline(always)]`. It is copied because
+/// a reference to it would be called and not inlined.
+pub fn of_pairs(mut a: Vec<f64>, b: &[f64], f: impl Fn(f64, f64) -> f64 + Copy) -> Vec<f64> {
+    with_widest_registers(
+        #[inline(always)]
+        || map_pairs(&mut a, b, f),
+    );
+    a
 }
 
 /// Adding and subtracting 1.5·2⁵² rounds to the nearest integer and leaves that integer, in two's

@@ -2,6 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
+use crate::dot::dot;
 use fourier::{Complex64, ComplexToReal, Forward, Inverse};
 
 /// After this many time constants the initial value of a response has decayed below rounding.
@@ -14,17 +15,24 @@ pub struct FineClock {
     forward: Forward,
     inverse: Inverse,
     fine_inverse: Inverse,
+    /// iω_h T/(e^{iω_h T} − 1) of every harmonic h.
+    of_mean: Vec<Complex64>,
 }
 
 impl FineClock {
     /// Creates the grid for periods of `samples` samples, with `ticks` ticks per sample.
     pub fn new(samples: usize, ticks: usize) -> Self {
+        let of_mean = |h: usize| {
+            let half = PI * h as f64 / samples as f64;
+            if h == 0 { Complex64::ONE } else { Complex64::from_polar(half / half.sin(), -half) }
+        };
         Self {
             samples,
             ticks,
             forward: fourier::forward(samples),
             inverse: fourier::inverse(samples),
             fine_inverse: fourier::inverse(ticks * samples),
+            of_mean: (0..=samples / 2).map(of_mean).collect(),
         }
     }
 
@@ -84,7 +92,18 @@ impl FineClock {
     /// a, and the remainder τ − a as above: together a + (τ − a)˜. For components slower than `highest` the two are
     /// alike; ripple faster than half the sampling rate is aliased to another amplitude and phase.
     pub fn as_logged(&self, fine_nm: &[f64], highest: usize, feedback_per_tick: f64) -> Vec<f64> {
-        self.as_logged_but(fine_nm, &first_order_lag(fine_nm, feedback_per_tick), highest)
+        let cell = LaggedCell::new(self.ticks, feedback_per_tick);
+        let next = fine_nm[self.ticks..].iter().step_by(self.ticks).chain(&fine_nm[..1]);
+        let cells = fine_nm.chunks_exact(self.ticks).zip(next);
+        let (mut rest, gained): (Vec<f64>, Vec<f64>) =
+            cells.map(|(cell_nm, end_nm)| cell.sums(cell_nm, *end_nm)).unzip();
+        let given_nm = cell.closed(&gained);
+        rest.iter_mut()
+            .zip(&given_nm)
+            .for_each(|(rest, given)| *rest -= cell.mean_of_start * given);
+        let mut logged = self.filtered(&rest, |h| self.of_mean(h, highest));
+        logged.iter_mut().zip(&given_nm).for_each(|(nm, given)| *nm += given);
+        logged
     }
 
     /// [`Self::as_logged`] for a drive whose entire reaction is the torque `given_nm`.
@@ -118,12 +137,7 @@ impl FineClock {
 
     /// The factor iω_h T/(e^{iω_h T} − 1) up to harmonic `highest`, zero beyond.
     fn of_mean(&self, h: usize, highest: usize) -> Complex64 {
-        let half = PI * h as f64 / self.samples as f64;
-        match h {
-            0 => Complex64::ONE,
-            _ if h > highest => Complex64::ZERO,
-            _ => Complex64::from_polar(half / half.sin(), -half),
-        }
+        if h > highest { Complex64::ZERO } else { self.of_mean[h] }
     }
 
     /// Multiplies each harmonic h of one period of `y` by `factor(h)`: ihω gives a derivative, e^(−ihωT) a delay of T.
@@ -155,27 +169,82 @@ impl FineClock {
     }
 }
 
+/// The lag a of [`first_order_lag`] over one sample, as sums over the torques at its ticks, the end included.
+struct LaggedCell {
+    /// Weights of the torques in the mean of τ − a from the sample to the next, for a = 0 at the sample.
+    rest: Vec<f64>,
+    /// Weights of the torques in a at the next sample, for a = 0 at the sample.
+    gained: Vec<f64>,
+    /// Mean of a over the cell, and a at its end, per a at its start and without torque.
+    mean_of_start: f64,
+    kept: f64,
+}
+
+impl LaggedCell {
+    fn new(ticks: usize, per_tick: f64) -> Self {
+        let keep = (-per_tick).exp();
+        // Means by the trapezoidal rule.
+        let in_mean = |i: usize| if i == 0 || i == ticks { 0.5 } else { 1.0 } / ticks as f64;
+        let of_start: Vec<f64> = (0..=ticks).map(|i| keep.powi(i as i32)).collect();
+        let mean_from = |m: usize| (m..=ticks).map(|i| in_mean(i) * of_start[i - m]).sum::<f64>();
+        // The step to tick m adds half of (1 − keep)(τ_{m−1} + τ_m).
+        let by_steps = |weight: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            let step = |m: usize| if (1..=ticks).contains(&m) { weight(m) } else { 0.0 };
+            (0..=ticks).map(|i| 0.5 * (1.0 - keep) * (step(i) + step(i + 1))).collect()
+        };
+        let in_mean_of_lag = by_steps(&mean_from);
+        Self {
+            rest: in_mean_of_lag.iter().enumerate().map(|(i, lag)| in_mean(i) - lag).collect(),
+            gained: by_steps(&|m| of_start[ticks - m]),
+            mean_of_start: mean_from(0),
+            kept: of_start[ticks],
+        }
+    }
+
+    /// The mean of τ − a over a cell and a at its end, for a = 0 at its start.
+    fn sums(&self, cell_nm: &[f64], end_nm: f64) -> (f64, f64) {
+        let sum = |weights: &[f64]| {
+            let (last, weights) = weights.split_last().expect("one weight more than ticks");
+            dot(weights, cell_nm) + last * end_nm
+        };
+        (sum(&self.rest), sum(&self.gained))
+    }
+
+    /// a at the samples of a period of which every cell adds what it `gained`.
+    fn closed(&self, gained: &[f64]) -> Vec<f64> {
+        let step = |a: f64, gained: &f64| a * self.kept + gained;
+        // All earlier periods contribute (a geometric series). Without feedback, nothing does.
+        let forgotten = 1.0 - self.kept.powi(gained.len() as i32);
+        let once = gained.iter().fold(0.0, step);
+        let mut a = if forgotten > 0.0 { once / forgotten } else { 0.0 };
+        let start = |gained: &f64| {
+            let start = a;
+            a = step(start, gained);
+            start
+        };
+        gained.iter().map(start).collect()
+    }
+}
+
 /// First-order lag of a periodic torque: the a of ȧ = ω (τ − a) over one period, with ω given as `per_tick`. τ between
 /// two ticks is the mean of both. Zero if ω is zero.
 pub fn first_order_lag(torque_nm: &[f64], per_tick: f64) -> Vec<f64> {
     let n = torque_nm.len();
     let keep = (-per_tick).exp();
-    let step = |a: f64, k: usize| {
-        let before = torque_nm[k.checked_sub(1).unwrap_or(n - 1)];
-        a * keep + (1.0 - keep) * 0.5 * (before + torque_nm[k])
-    };
+    let before = torque_nm.last().into_iter().chain(torque_nm);
+    let taken: Vec<f64> =
+        before.zip(torque_nm).map(|(before, nm)| (1.0 - keep) * 0.5 * (before + nm)).collect();
     let run_in = ((FORGOTTEN / per_tick) as usize).min(n);
-    let mut a = (n - run_in..n).fold(0.0, step);
+    let mut a = taken[n - run_in..].iter().fold(0.0, |a, taken| a * keep + taken);
     if run_in == n && keep < 1.0 {
         // If the period is short compared with the time constant, all earlier periods contribute (a geometric series).
         a /= 1.0 - keep.powi(n as i32);
     }
-    (0..n)
-        .map(|k| {
-            a = step(a, k);
-            a
-        })
-        .collect()
+    let lag = |taken: &f64| {
+        a = a * keep + taken;
+        a
+    };
+    taken.iter().map(lag).collect()
 }
 
 /// Inverse transform of the coefficients. The mean, and the harmonic at half the sampling rate that only an even number
@@ -308,6 +377,19 @@ mod tests {
         let logged = clock.as_logged(&wave(TICKS * N, 3.0), 20, 0.04);
         let tick = TAU * 3.0 / (TICKS * N) as f64;
         assert!(largest_difference(&logged, &wave(N, 3.0)) < tick * tick / 6.0 + 1e-13);
+    }
+
+    /// The lag is summed cell by cell. Followed from tick to tick, it is the same, however long its memory.
+    #[test]
+    fn a_lag_is_summed_as_it_is_followed() {
+        let clock = FineClock::new(N, TICKS);
+        let corner = |y: &f64| (8.0 * y).tanh();
+        let fine: Vec<f64> = wave(TICKS * N, 3.0).iter().map(corner).collect();
+        for per_tick in [1e-4, 0.02, 0.5, 50.0] {
+            let followed = clock.as_logged_but(&fine, &first_order_lag(&fine, per_tick), 20);
+            let summed = clock.as_logged(&fine, 20, per_tick);
+            assert!(largest_difference(&summed, &followed) < 1e-12, "{per_tick}");
+        }
     }
 
     /// For a period shorter than the memory of the lag, the result equals that of many repetitions; a constant passes

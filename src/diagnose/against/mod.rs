@@ -21,7 +21,7 @@ use super::intervals::{Base, tangents};
 use super::judgement::{TELLS_APART, probability_of_class};
 use super::kind::Kind;
 use super::significance::LEAST_EVIDENCE;
-use super::statistic::upper_fisher;
+use super::statistic::{Score, upper_fisher};
 use super::study::{Entry, Study};
 use super::verdict::{BaseParameter, Cause, Moved, MovedTogether, Rival};
 use super::whitening::RepeatingNoise;
@@ -370,8 +370,8 @@ impl Search<'_> {
         // The part of the residual that the change explains.
         let signal = span.inside(&left);
         let size = signal.square();
-        let gain = study.statistic.gain(&span, &left);
-        let scale = study.statistic.lambda(&span, &left, gain) / size.max(f64::MIN_POSITIVE);
+        let Score { lambda, .. } = study.statistic.score(&span, &left, &span.coordinates(&left));
+        let scale = lambda / size.max(f64::MIN_POSITIVE);
         let rivals: Vec<&Scored> = scored.iter().filter(|s| s.change != taken[index]).collect();
         let is_alike = |s: &&Scored| {
             let span = Span::outside(&others, &self.images[s.change]);
@@ -405,7 +405,7 @@ impl Search<'_> {
             parameters,
             peak_joint: None,
             gain_fraction: None,
-            strength: study.statistic.lambda(&span, &left, gain).max(0.0).sqrt(),
+            strength: lambda.max(0.0).sqrt(),
             in_words: change.in_words.to_owned(),
             form: None,
             rivals: behind.collect(),

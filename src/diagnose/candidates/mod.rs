@@ -31,7 +31,7 @@ mod torque_gain;
 use super::image::Column;
 use super::kind::Kind;
 use super::scene::{Instants, Scene};
-use crate::dynamics::{map_pairs, with_widest_registers};
+use crate::dynamics::{of_pairs, with_widest_registers};
 
 /// A point in the space of a family's nonlinear parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,6 +83,11 @@ pub trait Candidate: Sync {
     /// Sites at which the effect may occur: a joint (0-based), or `None` for the arm as a whole.
     fn sites(&self, joints: usize) -> Vec<Option<usize>> {
         (0..joints).map(Some).collect()
+    }
+
+    /// Whether what the arm as a whole adds is the sum of what its joints add, shape by shape.
+    fn is_sum_of_joints(&self) -> bool {
+        false
     }
 
     /// Prior odds of the effect at this site relative to the family's other sites. Only their ratios matter.
@@ -285,15 +290,6 @@ fn dry_friction(scene: &Scene, j: usize, level: impl Fn(&Instants, usize) -> f64
     let at = scene.instants(j);
     let friction = (0..at.sign.len()).map(|k| at.sign[k] * level(at, k)).collect();
     Column::on(j, scene.as_logged(friction))
-}
-
-/// `f(a, b)` of all pairs, with the machine's widest vector registers where `f` is inlined.
-fn of_pairs(mut a: Vec<f64>, b: &[f64], f: impl Fn(f64, f64) -> f64) -> Vec<f64> {
-    with_widest_registers(
-        #[inline(always)]
-        || map_pairs(&mut a, b, &f),
-    );
-    a
 }
 
 /// The joint at `site`, for families that always sit on a joint.

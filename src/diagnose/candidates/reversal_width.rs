@@ -43,6 +43,10 @@ impl Candidate for ReversalWidth {
         arm_and_joints(joints)
     }
 
+    fn is_sum_of_joints(&self) -> bool {
+        true
+    }
+
     fn shapes(&self, scene: &Scene, _: Option<usize>) -> Vec<Shape> {
         // The low-pass of a single run is slower than a reversal.
         if !scene.periodic {

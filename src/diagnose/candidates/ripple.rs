@@ -6,7 +6,7 @@
 //! that the drive answers, or that is in its current only, is in the recorded torque at every sample (variant 1).
 
 use super::*;
-use crate::dynamics::Real;
+use crate::dynamics::{Lanes, Real};
 
 /// See the module.
 pub struct Ripple;
@@ -182,20 +182,35 @@ fn power_of_orders(scene: &Scene, j: usize, weights: &[f64], tilt: i32) -> Order
     let q = scene.motion.q_rad.joint(j);
     let step = 0.5 * order_spacing(scene, j).min(2.0);
     let count = ((HIGHEST_ORDER - LOWEST_ORDER) / step) as usize;
-    let mut phasors: Vec<(f64, f64)> = q.iter().map(|q| (LOWEST_ORDER * q).sin_cos()).collect();
-    let turns: Vec<(f64, f64)> = q.iter().map(|q| (step * q).sin_cos()).collect();
-    let mut power_at = |k: usize| {
-        let (mut re, mut im) = (0.0, 0.0);
-        for ((phasor, turn), r) in phasors.iter_mut().zip(&turns).zip(weights) {
-            re += r * phasor.1;
-            im += r * phasor.0;
-            *phasor =
-                (phasor.0 * turn.1 + phasor.1 * turn.0, phasor.1 * turn.1 - phasor.0 * turn.0);
-        }
+    let (q, weights) = (Lanes::of(q), Lanes::of(weights));
+    let [mut phasors, turns] = [LOWEST_ORDER, step]
+        .map(|order| q.iter().map(|q| (*q * order).sin_cos()).collect::<Vec<_>>());
+    let power_at = |k: usize| {
+        let [re, im] = with_widest_registers(
+            #[inline(always)]
+            || sum_and_turn(&mut phasors, &turns, &weights),
+        );
         let order = LOWEST_ORDER + step * k as f64;
         (re * re + im * im) * order.powi(tilt)
     };
-    OrderSpectrum { step, power: (0..count).map(&mut power_at).collect() }
+    OrderSpectrum { step, power: (0..count).map(power_at).collect() }
+}
+
+/// Real and imaginary part of Σ w_k p_k, with the `phasors` p as (imaginary, real); each is then multiplied by its turn.
+#[inline(always)]
+fn sum_and_turn(
+    phasors: &mut [(Lanes, Lanes)],
+    turns: &[(Lanes, Lanes)],
+    weights: &[Lanes],
+) -> [f64; 2] {
+    let mut sums = [Lanes::constant(0.0); 2];
+    for ((phasor, turn), weight) in phasors.iter_mut().zip(turns).zip(weights) {
+        let (im, re) = *phasor;
+        sums[0] += re * *weight;
+        sums[1] += im * *weight;
+        *phasor = (im * turn.1 + re * turn.0, re * turn.1 - im * turn.0);
+    }
+    sums.map(|lanes| lanes.0.iter().sum())
 }
 
 impl OrderSpectrum {

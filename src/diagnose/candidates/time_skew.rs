@@ -40,6 +40,10 @@ impl Candidate for TimeSkew {
         arm_and_joints(joints)
     }
 
+    fn is_sum_of_joints(&self) -> bool {
+        true
+    }
+
     fn prior_odds(&self, site: Option<usize>) -> f64 {
         // Joints are recorded together: that a single one of six is late is a third as likely as that the whole arm is.
         if site.is_some() { 0.06 } else { 1.0 }

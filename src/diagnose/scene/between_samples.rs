@@ -6,6 +6,7 @@ use std::borrow::Cow;
 use super::Scene;
 use crate::diagnose::load::LinkTorque;
 use crate::diagnose::reversals::{Bends, Turning};
+use crate::dynamics::of_pairs;
 use crate::identify::{drive_answers, feedback_per_tick};
 use crate::signal::first_order_lag;
 
@@ -104,9 +105,12 @@ impl Scene {
         };
         let delivered: Vec<f64> = match fed {
             Some(fed) => {
-                let lacks = |(qd, sign): (&f64, &f64)| law(*qd) - fed * sign;
-                let lacking: Vec<f64> =
-                    joint.series_rad_s.iter().zip(&joint.expected).map(lacks).collect();
+                let lacking = of_pairs(
+                    joint.series_rad_s.clone(),
+                    &joint.expected,
+                    #[inline(always)]
+                    |qd, sign| law(qd) - fed * sign,
+                );
                 let back = self.answered(&lacking);
                 joint.expected.iter().zip(back).map(|(sign, back)| fed * sign + back).collect()
             }
@@ -189,9 +193,8 @@ impl Scene {
     /// feedback, not at once ([`FineClock::as_logged`](crate::signal::FineClock::as_logged)).
     pub fn as_logged(&self, torque_nm: Vec<f64>) -> Vec<f64> {
         match &self.clock {
-            Some(_) => {
-                let given_nm = self.answered(&torque_nm);
-                self.as_logged_but(torque_nm, &given_nm)
+            Some(clock) => {
+                clock.as_logged(&torque_nm, self.highest, feedback_per_tick(self.instant_s()))
             }
             None => torque_nm,
         }

@@ -246,11 +246,6 @@ impl Scene {
             })
         };
         let late_ticks = delay_s / self.instant_s();
-        let at_samples = |fine: &[f64], wanted: bool| {
-            let late = shifted(fine, late_ticks, FINE);
-            let change = late.iter().zip(fine.iter().step_by(FINE)).map(|(late, now)| late - now);
-            part(&change.collect::<Vec<_>>(), wanted)
-        };
         let (coulomb, viscous) = (self.coulomb_nm[j], self.arm.joints[j].drive.viscous_nm_s_rad);
         let load = delivered.load_nm.joint(j);
         // In the other harmonics, the differentiated noise of the velocity is that of the acceleration, which the
@@ -258,8 +253,10 @@ impl Scene {
         let qd = part(self.motion.qd_rad_s.joint(j), true);
         let smooth: Vec<f64> = load.iter().zip(&qd).map(|(load, qd)| load + viscous * qd).collect();
         let smooth = less(self.delayed(&smooth, delay_s), &smooth);
-        let dry = at_samples(&self.instants(j).sign, true);
-        let beyond = at_samples(&delivered.answers[j].given_nm(clock, late_ticks), false);
+        let sign = &self.instants(j).sign;
+        let now = sign.iter().step_by(FINE).copied().collect::<Vec<_>>();
+        let dry = part(&less(shifted(sign, late_ticks, FINE), &now), true);
+        let beyond = part(&delivered.answers[j].change_by_delay_nm(clock, late_ticks), false);
         let sum = |((s, d), b): ((&f64, &f64), &f64)| s + coulomb * d + b;
         smooth.iter().zip(&dry).zip(&beyond).map(sum).collect()
     }

@@ -42,7 +42,7 @@ pub struct PeriodWhitening {
     /// Effective number of periods in the mean, less than `periods` where samples are filled in.
     of_mean: f64,
     forward: Forward,
-    /// L⁻¹ per harmonic in use, row-major N × N.
+    /// L⁻¹ per harmonic in use, column-major N × N.
     factors: Vec<Vec<Complex<f64>>>,
     /// Uncertainty of the noise's power, per harmonic.
     unknown: Vec<Uncertainty>,
@@ -136,7 +136,7 @@ impl PeriodWhitening {
                 let frequency_hz = k as f64 * problem.rate_hz / n as f64;
                 return Err(DiagnoseError::NoNoise { log: log.to_owned(), frequency_hz });
             };
-            whitening.factors.push(inverse.transpose().iter().copied().collect());
+            whitening.factors.push(inverse.iter().copied().collect());
         }
         whitening.steps = steps(&whitening, &torque);
         whitening.stepping =
@@ -230,23 +230,23 @@ impl PeriodWhitening {
 
     /// Whitened rows of one period's spectra (joint, coefficients), times `scale`.
     fn rows(&self, spectra: &[(usize, Vec<Complex<f64>>)], scale: f64) -> Vec<f64> {
-        let rows = 2 * self.factors.len() - 1;
-        let mut out = vec![0.0; self.joints * rows];
-        let mut row = 0;
-        for (k, factor) in self.factors.iter().enumerate() {
-            let real = k == 0;
-            for i in 0..self.joints {
-                let mut sum = Complex::new(0.0, 0.0);
-                for (j, spectrum) in spectra.iter().filter(|(j, _)| *j <= i) {
-                    sum += factor[i * self.joints + j] * spectrum[k];
-                }
-                if real {
-                    out[row] = scale * sum.re;
-                    row += 1;
-                } else {
-                    out[row] = scale * std::f64::consts::SQRT_2 * sum.re;
-                    out[row + 1] = scale * std::f64::consts::SQRT_2 * sum.im;
-                    row += 2;
+        let n = self.joints;
+        let mut out = vec![0.0; n * (2 * self.factors.len() - 1)];
+        let (mean, harmonics) = out.split_at_mut(n);
+        for (j, spectrum) in spectra {
+            // L⁻¹ is zero above its diagonal.
+            let own = j * n + j..(j + 1) * n;
+            let level = scale * spectrum[0].re;
+            let factors = &self.factors[0][own.clone()];
+            mean[*j..].iter_mut().zip(factors).for_each(|(row, factor)| *row += factor.re * level);
+            let rows = harmonics.chunks_exact_mut(2 * n).zip(&self.factors[1..]);
+            for ((rows, factors), value) in rows.zip(&spectrum[1..]) {
+                let value = value * (scale * std::f64::consts::SQRT_2);
+                let (rows, _) = rows[2 * j..].as_chunks_mut::<2>();
+                for ([re, im], factor) in rows.iter_mut().zip(&factors[own.clone()]) {
+                    let product = factor * value;
+                    *re += product.re;
+                    *im += product.im;
                 }
             }
         }
@@ -273,7 +273,7 @@ impl PeriodWhitening {
                 };
                 row += if real { 1 } else { 2 };
                 for (j, spectrum) in spectra.iter_mut().enumerate().take(i + 1) {
-                    spectrum[k] += factor[i * self.joints + j].conj() * value;
+                    spectrum[k] += factor[j * self.joints + i].conj() * value;
                 }
             }
         }
