@@ -176,12 +176,19 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
         say!("report: {}", path.display());
     }
     if let Some(path) = &args.extended_scenario {
-        let simulation = diagnoser.extended_simulation(&finding)?;
-        let measurement = log.measurement();
-        Scenario::of_diagnosis(&simulation, &finding, &measurement, &set, &options)?.save(path)?;
-        // Loading checks that the written file is a valid scenario.
-        Scenario::load(Some(path))?;
-        say!("scenario: {}", path.display());
+        let extended = || -> CommandResult {
+            let simulation = diagnoser.extended_simulation(&finding)?;
+            let m = log.measurement();
+            Scenario::of_diagnosis(&simulation, &finding, &m, &set, &options)?.save(path)?;
+            // Loading checks that the written file is a valid scenario.
+            Scenario::load(Some(path))?;
+            Ok(Outcome::Done)
+        };
+        match (extended(), &failed) {
+            (Ok(_), _) => say!("scenario: {}", path.display()),
+            (Err(error), None) => return Err(error),
+            (Err(error), Some(_)) => say!("note: no scenario: {error}"),
+        }
     }
     match failed {
         Some(error) => Err(error.into()),

@@ -1,5 +1,7 @@
 //! Which families explain the residual: forward selection with refinement, exchange and removal.
 
+use std::cmp::Ordering;
+
 use rayon::prelude::*;
 
 use super::candidates::ripple::strongest_orders;
@@ -24,6 +26,9 @@ const MOST_ALIKE: usize = 3;
 /// Number of families whose shapes are refined before one is chosen.
 pub(super) const FINALISTS: usize = 10;
 
+/// Evidence, as 2 ln of the odds, that differs by less may as well be rounded differently.
+const ROUNDING: f64 = 1e-6;
+
 /// Another variant is refined only if, at its best starting shape, it explains at least this share of what the family
 /// explains at the starting shape under consideration; otherwise it cannot be ahead between its starting shapes. For
 /// scale: from a starting shape to the best one near it, Stribeck's curve gains 3 %.
@@ -38,6 +43,15 @@ pub struct Contender {
     pub score: Score,
     /// Twice the log-evidence for it against no effect.
     pub evidence: f64,
+}
+
+impl Contender {
+    /// By evidence, the most first. Laws with the same columns differ by rounding, which decides nothing: they keep their
+    /// order in the catalogue.
+    fn in_order(a: &Self, b: &Self) -> Ordering {
+        let to_rounding = |c: &Self| (c.evidence / ROUNDING).round();
+        to_rounding(b).total_cmp(&to_rounding(a))
+    }
 }
 
 /// The causes kept so far.
@@ -261,7 +275,7 @@ impl<'s, 'a> Kept<'s, 'a> {
             Contender { entry, score, evidence }
         };
         let mut forms: Vec<Contender> = own.into_iter().chain(forms).map(contender).collect();
-        forms.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+        forms.sort_by(Contender::in_order);
         let best = forms.first()?.evidence;
         let near = forms.iter().take_while(|form| best - form.evidence < FAR_AHEAD).count();
         let is_own = |form: &Contender| near == 1 || self.is_its_own(&form.entry, others, residual);
@@ -378,7 +392,7 @@ impl<'s, 'a> Kept<'s, 'a> {
                 None => best.push(Contender { entry: entry.clone(), score, evidence }),
             }
         }
-        best.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+        best.sort_by(Contender::in_order);
         let mut finalists = FINALISTS.min(best.len());
         if !study.scene.periodic {
             // Refining a shape does not double the evidence.
@@ -394,7 +408,7 @@ impl<'s, 'a> Kept<'s, 'a> {
             })
             .collect();
         all.extend_from_slice(tail);
-        all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+        all.sort_by(Contender::in_order);
         all
     }
 

@@ -137,7 +137,7 @@ impl Estimation {
                 whitened
             }
             Estimator::Iv => {
-                let instruments = aids.instruments.ok_or(FitError::WeakInstruments)?;
+                let instruments = aids.instruments.ok_or(FitError::NoInstruments)?;
                 let whitened = self.full.get_or_insert_with(full);
                 let first = self.fitter.fit(problem, set, Weighting::PerJoint)?;
                 instrument(problem, instruments, &first.weights, &mut whitened.problem)?;

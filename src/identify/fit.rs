@@ -87,6 +87,9 @@ pub enum FitError {
          higher cutoff, or another estimator than iv"
     )]
     WeakInstruments,
+    /// The smoother motion was not given.
+    #[error("the estimator iv needs the regressor along a smoother motion, and has none")]
+    NoInstruments,
     /// Columns of the regressor vanish or coincide along this motion.
     #[error(
         "the motion does not excite {}: along it their columns are dependent on the others to \

@@ -60,7 +60,7 @@ impl Arm {
 #[serde(deny_unknown_fields)]
 struct RobotFile {
     name: String,
-    #[serde(default = "standard_gravity")]
+    #[serde(default = "usual_gravity")]
     gravity_m_s2: [f64; 3],
     #[serde(default = "default_epsilon")]
     friction_epsilon_rad_s: f64,
@@ -81,7 +81,8 @@ fn fits_offsets() -> bool {
     true
 }
 
-fn standard_gravity() -> [f64; 3] {
+/// Acceleration of gravity where a file does not give it, m/s².
+pub(super) fn usual_gravity() -> [f64; 3] {
     [0.0, 0.0, -9.81]
 }
 

@@ -5,6 +5,7 @@ use urdf_rs::{Joint, JointType, Link};
 use super::fault::UrdfFault;
 use super::obstacle::Obstacle;
 use super::tree::Tree;
+use super::words::FEW;
 
 /// Links that move as one rigid body, in the order in which the joints between them are reached from the first.
 #[derive(Debug)]
@@ -43,9 +44,6 @@ fn body<'a>(tree: &Tree<'a>, joint: Option<&'a Joint>, next: Option<&Joint>) -> 
     }
     body
 }
-
-/// An error lists all links if there are at most this many.
-const FEW_LINKS: usize = 8;
 
 /// The joints that move the link `last`, from the root on. `is_arm` tells whether an arm that ends with a given link
 /// can be read; only such links are proposed in an error.
@@ -92,7 +90,8 @@ fn choice(tree: &Tree<'_>, is_arm: impl Fn(&str) -> bool) -> Vec<String> {
         let mut behind = tree.joints_on(link).iter().map(|joint| tree.behind(joint));
         behind.any(|next| links.iter().any(|other| other.name == next.name))
     };
-    let are_many = links.len() > FEW_LINKS;
+    // An error lists all links if they are few.
+    let are_many = links.len() > FEW;
     let named = links.iter().copied().filter(|link| !are_many || !carries_another(link));
     named.map(|link| link.name.clone()).collect()
 }

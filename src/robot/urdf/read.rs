@@ -2,7 +2,6 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use nalgebra::Vector3;
 use urdf_rs::{Pose, Robot};
 
 use super::arm::{FixedFrame, Frames, UrdfArm, UrdfLink};
@@ -17,7 +16,7 @@ use super::tree::Tree;
 use super::unreadable;
 use crate::robot::arm::{Arm, Clearance, Joint, LinkBounds, Placement};
 use crate::robot::error::RobotError;
-use crate::robot::file::default_epsilon;
+use crate::robot::file::{default_epsilon, usual_gravity};
 use crate::robot::inertia::LinkInertia;
 
 /// Half a unit of the fourth decimal: files print 1.5708 and 3.1416.
@@ -99,7 +98,7 @@ pub(in crate::robot) fn arm_of(
     Ok(UrdfArm {
         arm: Arm {
             name: if robot.name.is_empty() { source.to_owned() } else { robot.name.clone() },
-            gravity_m_s2: Vector3::new(0.0, 0.0, -9.81),
+            gravity_m_s2: usual_gravity().into(),
             friction_epsilon_rad_s: default_epsilon(),
             torque_offsets: true,
             joints,

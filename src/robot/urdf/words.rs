@@ -3,7 +3,7 @@
 use std::fmt::Display;
 
 /// A longer list is cut after this many items.
-const FEW: usize = 8;
+pub(super) const FEW: usize = 8;
 
 /// The items separated by commas; of a long list only the first ones and the number of the others.
 pub(in crate::robot) fn listed<T: Display>(items: impl IntoIterator<Item = T>) -> String {
