@@ -16,7 +16,7 @@
 use armid::diagnose::replay::{Replay, ReplayedLog};
 use armid::diagnose::{Diagnoser, Finding, Kind, Validation};
 use armid::dynamics::Model;
-use armid::excitation::{FourierSeries, Reference};
+use armid::excitation::FourierSeries;
 use armid::identify::{Identifier, Options};
 use armid::montecarlo::Scenario;
 use armid::plant::faults::{Effect, FaultyPlant};
@@ -24,7 +24,7 @@ use armid::plant::{Measured, PerJoint, PlantConfig, Recording, SensorConfig, Sen
 use armid::random::TrialStreams;
 use armid::robot::JointSignals;
 
-use crate::simulated::SIGMA_NM;
+use crate::simulated::{Periodic, SIGMA_NM};
 
 const RATE_HZ: f64 = 125.0;
 const PERIOD: usize = 1250;
@@ -43,7 +43,7 @@ fn hide(trajectory: &str, effects: &str, seed: u64) -> Hidden {
     let scenario = crate::simulated::scenario(("replay", 1), (trajectory, 1), "", effects);
     let series = FourierSeries::built_in(trajectory).unwrap();
     // One period is integrated, entered a second before it begins, and then repeated.
-    let periodic = Periodic { series, lead_s: LEAD as f64 / RATE_HZ };
+    let periodic = Periodic { series, lead_s: LEAD as f64 / RATE_HZ, periods: 1 };
     let config = PlantConfig::default();
     let plant = FaultyPlant::new(&scenario.arm, &scenario.effects, &config).unwrap();
     let known = LEAD + PERIOD;
@@ -63,26 +63,6 @@ fn hide(trajectory: &str, effects: &str, seed: u64) -> Hidden {
     let mut log = Measured::like(&truth);
     sensors.measure(&truth, &TrialStreams::new(seed, trajectory.as_bytes(), 0), &mut log);
     Hidden { log, truth }
-}
-
-/// A Fourier series for one period, after a lead of `lead_s`.
-struct Periodic {
-    series: FourierSeries,
-    lead_s: f64,
-}
-
-impl Reference for Periodic {
-    fn joints(&self) -> usize {
-        self.series.joints()
-    }
-
-    fn duration_s(&self) -> f64 {
-        self.lead_s + self.series.period_s
-    }
-
-    fn sample(&self, t_s: f64, q_rad: &mut [f64], qd_rad_s: &mut [f64], qdd_rad_s2: &mut [f64]) {
-        self.series.sample(t_s - self.lead_s, q_rad, qd_rad_s, qdd_rad_s2);
-    }
 }
 
 /// Σ_j (rms of simulated minus true torque / σ_j)² along one period of `log`.

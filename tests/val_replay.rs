@@ -16,11 +16,13 @@ use armid::diagnose::candidates::{self, Shape};
 use armid::diagnose::replay::{Counterpart, Found};
 use armid::diagnose::{Effect, Extension, Kind, Scene};
 use armid::dynamics::Model;
-use armid::excitation::{FourierSeries, Reference};
+use armid::excitation::FourierSeries;
 use armid::identify::{Identifier, Measurement, Options, Regression};
 use armid::plant::faults::{self, FaultyPlant};
 use armid::plant::{PlantConfig, Recording};
 use armid::robot::Arm;
+
+use crate::simulated::Periodic;
 
 const PERIOD: usize = 1250;
 const LEAD: usize = 125;
@@ -40,27 +42,6 @@ struct Case {
 fn case(kind: Kind, joint: usize, shape: (usize, f64), coefficients: &[f64], within: f64) -> Case {
     let shape = Shape { variant: shape.0, value: shape.1 };
     Case { kind, joint, shape, coefficients: coefficients.to_vec(), within }
-}
-
-/// A Fourier series for `periods` periods after a lead.
-struct Periodic {
-    series: FourierSeries,
-    lead_s: f64,
-    periods: usize,
-}
-
-impl Reference for Periodic {
-    fn joints(&self) -> usize {
-        self.series.joints()
-    }
-
-    fn duration_s(&self) -> f64 {
-        self.lead_s + self.periods as f64 * self.series.period_s
-    }
-
-    fn sample(&self, t_s: f64, q_rad: &mut [f64], qd_rad_s: &mut [f64], qdd_rad_s2: &mut [f64]) {
-        self.series.sample(t_s - self.lead_s, q_rad, qd_rad_s, qdd_rad_s2);
-    }
 }
 
 struct Bench {
@@ -175,6 +156,7 @@ fn log(arm: &Arm, effects: &[faults::Effect]) -> Recording {
 const NO_SHAPE: (usize, f64) = (0, 0.0);
 
 fn friction(arm: &Arm) -> Vec<Case> {
+    let carried_nm = arm.joints[4].drive.coulomb_nm;
     vec![
         // A peak that is passed in two or three samples: the sampled speeds cut a few percent off its top.
         case(Kind::Stribeck, 4, (0, 0.15), &[0.8], 0.1),
@@ -188,7 +170,9 @@ fn friction(arm: &Arm) -> Vec<Case> {
         case(Kind::ReversalWidth, 5, (0, 0.2), &[0.2], SAME),
         case(Kind::PositionFriction, 1, NO_SHAPE, &[1.5, -2.0], SAME),
         // The bristles carry the friction of the arm.
-        case(Kind::Presliding, 5, (0, 100.0), &[arm.joints[4].drive.coulomb_nm], SAME),
+        case(Kind::Presliding, 5, (0, 100.0), &[carried_nm], SAME),
+        // The same bristles, damped: σ₁/σ₀ is 5 ms.
+        case(Kind::Presliding, 5, (4, 100.0), &[carried_nm, 0.005 * carried_nm], SAME),
         // The plant heats by the power of friction, the family by time.
         case(Kind::ThermalDrift, 1, (0, 15.0), &[-0.3], SAME),
     ]

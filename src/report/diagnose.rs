@@ -2,7 +2,7 @@
 
 use super::json::Program;
 use super::plot::{Axis, Colour, Grid, Mark};
-use super::{Column, Page, ReportError, Section, Status, Table, Verdict, replay};
+use super::{Column, Page, ReportError, Section, Status, Table, Verdict, file_name, replay};
 use crate::diagnose::{self, Cause, DetectionLimit, Diagnosis, Finding, Kind, class_holds};
 use crate::number::{NONE, percent, resolved, significant};
 use crate::robot::Arm;
@@ -153,11 +153,6 @@ fn given(limits: &[DetectionLimit]) -> String {
 
 fn joint_columns<'a>(diagnosis: &Diagnosis, unit: &'a str) -> impl Iterator<Item = Column> + 'a {
     (1..=diagnosis.before.rms_nm.len()).map(move |j| Column::number(format!("joint {j}"), unit))
-}
-
-/// The last component of a path.
-fn file_name(path: &str) -> &str {
-    path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 
 fn joint(joint: Option<usize>) -> String {

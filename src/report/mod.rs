@@ -29,3 +29,8 @@ pub use error::ReportError;
 pub use page::{Page, Section, Verdict};
 pub use status::Status;
 pub use table::{Align, Column, Row, Table};
+
+/// The last component of a path.
+fn file_name(path: &str) -> &str {
+    path.rsplit(['/', '\\']).next().unwrap_or(path)
+}

@@ -1,7 +1,9 @@
 //! Page and tables of a Monte Carlo run.
 
 use super::json::Program;
-use super::plot::{Axis, Bars, Colour, IntervalPlot, IntervalRow, Mark, Span, XyPlot};
+use super::plot::{
+    Axis, Bars, Colour, IntervalPlot, IntervalRow, Mark, Span, XyPlot, standard_normal,
+};
 use super::{Column, Page, ReportError, Section, Status, Table, Verdict};
 use crate::montecarlo::calibration::{claims, wilson};
 use crate::montecarlo::tally::BIN_WIDTH;
@@ -252,8 +254,7 @@ fn histogram(merged: &Merged<Estimation>) -> Result<String, ReportError> {
     let mut edges: Vec<f64> = inner.iter().map(|(centre, _)| centre - 0.5 * BIN_WIDTH).collect();
     edges.push(inner[inner.len() - 1].0 + 0.5 * BIN_WIDTH);
     let x: Vec<f64> = (-200..=200).map(|k| k as f64 * 0.025).collect();
-    let normal: Vec<f64> =
-        x.iter().map(|z| (-0.5 * z * z).exp() / (2.0 * std::f64::consts::PI).sqrt()).collect();
+    let normal: Vec<f64> = x.iter().map(|z| standard_normal(*z)).collect();
     let mut plot = XyPlot::new(
         "Errors in units of the predicted σ",
         Axis::linear("(estimate − truth) / predicted σ", ""),

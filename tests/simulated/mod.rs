@@ -8,6 +8,7 @@ use armid::base::BaseSet;
 use armid::diagnose::candidates::Candidate;
 use armid::diagnose::{Cause, Diagnoser};
 use armid::dynamics::Model;
+use armid::excitation::{FourierSeries, Reference};
 use armid::identify::Options;
 use armid::montecarlo::{Scenario, Simulation};
 use armid::plant::Measured;
@@ -24,6 +25,27 @@ pub const NOISE: &str =
 
 /// Name of a built-in trajectory, and number of periods.
 pub type Along<'a> = (&'a str, usize);
+
+/// A Fourier series for `periods` periods after a lead.
+pub struct Periodic {
+    pub series: FourierSeries,
+    pub lead_s: f64,
+    pub periods: usize,
+}
+
+impl Reference for Periodic {
+    fn joints(&self) -> usize {
+        self.series.joints()
+    }
+
+    fn duration_s(&self) -> f64 {
+        self.lead_s + self.periods as f64 * self.series.period_s
+    }
+
+    fn sample(&self, t_s: f64, q_rad: &mut [f64], qd_rad_s: &mut [f64], qdd_rad_s2: &mut [f64]) {
+        self.series.sample(t_s - self.lead_s, q_rad, qd_rad_s, qdd_rad_s2);
+    }
+}
 
 /// Parses the `[[effect]]` tables of a scenario.
 pub fn effects(tables: &str) -> Vec<Effect> {

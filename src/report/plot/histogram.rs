@@ -18,6 +18,11 @@ pub struct Density {
     pub at: fn(f64) -> f64,
 }
 
+/// Density of the standard normal distribution.
+pub fn standard_normal(z: f64) -> f64 {
+    (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt()
+}
+
 /// A histogram scaled to unit area, with a reference density.
 #[derive(Debug, Clone)]
 pub struct Histogram {
@@ -58,8 +63,7 @@ impl Histogram {
 
     /// Adds the density of the standard normal distribution.
     pub fn against_standard_normal(mut self) -> Self {
-        let density = |x: f64| (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt();
-        self.reference = Some(Density { name: "standard normal".into(), at: density });
+        self.reference = Some(Density { name: "standard normal".into(), at: standard_normal });
         self
     }
 

@@ -34,7 +34,7 @@ pub(super) use canvas::labelled;
 pub use error::PlotError;
 pub use grid::Grid;
 pub use heat::HeatMap;
-pub use histogram::{Density, Histogram};
+pub use histogram::{Density, Histogram, standard_normal};
 pub use interval::{IntervalPlot, IntervalRow};
 pub use palette::Colour;
 pub use stick::{Stick, StickFigure, StickStyle};

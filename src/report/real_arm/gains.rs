@@ -1,9 +1,9 @@
 //! The improvement by the extended model on held-out runs, and the largest improvement that is possible.
 
-use super::{Part, RealArmStudy, file_name, list, mean, percents};
+use super::{Part, RealArmStudy, list, mean, percents};
 use crate::diagnose::HeldOut;
 use crate::number::percent;
-use crate::report::{Column, Table};
+use crate::report::{Column, Table, file_name};
 
 /// Mean of 1 − after/before for every joint over the held-out logs. Logs in which a joint never moves have no such
 /// value and are left out of its mean.
@@ -44,7 +44,7 @@ impl RealArmStudy {
             let mut row = |samples: &str, before: &[f64], after: &[f64], own: Option<&Vec<f64>>| {
                 let gains: Vec<f64> = before.iter().zip(after).map(|(b, a)| 1.0 - a / b).collect();
                 table.push([
-                    file_name(&log.log),
+                    file_name(&log.log).to_owned(),
                     samples.to_owned(),
                     list(before, 3),
                     list(after, 3),

@@ -309,7 +309,3 @@ impl RealArmStudy {
             )
     }
 }
-
-fn file_name(path: &str) -> String {
-    path.rsplit('/').next().unwrap_or(path).to_owned()
-}

@@ -1,7 +1,7 @@
 //! The summary of the case study: the findings in plain words, and the targets reached or missed.
 
-use super::super::{Status, Verdict};
-use super::{RealArmStudy, file_name, mean, percents};
+use super::super::{Status, Verdict, file_name};
+use super::{RealArmStudy, mean, percents};
 use crate::diagnose::{Cause, HeldOut, Kind};
 use crate::number::significant;
 
@@ -146,7 +146,7 @@ impl RealArmStudy {
             })
         };
         let held_out = &self.finding.diagnosis.held_out;
-        let below: Vec<String> =
+        let below: Vec<&str> =
             held_out.iter().filter(is_below).map(|log| file_name(&log.log)).collect();
         if below.is_empty() {
             return "On no held-out run is the error below that of the controller's own feed-forward on every joint."
