@@ -8,9 +8,10 @@ use super::distinct_shapes::DistinctShapes;
 use super::image::{Column, Image};
 use super::study::{Entry, Place, Shown, Study};
 
-/// Shapes of a family that are prepared at once, at the same sites.
+/// Shapes of a family that are prepared at once.
 struct Bank {
     family: usize,
+    /// One site; or the arm as a whole and all its joints, where it adds what they add.
     sites: Vec<Option<usize>>,
     shapes: Vec<Shape>,
 }
@@ -71,14 +72,10 @@ impl Study<'_> {
     /// The entries of `bank` that the null model does not absorb.
     fn entries_of(&self, bank: &Bank) -> Vec<Entry> {
         let Bank { family, sites, shapes } = bank;
-        let [None, joints @ ..] = &sites[..] else {
-            let at = |site: &Option<usize>| self.bank(*family, *site, shapes);
-            return sites.iter().flat_map(at).flatten().collect();
-        };
-        if joints.is_empty() {
-            return self.bank(*family, None, shapes).into_iter().flatten().collect();
+        if let [site] = sites[..] {
+            return self.bank(*family, site, shapes).into_iter().flatten().collect();
         }
-        // The arm as a whole adds what its joints add.
+        let (arm, joints) = (sites[0], &sites[1..]);
         let mut whole: Vec<Vec<Image>> = Vec::new();
         let mut entries = Vec::new();
         for site in joints {
@@ -91,7 +88,7 @@ impl Study<'_> {
             }
             entries.extend(self.outside(*family, *site, shapes, images));
         }
-        entries.extend(self.outside(*family, None, shapes, whole));
+        entries.extend(self.outside(*family, arm, shapes, whole));
         entries.into_iter().flatten().collect()
     }
 
@@ -105,8 +102,10 @@ impl Study<'_> {
         let Entry { family, site, .. } = *entry;
         let shapes = self.families[family].richer_shapes(&self.scene);
         let richer = shapes.into_par_iter().filter_map(|shape| self.entry(family, site, shape));
+        let same = self.entries.iter().filter(|other| other.place() == entry.place());
+        let plain = same.map(|other| other.images.len()).max().unwrap_or(0);
         // If the null model absorbs the further coefficient, the law is the one without it.
-        richer.filter(|entry| entry.images.len() > 1).collect()
+        richer.filter(|entry| entry.images.len() > plain).collect()
     }
 
     /// [`Self::entry`] for each of `shapes`.
