@@ -180,6 +180,7 @@ fn needed(study: &Study, entry: &Entry, span: &Span) -> f64 {
     let worth = study.price(entry) + LEAST_EVIDENCE;
     let rare = chance::LAW / study.tests(entry);
     let statistic = &study.statistic;
+    // ν does not depend on the size of the effect. Only logs whose noise is known come here.
     let freedom = statistic.freedom(span, &of_one);
     let is_found = |sqrt_lambda: f64| {
         let mut seen = of_one.clone();

@@ -103,7 +103,7 @@ impl Study<'_> {
         let shapes = self.families[family].richer_shapes(&self.scene);
         let richer = shapes.into_par_iter().filter_map(|shape| self.entry(family, site, shape));
         let same = self.entries.iter().filter(|other| other.place() == entry.place());
-        let plain = same.map(|other| other.images.len()).max().unwrap_or(0);
+        let plain = same.map(|other| other.images.len()).max().unwrap_or(1);
         // If the null model absorbs the further coefficient, the law is the one without it.
         richer.filter(|entry| entry.images.len() > plain).collect()
     }

@@ -175,13 +175,13 @@ mod tests {
         let (clock, answer, _) = answer(&[], 0.0);
         let dry: Vec<f64> = answer.sign.iter().map(|s| 8.0 * s).collect();
         assert_eq!(answer.given_nm(&clock, 0.0), dry);
-        // Nor does the torque of a joint that does not reverse tell anything.
         let change: Vec<f64> = shifted(&dry, 8.0, TICKS)
             .iter()
             .zip(dry.iter().step_by(TICKS))
             .map(|(late, now)| late - now)
             .collect();
         assert!(off(&answer.change_by_delay_nm(&clock, 8.0), &change) < 1e-12);
+        // Nor does the torque of a joint that does not reverse tell anything.
         let still = ReversalAnswer { sign: vec![1.0; N * TICKS], ..answer };
         assert_eq!(still.given_nm(&clock, 0.0), vec![8.0; N * TICKS]);
     }

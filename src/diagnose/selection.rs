@@ -46,10 +46,10 @@ pub struct Contender {
 }
 
 impl Contender {
-    /// By evidence, the most first. Laws with the same columns differ by rounding, which decides nothing: they keep their
-    /// order in the catalogue.
+    /// By evidence, the most first. Laws with the same columns differ by rounding, which decides nothing: they keep the
+    /// order in which they were considered, at first that of the catalogue.
     fn in_order(a: &Self, b: &Self) -> Ordering {
-        let to_rounding = |c: &Self| (c.evidence / ROUNDING).round();
+        let to_rounding = |c: &Self| (c.evidence / ROUNDING).round() + 0.0;
         to_rounding(b).total_cmp(&to_rounding(a))
     }
 }

@@ -189,8 +189,8 @@ pub fn map_pairs(a: &mut [f64], b: &[f64], f: impl Fn(f64, f64) -> f64) {
     a_rest.iter_mut().zip(b_rest).for_each(|(a, b)| *a = f(*a, *b));
 }
 
-/// `f(a, b)` of all pairs, with the widest registers of the machine if `f` is `#[inline(always)]`. It is copied because
-/// a reference to it would be called and not inlined.
+/// `f(a, b)` of all pairs, with the widest registers of the machine if `f` is `#[inline(always)]`. `f` is copied
+/// because a reference to it would be called and not inlined.
 pub fn of_pairs(mut a: Vec<f64>, b: &[f64], f: impl Fn(f64, f64) -> f64 + Copy) -> Vec<f64> {
     with_widest_registers(
         #[inline(always)]

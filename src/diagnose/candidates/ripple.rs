@@ -182,6 +182,7 @@ fn power_of_orders(scene: &Scene, j: usize, weights: &[f64], tilt: i32) -> Order
     let q = scene.motion.q_rad.joint(j);
     let step = 0.5 * order_spacing(scene, j).min(2.0);
     let count = ((HIGHEST_ORDER - LOWEST_ORDER) / step) as usize;
+    debug_assert_eq!(q.len(), weights.len());
     let (q, weights) = (Lanes::of(q), Lanes::of(weights));
     let [mut phasors, turns] = [LOWEST_ORDER, step]
         .map(|order| q.iter().map(|q| (*q * order).sin_cos()).collect::<Vec<_>>());
