@@ -93,10 +93,8 @@ impl FineClock {
     /// alike; ripple faster than half the sampling rate is aliased to another amplitude and phase.
     pub fn as_logged(&self, fine_nm: &[f64], highest: usize, feedback_per_tick: f64) -> Vec<f64> {
         let cell = LaggedCell::new(self.ticks, feedback_per_tick);
-        let next = fine_nm[self.ticks..].iter().step_by(self.ticks).chain(&fine_nm[..1]);
-        let cells = fine_nm.chunks_exact(self.ticks).zip(next);
         let (mut rest, gained): (Vec<f64>, Vec<f64>) =
-            cells.map(|(cell_nm, end_nm)| cell.sums(cell_nm, *end_nm)).unzip();
+            self.cells(fine_nm).map(|(cell_nm, end_nm)| cell.sums(cell_nm, end_nm)).unzip();
         let given_nm = cell.closed(&gained);
         rest.iter_mut()
             .zip(&given_nm)
@@ -115,13 +113,17 @@ impl FineClock {
         logged
     }
 
+    /// The torques at the ticks of every sample, and the torque at the next sample.
+    fn cells<'a>(&self, fine_nm: &'a [f64]) -> impl Iterator<Item = (&'a [f64], f64)> {
+        let next = fine_nm[self.ticks..].iter().step_by(self.ticks).chain(&fine_nm[..1]);
+        fine_nm.chunks_exact(self.ticks).zip(next.copied())
+    }
+
     /// τ̃ of [`Self::as_logged`].
     fn unanswered_as_logged(&self, fine_nm: &[f64], highest: usize) -> Vec<f64> {
-        let next = fine_nm[self.ticks..].iter().step_by(self.ticks).chain(&fine_nm[..1]);
         // Mean over each cell, by the trapezoidal rule.
-        let mean: Vec<f64> = fine_nm
-            .chunks_exact(self.ticks)
-            .zip(next)
+        let mean: Vec<f64> = self
+            .cells(fine_nm)
             .map(|(cell, end)| {
                 (cell.iter().sum::<f64>() + 0.5 * (end - cell[0])) / self.ticks as f64
             })
@@ -175,8 +177,9 @@ struct LaggedCell {
     rest: Vec<f64>,
     /// Weights of the torques in a at the next sample, for a = 0 at the sample.
     gained: Vec<f64>,
-    /// Mean of a over the cell, and a at its end, per a at its start and without torque.
+    /// Mean of a over the cell per a at its start, without torque.
     mean_of_start: f64,
+    /// The share of a that is left at the next sample, without torque.
     kept: f64,
 }
 
