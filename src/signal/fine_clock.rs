@@ -372,6 +372,29 @@ mod tests {
         assert!(largest_difference(&clock.as_logged(&fine, 20, 0.0), &shown) > 10.0 * lost);
     }
 
+    /// A drive damps a swing faster than half the rate by its speed. Of this torque the log shows what the samples of the
+    /// speed have beyond the derivative of the samples of the angle.
+    #[test]
+    fn a_damped_swing_is_logged_by_its_samples() {
+        let clock = FineClock::new(N, TICKS);
+        let harmonic = 30.0;
+        let omega = TAU * harmonic / N as f64;
+        let angle = wave(N, harmonic);
+        let fine_rate: Vec<f64> =
+            (0..TICKS * N).map(|k| omega * (omega * k as f64 / TICKS as f64 + 0.3).cos()).collect();
+        let shown = clock.as_logged_but(&vec![0.0; TICKS * N], &fine_rate, 20);
+        let derivative = clock.derivative_up_to(&angle, 1.0, 20);
+        let expected: Vec<f64> = fine_rate
+            .iter()
+            .step_by(TICKS)
+            .zip(derivative)
+            .map(|(rate, known)| rate - known)
+            .collect();
+        // The mean over a cell by the trapezoidal rule loses (ω Δ)²/12.
+        let lost = omega * (omega / TICKS as f64).powi(2) / 12.0;
+        assert!(largest_difference(&shown, &expected) < 2.0 * lost);
+    }
+
     /// Slow components are shown unchanged whatever the drive does: the mean over a tick and the sums over a cell lose
     /// (ω Δ)²/12 each.
     #[test]

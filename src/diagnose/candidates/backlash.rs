@@ -5,16 +5,17 @@
 //! δ̈ = (τ_L − T − d_M δ̇) (1/I_a + [(M + I_a')⁻¹]_jj),   T = k (δ ∓ g/2) + d δ̇ beyond ±g/2 as long as it pushes, 0 between
 //! ```
 //!
-//! Here δ = q_M − q_L, and τ_L is the load of the rigid arm, which passes through zero. The other joints are free to
-//! move; with them held, gaps at the elbow seemed half as wide as they were. The flanks are such that the rotor alone
-//! swings against them at √(k/I_a), with the damping d = 2 ζ √(k I_a). The drive damps by d_M, as it does in compliant
-//! gears.
+//! Here δ = q_M − q_L, and τ_L is the load of the rigid arm, which passes through zero ([`Scene::fine_rigid_nm`]: what the
+//! logged motion needs holds the flight as well). The other joints are free to move; with them held, gaps at the elbow
+//! seemed half as wide as they were. The flanks are such that the rotor alone swings against them at √(k/I_a), with the
+//! damping d = 2 ζ √(k I_a). The drives damp by d_M, as they do in compliant gears.
 //!
 //! The log has the motor's angle, so that the links have moved by δ less than it says. A flight lasts (6 g/δ⃛)^(1/3), a
 //! few milliseconds. It shows by its jerk at both ends and by the swing after it. The log has δ̇ only at its samples,
-//! and the acceleration is the derivative of these samples.
+//! and the acceleration is the derivative of these samples; so is what it shows of the drives' answer
+//! ([`Lag::column`]).
 
-use super::elasticity::{HELD_ERROR, Jolts, Lag, give_way, held_nm_s_rad};
+use super::elasticity::{HELD_ERROR, Jolts, Lag, held_nm_s_rad};
 use super::*;
 use crate::diagnose::scene::FINE;
 
@@ -29,11 +30,13 @@ const FLANK_RAD_S: [f64; 14] = [
     900.0, 775.0, 668.0, 576.0, 496.0, 428.0, 369.0, 318.0, 274.0, 236.0, 203.0, 175.0, 151.0,
     130.0,
 ];
-/// Damping ratio ζ of the flanks.
-const DAMPING_RATIO: f64 = 0.12;
-/// Fastest swing that steps of length h can follow, times h: flanks are made no stiffer than this. At sixteen instants
-/// per sample, this swing is five times faster than what the samples can show. Behind stiffer flanks, light links move
-/// with their rotor anyway.
+/// Damping ratio ζ of the flanks: a few percent in strain-wave gears, and the rotor's own friction.
+const DAMPING_RATIO: f64 = 0.08;
+/// Number of integration steps per instant. With one, rotors land on their flanks late by a part of it.
+const STEPS: usize = 4;
+/// Fastest swing that is followed, times the time between two instants: flanks are made no stiffer than this. At sixteen
+/// instants per sample, this swing is five times faster than what the samples can show. Behind stiffer flanks, light
+/// links move with their rotor anyway.
 const FOLLOWED: f64 = 1.0;
 /// Time in which the initial state of the simulated flight is mostly forgotten, s.
 const RUN_IN_S: f64 = 3.0;
@@ -130,8 +133,7 @@ impl Candidate for Backlash {
 /// Torque per unit of the gap of joint `j`, for each shape and the response to jolts that goes with it.
 fn flights(scene: &Scene, j: usize, flown: &[(Shape, Jolts)]) -> impl Iterator<Item = Column> {
     let column = move |((shape, _), [delta, rate]): (&(Shape, Jolts), [Vec<f64>; 2])| {
-        let links = Lag::logged(scene, delta, rate).of(scene, j);
-        give_way(scene, &links, shape.value)
+        Lag::logged(scene, delta, rate).column(scene, j, shape.value)
     };
     let abreast = flown.chunks(ABREAST).flat_map(move |some| some.iter().zip(fly(scene, j, some)));
     abreast.map(column)
@@ -139,14 +141,12 @@ fn flights(scene: &Scene, j: usize, flown: &[(Shape, Jolts)]) -> impl Iterator<I
 
 /// δ (rad) and δ̇ (rad/s) at the samples of joint `j`, for each of up to [`ABREAST`] shapes.
 fn fly(scene: &Scene, j: usize, flown: &[(Shape, Jolts)]) -> Vec<[Vec<f64>; 2]> {
-    let load = scene.link_nm.joint(j);
-    let n = load.len();
+    let n = scene.samples();
     let mobility = scene.mobility_per_kg_m2.joint(j);
-    let rotor = scene.rotor_kg_m2[j];
-    let step_s = scene.instant_s();
-    let (fine, jolts) = (scene.fine_link_nm(j), scene.fine_jolt_nm(j));
+    let step_s = scene.instant_s() / STEPS as f64;
+    let [load, jolts] = scene.fine_rigid_nm(j);
     let mut entered = scene.entered(RUN_IN_S).peekable();
-    let start_nm = entered.peek().map_or(0.0, |k| load[*k]);
+    let start_nm = entered.peek().map_or(0.0, |k| load[FINE * k]);
     let flanks = Flanks::by_variant(scene, j);
     let of_lane = |lane: usize| flown[lane.min(flown.len() - 1)];
     let made: [Jolts; ABREAST] = std::array::from_fn(|lane| of_lane(lane).1);
@@ -157,13 +157,25 @@ fn fly(scene: &Scene, j: usize, flown: &[(Shape, Jolts)]) -> Vec<[Vec<f64>; 2]> 
     let mut flights = Flights::abreast(pressed);
     let mut out: Vec<[Vec<f64>; 2]> = flown.iter().map(|_| [vec![0.0; n], vec![0.0; n]]).collect();
     for k in entered {
-        for (lane, [delta, rate]) in out.iter_mut().enumerate() {
-            (delta[k], rate[k]) = (flights.angle_rad[lane], flights.rate_rad_s[lane]);
+        let held = held_nm_s_rad(scene, j, k);
+        let mut steps = (FINE * k..FINE * (k + 1)).flat_map(|tick| {
+            let next = (tick + 1) % load.len();
+            (0..STEPS).map(move |step| {
+                let u = step as f64 / STEPS as f64;
+                [load, jolts].map(|y| y[tick] + u * (y[next] - y[tick]))
+            })
+        });
+        let [angle_rad, before_rad_s] = [flights.angle_rad, flights.rate_rad_s];
+        if let Some(nm) = steps.next() {
+            flights.step(nm, held, &made, mobility[k], step_s);
         }
-        let held = held_nm_s_rad(mobility[k], rotor);
-        let ticks = FINE * k..FINE * (k + 1);
-        for (load, jolt) in fine[ticks.clone()].iter().zip(&jolts[ticks]) {
-            flights.step([*load, *jolt], held, &made, mobility[k], step_s);
+        // The angle is that at the sample; rates are those between two steps.
+        for (lane, [delta, rate]) in out.iter_mut().enumerate() {
+            delta[k] = angle_rad[lane];
+            rate[k] = 0.5 * (before_rad_s[lane] + flights.rate_rad_s[lane]);
+        }
+        for nm in steps {
+            flights.step(nm, held, &made, mobility[k], step_s);
         }
     }
     out
@@ -241,7 +253,7 @@ impl Flights {
 
     /// Advances by `step_s` under a load and a jolt, Nm; `made` says how much of the jolt and of the drive's damping
     /// each gap gets. Semi-implicit Euler with all damping implicit, stable as long as √(k · mobility) · `step_s` < 2.
-    /// The flanks push and never pull.
+    /// The rate is that half a step before the angle. The flanks push and never pull.
     fn step(
         &mut self,
         [load_nm, jolt_nm]: [f64; 2],

@@ -4,7 +4,7 @@
 //! − δ, q̇ − δ̇, q̈ − δ̈) − τ(q, q̇, q̈). The link swings on its spring,
 //!
 //! ```text
-//! M_jj(q) δ̈ + d₁ δ̇ + k δ = τ_L
+//! M_jj(q) δ̈ + d δ̇ + k δ = τ_L
 //! ```
 //!
 //! with τ_L the load along the motor's motion, as far as the log determines it. The slow part of τ_L bends the gear by
@@ -13,11 +13,11 @@
 //! other:
 //!
 //! ```text
-//! δ̈ = (τ_J − k δ − (d₂ + d_M) δ̇) (I_a⁻¹ + [(M + I_a')⁻¹]_jj)
+//! δ̈ = (τ_J − k δ − (d + d_M) δ̇) (I_a⁻¹ + [(M + I_a')⁻¹]_jj)
 //! ```
 //!
-//! This swing reveals stiff gears that hardly bend. The drive, which holds the rotor, damps it by d_M
-//! ([`held_nm_s_rad`]).
+//! This swing reveals stiff gears that hardly bend. The drives damp it by d_M ([`held_nm_s_rad`]), with torques of which
+//! the samples of a log show less than they do ([`Lag::column`]).
 //!
 //! Where the log has the link's angle, the rotor and its friction move more: I_a δ̈ + F_v δ̇ + F_c [tanh((q̇ + δ̇)/ε) −
 //! tanh(q̇/ε)] on the joint itself, with δ = τ_L/(k + i d ω) (further variants; the friction reverses where the motor
@@ -38,11 +38,9 @@ use fourier::Complex64;
 /// See the module.
 pub struct Elasticity;
 
-/// Damping d₁ relative to the critical damping of the rotor on the spring, 2 √(k Ia): a few percent in strain-wave
-/// gears.
+/// Damping d of the gear relative to the critical damping of the rotor on the spring, 2 √(k Ia): a few percent in
+/// strain-wave gears.
 const DAMPING_RATIO: f64 = 0.05;
-/// The same for d₂, the damping of the swing after jolts: there, the rotor is also damped by its own friction.
-const JOLTED_DAMPING_RATIO: f64 = 0.15;
 
 /// How a gear responds to the jolts of its drive, relative to the assumptions of the law: how much of the friction the
 /// drive does not feed forward, how strongly it damps, and on how stiff a spring the gear swings.
@@ -115,6 +113,29 @@ impl Lag {
         Self { acceleration_rad_s2: scene.accelerations(&rate_rad_s), angle_rad, rate_rad_s }
     }
 
+    /// Change of the torques on all joints when joint `j` has this lag, per unit of `scale`.
+    ///
+    /// The drives answer the lag with −ω M_ij δ̇ on joint i ([`held_nm_s_rad`]). The log has this torque at its samples,
+    /// and what it does in the derivative of the sampled velocities. For swings faster than half the rate the two are
+    /// different: what remains is −ω M_ij (δ̇ − D δ), where D δ is the derivative of the sampled δ
+    /// ([`FineClock::as_logged_but`](crate::signal::FineClock::as_logged_but)).
+    pub(super) fn column(&self, scene: &Scene, j: usize, scale: f64) -> Column {
+        let mut column = give_way(scene, &self.of(scene, j), scale);
+        if !scene.periodic {
+            return column;
+        }
+        let known_rad_s = scene.accelerations(&self.angle_rad);
+        let unseen: Vec<f64> =
+            self.rate_rad_s.iter().zip(known_rad_s).map(|(rate, known)| rate - known).collect();
+        for (i, torque_nm) in &mut column.parts {
+            let mass = scene.mass_kg_m2[j].joint(*i);
+            for ((nm, mass), unseen) in torque_nm.iter_mut().zip(mass).zip(&unseen) {
+                *nm -= FEEDBACK_RAD_S * mass * unseen / scale;
+            }
+        }
+        column
+    }
+
     /// Motion of the links when joint `j` has this lag.
     pub(super) fn of(&self, scene: &Scene, j: usize) -> Motion {
         let mut motion: Motion = scene.motion.clone();
@@ -142,7 +163,7 @@ fn swing(scene: &Scene, j: usize, variant: usize, stiffness_nm_rad: f64, made: J
         0 => [scene.fine_link_nm(j), scene.fine_jolt_nm(j)],
         _ => scene.fine_bending_nm(j),
     };
-    let inertia = scene.own_inertia_kg_m2.joint(j);
+    let inertia = scene.mass_kg_m2[j].joint(j);
     let mobility = scene.mobility_per_kg_m2.joint(j);
     let step_s = scene.instant_s();
     let rotor = scene.rotor_kg_m2[j];
@@ -163,7 +184,7 @@ fn swing(scene: &Scene, j: usize, variant: usize, stiffness_nm_rad: f64, made: J
         lag.rate_rad_s[k] = bent.rate_rad_s + jolted.rate_rad_s;
         lag.acceleration_rad_s2[k] = bent.acceleration_rad_s2 + jolted.acceleration_rad_s2;
         jolted.damping_nm_s_rad =
-            made.damping * (JOLTED_DAMPING_RATIO * critical + held_nm_s_rad(mobility[k], rotor));
+            made.damping * (DAMPING_RATIO * critical + held_nm_s_rad(scene, j, k));
         for tick in FINE * k + 1..=FINE * (k + 1) {
             let tick = tick % load.len();
             bent.step(load[tick], inertia[k].max(f64::MIN_POSITIVE), step_s);
@@ -181,14 +202,20 @@ fn swing(scene: &Scene, j: usize, variant: usize, stiffness_nm_rad: f64, made: J
 /// 400 rad/s, the resulting intervals held 86 of 91, 92 of 97 and 89 of 90 true values.
 pub(super) const HELD_ERROR: f64 = 0.15;
 
-/// Damping d_M of δ̇ by the drive, Nm s/rad, with ω = [`FEEDBACK_RAD_S`].
+/// Damping d_M of δ̇ by the drives at sample `k`, Nm s/rad, with ω = [`FEEDBACK_RAD_S`].
 ///
-/// The drive answers the rotor's speed with ω (M + I_a) q̇_M. The rotor has the share s = M/(M + I_a) of δ̇, so that
-/// the dissipated power is that of d_M = ω (M + I_a) s² = ω I_a s²/(1 − s). `mobility_per_kg_m2` is I_a⁻¹ + M⁻¹ =
-/// 1/(I_a s), with M the inertia of the links where the other joints are free to move.
-pub(super) fn held_nm_s_rad(mobility_per_kg_m2: f64, rotor_kg_m2: f64) -> f64 {
-    let share = 1.0 / (mobility_per_kg_m2 * rotor_kg_m2);
-    FEEDBACK_RAD_S * rotor_kg_m2 * share.powi(2) / (1.0 - share)
+/// What presses links and rotor of joint j apart also moves the other joints: per unit of δ̇ the motors move by v = e_j −
+/// (M + I_a')⁻¹ e_j/m, with m the mobility and I_a' the rotors but that of joint j. The drives answer with the torques
+/// −ω (M + I_a) v = −ω M e_j, which dissipate the power of d_M = ω vᵀ (M + I_a) v = ω (M_jj − 1/m). The motor of the
+/// joint alone would dissipate a half to a ninth of that at the elbow of a UR5.
+pub(super) fn held_nm_s_rad(scene: &Scene, j: usize, k: usize) -> f64 {
+    let mobility = scene.mobility_per_kg_m2.joint(j)[k];
+    FEEDBACK_RAD_S * swung_kg_m2(scene.mass_kg_m2[j].joint(j)[k], mobility)
+}
+
+/// M_jj − 1/m, kg m²; not negative in any real arm.
+fn swung_kg_m2(own_kg_m2: f64, mobility_per_kg_m2: f64) -> f64 {
+    (own_kg_m2 - 1.0 / mobility_per_kg_m2).max(0.0)
 }
 
 /// An inertia on the spring of a gear.
@@ -276,8 +303,8 @@ impl Candidate for Elasticity {
         let j = joint(site);
         if shape.variant < ON_MOTOR {
             let stiffness = shape.value;
-            let links = swing(scene, j, shape.variant, stiffness, Jolts::USUAL).of(scene, j);
-            return vec![give_way(scene, &links, 1.0 / stiffness)];
+            let lag = swing(scene, j, shape.variant, stiffness, Jolts::USUAL);
+            return vec![lag.column(scene, j, 1.0 / stiffness)];
         }
         let form = shape.variant - ON_MOTOR;
         let (stiffness, ratio) = (shape.value, LINK_DAMPING_RATIO[form % LINK_DAMPING_RATIO.len()]);
@@ -310,8 +337,7 @@ impl Candidate for Elasticity {
         }
         let j = joint(site);
         let jolted = |made: Jolts| {
-            let links = swing(scene, j, shape.variant, shape.value, made).of(scene, j);
-            give_way(scene, &links, 1.0 / shape.value)
+            swing(scene, j, shape.variant, shape.value, made).column(scene, j, 1.0 / shape.value)
         };
         let usual = jolted(Jolts::USUAL);
         let others = Jolts::OF_OTHER_DRIVES.into_iter().chain(Jolts::OF_OTHER_SWINGS);
@@ -399,6 +425,24 @@ mod tests {
         assert!((1.0 - height).abs() < (omega * step_s).powi(2) / 8.0, "{height}");
     }
 
+    /// Of two joints whose links are coupled, the motors move by v while the second gear gives way by one: the drives'
+    /// torques (M + I_a) v are M e_j, and dissipate vᵀ (M + I_a) v.
+    #[test]
+    fn drives_of_all_joints_damp_a_gear() {
+        use nalgebra::{Matrix2, Vector2};
+        let mass = Matrix2::new(3.0, 1.2, 1.2, 0.8);
+        let rotors = Vector2::new(1.6, 0.5);
+        let but_own = mass + Matrix2::from_diagonal(&Vector2::new(rotors[0], 0.0));
+        let own = Vector2::new(0.0, 1.0);
+        let answer = but_own.try_inverse().unwrap() * own;
+        let mobility = 1.0 / rotors[1] + answer[1];
+        let motors = own - answer / mobility;
+        let torques = (mass + Matrix2::from_diagonal(&rotors)) * motors;
+        // A handful of operations on numbers of order one.
+        assert!((torques - mass * own).norm() < 1e-14);
+        assert!((motors.dot(&torques) - swung_kg_m2(mass[(1, 1)], mobility)).abs() < 1e-14);
+    }
+
     /// Two inertias on a spring, with the rotor's speed answered by ω (M + I_a) q̇_M with a small ω: their swing fades
     /// as exp(−d_M t/(2 μ)), where 1/μ is the mobility.
     #[test]
@@ -420,7 +464,7 @@ mod tests {
             link[0] += step_s * link[1];
         }
         let mobility = 1.0 / rotor + 1.0 / links;
-        let held = held_nm_s_rad(mobility, rotor) / FEEDBACK_RAD_S * omega;
+        let held = omega * swung_kg_m2(links, mobility);
         let faded = (energy(&motor, &link) / before).ln();
         let expected = -held * mobility * f64::from(count) * step_s;
         // The energy falls in waves, each of relative height up to d_M/(μ ω_0).

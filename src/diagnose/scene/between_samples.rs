@@ -2,6 +2,7 @@
 //! how the samples show a friction that acts between them.
 
 use std::borrow::Cow;
+use std::sync::OnceLock;
 
 use super::Scene;
 use crate::diagnose::load::LinkTorque;
@@ -50,9 +51,24 @@ impl Scene {
     /// Torques that make a compliant gear at joint `j` swing, at `FINE` instants per sample, Nm: the torque of its
     /// links that the motion determines, and what the links take in addition where joints reverse.
     pub fn fine_bending_nm(&self, j: usize) -> [&[f64]; 2] {
-        let LinkTorque { told_nm, jolt_nm } = &self.bending;
-        let fine = || [told_nm, jolt_nm].map(|y| self.fine(y.joint(j)));
-        self.fine_bending_nm[j].get_or_init(fine).each_ref().map(Vec::as_slice)
+        self.fine_parts_nm(&self.fine_bending_nm[j], &self.bending, j)
+    }
+
+    /// Torques that part the flanks of a gear with play at joint `j`, at `FINE` instants per sample, Nm: what moves its
+    /// links as long as no gear has play, and what they take in addition where joints reverse.
+    pub fn fine_rigid_nm(&self, j: usize) -> [&[f64]; 2] {
+        self.fine_parts_nm(&self.fine_rigid_nm[j], &self.rigid, j)
+    }
+
+    /// Both parts of the torque `of` at `FINE` instants per sample, kept in `cell`.
+    fn fine_parts_nm<'s>(
+        &self,
+        cell: &'s OnceLock<[Vec<f64>; 2]>,
+        of: &LinkTorque,
+        j: usize,
+    ) -> [&'s [f64]; 2] {
+        let fine = || [&of.told_nm, &of.jolt_nm].map(|y| self.fine(y.joint(j)));
+        cell.get_or_init(fine).each_ref().map(Vec::as_slice)
     }
 
     /// Instants at which the friction of joint `j` is evaluated: `FINE` per sample of a periodic motion; the samples

@@ -51,6 +51,8 @@ pub struct Scene {
     jolt_nm: JointSignals,
     /// Torque that moves the links of compliant gears.
     bending: LinkTorque,
+    /// Torque that would move the links if no gear had play.
+    rigid: LinkTorque,
     /// Torque that the drives deliver, where several periods reveal it.
     delivered: Option<Delivered>,
     /// Rotor inertia I_a of every joint, kg m², no less than a small share of the inertia of its links: compliant gears
@@ -66,8 +68,8 @@ pub struct Scene {
     pub noise_nm: Vec<f64>,
     /// Estimated Coulomb friction, Nm.
     pub coulomb_nm: Vec<f64>,
-    /// Diagonal of the links' mass matrix along the motion, kg m².
-    pub own_inertia_kg_m2: JointSignals,
+    /// Mass matrix of the links along the motion, kg m², column by column.
+    pub mass_kg_m2: Vec<JointSignals>,
     /// Half-width of the interval around each recorded angle in which the true one lies, rad; zero for a periodic
     /// motion, whose angles are averaged.
     pub angle_doubt_rad: Vec<f64>,
@@ -79,6 +81,8 @@ pub struct Scene {
     fine_jolt_nm: Vec<OnceLock<Vec<f64>>>,
     /// See [`Self::fine_bending_nm`].
     fine_bending_nm: Vec<OnceLock<[Vec<f64>; 2]>>,
+    /// See [`Self::fine_rigid_nm`].
+    fine_rigid_nm: Vec<OnceLock<[Vec<f64>; 2]>>,
     /// See [`Self::instants`].
     instants: Vec<OnceLock<Instants>>,
     /// See [`Self::sign_if_fed`].
@@ -126,9 +130,8 @@ impl Scene {
                 Loads::as_recorded(&arm, &motion, along, (noise, rate_hz))
             }
         };
-        let Loads { link, bending, delivered, load_nm, mobility_per_kg_m2 } = loads;
+        let Loads { link, bending, rigid, delivered, load_nm, mobility_per_kg_m2 } = loads;
         let LinkTorque { told_nm: link_nm, jolt_nm } = link;
-        let own_inertia_kg_m2 = JointSignals::from_fn(joints, n, |j, k| mass_kg_m2[j].joint(j)[k]);
         let sign =
             motion.qd_rad_s.map_joints(|_, v| v.iter().map(|v| arm.friction_sign(*v)).collect());
         let torque_nm = JointSignals::from_fn(joints, n, |j, k| {
@@ -143,7 +146,7 @@ impl Scene {
         let noise_nm = prepared.replicates.as_ref().map_or(vec![0.0; joints], |r| r.sigma.clone());
         Self {
             noise_nm,
-            own_inertia_kg_m2,
+            mass_kg_m2,
             angle_doubt_rad,
             coulomb_nm: (0..joints).map(|j| drive(j).coulomb_nm).collect(),
             rate_hz,
@@ -158,6 +161,7 @@ impl Scene {
             load_nm,
             jolt_nm,
             bending,
+            rigid,
             delivered,
             rotor_kg_m2,
             mobility_per_kg_m2,
@@ -167,6 +171,7 @@ impl Scene {
             fine_link_nm: vec![OnceLock::new(); joints],
             fine_jolt_nm: vec![OnceLock::new(); joints],
             fine_bending_nm: vec![OnceLock::new(); joints],
+            fine_rigid_nm: vec![OnceLock::new(); joints],
             instants: (0..joints).map(|_| OnceLock::new()).collect(),
             signs_if_fed: (0..joints).map(|_| Default::default()).collect(),
             bends: OnceLock::new(),
