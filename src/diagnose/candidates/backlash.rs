@@ -18,6 +18,7 @@
 use super::elasticity::{HELD_ERROR, Jolts, Lag, held_nm_s_rad};
 use super::*;
 use crate::diagnose::scene::FINE;
+use crate::dynamics::with_widest_registers;
 
 /// See the module.
 pub struct Backlash;
@@ -157,28 +158,32 @@ fn fly(scene: &Scene, j: usize, flown: &[(Shape, Jolts)]) -> Vec<[Vec<f64>; 2]> 
     let mut flights = Flights::abreast(pressed);
     let mut out: Vec<[Vec<f64>; 2]> = flown.iter().map(|_| [vec![0.0; n], vec![0.0; n]]).collect();
     for k in entered {
+        let (load_nm, jolt_nm) = (steps_from(load, k), steps_from(jolts, k));
         let held = held_nm_s_rad(scene, j, k);
-        let mut steps = (FINE * k..FINE * (k + 1)).flat_map(|tick| {
-            let next = (tick + 1) % load.len();
-            (0..STEPS).map(move |step| {
-                let u = step as f64 / STEPS as f64;
-                [load, jolts].map(|y| y[tick] + u * (y[next] - y[tick]))
-            })
-        });
+        let step = Step::of(&flights, &made, (mobility[k], held), step_s);
         let [angle_rad, before_rad_s] = [flights.angle_rad, flights.rate_rad_s];
-        if let Some(nm) = steps.next() {
-            flights.step(nm, held, &made, mobility[k], step_s);
-        }
+        flights.follow(&step, &load_nm[..1], &jolt_nm[..1]);
         // The angle is that at the sample; rates are those between two steps.
         for (lane, [delta, rate]) in out.iter_mut().enumerate() {
             delta[k] = angle_rad[lane];
             rate[k] = 0.5 * (before_rad_s[lane] + flights.rate_rad_s[lane]);
         }
-        for nm in steps {
-            flights.step(nm, held, &made, mobility[k], step_s);
-        }
+        flights.follow(&step, &load_nm[1..], &jolt_nm[1..]);
     }
     out
+}
+
+/// The torque `fine_nm`, known at the instants, at every step from sample `k` to the next.
+fn steps_from(fine_nm: &[f64], k: usize) -> [f64; FINE * STEPS] {
+    let mut at_steps = [0.0; FINE * STEPS];
+    let (between, ticks) = (at_steps.as_chunks_mut::<STEPS>().0, FINE * k..);
+    for (between, tick) in between.iter_mut().zip(ticks) {
+        let (from, to) = (fine_nm[tick], fine_nm[(tick + 1) % fine_nm.len()]);
+        for (step, nm) in between.iter_mut().enumerate() {
+            *nm = from + step as f64 / STEPS as f64 * (to - from);
+        }
+    }
+    at_steps
 }
 
 /// Stiffness and damping of the flanks that a rotor meets at the ends of its gap.
@@ -251,28 +256,68 @@ impl Flights {
         }
     }
 
-    /// Advances by `step_s` under a load and a jolt, Nm; `made` says how much of the jolt and of the drive's damping
-    /// each gap gets. Semi-implicit Euler with all damping implicit, stable as long as √(k · mobility) · `step_s` < 2.
-    /// The rate is that half a step before the angle. The flanks push and never pull.
-    fn step(
-        &mut self,
-        [load_nm, jolt_nm]: [f64; 2],
-        held_nm_s_rad: f64,
-        made: &[Jolts; ABREAST],
-        mobility: f64,
-        step_s: f64,
-    ) {
-        for (lane, made) in made.iter().enumerate() {
+    /// Advances by one `step` per load and jolt, Nm.
+    fn follow(&mut self, step: &Step, load_nm: &[f64], jolt_nm: &[f64]) {
+        with_widest_registers(
+            #[inline(always)]
+            || {
+                for (load_nm, jolt_nm) in load_nm.iter().zip(jolt_nm) {
+                    self.advance(step, *load_nm, *jolt_nm);
+                }
+            },
+        );
+    }
+
+    /// Semi-implicit Euler with all damping implicit, stable as long as √(k · mobility) · `step_s` < 2. The rate is that
+    /// half a step before the angle. The flanks push and never pull.
+    #[inline(always)]
+    fn advance(&mut self, step: &Step, load_nm: f64, jolt_nm: f64) {
+        for lane in 0..ABREAST {
             let (angle, half_gap) = (self.angle_rad[lane], self.half_gap_rad[lane]);
             let pressed = angle - angle.max(-half_gap).min(half_gap);
-            let (spring, damping) = (self.stiffness_nm_rad[lane], self.damping_nm_s_rad[lane]);
-            let pulls = (spring * pressed + damping * self.rate_rad_s[lane]) * pressed <= 0.0;
-            let (spring, damping) = if pulls { (0.0, 0.0) } else { (spring, damping) };
-            let load_nm = load_nm + made.height * jolt_nm;
-            let rate = self.rate_rad_s[lane] + (load_nm - spring * pressed) * mobility * step_s;
-            let damping = made.damping * held_nm_s_rad + damping;
-            self.rate_rad_s[lane] = rate / (1.0 + damping * mobility * step_s);
-            self.angle_rad[lane] += self.rate_rad_s[lane] * step_s;
+            let (rate, spring_nm) = (self.rate_rad_s[lane], self.stiffness_nm_rad[lane] * pressed);
+            let pushes = (spring_nm + self.damping_nm_s_rad[lane] * rate) * pressed > 0.0;
+            let (spring_nm, left) = match pushes {
+                true => (spring_nm, step.left_in_flank[lane]),
+                false => (0.0, step.left_in_gap[lane]),
+            };
+            let relative_nm = load_nm + step.jolted[lane] * jolt_nm - spring_nm;
+            self.rate_rad_s[lane] = (rate + relative_nm * step.rad_s_nm) * left;
+            self.angle_rad[lane] += self.rate_rad_s[lane] * step.step_s;
+        }
+    }
+}
+
+/// One integration step of several rotors, the same from one sample to the next.
+struct Step {
+    step_s: f64,
+    /// Change of the rate per torque, rad/s/Nm.
+    rad_s_nm: f64,
+    /// How much of the jolt each rotor gets.
+    jolted: [f64; ABREAST],
+    /// Share of its rate that damping leaves to a rotor, in its gap and against a flank.
+    left_in_gap: [f64; ABREAST],
+    left_in_flank: [f64; ABREAST],
+}
+
+impl Step {
+    /// `held` is the damping by the drives, Nm s/rad; `made` says how much of it and of the jolt each rotor gets.
+    fn of(
+        flights: &Flights,
+        made: &[Jolts; ABREAST],
+        (mobility, held): (f64, f64),
+        step_s: f64,
+    ) -> Self {
+        let rad_s_nm = mobility * step_s;
+        let left = |damping_nm_s_rad: f64| 1.0 / (1.0 + damping_nm_s_rad * rad_s_nm);
+        let in_gap = |lane: usize| made[lane].damping * held;
+        let in_flank = |lane: usize| in_gap(lane) + flights.damping_nm_s_rad[lane];
+        Self {
+            step_s,
+            rad_s_nm,
+            jolted: made.map(|made| made.height),
+            left_in_gap: std::array::from_fn(|lane| left(in_gap(lane))),
+            left_in_flank: std::array::from_fn(|lane| left(in_flank(lane))),
         }
     }
 }
@@ -281,16 +326,22 @@ impl Flights {
 mod tests {
     use super::*;
 
+    /// Steps without jolts and drives.
+    fn undriven(flights: &Flights, mobility: f64, step_s: f64) -> Step {
+        Step::of(flights, &[Jolts::USUAL; ABREAST], (mobility, 0.0), step_s)
+    }
+
     /// A load that grows as s t takes the rotor across the gap g in the time (6 g/s)^(1/3).
     #[test]
     fn a_gap_is_crossed_in_the_time_of_a_cubic() {
         let (gap, slope, step_s) = (2e-5_f64, 300.0_f64, 1e-5);
         let mut flights =
             Flights::abreast(|_| Flight::pressed(0.5 * gap, Flanks::alone(1.0, 900.0), -1e-9));
+        let step = undriven(&flights, 1.0, step_s);
         let mut t = 0.0;
         while flights.angle_rad[0] < 0.5 * gap {
             let load_nm = slope * (t + 0.5 * step_s);
-            flights.step([load_nm, 0.0], 0.0, &[Jolts::USUAL; ABREAST], 1.0, step_s);
+            flights.follow(&step, &[load_nm], &[0.0]);
             t += step_s;
         }
         // Steps of 10 µs.
@@ -304,9 +355,8 @@ mod tests {
         let mut flights = Flights::abreast(|lane| {
             Flight::pressed(1e-5, Flanks::alone(1.0, frequency(lane)), -1.0)
         });
-        for _ in 0..100_000 {
-            flights.step([5.0, 0.0], 0.0, &[Jolts::USUAL; ABREAST], 1.0, 1e-5);
-        }
+        let step = undriven(&flights, 1.0, 1e-5);
+        flights.follow(&step, &[5.0; 100_000], &[0.0; 100_000]);
         for (lane, angle) in flights.angle_rad.iter().enumerate() {
             let at_rest = 1e-5 + 5.0 / frequency(lane).powi(2);
             // The swing left after 1 s: e^(−0.12 · 300).
@@ -322,10 +372,11 @@ mod tests {
         let mobility = 1.0 / (rotor * share);
         let flanks = Flanks::alone(rotor, 900.0).followed(mobility, step_s);
         let mut flights = Flights::abreast(|_| Flight::pressed(half_gap, flanks, 1.0));
+        let step = undriven(&flights, mobility, step_s);
         let at_rest = half_gap + 1.0 / flanks.stiffness_nm_rad;
         for k in 0..100_000 {
             let load = (0.01 * f64::from(k) * std::f64::consts::TAU * step_s).cos();
-            flights.step([load, 0.0], 0.0, &[Jolts::USUAL; ABREAST], mobility, step_s);
+            flights.follow(&step, &[load], &[0.0]);
             // The load crosses zero at 2π · 0.01 Nm/s, the rotor crosses its gap in 36 ms, and the flank stops the
             // final speed of 0.016 rad/s within a few steps of 0.5 ms: 8 µrad deep, compared with 100 µrad under the
             // full load.
