@@ -102,6 +102,7 @@ impl Bench {
             site,
             shape: case.shape,
             coefficients: case.coefficients.clone(),
+            off: Vec::new(),
             absorbed: Vec::new(),
         };
         let predict = |effects: Vec<Effect>| {

@@ -97,15 +97,19 @@ impl Study<'_> {
         self.memory.entry((family, site, shape), || self.bank(family, site, &[shape]).remove(0))
     }
 
-    /// The family of `entry` at its site in each of its richer shapes.
-    pub fn richer_entries(&self, entry: &Entry) -> Vec<Entry> {
-        let Entry { family, site, .. } = *entry;
-        let shapes = self.families[family].richer_shapes(&self.scene);
-        let richer = shapes.into_par_iter().filter_map(|shape| self.entry(family, site, shape));
+    /// The family of `entry` at its site in each of its richer shapes, and in its finer ones near `entry`.
+    pub fn further_entries(&self, entry: &Entry) -> Vec<Entry> {
+        let Entry { family, site, shape, .. } = *entry;
+        let law = &self.families[family];
+        let entries = |shapes: Vec<Shape>| {
+            shapes.into_par_iter().filter_map(move |shape| self.entry(family, site, shape))
+        };
+        let richer = entries(law.richer_shapes(&self.scene));
+        let finer = entries(law.finer_shapes(&self.scene, site, shape));
         let same = self.entries.iter().filter(|other| other.place() == entry.place());
         let plain = same.map(|other| other.images.len()).max().unwrap_or(1);
         // If the null model absorbs the further coefficient, the law is the one without it.
-        richer.filter(|entry| entry.images.len() > plain).collect()
+        richer.filter(|entry| entry.images.len() > plain).chain(finer).collect()
     }
 
     /// [`Self::entry`] for each of `shapes`.

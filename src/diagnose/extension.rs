@@ -1,5 +1,7 @@
 //! The extended model: base parameters and effects, fitted together.
 
+use nalgebra::{Cholesky, DMatrix, DVector};
+
 use super::candidates::{Candidate, Shape};
 use super::drives::Answer;
 use super::image::{Column, Image, Span};
@@ -21,9 +23,17 @@ pub struct Effect {
     pub shape: Shape,
     /// Coefficients of its columns.
     pub coefficients: Vec<f64>,
+    /// Coefficients of the [directions](Candidate::loose) in which its law may be wrong.
+    pub off: Vec<f64>,
     /// Change of the base parameters that would absorb part of the effect if it were left out.
     pub absorbed: Vec<f64>,
 }
+
+/// Standard deviation of the coefficients of [`Candidate::loose`] relative to that of the law, before any log is seen.
+///
+/// The directions are differences to other drives and flanks that are listed as extremes, so that most arms are within a
+/// part of them.
+const OFF: f64 = 0.3;
 
 /// Base parameters and effects, fitted together.
 #[derive(Debug, Clone)]
@@ -41,6 +51,9 @@ pub struct Extension {
 impl Extension {
     /// Fits the null model and `entries` to `torque` by least squares in the whitened equations. `torque` is the
     /// study's own, or that of other periods of the same motion.
+    ///
+    /// What a law takes for granted about the drives may be fitted with it ([`Candidate::carries_loose`]), as far as the
+    /// log insists (ridge regression, Hoerl and Kennard 1970): the drives are the same along another motion.
     pub fn fit(study: &Study, entries: &[&Entry], torque: &Image) -> Self {
         let mut residual = torque.clone();
         study.null.residualise(&mut residual);
@@ -49,17 +62,36 @@ impl Extension {
             entry.images.iter().map(|image| span.push(image)).collect()
         };
         let telling: Vec<Vec<bool>> = entries.iter().map(&mut telling).collect();
-        let mut solved = span.solve(&residual).into_iter();
         // The coefficient of a column that is a combination of those before it is zero.
-        let mut coefficient = |told| if told { solved.next().unwrap_or(0.0) } else { 0.0 };
+        let of_entries = |residual: &Image| -> Vec<Vec<f64>> {
+            let mut solved = span.solve(residual).into_iter();
+            let mut coefficient =
+                |told: &bool| if *told { solved.next().unwrap_or(0.0) } else { 0.0 };
+            telling.iter().map(|telling| telling.iter().map(&mut coefficient).collect()).collect()
+        };
+        let loose_of = |entry: &&Entry| match study.families[entry.family].carries_loose() {
+            true => study.loose(entry),
+            false => Vec::new(),
+        };
+        let loose: Vec<Vec<Image>> = entries.iter().map(loose_of).collect();
+        let prior_sd = loose.iter().zip(of_entries(&residual)).flat_map(|(images, b)| {
+            let size = b.first().map_or(0.0, |b| b.abs());
+            images.iter().map(move |_| OFF * size)
+        });
+        let prior_sd: Vec<f64> = prior_sd.collect();
+        let directions: Vec<&Image> = loose.iter().flatten().collect();
+        let mut off = ridge(&span, &directions, &prior_sd, &residual);
+        directions.iter().zip(&off).for_each(|(image, c)| residual.add(-c, image));
         let mut effects: Vec<Effect> = entries
             .iter()
-            .zip(telling)
-            .map(|(entry, telling)| Effect {
+            .zip(of_entries(&residual))
+            .zip(&loose)
+            .map(|((entry, coefficients), loose)| Effect {
                 family: entry.family,
                 site: entry.site,
                 shape: entry.shape,
-                coefficients: telling.into_iter().map(&mut coefficient).collect(),
+                coefficients,
+                off: off.drain(..loose.len()).collect(),
                 absorbed: Vec::new(),
             })
             .collect();
@@ -67,7 +99,7 @@ impl Extension {
         for effect in &mut effects {
             let mut own = torque.clone();
             own.scale(0.0);
-            for (column, b) in effect.columns(study.families, &study.scene) {
+            for (column, b) in effect.torques(study.families, &study.scene) {
                 let image = study.whitening.image(&column);
                 rest.add(-b, &image);
                 own.add(b, &image);
@@ -115,7 +147,7 @@ impl Extension {
             }
         }
         for effect in &self.effects {
-            for (column, b) in effect.columns(families, scene) {
+            for (column, b) in effect.torques(families, scene) {
                 for (j, y) in column.parts {
                     // A torque that does not repeat is averaged over the periods.
                     let mean = mean_period(&y, scene.samples());
@@ -128,6 +160,29 @@ impl Extension {
     }
 }
 
+/// Coefficients c of the `directions` outside `span`, by ridge regression on `residual`: (LᵀL + diag(1/sd²)) c = Lᵀr.
+fn ridge(span: &Span, directions: &[&Image], prior_sd: &[f64], residual: &Image) -> Vec<f64> {
+    let count = directions.len();
+    let outside: Vec<Image> = directions
+        .iter()
+        .zip(prior_sd)
+        .map(|(direction, sd)| {
+            let mut image = (*direction).clone();
+            span.residualise(&mut image);
+            image.scale(*sd);
+            image
+        })
+        .collect();
+    // In units of the standard deviations, the prior is the unit matrix, and there is a solution even if one of them is
+    // zero.
+    let normal = DMatrix::from_fn(count, count, |i, k| {
+        outside[i].dot(&outside[k]) + if i == k { 1.0 } else { 0.0 }
+    });
+    let right = DVector::from_fn(count, |i, _| outside[i].dot(residual));
+    let solved = Cholesky::new(normal).map(|normal| normal.solve(&right));
+    prior_sd.iter().enumerate().map(|(i, sd)| solved.as_ref().map_or(0.0, |c| sd * c[i])).collect()
+}
+
 impl Effect {
     /// The effect's columns with their coefficients.
     pub(super) fn columns(
@@ -137,5 +192,39 @@ impl Effect {
     ) -> Vec<(Column, f64)> {
         let columns = families[self.family].columns(scene, self.site, self.shape);
         columns.into_iter().zip(self.coefficients.iter().copied()).collect()
+    }
+
+    /// The same, and the directions in which the law was found to be off, with their coefficients.
+    fn torques(&self, families: &[Box<dyn Candidate>], scene: &Scene) -> Vec<(Column, f64)> {
+        let mut torques = self.columns(families, scene);
+        if !self.off.is_empty() {
+            let loose = families[self.family].loose(scene, self.site, self.shape);
+            torques.extend(loose.into_iter().zip(self.off.iter().copied()));
+        }
+        torques
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One direction of length l beside a column: its coefficient is l r/(l² + 1/sd²) of the part r of the residual
+    /// along it, outside the column.
+    #[test]
+    fn a_prior_shrinks_what_the_log_does_not_insist_on() {
+        let image = |mean: &[f64]| Image { mean: mean.to_vec(), contrast: Vec::new() };
+        let mut law = Span::default();
+        assert!(law.push(&image(&[1.0, 0.0, 0.0])));
+        let directions = [image(&[5.0, 2.0, 0.0]), image(&[1.0, 0.0, 30.0])];
+        let residual = image(&[0.0, 4.0, 60.0]);
+        let c = ridge(&law, &[&directions[0], &directions[1]], &[0.5, 0.5], &residual);
+        let expected = [2.0 * 4.0 / (4.0 + 4.0), 30.0 * 60.0 / (900.0 + 4.0)];
+        // A handful of operations on numbers of order one.
+        for (c, expected) in c.iter().zip(expected) {
+            assert!((c - expected).abs() < 1e-14, "{c} {expected}");
+        }
+        // A law that is not there is not off.
+        assert_eq!(ridge(&law, &[&directions[0]], &[0.0], &residual), [0.0]);
     }
 }

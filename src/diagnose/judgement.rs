@@ -54,14 +54,15 @@ impl Kept<'_, '_> {
         let (others, residual) = self.without(Some(c));
         let Contender { entry, score, .. } = &self.causes[c];
         let own = score.gain;
-        let richer = self.study.richer_entries(entry);
+        let further = self.study.further_entries(entry);
         let least = f64::NEG_INFINITY;
-        let variants = self.other_variants(entry, &richer, least, &others, &residual);
+        let variants = self.other_variants(entry, &further, least, &others, &residual);
         let form = |(entry, score): (Entry, Score)| {
             let coefficients = self.study.span(&entry, &others).solve(&residual);
             let behind = (own - score.gain).max(0.0);
             let Entry { family, site, shape, .. } = entry;
-            let effect = Effect { family, site, shape, coefficients, absorbed: Vec::new() };
+            let effect =
+                Effect { family, site, shape, coefficients, off: Vec::new(), absorbed: Vec::new() };
             Form { effect, behind }
         };
         variants.into_iter().map(form).collect()

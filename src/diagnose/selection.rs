@@ -230,12 +230,12 @@ impl<'s, 'a> Kept<'s, 'a> {
         rivals
     }
 
-    /// `entry` in the other variants of its family, those of `richer` included, each at its best shape. Only variants
+    /// `entry` in the other variants of its family, those of `further` included, each at its best shape. Only variants
     /// whose best starting shape gains more than `least` are considered.
     pub(super) fn other_variants(
         &self,
         entry: &Entry,
-        richer: &[Entry],
+        further: &[Entry],
         least: f64,
         others: &Span,
         residual: &Image,
@@ -245,7 +245,7 @@ impl<'s, 'a> Kept<'s, 'a> {
         let mut best: Vec<(&Entry, Score)> = Vec::new();
         let is_other =
             |e: &&Entry| (e.family, e.site) == (family, site) && e.shape.variant != shape.variant;
-        for entry in study.entries.iter().chain(richer).filter(is_other) {
+        for entry in study.entries.iter().chain(further).filter(is_other) {
             let Some(score) = study.score(entry, others, residual) else { continue };
             match best.iter_mut().find(|(b, _)| b.shape.variant == entry.shape.variant) {
                 Some(old) if old.1.gain >= score.gain => {}
@@ -257,19 +257,19 @@ impl<'s, 'a> Kept<'s, 'a> {
         best.into_par_iter().filter_map(|(e, _)| study.refined(e, others, residual)).collect()
     }
 
-    /// The best variant and shape near `entry`, the variants of `richer` included. A form that is the family's own
+    /// The best variant and shape near `entry`, the variants of `further` included. A form that is the family's own
     /// ([`Self::is_its_own`]) is preferred to one that is not, unless the latter is far ahead: the narrowest curve of one
     /// law looks like a wider one of another.
     fn at_its_best(
         &self,
         entry: &Entry,
-        richer: &[Entry],
+        further: &[Entry],
         others: &Span,
         residual: &Image,
     ) -> Option<Contender> {
         let own = self.study.refined(entry, others, residual);
         let start = self.study.score(entry, others, residual).map_or(0.0, |score| score.gain);
-        let forms = self.other_variants(entry, richer, BETWEEN_SHAPES * start, others, residual);
+        let forms = self.other_variants(entry, further, BETWEEN_SHAPES * start, others, residual);
         let contender = |(entry, score): (Entry, Score)| {
             let evidence = self.evidence(&entry, score);
             Contender { entry, score, evidence }
@@ -287,8 +287,8 @@ impl<'s, 'a> Kept<'s, 'a> {
     fn refine(&mut self, c: usize) {
         let (others, residual) = self.without(Some(c));
         let current = self.best_start(&self.causes[c].entry, &others, &residual);
-        let richer = self.study.richer_entries(current);
-        if let Some(best) = self.at_its_best(current, &richer, &others, &residual) {
+        let further = self.study.further_entries(current);
+        if let Some(best) = self.at_its_best(current, &further, &others, &residual) {
             self.causes[c] = best;
         }
     }

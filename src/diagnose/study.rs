@@ -281,7 +281,7 @@ impl<'a> Study<'a> {
     }
 
     /// Directions along which the law of `entry` may be off, with the null model projected out.
-    fn loose(&self, entry: &Entry) -> Vec<Image> {
+    pub(super) fn loose(&self, entry: &Entry) -> Vec<Image> {
         let columns = self.families[entry.family].loose(&self.scene, entry.site, entry.shape);
         columns
             .iter()
@@ -419,6 +419,7 @@ impl<'a> Study<'a> {
         let family = &self.families[entry.family];
         let mut shapes = family.shapes(&self.scene, entry.site);
         shapes.extend(family.richer_shapes(&self.scene));
+        shapes.extend(family.finer_shapes(&self.scene, entry.site, entry.shape));
         let same = shapes.iter().filter(|shape| shape.variant == entry.shape.variant);
         let near = 1e-9 * value.abs();
         let (mut low, mut high) = (value, value);

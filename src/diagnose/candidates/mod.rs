@@ -106,6 +106,11 @@ pub trait Candidate: Sync {
         Vec::new()
     }
 
+    /// Shapes near `shape` in variants between those of the search, which are tried only where the law was found.
+    fn finer_shapes(&self, _scene: &Scene, _site: Option<usize>, _shape: Shape) -> Vec<Shape> {
+        Vec::new()
+    }
+
     /// How the shape is refined.
     fn search(&self) -> Search {
         Search::None
@@ -147,6 +152,12 @@ pub trait Candidate: Sync {
     /// the log does not tell. A residual along them is not evidence for another cause.
     fn loose(&self, _scene: &Scene, _site: Option<usize>, _shape: Shape) -> Vec<Column> {
         Vec::new()
+    }
+
+    /// Whether [`Self::loose`] is fitted and carried along to another motion. A law that predicts other motions well
+    /// without would only carry noise.
+    fn carries_loose(&self) -> bool {
+        false
     }
 
     /// [`Self::columns`] of several shapes at once, where computing them together is cheaper.
