@@ -129,6 +129,12 @@ impl BaseSet {
         &self.parameterisation.names[self.independent[k]]
     }
 
+    /// The base parameter whose kept column is `parameter`; `None` if there is none.
+    pub fn index_of(&self, parameter: Parameter) -> Option<usize> {
+        let name = parameter.to_string();
+        (0..self.rank()).find(|&k| self.name(k) == name)
+    }
+
     /// SI unit of base parameter `k`.
     pub fn unit(&self, k: usize) -> &'static str {
         self.parameterisation.units[self.independent[k]]

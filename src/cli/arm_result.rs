@@ -22,7 +22,7 @@ pub struct ArmResult {
     pub offsets_nm: Vec<f64>,
     /// Names of the standard parameters that the robot file decided rather than the data.
     pub by_prior: Vec<String>,
-    /// A warning if the identified model was wrong along its log or physically impossible.
+    /// A warning if the identified model was wrong along its log or contradicted by it.
     pub doubt: Option<String>,
     /// Named frames on the bodies of the arm.
     pub frames: Frames,
@@ -136,7 +136,7 @@ impl ArmResult {
             by_prior: by_prior.map(|v| v.name).collect(),
             doubt: match result.physical {
                 _ if result.verdict == CONTRADICTED => Some(format!(
-                    "{file}: what was identified there is physically impossible; this is the nearest arm that can exist"
+                    "{file}: its log contradicts the arm; this is the nearest arm that can exist"
                 )),
                 Some(found) if found.model_is_wrong => Some(format!(
                     "{file}: an arm with these parameters does not move as the recorded one did: {}",

@@ -62,8 +62,8 @@ pub(super) struct EarlierParameter {
 
 /// Why the numbers of a result must not be used as they are.
 pub(super) enum Doubt {
-    /// No arm can have these parameters.
-    Impossible,
+    /// The log of the result contradicts the arm: no arm can have these parameters, or the log is not of this arm.
+    Contradicted,
     /// The model was wrong along the log of the result.
     WrongModel,
 }
@@ -95,7 +95,7 @@ impl EarlierResult {
     /// The doubt that the result states about itself.
     pub(super) fn doubt(&self) -> Option<Doubt> {
         if self.verdict == CONTRADICTED {
-            Some(Doubt::Impossible)
+            Some(Doubt::Contradicted)
         } else if self.intervals.trusted == Some(false) {
             Some(Doubt::WrongModel)
         } else {

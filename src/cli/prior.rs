@@ -60,8 +60,8 @@ impl Prior {
             ));
         }
         notes.extend(result.doubt().map(|doubt| match doubt {
-            Doubt::Impossible => {
-                format!("{file}: its parameters are physically impossible, and its σ do not hold")
+            Doubt::Contradicted => {
+                format!("{file}: its log contradicts the arm, and its parameters and their σ do not hold")
             }
             Doubt::WrongModel => format!(
                 "{file}: its σ count the noise alone, and the model was wrong along its log: less is known than they say"

@@ -68,8 +68,8 @@ impl Simulated {
             return Err(format!("{name}: {message}").into());
         }
         let doubt = result.doubt().map(|doubt| match doubt {
-            Doubt::Impossible => format!(
-                "The parameters in {name} are physically impossible, and a difference from them does not say what changed."
+            Doubt::Contradicted => format!(
+                "The log of {name} contradicts the arm, and a difference from its parameters does not say what changed."
             ),
             Doubt::WrongModel => format!(
                 "The model is wrong along the log from which {name} was identified, and what differs from it here may be an error of \

@@ -80,7 +80,7 @@ pub fn find(m: &Measurement, single_run: bool) -> Result<Faults, SignalError> {
     record.undo_lags(&lags);
     out.extend(lags);
     out.extend(wild);
-    out.extend(quantisation(&record.torque_nm));
+    out.extend(quantisation(m.torque_nm, &record.torque_nm));
     Ok(Faults { causes: out, record, warning, unreadable })
 }
 
@@ -249,34 +249,44 @@ pub fn coarse_joints(faults: &[Cause]) -> Vec<usize> {
     faults.iter().filter(coarse).filter_map(|f| f.joint).map(|j| j - 1).collect()
 }
 
-/// Torques that are whole multiples of a step that is coarse compared with the changes from sample to sample.
-fn quantisation(torque_nm: &JointSignals) -> Vec<Cause> {
-    (0..torque_nm.joints())
-        .filter_map(|j| {
-            let y = torque_nm.joint(j);
-            let mut values = y.to_vec();
-            values.sort_by(f64::total_cmp);
-            values.dedup();
-            let gap = |w: &[f64]| w[1] - w[0];
-            let step = values.windows(2).map(gap).filter(|g| *g > 0.0).fold(f64::NAN, f64::min);
-            let scale = values.last()?.abs().max(values.first()?.abs());
-            // The last digits of every value may contain the rounding of a decimal fraction.
-            let off_grid = |v: &f64| {
-                let steps = (v - values[0]) / step;
-                (steps - steps.round()).abs() * step > 1e-9 * scale
-            };
-            if values.len() < 3 || step.is_nan() || values.iter().any(off_grid) {
-                return None;
-            }
-            let changes: Vec<f64> = y.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
-            let rms = (changes.iter().map(|c| c * c).sum::<f64>() / changes.len() as f64).sqrt();
-            (step > COARSE * rms).then(|| {
-                let parameters = [("step", exact(step, "Nm"))];
-                let words = "torque in coarse steps";
-                cause(Kind::Quantisation, Some(j), words, step / rms, &parameters)
-            })
+/// Least share of the rows whose torque is on a grid that counts as coarse. Readings that are wild, or hang, need not be
+/// on it.
+const ON_GRID: f64 = 0.9;
+
+/// Torques that were `recorded` as whole multiples of a step that is coarse compared with the changes from sample to
+/// sample of the `mended` ones. What was filled in or interpolated is on no grid, and what is wild changes too much.
+fn quantisation(recorded: &JointSignals, mended: &JointSignals) -> Vec<Cause> {
+    let of_joint = |j: usize| {
+        let step = grid_step(recorded.joint(j))?;
+        let y = mended.joint(j);
+        let changes: Vec<f64> = y.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+        let rms = (changes.iter().map(|c| c * c).sum::<f64>() / changes.len() as f64).sqrt();
+        (step > COARSE * rms).then(|| {
+            let parameters = [("step", exact(step, "Nm"))];
+            let words = "torque in coarse steps";
+            cause(Kind::Quantisation, Some(j), words, step / rms, &parameters)
         })
-        .collect()
+    };
+    (0..recorded.joints()).filter_map(of_joint).collect()
+}
+
+/// Step of the grid on which the values of `y` are; `None` if there is none. Values that occur once do not count: on a
+/// coarse grid, nearly all occur again.
+fn grid_step(y: &[f64]) -> Option<f64> {
+    let mut sorted = y.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let alike = sorted.chunk_by(|a, b| a == b).filter(|alike| alike.len() > 1);
+    let repeated: Vec<(f64, usize)> = alike.map(|alike| (alike[0], alike.len())).collect();
+    let (origin, _) = *repeated.iter().max_by_key(|(_, rows)| *rows)?;
+    let gaps = repeated.windows(2).map(|w| w[1].0 - w[0].0);
+    let step = gaps.fold(f64::INFINITY, f64::min);
+    // The last digits of every value may contain the rounding of a decimal fraction.
+    let on_grid = |(v, _): &&(f64, usize)| {
+        let steps = (v - origin) / step;
+        (steps - steps.round()).abs() * step <= 1e-9 * v.abs().max(origin.abs())
+    };
+    let rows: usize = repeated.iter().filter(on_grid).map(|(_, rows)| rows).sum();
+    (repeated.len() > 2 && rows as f64 > ON_GRID * y.len() as f64).then_some(step)
 }
 
 /// The record's usual step, s.
@@ -338,6 +348,27 @@ mod tests {
             assert!((cause.parameters["step"].value - 0.8).abs() < 1e-9);
         }
         assert_eq!(rounded(0.01), []);
+    }
+
+    /// Rows that are filled in, readings that are wild, and readings that hang are on no grid.
+    #[test]
+    fn a_grid_is_seen_beside_values_that_are_not_on_it() {
+        let (_, [_, _, torque]) = record(0.0, None);
+        let coarse: Vec<f64> = torque.joint(0).iter().map(|v| (v / 0.8).round() * 0.8).collect();
+        assert!((grid_step(&coarse).unwrap() - 0.8).abs() < 1e-9);
+        let spoilt = |every: usize| {
+            let value = |(k, v): (usize, &f64)| match k % every {
+                0 => torque.joint(0)[k],
+                1 => 333.3,
+                _ => *v,
+            };
+            coarse.iter().enumerate().map(value).collect::<Vec<f64>>()
+        };
+        assert!((grid_step(&spoilt(25)).unwrap() - 0.8).abs() < 1e-9);
+        // A grid for less than nine tenths of the rows is none.
+        assert_eq!(grid_step(&spoilt(15)), None);
+        assert_eq!(grid_step(torque.joint(0)), None);
+        assert_eq!(grid_step(&[1.0; 100]), None);
     }
 
     #[test]

@@ -37,7 +37,8 @@ pub fn detection_limits(study: &Study, accepted: &Span) -> Vec<DetectionLimit> {
         sites.into_iter().map(move |site| (family, site))
     };
     let places: Vec<_> = (0..study.families.len()).flat_map(sites).collect();
-    places.into_par_iter().filter_map(|place| limit_at(study, accepted, place)).collect()
+    let each = places.into_par_iter().with_max_len(1);
+    each.filter_map(|place| limit_at(study, accepted, place)).collect()
 }
 
 /// Detection limit of one family at one site; `None` if the family was not looked for there.

@@ -1,5 +1,7 @@
 //! The whole procedure from a log to a diagnosis.
 
+use rayon::prelude::*;
+
 use super::against::{self, Found, Nominal};
 use super::candidates::{self, Candidate};
 use super::cleaned::Cleaned;
@@ -25,10 +27,10 @@ use super::settled::{beside_model, residual, settled, without_contacts};
 use super::study::{Entry, Study};
 use super::verdict::{Cause, Diagnosis, HeldOut, Rival, Rms, Unexplained, Verdict};
 use crate::base::BaseSet;
-use crate::dynamics::Model;
+use crate::dynamics::{Model, Parameter};
 use crate::identify::{
     Doubt, Identification, Identifier, Measurement, Misreading, Options, Regression,
-    drive_limit_remark, unlike_remark,
+    drive_limit_remark, unlike,
 };
 use crate::robot::{Arm, JointSignals};
 
@@ -234,16 +236,16 @@ impl<'a> Diagnoser<'a> {
         identification: &Identification,
     ) {
         let nominal = self.set.values(&Model::new(self.arm).standard_parameters());
-        let sigma = sigma_of_friction_alone(diagnosis, self.set);
+        let sigma = sigma_of_friction_alone(diagnosis, self.set, self.arm.dof());
         // Contacts and friction that the null model lacks distort its estimate of gravity, so θ is that of the extended
         // model.
         let (theta, covariance) = (&extension.theta, &identification.covariance);
         let left = share_left(diagnosis, identification);
         let torque_nm = identification.residual().torque_nm();
         let doubt = Doubt::of(self.arm, self.set, &nominal, theta, &sigma, covariance, &torque_nm);
-        if let Some(doubt) = Doubt::or_unlike(doubt, unlike_remark(self.arm, &left)) {
-            diagnosis.sentences.insert(0, doubt.sentence);
-            if doubt.is_contradiction {
+        if let Some(doubt) = Doubt::or_unlike(doubt, unlike(self.arm, &left)) {
+            diagnosis.sentences.insert(0, doubt.sentence());
+            if doubt.is_contradiction() {
                 diagnosis.verdict = Verdict::Contradicted;
             }
         }
@@ -264,7 +266,7 @@ impl<'a> Diagnoser<'a> {
             let gain = gains[c].or(selected.left_out_gain);
             self.cause(study, kept, selected, c, gain, &extension)
         };
-        let causes = selected.iter().enumerate().map(cause).collect();
+        let causes = selected.par_iter().enumerate().map(cause).collect();
         let (accepted, rest) = kept.without(None);
         Extended { causes, after_nm: residual(study, &extension), extension, accepted, rest }
     }
@@ -414,14 +416,15 @@ fn share_left(diagnosis: &Diagnosis, identification: &Identification) -> Vec<f64
 
 /// σ of the base parameters beside the causes. It is ∞ for the Coulomb friction of a joint that also has another
 /// friction law: that parameter may be negative although the friction as a whole is not.
-fn sigma_of_friction_alone(diagnosis: &Diagnosis, set: &BaseSet) -> Vec<f64> {
-    let has_law = |name: &str| {
-        let laws = diagnosis.causes.iter().filter(|cause| cause.kind.is_friction());
-        let mut joints = laws.map(|cause| cause.joint);
-        joints.any(|joint| joint.is_none_or(|joint| name == format!("rc{joint}")))
-    };
-    let known = diagnosis.base_parameters.iter().enumerate();
-    known.map(|(k, p)| if has_law(set.name(k)) { f64::INFINITY } else { p.sigma }).collect()
+fn sigma_of_friction_alone(diagnosis: &Diagnosis, set: &BaseSet, joints: usize) -> Vec<f64> {
+    let mut sigma: Vec<f64> = diagnosis.base_parameters.iter().map(|p| p.sigma).collect();
+    for law in diagnosis.causes.iter().filter(|cause| cause.kind.is_friction()) {
+        let joints = law.joint.map_or(0..joints, |joint| joint - 1..joint);
+        for k in joints.filter_map(|j| set.index_of(Parameter::Coulomb(j))) {
+            sigma[k] = f64::INFINITY;
+        }
+    }
+    sigma
 }
 
 /// Orders the causes. For a repeating motion: faults of the record before physics, physics by strength. For a single
@@ -450,7 +453,8 @@ fn causes_of<'a>(
     let mut first = Study::new(families, sources, regression, estimate, source)?;
     first.leave_out(log.unreadable.clone());
     let null = Extension::fit(&first, &[], &first.torque);
-    let first = without_contacts(first, set, &null, source)?;
+    let mut first = without_contacts(first, set, &null, source)?;
+    first.look_everywhere();
     let found = select(&first);
     let (mut study, found) = if found.causes.is_empty() && first.scene.periodic {
         (first, found.causes)

@@ -72,7 +72,7 @@ mod tests {
 
     fn entry(variant: usize, value: f64, mean: &[f64]) -> Entry {
         let images = vec![Image { mean: mean.to_vec(), contrast: Vec::new() }];
-        Entry { family: 0, site: None, shape: Shape { variant, value }, images }
+        Entry { family: 0, site: None, shape: Shape { variant, value }, images: images.into() }
     }
 
     /// A family in which every coefficient is possible for every shape.
@@ -115,7 +115,7 @@ mod tests {
         assert_eq!(tests(&entries[1..3]), DistinctShapes { all: 2.0, within_reach: 1.0 });
         // One coefficient of two columns does not tell where the other one is.
         let mut both = entries;
-        both.iter_mut().for_each(|e| e.images.push(e.images[0].clone()));
+        both.iter_mut().for_each(|e| e.images = [&*e.images, &*e.images].concat().into());
         assert_eq!(tests(&both), DistinctShapes { all: 4.0, within_reach: 4.0 });
     }
 

@@ -1,5 +1,7 @@
 //! The extended model: base parameters and effects, fitted together.
 
+use std::sync::Arc;
+
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::candidates::{Candidate, Shape};
@@ -71,15 +73,15 @@ impl Extension {
         };
         let loose_of = |entry: &&Entry| match study.families[entry.family].carries_loose() {
             true => study.loose(entry),
-            false => Vec::new(),
+            false => Arc::default(),
         };
-        let loose: Vec<Vec<Image>> = entries.iter().map(loose_of).collect();
+        let loose: Vec<Arc<[Image]>> = entries.iter().map(loose_of).collect();
         let prior_sd = loose.iter().zip(of_entries(&residual)).flat_map(|(images, b)| {
             let size = b.first().map_or(0.0, |b| b.abs());
             images.iter().map(move |_| OFF * size)
         });
         let prior_sd: Vec<f64> = prior_sd.collect();
-        let directions: Vec<&Image> = loose.iter().flatten().collect();
+        let directions: Vec<&Image> = loose.iter().flat_map(|images| &**images).collect();
         let mut off = ridge(&span, &directions, &prior_sd, &residual);
         directions.iter().zip(&off).for_each(|(image, c)| residual.add(-c, image));
         let mut effects: Vec<Effect> = entries
@@ -194,14 +196,22 @@ impl Effect {
         columns.into_iter().zip(self.coefficients.iter().copied()).collect()
     }
 
-    /// The same, and the directions in which the law was found to be off, with their coefficients.
-    fn torques(&self, families: &[Box<dyn Candidate>], scene: &Scene) -> Vec<(Column, f64)> {
-        let mut torques = self.columns(families, scene);
-        if !self.off.is_empty() {
-            let loose = families[self.family].loose(scene, self.site, self.shape);
-            torques.extend(loose.into_iter().zip(self.off.iter().copied()));
+    /// The directions in which the law was found to be off, with their coefficients.
+    pub(super) fn off_columns(
+        &self,
+        families: &[Box<dyn Candidate>],
+        scene: &Scene,
+    ) -> Vec<(Column, f64)> {
+        if self.off.is_empty() {
+            return Vec::new();
         }
-        torques
+        let loose = families[self.family].loose(scene, self.site, self.shape);
+        loose.into_iter().zip(self.off.iter().copied()).collect()
+    }
+
+    /// All columns of the effect with their coefficients.
+    fn torques(&self, families: &[Box<dyn Candidate>], scene: &Scene) -> Vec<(Column, f64)> {
+        [self.columns(families, scene), self.off_columns(families, scene)].concat()
     }
 }
 

@@ -94,7 +94,7 @@ struct Model<'a> {
 impl<'a> Model<'a> {
     fn new(study: &'a Study, entries: &[&Entry]) -> Self {
         let mut causes = Span::default();
-        for image in entries.iter().flat_map(|entry| &entry.images) {
+        for image in entries.iter().flat_map(|entry| &*entry.images) {
             causes.push(image);
         }
         Self { null: &study.null, causes }

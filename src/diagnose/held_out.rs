@@ -16,6 +16,7 @@ use super::scene::Scene;
 use super::verdict::HeldOut;
 use super::whitening::{RunWhitening, Whitening};
 use crate::base::BaseSet;
+use crate::dynamics::Parameter;
 use crate::identify::{
     Identifier, MOVING_RAD_S, Measurement, Misreading, Options, Problem, Regression,
 };
@@ -163,13 +164,13 @@ fn without_friction_of(
     e: &[f64],
     moves: &[bool],
 ) -> f64 {
-    let names = [format!("rc{}", j + 1), format!("rv{}", j + 1)];
+    let own = [Parameter::Coulomb(j), Parameter::Viscous(j)].map(|own| set.index_of(own));
     let columns = problem.panels[j].x.chunks_exact(problem.samples);
     let friction: Vec<&[f64]> = problem
         .plan
         .base_indices(j)
         .zip(columns)
-        .filter(|(base, _)| names.iter().any(|name| name == set.name(*base)))
+        .filter(|(base, _)| own.contains(&Some(*base)))
         .map(|(_, column)| column)
         .collect();
     let where_moving = |y: &[f64]| -> Vec<f64> {
@@ -187,13 +188,7 @@ fn without_friction_of(
 
 /// Coulomb friction of joint `j` in the base parameters `theta`, Nm.
 fn coulomb_nm(set: &BaseSet, theta: &[f64], j: usize) -> f64 {
-    coulomb_index(set, j).map_or(0.0, |k| theta[k].abs())
-}
-
-/// Index of the base parameter that is joint `j`'s Coulomb friction.
-fn coulomb_index(set: &BaseSet, j: usize) -> Option<usize> {
-    let name = format!("rc{}", j + 1);
-    (0..set.rank()).find(|&k| set.name(k) == name)
+    set.index_of(Parameter::Coulomb(j)).map_or(0.0, |k| theta[k].abs())
 }
 
 /// `model` without its Coulomb friction and without effects of the friction families.

@@ -56,6 +56,11 @@ pub struct Image {
 }
 
 impl Image {
+    /// Number of bytes of its rows.
+    pub fn bytes(&self) -> usize {
+        (self.mean.len() + self.contrast.len()) * size_of::<f64>()
+    }
+
     /// ⟨self, other⟩.
     pub fn dot(&self, other: &Self) -> f64 {
         dot(&self.mean, &other.mean) + dot_of_contrasts(&self.contrast, &other.contrast)

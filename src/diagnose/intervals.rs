@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 #[cfg(doc)]
 use super::candidates::Candidate;
@@ -21,16 +22,18 @@ const STEP: f64 = 1e-3;
 /// Derivatives of `effect` in the whitened equations with respect to its coefficients, and with respect to its
 /// nonlinear parameter if it has one.
 pub(super) fn tangents(study: &Study, effect: &Effect) -> Vec<Image> {
+    let Effect { site, shape, .. } = *effect;
     let family = &study.families[effect.family];
-    let images = |value: f64| -> Vec<Image> {
-        let shape = Shape { value, ..effect.shape };
-        let columns = family.columns(&study.scene, effect.site, shape);
+    let step = STEP * shape.value.abs();
+    let has_slope = has_nonlinear_parameter(study, effect);
+    let around = [0.0, step, -step].map(|off| Shape { value: shape.value + off, ..shape });
+    let shapes = if has_slope { &around[..] } else { &around[..1] };
+    let banks = family.bank(&study.scene, site, shapes).into_iter();
+    let mut images = banks.map(|columns| -> Vec<Image> {
         study.whitening.images(columns.iter().take(effect.coefficients.len()))
-    };
-    let mut out = images(effect.shape.value);
-    let step = STEP * effect.shape.value.abs();
-    if family.search() != Search::None && step > 0.0 {
-        let [above, below] = [1.0, -1.0].map(|sign| images(effect.shape.value + sign * step));
+    });
+    let mut out = images.next().unwrap_or_default();
+    if let (Some(above), Some(below)) = (images.next(), images.next()) {
         let mut slope = Image::default();
         for ((mut above, below), b) in above.into_iter().zip(below).zip(&effect.coefficients) {
             above.add(-1.0, &below);
@@ -44,6 +47,11 @@ pub(super) fn tangents(study: &Study, effect: &Effect) -> Vec<Image> {
         out.push(slope);
     }
     out
+}
+
+/// Whether the law of `effect` has a nonlinear parameter. Where it is zero, the law is the one without it.
+fn has_nonlinear_parameter(study: &Study, effect: &Effect) -> bool {
+    study.families[effect.family].search() != Search::None && effect.shape.value != 0.0
 }
 
 /// Base parameters beside the effects of `extension`, with their σ when the numbers of the effects are unknown as well.
@@ -112,8 +120,7 @@ pub fn physical(
     let (others, residual) = kept.without(Some(index));
     let span = tangent_span(study, &others, effect);
     let quantile = study.statistic.quantile_95(&span, &residual);
-    let has_profile =
-        study.scene.periodic && study.families[effect.family].search() != Search::None;
+    let has_profile = study.scene.periodic && has_nonlinear_parameter(study, effect);
     let profile = Profile { study, effect, others: &others, residual: &residual, quantile };
     let mut out = has_profile
         .then(|| profile.intervals(&span))
@@ -190,16 +197,17 @@ impl Profile<'_> {
         let centre = self.entry(self.effect.shape.value)?;
         let best = self.gain(&centre)?;
         let mut out = self.estimates(&centre, self.quantile);
-        for side in [-1.0, 1.0] {
+        let on_the_way = |(end, part): (f64, usize)| {
+            let entry = self.entry(self.moved(end * part as f64 / PARTS as f64))?;
+            let left = self.quantile.powi(2) - (best - self.gain(&entry)?).max(0.0);
+            Some(self.estimates(&entry, left.max(0.0).sqrt()))
+        };
+        let on_side = |side: f64| {
             let end = self.end(side * self.quantile * sigma, best);
-            for part in 1..=PARTS {
-                let value = self.moved(end * part as f64 / PARTS as f64);
-                let Some(entry) = self.entry(value) else { continue };
-                let Some(gain) = self.gain(&entry) else { continue };
-                let left = self.quantile.powi(2) - (best - gain).max(0.0);
-                reach_over(&mut out, &self.estimates(&entry, left.max(0.0).sqrt()));
-            }
-        }
+            (1..=PARTS).into_par_iter().filter_map(move |part| on_the_way((end, part)))
+        };
+        let others: Vec<_> = [-1.0, 1.0].into_par_iter().flat_map(on_side).collect();
+        others.iter().for_each(|other| reach_over(&mut out, other));
         Some(out)
     }
 

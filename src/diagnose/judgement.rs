@@ -57,6 +57,7 @@ impl Kept<'_, '_> {
         let further = self.study.further_entries(entry);
         let least = f64::NEG_INFINITY;
         let variants = self.other_variants(entry, &further, least, &others, &residual);
+        let variants = self.study.refined(&variants, &others, &residual);
         let form = |(entry, score): (Entry, Score)| {
             let coefficients = self.study.span(&entry, &others).solve(&residual);
             let behind = (own - score.gain).max(0.0);

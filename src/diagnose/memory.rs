@@ -1,21 +1,27 @@
-//! A cache of the entries that a study has computed, keyed by family, site and shape.
+//! A cache of the entries that a study has computed, and of the directions in which their laws may be off, keyed by
+//! family, site and shape.
 //!
 //! It pays because a search for the best shape starts where the search before it started, so that both evaluate the
-//! same shapes first.
+//! same shapes first, and because a cause is looked at beside every other one.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::candidates::Shape;
-use super::study::Entry;
+use super::image::Image;
+use super::study::{Entry, Place};
 
-/// Upper limit of the bytes of columns that are kept. An entry beyond it is computed anew each time.
+/// Upper limit of the bytes of columns that are kept. What is beyond it is computed anew each time.
 const MOST_BYTES: usize = 64 << 20;
 
-/// Family, site, variant of the shape, and the bits of the shape's value.
-type Key = (usize, Option<usize>, usize, u64);
+/// A place, a variant of the shape, and the bits of the shape's value.
+type Key = (Place, usize, u64);
 
-/// The cache itself. It holds `None` for shapes whose columns the null model absorbs.
+fn key(place: Place, shape: &Shape) -> Key {
+    (place, shape.variant, shape.value.to_bits())
+}
+
+/// The cache itself.
 #[derive(Default)]
 pub struct Memory {
     known: Mutex<Known>,
@@ -23,31 +29,70 @@ pub struct Memory {
 
 #[derive(Default)]
 struct Known {
-    entries: HashMap<Key, Option<Arc<Entry>>>,
+    /// `None` for shapes whose columns the null model absorbs.
+    entries: HashMap<Key, Option<Entry>>,
+    loose: HashMap<Key, Arc<[Image]>>,
     bytes: usize,
 }
 
+impl Known {
+    /// Whether there is room for `images`, which is then taken.
+    fn takes(&mut self, images: &[Image]) -> bool {
+        let bytes: usize = images.iter().map(Image::bytes).sum();
+        let has_room = self.bytes + bytes <= MOST_BYTES;
+        self.bytes += if has_room { bytes } else { 0 };
+        has_room
+    }
+}
+
 impl Memory {
-    /// The entry of `family` at `site` with `shape`, computed by `make` if it is not in the cache.
-    pub fn entry(
+    /// Values are inserted whole or not at all, so a lock poisoned by a panic elsewhere still guards valid ones.
+    fn lock(&self) -> MutexGuard<'_, Known> {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The entries at `place` with these `shapes`. Those that are not in the cache are computed by `make`, all at once.
+    pub fn entries(
         &self,
-        (family, site, shape): (usize, Option<usize>, Shape),
-        make: impl FnOnce() -> Option<Entry>,
-    ) -> Option<Entry> {
-        let key = (family, site, shape.variant, shape.value.to_bits());
-        // An entry is inserted whole or not at all, so a lock poisoned by a panic elsewhere still guards valid entries.
-        let lock = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        let known = lock().entries.get(&key).cloned();
-        if let Some(entry) = known {
-            return entry.map(|entry| (*entry).clone());
+        place: Place,
+        shapes: &[Shape],
+        make: impl FnOnce(&[Shape]) -> Vec<Option<Entry>>,
+    ) -> Vec<Option<Entry>> {
+        let known: Vec<Option<Option<Entry>>> = {
+            let known = self.lock();
+            shapes.iter().map(|shape| known.entries.get(&key(place, shape)).cloned()).collect()
+        };
+        let pairs = shapes.iter().zip(&known);
+        let unknown: Vec<Shape> =
+            pairs.filter(|(_, known)| known.is_none()).map(|(shape, _)| *shape).collect();
+        let made = if unknown.is_empty() { Vec::new() } else { make(&unknown) };
+        let mut cache = self.lock();
+        for (shape, made) in unknown.iter().zip(&made) {
+            if cache.takes(made.as_ref().map_or(&[], |entry| &entry.images)) {
+                cache.entries.insert(key(place, shape), made.clone());
+            }
         }
-        let made = make();
-        let bytes = made.as_ref().map_or(0, Entry::bytes);
-        let kept = made.clone().map(Arc::new);
-        let mut known = lock();
-        if known.bytes + bytes <= MOST_BYTES && known.entries.insert(key, kept).is_none() {
-            known.bytes += bytes;
-        }
-        made
+        let mut made = made.into_iter();
+        known.into_iter().map(|known| known.unwrap_or_else(|| made.next().flatten())).collect()
+    }
+
+    /// The directions in which the law at `place` may be off at this `shape`, computed by `make` if they are not in the
+    /// cache.
+    pub fn loose(
+        &self,
+        place: Place,
+        shape: Shape,
+        make: impl FnOnce() -> Vec<Image>,
+    ) -> Arc<[Image]> {
+        let key = key(place, &shape);
+        let known = self.lock().loose.get(&key).cloned();
+        known.unwrap_or_else(|| {
+            let made: Arc<[Image]> = make().into();
+            let mut cache = self.lock();
+            if cache.takes(&made) {
+                cache.loose.insert(key, Arc::clone(&made));
+            }
+            made
+        })
     }
 }

@@ -51,6 +51,7 @@ mod payload;
 mod peak;
 mod price;
 mod record;
+mod refinement;
 mod repeated;
 pub mod replay;
 mod reversal_answer;

@@ -17,8 +17,8 @@ use super::candidates::Candidate;
 use super::chance;
 use super::clustered::{Equations, Solution, solve};
 use super::error::DiagnoseError;
-use super::extension::Extension;
-use super::image::{Image, Span};
+use super::extension::{Effect, Extension};
+use super::image::{Column, Image, Span};
 use super::kind::Kind;
 use super::scene::Scene;
 use super::verdict::{Cause, Estimate};
@@ -321,9 +321,11 @@ impl Layout {
         let effects: usize = extension.effects.iter().map(|e| e.coefficients.len()).sum();
         let body = base + effects;
         let friction = body + BODY;
-        let named = |name: String| (0..base).find(|&k| set.name(k) == name);
-        let friction_base = (1..=joints)
-            .map(|j| ["rc", "rv", "off"].map(|symbol| named(format!("{symbol}{j}"))))
+        let friction_base = (0..joints)
+            .map(|j| {
+                [Parameter::Coulomb(j), Parameter::Viscous(j), Parameter::Offset(j)]
+                    .map(|own| set.index_of(own))
+            })
             .collect();
         Self { base, body, friction, friction_base, count: friction + 3 * joints }
     }
@@ -408,6 +410,18 @@ fn equations(
     let (n, periods) = (problem.samples, problem.periods);
     let thin = (n * periods).div_ceil(MOST_ROWS).max(1);
     let block_rows = ((BLOCK_S * problem.rate_hz) as usize).max(1);
+    let of_effects = |columns: fn(&Effect, &[Box<dyn Candidate>], &Scene) -> Vec<(Column, f64)>| {
+        let each = extension.effects.iter();
+        each.map(|effect| columns(effect, families, &scene)).collect::<Vec<_>>()
+    };
+    let (laws, off) = (of_effects(Effect::columns), of_effects(Effect::off_columns));
+    let on_joint = |j: usize, column: &Column| -> Vec<Vec<f64>> {
+        let own = column.parts.iter().filter(|(joint, _)| *joint == j);
+        let as_regressed = |y: &Vec<f64>| {
+            whitening.as_ref().map_or_else(|| y.clone(), |whitening| whitening.as_regressed(y))
+        };
+        own.map(|(_, y)| as_regressed(y)).collect()
+    };
     let mut out = Vec::with_capacity(problem.joints());
     for (j, panel) in problem.panels.iter().enumerate() {
         let rows: Vec<usize> =
@@ -419,11 +433,10 @@ fn equations(
             }
         }
         let mut first = layout.base;
-        for effect in &extension.effects {
+        for (effect, law) in extension.effects.iter().zip(&laws) {
             // A single run has no columns of what a drive feeds forward.
-            for (at, (column, _)) in (first..).zip(effect.columns(families, &scene)) {
-                for (_, y) in column.parts.iter().filter(|(joint, _)| *joint == j) {
-                    let y = whitening.as_ref().map_or_else(|| y.clone(), |w| w.as_regressed(y));
+            for (at, (column, _)) in (first..).zip(law) {
+                for y in on_joint(j, column) {
                     for (value, row) in columns.column_mut(at).iter_mut().zip(&rows) {
                         *value = y[row % y.len()];
                     }
@@ -431,10 +444,19 @@ fn equations(
             }
             first += effect.coefficients.len();
         }
+        let mut torque_nm =
+            DVector::from_iterator(rows.len(), rows.iter().map(|row| panel.y[*row]));
+        for (column, b) in off.iter().flatten() {
+            for y in on_joint(j, column) {
+                for (value, row) in torque_nm.iter_mut().zip(&rows) {
+                    *value -= b * y[row % y.len()];
+                }
+            }
+        }
         out.push(Equations {
             joint: j,
             columns,
-            torque_nm: DVector::from_iterator(rows.len(), rows.iter().map(|row| panel.y[*row])),
+            torque_nm,
             block_of: rows.iter().map(|row| first_block + row / block_rows).collect(),
         });
     }

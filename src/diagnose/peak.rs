@@ -1,39 +1,89 @@
 //! Search for the peak of a curve.
 
-/// Steps of the golden section, after which the bracket is a twentieth of the first one.
-const GOLDEN_STEPS: usize = 6;
+use std::cmp::Ordering;
+
+/// Points of the golden section: two, and one for each of the six steps after which the bracket is a twentieth of the
+/// first one.
+const SECTIONS: usize = 8;
 /// Ratio of one bracket to the one before.
 const RATIO: f64 = 0.618_033_988_749_895;
 
-/// Looks for the peak of `f` between `low` and `high`, where it has only one: by golden section, and in the end at the
-/// vertex of the parabola through the highest point and its two neighbours (Brent 1973). `f` keeps what it finds; `known`
-/// is a point (x, f(x)) of the curve. Where there is no curve, f is −∞.
-pub fn search_peak([mut low, mut high]: [f64; 2], known: [f64; 2], mut f: impl FnMut(f64) -> f64) {
-    let mut points = vec![known];
-    let mut value = |x: f64| {
-        let y = f(x);
-        points.push([x, y]);
-        y
-    };
-    let mut inner = [high - RATIO * (high - low), low + RATIO * (high - low)];
-    let mut values = inner.map(&mut value);
-    for _ in 0..GOLDEN_STEPS {
-        if values[0] >= values[1] {
-            high = inner[1];
-            inner = [high - RATIO * (high - low), inner[0]];
-            values = [value(inner[0]), values[0]];
-        } else {
-            low = inner[0];
-            inner = [inner[1], low + RATIO * (high - low)];
-            values = [values[1], value(inner[1])];
+/// A search for the peak of a curve between two points, where it has only one: by golden section, and in the end at the
+/// vertex of the parabola through the highest point and its two neighbours (Brent 1973).
+///
+/// It asks for one point at a time, so that several searches can be answered together.
+pub struct PeakSearch {
+    bracket: [f64; 2],
+    /// The points that divide the bracket by the golden section, and the curve there.
+    inner: [f64; 2],
+    values: [f64; 2],
+    /// The one of them that is wanted.
+    wanted: usize,
+    /// Points (x, y) of the curve.
+    points: Vec<[f64; 2]>,
+    /// Number of answers.
+    told: usize,
+}
+
+impl PeakSearch {
+    /// `known` is a point (x, y) of the curve.
+    pub fn new([low, high]: [f64; 2], known: [f64; 2]) -> Self {
+        Self {
+            bracket: [low, high],
+            inner: [high - RATIO * (high - low), low + RATIO * (high - low)],
+            values: [f64::NEG_INFINITY; 2],
+            wanted: 0,
+            points: vec![known],
+            told: 0,
         }
     }
-    points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let is_peak = |three: &&[[f64; 2]]| three[1][1] >= three[0][1] && three[1][1] >= three[2][1];
-    let peaks = points.windows(3).filter(is_peak);
-    let highest = peaks.max_by(|a, b| a[1][1].total_cmp(&b[1][1]));
-    if let Some(vertex) = highest.and_then(vertex) {
-        f(vertex);
+
+    /// The point x at which the curve is wanted next; `None` at the end.
+    pub fn wanted(&self) -> Option<f64> {
+        match self.told.cmp(&SECTIONS) {
+            Ordering::Less => Some(self.inner[self.wanted]),
+            Ordering::Equal => self.vertex(),
+            Ordering::Greater => None,
+        }
+    }
+
+    /// Takes y at the point that is wanted; −∞ where there is no curve.
+    pub fn tell(&mut self, y: f64) {
+        if self.told < SECTIONS {
+            self.points.push([self.inner[self.wanted], y]);
+            self.values[self.wanted] = y;
+        }
+        self.told += 1;
+        match self.told {
+            1 => self.wanted = 1,
+            2..SECTIONS => self.narrow(),
+            _ => {}
+        }
+    }
+
+    /// Leaves out the end of the bracket that is farther from the higher one of the inner points.
+    fn narrow(&mut self) {
+        let [low, high] = &mut self.bracket;
+        if self.values[0] >= self.values[1] {
+            *high = self.inner[1];
+            self.inner = [*high - RATIO * (*high - *low), self.inner[0]];
+            self.values[1] = self.values[0];
+            self.wanted = 0;
+        } else {
+            *low = self.inner[0];
+            self.inner = [self.inner[1], *low + RATIO * (*high - *low)];
+            self.values[0] = self.values[1];
+            self.wanted = 1;
+        }
+    }
+
+    fn vertex(&self) -> Option<f64> {
+        let mut points = self.points.clone();
+        points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let is_peak =
+            |three: &&[[f64; 2]]| three[1][1] >= three[0][1] && three[1][1] >= three[2][1];
+        let peaks = points.windows(3).filter(is_peak);
+        peaks.max_by(|a, b| a[1][1].total_cmp(&b[1][1])).and_then(vertex)
     }
 }
 
@@ -52,13 +102,14 @@ mod tests {
     /// Distance from the peak of the best point that is tried of `f` between 0 and 1.
     fn missed(peak: f64, f: impl Fn(f64) -> f64) -> f64 {
         let mut best = [0.2, f(0.2)];
-        search_peak([0.0, 1.0], best, |x| {
+        let mut search = PeakSearch::new([0.0, 1.0], best);
+        while let Some(x) = search.wanted() {
             let y = f(x);
             if y > best[1] {
                 best = [x, y];
             }
-            y
-        });
+            search.tell(y);
+        }
         (best[0] - peak).abs()
     }
 

@@ -230,16 +230,16 @@ impl<'s, 'a> Kept<'s, 'a> {
         rivals
     }
 
-    /// `entry` in the other variants of its family, those of `further` included, each at its best shape. Only variants
-    /// whose best starting shape gains more than `least` are considered.
-    pub(super) fn other_variants(
-        &self,
+    /// The best starting shape of each other variant of the family of `entry`, those of `further` included, that gains
+    /// more than `least`.
+    pub(super) fn other_variants<'e>(
+        &'e self,
         entry: &Entry,
-        further: &[Entry],
+        further: &'e [Entry],
         least: f64,
         others: &Span,
         residual: &Image,
-    ) -> Vec<(Entry, Score)> {
+    ) -> Vec<&'e Entry> {
         let study = self.study;
         let Entry { family, site, shape, .. } = *entry;
         let mut best: Vec<(&Entry, Score)> = Vec::new();
@@ -254,7 +254,7 @@ impl<'s, 'a> Kept<'s, 'a> {
             }
         }
         best.retain(|(_, score)| score.gain > least);
-        best.into_par_iter().filter_map(|(e, _)| study.refined(e, others, residual)).collect()
+        best.into_iter().map(|(entry, _)| entry).collect()
     }
 
     /// The best variant and shape near `entry`, the variants of `further` included. A form that is the family's own
@@ -267,14 +267,21 @@ impl<'s, 'a> Kept<'s, 'a> {
         others: &Span,
         residual: &Image,
     ) -> Option<Contender> {
-        let own = self.study.refined(entry, others, residual);
         let start = self.study.score(entry, others, residual).map_or(0.0, |score| score.gain);
-        let forms = self.other_variants(entry, further, BETWEEN_SHAPES * start, others, residual);
+        let mut starts = vec![entry];
+        starts.extend(self.other_variants(
+            entry,
+            further,
+            BETWEEN_SHAPES * start,
+            others,
+            residual,
+        ));
+        let forms = self.study.refined(&starts, others, residual).into_iter();
         let contender = |(entry, score): (Entry, Score)| {
             let evidence = self.evidence(&entry, score);
             Contender { entry, score, evidence }
         };
-        let mut forms: Vec<Contender> = own.into_iter().chain(forms).map(contender).collect();
+        let mut forms: Vec<Contender> = forms.map(contender).collect();
         forms.sort_by(Contender::in_order);
         let best = forms.first()?.evidence;
         let near = forms.iter().take_while(|form| best - form.evidence < FAR_AHEAD).count();
@@ -369,10 +376,13 @@ impl<'s, 'a> Kept<'s, 'a> {
             if entry.site.is_some() { common > 0 && single > 0 } else { single > 1 }
         };
         let mut best: Vec<Contender> = Vec::new();
+        // What is faint takes part only as an alternative to a cause.
+        let faint: &[Entry] = if open.is_some() { &study.faint } else { &[] };
         let scores: Vec<Option<Score>> = study
             .entries
             .par_iter()
             .chain(orders.par_iter())
+            .chain(faint.par_iter())
             .map(|entry| {
                 if left_out(entry) || taken(entry) || outvoted(entry) {
                     None
@@ -381,7 +391,7 @@ impl<'s, 'a> Kept<'s, 'a> {
                 }
             })
             .collect();
-        for (entry, score) in study.entries.iter().chain(&orders).zip(scores) {
+        for (entry, score) in study.entries.iter().chain(&orders).chain(faint).zip(scores) {
             let Some(score) = score else { continue };
             let evidence = self.evidence(entry, score);
             let same =
@@ -402,6 +412,7 @@ impl<'s, 'a> Kept<'s, 'a> {
         let (head, tail) = best.split_at(finalists);
         let mut all: Vec<Contender> = head
             .par_iter()
+            .with_max_len(1)
             .map(|contender| {
                 let best = self.at_its_best(&contender.entry, &[], others, residual);
                 best.unwrap_or_else(|| contender.clone())
@@ -430,6 +441,20 @@ impl<'s, 'a> Kept<'s, 'a> {
                     .collect::<Vec<_>>()
             })
             .collect()
+    }
+
+    /// The law that is [`faint`](Study::faint) and explains more than cause `c`, far beyond doubt.
+    fn faint_behind(&self, c: usize) -> Option<Contender> {
+        let (others, residual) = self.without(Some(c));
+        let contender = |entry: &Entry| {
+            let score = self.study.score(entry, &others, &residual)?;
+            let evidence = self.evidence(entry, score);
+            Some(Contender { entry: entry.clone(), score, evidence })
+        };
+        let taken = |entry: &&Entry| self.causes.iter().any(|c| c.entry.place() == entry.place());
+        let free = self.study.faint.iter().filter(|entry| !taken(entry));
+        let best = free.filter_map(contender).min_by(Contender::in_order)?;
+        (best.evidence > self.causes[c].evidence + FAR_AHEAD).then_some(best)
     }
 
     /// Refines all causes jointly, replaces those that another family explains better beside the newest one, and drops
@@ -462,13 +487,19 @@ impl<'s, 'a> Kept<'s, 'a> {
                     continue;
                 };
                 let current = &self.causes[c];
-                if best.evidence > current.evidence + CLEARLY_BETTER
+                let is_faint = self.study.faint.iter().any(|f| f.place() == best.entry.place());
+                let margin = if is_faint { FAR_AHEAD } else { CLEARLY_BETTER };
+                if best.evidence > current.evidence + margin
                     && (best.entry.family, best.entry.site)
                         != (current.entry.family, current.entry.site)
                 {
                     self.causes[c] = best;
                     exchanged = true;
                 }
+            }
+            if let Some(faint) = self.faint_behind(newest) {
+                self.causes[newest] = faint;
+                exchanged = true;
             }
             if !exchanged {
                 break;

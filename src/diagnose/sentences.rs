@@ -52,7 +52,7 @@ impl Diagnosis {
             Some(_) => {
                 "Nothing found: what the model leaves is noise, as the scatter between periods shows; the detection \
                  limits say what would have been seen, of each law in the one shape that stands beside them. What only \
-                 moves the parameters (a body on the flange, gravity, a longer link) shows beside a simulation (--sim) or a second log."
+                 moves the parameters (a body on the flange, a little more gravity, a link that is a millimetre longer) shows beside a simulation (--sim) or a second log."
             }
             None => {
                 "Nothing found above what a single run can show; the motion does not repeat, so that the noise is \

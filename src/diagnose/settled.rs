@@ -49,9 +49,7 @@ pub fn settled<'s>(
             break;
         }
     }
-    if study.scene.periodic {
-        study.look_everywhere();
-    }
+    study.look_everywhere();
     Ok((study, causes))
 }
 

@@ -61,7 +61,7 @@ impl Kept<'_, '_> {
             return false;
         }
         let (mut others, _) = self.without(None);
-        for image in &other.entry.images {
+        for image in &*other.entry.images {
             others.push(image);
         }
         let mut residual = self.study.residual.clone();

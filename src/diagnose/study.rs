@@ -2,16 +2,17 @@
 
 use std::collections::HashMap;
 use std::ops::Range;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::candidates::{Candidate, Search, Shape};
+use super::candidates::{Candidate, Shape};
+use super::dictionary::{ABSORBED, FAINT};
 use super::distinct_shapes::DistinctShapes;
 use super::drives::{self, Answer};
 use super::error::DiagnoseError;
 use super::image::{Column, Image, Span, dot};
 use super::memory::Memory;
-use super::peak::search_peak;
 use super::scene::Scene;
 use super::statistic::{Score, Statistic};
 use super::whitening::{PeriodWhitening, RunWhitening, Whitening};
@@ -29,19 +30,13 @@ pub struct Entry {
     /// Nonlinear parameters.
     pub shape: Shape,
     /// Whitened columns, with the null model projected out.
-    pub images: Vec<Image>,
+    pub images: Arc<[Image]>,
 }
 
 impl Entry {
     /// Its family and site.
     pub(super) fn place(&self) -> Place {
         (self.family, self.site)
-    }
-
-    /// Number of bytes of its columns.
-    pub fn bytes(&self) -> usize {
-        let rows = self.images.iter().map(|image| image.mean.len() + image.contrast.len());
-        rows.sum::<usize>() * size_of::<f64>()
     }
 }
 
@@ -70,6 +65,9 @@ pub struct Study<'a> {
     pub statistic: Statistic,
     /// Every family at every site with every starting shape; but see [`Self::with_estimate`].
     pub entries: Vec<Entry>,
+    /// Laws of a motion that repeats that the null model absorbs nearly, each at a site with no entry. They are not
+    /// looked for, but one of them may be what really is behind a cause that was found.
+    pub(super) faint: Vec<Entry>,
     /// How many starting shapes of a family at a site can be told from each other.
     pub(super) shapes: HashMap<Place, DistinctShapes>,
     /// Whitened measured torque.
@@ -78,7 +76,7 @@ pub struct Study<'a> {
     pub left_out: Vec<usize>,
     /// Causes that were visible with an earlier estimate of the arm.
     pub(super) shown: Vec<Shown>,
-    /// Cache of entries with any shape.
+    /// Cache of entries with any shape, and of directions in which they may be off.
     pub(super) memory: Memory,
 }
 
@@ -91,6 +89,8 @@ pub(super) struct Shown {
     pub(super) site: Option<usize>,
     pub(super) variant: usize,
     pub(super) columns: usize,
+    /// The share of its length outside the null model that was asked of each column.
+    pub(super) least: f64,
 }
 
 /// Least share of the explained square that must also be explained in stretches left out of the fit.
@@ -100,7 +100,8 @@ const KEPT_SHARE: f64 = 0.5;
 pub(super) const LEAST_GAIN: f64 = 0.05;
 
 impl<'a> Study<'a> {
-    /// Prepares the log laid out in `regression`; `theta` and `sigma_nm` are the null model's fit.
+    /// Prepares the log laid out in `regression`; `theta` and `sigma_nm` are the null model's fit. The study has no
+    /// entries until it [looks everywhere](Self::look_everywhere).
     pub fn new(
         families: &'a [Box<dyn Candidate>],
         (arm, set, options): (&Arm, &BaseSet, &Options),
@@ -114,9 +115,7 @@ impl<'a> Study<'a> {
         } else {
             Whitening::Run(RunWhitening::new(regression, options, sigma_nm)?)
         };
-        let mut study = Self::behind((whitening, scene), families, set, regression, log)?;
-        study.look_everywhere();
-        Ok(study)
+        Self::behind((whitening, scene), families, set, regression, log)
     }
 
     /// Everything but the entries.
@@ -186,6 +185,7 @@ impl<'a> Study<'a> {
             residual,
             statistic,
             entries: Vec::new(),
+            faint: Vec::new(),
             shapes: HashMap::new(),
             torque,
             left_out: Vec::new(),
@@ -194,8 +194,8 @@ impl<'a> Study<'a> {
         })
     }
 
-    /// The same study of a single run without `rows` of the regression. What touched the arm there happened once, and
-    /// no law of friction is to be bent by it.
+    /// The same study of a single run without `rows` of the regression, and without entries. What touched the arm there
+    /// happened once, and no law of friction is to be bent by it.
     pub fn without_rows(
         mut self,
         set: &BaseSet,
@@ -210,13 +210,11 @@ impl<'a> Study<'a> {
         let Self { whitening, scene, families, regression, left_out, shown, .. } = self;
         let of_run = (whitening, scene);
         let study = Self::behind(of_run, families, set, regression, log)?;
-        let mut study = Self { left_out, shown, ..study };
-        study.look_everywhere();
-        Ok(study)
+        Ok(Self { left_out, shown, ..study })
     }
 
     /// The same study with torques predicted by the base parameters `theta`, after `entries` were found with others.
-    /// For a motion that repeats it prepares only the families of `entries`, each at its site, until it [looks
+    /// It prepares only the families of `entries`, each at its site, until it [looks
     /// everywhere](Self::look_everywhere) again.
     pub fn with_estimate(
         mut self,
@@ -232,11 +230,15 @@ impl<'a> Study<'a> {
             site,
             variant: shape.variant,
             columns: images.len(),
+            least: if self.faint.iter().any(|e| e.place() == (family, site)) {
+                FAINT
+            } else {
+                ABSORBED
+            },
         };
         self.shown = entries.iter().map(shown).collect();
         let places: Vec<Place> = entries.iter().map(|entry| (entry.family, entry.site)).collect();
-        let is_periodic = self.scene.periodic;
-        self.prepare(|place| !is_periodic || places.contains(place));
+        self.prepare(|place| places.contains(place));
         self
     }
 
@@ -266,31 +268,29 @@ impl<'a> Study<'a> {
     /// blurs reversals, and with the directions along which the laws of the entries may be off.
     pub fn span_of_all(&self, entries: &[&Entry]) -> Span {
         let mut span = Span::default();
-        for image in entries.iter().flat_map(|entry| &entry.images) {
+        for image in entries.iter().flat_map(|entry| &*entry.images) {
             span.push(image);
         }
         self.blurred_shares(entries).for_each(|share| {
             span.push(share);
         });
         for entry in entries {
-            for image in self.loose(entry) {
-                span.push(&image);
+            for image in &*self.loose(entry) {
+                span.push(image);
             }
         }
         span
     }
 
     /// Directions along which the law of `entry` may be off, with the null model projected out.
-    pub(super) fn loose(&self, entry: &Entry) -> Vec<Image> {
-        let columns = self.families[entry.family].loose(&self.scene, entry.site, entry.shape);
-        columns
-            .iter()
-            .map(|column| {
-                let mut image = self.whitening.image(column);
-                self.null.residualise(&mut image);
-                image
-            })
-            .collect()
+    pub(super) fn loose(&self, entry: &Entry) -> Arc<[Image]> {
+        let Entry { family, site, shape, .. } = *entry;
+        self.memory.loose((family, site), shape, || {
+            let columns = self.families[family].loose(&self.scene, site, shape);
+            let mut images = self.whitening.images(columns.iter());
+            self.null.residualise_all(&mut images);
+            images
+        })
     }
 
     /// The shares that drives feed forward on joints where one of `entries` blurs reversals, with the null model
@@ -367,78 +367,6 @@ impl<'a> Study<'a> {
         let rows = residual.mean.len() / self.scene.joints();
         let own = site.map_or(0..residual.mean.len(), |j| j * rows..(j + 1) * rows);
         dot(&residual.mean[own.clone()], &residual.mean[own])
-    }
-
-    /// The best shape near `entry` and its score, by [`search_peak`].
-    pub fn refined(
-        &self,
-        entry: &Entry,
-        others: &Span,
-        residual: &Image,
-    ) -> Option<(Entry, Score)> {
-        let start = (entry.clone(), self.score(entry, others, residual)?);
-        let search = self.families[entry.family].search();
-        if search == Search::None {
-            return Some(start);
-        }
-        let logarithmic = search == Search::Logarithmic;
-        let to = |value: f64| if logarithmic { value.ln() } else { value };
-        let from = |scaled: f64| if logarithmic { scaled.exp() } else { scaled };
-        let [low, high] = match self.bracket(entry) {
-            Some(bracket) => bracket,
-            None => return Some(start),
-        };
-        let mut best = start;
-        let known = [to(entry.shape.value), best.1.gain];
-        search_peak([to(low), to(high)], known, |at| {
-            let shape = Shape { value: from(at), ..entry.shape };
-            let entry = self.entry(entry.family, entry.site, shape);
-            let found = entry.and_then(|entry| {
-                let score = self.score(&entry, others, residual)?;
-                Some((entry, score))
-            });
-            let Some(found) = found else { return f64::NEG_INFINITY };
-            let gain = found.1.gain;
-            if gain > best.1.gain {
-                best = found;
-            }
-            gain
-        });
-        Some(best)
-    }
-
-    /// The range in which the nonlinear parameter of `entry` is searched: from the next smaller starting shape to the
-    /// next larger one, but never beyond the smallest and largest; or the half-width that the family prescribes.
-    fn bracket(&self, entry: &Entry) -> Option<[f64; 2]> {
-        let value = entry.shape.value;
-        if let Some(half_width) = self.families[entry.family].half_width(&self.scene, entry.site) {
-            return Some([value - half_width, value + half_width]);
-        }
-        // Starting shapes that the null model absorbs count as neighbours as well: a shape between one of them and this
-        // one need not be absorbed.
-        let family = &self.families[entry.family];
-        let mut shapes = family.shapes(&self.scene, entry.site);
-        shapes.extend(family.richer_shapes(&self.scene));
-        shapes.extend(family.finer_shapes(&self.scene, entry.site, entry.shape));
-        let same = shapes.iter().filter(|shape| shape.variant == entry.shape.variant);
-        let near = 1e-9 * value.abs();
-        let (mut low, mut high) = (value, value);
-        let mut below = f64::NEG_INFINITY;
-        let mut above = f64::INFINITY;
-        for other in same.map(|shape| shape.value) {
-            if other < value - near {
-                below = below.max(other);
-            } else if other > value + near {
-                above = above.min(other);
-            }
-        }
-        if below.is_finite() {
-            low = below;
-        }
-        if above.is_finite() {
-            high = above;
-        }
-        (low < high).then_some([low, high])
     }
 
     /// Whitened torque of the null model with base parameters `theta` on joint `j` alone.

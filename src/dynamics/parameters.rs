@@ -1,5 +1,7 @@
 //! Names, order and units of the standard parameters: the columns of the full regressor.
 
+use std::fmt;
+
 use crate::robot::{Arm, LinkInertia};
 
 /// The ten inertial parameters of a body in the paper's order (7).
@@ -26,6 +28,20 @@ pub enum Parameter {
     Coulomb(usize),
     /// Constant torque of a joint.
     Offset(usize),
+}
+
+/// Name such as `mx3`, `Ia1`, `rv6`: the symbol and the number of the body or joint, from 1.
+impl fmt::Display for Parameter {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let (symbol, j) = match *self {
+            Self::Body(body, k) => (BODY_PARAMETERS[k], body),
+            Self::RotorInertia(j) => ("Ia", j),
+            Self::Viscous(j) => ("rv", j),
+            Self::Coulomb(j) => ("rc", j),
+            Self::Offset(j) => ("off", j),
+        };
+        write!(f, "{symbol}{}", j + 1)
+    }
 }
 
 impl ParameterLayout {
@@ -70,13 +86,7 @@ impl ParameterLayout {
 
     /// Name such as `mx3`, `Ia1`, `rv6`: the symbol and the number of the body or joint, from 1.
     pub fn name(&self, index: usize) -> String {
-        match self.parameter(index) {
-            Parameter::Body(body, k) => format!("{}{}", BODY_PARAMETERS[k], body + 1),
-            Parameter::RotorInertia(j) => format!("Ia{}", j + 1),
-            Parameter::Viscous(j) => format!("rv{}", j + 1),
-            Parameter::Coulomb(j) => format!("rc{}", j + 1),
-            Parameter::Offset(j) => format!("off{}", j + 1),
-        }
+        self.parameter(index).to_string()
     }
 
     /// `arm` with the standard parameters `standard` (at least 13 N). Constant torques have no place in an [`Arm`]

@@ -11,16 +11,42 @@ use crate::robot::Arm;
 pub(super) const CERTAIN: f64 = 5.0;
 
 /// A reason to doubt that the identified parameters are those of the stated arm.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Doubt {
-    /// Whether no arm, or no arm mounted as described, has such parameters: drives that push, or gravity that pulls
-    /// the other way. Otherwise the log may be of another arm, or of another load.
-    pub is_contradiction: bool,
-    /// The doubt and its reason; to be stated before any result that depends on the parameters.
-    pub sentence: String,
+    /// Why they are those of no arm, or of no arm mounted as described.
+    contradiction: Option<String>,
+    /// What makes it likely that the log is of another arm, or of another load.
+    question: Option<String>,
 }
 
 impl Doubt {
+    /// A `sentence` that rules out that the parameters are those of the arm.
+    pub fn contradiction(sentence: String) -> Self {
+        Self { contradiction: Some(sentence), question: None }
+    }
+
+    /// A `sentence` that asks whether they are.
+    pub(super) fn question(sentence: String) -> Self {
+        Self { contradiction: None, question: Some(sentence) }
+    }
+
+    /// Whether no arm, or no arm mounted as described, has such parameters: drives that push, gravity that pulls the
+    /// other way, or torque that has little to do with the motion. Otherwise the log may be of another arm, or of another
+    /// load.
+    pub fn is_contradiction(&self) -> bool {
+        self.contradiction.is_some()
+    }
+
+    /// The doubt and its reason; to be stated before any result that depends on the parameters.
+    pub fn sentence(&self) -> String {
+        let parts: Vec<&str> = [&self.contradiction, &self.question]
+            .into_iter()
+            .flatten()
+            .map(String::as_str)
+            .collect();
+        parts.join(" ")
+    }
+
     /// Examines base parameters `theta` of `arm`, whose values by its description are `nominal`. `sigma` and
     /// `covariance` tell how well they are known; σ is infinite for a parameter that says nothing by itself.
     /// `torque_nm` is the torque of the joints along the log (rms).
@@ -43,22 +69,26 @@ impl Doubt {
             }
             (None, false) => None,
         };
-        let head = head.map(str::to_owned);
-        let is_contradiction = head.is_some();
+        let contradiction = head.map(|head| match pushing {
+            Some(pushing) => format!("{head} {pushing}"),
+            None => head.to_owned(),
+        });
         let question =
             gravity.map(|gravity| format!("Is this log of {}? The {}.", arm.name, gravity.text));
-        let parts: Vec<String> = head.into_iter().chain(pushing).chain(question).collect();
-        (!parts.is_empty()).then(|| Self { is_contradiction, sentence: parts.join(" ") })
+        let doubt = Self { contradiction, question };
+        (doubt != Self::default()).then_some(doubt)
     }
 
-    /// Combines a doubt with the `remark` that the model leaves much of the log's torque. The remark replaces
-    /// questions about parameters, which then mean nothing; a contradiction stays.
-    pub fn or_unlike(doubt: Option<Self>, remark: Option<String>) -> Option<Self> {
-        match (doubt, remark) {
-            (Some(doubt), _) if doubt.is_contradiction => Some(doubt),
-            (_, Some(sentence)) => Some(Self { is_contradiction: false, sentence }),
-            (doubt, None) => doubt,
-        }
+    /// Combines a `doubt` about parameters with that of a log which is [`unlike`](super::unlike) the arm's. The latter
+    /// comes first and replaces questions about parameters, which then mean nothing; a contradiction stays.
+    pub fn or_unlike(doubt: Option<Self>, unlike: Option<Self>) -> Option<Self> {
+        let Some(unlike) = unlike else { return doubt };
+        let Some(own) = doubt.and_then(|doubt| doubt.contradiction) else { return Some(unlike) };
+        let contradiction = match unlike.contradiction {
+            Some(first) => format!("{first} {own}"),
+            None => own,
+        };
+        Some(Self { contradiction: Some(contradiction), ..unlike })
     }
 }
 
@@ -68,6 +98,7 @@ mod tests {
     use crate::base::Parameterisation;
     use crate::dynamics::Model;
     use crate::identify::covariance::CovarianceKind;
+    use crate::identify::unlike;
     use nalgebra::DMatrix;
 
     #[test]
@@ -93,16 +124,30 @@ mod tests {
             (0..set.rank()).map(value).collect()
         };
         let larger = doubt(&scaled("m", 2.0)).unwrap();
-        assert!(!larger.is_contradiction && larger.sentence.starts_with("Is this log of ur5?"));
+        assert!(!larger.is_contradiction() && larger.sentence().starts_with("Is this log of ur5?"));
         let hanging = doubt(&scaled("m", -1.0)).unwrap();
         assert!(
             hanging
-                .sentence
+                .sentence()
                 .starts_with("What was identified is impossible for an arm mounted as described")
         );
-        assert!(hanging.is_contradiction && hanging.sentence.contains("the other sign"));
+        assert!(hanging.is_contradiction() && hanging.sentence().contains("the other sign"));
         let pushing = doubt(&scaled("rc3", -1.0)).unwrap();
-        assert!(pushing.is_contradiction && pushing.sentence.contains("joint 3 (-"));
-        assert!(!pushing.sentence.contains("Is this log"), "{pushing:?}");
+        assert!(pushing.is_contradiction() && pushing.sentence().contains("joint 3 (-"));
+        assert!(!pushing.sentence().contains("Is this log"), "{pushing:?}");
+
+        // Of a log that is unlike the arm's, only contradictions by parameters are told as well.
+        let much = unlike(&arm, &[0.3; 6]);
+        assert_eq!(Doubt::or_unlike(Some(larger), much.clone()), much);
+        let both = Doubt::or_unlike(Some(pushing.clone()), much.clone()).unwrap();
+        assert!(both.is_contradiction(), "{both:?}");
+        assert_eq!(
+            both.sentence(),
+            format!("{} {}", pushing.sentence(), much.clone().unwrap().sentence())
+        );
+        let most = unlike(&arm, &[0.6; 6]).unwrap();
+        let both = Doubt::or_unlike(Some(pushing.clone()), Some(most.clone())).unwrap();
+        assert_eq!(both.sentence(), format!("{} {}", most.sentence(), pushing.sentence()));
+        assert_eq!(Doubt::or_unlike(Some(pushing.clone()), None), Some(pushing));
     }
 }

@@ -57,5 +57,5 @@ pub use problem::{Assembler, Domain, Panel, Problem};
 pub use quality::{Condition, identifies_the_arm, not_identified, plausible_size};
 pub use residual::Residual;
 pub use triangle::Triangle;
-pub use unlike::unlike_remark;
+pub use unlike::unlike;
 pub use whiten::Spectrum;

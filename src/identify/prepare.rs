@@ -121,7 +121,7 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Accounts for `gaps` in the log that were filled in from the other periods
+    /// Accounts for further `gaps` in the log that were filled in from the other periods
     /// ([`fill_gaps`](crate::signal::fill_gaps)).
     pub fn count_filled(&mut self, gaps: &[Gap]) {
         let Processing { window_s: [start_s, end_s], rate_hz, .. } = self.processing;
@@ -129,10 +129,11 @@ impl Prepared {
             let missing_s = gap.end_s.min(end_s) - gap.start_s.max(start_s);
             (missing_s * rate_hz - 1.0).max(0.0)
         };
-        self.filled_share = gaps.iter().map(rows).sum::<f64>() / ((end_s - start_s) * rate_hz);
+        let [_, before] = self.kept();
+        self.filled_share += gaps.iter().map(rows).sum::<f64>() / ((end_s - start_s) * rate_hz);
         let [_, scatter] = self.kept();
         for sigma in self.replicates.iter_mut().flat_map(|r| &mut r.sigma) {
-            *sigma /= scatter.sqrt();
+            *sigma *= (before / scatter).sqrt();
         }
     }
 
@@ -282,9 +283,18 @@ impl Preparer {
         m: &Measurement,
         even: &Even,
         (window, samples_per_period): (Range<usize>, usize),
-        warnings: Vec<String>,
+        mut warnings: Vec<String>,
     ) -> Result<Prepared, IdentifyError> {
         let periods = window.len() / samples_per_period;
+        let at = |k: usize| even.start_s + k as f64 / even.rate_hz;
+        if even.q_rad.samples() / samples_per_period > periods {
+            let unused_s = (even.q_rad.samples() - window.len()) as f64 / even.rate_hz;
+            warnings.push(format!(
+                "the motion repeats from {:.2} s to {:.2} s; the other {unused_s:.2} s of the log, longer than a period, are not used",
+                at(window.start),
+                at(window.end)
+            ));
+        }
         let fit = self.periodic_fit(samples_per_period, periods, even.rate_hz)?;
         let q_rad = even.q_rad.slice(window.clone());
         let qd_rad_s = even.qd_rad_s.slice(window.clone());
@@ -301,7 +311,6 @@ impl Preparer {
             qd_rad_s,
             qdd_rad_s2,
         });
-        let at = |k: usize| even.start_s + k as f64 / even.rate_hz;
         Ok(Prepared {
             motion: Motion {
                 q_rad: averaged.q_rad,
@@ -482,8 +491,18 @@ mod tests {
         let mut prepared = prepared_from(&filled.time_s, channels);
         assert_eq!(prepared.processing.periods, 6);
         let before = prepared.replicates.clone().unwrap().sigma;
+        let mut in_parts = prepared.clone();
         prepared.count_filled(&filled.gaps);
+        // Gap by gap, and beside none, they count as they do together.
+        filled.gaps.iter().for_each(|gap| in_parts.count_filled(std::slice::from_ref(gap)));
+        in_parts.count_filled(&[]);
         let share = prepared.filled_share;
+        assert!((in_parts.filled_share - share).abs() < 1e-14, "{}", in_parts.filled_share);
+        let sigmas = [&prepared, &in_parts].map(|p| p.replicates.clone().unwrap().sigma);
+        for (together, in_parts) in sigmas[0].iter().zip(&sigmas[1]) {
+            // A product of as many square roots as there are gaps.
+            assert!((in_parts / together - 1.0).abs() < 1e-13, "{together} {in_parts}");
+        }
         assert!((0.07..0.085).contains(&share), "{share}");
         for (sigma, before) in prepared.replicates.unwrap().sigma.iter().zip(before) {
             assert!((sigma - 1.0).abs() < 0.035 && before < 0.965, "{sigma} {before}");

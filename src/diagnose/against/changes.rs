@@ -10,16 +10,11 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::base::BaseSet;
 use crate::diagnose::candidates::{Candidate, Quantity, Shape};
-use crate::diagnose::image::{Column, Image};
+use crate::diagnose::image::Image;
 use crate::diagnose::kind::Kind;
 use crate::diagnose::study::Study;
 use crate::diagnose::verdict::Estimate;
 use crate::dynamics::{Parameter, ParameterLayout};
-use crate::robot::{Arm, JointSignals};
-
-/// Steps of the numerical derivatives: small compared with relevant changes, large compared with rounding.
-const LENGTH_STEP_M: f64 = 1e-4;
-const GRAVITY_STEP: f64 = 1e-4;
 
 /// Function from coefficients to physical parameters; `None` for coefficients that the data do not determine.
 type Quantities<'a> = Box<dyn Fn(&[Option<f64>]) -> Vec<Quantity> + 'a>;
@@ -32,20 +27,11 @@ pub(super) struct Change<'a> {
     pub(super) images: Vec<Image>,
     quantities: Quantities<'a>,
     pub(super) in_words: &'static str,
+    /// The experiment that separates it from what looks alike.
+    pub(super) separating_experiment: &'static str,
 }
 
 impl Change<'_> {
-    pub(super) fn separating_experiment(&self) -> &'static str {
-        match self.kind {
-            Kind::Payload => "the same motion with the flange bare",
-            Kind::FrictionChange => "the same motion after half an hour of work",
-            Kind::TorqueGain => "a known payload: it scales every torque constant",
-            Kind::LinkLength => "a measurement of the kinematics",
-            Kind::Gravity => "a known payload, weighed at the same place",
-            _ => "a level on the base, and the same motion with joint 1 turned by 180°",
-        }
-    }
-
     /// Physical quantities of the coefficients `b`, with 95 % intervals by the delta method. `places` gives the
     /// position of each coefficient in the change, and whether the data determine it.
     pub(super) fn estimates(
@@ -103,6 +89,7 @@ pub(super) fn all<'a>(study: &'a Study<'a>, set: &BaseSet, simulation: &[f64]) -
         images: (0..10).map(|k| image(Parameter::Body(last, k))).collect(),
         quantities: Box::new(payload),
         in_words: "a body on the flange",
+        separating_experiment: "the same motion with the flange bare",
     }];
     for j in 0..joints {
         out.push(Change {
@@ -111,6 +98,7 @@ pub(super) fn all<'a>(study: &'a Study<'a>, set: &BaseSet, simulation: &[f64]) -
             images: [Parameter::Coulomb(j), Parameter::Viscous(j)].map(image).into(),
             quantities: Box::new(friction),
             in_words: "friction that is not what the simulation assumes",
+            separating_experiment: "the same motion after half an hour of work",
         });
         out.push(Change {
             kind: Kind::TorqueGain,
@@ -118,33 +106,18 @@ pub(super) fn all<'a>(study: &'a Study<'a>, set: &BaseSet, simulation: &[f64]) -
             images: vec![study.torque_on(j, simulation)],
             quantities: Box::new(|b| told("error_fraction", b[0], "")),
             in_words: "a wrong torque constant",
-        });
-        let length_m = scene.arm.joints[j].placement.translation_m.norm();
-        if j > 0 && length_m > 0.0 {
-            out.push(Change {
-                kind: Kind::LinkLength,
-                site: Some(j),
-                images: vec![study.whitening.image(&longer(study, j))],
-                quantities: Box::new(|b| told("error_m", b[0], "m")),
-                in_words: "a link that is longer or shorter than drawn",
-            });
-        }
-    }
-    let gravity_m_s2 = scene.arm.gravity_m_s2.norm();
-    if gravity_m_s2 > 0.0 {
-        let heavier = with_arm(study, GRAVITY_STEP, |arm| arm.gravity_m_s2 *= 1.0 + GRAVITY_STEP);
-        out.push(Change {
-            kind: Kind::Gravity,
-            site: None,
-            images: vec![study.whitening.image(&heavier)],
-            quantities: Box::new(move |b| {
-                told("g_m_s2", b[0].map(|b| gravity_m_s2 * (1.0 + b)), "m/s²")
-            }),
-            in_words: "another gravity than the simulation's",
+            separating_experiment: "a known payload: it scales every torque constant",
         });
     }
     for family in study.families {
-        let wanted = [Kind::BaseTilt, Kind::EncoderOffset, Kind::CurrentOffset, Kind::Spring];
+        let wanted = [
+            Kind::BaseTilt,
+            Kind::EncoderOffset,
+            Kind::CurrentOffset,
+            Kind::Spring,
+            Kind::LinkLength,
+            Kind::Gravity,
+        ];
         if wanted.contains(&family.kind()) {
             out.extend(
                 family
@@ -174,23 +147,8 @@ fn of_family<'a>(
         images: columns.iter().map(|c| study.whitening.image(c)).collect(),
         quantities: Box::new(move |b| of_told(b, |b| family.quantities(scene, site, shape, b))),
         in_words: family.in_words(),
+        separating_experiment: family.separating_experiment(),
     }
-}
-
-/// Torque per metre of lengthening of the vector to joint `j`'s frame, Nm/m.
-fn longer(study: &Study, j: usize) -> Column {
-    with_arm(study, LENGTH_STEP_M, |arm| {
-        let way_m = &mut arm.joints[j].placement.translation_m;
-        *way_m += way_m.normalize() * LENGTH_STEP_M;
-    })
-}
-
-/// Torque per unit of a small `change` of the arm, of size `step`.
-fn with_arm(study: &Study, step: f64, change: impl Fn(&mut Arm)) -> Column {
-    let mut arm = study.scene.arm.clone();
-    change(&mut arm);
-    let torque_nm: JointSignals = study.scene.torque_change(&arm, &study.scene.motion);
-    Column::everywhere(&torque_nm).scaled(1.0 / step)
 }
 
 /// Σ b_k column_k.

@@ -83,6 +83,10 @@ impl Candidate for Backlash {
         self.bank(scene, site, &[shape]).remove(0)
     }
 
+    fn abreast(&self) -> usize {
+        ABREAST
+    }
+
     fn bank(&self, scene: &Scene, site: Option<usize>, shapes: &[Shape]) -> Vec<Vec<Column>> {
         let flown: Vec<_> = shapes.iter().map(|shape| (*shape, Jolts::USUAL)).collect();
         flights(scene, joint(site), &flown).map(|column| vec![column]).collect()

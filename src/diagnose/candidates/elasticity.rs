@@ -282,13 +282,15 @@ impl Candidate for Elasticity {
             let parts = [0..1, well_known_on_link].map(|v| (v, STIFFEST_NM_RAD, BENT_STIFFNESSES));
             return parts.into_iter().flat_map(of).collect();
         }
-        let stiffest = stiffest_nm_rad(scene, joint(site)).clamp(SOFTEST_NM_RAD, STIFFEST_NM_RAD);
+        let stiffest = stiffest_nm_rad(scene, joint(site)).min(STIFFEST_NM_RAD);
+        // Noise would make all of them behind a rotor that is light.
+        let on_link = (stiffest > SOFTEST_NM_RAD).then_some((on_link, stiffest, BENT_STIFFNESSES));
         let parts = [
-            (on_motor, STIFFEST_NM_RAD, STIFFNESSES),
-            (on_link, stiffest, BENT_STIFFNESSES),
-            (well_known_on_link, STIFFEST_NM_RAD, BENT_STIFFNESSES),
+            Some((on_motor, STIFFEST_NM_RAD, STIFFNESSES)),
+            on_link,
+            Some((well_known_on_link, STIFFEST_NM_RAD, BENT_STIFFNESSES)),
         ];
-        parts.into_iter().flat_map(of).collect()
+        parts.into_iter().flatten().flat_map(of).collect()
     }
 
     fn search(&self) -> Search {

@@ -81,6 +81,8 @@ impl Candidate for LoadFriction {
         let mut out = vec![quantity(name, mu, "")];
         if shape.value > 0.0 {
             out.push(quantity("exponent", shape.value, ""));
+            // Only together with its load, μ says how large such friction is.
+            out.push(quantity("at_load_nm", rms, "Nm"));
         }
         out
     }

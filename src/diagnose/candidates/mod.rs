@@ -15,6 +15,8 @@ mod current_offset;
 pub(super) mod elasticity;
 mod encoder_offset;
 mod feed_forward;
+mod gravity;
+mod link_length;
 pub(super) mod load_friction;
 mod nonlinear_viscous;
 mod position_friction;
@@ -160,6 +162,11 @@ pub trait Candidate: Sync {
         false
     }
 
+    /// Number of shapes that [`Self::bank`] computes at hardly more than the price of one.
+    fn abreast(&self) -> usize {
+        1
+    }
+
     /// [`Self::columns`] of several shapes at once, where computing them together is cheaper.
     fn bank(&self, scene: &Scene, site: Option<usize>, shapes: &[Shape]) -> Vec<Vec<Column>> {
         shapes.iter().map(|shape| self.columns(scene, site, *shape)).collect()
@@ -282,6 +289,8 @@ pub fn all() -> Vec<Box<dyn Candidate>> {
         Box::new(encoder_offset::EncoderOffset),
         Box::new(base_tilt::BaseTilt),
         Box::new(spring::Spring),
+        Box::new(link_length::LinkLength),
+        Box::new(gravity::Gravity),
     ]
 }
 

@@ -81,9 +81,10 @@ pub fn between_periods(m: &Measurement, left_out: &[usize]) -> Result<Compared, 
     let mut known: Vec<Push> = Vec::new();
     let mut looked_at: Vec<Range<usize>> = Vec::new();
     let mut aside = vec![false; time_s.len()];
-    if repeats.search(&aside, &known, &looked_at, 1.0)?.is_some() {
-        repeats.drift = Some(of_moves.map_or_else(drift, Ok)?);
+    if repeats.search(&aside, &known, &looked_at, 1.0)?.is_none() {
+        return Ok(Compared::Alike);
     }
+    repeats.drift = Some(of_moves.map_or_else(drift, Ok)?);
     while looked_at.len() < MOST
         && let Some(candidate) = repeats.search(&aside, &known, &looked_at, 1.0)?
     {

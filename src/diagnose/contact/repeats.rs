@@ -153,9 +153,14 @@ impl Repeats {
         let apart = (APART_S * self.rate_hz) as usize;
         let mut highest = least;
         let mut best = None;
-        for length_s in self.lengths_s() {
+        let of_length = |length_s: f64| {
             let heights = filter.heights(|t_s| bump::bump(ORDINARY, length_s, t_s));
             let noise = Noise::of(&heights);
+            (length_s, heights, noise)
+        };
+        let lengths = self.lengths_s().into_par_iter().with_max_len(1);
+        let of_lengths: Vec<_> = lengths.map(of_length).collect();
+        for (length_s, heights, noise) in of_lengths {
             let others = |j: usize| [&rows[..j], &rows[j + 1..]].concat();
             let alone_felt: Vec<Felt> =
                 rows.iter().map(|j| noise.felt_by(&[*j], &others(*j))).collect();

@@ -187,6 +187,13 @@ impl Found<'_> {
                 tilt_x_rad: value("tilt_x_rad").unwrap_or(0.0),
                 tilt_y_rad: value("tilt_y_rad").unwrap_or(0.0),
             })),
+            Kind::Gravity => {
+                in_the_model(Effect::Gravity(faults::Gravity { g_m_s2: value("g_m_s2")? }))
+            }
+            Kind::LinkLength => in_the_model(Effect::LinkLength(faults::LinkLength {
+                joint: self.joint?,
+                error_m: value("error_m")?,
+            })),
             Kind::Spring => self.spring(),
             Kind::VelocityLag => of_the_record(Effect::VelocityLag(faults::VelocityLag {
                 joint: self.joint,
@@ -211,9 +218,7 @@ impl Found<'_> {
                 fraction: value("fraction")?,
             })),
             Kind::Contact => Some(Counterpart::None(ONE_EVENT)),
-            Kind::Gravity | Kind::Payload | Kind::LinkLength | Kind::FrictionChange => {
-                Some(Counterpart::None(IN_THE_PARAMETERS))
-            }
+            Kind::Payload | Kind::FrictionChange => Some(Counterpart::None(IN_THE_PARAMETERS)),
         }
     }
 

@@ -195,14 +195,15 @@ impl ExtendedSimulation {
 }
 
 /// Share of the explainable mean square that is removed: Σ (b² − a²)/σ² over Σ (b² − σ²)/σ², with b before, a after;
-/// `None` where there was nothing to explain.
+/// `None` where there was nothing to explain, or periods that are alike show no noise σ.
 fn removed_fraction(before_nm: &[f64], after_nm: &[f64], noise_nm: &[f64]) -> Option<f64> {
     let (mut removed, mut explainable) = (0.0, 0.0);
     for ((before, after), noise) in before_nm.iter().zip(after_nm).zip(noise_nm) {
         removed += (before.powi(2) - after.powi(2)) / noise.powi(2);
         explainable += (before.powi(2) - noise.powi(2)) / noise.powi(2);
     }
-    (explainable > 0.0).then(|| removed / explainable)
+    let is_known = noise_nm.iter().all(|noise| *noise > 0.0);
+    (is_known && explainable > 0.0).then(|| removed / explainable)
 }
 
 /// Distance from the identified arm, in σ per parameter, below which the simulated arm counts as the identified one: it
@@ -255,10 +256,24 @@ impl ReplayedLog {
     pub fn worst_joint(&self) -> usize {
         let gain = |j: usize| {
             let square = |distance: &Distance| distance.torque_rms_nm[j].powi(2);
-            let noise = self.noise_nm.as_ref().map_or(1.0, |noise| noise[j].powi(2));
-            (square(&self.before) - square(&self.after)) / noise
+            let noise_nm = self.noise_nm.as_ref().filter(|noise| noise.iter().all(|n| *n > 0.0));
+            (square(&self.before) - square(&self.after)) / noise_nm.map_or(1.0, |n| n[j].powi(2))
         };
         let joints = 0..self.before.torque_rms_nm.len();
         joints.max_by(|&a, &b| gain(a).total_cmp(&gain(b))).unwrap_or(0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_share_is_told_only_beside_noise() {
+        // (4 − 1)/(4 − 0.25) of what stands above the noise.
+        let share = removed_fraction(&[2.0], &[1.0], &[0.5]).unwrap();
+        assert!((share - 3.0 / 3.75).abs() < 1e-15, "{share}");
+        assert_eq!(removed_fraction(&[2.0, 1.0], &[1.0, 1.0], &[0.5, 0.0]), None);
+        assert_eq!(removed_fraction(&[0.5], &[0.5], &[0.5]), None);
     }
 }

@@ -223,11 +223,7 @@ impl Bench {
             (left[j].powi(2) - noise).max(0.0).sqrt()
         });
         let beyond_noise = beyond_noise.collect();
-        let layout = ParameterLayout::new(model.dof());
-        let value = |parameter| {
-            let index = layout.index(parameter);
-            (0..set.rank()).find(|k| set.column(*k)[0].0 == index).map_or(0.0, |k| theta[k])
-        };
+        let value = |parameter| set.index_of(parameter).map_or(0.0, |k| theta[k]);
         let friction_of = |j: usize| {
             let (coulomb_nm, viscous) =
                 (value(Parameter::Coulomb(j)), value(Parameter::Viscous(j)));

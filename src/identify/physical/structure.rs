@@ -48,10 +48,7 @@ impl std::fmt::Display for Subject {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Link(body) => write!(f, "pseudo-inertia of body {}", body + 1),
-            Self::Drive(Parameter::RotorInertia(j)) => write!(f, "Ia{} ≥ 0", j + 1),
-            Self::Drive(Parameter::Viscous(j)) => write!(f, "rv{} ≥ 0", j + 1),
-            Self::Drive(Parameter::Coulomb(j)) => write!(f, "rc{} ≥ 0", j + 1),
-            Self::Drive(parameter) => write!(f, "{parameter:?}"),
+            Self::Drive(parameter) => write!(f, "{parameter} ≥ 0"),
             Self::Mass(body) => write!(f, "bound on the mass of body {}", body + 1),
             Self::CentreOfMass(body) => {
                 write!(f, "bound on the centre of mass of body {}", body + 1)

@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 
 use crate::base::BaseSet;
+use crate::dynamics::Parameter;
 
 /// Moments of a joint's friction columns q̇ + v and tanh((q̇ + v)/ε) under velocity noise v.
 pub(super) struct NoisyFriction {
@@ -28,9 +29,8 @@ impl NoisyFriction {
         epsilon_rad_s: f64,
         velocity_sd_rad_s: f64,
     ) -> Self {
-        let find = |name: String| (0..set.rank()).find(|&k| set.name(k) == name);
-        let viscous = find(format!("rv{}", joint + 1));
-        let coulomb = find(format!("rc{}", joint + 1));
+        let viscous = set.index_of(Parameter::Viscous(joint));
+        let coulomb = set.index_of(Parameter::Coulomb(joint));
         let value = |k: Option<usize>| k.map_or(0.0, |k| theta[k]);
         let (rv, rc) = (value(viscous), value(coulomb));
         let mut out = Self {

@@ -9,7 +9,7 @@ use super::error::StudyError;
 use super::mass_matrix::indefinite_share;
 use super::paper_equations::{Acceleration, PaperEquations};
 use crate::base::{BaseSet, Parameterisation};
-use crate::dynamics::Model;
+use crate::dynamics::{Model, Parameter};
 use crate::excitation::{Excitation, FourierSeries};
 use crate::identify::{Fit, Fitter, Problem, Residual, Weighting};
 use crate::montecarlo::scenario::Scenario;
@@ -433,7 +433,7 @@ fn start(model: &Model, set: &BaseSet, run: &Run) -> Result<StartResult, StudyEr
     let theta = least_squares(&problem, set)?.theta;
     let error = problem.residuals(&theta);
     let joints = error.joints();
-    let coulomb = (0..joints).map(|j| named(set, &theta, &format!("rc{}", j + 1)));
+    let coulomb = (0..joints).map(|j| value_of(set, &theta, Parameter::Coulomb(j)));
     Ok(StartResult {
         hidden_effects: false,
         error_at_zero_nm: (0..joints).map(|j| error.joint(j)[0]).collect(),
@@ -442,9 +442,9 @@ fn start(model: &Model, set: &BaseSet, run: &Run) -> Result<StartResult, StudyEr
     })
 }
 
-/// Value of the base parameter whose kept column is `name`; NaN if there is none.
-fn named(set: &BaseSet, theta: &[f64], name: &str) -> f64 {
-    (0..set.rank()).find(|&k| set.name(k) == name).map_or(f64::NAN, |k| theta[k])
+/// Value of the base parameter whose kept column is `parameter`; NaN if there is none.
+fn value_of(set: &BaseSet, theta: &[f64], parameter: Parameter) -> f64 {
+    set.index_of(parameter).map_or(f64::NAN, |k| theta[k])
 }
 
 fn tried(
@@ -460,7 +460,8 @@ fn tried(
     let (indefinite_share, smallest_eigenvalue_kg_m2) = indefinite_share(model, set, &theta);
     Ok(MechanismResult {
         mechanism,
-        rotor_inertia_kg_m2: [3, 4, 5, 6].map(|j| named(set, &theta, &format!("Ia{j}"))),
+        rotor_inertia_kg_m2: [2, 3, 4, 5]
+            .map(|j| value_of(set, &theta, Parameter::RotorInertia(j))),
         e_n: residual(&noisy, &least_squares(&noisy, set)?.theta).e_n,
         indefinite_share,
         smallest_eigenvalue_kg_m2,

@@ -32,6 +32,9 @@ impl FaultyPlant {
     }
 
     /// As [`Self::new`], but the true arm is built from `arm`, while the model of the controller is `nominal`.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; [`PlantError::Joints`] if the two arms have different numbers of joints.
     pub fn with_controller(
         arm: &Arm,
         nominal: &Arm,
@@ -39,6 +42,10 @@ impl FaultyPlant {
         config: &PlantConfig,
     ) -> Result<Self, PlantError> {
         config.validate()?;
+        if arm.dof() != nominal.dof() {
+            let what = "the true arm";
+            return Err(PlantError::Joints { what, found: arm.dof(), expected: nominal.dof() });
+        }
         let mut assembly = Assembly::new(arm, config.friction_feedforward);
         for (i, effect) in effects.iter().enumerate() {
             let install = |assembly: &mut Assembly| {

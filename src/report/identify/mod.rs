@@ -23,7 +23,7 @@ use crate::identify::covariance::CovarianceKind;
 use crate::identify::physical::PhysicalEstimate;
 use crate::identify::{
     Condition, Doubt, Estimator, FitError, Identification, Prediction, Processing, Regression,
-    Residual, drive_limit_remark, identifies_the_arm, not_identified, unlike_remark,
+    Residual, drive_limit_remark, identifies_the_arm, not_identified, unlike,
 };
 use crate::log::Log;
 use crate::robot::{Arm, Kinematics};
@@ -215,7 +215,7 @@ impl Result {
             Some(MisreadLog { log, misreading, .. }) => {
                 let name = if several { format!("{log}: ") } else { String::new() };
                 let sentence = format!("{name}{}", misreading.sentence());
-                Some(Doubt { is_contradiction: true, sentence })
+                Some(Doubt::contradiction(sentence))
             }
             None => {
                 let torque_nm = identification.residual().torque_nm();
@@ -228,10 +228,10 @@ impl Result {
                     &identification.covariance,
                     &torque_nm,
                 );
-                Doubt::or_unlike(doubt, unlike_remark(arm, &identification.left()))
+                Doubt::or_unlike(doubt, unlike(arm, &identification.left()))
             }
         };
-        warnings.extend(doubt.iter().map(|doubt| doubt.sentence.clone()));
+        warnings.extend(doubt.iter().map(Doubt::sentence));
         let fit = identification.residual();
         // For a misread log, no further remark about the fit makes sense.
         warnings.extend(unrelated(&fit).filter(|_| training.misread.is_none()));
@@ -269,7 +269,7 @@ impl Result {
             condition: Condition::of(&regression.problem, set)?,
             verdict: match &doubt {
                 _ if !is_identified => NOT_IDENTIFIED,
-                Some(doubt) if doubt.is_contradiction => CONTRADICTED,
+                Some(doubt) if doubt.is_contradiction() => CONTRADICTED,
                 _ => IDENTIFIED,
             },
             not_identified: open.iter().map(|&k| set.name(k).to_owned()).collect(),
@@ -301,7 +301,7 @@ impl Result {
         self.verdict == NOT_IDENTIFIED
     }
 
-    /// Whether no arm can have the identified parameters, or the log is misread.
+    /// Whether no arm can have the identified parameters, or the log is misread or has little to do with the arm.
     pub fn is_contradicted(&self) -> bool {
         self.verdict == CONTRADICTED
     }
@@ -320,7 +320,7 @@ impl Result {
     /// The warnings without the one that [`Self::sentence`] begins with.
     pub fn notes(&self) -> impl Iterator<Item = &String> {
         let doubt = self.doubt.as_ref().filter(|_| !self.is_declined());
-        let leads = move |warning: &String| doubt.is_some_and(|d| d.sentence == *warning);
+        let leads = move |warning: &String| doubt.is_some_and(|d| d.sentence() == *warning);
         self.warnings.iter().filter(move |warning| !leads(warning))
     }
 
@@ -338,7 +338,7 @@ impl Result {
             );
         }
         if let (Some(doubt), Some(_)) = (&self.doubt, &self.misreading) {
-            return doubt.sentence.clone();
+            return doubt.sentence();
         }
         let percent = self.residual.relative_percent.iter();
         let (low, high) = percent.fold((f64::INFINITY, 0f64), |(l, h), &p| (l.min(p), h.max(p)));
@@ -354,7 +354,7 @@ impl Result {
             Some(false) => format!(" {}", self.intervals.reason),
             _ => String::new(),
         };
-        let doubt = self.doubt.as_ref().map_or(String::new(), |doubt| doubt.sentence.clone() + " ");
+        let doubt = self.doubt.as_ref().map_or(String::new(), |doubt| doubt.sentence() + " ");
         format!(
             "{doubt}Identified {b} base parameters of {} from {} samples: what the model leaves of the \
              torque is {low:.1} to {high:.1} % per joint.{open}{distrust}",

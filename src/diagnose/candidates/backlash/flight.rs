@@ -17,8 +17,9 @@ use super::super::elasticity::Jolts;
 use crate::dynamics::with_widest_registers;
 use crate::identify::FEEDBACK_RAD_S;
 
-/// Number of gaps that are simulated in parallel.
-pub(super) const ABREAST: usize = 8;
+/// Number of gaps that are simulated in parallel. One flight waits for the result of each operation before the next; two
+/// registers' worth of them take as long as one, and four hardly longer.
+pub(super) const ABREAST: usize = 16;
 /// Damping ratio ζ of the flanks: a few percent in strain-wave gears, and the rotor's own friction.
 const DAMPING_RATIO: f64 = 0.08;
 /// Fastest swing that is followed, times the time between two instants: flanks are made no stiffer than this. At sixteen

@@ -6,16 +6,24 @@
 //! harmonic is small and drowns in noise, yet these harmonics make gears swing. They are not accidental: a drive that
 //! does not answer dry friction at once jolts its joint, in the same way at every reversal. This common course is known
 //! ([`jolts`]), and the torque shows it better than the motion.
+//!
+//! Enters: the motion of a log, the arm, and the periods if the motion repeats. Leaves: [`Loads`].
+
+mod harmonics;
+mod rigid;
+
+pub use rigid::{load_along, mass_along, rigid_torque_along, rotors_kg_m2};
 
 use fourier::Complex64;
 use nalgebra::{Cholesky, DMatrix, DVector};
+use rayon::prelude::*;
 
-use super::reversal_answer::{FASTEST_HZ, ReversalAnswer, TorqueHarmonic};
-use crate::dynamics::{
-    LANES, Lanes, Model, Motion, Real, Workspace, rigid_torque, with_widest_registers,
-};
+use super::reversal_answer::{FASTEST_HZ, ReversalAnswer};
+use crate::dynamics::{Model, Motion};
 use crate::robot::{Arm, JointSignals};
 use crate::signal::{FineClock, mean_period};
+use harmonics::{Harmonics, KNOWN, Known, WELL_KNOWN, beside_differentiated_noise};
+use rigid::rotors_along;
 
 /// Torques of a rigid arm along the motion of a log, as far as the log determines them.
 pub struct Loads {
@@ -117,15 +125,18 @@ impl Loads {
     ) -> Self {
         let Periods { each, torque_nm, clock, rate_hz, highest } = *periods;
         let harmonics = |y: &JointSignals| -> Vec<Harmonics> {
-            (0..y.joints()).map(|j| Harmonics::of(clock, y.joint(j))).collect()
+            (0..y.joints()).into_par_iter().map(|j| Harmonics::of(clock, y.joint(j))).collect()
         };
-        let part = |of: &[Harmonics], y: &JointSignals, level: f64| {
+        let known = |y: &JointSignals| -> Vec<Known> {
+            harmonics(y).into_iter().map(|of| of.known).collect()
+        };
+        let part = |of: &[Known], y: &JointSignals, level: f64| {
             y.map_joints(|j, y| of[j].part(clock, y, level))
         };
         let (links, rotors) = (rigid_torque_along(model, each), rotors_along(arm, each));
         let loads = sum(&links, &rotors);
-        let (of_loads, of_links) = (harmonics(&loads), harmonics(&links));
-        let slow = |of: &[Harmonics]| -> Vec<Harmonics> {
+        let (of_loads, of_links) = (known(&loads), known(&links));
+        let slow = |of: &[Known]| -> Vec<Known> {
             let last = (RIGID_HZ * clock.samples() as f64 / rate_hz) as usize;
             of.iter().map(|of| of.up_to(last)).collect()
         };
@@ -140,13 +151,13 @@ impl Loads {
         let coulomb_nm = |j: usize| arm.joints[j].drive.coulomb_nm;
         let dry = |j: usize| fine_sign[j].iter().map(move |s| coulomb_nm(j) * s);
         // Fitted to the harmonics in which the load is not known to `level`.
-        let answers = |of_loads: &[Harmonics], level: f64| -> Vec<ReversalAnswer> {
+        let answers = |of_loads: &[Known], level: f64| -> Vec<ReversalAnswer> {
             let of_joint = |j: usize| {
                 let torque = of_torques[j].beyond(&of_loads[j], level, fastest(periods));
                 let sign = fine_sign[j].clone();
                 ReversalAnswer::new((clock, rate_hz), sign, coulomb_nm(j), torque)
             };
-            (0..mean.joints()).map(of_joint).collect()
+            (0..mean.joints()).into_par_iter().map(of_joint).collect()
         };
         let given = |answers: &[ReversalAnswer]| -> Vec<Vec<f64>> {
             answers.iter().map(|answer| answer.given_nm(clock, 0.0)).collect()
@@ -155,12 +166,14 @@ impl Loads {
         let slow_beyond_nm = given(&answers(&of_slow_loads, WELL_KNOWN));
         let answers = answers(&of_loads, KNOWN);
         let beyond_nm = given(&answers);
-        let jolts = |of_links: &[Harmonics], delivered_nm: &[Vec<f64>], level: f64| {
-            mean.qd_rad_s.map_joints(|j, _| {
+        let jolts = |of_links: &[Known], delivered_nm: &[Vec<f64>], level: f64| {
+            let of_joint = |j: usize| -> Vec<f64> {
                 let beside: Vec<f64> =
                     delivered_nm[j].iter().zip(dry(j)).map(|(given, dry)| given - dry).collect();
                 jolts(periods, &of_links[j], level, &beside)
-            })
+            };
+            let joints: Vec<Vec<f64>> = (0..mean.joints()).into_par_iter().map(of_joint).collect();
+            JointSignals::from_fn(mean.joints(), mean.samples(), |j, k| joints[j][k])
         };
         let jolts_nm = [
             &jolts(&of_links, &well_beyond_nm, WELL_KNOWN),
@@ -169,7 +182,7 @@ impl Loads {
         ];
         let (of_jolts, mobility_per_kg_m2) = apart(mass_kg_m2, rotor_kg_m2, jolts_nm);
         let [well_beyond, beyond, slow_beyond] = of_jolts;
-        let rest = |of_links: &[Harmonics], y: JointSignals, level: f64| {
+        let rest = |of_links: &[Known], y: JointSignals, level: f64| {
             y.map_joints(|j, y| of_links[j].rest(clock, y, level, highest))
         };
         let link = LinkTorque {
@@ -185,11 +198,11 @@ impl Loads {
             told_nm: part(&of_links, &mean_of(&links), KNOWN),
             jolt_nm: rest(&of_links, beyond, KNOWN),
         };
-        let known =
+        let is_known =
             of_loads.iter().map(|of| (0..=highest).map(|h| of.holds(h, KNOWN)).collect()).collect();
         let load_nm = part(&of_loads, &mean_of(&loads), KNOWN);
-        let delivered = Some(Delivered { load_nm, known, beyond_nm, answers });
-        let rotor_nm = part(&harmonics(&rotors), &rotors_along(arm, mean), WELL_KNOWN);
+        let delivered = Some(Delivered { load_nm, known: is_known, beyond_nm, answers });
+        let rotor_nm = part(&known(&rotors), &rotors_along(arm, mean), WELL_KNOWN);
         let load_nm = sum(&link.told_nm, &rotor_nm);
         Self { load_nm, link, bending, rigid, delivered, mobility_per_kg_m2 }
     }
@@ -232,10 +245,6 @@ fn apart<const N: usize>(
     (links_nm, mobility)
 }
 
-/// A band of harmonics whose power is more than this many times its noise is used as it is.
-const WELL_KNOWN: f64 = 100.0;
-/// The same for [`Loads::bending`].
-const KNOWN: f64 = 10.0;
 /// Fastest harmonics of [`Loads::rigid`], Hz.
 ///
 /// While a rotor flies through its gap g, its motor moves otherwise than behind a rigid gear, by as much as adds
@@ -244,107 +253,6 @@ const KNOWN: f64 = 10.0;
 /// friction reverses is in the jolts. Play of joint 3 that was named in one log removed 38 % of its squares along another
 /// motion, recorded without noise, as long as all harmonics counted, and 82 % with these.
 const RIGID_HZ: f64 = 7.0;
-/// Number of harmonics that are judged together.
-const BAND: usize = 8;
-
-/// The part of `y` whose power is more than ten times that of differentiated white noise, selected band by band.
-/// `noise` is the power density of the white noise, per Hz.
-///
-/// `y` is followed by its own mirror image, which avoids a jump between its ends.
-fn beside_differentiated_noise(y: &[f64], noise: f64, rate_hz: f64) -> Vec<f64> {
-    let there_and_back: Vec<f64> = y.iter().chain(y.iter().rev()).copied().collect();
-    let n = there_and_back.len();
-    let clock = FineClock::new(n, 1);
-    let spectrum = clock.spectrum(&there_and_back);
-    let omega = std::f64::consts::TAU * rate_hz / n as f64;
-    // The noise is mirrored as well: each coefficient has the mean square σ²/n, with σ² = density · f_s/2.
-    let of_noise = |h: usize| (h as f64 * omega).powi(2) * noise * 0.5 * rate_hz / n as f64;
-    let holds: Vec<bool> = spectrum
-        .chunks(BAND)
-        .zip((0..).step_by(BAND))
-        .map(|(band, first)| {
-            let power: f64 = band.iter().map(Complex64::norm_sqr).sum();
-            let noise: f64 = (first..first + band.len()).map(of_noise).sum();
-            power > (1.0 + KNOWN) * noise
-        })
-        .collect();
-    let gain = |h: usize| if holds[h / BAND] { Complex64::ONE } else { Complex64::ZERO };
-    let mut known = clock.filtered(&there_and_back, gain);
-    known.truncate(y.len());
-    known
-}
-
-/// The harmonics of a torque and how well they are known.
-struct Harmonics {
-    /// Ratio of power, without its noise, to noise, by band.
-    known: Vec<f64>,
-    /// Coefficients of the mean period.
-    mean: Vec<Complex64>,
-    /// Mean square of the noise in each coefficient.
-    noise: Vec<f64>,
-}
-
-impl Harmonics {
-    /// The harmonics of `periods`, which follow one after another.
-    fn of(clock: &FineClock, periods: &[f64]) -> Self {
-        let spectra: Vec<Vec<Complex64>> =
-            periods.chunks_exact(clock.samples()).map(|y| clock.spectrum(y)).collect();
-        let count = spectra.len() as f64;
-        let harmonics = clock.samples() / 2 + 1;
-        let mean: Vec<Complex64> = (0..harmonics)
-            .map(|h| spectra.iter().map(|s| s[h]).sum::<Complex64>() / count)
-            .collect();
-        let (mut known, mut noise) = (Vec::new(), Vec::with_capacity(harmonics));
-        for first in (0..harmonics).step_by(BAND) {
-            let band = first..(first + BAND).min(harmonics);
-            let (mut power, mut scatter) = (0.0, 0.0);
-            for h in band.clone() {
-                power += mean[h].norm_sqr();
-                scatter += spectra.iter().map(|s| (s[h] - mean[h]).norm_sqr()).sum::<f64>();
-            }
-            let of_mean = scatter / (count * (count - 1.0));
-            known.push(if power > 0.0 { power / of_mean - 1.0 } else { 0.0 });
-            noise.resize(band.end, of_mean / band.len() as f64);
-        }
-        // Without noise all harmonics are known equally well, to within their rounding.
-        let rounding = f64::EPSILON * mean.iter().map(Complex64::norm_sqr).fold(0.0, f64::max);
-        noise.iter_mut().for_each(|noise| *noise = noise.max(rounding));
-        Self { known, mean, noise }
-    }
-
-    /// The same with nothing known in bands beyond that of the harmonic `last`.
-    fn up_to(&self, last: usize) -> Self {
-        let bands = last / BAND + 1;
-        let known = |(band, known): (usize, &f64)| if band < bands { *known } else { 0.0 };
-        let known = self.known.iter().enumerate().map(known).collect();
-        Self { known, mean: self.mean.clone(), noise: self.noise.clone() }
-    }
-
-    /// Whether the power of harmonic `h`, judged with its band, is more than `level` times its noise.
-    fn holds(&self, h: usize, level: f64) -> bool {
-        self.known[h / BAND] > level
-    }
-
-    /// The harmonics up to `last` in which `load` is not known to `level`.
-    fn beyond(&self, load: &Self, level: f64, last: usize) -> Vec<TorqueHarmonic> {
-        let harmonic =
-            |h: usize| TorqueHarmonic { number: h, mean: self.mean[h], noise: self.noise[h] };
-        let is_beyond = |h: &TorqueHarmonic| !load.holds(h.number, level) && h.noise > 0.0;
-        (1..=last).map(harmonic).filter(is_beyond).collect()
-    }
-
-    /// `y` with only the harmonics that are known to `level`.
-    fn part(&self, clock: &FineClock, y: &[f64], level: f64) -> Vec<f64> {
-        let gain = |h: usize| if self.holds(h, level) { Complex64::ONE } else { Complex64::ZERO };
-        clock.filtered(y, gain)
-    }
-
-    /// `y` without the harmonics known to `level`, up to the harmonic `highest`.
-    fn rest(&self, clock: &FineClock, y: &[f64], level: f64, highest: usize) -> Vec<f64> {
-        let is_rest = |h: usize| h <= highest && !self.holds(h, level);
-        clock.filtered(y, |h| if is_rest(h) { Complex64::ONE } else { Complex64::ZERO })
-    }
-}
 
 /// The last harmonic in which the drives' answers are fitted.
 fn fastest(periods: &Periods) -> usize {
@@ -354,88 +262,13 @@ fn fastest(periods: &Periods) -> usize {
 
 /// The part of a drive's torque beyond friction in the harmonics in which the torque of its links is not known to
 /// `level`, at the samples, Nm. `beside_friction_nm` is the torque at every tick.
-fn jolts(periods: &Periods, links: &Harmonics, level: f64, beside_friction_nm: &[f64]) -> Vec<f64> {
+fn jolts(periods: &Periods, links: &Known, level: f64, beside_friction_nm: &[f64]) -> Vec<f64> {
     let last = fastest(periods);
     let every_tick = FineClock::new(beside_friction_nm.len(), 1);
     let fast = every_tick.filtered(beside_friction_nm, |h| {
         if h <= last && !links.holds(h, level) { Complex64::ONE } else { Complex64::ZERO }
     });
     fast.into_iter().step_by(periods.clock.ticks()).collect()
-}
-
-/// Torque on the gear of every sample, Nm: M q̈ + c + g of links and rotors, without friction.
-pub fn load_along(model: &Model, arm: &Arm, motion: &Motion) -> JointSignals {
-    sum(&rigid_torque_along(model, motion), &rotors_along(arm, motion))
-}
-
-/// M_links q̈ + c + g at every sample, eight samples at a time with the widest registers of the machine.
-pub fn rigid_torque_along(model: &Model, motion: &Motion) -> JointSignals {
-    let mut out = JointSignals::zeros(motion.joints(), motion.samples());
-    with_widest_registers(
-        #[inline(always)]
-        || fill_rigid_torque(model, motion, &mut out),
-    );
-    out
-}
-
-#[inline(always)]
-fn fill_rigid_torque(model: &Model, motion: &Motion, out: &mut JointSignals) {
-    let (joints, n) = (motion.joints(), motion.samples());
-    let mut workspace = Workspace::<Lanes>::new(model);
-    let zero = <Lanes as Real>::constant(0.0);
-    let (mut q, mut qd, mut qdd) = (vec![zero; joints], vec![zero; joints], vec![zero; joints]);
-    let mut torque = vec![zero; joints];
-    for start in (0..n).step_by(LANES) {
-        let count = LANES.min(n - start);
-        for j in 0..joints {
-            for lane in 0..count {
-                q[j].0[lane] = motion.q_rad.joint(j)[start + lane];
-                qd[j].0[lane] = motion.qd_rad_s.joint(j)[start + lane];
-                qdd[j].0[lane] = motion.qdd_rad_s2.joint(j)[start + lane];
-            }
-        }
-        rigid_torque(model, &mut workspace, &q, &qd, &qdd, &mut torque);
-        for (j, torque) in torque.iter().enumerate() {
-            out.joint_mut(j)[start..start + count].copy_from_slice(&torque.0[..count]);
-        }
-    }
-}
-
-/// M at every sample, kg m², column by column: the additional torque on all joints, over `recorded_nm`, when one joint
-/// accelerates by one rad/s² more.
-pub fn mass_along(model: &Model, motion: &Motion, recorded_nm: &JointSignals) -> Vec<JointSignals> {
-    (0..motion.joints())
-        .map(|j| {
-            let mut faster = motion.clone();
-            faster.qdd_rad_s2.joint_mut(j).iter_mut().for_each(|qdd| *qdd += 1.0);
-            let torque = rigid_torque_along(model, &faster);
-            torque
-                .map_joints(|i, t| t.iter().zip(recorded_nm.joint(i)).map(|(t, r)| t - r).collect())
-        })
-        .collect()
-}
-
-/// Least inertia of a rotor, as a share of the mean inertia of its links. A gear that gives way has two sides, and
-/// models without rotors count the inertia of the rotors with that of the links.
-const LIGHTEST_ROTOR: f64 = 0.02;
-
-/// I_a of every joint, kg m², at least the share `LIGHTEST_ROTOR` of the mean inertia of the links; `mass_kg_m2` comes
-/// from [`mass_along`].
-pub fn rotors_kg_m2(arm: &Arm, mass_kg_m2: &[JointSignals]) -> Vec<f64> {
-    let rotor = |(j, mass): (usize, &JointSignals)| {
-        let own = mass.joint(j);
-        let lightest = LIGHTEST_ROTOR * own.iter().sum::<f64>() / own.len() as f64;
-        arm.joints[j].drive.rotor_inertia_kg_m2.max(lightest).max(f64::MIN_POSITIVE)
-    };
-    mass_kg_m2.iter().enumerate().map(rotor).collect()
-}
-
-/// I_a q̈ at every sample, Nm.
-fn rotors_along(arm: &Arm, motion: &Motion) -> JointSignals {
-    motion.qdd_rad_s2.map_joints(|j, qdd| {
-        let inertia = arm.joints[j].drive.rotor_inertia_kg_m2;
-        qdd.iter().map(|qdd| inertia * qdd).collect()
-    })
 }
 
 fn sum(a: &JointSignals, b: &JointSignals) -> JointSignals {
@@ -445,8 +278,6 @@ fn sum(a: &JointSignals, b: &JointSignals) -> JointSignals {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::{SeedableRng, rngs::ChaCha8Rng};
-    use rand_distr::{Distribution, StandardNormal};
 
     const N: usize = 500;
     const TICKS: usize = 16;
@@ -496,32 +327,6 @@ mod tests {
         }
     }
 
-    /// A slow swing plus differentiated white noise: the swing is what remains. Its band is 0.1 Hz wide, a little wider
-    /// because of the kink at the ends, and the noise in this band is a ten thousandth of the swing.
-    #[test]
-    fn what_is_known_beside_differentiated_noise() {
-        const NOISE: f64 = 1e-3;
-        let swing = |k: usize| 20.0 * (0.8 * std::f64::consts::TAU * k as f64 / RATE_HZ).cos();
-        let mut rng = ChaCha8Rng::seed_from_u64(4);
-        let velocity: Vec<f64> = (0..4000).map(|_| StandardNormal.sample(&mut rng)).collect();
-        let noise = |k: usize| NOISE * 0.5 * RATE_HZ * (velocity[k + 1] - velocity[k - 1]);
-        let y: Vec<f64> = (1..3999).map(|k| swing(k) + noise(k)).collect();
-        let density = 2.0 * NOISE.powi(2) / RATE_HZ;
-        let known = beside_differentiated_noise(&y, density, RATE_HZ);
-        let rms =
-            |y: &mut dyn Iterator<Item = f64>| (y.map(|y| y * y).sum::<f64>() / 3998.0).sqrt();
-        let before = rms(&mut y.iter().zip(1..).map(|(y, k)| y - swing(k)));
-        let after = rms(&mut known.iter().zip(1..).map(|(y, k)| y - swing(k)));
-        assert!(after < 0.01 * 20.0 && after < 0.5 * before, "{before} {after}");
-        // Next to nothing remains of noise alone: the slowest harmonics, where differentiated noise is weaker than the
-        // jump at the ends. Without noise everything remains.
-        let alone: Vec<f64> = (1..3999).map(noise).collect();
-        let left = beside_differentiated_noise(&alone, density, RATE_HZ);
-        assert!(rms(&mut left.into_iter()) < 0.01 * rms(&mut alone.into_iter()));
-        let all = beside_differentiated_noise(&y, 0.0, RATE_HZ);
-        assert!(rms(&mut all.iter().zip(&y).map(|(a, b)| a - b)) < 1e-12);
-    }
-
     /// A drive that feeds 90 % of the friction forward, 3 ms late: the jolts of its joint are found as they should be,
     /// up to the noise of six coefficients and the inability of steps of 8 ms to follow a delay of 3 ms.
     #[test]
@@ -556,7 +361,7 @@ mod tests {
             rate_hz: RATE_HZ,
             highest: 200,
         };
-        let of_load = Harmonics::of(&clock, &load);
+        let of_load = Harmonics::of(&clock, &load).known;
         assert!(of_load.holds(8, WELL_KNOWN) && !of_load.holds(50, WELL_KNOWN));
         let of_torque = Harmonics::of(&clock, &torque);
         let torque = of_torque.beyond(&of_load, WELL_KNOWN, fastest(&periods));

@@ -1,0 +1,48 @@
+//! A link that is longer by e than drawn: the vector from the previous joint's frame to that of the joint at the site
+//! grows in its own direction.
+//!
+//! The torque changes by e times its derivative with respect to the length. Most of that looks like other masses and
+//! inertias, which the null model absorbs; the rest depends on them only as far as the log determines them.
+
+use super::*;
+
+/// See the module.
+pub struct LinkLength;
+
+/// Step of the numerical derivative, m: small compared with links, large compared with rounding.
+const STEP_M: f64 = 1e-4;
+
+impl Candidate for LinkLength {
+    fn kind(&self) -> Kind {
+        Kind::LinkLength
+    }
+
+    /// The link before the first joint is the height of the arm on its base, on which no torque depends.
+    fn sites(&self, joints: usize) -> Vec<Option<usize>> {
+        (1..joints).map(Some).collect()
+    }
+
+    fn columns(&self, scene: &Scene, site: Option<usize>, _: Shape) -> Vec<Column> {
+        let mut arm = scene.arm.clone();
+        let way_m = &mut arm.joints[joint(site)].placement.translation_m;
+        let length_m = way_m.norm();
+        if length_m == 0.0 {
+            return vec![Column::default()];
+        }
+        *way_m *= 1.0 + STEP_M / length_m;
+        let longer = Column::everywhere(&scene.torque_change(&arm, &scene.motion));
+        vec![longer.scaled(1.0 / STEP_M)]
+    }
+
+    fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {
+        vec![quantity("error_m", b[0], "m")]
+    }
+
+    fn separating_experiment(&self) -> &'static str {
+        "a measurement of the kinematics"
+    }
+
+    fn in_words(&self) -> &'static str {
+        "a link that is longer or shorter than drawn"
+    }
+}
