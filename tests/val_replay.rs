@@ -199,6 +199,9 @@ fn arm_and_surroundings() -> Vec<Case> {
         case(Kind::Spring, 3, NO_SHAPE, &[6.0, -4.0], SAME),
         case(Kind::BaseTilt, 0, NO_SHAPE, &[0.02, -0.03], SAME),
         case(Kind::EncoderOffset, 2, NO_SHAPE, &[0.02], SAME),
+        // A thousandth of the link, so that its square is as much of its effect.
+        case(Kind::LinkLength, 3, NO_SHAPE, &[5e-4], SAME),
+        case(Kind::Gravity, 0, NO_SHAPE, &[-0.02], SAME),
     ]
 }
 

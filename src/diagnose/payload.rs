@@ -17,7 +17,7 @@ use super::candidates::Candidate;
 use super::chance;
 use super::clustered::{Equations, Solution, solve};
 use super::error::DiagnoseError;
-use super::extension::{Effect, Extension};
+use super::extension::Extension;
 use super::image::{Column, Image, Span};
 use super::kind::Kind;
 use super::scene::Scene;
@@ -410,11 +410,10 @@ fn equations(
     let (n, periods) = (problem.samples, problem.periods);
     let thin = (n * periods).div_ceil(MOST_ROWS).max(1);
     let block_rows = ((BLOCK_S * problem.rate_hz) as usize).max(1);
-    let of_effects = |columns: fn(&Effect, &[Box<dyn Candidate>], &Scene) -> Vec<(Column, f64)>| {
-        let each = extension.effects.iter();
-        each.map(|effect| columns(effect, families, &scene)).collect::<Vec<_>>()
-    };
-    let (laws, off) = (of_effects(Effect::columns), of_effects(Effect::off_columns));
+    let effects = extension.effects.iter();
+    let (laws, off): (Vec<_>, Vec<_>) = effects
+        .map(|effect| (effect.columns(families, &scene), effect.off_columns(families, &scene)))
+        .unzip();
     let on_joint = |j: usize, column: &Column| -> Vec<Vec<f64>> {
         let own = column.parts.iter().filter(|(joint, _)| *joint == j);
         let as_regressed = |y: &Vec<f64>| {

@@ -84,7 +84,9 @@ impl Diagnosis {
     /// The sentence about a log along which the model errs far more than along this one, even with friction at
     /// standstill left open.
     fn does_not_carry_over(&self, held_out: &HeldOut) -> Option<String> {
-        let noise = |j: usize| self.noise_floor_nm.as_ref().map_or(0.0, |noise| noise[j]);
+        // Of a log that repeats, the mean is compared, whose noise is less than that of a sample.
+        let noise_nm = held_out.noise_rms_nm.as_ref().or(self.noise_floor_nm.as_ref());
+        let noise = |j: usize| noise_nm.map_or(0.0, |noise| noise[j]);
         let expected = self.after.rms_nm.iter().enumerate().map(|(j, rms)| rms.hypot(noise(j)));
         let (j, times) = held_out
             .after_standstill_free_rms_nm

@@ -60,6 +60,9 @@ pub fn without_contacts<'s>(
     model: &Extension,
     log: &str,
 ) -> Result<Study<'s>, DiagnoseError> {
+    if study.scene.periodic {
+        return Ok(study);
+    }
     let touched = beside_model(&study, &residual(&study, model))?;
     study.without_rows(set, &touched.samples, log)
 }

@@ -397,7 +397,7 @@ impl Search<'_> {
         Cause {
             kind: change.kind,
             joint: change.site.map(|j| j + 1),
-            separating_experiment: (!class.is_empty()).then(|| change.separating_experiment),
+            separating_experiment: (!class.is_empty()).then_some(change.separating_experiment),
             class,
             confidence: probability_of_class(evidence, &evidences, &alike),
             may_be_none: change.kind == Kind::Payload

@@ -217,9 +217,10 @@ impl Replay {
         for (log, place) in std::iter::once((&self.log, ""))
             .chain(self.held_out.iter().map(|log| (log, " on a log that was not used")))
         {
+            let off =
+                |j: usize| [&log.before, &log.after].map(|distance| distance.torque_rms_nm[j]);
             let j = log.worst_joint();
-            let [before, after] =
-                [&log.before, &log.after].map(|distance| distance.torque_rms_nm[j]);
+            let [before, after] = off(j);
             let mut text = format!(
                 "Replayed in the simulator{place}, joint {}'s torque is off by {before:.2} Nm before and \
                  {after:.2} Nm after",
@@ -235,6 +236,13 @@ impl Replay {
                 );
             }
             out.push(text + ".");
+            if let Some(j) = log.spoilt_joint() {
+                let [before, after] = off(j);
+                out.push(format!(
+                    "Joint {}'s is off by more with the causes: {before:.2} Nm before and {after:.2} Nm after.",
+                    j + 1
+                ));
+            }
         }
         for NotReplayed { kind, joint, reason } in &self.not_replayed {
             let place = joint.map_or(String::new(), |j| format!(" at joint {j}"));
@@ -251,16 +259,30 @@ impl Replay {
     }
 }
 
+/// Ratio of the error after to that before from which on a joint counts as worse.
+const WORSE: f64 = 1.1;
+
 impl ReplayedLog {
+    /// Mean square that the causes remove from the torque error of joint `j`, in units of its noise where that is known.
+    fn gain(&self, j: usize) -> f64 {
+        let square = |distance: &Distance| distance.torque_rms_nm[j].powi(2);
+        let noise_nm = self.noise_nm.as_ref().filter(|noise| noise.iter().all(|n| *n > 0.0));
+        (square(&self.before) - square(&self.after)) / noise_nm.map_or(1.0, |n| n[j].powi(2))
+    }
+
     /// The joint (0-based) whose torque improves most, in units of its noise where that is known.
     pub fn worst_joint(&self) -> usize {
-        let gain = |j: usize| {
-            let square = |distance: &Distance| distance.torque_rms_nm[j].powi(2);
-            let noise_nm = self.noise_nm.as_ref().filter(|noise| noise.iter().all(|n| *n > 0.0));
-            (square(&self.before) - square(&self.after)) / noise_nm.map_or(1.0, |n| n[j].powi(2))
-        };
         let joints = 0..self.before.torque_rms_nm.len();
-        joints.max_by(|&a, &b| gain(a).total_cmp(&gain(b))).unwrap_or(0)
+        joints.max_by(|&a, &b| self.gain(a).total_cmp(&self.gain(b))).unwrap_or(0)
+    }
+
+    /// The joint (0-based) that the causes make worst by far, if they make any worse.
+    fn spoilt_joint(&self) -> Option<usize> {
+        let rms = |distance: &Distance, j: usize| distance.torque_rms_nm[j];
+        let joints = 0..self.before.torque_rms_nm.len();
+        joints
+            .filter(|&j| rms(&self.after, j) > WORSE * rms(&self.before, j))
+            .min_by(|&a, &b| self.gain(a).total_cmp(&self.gain(b)))
     }
 }
 
