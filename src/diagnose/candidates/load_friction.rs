@@ -82,7 +82,7 @@ impl Candidate for LoadFriction {
         if shape.value > 0.0 {
             out.push(quantity("exponent", shape.value, ""));
             // Only together with its load, μ says how large such friction is.
-            out.push(quantity("at_load_nm", rms, "Nm"));
+            out.push(quantity("rms_load_nm", rms, "Nm"));
         }
         out
     }
