@@ -199,7 +199,7 @@ impl Study<'_> {
     }
 
     /// What was visible of a law with an earlier estimate of the arm.
-    fn shown_as(&self, place: Place, variant: usize) -> Option<&Shown> {
+    pub(super) fn shown_as(&self, place: Place, variant: usize) -> Option<&Shown> {
         let is_it = |s: &&Shown| ((s.family, s.site), s.variant) == (place, variant);
         self.shown.iter().filter(is_it).max_by_key(|s| s.columns)
     }

@@ -211,7 +211,9 @@ impl Effect {
 
     /// All columns of the effect with their coefficients.
     fn torques(&self, families: &[Box<dyn Candidate>], scene: &Scene) -> Vec<(Column, f64)> {
-        [self.columns(families, scene), self.off_columns(families, scene)].concat()
+        let mut torques = self.columns(families, scene);
+        torques.extend(self.off_columns(families, scene));
+        torques
     }
 }
 

@@ -487,8 +487,11 @@ impl<'s, 'a> Kept<'s, 'a> {
                     continue;
                 };
                 let current = &self.causes[c];
-                let is_faint = self.study.faint.iter().any(|f| f.place() == best.entry.place());
-                let margin = if is_faint { FAR_AHEAD } else { CLEARLY_BETTER };
+                let margin = if self.study.is_faint(best.entry.place()) {
+                    FAR_AHEAD
+                } else {
+                    CLEARLY_BETTER
+                };
                 if best.evidence > current.evidence + margin
                     && (best.entry.family, best.entry.site)
                         != (current.entry.family, current.entry.site)

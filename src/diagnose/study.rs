@@ -230,10 +230,11 @@ impl<'a> Study<'a> {
             site,
             variant: shape.variant,
             columns: images.len(),
-            least: if self.faint.iter().any(|e| e.place() == (family, site)) {
-                FAINT
-            } else {
-                ABSORBED
+            least: match self.shown_as((family, site), shape.variant) {
+                // What was faint once has been an entry since.
+                Some(shown) => shown.least,
+                None if self.is_faint((family, site)) => FAINT,
+                None => ABSORBED,
             },
         };
         self.shown = entries.iter().map(shown).collect();
@@ -246,6 +247,11 @@ impl<'a> Study<'a> {
     /// rows are independent.
     pub fn judge_by(&mut self, residual: &Image) {
         self.statistic = Statistic::new(&self.whitening, residual, self.scene.joints());
+    }
+
+    /// Whether the null model absorbs the law of `place` nearly.
+    pub(super) fn is_faint(&self, place: Place) -> bool {
+        self.faint.iter().any(|entry| entry.place() == place)
     }
 
     /// Excludes these joints from the search.

@@ -25,10 +25,7 @@ impl Candidate for BaseTilt {
             .map(|axis| {
                 // The base turns by +angle, so that gravity turns by −angle in the base frame.
                 let turn = Rotation3::from_axis_angle(axis, -SMALL_RAD);
-                let mut arm = scene.arm.clone();
-                arm.gravity_m_s2 = turn * arm.gravity_m_s2;
-                Column::everywhere(&scene.torque_change(&arm, &scene.motion))
-                    .scaled(1.0 / SMALL_RAD)
+                of_changed_arm(scene, SMALL_RAD, |arm| arm.gravity_m_s2 = turn * arm.gravity_m_s2)
             })
             .collect()
     }

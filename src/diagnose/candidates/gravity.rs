@@ -20,10 +20,7 @@ impl Candidate for Gravity {
     }
 
     fn columns(&self, scene: &Scene, _: Option<usize>, _: Shape) -> Vec<Column> {
-        let mut arm = scene.arm.clone();
-        arm.gravity_m_s2 *= 1.0 + STEP;
-        let heavier = Column::everywhere(&scene.torque_change(&arm, &scene.motion));
-        vec![heavier.scaled(1.0 / STEP)]
+        vec![of_changed_arm(scene, STEP, |arm| arm.gravity_m_s2 *= 1.0 + STEP)]
     }
 
     fn quantities(&self, scene: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {

@@ -23,15 +23,15 @@ impl Candidate for LinkLength {
     }
 
     fn columns(&self, scene: &Scene, site: Option<usize>, _: Shape) -> Vec<Column> {
-        let mut arm = scene.arm.clone();
-        let way_m = &mut arm.joints[joint(site)].placement.translation_m;
-        let length_m = way_m.norm();
+        let j = joint(site);
+        let length_m = scene.arm.joints[j].placement.translation_m.norm();
         if length_m == 0.0 {
             return vec![Column::default()];
         }
-        *way_m *= 1.0 + STEP_M / length_m;
-        let longer = Column::everywhere(&scene.torque_change(&arm, &scene.motion));
-        vec![longer.scaled(1.0 / STEP_M)]
+        let longer = |arm: &mut Arm| {
+            arm.joints[j].placement.translation_m *= 1.0 + STEP_M / length_m;
+        };
+        vec![of_changed_arm(scene, STEP_M, longer)]
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {

@@ -34,6 +34,7 @@ use super::image::Column;
 use super::kind::Kind;
 use super::scene::{Instants, Scene};
 use crate::dynamics::{of_pairs, with_widest_registers};
+use crate::robot::Arm;
 
 /// A point in the space of a family's nonlinear parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -310,6 +311,13 @@ fn dry_friction(scene: &Scene, j: usize, level: impl Fn(&Instants, usize) -> f64
     let at = scene.instants(j);
     let friction = (0..at.sign.len()).map(|k| at.sign[k] * level(at, k)).collect();
     Column::on(j, scene.as_logged(friction))
+}
+
+/// Torque per unit of a small `change` of the arm, of size `step`, along the motion.
+fn of_changed_arm(scene: &Scene, step: f64, change: impl Fn(&mut Arm)) -> Column {
+    let mut arm = scene.arm.clone();
+    change(&mut arm);
+    Column::everywhere(&scene.torque_change(&arm, &scene.motion)).scaled(1.0 / step)
 }
 
 /// The joint at `site`, for families that always sit on a joint.
