@@ -62,7 +62,7 @@ const WITHHELD: Shares = Shares { withheld: 1.0, ..NOTHING };
 const BESIDE: Shares = Shares { beside: 1.0, ..NOTHING };
 
 fn record(benchmark: &Benchmark, trial: u64) -> Record {
-    let record = benchmark.worker().trial(trial).unwrap();
+    let record = benchmark.trial(trial).unwrap();
     for line in armid::report::blind::replay_lines(&record) {
         println!("{line}");
     }
@@ -72,7 +72,7 @@ fn record(benchmark: &Benchmark, trial: u64) -> Record {
 /// Two effects cannot be drawn from a family that has only one possible place.
 #[test]
 fn two_effects_need_two_places() {
-    assert!(benchmark(TWO, &["base_tilt"]).worker().trial(0).is_err());
+    assert!(benchmark(TWO, &["base_tilt"]).trial(0).is_err());
 }
 
 /// What is wrong with the answer to a single hidden effect.

@@ -320,7 +320,7 @@ fn conclude(
 /// Runs one case of the blind benchmark alone and prints case, truth and answer.
 fn replay_blind(benchmark: &Benchmark, trial: u64) -> CommandResult {
     let begun = Instant::now();
-    let record = benchmark.worker().trial(trial)?;
+    let record = benchmark.trial(trial)?;
     for line in blind::replay_lines(&record) {
         say!("{line}");
     }

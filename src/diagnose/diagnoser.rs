@@ -135,7 +135,7 @@ impl<'a> Diagnoser<'a> {
         let moved_parameters = simulation.map_or(Vec::new(), |s| against::moved(s, &base));
         let moved_together = simulation.and_then(|s| against::moved_together(&study, s, &base));
         let tears = take_out_tears(&mut causes, m);
-        make_modest(&mut causes);
+        make_modest(&mut causes, simulation.is_some());
         let lack = misfit::lack_of_fit(&study, &accepted, &rest);
         let unexplained = unexplained(&study, (&accepted, &rest), lack, &causes, &log);
         if let Some(unknown) = &unexplained {
@@ -186,6 +186,7 @@ impl<'a> Diagnoser<'a> {
             replay: None,
             detection_limits: detection_limits(&study, &accepted),
             lack_of_fit_probability: lack.map(|lack| lack.probability),
+            doubt: None,
             sentences: Vec::new(),
             warnings,
         };
@@ -243,7 +244,8 @@ impl<'a> Diagnoser<'a> {
         let left = share_left(diagnosis, identification);
         let torque_nm = identification.residual().torque_nm();
         let doubt = Doubt::of(self.arm, self.set, &nominal, theta, &sigma, covariance, &torque_nm);
-        if let Some(doubt) = Doubt::or_unlike(doubt, unlike(self.arm, &left)) {
+        diagnosis.doubt = Doubt::or_unlike(doubt, unlike(self.arm, &left));
+        if let Some(doubt) = &diagnosis.doubt {
             diagnosis.sentences.insert(0, doubt.sentence());
             if doubt.is_contradiction() {
                 diagnosis.verdict = Verdict::Contradicted;

@@ -26,6 +26,7 @@ impl Diagnosis {
         let is_left = self.unexplained.is_some() && self.noise_floor_nm.is_some();
         let mut out: Vec<String> = Vec::new();
         out.extend(is_left.then(|| missing_effect(&self.causes)).flatten());
+        out.extend(told::overview(&self.causes));
         out.extend(told::in_sentences(&self.causes, self.noise_floor_nm.is_some()));
         if let Some(unexplained) = &self.unexplained {
             out.push(format!(

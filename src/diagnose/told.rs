@@ -8,6 +8,8 @@ use super::verdict::{Cause, Estimate};
 
 /// Up to this many touches get a sentence each.
 const TOUCHES: usize = 5;
+/// Up to this many causes are told without an overview of them.
+const MANY: usize = 6;
 
 /// The sentences about `causes`, in the order of the causes. Unlikely causes get none ([`in_the_table_alone`]).
 pub(super) fn in_sentences(causes: &[Cause], noise_is_known: bool) -> Vec<String> {
@@ -29,6 +31,39 @@ pub(super) fn in_sentences(causes: &[Cause], noise_is_known: bool) -> Vec<String
         }
     }
     out
+}
+
+/// One sentence that says how many causes there are and lists them by kind, for a reader of more than [`MANY`]
+/// sentences; `None` if there are fewer. Unlikely causes are not counted.
+pub(super) fn overview(causes: &[Cause]) -> Option<String> {
+    let likely: Vec<&Cause> = causes.iter().filter(|cause| !cause.is_unlikely()).collect();
+    if likely.len() <= MANY {
+        return None;
+    }
+    let mut kinds: Vec<Kind> = Vec::new();
+    for cause in &likely {
+        if !kinds.contains(&cause.kind) {
+            kinds.push(cause.kind);
+        }
+    }
+    let sites = |kind: Kind| {
+        let of_kind = likely.iter().filter(move |cause| cause.kind == kind);
+        let mut joints: Vec<usize> = of_kind.clone().filter_map(|cause| cause.joint).collect();
+        joints.sort_unstable();
+        joints.dedup();
+        let joints: Vec<String> = joints.iter().map(usize::to_string).collect();
+        let on = match &joints[..] {
+            [] => "the arm".to_owned(),
+            [one] => format!("joint {one}"),
+            _ => format!("joints {}", joints.join(", ")),
+        };
+        match of_kind.count() {
+            times if kind == Kind::Contact && times > 1 => format!("{kind} ({times} times)"),
+            _ => format!("{kind} ({on})"),
+        }
+    };
+    let kinds: Vec<String> = kinds.into_iter().map(sites).collect();
+    Some(format!("{} causes are named: {}.", likely.len(), kinds.join(", ")))
 }
 
 /// One sentence with the names of the causes that are too unlikely for a sentence of their own; `None` if there are
@@ -158,6 +193,23 @@ mod tests {
         assert_eq!(said[5], more);
         assert!(said[6].starts_with("Joint 1's record"));
         assert_eq!(in_sentences(&causes[..5], false).len(), 5);
+    }
+
+    #[test]
+    fn many_causes_have_an_overview() {
+        let gear = |joint| cause(Kind::Elasticity, Some(joint), "a soft gear", 9.0, &[]);
+        let payload = cause(Kind::Payload, None, "a body", 9.0, &[]);
+        let unlikely = Cause { confidence: 5e-4, ..delay(Kind::TimeSkew, 1, 0.001, 0.0001) };
+        let touches = [touch(1.0, 10.0), touch(3.0, 9.0)];
+        let mut causes: Vec<Cause> = [gear(4), gear(1), payload, unlikely].into();
+        causes.extend(touches);
+        causes.push(delay(Kind::VelocityLag, 0, 0.001, 0.0001));
+        assert_eq!(overview(&causes), None);
+        causes.push(gear(2));
+        assert_eq!(
+            overview(&causes).unwrap(),
+            "7 causes are named: elasticity (joints 2, 3, 5), payload (the arm), contact (2 times), velocity_lag (joint 1)."
+        );
     }
 
     #[test]

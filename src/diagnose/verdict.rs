@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::kind::Kind;
 use super::payload::PayloadFinding;
 use super::replay::Replay;
+use crate::identify::Doubt;
 
 /// Schema of the diagnosis JSON.
 pub const DIAGNOSE_SCHEMA: &str = "armid.diagnose/1";
@@ -261,6 +262,9 @@ pub struct Diagnosis {
     pub lack_of_fit_probability: Option<f64>,
     /// The result in one word.
     pub verdict: Verdict,
+    /// Why the log may not be of this arm, or its parameters those of no arm; null if nothing speaks for that. The
+    /// sentences begin with it.
+    pub doubt: Option<Doubt>,
     /// The result in sentences.
     pub sentences: Vec<String>,
     /// What the user should know.

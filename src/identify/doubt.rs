@@ -1,5 +1,7 @@
 //! Checks whether the identified parameters are those of the stated arm, or of any arm at all.
 
+use serde::{Serialize, Serializer};
+
 use super::covariance::Covariance;
 use super::gravity::gravity_remark;
 use super::negative_friction::negative_friction_remark;
@@ -10,13 +12,19 @@ use crate::robot::Arm;
 /// with a probability of 3e-7.
 pub(super) const CERTAIN: f64 = 5.0;
 
-/// A reason to doubt that the identified parameters are those of the stated arm.
+/// A reason to doubt that the identified parameters are those of the stated arm; in JSON, its sentence.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Doubt {
     /// Why they are those of no arm, or of no arm mounted as described.
     contradiction: Option<String>,
     /// What makes it likely that the log is of another arm, or of another load.
     question: Option<String>,
+}
+
+impl Serialize for Doubt {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&self.sentence())
+    }
 }
 
 impl Doubt {

@@ -20,7 +20,9 @@ pub enum IdentifyError {
         needed: usize,
     },
     /// The arm stands still throughout.
-    #[error("{log}: the arm never moves")]
+    #[error(
+        "{log}: the arm never moves, and a log at rest tells neither inertia nor friction; `armid excite` makes a motion that does"
+    )]
     NoMotion {
         /// The log.
         log: String,

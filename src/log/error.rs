@@ -497,7 +497,8 @@ pub enum UnitSuspicion {
     /// No unit explains how positions and velocities are related.
     #[error(
         "rows {first_row} to {last_row}, joint {joint}: the position moves {ratio:.4e} times as far as the integral of \
-         the velocity, which no unit explains; check which columns are q, qd and time in the layout"
+         the velocity, which no unit explains; check which columns are q, qd and time in the layout, and whether the velocities \
+         are those of the motors, before the gears"
     )]
     Unrelated {
         /// The joint on which it is seen, from 1.

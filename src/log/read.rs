@@ -259,6 +259,12 @@ impl Table {
             let c = worst.unwrap_or(q.start);
             format!("{} = {}", plan.fields[c].place(), table.columns[c][k])
         });
+        // Where half of the rows or more are removed, they are not garbage but the motion itself.
+        if let Err(suspicion) = &related
+            && 2 * self.rows.len() <= verdicts.len()
+        {
+            return Err(fault(suspicion.clone()));
+        }
         self.require_two(account, file)?;
         if related.is_err() {
             related = units::check(&self.motion(plan), &layout.units);

@@ -89,8 +89,13 @@ fn contradiction(motion: &Motion, units: &Units, ratios: &[Ratio], ratio: f64) -
         ratios.iter().min_by(|a, b| (a.ratio - ratio).abs().total_cmp(&(b.ratio - ratio).abs()));
     let (joint, (first, last)) = seen.map_or((0, (0, 0)), |r| (r.joint, r.span));
     let (first_row, last_row) = (motion.row[first], motion.row[last]);
-    let best =
-        alternatives(units).filter(|a| is_near(ratio, a.ratio)).min_by_key(|a| a.changes.len());
+    let step_s = median_step(motion.time_s);
+    let has_clock = |a: &Alternative| {
+        a.time == units.time || step_s.is_none_or(|s| has_plausible_clock(s, units.time, a.time))
+    };
+    let best = alternatives(units)
+        .filter(|a| is_near(ratio, a.ratio) && has_clock(a))
+        .min_by_key(|a| a.changes.len());
     match best.and_then(|a| a.changes.first().copied()) {
         Some((quantity, unit)) => UnitSuspicion::Ratio {
             quantity,
@@ -114,17 +119,17 @@ fn contradiction(motion: &Motion, units: &Units, ratios: &[Ratio], ratio: f64) -
 /// units.
 struct Alternative {
     ratio: f64,
+    time: TimeUnit,
     changes: Vec<(&'static str, &'static str)>,
 }
 
 fn alternatives(units: &Units) -> impl Iterator<Item = Alternative> {
-    let degree = |yes: bool| if yes { PI / 180.0 } else { 1.0 };
     let stated = *units;
-    TimeUnit::ALL.into_iter().flat_map(move |time| {
-        [(false, false), (true, false), (false, true), (true, true)].into_iter().map(
-            move |(q_deg, qd_deg)| {
-                let (q_stated, qd_stated) =
-                    (stated.q == Angle::Deg, stated.qd == AngularVelocity::DegS);
+    let degree = |yes: bool| if yes { PI / 180.0 } else { 1.0 };
+    let of_time = move |time: TimeUnit| {
+        [false, true].into_iter().flat_map(move |q_deg| {
+            AngularVelocity::ALL.into_iter().map(move |qd_unit| {
+                let q_stated = stated.q == Angle::Deg;
                 let mut changes = Vec::new();
                 if time != stated.time {
                     changes.push(("time", time.name()));
@@ -132,16 +137,22 @@ fn alternatives(units: &Units) -> impl Iterator<Item = Alternative> {
                 if q_deg != q_stated {
                     changes.push(("q", if q_deg { "deg" } else { "rad" }));
                 }
-                if qd_deg != qd_stated {
-                    changes.push(("qd", if qd_deg { "deg/s" } else { "rad/s" }));
+                if qd_unit != stated.qd {
+                    changes.push(("qd", qd_unit.name()));
                 }
                 let q = degree(q_stated) / degree(q_deg);
-                let qd = degree(qd_stated) / degree(qd_deg);
+                let qd = stated.qd.rad_s() / qd_unit.rad_s();
                 let t = stated.time.seconds() / time.seconds();
-                Alternative { ratio: q / (qd * t), changes }
-            },
-        )
-    })
+                Alternative { ratio: q / (qd * t), time, changes }
+            })
+        })
+    };
+    TimeUnit::ALL.into_iter().flat_map(of_time)
+}
+
+/// Whether a step of `step_s`, read in the unit `stated`, is one that a recorder can have if it is in `unit`.
+fn has_plausible_clock(step_s: f64, stated: TimeUnit, unit: TimeUnit) -> bool {
+    CLOCK_STEP_S.contains(&(step_s / stated.seconds() * unit.seconds()))
 }
 
 /// Checks the clock of a log at rest: no recorder of motion has steps of seconds.
@@ -149,9 +160,8 @@ fn check_clock(motion: &Motion, units: &Units) -> Result<(), UnitSuspicion> {
     let Some(step_s) = median_step(motion.time_s).filter(|s| !CLOCK_STEP_S.contains(s)) else {
         return Ok(());
     };
-    let better = TimeUnit::ALL
-        .into_iter()
-        .find(|unit| CLOCK_STEP_S.contains(&(step_s / units.time.seconds() * unit.seconds())));
+    let better =
+        TimeUnit::ALL.into_iter().find(|&unit| has_plausible_clock(step_s, units.time, unit));
     match better {
         Some(unit) => Err(UnitSuspicion::Clock {
             unit: unit.name(),

@@ -7,8 +7,8 @@ use thiserror::Error;
 pub enum RobotError {
     /// `--robot` is neither built in nor a file.
     #[error(
-        "unknown robot \"{name}\": built in are {}; or give a .urdf, .xml (MJCF) or .toml file",
-        super::file::built_in_names().collect::<Vec<_>>().join(", ")
+        "unknown robot \"{name}\"{}: built in are {}; or give a .urdf, .xml (MJCF) or .toml file",
+        folder_hint(name), super::file::built_in_names().collect::<Vec<_>>().join(", ")
     )]
     UnknownName {
         /// What was asked for.
@@ -62,4 +62,8 @@ pub enum RobotError {
         /// What is wrong, where, and what to do.
         what: String,
     },
+}
+
+fn folder_hint(name: &str) -> &'static str {
+    if std::path::Path::new(name).is_dir() { ", which is a folder" } else { "" }
 }

@@ -35,6 +35,7 @@ fn other_units_are_recognised_and_named() {
         ([1e9, 1.0, 1.0], ("time", "ns")),
         ([1.0, degrees, 1.0], ("q", "deg")),
         ([1.0, 1.0, degrees], ("qd", "deg/s")),
+        ([1.0, 1.0, 30.0 / PI], ("qd", "rpm")),
         ([1.0, degrees, degrees], ("both", "deg")),
         ([1e3, degrees, degrees], ("time", "ms")),
         ([1e3, degrees, 1.0], ("time", "ms")),
@@ -81,6 +82,15 @@ fn the_remedy_that_is_named_works() {
     // The same layout applied to numbers in SI units is recognised as wrong as well.
     let result = read_log_from(text(&valid(), ",", "\n").as_bytes(), "run.csv", &layout, JOINTS);
     assert_eq!(suspected(result), ("clock", "s"));
+}
+
+/// Velocities before the gear, in revolutions per minute, are 964.5 times those of the joint in rad/s. That is not far
+/// from the thousand between s and ms, but this clock cannot be in ms. They exceed the velocity of any arm's joint, and
+/// so do not belong to its motion; the log is refused all the same, not cut down to the rows in which the arm rests.
+#[test]
+fn velocities_of_motors() {
+    let result = edited(|rows| scale(rows, 7..13, 101.0 * 30.0 / PI));
+    assert_eq!(suspected(result), ("none", ""));
 }
 
 #[test]

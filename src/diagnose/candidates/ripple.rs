@@ -1,5 +1,5 @@
-//! Torque ripple that repeats many times per turn: τ = A cos(N q + φ), caused by the gear's teeth (even multiples of
-//! the ratio) or by the motor's poles.
+//! Torque ripple that repeats many times per turn: τ = A cos(N q + φ), caused by the gear (once, twice or four times
+//! per turn of its wave generator) or by the motor's poles.
 //!
 //! Fast ripple accelerates the links and hardly shows in the torque, and above half the sampling rate the samples hold
 //! its alias. A log shows it as it shows any torque that no controller answers at once ([`Scene::as_logged`]). Ripple

@@ -253,6 +253,23 @@ mod tests {
         assert!(misses < 24, "{misses} of {}", 3 * seen);
     }
 
+    /// A push of a hundred times the noise of a sample is as long and as high as it is; it is found as a bump much
+    /// shorter than itself. The intervals cover the shapes that are nearly as good as the best: they hold all of the
+    /// truth in all logs.
+    #[test]
+    fn strong_pushes_are_found_in_their_full_length() {
+        for seed in 0..10 {
+            let (start_s, length_s) = (21.0 + 0.7 * f64::from(seed), 0.3 + 0.15 * f64::from(seed));
+            let hidden = Hidden { start_s, end_s: start_s + length_s, nm: [50.0, 0.0] };
+            let causes = found(seed as u64, &hidden).unwrap().causes;
+            let truth = [("start_s", start_s), ("end_s", hidden.end_s), ("peak_nm", 50.0)];
+            for (name, truth) in truth {
+                let [low, high] = causes[0].parameters[name].ci95;
+                assert!(low <= truth && truth <= high, "{seed}, {name}: {low} … {high}, {truth}");
+            }
+        }
+    }
+
     /// A reading of thirty times the noise in one sample, and one that resampling spreads over two, are no contact.
     #[test]
     fn wild_readings_are_no_contact() {

@@ -14,6 +14,10 @@ pub(super) const ORDINARY: f64 = 1.0;
 /// Lengths at which a bump is evaluated around the first guess: steps in ln, and number of steps to either side.
 const STEP: f64 = 0.07;
 const STEPS: i32 = 9;
+/// Number of further steps to longer bumps, as long as the longest is the best. The chance of noise whose power is not
+/// known limits how significant a bump can be, and the more so the longer it is: a strong push is found as a bump of a
+/// third of its length.
+const FURTHER: i32 = 20;
 /// A joint on which a push was evaluated feels it if it shows this many σ of it, which noise does in one of 370 joints,
 /// and the share `FELT_SHARE` of the σ of the joint that feels it most: an arm that yields moves the other joints a
 /// little.
@@ -296,12 +300,20 @@ fn fits(
 ) -> Option<Vec<Fit>> {
     // (1 − u²)^p has the standard deviation 1/√(2p + 3) along u.
     let guess_s = length_s * ((2.0 * shape + 3.0) / (2.0 * ORDINARY + 3.0)).sqrt();
-    let mut fits: Vec<Fit> = (-STEPS..=STEPS)
-        .map(|step| guess_s * (STEP * f64::from(step)).exp())
-        .map(|length_s| of_length(filter, felt, centres.clone(), length_s, shape))
-        .collect::<Option<_>>()?;
-    let top = (0..fits.len()).max_by(|&a, &b| fits[a].gain.total_cmp(&fits[b].gain))?;
-    let top = top.clamp(1, fits.len() - 2);
+    let of_step = |step: i32| {
+        let length_s = guess_s * (STEP * f64::from(step)).exp();
+        of_length(filter, felt, centres.clone(), length_s, shape)
+    };
+    let mut fits: Vec<Fit> = (-STEPS..=STEPS).map(of_step).collect::<Option<_>>()?;
+    let best =
+        |fits: &[Fit]| (0..fits.len()).max_by(|&a, &b| fits[a].gain.total_cmp(&fits[b].gain));
+    for step in STEPS + 1..=STEPS + FURTHER {
+        if best(&fits)? + 1 < fits.len() {
+            break;
+        }
+        fits.push(of_step(step)?);
+    }
+    let top = best(&fits)?.clamp(1, fits.len() - 2);
     let around = [top - 1, top, top + 1].map(|i| &fits[i]);
     let Summit { at, value, sigma } = summit(around.map(|fit| fit.gain));
     // σ at a known length, widened by the effect of the length's own σ.

@@ -61,7 +61,8 @@ pub(super) fn built_in_without_header() -> impl Iterator<Item = &'static str> {
 ///
 /// [units]                      # defaults: s, rad, rad/s, rad/s2, A
 /// time = "ms"                  # s, ms, us, ns
-/// q = "deg"                    # rad, deg; qd = "deg/s", qdd = "deg/s2" likewise
+/// q = "deg"                    # rad, deg; qdd = "deg/s2" likewise
+/// qd = "deg/s"                 # rad/s, deg/s, rpm
 /// current = "mA"               # A, mA
 ///
 /// [columns]                    # {0}: joints counted from 0 in the names, {1}: from 1

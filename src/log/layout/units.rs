@@ -1,6 +1,6 @@
 //! Units in which the quantities of a file are written.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 use serde::Deserialize;
 
@@ -25,7 +25,9 @@ impl Units {
             Block::Time => Some(self.time.seconds()).filter(|&s| s != 1.0),
             Block::TimeNanoseconds => Some(TimeUnit::Ns.seconds()),
             Block::Q | Block::TargetQ => degrees(self.q == Angle::Deg),
-            Block::Qd | Block::TargetQd => degrees(self.qd == AngularVelocity::DegS),
+            Block::Qd | Block::TargetQd => {
+                Some(self.qd.rad_s()).filter(|_| self.qd != AngularVelocity::RadS)
+            }
             Block::TargetQdd => degrees(self.qdd == AngularAcceleration::DegS2),
             Block::Current | Block::TargetCurrent => (self.current == Current::Ma).then_some(1e-3),
             Block::Torque | Block::TargetMoment | Block::Temperature => None,
@@ -80,6 +82,29 @@ pub(in crate::log) enum AngularVelocity {
     RadS,
     #[serde(rename = "deg/s")]
     DegS,
+    #[serde(rename = "rpm")]
+    Rpm,
+}
+
+impl AngularVelocity {
+    pub(in crate::log) const ALL: [Self; 3] = [Self::RadS, Self::DegS, Self::Rpm];
+
+    /// The unit in rad/s.
+    pub(in crate::log) fn rad_s(self) -> f64 {
+        match self {
+            Self::RadS => 1.0,
+            Self::DegS => PI / 180.0,
+            Self::Rpm => TAU / 60.0,
+        }
+    }
+
+    pub(in crate::log) fn name(self) -> &'static str {
+        match self {
+            Self::RadS => "rad/s",
+            Self::DegS => "deg/s",
+            Self::Rpm => "rpm",
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]

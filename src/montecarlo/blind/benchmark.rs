@@ -103,36 +103,20 @@ impl Benchmark {
         families
     }
 
-    /// Creates the working memory of one thread.
-    pub fn worker(&self) -> BlindWorker<'_> {
-        BlindWorker { benchmark: self, log: Measured::like(&self.clean[0]) }
-    }
-}
-
-/// Working memory of one thread.
-pub struct BlindWorker<'a> {
-    benchmark: &'a Benchmark,
-    log: Measured,
-}
-
-impl BlindWorker<'_> {
     /// Runs one trial: draws a case, makes its log, diagnoses the log, and records the truth with the answer.
-    pub fn trial(&mut self, trial: u64) -> Result<Record, BlindError> {
-        let benchmark = self.benchmark;
-        let drawn = draw(benchmark, trial)?;
-        self.log = Measured::like(&drawn.simulation.recording);
-        drawn.simulation.log_into(trial, &mut self.log)?;
+    pub fn trial(&self, trial: u64) -> Result<Record, BlindError> {
+        let drawn = draw(self, trial)?;
+        let log = drawn.simulation.log(trial)?;
         let held_out = self.held_out(&drawn)?;
-        let simulation =
-            drawn.case.against_simulation.then(|| Nominal::certain(&benchmark.simulation));
+        let simulation = drawn.case.against_simulation.then(|| Nominal::certain(&self.simulation));
         let diagnosis = self
-            .diagnose(benchmark.dictionary(&drawn.case), held_out.as_ref(), simulation)
+            .diagnose(&log, self.dictionary(&drawn.case), held_out.as_ref(), simulation)
             .map_err(|source| BlindError::Diagnose {
                 case: Box::new(drawn.case.clone()),
                 source,
             })?;
         let sensors = &drawn.simulation.scenario.sensors;
-        let sd_nm = sensors.torque_sd_per_joint_nm(benchmark.plan.base.arm.dof())?;
+        let sd_nm = sensors.torque_sd_per_joint_nm(self.plan.base.arm.dof())?;
         let gain = match diagnosis.held_out.first() {
             None => None,
             Some(hidden) => {
@@ -141,18 +125,19 @@ impl BlindWorker<'_> {
             }
         };
         let hidden_arm = Model::new(drawn.simulation.plant.true_arm());
-        let truth = benchmark.plan.base.set.values(&hidden_arm.standard_parameters());
+        let truth = self.plan.base.set.values(&hidden_arm.standard_parameters());
         Ok(Record { trial, case: drawn.case, answer: Answer::of(&diagnosis, gain, &truth) })
     }
 
-    /// Diagnoses the worker's log with a dictionary of these `families`.
+    /// Diagnoses the `log` with a dictionary of these `families`.
     fn diagnose(
         &self,
+        log: &Measured,
         families: Vec<Box<dyn Candidate>>,
         held_out: Option<&Recording>,
         simulation: Option<Nominal>,
     ) -> Result<Diagnosis, DiagnoseError> {
-        let Benchmark { plan, model, .. } = self.benchmark;
+        let Self { plan, model, .. } = self;
         let Scenario { arm, set, processing, .. } = &plan.base;
         let mut diagnoser = Diagnoser::with_families(arm, model, set, processing.clone(), families);
         let held_out: Vec<Validation> = held_out
@@ -168,13 +153,13 @@ impl BlindWorker<'_> {
                 manufacturer_nm: None,
             })
             .collect();
-        Ok(diagnoser.diagnose(&self.log.measurement("hidden"), &held_out, simulation)?.diagnosis)
+        Ok(diagnoser.diagnose(&log.measurement("hidden"), &held_out, simulation)?.diagnosis)
     }
 
     /// The noise-free run of the same arm along the next motion, if the gain is measured for this case. Faults of the
     /// record are excluded, because they add nothing to the model of the arm that another motion could test.
     fn held_out(&self, drawn: &Drawn) -> Result<Option<Recording>, BlindError> {
-        let plan = &self.benchmark.plan;
+        let plan = &self.plan;
         let scenario = &drawn.simulation.scenario;
         let measured = drawn.measures_gain
             && scenario.effects.iter().all(Effect::repeats)
@@ -192,18 +177,17 @@ impl BlindWorker<'_> {
 
     /// Number of the motion along which the gain is measured: the one after the motion of the log.
     fn next_motion(&self, drawn: &Drawn) -> usize {
-        (drawn.motion + 1) % self.benchmark.plan.motions.len()
+        (drawn.motion + 1) % self.plan.motions.len()
     }
 
     /// Prediction of the next motion for the arm without effects, identified from a log of that arm with the noise of
     /// this trial. Its only error is the noise of the parameters, which the right cause could not remove either. `None`
     /// if the diagnosis of that log, which is not the log of the trial, fails.
-    fn clean_held_out(&mut self, drawn: &Drawn, trial: u64) -> Result<Option<HeldOut>, PlantError> {
-        let benchmark = self.benchmark;
+    fn clean_held_out(&self, drawn: &Drawn, trial: u64) -> Result<Option<HeldOut>, PlantError> {
         let scenario = drawn.simulation.scenario.clone();
-        self.log = benchmark.clean_simulation(scenario, drawn.motion)?.log(trial)?;
-        let next = &benchmark.clean[self.next_motion(drawn)];
-        let diagnosis = self.diagnose(Vec::new(), Some(next), None).ok();
+        let log = self.clean_simulation(scenario, drawn.motion)?.log(trial)?;
+        let next = &self.clean[self.next_motion(drawn)];
+        let diagnosis = self.diagnose(&log, Vec::new(), Some(next), None).ok();
         Ok(diagnosis.and_then(|diagnosis| diagnosis.held_out.into_iter().next()))
     }
 }
@@ -232,7 +216,7 @@ impl Content for BlindContent {
 
 impl Trials for Benchmark {
     type Content = BlindContent;
-    type Worker<'a> = BlindWorker<'a>;
+    type Worker<'a> = &'a Self;
     type Error = BlindError;
 
     fn scenario(&self) -> &Scenario {
@@ -243,11 +227,11 @@ impl Trials for Benchmark {
         BlindContent { known: self.known.clone() }
     }
 
-    fn worker(&self) -> BlindWorker<'_> {
-        Self::worker(self)
+    fn worker(&self) -> &Self {
+        self
     }
 
-    fn trial(worker: &mut BlindWorker<'_>, trial: u64) -> Result<Record, BlindError> {
-        worker.trial(trial)
+    fn trial(worker: &mut &Self, trial: u64) -> Result<Record, BlindError> {
+        (*worker).trial(trial)
     }
 }

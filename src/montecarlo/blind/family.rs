@@ -66,10 +66,7 @@ pub const FAMILIES: [Family; 32] = [
     residual(Kind::Saturation, EACH),
     residual(Kind::TimeSkew, EACH_AND_ALL),
     residual(Kind::VelocityLag, EACH_AND_ALL),
-    residual(Kind::EncoderOffset, &[Some(2), Some(3), Some(4)]),
     residual(Kind::BaseTilt, ARM),
-    residual(Kind::Gravity, ARM),
-    residual(Kind::LinkLength, &[Some(3), Some(4)]),
     residual(Kind::Spring, EACH),
     residual(Kind::Contact, EACH_AND_ALL),
     of_the_parameters(Kind::TorqueGain, &[Some(1), Some(4), Some(5), Some(6)]),
@@ -83,6 +80,9 @@ pub const FAMILIES: [Family; 32] = [
     of_the_record(Kind::Quantisation, EACH),
     of_the_record(Kind::Outliers, EACH),
     residual(Kind::ReversalWidth, EACH_AND_ALL),
+    residual(Kind::EncoderOffset, &[Some(2), Some(3), Some(4)]),
+    residual(Kind::Gravity, ARM),
+    residual(Kind::LinkLength, &[Some(3), Some(4)]),
 ];
 
 /// Families that are hidden only if a scenario names them. Whether a drive that feeds forward another share of friction
@@ -101,11 +101,14 @@ const fn of_the_record(kind: Kind, sites: &'static [Option<usize>]) -> Family {
     Family { kind, judged: Judged::Record, sites }
 }
 
-/// Families whose torque no log can distinguish from that of `kind`: a constant torque is also a friction that differs
-/// by direction, and a spring far from its rest position. If `kind` is withheld, they are withheld too.
+/// Families whose torque a log distinguishes from that of `kind` hardly or not at all: a constant torque is also a
+/// friction that differs by direction, and a spring far from its rest position. Gravity and the length of a link both
+/// leave the weight of the links out of proportion to their inertia; what distinguishes them is seen when both are
+/// known, and is too little to be seen as a rest of one beside the other. If `kind` is withheld, they are withheld too.
 pub(super) fn kin(kind: Kind) -> &'static [Kind] {
     const CONSTANT: &[Kind] = &[Kind::CurrentOffset, Kind::AsymmetricFriction, Kind::Spring];
-    if CONSTANT.contains(&kind) { CONSTANT } else { &[] }
+    const WEIGHT: &[Kind] = &[Kind::Gravity, Kind::LinkLength];
+    [CONSTANT, WEIGHT].into_iter().find(|group| group.contains(&kind)).unwrap_or(&[])
 }
 
 /// Circumstances of a trial from which shapes and sizes are derived.

@@ -16,7 +16,7 @@ mod record;
 mod score;
 mod target;
 
-pub use benchmark::{Benchmark, BlindContent, BlindError, BlindWorker};
+pub use benchmark::{Benchmark, BlindContent, BlindError};
 pub use case::{Case, Hidden, Secret, place};
 pub use family::{FAMILIES, Family, Judged};
 pub use judge::{Outcome, is_at, is_right};

@@ -131,8 +131,7 @@ pub struct Result {
     validation: Vec<ValidationJson>,
     /// Remarks for the user.
     pub warnings: Vec<String>,
-    /// The warning which doubts that the identified parameters belong to this robot, or to any.
-    #[serde(skip)]
+    /// The warning which doubts that the identified parameters belong to this robot, or to any; null if there is none.
     pub(super) doubt: Option<Doubt>,
     rows: Rows,
     verdict: &'static str,
