@@ -1,15 +1,17 @@
 //! Least squares over several logs. Joints are weighted by their residual; the covariance comes from the scatter of
 //! block sums, which is valid for residuals whose correlation time is short against a block.
 //!
-//! x̂ = A⁻¹ Σ Xᵀy/s_j², A = Σ XᵀX/s_j², V = B/(B − 1) A⁻¹ (Σ_b g_b g_bᵀ) A⁻¹, where g_b is the sum of Xᵀe/s_j² over
-//! block b.
+//! x̂ = A⁻¹ Σ Xᵀy/s_j², A = Σ XᵀX/s_j² = L Lᵀ, V = A⁻¹ (Σ_b g̃_b g̃_bᵀ) A⁻¹, where g_b is the sum of Xᵀe/s_j² over block
+//! b, S_b that of XᵀX/s_j², T_b = L⁻¹ S_b L⁻ᵀ, and g̃_b = L (1 − T_b)^(−½) L⁻¹ g_b makes up for the adaptation of the
+//! fit to its block, as in [`BlockCluster`](crate::identify::covariance::BlockCluster).
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::error::DiagnoseError;
 use super::verdict::Estimate;
-use crate::identify::covariance::quantile_95;
+use crate::identify::covariance::{leverage_correction, quantile_95};
 
 /// Equations of one joint along one log.
 #[derive(Clone)]
@@ -29,7 +31,9 @@ pub(super) struct Solution {
     /// x̂; zero for an unknown whose column is zero everywhere.
     pub(super) x: DVector<f64>,
     covariance: DMatrix<f64>,
-    blocks: usize,
+    /// Per unknown, the number of blocks in which its column is not zero: a body on the flange is known from the blocks
+    /// of one log alone.
+    blocks: Vec<usize>,
 }
 
 /// Rounds of reweighting the joints by their residual.
@@ -44,18 +48,19 @@ pub(super) fn solve(
     let unknowns = equations.first().map_or(0, |e| e.columns.ncols());
     let singular = || DiagnoseError::Singular { log: log.to_owned(), unknowns };
     let mut sigma = vec![1.0_f64; joints];
+    let mut weights = vec![1.0; joints];
     let mut x = DVector::zeros(unknowns);
-    let mut inverse = DMatrix::zeros(unknowns, unknowns);
+    let mut root = DMatrix::zeros(unknowns, unknowns);
     for _ in 0..ROUNDS {
+        weights = sigma.iter().map(|sigma| sigma.powi(-2)).collect();
         let mut gram = DMatrix::<f64>::zeros(unknowns, unknowns);
         let mut right = DVector::<f64>::zeros(unknowns);
         for e in equations {
-            let weight = sigma[e.joint].powi(-2);
-            gram.gemm_tr(weight, &e.columns, &e.columns, 1.0);
-            right.gemv_tr(weight, &e.columns, &e.torque_nm, 1.0);
+            gram.gemm_tr(weights[e.joint], &e.columns, &e.columns, 1.0);
+            right.gemv_tr(weights[e.joint], &e.columns, &e.torque_nm, 1.0);
         }
-        inverse = scaled_inverse(&gram).ok_or_else(singular)?;
-        x = &inverse * right;
+        root = inverse_root(&gram).ok_or_else(singular)?;
+        x = &root * root.tr_mul(&right);
         let mut squares = vec![(0.0, 0usize); joints];
         for e in equations {
             let residual = &e.torque_nm - &e.columns * &x;
@@ -66,26 +71,38 @@ pub(super) fn solve(
             *sigma = (square / count.max(1) as f64).sqrt().max(f64::MIN_POSITIVE);
         }
     }
-    let blocks = equations.iter().flat_map(|e| &e.block_of).max().map_or(0, |b| b + 1);
-    let mut scores = DMatrix::<f64>::zeros(unknowns, blocks);
+    let count = equations.iter().flat_map(|e| &e.block_of).max().map_or(0, |b| b + 1);
+    let mut scores = vec![DVector::<f64>::zeros(unknowns); count];
+    let mut grams = vec![DMatrix::<f64>::zeros(unknowns, unknowns); count];
     for e in equations {
         let residual = &e.torque_nm - &e.columns * &x;
-        let weight = sigma[e.joint].powi(-2);
-        for (row, &block) in e.block_of.iter().enumerate() {
-            let factor = weight * residual[row];
-            let mut score = scores.column_mut(block);
-            score.axpy(factor, &e.columns.row(row).transpose(), 1.0);
+        let weight = weights[e.joint];
+        let mut from = 0;
+        for part in e.block_of.chunk_by(|a, b| a == b) {
+            let columns = e.columns.rows(from, part.len());
+            scores[part[0]].gemv_tr(weight, &columns, &residual.rows(from, part.len()), 1.0);
+            grams[part[0]].gemm_tr(weight, &columns, &columns, 1.0);
+            from += part.len();
         }
     }
-    let used = scores.column_iter().filter(|s| s.amax() > 0.0).count();
-    let half = &inverse * scores;
-    let covariance = &half * half.transpose() * (used as f64 / (used.max(2) - 1) as f64);
-    Ok(Solution { x, covariance, blocks: used })
+    let told_by = |k: usize| grams.iter().filter(|gram| gram[(k, k)] > 0.0).count();
+    let blocks = (0..unknowns).map(told_by).collect();
+    let effects: Vec<DVector<f64>> = grams
+        .par_iter()
+        .zip(&scores)
+        .map(|(gram, score)| {
+            let share = root.tr_mul(gram) * &root;
+            &root * (leverage_correction(&share) * root.tr_mul(score))
+        })
+        .collect();
+    let mut covariance = DMatrix::zeros(unknowns, unknowns);
+    effects.iter().for_each(|effect| covariance.ger(1.0, effect, effect, 1.0));
+    Ok(Solution { x, covariance, blocks })
 }
 
-/// Inverse of a Gram matrix, scaled to a unit diagonal first because its columns differ in size. Rows and columns of
-/// unknowns without a column become zero.
-fn scaled_inverse(gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+/// L⁻ᵀ of a Gram matrix A = L Lᵀ, so that A⁻¹ = L⁻ᵀ L⁻¹. A is scaled to a unit diagonal first because its columns differ
+/// in size. Rows and columns of unknowns without a column are zero.
+fn inverse_root(gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = gram.nrows();
     let scale: Vec<f64> = (0..n)
         .map(|k| if gram[(k, k)] > 0.0 { gram[(k, k)].sqrt().recip() } else { 0.0 })
@@ -94,8 +111,9 @@ fn scaled_inverse(gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let diagonal = if i == k && scale[i] == 0.0 { 1.0 } else { 0.0 };
         gram[(i, k)] * scale[i] * scale[k] + diagonal
     });
-    let inverse = scaled.cholesky()?.inverse();
-    Some(DMatrix::from_fn(n, n, |i, k| inverse[(i, k)] * scale[i] * scale[k]))
+    let root = scaled.cholesky()?.l().transpose().try_inverse()?;
+    let has_column = |k: usize| f64::from(u8::from(scale[k] > 0.0));
+    Some(DMatrix::from_fn(n, n, |i, k| root[(i, k)] * scale[i] * has_column(k)))
 }
 
 impl Solution {
@@ -111,7 +129,8 @@ impl Solution {
         let g = DVector::from_column_slice(gradient);
         let part = self.covariance.view((first, first), (g.len(), g.len()));
         let variance = (g.transpose() * part * &g)[(0, 0)].max(0.0);
-        let reach = quantile_95((self.blocks.max(2) - 1) as f64) * variance.sqrt();
+        let used = (0..g.len()).filter(|k| g[*k] != 0.0).map(|k| first + k);
+        let reach = quantile_95((self.least_blocks(used) - 1) as f64) * variance.sqrt();
         Estimate { value, unit, ci95: [value - reach, value + reach] }
     }
 
@@ -122,12 +141,18 @@ impl Solution {
         let x = DVector::from_fn(count, |k, _| self.x[unknowns[k]]);
         let covariance = |i: usize, k: usize| self.covariance[(unknowns[i], unknowns[k])];
         let inverse = DMatrix::from_fn(count, count, covariance).try_inverse();
-        let Some(inverse) = inverse.filter(|_| count > 0 && self.blocks > count) else {
+        let blocks = self.least_blocks(unknowns.iter().copied());
+        let Some(inverse) = inverse.filter(|_| count > 0 && blocks > count) else {
             return 1.0;
         };
         let wald = (x.transpose() * inverse * &x)[(0, 0)];
-        let free = (self.blocks - count) as f64;
-        let f = wald * free / (count * (self.blocks - 1)) as f64;
+        let free = (blocks - count) as f64;
+        let f = wald * free / (count * (blocks - 1)) as f64;
         FisherSnedecor::new(count as f64, free).map_or(1.0, |d| d.sf(f))
+    }
+
+    /// Number B of blocks that tell the least known of these unknowns; at least 2.
+    fn least_blocks(&self, unknowns: impl Iterator<Item = usize>) -> usize {
+        unknowns.map(|k| self.blocks[k]).min().unwrap_or(0).max(2)
     }
 }

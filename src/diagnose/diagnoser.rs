@@ -23,14 +23,14 @@ use super::replay::measured_nm;
 use super::rms::rms_where;
 use super::scene::Scene;
 use super::selection::{Contender, Kept, select};
-use super::settled::{beside_model, residual, settled, without_contacts};
+use super::settled::{beside_model, fitted, residual, settled, without_contacts};
 use super::study::{Entry, Study};
 use super::verdict::{Cause, Diagnosis, HeldOut, Rival, Rms, Unexplained, Verdict};
 use crate::base::BaseSet;
 use crate::dynamics::{Model, Parameter};
 use crate::identify::{
     Doubt, Identification, Identifier, Measurement, Misreading, Options, Regression,
-    drive_limit_remark, unlike,
+    drive_limit_remark, drives_at_limits, unlike,
 };
 use crate::robot::{Arm, JointSignals};
 
@@ -152,7 +152,10 @@ impl<'a> Diagnoser<'a> {
             log.warning.iter().chain(&identification.warnings).cloned().collect();
         warnings.extend(contact_remark(&study, &log));
         let drift = drift_remark(&study, &causes);
-        warnings.extend(drive_limit_remark(self.arm, m.torque_nm));
+        let limited = limited_drives(self.arm, m.torque_nm, &causes, unexplained.as_ref());
+        if limited.is_empty() {
+            warnings.extend(drive_limit_remark(self.arm, m.torque_nm));
+        }
         for held_out in &held_out {
             let with_name = |warning: &String| format!("{}: {warning}", held_out.log);
             warnings.extend(held_out.warnings.iter().map(with_name));
@@ -165,6 +168,7 @@ impl<'a> Diagnoser<'a> {
             let of = |j: usize| rms_where(e.joint(j), |k| study.whitening.counts(j, k));
             (0..e.joints()).map(of).collect()
         };
+        let after_rms_nm = rms(&after_nm);
         let mut diagnosis = Diagnosis {
             log: m.source.to_owned(),
             noise_floor_nm: identification.replicates.as_ref().map(|r| r.sigma.clone()),
@@ -176,8 +180,8 @@ impl<'a> Diagnoser<'a> {
                 (None, false) => Verdict::CauseNamed,
             },
             causes,
-            unexplained,
-            after: Rms { rms_nm: rms(&after_nm) },
+            unexplained: unexplained.map(|unknown| unknown.at_most(&after_rms_nm)),
+            after: Rms { rms_nm: after_rms_nm },
             base_parameters: base.parameters,
             held_out,
             moved_parameters,
@@ -197,6 +201,7 @@ impl<'a> Diagnoser<'a> {
         // as noise in everything that follows.
         let place = if diagnosis.causes.is_empty() { 0 } else { diagnosis.sentences.len() };
         drift.into_iter().for_each(|drift| diagnosis.sentences.insert(place, drift));
+        diagnosis.sentences.splice(0..0, limited);
         if let Some(doubt) = simulation.and_then(|simulation| simulation.doubt) {
             // Everything that follows rests on the simulation.
             diagnosis.sentences.insert(0, doubt.to_owned());
@@ -289,7 +294,8 @@ impl<'a> Diagnoser<'a> {
             alike: selected.alike(),
         });
         let found: Vec<Found> = found.collect();
-        let explained = against::explain(study, self.set, simulation, &found);
+        let fitted_nm = fitted(study, &model.extension);
+        let explained = against::explain(study, self.set, simulation, &found, &fitted_nm);
         model.causes.retain(|c| !explained.judged.contains(&(c.kind, c.joint)));
         model.causes.extend(explained.causes);
         if simulation.doubt.is_some() {
@@ -515,6 +521,34 @@ fn unexplained(
         causes.iter().any(|cause| cause.kind.is_a_law() && is_there(cause))
     };
     misfit::unexplained(study, accepted, rest, lack, has_law, can_differ)
+}
+
+/// Share of the samples from which on a drive at its limit is told before what is named on its joint.
+const OFTEN_LIMITED: f64 = 0.01;
+
+/// The sentences about drives that are often at their limits, if something is named or `unexplained` where they act.
+fn limited_drives(
+    arm: &Arm,
+    torque_nm: &JointSignals,
+    causes: &[Cause],
+    unexplained: Option<&Unexplained>,
+) -> Vec<String> {
+    let laws = causes.iter().filter(|cause| cause.kind.is_a_law()).map(|cause| cause.joint);
+    let places: Vec<Option<usize>> = laws.chain(unexplained.map(|u| Some(u.joint))).collect();
+    let limited = drives_at_limits(arm, torque_nm).into_iter();
+    limited
+        .filter(|at| at.share > OFTEN_LIMITED)
+        .filter(|at| places.iter().any(|place| place.is_none_or(|joint| joint == at.joint + 1)))
+        .map(|at| {
+            format!(
+                "Joint {}'s drive is at its torque limit ({} Nm) in {:.1} % of the samples. Where it leaves the limit, the torque changes \
+                 faster than the log can follow, and what is named or unexplained may come from that: move more slowly or with less load.",
+                at.joint + 1,
+                at.limit_nm,
+                100.0 * at.share
+            )
+        })
+        .collect()
 }
 
 /// States why contacts were not looked for, if they were not.

@@ -123,6 +123,9 @@ pub fn unexplained(
     found.into_iter().rfind(of_joint).map(|curve| curve.unexplained)
 }
 
+/// The axis of a curve that does not repeat from period to period.
+pub(super) const SINCE_THE_START: &str = "time since the start";
+
 /// A joint, and what is known of it when its curves are tried.
 struct Around {
     joint: usize,
@@ -280,7 +283,7 @@ fn since_the_start(scene: &Scene, j: usize) -> Option<(Axis, Curves)> {
     let part_s = samples as f64 / scene.rate_hz / knots as f64;
     let at = (0..knots).map(|k| scene.lead_in_s + (k as f64 + 0.5) * part_s).collect();
     let (knots, hats) = hats_at(at, &time);
-    Some((("time since the start", "s"), (knots, times(hats, sign))))
+    Some(((SINCE_THE_START, "s"), (knots, times(hats, sign))))
 }
 
 /// The hats times the `direction` of motion, which is the same in every period.

@@ -42,7 +42,9 @@ pub fn repeated(first: &Finding, second: &Finding) -> Option<Repeated> {
                 count += 1;
             }
         }
-        square / f64::from(count.max(1))
+        // What hardly overlaps is not compared.
+        let is_enough = 2 * count >= a.joints() * a.samples().min(b.samples());
+        if is_enough { square / count as f64 } else { f64::INFINITY }
     };
     let (shift, square) =
         (-longest..=longest).map(|shift| (shift, off(shift))).min_by(|x, y| x.1.total_cmp(&y.1))?;

@@ -397,7 +397,7 @@ impl<'s, 'a> Kept<'s, 'a> {
             let same =
                 |c: &&mut Contender| (c.entry.family, c.entry.site) == (entry.family, entry.site);
             match best.iter_mut().find(same) {
-                Some(old) if old.score.gain >= score.gain => {}
+                Some(old) if old.evidence >= evidence => {}
                 Some(old) => *old = Contender { entry: entry.clone(), score, evidence },
                 None => best.push(Contender { entry: entry.clone(), score, evidence }),
             }

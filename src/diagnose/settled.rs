@@ -88,10 +88,16 @@ pub fn beside_model(study: &Study, after_nm: &JointSignals) -> Result<BesideMode
     contact::beside_model(after_nm, &qd, &time_s, &low_pass)
 }
 
+/// Torque that `model` predicts along its own log, Nm, at the samples of the regression.
+pub fn fitted(study: &Study, model: &Extension) -> JointSignals {
+    let problem = &study.regression.problem;
+    model.torque_nm(study.families, &study.scene, problem, Some(&study.whitening))
+}
+
 /// Residual of `model` over time, Nm: of the mean period, or of the single run.
 pub fn residual(study: &Study, model: &Extension) -> JointSignals {
     let problem = &study.regression.problem;
-    let predicted = model.torque_nm(study.families, &study.scene, problem, Some(&study.whitening));
+    let predicted = fitted(study, model);
     let mut out = JointSignals::zeros(problem.joints(), problem.samples);
     for (j, panel) in problem.panels.iter().enumerate() {
         let y = mean_period(&panel.y, problem.samples);

@@ -375,12 +375,9 @@ impl<'a> Study<'a> {
         dot(&residual.mean[own.clone()], &residual.mean[own])
     }
 
-    /// Whitened torque of the null model with base parameters `theta` on joint `j` alone.
-    pub fn torque_on(&self, j: usize, theta: &[f64]) -> Image {
-        let problem = &self.regression.problem;
-        let mut torque = vec![0.0; problem.samples];
-        problem.predict(j, theta, &mut torque);
-        self.whitening.regression_image(&Column::on(j, torque))
+    /// Whitened image of a torque on joint `j` alone, sampled as the regression is.
+    pub fn torque_on(&self, j: usize, torque_nm: &[f64]) -> Image {
+        self.whitening.regression_image(&Column::on(j, torque_nm.to_vec()))
     }
 
     /// Number of base parameters in the null model.

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::kind::Kind;
+use super::misfit::SINCE_THE_START;
 use super::payload::PayloadFinding;
 use super::replay::Replay;
 use crate::identify::Doubt;
@@ -118,6 +119,17 @@ pub struct Unexplained {
     pub rms_nm: f64,
     /// Points of the curve: value of the quantity and torque, Nm.
     pub curve: Vec<[f64; 2]>,
+}
+
+impl Unexplained {
+    /// The same with no more than the residual of its joint, whose rms per joint is `residual_nm`: the curve may hold a
+    /// part that the parameters absorb. What does not repeat is not in the residual of the mean period.
+    pub(super) fn at_most(mut self, residual_nm: &[f64]) -> Self {
+        if self.axis != SINCE_THE_START {
+            self.rms_nm = self.rms_nm.min(residual_nm[self.joint - 1]);
+        }
+        self
+    }
 }
 
 /// Smallest effect of a family that this log would show.

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::columns::ColumnPlan;
 use super::fit::{FitError, Fitter, Weighting};
 use super::problem::Problem;
-use super::whiten::{Spectrum, decorrelation, mix};
+use super::whiten::{Spectrum, mix};
 use crate::base::BaseSet;
 
 /// Torque noise of known statistics.
@@ -42,7 +42,7 @@ pub fn cramer_rao(
     let correlation =
         DMatrix::from_fn(joints, joints, |i, k| if i == k { 1.0 } else { noise.correlation });
     let mut whitened = Problem::new(plan.cumulative(), problem.rate_hz);
-    mix(&rows, &weights, &decorrelation(&correlation), &mut whitened);
+    mix(&rows, &weights, &correlation, &mut whitened);
     let fit = Fitter::new(&whitened).fit(&whitened, set, Weighting::Equal)?;
     let covariance = &fit.inverse * fit.inverse.transpose() / problem.periods as f64;
     Ok(covariance.diagonal().iter().map(|v| v.sqrt()).collect())

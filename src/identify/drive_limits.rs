@@ -1,25 +1,45 @@
 //! Checks whether drives reached their torque limits along a log.
 
-use crate::robot::{Arm, JointSignals};
+use crate::robot::{Arm, Joint, JointSignals};
 
 /// Share of its largest torque beyond which a drive counts as being at its limit: readings scatter there by noise and
 /// by the tolerance of the gain.
 const NEAR: f64 = 0.99;
+
+/// A drive that reaches its torque limit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AtLimit {
+    /// Joint, 0-based.
+    pub joint: usize,
+    /// Share of the samples in which it is at its limit.
+    pub share: f64,
+    /// The limit, Nm.
+    pub limit_nm: f64,
+}
+
+/// The drives that are at their limits in samples of `torque_nm` (joints × samples).
+pub fn drives_at_limits(arm: &Arm, torque_nm: &JointSignals) -> Vec<AtLimit> {
+    let samples = torque_nm.samples().max(1) as f64;
+    let joints = arm.joints.iter().enumerate().take(torque_nm.joints());
+    let of_joint = |(joint, j): (usize, &Joint)| {
+        let limit_nm = j.limits.torque_nm;
+        let is_near = |t: &&f64| t.abs() > NEAR * limit_nm;
+        let share = torque_nm.joint(joint).iter().filter(is_near).count() as f64 / samples;
+        AtLimit { joint, share, limit_nm }
+    };
+    joints.map(of_joint).filter(|at| at.share > 0.0).collect()
+}
 
 /// A remark where drives are at their limits in samples of `torque_nm` (joints × samples); `None` where none is.
 ///
 /// The equations of motion hold there as elsewhere, but the arm does not move as commanded, and the torque leaves the
 /// limit within a sample or two, faster than a log can follow.
 pub fn drive_limit_remark(arm: &Arm, torque_nm: &JointSignals) -> Option<String> {
-    let samples = torque_nm.samples().max(1) as f64;
-    let of_joint = |(j, joint): (usize, &crate::robot::Joint)| {
-        let limit_nm = joint.limits.torque_nm;
-        let at_limit = torque_nm.joint(j).iter().filter(|t| t.abs() > NEAR * limit_nm).count();
-        let percent = 100.0 * at_limit as f64 / samples;
-        (at_limit > 0).then(|| format!("joint {} in {percent:.1} % ({limit_nm} Nm)", j + 1))
+    let in_words = |at: &AtLimit| {
+        let percent = 100.0 * at.share;
+        format!("joint {} in {percent:.1} % ({} Nm)", at.joint + 1, at.limit_nm)
     };
-    let joints: Vec<String> =
-        arm.joints.iter().enumerate().take(torque_nm.joints()).filter_map(of_joint).collect();
+    let joints: Vec<String> = drives_at_limits(arm, torque_nm).iter().map(in_words).collect();
     (!joints.is_empty()).then(|| {
         format!(
             "drives are at their torque limits in some samples: {}; where the torque leaves its limit it changes faster than the log can \

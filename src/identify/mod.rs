@@ -41,7 +41,7 @@ pub use columns::ColumnPlan;
 pub use course::Course;
 pub use doubt::Doubt;
 pub use drive_answers::{FEEDBACK_RAD_S, drive_answers, feedback_per_tick};
-pub use drive_limits::drive_limit_remark;
+pub use drive_limits::{AtLimit, drive_limit_remark, drives_at_limits};
 pub use error::IdentifyError;
 pub use estimation::{Estimate, Estimation, MotionAids};
 pub use even::BetweenRows;

@@ -261,13 +261,17 @@ pub(super) fn unwrapped(motion: &Motion) -> (Vec<Unwrapped>, Option<LogWarning>)
 const BESIDE: usize = 5;
 
 /// For every row of a log without velocities the reason why its angles are rejected, if they are. An angle far from the
-/// median of five rows is wild; it would corrupt the slopes of four neighbouring rows. While a joint turns in one
-/// direction, the median is the angle itself.
+/// median of five rows, each carried to its own instant by their median step, is wild; it would corrupt the slopes of
+/// four neighbouring rows.
 pub(super) fn wild_angles(motion: &Motion) -> Vec<Option<Reason>> {
     let rows = motion.rows();
     let is_wild = |q: &Vec<f64>, k: usize| {
         let from = k.saturating_sub(BESIDE / 2).min(rows.saturating_sub(BESIDE));
-        let beside = median(&mut q[from..rows.min(from + BESIDE)].to_vec());
+        let beside = &q[from..rows.min(from + BESIDE)];
+        let step = median(&mut beside.windows(2).map(|w| w[1] - w[0]).collect::<Vec<f64>>());
+        let step = step.unwrap_or(0.0);
+        let carried = beside.iter().zip(from..).map(|(q, at)| q + step * (k as f64 - at as f64));
+        let beside = median(&mut carried.collect::<Vec<f64>>());
         beside.is_some_and(|beside| (q[k] - beside).abs() > STEP_TOLERANCE_RAD)
     };
     let verdict = |k: usize| match k {

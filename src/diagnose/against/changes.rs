@@ -1,7 +1,7 @@
 //! Possible differences between an arm and a simulation of it, and the torque that each of them adds.
 //!
 //! A body on the flange adds X K δ, with δ its ten inertial parameters and K the map to base parameters. Another
-//! friction adds multiples of the friction columns, and a wrong torque constant a share of the joint's torque. A change
+//! friction adds multiples of the friction columns, and a wrong torque constant a share of the recorded torque. A change
 //! of gravity, tilt or length adds the difference that it makes to the inverse dynamics of the arm.
 
 use std::collections::BTreeMap;
@@ -15,9 +15,13 @@ use crate::diagnose::kind::Kind;
 use crate::diagnose::study::Study;
 use crate::diagnose::verdict::Estimate;
 use crate::dynamics::{Parameter, ParameterLayout};
+use crate::robot::JointSignals;
 
 /// Function from coefficients to physical parameters; `None` for coefficients that the data do not determine.
 type Quantities<'a> = Box<dyn Fn(&[Option<f64>]) -> Vec<Quantity> + 'a>;
+
+/// Function from coefficients to whitened columns; see [`Candidate::secants`].
+type Secants<'a> = Box<dyn Fn(&[f64]) -> Option<Vec<Image>> + 'a>;
 
 /// A physical change that may have moved the parameters.
 pub(super) struct Change<'a> {
@@ -26,6 +30,8 @@ pub(super) struct Change<'a> {
     /// Whitened column of each coefficient; zero where it has no effect.
     pub(super) images: Vec<Image>,
     quantities: Quantities<'a>,
+    /// Columns of a change of this size, for changes whose torque is not proportional to their size.
+    pub(super) secants: Option<Secants<'a>>,
     pub(super) in_words: &'static str,
     /// The experiment that separates it from what looks alike.
     pub(super) separating_experiment: &'static str,
@@ -72,8 +78,13 @@ impl Change<'_> {
     }
 }
 
-/// All changes that are looked for.
-pub(super) fn all<'a>(study: &'a Study<'a>, set: &BaseSet, simulation: &[f64]) -> Vec<Change<'a>> {
+/// All changes that are looked for. `fitted_nm` is the recorded torque without what the extended model leaves of it, at
+/// the samples of the regression: noise in a column of torque would count as explained.
+pub(super) fn all<'a>(
+    study: &'a Study<'a>,
+    set: &BaseSet,
+    fitted_nm: &JointSignals,
+) -> Vec<Change<'a>> {
     let scene = &study.scene;
     let joints = scene.joints();
     let layout = ParameterLayout::new(joints);
@@ -88,6 +99,7 @@ pub(super) fn all<'a>(study: &'a Study<'a>, set: &BaseSet, simulation: &[f64]) -
         site: None,
         images: (0..10).map(|k| image(Parameter::Body(last, k))).collect(),
         quantities: Box::new(payload),
+        secants: None,
         in_words: "a body on the flange",
         separating_experiment: "the same motion with the flange bare",
     }];
@@ -97,14 +109,17 @@ pub(super) fn all<'a>(study: &'a Study<'a>, set: &BaseSet, simulation: &[f64]) -
             site: Some(j),
             images: [Parameter::Coulomb(j), Parameter::Viscous(j)].map(image).into(),
             quantities: Box::new(friction),
+            secants: None,
             in_words: "friction that is not what the simulation assumes",
             separating_experiment: "the same motion after half an hour of work",
         });
         out.push(Change {
             kind: Kind::TorqueGain,
             site: Some(j),
-            images: vec![study.torque_on(j, simulation)],
-            quantities: Box::new(|b| told("error_fraction", b[0], "")),
+            images: vec![study.torque_on(j, fitted_nm.joint(j))],
+            // Of the recorded torque (1 + e) τ, the share e/(1 + e) is too much, whatever else changed.
+            quantities: Box::new(|b| told("error_fraction", b[0].map(|b| b / (1.0 - b)), "")),
+            secants: None,
             in_words: "a wrong torque constant",
             separating_experiment: "a known payload: it scales every torque constant",
         });
@@ -146,6 +161,10 @@ fn of_family<'a>(
         site,
         images: columns.iter().map(|c| study.whitening.image(c)).collect(),
         quantities: Box::new(move |b| of_told(b, |b| family.quantities(scene, site, shape, b))),
+        secants: Some(Box::new(move |b| {
+            let columns = family.secants(scene, site, b)?;
+            Some(columns.iter().map(|c| study.whitening.image(c)).collect())
+        })),
         in_words: family.in_words(),
         separating_experiment: family.separating_experiment(),
     }

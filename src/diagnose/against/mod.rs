@@ -27,6 +27,7 @@ use super::verdict::{BaseParameter, Cause, Moved, MovedTogether, Rival};
 use super::whitening::RepeatingNoise;
 use crate::base::BaseSet;
 use crate::identify::covariance::squared_distance;
+use crate::robot::JointSignals;
 
 /// Maximum number of changes.
 const MOST_CHANGES: usize = 8;
@@ -187,8 +188,14 @@ pub struct Explained {
 }
 
 /// Finds the changes that explain how the data differ from the simulation; `accepted` are the effects that were found
-/// beside the null model.
-pub fn explain(study: &Study, set: &BaseSet, simulation: Nominal, accepted: &[Found]) -> Explained {
+/// beside the null model, which with them predicts the torque `fitted_nm`.
+pub fn explain(
+    study: &Study,
+    set: &BaseSet,
+    simulation: Nominal,
+    accepted: &[Found],
+    fitted_nm: &JointSignals,
+) -> Explained {
     let Nominal { theta, covariance, .. } = simulation;
     let unknown = Unknown::new(study, covariance);
     let mut residual = study.torque.clone();
@@ -196,7 +203,7 @@ pub fn explain(study: &Study, set: &BaseSet, simulation: Nominal, accepted: &[Fo
         residual.add(-theta, column);
     }
     unknown.whiten(std::slice::from_mut(&mut residual));
-    let changes = changes::all(study, set, theta);
+    let changes = changes::all(study, set, fitted_nm);
     let images = changes.iter().map(|change| unknown.whitened(change.images.clone())).collect();
     let is_change = |entry: &Entry| {
         let place = (study.families[entry.family].kind(), entry.site);
@@ -214,6 +221,8 @@ pub fn explain(study: &Study, set: &BaseSet, simulation: Nominal, accepted: &[Fo
     let nuisance = nuisance(study, &unknown, beside.iter());
     let mut search = Search { study, changes, images, places, unknown, nuisance, residual };
     let mut taken = search.select();
+    search.set_to_size(&taken);
+    taken = search.select();
     // An accepted effect may have been the part of a change that the null model could not absorb.
     while let Some(needless) = (0..beside.len()).find(|&e| !search.needs(e, &beside, &taken)) {
         let entry = beside.remove(needless).entry;
@@ -297,6 +306,23 @@ impl Search<'_> {
             }
         }
         taken
+    }
+
+    /// Replaces the columns of the changes `taken`, which are those of small changes, by those of their size.
+    fn set_to_size(&mut self, taken: &[usize]) {
+        for (index, &c) in taken.iter().enumerate() {
+            let Some(secants) = &self.changes[c].secants else { continue };
+            let (others, left) = self.outside(&without(taken, index));
+            let (span, places) = Span::telling(&others, &self.images[c]);
+            let mut b = vec![0.0; self.images[c].len()];
+            for (told, (place, _)) in span.solve(&left).into_iter().zip(places) {
+                b[place] = told;
+            }
+            if let Some(images) = secants(&b) {
+                self.images[c] = self.unknown.whitened(images.clone());
+                self.changes[c].images = images;
+            }
+        }
     }
 
     /// Whether effect number `e` of those `beside` is worth its price beside the other effects and the changes `taken`.

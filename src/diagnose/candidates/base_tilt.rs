@@ -10,6 +10,19 @@ pub struct BaseTilt;
 /// Tilt at which the torque change is evaluated, rad: small enough for it to be linear.
 const SMALL_RAD: f64 = 1e-5;
 
+/// Torque per angle about each axis, for tilts by these angles, rad.
+fn tilted(scene: &Scene, angles_rad: [f64; 2]) -> Vec<Column> {
+    [Vector3::x_axis(), Vector3::y_axis()]
+        .iter()
+        .zip(angles_rad)
+        .map(|(axis, angle_rad)| {
+            // The base turns by +angle, so that gravity turns by −angle in the base frame.
+            let turn = Rotation3::from_axis_angle(axis, -angle_rad);
+            of_changed_arm(scene, angle_rad, |arm| arm.gravity_m_s2 = turn * arm.gravity_m_s2)
+        })
+        .collect()
+}
+
 impl Candidate for BaseTilt {
     fn kind(&self) -> Kind {
         Kind::BaseTilt
@@ -20,14 +33,11 @@ impl Candidate for BaseTilt {
     }
 
     fn columns(&self, scene: &Scene, _: Option<usize>, _: Shape) -> Vec<Column> {
-        [Vector3::x_axis(), Vector3::y_axis()]
-            .iter()
-            .map(|axis| {
-                // The base turns by +angle, so that gravity turns by −angle in the base frame.
-                let turn = Rotation3::from_axis_angle(axis, -SMALL_RAD);
-                of_changed_arm(scene, SMALL_RAD, |arm| arm.gravity_m_s2 = turn * arm.gravity_m_s2)
-            })
-            .collect()
+        tilted(scene, [SMALL_RAD; 2])
+    }
+
+    fn secants(&self, scene: &Scene, _: Option<usize>, b: &[f64]) -> Option<Vec<Column>> {
+        Some(tilted(scene, [0, 1].map(|axis| large(b[axis], SMALL_RAD))))
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {

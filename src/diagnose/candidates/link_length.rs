@@ -12,6 +12,17 @@ pub struct LinkLength;
 /// Step of the numerical derivative, m: small compared with links, large compared with rounding.
 const STEP_M: f64 = 1e-4;
 
+/// Torque per length, for a link before joint `j` that is longer by `error_m`.
+fn lengthened(scene: &Scene, j: usize, error_m: f64) -> Column {
+    let length_m = scene.arm.joints[j].placement.translation_m.norm();
+    if length_m == 0.0 {
+        return Column::default();
+    }
+    of_changed_arm(scene, error_m, |arm| {
+        arm.joints[j].placement.translation_m *= 1.0 + error_m / length_m;
+    })
+}
+
 impl Candidate for LinkLength {
     fn kind(&self) -> Kind {
         Kind::LinkLength
@@ -23,15 +34,11 @@ impl Candidate for LinkLength {
     }
 
     fn columns(&self, scene: &Scene, site: Option<usize>, _: Shape) -> Vec<Column> {
-        let j = joint(site);
-        let length_m = scene.arm.joints[j].placement.translation_m.norm();
-        if length_m == 0.0 {
-            return vec![Column::default()];
-        }
-        let longer = |arm: &mut Arm| {
-            arm.joints[j].placement.translation_m *= 1.0 + STEP_M / length_m;
-        };
-        vec![of_changed_arm(scene, STEP_M, longer)]
+        vec![lengthened(scene, joint(site), STEP_M)]
+    }
+
+    fn secants(&self, scene: &Scene, site: Option<usize>, b: &[f64]) -> Option<Vec<Column>> {
+        Some(vec![lengthened(scene, joint(site), large(b[0], STEP_M))])
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, _: Shape, b: &[f64]) -> Vec<Quantity> {

@@ -200,6 +200,12 @@ pub trait Candidate: Sync {
         0.0
     }
 
+    /// The columns for an effect with the coefficients `b`: its torque over its size, where the torque of a large effect
+    /// is not proportional to its size; `None` where it is. [`Self::columns`] are those of a small effect.
+    fn secants(&self, _scene: &Scene, _site: Option<usize>, _b: &[f64]) -> Option<Vec<Column>> {
+        None
+    }
+
     /// Lower bound of the physical parameters: estimates below it are due to noise.
     fn least(&self) -> f64 {
         f64::NEG_INFINITY
@@ -313,7 +319,12 @@ fn dry_friction(scene: &Scene, j: usize, level: impl Fn(&Instants, usize) -> f64
     Column::on(j, scene.as_logged(friction))
 }
 
-/// Torque per unit of a small `change` of the arm, of size `step`, along the motion.
+/// The size `b` of a change, or `least` where the change is smaller.
+fn large(b: f64, least: f64) -> f64 {
+    if b.abs() > least { b } else { least }
+}
+
+/// Torque per unit of a `change` of the arm, of size `step`, along the motion.
 fn of_changed_arm(scene: &Scene, step: f64, change: impl Fn(&mut Arm)) -> Column {
     let mut arm = scene.arm.clone();
     change(&mut arm);

@@ -265,15 +265,27 @@ const WORSE: f64 = 1.1;
 impl ReplayedLog {
     /// Mean square that the causes remove from the torque error of joint `j`, in units of its noise where that is known.
     fn gain(&self, j: usize) -> f64 {
-        let square = |distance: &Distance| distance.torque_rms_nm[j].powi(2);
+        self.off(j) - self.in_noise(j, self.after.torque_rms_nm[j])
+    }
+
+    /// Mean square of the torque error of joint `j` without the causes, in units of its noise where that is known.
+    fn off(&self, j: usize) -> f64 {
+        self.in_noise(j, self.before.torque_rms_nm[j])
+    }
+
+    /// Square of a torque of joint `j`, in units of its noise where that is known.
+    fn in_noise(&self, j: usize, torque_nm: f64) -> f64 {
         let noise_nm = self.noise_nm.as_ref().filter(|noise| noise.iter().all(|n| *n > 0.0));
-        (square(&self.before) - square(&self.after)) / noise_nm.map_or(1.0, |n| n[j].powi(2))
+        (torque_nm / noise_nm.map_or(1.0, |n| n[j])).powi(2)
     }
 
     /// The joint (0-based) whose torque improves most, in units of its noise where that is known.
     pub fn worst_joint(&self) -> usize {
         let joints = 0..self.before.torque_rms_nm.len();
-        joints.max_by(|&a, &b| self.gain(a).total_cmp(&self.gain(b))).unwrap_or(0)
+        // Where nothing was named, the joint that is farthest off.
+        let is_alike = self.before.torque_rms_nm == self.after.torque_rms_nm;
+        let of = |j: usize| if is_alike { self.off(j) } else { self.gain(j) };
+        joints.max_by(|&a, &b| of(a).total_cmp(&of(b))).unwrap_or(0)
     }
 
     /// The joint (0-based) that the causes make worst by far, if they make any worse.

@@ -24,11 +24,11 @@ use crate::identify::problem::{Domain, Problem};
 pub struct BlockCluster;
 
 /// Length of a block, s: longer than the memory of motor-current noise (about 1 s), short enough for many blocks.
-const BLOCK_S: f64 = 5.0;
+pub const BLOCK_S: f64 = 5.0;
 /// Shortest block, s, to which blocks may shrink in short records.
 const SHORTEST_BLOCK_S: f64 = 1.0;
 /// Fewest blocks: with fewer the variance would be left to chance.
-const LEAST_BLOCKS: usize = 6;
+pub const LEAST_BLOCKS: usize = 6;
 
 impl CovarianceMethod for BlockCluster {
     fn covariance(&self, problem: &Problem, fit: &Fit) -> Result<Covariance, CovarianceError> {
@@ -97,12 +97,17 @@ impl Leverage {
         }
         normal.fill_upper_triangle_with_lower_triangle();
         let share = fit.inverse.tr_mul(&normal) * &fit.inverse / problem.periods as f64;
-        let parts = share.clone().symmetric_eigen();
-        let factor = parts.eigenvalues.map(|t| (1.0 - t).max(LEAST_LEFT).powf(-0.5));
-        let correction =
-            &parts.eigenvectors * DMatrix::from_diagonal(&factor) * parts.eigenvectors.transpose();
+        let correction = leverage_correction(&share);
         Self { share, correction }
     }
+}
+
+/// (1 − T)^(−½) for a block with the share T of the information: the factor by which its score has to be enlarged
+/// because the fit adapted to it.
+pub fn leverage_correction(share: &DMatrix<f64>) -> DMatrix<f64> {
+    let parts = share.clone().symmetric_eigen();
+    let factor = parts.eigenvalues.map(|t| (1.0 - t).max(LEAST_LEFT).powf(-0.5));
+    &parts.eigenvectors * DMatrix::from_diagonal(&factor) * parts.eigenvectors.transpose()
 }
 
 /// G_b of all blocks, period after period.

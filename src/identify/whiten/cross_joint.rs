@@ -1,5 +1,7 @@
 //! Whitens noise that is correlated between joints.
 
+use std::ops::Range;
+
 use nalgebra::DMatrix;
 
 use crate::identify::fit::Fit;
@@ -15,7 +17,7 @@ pub fn decorrelate(problem: &Problem, fit: &Fit, out: &mut Problem) {
         residuals.joint(i).iter().zip(residuals.joint(k)).map(|(a, b)| a * b).sum()
     });
     let weights: Vec<Vec<f64>> = fit.weights.iter().map(|w| vec![*w; problem.samples]).collect();
-    mix(problem, &weights, &decorrelation(&correlation(&products)), out);
+    mix(problem, &weights, &correlation(&products), out);
 }
 
 /// Least standard deviation of the part of a joint's noise that the other joints do not predict, over that of all its
@@ -25,7 +27,7 @@ const ALL_BUT_ALIKE: f64 = 1e-4;
 /// U, upper triangular, with U C Uᵀ = 1 for a correlation matrix C: row j mixes joint j only with the joints after
 /// it, so that wrist equations keep their few columns. The identity where the noise of one joint equals a combination
 /// of the others' to within [`ALL_BUT_ALIKE`].
-pub fn decorrelation(correlation: &DMatrix<f64>) -> DMatrix<f64> {
+fn decorrelation(correlation: &DMatrix<f64>) -> DMatrix<f64> {
     let n = correlation.nrows();
     let reversed = DMatrix::from_fn(n, n, |i, k| correlation[(n - 1 - i, n - 1 - k)]);
     let inverse = nalgebra::Cholesky::new(reversed)
@@ -39,7 +41,7 @@ pub fn decorrelation(correlation: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// Correlation of the joints from the sums of products of their deviations; a joint without deviations is
 /// uncorrelated.
-pub fn correlation(products: &DMatrix<f64>) -> DMatrix<f64> {
+fn correlation(products: &DMatrix<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(products.nrows(), products.nrows(), |i, k| {
         let scale = (products[(i, i)] * products[(k, k)]).sqrt();
         if i == k {
@@ -52,10 +54,12 @@ pub fn correlation(products: &DMatrix<f64>) -> DMatrix<f64> {
     })
 }
 
-/// Equation j of `out` = Σ_{i ≥ j} U_ji · weight_i · equation i of `problem`, row by row;
-/// `weights[i]` has one entry per row. `out` has the cumulative plan of `problem`.
-pub fn mix(problem: &Problem, weights: &[Vec<f64>], u: &DMatrix<f64>, out: &mut Problem) {
+/// Equation j of `out` = Σ_{i ≥ j} U_ji · weight_i · equation i of `problem`, row by row, with U from the `correlation`
+/// of the joints whose weight is not zero in that row; a row without weight stays zero. `weights[i]` has one entry per
+/// row. `out` has the cumulative plan of `problem`.
+pub fn mix(problem: &Problem, weights: &[Vec<f64>], correlation: &DMatrix<f64>, out: &mut Problem) {
     let n = problem.samples;
+    let stretches = stretches(weights, correlation);
     out.samples = n;
     out.periods = problem.periods;
     out.rate_hz = problem.rate_hz;
@@ -67,26 +71,57 @@ pub fn mix(problem: &Problem, weights: &[Vec<f64>], u: &DMatrix<f64>, out: &mut 
         target.y.clear();
         target.y.resize(problem.periods * n, 0.0);
         for i in j..problem.joints() {
-            let factor = u[(j, i)];
-            if factor == 0.0 {
-                continue;
-            }
             let source = &problem.panels[i];
+            let add = |values: &[f64], out: &mut [f64]| {
+                for Stretch { rows, u } in &stretches {
+                    let factor = u[(j, i)];
+                    for k in rows.clone() {
+                        out[k] += factor * weights[i][k] * values[k];
+                    }
+                }
+            };
             for (base, column) in problem.plan.base_indices(i).zip(source.x.chunks_exact(n)) {
                 let at = bases.partition_point(|b| *b < base);
-                add(factor, &weights[i], column, &mut target.x[at * n..(at + 1) * n]);
+                add(column, &mut target.x[at * n..(at + 1) * n]);
             }
             for (y, out) in source.y.chunks_exact(n).zip(target.y.chunks_exact_mut(n)) {
-                add(factor, &weights[i], y, out);
+                add(y, out);
             }
         }
     }
 }
 
-fn add(factor: f64, weights: &[f64], values: &[f64], out: &mut [f64]) {
-    for ((out, value), weight) in out.iter_mut().zip(values).zip(weights) {
-        *out += factor * weight * value;
+/// Rows in which the same joints have weight, with their U.
+struct Stretch {
+    rows: Range<usize>,
+    u: DMatrix<f64>,
+}
+
+fn stretches(weights: &[Vec<f64>], correlation: &DMatrix<f64>) -> Vec<Stretch> {
+    let joints = weights.len();
+    let rows = weights.iter().map(Vec::len).min().unwrap_or(0);
+    let used = |k: usize| -> Vec<bool> { weights.iter().map(|w| w[k] != 0.0).collect() };
+    let mut out: Vec<Stretch> = Vec::new();
+    let mut last: Option<Vec<bool>> = None;
+    for k in 0..rows {
+        let used = used(k);
+        match out.last_mut() {
+            Some(stretch) if last.as_ref() == Some(&used) => stretch.rows.end = k + 1,
+            _ => {
+                let both = |i: usize, j: usize| used[i] && used[j];
+                let own = DMatrix::from_fn(joints, joints, |i, j| match i == j {
+                    true => 1.0,
+                    false if both(i, j) => correlation[(i, j)],
+                    false => 0.0,
+                });
+                let mut u = decorrelation(&own);
+                (0..joints).filter(|j| !used[*j]).for_each(|j| u[(j, j)] = 0.0);
+                out.push(Stretch { rows: k..k + 1, u });
+            }
+        }
+        last = Some(used);
     }
+    out
 }
 
 #[cfg(test)]
@@ -100,6 +135,25 @@ mod tests {
         let one = &u * &c * u.transpose();
         assert!((one - DMatrix::identity(6, 6)).amax() < 1e-14);
         assert_eq!(u, u.upper_triangle());
+    }
+
+    /// The first joint is cut off before the others: it takes part in no row behind that, and theirs are mixed as if it
+    /// did not exist.
+    #[test]
+    fn joints_without_weight_are_not_mixed() {
+        let c = DMatrix::from_fn(3, 3, |i, k| if i == k { 1.0 } else { 0.5 });
+        let weights = [vec![2.0, 2.0, 0.0], vec![1.0; 3], vec![1.0; 3]];
+        let found = stretches(&weights, &c);
+        assert_eq!(found.iter().map(|s| s.rows.clone()).collect::<Vec<_>>(), [0..2, 2..3]);
+        assert_eq!(found[0].u, decorrelation(&c));
+        let of_two = decorrelation(&c.view((1, 1), (2, 2)).into_owned());
+        assert_eq!(found[1].u.view((1, 1), (2, 2)), of_two);
+        assert!(found[1].u.row(0).iter().chain(found[1].u.column(0).iter()).all(|u| *u == 0.0));
+        // A later joint that is cut off leaves an earlier one with the noise that it has.
+        let later = stretches(&[vec![1.0], vec![0.0], vec![1.0]], &c);
+        let u = &later[0].u;
+        let row = u.row(0) * &c * u.row(0).transpose();
+        assert!((row[(0, 0)] - 1.0).abs() < 1e-14, "{row}");
     }
 
     #[test]

@@ -12,7 +12,7 @@ mod replicates;
 mod spectrum;
 
 pub(super) use autoregression::{autoregression, prewhiten};
-pub(super) use cross_joint::{decorrelate, decorrelation, mix};
+pub(super) use cross_joint::{decorrelate, mix};
 pub(super) use decimate::decimate;
 pub(super) use instruments::{SMOOTHER, instrument, smoothed};
 pub(super) use replicates::ReplicateWhitening;

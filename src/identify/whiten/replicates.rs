@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::cross_joint::{correlation, decorrelation, mix};
+use super::cross_joint::mix;
 use super::spectrum::Spectrum;
 use crate::identify::problem::Problem;
 use crate::signal::{HarmonicPower, subtract_mean_period};
@@ -83,13 +83,32 @@ impl ReplicateWhitening {
         for (weights, power) in self.weights.iter_mut().zip(acceleration) {
             cut(weights, power);
         }
-        let products = DMatrix::from_fn(rows.joints(), rows.joints(), |i, k| {
-            let weights = self.weights[i].iter().zip(&self.weights[k]).cycle();
-            let products = deviations[i].iter().zip(&deviations[k]).zip(weights);
-            products.map(|((a, b), (wa, wb))| a * wa * b * wb).sum()
+        let correlation = DMatrix::from_fn(rows.joints(), rows.joints(), |i, k| {
+            if i == k {
+                1.0
+            } else {
+                correlation_of([i, k].map(|j| (&*deviations[j], &*self.weights[j])))
+            }
         });
-        mix(rows, &self.weights, &decorrelation(&correlation(&products)), out);
+        mix(rows, &self.weights, &correlation, out);
     }
+}
+
+/// Correlation of the deviations of two joints, period after period, over the rows in which both have weight; 0 if one
+/// of them has no deviations there.
+fn correlation_of([(a, weights_a), (b, weights_b)]: [(&[f64], &[f64]); 2]) -> f64 {
+    let mut sums = [0.0; 3];
+    let weights = weights_a.iter().zip(weights_b).cycle();
+    for ((a, b), (wa, wb)) in
+        a.iter().zip(b).zip(weights).filter(|(_, (wa, wb))| **wa * **wb != 0.0)
+    {
+        let (a, b) = (a * wa, b * wb);
+        sums[0] += a * b;
+        sums[1] += a * a;
+        sums[2] += b * b;
+    }
+    let scale = (sums[1] * sums[2]).sqrt();
+    if scale > 0.0 { sums[0] / scale } else { 0.0 }
 }
 
 /// Sets the weights of all harmonics above the last one whose acceleration can be trusted to zero.

@@ -159,6 +159,11 @@ impl Layout {
         Self::from_toml(&text, &source)
     }
 
+    /// Whether it is one of those that come with the program, as it is.
+    pub(super) fn is_built_in(&self) -> bool {
+        built_in(&self.source).is_some()
+    }
+
     /// Parses the text of a layout; `source` is its file, or its name in messages.
     ///
     /// # Errors

@@ -6,6 +6,12 @@ use super::assembly::Assembly;
 use super::effect::{Complaint, Fault, finite, not_negative, positive, require};
 use crate::robot::Drive;
 
+/// Largest warmth Θ for which friction is checked and steps are chosen. Θ is the power lost over its mean along the
+/// motion, averaged over the memory T: about 1 once warm, and above 2 only where the motion pauses for longer than T.
+const WARMEST: f64 = 2.0;
+/// Largest load-dependent friction of a warm gear: the factor by which errors of the load fall in an iteration.
+const MOST_WARM_MU: f64 = 0.65;
+
 /// Friction torque of one joint on the motor side of its gear:
 ///
 /// ```text
@@ -76,9 +82,22 @@ impl Friction {
             torque += power.amplitude_nm * speed.powf(power.exponent) * sign;
         }
         match &self.thermal {
-            Some(thermal) => torque * (1.0 + thermal.fraction * warmth),
+            Some(_) => torque * self.warm(warmth),
             None => torque,
         }
+    }
+
+    /// Friction at the warmth Θ over friction when cold, 1 + φ Θ.
+    #[inline]
+    fn warm(&self, warmth: f64) -> f64 {
+        1.0 + self.thermal.as_ref().map_or(0.0, |thermal| thermal.fraction * warmth)
+    }
+
+    /// Refuses load-dependent friction that is too strong, once warm, for the loads of the gears to be found by
+    /// iteration.
+    fn check_load(&self) -> Result<(), Complaint> {
+        let mu = self.mu * self.warm(WARMEST).max(1.0);
+        require(mu <= MOST_WARM_MU, "mu", mu, "of warm friction must not be above 0.65")
     }
 
     /// The level c of dry friction, Nm.
@@ -109,9 +128,11 @@ impl Friction {
         (0..SPEEDS)
             .map(|k| largest_rad_s * 0.8_f64.powi(k))
             .flat_map(|speed| [speed, -speed])
-            .find_map(|v| {
+            .flat_map(|v| [(v, 0.0), (v, WARMEST)])
+            .find_map(|(v, warmth)| {
                 let sign = (v / self.epsilon_rad_s).tanh();
-                let torque = unphased.torque_nm(0.0, v, None, 1.0, 0.0) - wave * sign;
+                let torque =
+                    unphased.torque_nm(0.0, v, None, warmth, 0.0) - wave * sign * self.warm(warmth);
                 (torque * v < 0.0).then_some((v, torque))
             })
     }
@@ -147,7 +168,7 @@ impl Friction {
             }
             None => smooth += (level + self.asymmetric_nm.abs()) / self.epsilon_rad_s,
         }
-        let warm = 1.0 + self.thermal.as_ref().map_or(0.0, |t| t.fraction.max(0.0) * 2.0);
+        let warm = self.warm(WARMEST).max(1.0);
         (smooth * warm, bristles * warm)
     }
 }
@@ -284,7 +305,8 @@ impl Fault for LoadFriction {
         assembly.require_torque_limit(self.joint - 1)?;
         let friction = &mut assembly.joint(self.joint).friction;
         friction.mu += self.mu;
-        require(friction.mu <= 0.5, "mu", friction.mu, "must not sum to more than 0.5 on a joint")
+        require(friction.mu <= 0.5, "mu", friction.mu, "must not sum to more than 0.5 on a joint")?;
+        friction.check_load()
     }
 }
 
@@ -433,8 +455,10 @@ impl Fault for ThermalDrift {
     }
 
     fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
-        let present = assembly.joint(self.joint).friction.thermal.replace(*self).is_some();
-        require(!present, "joint", self.joint as f64, "has a thermal drift already")
+        let friction = &mut assembly.joint(self.joint).friction;
+        let present = friction.thermal.replace(*self).is_some();
+        require(!present, "joint", self.joint as f64, "has a thermal drift already")?;
+        friction.check_load()
     }
 }
 
