@@ -34,8 +34,8 @@ enum End {
 use End::{Answer, NoMotion, NoTorque, Open, TooShort, TooSlow, Unread};
 
 /// Expected end for each damage: where the period is searched for, and where the log is treated as a single run. Rows
-/// that contradict the rows before them are set aside, so that too little remains of columns that are exchanged or have
-/// the wrong sign. Half of the log, and the part on one side of a pause, has two periods, too few because their σ needs
+/// that contradict the rows before them are set aside, so that too little remains of columns that are exchanged. Where
+/// angles and velocities are related by a wrong factor throughout, such as −1, the reader says so. Half of the log, and the part on one side of a pause, has two periods, too few because their σ needs
 /// six seconds of data.
 const ENDS: &[(&str, [End; 2])] = &[
     ("nothing", [Answer, Answer]),
@@ -65,8 +65,8 @@ const ENDS: &[(&str, [End; 2])] = &[
     ("efforts without the arm", [Answer, Answer]),
     ("spikes of an effort", [Answer, Answer]),
     ("spikes of an angle", [Answer, Answer]),
-    ("angles of the other sign", [TooShort, TooShort]),
-    ("velocities of the other sign", [TooShort, TooShort]),
+    ("angles of the other sign", [Unread, Unread]),
+    ("velocities of the other sign", [Unread, Unread]),
     ("time in nanoseconds", [Unread, Unread]),
     ("time since 1970", [Answer, Answer]),
     ("time that stands still", [Unread, Unread]),
