@@ -6,7 +6,6 @@ use super::against::{self, Found, Nominal};
 use super::candidates::{self, Candidate};
 use super::cleaned::Cleaned;
 use super::common_motion::{move_to_common_motion, noise_of_mean};
-use super::contact::Compared;
 use super::detection_limits::detection_limits;
 use super::error::DiagnoseError;
 use super::extension::{Effect, Extension};
@@ -19,6 +18,7 @@ use super::misfit;
 use super::modesty::{make_modest, make_modest_beside_unknown};
 use super::payload::{self, PayloadFinding};
 use super::record::{Record, is_torn};
+use super::remarks::{contact_remark, drift_remark, limited_drives};
 use super::replay::measured_nm;
 use super::rms::rms_where;
 use super::scene::Scene;
@@ -30,7 +30,7 @@ use crate::base::BaseSet;
 use crate::dynamics::{Model, Parameter};
 use crate::identify::{
     Doubt, Identification, Identifier, Measurement, Misreading, Options, Regression,
-    drive_limit_remark, drives_at_limits, unlike,
+    drive_limit_remark, unlike,
 };
 use crate::robot::{Arm, JointSignals};
 
@@ -521,65 +521,4 @@ fn unexplained(
         causes.iter().any(|cause| cause.kind.is_a_law() && is_there(cause))
     };
     misfit::unexplained(study, accepted, rest, lack, has_law, can_differ)
-}
-
-/// Share of the samples from which on a drive at its limit is told before what is named on its joint.
-const OFTEN_LIMITED: f64 = 0.01;
-
-/// The sentences about drives that are often at their limits, if something is named or `unexplained` where they act.
-fn limited_drives(
-    arm: &Arm,
-    torque_nm: &JointSignals,
-    causes: &[Cause],
-    unexplained: Option<&Unexplained>,
-) -> Vec<String> {
-    let laws = causes.iter().filter(|cause| cause.kind.is_a_law()).map(|cause| cause.joint);
-    let places: Vec<Option<usize>> = laws.chain(unexplained.map(|u| Some(u.joint))).collect();
-    let limited = drives_at_limits(arm, torque_nm).into_iter();
-    limited
-        .filter(|at| at.share > OFTEN_LIMITED)
-        .filter(|at| places.iter().any(|place| place.is_none_or(|joint| joint == at.joint + 1)))
-        .map(|at| {
-            format!(
-                "Joint {}'s drive is at its torque limit ({} Nm) in {:.1} % of the samples. Where it leaves the limit, the torque changes \
-                 faster than the log can follow, and what is named or unexplained may come from that: move more slowly or with less load.",
-                at.joint + 1,
-                at.limit_nm,
-                100.0 * at.share
-            )
-        })
-        .collect()
-}
-
-/// States why contacts were not looked for, if they were not.
-fn contact_remark(study: &Study, log: &Cleaned) -> Option<String> {
-    if log.is_mended {
-        let remark = "the clock was mended: contacts are not looked for, because what is left of its error looks like one, and causes named \
-                      beside it are less sure";
-        return Some(remark.to_owned());
-    }
-    (study.scene.periodic && matches!(log.compared, Compared::TooFew)).then(|| {
-        "contacts are not looked for: too few periods follow each other without a gap to be compared; repeat the motion three \
-         times or more"
-            .to_owned()
-    })
-}
-
-/// Warns of mean torques that drift, except on joints with a thermal drift among the causes.
-fn drift_remark(study: &Study, causes: &[Cause]) -> Option<String> {
-    let is_said = |joint: usize| {
-        causes.iter().any(|c| c.kind == Kind::ThermalDrift && c.joint == Some(joint))
-    };
-    let drifting = study.whitening.drifting().iter().map(|&(j, sd_nm)| (j + 1, sd_nm));
-    let own: Vec<String> = drifting
-        .filter(|(joint, _)| !is_said(*joint))
-        .map(|(joint, sd_nm)| format!("joint {joint} by {sd_nm:.3} Nm rms"))
-        .collect();
-    (!own.is_empty()).then(|| {
-        format!(
-            "The mean torque drifts: from period to period it changes by more than the noise beside it ({}). A current sensor whose zero \
-             drifts does that, or a load that changes; what is constant there, offsets and gravity, is less well known, as its intervals say.",
-            own.join(", ")
-        )
-    })
 }

@@ -52,6 +52,7 @@ mod peak;
 mod price;
 mod record;
 mod refinement;
+mod remarks;
 mod repeated;
 pub mod replay;
 mod reversal_answer;

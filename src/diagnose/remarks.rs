@@ -1,0 +1,101 @@
+//! Remarks about a log that bear on what a diagnosis says of it: drives at their limits, contacts that are not looked
+//! for, torques that drift.
+
+use super::cleaned::Cleaned;
+use super::contact::Compared;
+use super::kind::Kind;
+use super::study::Study;
+use super::verdict::{Cause, Unexplained};
+use crate::identify::drives_at_limits;
+use crate::robot::{Arm, JointSignals};
+
+/// Share of the samples from which on a drive at its limit is told before what is named on its joint.
+const OFTEN_LIMITED: f64 = 0.01;
+
+/// The sentences about drives that are often at their limits, if something is named or `unexplained` where they act.
+pub(super) fn limited_drives(
+    arm: &Arm,
+    torque_nm: &JointSignals,
+    causes: &[Cause],
+    unexplained: Option<&Unexplained>,
+) -> Vec<String> {
+    let laws = causes.iter().filter(|cause| cause.kind.is_a_law()).map(|cause| cause.joint);
+    let places: Vec<Option<usize>> = laws.chain(unexplained.map(|u| Some(u.joint))).collect();
+    let limited = drives_at_limits(arm, torque_nm).into_iter();
+    limited
+        .filter(|at| at.share > OFTEN_LIMITED)
+        .filter(|at| places.iter().any(|place| place.is_none_or(|joint| joint == at.joint + 1)))
+        .map(|at| {
+            format!(
+                "Joint {}'s drive is at its torque limit ({} Nm) in {:.1} % of the samples. Where it leaves the limit, the torque changes \
+                 faster than the log can follow, and what is named or unexplained may come from that: move more slowly or with less load.",
+                at.joint + 1,
+                at.limit_nm,
+                100.0 * at.share
+            )
+        })
+        .collect()
+}
+
+/// States why contacts were not looked for, if they were not.
+pub(super) fn contact_remark(study: &Study, log: &Cleaned) -> Option<String> {
+    if log.is_mended {
+        let remark = "the clock was mended: contacts are not looked for, because what is left of its error looks like one, and causes named \
+                      beside it are less sure";
+        return Some(remark.to_owned());
+    }
+    (study.scene.periodic && matches!(log.compared, Compared::TooFew)).then(|| {
+        "contacts are not looked for: too few periods follow each other without a gap to be compared; repeat the motion three \
+         times or more"
+            .to_owned()
+    })
+}
+
+/// Warns of mean torques that drift, except on joints with a thermal drift among the causes.
+pub(super) fn drift_remark(study: &Study, causes: &[Cause]) -> Option<String> {
+    let is_said = |joint: usize| {
+        causes.iter().any(|c| c.kind == Kind::ThermalDrift && c.joint == Some(joint))
+    };
+    let drifting = study.whitening.drifting().iter().map(|&(j, sd_nm)| (j + 1, sd_nm));
+    let own: Vec<String> = drifting
+        .filter(|(joint, _)| !is_said(*joint))
+        .map(|(joint, sd_nm)| format!("joint {joint} by {sd_nm:.3} Nm rms"))
+        .collect();
+    (!own.is_empty()).then(|| {
+        format!(
+            "The mean torque drifts: from period to period it changes by more than the noise beside it ({}). A current sensor whose zero \
+             drifts does that, or a load that changes; what is constant there, offsets and gravity, is less well known, as its intervals say.",
+            own.join(", ")
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::data_faults::cause;
+    use super::*;
+
+    /// Joint 2 is at its limit of 150 Nm in 20 of 1000 samples. That matters for a law on this joint or on the arm, and
+    /// for something unexplained there, but neither for a touch nor for a law on another joint.
+    #[test]
+    fn a_drive_at_its_limit_is_told_where_something_is_named() {
+        let arm = Arm::built_in("ur5").unwrap();
+        let torque = |samples: usize| {
+            JointSignals::from_fn(6, 1000, |j, k| if j == 1 && k < samples { -150.0 } else { 1.0 })
+        };
+        let of = |kind: Kind, joint| [cause(kind, joint, "an effect", 9.0, &[])];
+        let told = |causes: &[Cause]| limited_drives(&arm, &torque(20), causes, None);
+        for causes in [of(Kind::Elasticity, Some(1)), of(Kind::BaseTilt, None)] {
+            let said = told(&causes);
+            assert_eq!(said.len(), 1);
+            let begin = "Joint 2's drive is at its torque limit (150 Nm) in 2.0 % of the samples.";
+            assert!(said[0].starts_with(begin), "{said:?}");
+            assert!(limited_drives(&arm, &torque(5), &causes, None).is_empty());
+        }
+        assert!(told(&of(Kind::Contact, Some(1))).is_empty());
+        assert!(told(&of(Kind::Elasticity, Some(2))).is_empty());
+        let unknown =
+            Unexplained { axis: "angle", unit: "rad", joint: 2, rms_nm: 1.0, curve: Vec::new() };
+        assert_eq!(limited_drives(&arm, &torque(20), &[], Some(&unknown)).len(), 1);
+    }
+}
