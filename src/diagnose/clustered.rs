@@ -112,8 +112,7 @@ fn inverse_root(gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         gram[(i, k)] * scale[i] * scale[k] + diagonal
     });
     let root = scaled.cholesky()?.l().transpose().try_inverse()?;
-    let has_column = |k: usize| f64::from(u8::from(scale[k] > 0.0));
-    Some(DMatrix::from_fn(n, n, |i, k| root[(i, k)] * scale[i] * has_column(k)))
+    Some(DMatrix::from_fn(n, n, |i, k| root[(i, k)] * scale[i]))
 }
 
 impl Solution {

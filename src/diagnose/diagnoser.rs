@@ -153,9 +153,7 @@ impl<'a> Diagnoser<'a> {
         warnings.extend(contact_remark(&study, &log));
         let drift = drift_remark(&study, &causes);
         let limited = limited_drives(self.arm, m.torque_nm, &causes, unexplained.as_ref());
-        if limited.is_empty() {
-            warnings.extend(drive_limit_remark(self.arm, m.torque_nm));
-        }
+        warnings.extend(drive_limit_remark(self.arm, m.torque_nm));
         for held_out in &held_out {
             let with_name = |warning: &String| format!("{}: {warning}", held_out.log);
             warnings.extend(held_out.warnings.iter().map(with_name));
@@ -295,7 +293,8 @@ impl<'a> Diagnoser<'a> {
         });
         let found: Vec<Found> = found.collect();
         let fitted_nm = fitted(study, &model.extension);
-        let explained = against::explain(study, self.set, simulation, &found, &fitted_nm);
+        let sources = (self.arm, self.set);
+        let explained = against::explain(study, sources, simulation, &found, &fitted_nm);
         model.causes.retain(|c| !explained.judged.contains(&(c.kind, c.joint)));
         model.causes.extend(explained.causes);
         if simulation.doubt.is_some() {

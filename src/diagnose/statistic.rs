@@ -5,8 +5,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use super::image::{Image, Span, dot};
 use super::noise_power::NoiseKnowledge;
-use super::whitening::Whitening;
-use crate::identify::covariance::{leverage_correction, quantile_95};
+use super::whitening::{RunWhitening, Whitening};
+use crate::identify::covariance::{LEAST_BLOCKS, leverage_correction, quantile_95};
 
 /// How evidence is counted.
 pub enum Statistic {
@@ -22,8 +22,6 @@ pub enum Statistic {
         used: usize,
         /// Number of blocks that make one for the covariance.
         together: usize,
-        /// Number of such longer blocks with rows that count.
-        used_together: usize,
         /// Rows per joint.
         rows: usize,
         /// Per joint, number n of rows that count.
@@ -45,6 +43,8 @@ pub struct Score {
 /// λ of an effect of usual strength, √λ about 30. Schwarz's ln n takes n for λ: an effect as large as the noise in
 /// every sample.
 const USUAL_LAMBDA: f64 = 1000.0;
+/// Share of the square of the block that tells most of an effect from which on a block counts as telling of it.
+const TELLS: f64 = 0.01;
 /// Stretches of time in the cross-validation.
 const FOLDS: usize = 10;
 /// If less than this share of an effect's square lies on a joint, the joint does not count for it.
@@ -58,7 +58,7 @@ impl Statistic {
             Whitening::Run(run) => Self::of_blocks(
                 run.blocks(),
                 &run.counting(),
-                run.blocks_together(),
+                RunWhitening::TOGETHER,
                 residual,
                 joints,
             ),
@@ -69,7 +69,7 @@ impl Statistic {
     fn of_blocks(
         block_of: Vec<usize>,
         counts: &[bool],
-        together: usize,
+        longest: usize,
         residual: &Image,
         joints: usize,
     ) -> Self {
@@ -83,8 +83,8 @@ impl Statistic {
         let mut is_used = vec![false; blocks];
         block_of.iter().zip(counts).for_each(|(block, counts)| is_used[*block] |= counts);
         let used = is_used.iter().filter(|used| **used).count();
-        let used_together = is_used.chunks(together).filter(|part| part.contains(&true)).count();
-        Self::Blocks { block_of, blocks, used, together, used_together, rows, counting, memory }
+        let together = longest.min(used / LEAST_BLOCKS).max(1);
+        Self::Blocks { block_of, blocks, used, together, rows, counting, memory }
     }
 
     /// Twice the gain in log-likelihood when the part of `residual` that `span` explains is removed.
@@ -243,10 +243,10 @@ impl Statistic {
     /// of identification's [`BlockCluster`](crate::identify::covariance::BlockCluster), from the scatter of blocks that
     /// are longer than the memory of the noise, with each score enlarged because the fit adapted to its block.
     pub fn covariance(&self, span: &Span, residual: &Image) -> DMatrix<f64> {
-        let Self::Blocks { block_of, together, .. } = self else { return span.inverse_gram() };
-        let Some(sums) = self.block_sums(span, residual, *together) else {
-            return span.inverse_gram();
-        };
+        let Self::Blocks { block_of, .. } = self else { return span.inverse_gram() };
+        let (together, _) =
+            self.longer_blocks(&span.directions().map(|d| d.mean).collect::<Vec<_>>());
+        let sums = self.block_sums(span, residual, together).unwrap_or_default();
         let directions: Vec<&[f64]> = span.directions().map(|d| d.mean).collect();
         let mut shares = vec![DMatrix::<f64>::zeros(span.len(), span.len()); sums.len()];
         for (row, &block) in block_of.iter().enumerate() {
@@ -273,7 +273,29 @@ impl Statistic {
     pub fn freedom(&self, span: &Span, residual: &Image) -> f64 {
         match self {
             Self::Periods(knowledge) => knowledge.freedom(span, residual),
-            Self::Blocks { used_together, .. } => used_together.saturating_sub(1) as f64,
+            Self::Blocks { .. } => {
+                let directions: Vec<&[f64]> = span.directions().map(|d| d.mean).collect();
+                (self.longer_blocks(&directions).1.max(2) - 1) as f64
+            }
+        }
+    }
+
+    /// How many blocks make one for the covariance along `directions`, and how many of those tell of them: blocks that
+    /// hold a share of their square. An effect that is felt in few long blocks is judged by short ones.
+    fn longer_blocks(&self, directions: &[&[f64]]) -> (usize, usize) {
+        let Self::Blocks { block_of, blocks, together, .. } = self else { return (1, 0) };
+        let telling = |together: usize| {
+            let mut squares = vec![0.0; blocks.div_ceil(together)];
+            for direction in directions {
+                let rows = direction.iter().zip(block_of);
+                rows.for_each(|(d, block)| squares[block / together] += d * d);
+            }
+            let most = squares.iter().fold(0.0f64, |a, b| a.max(*b));
+            squares.iter().filter(|square| **square > TELLS * most).count()
+        };
+        match telling(*together) {
+            count if count >= LEAST_BLOCKS => (*together, count),
+            _ => (1, telling(1)),
         }
     }
 
@@ -289,8 +311,14 @@ impl Statistic {
                 let inverse = span.inverse_triangle();
                 (0..span.len()).map(|k| along(inverse.view((k, 0), (1, span.len())))).collect()
             }
-            Self::Blocks { used_together, .. } => {
-                vec![used_together.saturating_sub(1) as f64; span.len()]
+            Self::Blocks { .. } => {
+                let inverse = span.inverse_triangle();
+                let along = |k: usize| {
+                    let row: Vec<f64> = inverse.row(k).iter().copied().collect();
+                    let (_, count) = self.longer_blocks(&[&span.combination(&row).mean]);
+                    (count.max(2) - 1) as f64
+                };
+                (0..span.len()).map(along).collect()
             }
         }
     }

@@ -52,14 +52,18 @@ pub(super) fn overview(causes: &[Cause]) -> Option<String> {
         joints.sort_unstable();
         joints.dedup();
         let joints: Vec<String> = joints.iter().map(usize::to_string).collect();
-        let on = match &joints[..] {
-            [] => "the arm".to_owned(),
-            [one] => format!("joint {one}"),
-            _ => format!("joints {}", joints.join(", ")),
+        let of_joints = match &joints[..] {
+            [] => None,
+            [one] => Some(format!("joint {one}")),
+            _ => Some(format!("joints {}", joints.join(", "))),
         };
+        let is_of_all = of_kind.clone().any(|cause| cause.joint.is_none());
+        let of_arm = (is_of_all && !kind.is_of_the_record()).then(|| "the arm".to_owned());
+        let on: Vec<String> = of_arm.into_iter().chain(of_joints).collect();
         match of_kind.count() {
             times if kind == Kind::Contact && times > 1 => format!("{kind} ({times} times)"),
-            _ => format!("{kind} ({on})"),
+            _ if on.is_empty() => kind.to_string(),
+            _ => format!("{kind} ({})", on.join(", ")),
         }
     };
     let kinds: Vec<String> = kinds.into_iter().map(sites).collect();

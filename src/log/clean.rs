@@ -261,14 +261,19 @@ pub(super) fn unwrapped(motion: &Motion) -> (Vec<Unwrapped>, Option<LogWarning>)
 const BESIDE: usize = 5;
 
 /// For every row of a log without velocities the reason why its angles are rejected, if they are. An angle far from the
-/// median of five rows, each carried to its own instant by their median step, is wild; it would corrupt the slopes of
+/// median of five rows, each carried to its own instant by their middle step, is wild; it would corrupt the slopes of
 /// four neighbouring rows.
 pub(super) fn wild_angles(motion: &Motion) -> Vec<Option<Reason>> {
     let rows = motion.rows();
     let is_wild = |q: &Vec<f64>, k: usize| {
         let from = k.saturating_sub(BESIDE / 2).min(rows.saturating_sub(BESIDE));
         let beside = &q[from..rows.min(from + BESIDE)];
-        let step = median(&mut beside.windows(2).map(|w| w[1] - w[0]).collect::<Vec<f64>>());
+        let mut steps: Vec<f64> = beside.windows(2).map(|w| w[1] - w[0]).collect();
+        steps.sort_by(f64::total_cmp);
+        // Of the two in the middle the smaller one: two wild angles in a row make four steps that are not the motion's.
+        let middle = [steps.len().saturating_sub(1) / 2, steps.len() / 2];
+        let smaller = |a: f64, b: f64| if a.abs() <= b.abs() { a } else { b };
+        let step = middle.into_iter().filter_map(|k| steps.get(k).copied()).reduce(smaller);
         let step = step.unwrap_or(0.0);
         let carried = beside.iter().zip(from..).map(|(q, at)| q + step * (k as f64 - at as f64));
         let beside = median(&mut carried.collect::<Vec<f64>>());

@@ -240,7 +240,7 @@ impl Table {
         };
         let motion = self.motion(plan);
         // Many garbage rows can hide the relation between angles and velocities. If no unit explains the relation, the
-        // garbage is removed first and the units are checked again afterwards.
+        // garbage is removed first, if it is less than half of the rows, and the units are checked again afterwards.
         let mut related = units::check(&motion, &layout.units);
         if let Err(suspicion) = &related
             && !matches!(suspicion, UnitSuspicion::Unrelated { .. })

@@ -12,6 +12,7 @@ use crate::base::BaseSet;
 use crate::diagnose::candidates::{Candidate, Quantity, Shape};
 use crate::diagnose::image::Image;
 use crate::diagnose::kind::Kind;
+use crate::diagnose::scene::Scene;
 use crate::diagnose::study::Study;
 use crate::diagnose::verdict::Estimate;
 use crate::dynamics::{Parameter, ParameterLayout};
@@ -20,8 +21,8 @@ use crate::robot::JointSignals;
 /// Function from coefficients to physical parameters; `None` for coefficients that the data do not determine.
 type Quantities<'a> = Box<dyn Fn(&[Option<f64>]) -> Vec<Quantity> + 'a>;
 
-/// Function from coefficients to whitened columns; see [`Candidate::secants`].
-type Secants<'a> = Box<dyn Fn(&[f64]) -> Option<Vec<Image>> + 'a>;
+/// Function from the scene of the simulated arm and from coefficients to whitened columns; see [`Candidate::secants`].
+type Secants<'a> = Box<dyn Fn(&Scene, &[f64]) -> Option<Vec<Image>> + 'a>;
 
 /// A physical change that may have moved the parameters.
 pub(super) struct Change<'a> {
@@ -118,7 +119,10 @@ pub(super) fn all<'a>(
             site: Some(j),
             images: vec![study.torque_on(j, fitted_nm.joint(j))],
             // Of the recorded torque (1 + e) τ, the share e/(1 + e) is too much, whatever else changed.
-            quantities: Box::new(|b| told("error_fraction", b[0].map(|b| b / (1.0 - b)), "")),
+            quantities: Box::new(|b| {
+                let error = b[0].filter(|b| *b < 1.0).map(|b| b / (1.0 - b));
+                told("error_fraction", error, "")
+            }),
             secants: None,
             in_words: "a wrong torque constant",
             separating_experiment: "a known payload: it scales every torque constant",
@@ -161,8 +165,8 @@ fn of_family<'a>(
         site,
         images: columns.iter().map(|c| study.whitening.image(c)).collect(),
         quantities: Box::new(move |b| of_told(b, |b| family.quantities(scene, site, shape, b))),
-        secants: Some(Box::new(move |b| {
-            let columns = family.secants(scene, site, b)?;
+        secants: Some(Box::new(move |simulated, b| {
+            let columns = family.secants(simulated, site, b)?;
             Some(columns.iter().map(|c| study.whitening.image(c)).collect())
         })),
         in_words: family.in_words(),

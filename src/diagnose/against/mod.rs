@@ -20,6 +20,7 @@ use super::image::{Image, Span};
 use super::intervals::{Base, tangents};
 use super::judgement::{TELLS_APART, probability_of_class};
 use super::kind::Kind;
+use super::scene::Scene;
 use super::significance::LEAST_EVIDENCE;
 use super::statistic::{Score, upper_fisher};
 use super::study::{Entry, Study};
@@ -27,8 +28,10 @@ use super::verdict::{BaseParameter, Cause, Moved, MovedTogether, Rival};
 use super::whitening::RepeatingNoise;
 use crate::base::BaseSet;
 use crate::identify::covariance::squared_distance;
-use crate::robot::JointSignals;
+use crate::robot::{Arm, JointSignals};
 
+/// Largest tilt, zero or length at which a change is evaluated, rad or m.
+const LARGEST: f64 = 0.5;
 /// Maximum number of changes.
 const MOST_CHANGES: usize = 8;
 /// Rounds in which one change is added and others are removed; bounded because two may replace each other for ever.
@@ -191,7 +194,7 @@ pub struct Explained {
 /// beside the null model, which with them predicts the torque `fitted_nm`.
 pub fn explain(
     study: &Study,
-    set: &BaseSet,
+    (arm, set): (&Arm, &BaseSet),
     simulation: Nominal,
     accepted: &[Found],
     fitted_nm: &JointSignals,
@@ -221,8 +224,10 @@ pub fn explain(
     let nuisance = nuisance(study, &unknown, beside.iter());
     let mut search = Search { study, changes, images, places, unknown, nuisance, residual };
     let mut taken = search.select();
-    search.set_to_size(&taken);
-    taken = search.select();
+    if taken.iter().any(|c| search.changes[*c].secants.is_some()) {
+        search.set_to_size(&taken, &Scene::new(arm, set, theta, &study.regression.prepared));
+        taken = search.select();
+    }
     // An accepted effect may have been the part of a change that the null model could not absorb.
     while let Some(needless) = (0..beside.len()).find(|&e| !search.needs(e, &beside, &taken)) {
         let entry = beside.remove(needless).entry;
@@ -308,17 +313,19 @@ impl Search<'_> {
         taken
     }
 
-    /// Replaces the columns of the changes `taken`, which are those of small changes, by those of their size.
-    fn set_to_size(&mut self, taken: &[usize]) {
+    /// Replaces the columns of the changes `taken`, which are those of small changes of the identified arm, by those of
+    /// their size in the `simulated` arm: the identified one has taken most of a change up already.
+    fn set_to_size(&mut self, taken: &[usize], simulated: &Scene) {
         for (index, &c) in taken.iter().enumerate() {
             let Some(secants) = &self.changes[c].secants else { continue };
             let (others, left) = self.outside(&without(taken, index));
             let (span, places) = Span::telling(&others, &self.images[c]);
             let mut b = vec![0.0; self.images[c].len()];
-            for (told, (place, _)) in span.solve(&left).into_iter().zip(places) {
-                b[place] = told;
+            let told = span.solve(&left).into_iter().zip(places);
+            for (value, (place, _)) in told.filter(|(_, (_, is_told))| *is_told) {
+                b[place] = value.clamp(-LARGEST, LARGEST);
             }
-            if let Some(images) = secants(&b) {
+            if let Some(images) = secants(simulated, &b) {
                 self.images[c] = self.unknown.whitened(images.clone());
                 self.changes[c].images = images;
             }

@@ -129,7 +129,7 @@ impl Candidate for Backlash {
     /// How small a gap shows depends on how the rotor flies through it. A description without its inertia, as most URDFs
     /// are, does not tell: a gap of ten times the limit that follows from no inertia was not seen.
     fn can_be(&self, scene: &Scene, site: Option<usize>, _: f64) -> bool {
-        scene.arm.joints[joint(site)].drive.rotor_inertia_kg_m2 > 0.0
+        scene.has_described_rotor[joint(site)]
     }
 
     fn form_error(&self, _: &Scene, _: Shape) -> f64 {

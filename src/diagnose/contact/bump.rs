@@ -311,7 +311,8 @@ fn fits(
         if best(&fits)? + 1 < fits.len() {
             break;
         }
-        fits.push(of_step(step)?);
+        let Some(fit) = of_step(step) else { break };
+        fits.push(fit);
     }
     let top = best(&fits)?.clamp(1, fits.len() - 2);
     let around = [top - 1, top, top + 1].map(|i| &fits[i]);

@@ -58,6 +58,8 @@ pub struct Scene {
     /// Rotor inertia I_a of every joint, kg m², no less than a small share of the inertia of its links: compliant gears
     /// need something to swing against.
     pub rotor_kg_m2: Vec<f64>,
+    /// Per joint, whether the description of the arm has an inertia of the rotor.
+    pub has_described_rotor: Vec<bool>,
     /// Relative acceleration of links and rotor per torque that presses them apart, 1/(kg m²).
     pub mobility_per_kg_m2: JointSignals,
     /// Predicted drive torque: load, friction and offset, Nm.
@@ -164,6 +166,11 @@ impl Scene {
             rigid,
             delivered,
             rotor_kg_m2,
+            has_described_rotor: nominal
+                .joints
+                .iter()
+                .map(|joint| joint.drive.rotor_inertia_kg_m2 > 0.0)
+                .collect(),
             mobility_per_kg_m2,
             torque_nm,
             sign,

@@ -25,12 +25,15 @@ pub struct RunWhitening {
 }
 
 /// Length of the blocks of a single run, s: short, so that there are many of them to test whether an effect is there.
-/// Covariances need blocks that are longer than the memory of the noise ([`RunWhitening::blocks_together`]).
+/// Covariances need blocks that are longer than the memory of the noise ([`RunWhitening::TOGETHER`]).
 const BLOCK_S: f64 = 1.0;
 /// A joint slower than [`MOVING_RAD_S`] for this long, s, stands still.
 const REST_S: f64 = 0.25;
 
 impl RunWhitening {
+    /// Number of blocks that together are as long as those of identification, which are long enough for a covariance.
+    pub const TOGETHER: usize = (covariance::BLOCK_S / BLOCK_S) as usize;
+
     /// Whitening of a single run, from the standard deviation of its residual per joint, Nm.
     pub fn new(
         regression: &Regression,
@@ -58,13 +61,6 @@ impl RunWhitening {
         let one_joint: Vec<usize> =
             (0..self.rows).step_by(self.thin).map(|r| r / self.block_rows).collect();
         one_joint.repeat(self.weights.len())
-    }
-
-    /// Number of blocks that together are long enough for a covariance: as long as those of identification, but at
-    /// least as many as it needs.
-    pub fn blocks_together(&self) -> usize {
-        let blocks = self.rows.div_ceil(self.block_rows);
-        ((covariance::BLOCK_S / BLOCK_S) as usize).min(blocks / covariance::LEAST_BLOCKS).max(1)
     }
 
     /// Whether each row of an image counts.

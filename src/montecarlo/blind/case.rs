@@ -110,6 +110,8 @@ impl std::fmt::Display for Case {
 
 /// Number of sizes tried for an effect whose √λ is not proportional to its size.
 const PILOTS: usize = 3;
+/// Draws of a law beside a change, which must not be the change itself; more only if a plan has nothing else to hide.
+const ATTEMPTS: usize = 100;
 /// A pilot whose √λ is within this share of the wanted one is good enough.
 const CLOSE: f64 = 0.1;
 
@@ -237,8 +239,13 @@ impl Maker<'_> {
         let benchmark = self.benchmark;
         let range = benchmark.plan.sqrt_lambda_of_two;
         let change = self.hidden(&benchmark.open(|f| f.judged == Judged::Simulation), range)?;
-        let law = self.hidden(&benchmark.open(|f| benchmark.can_be_withheld(f)), range)?;
-        Ok(vec![change, law])
+        for _ in 0..ATTEMPTS {
+            let law = self.hidden(&benchmark.open(|f| benchmark.can_be_withheld(f)), range)?;
+            if (law.kind, law.joint) != (change.kind, change.joint) {
+                return Ok(vec![change, law]);
+            }
+        }
+        Err(BlindError::NothingToHide)
     }
 
     /// An effect of one of `families` whose strength lies in `range`, as far as its physics allows.

@@ -68,7 +68,7 @@ const COURSE_RATE_HZ: f64 = 100.0;
 /// Accuracy to which the loads of the gears are found, Nm; the integrator's own error is a thousand times larger.
 const LOAD_ACCURACY_NM: f64 = 1e-9;
 /// Limit of the iterations for gear loads. The error falls by at least the factor of warm load-dependent friction, at
-/// most 0.65, per iteration; from 1000 Nm the accuracy is reached after 64.
+/// most 0.65, per iteration; from 1000 Nm the accuracy is reached after 65.
 const LOAD_ITERATIONS: usize = 72;
 /// Largest number of parts into which a step may be divided.
 const MOST_SUBSTEPS: usize = 64;

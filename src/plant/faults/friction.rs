@@ -128,11 +128,10 @@ impl Friction {
         (0..SPEEDS)
             .map(|k| largest_rad_s * 0.8_f64.powi(k))
             .flat_map(|speed| [speed, -speed])
-            .flat_map(|v| [(v, 0.0), (v, WARMEST)])
-            .find_map(|(v, warmth)| {
+            .find_map(|v| {
                 let sign = (v / self.epsilon_rad_s).tanh();
-                let torque =
-                    unphased.torque_nm(0.0, v, None, warmth, 0.0) - wave * sign * self.warm(warmth);
+                // Warm friction has the sign of cold friction.
+                let torque = unphased.torque_nm(0.0, v, None, 0.0, 0.0) - wave * sign;
                 (torque * v < 0.0).then_some((v, torque))
             })
     }
