@@ -211,47 +211,27 @@ impl Statistic {
     /// Covariance of the coordinates on `span`, from the scatter of the block sums of what `span` leaves of `residual`;
     /// and the number B of blocks. `None` where noise is known.
     fn scatter(&self, span: &Span, residual: &Image) -> Option<(DMatrix<f64>, usize)> {
-        let Self::Blocks { used, .. } = self else { return None };
+        let Self::Blocks { block_of, blocks, used, .. } = self else { return None };
         let mut scatter = DMatrix::zeros(span.len(), span.len());
-        for sum in self.block_sums(span, residual, 1)? {
+        for sum in block_sums(span, residual, |row| block_of[row], *blocks) {
             scatter += &sum * sum.transpose();
         }
         Some((scatter * (*used as f64 / used.saturating_sub(1).max(1) as f64), *used))
-    }
-
-    /// Sums of directions times residual, after what `span` explains is removed, over every `together` blocks. `None`
-    /// where noise is known.
-    fn block_sums(
-        &self,
-        span: &Span,
-        residual: &Image,
-        together: usize,
-    ) -> Option<Vec<DVector<f64>>> {
-        let Self::Blocks { block_of, blocks, .. } = self else { return None };
-        let mut left = residual.clone();
-        span.residualise(&mut left);
-        let mut sums = vec![DVector::<f64>::zeros(span.len()); blocks.div_ceil(together)];
-        for (i, direction) in span.directions().enumerate() {
-            for ((d, r), &block) in direction.mean.iter().zip(&left.mean).zip(block_of) {
-                sums[block / together][i] += d * r;
-            }
-        }
-        Some(sums)
     }
 
     /// Covariance of the least-squares coefficients of `residual` on the columns of `span`. In a single run it is that
     /// of identification's [`BlockCluster`](crate::identify::covariance::BlockCluster), from the scatter of blocks that
     /// are longer than the memory of the noise, with each score enlarged because the fit adapted to its block.
     pub fn covariance(&self, span: &Span, residual: &Image) -> DMatrix<f64> {
-        let Self::Blocks { block_of, .. } = self else { return span.inverse_gram() };
-        let (together, _) =
-            self.longer_blocks(&span.directions().map(|d| d.mean).collect::<Vec<_>>());
-        let sums = self.block_sums(span, residual, together).unwrap_or_default();
+        let Self::Blocks { block_of, blocks, .. } = self else { return span.inverse_gram() };
         let directions: Vec<&[f64]> = span.directions().map(|d| d.mean).collect();
+        let together = self.joined(&directions);
+        let longer = |row: usize| block_of[row] / together;
+        let sums = block_sums(span, residual, longer, blocks.div_ceil(together));
         let mut shares = vec![DMatrix::<f64>::zeros(span.len(), span.len()); sums.len()];
-        for (row, &block) in block_of.iter().enumerate() {
+        for row in 0..block_of.len() {
             let along = DVector::from_iterator(span.len(), directions.iter().map(|d| d[row]));
-            shares[block / together].ger(1.0, &along, &along, 1.0);
+            shares[longer(row)].ger(1.0, &along, &along, 1.0);
         }
         let mut scatter = DMatrix::zeros(span.len(), span.len());
         for (sum, share) in sums.iter().zip(&shares) {
@@ -275,53 +255,76 @@ impl Statistic {
             Self::Periods(knowledge) => knowledge.freedom(span, residual),
             Self::Blocks { .. } => {
                 let directions: Vec<&[f64]> = span.directions().map(|d| d.mean).collect();
-                (self.longer_blocks(&directions).1.max(2) - 1) as f64
+                self.freedom_of_blocks(&directions, self.joined(&directions))
             }
         }
     }
 
-    /// How many blocks make one for the covariance along `directions`, and how many of those tell of them: blocks that
-    /// hold a share of their square. An effect that is felt in few long blocks is judged by short ones.
-    fn longer_blocks(&self, directions: &[&[f64]]) -> (usize, usize) {
-        let Self::Blocks { block_of, blocks, together, .. } = self else { return (1, 0) };
-        let telling = |together: usize| {
-            let mut squares = vec![0.0; blocks.div_ceil(together)];
-            for direction in directions {
-                let rows = direction.iter().zip(block_of);
-                rows.for_each(|(d, block)| squares[block / together] += d * d);
+    /// How many blocks make one for the covariance along `directions`. Where they are felt in few long blocks, the short
+    /// ones stay as they are.
+    fn joined(&self, directions: &[&[f64]]) -> usize {
+        match self {
+            Self::Blocks { together, .. }
+                if self.telling(directions, *together) >= LEAST_BLOCKS =>
+            {
+                *together
             }
-            let most = squares.iter().fold(0.0f64, |a, b| a.max(*b));
-            squares.iter().filter(|square| **square > TELLS * most).count()
-        };
-        match telling(*together) {
-            count if count >= LEAST_BLOCKS => (*together, count),
-            _ => (1, telling(1)),
+            _ => 1,
         }
+    }
+
+    /// Number of blocks, each of `together` short ones, that hold a share of the square of `directions`.
+    fn telling(&self, directions: &[&[f64]], together: usize) -> usize {
+        let Self::Blocks { block_of, blocks, .. } = self else { return 0 };
+        let mut squares = vec![0.0; blocks.div_ceil(together)];
+        for direction in directions {
+            let rows = direction.iter().zip(block_of);
+            rows.for_each(|(d, block)| squares[block / together] += d * d);
+        }
+        let most = squares.iter().fold(0.0f64, |a, b| a.max(*b));
+        squares.iter().filter(|square| **square > TELLS * most).count()
+    }
+
+    /// One less than the number of blocks that tell of `directions`; at least 1.
+    fn freedom_of_blocks(&self, directions: &[&[f64]], together: usize) -> f64 {
+        (self.telling(directions, together).max(2) - 1) as f64
     }
 
     /// Degrees of freedom of the noise along each coefficient of `span`; the coefficients are R⁻¹ times the coordinates
     /// on its directions.
     pub fn freedom_of_coefficients(&self, span: &Span) -> Vec<f64> {
-        match self {
-            Self::Periods(knowledge) => {
-                let along = |row: nalgebra::DMatrixView<f64>| {
-                    let row: Vec<f64> = row.iter().copied().collect();
-                    knowledge.freedom_along(&span.combination(&row))
-                };
-                let inverse = span.inverse_triangle();
-                (0..span.len()).map(|k| along(inverse.view((k, 0), (1, span.len())))).collect()
+        let directions: Vec<&[f64]> = span.directions().map(|d| d.mean).collect();
+        // The blocks are those of the covariance of all coefficients.
+        let together = self.joined(&directions);
+        let inverse = span.inverse_triangle();
+        let along = |k: usize| {
+            let row: Vec<f64> = inverse.row(k).iter().copied().collect();
+            let image = span.combination(&row);
+            match self {
+                Self::Periods(knowledge) => knowledge.freedom_along(&image),
+                Self::Blocks { .. } => self.freedom_of_blocks(&[&image.mean], together),
             }
-            Self::Blocks { .. } => {
-                let inverse = span.inverse_triangle();
-                let along = |k: usize| {
-                    let row: Vec<f64> = inverse.row(k).iter().copied().collect();
-                    let (_, count) = self.longer_blocks(&[&span.combination(&row).mean]);
-                    (count.max(2) - 1) as f64
-                };
-                (0..span.len()).map(along).collect()
-            }
+        };
+        (0..span.len()).map(along).collect()
+    }
+}
+
+/// Sums of directions times residual, after what `span` explains is removed, over each of `count` blocks.
+fn block_sums(
+    span: &Span,
+    residual: &Image,
+    block_of: impl Fn(usize) -> usize,
+    count: usize,
+) -> Vec<DVector<f64>> {
+    let mut left = residual.clone();
+    span.residualise(&mut left);
+    let mut sums = vec![DVector::<f64>::zeros(span.len()); count];
+    for (i, direction) in span.directions().enumerate() {
+        for (row, (d, r)) in direction.mean.iter().zip(&left.mean).enumerate() {
+            sums[block_of(row)][i] += d * r;
         }
     }
+    sums
 }
 
 /// P(F_{k,ν} > x), or P(χ²_k/k > x) where ν is large enough for the noise to count as known.

@@ -75,6 +75,9 @@ pub fn mix(problem: &Problem, weights: &[Vec<f64>], correlation: &DMatrix<f64>, 
             let add = |values: &[f64], out: &mut [f64]| {
                 for Stretch { rows, u } in &stretches {
                     let factor = u[(j, i)];
+                    if factor == 0.0 {
+                        continue;
+                    }
                     for k in rows.clone() {
                         out[k] += factor * weights[i][k] * values[k];
                     }
@@ -99,29 +102,21 @@ struct Stretch {
 
 fn stretches(weights: &[Vec<f64>], correlation: &DMatrix<f64>) -> Vec<Stretch> {
     let joints = weights.len();
-    let rows = weights.iter().map(Vec::len).min().unwrap_or(0);
-    let used = |k: usize| -> Vec<bool> { weights.iter().map(|w| w[k] != 0.0).collect() };
-    let mut out: Vec<Stretch> = Vec::new();
-    let mut last: Option<Vec<bool>> = None;
-    for k in 0..rows {
-        let used = used(k);
-        match out.last_mut() {
-            Some(stretch) if last.as_ref() == Some(&used) => stretch.rows.end = k + 1,
-            _ => {
-                let both = |i: usize, j: usize| used[i] && used[j];
-                let own = DMatrix::from_fn(joints, joints, |i, j| match i == j {
-                    true => 1.0,
-                    false if both(i, j) => correlation[(i, j)],
-                    false => 0.0,
-                });
-                let mut u = decorrelation(&own);
-                (0..joints).filter(|j| !used[*j]).for_each(|j| u[(j, j)] = 0.0);
-                out.push(Stretch { rows: k..k + 1, u });
-            }
-        }
-        last = Some(used);
-    }
-    out
+    let rows: Vec<usize> = (0..weights.iter().map(Vec::len).min().unwrap_or(0)).collect();
+    let is_used = |joint: usize, row: usize| weights[joint][row] != 0.0;
+    let are_alike = |a: &usize, b: &usize| (0..joints).all(|j| is_used(j, *a) == is_used(j, *b));
+    let stretch = |rows: &[usize]| {
+        let used = |joint: usize| is_used(joint, rows[0]);
+        let own = DMatrix::from_fn(joints, joints, |i, j| match i == j {
+            true => 1.0,
+            false if used(i) && used(j) => correlation[(i, j)],
+            false => 0.0,
+        });
+        let mut u = decorrelation(&own);
+        (0..joints).filter(|j| !used(*j)).for_each(|j| u[(j, j)] = 0.0);
+        Stretch { rows: rows[0]..rows[0] + rows.len(), u }
+    };
+    rows.chunk_by(are_alike).map(stretch).collect()
 }
 
 #[cfg(test)]

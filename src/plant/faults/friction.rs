@@ -81,10 +81,7 @@ impl Friction {
         for power in &self.powers {
             torque += power.amplitude_nm * speed.powf(power.exponent) * sign;
         }
-        match &self.thermal {
-            Some(_) => torque * self.warm(warmth),
-            None => torque,
-        }
+        torque * self.warm(warmth)
     }
 
     /// Friction at the warmth Θ over friction when cold, 1 + φ Θ.
