@@ -28,6 +28,8 @@ pub enum Secret {
     Withheld,
     /// A change of the arm, which the null model absorbs, and beside it a law, which it does not.
     Beside,
+    /// One effect that is far stronger than the noise.
+    Strong,
 }
 
 impl std::fmt::Display for Secret {
@@ -38,6 +40,7 @@ impl std::fmt::Display for Secret {
             Self::Two => "two effects",
             Self::Withheld => "family withheld",
             Self::Beside => "a change and a law",
+            Self::Strong => "one strong effect",
         })
     }
 }
@@ -157,6 +160,7 @@ pub(super) fn draw(benchmark: &Benchmark, trial: u64) -> Result<Drawn, BlindErro
     case.hidden = match secret {
         Secret::Two => maker.two()?,
         Secret::Beside => maker.beside()?,
+        Secret::Strong => vec![maker.strong()?],
         _ => vec![maker.one(secret == Secret::Withheld, plan.sqrt_lambda)?],
     };
     case.against_simulation = case.hidden.iter().any(|h| h.judged == Judged::Simulation);
@@ -185,6 +189,7 @@ fn secret(rng: &mut ChaCha8Rng, shares: Shares) -> Secret {
         u if u < shares.one + shares.two => Secret::Two,
         u if u < shares.one + shares.two + shares.withheld => Secret::Withheld,
         u if u < shares.one + shares.two + shares.withheld + shares.beside => Secret::Beside,
+        u if u < shares.sum() => Secret::Strong,
         _ => Secret::Nothing,
     }
 }
@@ -215,6 +220,12 @@ impl Maker<'_> {
     fn one(&mut self, withheld: bool, range: [f64; 2]) -> Result<Hidden, BlindError> {
         let benchmark = self.benchmark;
         self.hidden(&benchmark.open(|f| !withheld || benchmark.can_be_withheld(f)), range)
+    }
+
+    /// One strong effect. A fault of the record has no strength.
+    fn strong(&mut self) -> Result<Hidden, BlindError> {
+        let range = self.benchmark.plan.sqrt_lambda_of_strong;
+        self.hidden(&self.benchmark.open(|f| f.judged != Judged::Record), range)
     }
 
     /// Two effects of different families or at different joints, both visible in the residual.

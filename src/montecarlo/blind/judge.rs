@@ -60,7 +60,7 @@ impl Record {
         };
         let right = match self.case.secret {
             Secret::Nothing | Secret::Withheld => false,
-            Secret::One => hidden.iter().all(|h| is_right(first, h)),
+            Secret::One | Secret::Strong => hidden.iter().all(|h| is_right(first, h)),
             Secret::Two | Secret::Beside => {
                 hidden.iter().all(|h| named.iter().any(|n| is_right(n, h)))
             }
@@ -96,6 +96,12 @@ impl Case {
 }
 
 impl Record {
+    /// Whether every cause named is a hidden effect, and nothing is said to be left unexplained.
+    pub(super) fn is_all_right(&self) -> bool {
+        let is_hidden = |named: &Named| self.case.hidden.iter().any(|h| is_right(named, h));
+        self.answer.left.is_none() && self.answer.named.iter().all(is_hidden)
+    }
+
     /// Whether nothing was said.
     pub(super) fn is_silent(&self) -> bool {
         self.answer.named.is_empty() && self.answer.left.is_none()

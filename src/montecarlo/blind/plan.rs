@@ -23,6 +23,8 @@ pub struct BlindPlan {
     pub sqrt_lambda: [f64; 2],
     /// The same for each of two effects, and for a change (√λ_sim) and the law beside it (√λ).
     pub sqrt_lambda_of_two: [f64; 2],
+    /// The same for strong effects, as far as the physics of an effect allows.
+    pub sqrt_lambda_of_strong: [f64; 2],
     /// Families from which hidden effects are drawn.
     pub families: Vec<Family>,
     /// Share of logs without effects that are compared with the nominal simulation.
@@ -53,6 +55,9 @@ pub struct Shares {
     /// A change that the null model absorbs and a law beside it, compared with the nominal simulation.
     #[serde(default)]
     pub beside: f64,
+    /// One effect that is far stronger than the noise: what is named beside it comes from the model, not from chance.
+    #[serde(default)]
+    pub strong: f64,
 }
 
 /// The table as it is written in the file.
@@ -62,6 +67,8 @@ pub(in crate::montecarlo) struct BlindEntry {
     shares: Shares,
     sqrt_lambda: [f64; 2],
     sqrt_lambda_of_two: [f64; 2],
+    #[serde(default = "strong")]
+    sqrt_lambda_of_strong: [f64; 2],
     against_simulation: f64,
     held_out: f64,
     /// Families to be hidden; if left out, all of [`FAMILIES`].
@@ -72,12 +79,17 @@ pub(in crate::montecarlo) struct BlindEntry {
     sensors: Vec<SensorConfig>,
 }
 
+/// √λ of strong effects if a scenario says nothing else.
+fn strong() -> [f64; 2] {
+    [60.0, 500.0]
+}
+
 /// Round-off by which the sum of the shares may exceed 1: 0.33, 0.56 and 0.11 add up to 1.0000000000000002.
 const ROUND_OFF: f64 = 1e-9;
 
 impl Shares {
-    fn sum(self) -> f64 {
-        self.one + self.two + self.withheld + self.beside
+    pub(super) fn sum(self) -> f64 {
+        self.one + self.two + self.withheld + self.beside + self.strong
     }
 
     /// Refuses a positive share of a kind of case that cannot be drawn from `families`.
@@ -88,6 +100,7 @@ impl Shares {
         };
         let laws = places(&|family| family.can_be_withheld(&known));
         let changes = places(&|family| family.judged == Judged::Simulation);
+        let sized = places(&|family| family.judged != Judged::Record);
         let shares = [
             (
                 "blind.shares.one",
@@ -113,6 +126,12 @@ impl Shares {
                 laws > 0 && changes > 0,
                 "needs a family in blind.families that the model absorbs, and one that it does not",
             ),
+            (
+                "blind.shares.strong",
+                self.strong,
+                sized > 0,
+                "needs a family in blind.families that is no fault of the record",
+            ),
         ];
         for (key, share, can_be_drawn, requirement) in shares {
             source.check(share == 0.0 || can_be_drawn, key, share, requirement)?;
@@ -128,12 +147,13 @@ impl BlindPlan {
         entry: BlindEntry,
         source: &Source,
     ) -> Result<Self, ScenarioError> {
-        let Shares { one, two, withheld, beside } = entry.shares;
+        let Shares { one, two, withheld, beside, strong } = entry.shares;
         let shares = [
             ("blind.shares.one", one),
             ("blind.shares.two", two),
             ("blind.shares.withheld", withheld),
             ("blind.shares.beside", beside),
+            ("blind.shares.strong", strong),
             ("blind.against_simulation", entry.against_simulation),
             ("blind.held_out", entry.held_out),
         ];
@@ -146,6 +166,7 @@ impl BlindPlan {
         let ranges = [
             ("blind.sqrt_lambda", entry.sqrt_lambda),
             ("blind.sqrt_lambda_of_two", entry.sqrt_lambda_of_two),
+            ("blind.sqrt_lambda_of_strong", entry.sqrt_lambda_of_strong),
         ];
         for (key, [low, high]) in ranges {
             source.check(low > 0.0, key, low, "must begin above 0")?;
@@ -197,6 +218,7 @@ impl BlindPlan {
             shares: entry.shares,
             sqrt_lambda: entry.sqrt_lambda,
             sqrt_lambda_of_two: entry.sqrt_lambda_of_two,
+            sqrt_lambda_of_strong: entry.sqrt_lambda_of_strong,
             families,
             against_simulation: entry.against_simulation,
             held_out: entry.held_out,
@@ -265,6 +287,10 @@ mod tests {
         let beside = with("one = 0.5, two = 0.0", "withheld = 0.0, beside = 0.5");
         assert!(of(&beside, "\"payload\"").unwrap().contains("blind.shares.beside"));
         assert_eq!(of(&beside, "\"payload\", \"stribeck\""), None);
+        // Outliers have no size in units of the torque noise.
+        let strong = with("one = 0.5, two = 0.0", "withheld = 0.0, strong = 0.5");
+        assert!(of(&strong, "\"outliers\"").unwrap().contains("blind.shares.strong"));
+        assert_eq!(of(&strong, "\"payload\""), None);
         assert!(of(&with(one, none), "").unwrap().contains("blind.shares.one"));
     }
 

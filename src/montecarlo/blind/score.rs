@@ -22,7 +22,8 @@ use crate::montecarlo::trials::Failure;
 pub const SCORES_SCHEMA: &str = "armid.blind/2";
 
 /// Edges of the bins of √λ.
-const STRENGTHS: [f64; 12] = [0.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 30.0, 40.0, 60.0];
+const STRENGTHS: [f64; 15] =
+    [0.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 30.0, 40.0, 60.0, 100.0, 200.0, 500.0];
 /// Edges of the bins of stated confidence.
 const CONFIDENCES: [f64; 8] = [0.0, 0.5, 0.8, 0.9, 0.95, 0.99, 0.999, 1.0];
 
@@ -118,6 +119,8 @@ pub struct Scores {
     pub residual: Vec<StrengthBin>,
     /// Single effects seen against a simulation, by √λ_sim.
     pub simulation: Vec<StrengthBin>,
+    /// Single strong effects, by √λ or √λ_sim; `right` counts the answers in which nothing else is said.
+    pub strong: Vec<StrengthBin>,
     /// Effects whose family is withheld, by √λ; `right` counts the answers that report something unexplained.
     pub withheld: Vec<StrengthBin>,
     /// Share of right answers for single effects seen in the residual at √λ ≥ 8, by motion and noise.
@@ -163,6 +166,7 @@ impl Scores {
                     && r.outcome() != Outcome::Right
             }
             Secret::Withheld => r.outcome() == Outcome::Wrong,
+            Secret::Strong => r.outcome() != Outcome::Right || !r.is_all_right(),
             Secret::Nothing | Secret::Two | Secret::Beside => r.outcome() != Outcome::Right,
         };
         Self {
@@ -174,6 +178,9 @@ impl Scores {
             verdict,
             residual: bins(one(Judged::Residual), |r| r.outcome() == Outcome::Right),
             simulation: bins(one(Judged::Simulation), |r| r.outcome() == Outcome::Right),
+            strong: bins(secret(Secret::Strong), |r| {
+                r.outcome() == Outcome::Right && r.is_all_right()
+            }),
             withheld: bins(secret(Secret::Withheld), |r| r.answer.left.is_some()),
             conditions: conditions(one(Judged::Residual).filter(|r| r.case.is_from(8.0))),
             families: families(all),

@@ -15,6 +15,9 @@ use crate::montecarlo::share::Share;
 /// A share of fewer cases than this is not judged.
 const FEWEST: u64 = 20;
 
+/// √λ from which a case counts among the strong ones.
+const STRONG: f64 = 60.0;
+
 /// Name of the headline target.
 pub const NAMED_RIGHTLY: &str = "one effect, √λ ≥ 8: kind (class) and joint right";
 
@@ -132,6 +135,9 @@ pub fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
     let is_one = |r: &&Record| r.case.is_one(residual) && r.outcome() == Outcome::Right;
     let base = all.iter().filter(is_one).map(|r| r.answer.base);
     let large = || all.iter().filter(|r| r.case.is_from(40.0)).filter_map(|r| r.answer.gain);
+    // Where physics allows an effect no strength far above the noise, it is drawn as strong as it allows.
+    let of_strong =
+        || all.iter().filter(|r| r.case.secret == Secret::Strong && r.case.is_from(STRONG));
     // All other targets are about cases that have an answer.
     let failures = merged.tally.failures.len() as u64;
     let silent = Share { count: failures, of: all.len() as u64 + failures };
@@ -198,6 +204,21 @@ pub fn targets(merged: &Merged<BlindContent>) -> Vec<Target> {
             "√λ ≥ 40: at least 95 % of what a right model under the same noise removes",
             Share::of(large(), |gain| gain.share() >= 0.95 * gain.possible()),
             [0.9, 1.0],
+        ),
+        Target::new(
+            "one effect, √λ ≥ 60: kind (class) and joint right",
+            Share::of(of_strong(), is_right),
+            [0.97, 1.0],
+        ),
+        Target::new(
+            "one effect, √λ ≥ 60: right, and nothing else said",
+            Share::of(of_strong(), |r| is_right(r) && r.is_all_right()),
+            [0.90, 1.0],
+        ),
+        Target::of_cases(
+            "one effect, √λ ≥ 60: 95 % intervals of its parameters that hold the truth",
+            of_strong().map(Record::covered),
+            [0.93, 0.97],
         ),
         Target::new("cases without an answer", silent, [0.0, 0.005]),
     ]

@@ -57,7 +57,7 @@ const HOW: &str = "Each case draws what is hidden (nothing, one effect, two, one
 dictionary, or a change of the arm with a law beside it, which is compared with the arm's simulation), where, its shape and size, the motion and the colour of the noise. The effect is made by the plant's physics; \
 the diagnosis sees the log alone. √λ is the size of the effect in standard deviations of the noise (of torques and \
 encoders) of the best test that could be made; where the null model absorbs the effect, √λ_sim, against a given simulation. A name is right if kind and \
-joint are, or if the class that the diagnosis states holds them. Of one effect the first cause counts.";
+joint are, or if the class that the diagnosis states holds them. Of one effect the first cause counts. Strong effects have targets of their own and count nowhere else but among the causes named with confidence.";
 
 /// Most misses that the report lists.
 const LISTED: usize = 60;
@@ -112,6 +112,12 @@ fn parts(scores: &Scores) -> Vec<(&'static str, &'static str, Table)> {
             "The true family is not in the dictionary: no name is right, and something should be left unexplained.",
             strength_table(&scores.withheld, "left unexplained"),
         ),
+        (
+            "Strong effects",
+            "Single effects far above the noise, or as far as physics allows, by √λ or √λ_sim. Here chance says nothing \
+             more; a second cause, or a rest without a name, shows where a law is not exact.",
+            strength_table(&scores.strong, "right, and nothing else said"),
+        ),
         ("By family", "At √λ ≥ 8; faults of the record: all.", family_table(scores)),
         (
             "What was said for what",
@@ -151,7 +157,7 @@ pub fn markdown(scores: &Scores, command: &str) -> String {
         text += &format!("\n## {heading}\n\n{words}\n\n{}", table.to_markdown());
     }
     text += "\n## Misses\n\nFalse alarms, single effects with √λ ≥ 8 that were not named, pairs of which one was not, \
-             and wrong names of withheld families. `montecarlo --scenario … --trial K` replays trial K.\n";
+             wrong names of withheld families, and strong effects beside which something else was said. `montecarlo --scenario … --trial K` replays trial K.\n";
     for line in misses(scores) {
         text += &format!("\n- {line}");
     }

@@ -8,7 +8,11 @@ use crate::montecarlo::blind::{SAID_NOTHING, SAID_UNEXPLAINED, Scores, StrengthB
 use crate::report::ReportError;
 use crate::report::plot::{Axis, Band, Colour, HeatMap, IntervalPlot, IntervalRow, Mark, XyPlot};
 
+/// √λ up to which answers by size are drawn: beyond it, only the strongest effects of a family would stretch the axis.
+const DRAWN: f64 = 60.0;
+
 pub(super) fn detection_plot(bins: &[StrengthBin]) -> Result<String, ReportError> {
+    let bins: Vec<&StrengthBin> = bins.iter().filter(|bin| bin.mean <= DRAWN).collect();
     let mut plot = XyPlot::new(
         "Named rightly by size",
         Axis::linear("√λ", ""),
