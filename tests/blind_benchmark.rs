@@ -55,7 +55,7 @@ fn benchmark(shares: Shares, families: &[&str]) -> Benchmark {
 /// Rows of each log.
 const ROWS: f64 = 5000.0;
 
-const NOTHING: Shares = Shares { one: 0.0, two: 0.0, withheld: 0.0, beside: 0.0 };
+const NOTHING: Shares = Shares { one: 0.0, two: 0.0, withheld: 0.0, beside: 0.0, strong: 0.0 };
 const ONE: Shares = Shares { one: 1.0, ..NOTHING };
 const TWO: Shares = Shares { two: 1.0, ..NOTHING };
 const WITHHELD: Shares = Shares { withheld: 1.0, ..NOTHING };

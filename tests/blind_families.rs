@@ -2,7 +2,7 @@
 //! `blind_benchmark` tests one effect of each family with random joint and size.
 
 use armid::diagnose::candidates::{self, Candidate};
-use armid::diagnose::{Diagnosis, Kind, Verdict};
+use armid::diagnose::{Cause, Diagnosis, Kind, Verdict};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
 use crate::simulated::{NOISE, Run, SIGMA_NM, assert_holds, scenario, simulation};
@@ -428,4 +428,38 @@ fn friction_that_depends_on_an_angle_of_a_small_arc() {
     assert_eq!(d.causes.len(), 1, "{:?}", d.sentences);
     assert_holds(&d.causes[0], "amplitude_nm", 0.8);
     assert_holds(&d.causes[0], "phase_rad", -1.0);
+}
+
+/// All friction of a joint warms up, and all of its dry friction turns round at once: the law that multiplies the rest
+/// and the law that adds to it are both named, and nothing else, with intervals that hold the truth.
+#[test]
+fn friction_that_multiplies_other_friction() {
+    let warming = ("thermal_drift", [("fraction", -0.25), ("time_constant_s", 50.0)].as_slice());
+    let width = ("reversal_width", [("width_rad_s", 0.05)].as_slice());
+    let load = ("load_friction", [("mu", 0.1)].as_slice());
+    let place = ("position_friction", [("amplitude_nm", 0.8), ("phase_rad", 0.5)].as_slice());
+    let near_rest = |extra_nm| [("extra_nm", extra_nm), ("vs_rad_s", 0.2)];
+    let (strong, weak) = (near_rest(5.0), near_rest(1.2));
+    for (seed, joints, laws) in [
+        (801, [2, 3], [warming, load]),
+        (802, [2, 3], [warming, ("stribeck", strong.as_slice())]),
+        (803, [4, 5], [warming, place]),
+        (804, [4, 5], [warming, width]),
+        (805, [2, 3], [width, load]),
+        (806, [4, 6], [width, ("stribeck", weak.as_slice())]),
+    ] {
+        let joint = joints[ChaCha8Rng::seed_from_u64(seed).random_range(0..joints.len())];
+        let toml = |(kind, parameters): (&str, &[(&str, f64)])| {
+            let lines = parameters.iter().map(|(name, value)| format!("{name} = {value:?}\n"));
+            format!("[[effect]]\nkind = \"{kind}\"\njoint = {joint}\n{}", lines.collect::<String>())
+        };
+        let d = diagnose(seed, &laws.map(toml).concat());
+        println!("{laws:?} at joint {joint}: {:#?}", d.sentences);
+        assert_eq!((d.causes.len(), d.unexplained.is_some()), (2, false));
+        for (kind, parameters) in laws {
+            let is_it = |c: &&Cause| (c.kind.name(), c.joint) == (kind, Some(joint));
+            let cause = d.causes.iter().find(is_it).unwrap();
+            parameters.iter().for_each(|(name, truth)| assert_holds(cause, name, *truth));
+        }
+    }
 }

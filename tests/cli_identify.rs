@@ -352,3 +352,16 @@ fn several_logs_become_one_estimate_if_each_can_stand_alone() {
     let said = ["2 logs one below the other", "asked for"];
     result("0.csv 1.csv --covariance blocks", &said);
 }
+
+/// A soft gear with the encoder on its link makes the drive unstable: the log is written, and a note says what it is.
+#[test]
+fn an_arm_that_does_not_follow_its_motion_is_told() {
+    let folder = Folder::empty();
+    let gear = "[[effect]]\nkind = \"elasticity\"\njoint = 3\nstiffness_nm_rad = 15000.0\nencoder = \"link\"\n";
+    folder.write("s.toml", format!("{}\n{gear}", default_scenario(1)));
+    let told = ["the arm does not follow its motion", "joint 3 by"];
+    folder.armid("simulate --scenario s.toml --out log.csv").complains(0, &told);
+    folder.write("firm.toml", default_scenario(1));
+    let firm = folder.armid("simulate --scenario firm.toml --out log.csv");
+    assert!(!firm.stderr.contains("does not follow"), "{}", firm.stderr);
+}

@@ -1,6 +1,7 @@
 //! Effects produced by the physics of a drivetrain in these tests, found in periodic logs.
 
 use armid::diagnose::{Cause, Finding, Kind, Verdict};
+use armid::robot::Arm;
 
 use crate::hidden::{Hidden, Law};
 use crate::simulated::{NOISE, Run, assert_holds, scenario};
@@ -156,6 +157,29 @@ fn stiff_presliding_behind_a_drive_that_feeds_friction() {
 fn a_late_reading_of_a_sharp_reversal() {
     let found = Hidden::on(0, Law::Late { ms: 2 }).logged_at(250.0).diagnose(10);
     assert_holds(only(&found, Kind::TimeSkew, Some(1)), "delay_s", 0.002);
+}
+
+/// A drive that smooths the torque it reports: one cause, and its form says that it is no delay.
+#[test]
+fn a_torque_that_went_through_a_low_pass() {
+    let found = Hidden::on(3, Law::LowPass { ms: 5.0 }).diagnose(14);
+    let cause = only(&found, Kind::TimeSkew, Some(4));
+    assert_holds(cause, "delay_s", 0.005);
+    assert!(cause.form.is_some_and(|form| form.contains("low-pass")), "{:?}", cause.form);
+}
+
+/// The load of the gear of joint 2 depends on its rotor, whose inertia the motion adds to that of the links. Friction that
+/// grows with the load tells it: with the rotor of the file, or none, mu would be off by many σ.
+#[test]
+fn load_friction_of_a_gear_with_another_rotor() {
+    let rotor_kg_m2 = Arm::built_in("ur5").unwrap().joints[1].drive.rotor_inertia_kg_m2;
+    for (share, seed) in [(1.4, 15), (0.0, 16)] {
+        let hidden = Hidden::on(1, Law::Load { mu: 0.1 }).with_rotor_in_the_file(share);
+        let found = hidden.diagnose(seed);
+        let cause = only(&found, Kind::LoadFriction, Some(2));
+        assert_holds(cause, "mu", 0.1);
+        assert_holds(cause, "rotor_inertia_kg_m2", rotor_kg_m2);
+    }
 }
 
 /// Five gaps of a tenth to four tenths of a second: the other periods reveal what is missing, and the whole log is

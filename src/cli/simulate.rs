@@ -11,11 +11,12 @@ use super::{CommandResult, Outcome, simulating};
 use crate::dynamics::Model;
 use crate::dynamics::ParameterLayout;
 use crate::excitation::{ExcitationError, LimitKind, Margin, Requirements, check};
+use crate::identify::MOVING_RAD_S;
 use crate::log::{Effort, Log, write_log};
 use crate::montecarlo::{EffectSize, Scenario, Simulation};
 use crate::output::check_outputs;
-use crate::plant::SensorConfig;
 use crate::plant::faults::Effect;
+use crate::plant::{Recording, SensorConfig};
 use crate::report::json::{Document, Program};
 
 /// Simulate one trial of a scenario and write its log.
@@ -108,6 +109,36 @@ fn passed_limit(scenario: &Scenario) -> Result<Option<String>, ExcitationError> 
     }))
 }
 
+/// Share of a joint's rms velocity from which on it counts as not following its motion. Effects that leave a drive too
+/// little torque stay well below it; a joint that swings by itself is far beyond.
+const LOST: f64 = 0.5;
+
+/// A remark on joints of `recording` that do not follow the motion.
+fn lost_joints(recording: &Recording) -> Option<String> {
+    let rms = |y: &mut dyn Iterator<Item = f64>| {
+        let (sum, count) = y.fold((0.0, 0.0), |(sum, count), v| (sum + v * v, count + 1.0));
+        (sum / f64::max(count, 1.0)).sqrt()
+    };
+    let off = |j: usize| {
+        let target = recording.target_qd_rad_s.joint(j);
+        let pairs = recording.qd_rad_s.joint(j).iter().zip(target);
+        let off = rms(&mut pairs.map(|(qd, target)| qd - target));
+        let wanted = rms(&mut target.iter().copied());
+        // NaN counts as lost.
+        (off > f64::max(LOST * wanted, MOVING_RAD_S) || off.is_nan()).then(|| {
+            format!("joint {} by {off:.3} rad/s rms ({wanted:.3} of the motion itself)", j + 1)
+        })
+    };
+    let joints: Vec<String> = (0..recording.qd_rad_s.joints()).filter_map(off).collect();
+    (!joints.is_empty()).then(|| {
+        format!(
+            "the arm does not follow its motion, its velocity is off on {}: an effect leaves the drive too little torque, or makes it \
+             unstable, as a soft gear does with the encoder on its link",
+            joints.join(", ")
+        )
+    })
+}
+
 /// Runs the command.
 pub fn run(args: &SimulateArgs) -> CommandResult {
     let mut scenario = Scenario::load(args.scenario.as_deref())?;
@@ -144,6 +175,9 @@ pub fn run(args: &SimulateArgs) -> CommandResult {
     }
     eprintln!("{}", simulating(&scenario));
     let simulation = Simulation::run(scenario)?;
+    if let Some(lost) = lost_joints(&simulation.recording) {
+        eprintln!("note: {lost}");
+    }
     let measured = simulation.log(args.trial)?;
     let scenario = &simulation.scenario;
     let samples = measured.time_s.len();

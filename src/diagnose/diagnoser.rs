@@ -18,7 +18,7 @@ use super::misfit;
 use super::modesty::{make_modest, make_modest_beside_unknown};
 use super::payload::{self, PayloadFinding};
 use super::record::{Record, is_torn};
-use super::remarks::{contact_remark, drift_remark, limited_drives};
+use super::remarks::{contact_remark, drift_remark, limited_drives, rest_remark};
 use super::replay::measured_nm;
 use super::rms::rms_where;
 use super::scene::Scene;
@@ -30,7 +30,7 @@ use crate::base::BaseSet;
 use crate::dynamics::{Model, Parameter};
 use crate::identify::{
     Doubt, Identification, Identifier, Measurement, Misreading, Options, Regression,
-    drive_limit_remark, unlike,
+    drive_limit_remark, resting_joints, unlike,
 };
 use crate::robot::{Arm, JointSignals};
 
@@ -151,6 +151,7 @@ impl<'a> Diagnoser<'a> {
         let mut warnings: Vec<String> =
             log.warning.iter().chain(&identification.warnings).cloned().collect();
         warnings.extend(contact_remark(&study, &log));
+        warnings.extend(rest_remark(&regression.prepared.motion.qd_rad_s));
         let drift = drift_remark(&study, &causes);
         let limited = limited_drives(self.arm, m.torque_nm, &causes, unexplained.as_ref());
         warnings.extend(drive_limit_remark(self.arm, m.torque_nm));
@@ -458,7 +459,9 @@ fn causes_of<'a>(
     let (arm, set, _) = sources;
     let estimate = (&identification.fit.theta[..], &identification.fit.joint_sigma_nm[..]);
     let mut first = Study::new(families, sources, regression, estimate, source)?;
-    first.leave_out(log.unreadable.clone());
+    // Where a joint trembles about a place, all laws of friction and gears look alike.
+    let resting = resting_joints(&regression.prepared.motion.qd_rad_s);
+    first.leave_out([log.unreadable.clone(), resting].concat());
     let null = Extension::fit(&first, &[], &first.torque);
     let mut first = without_contacts(first, set, &null, source)?;
     first.look_everywhere();

@@ -7,11 +7,12 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use super::candidates::{Candidate, Shape};
 use super::drives::Answer;
 use super::image::{Column, Image, Span};
-use super::scene::Scene;
+use super::scene::{OtherFriction, Scene};
 use super::study::{Entry, Study};
 use super::whitening::Whitening;
-use crate::identify::Problem;
-use crate::robot::JointSignals;
+use crate::base::BaseSet;
+use crate::identify::{Prepared, Problem};
+use crate::robot::{Arm, JointSignals};
 use crate::signal::mean_period;
 
 /// An effect with its fitted shape and coefficients.
@@ -116,6 +117,52 @@ impl Extension {
         };
         let answers = study.answers.iter().zip(answers).flat_map(parts).collect();
         Self { theta, answers, instant_s: study.scene.instant_s(), effects }
+    }
+
+    /// The scene along `prepared` for the arm of this model, with the friction that its effects add.
+    pub fn scene(
+        &self,
+        families: &[Box<dyn Candidate>],
+        (arm, set): (&Arm, &BaseSet),
+        prepared: &Prepared,
+    ) -> Scene {
+        self.with_friction(families, Scene::new(arm, set, &self.theta, prepared))
+    }
+
+    /// `scene` with the friction that the effects add to joints where one law changes that of another.
+    pub fn with_friction(&self, families: &[Box<dyn Candidate>], mut scene: Scene) -> Scene {
+        for j in 0..scene.joints() {
+            let kinds = self.on_joint(j).map(|effect| families[effect.family].kind());
+            let (multiply, others): (Vec<_>, Vec<_>) =
+                kinds.partition(|kind| kind.multiplies_friction());
+            let is_product = multiply.len() > 1 || others.iter().any(|kind| kind.adds_friction());
+            if !multiply.is_empty() && is_product {
+                self.tell_friction(families, &mut scene, j);
+            }
+        }
+        scene
+    }
+
+    /// Tells `scene` the friction of the effects on joint `j`.
+    pub fn tell_friction(&self, families: &[Box<dyn Candidate>], scene: &mut Scene, j: usize) {
+        let width =
+            |effect: &Effect| families[effect.family].width_rad_s(scene, &effect.coefficients);
+        let width_rad_s = self.on_joint(j).find_map(width);
+        scene.set_other_friction(j, OtherFriction { width_rad_s, ..OtherFriction::default() });
+        // The other laws depend on the width.
+        let mut other = OtherFriction { width_rad_s, ..OtherFriction::default() };
+        for effect in self.on_joint(j).filter(|e| families[e.family].kind().adds_friction()) {
+            for (column, b) in effect.torques(families, scene) {
+                let parts = column.parts.iter().filter(|(joint, _)| *joint == j);
+                parts.for_each(|(_, y)| other.add(y, b));
+            }
+        }
+        scene.set_other_friction(j, other);
+    }
+
+    /// The effects on joint `j`, those of the arm as a whole among them.
+    fn on_joint(&self, j: usize) -> impl Iterator<Item = &Effect> {
+        self.effects.iter().filter(move |effect| effect.site.is_none_or(|own| own == j))
     }
 
     /// The same model for another log, with shapes as [`Candidate::elsewhere`] gives them.

@@ -12,7 +12,6 @@ use super::error::DiagnoseError;
 use super::extension::Extension;
 use super::image::{Image, Span};
 use super::rms::rms_where;
-use super::scene::Scene;
 use super::verdict::HeldOut;
 use super::whitening::{RunWhitening, Whitening};
 use crate::base::BaseSet;
@@ -60,7 +59,7 @@ pub(super) fn held_out_gain(
         let weights = vec![1.0; arm.dof()];
         Some(Whitening::Run(RunWhitening::new(&regression, options, &weights)?))
     };
-    let scene = Scene::new(arm, set, &extension.theta, prepared);
+    let scene = extension.scene(families, (arm, set), prepared);
     let problem = &regression.problem;
     let (joints, samples) = (problem.joints(), problem.samples);
     let measured: Vec<Vec<f64>> =

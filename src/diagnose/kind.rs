@@ -121,6 +121,17 @@ impl Kind {
         )
     }
 
+    /// Whether the law adds to the friction of its joint.
+    pub fn adds_friction(self) -> bool {
+        let others = matches!(self, Self::FeedForward | Self::FrictionChange);
+        self.is_friction() && !self.multiplies_friction() && !others
+    }
+
+    /// Whether the law changes all friction of its joint, that of other laws as well.
+    pub fn multiplies_friction(self) -> bool {
+        matches!(self, Self::ThermalDrift | Self::ReversalWidth)
+    }
+
     /// Whether it is a law of the arm: neither a fault of the recording nor something that happened once.
     pub fn is_a_law(self) -> bool {
         !self.is_of_the_record() && self != Self::Contact

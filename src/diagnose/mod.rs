@@ -41,6 +41,7 @@ mod image;
 mod intervals;
 mod judgement;
 mod kind;
+mod lateness;
 mod load;
 mod memory;
 mod misfit;

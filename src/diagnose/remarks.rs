@@ -6,7 +6,7 @@ use super::contact::Compared;
 use super::kind::Kind;
 use super::study::Study;
 use super::verdict::{Cause, Unexplained};
-use crate::identify::drives_at_limits;
+use crate::identify::{MOVING_RAD_S, drives_at_limits, resting_joints};
 use crate::robot::{Arm, JointSignals};
 
 /// Share of the samples from which on a drive at its limit is told before what is named on its joint.
@@ -48,6 +48,18 @@ pub(super) fn contact_remark(study: &Study, log: &Cleaned) -> Option<String> {
         "contacts are not looked for: too few periods follow each other without a gap to be compared; repeat the motion three \
          times or more"
             .to_owned()
+    })
+}
+
+/// States on which joints no cause is looked for because they rest.
+pub(super) fn rest_remark(qd_rad_s: &JointSignals) -> Option<String> {
+    let in_words = |j: usize| format!("joint {}", j + 1);
+    let joints: Vec<String> = resting_joints(qd_rad_s).into_iter().map(in_words).collect();
+    (!joints.is_empty()).then(|| {
+        format!(
+            "no causes are looked for where joints do not move faster than {MOVING_RAD_S} rad/s, and their friction is not identified: {}",
+            joints.join(", ")
+        )
     })
 }
 

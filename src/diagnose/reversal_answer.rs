@@ -6,11 +6,12 @@
 //! from two before to three behind the reversal, cover what a drive does within some twenty milliseconds.
 //!
 //! A torque that is recorded late shows the same sum later. Between two samples this is not the same sum with other c,
-//! so for a delay d the c are fitted to Σ_i c_i s(t − iΔ − d).
+//! so for a delay d the c are fitted to Σ_i c_i s(t − iΔ − d), and for a low-pass to the sum with s behind it.
 
 use fourier::Complex64;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
+use super::lateness::Lateness;
 use crate::signal::FineClock;
 
 /// Step Δ between two delays, s; never less than the time between two samples.
@@ -59,36 +60,43 @@ impl ReversalAnswer {
 
     /// What the drive delivers, Nm at every tick, if the torque was recorded `late_ticks` late.
     pub fn given_nm(&self, clock: &FineClock, late_ticks: f64) -> Vec<f64> {
-        self.sum_nm(self.coefficients(clock, late_ticks).as_deref(), 0.0, 1)
+        let c = self.coefficients(clock, (&self.sign, late_ticks));
+        self.sum_nm(c.as_deref(), (&self.sign, 0.0), 1)
     }
 
-    /// Change of what the drive delivers by a delay, Nm at every sample of `clock`, if the torque was recorded that many
-    /// ticks late.
-    pub fn change_by_delay_nm(&self, clock: &FineClock, late_ticks: f64) -> Vec<f64> {
-        let c = self.coefficients(clock, late_ticks);
-        let [mut late, now] =
-            [late_ticks, 0.0].map(|ticks| self.sum_nm(c.as_deref(), ticks, clock.ticks()));
+    /// Change of what the drive delivers by the `lateness` of its record, in ticks; Nm at every sample of `clock`.
+    pub fn change_nm(&self, clock: &FineClock, lateness: Lateness) -> Vec<f64> {
+        let (sign, late_ticks) = lateness.parts(&self.sign);
+        let c = self.coefficients(clock, (&sign, late_ticks));
+        let [mut late, now] = [(&*sign, late_ticks), (&self.sign, 0.0)]
+            .map(|of| self.sum_nm(c.as_deref(), of, clock.ticks()));
         late.iter_mut().zip(now).for_each(|(late, now)| *late -= now);
         late
     }
 
-    /// Σ_i c_i s(t − iΔ − d) with d = `late_ticks`, Nm, at every `every`-th tick; without `c`, all friction of t − d.
-    fn sum_nm(&self, c: Option<&[f64]>, late_ticks: f64, every: usize) -> Vec<f64> {
+    /// Σ_i c_i s(t − iΔ − d) with s = `sign` and d = `late_ticks`, Nm, at every `every`-th tick; without `c`, all friction
+    /// of t − d.
+    fn sum_nm(
+        &self,
+        c: Option<&[f64]>,
+        (sign, late_ticks): (&[f64], f64),
+        every: usize,
+    ) -> Vec<f64> {
         let Some(c) = c else {
-            let sign = shifted(&self.sign, late_ticks, every);
+            let sign = shifted(sign, late_ticks, every);
             return sign.iter().map(|s| self.coulomb_nm * s).collect();
         };
-        let mut sum_nm = vec![0.0; self.sign.len().div_ceil(every)];
-        for (sign, c) in self.delayed(late_ticks, every).zip(c) {
+        let mut sum_nm = vec![0.0; sign.len().div_ceil(every)];
+        for (sign, c) in self.delayed((sign, late_ticks), every).zip(c) {
             sum_nm.iter_mut().zip(sign).for_each(|(sum, sign)| *sum += c * sign);
         }
         sum_nm
     }
 
     /// The c, Nm; `None` where noise drowns the answer, or where the joint hardly reverses.
-    fn coefficients(&self, clock: &FineClock, late_ticks: f64) -> Option<Vec<f64>> {
+    fn coefficients(&self, clock: &FineClock, late: (&[f64], f64)) -> Option<Vec<f64>> {
         let spectra: Vec<Vec<Complex64>> =
-            self.delayed(late_ticks, clock.ticks()).map(|s| clock.spectrum(&s)).collect();
+            self.delayed(late, clock.ticks()).map(|s| clock.spectrum(&s)).collect();
         let count = spectra.len();
         let weighted = |i: usize, y: &dyn Fn(&TorqueHarmonic) -> Complex64| -> f64 {
             let product = |h: &TorqueHarmonic| (spectra[i][h.number].conj() * y(h)).re / h.noise;
@@ -103,8 +111,13 @@ impl ReversalAnswer {
     }
 
     /// s(t − iΔ − d) for every delay i, at every `every`-th tick.
-    fn delayed(&self, late_ticks: f64, every: usize) -> impl Iterator<Item = Vec<f64>> {
-        DELAYS.map(move |i| shifted(&self.sign, i as f64 * self.delay + late_ticks, every))
+    fn delayed<'s>(
+        &self,
+        (sign, late_ticks): (&'s [f64], f64),
+        every: usize,
+    ) -> impl Iterator<Item = Vec<f64>> + use<'s> {
+        let delay = self.delay;
+        DELAYS.map(move |i| shifted(sign, i as f64 * delay + late_ticks, every))
     }
 }
 
@@ -163,7 +176,10 @@ mod tests {
             assert!(off(&answer.given_nm(&clock, late), &truth) < 1e-9, "{late}");
             let [delayed, now] = [late, 0.0].map(|ticks| shifted(&truth, ticks, TICKS));
             let change: Vec<f64> = delayed.iter().zip(now).map(|(a, b)| a - b).collect();
-            assert!(off(&answer.change_by_delay_nm(&clock, late), &change) < 1e-9, "{late}");
+            assert!(
+                off(&answer.change_nm(&clock, Lateness::Delay(late)), &change) < 1e-9,
+                "{late}"
+            );
         }
         // A late torque that is taken for one on time tells another course between the samples.
         let (clock, answer, truth) = answer(&[(1.0, 0.0)], 8.0);
@@ -180,7 +196,7 @@ mod tests {
             .zip(dry.iter().step_by(TICKS))
             .map(|(late, now)| late - now)
             .collect();
-        assert!(off(&answer.change_by_delay_nm(&clock, 8.0), &change) < 1e-12);
+        assert!(off(&answer.change_nm(&clock, Lateness::Delay(8.0)), &change) < 1e-12);
         // Nor does the torque of a joint that does not reverse tell anything.
         let still = ReversalAnswer { sign: vec![1.0; N * TICKS], ..answer };
         assert_eq!(still.given_nm(&clock, 0.0), vec![8.0; N * TICKS]);

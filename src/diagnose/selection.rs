@@ -345,7 +345,12 @@ impl<'s, 'a> Kept<'s, 'a> {
 
     /// The best shape of every family at every free site, best first. `open` is the cause to be replaced, if any; its
     /// place counts as free.
-    fn contenders(&self, open: Option<usize>, others: &Span, residual: &Image) -> Vec<Contender> {
+    pub(super) fn contenders(
+        &self,
+        open: Option<usize>,
+        others: &Span,
+        residual: &Image,
+    ) -> Vec<Contender> {
         let study = self.study;
         let orders = self.ripple_orders(residual);
         let open_site =

@@ -7,8 +7,10 @@
 use super::contact::{self, BesideModel};
 use super::error::DiagnoseError;
 use super::extension::Extension;
+use super::scene::OtherFriction;
 use super::selection::{Contender, Found, Kept};
-use super::study::{Entry, Study};
+use super::significance::FAR_AHEAD;
+use super::study::{Entry, Place, Study};
 use crate::base::BaseSet;
 use crate::robot::{Arm, JointSignals};
 use crate::signal::{SignalError, ZeroPhase, mean_period};
@@ -17,6 +19,9 @@ use crate::signal::{SignalError, ZeroPhase, mean_period};
 const ROUNDS: usize = 4;
 /// A round that gains less than this, in 2 ln of the evidence, changes nothing that counts.
 const SETTLED: f64 = 4.0;
+/// Least number of rounds where one law multiplies the friction of others by 1 + f. Their sizes are those of the round
+/// before, and what is left of an error of sizes falls by about f in each.
+const ROUNDS_OF_PRODUCTS: usize = 3;
 
 /// Fits what was `found` in `study` and the estimate of the arm in turn, until neither changes the other.
 ///
@@ -24,17 +29,37 @@ const SETTLED: f64 = 4.0;
 /// the arm is estimated without it. A single run gets one round, because its causes are judged by what they leave
 /// ([`Kept::of_a_single_run`]).
 pub fn settled<'s>(
-    mut study: Study<'s>,
+    study: Study<'s>,
     found: Found,
-    (arm, set): (&Arm, &BaseSet),
+    sources: (&Arm, &BaseSet),
     log: &str,
 ) -> Result<(Study<'s>, Vec<Contender>), DiagnoseError> {
+    let (mut study, mut found) = in_turn(study, found, sources, log)?;
+    if study.scene.periodic {
+        let count = found.causes.len();
+        found = with_products(&mut study, found);
+        if found.causes.len() > count {
+            (study, found) = in_turn(study, found, sources, log)?;
+        }
+    }
+    study.look_everywhere();
+    Ok((study, found.causes))
+}
+
+/// The rounds of [`settled`].
+fn in_turn<'s>(
+    mut study: Study<'s>,
+    found: Found,
+    sources: (&Arm, &BaseSet),
+    log: &str,
+) -> Result<(Study<'s>, Found), DiagnoseError> {
     let Found { mut causes, mut evidence } = found;
-    for _ in 0..ROUNDS {
+    for round in 1..=ROUNDS {
         let entries: Vec<&Entry> = causes.iter().map(|c| &c.entry).collect();
         let refined = Extension::fit(&study, &entries, &study.torque);
-        study = study.with_estimate(arm, set, &refined.theta, &entries);
-        study = without_contacts(study, set, &refined, log)?;
+        let scene = refined.scene(study.families, sources, &study.regression.prepared);
+        study = study.with_scene(scene, &entries);
+        study = without_contacts(study, sources.1, &refined, log)?;
         if !study.scene.periodic {
             break;
         }
@@ -45,12 +70,76 @@ pub fn settled<'s>(
         let gained = kept.total_evidence() - evidence;
         evidence += gained;
         causes = kept.causes;
-        if is_complete && dropped.is_empty() && gained < SETTLED {
+        let is_due = study.scene.has_products() && round < ROUNDS_OF_PRODUCTS;
+        if is_complete && dropped.is_empty() && gained < SETTLED && !is_due {
             break;
         }
     }
-    study.look_everywhere();
-    Ok((study, causes))
+    Ok((study, Found { causes, evidence }))
+}
+
+/// What was `found`, and laws that multiply its friction.
+///
+/// Beside friction that falls with speed, say, no width of the reversal fits as long as the joint is taken to have
+/// Coulomb and viscous friction alone, and what falls with speed was fitted without the width. The law that multiplies is
+/// therefore taken on trial, refined in turn with the others, and only then has to be needed.
+fn with_products(study: &mut Study, mut found: Found) -> Found {
+    let families = study.families;
+    let joints = 0..study.scene.joints();
+    let before: Vec<OtherFriction> =
+        joints.clone().map(|j| study.scene.other_friction(j).clone()).collect();
+    let count = found.causes.len();
+    for j in joints {
+        let has_friction = found.causes.iter().any(|c| {
+            c.entry.site.is_none_or(|own| own == j)
+                && families[c.entry.family].kind().adds_friction()
+        });
+        if !has_friction {
+            continue;
+        }
+        let multiplies = |(family, site): &Place| {
+            *site == Some(j) && families[*family].kind().multiplies_friction()
+        };
+        tell_friction(study, &found.causes, multiplies);
+        let kept = Kept::taken_over(study, found.causes.clone());
+        let (others, residual) = kept.without(None);
+        let mut contenders = kept.contenders(None, &others, &residual).into_iter();
+        let Some(on_trial) =
+            contenders.find(|c| multiplies(&c.entry.place()) && c.evidence > FAR_AHEAD)
+        else {
+            continue;
+        };
+        let mut causes = kept.causes;
+        causes.push(on_trial);
+        for _ in 0..ROUNDS_OF_PRODUCTS {
+            tell_friction(study, &causes, |_| false);
+            causes = Kept::taken_over(study, causes).causes;
+        }
+        let mut kept = Kept::taken_over(study, causes);
+        kept.drop_unneeded(|_| true);
+        if kept.causes.len() > found.causes.len() {
+            found = Found { evidence: kept.total_evidence(), causes: kept.causes };
+        }
+    }
+    if found.causes.len() > count {
+        tell_friction(study, &found.causes, |_| false);
+    } else {
+        let of_joints = before.into_iter().enumerate();
+        of_joints.for_each(|(j, other)| study.scene.set_other_friction(j, other));
+        study.forget();
+    }
+    found
+}
+
+/// Tells the scene of `study` the friction of the `causes`, and prepares them and the places that are wanted besides.
+fn tell_friction(study: &mut Study, causes: &[Contender], is_wanted: impl Fn(&Place) -> bool) {
+    let entries: Vec<&Entry> = causes.iter().map(|c| &c.entry).collect();
+    let model = Extension::fit(study, &entries, &study.torque);
+    let families = study.families;
+    (0..study.scene.joints()).for_each(|j| model.tell_friction(families, &mut study.scene, j));
+    study.forget();
+    let is_cause = |place: &Place| entries.iter().any(|entry| entry.place() == *place);
+    study.prepare(|place| is_cause(place) || is_wanted(place));
 }
 
 /// The `study` of a single run without the rows in which something touched the arm according to `model`.

@@ -63,7 +63,7 @@ pub struct Study<'a> {
     pub residual: Image,
     /// How explained squares become statistics.
     pub statistic: Statistic,
-    /// Every family at every site with every starting shape; but see [`Self::with_estimate`].
+    /// Every family at every site with every starting shape; but see [`Self::with_scene`].
     pub entries: Vec<Entry>,
     /// Laws of a motion that repeats that the null model absorbs nearly, each at a site with no entry. They are not
     /// looked for, but one of them may be what really is behind a cause that was found.
@@ -213,18 +213,12 @@ impl<'a> Study<'a> {
         Ok(Self { left_out, shown, ..study })
     }
 
-    /// The same study with torques predicted by the base parameters `theta`, after `entries` were found with others.
+    /// The same study with the torques that `scene` predicts, after `entries` were found with others.
     /// It prepares only the families of `entries`, each at its site, until it [looks
     /// everywhere](Self::look_everywhere) again.
-    pub fn with_estimate(
-        mut self,
-        arm: &Arm,
-        set: &BaseSet,
-        theta: &[f64],
-        entries: &[&Entry],
-    ) -> Self {
-        self.scene = Scene::new(arm, set, theta, &self.regression.prepared);
-        self.memory = Memory::default();
+    pub fn with_scene(mut self, scene: Scene, entries: &[&Entry]) -> Self {
+        self.scene = scene;
+        self.forget();
         let shown = |&&Entry { family, site, shape, ref images }: &&Entry| Shown {
             family,
             site,
@@ -241,6 +235,11 @@ impl<'a> Study<'a> {
         let places: Vec<Place> = entries.iter().map(|entry| (entry.family, entry.site)).collect();
         self.prepare(|place| places.contains(place));
         self
+    }
+
+    /// Forgets columns that were computed before the scene changed.
+    pub(super) fn forget(&mut self) {
+        self.memory = Memory::default();
     }
 
     /// Recomputes the statistic from `residual`, that of a better model than the null model, so that it tells how many

@@ -42,7 +42,7 @@ pub fn drive_limit_remark(arm: &Arm, torque_nm: &JointSignals) -> Option<String>
     let joints: Vec<String> = drives_at_limits(arm, torque_nm).iter().map(in_words).collect();
     (!joints.is_empty()).then(|| {
         format!(
-            "drives are at their torque limits in some samples: {}; where the torque leaves its limit it changes faster than the log can \
+            "drives are at their torque limits, to within 1 %, in some samples: {}; where the torque leaves its limit it changes faster than the log can \
              follow, which may look like a soft gear or a late torque; move more slowly or with less load",
             joints.join(", ")
         )

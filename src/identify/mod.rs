@@ -51,7 +51,7 @@ pub use lack_of_fit::{Floor, LackOfFit, by_noise_in_words};
 pub use misreading::{Change, Channels, Match, Misreading};
 pub use options::Options;
 pub use pooled::{Agreement, Several, each_alone, pooled};
-pub use prediction::{MOVING_RAD_S, Prediction};
+pub use prediction::{MOVING_RAD_S, Prediction, resting_joints};
 pub use prepare::{Measurement, Prepared, Preparer, Processing};
 pub use problem::{Assembler, Domain, Panel, Problem};
 pub use quality::{Condition, identifies_the_arm, not_identified, plausible_size};

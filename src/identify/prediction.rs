@@ -21,6 +21,12 @@ pub struct Prediction {
 /// Speed beyond which a joint counts as moving, rad/s.
 pub const MOVING_RAD_S: f64 = 0.02;
 
+/// The joints (0-based) that never move faster than [`MOVING_RAD_S`].
+pub fn resting_joints(qd_rad_s: &JointSignals) -> Vec<usize> {
+    let rests = |j: &usize| qd_rad_s.joint(*j).iter().all(|qd| qd.abs() < MOVING_RAD_S);
+    (0..qd_rad_s.joints()).filter(rests).collect()
+}
+
 impl Prediction {
     /// Predicts the torque of the parameters `theta` along the log of `regression`.
     pub fn of(regression: &Regression, theta: &[f64]) -> Self {

@@ -46,6 +46,10 @@ pub enum Law {
     Late {
         ms: usize,
     },
+    /// Torque that goes through a low-pass of first order with this time constant before it is recorded.
+    LowPass {
+        ms: f64,
+    },
 }
 
 /// A hidden effect, its joint, and the way the log is recorded.
@@ -58,6 +62,7 @@ pub struct Hidden {
     noise: f64,
     fed_forward: f64,
     velocity_offset_rad_s: f64,
+    rotor_in_the_file: f64,
 }
 
 impl Hidden {
@@ -71,6 +76,7 @@ impl Hidden {
             noise: 1.0,
             fed_forward: PlantConfig::default().friction_feedforward,
             velocity_offset_rad_s: 0.0,
+            rotor_in_the_file: 1.0,
         }
     }
 
@@ -94,6 +100,11 @@ impl Hidden {
         Self { velocity_offset_rad_s: rad_s, ..self }
     }
 
+    /// Diagnoses with a robot's file whose rotor of this joint has this share of its true inertia.
+    pub fn with_rotor_in_the_file(self, share: f64) -> Self {
+        Self { rotor_in_the_file: share, ..self }
+    }
+
     pub fn logged_at(self, log_rate_hz: f64) -> Self {
         Self { log_rate_hz, ..self }
     }
@@ -114,8 +125,11 @@ impl Hidden {
             _ => PlantConfig::default().step_s,
         };
         // A delay is a whole number of rows in a log at 1 kHz.
-        let log_rate_hz =
-            if matches!(self.law, Law::Late { .. }) { 1000.0 } else { self.log_rate_hz };
+        let log_rate_hz = if matches!(self.law, Law::Late { .. } | Law::LowPass { .. }) {
+            1000.0
+        } else {
+            self.log_rate_hz
+        };
         let config = PlantConfig { log_rate_hz, step_s, ..PlantConfig::default() };
         let law = HiddenLaw::new(&arm, self.joint, self.law);
         let mut plant =
@@ -139,6 +153,18 @@ impl Hidden {
         if let Law::Late { ms } = self.law {
             let torque = recording.torque_nm.joint_mut(self.joint);
             torque.copy_within(..torque.len() - ms, ms);
+        }
+        if let Law::LowPass { ms } = self.law {
+            let torque = recording.torque_nm.joint_mut(self.joint);
+            let (mut out, mut before) = (torque[0], torque[0]);
+            for t in torque {
+                let mean = 0.5 * (*t + before);
+                before = *t;
+                out += (mean - out) * (1.0 - (-1.0 / ms).exp());
+                *t = out;
+            }
+        }
+        if let Law::Late { .. } | Law::LowPass { .. } = self.law {
             let every = (1000.0 / self.log_rate_hz) as usize;
             recording = only_rows(recording, |k| k % every == 0);
         }
@@ -163,6 +189,8 @@ impl Hidden {
             let velocities = measured.qd_rad_s.joint_mut(j).iter_mut();
             velocities.for_each(|qd| *qd += self.velocity_offset_rad_s);
         }
+        let mut arm = arm;
+        arm.joints[self.joint].drive.rotor_inertia_kg_m2 *= self.rotor_in_the_file;
         let model = Model::new(&arm);
         let full = Parameterisation::full(arm.dof(), arm.torque_offsets);
         let set = BaseSet::find(&arm, full).unwrap();
@@ -270,7 +298,10 @@ impl Drivetrain for HiddenLaw {
                 let carried = self.link_nm[h] / (1.0 + mu * sign * self.link_nm[h].signum());
                 self.link_nm[h] = carried;
             }
-            Law::CutBeforeNoise { .. } | Law::ZigzagOfTheCurrent { .. } | Law::Late { .. } => {}
+            Law::CutBeforeNoise { .. }
+            | Law::ZigzagOfTheCurrent { .. }
+            | Law::Late { .. }
+            | Law::LowPass { .. } => {}
             Law::Dahl { stiffness_per_rad } | Law::LuGre { stiffness_per_rad, .. } => {
                 let z = stage.states[0];
                 let rate = stiffness_per_rad * (v - v.abs() * z);

@@ -27,7 +27,7 @@ mod saturation;
 mod spring;
 mod stribeck;
 mod thermal_drift;
-mod time_skew;
+pub(super) mod time_skew;
 mod torque_gain;
 
 use super::image::Column;
@@ -150,6 +150,11 @@ pub trait Candidate: Sync {
 
     /// Torque per unit of each coefficient: one column per coefficient.
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column>;
+
+    /// Speed over which dry friction turns round, for the law that says so, with the coefficients `b`, rad/s.
+    fn width_rad_s(&self, _scene: &Scene, _b: &[f64]) -> Option<f64> {
+        None
+    }
 
     /// Directions of torque along which the law may be wrong at this shape, because it takes something for granted that
     /// the log does not tell. A residual along them is not evidence for another cause.
@@ -314,7 +319,7 @@ fn samples(scene: &Scene, f: impl Fn(usize) -> f64) -> Vec<f64> {
 
 /// Dry friction of joint `j` as logged: `level(instants, k)` times the sign of q̇.
 fn dry_friction(scene: &Scene, j: usize, level: impl Fn(&Instants, usize) -> f64) -> Column {
-    let at = scene.instants(j);
+    let at = scene.turned(j);
     let friction = (0..at.sign.len()).map(|k| at.sign[k] * level(at, k)).collect();
     Column::on(j, scene.as_logged(friction))
 }

@@ -97,6 +97,11 @@ impl Candidate for ReversalWidth {
         vec![quantity("width_rad_s", scene.arm.friction_epsilon_rad_s + b[0], "rad/s")]
     }
 
+    fn width_rad_s(&self, scene: &Scene, b: &[f64]) -> Option<f64> {
+        let epsilon = scene.arm.friction_epsilon_rad_s;
+        Some((epsilon + b[0]).max(SHARPEST * epsilon))
+    }
+
     fn agreeing(&self, shape: Shape, b: &[f64]) -> Shape {
         if b[0] / shape.value > MOST_WHOLE {
             Shape { value: b[0] / MOST_WHOLE, ..shape }

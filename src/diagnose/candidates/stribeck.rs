@@ -68,7 +68,7 @@ impl Candidate for Stribeck {
 
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let j = joint(site);
-        let epsilon = scene.arm.friction_epsilon_rad_s;
+        let epsilon = scene.width_rad_s(j);
         let velocity = scene.turning_rad_s(
             j,
             FED,
@@ -78,7 +78,7 @@ impl Candidate for Stribeck {
         );
         let beside = of_pairs(
             velocity,
-            &scene.instants(j).sign,
+            &scene.turned(j).sign,
             #[inline(always)]
             |v, sign| (usual(shape, epsilon, v) - sign) / USUAL_SHARE,
         );

@@ -1,5 +1,5 @@
-//! Friction that changes while the arm warms up: τ = f (F_c sign q̇ + F_v q̇)(1 − e^{−t/T}). t counts from the start of
-//! the record, not of the part that is used: a motion that changes with its friction becomes periodic only later. The
+//! Friction that changes while the arm warms up: τ = f F (1 − e^{−t/T}), with F = F_c sign q̇ + F_v q̇ and what other laws
+//! add to the friction of the joint. t counts from the start of the record, not of the part that is used: a motion that changes with its friction becomes periodic only later. The
 //! effect itself does not repeat, so that the differences between periods show it.
 
 use super::*;
@@ -35,12 +35,14 @@ impl Candidate for ThermalDrift {
         let drive = &scene.arm.joints[j].drive;
         let qd = scene.motion.qd_rad_s.joint(j);
         // The friction that a drive feeds forward does not warm up with the actual friction.
-        let sign = scene.as_logged(scene.instants(j).sign.clone());
+        let sign = scene.as_logged(scene.turned(j).sign.clone());
+        let other = scene.other_friction(j);
         let n = scene.samples();
         let friction = (0..n * scene.periods).map(|k| {
             let time_s = scene.lead_in_s + k as f64 / scene.rate_hz;
             let warm = 1.0 - (-time_s / shape.value).exp();
-            warm * (drive.coulomb_nm * sign[k % n] + drive.viscous_nm_s_rad * qd[k % n])
+            let own = drive.coulomb_nm * sign[k % n] + drive.viscous_nm_s_rad * qd[k % n];
+            warm * (own + other.at(k % n))
         });
         vec![Column::on(j, friction.collect())]
     }

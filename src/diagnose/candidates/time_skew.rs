@@ -3,8 +3,12 @@
 //! d is both the shape and the coefficient, because the change that a delay causes is divided by the delay. Where the
 //! two disagree, another effect looks like a delay of that shape: drives with slow feedback lead or lag slightly more
 //! at one reversal than at another, which is a sixteenth of the change by a delay of half a sample.
+//!
+//! Where a delay was found, a low-pass of first order is tried in its place, as drives smooth the torque that they
+//! report: to first order in its time constant it is a delay by that time.
 
 use super::*;
+use crate::diagnose::lateness::Lateness;
 
 /// See the module.
 pub struct TimeSkew;
@@ -28,6 +32,10 @@ const DELAYS_S: [f64; 12] = [
 /// Below this delay, s, the change is proportional to the delay, up to (ω d)²/6 = 0.15 % at 60 Hz, the highest
 /// frequency at which drives are examined.
 const SHORTEST_S: f64 = 2.5e-4;
+/// Variant in which the torque is low-passed with the time constant of the shape.
+pub const LOW_PASS: usize = 1;
+/// Time constants of low-passes that are tried, relative to the delay that was found.
+const TIME_CONSTANTS: [f64; 5] = [0.5, 0.7, 1.0, 1.4, 2.0];
 /// Largest ratio of coefficient to shape; its inverse is the smallest.
 const AGREES: f64 = 3.0;
 
@@ -58,6 +66,15 @@ impl Candidate for TimeSkew {
         DELAYS_S.map(|value| Shape { variant: 0, value }).to_vec()
     }
 
+    fn finer_shapes(&self, scene: &Scene, _: Option<usize>, shape: Shape) -> Vec<Shape> {
+        // The low-pass of a single run is slower than that of a drive, and no low-pass is early.
+        if !scene.periodic || shape.value <= 0.0 {
+            return Vec::new();
+        }
+        let low_pass = |factor| Shape { variant: LOW_PASS, value: factor * shape.value };
+        TIME_CONSTANTS.map(low_pass).to_vec()
+    }
+
     fn shape_is_coefficient(&self) -> bool {
         true
     }
@@ -71,8 +88,12 @@ impl Candidate for TimeSkew {
     }
 
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
+        let lateness = match shape.variant {
+            LOW_PASS => Lateness::LowPass(shape.value),
+            _ => Lateness::Delay(shape.value),
+        };
         let change = |j: usize| {
-            let change = scene.change_by_delay_nm(j, shape.value);
+            let change = scene.change_nm(j, lateness);
             change.into_iter().map(|change| change / shape.value).collect()
         };
         vec![Column { parts: joints_at(scene, site).map(|j| (j, change(j))).collect() }]
@@ -94,6 +115,10 @@ impl Candidate for TimeSkew {
 
     fn in_words(&self) -> &'static str {
         "torque that is recorded later than the motion"
+    }
+
+    fn form(&self, _: &Scene, shape: Shape) -> Option<&'static str> {
+        (shape.variant == LOW_PASS).then_some("a low-pass of first order with this time constant")
     }
 }
 

@@ -6,6 +6,7 @@
 use crate::diagnose::Kind;
 use crate::diagnose::candidates::elasticity::ON_MOTOR;
 use crate::diagnose::candidates::load_friction::MOTOR_SIDE;
+use crate::diagnose::candidates::time_skew::LOW_PASS;
 use crate::plant::PlantConfig;
 use crate::plant::faults::{self, Effect};
 
@@ -174,6 +175,7 @@ impl Found<'_> {
                 joint: self.joint?,
                 share_less: value("share_less")?.min(PlantConfig::default().friction_feedforward),
             })),
+            Kind::TimeSkew if self.variant == LOW_PASS => Some(Counterpart::None(NO_SUCH_LAW)),
             Kind::TimeSkew => in_the_model(Effect::TimeSkew(faults::TimeSkew {
                 joint: self.joint,
                 delay_s: value("delay_s")?,

@@ -19,7 +19,6 @@ use serde::Serialize;
 use super::diagnoser::{Diagnoser, Finding};
 use super::held_out::Validation;
 use super::rms::rms_where;
-use super::scene::Scene;
 use crate::plant::faults::Effect;
 use crate::robot::JointSignals;
 
@@ -120,7 +119,7 @@ impl Diagnoser<'_> {
         for other in held_out {
             let regression = self.identifier.regression(&other.measurement)?;
             let prepared = &regression.prepared;
-            let scene = Scene::new(self.arm, self.set, &finding.extension.theta, prepared);
+            let scene = finding.extension.scene(&self.families, (self.arm, self.set), prepared);
             let samples: Vec<usize> =
                 (0..regression.problem.samples).map(|row| regression.sample(row)).collect();
             let course = Course {

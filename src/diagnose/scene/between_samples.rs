@@ -28,7 +28,7 @@ pub struct Instants {
     /// Velocities, rad/s; in a periodic motion, as the model's friction bends them, which is not exactly the rate of
     /// the angles.
     pub qd_rad_s: Vec<f64>,
-    /// tanh(q̇/ε).
+    /// tanh(q̇/ε), or tanh(q̇/w) where another width w is known.
     pub sign: Vec<f64>,
 }
 
@@ -74,26 +74,27 @@ impl Scene {
     /// Instants at which the friction of joint `j` is evaluated: `FINE` per sample of a periodic motion; the samples
     /// themselves in a single run, whose low-pass lies far below the sampling rate.
     pub fn instants(&self, j: usize) -> &Instants {
-        self.instants[j].get_or_init(|| {
-            let (q, qd) = (self.motion.q_rad.joint(j), self.motion.qd_rad_s.joint(j));
-            if !self.periodic {
-                return Instants {
-                    step_s: 1.0 / self.rate_hz,
-                    q_rad: q.to_vec(),
-                    qd_rad_s: qd.to_vec(),
-                    sign: self.sign.joint(j).to_vec(),
-                };
-            }
-            let epsilon = self.arm.friction_epsilon_rad_s;
-            let sign = |v: f64| self.arm.friction_sign(v);
-            let qd_rad_s = self.turning_rad_s(j, None, epsilon, sign);
-            Instants {
-                step_s: self.instant_s(),
-                q_rad: self.fine_angles_rad(j),
-                sign: qd_rad_s.iter().map(|v| sign(*v)).collect(),
-                qd_rad_s,
-            }
-        })
+        self.instants[j].get_or_init(|| self.instants_with(j, self.arm.friction_epsilon_rad_s))
+    }
+
+    /// The same where the friction of joint `j` turns round over the width that is known of it ([`Self::width_rad_s`]).
+    pub fn turned(&self, j: usize) -> &Instants {
+        match self.other_friction(j).width_rad_s {
+            None => self.instants(j),
+            Some(width_rad_s) => self.turned[j].get_or_init(|| self.instants_with(j, width_rad_s)),
+        }
+    }
+
+    fn instants_with(&self, j: usize, width_rad_s: f64) -> Instants {
+        let (q, qd) = (self.motion.q_rad.joint(j), self.motion.qd_rad_s.joint(j));
+        let sign = |v: f64| (v / width_rad_s).tanh();
+        let (step_s, q_rad, qd_rad_s) = if self.periodic {
+            let qd_rad_s = self.turning_rad_s(j, None, width_rad_s, sign);
+            (self.instant_s(), self.fine_angles_rad(j), qd_rad_s)
+        } else {
+            (1.0 / self.rate_hz, q.to_vec(), qd.to_vec())
+        };
+        Instants { step_s, q_rad, sign: qd_rad_s.iter().map(|v| sign(*v)).collect(), qd_rad_s }
     }
 
     /// Velocity of joint `j` at its instants, rad/s, while dry friction turns round by `law` within a few `width_rad_s`

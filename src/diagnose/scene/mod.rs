@@ -4,13 +4,16 @@
 //! and, where the motion repeats, between the samples.
 
 mod between_samples;
+mod other_friction;
 
 pub use between_samples::{FINE, Instants, LONGEST_LEAD_S};
+pub use other_friction::OtherFriction;
 
 use std::sync::OnceLock;
 
 use fourier::Complex64;
 
+use super::lateness::Lateness;
 use super::load::{
     Delivered, LinkTorque, Loads, Periods, mass_along, rigid_torque_along, rotors_kg_m2,
 };
@@ -60,6 +63,8 @@ pub struct Scene {
     pub rotor_kg_m2: Vec<f64>,
     /// Per joint, whether the description of the arm has an inertia of the rotor.
     pub has_described_rotor: Vec<bool>,
+    /// Per joint, whether the motion tells the inertia of the rotor from that of the links.
+    pub tells_rotor: Vec<bool>,
     /// Relative acceleration of links and rotor per torque that presses them apart, 1/(kg m²).
     pub mobility_per_kg_m2: JointSignals,
     /// Predicted drive torque: load, friction and offset, Nm.
@@ -70,6 +75,8 @@ pub struct Scene {
     pub noise_nm: Vec<f64>,
     /// Estimated Coulomb friction, Nm.
     pub coulomb_nm: Vec<f64>,
+    /// What is known of the friction of every joint beside Coulomb and viscous friction.
+    other_friction: Vec<OtherFriction>,
     /// Mass matrix of the links along the motion, kg m², column by column.
     pub mass_kg_m2: Vec<JointSignals>,
     /// Half-width of the interval around each recorded angle in which the true one lies, rad; zero for a periodic
@@ -87,6 +94,8 @@ pub struct Scene {
     fine_rigid_nm: Vec<OnceLock<[Vec<f64>; 2]>>,
     /// See [`Self::instants`].
     instants: Vec<OnceLock<Instants>>,
+    /// See [`Self::turned`].
+    turned: Vec<OnceLock<Instants>>,
     /// See [`Self::sign_if_fed`].
     signs_if_fed: Vec<[OnceLock<Vec<f64>>; 2]>,
     /// Correction of the Fourier series of the samples for bends between them.
@@ -151,6 +160,7 @@ impl Scene {
             mass_kg_m2,
             angle_doubt_rad,
             coulomb_nm: (0..joints).map(|j| drive(j).coulomb_nm).collect(),
+            other_friction: vec![OtherFriction::default(); joints],
             rate_hz,
             periods: prepared.processing.periods,
             lead_in_s: prepared.lead_in_s,
@@ -171,6 +181,10 @@ impl Scene {
                 .iter()
                 .map(|joint| joint.drive.rotor_inertia_kg_m2 > 0.0)
                 .collect(),
+            tells_rotor: (0..joints)
+                .map(|j| set.index_of(Parameter::RotorInertia(j)))
+                .map(|place| place.is_some_and(|k| set.column(k).len() == 1))
+                .collect(),
             mobility_per_kg_m2,
             torque_nm,
             sign,
@@ -180,6 +194,7 @@ impl Scene {
             fine_bending_nm: vec![OnceLock::new(); joints],
             fine_rigid_nm: vec![OnceLock::new(); joints],
             instants: (0..joints).map(|_| OnceLock::new()).collect(),
+            turned: (0..joints).map(|_| OnceLock::new()).collect(),
             signs_if_fed: (0..joints).map(|_| Default::default()).collect(),
             bends: OnceLock::new(),
             turnings: (0..joints).map(|_| OnceLock::new()).collect(),
@@ -192,6 +207,29 @@ impl Scene {
     /// Number of joints.
     pub fn joints(&self) -> usize {
         self.motion.joints()
+    }
+
+    /// What is known of the friction of joint `j` beside Coulomb and viscous friction.
+    pub fn other_friction(&self, j: usize) -> &OtherFriction {
+        &self.other_friction[j]
+    }
+
+    /// Sets [`Self::other_friction`].
+    pub fn set_other_friction(&mut self, j: usize, other: OtherFriction) {
+        self.turned[j] = OnceLock::new();
+        self.other_friction[j] = other;
+    }
+
+    /// Whether laws are known of a joint that change the friction of others.
+    pub fn has_products(&self) -> bool {
+        let is_product =
+            |other: &OtherFriction| other.width_rad_s.is_some() || !other.torque_nm.is_empty();
+        self.other_friction.iter().any(is_product)
+    }
+
+    /// Speed over which the dry friction of joint `j` turns round, rad/s.
+    pub fn width_rad_s(&self, j: usize) -> f64 {
+        self.other_friction[j].width_rad_s.unwrap_or(self.arm.friction_epsilon_rad_s)
     }
 
     /// Number of samples n of the motion.
@@ -237,19 +275,19 @@ impl Scene {
         self.bending.told_nm.joint(j)
     }
 
-    /// Change of the predicted drive torque of joint `j` by a delay: its value `delay_s` before every sample less that
-    /// at the sample, Nm.
+    /// Change of the predicted drive torque of joint `j` where its record is late: its value behind `lateness`, in
+    /// seconds, less that at the sample, Nm. In a single run, a low-pass counts as a delay.
     ///
     /// Dry friction reverses between two samples, so that the exact instant counts. A drive that is slow to answer it
     /// lets the joint accelerate instead; load and friction then change together, and their sum hardly does. In
     /// harmonics where the load drowns in noise, the reversals tell what the drive delivers.
-    pub fn change_by_delay_nm(&self, j: usize, delay_s: f64) -> Vec<f64> {
+    pub fn change_nm(&self, j: usize, lateness: Lateness) -> Vec<f64> {
         let less = |late: Vec<f64>, now: &[f64]| -> Vec<f64> {
             late.iter().zip(now).map(|(late, now)| late - now).collect()
         };
         let (Some(clock), Some(delivered)) = (&self.clock, &self.delivered) else {
             let now = self.torque_nm.joint(j);
-            return less(self.delayed(now, delay_s), now);
+            return less(self.late(now, lateness), now);
         };
         let part = |y: &[f64], wanted: bool| {
             clock.filtered(y, |h| match delivered.known[j].get(h) {
@@ -257,18 +295,19 @@ impl Scene {
                 _ => Complex64::ZERO,
             })
         };
-        let late_ticks = delay_s / self.instant_s();
+        let in_ticks = lateness.scaled(1.0 / self.instant_s());
         let (coulomb, viscous) = (self.coulomb_nm[j], self.arm.joints[j].drive.viscous_nm_s_rad);
         let load = delivered.load_nm.joint(j);
         // In the other harmonics, the differentiated noise of the velocity is that of the acceleration, which the
         // residual holds as well.
         let qd = part(self.motion.qd_rad_s.joint(j), true);
         let smooth: Vec<f64> = load.iter().zip(&qd).map(|(load, qd)| load + viscous * qd).collect();
-        let smooth = less(self.delayed(&smooth, delay_s), &smooth);
+        let smooth = less(self.late(&smooth, lateness), &smooth);
         let sign = &self.instants(j).sign;
         let now = sign.iter().step_by(FINE).copied().collect::<Vec<_>>();
-        let dry = part(&less(shifted(sign, late_ticks, FINE), &now), true);
-        let beyond = part(&delivered.answers[j].change_by_delay_nm(clock, late_ticks), false);
+        let (smoothed, late_ticks) = in_ticks.parts(sign);
+        let dry = part(&less(shifted(&smoothed, late_ticks, FINE), &now), true);
+        let beyond = part(&delivered.answers[j].change_nm(clock, in_ticks), false);
         let sum = |((s, d), b): ((&f64, &f64), &f64)| s + coulomb * d + b;
         smooth.iter().zip(&dry).zip(&beyond).map(sum).collect()
     }
@@ -276,7 +315,7 @@ impl Scene {
     /// Rate of the predicted drive torque of joint `j`, Nm/s: minus its change by a delay of one sample, per unit of
     /// time.
     pub fn torque_rate_nm_s(&self, j: usize) -> Vec<f64> {
-        let change_nm = self.change_by_delay_nm(j, 1.0 / self.rate_hz);
+        let change_nm = self.change_nm(j, Lateness::Delay(1.0 / self.rate_hz));
         change_nm.into_iter().map(|nm| -nm * self.rate_hz).collect()
     }
 
@@ -287,13 +326,16 @@ impl Scene {
         clock.filtered(y, |h| if h <= last { Complex64::ONE } else { Complex64::ZERO })
     }
 
-    /// y(t − delay) on the grid of y.
-    pub fn delayed(&self, y: &[f64], delay_s: f64) -> Vec<f64> {
+    /// y behind `lateness`, in seconds, on the grid of y; in a single run, a low-pass counts as a delay.
+    fn late(&self, y: &[f64], lateness: Lateness) -> Vec<f64> {
         if self.clock.is_some() {
-            return self.filtered(y, |omega| Complex64::from_polar(1.0, -omega * delay_s));
+            return self.filtered(y, |omega| lateness.response(omega));
         }
         let value = |k: usize| {
-            linear_at(y, (k as f64 - delay_s * self.rate_hz).clamp(0.0, (y.len() - 1) as f64))
+            linear_at(
+                y,
+                (k as f64 - lateness.time() * self.rate_hz).clamp(0.0, (y.len() - 1) as f64),
+            )
         };
         (0..y.len()).map(value).collect()
     }

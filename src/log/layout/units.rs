@@ -15,6 +15,7 @@ pub(in crate::log) struct Units {
     pub(in crate::log) qd: AngularVelocity,
     qdd: AngularAcceleration,
     current: Current,
+    torque: Torque,
 }
 
 impl Units {
@@ -30,7 +31,8 @@ impl Units {
             }
             Block::TargetQdd => degrees(self.qdd == AngularAcceleration::DegS2),
             Block::Current | Block::TargetCurrent => (self.current == Current::Ma).then_some(1e-3),
-            Block::Torque | Block::TargetMoment | Block::Temperature => None,
+            Block::Torque | Block::TargetMoment => (self.torque == Torque::Mnm).then_some(1e-3),
+            Block::Temperature => None,
         }
     }
 }
@@ -122,4 +124,12 @@ enum Current {
     A,
     #[serde(rename = "mA")]
     Ma,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+enum Torque {
+    #[default]
+    Nm,
+    #[serde(rename = "mNm")]
+    Mnm,
 }

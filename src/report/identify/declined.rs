@@ -3,12 +3,22 @@
 use serde::Serialize;
 
 use super::{BaseParameter, NOT_IDENTIFIED};
-use crate::identify::{MOVING_RAD_S, Processing, Regression};
+use crate::identify::{Processing, Regression, resting_joints};
 use crate::log::Log;
 use crate::report::json::Program;
 use crate::report::rows::{Rows, log_warnings, names};
 use crate::report::{Page, Status, Verdict};
 use crate::robot::Arm;
+
+/// A sentence on joints `at_rest` (0-based), with a blank behind it; empty if there are none.
+pub(super) fn at_rest_in_words(at_rest: &[usize]) -> String {
+    let joints: Vec<String> = at_rest.iter().map(|j| (j + 1).to_string()).collect();
+    match &joints[..] {
+        [] => String::new(),
+        [joint] => format!("Joint {joint} does not move. "),
+        _ => format!("Joints {} do not move. ", joints.join(", ")),
+    }
+}
 
 /// The JSON of a log whose motion leaves parameters without any effect on the torque. It uses the schema of a normal
 /// result, without estimates.
@@ -23,7 +33,7 @@ pub struct Declined {
     /// Remarks for the user about the log and its processing.
     pub warnings: Vec<String>,
     rows: Rows,
-    /// Joints, from 1, that stand still throughout.
+    /// Joints (0-based) that stand still throughout.
     #[serde(skip)]
     at_rest: Vec<usize>,
     verdict: &'static str,
@@ -34,8 +44,6 @@ impl Declined {
     /// others.
     pub fn new(arm: &Arm, logs: &[&Log], regression: &Regression, parameters: Vec<String>) -> Self {
         let of_the_logs = logs.iter().flat_map(|log| log_warnings(log));
-        let qd_rad_s = &regression.prepared.motion.qd_rad_s;
-        let rests = |j: &usize| qd_rad_s.joint(*j).iter().all(|qd| qd.abs() < MOVING_RAD_S);
         Self {
             robot: arm.name.clone(),
             log: names(logs),
@@ -45,23 +53,18 @@ impl Declined {
             not_identified: parameters,
             warnings: of_the_logs.chain(regression.prepared.warnings.iter().cloned()).collect(),
             rows: Rows::of(logs),
-            at_rest: (0..arm.dof()).filter(rests).map(|j| j + 1).collect(),
+            at_rest: resting_joints(&regression.prepared.motion.qd_rad_s),
             verdict: NOT_IDENTIFIED,
         }
     }
 
     /// The verdict in a sentence.
     pub fn sentence(&self) -> String {
-        let at_rest: Vec<String> = self.at_rest.iter().map(usize::to_string).collect();
-        let at_rest = match &at_rest[..] {
-            [] => String::new(),
-            [joint] => format!("Joint {joint} does not move. "),
-            _ => format!("Joints {} do not move. ", at_rest.join(", ")),
-        };
         format!(
-            "Declined: this motion does not identify the arm. {at_rest}Along it the columns of {} vanish or \
+            "Declined: this motion does not identify the arm. {}Along it the columns of {} vanish or \
              depend on the others to within rounding. Record a motion that excites them (armid \
              excite).",
+            at_rest_in_words(&self.at_rest),
             self.not_identified.join(", ")
         )
     }
@@ -117,7 +120,7 @@ mod tests {
         assert!(of_the_file.starts_with("a.csv: 7 of 9 rows"), "{of_the_file}");
         assert_eq!(processing, "resampled");
         assert!(declined.sentence().contains("the arm. Along it"), "{}", declined.sentence());
-        let still = Declined { at_rest: vec![1, 4], ..declined.clone() };
+        let still = Declined { at_rest: vec![0, 3], ..declined.clone() };
         assert!(still.sentence().contains("Joints 1, 4 do not move."), "{}", still.sentence());
         let html = declined.page(Program::new(["armid"], None, Vec::new())).to_html().unwrap();
         assert!(html.contains("7 of 9 rows") && html.contains("resampled"), "{html}");

@@ -4,6 +4,7 @@
 //! JSON, or the reason why there is none ([`Declined`]), and a [`Page`](crate::report::Page).
 
 mod declined;
+mod foreign;
 mod intervals;
 mod page;
 
@@ -12,6 +13,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 pub use declined::Declined;
+use declined::at_rest_in_words;
 pub use intervals::{AgreementResult, Intervals, TestResult};
 pub use page::{facts, page, parameter_table, residual_table};
 
@@ -23,7 +25,7 @@ use crate::identify::covariance::CovarianceKind;
 use crate::identify::physical::PhysicalEstimate;
 use crate::identify::{
     Condition, Doubt, Estimator, FitError, Identification, Prediction, Processing, Regression,
-    Residual, drive_limit_remark, identifies_the_arm, not_identified, unlike,
+    Residual, drive_limit_remark, identifies_the_arm, not_identified, resting_joints, unlike,
 };
 use crate::log::Log;
 use crate::robot::{Arm, Kinematics};
@@ -68,6 +70,8 @@ pub struct Validation {
     pub log: PathBuf,
     /// Measured and predicted torque.
     pub prediction: Prediction,
+    /// How the log was processed.
+    pub processing: Processing,
     /// The manufacturer's feed-forward torque after the same processing, Nm.
     pub manufacturer: Option<Prediction>,
     /// Remarks about the log and its processing.
@@ -88,10 +92,15 @@ impl Validation {
             predicted_nm: Prediction::of(m, theta).measured_nm,
             ..prediction.clone()
         });
-        let processing = &regression.prepared.warnings;
-        let processing = processing.iter().map(|warning| format!("{}: {warning}", log.source));
-        let warnings = log_warnings(log).chain(processing).collect();
-        Self { log: PathBuf::from(&log.source), prediction, manufacturer, warnings }
+        let prepared = &regression.prepared;
+        let of_it = prepared.warnings.iter().map(|warning| format!("{}: {warning}", log.source));
+        Self {
+            log: PathBuf::from(&log.source),
+            prediction,
+            processing: prepared.processing.clone(),
+            manufacturer,
+            warnings: log_warnings(log).chain(of_it).collect(),
+        }
     }
 }
 
@@ -126,6 +135,9 @@ pub struct Result {
     intervals: Intervals,
     condition: Condition,
     not_identified: Vec<String>,
+    /// Joints (0-based) that stand still throughout.
+    #[serde(skip)]
+    at_rest: Vec<usize>,
     /// How the log has to be read; null if it fits the arm as it is.
     misreading: Option<MisreadLog>,
     validation: Vec<ValidationJson>,
@@ -234,7 +246,10 @@ impl Result {
         let fit = identification.residual();
         // For a misread log, no further remark about the fit makes sense.
         warnings.extend(unrelated(&fit).filter(|_| training.misread.is_none()));
-        warnings.extend(validations.iter().filter_map(|validation| foreign(validation, &fit)));
+        let described = Prediction::of(regression, theta);
+        let described = (&described, &regression.prepared.processing);
+        let foreign = validations.iter().filter_map(|v| foreign::remark(v, described));
+        warnings.extend(foreign);
         // Logs whose torque cannot be read never get here: such an error is ignored.
         warnings.extend(training.logs.iter().filter_map(|log| {
             let remark = drive_limit_remark(arm, &log.torque_nm(arm).ok()?)?;
@@ -272,6 +287,7 @@ impl Result {
                 _ => IDENTIFIED,
             },
             not_identified: open.iter().map(|&k| set.name(k).to_owned()).collect(),
+            at_rest: resting_joints(&regression.prepared.motion.qd_rad_s),
             misreading: training.misread.cloned(),
             validation: validations.iter().map(ValidationJson::of).collect(),
             warnings,
@@ -329,9 +345,10 @@ impl Result {
         if self.is_declined() {
             let names = &self.not_identified;
             return format!(
-                "Declined: this motion does not identify the arm. For {} of {b} base parameters the \
+                "Declined: this motion does not identify the arm. {}For {} of {b} base parameters the \
                  95 % interval is wider than anything an arm of this size could have: {}. Record a \
                  motion that excites them (armid excite).",
+                at_rest_in_words(&self.at_rest),
                 names.len(),
                 names.join(", ")
             );
@@ -373,34 +390,6 @@ fn unrelated(fit: &Residual) -> Option<String> {
     (!joints.is_empty()).then(|| {
         format!(
             "the model leaves nearly all of the torque of {}: what is recorded there is noise, or not the torque of that joint",
-            joints.join(", ")
-        )
-    })
-}
-
-/// Ratio of validation error to fit error above which a log is said to come from another arm. Along another motion, an
-/// incomplete model of the same arm is wrong by up to twice its fit error.
-const FOREIGN: f64 = 3.0;
-
-/// A remark on a validation log that the identified parameters do not describe. Only moving samples count: at rest,
-/// friction can take any value up to Coulomb friction, in any log of any arm.
-fn foreign(validation: &Validation, fit: &Residual) -> Option<String> {
-    let found = validation.prediction.moving_residual();
-    let is_far = |&j: &usize| found.rms_nm[j] > FOREIGN * fit.rms_nm[j];
-    let joint = |j: usize| {
-        let times = found.rms_nm[j] / fit.rms_nm[j];
-        format!(
-            "joint {} by {:.3} Nm, {times:.0} times the error of the fit",
-            j + 1,
-            found.rms_nm[j]
-        )
-    };
-    let joints: Vec<String> = (0..fit.rms_nm.len()).filter(is_far).map(joint).collect();
-    (!joints.is_empty()).then(|| {
-        format!(
-            "{}: what was identified does not describe this log (off on {}): another load, arm or mounting, or channels that were \
-             recorded otherwise",
-            validation.log.display(),
             joints.join(", ")
         )
     })
