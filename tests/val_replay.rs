@@ -107,7 +107,8 @@ impl Bench {
         };
         let predict = |effects: Vec<Effect>| {
             let (theta, instant_s) = (theta.clone(), scene.instant_s());
-            let model = Extension { theta, answers: Vec::new(), instant_s, effects };
+            let model =
+                Extension { theta, answers: Vec::new(), instant_s, effects, told: Vec::new() };
             model.torque_nm(&families, &scene, &regression.problem, None)
         };
         let (with, without) = (predict(vec![effect]), predict(Vec::new()));

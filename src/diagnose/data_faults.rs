@@ -141,7 +141,7 @@ pub(super) fn exact(value: f64, unit: &'static str) -> Estimate {
 
 /// Least σ of a lag, in samples: how well means over four steps tell it where velocities carry no noise, as those that
 /// are differences of the recorded angles. A lag of 4.33 samples, hidden with little noise, came out 1e-3 samples short.
-const LAW_SAMPLES: f64 = 1e-3;
+const LEAST_SIGMA_SAMPLES: f64 = 1e-3;
 
 /// Velocity channels that lag behind the angle: one cause for all joints if they share one lag, otherwise one per
 /// joint.
@@ -165,7 +165,8 @@ fn velocity_lag(m: &Measurement) -> Vec<Cause> {
         let alike =
             known.iter().all(|(d, s)| (d - mean).abs() < ALIKE[0] * s + ALIKE[1] * mean.abs());
         if alike {
-            let sigma = weight.powf(-0.5);
+            // What the means over four steps do to one joint they do to all.
+            let sigma = weight.powf(-0.5).max(LEAST_SIGMA_SAMPLES * step_s);
             return vec![cause(
                 Kind::VelocityLag,
                 None,
@@ -221,7 +222,7 @@ fn lag(m: &Measurement, j: usize) -> Option<(f64, f64)> {
         })
         .sum();
     let variance = scatter * BLOCKS as f64 / (BLOCKS - 1) as f64 / square.powi(2);
-    Some((lag, variance.sqrt().max(LAW_SAMPLES * step_s(m))))
+    Some((lag, variance.sqrt().max(LEAST_SIGMA_SAMPLES * step_s(m))))
 }
 
 /// Rows of a moving arm that repeat the row before in every channel.

@@ -459,9 +459,8 @@ fn causes_of<'a>(
     let (arm, set, _) = sources;
     let estimate = (&identification.fit.theta[..], &identification.fit.joint_sigma_nm[..]);
     let mut first = Study::new(families, sources, regression, estimate, source)?;
-    // Where a joint trembles about a place, all laws of friction and gears look alike.
-    let resting = resting_joints(&regression.prepared.motion.qd_rad_s);
-    first.leave_out([log.unreadable.clone(), resting].concat());
+    first.leave_out(log.unreadable.clone());
+    first.resting = resting_joints(&regression.prepared.motion.qd_rad_s);
     let null = Extension::fit(&first, &[], &first.torque);
     let mut first = without_contacts(first, set, &null, source)?;
     first.look_everywhere();

@@ -65,7 +65,7 @@ impl Study<'_> {
             sites.into_iter().map(move |site| (family, site))
         });
         let is_absent = |place: &Place| {
-            self.looks_at(place.1) && is_wanted(place) && !self.shapes.contains_key(place)
+            self.looks_for(*place) && is_wanted(place) && !self.shapes.contains_key(place)
         };
         let absent: Vec<Place> = places.filter(is_absent).collect();
         let faint = |(family, site): Place| {
@@ -86,7 +86,8 @@ impl Study<'_> {
             shapes_at(sites[0]).chunks(BANK.max(candidate.abreast())).map(of_shapes).collect()
         };
         let every = candidate.sites(self.scene.joints());
-        let is_wanted = |site: &Option<usize>| self.looks_at(*site) && is_wanted(&(family, *site));
+        let is_wanted =
+            |site: &Option<usize>| self.looks_for((family, *site)) && is_wanted(&(family, *site));
         let wanted: Vec<Option<usize>> = every.iter().copied().filter(is_wanted).collect();
         let are_alike = || every.iter().all(|site| shapes_at(*site) == shapes_at(every[0]));
         if candidate.is_sum_of_joints() && wanted == every && are_alike() {

@@ -7,7 +7,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use super::candidates::{Candidate, Shape};
 use super::drives::Answer;
 use super::image::{Column, Image, Span};
-use super::scene::{OtherFriction, Scene};
+use super::scene::{OtherFriction, SHARPEST, Scene, Turn};
 use super::study::{Entry, Study};
 use super::whitening::Whitening;
 use crate::base::BaseSet;
@@ -49,6 +49,8 @@ pub struct Extension {
     pub instant_s: f64,
     /// Effects.
     pub effects: Vec<Effect>,
+    /// Effects whose friction the scene of the fit was told ([`OtherFriction`]): those of the round before.
+    pub told: Vec<Effect>,
 }
 
 impl Extension {
@@ -116,59 +118,38 @@ impl Extension {
             answer.iter().map(|(j, which, factor)| (*j, *which, factor * b)).collect()
         };
         let answers = study.answers.iter().zip(answers).flat_map(parts).collect();
-        Self { theta, answers, instant_s: study.scene.instant_s(), effects }
+        let told = study.told.clone();
+        Self { theta, answers, instant_s: study.scene.instant_s(), effects, told }
     }
 
-    /// The scene along `prepared` for the arm of this model, with the friction that its effects add.
+    /// The scene along `prepared` for the arm of this model, told the friction that the scene of its fit was told.
     pub fn scene(
         &self,
         families: &[Box<dyn Candidate>],
         (arm, set): (&Arm, &BaseSet),
         prepared: &Prepared,
     ) -> Scene {
-        self.with_friction(families, Scene::new(arm, set, &self.theta, prepared))
+        self.telling(families, Scene::new(arm, set, &self.theta, prepared))
     }
 
-    /// `scene` with the friction that the effects add to joints where one law changes that of another.
-    pub fn with_friction(&self, families: &[Box<dyn Candidate>], mut scene: Scene) -> Scene {
+    /// `scene` told the friction of [`Self::told`] on joints where one law changes that of another.
+    pub fn telling(&self, families: &[Box<dyn Candidate>], mut scene: Scene) -> Scene {
         for j in 0..scene.joints() {
-            let kinds = self.on_joint(j).map(|effect| families[effect.family].kind());
-            let (multiply, others): (Vec<_>, Vec<_>) =
-                kinds.partition(|kind| kind.multiplies_friction());
-            let is_product = multiply.len() > 1 || others.iter().any(|kind| kind.adds_friction());
-            if !multiply.is_empty() && is_product {
-                self.tell_friction(families, &mut scene, j);
+            let kinds = on_joint(&self.told, j).map(|effect| families[effect.family].kind());
+            let (change, others): (Vec<_>, Vec<_>) =
+                kinds.partition(|kind| kind.changes_friction());
+            let is_product = change.len() > 1 || others.iter().any(|kind| kind.adds_friction());
+            if !change.is_empty() && is_product {
+                tell_friction(&self.told, families, &mut scene, j);
             }
         }
         scene
     }
 
-    /// Tells `scene` the friction of the effects on joint `j`.
-    pub fn tell_friction(&self, families: &[Box<dyn Candidate>], scene: &mut Scene, j: usize) {
-        let width =
-            |effect: &Effect| families[effect.family].width_rad_s(scene, &effect.coefficients);
-        let width_rad_s = self.on_joint(j).find_map(width);
-        scene.set_other_friction(j, OtherFriction { width_rad_s, ..OtherFriction::default() });
-        // The other laws depend on the width.
-        let mut other = OtherFriction { width_rad_s, ..OtherFriction::default() };
-        for effect in self.on_joint(j).filter(|e| families[e.family].kind().adds_friction()) {
-            for (column, b) in effect.torques(families, scene) {
-                let parts = column.parts.iter().filter(|(joint, _)| *joint == j);
-                parts.for_each(|(_, y)| other.add(y, b));
-            }
-        }
-        scene.set_other_friction(j, other);
-    }
-
-    /// The effects on joint `j`, those of the arm as a whole among them.
-    fn on_joint(&self, j: usize) -> impl Iterator<Item = &Effect> {
-        self.effects.iter().filter(move |effect| effect.site.is_none_or(|own| own == j))
-    }
-
     /// The same model for another log, with shapes as [`Candidate::elsewhere`] gives them.
     pub fn elsewhere(&self, families: &[Box<dyn Candidate>]) -> Self {
         let mut out = self.clone();
-        for effect in &mut out.effects {
+        for effect in out.effects.iter_mut().chain(&mut out.told) {
             effect.shape = families[effect.family].elsewhere(effect.shape, &effect.coefficients);
         }
         out
@@ -207,6 +188,42 @@ impl Extension {
         }
         out
     }
+}
+
+/// Those of the `effects` that act on joint `j`, those of the arm as a whole among them.
+fn on_joint(effects: &[Effect], j: usize) -> impl Iterator<Item = &Effect> {
+    effects.iter().filter(move |effect| effect.site.is_none_or(|own| own == j))
+}
+
+/// Tells `scene` the friction of the `effects` on joint `j`.
+pub(super) fn tell_friction(
+    effects: &[Effect],
+    families: &[Box<dyn Candidate>],
+    scene: &mut Scene,
+    j: usize,
+) {
+    let (mut change_rad_s, mut turn) = (0.0, None);
+    let mut warm = 1.0;
+    for Effect { family, shape, coefficients, .. } in on_joint(effects, j) {
+        if let Some((change, fed)) = families[*family].turning(*shape, coefficients) {
+            let epsilon = scene.arm.friction_epsilon_rad_s;
+            // A joint may have a width of its own beside that of the arm: their torques add.
+            change_rad_s += change;
+            let width_rad_s = (epsilon + change_rad_s).max(SHARPEST * epsilon);
+            turn = Some(Turn { width_rad_s, fed });
+        }
+        warm *= families[*family].warm(scene, *shape, coefficients).unwrap_or(1.0);
+    }
+    let mut other = OtherFriction { turn, torque_nm: Vec::new(), warm };
+    // The other laws depend on how friction turns round.
+    scene.set_other_friction(j, other.clone());
+    for effect in on_joint(effects, j).filter(|e| families[e.family].kind().adds_friction()) {
+        for (column, b) in effect.torques(families, scene) {
+            let parts = column.parts.iter().filter(|(joint, _)| *joint == j);
+            parts.for_each(|(_, y)| other.add(y, b));
+        }
+    }
+    scene.set_torque_of_others(j, other.torque_nm);
 }
 
 /// Coefficients c of the `directions` outside `span`, by ridge regression on `residual`: (LᵀL + diag(1/sd²)) c = Lᵀr.

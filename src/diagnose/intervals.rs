@@ -153,14 +153,23 @@ pub fn physical(
         let own = out.get_mut(name).into_iter();
         own.for_each(|own| ends.into_iter().for_each(|end| own.reach(end)));
     }
+    // The columns are those of cold friction, while the log shows warm friction.
+    let warm = match site {
+        Some(j) if family.kind().adds_friction() => study.scene.other_friction(*j).warm,
+        _ => 1.0,
+    };
     let form_error = family.form_error(&study.scene, effect.shape);
     let nothing = family.without_effect(&study.scene);
     for own in out.values_mut() {
+        own.stretch(1.0 / warm.clamp(LEAST_WARM, 1.0));
         own.widen(quantile * form_error * (own.value - nothing).abs());
         own.keep_above(family.least());
     }
     out
 }
+
+/// Least factor of warm friction for which intervals are stretched.
+const LEAST_WARM: f64 = 0.2;
 
 /// Extends the intervals `own` to cover those of `other`; phases are first shifted by whole turns to be near each
 /// other.

@@ -124,12 +124,17 @@ impl Kind {
     /// Whether the law adds to the friction of its joint.
     pub fn adds_friction(self) -> bool {
         let others = matches!(self, Self::FeedForward | Self::FrictionChange);
-        self.is_friction() && !self.multiplies_friction() && !others
+        self.is_friction() && !self.changes_friction() && !others
     }
 
     /// Whether the law changes all friction of its joint, that of other laws as well.
-    pub fn multiplies_friction(self) -> bool {
+    pub fn changes_friction(self) -> bool {
         matches!(self, Self::ThermalDrift | Self::ReversalWidth)
+    }
+
+    /// Whether only a joint that moves can show it.
+    pub fn needs_motion(self) -> bool {
+        self.is_friction() || matches!(self, Self::Elasticity | Self::Backlash | Self::Ripple)
     }
 
     /// Whether it is a law of the arm: neither a fault of the recording nor something that happened once.

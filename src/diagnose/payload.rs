@@ -399,7 +399,7 @@ fn equations(
     let Shared { arm, set, options, families, extension } = shared;
     let prepared = &regression.prepared;
     let problem = &regression.problem;
-    let scene = extension.with_friction(families, Scene::new(arm, set, theta, prepared));
+    let scene = extension.telling(families, Scene::new(arm, set, theta, prepared));
     let whitening = if scene.periodic {
         None
     } else {

@@ -51,13 +51,14 @@ pub(super) fn contact_remark(study: &Study, log: &Cleaned) -> Option<String> {
     })
 }
 
-/// States on which joints no cause is looked for because they rest.
+/// States on which joints no friction and no gear is looked at because they rest.
 pub(super) fn rest_remark(qd_rad_s: &JointSignals) -> Option<String> {
     let in_words = |j: usize| format!("joint {}", j + 1);
     let joints: Vec<String> = resting_joints(qd_rad_s).into_iter().map(in_words).collect();
     (!joints.is_empty()).then(|| {
         format!(
-            "no causes are looked for where joints do not move faster than {MOVING_RAD_S} rad/s, and their friction is not identified: {}",
+            "friction and gears are not looked at where joints do not move faster than {MOVING_RAD_S} rad/s, and their friction is not \
+             identified: {}",
             joints.join(", ")
         )
     })

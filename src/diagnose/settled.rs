@@ -6,7 +6,8 @@
 
 use super::contact::{self, BesideModel};
 use super::error::DiagnoseError;
-use super::extension::Extension;
+use super::extension::{Extension, tell_friction};
+use super::kind::Kind;
 use super::scene::OtherFriction;
 use super::selection::{Contender, Found, Kept};
 use super::significance::FAR_AHEAD;
@@ -20,7 +21,7 @@ const ROUNDS: usize = 4;
 /// A round that gains less than this, in 2 ln of the evidence, changes nothing that counts.
 const SETTLED: f64 = 4.0;
 /// Least number of rounds where one law multiplies the friction of others by 1 + f. Their sizes are those of the round
-/// before, and what is left of an error of sizes falls by about f in each.
+/// before, and what is left of an error of sizes falls by less than f in each.
 const ROUNDS_OF_PRODUCTS: usize = 3;
 
 /// Fits what was `found` in `study` and the estimate of the arm in turn, until neither changes the other.
@@ -35,12 +36,10 @@ pub fn settled<'s>(
     log: &str,
 ) -> Result<(Study<'s>, Vec<Contender>), DiagnoseError> {
     let (mut study, mut found) = in_turn(study, found, sources, log)?;
-    if study.scene.periodic {
-        let count = found.causes.len();
-        found = with_products(&mut study, found);
-        if found.causes.len() > count {
-            (study, found) = in_turn(study, found, sources, log)?;
-        }
+    if study.scene.periodic
+        && let Some(more) = with_products(&mut study, &found)
+    {
+        (study, found) = in_turn(study, more, sources, log)?;
     }
     study.look_everywhere();
     Ok((study, found.causes))
@@ -56,9 +55,11 @@ fn in_turn<'s>(
     let Found { mut causes, mut evidence } = found;
     for round in 1..=ROUNDS {
         let entries: Vec<&Entry> = causes.iter().map(|c| &c.entry).collect();
-        let refined = Extension::fit(&study, &entries, &study.torque);
+        let mut refined = Extension::fit(&study, &entries, &study.torque);
+        // The causes of a single run are chosen anew once all are found, so that its scene is told none of them.
+        refined.told = if study.scene.periodic { refined.effects.clone() } else { Vec::new() };
         let scene = refined.scene(study.families, sources, &study.regression.prepared);
-        study = study.with_scene(scene, &entries);
+        study = study.with_scene((scene, refined.told.clone()), &entries);
         study = without_contacts(study, sources.1, &refined, log)?;
         if !study.scene.periodic {
             break;
@@ -78,65 +79,73 @@ fn in_turn<'s>(
     Ok((study, Found { causes, evidence }))
 }
 
-/// What was `found`, and laws that multiply its friction.
+/// What was `found` with laws that change its friction, if that explains the log far better; the scene of `study` is then
+/// told of them.
 ///
 /// Beside friction that falls with speed, say, no width of the reversal fits as long as the joint is taken to have
-/// Coulomb and viscous friction alone, and what falls with speed was fitted without the width. The law that multiplies is
-/// therefore taken on trial, refined in turn with the others, and only then has to be needed.
-fn with_products(study: &mut Study, mut found: Found) -> Found {
+/// Coulomb and viscous friction alone, and what falls with speed was fitted without the width. A law that changes the
+/// friction of others is therefore taken on trial, refined in turn with them, and only then has to be needed.
+fn with_products(study: &mut Study, found: &Found) -> Option<Found> {
     let families = study.families;
     let joints = 0..study.scene.joints();
     let before: Vec<OtherFriction> =
         joints.clone().map(|j| study.scene.other_friction(j).clone()).collect();
-    let count = found.causes.len();
+    let told = study.told.clone();
+    let mut better: Option<Found> = None;
     for j in joints {
-        let has_friction = found.causes.iter().any(|c| {
-            c.entry.site.is_none_or(|own| own == j)
-                && families[c.entry.family].kind().adds_friction()
-        });
-        if !has_friction {
+        // Bristles have no width: their law says by itself how friction turns round.
+        let is_plain = |kind: Kind| kind.adds_friction() && kind != Kind::Presliding;
+        let is_on_joint = |c: &Contender| c.entry.site.is_none_or(|own| own == j);
+        let causes = |better: &Option<Found>| better.as_ref().unwrap_or(found).causes.clone();
+        let own = causes(&better);
+        let mut own = own.iter().filter(|c| is_on_joint(c));
+        if !own.any(|c| is_plain(families[c.entry.family].kind())) {
             continue;
         }
-        let multiplies = |(family, site): &Place| {
-            *site == Some(j) && families[*family].kind().multiplies_friction()
+        let changes = |(family, site): &Place| {
+            *site == Some(j) && families[*family].kind().changes_friction()
         };
-        tell_friction(study, &found.causes, multiplies);
-        let kept = Kept::taken_over(study, found.causes.clone());
+        tell(study, &causes(&better), changes);
+        let kept = Kept::taken_over(study, causes(&better));
         let (others, residual) = kept.without(None);
-        let mut contenders = kept.contenders(None, &others, &residual).into_iter();
-        let Some(on_trial) =
-            contenders.find(|c| multiplies(&c.entry.place()) && c.evidence > FAR_AHEAD)
-        else {
-            continue;
-        };
-        let mut causes = kept.causes;
-        causes.push(on_trial);
-        for _ in 0..ROUNDS_OF_PRODUCTS {
-            tell_friction(study, &causes, |_| false);
-            causes = Kept::taken_over(study, causes).causes;
-        }
-        let mut kept = Kept::taken_over(study, causes);
-        kept.drop_unneeded(|_| true);
-        if kept.causes.len() > found.causes.len() {
-            found = Found { evidence: kept.total_evidence(), causes: kept.causes };
+        let contenders = kept.contenders(None, &others, &residual).into_iter();
+        let on_trial: Vec<Contender> =
+            contenders.filter(|c| changes(&c.entry.place()) && c.evidence > FAR_AHEAD).collect();
+        for contender in on_trial {
+            let place = contender.entry.place();
+            let mut trial = causes(&better);
+            trial.push(contender);
+            for _ in 0..ROUNDS_OF_PRODUCTS {
+                tell(study, &trial, |_| false);
+                trial = Kept::taken_over(study, trial).causes;
+            }
+            let mut kept = Kept::taken_over(study, trial);
+            kept.drop_unneeded(|_| true);
+            let evidence = kept.total_evidence();
+            let least = better.as_ref().unwrap_or(found).evidence + FAR_AHEAD;
+            if evidence > least && kept.causes.iter().any(|c| c.entry.place() == place) {
+                better = Some(Found { causes: kept.causes, evidence });
+            }
         }
     }
-    if found.causes.len() > count {
-        tell_friction(study, &found.causes, |_| false);
-    } else {
-        let of_joints = before.into_iter().enumerate();
-        of_joints.for_each(|(j, other)| study.scene.set_other_friction(j, other));
-        study.forget();
+    match &better {
+        Some(better) => tell(study, &better.causes, |_| false),
+        None => {
+            let of_joints = before.into_iter().enumerate();
+            of_joints.for_each(|(j, other)| study.scene.set_other_friction(j, other));
+            study.told = told;
+            study.forget();
+        }
     }
-    found
+    better
 }
 
 /// Tells the scene of `study` the friction of the `causes`, and prepares them and the places that are wanted besides.
-fn tell_friction(study: &mut Study, causes: &[Contender], is_wanted: impl Fn(&Place) -> bool) {
+fn tell(study: &mut Study, causes: &[Contender], is_wanted: impl Fn(&Place) -> bool) {
     let entries: Vec<&Entry> = causes.iter().map(|c| &c.entry).collect();
-    let model = Extension::fit(study, &entries, &study.torque);
-    let families = study.families;
-    (0..study.scene.joints()).for_each(|j| model.tell_friction(families, &mut study.scene, j));
+    study.told = Extension::fit(study, &entries, &study.torque).effects;
+    let joints = 0..study.scene.joints();
+    joints.for_each(|j| tell_friction(&study.told, study.families, &mut study.scene, j));
     study.forget();
     let is_cause = |place: &Place| entries.iter().any(|entry| entry.place() == *place);
     study.prepare(|place| is_cause(place) || is_wanted(place));

@@ -11,6 +11,7 @@ use super::dictionary::{ABSORBED, FAINT};
 use super::distinct_shapes::DistinctShapes;
 use super::drives::{self, Answer};
 use super::error::DiagnoseError;
+use super::extension::Effect;
 use super::image::{Column, Image, Span, dot};
 use super::memory::Memory;
 use super::scene::Scene;
@@ -74,6 +75,10 @@ pub struct Study<'a> {
     pub torque: Image,
     /// Joints (0-based) whose readings are too bad to look for physics in them.
     pub left_out: Vec<usize>,
+    /// Joints (0-based) that do not move: all laws of friction and gears look alike where a joint trembles about a place.
+    pub resting: Vec<usize>,
+    /// Effects whose friction the scene was told.
+    pub told: Vec<Effect>,
     /// Causes that were visible with an earlier estimate of the arm.
     pub(super) shown: Vec<Shown>,
     /// Cache of entries with any shape, and of directions in which they may be off.
@@ -189,6 +194,8 @@ impl<'a> Study<'a> {
             shapes: HashMap::new(),
             torque,
             left_out: Vec::new(),
+            resting: Vec::new(),
+            told: Vec::new(),
             shown: Vec::new(),
             memory: Memory::default(),
         })
@@ -207,17 +214,20 @@ impl<'a> Study<'a> {
             return Ok(self);
         }
         run.leave_out(rows);
-        let Self { whitening, scene, families, regression, left_out, shown, .. } = self;
+        let Self { whitening, scene, families, regression, left_out, resting, shown, told, .. } =
+            self;
         let of_run = (whitening, scene);
         let study = Self::behind(of_run, families, set, regression, log)?;
-        Ok(Self { left_out, shown, ..study })
+        Ok(Self { left_out, resting, shown, told, ..study })
     }
 
-    /// The same study with the torques that `scene` predicts, after `entries` were found with others.
+    /// The same study with the torques that `scene` predicts, which was `told` effects, after `entries` were found with
+    /// others.
     /// It prepares only the families of `entries`, each at its site, until it [looks
     /// everywhere](Self::look_everywhere) again.
-    pub fn with_scene(mut self, scene: Scene, entries: &[&Entry]) -> Self {
+    pub fn with_scene(mut self, (scene, told): (Scene, Vec<Effect>), entries: &[&Entry]) -> Self {
         self.scene = scene;
+        self.told = told;
         self.forget();
         let shown = |&&Entry { family, site, shape, ref images }: &&Entry| Shown {
             family,
@@ -262,6 +272,12 @@ impl<'a> Study<'a> {
     /// Whether the search includes `site`: a joint that is not left out, or the arm as a whole.
     pub fn looks_at(&self, site: Option<usize>) -> bool {
         site.is_none_or(|j| !self.left_out.contains(&j))
+    }
+
+    /// Whether the search includes the family of `place` at its site.
+    pub(super) fn looks_for(&self, (family, site): Place) -> bool {
+        let rests = site.is_some_and(|j| self.resting.contains(&j));
+        self.looks_at(site) && !(rests && self.families[family].kind().needs_motion())
     }
 
     /// Span of an entry outside the null model and outside `others`.

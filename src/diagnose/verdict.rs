@@ -41,6 +41,11 @@ impl Estimate {
         self.ci95 = [self.value - low, self.value + high];
     }
 
+    /// Makes both halves of the interval `factor` times as long.
+    pub(super) fn stretch(&mut self, factor: f64) {
+        self.ci95 = self.ci95.map(|end| self.value + factor * (end - self.value));
+    }
+
     /// Raises the value and the ends of the interval to `least` where they lie below it.
     pub(super) fn keep_above(&mut self, least: f64) {
         self.value = self.value.max(least);

@@ -18,7 +18,7 @@ pub enum Estimator {
     /// Each joint's equation divided by the standard deviation of its own residual, s_j, iterated
     /// (Gautier 1997).
     Wls,
-    /// Seemingly unrelated regressions: the joints' equations weighted by the 6 × 6 covariance of
+    /// Seemingly unrelated regressions: the joints' equations weighted by the N × N covariance of
     /// their residuals (Zellner 1962).
     Sur,
     /// Each joint's equations filtered so that its residuals become white (autoregression), then weighted per joint.

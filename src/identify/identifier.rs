@@ -516,11 +516,7 @@ impl Identification {
     /// Share of each joint's torque (rms) that the model leaves, without noise as far as the log reveals it.
     pub fn left(&self) -> Vec<f64> {
         let Residual { rms_nm, relative_percent, .. } = self.residual();
-        let beyond_noise = |j: usize| match (&self.explainable_nm, &self.replicates) {
-            (Some(explainable_nm), _) => explainable_nm[j],
-            (None, Some(noise)) => (rms_nm[j].powi(2) - noise.sigma[j].powi(2)).max(0.0).sqrt(),
-            (None, None) => rms_nm[j],
-        };
+        let beyond_noise = |j: usize| self.explainable_nm.as_ref().map_or(rms_nm[j], |nm| nm[j]);
         let share = |j: usize| 0.01 * relative_percent[j] * beyond_noise(j) / rms_nm[j];
         (0..rms_nm.len()).map(share).collect()
     }

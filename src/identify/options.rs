@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::covariance::CovarianceKind;
 use super::fit::Estimator;
+use crate::signal::SERIES_END;
 
 /// All settings of the processing that a user may choose; by default they follow from the data.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -33,7 +34,7 @@ impl Options {
 
     /// Cut-off of the velocity from which the friction of a single run is computed, as a share of the sampling rate.
     /// The Fourier series of a repeating motion ends there as well.
-    pub const VELOCITY_END: f64 = 0.32;
+    pub const VELOCITY_END: f64 = SERIES_END;
 
     /// Whether the log counts as a single run even where its motion repeats.
     pub fn is_single_run(&self) -> bool {

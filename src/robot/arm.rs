@@ -71,9 +71,17 @@ impl Placement {
         }
     }
 
-    /// Roll, pitch and yaw of [`Self::from_xyz_rpy`], rad.
+    /// Roll, pitch and yaw of [`Self::from_xyz_rpy`], rad, from which the rotation is recovered to the last digits.
+    ///
+    /// At a pitch of ±π/2 only the sum or the difference of roll and yaw is determined: roll is computed from what remains
+    /// of the rotation after yaw, whatever its value, is removed.
     pub fn rpy_rad(&self) -> [f64; 3] {
-        Rotation3::from_matrix_unchecked(self.rotation).euler_angles().into()
+        let r = &self.rotation;
+        let pitch = (-r[(2, 0)]).atan2(r[(0, 0)].hypot(r[(1, 0)]));
+        let yaw = r[(1, 0)].atan2(r[(0, 0)]);
+        let (sin, cos) = yaw.sin_cos();
+        let roll = (sin * r[(0, 2)] - cos * r[(1, 2)]).atan2(cos * r[(1, 1)] - sin * r[(0, 1)]);
+        [roll, pitch, yaw]
     }
 
     /// No rotation, no translation.
@@ -241,5 +249,31 @@ impl Arm {
                 pose
             })
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// Also of placements that are composed to a pitch of π/2, to rounding, and close to it.
+        #[test]
+        fn angles_give_their_rotation_back(
+            [roll, yaw] in [-PI..PI, -PI..PI],
+            pitch in prop_oneof![-PI..PI, Just(FRAC_PI_2), Just(-FRAC_PI_2), Just(FRAC_PI_2 - 1e-9)],
+            part in 0.0..1.0,
+        ) {
+            let of = |rpy_rad| Placement::from_xyz_rpy([0.0; 3], rpy_rad);
+            let mount = of([0.0, part * pitch, yaw]);
+            let rotation = mount.compose(&of([roll, (1.0 - part) * pitch, 0.0])).rotation;
+            let back = of(Placement { rotation, translation_m: Vector3::zeros() }.rpy_rad()).rotation;
+            // A few roundings, and entries snapped by 4 ε.
+            prop_assert!((rotation - back).amax() < 1e-14, "{rotation} {back}");
+        }
     }
 }

@@ -81,7 +81,7 @@ impl JointSignals {
 
     /// The samples in `range`, as new signals.
     pub fn slice(&self, range: std::ops::Range<usize>) -> Self {
-        Self::from_fn(self.joints, range.len(), |j, k| self.joint(j)[range.start + k])
+        self.map_joints(|_, y| y[range.clone()].to_vec())
     }
 
     /// Signals in which each joint's series is replaced by `f(joint, series)`; all results must have the same length.

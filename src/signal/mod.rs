@@ -56,7 +56,7 @@ pub use noise_trend::{LogScatter, NoisePower, noise_trend, noise_trends, pooled,
 pub use other_periods::other_periods;
 pub use paper_filter::{PaperDifferentiator, PaperReading};
 pub use period::{Period, PeriodSearch, find_period, variance_of};
-pub use periodic_fit::{FitScratch, PeriodicFit};
+pub use periodic_fit::{FitScratch, PeriodicFit, SERIES_END};
 pub use periods::{mean_period, subtract_mean_period};
 pub use readings::{reading_limit, reading_noise, resolution};
 pub use replicates::{Replicates, replicate_noise};

@@ -52,7 +52,7 @@ pub struct PeriodicFit {
 const ALIAS_FREE: f64 = 0.2;
 /// The same for q and q̇. The friction model evaluates q̇ sample by sample: there the aliased part belongs to the value
 /// at the sample, and a series that ends at 0.2 f_s would round the kink off by several mrad/s.
-const SERIES_END: f64 = 0.32;
+pub const SERIES_END: f64 = 0.32;
 /// Highest frequency of q̈ at any sampling rate, Hz: an arm is moved at a few hertz. The effect of friction on q̈
 /// stands out of the noise of a fast log up to much higher frequencies, but there the noise in q̈, which grows with the
 /// square of the frequency, outweighs it.

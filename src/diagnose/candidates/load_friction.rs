@@ -22,9 +22,9 @@ const BENDING: usize = 1;
 /// Variant whose load is the torque on the motor's side of the gear, including the rotor's.
 pub const MOTOR_SIDE: usize = 2;
 /// Variant whose load is the torque that the gear transmits, for another rotor than that of the description. The value is
-/// the rotor's share of the inertia of rotor and links.
-const ROTOR: usize = 3;
-/// Shares of the rotor that are tried, least and largest.
+/// the rotor's inertia, kg m².
+pub const ROTOR: usize = 3;
+/// Shares of the inertia of rotor and links that the rotor is tried with, least and largest.
 const SHARES: [f64; 2] = [0.02, 0.98];
 /// Number of these shares.
 const SHARES_TRIED: usize = 8;
@@ -38,7 +38,7 @@ fn load(scene: &Scene, j: usize, shape: Shape) -> Cow<'_, [f64]> {
         BENDING => scene.link_at_instants(j + 1).into(),
         ROTOR => {
             let described = scene.arm.joints[j].drive.rotor_inertia_kg_m2;
-            let lighter = described - shape.value * inertia_kg_m2(scene, j);
+            let lighter = described - shape.value;
             let qdd = scene.accelerations(scene.motion.qd_rad_s.joint(j));
             let mut load = scene.link_at_instants(j).to_vec();
             let rest = scene.at_instants(&qdd);
@@ -90,8 +90,9 @@ impl Candidate for LoadFriction {
         if !scene.periodic || scene.tells_rotor[joint(site)] {
             return Vec::new();
         }
+        let inertia_kg_m2 = inertia_kg_m2(scene, joint(site));
         let shares = geometric(SHARES[0], SHARES[1], SHARES_TRIED);
-        shares.map(|value| Shape { variant: ROTOR, value }).collect()
+        shares.map(|share| Shape { variant: ROTOR, value: share * inertia_kg_m2 }).collect()
     }
 
     /// The rotor's share is one more number that is fitted: it counts as many shapes.
@@ -117,21 +118,22 @@ impl Candidate for LoadFriction {
         shape: Shape,
         b: &[f64],
     ) -> Vec<Quantity> {
+        let name = if shape.variant == BENDING { "mu_bending" } else { "mu" };
+        let Some(exponent) = fitted_exponent(shape) else {
+            let mut out = vec![quantity(name, b[0], "")];
+            if shape.variant == ROTOR {
+                out.push(quantity("rotor_inertia_kg_m2", shape.value, "kg m²"));
+            }
+            return out;
+        };
         let load = load(scene, joint(site), shape);
         let rms = (load.iter().map(|l| l * l).sum::<f64>() / load.len() as f64).sqrt();
-        let mu = b[0] * rms.powf(exponent(shape) - 1.0);
-        let name = if shape.variant == BENDING { "mu_bending" } else { "mu" };
-        let mut out = vec![quantity(name, mu, "")];
-        if shape.variant == ROTOR {
-            let rotor_kg_m2 = shape.value * inertia_kg_m2(scene, joint(site));
-            out.push(quantity("rotor_inertia_kg_m2", rotor_kg_m2, "kg m²"));
-        }
-        if let Some(exponent) = fitted_exponent(shape) {
-            out.push(quantity("exponent", exponent, ""));
-            // Only together with its load, μ says how large such friction is.
-            out.push(quantity("rms_load_nm", rms, "Nm"));
-        }
-        out
+        // Only together with its load, μ says how large such friction is.
+        vec![
+            quantity(name, b[0] * rms.powf(exponent - 1.0), ""),
+            quantity("exponent", exponent, ""),
+            quantity("rms_load_nm", rms, "Nm"),
+        ]
     }
 
     /// No gear runs easier under load.

@@ -151,8 +151,14 @@ pub trait Candidate: Sync {
     /// Torque per unit of each coefficient: one column per coefficient.
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column>;
 
-    /// Speed over which dry friction turns round, for the law that says so, with the coefficients `b`, rad/s.
-    fn width_rad_s(&self, _scene: &Scene, _b: &[f64]) -> Option<f64> {
+    /// Change of the width over which dry friction turns round, rad/s, and the share of it that the drive feeds forward,
+    /// for the law that says so.
+    fn turning(&self, _shape: Shape, _b: &[f64]) -> Option<(f64, f64)> {
+        None
+    }
+
+    /// Mean over the log of the factor by which the joint's friction has changed since it began, for the law that says so.
+    fn warm(&self, _scene: &Scene, _shape: Shape, _b: &[f64]) -> Option<f64> {
         None
     }
 

@@ -11,6 +11,7 @@
 //! variants.
 
 use super::*;
+use crate::diagnose::scene::SHARPEST;
 use crate::dynamics::Real;
 
 /// See the module.
@@ -18,8 +19,6 @@ pub struct ReversalWidth;
 
 /// Two widths this close, as a share of ε, count as one: the difference quotient is then the derivative of the law.
 const APART: f64 = 1e-3;
-/// Width of the sharpest law whose reversal is simulated, as a share of ε.
-const SHARPEST: f64 = 0.05;
 /// Starting values of w − ε, as shares of ε.
 const CHANGES: [f64; 11] = [-0.9, -0.8, -0.6, -0.35, -0.15, 0.15, 0.4, 0.8, 1.6, 3.2, 6.4];
 /// Possible ratios of coefficient to shape. All dry friction of a joint turns round, and the ratio of an estimate is
@@ -97,9 +96,8 @@ impl Candidate for ReversalWidth {
         vec![quantity("width_rad_s", scene.arm.friction_epsilon_rad_s + b[0], "rad/s")]
     }
 
-    fn width_rad_s(&self, scene: &Scene, b: &[f64]) -> Option<f64> {
-        let epsilon = scene.arm.friction_epsilon_rad_s;
-        Some((epsilon + b[0]).max(SHARPEST * epsilon))
+    fn turning(&self, shape: Shape, b: &[f64]) -> Option<(f64, f64)> {
+        Some((b[0], shape.variant as f64))
     }
 
     fn agreeing(&self, shape: Shape, b: &[f64]) -> Shape {

@@ -47,9 +47,9 @@ impl Candidate for Stribeck {
         Kind::Stribeck
     }
 
-    fn shapes(&self, scene: &Scene, _: Option<usize>) -> Vec<Shape> {
+    fn shapes(&self, scene: &Scene, site: Option<usize>) -> Vec<Shape> {
         // Up to twice the widest, to see where the search would end.
-        let epsilon = scene.arm.friction_epsilon_rad_s;
+        let epsilon = scene.width_rad_s(joint(site));
         (0..2)
             .flat_map(|variant| {
                 geometric(NARROWEST * epsilon, 2.0 * WIDEST * epsilon, 8)
@@ -107,8 +107,8 @@ impl Candidate for Stribeck {
 
     /// Friction that falls over the whole range of speeds follows another law, and so does friction that falls while
     /// the sign turns round.
-    fn is_its_own(&self, scene: &Scene, _: Option<usize>, shape: Shape, _: &[f64]) -> bool {
-        let widths = shape.value / scene.arm.friction_epsilon_rad_s;
+    fn is_its_own(&self, scene: &Scene, site: Option<usize>, shape: Shape, _: &[f64]) -> bool {
+        let widths = shape.value / scene.width_rad_s(joint(site));
         widths > AT_THE_END && widths <= WIDEST
     }
 

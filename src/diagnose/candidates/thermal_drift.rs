@@ -15,6 +15,14 @@ fn fastest_s(scene: &Scene) -> f64 {
     scene.duration_s() / if scene.periodic { 20.0 } else { 8.0 }
 }
 
+/// 1 − e^{−t/T} at all rows.
+fn warmth(scene: &Scene, shape: Shape) -> impl Iterator<Item = f64> {
+    (0..scene.samples() * scene.periods).map(move |k| {
+        let time_s = scene.lead_in_s + k as f64 / scene.rate_hz;
+        1.0 - (-time_s / shape.value).exp()
+    })
+}
+
 impl Candidate for ThermalDrift {
     fn kind(&self) -> Kind {
         Kind::ThermalDrift
@@ -38,13 +46,16 @@ impl Candidate for ThermalDrift {
         let sign = scene.as_logged(scene.turned(j).sign.clone());
         let other = scene.other_friction(j);
         let n = scene.samples();
-        let friction = (0..n * scene.periods).map(|k| {
-            let time_s = scene.lead_in_s + k as f64 / scene.rate_hz;
-            let warm = 1.0 - (-time_s / shape.value).exp();
+        let friction = warmth(scene, shape).enumerate().map(|(k, warm)| {
             let own = drive.coulomb_nm * sign[k % n] + drive.viscous_nm_s_rad * qd[k % n];
             warm * (own + other.at(k % n))
         });
         vec![Column::on(j, friction.collect())]
+    }
+
+    fn warm(&self, scene: &Scene, shape: Shape, b: &[f64]) -> Option<f64> {
+        let rows = (scene.samples() * scene.periods) as f64;
+        Some(1.0 + b[0] * warmth(scene, shape).sum::<f64>() / rows)
     }
 
     fn quantities(&self, _: &Scene, _: Option<usize>, shape: Shape, b: &[f64]) -> Vec<Quantity> {

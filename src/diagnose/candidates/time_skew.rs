@@ -75,6 +75,11 @@ impl Candidate for TimeSkew {
         TIME_CONSTANTS.map(low_pass).to_vec()
     }
 
+    /// To first order, both forms are one: a low-pass is named where it is twenty times as likely as a delay.
+    fn alternatives(&self, _: &Scene, _: Option<usize>, shape: Shape) -> Option<f64> {
+        (shape.variant == LOW_PASS).then_some(20.0 * DELAYS_S.len() as f64)
+    }
+
     fn shape_is_coefficient(&self) -> bool {
         true
     }

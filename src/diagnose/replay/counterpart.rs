@@ -5,7 +5,7 @@
 
 use crate::diagnose::Kind;
 use crate::diagnose::candidates::elasticity::ON_MOTOR;
-use crate::diagnose::candidates::load_friction::MOTOR_SIDE;
+use crate::diagnose::candidates::load_friction::{MOTOR_SIDE, ROTOR};
 use crate::diagnose::candidates::time_skew::LOW_PASS;
 use crate::plant::PlantConfig;
 use crate::plant::faults::{self, Effect};
@@ -28,6 +28,9 @@ const ONE_EVENT: &str =
     "it happened once: no property of the arm, taken out of the log before the fit";
 const NO_SUCH_SIZE: &str = "the size that was found is none that the simulated effect can have";
 const NO_SUCH_LAW: &str = "the simulated arm has no friction of this law";
+const NO_LOW_PASS: &str = "the simulated arm reads its torque without a low-pass";
+const OTHER_ROTOR: &str =
+    "the simulated arm has the rotor of the robot's file, with which its gear carries another load";
 const INCOMPLETE: &str = "the log does not tell all of its numbers";
 
 /// Stiffest bristles that are simulated, 1/rad. Friction then turns round within 0.1 mrad, less than a joint moves in
@@ -99,6 +102,7 @@ impl Found<'_> {
                     viscous_nm_s_rad: value("viscous_nm_s_rad")?,
                 }))
             }
+            Kind::LoadFriction if self.variant == ROTOR => Some(Counterpart::None(OTHER_ROTOR)),
             Kind::LoadFriction => match value("mu")? {
                 mu if (0.0..=0.5).contains(&mu) => {
                     let joint = self.joint?;
@@ -175,7 +179,7 @@ impl Found<'_> {
                 joint: self.joint?,
                 share_less: value("share_less")?.min(PlantConfig::default().friction_feedforward),
             })),
-            Kind::TimeSkew if self.variant == LOW_PASS => Some(Counterpart::None(NO_SUCH_LAW)),
+            Kind::TimeSkew if self.variant == LOW_PASS => Some(Counterpart::None(NO_LOW_PASS)),
             Kind::TimeSkew => in_the_model(Effect::TimeSkew(faults::TimeSkew {
                 joint: self.joint,
                 delay_s: value("delay_s")?,

@@ -4,7 +4,7 @@
 use std::borrow::Cow;
 use std::sync::OnceLock;
 
-use super::Scene;
+use super::{Scene, Turn};
 use crate::diagnose::load::LinkTorque;
 use crate::diagnose::reversals::{Bends, Turning};
 use crate::dynamics::of_pairs;
@@ -74,22 +74,28 @@ impl Scene {
     /// Instants at which the friction of joint `j` is evaluated: `FINE` per sample of a periodic motion; the samples
     /// themselves in a single run, whose low-pass lies far below the sampling rate.
     pub fn instants(&self, j: usize) -> &Instants {
-        self.instants[j].get_or_init(|| self.instants_with(j, self.arm.friction_epsilon_rad_s))
+        let epsilon = self.arm.friction_epsilon_rad_s;
+        self.instants[j].get_or_init(|| self.instants_with(j, None, epsilon))
     }
 
-    /// The same where the friction of joint `j` turns round over the width that is known of it ([`Self::width_rad_s`]).
+    /// The same where the friction of joint `j` turns round as another law says ([`OtherFriction::turn`]).
+    ///
+    /// [`OtherFriction::turn`]: super::OtherFriction::turn
     pub fn turned(&self, j: usize) -> &Instants {
-        match self.other_friction(j).width_rad_s {
+        match self.other_friction(j).turn {
             None => self.instants(j),
-            Some(width_rad_s) => self.turned[j].get_or_init(|| self.instants_with(j, width_rad_s)),
+            Some(Turn { width_rad_s, fed }) => {
+                self.turned[j].get_or_init(|| self.instants_with(j, Some(fed), width_rad_s))
+            }
         }
     }
 
-    fn instants_with(&self, j: usize, width_rad_s: f64) -> Instants {
+    /// The instants where friction turns round over `width_rad_s`, behind a drive as in [`Self::turning_rad_s`].
+    fn instants_with(&self, j: usize, fed: Option<f64>, width_rad_s: f64) -> Instants {
         let (q, qd) = (self.motion.q_rad.joint(j), self.motion.qd_rad_s.joint(j));
         let sign = |v: f64| (v / width_rad_s).tanh();
         let (step_s, q_rad, qd_rad_s) = if self.periodic {
-            let qd_rad_s = self.turning_rad_s(j, None, width_rad_s, sign);
+            let qd_rad_s = self.turning_rad_s(j, fed, width_rad_s, sign);
             (self.instant_s(), self.fine_angles_rad(j), qd_rad_s)
         } else {
             (1.0 / self.rate_hz, q.to_vec(), qd.to_vec())

@@ -7,7 +7,7 @@ mod between_samples;
 mod other_friction;
 
 pub use between_samples::{FINE, Instants, LONGEST_LEAD_S};
-pub use other_friction::OtherFriction;
+pub use other_friction::{OtherFriction, SHARPEST, Turn};
 
 use std::sync::OnceLock;
 
@@ -63,7 +63,7 @@ pub struct Scene {
     pub rotor_kg_m2: Vec<f64>,
     /// Per joint, whether the description of the arm has an inertia of the rotor.
     pub has_described_rotor: Vec<bool>,
-    /// Per joint, whether the motion tells the inertia of the rotor from that of the links.
+    /// Per joint, whether the inertia of the rotor is a base parameter, and not one sum with those of the links.
     pub tells_rotor: Vec<bool>,
     /// Relative acceleration of links and rotor per torque that presses them apart, 1/(kg m²).
     pub mobility_per_kg_m2: JointSignals,
@@ -182,8 +182,7 @@ impl Scene {
                 .map(|joint| joint.drive.rotor_inertia_kg_m2 > 0.0)
                 .collect(),
             tells_rotor: (0..joints)
-                .map(|j| set.index_of(Parameter::RotorInertia(j)))
-                .map(|place| place.is_some_and(|k| set.column(k).len() == 1))
+                .map(|j| set.index_of(Parameter::RotorInertia(j)).is_some())
                 .collect(),
             mobility_per_kg_m2,
             torque_nm,
@@ -220,16 +219,22 @@ impl Scene {
         self.other_friction[j] = other;
     }
 
+    /// Sets the torque of the other laws of joint `j` ([`OtherFriction::torque_nm`]).
+    pub fn set_torque_of_others(&mut self, j: usize, torque_nm: Vec<f64>) {
+        self.other_friction[j].torque_nm = torque_nm;
+    }
+
     /// Whether laws are known of a joint that change the friction of others.
     pub fn has_products(&self) -> bool {
         let is_product =
-            |other: &OtherFriction| other.width_rad_s.is_some() || !other.torque_nm.is_empty();
+            |other: &OtherFriction| other.turn.is_some() || !other.torque_nm.is_empty();
         self.other_friction.iter().any(is_product)
     }
 
     /// Speed over which the dry friction of joint `j` turns round, rad/s.
     pub fn width_rad_s(&self, j: usize) -> f64 {
-        self.other_friction[j].width_rad_s.unwrap_or(self.arm.friction_epsilon_rad_s)
+        let turn = self.other_friction[j].turn;
+        turn.map_or(self.arm.friction_epsilon_rad_s, |turn| turn.width_rad_s)
     }
 
     /// Number of samples n of the motion.

@@ -37,8 +37,11 @@ pub(super) fn realisability(
     hessian[(dimension, dimension)] = CURVATURE;
     let mut linear = DVector::zeros(dimension + 1);
     linear[dimension] = 1.0;
+    // Bounds that a user gives say what links he has, not what links can be.
+    let is_physics = |subject: &Subject| matches!(subject, Subject::Link(_) | Subject::Drive(_));
     let constraints = structure.constraints.iter().zip(&structure.subjects);
     let constraints: Vec<Constraint> = constraints
+        .filter(|(_, subject)| is_physics(subject))
         .map(|(constraint, subject)| {
             let unit = match constraint.cone {
                 Cone::NonNegative => DVector::from_element(1, 1.0),

@@ -53,7 +53,7 @@ impl Declined {
             not_identified: parameters,
             warnings: of_the_logs.chain(regression.prepared.warnings.iter().cloned()).collect(),
             rows: Rows::of(logs),
-            at_rest: resting_joints(&regression.prepared.motion.qd_rad_s),
+            at_rest: resting_joints(&regression.course().qd_rad_s),
             verdict: NOT_IDENTIFIED,
         }
     }

@@ -22,14 +22,13 @@ pub fn remark(
     validation: &Validation,
     (fit, processing): (&Prediction, &Processing),
 ) -> Option<String> {
-    let cutoff_hz = [processing, &validation.processing]
-        .iter()
-        .filter_map(|processing| processing.cutoff_hz)
-        .fold(COMPARED_HZ, f64::min);
-    let found = slow_rms_nm(&validation.prediction, &validation.processing, cutoff_hz)?;
-    let usual = slow_rms_nm(fit, processing, cutoff_hz)?;
+    let cutoffs_hz = [processing.cutoff_hz, validation.processing.cutoff_hz];
+    let cutoff_hz = cutoffs_hz.into_iter().flatten().reduce(f64::min).unwrap_or(COMPARED_HZ);
+    let found = slow_rms_nm(&validation.prediction, &validation.processing, cutoff_hz);
+    let usual = slow_rms_nm(fit, processing, cutoff_hz);
     let joint = |(j, (found, usual)): (usize, (&f64, &f64))| {
-        (*found > FOREIGN * usual).then(|| {
+        // A joint that rested when the arm was identified has no usual error.
+        (*usual > 0.0 && *found > FOREIGN * usual).then(|| {
             format!(
                 "joint {} by {found:.3} Nm, {:.0} times the error of the fit",
                 j + 1,
@@ -40,7 +39,7 @@ pub fn remark(
     let joints: Vec<String> = found.iter().zip(&usual).enumerate().filter_map(joint).collect();
     (!joints.is_empty()).then(|| {
         format!(
-            "{}: what was identified does not describe this log (off on {}, both below {cutoff_hz} Hz): another load, arm or \
+            "{}: what was identified does not describe this log (off on {}; errors below {cutoff_hz} Hz): another load, arm or \
              mounting, or channels that were recorded otherwise",
             validation.log.display(),
             joints.join(", ")
@@ -48,20 +47,19 @@ pub fn remark(
     })
 }
 
-/// Rms error of `prediction` below `cutoff_hz` in moving samples, per joint, Nm; `None` if the log is too short for the
-/// low-pass.
-fn slow_rms_nm(
-    prediction: &Prediction,
-    processing: &Processing,
-    cutoff_hz: f64,
-) -> Option<Vec<f64>> {
+/// Rms error of `prediction` below `cutoff_hz` in moving samples, per joint, Nm. Of a log that is too short or too slow
+/// for the low-pass, that of all frequencies.
+fn slow_rms_nm(prediction: &Prediction, processing: &Processing, cutoff_hz: f64) -> Vec<f64> {
     let mut error_nm = prediction.error_nm();
     // A single run keeps only as many samples as its low-pass needs.
-    if processing.cutoff_hz.is_none() {
-        let low_pass = ZeroPhase::new(cutoff_hz, ORDER, processing.rate_hz).ok()?;
+    if processing.cutoff_hz.is_none()
+        && let Ok(low_pass) = ZeroPhase::new(cutoff_hz, ORDER, processing.rate_hz)
+        && low_pass.least_samples() <= error_nm.samples()
+    {
         let mut scratch = Scratch::default();
         for j in 0..error_nm.joints() {
-            low_pass.filter_in_place(error_nm.joint_mut(j), &mut scratch).ok()?;
+            // The length was checked.
+            let _ = low_pass.filter_in_place(error_nm.joint_mut(j), &mut scratch);
         }
     }
     let rms = |j: usize| {
@@ -70,5 +68,5 @@ fn slow_rms_nm(
         let (sum, count) = squares.fold((0.0, 0.0), |(sum, n), (e, _)| (sum + e * e, n + 1.0));
         if count > 0.0 { (sum / count).sqrt() } else { 0.0 }
     };
-    Some((0..error_nm.joints()).map(rms).collect())
+    (0..error_nm.joints()).map(rms).collect()
 }

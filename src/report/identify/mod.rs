@@ -287,7 +287,7 @@ impl Result {
                 _ => IDENTIFIED,
             },
             not_identified: open.iter().map(|&k| set.name(k).to_owned()).collect(),
-            at_rest: resting_joints(&regression.prepared.motion.qd_rad_s),
+            at_rest: resting_joints(&regression.course().qd_rad_s),
             misreading: training.misread.cloned(),
             validation: validations.iter().map(ValidationJson::of).collect(),
             warnings,

@@ -262,9 +262,9 @@ impl DriveEntry {
             viscous_nm_s_rad: Some(drive.viscous_nm_s_rad),
             coulomb_nm: Some(drive.coulomb_nm),
             torque_offset_nm: Some(torque_offset_nm),
-            // The URDF beside the drive file has these limits.
+            // The URDF beside the drive file has these limits, but no word for an unknown torque.
             velocity_rad_s: None,
-            torque_nm: None,
+            torque_nm: limits.torque_nm.is_infinite().then_some(f64::INFINITY),
             acceleration_rad_s2: Some(limits.acceleration_rad_s2),
             gear_ratio: Some(drive.gear_ratio),
             torque_constant_nm_a: Some(drive.torque_constant_nm_a),

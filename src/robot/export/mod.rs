@@ -233,6 +233,8 @@ mod tests {
         let mut arm = Arm::built_in("ur5").unwrap();
         arm.joints[1].bounds.mass_kg = Some([7.0, 9.0]);
         arm.joints[2].bounds.com_m = Some([[-0.4, 0.0], [-0.1, 0.1], [-0.1, 0.2]]);
+        // The URDF has a large number for it.
+        arm.joints[3].limits.torque_nm = f64::INFINITY;
         let mut read = read_urdf(&urdf(&arm, &Frames::default()).unwrap(), "x.urdf").unwrap().arm;
         apply_drive_file(&mut read, &drive_file(&arm, &[0.0; 6]), "x.drives.toml").unwrap();
         assert_eq!(read.gravity_m_s2, arm.gravity_m_s2);

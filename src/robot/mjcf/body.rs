@@ -15,7 +15,7 @@ use super::geom::stretch;
 use super::inertia::BodyInertia;
 use super::joint::Joint;
 use super::notice::LeftOut;
-use super::pose::{pose, rpy_rad, shift};
+use super::pose::{pose, shift};
 use crate::robot::arm::Placement;
 use crate::robot::shapes::LinkShape;
 
@@ -328,10 +328,7 @@ fn joint_between(name: String, origin: &Placement, parent: &str, child: &str) ->
     urdf_rs::Joint {
         name,
         joint_type: JointType::Fixed,
-        origin: Pose {
-            xyz: Vec3(origin.translation_m.into()),
-            rpy: Vec3(rpy_rad(&origin.rotation)),
-        },
+        origin: Pose { xyz: Vec3(origin.translation_m.into()), rpy: Vec3(origin.rpy_rad()) },
         parent: LinkName { link: parent.to_owned() },
         child: LinkName { link: child.to_owned() },
         axis: Axis::default(),

@@ -107,15 +107,3 @@ pub(super) fn from_z(to: Vector3<f64>) -> Matrix3<f64> {
     // The axis is ẑ × to; 1 + cos and sin of the angle have the ratio of cos and sin of half the angle.
     from_quaternion([1.0 + to.z, -to.y, to.x, 0.0])
 }
-
-/// Roll, pitch and yaw (fixed axes), from which the rotation is recovered to the last digits.
-///
-/// At a pitch of ±π/2 only the sum or the difference of roll and yaw is determined: roll is computed from what remains
-/// of the rotation after yaw, whatever its value, is removed.
-pub(super) fn rpy_rad(r: &Matrix3<f64>) -> [f64; 3] {
-    let pitch = (-r[(2, 0)]).atan2(r[(0, 0)].hypot(r[(1, 0)]));
-    let yaw = r[(1, 0)].atan2(r[(0, 0)]);
-    let (sin, cos) = yaw.sin_cos();
-    let roll = (sin * r[(0, 2)] - cos * r[(1, 2)]).atan2(cos * r[(1, 1)] - sin * r[(0, 1)]);
-    [roll, pitch, yaw]
-}
