@@ -3,9 +3,12 @@
 
 use armid::dynamics::Model;
 use armid::identify::covariance::Covariance;
-use armid::identify::{Identification, Identifier, Regression, Several, each_alone, pooled};
-use armid::montecarlo::Simulation;
+use armid::identify::{
+    Identification, Identifier, Options, Regression, Several, each_alone, pooled,
+};
+use armid::montecarlo::{Scenario, Simulation};
 use armid::plant::Measured;
+use armid::robot::JointSignals;
 
 use crate::simulated::{SIGMA_NM, scenario};
 
@@ -109,4 +112,40 @@ fn logs_of_an_arm_that_was_loaded_between_them_do_not_agree() {
     println!("{agreement:?} {name}");
     assert!(agreement.p_value < 1e-9, "{agreement:?}");
     assert!(!name.starts_with('r') && !name.starts_with("Ia"), "{name}");
+}
+
+/// A run of 14 minutes is thinned behind its low-pass, one of 40 s is not: together they have the rows of the longer one's
+/// rate.
+#[test]
+fn a_long_run_and_a_short_one_are_used_together() {
+    let simulation = simulation("ur5_identification", 1.0, "");
+    let Scenario { arm, set, .. } = &simulation.scenario;
+    let model = Model::new(arm);
+    let options = Options { period_s: Some(0.0), ..Options::default() };
+    let mut identifier = Identifier::new(&model, set, options);
+    let short = simulation.log(0).unwrap();
+    let rows = short.time_s.len();
+    // Whole periods, so that the arm goes on without a jump.
+    let repeated = rows - rows % 1250;
+    let copies = 102_000 / repeated + 1;
+    let tiled = |y: &JointSignals| {
+        y.map_joints(|_, y| {
+            y[rows - repeated..].iter().copied().cycle().take(copies * repeated).collect()
+        })
+    };
+    let mut long = short.clone();
+    long.time_s = (0..copies * repeated).map(|k| 0.008 * k as f64).collect();
+    for signals in [&mut long.q_rad, &mut long.qd_rad_s, &mut long.torque_nm] {
+        *signals = tiled(signals);
+    }
+    let both = [&long, &short].map(|log| laid_out(&mut identifier, log));
+    let every = both[0].every;
+    assert_eq!((every > 1, both[1].every), (true, 1));
+    let (long_rows, short_rows) = (both[0].problem.samples, both[1].problem.samples);
+    let last = both[1].problem.panels[2].y[(short_rows - 1) / every * every];
+    let joined = Regression::joined(both.into()).unwrap();
+    let count = long_rows + short_rows.div_ceil(every);
+    assert_eq!((joined.problem.samples, joined.course().time_s.len()), (count, count));
+    assert_eq!(joined.problem.panels[2].y.last(), Some(&last));
+    assert_eq!(joined.problem.panels[0].x.len() % count, 0);
 }

@@ -29,6 +29,13 @@ impl Course {
         }
     }
 
+    /// Keeps every `factor`-th row.
+    pub(super) fn thin(&mut self, factor: usize) {
+        let kept = |y: &[f64]| y.iter().step_by(factor).copied().collect();
+        self.time_s = kept(&self.time_s);
+        self.qd_rad_s = self.qd_rad_s.map_joints(|_, y| kept(y));
+    }
+
     /// Appends `other` after this course, one of its own steps later.
     pub(super) fn append(&mut self, other: &Self) {
         if let (Some(last), [first, second, ..]) = (self.time_s.last(), &other.time_s[..]) {

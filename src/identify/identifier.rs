@@ -90,7 +90,17 @@ impl Regression {
     /// processing reported is that of the first log.
     pub fn joined(regressions: Vec<Self>) -> Result<Self, IdentifyError> {
         let logs = regressions.len();
-        let mut rest = regressions.into_iter();
+        let mut rates_hz = regressions.iter().map(|r| r.prepared.processing.rate_hz);
+        let Some(expected_hz) = rates_hz.next() else {
+            return Err(IdentifyError::NoLogs);
+        };
+        if let Some(found_hz) = rates_hz.find(|hz| (hz / expected_hz - 1.0).abs() > 0.02) {
+            return Err(IdentifyError::Rates { found_hz, expected_hz });
+        }
+        // Long runs were thinned behind their low-pass; the others follow.
+        let coarsest = regressions.iter().map(|r| r.every).max().unwrap_or(1);
+        let thinned = |r: Self| if logs > 1 { r.thinned(coarsest) } else { r };
+        let mut rest = regressions.into_iter().map(thinned);
         let Some(mut first) = rest.next() else {
             return Err(IdentifyError::NoLogs);
         };
@@ -113,10 +123,6 @@ impl Regression {
             filled_rows += other.filled_rows();
             let mut problem = other.problem;
             problem.unfold();
-            let (found_hz, expected_hz) = (problem.rate_hz, first.problem.rate_hz);
-            if (found_hz / expected_hz - 1.0).abs() > 0.02 {
-                return Err(IdentifyError::Rates { found_hz, expected_hz });
-            }
             first.problem.append(&problem);
             match (&mut first.instruments, other.instruments) {
                 (Some(instruments), Some(mut more)) => {
@@ -130,6 +136,22 @@ impl Regression {
         first.prepared.filled_share = filled_rows / first.problem.samples as f64;
         first.course = Some(course);
         Ok(first)
+    }
+
+    /// The same with `every`-th sample of `prepared` in the problem, a multiple of what it has now.
+    fn thinned(mut self, every: usize) -> Self {
+        let factor = (every / self.every).max(1);
+        if factor > 1 {
+            let mut course = self.course();
+            course.thin(factor);
+            self.course = Some(course);
+            for problem in std::iter::once(&mut self.problem).chain(&mut self.instruments) {
+                problem.unfold();
+                problem.thin(factor);
+            }
+            self.every *= factor;
+        }
+        self
     }
 
     /// Number of rows that were filled in and are not in the log.

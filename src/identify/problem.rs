@@ -129,6 +129,17 @@ impl Problem {
         self.periods = 1;
     }
 
+    /// Keeps every `factor`-th row of a single run.
+    pub fn thin(&mut self, factor: usize) {
+        for panel in &mut self.panels {
+            let columns = panel.x.chunks_exact(self.samples);
+            panel.x = columns.flat_map(|column| column.iter().step_by(factor).copied()).collect();
+            panel.y = panel.y.iter().step_by(factor).copied().collect();
+        }
+        self.samples = self.samples.div_ceil(factor);
+        self.rate_hz /= factor as f64;
+    }
+
     /// Puts the rows of `other` below this problem's; both single runs over the same columns.
     pub fn append(&mut self, other: &Self) {
         let (n, m) = (self.samples, other.samples);
