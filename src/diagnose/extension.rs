@@ -49,7 +49,7 @@ pub struct Extension {
     pub instant_s: f64,
     /// Effects.
     pub effects: Vec<Effect>,
-    /// Effects whose friction the scene of the fit was told ([`OtherFriction`]): those of the round before.
+    /// Effects whose friction the scene of the fit was told: those of the round before.
     pub told: Vec<Effect>,
 }
 

@@ -78,9 +78,7 @@ impl Scene {
         self.instants[j].get_or_init(|| self.instants_with(j, None, epsilon))
     }
 
-    /// The same where the friction of joint `j` turns round as another law says ([`OtherFriction::turn`]).
-    ///
-    /// [`OtherFriction::turn`]: super::OtherFriction::turn
+    /// The same where the friction of joint `j` turns round as another law says.
     pub fn turned(&self, j: usize) -> &Instants {
         match self.other_friction(j).turn {
             None => self.instants(j),

@@ -219,7 +219,7 @@ impl Scene {
         self.other_friction[j] = other;
     }
 
-    /// Sets the torque of the other laws of joint `j` ([`OtherFriction::torque_nm`]).
+    /// Sets the torque that other laws add to joint `j`, Nm at the samples.
     pub fn set_torque_of_others(&mut self, j: usize, torque_nm: Vec<f64>) {
         self.other_friction[j].torque_nm = torque_nm;
     }
