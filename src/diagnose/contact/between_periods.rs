@@ -26,6 +26,9 @@ const MOST: usize = 40;
 /// Time left out at an end where the repetitions were extended, s. The last part of a run-in differs so little from the
 /// repetitions that the angles do not show it, but it takes torque.
 const EDGE_S: f64 = 0.5;
+/// What lies within this time of an end of the repetitions, s, behind a run-in or before a stop, belongs to these: a soft
+/// gear swings on. It is taken out of the torque, and is no touch.
+const SWINGS_S: f64 = 0.3;
 /// A last period that lacks no more than this share counts as complete.
 const WHOLE_WITHIN: f64 = 0.01;
 
@@ -60,6 +63,9 @@ pub fn between_periods(m: &Measurement, left_out: &[usize]) -> Result<Compared, 
     let period = found.refined_samples;
     let edge = (EDGE_S * rate_hz) as usize;
     let window = with_disturbed_periods(&q_rad, period, found.window, edge);
+    let swings = (SWINGS_S * rate_hz) as usize;
+    let begin = if window.start > 0 { window.start + swings } else { 0 };
+    let stop = if window.end < grid.samples() { window.end - swings } else { usize::MAX };
     if ((window.len() as f64 / period + WHOLE_WITHIN) as usize) < FEWEST_PERIODS {
         return Ok(Compared::TooFew);
     }
@@ -122,7 +128,8 @@ pub fn between_periods(m: &Measurement, left_out: &[usize]) -> Result<Compared, 
             None => contacts.push(touch),
         }
     }
-    let causes = contacts.iter().map(Touch::cause).collect();
+    let is_touch = |touch: &&Touch| touch.samples.end > begin && touch.samples.start < stop;
+    let causes = contacts.iter().filter(is_touch).map(Touch::cause).collect();
     let mut torque_nm = m.torque_nm.clone();
     for j in 0..torque_nm.joints() {
         let of_joint = repeats.signals.joint(j);
@@ -197,6 +204,24 @@ mod tests {
             let value = |j, k| if j < 2 { two.joint(j)[k] } else { 0.0 };
             JointSignals::from_fn(3, two.samples(), value)
         })
+    }
+
+    /// The arm waits for a second, and then begins to repeat its motion. What its gear does in the tenths of a second behind
+    /// that is taken out of the torque, but no touch; the same a second later is one.
+    #[test]
+    fn what_a_run_in_leaves_is_no_touch() {
+        let after_a_rest = |start_s: f64| {
+            let hidden = Hidden { start_s, end_s: start_s + 0.2, nm: [8.0, 0.0] };
+            let (time_s, [mut q, mut qd, torque]) = log(3, &hidden);
+            for j in 0..2 {
+                let first = q.joint(j)[100];
+                q.joint_mut(j)[..100].fill(first);
+                qd.joint_mut(j)[..100].fill(0.0);
+            }
+            contacts(&time_s, &[q, qd, torque])
+        };
+        let causes = |found: Option<WithoutContacts>| found.map(|without| without.causes.len());
+        assert_eq!([1.05, 2.05].map(|s| causes(after_a_rest(s))), [Some(0), Some(1)]);
     }
 
     #[test]
