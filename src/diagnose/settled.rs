@@ -96,24 +96,26 @@ fn with_products(study: &mut Study, found: &Found) -> Option<Found> {
         // Bristles have no width: their law says by itself how friction turns round.
         let is_plain = |kind: Kind| kind.adds_friction() && kind != Kind::Presliding;
         let is_on_joint = |c: &Contender| c.entry.site.is_none_or(|own| own == j);
-        let causes = |better: &Option<Found>| better.as_ref().unwrap_or(found).causes.clone();
-        let own = causes(&better);
-        let mut own = own.iter().filter(|c| is_on_joint(c));
-        if !own.any(|c| is_plain(families[c.entry.family].kind())) {
+        let start = better.as_ref().unwrap_or(found).causes.clone();
+        let is_multiplied =
+            |c: &Contender| is_on_joint(c) && is_plain(families[c.entry.family].kind());
+        if !start.iter().any(is_multiplied) {
             continue;
         }
         let changes = |(family, site): &Place| {
             *site == Some(j) && families[*family].kind().changes_friction()
         };
-        tell(study, &causes(&better), changes);
-        let kept = Kept::taken_over(study, causes(&better));
+        tell(study, &start, changes);
+        let kept = Kept::taken_over(study, start);
         let (others, residual) = kept.without(None);
         let contenders = kept.contenders(None, &others, &residual).into_iter();
         let on_trial: Vec<Contender> =
             contenders.filter(|c| changes(&c.entry.place()) && c.evidence > FAR_AHEAD).collect();
         for contender in on_trial {
             let place = contender.entry.place();
-            let mut trial = causes(&better);
+            let best = better.as_ref().unwrap_or(found);
+            let least = best.evidence + FAR_AHEAD;
+            let mut trial = best.causes.clone();
             trial.push(contender);
             for _ in 0..ROUNDS_OF_PRODUCTS {
                 tell(study, &trial, |_| false);
@@ -122,7 +124,6 @@ fn with_products(study: &mut Study, found: &Found) -> Option<Found> {
             let mut kept = Kept::taken_over(study, trial);
             kept.drop_unneeded(|_| true);
             let evidence = kept.total_evidence();
-            let least = better.as_ref().unwrap_or(found).evidence + FAR_AHEAD;
             if evidence > least && kept.causes.iter().any(|c| c.entry.place() == place) {
                 better = Some(Found { causes: kept.causes, evidence });
             }

@@ -1,7 +1,7 @@
 //! Whether a validation log is described by what was identified.
 
 use super::Validation;
-use crate::identify::{MOVING_RAD_S, Prediction, Processing};
+use crate::identify::{MOVING_RAD_S, Prediction, Processing, Residual};
 use crate::signal::{Scratch, ZeroPhase};
 
 /// Ratio of validation error to fit error above which a log is said to come from another arm. Along another motion, an
@@ -62,11 +62,6 @@ fn slow_rms_nm(prediction: &Prediction, processing: &Processing, cutoff_hz: f64)
             let _ = low_pass.filter_in_place(error_nm.joint_mut(j), &mut scratch);
         }
     }
-    let rms = |j: usize| {
-        let moving = prediction.qd_rad_s.joint(j).iter().map(|qd| qd.abs() > MOVING_RAD_S);
-        let squares = error_nm.joint(j).iter().zip(moving).filter(|(_, moves)| *moves);
-        let (sum, count) = squares.fold((0.0, 0.0), |(sum, n), (e, _)| (sum + e * e, n + 1.0));
-        if count > 0.0 { (sum / count).sqrt() } else { 0.0 }
-    };
-    (0..error_nm.joints()).map(rms).collect()
+    let moves = |j: usize, k: usize| prediction.qd_rad_s.joint(j)[k].abs() > MOVING_RAD_S;
+    Residual::of(&error_nm, &prediction.measured_nm, moves).rms_nm
 }
