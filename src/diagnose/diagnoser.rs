@@ -383,7 +383,7 @@ impl<'a> Diagnoser<'a> {
             .and_then(|size| parameters.get(size.name));
         let nothing = family.without_effect(&study.scene);
         let may_be_none = size.is_some_and(|size| size.holds(nothing));
-        Cause {
+        let mut cause = Cause {
             kind: family.kind(),
             joint: entry.site.map(|j| j + 1),
             confidence: selected.confidence,
@@ -397,7 +397,11 @@ impl<'a> Diagnoser<'a> {
             form: family.form(&study.scene, *shape),
             may_be_none,
             rivals: rivals.collect(),
+        };
+        if family.is_commonplace(&study.scene, *site, *shape) {
+            cause.make_provisional();
         }
+        cause
     }
 }
 

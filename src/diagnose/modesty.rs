@@ -38,7 +38,8 @@ const SEVERAL: usize = 3;
 /// `is_compared` with. The parameters take up nearly all of them; what is left is the weight of the links out of
 /// proportion to their inertia, by which one is told from the other as long as both are known: with one of the two
 /// taken out of the dictionary, the other explained all that the log showed of it (√λ of 14 to 38, in each of five
-/// logs). Other errors of an arm's geometry would do the same.
+/// logs). Other errors of an arm's geometry would do the same. With both taken out, gravity looked like torque gains of
+/// two or three joints (√λ of 18, in two of two logs), which therefore share that limit.
 pub(super) fn make_modest(causes: &mut [Cause], is_compared: bool) {
     let is_spoilt = |kind: Kind| matches!(kind, Kind::ClockFault | Kind::Quantisation);
     let beside_a_spoilt_record = causes.iter().any(|c| is_spoilt(c.kind));
@@ -53,8 +54,14 @@ pub(super) fn make_modest(causes: &mut [Cause], is_compared: bool) {
     let of_kind = |kind: Kind| causes.iter().filter(move |c| c.kind == kind).map(|c| c.joint);
     let wild: Vec<Option<usize>> = of_kind(Kind::Outliers).collect();
     let has_gaps = of_kind(Kind::DroppedSamples).next().is_some();
+    let has_several_gains = of_kind(Kind::TorqueGain).count() > 1;
     for cause in causes.iter_mut() {
-        if matches!(cause.kind, Kind::Gravity | Kind::LinkLength) && !is_compared {
+        let is_of_weight = match cause.kind {
+            Kind::Gravity | Kind::LinkLength => true,
+            Kind::TorqueGain => has_several_gains,
+            _ => false,
+        };
+        if is_of_weight && !is_compared {
             cause.make_provisional();
         }
         if cause.kind == Kind::Contact {

@@ -275,6 +275,12 @@ pub trait Candidate: Sync {
         true
     }
 
+    /// Whether laws that are not in the dictionary may look just like this one at this shape, so that its name is never
+    /// certain.
+    fn is_commonplace(&self, _scene: &Scene, _site: Option<usize>, _shape: Shape) -> bool {
+        false
+    }
+
     /// The effect in words, to which its parameters are appended: "friction that grows with load".
     fn in_words(&self) -> &'static str;
 
