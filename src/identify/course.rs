@@ -1,6 +1,6 @@
 //! Times and joint velocities of the rows of a regression.
 
-use super::identifier::Regression;
+use super::regression::Regression;
 use crate::robot::JointSignals;
 
 /// Time and velocity of every row, of all periods.
@@ -36,13 +36,19 @@ impl Course {
         self.qd_rad_s = self.qd_rad_s.map_joints(|_, y| kept(y));
     }
 
-    /// Appends `other` after this course, one of its own steps later.
-    pub(super) fn append(&mut self, other: &Self) {
-        if let (Some(last), [first, second, ..]) = (self.time_s.last(), &other.time_s[..]) {
-            let shift_s = last + (second - first) - first;
-            self.time_s.extend(other.time_s.iter().map(|time_s| time_s + shift_s));
-            let both = |j: usize, own: &[f64]| [own, other.qd_rad_s.joint(j)].concat();
-            self.qd_rad_s = self.qd_rad_s.map_joints(both);
+    /// Appends `others` after this course, each one of its own steps after the one before it.
+    pub(super) fn append(&mut self, others: &[Self]) {
+        for other in others {
+            if let (Some(last), Some(first)) = (self.time_s.last(), other.time_s.first()) {
+                let step_s = other.time_s.get(1).map_or(0.0, |second| second - first);
+                let shift_s = last + step_s - first;
+                self.time_s.extend(other.time_s.iter().map(|time_s| time_s + shift_s));
+            }
         }
+        let all = |j: usize, own: &[f64]| {
+            let parts = others.iter().map(|other| other.qd_rad_s.joint(j));
+            std::iter::once(own).chain(parts).collect::<Vec<_>>().concat()
+        };
+        self.qd_rad_s = self.qd_rad_s.map_joints(all);
     }
 }

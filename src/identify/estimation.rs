@@ -48,7 +48,7 @@ pub struct Estimate {
 
 impl Estimate {
     /// Corrects covariances and test for periods some of whose rows were filled in: only the parts `kept` of the
-    /// periods determine their mean and their scatter ([`Prepared::kept`](super::prepare::Prepared::kept)).
+    /// periods determine their mean and their scatter ([`Prepared::kept`](super::prepared::Prepared::kept)).
     pub(super) fn of_fewer_rows(mut self, kept: [f64; 2]) -> Self {
         let kept = kept[0] * kept[1];
         for covariance in self.covariances.iter_mut().flatten() {

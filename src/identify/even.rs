@@ -3,8 +3,8 @@
 use std::borrow::Cow;
 
 use super::error::IdentifyError;
+use super::measurement::Measurement;
 use super::options::Options;
-use super::prepare::Measurement;
 use crate::robot::JointSignals;
 use crate::signal::{
     Bracket, Decimator, MOST_PER_ROW, Resampler, Scratch, bridged_gap_s, natural_rate_hz,

@@ -1,19 +1,19 @@
 //! From a raw log to θ̂ and σ: the one path that real logs and simulated trials share.
 
 use super::columns::ColumnPlan;
-use super::course::Course;
-use super::covariance::{Covariance, CovarianceError, CovarianceKind};
+use super::covariance::{CovarianceError, CovarianceKind};
 use super::drive_answers::without_drive_answers;
 use super::error::IdentifyError;
 use super::estimation::{Estimate, Estimation, MotionAids};
-use super::fit::{Estimator, Fit};
-use super::lack_of_fit::LackOfFit;
+use super::fit::Estimator;
+use super::identification::{Identification, explainable};
+use super::measurement::Measurement;
 use super::motion_noise::moved_to_mean;
 use super::options::Options;
-use super::pooled::Agreement;
-use super::prepare::{Measurement, Prepared, Preparer, Processing};
+use super::prepare::Preparer;
+use super::prepared::{Prepared, Processing};
 use super::problem::{Assembler, Problem};
-use super::residual::Residual;
+use super::regression::Regression;
 use super::whiten::{SMOOTHER, smoothed};
 use crate::base::BaseSet;
 use crate::dynamics::Model;
@@ -32,134 +32,6 @@ pub struct Identifier<'a> {
     clock: Option<FineClock>,
 }
 
-/// The result of identification from a log.
-#[derive(Debug, Clone)]
-pub struct Identification {
-    /// Which estimator made the solution.
-    pub estimator: Estimator,
-    /// The least-squares solution.
-    pub fit: Fit,
-    /// Its covariance.
-    pub covariance: Covariance,
-    /// Why this covariance was chosen.
-    pub covariance_reason: &'static str,
-    /// What was done to the log.
-    pub processing: Processing,
-    /// Torque samples per joint that were used.
-    pub samples: usize,
-    /// Scatter of the torque between periods; `None` for a single run.
-    pub replicates: Option<Replicates>,
-    /// Rms per joint of the repeating torque that the model does not explain, Nm; `None` for a single run.
-    pub explainable_nm: Option<Vec<f64>>,
-    /// Test of the model against the scatter between periods; known for the spectral estimator.
-    pub lack_of_fit: Option<LackOfFit>,
-    /// Test whether several logs come from one arm; known where each of them repeats its motion.
-    pub agreement: Option<Agreement>,
-    /// What the user should know about how the log was used.
-    pub warnings: Vec<String>,
-}
-
-/// A log laid out for regression.
-pub struct Regression {
-    /// X and y of every joint.
-    pub problem: Problem,
-    /// The regressor along a smoother motion; only where the estimator asks for it.
-    pub instruments: Option<Problem>,
-    /// The motion and torque from which they were made; for a single run unfiltered and as long as the window.
-    pub prepared: Prepared,
-    /// First sample of `prepared` that is in `problem` (the edges of the filter are cut off).
-    pub first_sample: usize,
-    /// Samples of `prepared` per sample of `problem` (long logs are thinned after the filter).
-    pub every: usize,
-    /// Course of several joined logs, of which `prepared` holds the first; `None` for a single log.
-    course: Option<Course>,
-}
-
-impl Regression {
-    /// The sample of `prepared` that belongs to row `row` of one period (or of the run).
-    pub fn sample(&self, row: usize) -> usize {
-        self.first_sample + row * self.every
-    }
-
-    /// Time and velocity of every row.
-    pub fn course(&self) -> Course {
-        self.course.clone().unwrap_or_else(|| Course::of(self))
-    }
-
-    /// Joins several logs into one by stacking their rows. Every period then counts as part of a single run, and the
-    /// processing reported is that of the first log.
-    pub fn joined(regressions: Vec<Self>) -> Result<Self, IdentifyError> {
-        let logs = regressions.len();
-        let mut rates_hz = regressions.iter().map(|r| r.prepared.processing.rate_hz);
-        let Some(expected_hz) = rates_hz.next() else {
-            return Err(IdentifyError::NoLogs);
-        };
-        if let Some(found_hz) = rates_hz.find(|hz| (hz / expected_hz - 1.0).abs() > 0.02) {
-            return Err(IdentifyError::Rates { found_hz, expected_hz });
-        }
-        // Long runs were thinned behind their low-pass; the others follow.
-        let coarsest = regressions.iter().map(|r| r.every).max().unwrap_or(1);
-        let thinned = |r: Self| if logs > 1 { r.thinned(coarsest) } else { r };
-        let mut rest = regressions.into_iter().map(thinned);
-        let Some(mut first) = rest.next() else {
-            return Err(IdentifyError::NoLogs);
-        };
-        if logs == 1 {
-            return Ok(first);
-        }
-        let mut course = first.course();
-        let mut filled_rows = first.filled_rows();
-        first.problem.unfold();
-        first.instruments.iter_mut().for_each(Problem::unfold);
-        first.prepared.replicates = None;
-        first.prepared.acceleration = None;
-        first.prepared.each_period = None;
-        first.prepared.recorded = None;
-        first.prepared.between = None;
-        let processing = &mut first.prepared.processing;
-        *processing = Processing { logs, periods: 1, harmonics: None, ..processing.clone() };
-        for other in rest {
-            course.append(&other.course());
-            filled_rows += other.filled_rows();
-            let mut problem = other.problem;
-            problem.unfold();
-            first.problem.append(&problem);
-            match (&mut first.instruments, other.instruments) {
-                (Some(instruments), Some(mut more)) => {
-                    more.unfold();
-                    instruments.append(&more);
-                }
-                (instruments, _) => *instruments = None,
-            }
-            first.prepared.warnings.extend(other.prepared.warnings);
-        }
-        first.prepared.filled_share = filled_rows / first.problem.samples as f64;
-        first.course = Some(course);
-        Ok(first)
-    }
-
-    /// The same with `every`-th sample of `prepared` in the problem, a multiple of what it has now.
-    fn thinned(mut self, every: usize) -> Self {
-        let factor = (every / self.every).max(1);
-        if factor > 1 {
-            let mut course = self.course();
-            course.thin(factor);
-            self.course = Some(course);
-            for problem in std::iter::once(&mut self.problem).chain(&mut self.instruments) {
-                problem.unfold();
-                problem.thin(factor);
-            }
-            self.every *= factor;
-        }
-        self
-    }
-
-    /// Number of rows that were filled in and are not in the log.
-    fn filled_rows(&self) -> f64 {
-        self.prepared.filled_share * (self.problem.samples * self.problem.periods) as f64
-    }
-}
-
 const ALIKE_TO_THE_LAST_DIGIT: &str = "the periods are alike to the last digit, and their scatter says nothing: that of the \
      residual between blocks of time holds for noise with a memory short against a block";
 /// Single runs are processed in pieces of this many samples, so that memory stays bounded.
@@ -171,6 +43,9 @@ const TICKS: usize = 8;
 const LONG_RUN: usize = 100_000;
 /// Sampling rate kept after a low-pass where a run is long or its rows are counted, in multiples of the cut-off.
 pub const KEPT_RATE: f64 = 4.0;
+/// Periods from which on their scatter is used; with fewer it has so few degrees of freedom that blocks of time are
+/// more informative.
+pub const MANY_PERIODS: usize = 4;
 
 impl<'a> Identifier<'a> {
     /// An identifier for logs of one arm.
@@ -241,7 +116,7 @@ impl<'a> Identifier<'a> {
         let instruments = self.instruments_for(self.options.estimator, &prepared)?;
         let empty = Problem::new(self.problem.plan.clone(), 0.0);
         let problem = std::mem::replace(&mut self.problem, empty);
-        Ok(Regression { problem, instruments, prepared, first_sample, every, course: None })
+        Ok(Regression::of(prepared, problem, instruments, [first_sample, every]))
     }
 
     /// Solves a log laid out before.
@@ -498,92 +373,5 @@ impl<'a> Identifier<'a> {
             Ok(self.with_motion_noise(estimate, &prepared)?.of_fewer_rows(prepared.kept()))
         });
         Ok(estimates.collect())
-    }
-}
-
-/// Rms per joint of the repeating torque that is not explained, Nm. `residual_squares` are ‖e_j‖² over all periods,
-/// left by a fit of `parameters` parameters. From them the scatter between periods is subtracted, and from the mean
-/// period the share of its noise σ²/P that the fit leaves. Filled-in rows lower P and the scatter to the parts that
-/// are `kept` ([`Prepared::kept`](super::Prepared::kept)).
-fn explainable(
-    residual_squares: &[f64],
-    parameters: usize,
-    replicates: &Replicates,
-    kept: [f64; 2],
-) -> Vec<f64> {
-    let n = replicates.mean.samples() as f64;
-    let periods = replicates.periods as f64;
-    let joints = replicates.sigma.len() as f64;
-    let fitted = parameters as f64 / (joints * n);
-    let pairs = residual_squares.iter().zip(&replicates.sigma);
-    pairs
-        .map(|(squares, sigma)| {
-            let variance = sigma * sigma;
-            let of_mean = (squares - kept[1] * variance * n * (periods - 1.0)) / (n * periods);
-            (of_mean - variance / (kept[0] * periods) * (1.0 - fitted)).max(0.0).sqrt()
-        })
-        .collect()
-}
-
-/// Periods from which on their scatter is used; with fewer it has so few degrees of freedom that blocks of time are
-/// more informative.
-pub const MANY_PERIODS: usize = 4;
-
-impl Identification {
-    /// Residual of the fit over all samples used.
-    pub fn residual(&self) -> Residual {
-        Residual::from_squares(&self.fit.residual_squares, &self.fit.torque_squares, self.samples)
-    }
-
-    /// Share of each joint's torque (rms) that the model leaves, without noise as far as the log reveals it.
-    pub fn left(&self) -> Vec<f64> {
-        let Residual { rms_nm, relative_percent, .. } = self.residual();
-        let beyond_noise = |j: usize| self.explainable_nm.as_ref().map_or(rms_nm[j], |nm| nm[j]);
-        let share = |j: usize| 0.01 * relative_percent[j] * beyond_noise(j) / rms_nm[j];
-        (0..rms_nm.len()).map(share).collect()
-    }
-
-    /// σ of every base parameter.
-    pub fn sigma(&self) -> Vec<f64> {
-        self.covariance.sigma()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::robot::JointSignals;
-    use crate::signal::replicate_noise;
-    use rand::{SeedableRng, rngs::ChaCha8Rng};
-    use rand_distr::{Distribution, StandardNormal};
-
-    /// Eight periods of an error of 0.3 Nm rms that repeats, under noise of 1 Nm. A twelfth of the rows, at other
-    /// phases in each period, is the mean of the other periods. The mean square of the mean period is 0.09 and
-    /// 1/(8 · 11/12) Nm², known to √(2/8000) of the second term and twice the root of both terms' product over 8000:
-    /// 0.0048 Nm². Five of these standard deviations leave 0.257 to 0.338; without `kept` the result would be 0.16.
-    #[test]
-    fn rows_that_were_filled_in_explain_nothing() {
-        const N: usize = 8000;
-        const PERIODS: usize = 8;
-        let mut rng = ChaCha8Rng::seed_from_u64(4);
-        let mut noise = || -> f64 { StandardNormal.sample(&mut rng) };
-        let error = |k: usize| 0.3 * std::f64::consts::SQRT_2 * (0.01 * k as f64).sin();
-        let mut y: Vec<f64> = (0..N * PERIODS).map(|k| error(k % N) + noise()).collect();
-        let is_filled = |k: usize, period: usize| k % 12 == period;
-        for k in 0..N {
-            for period in (0..PERIODS).filter(|period| is_filled(k, *period)) {
-                let others = (0..PERIODS).filter(|other| *other != period);
-                y[period * N + k] = others.map(|other| y[other * N + k]).sum::<f64>() / 7.0;
-            }
-        }
-        let filled = (0..N * PERIODS).filter(|k| is_filled(k % N, k / N)).count();
-        let f = filled as f64 / (N * PERIODS) as f64;
-        let kept = [1.0 - f, 1.0 - f * 8.0 / 7.0];
-        let signals = JointSignals::from_fn(1, N * PERIODS, |_, k| y[k]);
-        let mut replicates = replicate_noise(&signals, N).unwrap();
-        replicates.sigma[0] /= kept[1].sqrt();
-        let squares = y.iter().map(|y| y * y).sum::<f64>();
-        let found = explainable(&[squares], 0, &replicates, kept)[0];
-        assert!((0.257..0.338).contains(&found), "{found}");
     }
 }

@@ -7,9 +7,11 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use super::covariance::{Covariance, CovarianceKind};
 use super::error::IdentifyError;
 use super::fit::{Estimator, Fit};
-use super::identifier::{Identification, Identifier, MANY_PERIODS, Regression};
+use super::identification::Identification;
+use super::identifier::{Identifier, MANY_PERIODS};
 use super::lack_of_fit::LackOfFit;
-use super::prepare::Processing;
+use super::prepared::Processing;
+use super::regression::Regression;
 use super::triangle::Triangle;
 
 /// Test whether several logs contradict each other.

@@ -1,7 +1,7 @@
 //! Torque as measured and as predicted by a set of parameters, sample by sample.
 
 use super::course::Course;
-use super::identifier::Regression;
+use super::regression::Regression;
 use super::residual::Residual;
 use crate::robot::JointSignals;
 

@@ -140,15 +140,23 @@ impl Problem {
         self.rate_hz /= factor as f64;
     }
 
-    /// Puts the rows of `other` below this problem's; both single runs over the same columns.
-    pub fn append(&mut self, other: &Self) {
-        let (n, m) = (self.samples, other.samples);
-        for (panel, more) in self.panels.iter_mut().zip(&other.panels) {
-            let pairs = panel.x.chunks_exact(n).zip(more.x.chunks_exact(m));
-            panel.x = pairs.flat_map(|(above, below)| [above, below].concat()).collect();
-            panel.y.extend_from_slice(&more.y);
+    /// Puts the rows of `others` below this problem's, one after the other; all of them single runs over the same
+    /// columns.
+    pub fn append(&mut self, others: &[Self]) {
+        let samples = self.samples + others.iter().map(|other| other.samples).sum::<usize>();
+        for (j, panel) in self.panels.iter_mut().enumerate() {
+            let columns = self.plan.base_indices(j).len();
+            let mut x = Vec::with_capacity(columns * samples);
+            for c in 0..columns {
+                x.extend_from_slice(&panel.x[c * self.samples..][..self.samples]);
+                for other in others {
+                    x.extend_from_slice(&other.panels[j].x[c * other.samples..][..other.samples]);
+                }
+            }
+            panel.x = x;
+            others.iter().for_each(|other| panel.y.extend_from_slice(&other.panels[j].y));
         }
-        self.samples = n + m;
+        self.samples = samples;
     }
 
     /// X θ of joint `joint`, Nm, written into `out` (n values).

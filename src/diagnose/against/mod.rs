@@ -8,36 +8,24 @@
 //! Leaves: the changes that explain the difference, as causes, and which parameters moved by how much.
 
 mod changes;
+mod search;
 
-use std::collections::BTreeMap;
-
-use changes::{Change, combined};
+use changes::Change;
 use nalgebra::DMatrix;
+use search::{Beside, Search, Unknown, nuisance, places};
 
-use super::chance;
 use super::extension::Effect;
-use super::image::{Image, Span};
-use super::intervals::{Base, tangents};
-use super::judgement::{TELLS_APART, probability_of_class};
+use super::image::Span;
+use super::intervals::Base;
 use super::kind::Kind;
 use super::scene::Scene;
-use super::significance::LEAST_EVIDENCE;
-use super::statistic::{Score, upper_fisher};
+use super::statistic::upper_fisher;
 use super::study::{Entry, Study};
-use super::verdict::{BaseParameter, Cause, Moved, MovedTogether, Rival};
-use super::whitening::RepeatingNoise;
+use super::verdict::{BaseParameter, Cause, Moved, MovedTogether};
 use crate::base::BaseSet;
 use crate::identify::covariance::squared_distance;
 use crate::robot::{Arm, JointSignals};
 
-/// Largest tilt, zero or length at which a change is evaluated, rad or m.
-const LARGEST: f64 = 0.5;
-/// Maximum number of changes.
-const MOST_CHANGES: usize = 8;
-/// Rounds in which one change is added and others are removed; bounded because two may replace each other for ever.
-const ROUNDS: usize = 2 * MOST_CHANGES;
-/// Number of alternatives that are reported.
-const RIVALS: usize = 5;
 /// Difference between a parameter and a simulation, in σ of known noise, beyond which the parameter has moved: noise
 /// exceeds it in one of 300 comparisons of fifty parameters.
 pub const MOVED: f64 = 4.0;
@@ -130,55 +118,6 @@ pub struct Found<'a> {
     pub alike: Vec<&'a Entry>,
 }
 
-/// An effect and the room that it is given in the residual of a simulation: its columns, including the part that a fit
-/// of the null model would absorb, which is most of them; the derivatives of these columns by its shape; and the
-/// columns of laws that the data cannot distinguish from it. A law whose exponent is off by a tenth, or that is another
-/// one of its class, is still not a change of the arm.
-struct Beside<'a> {
-    entry: &'a Entry,
-    room: Vec<Image>,
-}
-
-impl<'a> Beside<'a> {
-    fn new(study: &Study, found: &Found<'a>, unknown: &Unknown) -> Self {
-        let mut room = tangents(study, found.effect);
-        room.extend(found.alike.iter().flat_map(|entry| study.whole_images(entry)));
-        Self { entry: found.entry, room: unknown.whitened(room) }
-    }
-}
-
-/// Uncertainty of the simulation, as noise of its residual.
-struct Unknown(Option<RepeatingNoise>);
-
-impl Unknown {
-    /// Uncertainty of a simulation whose base parameters have this `covariance`. The null model's columns times the
-    /// root of the covariance are torques of standard deviation one.
-    fn new(study: &Study, covariance: Option<&DMatrix<f64>>) -> Self {
-        Self(covariance.map(|covariance| {
-            let parts = covariance.clone().symmetric_eigen();
-            // Rounding may make zero eigenvalues slightly negative.
-            let roots = parts.eigenvalues.map(|variance| variance.max(0.0).sqrt());
-            let torque = |(direction, root): (nalgebra::DVectorView<f64>, &f64)| {
-                let coefficients: Vec<f64> = direction.iter().map(|d| root * d).collect();
-                combined(&study.null_columns, &coefficients)
-            };
-            let columns = parts.eigenvectors.column_iter().zip(&roots);
-            RepeatingNoise::new(&columns.map(torque).collect::<Vec<_>>())
-        }))
-    }
-
-    /// Whitens `images` for this noise as well.
-    fn whiten(&self, images: &mut [Image]) {
-        self.0.iter().for_each(|noise| noise.whiten(images));
-    }
-
-    /// [`Self::whiten`], by value.
-    fn whitened(&self, mut images: Vec<Image>) -> Vec<Image> {
-        self.whiten(&mut images);
-        images
-    }
-}
-
 /// How the data differ from a simulation.
 pub struct Explained {
     /// The changes, in descending order of what they explain.
@@ -242,222 +181,6 @@ pub fn explain(
     }
     let causes = (0..taken.len()).map(|index| search.cause(&taken, index)).collect();
     Explained { causes, judged, span }
-}
-
-/// Nuisance columns of the residual of a simulation: the effects `beside` with their room, and how drives answer
-/// friction, which no simulation says.
-fn nuisance<'a>(
-    study: &Study,
-    unknown: &Unknown,
-    beside: impl Iterator<Item = &'a Beside<'a>>,
-) -> Span {
-    let mut span = Span::default();
-    let mut entries = Vec::new();
-    for Beside { entry, room } in beside {
-        entries.push(*entry);
-        for image in room {
-            span.push(image);
-        }
-    }
-    let answers = &study.null_columns[study.base_count()..];
-    let of_drives = study.blurred_shares(&entries).chain(answers).cloned().collect();
-    for image in unknown.whitened(of_drives) {
-        span.push(&image);
-    }
-    span
-}
-
-struct Search<'a> {
-    study: &'a Study<'a>,
-    changes: Vec<Change<'a>>,
-    /// Columns of each change, whitened for the uncertainty of the simulation as well.
-    images: Vec<Vec<Image>>,
-    /// See [`places`].
-    places: Vec<f64>,
-    unknown: Unknown,
-    nuisance: Span,
-    residual: Image,
-}
-
-/// A change with 2 ln of the evidence for it, and the probability that chance explains as much.
-struct Scored {
-    change: usize,
-    evidence: f64,
-    probability: f64,
-}
-
-impl Search<'_> {
-    /// Forward selection of changes; changes that a later one makes unnecessary are removed.
-    fn select(&self) -> Vec<usize> {
-        let significant =
-            |s: &Scored| s.evidence > 0.0 && s.probability * self.places[s.change] < chance::CHANGE;
-        let mut taken: Vec<usize> = Vec::new();
-        for _ in 0..ROUNDS {
-            if taken.len() == MOST_CHANGES {
-                break;
-            }
-            let Some(best) = self.scored(&taken).into_iter().find(significant) else { break };
-            taken.push(best.change);
-            let mut c = 0;
-            while c + 1 < taken.len() {
-                let rest = without(&taken, c);
-                let again = self.scored(&rest);
-                let own = again.iter().find(|s| s.change == taken[c]);
-                if own.is_some_and(significant) {
-                    c += 1;
-                } else {
-                    taken.remove(c);
-                }
-            }
-        }
-        taken
-    }
-
-    /// Replaces the columns of the changes `taken`, which are those of small changes of the identified arm, by those of
-    /// their size in the `simulated` arm: the identified one has taken most of a change up already.
-    fn set_to_size(&mut self, taken: &[usize], simulated: &Scene) {
-        for (index, &c) in taken.iter().enumerate() {
-            let Some(secants) = &self.changes[c].secants else { continue };
-            let (others, left) = self.outside(&without(taken, index));
-            let (span, places) = Span::telling(&others, &self.images[c]);
-            let mut b = vec![0.0; self.images[c].len()];
-            let told = span.solve(&left).into_iter().zip(places);
-            for (value, (place, _)) in told.filter(|(_, (_, is_told))| *is_told) {
-                b[place] = value.clamp(-LARGEST, LARGEST);
-            }
-            if let Some(images) = secants(simulated, &b) {
-                self.images[c] = self.unknown.whitened(images.clone());
-                self.changes[c].images = images;
-            }
-        }
-    }
-
-    /// Whether effect number `e` of those `beside` is worth its price beside the other effects and the changes `taken`.
-    /// True where no change is taken, since the effect was found that way, and for each of several effects of a family
-    /// at the same site, which are judged together.
-    fn needs(&self, e: usize, beside: &[Beside], taken: &[usize]) -> bool {
-        let study = self.study;
-        let entry = beside[e].entry;
-        let place = |entry: &Entry| (entry.family, entry.site);
-        let alike = beside.iter().filter(|b| place(b.entry) == place(entry));
-        if taken.is_empty() || alike.count() > 1 {
-            return true;
-        }
-        let others = nuisance(study, &self.unknown, beside[..e].iter().chain(&beside[e + 1..]));
-        let (others, rest) = self.outside_of(others, taken);
-        let span = Span::outside(&others, &self.unknown.whitened(study.whole_images(entry)));
-        let gain = study.statistic.gain(&span, &rest);
-        let probability = study.statistic.probability(&span, &rest) * study.tests(entry);
-        gain - study.price(entry) > LEAST_EVIDENCE && probability < chance::LAW
-    }
-
-    /// All changes that are not `taken`, best first.
-    fn scored(&self, taken: &[usize]) -> Vec<Scored> {
-        let study = self.study;
-        let (others, rest) = self.outside(taken);
-        let mut out: Vec<Scored> = (0..self.changes.len())
-            .filter(|c| !taken.contains(c))
-            .map(|c| {
-                let site = self.changes[c].site;
-                let span = Span::outside(&others, &self.images[c]);
-                let price = study.statistic.coefficients_price(span.len(), site)
-                    + 2.0 * self.places[c].ln();
-                Scored {
-                    change: c,
-                    evidence: study.statistic.gain(&span, &rest) - price,
-                    probability: study.statistic.probability(&span, &rest),
-                }
-            })
-            .collect();
-        out.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
-        out
-    }
-
-    /// Span of the changes `taken` and of the nuisance columns, and the residual outside it.
-    fn outside(&self, taken: &[usize]) -> (Span, Image) {
-        self.outside_of(self.nuisance.clone(), taken)
-    }
-
-    /// The same for the changes `taken` and a given `span`.
-    fn outside_of(&self, mut span: Span, taken: &[usize]) -> (Span, Image) {
-        for image in taken.iter().flat_map(|&c| &self.images[c]) {
-            span.push(image);
-        }
-        let mut rest = self.residual.clone();
-        span.residualise(&mut rest);
-        (span, rest)
-    }
-
-    /// Change `taken[index]` as a cause with its numbers, the other changes given.
-    fn cause(&self, taken: &[usize], index: usize) -> Cause {
-        let study = self.study;
-        let change = &self.changes[taken[index]];
-        let rest = without(taken, index);
-        let (others, left) = self.outside(&rest);
-        let (span, places) = Span::telling(&others, &self.images[taken[index]]);
-        let b = span.solve(&left);
-        let covariance = study.statistic.covariance(&span, &left);
-        let scored = self.scored(&rest);
-        let evidence = scored.iter().find(|s| s.change == taken[index]).map_or(0.0, |s| s.evidence);
-        let quantile = study.statistic.quantile_95(&span, &left);
-        // The part of the residual that the change explains.
-        let signal = span.inside(&left);
-        let size = signal.square();
-        let Score { lambda, .. } = study.statistic.score(&span, &left, &span.coordinates(&left));
-        let scale = lambda / size.max(f64::MIN_POSITIVE);
-        let rivals: Vec<&Scored> = scored.iter().filter(|s| s.change != taken[index]).collect();
-        let is_alike = |s: &&Scored| {
-            let span = Span::outside(&others, &self.images[s.change]);
-            scale * (size - span.explained(&signal)) < TELLS_APART
-        };
-        let alike: Vec<bool> = rivals.iter().map(is_alike).collect();
-        let name = |(s, _): (&&Scored, &bool)| {
-            let Change { kind, site, .. } = &self.changes[s.change];
-            match site.filter(|_| *site != change.site) {
-                Some(j) => format!("{kind}@{}", j + 1),
-                None => kind.to_string(),
-            }
-        };
-        let evidences: Vec<f64> = rivals.iter().map(|s| s.evidence).collect();
-        let in_class = rivals.iter().zip(&alike).filter(|(_, alike)| **alike);
-        let class: Vec<String> = in_class.map(name).collect();
-        let behind = rivals.iter().take(RIVALS).map(|s| Rival {
-            kind: self.changes[s.change].kind,
-            joint: self.changes[s.change].site.map(|j| j + 1),
-            evidence_behind: evidence - s.evidence,
-        });
-        let parameters = change.estimates((&b, &places), &covariance, quantile);
-        Cause {
-            kind: change.kind,
-            joint: change.site.map(|j| j + 1),
-            separating_experiment: (!class.is_empty()).then_some(change.separating_experiment),
-            class,
-            confidence: probability_of_class(evidence, &evidences, &alike),
-            may_be_none: change.kind == Kind::Payload
-                && parameters.get("mass_kg").is_some_and(|mass| mass.holds(0.0)),
-            parameters,
-            peak_joint: None,
-            gain_fraction: None,
-            strength: lambda.max(0.0).sqrt(),
-            in_words: change.in_words.to_owned(),
-            form: None,
-            rivals: behind.collect(),
-        }
-    }
-}
-
-/// Number of kinds of changes times the number of sites of each change's kind. Chance and odds are shared evenly: first
-/// between the kinds, then between the sites of each, as for laws ([`price`](super::price)).
-fn places(changes: &[Change]) -> Vec<f64> {
-    let mut sites: BTreeMap<Kind, usize> = BTreeMap::new();
-    for change in changes {
-        *sites.entry(change.kind).or_default() += 1;
-    }
-    changes.iter().map(|change| (sites.len() * sites[&change.kind]) as f64).collect()
-}
-
-fn without(taken: &[usize], index: usize) -> Vec<usize> {
-    taken.iter().enumerate().filter(|(i, _)| *i != index).map(|(_, c)| *c).collect()
 }
 
 #[cfg(test)]

@@ -29,8 +29,8 @@ use serde::Serialize;
 pub use bench::Match;
 pub use change::{Change, Channels};
 
-use super::identifier::Regression;
 use super::options::Options;
+use super::regression::Regression;
 use crate::log::Layout;
 use crate::robot::Arm;
 use bench::Bench;
