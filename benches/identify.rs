@@ -5,7 +5,8 @@
 use std::hint::black_box;
 use std::path::Path;
 
-use armid::identify::{Assembler, ColumnPlan, Identifier, Measurement, Options, Problem, Triangle};
+use armid::base::ColumnPlan;
+use armid::identify::{Assembler, Identifier, Measurement, Options, Problem, Triangle};
 use armid::montecarlo::{Experiment, Scenario};
 use criterion::{Criterion, criterion_group, criterion_main};
 use faer::Mat;

@@ -8,11 +8,10 @@
 use std::error::Error;
 use std::hint::black_box;
 
+use armid::base::ColumnPlan;
 use armid::dynamics::Motion;
 use armid::identify::covariance::CovarianceKind;
-use armid::identify::{
-    Assembler, ColumnPlan, Estimator, Fitter, Identifier, Options, Problem, Weighting,
-};
+use armid::identify::{Assembler, Estimator, Fitter, Identifier, Options, Problem, Weighting};
 use armid::montecarlo::{Scenario, Simulation};
 use armid::signal::{FitScratch, PeriodicFit, find_period, replicate_noise};
 use rand::rngs::ChaCha8Rng;

@@ -138,6 +138,11 @@ pub fn write_atomically(
     }
 }
 
+/// [`write_atomically`] for a text that is complete.
+pub fn write_text(path: &Path, text: &str) -> Result<(), OutputError> {
+    write_atomically(path, |out| out.write_all(text.as_bytes()))
+}
+
 fn fill(file: &File, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
     let mut buffer = BufWriter::with_capacity(1 << 16, file);
     write(&mut buffer)?;

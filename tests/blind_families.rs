@@ -463,3 +463,23 @@ fn friction_that_multiplies_other_friction() {
         }
     }
 }
+
+/// A wide Stribeck curve and concave friction stand for each other so well that nothing is left to explain. Where the law
+/// of the arm is not in the dictionary, the other may be named, but not for certain; where both are, the right one is.
+#[test]
+fn what_other_laws_imitate_is_not_named_for_certain() {
+    let stribeck = "kind = \"stribeck\"\nextra_nm = 2.2\nvs_rad_s = 0.26";
+    let concave = "kind = \"nonlinear_viscous\"\namplitude_nm = -6.0\nexponent = 0.5";
+    for (seed, kind, law) in
+        [(611, Kind::Stribeck, stribeck), (612, Kind::NonlinearViscous, concave)]
+    {
+        let toml = format!("[[effect]]\njoint = 2\n{law}\n");
+        let mut families = candidates::all();
+        families.retain(|family| family.kind() != kind);
+        let log = ("ur5_validation", seed, &*toml);
+        let d = diagnose_by(families, log, |samples, _| (0..samples).collect());
+        println!("without {kind}: {:?} {:#?}", d.verdict, d.sentences);
+        assert!(d.unexplained.is_some() || d.causes.iter().all(|c| c.confidence <= 0.9));
+        assert!(is_named(&diagnose_along("ur5_validation", seed, &toml), kind.name(), Some(2)));
+    }
+}

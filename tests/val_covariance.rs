@@ -4,13 +4,13 @@
 //! row space, and without that correction statsmodels' clusters. Seemingly unrelated equations and resampled blocks are
 //! tested against their formulas.
 
-use armid::base::{BaseSet, Parameterisation};
+use armid::base::{BaseSet, ColumnPlan, Parameterisation};
 use armid::identify::covariance::{
     BlockBootstrap, BlockCluster, Covariance, CovarianceKind, CovarianceMethod, NeweyWest,
     OrdinaryLeastSquares,
 };
 use armid::identify::{
-    ColumnPlan, Estimation, Estimator, Fit, Fitter, MotionAids, Options, Problem, Weighting,
+    Estimation, Estimator, Fit, Fitter, MotionAids, Options, Problem, Weighting,
 };
 use armid::robot::Arm;
 use armid::signal::ZeroPhase;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
-use super::identify::{LoadedLog, ProcessingArgs, SourceArgs, read_logs};
+use super::identify::{LoadedLog, ProcessingArgs, RowsOf, SourceArgs, read_logs};
 use super::simulated::Simulated;
 use super::{CommandResult, Outcome};
 use crate::base::{BaseSet, Parameterisation};
@@ -91,7 +91,12 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
     let model = Model::new(&arm);
     let logs = read_logs(&args.logs, &arm, &layout)?;
     let held_out = read_logs(&args.held_out, &arm, &layout)?;
-    if let Some(same) = held_out.iter().find(|h| logs.iter().any(|log| h.is_of(log))) {
+    let known: Vec<RowsOf> = logs.iter().map(LoadedLog::rows).collect();
+    let is_known = |log: &&LoadedLog| {
+        let rows = log.rows();
+        known.iter().any(|other| rows.are_of(other))
+    };
+    if let Some(same) = held_out.iter().find(is_known) {
         let file = same.input.path.display();
         return Err(format!("{file} is held out, but it is also the log that is diagnosed").into());
     }

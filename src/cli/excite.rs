@@ -24,7 +24,7 @@ use crate::excitation::design::{
 };
 use crate::excitation::export::{Playback, urscript, write_csv};
 use crate::excitation::{Requirements, TRAJECTORY_SCHEMA};
-use crate::output::{check_outputs, write_atomically};
+use crate::output::{check_outputs, write_atomically, write_text};
 use crate::report::excitation::page;
 use crate::report::json::{Document, Program};
 use crate::robot::{Arm, Joint, LoadedArm};
@@ -379,18 +379,15 @@ fn write_outputs(
     (program, playback): (&Program, Option<&Playback>),
 ) -> Result<(), Box<dyn Error>> {
     let record = Record::of(arm, spec, found);
-    let text = Document { schema: TRAJECTORY_SCHEMA, program, body: &record }.to_json()?;
-    write_atomically(&args.out, |out| out.write_all(text.as_bytes()))?;
+    Document { schema: TRAJECTORY_SCHEMA, program, body: &record }.write(&args.out)?;
     if let Some(path) = &args.csv {
         write_atomically(path, |out| write_csv(out, &found.excitation, args.rate_hz))?;
     }
     if let Some((path, playback)) = args.urscript.as_ref().zip(playback) {
-        let script = urscript(&found.excitation, playback);
-        write_atomically(path, |out| out.write_all(script.as_bytes()))?;
+        write_text(path, &urscript(&found.excitation, playback))?;
     }
     if let Some(path) = &args.report {
-        let html = page(arm, base, spec, found, program.clone())?.to_html()?;
-        write_atomically(path, |out| out.write_all(html.as_bytes()))?;
+        page(arm, base, spec, found, program.clone())?.write(path)?;
     }
     Ok(())
 }

@@ -6,7 +6,7 @@ use clap::{ArgGroup, Args};
 
 use super::arm_result::ArmResult;
 use super::{CommandResult, Outcome};
-use crate::output::{OutputError, check_outputs, write_atomically};
+use crate::output::{check_outputs, write_text};
 use crate::robot::export::{OwnUrdf, drive_file, drive_file_of_urdf, mjcf_of_urdf, own_urdf, urdf};
 use crate::robot::{LoadedArm, RobotError, text_of};
 
@@ -40,12 +40,12 @@ pub fn run(args: &ExportArgs) -> CommandResult {
         write_urdf(path, &result)?;
     }
     if let Some(path) = &drives {
-        write(path, &drives_of(&result)?)?;
+        write_text(path, &drives_of(&result)?)?;
         say!("{}", path.display());
     }
     let ArmResult { arm, offsets_nm, by_prior, doubt, frames, urdf_links, .. } = result;
     if let Some(path) = &args.mjcf {
-        write(path, &mjcf_of_urdf(&arm, &frames, &urdf_links)?)?;
+        write_text(path, &mjcf_of_urdf(&arm, &frames, &urdf_links)?)?;
         say!("{}", path.display());
         if offsets_nm.iter().any(|offset| *offset != 0.0) {
             say!("note: torque offsets {offsets_nm:?} Nm have no place in an MJCF");
@@ -70,14 +70,14 @@ pub fn run(args: &ExportArgs) -> CommandResult {
 fn write_urdf(path: &Path, result: &ArmResult) -> Result<(), Box<dyn std::error::Error>> {
     let ArmResult { arm, frames, files, urdf_links, .. } = result;
     let Some(own) = files.first().filter(|_| !urdf_links.is_empty()) else {
-        write(path, &urdf(arm, frames)?)?;
+        write_text(path, &urdf(arm, frames)?)?;
         say!("{}", path.display());
         return Ok(());
     };
     let name = own.display().to_string();
     let text = text_of(own)?;
     let OwnUrdf { text, takeovers, relative_mesh } = own_urdf(&text, &name, arm, urdf_links)?;
-    write(path, &text)?;
+    write_text(path, &text)?;
     let end = if arm.dof() == 1 { "" } else { "s" };
     say!(
         "{}: {name} with the inertia of {dof} link{end} and the friction of {dof} joint{end}; everything else as it was",
@@ -109,10 +109,6 @@ fn drives_of(result: &ArmResult) -> Result<String, RobotError> {
         }
         None => drive_file_of_urdf(arm, offsets_nm, "", ""),
     }
-}
-
-fn write(path: &Path, text: &str) -> Result<(), OutputError> {
-    write_atomically(path, |file| file.write_all(text.as_bytes()))
 }
 
 /// The real folder of a file, with symbolic links resolved.

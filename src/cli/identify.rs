@@ -1,6 +1,7 @@
 //! `armid identify`: estimates parameters and their uncertainty from logs of a real or simulated arm.
 
 use std::collections::HashSet;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::PathBuf;
 
 use clap::Args;
@@ -12,8 +13,8 @@ use crate::dynamics::Model;
 use crate::identify::covariance::CovarianceKind;
 use crate::identify::physical::{self, PhysicalOptions, PriorMetric, PriorWeight};
 use crate::identify::{
-    Estimator, FitError, Identification, Identifier, IdentifyError, Measurement, Misreading,
-    Options, Processing, Regression, Several, each_alone, pooled,
+    Estimator, FitError, Identification, Identifier, IdentifyError, Improper, Measurement,
+    Misreading, Options, Processing, Regression, Several, each_alone, pooled,
 };
 use crate::log::{Layout, Log, read_log};
 use crate::output::check_outputs;
@@ -96,22 +97,20 @@ impl ProcessingArgs {
     /// Checks the options and converts them to those of the library.
     pub fn options(&self) -> Result<Options, String> {
         let default = Options::default();
-        let positive = |name: &str, value: Option<f64>, zero_allowed: bool| match value {
-            Some(v) if !(v > 0.0 && v.is_finite() || zero_allowed && v == 0.0) => {
-                Err(format!("--{name} {v}: must be a positive number"))
-            }
-            _ => Ok(()),
-        };
-        positive("cutoff", self.cutoff_hz, false)?;
-        positive("rate", self.rate_hz, false)?;
-        positive("period", self.period_s, true)?;
-        Ok(Options {
+        let options = Options {
             estimator: self.estimator,
             cutoff_hz: self.cutoff_hz.unwrap_or(default.cutoff_hz),
             rate_hz: self.rate_hz,
             period_s: self.period_s,
             ..default
-        })
+        };
+        match options.improper() {
+            Some(Improper { key, value, requirement }) => {
+                let name = key.trim_end_matches("_hz").trim_end_matches("_s");
+                Err(format!("--{name} {value}: {requirement}"))
+            }
+            None => Ok(options),
+        }
     }
 
     /// A warning about a given option that the `processing` did not use.
@@ -151,18 +150,34 @@ impl LoadedLog {
 const SAME: f64 = 0.5;
 
 impl LoadedLog {
-    /// Whether this log and `other` are the same recording, or one is a part of the other.
-    pub fn is_of(&self, other: &Self) -> bool {
-        fn row(log: &LoadedLog, k: usize) -> Vec<u64> {
-            let channels = [&log.log.q_rad, &log.log.qd_rad_s, &log.torque_nm];
-            let joints = channels.into_iter().flat_map(|y| (0..y.joints()).map(|j| y.joint(j)));
-            joints.map(|y| y[k].to_bits()).collect()
-        }
-        let rows = |log: &Self| 0..log.log.time_s.len();
-        let known: HashSet<Vec<u64>> = rows(other).map(|k| row(other, k)).collect();
-        let common = rows(self).filter(|k| known.contains(&row(self, *k))).count();
-        let shorter = self.log.time_s.len().min(other.log.time_s.len());
-        common as f64 > SAME * shorter as f64
+    /// What tells its recording from others.
+    pub fn rows(&self) -> RowsOf<'_> {
+        let channels = [&self.log.q_rad, &self.log.qd_rad_s, &self.torque_nm];
+        let joints = channels.into_iter().flat_map(|y| (0..y.joints()).map(|j| y.joint(j)));
+        let joints: Vec<&[f64]> = joints.collect();
+        let row = |k: usize| {
+            let mut hasher = DefaultHasher::new();
+            joints.iter().for_each(|y| y[k].to_bits().hash(&mut hasher));
+            hasher.finish()
+        };
+        let hashes: Vec<u64> = (0..self.log.time_s.len()).map(row).collect();
+        RowsOf { log: self, known: hashes.iter().copied().collect(), hashes }
+    }
+}
+
+/// Hashes of the rows of a log.
+pub struct RowsOf<'a> {
+    /// The log.
+    pub log: &'a LoadedLog,
+    hashes: Vec<u64>,
+    known: HashSet<u64>,
+}
+
+impl RowsOf<'_> {
+    /// Whether these are rows of the same recording as those of `other`, or one is a part of the other.
+    pub fn are_of(&self, other: &Self) -> bool {
+        let common = self.hashes.iter().filter(|row| other.known.contains(row)).count();
+        common as f64 > SAME * self.hashes.len().min(other.hashes.len()) as f64
     }
 }
 
@@ -209,22 +224,24 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
     let model = Model::new(&arm);
     let logs = read_logs(&args.logs, &arm, &layout)?;
     let validation_logs = read_logs(&args.validate, &arm, &layout)?;
-    for (k, log) in logs.iter().enumerate() {
-        if let Some(same) = logs[..k].iter().find(|other| log.is_of(other)) {
-            let [one, other] = [same, log].map(|l| l.input.path.display());
+    let [rows, validation_rows] =
+        [&logs, &validation_logs].map(|logs| logs.iter().map(LoadedLog::rows).collect::<Vec<_>>());
+    for (k, log) in rows.iter().enumerate() {
+        if let Some(same) = rows[..k].iter().find(|other| log.are_of(other)) {
+            let [one, other] = [same, log].map(|rows| rows.log.input.path.display());
             return Err(format!(
                 "{one} and {other} are the same log, or parts of it: counted twice, it would claim to know more than it does"
             )
             .into());
         }
     }
-    for validation in &validation_logs {
-        if let Some(same) = logs.iter().find(|log| validation.is_of(log)) {
+    for validation in &validation_rows {
+        if let Some(same) = rows.iter().find(|log| validation.are_of(log)) {
             return Err(format!(
                 "{} is validated on, but it is the training log {}, or a part of it: a fit always describes its \
                  own data",
-                validation.input.path.display(),
-                same.input.path.display()
+                validation.log.input.path.display(),
+                same.log.input.path.display()
             )
             .into());
         }

@@ -1,12 +1,13 @@
 //! The `montecarlo` program: runs trials, and `montecarlo merge` combines shards.
 
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Instant;
 
 use clap::{Args, Parser, Subcommand};
 
+use super::outputs::Outputs;
 use super::robot::inputs;
 use super::{CommandResult, Outcome, Progress, interrupt_flag, simulating, threads_or_all};
 use crate::montecarlo::blind::{Benchmark, BlindContent, SCORES_SCHEMA, Scores};
@@ -15,9 +16,9 @@ use crate::montecarlo::folder::{check_cut, load_all, schema_of, shard_files, sha
 use crate::montecarlo::shard::{Merged, Shard, merge, same_run, shard_range};
 use crate::montecarlo::trials::{Content, Trials};
 use crate::montecarlo::{Estimation, Experiment, Job, SUMMARY_SCHEMA, Summary};
-use crate::output::{check_outputs, check_writable, write_atomically};
+use crate::output::check_writable;
 use crate::report::blind;
-use crate::report::json::{Document, Input, Program, sha256_of_file};
+use crate::report::json::{Input, Program, sha256_of_file};
 use crate::report::montecarlo::{
     check_table, efficiency_sentence, markdown, page, parameter_table,
 };
@@ -41,7 +42,7 @@ enum MergeCommand {
         #[arg(required = true)]
         folders: Vec<PathBuf>,
         #[command(flatten)]
-        output: OutputArgs,
+        output: Outputs,
     },
 }
 
@@ -74,20 +75,7 @@ struct RunArgs {
     #[arg(long, requires = "out")]
     resume: bool,
     #[command(flatten)]
-    output: OutputArgs,
-}
-
-#[derive(Debug, Args)]
-struct OutputArgs {
-    /// Write the result as JSON.
-    #[arg(long)]
-    json: Option<PathBuf>,
-    /// Write the report as one HTML page.
-    #[arg(long)]
-    report: Option<PathBuf>,
-    /// Write the report as Markdown.
-    #[arg(long)]
-    markdown: Option<PathBuf>,
+    output: Outputs,
 }
 
 /// Part `I/N` of a run, with I < N.
@@ -121,7 +109,7 @@ pub fn run(command: Command) -> CommandResult {
     }
 }
 
-fn run_merge(folders: &[PathBuf], output: &OutputArgs) -> CommandResult {
+fn run_merge(folders: &[PathBuf], output: &Outputs) -> CommandResult {
     let files = shard_files(folders)?;
     output.check(&files)?;
     let inputs = inputs(&files)?;
@@ -228,7 +216,7 @@ fn run_all<T: Trials>(
     let range = shard.range;
     let mut merged = merge(vec![(PathBuf::new(), shard)])?;
     // A single shard is judged by its own trials; the trials of other shards are not missing.
-    merged.missing.retain(|gap| gap.start >= range[0] && gap.end <= range[1]);
+    merged.look_only_at(range);
     Ok((merged, wall_s))
 }
 
@@ -281,7 +269,7 @@ fn conclude(
     merged: &Merged<Estimation>,
     wall_s: f64,
     inputs: Vec<Input>,
-    output: &OutputArgs,
+    output: &Outputs,
 ) -> CommandResult {
     let summary = Summary::of(merged, wall_s);
     say!("{}", parameter_table(&summary).to_text());
@@ -303,17 +291,9 @@ fn conclude(
     }
     say!("\n{}: {}", summary.verdict.to_string().to_uppercase(), summary.sentence());
     let program = Program::started(Some(merged.header.seed), inputs);
-    if let Some(path) = &output.json {
-        let document = Document { schema: SUMMARY_SCHEMA, program: &program, body: &summary };
-        write_text(path, &document.to_json()?)?;
-    }
-    if let Some(path) = &output.markdown {
-        write_text(path, &markdown(&summary, &program.command))?;
-    }
-    if let Some(path) = &output.report {
-        write_text(path, &page(&summary, merged, program)?.to_html()?)?;
-        say!("report: {}", path.display());
-    }
+    let page = |summary: &Summary, program| page(summary, merged, program);
+    output.save(SUMMARY_SCHEMA, &summary, program, markdown, page)?;
+    output.name_report();
     Ok(if summary.verdict == Verdict::Fail { Outcome::Negative } else { Outcome::Done })
 }
 
@@ -332,33 +312,13 @@ fn replay_blind(benchmark: &Benchmark, trial: u64) -> CommandResult {
 fn conclude_blind(
     merged: &Merged<BlindContent>,
     inputs: Vec<Input>,
-    output: &OutputArgs,
+    output: &Outputs,
 ) -> CommandResult {
     let scores = Scores::of(merged);
     let program = Program::started(Some(merged.header.seed), inputs);
-    say!("{}", blind::markdown(&scores, &program.command));
-    if let Some(path) = &output.json {
-        let document = Document { schema: SCORES_SCHEMA, program: &program, body: &scores };
-        write_text(path, &document.to_json()?)?;
-    }
-    if let Some(path) = &output.markdown {
-        write_text(path, &blind::markdown(&scores, &program.command))?;
-    }
-    if let Some(path) = &output.report {
-        write_text(path, &blind::page(&scores, program)?.to_html()?)?;
-        say!("report: {}", path.display());
-    }
+    output.write(SCORES_SCHEMA, &scores, program, blind::markdown, blind::page)?;
+    output.name_report();
     Ok(if scores.verdict == Verdict::Fail { Outcome::Negative } else { Outcome::Done })
-}
-
-fn write_text(path: &Path, text: &str) -> Result<(), crate::output::OutputError> {
-    write_atomically(path, |out| out.write_all(text.as_bytes()))
-}
-
-impl OutputArgs {
-    fn check(&self, inputs: &[PathBuf]) -> Result<(), crate::output::OutputError> {
-        check_outputs([&self.json, &self.report, &self.markdown].into_iter().flatten(), inputs)
-    }
 }
 
 #[cfg(test)]

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::outputs::Outputs;
 use super::robot::inputs;
-use super::study_output::StudyOutput;
 use super::{CommandResult, Progress};
 use crate::montecarlo::Scenario;
 use crate::montecarlo::study::{cutoff_study, cutoff_study_trials};
@@ -21,7 +21,7 @@ pub(super) struct CutoffArgs {
     #[arg(long, value_parser = clap::value_parser!(u64).range(2..))]
     trials: Option<u64>,
     #[command(flatten)]
-    output: StudyOutput,
+    output: Outputs,
 }
 
 pub(super) fn run(args: &CutoffArgs) -> CommandResult {

@@ -6,8 +6,8 @@ use clap::Args;
 use serde::Deserialize;
 use thiserror::Error;
 
+use super::outputs::Outputs;
 use super::robot::inputs;
-use super::study_output::StudyOutput;
 use super::{CommandResult, Progress, threads_or_all};
 use crate::montecarlo::Scenario;
 use crate::montecarlo::study::{NoiseStudy, study};
@@ -33,7 +33,7 @@ pub(super) struct NoiseArgs {
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
     #[command(flatten)]
-    output: StudyOutput,
+    output: Outputs,
 }
 
 /// Results that cannot be combined.

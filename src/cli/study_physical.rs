@@ -4,13 +4,15 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::outputs::Outputs;
 use super::robot::inputs;
-use super::study_output::StudyOutput;
 use super::{CommandResult, Progress, threads_or_all};
 use crate::montecarlo::Scenario;
 use crate::montecarlo::study::physical::{PhysicalStudy, THOROUGH_EVERY, physical_case};
 use crate::report::json::Program;
 use crate::report::physical_study::{markdown, page};
+
+const SCHEMA: &str = "armid.study-physical/1";
 
 /// Which scenarios, and where to write.
 #[derive(Debug, Args)]
@@ -25,7 +27,7 @@ pub struct PhysicalArgs {
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
     #[command(flatten)]
-    output: StudyOutput,
+    output: Outputs,
 }
 
 /// Runs the study.
@@ -48,7 +50,8 @@ pub fn run(args: &PhysicalArgs) -> CommandResult {
         let case = physical_case(scenario, args.trials, THOROUGH_EVERY, threads, &reached)?;
         study.cases.push(case);
         progress.finish();
+        let program = Program::started(None, inputs.clone());
+        args.output.save(SCHEMA, &study, program, markdown, page)?;
     }
-    let program = Program::started(None, inputs);
-    args.output.write("armid.study-physical/1", &study, program, markdown, page)
+    args.output.write(SCHEMA, &study, Program::started(None, inputs), markdown, page)
 }

@@ -12,7 +12,7 @@ use crate::diagnose::{Cause, Diagnoser, Finding, Kind, Validation, repeated};
 use crate::dynamics::Model;
 use crate::identify::Options;
 use crate::log::{Effort, Layout};
-use crate::output::{check_outputs, write_atomically};
+use crate::output::{check_outputs, write_text};
 use crate::report::json::{Input, Program};
 use crate::report::real_arm::{Pair, RealArmStudy, Recorded};
 use crate::robot::{Arm, LoadedArm};
@@ -166,7 +166,7 @@ pub(super) fn run(args: &RealArmArgs) -> CommandResult {
     let text = study.markdown(&program.command)?;
     say!("{text}");
     if let Some(path) = &args.markdown {
-        write_atomically(path, |out| out.write_all(text.as_bytes()))?;
+        write_text(path, &text)?;
     }
     if let Some(path) = &args.report {
         study.page(program)?.write(path)?;

@@ -7,11 +7,10 @@
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::error::DiagnoseError;
 use super::verdict::Estimate;
-use crate::identify::covariance::{leverage_correction, quantile_95};
+use crate::identify::covariance::{by_chance, enlarged_scatter, quantile_95};
 
 /// Equations of one joint along one log.
 #[derive(Clone)]
@@ -87,16 +86,10 @@ pub(super) fn solve(
     }
     let told_by = |k: usize| grams.iter().filter(|gram| gram[(k, k)] > 0.0).count();
     let blocks = (0..unknowns).map(told_by).collect();
-    let effects: Vec<DVector<f64>> = grams
-        .par_iter()
-        .zip(&scores)
-        .map(|(gram, score)| {
-            let share = root.tr_mul(gram) * &root;
-            &root * (leverage_correction(&share) * root.tr_mul(score))
-        })
-        .collect();
-    let mut covariance = DMatrix::zeros(unknowns, unknowns);
-    effects.iter().for_each(|effect| covariance.ger(1.0, effect, effect, 1.0));
+    let shares: Vec<DMatrix<f64>> =
+        grams.par_iter().map(|gram| root.tr_mul(gram) * &root).collect();
+    let scores: Vec<DVector<f64>> = scores.iter().map(|score| root.tr_mul(score)).collect();
+    let covariance = &root * enlarged_scatter(&shares, &scores) * root.transpose();
     Ok(Solution { x, covariance, blocks })
 }
 
@@ -133,21 +126,13 @@ impl Solution {
         Estimate { value, unit, ci95: [value - reach, value + reach] }
     }
 
-    /// Probability that chance alone takes these unknowns this far from zero: the Wald statistic W as Hotelling's T²,
-    /// that is W (B − k)/(k (B − 1)) as F(k, B − k). 1 if the covariance is singular or there are too few blocks.
+    /// Probability that chance alone takes these unknowns this far from zero ([`by_chance`]).
     pub(super) fn probability(&self, unknowns: &[usize]) -> f64 {
         let count = unknowns.len();
         let x = DVector::from_fn(count, |k, _| self.x[unknowns[k]]);
         let covariance = |i: usize, k: usize| self.covariance[(unknowns[i], unknowns[k])];
-        let inverse = DMatrix::from_fn(count, count, covariance).try_inverse();
         let blocks = self.least_blocks(unknowns.iter().copied());
-        let Some(inverse) = inverse.filter(|_| count > 0 && blocks > count) else {
-            return 1.0;
-        };
-        let wald = (x.transpose() * inverse * &x)[(0, 0)];
-        let free = (blocks - count) as f64;
-        let f = wald * free / (count * (blocks - 1)) as f64;
-        FisherSnedecor::new(count as f64, free).map_or(1.0, |d| d.sf(f))
+        by_chance(&x, DMatrix::from_fn(count, count, covariance), blocks)
     }
 
     /// Number B of blocks that tell the least known of these unknowns; at least 2.

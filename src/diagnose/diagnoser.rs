@@ -9,6 +9,7 @@ use super::common_motion::{move_to_common_motion, noise_of_mean};
 use super::detection_limits::detection_limits;
 use super::error::DiagnoseError;
 use super::extension::{Effect, Extension};
+use super::finding::Finding;
 use super::held_out::{Models, Validation, held_out_gain};
 use super::image::{Image, Span};
 use super::intervals;
@@ -21,16 +22,16 @@ use super::record::{Record, is_torn};
 use super::remarks::{contact_remark, drift_remark, limited_drives, rest_remark};
 use super::replay::measured_nm;
 use super::rms::rms_where;
-use super::scene::Scene;
 use super::selection::{Contender, Kept, select};
+use super::sentences::Besides;
 use super::settled::{beside_model, fitted, residual, settled, without_contacts};
 use super::study::{Entry, Study};
 use super::verdict::{Cause, Diagnosis, HeldOut, Rival, Rms, Unexplained, Verdict};
 use crate::base::BaseSet;
-use crate::dynamics::{Model, Parameter};
+use crate::dynamics::Model;
 use crate::identify::{
-    Doubt, Identification, Identifier, Measurement, Misreading, Options, Regression,
-    drive_limit_remark, resting_joints, unlike,
+    Identification, Identifier, Measurement, Misreading, Options, Regression, drive_limit_remark,
+    resting_joints,
 };
 use crate::robot::{Arm, JointSignals};
 
@@ -43,26 +44,6 @@ pub struct Diagnoser<'a> {
     drive_gain_nm_a: Option<Vec<f64>>,
     pub(super) identifier: Identifier<'a>,
     pub(super) families: Vec<Box<dyn Candidate>>,
-}
-
-/// A diagnosis with the data from which it was made, for plots.
-pub struct Finding {
-    /// The diagnosis itself.
-    pub diagnosis: Diagnosis,
-    /// The null model's identification.
-    pub identification: Identification,
-    /// Motion and predictions along the log.
-    pub scene: Scene,
-    /// The extended model.
-    pub extension: Extension,
-    /// Residual of the null model, one period or the run, Nm.
-    pub before_nm: JointSignals,
-    /// Residual of the extended model, Nm.
-    pub after_nm: JointSignals,
-    /// Logged torque: the mean period, or the run behind its low-pass, Nm.
-    pub measured_nm: JointSignals,
-    /// The sample of the scene that belongs to each residual.
-    pub samples: Vec<usize>,
 }
 
 impl<'a> Diagnoser<'a> {
@@ -109,7 +90,7 @@ impl<'a> Diagnoser<'a> {
         let (study, found) =
             causes_of(&self.families, sources, &regression, &identification, &log, m.source)?;
         let mut kept = match study.scene.periodic {
-            true => Kept::settled(&study, found),
+            true => Kept::of(&study, found),
             false => Kept::of_a_single_run(&study, found),
         };
         let null = Extension::fit(&study, &[], &study.torque);
@@ -193,19 +174,11 @@ impl<'a> Diagnoser<'a> {
             sentences: Vec::new(),
             warnings,
         };
+        self.question_the_arm(&mut diagnosis, &extension, &identification);
         let laws: Vec<Option<usize>> =
             extension.effects.iter().map(|effect| effect.site.map(|j| j + 1)).collect();
-        diagnosis.sentences = diagnosis.in_sentences(&laws);
-        // This sentence comes first only if no cause is named: drift does not repeat from period to period and counts
-        // as noise in everything that follows.
-        let place = if diagnosis.causes.is_empty() { 0 } else { diagnosis.sentences.len() };
-        drift.into_iter().for_each(|drift| diagnosis.sentences.insert(place, drift));
-        diagnosis.sentences.splice(0..0, limited);
-        if let Some(doubt) = simulation.and_then(|simulation| simulation.doubt) {
-            // Everything that follows rests on the simulation.
-            diagnosis.sentences.insert(0, doubt.to_owned());
-        }
-        self.question_the_arm(&mut diagnosis, &extension, &identification);
+        let doubt = simulation.and_then(|simulation| simulation.doubt);
+        diagnosis.sentences = diagnosis.in_sentences(&laws, Besides { doubt, limited, drift });
         let samples = (0..regression.problem.samples).map(|row| regression.sample(row)).collect();
         let scene = study.scene;
         Ok(Finding {
@@ -229,31 +202,6 @@ impl<'a> Diagnoser<'a> {
                 misreading: Box::new(misreading),
             }),
             None => Ok(()),
-        }
-    }
-
-    /// Puts a doubt before all other sentences: that the log may be that of another robot, or that no arm has these
-    /// parameters.
-    fn question_the_arm(
-        &self,
-        diagnosis: &mut Diagnosis,
-        extension: &Extension,
-        identification: &Identification,
-    ) {
-        let nominal = self.set.values(&Model::new(self.arm).standard_parameters());
-        let sigma = sigma_of_friction_alone(diagnosis, self.set, self.arm.dof());
-        // Contacts and friction that the null model lacks distort its estimate of gravity, so θ is that of the extended
-        // model.
-        let (theta, covariance) = (&extension.theta, &identification.covariance);
-        let left = share_left(diagnosis, identification);
-        let torque_nm = identification.residual().torque_nm();
-        let doubt = Doubt::of(self.arm, self.set, &nominal, theta, &sigma, covariance, &torque_nm);
-        diagnosis.doubt = Doubt::or_unlike(doubt, unlike(self.arm, &left));
-        if let Some(doubt) = &diagnosis.doubt {
-            diagnosis.sentences.insert(0, doubt.sentence());
-            if doubt.is_contradiction() {
-                diagnosis.verdict = Verdict::Contradicted;
-            }
         }
     }
 
@@ -414,29 +362,6 @@ struct Extended {
     /// Span of the causes outside the null model, and the residual of the null model without its part in this span.
     accepted: Span,
     rest: Image,
-}
-
-/// Share of each joint's rms torque that is left unexplained beside the causes, with the known noise subtracted.
-fn share_left(diagnosis: &Diagnosis, identification: &Identification) -> Vec<f64> {
-    let torque_nm = identification.residual().torque_nm();
-    let share = |j: usize| {
-        let noise_nm = diagnosis.noise_of_mean_nm.as_ref().map_or(0.0, |nm| nm[j]);
-        (diagnosis.after.rms_nm[j].powi(2) - noise_nm.powi(2)).max(0.0).sqrt() / torque_nm[j]
-    };
-    (0..torque_nm.len()).map(share).collect()
-}
-
-/// σ of the base parameters beside the causes. It is ∞ for the Coulomb friction of a joint that also has another
-/// friction law: that parameter may be negative although the friction as a whole is not.
-fn sigma_of_friction_alone(diagnosis: &Diagnosis, set: &BaseSet, joints: usize) -> Vec<f64> {
-    let mut sigma: Vec<f64> = diagnosis.base_parameters.iter().map(|p| p.sigma).collect();
-    for law in diagnosis.causes.iter().filter(|cause| cause.kind.is_friction()) {
-        let joints = law.joint.map_or(0..joints, |joint| joint - 1..joint);
-        for k in joints.filter_map(|j| set.index_of(Parameter::Coulomb(j))) {
-            sigma[k] = f64::INFINITY;
-        }
-    }
-    sigma
 }
 
 /// Orders the causes. For a repeating motion: faults of the record before physics, physics by strength. For a single

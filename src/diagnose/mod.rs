@@ -21,6 +21,7 @@
 pub mod candidates;
 
 mod against;
+mod arm_in_doubt;
 pub mod chance;
 mod cleaned;
 mod clustered;
@@ -34,6 +35,7 @@ mod distinct_shapes;
 mod drives;
 mod error;
 mod extension;
+mod finding;
 mod friction_drift;
 mod gain;
 mod held_out;
@@ -73,9 +75,10 @@ mod verdict;
 mod whitening;
 
 pub use against::Nominal;
-pub use diagnoser::{Diagnoser, Finding};
+pub use diagnoser::Diagnoser;
 pub use error::DiagnoseError;
 pub use extension::{Effect, Extension};
+pub use finding::Finding;
 pub use held_out::Validation;
 pub use image::Column;
 pub use kind::Kind;

@@ -172,6 +172,21 @@ mod tests {
         assert_eq!(confidences(causes[..3].to_vec(), 5, true), [0.9, 0.5, 0.9]);
     }
 
+    /// An error of the arm's geometry looks like gains of several joints. A simulation that the log is compared with has
+    /// none.
+    #[test]
+    fn gains_of_several_joints_may_be_one_error() {
+        let of_gains = |joints: &[usize], is_compared: bool| -> Vec<f64> {
+            let mut causes: Vec<Cause> =
+                joints.iter().map(|j| cause(Kind::TorqueGain, *j, 0.9)).collect();
+            make_modest(&mut causes, is_compared);
+            causes.iter().map(|cause| cause.confidence).collect()
+        };
+        assert_eq!(of_gains(&[3, 4], false), [0.9; 2]);
+        assert_eq!(of_gains(&[3, 4], true), [1.0; 2]);
+        assert_eq!(of_gains(&[3], false), [1.0]);
+    }
+
     /// Bristles on all joints and a time skew of the arm as a whole, beside two faults of one joint each and two faults
     /// of the record.
     #[test]

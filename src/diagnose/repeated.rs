@@ -5,7 +5,7 @@
 //! the share of the rms error that the best possible model could remove along that motion. ρ does not count what the
 //! fits themselves absorb, nor what changes between the runs.
 
-use super::diagnoser::Finding;
+use super::finding::Finding;
 use crate::identify::MOVING_RAD_S;
 use crate::robot::JointSignals;
 

@@ -96,7 +96,7 @@ pub fn select(study: &Study) -> Found {
 
 impl<'s, 'a> Kept<'s, 'a> {
     /// The `causes` as they were found in this `study`.
-    pub fn settled(study: &'s Study<'a>, causes: Vec<Contender>) -> Self {
+    pub fn of(study: &'s Study<'a>, causes: Vec<Contender>) -> Self {
         Self { study, causes, with_common: true }
     }
 
@@ -168,7 +168,7 @@ impl<'s, 'a> Kept<'s, 'a> {
             };
             let place = (best.entry.family, best.entry.site);
             self.causes.push(best);
-            if !self.settle() {
+            if !self.revise() {
                 dropped.push(place);
             }
         }
@@ -467,7 +467,7 @@ impl<'s, 'a> Kept<'s, 'a> {
     ///
     /// Along a single run, which has many causes, only those that share a joint with the newest are looked at; the
     /// others follow once all are found ([`Self::exchange`]).
-    fn settle(&mut self) -> bool {
+    fn revise(&mut self) -> bool {
         let newest = self.causes.len() - 1;
         let new_site = self.causes[newest].entry.site;
         let shares_joint =

@@ -19,10 +19,35 @@ const RARE: f64 = 1e-4;
 /// it.
 const VAST: f64 = 10.0;
 
+/// What is said besides the causes.
+pub(super) struct Besides<'a> {
+    /// Doubt about the simulation that the log is compared with: everything else rests on it.
+    pub doubt: Option<&'a str>,
+    /// Drives at their limits.
+    pub limited: Vec<String>,
+    /// Torque that drifts. It does not repeat from period to period, and counts as noise in all that is said of causes.
+    pub drift: Option<String>,
+}
+
 impl Diagnosis {
     /// The sentences of the first screen. `laws` are the sites of the extended model's effects: a joint (1-based), or
     /// `None` for the arm as a whole.
-    pub(super) fn in_sentences(&self, laws: &[Option<usize>]) -> Vec<String> {
+    pub(super) fn in_sentences(&self, laws: &[Option<usize>], besides: Besides) -> Vec<String> {
+        let Besides { doubt, limited, drift } = besides;
+        // Without a cause, drift is what there is to say.
+        let (first, last) = if self.causes.is_empty() { (drift, None) } else { (None, drift) };
+        let of_the_arm = self.doubt.as_ref().map(|doubt| doubt.sentence());
+        let mut out: Vec<String> = of_the_arm.into_iter().collect();
+        out.extend(doubt.map(str::to_owned));
+        out.extend(limited);
+        out.extend(first);
+        out.extend(self.about_causes(laws));
+        out.extend(last);
+        out
+    }
+
+    /// The sentences about the causes, and about what is left beside them.
+    fn about_causes(&self, laws: &[Option<usize>]) -> Vec<String> {
         let is_left = self.unexplained.is_some() && self.noise_floor_nm.is_some();
         let mut out: Vec<String> = Vec::new();
         out.extend(is_left.then(|| missing_effect(&self.causes)).flatten());

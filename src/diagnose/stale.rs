@@ -2,7 +2,7 @@
 //! one.
 //!
 //! A signal that is quantised in steps Δ and changes by c from reading to reading repeats by chance in about Δ/c of all
-//! readings. Readings that repeat far more often while their joint moves are stale, unless they lie at the end of the
+//! readings, and a noisy one as often as it comes back to the reading before the last one. Readings that repeat far more often while their joint moves are stale, unless they lie at the end of the
 //! channel's range.
 
 use rayon::prelude::*;
@@ -198,8 +198,13 @@ fn stale(y: &[f64], should_change: impl Fn(usize, f64) -> bool) -> (Vec<usize>, 
         // A smooth signal may as well be constant.
         hanging.clear();
     }
-    let chance = if change > 0.0 { BEYOND_CHANCE * step / change } else { 1.0 };
     let share = |rows: &[usize]| rows.len() as f64 / changing.len().max(1) as f64;
+    let by_steps = if change > 0.0 { step / change } else { 1.0 };
+    // Noise comes back to the reading before the last one as often as it stays. (Velocities that are slopes of rounded
+    // angles have coarse steps that no smallest difference shows.)
+    let comes_back = |k: &usize| *k > 1 && y[*k] == y[*k - 2] && y[*k] != y[*k - 1];
+    let back: Vec<usize> = changing.iter().copied().filter(comes_back).collect();
+    let chance = BEYOND_CHANCE * by_steps.max(share(&back));
     if !(chance.max(LEAST_SHARE)..MOST_SHARE).contains(&share(&single)) {
         single.clear();
     }
@@ -272,6 +277,23 @@ mod tests {
         let torque = half.torque_nm.joint_mut(0);
         (0..torque.len()).for_each(|k| torque[k] = torque[k - k % 2]);
         assert_eq!(mend(&mut half).causes, []);
+    }
+
+    /// The slopes of angles in steps of 50 µrad, over five rows: no two of their values are closer than those steps make
+    /// them but for rounding, by which resolutions are told.
+    #[test]
+    fn slopes_of_rounded_angles_are_not_stale() {
+        let mut record = record(4.0, 0.3);
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let rounded = |q: &f64| ((q + rng.random_range(-3e-5..3e-5)) / 5e-5).round() * 5e-5;
+        let q: Vec<f64> = record.q_rad.joint(0).iter().map(rounded).collect();
+        let slope = |k: usize| (q[k - 2] - 8.0 * q[k - 1] + 8.0 * q[k + 1] - q[k + 2]) / 12.0;
+        for k in 2..q.len() - 2 {
+            let step_s = record.time_s[k] - record.time_s[k - 1];
+            record.qd_rad_s.joint_mut(0)[k] = slope(k) / step_s;
+        }
+        record.q_rad.joint_mut(0).copy_from_slice(&q);
+        assert_eq!(mend(&mut record).causes, []);
     }
 
     /// One in ten angles repeats the one before: these rows are removed, and the words name the channel.

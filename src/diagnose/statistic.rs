@@ -6,7 +6,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 use super::image::{Image, Span, dot};
 use super::noise_power::NoiseKnowledge;
 use super::whitening::{RunWhitening, Whitening};
-use crate::identify::covariance::{LEAST_BLOCKS, leverage_correction, quantile_95};
+use crate::identify::covariance::{LEAST_BLOCKS, by_chance, enlarged_scatter, quantile_95};
 
 /// How evidence is counted.
 pub enum Statistic {
@@ -165,14 +165,8 @@ impl Statistic {
             }
             Self::Blocks { .. } => {
                 let coordinates = DVector::from_vec(span.coordinates(residual));
-                let Some((scatter, blocks)) = self.scatter(span, residual) else { return 1.0 };
-                let Some(inverse) = scatter.try_inverse() else { return 1.0 };
-                if blocks <= k {
-                    return 1.0;
-                }
-                let wald = (coordinates.transpose() * inverse * &coordinates)[(0, 0)];
-                let f = wald * (blocks - k) as f64 / (k * (blocks - 1)) as f64;
-                FisherSnedecor::new(k as f64, (blocks - k) as f64).map_or(1.0, |d| d.sf(f))
+                let scatter = self.scatter(span, residual);
+                scatter.map_or(1.0, |(scatter, blocks)| by_chance(&coordinates, scatter, blocks))
             }
         }
     }
@@ -233,13 +227,8 @@ impl Statistic {
             let along = DVector::from_iterator(span.len(), directions.iter().map(|d| d[row]));
             shares[longer(row)].ger(1.0, &along, &along, 1.0);
         }
-        let mut scatter = DMatrix::zeros(span.len(), span.len());
-        for (sum, share) in sums.iter().zip(&shares) {
-            let enlarged = leverage_correction(share) * sum;
-            scatter += &enlarged * enlarged.transpose();
-        }
         let inverse = span.inverse_triangle();
-        &inverse * scatter * inverse.transpose()
+        &inverse * enlarged_scatter(&shares, &sums) * inverse.transpose()
     }
 
     /// Half-width, in σ, of a 95 % interval along `span`: the quantile of Student's t with the degrees of freedom of

@@ -10,6 +10,7 @@ use super::run_in::Excitation;
 
 /// How a URScript program plays a motion.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Playback {
     /// Cycle of the controller, s: 0.008 for the CB series, 0.002 for the e-Series.
     pub cycle_s: f64,
@@ -31,6 +32,14 @@ pub enum PlaybackError {
         /// Set points per second, Hz.
         rate_hz: f64,
     },
+    /// A program that stands still never ends, and a faster one leaves the limits of the design.
+    #[error(
+        "a speed of {speed} cannot be played: choose a share of the designed one, above 0 and at most 1"
+    )]
+    Speed {
+        /// Share of the designed speed.
+        speed: f64,
+    },
     /// Arms of Universal Robots have six joints.
     #[error("a controller of Universal Robots moves {JOINTS} joints, the motion has {joints}")]
     Joints {
@@ -48,12 +57,18 @@ const CB_SERIES_HZ: f64 = 125.0;
 
 impl Playback {
     /// For a motion of `joints` joints with `rate_hz` set points per second, played at `speed` in (0, 1].
+    ///
+    /// # Errors
+    /// What no controller can play; see [`PlaybackError`].
     pub fn new(joints: usize, rate_hz: f64, speed: f64) -> Result<Self, PlaybackError> {
         if joints != JOINTS {
             return Err(PlaybackError::Joints { joints });
         }
         if !is_whole(E_SERIES_HZ / rate_hz) {
             return Err(PlaybackError::Rate { rate_hz });
+        }
+        if !(speed > 0.0 && speed <= 1.0) {
+            return Err(PlaybackError::Speed { speed });
         }
         // 166.667 means 500/3.
         let cycle_s = (E_SERIES_HZ / rate_hz).round() / E_SERIES_HZ;
@@ -224,6 +239,9 @@ mod tests {
         for rate_hz in [1000.0, 300.0, 333.0, 0.0, -125.0, f64::NAN] {
             let refused = Playback::new(6, rate_hz, 1.0).unwrap_err();
             assert!(matches!(refused, PlaybackError::Rate { .. }), "{rate_hz} Hz: {refused}");
+        }
+        for speed in [0.0, -0.5, 1.01, f64::NAN] {
+            assert!(matches!(Playback::new(6, 125.0, speed), Err(PlaybackError::Speed { .. })));
         }
         let refused = Playback::new(7, 125.0, 1.0).unwrap_err();
         assert_eq!(refused, PlaybackError::Joints { joints: 7 });

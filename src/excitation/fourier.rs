@@ -37,6 +37,7 @@ pub fn built_in_names() -> impl Iterator<Item = &'static str> {
 /// `a` and `b` are velocities (rad/s), so position, velocity and acceleration are linear in the
 /// coefficients, and every joint has the same order L.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct FourierSeries {
     /// 2π/ω, s.
     pub period_s: f64,

@@ -2,11 +2,10 @@
 
 use nalgebra::DMatrix;
 
-use super::columns::ColumnPlan;
 use super::fit::{FitError, Fitter, Weighting};
 use super::problem::Problem;
 use super::whiten::{Spectrum, mix};
-use crate::base::BaseSet;
+use crate::base::{BaseSet, ColumnPlan};
 
 /// Torque noise of known statistics.
 pub struct KnownNoise<'a> {

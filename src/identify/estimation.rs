@@ -1,6 +1,5 @@
 //! Applies estimators and covariances to one problem.
 
-use super::columns::ColumnPlan;
 use super::covariance::{Covariance, CovarianceError, CovarianceKind};
 use super::error::IdentifyError;
 use super::fit::{Estimator, Fit, FitError, Fitter, Weighting};
@@ -8,7 +7,7 @@ use super::lack_of_fit::{Floor, LackOfFit};
 use super::options::Options;
 use super::problem::Problem;
 use super::whiten::{ReplicateWhitening, decimate, decorrelate, instrument, prewhiten};
-use crate::base::BaseSet;
+use crate::base::{BaseSet, ColumnPlan};
 use crate::signal::{HarmonicPower, Scratch};
 
 /// Memory for estimating problems of one shape.

@@ -43,9 +43,9 @@ impl Identification {
 
     /// Share of each joint's torque (rms) that the model leaves, without noise as far as the log reveals it.
     pub fn left(&self) -> Vec<f64> {
-        let Residual { rms_nm, relative_percent, .. } = self.residual();
+        let Residual { rms_nm, torque_rms_nm, .. } = self.residual();
         let beyond_noise = |j: usize| self.explainable_nm.as_ref().map_or(rms_nm[j], |nm| nm[j]);
-        let share = |j: usize| 0.01 * relative_percent[j] * beyond_noise(j) / rms_nm[j];
+        let share = |j: usize| beyond_noise(j) / torque_rms_nm[j];
         (0..rms_nm.len()).map(share).collect()
     }
 

@@ -1,6 +1,5 @@
 //! From a raw log to θ̂ and σ: the one path that real logs and simulated trials share.
 
-use super::columns::ColumnPlan;
 use super::covariance::{CovarianceError, CovarianceKind};
 use super::drive_answers::without_drive_answers;
 use super::error::IdentifyError;
@@ -15,7 +14,7 @@ use super::prepared::{Prepared, Processing};
 use super::problem::{Assembler, Problem};
 use super::regression::Regression;
 use super::whiten::{SMOOTHER, smoothed};
-use crate::base::BaseSet;
+use crate::base::{BaseSet, ColumnPlan};
 use crate::dynamics::Model;
 use crate::signal::{FineClock, Replicates, Scratch, ZeroPhase, fill_gaps};
 
@@ -42,10 +41,18 @@ const TICKS: usize = 8;
 /// Longest single run that keeps all its samples.
 const LONG_RUN: usize = 100_000;
 /// Sampling rate kept after a low-pass where a run is long or its rows are counted, in multiples of the cut-off.
-pub const KEPT_RATE: f64 = 4.0;
+const KEPT_RATE: f64 = 4.0;
+/// Relative difference up to which two rates are the same: recorders of one arm differ by less.
+pub(super) const SAME_RATE: f64 = 0.02;
 /// Periods from which on their scatter is used; with fewer it has so few degrees of freedom that blocks of time are
 /// more informative.
 pub const MANY_PERIODS: usize = 4;
+
+/// Samples at `rate_hz` of which one is kept behind a low-pass of `cutoff_hz`. Rates just below a whole multiple count as
+/// that multiple, so that logs of nearly the same rate keep the same rows.
+pub fn kept_every(rate_hz: f64, cutoff_hz: f64) -> usize {
+    ((1.0 + SAME_RATE) * rate_hz / (KEPT_RATE * cutoff_hz)).floor().max(1.0) as usize
+}
 
 impl<'a> Identifier<'a> {
     /// An identifier for logs of one arm.
@@ -208,11 +215,7 @@ impl<'a> Identifier<'a> {
         let filter = ZeroPhase::new(cutoff_hz, order, rate_hz)?;
         let samples = prepared.motion.samples();
         let edge = filter.edge_samples().min(samples / 8);
-        let every = if samples > LONG_RUN {
-            ((rate_hz / (KEPT_RATE * cutoff_hz)).floor() as usize).max(1)
-        } else {
-            1
-        };
+        let every = if samples > LONG_RUN { kept_every(rate_hz, cutoff_hz) } else { 1 };
         let mut whole = Problem::new(self.problem.plan.clone(), rate_hz / every as f64);
         whole.periods = 1;
         let kept = edge..samples - edge;
@@ -269,7 +272,9 @@ impl<'a> Identifier<'a> {
             false => CovarianceKind::Blocks,
         };
         let kind = self.options.covariance.unwrap_or(default_kind);
-        if are_alike && matches!(kind, CovarianceKind::Spectral | CovarianceKind::Periods) {
+        let needs_scatter = estimator == Estimator::Spectral
+            || matches!(kind, CovarianceKind::Spectral | CovarianceKind::Periods);
+        if are_alike && needs_scatter {
             return Err(CovarianceError::AlikePeriods.into());
         }
         let Processing { logs, periods, .. } = prepared.processing;
@@ -373,5 +378,17 @@ impl<'a> Identifier<'a> {
             Ok(self.with_motion_noise(estimate, &prepared)?.of_fewer_rows(prepared.kept()))
         });
         Ok(estimates.collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// At 40 Hz behind a low-pass of 10 Hz, clocks that are off by 0.01 % keep the same rows.
+    #[test]
+    fn logs_of_nearly_one_rate_keep_the_same_rows() {
+        assert_eq!([199.98, 200.0, 200.02].map(|hz| kept_every(hz, 10.0)), [5; 3]);
+        assert_eq!([125.0, 500.0, 30.0].map(|hz| kept_every(hz, 10.0)), [3, 12, 1]);
     }
 }

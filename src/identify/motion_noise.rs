@@ -63,8 +63,8 @@ pub fn moved_to_mean(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::ColumnPlan;
     use crate::base::{BaseSet, Parameterisation};
-    use crate::identify::ColumnPlan;
     use crate::robot::Arm;
 
     /// Four runs whose true motions differ a little, read without noise: moved to the mean motion, their torques are

@@ -24,7 +24,32 @@ pub struct Options {
     pub period_s: Option<f64>,
 }
 
+/// A setting that no log can be processed with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Improper {
+    /// Its name in [`Options`].
+    pub key: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// What it must be.
+    pub requirement: &'static str,
+}
+
 impl Options {
+    /// The first setting that no log can be processed with.
+    pub fn improper(&self) -> Option<Improper> {
+        let settings = [
+            ("cutoff_hz", Some(self.cutoff_hz)),
+            ("rate_hz", self.rate_hz),
+            // Zero treats the log as a single run.
+            ("period_s", self.period_s.filter(|s| *s != 0.0)),
+        ];
+        settings.into_iter().find_map(|(key, value)| {
+            let value = value.filter(|v| !(v.is_finite() && *v > 0.0))?;
+            Some(Improper { key, value, requirement: "must be a positive number" })
+        })
+    }
+
     /// Faster logs are decimated to at most this rate. The motion itself would need less, but dry friction does not
     /// allow it: behind the decimator's low-pass the velocity passes through zero more slowly than the drive does,
     /// and the friction computed from it is not that in the torque. In logs decimated to 125 Hz this appears as
@@ -61,5 +86,21 @@ impl Default for Options {
             rate_hz: None,
             period_s: None,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_that_no_log_can_be_processed_with_are_named() {
+        let default = Options::default();
+        assert_eq!(default.improper(), None);
+        assert_eq!(Options { period_s: Some(0.0), ..default.clone() }.improper(), None);
+        let key = |options: Options| options.improper().map(|improper| improper.key);
+        assert_eq!(key(Options { cutoff_hz: f64::NAN, ..default.clone() }), Some("cutoff_hz"));
+        assert_eq!(key(Options { rate_hz: Some(0.0), ..default.clone() }), Some("rate_hz"));
+        assert_eq!(key(Options { period_s: Some(-3.0), ..default }), Some("period_s"));
     }
 }

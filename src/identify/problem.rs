@@ -1,6 +1,6 @@
 //! The linear problem: base regressor and torque, joint by joint.
 
-use super::columns::ColumnPlan;
+use crate::base::ColumnPlan;
 use crate::dynamics::{Lanes, Model, Motion, RegressorBlock, Workspace};
 use crate::robot::JointSignals;
 

@@ -2,6 +2,7 @@
 
 use super::course::Course;
 use super::error::IdentifyError;
+use super::identifier::SAME_RATE;
 use super::prepared::{Prepared, Processing};
 use super::problem::Problem;
 
@@ -50,13 +51,21 @@ impl Regression {
         let Some(expected_hz) = rates_hz.next() else {
             return Err(IdentifyError::NoLogs);
         };
-        if let Some(found_hz) = rates_hz.find(|hz| (hz / expected_hz - 1.0).abs() > 0.02) {
+        let is_other = |found_hz: &f64, own_hz: f64| (found_hz / own_hz - 1.0).abs() > SAME_RATE;
+        if let Some(found_hz) = rates_hz.find(|hz| is_other(hz, expected_hz)) {
             return Err(IdentifyError::Rates { found_hz, expected_hz });
         }
-        // Long runs were thinned behind their low-pass; the others follow.
+        // Long runs were thinned behind their low-pass. The others follow, because blocks of time and the colour of the
+        // noise are counted in rows.
         let coarsest = regressions.iter().map(|r| r.every).max().unwrap_or(1);
         let thinned = |r: Self| if logs > 1 { r.thinned(coarsest) } else { r };
-        let mut all = regressions.into_iter().map(thinned);
+        let regressions: Vec<Self> = regressions.into_iter().map(thinned).collect();
+        let mut rows_hz = regressions.iter().map(|r| r.problem.rate_hz);
+        let expected_hz = rows_hz.next().unwrap_or(expected_hz);
+        if let Some(found_hz) = rows_hz.find(|hz| is_other(hz, expected_hz)) {
+            return Err(IdentifyError::Rates { found_hz, expected_hz });
+        }
+        let mut all = regressions.into_iter();
         let Some(mut first) = all.next() else {
             return Err(IdentifyError::NoLogs);
         };
@@ -92,7 +101,7 @@ impl Regression {
         Ok(first)
     }
 
-    /// The same with `every`-th sample of `prepared` in the problem, a multiple of what it has now.
+    /// The same with `every`-th sample of `prepared` in the problem, as far as that is a multiple of what it has now.
     fn thinned(mut self, every: usize) -> Self {
         let factor = (every / self.every).max(1);
         if factor > 1 {

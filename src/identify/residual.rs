@@ -7,6 +7,8 @@ use crate::robot::JointSignals;
 pub struct Residual {
     /// Root mean square per joint, Nm.
     pub rms_nm: Vec<f64>,
+    /// Root mean square of the torque itself per joint, Nm.
+    pub torque_rms_nm: Vec<f64>,
     /// 100 ‖e_j‖/‖τ_j‖ per joint, percent.
     pub relative_percent: Vec<f64>,
     /// The paper's (21): √(eᵀe)/m, e over all joints, m time samples. Not an rms: it shrinks with
@@ -21,15 +23,10 @@ impl Residual {
         let pairs = residual.iter().zip(torque);
         Self {
             rms_nm: residual.iter().map(|e| (e / m).sqrt()).collect(),
+            torque_rms_nm: torque.iter().map(|t| (t / m).sqrt()).collect(),
             relative_percent: pairs.map(|(e, t)| 100.0 * (e / t).sqrt()).collect(),
             e_n: residual.iter().sum::<f64>().sqrt() / m,
         }
-    }
-
-    /// Rms of the torque per joint, Nm.
-    pub fn torque_nm(&self) -> Vec<f64> {
-        let pairs = self.rms_nm.iter().zip(&self.relative_percent);
-        pairs.map(|(rms_nm, percent)| 100.0 * rms_nm / percent).collect()
     }
 
     /// From the samples of `error_nm` and `torque_nm` (same shape) for which `counts(joint, sample)` holds.
@@ -39,7 +36,7 @@ impl Residual {
         counts: impl Fn(usize, usize) -> bool,
     ) -> Self {
         let (n, samples) = (error_nm.joints(), error_nm.samples());
-        let mut rms_nm = Vec::with_capacity(n);
+        let [mut rms_nm, mut torque_rms_nm] = [(); 2].map(|()| Vec::with_capacity(n));
         let mut relative_percent = Vec::with_capacity(n);
         let mut all = 0.0;
         for j in 0..n {
@@ -51,9 +48,10 @@ impl Residual {
                 counted += 1;
             }
             rms_nm.push((squares[0] / counted as f64).sqrt());
+            torque_rms_nm.push((squares[1] / counted as f64).sqrt());
             relative_percent.push(100.0 * (squares[0] / squares[1]).sqrt());
             all += squares[0];
         }
-        Self { rms_nm, relative_percent, e_n: all.sqrt() / samples as f64 }
+        Self { rms_nm, torque_rms_nm, relative_percent, e_n: all.sqrt() / samples as f64 }
     }
 }

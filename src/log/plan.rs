@@ -1,6 +1,7 @@
 //! A layout applied to one file: which field of a row goes where.
 
-use super::error::{LayoutFault, LogError};
+use super::error::LogError;
+use super::layout::LayoutFault;
 use super::layout::{Block, Columns, DelimiterChoice, Layout};
 use super::lines::Line;
 

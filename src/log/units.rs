@@ -7,8 +7,8 @@ use std::f64::consts::{PI, TAU};
 
 use super::account::LogWarning;
 use super::clean::Motion;
-use super::error::UnitSuspicion;
 use super::layout::{Angle, AngularVelocity, TimeUnit, Units};
+use super::unit_suspicion::UnitSuspicion;
 use crate::median::{median, median_step};
 
 /// A span in which a joint moves less than this is not used, rad: 200 steps of a 10⁻⁴ rad encoder.

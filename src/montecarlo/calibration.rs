@@ -1,11 +1,12 @@
 //! Verdict over a tally: is the claimed σ true?
 
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::share::Share;
 pub use super::statistic::Statistic;
 use super::tally::Tally;
+use crate::identify::covariance::student_quantile;
 
 /// Probability that any check fails although the identifier is exactly as good as claimed.
 pub const FALSE_FAILURE_RATE: f64 = 1e-3;
@@ -116,12 +117,12 @@ impl Calibration {
         let statistics: Vec<_> = (0..b).map(|k| tally.statistics(k)).collect();
         let single = FALSE_FAILURE_RATE / CHECKS;
         let each = single / b as f64;
-        let [t_single, t_each] = [single, each].map(|alpha| student_quantile(alpha, n - 1.0));
+        let [t_single, t_each] = [single, each].map(|alpha| two_sided_quantile(alpha, n - 1.0));
         let (mean, error) = tally.mean_coverage();
         // A handful of trials may show no scatter at all. The standard error is therefore at least the smallest
         // one possible, that of independent parameters: the binomial error of one parameter over √b.
         let least = (0.95 * 0.05 / (all * b as f64)).sqrt();
-        let half = student_quantile(single, all - 1.0) * error.max(least);
+        let half = two_sided_quantile(single, all - 1.0) * error.max(least);
         let ratios: Vec<f64> =
             statistics.iter().map(|s| s.sigma_empirical / s.sigma_predicted).collect();
         let (pooled, pooled_error) = tally.pooled_ratio();
@@ -240,10 +241,9 @@ impl Check {
     }
 }
 
-/// Student's two-sided quantile for a total tail probability `alpha`.
-fn student_quantile(alpha: f64, degrees_of_freedom: f64) -> f64 {
-    StudentsT::new(0.0, 1.0, degrees_of_freedom)
-        .map_or(f64::INFINITY, |t| -t.inverse_cdf(0.5 * alpha))
+/// What |t| exceeds with probability `alpha`.
+fn two_sided_quantile(alpha: f64, degrees_of_freedom: f64) -> f64 {
+    student_quantile(1.0 - 0.5 * alpha, degrees_of_freedom)
 }
 
 /// Wilson's confidence interval for a binomial proportion (E. B. Wilson 1927).
@@ -361,8 +361,8 @@ mod tests {
     #[test]
     fn failed_trials_scatter_the_coverage() {
         let check = check_of(&all_held(50, None), Statistic::MeanCoverage, claims::MEAN_COVERAGE);
-        let half =
-            student_quantile(FALSE_FAILURE_RATE / CHECKS, 999.0) * (0.95_f64 * 0.05 / 999.0).sqrt();
+        let half = two_sided_quantile(FALSE_FAILURE_RATE / CHECKS, 999.0)
+            * (0.95_f64 * 0.05 / 999.0).sqrt();
         assert!((check.value - 0.95).abs() < 1e-12, "{}", check.value);
         let off = [0.95 - half - check.interval[0], 0.95 + half - check.interval[1]];
         assert!(off.iter().all(|off| off.abs() < 1e-12), "{:?} {half}", check.interval);

@@ -6,8 +6,9 @@ use serde::Serialize;
 use super::motion_noise::MotionNoise;
 use super::scenario::Scenario;
 use super::simulation::Simulation;
+use crate::base::ColumnPlan;
 use crate::dynamics::{Model, Motion};
-use crate::identify::{Assembler, ColumnPlan, Problem, Spectrum, Triangle};
+use crate::identify::{Assembler, Problem, Spectrum, Triangle};
 use crate::plant::{PlantError, Recording, Whitening};
 use crate::signal::FineClock;
 

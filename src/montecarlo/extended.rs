@@ -10,7 +10,7 @@ use crate::diagnose::Finding;
 use crate::diagnose::replay::ExtendedSimulation;
 use crate::excitation::{Excitation, ExcitationError, FourierSeries, Requirements};
 use crate::identify::{Measurement, Options};
-use crate::output::{OutputError, write_atomically};
+use crate::output::{OutputError, write_text};
 use crate::plant::faults::Effect;
 use crate::plant::{PerJoint, PlantConfig, SensorConfig};
 use crate::robot::JointSignals;
@@ -124,12 +124,9 @@ impl Scenario {
         let [_, robot, trajectory] = Self::files_of(path);
         let name = |path: &Path| path.file_name().unwrap_or_default().display().to_string();
         let text = self.text(&name(&robot), &name(&trajectory));
-        let write = |path: &Path, text: String| {
-            write_atomically(path, |out| out.write_all(text.as_bytes()))
-        };
-        write(&robot, self.arm.to_toml())?;
-        write(&trajectory, self.excitation.series().to_json())?;
-        write(path, text)
+        write_text(&robot, &self.arm.to_toml())?;
+        write_text(&trajectory, &self.excitation.series().to_json())?;
+        write_text(path, &text)
     }
 
     fn text(&self, robot: &str, trajectory: &str) -> String {

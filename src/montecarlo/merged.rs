@@ -22,6 +22,14 @@ pub struct Merged<C: Content> {
     pub programs: BTreeSet<String>,
 }
 
+impl<C: Content> Merged<C> {
+    /// Leaves only those of the missing trials that are in `range`.
+    pub fn look_only_at(&mut self, [first, end]: [u64; 2]) {
+        let inside = self.missing.iter().map(|gap| gap.start.max(first)..gap.end.min(end));
+        self.missing = inside.filter(|gap| !gap.is_empty()).collect();
+    }
+}
+
 /// Merges shards, each given with its file. The result is the same to the last bit for any order.
 pub fn merge<C: Content>(mut shards: Vec<(PathBuf, Shard<C>)>) -> Result<Merged<C>, ShardError> {
     shards.sort_by_key(|(_, shard)| shard.range);
@@ -110,6 +118,20 @@ mod tests {
         let tally = Records { records: Vec::new(), failures };
         let shard = Shard { header, range, next: range[1], seconds: 1.0, tally };
         (PathBuf::from(format!("{}.json", range[0])), shard)
+    }
+
+    /// The first half of a run was stopped after three of its five trials. The trials of the second half are not its own.
+    #[test]
+    fn a_shard_that_was_stopped_misses_its_own_trials() {
+        let (file, mut half) = shard([0, 5], 1, "a");
+        half.next = 3;
+        let mut merged = merge(vec![(file, half)]).unwrap();
+        assert_eq!(merged.missing[0], 3..10);
+        merged.look_only_at([0, 5]);
+        assert_eq!((merged.missing.len(), merged.missing[0].clone()), (1, 3..5));
+        let mut whole = merge(vec![shard([5, 8], 1, "a")]).unwrap();
+        whole.look_only_at([5, 8]);
+        assert!(whole.missing.is_empty());
     }
 
     #[test]

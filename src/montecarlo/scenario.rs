@@ -9,7 +9,7 @@ use thiserror::Error;
 use super::blind::BlindEntry;
 use crate::base::{BaseSet, Parameterisation, ParameterisationError};
 use crate::excitation::{Excitation, ExcitationError, FourierSeries, Requirements};
-use crate::identify::Options;
+use crate::identify::{Improper, Options};
 use crate::plant::faults::{Effect, FaultyPlant};
 use crate::plant::{PlantConfig, PlantError, SensorConfig, Sensors};
 use crate::robot::{Arm, LoadedArm, RobotError};
@@ -223,6 +223,9 @@ impl Scenario {
 
     fn asked_for(file: ScenarioFile, source: &Source) -> Result<Self, ScenarioError> {
         source.check(file.trials > 0, "trials", 0.0, "must be at least 1")?;
+        if let Some(Improper { key, value, requirement }) = file.processing.improper() {
+            source.check(false, key, value, requirement)?;
+        }
         let robot = source.beside(&file.robot);
         let LoadedArm { arm, mut files, .. } = LoadedArm::load(&robot)?;
         let parameterisation = Parameterisation::of(&arm, file.reduced.as_deref())?;

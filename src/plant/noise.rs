@@ -122,7 +122,7 @@ impl NoiseModel {
             }
             if let Colour::LowPass { cutoff_hz } = *colour {
                 let filter = Butterworth2::new(cutoff_hz / rate_hz);
-                let correlation = filter.autocorrelation(settled(cutoff_hz, rate_hz), lags);
+                let correlation = filter.autocorrelation(run_in_samples(cutoff_hz, rate_hz), lags);
                 for (sum, r) in sum.iter_mut().zip(correlation) {
                     *sum += share * r;
                 }
@@ -201,7 +201,8 @@ impl Spectrum {
             }
             Colour::LowPass { cutoff_hz } => Self::LowPass {
                 corner: (std::f64::consts::PI * cutoff_hz / rate_hz).tan(),
-                energy: Butterworth2::new(cutoff_hz / rate_hz).energy(settled(cutoff_hz, rate_hz)),
+                energy: Butterworth2::new(cutoff_hz / rate_hz)
+                    .energy(run_in_samples(cutoff_hz, rate_hz)),
             },
         }
     }
@@ -237,7 +238,7 @@ impl Process {
                 Self::Ar1 { phi, innovation: (1.0 - phi * phi).sqrt(), value: normal(rng) }
             }
             Colour::LowPass { cutoff_hz } => {
-                let settled = settled(cutoff_hz, rate_hz);
+                let settled = run_in_samples(cutoff_hz, rate_hz);
                 let mut filter = Butterworth2::new(cutoff_hz / rate_hz);
                 filter.gain /= filter.clone().energy(settled).sqrt();
                 for _ in 0..settled {
@@ -268,7 +269,7 @@ const FORGOTTEN: f64 = 4.5;
 const LONGEST_S: f64 = 3600.0;
 
 /// Number of samples after which a low-pass has settled.
-fn settled(cutoff_hz: f64, rate_hz: f64) -> usize {
+fn run_in_samples(cutoff_hz: f64, rate_hz: f64) -> usize {
     (FORGOTTEN * rate_hz / cutoff_hz).ceil() as usize
 }
 

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::error::ReportError;
-use crate::output::write_atomically;
+use crate::output::write_text;
 
 /// An input file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -101,8 +101,7 @@ impl<T: Serialize> Document<'_, T> {
 
     /// Writes the document atomically.
     pub fn write(&self, path: &Path) -> Result<(), ReportError> {
-        let text = self.to_json()?;
-        Ok(write_atomically(path, |file| file.write_all(text.as_bytes()))?)
+        Ok(write_text(path, &self.to_json()?)?)
     }
 }
 

@@ -12,7 +12,7 @@ use super::json::Program;
 use super::plot::labelled;
 use super::status::Status;
 use super::table::Table;
-use crate::output::write_atomically;
+use crate::output::write_text;
 
 /// The banner of a page: what a reader takes away who reads nothing else.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -157,8 +157,7 @@ impl Page {
 
     /// Writes the page atomically.
     pub fn write(&self, path: &Path) -> Result<(), ReportError> {
-        let html = self.to_html()?;
-        Ok(write_atomically(path, |file| file.write_all(html.as_bytes()))?)
+        Ok(write_text(path, &self.to_html()?)?)
     }
 }
 

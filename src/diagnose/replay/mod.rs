@@ -16,7 +16,8 @@ mod simulated;
 
 use serde::Serialize;
 
-use super::diagnoser::{Diagnoser, Finding};
+use super::diagnoser::Diagnoser;
+use super::finding::Finding;
 use super::held_out::Validation;
 use super::rms::rms_where;
 use crate::plant::faults::Effect;

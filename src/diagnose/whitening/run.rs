@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::image::{Column, Image};
 use crate::identify::covariance;
-use crate::identify::{KEPT_RATE, MOVING_RAD_S, Options, Regression};
+use crate::identify::{MOVING_RAD_S, Options, Regression, kept_every};
 use crate::signal::{Scratch, ZeroPhase};
 
 /// Rows of a single run: the regression's low-pass, then one weight per joint. Only samples in which the joint moves
@@ -48,8 +48,7 @@ impl RunWhitening {
             first_sample: regression.first_sample,
             every: regression.every,
             rows,
-            thin: ((rate_hz / regression.every as f64 / (KEPT_RATE * options.cutoff_hz)) as usize)
-                .max(1),
+            thin: kept_every(rate_hz / regression.every as f64, options.cutoff_hz),
             weights: sigma_nm.iter().map(|s| 1.0 / s).collect(),
             counts: Self::moving_rows(regression),
             block_rows: ((BLOCK_S * rate_hz / regression.every as f64) as usize).max(1),

@@ -3,7 +3,7 @@
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 
-use crate::base::BaseSet;
+use crate::base::{BaseSet, ColumnPlan};
 use crate::dynamics::{
     AdjointWorkspace, Lanes, Model, Motion, Parameter, ParameterLayout, RegressorBlock, Workspace,
 };
@@ -13,18 +13,10 @@ use crate::dynamics::{
 #[derive(Debug, Clone)]
 pub struct Information {
     model: Model,
-    /// For every joint, the base columns on which its torque depends.
-    visible: Vec<Vec<VisibleColumn>>,
-    rank: usize,
+    plan: ColumnPlan,
     weights: Vec<f64>,
     /// Non-zero standard parameters of the nominal model, for its torque.
     nominal: Vec<(Parameter, f64)>,
-}
-
-#[derive(Debug, Clone)]
-struct VisibleColumn {
-    base: usize,
-    terms: Vec<(Parameter, f64)>,
 }
 
 /// Scratch for motions of one length.
@@ -41,31 +33,7 @@ pub struct InformationWorkspace {
 impl Information {
     /// Information about the parameters of `base` with the weights `weights` (one per joint).
     pub fn new(model: &Model, base: &BaseSet, weights: Vec<f64>) -> Self {
-        let dof = model.dof();
-        let layout = ParameterLayout::new(dof);
-        let sees = |joint: usize, parameter: &Parameter| match *parameter {
-            Parameter::Body(body, _) => body >= joint,
-            Parameter::RotorInertia(j)
-            | Parameter::Viscous(j)
-            | Parameter::Coulomb(j)
-            | Parameter::Offset(j) => j == joint,
-        };
-        let visible = (0..dof)
-            .map(|joint| {
-                (0..base.rank())
-                    .map(|k| VisibleColumn {
-                        base: k,
-                        terms: base
-                            .column(k)
-                            .iter()
-                            .map(|&(index, coefficient)| (layout.parameter(index), coefficient))
-                            .filter(|(parameter, _)| sees(joint, parameter))
-                            .collect(),
-                    })
-                    .filter(|column| !column.terms.is_empty())
-                    .collect()
-            })
-            .collect();
+        let layout = ParameterLayout::new(model.dof());
         let nominal = model
             .standard_parameters()
             .into_iter()
@@ -73,7 +41,7 @@ impl Information {
             .filter(|&(_, value)| value != 0.0)
             .map(|(index, value)| (layout.parameter(index), value))
             .collect();
-        Self { model: model.clone(), visible, rank: base.rank(), weights, nominal }
+        Self { model: model.clone(), plan: ColumnPlan::new(model, base), weights, nominal }
     }
 
     /// Scratch for motions of `samples` samples.
@@ -83,7 +51,9 @@ impl Information {
             backward: AdjointWorkspace::new(&self.model),
             regressor: RegressorBlock::new(&self.model, samples),
             adjoint: RegressorBlock::new(&self.model, samples),
-            columns: self.visible.iter().map(|v| Mat::zeros(samples, v.len())).collect(),
+            columns: (0..self.plan.joints())
+                .map(|joint| Mat::zeros(samples, self.plan.columns(joint).len()))
+                .collect(),
         }
     }
 
@@ -97,8 +67,9 @@ impl Information {
     ) -> Mat<f64> {
         let samples = motion.samples();
         ws.regressor.fill(&self.model, &mut ws.forward, motion, 0..samples);
-        let mut information = Mat::<f64>::zeros(self.rank, self.rank);
-        for (joint, visible) in self.visible.iter().enumerate() {
+        let mut information = Mat::<f64>::zeros(self.plan.base_count(), self.plan.base_count());
+        for joint in 0..self.plan.joints() {
+            let visible = self.plan.columns(joint);
             let torque = &mut torque_nm[joint * samples..(joint + 1) * samples];
             torque.fill(0.0);
             for &(parameter, value) in &self.nominal {
@@ -139,7 +110,8 @@ impl Information {
     ) {
         let samples = motion.samples();
         ws.adjoint.set_samples(samples);
-        for (joint, visible) in self.visible.iter().enumerate() {
+        for joint in 0..self.plan.joints() {
+            let visible = self.plan.columns(joint);
             let n = visible.len();
             let g_seen = Mat::from_fn(n, n, |r, c| g[(visible[r].base, visible[c].base)]);
             let mut weights = Mat::<f64>::zeros(samples, n);

@@ -3,6 +3,8 @@
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::{Covariance, CovarianceError, CovarianceKind, CovarianceMethod};
 use crate::dot::dot;
@@ -104,10 +106,37 @@ impl Leverage {
 
 /// (1 − T)^(−½) for a block with the share T of the information: the factor by which its score has to be enlarged
 /// because the fit adapted to it.
-pub fn leverage_correction(share: &DMatrix<f64>) -> DMatrix<f64> {
+fn leverage_correction(share: &DMatrix<f64>) -> DMatrix<f64> {
     let parts = share.clone().symmetric_eigen();
     let factor = parts.eigenvalues.map(|t| (1.0 - t).max(LEAST_LEFT).powf(-0.5));
     &parts.eigenvectors * DMatrix::from_diagonal(&factor) * parts.eigenvectors.transpose()
+}
+
+/// Σ_b c_b c_bᵀ, c_b = (1 − T_b)^(−½) L⁻¹ G_b, from the `shares` T_b of the blocks and their `scores` L⁻¹ G_b.
+pub fn enlarged_scatter(shares: &[DMatrix<f64>], scores: &[DVector<f64>]) -> DMatrix<f64> {
+    let count = scores.first().map_or(0, |score| score.len());
+    let enlarged: Vec<DVector<f64>> = shares
+        .par_iter()
+        .zip(scores)
+        .map(|(share, score)| leverage_correction(share) * score)
+        .collect();
+    let mut scatter = DMatrix::zeros(count, count);
+    enlarged.iter().for_each(|score| scatter.ger(1.0, score, score, 1.0));
+    scatter
+}
+
+/// Probability that chance alone takes k `values` this far from zero, with a `covariance` from the scatter of B
+/// `blocks`: the Wald statistic W as Hotelling's T², that is W (B − k)/(k (B − 1)) as F(k, B − k). 1 if the covariance
+/// is singular or there are too few blocks.
+pub fn by_chance(values: &DVector<f64>, covariance: DMatrix<f64>, blocks: usize) -> f64 {
+    let k = values.len();
+    let Some(inverse) = covariance.try_inverse().filter(|_| k > 0 && blocks > k) else {
+        return 1.0;
+    };
+    let wald = (values.transpose() * inverse * values)[(0, 0)];
+    let free = (blocks - k) as f64;
+    let f = wald * free / (k * (blocks - 1)) as f64;
+    FisherSnedecor::new(k as f64, free).map_or(1.0, |d| d.sf(f))
 }
 
 /// G_b of all blocks, period after period.
@@ -146,15 +175,16 @@ fn degrees_of_freedom(fit: &Fit, leverages: &[Leverage], periods: usize) -> f64 
             .collect();
         let mut trace = 0.0;
         let mut squares = 0.0;
-        for (at, (own, through)) in told.iter().enumerate() {
+        let mut products = DMatrix::zeros(b, b);
+        for (own, through) in &told {
             let same = through.norm_squared();
             trace += own - same;
-            // The block itself and the same block in other periods; the other blocks follow.
-            squares += (own - same).powi(2) + (periods - 1) as f64 * same * same;
-            for (_, other) in &told[..at] {
-                squares += 2.0 * periods as f64 * through.dot(other).powi(2);
-            }
+            // The block itself instead of its product with itself, which is among those of all pairs.
+            squares += (own - same).powi(2) - same * same;
+            products.ger(1.0, through, through, 1.0);
         }
+        // Σ_bc (t_b · t_c)² = ‖Σ_b t_b t_bᵀ‖², in a time that grows with the number of blocks and not with its square.
+        squares += periods as f64 * products.norm_squared();
         inverse_sum += squares / (periods as f64 * trace * trace);
     }
     b as f64 / inverse_sum

@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use thiserror::Error;
 
-pub use blocks::{BLOCK_S, BlockCluster, LEAST_BLOCKS, leverage_correction};
+pub use blocks::{BLOCK_S, BlockCluster, LEAST_BLOCKS, by_chance, enlarged_scatter};
 pub use bootstrap::BlockBootstrap;
 pub use newey_west::NeweyWest;
 pub use ols::OrdinaryLeastSquares;

@@ -21,10 +21,13 @@ impl CovarianceMethod for WeightedLeastSquares {
         } else {
             sandwich(fit, &meat(problem, fit, &fit.joint_sigma_nm, |_, _| {}))
         };
+        // Those with which s_j is known on the joint that tells most parameters.
+        let most = (0..problem.joints()).map(|j| problem.plan.base_indices(j).len()).max();
+        let values = problem.samples * problem.periods;
         Ok(Covariance {
             kind: CovarianceKind::Wls,
             matrix: matrix / problem.periods as f64,
-            degrees_of_freedom: (problem.samples * problem.periods) as f64,
+            degrees_of_freedom: values.saturating_sub(most.unwrap_or(0)).max(1) as f64,
         })
     }
 }

@@ -5,9 +5,9 @@ use serde::Serialize;
 
 use super::change::other_gravity;
 use super::reading::Reading;
+use crate::base::ColumnPlan;
 use crate::base::{BaseSet, Parameterisation};
 use crate::dynamics::{Model, Motion, Parameter, ParameterLayout};
-use crate::identify::columns::ColumnPlan;
 use crate::identify::fit::{Fitter, Weighting};
 use crate::identify::options::Options;
 use crate::identify::problem::{Assembler, Problem};

@@ -132,7 +132,7 @@ pub fn instrument(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::columns::ColumnPlan;
+    use crate::base::ColumnPlan;
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
 

@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Deserialize;
 
 use super::block::Block;
-use crate::log::error::LayoutFault;
+use super::fault::LayoutFault;
 
 /// The columns of every block.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]

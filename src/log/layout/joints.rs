@@ -5,9 +5,9 @@ use std::fmt::Write as _;
 
 use serde::{Deserialize, Serialize};
 
+use super::fault::LayoutFault;
 use super::units::Angle;
 use crate::log::counting::{Counting, Place};
-use crate::log::error::LayoutFault;
 
 /// Where the joints of a recorder differ in order, sign or zero from the description of the robot; joints count from 1.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 
 use toml::{Table, Value};
 
+use super::fault::LayoutFault;
 use super::{Layout, built_in, is_file};
-use crate::log::error::{LayoutFault, LogError};
+use crate::log::error::LogError;
 
 /// Keys that a layout must have, either itself or by inheritance.
 const NEEDED: [&str; 2] = ["name", "header"];

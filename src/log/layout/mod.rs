@@ -5,6 +5,7 @@
 
 mod block;
 mod columns;
+mod fault;
 mod joints;
 mod like;
 mod units;
@@ -14,10 +15,11 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::counting::Counting;
-use super::error::{LayoutFault, LogError};
+use super::error::LogError;
 pub(super) use block::Block;
 use columns::Blocks;
 pub(super) use columns::Columns;
+pub use fault::LayoutFault;
 pub use joints::Joints;
 pub(super) use units::{Angle, AngularVelocity, TimeUnit, Units};
 

@@ -38,10 +38,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::noisy_friction::NoisyFriction;
 use super::periodic::Periodic;
-use crate::base::BaseSet;
+use crate::base::{BaseSet, ColumnPlan};
 use crate::dot::dot;
 use crate::dynamics::{Model, Motion};
-use crate::identify::{Assembler, ColumnPlan, Problem};
+use crate::identify::{Assembler, Problem};
 use crate::robot::JointSignals;
 
 /// A real frequency response as a function of the frequency in Hz.

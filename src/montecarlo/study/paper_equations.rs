@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use serde::Serialize;
 
-use crate::base::BaseSet;
+use crate::base::{BaseSet, ColumnPlan};
 use crate::dynamics::{Model, Motion};
-use crate::identify::{Assembler, ColumnPlan, Problem};
+use crate::identify::{Assembler, Problem};
 use crate::plant::Measured;
 use crate::robot::JointSignals;
 use crate::signal::{PaperDifferentiator, PaperReading, Scratch, SignalError, ZeroPhase};

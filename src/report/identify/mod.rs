@@ -229,7 +229,7 @@ impl Result {
                 Some(Doubt::contradiction(sentence))
             }
             None => {
-                let torque_nm = identification.residual().torque_nm();
+                let torque_nm = identification.residual().torque_rms_nm;
                 let doubt = Doubt::of(
                     arm,
                     set,
@@ -417,6 +417,7 @@ mod tests {
     fn a_joint_whose_torque_has_nothing_to_do_with_the_motion_is_told() {
         let fit = |relative_percent: Vec<f64>| Residual {
             rms_nm: vec![1.0; relative_percent.len()],
+            torque_rms_nm: relative_percent.iter().map(|percent| 100.0 / percent).collect(),
             relative_percent,
             e_n: 0.1,
         };

@@ -1,7 +1,8 @@
 //! Which base columns each joint's equation contains.
 
-use crate::base::{BaseSet, Terms};
-use crate::dynamics::{Model, Parameter, ParameterLayout, RegressorBlock, Workspace};
+use super::parameterisation::Terms;
+use super::set::BaseSet;
+use crate::dynamics::{Model, Motion, Parameter, ParameterLayout, RegressorBlock, Workspace};
 
 /// For every joint, the base columns that are structurally non-zero in its row of Θ_B.
 ///
@@ -13,12 +14,13 @@ pub struct ColumnPlan {
     base_count: usize,
 }
 
+/// A base column as one joint sees it.
 #[derive(Debug, Clone)]
-struct PlannedColumn {
+pub struct PlannedColumn {
     /// Index of the base parameter.
-    base: usize,
+    pub base: usize,
     /// Terms over the standard regressor's columns, non-zero for this joint only.
-    terms: Vec<(Parameter, f64)>,
+    pub terms: Vec<(Parameter, f64)>,
 }
 
 impl ColumnPlan {
@@ -26,7 +28,7 @@ impl ColumnPlan {
     pub fn new(model: &Model, set: &BaseSet) -> Self {
         let layout = ParameterLayout::new(model.dof());
         let mut block = RegressorBlock::new(model, 1);
-        let at_rest = crate::dynamics::Motion::at_rest(model.dof(), 1);
+        let at_rest = Motion::at_rest(model.dof(), 1);
         block.fill(model, &mut Workspace::new(model), &at_rest, 0..1);
         let present = |joint: usize, terms: &Terms| -> Vec<(Parameter, f64)> {
             terms
@@ -82,6 +84,11 @@ impl ColumnPlan {
     /// Number of base parameters.
     pub fn base_count(&self) -> usize {
         self.base_count
+    }
+
+    /// The columns of joint `joint`'s equation, by ascending base parameter.
+    pub fn columns(&self, joint: usize) -> &[PlannedColumn] {
+        &self.joints[joint]
     }
 
     /// Base parameters in joint `joint`'s equation, ascending.
