@@ -483,3 +483,15 @@ fn what_other_laws_imitate_is_not_named_for_certain() {
         assert!(is_named(&diagnose_along("ur5_validation", seed, &toml), kind.name(), Some(2)));
     }
 }
+
+/// Friction that falls with a power of the speed is Stribeck friction in a form of its own, and its size is that of the
+/// form.
+#[test]
+fn friction_that_falls_slowly_far_from_rest() {
+    let toml = "[[effect]]\nkind = \"stribeck\"\njoint = 3\nextra_nm = 1.6\nvs_rad_s = 0.09\nfall = \"rational\"\n";
+    let d = diagnose_along("ur5_validation", 621, toml);
+    assert!(is_named(&d, "stribeck", Some(3)));
+    assert_eq!((d.causes.len(), d.unexplained.is_some()), (1, false), "{:?}", d.sentences);
+    assert_holds(&d.causes[0], "extra_nm", 1.6);
+    assert_holds(&d.causes[0], "vs_rad_s", 0.09);
+}

@@ -133,6 +133,10 @@ fn stribeck_friction_fades_at_its_speed() {
     close(extra(-0.4), -3.0 / std::f64::consts::E, 1e-6, "at -v_s");
     close(extra(2.0), 0.0, 1e-6, "far above v_s");
     assert!(extra(0.2) > extra(0.3) && extra(0.3) > extra(0.6));
+    let rational =
+        |v| added("kind='stribeck';joint=1;extra_nm=3;vs_rad_s=0.4;fall='rational'", 0, v);
+    close(rational(0.4), 1.5, 1e-6, "half of it at v_s");
+    close(rational(-1.2), -0.3, 1e-6, "a tenth at -3 v_s");
 }
 
 #[test]

@@ -365,8 +365,14 @@ impl<'s, 'a> Kept<'s, 'a> {
             let is_taken = |(c, cause): &(usize, &Contender)| {
                 Some(*c) != open && (cause.entry.family, cause.entry.site) == place
             };
-            let most = if study.families[entry.family].is_repeatable() { MOST_ALIKE } else { 1 };
-            self.causes.iter().enumerate().filter(is_taken).count() >= most
+            let law = &study.families[entry.family];
+            let most = if law.is_repeatable() { MOST_ALIKE } else { 1 };
+            let is_same = |(_, cause): &(usize, &Contender)| {
+                !law.are_apart(&study.scene, entry.site, entry.shape, cause.entry.shape)
+            };
+            let there: Vec<(usize, &Contender)> =
+                self.causes.iter().enumerate().filter(is_taken).collect();
+            there.len() >= most || there.iter().any(is_same)
         };
         // An effect that all joints share is told from effects of single joints by majority. Beside a cause of the
         // whole arm, at most one joint may have a cause of the same family: if most joints had one, these would say in

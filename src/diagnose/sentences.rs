@@ -219,6 +219,9 @@ impl Cause {
             (false, _) if self.is_doubtful() => {
                 format!("{place} may miss {what}; other causes fit as well.")
             }
+            (false, _) if self.confidence <= EVEN_ODDS => {
+                format!("{place} may miss {what}, or something unknown that looks like it.")
+            }
             (false, _) if self.may_be_none => {
                 format!("{place} may miss {what}; as far as its size is known, there may be none.")
             }

@@ -32,6 +32,8 @@ const ONE_NUMBER: f64 = 0.05;
 /// A signal is noisy if its second differences are at least this share of its first differences (in the median): for
 /// white noise the ratio is 1.7, for smooth motion less than 0.2.
 const NOISY: f64 = 0.5;
+/// Readings that differ by less than this share of their median change are the same but for rounding.
+const SAME: f64 = 1e-4;
 /// If more than this share of the stale rows of every joint is common to all joints, the whole recorder hangs.
 const ALIKE: f64 = 0.9;
 
@@ -201,8 +203,9 @@ fn stale(y: &[f64], should_change: impl Fn(usize, f64) -> bool) -> (Vec<usize>, 
     let share = |rows: &[usize]| rows.len() as f64 / changing.len().max(1) as f64;
     let by_steps = if change > 0.0 { step / change } else { 1.0 };
     // Noise comes back to the reading before the last one as often as it stays. (Velocities that are slopes of rounded
-    // angles have coarse steps that no smallest difference shows.)
-    let comes_back = |k: &usize| *k > 1 && y[*k] == y[*k - 2] && y[*k] != y[*k - 1];
+    // angles have coarse steps that no smallest difference shows, because times are rounded as well.)
+    let comes_back =
+        |k: &usize| *k > 1 && (y[*k] - y[*k - 2]).abs() <= SAME * change && y[*k] != y[*k - 1];
     let back: Vec<usize> = changing.iter().copied().filter(comes_back).collect();
     let chance = BEYOND_CHANCE * by_steps.max(share(&back));
     if !(chance.max(LEAST_SHARE)..MOST_SHARE).contains(&share(&single)) {
@@ -279,8 +282,7 @@ mod tests {
         assert_eq!(mend(&mut half).causes, []);
     }
 
-    /// The slopes of angles in steps of 50 µrad, over five rows: no two of their values are closer than those steps make
-    /// them but for rounding, by which resolutions are told.
+    /// The slopes of angles in steps of 50 µrad, over five rows, differ by rounding from multiples of a step.
     #[test]
     fn slopes_of_rounded_angles_are_not_stale() {
         let mut record = record(4.0, 0.3);
@@ -289,8 +291,8 @@ mod tests {
         let q: Vec<f64> = record.q_rad.joint(0).iter().map(rounded).collect();
         let slope = |k: usize| (q[k - 2] - 8.0 * q[k - 1] + 8.0 * q[k + 1] - q[k + 2]) / 12.0;
         for k in 2..q.len() - 2 {
-            let step_s = record.time_s[k] - record.time_s[k - 1];
-            record.qd_rad_s.joint_mut(0)[k] = slope(k) / step_s;
+            let rounding = 1.0 + 1e-14 * (k % 3) as f64;
+            record.qd_rad_s.joint_mut(0)[k] = slope(k) / 0.008 * rounding;
         }
         record.q_rad.joint_mut(0).copy_from_slice(&q);
         assert_eq!(mend(&mut record).causes, []);

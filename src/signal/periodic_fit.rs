@@ -8,7 +8,8 @@
 //!    bands of neighbouring harmonics. S/P is the noise power of a mean coefficient.
 //! 2. Both channels measure the same series, V_h = ihω Q_h. Weighted by their noise, Q̂_h = Q̄_h + w (V̄_h/ihω − Q̄_h)
 //!    with w = S_q / (S_q + S_v/(hω)²) has the variance v_h = w S_v / (P (hω)²). Slow harmonics come from the angle,
-//!    fast ones from the velocity.
+//!    fast ones from the velocity. A velocity whose scatter follows that of the angle was computed from it and is no
+//!    second measurement: the series is then that of the angle alone.
 //! 3. The series contains at least all bands up to the last one whose energy exceeds the noise. In a band of B
 //!    harmonics without motion, the ratio of P Σ|Ȳ_h|²/B to ΣS_h/B follows F(2B, 2B(P − 1)) for Gaussian noise of any
 //!    smooth spectrum. Angle and velocity are both tested, at a level at which one joint in a hundred keeps a band too
@@ -57,6 +58,10 @@ pub const SERIES_END: f64 = 0.32;
 /// stands out of the noise of a fast log up to much higher frequencies, but there the noise in q̈, which grows with the
 /// square of the frequency, outweighs it.
 const ACCELERATION_HZ: f64 = 25.0;
+
+/// Coherence of the scatter of angle and velocity ([`Spectra::coherence`]) from which on the velocity was computed from
+/// the angle. Two sensors have 0.04 along four periods, and 0.13 along two.
+const COMPUTED: f64 = 0.9;
 
 /// Working memory of [`PeriodicFit::fit`], one per thread.
 #[derive(Default)]
@@ -288,6 +293,9 @@ impl PeriodicFit {
         let FitScratch { time, fft, q, qd, .. } = scratch;
         self.analyse(q_rad.joint(j), time, fft, q);
         self.analyse(qd_rad_s.joint(j), time, fft, qd);
+        if q.coherence(qd, &self.bands) > COMPUTED {
+            qd.silence();
+        }
         Ok(())
     }
 
@@ -337,7 +345,10 @@ impl PeriodicFit {
             let weight = |w: f64| weight(noise_q, noise_qd, w);
             let frequencies = band.harmonics.clone().map(|h| (h, self.angular_frequency(h)));
             // Mean square of the noise in q̇ at a harmonic.
-            let in_qd = |w: f64| 2.0 * weight(w) * noise_qd / periods;
+            let in_qd = |w: f64| match noise_qd.is_finite() {
+                true => 2.0 * weight(w) * noise_qd / periods,
+                false => 2.0 * w * w * noise_q / periods,
+            };
             let added = frequencies.clone().fold([0.0; 2], |[v, a], (_, w)| {
                 let noise = in_qd(w);
                 [v + noise, a + w * w * noise]
@@ -402,195 +413,4 @@ fn check_finite(what: &'static str, y: &JointSignals, joint: usize) -> Result<()
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use rand::{SeedableRng, rngs::ChaCha8Rng};
-    use rand_distr::{Distribution, StandardNormal};
-
-    const RATE_HZ: f64 = 125.0;
-
-    /// A five-harmonic motion of `joints` joints: angle, velocity, acceleration at time t.
-    fn motion(joint: usize, t: f64, period_s: f64) -> [f64; 3] {
-        (1..=5).fold([0.4 * joint as f64, 0.0, 0.0], |[q, qd, qdd], h| {
-            let w = 2.0 * PI * h as f64 / period_s;
-            let (s, c) = (w * t + (joint * h) as f64).sin_cos();
-            let a = 0.5 / h as f64;
-            [q + a * s, qd + a * w * c, qdd - a * w * w * s]
-        })
-    }
-
-    fn record(n: usize, p: usize, sigma: [f64; 2], seed: u64) -> [JointSignals; 2] {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut noise = || -> f64 { StandardNormal.sample(&mut rng) };
-        [0, 1].map(|i| {
-            JointSignals::from_fn(6, n * p, |j, k| {
-                motion(j, k as f64 / RATE_HZ, n as f64 / RATE_HZ)[i] + sigma[i] * noise()
-            })
-        })
-    }
-
-    fn rms_error(found: &JointSignals, j: usize, which: usize) -> f64 {
-        let n = found.samples();
-        let square: f64 = (0..n)
-            .map(|k| motion(j, k as f64 / RATE_HZ, n as f64 / RATE_HZ)[which])
-            .zip(found.joint(j))
-            .map(|(truth, value)| (value - truth).powi(2))
-            .sum();
-        (square / n as f64).sqrt()
-    }
-
-    #[test]
-    fn without_noise_the_derivatives_are_exact_to_rounding() {
-        for n in [1250, 1251] {
-            let [q, qd] = record(n, 3, [0.0, 0.0], 0);
-            let fit = PeriodicFit::new(n, 3, RATE_HZ).unwrap();
-            let m = fit.fit(&q, &qd, &mut FitScratch::default()).unwrap();
-            for j in 0..6 {
-                assert!(m.harmonics[j] >= 5);
-                // Rounding of a coefficient, 1e-16, grows by ω and ω² of the highest harmonic.
-                let w = fit.angular_frequency(n / 2);
-                assert!(rms_error(&m.q_rad, j, 0) < 1e-14);
-                assert!(rms_error(&m.qd_rad_s, j, 1) < 1e-15 * (10.0 + w));
-                assert!(rms_error(&m.qdd_rad_s2, j, 2) < 1e-15 * (100.0 + w * w));
-            }
-        }
-    }
-
-    /// Every period separately: without noise it is the motion; with noise the periods scatter about their own mean,
-    /// which the fit of all periods is close to.
-    #[test]
-    fn each_period_is_the_motion_with_its_own_noise() {
-        let (n, p) = (1250, 4);
-        let fit = PeriodicFit::new(n, p, RATE_HZ).unwrap();
-        let mut scratch = FitScratch::default();
-        let [q, qd] = record(n, p, [0.0, 0.0], 0);
-        let each = fit.each_period(&q, &qd, 0.32, &mut scratch).unwrap();
-        for (which, found) in each.iter().enumerate() {
-            // Rounding, 1e-16 of an angle, grows by ω ≤ 2π 0.32 · 125 rad/s per derivative.
-            let limit = 1e-14 * 251.0f64.powi(which as i32);
-            for (j, k) in (0..6).flat_map(|j| (0..n * p).map(move |k| (j, k))) {
-                let truth = motion(j, k as f64 / RATE_HZ, n as f64 / RATE_HZ)[which];
-                assert!((found.joint(j)[k] - truth).abs() < limit, "joint {j}, sample {k}");
-            }
-        }
-        let [q, qd] = record(n, p, [2e-5, 1e-3], 1);
-        let [found, ..] = fit.each_period(&q, &qd, 0.32, &mut scratch).unwrap();
-        let mean = fit.fit(&q, &qd, &mut scratch).unwrap().q_rad;
-        // Angle and velocity together have the variance 1/(1/σ_q² + ω²/σ_q̇²) per harmonic. For each harmonic the fit
-        // contains the mean of the periods, or nothing: (P − 1)/P of the variance, or all of it, is scatter. Some 650
-        // degrees of freedom determine the rms of a joint to 2.8 %; the limit is four times that, one seed in 2000.
-        let variance =
-            |h: usize| 1.0 / (2e-5f64.powi(-2) + (fit.angular_frequency(h) / 1e-3).powi(2));
-        let highest = (0.32 * n as f64) as usize;
-        let expected = (2.0 / n as f64 * (1..=highest).map(variance).sum::<f64>()).sqrt();
-        let least = expected * (1.0 - 1.0 / p as f64).sqrt();
-        for j in 0..6 {
-            let scatter = |k: usize| found.joint(j)[k] - mean.joint(j)[k % n];
-            let rms = ((0..n * p).map(|k| scatter(k).powi(2)).sum::<f64>() / (n * p) as f64).sqrt();
-            assert!(
-                rms > 0.89 * least && rms < 1.11 * expected,
-                "joint {j}: {rms:e}, {expected:e}"
-            );
-        }
-    }
-
-    /// The error of the acceleration agrees with the predicted one.
-    #[test]
-    fn with_noise_the_claimed_noise_of_the_acceleration_holds() {
-        let (n, p) = (1250, 8);
-        let fit = PeriodicFit::new(n, p, RATE_HZ).unwrap();
-        let mut scratch = FitScratch::default();
-        let mut ratio = 0.0;
-        let mut too_noisy = 0;
-        const TRIALS: u64 = 40;
-        for seed in 0..TRIALS {
-            let [q, qd] = record(n, p, [2e-5, 1e-3], seed);
-            let m = fit.fit(&q, &qd, &mut scratch).unwrap();
-            for j in 0..6 {
-                let noise = m.acceleration[j].noise.iter().sum::<f64>();
-                let square = (0..n)
-                    .map(|k| motion(j, k as f64 / RATE_HZ, n as f64 / RATE_HZ)[2].powi(2))
-                    .sum::<f64>()
-                    / n as f64;
-                assert!(m.harmonics[j] > 5);
-                too_noisy += usize::from(noise > 1.1 * FREE_NOISE * square);
-                ratio += rms_error(&m.qdd_rad_s2, j, 2).powi(2) / noise;
-            }
-        }
-        // 100 harmonics and more are 200 normal numbers, unevenly weighted (ω²): about 110 effective
-        // ones, relative sd of the mean square √(2/110/240) = 0.9 %; 5 sd.
-        let mean = ratio / (6 * TRIALS) as f64;
-        assert!((mean - 1.0).abs() < 0.045, "squared error / claimed variance = {mean}");
-        // 240 joints, each with a probability of 1 % of keeping a band of pure noise: more than 9 of them in 5e-4 of
-        // the runs.
-        assert!(too_noisy <= 9, "{too_noisy} of 240 joints kept too much noise");
-    }
-
-    /// The deviations of the periods from their mean predict the error of the mean.
-    #[test]
-    fn deviations_over_the_root_of_the_periods_are_the_errors_of_the_mean() {
-        const TRIALS: u64 = 40;
-        let (n, p) = (1250, 8);
-        let fit = PeriodicFit::new(n, p, RATE_HZ).unwrap();
-        let mut scratch = FitScratch::default();
-        let (mut errors, mut claimed) = ([0.0; 3], [0.0; 3]);
-        for seed in 0..TRIALS {
-            let [q, qd] = record(n, p, [2e-5, 1e-3], seed);
-            let mean = fit.fit(&q, &qd, &mut scratch).unwrap();
-            let deviations = fit.deviations(&q, &qd, &mut scratch).unwrap();
-            let means = [&mean.q_rad, &mean.qd_rad_s, &mean.qdd_rad_s2];
-            for (which, (mean, off)) in means.into_iter().zip(&deviations).enumerate() {
-                for j in 0..6 {
-                    errors[which] += n as f64 * rms_error(mean, j, which).powi(2);
-                    claimed[which] += off.joint(j).iter().map(|d| d * d).sum::<f64>();
-                    let sum: f64 = off.joint(j).iter().skip(7).step_by(n).sum();
-                    assert!(sum.abs() < 1e-10, "deviations of joint {j} sum to {sum:e}");
-                }
-            }
-        }
-        // 240 joints with at least 16 numbers of similar weight (slow harmonics for the angle, fast ones for the
-        // acceleration): the errors' mean square has a relative sd of √(2/16/240) = 2.3 %, the claim 0.9 %; the limit
-        // is 5 sd.
-        for (errors, claimed) in errors.into_iter().zip(claimed) {
-            let ratio = errors / (claimed / (p * (p - 1)) as f64);
-            assert!((ratio - 1.0).abs() < 0.12, "squared error over claim: {ratio}");
-        }
-    }
-
-    /// Above the last visible band of the motion, harmonics are added only while their noise is negligible.
-    #[test]
-    fn much_noise_ends_the_series_with_the_motion() {
-        let (n, p) = (1250, 8);
-        let fit = PeriodicFit::new(n, p, RATE_HZ).unwrap();
-        let mut too_many = 0;
-        for seed in 0..40 {
-            let [q, qd] = record(n, p, [1e-2, 3e-1], seed);
-            let m = fit.fit(&q, &qd, &mut FitScratch::default()).unwrap();
-            too_many += m.harmonics.iter().filter(|h| **h != BAND_HARMONICS).count();
-        }
-        // 240 joints with a probability of 1 % each: more than 9 of them in 5e-4 of the runs.
-        assert!(too_many <= 9, "{too_many} of 240 joints kept a band of pure noise");
-    }
-
-    #[test]
-    fn what_cannot_be_fitted_is_refused() {
-        assert!(matches!(PeriodicFit::new(100, 1, 125.0), Err(SignalError::Periods { .. })));
-        assert!(matches!(PeriodicFit::new(4, 2, 125.0), Err(SignalError::TooFewSamples { .. })));
-        let fit = PeriodicFit::new(100, 2, 125.0).unwrap();
-        let short = JointSignals::zeros(6, 199);
-        let mut scratch = FitScratch::default();
-        assert!(matches!(
-            fit.fit(&short, &short, &mut scratch),
-            Err(SignalError::Mismatch { expected: 200, found: 199, .. })
-        ));
-        let good = JointSignals::zeros(6, 200);
-        let still = fit.fit(&good, &good, &mut scratch).unwrap();
-        assert_eq!(still.harmonics, [0; 6]);
-        let mut bad = good.clone();
-        bad.joint_mut(4)[17] = f64::NAN;
-        assert!(matches!(
-            fit.fit(&good, &bad, &mut scratch),
-            Err(SignalError::NotFinite { what: "velocity", joint: 4, sample: 17, .. })
-        ));
-    }
-}
+mod tests;

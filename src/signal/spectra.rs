@@ -53,6 +53,9 @@ const READ_AGAIN: f64 = 0.05;
 /// velocity, and where a joint reverses a tenth of a Nm that looks like friction.
 const UNSEEN: f64 = 16.0;
 
+/// Periods whose scatter is less than this share of their power are alike but for the last digits.
+const ALIKE: f64 = 1e-20;
+
 /// Variance of the rounding error that is the same in every period.
 ///
 /// `y` is a signal with periods of `n` samples whose noise has the variance `noise`. For readings in steps Δ the
@@ -125,6 +128,40 @@ impl Spectra {
     pub(super) fn noise(&self, band: &RangeInclusive<usize>) -> f64 {
         let scatter = &self.scatter[band.clone()];
         (scatter.iter().sum::<f64>() / scatter.len() as f64).max(self.floor)
+    }
+
+    /// How much of the scatter of `other` follows this one's through some filter: |Σ D*E|² over Σ|D|² Σ|E|², D and E being
+    /// the deviations of both from their means, summed over all periods and the harmonics of a band, and pooled over the
+    /// fastest third of the `bands`, where no arm moves. 1 for a signal that was computed from the other, about
+    /// 1/(8 (P − 1)) for two sensors. Of periods that are alike to the last digit, the coefficients themselves are
+    /// compared: what they have there is rounding.
+    pub(super) fn coherence(&self, other: &Self, bands: &[Band]) -> f64 {
+        let bins = self.mean.len();
+        let power = self.mean.iter().map(|c| c.norm_sqr()).sum::<f64>();
+        let are_alike = self.scatter.iter().sum::<f64>() < ALIKE * power;
+        let mean = |of: &Self, h: usize| if are_alike { Complex64::ZERO } else { of.mean[h] };
+        let (mut common, mut all) = (0.0, 0.0);
+        for Band { harmonics, .. } in &bands[2 * bands.len() / 3..] {
+            let (mut cross, mut squares) = (Complex64::ZERO, [0.0; 2]);
+            for (own, others) in
+                self.periods.chunks_exact(bins).zip(other.periods.chunks_exact(bins))
+            {
+                for h in harmonics.clone() {
+                    let (d, e) = (own[h] - mean(self, h), others[h] - mean(other, h));
+                    cross += d.conj() * e;
+                    squares = [squares[0] + d.norm_sqr(), squares[1] + e.norm_sqr()];
+                }
+            }
+            common += cross.norm_sqr();
+            all += squares[0] * squares[1];
+        }
+        if all > 0.0 { common / all } else { 0.0 }
+    }
+
+    /// Takes away all that the signal tells: its noise becomes infinite.
+    pub(super) fn silence(&mut self) {
+        self.floor = f64::INFINITY;
+        self.is_coarse = false;
     }
 
     /// Whether the energy of the mean in the band exceeds what noise explains.

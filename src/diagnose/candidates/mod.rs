@@ -25,7 +25,7 @@ mod reversal_width;
 pub(super) mod ripple;
 mod saturation;
 mod spring;
-mod stribeck;
+pub(super) mod stribeck;
 mod thermal_drift;
 pub(super) mod time_skew;
 mod torque_gain;
@@ -140,6 +140,11 @@ pub trait Candidate: Sync {
     /// Whether one joint may have several effects of this family, with different shapes.
     fn is_repeatable(&self) -> bool {
         false
+    }
+
+    /// Whether a motion tells effects with these shapes on one joint from each other, for repeatable families.
+    fn are_apart(&self, _scene: &Scene, _site: Option<usize>, _one: Shape, _other: Shape) -> bool {
+        true
     }
 
     /// Whether the effect changes how reversals of its joint look in the log. Beside such an effect, the log no longer

@@ -6,6 +6,7 @@
 //! that the drive answers, or that is in its current only, is in the recorded torque at every sample (variant 1).
 
 use super::*;
+use crate::diagnose::rms::rms_where;
 use crate::dynamics::{Lanes, Real};
 
 /// See the module.
@@ -81,6 +82,11 @@ impl Candidate for Ripple {
         true
     }
 
+    /// Orders that differ by less than two cycles over the joint's range are one, which is refined by half a cycle.
+    fn are_apart(&self, scene: &Scene, site: Option<usize>, one: Shape, other: Shape) -> bool {
+        (one.value - other.value).abs() >= 2.0 * order_spacing(scene, joint(site))
+    }
+
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let j = joint(site);
         if shape.variant == OF_THE_DRIVE {
@@ -119,6 +125,13 @@ impl Candidate for Ripple {
 
     fn separating_experiment(&self) -> &'static str {
         "constant speed over a whole turn at two speeds: the order per turn stays"
+    }
+
+    /// A ripple as large as all the torque of its joint is none: it stands in for something else that depends on the
+    /// angle.
+    fn is_its_own(&self, scene: &Scene, site: Option<usize>, _: Shape, b: &[f64]) -> bool {
+        let torque_nm = rms_where(scene.torque_nm.joint(joint(site)), |_| true);
+        b[0].hypot(second(b)) < torque_nm
     }
 
     fn in_words(&self) -> &'static str {

@@ -1,5 +1,6 @@
 //! Friction that falls with speed near rest: τ = F e^{−(|q̇|/v_s)ⁿ} sign q̇, n = 2 or 1 (Stribeck 1902;
-//! Armstrong-Hélouvry, Dupont and Canudas de Wit 1994).
+//! Armstrong-Hélouvry, Dupont and Canudas de Wit 1994). Where it is found, τ = F/(1 + (q̇/v_s)²) sign q̇ is tried as well
+//! (Hess and Soom 1990): it falls from rest as the first does, and more slowly than either farther on.
 //!
 //! Where friction turns round, a joint does not move as its samples say ([`Scene::turning_rad_s`]): this friction,
 //! added to the joint's own, bends its velocity. Its size is not known before the fit. The columns are therefore
@@ -10,6 +11,14 @@ use crate::dynamics::Real;
 
 /// See the module.
 pub struct Stribeck;
+
+/// Variant with n = 1.
+pub const STEEP_AT_REST: usize = 1;
+/// Variant that falls with a power of the speed.
+pub const RATIONAL: usize = 2;
+/// Widths that are tried for the latter, in those of the curve that was found: it has half its height at v_s, the others
+/// at 0.83 and 0.69 v_s.
+const WIDTHS_OF_RATIONAL: [f64; 3] = [0.4, 0.8, 1.6];
 
 /// Assumed ratio F/F_c of the extra friction near rest to the joint's own, for simulating its reversals. A few tenths
 /// to one are typical. Between 0.2 and 0.8, the reversal moves estimates of F by 4 %; between zero and 0.2, by more
@@ -42,7 +51,11 @@ const AT_THE_END: f64 = 1.25;
 #[inline(always)]
 fn usual(shape: Shape, epsilon_rad_s: f64, v: f64) -> f64 {
     let x = v.abs() / shape.value;
-    let more = Real::exp(-if shape.variant == 0 { x * x } else { x });
+    let more = match shape.variant {
+        RATIONAL => 1.0 / (1.0 + x * x),
+        STEEP_AT_REST => Real::exp(-x),
+        _ => Real::exp(-x * x),
+    };
     Real::tanh(v / epsilon_rad_s) * (1.0 + USUAL_SHARE * more)
 }
 
@@ -54,12 +67,18 @@ impl Candidate for Stribeck {
     fn shapes(&self, scene: &Scene, site: Option<usize>) -> Vec<Shape> {
         // Up to twice the widest, to see where the search would end.
         let epsilon = scene.width_rad_s(joint(site));
-        (0..2)
+        (0..=STEEP_AT_REST)
             .flat_map(|variant| {
                 geometric(NARROWEST * epsilon, 2.0 * WIDEST * epsilon, 8)
                     .map(move |value| Shape { variant, value })
             })
             .collect()
+    }
+
+    fn finer_shapes(&self, _: &Scene, _: Option<usize>, shape: Shape) -> Vec<Shape> {
+        WIDTHS_OF_RATIONAL
+            .map(|width| Shape { variant: RATIONAL, value: width * shape.value })
+            .to_vec()
     }
 
     fn search(&self) -> Search {
@@ -125,6 +144,10 @@ impl Candidate for Stribeck {
     }
 
     fn form(&self, _: &Scene, shape: Shape) -> Option<&'static str> {
-        Some(if shape.variant == 0 { "extra exp(-(v/vs)^2)" } else { "extra exp(-v/vs)" })
+        Some(match shape.variant {
+            RATIONAL => "extra/(1+(v/vs)^2)",
+            STEEP_AT_REST => "extra exp(-v/vs)",
+            _ => "extra exp(-(v/vs)^2)",
+        })
     }
 }

@@ -6,9 +6,10 @@
 use crate::diagnose::Kind;
 use crate::diagnose::candidates::elasticity::ON_MOTOR;
 use crate::diagnose::candidates::load_friction::{MOTOR_SIDE, ROTOR};
+use crate::diagnose::candidates::stribeck::{RATIONAL, STEEP_AT_REST};
 use crate::diagnose::candidates::time_skew::LOW_PASS;
 use crate::plant::PlantConfig;
-use crate::plant::faults::{self, Effect};
+use crate::plant::faults::{self, Effect, Fall};
 
 /// What happens to a cause when the simulation is extended by it.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,7 +76,8 @@ impl Found<'_> {
                 joint: self.joint?,
                 extra_nm: value("extra_nm")?,
                 vs_rad_s: value("vs_rad_s")?,
-                exponent: if self.variant == 0 { 2 } else { 1 },
+                exponent: if self.variant == STEEP_AT_REST { 1 } else { 2 },
+                fall: if self.variant == RATIONAL { Fall::Rational } else { Fall::Exponential },
             })),
             // Laws that the plant does not have. Most of them are fitted to single runs only.
             Kind::NonlinearViscous if value("speed_rad_s").is_some() => {

@@ -10,7 +10,7 @@ use crate::diagnose::Kind;
 use crate::plant::SensorConfig;
 use crate::plant::faults::{
     AsymmetricFriction, Backlash, BaseTilt, ClockFault, Contact, CurrentOffset, DroppedSamples,
-    Effect, Elasticity, EncoderOffset, EncoderSide, FeedForward, FrictionChange, Gravity,
+    Effect, Elasticity, EncoderOffset, EncoderSide, Fall, FeedForward, FrictionChange, Gravity,
     LinkLength, LoadFriction, NonlinearViscous, Outliers, Payload, PositionFriction, Presliding,
     Quantisation, ReadingChannel, ReversalWidth, Ripple, Saturation, Spring, Stribeck,
     ThermalDrift, TimeSkew, TorqueGain, VelocityLag,
@@ -204,7 +204,8 @@ impl Family {
             Kind::Stribeck => {
                 let vs_rad_s = log_uniform(rng, [0.03, 0.3]);
                 Recipe::linear(0.1 * coulomb, 0.8 * coulomb, move |s| {
-                    Effect::Stribeck(Stribeck { joint, extra_nm: s, vs_rad_s, exponent: 2 })
+                    let fall = Fall::Exponential;
+                    Effect::Stribeck(Stribeck { joint, extra_nm: s, vs_rad_s, exponent: 2, fall })
                 })
             }
             Kind::NonlinearViscous => {

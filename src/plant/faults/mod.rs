@@ -17,7 +17,7 @@
 //!
 //! | kind | acts in | keys besides `joint` |
 //! |---|---|---|
-//! | [`stribeck`](Stribeck) | friction | `extra_nm`, `vs_rad_s`, (`exponent`) |
+//! | [`stribeck`](Stribeck) | friction | `extra_nm`, `vs_rad_s`, (`exponent`, `fall`) |
 //! | [`nonlinear_viscous`](NonlinearViscous) | friction | `amplitude_nm`, `exponent` |
 //! | [`asymmetric_friction`](AsymmetricFriction) | friction | `coulomb_nm`, `viscous_nm_s_rad` |
 //! | [`load_friction`](LoadFriction) | friction | `mu` |
@@ -64,7 +64,7 @@ pub use drive::{CurrentOffset, FeedForward, Saturation, TorqueGain};
 pub use drivetrain::HiddenDrivetrain;
 pub use effect::Effect;
 pub use friction::{
-    AsymmetricFriction, FrictionChange, LoadFriction, NonlinearViscous, PositionFriction,
+    AsymmetricFriction, Fall, FrictionChange, LoadFriction, NonlinearViscous, PositionFriction,
     Presliding, ReversalWidth, Stribeck, ThermalDrift,
 };
 pub use gear::{Backlash, Elasticity, EncoderSide, Ripple};

@@ -17,7 +17,7 @@ pub use nonlinear_viscous::NonlinearViscous;
 pub use position_friction::PositionFriction;
 pub use presliding::Presliding;
 pub use reversal_width::ReversalWidth;
-pub use stribeck::Stribeck;
+pub use stribeck::{Fall, Stribeck};
 pub use thermal_drift::ThermalDrift;
 
 use super::effect::{Complaint, require};
@@ -33,7 +33,7 @@ const MOST_WARM_MU: f64 = 0.65;
 ///
 /// ```text
 /// τ_f = (1 + φ Θ) · [ rv q̇ + c(q, q̇, L) z + Σ A |q̇|ᵖ s + a z² + b |q̇| ]
-/// c   = rc + Σ d exp(−|q̇/v_s|ⁿ) + Σ P cos(q + ψ) + μ |L|
+/// c   = rc + Σ d(q̇) + Σ P cos(q + ψ) + μ |L|
 /// s   = tanh(q̇/ε);   z = s, or the bristle's state with presliding, whose damping adds (c − μ |L|) T ż
 /// ```
 #[derive(Debug, Clone)]
@@ -119,7 +119,7 @@ impl Friction {
     fn level_nm(&self, q_rad: f64, qd_rad_s: f64, load_nm: f64) -> f64 {
         let mut level = self.coulomb_nm + self.mu * load_nm.abs();
         for part in &self.stribeck {
-            level += part.extra_nm * (-(qd_rad_s / part.vs_rad_s).abs().powi(part.exponent)).exp();
+            level += part.level_nm(qd_rad_s);
         }
         for part in &self.positions {
             level += part.amplitude_nm * (q_rad + part.phase_rad).cos();
@@ -195,9 +195,18 @@ mod tests {
     #[test]
     fn slopes_beside_presliding_are_bounds() {
         let drive = crate::robot::Arm::built_in("ur5").unwrap().joints[0].drive;
-        for (exponent, damping_s) in [(1, 0.0), (2, 0.0), (2, 0.01)] {
+        let (exp, rational) = (Fall::Exponential, Fall::Rational);
+        let cases =
+            [(1, exp, 0.0), (2, exp, 0.0), (2, exp, 0.01), (1, rational, 0.0), (2, rational, 0.0)];
+        for (exponent, fall, damping_s) in cases {
             let friction = Friction {
-                stribeck: vec![Stribeck { joint: 1, extra_nm: 2.0, vs_rad_s: 0.01, exponent }],
+                stribeck: vec![Stribeck {
+                    joint: 1,
+                    extra_nm: 2.0,
+                    vs_rad_s: 0.01,
+                    exponent,
+                    fall,
+                }],
                 asymmetric_nm: 1.5,
                 presliding: Some(Presliding { damping_s, ..Presliding::new(1, 1e3) }),
                 ..Friction::nominal(&drive, 0.02)
