@@ -1,8 +1,9 @@
 //! Alternatives to a cause that was kept: its class, its rivals and other forms of its own law, and how certain its
 //! name is.
 
+use super::contenders::{Contender, SHARED};
 use super::extension::Effect;
-use super::selection::{Contender, FINALISTS, Kept, SHARED};
+use super::selection::{FINALISTS, Kept};
 use super::statistic::Score;
 use super::study::Entry;
 

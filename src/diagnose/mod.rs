@@ -27,6 +27,7 @@ mod cleaned;
 mod clustered;
 mod common_motion;
 mod contact;
+mod contenders;
 mod data_faults;
 mod detection_limits;
 mod diagnoser;

@@ -5,11 +5,12 @@
 //! where readings are cut off.
 
 use super::contact::{self, BesideModel};
+use super::contenders::Contender;
 use super::error::DiagnoseError;
 use super::extension::{Extension, tell_friction};
 use super::kind::Kind;
 use super::scene::OtherFriction;
-use super::selection::{Contender, Found, Kept};
+use super::selection::{Found, Kept};
 use super::significance::FAR_AHEAD;
 use super::study::{Entry, Place, Study};
 use crate::base::BaseSet;

@@ -3,8 +3,9 @@
 
 use super::candidates::Shape;
 use super::chance;
+use super::contenders::Contender;
 use super::image::{Image, Span};
-use super::selection::{Contender, Kept};
+use super::selection::Kept;
 use super::study::{Entry, LEAST_GAIN};
 
 /// A coefficient rules a law out as the family's own only if it still does so this many σ to either side.
