@@ -18,7 +18,7 @@ use crate::robot::{Arm, JointSignals};
 use crate::signal::{SignalError, ZeroPhase, mean_period};
 
 /// Most rounds of causes and estimate.
-const ROUNDS: usize = 8;
+const ROUNDS: usize = 4;
 /// A round that gains less than this, in 2 ln of the evidence, changes nothing that counts.
 const SETTLED: f64 = 4.0;
 /// Least number of rounds where one law multiplies the friction of others by 1 + f. Their sizes are those of the round

@@ -2,17 +2,14 @@
 
 use crate::median::sigma_of_changes;
 
-/// Values of a series that differ by less than this share of the largest one differ by rounding. Slopes of rounded angles
-/// differ by 1e-11 of it from multiples of their step, because their times are rounded as well.
-const ROUNDING: f64 = 1e-9;
-
 /// The resolution of a series as recorded: the smallest distance between two different values. Zero for a constant.
 pub fn resolution(series: &[f64]) -> f64 {
     let mut values = series.to_vec();
     values.sort_by(f64::total_cmp);
     let scale =
         [values.first(), values.last()].into_iter().flatten().fold(0.0, |s: f64, v| s.max(v.abs()));
-    let distances = values.windows(2).map(|v| v[1] - v[0]).filter(|d| *d > ROUNDING * scale);
+    // Values that differ only by rounding count as equal.
+    let distances = values.windows(2).map(|v| v[1] - v[0]).filter(|d| *d > 1e-12 * scale);
     let smallest = distances.fold(f64::INFINITY, f64::min);
     if smallest.is_finite() { smallest } else { 0.0 }
 }

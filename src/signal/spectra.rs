@@ -53,6 +53,8 @@ const READ_AGAIN: f64 = 0.05;
 /// velocity, and where a joint reverses a tenth of a Nm that looks like friction.
 const UNSEEN: f64 = 16.0;
 
+/// Energy of the mean coefficients over that of their noise below which they are noise: it is 1 without motion.
+const NO_MOTION: f64 = 4.0;
 /// Periods whose scatter is less than this share of their power are alike but for the last digits.
 const ALIKE: f64 = 1e-20;
 
@@ -84,6 +86,8 @@ pub(super) struct Spectra {
     pub(super) scatter: Vec<f64>,
     /// Lower bound of the noise power of a coefficient, for errors that no scatter between periods shows: rounding.
     floor: f64,
+    /// Power of a coefficient due to rounding that repeats.
+    rounding: f64,
     /// Whether the rounding that repeats exceeds the scatter between periods.
     pub(super) is_coarse: bool,
 }
@@ -112,7 +116,9 @@ impl Spectra {
         let digits = (8.0 * f64::EPSILON).powi(2) * power * (1.0 / n as f64);
         let noise = n as f64 / bins as f64 * self.scatter.iter().sum::<f64>();
         // Averaging divides the scatter by P but leaves the repeated rounding whole, hence the factor P.
-        let repeated = count as f64 * repeated_rounding(y, n, noise);
+        let rounding = repeated_rounding(y, n, noise);
+        self.rounding = rounding / n as f64;
+        let repeated = count as f64 * rounding;
         self.is_coarse = repeated > noise;
         self.floor = digits.max(UNSEEN * repeated / n as f64).max(f64::MIN_POSITIVE.sqrt());
     }
@@ -134,12 +140,15 @@ impl Spectra {
     /// the deviations of both from their means, summed over all periods and the harmonics of a band, and pooled over the
     /// fastest third of the `bands`, where no arm moves. 1 for a signal that was computed from the other, about
     /// 1/(8 (P − 1)) for two sensors. Of periods that are alike to the last digit, the coefficients themselves are
-    /// compared: what they have there is rounding.
+    /// compared: what they have there is rounding. 0 where the signal has more than noise and rounding there: both then
+    /// show the same motion.
     pub(super) fn coherence(&self, other: &Self, bands: &[Band]) -> f64 {
         let bins = self.mean.len();
         let power = self.mean.iter().map(|c| c.norm_sqr()).sum::<f64>();
         let are_alike = self.scatter.iter().sum::<f64>() < ALIKE * power;
         let mean = |of: &Self, h: usize| if are_alike { Complex64::ZERO } else { of.mean[h] };
+        let count = self.periods.len() as f64 / bins as f64;
+        let (mut energy, mut noise) = (0.0, 0.0);
         let (mut common, mut all) = (0.0, 0.0);
         for Band { harmonics, .. } in &bands[2 * bands.len() / 3..] {
             let (mut cross, mut squares) = (Complex64::ZERO, [0.0; 2]);
@@ -154,8 +163,12 @@ impl Spectra {
             }
             common += cross.norm_sqr();
             all += squares[0] * squares[1];
+            for h in harmonics.clone() {
+                energy += count * self.mean[h].norm_sqr();
+                noise += self.scatter[h] + count * self.rounding;
+            }
         }
-        if all > 0.0 { common / all } else { 0.0 }
+        if all > 0.0 && energy < NO_MOTION * noise { common / all } else { 0.0 }
     }
 
     /// Takes away all that the signal tells: its noise becomes infinite.

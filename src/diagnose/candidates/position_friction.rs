@@ -59,9 +59,18 @@ impl Candidate for PositionFriction {
         "the same motion with another payload or on a tilted base: this friction stays where it was"
     }
 
-    /// A variation of more than [`MOST`] means that the law of something else is curved, seen over a small arc.
-    fn is_its_own(&self, scene: &Scene, site: Option<usize>, _: Shape, b: &[f64]) -> bool {
-        !scene.periodic || b[0].hypot(second(b)) < MOST * scene.coulomb_nm[joint(site)]
+    /// A variation of more than [`MOST`] means that the law of something else is curved, seen over a small arc. The
+    /// Coulomb friction of the scene may hold the mean of this law along the motion, if it was estimated without it.
+    fn is_its_own(&self, scene: &Scene, site: Option<usize>, shape: Shape, b: &[f64]) -> bool {
+        let j = joint(site);
+        let q_rad = scene.motion.q_rad.joint(j);
+        let of_angle = |q: &f64| {
+            let (sin, cos) = (q - shape.value).sin_cos();
+            b[0] * sin + second(b) * cos
+        };
+        let mean_nm = q_rad.iter().map(of_angle).sum::<f64>() / q_rad.len() as f64;
+        let level_nm = scene.coulomb_nm[j] - mean_nm.min(0.0);
+        !scene.periodic || b[0].hypot(second(b)) < MOST * level_nm
     }
 
     fn in_words(&self) -> &'static str {

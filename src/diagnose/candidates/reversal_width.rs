@@ -20,7 +20,7 @@ pub struct ReversalWidth;
 /// Two widths this close, as a share of ε, count as one: the difference quotient is then the derivative of the law.
 const APART: f64 = 1e-3;
 /// Starting values of w − ε, as shares of ε.
-const CHANGES: [f64; 11] = [-0.9, -0.8, -0.6, -0.35, -0.15, 0.15, 0.4, 0.8, 1.6, 3.2, 6.4];
+const CHANGES: [f64; 12] = [-0.9, -0.8, -0.6, -0.35, -0.15, 0.15, 0.4, 0.8, 1.6, 3.2, 6.4, 12.8];
 /// Possible ratios of coefficient to shape. All dry friction of a joint turns round, and the ratio of an estimate is
 /// off by less than this.
 const WHOLE: std::ops::RangeInclusive<f64> = 0.4..=2.5;

@@ -20,6 +20,9 @@ pub const RATIONAL: usize = 2;
 /// at 0.83 and 0.69 v_s.
 const WIDTHS_OF_RATIONAL: [f64; 3] = [0.4, 0.8, 1.6];
 
+/// Its narrowest, in widths of the regularised sign: a narrower one also looks like a sign that turns round faster.
+const NARROWEST_RATIONAL: f64 = 2.5;
+
 /// Assumed ratio F/F_c of the extra friction near rest to the joint's own, for simulating its reversals. A few tenths
 /// to one are typical. Between 0.2 and 0.8, the reversal moves estimates of F by 4 %; between zero and 0.2, by more
 /// than their σ.
@@ -75,10 +78,11 @@ impl Candidate for Stribeck {
             .collect()
     }
 
-    fn finer_shapes(&self, _: &Scene, _: Option<usize>, shape: Shape) -> Vec<Shape> {
-        WIDTHS_OF_RATIONAL
-            .map(|width| Shape { variant: RATIONAL, value: width * shape.value })
-            .to_vec()
+    fn finer_shapes(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Shape> {
+        let least = NARROWEST_RATIONAL * scene.width_rad_s(joint(site));
+        let values = WIDTHS_OF_RATIONAL.map(|width| width * shape.value).into_iter();
+        let wide = values.filter(|value| *value >= least);
+        wide.map(|value| Shape { variant: RATIONAL, value }).collect()
     }
 
     fn search(&self) -> Search {
