@@ -2,8 +2,8 @@
 //! one.
 //!
 //! A signal that is quantised in steps Δ and changes by c from reading to reading repeats by chance in about Δ/c of all
-//! readings, and a noisy one as often as it comes back to the reading before the last one. Readings that repeat far more often while their joint moves are stale, unless they lie at the end of the
-//! channel's range.
+//! readings, and a noisy one as often as it comes back to the reading before the last one. Readings that repeat far more
+//! often while their joint moves are stale, unless they lie at the end of the channel's range.
 
 use rayon::prelude::*;
 
@@ -291,7 +291,8 @@ mod tests {
         let q: Vec<f64> = record.q_rad.joint(0).iter().map(rounded).collect();
         let slope = |k: usize| (q[k - 2] - 8.0 * q[k - 1] + 8.0 * q[k + 1] - q[k + 2]) / 12.0;
         for k in 2..q.len() - 2 {
-            let rounding = 1.0 + 1e-14 * (k % 3) as f64;
+            // Two neighbours are rounded alike, and may be equal; the one before them is not.
+            let rounding = 1.0 + 1e-14 * (k / 2 % 3) as f64;
             record.qd_rad_s.joint_mut(0)[k] = slope(k) / 0.008 * rounding;
         }
         record.q_rad.joint_mut(0).copy_from_slice(&q);
