@@ -13,7 +13,7 @@ use armid::dynamics::Motion;
 use armid::identify::covariance::CovarianceKind;
 use armid::identify::{Assembler, Estimator, Fitter, Identifier, Options, Problem, Weighting};
 use armid::montecarlo::{Scenario, Simulation};
-use armid::signal::{FitScratch, PeriodicFit, find_period, replicate_noise};
+use armid::signal::{FitScratch, PeriodicFit, PeriodicRecord, find_period, replicate_noise};
 use rand::rngs::ChaCha8Rng;
 use rand::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -113,15 +113,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     })?;
     let period = find_period(&log.q_rad)?.ok_or("the default motion repeats")?;
     let cut = |signals: &armid::robot::JointSignals| signals.slice(period.window.clone());
-    let (q, qd, torque) = (cut(&log.q_rad), cut(&log.qd_rad_s), cut(&log.torque_nm));
+    let torque = cut(&log.torque_nm);
+    let record = PeriodicRecord::new(cut(&log.q_rad), cut(&log.qd_rad_s), period.samples);
     let rate_hz = scenario.plant.log_rate_hz;
     let fit = PeriodicFit::new(period.samples, period.periods, rate_hz)?;
     let mut scratch = FitScratch::default();
     let average_ms = median_ms(repeats, || {
-        black_box(fit.fit(&q, &qd, &mut scratch).ok());
+        black_box(fit.fit(&record, &mut scratch).ok());
         black_box(replicate_noise(&torque, period.samples).ok());
     })?;
-    let averaged = fit.fit(&q, &qd, &mut scratch)?;
+    let averaged = fit.fit(&record, &mut scratch)?;
     let motion = Motion {
         q_rad: averaged.q_rad,
         qd_rad_s: averaged.qd_rad_s,

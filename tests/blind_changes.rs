@@ -61,6 +61,24 @@ fn a_wrong_gain_is_named_at_its_joint_against_the_simulation() {
     assert_holds(cause, "error_fraction", 0.05);
 }
 
+/// A zero that is off is felt the more, the more the flange carries: its size is that in the loaded arm, and nothing is
+/// left for other zeros.
+#[test]
+fn a_lost_zero_is_sized_in_the_loaded_arm() {
+    let toml = "[[effect]]\nkind = \"payload\"\nmass_kg = 1.5\ncom_x_m = 0.02\ncom_y_m = -0.03\n\
+                com_z_m = 0.06\n[[effect]]\nkind = \"encoder_offset\"\njoint = 2\noffset_rad = 0.02\n";
+    let d = against_nominal(&run(15, 4, toml));
+    let mut named: Vec<_> = d.causes.iter().map(|c| (c.kind.name(), c.joint)).collect();
+    named.sort_unstable();
+    assert_eq!(named, [("encoder_offset", Some(2)), ("payload", None)]);
+    for cause in &d.causes {
+        match cause.kind {
+            Kind::Payload => assert_holds(cause, "mass_kg", 1.5),
+            _ => assert_holds(cause, "offset_rad", 0.02),
+        }
+    }
+}
+
 #[test]
 fn nothing_is_named_against_the_simulation_that_made_the_log() {
     let d = against_nominal(&run(14, 4, ""));

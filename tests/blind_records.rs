@@ -5,7 +5,7 @@ use armid::diagnose::{Diagnosis, Kind};
 use armid::plant::Measured;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
-use crate::simulated::{NOISE, Run, TORQUE_NOISE, scenario};
+use crate::simulated::{NOISE, Run, TORQUE_NOISE, assert_holds, scenario};
 
 /// Diagnoses a log of six periods with `sensors` and the effects in `rest`, modified by `change`.
 fn diagnose(
@@ -50,6 +50,58 @@ fn rounded_angles_of_a_motion_that_repeats_exactly_are_no_fault() {
     let diagnosis = diagnose(311, (&rounded, ""), as_recorded);
     assert_eq!(named(&diagnosis), []);
     assert!(diagnosis.unexplained.is_none());
+}
+
+/// Replaces the velocities by the slopes of the angles over five rows.
+fn with_slopes(log: &mut Measured, _: &mut ChaCha8Rng) {
+    let step_s = log.time_s[1] - log.time_s[0];
+    for j in 0..log.q_rad.joints() {
+        let q = log.q_rad.joint(j);
+        let slope = |y: &[f64]| (y[0] - 8.0 * y[1] + 8.0 * y[3] - y[4]) / (12.0 * step_s);
+        let slopes: Vec<f64> = q.windows(5).map(slope).collect();
+        log.qd_rad_s.joint_mut(j)[2..q.len() - 2].copy_from_slice(&slopes);
+    }
+}
+
+const FAST: &str = "[plant]\nlog_rate_hz = 500.0\n";
+
+/// Leaves only the last six periods of 5000 rows of the log.
+fn without_run_in(log: &mut Measured) {
+    let first = log.time_s.len() - 6 * 5000;
+    log.time_s.drain(..first);
+    for signals in [&mut log.q_rad, &mut log.qd_rad_s, &mut log.torque_nm] {
+        *signals = signals.slice(first..signals.samples());
+    }
+}
+
+/// Angles in steps of 50 µrad without noise, and velocities computed from them, at a rate that the diagnosis halves:
+/// neither the scatter between periods nor the samples that are kept show the rounding.
+#[test]
+fn coarse_angles_of_a_fast_log_are_no_fault() {
+    // Of finer steps, the fastest harmonics show motion as well; and without its run-in, the log begins and ends amid the
+    // motion, where the low-pass does not know how it goes on.
+    for (seed, step_rad, is_cut) in [(312, 5e-5, false), (314, 1e-5, true)] {
+        let rounded = format!("{TORQUE_NOISE}q_step_rad = {step_rad}\n");
+        let diagnosis = diagnose(seed, (&rounded, FAST), |log, rng| {
+            with_slopes(log, rng);
+            if is_cut {
+                without_run_in(log);
+            }
+        });
+        assert_eq!(named(&diagnosis), []);
+        assert!(diagnosis.unexplained.is_none());
+    }
+}
+
+/// What is hidden in such a log is found as in any other.
+#[test]
+fn friction_is_found_in_coarse_angles_of_a_fast_log() {
+    let rounded = format!("{TORQUE_NOISE}q_step_rad = 5e-5\n");
+    let effect = "[[effect]]\nkind = \"presliding\"\njoint = 3\nstiffness_per_rad = 1000.0\n";
+    let diagnosis = diagnose(313, (&rounded, &format!("{effect}{FAST}")), with_slopes);
+    assert_eq!(named(&diagnosis), [(Kind::Presliding, Some(3))]);
+    assert!(diagnosis.unexplained.is_none());
+    assert_holds(&diagnosis.causes[0], "stiffness_per_rad", 1000.0);
 }
 
 /// Friction that builds up after the reversals of all joints comes late, as if the whole torque were recorded late.

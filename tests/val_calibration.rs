@@ -70,6 +70,16 @@ fn a_fast_log() {
     assert_calibrated(&fast);
 }
 
+/// Angles in steps of 0.2 mrad without any noise round alike in every period: no scatter shows it, nor, behind the low-pass
+/// of a decimator, do the samples.
+#[test]
+fn a_fast_log_of_angles_that_round_alike() {
+    let fast = format!("{}\n[plant]\nlog_rate_hz = 500.0\n", include_str!("../sims/default.toml"));
+    let rounded = fast.replace("q_sd_rad = 2e-5", "q_step_rad = 2e-4");
+    assert_ne!(rounded, fast);
+    assert_calibrated(&rounded);
+}
+
 /// Encoders ten times worse: their remaining errors in the averaged motion are noise, not lack of fit.
 #[test]
 fn noise_of_bad_encoders_withholds_no_interval() {

@@ -100,6 +100,15 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
         let file = same.input.path.display();
         return Err(format!("{file} is held out, but it is also the log that is diagnosed").into());
     }
+    if let [one, other] = &known[..]
+        && one.are_of(other)
+    {
+        let [one, other] = [one, other].map(|rows| rows.log.input.path.display());
+        return Err(format!(
+            "{one} and {other} are the same log, or parts of it: they tell of no load"
+        )
+        .into());
+    }
     let manufacturer =
         held_out.iter().map(|log| log.log.target_torque_nm(&arm)).collect::<Result<Vec<_>, _>>()?;
     let validations: Vec<Validation> = held_out

@@ -9,6 +9,7 @@ use clap::Args;
 use super::robot::{inputs, load_robot};
 use super::{CommandResult, Outcome};
 use crate::base::{BaseSet, Parameterisation};
+use crate::diagnose::without_wild_readings;
 use crate::dynamics::Model;
 use crate::identify::covariance::CovarianceKind;
 use crate::identify::physical::{self, PhysicalOptions, PriorMetric, PriorWeight};
@@ -130,6 +131,8 @@ pub struct LoadedLog {
     pub torque_nm: JointSignals,
     /// The file the log was read from.
     pub input: Input,
+    /// Remarks on wild readings that were replaced.
+    pub mended: Vec<String>,
 }
 
 impl LoadedLog {
@@ -150,6 +153,14 @@ impl LoadedLog {
 const SAME: f64 = 0.5;
 
 impl LoadedLog {
+    /// Replaces wild readings by what their neighbours say they should be.
+    fn mend_wild_readings(&mut self) {
+        let Some((channels, remarks)) = without_wild_readings(&self.measurement()) else { return };
+        [self.log.q_rad, self.log.qd_rad_s, self.torque_nm] = channels;
+        let of_log = |remark| format!("{}: {remark}", self.log.source);
+        self.mended = remarks.into_iter().map(of_log).collect();
+    }
+
     /// What tells its recording from others.
     pub fn rows(&self) -> RowsOf<'_> {
         let channels = [&self.log.q_rad, &self.log.qd_rad_s, &self.torque_nm];
@@ -202,7 +213,7 @@ pub fn read_logs(
         eprintln!("{}:\n{}", file.display(), log.rows);
         let torque_nm = log.torque_nm(arm)?;
         let input = Input { path: file.clone(), sha256: log.sha256.clone() };
-        Ok(LoadedLog { log, torque_nm, input })
+        Ok(LoadedLog { log, torque_nm, input, mended: Vec::new() })
     };
     files.iter().map(read).collect()
 }
@@ -222,8 +233,8 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
     let parameterisation = Parameterisation::of(&arm, args.reduced.as_deref())?;
     let set = BaseSet::find(&arm, parameterisation)?;
     let model = Model::new(&arm);
-    let logs = read_logs(&args.logs, &arm, &layout)?;
-    let validation_logs = read_logs(&args.validate, &arm, &layout)?;
+    let mut logs = read_logs(&args.logs, &arm, &layout)?;
+    let mut validation_logs = read_logs(&args.validate, &arm, &layout)?;
     let [rows, validation_rows] =
         [&logs, &validation_logs].map(|logs| logs.iter().map(LoadedLog::rows).collect::<Vec<_>>());
     for (k, log) in rows.iter().enumerate() {
@@ -246,24 +257,32 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
             .into());
         }
     }
+    drop((rows, validation_rows));
+    let all_parameters = || (0..set.rank()).map(|k| set.name(k).to_owned()).collect();
+    logs.iter_mut().chain(&mut validation_logs).for_each(LoadedLog::mend_wild_readings);
+    inputs.extend(logs.iter().chain(&validation_logs).map(|l| l.input.clone()));
+    let program = Program::started(None, inputs);
     let mut identifier = Identifier::new(&model, &set, options.clone());
-    let mut regressions = logs
-        .iter()
-        .map(|log| identifier.regression(&log.measurement()))
-        .collect::<Result<Vec<_>, _>>()?;
-    if logs.len() > 1 {
-        for (regression, log) in regressions.iter_mut().zip(&logs) {
-            let of_log = |warning: &String| format!("{}: {warning}", log.log.source);
-            let warnings = &mut regression.prepared.warnings;
-            *warnings = warnings.iter().map(of_log).collect();
+    let mut regressions = match laid_out(&mut identifier, &logs) {
+        Err(IdentifyError::NoMotion { .. }) if logs.len() == 1 => {
+            let logs: Vec<&Log> = logs.iter().map(|l| &l.log).collect();
+            return decline(args, &Declined::at_rest(&arm, &logs, all_parameters()), program);
         }
-    }
+        regressions => regressions?,
+    };
     let misread = regressions.iter().zip(&logs).find_map(|(regression, log)| {
         let gain = log.log.drive_gain_nm_a(&arm);
         let misreading = Misreading::of(&arm, regression, &options, gain.as_deref())?;
         Some(MisreadLog::new(log.log.source.clone(), misreading, &layout))
     });
     let several = each_alone(&mut identifier, &regressions)?;
+    let is_run = |regression: &Regression| regression.prepared.processing.period_s.is_none();
+    let runs = regressions.iter().filter(|regression| is_run(regression)).count();
+    if !matches!(several, Several::Apart(_)) && 0 < runs && runs < regressions.len() {
+        // The rows of a single run are filtered and scatter less: rows that are weighted together must be alike.
+        let alike = Options { period_s: Some(0.0), ..options.clone() };
+        regressions = laid_out(&mut Identifier::new(&model, &set, alike), &logs)?;
+    }
     let mut regression = Regression::joined(regressions)?;
     let unused = args.processing.unused(&regression.prepared.processing);
     regression.prepared.warnings.extend(unused);
@@ -273,8 +292,8 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
             "all logs count as single runs together, because {name} cannot stand alone: {reason}"
         ));
     }
-    inputs.extend(logs.iter().chain(&validation_logs).map(|l| l.input.clone()));
-    let program = Program::started(None, inputs);
+    let remarks = logs.iter().flat_map(|log| &log.mended).cloned();
+    regression.prepared.warnings.extend(remarks);
     let logs: Vec<&Log> = logs.iter().map(|l| &l.log).collect();
     let identified = match several {
         Several::Apart(parts) => Ok(pooled(&parts, &regression)),
@@ -285,8 +304,8 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
             return decline(args, &Declined::new(&arm, &logs, &regression, parameters), program);
         }
         Err(IdentifyError::Fit(FitError::StandsStill)) => {
-            let all = (0..set.rank()).map(|k| set.name(k).to_owned()).collect();
-            return decline(args, &Declined::new(&arm, &logs, &regression, all), program);
+            let declined = Declined::new(&arm, &logs, &regression, all_parameters());
+            return decline(args, &declined, program);
         }
         other => other?,
     };
@@ -301,13 +320,16 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         reduced: args.reduced.as_deref(),
         misread: misread.as_ref(),
     };
+    // An error in a later step must not discard the identification.
+    let mut failed: Option<Box<dyn std::error::Error>> = None;
     let mut validations = Vec::new();
     for log in &validation_logs {
-        validations.push(validate(&arm, &mut identifier, log, &identification.fit.theta)?);
+        match validate(&arm, &mut identifier, log, &identification.fit.theta) {
+            Ok(validation) => validations.push(validation),
+            Err(error) => failed = Some(error),
+        }
     }
     let mut result = IdentifyResult::of(&training, &validations)?;
-    // An error in the later step must not discard the identification.
-    let mut failed = None;
     if args.physical {
         let options = PhysicalOptions {
             metric: args.prior,
@@ -317,7 +339,7 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         let Identification { fit, covariance, .. } = &identification;
         match physical::solve(&arm, &set, fit, covariance, &options) {
             Ok(estimate) => result.set_physical(&estimate, &training),
-            Err(error) => failed = Some(error),
+            Err(error) => failed = Some(error.into()),
         }
     }
     say!("{}", parameter_table(&result).to_text());
@@ -346,10 +368,29 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         say!("report: {}", path.display());
     }
     match failed {
-        Some(error) => Err(error.into()),
+        Some(error) => Err(error),
         None if result.is_declined() || result.is_contradicted() => Ok(Outcome::Negative),
         None => Ok(Outcome::Done),
     }
+}
+
+/// The logs laid out for regression. Warnings about one of several name it.
+fn laid_out(
+    identifier: &mut Identifier,
+    logs: &[LoadedLog],
+) -> Result<Vec<Regression>, IdentifyError> {
+    let mut regressions = logs
+        .iter()
+        .map(|log| identifier.regression(&log.measurement()))
+        .collect::<Result<Vec<_>, _>>()?;
+    if logs.len() > 1 {
+        for (regression, log) in regressions.iter_mut().zip(logs) {
+            let of_log = |warning: &String| format!("{}: {warning}", log.log.source);
+            let warnings = &mut regression.prepared.warnings;
+            *warnings = warnings.iter().map(of_log).collect();
+        }
+    }
+    Ok(regressions)
 }
 
 /// Reports on a log whose motion leaves parameters without any effect on the torque.

@@ -20,8 +20,8 @@ pub struct Cleaned {
     pub is_mended: bool,
     /// What the comparison of repetitions shows of contacts.
     pub compared: Compared,
-    /// A remark for the user.
-    pub warning: Option<String>,
+    /// Remarks for the user.
+    pub warnings: Vec<String>,
 }
 
 impl Cleaned {
@@ -30,7 +30,7 @@ impl Cleaned {
     /// # Errors [`DiagnoseError`] if the rows are invalid or the signals cannot be processed.
     pub fn of(m: &Measurement, options: &Options) -> Result<Self, DiagnoseError> {
         m.require_rows()?;
-        let Faults { causes: faults, record, warning, unreadable: mut hanging } =
+        let Faults { causes: faults, record, warnings, unreadable: mut hanging } =
             data_faults::find(m, options.is_single_run())?;
         let mut unreadable = coarse_joints(&faults);
         unreadable.append(&mut hanging);
@@ -41,7 +41,7 @@ impl Cleaned {
             true => Compared::TooFew,
             false => between_periods(&record.measurement(m.source), &unreadable)?,
         };
-        Ok(Self { record, faults, unreadable, is_mended, compared, warning })
+        Ok(Self { record, faults, unreadable, is_mended, compared, warnings })
     }
 
     /// The contacts found, and the torque without them, if the comparison of repetitions shows any.

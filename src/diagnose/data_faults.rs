@@ -52,8 +52,8 @@ pub struct Faults {
     pub causes: Vec<Cause>,
     /// The record after the faults that can be corrected have been corrected.
     pub record: Record,
-    /// A remark for the user.
-    pub warning: Option<String>,
+    /// Remarks for the user.
+    pub warnings: Vec<String>,
     /// Joints (0-based) whose torque readings are not reliable.
     pub unreadable: Vec<usize>,
 }
@@ -69,6 +69,7 @@ pub fn find(m: &Measurement, single_run: bool) -> Result<Faults, SignalError> {
     let stale = stale::mend(&mut record);
     let strays = outliers::mend(&mut record);
     let wild = outliers::causes(&strays, record.time_s.len());
+    let mut warnings = outliers::accidents(&strays, &record.time_s);
     let stalls = stalls(&record.measurement(m.source));
     if let Some(stalls) = &stalls {
         out.push(stalls.cause());
@@ -81,7 +82,8 @@ pub fn find(m: &Measurement, single_run: bool) -> Result<Faults, SignalError> {
     out.extend(lags);
     out.extend(wild);
     out.extend(quantisation(m.torque_nm, &record.torque_nm));
-    Ok(Faults { causes: out, record, warning, unreadable })
+    warnings.extend(warning);
+    Ok(Faults { causes: out, record, warnings, unreadable })
 }
 
 /// If a torque hangs in no more than this share of the rows, they are replaced only where other periods can fill them

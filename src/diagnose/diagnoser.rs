@@ -131,7 +131,7 @@ impl<'a> Diagnoser<'a> {
         };
         let held_out = held_out.iter().map(gain).collect::<Result<Vec<_>, _>>()?;
         let mut warnings: Vec<String> =
-            log.warning.iter().chain(&identification.warnings).cloned().collect();
+            log.warnings.iter().chain(&identification.warnings).cloned().collect();
         warnings.extend(contact_remark(&study, &log));
         warnings.extend(rest_remark(&regression.prepared.motion.qd_rad_s));
         let drift = drift_remark(&study, &causes);

@@ -78,7 +78,11 @@ impl DiagnoseError {
     /// Whether the log is declined: its motion does not identify the unknowns, or it is not read as it was recorded.
     pub fn is_declined(&self) -> bool {
         let of_the_fit = |error: &IdentifyError| {
-            matches!(error, IdentifyError::Fit(FitError::NotExcited { .. } | FitError::StandsStill))
+            matches!(
+                error,
+                IdentifyError::NoMotion { .. }
+                    | IdentifyError::Fit(FitError::NotExcited { .. } | FitError::StandsStill)
+            )
         };
         match self {
             Self::Singular { .. } | Self::NotExcited { .. } | Self::Misread { .. } => true,

@@ -83,6 +83,7 @@ pub use finding::Finding;
 pub use held_out::Validation;
 pub use image::Column;
 pub use kind::Kind;
+pub use outliers::without_wild_readings;
 pub use payload::PayloadFinding;
 pub use repeated::{Repeated, repeated};
 pub use scene::{Scene, equivalent_arm};

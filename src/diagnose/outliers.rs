@@ -12,11 +12,14 @@ use super::data_faults::{FAR, cause, exact, step_s};
 use super::kind::Kind;
 use super::record::Record;
 use super::verdict::Cause;
+use crate::identify::Measurement;
 use crate::median::{median, sigma_of_changes};
 use crate::robot::JointSignals;
 
-/// Least number of wild readings in one channel of a joint: fewer are an accident, and no fault of the channel.
+/// Least number of wild readings in one channel of a joint: fewer are an accident, and no fault of the channel. They are
+/// replaced only where they are so many standard deviations off that nothing but an accident can be meant.
 const FEWEST: usize = 3;
+const ACCIDENT: f64 = 50.0;
 /// An angle that is off by less than this share of its usual change between two rows is not wild.
 const SMALL_STRAY: f64 = 0.5;
 /// A time stamp may be off by this many steps: a deviation no larger than what the joint travels in that time is not
@@ -39,11 +42,44 @@ pub struct Strays {
     rows: Vec<usize>,
 }
 
+impl Strays {
+    /// Whether there are so many that the channel is at fault.
+    fn are_many(&self) -> bool {
+        self.rows.len() >= FEWEST
+    }
+
+    fn in_words(&self, time_s: &[f64]) -> String {
+        let Self { joint, channel, rows } = self;
+        let first_s = rows.first().and_then(|row| time_s.get(*row)).unwrap_or(&0.0);
+        let values = if rows.len() == 1 { "value" } else { "values" };
+        format!(
+            "{} single {values} of the {channel} of joint {}, far off those around, replaced by what these say (the first at {first_s:.3} s)",
+            rows.len(),
+            joint + 1
+        )
+    }
+}
+
 /// Replaces wild readings by what their neighbours say they should be.
 pub fn mend(record: &mut Record) -> Vec<Strays> {
     let mut strays = mend_motion(record);
     strays.extend(mend_torque(record));
     strays
+}
+
+/// Remarks for the user about wild readings that are too few to be a fault of their channel.
+pub fn accidents(strays: &[Strays], time_s: &[f64]) -> Vec<String> {
+    strays.iter().filter(|few| !few.are_many()).map(|few| few.in_words(time_s)).collect()
+}
+
+/// The channels of `m` with wild readings replaced, and a remark for the user about every channel that has any. `None`
+/// for a log without wild readings.
+pub fn without_wild_readings(m: &Measurement) -> Option<([JointSignals; 3], Vec<String>)> {
+    let mut record = Record::without_rows(m, &[]);
+    let strays = mend(&mut record);
+    let remarks = strays.iter().map(|strays| strays.in_words(m.time_s)).collect();
+    let Record { q_rad, qd_rad_s, torque_nm, .. } = record;
+    (!strays.is_empty()).then_some(([q_rad, qd_rad_s, torque_nm], remarks))
 }
 
 /// Replaces wild torques by the median of nine.
@@ -115,17 +151,23 @@ fn by_all<const N: usize>(y: &[f64], ways: [Vec<Stray>; N]) -> Vec<Stray> {
     let is_in = |way: &[Stray], row| way.binary_search_by_key(&row, |stray| stray.row).is_ok();
     let Some((last, others)) = ways.split_last() else { return Vec::new() };
     let all = last.iter().filter(|stray| others.iter().all(|way| is_in(way, stray.row)));
-    all.map(|&Stray { row, off, .. }| Stray { row, off, instead: y[row] - off }).collect()
+    all.map(|stray| Stray { instead: y[stray.row] - stray.off, ..*stray }).collect()
 }
 
-/// Replaces the readings `found`, on every joint that has at least [`FEWEST`] of them.
+/// Replaces the readings `found`: on a joint with at least [`FEWEST`] of them all, on others those of an [`ACCIDENT`].
 fn replace(
     signals: &mut JointSignals,
     channel: &'static str,
     found: Vec<(usize, Vec<Stray>)>,
 ) -> Vec<Strays> {
-    let several = found.into_iter().filter(|(_, far)| far.len() >= FEWEST);
-    several
+    let meant = found.into_iter().map(|(joint, mut far)| {
+        if far.len() < FEWEST {
+            far.retain(|stray| stray.sigmas > ACCIDENT);
+        }
+        (joint, far)
+    });
+    meant
+        .filter(|(_, far)| !far.is_empty())
         .map(|(joint, far)| {
             let y = signals.joint_mut(joint);
             far.iter().for_each(|stray| y[stray.row] = stray.instead);
@@ -136,11 +178,13 @@ fn replace(
 
 /// One cause for every joint with wild readings, in a record of `rows` rows.
 pub fn causes(strays: &[Strays], rows: usize) -> Vec<Cause> {
+    let strays: Vec<&Strays> = strays.iter().filter(|strays| strays.are_many()).collect();
     let mut joints: Vec<usize> = strays.iter().map(|stray| stray.joint).collect();
     joints.sort_unstable();
     joints.dedup();
     let of_joint = |joint: usize| {
-        let own: Vec<&Strays> = strays.iter().filter(|stray| stray.joint == joint).collect();
+        let own: Vec<&Strays> =
+            strays.iter().copied().filter(|stray| stray.joint == joint).collect();
         let mut wild: Vec<usize> = own.iter().flat_map(|stray| &stray.rows).copied().collect();
         wild.sort_unstable();
         wild.dedup();
@@ -160,16 +204,21 @@ struct Stray {
     off: f64,
     /// What its neighbours say it should be.
     instead: f64,
+    /// The difference in standard deviations of the changes from row to row.
+    sigmas: f64,
 }
 
 /// Values of `y` far off the median of nine, in the order of their rows.
 fn far_off(y: &[f64]) -> Vec<Stray> {
-    let limit = FAR * sigma_of_changes(&steps(y));
+    let sigma = sigma_of_changes(&steps(y));
     y.windows(2 * REACH + 1)
         .enumerate()
         .filter_map(|(k, window)| Some((k + REACH, median(&mut window.to_vec())?)))
-        .map(|(row, instead)| Stray { row, off: y[row] - instead, instead })
-        .filter(|stray| stray.off.abs() > limit)
+        .filter(|(row, instead)| (y[*row] - instead).abs() > FAR * sigma)
+        .map(|(row, instead)| {
+            let off = y[row] - instead;
+            Stray { row, off, instead, sigmas: off.abs() / sigma }
+        })
         .collect()
 }
 
@@ -266,7 +315,7 @@ mod tests {
     }
 
     /// None of these is wild: stamps that are half a row late, rows that were read that late, an acceleration that
-    /// jumps where a move begins, a torque that steps, two wild readings.
+    /// jumps where a move begins, a torque that steps.
     #[test]
     fn what_moves_is_not_wild() {
         let late_s = 0.004;
@@ -285,8 +334,31 @@ mod tests {
         let mut steps = moves_and_rests(4.0, 0.3);
         steps.torque_nm.joint_mut(0)[1200..1700].iter_mut().for_each(|t| *t += 30.0);
         assert_eq!(mend(&mut steps).len(), 0);
+    }
+
+    /// One or two wild readings are replaced and told, but are no fault of their channel. What is only 17 standard
+    /// deviations off may be torque.
+    #[test]
+    fn an_accident_is_mended_and_no_cause() {
+        let clean = moves_and_rests(4.0, 0.3);
         let mut accident = moves_and_rests(4.0, 0.3);
         WILD[..2].iter().for_each(|&row| accident.q_rad.joint_mut(0)[row] += 0.1);
-        assert_eq!(mend(&mut accident).len(), 0);
+        accident.torque_nm.joint_mut(0)[700] += 20_000.0;
+        let strays = mend(&mut accident);
+        let rows = accident.time_s.len();
+        assert_eq!(causes(&strays, rows), []);
+        let remarks = accidents(&strays, &accident.time_s);
+        let said =
+            ["2 single values of the angle of joint 1", "1 single value of the torque of joint 1"];
+        assert_eq!(remarks.len(), said.len());
+        remarks.iter().zip(said).for_each(|(told, said)| assert!(told.starts_with(said), "{told}"));
+        let off =
+            |a: &JointSignals, b: &JointSignals, row: usize| a.joint(0)[row] - b.joint(0)[row];
+        let of_angles = WILD[..2].iter().map(|&row| off(&accident.q_rad, &clean.q_rad, row));
+        assert!(of_angles.map(f64::abs).fold(0.0, f64::max) < 2e-6);
+        assert!(off(&accident.torque_nm, &clean.torque_nm, 700).abs() < 1.6);
+        let mut peak = moves_and_rests(4.0, 0.3);
+        peak.torque_nm.joint_mut(0)[700] += 17.0 * 0.3;
+        assert_eq!(mend(&mut peak).len(), 0);
     }
 }

@@ -13,6 +13,8 @@ const UNEVEN: f64 = 1.2;
 const EVEN_ODDS: f64 = 0.5;
 /// From this many times the error along the log on, the error along another log is not one of the same arm.
 const OF_ANOTHER_ARM: f64 = 3.0;
+/// Nothing is called noise that noise leaves in a smaller share of logs than this.
+const SELDOM: f64 = 0.01;
 /// Smaller probabilities are not told apart.
 const RARE: f64 = 1e-4;
 /// If the ends of an uneven interval are this factor apart, the size is open: no value between them is an estimate of
@@ -63,7 +65,7 @@ impl Diagnosis {
         }
         out.extend(told::in_the_table_alone(&self.causes));
         if out.is_empty() {
-            out.push(self.nothing_found().into());
+            out.push(self.nothing_found());
         }
         out.extend(self.moved());
         let along =
@@ -73,18 +75,26 @@ impl Diagnosis {
     }
 
     /// The sentence if nothing is named.
-    pub(super) fn nothing_found(&self) -> &'static str {
-        match self.noise_floor_nm {
-            Some(_) => {
+    pub(super) fn nothing_found(&self) -> String {
+        let words = match (&self.noise_floor_nm, self.lack_of_fit_probability) {
+            (Some(_), Some(chance)) if chance < SELDOM => {
+                return format!(
+                    "Nothing found that could be told from noise for certain. But noise alone leaves as much as is left here in {} of logs: \
+                     there may be an effect that a longer log would show.",
+                    percent(chance, 2)
+                );
+            }
+            (Some(_), _) => {
                 "Nothing found: what the model leaves is noise, as the scatter between periods shows; the detection \
                  limits say what would have been seen, of each law in the one shape that stands beside them. What only \
                  moves the parameters (a body on the flange, a little more gravity, a link that is a millimetre longer) shows beside a simulation (--sim) or a second log."
             }
-            None => {
+            (None, _) => {
                 "Nothing found above what a single run can show; the motion does not repeat, so that the noise is \
                  judged from the residual itself."
             }
-        }
+        };
+        words.to_owned()
     }
 
     /// The sentence that compares the base parameters with those of a simulation.

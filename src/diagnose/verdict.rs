@@ -325,7 +325,7 @@ impl Diagnosis {
         if let (Verdict::NothingFound, Some(_)) = (self.verdict, &cause) {
             self.verdict = Verdict::CauseNamed;
             let nothing_found = self.nothing_found();
-            self.sentences.retain(|sentence| sentence != nothing_found);
+            self.sentences.retain(|sentence| *sentence != nothing_found);
         }
         let noise_is_known = self.noise_floor_nm.is_some();
         self.sentences.extend(cause.iter().map(|c| c.sentence(noise_is_known)));

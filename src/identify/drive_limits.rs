@@ -5,6 +5,8 @@ use crate::robot::{Arm, Joint, JointSignals};
 /// Share of its largest torque beyond which a drive counts as being at its limit: readings scatter there by noise and
 /// by the tolerance of the gain.
 const NEAR: f64 = 0.99;
+/// Readings beyond this many times the largest torque are no torque of this drive.
+const BEYOND: f64 = 1.1;
 
 /// A drive that reaches its torque limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,7 +25,8 @@ pub fn drives_at_limits(arm: &Arm, torque_nm: &JointSignals) -> Vec<AtLimit> {
     let joints = arm.joints.iter().enumerate().take(torque_nm.joints());
     let of_joint = |(joint, j): (usize, &Joint)| {
         let limit_nm = j.limits.torque_nm;
-        let is_near = |t: &&f64| t.abs() > NEAR * limit_nm;
+        let near = NEAR * limit_nm..BEYOND * limit_nm;
+        let is_near = |t: &&f64| near.contains(&t.abs());
         let share = torque_nm.joint(joint).iter().filter(is_near).count() as f64 / samples;
         AtLimit { joint, share, limit_nm }
     };

@@ -79,8 +79,11 @@ pub enum IdentifyError {
     },
     /// `--period` names a period that the motion does not have.
     #[error(
-        "{log}: the motion does not repeat every {wanted_s} s{}",
-        found_s.map_or_else(String::new, |s| format!(" (it does every {s:.3} s)"))
+        "{log}: {}",
+        match found_s {
+            Some(s) => format!("the period of the motion is {s:.3} s, not {wanted_s} s"),
+            None => format!("the motion does not repeat every {wanted_s} s"),
+        }
     )]
     NoSuchPeriod {
         /// The log.

@@ -1,13 +1,15 @@
 //! Puts the channels of a log on an even clock that is not faster than needed.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use super::error::IdentifyError;
 use super::measurement::Measurement;
 use super::options::Options;
 use crate::robot::JointSignals;
 use crate::signal::{
-    Bracket, Decimator, MOST_PER_ROW, Resampler, Scratch, bridged_gap_s, natural_rate_hz,
+    Bracket, Decimator, MOST_PER_ROW, Resampler, Scratch, SignalError, bridged_gap_s,
+    natural_rate_hz,
 };
 
 /// A log is uneven if one of its time steps differs from the natural step by more than this share.
@@ -29,6 +31,12 @@ pub struct BetweenRows {
     pub places: Vec<Bracket>,
 }
 
+/// Angle, velocity and torque before they were decimated.
+struct Fine<'a> {
+    signals: [Cow<'a, JointSignals>; 3],
+    decimator: Decimator,
+}
+
 /// A log on an even clock.
 pub(super) struct Even<'a> {
     /// Instant of the first sample, s, on the log's clock.
@@ -39,6 +47,8 @@ pub(super) struct Even<'a> {
     pub(super) resampled: bool,
     /// Highest frequency, in cycles per sample, at which the samples still show the log's content.
     pub(super) highest: f64,
+    /// The samples before they were decimated; `None` where they were not.
+    fine: Option<Fine<'a>>,
     /// Places of resampled samples among the rows; `None` where the samples are the rows, or were decimated
     /// afterwards.
     pub(super) between: Option<BetweenRows>,
@@ -70,6 +80,7 @@ impl<'a> Even<'a> {
             rate_hz: if is_even { mean_hz } else { natural_hz },
             resampled: false,
             highest: AS_LOGGED,
+            fine: None,
             between: None,
             q_rad: Cow::Borrowed(m.q_rad),
             qd_rad_s: Cow::Borrowed(m.qd_rad_s),
@@ -100,9 +111,62 @@ impl<'a> Even<'a> {
             None => whole_parts(even.rate_hz, Options::HIGHEST_RATE_HZ),
         };
         if every > 1 {
-            even.decimate(&Decimator::new(every, even.rate_hz)?, filter)?;
+            even.decimate(Decimator::new(every, even.rate_hz)?, filter)?;
         }
         Ok(even)
+    }
+
+    /// Angles and velocities as they were read, in the rows from which a decimator made the samples `window`, and how
+    /// many rows make one sample. `None` where samples are no rows of `m` behind a decimator.
+    pub(super) fn as_read(
+        &self,
+        m: &Measurement,
+        window: Range<usize>,
+    ) -> Option<([JointSignals; 2], usize)> {
+        let every = self.fine.as_ref().filter(|_| !self.resampled)?.decimator.every();
+        let rows = window.start * every..(window.end * every).min(m.time_s.len());
+        Some(([m.q_rad.slice(rows.clone()), m.qd_rad_s.slice(rows)], every))
+    }
+
+    /// Angle, velocity and torque in the samples `window` of a motion that repeats every `samples_per_period` samples.
+    ///
+    /// A decimator does not know how a record continues beyond its ends. That of a motion that repeats continues as it
+    /// does a period later or earlier.
+    pub(super) fn repeated(
+        &self,
+        window: &Range<usize>,
+        samples_per_period: usize,
+        filter: &mut Scratch,
+    ) -> Result<[JointSignals; 3], SignalError> {
+        let Some(Fine { signals, decimator }) = &self.fine else {
+            return Ok(
+                [&self.q_rad, &self.qd_rad_s, &self.torque_nm].map(|y| y.slice(window.clone()))
+            );
+        };
+        let every = decimator.every();
+        // Both are whole numbers of samples.
+        let period = samples_per_period * every;
+        let pad = (decimator.edge_samples().div_ceil(every) * every).min(period);
+        let mut out = [(); 3].map(|()| JointSignals::zeros(self.q_rad.joints(), window.len()));
+        let mut row = Vec::new();
+        for (out, y) in out.iter_mut().zip(signals) {
+            for j in 0..y.joints() {
+                let y = y.joint(j);
+                row.clear();
+                row.extend((window.start * every..window.end * every + 2 * pad).map(|k| {
+                    // Row k − pad of the record.
+                    match k.checked_sub(pad) {
+                        None => y[k + period - pad],
+                        Some(k) if k >= y.len() => y[k - period],
+                        Some(k) => y[k],
+                    }
+                }));
+                decimator.decimate_in_place(&mut row, filter)?;
+                let first = pad / every;
+                out.joint_mut(j).copy_from_slice(&row[first..first + window.len()]);
+            }
+        }
+        Ok(out)
     }
 
     fn put_on(
@@ -139,9 +203,10 @@ impl<'a> Even<'a> {
 
     fn decimate(
         &mut self,
-        decimator: &Decimator,
+        decimator: Decimator,
         filter: &mut Scratch,
     ) -> Result<(), IdentifyError> {
+        let signals = [&self.q_rad, &self.qd_rad_s, &self.torque_nm].map(|signals| signals.clone());
         for signals in [&mut self.q_rad, &mut self.qd_rad_s, &mut self.torque_nm] {
             let mut error = None;
             let decimated = signals.map_joints(|_, y| {
@@ -158,6 +223,7 @@ impl<'a> Even<'a> {
         self.rate_hz = decimator.rate_hz();
         self.highest = REWORKED;
         self.between = None;
+        self.fine = Some(Fine { signals, decimator });
         Ok(())
     }
 }

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::covariance::CovarianceKind;
 use super::fit::Estimator;
-use crate::signal::SERIES_END;
+use crate::signal::{HIGHEST_ORDER, SERIES_END};
 
 /// All settings of the processing that a user may choose; by default they follow from the data.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -44,10 +44,17 @@ impl Options {
             // Zero treats the log as a single run.
             ("period_s", self.period_s.filter(|s| *s != 0.0)),
         ];
-        settings.into_iter().find_map(|(key, value)| {
+        let not_positive = settings.into_iter().find_map(|(key, value)| {
             let value = value.filter(|v| !(v.is_finite() && *v > 0.0))?;
             Some(Improper { key, value, requirement: "must be a positive number" })
-        })
+        });
+        let is_order = (1..=HIGHEST_ORDER).contains(&self.order);
+        let order = Improper {
+            key: "order",
+            value: self.order as f64,
+            requirement: "must be a whole number from 1 to 20",
+        };
+        not_positive.or((!is_order).then_some(order))
     }
 
     /// Faster logs are decimated to at most this rate. The motion itself would need less, but dry friction does not
@@ -101,6 +108,8 @@ mod tests {
         let key = |options: Options| options.improper().map(|improper| improper.key);
         assert_eq!(key(Options { cutoff_hz: f64::NAN, ..default.clone() }), Some("cutoff_hz"));
         assert_eq!(key(Options { rate_hz: Some(0.0), ..default.clone() }), Some("rate_hz"));
-        assert_eq!(key(Options { period_s: Some(-3.0), ..default }), Some("period_s"));
+        assert_eq!(key(Options { period_s: Some(-3.0), ..default.clone() }), Some("period_s"));
+        assert_eq!(key(Options { order: 0, ..default.clone() }), Some("order"));
+        assert_eq!(key(Options { order: 21, ..default }), Some("order"));
     }
 }

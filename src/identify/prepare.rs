@@ -11,8 +11,8 @@ use crate::dynamics::Motion;
 use crate::median::median_step;
 use crate::robot::JointSignals;
 use crate::signal::{
-    Activity, FitScratch, Period, PeriodSearch, PeriodicFit, Scratch, ZeroPhase, central_4,
-    reading_limit, reading_noise, replicate_noise, resolution,
+    Activity, FitScratch, Period, PeriodSearch, PeriodicFit, PeriodicRecord, Scratch, ZeroPhase,
+    central_4, reading_limit, reading_noise, replicate_noise, resolution,
 };
 
 /// Fewest periods for which a log is put on another clock: two reveal little about the noise.
@@ -116,10 +116,10 @@ impl Preparer {
         &mut self,
         prepared: &Prepared,
     ) -> Result<Option<Motion>, IdentifyError> {
-        let Some([q_rad, qd_rad_s]) = &prepared.recorded else { return Ok(None) };
+        let Some(record) = &prepared.recorded else { return Ok(None) };
         let Processing { periods, rate_hz, .. } = prepared.processing;
         let fit = self.periodic_fit(prepared.motion.samples(), periods, rate_hz)?;
-        let deviations = fit.deviations(q_rad, qd_rad_s, &mut self.fit);
+        let deviations = fit.deviations(record, &mut self.fit);
         self.periodic = Some(fit);
         let [q_rad, qd_rad_s, qdd_rad_s2] = deviations?;
         Ok(Some(Motion { q_rad, qd_rad_s, qdd_rad_s2 }))
@@ -161,13 +161,22 @@ impl Preparer {
             ));
         }
         let fit = self.periodic_fit(samples_per_period, periods, even.rate_hz)?;
-        let q_rad = even.q_rad.slice(window.clone());
-        let qd_rad_s = even.qd_rad_s.slice(window.clone());
-        let torque_nm = even.torque_nm.slice(window.clone());
-        let averaged = fit.fit(&q_rad, &qd_rad_s, &mut self.fit);
+        let [q_rad, qd_rad_s, torque_nm] =
+            even.repeated(&window, samples_per_period, &mut self.filter)?;
+        let rows = even.as_read(m, window.clone());
+        let record = match &rows {
+            Some((rows, every)) => PeriodicRecord::decimated(
+                [q_rad, qd_rad_s],
+                rows.each_ref(),
+                samples_per_period * every,
+                *every,
+            ),
+            None => PeriodicRecord::new(q_rad, qd_rad_s, samples_per_period),
+        };
+        let averaged = fit.fit(&record, &mut self.fit);
         let each_period = self
             .keeps_periods
-            .then(|| fit.each_period(&q_rad, &qd_rad_s, even.highest, &mut self.fit))
+            .then(|| fit.each_period(&record, even.highest, &mut self.fit))
             .transpose();
         self.periodic = Some(fit);
         let averaged = averaged?;
@@ -184,7 +193,7 @@ impl Preparer {
             },
             lead_in_s: even.start_s - m.time_s[0] + window.start as f64 / even.rate_hz,
             each_period,
-            recorded: Some([q_rad, qd_rad_s]),
+            recorded: Some(record),
             between: even.between.as_ref().map(|rows| BetweenRows {
                 time_s: rows.time_s.clone(),
                 qd_rad_s: rows.qd_rad_s.clone(),

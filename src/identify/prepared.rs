@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::even::BetweenRows;
 use crate::dynamics::Motion;
 use crate::robot::JointSignals;
-use crate::signal::{Gap, HarmonicPower, Replicates};
+use crate::signal::{Gap, HarmonicPower, PeriodicRecord, Replicates};
 
 /// What was done to a log before the regression.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -49,7 +49,7 @@ pub struct Prepared {
     /// motion repeats.
     pub each_period: Option<Motion>,
     /// Angles and velocities of all periods as they were recorded, rad and rad/s; `None` for a single run.
-    pub recorded: Option<[JointSignals; 2]>,
+    pub recorded: Option<PeriodicRecord>,
     /// Where the samples of `torque_nm` are among the rows of the log, between which the torque was interpolated
     /// linearly; only where an uneven log of a repeating motion was put on an even clock.
     pub between: Option<BetweenRows>,

@@ -8,6 +8,7 @@ use thiserror::Error;
 
 use super::blind::BlindEntry;
 use crate::base::{BaseSet, Parameterisation, ParameterisationError};
+use crate::excitation::design::LONGEST_S;
 use crate::excitation::{Excitation, ExcitationError, FourierSeries, Requirements};
 use crate::identify::{Improper, Options};
 use crate::plant::faults::{Effect, FaultyPlant};
@@ -277,6 +278,9 @@ impl MotionEntry {
     ) -> Result<Excitation, ScenarioError> {
         source.check(self.periods > 0, "motion.periods", 0.0, "must be at least 1")?;
         let series = FourierSeries::load(&source.beside(&self.trajectory))?;
+        let data_s = self.periods as f64 * series.period_s;
+        let requirement = "must make at most 86400 s of data";
+        source.check(data_s <= LONGEST_S, "motion.periods", self.periods as f64, requirement)?;
         Ok(match self.run_in_s {
             Some(run_in_s) => Excitation::new(series, run_in_s, self.periods)?,
             None => {

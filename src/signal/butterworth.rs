@@ -18,7 +18,7 @@ use super::error::{SignalError, checked_cutoff_hz};
 pub use super::biquad::Scratch;
 
 /// Above this order nothing is gained: the two-pass roll-off is 1 : f⁴⁰ already.
-const HIGHEST_ORDER: usize = 20;
+pub const HIGHEST_ORDER: usize = 20;
 
 /// A Butterworth low-pass without phase: filtered signals are not delayed.
 ///

@@ -41,6 +41,16 @@ impl Decimator {
         self.rate_hz / self.every as f64
     }
 
+    /// One sample in so many is kept.
+    pub fn every(&self) -> usize {
+        self.every
+    }
+
+    /// Number of samples at each end of a record that depend on how it is taken to continue.
+    pub fn edge_samples(&self) -> usize {
+        self.filter.as_ref().map_or(0, ZeroPhase::edge_samples)
+    }
+
     /// Number of samples of the result for a record of `samples`: ⌈samples / every⌉.
     pub fn samples(&self, samples: usize) -> usize {
         samples.div_ceil(self.every)

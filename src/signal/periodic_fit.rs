@@ -5,7 +5,9 @@
 //! e^{−2πihk/n} of angle and velocity:
 //!
 //! 1. The means Q̄_h, V̄_h and the scatter S_h = Σ_p |Y_ph − Ȳ_h|² / (P − 1) are computed; the scatter is pooled over
-//!    bands of neighbouring harmonics. S/P is the noise power of a mean coefficient.
+//!    bands of neighbouring harmonics. S/P is the noise power of a mean coefficient. Rounding that is the same in every
+//!    period does not scatter: its power is known ([`PeriodicRecord`]), and P times as much is added to the periods as
+//!    noise, with a mean of zero. The means stay as they are, and all that follows from the scatter counts the rounding.
 //! 2. Both channels measure the same series, V_h = ihω Q_h. Weighted by their noise, Q̂_h = Q̄_h + w (V̄_h/ihω − Q̄_h)
 //!    with w = S_q / (S_q + S_v/(hω)²) has the variance v_h = w S_v / (P (hω)²). Slow harmonics come from the angle,
 //!    fast ones from the velocity. A velocity whose scatter follows that of the angle was computed from it and is no
@@ -27,7 +29,9 @@ use fourier::{Complex64, Forward, Inverse};
 
 use super::averaged_motion::{AveragedMotion, HarmonicPower};
 use super::error::{SignalError, checked_rate_hz, enough, same};
+use super::periodic_record::PeriodicRecord;
 use super::spectra::{BAND_HARMONICS, Band, Spectra};
+use crate::random::{Channel, TrialStreams};
 use crate::robot::JointSignals;
 
 /// Noise in q̈, as a fraction of its mean square, that costs nothing: it attenuates an inertia by about the same
@@ -121,18 +125,16 @@ impl PeriodicFit {
         self.periods
     }
 
-    /// Averages the periods of angle and velocity (each joints × P·n samples), combines them and
-    /// differentiates.
+    /// Averages the periods of angle and velocity, combines them and differentiates.
     ///
     /// Errors: a length other than P·n, unequal sizes, a value that is not finite.
     pub fn fit(
         &self,
-        q_rad: &JointSignals,
-        qd_rad_s: &JointSignals,
+        record: &PeriodicRecord,
         scratch: &mut FitScratch,
     ) -> Result<AveragedMotion, SignalError> {
-        let (n, joints) = (self.samples_per_period, q_rad.joints());
-        self.check_sizes(q_rad, qd_rad_s)?;
+        let (n, joints) = (self.samples_per_period, record.q_rad().joints());
+        self.check_sizes(record)?;
         let mut motion = AveragedMotion {
             q_rad: JointSignals::zeros(joints, n),
             qd_rad_s: JointSignals::zeros(joints, n),
@@ -141,7 +143,7 @@ impl PeriodicFit {
             acceleration: Vec::with_capacity(joints),
         };
         for j in 0..joints {
-            self.analyse_joint(q_rad, qd_rad_s, j, scratch)?;
+            self.analyse_joint(record, j, scratch)?;
             let Kept { acceleration, .. } = self.combine(scratch);
             let in_qdd = acceleration.noise.len();
             motion.harmonics.push(in_qdd);
@@ -157,27 +159,18 @@ impl PeriodicFit {
     /// combined as in step 2 with all harmonics up to `share` of the sampling rate, and nothing is averaged.
     ///
     /// The differences between the periods are encoder noise as it appears in the acceleration, and motion that does
-    /// not repeat. If readings are so coarse that their rounding repeats, only the harmonics of [`Self::fit`] are used:
-    /// the others are rounding that looks like motion.
+    /// not repeat.
     ///
     /// Errors: as for [`Self::fit`].
     pub fn each_period(
         &self,
-        q_rad: &JointSignals,
-        qd_rad_s: &JointSignals,
+        record: &PeriodicRecord,
         share: f64,
         scratch: &mut FitScratch,
     ) -> Result<[JointSignals; 3], SignalError> {
         let n = self.samples_per_period;
         let highest = ((share * n as f64) as usize).clamp(1, n / 2);
-        self.period_by_period(q_rad, qd_rad_s, scratch, |scratch| {
-            if scratch.q.is_coarse || scratch.qd.is_coarse {
-                let kept = self.combine(scratch);
-                [highest.min(kept.highest), highest.min(kept.acceleration.noise.len())]
-            } else {
-                [highest, highest]
-            }
-        })
+        self.period_by_period(record, scratch, |_| [highest, highest])
     }
 
     /// Returns the deviation of every period from the mean of all, in the harmonics that [`Self::fit`] keeps: angle,
@@ -188,11 +181,10 @@ impl PeriodicFit {
     /// Errors: as for [`Self::fit`].
     pub fn deviations(
         &self,
-        q_rad: &JointSignals,
-        qd_rad_s: &JointSignals,
+        record: &PeriodicRecord,
         scratch: &mut FitScratch,
     ) -> Result<[JointSignals; 3], SignalError> {
-        self.period_by_period(q_rad, qd_rad_s, scratch, |scratch| {
+        self.period_by_period(record, scratch, |scratch| {
             let Kept { highest, acceleration } = self.combine(scratch);
             scratch.q.subtract_mean();
             scratch.qd.subtract_mean();
@@ -205,16 +197,15 @@ impl PeriodicFit {
     /// the acceleration.
     fn period_by_period(
         &self,
-        q_rad: &JointSignals,
-        qd_rad_s: &JointSignals,
+        record: &PeriodicRecord,
         scratch: &mut FitScratch,
         prepare: impl Fn(&mut FitScratch) -> [usize; 2],
     ) -> Result<[JointSignals; 3], SignalError> {
-        let (n, joints) = (self.samples_per_period, q_rad.joints());
-        self.check_sizes(q_rad, qd_rad_s)?;
+        let (n, joints) = (self.samples_per_period, record.q_rad().joints());
+        self.check_sizes(record)?;
         let mut out = [(); 3].map(|()| JointSignals::zeros(joints, n * self.periods));
         for j in 0..joints {
-            self.analyse_joint(q_rad, qd_rad_s, j, scratch)?;
+            self.analyse_joint(record, j, scratch)?;
             let [in_qd, in_qdd] = prepare(scratch);
             for p in 0..self.periods {
                 let FitScratch { q, qd, series, .. } = &mut *scratch;
@@ -265,11 +256,8 @@ impl PeriodicFit {
         self.synthesise(scratch, |w| Complex64::new(-w * w, 0.0), qdd);
     }
 
-    fn check_sizes(
-        &self,
-        q_rad: &JointSignals,
-        qd_rad_s: &JointSignals,
-    ) -> Result<(), SignalError> {
+    fn check_sizes(&self, record: &PeriodicRecord) -> Result<(), SignalError> {
+        let (q_rad, qd_rad_s) = (record.q_rad(), record.qd_rad_s());
         same("samples in whole periods", self.samples_per_period * self.periods, q_rad.samples())?;
         same("samples of angle and velocity", q_rad.samples(), qd_rad_s.samples())?;
         same("joints of angle and velocity", q_rad.joints(), qd_rad_s.joints())
@@ -283,24 +271,35 @@ impl PeriodicFit {
     /// Step 1 for both channels of joint `j`.
     fn analyse_joint(
         &self,
-        q_rad: &JointSignals,
-        qd_rad_s: &JointSignals,
+        record: &PeriodicRecord,
         j: usize,
         scratch: &mut FitScratch,
     ) -> Result<(), SignalError> {
-        check_finite("angle", q_rad, j)?;
-        check_finite("velocity", qd_rad_s, j)?;
+        check_finite("angle", record.q_rad(), j)?;
+        check_finite("velocity", record.qd_rad_s(), j)?;
         let FitScratch { time, fft, q, qd, .. } = scratch;
-        self.analyse(q_rad.joint(j), time, fft, q);
-        self.analyse(qd_rad_s.joint(j), time, fft, qd);
+        let [of_q, of_qd] = record.rounding(j);
+        self.transform(record.q_rad().joint(j), time, fft, q);
+        q.average(self.samples_per_period, of_q);
+        self.transform(record.qd_rad_s().joint(j), time, fft, qd);
+        qd.average(self.samples_per_period, of_qd);
         if q.coherence(qd, &self.bands) > COMPUTED {
             qd.silence();
         }
+        let streams = TrialStreams::new(0, b"rounding that repeats", 0);
+        q.scatter_rounding(streams.stream(Channel::Position, j));
+        qd.scatter_rounding(streams.stream(Channel::Velocity, j));
         Ok(())
     }
 
-    /// Step 1: coefficients of every period, their mean, and their scatter pooled over bands.
-    fn analyse(&self, y: &[f64], time: &mut Vec<f64>, fft: &mut Vec<Complex64>, out: &mut Spectra) {
+    /// Coefficients of every period of `y`.
+    fn transform(
+        &self,
+        y: &[f64],
+        time: &mut Vec<f64>,
+        fft: &mut Vec<Complex64>,
+        out: &mut Spectra,
+    ) {
         let n = self.samples_per_period;
         let bins = n / 2 + 1;
         let scale = 1.0 / n as f64;
@@ -317,7 +316,6 @@ impl PeriodicFit {
                 .expect("all buffers have the plan's own lengths");
             spectrum.iter_mut().for_each(|c| *c *= scale);
         }
-        out.average(y, n);
     }
 
     /// Steps 2 and 3: writes Q̂ into `scratch.series` and returns which harmonics are kept.

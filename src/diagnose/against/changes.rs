@@ -30,6 +30,9 @@ pub(super) struct Change<'a> {
     pub(super) site: Option<usize>,
     /// Whitened column of each coefficient; zero where it has no effect.
     pub(super) images: Vec<Image>,
+    /// Base parameters that each coefficient adds to those of the arm; empty for changes that are no difference of its
+    /// parameters.
+    pub(super) base: Vec<Vec<f64>>,
     quantities: Quantities<'a>,
     /// Columns of a change of this size, for changes whose torque is not proportional to their size.
     pub(super) secants: Option<Secants<'a>>,
@@ -89,26 +92,33 @@ pub(super) fn all<'a>(
     let scene = &study.scene;
     let joints = scene.joints();
     let layout = ParameterLayout::new(joints);
-    let image = |parameter: Parameter| {
+    let base = |parameter: Parameter| {
         let mut standard = vec![0.0; layout.count()];
         standard[layout.index(parameter)] = 1.0;
-        combined(&study.null_columns, &set.values(&standard))
+        set.values(&standard)
+    };
+    let images = |base: &[Vec<f64>]| -> Vec<Image> {
+        base.iter().map(|theta| combined(&study.null_columns, theta)).collect()
     };
     let last = joints - 1;
+    let body: Vec<Vec<f64>> = (0..10).map(|k| base(Parameter::Body(last, k))).collect();
     let mut out = vec![Change {
         kind: Kind::Payload,
         site: None,
-        images: (0..10).map(|k| image(Parameter::Body(last, k))).collect(),
+        images: images(&body),
+        base: body,
         quantities: Box::new(payload),
         secants: None,
         in_words: "a body on the flange",
         separating_experiment: "the same motion with the flange bare",
     }];
     for j in 0..joints {
+        let of_friction = [Parameter::Coulomb(j), Parameter::Viscous(j)].map(base);
         out.push(Change {
             kind: Kind::FrictionChange,
             site: Some(j),
-            images: [Parameter::Coulomb(j), Parameter::Viscous(j)].map(image).into(),
+            images: images(&of_friction),
+            base: of_friction.into(),
             quantities: Box::new(friction),
             secants: None,
             in_words: "friction that is not what the simulation assumes",
@@ -118,6 +128,7 @@ pub(super) fn all<'a>(
             kind: Kind::TorqueGain,
             site: Some(j),
             images: vec![study.torque_on(j, fitted_nm.joint(j))],
+            base: Vec::new(),
             // Of the recorded torque (1 + e) τ, the share e/(1 + e) is too much, whatever else changed.
             quantities: Box::new(|b| {
                 let error = b[0].filter(|b| *b < 1.0).map(|b| b / (1.0 - b));
@@ -164,6 +175,7 @@ fn of_family<'a>(
         kind: family.kind(),
         site,
         images: columns.iter().map(|c| study.whitening.image(c)).collect(),
+        base: Vec::new(),
         quantities: Box::new(move |b| of_told(b, |b| family.quantities(scene, site, shape, b))),
         secants: Some(Box::new(move |simulated, b| {
             let columns = family.secants(simulated, site, b)?;

@@ -164,7 +164,8 @@ pub fn explain(
     let mut search = Search { study, changes, images, places, unknown, nuisance, residual };
     let mut taken = search.select();
     if taken.iter().any(|c| search.changes[*c].secants.is_some()) {
-        search.set_to_size(&taken, &Scene::new(arm, set, theta, &study.regression.prepared));
+        let prepared = &study.regression.prepared;
+        search.set_to_size(&taken, theta, |theta| Scene::new(arm, set, theta, prepared));
         taken = search.select();
     }
     // An accepted effect may have been the part of a change that the null model could not absorb.

@@ -20,6 +20,8 @@ use super::changes::{Change, combined};
 
 /// Largest tilt, zero or length at which a change is evaluated, rad or m.
 const LARGEST: f64 = 0.5;
+/// Rounds in which the changes are set to their size: each changes what the others are estimated to be.
+const SIZING: usize = 2;
 /// Maximum number of changes.
 const MOST_CHANGES: usize = 8;
 /// Rounds in which one change is added and others are removed; bounded because two may replace each other for ever.
@@ -146,22 +148,47 @@ impl Search<'_> {
     }
 
     /// Replaces the columns of the changes `taken`, which are those of small changes of the identified arm, by those of
-    /// their size in the `simulated` arm: the identified one has taken most of a change up already.
-    pub(super) fn set_to_size(&mut self, taken: &[usize], simulated: &Scene) {
-        for (index, &c) in taken.iter().enumerate() {
-            let Some(secants) = &self.changes[c].secants else { continue };
-            let (others, left) = self.outside(&without(taken, index));
-            let (span, places) = Span::telling(&others, &self.images[c]);
-            let mut b = vec![0.0; self.images[c].len()];
-            let told = span.solve(&left).into_iter().zip(places);
-            for (value, (place, _)) in told.filter(|(_, (_, is_told))| *is_told) {
-                b[place] = value.clamp(-LARGEST, LARGEST);
-            }
-            if let Some(images) = secants(simulated, &b) {
-                self.images[c] = self.unknown.whitened(images.clone());
-                self.changes[c].images = images;
+    /// their size in the arm of the simulation with the base parameters `theta`: the identified one has taken most of a
+    /// change up already. What the other changes add to the parameters counts: a zero that is off is felt the more, the
+    /// more the flange carries. `scene` is the scene of an arm with given base parameters.
+    pub(super) fn set_to_size(
+        &mut self,
+        taken: &[usize],
+        theta: &[f64],
+        scene: impl Fn(&[f64]) -> Scene,
+    ) {
+        for _ in 0..SIZING {
+            for (index, &c) in taken.iter().enumerate() {
+                let Some(secants) = &self.changes[c].secants else { continue };
+                let mut theta = theta.to_vec();
+                for (other, &o) in taken.iter().enumerate() {
+                    for (b, base) in
+                        self.coefficients(taken, other).iter().zip(&self.changes[o].base)
+                    {
+                        theta.iter_mut().zip(base).for_each(|(theta, base)| *theta += b * base);
+                    }
+                }
+                let b = self.coefficients(taken, index);
+                let b: Vec<f64> = b.iter().map(|b| b.clamp(-LARGEST, LARGEST)).collect();
+                if let Some(images) = secants(&scene(&theta), &b) {
+                    self.images[c] = self.unknown.whitened(images.clone());
+                    self.changes[c].images = images;
+                }
             }
         }
+    }
+
+    /// Coefficients of change `taken[index]` beside the others; zero where the data do not determine them.
+    fn coefficients(&self, taken: &[usize], index: usize) -> Vec<f64> {
+        let images = &self.images[taken[index]];
+        let (others, left) = self.outside(&without(taken, index));
+        let (span, places) = Span::telling(&others, images);
+        let mut b = vec![0.0; images.len()];
+        let told = span.solve(&left).into_iter().zip(places);
+        for (value, (place, _)) in told.filter(|(_, (_, is_told))| *is_told) {
+            b[place] = value;
+        }
+        b
     }
 
     /// Whether effect number `e` of those `beside` is worth its price beside the other effects and the changes `taken`.

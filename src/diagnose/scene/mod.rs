@@ -116,7 +116,8 @@ impl Scene {
         let periodic = prepared.replicates.is_some();
         let mean_of =
             |y: &JointSignals| y.map_joints(|_, y| mean_period(y, prepared.motion.samples()));
-        let recorded = prepared.recorded.as_ref().map(|both| both.each_ref().map(mean_of));
+        let recorded =
+            prepared.recorded.as_ref().map(|both| [both.q_rad(), both.qd_rad_s()].map(mean_of));
         let motion = prepared.motion.clone();
         let (arm, offset_nm) = equivalent_arm(nominal, set, theta);
         let (joints, n) = (motion.joints(), motion.samples());

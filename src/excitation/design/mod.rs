@@ -31,4 +31,4 @@ pub use prediction::{Experiment, Prediction};
 pub use run::{Budget, Design, Finalist, design, parameter_scales};
 pub use search::Progress;
 pub use space::Variables;
-pub use specification::Specification;
+pub use specification::{LONGEST_S, Specification};

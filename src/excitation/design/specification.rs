@@ -38,7 +38,7 @@ const HIGHEST_ORDER: usize = 100;
 /// Largest number of starts; this many take hours.
 const MOST_STARTS: usize = 100_000;
 /// Longest data, s: the whole motion is checked against the limits, which takes minutes for a day.
-const LONGEST_S: f64 = 86_400.0;
+pub const LONGEST_S: f64 = 86_400.0;
 
 impl Specification {
     /// Checks that the specification can be met by `arm`.

@@ -26,7 +26,8 @@ pub(super) fn at_rest_in_words(at_rest: &[usize]) -> String {
 pub struct Declined {
     robot: String,
     log: String,
-    processing: Processing,
+    /// `None` where nothing moves.
+    processing: Option<Processing>,
     base_parameters: Vec<BaseParameter>,
     standard_parameters: Option<Vec<()>>,
     not_identified: Vec<String>,
@@ -36,6 +37,8 @@ pub struct Declined {
     /// Joints (0-based) that stand still throughout.
     #[serde(skip)]
     at_rest: Vec<usize>,
+    #[serde(skip)]
+    joints: usize,
     verdict: &'static str,
 }
 
@@ -43,23 +46,36 @@ impl Declined {
     /// Declines the estimate; `parameters` are the names of base parameters whose columns vanish or depend on the
     /// others.
     pub fn new(arm: &Arm, logs: &[&Log], regression: &Regression, parameters: Vec<String>) -> Self {
-        let of_the_logs = logs.iter().flat_map(|log| log_warnings(log));
+        let mut declined = Self::at_rest(arm, logs, parameters);
+        declined.processing = Some(regression.prepared.processing.clone());
+        declined.warnings.extend(regression.prepared.warnings.iter().cloned());
+        declined.at_rest = resting_joints(&regression.course().qd_rad_s);
+        declined
+    }
+
+    /// Declines the estimate from logs in which no joint moves; `parameters` are the names of all base parameters.
+    pub fn at_rest(arm: &Arm, logs: &[&Log], parameters: Vec<String>) -> Self {
         Self {
             robot: arm.name.clone(),
             log: names(logs),
-            processing: regression.prepared.processing.clone(),
+            processing: None,
             base_parameters: Vec::new(),
             standard_parameters: None,
             not_identified: parameters,
-            warnings: of_the_logs.chain(regression.prepared.warnings.iter().cloned()).collect(),
+            warnings: logs.iter().flat_map(|log| log_warnings(log)).collect(),
             rows: Rows::of(logs),
-            at_rest: resting_joints(&regression.course().qd_rad_s),
+            at_rest: (0..arm.dof()).collect(),
+            joints: arm.dof(),
             verdict: NOT_IDENTIFIED,
         }
     }
 
     /// The verdict in a sentence.
     pub fn sentence(&self) -> String {
+        if self.at_rest.len() == self.joints {
+            return "Declined: no joint moves. Record a motion that excites all parameters (armid excite)."
+                .to_owned();
+        }
         format!(
             "Declined: this motion does not identify the arm. {}Along it the columns of {} vanish or \
              depend on the others to within rounding. Record a motion that excites them (armid \

@@ -361,9 +361,14 @@ impl Result {
         let open = match self.not_identified.len() {
             0 => String::new(),
             n => format!(
-                " {n} moments of inertia of light bodies stay open ({}): the torque of this motion depends on \
-                 them too little.",
-                self.not_identified.join(", ")
+                " {n} {} open ({}): the torque of this motion depends on {} too little.",
+                if n == 1 {
+                    "moment of inertia of a light body stays"
+                } else {
+                    "moments of inertia of light bodies stay"
+                },
+                self.not_identified.join(", "),
+                if n == 1 { "it" } else { "them" },
             ),
         };
         let distrust = match self.intervals.trusted {

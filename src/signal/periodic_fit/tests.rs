@@ -14,14 +14,15 @@ fn motion(joint: usize, t: f64, period_s: f64) -> [f64; 3] {
     })
 }
 
-fn record(n: usize, p: usize, sigma: [f64; 2], seed: u64) -> [JointSignals; 2] {
+fn record(n: usize, p: usize, sigma: [f64; 2], seed: u64) -> PeriodicRecord {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut noise = || -> f64 { StandardNormal.sample(&mut rng) };
-    [0, 1].map(|i| {
+    let [q_rad, qd_rad_s] = [0, 1].map(|i| {
         JointSignals::from_fn(6, n * p, |j, k| {
             motion(j, k as f64 / RATE_HZ, n as f64 / RATE_HZ)[i] + sigma[i] * noise()
         })
-    })
+    });
+    PeriodicRecord::new(q_rad, qd_rad_s, n)
 }
 
 fn rms_error(found: &JointSignals, j: usize, which: usize) -> f64 {
@@ -37,9 +38,9 @@ fn rms_error(found: &JointSignals, j: usize, which: usize) -> f64 {
 #[test]
 fn without_noise_the_derivatives_are_exact_to_rounding() {
     for n in [1250, 1251] {
-        let [q, qd] = record(n, 3, [0.0, 0.0], 0);
+        let record = record(n, 3, [0.0, 0.0], 0);
         let fit = PeriodicFit::new(n, 3, RATE_HZ).unwrap();
-        let m = fit.fit(&q, &qd, &mut FitScratch::default()).unwrap();
+        let m = fit.fit(&record, &mut FitScratch::default()).unwrap();
         for j in 0..6 {
             assert!(m.harmonics[j] >= 5);
             // Rounding of a coefficient, 1e-16, grows by ω and ω² of the highest harmonic.
@@ -58,8 +59,8 @@ fn each_period_is_the_motion_with_its_own_noise() {
     let (n, p) = (1250, 4);
     let fit = PeriodicFit::new(n, p, RATE_HZ).unwrap();
     let mut scratch = FitScratch::default();
-    let [q, qd] = record(n, p, [0.0, 0.0], 0);
-    let each = fit.each_period(&q, &qd, 0.32, &mut scratch).unwrap();
+    let record = self::record(n, p, [0.0, 0.0], 0);
+    let each = fit.each_period(&record, 0.32, &mut scratch).unwrap();
     for (which, found) in each.iter().enumerate() {
         // Rounding, 1e-16 of an angle, grows by ω ≤ 2π 0.32 · 125 rad/s per derivative.
         let limit = 1e-14 * 251.0f64.powi(which as i32);
@@ -68,9 +69,9 @@ fn each_period_is_the_motion_with_its_own_noise() {
             assert!((found.joint(j)[k] - truth).abs() < limit, "joint {j}, sample {k}");
         }
     }
-    let [q, qd] = record(n, p, [2e-5, 1e-3], 1);
-    let [found, ..] = fit.each_period(&q, &qd, 0.32, &mut scratch).unwrap();
-    let mean = fit.fit(&q, &qd, &mut scratch).unwrap().q_rad;
+    let record = self::record(n, p, [2e-5, 1e-3], 1);
+    let [found, ..] = fit.each_period(&record, 0.32, &mut scratch).unwrap();
+    let mean = fit.fit(&record, &mut scratch).unwrap().q_rad;
     // Angle and velocity together have the variance 1/(1/σ_q² + ω²/σ_q̇²) per harmonic. For each harmonic the fit
     // contains the mean of the periods, or nothing: (P − 1)/P of the variance, or all of it, is scatter. Some 650
     // degrees of freedom determine the rms of a joint to 2.8 %; the limit is four times that, one seed in 2000.
@@ -89,15 +90,15 @@ const TRIALS: u64 = 40;
 
 /// Mean ratio of the squared error of the acceleration to the predicted one, and the number of joints with too much
 /// noise, over records of eight periods of 1250 samples.
-fn of_claimed(record: impl Fn(u64) -> [JointSignals; 2]) -> (f64, usize) {
+fn of_claimed(record: impl Fn(u64) -> PeriodicRecord) -> (f64, usize) {
     let (n, p) = (1250, 8);
     let fit = PeriodicFit::new(n, p, RATE_HZ).unwrap();
     let mut scratch = FitScratch::default();
     let mut ratio = 0.0;
     let mut too_noisy = 0;
     for seed in 0..TRIALS {
-        let [q, qd] = record(seed);
-        let m = fit.fit(&q, &qd, &mut scratch).unwrap();
+        let record = record(seed);
+        let m = fit.fit(&record, &mut scratch).unwrap();
         for j in 0..6 {
             let noise = m.acceleration[j].noise.iter().sum::<f64>();
             let square = (0..n)
@@ -130,13 +131,13 @@ fn with_noise_the_claimed_noise_of_the_acceleration_holds() {
 #[test]
 fn slopes_of_the_angle_are_no_second_measurement() {
     let (mean, _) = of_claimed(|seed| {
-        let [q, _] = record(1250, 8, [2e-5, 0.0], seed);
+        let q = record(1250, 8, [2e-5, 0.0], seed).q_rad().clone();
         let slope = |y: &[f64], k: usize| {
             let at = |by: usize| y[(k + y.len() + by - 2) % y.len()];
             (at(0) - 8.0 * at(1) + 8.0 * at(3) - at(4)) / 12.0 * RATE_HZ
         };
         let qd = q.map_joints(|_, y| (0..y.len()).map(|k| slope(y, k)).collect());
-        [q, qd]
+        PeriodicRecord::new(q, qd, 1250)
     });
     assert!((mean - 1.0).abs() < 0.15, "squared error / claimed variance = {mean}");
 }
@@ -149,9 +150,9 @@ fn deviations_over_the_root_of_the_periods_are_the_errors_of_the_mean() {
     let mut scratch = FitScratch::default();
     let (mut errors, mut claimed) = ([0.0; 3], [0.0; 3]);
     for seed in 0..TRIALS {
-        let [q, qd] = record(n, p, [2e-5, 1e-3], seed);
-        let mean = fit.fit(&q, &qd, &mut scratch).unwrap();
-        let deviations = fit.deviations(&q, &qd, &mut scratch).unwrap();
+        let record = record(n, p, [2e-5, 1e-3], seed);
+        let mean = fit.fit(&record, &mut scratch).unwrap();
+        let deviations = fit.deviations(&record, &mut scratch).unwrap();
         let means = [&mean.q_rad, &mean.qd_rad_s, &mean.qdd_rad_s2];
         for (which, (mean, off)) in means.into_iter().zip(&deviations).enumerate() {
             for j in 0..6 {
@@ -178,8 +179,8 @@ fn much_noise_ends_the_series_with_the_motion() {
     let fit = PeriodicFit::new(n, p, RATE_HZ).unwrap();
     let mut too_many = 0;
     for seed in 0..40 {
-        let [q, qd] = record(n, p, [1e-2, 3e-1], seed);
-        let m = fit.fit(&q, &qd, &mut FitScratch::default()).unwrap();
+        let record = record(n, p, [1e-2, 3e-1], seed);
+        let m = fit.fit(&record, &mut FitScratch::default()).unwrap();
         too_many += m.harmonics.iter().filter(|h| **h != BAND_HARMONICS).count();
     }
     // 240 joints with a probability of 1 % each: more than 9 of them in 5e-4 of the runs.
@@ -191,19 +192,21 @@ fn what_cannot_be_fitted_is_refused() {
     assert!(matches!(PeriodicFit::new(100, 1, 125.0), Err(SignalError::Periods { .. })));
     assert!(matches!(PeriodicFit::new(4, 2, 125.0), Err(SignalError::TooFewSamples { .. })));
     let fit = PeriodicFit::new(100, 2, 125.0).unwrap();
-    let short = JointSignals::zeros(6, 199);
+    let zeros = |samples| JointSignals::zeros(6, samples);
+    let short = PeriodicRecord::new(zeros(199), zeros(199), 100);
     let mut scratch = FitScratch::default();
     assert!(matches!(
-        fit.fit(&short, &short, &mut scratch),
+        fit.fit(&short, &mut scratch),
         Err(SignalError::Mismatch { expected: 200, found: 199, .. })
     ));
-    let good = JointSignals::zeros(6, 200);
-    let still = fit.fit(&good, &good, &mut scratch).unwrap();
+    let good = PeriodicRecord::new(zeros(200), zeros(200), 100);
+    let still = fit.fit(&good, &mut scratch).unwrap();
     assert_eq!(still.harmonics, [0; 6]);
-    let mut bad = good.clone();
+    let mut bad = zeros(200);
     bad.joint_mut(4)[17] = f64::NAN;
+    let bad = PeriodicRecord::new(zeros(200), bad, 100);
     assert!(matches!(
-        fit.fit(&good, &bad, &mut scratch),
+        fit.fit(&bad, &mut scratch),
         Err(SignalError::NotFinite { what: "velocity", joint: 4, sample: 17, .. })
     ));
 }
