@@ -15,6 +15,7 @@ use super::verdict::Cause;
 use crate::identify::Measurement;
 use crate::median::{median, sigma_of_changes};
 use crate::robot::JointSignals;
+use crate::signal::resolution;
 
 /// Least number of wild readings in one channel of a joint: fewer are an accident, and no fault of the channel. They are
 /// replaced only where they are so many standard deviations off that nothing but an accident can be meant.
@@ -22,6 +23,8 @@ const FEWEST: usize = 3;
 const ACCIDENT: f64 = 50.0;
 /// An angle that is off by less than this share of its usual change between two rows is not wild.
 const SMALL_STRAY: f64 = 0.5;
+/// Readings that flicker by so many steps of their resolution, as those of a joint at rest, are not wild.
+const STEPS_OFF: f64 = 3.0;
 /// A time stamp may be off by this many steps: a deviation no larger than what the joint travels in that time is not
 /// wild.
 const STAMPS_OFF: f64 = 1.5;
@@ -161,12 +164,16 @@ fn replace(
     found: Vec<(usize, Vec<Stray>)>,
 ) -> Vec<Strays> {
     let meant = found.into_iter().map(|(joint, mut far)| {
+        let least = STEPS_OFF * resolution(signals.joint(joint));
+        far.retain(|stray| stray.off.abs() > least);
         if far.len() < FEWEST {
             far.retain(|stray| stray.sigmas > ACCIDENT);
         }
         (joint, far)
     });
+    let meant: Vec<(usize, Vec<Stray>)> = meant.collect();
     meant
+        .into_iter()
         .filter(|(_, far)| !far.is_empty())
         .map(|(joint, far)| {
             let y = signals.joint_mut(joint);
@@ -334,6 +341,19 @@ mod tests {
         let mut steps = moves_and_rests(4.0, 0.3);
         steps.torque_nm.joint_mut(0)[1200..1700].iter_mut().for_each(|t| *t += 30.0);
         assert_eq!(mend(&mut steps).len(), 0);
+    }
+
+    /// The last digit of a joint at rest flickers.
+    #[test]
+    fn a_last_digit_is_not_wild() {
+        let mut rest = moves_and_rests(4.0, 0.3);
+        rest.q_rad.joint_mut(0).fill(0.5);
+        rest.qd_rad_s.joint_mut(0).fill(0.0);
+        for row in (50..3000).step_by(41) {
+            rest.q_rad.joint_mut(0)[row] += 1e-4;
+            rest.qd_rad_s.joint_mut(0)[row + 7] -= 1e-4;
+        }
+        assert_eq!(mend(&mut rest).len(), 0);
     }
 
     /// One or two wild readings are replaced and told, but are no fault of their channel. What is only 17 standard
