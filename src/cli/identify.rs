@@ -321,12 +321,12 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         misread: misread.as_ref(),
     };
     // An error in a later step must not discard the identification.
-    let mut failed: Option<Box<dyn std::error::Error>> = None;
+    let mut failed: Vec<String> = Vec::new();
     let mut validations = Vec::new();
     for log in &validation_logs {
         match validate(&arm, &mut identifier, log, &identification.fit.theta) {
             Ok(validation) => validations.push(validation),
-            Err(error) => failed = Some(error),
+            Err(error) => failed.push(error.to_string()),
         }
     }
     let mut result = IdentifyResult::of(&training, &validations)?;
@@ -339,7 +339,7 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         let Identification { fit, covariance, .. } = &identification;
         match physical::solve(&arm, &set, fit, covariance, &options) {
             Ok(estimate) => result.set_physical(&estimate, &training),
-            Err(error) => failed = Some(error.into()),
+            Err(error) => failed.push(error.to_string()),
         }
     }
     say!("{}", parameter_table(&result).to_text());
@@ -367,10 +367,10 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         page(&result, &training, &validations, program)?.write(path)?;
         say!("report: {}", path.display());
     }
-    match failed {
-        Some(error) => Err(error),
-        None if result.is_declined() || result.is_contradicted() => Ok(Outcome::Negative),
-        None => Ok(Outcome::Done),
+    match failed.is_empty() {
+        false => Err(failed.join("; ").into()),
+        true if result.is_declined() || result.is_contradicted() => Ok(Outcome::Negative),
+        true => Ok(Outcome::Done),
     }
 }
 
@@ -430,5 +430,6 @@ fn validate(
     let mut validation = Validation::new(&log.log, &regression, manufacturer.as_ref(), theta);
     let with_name = |warning| format!("{}: {warning}", log.log.source);
     validation.warnings.extend(warnings.into_iter().map(with_name));
+    validation.warnings.extend(log.mended.iter().cloned());
     Ok(validation)
 }

@@ -117,15 +117,13 @@ impl<'a> Even<'a> {
     }
 
     /// Angles and velocities as they were read, in the rows from which a decimator made the samples `window`, and how
-    /// many rows make one sample. `None` where samples are no rows of `m` behind a decimator.
-    pub(super) fn as_read(
-        &self,
-        m: &Measurement,
-        window: Range<usize>,
-    ) -> Option<([JointSignals; 2], usize)> {
-        let every = self.fine.as_ref().filter(|_| !self.resampled)?.decimator.every();
-        let rows = window.start * every..(window.end * every).min(m.time_s.len());
-        Some(([m.q_rad.slice(rows.clone()), m.qd_rad_s.slice(rows)], every))
+    /// many rows make one sample. `None` where samples are not rows of the log behind a decimator.
+    pub(super) fn as_read(&self, window: &Range<usize>) -> Option<([JointSignals; 2], usize)> {
+        let Fine { signals: [q_rad, qd_rad_s, _], decimator } =
+            self.fine.as_ref().filter(|_| !self.resampled)?;
+        let every = decimator.every();
+        let rows = window.start * every..(window.end * every).min(q_rad.samples());
+        Some(([q_rad.slice(rows.clone()), qd_rad_s.slice(rows)], every))
     }
 
     /// Angle, velocity and torque in the samples `window` of a motion that repeats every `samples_per_period` samples.

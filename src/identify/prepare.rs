@@ -163,7 +163,7 @@ impl Preparer {
         let fit = self.periodic_fit(samples_per_period, periods, even.rate_hz)?;
         let [q_rad, qd_rad_s, torque_nm] =
             even.repeated(&window, samples_per_period, &mut self.filter)?;
-        let rows = even.as_read(m, window.clone());
+        let rows = even.as_read(&window);
         let record = match &rows {
             Some((rows, every)) => PeriodicRecord::decimated(
                 [q_rad, qd_rad_s],

@@ -10,6 +10,8 @@ use super::{Covariance, CovarianceError, CovarianceKind, CovarianceMethod};
 use crate::dot::dot;
 use crate::identify::fit::Fit;
 use crate::identify::problem::{Domain, Problem};
+use crate::robot::JointSignals;
+use crate::signal::replicate_noise;
 
 /// V = A⁻¹ (Σ_b G̃_b G̃_bᵀ) A⁻¹ with A = XᵀW²X over B blocks of time with the scores G_b = Σ_{t in block b}
 /// X_tᵀW²e_t.
@@ -71,16 +73,11 @@ impl CovarianceMethod for BlockCluster {
     }
 }
 
-/// Torques of two periods are copies if they differ by no more than this share, the last digits.
-const LAST_DIGITS: f64 = 1e-9;
-
-/// Whether the torque of all periods is that of the first.
+/// Whether the torque of all periods is that of the first; false for a single one.
 fn are_copies(problem: &Problem) -> bool {
-    let is_own = |(y, own): (&f64, &f64)| (y - own).abs() <= LAST_DIGITS * own.abs();
-    problem.panels.iter().all(|panel| {
-        let (first, later) = panel.y.split_at(problem.samples.min(panel.y.len()));
-        later.iter().zip(first.iter().cycle()).all(is_own)
-    })
+    let Problem { panels, samples, periods, .. } = problem;
+    let torque = JointSignals::from_fn(panels.len(), samples * periods, |j, k| panels[j].y[k]);
+    replicate_noise(&torque, *samples).is_ok_and(|replicates| replicates.are_alike())
 }
 
 /// Share of one block in the information of the whole record.
