@@ -323,7 +323,7 @@ impl<'a> Diagnoser<'a> {
             evidence_behind: selected.contender.evidence - rival.evidence,
         });
         let effect = &extension.effects[index];
-        let parameters = intervals::physical(study, kept, effect, index);
+        let parameters = intervals::physical(study, kept, &extension.effects, index);
         let Effect { site, shape, coefficients, .. } = effect;
         // Only for laws with one coefficient: one of several coefficients may be zero although the others are not.
         let size = (coefficients.len() == 1)

@@ -4,9 +4,11 @@ use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
+use super::bristles::Curve;
 use super::candidates::{Candidate, Shape};
 use super::drives::Answer;
 use super::image::{Column, Image, Span};
+use super::kind::Kind;
 use super::scene::{OtherFriction, SHARPEST, Scene, Turn};
 use super::study::{Entry, Study};
 use super::whitening::Whitening;
@@ -139,7 +141,8 @@ impl Extension {
             let (change, others): (Vec<_>, Vec<_>) =
                 kinds.partition(|kind| kind.changes_friction());
             let is_product = change.len() > 1 || others.iter().any(|kind| kind.adds_friction());
-            if !change.is_empty() && is_product {
+            let is_held = [Kind::Presliding, Kind::Stribeck].iter().all(|k| others.contains(k));
+            if !change.is_empty() && is_product || is_held {
                 tell_friction(&self.told, families, &mut scene, j);
             }
         }
@@ -204,6 +207,7 @@ pub(super) fn tell_friction(
 ) {
     let (mut change_rad_s, mut turn) = (0.0, None);
     let mut warm = 1.0;
+    let (mut bristles, mut near_rest) = (None, None);
     for Effect { family, shape, coefficients, .. } in on_joint(effects, j) {
         if let Some((change, fed)) = families[*family].turning(*shape, coefficients) {
             let epsilon = scene.arm.friction_epsilon_rad_s;
@@ -213,8 +217,14 @@ pub(super) fn tell_friction(
             turn = Some(Turn { width_rad_s, fed });
         }
         warm *= families[*family].warm(scene, *shape, coefficients).unwrap_or(1.0);
+        bristles = bristles.or(families[*family].bristles(*shape, coefficients));
+        let curve = families[*family].near_rest_nm(coefficients).map(|nm| (nm, *shape));
+        near_rest = near_rest.or(curve);
     }
-    let mut other = OtherFriction { turn, torque_nm: Vec::new(), warm };
+    if let (Some(bristles), Some((nm, shape))) = (&mut bristles, near_rest) {
+        bristles.curve = Some(Curve { share: nm / bristles.coulomb_nm, shape });
+    }
+    let mut other = OtherFriction { turn, bristles, torque_nm: Vec::new(), warm };
     // The other laws depend on how friction turns round.
     scene.set_other_friction(j, other.clone());
     for effect in on_joint(effects, j).filter(|e| families[e.family].kind().adds_friction()) {

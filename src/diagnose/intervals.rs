@@ -11,6 +11,7 @@ use super::candidates::Candidate;
 use super::candidates::{Quantity, Search, Shape};
 use super::extension::{Effect, Extension};
 use super::image::{Image, Span};
+use super::kind::Kind;
 use super::selection::Kept;
 use super::study::{Entry, Study};
 use super::verdict::{BaseParameter, Estimate};
@@ -103,7 +104,8 @@ pub struct Base {
 /// Physical parameters of a cause, with 95 % intervals.
 ///
 /// For a motion that repeats, the nonlinear parameter is varied value by value: its interval is that of the profile
-/// likelihood (Venzon and Moolgavkar 1988), which need not be symmetric. Where the family has several forms (Stribeck's
+/// likelihood (Venzon and Moolgavkar 1988), which need not be symmetric. The coefficients of the other causes are free
+/// then, and so is the shape of the curve that bristles hold, or of the bristles. Where the family has several forms (Stribeck's
 /// exponent, the stiffness of a gear's flanks), the interval covers all forms that the log allows. With D = 2 ln of the
 /// odds against a form and q the 95 % quantile, the interval of that form is shrunk by √(1 − D/q²); it ends where the
 /// likelihood is below that of the best form by q².
@@ -114,10 +116,17 @@ pub struct Base {
 pub fn physical(
     study: &Study,
     kept: &Kept,
-    effect: &Effect,
+    effects: &[Effect],
     index: usize,
 ) -> BTreeMap<&'static str, Estimate> {
-    let (others, residual) = kept.without(Some(index));
+    let effect = &effects[index];
+    let (mut others, mut residual) = kept.without(Some(index));
+    for other in effects.iter().filter(|other| are_of_one_law(study, effect, other)) {
+        for tangent in tangents_outside_null(study, other) {
+            others.push(&tangent);
+        }
+    }
+    others.residualise(&mut residual);
     let span = tangent_span(study, &others, effect);
     let quantile = study.statistic.quantile_95(&span, &residual);
     let has_profile = study.scene.periodic && has_nonlinear_parameter(study, effect);
@@ -277,14 +286,23 @@ impl Profile<'_> {
     }
 }
 
+/// Whether one of two effects is a curve that the bristles of the other hold.
+fn are_of_one_law(study: &Study, one: &Effect, other: &Effect) -> bool {
+    let kinds = [one, other].map(|effect| study.families[effect.family].kind());
+    let is_law = [Kind::Presliding, Kind::Stribeck].iter().all(|kind| kinds.contains(kind));
+    study.scene.periodic && is_law && one.site == other.site
+}
+
+/// The [`tangents`] of `effect`, with the null model projected out.
+fn tangents_outside_null(study: &Study, effect: &Effect) -> Vec<Image> {
+    let mut tangents = tangents(study, effect);
+    study.null.residualise_all(&mut tangents);
+    tangents
+}
+
 /// Span of the [`tangents`] of `effect` outside the null model and outside `others`.
 fn tangent_span(study: &Study, others: &Span, effect: &Effect) -> Span {
-    let outside_null = |mut image: Image| {
-        study.null.residualise(&mut image);
-        image
-    };
-    let tangents: Vec<Image> = tangents(study, effect).into_iter().map(outside_null).collect();
-    Span::outside(others, &tangents)
+    Span::outside(others, &tangents_outside_null(study, effect))
 }
 
 /// Parameters of one form by the delta method, with intervals of ± `half` σ. `span` holds the tangents of coefficients

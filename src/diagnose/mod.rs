@@ -22,6 +22,7 @@ pub mod candidates;
 
 mod against;
 mod arm_in_doubt;
+mod bristles;
 pub mod chance;
 mod cleaned;
 mod clustered;

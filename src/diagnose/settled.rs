@@ -11,7 +11,7 @@ use super::extension::{Extension, tell_friction};
 use super::kind::Kind;
 use super::scene::OtherFriction;
 use super::selection::{Found, Kept};
-use super::significance::FAR_AHEAD;
+use super::significance::{FAR_AHEAD, LEAST_EVIDENCE};
 use super::study::{Entry, Place, Study};
 use crate::base::BaseSet;
 use crate::robot::{Arm, JointSignals};
@@ -80,12 +80,13 @@ fn in_turn<'s>(
     Ok((study, Found { causes, evidence }))
 }
 
-/// What was `found` with laws that change its friction, if that explains the log far better; the scene of `study` is then
-/// told of them.
+/// What was `found` with laws that change its friction, or that its bristles hold, if that explains the log far better;
+/// the scene of `study` is then told of them.
 ///
 /// Beside friction that falls with speed, say, no width of the reversal fits as long as the joint is taken to have
 /// Coulomb and viscous friction alone, and what falls with speed was fitted without the width. A law that changes the
-/// friction of others is therefore taken on trial, refined in turn with them, and only then has to be needed.
+/// friction of others is therefore taken on trial, refined in turn with them, and only then has to be needed; and so is
+/// a Stribeck curve on a joint with bristles.
 fn with_products(study: &mut Study, found: &Found) -> Option<Found> {
     let families = study.families;
     let joints = 0..study.scene.joints();
@@ -94,28 +95,37 @@ fn with_products(study: &mut Study, found: &Found) -> Option<Found> {
     let told = study.told.clone();
     let mut better: Option<Found> = None;
     for j in joints {
-        // Bristles have no width: their law says by itself how friction turns round.
-        let is_plain = |kind: Kind| kind.adds_friction() && kind != Kind::Presliding;
-        let is_on_joint = |c: &Contender| c.entry.site.is_none_or(|own| own == j);
         let start = better.as_ref().unwrap_or(found).causes.clone();
-        let is_multiplied =
-            |c: &Contender| is_on_joint(c) && is_plain(families[c.entry.family].kind());
-        if !start.iter().any(is_multiplied) {
+        let on_joint = start.iter().filter(|c| c.entry.site.is_none_or(|own| own == j));
+        let kinds: Vec<Kind> = on_joint.map(|c| families[c.entry.family].kind()).collect();
+        let has_bristles = kinds.contains(&Kind::Presliding);
+        // Bristles have no width: their law says by itself how friction turns round.
+        let is_plain = |kind: &Kind| kind.adds_friction() && *kind != Kind::Presliding;
+        let is_multiplied = kinds.iter().any(is_plain);
+        if !is_multiplied && !has_bristles {
             continue;
         }
         let changes = |(family, site): &Place| {
-            *site == Some(j) && families[*family].kind().changes_friction()
+            let kind = families[*family].kind();
+            let is_held = has_bristles && kind == Kind::Stribeck;
+            *site == Some(j) && (is_multiplied && kind.changes_friction() || is_held)
         };
         tell(study, &start, changes);
         let kept = Kept::taken_over(study, start);
         let (others, residual) = kept.without(None);
         let contenders = kept.contenders(None, &others, &residual).into_iter();
-        let on_trial: Vec<Contender> =
-            contenders.filter(|c| changes(&c.entry.place()) && c.evidence > FAR_AHEAD).collect();
+        // Bristles with a curve are no other model of the joint than bristles and a curve: the curve has to be
+        // significant beside them, and no more.
+        let margin = |(family, _): Place| {
+            if families[family].kind().changes_friction() { FAR_AHEAD } else { LEAST_EVIDENCE }
+        };
+        let on_trial: Vec<Contender> = contenders
+            .filter(|c| changes(&c.entry.place()) && c.evidence > margin(c.entry.place()))
+            .collect();
         for contender in on_trial {
             let place = contender.entry.place();
             let best = better.as_ref().unwrap_or(found);
-            let least = best.evidence + FAR_AHEAD;
+            let least = best.evidence + margin(place);
             let mut trial = best.causes.clone();
             trial.push(contender);
             for _ in 0..ROUNDS_OF_PRODUCTS {

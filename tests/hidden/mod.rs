@@ -28,10 +28,12 @@ pub enum Law {
     Dahl {
         stiffness_per_rad: f64,
     },
-    /// Bristles that are damped as well: σ₁/σ₀ is `damping_s`.
+    /// Bristles that are damped as well (σ₁/σ₀ is `damping_s`), and hold a Stribeck curve if `extra_nm` is not zero.
     LuGre {
         stiffness_per_rad: f64,
         damping_s: f64,
+        extra_nm: f64,
+        vs_rad_s: f64,
     },
     /// A reading that saturates at this share of the largest torque; noise is added afterwards.
     CutBeforeNoise {
@@ -121,7 +123,11 @@ impl Hidden {
         let excitation = Excitation::new(series, 2.0, self.periods).unwrap();
         // Stiff bristles need short integration steps.
         let step_s = match self.law {
-            Law::Dahl { stiffness_per_rad } if stiffness_per_rad > 1000.0 => 0.00025,
+            Law::Dahl { stiffness_per_rad } | Law::LuGre { stiffness_per_rad, .. }
+                if stiffness_per_rad > 800.0 =>
+            {
+                0.00025
+            }
             _ => PlantConfig::default().step_s,
         };
         // A delay is a whole number of rows in a log at 1 kHz.
@@ -302,13 +308,20 @@ impl Drivetrain for HiddenLaw {
             | Law::ZigzagOfTheCurrent { .. }
             | Law::Late { .. }
             | Law::LowPass { .. } => {}
-            Law::Dahl { stiffness_per_rad } | Law::LuGre { stiffness_per_rad, .. } => {
+            Law::Dahl { stiffness_per_rad } => {
                 let z = stage.states[0];
-                let rate = stiffness_per_rad * (v - v.abs() * z);
-                let damping_s =
-                    if let Law::LuGre { damping_s, .. } = self.law { damping_s } else { 0.0 };
+                states_rate[0] = stiffness_per_rad * (v - v.abs() * z);
+                self.link_nm[h] += drive.coulomb_nm * (sign - z);
+            }
+            Law::LuGre { stiffness_per_rad, damping_s, extra_nm, vs_rad_s } => {
+                // In the symbols of the model: σ₀, σ₁, g(v), and the mean deflection z of its bristles.
+                let sigma0 = stiffness_per_rad * drive.coulomb_nm;
+                let sigma1 = sigma0 * damping_s;
+                let g = drive.coulomb_nm + extra_nm * (-(v / vs_rad_s).powi(2)).exp();
+                let z = stage.states[0];
+                let rate = v - sigma0 * v.abs() / g * z;
                 states_rate[0] = rate;
-                self.link_nm[h] += drive.coulomb_nm * (sign - z - damping_s * rate);
+                self.link_nm[h] += drive.coulomb_nm * sign - sigma0 * z - sigma1 * rate;
             }
         }
         arm.forward_dynamics(stage.q_rad, stage.qd_rad_s, &self.link_nm, qdd);

@@ -30,6 +30,7 @@ mod thermal_drift;
 pub(super) mod time_skew;
 mod torque_gain;
 
+use super::bristles::Bristles;
 use super::image::Column;
 use super::kind::Kind;
 use super::scene::{Instants, Scene};
@@ -159,6 +160,16 @@ pub trait Candidate: Sync {
     /// Change of the width over which dry friction turns round, rad/s, and the share of it that the drive feeds forward,
     /// for the law that says so.
     fn turning(&self, _shape: Shape, _b: &[f64]) -> Option<(f64, f64)> {
+        None
+    }
+
+    /// Bristles of the joint, for the law that has them.
+    fn bristles(&self, _shape: Shape, _b: &[f64]) -> Option<Bristles> {
+        None
+    }
+
+    /// Friction near rest, Nm, that bristles of the joint hold, for the law that adds it.
+    fn near_rest_nm(&self, _b: &[f64]) -> Option<f64> {
         None
     }
 

@@ -4,9 +4,8 @@
 //! damping, so it does not take part in the search. Where presliding was found, it is a further form of the law, with
 //! F T as a second coefficient.
 //!
-//! z is propagated exactly along the motion. Over a stretch of length Δ in one direction s, z ← s + (z − s) e^{−kΔ}; a
-//! step within which the velocity reverses consists of two such stretches. Over a periodic motion, z is carried round
-//! until it repeats as well.
+//! Where the joint also has a Stribeck curve, the bristle holds it (LuGre): z then comes to rest at ±γ(q̇) ([`Bristles`]).
+//! The torque of both is F z, of which the curve's own column accounts for what z has more than without it.
 //!
 //! Stiff bristles turn round within a few samples, and how the samples show it depends on the torque that the drive
 //! gives meanwhile. A drive that feeds friction forward does so where the commanded velocity reverses. Real presliding
@@ -18,7 +17,7 @@
 //! (their rounding) demands. Without this play, rounding at standstill would shake the friction loose.
 
 use super::*;
-use crate::dynamics::Real;
+use crate::diagnose::bristles::{Bristles, DRIVES, Way, column};
 
 /// See the module.
 pub struct Presliding;
@@ -31,32 +30,6 @@ const TURN_RAD: f64 = 4.5e-6;
 const MOST_ERROR: f64 = 0.15;
 /// Range of stiffnesses that is searched, 1/rad.
 const STIFFNESSES_PER_RAD: [f64; 2] = [20.0, 100_000.0];
-
-/// How the drive of the joint reacts to friction that turns round, by variant.
-#[derive(Clone, Copy)]
-enum Drive {
-    /// It feeds forward a share of friction by the sign of the joint's velocity, or nothing.
-    BySign,
-    /// It feeds forward a share of friction by the sign of the commanded velocity, and has feedback of this bandwidth,
-    /// rad/s.
-    ByWantedVelocity(f64),
-    /// It gives exactly what the bristles take: the joint moves as commanded.
-    Bristles,
-}
-
-/// The drives that are tried. A bandwidth that is wrong by a factor of 1.7 moves 1/k by 2 % at most.
-const DRIVES: [Drive; 4] =
-    [Drive::BySign, Drive::ByWantedVelocity(30.0), Drive::ByWantedVelocity(80.0), Drive::Bristles];
-
-/// Share β of friction that drives feed forward by the commanded velocity, if they do. How much the actual share
-/// differs is left to the drive-answer columns of the null model.
-const FED: f64 = 0.9;
-/// Widths of the model's regularised sign beyond which it is complete up to 3e-7.
-const TURNED: f64 = 8.0;
-/// Smallest acceleration per torque that a joint may have as the arm moves, relative to its largest. No arm's inertia
-/// changes a thousandfold. Where an estimated inertia is not positive, the value that replaces it is off by more than
-/// that.
-const LEAST_MOBILITY: f64 = 1e-3;
 
 /// Variants from this one on have damped bristles, behind the same drives as [`DRIVES`].
 const DAMPED: usize = DRIVES.len();
@@ -71,166 +44,12 @@ const LEAST_SHARE: f64 = 0.7;
 /// give shares of 0.13 to 0.16, a soft gear 0.07.
 const LEAST_SHARE_OF_A_RUN: f64 = 0.25;
 
-/// Path of a joint from each of its instants to the next, rad.
-struct Way {
-    /// Path to the instant, or to the point before it where the joint turns round.
-    there: Vec<f64>,
-    /// Path from that turning point to the instant; 0 without one.
-    back: Vec<f64>,
-    /// Velocities at the instants, rad/s. For a periodic motion, they are differences of the angles between the
-    /// samples: the velocities of [`Instants`] are bent by the model's friction, not by bristles.
-    qd_rad_s: Vec<f64>,
-}
-
-impl Way {
-    fn new(scene: &Scene, j: usize) -> Self {
-        let Instants { q_rad, qd_rad_s, step_s, .. } = scene.instants(j);
-        let doubt_rad = scene.angle_doubt_rad[j];
-        let n = q_rad.len();
-        let (q, qd_rad_s) = if scene.periodic {
-            let rate = |k: usize| (q_rad[(k + 1) % n] - q_rad[(k + n - 1) % n]) / (2.0 * step_s);
-            (q_rad.clone(), (0..n).map(rate).collect())
-        } else {
-            (with_play(q_rad, doubt_rad), qd_rad_s.clone())
-        };
-        let first = if scene.periodic { n - 1 } else { 0 };
-        let before = std::iter::once(first).chain(0..n - 1);
-        let way = |(k, now): (usize, usize)| {
-            // An angle known only to its resolution allows no turning point between two instants.
-            if doubt_rad > 0.0 {
-                (q[now] - q[k], 0.0)
-            } else {
-                legs((q[k], qd_rad_s[k]), (q[now], qd_rad_s[now]), *step_s)
-            }
-        };
-        let (there, back) = before.zip(0..n).map(way).unzip();
-        Self { there, back, qd_rad_s }
-    }
-
-    /// z at the instants. It begins as `state` where the motion does not repeat.
-    fn deflection(&self, is_periodic: bool, mut state: f64, stiffness_per_rad: f64) -> Vec<f64> {
-        let lefts = of_pairs(
-            self.there.clone(),
-            &self.there,
-            #[inline(always)]
-            |leg, _| left_behind(leg, stiffness_per_rad),
-        );
-        let towards = |state: f64, leg: f64, left: f64| {
-            let direction = if leg >= 0.0 { 1.0 } else { -1.0 };
-            direction + (state - direction) * left
-        };
-        let mut z = vec![0.0; self.there.len()];
-        // One lap forgets the initial state if the joint travels a few times 1/k; two are plenty.
-        let laps = if is_periodic { 2 } else { 1 };
-        for _ in 0..laps {
-            for (((z, there), left), back) in
-                z.iter_mut().zip(&self.there).zip(&lefts).zip(&self.back)
-            {
-                state = towards(state, *there, *left);
-                if *back != 0.0 {
-                    state = towards(state, *back, left_behind(*back, stiffness_per_rad));
-                }
-                *z = state;
-            }
-        }
-        z
-    }
-}
-
-/// dz/dt, 1/s, of bristles whose deflection along `way` is z.
-fn deflection_rate(way: &Way, z: &[f64], stiffness_per_rad: f64) -> Vec<f64> {
-    let rate = |(qd, z): (&f64, &f64)| stiffness_per_rad * (qd - qd.abs() * z);
-    way.qd_rad_s.iter().zip(z).map(rate).collect()
-}
-
-/// Factor by which a leg of the path reduces the distance of a deflection from its limit.
-#[inline(always)]
-fn left_behind(leg: f64, stiffness_per_rad: f64) -> f64 {
-    Real::exp(-stiffness_per_rad * leg.abs())
-}
-
-/// Signed lengths of the path from one (angle, velocity) to the next: there and back, where the linearly interpolated
-/// velocity passes through zero.
-fn legs((q0, v0): (f64, f64), (q1, v1): (f64, f64), step_s: f64) -> (f64, f64) {
-    if v0 * v1 >= 0.0 {
-        return (q1 - q0, 0.0);
-    }
-    let turn = q0 + 0.5 * v0 * step_s * v0 / (v0 - v1);
-    (turn - q0, q1 - turn)
-}
-
-/// The angle that stays within ± `half_width` of `q` and moves only when it must.
-fn with_play(q: &[f64], half_width: f64) -> Vec<f64> {
-    let mut angle = q[0];
-    q.iter()
-        .map(|q| {
-            angle = angle.clamp(q - half_width, q + half_width);
-            angle
-        })
-        .collect()
-}
-
-/// Torque, relative to F, that the drive of joint `j` gives at its instants while friction is F z. The drive feeds
-/// friction forward by the commanded velocity and has critically damped feedback of bandwidth ω.
-///
-/// With a the joint's acceleration per torque, the joint lags behind the commanded velocity by v:
-///
-/// v̇ = a F z − a τ, τ = β F s_ε(q̇ + v) + (2 ω v + ω² ∫ v dt)/a.
-fn given(scene: &Scene, j: usize, way: &Way, z: &[f64], omega: f64) -> Vec<f64> {
-    let step_s = scene.instant_s();
-    let width = scene.arm.friction_epsilon_rad_s;
-    let kicks = scene.kick_rad_s(j);
-    // Initial state: as if the joint had always moved in one direction.
-    let at_rest = (1.0 - FED) * kicks[0] * z[0] / (omega * omega * step_s);
-    let (mut lag, mut behind) = (0.0, at_rest);
-    let mut out = vec![0.0; z.len()];
-    // The second lap begins where the first one ends.
-    for _ in 0..2 {
-        for (((out, z), kick), qd) in out.iter_mut().zip(z).zip(kicks).zip(&way.qd_rad_s) {
-            let widths = (qd + lag) / width;
-            let sign = if widths.abs() < TURNED { Real::tanh(widths) } else { widths.signum() };
-            let feedback = (2.0 * omega * lag + omega * omega * behind) * step_s;
-            lag += kick * (z - FED * sign) - feedback;
-            behind += lag * step_s;
-            *out = FED * sign + feedback / kick;
-        }
-    }
-    out
-}
-
-/// Column of joint `j` for this `drive` and the deflection z.
-fn column(scene: &Scene, j: usize, way: &Way, z: &[f64], drive: Drive) -> Column {
-    let sign = &scene.instants(j).sign;
-    let less: Vec<f64> = z.iter().zip(sign).map(|(z, sign)| z - sign).collect();
-    let column = match drive {
-        Drive::ByWantedVelocity(omega) if moves_alike(scene, j) => {
-            let given = given(scene, j, way, z, omega);
-            // Difference from what the drive gives for friction that follows the sign, as the null model has it.
-            let by_feedback = scene.answered(sign);
-            let by_sign = sign.iter().zip(by_feedback).map(|(s, a)| FED * s + (1.0 - FED) * a);
-            let more: Vec<f64> = given.iter().zip(by_sign).map(|(g, own)| g - own).collect();
-            scene.as_logged_but(less, &more)
-        }
-        Drive::Bristles => scene.as_logged_but(less.clone(), &less),
-        _ => scene.as_logged(less),
-    };
-    Column::on(j, column)
-}
-
 /// Starting stiffnesses of a variant. With the reaction of a drive, there is one optimum between neighbours of a coarser
 /// grid as well.
 fn grid(variant: usize) -> impl Iterator<Item = Shape> {
     let [softest, stiffest] = STIFFNESSES_PER_RAD;
     let count = if variant.is_multiple_of(DAMPED) { 13 } else { 7 };
     geometric(softest, stiffest, count).map(move |value| Shape { variant, value })
-}
-
-/// Whether joint `j` has friction, and a positive inertia in all of its poses: estimated inertias may be non-positive
-/// in some.
-fn moves_alike(scene: &Scene, j: usize) -> bool {
-    let ends = |(least, most): (f64, f64), kick: &f64| (least.min(*kick), most.max(*kick));
-    let (least, most) = scene.kick_rad_s(j).iter().fold((f64::INFINITY, 0.0), ends);
-    scene.coulomb_nm[j] > 0.0 && least > LEAST_MOBILITY * most
 }
 
 impl Candidate for Presliding {
@@ -262,21 +81,29 @@ impl Candidate for Presliding {
 
     fn bank(&self, scene: &Scene, site: Option<usize>, shapes: &[Shape]) -> Vec<Vec<Column>> {
         let j = joint(site);
-        let (way, first) = (Way::new(scene, j), scene.instants(j).sign[0]);
+        let way = Way::new(scene, j);
+        let known = scene.other_friction(j).bristles;
+        let curve = known.and_then(|bristles| bristles.curve);
+        let of_curve =
+            known.zip(curve).map(|(known, curve)| known.more_with(scene, j, &way, curve));
+        let less = |dry: Column| match &of_curve {
+            Some(of_curve) => dry.minus(of_curve),
+            None => dry,
+        };
         shapes
             .iter()
             .map(|shape| {
-                let z = way.deflection(scene.periodic, first, shape.value);
+                let z = way.deflection(shape.value, curve);
                 let drive = DRIVES[shape.variant % DAMPED];
                 let dry = column(scene, j, &way, &z, drive);
                 if shape.variant < DAMPED {
-                    return vec![dry];
+                    return vec![less(dry)];
                 }
-                let rate = deflection_rate(&way, &z, shape.value);
+                let rate = way.rate(&z, shape.value, curve);
                 let damped: Vec<f64> =
                     z.iter().zip(rate).map(|(z, rate)| z + DAMPING_STEP_S * rate).collect();
                 let more = column(scene, j, &way, &damped, drive).minus(&dry);
-                vec![dry, more.scaled(1.0 / DAMPING_STEP_S)]
+                vec![less(dry), more.scaled(1.0 / DAMPING_STEP_S)]
             })
             .collect()
     }
@@ -288,6 +115,16 @@ impl Candidate for Presliding {
         ];
         out.extend(b.get(1).map(|damping| quantity("damping_s", damping / b[0], "s")));
         out
+    }
+
+    fn bristles(&self, shape: Shape, b: &[f64]) -> Option<Bristles> {
+        Some(Bristles {
+            stiffness_per_rad: shape.value,
+            damping_s: second(b) / b[0],
+            coulomb_nm: b[0],
+            drive: DRIVES[shape.variant % DAMPED],
+            curve: None,
+        })
     }
 
     fn size(&self, quantities: &[Quantity]) -> Option<Quantity> {
@@ -329,6 +166,7 @@ impl Candidate for Presliding {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::bristles::left_behind;
 
     /// Share of their friction with which bristles of exponent i are fitted by the law, by least squares over a path of
     /// 100/k after a reversal, with the level of friction free. With w = 1 − z, w' = −wⁱ from w = 2.

@@ -2,11 +2,14 @@
 //! Armstrong-Hélouvry, Dupont and Canudas de Wit 1994). Where it is found, τ = F/(1 + (q̇/v_s)²) sign q̇ is tried as well
 //! (Hess and Soom 1990): it falls from rest as the first does, and more slowly than either farther on.
 //!
+//! On a joint with presliding, the bristles hold the curve ([`Bristles::more_with`]).
+//!
 //! Where friction turns round, a joint does not move as its samples say ([`Scene::turning_rad_s`]): this friction,
 //! added to the joint's own, bends its velocity. Its size is not known before the fit. The columns are therefore
 //! computed for a typical share and divided by it.
 
 use super::*;
+use crate::diagnose::bristles::{Bristles, Curve, Way};
 use crate::dynamics::Real;
 
 /// See the module.
@@ -27,6 +30,9 @@ const NARROWEST_RATIONAL: f64 = 2.5;
 /// to one are typical. Between 0.2 and 0.8, the reversal moves estimates of F by 4 %; between zero and 0.2, by more
 /// than their σ.
 const USUAL_SHARE: f64 = 0.5;
+
+/// Smallest ratio for which bristles are simulated with the curve.
+const LEAST_SHARE: f64 = 0.01;
 
 /// How the drive answers while friction turns round: by its feedback alone. The answer inferred from reversals is no
 /// better a guess on joints 3 to 6. On joints 1 and 2, which turn round within few samples, it made F 1.8 to 2.6 times
@@ -49,17 +55,29 @@ const NARROWEST: f64 = 1.2;
 /// another way.
 const AT_THE_END: f64 = 1.25;
 
+/// The extra friction at the speed `v`, rad/s, relative to that at rest.
+#[inline(always)]
+pub fn near_rest(shape: Shape, v: f64) -> f64 {
+    let x = v.abs() / shape.value;
+    match shape.variant {
+        RATIONAL => 1.0 / (1.0 + x * x),
+        STEEP_AT_REST => Real::exp(-x),
+        _ => Real::exp(-x * x),
+    }
+}
+
 /// Friction at the speed `v`, rad/s, relative to Coulomb friction, with [`USUAL_SHARE`] of extra friction near rest
 /// that falls with speed.
 #[inline(always)]
 fn usual(shape: Shape, epsilon_rad_s: f64, v: f64) -> f64 {
-    let x = v.abs() / shape.value;
-    let more = match shape.variant {
-        RATIONAL => 1.0 / (1.0 + x * x),
-        STEEP_AT_REST => Real::exp(-x),
-        _ => Real::exp(-x * x),
-    };
-    Real::tanh(v / epsilon_rad_s) * (1.0 + USUAL_SHARE * more)
+    Real::tanh(v / epsilon_rad_s) * (1.0 + USUAL_SHARE * near_rest(shape, v))
+}
+
+/// Column of a curve of this `shape` that `bristles` on joint `j` hold.
+fn held(scene: &Scene, j: usize, bristles: &Bristles, shape: Shape) -> Column {
+    let share = bristles.curve.map_or(USUAL_SHARE, |curve| curve.share.max(LEAST_SHARE));
+    let more = bristles.more_with(scene, j, &Way::new(scene, j), Curve { share, shape });
+    more.scaled(1.0 / share)
 }
 
 impl Candidate for Stribeck {
@@ -95,6 +113,9 @@ impl Candidate for Stribeck {
 
     fn columns(&self, scene: &Scene, site: Option<usize>, shape: Shape) -> Vec<Column> {
         let j = joint(site);
+        if let Some(bristles) = &scene.other_friction(j).bristles {
+            return vec![held(scene, j, bristles, shape)];
+        }
         let epsilon = scene.width_rad_s(j);
         let velocity = scene.turning_rad_s(
             j,
@@ -114,6 +135,10 @@ impl Candidate for Stribeck {
 
     fn quantities(&self, _: &Scene, _: Option<usize>, shape: Shape, b: &[f64]) -> Vec<Quantity> {
         vec![quantity("extra_nm", b[0], "Nm"), quantity("vs_rad_s", shape.value, "rad/s")]
+    }
+
+    fn near_rest_nm(&self, b: &[f64]) -> Option<f64> {
+        Some(b[0])
     }
 
     fn least(&self) -> f64 {

@@ -1,5 +1,7 @@
 //! What laws that were found on a joint say about its friction, as far as other laws of the joint depend on it: all of its
-//! friction warms up, and all of it turns round over the same range of speeds.
+//! friction warms up, all of it turns round over the same range of speeds, and bristles hold the curve of it.
+
+use crate::diagnose::bristles::Bristles;
 
 /// Width of the sharpest law whose reversal is simulated, as a share of that of the robot's file.
 pub const SHARPEST: f64 = 0.05;
@@ -18,6 +20,8 @@ pub struct Turn {
 pub struct OtherFriction {
     /// `None`: as in the robot's file, with the drive's answer that the log tells.
     pub turn: Option<Turn>,
+    /// Bristles, which hold the friction near rest of other laws.
+    pub bristles: Option<Bristles>,
     /// Torque of the other laws at the samples, as logged, Nm; empty if there are none.
     pub torque_nm: Vec<f64>,
     /// Mean over the log of the factor by which friction has changed since it began.
@@ -26,7 +30,7 @@ pub struct OtherFriction {
 
 impl Default for OtherFriction {
     fn default() -> Self {
-        Self { turn: None, torque_nm: Vec::new(), warm: 1.0 }
+        Self { turn: None, bristles: None, torque_nm: Vec::new(), warm: 1.0 }
     }
 }
 

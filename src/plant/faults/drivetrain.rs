@@ -273,13 +273,10 @@ impl Drivetrain for HiddenDrivetrain {
             }
             let (viscous, bristles) = joint.friction.slopes(speed, self.limit_nm[j]);
             fastest = fastest.max(viscous * inverse).max(2.0 * (bristles * inverse).sqrt());
-            if let Some(presliding) = &joint.friction.presliding {
-                let acceleration = self.course.largest_acceleration_rad_s2[j];
-                let turning = presliding.fastest_turn_per_s(acceleration);
-                let passing = presliding.stiffness_per_rad * speed;
-                // The factor 2 allows for the kink of the decay where the joint reverses within a step.
-                fastest = fastest.max(2.0 * turning.min(passing));
-            }
+            let acceleration = self.course.largest_acceleration_rad_s2[j];
+            let [turning, passing] = joint.friction.bristle_decays_per_s(acceleration, speed);
+            // The factor 2 allows for the kink of the decay where the joint reverses within a step.
+            fastest = fastest.max(2.0 * turning.min(passing));
             for ripple in &joint.ripples {
                 fastest = fastest.max(2.0 * ripple.order_per_turn * speed);
             }
@@ -321,11 +318,10 @@ impl Drivetrain for HiddenDrivetrain {
         self.settle_loads(arm, stage, qdd_rad_s2);
         for (j, joint) in self.joints.iter().enumerate() {
             let speed = self.motor[j].qd_rad_s;
-            if let (Some(presliding), Some(s)) = (&joint.friction.presliding, self.slots[j].bristle)
-            {
-                let turning =
-                    presliding.fastest_turn_per_s(self.course.largest_acceleration_rad_s2[j]);
-                states_rate[s] = presliding.bristle_rate(speed, turning, stage.states[s]);
+            if let Some(s) = self.slots[j].bristle {
+                let acceleration = self.course.largest_acceleration_rad_s2[j];
+                let [turning, _] = joint.friction.bristle_decays_per_s(acceleration, speed);
+                states_rate[s] = joint.friction.bristle_rate(speed, turning, stage.states[s]);
             }
             if let (Some(thermal), Some(s)) = (&joint.friction.thermal, self.slots[j].warmth) {
                 let mean_w = self.course.mean_friction_power_w[j];

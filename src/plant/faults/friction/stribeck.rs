@@ -75,7 +75,8 @@ impl Fault for Stribeck {
     }
 
     fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
-        assembly.joint(self.joint).friction.stribeck.push(*self);
-        Ok(())
+        let friction = &mut assembly.joint(self.joint).friction;
+        friction.stribeck.push(*self);
+        friction.check_bristle()
     }
 }
