@@ -6,7 +6,7 @@ use std::hint::black_box;
 use std::path::Path;
 
 use armid::base::ColumnPlan;
-use armid::identify::{Assembler, Identifier, Measurement, Options, Problem, Triangle};
+use armid::identify::{Assembler, Identifier, Measurement, Options, Problem, Repetition, Triangle};
 use armid::montecarlo::{Experiment, Scenario};
 use criterion::{Criterion, criterion_group, criterion_main};
 use faer::Mat;
@@ -37,7 +37,7 @@ fn trial(criterion: &mut Criterion) {
     group.bench_function("identify, periods averaged", |b| {
         b.iter(|| black_box(identifier.identify(&measurement).unwrap()))
     });
-    let single = Options { period_s: Some(0.0), ..Options::default() };
+    let single = Options { repetition: Repetition::Never, ..Options::default() };
     let mut identifier = Identifier::new(&experiment.model, set, single);
     group.bench_function("identify, single run of 10 000 samples, filtered", |b| {
         b.iter(|| black_box(identifier.identify(&measurement).unwrap()))

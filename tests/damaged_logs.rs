@@ -137,7 +137,7 @@ fn ends(bench: &Run, text: &str, period_s: Option<f64>) -> [End; 2] {
         qd_rad_s: &log.qd_rad_s,
         torque_nm: &torque_nm,
     };
-    let options = Options { period_s, ..Options::default() };
+    let options = Options { repetition: period_s.into(), ..Options::default() };
     let identified = match Identifier::new(model, set, options.clone()).identify(&m) {
         Ok(identification) => {
             assert_numbers(&identification);

@@ -5,7 +5,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use armid::identify::Channels::{All, Motion, Torque};
-use armid::identify::{Change, Channels, Identifier, Misreading, Options};
+use armid::identify::{Change, Channels, Identifier, Misreading, Options, Repetition};
 use armid::plant::Measured;
 use armid::robot::{Arm, JointSignals};
 use nalgebra::Vector3;
@@ -101,7 +101,7 @@ pub fn assert_exchange_is_named(run: &Run, joints: [usize; 2]) {
 #[test]
 fn each_way_to_misread_a_log_is_named() {
     let run = run(("ur5_identification", 4), "");
-    let single = Options { period_s: Some(0.0), ..run.options.clone() };
+    let single = Options { repetition: Repetition::Never, ..run.options.clone() };
     for hidden in [
         exchanged(All, [0, 2]),
         exchanged(All, [3, 4]),

@@ -4,7 +4,7 @@
 use armid::dynamics::Model;
 use armid::identify::covariance::Covariance;
 use armid::identify::{
-    Identification, Identifier, Options, Regression, Several, each_alone, pooled,
+    Identification, Identifier, Options, Regression, Repetition, Several, each_alone, pooled,
 };
 use armid::montecarlo::{Scenario, Simulation};
 use armid::plant::Measured;
@@ -121,7 +121,7 @@ fn a_long_run_and_a_short_one_are_used_together() {
     let simulation = simulation("ur5_identification", 1.0, "");
     let Scenario { arm, set, .. } = &simulation.scenario;
     let model = Model::new(arm);
-    let options = Options { period_s: Some(0.0), ..Options::default() };
+    let options = Options { repetition: Repetition::Never, ..Options::default() };
     let mut identifier = Identifier::new(&model, set, options);
     let short = simulation.log(0).unwrap();
     let rows = short.time_s.len();

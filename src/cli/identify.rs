@@ -15,7 +15,7 @@ use crate::identify::covariance::CovarianceKind;
 use crate::identify::physical::{self, PhysicalOptions, PriorMetric, PriorWeight};
 use crate::identify::{
     Estimator, FitError, Identification, Identifier, IdentifyError, Improper, Measurement,
-    Misreading, Options, Processing, Regression, Several, each_alone, pooled,
+    Misreading, Options, Processing, SeveralLogs,
 };
 use crate::log::{Layout, Log, read_log};
 use crate::output::check_outputs;
@@ -102,7 +102,7 @@ impl ProcessingArgs {
             estimator: self.estimator,
             cutoff_hz: self.cutoff_hz.unwrap_or(default.cutoff_hz),
             rate_hz: self.rate_hz,
-            period_s: self.period_s,
+            repetition: self.period_s.into(),
             ..default
         };
         match options.improper() {
@@ -263,7 +263,8 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
     inputs.extend(logs.iter().chain(&validation_logs).map(|l| l.input.clone()));
     let program = Program::started(None, inputs);
     let mut identifier = Identifier::new(&model, &set, options.clone());
-    let mut regressions = match laid_out(&mut identifier, &logs) {
+    let measurements: Vec<Measurement> = logs.iter().map(LoadedLog::measurement).collect();
+    let regressions = match SeveralLogs::each(&mut identifier, &measurements) {
         Err(IdentifyError::NoMotion { .. }) if logs.len() == 1 => {
             let logs: Vec<&Log> = logs.iter().map(|l| &l.log).collect();
             return decline(args, &Declined::at_rest(&arm, &logs, all_parameters()), program);
@@ -275,36 +276,18 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         let misreading = Misreading::of(&arm, regression, &options, gain.as_deref())?;
         Some(MisreadLog::new(log.log.source.clone(), misreading, &layout))
     });
-    let several = each_alone(&mut identifier, &regressions)?;
-    let is_run = |regression: &Regression| regression.prepared.processing.period_s.is_none();
-    let runs = regressions.iter().filter(|regression| is_run(regression)).count();
-    if !matches!(several, Several::Apart(_)) && 0 < runs && runs < regressions.len() {
-        // The rows of a single run are filtered and scatter less: rows that are weighted together must be alike.
-        let alike = Options { period_s: Some(0.0), ..options.clone() };
-        regressions = laid_out(&mut Identifier::new(&model, &set, alike), &logs)?;
-    }
-    let mut regression = Regression::joined(regressions)?;
-    let unused = args.processing.unused(&regression.prepared.processing);
-    regression.prepared.warnings.extend(unused);
-    if let Several::Together { log, reason } = &several {
-        let name = logs[*log].input.path.display();
-        regression.prepared.warnings.push(format!(
-            "all logs count as single runs together, because {name} cannot stand alone: {reason}"
-        ));
-    }
+    let mut all = SeveralLogs::together(&mut identifier, &measurements, regressions)?;
+    let unused = args.processing.unused(&all.regression.prepared.processing);
     let remarks = logs.iter().flat_map(|log| &log.mended).cloned();
-    regression.prepared.warnings.extend(remarks);
+    all.regression.prepared.warnings.extend(unused.into_iter().chain(remarks));
     let logs: Vec<&Log> = logs.iter().map(|l| &l.log).collect();
-    let identified = match several {
-        Several::Apart(parts) => Ok(pooled(&parts, &regression)),
-        Several::AsOne | Several::Together { .. } => identifier.identify_regression(&regression),
-    };
-    let identification = match identified {
+    let regression = &all.regression;
+    let identification = match all.identify(&mut identifier) {
         Err(IdentifyError::Fit(FitError::NotExcited { parameters })) => {
-            return decline(args, &Declined::new(&arm, &logs, &regression, parameters), program);
+            return decline(args, &Declined::new(&arm, &logs, regression, parameters), program);
         }
         Err(IdentifyError::Fit(FitError::StandsStill)) => {
-            let declined = Declined::new(&arm, &logs, &regression, all_parameters());
+            let declined = Declined::new(&arm, &logs, regression, all_parameters());
             return decline(args, &declined, program);
         }
         other => other?,
@@ -315,7 +298,7 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         set: &set,
         logs: &logs,
         nominal: &set.values(&model.standard_parameters()),
-        regression: &regression,
+        regression,
         identification: &identification,
         reduced: args.reduced.as_deref(),
         misread: misread.as_ref(),
@@ -372,25 +355,6 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
         true if result.is_declined() || result.is_contradicted() => Ok(Outcome::Negative),
         true => Ok(Outcome::Done),
     }
-}
-
-/// The logs laid out for regression. Warnings about one of several name it.
-fn laid_out(
-    identifier: &mut Identifier,
-    logs: &[LoadedLog],
-) -> Result<Vec<Regression>, IdentifyError> {
-    let mut regressions = logs
-        .iter()
-        .map(|log| identifier.regression(&log.measurement()))
-        .collect::<Result<Vec<_>, _>>()?;
-    if logs.len() > 1 {
-        for (regression, log) in regressions.iter_mut().zip(logs) {
-            let of_log = |warning: &String| format!("{}: {warning}", log.log.source);
-            let warnings = &mut regression.prepared.warnings;
-            *warnings = warnings.iter().map(of_log).collect();
-        }
-    }
-    Ok(regressions)
 }
 
 /// Reports on a log whose motion leaves parameters without any effect on the torque.

@@ -71,6 +71,11 @@ impl<'a> Identifier<'a> {
         }
     }
 
+    /// An identifier for logs of the same arm with other `options`.
+    pub fn with_options(&self, options: Options) -> Self {
+        Self::new(self.model, self.set, options)
+    }
+
     /// The options of identification.
     pub fn options(&self) -> &Options {
         &self.options

@@ -20,8 +20,53 @@ pub struct Options {
     pub order: usize,
     /// Rate that logs are resampled to, Hz; `None`: the log's own, at most [`Self::HIGHEST_RATE_HZ`].
     pub rate_hz: Option<f64>,
-    /// Period of the motion, s; `None`: found in the log. Zero treats the log as a single run.
-    pub period_s: Option<f64>,
+    /// How the motion repeats.
+    #[serde(rename = "period_s")]
+    pub repetition: Repetition,
+}
+
+/// How the motion of a log repeats. In scenarios it is the period in s: left out where it is found, and 0 for a single
+/// run.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(from = "Option<f64>", into = "Option<f64>")]
+pub enum Repetition {
+    /// With the period that the log shows, if it shows one.
+    #[default]
+    Found,
+    /// With this period, s.
+    Every(f64),
+    /// Not at all: the log counts as a single run.
+    Never,
+}
+
+impl From<Option<f64>> for Repetition {
+    fn from(period_s: Option<f64>) -> Self {
+        match period_s {
+            None => Self::Found,
+            Some(0.0) => Self::Never,
+            Some(period_s) => Self::Every(period_s),
+        }
+    }
+}
+
+impl From<Repetition> for Option<f64> {
+    fn from(repetition: Repetition) -> Self {
+        match repetition {
+            Repetition::Found => None,
+            Repetition::Never => Some(0.0),
+            Repetition::Every(period_s) => Some(period_s),
+        }
+    }
+}
+
+impl Repetition {
+    /// The period that the user gave, s.
+    pub fn period_s(self) -> Option<f64> {
+        match self {
+            Self::Every(period_s) => Some(period_s),
+            Self::Found | Self::Never => None,
+        }
+    }
 }
 
 /// A setting that no log can be processed with.
@@ -41,8 +86,7 @@ impl Options {
         let settings = [
             ("cutoff_hz", Some(self.cutoff_hz)),
             ("rate_hz", self.rate_hz),
-            // Zero treats the log as a single run.
-            ("period_s", self.period_s.filter(|s| *s != 0.0)),
+            ("period_s", self.repetition.period_s()),
         ];
         let not_positive = settings.into_iter().find_map(|(key, value)| {
             let value = value.filter(|v| !(v.is_finite() && *v > 0.0))?;
@@ -70,7 +114,7 @@ impl Options {
 
     /// Whether the log counts as a single run even where its motion repeats.
     pub fn is_single_run(&self) -> bool {
-        self.period_s == Some(0.0)
+        self.repetition == Repetition::Never
     }
 
     /// Cutoff (Hz) of the low-pass on the velocity of a single run before it is differentiated: wide
@@ -91,7 +135,7 @@ impl Default for Options {
             cutoff_hz: 10.0,
             order: 4,
             rate_hz: None,
-            period_s: None,
+            repetition: Repetition::Found,
         }
     }
 }
@@ -104,11 +148,12 @@ mod tests {
     fn settings_that_no_log_can_be_processed_with_are_named() {
         let default = Options::default();
         assert_eq!(default.improper(), None);
-        assert_eq!(Options { period_s: Some(0.0), ..default.clone() }.improper(), None);
+        assert_eq!(Options { repetition: Repetition::Never, ..default.clone() }.improper(), None);
         let key = |options: Options| options.improper().map(|improper| improper.key);
         assert_eq!(key(Options { cutoff_hz: f64::NAN, ..default.clone() }), Some("cutoff_hz"));
         assert_eq!(key(Options { rate_hz: Some(0.0), ..default.clone() }), Some("rate_hz"));
-        assert_eq!(key(Options { period_s: Some(-3.0), ..default.clone() }), Some("period_s"));
+        let repetition = Repetition::from(Some(-3.0));
+        assert_eq!(key(Options { repetition, ..default.clone() }), Some("period_s"));
         assert_eq!(key(Options { order: 0, ..default.clone() }), Some("order"));
         assert_eq!(key(Options { order: 21, ..default }), Some("order"));
     }

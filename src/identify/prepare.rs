@@ -65,7 +65,7 @@ impl Preparer {
         {
             (even, period, warnings) = (fitting, Some(whole), remarks);
         }
-        if let (Some(wanted), false) = (options.period_s, options.is_single_run()) {
+        if let Some(wanted) = options.repetition.period_s() {
             let found = period.as_ref().map(|p| p.samples as f64 / even.rate_hz);
             if found.is_none_or(|found| (found - wanted).abs() > 1.5 / even.rate_hz) {
                 let log = m.source.to_owned();

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::experiment::{Experiment, TrialError};
 use super::simulation::Simulation;
-use crate::identify::{Identifier, KnownNoise, Measurement, Options, cramer_rao};
+use crate::identify::{Identifier, KnownNoise, Measurement, Options, Repetition, cramer_rao};
 
 /// Noise whose power falls below this share of its largest power has been filtered out: no sensor is that quiet.
 const FILTERED_OUT: f64 = 1e-9;
@@ -47,7 +47,7 @@ impl Experiment {
         if scenario.controller_reads_sensors || torque.sd_nm.iter().any(|sd| *sd <= 0.0) {
             return Ok(None);
         }
-        let options = Options { period_s: None, ..scenario.processing.clone() };
+        let options = Options { repetition: Repetition::Found, ..scenario.processing.clone() };
         let regression =
             Identifier::new(&self.model, &scenario.set, options).regression(&Measurement {
                 source: "noise-free log",

@@ -36,8 +36,8 @@ impl Covariance {
     }
 }
 
-/// m_ik/√(m_ii m_kk); 0 for a parameter without scatter.
-pub(super) fn correlations(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+/// Correlations m_ik/√(m_ii m_kk) of what has the covariance, or the sums of products, m; 0 for what does not scatter.
+pub(in crate::identify) fn correlations(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     let scale = matrix.diagonal().map(f64::sqrt);
     DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, k| {
         let product = scale[i] * scale[k];

@@ -32,7 +32,7 @@ pub use periods::PeriodReplicates;
 pub use spectral::SpectralSandwich;
 pub use wls::WeightedLeastSquares;
 
-use correlations::correlations;
+pub(super) use correlations::correlations;
 use equations::of_equations;
 
 use super::fit::Fit;

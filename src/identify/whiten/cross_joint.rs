@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
+use crate::identify::covariance::correlations;
 use crate::identify::fit::Fit;
 use crate::identify::problem::Problem;
 
@@ -17,7 +18,7 @@ pub fn decorrelate(problem: &Problem, fit: &Fit, out: &mut Problem) {
         residuals.joint(i).iter().zip(residuals.joint(k)).map(|(a, b)| a * b).sum()
     });
     let weights: Vec<Vec<f64>> = fit.weights.iter().map(|w| vec![*w; problem.samples]).collect();
-    mix(problem, &weights, &correlation(&products), out);
+    mix(problem, &weights, &correlations(&products), out);
 }
 
 /// Least standard deviation of the part of a joint's noise that the other joints do not predict, over that of all its
@@ -37,21 +38,6 @@ fn decorrelation(correlation: &DMatrix<f64>) -> DMatrix<f64> {
         Some(inverse) => DMatrix::from_fn(n, n, |i, k| inverse[(n - 1 - i, n - 1 - k)]),
         None => DMatrix::identity(n, n),
     }
-}
-
-/// Correlation of the joints from the sums of products of their deviations; a joint without deviations is
-/// uncorrelated.
-fn correlation(products: &DMatrix<f64>) -> DMatrix<f64> {
-    DMatrix::from_fn(products.nrows(), products.nrows(), |i, k| {
-        let scale = (products[(i, i)] * products[(k, k)]).sqrt();
-        if i == k {
-            1.0
-        } else if scale > 0.0 {
-            products[(i, k)] / scale
-        } else {
-            0.0
-        }
-    })
 }
 
 /// Equation j of `out` = Σ_{i ≥ j} U_ji · weight_i · equation i of `problem`, row by row, with U from the `correlation`

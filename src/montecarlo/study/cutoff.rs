@@ -12,7 +12,7 @@ use super::paper_sigma::{SigmaCase, paper_sigma};
 use super::record_length::{RecordLength, record_length};
 use crate::dynamics::{Model, Motion};
 use crate::identify::covariance::CovarianceKind;
-use crate::identify::{Estimator, Fitter, Identifier, Measurement, Options, Weighting};
+use crate::identify::{Estimator, Fitter, Identifier, Measurement, Options, Repetition, Weighting};
 use crate::montecarlo::scenario::Scenario;
 use crate::montecarlo::simulation::Simulation;
 use crate::plant::{Measured, PerJoint, SensorConfig};
@@ -228,7 +228,7 @@ fn identify(
 
 /// Processing options for a single run with a cut-off.
 fn parallel_options(cutoff_hz: f64) -> Options {
-    Options { cutoff_hz, period_s: Some(0.0), ..Options::default() }
+    Options { cutoff_hz, repetition: Repetition::Never, ..Options::default() }
 }
 
 /// Estimates of one trial: by the paper's method and by this program at every cut-off, and by this program from

@@ -99,7 +99,7 @@ mod tests {
     use super::*;
     use crate::base::{BaseSet, Parameterisation};
     use crate::dynamics::Model;
-    use crate::identify::{Identifier, Measurement, Options};
+    use crate::identify::{Identifier, Measurement, Options, Repetition};
     use crate::log::{Effort, LogWarning};
     use crate::robot::JointSignals;
 
@@ -120,7 +120,7 @@ mod tests {
         let effort = Effort::Torque(torque_nm.clone());
         let mut log = Log::new("a.csv", time_s.clone(), q_rad, qd_rad_s, effort).unwrap();
         log.rows.warnings.push(LogWarning::ManySetAside { set_aside: 7, read: 9 });
-        let options = Options { period_s: Some(0.0), ..Options::default() };
+        let options = Options { repetition: Repetition::Never, ..Options::default() };
         let measurement = Measurement {
             source: &log.source,
             time_s: &log.time_s,

@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use crate::excitation::{Excitation, FourierSeries, Requirements};
-use crate::identify::{Identifier, Options, Problem, Triangle};
+use crate::identify::{Identifier, Options, Problem, Repetition, Triangle};
 use crate::montecarlo::experiment::TrialError;
 use crate::montecarlo::scenario::{Scenario, ScenarioError};
 use crate::montecarlo::simulation::Simulation;
@@ -26,7 +26,7 @@ impl Validation {
         let quiet = Scenario { excitation, sensors: SensorConfig::default(), ..scenario.clone() };
         let simulation = Simulation::run(quiet).map_err(TrialError::from)?;
         let log = simulation.log(0).map_err(TrialError::from)?;
-        let options = Options { period_s: Some(0.0), ..scenario.processing.clone() };
+        let options = Options { repetition: Repetition::Never, ..scenario.processing.clone() };
         let model = crate::dynamics::Model::new(arm);
         let mut identifier = Identifier::new(&model, &scenario.set, options);
         let regression =
