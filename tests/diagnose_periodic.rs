@@ -126,6 +126,21 @@ fn bristles_hold_a_stribeck_curve() {
     }
 }
 
+/// Bristles that build up otherwise than in the law are no curve beside it: what they leave is said to be unexplained, and
+/// to depend on the way since the reversal.
+#[test]
+fn bristles_of_other_exponents_have_no_stribeck_curve() {
+    for (h, exponent, seed) in [(3, 0.5, 41), (3, 1.5, 42), (4, 2.0, 43), (2, 1.5, 44)] {
+        let law = Law::DahlOfExponent { stiffness_per_rad: 600.0, exponent };
+        let found = Hidden::on(h, law).diagnose(seed).diagnosis;
+        println!("{exponent} on {}: {:#?}", h + 1, found.sentences);
+        let is_curve = |c: &Cause| c.kind == Kind::Stribeck && c.confidence > 0.5;
+        assert!(!found.causes.iter().any(is_curve), "{exponent} on joint {}", h + 1);
+        let unexplained = found.unexplained.expect("the law is another one");
+        assert_eq!((unexplained.joint, unexplained.axis), (h + 1, "way since the reversal"));
+    }
+}
+
 /// A LuGre model: damping makes bristles look stiffer than they are, and fewer.
 #[test]
 fn presliding_of_damped_bristles() {

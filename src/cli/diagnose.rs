@@ -24,14 +24,15 @@ use crate::report::{Page, Status, Verdict};
 /// Say what the rigid model with linear friction gets wrong along a log, and what explains it.
 #[derive(Debug, Args)]
 pub struct DiagnoseArgs {
-    /// The log. If two are given, the body that the flange carries in the second one only is weighed.
+    /// The log. With a second log, of the same arm with a body on its flange, that body is weighed.
     #[arg(required = true, num_args = 1..=2)]
     logs: Vec<PathBuf>,
     #[command(flatten)]
     source: SourceArgs,
     #[command(flatten)]
     processing: ProcessingArgs,
-    /// Logs on which the gain is measured. Nothing is fitted to them or chosen by them.
+    /// Other logs of the arm, on which the gain is measured. Nothing is fitted to them or chosen by them. (The log to
+    /// diagnose goes before this option.)
     #[arg(long, num_args = 1..)]
     held_out: Vec<PathBuf>,
     /// A simulation to compare with: a scenario (.toml) or a result of `armid identify` (.json).

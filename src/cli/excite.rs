@@ -49,13 +49,14 @@ pub struct ExciteArgs {
     /// Let the base frequency be free, with periods between these, s: LOW,HIGH.
     #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 1)]
     period_range: Option<Vec<f64>>,
-    /// Fix offsets, rad, joint by joint: `free` or a number, such as 0,-1.5708,0,0,0,free.
+    /// Centres of the joints' motions (the constant terms of their series), rad: `free`, which is the default, or a number
+    /// for each joint, such as 0,-1.5708,0,0,0,free.
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     offsets: Option<String>,
     /// Start and end every period at rest.
     #[arg(long)]
     rest_start: bool,
-    /// Smallest distance of the arm from itself and the floor, m.
+    /// Smallest distance of the arm from itself, the floor and boxes, m.
     #[arg(long = "clearance", value_name = "M", default_value_t = 0.02)]
     clearance_m: f64,
     /// A box in the cell to stay clear of: two corners in the base frame, m. May be given several times.
@@ -71,7 +72,7 @@ pub struct ExciteArgs {
     /// Torque noise, Nm: one number for all joints or one for each. Default: 0.6 % of the torque limits.
     #[arg(long, value_name = "LIST", value_delimiter = ',', num_args = 1)]
     noise_nm: Option<Vec<f64>>,
-    /// Length of the data that will be recorded, s. The motion has as many whole periods as cover it.
+    /// Length of the periodic part of the motion, s, in whole periods that cover it. Run-in and run-out are added.
     #[arg(long = "data", value_name = "S", default_value_t = 80.0)]
     data_s: f64,
     /// Rate of the data, of the CSV and of the set points in the URScript, Hz. CB-series controllers take 125 divided by
@@ -81,13 +82,13 @@ pub struct ExciteArgs {
     /// Result of an earlier identification. The motion is designed for the parameters that are still poorly known.
     #[arg(long, value_name = "RESULT.json")]
     prior: Option<PathBuf>,
-    /// Random starts.
+    /// Random motions from which the search starts.
     #[arg(long, default_value_t = 48)]
     starts: usize,
-    /// Starts taken to the end.
+    /// How many of the best starts are optimised to the end.
     #[arg(long, default_value_t = 4)]
     finalists: usize,
-    /// Seed of the starts.
+    /// Seed of the random starts.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Stop after this time and keep the best design so far, s.
@@ -105,7 +106,7 @@ pub struct ExciteArgs {
     /// Program for a Universal Robots controller.
     #[arg(long, value_name = "FILE.script")]
     urscript: Option<PathBuf>,
-    /// Playback speed of the URScript program as a fraction of the designed one.
+    /// Playback speed of the URScript program as a fraction of the designed one: the line `speed = …` in it.
     #[arg(long, value_name = "0…1", default_value_t = 1.0, requires = "urscript")]
     speed: f64,
     /// Report page.

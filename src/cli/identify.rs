@@ -35,7 +35,7 @@ pub struct IdentifyArgs {
     logs: Vec<PathBuf>,
     #[command(flatten)]
     source: SourceArgs,
-    /// Reduced parameter set instead of the full one: paper (section IV-A, of a UR5).
+    /// Reduced parameter set instead of the full one: paper (that of Kovincic et al., of a UR5).
     #[arg(long)]
     reduced: Option<String>,
     #[command(flatten)]
@@ -43,7 +43,7 @@ pub struct IdentifyArgs {
     /// Method of the covariance. Default: the best one that the log allows.
     #[arg(long, value_enum)]
     covariance: Option<CovarianceKind>,
-    /// Logs to validate on. Nothing is fitted to them.
+    /// Logs to validate on. Nothing is fitted to them. (The logs to identify from go before this option.)
     #[arg(long, num_args = 1..)]
     validate: Vec<PathBuf>,
     /// Also estimate physically consistent standard parameters, for simulators.
@@ -52,8 +52,8 @@ pub struct IdentifyArgs {
     /// How deviations from the robot file's values are measured for parameters that the data do not decide.
     #[arg(long, requires = "physical", value_enum, default_value = "pull_back")]
     prior: PriorMetric,
-    /// Weight of the robot file's values: 1/s² treats them as known to a relative σ of s (1: to 100 %), auto takes the
-    /// weight that predicts left-out periods best.
+    /// Weight of the robot file's values: 1/s² treats them as known to a relative σ of s (1: to 100 %; 100: to 10 %), auto
+    /// takes the weight that predicts left-out periods best.
     #[arg(long, requires = "physical", default_value_t)]
     prior_weight: PriorWeight,
     /// Write the result as JSON.
@@ -71,7 +71,8 @@ pub struct SourceArgs {
     /// up to that link).
     #[arg(long)]
     pub robot: String,
-    /// Layout of the logs: armid (RTDE names), ur10e_innopolis, ur10e_innopolis_author, or a .toml file.
+    /// Layout of the logs: armid (RTDE names), ur10e_innopolis, ur10e_innopolis_author, or a .toml file (all keys:
+    /// layouts/example.toml).
     #[arg(long, default_value = "armid")]
     pub layout: String,
 }

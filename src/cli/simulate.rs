@@ -28,16 +28,16 @@ pub struct SimulateArgs {
     /// Simulate the arm of this result of `armid identify --physical` instead of the scenario's.
     #[arg(long, value_name = "RESULT.json")]
     arm: Option<PathBuf>,
-    /// Robot of the result, if it is not the one that the result or the scenario names.
+    /// Robot file of the result, if it cannot be found under the name that the result or the scenario has for it.
     #[arg(long, requires = "arm")]
     robot: Option<String>,
-    /// The log.
+    /// CSV file for the log.
     #[arg(long)]
     out: PathBuf,
     /// Trial whose noise is used, counted from 0.
     #[arg(long, default_value_t = 0)]
     trial: u64,
-    /// Write the truth as JSON.
+    /// Write the true parameters and the hidden effects as JSON.
     #[arg(long)]
     truth: Option<PathBuf>,
 }

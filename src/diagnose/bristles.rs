@@ -44,7 +44,7 @@ const LEAST_MOBILITY: f64 = 1e-3;
 /// Friction near rest that bristles hold beside Coulomb friction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Curve {
-    /// Its height e over Coulomb friction.
+    /// Its height e, relative to Coulomb friction.
     pub share: f64,
     /// How it falls with speed: a shape of [`Stribeck`](super::candidates::stribeck::Stribeck).
     pub shape: Shape,
@@ -74,15 +74,22 @@ pub struct Bristles {
 }
 
 impl Bristles {
-    /// Torque, relative to F, that a `curve` adds to these bristles on joint `j`, as logged.
-    pub fn more_with(&self, scene: &Scene, j: usize, way: &Way, curve: Curve) -> Column {
-        let [with, without] = [Some(curve), None].map(|curve| {
+    /// Torque, relative to F, that each of the `curves` adds to these bristles on joint `j`, as logged.
+    pub fn more_with(
+        &self,
+        scene: &Scene,
+        j: usize,
+        way: &Way,
+        curves: impl Iterator<Item = Curve>,
+    ) -> Vec<Column> {
+        let with = |curve: Option<Curve>| {
             let mut z = way.deflection(self.stiffness_per_rad, curve);
             let rate = way.rate(&z, self.stiffness_per_rad, curve);
             z.iter_mut().zip(rate).for_each(|(z, rate)| *z += self.damping_s * rate);
             column(scene, j, way, &z, self.drive)
-        });
-        with.minus(&without)
+        };
+        let without = with(None);
+        curves.map(|curve| with(Some(curve)).minus(&without)).collect()
     }
 }
 
@@ -224,11 +231,11 @@ fn given(scene: &Scene, j: usize, way: &Way, z: &[f64], omega: f64) -> Vec<f64> 
     let step_s = scene.instant_s();
     let width = scene.arm.friction_epsilon_rad_s;
     let kicks = scene.kick_rad_s(j);
-    // Initial state: as if the joint had always moved in one direction.
-    let at_rest = (1.0 - FED) * kicks[0] * z[0] / (omega * omega * step_s);
+    // Initial state: as if the joint had always moved in one direction. The second lap begins where the first one ends.
+    let lacking = z[0] - FED * way.first;
+    let at_rest = lacking * kicks[0] / (omega * omega * step_s);
     let (mut lag, mut behind) = (0.0, at_rest);
     let mut out = vec![0.0; z.len()];
-    // The second lap begins where the first one ends.
     for _ in 0..2 {
         for (((out, z), kick), qd) in out.iter_mut().zip(z).zip(kicks).zip(&way.qd_rad_s) {
             let widths = (qd + lag) / width;

@@ -40,6 +40,9 @@ pub struct Effect {
 /// part of them.
 const OFF: f64 = 0.3;
 
+/// Smallest curve that bristles hold, relative to Coulomb friction.
+const LEAST_SHARE: f64 = 0.01;
+
 /// Base parameters and effects, fitted together.
 #[derive(Debug, Clone)]
 pub struct Extension {
@@ -134,7 +137,7 @@ impl Extension {
         self.telling(families, Scene::new(arm, set, &self.theta, prepared))
     }
 
-    /// `scene` told the friction of [`Self::told`] on joints where one law changes that of another.
+    /// `scene` told the friction of [`Self::told`] on joints where one law changes that of another, or bristles hold a curve.
     pub fn telling(&self, families: &[Box<dyn Candidate>], mut scene: Scene) -> Scene {
         for j in 0..scene.joints() {
             let kinds = on_joint(&self.told, j).map(|effect| families[effect.family].kind());
@@ -221,8 +224,11 @@ pub(super) fn tell_friction(
         let curve = families[*family].near_rest_nm(coefficients).map(|nm| (nm, *shape));
         near_rest = near_rest.or(curve);
     }
-    if let (Some(bristles), Some((nm, shape))) = (&mut bristles, near_rest) {
-        bristles.curve = Some(Curve { share: nm / bristles.coulomb_nm, shape });
+    if let (Some(bristles), Some((nm, shape))) =
+        (&mut bristles, near_rest.filter(|(nm, _)| *nm > 0.0))
+    {
+        let share = (nm / bristles.coulomb_nm).max(LEAST_SHARE);
+        bristles.curve = Some(Curve { share, shape });
     }
     let mut other = OtherFriction { turn, bristles, torque_nm: Vec::new(), warm };
     // The other laws depend on how friction turns round.

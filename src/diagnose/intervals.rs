@@ -135,7 +135,7 @@ pub fn physical(
         .then(|| profile.intervals(&span))
         .flatten()
         .unwrap_or_else(|| of_one_form(study, effect, (&span, &residual), quantile));
-    for form in kept.other_forms(index) {
+    for form in kept.other_forms(index, (&others, &residual)) {
         let left = 1.0 - form.behind / quantile.powi(2);
         if left <= 0.0 {
             continue;

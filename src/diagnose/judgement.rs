@@ -3,6 +3,7 @@
 
 use super::contenders::{Contender, SHARED};
 use super::extension::Effect;
+use super::image::{Image, Span};
 use super::selection::{FINALISTS, Kept};
 use super::statistic::Score;
 use super::study::Entry;
@@ -50,17 +51,17 @@ impl Kept<'_, '_> {
         (0..self.causes.len()).map(|c| self.judged(c)).collect()
     }
 
-    /// Cause `c` in the other variants of its family, each at its best shape.
-    pub fn other_forms(&self, c: usize) -> Vec<Form> {
-        let (others, residual) = self.without(Some(c));
-        let Contender { entry, score, .. } = &self.causes[c];
-        let own = score.gain;
+    /// Cause `c` in the other variants of its family, each at its best shape beside `others`, outside which the
+    /// `residual` is.
+    pub fn other_forms(&self, c: usize, (others, residual): (&Span, &Image)) -> Vec<Form> {
+        let entry = &self.causes[c].entry;
+        let own = self.study.score(entry, others, residual).map_or(0.0, |score| score.gain);
         let further = self.study.further_entries(entry);
         let least = f64::NEG_INFINITY;
-        let variants = self.other_variants(entry, &further, least, &others, &residual);
-        let variants = self.study.refined(&variants, &others, &residual);
+        let variants = self.other_variants(entry, &further, least, others, residual);
+        let variants = self.study.refined(&variants, others, residual);
         let form = |(entry, score): (Entry, Score)| {
-            let coefficients = self.study.span(&entry, &others).solve(&residual);
+            let coefficients = self.study.span(&entry, others).solve(residual);
             let behind = (own - score.gain).max(0.0);
             let Entry { family, site, shape, .. } = entry;
             let effect =

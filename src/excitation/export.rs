@@ -153,6 +153,7 @@ pub fn urscript(motion: &Excitation, playback: &Playback) -> String {
     }
     line("  q = start_pose".into());
     let approach = playback.approach_rad_s;
+    line("  popup(\"The arm will move straight to the start pose, slowly. Is that way clear?\", \"Excitation\", blocking = True)".into());
     line(format!("  movej(start_pose, a = {approach}, v = {approach})"));
     line("  popup(\"At the start pose. Continue plays the excitation.\", \"Excitation\", blocking = True)".into());
     line("  t = 0.0".into());
@@ -259,9 +260,9 @@ mod tests {
             })
             .count();
         assert_eq!(opened, script.lines().filter(|l| l.trim() == "end").count());
-        let movej = script.find("movej(start_pose, a = 0.3, v = 0.3)").unwrap();
-        assert!(movej < script.find("popup(").unwrap());
-        assert!(script.find("popup(").unwrap() < script.find("servoj(").unwrap());
+        let places = ["popup(", "movej(start_pose, a = 0.3, v = 0.3)", "popup(", "servoj("];
+        let find = |from: usize, text: &str| Some(from + script[from..].find(text)? + text.len());
+        assert!(places.into_iter().try_fold(0, find).is_some(), "each is behind the one before");
         assert!(script.contains("speed = 0.25\n"));
     }
 }

@@ -144,6 +144,21 @@ impl Default for Options {
 mod tests {
     use super::*;
 
+    /// In scenarios and results, `period_s` is left out, a period, or 0.
+    #[test]
+    fn a_repetition_is_a_period_in_files() {
+        for (repetition, line) in [
+            (Repetition::Found, None),
+            (Repetition::Every(12.5), Some("period_s = 12.5")),
+            (Repetition::Never, Some("period_s = 0.0")),
+        ] {
+            let options = Options { repetition, ..Options::default() };
+            let text = toml::to_string(&options).unwrap();
+            assert_eq!(text.lines().find(|line| line.starts_with("period_s")), line);
+            assert_eq!(toml::from_str::<Options>(&text).unwrap(), options);
+        }
+    }
+
     #[test]
     fn settings_that_no_log_can_be_processed_with_are_named() {
         let default = Options::default();

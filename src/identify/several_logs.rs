@@ -45,11 +45,15 @@ impl SeveralLogs {
     ///
     /// # Errors
     /// Logs of different rates, and those of [`Identifier::regression`] and of an identification of each log.
+    ///
+    /// # Panics
+    /// If `each` is not as many as the `logs`.
     pub fn together(
         identifier: &mut Identifier,
         logs: &[Measurement],
         each: Vec<Regression>,
     ) -> Result<Self, IdentifyError> {
+        assert_eq!(each.len(), logs.len(), "one regression for every log");
         let several = each_alone(identifier, &each)?;
         let is_run = |regression: &&Regression| regression.prepared.processing.period_s.is_none();
         let runs = each.iter().filter(is_run).count();

@@ -98,8 +98,7 @@ impl Plan {
                 continue;
             }
             let found = header.block(block)?;
-            // A layout of one's own names what the file has; a built-in one may name more.
-            if block == Block::Qd && found.is_err() && layout.is_built_in() {
+            if block == Block::Qd && found.is_err() && layout.may_lack(block) {
                 continue;
             }
             fields.extend(found.map_err(|missing| header.missing(missing))?);

@@ -82,6 +82,17 @@ pub enum PlantError {
         /// Friction at that speed, Nm.
         torque_nm: f64,
     },
+    /// Bristles cannot hold the Stribeck friction of their joint.
+    #[error(
+        "joint {joint}: with presliding, Stribeck friction needs more Coulomb friction than it takes away, and \
+         leaves {least_nm:.3} Nm"
+    )]
+    BristlesWithoutFriction {
+        /// Joint, from 1.
+        joint: usize,
+        /// Least dry friction that is left, Nm.
+        least_nm: f64,
+    },
     /// A list with one entry per joint has another length.
     #[error("{what} has {found} joints, the arm has {expected}")]
     Joints {

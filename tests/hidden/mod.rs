@@ -28,6 +28,11 @@ pub enum Law {
     Dahl {
         stiffness_per_rad: f64,
     },
+    /// Bristles with dz/dq = k (1 − z sign q̇)ⁱ, i = `exponent`.
+    DahlOfExponent {
+        stiffness_per_rad: f64,
+        exponent: f64,
+    },
     /// Bristles that are damped as well (σ₁/σ₀ is `damping_s`), and hold a Stribeck curve if `extra_nm` is not zero.
     LuGre {
         stiffness_per_rad: f64,
@@ -243,7 +248,7 @@ impl HiddenLaw {
 impl Drivetrain for HiddenLaw {
     fn states(&self) -> usize {
         match self.law {
-            Law::Dahl { .. } | Law::LuGre { .. } => 1,
+            Law::Dahl { .. } | Law::DahlOfExponent { .. } | Law::LuGre { .. } => 1,
             _ => 0,
         }
     }
@@ -311,6 +316,12 @@ impl Drivetrain for HiddenLaw {
             Law::Dahl { stiffness_per_rad } => {
                 let z = stage.states[0];
                 states_rate[0] = stiffness_per_rad * (v - v.abs() * z);
+                self.link_nm[h] += drive.coulomb_nm * (sign - z);
+            }
+            Law::DahlOfExponent { stiffness_per_rad, exponent } => {
+                let z = stage.states[0];
+                let left = (1.0 - v.signum() * z).max(0.0);
+                states_rate[0] = stiffness_per_rad * v * left.powf(exponent);
                 self.link_nm[h] += drive.coulomb_nm * (sign - z);
             }
             Law::LuGre { stiffness_per_rad, damping_s, extra_nm, vs_rad_s } => {

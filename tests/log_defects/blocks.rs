@@ -52,6 +52,49 @@ fn a_bad_field_in_a_row_that_is_set_aside_costs_no_block() {
     assert!(log.target_effort.is_some() && log.temperature_c.is_some());
 }
 
+/// What a layout inherits from a built-in one is no statement about the file, and what it says itself is.
+#[test]
+fn a_layout_that_inherits_the_velocities_can_do_without_them() {
+    let mut rows = valid();
+    rows.iter_mut().for_each(|row| {
+        row.drain(1 + JOINTS..1 + 2 * JOINTS);
+    });
+    let text = text(&rows, ",", "\n");
+    let inherited =
+        "name = \"mine\"\nlike = \"armid\"\ndrive_gain_nm_a = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0]\n";
+    let layout = Layout::from_toml(inherited, "mine.toml").unwrap();
+    let log = read_log_from(text.as_bytes(), "run.csv", &layout, JOINTS).unwrap();
+    assert_eq!(log.samples(), SAMPLES);
+    let own = format!("{inherited}[columns]\nqd = \"velocity_{{0}}\"\n");
+    let layout = Layout::from_toml(&own, "mine.toml").unwrap();
+    let result = read_log_from(text.as_bytes(), "run.csv", &layout, JOINTS);
+    assert_says(result, &["no column \"velocity_0\""]);
+}
+
+/// Rows of `ros2 topic echo --csv /joint_states`: stamp in two columns, frame, names, and the joints' values.
+#[test]
+fn joint_states_of_ros_are_read() {
+    let layout =
+        Layout::from_toml(include_str!("../../layouts/ros2_joint_states.toml"), "ros").unwrap();
+    let names = "shoulder_pan,shoulder_lift,elbow,wrist_1,wrist_2,wrist_3";
+    let rows = valid();
+    let lines = rows[1..].iter().enumerate().map(|(k, row)| {
+        let nanoseconds = 8_000_000 * k as u64;
+        let stamp = (100 + nanoseconds / 1_000_000_000, nanoseconds % 1_000_000_000);
+        format!("{},{},base,{names},{}\n", stamp.0, stamp.1, row[1..].join(","))
+    });
+    let text: String = lines.collect();
+    let log = read_log_from(text.as_bytes(), "echo.csv", &layout, JOINTS).unwrap();
+    assert_eq!(log.samples(), SAMPLES);
+    for k in [0, 130, SAMPLES - 1] {
+        let t = 100.0 + STEP_S * k as f64;
+        // Digits are written in full; stamps are seconds counted from the first row or from 1970.
+        assert!((log.q_rad.joint(2)[k] - angle_rad(2, t)).abs() < 1e-12);
+        assert!((log.qd_rad_s.joint(5)[k] - velocity_rad_s(5, t)).abs() < 1e-12);
+        assert!((log.time_s[k] - log.time_s[0] - STEP_S * k as f64).abs() < 1e-9);
+    }
+}
+
 /// A layout without torque columns does not ask for them.
 #[test]
 fn the_effort_that_a_layout_names_is_the_one_that_is_missing() {

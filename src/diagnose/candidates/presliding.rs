@@ -4,14 +4,15 @@
 //! damping, so it does not take part in the search. Where presliding was found, it is a further form of the law, with
 //! F T as a second coefficient.
 //!
-//! Where the joint also has a Stribeck curve, the bristle holds it (LuGre): z then comes to rest at ±γ(q̇) ([`Bristles`]).
-//! The torque of both is F z, of which the curve's own column accounts for what z has more than without it.
+//! Where the scene was told of a Stribeck curve of the joint, the bristle holds it (LuGre): z then comes to rest at ±γ(q̇)
+//! ([`Bristles`]). The torque of both is F z, of which the curve's own column accounts for what z has more than without
+//! it.
 //!
 //! Stiff bristles turn round within a few samples, and how the samples show it depends on the torque that the drive
 //! gives meanwhile. A drive that feeds friction forward does so where the commanded velocity reverses. Real presliding
 //! friction gives way only after the joint has reversed, some milliseconds later, and the later the more gently the
 //! joint turns. A constant lead, as in the null model, cannot follow that. The torque of the drive is therefore
-//! simulated along with the bristles ([`given`]); the kind of drive is a variant of the law.
+//! simulated along with the bristles ([`column`]); the kind of drive is a variant of the law.
 //!
 //! In a single run, the angle is followed with play: it moves only as far as the uncertainty of the recorded angles
 //! (their rounding) demands. Without this play, rounding at standstill would shake the friction loose.
@@ -84,8 +85,9 @@ impl Candidate for Presliding {
         let way = Way::new(scene, j);
         let known = scene.other_friction(j).bristles;
         let curve = known.and_then(|bristles| bristles.curve);
-        let of_curve =
-            known.zip(curve).map(|(known, curve)| known.more_with(scene, j, &way, curve));
+        let of_curve = known.zip(curve).map(|(known, curve)| {
+            known.more_with(scene, j, &way, std::iter::once(curve)).remove(0)
+        });
         let less = |dry: Column| match &of_curve {
             Some(of_curve) => dry.minus(of_curve),
             None => dry,
@@ -118,9 +120,9 @@ impl Candidate for Presliding {
     }
 
     fn bristles(&self, shape: Shape, b: &[f64]) -> Option<Bristles> {
-        Some(Bristles {
+        (b[0] > 0.0).then(|| Bristles {
             stiffness_per_rad: shape.value,
-            damping_s: second(b) / b[0],
+            damping_s: second(b).max(0.0) / b[0],
             coulomb_nm: b[0],
             drive: DRIVES[shape.variant % DAMPED],
             curve: None,

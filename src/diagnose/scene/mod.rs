@@ -225,7 +225,7 @@ impl Scene {
         self.other_friction[j].torque_nm = torque_nm;
     }
 
-    /// Whether laws are known of a joint that change the friction of others.
+    /// Whether laws are known of a joint that change the friction of others, or that are parts of one law.
     pub fn has_products(&self) -> bool {
         let is_product =
             |other: &OtherFriction| other.turn.is_some() || !other.torque_nm.is_empty();

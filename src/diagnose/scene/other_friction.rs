@@ -1,5 +1,5 @@
 //! What laws that were found on a joint say about its friction, as far as other laws of the joint depend on it: all of its
-//! friction warms up, all of it turns round over the same range of speeds, and bristles hold the curve of it.
+//! friction warms up, all of it turns round over the same range of speeds, and bristles hold its Stribeck curve.
 
 use crate::diagnose::bristles::Bristles;
 

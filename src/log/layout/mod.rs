@@ -161,9 +161,12 @@ impl Layout {
         Self::from_toml(&text, &source)
     }
 
-    /// Whether it is one of those that come with the program, as it is.
-    pub(super) fn is_built_in(&self) -> bool {
-        built_in(&self.source).is_some()
+    /// Whether a file may lack the columns of `block` that the layout names: a layout of one's own names what the file
+    /// has, while one that comes with the program, or the part of another that is inherited from it, may name more.
+    pub(super) fn may_lack(&self, block: Block) -> bool {
+        let is_inherited =
+            |below: &Self| below.columns(block) == self.columns(block) && below.may_lack(block);
+        built_in(&self.source).is_some() || self.below.as_deref().is_some_and(is_inherited)
     }
 
     /// Parses the text of a layout; `source` is its file, or its name in messages.
@@ -324,6 +327,13 @@ mod tests {
         assert!(Block::ALL.iter().all(|block| layout.columns(*block).is_some()));
         assert_eq!(layout.units.factor(Block::Time), Some(1e-3));
         assert_ne!(layout.joints, Joints::default());
+    }
+
+    #[test]
+    fn the_layout_of_ros_is_valid() {
+        let text = include_str!("../../../layouts/ros2_joint_states.toml");
+        let layout = Layout::from_toml(text, "ros2_joint_states.toml").unwrap();
+        layout.check_for(6).unwrap();
     }
 
     fn fault_of(from: &str, to: &str) -> String {

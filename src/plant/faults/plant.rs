@@ -72,6 +72,9 @@ impl FaultyPlant {
             if let Some((qd_rad_s, torque_nm)) = joint.friction.first_driving(limit) {
                 return Err(PlantError::FrictionDrives { joint: j + 1, qd_rad_s, torque_nm });
             }
+            if let Some(least_nm) = joint.friction.not_held_nm() {
+                return Err(PlantError::BristlesWithoutFriction { joint: j + 1, least_nm });
+            }
         }
         Ok(Self {
             limit_nm: nominal.joints.iter().map(|j| j.limits.torque_nm).collect(),

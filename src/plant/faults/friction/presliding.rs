@@ -57,7 +57,9 @@ impl Presliding {
 /// Fastest decay of bristles of the stiffness k that matters, 1/s, for a joint that starts at rest with an acceleration
 /// of at most a. When the joint has moved by d after a reversal, its speed is at most √(2 a d), and the deviation of the
 /// bristle has shrunk to e^(−k d). The bristle has therefore completed its reversal (k d = 18) before the decay rate k q̇
-/// exceeds √(2 a k · 18). From then on it stays where it rests, and the rate has no effect.
+/// exceeds √(2 a k · 18). From then on it stays where it rests, and the rate has no effect; where a curve changes that
+/// rest, the bristle then follows it by a little more than it would (0.002 in place of 0.0014 of Coulomb friction, for
+/// k of 10 000 /rad and a curve of 0.4 that falls within 0.2 rad/s, along 11 rad/s²).
 pub(super) fn fastest_turn_per_s(stiffness_per_rad: f64, acceleration_rad_s2: f64) -> f64 {
     (2.0 * acceleration_rad_s2 * stiffness_per_rad * TURNED_ROUND).sqrt()
 }
@@ -75,8 +77,7 @@ impl Fault for Presliding {
     fn install(&self, assembly: &mut Assembly) -> Result<(), Complaint> {
         let friction = &mut assembly.joint(self.joint).friction;
         let present = friction.presliding.replace(*self).is_some();
-        require(!present, "joint", self.joint as f64, "has presliding already")?;
-        friction.check_bristle()
+        require(!present, "joint", self.joint as f64, "has presliding already")
     }
 }
 
