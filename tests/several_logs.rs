@@ -4,7 +4,7 @@
 use armid::dynamics::Model;
 use armid::identify::covariance::Covariance;
 use armid::identify::{
-    Identification, Identifier, Options, Regression, Repetition, Several, each_alone, pooled,
+    Identification, Identifier, Measurement, Options, Regression, Repetition, SeveralLogs,
 };
 use armid::montecarlo::{Scenario, Simulation};
 use armid::plant::Measured;
@@ -33,12 +33,45 @@ fn identified(
     identifier: &mut Identifier,
     logs: &[Measured],
 ) -> (Vec<Identification>, Identification) {
-    let regressions: Vec<Regression> = logs.iter().map(|log| laid_out(identifier, log)).collect();
-    let Several::Apart(parts) = each_alone(identifier, &regressions).unwrap() else {
-        panic!("all repeat");
-    };
-    let whole = pooled(&parts, &Regression::joined(regressions).unwrap());
-    (parts, whole)
+    let logs: Vec<Measurement> = logs.iter().map(|log| log.measurement("several")).collect();
+    let each = SeveralLogs::each(identifier, &logs).unwrap();
+    let alone = each.iter().map(|log| identifier.identify_regression(log).unwrap()).collect();
+    let whole =
+        SeveralLogs::together(identifier, &logs, each).unwrap().identify(identifier).unwrap();
+    assert!(whole.agreement.is_some(), "all repeat");
+    (alone, whole)
+}
+
+/// Two and a half seconds more than a period do not repeat. The rows of the other log, a mean over four periods, scatter less
+/// than filtered ones: weighted together they have to be filtered as well.
+#[test]
+fn a_log_beside_a_single_run_counts_as_one() {
+    let simulation = simulation("ur5_identification", 1.0, "");
+    let Scenario { arm, set, processing, .. } = &simulation.scenario;
+    let model = Model::new(arm);
+    let mut identifier = Identifier::new(&model, set, processing.clone());
+    let whole = simulation.log(0).unwrap();
+    let rows = 1250 + 312;
+    let mut short = whole.clone();
+    short.time_s.truncate(rows);
+    for signals in [&mut short.q_rad, &mut short.qd_rad_s, &mut short.torque_nm] {
+        *signals = signals.map_joints(|_, y| y[..rows].to_vec());
+    }
+    let logs = [whole.measurement("whole.csv"), short.measurement("short.csv")];
+    let each = SeveralLogs::each(&mut identifier, &logs).unwrap();
+    let periods = [0, 1].map(|k| each[k].prepared.processing.period_s.is_some());
+    assert_eq!(periods, [true, false]);
+    let together = SeveralLogs::together(&mut identifier, &logs, each).unwrap();
+    let processing = &together.regression.prepared.processing;
+    assert!(processing.period_s.is_none() && processing.cutoff_hz.is_some(), "{processing:?}");
+    let warnings = &together.regression.prepared.warnings;
+    let is_told = |text: &str| warnings.iter().any(|warning| warning.contains(text));
+    assert!(is_told("because short.csv cannot stand alone"), "{warnings:?}");
+    let found = together.identify(&mut identifier).unwrap();
+    let truth = set.values(&model.standard_parameters());
+    let covered = coverage(&found.fit.theta, &found.covariance, &truth);
+    // 52 intervals that hold at 95 %: fewer than 43 hold once in 4500 if they are independent.
+    assert!(covered > 42.5 / 52.0, "{covered}");
 }
 
 /// Share of the base parameters whose 95 % interval holds the truth.

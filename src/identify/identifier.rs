@@ -38,8 +38,8 @@ const PIECE: usize = 1 << 16;
 /// Instants per sample at which reversals of velocity are resolved: a millisecond at 125 Hz, a tenth of the time that
 /// a joint takes to reverse its friction.
 const TICKS: usize = 8;
-/// Longest single run that keeps all its samples.
-const LONG_RUN: usize = 100_000;
+/// Longest single run that keeps all its samples, of which a diagnosis needs some 30 kB each.
+const LONG_RUN: usize = 30_000;
 /// Sampling rate kept after a low-pass where a run is long or its rows are counted, in multiples of the cut-off.
 const KEPT_RATE: f64 = 4.0;
 /// Relative difference up to which two rates are the same: recorders of one arm differ by less.

@@ -55,7 +55,7 @@ pub use lack_of_fit::{Floor, LackOfFit, by_noise_in_words};
 pub use measurement::Measurement;
 pub use misreading::{Change, Channels, Match, Misreading};
 pub use options::{Improper, Options, Repetition};
-pub use pooled::{Agreement, Several, each_alone, pooled};
+pub use pooled::Agreement;
 pub use prediction::{MOVING_RAD_S, Prediction, resting_joints};
 pub use prepare::Preparer;
 pub use prepared::{Prepared, Processing};

@@ -282,6 +282,8 @@ impl Result {
             intervals: Intervals::of(training),
             condition: Condition::of(&regression.problem, set)?,
             verdict: match &doubt {
+                // What a misread log does not tell need not be a matter of its motion.
+                _ if training.misread.is_some() => CONTRADICTED,
                 _ if !is_identified => NOT_IDENTIFIED,
                 Some(doubt) if doubt.is_contradiction() => CONTRADICTED,
                 _ => IDENTIFIED,
