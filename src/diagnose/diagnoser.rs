@@ -25,7 +25,9 @@ use super::replay::measured_nm;
 use super::rms::rms_where;
 use super::selection::{Kept, select};
 use super::sentences::Besides;
-use super::settled::{beside_model, fitted, residual, settled, without_contacts};
+use super::settled::{
+    as_told, beside_model, fitted, is_told_of_others, residual, settled, without_contacts,
+};
 use super::study::{Entry, Study};
 use super::verdict::{Cause, Diagnosis, HeldOut, Rival, Rms, Unexplained, Verdict};
 use crate::base::BaseSet;
@@ -88,14 +90,21 @@ impl<'a> Diagnoser<'a> {
         move_to_common_motion(&mut regression, (self.arm, self.set), &identification.fit.theta);
         let noise_nm = noise_of_mean(&regression);
         let sources = (self.arm, self.set, &self.options);
-        let (study, found) =
+        let (mut study, found) =
             causes_of(&self.families, sources, &regression, &identification, &log, m.source)?;
         let mut kept = match study.scene.periodic {
             true => Kept::of(&study, found),
             false => Kept::of_a_single_run(&study, found),
         };
         let null = Extension::fit(&study, &[], &study.torque);
-        let gains = kept.drop_idle();
+        let mut gains = kept.drop_idle();
+        if study.scene.periodic && is_told_of_others(&study, &kept.causes) {
+            let left = kept.causes;
+            let causes = as_told(&mut study, left);
+            study.look_everywhere();
+            kept = Kept::of(&study, causes);
+            gains = kept.drop_idle();
+        }
         let selected = kept.selected();
         let before_nm = residual(&study, &null);
         let mut model = self.extended(&study, &kept, &selected, &gains);

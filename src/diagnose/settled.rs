@@ -50,17 +50,18 @@ pub fn settled<'s>(
     Ok((study, found.causes))
 }
 
-/// The `causes` in a scene that was told of no others. A law that was dropped last may have been told, and the laws
-/// beside it be computed with it.
-fn as_told(study: &mut Study, mut causes: Vec<Contender>) -> Vec<Contender> {
-    let is_stale = |study: &Study, causes: &[Contender]| {
-        let is_cause = |effect: &Effect| {
-            causes.iter().any(|c| c.entry.place() == (effect.family, effect.site))
-        };
-        study.scene.has_products() && !study.told.iter().all(is_cause)
-    };
+/// Whether the scene of `study` was told of laws that are not among the `causes`, and those beside them are computed with
+/// them.
+pub fn is_told_of_others(study: &Study, causes: &[Contender]) -> bool {
+    let is_cause =
+        |effect: &Effect| causes.iter().any(|c| c.entry.place() == (effect.family, effect.site));
+    study.scene.has_products() && !study.told.iter().all(is_cause)
+}
+
+/// The `causes` in a scene that is told of no others; a law that was dropped last may have been told.
+pub fn as_told(study: &mut Study, mut causes: Vec<Contender>) -> Vec<Contender> {
     // Every round takes a cause away, or is the last.
-    while is_stale(study, &causes) {
+    while is_told_of_others(study, &causes) {
         tell(study, &causes, |_| false);
         let mut kept = Kept::taken_over(study, causes);
         kept.drop_unneeded(|_| true);

@@ -5,6 +5,7 @@
 
 use super::kind::Kind;
 use super::verdict::{Cause, Estimate};
+use crate::number::significant;
 
 /// Up to this many touches get a sentence each.
 const TOUCHES: usize = 5;
@@ -30,7 +31,33 @@ pub(super) fn in_sentences(causes: &[Cause], noise_is_known: bool) -> Vec<String
             out.extend(number_of(&weaker, causes));
         }
     }
+    if noise_is_known {
+        out.extend(causes.iter().filter_map(|bristles| lugre(bristles, causes)));
+    }
     out
+}
+
+/// The sentence about `bristles` that hold a Stribeck curve among `causes`, as a log that repeats tells: the parts of a
+/// LuGre model, by its own parameters. `None` for any other cause.
+fn lugre(bristles: &Cause, causes: &[Cause]) -> Option<String> {
+    let is_told = |cause: &Cause, kind: Kind| cause.kind == kind && !cause.is_unlikely();
+    let curve = causes
+        .iter()
+        .find(|cause| is_told(cause, Kind::Stribeck) && cause.joint == bristles.joint)?;
+    let joint = bristles.joint.filter(|_| is_told(bristles, Kind::Presliding))?;
+    let value = |cause: &Cause, name: &str| cause.parameters.get(name).map(|e| e.value);
+    let coulomb_nm = value(bristles, "coulomb_nm")?;
+    let sigma0 = coulomb_nm * value(bristles, "stiffness_per_rad")?;
+    let damping = value(bristles, "damping_s").map_or_else(String::new, |damping_s| {
+        format!("σ₁ = {} Nm s/rad, ", significant(sigma0 * damping_s, 3))
+    });
+    Some(format!(
+        "Both laws of joint {joint} are one LuGre model: σ₀ = {} Nm/rad, {damping}F_c = {} Nm, F_s = {} Nm, v_s = {} rad/s.",
+        significant(sigma0, 3),
+        significant(coulomb_nm, 3),
+        significant(coulomb_nm + value(curve, "extra_nm")?, 3),
+        significant(value(curve, "vs_rad_s")?, 3),
+    ))
 }
 
 /// One sentence that says how many causes there are and lists them by kind, for a reader of more than [`MANY`]
@@ -175,6 +202,28 @@ mod tests {
         ] {
             assert_eq!(in_sentences(&[lag.clone(), other], true).len(), 2);
         }
+    }
+
+    /// Bristles of 1000 /rad and 2 Nm with a damping of 2 ms, and a curve of 0.5 Nm.
+    #[test]
+    fn bristles_with_a_curve_are_lugres() {
+        let law = |kind: Kind, joint: usize, parameters: &[(&'static str, f64)]| {
+            let parameters: Vec<(&str, Estimate)> =
+                parameters.iter().map(|(name, value)| (*name, exact(*value, ""))).collect();
+            cause(kind, Some(joint), "a law", 20.0, &parameters)
+        };
+        let of_bristles =
+            [("coulomb_nm", 2.0), ("stiffness_per_rad", 1000.0), ("damping_s", 0.002)];
+        let of_curve = [("extra_nm", 0.5), ("vs_rad_s", 0.1)];
+        let bristles = law(Kind::Presliding, 3, &of_bristles);
+        let curve = law(Kind::Stribeck, 3, &of_curve);
+        let said = in_sentences(&[curve.clone(), bristles.clone()], true);
+        let lugre = "Both laws of joint 4 are one LuGre model: σ₀ = 2000 Nm/rad, σ₁ = 4.00 Nm s/rad, F_c = 2.00 Nm, F_s = 2.50 Nm, v_s = 0.100 rad/s.";
+        assert_eq!((said.len(), &*said[2]), (3, lugre));
+        // Of a single run, or of another joint, they are laws of their own.
+        assert_eq!(in_sentences(&[curve.clone(), bristles], false).len(), 2);
+        let elsewhere = law(Kind::Presliding, 2, &of_bristles[..2]);
+        assert_eq!(in_sentences(&[curve, elsewhere], true).len(), 2);
     }
 
     fn touch(start_s: f64, strength: f64) -> Cause {

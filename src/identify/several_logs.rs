@@ -10,7 +10,7 @@ use super::regression::Regression;
 
 /// Logs of one arm, laid out to be identified as one.
 ///
-/// Logs that repeat their motion often enough are identified one by one and [`pooled`]; otherwise the rows of all logs
+/// Logs that repeat their motion often enough are identified one by one and pooled; otherwise the rows of all logs
 /// are stacked. A single log is itself.
 pub struct SeveralLogs {
     /// The rows of all logs.
