@@ -112,7 +112,6 @@ fn in_turn<'s>(
 /// friction of others is therefore taken on trial, refined in turn with them, and only then has to be needed; and so is
 /// a Stribeck curve on a joint with bristles.
 fn with_products(study: &mut Study, found: &Found) -> Option<Found> {
-    let families = study.families;
     let joints = 0..study.scene.joints();
     let before: Vec<OtherFriction> =
         joints.clone().map(|j| study.scene.other_friction(j).clone()).collect();
@@ -120,57 +119,9 @@ fn with_products(study: &mut Study, found: &Found) -> Option<Found> {
     let mut better: Option<Found> = None;
     for j in joints {
         let start = better.as_ref().unwrap_or(found).causes.clone();
-        let on_joint = start.iter().filter(|c| c.entry.site.is_none_or(|own| own == j));
-        let kinds: Vec<Kind> = on_joint.map(|c| families[c.entry.family].kind()).collect();
-        let has_bristles = kinds.contains(&Kind::Presliding);
-        // Bristles have no width: their law says by itself how friction turns round.
-        let is_plain = |kind: &Kind| kind.adds_friction() && *kind != Kind::Presliding;
-        let is_multiplied = kinds.iter().any(is_plain);
-        if !is_multiplied && !has_bristles {
-            continue;
-        }
-        let changes = |(family, site): &Place| {
-            let kind = families[*family].kind();
-            let is_held = has_bristles && kind == Kind::Stribeck;
-            *site == Some(j) && (is_multiplied && kind.changes_friction() || is_held)
-        };
-        let is_there = |place: &Place| place.1 == Some(j);
-        tell(study, &start, |place| changes(place) || has_bristles && is_there(place));
-        let kept = Kept::taken_over(study, start);
-        let (others, residual) = kept.without(None);
-        let contenders = kept.contenders(None, &others, &residual);
-        // What stands in for something unknown on the joint, as [`Kept::grow`] sees it: a curve far behind is part of that.
-        let stands_in = |c: &&Contender| {
-            is_there(&c.entry.place()) && !kept.is_its_own(&c.entry, &others, &residual)
-        };
-        let finalists = contenders.iter().take(FINALISTS);
-        let unknown = finalists.filter(stands_in).map(|c| c.evidence).fold(0.0, f64::max);
-        let is_held = |(family, _): Place| families[family].kind() == Kind::Stribeck;
-        // Bristles with a curve are no other model of the joint than bristles and a curve: the curve has to be
-        // significant beside them, and no more.
-        let margin = |place: Place| if is_held(place) { LEAST_EVIDENCE } else { FAR_AHEAD };
-        let is_clear = |c: &Contender| {
-            let place = c.entry.place();
-            let is_behind = is_held(place) && unknown > c.evidence + FAR_AHEAD;
-            changes(&place) && c.evidence > margin(place) && !is_behind
-        };
-        let on_trial: Vec<Contender> = contenders.into_iter().filter(is_clear).collect();
-        for contender in on_trial {
-            let place = contender.entry.place();
+        for contender in for_trial(study, start, j) {
             let best = better.as_ref().unwrap_or(found);
-            let least = best.evidence + margin(place);
-            let mut trial = best.causes.clone();
-            trial.push(contender);
-            for _ in 0..ROUNDS_OF_PRODUCTS {
-                tell(study, &trial, |_| false);
-                trial = Kept::taken_over(study, trial).causes;
-            }
-            let mut kept = Kept::taken_over(study, trial);
-            kept.drop_unneeded(|_| true);
-            let evidence = kept.total_evidence();
-            if evidence > least && kept.causes.iter().any(|c| c.entry.place() == place) {
-                better = Some(Found { causes: kept.causes, evidence });
-            }
+            better = tried(study, best, contender).or(better);
         }
     }
     match &better {
@@ -183,6 +134,71 @@ fn with_products(study: &mut Study, found: &Found) -> Option<Found> {
         }
     }
     better
+}
+
+/// 2 ln of the odds by which a log has to be explained better with a law of this `kind` than without.
+///
+/// Bristles with a curve are no other model of the joint than bristles and a curve: the curve has to be significant
+/// beside them, and no more.
+fn margin(kind: Kind) -> f64 {
+    if kind.changes_friction() { FAR_AHEAD } else { LEAST_EVIDENCE }
+}
+
+/// What may act on joint `j` beside `causes` and changes their friction, or is held by their bristles, in a scene that was
+/// told of them.
+///
+/// A law that explains the joint best but is not its family's own stands in for something unknown there. A curve far
+/// behind it is part of that, as everywhere ([`Kept::grow`]).
+fn for_trial(study: &mut Study, causes: Vec<Contender>, j: usize) -> Vec<Contender> {
+    let families = study.families;
+    let kind = |place: Place| families[place.0].kind();
+    let on_joint = causes.iter().filter(|c| c.entry.site.is_none_or(|own| own == j));
+    let kinds: Vec<Kind> = on_joint.map(|c| kind(c.entry.place())).collect();
+    let has_bristles = kinds.contains(&Kind::Presliding);
+    // Bristles have no width: their law says by itself how friction turns round.
+    let is_plain = |kind: &Kind| kind.adds_friction() && *kind != Kind::Presliding;
+    let is_multiplied = kinds.iter().any(is_plain);
+    if !is_multiplied && !has_bristles {
+        return Vec::new();
+    }
+    let is_there = |place: Place| place.1 == Some(j);
+    let is_held = |place: Place| has_bristles && kind(place) == Kind::Stribeck;
+    let changes = |place: Place| is_multiplied && kind(place).changes_friction();
+    let is_wanted = |place: &Place| is_there(*place) && (has_bristles || changes(*place));
+    tell(study, &causes, is_wanted);
+    let kept = Kept::taken_over(study, causes);
+    let (others, residual) = kept.without(None);
+    let contenders = kept.contenders(None, &others, &residual);
+    let stands_in = |c: &&Contender| {
+        is_there(c.entry.place()) && !kept.is_its_own(&c.entry, &others, &residual)
+    };
+    let finalists = contenders.iter().take(FINALISTS);
+    let unknown = finalists.filter(stands_in).map(|c| c.evidence).fold(0.0, f64::max);
+    let is_clear = |c: &Contender| {
+        let place = c.entry.place();
+        let is_part = is_held(place) && unknown > c.evidence + FAR_AHEAD;
+        let is_of_products = is_there(place) && (is_held(place) || changes(place));
+        is_of_products && c.evidence > margin(kind(place)) && !is_part
+    };
+    contenders.into_iter().filter(is_clear).collect()
+}
+
+/// The causes of `best` with `contender`, refined in turn, if it is needed and the log is explained better enough.
+fn tried(study: &mut Study, best: &Found, contender: Contender) -> Option<Found> {
+    let place = contender.entry.place();
+    let least = best.evidence + margin(study.families[place.0].kind());
+    let mut trial = best.causes.clone();
+    trial.push(contender);
+    for _ in 0..ROUNDS_OF_PRODUCTS {
+        tell(study, &trial, |_| false);
+        trial = Kept::taken_over(study, trial).causes;
+    }
+    let mut kept = Kept::taken_over(study, trial);
+    kept.drop_unneeded(|_| true);
+    let evidence = kept.total_evidence();
+    let is_better =
+        evidence > least && kept.causes.iter().any(|cause| cause.entry.place() == place);
+    is_better.then(|| Found { causes: kept.causes, evidence })
 }
 
 /// Tells the scene of `study` the friction of the `causes`, and prepares them and the places that are wanted besides.
