@@ -198,7 +198,7 @@ fn tried(study: &mut Study, best: &Found, contender: Contender) -> Option<Found>
     let evidence = kept.total_evidence();
     let is_better =
         evidence > least && kept.causes.iter().any(|cause| cause.entry.place() == place);
-    is_better.then(|| Found { causes: kept.causes, evidence })
+    is_better.then_some(Found { causes: kept.causes, evidence })
 }
 
 /// Tells the scene of `study` the friction of the `causes`, and prepares them and the places that are wanted besides.
