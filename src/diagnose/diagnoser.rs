@@ -130,7 +130,7 @@ impl<'a> Diagnoser<'a> {
         let lack = misfit::lack_of_fit(&study, &accepted, &rest);
         let unexplained = unexplained(&study, (&accepted, &rest), lack, &causes, &log);
         if let Some(unknown) = &unexplained {
-            make_modest_beside_unknown(&mut causes, unknown.joint, study.scene.periodic);
+            make_modest_beside_unknown(&mut causes, unknown.site(), study.scene.periodic);
         }
         let models = Models { null: &null, extension: &extension };
         let gain = |log| {

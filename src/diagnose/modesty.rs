@@ -91,10 +91,15 @@ pub(super) fn make_modest(causes: &mut [Cause], is_compared: bool) {
     }
 }
 
-/// Limits the confidence in causes while something is left unexplained on `joint` (1-based). The small gain of causes and
+/// Limits the confidence in causes while something is left unexplained at `site`: a joint (1-based), or the arm as a
+/// whole. The small gain of causes and
 /// the number of joints with causes are evidence only where `noise_is_known`: along single runs of real arms, friction
 /// has laws on all joints.
-pub(super) fn make_modest_beside_unknown(causes: &mut [Cause], joint: usize, noise_is_known: bool) {
+pub(super) fn make_modest_beside_unknown(
+    causes: &mut [Cause],
+    site: Option<usize>,
+    noise_is_known: bool,
+) {
     let all: &[Cause] = causes;
     let has_parts = noise_is_known && !scattered_joints(all).is_empty();
     let explained = |cause: &Cause| -> f64 {
@@ -107,7 +112,7 @@ pub(super) fn make_modest_beside_unknown(causes: &mut [Cause], joint: usize, noi
     };
     let parts: Vec<bool> = all.iter().map(is_part).collect();
     for (cause, is_part) in causes.iter_mut().zip(parts) {
-        let is_there = cause.joint.is_none_or(|own| own == joint);
+        let is_there = cause.joint.is_none() || site.is_none() || cause.joint == site;
         cause.is_no_surer_than(if is_there || is_part { BESIDE_UNKNOWN } else { PROVISIONAL });
         let gains_nothing = cause.gain_fraction.is_some_and(|gain| gain < NEXT_TO_NOTHING);
         if noise_is_known && gains_nothing {
@@ -157,7 +162,7 @@ mod tests {
     }
 
     fn confidences(mut causes: Vec<Cause>, joint: usize, noise_is_known: bool) -> Vec<f64> {
-        make_modest_beside_unknown(&mut causes, joint, noise_is_known);
+        make_modest_beside_unknown(&mut causes, Some(joint), noise_is_known);
         causes.iter().map(|cause| cause.confidence).collect()
     }
 
@@ -199,6 +204,14 @@ mod tests {
         assert_eq!(of_gains(&[3, 4], false), [0.9; 2]);
         assert_eq!(of_gains(&[3, 4], true), [1.0; 2]);
         assert_eq!(of_gains(&[3], false), [1.0]);
+    }
+
+    /// Who knows what acts on the arm as a whole does not know which joint's cause is a part of it.
+    #[test]
+    fn beside_something_unknown_on_all_joints_no_cause_is_sure() {
+        let mut causes = vec![cause(Kind::TorqueGain, 3, 0.9), cause(Kind::Stribeck, 5, 0.9)];
+        make_modest_beside_unknown(&mut causes, None, true);
+        assert!(causes.iter().all(|cause| cause.confidence == 0.5), "{causes:?}");
     }
 
     /// Bristles on all joints and a time skew of the arm as a whole, beside two faults of one joint each and two faults

@@ -107,8 +107,14 @@ mod tests {
         }
         assert!(told(&of(Kind::Contact, Some(1))).is_empty());
         assert!(told(&of(Kind::Elasticity, Some(2))).is_empty());
-        let unknown =
-            Unexplained { axis: "angle", unit: "rad", joint: 2, rms_nm: 1.0, curve: Vec::new() };
+        let unknown = Unexplained {
+            axis: "angle",
+            unit: "rad",
+            joint: 2,
+            of_all_joints: false,
+            rms_nm: 1.0,
+            curve: Vec::new(),
+        };
         assert_eq!(limited_drives(&arm, &torque(20), &[], Some(&unknown)).len(), 1);
     }
 }

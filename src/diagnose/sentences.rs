@@ -4,7 +4,7 @@ use super::against::MOVED;
 use super::kind::Kind;
 use super::modesty::scattered_joints;
 use super::told;
-use super::verdict::{Cause, Diagnosis, Estimate, HeldOut, Moved};
+use super::verdict::{Cause, Diagnosis, Estimate, HeldOut, Moved, Unexplained};
 use crate::number::{percent, resolved_from, significant, with_sigma};
 
 /// An interval that reaches this many times farther to one side than to the other is stated by its ends.
@@ -56,12 +56,7 @@ impl Diagnosis {
         out.extend(told::overview(&self.causes));
         out.extend(told::in_sentences(&self.causes, self.noise_floor_nm.is_some()));
         if let Some(unexplained) = &self.unexplained {
-            out.push(format!(
-                "Joint {} shows {} Nm (rms) that no known effect explains; it depends most clearly on the {}.",
-                unexplained.joint,
-                significant(unexplained.rms_nm, 2),
-                unexplained.axis
-            ));
+            out.push(unexplained.sentence());
         }
         out.extend(told::in_the_table_alone(&self.causes));
         if out.is_empty() {
@@ -138,6 +133,22 @@ impl Diagnosis {
             held_out.log,
             j + 1
         ))
+    }
+}
+
+impl Unexplained {
+    fn sentence(&self) -> String {
+        let (joint, axis, nm) = (self.joint, self.axis, significant(self.rms_nm, 2));
+        if self.of_all_joints {
+            format!(
+                "The joints together show what no known effect explains and noise does not leave, most on joint {joint} ({nm} Nm rms); \
+                 it depends most clearly on the {axis}. Something may act on the arm as a whole."
+            )
+        } else {
+            format!(
+                "Joint {joint} shows {nm} Nm (rms) that no known effect explains; it depends most clearly on the {axis}."
+            )
+        }
     }
 }
 

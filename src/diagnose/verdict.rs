@@ -120,13 +120,21 @@ pub struct Unexplained {
     pub unit: &'static str,
     /// Joint (1-based).
     pub joint: usize,
-    /// Rms of that dependence, Nm.
+    /// Whether it is told from noise only together with what other joints show along the same quantity; the joint is
+    /// then the one that shows most.
+    pub of_all_joints: bool,
+    /// Rms of that dependence on this joint, Nm.
     pub rms_nm: f64,
     /// Points of the curve: value of the quantity and torque, Nm.
     pub curve: Vec<[f64; 2]>,
 }
 
 impl Unexplained {
+    /// The joint (1-based) that it belongs to; `None` if it acts on the arm as a whole.
+    pub(super) fn site(&self) -> Option<usize> {
+        (!self.of_all_joints).then_some(self.joint)
+    }
+
     /// The same with no more than the residual of its joint, whose rms per joint is `residual_nm`: the curve may hold a
     /// part that the parameters absorb. What does not repeat is not in the residual of the mean period.
     pub(super) fn at_most(mut self, residual_nm: &[f64]) -> Self {

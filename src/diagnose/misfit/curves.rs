@@ -1,20 +1,12 @@
-//! Tests of the residual that is left after the last cause: is it noise, and if not, on what does it depend?
+//! Curves of the residual along the quantities of one joint.
 
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::chance;
-use super::image::{Column, Image, Span};
-use super::scene::Scene;
-use super::statistic::Statistic;
-use super::study::{LEAST_GAIN, Study};
-use super::verdict::Unexplained;
+use crate::diagnose::image::{Column, Image, Span};
+use crate::diagnose::scene::Scene;
+use crate::diagnose::study::{LEAST_GAIN, Study};
+use crate::diagnose::verdict::Unexplained;
 
-/// Lower edges, in Hz, of the bands in which the residual is compared with noise; the last band reaches to the highest
-/// harmonic that has rows. Errors of friction and load show in the slow bands, those of gears and clocks in the fast
-/// ones.
-const BANDS_HZ: [f64; 5] = [0.0, 2.0, 5.0, 10.0, 20.0];
 /// A hat that keeps less than this share of its length outside the model, the causes and the hats before it is not
 /// fitted.
 const ABSORBED: f64 = 0.1;
@@ -40,103 +32,26 @@ const FEWEST_PERIODS: usize = 4;
 /// than this.
 const SHORTEST_WAY_RAD: f64 = 1e-4;
 
-/// How well noise alone explains the residual that is left.
-#[derive(Debug, Clone, Copy)]
-pub struct LackOfFit {
-    /// Probability that noise alone leaves a residual as large in any band of any joint.
-    pub probability: f64,
-    /// The joint (0-based) that noise explains least well.
-    pub joint: usize,
-}
-
-/// Tests whether noise alone explains the residual on the joints that are looked at; `None` for a single run.
-///
-/// Per joint and band, Σ r² divided by its degrees of freedom k is distributed as F(k, ν). Here k is the number of rows
-/// less their share in the directions that the null model and `accepted` have fitted (the sum of the leverages), and ν
-/// the degrees of freedom with which the periods tell the noise power in the band. The smallest probability is
-/// multiplied by the number of tests (Bonferroni).
-pub fn lack_of_fit(study: &Study, accepted: &Span, residual: &Image) -> Option<LackOfFit> {
-    let Statistic::Periods(knowledge) = &study.statistic else { return None };
-    let harmonic = |hz: f64| (hz * study.scene.samples() as f64 / study.scene.rate_hz) as usize;
-    let edges = band_edges(BANDS_HZ.map(harmonic), knowledge.harmonics());
-    let fitted = |row: usize| -> f64 {
-        let directions = study.null.directions().chain(accepted.directions());
-        directions.map(|d| d.mean[row] * d.mean[row]).sum()
-    };
-    let (mut least, mut worst) = (1.0f64, 0);
-    let mut tests = 0.0;
-    for joint in (0..study.scene.joints()).filter(|j| study.looks_at(Some(*j))) {
-        for band in edges.windows(2).filter(|band| band[0] < band[1]) {
-            let (mut square, mut freedom) = (0.0, 0.0);
-            for row in (band[0]..band[1]).flat_map(|h| knowledge.rows(h, joint)) {
-                square += residual.mean[row] * residual.mean[row];
-                freedom += 1.0 - fitted(row);
-            }
-            let freedom = freedom.max(1.0);
-            let noise = knowledge.freedom_of_band(band[0]..band[1], joint);
-            let chance =
-                FisherSnedecor::new(freedom, noise).map_or(1.0, |f| f.sf(square / freedom));
-            if chance < least {
-                (least, worst) = (chance, joint);
-            }
-            tests += 1.0;
-        }
-    }
-    (tests > 0.0).then(|| LackOfFit { probability: (tests * least).min(1.0), joint: worst })
-}
-
-/// The edges in `first` that lie below `end`, the harmonic behind the last one with rows, followed by `end`.
-fn band_edges(first: [usize; BANDS_HZ.len()], end: usize) -> Vec<usize> {
-    first.into_iter().take_while(|edge| *edge < end).chain([end]).collect()
-}
-
-/// Finds the axis along which the residual is largest, by a curve of 10 knots in each quantity of each joint.
-///
-/// Returns the curve with the most evidence among those that noise cannot explain. If there is none but noise cannot
-/// explain the lack of fit either, it returns the best curve of the joint with that lack. Along a single run a curve
-/// must also reduce the error in stretches of time that were left out of its fit, and on a joint that `has_law` by more
-/// than approximate laws leave. A curve of friction over the whole log is tried only on joints whose periods
-/// `can_differ` for no reason that is known already.
-pub fn unexplained(
-    study: &Study,
-    accepted: &Span,
-    residual: &Image,
-    lack_of_fit: Option<LackOfFit>,
-    has_law: impl Fn(usize) -> bool,
-    can_differ: impl Fn(usize) -> bool,
-) -> Option<Unexplained> {
-    let joints: Vec<Around> = (0..study.scene.joints())
-        .filter(|j| study.looks_at(Some(*j)))
-        .map(|joint| Around { joint, has_law: has_law(joint), can_differ: can_differ(joint) })
-        .collect();
-    let curves = joints.par_iter().flat_map_iter(|joint| curves(study, accepted, residual, joint));
-    let mut found: Vec<Curve> = curves.collect();
-    let tests = found.len() as f64;
-    found.sort_by(|a, b| a.evidence.total_cmp(&b.evidence));
-    // The curve with the most evidence may still be noise, because curves with fewer knots pay a lower price.
-    if let Some(clear) = found.iter().rposition(|c| c.probability * tests < chance::UNEXPLAINED) {
-        return Some(found.swap_remove(clear).unexplained);
-    }
-    let lack = lack_of_fit.filter(|lack| lack.probability < chance::UNEXPLAINED)?;
-    // The lack of fit is one of the mean period, to which only curves that repeat can belong.
-    let of_joint = |curve: &Curve| curve.repeats && curve.unexplained.joint == lack.joint + 1;
-    found.into_iter().rfind(of_joint).map(|curve| curve.unexplained)
-}
-
 /// The axis of a curve that does not repeat from period to period.
-pub(super) const SINCE_THE_START: &str = "time since the start";
+pub(in crate::diagnose) const SINCE_THE_START: &str = "time since the start";
 
 /// A joint, and what is known of it when its curves are tried.
-struct Around {
-    joint: usize,
+pub(super) struct Around {
+    /// Its index, from 0 on.
+    pub(super) joint: usize,
     /// Whether a law is named on it.
-    has_law: bool,
+    pub(super) has_law: bool,
     /// Whether its periods may differ for no reason that is known already.
-    can_differ: bool,
+    pub(super) can_differ: bool,
 }
 
 /// A curve of 10 knots in each quantity of one joint.
-fn curves(study: &Study, accepted: &Span, residual: &Image, around: &Around) -> Vec<Curve> {
+pub(super) fn curves(
+    study: &Study,
+    accepted: &Span,
+    residual: &Image,
+    around: &Around,
+) -> Vec<Curve> {
     let (scene, j) = (&study.scene, around.joint);
     let torque_rate = scene.torque_rate_nm_s(j);
     let time: Vec<f64> = (0..scene.samples()).map(|k| k as f64 / scene.rate_hz).collect();
@@ -154,19 +69,10 @@ fn curves(study: &Study, accepted: &Span, residual: &Image, around: &Around) -> 
     let course = if around.can_differ { since_the_start(scene, j) } else { None };
     let of_friction = behind_reversals(scene, j).into_iter().chain(course);
     let curve = |((axis, unit), (knots, hats)): (Axis, (Vec<f64>, Vec<Vec<f64>>))| {
-        let mut span = Span::default();
         let columns: Vec<Column> = hats.iter().map(|hat| Column::on(j, hat.clone())).collect();
         let raw = study.whitening.images(columns.iter());
-        let mut outside = raw.clone();
-        study.null.residualise_all(&mut outside);
-        accepted.residualise_all(&mut outside);
-        for (raw, image) in raw.iter().zip(&outside) {
-            let mut own = image.clone();
-            span.residualise(&mut own);
-            if own.square() > ABSORBED * ABSORBED * raw.square() {
-                span.push(image);
-            }
-        }
+        let outside = outside(study, accepted, &raw);
+        let span = clear_of(&raw, &outside);
         let explained = span.explained(residual);
         let least = if around.has_law { LEFT_BY_LAWS } else { LEAST_GAIN };
         let probability = if study.generalises(Some(j), &span, residual, least) {
@@ -183,23 +89,48 @@ fn curves(study: &Study, accepted: &Span, residual: &Image, around: &Around) -> 
             axis,
             unit,
             joint: j + 1,
+            of_all_joints: false,
             rms_nm: (square / n as f64).sqrt(),
             curve: knots.iter().zip(&heights).map(|(x, y)| [*x, *y]).collect(),
         };
-        Curve { evidence, probability, repeats: n == scene.samples(), unexplained }
+        Curve { span, evidence, probability, repeats: n == scene.samples(), unexplained }
     };
     curves.chain(of_friction).map(curve).collect()
 }
 
+/// The parts of the `images` outside the null model and `accepted`.
+pub(super) fn outside(study: &Study, accepted: &Span, images: &[Image]) -> Vec<Image> {
+    let mut outside = images.to_vec();
+    study.null.residualise_all(&mut outside);
+    accepted.residualise_all(&mut outside);
+    outside
+}
+
+/// The span of the parts `outside`, without those that keep less than the share [`ABSORBED`] of their length in `raw`
+/// beside the ones before them.
+pub(super) fn clear_of(raw: &[Image], outside: &[Image]) -> Span {
+    let mut span = Span::default();
+    for (raw, image) in raw.iter().zip(outside) {
+        let mut own = image.clone();
+        span.residualise(&mut own);
+        if own.square() > ABSORBED * ABSORBED * raw.square() {
+            span.push(image);
+        }
+    }
+    span
+}
+
 /// A curve along one axis, and how clearly the residual shows it.
-struct Curve {
+pub(super) struct Curve {
+    /// The curve's hats outside the model and the causes.
+    pub(super) span: Span,
     /// Twice the gain in log-likelihood less its price.
-    evidence: f64,
+    pub(super) evidence: f64,
     /// Probability that noise alone explains as much, this curve taken by itself.
-    probability: f64,
+    pub(super) probability: f64,
     /// Whether the curve is the same in every period.
-    repeats: bool,
-    unexplained: Unexplained,
+    pub(super) repeats: bool,
+    pub(super) unexplained: Unexplained,
 }
 
 /// Least-squares heights of the knots that `residual` shows, without the components of the curve of which the model and
@@ -324,15 +255,6 @@ fn hats_at(knots: Vec<f64>, values: &[f64]) -> Curves {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// In periods of 10 s the rows end beyond 20 Hz, within a band, and at an edge.
-    #[test]
-    fn bands_reach_to_the_last_row() {
-        let first = [0, 20, 50, 100, 200];
-        assert_eq!(band_edges(first, 600), [0, 20, 50, 100, 200, 600]);
-        assert_eq!(band_edges(first, 80), [0, 20, 50, 80]);
-        assert_eq!(band_edges(first, 100), [0, 20, 50, 100]);
-    }
 
     /// The model absorbs a straight line except for 2 % of it. Least squares would give the remainder of the line fifty
     /// times its height.
