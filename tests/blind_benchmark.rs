@@ -189,6 +189,7 @@ fn joints_that_do_not_share_their_parameters() {
     let record = record(&Benchmark::prepare(plan).unwrap(), 248);
     assert_eq!(record.case.hidden[0].kind, Kind::LinkLength);
     assert_eq!(record.outcome(), Outcome::WrongFlagged);
+    assert!(record.answer.left.as_ref().is_some_and(|left| left.of_all_joints));
     assert!(record.answer.named.iter().all(|named| named.confidence <= 0.5));
 }
 

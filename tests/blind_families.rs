@@ -498,6 +498,7 @@ fn what_acts_on_the_whole_arm_is_not_silently_the_fault_of_a_joint() {
     println!("{:#?}", d.sentences);
     let unknown = d.unexplained.expect("no name is right");
     assert!(unknown.of_all_joints, "{unknown:?}");
+    assert!(d.sentences.iter().any(|sentence| sentence.starts_with("The joints together show")));
     assert!(!d.causes.is_empty() && d.causes.iter().all(|cause| cause.confidence <= 0.5));
 }
 

@@ -4,7 +4,7 @@ use armid::diagnose::{Cause, Finding, Kind, Verdict};
 use armid::robot::Arm;
 
 use crate::hidden::{Hidden, Law};
-use crate::simulated::{NOISE, Run, assert_holds, scenario};
+use crate::simulated::{NOISE, Run, SIGMA_NM, assert_holds, scenario, simulation};
 
 fn only(finding: &Finding, kind: Kind, joint: Option<usize>) -> &Cause {
     let d = &finding.diagnosis;
@@ -72,6 +72,40 @@ fn a_reading_that_ends_before_its_noise() {
     let most = found.scene.torque_nm.joint(1).iter().fold(0.0f64, |most, t| most.max(t.abs()));
     // The largest torque of the motion is known a hundred times better than this.
     assert!((cause.parameters["limit_nm"].value / most - 0.74).abs() < 0.01);
+}
+
+/// A reading that is cut off for a seventh of the time, noise and all: what is beyond the limit reads as the limit, and
+/// nothing is left beside the cut.
+#[test]
+fn a_reading_that_is_cut_off_behind_its_noise() {
+    let cut = "[[effect]]\nkind = \"saturation\"\njoint = 3\nlimit_nm = 47.858\n";
+    let simulation = simulation(scenario(("cut", 5), ("ur5_validation", 8), NOISE, cut));
+    let run = Run::of(&simulation, 0);
+    let (read, real) = (run.log.torque_nm.joint(2), simulation.recording.torque_nm.joint(2));
+    let beyond = real.iter().zip(read).filter(|(real, _)| real.abs() > 47.858 + 6.0 * SIGMA_NM[2]);
+    assert!(beyond.clone().count() > 500);
+    assert!(beyond.into_iter().all(|(real, read)| *read == 47.858 * real.signum()));
+    let found = run.diagnoser().diagnose(&run.log.measurement("cut"), &[], None).unwrap();
+    assert_holds(only(&found, Kind::Saturation, Some(3)), "share_cut", 1.0);
+}
+
+/// A ripple of 10 000 σ is fitted to within two thousandths, which a log of so little noise shows. That is no second
+/// effect, and no doubt in the first.
+#[test]
+fn a_law_that_is_not_exact_is_the_law_all_the_same() {
+    let quiet = "torque_sd_nm = [0.03, 0.03, 0.02, 0.005, 0.005, 0.005]\nq_sd_rad = 1e-6\nqd_sd_rad_s = 3e-5\n";
+    let ripple = "[[effect]]\nkind = \"ripple\"\njoint = 4\namplitude_nm = 0.8\norder_per_turn = 101.0\nphase_rad = 1.5487\n";
+    let run = Run::new(scenario(("ripple", 5), ("ur5_validation", 8), quiet, ripple));
+    let found = run.diagnoser().diagnose(&run.log.measurement("ripple"), &[], None).unwrap();
+    let [cause, others @ ..] = &found.diagnosis.causes[..] else { panic!("nothing is named") };
+    assert_eq!((cause.kind, cause.joint), (Kind::Ripple, Some(4)));
+    assert!(others.iter().all(|other| other.confidence < 0.001), "{others:?}");
+    let amplitude_nm = cause.parameters["amplitude_nm"].value;
+    assert!(cause.confidence > 0.99 && (amplitude_nm - 0.8).abs() < 0.008, "{cause:?}");
+    let form_error = found.diagnosis.form_error.as_ref().expect("it is not exact to 1 in 10 000");
+    assert!(form_error.joint == 4 && form_error.rms_nm < 0.008, "{form_error:?}");
+    let said = "On joint 4 the laws named are not exact";
+    assert!(found.diagnosis.sentences.iter().any(|sentence| sentence.starts_with(said)));
 }
 
 /// Waves in the current that move no link, at up to 96 Hz: sampled at 125 Hz, their aliases are as high as the waves

@@ -21,10 +21,10 @@ pub(super) const CONTACT_WHERE_MOVED: f64 = 0.02;
 /// Something unexplained, by the size of the remaining residual. The curve that it follows on one joint, and the curves
 /// that it follows on all of them, are two more tests with the same share.
 pub(super) const UNEXPLAINED: f64 = 0.1 / 3.0 * FALSE_ALARM;
-/// The same beside a law that was named. The arm has none of the laws in at most the share [`LAW`] of such logs, and the
-/// probability that this hypothesis was allowed passes on to those that are still open: the share of logs with any false
-/// alarm stays what it was (Holm 1979). It is divided among four tests: joints that each have parameters of their own
-/// are tried only here.
+/// The same beside a law that was named. In a log without faults a law is named by chance, and that is a false alarm
+/// already: what is said to be left beside it adds none, and [`FALSE_ALARM`] stays what it is. Where the law is there, four
+/// tests of this level (joints that each have parameters of their own are tried only here) say by chance in 0.16 % of logs
+/// that something is left. That costs a doubt; what it is paid for is names that are not all there is to be said.
 pub(super) const UNEXPLAINED_BESIDE_A_LAW: f64 = (3.0 * UNEXPLAINED + LAW) / 4.0;
 
 /// A body on the flange between two logs. It is a test of its own, made only on request, with a false-alarm probability

@@ -92,7 +92,7 @@ pub(super) fn make_modest(causes: &mut [Cause], is_compared: bool) {
 }
 
 /// Limits the confidence in causes while something is left unexplained at `site`: a joint (1-based), or the arm as a
-/// whole. The small gain of causes and
+/// whole, of which a touch is no part. The small gain of causes and
 /// the number of joints with causes are evidence only where `noise_is_known`: along single runs of real arms, friction
 /// has laws on all joints.
 pub(super) fn make_modest_beside_unknown(
@@ -112,7 +112,10 @@ pub(super) fn make_modest_beside_unknown(
     };
     let parts: Vec<bool> = all.iter().map(is_part).collect();
     for (cause, is_part) in causes.iter_mut().zip(parts) {
-        let is_there = cause.joint.is_none() || site.is_none() || cause.joint == site;
+        let is_there = match site {
+            None => cause.kind.is_a_law(),
+            Some(_) => cause.joint.is_none() || cause.joint == site,
+        };
         cause.is_no_surer_than(if is_there || is_part { BESIDE_UNKNOWN } else { PROVISIONAL });
         let gains_nothing = cause.gain_fraction.is_some_and(|gain| gain < NEXT_TO_NOTHING);
         if noise_is_known && gains_nothing {
@@ -212,6 +215,9 @@ mod tests {
         let mut causes = vec![cause(Kind::TorqueGain, 3, 0.9), cause(Kind::Stribeck, 5, 0.9)];
         make_modest_beside_unknown(&mut causes, None, true);
         assert!(causes.iter().all(|cause| cause.confidence == 0.5), "{causes:?}");
+        let mut touch = [cause(Kind::Contact, 3, 0.9)];
+        make_modest_beside_unknown(&mut touch, None, true);
+        assert_eq!(touch[0].confidence, 0.9);
     }
 
     /// Bristles on all joints and a time skew of the arm as a whole, beside two faults of one joint each and two faults

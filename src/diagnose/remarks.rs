@@ -20,7 +20,7 @@ pub(super) fn limited_drives(
     unexplained: Option<&Unexplained>,
 ) -> Vec<String> {
     let laws = causes.iter().filter(|cause| cause.kind.is_a_law()).map(|cause| cause.joint);
-    let places: Vec<Option<usize>> = laws.chain(unexplained.map(|u| Some(u.joint))).collect();
+    let places: Vec<Option<usize>> = laws.chain(unexplained.map(Unexplained::site)).collect();
     let limited = drives_at_limits(arm, torque_nm).into_iter();
     limited
         .filter(|at| at.share > OFTEN_LIMITED)
@@ -116,5 +116,9 @@ mod tests {
             curve: Vec::new(),
         };
         assert_eq!(limited_drives(&arm, &torque(20), &[], Some(&unknown)).len(), 1);
+        let elsewhere = Unexplained { joint: 3, ..unknown };
+        assert!(limited_drives(&arm, &torque(20), &[], Some(&elsewhere)).is_empty());
+        let everywhere = Unexplained { of_all_joints: true, ..elsewhere };
+        assert_eq!(limited_drives(&arm, &torque(20), &[], Some(&everywhere)).len(), 1);
     }
 }

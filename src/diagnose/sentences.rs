@@ -58,6 +58,7 @@ impl Diagnosis {
         if let Some(unexplained) = &self.unexplained {
             out.push(unexplained.sentence());
         }
+        out.extend(self.form_error.as_ref().map(Unexplained::as_form_error));
         out.extend(told::in_the_table_alone(&self.causes));
         if out.is_empty() {
             out.push(self.nothing_found());
@@ -137,12 +138,21 @@ impl Diagnosis {
 }
 
 impl Unexplained {
+    fn as_form_error(&self) -> String {
+        format!(
+            "On joint {} the laws named are not exact: {} Nm (rms) are left, less than 3 % of what they do there; they are seen best along the {}.",
+            self.joint,
+            significant(self.rms_nm, 2),
+            self.axis
+        )
+    }
+
     fn sentence(&self) -> String {
         let (joint, axis, nm) = (self.joint, self.axis, significant(self.rms_nm, 2));
         if self.of_all_joints {
             format!(
                 "The joints together show what no known effect explains and noise does not leave, most on joint {joint} ({nm} Nm rms); \
-                 it depends most clearly on the {axis}. Something may act on the arm as a whole."
+                 it is seen best along the {axis}. Something may act on the arm as a whole."
             )
         } else {
             format!(

@@ -120,8 +120,8 @@ pub struct Unexplained {
     pub unit: &'static str,
     /// Joint (1-based).
     pub joint: usize,
-    /// Whether it is told from noise only together with what other joints show along the same quantity; the joint is
-    /// then the one that shows most.
+    /// Whether it is told from noise only together with what other joints show; the joint is then the one that shows
+    /// most.
     pub of_all_joints: bool,
     /// Rms of that dependence on this joint, Nm.
     pub rms_nm: f64,
@@ -266,6 +266,8 @@ pub struct Diagnosis {
     pub causes: Vec<Cause>,
     /// The effect that is there but not explained, if any.
     pub unexplained: Option<Unexplained>,
+    /// What the causes of a joint leave because their laws are not exact, if it can be told from noise.
+    pub form_error: Option<Unexplained>,
     /// Residual of the extended model.
     pub after: Rms,
     /// Base parameters of the extended model.

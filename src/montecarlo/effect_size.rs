@@ -62,7 +62,7 @@ impl Simulation {
         let sd = scenario.sensors.torque_sd_per_joint_nm(scenario.arm.dof())?;
         let whitening = Whitening::new(&scenario.sensors.torque_noise, &sd, rate_hz)?;
         let model = Model::new(&scenario.arm);
-        let mut problem = self.equations(&model, &self.recording);
+        let mut problem = self.equations(&model, &self.without_noise());
         let truth = scenario.set.values(&model.standard_parameters());
         let difference = problem.residuals(&truth);
         let without = self.equations(&model, clean).residuals(&truth);

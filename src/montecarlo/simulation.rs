@@ -15,7 +15,7 @@ use crate::random::TrialStreams;
 pub struct Simulation {
     /// The scenario.
     pub scenario: Scenario,
-    /// The noise-free run.
+    /// The run that the sensors read: without noise, and without limits of the readings, which cut noise off as well.
     pub recording: Recording,
     pub(super) plant: FaultyPlant,
     sensors: Sensors,
@@ -27,7 +27,7 @@ impl Simulation {
     pub fn run(scenario: Scenario) -> Result<Self, PlantError> {
         let plant = FaultyPlant::new(&scenario.arm, &scenario.effects, &scenario.plant)?;
         let excitation = &scenario.excitation;
-        let run = |reference: &dyn Reference| plant.run(reference, None);
+        let run = |reference: &dyn Reference| plant.run_before_limits(reference, None);
         let recording = match scenario.effects.iter().all(Effect::repeats) {
             true => run_repeating(excitation, &scenario.plant, run)?,
             false => run(excitation)?,
@@ -76,7 +76,15 @@ impl Simulation {
             return Ok(Cow::Borrowed(&self.recording));
         }
         let encoders = self.sensors.encoders(&self.streams(trial));
-        Ok(Cow::Owned(self.plant.run(&self.scenario.excitation, Some(encoders))?))
+        let excitation = &self.scenario.excitation;
+        Ok(Cow::Owned(self.plant.run_before_limits(excitation, Some(encoders))?))
+    }
+
+    /// The shared run as sensors without noise read it.
+    pub fn without_noise(&self) -> Recording {
+        let mut recording = self.recording.clone();
+        self.plant.end_at_limits(&mut recording.torque_nm);
+        recording
     }
 
     /// The law of the torque noise; `None` if rounding adds to the noise.

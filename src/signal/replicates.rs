@@ -20,6 +20,16 @@ impl Replicates {
     /// Scatter below this fraction of a signal's rms is rounding in a file that repeats one period.
     const ROUNDING: f64 = 1e-9;
 
+    /// Rms noise of one raw sample of signal `j` at the instants whose mean `is_kept`; `None` if there are none.
+    pub fn sigma_where(&self, j: usize, is_kept: impl Fn(f64) -> bool) -> Option<f64> {
+        let mean = self.mean.joint(j);
+        let deviations = self.deviations.joint(j).iter().zip(mean.iter().cycle());
+        let kept = deviations.filter(|(_, mean)| is_kept(**mean)).map(|(d, _)| d * d);
+        let (square, count) = kept.fold((0.0, 0.0), |(square, count), d| (square + d, count + 1.0));
+        let periods = self.periods as f64;
+        (count > 0.0).then(|| (square / count * periods / (periods - 1.0)).sqrt())
+    }
+
     /// Whether the periods agree to the last digit, so that their scatter says nothing about noise.
     pub fn are_alike(&self) -> bool {
         let scatters = |(j, sigma): (usize, &f64)| {
@@ -99,8 +109,14 @@ mod tests {
                 let sum = r.mean.joint(j)[k % n] + r.deviations.joint(j)[k];
                 assert!((sum - y.joint(j)[k]).abs() < 1e-11);
             }
+            let all = r.sigma_where(j, |_| true).unwrap();
+            assert!((all / r.sigma[j] - 1.0).abs() < 1e-12);
             // Relative sd of a uniform's rms over 3500 degrees: √(0.8/4/3500) = 0.8 %; 5 sd.
             assert!((r.sigma[j] / 0.5 - 1.0).abs() < 0.04, "{}", r.sigma[j]);
+            // Half of the samples: √2 times that.
+            let half = r.sigma_where(j, |mean| mean < 250.0 * (j + 1) as f64).unwrap();
+            assert!((half / 0.5 - 1.0).abs() < 0.06, "{half}");
+            assert!(r.sigma_where(j, |mean| mean > 1e6).is_none());
         }
     }
 

@@ -93,7 +93,7 @@ pub(super) fn curves(
             rms_nm: (square / n as f64).sqrt(),
             curve: knots.iter().zip(&heights).map(|(x, y)| [*x, *y]).collect(),
         };
-        Curve { span, evidence, probability, repeats: n == scene.samples(), unexplained }
+        Curve { span, explained, evidence, probability, repeats: n == scene.samples(), unexplained }
     };
     curves.chain(of_friction).map(curve).collect()
 }
@@ -124,6 +124,8 @@ pub(super) fn clear_of(raw: &[Image], outside: &[Image]) -> Span {
 pub(super) struct Curve {
     /// The curve's hats outside the model and the causes.
     pub(super) span: Span,
+    /// Square of the residual that it removes.
+    pub(super) explained: f64,
     /// Twice the gain in log-likelihood less its price.
     pub(super) evidence: f64,
     /// Probability that noise alone explains as much, this curve taken by itself.
@@ -131,6 +133,13 @@ pub(super) struct Curve {
     /// Whether the curve is the same in every period.
     pub(super) repeats: bool,
     pub(super) unexplained: Unexplained,
+}
+
+impl Curve {
+    /// Its joint, from 0 on.
+    pub(super) fn joint(&self) -> usize {
+        self.unexplained.joint - 1
+    }
 }
 
 /// Least-squares heights of the knots that `residual` shows, without the components of the curve of which the model and

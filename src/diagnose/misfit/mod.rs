@@ -1,13 +1,16 @@
 //! Tests of the residual that is left after the last cause: is it noise, and if not, on what does it depend?
 //!
 //! Enters: the whitened equations of a log, the span of its causes, and the residual that they leave. Leaves: how well
-//! noise alone explains that residual, and the curve that it follows if noise does not.
+//! noise alone explains that residual, and the curve that it follows if noise does not: what the laws of a joint leave
+//! because they are not exact, or something unexplained, of one joint or of all of them together.
 
 mod curves;
 mod own_parameters;
 mod together;
 
 pub(super) use curves::SINCE_THE_START;
+
+use std::ops::Range;
 
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -26,13 +29,27 @@ use together::together;
 /// ones.
 const BANDS_HZ: [f64; 5] = [0.0, 2.0, 5.0, 10.0, 20.0];
 
+/// From this λ of its laws' error of form on, a joint is not asked whether it shows something together with others.
+const NOTICEABLE: f64 = 10.0;
+
 /// How well noise alone explains the residual that is left.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct LackOfFit {
     /// Probability that noise alone leaves a residual as large in any band of any joint.
     pub probability: f64,
-    /// The joint (0-based) that noise explains least well.
-    pub joint: usize,
+    /// The joints that are looked at, beginning with the one that noise explains least well.
+    joints: Vec<OfJoint>,
+}
+
+/// The band of a joint that noise explains least well.
+#[derive(Debug, Clone, Copy)]
+struct OfJoint {
+    /// Index of the joint, from 0 on.
+    joint: usize,
+    /// Probability that noise alone leaves as much in any band of any joint.
+    probability: f64,
+    /// Σ r² less its degrees of freedom.
+    excess: f64,
 }
 
 /// Tests whether noise alone explains the residual on the joints that are looked at; `None` for a single run.
@@ -49,26 +66,28 @@ pub fn lack_of_fit(study: &Study, accepted: &Span, residual: &Image) -> Option<L
         let directions = study.null.directions().chain(accepted.directions());
         directions.map(|d| d.mean[row] * d.mean[row]).sum()
     };
-    let (mut least, mut worst) = (1.0f64, 0);
-    let mut tests = 0.0;
-    for joint in (0..study.scene.joints()).filter(|j| study.looks_at(Some(*j))) {
-        for band in edges.windows(2).filter(|band| band[0] < band[1]) {
-            let (mut square, mut freedom) = (0.0, 0.0);
-            for row in (band[0]..band[1]).flat_map(|h| knowledge.rows(h, joint)) {
-                square += residual.mean[row] * residual.mean[row];
-                freedom += 1.0 - fitted(row);
-            }
-            let freedom = freedom.max(1.0);
-            let noise = knowledge.freedom_of_band(band[0]..band[1], joint);
-            let chance =
-                FisherSnedecor::new(freedom, noise).map_or(1.0, |f| f.sf(square / freedom));
-            if chance < least {
-                (least, worst) = (chance, joint);
-            }
-            tests += 1.0;
+    let band_of = |joint: usize, band: Range<usize>| {
+        let (mut square, mut freedom) = (0.0, 0.0);
+        for row in band.clone().flat_map(|h| knowledge.rows(h, joint)) {
+            square += residual.mean[row] * residual.mean[row];
+            freedom += 1.0 - fitted(row);
         }
-    }
-    (tests > 0.0).then(|| LackOfFit { probability: (tests * least).min(1.0), joint: worst })
+        let freedom = freedom.max(1.0);
+        let noise = knowledge.freedom_of_band(band, joint);
+        let probability =
+            FisherSnedecor::new(freedom, noise).map_or(1.0, |f| f.sf(square / freedom));
+        OfJoint { joint, probability, excess: square - freedom }
+    };
+    let bands = || edges.windows(2).map(|edge| edge[0]..edge[1]).filter(|band| !band.is_empty());
+    let looked_at = (0..study.scene.joints()).filter(|j| study.looks_at(Some(*j)));
+    let by_probability = |a: &OfJoint, b: &OfJoint| a.probability.total_cmp(&b.probability);
+    let worst = |joint: usize| bands().map(|band| band_of(joint, band)).min_by(by_probability);
+    let mut joints: Vec<OfJoint> = looked_at.filter_map(worst).collect();
+    let tests = (joints.len() * bands().count()) as f64;
+    joints.iter_mut().for_each(|of| of.probability = (tests * of.probability).min(1.0));
+    joints.sort_by(by_probability);
+    let probability = joints.first()?.probability;
+    Some(LackOfFit { probability, joints })
 }
 
 /// The edges in `first` that lie below `end`, the harmonic behind the last one with rows, followed by `end`.
@@ -76,28 +95,56 @@ fn band_edges(first: [usize; BANDS_HZ.len()], end: usize) -> Vec<usize> {
     first.into_iter().take_while(|edge| *edge < end).chain([end]).collect()
 }
 
+/// What is known of the joints when their residuals are looked at.
+pub struct Known<'k, L, D> {
+    /// Whether a law is named on a joint (0-based).
+    pub has_law: L,
+    /// Whether the periods of a joint (0-based) may differ for no reason that is known already.
+    pub can_differ: D,
+    /// λ that the laws of each joint may leave because they are not exact.
+    pub form: &'k [f64],
+}
+
+/// What the causes leave.
+#[derive(Debug, Default)]
+pub struct Left {
+    /// An effect that is there but not explained.
+    pub unexplained: Option<Unexplained>,
+    /// What the laws of a joint leave because they are not exact.
+    pub form_error: Option<Unexplained>,
+}
+
+impl Left {
+    /// See [`Unexplained::at_most`].
+    pub(super) fn at_most(self, residual_nm: &[f64]) -> Self {
+        let at_most = |left: Option<Unexplained>| left.map(|left| left.at_most(residual_nm));
+        Self { unexplained: at_most(self.unexplained), form_error: at_most(self.form_error) }
+    }
+}
+
 /// Finds the axis along which the residual is largest, by a curve of 10 knots in each quantity of each joint.
 ///
-/// Returns the curve with the most evidence among those that noise cannot explain. If there is none, it returns the best
-/// of the curves that noise cannot explain [`together`] with those of the other joints; and if there is none either, but
-/// noise cannot explain the lack of fit, the best curve of the joint with that lack. Beside a law of a log that repeats,
-/// less is asked of these tests ([`chance::UNEXPLAINED_BESIDE_A_LAW`]), and joints
-/// [with parameters of their own](with_own_parameters) are one more. Along a single run a curve must also reduce the
-/// error in stretches of time that were left out of its fit, and on a joint that `has_law` by more than approximate laws
-/// leave. A curve of friction over the whole log is tried only on joints whose periods `can_differ` for no reason that is
-/// known already.
-pub fn unexplained(
+/// What is not explained is the curve with the most evidence among those that noise cannot explain, and that are more
+/// than an error of form. If there is none, it is the best of the curves that noise cannot explain [`together`] with
+/// those of the other joints; and if there is none either, but noise cannot explain the lack of fit, the best curve of
+/// the joint with that lack. Beside a law of a log that repeats, less is asked of these tests
+/// ([`chance::UNEXPLAINED_BESIDE_A_LAW`]), and joints [with parameters of their own](with_own_parameters) are one more.
+/// Along a single run a curve must also reduce the error in stretches of time that were left out of its fit, and on a
+/// joint that has a law by more than approximate laws leave. A curve of friction over the whole log is tried only on
+/// joints whose periods can differ.
+pub fn left(
     study: &Study,
     accepted: &Span,
     residual: &Image,
-    lack_of_fit: Option<LackOfFit>,
-    has_law: impl Fn(usize) -> bool,
-    can_differ: impl Fn(usize) -> bool,
-) -> Option<Unexplained> {
-    let joints: Vec<Around> = (0..study.scene.joints())
-        .filter(|j| study.looks_at(Some(*j)))
-        .map(|joint| Around { joint, has_law: has_law(joint), can_differ: can_differ(joint) })
-        .collect();
+    lack_of_fit: Option<&LackOfFit>,
+    known: &Known<impl Fn(usize) -> bool, impl Fn(usize) -> bool>,
+) -> Left {
+    let around = |joint: usize| {
+        let (has_law, can_differ) = ((known.has_law)(joint), (known.can_differ)(joint));
+        Around { joint, has_law, can_differ }
+    };
+    let looked_at = (0..study.scene.joints()).filter(|j| study.looks_at(Some(*j)));
+    let joints: Vec<Around> = looked_at.map(around).collect();
     let is_beside_a_law = study.scene.periodic && joints.iter().any(|joint| joint.has_law);
     let level =
         if is_beside_a_law { chance::UNEXPLAINED_BESIDE_A_LAW } else { chance::UNEXPLAINED };
@@ -106,23 +153,40 @@ pub fn unexplained(
     let tests = found.len() as f64;
     found.sort_by(|a, b| a.evidence.total_cmp(&b.evidence));
     // The curve with the most evidence may still be noise, because curves with fewer knots pay a lower price.
-    if let Some(clear) = found.iter().rposition(|c| c.probability * tests < level) {
-        return Some(found.swap_remove(clear).unexplained);
+    let is_clear = |curve: &Curve| curve.probability * tests < level;
+    // Friction that changes as the log goes on is no form of what is the same in every period.
+    let is_of_form = |curve: &Curve| curve.repeats && curve.explained < known.form[curve.joint()];
+    let mut form_error =
+        found.iter().rfind(|c| is_clear(c) && is_of_form(c)).map(|c| c.unexplained.clone());
+    if let Some(clear) = found.iter().rposition(|c| is_clear(c) && !is_of_form(c)) {
+        return Left { unexplained: Some(found.swap_remove(clear).unexplained), form_error };
     }
+    let is_exact = |joint: usize| known.form[joint] < NOTICEABLE;
     // What is told by no curve is told of the mean period, to which only curves that repeat can belong.
-    let best_of = |joint: usize| {
-        found.iter().rposition(|curve| curve.repeats && curve.unexplained.joint == joint + 1)
-    };
-    let beside_a_law =
-        || is_beside_a_law.then(|| with_own_parameters(study, accepted, residual, level)).flatten();
-    let of_all =
-        together(study, residual, &found, level).or_else(|| beside_a_law().and_then(best_of));
+    let best_of =
+        |joint: usize| found.iter().rposition(|curve| curve.repeats && curve.joint() == joint);
+    let of_all = together(study, residual, &found, is_exact, level).or_else(|| {
+        let exact: Vec<usize> =
+            joints.iter().map(|around| around.joint).filter(|j| is_exact(*j)).collect();
+        let test = || with_own_parameters(study, accepted, residual, &exact, level);
+        is_beside_a_law.then(test).flatten().and_then(best_of)
+    });
     if let Some(largest) = of_all {
         let unexplained = found.swap_remove(largest).unexplained;
-        return Some(Unexplained { of_all_joints: true, ..unexplained });
+        let unexplained = Some(Unexplained { of_all_joints: true, ..unexplained });
+        return Left { unexplained, form_error };
     }
-    let lack = lack_of_fit.filter(|lack| lack.probability < level)?;
-    best_of(lack.joint).map(|curve| found.swap_remove(curve).unexplained)
+    let mut unexplained = None;
+    let lacks = lack_of_fit.into_iter().flat_map(|lack| &lack.joints);
+    for lack in lacks.filter(|lack| lack.probability < level) {
+        let best = || best_of(lack.joint).map(|curve| found[curve].unexplained.clone());
+        if lack.excess < known.form[lack.joint] {
+            form_error = form_error.or_else(best);
+        } else if unexplained.is_none() {
+            unexplained = best();
+        }
+    }
+    Left { unexplained, form_error }
 }
 
 #[cfg(test)]

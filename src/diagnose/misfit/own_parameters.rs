@@ -5,8 +5,8 @@ use super::together::joined;
 use crate::diagnose::image::{Column, Image, Span};
 use crate::diagnose::study::Study;
 
-/// The joint (0-based) whose `residual` noise explains least if every joint may have base parameters of its own, where
-/// noise explains what these parameters remove on all joints in less than the share `level` of logs.
+/// The one of `joints` (0-based) whose `residual` noise explains least if each of them may have base parameters of its
+/// own, where noise explains what these parameters remove on all of them in less than the share `level` of logs.
 ///
 /// Newton's third law makes the torques of all joints depend on the same parameters. An arm whose lengths, axes or gains
 /// are not those of the model breaks that: what the load does to one joint is then not what it does to the others.
@@ -15,10 +15,12 @@ pub(super) fn with_own_parameters(
     study: &Study,
     accepted: &Span,
     residual: &Image,
+    joints: &[usize],
     level: f64,
 ) -> Option<usize> {
-    let joints: Vec<usize> =
-        (0..study.scene.joints()).filter(|j| study.looks_at(Some(*j))).collect();
+    if joints.len() < 2 {
+        return None;
+    }
     let spans: Vec<Span> = joints.iter().map(|j| of_joint(study, accepted, *j)).collect();
     let probability = |span: &Span| study.statistic.probability(span, residual);
     let least = spans.iter().map(probability).enumerate().min_by(|a, b| a.1.total_cmp(&b.1))?;

@@ -10,9 +10,9 @@ use crate::diagnose::study::Study;
 /// lower.
 const SCREEN: f64 = 0.05;
 
-/// Index in `found` of a curve of which noise explains too much, together with the curves of all other joints along the
-/// same axis, in less than the share `level` of logs: of those along the axis that noise explains least, the one with the
-/// most evidence. `None` for a single run, whose noise is not known.
+/// The curves of the joints that are asked (`is_asked`), all along one axis, if noise explains what they remove together
+/// in less than the share `level` of logs: of the axis that noise explains least, the index in `found` of the curve with
+/// the most evidence. `None` for a single run, whose noise is not known.
 ///
 /// What acts on the arm as a whole, like an error of its geometry, may leave less on each joint than a curve needs to be
 /// clear. With the curves of all joints in one span, the residual's part in it is tested like that of a curve alone.
@@ -20,21 +20,25 @@ pub(super) fn together(
     study: &Study,
     residual: &Image,
     found: &[Curve],
+    is_asked: impl Fn(usize) -> bool,
     level: f64,
 ) -> Option<usize> {
     let Statistic::Periods(_) = &study.statistic else { return None };
+    let along = |axis: &'static str| {
+        let of_axis = |curve: &Curve| curve.unexplained.axis == axis && is_asked(curve.joint());
+        (0..found.len()).filter(|k| of_axis(&found[*k])).collect::<Vec<usize>>()
+    };
     let mut axes: Vec<&'static str> = found.iter().map(|curve| curve.unexplained.axis).collect();
     axes.sort_unstable();
     axes.dedup();
+    // A curve of one joint alone has been tested already.
+    axes.retain(|axis| along(axis).len() > 1);
     let tests = axes.len() as f64;
-    let along = |axis: &'static str| {
-        let of_axis = move |k: &usize| found[*k].unexplained.axis == axis;
-        (0..found.len()).filter(of_axis)
-    };
     let probability = |axis: &'static str| {
-        let curves = || along(axis).map(|k| &found[k]);
+        let along = along(axis);
+        let curves = || along.iter().map(|k| &found[*k]);
         let count = curves().map(|curve| curve.span.len()).sum();
-        let explained = curves().map(|curve| curve.span.explained(residual)).sum();
+        let explained = curves().map(|curve| curve.explained).sum();
         if upper_chi_squared(explained, count) > SCREEN {
             return 1.0;
         }
@@ -45,7 +49,7 @@ pub(super) fn together(
         .map(|axis| (axis, probability(axis)))
         .min_by(|a, b| a.1.total_cmp(&b.1))?;
     let by_evidence = |a: &usize, b: &usize| found[*a].evidence.total_cmp(&found[*b].evidence);
-    if least * tests < level { along(axis).max_by(by_evidence) } else { None }
+    if least * tests < level { along(axis).into_iter().max_by(by_evidence) } else { None }
 }
 
 /// The span of all `spans`, without directions that lie in the others but for a tenth of their length.

@@ -110,6 +110,19 @@ pub struct Scene {
     pub highest: usize,
 }
 
+/// A reading whose mean is this many σ below its limit is not cut off.
+const FREE: f64 = 3.0;
+
+/// Noise of one sample of the torque of joint `j`, Nm, where no limit cuts it off; zero for a single run.
+fn noise_of_a_free_reading(prepared: &Prepared, j: usize) -> f64 {
+    let Some(replicates) = &prepared.replicates else { return 0.0 };
+    let all = replicates.sigma[j];
+    let free = |limit_nm: f64| {
+        replicates.sigma_where(j, |mean| mean.abs() < limit_nm - FREE * all).unwrap_or(all)
+    };
+    prepared.torque_limit_nm[j].map_or(all, free)
+}
+
 impl Scene {
     /// The scene along `prepared`, for the arm with the base parameters `theta`.
     pub fn new(nominal: &Arm, set: &BaseSet, theta: &[f64], prepared: &Prepared) -> Self {
@@ -155,9 +168,8 @@ impl Scene {
         // Rounded to a resolution Δ, the true angle lies within ±Δ/2.
         let doubt = |resolution: &f64| if periodic { 0.0 } else { 0.5 * resolution };
         let angle_doubt_rad = prepared.angle_resolution_rad.iter().map(doubt).collect();
-        let noise_nm = prepared.replicates.as_ref().map_or(vec![0.0; joints], |r| r.sigma.clone());
         Self {
-            noise_nm,
+            noise_nm: (0..joints).map(|j| noise_of_a_free_reading(prepared, j)).collect(),
             mass_kg_m2,
             angle_doubt_rad,
             coulomb_nm: (0..joints).map(|j| drive(j).coulomb_nm).collect(),

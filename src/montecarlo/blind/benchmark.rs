@@ -172,7 +172,7 @@ impl Benchmark {
         let excitation = next.excitation.clone();
         let sensors = SensorConfig::default();
         let simulation = Simulation::run(Scenario { excitation, sensors, ..scenario.clone() })?;
-        Ok(Some(simulation.recording))
+        Ok(Some(simulation.without_noise()))
     }
 
     /// Number of the motion along which the gain is measured: the one after the motion of the log.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::case::Case;
-use crate::diagnose::{BaseParameter, Cause, Diagnosis, HeldOut, Kind};
+use crate::diagnose::{BaseParameter, Cause, Diagnosis, HeldOut, Kind, Unexplained};
 use crate::montecarlo::share::Share;
 use crate::montecarlo::trials::{Failure, Gathered};
 
@@ -70,6 +70,20 @@ pub struct Left {
     pub joint: usize,
     /// Root mean square, Nm.
     pub rms_nm: f64,
+    /// Whether only the joints together tell it from noise.
+    #[serde(default)]
+    pub of_all_joints: bool,
+}
+
+impl Left {
+    fn of(unexplained: &Unexplained) -> Self {
+        Self {
+            axis: unexplained.axis.to_owned(),
+            joint: unexplained.joint,
+            rms_nm: unexplained.rms_nm,
+            of_all_joints: unexplained.of_all_joints,
+        }
+    }
 }
 
 /// Mean squared residuals along a noise-free motion that was not used for the diagnosis, in units of each joint's noise
@@ -118,6 +132,9 @@ pub struct Answer {
     pub named: Vec<Named>,
     /// The unexplained residual, if any.
     pub left: Option<Left>,
+    /// What the laws of a joint leave because they are not exact, if anything.
+    #[serde(default)]
+    pub form_error: Option<Left>,
     /// Gain along another motion, if it was measured.
     pub gain: Option<HeldOutGain>,
     /// Share of the base parameters of the extended model whose 95 % interval holds the true value.
@@ -137,11 +154,8 @@ impl Answer {
     pub fn of(diagnosis: &Diagnosis, gain: Option<HeldOutGain>, truth: &[f64]) -> Self {
         Self {
             named: diagnosis.causes.iter().map(Named::of).collect(),
-            left: diagnosis.unexplained.as_ref().map(|u| Left {
-                axis: u.axis.to_owned(),
-                joint: u.joint,
-                rms_nm: u.rms_nm,
-            }),
+            left: diagnosis.unexplained.as_ref().map(Left::of),
+            form_error: diagnosis.form_error.as_ref().map(Left::of),
             base: covered(&diagnosis.base_parameters, truth),
             gain: gain
                 .filter(|g| [g.before, g.after, g.least].iter().all(|square| square.is_finite())),

@@ -267,7 +267,7 @@ impl Run {
     }
 
     fn noise_free(&self) -> Measured {
-        Measured::like(&self.simulation.recording)
+        Measured::like(&self.simulation.without_noise())
     }
 
     fn problem(

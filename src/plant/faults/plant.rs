@@ -96,15 +96,24 @@ impl FaultyPlant {
         reference: &dyn Reference,
         encoders: Option<Encoders>,
     ) -> Result<Recording, PlantError> {
-        let mut recording = if self.assembly.timing.is_exact() {
-            self.plant(reference, &self.config)?.run(reference, encoders)?
-        } else {
-            let (config, every) = self.dense_config()?;
-            let dense = self.plant(reference, &config)?.run(reference, encoders)?;
-            self.assembly.timing.sample(&dense, config.log_rate_hz, every)
-        };
+        let mut recording = self.run_before_limits(reference, encoders)?;
         self.end_at_limits(&mut recording.torque_nm);
         Ok(recording)
+    }
+
+    /// As [`Self::run`], but no reading of the torque ends at a limit: that is what noise is added to. The limits then cut
+    /// the noise off as well ([`Self::spoil`]).
+    pub fn run_before_limits(
+        &self,
+        reference: &dyn Reference,
+        encoders: Option<Encoders>,
+    ) -> Result<Recording, PlantError> {
+        if self.assembly.timing.is_exact() {
+            return self.plant(reference, &self.config)?.run(reference, encoders);
+        }
+        let (config, every) = self.dense_config()?;
+        let dense = self.plant(reference, &config)?.run(reference, encoders)?;
+        Ok(self.assembly.timing.sample(&dense, config.log_rate_hz, every))
     }
 
     /// As [`Self::run`] without encoder errors, but also returns the accelerations (rad/s²) at the encoders at the
@@ -153,7 +162,8 @@ impl FaultyPlant {
         Ok((PlantConfig { log_rate_hz, ..self.config.clone() }, every))
     }
 
-    fn end_at_limits(&self, torque_nm: &mut JointSignals) {
+    /// Ends the readings of the torque at their limits.
+    pub fn end_at_limits(&self, torque_nm: &mut JointSignals) {
         for (j, joint) in self.assembly.joints.iter().enumerate() {
             let limit = joint.reading_limit_nm;
             if limit.is_finite() {
