@@ -83,10 +83,9 @@ impl Bristles {
         curves: impl Iterator<Item = Curve>,
     ) -> Vec<Column> {
         let with = |curve: Option<Curve>| {
-            let mut z = way.deflection(self.stiffness_per_rad, curve);
-            let rate = way.rate(&z, self.stiffness_per_rad, curve);
-            z.iter_mut().zip(rate).for_each(|(z, rate)| *z += self.damping_s * rate);
-            column(scene, j, way, &z, self.drive)
+            let z = way.deflection(self.stiffness_per_rad, curve);
+            let damped = way.damped(&z, self.stiffness_per_rad, curve, self.damping_s);
+            column(scene, j, way, &damped, self.drive)
         };
         let without = with(None);
         curves.map(|curve| with(Some(curve)).minus(&without)).collect()
@@ -172,12 +171,20 @@ impl Way {
         z
     }
 
-    /// dz/dt, 1/s, of bristles whose deflection along the way is z.
-    pub fn rate(&self, z: &[f64], stiffness_per_rad: f64, curve: Option<Curve>) -> Vec<f64> {
+    /// z + T dz/dt of bristles whose deflection along the way is z: their friction relative to F.
+    pub fn damped(
+        &self,
+        z: &[f64],
+        stiffness_per_rad: f64,
+        curve: Option<Curve>,
+        damping_s: f64,
+    ) -> Vec<f64> {
         let rests = self.rests(&self.qd_rad_s, curve);
-        let rate =
-            |((qd, rest), z): ((&f64, f64), &f64)| stiffness_per_rad * (qd - qd.abs() * (z / rest));
-        self.qd_rad_s.iter().zip(rests).zip(z).map(rate).collect()
+        let damped = |((qd, rest), z): ((&f64, f64), &f64)| {
+            let rate = stiffness_per_rad * (qd - qd.abs() * (z / rest));
+            z + damping_s * rate
+        };
+        self.qd_rad_s.iter().zip(rests).zip(z).map(damped).collect()
     }
 
     /// γ at the speeds `qd_rad_s`.

@@ -101,9 +101,7 @@ impl Candidate for Presliding {
                 if shape.variant < DAMPED {
                     return vec![less(dry)];
                 }
-                let rate = way.rate(&z, shape.value, curve);
-                let damped: Vec<f64> =
-                    z.iter().zip(rate).map(|(z, rate)| z + DAMPING_STEP_S * rate).collect();
+                let damped = way.damped(&z, shape.value, curve, DAMPING_STEP_S);
                 let more = column(scene, j, &way, &damped, drive).minus(&dry);
                 vec![less(dry), more.scaled(1.0 / DAMPING_STEP_S)]
             })

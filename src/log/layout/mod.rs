@@ -329,13 +329,6 @@ mod tests {
         assert_ne!(layout.joints, Joints::default());
     }
 
-    #[test]
-    fn the_layout_of_ros_is_valid() {
-        let text = include_str!("../../../layouts/ros2_joint_states.toml");
-        let layout = Layout::from_toml(text, "ros2_joint_states.toml").unwrap();
-        layout.check_for(6).unwrap();
-    }
-
     fn fault_of(from: &str, to: &str) -> String {
         assert!(VALID.contains(from));
         Layout::from_toml(&VALID.replacen(from, to, 1), "mine.toml").unwrap_err().to_string()
