@@ -337,7 +337,8 @@ def said(answer):
         for c in answer["causes"]
     ]
     if answer["unexplained"]:
-        causes.append(f"joint {answer['unexplained']['joint']} unexplained")
+        rest = answer["unexplained"]
+        causes.append(f"{'joints together' if rest['of_all_joints'] else 'joint'} {rest['joint']} unexplained")
     return ", ".join(causes) or "nothing"
 
 

@@ -165,7 +165,7 @@ def main():
         lines += ["", f"## Drives: {name}", "", f"{sum(right[r] for r in rows)} of {len(rows)} right.", ""]
         lines += ["| hidden | gets | right |", "|---|---|---|"]
         for r in rows:
-            rest = "; " + " and ".join(f"joint {u['joint']} unexplained" for u in unexplained(answers[r])) \
+            rest = "; " + " and ".join(f"{place(u)} unexplained" for u in unexplained(answers[r])) \
                 if unexplained(answers[r]) else ""
             lines.append(
                 f"| {hidden_in_words(jobs[r][3])} | {named_in_words(answers[r]['causes'])}{rest} | {'yes' if right[r] else 'no'} |"
@@ -178,6 +178,11 @@ def unexplained(answer):
     """What the program says that it cannot explain, as a list."""
     found = answer["unexplained"]
     return found if isinstance(found, list) else [found] if found else []
+
+
+def place(rest):
+    joint = f"joint {rest['joint']}"
+    return f"the joints together, {joint} most," if rest.get("of_all_joints") else joint
 
 
 if __name__ == "__main__":

@@ -115,7 +115,7 @@ impl<'a> Diagnoser<'a> {
         let selected = kept.selected();
         let before_nm = residual(&study, &null);
         let mut model = self.extended(&study, &kept, &selected, &gains);
-        let form = error_of_form(&study, &selected, &model.extension.effects);
+        let laws = on_joints(&study, &selected, &model.extension.effects);
         let touches = match log.touched() {
             Some(touched) => touched.causes.clone(),
             // Every stall is given back the mean lost time of all stalls. The remaining error shifts torque and motion
@@ -141,8 +141,9 @@ impl<'a> Diagnoser<'a> {
             (0..e.joints()).map(of).collect()
         };
         let [before_rms_nm, after_rms_nm] = [&before_nm, &after_nm].map(rms);
+        let form = error_of_form(&laws, &causes, study.scene.joints());
         let left = left(&study, (&accepted, &rest), lack.as_ref(), (&causes, &form), &log);
-        let Left { unexplained, form_error } = left.at_most(&after_rms_nm);
+        let Left { unexplained, form_error } = left.told_once().at_most(&after_rms_nm);
         if let Some(unknown) = &unexplained {
             make_modest_beside_unknown(&mut causes, unknown.site(), study.scene.periodic);
         }
@@ -474,12 +475,32 @@ fn left(
     misfit::left(study, accepted, rest, lack, &Known { has_law, can_differ, form })
 }
 
-/// λ that the laws `selected` for each joint may leave there because they are not exact.
-fn error_of_form(study: &Study, selected: &[Selected], effects: &[Effect]) -> Vec<f64> {
-    let square = |j: usize| {
-        let likely = selected.iter().zip(effects).filter(|(s, _)| s.confidence > LIKELY);
-        let of_joint = likely.filter(|(_, effect)| effect.site == Some(j));
-        of_joint.map(|(s, e)| study.square_on(j, &s.contender.entry, &e.coefficients)).sum::<f64>()
+/// A law of one joint, and λ of what it does there.
+struct OnJoint {
+    kind: Kind,
+    joint: usize,
+    lambda: f64,
+}
+
+/// The likely ones among the laws `selected` for one joint. What they do to other joints, and laws of the arm as a whole,
+/// are no part of it.
+fn on_joints(study: &Study, selected: &[Selected], effects: &[Effect]) -> Vec<OnJoint> {
+    let likely = selected.iter().zip(effects).filter(|(s, _)| s.confidence > LIKELY);
+    let on_joint = |(s, effect): (&Selected, &Effect)| {
+        let (entry, kind) = (&s.contender.entry, study.families[effect.family].kind());
+        let on_joint = |j| study.square_on(j, entry, &effect.coefficients);
+        effect.site.map(|joint| OnJoint { kind, joint, lambda: on_joint(joint) })
     };
-    (0..study.scene.joints()).map(|j| EXACT * EXACT * square(j)).collect()
+    likely.filter_map(on_joint).collect()
+}
+
+/// λ that the `laws` among the `causes` may leave on each joint because they are not exact.
+fn error_of_form(laws: &[OnJoint], causes: &[Cause], joints: usize) -> Vec<f64> {
+    let is_named = |law: &&OnJoint| {
+        causes.iter().any(|cause| (cause.kind, cause.joint) == (law.kind, Some(law.joint + 1)))
+    };
+    let mut form = vec![0.0; joints];
+    let named = laws.iter().filter(is_named);
+    named.for_each(|law| form[law.joint] += EXACT * EXACT * law.lambda);
+    form
 }

@@ -140,7 +140,7 @@ impl Diagnosis {
 impl Unexplained {
     fn as_form_error(&self) -> String {
         format!(
-            "On joint {} the laws named are not exact: {} Nm (rms) are left, less than 3 % of what they do there; they are seen best along the {}.",
+            "On joint {} the laws named are not exact: {} Nm (rms) are left, less than 3 % of what they do there, in units of the noise; it is seen best along the {}.",
             self.joint,
             significant(self.rms_nm, 2),
             self.axis

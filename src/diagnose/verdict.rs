@@ -304,7 +304,7 @@ pub struct Diagnosis {
 pub enum Verdict {
     /// Nothing was found that this log could show.
     NothingFound,
-    /// Causes named, nothing left over.
+    /// Causes named; nothing is left but what their laws leave because they are not exact.
     CauseNamed,
     /// Something is left that no family explains.
     Unexplained,

@@ -207,7 +207,12 @@ pub fn page(finding: &Finding, arm: &Arm, program: Program) -> Result<Page, Repo
         grid.panels.push(panel.with("unexplained", &x, &y, Colour::MEASURED, Mark::DotsAndLine));
         page.push(
             Section::new("Not explained")
-                .paragraph("No known effect explains this part; the curve says on what it depends.")
+                .paragraph(if unexplained.of_all_joints {
+                    "No known effect explains this. Only the joints together tell it from noise; the curve is that of the joint that \
+                     shows most."
+                } else {
+                    "No known effect explains this part; the curve says on what it depends."
+                })
                 .figure(
                     grid.to_svg()?,
                     "Mean of the unexplained torque along the axis on which it depends most; behind reversals and since \

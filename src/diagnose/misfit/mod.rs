@@ -48,7 +48,7 @@ struct OfJoint {
     joint: usize,
     /// Probability that noise alone leaves as much in any band of any joint.
     probability: f64,
-    /// Σ r² less its degrees of freedom.
+    /// Σ r² less its degrees of freedom: of the joint in all bands.
     excess: f64,
 }
 
@@ -81,7 +81,11 @@ pub fn lack_of_fit(study: &Study, accepted: &Span, residual: &Image) -> Option<L
     let bands = || edges.windows(2).map(|edge| edge[0]..edge[1]).filter(|band| !band.is_empty());
     let looked_at = (0..study.scene.joints()).filter(|j| study.looks_at(Some(*j)));
     let by_probability = |a: &OfJoint, b: &OfJoint| a.probability.total_cmp(&b.probability);
-    let worst = |joint: usize| bands().map(|band| band_of(joint, band)).min_by(by_probability);
+    let worst = |joint: usize| {
+        let all: Vec<OfJoint> = bands().map(|band| band_of(joint, band)).collect();
+        let excess = all.iter().map(|of| of.excess).sum();
+        all.into_iter().min_by(by_probability).map(|of| OfJoint { excess, ..of })
+    };
     let mut joints: Vec<OfJoint> = looked_at.filter_map(worst).collect();
     let tests = (joints.len() * bands().count()) as f64;
     joints.iter_mut().for_each(|of| of.probability = (tests * of.probability).min(1.0));
@@ -115,6 +119,13 @@ pub struct Left {
 }
 
 impl Left {
+    /// A joint that shows something unexplained has no mere error of form.
+    pub(super) fn told_once(self) -> Self {
+        let joint = self.unexplained.as_ref().map(|left| left.joint);
+        let form_error = self.form_error.filter(|left| Some(left.joint) != joint);
+        Self { form_error, ..self }
+    }
+
     /// See [`Unexplained::at_most`].
     pub(super) fn at_most(self, residual_nm: &[f64]) -> Self {
         let at_most = |left: Option<Unexplained>| left.map(|left| left.at_most(residual_nm));
@@ -125,7 +136,7 @@ impl Left {
 /// Finds the axis along which the residual is largest, by a curve of 10 knots in each quantity of each joint.
 ///
 /// What is not explained is the curve with the most evidence among those that noise cannot explain, and that are more
-/// than an error of form. If there is none, it is the best of the curves that noise cannot explain [`together`] with
+/// than an error of form. If there is none, it is the best of the curves that noise cannot explain [`together()`] with
 /// those of the other joints; and if there is none either, but noise cannot explain the lack of fit, the best curve of
 /// the joint with that lack. Beside a law of a log that repeats, less is asked of these tests
 /// ([`chance::UNEXPLAINED_BESIDE_A_LAW`]), and joints [with parameters of their own](with_own_parameters) are one more.
@@ -192,6 +203,21 @@ pub fn left(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_joint_is_told_once() {
+        let on = |joint| Unexplained {
+            axis: "angle",
+            unit: "rad",
+            joint,
+            of_all_joints: false,
+            rms_nm: 0.1,
+            curve: Vec::new(),
+        };
+        let left = |joint| Left { unexplained: Some(on(2)), form_error: Some(on(joint)) };
+        assert!(left(2).told_once().form_error.is_none());
+        assert_eq!(left(3).told_once().form_error, Some(on(3)));
+    }
 
     /// In periods of 10 s the rows end beyond 20 Hz, within a band, and at an edge.
     #[test]

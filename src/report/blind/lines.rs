@@ -1,6 +1,6 @@
 //! One trial of the blind benchmark as lines of text: what it hid and what the diagnosis said.
 
-use crate::montecarlo::blind::{Named, Record, place};
+use crate::montecarlo::blind::{Left, Named, Record, place};
 use crate::number::percent;
 
 /// A named cause in one line.
@@ -34,13 +34,12 @@ pub fn replay_lines(record: &Record) -> Vec<String> {
     ];
     lines.extend(case.cosine.map(|c| format!("  cosine between the two {c:.2}")));
     lines.extend(record.answer.named.iter().map(|n| format!("  named: {}", named_line(n))));
-    lines.extend(
-        record
-            .answer
-            .left
-            .iter()
-            .map(|l| format!("  left: {:.3} Nm on joint {}, by the {}", l.rms_nm, l.joint, l.axis)),
-    );
+    let rest = |l: &Left| {
+        let all = if l.of_all_joints { ", and on all joints together" } else { "" };
+        format!("{:.3} Nm on joint {}, by the {}{all}", l.rms_nm, l.joint, l.axis)
+    };
+    lines.extend(record.answer.left.iter().map(|l| format!("  left: {}", rest(l))));
+    lines.extend(record.answer.form_error.iter().map(|l| format!("  not exact: {}", rest(l))));
     lines.extend(record.answer.gain.map(|g| {
         let [removed, possible] = [g.share(), g.possible()].map(|share| percent(share, 3));
         format!(

@@ -115,7 +115,7 @@ fn parts(scores: &Scores) -> Vec<(&'static str, &'static str, Table)> {
         (
             "Strong effects",
             "Single effects far above the noise, or as far as physics allows, by √λ or √λ_sim. Here chance says nothing \
-             more; a second cause, or a rest without a name, shows where a law is off by more than 3 % of itself.",
+             more; a second cause, or a rest without a name, shows where a law is not exact enough.",
             strength_table(&scores.strong, "right, and nothing else said"),
         ),
         ("By family", "At √λ ≥ 8; faults of the record: all.", family_table(scores)),
