@@ -11,6 +11,7 @@ use super::detection_limits::detection_limits;
 use super::error::DiagnoseError;
 use super::extension::{Effect, Extension};
 use super::finding::Finding;
+use super::form_error::{OnJoint, error_of_form};
 use super::held_out::{Models, Validation, held_out_gain};
 use super::image::{Image, Span};
 use super::intervals;
@@ -37,13 +38,6 @@ use crate::identify::{
     resting_joints,
 };
 use crate::robot::{Arm, JointSignals};
-
-/// Laws are exact to this share of what they do, in units of the noise; less of it than that is no other effect. Of strong
-/// effects in the simulated arm, the right laws left up to 2.7 % (ripple whose waves pass at up to half the rate of the
-/// log).
-const EXACT: f64 = 0.03;
-/// A law with less confidence than this has no form that could be wrong.
-const LIKELY: f64 = 0.5;
 
 /// Diagnoses logs of one arm; holds everything that does not change from log to log.
 pub struct Diagnoser<'a> {
@@ -115,7 +109,7 @@ impl<'a> Diagnoser<'a> {
         let selected = kept.selected();
         let before_nm = residual(&study, &null);
         let mut model = self.extended(&study, &kept, &selected, &gains);
-        let laws = on_joints(&study, &selected, &model.extension.effects);
+        let laws = OnJoint::of(&study, &selected, &model.extension.effects);
         let touches = match log.touched() {
             Some(touched) => touched.causes.clone(),
             // Every stall is given back the mean lost time of all stalls. The remaining error shifts torque and motion
@@ -143,7 +137,7 @@ impl<'a> Diagnoser<'a> {
         let [before_rms_nm, after_rms_nm] = [&before_nm, &after_nm].map(rms);
         let form = error_of_form(&laws, &causes, study.scene.joints());
         let left = left(&study, (&accepted, &rest), lack.as_ref(), (&causes, &form), &log);
-        let Left { unexplained, form_error } = left.told_once().at_most(&after_rms_nm);
+        let Left { unexplained, form_error } = left.at_most(&after_rms_nm);
         if let Some(unknown) = &unexplained {
             make_modest_beside_unknown(&mut causes, unknown.site(), study.scene.periodic);
         }
@@ -473,34 +467,4 @@ fn left(
         causes.iter().any(|cause| cause.kind.is_a_law() && is_there(cause))
     };
     misfit::left(study, accepted, rest, lack, &Known { has_law, can_differ, form })
-}
-
-/// A law of one joint, and λ of what it does there.
-struct OnJoint {
-    kind: Kind,
-    joint: usize,
-    lambda: f64,
-}
-
-/// The likely ones among the laws `selected` for one joint. What they do to other joints, and laws of the arm as a whole,
-/// are no part of it.
-fn on_joints(study: &Study, selected: &[Selected], effects: &[Effect]) -> Vec<OnJoint> {
-    let likely = selected.iter().zip(effects).filter(|(s, _)| s.confidence > LIKELY);
-    let on_joint = |(s, effect): (&Selected, &Effect)| {
-        let (entry, kind) = (&s.contender.entry, study.families[effect.family].kind());
-        let on_joint = |j| study.square_on(j, entry, &effect.coefficients);
-        effect.site.map(|joint| OnJoint { kind, joint, lambda: on_joint(joint) })
-    };
-    likely.filter_map(on_joint).collect()
-}
-
-/// λ that the `laws` among the `causes` may leave on each joint because they are not exact.
-fn error_of_form(laws: &[OnJoint], causes: &[Cause], joints: usize) -> Vec<f64> {
-    let is_named = |law: &&OnJoint| {
-        causes.iter().any(|cause| (cause.kind, cause.joint) == (law.kind, Some(law.joint + 1)))
-    };
-    let mut form = vec![0.0; joints];
-    let named = laws.iter().filter(is_named);
-    named.for_each(|law| form[law.joint] += EXACT * EXACT * law.lambda);
-    form
 }

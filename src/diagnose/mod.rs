@@ -39,6 +39,7 @@ mod drives;
 mod error;
 mod extension;
 mod finding;
+mod form_error;
 mod friction_drift;
 mod gain;
 mod held_out;

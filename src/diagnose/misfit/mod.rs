@@ -41,7 +41,7 @@ pub struct LackOfFit {
     joints: Vec<OfJoint>,
 }
 
-/// The band of a joint that noise explains least well.
+/// How well noise alone explains the residual of a joint, in the band that it explains least.
 #[derive(Debug, Clone, Copy)]
 struct OfJoint {
     /// Index of the joint, from 0 on.
@@ -110,7 +110,7 @@ pub struct Known<'k, L, D> {
 }
 
 /// What the causes leave.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Left {
     /// An effect that is there but not explained.
     pub unexplained: Option<Unexplained>,
@@ -119,11 +119,11 @@ pub struct Left {
 }
 
 impl Left {
-    /// A joint that shows something unexplained has no mere error of form.
-    pub(super) fn told_once(self) -> Self {
-        let joint = self.unexplained.as_ref().map(|left| left.joint);
-        let form_error = self.form_error.filter(|left| Some(left.joint) != joint);
-        Self { form_error, ..self }
+    /// Both, but a joint that shows something unexplained has no mere error of form.
+    fn of(unexplained: Option<Unexplained>, form_error: Option<Unexplained>) -> Self {
+        let joint = unexplained.as_ref().map(|left| left.joint);
+        let form_error = form_error.filter(|left| Some(left.joint) != joint);
+        Self { unexplained, form_error }
     }
 
     /// See [`Unexplained::at_most`].
@@ -170,7 +170,7 @@ pub fn left(
     let mut form_error =
         found.iter().rfind(|c| is_clear(c) && is_of_form(c)).map(|c| c.unexplained.clone());
     if let Some(clear) = found.iter().rposition(|c| is_clear(c) && !is_of_form(c)) {
-        return Left { unexplained: Some(found.swap_remove(clear).unexplained), form_error };
+        return Left::of(Some(found.swap_remove(clear).unexplained), form_error);
     }
     let is_exact = |joint: usize| known.form[joint] < NOTICEABLE;
     // What is told by no curve is told of the mean period, to which only curves that repeat can belong.
@@ -184,8 +184,7 @@ pub fn left(
     });
     if let Some(largest) = of_all {
         let unexplained = found.swap_remove(largest).unexplained;
-        let unexplained = Some(Unexplained { of_all_joints: true, ..unexplained });
-        return Left { unexplained, form_error };
+        return Left::of(Some(Unexplained { of_all_joints: true, ..unexplained }), form_error);
     }
     let mut unexplained = None;
     let lacks = lack_of_fit.into_iter().flat_map(|lack| &lack.joints);
@@ -197,7 +196,7 @@ pub fn left(
             unexplained = best();
         }
     }
-    Left { unexplained, form_error }
+    Left::of(unexplained, form_error)
 }
 
 #[cfg(test)]
@@ -214,9 +213,9 @@ mod tests {
             rms_nm: 0.1,
             curve: Vec::new(),
         };
-        let left = |joint| Left { unexplained: Some(on(2)), form_error: Some(on(joint)) };
-        assert!(left(2).told_once().form_error.is_none());
-        assert_eq!(left(3).told_once().form_error, Some(on(3)));
+        let left = |joint| Left::of(Some(on(2)), Some(on(joint)));
+        assert!(left(2).form_error.is_none());
+        assert_eq!(left(3).form_error, Some(on(3)));
     }
 
     /// In periods of 10 s the rows end beyond 20 Hz, within a band, and at an edge.
