@@ -66,8 +66,11 @@ pub(super) fn solve(
             squares[e.joint].0 += residual.norm_squared();
             squares[e.joint].1 += residual.len();
         }
+        // A joint without rows has no residual, and its weight is not needed.
         for (sigma, (square, count)) in sigma.iter_mut().zip(squares) {
-            *sigma = (square / count.max(1) as f64).sqrt().max(f64::MIN_POSITIVE);
+            if count > 0 {
+                *sigma = (square / count as f64).sqrt().max(f64::MIN_POSITIVE);
+            }
         }
     }
     let count = equations.iter().flat_map(|e| &e.block_of).max().map_or(0, |b| b + 1);

@@ -51,13 +51,14 @@ impl Kept<'_, '_> {
     /// the residual and would itself be significant there: more evidence in a few stretches of time does not make a
     /// rival.
     pub(super) fn rivals(&self, c: usize, others: &Span, residual: &Image) -> Vec<Contender> {
-        let Entry { family, site, .. } = self.causes[c].entry;
+        let own = &self.causes[c].entry;
         let mut rivals = self.contenders(Some(c), others, residual);
-        rivals.retain(|r| (r.entry.family, r.entry.site) != (family, site));
+        rivals.retain(|r| r.entry.place() != own.place());
         if !self.study.scene.periodic {
-            let signal = self.study.span(&self.causes[c].entry, others).inside(residual);
+            let signal = self.study.span(own, others).inside(residual);
             let size = signal.square();
-            let is_ahead = |r: &Contender| r.evidence > self.causes[c].evidence;
+            let evidence = self.evidence_of(c, others, residual);
+            let is_ahead = |r: &Contender| r.evidence > evidence;
             rivals.retain(|r| {
                 !is_ahead(r)
                     || self.explains(r, others, &signal) > SHARED * size
@@ -78,10 +79,9 @@ impl Kept<'_, '_> {
         residual: &Image,
     ) -> Vec<&'e Entry> {
         let study = self.study;
-        let Entry { family, site, shape, .. } = *entry;
         let mut best: Vec<(&Entry, Score)> = Vec::new();
         let is_other =
-            |e: &&Entry| (e.family, e.site) == (family, site) && e.shape.variant != shape.variant;
+            |e: &&Entry| e.place() == entry.place() && e.shape.variant != entry.shape.variant;
         for entry in study.entries.iter().chain(further).filter(is_other) {
             let Some(score) = study.score(entry, others, residual) else { continue };
             match best.iter_mut().find(|(b, _)| b.shape.variant == entry.shape.variant) {
@@ -163,6 +163,29 @@ impl Kept<'_, '_> {
         best.fold(start, |best, e| if e.1 > best.1 { e } else { best }).0
     }
 
+    /// `entry` beside `others`, outside which the `residual` is; `None` if nothing of it lies outside them.
+    pub(super) fn scored(
+        &self,
+        entry: &Entry,
+        others: &Span,
+        residual: &Image,
+    ) -> Option<Contender> {
+        let score = self.study.score(entry, others, residual)?;
+        let evidence = self.evidence(entry, score);
+        Some(Contender { entry: entry.clone(), score, evidence })
+    }
+
+    /// Cause `c` as it is now, beside `others`, outside which the `residual` is. Its own score is that of its choice: what
+    /// was found, refined or dropped since changes it.
+    pub(super) fn beside(&self, c: usize, others: &Span, residual: &Image) -> Option<Contender> {
+        self.scored(&self.causes[c].entry, others, residual)
+    }
+
+    /// The evidence for [cause `c` as it is now](Self::beside).
+    pub(super) fn evidence_of(&self, c: usize, others: &Span, residual: &Image) -> f64 {
+        self.beside(c, others, residual).map_or(f64::NEG_INFINITY, |own| own.evidence)
+    }
+
     /// 2 ln of the evidence for adding `entry`: its gain less its price.
     pub(super) fn evidence(&self, entry: &Entry, score: Score) -> f64 {
         score.gain - self.study.price(entry)
@@ -186,10 +209,9 @@ impl Kept<'_, '_> {
             site => open_site.is_some() && site != open_site,
         };
         let taken = |entry: &Entry| {
-            let place = (entry.family, entry.site);
-            let is_taken = |(c, cause): &(usize, &Contender)| {
-                Some(*c) != open && (cause.entry.family, cause.entry.site) == place
-            };
+            let place = entry.place();
+            let is_taken =
+                |(c, cause): &(usize, &Contender)| Some(*c) != open && cause.entry.place() == place;
             let law = &study.families[entry.family];
             let most = if law.is_repeatable() { MOST_ALIKE } else { 1 };
             let is_same = |(_, cause): &(usize, &Contender)| {
@@ -230,8 +252,7 @@ impl Kept<'_, '_> {
         for (entry, score) in study.entries.iter().chain(&orders).chain(faint).zip(scores) {
             let Some(score) = score else { continue };
             let evidence = self.evidence(entry, score);
-            let same =
-                |c: &&mut Contender| (c.entry.family, c.entry.site) == (entry.family, entry.site);
+            let same = |c: &&mut Contender| c.entry.place() == entry.place();
             match best.iter_mut().find(same) {
                 Some(old) if old.evidence >= evidence => {}
                 Some(old) => *old = Contender { entry: entry.clone(), score, evidence },
@@ -282,15 +303,11 @@ impl Kept<'_, '_> {
     /// The law that is [`faint`](Study::faint) and explains more than cause `c`, far beyond doubt.
     pub(super) fn faint_behind(&self, c: usize) -> Option<Contender> {
         let (others, residual) = self.without(Some(c));
-        let contender = |entry: &Entry| {
-            let score = self.study.score(entry, &others, &residual)?;
-            let evidence = self.evidence(entry, score);
-            Some(Contender { entry: entry.clone(), score, evidence })
-        };
+        let contender = |entry: &Entry| self.scored(entry, &others, &residual);
         let taken = |entry: &&Entry| self.causes.iter().any(|c| c.entry.place() == entry.place());
         let free = self.study.faint.iter().filter(|entry| !taken(entry));
         let best = free.filter_map(contender).min_by(Contender::in_order)?;
-        (best.evidence > self.causes[c].evidence + FAR_AHEAD).then_some(best)
+        (best.evidence > self.evidence_of(c, &others, &residual) + FAR_AHEAD).then_some(best)
     }
 
     /// Square of the part of `signal`, which lies outside `others`, that `contender` explains.

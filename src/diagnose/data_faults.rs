@@ -7,8 +7,6 @@
 //! - the lag d of q̇ follows from q̇ − Δq/Δt = −d q̈ by least squares;
 //! - for the time lost between two rows see [`stalls`](super::stalls).
 
-use std::collections::BTreeMap;
-
 use super::kind::Kind;
 use super::outliers;
 use super::record::Record;
@@ -16,6 +14,7 @@ use super::stale;
 use super::stalls::stalls;
 use super::verdict::{Cause, Estimate};
 use crate::identify::Measurement;
+use crate::identify::covariance::quantile_95;
 use crate::median::{median_step, missing_steps};
 use crate::robot::JointSignals;
 use crate::signal::SignalError;
@@ -113,34 +112,6 @@ fn without_hanging_torques(
     Ok((filled(record)?, hanging))
 }
 
-pub(super) fn cause(
-    kind: Kind,
-    joint: Option<usize>,
-    in_words: &str,
-    strength: f64,
-    parameters: &[(&'static str, Estimate)],
-) -> Cause {
-    Cause {
-        kind,
-        joint: joint.map(|j| j + 1),
-        class: Vec::new(),
-        confidence: 1.0,
-        parameters: parameters.iter().cloned().collect::<BTreeMap<_, _>>(),
-        peak_joint: None,
-        gain_fraction: None,
-        separating_experiment: None,
-        strength,
-        in_words: in_words.to_owned(),
-        form: None,
-        may_be_none: false,
-        rivals: Vec::new(),
-    }
-}
-
-pub(super) fn exact(value: f64, unit: &'static str) -> Estimate {
-    Estimate { value, unit, ci95: [value, value] }
-}
-
 /// Least σ of a lag, in samples: how well means over four steps tell it where velocities carry no noise, as those that
 /// are differences of the recorded angles. A lag of 4.33 samples, hidden with little noise, came out 1e-3 samples short.
 const LEAST_SIGMA_SAMPLES: f64 = 1e-3;
@@ -155,7 +126,7 @@ fn velocity_lag(m: &Measurement) -> Vec<Cause> {
     };
     let words = "a velocity that lags behind the angle";
     let estimate = |lag: f64, sigma: f64| {
-        let reach = 2.09 * sigma;
+        let reach = quantile_95((BLOCKS - 1) as f64) * sigma;
         [("delay_s", Estimate { value: lag, unit: "s", ci95: [lag - reach, lag + reach] })]
     };
     let known: Vec<(f64, f64)> = lags.iter().flatten().copied().collect();
@@ -169,7 +140,7 @@ fn velocity_lag(m: &Measurement) -> Vec<Cause> {
         if alike {
             // What the means over four steps do to one joint they do to all.
             let sigma = weight.powf(-0.5).max(LEAST_SIGMA_SAMPLES * step_s);
-            return vec![cause(
+            return vec![Cause::certain(
                 Kind::VelocityLag,
                 None,
                 words,
@@ -182,7 +153,13 @@ fn velocity_lag(m: &Measurement) -> Vec<Cause> {
         .enumerate()
         .filter_map(|(j, lag)| {
             let (lag, sigma) = lag.filter(is_late)?;
-            Some(cause(Kind::VelocityLag, Some(j), words, lag.abs() / sigma, &estimate(lag, sigma)))
+            Some(Cause::certain(
+                Kind::VelocityLag,
+                Some(j),
+                words,
+                lag.abs() / sigma,
+                &estimate(lag, sigma),
+            ))
         })
         .collect()
 }
@@ -245,8 +222,8 @@ fn repeated_or_missing(m: &Measurement, repeats: &[usize]) -> Option<Cause> {
     let fraction = (missing + repeats.len() as f64) / (missing + m.time_s.len() as f64);
     (fraction > MISSED).then(|| {
         let words = "samples that are missing or repeat the one before";
-        let parameters = [("fraction", exact(fraction, ""))];
-        cause(Kind::DroppedSamples, None, words, f64::INFINITY, &parameters)
+        let parameters = [("fraction", Estimate::exact(fraction, ""))];
+        Cause::certain(Kind::DroppedSamples, None, words, f64::INFINITY, &parameters)
     })
 }
 
@@ -269,9 +246,9 @@ fn quantisation(recorded: &JointSignals, mended: &JointSignals) -> Vec<Cause> {
         let changes: Vec<f64> = y.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
         let rms = (changes.iter().map(|c| c * c).sum::<f64>() / changes.len() as f64).sqrt();
         (step > COARSE * rms).then(|| {
-            let parameters = [("step", exact(step, "Nm"))];
+            let parameters = [("step", Estimate::exact(step, "Nm"))];
             let words = "torque in coarse steps";
-            cause(Kind::Quantisation, Some(j), words, step / rms, &parameters)
+            Cause::certain(Kind::Quantisation, Some(j), words, step / rms, &parameters)
         })
     };
     (0..recorded.joints()).filter_map(of_joint).collect()

@@ -48,7 +48,7 @@ fn limit_at(
     (family, site): (usize, Option<usize>),
 ) -> Option<DetectionLimit> {
     let candidate = &study.families[family];
-    let here = study.entries.iter().filter(|e| (e.family, e.site) == (family, site));
+    let here = study.entries.iter().filter(|e| e.place() == (family, site));
     // Only the first variant, which bears the family's name: in another law the same parameter means another size.
     let law = here.clone().map(|entry| entry.shape.variant).min()?;
     let visible: Vec<Visible> = here

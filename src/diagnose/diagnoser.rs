@@ -189,7 +189,7 @@ impl<'a> Diagnoser<'a> {
             sentences: Vec::new(),
             warnings,
         };
-        self.question_the_arm(&mut diagnosis, &extension, &identification);
+        self.question_the_arm(&mut diagnosis, &extension, base.covariance, &identification);
         let laws: Vec<Option<usize>> =
             extension.effects.iter().map(|effect| effect.site.map(|j| j + 1)).collect();
         let doubt = simulation.and_then(|simulation| simulation.doubt);
@@ -355,7 +355,7 @@ impl<'a> Diagnoser<'a> {
             gain_fraction,
             separating_experiment: (!class.is_empty()).then(|| family.separating_experiment()),
             class,
-            strength: selected.contender.score.lambda.sqrt(),
+            strength: selected.contender.score.lambda.max(0.0).sqrt(),
             in_words: family.in_words().to_owned(),
             form: family.form(&study.scene, *shape),
             may_be_none,

@@ -21,7 +21,7 @@ use super::whitening::Whitening;
 pub type Answer = Vec<(usize, usize, f64)>;
 
 /// Index of the share in [`Scene::answers`].
-const SHARE: usize = 0;
+pub(super) const SHARE: usize = 0;
 /// Index of the lead in [`Scene::answers`].
 const LEAD: usize = 1;
 

@@ -9,7 +9,7 @@ use super::verdict::Cause;
 /// Laws are exact to this share of what they do, in units of the noise; less of it than that is no other effect. The right
 /// law of a strong effect in the simulated arm left 0.015 Nm of a ripple of 0.8 Nm; of 38 wrong laws of strong effects that
 /// were withheld none left as little as this share.
-const EXACT: f64 = 0.03;
+pub(super) const EXACT: f64 = 0.03;
 /// A law with less confidence than this has no form that could be wrong.
 const LIKELY: f64 = 0.5;
 
@@ -47,7 +47,6 @@ pub(super) fn error_of_form(laws: &[OnJoint], causes: &[Cause], joints: usize) -
 
 #[cfg(test)]
 mod tests {
-    use super::super::data_faults;
     use super::*;
 
     /// Of two laws, one is named: a law that did not stay among the causes excuses nothing.
@@ -55,7 +54,7 @@ mod tests {
     fn only_laws_that_are_named_may_be_inexact() {
         let law = |kind, joint| OnJoint { kind, joint, lambda: 1e4 };
         let laws = [law(Kind::Ripple, 0), law(Kind::Spring, 2)];
-        let causes = [data_faults::cause(Kind::Ripple, Some(0), "ripple", 100.0, &[])];
+        let causes = [Cause::certain(Kind::Ripple, Some(0), "ripple", 100.0, &[])];
         let form = error_of_form(&laws, &causes, 3);
         assert!((form[0] - 9.0).abs() < 1e-9 && form[1..] == [0.0, 0.0], "{form:?}");
     }

@@ -53,12 +53,7 @@ pub(super) fn held_out_gain(
     let misreading = Misreading::of(arm, &regression, options, drive_gain_nm_a);
     move_to_common_motion(&mut regression, (arm, set), &models.null.theta);
     let prepared = &regression.prepared;
-    let whitening = if prepared.replicates.is_some() {
-        None
-    } else {
-        let weights = vec![1.0; arm.dof()];
-        Some(Whitening::Run(RunWhitening::new(&regression, options, &weights)?))
-    };
+    let whitening = Whitening::filter_of(&regression, options)?;
     let scene = extension.scene(families, (arm, set), prepared);
     let problem = &regression.problem;
     let (joints, samples) = (problem.joints(), problem.samples);

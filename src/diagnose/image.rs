@@ -189,17 +189,28 @@ impl Span {
         self.take(column.clone())
     }
 
-    /// [`Self::push`] by classical Gram-Schmidt, applied twice, which makes the directions as orthogonal as rounding
-    /// allows (Giraud et al. 2005).
-    fn take(&mut self, mut rest: Image) -> bool {
-        let length = rest.square().sqrt();
+    /// [`Self::push`], but only if the part of `column` outside the span is longer than `least`.
+    pub fn push_longer_than(&mut self, least: f64, column: &Image) -> bool {
+        let length = column.square().sqrt();
+        self.take_longer_than(least.max(DEPENDENT * length), length, column.clone())
+    }
+
+    /// [`Self::push`] of a column that is not needed any more.
+    fn take(&mut self, column: Image) -> bool {
+        let length = column.square().sqrt();
+        self.take_longer_than(DEPENDENT * length, length, column)
+    }
+
+    /// Adds a column of this `length` if its part outside the span is longer than `least`, by classical Gram-Schmidt,
+    /// applied twice, which makes the directions as orthogonal as rounding allows (Giraud et al. 2005).
+    fn take_longer_than(&mut self, least: f64, length: f64, mut rest: Image) -> bool {
         let mut coefficients = vec![0.0; self.len()];
         for _ in 0..2 {
             let along = self.project_out(std::slice::from_mut(&mut rest));
             coefficients.iter_mut().zip(along.col_as_slice(0)).for_each(|(c, a)| *c += a);
         }
         let outside = if self.is_empty() { length } else { rest.square().sqrt() };
-        if outside.is_nan() || outside <= DEPENDENT * length {
+        if outside.is_nan() || outside <= least {
             return false;
         }
         rest.scale(1.0 / outside);

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 #[cfg(doc)]
 use super::candidates::Candidate;
 use super::candidates::{Quantity, Search, Shape};
+use super::delta_method::with_reach;
 use super::extension::{Effect, Extension};
 use super::image::{Image, Span};
 use super::kind::Kind;
@@ -127,21 +128,22 @@ pub fn physical(
         }
     }
     others.residualise(&mut residual);
-    let span = tangent_span(study, &others, effect);
-    let quantile = study.statistic.quantile_95(&span, &residual);
+    let tangents = Tangents::outside(study, &others, effect);
+    let quantile = study.statistic.quantile_95(&tangents.span, &residual);
     let has_profile = study.scene.periodic && has_nonlinear_parameter(study, effect);
     let profile = Profile { study, effect, others: &others, residual: &residual, quantile };
     let mut out = has_profile
-        .then(|| profile.intervals(&span))
+        .then(|| profile.intervals(&tangents))
         .flatten()
-        .unwrap_or_else(|| of_one_form(study, effect, (&span, &residual), quantile));
+        .unwrap_or_else(|| of_one_form(study, effect, (&tangents, &residual), quantile));
     for form in kept.other_forms(index, (&others, &residual)) {
         let left = 1.0 - form.behind / quantile.powi(2);
         if left <= 0.0 {
             continue;
         }
-        let span = tangent_span(study, &others, &form.effect);
-        let other = of_one_form(study, &form.effect, (&span, &residual), left.sqrt() * quantile);
+        let tangents = Tangents::outside(study, &others, &form.effect);
+        let half = left.sqrt() * quantile;
+        let other = of_one_form(study, &form.effect, (&tangents, &residual), half);
         // A form with the opposite sign bends the other way where this matters less; it is a different statement.
         let is_opposite = |(name, own): (&&str, &Estimate)| {
             other.get(name).is_some_and(|other| own.value * other.value < 0.0)
@@ -207,11 +209,13 @@ const STEPS_OUT: usize = 4;
 const HALVINGS: usize = 4;
 
 impl Profile<'_> {
-    /// Intervals from the profile. The search for the ends starts from σ of the nonlinear parameter, which is the last
-    /// of `tangents`. `None` if the columns at the best value depend linearly on those of the other causes.
-    fn intervals(&self, tangents: &Span) -> Option<BTreeMap<&'static str, Estimate>> {
-        let covariance = self.study.statistic.covariance(tangents, self.residual);
-        let sigma = covariance.diagonal().as_slice().last().map_or(0.0, |v| v.max(0.0).sqrt());
+    /// Intervals from the profile. The search for the ends starts from σ of the nonlinear parameter; there is no search
+    /// where the `tangents` do not tell it. `None` if the columns at the best value depend linearly on those of the other
+    /// causes.
+    fn intervals(&self, tangents: &Tangents) -> Option<BTreeMap<&'static str, Estimate>> {
+        let covariance = self.study.statistic.covariance(&tangents.span, self.residual);
+        let of_shape = tangents.free.iter().position(|k| *k == self.effect.coefficients.len());
+        let sigma = of_shape.map_or(0.0, |at| covariance[(at, at)].max(0.0).sqrt());
         let centre = self.entry(self.effect.shape.value)?;
         let best = self.gain(&centre)?;
         let mut out = self.estimates(&centre, self.quantile);
@@ -282,7 +286,8 @@ impl Profile<'_> {
             shape: entry.shape,
             ..self.effect.clone()
         };
-        of_one_form(self.study, &effect, (&span, self.residual), half)
+        let free = (0..span.len()).collect();
+        of_one_form(self.study, &effect, (&Tangents { span, free }, self.residual), half)
     }
 }
 
@@ -300,67 +305,58 @@ fn tangents_outside_null(study: &Study, effect: &Effect) -> Vec<Image> {
     tangents
 }
 
-/// Span of the [`tangents`] of `effect` outside the null model and outside `others`.
-fn tangent_span(study: &Study, others: &Span, effect: &Effect) -> Span {
-    Span::outside(others, &tangents_outside_null(study, effect))
+/// The [`tangents`] of an effect, and which of its numbers they belong to.
+struct Tangents {
+    /// Their span outside the null model and the other causes.
+    span: Span,
+    /// For each column of the span the index of its number: the coefficients, and the shape behind them. The others are
+    /// those whose columns depend linearly on these.
+    free: Vec<usize>,
 }
 
-/// Parameters of one form by the delta method, with intervals of ± `half` σ. `span` holds the tangents of coefficients
-/// and shape; the coefficients of the other causes are free.
+impl Tangents {
+    /// Those of `effect` outside the null model and outside `others`.
+    fn outside(study: &Study, others: &Span, effect: &Effect) -> Self {
+        let mut tangents = tangents_outside_null(study, effect);
+        others.residualise_all(&mut tangents);
+        let mut span = Span::default();
+        let free = (0..tangents.len()).filter(|k| span.push(&tangents[*k])).collect();
+        Self { span, free }
+    }
+}
+
+/// Parameters of one form by the [delta method](with_reach), with intervals of ± `half` σ, where the coefficients of the
+/// other causes are free.
 fn of_one_form(
     study: &Study,
     effect: &Effect,
-    (span, residual): (&Span, &Image),
+    (tangents, residual): (&Tangents, &Image),
     half: f64,
 ) -> BTreeMap<&'static str, Estimate> {
     let family = &study.families[effect.family];
-    let covariance = study.statistic.covariance(span, residual);
-    let at = |b: &[f64], value: f64| -> Vec<Quantity> {
-        family.quantities(&study.scene, effect.site, Shape { value, ..effect.shape }, b)
-    };
-    let centre = at(&effect.coefficients, effect.shape.value);
+    let covariance = study.statistic.covariance(&tangents.span, residual);
     let k = effect.coefficients.len();
-    let mut gradients = vec![vec![0.0; span.len()]; centre.len()];
-    for parameter in 0..span.len() {
-        let sigma = covariance[(parameter, parameter)].max(0.0).sqrt();
-        let h = 1e-3 * sigma.max(f64::MIN_POSITIVE);
-        let moved = |sign: f64| {
-            let mut b = effect.coefficients.clone();
-            let mut value = effect.shape.value;
-            if parameter < k {
-                b[parameter] += sign * h;
-            } else {
-                value += sign * h;
-            }
-            at(&b, value)
+    let at = |numbers: &[f64]| -> Vec<Quantity> {
+        let shape = Shape { value: numbers[k], ..effect.shape };
+        family.quantities(&study.scene, effect.site, shape, &numbers[..k])
+    };
+    let numbers = [&effect.coefficients[..], &[effect.shape.value]].concat();
+    let estimate = |(quantity, reach): (Quantity, f64)| {
+        let value = quantity.value;
+        // A parameter that is searched on a logarithmic scale is positive; a single run determines it to within a
+        // factor.
+        let by_factor = !study.scene.periodic
+            && family.search() == Search::Logarithmic
+            && value == effect.shape.value;
+        let ci95 = if by_factor {
+            [value * (-reach / value).exp(), value * (reach / value).exp()]
+        } else {
+            [value - reach, value + reach]
         };
-        for (g, (up, down)) in gradients.iter_mut().zip(moved(1.0).iter().zip(moved(-1.0))) {
-            let mut difference = up.value - down.value;
-            if up.unit == "rad" && difference.abs() > std::f64::consts::PI {
-                difference -= difference.signum() * TAU;
-            }
-            g[parameter] = difference / (2.0 * h);
-        }
-    }
-    centre
-        .iter()
-        .zip(&gradients)
-        .map(|(quantity, gradient)| {
-            let g = nalgebra::DVector::from_column_slice(gradient);
-            let variance = (g.transpose() * &covariance * &g)[(0, 0)].max(0.0);
-            let reach = half * variance.sqrt();
-            let value = quantity.value;
-            // A parameter that is searched on a logarithmic scale is positive; a single run determines it to within a
-            // factor.
-            let by_factor = !study.scene.periodic
-                && family.search() == Search::Logarithmic
-                && value == effect.shape.value;
-            let ci95 = if by_factor {
-                [value * (-reach / value).exp(), value * (reach / value).exp()]
-            } else {
-                [value - reach, value + reach]
-            };
-            (quantity.name, Estimate { value, unit: quantity.unit, ci95 })
-        })
+        (quantity.name, Estimate { value, unit: quantity.unit, ci95 })
+    };
+    with_reach(at, &numbers, (&tangents.free, &covariance), half)
+        .into_iter()
+        .map(estimate)
         .collect()
 }

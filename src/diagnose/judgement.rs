@@ -30,8 +30,7 @@ pub struct Selected {
 impl Selected {
     /// The rivals that the data cannot tell from the cause, at their best shapes.
     pub fn alike(&self) -> Vec<&Entry> {
-        let in_class =
-            |rival: &&Contender| self.class.contains(&(rival.entry.family, rival.entry.site));
+        let in_class = |rival: &&Contender| self.class.contains(&rival.entry.place());
         self.rivals.iter().filter(in_class).map(|rival| &rival.entry).collect()
     }
 }
@@ -75,7 +74,9 @@ impl Kept<'_, '_> {
     fn judged(&self, c: usize) -> Selected {
         let study = self.study;
         let (others, residual) = self.without(Some(c));
-        let contender = self.causes[c].clone();
+        // What is found later changes the score of a cause; one that nothing is left of keeps that of its choice.
+        let contender =
+            self.beside(c, &others, &residual).unwrap_or_else(|| self.causes[c].clone());
         let own = study.span(&contender.entry, &others);
         // The signal of the cause as it appears in the data.
         let signal = own.inside(&residual);
@@ -86,7 +87,7 @@ impl Kept<'_, '_> {
             rivals.iter().map(|rival| self.explains(rival, &others, &signal)).collect();
         let is_alike = |explained: &f64| scale * (size - explained) < TELLS_APART;
         let in_class = rivals.iter().zip(&explained).filter(|(_, explained)| is_alike(explained));
-        let class = in_class.map(|(rival, _)| (rival.entry.family, rival.entry.site)).collect();
+        let class = in_class.map(|(rival, _)| rival.entry.place()).collect();
         // Along a single run, another effect that is visible beside the cause is no reason to doubt it.
         let in_its_place = |explained: &f64| {
             study.scene.periodic || is_alike(explained) || *explained > SHARED * size

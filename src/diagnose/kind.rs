@@ -1,4 +1,4 @@
-//! Names of the families of effects, shared by the scenarios of the plant and the JSON output.
+//! Names of the families of effects, in the JSON output and in the blind benchmark.
 
 use serde::{Deserialize, Serialize};
 

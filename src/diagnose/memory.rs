@@ -11,8 +11,10 @@ use super::candidates::Shape;
 use super::image::Image;
 use super::study::{Entry, Place};
 
-/// Upper limit of the bytes of columns that are kept. What is beyond it is computed anew each time.
-const MOST_BYTES: usize = 64 << 20;
+/// Upper limit of the bytes of columns that are kept of a place. What is beyond it is computed anew each time. Places have
+/// limits of their own because several are searched at once: which columns are kept would otherwise depend on how the
+/// threads run, and the last bit of a column depends on those that are computed with it.
+const MOST_BYTES: usize = 4 << 20;
 
 /// A place, a variant of the shape, and the bits of the shape's value.
 type Key = (Place, usize, u64);
@@ -32,15 +34,16 @@ struct Known {
     /// `None` for shapes whose columns the null model absorbs.
     entries: HashMap<Key, Option<Entry>>,
     loose: HashMap<Key, Arc<[Image]>>,
-    bytes: usize,
+    bytes: HashMap<Place, usize>,
 }
 
 impl Known {
-    /// Whether there is room for `images`, which is then taken.
-    fn takes(&mut self, images: &[Image]) -> bool {
+    /// Whether there is room for `images` of `place`, which is then taken.
+    fn takes(&mut self, place: Place, images: &[Image]) -> bool {
         let bytes: usize = images.iter().map(Image::bytes).sum();
-        let has_room = self.bytes + bytes <= MOST_BYTES;
-        self.bytes += if has_room { bytes } else { 0 };
+        let taken = self.bytes.entry(place).or_default();
+        let has_room = *taken + bytes <= MOST_BYTES;
+        *taken += if has_room { bytes } else { 0 };
         has_room
     }
 }
@@ -68,7 +71,7 @@ impl Memory {
         let made = if unknown.is_empty() { Vec::new() } else { make(&unknown) };
         let mut cache = self.lock();
         for (shape, made) in unknown.iter().zip(&made) {
-            if cache.takes(made.as_ref().map_or(&[], |entry| &entry.images)) {
+            if cache.takes(place, made.as_ref().map_or(&[], |entry| &entry.images)) {
                 cache.entries.insert(key(place, shape), made.clone());
             }
         }
@@ -89,7 +92,7 @@ impl Memory {
         known.unwrap_or_else(|| {
             let made: Arc<[Image]> = make().into();
             let mut cache = self.lock();
-            if cache.takes(&made) {
+            if cache.takes(place, &made) {
                 cache.loose.insert(key, Arc::clone(&made));
             }
             made

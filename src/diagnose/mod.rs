@@ -31,6 +31,7 @@ mod common_motion;
 mod contact;
 mod contenders;
 mod data_faults;
+mod delta_method;
 mod detection_limits;
 mod diagnoser;
 mod dictionary;

@@ -49,16 +49,17 @@ pub(super) fn make_modest(causes: &mut [Cause], is_compared: bool) {
     let of_the_arm = |kind: Kind| {
         matches!(kind, Kind::Payload | Kind::Gravity | Kind::BaseTilt | Kind::LinkLength)
     };
-    let steady: Vec<(Kind, Option<usize>, f64)> = causes
+    let steady: Vec<(usize, Kind, Option<usize>, f64)> = causes
         .iter()
-        .filter(|c| c.kind.is_a_law())
-        .map(|c| (c.kind, c.joint, c.strength))
+        .enumerate()
+        .filter(|(_, c)| c.kind.is_a_law())
+        .map(|(index, c)| (index, c.kind, c.joint, c.strength))
         .collect();
     let of_kind = |kind: Kind| causes.iter().filter(move |c| c.kind == kind).map(|c| c.joint);
     let wild: Vec<Option<usize>> = of_kind(Kind::Outliers).collect();
     let has_gaps = of_kind(Kind::DroppedSamples).next().is_some();
     let has_several_gains = of_kind(Kind::TorqueGain).count() > 1;
-    for cause in causes.iter_mut() {
+    for (index, cause) in causes.iter_mut().enumerate() {
         let is_of_weight = match cause.kind {
             Kind::Gravity | Kind::LinkLength => true,
             Kind::TorqueGain => has_several_gains,
@@ -74,12 +75,12 @@ pub(super) fn make_modest(causes: &mut [Cause], is_compared: bool) {
             continue;
         }
         let of_both = |kind: Kind| of_the_arm(kind) && of_the_arm(cause.kind);
-        let beside = steady.iter().filter(|(kind, joint, _)| {
+        let beside = steady.iter().filter(|(other, kind, joint, _)| {
             let shares = *joint == cause.joint || joint.is_none() || cause.joint.is_none();
-            (*kind, *joint) != (cause.kind, cause.joint) && (shares || of_both(*kind))
+            *other != index && (shares || of_both(*kind))
         });
         let (mut count, mut strongest, mut is_akin) = (1, 0.0f64, false);
-        for &(kind, _, strength) in beside {
+        for &(_, kind, _, strength) in beside {
             count += 1;
             strongest = strongest.max(strength);
             is_akin |= of_both(kind);
@@ -155,12 +156,11 @@ impl Cause {
 
 #[cfg(test)]
 mod tests {
-    use super::super::data_faults;
     use super::*;
 
     /// A cause on `joint` (1-based) with this gain.
     fn cause(kind: Kind, joint: usize, gain: f64) -> Cause {
-        let sure = data_faults::cause(kind, Some(joint - 1), "an effect", 20.0, &[]);
+        let sure = Cause::certain(kind, Some(joint - 1), "an effect", 20.0, &[]);
         Cause { gain_fraction: Some(gain), ..sure }
     }
 
@@ -192,6 +192,21 @@ mod tests {
         assert_eq!(confidences(causes[..3].to_vec(), 5, true), [0.5; 3]);
         let faults = [6, 5, 3].map(|j| cause(Kind::TorqueGain, j, 0.6)).to_vec();
         assert_eq!(confidences(faults, 5, true), [0.9, 0.5, 0.9]);
+    }
+
+    /// Ripples of a joint are laws beside each other as any others are.
+    #[test]
+    fn laws_of_one_kind_limit_each_other() {
+        let confidences = |strengths: &[f64]| -> Vec<f64> {
+            let of_strength = |s: &f64| Cause { strength: *s, ..cause(Kind::Ripple, 4, 0.3) };
+            let mut causes: Vec<Cause> = strengths.iter().map(of_strength).collect();
+            make_modest(&mut causes, false);
+            causes.iter().map(|cause| cause.confidence).collect()
+        };
+        assert_eq!(confidences(&[20.0]), [1.0]);
+        assert_eq!(confidences(&[20.0, 15.0]), [1.0; 2]);
+        assert_eq!(confidences(&[20.0, 9.0]), [1.0, 0.9]);
+        assert_eq!(confidences(&[20.0, 15.0, 15.0]), [0.9; 3]);
     }
 
     /// An error of the arm's geometry looks like gains of several joints. A simulation that the log is compared with has

@@ -8,10 +8,10 @@
 
 use rayon::prelude::*;
 
-use super::data_faults::{FAR, cause, exact, step_s};
+use super::data_faults::{FAR, step_s};
 use super::kind::Kind;
 use super::record::Record;
-use super::verdict::Cause;
+use super::verdict::{Cause, Estimate};
 use crate::identify::Measurement;
 use crate::median::{median, sigma_of_changes};
 use crate::robot::JointSignals;
@@ -197,8 +197,8 @@ pub fn causes(strays: &[Strays], rows: usize) -> Vec<Cause> {
         wild.dedup();
         let channels: Vec<&str> = own.iter().map(|stray| stray.channel).collect();
         let words = format!("single values of {} that are far off", channels.join(" and "));
-        let parameters = [("fraction", exact(wild.len() as f64 / rows as f64, ""))];
-        cause(Kind::Outliers, Some(joint), &words, FAR, &parameters)
+        let parameters = [("fraction", Estimate::exact(wild.len() as f64 / rows as f64, ""))];
+        Cause::certain(Kind::Outliers, Some(joint), &words, FAR, &parameters)
     };
     joints.into_iter().map(of_joint).collect()
 }

@@ -85,7 +85,6 @@ pub(super) fn drift_remark(study: &Study, causes: &[Cause]) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::data_faults::cause;
     use super::*;
 
     /// Joint 2 is at its limit of 150 Nm in 20 of 1000 samples. That matters for a law on this joint or on the arm, and
@@ -96,7 +95,7 @@ mod tests {
         let torque = |samples: usize| {
             JointSignals::from_fn(6, 1000, |j, k| if j == 1 && k < samples { -150.0 } else { 1.0 })
         };
-        let of = |kind: Kind, joint| [cause(kind, joint, "an effect", 9.0, &[])];
+        let of = |kind: Kind, joint| [Cause::certain(kind, joint, "an effect", 9.0, &[])];
         let told = |causes: &[Cause]| limited_drives(&arm, &torque(20), causes, None);
         for causes in [of(Kind::Elasticity, Some(1)), of(Kind::BaseTilt, None)] {
             let said = told(&causes);

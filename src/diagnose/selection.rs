@@ -91,6 +91,8 @@ impl<'s, 'a> Kept<'s, 'a> {
             }
         }
         kept.exchange();
+        // The arm was estimated anew since its causes were found.
+        kept.drop_unneeded(|_| true);
         kept
     }
 
@@ -104,8 +106,7 @@ impl<'s, 'a> Kept<'s, 'a> {
             // chance.
             let contenders = self.contenders(None, &others, &residual);
             let significant = |c: &Contender| {
-                !dropped.contains(&(c.entry.family, c.entry.site))
-                    && self.is_significant(c, &others, &residual)
+                !dropped.contains(&c.entry.place()) && self.is_significant(c, &others, &residual)
             };
             let finalists = &contenders[..FINALISTS.min(contenders.len())];
             // A contender that explains a joint best but is not its family's own law stands in for something unknown. A
@@ -127,7 +128,7 @@ impl<'s, 'a> Kept<'s, 'a> {
             else {
                 break;
             };
-            let place = (best.entry.family, best.entry.site);
+            let place = best.entry.place();
             self.causes.push(best);
             if !self.revise() {
                 dropped.push(place);
@@ -153,7 +154,7 @@ impl<'s, 'a> Kept<'s, 'a> {
                 let Some(best) = self.rivals(c, &others, &residual).into_iter().next() else {
                     continue;
                 };
-                if best.evidence > self.causes[c].evidence + CLEARLY_BETTER {
+                if best.evidence > self.evidence_of(c, &others, &residual) + CLEARLY_BETTER {
                     self.causes[c] = best;
                     exchanged = true;
                 }
@@ -210,15 +211,14 @@ impl<'s, 'a> Kept<'s, 'a> {
                 else {
                     continue;
                 };
-                let current = &self.causes[c];
+                let current = self.evidence_of(c, &others, &residual);
                 let margin = if self.study.is_faint(best.entry.place()) {
                     FAR_AHEAD
                 } else {
                     CLEARLY_BETTER
                 };
-                if best.evidence > current.evidence + margin
-                    && (best.entry.family, best.entry.site)
-                        != (current.entry.family, current.entry.site)
+                if best.evidence > current + margin
+                    && best.entry.place() != self.causes[c].entry.place()
                 {
                     self.causes[c] = best;
                     exchanged = true;
@@ -245,7 +245,9 @@ impl<'s, 'a> Kept<'s, 'a> {
         while c < self.causes.len() {
             let is_needed = |kept: &Self| {
                 let (others, residual) = kept.without(Some(c));
-                kept.is_significant(&kept.causes[c], &others, &residual) && kept.is_more_with(c)
+                let beside = kept.beside(c, &others, &residual);
+                beside.is_some_and(|own| kept.is_significant(&own, &others, &residual))
+                    && kept.is_more_with(c)
             };
             if !is_looked_at(self.causes[c].entry.site) || is_needed(self) {
                 c += 1;

@@ -1,10 +1,11 @@
 //! A diagnosis in words.
 
 use super::against::MOVED;
+use super::form_error::EXACT;
 use super::kind::Kind;
 use super::modesty::scattered_joints;
 use super::told;
-use super::verdict::{Cause, Diagnosis, Estimate, HeldOut, Moved, Unexplained};
+use super::verdict::{Cause, Diagnosis, Estimate, HeldOut, Unexplained};
 use crate::number::{percent, resolved_from, significant, with_sigma};
 
 /// An interval that reaches this many times farther to one side than to the other is stated by its ends.
@@ -95,9 +96,10 @@ impl Diagnosis {
 
     /// The sentence that compares the base parameters with those of a simulation.
     fn moved(&self) -> Option<String> {
-        let far = |a: &&Moved, b: &&Moved| a.z.abs().total_cmp(&b.z.abs());
-        let farthest = self.moved_parameters.iter().max_by(far)?;
-        let moved = self.moved_parameters.iter().filter(|m| m.z.abs() > MOVED).count();
+        // What a cause absorbs of a parameter is not known, and has no z.
+        let known = || self.moved_parameters.iter().filter(|m| m.z.is_finite());
+        let farthest = known().max_by(|a, b| a.z.abs().total_cmp(&b.z.abs()))?;
+        let moved = known().filter(|m| m.z.abs() > MOVED).count();
         let together = self.moved_together.map_or_else(String::new, |together| {
             let share = match together.p_value < RARE {
                 true => format!("less than {}", percent(RARE, 1)),
@@ -107,7 +109,7 @@ impl Diagnosis {
         });
         Some(format!(
             "Compared with the simulation, {moved} of {} base parameters differ by more than {MOVED} σ; {} differs most, by {} σ{together}.",
-            self.moved_parameters.len(),
+            known().count(),
             farthest.name,
             significant(farthest.z.abs(), 2),
         ))
@@ -140,9 +142,10 @@ impl Diagnosis {
 impl Unexplained {
     fn as_form_error(&self) -> String {
         format!(
-            "On joint {} the laws named are not exact: {} Nm (rms) are left, less than 3 % of what they do there, in units of the noise; it is seen best along the {}.",
+            "On joint {} the laws named are not exact: {} Nm (rms) are left, less than {:.0} % of what they do there, in units of the noise; it is seen best along the {}.",
             self.joint,
             significant(self.rms_nm, 2),
+            100.0 * EXACT,
             self.axis
         )
     }
@@ -357,7 +360,6 @@ fn pair(value: f64, half: f64, unit: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::data_faults::cause;
     use super::*;
 
     fn told(value: f64, ci95: [f64; 2], unit: &'static str) -> String {
@@ -387,7 +389,7 @@ mod tests {
     #[test]
     fn what_may_be_none_is_said_with_a_may() {
         let estimate = |ci95| Estimate { value: 0.02, unit: "", ci95 };
-        let known = cause(
+        let known = Cause::certain(
             Kind::LoadFriction,
             Some(1),
             "friction by load",
@@ -417,7 +419,7 @@ mod tests {
     #[test]
     fn causes_on_many_joints_are_told_to_lack_one_effect() {
         let kinds = [Kind::Stribeck, Kind::TorqueGain, Kind::Ripple, Kind::Spring];
-        let of_joint = |(j, kind)| cause(kind, Some(j), "an effect", 9.0, &[]);
+        let of_joint = |(j, kind)| Cause::certain(kind, Some(j), "an effect", 9.0, &[]);
         let causes: Vec<Cause> = kinds.into_iter().enumerate().map(of_joint).collect();
         let said = missing_effect(&causes).unwrap();
         assert!(said.contains("joints 1, 2, 3, 4 have causes of their own"), "{said}");

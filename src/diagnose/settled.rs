@@ -38,12 +38,10 @@ pub fn settled<'s>(
     log: &str,
 ) -> Result<(Study<'s>, Vec<Contender>), DiagnoseError> {
     let (mut study, mut found) = in_turn(study, found, sources, log)?;
-    if study.scene.periodic
-        && let Some(more) = with_products(&mut study, &found)
-    {
-        (study, found) = in_turn(study, more, sources, log)?;
-    }
     if study.scene.periodic {
+        if let Some(more) = with_products(&mut study, &found) {
+            (study, found) = in_turn(study, more, sources, log)?;
+        }
         found.causes = as_told(&mut study, found.causes);
     }
     study.look_everywhere();

@@ -33,22 +33,22 @@ impl Kept<'_, '_> {
     ) -> bool {
         let study = self.study;
         let site = contender.entry.site;
+        let span = study.span(&contender.entry, others);
+        let explained = span.explained(residual);
         let is_left_by = |(c, cause): (usize, &Contender)| {
-            if (cause.entry.family, cause.entry.site) == (contender.entry.family, site) {
+            if cause.entry.place() == contender.entry.place() {
                 return false;
             }
             let error = self.form_error(&cause.entry).powi(2);
-            let is_less = |square: f64| contender.score.lambda < error * square;
-            is_less(cause.score.lambda)
+            contender.score.lambda < error * cause.score.lambda
                 && match (cause.entry.site, site) {
-                    (Some(own), Some(j)) if own != j => is_less(self.square_on(j, c)),
+                    (Some(own), Some(j)) if own != j => explained < error * self.square_on(j, c),
                     _ => true,
                 }
         };
         if self.causes.iter().enumerate().any(is_left_by) {
             return false;
         }
-        let span = study.span(&contender.entry, others);
         let single = study.statistic.probability(&span, residual);
         contender.evidence > LEAST_EVIDENCE
             && single * study.tests(&contender.entry) < chance::LAW
@@ -68,12 +68,8 @@ impl Kept<'_, '_> {
         }
         let mut residual = self.study.residual.clone();
         others.residualise(&mut residual);
-        let Some(score) = self.study.score(&contender.entry, &others, &residual) else {
-            return false;
-        };
-        let evidence = self.evidence(&contender.entry, score);
-        let beside = Contender { entry: contender.entry.clone(), score, evidence };
-        self.is_significant(&beside, &others, &residual)
+        let beside = self.scored(&contender.entry, &others, &residual);
+        beside.is_some_and(|beside| self.is_significant(&beside, &others, &residual))
     }
 
     /// Whether `entry`, with its shape and fitted coefficients, is its family's own law

@@ -7,10 +7,10 @@
 
 use rayon::prelude::*;
 
-use super::data_faults::{MOVES_RAD_S, cause, exact};
+use super::data_faults::MOVES_RAD_S;
 use super::kind::Kind;
 use super::record::Record;
-use super::verdict::Cause;
+use super::verdict::{Cause, Estimate};
 use crate::median::median;
 use crate::robot::JointSignals;
 use crate::signal::resolution;
@@ -112,9 +112,9 @@ pub fn mend(record: &mut Record) -> Found {
 fn causes(found: &[OfJoint], samples: usize) -> Vec<Cause> {
     let rows: Vec<Vec<usize>> = found.iter().map(OfJoint::rows).collect();
     let said = |joint: Option<usize>, rows: &[usize], channels: String| {
-        let parameters = [("fraction", exact(rows.len() as f64 / samples as f64, ""))];
+        let parameters = [("fraction", Estimate::exact(rows.len() as f64 / samples as f64, ""))];
         let words = format!("readings of the {channels} that repeat the one before");
-        cause(Kind::DroppedSamples, joint, &words, f64::INFINITY, &parameters)
+        Cause::certain(Kind::DroppedSamples, joint, &words, f64::INFINITY, &parameters)
     };
     let channels = |stale: &[&OfJoint]| {
         let is_stale = |c: usize| {

@@ -1,6 +1,6 @@
 //! A clock that stood still while the arm moved on: angles and velocities tell for how long.
 
-use super::data_faults::{FAR, cause, exact, step_s};
+use super::data_faults::{FAR, step_s};
 use super::kind::Kind;
 use super::verdict::{Cause, Estimate};
 use crate::identify::Measurement;
@@ -107,9 +107,9 @@ impl Stalls {
         let Self { rows, lost_s, reach_s: reach, sigma_s } = self;
         let lost = Estimate { value: *lost_s, unit: "s", ci95: [lost_s - reach, lost_s + reach] };
         let rhythm = rhythm(rows);
-        let every = rhythm.ok().map(|rows| ("every_rows", exact(rows, "rows")));
+        let every = rhythm.ok().map(|rows| ("every_rows", Estimate::exact(rows, "rows")));
         let parameters: Vec<_> = [("lost_s", lost)].into_iter().chain(every).collect();
-        let cause = cause(
+        let cause = Cause::certain(
             Kind::ClockFault,
             None,
             "time that passed without the time stamps showing it",

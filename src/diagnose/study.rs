@@ -242,7 +242,7 @@ impl<'a> Study<'a> {
             },
         };
         self.shown = entries.iter().map(shown).collect();
-        let places: Vec<Place> = entries.iter().map(|entry| (entry.family, entry.site)).collect();
+        let places: Vec<Place> = entries.iter().map(|entry| entry.place()).collect();
         self.prepare(|place| places.contains(place));
         self
     }

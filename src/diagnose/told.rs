@@ -173,12 +173,11 @@ fn late_angle(lag: &Cause, skew: &Cause, noise_is_known: bool) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::data_faults::{cause, exact};
     use super::*;
 
     fn delay(kind: Kind, joint: usize, value: f64, half: f64) -> Cause {
         let estimate = Estimate { value, unit: "s", ci95: [value - half, value + half] };
-        cause(kind, Some(joint), "a delay", 20.0, &[("delay_s", estimate)])
+        Cause::certain(kind, Some(joint), "a delay", 20.0, &[("delay_s", estimate)])
     }
 
     /// An angle that is 2 ms late shows as two causes of one joint, which share one sentence.
@@ -208,9 +207,11 @@ mod tests {
     #[test]
     fn bristles_with_a_curve_are_lugres() {
         let law = |kind: Kind, joint: usize, parameters: &[(&'static str, f64)]| {
-            let parameters: Vec<(&str, Estimate)> =
-                parameters.iter().map(|(name, value)| (*name, exact(*value, ""))).collect();
-            cause(kind, Some(joint), "a law", 20.0, &parameters)
+            let parameters: Vec<(&str, Estimate)> = parameters
+                .iter()
+                .map(|(name, value)| (*name, Estimate::exact(*value, "")))
+                .collect();
+            Cause::certain(kind, Some(joint), "a law", 20.0, &parameters)
         };
         let of_bristles =
             [("coulomb_nm", 2.0), ("stiffness_per_rad", 1000.0), ("damping_s", 0.002)];
@@ -227,9 +228,15 @@ mod tests {
     }
 
     fn touch(start_s: f64, strength: f64) -> Cause {
-        let [start, end] = [start_s, start_s + 0.5].map(|t| exact(t, "s"));
+        let [start, end] = [start_s, start_s + 0.5].map(|t| Estimate::exact(t, "s"));
         let words = "something touched the arm: joint 6 by +1.0 Nm";
-        cause(Kind::Contact, Some(5), words, strength, &[("start_s", start), ("end_s", end)])
+        Cause::certain(
+            Kind::Contact,
+            Some(5),
+            words,
+            strength,
+            &[("start_s", start), ("end_s", end)],
+        )
     }
 
     #[test]
@@ -250,8 +257,8 @@ mod tests {
 
     #[test]
     fn many_causes_have_an_overview() {
-        let gear = |joint| cause(Kind::Elasticity, Some(joint), "a soft gear", 9.0, &[]);
-        let payload = cause(Kind::Payload, None, "a body", 9.0, &[]);
+        let gear = |joint| Cause::certain(Kind::Elasticity, Some(joint), "a soft gear", 9.0, &[]);
+        let payload = Cause::certain(Kind::Payload, None, "a body", 9.0, &[]);
         let unlikely = Cause { confidence: 5e-4, ..delay(Kind::TimeSkew, 1, 0.001, 0.0001) };
         let touches = [touch(1.0, 10.0), touch(3.0, 9.0)];
         let mut causes: Vec<Cause> = [gear(4), gear(1), payload, unlikely].into();
@@ -268,8 +275,10 @@ mod tests {
     #[test]
     fn what_is_unlikely_leads_nowhere() {
         let likely = touch(1.0, 10.0);
-        let unlikely =
-            Cause { confidence: 5e-4, ..cause(Kind::Elasticity, Some(0), "a soft gear", 5.9, &[]) };
+        let unlikely = Cause {
+            confidence: 5e-4,
+            ..Cause::certain(Kind::Elasticity, Some(0), "a soft gear", 5.9, &[])
+        };
         let causes = [unlikely, likely];
         assert_eq!(in_sentences(&causes, true), [causes[1].sentence(true)]);
         let said = in_the_table_alone(&causes).unwrap();

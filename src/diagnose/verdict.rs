@@ -23,6 +23,11 @@ pub struct Estimate {
 }
 
 impl Estimate {
+    /// A value that is known exactly.
+    pub(super) fn exact(value: f64, unit: &'static str) -> Self {
+        Self { value, unit, ci95: [value, value] }
+    }
+
     /// Whether the interval holds `value`.
     pub(super) fn holds(&self, value: f64) -> bool {
         self.ci95[0] <= value && value <= self.ci95[1]
@@ -93,6 +98,31 @@ pub struct Cause {
 const UNLIKELY: f64 = 1e-3;
 
 impl Cause {
+    /// A cause with confidence 1, at joint `site` (from 0 on) or of the arm as a whole, that nothing else resembles.
+    pub(super) fn certain(
+        kind: Kind,
+        site: Option<usize>,
+        in_words: &str,
+        strength: f64,
+        parameters: &[(&'static str, Estimate)],
+    ) -> Self {
+        Self {
+            kind,
+            joint: site.map(|j| j + 1),
+            class: Vec::new(),
+            confidence: 1.0,
+            parameters: parameters.iter().cloned().collect(),
+            peak_joint: None,
+            gain_fraction: None,
+            separating_experiment: None,
+            strength,
+            in_words: in_words.to_owned(),
+            form: None,
+            may_be_none: false,
+            rivals: Vec::new(),
+        }
+    }
+
     /// Whether the cause is less likely than one in a thousand: something else, which is no cause that could be named,
     /// explains the log better.
     pub fn is_unlikely(&self) -> bool {

@@ -6,10 +6,11 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use crate::base::BaseSet;
 use crate::diagnose::candidates::{Candidate, Quantity, Shape};
+use crate::diagnose::delta_method::with_reach;
 use crate::diagnose::image::Image;
 use crate::diagnose::kind::Kind;
 use crate::diagnose::scene::Scene;
@@ -57,28 +58,12 @@ impl Change<'_> {
             }
             (self.quantities)(&all)
         };
-        let centre = quantities(b);
-        let mut gradients = vec![DVector::<f64>::zeros(b.len()); centre.len()];
-        for k in 0..b.len() {
-            let h = 1e-3 * covariance[(k, k)].max(0.0).sqrt().max(f64::MIN_POSITIVE);
-            let at = |sign: f64| {
-                let mut moved = b.to_vec();
-                moved[k] += sign * h;
-                quantities(&moved)
-            };
-            for (g, (up, down)) in gradients.iter_mut().zip(at(1.0).iter().zip(at(-1.0))) {
-                g[k] = (up.value - down.value) / (2.0 * h);
-            }
-        }
-        centre
-            .iter()
-            .zip(&gradients)
-            .map(|(q, g)| {
-                let reach = half * (g.transpose() * covariance * g)[(0, 0)].max(0.0).sqrt();
-                let ci95 = [q.value - reach, q.value + reach];
-                (q.name, Estimate { value: q.value, unit: q.unit, ci95 })
-            })
-            .collect()
+        let free: Vec<usize> = (0..b.len()).collect();
+        let estimate = |(q, reach): (Quantity, f64)| {
+            let ci95 = [q.value - reach, q.value + reach];
+            (q.name, Estimate { value: q.value, unit: q.unit, ci95 })
+        };
+        with_reach(quantities, b, (&free, covariance), half).into_iter().map(estimate).collect()
     }
 }
 

@@ -85,7 +85,7 @@ fn as_gaussian(t: f64, freedom: f64) -> f64 {
 }
 
 /// Distance of the data from a simulation in all `base` parameters together, for a periodic log, whose noise the
-/// `study` knows; `None` for a single run.
+/// `study` knows; `None` for a single run. A parameter whose column a cause absorbs is left out.
 ///
 /// Combinations of parameters are known far better than any single one. d²/b of b parameters is treated as F(b, ν),
 /// with ν the harmonic mean of the degrees of freedom with which each σ is known.
@@ -98,11 +98,14 @@ pub fn moved_together(study: &Study, simulation: Nominal, base: &Base) -> Option
         Some(unknown) => covariance + unknown,
         None => covariance.clone(),
     };
-    let difference =
-        parameters.iter().zip(simulation.theta).map(|(data, theta)| data.value - theta);
+    let known: Vec<usize> =
+        (0..parameters.len()).filter(|k| covariance[(*k, *k)].is_finite()).collect();
+    let difference = known.iter().map(|k| parameters[*k].value - simulation.theta[*k]);
+    let covariance = covariance.select_rows(&known).select_columns(&known);
     let squared_distance = squared_distance(&covariance, &difference.collect::<Vec<_>>())?;
-    let count = parameters.len();
-    let inverse = simulation.noise_beside(base).into_iter().map(|(_, freedom)| 1.0 / freedom);
+    let count = known.len();
+    let noise = simulation.noise_beside(base);
+    let inverse = known.iter().map(|k| 1.0 / noise[*k].1);
     let freedom = count as f64 / inverse.sum::<f64>();
     let p_value = upper_fisher(squared_distance / count as f64, count, freedom);
     Some(MovedTogether { squared_distance, degrees_of_freedom: [count as f64, freedom], p_value })

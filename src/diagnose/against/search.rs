@@ -197,8 +197,7 @@ impl Search<'_> {
     pub(super) fn needs(&self, e: usize, beside: &[Beside], taken: &[usize]) -> bool {
         let study = self.study;
         let entry = beside[e].entry;
-        let place = |entry: &Entry| (entry.family, entry.site);
-        let alike = beside.iter().filter(|b| place(b.entry) == place(entry));
+        let alike = beside.iter().filter(|b| b.entry.place() == entry.place());
         if taken.is_empty() || alike.count() > 1 {
             return true;
         }

@@ -63,12 +63,13 @@ pub fn between_periods(m: &Measurement, left_out: &[usize]) -> Result<Compared, 
     let period = found.refined_samples;
     let edge = (EDGE_S * rate_hz) as usize;
     let window = with_disturbed_periods(&q_rad, period, found.window, edge);
-    let swings = (SWINGS_S * rate_hz) as usize;
-    let begin = if window.start > 0 { window.start + swings } else { 0 };
-    let stop = if window.end < grid.samples() { window.end - swings } else { usize::MAX };
     if ((window.len() as f64 / period + WHOLE_WITHIN) as usize) < FEWEST_PERIODS {
         return Ok(Compared::TooFew);
     }
+    let swings = (SWINGS_S * rate_hz) as usize;
+    let begin = if window.start > 0 { window.start + swings } else { 0 };
+    let stop =
+        if window.end < grid.samples() { window.end.saturating_sub(swings) } else { usize::MAX };
     let joints: Vec<usize> = (0..m.torque_nm.joints()).filter(|j| !left_out.contains(j)).collect();
     let signals = grid.instants().straight(m.torque_nm)?;
     let between_samples = linear_at;

@@ -90,42 +90,37 @@ impl Touch {
     fn cause(&self) -> Cause {
         let joints: Vec<String> =
             self.felt.iter().map(|(j, nm)| format!("joint {j} by {nm:+.1} Nm")).collect();
-        let parameters =
-            [("start_s", &self.start_s), ("end_s", &self.end_s), ("peak_nm", &self.peak_nm)];
-        let joint = if self.felt.len() == 1 { Some(self.felt[0].0) } else { None };
-        let may_be_of_the_arm = joint.is_some() && self.moved_others;
+        let parameters = [
+            ("start_s", self.start_s.clone()),
+            ("end_s", self.end_s.clone()),
+            ("peak_nm", self.peak_nm.clone()),
+        ];
+        let site = if self.felt.len() == 1 { Some(self.felt[0].0 - 1) } else { None };
+        let may_be_of_the_arm = site.is_some() && self.moved_others;
         let class =
             if may_be_of_the_arm { vec![Kind::Contact.name().to_owned()] } else { Vec::new() };
+        let in_words = format!("something touched the arm: {}", joints.join(", "));
         Cause {
-            kind: Kind::Contact,
-            joint,
             class,
             confidence: self.confidence,
-            parameters: parameters.map(|(name, estimate)| (name, estimate.clone())).into(),
             peak_joint: Some(self.peak_joint),
-            gain_fraction: None,
             separating_experiment: may_be_of_the_arm.then_some(HARDER),
-            strength: self.strength,
-            in_words: format!("something touched the arm: {}", joints.join(", ")),
-            form: None,
-            may_be_none: false,
-            rivals: Vec::new(),
+            ..Cause::certain(Kind::Contact, site, &in_words, self.strength, &parameters)
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::data_faults::exact;
     use super::*;
 
     /// A contact felt by the joints `felt`, the first of which feels it most.
     fn touch(start: usize, felt: &[(usize, f64)]) -> Touch {
         Touch {
             samples: start..start + 50,
-            start_s: exact(start as f64 / 100.0, "s"),
-            end_s: exact((start + 50) as f64 / 100.0, "s"),
-            peak_nm: exact(felt[0].1, "Nm"),
+            start_s: Estimate::exact(start as f64 / 100.0, "s"),
+            end_s: Estimate::exact((start + 50) as f64 / 100.0, "s"),
+            peak_nm: Estimate::exact(felt[0].1, "Nm"),
             peak_joint: felt[0].0,
             felt: felt.to_vec(),
             strength: 10.0,

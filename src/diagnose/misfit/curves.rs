@@ -111,11 +111,7 @@ pub(super) fn outside(study: &Study, accepted: &Span, images: &[Image]) -> Vec<I
 pub(super) fn clear_of(raw: &[Image], outside: &[Image]) -> Span {
     let mut span = Span::default();
     for (raw, image) in raw.iter().zip(outside) {
-        let mut own = image.clone();
-        span.residualise(&mut own);
-        if own.square() > ABSORBED * ABSORBED * raw.square() {
-            span.push(image);
-        }
+        span.push_longer_than(ABSORBED * raw.square().sqrt(), image);
     }
     span
 }
@@ -126,7 +122,7 @@ pub(super) struct Curve {
     pub(super) span: Span,
     /// Square of the residual that it removes.
     pub(super) explained: f64,
-    /// Twice the gain in log-likelihood less its price.
+    /// The square that it removes less k ln n for its k knots and the n rows (Schwarz 1978), which ranks curves.
     pub(super) evidence: f64,
     /// Probability that noise alone explains as much, this curve taken by itself.
     pub(super) probability: f64,

@@ -85,12 +85,7 @@ pub(super) fn equations(
     let prepared = &regression.prepared;
     let problem = &regression.problem;
     let scene = extension.telling(families, Scene::new(arm, set, theta, prepared));
-    let whitening = if scene.periodic {
-        None
-    } else {
-        let weights = vec![1.0; arm.dof()];
-        Some(Whitening::Run(RunWhitening::new(regression, options, &weights)?))
-    };
+    let whitening = Whitening::filter_of(regression, options)?;
     let moving = RunWhitening::moving_rows(regression);
     let (n, periods) = (problem.samples, problem.periods);
     let thin = (n * periods).div_ceil(MOST_ROWS).max(1);

@@ -83,10 +83,12 @@ pub(super) fn between(
     let layout = Layout::new(set, shared.extension, joints);
     let unloaded = equations(shared, &layout, first, &shared.extension.theta, 0)?;
     let offset = blocks(&unloaded);
+    let elsewhere = shared.extension.elsewhere(shared.families);
+    let beside_body = Shared { extension: &elsewhere, ..*shared };
     let mut fit: Option<(Vec<Equations>, Solution)> = None;
     for _ in 0..ROUNDS {
         let mut all = unloaded.clone();
-        let mut loaded = equations(shared, &layout, second, &loaded_theta, offset)?;
+        let mut loaded = equations(&beside_body, &layout, second, &loaded_theta, offset)?;
         for e in &mut loaded {
             layout.add_friction_change(e);
             for (c, terms) in terms.iter().enumerate() {
@@ -167,21 +169,12 @@ impl PayloadFinding {
         let [x, y, z] = self.com_m.clone();
         let all =
             [("mass_kg", self.mass_kg.clone()), ("com_x_m", x), ("com_y_m", y), ("com_z_m", z)];
-        let parameters = all.into_iter().filter(|(_, estimate)| !estimate.value.is_nan());
+        let parameters: Vec<_> =
+            all.into_iter().filter(|(_, estimate)| !estimate.value.is_nan()).collect();
+        let strength = self.mass_kg.value / sigma;
         Some(Cause {
-            kind: Kind::Payload,
-            joint: None,
-            class: Vec::new(),
             confidence: 1.0 - self.probability,
-            parameters: parameters.collect(),
-            peak_joint: None,
-            gain_fraction: None,
-            separating_experiment: None,
-            strength: self.mass_kg.value / sigma,
-            in_words: "a body on the flange".to_owned(),
-            form: None,
-            may_be_none: false,
-            rivals: Vec::new(),
+            ..Cause::certain(Kind::Payload, None, "a body on the flange", strength, &parameters)
         })
     }
 }

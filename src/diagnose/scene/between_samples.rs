@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use std::sync::OnceLock;
 
 use super::{Scene, Turn};
+use crate::diagnose::drives::SHARE;
 use crate::diagnose::load::LinkTorque;
 use crate::diagnose::reversals::{Bends, Turning};
 use crate::dynamics::of_pairs;
@@ -254,13 +255,13 @@ impl Scene {
     /// Converts the coefficient `b` of answer number `which` ([`Self::answers`]) to this log, from a log whose instants
     /// are `instant_s` apart: the lead's column is a rate per instant.
     pub fn answer_from(&self, instant_s: f64, which: usize, b: f64) -> f64 {
-        if which == 0 { b } else { b * (instant_s / self.instant_s()) }
+        if which == SHARE { b } else { b * (instant_s / self.instant_s()) }
     }
 
     /// Whether a real drive of joint `j` can give its answer number `which` ([`Self::answers`]) the coefficient `b`: no
     /// drive leads or lags its joint by more than `LONGEST_LEAD_S`.
     pub fn can_answer(&self, j: usize, which: usize, b: f64) -> bool {
         let lead_s = b * self.instants(j).step_s;
-        which == 0 || lead_s.abs() < LONGEST_LEAD_S * self.coulomb_nm[j].abs()
+        which == SHARE || lead_s.abs() < LONGEST_LEAD_S * self.coulomb_nm[j].abs()
     }
 }

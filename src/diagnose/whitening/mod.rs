@@ -17,7 +17,9 @@ pub use repeating::RepeatingNoise;
 pub use run::RunWhitening;
 pub use scatter::FLOOR;
 
+use super::error::DiagnoseError;
 use super::image::{Column, Image};
+use crate::identify::{Options, Regression};
 use crate::robot::JointSignals;
 
 /// Map from torques in time to whitened rows.
@@ -29,6 +31,19 @@ pub enum Whitening {
 }
 
 impl Whitening {
+    /// For a log whose noise is not asked for: the filter that the columns of a single run go through ([`Self::as_regressed`]),
+    /// with weights of 1; `None` where the motion repeats, which needs none.
+    pub fn filter_of(
+        regression: &Regression,
+        options: &Options,
+    ) -> Result<Option<Self>, DiagnoseError> {
+        if regression.prepared.replicates.is_some() {
+            return Ok(None);
+        }
+        let weights = vec![1.0; regression.problem.joints()];
+        Ok(Some(Self::Run(RunWhitening::new(regression, options, &weights)?)))
+    }
+
     /// Whitened rows of a torque signal in time.
     pub fn image(&self, column: &Column) -> Image {
         match self {

@@ -111,7 +111,7 @@ impl std::fmt::Display for Case {
     }
 }
 
-/// Number of sizes tried for an effect whose √λ is not proportional to its size.
+/// Number of sizes tried for an effect whose √λ is not proportional to its size, before the last one is taken.
 const PILOTS: usize = 3;
 /// Draws of a law beside a change, which must not be the change itself; more only if a plan has nothing else to hide.
 const ATTEMPTS: usize = 100;
@@ -275,8 +275,8 @@ impl Maker<'_> {
         Ok(Hidden { kind: family.kind, joint, judged: family.judged, strength, effect })
     }
 
-    /// The effect of `recipe` at a size whose strength is about `wanted`, and its estimated strength. The strength is
-    /// `None` if no pilot determined it for this size.
+    /// The effect of `recipe` at a size whose strength is about `wanted`, and its strength as a pilot determined it, or
+    /// as it follows from one: `None` for faults of the record, which have none.
     fn sized(
         &self,
         family: &Family,
@@ -297,7 +297,8 @@ impl Maker<'_> {
             }
             size = next;
         }
-        Ok((recipe.effect(size), None))
+        let strength = self.pilot(family.judged, recipe.effect(size))?;
+        Ok((recipe.effect(size), strength))
     }
 
     /// Strength of `effect` along the log. If the effect repeats, one period is run and the strength is multiplied by
