@@ -14,7 +14,7 @@ fn excite(folder: &Folder, words: &str) -> Said {
 fn a_small_design_writes_every_output() {
     let folder = Folder::empty();
     let words = "--robot ur5 --order 3 --starts 2 --finalists 1 --out t.json --csv t.csv \
-                 --urscript t.script --report t.html --box 0.4,-0.5,0,0.9,0.5,0.3 --velocity-share 0.5";
+                 --urscript t.script --speed 0.5 --report t.html --box 0.4,-0.5,0,0.9,0.5,0.3 --velocity-share 0.5";
     excite(&folder, words).says(0, &[]);
     let series = FourierSeries::load(folder.path("t.json").to_str().unwrap());
     let series = series.unwrap();
@@ -33,7 +33,13 @@ fn a_small_design_writes_every_output() {
     assert!(margins.len() > 24 && margins.iter().all(|m| m["free"].as_f64().unwrap() >= 0.0));
     let page = folder.read("t.html");
     assert!(page.contains("forearm and wrist 3") && page.contains("The swept arm"));
-    assert!(folder.path("t.csv").exists() && folder.path("t.script").exists());
+    // What is played has half the speed of the design, a little more between the instants at which that was checked.
+    for row in folder.read("t.csv").lines().skip(1) {
+        let row: Vec<f64> = row.split(',').map(|word| word.parse().unwrap()).collect();
+        let mut velocities = row[7..13].iter().zip(&limits);
+        assert!(velocities.all(|(qd, limit)| qd.abs() <= 0.26 * limit), "{row:?}");
+    }
+    assert!(folder.read("t.script").contains("speed = 0.5\n"));
 }
 
 /// Exit code 3, a reason, and no file: a failed design must not look like a successful one.
@@ -58,6 +64,8 @@ fn bad_input_is_named_before_the_work() {
     fails("--robot ur5 --out t.json --period nan", "NaN");
     fails("--robot ur5 --out t.json --seconds 0", "seconds");
     fails("--robot ur5 --out t.json --urscript t.script --speed 2", "speed");
+    fails("--robot ur5 --out t.json --csv t.csv --speed 0", "speed");
+    excite(&folder, "--robot ur5 --out t.json --speed 0.5").complains(2, &["--csv", "--urscript"]);
     fails("--robot ur5 --out t.json --velocity-share 0", "velocity-share");
     fails("--robot ur5 --out t.json --clearance=-1", "-1");
     fails("--robot ur5 --out t.json --prior no.json", "no.json");

@@ -43,6 +43,8 @@ fn bad_input_ends_in_a_message_that_names_it() {
     refused("identify no.csv --robot ur5", 1, &["no.csv"]);
     refused("identify log.csv --robot ur5 --validate log.csv", 1, &["training log"]);
     refused("identify log.csv --robot ur5 --period 3", 1, &["does not repeat every 3 s"]);
+    let slow = ["log.csv: a single run", "10 Hz (--cutoff)", "18.0 Hz"];
+    refused("identify log.csv --robot ur5 --rate 18 --period 0", 1, &slow);
     let unwritable = "identify log.csv --robot ur5 --json /no/such/folder/x.json";
     refused(unwritable, 1, &["/no/such/folder"]);
     refused("identify log.csv", 2, &["--robot"]);
@@ -297,7 +299,7 @@ fn what_is_chosen_of_the_processing_is_what_is_done() {
         ("--layout none", 1, "unknown layout \"none\""),
         ("--layout other.toml", 1, "no column \"angle_0\", which the layout \"mine\" needs"),
         ("--cutoff 0", 1, "--cutoff 0"),
-        ("--cutoff 50 --rate 100", 1, "a cutoff of 50 Hz cannot be had at 100 Hz"),
+        ("--cutoff 50 --rate 100", 1, "at 50 Hz (--cutoff), which has to be below half of"),
         ("--rate inf", 1, "--rate inf"),
         ("--rate 1e9", 1, "a rate of 1000000000 Hz is more than can be made"),
         ("--estimator best", 2, "'best' for '--estimator"),

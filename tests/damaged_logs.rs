@@ -166,6 +166,7 @@ fn end_of(error: &IdentifyError) -> Option<End> {
         IdentifyError::TooShort { .. }
         | IdentifyError::Covariance(CovarianceError::TooShort { .. }) => Some(TooShort),
         IdentifyError::NoMotion { .. } => Some(NoMotion),
+        IdentifyError::Cutoff { .. } => Some(TooSlow),
         IdentifyError::DeadTorque { .. } => Some(NoTorque),
         IdentifyError::Fit(FitError::NotExcited { .. }) => Some(Open),
         IdentifyError::Signal(error) => end_of_signal(error),

@@ -9,7 +9,7 @@ use std::sync::Mutex;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use clap::Args;
+use clap::{ArgGroup, Args};
 use thiserror::Error as ThisError;
 
 use clearance::{cell_box, say_what_helps, say_what_is_watched};
@@ -22,7 +22,7 @@ use crate::base::{BaseSet, Parameterisation};
 use crate::excitation::design::{
     self, Budget, Criterion, Design, DesignError, Experiment, Specification, Variables,
 };
-use crate::excitation::export::{Playback, urscript, write_csv};
+use crate::excitation::export::{Playback, Slowed, urscript, write_csv};
 use crate::excitation::{Requirements, TRAJECTORY_SCHEMA};
 use crate::output::{check_outputs, write_atomically, write_text};
 use crate::report::excitation::page;
@@ -31,6 +31,7 @@ use crate::robot::{Arm, Joint, LoadedArm};
 
 /// Design the motion that tells most about the parameters, inside all limits.
 #[derive(Debug, Args)]
+#[command(group = ArgGroup::new("played").args(["csv", "urscript"]).multiple(true))]
 pub struct ExciteArgs {
     /// Robot: ur5, ur10e, ur3e, ur5e, or a .toml, .urdf or .xml (MJCF) file (FILE.urdf#LINK: the arm
     /// up to that link).
@@ -106,8 +107,9 @@ pub struct ExciteArgs {
     /// Program for a Universal Robots controller.
     #[arg(long, value_name = "FILE.script")]
     urscript: Option<PathBuf>,
-    /// Playback speed of the URScript program as a fraction of the designed one: the line `speed = …` in it.
-    #[arg(long, value_name = "0…1", default_value_t = 1.0, requires = "urscript")]
+    /// Speed of what --csv and --urscript write, as a fraction of the designed one: the same path, played more slowly. In
+    /// the URScript it is the line `speed = …`.
+    #[arg(long, value_name = "0…1", default_value_t = 1.0, requires = "played")]
     speed: f64,
     /// Report page.
     #[arg(long, value_name = "FILE.html")]
@@ -164,6 +166,9 @@ pub fn run(args: &ExciteArgs) -> CommandResult {
     for joint in &mut arm.joints {
         joint.limits.velocity_rad_s *= args.velocity_share;
     }
+    if !(args.speed > 0.0 && args.speed <= 1.0) {
+        return Err(BadOption::new("speed", args.speed, "must be in (0, 1]").into());
+    }
     let arm = arm;
     say_what_is_watched(&args.robot, &arm, &args.boxes)?;
     let playback = playback(args, &arm)?;
@@ -189,6 +194,10 @@ pub fn run(args: &ExciteArgs) -> CommandResult {
     let found = pool.install(|| design::design(&arm, &base, &spec, &budget, &|p| rounds.report(p)));
     if let Err(fault) = &found {
         say_what_helps(&args.robot, &notices, fault);
+        let has_fixed_offsets = spec.variables.fixed_offsets_rad.iter().any(Option::is_some);
+        if matches!(fault, DesignError::Infeasible { .. }) && has_fixed_offsets {
+            eprintln!("note: an offset that --offsets fixes leaves less room than a free one");
+        }
     }
     let interrupted = budget.stop.load(Ordering::Relaxed);
     let found = match found {
@@ -223,9 +232,6 @@ pub fn run(args: &ExciteArgs) -> CommandResult {
 /// How the requested URScript plays the motion; `None` if none is requested.
 fn playback(args: &ExciteArgs, arm: &Arm) -> Result<Option<Playback>, BadOption> {
     let Some(path) = &args.urscript else { return Ok(None) };
-    if !(args.speed > 0.0 && args.speed <= 1.0) {
-        return Err(BadOption::new("speed", args.speed, "must be in (0, 1]"));
-    }
     let asked = format!("{} --rate {}", path.display(), args.rate_hz);
     let playback = Playback::new(arm.dof(), args.rate_hz, args.speed)
         .map_err(|fault| BadOption::new("urscript", &asked, fault.to_string()))?;
@@ -382,7 +388,8 @@ fn write_outputs(
     let record = Record::of(arm, spec, found);
     Document { schema: TRAJECTORY_SCHEMA, program, body: &record }.write(&args.out)?;
     if let Some(path) = &args.csv {
-        write_atomically(path, |out| write_csv(out, &found.excitation, args.rate_hz))?;
+        let motion = Slowed::new(&found.excitation, args.speed)?;
+        write_atomically(path, |out| write_csv(out, &motion, args.rate_hz))?;
     }
     if let Some((path, playback)) = args.urscript.as_ref().zip(playback) {
         write_text(path, &urscript(&found.excitation, playback))?;

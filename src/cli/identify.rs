@@ -71,8 +71,8 @@ pub struct SourceArgs {
     /// up to that link).
     #[arg(long)]
     pub robot: String,
-    /// Layout of the logs: armid (RTDE names), ur10e_innopolis, ur10e_innopolis_author, or a .toml file (all keys:
-    /// layouts/example.toml).
+    /// Layout of the logs: armid (RTDE names), ur_torque (RTDE, with actual_current_as_torque), ros2_joint_states,
+    /// ur10e_innopolis, ur10e_innopolis_author, or a .toml file (all keys: layouts/example.toml).
     #[arg(long, default_value = "armid")]
     pub layout: String,
 }
@@ -210,7 +210,8 @@ pub fn read_logs(
     layout: &Layout,
 ) -> Result<Vec<LoadedLog>, Box<dyn std::error::Error>> {
     let read = |file: &PathBuf| {
-        let log = read_log(file, layout, arm.dof())?;
+        let mut log = read_log(file, layout, arm.dof())?;
+        log.warn_of_assumed_gains(arm);
         eprintln!("{}:\n{}", file.display(), log.rows);
         let torque_nm = log.torque_nm(arm)?;
         let input = Input { path: file.clone(), sha256: log.sha256.clone() };

@@ -77,6 +77,18 @@ pub enum IdentifyError {
         /// Highest rate that can be made of it, Hz.
         most_hz: f64,
     },
+    /// The low-pass of a single run is too wide for its rate.
+    #[error(
+        "{log}: a single run is low-passed at {cutoff_hz} Hz (--cutoff), which has to be below half of its rate of {rate_hz:.1} Hz"
+    )]
+    Cutoff {
+        /// The log.
+        log: String,
+        /// Cut-off of the low-pass, Hz.
+        cutoff_hz: f64,
+        /// Rate of its samples, Hz.
+        rate_hz: f64,
+    },
     /// `--period` names a period that the motion does not have.
     #[error(
         "{log}: {}",

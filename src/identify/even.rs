@@ -8,7 +8,7 @@ use super::measurement::Measurement;
 use super::options::Options;
 use crate::robot::JointSignals;
 use crate::signal::{
-    Bracket, Decimator, MOST_PER_ROW, Resampler, Scratch, SignalError, bridged_gap_s,
+    Bracket, Decimator, Gap, MOST_PER_ROW, Resampler, Scratch, SignalError, bridged_gap_s,
     natural_rate_hz,
 };
 
@@ -174,17 +174,11 @@ impl<'a> Even<'a> {
         m: &Measurement,
         warnings: &mut Vec<String>,
     ) -> Result<(), IdentifyError> {
-        for gap in grid.gaps() {
-            warnings.push(format!(
-                "no samples for {:.2} s from {:.2} s on: only the longest stretch without such a gap \
-                 is used (cut into files, the others count as logs beside it)",
-                gap.end_s - gap.start_s,
-                gap.start_s
-            ));
-        }
         let longest = grid.longest_segment();
         let cut = |signals: JointSignals| Cow::Owned(signals.slice(longest.clone()));
-        self.start_s = grid.time_s()[longest.start];
+        let grid_s = &grid.time_s()[longest.clone()];
+        warnings.extend(gap_warning(grid.gaps(), [grid_s[0], grid_s[grid_s.len() - 1]]));
+        self.start_s = grid_s[0];
         self.q_rad = cut(grid.instants().angles(m.q_rad, m.qd_rad_s)?);
         self.qd_rad_s = cut(grid.instants().smooth(m.qd_rad_s)?);
         self.torque_nm = cut(grid.instants().straight(m.torque_nm)?);
@@ -224,6 +218,28 @@ impl<'a> Even<'a> {
         self.fine = Some(Fine { signals, decimator });
         Ok(())
     }
+}
+
+/// What the user should know of the `gaps` in a log of which only the stretch from `kept_s[0]` to `kept_s[1]` is used;
+/// `None` without a gap.
+fn gap_warning(gaps: &[Gap], kept_s: [f64; 2]) -> Option<String> {
+    let length_s = |gap: &Gap| gap.end_s - gap.start_s;
+    let longest = gaps.iter().max_by(|a, b| length_s(a).total_cmp(&length_s(b)))?;
+    let (longest_s, from_s) = (length_s(longest), longest.start_s);
+    let missing = match gaps.len() {
+        1 => format!("for {longest_s:.2} s from {from_s:.2} s on"),
+        count => {
+            let all_s: f64 = gaps.iter().map(length_s).sum();
+            format!(
+                "in {count} gaps of {all_s:.2} s together, the longest {longest_s:.2} s from {from_s:.2} s on"
+            )
+        }
+    };
+    Some(format!(
+        "no samples {missing}: only the longest stretch without such a gap, {:.2} s to {:.2} s, is used (cut into files, the \
+         others count as logs beside it)",
+        kept_s[0], kept_s[1]
+    ))
 }
 
 /// Smallest whole number that divides `rate_hz` into at most `highest_hz`, or a thousandth more.
@@ -272,6 +288,33 @@ mod tests {
             // Cubic interpolation is off by (ω/125 Hz)⁴/384 = 9e-10, and the ends of the slowest low-pass by e⁻²⁰.
             assert!(off_rad < 1e-8, "{off_rad:e} rad at {wanted_hz} Hz");
         }
+    }
+
+    /// A thousand rows at 125 Hz without those in `missing`, and the warnings about them.
+    fn warned(missing: &[Range<usize>]) -> Vec<String> {
+        let is_there = |k: &usize| !missing.iter().any(|gap| gap.contains(k));
+        let time_s: Vec<f64> = (0..1000).filter(is_there).map(|k| k as f64 / 125.0).collect();
+        let swing = JointSignals::from_fn(1, time_s.len(), |_, k| (OMEGA_RAD_S * time_s[k]).sin());
+        let [q_rad, qd_rad_s, torque_nm] = [&swing; 3];
+        let m = Measurement { source: "test", time_s: &time_s, q_rad, qd_rad_s, torque_nm };
+        let mut warnings = Vec::new();
+        Even::of(&m, &Options::default(), None, &mut Scratch::default(), &mut warnings).unwrap();
+        warnings
+    }
+
+    /// However many gaps there are, one sentence tells of them: a log may lose a hundred stretches.
+    #[test]
+    fn gaps_are_told_once() {
+        const END: &str = "is used (cut into files, the others count as logs beside it)";
+        let only = "only the longest stretch without such a gap";
+        assert_eq!(warned(&[]), [""; 0]);
+        let one = format!("no samples for 0.81 s from 3.19 s on: {only}, 4.00 s to 7.99 s, {END}");
+        assert_eq!(warned(&[400..500]), [one]);
+        // 51, 101 and 21 steps of 8 ms.
+        let three = format!(
+            "no samples in 3 gaps of 1.38 s together, the longest 0.81 s from 3.19 s on: {only}, 4.00 s to 7.19 s, {END}"
+        );
+        assert_eq!(warned(&[100..150, 400..500, 900..920]), [three]);
     }
 
     #[test]

@@ -136,7 +136,7 @@ impl GravityMatch {
                 "no body on the flange explains".to_owned()
             };
             format!(
-                "{far}, and {nearest} {:.0} % of it: this is the log of another robot, something pulls at the arm, its torques are currents or those of the motors, or the drive gains are off",
+                "{far}, and {nearest} {:.0} % of it: this is the log of another robot, something pulls at the arm, its torques are currents or those of the motors, its currents are torques already (Nm), or the drive gains are off",
                 100.0 * left
             )
         }

@@ -143,7 +143,7 @@ impl<'a> Identifier<'a> {
     fn fill_from(
         &mut self,
         m: &Measurement,
-        with_periods: bool,
+        for_diagnosis: bool,
     ) -> Result<(Prepared, usize, usize), IdentifyError> {
         if m.q_rad.joints() != self.model.dof() {
             let (found, expected) = (m.q_rad.joints(), self.model.dof());
@@ -165,8 +165,8 @@ impl<'a> Identifier<'a> {
             qd_rad_s: &filled.qd_rad_s,
             torque_nm: &filled.torque_nm,
         });
-        let mut prepared = if with_periods {
-            self.preparer.prepare_with_periods(m, &self.options)?
+        let mut prepared = if for_diagnosis {
+            self.preparer.prepare_for_diagnosis(m, &self.options)?
         } else {
             self.preparer.prepare(m, &self.options)?
         };

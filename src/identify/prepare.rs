@@ -27,19 +27,20 @@ pub struct Preparer {
     periodic: Option<PeriodicFit>,
     fit: FitScratch,
     filter: Scratch,
-    keeps_periods: bool,
+    for_diagnosis: bool,
 }
 
 impl Preparer {
-    /// As [`Self::prepare`], with the motion of every single period.
-    pub fn prepare_with_periods(
+    /// As [`Self::prepare`], with what only a diagnosis reads: the motion of every single period, and the resolution and
+    /// limits of the readings, for which whole columns of the log are sorted.
+    pub fn prepare_for_diagnosis(
         &mut self,
         m: &Measurement,
         options: &Options,
     ) -> Result<Prepared, IdentifyError> {
-        self.keeps_periods = true;
+        self.for_diagnosis = true;
         let prepared = self.prepare(m, options);
-        self.keeps_periods = false;
+        self.for_diagnosis = false;
         prepared
     }
 
@@ -175,11 +176,12 @@ impl Preparer {
         };
         let averaged = fit.fit(&record, &mut self.fit);
         let each_period = self
-            .keeps_periods
+            .for_diagnosis
             .then(|| fit.each_period(&record, even.highest, &mut self.fit))
             .transpose();
         self.periodic = Some(fit);
         let averaged = averaged?;
+        let (angle_resolution_rad, torque_limit_nm) = self.readings(m);
         let each_period = each_period?.map(|[q_rad, qd_rad_s, qdd_rad_s2]| Motion {
             q_rad,
             qd_rad_s,
@@ -200,9 +202,9 @@ impl Preparer {
                 places: rows.places[window.clone()].to_vec(),
             }),
             highest: even.highest,
-            angle_resolution_rad: angle_resolution_rad(m),
+            angle_resolution_rad,
             velocity_noise: None,
-            torque_limit_nm: torque_limit_nm(m),
+            torque_limit_nm,
             replicates: Some(replicate_noise(&torque_nm, samples_per_period)?),
             acceleration: Some(averaged.acceleration),
             torque_nm,
@@ -223,6 +225,16 @@ impl Preparer {
         })
     }
 
+    /// Resolution of the angles, rad, and limit of the torques, Nm, as read, where a diagnosis wants them.
+    fn readings(&self, m: &Measurement) -> (Vec<f64>, Vec<Option<f64>>) {
+        if !self.for_diagnosis {
+            return (Vec::new(), Vec::new());
+        }
+        let angles = (0..m.q_rad.joints()).map(|j| m.q_rad.joint(j));
+        let torques = (0..m.torque_nm.joints()).map(|j| m.torque_nm.joint(j));
+        (angles.map(resolution).collect(), torques.map(reading_limit).collect())
+    }
+
     fn single_run(
         &mut self,
         m: &Measurement,
@@ -237,6 +249,10 @@ impl Preparer {
             let (samples, needed) = (window.len(), FEWEST_SAMPLES);
             return Err(IdentifyError::TooShort { log: m.source.to_owned(), samples, needed });
         }
+        if options.cutoff_hz >= 0.5 * rate_hz {
+            let (log, cutoff_hz) = (m.source.to_owned(), options.cutoff_hz);
+            return Err(IdentifyError::Cutoff { log, cutoff_hz, rate_hz });
+        }
         let cutoff_hz = options.derivative_cutoff_hz(rate_hz);
         let smooth = ZeroPhase::new(cutoff_hz, options.order, rate_hz)?;
         let light = ZeroPhase::new(Options::VELOCITY_END * rate_hz, options.order, rate_hz)?;
@@ -249,6 +265,7 @@ impl Preparer {
             light.filter_in_place(qd_rad_s.joint_mut(j), &mut self.filter)?;
         }
         let at = |k: usize| even.start_s + k as f64 / rate_hz;
+        let (angle_resolution_rad, torque_limit_nm) = self.readings(m);
         Ok(Prepared {
             motion: Motion {
                 q_rad: even.q_rad.slice(window.clone()),
@@ -261,9 +278,9 @@ impl Preparer {
             recorded: None,
             between: None,
             highest: even.highest,
-            angle_resolution_rad: angle_resolution_rad(m),
+            angle_resolution_rad,
             velocity_noise: Some(velocity_noise(m)),
-            torque_limit_nm: torque_limit_nm(m),
+            torque_limit_nm,
             replicates: None,
             acceleration: None,
             processing: Processing {
@@ -284,18 +301,10 @@ impl Preparer {
     }
 }
 
-fn angle_resolution_rad(m: &Measurement) -> Vec<f64> {
-    (0..m.q_rad.joints()).map(|j| resolution(m.q_rad.joint(j))).collect()
-}
-
 fn velocity_noise(m: &Measurement) -> Vec<f64> {
     let step_s = median_step(m.time_s).unwrap_or(0.0);
     let density = |j| 2.0 * step_s * reading_noise(m.qd_rad_s.joint(j)).powi(2);
     (0..m.qd_rad_s.joints()).map(density).collect()
-}
-
-fn torque_limit_nm(m: &Measurement) -> Vec<Option<f64>> {
-    (0..m.torque_nm.joints()).map(|j| reading_limit(m.torque_nm.joint(j))).collect()
 }
 
 /// The samples of the experiment proper: the motion without standstill at its ends, and without a part that a pause

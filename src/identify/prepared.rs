@@ -45,8 +45,8 @@ pub struct Prepared {
     pub torque_nm: JointSignals,
     /// Scatter of the torque between periods; `None` for a single run.
     pub replicates: Option<Replicates>,
-    /// The motion of every single period, with all harmonics up to `highest`; only where it was asked for and the
-    /// motion repeats.
+    /// The motion of every single period, with all harmonics up to `highest`; only for a diagnosis and where the motion
+    /// repeats.
     pub each_period: Option<Motion>,
     /// Angles and velocities of all periods as they were recorded, rad and rad/s; `None` for a single run.
     pub recorded: Option<PeriodicRecord>,
@@ -56,12 +56,13 @@ pub struct Prepared {
     /// Highest frequency, in cycles per sample, at which the samples of a repeating motion still show the log's
     /// content; the harmonics of `each_period` end there. Not used for a single run.
     pub highest: f64,
-    /// Smallest distance between two recorded angles, per joint, rad.
+    /// Smallest distance between two recorded angles, per joint, rad; empty unless for a diagnosis.
     pub angle_resolution_rad: Vec<f64>,
     /// Power density of the velocities' noise, 2 σ²/f_s for white noise, per joint, (rad/s)²/Hz; `None` where the
     /// periods reveal the noise frequency by frequency.
     pub velocity_noise: Option<Vec<f64>>,
-    /// Largest magnitude of torque that is read, per joint, where readings are clipped there, Nm.
+    /// Largest magnitude of torque that is read, per joint, where readings are clipped there, Nm; empty unless for a
+    /// diagnosis.
     pub torque_limit_nm: Vec<Option<f64>>,
     /// How well the averaged acceleration is known, per joint; `None` for a single run.
     pub acceleration: Option<Vec<HarmonicPower>>,

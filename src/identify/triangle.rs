@@ -17,7 +17,6 @@ pub struct Triangle {
     entries: Vec<f64>,
     /// Squared length of each right-hand side outside the span of X.
     outside: Vec<f64>,
-    rows: usize,
 }
 
 impl Triangle {
@@ -28,7 +27,6 @@ impl Triangle {
             right_hand_sides,
             entries: vec![0.0; columns * (columns + right_hand_sides)],
             outside: vec![0.0; right_hand_sides],
-            rows: 0,
         }
     }
 
@@ -36,7 +34,6 @@ impl Triangle {
     pub fn clear(&mut self) {
         self.entries.fill(0.0);
         self.outside.fill(0.0);
-        self.rows = 0;
     }
 
     /// Number of columns c of X.
@@ -47,11 +44,6 @@ impl Triangle {
     /// Number of columns of Y.
     pub fn right_hand_sides(&self) -> usize {
         self.right_hand_sides
-    }
-
-    /// Rows appended so far.
-    pub fn rows(&self) -> usize {
-        self.rows
     }
 
     /// R at row `i`, column `k`.
@@ -75,7 +67,6 @@ impl Triangle {
     pub fn append(&mut self, block: &mut [f64], rows: usize) {
         assert_eq!(block.len(), rows * (self.columns + self.right_hand_sides));
         if rows > 0 {
-            self.rows += rows;
             with_widest_registers(
                 #[inline(always)]
                 || self.eliminate(block, rows),
@@ -191,7 +182,6 @@ mod tests {
                 triangle.append(&mut block, n);
                 start += n;
             }
-            assert_eq!(triangle.rows(), rows);
             // Condition number of this X is below 10; rounding grows with rows·ε.
             let tolerance = 10.0 * rows as f64 * f64::EPSILON;
             for p in 0..2 {

@@ -176,6 +176,13 @@ pub enum LogWarning {
         /// The column of that field.
         column: String,
     },
+    /// Currents became torques by drive gains that are a guess.
+    AssumedGains {
+        /// The robot.
+        robot: String,
+        /// Its gains, Nm/A.
+        gain_nm_a: Vec<f64>,
+    },
 }
 
 impl fmt::Display for LogWarning {
@@ -229,6 +236,15 @@ impl fmt::Display for LogWarning {
                 "{fields} fields of {block} hold nothing that can be used, the first in row {first_row}, {column}: \
                  the block is left out"
             ),
+            Self::AssumedGains { ref robot, ref gain_nm_a } => {
+                let gains: Vec<String> = gain_nm_a.iter().map(|gain| format!("{gain:.3}")).collect();
+                write!(
+                    f,
+                    "the drive gains of {robot} ({} Nm/A) are a guess, and masses, inertias and friction are as wrong as they are: state \
+                     those of your arm (drive_gain_nm_a in a layout), or log torques",
+                    gains.join(", ")
+                )
+            }
         }
     }
 }

@@ -64,7 +64,7 @@ pub enum LogError {
         /// The header's row.
         row: usize,
     },
-    /// The layout expects column names in the first row, which holds numbers.
+    /// The layout expects column names in the first row, which begins with a number.
     #[error(
         "{file}: row {row} begins with the number {value} where the layout \"{layout}\" expects column names; \
          for a file without header give --layout ({} or a .toml file with header = false)",
@@ -131,7 +131,8 @@ pub enum LogError {
     },
     /// The header has neither currents nor torques.
     #[error(
-        "{file}: row {row} (header) has neither \"{current}\" nor \"{torque}\"; one of them must be logged"
+        "{file}: row {row} (header) has neither \"{current}\" nor \"{torque}\"; one of them must be logged: \
+         where it has another name, a layout says so (--layout; layouts/example.toml shows how)"
     )]
     NoEffort {
         /// The file.

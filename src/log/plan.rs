@@ -198,14 +198,16 @@ struct Header<'a> {
 
 impl Header<'_> {
     fn refuse_numbers(&self) -> Result<(), LogError> {
-        let is_number = |name: &String| name.replace(',', ".").parse::<f64>().is_ok();
+        // Rows of numbers may hold names as well: those of the joints in messages of ROS.
         match self.names.first() {
-            Some(first) if self.names.iter().all(is_number) => Err(LogError::NoHeader {
-                file: self.file.to_owned(),
-                row: self.row,
-                value: first.clone(),
-                layout: self.layout.name.clone(),
-            }),
+            Some(first) if first.replace(',', ".").parse::<f64>().is_ok() => {
+                Err(LogError::NoHeader {
+                    file: self.file.to_owned(),
+                    row: self.row,
+                    value: first.clone(),
+                    layout: self.layout.name.clone(),
+                })
+            }
             _ => Ok(()),
         }
     }

@@ -1,6 +1,6 @@
 //! The log of one run.
 
-use super::account::RowAccount;
+use super::account::{LogWarning, RowAccount};
 use super::error::LogError;
 use crate::robot::{Arm, JointSignals};
 
@@ -143,6 +143,17 @@ impl Log {
     /// Joint torque per ampere that [`Log::torque_nm`] multiplies currents with, Nm/A; `None` if torques were logged.
     pub fn drive_gain_nm_a(&self, arm: &Arm) -> Option<Vec<f64>> {
         self.effort.gain_nm_a(arm)
+    }
+
+    /// Warns if [`Log::torque_nm`] multiplies currents with gains of the `arm` that are a guess.
+    pub fn warn_of_assumed_gains(&mut self, arm: &Arm) {
+        if arm.drive_gains_assumed
+            && let Effort::Current { gain_nm_a: None, .. } = self.effort
+            && let Some(gain_nm_a) = self.drive_gain_nm_a(arm)
+        {
+            let robot = arm.name.clone();
+            self.rows.warnings.push(LogWarning::AssumedGains { robot, gain_nm_a });
+        }
     }
 
     /// The manufacturer's feed-forward as torque at the joints, Nm; `None` if it was not logged.

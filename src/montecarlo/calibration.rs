@@ -206,10 +206,11 @@ impl Check {
             let outside = interval[0] > claim[1] || interval[1] < claim[0];
             let verdict = if outside {
                 Verdict::Fail
-            } else if interval[1] - interval[0] > claim[1] - claim[0] {
-                Verdict::NotEvaluated
-            } else {
+            } else if interval[1] - interval[0] <= claim[1] - claim[0] {
                 Verdict::Pass
+            } else {
+                // Too wide, or not a number: 0/0 where trials neither scatter nor claim to.
+                Verdict::NotEvaluated
             };
             let severity = |check: &Self| {
                 let rank = match check.verdict {
@@ -380,6 +381,20 @@ mod tests {
         let of = |claim| check_of(&tally, Statistic::MeanCoverage, claim).verdict;
         assert_eq!(of(claims::MEAN_COVERAGE), Verdict::Fail);
         assert_eq!(of(claims::MEAN_COVERAGE_OF_A_SINGLE_RUN), Verdict::Pass);
+    }
+
+    /// Trials without any scatter that claim none have no ratio of the two. They do not pass as if they had, neither
+    /// alone nor beside a parameter that passes.
+    #[test]
+    fn a_ratio_that_is_no_number_does_not_pass() {
+        let of = |ratios: &[f64]| {
+            let each = ratios.iter().map(|r| (None, *r, [*r - 0.01, *r + 0.01]));
+            Check::new(Statistic::EachRatio, claims::EACH_RATIO, each).verdict
+        };
+        assert_eq!(of(&[1.0]), Verdict::Pass);
+        assert_eq!(of(&[f64::NAN]), Verdict::NotEvaluated);
+        assert_eq!(of(&[1.0, f64::NAN, 1.1]), Verdict::NotEvaluated);
+        assert_eq!(of(&[f64::NAN, 2.0]), Verdict::Fail);
     }
 
     /// A claim does not pass if no trial provides evidence about it.

@@ -141,7 +141,10 @@ pub enum ScenarioError {
         requirement: &'static str,
     },
     /// The motion of the log does not repeat, so it cannot become the motion of a scenario.
-    #[error("{log}: its motion does not repeat, and that of a scenario does")]
+    #[error(
+        "{log}: its motion does not repeat, and that of a scenario does: --extended-scenario needs a log that repeats (--replay works \
+         for a single run as well)"
+    )]
     OnePeriod {
         /// The log.
         log: String,
@@ -282,7 +285,17 @@ impl MotionEntry {
         let requirement = "must make at most 86400 s of data";
         source.check(data_s <= LONGEST_S, "motion.periods", self.periods as f64, requirement)?;
         Ok(match self.run_in_s {
-            Some(run_in_s) => Excitation::new(series, run_in_s, self.periods)?,
+            Some(run_in_s) => {
+                let excitation = Excitation::new(series, run_in_s, self.periods)?;
+                let requirement = "and the periods must together make at most 86400 s";
+                source.check(
+                    data_s + run_in_s <= LONGEST_S,
+                    "motion.run_in_s",
+                    run_in_s,
+                    requirement,
+                )?;
+                excitation
+            }
             None => {
                 let requirements = Requirements::default();
                 Excitation::fitted_without_limits(arm, &requirements, series, self.periods)?
@@ -350,5 +363,30 @@ impl Source {
         } else {
             Err(ScenarioError::Setting { file: file(), key, value, requirement })
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The periods of the default scenario take less than the longest time that a log may take, and a run-in of 1e8 s
+    /// would not fit into memory.
+    #[test]
+    fn a_run_in_counts_with_the_periods() {
+        let with_run_in = |run_in_s: &str| {
+            let text = DEFAULT.replace("[motion]", &format!("[motion]\nrun_in_s = {run_in_s}"));
+            Scenario::from_toml(&text, "long.toml", Path::new(""))
+        };
+        let loaded = with_run_in("2.0").unwrap();
+        let whole_s = loaded.excitation.periods() as f64 * loaded.excitation.series().period_s;
+        for too_long_s in [LONGEST_S - whole_s + 1.0, 1e8] {
+            let message = with_run_in(&format!("{too_long_s:?}")).unwrap_err().to_string();
+            let expected = format!(
+                "long.toml: motion.run_in_s = {too_long_s} and the periods must together make at most 86400 s"
+            );
+            assert_eq!(message, expected);
+        }
+        with_run_in(&format!("{:?}", LONGEST_S - whole_s)).unwrap();
     }
 }

@@ -259,6 +259,7 @@ impl<C: Content> Shard<C> {
         // Threads take trials in ascending order and finish every trial they have taken, so that the trials that have
         // been run leave no gap.
         let next = &AtomicU64::new(self.next);
+        let nothing = &experiment.content().nothing();
         let (sender, outcomes) = channel();
         pool.in_place_scope(|scope| {
             for mut worker in workers {
@@ -269,7 +270,7 @@ impl<C: Content> Shard<C> {
                         if trial >= end {
                             break;
                         }
-                        let mut outcome = experiment.content().nothing();
+                        let mut outcome = nothing.clone();
                         run_one::<T>(&mut worker, trial, &mut outcome);
                         if sender.send((trial, outcome)).is_err() {
                             break;

@@ -20,6 +20,8 @@ pub struct Arm {
     /// Whether identification fits a constant torque per joint, for the offset of the current sensor and for friction
     /// that differs between the two directions: yes for real arms, no for the simulated null model.
     pub torque_offsets: bool,
+    /// Whether the drive gains (Nm/A) are a guess, about which users of logs in ampere are warned.
+    pub drive_gains_assumed: bool,
     /// Joints from base to flange.
     pub joints: Vec<Joint>,
     /// What the arm must not touch: itself, the floor, boxes in the cell.

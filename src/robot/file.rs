@@ -66,6 +66,8 @@ struct RobotFile {
     friction_epsilon_rad_s: f64,
     #[serde(default = "fits_offsets")]
     torque_offsets: bool,
+    #[serde(default)]
+    drive_gains_assumed: bool,
     floor_z_m: Option<f64>,
     #[serde(default)]
     collision_pairs: Vec<[String; 2]>,
@@ -151,6 +153,7 @@ impl RobotFile {
             gravity_m_s2: Vector3::from(self.gravity_m_s2),
             friction_epsilon_rad_s: self.friction_epsilon_rad_s,
             torque_offsets: self.torque_offsets,
+            drive_gains_assumed: self.drive_gains_assumed,
             joints,
             clearance,
         })

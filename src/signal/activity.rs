@@ -14,6 +14,9 @@ const QUIET_SHARE: f64 = 0.1;
 /// Fraction of the fastest joint's rms speed below which nothing counts as motion: brakes, settling and sensor flicker
 /// at rest are not noise of a fixed size.
 const CREEP_SHARE: f64 = 0.005;
+/// Steps of the recorded numbers up to which a reading at rest may flicker: more than one step, less than two. Printed
+/// decimals make steps unequal, and the smallest of them, which is known, a little smaller than the others.
+const FLICKER_STEPS: f64 = 1.5;
 /// A rest is at least this long, s: shorter ones are reversals.
 const SHORTEST_REST_S: f64 = 0.5;
 /// Consecutive samples above the threshold that make a motion; fewer are outliers.
@@ -25,8 +28,8 @@ pub struct Activity {
     /// Velocity noise per joint in the quietest tenth of the log, rad/s.
     pub noise_rad_s: Vec<f64>,
     /// Velocity above which a joint counts as moving, rad/s: σ√(2 ln N), which the largest of N noise values hardly
-    /// exceeds, plus the resolution of the recorded numbers; but at least half a percent of the fastest joint's rms
-    /// speed.
+    /// exceeds, plus one and a half times the resolution of the recorded numbers; but at least half a percent of the
+    /// fastest joint's rms speed.
     pub threshold_rad_s: Vec<f64>,
     /// Stretches of samples in which no joint moves for half a second or longer.
     pub rests: Vec<Range<usize>>,
@@ -58,7 +61,8 @@ impl Activity {
                 return Err(SignalError::NotFinite { what: "velocity", joint: j, sample, value });
             }
             let noise = quantile(&block_noise(series, block.max(16)), QUIET_SHARE);
-            let threshold = (peak * noise + resolution(series)).max(creep_rad_s);
+            let flicker_rad_s = FLICKER_STEPS * resolution(series);
+            let threshold = (peak * noise + flicker_rad_s).max(creep_rad_s);
             for (moves, v) in moves.iter_mut().zip(series) {
                 *moves |= v.abs() > threshold;
             }
@@ -136,6 +140,27 @@ mod tests {
             assert_eq!(activity.moving_window(10).unwrap().start, window.start - 10);
             assert_eq!(activity.moving_window(9999).unwrap(), 0..1500);
         }
+    }
+
+    /// A standing encoder that flickers by one step, for as many rows as make a motion, and by two steps in single rows.
+    /// Six decimals make steps of 0.958 and 0.959 mrad/s of a step of 0.95874 mrad/s.
+    #[test]
+    fn a_printed_step_is_no_motion_and_two_are() {
+        const STEP_RAD_S: f64 = 0.00095874;
+        let printed = |steps: i32| (1e6 * f64::from(steps) * STEP_RAD_S).round() / 1e6;
+        let flicker = |k: usize| match k % 100 {
+            20..23 => 1,
+            60..63 => -1,
+            80 => 2,
+            _ => 0,
+        };
+        let still = JointSignals::from_fn(2, 1500, |_, k| printed(flicker(k)));
+        let activity = Activity::of(&still, 125.0).unwrap();
+        assert_eq!(activity.moving_window(0), None, "{:?}", activity.threshold_rad_s);
+        let slow = JointSignals::from_fn(2, 1500, |_, k| {
+            printed(if (700..703).contains(&k) { 2 } else { flicker(k) })
+        });
+        assert_eq!(Activity::of(&slow, 125.0).unwrap().moving_window(0), Some(700..703));
     }
 
     #[test]

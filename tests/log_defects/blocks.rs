@@ -1,6 +1,7 @@
 //! Optional quantities of a log.
 
 use super::*;
+use armid::robot::Arm;
 
 /// Column of the first desired moment in [`with_optional_blocks`]; the temperatures follow the moments.
 const MOMENT: usize = 19;
@@ -74,8 +75,7 @@ fn a_layout_that_inherits_the_velocities_can_do_without_them() {
 /// Rows of `ros2 topic echo --csv /joint_states`: stamp in two columns, frame, names, and the joints' values.
 #[test]
 fn joint_states_of_ros_are_read() {
-    let layout =
-        Layout::from_toml(include_str!("../../layouts/ros2_joint_states.toml"), "ros").unwrap();
+    let layout = Layout::load("ros2_joint_states").unwrap();
     let names = "shoulder_pan,shoulder_lift,elbow,wrist_1,wrist_2,wrist_3";
     let rows = valid();
     let lines = rows[1..].iter().enumerate().map(|(k, row)| {
@@ -84,6 +84,9 @@ fn joint_states_of_ros_are_read() {
         format!("{},{},base,{names},{}\n", stamp.0, stamp.1, row[1..].join(","))
     });
     let text: String = lines.collect();
+    // The default layout takes no row for a header, although it holds names, and says which layouts have none.
+    let result = read_log_from(text.as_bytes(), "echo.csv", &Layout::default(), JOINTS);
+    assert_says(result, &["begins with the number 100", "ros2_joint_states"]);
     let log = read_log_from(text.as_bytes(), "echo.csv", &layout, JOINTS).unwrap();
     assert_eq!(log.samples(), SAMPLES);
     for k in [0, 130, SAMPLES - 1] {
@@ -93,6 +96,44 @@ fn joint_states_of_ros_are_read() {
         assert!((log.qd_rad_s.joint(5)[k] - velocity_rad_s(5, t)).abs() < 1e-12);
         assert!((log.time_s[k] - log.time_s[0] - STEP_S * k as f64).abs() < 1e-9);
     }
+}
+
+/// Torques that the controller makes of the currents are read as they are; a log without them is not read in ampere.
+#[test]
+fn torques_of_the_controller_need_no_gain() {
+    let layout = Layout::load("ur_torque").unwrap();
+    let currents = text(&valid(), ",", "\n");
+    let result = read_log_from(currents.as_bytes(), "run.csv", &layout, JOINTS);
+    assert_says(result, &["no column \"actual_current_as_torque_0\"", "\"ur_torque\""]);
+    let torques = currents.replace("actual_current", "actual_current_as_torque");
+    let log = read_log_from(torques.as_bytes(), "run.csv", &layout, JOINTS).unwrap();
+    let in_ampere =
+        read_log_from(currents.as_bytes(), "run.csv", &Layout::default(), JOINTS).unwrap();
+    let arm = Arm::built_in("ur5e").unwrap();
+    assert_eq!(log.drive_gain_nm_a(&arm), None);
+    assert_eq!(log.torque_nm(&arm).unwrap(), *in_ampere.effort.signals());
+}
+
+/// Only logs in ampere depend on gains, and only those of arms whose gains are a guess get a warning.
+#[test]
+fn guessed_gains_are_told() {
+    let currents = text(&valid(), ",", "\n");
+    let torques = currents.replace("actual_current", "actual_torque");
+    let own =
+        "name = \"mine\"\nlike = \"armid\"\ndrive_gain_nm_a = [9.0, 9.0, 9.0, 9.0, 9.0, 9.0]\n";
+    let own = Layout::from_toml(own, "mine.toml").unwrap();
+    let remarks = |robot: &str, text: &str, layout: &Layout| -> Vec<String> {
+        let arm = Arm::built_in(robot).unwrap();
+        let mut log = read_log_from(text.as_bytes(), "run.csv", layout, JOINTS).unwrap();
+        let before = log.rows.warnings.len();
+        log.warn_of_assumed_gains(&arm);
+        log.rows.warnings[before..].iter().map(ToString::to_string).collect()
+    };
+    let guessed = remarks("ur5e", &currents, &Layout::default());
+    assert!(guessed[0].contains("ur5e (12.625, ") && guessed.len() == 1, "{guessed:?}");
+    assert!(remarks("ur5e", &torques, &Layout::default()).is_empty());
+    assert!(remarks("ur5e", &currents, &own).is_empty());
+    assert!(remarks("ur10e", &currents, &Layout::default()).is_empty());
 }
 
 /// A layout without torque columns does not ask for them.

@@ -65,8 +65,8 @@ pub enum DesignError {
     },
     /// None of the starts became a motion inside the limits.
     #[error(
-        "no motion inside the limits was found from {starts} starts: ask for less clearance ({clearance_m} m), \
-         free the offsets, or look at the limits of \"{arm}\""
+        "no motion inside the limits was found from {starts} starts: ask for less --clearance ({clearance_m} m) or a longer \
+         --period, allow more of the limits (--velocity-share, --torque-share), or look at the limits of \"{arm}\""
     )]
     Infeasible {
         /// How many were tried.

@@ -31,7 +31,8 @@ pub struct BlockCluster;
 pub const BLOCK_S: f64 = 5.0;
 /// Shortest block, s, to which blocks may shrink in short records.
 const SHORTEST_BLOCK_S: f64 = 1.0;
-/// Fewest blocks: with fewer the variance would be left to chance.
+/// Fewest blocks of which a covariance is made: the variance of fewer would be left to chance, and drawing from fewer
+/// would repeat the same record over and over.
 pub const LEAST_BLOCKS: usize = 6;
 
 impl CovarianceMethod for BlockCluster {

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
 
-use super::{Covariance, CovarianceError, CovarianceKind, CovarianceMethod};
+use super::{Covariance, CovarianceError, CovarianceKind, CovarianceMethod, LEAST_BLOCKS};
 use crate::identify::fit::Fit;
 use crate::identify::problem::{Domain, Problem};
 use crate::random::{Channel, TrialStreams};
@@ -17,8 +17,6 @@ pub struct BlockBootstrap;
 
 const REPLICATES: usize = 200;
 const BLOCK_S: f64 = 2.0;
-/// Fewest blocks: fewer different blocks would resample the same record over and over.
-const LEAST_BLOCKS: usize = 6;
 
 impl CovarianceMethod for BlockBootstrap {
     fn covariance(&self, problem: &Problem, fit: &Fit) -> Result<Covariance, CovarianceError> {

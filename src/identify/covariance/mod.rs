@@ -85,7 +85,10 @@ pub fn precision(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(inverse.map_with_location(|i, k, value| scale[i] * scale[k] * value))
 }
 
-/// 97.5 % quantile of Student's t; 1.96 for infinitely many degrees of freedom.
+/// 97.5 % quantile of the normal distribution: 95 % of its values lie within this many σ of its mean.
+pub const Z_95: f64 = 1.959_963_984_540_054;
+
+/// 97.5 % quantile of Student's t; [`Z_95`] for infinitely many degrees of freedom.
 pub fn quantile_95(degrees_of_freedom: f64) -> f64 {
     student_quantile(0.975, degrees_of_freedom)
 }

@@ -67,7 +67,9 @@ pub fn prewhiten(problem: &Problem, fit: &Fit, out: &mut Problem) {
 
 fn filter_round(y: &[f64], a: &[f64], lost: usize, out: &mut Vec<f64>) {
     let n = y.len();
-    let past = |t: usize, i: usize| y[if t > i { t - i - 1 } else { t + n - i - 1 }];
+    // The memory may be longer than a period.
+    let past =
+        |t: usize, i: usize| y[if t > i { t - i - 1 } else { (t + a.len() * n - i - 1) % n }];
     out.extend((lost..n).map(|t| {
         let predicted: f64 = a.iter().enumerate().map(|(i, a)| a * past(t, i)).sum();
         y[t] - predicted
@@ -97,6 +99,22 @@ mod tests {
         let variance = white.iter().map(|v| v * v).sum::<f64>() / white.len() as f64;
         let lagged = white.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / white.len() as f64;
         assert!((variance - 1.0).abs() < 0.05 && lagged.abs() < 0.035, "{variance} {lagged}");
+    }
+
+    /// The filter by its definition, on so many repetitions of the period that nothing has to be wrapped. The sums are
+    /// the same, term by term.
+    #[test]
+    fn a_memory_longer_than_the_period_goes_round_it() {
+        let period: Vec<f64> = (0..20).map(|t| (0.7 * (t * t) as f64).sin()).collect();
+        let a: Vec<f64> = (0..25).map(|i| 0.3 * (1.3 * i as f64).cos()).collect();
+        let mut round = Vec::new();
+        filter_round(&period, &a, 0, &mut round);
+        let long = period.repeat(3);
+        let plain = |t: usize| {
+            let predicted: f64 = a.iter().zip(1..).map(|(a, back)| a * long[t - back]).sum();
+            long[t] - predicted
+        };
+        assert_eq!(round, (40..60).map(plain).collect::<Vec<f64>>());
     }
 
     #[test]

@@ -15,37 +15,34 @@ pub fn decimate(
 ) -> Result<(), SignalError> {
     let n = problem.samples;
     let periods = problem.periods;
+    let repeats = periods > 1;
     let filter = ZeroPhase::new(cutoff_hz, order, problem.rate_hz)?;
-    let edge = filter.edge_samples();
+    let edge = filter.edge_samples().min(n / 8);
     let mut every = ((problem.rate_hz / (2.0 * cutoff_hz)) as usize).max(1);
-    while periods > 1 && !n.is_multiple_of(every) {
+    while repeats && !n.is_multiple_of(every) {
         every -= 1;
     }
-    // A single run loses its ends; a repeating motion is continued periodically.
-    let (before, kept) = if periods > 1 {
-        // One edge leaves 1 % of a transient, three leave 1e-6; inside the log there is none.
-        ((3 * edge).min(n), 0..n * periods)
-    } else {
-        (0, edge.min(n / 8)..n - edge.min(n / 8))
-    };
     let mut filtered = Vec::new();
-    let mut thin = |series: &[f64], out: &mut Vec<f64>, kept: std::ops::Range<usize>| {
-        filtered.clear();
-        filtered.extend_from_slice(&series[series.len() - before..]);
-        filtered.extend_from_slice(series);
-        filtered.extend_from_slice(&series[..before]);
-        filter.filter_in_place(&mut filtered, scratch)?;
-        out.extend(filtered[before..][kept].iter().step_by(every));
+    let mut thin = |series: &[f64], out: &mut Vec<f64>| {
+        // A single run loses its ends; a repeating motion is continued periodically.
+        let kept = if repeats {
+            filter.filter_periodic(series, &mut filtered, scratch)?
+        } else {
+            filtered.clear();
+            filtered.extend_from_slice(series);
+            filter.filter_in_place(&mut filtered, scratch)?;
+            edge..n - edge
+        };
+        out.extend(filtered[kept].iter().step_by(every));
         Ok::<(), SignalError>(())
     };
     for (source, target) in problem.panels.iter().zip(&mut out.panels) {
         target.x.clear();
         target.y.clear();
-        let one = if periods > 1 { 0..n } else { kept.clone() };
         for column in source.x.chunks_exact(n) {
-            thin(column, &mut target.x, one.clone())?;
+            thin(column, &mut target.x)?;
         }
-        thin(&source.y, &mut target.y, kept.clone())?;
+        thin(&source.y, &mut target.y)?;
         out.samples = target.y.len() / periods;
     }
     out.periods = periods;

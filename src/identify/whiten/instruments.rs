@@ -32,22 +32,22 @@ pub fn smoothed(
 ) -> Result<Motion, SignalError> {
     let filter = ZeroPhase::new(cutoff_hz, order, rate_hz)?;
     let n = motion.samples();
-    // After one edge the influence of the guess about the values beyond the ends has faded to 1 %; three edges leave
-    // 1e-6.
-    let around = if repeats { (3 * filter.edge_samples()).min(n) } else { 0 };
-    let mut longer = Vec::with_capacity(n + 2 * around);
+    let mut longer = Vec::new();
     let mut slope = Vec::new();
     let mut low_pass = |series: &[f64], out: &mut [f64], derivative: Option<&mut [f64]>| {
-        longer.clear();
-        longer.extend_from_slice(&series[n - around..]);
-        longer.extend_from_slice(series);
-        longer.extend_from_slice(&series[..around]);
-        filter.filter_in_place(&mut longer, scratch)?;
-        out.copy_from_slice(&longer[around..around + n]);
+        let inside = if repeats {
+            filter.filter_periodic(series, &mut longer, scratch)?
+        } else {
+            longer.clear();
+            longer.extend_from_slice(series);
+            filter.filter_in_place(&mut longer, scratch)?;
+            0..n
+        };
+        out.copy_from_slice(&longer[inside.clone()]);
         if let Some(derivative) = derivative {
             slope.resize(longer.len(), 0.0);
             central_4(&longer, rate_hz, &mut slope)?;
-            derivative.copy_from_slice(&slope[around..around + n]);
+            derivative.copy_from_slice(&slope[inside]);
         }
         Ok::<(), SignalError>(())
     };

@@ -5,13 +5,13 @@ use nalgebra::DMatrix;
 use super::cross_joint::mix;
 use super::spectrum::Spectrum;
 use crate::identify::problem::Problem;
-use crate::signal::{HarmonicPower, subtract_mean_period};
+use crate::signal::{HarmonicPower, pooled, subtract_mean_period};
 
 /// Whitening by the scatter between periods.
 ///
 /// With the Fourier coefficients Y_pk of period p and their mean Ȳ_k, the noise of joint j at harmonic k has the
-/// variance s²_jk = Σ_p |Y_jpk − Ȳ_jk|²/(P − 1), averaged over the neighbouring harmonics (k ± max(3, k/4), without k
-/// itself). The joints have the correlation C of the deviations over s, pooled over all harmonics. Rows become U
+/// variance s²_jk = Σ_p |Y_jpk − Ȳ_jk|²/(P − 1), averaged over the neighbouring harmonics ([`pooled`]: k ± max(3, k/4),
+/// without k itself). The joints have the correlation C of the deviations over s, pooled over all harmonics. Rows become U
 /// diag(1/s_k) · row with U C Uᵀ = 1.
 ///
 /// Rows end at 0.08 of the sampling rate. Near a reversal of friction the acceleration is a pulse shorter than a
@@ -45,10 +45,6 @@ const HARMLESS_NOISE: f64 = 5e-6;
 const USED_HARMONICS: f64 = 0.8;
 /// Harmonics that are always used, so that a motion of few harmonics still gives equations for all parameters.
 const LEAST_HARMONICS: usize = 16;
-/// Neighbours on either side that a weight is averaged over: at least these …
-const LEAST_NEIGHBOURS: usize = 3;
-/// … and this part of the harmonic's own number.
-const NEIGHBOUR_SHARE: usize = 4;
 /// Rows almost without noise are weighted as if they had this share of the noisiest row's noise.
 const LEAST_NOISE: f64 = 1e-9;
 
@@ -138,7 +134,7 @@ fn smooth(variances: &mut [f64]) {
         sums.push(sum);
     }
     for h in 0..=last {
-        let reach = (h / NEIGHBOUR_SHARE).max(LEAST_NEIGHBOURS);
+        let reach = pooled(h);
         let window = first_row(h.saturating_sub(reach))..2 * (h + reach).min(last) + 1;
         let own = first_row(h)..2 * h + 1;
         let others = (window.len() - own.len()).max(1) as f64;

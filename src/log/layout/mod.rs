@@ -24,8 +24,10 @@ pub use joints::Joints;
 pub(super) use units::{Angle, AngularVelocity, TimeUnit, Units};
 
 /// Built-in layouts, by the name given to `--layout`.
-const BUILT_IN: [(&str, &str); 3] = [
+const BUILT_IN: [(&str, &str); 5] = [
     ("armid", include_str!("../../../layouts/armid.toml")),
+    ("ur_torque", include_str!("../../../layouts/ur_torque.toml")),
+    ("ros2_joint_states", include_str!("../../../layouts/ros2_joint_states.toml")),
     ("ur10e_innopolis", include_str!("../../../layouts/ur10e_innopolis.toml")),
     ("ur10e_innopolis_author", include_str!("../../../layouts/ur10e_innopolis_author.toml")),
 ];
@@ -307,7 +309,9 @@ mod tests {
         };
         let message = message.to_string();
         assert!(
-            message.contains("--layout (ur10e_innopolis, ur10e_innopolis_author or"),
+            message.contains(
+                "--layout (ros2_joint_states, ur10e_innopolis, ur10e_innopolis_author or"
+            ),
             "{message}"
         );
     }

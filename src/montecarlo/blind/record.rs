@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::case::Case;
 use crate::diagnose::{BaseParameter, Cause, Diagnosis, HeldOut, Kind, Unexplained};
+use crate::identify::covariance::Z_95;
 use crate::montecarlo::share::Share;
 use crate::montecarlo::trials::{Failure, Gathered};
 
@@ -140,9 +141,6 @@ pub struct Answer {
     /// Share of the base parameters of the extended model whose 95 % interval holds the true value.
     pub base: Share,
 }
-
-/// 95 % of a normal distribution lie within this many σ of its mean.
-const Z_95: f64 = 1.959_963_984_540_054;
 
 /// Share of the base parameters whose 95 % interval holds the true value.
 fn covered(estimates: &[BaseParameter], truth: &[f64]) -> Share {

@@ -8,6 +8,7 @@ use super::family::Judged;
 use super::judge::{Outcome, is_at};
 use super::record::Record;
 use super::score::causes;
+use crate::identify::covariance::Z_95;
 use crate::montecarlo::calibration::Verdict;
 use crate::montecarlo::shard::Merged;
 use crate::montecarlo::share::Share;
@@ -55,7 +56,7 @@ impl Target {
         let off = |case: &Share| case.count as f64 - case.of as f64 * all.value();
         let square: f64 = cases.iter().map(|case| off(case).powi(2)).sum();
         let count = cases.len() as f64;
-        let half = 1.96 * (square * count / (count - 1.0)).sqrt() / all.of as f64;
+        let half = Z_95 * (square * count / (count - 1.0)).sqrt() / all.of as f64;
         let [low, high] = all.bounds(0.025);
         // For a single case `half` is NaN, which `min` and `max` ignore.
         let interval = [low.min(all.value() - half), high.max(all.value() + half)];
@@ -234,7 +235,7 @@ mod tests {
     fn what_goes_together_counts_once() {
         let cases = (0..100).map(|i| Share { count: 50 * (i % 2), of: 50 });
         let [low, high] = Target::of_cases("", cases, [0.0, 1.0]).interval;
-        let half = 1.96 * (0.25_f64 / 99.0).sqrt();
+        let half = Z_95 * (0.25_f64 / 99.0).sqrt();
         assert!((low - 0.5 + half).abs() < 1e-12 && (high - 0.5 - half).abs() < 1e-12);
     }
 

@@ -195,6 +195,26 @@ pub(super) fn central_difference(frequency_hz: f64, rate_hz: f64) -> f64 {
     rate_hz * (8.0 * x.sin() - (2.0 * x).sin()) / 6.0
 }
 
+/// Number of ends of the low-pass that a period must be long. Identification cuts off an end at either side of a single
+/// run, but no more than an eighth of its samples: the record with both ends must be eight of them long, and its periods
+/// six.
+const ENDS_PER_PERIOD: f64 = 6.0 / RECORD_PERIODS as f64;
+
+/// Refuses a scenario whose period is too short for [`around`] at the lowest cut-off.
+fn check_period(scenario: &Scenario) -> Result<(), StudyError> {
+    let cutoff_hz = CUTOFFS_HZ.into_iter().fold(f64::INFINITY, f64::min);
+    let Options { order, .. } = parallel_options(cutoff_hz);
+    let rate_hz = scenario.plant.log_rate_hz;
+    let filter = ZeroPhase::new(cutoff_hz, order, rate_hz)?;
+    let needed_s = ENDS_PER_PERIOD * filter.edge_samples() as f64 / rate_hz;
+    let period_s = scenario.excitation.series().period_s;
+    if period_s < needed_s {
+        let scenario = scenario.name.clone();
+        return Err(StudyError::ShortPeriod { scenario, period_s, needed_s, cutoff_hz });
+    }
+    Ok(())
+}
+
 /// The part of `log` that yields equations for exactly the samples of the record, given that a processing loses `edge`
 /// samples at either end.
 fn around(bench: &Bench, log: &Measured, edge: usize) -> [JointSignals; 3] {
@@ -265,6 +285,7 @@ pub fn cutoff_study(
 ) -> Result<CutoffStudy, StudyError> {
     let done = std::sync::atomic::AtomicU64::new(0);
     let count = || progress(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1);
+    check_period(scenario)?;
     let run = Bench::new(scenario.clone())?;
     let motion = run.exact_motion()?;
     let mut curves = Vec::new();
@@ -376,6 +397,8 @@ fn point(
     let equations = |f: f64| both.as_ref().map_or(1.0, |(_, both)| both.response(f));
     let velocity = |f: f64| both.as_ref().map_or(1.0, |(velocity, _)| velocity.response(f));
     let white = |_: f64| 1.0;
+    let (noisy, exact) =
+        (vec![velocity_sd_rad_s; torque_sd_nm.len()], vec![0.0; torque_sd_nm.len()]);
     let noise = |velocity_sd_rad_s| LogNoise {
         velocity_sd_rad_s,
         torque_sd_nm: &torque_sd_nm,
@@ -390,10 +413,10 @@ fn point(
         weights,
     };
     let periods = RECORD_PERIODS as f64;
-    let whole = formulas.outcome(&treatment, &noise(velocity_sd_rad_s), periods);
-    let filter = formulas.outcome(&treatment, &noise(0.0), periods);
-    let unfiltered =
-        formulas.outcome(&Treatment { differentiator: &ideal, ..treatment }, &noise(0.0), periods);
+    let whole = formulas.outcome(&treatment, &noise(&noisy), periods);
+    let filter = formulas.outcome(&treatment, &noise(&exact), periods);
+    let plain = Treatment { differentiator: &ideal, ..treatment };
+    let unfiltered = formulas.outcome(&plain, &noise(&exact), periods);
     let scatter = rms_in(unit, |k| whole.variance[k].sqrt());
     // The bias that the sampled motion leaves even without a filter belongs to neither branch.
     let filter_bias = rms_in(unit, |k| filter.bias[k] - unfiltered.bias[k]);
@@ -410,66 +433,4 @@ fn point(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use std::path::Path;
-
-    /// Both ends of the U-shaped curve, parameter by parameter: the mean error of the paper's processing at 2 Hz
-    /// (filter branch) and at 30 Hz with 1e-2 rad/s (noise branch) is compared with the formula.
-    ///
-    /// With T trials the mean is known to √(V/T), with V by formula. The deviation from the formula, as a root mean
-    /// square over the parameters in these units, must stay below 3 plus 5 % of the bias. Even if all parameters were
-    /// perfectly correlated, chance alone would exceed 3 for less than 0.3 % of seeds (the seed is fixed). The 5 %
-    /// allow for the formula being of first order in the covariance of the regressor's noise, which fluctuates by
-    /// 1/√(samples of a correlation time) ≈ 3 %.
-    #[test]
-    fn both_branches_are_those_of_the_formula() {
-        const TRIALS: u64 = 10;
-        let text = include_str!("../../../sims/cutoff.toml");
-        let scenario = Scenario::from_toml(text, "sims/cutoff.toml", Path::new("sims")).unwrap();
-        let run = Bench::new(scenario.clone()).unwrap();
-        let motion = run.exact_motion().unwrap();
-        for (cutoff_hz, velocity_sd_rad_s, least_bias) in [(2.0, 1e-3, 5.0), (30.0, 1e-2, 5.0)] {
-            let qd_sd_rad_s = PerJoint::All(velocity_sd_rad_s);
-            let sensors = SensorConfig { qd_sd_rad_s, ..scenario.sensors.clone() };
-            let bench = run.read_by(sensors).unwrap();
-            let formulas = bench.formulas(&motion);
-            let torque_sd_nm = bench.torque_sd_nm().unwrap();
-            let filter = ZeroPhase::with_single_pass_cutoff(cutoff_hz, 1, bench.rate_hz()).unwrap();
-            let differentiator =
-                |f: f64| central_difference(f, bench.rate_hz()) * filter.response(f);
-            let one = |_: f64| 1.0;
-            let treatment = Treatment {
-                differentiator: &differentiator,
-                velocity: &one,
-                regressor: &one,
-                torque: &one,
-                weights: &[1.0; 6],
-            };
-            let noise = LogNoise {
-                velocity_sd_rad_s,
-                torque_sd_nm: &torque_sd_nm,
-                torque_power: &one,
-                torque_correlation: 0.0,
-            };
-            let predicted = formulas.outcome(&treatment, &noise, RECORD_PERIODS as f64);
-            let equations = PaperEquations { cutoff_hz, ..PaperEquations::PAPER };
-            let thetas: Vec<Vec<f64>> = (0..TRIALS)
-                .map(|trial| {
-                    let log = bench.simulation.log(trial).unwrap();
-                    bench.paper_estimate(&equations, &log).unwrap().theta
-                })
-                .collect();
-            let error = |k: usize| {
-                let mean = thetas.iter().map(|theta| theta[k]).sum::<f64>() / TRIALS as f64;
-                mean - bench.theta[k]
-            };
-            let chance: Vec<f64> =
-                predicted.variance.iter().map(|v| (v / TRIALS as f64).sqrt()).collect();
-            let bias = rms_in(&chance, |k| predicted.bias[k]);
-            let off = rms_in(&chance, |k| error(k) - predicted.bias[k]);
-            assert!(bias > least_bias, "no branch to see at {cutoff_hz} Hz: {bias}");
-            assert!(off < 3.0 + 0.05 * bias, "{cutoff_hz} Hz: off by {off}, bias {bias}");
-        }
-    }
-}
+mod tests;

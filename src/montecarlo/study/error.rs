@@ -42,6 +42,21 @@ pub enum StudyError {
         /// What the periods are needed for.
         why: &'static str,
     },
+    /// The period is too short for the ends of a low-pass.
+    #[error(
+        "scenario {scenario}: a period of {period_s} s is too short for this study: the ends of its low-pass at \
+         {cutoff_hz} Hz need {needed_s:.2} s"
+    )]
+    ShortPeriod {
+        /// Name of the scenario.
+        scenario: String,
+        /// Period, s.
+        period_s: f64,
+        /// Period needed, s.
+        needed_s: f64,
+        /// Lowest cut-off of the study, Hz.
+        cutoff_hz: f64,
+    },
     /// The period is not a whole number of samples.
     #[error(
         "scenario {scenario}: a period of {period_s} s is not a whole number of samples at {rate_hz} Hz"

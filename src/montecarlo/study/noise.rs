@@ -6,7 +6,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::identify::covariance::CovarianceKind as C;
+use crate::identify::covariance::{CovarianceKind as C, Z_95};
 use crate::identify::{Estimate, Estimator as E, Floor, Identifier, LackOfFit};
 use crate::montecarlo::calibration::{Calibration, claims, wilson};
 use crate::montecarlo::efficiency::Efficiency;
@@ -316,7 +316,7 @@ impl MethodResult {
             coverage_mean,
             coverage_error,
             coverage_worst,
-            coverage_worst_within: wilson(coverage_worst, tally.trials() as f64, 1.96),
+            coverage_worst_within: wilson(coverage_worst, tally.trials() as f64, Z_95),
             coverage_worst_of: set.name(coverage).to_owned(),
             ratio: [
                 ratios().fold(f64::INFINITY, f64::min),

@@ -2,8 +2,9 @@
 //!
 //! The true equations are y = Xθ. The equations that a processing solves differ: the torque is filtered by G_y and the
 //! regressor by G_x. The velocity in the regressor is filtered by L (1 in the paper), and the acceleration is computed
-//! from the velocity by a differentiator with the response jA(ω). The velocity contains the encoder's white noise v of
-//! variance σ_v². With X̄ the mean of the regressor that is used, E its random part, and W the weights of the joints,
+//! from the velocity by a differentiator with the response jA(ω). The velocity of joint i contains its encoder's white
+//! noise v_i of variance σ_i². With X̄ the mean of the regressor that is used, E its random part, and W the weights of
+//! the joints,
 //!
 //! ```text
 //! θ̂ → (X̄ᵀW²X̄ + N)⁻¹ X̄ᵀW² G_y y,   N = E[EᵀW²E]                                  (a)
@@ -14,14 +15,14 @@
 //! torque. For (33), A/ω = 1/(1 + (f/f_c)²): a rotor inertia comes out too large by about (f/f_c)², with f the
 //! frequency of the motion. This bias falls as 1/f_c².
 //!
-//! **Noise branch** (errors in variables): the acceleration noise a = A v has the variance
+//! **Noise branch** (errors in variables): the acceleration noise a_i = A v_i has the variance
 //!
 //! ```text
-//! σ_a² = σ_v² · mean over all frequencies of (A G_x)²  →  σ_v² ω_c³/(4 f_s) for (33)
-//! N    = σ_a² Σ_i Σ_t D_iᵀW²D_i + N_friction,   D_i = ∂X/∂q̈_i
+//! σ_ai² = σ_i² · mean over all frequencies of (A G_x)²  →  σ_i² ω_c³/(4 f_s) for (33)
+//! N     = Σ_i σ_ai² Σ_t D_iᵀW²D_i + N_friction,   D_i = ∂X/∂q̈_i
 //! ```
 //!
-//! and attenuates inertias by the share σ_a²/var(q̈ | other columns). This bias grows as f_c³. N_friction is the
+//! and attenuates inertias by the share σ_ai²/var(q̈_i | other columns). This bias grows as f_c³. N_friction is the
 //! covariance of q̇ + Lv and tanh((q̇ + Lv)/ε), by quadrature; it hardly depends on the cut-off. The noise of velocity
 //! and the noise of acceleration at the same instant are uncorrelated (A is odd).
 //!
@@ -29,7 +30,7 @@
 //! and a part from the encoder noise, which enters the error of the equations to first order in v:
 //!
 //! ```text
-//! Ω = Σ_jj' C_jj' s_j s_j' w_j² w_j'² Y_jᵀY_j' + σ_v² Σ_i g_iᵀg_i,   Y = √S G_y X̄
+//! Ω = Σ_jj' C_jj' s_j s_j' w_j² w_j'² Y_jᵀY_j' + Σ_i σ_i² g_iᵀg_i,   Y = √S G_y X̄
 //! g_i = jA* [Σ_j w_j² (G_x X̄)_j (D_iθ)_j] + L [w_i² (G_x X̄)_i (rv_i + rc_i E[1 − tanh²]/ε)]
 //! ```
 
@@ -63,8 +64,8 @@ pub(super) struct Treatment<'a> {
 
 /// The noise of a log.
 pub(super) struct LogNoise<'a> {
-    /// σ_v, the noise of the velocity reading, rad/s.
-    pub velocity_sd_rad_s: f64,
+    /// σ_i, the noise of each joint's velocity reading, rad/s.
+    pub velocity_sd_rad_s: &'a [f64],
     /// s_j, the torque noise of each joint, Nm.
     pub torque_sd_nm: &'a [f64],
     /// S(f), the spectrum of the torque noise, with mean 1 over all frequencies.
@@ -179,11 +180,11 @@ impl<'a> NoisyRegressor<'a> {
             motion.qd_rad_s.joint_mut(j).copy_from_slice(&qd);
         }
         let velocity_gain = self.periodic.noise_gain(how.velocity);
-        let velocity_sd_rad_s = noise.velocity_sd_rad_s * velocity_gain.sqrt();
         let mut mean = assembled(self.model, self.set, &motion, self.rate_hz);
         let friction: Vec<NoisyFriction> = (0..joints)
             .map(|j| {
                 let qd = motion.qd_rad_s.joint(j);
+                let velocity_sd_rad_s = noise.velocity_sd_rad_s[j] * velocity_gain.sqrt();
                 let epsilon = self.epsilon_rad_s;
                 NoisyFriction::new(self.set, &self.theta, j, qd, epsilon, velocity_sd_rad_s)
             })
@@ -198,10 +199,10 @@ impl<'a> NoisyRegressor<'a> {
         }
 
         let mut information = self.gram(&mean, how.weights);
-        let acceleration_variance = noise.velocity_sd_rad_s.powi(2)
-            * self.periodic.noise_gain(|f| (how.differentiator)(f) * (how.regressor)(f));
-        for slope in &self.slopes {
-            information += self.gram(slope, how.weights) * acceleration_variance;
+        let acceleration_gain =
+            self.periodic.noise_gain(|f| (how.differentiator)(f) * (how.regressor)(f));
+        for (slope, sd) in self.slopes.iter().zip(noise.velocity_sd_rad_s) {
+            information += self.gram(slope, how.weights) * (sd.powi(2) * acceleration_gain);
         }
         let both = self.periodic.noise_gain(|f| (how.regressor)(f) * (how.velocity)(f));
         let passed = both / velocity_gain;
@@ -220,7 +221,7 @@ impl<'a> NoisyRegressor<'a> {
         let inverse = inverse(information);
         let limit = &inverse * right;
         let mut omega = self.torque_part(&mean, how, noise);
-        if noise.velocity_sd_rad_s > 0.0 {
+        if noise.velocity_sd_rad_s.iter().any(|sd| *sd > 0.0) {
             let seen: Columns = mean
                 .iter()
                 .map(|joint| {
@@ -228,10 +229,10 @@ impl<'a> NoisyRegressor<'a> {
                 })
                 .collect();
             let mut score = DMatrix::zeros(n, b);
-            for i in 0..joints {
+            for (i, sd) in noise.velocity_sd_rad_s.iter().enumerate() {
                 score.fill(0.0);
                 self.encoder_score(&seen, how, &friction, i, &mut score);
-                omega += score.tr_mul(&score) * noise.velocity_sd_rad_s.powi(2);
+                omega += score.tr_mul(&score) * sd.powi(2);
             }
         }
         let variance = &inverse * omega * &inverse;
@@ -353,116 +354,4 @@ fn inverse(mut matrix: DMatrix<f64>) -> DMatrix<f64> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::base::Parameterisation;
-    use crate::excitation::{FourierSeries, Reference};
-    use crate::montecarlo::study::cutoff::central_difference;
-    use crate::robot::Arm;
-    use crate::signal::ZeroPhase;
-
-    const RATE_HZ: f64 = 125.0;
-
-    /// Exact motion of one period of the identification trajectory.
-    fn motion() -> Motion {
-        let series = FourierSeries::built_in("ur5_identification").unwrap();
-        let samples = (series.period_s * RATE_HZ).round() as usize;
-        let mut motion = Motion::at_rest(6, samples);
-        let [mut q, mut qd, mut qdd] = [[0.0; 6]; 3];
-        for k in 0..samples {
-            series.sample(k as f64 / RATE_HZ, &mut q, &mut qd, &mut qdd);
-            motion.q_rad.set_sample(k, &q);
-            motion.qd_rad_s.set_sample(k, &qd);
-            motion.qdd_rad_s2.set_sample(k, &qdd);
-        }
-        motion
-    }
-
-    fn with_formulas(check: impl Fn(&NoisyRegressor)) {
-        let arm = Arm::load("ur5").unwrap();
-        let model = Model::new(&arm);
-        let set = BaseSet::find(&arm, Parameterisation::full(6, false)).unwrap();
-        let theta = set.values(&model.standard_parameters());
-        let epsilon = arm.friction_epsilon_rad_s;
-        check(&NoisyRegressor::new(&model, &set, theta, epsilon, motion(), RATE_HZ));
-    }
-
-    fn outcome(formulas: &NoisyRegressor, cutoff_hz: f64, velocity_sd_rad_s: f64) -> Outcome {
-        let filter = ZeroPhase::with_single_pass_cutoff(cutoff_hz, 1, RATE_HZ).unwrap();
-        let differentiator = |f: f64| central_difference(f, RATE_HZ) * filter.response(f);
-        let one = |_: f64| 1.0;
-        let treatment = Treatment {
-            differentiator: &differentiator,
-            velocity: &one,
-            regressor: &one,
-            torque: &one,
-            weights: &[1.0; 6],
-        };
-        let noise = LogNoise {
-            velocity_sd_rad_s,
-            torque_sd_nm: &[1.0; 6],
-            torque_power: &one,
-            torque_correlation: 0.0,
-        };
-        formulas.outcome(&treatment, &noise, 1.0)
-    }
-
-    fn norm(values: &[f64]) -> f64 {
-        values.iter().map(|v| v * v).sum::<f64>().sqrt()
-    }
-
-    /// To leading order the filter removes the share tan²(πf/f_s)/tan²(πf_c/f_s) of the acceleration. The relative
-    /// error of this approximation is the same share again, at most (0.5/20)² = 6e-4. The central difference adds
-    /// (2πf/f_s)⁴/30 < 1e-8.
-    #[test]
-    fn the_filter_branch_falls_with_the_square_of_the_cutoff() {
-        with_formulas(|formulas| {
-            let [low, high] = [20.0, 40.0].map(|hz| norm(&outcome(formulas, hz, 0.0).bias));
-            let warped = |hz: f64| (std::f64::consts::PI * hz / RATE_HZ).tan();
-            let expected = (warped(40.0) / warped(20.0)).powi(2);
-            assert!((low / high / expected - 1.0).abs() < 2e-3, "{low} {high} {expected}");
-        });
-    }
-
-    /// With white noise of 1 Nm on every joint and an exact regressor the scatter equals the paper's (20). The
-    /// regressor is nearly exact: at 40 Hz the filter removes (0.5/40)² = 1.6e-4 of the acceleration.
-    #[test]
-    fn without_encoder_noise_and_for_unit_noise_the_scatter_is_the_papers_sigma() {
-        with_formulas(|formulas| {
-            let scatter = outcome(formulas, 40.0, 0.0).variance;
-            for (variance, sigma) in scatter.iter().zip(formulas.paper_sigma(1.0)) {
-                assert!((variance.sqrt() / sigma - 1.0).abs() < 2e-3);
-            }
-        });
-    }
-
-    /// σ_a agrees with the formula for fast sampling, and the noise branch grows in proportion to σ_a².
-    #[test]
-    fn the_noise_branch_grows_with_the_variance_of_the_acceleration() {
-        let gain = |cutoff_hz: f64| {
-            let filter = ZeroPhase::with_single_pass_cutoff(cutoff_hz, 1, RATE_HZ).unwrap();
-            let periodic = Periodic::new(12_500, RATE_HZ);
-            periodic.noise_gain(|f| central_difference(f, RATE_HZ) * filter.response(f))
-        };
-        // σ_a² = σ_v² ω_c³ / (4 f_s) for f_c ≪ f_s. Above 10 Hz the central difference falls short of the
-        // derivative; these frequencies hold 4 f_c/(π · 10 Hz) = 3 % of σ_a² at f_c = 0.25 Hz, or 1.6 % of σ_a.
-        let sigma = gain(0.25).sqrt();
-        let expected = ((std::f64::consts::TAU * 0.25).powi(3) / (4.0 * RATE_HZ)).sqrt();
-        assert!((sigma / expected - 1.0).abs() < 0.016, "{sigma}");
-        with_formulas(|formulas| {
-            // At 2e-5 rad/s the attenuation is linear in σ_a². The contribution of the friction columns does not
-            // depend on the cut-off; differences to a third cut-off remove it.
-            let bias = |hz: f64| {
-                let [with, without] = [2e-5, 0.0].map(|sd| outcome(formulas, hz, sd).bias);
-                with.iter().zip(without).map(|(a, b)| a - b).collect::<Vec<f64>>()
-            };
-            let [five, ten, twenty] = [5.0, 10.0, 20.0].map(bias);
-            let less = |a: &[f64], b: &[f64]| -> Vec<f64> {
-                a.iter().zip(b).map(|(a, b)| a - b).collect()
-            };
-            let ratio = norm(&less(&twenty, &five)) / norm(&less(&ten, &five));
-            let expected = (gain(20.0) - gain(5.0)) / (gain(10.0) - gain(5.0));
-            assert!((ratio / expected - 1.0).abs() < 0.02, "{ratio} {expected}");
-        });
-    }
-}
+mod tests;

@@ -8,6 +8,7 @@ use super::error::StudyError;
 use super::noisy_regressor::{LogNoise, Treatment};
 use super::paper_equations::PaperEquations;
 use crate::dynamics::Motion;
+use crate::identify::covariance::Z_95;
 use crate::plant::{Colour, Component, NoiseModel, PerJoint, SensorConfig};
 use crate::signal::ZeroPhase;
 
@@ -73,10 +74,7 @@ pub(super) fn paper_sigma(
     let claimed = formulas.paper_sigma(periods);
     let smooth = ZeroPhase::with_single_pass_cutoff(PaperEquations::PAPER.cutoff_hz, 1, rate_hz)?;
     let differentiator = |f: f64| central_difference(f, rate_hz) * smooth.response(f);
-    let velocity_sd_rad_s = match scenario.sensors.qd_sd_rad_s {
-        PerJoint::All(sd) => sd,
-        PerJoint::Each(ref sd) => sd.iter().sum::<f64>() / sd.len() as f64,
-    };
+    let velocity_sd_rad_s = scenario.sensors.qd_sd_per_joint_rad_s(motion.joints())?;
     let mut results = Vec::new();
     for case in cases(&scenario.sensors.torque_sd_nm) {
         let own = bench.read_by(SensorConfig {
@@ -96,7 +94,7 @@ pub(super) fn paper_sigma(
                 weights: &vec![1.0; torque_sd_nm.len()],
             },
             &LogNoise {
-                velocity_sd_rad_s,
+                velocity_sd_rad_s: &velocity_sd_rad_s,
                 torque_sd_nm: &torque_sd_nm,
                 torque_power: &case.model.spectrum(rate_hz),
                 torque_correlation: case.model.cross_joint_correlation,
@@ -120,7 +118,7 @@ pub(super) fn paper_sigma(
             (square / (number - 1.0)).sqrt() / sigma
         };
         let held = |(theta, sigma): &(Vec<f64>, Vec<f64>)| {
-            let within = |k: &usize| (theta[*k] - own.theta[*k]).abs() <= 1.96 * sigma[*k];
+            let within = |k: &usize| (theta[*k] - own.theta[*k]).abs() <= Z_95 * sigma[*k];
             (0..theta.len()).filter(within).count() as f64 / theta.len() as f64
         };
         results.push(SigmaCase {

@@ -124,6 +124,8 @@ pub struct Result {
     base_parameters: Vec<BaseParameter>,
     /// Covariance of the base parameters, row by row.
     base_covariance: Vec<Vec<f64>>,
+    /// Drive gains by which currents became torques, Nm/A; null if torques were logged.
+    drive_gain_nm_a: Option<Vec<f64>>,
     /// Null without `--physical`: only combinations of standard parameters are then known.
     standard_parameters: Option<Vec<StandardParameter>>,
     /// How the standard parameters were found; null without `--physical`.
@@ -270,6 +272,7 @@ impl Result {
             covariance_reason: identification.covariance_reason,
             degrees_of_freedom: identification.covariance.degrees_of_freedom,
             base_parameters,
+            drive_gain_nm_a: training.logs.first().and_then(|log| log.drive_gain_nm_a(arm)),
             base_covariance: covariance
                 .row_iter()
                 .map(|row| row.iter().copied().collect())
@@ -360,10 +363,17 @@ impl Result {
         }
         let percent = self.residual.relative_percent.iter();
         let (low, high) = percent.fold((f64::INFINITY, 0f64), |(l, h), &p| (l.min(p), h.max(p)));
+        // No motion is designed for a reduced set.
+        let help = match self.reduced {
+            None => {
+                "; a motion designed for what is open helps (`armid excite --prior RESULT.json`)"
+            }
+            Some(_) => "",
+        };
         let open = match self.not_identified.len() {
             0 => String::new(),
             n => format!(
-                " {n} {} open ({}): the torque of this motion depends on {} too little.",
+                " {n} {} open ({}): the torque of this motion depends on {} too little{help}.",
                 if n == 1 {
                     "moment of inertia of a light body stays"
                 } else {

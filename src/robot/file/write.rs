@@ -12,6 +12,7 @@ impl Arm {
             gravity_m_s2: self.gravity_m_s2.into(),
             friction_epsilon_rad_s: self.friction_epsilon_rad_s,
             torque_offsets: self.torque_offsets,
+            drive_gains_assumed: self.drive_gains_assumed,
             floor_z_m: self.clearance.floor_z_m,
             collision_pairs: self.clearance.pairs.iter().map(|pair| pair.map(capsule)).collect(),
             joints: self.joints.iter().map(JointEntry::of).collect(),

@@ -101,6 +101,8 @@ pub(in crate::robot) fn arm_of(
             gravity_m_s2: usual_gravity().into(),
             friction_epsilon_rad_s: default_epsilon(),
             torque_offsets: true,
+            // A gain that the file does not give has a notice of its own.
+            drive_gains_assumed: false,
             joints,
             clearance: Clearance::default(),
         },

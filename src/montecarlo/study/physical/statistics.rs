@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::METHODS;
 use super::trial::{Lost, Outcome, SIGMAS};
 use super::validation::Validation;
+use crate::identify::covariance::Z_95;
 use crate::median::median;
 use crate::montecarlo::experiment::Experiment;
 use crate::montecarlo::trials::Failure;
@@ -134,7 +135,7 @@ impl Prediction {
         let scatter = (square - mean.norm_squared()).max(0.0) * n / (n - 1.0);
         let systematic = (mean.norm_squared() - scatter / n).max(0.0) + unexplained;
         let variance = squares.iter().map(|s| (s - square).powi(2)).sum::<f64>() / (n - 1.0);
-        let half = 1.96 * (variance / n).sqrt();
+        let half = Z_95 * (variance / n).sqrt();
         let percent = |square: f64| 100.0 * square.max(0.0).sqrt();
         Some(Self {
             trials,
