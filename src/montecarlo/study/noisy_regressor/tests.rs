@@ -100,8 +100,8 @@ fn every_encoder_brings_its_own_noise() {
     with_formulas(|formulas| {
         let together = of_noise(formulas, 10.0, SD_RAD_S, 0.0).variance;
         let mut sum = vec![0.0; together.len()];
-        for i in 0..6 {
-            let only = std::array::from_fn(|j| if j == i { SD_RAD_S[i] } else { 0.0 });
+        for (i, sd_rad_s) in SD_RAD_S.into_iter().enumerate() {
+            let only = std::array::from_fn(|j| if j == i { sd_rad_s } else { 0.0 });
             let alone = of_noise(formulas, 10.0, only, 0.0).variance;
             sum.iter_mut().zip(alone).for_each(|(sum, alone)| *sum += alone);
         }
