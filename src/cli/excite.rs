@@ -22,7 +22,7 @@ use crate::base::{BaseSet, Parameterisation};
 use crate::excitation::design::{
     self, Budget, Criterion, Design, DesignError, Experiment, Specification, Variables,
 };
-use crate::excitation::export::{Playback, Slowed, urscript, write_csv};
+use crate::excitation::export::{Playback, SLOWEST, Slowed, urscript, write_csv};
 use crate::excitation::{Requirements, TRAJECTORY_SCHEMA};
 use crate::output::{check_outputs, write_atomically, write_text};
 use crate::report::excitation::page;
@@ -109,7 +109,7 @@ pub struct ExciteArgs {
     urscript: Option<PathBuf>,
     /// Speed of what --csv and --urscript write, as a fraction of the designed one: the same path, played more slowly. In
     /// the URScript it is the line `speed = …`.
-    #[arg(long, value_name = "0…1", default_value_t = 1.0, requires = "played")]
+    #[arg(long, value_name = "0.01…1", default_value_t = 1.0, requires = "played")]
     speed: f64,
     /// Report page.
     #[arg(long, value_name = "FILE.html")]
@@ -166,8 +166,9 @@ pub fn run(args: &ExciteArgs) -> CommandResult {
     for joint in &mut arm.joints {
         joint.limits.velocity_rad_s *= args.velocity_share;
     }
-    if !(args.speed > 0.0 && args.speed <= 1.0) {
-        return Err(BadOption::new("speed", args.speed, "must be in (0, 1]").into());
+    if !(SLOWEST..=1.0).contains(&args.speed) {
+        let message = format!("must be from {SLOWEST} to 1");
+        return Err(BadOption::new("speed", args.speed, message).into());
     }
     let arm = arm;
     say_what_is_watched(&args.robot, &arm, &args.boxes)?;

@@ -1,41 +1,28 @@
 //! Whether a log can be one of the arm that the robot file describes.
 
-use nalgebra::DMatrix;
-
 use super::diagnoser::Diagnoser;
 use super::extension::Extension;
 use super::verdict::{Diagnosis, Verdict};
 use crate::base::BaseSet;
 use crate::dynamics::{Model, Parameter};
-use crate::identify::covariance::Covariance;
 use crate::identify::{Doubt, Identification, unlike};
 
-/// Variance of a parameter whose column the causes absorb: finite, so that sums in which it has no part stay known.
-const UNKNOWN: f64 = 1e100;
-
 impl Diagnoser<'_> {
-    /// Adds the doubt that the log may be that of another robot, or that no arm has these parameters. `of_base` is the
-    /// covariance of the base parameters [beside the causes](super::intervals::base).
+    /// Adds the doubt that the log may be that of another robot, or that no arm has these parameters.
     pub(super) fn question_the_arm(
         &self,
         diagnosis: &mut Diagnosis,
         extension: &Extension,
-        of_base: DMatrix<f64>,
         identification: &Identification,
     ) {
         let nominal = self.set.values(&Model::new(self.arm).standard_parameters());
         let sigma = sigma_of_friction_alone(diagnosis, self.set, self.arm.dof());
         // Contacts and friction that the null model lacks distort its estimate of gravity, so θ is that of the extended
-        // model, and so is its covariance: a spring beside gravity leaves less of both.
-        let theta = &extension.theta;
-        let absorbed: Vec<usize> =
-            (0..theta.len()).filter(|k| of_base[(*k, *k)].is_nan()).collect();
-        let mut matrix = of_base.map(|c| if c.is_nan() { 0.0 } else { c });
-        absorbed.iter().for_each(|k| matrix[(*k, *k)] = UNKNOWN);
-        let covariance = Covariance { matrix, ..identification.covariance.clone() };
+        // model.
+        let (theta, covariance) = (&extension.theta, &identification.covariance);
         let left = share_left(diagnosis, identification);
         let torque_nm = identification.residual().torque_rms_nm;
-        let doubt = Doubt::of(self.arm, self.set, &nominal, theta, &sigma, &covariance, &torque_nm);
+        let doubt = Doubt::of(self.arm, self.set, &nominal, theta, &sigma, covariance, &torque_nm);
         diagnosis.doubt = Doubt::or_unlike(doubt, unlike(self.arm, &left));
         if diagnosis.doubt.as_ref().is_some_and(Doubt::is_contradiction) {
             diagnosis.verdict = Verdict::Contradicted;

@@ -43,9 +43,10 @@ pub(super) fn with_reach(
 mod tests {
     use super::*;
 
-    /// The product and the angle of two numbers with variances of 0.04 and 0.09, of which the second is known: d(ab)/da =
-    /// b, dα/da = −b/(a² + b²). The angle lies at the cut of atan2. The error of the central difference is of the order
-    /// of the step squared, 1e-6.
+    /// The product a b and the angle α of two numbers: d(ab)/da = b, dα/da = −b/(a² + b²), dα/db = a/(a² + b²). One of them
+    /// is free, at first where the angle lies at the cut of atan2; then both, given the other way round, with variances of
+    /// 0.04 (b) and 0.09 (a) and a covariance of 0.03. The error of the central difference is of the order of the step
+    /// squared, 1e-6.
     #[test]
     fn only_what_is_free_makes_an_interval() {
         let quantity = |name, value, unit| Quantity { name, value, unit };
@@ -61,5 +62,10 @@ mod tests {
         let found = with_reach(at, &[-2.0, 3.0], (&[0], &covariance), 1.0);
         assert!((found[0].1 - 3.0 * 0.2).abs() < 1e-6, "{}", found[0].1);
         assert!((found[1].1 - 3.0 / 13.0 * 0.2).abs() < 1e-6, "{}", found[1].1);
+        let both = DMatrix::from_row_slice(2, 2, &[0.04, 0.03, 0.03, 0.09]);
+        let found = with_reach(at, &[-2.0, 3.0], (&[1, 0], &both), 1.0);
+        let sigma = |db: f64, da: f64| (0.04 * db * db + 0.06 * db * da + 0.09 * da * da).sqrt();
+        assert!((found[0].1 - sigma(-2.0, 3.0)).abs() < 1e-6, "{}", found[0].1);
+        assert!((found[1].1 - sigma(-2.0 / 13.0, -3.0 / 13.0)).abs() < 1e-6, "{}", found[1].1);
     }
 }

@@ -189,7 +189,7 @@ impl<'a> Diagnoser<'a> {
             sentences: Vec::new(),
             warnings,
         };
-        self.question_the_arm(&mut diagnosis, &extension, base.covariance, &identification);
+        self.question_the_arm(&mut diagnosis, &extension, &identification);
         let laws: Vec<Option<usize>> =
             extension.effects.iter().map(|effect| effect.site.map(|j| j + 1)).collect();
         let doubt = simulation.and_then(|simulation| simulation.doubt);

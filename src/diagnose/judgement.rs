@@ -85,7 +85,8 @@ impl Kept<'_, '_> {
         let scale = contender.score.lambda / size.max(f64::MIN_POSITIVE);
         let explained: Vec<f64> =
             rivals.iter().map(|rival| self.explains(rival, &others, &signal)).collect();
-        let is_alike = |explained: &f64| scale * (size - explained) < TELLS_APART;
+        // Along a single run, a cause may gain nothing as it is now, and then resembles no other.
+        let is_alike = |explained: &f64| scale > 0.0 && scale * (size - explained) < TELLS_APART;
         let in_class = rivals.iter().zip(&explained).filter(|(_, explained)| is_alike(explained));
         let class = in_class.map(|(rival, _)| rival.entry.place()).collect();
         // Along a single run, another effect that is visible beside the cause is no reason to doubt it.

@@ -12,8 +12,8 @@ use super::image::Image;
 use super::study::{Entry, Place};
 
 /// Upper limit of the bytes of columns that are kept of a place. What is beyond it is computed anew each time. Places have
-/// limits of their own because several are searched at once: which columns are kept would otherwise depend on how the
-/// threads run, and the last bit of a column depends on those that are computed with it.
+/// limits of their own because several are searched at once: with a common one, which columns are kept would depend on
+/// how the threads run, and the last bit of a column depends on those that are computed with it.
 const MOST_BYTES: usize = 4 << 20;
 
 /// A place, a variant of the shape, and the bits of the shape's value.
@@ -71,8 +71,11 @@ impl Memory {
         let made = if unknown.is_empty() { Vec::new() } else { make(&unknown) };
         let mut cache = self.lock();
         for (shape, made) in unknown.iter().zip(&made) {
-            if cache.takes(place, made.as_ref().map_or(&[], |entry| &entry.images)) {
-                cache.entries.insert(key(place, shape), made.clone());
+            let key = key(place, shape);
+            if !cache.entries.contains_key(&key)
+                && cache.takes(place, made.as_ref().map_or(&[], |entry| &entry.images))
+            {
+                cache.entries.insert(key, made.clone());
             }
         }
         let mut made = made.into_iter();
@@ -92,7 +95,7 @@ impl Memory {
         known.unwrap_or_else(|| {
             let made: Arc<[Image]> = make().into();
             let mut cache = self.lock();
-            if cache.takes(place, &made) {
+            if !cache.loose.contains_key(&key) && cache.takes(place, &made) {
                 cache.loose.insert(key, Arc::clone(&made));
             }
             made

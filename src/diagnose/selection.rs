@@ -91,8 +91,10 @@ impl<'s, 'a> Kept<'s, 'a> {
             }
         }
         kept.exchange();
-        // The arm was estimated anew since its causes were found.
-        kept.drop_unneeded(|_| true);
+        // The arm was estimated anew since its causes were found. What a dropped one explained may have another cause.
+        if !kept.drop_unneeded(|_| true).is_empty() {
+            kept.grow();
+        }
         kept
     }
 

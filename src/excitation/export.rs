@@ -32,9 +32,9 @@ pub enum PlaybackError {
         /// Set points per second, Hz.
         rate_hz: f64,
     },
-    /// A motion that stands still never ends, and a faster one leaves the limits of the design.
+    /// A motion that hardly moves hardly ends, and a faster one leaves the limits of the design.
     #[error(
-        "a speed of {speed} cannot be played: choose a share of the designed one, above 0 and at most 1"
+        "a speed of {speed} cannot be played: choose a share of the designed one, from {SLOWEST} to 1"
     )]
     Speed {
         /// Share of the designed speed.
@@ -117,9 +117,12 @@ impl<M: Reference> Reference for Slowed<'_, M> {
     }
 }
 
-/// Returns the speed if it is above 0 and at most the designed one.
+/// Slowest speed, as a fraction of the designed one: a motion of 80 s then takes two hours.
+pub const SLOWEST: f64 = 0.01;
+
+/// Returns the speed if it can be played.
 fn checked_speed(speed: f64) -> Result<f64, PlaybackError> {
-    let is_share = speed > 0.0 && speed <= 1.0;
+    let is_share = (SLOWEST..=1.0).contains(&speed);
     if is_share { Ok(speed) } else { Err(PlaybackError::Speed { speed }) }
 }
 

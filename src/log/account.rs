@@ -241,7 +241,7 @@ impl fmt::Display for LogWarning {
                 write!(
                     f,
                     "the drive gains of {robot} ({} Nm/A) are a guess, and masses, inertias and friction are as wrong as they are: state \
-                     those of your arm (drive_gain_nm_a in a layout), or log torques",
+                     those of your arm (drive_gain_nm_a in a layout, or a robot file without drive_gains_assumed), or log torques",
                     gains.join(", ")
                 )
             }

@@ -85,7 +85,7 @@ fn as_gaussian(t: f64, freedom: f64) -> f64 {
 }
 
 /// Distance of the data from a simulation in all `base` parameters together, for a periodic log, whose noise the
-/// `study` knows; `None` for a single run. A parameter whose column a cause absorbs is left out.
+/// `study` knows; `None` for a single run. A parameter whose column the causes absorb is left out.
 ///
 /// Combinations of parameters are known far better than any single one. d²/b of b parameters is treated as F(b, ν),
 /// with ν the harmonic mean of the degrees of freedom with which each σ is known.
@@ -100,6 +100,9 @@ pub fn moved_together(study: &Study, simulation: Nominal, base: &Base) -> Option
     };
     let known: Vec<usize> =
         (0..parameters.len()).filter(|k| covariance[(*k, *k)].is_finite()).collect();
+    if known.is_empty() {
+        return None;
+    }
     let difference = known.iter().map(|k| parameters[*k].value - simulation.theta[*k]);
     let covariance = covariance.select_rows(&known).select_columns(&known);
     let squared_distance = squared_distance(&covariance, &difference.collect::<Vec<_>>())?;

@@ -272,7 +272,7 @@ impl Result {
             covariance_reason: identification.covariance_reason,
             degrees_of_freedom: identification.covariance.degrees_of_freedom,
             base_parameters,
-            drive_gain_nm_a: training.logs.first().and_then(|log| log.drive_gain_nm_a(arm)),
+            drive_gain_nm_a: training.logs.iter().find_map(|log| log.drive_gain_nm_a(arm)),
             base_covariance: covariance
                 .row_iter()
                 .map(|row| row.iter().copied().collect())
