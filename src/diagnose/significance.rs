@@ -34,7 +34,6 @@ impl Kept<'_, '_> {
         let study = self.study;
         let site = contender.entry.site;
         let span = study.span(&contender.entry, others);
-        let explained = span.explained(residual);
         let is_left_by = |(c, cause): (usize, &Contender)| {
             if cause.entry.place() == contender.entry.place() {
                 return false;
@@ -42,7 +41,9 @@ impl Kept<'_, '_> {
             let error = self.form_error(&cause.entry).powi(2);
             contender.score.lambda < error * cause.score.lambda
                 && match (cause.entry.site, site) {
-                    (Some(own), Some(j)) if own != j => explained < error * self.square_on(j, c),
+                    (Some(own), Some(j)) if own != j => {
+                        span.explained(residual) < error * self.square_on(j, c)
+                    }
                     _ => true,
                 }
         };

@@ -115,6 +115,23 @@ impl ZeroPhase {
         Ok(pad..pad + n)
     }
 
+    /// Filters `series` into `longer`, by [`Self::filter_periodic`] if it `repeats`; returned is where in it the series lies.
+    pub fn filter_into(
+        &self,
+        series: &[f64],
+        repeats: bool,
+        longer: &mut Vec<f64>,
+        scratch: &mut Scratch,
+    ) -> Result<Range<usize>, SignalError> {
+        if repeats {
+            return self.filter_periodic(series, longer, scratch);
+        }
+        longer.clear();
+        longer.extend_from_slice(series);
+        self.filter_in_place(longer, scratch)?;
+        Ok(0..series.len())
+    }
+
     /// Samples a series must have at least: 3(order + 1) + 1.
     pub fn least_samples(&self) -> usize {
         self.passes.least_samples()

@@ -24,15 +24,9 @@ pub fn decimate(
     }
     let mut filtered = Vec::new();
     let mut thin = |series: &[f64], out: &mut Vec<f64>| {
+        let inside = filter.filter_into(series, repeats, &mut filtered, scratch)?;
         // A single run loses its ends; a repeating motion is continued periodically.
-        let kept = if repeats {
-            filter.filter_periodic(series, &mut filtered, scratch)?
-        } else {
-            filtered.clear();
-            filtered.extend_from_slice(series);
-            filter.filter_in_place(&mut filtered, scratch)?;
-            edge..n - edge
-        };
+        let kept = if repeats { inside } else { edge..n - edge };
         out.extend(filtered[kept].iter().step_by(every));
         Ok::<(), SignalError>(())
     };

@@ -35,14 +35,7 @@ pub fn smoothed(
     let mut longer = Vec::new();
     let mut slope = Vec::new();
     let mut low_pass = |series: &[f64], out: &mut [f64], derivative: Option<&mut [f64]>| {
-        let inside = if repeats {
-            filter.filter_periodic(series, &mut longer, scratch)?
-        } else {
-            longer.clear();
-            longer.extend_from_slice(series);
-            filter.filter_in_place(&mut longer, scratch)?;
-            0..n
-        };
+        let inside = filter.filter_into(series, repeats, &mut longer, scratch)?;
         out.copy_from_slice(&longer[inside.clone()]);
         if let Some(derivative) = derivative {
             slope.resize(longer.len(), 0.0);
