@@ -58,6 +58,24 @@ pub struct DiagnoseArgs {
 }
 
 impl DiagnoseArgs {
+    /// Says what two logs are for, and refuses a known mass without the second one.
+    fn check_logs(&self) -> Result<(), String> {
+        match (&self.logs[..], self.known_payload_kg) {
+            ([first, second], _) => {
+                eprintln!(
+                    "note: {} is compared with {} for what its flange carries; several logs of one arm are for `armid identify`",
+                    second.display(),
+                    first.display()
+                );
+                Ok(())
+            }
+            (_, Some(mass_kg)) => Err(format!(
+                "--known-payload {mass_kg}: it tells what the second of two logs was recorded with, and there is one"
+            )),
+            (_, None) => Ok(()),
+        }
+    }
+
     /// Refuses outputs that cannot be written or that would overwrite one of the `inputs`.
     fn check_outputs<'a>(
         &self,
@@ -71,19 +89,7 @@ impl DiagnoseArgs {
 
 /// Runs the command.
 pub fn run(args: &DiagnoseArgs) -> CommandResult {
-    if let [first, second] = &args.logs[..] {
-        eprintln!(
-            "note: {} is compared with {} for what its flange carries; several logs of one arm are for `armid identify`",
-            second.display(),
-            first.display()
-        );
-    }
-    if let (Some(mass_kg), 1) = (args.known_payload_kg, args.logs.len()) {
-        return Err(format!(
-            "--known-payload {mass_kg}: it tells what the second of two logs was recorded with, and there is one"
-        )
-        .into());
-    }
+    args.check_logs()?;
     let options = args.processing.options()?;
     let (arm, layout, mut inputs) = args.source.load()?;
     let logs = args.logs.iter().chain(&args.held_out).chain(&args.sim);
@@ -92,24 +98,8 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
     let model = Model::new(&arm);
     let logs = read_logs(&args.logs, &arm, &layout)?;
     let held_out = read_logs(&args.held_out, &arm, &layout)?;
-    let known: Vec<RowsOf> = logs.iter().map(LoadedLog::rows).collect();
-    let is_known = |log: &&LoadedLog| {
-        let rows = log.rows();
-        known.iter().any(|other| rows.are_of(other))
-    };
-    if let Some(same) = held_out.iter().find(is_known) {
-        let file = same.input.path.display();
-        return Err(format!("{file} is held out, but it is also the log that is diagnosed").into());
-    }
-    if let [one, other] = &known[..]
-        && one.are_of(other)
-    {
-        let [one, other] = [one, other].map(|rows| rows.log.input.path.display());
-        return Err(format!(
-            "{one} and {other} are the same log, or parts of it: they tell of no load"
-        )
-        .into());
-    }
+    refuse_same(&logs, &held_out)?;
+    let Some(log) = logs.first() else { return Ok(Outcome::Done) };
     let manufacturer =
         held_out.iter().map(|log| log.log.target_torque_nm(&arm)).collect::<Result<Vec<_>, _>>()?;
     let validations: Vec<Validation> = held_out
@@ -120,18 +110,20 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
             manufacturer_nm: manufacturer_nm.as_ref(),
         })
         .collect();
-    let sha256 = logs.first().map_or("", |log| &log.input.sha256);
-    let simulation =
-        args.sim.as_deref().map(|file| Simulated::load(file, (&arm, &set), sha256)).transpose()?;
-    let Some(log) = logs.first() else { return Ok(Outcome::Done) };
-    let mut diagnoser = Diagnoser::new(&arm, &model, &set, options.clone())
-        .of_currents(log.log.drive_gain_nm_a(&arm));
+    let simulation = args
+        .sim
+        .as_deref()
+        .map(|file| Simulated::load(file, (&arm, &set), &log.input.sha256))
+        .transpose()?;
     if let Some(Simulated { files, .. }) = &simulation {
         args.check_outputs(files)?;
         inputs.extend(super::robot::inputs(files)?);
     }
-    inputs.extend(logs.iter().chain(&held_out).map(|l: &LoadedLog| l.input.clone()));
+    inputs.extend(logs.iter().chain(&held_out).map(|log| log.input.clone()));
     let program = Program::started(None, inputs);
+
+    let mut diagnoser = Diagnoser::new(&arm, &model, &set, options.clone())
+        .of_currents(log.log.drive_gain_nm_a(&arm));
     let nominal = simulation.as_ref().map(Simulated::nominal);
     let mut finding = match diagnoser.diagnose(&log.measurement(), &validations, nominal) {
         Err(error) if error.is_declined() => {
@@ -139,17 +131,12 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
         }
         finding => finding?,
     };
-    finding.diagnosis.warnings.extend(simulation.and_then(|simulation| simulation.warning));
-    let unused = args.processing.unused(&finding.identification.processing);
-    finding.diagnosis.warnings.extend(unused);
     // An error in a later step must not discard the diagnosis: it is reported after everything else is printed and
     // written.
     let mut failed = None;
     if let Some(loaded) = logs.get(1) {
-        let measurements = (&log.measurement(), &loaded.measurement());
-        let payload =
-            diagnoser.payload(&finding, measurements.0, measurements.1, args.known_payload_kg);
-        match payload {
+        let [reference, loaded] = [log, loaded].map(LoadedLog::measurement);
+        match diagnoser.payload(&finding, &reference, &loaded, args.known_payload_kg) {
             Ok(payload) => finding.diagnosis.add_payload(payload),
             Err(error) => failed = Some(error),
         }
@@ -160,30 +147,14 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
         let replay = diagnoser.replay(&finding, &validations);
         finding.diagnosis.add_replay(replay);
     }
+    let of_the_options = simulation.and_then(|simulation| simulation.warning).into_iter();
+    let unused = args.processing.unused(&finding.identification.processing);
     let of_the_logs = logs.iter().chain(&held_out).flat_map(|log| log_warnings(&log.log));
-    finding.diagnosis.warnings.extend(of_the_logs);
-    let diagnosis = &finding.diagnosis;
-    for sentence in &diagnosis.sentences {
-        say!("{sentence}");
-    }
-    say!("");
-    if !diagnosis.causes.is_empty() {
-        say!("{}", cause_table(diagnosis).to_text());
-    }
-    if !diagnosis.held_out.is_empty() {
-        say!("{}", held_out_table(diagnosis).to_text());
-    }
-    if let Some(replay) = &diagnosis.replay {
-        say!("{}", replay_table(replay).to_text());
-    }
-    if !diagnosis.detection_limits.is_empty() {
-        say!("{}", limit_table(diagnosis).to_text());
-    }
-    for warning in &diagnosis.warnings {
-        say!("note: {warning}");
-    }
+    finding.diagnosis.warnings.extend(of_the_options.chain(unused).chain(of_the_logs));
+
+    print(&finding.diagnosis);
     if let Some(path) = &args.json {
-        let body = WithRows { diagnosis, rows: Rows::of(&[&log.log]) };
+        let body = WithRows { diagnosis: &finding.diagnosis, rows: Rows::of(&[&log.log]) };
         Document { schema: DIAGNOSE_SCHEMA, program: &program, body: &body }.write(path)?;
     }
     if let Some(path) = &args.report {
@@ -209,6 +180,49 @@ pub fn run(args: &DiagnoseArgs) -> CommandResult {
         Some(error) => Err(error.into()),
         None if finding.diagnosis.is_contradicted() => Ok(Outcome::Negative),
         None => Ok(Outcome::Done),
+    }
+}
+
+/// Refuses a log that is held out from itself, and two logs that are one.
+fn refuse_same(logs: &[LoadedLog], held_out: &[LoadedLog]) -> Result<(), String> {
+    let known: Vec<RowsOf> = logs.iter().map(LoadedLog::rows).collect();
+    let is_known = |log: &&LoadedLog| {
+        let rows = log.rows();
+        known.iter().any(|other| rows.are_of(other))
+    };
+    if let Some(same) = held_out.iter().find(is_known) {
+        let file = same.input.path.display();
+        return Err(format!("{file} is held out, but it is also the log that is diagnosed"));
+    }
+    match &known[..] {
+        [one, other] if one.are_of(other) => {
+            let [one, other] = [one, other].map(|rows| rows.log.input.path.display());
+            Err(format!("{one} and {other} are the same log, or parts of it: they tell of no load"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Prints the sentences, the tables that have rows, and the remarks.
+fn print(diagnosis: &Diagnosis) {
+    for sentence in &diagnosis.sentences {
+        say!("{sentence}");
+    }
+    say!("");
+    if !diagnosis.causes.is_empty() {
+        say!("{}", cause_table(diagnosis).to_text());
+    }
+    if !diagnosis.held_out.is_empty() {
+        say!("{}", held_out_table(diagnosis).to_text());
+    }
+    if let Some(replay) = &diagnosis.replay {
+        say!("{}", replay_table(replay).to_text());
+    }
+    if !diagnosis.detection_limits.is_empty() {
+        say!("{}", limit_table(diagnosis).to_text());
+    }
+    for warning in &diagnosis.warnings {
+        say!("note: {warning}");
     }
 }
 

@@ -1,41 +1,34 @@
 //! The whole procedure from a log to a diagnosis.
 
-use rayon::prelude::*;
-
-use super::against::{self, Found, Nominal};
+use super::against::{self, Nominal};
 use super::candidates::{self, Candidate};
 use super::cleaned::Cleaned;
 use super::common_motion::{move_to_common_motion, noise_of_mean};
-use super::contenders::Contender;
 use super::detection_limits::detection_limits;
 use super::error::DiagnoseError;
-use super::extension::{Effect, Extension};
+use super::explanation::Explanation;
+use super::extended::Extended;
 use super::finding::Finding;
 use super::form_error::{OnJoint, error_of_form};
 use super::held_out::{Models, Validation, held_out_gain};
 use super::image::{Image, Span};
 use super::intervals;
-use super::judgement::Selected;
 use super::kind::Kind;
 use super::misfit::{self, Known, Left};
 use super::modesty::{make_modest, make_modest_beside_unknown};
 use super::payload::{self, PayloadFinding};
 use super::record::{Record, is_torn};
-use super::remarks::{contact_remark, drift_remark, limited_drives, rest_remark};
+use super::remarks::{contact_remark, drift_remark, limited_drives, rest_remark, tear_remark};
 use super::replay::measured_nm;
 use super::rms::rms_where;
-use super::selection::{Kept, select};
 use super::sentences::Besides;
-use super::settled::{
-    as_told, beside_model, fitted, is_told_of_others, residual, settled, without_contacts,
-};
-use super::study::{Entry, Study};
-use super::verdict::{Cause, Diagnosis, HeldOut, Rival, Rms, Verdict};
+use super::settled::{beside_model, residual};
+use super::study::Study;
+use super::verdict::{Cause, Diagnosis, HeldOut, Rms, Verdict};
 use crate::base::BaseSet;
 use crate::dynamics::Model;
 use crate::identify::{
-    Identification, Identifier, Measurement, Misreading, Options, Regression, drive_limit_remark,
-    resting_joints,
+    Identifier, Measurement, Misreading, Options, Regression, drive_limit_remark,
 };
 use crate::robot::{Arm, JointSignals};
 
@@ -82,6 +75,7 @@ impl<'a> Diagnoser<'a> {
         held_out: &[Validation],
         simulation: Option<Nominal>,
     ) -> Result<Finding, DiagnoseError> {
+        // The log, without the faults of its record, and the model without causes.
         let log = Cleaned::of(m, &self.options)?;
         let m = &log.measurement(m.source);
         let mut regression = log.regression(&mut self.identifier, m.source)?;
@@ -89,84 +83,69 @@ impl<'a> Diagnoser<'a> {
         self.refuse_misread(&regression, m.source)?;
         let measured_nm = measured_nm(&regression);
         move_to_common_motion(&mut regression, (self.arm, self.set), &identification.fit.theta);
-        let noise_nm = noise_of_mean(&regression);
+
+        // What explains it.
         let sources = (self.arm, self.set, &self.options);
-        let (mut study, found) =
-            causes_of(&self.families, sources, &regression, &identification, &log, m.source)?;
-        let mut kept = match study.scene.periodic {
-            true => Kept::of(&study, found),
-            false => Kept::of_a_single_run(&study, found),
-        };
-        let null = Extension::fit(&study, &[], &study.torque);
-        let mut gains = kept.drop_idle();
-        if study.scene.periodic && is_told_of_others(&study, &kept.causes) {
-            let left = kept.causes;
-            let causes = as_told(&mut study, left);
-            study.look_everywhere();
-            kept = Kept::of(&study, causes);
-            gains = kept.drop_idle();
-        }
+        let explanation =
+            Explanation::of(&self.families, sources, &regression, &identification, &log, m.source)?;
+        let Explanation { study, null, .. } = &explanation;
+        let kept = explanation.kept();
         let selected = kept.selected();
-        let before_nm = residual(&study, &null);
-        let mut model = self.extended(&study, &kept, &selected, &gains);
-        let laws = OnJoint::of(&study, &selected, &model.extension.effects);
-        let touches = match log.touched() {
-            Some(touched) => touched.causes.clone(),
-            // Every stall is given back the mean lost time of all stalls. The remaining error shifts torque and motion
-            // against each other for a moment and stands out of the noise as far as a touch does, so no confidence in a
-            // touch would be justified.
-            None if log.is_mended => Vec::new(),
-            None => beside_model(&study, &model.after_nm)?.causes,
-        };
+        let mut model = self.extended(study, &kept, &selected, &explanation.gains);
+        let laws = OnJoint::of(study, &selected, &model.extension.effects);
+        let touches = touches(&log, study, &model.after_nm)?;
         if let Some(simulation) = simulation {
-            self.compare(&study, &selected, simulation, &mut model);
+            self.compare(study, &selected, simulation, &mut model);
         }
+        let Extended { causes, extension, after_nm, accepted, rest } = model;
         let faults = [log.faults.clone(), touches].concat();
-        model.causes = in_order(faults, model.causes, study.scene.periodic);
-        let Extended { mut causes, extension, after_nm, accepted, rest } = model;
-        let base = intervals::base(&study, self.set, &extension);
-        let moved_parameters = simulation.map_or(Vec::new(), |s| against::moved(s, &base));
-        let moved_together = simulation.and_then(|s| against::moved_together(&study, s, &base));
+        let mut causes = in_order(faults, causes, study.scene.periodic);
         let tears = take_out_tears(&mut causes, m);
         make_modest(&mut causes, simulation.is_some());
-        let lack = misfit::lack_of_fit(&study, &accepted, &rest);
+
+        // What is left, and how sure the causes are beside it.
         let rms = |e: &JointSignals| -> Vec<f64> {
             let of = |j: usize| rms_where(e.joint(j), |k| study.whitening.counts(j, k));
             (0..e.joints()).map(of).collect()
         };
+        let before_nm = residual(study, null);
         let [before_rms_nm, after_rms_nm] = [&before_nm, &after_nm].map(rms);
+        let lack = misfit::lack_of_fit(study, &accepted, &rest);
         let form = error_of_form(&laws, &causes, study.scene.joints());
-        let left = left(&study, (&accepted, &rest), lack.as_ref(), (&causes, &form), &log);
+        let left = left(study, (&accepted, &rest), lack.as_ref(), (&causes, &form), &log);
         let Left { unexplained, form_error } = left.at_most(&after_rms_nm);
         if let Some(unknown) = &unexplained {
             make_modest_beside_unknown(&mut causes, unknown.site(), study.scene.periodic);
         }
-        let models = Models { null: &null, extension: &extension };
+
+        // What it is worth elsewhere.
+        let base = intervals::base(study, self.set, &extension);
+        let models = Models { null, extension: &extension };
         let gain = |log| {
             let parts = (&mut self.identifier, &*self.families);
             let currents = self.drive_gain_nm_a.as_deref();
             gain_along(parts, sources, currents, log, &models, &causes)
         };
         let held_out = held_out.iter().map(gain).collect::<Result<Vec<_>, _>>()?;
-        let mut warnings: Vec<String> =
-            log.warnings.iter().chain(&identification.warnings).cloned().collect();
-        warnings.extend(contact_remark(&study, &log));
-        warnings.extend(rest_remark(&regression.prepared.motion.qd_rad_s));
-        let drift = drift_remark(&study, &causes);
-        let limited = limited_drives(self.arm, m.torque_nm, &causes, unexplained.as_ref());
-        warnings.extend(drive_limit_remark(self.arm, m.torque_nm));
-        for held_out in &held_out {
-            let with_name = |warning: &String| format!("{}: {warning}", held_out.log);
-            warnings.extend(held_out.warnings.iter().map(with_name));
-        }
-        if tears > 0 {
-            let warning = "the angles jump as no arm can; what looks like a touch there is none";
-            warnings.push(warning.into());
-        }
+
+        let besides = Besides {
+            doubt: simulation.and_then(|simulation| simulation.doubt),
+            limited: limited_drives(self.arm, m.torque_nm, &causes, unexplained.as_ref()),
+            drift: drift_remark(study, &causes),
+        };
+        let warnings = [
+            log.warnings.clone(),
+            identification.warnings.clone(),
+            contact_remark(study, &log).into_iter().collect(),
+            rest_remark(&regression.prepared.motion.qd_rad_s).into_iter().collect(),
+            drive_limit_remark(self.arm, m.torque_nm).into_iter().collect(),
+            of_held_out(&held_out),
+            tear_remark(tears).into_iter().collect(),
+        ];
         let mut diagnosis = Diagnosis {
             log: m.source.to_owned(),
             noise_floor_nm: identification.replicates.as_ref().map(|r| r.sigma.clone()),
-            noise_of_mean_nm: noise_nm.as_ref().map(rms),
+            noise_of_mean_nm: noise_of_mean(&regression).as_ref().map(rms),
             before: Rms { rms_nm: before_rms_nm },
             verdict: match (&unexplained, causes.is_empty()) {
                 (Some(_), _) => Verdict::Unexplained,
@@ -177,25 +156,24 @@ impl<'a> Diagnoser<'a> {
             unexplained,
             form_error,
             after: Rms { rms_nm: after_rms_nm },
+            moved_parameters: simulation.map_or(Vec::new(), |s| against::moved(s, &base)),
+            moved_together: simulation.and_then(|s| against::moved_together(study, s, &base)),
             base_parameters: base.parameters,
             held_out,
-            moved_parameters,
-            moved_together,
             payload: None,
             replay: None,
-            detection_limits: detection_limits(&study, &accepted),
+            detection_limits: detection_limits(study, &accepted),
             lack_of_fit_probability: lack.map(|lack| lack.probability),
             doubt: None,
             sentences: Vec::new(),
-            warnings,
+            warnings: warnings.concat(),
         };
         self.question_the_arm(&mut diagnosis, &extension, &identification);
         let laws: Vec<Option<usize>> =
             extension.effects.iter().map(|effect| effect.site.map(|j| j + 1)).collect();
-        let doubt = simulation.and_then(|simulation| simulation.doubt);
-        diagnosis.sentences = diagnosis.in_sentences(&laws, Besides { doubt, limited, drift });
+        diagnosis.sentences = diagnosis.in_sentences(&laws, besides);
         let samples = (0..regression.problem.samples).map(|row| regression.sample(row)).collect();
-        let scene = study.scene;
+        let scene = explanation.study.scene;
         Ok(Finding {
             diagnosis,
             identification,
@@ -217,68 +195,6 @@ impl<'a> Diagnoser<'a> {
                 misreading: Box::new(misreading),
             }),
             None => Ok(()),
-        }
-    }
-
-    /// Fits the model of `study` with the causes `selected` from those `kept`; `gains` are their gains on other
-    /// periods.
-    fn extended(
-        &self,
-        study: &Study,
-        kept: &Kept,
-        selected: &[Selected],
-        gains: &[Option<f64>],
-    ) -> Extended {
-        let entries: Vec<&Entry> = selected.iter().map(|s| &s.contender.entry).collect();
-        let extension = Extension::fit(study, &entries, &study.torque);
-        let cause = |(c, selected): (usize, &Selected)| {
-            let gain = gains[c].or(selected.left_out_gain);
-            self.cause(study, kept, selected, c, gain, &extension)
-        };
-        let causes = selected.par_iter().enumerate().map(cause).collect();
-        let (accepted, rest) = kept.without(None);
-        Extended { causes, after_nm: residual(study, &extension), extension, accepted, rest }
-    }
-
-    /// Compares the log with a `simulation`. A kind of cause that can be a change against the simulation is judged by
-    /// this comparison alone, in which effects that any fit would absorb stand out too. Effects that the changes make
-    /// needless are dropped.
-    fn compare(
-        &self,
-        study: &Study,
-        selected: &[Selected],
-        simulation: Nominal,
-        model: &mut Extended,
-    ) {
-        let found = selected.iter().zip(&model.extension.effects).map(|(selected, effect)| Found {
-            entry: &selected.contender.entry,
-            effect,
-            alike: selected.alike(),
-        });
-        let found: Vec<Found> = found.collect();
-        let fitted_nm = fitted(study, &model.extension);
-        let sources = (self.arm, self.set);
-        let explained = against::explain(study, sources, simulation, &found, &fitted_nm);
-        model.causes.retain(|c| !explained.judged.contains(&(c.kind, c.joint)));
-        model.causes.extend(explained.causes);
-        if simulation.doubt.is_some() {
-            // The laws become provisional as well, because they were found beside the changes.
-            let judged = model.causes.iter_mut().filter(|cause| cause.kind.is_a_law());
-            judged.for_each(Cause::make_provisional);
-        }
-        model.rest = study.residual.clone();
-        explained.span.residualise(&mut model.rest);
-        model.accepted = explained.span;
-        // An effect that is not found again beside the simulation leaves the model.
-        let is_named = |entry: &&Entry| {
-            let place = (self.families[entry.family].kind(), entry.site.map(|j| j + 1));
-            model.causes.iter().any(|cause| (cause.kind, cause.joint) == place)
-        };
-        let entries = selected.iter().map(|s| &s.contender.entry);
-        let named: Vec<&Entry> = entries.filter(is_named).collect();
-        if named.len() < selected.len() {
-            model.extension = Extension::fit(study, &named, &study.torque);
-            model.after_nm = residual(study, &model.extension);
         }
     }
 
@@ -311,72 +227,6 @@ impl<'a> Diagnoser<'a> {
         let found = payload::between(&shared, &reference_rows, &loaded_rows, names, known_mass_kg)?;
         Ok(PayloadFinding { was_touched: touched, ..found })
     }
-
-    fn cause(
-        &self,
-        study: &Study,
-        kept: &Kept,
-        selected: &Selected,
-        index: usize,
-        gain_fraction: Option<f64>,
-        extension: &Extension,
-    ) -> Cause {
-        let entry = &selected.contender.entry;
-        let family = &self.families[entry.family];
-        let name = |&(f, site): &(usize, Option<usize>)| {
-            let kind = self.families[f].kind();
-            match site.filter(|_| site != entry.site) {
-                Some(j) => format!("{kind}@{}", j + 1),
-                None => kind.to_string(),
-            }
-        };
-        let class: Vec<String> = selected.class.iter().map(name).collect();
-        let rivals = selected.rivals.iter().map(|rival| Rival {
-            kind: self.families[rival.entry.family].kind(),
-            joint: rival.entry.site.map(|j| j + 1),
-            evidence_behind: selected.contender.evidence - rival.evidence,
-        });
-        let effect = &extension.effects[index];
-        let parameters = intervals::physical(study, kept, &extension.effects, index);
-        let Effect { site, shape, coefficients, .. } = effect;
-        // Only for laws with one coefficient: one of several coefficients may be zero although the others are not.
-        let size = (coefficients.len() == 1)
-            .then(|| family.size(&family.quantities(&study.scene, *site, *shape, coefficients)))
-            .flatten()
-            .and_then(|size| parameters.get(size.name));
-        let nothing = family.without_effect(&study.scene);
-        let may_be_none = size.is_some_and(|size| size.holds(nothing));
-        let mut cause = Cause {
-            kind: family.kind(),
-            joint: entry.site.map(|j| j + 1),
-            confidence: selected.confidence,
-            parameters,
-            peak_joint: None,
-            gain_fraction,
-            separating_experiment: (!class.is_empty()).then(|| family.separating_experiment()),
-            class,
-            strength: selected.contender.score.lambda.max(0.0).sqrt(),
-            in_words: family.in_words().to_owned(),
-            form: family.form(&study.scene, *shape),
-            may_be_none,
-            rivals: rivals.collect(),
-        };
-        if family.is_commonplace(&study.scene, *site, *shape) {
-            cause.make_provisional();
-        }
-        cause
-    }
-}
-
-/// The extended model, and the causes to report.
-struct Extended {
-    causes: Vec<Cause>,
-    extension: Extension,
-    /// Residual of the extended model, Nm.
-    after_nm: JointSignals,
-    /// Span of the causes outside the null model, and the residual of the null model without its part in this span.
-    accepted: Span,
-    rest: Image,
 }
 
 /// Orders the causes. For a repeating motion: faults of the record before physics, physics by strength. For a single
@@ -391,35 +241,21 @@ fn in_order(mut faults: Vec<Cause>, mut physics: Vec<Cause>, periodic: bool) -> 
     faults.into_iter().chain(physics).collect()
 }
 
-/// Prepares the study of the log in `regression` and finds its causes.
-fn causes_of<'a>(
-    families: &'a [Box<dyn Candidate>],
-    sources: (&Arm, &BaseSet, &Options),
-    regression: &'a Regression,
-    identification: &Identification,
+/// Contacts with the arm: those that the comparison of repetitions shows, or those in what the model leaves along a single
+/// run.
+fn touches(
     log: &Cleaned,
-    source: &str,
-) -> Result<(Study<'a>, Vec<Contender>), DiagnoseError> {
-    let (arm, set, _) = sources;
-    let estimate = (&identification.fit.theta[..], &identification.fit.joint_sigma_nm[..]);
-    let mut first = Study::new(families, sources, regression, estimate, source)?;
-    first.leave_out(log.unreadable.clone());
-    first.resting = resting_joints(&regression.prepared.motion.qd_rad_s);
-    let null = Extension::fit(&first, &[], &first.torque);
-    let mut first = without_contacts(first, set, &null, source)?;
-    first.look_everywhere();
-    let found = select(&first);
-    let (mut study, found) = if found.causes.is_empty() && first.scene.periodic {
-        (first, found.causes)
-    } else {
-        settled(first, found, (arm, set), source)?
-    };
-    if !study.scene.periodic {
-        // A single run is judged by the residual that the causes leave, which is known only at this point.
-        let (_, rest) = Kept::taken_over(&study, found.clone()).without(None);
-        study.judge_by(&rest);
+    study: &Study,
+    after_nm: &JointSignals,
+) -> Result<Vec<Cause>, DiagnoseError> {
+    match log.touched() {
+        Some(touched) => Ok(touched.causes.clone()),
+        // Every stall is given back the mean lost time of all stalls. The remaining error shifts torque and motion
+        // against each other for a moment and stands out of the noise as far as a touch does, so no confidence in a
+        // touch would be justified.
+        None if log.is_mended => Ok(Vec::new()),
+        None => Ok(beside_model(study, after_nm)?.causes),
     }
-    Ok((study, found))
 }
 
 /// Gain of the extended model over the null model along another `log`.
@@ -437,6 +273,14 @@ fn gain_along(
     let measurement = record.measurement(log.measurement.source);
     let log = &Validation { measurement, manufacturer_nm: log.manufacturer_nm };
     held_out_gain(identifier, sources, drive_gain_nm_a, families, log, models)
+}
+
+/// The remarks on held-out logs, each with the name of its log.
+fn of_held_out(held_out: &[HeldOut]) -> Vec<String> {
+    let with_name = |log: &HeldOut| -> Vec<String> {
+        log.warnings.iter().map(|warning| format!("{}: {warning}", log.log)).collect()
+    };
+    held_out.iter().flat_map(with_name).collect()
 }
 
 /// Removes contacts at which the angles jump as no arm can, and returns their number.

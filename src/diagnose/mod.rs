@@ -38,6 +38,8 @@ mod dictionary;
 mod distinct_shapes;
 mod drives;
 mod error;
+mod explanation;
+mod extended;
 mod extension;
 mod finding;
 mod form_error;

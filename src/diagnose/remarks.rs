@@ -64,6 +64,12 @@ pub(super) fn rest_remark(qd_rad_s: &JointSignals) -> Option<String> {
     })
 }
 
+/// States that what looks like a touch at some `tears` of the angles is none.
+pub(super) fn tear_remark(tears: usize) -> Option<String> {
+    let remark = "the angles jump as no arm can; what looks like a touch there is none";
+    (tears > 0).then(|| remark.to_owned())
+}
+
 /// Warns of mean torques that drift, except on joints with a thermal drift among the causes.
 pub(super) fn drift_remark(study: &Study, causes: &[Cause]) -> Option<String> {
     let is_said = |joint: usize| {

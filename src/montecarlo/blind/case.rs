@@ -6,8 +6,9 @@ use rand::seq::IndexedRandom;
 use serde::{Deserialize, Serialize};
 
 use super::benchmark::{Benchmark, BlindError};
-use super::family::{Family, Judged, Recipe, Surroundings, chance, log_uniform};
+use super::family::{Family, Judged};
 use super::plan::Shares;
+use super::recipe::{Recipe, Surroundings, chance, log_uniform};
 use crate::diagnose::Kind;
 use crate::montecarlo::{EffectSize, Scenario, Simulation};
 use crate::plant::NoiseModel;
@@ -269,7 +270,7 @@ impl Maker<'_> {
             window_s: self.scenario.excitation.periodic_window_s(),
             sensors: &self.scenario.sensors,
         };
-        let recipe = family.recipe(joint, &around, self.rng);
+        let recipe = Recipe::draw(family.kind, joint, &around, self.rng);
         let wanted = log_uniform(self.rng, range);
         let (effect, strength) = self.sized(&family, &recipe, wanted)?;
         Ok(Hidden { kind: family.kind, joint, judged: family.judged, strength, effect })

@@ -12,6 +12,7 @@ mod case;
 mod family;
 mod judge;
 mod plan;
+mod recipe;
 mod record;
 mod score;
 mod target;
