@@ -1,6 +1,6 @@
 //! Output files: checked before the work starts, and afterwards either complete or not there at all.
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -66,12 +66,14 @@ impl OutputError {
 /// Checks that `path` can be written now: its folder exists and accepts a new file, and the path is neither a folder
 /// nor read-only. Called before long work, so that its result is not lost at the end.
 pub fn check_writable(path: &Path) -> Result<(), OutputError> {
+    let fault = |e| OutputError::new(path, e);
     match Target::find(path)? {
+        Target::StandardOutput | Target::StandardError => {}
         Target::Device => {
-            OpenOptions::new().write(true).open(path).map_err(|e| OutputError::new(path, e))?;
+            open_device(path).map_err(fault)?;
         }
         Target::File { path: file, .. } => {
-            Partial::create(&file).map_err(|e| OutputError::new(path, e))?;
+            Partial::create(&file).map_err(fault)?;
         }
     }
     Ok(())
@@ -83,8 +85,10 @@ pub fn check_outputs(
     outputs: impl IntoIterator<Item = impl AsRef<Path>>,
     inputs: impl IntoIterator<Item = impl AsRef<Path>>,
 ) -> Result<(), OutputError> {
+    // What is read through a name of an open file, such as `/dev/stdin`, may be a file all the same.
+    let read = |input: &Path| place(input).or_else(|| fs::canonicalize(input).ok());
     let inputs: Vec<PathBuf> =
-        inputs.into_iter().filter_map(|input| place(input.as_ref())).collect();
+        inputs.into_iter().filter_map(|input| read(input.as_ref())).collect();
     let mut taken: Vec<PathBuf> = Vec::new();
     for output in outputs {
         let path = output.as_ref();
@@ -104,28 +108,23 @@ pub fn check_outputs(
 /// The file that `path` names, with all links resolved, whether it exists or not; `None` for paths that no file can
 /// replace: a device, a folder, a file that cannot be written.
 fn place(path: &Path) -> Option<PathBuf> {
-    match Target::find(path).ok()? {
-        Target::Device => None,
-        Target::File { path, .. } => {
-            let folder = fs::canonicalize(folder_of(&path)).ok()?;
-            Some(folder.join(path.file_name()?))
-        }
-    }
+    let Target::File { path, .. } = Target::find(path).ok()? else { return None };
+    let folder = fs::canonicalize(folder_of(&path)).ok()?;
+    Some(folder.join(path.file_name()?))
 }
 
 /// Writes `path` as a whole: into a temporary file beside it, which is forced to disk and then renamed. On any error,
 /// including one of the writer itself, an earlier file of that name stays as it was and the temporary file is removed.
-/// A device (such as `/dev/stdout`) is written directly.
+/// A device, or an open file of this program (such as `/dev/stdout`), is written directly.
 pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), OutputError> {
     let fault = |e| OutputError::new(path, e);
     match Target::find(path)? {
-        Target::Device => {
-            let file = OpenOptions::new().write(true).open(path).map_err(fault)?;
-            fill(&file, write).map_err(fault)
-        }
+        Target::StandardOutput => fill(io::stdout(), write).map_err(fault),
+        Target::StandardError => fill(io::stderr(), write).map_err(fault),
+        Target::Device => open_device(path).and_then(|file| fill(file, write)).map_err(fault),
         Target::File { path: file, permissions } => {
             let partial = Partial::create(&file).map_err(fault)?;
             fill(&partial.file, write).map_err(fault)?;
@@ -143,46 +142,78 @@ pub fn write_text(path: &Path, text: &str) -> Result<(), OutputError> {
     write_atomically(path, |out| out.write_all(text.as_bytes()))
 }
 
-fn fill(file: &File, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+fn fill(file: impl Write, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
     let mut buffer = BufWriter::with_capacity(1 << 16, file);
     write(&mut buffer)?;
     buffer.flush()
 }
 
+/// Opens a device for appending: behind `/dev/fd/3` there may be a file that already has contents.
+fn open_device(path: &Path) -> io::Result<File> {
+    OpenOptions::new().append(true).open(path)
+}
+
+/// Longest chain of links that is followed, as in Linux.
+const LINKS: usize = 40;
+
 /// The kind of object that a path leads to.
 enum Target {
     /// A regular file that exists or can be created; links are followed, so that a link stays a link.
     File { path: PathBuf, permissions: Option<fs::Permissions> },
-    /// A terminal, pipe or device, which cannot be replaced by renaming.
+    /// A terminal, pipe, device or open file, which cannot be replaced by renaming.
     Device,
+    /// The standard output. Opened once more by its name, a file behind it would be written from its start.
+    StandardOutput,
+    /// The standard error, for which the same holds.
+    StandardError,
 }
 
 impl Target {
     fn find(path: &Path) -> Result<Self, OutputError> {
         let fault = |e| OutputError::new(path, e);
-        match fs::metadata(path) {
+        // Links are followed one by one: the name of an open file is a link too, but to the file behind it, and the last
+        // link may lead to a file that does not exist yet. In a circle of links the last one remains, and is refused.
+        let mut end = path.to_owned();
+        for _ in 0..LINKS {
+            if let Some(open) = Self::of_open_file(&end) {
+                return Ok(open);
+            }
+            let Ok(next) = fs::read_link(&end) else { break };
+            end = folder_of(&end).join(next);
+        }
+        match fs::metadata(&end) {
             Ok(data) if data.is_dir() => Err(OutputError::IsFolder { path: path.to_owned() }),
             Ok(data) if !data.is_file() => Ok(Self::Device),
             Ok(data) if data.permissions().readonly() => {
                 Err(fault(io::Error::new(ErrorKind::PermissionDenied, "the file is read-only")))
             }
             Ok(data) => Ok(Self::File {
-                path: fs::canonicalize(path).map_err(fault)?,
+                path: fs::canonicalize(&end).map_err(fault)?,
                 permissions: Some(data.permissions()),
             }),
             Err(e) if e.kind() == ErrorKind::NotFound => {
-                let folder = folder_of(path);
-                match fs::metadata(folder) {
-                    Ok(data) if data.is_dir() && path.file_name().is_some() => {
-                        Ok(Self::File { path: path.to_owned(), permissions: None })
+                let folder = folder_of(&end).to_owned();
+                match fs::metadata(&folder) {
+                    Ok(data) if data.is_dir() && end.file_name().is_some() => {
+                        Ok(Self::File { path: end, permissions: None })
                     }
-                    _ => Err(OutputError::NoFolder {
-                        path: path.to_owned(),
-                        folder: folder.to_owned(),
-                    }),
+                    _ => Err(OutputError::NoFolder { path: path.to_owned(), folder }),
                 }
             }
             Err(e) => Err(fault(e)),
+        }
+    }
+
+    /// What `path` leads to if it names an open file by its number, such as `/dev/fd/1` or `/proc/self/fd/1`, or anything
+    /// else of the system in `/proc`. The rest of `/dev` is told by its kind: `/dev/shm` holds regular files.
+    fn of_open_file(path: &Path) -> Option<Self> {
+        let folder = fs::canonicalize(folder_of(path)).ok()?;
+        let own = fs::canonicalize("/proc/self/fd").ok();
+        let is_own = folder == Path::new("/dev/fd") || own.is_some_and(|own| folder == own);
+        match path.file_name().and_then(OsStr::to_str) {
+            Some("1") if is_own => Some(Self::StandardOutput),
+            Some("2") if is_own => Some(Self::StandardError),
+            _ => (is_own || folder.starts_with("/proc")).then_some(Self::Device),
         }
     }
 }
@@ -317,5 +348,64 @@ mod tests {
         write_atomically(&link, |w| w.write_all(b"new")).unwrap();
         assert_eq!(fs::read_to_string(&file).unwrap(), "new");
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+    }
+
+    /// Targets of links are relative to the folder of the link.
+    #[cfg(unix)]
+    #[test]
+    fn a_link_to_a_file_that_is_not_there_yet_is_followed() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let link = |target: &str, name: &str| {
+            std::os::unix::fs::symlink(target, at(name)).unwrap();
+        };
+        fs::create_dir(at("links")).unwrap();
+        link("links/second", "first");
+        link("../file", "links/second");
+        let twice = check_outputs([at("first"), at("file")], [at("missing.csv")]);
+        assert!(matches!(twice, Err(OutputError::Twice { .. })));
+        write_text(&at("first"), "new").unwrap();
+        assert_eq!(fs::read_to_string(at("file")).unwrap(), "new");
+        assert!(["first", "links/second"].map(at).iter().all(|link| link.is_symlink()));
+
+        link("nowhere/file", "lost");
+        let error = check_writable(&at("lost")).unwrap_err();
+        assert!(error.to_string().contains("nowhere does not exist"), "{error}");
+        link("round", "about");
+        link("about", "round");
+        let error = check_writable(&at("about")).unwrap_err();
+        assert!(matches!(error, OutputError::NotWritable { .. }), "{error}");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn the_standard_streams_are_known_by_all_their_names() {
+        let folder = tempfile::tempdir().unwrap();
+        let link = folder.path().join("link");
+        std::os::unix::fs::symlink("/dev/stdout", &link).unwrap();
+        let output = ["/dev/stdout", "/dev/../dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
+        for path in output.map(Path::new).into_iter().chain([&*link]) {
+            assert!(matches!(Target::find(path), Ok(Target::StandardOutput)), "{path:?}");
+        }
+        for path in ["/dev/stderr", "/dev/fd/2", "/proc/self/fd/2"].map(Path::new) {
+            assert!(matches!(Target::find(path), Ok(Target::StandardError)), "{path:?}");
+        }
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn an_open_file_is_added_to() {
+        use std::os::fd::AsRawFd;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("all.txt");
+        let mut file = File::create(&path).unwrap();
+        file.write_all(b"earlier, ").unwrap();
+        let open = PathBuf::from(format!("/dev/fd/{}", file.as_raw_fd()));
+        check_outputs([&open], [&folder.path().join("log.csv")]).unwrap();
+        write_text(&open, "new").unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "earlier, new");
+        // A file that is read through its number is not to be replaced either.
+        let replaced = check_outputs([&path], [&open]);
+        assert!(matches!(replaced, Err(OutputError::IsInput { .. })));
     }
 }

@@ -13,9 +13,10 @@ fn excite(folder: &Folder, words: &str) -> Said {
 #[test]
 fn a_small_design_writes_every_output() {
     let folder = Folder::empty();
-    let words = "--robot ur5 --order 3 --starts 2 --finalists 1 --out t.json --csv t.csv \
+    let words = "--robot ur5 --order 3 --starts 2 --finalists 1 --rate 10 --out t.json --csv t.csv \
                  --urscript t.script --speed 0.5 --report t.html --box 0.4,-0.5,0,0.9,0.5,0.3 --velocity-share 0.5";
-    excite(&folder, words).says(0, &[]);
+    let slowed = "those of full speed: at a speed of 0.5 the motion takes 16";
+    excite(&folder, words).says(0, &[slowed]);
     let series = FourierSeries::load(folder.path("t.json").to_str().unwrap());
     let series = series.unwrap();
     assert_eq!(series.order(), 3);
@@ -33,13 +34,16 @@ fn a_small_design_writes_every_output() {
     assert!(margins.len() > 24 && margins.iter().all(|m| m["free"].as_f64().unwrap() >= 0.0));
     let page = folder.read("t.html");
     assert!(page.contains("forearm and wrist 3") && page.contains("The swept arm"));
+    assert!(page.contains(slowed));
     // What is played has half the speed of the design, a little more between the instants at which that was checked.
     for row in folder.read("t.csv").lines().skip(1) {
         let row: Vec<f64> = row.split(',').map(|word| word.parse().unwrap()).collect();
         let mut velocities = row[7..13].iter().zip(&limits);
         assert!(velocities.all(|(qd, limit)| qd.abs() <= 0.26 * limit), "{row:?}");
     }
-    assert!(folder.read("t.script").contains("speed = 0.5\n"));
+    // The set points follow each other as controllers expect it, however slowly the data are recorded.
+    let script = folder.read("t.script");
+    assert!(script.contains("speed = 0.5\n") && script.contains("cycle = 0.008\n"), "{script}");
 }
 
 /// Exit code 3, a reason, and no file: a failed design must not look like a successful one.
@@ -59,9 +63,9 @@ fn bad_input_is_named_before_the_work() {
     fails("--robot ur5 --out no/such/folder/t.json", "no/such/folder");
     fails("--robot ur5 --out t.json --offsets 0,0", "6 joints");
     fails("--robot ur5 --out t.json --offsets 0,x,0,0,0,0", "\"x\"");
-    fails("--robot ur5 --out t.json --offsets 0,0.5,0,0,0,0", "floor");
     fails("--robot ur5 --out t.json --noise-nm 1,1", "6 joints");
     fails("--robot ur5 --out t.json --period nan", "NaN");
+    fails("--robot ur5 --out t.json --data 1e300", "= 1.00000e300 must be at most 86400 s");
     fails("--robot ur5 --out t.json --seconds 0", "seconds");
     fails("--robot ur5 --out t.json --urscript t.script --speed 2", "speed");
     fails("--robot ur5 --out t.json --csv t.csv --speed 0", "speed");
@@ -81,6 +85,15 @@ fn what_no_motion_keeps_clear_of_is_a_negative_result() {
     let words = "--robot ur5 --box -0.3,-0.3,0,0.3,0.3,0.3 --out t.json";
     excite(&folder, words).complains(3, &["clearance of upper arm and box 1"]);
     assert!(!folder.path("t.json").exists());
+}
+
+#[test]
+fn a_fixed_pose_inside_the_floor_is_a_negative_result() {
+    let folder = Folder::empty();
+    let words = "--robot ur5 --out t.json --offsets 0,1.5,0,0,0,0";
+    excite(&folder, words)
+        .complains(3, &["no pose the arm may take", "floor", "nothing was written"]);
+    assert!(folder.is_empty());
 }
 
 /// Gaps in a URDF are reported, and a distance that cannot be watched is not promised.
@@ -180,7 +193,7 @@ fn an_arm_with_collision_shapes_is_kept_clear() {
     assert_eq!(inputs, 2 + 8, "URDF, drive file, meshes");
     // For an arm folded onto itself, the message names the links and the remedy.
     let folded = excite(&folder, &format!("{words} --offsets 0,-1.57,3.1,0,0,0"));
-    folded.complains(1, &["no pose the arm may take: clearance of ", "_link", "unwatched_pairs"]);
+    folded.complains(3, &["no pose the arm may take: clearance of ", "_link", "unwatched_pairs"]);
     folder.write("arm.drives.toml", "clearance = \"none\"\n");
     excite(&folder, words).complains(0, &["the robot has no capsules"]);
 }

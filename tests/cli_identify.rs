@@ -45,6 +45,8 @@ fn bad_input_ends_in_a_message_that_names_it() {
     refused("identify log.csv --robot ur5 --period 3", 1, &["does not repeat every 3 s"]);
     let slow = ["log.csv: a single run", "10 Hz (--cutoff)", "18.0 Hz"];
     refused("identify log.csv --robot ur5 --rate 18 --period 0", 1, &slow);
+    let narrow = ["log.csv: the low-pass at 0.05 Hz (--cutoff) leaves 0.", "at least 6 are needed"];
+    refused("identify log.csv --robot ur5 --cutoff 0.05 --period 0", 1, &narrow);
     let unwritable = "identify log.csv --robot ur5 --json /no/such/folder/x.json";
     refused(unwritable, 1, &["/no/such/folder"]);
     refused("identify log.csv", 2, &["--robot"]);
@@ -82,6 +84,50 @@ fn a_motion_that_does_not_excite_the_arm_is_a_negative_result_not_an_error() {
     assert_eq!(result["not_identified"].as_array().unwrap().len(), 52);
     assert!(folder.read("rest.html").contains("no joint moves"));
     folder.armid("diagnose rest.csv --robot ur5").says(3, &["declined", "armid excite"]);
+}
+
+/// Joint 1 of this arm turns too fast for a sample per second. It does not rest: a higher rate is all it takes.
+#[test]
+fn a_rate_too_low_for_the_motion_is_not_called_rest() {
+    let folder = Folder::empty();
+    folder.write("s.toml", default_scenario(7));
+    folder.armid("simulate --scenario s.toml --out run.csv").says(0, &["samples"]);
+    let lost =
+        ["Declined", "At 1.00 Hz (--rate) less than half of the motion of joint 1", "or none"];
+    let told = folder.armid("identify run.csv --robot ur5 --rate 1").says(3, &lost);
+    assert!(!told.contains("not move") && !told.contains("Record a motion"), "{told}");
+    // Fewer samples than any experiment has, whether a period is looked for or not.
+    for options in ["--rate 0.5", "--rate 0.5 --period 0"] {
+        let words = format!("identify run.csv --robot ur5 {options}");
+        folder.armid(&words).says(1, &["run.csv: in samples at 0.5 Hz (--rate) the motion"]);
+    }
+}
+
+/// Of several logs, the one that is too short has to be known.
+#[test]
+fn a_log_too_short_for_its_sigma_is_named() {
+    let folder = Folder::empty();
+    folder.write("short.csv", log([0.5; 6], 300));
+    for command in ["identify", "diagnose"] {
+        let words = format!("{command} short.csv --robot ur5");
+        folder.armid(&words).says(1, &["error: short.csv: 2.", "s of motion without a gap"]);
+    }
+}
+
+/// Logs of several days often have the same name, in folders of their own.
+#[test]
+fn validation_logs_of_one_name_are_told_by_their_folders() {
+    let folder = Folder::empty();
+    folder.write("s.toml", default_scenario(2));
+    for trial in 0..3 {
+        let words = format!("simulate --scenario s.toml --trial {trial} --out {trial}.csv");
+        folder.armid(&words).says(0, &["samples"]);
+    }
+    folder.write("a/run.csv", folder.read("1.csv"));
+    folder.write("b/run.csv", folder.read("2.csv"));
+    let words = "identify 0.csv --robot ur5 --report r.html --validate a/run.csv b/run.csv";
+    folder.armid(words).says(0, &["a/run: prediction", "b/run: prediction"]);
+    assert!(!folder.read("r.html").contains("Validation on run"));
 }
 
 /// An identification is not lost because a log it is validated on is of no use.
@@ -281,6 +327,8 @@ fn what_is_chosen_of_the_processing_is_what_is_done() {
         assert_eq!(result["estimator"], estimator);
     };
     done(&identified(""), 10.0, 125.0, "wls");
+    let narrower = folder.armid("identify log.csv --robot ur5 --cutoff 2.5");
+    narrower.says(0, &["low-passed at 2.50 Hz"]);
     let options = "--cutoff 5 --rate 100 --estimator ols";
     let chosen = identified(options);
     done(&chosen, 5.0, 100.0, "ols");

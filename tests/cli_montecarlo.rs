@@ -103,6 +103,43 @@ fn a_stopped_run_goes_on_where_it_was() {
     folder.montecarlo("merge half").says(0, &["6 trials"]);
 }
 
+/// A shard that cannot be written, or that another output would replace, is refused before anything is simulated.
+#[test]
+fn a_shard_has_a_file_of_its_own() {
+    let folder = runs();
+    let file = file_of("own", 0, 6);
+    folder.write("own/note.txt", "nothing yet");
+    let refused = |words: &str, expected: &[&str]| {
+        let said = folder.montecarlo(&format!("{RUN} {words}"));
+        said.complains(1, expected);
+        assert!(!said.stderr.contains("simulating"), "{words}: {}", said.stderr);
+    };
+    for output in ["json", "report", "markdown"] {
+        let words = format!("--out own --{output} {file}");
+        refused(&words, &[&file, "two outputs would go to this file"]);
+    }
+    assert!(!folder.path(&file).exists());
+    refused("--out s.toml/own", &["s.toml/own"]);
+}
+
+/// What goes to the standard output is added to the file behind it, and does not replace it.
+#[cfg(unix)]
+#[test]
+fn a_redirected_output_keeps_what_the_file_has() {
+    let folder = runs();
+    folder.write("all.txt", "earlier\n");
+    let path = folder.path("all.txt");
+    let all = std::fs::OpenOptions::new().append(true).open(&path).unwrap();
+    let mut merge = folder.montecarlo_command("merge a b --json /dev/stdout");
+    let output = merge.stdout(all).output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let text = folder.read("all.txt");
+    assert!(text.starts_with("earlier\n"), "{text}");
+    for part in ["6 trials (", "\"schema\""] {
+        assert!(text.contains(part), "\"{part}\" is not in: {text}");
+    }
+}
+
 #[test]
 fn shards_that_do_not_belong_together_are_refused() {
     let folder = runs();

@@ -164,7 +164,9 @@ fn ends(bench: &Run, text: &str, period_s: Option<f64>) -> [End; 2] {
 fn end_of(error: &IdentifyError) -> Option<End> {
     match error {
         IdentifyError::TooShort { .. }
-        | IdentifyError::Covariance(CovarianceError::TooShort { .. }) => Some(TooShort),
+        | IdentifyError::Covariance { error: CovarianceError::TooShort { .. }, .. } => {
+            Some(TooShort)
+        }
         IdentifyError::NoMotion { .. } => Some(NoMotion),
         IdentifyError::Cutoff { .. } => Some(TooSlow),
         IdentifyError::DeadTorque { .. } => Some(NoTorque),

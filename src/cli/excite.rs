@@ -22,10 +22,10 @@ use crate::base::{BaseSet, Parameterisation};
 use crate::excitation::design::{
     self, Budget, Criterion, Design, DesignError, Experiment, Specification, Variables,
 };
-use crate::excitation::export::{Playback, SLOWEST, Slowed, urscript, write_csv};
+use crate::excitation::export::{Playback, Slowed, Speed, urscript, write_csv};
 use crate::excitation::{Requirements, TRAJECTORY_SCHEMA};
 use crate::output::{check_outputs, write_atomically, write_text};
-use crate::report::excitation::page;
+use crate::report::excitation::{at_full_speed, page};
 use crate::report::json::{Document, Program};
 use crate::robot::{Arm, Joint, LoadedArm};
 
@@ -76,8 +76,7 @@ pub struct ExciteArgs {
     /// Length of the periodic part of the motion, s, in whole periods that cover it. Run-in and run-out are added.
     #[arg(long = "data", value_name = "S", default_value_t = 80.0)]
     data_s: f64,
-    /// Rate of the data, of the CSV and of the set points in the URScript, Hz. CB-series controllers take 125 divided by
-    /// a whole number, e-Series controllers 500 divided by one.
+    /// Rate of the data and of the CSV, Hz. The URScript has a set point every 8 ms at any rate.
     #[arg(long = "rate", value_name = "HZ", default_value_t = 125.0)]
     rate_hz: f64,
     /// Result of an earlier identification. The motion is designed for the parameters that are still poorly known.
@@ -166,13 +165,10 @@ pub fn run(args: &ExciteArgs) -> CommandResult {
     for joint in &mut arm.joints {
         joint.limits.velocity_rad_s *= args.velocity_share;
     }
-    if !(SLOWEST..=1.0).contains(&args.speed) {
-        let message = format!("must be from {SLOWEST} to 1");
-        return Err(BadOption::new("speed", args.speed, message).into());
-    }
+    let speed = Speed::new(args.speed)?;
     let arm = arm;
     say_what_is_watched(&args.robot, &arm, &args.boxes)?;
-    let playback = playback(args, &arm)?;
+    let playback = playback(args, &arm, speed)?;
     let base = BaseSet::find(&arm, Parameterisation::full(arm.dof(), arm.torque_offsets))?;
     let spec = specification(args, &arm, &base)?;
     let outputs =
@@ -212,6 +208,7 @@ pub fn run(args: &ExciteArgs) -> CommandResult {
         Err(
             e @ (DesignError::Infeasible { .. }
             | DesignError::NeverClear { .. }
+            | DesignError::FixedPose { .. }
             | DesignError::OutOfTime { .. }
             | DesignError::CheckFailed { .. }),
         ) => {
@@ -221,8 +218,8 @@ pub fn run(args: &ExciteArgs) -> CommandResult {
         other => other?,
     };
     let seconds = begun.elapsed().as_secs_f64();
-    print_summary(&base, &spec, &found, seconds);
-    write_outputs(args, (&arm, &base, &spec), &found, (&program, playback.as_ref()))?;
+    print_summary(&base, &spec, &found, speed, seconds);
+    write_outputs(args, (&arm, &base, &spec), &found, (&program, speed, playback.as_ref()))?;
     if interrupted && found.cut_short {
         eprintln!("interrupted: what was written is the best motion found until then");
         return Ok(Outcome::Interrupted);
@@ -231,15 +228,10 @@ pub fn run(args: &ExciteArgs) -> CommandResult {
 }
 
 /// How the requested URScript plays the motion; `None` if none is requested.
-fn playback(args: &ExciteArgs, arm: &Arm) -> Result<Option<Playback>, BadOption> {
+fn playback(args: &ExciteArgs, arm: &Arm, speed: Speed) -> Result<Option<Playback>, BadOption> {
     let Some(path) = &args.urscript else { return Ok(None) };
-    let asked = format!("{} --rate {}", path.display(), args.rate_hz);
-    let playback = Playback::new(arm.dof(), args.rate_hz, args.speed)
-        .map_err(|fault| BadOption::new("urscript", &asked, fault.to_string()))?;
-    if !playback.suits_cb_series() {
-        let why = "set points are no multiple of 8 ms apart";
-        eprintln!("note: --urscript {asked}: plays on the e-Series, not on the CB-Series ({why})");
-    }
+    let playback = Playback::new(arm.dof(), speed)
+        .map_err(|fault| BadOption::new("urscript", path.display(), fault.to_string()))?;
     Ok(Some(playback))
 }
 
@@ -343,7 +335,7 @@ impl Rounds {
     }
 }
 
-fn print_summary(base: &BaseSet, spec: &Specification, found: &Design, seconds: f64) {
+fn print_summary(base: &BaseSet, spec: &Specification, found: &Design, speed: Speed, seconds: f64) {
     let p = &found.prediction;
     say!(
         "cond(ΘᵀΘ) {:.1}, columns scaled {:.2}; predicted from {} periods, {:.1} s: geometric mean σ {:.6}, relative σ \
@@ -356,6 +348,9 @@ fn print_summary(base: &BaseSet, spec: &Specification, found: &Design, seconds: 
         100.0 * p.relative_quantile(0.5),
         100.0 * p.relative_quantile(0.9),
     );
+    if let Some(remark) = at_full_speed(found, speed) {
+        say!("{remark}");
+    }
     say!(
         "{} base parameters; margins, the smallest share of a limit first (of clearance: what is left beyond {} m, over 0.1 m; a tool \
          that the robot's description lacks is not kept clear):",
@@ -384,19 +379,19 @@ fn write_outputs(
     args: &ExciteArgs,
     (arm, base, spec): (&Arm, &BaseSet, &Specification),
     found: &Design,
-    (program, playback): (&Program, Option<&Playback>),
+    (program, speed, playback): (&Program, Speed, Option<&Playback>),
 ) -> Result<(), Box<dyn Error>> {
     let record = Record::of(arm, spec, found);
     Document { schema: TRAJECTORY_SCHEMA, program, body: &record }.write(&args.out)?;
     if let Some(path) = &args.csv {
-        let motion = Slowed::new(&found.excitation, args.speed)?;
+        let motion = Slowed::new(&found.excitation, speed);
         write_atomically(path, |out| write_csv(out, &motion, args.rate_hz))?;
     }
     if let Some((path, playback)) = args.urscript.as_ref().zip(playback) {
         write_text(path, &urscript(&found.excitation, playback))?;
     }
     if let Some(path) = &args.report {
-        page(arm, base, spec, found, program.clone())?.write(path)?;
+        page(arm, base, spec, found, speed, program.clone())?.write(path)?;
     }
     Ok(())
 }

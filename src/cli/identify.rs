@@ -5,6 +5,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::PathBuf;
 
 use clap::Args;
+use serde::Serialize;
 
 use super::robot::{inputs, load_robot};
 use super::{CommandResult, Outcome};
@@ -12,10 +13,10 @@ use crate::base::{BaseSet, Parameterisation};
 use crate::diagnose::without_wild_readings;
 use crate::dynamics::Model;
 use crate::identify::covariance::CovarianceKind;
-use crate::identify::physical::{self, PhysicalOptions, PriorMetric, PriorWeight};
+use crate::identify::physical::{self, PhysicalError, PhysicalOptions, PriorMetric, PriorWeight};
 use crate::identify::{
     Estimator, FitError, Identification, Identifier, IdentifyError, Improper, Measurement,
-    Misreading, Options, Processing, SeveralLogs,
+    Misreading, Options, Processing, Regression, SeveralLogs,
 };
 use crate::log::{Layout, Log, read_log};
 use crate::output::check_outputs;
@@ -25,6 +26,7 @@ use crate::report::identify::{
 };
 use crate::report::json::{Document, Input, Program};
 use crate::report::misread::MisreadLog;
+use crate::report::{Page, ReportError};
 use crate::robot::{Arm, JointSignals, LoadedArm};
 
 /// Identify the base parameters of an arm from logs of its motion.
@@ -162,6 +164,17 @@ impl LoadedLog {
         self.mended = remarks.into_iter().map(of_log).collect();
     }
 
+    /// How the log has to be read, if not as it was.
+    fn misreading(
+        &self,
+        arm: &Arm,
+        regression: &Regression,
+        options: &Options,
+    ) -> Option<Misreading> {
+        let gain = self.log.drive_gain_nm_a(arm);
+        Misreading::of(arm, regression, options, gain.as_deref())
+    }
+
     /// What tells its recording from others.
     pub fn rows(&self) -> RowsOf<'_> {
         let channels = [&self.log.q_rad, &self.log.qd_rad_s, &self.torque_nm];
@@ -220,119 +233,206 @@ pub fn read_logs(
     files.iter().map(read).collect()
 }
 
+/// What the command reads.
+struct Sources {
+    arm: Arm,
+    layout: Layout,
+    set: BaseSet,
+    logs: Vec<LoadedLog>,
+    validation_logs: Vec<LoadedLog>,
+}
+
+/// What was identified from the logs.
+struct Identified {
+    regression: Regression,
+    identification: Identification,
+    /// The first log that has to be read differently.
+    misread: Option<MisreadLog>,
+}
+
 /// Runs the command.
 pub fn run(args: &IdentifyArgs) -> CommandResult {
-    let options = Options { covariance: args.covariance, ..args.processing.options()? };
-    if args.logs.len() > 1 && args.prior_weight == PriorWeight::CrossValidated {
-        let message = "the weight is found by leaving out periods of one log in turn; of several logs give it as a number";
-        return Err(format!("--prior-weight auto: {message}").into());
+    let options = args.options()?;
+    let (sources, program) = Sources::read(args)?;
+    let Sources { arm, set, .. } = &sources;
+    let model = Model::new(arm);
+    let mut identifier = Identifier::new(&model, set, options);
+    let identified = match sources.identify(args, &mut identifier)? {
+        Ok(identified) => identified,
+        Err(declined) => return decline(args, &declined, program),
+    };
+    let training = Training {
+        arm,
+        robot_source: &args.source.robot,
+        set,
+        logs: &sources.training_logs(),
+        nominal: &set.values(&model.standard_parameters()),
+        regression: &identified.regression,
+        identification: &identified.identification,
+        reduced: args.reduced.as_deref(),
+        misread: identified.misread.as_ref(),
+    };
+    // An error in a later step must not discard the identification.
+    let mut failed: Vec<String> = Vec::new();
+    let validations = sources.validations(&mut identifier, &training, &mut failed);
+    let mut result = IdentifyResult::of(&training, &validations)?;
+    if let Err(error) = args.add_physical(&mut result, &training) {
+        failed.push(error.to_string());
     }
-    let (arm, layout, mut inputs) = args.source.load()?;
-    check_outputs(
-        [&args.json, &args.report].into_iter().flatten(),
-        inputs.iter().map(|input| &input.path).chain(&args.logs).chain(&args.validate),
-    )?;
-    let parameterisation = Parameterisation::of(&arm, args.reduced.as_deref())?;
-    let set = BaseSet::find(&arm, parameterisation)?;
-    let model = Model::new(&arm);
-    let mut logs = read_logs(&args.logs, &arm, &layout)?;
-    let mut validation_logs = read_logs(&args.validate, &arm, &layout)?;
-    let [rows, validation_rows] =
-        [&logs, &validation_logs].map(|logs| logs.iter().map(LoadedLog::rows).collect::<Vec<_>>());
+    print(&result);
+    write(args, &result, program, |program| page(&result, &training, &validations, program))?;
+    match failed.is_empty() {
+        false => Err(failed.join("; ").into()),
+        true if result.is_declined() || result.is_contradicted() => Ok(Outcome::Negative),
+        true => Ok(Outcome::Done),
+    }
+}
+
+impl IdentifyArgs {
+    /// Checks the options and converts them to those of the library.
+    fn options(&self) -> Result<Options, String> {
+        let options = Options { covariance: self.covariance, ..self.processing.options()? };
+        if self.logs.len() > 1 && self.prior_weight == PriorWeight::CrossValidated {
+            let message = "the weight is found by leaving out periods of one log in turn; of several logs give it as a number";
+            return Err(format!("--prior-weight auto: {message}"));
+        }
+        Ok(options)
+    }
+
+    /// Adds physically consistent standard parameters to `result`, where they are asked for.
+    fn add_physical(
+        &self,
+        result: &mut IdentifyResult,
+        training: &Training,
+    ) -> Result<(), PhysicalError> {
+        if !self.physical {
+            return Ok(());
+        }
+        let options = PhysicalOptions {
+            metric: self.prior,
+            prior_weight: self.prior_weight,
+            ..PhysicalOptions::default()
+        };
+        let Training { arm, set, identification, .. } = training;
+        let Identification { fit, covariance, .. } = identification;
+        let estimate = physical::solve(arm, set, fit, covariance, &options)?;
+        result.set_physical(&estimate, training);
+        Ok(())
+    }
+}
+
+impl Sources {
+    /// Reads everything that `args` names, and refuses outputs that would overwrite it and logs that are used twice.
+    fn read(args: &IdentifyArgs) -> Result<(Self, Program), Box<dyn std::error::Error>> {
+        let (arm, layout, mut inputs) = args.source.load()?;
+        check_outputs(
+            [&args.json, &args.report].into_iter().flatten(),
+            inputs.iter().map(|input| &input.path).chain(&args.logs).chain(&args.validate),
+        )?;
+        let parameterisation = Parameterisation::of(&arm, args.reduced.as_deref())?;
+        let set = BaseSet::find(&arm, parameterisation)?;
+        let mut logs = read_logs(&args.logs, &arm, &layout)?;
+        let mut validation_logs = read_logs(&args.validate, &arm, &layout)?;
+        refuse_twice(&logs, &validation_logs)?;
+        logs.iter_mut().chain(&mut validation_logs).for_each(LoadedLog::mend_wild_readings);
+        inputs.extend(logs.iter().chain(&validation_logs).map(|l| l.input.clone()));
+        let sources = Self { arm, layout, set, logs, validation_logs };
+        Ok((sources, Program::started(None, inputs)))
+    }
+
+    /// The logs to identify from.
+    fn training_logs(&self) -> Vec<&Log> {
+        self.logs.iter().map(|l| &l.log).collect()
+    }
+
+    /// Identifies the arm from all logs, or says why they do not tell its parameters.
+    fn identify(
+        &self,
+        args: &IdentifyArgs,
+        identifier: &mut Identifier,
+    ) -> Result<Result<Identified, Box<Declined>>, IdentifyError> {
+        let Self { arm, set, .. } = self;
+        let logs = self.training_logs();
+        let all_parameters = || (0..set.rank()).map(|k| set.name(k).to_owned()).collect();
+        let measurements: Vec<Measurement> = self.logs.iter().map(LoadedLog::measurement).collect();
+        let regressions = match SeveralLogs::each(identifier, &measurements) {
+            Err(IdentifyError::NoMotion { .. }) if logs.len() == 1 => {
+                return Ok(Err(Box::new(Declined::at_rest(arm, &logs, all_parameters()))));
+            }
+            regressions => regressions?,
+        };
+        let misread = self.misread(&regressions, identifier.options());
+        let mut all = SeveralLogs::together(identifier, &measurements, regressions)?;
+        let unused = args.processing.unused(&all.regression.prepared.processing);
+        let remarks = self.logs.iter().flat_map(|log| &log.mended).cloned();
+        all.regression.prepared.warnings.extend(unused.into_iter().chain(remarks));
+        let parameters = match all.identify(identifier) {
+            Err(IdentifyError::Fit(FitError::NotExcited { parameters })) => parameters,
+            Err(IdentifyError::Fit(FitError::StandsStill)) => all_parameters(),
+            identification => {
+                let (regression, identification) = (all.regression, identification?);
+                return Ok(Ok(Identified { regression, identification, misread }));
+            }
+        };
+        Ok(Err(Box::new(Declined::new(arm, &logs, &all.regression, parameters))))
+    }
+
+    /// The first of the logs, laid out as `regressions`, that has to be read differently.
+    fn misread(&self, regressions: &[Regression], options: &Options) -> Option<MisreadLog> {
+        regressions.iter().zip(&self.logs).find_map(|(regression, log)| {
+            let misreading = log.misreading(&self.arm, regression, options)?;
+            Some(MisreadLog::new(log.log.source.clone(), misreading, &self.layout))
+        })
+    }
+
+    /// Predicts the logs for validation; those that cannot be predicted are added to `failed`.
+    fn validations(
+        &self,
+        identifier: &mut Identifier,
+        training: &Training,
+        failed: &mut Vec<String>,
+    ) -> Vec<Validation> {
+        let mut validations = Vec::new();
+        for log in &self.validation_logs {
+            match validate(&self.arm, identifier, log, &training.identification.fit.theta) {
+                Ok(validation) => validations.push(validation),
+                Err(error) => failed.push(error.to_string()),
+            }
+        }
+        validations
+    }
+}
+
+/// Refuses logs that are given twice, or validated on although they are identified from.
+fn refuse_twice(logs: &[LoadedLog], validation_logs: &[LoadedLog]) -> Result<(), String> {
+    let rows: Vec<RowsOf> = logs.iter().map(LoadedLog::rows).collect();
     for (k, log) in rows.iter().enumerate() {
         if let Some(same) = rows[..k].iter().find(|other| log.are_of(other)) {
             let [one, other] = [same, log].map(|rows| rows.log.input.path.display());
             return Err(format!(
                 "{one} and {other} are the same log, or parts of it: counted twice, it would claim to know more than it does"
-            )
-            .into());
+            ));
         }
     }
-    for validation in &validation_rows {
+    for validation in validation_logs.iter().map(LoadedLog::rows) {
         if let Some(same) = rows.iter().find(|log| validation.are_of(log)) {
+            let [validation, log] = [&validation, same].map(|rows| rows.log.input.path.display());
             return Err(format!(
-                "{} is validated on, but it is the training log {}, or a part of it: a fit always describes its \
-                 own data",
-                validation.log.input.path.display(),
-                same.log.input.path.display()
-            )
-            .into());
+                "{validation} is validated on, but it is the training log {log}, or a part of it: a fit always describes its own data"
+            ));
         }
     }
-    drop((rows, validation_rows));
-    let all_parameters = || (0..set.rank()).map(|k| set.name(k).to_owned()).collect();
-    logs.iter_mut().chain(&mut validation_logs).for_each(LoadedLog::mend_wild_readings);
-    inputs.extend(logs.iter().chain(&validation_logs).map(|l| l.input.clone()));
-    let program = Program::started(None, inputs);
-    let mut identifier = Identifier::new(&model, &set, options.clone());
-    let measurements: Vec<Measurement> = logs.iter().map(LoadedLog::measurement).collect();
-    let regressions = match SeveralLogs::each(&mut identifier, &measurements) {
-        Err(IdentifyError::NoMotion { .. }) if logs.len() == 1 => {
-            let logs: Vec<&Log> = logs.iter().map(|l| &l.log).collect();
-            return decline(args, &Declined::at_rest(&arm, &logs, all_parameters()), program);
-        }
-        regressions => regressions?,
-    };
-    let misread = regressions.iter().zip(&logs).find_map(|(regression, log)| {
-        let gain = log.log.drive_gain_nm_a(&arm);
-        let misreading = Misreading::of(&arm, regression, &options, gain.as_deref())?;
-        Some(MisreadLog::new(log.log.source.clone(), misreading, &layout))
-    });
-    let mut all = SeveralLogs::together(&mut identifier, &measurements, regressions)?;
-    let unused = args.processing.unused(&all.regression.prepared.processing);
-    let remarks = logs.iter().flat_map(|log| &log.mended).cloned();
-    all.regression.prepared.warnings.extend(unused.into_iter().chain(remarks));
-    let logs: Vec<&Log> = logs.iter().map(|l| &l.log).collect();
-    let regression = &all.regression;
-    let identification = match all.identify(&mut identifier) {
-        Err(IdentifyError::Fit(FitError::NotExcited { parameters })) => {
-            return decline(args, &Declined::new(&arm, &logs, regression, parameters), program);
-        }
-        Err(IdentifyError::Fit(FitError::StandsStill)) => {
-            let declined = Declined::new(&arm, &logs, regression, all_parameters());
-            return decline(args, &declined, program);
-        }
-        other => other?,
-    };
-    let training = Training {
-        arm: &arm,
-        robot_source: &args.source.robot,
-        set: &set,
-        logs: &logs,
-        nominal: &set.values(&model.standard_parameters()),
-        regression,
-        identification: &identification,
-        reduced: args.reduced.as_deref(),
-        misread: misread.as_ref(),
-    };
-    // An error in a later step must not discard the identification.
-    let mut failed: Vec<String> = Vec::new();
-    let mut validations = Vec::new();
-    for log in &validation_logs {
-        match validate(&arm, &mut identifier, log, &identification.fit.theta) {
-            Ok(validation) => validations.push(validation),
-            Err(error) => failed.push(error.to_string()),
-        }
-    }
-    let mut result = IdentifyResult::of(&training, &validations)?;
-    if args.physical {
-        let options = PhysicalOptions {
-            metric: args.prior,
-            prior_weight: args.prior_weight,
-            ..PhysicalOptions::default()
-        };
-        let Identification { fit, covariance, .. } = &identification;
-        match physical::solve(&arm, &set, fit, covariance, &options) {
-            Ok(estimate) => result.set_physical(&estimate, &training),
-            Err(error) => failed.push(error.to_string()),
-        }
-    }
-    say!("{}", parameter_table(&result).to_text());
-    say!("{}", residual_table(&result).to_text());
+    Ok(())
+}
+
+/// Prints the tables, remarks and verdict of `result`.
+fn print(result: &IdentifyResult) {
+    say!("{}", parameter_table(result).to_text());
+    say!("{}", residual_table(result).to_text());
     for warning in result.notes() {
         say!("note: {warning}");
     }
-    for fact in facts(&result) {
+    for fact in facts(result) {
         say!("{fact}");
     }
     say!("\n{}", result.sentence());
@@ -345,18 +445,23 @@ pub fn run(args: &IdentifyArgs) -> CommandResult {
     for fact in result.physical().map_or_else(Vec::new, |physical| physical.facts()) {
         say!("{fact}");
     }
+}
+
+/// Writes the files that are asked for: `body` as JSON, and the page that `page_of` makes.
+fn write(
+    args: &IdentifyArgs,
+    body: &impl Serialize,
+    program: Program,
+    page_of: impl FnOnce(Program) -> Result<Page, ReportError>,
+) -> Result<(), ReportError> {
     if let Some(path) = &args.json {
-        Document { schema: IDENTIFY_SCHEMA, program: &program, body: &result }.write(path)?;
+        Document { schema: IDENTIFY_SCHEMA, program: &program, body }.write(path)?;
     }
     if let Some(path) = &args.report {
-        page(&result, &training, &validations, program)?.write(path)?;
+        page_of(program)?.write(path)?;
         say!("report: {}", path.display());
     }
-    match failed.is_empty() {
-        false => Err(failed.join("; ").into()),
-        true if result.is_declined() || result.is_contradicted() => Ok(Outcome::Negative),
-        true => Ok(Outcome::Done),
-    }
+    Ok(())
 }
 
 /// Reports on a log whose motion leaves parameters without any effect on the torque.
@@ -365,13 +470,7 @@ fn decline(args: &IdentifyArgs, declined: &Declined, program: Program) -> Comman
         say!("note: {warning}");
     }
     say!("\n{}", declined.sentence());
-    if let Some(path) = &args.json {
-        Document { schema: IDENTIFY_SCHEMA, program: &program, body: declined }.write(path)?;
-    }
-    if let Some(path) = &args.report {
-        declined.page(program).write(path)?;
-        say!("report: {}", path.display());
-    }
+    write(args, declined, program, |program| Ok(declined.page(program)))?;
     Ok(Outcome::Negative)
 }
 
@@ -383,8 +482,7 @@ fn validate(
     theta: &[f64],
 ) -> Result<Validation, Box<dyn std::error::Error>> {
     let regression = identifier.regression(&log.measurement())?;
-    let gain = log.log.drive_gain_nm_a(arm);
-    let misreading = Misreading::of(arm, &regression, identifier.options(), gain.as_deref());
+    let misreading = log.misreading(arm, &regression, identifier.options());
     let mut warnings: Vec<String> = misreading.iter().map(Misreading::sentence).collect();
     let manufacturer = match log.log.target_torque_nm(arm)? {
         Some(torque_nm) => {

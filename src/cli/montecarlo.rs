@@ -1,7 +1,7 @@
 //! The `montecarlo` program: runs trials, and `montecarlo merge` combines shards.
 
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Instant;
 
@@ -16,7 +16,7 @@ use crate::montecarlo::folder::{check_cut, load_all, schema_of, shard_files, sha
 use crate::montecarlo::shard::{Merged, Shard, merge, same_run, shard_range};
 use crate::montecarlo::trials::{Content, Trials};
 use crate::montecarlo::{Estimation, Experiment, Job, SUMMARY_SCHEMA, Summary};
-use crate::output::check_writable;
+use crate::output::{OutputError, check_writable};
 use crate::report::blind;
 use crate::report::json::{Input, Program, sha256_of_file};
 use crate::report::montecarlo::{
@@ -158,11 +158,7 @@ fn run_trials(args: &RunArgs) -> CommandResult {
         return Ok(Outcome::Done);
     }
     // Checked before the simulation, which may take minutes.
-    let file = args.out.as_ref().map(|folder| shard_path(folder, &range));
-    if let Some(file) = file.filter(|file| file.exists() && !args.resume) {
-        let file = file.display();
-        return Err(format!("{file} exists: give --resume to go on, or another --out").into());
-    }
+    let file = args.out.as_ref().map(|folder| shard_file(args, folder, &range)).transpose()?;
     let inputs = inputs(args.scenario.iter().chain(&scenario.files))?;
     scenario.seed = args.seed.unwrap_or(scenario.seed);
     eprintln!("{}: {}", scenario.name, scenario.description);
@@ -173,7 +169,7 @@ fn run_trials(args: &RunArgs) -> CommandResult {
             if let Some(trial) = args.trial {
                 return replay(&experiment, trial);
             }
-            let (merged, wall_s) = run_all(&experiment, args, trials, range)?;
+            let (merged, wall_s) = run_all(&experiment, args, trials, range, file.as_deref())?;
             let outcome = conclude(&merged, wall_s, inputs, &args.output)?;
             Ok(unless_interrupted(outcome, &merged))
         }
@@ -182,11 +178,32 @@ fn run_trials(args: &RunArgs) -> CommandResult {
             if let Some(trial) = args.trial {
                 return replay_blind(&benchmark, trial);
             }
-            let (merged, _) = run_all(&benchmark, args, trials, range)?;
+            let (merged, _) = run_all(&benchmark, args, trials, range, file.as_deref())?;
             let outcome = conclude_blind(&merged, inputs, &args.output)?;
             Ok(unless_interrupted(outcome, &merged))
         }
     }
+}
+
+/// The file of the shard with the trials `range`, in `folder`, which is created. Refuses a file that exists already without
+/// --resume, that cannot be written, or that is another output as well.
+fn shard_file(
+    args: &RunArgs,
+    folder: &Path,
+    range: &Range<u64>,
+) -> Result<PathBuf, Box<dyn std::error::Error>> {
+    let file = shard_path(folder, range);
+    if file.exists() && !args.resume {
+        let file = file.display();
+        return Err(format!("{file} exists: give --resume to go on, or another --out").into());
+    }
+    std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    check_writable(&file)?;
+    args.output.check(std::slice::from_ref(&file)).map_err(|e| match e {
+        OutputError::IsInput { path } => OutputError::Twice { path },
+        e => e,
+    })?;
+    Ok(file)
 }
 
 /// Exit with an interruption if trials are missing: the result for a part is not the final answer, and whoever started
@@ -198,18 +215,15 @@ fn unless_interrupted<C: Content>(outcome: Outcome, merged: &Merged<C>) -> Outco
 /// A value with the wall time that it took, s.
 type Timed<T> = Result<(T, f64), Box<dyn std::error::Error>>;
 
-/// Runs the trials in `range` out of `trials`.
+/// Runs the trials in `range` out of `trials`, and saves them as the shard `file` if there is one.
 fn run_all<T: Trials>(
     experiment: &T,
     args: &RunArgs,
     trials: u64,
     range: Range<u64>,
+    file: Option<&Path>,
 ) -> Timed<Merged<T::Content>> {
-    if let Some(folder) = &args.out {
-        std::fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-        check_writable(&shard_path(folder, &range))?;
-    }
-    let (shard, wall_s) = run_shard(experiment, args, trials, range)?;
+    let (shard, wall_s) = run_shard(experiment, args, trials, range, file)?;
     if !shard.is_complete() {
         eprintln!("interrupted after {} trials", shard.next - shard.range[0]);
     }
@@ -225,11 +239,11 @@ fn run_shard<T: Trials>(
     args: &RunArgs,
     trials: u64,
     range: Range<u64>,
+    file: Option<&Path>,
 ) -> Timed<Shard<T::Content>> {
     let (threads, stop) = (threads_or_all(args.threads), interrupt_flag());
-    let file = args.out.as_ref().map(|folder| shard_path(folder, &range));
     let mut shard = Shard::new(experiment, trials, range);
-    if let Some(file) = &file {
+    if let Some(file) = file {
         shard.header.program = sha256_of_file(&std::env::current_exe()?)?;
         if file.exists() {
             let saved = Shard::load(file)?;
@@ -244,7 +258,7 @@ fn run_shard<T: Trials>(
     let progress = Progress::new("trials", shard.range[1] - shard.range[0]);
     let begun = Instant::now();
     let before = shard.seconds;
-    shard.run(experiment, threads, file.as_deref(), stop, &|n| progress.reached(n))?;
+    shard.run(experiment, threads, file, stop, &|n| progress.reached(n))?;
     progress.finish();
     Ok((shard, before + begun.elapsed().as_secs_f64()))
 }

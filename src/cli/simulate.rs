@@ -87,13 +87,7 @@ fn passed_limit(scenario: &Scenario) -> Result<Option<String>, ExcitationError> 
     let requirements =
         Requirements { clearance_m: 0.0, torque_share: 1.0, ..Requirements::default() };
     let margins = check(&scenario.arm, &requirements, &scenario.excitation)?;
-    let of_a_joint = |margin: &&Margin| {
-        let limit = &margin.limit;
-        !matches!(
-            limit,
-            LimitKind::Clearance { .. } | LimitKind::Floor { .. } | LimitKind::Box { .. }
-        )
-    };
+    let of_a_joint = |margin: &&Margin| !margin.limit.is_distance();
     let worst = margins.least_first().into_iter().find(of_a_joint);
     Ok(worst.filter(|margin| margin.free < 0.0).map(|Margin { limit, free, time_s, .. }| {
         let consequence = match limit {

@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use crate::number::significant;
+
 /// A trajectory that cannot be used, with the place and the value.
 #[derive(Debug, Error)]
 pub enum ExcitationError {
@@ -39,7 +41,7 @@ pub enum ExcitationError {
         found: String,
     },
     /// A value that a series cannot have.
-    #[error("{what} = {value} must be {must}")]
+    #[error("{what} = {} must be {must}", readable(*value))]
     Value {
         /// Which quantity.
         what: String,
@@ -102,4 +104,39 @@ pub enum ExcitationError {
         /// When, s.
         time_s: f64,
     },
+}
+
+/// Refuses a `value` that is not positive and finite.
+pub(super) fn positive(what: &str, value: f64) -> Result<(), ExcitationError> {
+    if value > 0.0 && value.is_finite() {
+        return Ok(());
+    }
+    Err(ExcitationError::Value { what: what.to_owned(), value, must: "positive" })
+}
+
+/// Characters up to which a number is shown with all of its digits.
+const LONGEST_NUMBER: usize = 12;
+
+/// A number as it was given, so that it can be found again, or with six digits if it is long: 1e300 has 301.
+pub(super) fn readable(value: f64) -> String {
+    let whole = value.to_string();
+    if whole.len() <= LONGEST_NUMBER { whole } else { significant(value, 6) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_is_shown_as_given_unless_it_is_long() {
+        for (value, shown) in
+            [(24.0, "24"), (-0.02, "-0.02"), (1e9, "1000000000"), (f64::NAN, "NaN")]
+        {
+            assert_eq!(readable(value), shown);
+        }
+        assert_eq!(readable(1e300), "1.00000e300");
+        assert_eq!(readable(0.1 + 0.2), "0.300000");
+        let refused = positive("period_s", -1e300).unwrap_err().to_string();
+        assert_eq!(refused, "period_s = -1.00000e300 must be positive");
+    }
 }

@@ -1,10 +1,10 @@
 //! Exports a motion to other programs: samples as CSV, and a URScript program that plays it.
 
-use std::fmt::Write as _;
 use std::io::{self, Write};
 
 use thiserror::Error;
 
+use super::error::readable;
 use super::reference::Reference;
 use super::run_in::Excitation;
 
@@ -12,10 +12,8 @@ use super::run_in::Excitation;
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Playback {
-    /// Cycle of the controller, s: 0.008 for the CB series, 0.002 for the e-Series.
-    pub cycle_s: f64,
-    /// Speed as a fraction of the designed one, in (0, 1]. The path is the same, only slower.
-    pub speed: f64,
+    /// Speed at which the script begins; whoever plays it may edit it there.
+    pub speed: Speed,
     /// Largest joint speed while approaching the start pose, rad/s.
     pub approach_rad_s: f64,
 }
@@ -23,18 +21,10 @@ pub struct Playback {
 /// Why no controller can play a motion.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum PlaybackError {
-    /// `servoj` lasts a whole number of controller cycles; any other rate would play another motion.
-    #[error(
-        "{rate_hz} set points per second are no whole number of a controller's cycles apart, which last 2 ms (e-Series) \
-         or 8 ms (CB-Series): choose 500 over a whole number, such as 125, 250 or 500"
-    )]
-    Rate {
-        /// Set points per second, Hz.
-        rate_hz: f64,
-    },
     /// A motion that hardly moves hardly ends, and a faster one leaves the limits of the design.
     #[error(
-        "a speed of {speed} cannot be played: choose a share of the designed one, from {SLOWEST} to 1"
+        "a speed of {} cannot be played: choose a share of the designed one, from {SLOWEST} to 1",
+        readable(*speed)
     )]
     Speed {
         /// Share of the designed speed.
@@ -50,38 +40,45 @@ pub enum PlaybackError {
 
 /// Joints that `servoj` takes.
 const JOINTS: usize = 6;
-/// Cycles per second of a controller of the e-Series, Hz.
-const E_SERIES_HZ: f64 = 500.0;
-/// Cycles per second of a controller of the CB-Series, Hz.
-const CB_SERIES_HZ: f64 = 125.0;
+/// Time between two set points of a script, s: one cycle of a controller of the CB-Series, four of one of the e-Series.
+/// The script evaluates the series itself, so that the rate of the data does not matter.
+const CYCLE_S: f64 = 0.008;
+/// Largest joint speed while approaching the start pose, rad/s.
+const APPROACH_RAD_S: f64 = 0.3;
+/// Slowest speed, as a share of the designed one: a motion of 80 s then takes two hours.
+const SLOWEST: f64 = 0.01;
 
 impl Playback {
-    /// For a motion of `joints` joints with `rate_hz` set points per second, played at `speed` in (0, 1].
+    /// For a motion of `joints` joints, played at `speed`.
     ///
     /// # Errors
-    /// What no controller can play; see [`PlaybackError`].
-    pub fn new(joints: usize, rate_hz: f64, speed: f64) -> Result<Self, PlaybackError> {
+    /// [`PlaybackError::Joints`] for any other arm than those that a controller of Universal Robots moves.
+    pub fn new(joints: usize, speed: Speed) -> Result<Self, PlaybackError> {
         if joints != JOINTS {
             return Err(PlaybackError::Joints { joints });
         }
-        if !is_whole(E_SERIES_HZ / rate_hz) {
-            return Err(PlaybackError::Rate { rate_hz });
-        }
-        let speed = checked_speed(speed)?;
-        // 166.667 means 500/3.
-        let cycle_s = (E_SERIES_HZ / rate_hz).round() / E_SERIES_HZ;
-        Ok(Self { cycle_s, speed, approach_rad_s: 0.3 })
-    }
-
-    /// Whether a controller of the CB-Series can play it as well as one of the e-Series.
-    pub fn suits_cb_series(&self) -> bool {
-        is_whole(self.cycle_s * CB_SERIES_HZ)
+        Ok(Self { speed, approach_rad_s: APPROACH_RAD_S })
     }
 }
 
-/// Whether `cycles` is a whole number ≥ 1, to within the accuracy of a rate written with six digits.
-fn is_whole(cycles: f64) -> bool {
-    cycles.round() >= 1.0 && (cycles - cycles.round()).abs() < 1e-5 * cycles
+/// A speed at which a motion can be played, as a share of the designed one: from 0.01 to 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Speed(f64);
+
+impl Speed {
+    /// The speed `share`, if it can be played.
+    ///
+    /// # Errors
+    /// [`PlaybackError::Speed`] if it cannot.
+    pub fn new(share: f64) -> Result<Self, PlaybackError> {
+        let is_playable = (SLOWEST..=1.0).contains(&share);
+        if is_playable { Ok(Self(share)) } else { Err(PlaybackError::Speed { speed: share }) }
+    }
+
+    /// The share of the designed speed.
+    pub fn share(self) -> f64 {
+        self.0
+    }
 }
 
 /// A motion played more slowly: the same path, with all velocities times `speed` and all accelerations times its square.
@@ -92,12 +89,9 @@ pub struct Slowed<'a, M: Reference> {
 }
 
 impl<'a, M: Reference> Slowed<'a, M> {
-    /// The `motion` at a `speed` in (0, 1], as a fraction of its own.
-    ///
-    /// # Errors
-    /// [`PlaybackError::Speed`] for any other speed.
-    pub fn new(motion: &'a M, speed: f64) -> Result<Self, PlaybackError> {
-        checked_speed(speed).map(|speed| Self { motion, speed })
+    /// The `motion` at a `speed`.
+    pub fn new(motion: &'a M, speed: Speed) -> Self {
+        Self { motion, speed: speed.share() }
     }
 }
 
@@ -115,15 +109,6 @@ impl<M: Reference> Reference for Slowed<'_, M> {
         qd_rad_s.iter_mut().for_each(|qd| *qd *= self.speed);
         qdd_rad_s2.iter_mut().for_each(|qdd| *qdd *= self.speed * self.speed);
     }
-}
-
-/// Slowest speed, as a fraction of the designed one: a motion of 80 s then takes two hours.
-pub const SLOWEST: f64 = 0.01;
-
-/// Returns the speed if it can be played.
-fn checked_speed(speed: f64) -> Result<f64, PlaybackError> {
-    let is_share = (SLOWEST..=1.0).contains(&speed);
-    if is_share { Ok(speed) } else { Err(PlaybackError::Speed { speed }) }
 }
 
 /// Writes `motion` sampled at `rate_hz` with the header `timestamp, target_q_0…, target_qd_0…,
@@ -151,6 +136,9 @@ pub fn write_csv(out: &mut dyn Write, motion: &impl Reference, rate_hz: f64) -> 
     Ok(())
 }
 
+/// The script, with names in braces where the motion's values go.
+const SCRIPT: &str = include_str!("excitation.script");
+
 /// A URScript program that moves slowly to the start pose, waits for the operator, and plays
 /// `motion` with `servoj`, evaluating the series (24) on the controller.
 ///
@@ -160,81 +148,43 @@ pub fn urscript(motion: &Excitation, playback: &Playback) -> String {
     let series = motion.series();
     let (n, order) = (motion.joints(), series.order());
     let [begin_s, end_s] = motion.periodic_window_s();
-    let (mut v, mut a, mut q0) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-    series.sample(0.0, &mut q0, &mut v, &mut a);
-    let mut out = String::new();
-    // Writing into a String cannot fail.
-    let mut line = |text: String| {
-        let _ = writeln!(out, "{text}");
+    let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    series.sample(0.0, &mut q, &mut v, &mut a);
+    let column = |rows: &[Vec<f64>], l: usize| {
+        list(&rows.iter().map(|row| row[l - 1]).collect::<Vec<f64>>())
     };
-    line("def excitation():".into());
-    line(format!(
-        "  # {} periods of {} s, run-in {} s",
-        motion.periods(),
-        series.period_s,
-        begin_s
-    ));
-    line("  # Check the cell, keep a hand on the emergency stop, and play it slowly first.".into());
-    line(format!("  speed = {}", playback.speed));
-    line(format!("  cycle = {}", playback.cycle_s));
-    line(format!("  omega = {}", series.omega_rad_s()));
-    line(format!("  begin = {begin_s}"));
-    line(format!("  finish = {end_s}"));
-    line(format!("  total = {}", motion.duration_s()));
-    line(format!("  start_pose = {}", list(&motion.start_rad())));
-    line(format!("  offset = {}", list(&series.q0_rad)));
-    line(format!("  join_q = {}", list(&q0)));
-    line(format!("  join_v = {}", list(&v)));
-    line(format!("  join_a = {}", list(&a)));
-    for l in 0..order {
-        let column = |rows: &[Vec<f64>]| rows.iter().map(|row| row[l]).collect::<Vec<f64>>();
-        line(format!("  a{} = {}", l + 1, list(&column(&series.a_rad_s))));
-        line(format!("  b{} = {}", l + 1, list(&column(&series.b_rad_s))));
-    }
-    line("  q = start_pose".into());
-    let approach = playback.approach_rad_s;
-    line("  popup(\"The arm will move straight to the start pose, slowly. Is that way clear?\", \"Excitation\", blocking = True)".into());
-    line(format!("  movej(start_pose, a = {approach}, v = {approach})"));
-    line("  popup(\"At the start pose. Continue plays the excitation.\", \"Excitation\", blocking = True)".into());
-    line("  t = 0.0".into());
-    line("  while t < total:".into());
-    line("    i = 0".into());
-    line("    if t < begin or t > finish:".into());
-    // The blend of `run_in.rs`; backwards in time the joint velocity changes its sign.
-    line("      if t < begin:".into());
-    line("        d = begin".into());
-    line("        s = t / d".into());
-    line("        sign = 1.0".into());
-    line("      else:".into());
-    line("        d = total - finish".into());
-    line("        s = (total - t) / d".into());
-    line("        sign = -1.0".into());
-    line("      end".into());
-    line("      of_v = d * (s*s*s - s*s*s*s/2 - 0.5)".into());
-    line("      of_a = d * d * (s*s*s*s/4 - s*s*s/3 + 1.0/12)".into());
-    line(format!("      while i < {n}:"));
-    line("        q[i] = join_q[i] + sign * join_v[i] * of_v + join_a[i] * of_a".into());
-    line("        i = i + 1".into());
-    line("      end".into());
-    line("    else:".into());
-    line("      x = omega * (t - begin)".into());
-    for l in 1..=order {
-        line(format!("      s{l} = sin({l}*x) / ({l}*omega)"));
-        line(format!("      c{l} = cos({l}*x) / ({l}*omega)"));
-    }
-    line(format!("      while i < {n}:"));
-    let terms: String = (1..=order).map(|l| format!(" + a{l}[i]*s{l} - b{l}[i]*c{l}")).collect();
-    line(format!("        q[i] = offset[i]{terms}"));
-    line("        i = i + 1".into());
-    line("      end".into());
-    line("    end".into());
-    line("    servoj(q, t = cycle, lookahead_time = 0.1, gain = 300)".into());
-    line("    t = t + cycle * speed".into());
-    line("  end".into());
-    line("  stopj(1.0)".into());
-    line("end".into());
-    line("excitation()".into());
-    out
+    let of_harmonics = |text: &dyn Fn(usize) -> String, between: &str| {
+        (1..=order).map(text).collect::<Vec<String>>().join(between)
+    };
+    let coefficients = |l: usize| {
+        let [a, b] = [&series.a_rad_s, &series.b_rad_s].map(|rows| column(rows, l));
+        format!("  a{l} = {a}\n  b{l} = {b}")
+    };
+    let harmonic = |l: usize| {
+        format!("      s{l} = sin({l}*x) / ({l}*omega)\n      c{l} = cos({l}*x) / ({l}*omega)")
+    };
+    let term = |l: usize| format!(" + a{l}[i]*s{l} - b{l}[i]*c{l}");
+    let values = [
+        ("{periods}", motion.periods().to_string()),
+        ("{period}", series.period_s.to_string()),
+        ("{speed}", playback.speed.share().to_string()),
+        ("{cycle}", CYCLE_S.to_string()),
+        ("{omega}", series.omega_rad_s().to_string()),
+        ("{begin}", begin_s.to_string()),
+        ("{finish}", end_s.to_string()),
+        ("{total}", motion.duration_s().to_string()),
+        ("{start_pose}", list(&motion.start_rad())),
+        ("{offset}", list(&series.q0_rad)),
+        ("{join_q}", list(&q)),
+        ("{join_v}", list(&v)),
+        ("{join_a}", list(&a)),
+        ("{coefficients}", of_harmonics(&coefficients, "\n")),
+        ("{approach}", playback.approach_rad_s.to_string()),
+        ("{joints}", n.to_string()),
+        ("{harmonics}", of_harmonics(&harmonic, "\n")),
+        ("{terms}", of_harmonics(&term, "")),
+    ];
+    values.into_iter().fold(SCRIPT.to_owned(), |script, (name, value)| script.replace(name, &value))
 }
 
 fn list(values: &[f64]) -> String {
@@ -276,9 +226,8 @@ mod tests {
     fn a_slowed_motion_takes_the_same_path() {
         let motion = motion();
         let (s, h) = (0.25, 1e-3);
-        let slowed = Slowed::new(&motion, s).unwrap();
+        let slowed = Slowed::new(&motion, Speed::new(s).unwrap());
         assert_eq!(slowed.duration_s(), motion.duration_s() / s);
-        assert!(matches!(Slowed::new(&motion, 0.0), Err(PlaybackError::Speed { .. })));
         let at = |motion: &dyn Reference, t_s: f64| {
             let [mut q, mut qd, mut qdd] = [[0.0; 6]; 3];
             motion.sample(t_s, &mut q, &mut qd, &mut qdd);
@@ -309,30 +258,44 @@ mod tests {
         }
     }
 
-    /// Rates that divide the 500 Hz of an e-Series; the CB-Series needs those that divide 125 Hz.
     #[test]
     fn only_what_a_controller_can_play_is_a_playback() {
-        for (rate_hz, cb_series) in
-            [(500.0, false), (250.0, false), (125.0, true), (500.0 / 3.0, false), (62.5, true)]
-        {
-            let playback = Playback::new(6, rate_hz, 1.0).unwrap();
-            assert_eq!(playback.suits_cb_series(), cb_series, "{rate_hz} Hz");
+        for speed in [0.0, -0.5, 0.009, 1.01, f64::NAN] {
+            assert!(matches!(Speed::new(speed), Err(PlaybackError::Speed { .. })));
         }
-        for rate_hz in [1000.0, 300.0, 333.0, 0.0, -125.0, f64::NAN] {
-            let refused = Playback::new(6, rate_hz, 1.0).unwrap_err();
-            assert!(matches!(refused, PlaybackError::Rate { .. }), "{rate_hz} Hz: {refused}");
-        }
-        for speed in [0.0, -0.5, 1.01, f64::NAN] {
-            assert!(matches!(Playback::new(6, 125.0, speed), Err(PlaybackError::Speed { .. })));
-        }
-        let refused = Playback::new(7, 125.0, 1.0).unwrap_err();
-        assert_eq!(refused, PlaybackError::Joints { joints: 7 });
+        let full = Speed::new(1.0).unwrap();
+        assert!(Playback::new(6, full).is_ok());
+        assert_eq!(Playback::new(7, full), Err(PlaybackError::Joints { joints: 7 }));
+    }
+
+    fn script() -> String {
+        urscript(&motion(), &Playback::new(6, Speed::new(0.25).unwrap()).unwrap())
+    }
+
+    #[test]
+    fn the_script_is_complete() {
+        let script = script();
+        assert!(!script.contains(['{', '}']), "{script}");
+        let series = motion().series().clone();
+        let order = series.order();
+        let last: Vec<f64> = series.b_rad_s.iter().map(|row| row[order - 1]).collect();
+        assert!(script.contains(&format!("\n  b{order} = {}\n", list(&last))));
+        assert!(script.contains(&format!(" + a{order}[i]*s{order} - b{order}[i]*c{order}\n")));
+    }
+
+    /// Whoever edits the speed must not make the motion faster than it was designed, nor run it backwards for ever.
+    #[test]
+    fn a_speed_that_was_edited_is_checked_before_the_arm_moves() {
+        let script = script();
+        let guard = script.find("  if speed <= 0 or speed > 1:\n    popup(").unwrap();
+        let halt = script.find("    halt\n  end\n").unwrap();
+        assert!(script.find("speed = 0.25\n").unwrap() < guard);
+        assert!(guard < halt && halt < script.find("movej(").unwrap());
     }
 
     #[test]
     fn the_script_is_balanced_and_starts_gently() {
-        let playback = Playback::new(6, 125.0, 0.25).unwrap();
-        let script = urscript(&motion(), &playback);
+        let script = script();
         let opened = script
             .lines()
             .filter(|l| {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::error::ExcitationError;
+use super::error::{ExcitationError, positive};
 use super::reference::Reference;
 use crate::robot::JointSignals;
 
@@ -74,10 +74,7 @@ impl FourierSeries {
         a_rad_s: Vec<Vec<f64>>,
         b_rad_s: Vec<Vec<f64>>,
     ) -> Result<Self, ExcitationError> {
-        if !(period_s > 0.0 && period_s.is_finite()) {
-            let what = "period_s".to_owned();
-            return Err(ExcitationError::Value { what, value: period_s, must: "positive" });
-        }
+        positive("period_s", period_s)?;
         finite("q0_rad", &q0_rad)?;
         let expect = |what: String, found: usize, expected: usize| {
             if found == expected {

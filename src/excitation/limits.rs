@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::clearance::ClearanceModel;
-use super::error::ExcitationError;
+use super::error::{ExcitationError, positive};
 use super::reference::Reference;
 use crate::dynamics::{Model, Workspace, inverse_dynamics};
 use crate::robot::Arm;
@@ -186,10 +186,7 @@ pub fn check(
             return Err(ExcitationError::Value { what, value, must: "finite and not negative" });
         }
     }
-    if !(requirements.check_rate_hz > 0.0 && requirements.check_rate_hz.is_finite()) {
-        let (what, value) = ("check rate".to_owned(), requirements.check_rate_hz);
-        return Err(ExcitationError::Value { what, value, must: "positive" });
-    }
+    positive("check rate", requirements.check_rate_hz)?;
     let model = Model::new(arm);
     let mut dynamics = Workspace::new(&model);
     let clearance = ClearanceModel::new(arm);

@@ -1,6 +1,6 @@
 //! Periods of a series, with smooth transitions from and to rest.
 
-use super::error::ExcitationError;
+use super::error::{ExcitationError, positive};
 use super::fourier::FourierSeries;
 use super::limits::{Margin, Requirements, check};
 use super::reference::Reference;
@@ -201,13 +201,6 @@ impl Excitation {
             qdd[j] = (v * 6.0 * (s - s2) + at * (3.0 * s2 - 2.0 * s)) / duration_s;
         }
     }
-}
-
-fn positive(what: &str, value: f64) -> Result<(), ExcitationError> {
-    if value > 0.0 && value.is_finite() {
-        return Ok(());
-    }
-    Err(ExcitationError::Value { what: what.to_owned(), value, must: "positive" })
 }
 
 impl Reference for Excitation {

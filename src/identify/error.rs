@@ -89,6 +89,33 @@ pub enum IdentifyError {
         /// Rate of its samples, Hz.
         rate_hz: f64,
     },
+    /// The low-pass of a single run is so narrow that next to nothing of the motion passes.
+    #[error(
+        "{log}: the low-pass at {cutoff_hz} Hz (--cutoff) leaves {cycles:.2} cycles of {seconds:.2} s of motion, of which at least \
+         {needed} are needed: a higher cut-off leaves more, and so does a longer record"
+    )]
+    CutoffTooLow {
+        /// The log.
+        log: String,
+        /// Cut-off of the low-pass, Hz.
+        cutoff_hz: f64,
+        /// Length of the motion, s.
+        seconds: f64,
+        /// Cycles of the cut-off in it.
+        cycles: f64,
+        /// Cycles needed.
+        needed: f64,
+    },
+    /// `--rate` asks for so few samples that the motion does not show in them.
+    #[error(
+        "{log}: in samples at {rate_hz} Hz (--rate) the motion of the log does not show: give a higher rate, or none"
+    )]
+    RateTooLow {
+        /// The log.
+        log: String,
+        /// Rate asked for, Hz.
+        rate_hz: f64,
+    },
     /// `--period` names a period that the motion does not have.
     #[error(
         "{log}: {}",
@@ -112,6 +139,11 @@ pub enum IdentifyError {
     #[error(transparent)]
     Fit(#[from] FitError),
     /// The covariance asked for does not exist for these data.
-    #[error(transparent)]
-    Covariance(#[from] CovarianceError),
+    #[error("{log}: {error}")]
+    Covariance {
+        /// The log, or the logs that were joined.
+        log: String,
+        /// What the data lack.
+        error: CovarianceError,
+    },
 }

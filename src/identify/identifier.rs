@@ -13,6 +13,7 @@ use super::prepare::Preparer;
 use super::prepared::{Prepared, Processing};
 use super::problem::{Assembler, Problem};
 use super::regression::Regression;
+use super::rest::outpaced;
 use super::whiten::{SMOOTHER, smoothed};
 use crate::base::{BaseSet, ColumnPlan};
 use crate::dynamics::Model;
@@ -98,7 +99,7 @@ impl<'a> Identifier<'a> {
     pub fn identify(&mut self, m: &Measurement) -> Result<Identification, IdentifyError> {
         let (prepared, ..) = self.fill_from(m, false)?;
         let instruments = self.instruments_for(self.options.estimator, &prepared)?;
-        self.solve(prepared, instruments.as_ref())
+        self.solve(prepared, instruments.as_ref(), m.source)
     }
 
     /// Lays out `m`, whose torque is the manufacturer's feed-forward, for regression. `None` where that torque is the
@@ -128,7 +129,12 @@ impl<'a> Identifier<'a> {
         let instruments = self.instruments_for(self.options.estimator, &prepared)?;
         let empty = Problem::new(self.problem.plan.clone(), 0.0);
         let problem = std::mem::replace(&mut self.problem, empty);
-        Ok(Regression::of(prepared, problem, instruments, [first_sample, every]))
+        let mut regression =
+            Regression::of(m.source, prepared, problem, instruments, [first_sample, every]);
+        if self.options.rate_hz.is_some() {
+            regression.outpaced = outpaced(m, &regression.course());
+        }
+        Ok(regression)
     }
 
     /// Solves a log laid out before.
@@ -137,7 +143,8 @@ impl<'a> Identifier<'a> {
         regression: &Regression,
     ) -> Result<Identification, IdentifyError> {
         self.problem.clone_from(&regression.problem);
-        self.solve(regression.prepared.clone(), regression.instruments.as_ref())
+        let Regression { prepared, instruments, log, .. } = regression;
+        self.solve(prepared.clone(), instruments.as_ref(), log)
     }
 
     fn fill_from(
@@ -259,11 +266,14 @@ impl<'a> Identifier<'a> {
         Ok((kept.start, every))
     }
 
+    /// Solves the problem that was laid out from `prepared`, which comes from `log`.
     fn solve(
         &mut self,
         prepared: Prepared,
         instruments: Option<&Problem>,
+        log: &str,
     ) -> Result<Identification, IdentifyError> {
+        let without = |error| IdentifyError::Covariance { log: log.to_owned(), error };
         let are_alike = prepared.replicates.as_ref().is_some_and(Replicates::are_alike);
         let repeats = prepared.processing.periods >= MANY_PERIODS && !are_alike;
         let estimator = match self.options.estimator {
@@ -280,7 +290,7 @@ impl<'a> Identifier<'a> {
         let needs_scatter = estimator == Estimator::Spectral
             || matches!(kind, CovarianceKind::Spectral | CovarianceKind::Periods);
         if are_alike && needs_scatter {
-            return Err(CovarianceError::AlikePeriods.into());
+            return Err(without(CovarianceError::AlikePeriods));
         }
         let Processing { logs, periods, .. } = prepared.processing;
         let covariance_reason = match (self.options.covariance, default_kind) {
@@ -313,7 +323,7 @@ impl<'a> Identifier<'a> {
         )?;
         let estimate = self.with_motion_noise(estimate, &prepared)?.of_fewer_rows(prepared.kept());
         let Estimate { fit, mut covariances, lack_of_fit } = estimate;
-        let covariance = covariances.swap_remove(0)?;
+        let covariance = covariances.swap_remove(0).map_err(without)?;
         Ok(Identification {
             estimator,
             samples: self.problem.samples * self.problem.periods,

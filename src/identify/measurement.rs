@@ -3,6 +3,7 @@
 use super::error::IdentifyError;
 use super::prediction::MOVING_RAD_S;
 use crate::robot::JointSignals;
+use crate::signal::reading_noise;
 
 /// Fewer samples than this are no experiment.
 pub(super) const FEWEST_SAMPLES: usize = 64;
@@ -34,6 +35,15 @@ impl Measurement<'_> {
             return Err(IdentifyError::TooShort { log, samples, needed: FEWEST_SAMPLES });
         }
         Ok(())
+    }
+
+    /// Whether joint `j` ever moves faster than [`MOVING_RAD_S`] beyond its noise: σ √(2 ln N) is hardly exceeded by the
+    /// largest of N noise values.
+    pub(super) fn moves(&self, j: usize) -> bool {
+        let qd_rad_s = self.qd_rad_s.joint(j);
+        let peak = (2.0 * (qd_rad_s.len() as f64).ln()).sqrt();
+        let threshold_rad_s = MOVING_RAD_S + peak * reading_noise(qd_rad_s);
+        qd_rad_s.iter().any(|qd| qd.abs() > threshold_rad_s)
     }
 
     /// Whether joint `j` moves and its torque never changes.

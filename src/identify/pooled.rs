@@ -88,10 +88,15 @@ pub fn each_alone(
                 let reason = "its periods are alike to the last digit".to_owned();
                 return Ok(Several::Together { log, reason });
             }
-            Err(error @ (IdentifyError::Fit(_) | IdentifyError::Covariance(_))) => {
-                return Ok(Several::Together { log, reason: error.to_string() });
+            Err(error) => {
+                let reason = match error {
+                    IdentifyError::Fit(error) => error.to_string(),
+                    // Without the log's name, beside which the reason is told.
+                    IdentifyError::Covariance { error, .. } => error.to_string(),
+                    other => return Err(other),
+                };
+                return Ok(Several::Together { log, reason });
             }
-            Err(error) => return Err(error),
         }
     }
     Ok(Several::Apart(parts))

@@ -19,6 +19,10 @@ use crate::signal::{
 const FEWEST_PERIODS: usize = 3;
 /// Number of clocks tried until a period is a whole number of samples: with each the period is known better.
 const CLOCKS: usize = 3;
+/// Fewest cycles of its cut-off that a single run may last. Behind a low-pass at f, T seconds hold 2 f T independent
+/// values of each torque; six cycles, of whose samples at least three quarters are used, hold 54 for six joints, about
+/// as many as such an arm has base parameters.
+const LEAST_CYCLES: f64 = 6.0;
 
 /// Filters and plans kept from log to log.
 #[derive(Default)]
@@ -57,6 +61,9 @@ impl Preparer {
         m.require_rows()?;
         let mut warnings = Vec::new();
         let mut even = Even::of(m, options, None, &mut self.filter, &mut warnings)?;
+        if let Some(rate_hz) = options.rate_hz.filter(|_| even.q_rad.samples() < FEWEST_SAMPLES) {
+            return Err(IdentifyError::RateTooLow { log: m.source.to_owned(), rate_hz });
+        }
         let mut period =
             if options.is_single_run() { None } else { self.search.find(&even.q_rad)? };
         let is_misfit = |p: &&Period| !p.is_whole && p.periods >= FEWEST_PERIODS;
@@ -244,7 +251,7 @@ impl Preparer {
     ) -> Result<Prepared, IdentifyError> {
         let rate_hz = even.rate_hz;
         let window = experiment_window(&Activity::of(&even.qd_rad_s, rate_hz)?)
-            .ok_or_else(|| IdentifyError::NoMotion { log: m.source.to_owned() })?;
+            .ok_or_else(|| without_motion(m, options))?;
         if window.len() < FEWEST_SAMPLES {
             let (samples, needed) = (window.len(), FEWEST_SAMPLES);
             return Err(IdentifyError::TooShort { log: m.source.to_owned(), samples, needed });
@@ -252,6 +259,12 @@ impl Preparer {
         if options.cutoff_hz >= 0.5 * rate_hz {
             let (log, cutoff_hz) = (m.source.to_owned(), options.cutoff_hz);
             return Err(IdentifyError::Cutoff { log, cutoff_hz, rate_hz });
+        }
+        let seconds = window.len() as f64 / rate_hz;
+        let cycles = options.cutoff_hz * seconds;
+        if cycles < LEAST_CYCLES {
+            let (log, cutoff_hz, needed) = (m.source.to_owned(), options.cutoff_hz, LEAST_CYCLES);
+            return Err(IdentifyError::CutoffTooLow { log, cutoff_hz, seconds, cycles, needed });
         }
         let cutoff_hz = options.derivative_cutoff_hz(rate_hz);
         let smooth = ZeroPhase::new(cutoff_hz, options.order, rate_hz)?;
@@ -298,6 +311,17 @@ impl Preparer {
             filled_share: 0.0,
             warnings,
         })
+    }
+}
+
+/// Why the samples of `m` show no motion: there is none in the log, or none that the rate asked for resolves.
+fn without_motion(m: &Measurement, options: &Options) -> IdentifyError {
+    let log = m.source.to_owned();
+    match options.rate_hz {
+        Some(rate_hz) if (0..m.q_rad.joints()).any(|j| m.moves(j)) => {
+            IdentifyError::RateTooLow { log, rate_hz }
+        }
+        _ => IdentifyError::NoMotion { log },
     }
 }
 

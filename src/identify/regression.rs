@@ -18,19 +18,25 @@ pub struct Regression {
     pub first_sample: usize,
     /// Samples of `prepared` per sample of `problem` (long logs are thinned after the filter).
     pub every: usize,
+    /// Joints (0-based) that move in every log, too fast for the rate asked for.
+    pub(super) outpaced: Vec<usize>,
+    /// Where the log comes from, or the logs that are joined, for messages.
+    pub(super) log: String,
     /// Course of several joined logs, of which `prepared` holds the first; `None` for a single log.
     course: Option<Course>,
 }
 
 impl Regression {
-    /// A single log, `prepared` and laid out from its sample `first_sample` on, every `every`-th.
+    /// A single log from `log`, `prepared` and laid out from its sample `first_sample` on, every `every`-th.
     pub(super) fn of(
+        log: &str,
         prepared: Prepared,
         problem: Problem,
         instruments: Option<Problem>,
         [first_sample, every]: [usize; 2],
     ) -> Self {
-        Self { problem, instruments, prepared, first_sample, every, course: None }
+        let (outpaced, log) = (Vec::new(), log.to_owned());
+        Self { problem, instruments, prepared, first_sample, every, outpaced, log, course: None }
     }
 
     /// The sample of `prepared` that belongs to row `row` of one period (or of the run).
@@ -83,6 +89,9 @@ impl Regression {
         let Prepared { processing, warnings, .. } = &mut first.prepared;
         *processing = Processing { logs, periods: 1, harmonics: None, ..processing.clone() };
         warnings.extend(rest.iter().flat_map(|other| other.prepared.warnings.clone()));
+        first.outpaced.retain(|j| rest.iter().all(|other| other.outpaced.contains(j)));
+        first.log =
+            std::iter::once(&first).chain(&rest).map(|r| &*r.log).collect::<Vec<_>>().join(", ");
         first.prepared.replicates = None;
         first.prepared.acceleration = None;
         first.prepared.each_period = None;

@@ -176,6 +176,20 @@ pub enum LogWarning {
         /// The column of that field.
         column: String,
     },
+    /// An optional block is not used, because the file lacks some of its columns.
+    Incomplete {
+        /// The block's key in a layout.
+        block: &'static str,
+        /// The first column that is missing.
+        column: String,
+    },
+    /// Torques were read with a layout that expects currents: what it states about them has no effect on torques.
+    TorquesRead {
+        /// The layout.
+        layout: String,
+        /// What it states about currents.
+        stated: Vec<&'static str>,
+    },
     /// Currents became torques by drive gains that are a guess.
     AssumedGains {
         /// The robot.
@@ -235,6 +249,16 @@ impl fmt::Display for LogWarning {
                 f,
                 "{fields} fields of {block} hold nothing that can be used, the first in row {first_row}, {column}: \
                  the block is left out"
+            ),
+            Self::Incomplete { block, ref column } => write!(
+                f,
+                "the log has some columns of {block} and no \"{column}\": the block is left out"
+            ),
+            Self::TorquesRead { ref layout, ref stated } => write!(
+                f,
+                "the torques of the log are read, to which nothing applies that the layout \"{layout}\" says of currents ({}): name the \
+                 log's columns of currents in it (current under [columns]) to have them read instead",
+                stated.join(", ")
             ),
             Self::AssumedGains { ref robot, ref gain_nm_a } => {
                 let gains: Vec<String> = gain_nm_a.iter().map(|gain| format!("{gain:.3}")).collect();

@@ -49,7 +49,7 @@ pub enum LogError {
         limit: usize,
     },
     /// The file has no bytes, or blank lines only.
-    #[error("{file}: the file is empty ({lines} blank lines); record the log again")]
+    #[error("{file}: the file is empty{}; record the log again", blank(*lines))]
     Empty {
         /// The file.
         file: String,
@@ -258,6 +258,14 @@ pub enum LogError {
 
 fn utf16_hint(utf16: bool) -> &'static str {
     if utf16 { " (it begins like UTF-16; save it as UTF-8)" } else { "" }
+}
+
+fn blank(lines: usize) -> String {
+    match lines {
+        0 => String::new(),
+        1 => " (1 blank line)".to_owned(),
+        lines => format!(" ({lines} blank lines)"),
+    }
 }
 
 fn built_in() -> String {

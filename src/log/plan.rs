@@ -1,5 +1,6 @@
 //! A layout applied to one file: which field of a row goes where.
 
+use super::account::LogWarning;
 use super::error::LogError;
 use super::layout::LayoutFault;
 use super::layout::{Block, Columns, DelimiterChoice, Layout};
@@ -69,6 +70,8 @@ pub(super) struct Plan {
     pub(super) fields: Vec<Field>,
     /// For every column of the file, its index in `fields`.
     pub(super) place: Vec<Option<usize>>,
+    /// What a reader of the results should know about the choice of columns.
+    pub(super) warnings: Vec<LogWarning>,
     joints: usize,
 }
 
@@ -104,12 +107,19 @@ impl Plan {
             fields.extend(found.map_err(|missing| header.missing(missing))?);
         }
         fields.extend(header.effort()?);
-        for block in Block::optional() {
-            if layout.columns(block).is_some() {
-                fields.extend(header.block(block)?.unwrap_or_default());
+        let mut incomplete = Vec::new();
+        for block in Block::optional().filter(|block| layout.columns(*block).is_some()) {
+            match header.block(block) {
+                // Nothing is identified from these blocks, so a part of one costs no log.
+                Err(LogError::MissingColumn { column, .. }) => {
+                    incomplete.push(LogWarning::Incomplete { block: block.key(), column });
+                }
+                found => fields.extend(found?.unwrap_or_default()),
             }
         }
-        Self::new(layout, joints, delimiter, header.names.len(), fields)
+        let mut plan = Self::new(layout, joints, delimiter, header.names.len(), fields)?;
+        plan.warnings.extend(incomplete);
+        Ok(plan)
     }
 
     /// Builds the plan from the number of fields of a file without header; `None` if the layout does not list this
@@ -125,9 +135,10 @@ impl Plan {
             return Ok(None);
         };
         let mut fields = Vec::new();
+        let efforts = layout.efforts();
+        let read = efforts.into_iter().find(|effort| known.blocks.contains(effort));
         for &block in &known.blocks {
-            // Torques take precedence where both are present.
-            if block == Block::Current && known.blocks.contains(&Block::Torque) {
+            if efforts.contains(&block) && Some(block) != read {
                 continue;
             }
             let numbers = layout.columns(block).and_then(Columns::numbers).unwrap_or_default();
@@ -160,7 +171,19 @@ impl Plan {
                 return Err(LogError::Layout { file: layout.source.clone(), fault });
             }
         }
-        Ok(Self { delimiter, decimal_comma: layout.decimal_comma, width, fields, place, joints })
+        let has_torque = fields.iter().any(|field| field.block == Block::Torque);
+        let stated = if has_torque { layout.about_currents() } else { Vec::new() };
+        let about_currents = (!stated.is_empty())
+            .then(|| LogWarning::TorquesRead { layout: layout.name.clone(), stated });
+        Ok(Self {
+            delimiter,
+            decimal_comma: layout.decimal_comma,
+            width,
+            fields,
+            place,
+            warnings: about_currents.into_iter().collect(),
+            joints,
+        })
     }
 
     /// Range of the block's fields within `fields`.
@@ -271,21 +294,22 @@ impl Header<'_> {
         }
     }
 
-    /// The fields of torques where they are logged, otherwise those of currents.
+    /// The fields of the torques or of the currents: of the first of [`Layout::efforts`] that is logged.
     fn effort(&self) -> Result<Vec<Field>, LogError> {
-        let torque = match self.block(Block::Torque)? {
-            Ok(fields) => return Ok(fields),
-            Err(name) => name,
-        };
-        let current = match self.block(Block::Current)? {
-            Ok(fields) => return Ok(fields),
-            Err(name) => name,
-        };
-        let names = |block| self.layout.columns(block).is_some();
-        Err(match (names(Block::Current), names(Block::Torque)) {
-            (true, false) => self.missing(current),
-            (false, true) => self.missing(torque),
-            _ => LogError::NoEffort { file: self.file.to_owned(), row: self.row, current, torque },
+        for effort in self.layout.efforts() {
+            if let Ok(fields) = self.block(effort)? {
+                return Ok(fields);
+            }
+        }
+        let first = |block| self.layout.columns(block).and_then(|columns| columns.name(0));
+        Err(match (first(Block::Current), first(Block::Torque)) {
+            (Some(current), Some(torque)) => {
+                LogError::NoEffort { file: self.file.to_owned(), row: self.row, current, torque }
+            }
+            (current, torque) => {
+                let only = current.or(torque);
+                self.missing(only.unwrap_or_else(|| Block::Current.key().to_owned()))
+            }
         })
     }
 

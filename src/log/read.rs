@@ -35,13 +35,14 @@ const WIDTH_ROWS: usize = 50;
 ///    that late. Then times must increase: repeated and backward times are set aside, and so are up to 8 consecutive
 ///    rows whose time is far ahead.
 /// 3. Units are checked: Δq is compared with ∫q̇ dt, and the clock with the steps a recorder can have. Numbers that
-///    indicate degrees, milli-, micro- or nanoseconds are an error that names the change to make in the layout.
+///    indicate degrees, milli-, micro- or nanoseconds are an error that names the change to make in the layout. So are,
+///    in a log without velocities, angles that move faster than 30 rad/s.
 /// 4. Rows with angles beyond 1000 rad or velocities beyond 100 rad/s are set aside, and so are rows whose angles and
 ///    velocities do not follow from those of their neighbours: stretches of fewer than 10 rows, or interleaved with a
 ///    longer one, that no acceleration below 20 rad/s² connects to the other rows.
 /// 5. Angles that jump by one turn are unwrapped, and the target angles with them.
-/// 6. A block of targets or temperatures is left out of the log if it has a field as in step 1 in any of the remaining
-///    rows. Nothing is identified from these blocks, so they cost no rows.
+/// 6. A block of targets or temperatures is left out of the log if the header lacks some of its columns, or if it has a
+///    field as in step 1 in any of the remaining rows. Nothing is identified from these blocks, so they cost no rows.
 /// 7. Joints that the recorder counts differently, according to the layout, are renumbered and re-signed to match the
 ///    robot's description.
 ///
@@ -81,8 +82,9 @@ pub fn read_log_from(
     } else {
         plan_by_width(&mut lines, first.clone(), layout, joints, delimiter, name)?
     };
+    layout.check_gains_for(joints)?;
     let mut table = Table::new(&plan);
-    let mut account = RowAccount::default();
+    let mut account = RowAccount { warnings: plan.warnings.clone(), ..RowAccount::default() };
     for line in &ahead {
         table.push(&plan, line, &mut account, name)?;
     }

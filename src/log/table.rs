@@ -90,12 +90,18 @@ impl Table {
         self.require_two(account, file)?;
         let slopes = match has_velocities {
             true => Vec::new(),
-            false => self.take_slopes(plan, account, file)?,
+            false => {
+                units::check_clock(&self.motion(plan), &layout.units).map_err(fault)?;
+                self.take_slopes(plan, account, file)?
+            }
         };
         let motion = self.motion(plan);
         // Many garbage rows can hide the relation between angles and velocities. If no unit explains the relation, the
         // garbage is removed first, if it is less than half of the rows, and the units are checked again afterwards.
-        let mut related = units::check(&motion, &layout.units);
+        let mut related = match has_velocities {
+            true => units::check(&motion, &layout.units),
+            false => units::check_slopes(&motion, &layout.units).map(|()| Vec::new()),
+        };
         if let Err(suspicion) = &related
             && !matches!(suspicion, UnitSuspicion::Unrelated { .. })
         {

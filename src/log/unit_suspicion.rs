@@ -31,18 +31,39 @@ pub enum UnitSuspicion {
     },
     /// The time steps are too long or too short for a recorder of motion.
     #[error(
-        "the time steps by {step_s:.3e} s from row to row (first at row {row}, time {time_s}): it looks like {unit}; \
-         put time = \"{unit}\" under [units] in a layout file (--layout)"
+        "the time steps by {step_s:.3e} s from row to row (first at row {row}, time {time_s}): {}put time = \"{unit}\" \
+         under [units] in a layout file (--layout)",
+        reading_of_clock(unit, *may_be_slow)
     )]
     Clock {
         /// The unit it seems to be in.
         unit: &'static str,
         /// Median step as read, s.
         step_s: f64,
+        /// Whether the rows may really be that far apart.
+        may_be_slow: bool,
         /// The first row.
         row: usize,
         /// Its time as read, s.
         time_s: f64,
+    },
+    /// The angles of a log without velocities move faster than any arm.
+    #[error(
+        "rows {first_row} to {last_row}, joint {joint}: the position moves at {speed_rad_s:.1} rad/s as read, and no arm moves faster \
+         than {bound_rad_s:.0} rad/s: either the time is in a longer unit than the layout says (write minutes as seconds), or q is in \
+         degrees; correct time, or put q = \"deg\", under [units] in a layout file (--layout)"
+    )]
+    TooFast {
+        /// The joint on which it is seen, from 1.
+        joint: usize,
+        /// Its mean speed over the fastest stretch, as read, rad/s.
+        speed_rad_s: f64,
+        /// The speed that no arm exceeds, rad/s.
+        bound_rad_s: f64,
+        /// First row of that stretch.
+        first_row: usize,
+        /// Last row of that stretch.
+        last_row: usize,
     },
     /// Positions and velocities agree with each other, and both are too large.
     #[error(
@@ -88,4 +109,14 @@ pub enum UnitSuspicion {
         /// Last row of that stretch.
         last_row: usize,
     },
+}
+
+/// What the steps of a clock say, up to the remedy for a clock in `unit`.
+fn reading_of_clock(unit: &str, may_be_slow: bool) -> String {
+    match may_be_slow {
+        true => format!(
+            "the rows are too far apart for a motion (record it again, 125 rows a second are enough), or the time is in {unit}; if it is, "
+        ),
+        false => format!("it looks like {unit}; "),
+    }
 }

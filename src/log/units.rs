@@ -1,7 +1,8 @@
 //! Checks that the numbers are in the units stated by the layout.
 //!
 //! An angle is the integral of its velocity over time. If Δq / ∫q̇ dt, which is 1 in the right units, equals 180/π,
-//! 10⁻³ or another factor between units, then one of the three quantities is in another unit than stated.
+//! 10⁻³ or another factor between units, then one of the three quantities is in another unit than stated. Velocities
+//! that are the slopes of the angles agree with them in any unit of time; then the clock and the speed have to tell.
 
 use std::f64::consts::{PI, TAU};
 
@@ -20,6 +21,11 @@ const RATIO_TOLERANCE: f64 = 0.2;
 const NO_VELOCITY: f64 = 1e6;
 /// Time steps that a recorder of robot motion can have, s.
 const CLOCK_STEP_S: std::ops::Range<f64> = 1e-5..0.9;
+/// Time steps up to this, s, can be those of a recorder that is too slow. Longer ones are in another unit.
+const SLOW_STEP_S: f64 = 60.0;
+/// No joint of a serial arm moves faster than this, rad/s: twice as fast as the fastest arms. Times in minutes read as
+/// seconds make 30 rad/s of 0.5 rad/s.
+const FASTEST_RAD_S: f64 = 30.0;
 
 /// Δq / ∫q̇ dt of one joint.
 struct Ratio {
@@ -29,7 +35,7 @@ struct Ratio {
     span: (usize, usize),
 }
 
-/// Compares angles, velocities and clock; returns a warning for each joint whose velocity disagrees.
+/// Compares angles, recorded velocities and clock; returns a warning for each joint whose velocity disagrees.
 ///
 /// # Errors
 /// The unit that the numbers contradict, with the remedy.
@@ -56,14 +62,11 @@ fn is_near(ratio: f64, expected: f64) -> bool {
 
 /// Returns the median ratio over the spans of the log in which the joint moves; `None` if it hardly moves.
 fn ratio_of(motion: &Motion, joint: usize) -> Option<Ratio> {
-    let rows = motion.rows();
-    let length = (rows / 200).clamp(10, 100);
     let (q, qd) = (&motion.q[joint], &motion.qd[joint]);
     let mut ratios = Vec::new();
     let mut widest = (0.0, (0, 0));
-    let spans = rows.saturating_sub(1) / length;
-    for first in (0..spans).map(|s| s * length) {
-        let last = first + length;
+    let spans = spans(motion.rows());
+    for (first, last) in spans.clone() {
         let moved = q[last] - q[first];
         let integral: f64 = (first..last)
             .map(|k| 0.5 * (qd[k] + qd[k + 1]) * (motion.time_s[k + 1] - motion.time_s[k]))
@@ -76,11 +79,21 @@ fn ratio_of(motion: &Motion, joint: usize) -> Option<Ratio> {
             widest = (moved.abs(), (first, last));
         }
     }
-    // In a log at rest, a few spans of garbage must not count as motion.
-    if ratios.len() < 3.max(spans / 20) {
+    if ratios.len() < fewest_of(spans.len()) {
         return None;
     }
     Some(Ratio { joint, ratio: median(&mut ratios)?, span: widest.1 })
+}
+
+/// First and last row (indices) of each of the spans into which a log of this many rows is divided.
+fn spans(rows: usize) -> impl ExactSizeIterator<Item = (usize, usize)> + Clone {
+    let length = (rows / 200).clamp(10, 100);
+    (0..rows.saturating_sub(1) / length).map(move |s| (s * length, (s + 1) * length))
+}
+
+/// Fewest of the spans of a log that count as motion: in a log at rest, a few spans of garbage must not.
+fn fewest_of(spans: usize) -> usize {
+    3.max(spans / 20)
 }
 
 /// Finds the smallest set of unit changes that explains the ratio and names the first change in it.
@@ -155,8 +168,11 @@ fn has_plausible_clock(step_s: f64, stated: TimeUnit, unit: TimeUnit) -> bool {
     CLOCK_STEP_S.contains(&(step_s / stated.seconds() * unit.seconds()))
 }
 
-/// Checks the clock of a log at rest: no recorder of motion has steps of seconds.
-fn check_clock(motion: &Motion, units: &Units) -> Result<(), UnitSuspicion> {
+/// Checks the clock of a log at rest, or without recorded velocities: no recorder of motion has steps of seconds.
+///
+/// # Errors
+/// [`UnitSuspicion::Clock`], if another unit makes the steps those of a recorder.
+pub(super) fn check_clock(motion: &Motion, units: &Units) -> Result<(), UnitSuspicion> {
     let Some(step_s) = median_step(motion.time_s).filter(|s| !CLOCK_STEP_S.contains(s)) else {
         return Ok(());
     };
@@ -166,11 +182,51 @@ fn check_clock(motion: &Motion, units: &Units) -> Result<(), UnitSuspicion> {
         Some(unit) => Err(UnitSuspicion::Clock {
             unit: unit.name(),
             step_s,
+            may_be_slow: (CLOCK_STEP_S.end..SLOW_STEP_S).contains(&step_s),
             row: motion.row[0],
             time_s: motion.time_s[0],
         }),
         None => Ok(()),
     }
+}
+
+/// Checks a log whose velocities are the slopes of its angles. Its clock is for [`check_clock`], which has to come before
+/// any angle is taken for wild: between rows that are far apart all of them jump.
+///
+/// # Errors
+/// The unit that the angles contradict, with the remedy.
+pub(super) fn check_slopes(motion: &Motion, units: &Units) -> Result<(), UnitSuspicion> {
+    check_degrees(motion, units)?;
+    check_speed(motion)
+}
+
+/// Refuses angles that move faster than any arm. Mean speeds over spans are compared, which neither noise nor readings
+/// held over several rows make larger.
+fn check_speed(motion: &Motion) -> Result<(), UnitSuspicion> {
+    let spans = spans(motion.rows());
+    for (joint, q) in motion.q.iter().enumerate() {
+        let speed_rad_s = |first: usize, last: usize| {
+            ((q[last] - q[first]) / (motion.time_s[last] - motion.time_s[first])).abs()
+        };
+        let fast: Vec<(f64, (usize, usize))> = spans
+            .clone()
+            .map(|(first, last)| (speed_rad_s(first, last), (first, last)))
+            .filter(|(speed, _)| *speed > FASTEST_RAD_S)
+            .collect();
+        let fastest = fast.iter().max_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some(&(speed_rad_s, (first, last))) = fastest
+            && fast.len() >= fewest_of(spans.len())
+        {
+            return Err(UnitSuspicion::TooFast {
+                joint: joint + 1,
+                speed_rad_s,
+                bound_rad_s: FASTEST_RAD_S,
+                first_row: motion.row[first],
+                last_row: motion.row[last],
+            });
+        }
+    }
+    Ok(())
 }
 
 /// Detects angles and velocities that are both in degrees, which agree with each other. No arm keeps two joints beyond

@@ -13,11 +13,9 @@ use crate::identify::{Measurement, Options};
 use crate::output::{OutputError, write_text};
 use crate::plant::faults::Effect;
 use crate::plant::{PerJoint, PlantConfig, SensorConfig};
-use crate::robot::JointSignals;
+use crate::robot::{Arm, JointSignals};
 use crate::signal::replicate_noise;
 
-/// Run-in from rest, s, if no run-in keeps the arm within its limits.
-const RUN_IN_S: f64 = 2.0;
 /// Number of trials of a scenario that is made from a log.
 const TRIALS: u64 = 100;
 /// Seed of a scenario that is made from a log.
@@ -71,15 +69,7 @@ impl Scenario {
         let series =
             FourierSeries::of_period(&scene.motion.q_rad, scene.rate_hz, processing.cutoff_hz)?;
         let arm = simulation.extended.arm.clone();
-        // The log does not say how its motion was started from rest.
-        let requirements = Requirements::default();
-        let run_in_s = match Excitation::fitted(&arm, &requirements, series.clone(), 1, false) {
-            Err(ExcitationError::NoRunIn { .. } | ExcitationError::PeriodPasses { .. }) => RUN_IN_S,
-            fitted => fitted?.run_in_s(),
-        };
-        // Round the run-in up to whole rows, so that each period begins exactly at a row, as in the log.
-        let rate_hz = simulation.plant.log_rate_hz;
-        let run_in_s = (run_in_s * rate_hz - 1e-6).ceil() / rate_hz;
+        let run_in_s = run_in_s(&arm, &series, simulation.plant.log_rate_hz)?;
         let excitation = Excitation::new(series, run_in_s, scene.periods)?;
         let (effects, further) = (&simulation.effects, &simulation.of_the_record);
         let effects = simulation.extended.offsets.iter().chain(effects).chain(further);
@@ -152,6 +142,14 @@ impl Scenario {
     }
 }
 
+/// Length of the run-in, s. The log does not say how its motion was started from rest: this one keeps the limits of the
+/// arm, or exceeds them least. It has whole rows, so that each period begins exactly at a row, as in the log.
+fn run_in_s(arm: &Arm, series: &FourierSeries, rate_hz: f64) -> Result<f64, ExcitationError> {
+    let requirements = Requirements::default();
+    let fitted = Excitation::fitted_without_limits(arm, &requirements, series.clone(), 1)?;
+    Ok((fitted.run_in_s() * rate_hz - 1e-6).ceil() / rate_hz)
+}
+
 /// Standard deviation of one sample, per joint, from the scatter between the periods of `signals`. Zero if the log was
 /// resampled to another clock before it was used.
 fn scatter(finding: &Finding, log: &Measurement, signals: &JointSignals) -> Vec<f64> {
@@ -167,4 +165,22 @@ fn scatter(finding: &Finding, log: &Measurement, signals: &JointSignals) -> Vec<
     }
     let noise = replicate_noise(&signals.slice(window), n);
     noise.map_or(vec![0.0; signals.joints()], |noise| noise.sigma)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Joint 1 is fastest where the period begins, and moves by all but 5 % of its range: a run-in of T starts v T/2 away,
+    /// beyond the range, and the shortest of 0.5 s least. At 125 Hz, 63 rows hold it.
+    #[test]
+    fn the_run_in_of_a_motion_without_any_is_the_one_that_passes_the_limits_least() {
+        let mut arm = Arm::built_in("ur5").unwrap();
+        arm.joints[0].limits.position_rad = [-0.105, 0.105];
+        let mut a = vec![vec![0.0]; 6];
+        a[0] = vec![0.1 * std::f64::consts::TAU];
+        let q0 = vec![0.0, -1.2, 0.0, -1.5, 0.3, 0.0];
+        let series = FourierSeries::new(1.0, q0, a, vec![vec![0.0]; 6]).unwrap();
+        assert_eq!(run_in_s(&arm, &series, 125.0).unwrap(), 63.0 / 125.0);
+    }
 }

@@ -2,6 +2,7 @@
 
 use crate::base::BaseSet;
 use crate::excitation::design::{Design, Specification};
+use crate::excitation::export::Speed;
 use crate::excitation::{ClearanceModel, LimitKind, Reference};
 use crate::number;
 use crate::robot::Arm;
@@ -19,60 +20,104 @@ const SAMPLES: usize = 600;
 pub const NO_CLEARANCE: &str =
     "the robot has no capsules: its distance from itself, the floor and the cell is not watched";
 
-/// The report page of a design.
+/// Remark on a motion that is played more slowly than it was designed; `None` at full speed.
+pub fn at_full_speed(found: &Design, speed: Speed) -> Option<String> {
+    let share = speed.share();
+    (share < 1.0).then(|| {
+        format!(
+            "Predicted σ and length are those of full speed: at a speed of {share} the motion takes {:.1} s, and tells less \
+             about what depends on speed and acceleration.",
+            found.excitation.duration_s() / share
+        )
+    })
+}
+
+/// The report page of a design that is played at `speed`.
 pub fn page(
     arm: &Arm,
     base: &BaseSet,
     spec: &Specification,
     found: &Design,
+    speed: Speed,
     program: Program,
 ) -> Result<Page, ReportError> {
+    let is_watched = !ClearanceModel::new(arm).is_empty();
+    let motion = Samples::of(arm, found);
+    let verdict = verdict(spec, found, speed, is_watched);
+    let mut page = Page::new("Excitation", subtitle(arm, found), verdict, program);
+    page.push(the_motion(arm, spec, &motion, is_watched)?);
+    page.push(what_it_will_tell(arm, base, found));
+    page.push(margins(found));
+    if is_watched {
+        page.push(clearance_model(arm, &motion)?);
+    }
+    Ok(page)
+}
+
+fn subtitle(arm: &Arm, found: &Design) -> String {
+    let series = found.excitation.series();
+    format!(
+        "{}, order {}, period {} s, run-in {} s",
+        arm.name,
+        series.order(),
+        number::significant(series.period_s, 4),
+        found.excitation.run_in_s()
+    )
+}
+
+fn verdict(spec: &Specification, found: &Design, speed: Speed, is_watched: bool) -> Verdict {
     let p = &found.prediction;
     let worst = found.margins.worst();
-    let is_watched = !ClearanceModel::new(arm).is_empty();
     let limits = match is_watched {
         true => "A motion inside every limit".to_owned(),
         false => format!("A motion inside every limit of the joints ({NO_CLEARANCE})"),
     };
-    let verdict = Verdict {
+    let prediction = format!(
+        "Predicted from {} periods, {:.1} s of data: half of the parameters to {} or better, nine tenths to {}.",
+        found.excitation.periods(),
+        found.experiment.data_s,
+        number::percent(p.relative_quantile(0.5), 2),
+        number::percent(p.relative_quantile(0.9), 2)
+    );
+    let conditions = format!(
+        "cond(ΘᵀΘ) {}; with columns of unit length {}.",
+        number::significant(p.condition, 4),
+        number::significant(p.scaled_condition, 3)
+    );
+    let closest = format!(
+        "Closest limit: {}, {} left at {:.2} s.",
+        worst.limit,
+        worst.in_words(),
+        worst.time_s
+    );
+    let facts = std::iter::once(prediction).chain(at_full_speed(found, speed));
+    Verdict {
         status: if found.cut_short || !is_watched { Status::Warn } else { Status::Good },
         sentence: format!(
             "{limits}, checked at {} Hz: {}.",
             spec.requirements.check_rate_hz,
             spec.criterion.in_words(found.value)
         ),
-        facts: vec![
-            format!(
-                "Predicted from {} periods, {:.1} s of data: half of the parameters to {} or better, nine tenths to {}.",
-                found.excitation.periods(),
-                found.experiment.data_s,
-                number::percent(p.relative_quantile(0.5), 2),
-                number::percent(p.relative_quantile(0.9), 2)
-            ),
-            format!(
-                "cond(ΘᵀΘ) {}; with columns of unit length {}.",
-                number::significant(p.condition, 4),
-                number::significant(p.scaled_condition, 3)
-            ),
-            format!(
-                "Closest limit: {}, {} left at {:.2} s.",
-                worst.limit,
-                worst.in_words(),
-                worst.time_s
-            ),
-            search_fact(found),
-        ],
-    };
-    let series = found.excitation.series();
-    let subtitle = format!(
-        "{}, order {}, period {} s, run-in {} s",
-        arm.name,
-        series.order(),
-        number::significant(series.period_s, 4),
-        found.excitation.run_in_s()
-    );
-    let motion = Samples::of(arm, found);
-    let mut page = Page::new("Excitation", subtitle, verdict, program);
+        facts: facts.chain([conditions, closest, search_fact(found)]).collect(),
+    }
+}
+
+fn search_fact(found: &Design) -> String {
+    let end = if found.cut_short { "; cut short, so another run may end elsewhere" } else { "" };
+    format!(
+        "{} of {} random starts were feasible, {} evaluations{end}.",
+        found.feasible_starts,
+        found.starts,
+        number::count(found.evaluations)
+    )
+}
+
+fn the_motion(
+    arm: &Arm,
+    spec: &Specification,
+    motion: &Samples,
+    is_watched: bool,
+) -> Result<Section, PlotError> {
     let mut section = Section::new("The motion")
         .figure(motion.against_limits(arm, 0)?, "Angles; dashed: limits.")
         .figure(
@@ -85,41 +130,32 @@ pub fn page(
         section = section.figure(motion.clearance(arm, spec)?, caption);
     }
     let caption = "Postures over one period (pale), where it is closest to itself, and the way of the flange.";
-    page.push(section.figure(swept(arm, &motion)?, caption));
-    page.push(
-        Section::new("What it will tell")
-            .paragraph(
-                "Standard deviations by weighted least squares from white torque noise, before any experiment is run. \
-                 Parameters that are zero for this arm have no relative σ.",
-            )
-            .table(parameters(arm, base, found), ""),
-    );
-    page.push(
-        Section::new("Margins").table(
-            margins(found),
-            "What the whole motion, run-in and run-out included, leaves free, also as a share of half the range of a position, of \
-             the largest velocity, acceleration or torque, and of 0.1 m of clearance.",
-        ),
-    );
-    if is_watched {
-        page.push(
-            Section::new("Clearance model")
-                .paragraph("Capsules fixed in the bodies; ends in the joint frame of the body, body 0 is the base.")
-                .table(capsules(arm), "")
-                .figure(drawn_capsules(arm, &motion)?, "Axes of the capsules at the start of the period."),
-        );
-    }
-    Ok(page)
+    Ok(section.figure(swept(arm, motion)?, caption))
 }
 
-fn search_fact(found: &Design) -> String {
-    let end = if found.cut_short { "; cut short, so another run may end elsewhere" } else { "" };
-    format!(
-        "{} of {} random starts were feasible, {} evaluations{end}.",
-        found.feasible_starts,
-        found.starts,
-        number::count(found.evaluations)
+fn what_it_will_tell(arm: &Arm, base: &BaseSet, found: &Design) -> Section {
+    Section::new("What it will tell")
+        .paragraph(
+            "Standard deviations by weighted least squares from white torque noise, before any experiment is run. \
+             Parameters that are zero for this arm have no relative σ.",
+        )
+        .table(parameters(arm, base, found), "")
+}
+
+fn margins(found: &Design) -> Section {
+    Section::new("Margins").table(
+        margin_table(found),
+        "What the whole motion, run-in and run-out included, leaves free, also as a share of half the range of a position, of \
+         the largest velocity, acceleration or torque, and of 0.1 m of clearance.",
     )
+}
+
+fn clearance_model(arm: &Arm, motion: &Samples) -> Result<Section, PlotError> {
+    let section = Section::new("Clearance model")
+        .paragraph("Capsules fixed in the bodies; ends in the joint frame of the body, body 0 is the base.")
+        .table(capsules(arm), "");
+    Ok(section
+        .figure(drawn_capsules(arm, motion)?, "Axes of the capsules at the start of the period."))
 }
 
 /// One period, sampled at [`SAMPLES`] + 1 instants.
@@ -300,7 +336,7 @@ fn parameters(arm: &Arm, base: &BaseSet, found: &Design) -> Table {
     table
 }
 
-fn margins(found: &Design) -> Table {
+fn margin_table(found: &Design) -> Table {
     let mut table = Table::new([
         Column::text("limit"),
         Column::number("left", ""),

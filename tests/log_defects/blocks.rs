@@ -1,6 +1,7 @@
 //! Optional quantities of a log.
 
 use super::*;
+use armid::log::Effort;
 use armid::robot::Arm;
 
 /// Column of the first desired moment in [`with_optional_blocks`]; the temperatures follow the moments.
@@ -43,6 +44,25 @@ fn a_bad_field_that_nothing_needs_costs_its_block_and_no_row() {
     assert!(blank.target_effort.is_some() && blank.temperature_c.is_none());
     let warning = blank.rows.warnings[0].to_string();
     assert!(warning.contains(&format!("{} fields", SAMPLES * JOINTS)), "{warning}");
+}
+
+#[test]
+fn a_column_that_nothing_needs_may_be_missing() {
+    for (block, name, column) in [
+        ("target_moment", "target_moment_0", MOMENT),
+        ("target_moment", "target_moment_3", MOMENT + 3),
+        ("temperature", "joint_temperatures_5", MOMENT + JOINTS + 5),
+    ] {
+        let log = with_optional_blocks(|rows| rows[0][column] = "another".into());
+        assert_eq!((log.samples(), log.rows.warnings.len()), (SAMPLES, 1), "{}", log.rows);
+        let is_temperature = block == "temperature";
+        assert_eq!(log.target_effort.is_some(), is_temperature);
+        assert_eq!(log.temperature_c.is_none(), is_temperature);
+        let warning = log.rows.warnings[0].to_string();
+        for part in [block, name, "left out"] {
+            assert!(warning.contains(part), "{warning}");
+        }
+    }
 }
 
 #[test]
@@ -134,6 +154,53 @@ fn guessed_gains_are_told() {
     assert!(remarks("ur5e", &torques, &Layout::default()).is_empty());
     assert!(remarks("ur5e", &currents, &own).is_empty());
     assert!(remarks("ur10e", &currents, &Layout::default()).is_empty());
+}
+
+/// The log that a layout like armid's, with `lines` of its own, reads in the valid file with torques behind its currents.
+fn read_with_torques(lines: &str) -> Result<Log, LogError> {
+    let mut rows = valid();
+    rows[0].extend((0..JOINTS).map(|j| format!("actual_torque_{j}")));
+    rows[1..].iter_mut().for_each(|row| row.extend((0..JOINTS).map(|j| format!("{j}.5"))));
+    let layout = format!("name = \"mine\"\nlike = \"armid\"\n{lines}\n");
+    let layout = Layout::from_toml(&layout, "mine.toml").unwrap();
+    read_log_from(text(&rows, ",", "\n").as_bytes(), "run.csv", &layout, JOINTS)
+}
+
+/// The columns that a layout names itself count before those that it inherits.
+#[test]
+fn own_currents_count_before_inherited_torques() {
+    let currents = "[columns]\ncurrent = \"actual_current_{0}\"";
+    let both = format!("{currents}\ntorque = \"actual_torque_{{0}}\"");
+    for (lines, has_currents) in [("", false), (currents, true), (&*both, false)] {
+        let log = read_with_torques(lines).unwrap();
+        assert_eq!(matches!(log.effort, Effort::Current { .. }), has_currents, "{lines}");
+        assert!(log.rows.warnings.is_empty(), "{lines}: {}", log.rows);
+    }
+}
+
+#[test]
+fn what_a_layout_says_of_currents_in_vain_is_told() {
+    for (lines, said) in [
+        ("drive_gain_nm_a = [9.0, 9.0, 9.0, 9.0, 9.0, 9.0]", "drive_gain_nm_a"),
+        ("[units]\ncurrent = \"mA\"", "current under [units]"),
+        ("[columns]\ncurrent = \"ampere_{0}\"", "current under [columns]"),
+    ] {
+        let log = read_with_torques(lines).unwrap();
+        assert!(matches!(log.effort, Effort::Torque(_)), "{lines}");
+        let [LogWarning::TorquesRead { stated, .. }] = &log.rows.warnings[..] else {
+            panic!("{lines}: {}", log.rows)
+        };
+        assert_eq!(*stated, [said]);
+        let warning = log.rows.warnings[0].to_string();
+        assert!(warning.contains("\"mine\"") && warning.contains(said), "{warning}");
+    }
+}
+
+/// Gains for another number of joints belong to another arm, even if this log needs none.
+#[test]
+fn there_is_a_gain_for_each_joint() {
+    let result = read_with_torques("drive_gain_nm_a = [1.0, 2.0, 3.0]");
+    assert_says(result, &["layout mine.toml", "drive_gain_nm_a has 3 number(s)", "6 joints"]);
 }
 
 /// A layout without torque columns does not ask for them.

@@ -110,6 +110,7 @@ fn suspected(result: Result<Log, LogError>) -> (&'static str, &'static str) {
             match suspicion {
                 UnitSuspicion::Ratio { quantity, unit, .. } => (quantity, unit),
                 UnitSuspicion::Clock { unit, .. } => ("clock", unit),
+                UnitSuspicion::TooFast { .. } => ("speed", ""),
                 UnitSuspicion::Degrees { .. } => ("both", "deg"),
                 UnitSuspicion::Unrelated { .. } => ("none", ""),
                 UnitSuspicion::NoVelocity { .. } => ("no velocity", ""),

@@ -206,7 +206,8 @@ fn missed_samples_are_counted() {
 
 #[test]
 fn files_without_data() {
-    assert_says(read(""), &["run.csv", "empty"]);
+    assert_says(read(""), &["run.csv", "the file is empty; record"]);
+    assert_says(read("\n"), &["run.csv", "empty", "(1 blank line)"]);
     assert_says(read("\n\r\n  \n"), &["run.csv", "empty", "3 blank lines"]);
     assert_says(edited(|rows| rows.truncate(1)), &["run.csv", "row 1", "header"]);
     assert_says(edited(|rows| rows.truncate(2)), &["run.csv", "1 can be used"]);

@@ -39,6 +39,45 @@ fn velocities_that_were_not_recorded_are_slopes_of_the_angles() {
     }
 }
 
+/// Velocities that are slopes of the angles agree with them in any unit of time; the clock tells the unit, and minutes
+/// are told by the speed.
+#[test]
+fn the_units_of_a_log_without_velocities_are_recognised() {
+    let layout = without_velocities();
+    for (factors, expected) in [
+        ([1e3, 1.0], ("clock", "ms")),
+        ([1e6, 1.0], ("clock", "us")),
+        ([1e9, 1.0], ("clock", "ns")),
+        ([1.0 / 60.0, 1.0], ("speed", "")),
+        ([1.0 / 3600.0, 1.0], ("speed", "")),
+        ([1.0, 180.0 / PI], ("both", "deg")),
+        ([1e3, 180.0 / PI], ("clock", "ms")),
+    ] {
+        let mut rows = valid();
+        scale(&mut rows, 0..1, factors[0]);
+        scale(&mut rows, 1..7, factors[1]);
+        let text = text(&rows, ",", "\n");
+        let result = read_log_from(text.as_bytes(), "run.csv", &layout, JOINTS);
+        assert_eq!(suspected(result), expected, "{factors:?}");
+    }
+}
+
+/// Steps of a second are those of a slow recorder or of milliseconds, and not rows that do not follow from each other.
+#[test]
+fn rows_that_are_far_apart_are_not_only_taken_for_milliseconds() {
+    let mut rows = valid();
+    let mut k = 0;
+    rows.retain(|_| {
+        k += 1;
+        k < 3 || k % 50 == 2
+    });
+    scale(&mut rows, 0..1, 1.0 / (50.0 * STEP_S));
+    let text = text(&rows, ",", "\n");
+    let result = read_log_from(text.as_bytes(), "run.csv", &without_velocities(), JOINTS);
+    let parts = ["by 1.000e0 s", "row 2", "too far apart", "or the time is in ms", "time = \"ms\""];
+    assert_says(result, &parts);
+}
+
 /// Stamps rounded to 0.01 s at 125 rows per second, without velocities that could show that the rows are evenly spaced.
 #[test]
 fn rounded_stamps_are_mended_without_velocities() {

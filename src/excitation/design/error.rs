@@ -3,13 +3,14 @@
 use thiserror::Error;
 
 use crate::base::{AmbiguousRank, ParameterisationError};
+use crate::excitation::error::readable;
 use crate::excitation::{ExcitationError, LimitKind, POSES_TRIED};
 
 /// A specification that cannot be met or makes no sense.
 #[derive(Debug, Error)]
 pub enum DesignError {
     /// A number outside what is possible.
-    #[error("{what} = {value} must be {must}")]
+    #[error("{what} = {} must be {must}", readable(*value))]
     Value {
         /// Which quantity.
         what: String,
@@ -32,7 +33,8 @@ pub enum DesignError {
     },
     /// A distance is too small wherever the arm is.
     #[error(
-        "{limit}: at most {most_m:.3} m in {POSES_TRIED} poses all over the range of the joints, and {clearance_m} m are asked for"
+        "{limit}: at most {most_m:.3} m in {POSES_TRIED} poses all over the range of the joints, and {} m are asked for",
+        readable(*clearance_m)
     )]
     NeverClear {
         /// The distance, in words.
@@ -88,7 +90,7 @@ pub enum DesignError {
         starts: usize,
     },
     /// Designs were found, but none passed the check on the fine grid together with a run-in.
-    #[error("{candidates} designs were found, none of which passes the final check: {last}")]
+    #[error("{}: {last}", none_passes(*candidates))]
     CheckFailed {
         /// How many.
         candidates: usize,
@@ -114,5 +116,26 @@ impl DesignError {
             Self::FixedPose { limit, .. } => limit.is_distance(),
             _ => false,
         }
+    }
+}
+
+fn none_passes(candidates: usize) -> String {
+    match candidates {
+        1 => "one design was found, which does not pass the final check".to_owned(),
+        more => format!("{more} designs were found, none of which passes the final check"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_design_is_no_plural() {
+        let of = |candidates: usize| {
+            DesignError::CheckFailed { candidates, last: "why".into() }.to_string()
+        };
+        assert_eq!(of(1), "one design was found, which does not pass the final check: why");
+        assert_eq!(of(2), "2 designs were found, none of which passes the final check: why");
     }
 }

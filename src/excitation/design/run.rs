@@ -15,7 +15,7 @@ use super::specification::Specification;
 use crate::base::BaseSet;
 use crate::dynamics::{Model, Parameter, ParameterLayout, Workspace, inverse_dynamics};
 use crate::excitation::{
-    ClearanceModel, Excitation, ExcitationError, FourierSeries, Margins, Reference, check,
+    ClearanceModel, Excitation, FourierSeries, Margins, Reference, Requirements, check,
 };
 use crate::robot::Arm;
 
@@ -126,27 +126,7 @@ pub fn design(
     spec.check(arm)?;
     let spec = &of_whole_periods(spec);
     let model = Model::new(arm);
-    let scales = parameter_scales(base, &model);
-    // Λ is averaged over the samples of one period, so it is multiplied by the number of samples of the experiment.
-    let samples = spec.experiment.samples();
-    let weights = if spec.criterion.whitened() {
-        spec.experiment.weights().iter().map(|w| w * samples).collect()
-    } else {
-        vec![1.0; arm.dof()]
-    };
-    let information = Information::new(&model, base, weights);
-    let barrier = LimitBarrier::new(arm, &spec.requirements, ClearanceModel::new(arm));
-    let torque_nm =
-        arm.joints.iter().map(|j| spec.requirements.torque_share * j.limits.torque_nm).collect();
-    let problem = Problem {
-        space: DesignSpace::new(spec.variables.clone(), 8),
-        information,
-        criterion: spec.criterion,
-        scales,
-        prior: spec.prior.clone(),
-        barrier,
-        torque_nm,
-    };
+    let problem = problem(arm, base, spec, &model);
     let at = |samples: usize| Problem {
         space: DesignSpace::new(spec.variables.clone(), samples),
         ..problem.clone()
@@ -169,40 +149,83 @@ pub fn design(
             arm: arm.name.clone(),
         });
     }
-    let mut last = String::new();
-    for candidate in &found.candidates {
-        match finish(arm, spec, &problem.space, candidate) {
-            Err(DesignError::Excitation(e)) => last = e.to_string(),
-            Err(e) => return Err(e),
-            Ok((excitation, margins)) => {
-                let series = excitation.series();
-                let data_s = excitation.periods() as f64 * series.period_s;
-                let experiment = Experiment { data_s, ..spec.experiment.clone() };
-                let prior = spec.prior.as_ref();
-                let prediction = Prediction::of(&model, base, &experiment, series, prior);
-                let Some(prediction) = prediction else {
-                    last = "it leaves a parameter undetermined".into();
-                    continue;
-                };
-                let finalists = found.candidates.iter().take(spec.finalists);
-                return Ok(Design {
-                    excitation,
-                    value: candidate.value,
-                    experiment,
-                    prediction,
-                    margins,
-                    finalists: finalists
-                        .map(|c| Finalist { start: c.start, value: c.value })
-                        .collect(),
-                    starts: spec.starts,
-                    feasible_starts: found.feasible_starts,
-                    evaluations: found.evaluations,
-                    cut_short: found.cut_short,
-                });
-            }
-        }
+    let Checked { excitation, value, experiment, prediction, margins } =
+        first_that_passes(&found.candidates, arm, base, spec, &model, &problem.space)?;
+    let finalists = found.candidates.iter().take(spec.finalists);
+    Ok(Design {
+        excitation,
+        value,
+        experiment,
+        prediction,
+        margins,
+        finalists: finalists.map(|c| Finalist { start: c.start, value: c.value }).collect(),
+        starts: spec.starts,
+        feasible_starts: found.feasible_starts,
+        evaluations: found.evaluations,
+        cut_short: found.cut_short,
+    })
+}
+
+/// The problem that `spec` poses, on a coarse grid.
+fn problem(arm: &Arm, base: &BaseSet, spec: &Specification, model: &Model) -> Problem {
+    // Λ is averaged over the samples of one period, so it is multiplied by the number of samples of the experiment.
+    let samples = spec.experiment.samples();
+    let weights = if spec.criterion.whitened() {
+        spec.experiment.weights().iter().map(|w| w * samples).collect()
+    } else {
+        vec![1.0; arm.dof()]
+    };
+    let torque_nm =
+        arm.joints.iter().map(|j| spec.requirements.torque_share * j.limits.torque_nm).collect();
+    Problem {
+        space: DesignSpace::new(spec.variables.clone(), 8),
+        information: Information::new(model, base, weights),
+        criterion: spec.criterion,
+        scales: parameter_scales(base, model),
+        prior: spec.prior.clone(),
+        barrier: LimitBarrier::new(arm, &spec.requirements, ClearanceModel::new(arm)),
+        torque_nm,
     }
-    Err(DesignError::CheckFailed { candidates: found.candidates.len(), last })
+}
+
+/// A candidate that passed its check.
+struct Checked {
+    excitation: Excitation,
+    value: f64,
+    experiment: Experiment,
+    prediction: Prediction,
+    margins: Margins,
+}
+
+/// The best of the `candidates`, which are sorted, that passes its check.
+fn first_that_passes(
+    candidates: &[Candidate],
+    arm: &Arm,
+    base: &BaseSet,
+    spec: &Specification,
+    model: &Model,
+    space: &DesignSpace,
+) -> Result<Checked, DesignError> {
+    let mut last = String::new();
+    for candidate in candidates {
+        let (excitation, margins) = match finish(arm, spec, space, candidate) {
+            Ok(finished) => finished,
+            Err(reason) => {
+                last = reason;
+                continue;
+            }
+        };
+        let series = excitation.series();
+        let data_s = excitation.periods() as f64 * series.period_s;
+        let experiment = Experiment { data_s, ..spec.experiment.clone() };
+        let prediction = Prediction::of(model, base, &experiment, series, spec.prior.as_ref());
+        let Some(prediction) = prediction else {
+            last = "it leaves a parameter undetermined".into();
+            continue;
+        };
+        return Ok(Checked { excitation, value: candidate.value, experiment, prediction, margins });
+    }
+    Err(DesignError::CheckFailed { candidates: candidates.len(), last })
 }
 
 /// The same specification, with the data extended to the whole periods that will be played if their length is fixed.
@@ -222,40 +245,53 @@ fn periods_to_cover(data_s: f64, period_s: f64) -> usize {
 }
 
 /// Prepares a candidate for execution: scales it down slightly if it exceeds a limit on the fine grid, starts it at its
-/// calmest moment, adds run-in and run-out, and checks the whole motion.
+/// calmest moment, adds run-in and run-out, and checks the whole motion. Says why if it fails wherever it starts.
 fn finish(
     arm: &Arm,
     spec: &Specification,
     space: &DesignSpace,
     candidate: &Candidate,
-) -> Result<(Excitation, Margins), DesignError> {
+) -> Result<(Excitation, Margins), String> {
     const SHRINK: f64 = 0.998;
     const ATTEMPTS: usize = 15;
+    let requirements = &spec.requirements;
     let mut x = candidate.x.as_slice().to_vec();
     for _ in 0..ATTEMPTS {
-        if check(arm, &spec.requirements, &space.series(&x))?.feasible() {
+        let margins = check(arm, requirements, &space.series(&x)).map_err(|e| e.to_string())?;
+        if margins.feasible() {
             break;
         }
         x = space.scaled(&x, SHRINK);
     }
     let series = space.series(&x);
     let periods = periods_to_cover(spec.experiment.data_s, series.period_s);
-    let mut failure = None;
+    let mut failure = String::new();
     for shift_s in calm_moments(arm, spec, &series) {
-        let begun = series.shifted(shift_s);
-        match Excitation::fitted(arm, &spec.requirements, begun, periods, true) {
-            Ok(excitation) => {
-                let margins = check(arm, &spec.requirements, &excitation)?;
-                return Ok((excitation, margins));
-            }
-            Err(e @ (ExcitationError::NoRunIn { .. } | ExcitationError::PeriodPasses { .. })) => {
-                failure = Some(e);
-            }
-            Err(e) => return Err(e.into()),
+        match whole_motion(arm, requirements, series.shifted(shift_s), periods) {
+            Ok(whole) => return Ok(whole),
+            Err(reason) => failure = reason,
         }
     }
-    let shortfall = DesignError::CheckFailed { candidates: 1, last: String::new() };
-    Err(failure.map_or(shortfall, DesignError::from))
+    Err(failure)
+}
+
+/// The motion of `periods` periods of `series` with run-in and run-out, or the reason why it cannot be played. The
+/// run-in was chosen with one period, so that the instants at which the whole is checked lie elsewhere in the period.
+fn whole_motion(
+    arm: &Arm,
+    requirements: &Requirements,
+    series: FourierSeries,
+    periods: usize,
+) -> Result<(Excitation, Margins), String> {
+    let excitation =
+        Excitation::fitted(arm, requirements, series, periods, true).map_err(|e| e.to_string())?;
+    let margins = check(arm, requirements, &excitation).map_err(|e| e.to_string())?;
+    if margins.feasible() {
+        return Ok((excitation, margins));
+    }
+    let worst = margins.worst();
+    let (limit, short, time_s) = (&worst.limit, worst.shortfall_in_words(), worst.time_s);
+    Err(format!("the whole motion passes a limit: {limit} by {short} at t = {time_s:.3} s"))
 }
 
 /// Times of the period at which the motion may start: only 0 for a motion through rest; otherwise the moments closest
@@ -298,4 +334,30 @@ fn calm_moments(arm: &Arm, spec: &Specification, series: &FourierSeries) -> Vec<
         }
     }
     chosen.into_iter().map(|k| series.period_s * k as f64 / MOMENTS as f64).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Joint 6 oscillates with a period of 4 s, and its speed reaches `share` of its limit. The run-in is chosen along
+    /// a motion of 5 … 12 s, and at one sample in ten seconds that joint is at rest in each of these. Along 25 periods,
+    /// all run-ins leave a sample at which its speed is at least 0.93 of its largest.
+    fn sampled_rarely(share: f64) -> Result<(Excitation, Margins), String> {
+        let arm = Arm::built_in("ur5").unwrap();
+        let rare = Requirements { check_rate_hz: 0.1, ..Requirements::default() };
+        let mut b = vec![vec![0.0]; 6];
+        b[5] = vec![share * arm.joints[5].limits.velocity_rad_s];
+        let q0 = vec![0.0, -1.2, 0.0, -1.5, 0.3, 0.0];
+        let series = FourierSeries::new(4.0, q0, vec![vec![0.0]; 6], b).unwrap();
+        whole_motion(&arm, &rare, series, 25)
+    }
+
+    #[test]
+    fn no_motion_is_handed_out_that_passes_a_limit_after_its_first_period() {
+        let (excitation, margins) = sampled_rarely(0.9).unwrap();
+        assert!(excitation.periods() == 25 && margins.feasible());
+        let refused = sampled_rarely(1.1).unwrap_err();
+        assert!(refused.contains("whole motion") && refused.contains("joint 6"), "{refused}");
+    }
 }

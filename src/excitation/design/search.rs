@@ -82,6 +82,14 @@ pub struct Found {
     pub cut_short: bool,
 }
 
+/// What a round made of one entrant.
+struct Advanced {
+    candidate: Candidate,
+    evaluations: usize,
+    /// Whether it was stopped before its last stage had ended.
+    interrupted: bool,
+}
+
 /// Runs the rounds. `problem_at(samples)` is the problem on a grid of `samples` times.
 ///
 /// Every start is a function of (seed, start) alone, every descent is sequential, and survivors are chosen by value,
@@ -121,24 +129,18 @@ pub fn search(
                 Some(x) => x,
                 None => random_start(arm, &problem, start as u64, effort.seed, ws)?,
             };
-            let first = round.stages.first()?;
-            let from = inside(&problem, ws, from, first)?;
-            let descent = descend(&problem, ws, from, &round.stages, &|| effort.over())?;
-            let Descent { x, evaluations, ending, .. } = descent;
-            let value = problem.exact(ws, &x)?;
-            let interrupted = ending == Ending::Interrupted;
-            Some((Candidate { start, x, value }, evaluations, interrupted))
+            refined(&problem, ws, (start, from), &round.stages, effort)
         };
         // Reported for every entrant, including those without a feasible motion.
-        let report = |result: &Option<(Candidate, usize, bool)>| {
-            let value = result.as_ref().map_or(f64::INFINITY, |(candidate, ..)| candidate.value);
+        let report = |result: &Option<Advanced>| {
+            let value = result.as_ref().map_or(f64::INFINITY, |found| found.candidate.value);
             if let Ok(mut reached) = reached.lock() {
                 let (done, best) = &mut *reached;
                 (*done, *best) = (*done + 1, best.min(value));
                 progress(Progress { round: index + 1, done: *done, of, best: *best });
             }
         };
-        let results: Vec<Option<(Candidate, usize, bool)>> = entrants
+        let results: Vec<Option<Advanced>> = entrants
             .into_par_iter()
             .map_init(
                 || problem.workspace(),
@@ -150,10 +152,10 @@ pub fn search(
             )
             .collect();
         let mut next: Vec<Candidate> = Vec::new();
-        for (candidate, used, interrupted) in results.into_iter().flatten() {
-            evaluations += used;
-            cut_short |= interrupted;
-            next.push(candidate);
+        for advanced in results.into_iter().flatten() {
+            evaluations += advanced.evaluations;
+            cut_short |= advanced.interrupted;
+            next.push(advanced.candidate);
         }
         if index == 0 {
             feasible_starts = next.len();
@@ -169,6 +171,22 @@ pub fn search(
     }
     let tried_starts = tried_starts.into_inner();
     Found { candidates, tried_starts, feasible_starts, evaluations, cut_short }
+}
+
+/// Takes the entrant that came from `start` and is at `from` now through `stages`; `None` if no motion about its offsets
+/// is feasible.
+fn refined(
+    problem: &Problem,
+    ws: &mut ProblemWorkspace,
+    (start, from): (usize, DVector<f64>),
+    stages: &[Stage],
+    effort: &Effort,
+) -> Option<Advanced> {
+    let from = inside(problem, ws, from, stages.first()?)?;
+    let Descent { x, evaluations, ending } = descend(problem, ws, from, stages, &|| effort.over())?;
+    let value = problem.exact(ws, &x)?;
+    let candidate = Candidate { start, x, value };
+    Some(Advanced { candidate, evaluations, interrupted: ending == Ending::Interrupted })
 }
 
 /// Returns `x` if it is strictly feasible in `problem`, or the largest of a series of smaller motions about the same

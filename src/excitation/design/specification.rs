@@ -6,6 +6,7 @@ use super::criterion::Criterion;
 use super::error::DesignError;
 use super::prediction::Experiment;
 use super::space::Variables;
+use crate::excitation::error::{positive, readable};
 use crate::excitation::{ClearanceModel, FourierSeries, Requirements, check};
 use crate::robot::Arm;
 
@@ -72,7 +73,7 @@ impl Specification {
                 return Err(DesignError::Value {
                     what: "the period".into(),
                     value: v.period_s,
-                    must: format!("inside its range of {low} … {high} s"),
+                    must: format!("inside its range of {} … {} s", readable(low), readable(high)),
                 });
             }
         }
@@ -80,7 +81,8 @@ impl Specification {
         let rate_hz = self.experiment.rate_hz;
         // At half the sampling rate the samples show no sine component, so the order must stay below that harmonic.
         let seen = ((0.5 * rate_hz * shortest_s - 1e-9).ceil() as usize).saturating_sub(1);
-        let why = format!(": {rate_hz} Hz show no higher harmonics of {shortest_s} s");
+        let [rate, shortest] = [rate_hz, shortest_s].map(readable);
+        let why = format!(": {rate} Hz show no higher harmonics of {shortest} s");
         at_most("the order", v.order, seen, &why)?;
         at_most("the order", v.order, HIGHEST_ORDER, "")?;
         if self.prior.is_some() && !self.criterion.whitened() {
@@ -135,13 +137,6 @@ impl Specification {
         let short = worst.shortfall_in_words();
         Err(DesignError::FixedPose { limit: worst.limit.clone(), short })
     }
-}
-
-fn positive(what: &str, value: f64) -> Result<(), DesignError> {
-    if value > 0.0 && value.is_finite() {
-        return Ok(());
-    }
-    Err(DesignError::Value { what: what.to_owned(), value, must: "positive".into() })
 }
 
 fn at_least(what: &str, value: usize, least: usize) -> Result<(), DesignError> {

@@ -5,12 +5,14 @@ use serde::Serialize;
 
 use super::change::other_gravity;
 use super::reading::Reading;
+use super::{EXPLAINED, ROUNDING};
 use crate::base::ColumnPlan;
 use crate::base::{BaseSet, Parameterisation};
 use crate::dynamics::{Model, Motion, Parameter, ParameterLayout};
 use crate::identify::fit::{Fitter, Weighting};
 use crate::identify::options::Options;
 use crate::identify::problem::{Assembler, Problem};
+use crate::identify::quality::Condition;
 use crate::identify::regression::Regression;
 use crate::identify::whiten::smoothed;
 use crate::robot::{Arm, JointSignals};
@@ -86,6 +88,13 @@ impl Match {
         self.beyond_noise.iter().any(|left| *left > share) || self.friction_pushes.contains(&true)
     }
 
+    /// Whether the log may have to be read differently: the model leaves part of it, or something pushes. Where the model
+    /// leaves nothing but rounding, only the sign of all torques can be wrong.
+    pub(super) fn calls_for_another(&self) -> bool {
+        let is_recorded = self.left.iter().any(|left| *left > ROUNDING);
+        self.is_clearly_turned() || (is_recorded && self.leaves_more_than(EXPLAINED))
+    }
+
     /// Whether all torques should have the other sign, with which the model fits equally well: friction decides, or
     /// gravity where there is next to no friction.
     pub(super) fn is_turned(&self) -> bool {
@@ -113,6 +122,13 @@ pub struct Bench {
     /// Gain from logged values to torques, joint by joint, Nm/A; 1 where they are logged in Nm.
     gain: Vec<f64>,
     mountings: Vec<Mounting>,
+}
+
+/// The log as a reading has it, laid out for the arm as that reading mounts it.
+struct LaidOut<'a> {
+    mounting: &'a Mounting,
+    motion: Motion,
+    problem: Problem,
 }
 
 struct Mounting {
@@ -191,12 +207,11 @@ impl Bench {
         self.mountings.extend(others.filter_map(|gravity| Mounting::of(arm, Some(gravity))));
     }
 
-    /// Fits the full model to the log as read by `reading`; `None` where the motion read so does not determine all
-    /// parameters.
-    pub fn fit(&self, reading: &Reading) -> Option<Match> {
+    /// Lays out the log as read by `reading`; `None` where there is no model for its mounting.
+    fn lay_out(&self, reading: &Reading) -> Option<LaidOut<'_>> {
         let mut mountings = self.mountings.iter();
-        let Mounting { model, set, first_moments, .. } =
-            mountings.find(|m| m.gravity_m_s2 == reading.gravity_m_s2())?;
+        let mounting = mountings.find(|m| m.gravity_m_s2 == reading.gravity_m_s2())?;
+        let Mounting { model, set, .. } = mounting;
         let counting = reading.counting();
         let motion = Motion {
             q_rad: counting.angles(&self.motion.q_rad),
@@ -208,6 +223,22 @@ impl Bench {
             effort.map_joints(|j, y| y.iter().map(|effort| self.gain[j] * effort).collect());
         let mut problem = Problem::new(ColumnPlan::new(model, set), 0.0);
         Assembler::new(model).assemble(&mut problem, model, &motion, &torque_nm);
+        Some(LaidOut { mounting, motion, problem })
+    }
+
+    /// Condition of the full model's regressor along the motion as read by `reading`, with columns of unit length;
+    /// `None` where the regressor is singular.
+    pub fn condition(&self, reading: &Reading) -> Option<f64> {
+        let LaidOut { mounting, problem, .. } = self.lay_out(reading)?;
+        Some(Condition::of(&problem, &mounting.set).ok()?.scaled)
+    }
+
+    /// Fits the full model to the log as read by `reading`; `None` where the motion read so does not determine all
+    /// parameters.
+    pub fn fit(&self, reading: &Reading) -> Option<Match> {
+        let LaidOut { mounting, motion, problem } = self.lay_out(reading)?;
+        let Mounting { model, set, first_moments, .. } = mounting;
+        let counting = reading.counting();
         let fit = Fitter::new(&problem).fit(&problem, set, Weighting::PerJoint).ok()?;
         let theta = &fit.theta;
         let squares = fit.residual_squares.iter().zip(&fit.torque_squares);
@@ -267,5 +298,26 @@ impl Mounting {
         let layout = ParameterLayout::new(arm.dof());
         let first_moments = set.first_moments(&layout).map(|k| (k, nominal[k])).collect();
         Some(Self { gravity_m_s2, model, set, first_moments })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Friction that pushes calls for another reading where the residual was recorded, and not where it is rounding;
+    /// the sign of all torques shows without a residual.
+    #[test]
+    fn what_rounding_leaves_calls_for_no_other_reading() {
+        let pushed = |left: f64, friction: f64| Match {
+            left: vec![left; 2],
+            friction_pushes: vec![false, true],
+            beyond_noise: vec![left; 2],
+            friction,
+            gravity: 1.0,
+        };
+        assert!(pushed(1e-2, 0.1).calls_for_another());
+        assert!(!pushed(1e-7, 0.1).calls_for_another());
+        assert!(pushed(1e-7, -0.1).calls_for_another());
     }
 }

@@ -80,6 +80,17 @@ pub enum LayoutFault {
         /// The value.
         value: f64,
     },
+    /// The number of drive gains differs from the number of joints.
+    #[error(
+        "drive_gain_nm_a has {found} number(s), and the arm has {joints} joints: give one for each joint, or choose the --robot the \
+         log is of"
+    )]
+    GainCount {
+        /// Number of gains.
+        found: usize,
+        /// Joints of the arm.
+        joints: usize,
+    },
     /// A list names joint 0, but joints count from 1 in layouts.
     #[error("{key} under [joints] names joint 0: joints count from 1")]
     JointFromOne {

@@ -53,7 +53,8 @@ fn overlaid_within(
     let own: Layout = toml::from_str(text).map_err(toml)?;
     let table = text.parse::<Table>().map_err(toml)?;
     let Some(like) = own.like.clone() else {
-        return Ok((table, Layout { source: source.to_owned(), ..own }));
+        let stated = table.clone();
+        return Ok((table, Layout { source: source.to_owned(), stated, ..own }));
     };
     let in_like = |error| fault(LayoutFault::Like { like: like.clone(), fault: Box::new(error) });
     let folder = Path::new(source).parent().unwrap_or(Path::new(""));
@@ -71,6 +72,7 @@ fn overlaid_within(
         return Err(fault(LayoutFault::LikeItself { like: like.clone() }));
     }
     let (mut merged, below) = overlaid_within(&below, &name, above).map_err(in_like)?;
+    let stated = table.clone();
     for (key, value) in table {
         match (merged.get_mut(&key), value) {
             (Some(Value::Table(there)), Value::Table(own)) if BY_KEY.contains(&&*key) => {
@@ -83,7 +85,7 @@ fn overlaid_within(
     }
     let layout: Layout = merged.clone().try_into().map_err(toml)?;
     let below = Some(Box::new(below));
-    Ok((merged, Layout { source: source.to_owned(), below, ..layout }))
+    Ok((merged, Layout { source: source.to_owned(), below, stated, ..layout }))
 }
 
 /// The canonical path of a file, by which it is recognised under any of its names.
@@ -100,6 +102,24 @@ impl Layout {
         let own = is_file(&self.source).then(|| PathBuf::from(&self.source));
         let below = self.below.iter().flat_map(|below| below.files());
         own.into_iter().chain(below).collect()
+    }
+
+    /// Whether `key` is stated in a layout that inherits `other`. A key within a table is written behind that of the table.
+    pub(super) fn overrides(&self, key: &[&str], other: &[&str]) -> bool {
+        self.depth_of(key).zip(self.depth_of(other)).is_some_and(|(key, other)| key < other)
+    }
+
+    /// How many steps of `like` lead to the nearest layout that states `key`; `None` if none does.
+    fn depth_of(&self, key: &[&str]) -> Option<usize> {
+        let (first, rest) = key.split_first()?;
+        let mut own = self.stated.get(*first);
+        for key in rest {
+            own = own.and_then(|table| table.get(*key));
+        }
+        match own {
+            Some(_) => Some(0),
+            None => Some(1 + self.below.as_ref()?.depth_of(key)?),
+        }
     }
 
     /// Runs `check`; a fault is attributed to the deepest layout of the chain that already has it.
@@ -126,6 +146,7 @@ mod tests {
 
     use super::*;
     use crate::log::layout::block::Block;
+    use crate::log::read_log_from;
 
     #[test]
     fn what_it_does_not_say_is_as_in_the_other() {
@@ -171,6 +192,34 @@ mod tests {
             layout.counting(3).motion().iter().map(|place| place.is_reversed).collect();
         assert_eq!(reversed, [false, false, true]);
         assert_eq!((&*layout.name, layout.files().len()), ("a", 2), "{:?}", layout.files());
+    }
+
+    /// Of currents and torques those count that are stated nearest to the layout, and torques where neither is nearer.
+    #[test]
+    fn the_nearest_effort_counts() {
+        let all = "name = \"all\"\nheader = false\n[columns]\ntime = 1\nq = { first = 2, last = 3 }\n\
+            current = { first = 4, last = 5 }\ntorque = { first = 6, last = 7 }\n\
+            [[width]]\nfields = 7\nblocks = [\"time\", \"q\", \"current\", \"torque\"]\n";
+        let folder = Folder::with(&[
+            ("all.toml", all),
+            (
+                "current.toml",
+                "like = \"all.toml\"\ncolumns = { current = { first = 4, last = 5 } }\n",
+            ),
+            ("same.toml", "like = \"current.toml\"\n"),
+            (
+                "torque.toml",
+                "like = \"same.toml\"\ncolumns = { torque = { first = 6, last = 7 } }\n",
+            ),
+        ]);
+        let file = "0.0,1,1,40,50,60,70\n0.1,1,1,40,50,60,70\n0.2,1,1,40,50,60,70\n";
+        for (name, effort) in
+            [("all.toml", 60.0), ("current.toml", 40.0), ("same.toml", 40.0), ("torque.toml", 60.0)]
+        {
+            let layout = folder.load(name).unwrap();
+            let log = read_log_from(file.as_bytes(), "x.csv", &layout, 2).unwrap();
+            assert_eq!(log.effort.signals().joint(0)[0], effort, "{name}");
+        }
     }
 
     #[test]

@@ -32,6 +32,10 @@ const BUILT_IN: [(&str, &str); 5] = [
     ("ur10e_innopolis_author", include_str!("../../../layouts/ur10e_innopolis_author.toml")),
 ];
 
+/// The keys of the columns of currents and torques, with the table that they are in.
+const CURRENT_COLUMNS: [&str; 2] = ["columns", "current"];
+const TORQUE_COLUMNS: [&str; 2] = ["columns", "torque"];
+
 /// The text of the built-in layout of this name.
 fn built_in(name: &str) -> Option<&'static str> {
     BUILT_IN.iter().find(|(built_in, _)| *built_in == name).map(|(_, text)| *text)
@@ -82,7 +86,7 @@ pub(super) fn built_in_without_header() -> impl Iterator<Item = &'static str> {
 /// zero = [0, -90, 0, 0, 0, 0]  # added to the angles, in the unit of q
 /// ```
 ///
-/// Blocks: `time q qd`, `current` or `torque` (Nm; it takes precedence where both are present), and optionally
+/// Blocks: `time q qd`, `current` or `torque` (Nm; it takes precedence where both are present, see below), and optionally
 /// `time_nanoseconds` (added to the time: ROS stamps), `target_q target_qd target_qdd target_current target_moment
 /// temperature`. The unit of `q` also applies to `target_q`, and likewise for the other targets. Layouts for files
 /// without a header must list their possible widths:
@@ -94,7 +98,10 @@ pub(super) fn built_in_without_header() -> impl Iterator<Item = &'static str> {
 /// ```
 ///
 /// With `like = "armid"` (a built-in name, or a file beside this one) everything that this layout does not state is
-/// taken from the other layout: `[units]` and `[columns]` key by key, any other entry as a whole.
+/// taken from the other layout: `[units]` and `[columns]` key by key, any other entry as a whole. What a layout states
+/// itself beats what it inherits, so one that states `current` and inherits `torque` reads the currents of a log that has
+/// both. If torques are read with a layout that inherits `torque` and states `drive_gain_nm_a` or `current`, a warning
+/// says so.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Layout {
@@ -125,6 +132,9 @@ pub struct Layout {
     /// The layout named by `like`.
     #[serde(skip)]
     below: Option<Box<Layout>>,
+    /// The layout's own keys, without those that it inherits.
+    #[serde(skip)]
+    stated: toml::Table,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
@@ -184,6 +194,36 @@ impl Layout {
     /// Checks that the layout fits an arm with this many joints.
     pub(super) fn check_for(&self, joints: usize) -> Result<(), LogError> {
         self.checked_by(&|layout: &Self| layout.joints.check_for(joints))
+    }
+
+    /// Checks that the layout has a drive gain for each joint of an arm with this many joints, even if no current is read.
+    pub(super) fn check_gains_for(&self, joints: usize) -> Result<(), LogError> {
+        self.checked_by(&|layout: &Self| match layout.drive_gain_nm_a.as_ref().map(Vec::len) {
+            Some(found) if found != joints => Err(LayoutFault::GainCount { found, joints }),
+            _ => Ok(()),
+        })
+    }
+
+    /// Torque and current; the one that is read where a file has both is the first.
+    pub(super) fn efforts(&self) -> [Block; 2] {
+        match self.overrides(&CURRENT_COLUMNS, &TORQUE_COLUMNS) {
+            true => [Block::Current, Block::Torque],
+            false => [Block::Torque, Block::Current],
+        }
+    }
+
+    /// What the layout says about currents although it only inherits the torques: whoever wrote it does not expect that
+    /// torques are read.
+    pub(super) fn about_currents(&self) -> Vec<&'static str> {
+        let said: [(&[&str], &str); 3] = [
+            (&["drive_gain_nm_a"], "drive_gain_nm_a"),
+            (&["units", "current"], "current under [units]"),
+            (&CURRENT_COLUMNS, "current under [columns]"),
+        ];
+        said.into_iter()
+            .filter(|(key, _)| self.overrides(key, &TORQUE_COLUMNS))
+            .map(|(_, words)| words)
+            .collect()
     }
 
     /// The convention of the layout for the joints of an arm with this many joints.

@@ -272,12 +272,14 @@ impl Tallies {
         }
         for (covariance, &k) in estimate.covariances.iter().zip(indices) {
             let outcomes = match covariance {
-                Ok(covariance) => experiment.outcomes(&estimate.fit.theta, covariance),
-                Err(error) => Err(TrialError::Identify(error.clone().into())),
+                Ok(covariance) => experiment
+                    .outcomes(&estimate.fit.theta, covariance)
+                    .map_err(|error| error.to_string()),
+                Err(error) => Err(error.to_string()),
             };
             match outcomes {
                 Ok(outcomes) => self.methods[k].add(&outcomes),
-                Err(error) => self.lose(k, trial, error.to_string()),
+                Err(reason) => self.lose(k, trial, reason),
             }
         }
     }

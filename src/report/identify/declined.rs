@@ -3,20 +3,40 @@
 use serde::Serialize;
 
 use super::{BaseParameter, NOT_IDENTIFIED};
-use crate::identify::{Processing, Regression, resting_joints};
+use crate::identify::{Processing, Regression, Rest};
 use crate::log::Log;
+use crate::number::significant;
 use crate::report::json::Program;
 use crate::report::rows::{Rows, log_warnings, names};
 use crate::report::{Page, Status, Verdict};
 use crate::robot::Arm;
 
-/// A sentence on joints `at_rest` (0-based), with a blank behind it; empty if there are none.
-pub(super) fn at_rest_in_words(at_rest: &[usize]) -> String {
-    let joints: Vec<String> = at_rest.iter().map(|j| (j + 1).to_string()).collect();
-    match &joints[..] {
+/// Sentences on the joints whose motion is missing, with a blank behind each; empty if there are none.
+pub(super) fn rest_in_words(rest: &Rest) -> String {
+    let listed = |joints: &[usize]| {
+        joints.iter().map(|j| (j + 1).to_string()).collect::<Vec<_>>().join(", ")
+    };
+    let still = match &rest.still[..] {
         [] => String::new(),
-        [joint] => format!("Joint {joint} does not move. "),
-        _ => format!("Joints {} do not move. ", joints.join(", ")),
+        [joint] => format!("Joint {} does not move. ", joint + 1),
+        joints => format!("Joints {} do not move. ", listed(joints)),
+    };
+    let outpaced = match &rest.outpaced[..] {
+        [] => String::new(),
+        joints => format!(
+            "At {} Hz (--rate) less than half of the motion of joint {} is left. ",
+            significant(rest.rate_hz, 3),
+            listed(joints)
+        ),
+    };
+    still + &outpaced
+}
+
+/// What helps where a motion does not identify the arm.
+pub(super) fn remedy(rest: &Rest) -> &'static str {
+    match &rest.outpaced[..] {
+        [] => "Record a motion that excites them (armid excite).",
+        _ => "The rate is too low for this motion: give a higher one, or none.",
     }
 }
 
@@ -34,9 +54,9 @@ pub struct Declined {
     /// Remarks for the user about the log and its processing.
     pub warnings: Vec<String>,
     rows: Rows,
-    /// Joints (0-based) that stand still throughout.
+    /// Joints whose motion is missing.
     #[serde(skip)]
-    at_rest: Vec<usize>,
+    rest: Rest,
     #[serde(skip)]
     joints: usize,
     verdict: &'static str,
@@ -49,7 +69,7 @@ impl Declined {
         let mut declined = Self::at_rest(arm, logs, parameters);
         declined.processing = Some(regression.prepared.processing.clone());
         declined.warnings.extend(regression.prepared.warnings.iter().cloned());
-        declined.at_rest = resting_joints(&regression.course().qd_rad_s);
+        declined.rest = Rest::of(regression);
         declined
     }
 
@@ -64,7 +84,7 @@ impl Declined {
             not_identified: parameters,
             warnings: logs.iter().flat_map(|log| log_warnings(log)).collect(),
             rows: Rows::of(logs),
-            at_rest: (0..arm.dof()).collect(),
+            rest: Rest { still: (0..arm.dof()).collect(), ..Rest::default() },
             joints: arm.dof(),
             verdict: NOT_IDENTIFIED,
         }
@@ -72,16 +92,16 @@ impl Declined {
 
     /// The verdict in a sentence.
     pub fn sentence(&self) -> String {
-        if self.at_rest.len() == self.joints {
+        if self.rest.still.len() == self.joints {
             return "Declined: no joint moves. Record a motion that excites all parameters (armid excite)."
                 .to_owned();
         }
         format!(
             "Declined: this motion does not identify the arm. {}Along it the columns of {} vanish or \
-             depend on the others to within rounding. Record a motion that excites them (armid \
-             excite).",
-            at_rest_in_words(&self.at_rest),
-            self.not_identified.join(", ")
+             depend on the others to within rounding. {}",
+            rest_in_words(&self.rest),
+            self.not_identified.join(", "),
+            remedy(&self.rest)
         )
     }
 
@@ -136,8 +156,13 @@ mod tests {
         assert!(of_the_file.starts_with("a.csv: 7 of 9 rows"), "{of_the_file}");
         assert_eq!(processing, "resampled");
         assert!(declined.sentence().contains("the arm. Along it"), "{}", declined.sentence());
-        let still = Declined { at_rest: vec![0, 3], ..declined.clone() };
-        assert!(still.sentence().contains("Joints 1, 4 do not move."), "{}", still.sentence());
+        let still = Rest { still: vec![0, 3], ..Rest::default() };
+        let told = Declined { rest: still, ..declined.clone() }.sentence();
+        assert!(told.contains("Joints 1, 4 do not move.") && told.contains("excite)."), "{told}");
+        let fast = Rest { outpaced: vec![1, 4], rate_hz: 2.0, ..Rest::default() };
+        let told = Declined { rest: fast, ..declined.clone() }.sentence();
+        assert!(told.contains("less than half of the motion of joint 2, 5 is left"), "{told}");
+        assert!(!told.contains("not move") && told.ends_with("or none."), "{told}");
         let html = declined.page(Program::new(["armid"], None, Vec::new())).to_html().unwrap();
         assert!(html.contains("7 of 9 rows") && html.contains("resampled"), "{html}");
     }

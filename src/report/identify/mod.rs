@@ -7,13 +7,14 @@ mod declined;
 mod foreign;
 mod intervals;
 mod page;
+mod short_names;
 
 use std::path::PathBuf;
 
 use serde::Serialize;
 
 pub use declined::Declined;
-use declined::at_rest_in_words;
+use declined::{remedy, rest_in_words};
 pub use intervals::{AgreementResult, Intervals, TestResult};
 pub use page::{facts, page, parameter_table, residual_table};
 
@@ -25,7 +26,7 @@ use crate::identify::covariance::CovarianceKind;
 use crate::identify::physical::PhysicalEstimate;
 use crate::identify::{
     Condition, Doubt, Estimator, FitError, Identification, Prediction, Processing, Regression,
-    Residual, drive_limit_remark, identifies_the_arm, not_identified, resting_joints, unlike,
+    Residual, Rest, drive_limit_remark, identifies_the_arm, not_identified, unlike,
 };
 use crate::log::Log;
 use crate::robot::{Arm, Kinematics};
@@ -62,6 +63,89 @@ pub struct Training<'a> {
     pub reduced: Option<&'a str>,
     /// The first log that fits the arm only when its channels are read differently; `None` if there is none.
     pub misread: Option<&'a MisreadLog>,
+}
+
+impl Training<'_> {
+    /// Half-widths of the 95 % intervals of all base parameters.
+    fn half_widths(&self) -> Vec<f64> {
+        let quantile = self.identification.covariance.quantile_95();
+        self.identification.sigma().iter().map(|sigma| quantile * sigma).collect()
+    }
+
+    /// The base parameters that the logs leave open.
+    fn open(&self) -> Vec<usize> {
+        not_identified(self.arm, self.set, &self.half_widths())
+    }
+
+    /// Begins a remark on `log` with its name, where there are several.
+    fn named(&self, log: &str, remark: String) -> String {
+        if self.logs.len() > 1 { format!("{log}: {remark}") } else { remark }
+    }
+
+    /// What makes it doubtful that the parameters belong to this robot. That a log is misread explains every other
+    /// doubt.
+    fn doubt(&self) -> Option<Doubt> {
+        let Self { arm, set, identification, .. } = self;
+        if let Some(MisreadLog { log, misreading, .. }) = self.misread {
+            return Some(Doubt::contradiction(self.named(log, misreading.sentence())));
+        }
+        let doubt = Doubt::of(
+            arm,
+            set,
+            self.nominal,
+            &identification.fit.theta,
+            &identification.sigma(),
+            &identification.covariance,
+            &identification.residual().torque_rms_nm,
+        );
+        Doubt::or_unlike(doubt, unlike(arm, &identification.left()))
+    }
+
+    /// The verdict with the base parameters `open` and a `doubt`.
+    fn verdict(&self, open: &[usize], doubt: Option<&Doubt>) -> &'static str {
+        match doubt {
+            // What a misread log does not tell need not be a matter of its motion.
+            _ if self.misread.is_some() => CONTRADICTED,
+            _ if !identifies_the_arm(self.arm, self.set, open) => NOT_IDENTIFIED,
+            Some(doubt) if doubt.is_contradiction() => CONTRADICTED,
+            _ => IDENTIFIED,
+        }
+    }
+
+    /// All remarks: on the logs, on the fit with its `doubt`, on the `validations`, and on the drives.
+    fn warnings(&self, doubt: Option<&Doubt>, validations: &[Validation]) -> Vec<String> {
+        let Self { identification, regression, .. } = self;
+        let mut warnings: Vec<String> =
+            self.logs.iter().flat_map(|log| log_warnings(log)).collect();
+        warnings.extend(identification.warnings.clone());
+        warnings.extend(identification.lack_of_fit.and_then(|lack| lack.warning()));
+        warnings.extend(few_degrees_of_freedom(identification.covariance.degrees_of_freedom));
+        warnings.extend(doubt.map(Doubt::sentence));
+        // For a misread log, no further remark about the fit makes sense.
+        warnings.extend(unrelated(&identification.residual()).filter(|_| self.misread.is_none()));
+        let described = Prediction::of(regression, &identification.fit.theta);
+        let described = (&described, &regression.prepared.processing);
+        warnings.extend(validations.iter().filter_map(|v| foreign::remark(v, described)));
+        warnings.extend(self.logs.iter().filter_map(|log| self.drive_limits(log)));
+        warnings.extend(validations.iter().flat_map(|validation| validation.warnings.clone()));
+        warnings
+    }
+
+    /// A remark on drives at their limits in `log`.
+    fn drive_limits(&self, log: &Log) -> Option<String> {
+        // Logs whose torque cannot be read never get here: such an error is ignored.
+        let remark = drive_limit_remark(self.arm, &log.torque_nm(self.arm).ok()?)?;
+        Some(self.named(&log.source, remark))
+    }
+}
+
+/// Warns of intervals that are far longer than ± tells.
+fn few_degrees_of_freedom(freedom: f64) -> Option<String> {
+    (freedom < FEW_DEGREES_OF_FREEDOM).then(|| {
+        format!(
+            "σ is known with {freedom:.1} degrees of freedom: rely on the intervals, which are longer for that, not on ±"
+        )
+    })
 }
 
 /// A prediction of a log that was not used for the fit.
@@ -137,9 +221,9 @@ pub struct Result {
     intervals: Intervals,
     condition: Condition,
     not_identified: Vec<String>,
-    /// Joints (0-based) that stand still throughout.
+    /// Joints whose motion is missing.
     #[serde(skip)]
-    at_rest: Vec<usize>,
+    rest: Rest,
     /// How the log has to be read; null if it fits the arm as it is.
     misreading: Option<MisreadLog>,
     validation: Vec<ValidationJson>,
@@ -159,6 +243,23 @@ struct BaseParameter {
     unit: &'static str,
     sigma: f64,
     ci95: [f64; 2],
+}
+
+impl BaseParameter {
+    /// All base parameters with their intervals.
+    fn all(training: &Training) -> Vec<Self> {
+        let Training { set, identification, .. } = training;
+        let values = identification.fit.theta.iter().zip(identification.sigma());
+        let estimate = |(k, ((value, sigma), half_width)): (usize, ((&f64, f64), f64))| Self {
+            name: set.name(k).to_owned(),
+            formula: set.formula(k),
+            value: *value,
+            unit: set.unit(k),
+            sigma,
+            ci95: [value - half_width, value + half_width],
+        };
+        values.zip(training.half_widths()).enumerate().map(estimate).collect()
+    }
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -191,89 +292,27 @@ impl Result {
         training: &Training,
         validations: &[Validation],
     ) -> std::result::Result<Self, FitError> {
-        let Training { arm, set, identification, regression, .. } = training;
-        let sigma = identification.sigma();
-        let covariance = &identification.covariance.matrix;
-        let quantile = identification.covariance.quantile_95();
-        let half_width: Vec<f64> = sigma.iter().map(|s| quantile * s).collect();
-        let open = not_identified(arm, set, &half_width);
-        let base_parameters = (0..set.rank())
-            .map(|k| {
-                let value = identification.fit.theta[k];
-                BaseParameter {
-                    name: set.name(k).to_owned(),
-                    formula: set.formula(k),
-                    value,
-                    unit: set.unit(k),
-                    sigma: sigma[k],
-                    ci95: [value - half_width[k], value + half_width[k]],
-                }
-            })
-            .collect();
-        let mut warnings: Vec<String> =
-            training.logs.iter().flat_map(|log| log_warnings(log)).collect();
-        warnings.extend(identification.warnings.clone());
-        warnings.extend(identification.lack_of_fit.and_then(|lack| lack.warning()));
-        let freedom = identification.covariance.degrees_of_freedom;
-        if freedom < FEW_DEGREES_OF_FREEDOM {
-            warnings.push(format!(
-                "σ is known with {freedom:.1} degrees of freedom: rely on the intervals, which are longer for that, not on ±"
-            ));
-        }
-        let is_identified = identifies_the_arm(arm, set, &open);
-        let theta = &identification.fit.theta;
-        let several = training.logs.len() > 1;
-        let doubt = match training.misread {
-            // A misread log explains every other doubt.
-            Some(MisreadLog { log, misreading, .. }) => {
-                let name = if several { format!("{log}: ") } else { String::new() };
-                let sentence = format!("{name}{}", misreading.sentence());
-                Some(Doubt::contradiction(sentence))
-            }
-            None => {
-                let torque_nm = identification.residual().torque_rms_nm;
-                let doubt = Doubt::of(
-                    arm,
-                    set,
-                    training.nominal,
-                    theta,
-                    &sigma,
-                    &identification.covariance,
-                    &torque_nm,
-                );
-                Doubt::or_unlike(doubt, unlike(arm, &identification.left()))
-            }
-        };
-        warnings.extend(doubt.iter().map(Doubt::sentence));
-        let fit = identification.residual();
-        // For a misread log, no further remark about the fit makes sense.
-        warnings.extend(unrelated(&fit).filter(|_| training.misread.is_none()));
-        let described = Prediction::of(regression, theta);
-        let described = (&described, &regression.prepared.processing);
-        let foreign = validations.iter().filter_map(|v| foreign::remark(v, described));
-        warnings.extend(foreign);
-        // Logs whose torque cannot be read never get here: such an error is ignored.
-        warnings.extend(training.logs.iter().filter_map(|log| {
-            let remark = drive_limit_remark(arm, &log.torque_nm(arm).ok()?)?;
-            Some(if several { format!("{}: {remark}", log.source) } else { remark })
-        }));
-        warnings.extend(validations.iter().flat_map(|validation| validation.warnings.clone()));
+        let Training { arm, set, logs, identification, regression, .. } = training;
+        let covariance = &identification.covariance;
+        let open = training.open();
+        let doubt = training.doubt();
         Ok(Self {
             robot: arm.name.clone(),
             robot_source: training.robot_source.to_owned(),
             kinematics: Kinematics::of(arm),
             reduced: training.reduced.map(str::to_owned),
-            log: names(training.logs),
+            log: names(logs),
             samples: identification.samples,
             rate_hz: regression.problem.rate_hz,
             processing: identification.processing.clone(),
             estimator: identification.estimator,
-            covariance: identification.covariance.kind,
+            covariance: covariance.kind,
             covariance_reason: identification.covariance_reason,
-            degrees_of_freedom: identification.covariance.degrees_of_freedom,
-            base_parameters,
-            drive_gain_nm_a: training.logs.iter().find_map(|log| log.drive_gain_nm_a(arm)),
+            degrees_of_freedom: covariance.degrees_of_freedom,
+            base_parameters: BaseParameter::all(training),
+            drive_gain_nm_a: logs.iter().find_map(|log| log.drive_gain_nm_a(arm)),
             base_covariance: covariance
+                .matrix
                 .row_iter()
                 .map(|row| row.iter().copied().collect())
                 .collect(),
@@ -284,20 +323,14 @@ impl Result {
             explainable_nm: identification.explainable_nm.clone(),
             intervals: Intervals::of(training),
             condition: Condition::of(&regression.problem, set)?,
-            verdict: match &doubt {
-                // What a misread log does not tell need not be a matter of its motion.
-                _ if training.misread.is_some() => CONTRADICTED,
-                _ if !is_identified => NOT_IDENTIFIED,
-                Some(doubt) if doubt.is_contradiction() => CONTRADICTED,
-                _ => IDENTIFIED,
-            },
+            verdict: training.verdict(&open, doubt.as_ref()),
             not_identified: open.iter().map(|&k| set.name(k).to_owned()).collect(),
-            at_rest: resting_joints(&regression.course().qd_rad_s),
+            rest: Rest::of(regression),
             misreading: training.misread.cloned(),
             validation: validations.iter().map(ValidationJson::of).collect(),
-            warnings,
+            warnings: training.warnings(doubt.as_ref(), validations),
             doubt,
-            rows: Rows::of(training.logs),
+            rows: Rows::of(logs),
         })
     }
 
@@ -351,11 +384,11 @@ impl Result {
             let names = &self.not_identified;
             return format!(
                 "Declined: this motion does not identify the arm. {}For {} of {b} base parameters the \
-                 95 % interval is wider than anything an arm of this size could have: {}. Record a \
-                 motion that excites them (armid excite).",
-                at_rest_in_words(&self.at_rest),
+                 95 % interval is wider than anything an arm of this size could have: {}. {}",
+                rest_in_words(&self.rest),
                 names.len(),
-                names.join(", ")
+                names.join(", "),
+                remedy(&self.rest)
             );
         }
         if let (Some(doubt), Some(_)) = (&self.doubt, &self.misreading) {

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::short_names::short_names;
 use super::{Result, Training, Validation};
 use crate::identify::Prediction;
 use crate::number::{significant, with_sigma};
@@ -58,10 +59,7 @@ pub fn residual_table(result: &Result) -> Table {
     if let Some(explainable) = &result.explainable_nm {
         row("repeats and is not explained".into(), "Nm", explainable);
     }
-    for v in &result.validation {
-        let name = Path::new(&v.log)
-            .file_stem()
-            .map_or_else(|| v.log.clone(), |stem| stem.to_string_lossy().into_owned());
+    for (v, name) in result.validation.iter().zip(validation_names(result)) {
         row(format!("{name}: prediction"), "Nm", &v.residual.rms_nm);
         row(format!("{name}: … moving samples"), "Nm", &v.moving_rms_nm);
         if let (Some(all), Some(moving)) = (&v.manufacturer_rms_nm, &v.manufacturer_moving_rms_nm) {
@@ -70,6 +68,12 @@ pub fn residual_table(result: &Result) -> Table {
         }
     }
     table
+}
+
+/// Names of the validation logs that differ, in their order.
+fn validation_names(result: &Result) -> Vec<String> {
+    let files: Vec<&Path> = result.validation.iter().map(|v| Path::new(&v.log)).collect();
+    short_names(&files)
 }
 
 /// How the log was processed and how estimate and σ were computed.
@@ -89,8 +93,8 @@ pub fn facts(result: &Result) -> Vec<String> {
             processing.periods
         ),
         None => format!(
-            "a single run, torque and regressor low-passed at {:.0} Hz",
-            processing.cutoff_hz.unwrap_or(f64::NAN)
+            "a single run, torque and regressor low-passed at {} Hz",
+            significant(processing.cutoff_hz.unwrap_or(f64::NAN), 3)
         ),
     };
     vec![
@@ -135,8 +139,7 @@ pub fn page(
         .paragraph(&result.intervals.reason)
         .warnings(result.notes());
     page.push(section);
-    for v in validations {
-        let name = v.log.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+    for (v, name) in validations.iter().zip(validation_names(result)) {
         page.push(
             Section::new(format!("Validation on {name}"))
                 .paragraph("Nothing is fitted to this log; same processing.")
