@@ -1,7 +1,10 @@
-//! Robots given as URDF or MJCF: an arm that is a part of the model, and the drive file beside the model.
+//! Robots given as URDF or MJCF: an arm that is a part of the model, the drive file beside the model, and what is left
+//! of both in an exported model.
 
+use armid::dynamics::{Model, ParameterLayout};
 use armid::robot::export::{drive_file, mjcf, urdf};
-use armid::robot::{Arm, Frames};
+use armid::robot::{Arm, Frames, Kinematics};
+use serde_json::{Value, json};
 
 use crate::cli::{Folder, default_scenario};
 
@@ -143,4 +146,87 @@ fn a_drive_file_says_as_much_as_its_author_knows() {
     assert!(!text.contains("taken as"), "{text}");
     folder.write("arm.drives.toml", elbow.replace("elbow", "knee"));
     folder.armid("base --robot arm.urdf").complains(1, &["\"knee\"", "shoulder_pan, "]);
+}
+
+/// The result of an identification that found exactly `arm`, whose robot was given as `source`.
+fn result_of(arm: &Arm, source: &str) -> String {
+    let layout = ParameterLayout::new(arm.dof());
+    let values = Model::new(arm).standard_parameters();
+    let named = values
+        .iter()
+        .enumerate()
+        .map(|(k, value)| json!({"name": layout.name(k), "value": value, "decided_by": "data"}));
+    let result = json!({
+        "schema": "armid.identify/1",
+        "robot": arm.name,
+        "robot_source": source,
+        "kinematics": Kinematics::of(arm),
+        "standard_parameters": named.collect::<Vec<Value>>(),
+    });
+    result.to_string()
+}
+
+/// A drive file of the same name that lies there already is about the arm as it was before, or about another.
+#[test]
+fn an_exported_mjcf_comes_back_with_its_own_drive_file() {
+    let folder = Folder::empty();
+    let (mut arm, urdf) = ur5();
+    for joint in &mut arm.joints {
+        joint.drive.coulomb_nm *= 2.0;
+    }
+    folder.write("result.json", result_of(&arm, "ur5"));
+    let earlier = "[[joint]]\nname = \"elbow\"\ncoulomb_nm = 99.0\nrotor_inertia_kg_m2 = 99.0\n";
+    folder.write("x.drives.toml", earlier);
+    folder.armid("export result.json --mjcf x.xml").says(0, &["x.xml", "x.drives.toml"]);
+    let back = Arm::load(folder.path("x.xml").to_str().unwrap()).unwrap();
+    assert_eq!(back.friction_epsilon_rad_s, arm.friction_epsilon_rad_s);
+    assert_eq!(back.clearance, arm.clearance);
+    for (a, b) in arm.joints.iter().zip(&back.joints) {
+        assert_eq!((a.drive, a.limits), (b.drive, b.limits));
+    }
+    let text = folder.armid("base --robot x.xml").says(0, &["52 base parameters"]);
+    assert!(!text.contains("taken as"), "{text}");
+    let words = "export result.json --urdf both.urdf --mjcf both.xml";
+    let text = folder.armid(words).says(0, &[]);
+    assert_eq!(text.matches("both.drives.toml").count(), 1, "{text}");
+    let words = "export result.json --urdf one.urdf --mjcf other.xml";
+    folder.armid(words).says(0, &["one.drives.toml", "other.drives.toml"]);
+    // The robot's own drive file is not replaced.
+    folder.write("own.urdf", urdf);
+    folder.write("own.drives.toml", earlier);
+    let words = "export result.json --robot own.urdf --mjcf own.xml";
+    folder.armid(words).says(1, &["own.drives.toml", "the command reads this file"]);
+    assert_eq!(folder.read("own.drives.toml"), earlier);
+}
+
+/// Simulations address bodies by name.
+#[test]
+fn an_arm_that_came_as_mjcf_keeps_the_names_of_its_bodies() {
+    let folder = Folder::empty();
+    let (arm, _) = ur5();
+    let model = mjcf(&arm, &Frames::default()).unwrap();
+    folder.write("arm.xml", model.replace("\"elbow_link\"", "\"forearm\""));
+    folder.write("result.json", result_of(&arm, "arm.xml"));
+    let words = "export result.json --mjcf out.xml --urdf out.urdf";
+    folder.armid(words).says(0, &["out.xml", "out.urdf"]);
+    assert!(folder.read("out.xml").contains("<body name=\"forearm\""));
+    assert!(folder.read("out.urdf").contains("<link name=\"forearm\""));
+}
+
+/// Angles mean the same in every format, so that an exported arm is the one that was identified.
+#[test]
+fn an_arm_with_a_small_tilt_is_still_itself_when_it_is_exported() {
+    let folder = Folder::empty();
+    let own = include_str!("../robots/ur5.toml");
+    let tilted = own.replacen("rpy_rad = [0.0,", "rpy_rad = [3e-5,", 1);
+    folder.write("tilted.toml", &tilted);
+    let arm = Arm::from_toml(&tilted, "tilted.toml").unwrap();
+    folder.write("result.json", result_of(&arm, "tilted.toml"));
+    let first = folder.armid("export result.json --urdf a.urdf --mjcf b.xml");
+    first.complains(0, &["taken as these: joint \"shoulder_pan\""]);
+    folder.armid("export result.json --robot a.urdf --urdf c.urdf").says(0, &["c.urdf"]);
+    folder.armid("export result.json --robot b.xml --mjcf d.xml").says(0, &["d.xml"]);
+    folder.write("few.toml", own.replace("1.5707963267948966", "1.57"));
+    let words = ["1.57 (of a right angle write 1.5707963)", "axes are nearly parallel", "column "];
+    folder.armid("base --robot few.toml").complains(0, &words);
 }

@@ -10,4 +10,4 @@ mod set;
 
 pub use columns::{ColumnPlan, PlannedColumn};
 pub use parameterisation::{Parameterisation, ParameterisationError, Terms};
-pub use set::{AmbiguousRank, BaseSet, RankGap};
+pub use set::{AmbiguousRank, BaseSet, NearlyDependent, RankGap};

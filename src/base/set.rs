@@ -1,5 +1,7 @@
 //! Finds the base parameters, the combinations of parameters that can be identified.
 
+use std::fmt;
+
 use nalgebra::{DMatrix, DVector};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -31,8 +33,31 @@ pub struct BaseSet {
 pub struct RankGap {
     /// Smallest ratio that counted as independent.
     pub smallest_independent: f64,
+    /// The column that has this ratio: an index into the parameterisation; 0 if there is no independent column.
+    pub weakest: usize,
     /// Largest ratio that counted as dependent; 0 if every column is independent.
     pub largest_dependent: f64,
+}
+
+/// A column that is independent only because of digits that the description of the arm may lack.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NearlyDependent {
+    /// Name of the column.
+    pub column: String,
+    /// Its relative distance from the columns before it.
+    pub ratio: f64,
+}
+
+impl fmt::Display for NearlyDependent {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { column, ratio } = self;
+        write!(
+            f,
+            "axes are nearly parallel, or nearly meet, perhaps only by the digits printed: column {column} stands only {ratio:.1e} of its \
+             length off the columns before it, and hardly any motion tells it from them; if they are parallel, write the angles in full \
+             (1.5707963 for a right angle)"
+        )
+    }
 }
 
 /// The rank of the regressor cannot be determined, because a column may be dependent except for rounding errors.
@@ -53,6 +78,9 @@ pub struct AmbiguousRank {
 const DEPENDENT_BELOW: f64 = 1e-10;
 /// Relative distance above which a column is independent. Between the two thresholds the answer would be a guess.
 const INDEPENDENT_ABOVE: f64 = 1e-7;
+/// Relative distance below which an independent column hangs on digits: arms whose axes are neither parallel nor at right
+/// angles have 0.1 and more, 1.57 in place of π/2 gives 1e-3.
+const NEARLY_DEPENDENT_BELOW: f64 = 2e-3;
 /// Number of random states, with one row per joint each: far more rows than columns.
 const STATES: usize = 200;
 /// Coefficients below this are rounding and are left out.
@@ -71,7 +99,8 @@ impl BaseSet {
         let mut triangle: Vec<Vec<f64>> = Vec::new();
         let mut independent: Vec<usize> = Vec::new();
         let mut combinations: Vec<Terms> = Vec::new();
-        let mut gap = RankGap { smallest_independent: f64::INFINITY, largest_dependent: 0.0 };
+        let mut gap =
+            RankGap { smallest_independent: f64::INFINITY, weakest: 0, largest_dependent: 0.0 };
         let longest = stacked.column_iter().map(|c| c.norm()).fold(0.0, f64::max);
         for (c, column) in stacked.column_iter().enumerate() {
             let length = column.norm();
@@ -91,7 +120,9 @@ impl BaseSet {
             let outside = rest.norm();
             let ratio = outside / length;
             if ratio > INDEPENDENT_ABOVE {
-                gap.smallest_independent = gap.smallest_independent.min(ratio);
+                if ratio < gap.smallest_independent {
+                    (gap.smallest_independent, gap.weakest) = (ratio, c);
+                }
                 coordinates.push(outside);
                 triangle.push(coordinates);
                 directions.push(rest / outside);
@@ -115,6 +146,15 @@ impl BaseSet {
     /// Number of base parameters.
     pub fn rank(&self) -> usize {
         self.independent.len()
+    }
+
+    /// The independent column that is nearest to the others, if it is nearly one of them.
+    pub fn nearly_dependent(&self) -> Option<NearlyDependent> {
+        let RankGap { smallest_independent: ratio, weakest, .. } = self.gap;
+        (ratio < NEARLY_DEPENDENT_BELOW).then(|| NearlyDependent {
+            column: self.parameterisation.names[weakest].clone(),
+            ratio,
+        })
     }
 
     /// Base parameters whose kept column is a first moment of a body of an arm with the `layout`.
@@ -220,6 +260,27 @@ fn back_substitute(columns: &[Vec<f64>], mut c: Vec<f64>) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The UR5 has three parallel axes; with right angles of three digits they are nearly so.
+    #[test]
+    fn an_angle_with_few_digits_makes_a_column_nearly_dependent() {
+        let of = |right_angle: &str| {
+            let text = include_str!("../../robots/ur5.toml");
+            let text = text.replace("1.5707963267948966", right_angle);
+            let arm = Arm::from_toml(&text, "x.toml").unwrap();
+            BaseSet::find(&arm, Parameterisation::full(arm.dof(), false)).unwrap()
+        };
+        for right_angle in ["1.5707963267948966", "1.5708"] {
+            let set = of(right_angle);
+            assert_eq!((set.rank(), set.nearly_dependent()), (52, None));
+        }
+        for right_angle in ["1.57", "1.5709"] {
+            let set = of(right_angle);
+            let found = set.nearly_dependent().unwrap();
+            assert_eq!(set.rank(), 53);
+            assert!((0..53).any(|k| set.name(k) == found.column), "{found}");
+        }
+    }
 
     #[test]
     fn coefficients_have_no_zeros_at_their_end() {

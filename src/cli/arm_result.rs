@@ -28,7 +28,7 @@ pub struct ArmResult {
     pub frames: Frames,
     /// Files that describe the robot.
     pub files: Vec<PathBuf>,
-    /// Links of the first file if it is a URDF; empty for other robots.
+    /// Links of the first file if it is a URDF or an MJCF; empty for other robots.
     pub urdf_links: Vec<UrdfLink>,
 }
 

@@ -7,8 +7,11 @@ use clap::{ArgGroup, Args};
 use super::arm_result::ArmResult;
 use super::{CommandResult, Outcome};
 use crate::output::{check_outputs, write_text};
-use crate::robot::export::{OwnUrdf, drive_file, drive_file_of_urdf, mjcf_of_urdf, own_urdf, urdf};
-use crate::robot::{LoadedArm, RobotError, text_of};
+use crate::robot::export::{
+    OwnUrdf, drive_file, drive_file_of_mjcf, drive_file_of_urdf, mjcf_with_links, own_urdf,
+    urdf_with_links,
+};
+use crate::robot::{LoadedArm, RobotError, is_urdf, text_of};
 
 /// Write an identified arm as URDF or MJCF.
 #[derive(Debug, Args)]
@@ -23,33 +26,40 @@ pub struct ExportArgs {
     /// file, the result is that file with its inertias and friction replaced.
     #[arg(long, value_name = "FILE")]
     urdf: Option<PathBuf>,
-    /// Write an MJCF.
+    /// Write an MJCF, and beside it `NAME.drives.toml` with what an MJCF has no place for (one for both if the URDF has
+    /// the same name).
     #[arg(long, value_name = "FILE")]
     mjcf: Option<PathBuf>,
 }
 
 /// Runs the command.
 pub fn run(args: &ExportArgs) -> CommandResult {
-    let drives = args.urdf.as_ref().map(|path| path.with_extension("drives.toml"));
+    let beside = |model: &PathBuf| model.with_extension("drives.toml");
+    let of_mjcf = args.mjcf.as_ref().map(beside);
+    // The drive file of the MJCF says what a URDF of the same name needs as well.
+    let of_urdf = args.urdf.as_ref().map(beside).filter(|path| Some(path) != of_mjcf.as_ref());
     let result = ArmResult::load(&args.result, args.robot.as_deref(), None)?;
     check_outputs(
-        [&args.urdf, &drives, &args.mjcf].into_iter().flatten(),
+        [&args.urdf, &of_urdf, &args.mjcf, &of_mjcf].into_iter().flatten(),
         result.files.iter().chain([&args.result]),
     )?;
+    let own = own_urdf_text(&result)?;
     if let Some(path) = &args.urdf {
-        write_urdf(path, &result)?;
+        write_urdf(path, &result, own.as_ref())?;
     }
-    if let Some(path) = &drives {
-        write_text(path, &drives_of(&result)?)?;
+    if let Some(path) = &of_urdf {
+        write_text(path, &drives_of_urdf(&result, own.is_some())?)?;
         say!("{}", path.display());
     }
-    let ArmResult { arm, offsets_nm, by_prior, doubt, frames, urdf_links, .. } = result;
+    let ArmResult { arm, offsets_nm, by_prior, doubt, frames, files, urdf_links, .. } = &result;
     if let Some(path) = &args.mjcf {
-        write_text(path, &mjcf_of_urdf(&arm, &frames, &urdf_links)?)?;
+        write_text(path, &mjcf_with_links(arm, frames, urdf_links)?)?;
         say!("{}", path.display());
-        if offsets_nm.iter().any(|offset| *offset != 0.0) {
-            say!("note: torque offsets {offsets_nm:?} Nm have no place in an MJCF");
-        }
+    }
+    if let Some(path) = &of_mjcf {
+        let (text, source) = own_drives(files)?;
+        write_text(path, &drive_file_of_mjcf(arm, offsets_nm, &text, &source)?)?;
+        say!("{}", path.display());
     }
     if let Some(doubt) = doubt {
         say!("note: {doubt}");
@@ -65,18 +75,31 @@ pub fn run(args: &ExportArgs) -> CommandResult {
     Ok(Outcome::Done)
 }
 
-/// Writes a URDF: for a robot that came as a URDF a copy of that file with new numbers, for any other robot a URDF with
-/// bodies only.
-fn write_urdf(path: &Path, result: &ArmResult) -> Result<(), Box<dyn std::error::Error>> {
-    let ArmResult { arm, frames, files, urdf_links, .. } = result;
-    let Some(own) = files.first().filter(|_| !urdf_links.is_empty()) else {
-        write_text(path, &urdf(arm, frames)?)?;
+/// The file that the robot came from, and its text, if it is a URDF.
+fn own_urdf_text(result: &ArmResult) -> Result<Option<(&Path, String)>, RobotError> {
+    // Robots without links came from files of other kinds.
+    let Some(own) = result.files.first().filter(|_| !result.urdf_links.is_empty()) else {
+        return Ok(None);
+    };
+    let text = text_of(own)?;
+    Ok(is_urdf(own, &text).then_some((own.as_path(), text)))
+}
+
+/// Writes a URDF: for a robot that came as a URDF a copy of that file (`own`) with new numbers, for any other robot a
+/// URDF with bodies only.
+fn write_urdf(
+    path: &Path,
+    result: &ArmResult,
+    own: Option<&(&Path, String)>,
+) -> Result<(), Box<dyn std::error::Error>> {
+    let ArmResult { arm, frames, urdf_links, .. } = result;
+    let Some((own, text)) = own else {
+        write_text(path, &urdf_with_links(arm, frames, urdf_links)?)?;
         say!("{}", path.display());
         return Ok(());
     };
     let name = own.display().to_string();
-    let text = text_of(own)?;
-    let OwnUrdf { text, takeovers, relative_mesh } = own_urdf(&text, &name, arm, urdf_links)?;
+    let OwnUrdf { text, takeovers, relative_mesh } = own_urdf(text, &name, arm, urdf_links)?;
     write_text(path, &text)?;
     let end = if arm.dof() == 1 { "" } else { "s" };
     say!(
@@ -95,19 +118,22 @@ fn write_urdf(path: &Path, result: &ArmResult) -> Result<(), Box<dyn std::error:
     Ok(())
 }
 
-/// The drive file. For a robot that came as a URDF it contains no shapes, since they are in the URDF, and it keeps the
-/// entries of the robot's own drive file for joints outside the arm.
-fn drives_of(result: &ArmResult) -> Result<String, RobotError> {
-    let ArmResult { arm, offsets_nm, files, urdf_links, .. } = result;
-    if urdf_links.is_empty() {
+/// The drive file beside a URDF. For a robot that came as a URDF it contains no shapes, since they are in the URDF, and
+/// it keeps the entries of the robot's own drive file for joints outside the arm.
+fn drives_of_urdf(result: &ArmResult, came_as_urdf: bool) -> Result<String, RobotError> {
+    let ArmResult { arm, offsets_nm, files, .. } = result;
+    if !came_as_urdf {
         return Ok(drive_file(arm, offsets_nm));
     }
+    let (text, source) = own_drives(files)?;
+    drive_file_of_urdf(arm, offsets_nm, &text, &source)
+}
+
+/// Text and name of the drive file among the robot's `files`; empty if there is none.
+fn own_drives(files: &[PathBuf]) -> Result<(String, String), RobotError> {
     match LoadedArm::drive_file(files) {
-        Some(own) => {
-            let source = own.display().to_string();
-            drive_file_of_urdf(arm, offsets_nm, &text_of(own)?, &source)
-        }
-        None => drive_file_of_urdf(arm, offsets_nm, "", ""),
+        Some(own) => Ok((text_of(own)?, own.display().to_string())),
+        None => Ok((String::new(), String::new())),
     }
 }
 

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::Deserialize;
 use thiserror::Error;
 
+use crate::base::{BaseSet, Parameterisation};
 use crate::report::ReportError;
 use crate::report::json::Input;
 use crate::robot::{Arm, Kinematics, KinematicsDifference, LoadedArm, RobotError};
@@ -14,6 +15,12 @@ pub fn load_robot(name_or_path: &str) -> Result<LoadedArm, RobotError> {
     let loaded = LoadedArm::load(name_or_path)?;
     for notice in &loaded.notices {
         eprintln!("note: {name_or_path}: {notice}");
+    }
+    let arm = &loaded.arm;
+    // A rank that is not clear is the business of the commands that need it.
+    let set = BaseSet::find(arm, Parameterisation::full(arm.dof(), arm.torque_offsets));
+    if let Some(doubt) = set.ok().and_then(|set| set.nearly_dependent()) {
+        eprintln!("note: {name_or_path}: {doubt}");
     }
     Ok(loaded)
 }

@@ -15,6 +15,8 @@ pub struct Arm {
     pub name: String,
     /// Gravity in the base frame, m/s².
     pub gravity_m_s2: Vector3<f64>,
+    /// Whether no file says so, and gravity was assumed.
+    pub gravity_assumed: bool,
     /// ε of the regularised sign tanh(q̇/ε) of the paper's (3), rad/s.
     pub friction_epsilon_rad_s: f64,
     /// Whether identification fits a constant torque per joint, for the offset of the current sensor and for friction
@@ -43,6 +45,22 @@ pub struct Joint {
     pub limits: Limits,
     /// What is known about the moved body before identification.
     pub bounds: LinkBounds,
+    /// Which of these numbers no file states.
+    pub assumed: Assumed,
+}
+
+/// Numbers of a joint that no file states, so that they were assumed. An export leaves them open again: written down,
+/// they would look known to whoever reads them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Assumed {
+    /// The gear ratio.
+    pub gear_ratio: bool,
+    /// The torque constant.
+    pub torque_constant: bool,
+    /// The speed limit.
+    pub velocity: bool,
+    /// The acceleration limit.
+    pub acceleration: bool,
 }
 
 /// Known bounds that a physically consistent estimate of a body must respect.
@@ -149,9 +167,12 @@ pub struct Limits {
     pub velocity_rad_s: f64,
     /// Largest acceleration, rad/s².
     pub acceleration_rad_s2: f64,
-    /// Largest drive torque at the joint, Nm.
+    /// Largest drive torque at the joint, Nm; infinite if it is unknown.
     pub torque_nm: f64,
 }
+
+/// A torque limit that stands for an unknown one in formats that require a number: simulators take 0 literally.
+pub(super) const UNKNOWN_TORQUE_NM: f64 = 1e9;
 
 /// Collision geometry: capsules on the bodies, the pairs to keep apart, and the floor.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -8,14 +8,16 @@ mod write;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::arm::{Arm, Clearance, Drive, Joint, Limits, Placement};
+use super::angles::RightAngles;
+use super::arm::{Arm, Assumed, Clearance, Drive, Joint, Limits, Placement};
 use super::error::RobotError;
 use super::inertia::LinkInertia;
 use super::place::Place;
+use super::urdf::UrdfNotice;
 
 pub(super) use clearance::{BoxEntry, CapsuleEntry, ClearanceKeys, pair};
 pub use loaded::LoadedArm;
-pub(crate) use loaded::text_of;
+pub(crate) use loaded::{is_urdf, text_of};
 
 /// Built-in arms, by the name given to `--robot`.
 const BUILT_IN: [(&str, &str); 4] = [
@@ -50,10 +52,15 @@ impl Arm {
 
     /// Reads the text of a robot file; `source` names it in messages.
     pub fn from_toml(text: &str, source: &str) -> Result<Self, RobotError> {
-        let file: RobotFile = toml::from_str(text)
-            .map_err(|e| RobotError::Toml { file: source.to_owned(), message: e.to_string() })?;
-        file.into_arm(source)
+        read_toml(text, source).map(|(arm, _)| arm)
     }
+}
+
+/// The arm in the text of a robot file, and how its angles were understood.
+fn read_toml(text: &str, source: &str) -> Result<(Arm, Vec<UrdfNotice>), RobotError> {
+    let file: RobotFile = toml::from_str(text)
+        .map_err(|e| RobotError::Toml { file: source.to_owned(), message: e.to_string() })?;
+    file.into_arm(source)
 }
 
 #[derive(Serialize, Deserialize)]
@@ -128,7 +135,7 @@ struct Tensor {
 }
 
 impl RobotFile {
-    fn into_arm(self, source: &str) -> Result<Arm, RobotError> {
+    fn into_arm(self, source: &str) -> Result<(Arm, Vec<UrdfNotice>), RobotError> {
         let place = Place::of_arm(source);
         if self.joints.is_empty() {
             return Err(place.fault("it has no [[joint]]"));
@@ -143,25 +150,28 @@ impl RobotFile {
             boxes: &self.boxes,
         };
         let clearance = keys.added_to(Clearance::default(), self.joints.len(), &place)?;
+        let mut angles = RightAngles::default();
         let joints = self
             .joints
             .into_iter()
-            .map(|entry| entry.into_joint(&place))
+            .map(|entry| entry.into_joint(&place, &mut angles))
             .collect::<Result<Vec<_>, _>>()?;
-        Ok(Arm {
+        let arm = Arm {
             name: self.name,
             gravity_m_s2: Vector3::from(self.gravity_m_s2),
+            gravity_assumed: false,
             friction_epsilon_rad_s: self.friction_epsilon_rad_s,
             torque_offsets: self.torque_offsets,
             drive_gains_assumed: self.drive_gains_assumed,
             joints,
             clearance,
-        })
+        };
+        Ok((arm, angles.notices().collect()))
     }
 }
 
 impl JointEntry {
-    fn into_joint(self, of_arm: &Place) -> Result<Joint, RobotError> {
+    fn into_joint(self, of_arm: &Place, angles: &mut RightAngles) -> Result<Joint, RobotError> {
         let place = of_arm.table("joint", &self.name);
         let t = &self.inertia_com_kg_m2;
         place.finite("xyz_m", &self.xyz_m)?;
@@ -194,8 +204,10 @@ impl JointEntry {
                  [-6.2832, 6.2832]"
             )));
         }
+        let at = format!("joint \"{}\"", self.name);
+        let rpy_rad = self.rpy_rad.map(|angle_rad| angles.read(angle_rad, &at));
         Ok(Joint {
-            placement: Placement::from_xyz_rpy(self.xyz_m, self.rpy_rad),
+            placement: Placement::from_xyz_rpy(self.xyz_m, rpy_rad),
             link,
             drive: Drive {
                 rotor_inertia_kg_m2: self.rotor_inertia_kg_m2,
@@ -211,6 +223,7 @@ impl JointEntry {
                 torque_nm: self.torque_nm,
             },
             bounds: place.bounds(self.mass_bounds_kg, self.com_bounds_m)?,
+            assumed: Assumed::default(),
             name: self.name,
         })
     }
@@ -249,6 +262,27 @@ mod tests {
         std::fs::write(file.path(), include_str!("../../robots/ur5.toml")).unwrap();
         let arm = Arm::load(file.path().to_str().unwrap()).unwrap();
         assert_eq!(arm, Arm::built_in("ur5").unwrap());
+    }
+
+    /// As in a URDF, so that an arm exported from one file to the other has the same frames.
+    #[test]
+    fn angles_printed_short_are_right_angles() {
+        let with = |right_angle: &str, zero: &str| {
+            let text = include_str!("../../robots/ur5.toml")
+                .replace("1.5707963267948966", right_angle)
+                .replacen("rpy_rad = [0.0,", &format!("rpy_rad = [{zero},"), 1);
+            let (arm, notices) = read_toml(&text, "x.toml").unwrap();
+            (arm, notices.iter().map(ToString::to_string).collect::<Vec<_>>())
+        };
+        let built_in = Arm::built_in("ur5").unwrap();
+        let (arm, told) = with("1.5708", "3e-5");
+        assert_eq!(arm, built_in);
+        assert!(told[0].contains("are taken as these: joint \"shoulder_pan\", joint"), "{told:?}");
+        let (arm, told) = with("1.57", "0.0");
+        assert_ne!(arm, built_in);
+        let words = "joint \"wrist_2\" 1.57 (of a right angle write 1.5707963)";
+        assert!(told[0].contains(words), "{told:?}");
+        assert!(read_toml(BUILT_IN[0].1, "ur5").unwrap().1.is_empty());
     }
 
     #[test]

@@ -5,6 +5,7 @@
 
 pub mod export;
 
+mod angles;
 mod arm;
 mod error;
 mod file;
@@ -18,10 +19,12 @@ mod signals;
 mod urdf;
 
 pub(crate) use arm::ON_AXIS;
-pub use arm::{Arm, Capsule, CellBox, Clearance, Drive, Joint, Limits, LinkBounds, Placement};
+pub use arm::{
+    Arm, Assumed, Capsule, CellBox, Clearance, Drive, Joint, Limits, LinkBounds, Placement,
+};
 pub use error::RobotError;
-pub(crate) use file::text_of;
 pub use file::{LoadedArm, built_in_names};
+pub(crate) use file::{is_urdf, text_of};
 pub use inertia::LinkInertia;
 pub use kinematics::{Kinematics, KinematicsDifference};
 pub use mjcf::{LeftOut, MjcfArm, MjcfFault, MjcfNotice, read_mjcf, read_mjcf_up_to};

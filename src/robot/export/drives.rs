@@ -1,4 +1,4 @@
-//! The drive file: everything about an arm that a URDF has no place for.
+//! The drive file: everything about an arm that a URDF or an MJCF has no place for.
 
 mod clearance;
 
@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::robot::file::{BoxEntry, CapsuleEntry};
 use crate::robot::place::Place;
-use crate::robot::{Arm, Joint, MjcfNotice, RobotError, UrdfNotice};
+use crate::robot::urdf::unless_empty;
+use crate::robot::{Arm, Joint, MjcfNotice, RobotError, ShapeNotice, UrdfNotice};
 
 /// The drive file beside a URDF or an MJCF. A key that is left out keeps the value of that file, or the value that is
 /// assumed without a drive file.
@@ -19,6 +20,7 @@ pub(in crate::robot) struct DriveFile {
     gravity_m_s2: Option<[f64; 3]>,
     friction_epsilon_rad_s: Option<f64>,
     torque_offsets: Option<bool>,
+    drive_gains_assumed: Option<bool>,
     clearance: Option<Source>,
     floor_z_m: Option<f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -50,9 +52,31 @@ struct DriveEntry {
     com_bounds_m: Option<[[f64; 2]; 3]>,
 }
 
+/// What a drive file leaves of a notice.
+#[derive(Debug, PartialEq)]
+pub(in crate::robot) enum Rest {
+    /// The file has no say in it.
+    Untouched(UrdfNotice),
+    /// Neither the file nor the model beside it says this.
+    Open(UrdfNotice),
+    /// The file settles it.
+    Nothing,
+}
+
+impl Rest {
+    fn open_if(is_open: bool, notice: UrdfNotice) -> Self {
+        if is_open { Self::Open(notice) } else { Self::Nothing }
+    }
+
+    /// What is left of a notice about the joints or the like that the file does not settle.
+    fn about<T>(left: Vec<T>, notice: impl FnOnce(Vec<T>) -> UrdfNotice) -> Self {
+        unless_empty(left, notice).map_or(Self::Nothing, Self::Open)
+    }
+}
+
 /// The drives and the clearance of `arm` as TOML, to lie beside a URDF that describes the bodies alone. The torque of a
 /// joint is that of the bodies plus rotor inertia · q̈ + viscous · q̇ + coulomb · tanh(q̇/ε) + offset; `offsets_nm` has
-/// one entry per joint.
+/// one entry per joint. What was only assumed about the arm is left out.
 pub fn drive_file(arm: &Arm, offsets_nm: &[f64]) -> String {
     DriveFile::of(arm, offsets_nm).text()
 }
@@ -67,34 +91,46 @@ pub fn drive_file_of_urdf(
     source: &str,
 ) -> Result<String, RobotError> {
     let own = DriveFile::read(text, source)?;
-    let DriveFile { robot, gravity_m_s2, friction_epsilon_rad_s, torque_offsets, joint, .. } =
-        DriveFile::of(arm, offsets_nm);
-    let of_arm = |entry: &DriveEntry| arm.joints.iter().any(|joint| joint.name == entry.name);
+    let mut file = DriveFile::of(arm, offsets_nm);
     // Speed and torque limits are written only where the old drive file has them: others are in the URDF, which keeps
     // its own.
-    let limited = joint.into_iter().map(|entry| {
-        let before = own.joint.iter().find(|before| before.name == entry.name);
-        DriveEntry {
-            velocity_rad_s: before.and_then(|before| before.velocity_rad_s),
-            torque_nm: before.and_then(|before| before.torque_nm),
-            ..entry
-        }
-    });
-    let mut joint: Vec<DriveEntry> = limited.collect();
-    joint.extend(own.joint.into_iter().filter(|entry| !of_arm(entry)));
+    for entry in &mut file.joint {
+        let before = own.entry(&entry.name);
+        entry.velocity_rad_s = before.and_then(|before| before.velocity_rad_s);
+        entry.torque_nm = before.and_then(|before| before.torque_nm);
+    }
+    let of_arm = |entry: &DriveEntry| arm.joints.iter().any(|joint| joint.name == entry.name);
+    file.joint.extend(own.joint.into_iter().filter(|entry| !of_arm(entry)));
     let file = DriveFile {
-        robot,
-        gravity_m_s2,
-        friction_epsilon_rad_s,
-        torque_offsets,
-        joint,
         clearance: own.clearance,
         floor_z_m: own.floor_z_m,
         collision_pairs: own.collision_pairs,
         unwatched_pairs: own.unwatched_pairs,
         capsules: own.capsules,
         boxes: own.boxes,
+        ..file
     };
+    Ok(file.text())
+}
+
+/// As [`drive_file`], to lie beside an MJCF that describes the bodies of `arm` alone and has no speed limits. It also
+/// fits a URDF that the arm came from, together with its own drive file, whose text is `text`: the shapes of the URDF
+/// are written out as they were understood. Joints of `text` that are not the arm's are left out, since an MJCF has
+/// none of them; `source` names the drive file in messages.
+pub fn drive_file_of_mjcf(
+    arm: &Arm,
+    offsets_nm: &[f64],
+    text: &str,
+    source: &str,
+) -> Result<String, RobotError> {
+    let own = DriveFile::read(text, source)?;
+    let mut file = DriveFile::of(arm, offsets_nm);
+    for (entry, joint) in file.joint.iter_mut().zip(&arm.joints) {
+        let stated = !joint.assumed.velocity;
+        entry.velocity_rad_s = stated.then_some(joint.limits.velocity_rad_s);
+        entry.torque_nm = own.entry(&joint.name).and_then(|before| before.torque_nm);
+    }
+    let file = DriveFile { clearance: own.clearance, unwatched_pairs: own.unwatched_pairs, ..file };
     Ok(file.text())
 }
 
@@ -111,9 +147,11 @@ impl DriveFile {
         let named = |pair: &[usize; 2]| pair.map(|k| capsules[k].name.clone());
         Self {
             robot: Some(arm.name.clone()),
-            gravity_m_s2: Some(arm.gravity_m_s2.into()),
+            gravity_m_s2: (!arm.gravity_assumed).then_some(arm.gravity_m_s2.into()),
+            // Assumed or not: the friction that was identified belongs to this ε.
             friction_epsilon_rad_s: Some(arm.friction_epsilon_rad_s),
             torque_offsets: Some(arm.torque_offsets),
+            drive_gains_assumed: arm.drive_gains_assumed.then_some(true),
             clearance: None,
             floor_z_m: arm.clearance.floor_z_m,
             collision_pairs: arm.clearance.pairs.iter().map(named).collect(),
@@ -151,11 +189,13 @@ impl DriveFile {
         if let Some(gravity_m_s2) = self.gravity_m_s2 {
             place.finite("gravity_m_s2", &gravity_m_s2)?;
             arm.gravity_m_s2 = Vector3::from(gravity_m_s2);
+            arm.gravity_assumed = false;
         }
         arm.torque_offsets = self.torque_offsets.unwrap_or(arm.torque_offsets);
-        self.clear(arm, &place)?;
+        arm.drive_gains_assumed = self.drive_gains_assumed.unwrap_or(arm.drive_gains_assumed);
+        self.add_clearance(arm, &place)?;
         for joint in &mut arm.joints {
-            if let Some(entry) = self.joint.iter().find(|entry| entry.name == joint.name) {
+            if let Some(entry) = self.entry(&joint.name) {
                 entry.apply(joint, &place.table("joint", &entry.name))?;
             }
         }
@@ -195,11 +235,14 @@ impl DriveFile {
         }
     }
 
-    /// The part of a `notice` about the URDF that this file leaves open.
-    pub(in crate::robot) fn leaves(&self, notice: UrdfNotice) -> Option<UrdfNotice> {
+    /// What this file leaves of a `notice` about the model beside it.
+    pub(in crate::robot) fn rest_of(&self, notice: UrdfNotice) -> Rest {
         match notice {
-            UrdfNotice::Gravity { root } => {
-                self.gravity_m_s2.is_none().then_some(UrdfNotice::Gravity { root })
+            UrdfNotice::Gravity { .. } | UrdfNotice::Mjcf(MjcfNotice::Weightless) => {
+                Rest::open_if(self.gravity_m_s2.is_none(), notice)
+            }
+            UrdfNotice::FrictionEpsilon { .. } => {
+                Rest::open_if(self.friction_epsilon_rad_s.is_none(), notice)
             }
             UrdfNotice::Drives { rotor_inertia, gear_ratio, torque_constant } => {
                 let rotor_inertia = self.without(rotor_inertia, |e| e.rotor_inertia_kg_m2);
@@ -207,35 +250,41 @@ impl DriveFile {
                 let torque_constant = self.without(torque_constant, |e| e.torque_constant_nm_a);
                 let lists = [&rotor_inertia, &gear_ratio, &torque_constant];
                 let is_open = lists.iter().any(|joints| !joints.is_empty());
-                is_open.then_some(UrdfNotice::Drives { rotor_inertia, gear_ratio, torque_constant })
+                let notice = UrdfNotice::Drives { rotor_inertia, gear_ratio, torque_constant };
+                Rest::open_if(is_open, notice)
             }
             UrdfNotice::NoFriction { joints } => {
                 let joints = self.without(joints, |e| e.viscous_nm_s_rad.or(e.coulomb_nm));
-                (!joints.is_empty()).then_some(UrdfNotice::NoFriction { joints })
+                Rest::about(joints, |joints| UrdfNotice::NoFriction { joints })
             }
             UrdfNotice::ServoDamping { mut joints } => {
                 joints.retain(|(joint, ..)| !self.says(joint, |e| e.viscous_nm_s_rad));
-                (!joints.is_empty()).then_some(UrdfNotice::ServoDamping { joints })
+                Rest::about(joints, |joints| UrdfNotice::ServoDamping { joints })
             }
             UrdfNotice::AssumedVelocity { joints, velocity_rad_s } => {
                 let joints = self.without(joints, |e| e.velocity_rad_s);
-                (!joints.is_empty())
-                    .then_some(UrdfNotice::AssumedVelocity { joints, velocity_rad_s })
+                Rest::about(joints, |joints| UrdfNotice::AssumedVelocity { joints, velocity_rad_s })
             }
             UrdfNotice::NoTorqueLimit { joints } => {
                 let joints = self.without(joints, |e| e.torque_nm);
-                (!joints.is_empty()).then_some(UrdfNotice::NoTorqueLimit { joints })
+                Rest::about(joints, |joints| UrdfNotice::NoTorqueLimit { joints })
             }
             UrdfNotice::AssumedAcceleration { joints, acceleration_rad_s2 } => {
                 let joints = self.without(joints, |e| e.acceleration_rad_s2);
-                (!joints.is_empty())
-                    .then_some(UrdfNotice::AssumedAcceleration { joints, acceleration_rad_s2 })
+                Rest::about(joints, |joints| UrdfNotice::AssumedAcceleration {
+                    joints,
+                    acceleration_rad_s2,
+                })
             }
-            UrdfNotice::Mjcf(MjcfNotice::Weightless) => {
-                self.gravity_m_s2.is_none().then_some(notice)
-            }
-            other => Some(other),
+            UrdfNotice::Shapes(_) if self.sets_shapes_aside() => Rest::Nothing,
+            UrdfNotice::Shapes(ShapeNotice::Nothing) if !self.capsules.is_empty() => Rest::Nothing,
+            other => Rest::Untouched(other),
         }
+    }
+
+    /// What the file says about a joint.
+    fn entry(&self, joint: &str) -> Option<&DriveEntry> {
+        self.joint.iter().find(|entry| entry.name == joint)
     }
 
     /// Those of `joints` for which the file does not give a quantity.
@@ -249,32 +298,32 @@ impl DriveFile {
 
     /// Whether the file gives a quantity of a joint.
     fn says(&self, joint: &str, quantity: impl Fn(&DriveEntry) -> Option<f64>) -> bool {
-        self.joint.iter().any(|entry| entry.name == joint && quantity(entry).is_some())
+        self.entry(joint).and_then(quantity).is_some()
     }
 }
 
 impl DriveEntry {
     fn of(joint: &Joint, torque_offset_nm: f64) -> Self {
-        let Joint { name, drive, limits, bounds, .. } = joint;
+        let Joint { name, drive, limits, bounds, assumed, .. } = joint;
         Self {
             name: name.clone(),
             rotor_inertia_kg_m2: Some(drive.rotor_inertia_kg_m2),
             viscous_nm_s_rad: Some(drive.viscous_nm_s_rad),
             coulomb_nm: Some(drive.coulomb_nm),
             torque_offset_nm: Some(torque_offset_nm),
-            // The URDF beside the drive file has these limits, but no word for an unknown torque.
+            // The URDF beside the drive file has these limits.
             velocity_rad_s: None,
-            torque_nm: limits.torque_nm.is_infinite().then_some(f64::INFINITY),
-            acceleration_rad_s2: Some(limits.acceleration_rad_s2),
-            gear_ratio: Some(drive.gear_ratio),
-            torque_constant_nm_a: Some(drive.torque_constant_nm_a),
+            torque_nm: None,
+            acceleration_rad_s2: (!assumed.acceleration).then_some(limits.acceleration_rad_s2),
+            gear_ratio: (!assumed.gear_ratio).then_some(drive.gear_ratio),
+            torque_constant_nm_a: (!assumed.torque_constant).then_some(drive.torque_constant_nm_a),
             mass_bounds_kg: bounds.mass_kg,
             com_bounds_m: bounds.com_m,
         }
     }
 
     fn apply(&self, joint: &mut Joint, place: &Place) -> Result<(), RobotError> {
-        let Joint { drive, limits, bounds, .. } = joint;
+        let Joint { drive, limits, bounds, assumed, .. } = joint;
         take(&mut drive.rotor_inertia_kg_m2, self.rotor_inertia_kg_m2, |value| {
             place.not_negative("rotor_inertia_kg_m2", value)
         })?;
@@ -299,6 +348,10 @@ impl DriveEntry {
         let given = place.bounds(self.mass_bounds_kg, self.com_bounds_m)?;
         bounds.mass_kg = given.mass_kg.or(bounds.mass_kg);
         bounds.com_m = given.com_m.or(bounds.com_m);
+        assumed.gear_ratio &= self.gear_ratio.is_none();
+        assumed.torque_constant &= self.torque_constant_nm_a.is_none();
+        assumed.velocity &= self.velocity_rad_s.is_none();
+        assumed.acceleration &= self.acceleration_rad_s2.is_none();
         Ok(())
     }
 }
@@ -365,7 +418,9 @@ mod tests {
         assert_eq!(arm, wanted);
         let file = DriveFile::read(&limits, "x.drives.toml").unwrap();
         let notice = UrdfNotice::NoTorqueLimit { joints: names(&arm) };
-        let Some(UrdfNotice::NoTorqueLimit { joints }) = file.leaves(notice) else { panic!() };
+        let Rest::Open(UrdfNotice::NoTorqueLimit { joints }) = file.rest_of(notice) else {
+            panic!()
+        };
         assert_eq!(joints, [&names(&arm)[..1], &names(&arm)[2..]].concat());
         let unknown = text("torque_nm = inf");
         apply_drive_file(&mut arm, &unknown, "x.drives.toml").unwrap();
@@ -435,7 +490,12 @@ mod tests {
         };
         let left = |text: &str| -> Vec<UrdfNotice> {
             let file = DriveFile::read(text, "x.drives.toml").unwrap();
-            notices().into_iter().filter_map(|notice| file.leaves(notice)).collect()
+            let rest = |notice| match file.rest_of(notice) {
+                Rest::Open(notice) => Some(notice),
+                Rest::Nothing => None,
+                Rest::Untouched(other) => panic!("{other}"),
+            };
+            notices().into_iter().filter_map(rest).collect()
         };
         assert_eq!(left("friction_epsilon_rad_s = 0.01"), notices());
         let one = "[[joint]]\nname = \"a\"\n";

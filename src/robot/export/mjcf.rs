@@ -5,29 +5,30 @@ use std::fmt::Write;
 use nalgebra::{Rotation3, UnitQuaternion};
 
 use super::xml::{about_com, escaped, frames_of, numbers};
-use super::{ExportError, UNKNOWN_TORQUE_NM, check, link_names};
+use super::{ExportError, body_names, check, with_merged};
 use crate::robot::{Arm, FixedFrame, Frames, Joint, Placement, UrdfLink};
 
 /// The arm as MJCF, with `frames` as sites and one motor per joint.
 ///
 /// `armature` is the rotor inertia, `damping` is rv, `frictionloss` is rc. MuJoCo's dry friction is a constraint that
 /// holds at standstill, not tanh(q̇/ε), so the two differ at speeds below a few ε. Position limits and the motors'
-/// torque limits are written; speed and acceleration limits, ε, offsets and clearance capsules have no place in an
-/// MJCF. Bodies are named `<joint>_link`.
+/// torque limits are written, where these are known. Speed and acceleration limits, gears, ε, offsets and clearance
+/// capsules have no place in an MJCF; they are in the [drive file](super::drive_file_of_mjcf). Bodies are named
+/// `<joint>_link`.
 pub fn mjcf(arm: &Arm, frames: &Frames) -> Result<String, ExportError> {
-    mjcf_of_urdf(arm, frames, &[])
+    mjcf_with_links(arm, frames, &[])
 }
 
-/// As [`mjcf`], for an arm that was read from a URDF with these `links`: each body has the name of the link directly
-/// behind its joint.
-pub fn mjcf_of_urdf(arm: &Arm, frames: &Frames, links: &[UrdfLink]) -> Result<String, ExportError> {
-    let mut bodies = link_names(arm);
-    for (number, name) in (1..).zip(&mut bodies) {
-        if let Some(link) = links.iter().find(|link| link.is_first && link.body == number) {
-            name.clone_from(&link.name);
-        }
-    }
-    check(arm, frames, &bodies)?;
+/// As [`mjcf`], for an arm that consists of `links`: each body has the name of the link directly behind its joint, and
+/// links that are fixed to it are sites.
+pub fn mjcf_with_links(
+    arm: &Arm,
+    frames: &Frames,
+    links: &[UrdfLink],
+) -> Result<String, ExportError> {
+    let bodies = body_names(arm, links);
+    let frames = with_merged(frames, links);
+    check(arm, &frames, &bodies)?;
     let frames = &frames.fixed;
     let mut out = String::new();
     // Writing to a String cannot fail, so the results carry no information.
@@ -48,13 +49,13 @@ pub fn mjcf_of_urdf(arm: &Arm, frames: &Frames, links: &[UrdfLink]) -> Result<St
     }
     out.push_str("  </worldbody>\n  <actuator>\n");
     for joint in &arm.joints {
-        let limit = joint.limits.torque_nm.min(UNKNOWN_TORQUE_NM);
+        let limit = joint.limits.torque_nm;
+        let range = match limit.is_finite() {
+            true => format!(" ctrlrange=\"{}\"", numbers([&-limit, &limit])),
+            false => String::new(),
+        };
         let name = escaped(&joint.name);
-        let _ = writeln!(
-            out,
-            "    <motor name=\"{name}\" joint=\"{name}\" ctrlrange=\"{}\"/>",
-            numbers([&-limit, &limit])
-        );
+        let _ = writeln!(out, "    <motor name=\"{name}\" joint=\"{name}\"{range}/>");
     }
     out.push_str("  </actuator>\n</mujoco>\n");
     Ok(out)

@@ -1,7 +1,7 @@
 //! Export of arms to other programs.
 //!
 //! Input: an [`Arm`] whose bodies can exist, and named frames on them. Output: a URDF (a new one, or the one that the
-//! arm came from with other numbers), the drive file with everything that a URDF has no place for, or an MJCF. All
+//! arm came from with other numbers) or an MJCF, and the drive file with everything that these have no place for. All
 //! numbers are written so that they read back as the same bits.
 
 mod drives;
@@ -15,13 +15,13 @@ use std::collections::HashSet;
 use thiserror::Error;
 
 use super::arm::Arm;
-use super::urdf::Frames;
+use super::urdf::{FixedFrame, Frames, UrdfLink};
 
-pub(super) use drives::DriveFile;
-pub use drives::{apply_drive_file, drive_file, drive_file_of_urdf};
-pub use mjcf::{mjcf, mjcf_of_urdf};
+pub(super) use drives::{DriveFile, Rest};
+pub use drives::{apply_drive_file, drive_file, drive_file_of_mjcf, drive_file_of_urdf};
+pub use mjcf::{mjcf, mjcf_with_links};
 pub use own_urdf::{OwnUrdf, OwnUrdfError, Takeover, Unfit, own_urdf};
-pub use urdf::urdf;
+pub use urdf::{urdf, urdf_with_links};
 
 /// The arm is not one that a simulator accepts.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -65,9 +65,6 @@ pub enum ExportError {
     },
 }
 
-/// Written for an unknown torque limit: simulators require a number, and take 0 literally.
-const UNKNOWN_TORQUE_NM: f64 = 1e9;
-
 /// Refuses an arm that could not run, and names that would collide; `bodies` are the names of the moving bodies.
 fn check(arm: &Arm, frames: &Frames, bodies: &[String]) -> Result<(), ExportError> {
     check_numbers(arm)?;
@@ -110,15 +107,32 @@ fn check_numbers(arm: &Arm) -> Result<(), ExportError> {
     Ok(())
 }
 
-/// Default names of the links that the joints move.
-fn link_names(arm: &Arm) -> Vec<String> {
-    arm.joints.iter().map(|joint| format!("{}_link", joint.name)).collect()
+/// Names of the moving bodies: of `links`, the one directly behind the joint, or `<joint>_link`.
+fn body_names(arm: &Arm, links: &[UrdfLink]) -> Vec<String> {
+    let names = (1..).zip(&arm.joints).map(|(body, joint)| {
+        let link = links.iter().find(|link| link.is_first && link.body == body);
+        link.map_or_else(|| format!("{}_link", joint.name), |link| link.name.clone())
+    });
+    names.collect()
+}
+
+/// The frames of an arm that consists of `links`: those with mass that are fixed to a moving body are a part of it, and
+/// keep only their frames.
+fn with_merged(frames: &Frames, links: &[UrdfLink]) -> Frames {
+    let is_merged = |link: &&UrdfLink| link.body > 0 && !link.is_first && link.inertia.is_some();
+    let merged = links.iter().filter(is_merged).map(|link| FixedFrame {
+        name: link.name.clone(),
+        body: link.body,
+        placement: link.placement,
+    });
+    let fixed = frames.fixed.iter().cloned().chain(merged).collect();
+    Frames { root: frames.root.clone(), fixed }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::{FixedFrame, Placement, UrdfArm, read_urdf};
+    use crate::robot::{MjcfArm, Placement, UrdfArm, UrdfNotice, read_mjcf, read_urdf};
 
     /// A robot on a stand: its base is a frame of the root link.
     fn frames() -> Frames {
@@ -164,7 +178,8 @@ mod tests {
                 assert!((a.placement.translation_m - b.placement.translation_m).norm() < 1e-15);
             }
             for notice in notices {
-                let harmless = ["gravity", "rotor", "collision", "clear", "acceleration"];
+                let harmless =
+                    ["gravity", "rotor", "collision", "clear", "acceleration", "Coulomb"];
                 let text = notice.to_string();
                 assert!(harmless.iter().any(|word| text.contains(word)), "{text}");
             }
@@ -190,11 +205,61 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_torque_limit_is_a_large_number() {
+    fn an_unknown_torque_limit_reads_back_as_unknown() {
         let mut arm = Arm::built_in("ur5").unwrap();
         arm.joints[0].limits.torque_nm = f64::INFINITY;
-        assert!(urdf(&arm, &Frames::default()).unwrap().contains("effort=\"1000000000\""));
-        assert!(mjcf(&arm, &Frames::default()).unwrap().contains("-1000000000 1000000000"));
+        let model = urdf(&arm, &Frames::default()).unwrap();
+        // A URDF requires a number.
+        assert!(model.contains("effort=\"1000000000\""));
+        let unknown = UrdfNotice::NoTorqueLimit { joints: vec!["shoulder_pan".to_owned()] };
+        let read = read_urdf(&model, "x.urdf").unwrap();
+        assert_eq!(read.arm.joints[0].limits.torque_nm, f64::INFINITY);
+        assert!(read.notices.contains(&unknown));
+        let model = mjcf(&arm, &Frames::default()).unwrap();
+        assert!(model.contains("<motor name=\"shoulder_pan\" joint=\"shoulder_pan\"/>"), "{model}");
+        // Files of older versions have the large number.
+        let older = model.replacen(
+            "joint=\"shoulder_pan\"/>",
+            "joint=\"shoulder_pan\" ctrlrange=\"-1e9 1e9\"/>",
+            1,
+        );
+        for text in [model, older] {
+            let read = read_mjcf(&text, "x.xml").unwrap();
+            assert_eq!(read.arm.joints[0].limits.torque_nm, f64::INFINITY);
+            assert_eq!(read.arm.joints[1].limits.torque_nm, 150.0);
+            assert!(read.notices.contains(&unknown));
+        }
+    }
+
+    /// The joints of frames must differ from those of the arm.
+    #[test]
+    fn a_frame_gets_a_joint_of_its_own() {
+        let mut arm = Arm::built_in("ur5").unwrap();
+        arm.joints[2].name = "base_link_fixed".into();
+        arm.joints[3].name = "base_link_fixed_2".into();
+        let text = urdf(&arm, &frames()).unwrap();
+        assert!(text.contains("<joint name=\"base_link_fixed_3\" type=\"fixed\">"), "{text}");
+        assert_eq!(read_urdf(&text, "x.urdf").unwrap().arm.dof(), 6);
+    }
+
+    /// A gripper without a drive is a part of the last body, where simulators still ask for its frame.
+    #[test]
+    fn a_merged_link_keeps_its_frame() {
+        let body = "<inertial pos=\"0.1 0 0\" mass=\"2\" diaginertia=\"0.01 0.02 0.025\"/>";
+        let inside =
+            format!("<joint name=\"j\"/>{body}<body name=\"hand\" pos=\"0 0 1\">{body}</body>");
+        let text =
+            format!("<mujoco><worldbody><body name=\"arm\">{inside}</body></worldbody></mujoco>");
+        let MjcfArm { arm, frames, links, .. } = read_mjcf(&text, "x.xml").unwrap();
+        assert!(frames.fixed.is_empty());
+        let written = mjcf_with_links(&arm, &frames, &links).unwrap();
+        assert!(written.contains("<body name=\"arm\""), "{written}");
+        assert!(written.contains("<site name=\"hand\" pos=\"0 0 1\""), "{written}");
+        let written = urdf_with_links(&arm, &frames, &links).unwrap();
+        let back = read_urdf(&written, "x.urdf").unwrap();
+        let first = back.links.iter().find(|link| link.is_first && link.body == 1).unwrap();
+        assert_eq!(first.name, "arm");
+        assert_eq!(back.frames.fixed[0].name, "hand");
     }
 
     /// Simulators address bodies by the link names of the URDF, which need not resemble the names of the joints.
@@ -204,7 +269,7 @@ mod tests {
         let text = urdf(&arm, &frames()).unwrap();
         let text = text.replace("\"elbow_link\"", "\"fore &amp; arm\"");
         let UrdfArm { arm, frames, links, .. } = read_urdf(&text, "x.urdf").unwrap();
-        let named = mjcf_of_urdf(&arm, &frames, &links).unwrap();
+        let named = mjcf_with_links(&arm, &frames, &links).unwrap();
         for words in [
             "<body name=\"shoulder_pan_link\"",
             "<body name=\"fore &amp; arm\"",
@@ -233,7 +298,7 @@ mod tests {
         let mut arm = Arm::built_in("ur5").unwrap();
         arm.joints[1].bounds.mass_kg = Some([7.0, 9.0]);
         arm.joints[2].bounds.com_m = Some([[-0.4, 0.0], [-0.1, 0.1], [-0.1, 0.2]]);
-        // The URDF has a large number for it.
+        // The URDF has a number for it that is read as unknown.
         arm.joints[3].limits.torque_nm = f64::INFINITY;
         let mut read = read_urdf(&urdf(&arm, &Frames::default()).unwrap(), "x.urdf").unwrap().arm;
         apply_drive_file(&mut read, &drive_file(&arm, &[0.0; 6]), "x.drives.toml").unwrap();
@@ -243,6 +308,88 @@ mod tests {
         assert_eq!(read.clearance, arm.clearance);
         for (a, b) in arm.joints.iter().zip(&read.joints) {
             assert_eq!((a.drive, a.limits, a.bounds), (b.drive, b.limits, b.bounds));
+        }
+    }
+
+    /// An exported arm is no better known than the one that was read: what was assumed about it is assumed again, and
+    /// its gains are the same guess.
+    #[test]
+    fn what_was_assumed_is_not_written_as_if_it_were_known() {
+        let told = |text: &str, drives: &str| {
+            let UrdfArm { mut arm, notices, .. } = read_urdf(text, "x.urdf").unwrap();
+            let file = DriveFile::read(drives, "x.drives.toml").unwrap();
+            file.apply(&mut arm, &[], "x.drives.toml").unwrap();
+            let open = notices.into_iter().filter_map(|notice| match file.rest_of(notice) {
+                Rest::Open(notice) => Some(notice.to_string()),
+                _ => None,
+            });
+            (open.collect::<Vec<_>>().join("\n"), arm)
+        };
+        let text = urdf(&Arm::built_in("ur5e").unwrap(), &Frames::default()).unwrap();
+        let (_, arm) = told(&text, "[[joint]]\nname = \"elbow\"\ngear_ratio = 50.0\n");
+        for written in
+            [drive_file(&arm, &[0.0; 6]), drive_file_of_mjcf(&arm, &[0.0; 6], "", "").unwrap()]
+        {
+            let (open, back) = told(&text, &written);
+            assert_eq!(back, arm);
+            for words in [
+                "gravity is taken as 9.81",
+                "no gear ratio given, taken as 1: shoulder_pan, shoulder_lift, wrist_1",
+                "no torque constant given, taken as 1 Nm/A: shoulder_pan",
+                "no acceleration limit",
+            ] {
+                assert!(open.contains(words), "{words}: {open}");
+            }
+            assert!(!open.contains("rotor") && !open.contains("Coulomb"), "{open}");
+        }
+        let guessed = Arm::built_in("ur5e").unwrap();
+        let (_, back) = told(&text, &drive_file(&guessed, &[0.0; 6]));
+        assert!(back.drive_gains_assumed);
+        assert!(!told(&text, &drive_file(&arm, &[0.0; 6])).1.drive_gains_assumed);
+    }
+
+    /// MJCF and drive file together contain the whole arm, although an MJCF has neither ε nor gains nor speed limits.
+    #[test]
+    fn the_drive_file_gives_an_mjcf_its_drives_back() {
+        let mut arm = Arm::built_in("ur5").unwrap();
+        arm.friction_epsilon_rad_s = 0.2;
+        arm.joints[1].limits.velocity_rad_s = 1.25;
+        arm.joints[3].limits.torque_nm = f64::INFINITY;
+        arm.joints[4].drive.coulomb_nm = 4.5;
+        let mut read = read_mjcf(&mjcf(&arm, &Frames::default()).unwrap(), "x.xml").unwrap().arm;
+        let drives = drive_file_of_mjcf(&arm, &[0.0; 6], "", "").unwrap();
+        apply_drive_file(&mut read, &drives, "x.drives.toml").unwrap();
+        assert_eq!(read.friction_epsilon_rad_s, arm.friction_epsilon_rad_s);
+        assert_eq!(read.clearance, arm.clearance);
+        for (a, b) in arm.joints.iter().zip(&read.joints) {
+            assert_eq!((a.drive, a.limits, a.assumed), (b.drive, b.limits, b.assumed));
+        }
+    }
+
+    /// The robot's own drive file replaces a capsule, takes a pair out and limits a torque. One new file beside its URDF
+    /// and an MJCF says the same to both.
+    #[test]
+    fn one_drive_file_fits_a_urdf_and_an_mjcf() {
+        let shapes = |text: String| {
+            let ball =
+                "<collision><geometry><sphere radius=\"0.05\"/></geometry></collision></link>";
+            text.replace("</link>", ball)
+        };
+        let text = shapes(urdf(&Arm::built_in("ur5").unwrap(), &Frames::default()).unwrap());
+        let own = "floor_z_m = -0.2\nunwatched_pairs = [[\"shoulder_pan_link\", \"wrist_3_link\"]]\n\
+                   [[joint]]\nname = \"elbow\"\ntorque_nm = 87.0\n[[joint]]\nname = \"finger\"\n";
+        let mut arm = read_urdf(&text, "x.urdf").unwrap().arm;
+        let before = arm.clearance.pairs.len();
+        let own_file = DriveFile::read(own, "own.drives.toml").unwrap();
+        own_file.apply(&mut arm, &["finger"], "own.drives.toml").unwrap();
+        assert_eq!(arm.clearance.pairs.len(), before - 1);
+        let drives = drive_file_of_mjcf(&arm, &[0.0; 6], own, "own.drives.toml").unwrap();
+        let mut of_urdf = read_urdf(&text, "x.urdf").unwrap().arm;
+        let mut of_mjcf = read_mjcf(&mjcf(&arm, &Frames::default()).unwrap(), "x.xml").unwrap().arm;
+        for back in [&mut of_urdf, &mut of_mjcf] {
+            apply_drive_file(back, &drives, "x.drives.toml").unwrap();
+            assert_eq!(back.clearance, arm.clearance);
+            assert_eq!(back.joints[2].limits, arm.joints[2].limits);
         }
     }
 

@@ -1,10 +1,12 @@
 //! Export as URDF: kinematics, inertias, limits and friction.
 
+use std::collections::HashSet;
 use std::fmt::Write;
 
 use super::xml::{about_com, escaped, frames_of, numbers, tensor};
-use super::{ExportError, UNKNOWN_TORQUE_NM, check, link_names};
-use crate::robot::{Arm, FixedFrame, Frames, Joint, Placement};
+use super::{ExportError, body_names, check, with_merged};
+use crate::robot::arm::UNKNOWN_TORQUE_NM;
+use crate::robot::{Arm, FixedFrame, Frames, Joint, Placement, UrdfLink};
 
 /// The arm as URDF, with `frames` as links without mass.
 ///
@@ -15,19 +17,32 @@ use crate::robot::{Arm, FixedFrame, Frames, Joint, Placement};
 /// - Rotor inertia, acceleration limit, gear ratio, torque constant, ε, torque offsets, gravity and clearance have no
 ///   place in a URDF; they are in the [`drive_file`](super::drive_file).
 pub fn urdf(arm: &Arm, frames: &Frames) -> Result<String, ExportError> {
-    let links = link_names(arm);
-    check(arm, frames, &links)?;
-    let Frames { root, fixed: frames } = frames;
+    urdf_with_links(arm, frames, &[])
+}
+
+/// As [`urdf`], for an arm that consists of `links`: each body has the name of the link directly behind its joint, and
+/// links that are fixed to it are links without mass.
+pub fn urdf_with_links(
+    arm: &Arm,
+    frames: &Frames,
+    links: &[UrdfLink],
+) -> Result<String, ExportError> {
+    let links_of_bodies = body_names(arm, links);
+    let frames = with_merged(frames, links);
+    check(arm, &frames, &links_of_bodies)?;
+    let Frames { root, fixed: frames } = &frames;
+    let mut joint_names: HashSet<String> =
+        arm.joints.iter().map(|joint| joint.name.clone()).collect();
     let mut out = String::from("<?xml version=\"1.0\"?>\n");
     // Writing to a String cannot fail, so the results carry no information.
     let _ = writeln!(out, "<robot name=\"{}\">", escaped(&arm.name));
     let _ = writeln!(out, "  <link name=\"{}\"/>", escaped(root));
-    write_frames(&mut out, frames, 0, root);
+    write_frames(&mut out, frames, 0, root, &mut joint_names);
     let mut parent = root;
-    for (body, (joint, child)) in (1..).zip(arm.joints.iter().zip(&links)) {
+    for (body, (joint, child)) in (1..).zip(arm.joints.iter().zip(&links_of_bodies)) {
         write_link(&mut out, joint, child);
         write_joint(&mut out, joint, parent, child);
-        write_frames(&mut out, frames, body, child);
+        write_frames(&mut out, frames, body, child, &mut joint_names);
         parent = child;
     }
     out.push_str("</robot>\n");
@@ -65,17 +80,34 @@ fn write_joint(out: &mut String, joint: &Joint, parent: &str, child: &str) {
     );
 }
 
-fn write_frames(out: &mut String, frames: &[FixedFrame], body: usize, parent: &str) {
+fn write_frames(
+    out: &mut String,
+    frames: &[FixedFrame],
+    body: usize,
+    parent: &str,
+    joint_names: &mut HashSet<String>,
+) {
     for frame in frames_of(frames, body) {
         let name = escaped(&frame.name);
         let _ = write!(
             out,
-            "  <link name=\"{name}\"/>\n  <joint name=\"{name}_fixed\" type=\"fixed\">\n    {}\n    \
+            "  <link name=\"{name}\"/>\n  <joint name=\"{}\" type=\"fixed\">\n    {}\n    \
              <parent link=\"{}\"/>\n    <child link=\"{name}\"/>\n  </joint>\n",
+            escaped(&free_name(&format!("{}_fixed", frame.name), joint_names)),
             origin(&frame.placement),
             escaped(parent),
         );
     }
+}
+
+/// A name that is not among those `taken`, with a number behind it if necessary; it is taken from now on.
+fn free_name(wanted: &str, taken: &mut HashSet<String>) -> String {
+    let numbered = (2..).map(|number| format!("{wanted}_{number}"));
+    let mut names = std::iter::once(wanted.to_owned()).chain(numbered);
+    // The iterator is endless.
+    let name = names.find(|name| !taken.contains(name)).unwrap_or_default();
+    taken.insert(name.clone());
+    name
 }
 
 /// Translation and fixed-axis roll, pitch, yaw.

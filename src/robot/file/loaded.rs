@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use super::name;
+use super::{name, read_toml};
 use crate::robot::arm::Arm;
 use crate::robot::error::RobotError;
-use crate::robot::export::DriveFile;
-use crate::robot::mjcf::{MjcfArm, is_urdf, read_mjcf, read_mjcf_up_to};
+use crate::robot::export::{DriveFile, Rest};
+use crate::robot::mjcf::{self, MjcfArm, read_mjcf, read_mjcf_up_to};
 use crate::robot::urdf::{Frames, UrdfArm, UrdfLink, UrdfNotice, read_urdf, read_urdf_up_to};
 
 /// Extension that replaces `urdf` in `NAME.urdf` to name its drive file.
@@ -17,11 +17,11 @@ const DRIVES: &str = "drives.toml";
 pub struct LoadedArm {
     /// The arm.
     pub arm: Arm,
-    /// Assumptions that had to be made; only a URDF or an MJCF leaves anything open.
+    /// What had to be assumed or interpreted; a robot file leaves open only what its angles mean.
     pub notices: Vec<UrdfNotice>,
     /// Named frames on its bodies; only a URDF or an MJCF has any.
     pub frames: Frames,
-    /// Links that its bodies consist of; only a URDF has any.
+    /// Links that its bodies consist of; only a URDF or an MJCF has any.
     pub urdf_links: Vec<UrdfLink>,
     /// Files that the arm was read from, the one that was named first: none for a built-in arm. For a URDF or an MJCF
     /// also the drive file and the meshes, for an MJCF the files that it includes.
@@ -42,20 +42,21 @@ impl LoadedArm {
         };
         let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
         match (extension.as_deref(), last_link) {
-            (Some(end @ ("urdf" | "xml" | "mjcf")), _) => {
+            (Some("urdf" | "xml" | "mjcf"), _) => {
                 let text = text_of(path)?;
-                let (mut loaded, meshes) = if end == "urdf" || is_urdf(&text) {
+                let (mut loaded, meshes) = if is_urdf(path, &text) {
                     let UrdfArm { arm, frames, links, notices, meshes } = match last_link {
                         Some(last) => read_urdf_up_to(&text, file, last)?,
                         None => read_urdf(&text, file)?,
                     };
                     (Self { notices, frames, urdf_links: links, ..own(arm) }, meshes)
                 } else {
-                    let MjcfArm { arm, frames, notices, included, meshes } = match last_link {
+                    let MjcfArm { arm, frames, links, notices, included, meshes } = match last_link
+                    {
                         Some(last) => read_mjcf_up_to(&text, file, last)?,
                         None => read_mjcf(&text, file)?,
                     };
-                    let mut loaded = Self { notices, frames, ..own(arm) };
+                    let mut loaded = Self { notices, frames, urdf_links: links, ..own(arm) };
                     loaded.files.extend(included);
                     (loaded, meshes)
                 };
@@ -66,7 +67,10 @@ impl LoadedArm {
                 loaded.files.extend(meshes);
                 Ok(loaded)
             }
-            (Some("toml"), None) => Ok(own(Arm::from_toml(&text_of(path)?, file)?)),
+            (Some("toml"), None) => {
+                let (arm, notices) = read_toml(&text_of(path)?, file)?;
+                Ok(Self { notices, ..own(arm) })
+            }
             (Some("toml"), Some(link)) => Err(RobotError::Invalid {
                 file: file.to_owned(),
                 what: format!(
@@ -89,16 +93,23 @@ impl LoadedArm {
         let drives = DriveFile::read(&text_of(&path)?, &source)?;
         let locked: Vec<&str> = self.notices.iter().flat_map(UrdfNotice::locked).collect();
         drives.apply(&mut self.arm, &locked, &source)?;
-        let mut notices = std::mem::take(&mut self.notices);
-        notices.retain(|notice| !drives.settles(notice));
-        let (about_drives, others): (Vec<_>, Vec<_>) =
-            notices.into_iter().partition(UrdfNotice::is_about_drives);
-        self.notices = others;
-        let open = about_drives.into_iter().filter_map(|notice| drives.leaves(notice)).collect();
+        let mut open = Vec::new();
+        for notice in std::mem::take(&mut self.notices) {
+            match drives.rest_of(notice) {
+                Rest::Untouched(notice) => self.notices.push(notice),
+                Rest::Open(notice) => open.push(notice),
+                Rest::Nothing => {}
+            }
+        }
         self.notices.push(UrdfNotice::DriveFile { file: source, open });
         self.files.push(path);
         Ok(())
     }
+}
+
+/// Whether the `text` of `file` is a URDF: the content of an .xml decides.
+pub(crate) fn is_urdf(file: &Path, text: &str) -> bool {
+    file.extension().is_some_and(|end| end.eq_ignore_ascii_case("urdf")) || mjcf::is_urdf(text)
 }
 
 /// Reads the text of a file that describes a robot.

@@ -26,7 +26,7 @@ impl Arm {
 
 impl JointEntry {
     fn of(joint: &Joint) -> Self {
-        let Joint { name, placement, link, drive, limits, bounds } = joint;
+        let Joint { name, placement, link, drive, limits, bounds, .. } = joint;
         let t = link.inertia_com_kg_m2().unwrap_or_default();
         Self {
             name: name.clone(),

@@ -1,6 +1,6 @@
 //! Contributions of actuators to their joints.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::compiler::Compiler;
 use super::defaults::{ACTUATORS, Defaults};
@@ -24,7 +24,7 @@ pub(super) struct Actuated {
     pub damping: f64,
 }
 
-/// The contributions by name of the joint.
+/// The contributions by name of the joint, which must be one of those that the file has `named`.
 ///
 /// MuJoCo limits the input of an actuator (`ctrlrange`) and its output (`forcerange`). The joint receives the output
 /// times `gear`, summed over its actuators. Rotors and dampers of actuators turn with the motor: the joint has their
@@ -33,6 +33,7 @@ pub(super) fn actuated(
     root: &Element,
     compiler: &Compiler,
     defaults: &Defaults,
+    named: &HashSet<String>,
 ) -> Result<HashMap<String, Actuated>, MjcfFault> {
     let mut actuated: HashMap<String, Actuated> = HashMap::new();
     let actuators = root.each("actuator").flat_map(|section| &section.children);
@@ -41,6 +42,7 @@ pub(super) fn actuated(
         let Some(joint) = actuator.text("joint").or(actuator.text("jointinparent")) else {
             continue;
         };
+        actuator.refuse_unknown_joint(joint, named)?;
         let gear = actuator.up_to("gear", GEARS)?.map_or(1.0, |gear| gear[0]).abs();
         // An actuator that is not connected limits nothing.
         if gear == 0.0 {

@@ -65,6 +65,8 @@ pub(super) struct Bodies<'a> {
     pub references: HashMap<String, f64>,
     /// Properties of joints that an arm does not have.
     pub left_out: Vec<(LeftOut, String)>,
+    /// Names that were made up for bodies without one.
+    pub unnamed: HashSet<String>,
     /// Bodies whose weight is compensated.
     pub weightless: HashSet<String>,
     /// Number of equalities that connect bodies in addition to the joints.
@@ -74,13 +76,14 @@ pub(super) struct Bodies<'a> {
 }
 
 impl<'a> Bodies<'a> {
-    /// Everything in the `<worldbody>` of `root`.
+    /// Everything in the `<worldbody>` of `root`, whose joints have the `joint_names`.
     pub(super) fn of(
         root: &Element,
         compiler: &'a Compiler,
         defaults: &'a Defaults,
         actuated: &'a HashMap<String, Actuated>,
         meshes: &'a MeshAssets,
+        joint_names: HashSet<String>,
     ) -> Result<Self, MjcfFault> {
         let mut bodies = Self {
             compiler,
@@ -95,7 +98,7 @@ impl<'a> Bodies<'a> {
                 materials: Vec::new(),
             },
             inertias: Vec::new(),
-            joint_names: HashSet::new(),
+            joint_names,
             sites: Vec::new(),
             links_of_sites: HashMap::new(),
             namesakes: Vec::new(),
@@ -103,15 +106,13 @@ impl<'a> Bodies<'a> {
             armature_kg_m2: HashMap::new(),
             references: HashMap::new(),
             left_out: Vec::new(),
+            unnamed: HashSet::new(),
             weightless: HashSet::new(),
             loops: 0,
             shapes: Vec::new(),
         };
         bodies.link(WORLD.to_owned(), Ok(Inertial::default()));
         let world = Hold { link: WORLD.to_owned(), anchor_m: Vector3::zeros() };
-        for section in root.each("worldbody") {
-            collect_joint_names(section, &mut bodies.joint_names);
-        }
         for section in root.each("worldbody") {
             let parts = bodies.parts(section, section.text("childclass"))?;
             bodies.inner(&parts, &world)?;
@@ -162,8 +163,13 @@ impl<'a> Bodies<'a> {
         let Part { element, frame, childclass } = body;
         let name = match element.text("name") {
             Some(name) => name.to_owned(),
-            // The number distinguishes several on one line.
-            None => format!("unnamed body {} ({})", self.robot.links.len(), element.line()),
+            None => {
+                // The number distinguishes several on one line.
+                let count = self.robot.links.len();
+                let name = format!("unnamed body {count} ({})", element.line());
+                self.unnamed.insert(name.clone());
+                name
+            }
         };
         let parts = self.parts(element, element.text("childclass").or(*childclass))?;
         let pose = frame.compose(&pose(element, self.compiler)?);
@@ -302,6 +308,15 @@ impl<'a> Bodies<'a> {
         self.robot.links.push(Link { name, inertial, visual: Vec::new(), collision: Vec::new() });
         self.inertias.push(inertia);
     }
+}
+
+/// The names of all joints in the `<worldbody>` of `root`.
+pub(super) fn joint_names(root: &Element) -> HashSet<String> {
+    let mut names = HashSet::new();
+    for section in root.each("worldbody") {
+        collect_joint_names(section, &mut names);
+    }
+    names
 }
 
 /// Collects the names of all joints in an element.

@@ -1,6 +1,6 @@
 //! Elements of an MJCF: their attributes and their places in the file.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::rc::Rc;
 
 use super::fault::MjcfFault;
@@ -195,6 +195,18 @@ impl Element {
             }
             (one, _) => Ok(one),
         }
+    }
+
+    /// Refuses a `joint` that is none of those that the file has `named`.
+    pub(super) fn refuse_unknown_joint(
+        &self,
+        joint: &str,
+        named: &HashSet<String>,
+    ) -> Result<(), MjcfFault> {
+        if named.contains(joint) {
+            return Ok(());
+        }
+        Err(MjcfFault::UnknownJoint { place: self.place(), joint: joint.to_owned() })
     }
 
     /// The fault for an element that only MuJoCo can process, so that the file must be compiled there first.

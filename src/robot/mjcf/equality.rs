@@ -1,6 +1,6 @@
 //! Constraints between joints or bodies: `<equality>`.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use urdf_rs::{Mimic, Robot};
 
@@ -13,10 +13,11 @@ use super::notice::LeftOut;
 const COEFFICIENTS: usize = 5;
 
 /// Gives the joints of `robot` that follow others their `mimic`, and returns what is left out of the constraints.
-/// `references` are the positions of the joints in the pose of the file.
+/// `references` are the positions of the joints in the pose of the file, which has `named` these joints.
 pub(super) fn couple(
     root: &Element,
     defaults: &Defaults,
+    named: &HashSet<String>,
     robot: &mut Robot,
     references: &HashMap<String, f64>,
 ) -> Result<Vec<(LeftOut, String)>, MjcfFault> {
@@ -24,6 +25,9 @@ pub(super) fn couple(
     let reference = |joint: &str| references.get(joint).copied().unwrap_or(0.0);
     for joint in active(root, defaults, "joint")? {
         let name = joint.required("joint1")?;
+        for joint_name in std::iter::once(name).chain(joint.text("joint2")) {
+            joint.refuse_unknown_joint(joint_name, named)?;
+        }
         let coefficients = joint.up_to("polycoef", COEFFICIENTS)?;
         let coefficients = coefficients.unwrap_or_else(|| vec![0.0, 1.0]);
         let Some(followed) = joint.text("joint2") else {

@@ -175,6 +175,14 @@ pub enum MjcfFault {
         /// The class.
         class: String,
     },
+    /// An unknown joint.
+    #[error("{place}: there is no joint \"{joint}\" in <worldbody>; correct the name")]
+    UnknownJoint {
+        /// The element that names it.
+        place: String,
+        /// The joint.
+        joint: String,
+    },
     /// An unknown mesh.
     #[error("{place}: there is no <mesh> \"{mesh}\" in <asset>")]
     UnknownMesh {

@@ -51,7 +51,8 @@ impl Options {
             },
             has_medium: said.not_negative("density")? > 0.0
                 || said.not_negative("viscosity")? > 0.0,
-            is_undamped: is_off("damper"),
+            // Older versions of MuJoCo have one flag for springs and dampers.
+            is_undamped: is_off("damper") || is_off("passive"),
             // In MuJoCo, dry friction is one of the constraints.
             is_without_dry_friction: is_off("frictionloss") || is_off("constraint"),
         })

@@ -7,6 +7,7 @@ use super::equality::active;
 use super::fault::MjcfFault;
 use super::joint::POWERS;
 use super::notice::MjcfNotice;
+use crate::robot::urdf::unless_empty;
 
 /// Something that pulls, and the joints and sites at which it pulls.
 struct Pull {
@@ -71,16 +72,11 @@ impl Pulls {
             });
             at_arm.map(|pull| pull.name.clone()).collect()
         };
-        let mut notices = Vec::new();
-        let tendons = names(&self.tendons);
-        if !tendons.is_empty() {
-            notices.push(MjcfNotice::Tendons { tendons });
-        }
-        let actuators = names(&self.actuators);
-        if !actuators.is_empty() {
-            notices.push(MjcfNotice::SiteActuators { actuators });
-        }
-        notices
+        let tendons = unless_empty(names(&self.tendons), |tendons| MjcfNotice::Tendons { tendons });
+        let actuators = unless_empty(names(&self.actuators), |actuators| {
+            MjcfNotice::SiteActuators { actuators }
+        });
+        tendons.into_iter().chain(actuators).collect()
     }
 }
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::Vector3;
 
 use super::actuator::actuated;
-use super::body::Bodies;
+use super::body::{Bodies, joint_names};
 use super::collision::meshes;
 use super::compiler::Compiler;
 use super::defaults::Defaults;
@@ -18,7 +18,9 @@ use super::option::Options;
 use super::pull::Pulls;
 use crate::robot::arm::Arm;
 use crate::robot::error::RobotError;
-use crate::robot::urdf::{Frames, UrdfArm, UrdfLink, UrdfNotice, arm_of, moving_links};
+use crate::robot::urdf::{
+    Frames, UrdfArm, UrdfLink, UrdfNotice, arm_of, moving_links, unless_empty,
+};
 
 /// An arm read from an MJCF.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +29,8 @@ pub struct MjcfArm {
     pub arm: Arm,
     /// Named frames: bodies without mass, and named sites.
     pub frames: Frames,
+    /// The bodies and sites with a name: those that stand still, then those of body 1, and so on.
+    pub links: Vec<UrdfLink>,
     /// Everything that was assumed, merged or left out; `Display` puts each into words.
     pub notices: Vec<UrdfNotice>,
     /// Included files.
@@ -49,7 +53,8 @@ pub struct MjcfArm {
 ///   says. Named sites become frames, as bodies without mass do.
 /// - **Drives**: `armature` is the rotor inertia, `damping` is rv, `frictionloss` is rc. The torque limit is the
 ///   smaller of the joint's `actuatorfrcrange` and the limit of its actuators: `gear` times the `forcerange`, or for a
-///   motor times the `ctrlrange` if that is smaller. `armature` and `damping` of actuators are added, times `gear`².
+///   motor times the `ctrlrange` if that is smaller; from 1e9 Nm on it is unknown. `armature` and `damping` of actuators
+///   are added, times `gear`².
 /// - **Default classes**, `childclass`, `<include>`, `<frame>` and the ways to give orientations are as in MuJoCo.
 ///   Copies (`<replicate>`), attached models, deformable bodies and the mass of meshes on moving bodies are refused.
 /// - **Collision shapes** are the geoms with a `contype` or `conaffinity`, including those of the world, except planes
@@ -79,26 +84,32 @@ fn read(text: &str, source: &str, last_body: Option<&str>) -> Result<MjcfArm, Mj
     let compiler = Compiler::of(&root)?;
     let options = Options::of(&root)?;
     let defaults = Defaults::of(&root)?;
-    let actuated = actuated(&root, &compiler, &defaults)?;
+    let named = joint_names(&root);
+    let actuated = actuated(&root, &compiler, &defaults, &named)?;
     let pulls = Pulls::of(&root, &compiler, &defaults)?;
     let meshes = meshes(&root, &compiler, &defaults);
-    let mut bodies = Bodies::of(&root, &compiler, &defaults, &actuated, &meshes)?;
+    let mut bodies = Bodies::of(&root, &compiler, &defaults, &actuated, &meshes, named.clone())?;
     if bodies.robot.name.is_empty() {
         let stem = Path::new(source).file_stem().unwrap_or_default();
         bodies.robot.name = stem.to_string_lossy().into_owned();
     }
-    let coupled = couple(&root, &defaults, &mut bodies.robot, &bodies.references)?;
+    let coupled = couple(&root, &defaults, &named, &mut bodies.robot, &bodies.references)?;
     bodies.left_out.extend(coupled);
     bodies.left_out.extend(options.switch_off(&mut bodies.robot));
     bodies.loops = loops(&root, &defaults)?;
     give_inertias(&mut bodies, source, last_body)?;
     let mut read = arm_of(&bodies.robot, source, last_body).map_err(MjcfFault::Arm)?;
     read.watch(&bodies.shapes, source);
-    let UrdfArm { mut arm, frames, links, notices, meshes } = read;
+    let UrdfArm { mut arm, frames, mut links, mut notices, meshes } = read;
     arm.gravity_m_s2 = options.gravity_m_s2;
+    arm.gravity_assumed = false;
     for joint in &mut arm.joints {
         joint.drive.rotor_inertia_kg_m2 =
             bodies.armature_kg_m2.get(&joint.name).copied().unwrap_or(0.0);
+    }
+    if compiler.angle_rad != 1.0 {
+        // What was written in degrees is not mistaken for radians.
+        notices.retain(|notice| !matches!(notice, UrdfNotice::WideRanges { .. }));
     }
     let mut notices = told(notices, &arm, &links, &bodies, &options);
     let is_joint = |name: &str| arm.joints.iter().any(|joint| joint.name == name);
@@ -107,7 +118,8 @@ fn read(text: &str, source: &str, last_body: Option<&str>) -> Result<MjcfArm, Mj
         link.is_some_and(|link| links.iter().any(|one| one.body > 0 && one.name == *link))
     };
     notices.extend(pulls.notices(is_joint, moves).into_iter().map(UrdfNotice::Mjcf));
-    Ok(MjcfArm { arm, frames, notices, included, meshes })
+    links.retain(|link| !bodies.unnamed.contains(&link.name));
+    Ok(MjcfArm { arm, frames, links, notices, included, meshes })
 }
 
 /// Gives the links their inertia. Links that never move need none, so that a fault in their inertia does not matter.
@@ -150,12 +162,8 @@ fn told(
     if bodies.loops > 0 {
         own.push(MjcfNotice::Loops { count: bodies.loops });
     }
-    if !bodies.free.is_empty() {
-        own.push(MjcfNotice::FreeJoints { joints: bodies.free.clone() });
-    }
-    if !bodies.namesakes.is_empty() {
-        own.push(MjcfNotice::Namesakes { sites: bodies.namesakes.clone() });
-    }
+    own.extend(unless_empty(bodies.free.clone(), |joints| MjcfNotice::FreeJoints { joints }));
+    own.extend(unless_empty(bodies.namesakes.clone(), |sites| MjcfNotice::Namesakes { sites }));
     for notice in noticed {
         match notice {
             UrdfNotice::Gravity { .. } => {}
@@ -167,29 +175,24 @@ fn told(
             other => notices.push(other),
         }
     }
-    for what in [
-        LeftOut::Stiffness,
-        LeftOut::SpringDamper,
-        LeftOut::HigherDamping,
-        LeftOut::SwitchedOff,
-        LeftOut::Held,
-        LeftOut::Curve,
-    ] {
+    let mut said: Vec<LeftOut> = Vec::new();
+    for &(what, _) in &bodies.left_out {
+        if said.contains(&what) {
+            continue;
+        }
+        said.push(what);
         let having = bodies.left_out.iter().filter(|(one, _)| *one == what);
         let joints: Vec<String> = having
             .map(|(_, joint)| joint.clone())
             .filter(|name| what == LeftOut::Curve || arm.joints.iter().any(|j| j.name == *name))
             .collect();
-        if !joints.is_empty() {
-            own.push(MjcfNotice::LeftOut { what, joints });
-        }
+        own.extend(unless_empty(joints, |joints| MjcfNotice::LeftOut { what, joints }));
     }
     let moving = links.iter().filter(|link| link.body > 0).map(|link| &link.name);
     let compensated: Vec<String> =
         moving.filter(|name| bodies.weightless.contains(*name)).cloned().collect();
-    if !compensated.is_empty() {
-        own.push(MjcfNotice::GravityCompensation { bodies: compensated });
-    }
+    let compensation = |bodies| MjcfNotice::GravityCompensation { bodies };
+    own.extend(unless_empty(compensated, compensation));
     notices.extend(own.into_iter().map(UrdfNotice::Mjcf));
     notices
 }

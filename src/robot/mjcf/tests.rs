@@ -101,7 +101,8 @@ fn a_plain_chain_is_the_arm_of_the_same_urdf() {
         </robot>"#;
     let MjcfArm { arm, frames, notices, .. } = read(&text);
     let expected = read_urdf(same, "toy.urdf").unwrap();
-    assert_eq!(arm, expected.arm);
+    // A URDF has no gravity of its own.
+    assert_eq!(arm, Arm { gravity_assumed: false, ..expected.arm });
     assert_eq!(frames, expected.frames);
     let joints = arm.joints.iter().map(|joint| joint.name.clone()).collect();
     let no_speed = UrdfNotice::AssumedVelocity { joints, velocity_rad_s: PI };
@@ -264,7 +265,7 @@ fn the_torque_limit_is_the_least_of_the_joints_and_its_actuators() {
     assert_eq!(of("", general), 60.0);
     assert_eq!(of("", r#"<motor joint="j" ctrlrange="-1 1" gear="20"/>"#), 20.0);
     assert_eq!(of("", r#"<position joint="j" ctrlrange="-1 1"/>"#), f64::INFINITY);
-    assert_eq!(of("", r#"<position joint="other" forcerange="-1 1"/>"#), f64::INFINITY);
+    assert_eq!(of("", r#"<motor joint="j" ctrlrange="-1e9 1e9"/>"#), f64::INFINITY);
     let two = r#"<position joint="j" forcerange="-4 4"/><velocity joint="j" forcerange="0 6"/>"#;
     assert_eq!(of("", two), 10.0);
 }

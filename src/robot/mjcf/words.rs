@@ -1,6 +1,6 @@
 //! Faults of the conversion into an arm, in the terms of MJCF: the checks themselves are those for URDFs.
 
-use crate::robot::urdf::{Obstacle, UrdfFault, listed};
+use crate::robot::urdf::{Obstacle, UrdfFault, infinitely_thin, listed};
 
 /// The message for a fault that was found in the bodies and joints of an MJCF.
 pub(super) fn arm_fault(fault: &UrdfFault) -> String {
@@ -50,6 +50,9 @@ pub(super) fn arm_fault(fault: &UrdfFault) -> String {
              order of fullinertia: xx yy zz xy xz yz",
             moments(principal_kg_m2)
         ),
+        UrdfFault::InfinitelyThin { link, principal_kg_m2 } => {
+            format!("body \"{link}\": {}", infinitely_thin(principal_kg_m2))
+        }
         UrdfFault::Triangle { link, principal_kg_m2 } => format!(
             "body \"{link}\": principal moments {} kg m2 violate the triangle inequality (each must be less than the sum of the \
              other two): no body has them; check the moments, and the frame in which they are given",

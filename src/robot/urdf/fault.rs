@@ -148,6 +148,19 @@ pub enum UrdfFault {
         /// As written; 0 where missing.
         upper_rad: f64,
     },
+    /// The soft limits leave nothing of the range.
+    #[error(
+        "joint \"{joint}\": its soft limits {} to {} rad (<safety_controller>) leave nothing of its range {} to {} rad; correct one of them",
+        soft[0], soft[1], range[0], range[1]
+    )]
+    SoftRange {
+        /// The joint.
+        joint: String,
+        /// Its range, rad.
+        range: [f64; 2],
+        /// The soft limits as written, rad; 0 where missing.
+        soft: [f64; 2],
+    },
     /// A moving body without mass.
     #[error(
         "link \"{link}\", moved by joint \"{joint}\", has no mass (no <inertial>, or mass 0), nor has any link fixed to it; give it the manufacturer's <inertial>"
@@ -177,6 +190,14 @@ pub enum UrdfFault {
         /// Principal moments about the centre of mass, ascending.
         principal_kg_m2: [f64; 3],
     },
+    /// The principal moments are those of a plate without thickness.
+    #[error("link \"{link}\": {}", infinitely_thin(principal_kg_m2))]
+    InfinitelyThin {
+        /// The link.
+        link: String,
+        /// Principal moments about the centre of mass, ascending.
+        principal_kg_m2: [f64; 3],
+    },
     /// No distribution of mass has these principal moments.
     #[error(
         "link \"{link}\": principal moments {:.6e}, {:.6e}, {:.6e} kg m2 violate the triangle inequality (each must be less than the sum of the other two): no body has them; check the inertia matrix and the frame it is given in",
@@ -188,6 +209,14 @@ pub enum UrdfFault {
         /// Principal moments about the centre of mass, ascending.
         principal_kg_m2: [f64; 3],
     },
+}
+
+/// What to do about the moments of a plate without thickness.
+pub(in crate::robot) fn infinitely_thin([small, middle, large]: &[f64; 3]) -> String {
+    format!(
+        "principal moments {small:.6e}, {middle:.6e}, {large:.6e} kg m2 are those of an infinitely thin plate (the largest is the sum of the \
+         others), and every body has a thickness: make the largest a little smaller, for example by 0.1 %"
+    )
 }
 
 /// Refuses NaN and infinite values.

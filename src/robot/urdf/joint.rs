@@ -7,12 +7,14 @@ use urdf_rs::{Joint, JointType};
 
 use super::fault::{UrdfFault, finite, quoted};
 use super::read::Reader;
-use crate::robot::arm::{Drive, Limits, Placement};
+use crate::robot::arm::{Assumed, Drive, Limits, Placement, UNKNOWN_TORQUE_NM};
 
 /// Speed limit if the file gives none: 180 °/s, usual for arms of this size.
 pub(super) const ASSUMED_VELOCITY_RAD_S: f64 = PI;
 /// Acceleration limit if the file gives none; the same as that of the built-in arms.
 pub(super) const ASSUMED_ACCELERATION_RAD_S2: f64 = 10.0;
+/// No arm turns farther from zero: a range beyond is one in degrees.
+const FARTHEST_RAD: f64 = 4.0 * PI;
 /// Tolerance of the length of an axis: axes such as (0.577, 0.577, 0.577) have unit length to three digits.
 const AXIS_LENGTH: f64 = 1e-3;
 
@@ -71,15 +73,62 @@ impl Reader {
             let (lower_rad, upper_rad) = (limit.lower, limit.upper);
             return Err(UrdfFault::Range { joint: name(), lower_rad, upper_rad });
         };
+        let position_rad = self.softened(joint, position_rad)?;
+        if position_rad.iter().any(|end_rad| end_rad.abs() > FARTHEST_RAD) {
+            self.remarks.wide.push((name(), position_rad));
+        }
         let velocity_rad_s = given(limit.velocity).unwrap_or(ASSUMED_VELOCITY_RAD_S);
-        let torque_nm = given(limit.effort).unwrap_or(f64::INFINITY);
+        let known = given(limit.effort).filter(|torque_nm| *torque_nm < UNKNOWN_TORQUE_NM);
+        let torque_nm = known.unwrap_or(f64::INFINITY);
         let acceleration_rad_s2 = given(limit.acceleration).unwrap_or(ASSUMED_ACCELERATION_RAD_S2);
         Ok(Limits { position_rad, velocity_rad_s, acceleration_rad_s2, torque_nm })
+    }
+
+    /// What the soft limits of a joint, at which its controller stops it, leave of its range. Both are zero where they
+    /// are missing.
+    fn softened(
+        &mut self,
+        joint: &Joint,
+        [lower_rad, upper_rad]: [f64; 2],
+    ) -> Result<[f64; 2], UrdfFault> {
+        let soft = joint.safety_controller.as_ref();
+        let soft = soft.map_or([0.0; 2], |soft| [soft.soft_lower_limit, soft.soft_upper_limit]);
+        let [soft_lower_rad, soft_upper_rad] = soft;
+        for (quantity, value) in
+            [("soft_lower_limit", soft_lower_rad), ("soft_upper_limit", soft_upper_rad)]
+        {
+            if value.is_nan() {
+                let place = quoted("joint", &joint.name);
+                return Err(UrdfFault::NotFinite { place, quantity, value });
+            }
+        }
+        if soft == [0.0; 2] {
+            return Ok([lower_rad, upper_rad]);
+        }
+        let left_rad = [lower_rad.max(soft_lower_rad), upper_rad.min(soft_upper_rad)];
+        if left_rad[0] >= left_rad[1] {
+            let joint = joint.name.clone();
+            return Err(UrdfFault::SoftRange { joint, range: [lower_rad, upper_rad], soft });
+        }
+        if left_rad != [lower_rad, upper_rad] {
+            self.remarks.soft.push((joint.name.clone(), left_rad));
+        }
+        Ok(left_rad)
+    }
+}
+
+/// What a URDF does not say about a joint: it never has a drive, and often lacks limits.
+pub(super) fn assumed(joint: &Joint) -> Assumed {
+    Assumed {
+        gear_ratio: true,
+        torque_constant: true,
+        velocity: given(joint.limit.velocity).is_none(),
+        acceleration: given(joint.limit.acceleration).is_none(),
     }
 }
 
 /// A limit, if it was given: a missing number is read as zero, and many files write zero for "unknown".
-pub(super) fn given(limit: f64) -> Option<f64> {
+fn given(limit: f64) -> Option<f64> {
     (limit > 0.0 && limit.is_finite()).then_some(limit)
 }
 

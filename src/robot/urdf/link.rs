@@ -40,6 +40,9 @@ impl Reader {
     }
 }
 
+/// Share of the largest moment by which the others may miss it because of rounding.
+const ROUNDING: f64 = 1e-9;
+
 /// Checks that the principal moments are positive and obey the triangle inequality.
 fn possible(link: &str, central: &Matrix3<f64>) -> Result<(), UrdfFault> {
     let principal_kg_m2 = principal_moments(central);
@@ -47,6 +50,8 @@ fn possible(link: &str, central: &Matrix3<f64>) -> Result<(), UrdfFault> {
     let link = link.to_owned();
     if small <= 0.0 {
         Err(UrdfFault::NotPositiveDefinite { link, principal_kg_m2 })
+    } else if small + middle <= large && small + middle >= (1.0 - ROUNDING) * large {
+        Err(UrdfFault::InfinitelyThin { link, principal_kg_m2 })
     } else if small + middle <= large {
         Err(UrdfFault::Triangle { link, principal_kg_m2 })
     } else {

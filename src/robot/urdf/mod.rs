@@ -24,9 +24,10 @@ mod words;
 
 pub use arm::{FixedFrame, Frames, UrdfArm, UrdfLink};
 pub use fault::UrdfFault;
+pub(super) use fault::infinitely_thin;
 pub use locked::{LockedJoint, Stand};
 pub use notice::UrdfNotice;
 pub use obstacle::Obstacle;
 pub(super) use read::{arm_of, moving_links};
 pub use read::{read_urdf, read_urdf_up_to};
-pub(super) use words::listed;
+pub(super) use words::{listed, unless_empty};

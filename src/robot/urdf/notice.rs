@@ -1,4 +1,4 @@
-//! Notices about what was assumed or left out in reading a URDF.
+//! Notices about what was assumed or left out in reading a file that describes an arm.
 
 use std::fmt;
 
@@ -23,6 +23,11 @@ pub enum UrdfNotice {
         gear_ratio: Vec<String>,
         /// The joints without torque constant.
         torque_constant: Vec<String>,
+    },
+    /// The friction law is `rc tanh(q̇/ε)` with an ε that neither a URDF nor an MJCF has.
+    FrictionEpsilon {
+        /// The assumed ε, rad/s.
+        epsilon_rad_s: f64,
     },
     /// Joints that are not on the way to the arm's last link are locked.
     Locked {
@@ -55,6 +60,16 @@ pub enum UrdfNotice {
     Continuous {
         /// The joints.
         joints: Vec<String>,
+    },
+    /// Soft limits, at which the controller stops a joint, narrow its range.
+    SoftLimits {
+        /// The joints, each with the range that is left, rad.
+        joints: Vec<(String, [f64; 2])>,
+    },
+    /// Ranges of more than two turns to one side, as angles in degrees are when they are read as radians.
+    WideRanges {
+        /// The joints, each with its range, rad.
+        joints: Vec<(String, [f64; 2])>,
     },
     /// The file has no speed limit.
     AssumedVelocity {
@@ -104,6 +119,11 @@ pub enum UrdfNotice {
         /// The largest deviation from such a multiple, rad.
         off_rad: f64,
     },
+    /// Angles near multiples of π/2 that were taken literally: they may be right angles, printed with too few digits.
+    NearRightAngles {
+        /// The joints and links, each with the angle as written and the multiple of π/2 beside it, rad.
+        angles: Vec<(String, f64, f64)>,
+    },
     /// A notice about something in an MJCF that has no equivalent in a URDF.
     Mjcf(MjcfNotice),
 }
@@ -117,21 +137,6 @@ impl UrdfNotice {
         };
         joints.iter().map(|joint| joint.name.as_str())
     }
-
-    /// Whether a drive file can settle this notice.
-    pub(in crate::robot) fn is_about_drives(&self) -> bool {
-        matches!(
-            self,
-            Self::Gravity { .. }
-                | Self::Drives { .. }
-                | Self::NoFriction { .. }
-                | Self::ServoDamping { .. }
-                | Self::AssumedVelocity { .. }
-                | Self::NoTorqueLimit { .. }
-                | Self::AssumedAcceleration { .. }
-                | Self::Mjcf(MjcfNotice::Weightless)
-        )
-    }
 }
 
 impl fmt::Display for UrdfNotice {
@@ -140,65 +145,18 @@ impl fmt::Display for UrdfNotice {
             Self::Gravity { root } => {
                 write!(f, "gravity is taken as 9.81 m/s2 along -z of the root link \"{root}\"")
             }
-            Self::Drives { rotor_inertia, gear_ratio, torque_constant }
-                if rotor_inertia == gear_ratio && gear_ratio == torque_constant =>
-            {
-                write!(
-                    f,
-                    "the file has no drives: rotor inertia 0, gear ratio 1, torque constant 1 Nm/A (a current column reads as joint torque): {}",
-                    gear_ratio.join(", ")
-                )
-            }
             Self::Drives { rotor_inertia, gear_ratio, torque_constant } => {
-                let open = [
-                    ("rotor inertia", "0", rotor_inertia),
-                    ("gear ratio", "1", gear_ratio),
-                    ("torque constant", "1 Nm/A", torque_constant),
-                ];
-                let mut words: Vec<String> = Vec::new();
-                for (k, (_, _, joints)) in open.iter().enumerate() {
-                    let is_said = open[..k].iter().any(|(_, _, earlier)| earlier == joints);
-                    if joints.is_empty() || is_said {
-                        continue;
-                    }
-                    let of_same = || open.iter().filter(|(_, _, others)| others == joints);
-                    let whats: Vec<&str> = of_same().map(|(what, _, _)| *what).collect();
-                    let values: Vec<&str> = of_same().map(|(_, value, _)| *value).collect();
-                    words.push(format!(
-                        "no {} given, taken as {}: {}",
-                        whats.join(" and no "),
-                        values.join(" and "),
-                        joints.join(", ")
-                    ));
-                }
-                write!(f, "{}", words.join("; "))
+                f.write_str(&no_drives([rotor_inertia, gear_ratio, torque_constant]))
             }
-            Self::Locked { joints, last } => {
-                let (noun, verb) =
-                    if joints.len() == 1 { ("joint", "is") } else { ("joints", "are") };
-                write!(
-                    f,
-                    "{noun} {} {verb} not on the way to link \"{last}\": taken as locked there, links behind count in the body that carries them",
-                    listed(joints)
-                )
-            }
+            Self::FrictionEpsilon { epsilon_rad_s } => write!(
+                f,
+                "the speed at which Coulomb friction sets in is taken as {epsilon_rad_s} rad/s (friction_epsilon_rad_s in NAME.drives.toml)"
+            ),
+            Self::Locked { joints, last } => f.write_str(&locked(joints, last)),
             Self::NoFriction { joints } => {
                 write!(f, "no damping and no friction given, taken as 0: {}", joints.join(", "))
             }
-            Self::ServoDamping { joints } => {
-                let joints = joints.iter().map(|(joint, damping, torque_nm)| {
-                    let speed_rad_s = torque_nm / damping;
-                    format!(
-                        "{joint} ({damping} Nm s/rad: {torque_nm} Nm at {speed_rad_s:.2} rad/s)"
-                    )
-                });
-                write!(
-                    f,
-                    "damping that takes the whole torque limit below the speed limit is a simulated servo's and not the arm's, but is read as its \
-                     friction (viscous_nm_s_rad in NAME.drives.toml says otherwise): {}",
-                    listed(joints)
-                )
-            }
+            Self::ServoDamping { joints } => f.write_str(&of_servos(joints)),
             Self::Shapes(notice) => write!(f, "{notice}"),
             Self::DriveFile { file, open } if open.is_empty() => {
                 write!(f, "drives and gravity are those of {file}")
@@ -210,6 +168,16 @@ impl fmt::Display for UrdfNotice {
             Self::Continuous { joints } => {
                 write!(f, "no end stops, taken as -2 pi to 2 pi: {}", listed(joints))
             }
+            Self::SoftLimits { joints } => write!(
+                f,
+                "soft limits (<safety_controller>) narrow the ranges: {}",
+                listed(joints.iter().map(with_range))
+            ),
+            Self::WideRanges { joints } => write!(
+                f,
+                "ranges of more than two turns, are they in degrees? The file's unit is rad: {}",
+                listed(joints.iter().map(with_range))
+            ),
             Self::AssumedVelocity { joints, velocity_rad_s } => write!(
                 f,
                 "no speed limit, taken as {velocity_rad_s:.4} rad/s (velocity_rad_s in NAME.drives.toml): {}",
@@ -232,17 +200,7 @@ impl fmt::Display for UrdfNotice {
             Self::StandingMass { links } => {
                 write!(f, "{} still: inertia left out", with_masses(links, "stands", "stand"))
             }
-            Self::Reoriented { joints } => {
-                let axes = joints.iter().map(|(joint, axis)| {
-                    let [x, y, z] = axis.map(to_four_places);
-                    format!("{joint} ({x}, {y}, {z})")
-                });
-                write!(
-                    f,
-                    "frames of joints are turned from those of their links to have z along the axis, parameters are about them: {}",
-                    listed(axes)
-                )
-            }
+            Self::Reoriented { joints } => f.write_str(&turned(joints)),
             Self::AxisNormalised { joints } => {
                 let lengths = joints.iter().map(|(joint, length)| format!("{joint} ({length})"));
                 write!(f, "axes that are not of length 1 were made so: {}", listed(lengths))
@@ -252,14 +210,102 @@ impl fmt::Display for UrdfNotice {
                 "angles that are off multiples of pi/2 by {off_rad:.1e} rad or less are taken as these: {}",
                 listed(places)
             ),
+            Self::NearRightAngles { angles } => f.write_str(&nearly_right(angles)),
             Self::Mjcf(notice) => write!(f, "{notice}"),
         }
     }
 }
 
-/// A coordinate with four decimals, zero without a sign.
-fn to_four_places(value: f64) -> f64 {
-    (value * 1e4).round() / 1e4 + 0.0
+/// The text about joints without rotor inertia, gear ratio and torque constant: one phrase for those that the same
+/// joints lack.
+fn no_drives([rotor_inertia, gear_ratio, torque_constant]: [&Vec<String>; 3]) -> String {
+    if rotor_inertia == gear_ratio && gear_ratio == torque_constant {
+        return format!(
+            "the file has no drives: rotor inertia 0, gear ratio 1, torque constant 1 Nm/A (a current column reads as joint torque): {}",
+            gear_ratio.join(", ")
+        );
+    }
+    let open = [
+        ("rotor inertia", "0", rotor_inertia),
+        ("gear ratio", "1", gear_ratio),
+        ("torque constant", "1 Nm/A", torque_constant),
+    ];
+    let mut words: Vec<String> = Vec::new();
+    for (k, (_, _, joints)) in open.iter().enumerate() {
+        let is_said = open[..k].iter().any(|(_, _, earlier)| earlier == joints);
+        if joints.is_empty() || is_said {
+            continue;
+        }
+        let of_same = || open.iter().filter(|(_, _, others)| others == joints);
+        let whats: Vec<&str> = of_same().map(|(what, _, _)| *what).collect();
+        let values: Vec<&str> = of_same().map(|(_, value, _)| *value).collect();
+        words.push(format!(
+            "no {} given, taken as {}: {}",
+            whats.join(" and no "),
+            values.join(" and "),
+            joints.join(", ")
+        ));
+    }
+    words.join("; ")
+}
+
+fn locked(joints: &[LockedJoint], last: &str) -> String {
+    let (noun, verb) = if joints.len() == 1 { ("joint", "is") } else { ("joints", "are") };
+    format!(
+        "{noun} {} {verb} not on the way to link \"{last}\": taken as locked there, links behind count in the body that carries them",
+        listed(joints)
+    )
+}
+
+/// The text about joints with their damping, Nm s/rad, and torque limit, Nm.
+fn of_servos(joints: &[(String, f64, f64)]) -> String {
+    let joints = joints.iter().map(|(joint, damping, torque_nm)| {
+        let speed_rad_s = torque_nm / damping;
+        format!("{joint} ({damping} Nm s/rad: {torque_nm} Nm at {speed_rad_s:.2} rad/s)")
+    });
+    format!(
+        "damping that takes the whole torque limit below the speed limit is a simulated servo's and not the arm's, but is read as its \
+         friction (viscous_nm_s_rad in NAME.drives.toml says otherwise): {}",
+        listed(joints)
+    )
+}
+
+/// The text about joints with their axes in the link's frame.
+fn turned(joints: &[(String, [f64; 3])]) -> String {
+    let axes = joints.iter().map(|(joint, axis)| {
+        let [x, y, z] = axis.map(|value| rounded(value, 4));
+        format!("{joint} ({x}, {y}, {z})")
+    });
+    format!(
+        "frames of joints are turned from those of their links to have z along the axis, parameters are about them: {}",
+        listed(axes)
+    )
+}
+
+/// The text about places with an angle as written and the right angle beside it, rad.
+fn nearly_right(angles: &[(String, f64, f64)]) -> String {
+    let angles = angles.iter().map(|(place, written_rad, right_rad)| {
+        format!(
+            "{place} {} (of a right angle write {})",
+            rounded(*written_rad, 7),
+            rounded(*right_rad, 7)
+        )
+    });
+    format!(
+        "angles near multiples of pi/2 are taken literally, so that axes are not quite parallel: {}",
+        listed(angles)
+    )
+}
+
+/// A number with so many decimals at most, zero without a sign.
+fn rounded(value: f64, decimals: i32) -> f64 {
+    let unit = 10_f64.powi(decimals);
+    (value * unit).round() / unit + 0.0
+}
+
+/// A joint with its range, rad.
+fn with_range((joint, [lower_rad, upper_rad]): &(String, [f64; 2])) -> String {
+    format!("{joint} ({lower_rad} to {upper_rad} rad)")
 }
 
 /// The links with their masses, kg, followed by the verb in the singular or the plural.

@@ -1,29 +1,22 @@
 //! Reading of a URDF into an [`Arm`].
 
-use std::f64::consts::FRAC_PI_2;
-
 use urdf_rs::{Pose, Robot};
 
 use super::arm::{FixedFrame, Frames, UrdfArm, UrdfLink};
 use super::chain::{Body, all_joints, bodies, joints_up_to};
 use super::collision::shapes;
 use super::fault::{UrdfFault, finite, quoted};
-use super::joint::{ASSUMED_ACCELERATION_RAD_S2, ASSUMED_VELOCITY_RAD_S, drive, given};
+use super::joint::{ASSUMED_ACCELERATION_RAD_S2, ASSUMED_VELOCITY_RAD_S, assumed, drive};
 use super::locked::{LockedJoint, locked_joints};
 use super::notice::UrdfNotice;
 use super::remarks::Remarks;
 use super::tree::Tree;
 use super::unreadable;
+use super::words::unless_empty;
 use crate::robot::arm::{Arm, Clearance, Joint, LinkBounds, Placement};
 use crate::robot::error::RobotError;
 use crate::robot::file::{default_epsilon, usual_gravity};
 use crate::robot::inertia::LinkInertia;
-
-/// Half a unit of the fourth decimal: files print 1.5708 and 3.1416.
-const RIGHT_ANGLE_RAD: f64 = 5e-5;
-/// A smaller deviation from a right angle is not reported: it is the rounding of a number with many digits, and at the
-/// end of an arm of 2 m it amounts to 2 nm.
-const WORTH_SAYING_RAD: f64 = 1e-9;
 
 /// Reads the text of a URDF; `source` names it in messages.
 ///
@@ -39,14 +32,14 @@ const WORTH_SAYING_RAD: f64 = 1e-9;
 /// - **Joint frames**: the origin is that of the URDF joint, z lies along the joint axis a. With a given in the link
 ///   frame, the joint frame is the link frame turned by S with S ẑ = a: the smallest rotation from ẑ to a if a_z ≥ 0,
 ///   otherwise π about x followed by the smallest rotation from −ẑ to a. For the axis z, S = 1.
-/// - **Friction**: `damping` is rv, `friction` is rc. **Limits**: `effort` is the torque limit, `velocity` the speed
-///   limit.
+/// - **Friction**: `damping` is rv, `friction` is rc. **Limits**: `effort` is the torque limit (unknown from 1e9 Nm on),
+///   `velocity` the speed limit. The soft limits of a `<safety_controller>` narrow the range.
 /// - **Collision shapes** become capsules on the bodies, and pairs of capsules to keep apart; meshes (STL, OBJ) are
 ///   searched for from the folder of `source`. The notices name everything that is not watched. Visual geometry is not
 ///   read.
 /// - **Not in a URDF**: the rotor inertia is taken as 0, the gear ratio as 1 and the torque constant as 1 Nm/A (a
-///   current column then reads as joint torque), gravity as 9.81 m/s² along −z of the root link, the acceleration limit
-///   as 10 rad/s² unless the file has one. Transmissions are not read.
+///   current column then reads as joint torque), gravity as 9.81 m/s² along −z of the root link, ε of the friction law
+///   as 0.02 rad/s, the acceleration limit as 10 rad/s² unless the file has one. Transmissions are not read.
 /// - **Angles** within 5e-5 rad of a multiple of π/2 are taken as that multiple: files print 1.5708 for π/2, and axes
 ///   that are parallel only to the digits printed blur which parameters are identifiable.
 ///
@@ -74,16 +67,24 @@ pub fn read_urdf_up_to(text: &str, source: &str, last_link: &str) -> Result<Urdf
 }
 
 fn read(text: &str, source: &str, last_link: Option<&str>) -> Result<UrdfArm, RobotError> {
-    let robot = urdf_rs::read_from_string(text.trim_start_matches('\u{feff}')).map_err(|e| {
-        RobotError::Urdf {
-            file: source.to_owned(),
-            message: unreadable::reason(text, &e.to_string()),
-        }
+    let text = text.trim_start_matches('\u{feff}');
+    let robot = robot(text).map_err(|message| RobotError::Urdf {
+        file: source.to_owned(),
+        message: unreadable::reason(text, &message),
     })?;
     let mut read = arm_of(&robot, source, last_link)
         .map_err(|fault| RobotError::UrdfArm { file: source.to_owned(), fault })?;
     read.watch(&shapes(&robot), source);
     Ok(read)
+}
+
+/// The links and joints of a text, or the parser's message. Speed limits may be missing, unlike for the parser.
+fn robot(text: &str) -> Result<Robot, String> {
+    let read = |text: &str| urdf_rs::read_from_string(text).map_err(|e| e.to_string());
+    read(text).or_else(|message| match unreadable::with_velocities(text) {
+        Some(completed) => read(&completed),
+        None => Err(message),
+    })
 }
 
 /// The arm of a robot without its clearance, from a file of any format; `source` names the file in messages and begins
@@ -99,6 +100,7 @@ pub(in crate::robot) fn arm_of(
         arm: Arm {
             name: if robot.name.is_empty() { source.to_owned() } else { robot.name.clone() },
             gravity_m_s2: usual_gravity().into(),
+            gravity_assumed: true,
             friction_epsilon_rad_s: default_epsilon(),
             torque_offsets: true,
             // A gain that the file does not give has a notice of its own.
@@ -178,6 +180,7 @@ impl Reader {
         let names: Vec<String> = moving.map(|joint| joint.name.clone()).collect();
         self.notices.extend([
             UrdfNotice::Gravity { root },
+            UrdfNotice::FrictionEpsilon { epsilon_rad_s: default_epsilon() },
             UrdfNotice::Drives {
                 rotor_inertia: names.clone(),
                 gear_ratio: names.clone(),
@@ -200,6 +203,7 @@ impl Reader {
                         drive: drive(joint)?,
                         limits: self.limits(joint)?,
                         bounds: LinkBounds::default(),
+                        assumed: assumed(joint),
                     });
                     turn
                 }
@@ -213,7 +217,7 @@ impl Reader {
             }
             parent = poses[body.next_parent];
         }
-        self.summarise(&joints, chain);
+        self.summarise(&joints);
         Ok(joints)
     }
 
@@ -276,14 +280,15 @@ impl Reader {
                 is_first: held.is_none(),
             });
         }
-        if !merged.is_empty() {
-            self.notices.push(UrdfNotice::Merged { joint: joint.name.clone(), links: merged });
-        }
+        let joint_name = || joint.name.clone();
+        let merged =
+            unless_empty(merged, |links| UrdfNotice::Merged { joint: joint_name(), links });
+        self.notices.extend(merged);
         if sum.mass_kg() > 0.0 {
             return Ok(sum);
         }
         let link = body.links[0].0.name.clone();
-        Err(UrdfFault::NoMass { link, joint: joint.name.clone() })
+        Err(UrdfFault::NoMass { link, joint: joint_name() })
     }
 
     /// Records the links that never move: only their frames and a notice of their mass remain.
@@ -291,9 +296,9 @@ impl Reader {
         let mut heavy = Vec::new();
         for ((link, held), pose) in body.links.iter().zip(poses) {
             // Errors and oddities in the moments of a standing link do not matter.
-            let remarks = self.remarks.right_angles.len();
+            let angles = std::mem::take(&mut self.remarks.right_angles);
             let inertia = self.link_inertia(link).ok().flatten();
-            self.remarks.right_angles.truncate(remarks);
+            self.remarks.right_angles = angles;
             let mass_kg = link.inertial.mass.value;
             if mass_kg != 0.0 {
                 heavy.push((link.name.clone(), mass_kg));
@@ -309,9 +314,7 @@ impl Reader {
                 is_first: held.is_none(),
             });
         }
-        if !heavy.is_empty() {
-            self.notices.push(UrdfNotice::StandingMass { links: heavy });
-        }
+        self.notices.extend(unless_empty(heavy, |links| UrdfNotice::StandingMass { links }));
     }
 
     /// A pose of the file, with angles close to multiples of π/2 made exact.
@@ -322,58 +325,40 @@ impl Reader {
         let mut rpy_rad = *pose.rpy;
         for angle in &mut rpy_rad {
             finite(place, "rpy", *angle)?;
-            let used_rad = (*angle / FRAC_PI_2).round() * FRAC_PI_2;
-            let off = (*angle - used_rad).abs();
-            if off < RIGHT_ANGLE_RAD {
-                if off > WORTH_SAYING_RAD {
-                    self.remarks.right_angles.push((place.to_owned(), off));
-                }
-                *angle = used_rad;
-            }
+            *angle = self.remarks.right_angles.read(*angle, place);
         }
         Ok(Placement::from_xyz_rpy(*pose.xyz, rpy_rad))
     }
 
     /// Adds the notices that concern several joints at once.
-    fn summarise(&mut self, joints: &[Joint], chain: &[Body<'_>]) {
+    fn summarise(&mut self, joints: &[Joint]) {
         self.notices.extend(std::mem::take(&mut self.remarks).notices());
-        let no_friction: Vec<String> = joints
-            .iter()
-            .filter(|j| j.drive.viscous_nm_s_rad == 0.0 && j.drive.coulomb_nm == 0.0)
-            .map(|j| j.name.clone())
-            .collect();
-        if !no_friction.is_empty() {
-            self.notices.push(UrdfNotice::NoFriction { joints: no_friction });
-        }
-        let servo_damping: Vec<(String, f64, f64)> = joints
-            .iter()
-            .map(|joint| (joint, joint.drive.viscous_nm_s_rad, joint.limits.torque_nm))
-            .filter(|(joint, damping, torque_nm)| {
-                damping * joint.limits.velocity_rad_s > *torque_nm
-            })
-            .map(|(joint, damping, torque_nm)| (joint.name.clone(), damping, torque_nm))
-            .collect();
-        if !servo_damping.is_empty() {
-            self.notices.push(UrdfNotice::ServoDamping { joints: servo_damping });
-        }
-        let without = |limit: fn(&urdf_rs::JointLimit) -> f64| -> Vec<String> {
-            let moving = chain.iter().filter_map(|body| body.joint);
-            let open = moving.filter(|joint| given(limit(&joint.limit)).is_none());
-            open.map(|joint| joint.name.clone()).collect()
+        let those = |has: fn(&Joint) -> bool| -> Vec<String> {
+            joints.iter().filter(|joint| has(joint)).map(|joint| joint.name.clone()).collect()
         };
-        let joints = without(|limit| limit.velocity);
-        if !joints.is_empty() {
-            let velocity_rad_s = ASSUMED_VELOCITY_RAD_S;
-            self.notices.push(UrdfNotice::AssumedVelocity { joints, velocity_rad_s });
-        }
-        let joints = without(|limit| limit.effort);
-        if !joints.is_empty() {
-            self.notices.push(UrdfNotice::NoTorqueLimit { joints });
-        }
-        let joints = without(|limit| limit.acceleration);
-        if !joints.is_empty() {
-            let acceleration_rad_s2 = ASSUMED_ACCELERATION_RAD_S2;
-            self.notices.push(UrdfNotice::AssumedAcceleration { joints, acceleration_rad_s2 });
-        }
+        let frictionless = those(|j| j.drive.viscous_nm_s_rad == 0.0 && j.drive.coulomb_nm == 0.0);
+        let servos = joints.iter().filter(|joint| {
+            joint.drive.viscous_nm_s_rad * joint.limits.velocity_rad_s > joint.limits.torque_nm
+        });
+        let servos: Vec<(String, f64, f64)> = servos
+            .map(|j| (j.name.clone(), j.drive.viscous_nm_s_rad, j.limits.torque_nm))
+            .collect();
+        let slow = those(|joint| joint.assumed.velocity);
+        let unlimited = those(|joint| joint.limits.torque_nm.is_infinite());
+        let gentle = those(|joint| joint.assumed.acceleration);
+        let notices = [
+            unless_empty(frictionless, |joints| UrdfNotice::NoFriction { joints }),
+            unless_empty(servos, |joints| UrdfNotice::ServoDamping { joints }),
+            unless_empty(slow, |joints| UrdfNotice::AssumedVelocity {
+                joints,
+                velocity_rad_s: ASSUMED_VELOCITY_RAD_S,
+            }),
+            unless_empty(unlimited, |joints| UrdfNotice::NoTorqueLimit { joints }),
+            unless_empty(gentle, |joints| UrdfNotice::AssumedAcceleration {
+                joints,
+                acceleration_rad_s2: ASSUMED_ACCELERATION_RAD_S2,
+            }),
+        ];
+        self.notices.extend(notices.into_iter().flatten());
     }
 }

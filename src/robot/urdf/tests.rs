@@ -202,6 +202,52 @@ fn a_continuous_joint_has_two_turns_and_missing_limits_are_named() {
     }
 }
 
+/// From 1e9 Nm on, a torque limit stands for an unknown one.
+#[test]
+fn a_torque_limit_that_no_drive_has_is_unknown() {
+    let mut parts = two_joints();
+    let limit = LIMIT.replace("effort=\"50\"", "effort=\"1e9\"");
+    parts[3] = joint("j1", "revolute", "base", "a", &limit);
+    let UrdfArm { arm, notices, .. } = read(&robot(&parts));
+    assert_eq!(arm.joints[0].limits.torque_nm, f64::INFINITY);
+    assert!(notices.contains(&UrdfNotice::NoTorqueLimit { joints: vec!["j1".into()] }));
+}
+
+/// Many files leave the speed out, which the parser does not allow.
+#[test]
+fn a_speed_limit_may_be_missing() {
+    let mut parts = two_joints();
+    parts[4] = joint("j2", "revolute", "a", "b", r#"<limit lower="-1" upper="2" effort="50"/>"#);
+    let UrdfArm { arm, notices, .. } = read(&robot(&parts));
+    let limits: Vec<f64> = arm.joints.iter().map(|joint| joint.limits.velocity_rad_s).collect();
+    assert_eq!(limits, [3.0, PI]);
+    let joints = vec!["j2".to_owned()];
+    assert!(notices.contains(&UrdfNotice::AssumedVelocity { joints, velocity_rad_s: PI }));
+}
+
+/// The controller stops the joint at its soft limits, before its end stops.
+#[test]
+fn soft_limits_narrow_the_range() {
+    let of = |soft: &str| {
+        let inside = format!("{LIMIT}<safety_controller k_velocity=\"1\" {soft}/>");
+        let mut parts = two_joints();
+        parts[4] = joint("j2", "revolute", "a", "b", &inside);
+        robot(&parts)
+    };
+    for (soft, range, is_told) in [
+        (r#"soft_lower_limit="-0.5" soft_upper_limit="3""#, [-0.5, 2.0], true),
+        (r#"soft_lower_limit="-2" soft_upper_limit="3""#, [-1.0, 2.0], false),
+        ("", [-1.0, 2.0], false),
+    ] {
+        let UrdfArm { arm, notices, .. } = read(&of(soft));
+        assert_eq!(arm.joints[1].limits.position_rad, range, "{soft}");
+        let told = UrdfNotice::SoftLimits { joints: vec![("j2".into(), range)] };
+        assert_eq!(notices.contains(&told), is_told, "{soft}");
+    }
+    let apart = of(r#"soft_lower_limit="3" soft_upper_limit="4""#);
+    says(&apart, &["\"j2\"", "3 to 4 rad (<safety_controller>)", "range -1 to 2 rad"]);
+}
+
 #[test]
 fn a_right_angle_printed_short_is_a_right_angle_and_is_said() {
     for written in ["1.5708", "1.570796327", "1.57079632679"] {
@@ -363,6 +409,8 @@ fn an_impossible_inertia_is_refused_with_its_principal_moments() {
     let mut parts = two_joints();
     parts[2] = link("b", &BODY.replace(r#"izz="0.025""#, r#"izz="0.035""#));
     says(&robot(&parts), &["\"b\"", "triangle", "1.000000e-2", "3.500000e-2"]);
+    parts[2] = link("b", &BODY.replace(r#"izz="0.025""#, r#"izz="0.03""#));
+    says(&robot(&parts), &["\"b\"", "infinitely thin plate", "make the largest a little smaller"]);
     parts[2] = link("b", &BODY.replace(r#"ixy="0""#, r#"ixy="0.02""#));
     says(&robot(&parts), &["\"b\"", "not positive definite"]);
     let point = BODY.replace("0.01", "0").replace("0.025", "0").replace("0.02", "0");

@@ -1,4 +1,4 @@
-//! Lists for use in sentences.
+//! Lists for use in sentences and notices.
 
 use std::fmt::Display;
 
@@ -12,6 +12,14 @@ pub(in crate::robot) fn listed<T: Display>(items: impl IntoIterator<Item = T>) -
     words.truncate(FEW);
     let words = words.join(", ");
     if more == 0 { words } else { format!("{words} and {more} more") }
+}
+
+/// The notice about `items`, if there are any.
+pub(in crate::robot) fn unless_empty<T, N>(
+    items: Vec<T>,
+    notice: impl FnOnce(Vec<T>) -> N,
+) -> Option<N> {
+    (!items.is_empty()).then(|| notice(items))
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::DriveFile;
 use crate::robot::file::{ClearanceKeys, pair};
 use crate::robot::place::Place;
-use crate::robot::{Arm, Clearance, RobotError, ShapeNotice, UrdfNotice};
+use crate::robot::{Arm, Clearance, RobotError};
 
 /// Sources of the arm's clearance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -20,7 +20,7 @@ pub(super) enum Source {
 
 impl DriveFile {
     /// Adds what the file says about clearance to that of `arm`, which comes from the shapes of its links.
-    pub(super) fn clear(&self, arm: &mut Arm, place: &Place) -> Result<(), RobotError> {
+    pub(super) fn add_clearance(&self, arm: &mut Arm, place: &Place) -> Result<(), RobotError> {
         let of_shapes = std::mem::take(&mut arm.clearance);
         let begin = if self.sets_shapes_aside() { Clearance::default() } else { of_shapes };
         let keys = ClearanceKeys {
@@ -38,19 +38,9 @@ impl DriveFile {
         Ok(())
     }
 
-    fn sets_shapes_aside(&self) -> bool {
+    /// Whether only the file's own keys count.
+    pub(super) fn sets_shapes_aside(&self) -> bool {
         self.clearance == Some(Source::Nothing)
-    }
-
-    /// Whether the file makes a `notice` about shapes pointless.
-    pub(in crate::robot) fn settles(&self, notice: &UrdfNotice) -> bool {
-        match notice {
-            UrdfNotice::Shapes(ShapeNotice::Nothing) => {
-                self.sets_shapes_aside() || !self.capsules.is_empty()
-            }
-            UrdfNotice::Shapes(_) => self.sets_shapes_aside(),
-            _ => false,
-        }
     }
 }
 

@@ -62,6 +62,15 @@ fn bad_input_is_told_with_its_place() {
     says(&one(r#"<compiler eulerseq="xyw"/>"#, "", BODY), &["eulerseq=\"xyw\""]);
     says(&one("", "", "<replicate count=\"2\"/>"), &["<replicate>: copies are not read"]);
     says(&one("", "", BODY), &["no hinge is in it"]);
+    let jointed = |sections: &str| one(sections, "", &format!("<joint name=\"j\"/>{BODY}"));
+    for (sections, place) in [
+        ("\n<actuator><motor name=\"m\" joint=\"k\"/></actuator>", "line 2: motor \"m\": "),
+        ("<equality>\n<joint joint1=\"k\"/></equality>", "line 2: <joint>: "),
+        ("<equality><joint joint1=\"j\" joint2=\"k\"/></equality>", "line 1: <joint>: "),
+    ] {
+        let unknown = format!("{place}there is no joint \"k\" in <worldbody>");
+        says(&jointed(sections), &[&unknown]);
+    }
     let twice = one("", "", &format!("<joint/>{BODY}<body name=\"a\"/>"));
     says(&twice, &["body \"a\" is there twice"]);
     says("<mujoco><worldbody>", &["not readable as XML"]);
@@ -96,5 +105,6 @@ fn a_drive_file_comes_before_the_mjcf() {
     assert_eq!(loaded.arm.joints[0].drive.rotor_inertia_kg_m2, 0.4);
     assert_eq!(loaded.arm.joints[0].drive.viscous_nm_s_rad, 1.5);
     assert_eq!(loaded.files.len(), 2);
-    assert!(loaded.urdf_links.is_empty());
+    let names: Vec<&str> = loaded.urdf_links.iter().map(|link| link.name.as_str()).collect();
+    assert_eq!(names, ["world", "a"]);
 }

@@ -37,7 +37,7 @@ fn damping_that_mujoco_works_out_itself_is_told() {
     assert!(lines.iter().any(is_told), "{lines:?}");
 }
 
-/// As in MuJoCo 4.0: the flag `constraint` disables dry friction as much as its own flag does.
+/// As in MuJoCo 4.0 (`passive`: as in older versions): the flag `constraint` disables dry friction as much as its own flag does.
 #[test]
 fn what_flags_disable_is_zero_and_told() {
     let of = |flags: &str, joint: &str| {
@@ -52,9 +52,24 @@ fn what_flags_disable_is_zero_and_told() {
     let both = r#"damping="2" frictionloss="1""#;
     assert_eq!(of(r#"contact="disable" damper="enable""#, both), (2.0, 1.0, false));
     assert_eq!(of(r#"damper="disable""#, both), (0.0, 1.0, true));
+    assert_eq!(of(r#"passive="disable""#, both), (0.0, 1.0, true));
     assert_eq!(of(r#"frictionloss="disable""#, both), (2.0, 0.0, true));
     assert_eq!(of(r#"constraint="disable""#, both), (2.0, 0.0, true));
     assert_eq!(of(r#"constraint="disable""#, r#"damping="2""#), (2.0, 0.0, false));
+}
+
+/// Angles are in degrees unless the compiler says otherwise.
+#[test]
+fn a_range_in_degrees_is_told_where_it_should_be_in_radians() {
+    let is_told = |sections: &str, range: &str| {
+        let lines = told(sections, &format!("range=\"{range}\""));
+        let line = "ranges of more than two turns, are they in degrees? The file's unit is rad: j (-170 to 170 rad)";
+        lines.iter().any(|said| said == line)
+    };
+    let radian = r#"<compiler angle="radian"/>"#;
+    assert!(is_told(radian, "-170 170"));
+    assert!(!is_told(radian, "-6.3 6.3"));
+    assert!(!told("", r#"range="-2000 2000""#).iter().any(|line| line.contains("in degrees")));
 }
 
 #[test]

@@ -307,8 +307,8 @@ fn what_is_told_of_many_joints_and_links_is_short() {
         let lines = said.iter().filter(|line| line.contains(words)).count();
         assert_eq!(lines, 1, "{words}: {said:#?}");
     }
-    // Gravity, drives, clearance, friction and acceleration, in addition to these.
-    assert_eq!(said.len(), 8, "{said:#?}");
+    // Gravity, drives, clearance, friction and its epsilon, and acceleration, in addition to these.
+    assert_eq!(said.len(), 9, "{said:#?}");
 }
 
 /// In many files the base has moments that no body can have; it never moves.

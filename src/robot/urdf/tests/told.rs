@@ -22,6 +22,19 @@ fn what_holds_for_several_joints_is_one_line() {
     ] {
         assert!(lines.contains(&line.to_owned()), "{line}: {lines:?}");
     }
+    // 1.5709 is 1e-4 from a right angle.
+    let lines = told("continuous", r#"<origin xyz="0 0 0.1" rpy="1.5709 0 0"/>"#);
+    let line = "angles near multiples of pi/2 are taken literally, so that axes are not quite parallel: \
+        joint \"j1\" 1.5709 (of a right angle write 1.5707963), joint \"j2\" 1.5709 (of a right angle write 1.5707963)";
+    assert!(lines.contains(&line.to_owned()), "{lines:?}");
+    let lines = told("revolute", r#"<limit lower="-170" upper="170" effort="1" velocity="1"/>"#);
+    let line = "ranges of more than two turns, are they in degrees? The file's unit is rad: j1 (-170 to 170 rad), j2 (-170 to 170 rad)";
+    assert!(lines.contains(&line.to_owned()), "{lines:?}");
+}
+
+#[test]
+fn axes_that_are_no_unit_vectors_are_one_line() {
+    let lines = told("continuous", r#"<axis xyz="0 0.6001 -0.8"/>"#);
     let length =
         |line: &&String| line.starts_with("axes that are not of length 1 were made so: j1 (");
     assert_eq!(lines.iter().filter(length).count(), 1, "{lines:?}");
