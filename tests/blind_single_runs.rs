@@ -1,5 +1,7 @@
 //! Hide and find along single runs, where only the residual itself tells the size of the noise.
 
+use std::f64::consts::TAU;
+
 use armid::diagnose::{Diagnosis, Kind, Verdict};
 
 use crate::simulated::{Run, SIGMA_NM, assert_holds, scenario};
@@ -71,6 +73,31 @@ fn one_joints_late_torque_is_unexplained_and_nothing_else_for_sure() {
     let d = diagnose(3, "[[effect]]\nkind = \"time_skew\"\njoint = 4\ndelay_s = 0.004\n");
     assert!(d.causes.iter().all(|c| c.confidence <= 0.5), "{:?}", d.causes);
     assert_eq!(d.unexplained.map(|unknown| unknown.joint), Some(4));
+}
+
+/// Friction that turns round over four times the range of speeds of the robot's file was once called concave viscous
+/// friction and a Stribeck curve, each of thousands of Nm, which cancelled each other.
+#[test]
+fn friction_that_turns_round_slowly_is_told_its_width() {
+    let d = diagnose(7, "[[effect]]\nkind = \"reversal_width\"\njoint = 4\nwidth_rad_s = 0.08\n");
+    let named: Vec<_> = d.causes.iter().map(|c| (c.kind, c.joint)).collect();
+    assert_eq!(named, [(Kind::ReversalWidth, Some(4))]);
+    assert_holds(&d.causes[0], "width_rad_s", 0.08);
+}
+
+/// A torque that sways in time has no name. How much it leaves is said all the same; of a clean run, nothing is.
+#[test]
+fn what_a_run_leaves_is_told_if_it_is_slow() {
+    let said = |d: &Diagnosis| d.sentences.iter().any(|s| s.contains("slowly than white noise"));
+    assert!(!said(&diagnose(1, "")));
+    let rest = "[processing]\nperiod_s = 0.0";
+    let mut run = Run::new(scenario(("sway", 1), ("ur5_identification", 8), NOISE, rest));
+    let sway_nm = |t_s: f64| (TAU * t_s / 3.7).sin() + (TAU * t_s / 2.3).sin();
+    let torque_nm = run.log.torque_nm.joint_mut(2).iter_mut();
+    torque_nm.zip(&run.log.time_s).for_each(|(nm, t_s)| *nm += sway_nm(*t_s));
+    let d = run.diagnoser().diagnose(&run.log.measurement("sway"), &[], None).unwrap().diagnosis;
+    assert_eq!(d.verdict, Verdict::NothingFound, "{:#?}", d.sentences);
+    assert!(said(&d), "{:#?}", d.sentences);
 }
 
 /// The time constant is a fifth of the record; half of the record was once the shortest that was searched for.

@@ -108,6 +108,22 @@ fn a_law_that_is_not_exact_is_the_law_all_the_same() {
     assert!(found.diagnosis.sentences.iter().any(|sentence| sentence.starts_with(said)));
 }
 
+/// Joints with a twelfth of their rotors' inertia stick before they turn round, and move between two samples as their drives
+/// let them. A guess of what these give once made concave viscous friction of a Stribeck curve.
+#[test]
+fn a_light_joint_that_sticks_has_a_stribeck_curve() {
+    let curve = "[plant]\ncontrol_rate_hz = 4000.0\nstep_s = 0.00025\n\
+                 [[effect]]\nkind = \"stribeck\"\njoint = 5\nextra_nm = 0.7\nvs_rad_s = 0.1\n";
+    let scenario = scenario(("light", 3), ("ur5_identification", 6), NOISE, curve);
+    let mut arm = scenario.arm.clone();
+    arm.joints[3..].iter_mut().for_each(|joint| joint.drive.rotor_inertia_kg_m2 = 0.02);
+    let run = Run::new(scenario.with_arm(arm).unwrap());
+    let found = run.diagnoser().diagnose(&run.log.measurement("light"), &[], None).unwrap();
+    let cause = only(&found, Kind::Stribeck, Some(5));
+    assert_holds(cause, "extra_nm", 0.7);
+    assert_holds(cause, "vs_rad_s", 0.1);
+}
+
 /// Waves in the current that move no link, at up to 96 Hz: sampled at 125 Hz, their aliases are as high as the waves
 /// themselves. The first harmonic of a zigzag has 8/π² of its amplitude.
 #[test]

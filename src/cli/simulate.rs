@@ -10,13 +10,14 @@ use super::robot::inputs;
 use super::{CommandResult, Outcome, simulating};
 use crate::dynamics::Model;
 use crate::dynamics::ParameterLayout;
-use crate::excitation::{ExcitationError, LimitKind, Margin, Requirements, check};
+use crate::excitation::{ExcitationError, LimitKind, Margin, Reference, Requirements, check};
 use crate::identify::MOVING_RAD_S;
 use crate::log::{Effort, Log, write_log};
 use crate::montecarlo::{EffectSize, Scenario, Simulation};
+use crate::number;
 use crate::output::check_outputs;
 use crate::plant::faults::Effect;
-use crate::plant::{Recording, SensorConfig};
+use crate::plant::{PlantError, Recording, SensorConfig, tied_to_held_torque};
 use crate::report::json::{Document, Program};
 
 /// Simulate one trial of a scenario and write its log.
@@ -75,7 +76,7 @@ impl<'a> HiddenEffect<'a> {
 }
 
 /// λ of all effects of the scenario; `None` if a joint's torque has no noise to compare with.
-fn size(simulation: &Simulation) -> Result<Option<EffectSize>, crate::plant::PlantError> {
+fn size(simulation: &Simulation) -> Result<Option<EffectSize>, PlantError> {
     let sensors = &simulation.scenario.sensors;
     let sd = sensors.torque_sd_per_joint_nm(simulation.scenario.arm.dof())?;
     if sd.contains(&0.0) { Ok(None) } else { simulation.effect_size().map(Some) }
@@ -99,6 +100,28 @@ fn passed_limit(scenario: &Scenario) -> Result<Option<String>, ExcitationError> 
         format!(
             "{limit}: the motion {} passes the limit of {} by {:.3} {} at {time_s:.2} s; {consequence}",
             scenario.trajectory, scenario.arm.name, -free, limit.unit()
+        )
+    }))
+}
+
+/// A remark on joints so light that their logged torque comes early ([`tied_to_held_torque`]).
+fn light_joints(scenario: &Scenario) -> Result<Option<String>, PlantError> {
+    let mut pose = vec![0.0; scenario.arm.dof()];
+    let mut rest = [pose.clone(), pose.clone()];
+    let [qd, qdd] = &mut rest;
+    scenario.excitation.sample(0.0, &mut pose, qd, qdd);
+    let (tied, enough_hz) = tied_to_held_torque(&scenario.arm, &scenario.plant, &pose)?;
+    let names: Vec<String> = tied.iter().map(|j| (j + 1).to_string()).collect();
+    Ok((!tied.is_empty()).then(|| {
+        // A power of two times 1 kHz: its period is a plain number, and a part of the periods of usual logs.
+        let rate_hz = 1e3 * (1e-3 * enough_hz).log2().ceil().exp2();
+        format!(
+            "friction stops joint(s) {} within a third of a period of the controller, as they have hardly any rotor inertia: their logged \
+             torque comes up to {} ms early, which a diagnosis may name as a delay. State rotor inertias, or set control_rate_hz = {rate_hz} \
+             and step_s = {} in [plant]",
+            names.join(", "),
+            number::significant(500.0 / scenario.plant.control_rate_hz, 2),
+            1.0 / rate_hz
         )
     }))
 }
@@ -166,6 +189,9 @@ pub fn run(args: &SimulateArgs) -> CommandResult {
     )?;
     if let Some(passed) = passed_limit(&scenario)? {
         eprintln!("note: {passed}");
+    }
+    if let Some(light) = light_joints(&scenario)? {
+        eprintln!("note: {light}");
     }
     eprintln!("{}", simulating(&scenario));
     let simulation = Simulation::run(scenario)?;

@@ -18,7 +18,9 @@ use super::misfit::{self, Known, Left};
 use super::modesty::{make_modest, make_modest_beside_unknown};
 use super::payload::{self, PayloadFinding};
 use super::record::{Record, is_torn};
-use super::remarks::{contact_remark, drift_remark, limited_drives, rest_remark, tear_remark};
+use super::remarks::{
+    contact_remark, drift_remark, limited_drives, rest_remark, slow_remark, tear_remark,
+};
 use super::replay::measured_nm;
 use super::rms::rms_where;
 use super::sentences::Besides;
@@ -132,6 +134,8 @@ impl<'a> Diagnoser<'a> {
             doubt: simulation.and_then(|simulation| simulation.doubt),
             limited: limited_drives(self.arm, m.torque_nm, &causes, unexplained.as_ref()),
             drift: drift_remark(study, &causes),
+            slow: slow_remark(study, &measured_nm, &after_nm)
+                .filter(|_| causes.is_empty() && unexplained.is_none()),
         };
         let warnings = [
             log.warnings.clone(),

@@ -4,10 +4,18 @@
 use super::cleaned::Cleaned;
 use super::contact::Compared;
 use super::kind::Kind;
+use super::rms::rms_where;
 use super::study::Study;
 use super::verdict::{Cause, Unexplained};
 use crate::identify::{MOVING_RAD_S, drives_at_limits, resting_joints};
 use crate::robot::{Arm, JointSignals};
+
+/// Time over which a slow error is averaged, s: shorter than the motion of an arm, longer than the memory of a low-pass.
+const SLOW_S: f64 = 0.5;
+/// A residual is slow if these averages hold this many times the share of its square that they hold of white noise.
+const SLOWER_THAN_NOISE: f64 = 3.0;
+/// Share of a joint's torque from which on a slow residual is told.
+const WORTH_TELLING: f64 = 0.02;
 
 /// Share of the samples from which on a drive at its limit is told before what is named on its joint.
 const OFTEN_LIMITED: f64 = 0.01;
@@ -89,6 +97,61 @@ pub(super) fn drift_remark(study: &Study, causes: &[Cause]) -> Option<String> {
     })
 }
 
+/// States the joint of a single run of which most is left, if what is left is no white noise: a single run does not tell
+/// whether noise is slow or the model lacks something, but how much is left.
+///
+/// White noise behind a low-pass of f_c has 1/(2 D f_c) of its square in its means over D.
+pub(super) fn slow_remark(
+    study: &Study,
+    measured_nm: &JointSignals,
+    after_nm: &JointSignals,
+) -> Option<String> {
+    let processing = &study.regression.prepared.processing;
+    let (false, Some(cutoff_hz)) = (study.scene.periodic, processing.cutoff_hz) else {
+        return None;
+    };
+    let block =
+        |k: usize| (study.regression.sample(k) as f64 / (SLOW_S * processing.rate_hz)) as usize;
+    let slow = |j: usize| {
+        let counts = |k: usize| study.whitening.counts(j, k);
+        let [left_nm, torque_nm] = [after_nm, measured_nm].map(|y| rms_where(y.joint(j), counts));
+        let residual = after_nm.joint(j).iter().enumerate().filter(|(k, _)| counts(*k));
+        let share = share_of_means(residual.map(|(k, nm)| (block(k), *nm)));
+        let is_slow = share > SLOWER_THAN_NOISE / (2.0 * SLOW_S * cutoff_hz);
+        (is_slow && left_nm > WORTH_TELLING * torque_nm).then_some((
+            j,
+            left_nm,
+            left_nm / torque_nm,
+        ))
+    };
+    let all = (0..after_nm.joints()).filter_map(slow);
+    let (j, left_nm, share) = all.max_by(|a, b| a.2.total_cmp(&b.2))?;
+    Some(format!(
+        "Of joint {}'s torque the model leaves {:.0} % ({left_nm:.3} Nm rms), and that changes more slowly than white noise would: either \
+         the noise is slow, or something acts there that has no name here. A motion that repeats tells the two apart.",
+        j + 1,
+        100.0 * share
+    ))
+}
+
+/// Share of the square of a series that is in its means over blocks; the values come with the number of their block, in
+/// order.
+fn share_of_means(values: impl Iterator<Item = (usize, f64)>) -> f64 {
+    let (mut of_means, mut all) = (0.0, 0.0);
+    let (mut current, mut sum, mut count) = (None, 0.0, 0.0);
+    for (block, value) in values {
+        if current != Some(block) {
+            of_means += sum * sum / f64::max(count, 1.0);
+            (current, sum, count) = (Some(block), 0.0, 0.0);
+        }
+        sum += value;
+        count += 1.0;
+        all += value * value;
+    }
+    of_means += sum * sum / f64::max(count, 1.0);
+    if all > 0.0 { of_means / all } else { 0.0 }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -125,5 +188,22 @@ mod tests {
         assert!(limited_drives(&arm, &torque(20), &[], Some(&elsewhere)).is_empty());
         let everywhere = Unexplained { of_all_joints: true, ..elsewhere };
         assert_eq!(limited_drives(&arm, &torque(20), &[], Some(&everywhere)).len(), 1);
+    }
+
+    /// A constant is all in its means, an alternation not at all, and of ten values that are independent each mean holds a
+    /// tenth.
+    #[test]
+    fn means_hold_what_is_slow() {
+        let blocks = |y: &dyn Fn(usize) -> f64| {
+            share_of_means((0..1000).map(|k| (k / 10, y(k))).collect::<Vec<_>>().into_iter())
+        };
+        assert_eq!(blocks(&|_| 0.3), 1.0);
+        assert_eq!(blocks(&|k| if k % 2 == 0 { 1.0 } else { -1.0 }), 0.0);
+        assert_eq!(blocks(&|_| 0.0), 0.0);
+        // 100 means of ten: the share is 0.1 ± 0.014, and the tolerance five of these.
+        let mixed =
+            |k: usize| ((k as u32 + 1).wrapping_mul(2_654_435_761) >> 16) as f64 / 65_536.0 - 0.5;
+        let share = blocks(&|k| mixed(k * k + 7 * k));
+        assert!((share - 0.1).abs() < 0.07, "{share}");
     }
 }

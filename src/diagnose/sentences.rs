@@ -30,13 +30,15 @@ pub(super) struct Besides<'a> {
     pub limited: Vec<String>,
     /// Torque that drifts. It does not repeat from period to period, and counts as noise in all that is said of causes.
     pub drift: Option<String>,
+    /// Of a single run in which nothing was found, how much is left if that is no white noise.
+    pub slow: Option<String>,
 }
 
 impl Diagnosis {
     /// The sentences of the first screen. `laws` are the sites of the extended model's effects: a joint (1-based), or
     /// `None` for the arm as a whole.
     pub(super) fn in_sentences(&self, laws: &[Option<usize>], besides: Besides) -> Vec<String> {
-        let Besides { doubt, limited, drift } = besides;
+        let Besides { doubt, limited, drift, slow } = besides;
         // Without a cause, drift is what there is to say.
         let (first, last) = if self.causes.is_empty() { (drift, None) } else { (None, drift) };
         let of_the_arm = self.doubt.as_ref().map(|doubt| doubt.sentence());
@@ -46,6 +48,7 @@ impl Diagnosis {
         out.extend(first);
         out.extend(self.about_causes(laws));
         out.extend(last);
+        out.extend(slow);
         out
     }
 

@@ -26,7 +26,7 @@ mod whitening;
 
 pub use config::PlantConfig;
 pub use controller::Controller;
-pub use drivetrain::{Drivetrain, RigidDrivetrain, Stage};
+pub use drivetrain::{Drivetrain, RigidDrivetrain, Stage, tied_to_held_torque};
 pub use error::PlantError;
 pub use integrate::{RungeKutta4, State};
 pub use noise::{Colour, Component, NoiseModel};

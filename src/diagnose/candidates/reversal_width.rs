@@ -47,14 +47,15 @@ impl Candidate for ReversalWidth {
     }
 
     fn shapes(&self, scene: &Scene, _: Option<usize>) -> Vec<Shape> {
-        // The low-pass of a single run is slower than a reversal.
-        if !scene.periodic {
-            return Vec::new();
-        }
         let epsilon = scene.arm.friction_epsilon_rad_s;
+        // A sharper reversal is over before the low-pass of a single run shows it. Of a slower one it shows the area.
+        let is_sought = |shape: &Shape| match (scene.periodic, shape.value < 0.0) {
+            (true, sharper) => shape.variant == 0 || sharper,
+            (false, sharper) => shape.variant == 0 && !sharper,
+        };
         (0..2)
             .flat_map(|variant| CHANGES.map(|share| Shape { variant, value: share * epsilon }))
-            .filter(|shape| shape.variant == 0 || shape.value < 0.0)
+            .filter(is_sought)
             .collect()
     }
 
