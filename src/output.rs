@@ -85,24 +85,29 @@ pub fn check_outputs(
     outputs: impl IntoIterator<Item = impl AsRef<Path>>,
     inputs: impl IntoIterator<Item = impl AsRef<Path>>,
 ) -> Result<(), OutputError> {
-    // What is read through a name of an open file, such as `/dev/stdin`, may be a file all the same.
-    let read = |input: &Path| place(input).or_else(|| fs::canonicalize(input).ok());
     let inputs: Vec<PathBuf> =
-        inputs.into_iter().filter_map(|input| read(input.as_ref())).collect();
-    let mut taken: Vec<PathBuf> = Vec::new();
+        inputs.into_iter().filter_map(|input| file_behind(input.as_ref())).collect();
+    let mut taken: Vec<(PathBuf, bool)> = Vec::new();
     for output in outputs {
         let path = output.as_ref();
         check_writable(path)?;
-        let Some(place) = place(path) else { continue };
-        if inputs.contains(&place) {
+        let Some(file) = file_behind(path) else { continue };
+        if inputs.contains(&file) {
             return Err(OutputError::IsInput { path: path.to_owned() });
         }
-        if taken.contains(&place) {
+        // Several outputs may be added to an open file, but what replaces it would be all that is left.
+        let is_replaced = place(path).is_some();
+        if taken.iter().any(|(other, replaced)| *other == file && (is_replaced || *replaced)) {
             return Err(OutputError::Twice { path: path.to_owned() });
         }
-        taken.push(place);
+        taken.push((file, is_replaced));
     }
     Ok(())
+}
+
+/// The regular file that is read or written under the name `path`, which may be that of an open file.
+fn file_behind(path: &Path) -> Option<PathBuf> {
+    place(path).or_else(|| fs::canonicalize(path).ok().filter(|file| file.is_file()))
 }
 
 /// The file that `path` names, with all links resolved, whether it exists or not; `None` for paths that no file can
@@ -404,8 +409,16 @@ mod tests {
         check_outputs([&open], [&folder.path().join("log.csv")]).unwrap();
         write_text(&open, "new").unwrap();
         assert_eq!(fs::read_to_string(&path).unwrap(), "earlier, new");
-        // A file that is read through its number is not to be replaced either.
-        let replaced = check_outputs([&path], [&open]);
-        assert!(matches!(replaced, Err(OutputError::IsInput { .. })));
+        // A file that is read through its number is not to be replaced, nor one that is read to be added to.
+        for (output, input) in [(&path, &open), (&open, &path), (&open, &open)] {
+            let lost = check_outputs([output], [input]);
+            assert!(matches!(lost, Err(OutputError::IsInput { .. })), "{output:?}");
+        }
+        let nothing: [&Path; 0] = [];
+        check_outputs([&open, &open], nothing).unwrap();
+        for outputs in [[&path, &open], [&open, &path]] {
+            let lost = check_outputs(outputs, nothing);
+            assert!(matches!(lost, Err(OutputError::Twice { .. })), "{outputs:?}");
+        }
     }
 }

@@ -165,7 +165,8 @@ pub fn run(args: &ExciteArgs) -> CommandResult {
     for joint in &mut arm.joints {
         joint.limits.velocity_rad_s *= args.velocity_share;
     }
-    let speed = Speed::new(args.speed)?;
+    let speed = Speed::new(args.speed)
+        .map_err(|error| BadOption::new("speed", args.speed, error.to_string()))?;
     let arm = arm;
     say_what_is_watched(&args.robot, &arm, &args.boxes)?;
     let playback = playback(args, &arm, speed)?;

@@ -10,8 +10,9 @@ use super::verdict::{Cause, Unexplained};
 use crate::identify::{MOVING_RAD_S, drives_at_limits, resting_joints};
 use crate::robot::{Arm, JointSignals};
 
-/// Time over which a slow error is averaged, s: shorter than the motion of an arm, longer than the memory of a low-pass.
-const SLOW_S: f64 = 0.5;
+/// Time over which a slow error is averaged, in periods of the low-pass: longer than its memory, and with the usual 10 Hz
+/// (0.5 s) shorter than the motion of an arm.
+const SLOW_PERIODS: f64 = 5.0;
 /// A residual is slow if these averages hold this many times the share of its square that they hold of white noise.
 const SLOWER_THAN_NOISE: f64 = 3.0;
 /// Share of a joint's torque from which on a slow residual is told.
@@ -110,14 +111,15 @@ pub(super) fn slow_remark(
     let (false, Some(cutoff_hz)) = (study.scene.periodic, processing.cutoff_hz) else {
         return None;
     };
+    let mean_s = SLOW_PERIODS / cutoff_hz;
     let block =
-        |k: usize| (study.regression.sample(k) as f64 / (SLOW_S * processing.rate_hz)) as usize;
+        |k: usize| (study.regression.sample(k) as f64 / (mean_s * processing.rate_hz)) as usize;
     let slow = |j: usize| {
         let counts = |k: usize| study.whitening.counts(j, k);
         let [left_nm, torque_nm] = [after_nm, measured_nm].map(|y| rms_where(y.joint(j), counts));
         let residual = after_nm.joint(j).iter().enumerate().filter(|(k, _)| counts(*k));
         let share = share_of_means(residual.map(|(k, nm)| (block(k), *nm)));
-        let is_slow = share > SLOWER_THAN_NOISE / (2.0 * SLOW_S * cutoff_hz);
+        let is_slow = share > SLOWER_THAN_NOISE / (2.0 * mean_s * cutoff_hz);
         (is_slow && left_nm > WORTH_TELLING * torque_nm).then_some((
             j,
             left_nm,
@@ -197,7 +199,7 @@ mod tests {
         let blocks = |y: &dyn Fn(usize) -> f64| {
             share_of_means((0..1000).map(|k| (k / 10, y(k))).collect::<Vec<_>>().into_iter())
         };
-        assert_eq!(blocks(&|_| 0.3), 1.0);
+        assert_eq!(blocks(&|_| 0.5), 1.0);
         assert_eq!(blocks(&|k| if k % 2 == 0 { 1.0 } else { -1.0 }), 0.0);
         assert_eq!(blocks(&|_| 0.0), 0.0);
         // 100 means of ten: the share is 0.1 ± 0.014, and the tolerance five of these.

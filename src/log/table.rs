@@ -91,7 +91,12 @@ impl Table {
         let slopes = match has_velocities {
             true => Vec::new(),
             false => {
-                units::check_clock(&self.motion(plan), &layout.units).map_err(fault)?;
+                // Between rows that are far apart all angles jump, and angles that turn on and on are unwrapped: both
+                // units show before any angle is taken for wild.
+                let recorded = self.motion(plan);
+                units::check_clock(&recorded, &layout.units)
+                    .and_then(|()| units::check_degrees(&recorded, &layout.units))
+                    .map_err(fault)?;
                 self.take_slopes(plan, account, file)?
             }
         };
@@ -100,7 +105,7 @@ impl Table {
         // garbage is removed first, if it is less than half of the rows, and the units are checked again afterwards.
         let mut related = match has_velocities {
             true => units::check(&motion, &layout.units),
-            false => units::check_slopes(&motion, &layout.units).map(|()| Vec::new()),
+            false => units::check_speed(&motion).map(|()| Vec::new()),
         };
         if let Err(suspicion) = &related
             && !matches!(suspicion, UnitSuspicion::Unrelated { .. })

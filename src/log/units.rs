@@ -190,19 +190,9 @@ pub(super) fn check_clock(motion: &Motion, units: &Units) -> Result<(), UnitSusp
     }
 }
 
-/// Checks a log whose velocities are the slopes of its angles. Its clock is for [`check_clock`], which has to come before
-/// any angle is taken for wild: between rows that are far apart all of them jump.
-///
-/// # Errors
-/// The unit that the angles contradict, with the remedy.
-pub(super) fn check_slopes(motion: &Motion, units: &Units) -> Result<(), UnitSuspicion> {
-    check_degrees(motion, units)?;
-    check_speed(motion)
-}
-
-/// Refuses angles that move faster than any arm. Mean speeds over spans are compared, which neither noise nor readings
+/// Refuses angles that move faster than any arm, in a log whose velocities are their slopes. Mean speeds over spans are compared, which neither noise nor readings
 /// held over several rows make larger.
-fn check_speed(motion: &Motion) -> Result<(), UnitSuspicion> {
+pub(super) fn check_speed(motion: &Motion) -> Result<(), UnitSuspicion> {
     let spans = spans(motion.rows());
     for (joint, q) in motion.q.iter().enumerate() {
         let speed_rad_s = |first: usize, last: usize| {
@@ -231,7 +221,7 @@ fn check_speed(motion: &Motion) -> Result<(), UnitSuspicion> {
 
 /// Detects angles and velocities that are both in degrees, which agree with each other. No arm keeps two joints beyond
 /// a whole turn for half of a log, but in degrees read as radians nearly every posture looks like that.
-fn check_degrees(motion: &Motion, units: &Units) -> Result<(), UnitSuspicion> {
+pub(super) fn check_degrees(motion: &Motion, units: &Units) -> Result<(), UnitSuspicion> {
     if units.q == Angle::Deg {
         return Ok(());
     }

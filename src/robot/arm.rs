@@ -50,7 +50,7 @@ pub struct Joint {
 }
 
 /// Numbers of a joint that no file states, so that they were assumed. An export leaves them open again: written down,
-/// they would look known to whoever reads them.
+/// they would look known to whoever reads them. (A URDF has to have a speed limit, and has the assumed one.)
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Assumed {
     /// The gear ratio.

@@ -21,7 +21,8 @@ pub const FINE: usize = 16;
 pub const LONGEST_LEAD_S: f64 = 0.002;
 
 /// Change of a joint's velocity within one sample by all of its dry friction, in widths of the law, up to which the motion
-/// between samples is followed. The joints of a UR5 change by up to 2.4 widths.
+/// between samples is followed. Beyond it, the part that is followed falls with the inverse of the change. The joints of a
+/// UR5 change by up to 2.4 widths.
 ///
 /// A joint that changes by far more (one without a rotor: 8 to 30 widths) moves as its drive lets it. What the drive gives
 /// between two samples is hardly known, and a wrong guess moves such a joint by widths, where the series of its samples is
@@ -160,7 +161,8 @@ impl Scene {
         })
     }
 
-    /// Change of the velocity of joint `j` within one instant by its unbalanced dry friction, rad/s.
+    /// Change of the velocity of joint `j` within one instant by its unbalanced dry friction, as far as it is followed,
+    /// rad/s.
     pub fn kick_rad_s(&self, j: usize) -> &[f64] {
         &self.turning(j).kick_rad_s
     }

@@ -85,7 +85,7 @@ impl Reader {
     }
 
     /// What the soft limits of a joint, at which its controller stops it, leave of its range. Both are zero where they
-    /// are missing.
+    /// are missing; one alone is zero as well, as the format has it.
     fn softened(
         &mut self,
         joint: &Joint,

@@ -7,9 +7,10 @@ use crate::plant::faults::{
 
 impl Draw<'_> {
     pub(super) fn base_tilt(&mut self) -> Recipe {
-        let (sin, cos) = self.angle_rad().sin_cos();
+        let angle = self.angle_rad();
         Recipe::linear(0.005, 0.1, move |s| {
-            Effect::BaseTilt(BaseTilt { tilt_x_rad: s * cos, tilt_y_rad: s * sin })
+            let (tilt_x_rad, tilt_y_rad) = (s * angle.cos(), s * angle.sin());
+            Effect::BaseTilt(BaseTilt { tilt_x_rad, tilt_y_rad })
         })
     }
 

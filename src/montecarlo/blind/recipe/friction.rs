@@ -34,27 +34,28 @@ impl Draw<'_> {
 
     pub(super) fn asymmetric_friction(&mut self) -> Recipe {
         let joint = self.joint;
-        let parts = self.coulomb_and_viscous();
+        let friction = self.share_of_friction();
         Recipe::linear(0.05, 0.5, move |s| {
-            let [coulomb_nm, viscous_nm_s_rad] = parts.map(|part| s * part);
+            let [coulomb_nm, viscous_nm_s_rad] = friction(s);
             Effect::AsymmetricFriction(AsymmetricFriction { joint, coulomb_nm, viscous_nm_s_rad })
         })
     }
 
     pub(super) fn friction_change(&mut self) -> Recipe {
         let joint = self.joint;
-        let parts = self.coulomb_and_viscous();
+        let friction = self.share_of_friction();
         Recipe::linear(0.05, 0.5, move |s| {
-            let [coulomb_nm, viscous_nm_s_rad] = parts.map(|part| s * part);
+            let [coulomb_nm, viscous_nm_s_rad] = friction(s);
             Effect::FrictionChange(FrictionChange { joint, coulomb_nm, viscous_nm_s_rad })
         })
     }
 
-    /// Any mixture of the two, as large as both are at the joint.
-    fn coulomb_and_viscous(&mut self) -> [f64; 2] {
+    /// A share of the joint's Coulomb and viscous friction, in any mixture of the two, as a function of its size.
+    fn share_of_friction(&mut self) -> impl Fn(f64) -> [f64; 2] + 'static {
         let angle = self.angle_rad();
         let drive = self.drive();
-        [drive.coulomb_nm * angle.cos(), drive.viscous_nm_s_rad * angle.sin()]
+        let (coulomb_nm, viscous_nm_s_rad) = (drive.coulomb_nm, drive.viscous_nm_s_rad);
+        move |s| [s * coulomb_nm * angle.cos(), s * viscous_nm_s_rad * angle.sin()]
     }
 
     pub(super) fn load_friction(&mut self) -> Recipe {
