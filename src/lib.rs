@@ -36,6 +36,7 @@
 //!     name = "example"
 //!     robot = "ur5"
 //!     seed = 1
+//!     trials = 1
 //!     [motion]
 //!     trajectory = "ur5_identification"
 //!     periods = 4
