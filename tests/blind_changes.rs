@@ -245,8 +245,14 @@ fn a_body_between_two_logs_is_weighed_and_scales_the_gains() {
     let swapped = diagnoser.payload(&of_loaded, &loaded, &bare, None).unwrap();
     assert!(swapped.mass_kg.value < 0.0 && swapped.cause().is_none(), "{swapped:?}");
     assert!(swapped.sentences()[0].contains("swapped"), "{:?}", swapped.sentences());
-    let said = &of_loaded.diagnosis.sentences;
+    let mut told = of_loaded.diagnosis;
+    let of_the_body = swapped.sentences();
+    told.add_payload(swapped);
+    let said = &told.sentences;
     assert!(said.iter().any(|s| s.contains("does not carry over")), "{said:?}");
+    // What was asked for is told first.
+    let first = usize::from(told.doubt.is_some());
+    assert_eq!(said[first..first + of_the_body.len()], of_the_body);
 }
 
 #[test]

@@ -300,6 +300,11 @@ pub trait Candidate: Sync {
     /// The effect in words, to which its parameters are appended: "friction that grows with load".
     fn in_words(&self) -> &'static str;
 
+    /// [`Self::in_words`] of the effect with the coefficients `b`, where its sign changes what it is called.
+    fn in_words_of(&self, _b: &[f64]) -> &'static str {
+        self.in_words()
+    }
+
     /// Name of the form of the law that this shape selects, for families with several forms that the parameters do not
     /// distinguish; `None`: the usual form.
     fn form(&self, _scene: &Scene, _shape: Shape) -> Option<&'static str> {

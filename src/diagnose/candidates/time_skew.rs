@@ -122,6 +122,13 @@ impl Candidate for TimeSkew {
         "torque that is recorded later than the motion"
     }
 
+    fn in_words_of(&self, b: &[f64]) -> &'static str {
+        match b {
+            [delay_s, ..] if *delay_s < 0.0 => "torque that is recorded earlier than the motion",
+            _ => self.in_words(),
+        }
+    }
+
     fn form(&self, _: &Scene, shape: Shape) -> Option<&'static str> {
         (shape.variant == LOW_PASS).then_some("a low-pass of first order with this time constant")
     }
@@ -130,6 +137,12 @@ impl Candidate for TimeSkew {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_negative_delay_is_early() {
+        assert!(TimeSkew.in_words_of(&[-1e-3]).contains("earlier"));
+        assert_eq!(TimeSkew.in_words_of(&[1e-3]), TimeSkew.in_words());
+    }
 
     /// Whether the change is proportional to the delay or to its square, some starting shape accepts every delay up to
     /// 60 ms. No shape accepts a delay that is a sixteenth of it or has the other sign.
