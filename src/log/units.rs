@@ -190,8 +190,8 @@ pub(super) fn check_clock(motion: &Motion, units: &Units) -> Result<(), UnitSusp
     }
 }
 
-/// Refuses angles that move faster than any arm, in a log whose velocities are their slopes. Mean speeds over spans are compared, which neither noise nor readings
-/// held over several rows make larger.
+/// Refuses angles that move faster than any arm, in a log whose velocities are their slopes. Mean speeds over spans are
+/// compared, which neither noise nor readings held over several rows make larger.
 pub(super) fn check_speed(motion: &Motion) -> Result<(), UnitSuspicion> {
     let spans = spans(motion.rows());
     for (joint, q) in motion.q.iter().enumerate() {
