@@ -250,7 +250,7 @@ fn a_body_between_two_logs_is_weighed_and_scales_the_gains() {
     told.add_payload(swapped);
     let said = &told.sentences;
     assert!(said.iter().any(|s| s.contains("does not carry over")), "{said:?}");
-    // What was asked for is told first.
+    // The body that is missing is told first.
     let first = usize::from(told.doubt.is_some());
     assert_eq!(said[first..first + of_the_body.len()], of_the_body);
 }

@@ -359,8 +359,8 @@ impl Diagnosis {
         }
     }
 
-    /// Adds what a second log says about a body on the flange. It was asked for, and comes before what the first log
-    /// tells of the arm, behind a doubt whether it is this arm.
+    /// Adds what a second log says about a body on the flange. A difference comes before what the first log tells of the
+    /// arm, behind a doubt whether it is this arm; what chance explains comes behind the causes.
     pub fn add_payload(&mut self, payload: PayloadFinding) {
         let cause = payload.cause();
         if let (Verdict::NothingFound, Some(_)) = (self.verdict, &cause) {
@@ -371,8 +371,11 @@ impl Diagnosis {
         let noise_is_known = self.noise_floor_nm.is_some();
         let of_the_body = cause.iter().map(|c| c.sentence(noise_is_known));
         let of_the_body: Vec<String> = of_the_body.chain(payload.sentences()).collect();
-        let first = usize::from(self.doubt.is_some());
-        self.sentences.splice(first..first, of_the_body);
+        let at = match payload.differs() {
+            true => usize::from(self.doubt.is_some()),
+            false => self.sentences.len(),
+        };
+        self.sentences.splice(at..at, of_the_body);
         self.causes.extend(cause);
         self.payload = Some(payload);
     }

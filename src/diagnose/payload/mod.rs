@@ -160,6 +160,11 @@ pub(super) fn between(
 }
 
 impl PayloadFinding {
+    /// Whether the second log carries something else than the first, beyond what chance explains.
+    pub fn differs(&self) -> bool {
+        self.probability < chance::PAYLOAD
+    }
+
     /// The finding as a cause, if a body is named.
     pub fn cause(&self) -> Option<Cause> {
         if !self.is_named {

@@ -1,6 +1,5 @@
 //! What is said about a body on the flange.
 
-use super::super::chance;
 use super::super::verdict::Estimate;
 use super::PayloadFinding;
 use crate::number::significant;
@@ -64,7 +63,7 @@ impl PayloadFinding {
             .map(|(axis, moment)| format!("{axis} {}", with_interval(moment)))
             .collect();
         let moments = moments.join(", ");
-        let by_chance = *probability >= chance::PAYLOAD;
+        let by_chance = !self.differs();
         let chance = significant(*probability, 2);
         if mass_kg.value.is_nan() {
             let first = "These motions cannot tell a mass on the flange";
